@@ -1,0 +1,137 @@
+# make demo    install what is missing, build, simulate a cantilever and compare it with theory
+# make test    all of ctest and pytest
+# make help    the rest
+#
+# PYTHON=/path/to/python3 chooses the interpreter that .venv is made from (default: the system's).
+
+SHELL := /bin/bash
+.SHELLFLAGS := -eu -o pipefail -c
+.DELETE_ON_ERROR:
+.DEFAULT_GOAL := help
+
+PYTHON ?=
+VENV := $(CURDIR)/.venv
+STAMPS := .venv/stamps
+BUILD := build/make
+JOBS ?= $(shell nproc 2>/dev/null || echo 2)
+TEST_JOBS ?= $(shell n=$(JOBS); echo $$((n < 8 ? n : 8)))
+
+export PATH := $(VENV)/bin:$(PATH)
+export CMAKE_BUILD_PARALLEL_LEVEL ?= $(JOBS)
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
+unexport PYTHONPATH PYTHONHOME
+PIP_INSTALL := python -m pip install --quiet --constraint constraints.txt
+requirements = $$(python tools/requirements.py $(1))
+
+CXX_SOURCES := $(wildcard cpp/*/*.hpp cpp/*/*.cpp python/bindings/*.hpp python/bindings/*.cpp)
+CXX_TESTS := $(wildcard tests/cpp/*.hpp tests/cpp/*.cpp tests/cpp/*/*.hpp tests/cpp/*/*.cpp)
+CMAKE_FILES := CMakeLists.txt cpp/CMakeLists.txt $(wildcard cpp/*/CMakeLists.txt) python/bindings/CMakeLists.txt
+PYTHON_SOURCES := $(shell find python/withe -name '*.py' -o -name '*.pyi' -o -name py.typed)
+# Folders too: a deleted file is a change.
+SOURCE_FOLDERS := $(wildcard cpp/*/) $(shell find python/withe -type d -not -name __pycache__)
+
+.PHONY: help demo test ctest pytest asan bench wheel lint format format-check types stubs stub-check tidy clean distclean
+
+help:
+	@echo "make demo          install what is missing, build, simulate a cantilever, compare with theory"
+	@echo "make test          all tests, C++ and Python"
+	@echo "make asan          C++ tests under the address and undefined-behaviour sanitizers"
+	@echo "make wheel         dist/*.whl for machines without compiler"
+	@echo "make bench         benchmarks/*.py"
+	@echo "make lint          ruff; make format applies formatters, make format-check only looks"
+	@echo "make types         mypy --strict"
+	@echo "make stubs         regenerate the stubs of the compiled module (make stub-check compares)"
+	@echo "make tidy          clang-tidy over every C++ file"
+	@echo "make clean         remove build, dist and out; make distclean also .venv"
+
+# --- set-up; every stamp is a step that need not be repeated -----------------------------------------------
+
+$(STAMPS)/venv: tools/install_system_packages.sh tools/find_python.sh
+	@tools/install_system_packages.sh
+	@base="$(PYTHON)"; base="$${base:-$$(tools/find_python.sh)}"; \
+	    echo "Making .venv with $$base ($$("$$base" --version))"; rm -rf .venv; "$$base" -m venv .venv
+	@mkdir -p $(@D) && touch $@
+
+$(STAMPS)/build_tools: $(STAMPS)/venv pyproject.toml constraints.txt tools/requirements.py
+	@echo "Installing build tools, NumPy, SciPy and matplotlib into .venv"
+	@$(PIP_INSTALL) $(call requirements,build runtime) matplotlib
+	@touch $@
+
+$(STAMPS)/test_tools: $(STAMPS)/build_tools
+	@echo "Installing what the tests need into .venv"
+	@$(PIP_INSTALL) $(call requirements,test)
+	@touch $@
+
+$(STAMPS)/dev_tools: $(STAMPS)/test_tools
+	@echo "Installing developers' tools into .venv"
+	@$(PIP_INSTALL) $(call requirements,dev)
+	@touch $@
+
+# One build folder serves the installed module and the C++ tests, so the engine is compiled once.
+$(STAMPS)/installed: $(STAMPS)/build_tools $(CXX_SOURCES) $(CMAKE_FILES) $(PYTHON_SOURCES) $(SOURCE_FOLDERS) README.md
+	@echo "Building and installing withe (the first time takes some minutes)"
+	@python -m pip install --quiet --no-build-isolation --no-deps --force-reinstall \
+	    --config-settings=build-dir=$(BUILD) .
+	@touch $@
+
+# --- use ----------------------------------------------------------------------------------------------------
+
+demo: $(STAMPS)/installed
+	@mkdir -p out
+	@python examples/cantilever.py
+
+test: ctest pytest
+
+ctest: $(STAMPS)/installed $(CXX_TESTS)
+	@cmake -S . -B $(BUILD) -DWITHE_BUILD_TESTS=ON >build/configure.log || { cat build/configure.log; exit 1; }
+	@cmake --build $(BUILD)
+	@ctest --test-dir $(BUILD) --output-on-failure --no-tests=error --parallel $(JOBS) --progress
+
+pytest: $(STAMPS)/installed $(STAMPS)/test_tools
+	@python -m pytest --numprocesses $(TEST_JOBS) --dist worksteal
+
+asan: $(STAMPS)/build_tools
+	@cmake --preset asan-ubsan
+	@cmake --build --preset asan-ubsan
+	@ctest --preset asan-ubsan --parallel $(JOBS)
+
+bench: $(STAMPS)/installed
+	@shopt -s nullglob; for script in benchmarks/*.py; do echo "== $$script"; python "$$script"; done
+
+wheel: $(STAMPS)/dev_tools
+	@python tools/make_wheel.py
+
+# --- quality ------------------------------------------------------------------------------------------------
+
+CXX_FILES = $(CXX_SOURCES) $(CXX_TESTS)
+
+lint: $(STAMPS)/dev_tools
+	@ruff check .
+
+format: $(STAMPS)/dev_tools
+	@ruff check --fix --exit-zero --quiet .
+	@ruff format .
+	@clang-format -i $(CXX_FILES)
+
+format-check: $(STAMPS)/dev_tools
+	@ruff format --check .
+	@clang-format --dry-run --Werror $(CXX_FILES)
+
+types: $(STAMPS)/dev_tools
+	@mypy
+
+stubs: $(STAMPS)/installed $(STAMPS)/dev_tools
+	@tools/stubs.sh
+
+stub-check: $(STAMPS)/installed $(STAMPS)/dev_tools
+	@tools/stubs.sh --check
+
+tidy: $(STAMPS)/dev_tools
+	@cmake --preset tidy
+	@cmake --build --preset tidy --clean-first
+
+clean:
+	rm -rf build dist out
+
+distclean: clean
+	rm -rf .venv
