@@ -1,0 +1,300 @@
+"""Files: arrays with a header in one .npz without pickle, and VTK collections for ParaView."""
+
+from __future__ import annotations
+
+import base64
+import json
+import os
+import uuid
+import zipfile
+import zlib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+import numpy.typing as npt
+
+if TYPE_CHECKING:
+    from withe.recording import Record
+
+__all__ = ["load_arrays", "save_arrays", "write_vtk"]
+
+_HEADER = "header"
+
+
+def save_arrays(
+    path: str | os.PathLike[str],
+    kind: str,
+    version: int,
+    header: Mapping[str, Any],
+    arrays: Mapping[str, npt.NDArray[Any]],
+) -> Path:
+    """Write arrays and a header to one .npz file, at once or not at all.
+
+    Parameters
+    ----------
+    path : path
+        Where to; written exactly there, whatever its suffix.
+    kind : str
+        What the file holds, such as "record"; `load_arrays` refuses any other kind.
+    version : int
+        Version of the layout of this kind.
+    header : mapping
+        Names and units, anything that JSON can hold.
+    arrays : mapping of str to ndarray
+        Numbers only; objects are refused, so that reading never runs code.
+
+    Returns
+    -------
+    pathlib.Path
+        The file.
+
+    Raises
+    ------
+    ValueError
+        An array that holds objects.
+    OSError
+        The file cannot be written.
+    """
+    path = Path(path)
+    for name, array in arrays.items():
+        if array.dtype.hasobject:
+            raise ValueError(f"array {name!r} for {path} must hold numbers, got objects")
+    text = json.dumps({"format": f"withe {kind}", "version": version, **header})
+    temporary = path.with_name(f".{path.name}.{uuid.uuid4().hex}.part")
+    try:
+        with temporary.open("xb") as stream:
+            np.savez(stream, allow_pickle=False, **{_HEADER: np.array(text)}, **dict(arrays))
+        os.replace(temporary, path)
+    except BaseException:
+        temporary.unlink(missing_ok=True)
+        raise
+    return path
+
+
+def load_arrays(
+    path: str | os.PathLike[str], kind: str, version: int
+) -> tuple[dict[str, Any], dict[str, npt.NDArray[Any]]]:
+    """Read what `save_arrays` wrote. Nothing in the file is ever run.
+
+    Returns
+    -------
+    header : dict
+        As it was saved.
+    arrays : dict of str to ndarray
+        Every array of the file.
+
+    Raises
+    ------
+    ValueError
+        A file that is damaged, not ours, of another kind or of another version; the message names
+        the file and the reason.
+    OSError
+        The file cannot be opened.
+    """
+    path = Path(path)
+    with path.open("rb") as stream:
+        try:
+            with np.load(stream, allow_pickle=False) as archive:
+                if not isinstance(archive, np.lib.npyio.NpzFile) or _HEADER not in archive.files:
+                    raise ValueError(f"{path} is not a withe file")
+                header = _read_header(path, archive[_HEADER], kind, version)
+                arrays = {name: archive[name] for name in archive.files if name != _HEADER}
+        except ValueError as error:
+            if str(path) in str(error):
+                raise
+            raise ValueError(f"{path} is not a withe file, or damaged: {error}") from error
+        except _DAMAGE as error:
+            reason = str(error) or type(error).__name__
+            raise ValueError(f"{path} is not a withe file, or damaged: {reason}") from error
+    return header, arrays
+
+
+# What NumPy and zipfile raise on bytes that they do not understand.
+_DAMAGE = (
+    zipfile.BadZipFile,
+    zipfile.LargeZipFile,
+    zlib.error,
+    EOFError,
+    OSError,
+    KeyError,
+    IndexError,
+    AttributeError,
+    TypeError,
+    SyntaxError,
+    RuntimeError,
+    OverflowError,
+    MemoryError,
+)
+
+
+def _read_header(path: Path, text: npt.NDArray[Any], kind: str, version: int) -> dict[str, Any]:
+    try:
+        header = json.loads(str(text))
+    except (json.JSONDecodeError, RecursionError) as error:
+        raise ValueError(f"{path} is not a withe file: its header is unreadable ({error})") from error
+    if not isinstance(header, dict) or not str(header.get("format", "")).startswith("withe "):
+        raise ValueError(f"{path} is not a withe file")
+    if header["format"] != f"withe {kind}":
+        raise ValueError(f"{path} holds a {header['format']}, expected a withe {kind}")
+    if header.get("version") != version:
+        raise ValueError(f"{path} is a {kind} of version {header.get('version')!r}, this withe reads version {version}")
+    return header
+
+
+def write_vtk(record: Record, folder: str | os.PathLike[str]) -> Path:
+    """Write a record as a time series for ParaView: one .vtp file a frame, and a .pvd that lists them.
+
+    Every rod is one polyline. Its points carry radius [m], tension [N] (mean of the two edges at a
+    node), curvature (towards d1 and d2) [1/m], twist [rad/m], the first director and the velocity
+    [m/s]; curvature and twist are zero at the ends of an open rod. The polyline carries the number of
+    its rod, and the file the names.
+
+    Parameters
+    ----------
+    record : Record
+    folder : path
+        Created if missing; files of the same names are written over.
+
+    Returns
+    -------
+    pathlib.Path
+        The .pvd file, which is what to open.
+
+    Raises
+    ------
+    ValueError
+        A record without frames.
+    OSError
+        The folder cannot be written.
+    """
+    if len(record) == 0:
+        raise ValueError("record has no frames to write")
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    times = record.times
+    digits = max(4, len(str(len(record) - 1)))
+    names = [f"frame_{frame:0{digits}d}.vtp" for frame in range(len(record))]
+    polylines = _Polylines(record)
+    for frame, name in enumerate(names):
+        (folder / name).write_text(polylines.document(frame, float(times[frame])), encoding="utf-8")
+    entries = "\n".join(
+        f'    <DataSet timestep="{time!r}" group="" part="0" file={quoteattr(name)}/>'
+        for time, name in zip(times.tolist(), names, strict=True)
+    )
+    collection = folder / "record.pvd"
+    collection.write_text(
+        '<?xml version="1.0"?>\n'
+        '<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">\n'
+        f"  <Collection>\n{entries}\n  </Collection>\n</VTKFile>\n",
+        encoding="utf-8",
+    )
+    return collection
+
+
+class _Polylines:
+    """The frames of a record as VTK PolyData documents."""
+
+    def __init__(self, record: Record) -> None:
+        rods = record.rods
+        self._rods = rods
+        positions, velocities = record.positions(), record.velocities()
+        self._positions = [positions[:, rod.rows] for rod in rods]
+        self._point_data: dict[str, list[npt.NDArray[np.float64]]] = {
+            "radius": [],
+            "tension": [],
+            "curvature": [],
+            "twist": [],
+            "d1": [],
+            "velocity": [velocities[:, rod.rows] for rod in rods],
+        }
+        frames = len(record)
+        for rod in rods:
+            radii = np.broadcast_to(rod.radii, (frames, len(rod.radii)))
+            directors = edges_to_nodes(record.directors(rod)[:, :, 0], rod.closed)
+            directors /= np.maximum(np.linalg.norm(directors, axis=-1, keepdims=True), 1e-300)
+            self._point_data["radius"].append(edges_to_nodes(radii, rod.closed))
+            self._point_data["tension"].append(edges_to_nodes(record.tensions(rod), rod.closed))
+            self._point_data["curvature"].append(_stencils_to_nodes(record.curvatures(rod), rod.closed))
+            self._point_data["twist"].append(_stencils_to_nodes(record.twists(rod), rod.closed))
+            self._point_data["d1"].append(directors)
+
+        counts = np.array([len(rod.rows) for rod in rods])
+        starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
+        chains = [
+            np.append(start + np.arange(count), start) if rod.closed else start + np.arange(count)
+            for rod, start, count in zip(rods, starts, counts, strict=True)
+        ]
+        self._point_count = int(counts.sum())
+        self._lines = _data_array("connectivity", np.concatenate(chains)) + _data_array(
+            "offsets", np.cumsum([len(chain) for chain in chains])
+        )
+        self._cell_data = _data_array("rod", np.arange(len(rods)))
+
+    def document(self, frame: int, time: float) -> str:
+        """One frame as the text of a .vtp file."""
+        points = np.concatenate([positions[frame] for positions in self._positions])
+        point_data = "".join(
+            _data_array(name, np.concatenate([values[frame] for values in per_rod]))
+            for name, per_rod in self._point_data.items()
+        )
+        names = _string_array("rod_names", [rod.name for rod in self._rods])
+        return (
+            '<?xml version="1.0"?>\n'
+            '<VTKFile type="PolyData" version="1.0" byte_order="LittleEndian" header_type="UInt64">\n'
+            "<PolyData>\n"
+            f"<FieldData>\n{_data_array('TimeValue', np.array([time]), field=True)}{names}</FieldData>\n"
+            f'<Piece NumberOfPoints="{self._point_count}" NumberOfVerts="0" '
+            f'NumberOfLines="{len(self._rods)}" NumberOfStrips="0" NumberOfPolys="0">\n'
+            f"<Points>\n{_data_array('points', points)}</Points>\n"
+            f"<Lines>\n{self._lines}</Lines>\n"
+            f'<PointData Scalars="curvature">\n{point_data}</PointData>\n'
+            f"<CellData>\n{self._cell_data}</CellData>\n"
+            "</Piece>\n</PolyData>\n</VTKFile>\n"
+        )
+
+
+def _data_array(name: str, values: npt.NDArray[Any], field: bool = False) -> str:
+    kind, values = ("Int64", values.astype("<i8")) if values.dtype.kind in "iu" else ("Float64", values.astype("<f8"))
+    components = 1 if values.ndim == 1 else values.shape[1]
+    size = f' NumberOfTuples="{len(values)}"' if field else f' NumberOfComponents="{components}"'
+    return f'<DataArray type="{kind}" Name="{name}"{size} format="binary">{_base64(values.tobytes())}</DataArray>\n'
+
+
+def _string_array(name: str, words: list[str]) -> str:
+    """Strings as VTK keeps them: bytes, each word ended by a zero, in decimal."""
+    data = b"".join(word.encode() + b"\0" for word in words)
+    numbers = " ".join(str(byte) for byte in data)
+    return f'<Array type="String" Name="{name}" NumberOfTuples="{len(words)}" format="ascii">{numbers}</Array>\n'
+
+
+def _base64(data: bytes) -> str:
+    return base64.b64encode(np.uint64(len(data)).astype("<u8").tobytes() + data).decode("ascii")
+
+
+def edges_to_nodes(values: npt.NDArray[np.float64], closed: bool) -> npt.NDArray[np.float64]:
+    """Mean of the two edges at each node; the end nodes of an open rod take that of their one edge.
+
+    Parameters
+    ----------
+    values : ndarray of shape (frames, edges, ...)
+    closed : bool
+
+    Returns
+    -------
+    ndarray of shape (frames, nodes, ...)
+    """
+    if closed:
+        return 0.5 * (values + np.roll(values, 1, axis=1))
+    inner = 0.5 * (values[:, :-1] + values[:, 1:])
+    return np.concatenate([values[:, :1], inner, values[:, -1:]], axis=1)
+
+
+def _stencils_to_nodes(values: npt.NDArray[np.float64], closed: bool) -> npt.NDArray[np.float64]:
+    """Values of the inner nodes of an open rod, with zeros at its ends; shape (frames, nodes, ...)."""
+    if closed:
+        return values
+    padding = [(0, 0), (1, 1)] + [(0, 0)] * (values.ndim - 2)
+    return np.pad(values, padding)

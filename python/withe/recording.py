@@ -1,0 +1,486 @@
+"""What a run leaves behind: the read-outs of a simulation, frame by frame.
+
+A `Record` answers to the same read-outs as a `Simulation`, with one more axis in front: the frames. It
+holds NumPy arrays only, so it pickles, saves to one file, and needs no engine to be looked at.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from withe import io
+
+__all__ = ["EnergyHistory", "Record", "Recorder", "RodOutline"]
+
+FloatArray = npt.NDArray[np.float64]
+
+_FILE_VERSION = 1
+_UNITS = {
+    "times": "s",
+    "positions": "m",
+    "velocities": "m/s",
+    "directors": "1",
+    "curvatures": "1/m",
+    "twists": "rad/m",
+    "tensions": "N",
+    "energy": "J",
+    "radii": "m",
+}
+_ROD_READOUTS = ("directors", "curvatures", "twists", "tensions")
+
+
+@dataclass(frozen=True)
+class RodOutline:
+    """What pictures and files need to know of a rod besides its motion.
+
+    Attributes
+    ----------
+    name : str
+    rows : ndarray of int, shape (nodes,)
+        The rod's rows among the nodes of the scene.
+    closed : bool
+        Whether the last node is joined to the first by an edge.
+    radii : ndarray of shape (edges,) [m]
+    widths : ndarray of shape (edges, 2) [m], or None
+        Sides of a rectangular section along d1 and d2; None for a round one.
+    """
+
+    name: str
+    rows: npt.NDArray[np.int64]
+    closed: bool
+    radii: FloatArray
+    widths: FloatArray | None = None
+
+    @property
+    def edges(self) -> int:
+        """Number of edges."""
+        return len(self.rows) - (0 if self.closed else 1)
+
+    @property
+    def stencils(self) -> int:
+        """Number of nodes at which the rod bends."""
+        return len(self.rows) - (0 if self.closed else 2)
+
+
+@dataclass(frozen=True)
+class EnergyHistory:
+    """Energies of every frame, arrays of shape (frames,) [J].
+
+    `total` is the sum of kinetic, stretch, bend, twist, gravity, loads and contact. `work`, done by
+    supports and actuation, and `dissipated` count from the start of the simulation.
+    """
+
+    kinetic: FloatArray
+    stretch: FloatArray
+    bend: FloatArray
+    twist: FloatArray
+    gravity: FloatArray
+    loads: FloatArray
+    contact: FloatArray
+    total: FloatArray
+    work: FloatArray
+    dissipated: FloatArray
+
+
+_ENERGIES = tuple(field.name for field in fields(EnergyHistory))
+
+
+class Record:
+    """The frames of a run. Made by `Simulation.run`, or read with `Record.load`.
+
+    Every read-out is a copy, and its first axis is the frame. A rod is named by its handle or its name.
+
+    Examples
+    --------
+    >>> record = simulation.run(duration=2.0, record_every=0.02)      # doctest: +SKIP
+    >>> tip = record.positions("arm")[:, -1]                          # doctest: +SKIP
+    """
+
+    def __init__(
+        self,
+        rods: Iterable[RodOutline],
+        arrays: Mapping[str, npt.NDArray[Any]],
+        extras: Iterable[str] = (),
+    ) -> None:
+        self._rods = tuple(rods)
+        self._arrays = dict(arrays)
+        self._extras = tuple(extras)
+        self._check()
+
+    def _check(self) -> None:
+        """Refuse arrays that do not fit together."""
+        frames = len(self._array("times", ()))
+        positions = self._array("positions", (frames, None, 3))
+        nodes = positions.shape[1]
+        self._array("velocities", (frames, nodes, 3))
+        for index, rod in enumerate(self._rods):
+            if rod.rows.ndim != 1 or rod.rows.dtype.kind != "i" or len(rod.rows) < 2:
+                raise ValueError(f"rows of rod {rod.name!r} must be two or more integers")
+            if rod.rows.min() < 0 or rod.rows.max() >= nodes:
+                raise ValueError(f"rows of rod {rod.name!r} must lie in 0..{nodes - 1}")
+            for name, values, shape in (
+                ("radii", rod.radii, (rod.edges,)),
+                ("widths", rod.widths, (rod.edges, 2)),
+            ):
+                if values is not None and (values.shape != shape or values.dtype.kind != "f"):
+                    raise ValueError(
+                        f"{name} of rod {rod.name!r} must be floats of shape {shape}, "
+                        f"got {values.dtype} of shape {values.shape}"
+                    )
+            self._array(f"rod_{index}_directors", (frames, rod.edges, 3, 3))
+            self._array(f"rod_{index}_curvatures", (frames, rod.stencils, 2))
+            self._array(f"rod_{index}_twists", (frames, rod.stencils))
+            self._array(f"rod_{index}_tensions", (frames, rod.edges))
+        for name in _ENERGIES:
+            self._array(f"energy_{name}", (frames,))
+        for index, name in enumerate(self._extras):
+            values = self._arrays.get(f"extra_{index}")
+            if values is None or values.shape[:1] != (frames,):
+                raise ValueError(f"record[{name!r}] must have one row for each of {frames} frames")
+
+    def _array(self, name: str, shape: tuple[int | None, ...]) -> npt.NDArray[Any]:
+        values = self._arrays.get(name)
+        if values is None:
+            raise ValueError(f"array {name!r} is missing")
+        if (shape and len(shape) != values.ndim) or (not shape and values.ndim != 1):
+            raise ValueError(f"array {name!r} has shape {values.shape}")
+        if any(want not in (None, got) for want, got in zip(shape, values.shape, strict=False)):
+            raise ValueError(f"array {name!r} must have shape {shape}, got {values.shape}")
+        if values.dtype != np.float64:
+            raise ValueError(f"array {name!r} must hold floats, got {values.dtype}")
+        return values
+
+    # Read-outs
+
+    @property
+    def times(self) -> FloatArray:
+        """Times of the frames, shape (frames,) [s]."""
+        return self._arrays["times"].copy()
+
+    @property
+    def rods(self) -> tuple[RodOutline, ...]:
+        """The rods, in the order of the scene."""
+        return self._rods
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Units of the read-outs, by name."""
+        return dict(_UNITS)
+
+    def __len__(self) -> int:
+        """Number of frames."""
+        return len(self._arrays["times"])
+
+    def positions(self, rod: Any = None) -> FloatArray:
+        """Positions of the nodes of a rod, or of every node of the scene once.
+
+        Returns
+        -------
+        ndarray of shape (frames, nodes, 3) [m]
+
+        Raises
+        ------
+        ValueError
+            No rod of that name.
+        """
+        return self._nodal("positions", rod)
+
+    def velocities(self, rod: Any = None) -> FloatArray:
+        """Velocities of the nodes of a rod, or of every node once, (frames, nodes, 3) [m/s]."""
+        return self._nodal("velocities", rod)
+
+    def directors(self, rod: Any) -> FloatArray:
+        """Material frames of the edges, (frames, edges, 3, 3), rows d1, d2, tangent."""
+        return self._of_rod("directors", rod)
+
+    def curvatures(self, rod: Any) -> FloatArray:
+        """Curvatures towards d1 and d2, shape (frames, stencils, 2) [1/m]."""
+        return self._of_rod("curvatures", rod)
+
+    def twists(self, rod: Any) -> FloatArray:
+        """Twists, shape (frames, stencils) [rad/m]."""
+        return self._of_rod("twists", rod)
+
+    def tensions(self, rod: Any) -> FloatArray:
+        """Axial forces of the edges, shape (frames, edges) [N]."""
+        return self._of_rod("tensions", rod)
+
+    def energy(self) -> EnergyHistory:
+        """Energies, every one an array of shape (frames,) [J]."""
+        return EnergyHistory(*(self._arrays[f"energy_{name}"].copy() for name in _ENERGIES))
+
+    def keys(self) -> tuple[str, ...]:
+        """Names of what was recorded besides the read-outs."""
+        return self._extras
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._extras)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._extras
+
+    def __getitem__(self, name: str) -> npt.NDArray[Any]:
+        """What `run(record={name: ...})` returned, one row a frame.
+
+        Raises
+        ------
+        KeyError
+            Nothing was recorded under that name.
+        """
+        if name not in self._extras:
+            known = ", ".join(map(repr, self._extras)) or "nothing"
+            raise KeyError(f"nothing was recorded as {name!r}; known: {known}")
+        return self._arrays[f"extra_{self._extras.index(name)}"].copy()
+
+    def _nodal(self, name: str, rod: Any) -> FloatArray:
+        values = self._arrays[name]
+        return values.copy() if rod is None else values[:, self._rods[self._index(rod)].rows]
+
+    def _of_rod(self, name: str, rod: Any) -> FloatArray:
+        return self._arrays[f"rod_{self._index(rod)}_{name}"].copy()
+
+    def _index(self, rod: Any) -> int:
+        name = rod if isinstance(rod, str) else getattr(rod, "name", None)
+        for index, outline in enumerate(self._rods):
+            if outline.name == name:
+                return index
+        known = ", ".join(repr(outline.name) for outline in self._rods)
+        wanted = repr(rod) if name is None else repr(name)
+        raise ValueError(f"rod must be one of {known} or its handle, got {wanted}")
+
+    def __repr__(self) -> str:
+        rods = ", ".join(rod.name for rod in self._rods)
+        if len(self) == 0:
+            return f"Record(no frames; rods {rods})"
+        first, last = self._arrays["times"][[0, -1]]
+        return f"Record({len(self)} frames, {first:g}..{last:g} s; rods {rods})"
+
+    # Files
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write the record to one .npz file that NumPy alone can read.
+
+        Raises
+        ------
+        OSError
+            The file cannot be written.
+        """
+        header = {
+            "units": _UNITS,
+            "rods": [{"name": rod.name, "closed": rod.closed} for rod in self._rods],
+            "extras": list(self._extras),
+        }
+        arrays = dict(self._arrays)
+        for index, rod in enumerate(self._rods):
+            arrays[f"rod_{index}_rows"] = rod.rows
+            arrays[f"rod_{index}_radii"] = rod.radii
+            if rod.widths is not None:
+                arrays[f"rod_{index}_widths"] = rod.widths
+        return io.save_arrays(path, "record", _FILE_VERSION, header, arrays)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Record:
+        """Read a record that `save` wrote.
+
+        Raises
+        ------
+        ValueError
+            A file that is damaged, not a record, or of another version.
+        OSError
+            The file cannot be opened.
+        """
+        header, arrays = io.load_arrays(path, "record", _FILE_VERSION)
+        try:
+            rods = [
+                RodOutline(
+                    name=str(rod["name"]),
+                    rows=arrays.pop(f"rod_{index}_rows"),
+                    closed=bool(rod["closed"]),
+                    radii=arrays.pop(f"rod_{index}_radii"),
+                    widths=arrays.pop(f"rod_{index}_widths", None),
+                )
+                for index, rod in enumerate(header["rods"])
+            ]
+            return cls(rods, arrays, [str(name) for name in header["extras"]])
+        except (KeyError, TypeError, ValueError) as error:
+            raise ValueError(f"{path} is a damaged record: {error}") from error
+
+    def to_vtk(self, folder: str | os.PathLike[str]) -> Path:
+        """Write the frames for ParaView; open the .pvd file whose path is returned.
+
+        See `withe.io.write_vtk` for what the files hold.
+        """
+        return io.write_vtk(self, folder)
+
+    # Pictures
+
+    def plot(self, **options: Any) -> Any:
+        """Shapes at several times and energies over time, as a matplotlib figure.
+
+        See `withe.view.plot` for the options.
+        """
+        from withe import view
+
+        return view.plot(self, **options)
+
+    def view(self, **options: Any) -> Any:
+        """Turn the rods about and slide through time, in a notebook or a window.
+
+        See `withe.view.view` for the options.
+        """
+        from withe import view
+
+        return view.view(self, **options)
+
+    def animate(self, path: str | os.PathLike[str], **options: Any) -> Path:
+        """Render the rods as tubes into a film, .mp4 or .gif.
+
+        See `withe.view.animate` for the options.
+        """
+        from withe import view
+
+        return view.animate(self, path, **options)
+
+    def picture(self, path: str | os.PathLike[str], **options: Any) -> Path:
+        """Render one frame, the last one unless `frame=` says otherwise, into a .png file.
+
+        See `withe.view.picture` for the options.
+        """
+        from withe import view
+
+        return view.picture(self, path, **options)
+
+
+class _Column:
+    """An array that grows by whole frames."""
+
+    def __init__(self, first: npt.NDArray[Any]) -> None:
+        self._values = np.empty((16, *first.shape), first.dtype)
+        self._count = 0
+
+    def check(self, name: str, value: npt.NDArray[Any]) -> None:
+        if value.shape != self._values.shape[1:]:
+            raise ValueError(f"record[{name!r}] must keep its shape {self._values.shape[1:]}, got {value.shape}")
+
+    def append(self, value: npt.NDArray[Any]) -> None:
+        if self._count == len(self._values):
+            self._values = np.concatenate([self._values, np.empty_like(self._values)])
+        if not np.can_cast(value.dtype, self._values.dtype):
+            self._values = self._values.astype(np.result_type(value, self._values))
+        self._values[self._count] = value
+        self._count += 1
+
+    def values(self) -> npt.NDArray[Any]:
+        return self._values[: self._count].copy()
+
+
+class Recorder:
+    """Takes frames from a simulation while it runs.
+
+    Parameters
+    ----------
+    simulation
+        Answers to the read-outs of `Simulation`.
+    extra : mapping of str to callable
+        Called with the simulation at every frame; each returns a number or an array, of one shape.
+
+    Raises
+    ------
+    ValueError
+        A name that is not text, or something that cannot be called.
+    """
+
+    def __init__(self, simulation: Any, extra: Mapping[str, Callable[[Any], npt.ArrayLike]] | None = None) -> None:
+        self._simulation = simulation
+        self._extra = dict(extra or {})
+        for name, function in self._extra.items():
+            if not isinstance(name, str):
+                raise ValueError(f"names in record must be text, got {name!r}")
+            if not callable(function):
+                raise ValueError(f"record[{name!r}] must be a function, got {function!r}")
+        self._rods = outlines(simulation)
+        self._columns: dict[str, _Column] = {}
+
+    def capture(self) -> None:
+        """Take one frame. A callback's exception propagates, and then no part of the frame is kept.
+
+        Raises
+        ------
+        ValueError
+            An extra that is not numbers, or changes its shape.
+        """
+        frame = self._frame()
+        for index, name in enumerate(self._extra):
+            if self._columns:
+                self._columns[f"extra_{index}"].check(name, frame[f"extra_{index}"])
+        if not self._columns:
+            self._columns = {name: _Column(values) for name, values in frame.items()}
+        for name, values in frame.items():
+            self._columns[name].append(values)
+
+    def _frame(self) -> dict[str, npt.NDArray[Any]]:
+        simulation = self._simulation
+        frame: dict[str, npt.NDArray[Any]] = {
+            "times": np.array(simulation.time, float),
+            "positions": simulation.positions(),
+            "velocities": simulation.velocities(),
+        }
+        for index, rod in enumerate(self._rods):
+            for readout in _ROD_READOUTS:
+                frame[f"rod_{index}_{readout}"] = getattr(simulation, readout)(rod.name)
+        energy = simulation.energy()
+        for name in _ENERGIES:
+            frame[f"energy_{name}"] = np.array(getattr(energy, name), float)
+        for index, (name, function) in enumerate(self._extra.items()):
+            frame[f"extra_{index}"] = _numbers(name, function(simulation))
+        return frame
+
+    @property
+    def record(self) -> Record:
+        """The frames taken so far."""
+        if self._columns:
+            arrays = {name: column.values() for name, column in self._columns.items()}
+        else:
+            arrays = {name: values[None][:0].copy() for name, values in self._frame().items()}
+        return Record(self._rods, arrays, self._extra)
+
+
+def _numbers(name: str, value: npt.ArrayLike) -> npt.NDArray[Any]:
+    try:
+        array = np.array(value)
+    except ValueError:
+        array = np.array(None)
+    if array.dtype.kind not in "biufc":
+        raise ValueError(f"record[{name!r}] must return numbers of one shape, got {value!r}")
+    return array
+
+
+def outlines(simulation: Any) -> tuple[RodOutline, ...]:
+    """The outlines of the rods of a simulation, from its scene's handles."""
+    return tuple(_outline(rod) for rod in simulation.rods)
+
+
+def _outline(rod: Any) -> RodOutline:
+    rows = np.array(rod.rows, np.int64)
+    edges = len(rows) - (0 if rod.closed else 1)
+    widths = getattr(rod, "widths", None)
+    return RodOutline(
+        name=rod.name,
+        rows=rows,
+        closed=bool(rod.closed),
+        radii=np.array(np.broadcast_to(np.asarray(rod.radii, float), (edges,))),
+        widths=None if widths is None else np.array(np.broadcast_to(widths, (edges, 2)), float),
+    )
+
+
+def present(simulation: Any) -> Record:
+    """A record of one frame: the present state of a simulation."""
+    recorder = Recorder(simulation)
+    recorder.capture()
+    return recorder.record

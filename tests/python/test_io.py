@@ -1,0 +1,202 @@
+"""Files: what is saved comes back bit for bit, and nothing that is not ours gets in."""
+
+import json
+import os
+import pickle
+import zipfile
+from dataclasses import fields
+
+import numpy as np
+import pytest
+from curling_motion import CurlingSimulation
+from withe.io import load_arrays, save_arrays
+from withe.recording import EnergyHistory, Record, Recorder
+
+
+@pytest.fixture
+def record():
+    simulation = CurlingSimulation()
+    recorder = Recorder(simulation, {"tip/x": lambda s: s.positions("arm")[-1], "n": lambda s: 3})
+    for _ in range(5):
+        recorder.capture()
+        simulation.step(0.05)
+    return recorder.record
+
+
+def test_a_record_comes_back_bit_for_bit(record, tmp_path):
+    path = record.save(tmp_path / "arm.npz")
+    loaded = Record.load(path)
+    np.testing.assert_array_equal(loaded.times, record.times)
+    np.testing.assert_array_equal(loaded.positions(), record.positions())
+    np.testing.assert_array_equal(loaded.velocities(), record.velocities())
+    for rod in ("arm", "hand", "ring"):
+        for readout in ("directors", "curvatures", "twists", "tensions"):
+            np.testing.assert_array_equal(getattr(loaded, readout)(rod), getattr(record, readout)(rod))
+    for field in fields(EnergyHistory):
+        ours, theirs = getattr(loaded.energy(), field.name), getattr(record.energy(), field.name)
+        np.testing.assert_array_equal(ours, theirs)
+    assert loaded.keys() == record.keys()
+    np.testing.assert_array_equal(loaded["tip/x"], record["tip/x"])
+    for ours, theirs in zip(loaded.rods, record.rods, strict=True):
+        assert (ours.name, ours.closed) == (theirs.name, theirs.closed)
+        np.testing.assert_array_equal(ours.rows, theirs.rows)
+        np.testing.assert_array_equal(ours.radii, theirs.radii)
+        np.testing.assert_array_equal(ours.widths, theirs.widths)
+
+
+def test_the_file_tells_names_radii_units_and_version_to_numpy_alone(record, tmp_path):
+    with np.load(record.save(tmp_path / "arm.npz"), allow_pickle=False) as archive:
+        header = json.loads(str(archive["header"]))
+        np.testing.assert_array_equal(archive["rod_0_radii"], np.linspace(6e-3, 4e-3, 20))
+    assert header["format"] == "withe record"
+    assert header["version"] == 1
+    assert [rod["name"] for rod in header["rods"]] == ["arm", "hand", "ring"]
+    assert header["units"]["positions"] == "m"
+
+
+def test_a_failed_save_leaves_the_old_file_and_no_rubbish(record, tmp_path, monkeypatch):
+    path = record.save(tmp_path / "arm.npz")
+    before = path.read_bytes()
+    monkeypatch.setattr(os, "replace", lambda *_: (_ for _ in ()).throw(OSError("disk full")))
+    with pytest.raises(OSError, match="disk full"):
+        record.save(path)
+    assert path.read_bytes() == before
+    assert os.listdir(tmp_path) == ["arm.npz"]
+
+
+def test_every_cut_of_a_file_is_refused_with_its_name(record, tmp_path):
+    path = tmp_path / "arm.npz"
+    data = record.save(path).read_bytes()
+    for length in range(0, len(data), len(data) // 60):
+        path.write_bytes(data[:length])
+        with pytest.raises(ValueError, match=r"arm\.npz"):
+            Record.load(path)
+
+
+def test_flipped_bytes_are_refused_or_harmless(record, tmp_path):
+    path = tmp_path / "arm.npz"
+    data = record.save(path).read_bytes()
+    rng = np.random.default_rng(5)
+    refused = 0
+    for place in rng.integers(0, len(data), 300):
+        path.write_bytes(data[:place] + bytes([data[place] ^ 0x55]) + data[place + 1 :])
+        try:
+            loaded = Record.load(path)
+        except ValueError:
+            refused += 1
+        else:
+            np.testing.assert_array_equal(loaded.positions(), record.positions())
+    assert refused > 250
+
+
+class Bomb:
+    def __reduce__(self):
+        return (os.system, ("touch bomb_went_off",))
+
+
+@pytest.mark.parametrize("name", ["text", "empty", "npy", "pickle", "object", "foreign", "zip"])
+def test_foreign_files_are_refused_and_nothing_runs(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / f"{name}.npz"
+    if name == "text":
+        path.write_text("not an archive")
+    elif name == "empty":
+        path.touch()
+    elif name == "npy":
+        with path.open("wb") as stream:
+            np.save(stream, np.arange(3))
+    elif name == "pickle":
+        path.write_bytes(pickle.dumps(Bomb()))
+    elif name == "object":
+        np.savez(path, header=np.array(Bomb(), object))
+    elif name == "foreign":
+        np.savez(path, header=np.array("{}"), times=np.arange(3.0))
+    else:
+        with zipfile.ZipFile(path, "w") as archive:
+            archive.writestr("header.npy", b"\x93NUMPY\x01\x00garbage")
+    with pytest.raises(ValueError, match=f"{name}.npz"):
+        Record.load(path)
+    assert not (tmp_path / "bomb_went_off").exists()
+
+
+def test_another_version_and_another_kind_are_named(record, tmp_path):
+    path = tmp_path / "later.npz"
+    save_arrays(path, "record", 2, {}, {})
+    with pytest.raises(ValueError, match=r"later\.npz is a record of version 2, this withe reads version 1"):
+        Record.load(path)
+    save_arrays(path, "snapshot", 1, {}, {})
+    with pytest.raises(ValueError, match=r"later\.npz holds a withe snapshot, expected a withe record"):
+        Record.load(path)
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("times", np.zeros((5, 1))),
+        ("times", np.zeros(5, int)),
+        ("positions", np.zeros((4, 55, 3))),
+        ("velocities", np.zeros((5, 54, 3))),
+        ("rod_0_rows", np.arange(40, 61)),
+        ("rod_0_rows", np.zeros(21)),
+        ("rod_0_radii", np.zeros(3)),
+        ("rod_1_tensions", None),
+        ("energy_total", np.zeros(6)),
+        ("extra_0", np.zeros(6)),
+    ],
+)
+def test_arrays_that_do_not_fit_together_are_refused(record, tmp_path, key, value):
+    header, arrays = load_arrays(record.save(tmp_path / "arm.npz"), "record", 1)
+    if value is None:
+        del arrays[key]
+    else:
+        arrays[key] = value
+    save_arrays(tmp_path / "bad.npz", "record", 1, header, arrays)
+    with pytest.raises(ValueError, match=r"bad\.npz is a damaged record"):
+        Record.load(tmp_path / "bad.npz")
+
+
+@pytest.mark.parametrize("rods", [3, [{"closed": False}], ["arm"], None])
+def test_a_header_of_the_wrong_form_is_refused(record, tmp_path, rods):
+    header, arrays = load_arrays(record.save(tmp_path / "arm.npz"), "record", 1)
+    save_arrays(tmp_path / "bad.npz", "record", 1, {**header, "rods": rods}, arrays)
+    with pytest.raises(ValueError, match=r"bad\.npz is a damaged record"):
+        Record.load(tmp_path / "bad.npz")
+
+
+def test_objects_are_not_saved(tmp_path):
+    with pytest.raises(ValueError, match="must hold numbers"):
+        save_arrays(tmp_path / "x.npz", "record", 1, {}, {"a": np.array([None])})
+
+
+def test_a_missing_file_stays_a_missing_file(tmp_path):
+    with pytest.raises(FileNotFoundError):
+        Record.load(tmp_path / "none.npz")
+
+
+def test_vtk_frames_are_read_back_by_vtk(record, tmp_path):
+    pyvista = pytest.importorskip("pyvista")
+    collection = record.to_vtk(tmp_path / "frames")
+    reader = pyvista.PVDReader(str(collection))
+    np.testing.assert_array_equal(reader.time_values, record.times)
+    reader.set_active_time_point(3)
+    mesh = reader.read()[0]
+    rods = ("arm", "hand", "ring")
+    points = np.concatenate([record.positions(rod)[3] for rod in rods])
+    np.testing.assert_array_equal(mesh.points, points)
+    assert mesh.n_lines == 3
+    np.testing.assert_array_equal(mesh.lines[:22], [21, *range(21)])
+    np.testing.assert_array_equal(mesh.lines[34:], [25, *range(32, 56), 32])
+    assert list(mesh.field_data["rod_names"]) == list(rods)
+    np.testing.assert_array_equal(mesh.cell_data["rod"], [0, 1, 2])
+    np.testing.assert_array_equal(mesh["radius"][21:32], 4e-3)
+    np.testing.assert_array_equal(mesh["curvature"][1:20], record.curvatures("arm")[3])
+    np.testing.assert_array_equal(mesh["curvature"][[0, 20]], 0.0)
+    tensions = record.tensions("arm")[3]
+    np.testing.assert_allclose(mesh["tension"][1:20], (tensions[1:] + tensions[:-1]) / 2)
+    assert mesh["tension"][0] == tensions[0]
+    np.testing.assert_array_equal(mesh["twist"][32:], record.twists("ring")[3])
+
+
+def test_vtk_of_no_frames_is_refused(tmp_path):
+    with pytest.raises(ValueError, match="no frames"):
+        Recorder(CurlingSimulation()).record.to_vtk(tmp_path)
