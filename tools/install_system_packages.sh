@@ -52,7 +52,7 @@ fi
 
 run() {
   echo "+ $*"
-  "$@"
+  "$@" >/dev/null
 }
 echo "Missing system packages: ${missing[*]}"
 run "${as_root[@]}" apt-get update -qq || explain
