@@ -1,0 +1,68 @@
+#pragma once
+/// The one door to linear algebra: a matrix with a fixed pattern, filled through precomputed offsets,
+/// factorised and solved again and again without allocation. SuiteSparse is hidden behind it.
+
+#include <cstddef>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace withe {
+
+/// Pattern of a square matrix, structurally symmetric, column by column, rows sorted, diagonal included.
+struct SparsityPattern {
+  int size = 0;
+  std::vector<int> column_starts;  ///< size + 1
+  std::vector<int> row_indices;
+
+  /// Pattern from cliques: every group of unknowns couples fully. Entries < 0 are skipped.
+  static SparsityPattern from_cliques(int size, const std::vector<std::vector<int>>& cliques);
+  /// Greatest |row - column| of any entry.
+  int half_bandwidth() const;
+};
+
+enum class Symmetry { symmetric, unsymmetric };
+
+enum class SolverKind {
+  automatic,  ///< band where the half bandwidth is small, otherwise sparse
+  band,       ///< LDL^T of fixed half bandwidth, or band LU with partial pivoting
+  sparse,     ///< Eigen SimplicialLDLT, or KLU
+};
+
+enum class FactorStatus { ok, singular };
+
+struct Factorization {
+  FactorStatus status = FactorStatus::ok;
+  int negative_pivots = 0;  ///< symmetric only: number of negative eigenvalues (Sylvester)
+};
+
+class LinearSolver {
+ public:
+  virtual ~LinearSolver() = default;
+  virtual int size() const = 0;
+  virtual Symmetry symmetry() const = 0;
+  /// "band LDLT (half bandwidth 10)", "sparse LDLT", "band LU", "KLU": for `plan`.
+  virtual std::string name() const = 0;
+  /// Where entry (row, column) lives in values(). Symmetric: only row >= column may be asked for.
+  /// Throws std::invalid_argument outside the pattern.
+  virtual std::ptrdiff_t offset(int row, int column) const = 0;
+  /// The matrix's entries; kept intact by factorize().
+  virtual std::span<double> values() = 0;
+  virtual std::span<const double> values() const = 0;
+  /// Factorises values() plus `shift` (empty, or one number a row) on the diagonal. Does not allocate
+  /// after the first call. A zero or non-finite pivot gives FactorStatus::singular.
+  virtual Factorization factorize(std::span<const double> shift = {}) = 0;
+  /// Solves in place with the last factorisation.
+  virtual void solve(std::span<double> right_hand_side) const = 0;
+  virtual void solve_transposed(std::span<double> right_hand_side) const = 0;
+  /// y = A x with the unfactorised values().
+  virtual void multiply(std::span<const double> x, std::span<double> y) const = 0;
+  virtual std::unique_ptr<LinearSolver> clone() const = 0;
+};
+
+/// Analyses the pattern once. `automatic` takes the band when its half bandwidth is at most 24.
+std::unique_ptr<LinearSolver> make_linear_solver(const SparsityPattern& pattern, Symmetry symmetry,
+                                                 SolverKind kind = SolverKind::automatic);
+
+}  // namespace withe
