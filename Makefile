@@ -30,7 +30,8 @@ PYTHON_SOURCES := $(shell find python/withe -name '*.py' -o -name '*.pyi' -o -na
 # Folders too: a deleted file is a change.
 SOURCE_FOLDERS := $(wildcard cpp/*/) $(shell find python/withe -type d -not -name __pycache__)
 
-.PHONY: help demo test ctest pytest asan bench wheel lint format format-check types stubs stub-check tidy clean distclean
+.PHONY: help demo test ctest-build ctest pytest asan bench wheel lint format format-check types stubs stub-check \
+    tidy tidy-changed clean distclean
 
 help:
 	@echo "make demo          install what is missing, build, simulate a cantilever, compare with theory"
@@ -41,7 +42,7 @@ help:
 	@echo "make lint          ruff; make format applies formatters, make format-check only looks"
 	@echo "make types         mypy --strict"
 	@echo "make stubs         regenerate the stubs of the compiled module (make stub-check compares)"
-	@echo "make tidy          clang-tidy over every C++ file"
+	@echo "make tidy          clang-tidy over every C++ file; make tidy-changed over those changed since BASE="
 	@echo "make clean         remove build, dist and out; make distclean also .venv"
 
 # --- set-up; every stamp is a step that need not be repeated -----------------------------------------------
@@ -82,9 +83,11 @@ demo: $(STAMPS)/installed
 
 test: ctest pytest
 
-ctest: $(STAMPS)/installed $(CXX_TESTS)
+ctest-build: $(STAMPS)/installed
 	@cmake -S . -B $(BUILD) -DWITHE_BUILD_TESTS=ON >build/configure.log || { cat build/configure.log; exit 1; }
 	@cmake --build $(BUILD)
+
+ctest: ctest-build
 	@ctest --test-dir $(BUILD) --output-on-failure --no-tests=error --parallel $(JOBS) --progress
 
 pytest: $(STAMPS)/installed $(STAMPS)/test_tools
@@ -129,6 +132,9 @@ stub-check: $(STAMPS)/installed $(STAMPS)/dev_tools
 tidy: $(STAMPS)/dev_tools
 	@cmake --preset tidy
 	@cmake --build --preset tidy --clean-first
+
+tidy-changed: ctest-build $(STAMPS)/dev_tools
+	@tools/tidy_changed.sh $(BUILD) $(BASE)
 
 clean:
 	rm -rf build dist out
