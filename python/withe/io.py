@@ -217,8 +217,8 @@ class _Polylines:
             directors /= np.maximum(np.linalg.norm(directors, axis=-1, keepdims=True), 1e-300)
             self._point_data["radius"].append(edges_to_nodes(radii, rod.closed))
             self._point_data["tension"].append(edges_to_nodes(record.tensions(rod), rod.closed))
-            self._point_data["curvature"].append(_stencils_to_nodes(record.curvatures(rod), rod.closed))
-            self._point_data["twist"].append(_stencils_to_nodes(record.twists(rod), rod.closed))
+            self._point_data["curvature"].append(stencils_to_nodes(record.curvatures(rod), rod.closed))
+            self._point_data["twist"].append(stencils_to_nodes(record.twists(rod), rod.closed))
             self._point_data["d1"].append(directors)
 
         counts = np.array([len(rod.rows) for rod in rods])
@@ -292,7 +292,7 @@ def edges_to_nodes(values: npt.NDArray[np.float64], closed: bool) -> npt.NDArray
     return np.concatenate([values[:, :1], inner, values[:, -1:]], axis=1)
 
 
-def _stencils_to_nodes(values: npt.NDArray[np.float64], closed: bool) -> npt.NDArray[np.float64]:
+def stencils_to_nodes(values: npt.NDArray[np.float64], closed: bool) -> npt.NDArray[np.float64]:
     """Values of the inner nodes of an open rod, with zeros at its ends; shape (frames, nodes, ...)."""
     if closed:
         return values

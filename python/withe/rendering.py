@@ -1,0 +1,405 @@
+"""Rods as tubes on a light ground, rendered by PyVista: the stage that pictures, films and the viewer share."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from functools import cache
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+from withe.extras import require
+from withe.io import edges_to_nodes, stencils_to_nodes
+from withe.tubes import Tube
+
+if TYPE_CHECKING:
+    from withe.recording import Record
+
+__all__ = ["Stage", "probe_rendering"]
+
+FloatArray = npt.NDArray[np.float64]
+ColorBy = Literal["rod", "tension", "curvature", "twist", "speed"]
+
+_PALETTE = ("#2a9d8f", "#e76f51", "#457b9d", "#e9b44c", "#8d6a9f", "#6a994e", "#c8553d", "#4f6d7a")
+_BARS = {
+    "tension": ("tension [N]", "viridis"),
+    "curvature": ("curvature [1/m]", "viridis"),
+    "twist": ("twist [rad/m]", "viridis"),
+    "speed": ("speed [m/s]", "viridis"),
+}
+_DIRECTIONS = {
+    "front": (0.0, -1.0, 0.12),
+    "side": (1.0, 0.0, 0.12),
+    "top": (0.0, 0.0, 1.0),
+    "oblique": (0.6, -1.0, 0.55),
+}
+_VIEW_ANGLE = 24.0  # [degrees]
+_INK = "#33383d"
+_MAX_SAMPLES = 6000  # rings of all rods together
+_SHADOW_CELLS = 320
+_BLURS = (2.5, 5.0, 9.0, 14.0)  # [cells], by height above the ground
+_SUPERSAMPLING = 2  # pixels rendered for one shown, along each side
+
+
+class Stage:
+    """The rods of a record in front of a camera that sees all their frames.
+
+    Parameters
+    ----------
+    record : Record
+    size : pair of int [px]
+    color_by : {"rod", "tension", "curvature", "twist", "speed"}
+    camera : str or array_like of shape (3,), optional
+        From where to look: "front", "side", "top", "oblique" or a direction. By default along the
+        normal of a planar motion, and obliquely at any other.
+    off_screen : bool
+        Render into memory rather than into a window.
+
+    Raises
+    ------
+    ValueError
+        A record without frames, or an argument out of range.
+    RuntimeError
+        Nothing can be rendered off-screen here.
+    """
+
+    def __init__(
+        self,
+        record: Record,
+        *,
+        size: Sequence[int] = (1280, 720),
+        color_by: ColorBy = "rod",
+        camera: str | npt.ArrayLike | None = None,
+        off_screen: bool = True,
+    ) -> None:
+        if len(record) == 0:
+            raise ValueError("record has no frames to show")
+        if color_by != "rod" and color_by not in _BARS:
+            raise ValueError(f"color_by must be one of 'rod', {str(list(_BARS))[1:-1]}, got {color_by!r}")
+        self.size = _checked_size(size)
+        self._record = record
+        self.times = record.times
+        self._positions = record.positions()
+        self._directors = [record.directors(rod)[:, :, 0] for rod in record.rods]
+        samples = max(1, min(6, _MAX_SAMPLES // sum(len(rod.rows) for rod in record.rods)))
+        self._tubes = [Tube(rod, self._positions[0, rod.rows], samples) for rod in record.rods]
+        self._footprints = [
+            tube.footprint(self._positions[0, rod.rows]) for tube, rod in zip(self._tubes, record.rods, strict=True)
+        ]
+        self._values = None if color_by == "rod" else [_nodal(record, rod, color_by) for rod in record.rods]
+        direction = _direction(camera, self._positions)
+
+        pyvista = require("pyvista", "view")
+        self._fineness = _SUPERSAMPLING if off_screen else 1
+        window = [side * self._fineness for side in self.size]
+        with _window(off_screen):
+            self.plotter = pyvista.Plotter(off_screen=off_screen, window_size=window, lighting="none")
+        self.plotter.set_background("#e4e9ee", top="#ffffff")
+        self._frame_camera(direction)
+        self._add_lights(pyvista, direction)
+        self._add_shadow(pyvista)
+        self._add_rods(pyvista, color_by)
+        if not off_screen:
+            self.plotter.enable_anti_aliasing("ssaa")
+        self._label: Any = None
+        self.show(0.0)
+
+    def show(self, frame: float) -> None:
+        """Move the rods to a frame; between two frames, in between."""
+        before = min(int(frame), len(self.times) - 1)
+        after = min(before + 1, len(self.times) - 1)
+        share = frame - before
+        surfaces = []
+        for index, rod in enumerate(self._record.rods):
+            nodes = self._mixed(self._positions, before, after, share)[rod.rows]
+            points, normals = self._tubes[index].surface(
+                nodes, self._mixed(self._directors[index], before, after, share)
+            )
+            mesh = self._meshes[index]
+            mesh.points = points
+            mesh.point_data["Normals"] = normals
+            if self._values is not None:
+                nodal = self._mixed(self._values[index], before, after, share)
+                mesh.point_data["value"] = self._tubes[index].on_surface(nodal)
+            surfaces.append(points)
+        self._cast_shadow(surfaces)
+
+    def label(self, text: str) -> None:
+        """Write a line of text in the lower left corner, in place of the one before."""
+        if self._label is None:
+            size = max(7, self.size[1] * self._fineness // 55)
+            self._label = self.plotter.add_text(text, position=(0.03, 0.04), viewport=True, color=_INK, font_size=size)
+        else:
+            self._label.input = text
+
+    def image(self) -> npt.NDArray[np.uint8]:
+        """What the camera sees, shape (height, width, 3)."""
+        self.plotter.render()
+        fine = self.plotter.screenshot(return_img=True)[..., :3]
+        if self._fineness == 1:
+            return np.asarray(fine, np.uint8)
+        height, width = fine.shape[0] // self._fineness, fine.shape[1] // self._fineness
+        blocks = fine.reshape(height, self._fineness, width, self._fineness, 3)
+        return np.asarray(blocks.mean(axis=(1, 3), dtype=np.float32) + 0.5, np.uint8)
+
+    def close(self) -> None:
+        """Free the window."""
+        self.plotter.close()
+
+    @staticmethod
+    def _mixed(values: FloatArray, before: int, after: int, share: float) -> FloatArray:
+        mixed: FloatArray = (1.0 - share) * values[before] + share * values[after]
+        return mixed
+
+    def _frame_camera(self, direction: FloatArray) -> None:
+        """Look from a direction at the middle of all frames, from as near as all of them are in view."""
+        reach = max(float(rod.radii.max()) for rod in self._record.rods)
+        points = self._positions.reshape(-1, 3)
+        low, high = points.min(axis=0), points.max(axis=0)
+        extent = float(np.linalg.norm(high - low)) + 2.0 * reach
+        self._extent = extent
+        self._ground = float(low[2]) - reach - 0.03 * extent
+        margin = 0.15 * extent
+        self._shadow_bounds = low[:2] - margin, high[:2] + margin
+        corners = [points + reach * sign * axis for axis in np.eye(3) for sign in (-1.0, 1.0)]
+        shadows = np.column_stack([points[:, :2], np.full(len(points), self._ground)])
+        seen = np.concatenate([*corners, shadows])
+        up = np.array([0.0, 1.0, 0.0]) if abs(direction[2]) > 0.99 else np.array([0.0, 0.0, 1.0])
+        right = np.cross(up, direction)
+        right /= np.linalg.norm(right)
+        up = np.cross(direction, right)
+        across, height = seen @ right, seen @ up
+        focus = 0.5 * (across.max() + across.min()) * right + 0.5 * (height.max() + height.min()) * up
+        focus += (seen @ direction).mean() * direction
+        slope = np.tan(np.radians(0.5 * _VIEW_ANGLE))
+        local = seen - focus
+        needed = np.maximum(
+            np.abs(local @ up) / (0.82 * slope), np.abs(local @ right) / (0.86 * slope * self.size[0] / self.size[1])
+        )
+        distance = float((needed + local @ direction).max())
+        view = self.plotter.camera
+        view.view_angle = _VIEW_ANGLE
+        view.focal_point, view.position, view.up = focus, focus + distance * direction, up
+        view.clipping_range = (0.05 * distance, 10.0 * (distance + extent))
+
+    def _add_lights(self, pyvista: Any, direction: FloatArray) -> None:
+        focus = np.array(self.plotter.camera.focal_point)
+        right, up = np.cross(self.plotter.camera.up, direction), np.array(self.plotter.camera.up)
+        for offset, strength in (
+            (1.2 * direction - 0.7 * right + 0.9 * up, 0.9),
+            (0.9 * direction + 1.1 * right + 0.1 * up, 0.45),
+            (-0.8 * direction + 0.2 * right + 0.9 * up, 0.35),
+        ):
+            position = focus + 20.0 * self._extent * offset
+            self.plotter.add_light(pyvista.Light(position=position, focal_point=focus, intensity=strength))
+
+    def _add_rods(self, pyvista: Any, color_by: ColorBy) -> None:
+        self._meshes = [_empty_mesh(pyvista, tube) for tube in self._tubes]
+        options: dict[str, Any] = {"ambient": 0.35, "diffuse": 0.8, "specular": 0.3, "specular_power": 30.0}
+        if self._values is not None:
+            title, colours = _BARS[color_by]
+            low = min(float(values.min()) for values in self._values)
+            high = max(float(values.max()) for values in self._values)
+            if low < -0.05 * high and high > 0.0:
+                low, high, colours = -max(-low, high), max(-low, high), "coolwarm"
+            options |= {
+                "scalars": "value",
+                "cmap": colours,
+                "clim": (low, high if high > low else low + 1e-12),
+                "scalar_bar_args": {
+                    "title": f"{title}\n",
+                    "color": _INK,
+                    "vertical": True,
+                    "position_x": 0.88,
+                    "position_y": 0.25,
+                    "width": 0.05,
+                    "height": 0.5,
+                    "title_font_size": self.size[1] * self._fineness // 42,
+                    "label_font_size": self.size[1] * self._fineness // 48,
+                    "fmt": "%.3g",
+                    "n_labels": 5,
+                },
+            }
+        for index, mesh in enumerate(self._meshes):
+            if self._values is None:
+                options["color"] = _PALETTE[index % len(_PALETTE)]
+            else:
+                mesh.point_data["value"] = np.zeros(mesh.n_points)
+            actor = self.plotter.add_mesh(mesh, reset_camera=False, **options)
+            actor.prop.interpolation = "Phong"
+
+    def _add_shadow(self, pyvista: Any) -> None:
+        """A plane under the rods, clear where no shadow falls."""
+        low, high = self._shadow_bounds
+        corners = np.column_stack([[low[0], high[0], high[0], low[0]], [low[1], low[1], high[1], high[1]]])
+        plane = pyvista.PolyData(np.column_stack([corners, np.full(4, self._ground)]), [4, 0, 1, 2, 3])
+        plane.active_texture_coordinates = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+        blank = pyvista.Texture(np.zeros((_SHADOW_CELLS, _SHADOW_CELLS, 4), np.uint8))
+        self._shadow = self.plotter.add_mesh(plane, texture=blank, lighting=False, reset_camera=False)
+        self._shadow.ForceTranslucentOn()
+
+    def _cast_shadow(self, points: list[FloatArray]) -> None:
+        """Lay the rods flat on a grid and blur them, the more the higher they are."""
+        from scipy.ndimage import gaussian_filter
+
+        low, high = self._shadow_bounds
+        shade = np.zeros((_SHADOW_CELLS, _SHADOW_CELLS))
+        heights = np.concatenate(points)[:, 2] - self._ground
+        places = (np.concatenate(points)[:, :2] - low) / (high - low) * _SHADOW_CELLS
+        weights = np.concatenate(self._footprints) / np.prod((high - low) / _SHADOW_CELLS)
+        level = np.minimum(heights / self._extent * len(_BLURS), len(_BLURS) - 1).astype(int)
+        box = [[0, _SHADOW_CELLS]] * 2
+        for index, blur in enumerate(_BLURS):
+            here = level == index
+            if here.any():
+                cover, *_ = np.histogram2d(places[here, 1], places[here, 0], _SHADOW_CELLS, box, weights=weights[here])
+                shade += gaussian_filter(cover, blur, mode="constant")
+        pixels = np.empty((_SHADOW_CELLS, _SHADOW_CELLS, 4), np.uint8)
+        pixels[..., :3] = (62, 74, 86)
+        pixels[..., 3] = 255.0 * 0.42 * -np.expm1(-1.4 * shade[::-1])
+        texture = require("pyvista", "view").Texture(pixels)
+        texture.interpolate = True
+        self._shadow.texture = texture
+
+
+def _empty_mesh(pyvista: Any, tube: Tube) -> Any:
+    faces = np.column_stack([np.full(len(tube.faces), 4), tube.faces])
+    mesh = pyvista.PolyData(np.zeros((int(tube.faces.max()) + 1, 3)), faces.ravel())
+    mesh.point_data.active_normals = np.zeros((mesh.n_points, 3))
+    return mesh
+
+
+def _nodal(record: Record, rod: Any, color_by: ColorBy) -> FloatArray:
+    """The quantity that colours a rod, at its nodes, shape (frames, nodes)."""
+    if color_by == "tension":
+        return edges_to_nodes(record.tensions(rod), rod.closed)
+    if color_by == "twist":
+        return stencils_to_nodes(record.twists(rod), rod.closed)
+    if color_by == "curvature":
+        return stencils_to_nodes(np.linalg.norm(record.curvatures(rod), axis=-1), rod.closed)
+    speeds: FloatArray = np.linalg.norm(record.velocities(rod), axis=-1)
+    return speeds
+
+
+def _checked_size(size: Sequence[int]) -> tuple[int, int]:
+    try:
+        width, height = (int(side) for side in size)
+    except (TypeError, ValueError):
+        raise ValueError(f"size must be two integers, width and height in pixels, got {size!r}") from None
+    if not (16 <= width <= 8192 and 16 <= height <= 8192):
+        raise ValueError(f"size must lie between 16 and 8192 pixels, got {size!r}")
+    return width, height
+
+
+def _direction(camera: str | npt.ArrayLike | None, positions: FloatArray) -> FloatArray:
+    """Unit vector from the rods to the camera."""
+    if camera is None:
+        direction = _facing(positions)
+    elif isinstance(camera, str):
+        if camera not in _DIRECTIONS:
+            raise ValueError(f"camera must be one of {str(list(_DIRECTIONS))[1:-1]} or a direction, got {camera!r}")
+        direction = np.array(_DIRECTIONS[camera])
+    else:
+        direction = np.asarray(camera, float)
+        if direction.shape != (3,) or not np.all(np.isfinite(direction)) or not np.any(direction):
+            raise ValueError(f"camera must be a direction of shape (3,), not zero, got {camera!r}")
+    return direction / np.linalg.norm(direction)
+
+
+def _facing(positions: FloatArray) -> FloatArray:
+    """Along the normal of a planar motion, a little from above; obliquely at any other."""
+    points = positions.reshape(-1, 3) - positions.reshape(-1, 3).mean(axis=0)
+    spread, axes = np.linalg.eigh(points.T @ points)
+    if spread[0] > 1e-4 * spread[2] or spread[1] <= 1e-4 * spread[2]:
+        return np.array(_DIRECTIONS["oblique"])
+    normal = axes[:, 0]
+    if abs(normal[2]) > 0.9:
+        return np.array([0.0, -0.6, 1.0])
+    if normal @ np.array([0.3, -1.0, 0.0]) < 0.0:
+        normal = -normal
+    level = normal[:2] / np.linalg.norm(normal[:2])
+    return np.array([level[0], level[1], 0.2])
+
+
+# Rendering off-screen takes a graphics library that wheels do not bring. VTK may end the process where it
+# is missing, so the first render is tried in another one.
+
+_PROBE = """
+import pyvista
+plotter = pyvista.Plotter(off_screen=True, window_size=(64, 64))
+plotter.add_mesh(pyvista.Sphere())
+image = plotter.screenshot(return_img=True)
+raise SystemExit(0 if image.min() < image.max() else 3)
+"""
+_WINDOW = "VTK_DEFAULT_OPENGL_WINDOW"
+
+
+@cache
+def probe_rendering() -> str:
+    """Find a way to render off-screen, in a subprocess, once.
+
+    Returns
+    -------
+    str
+        The render window of VTK that works; empty for its own choice.
+
+    Raises
+    ------
+    RuntimeError
+        None works; the message names the package to install.
+    """
+    windows = ["vtkEGLRenderWindow", "vtkOSOpenGLRenderWindow"] if sys.platform == "linux" else []
+    if sys.platform != "linux" or os.environ.get("DISPLAY") or os.environ.get(_WINDOW):
+        windows.insert(0, "")
+    output = ""
+    for window in windows:
+        environment = {**os.environ, _WINDOW: window} if window else dict(os.environ)
+        try:
+            result = subprocess.run(
+                [sys.executable, "-c", _PROBE], env=environment, capture_output=True, text=True, timeout=180
+            )
+        except (OSError, subprocess.TimeoutExpired) as error:
+            output += str(error)
+            continue
+        if result.returncode == 0:
+            return window
+        output += result.stderr
+    raise RuntimeError(_advice(output))
+
+
+def _advice(output: str) -> str:
+    """What to install, from what the failed render wrote."""
+    message = "cannot render off-screen: "
+    if sys.platform != "linux":
+        last = output.strip().splitlines()[-1:] or ["no reason given"]
+        return message + last[0]
+    for library, package in (
+        ("libGL.so", "libgl1"),
+        ("libXrender.so", "libxrender1"),
+        ("libX11.so", "libx11-6"),
+        ("libSM.so", "libsm6"),
+    ):
+        if f"{library}" in output and "ImportError" in output:
+            return message + f"{library} is missing; install it with: apt install {package}"
+    return message + "no working EGL library was found; install it with: apt install libegl1"
+
+
+@contextlib.contextmanager
+def _window(off_screen: bool) -> Iterator[None]:
+    """Have VTK make the window that the probe found, and leave the environment as it was."""
+    if not off_screen:
+        yield
+        return
+    window = probe_rendering()
+    before = os.environ.get(_WINDOW)
+    if window:
+        os.environ[_WINDOW] = window
+    try:
+        yield
+    finally:
+        if window and before is None:
+            os.environ.pop(_WINDOW, None)

@@ -1,0 +1,426 @@
+"""Pictures of a record: figures by matplotlib; pictures, films and a viewer by PyVista.
+
+Both are extras, imported when first used: ``pip install "withe[view]"``.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+from withe.extras import require
+from withe.progress import progress as progress_bar
+from withe.rendering import ColorBy, Stage
+
+if TYPE_CHECKING:
+    from withe.recording import Record
+
+__all__ = ["animate", "picture", "plot", "view"]
+
+FloatArray = npt.NDArray[np.float64]
+
+
+def picture(
+    record: Record,
+    path: str | os.PathLike[str],
+    *,
+    frame: int = -1,
+    size: Sequence[int] = (1280, 960),
+    color_by: ColorBy = "rod",
+    camera: str | npt.ArrayLike | None = None,
+    label: str | None = None,
+) -> Path:
+    """Render one frame as tubes into a .png file.
+
+    Parameters
+    ----------
+    record : Record
+    path : path
+        The file, ending in .png.
+    frame : int
+        Which frame; negative numbers count from the last one.
+    size : pair of int [px]
+    color_by : {"rod", "tension", "curvature", "twist", "speed"}
+        One colour a rod, or the quantity with its scale, the same for all frames.
+    camera : str or array_like of shape (3,), optional
+        From where to look: "front", "side", "top", "oblique" or a direction. By default along the
+        normal of a planar motion, and obliquely at any other. All frames fit into the picture.
+    label : str, optional
+        Text in the lower left corner.
+
+    Returns
+    -------
+    pathlib.Path
+        The file.
+
+    Raises
+    ------
+    ValueError
+        A record without frames, a frame that it has not, another suffix, or an option out of range.
+    ImportError
+        PyVista is not installed.
+    RuntimeError
+        Nothing can be rendered here; the message names the package to install.
+    """
+    path = _path(path, ".png")
+    number = _frame(record, frame)
+    stage = Stage(record, size=size, color_by=color_by, camera=camera)
+    try:
+        stage.show(number)
+        if label:
+            stage.label(label)
+        pyplot_image = require("matplotlib.image", "view")
+        pyplot_image.imsave(path, stage.image())
+    finally:
+        stage.close()
+    return path
+
+
+def animate(
+    record: Record,
+    path: str | os.PathLike[str],
+    *,
+    fps: float | None = None,
+    speed: float = 1.0,
+    size: Sequence[int] = (1280, 720),
+    color_by: ColorBy = "rod",
+    camera: str | npt.ArrayLike | None = None,
+    progress: bool | Literal["always"] = True,
+) -> Path:
+    """Render the rods as tubes into a film.
+
+    Parameters
+    ----------
+    record : Record
+    path : path
+        The file, ending in .mp4 or .gif.
+    fps : float, optional
+        Pictures a second of film; 30 for .mp4, 20 for .gif. Between two frames of the record the rods
+        are drawn in between.
+    speed : float
+        Seconds of the simulation shown in one second of film.
+    size, color_by, camera
+        As in `picture`.
+    progress : bool or "always"
+        Whether to show a progress bar, as in `Simulation.run`.
+
+    Returns
+    -------
+    pathlib.Path
+        The file.
+
+    Raises
+    ------
+    ValueError
+        A record without frames, another suffix, or an option out of range.
+    ImportError
+        PyVista or imageio-ffmpeg is not installed.
+    RuntimeError
+        Nothing can be rendered here, or ffmpeg fails; the message says why.
+    """
+    path = _path(path, ".mp4", ".gif")
+    fps = float(fps if fps is not None else (30.0 if path.suffix.lower() == ".mp4" else 20.0))
+    for name, value in (("fps", fps), ("speed", speed)):
+        if not (np.isfinite(value) and value > 0.0):
+            raise ValueError(f"{name} must be positive, got {value!r}")
+    encoder = require("imageio_ffmpeg", "view").get_ffmpeg_exe()
+    stage = Stage(record, size=_even(size), color_by=color_by, camera=camera)
+    try:
+        places = film_places(stage.times, speed / fps)
+        with (
+            _Film(encoder, path, stage.size, fps) as film,
+            progress_bar(len(places), "rendering", progress, unit="pictures") as bar,
+        ):
+            for place in places:
+                stage.show(place)
+                stage.label(f"t = {np.interp(place, np.arange(len(stage.times)), stage.times):.2f} s")
+                film.write(stage.image())
+                bar.advance(1)
+    finally:
+        stage.close()
+    return path
+
+
+def view(
+    record: Record,
+    *,
+    size: Sequence[int] = (1024, 640),
+    color_by: ColorBy = "rod",
+    camera: str | npt.ArrayLike | None = None,
+    backend: str | None = None,
+) -> Any:
+    """Turn the rods about and slide through time, in a notebook or a window.
+
+    Parameters
+    ----------
+    record : Record
+    size, color_by, camera
+        As in `picture`.
+    backend : str, optional
+        PyVista's way to show it in a notebook, such as "trame" or "static"; its own choice by default.
+
+    Returns
+    -------
+    widget
+        In a notebook, what displays the viewer; None elsewhere.
+
+    Raises
+    ------
+    ValueError, ImportError, RuntimeError
+        As in `picture`.
+    """
+    notebook = _in_notebook()
+    stage = Stage(record, size=size, color_by=color_by, camera=camera, off_screen=notebook)
+    if len(record) > 1 and backend != "static":
+        stage.plotter.add_slider_widget(
+            lambda time: stage.show(float(np.interp(time, stage.times, np.arange(len(stage.times))))),
+            rng=(float(stage.times[0]), float(stage.times[-1])),
+            value=float(stage.times[0]),
+            title="time [s]",
+            color="#33383d",
+            pointa=(0.06, 0.1),
+            pointb=(0.4, 0.1),
+            style="modern",
+        )
+    stage.plotter.add_axes(color="#33383d")
+    options = {"jupyter_backend": backend} if notebook and backend else {}
+    return stage.plotter.show(**options)
+
+
+def plot(record: Record, *, shapes: int = 6) -> Any:
+    """Draw the shapes of the rods at several times, and the energies over time.
+
+    Parameters
+    ----------
+    record : Record
+    shapes : int
+        At how many times, evenly chosen, the first and last among them.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        In two dimensions where the motion stays in a coordinate plane, else in three.
+
+    Raises
+    ------
+    ValueError
+        A record without frames, or fewer than one shape.
+    ImportError
+        matplotlib is not installed.
+
+    Examples
+    --------
+    >>> record.plot(shapes=4).savefig("arm.png")      # doctest: +SKIP
+    """
+    if len(record) == 0:
+        raise ValueError("record has no frames to plot")
+    if int(shapes) != shapes or shapes < 1:
+        raise ValueError(f"shapes must be a positive integer, got {shapes!r}")
+    pyplot = require("matplotlib.pyplot", "view")
+    with pyplot.rc_context(_STYLE):
+        single = len(record) == 1
+        figure = pyplot.figure(figsize=(5.5, 4.6) if single else (11.0, 4.6), layout="constrained")
+        grid = figure.add_gridspec(1, 1 if single else 2, width_ratios=[1] if single else [1.1, 1.0])
+        _plot_shapes(figure, grid[0], record, int(shapes))
+        if not single:
+            _plot_energies(figure.add_subplot(grid[1]), record)
+    if "inline" in pyplot.get_backend():
+        pyplot.close(figure)  # a notebook shows what the cell returns, and would show this twice
+    return figure
+
+
+_STYLE = {
+    "axes.edgecolor": "#8a9299",
+    "axes.labelcolor": "#33383d",
+    "axes.spines.right": False,
+    "axes.spines.top": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": "#e3e7ea",
+    "grid.linewidth": 0.8,
+    "xtick.color": "#5c646b",
+    "ytick.color": "#5c646b",
+    "legend.frameon": False,
+    "lines.solid_capstyle": "round",
+    "font.size": 10,
+}
+_ENERGY_COLOURS = {
+    "kinetic": "#e76f51",
+    "stretch": "#e9b44c",
+    "bend": "#2a9d8f",
+    "twist": "#8d6a9f",
+    "gravity": "#457b9d",
+    "loads": "#6a994e",
+    "contact": "#c8553d",
+    "total": "#33383d",
+}
+
+
+def _plot_shapes(figure: Any, place: Any, record: Record, count: int) -> None:
+    colormaps = require("matplotlib", "view").colormaps
+    colors = require("matplotlib.colors", "view")
+    cm = require("matplotlib.cm", "view")
+    positions, times = record.positions(), record.times
+    frames = np.unique(np.linspace(0, len(record) - 1, count).round().astype(int))
+    size = float(np.ptp(positions.reshape(-1, 3), axis=0).max())
+    factor, prefix = _prefix(size, (1.0, 1e-3, 1e-6))
+    axes_shown = _plane(positions)
+    three = axes_shown is None
+    shown = list(range(3)) if axes_shown is None else axes_shown
+    axes = figure.add_subplot(place, projection="3d" if three else None)
+    late = colors.LinearSegmentedColormap.from_list("ink", colormaps["YlGnBu"](np.linspace(0.3, 1.0, 64)))
+    end = times[-1] if times[-1] > times[0] else times[0] + 1.0
+    scale = cm.ScalarMappable(colors.Normalize(times[0], end), late)
+    for frame in frames:
+        for rod in record.rods:
+            points = positions[frame, rod.rows][:, shown] * factor
+            if rod.closed:
+                points = np.concatenate([points, points[:1]])
+            axes.plot(*points.T, color=scale.to_rgba(times[frame]), linewidth=2.2)
+    names = "xyz"
+    axes.set_xlabel(f"{names[shown[0]]} [{prefix}m]")
+    axes.set_ylabel(f"{names[shown[1]]} [{prefix}m]")
+    if three:
+        axes.set_zlabel(f"z [{prefix}m]")
+        for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
+            axis.set_pane_color((1.0, 1.0, 1.0, 0.0))
+            axis.set_major_locator(require("matplotlib.ticker", "view").MaxNLocator(4))
+    axes.set_aspect("equal", adjustable="datalim" if not three else None)
+    if len(frames) > 1:
+        bar = figure.colorbar(scale, ax=axes, shrink=0.75, pad=0.12 if three else 0.03, ticks=times[frames])
+        bar.set_label("time [s]")
+        bar.ax.set_yticklabels([f"{time:.3g}" for time in times[frames]])
+        bar.outline.set_visible(False)
+
+
+def _plot_energies(axes: Any, record: Record) -> None:
+    energy, times = record.energy(), record.times
+    curves = {name: getattr(energy, name) for name in _ENERGY_COLOURS}
+    # Heights have no zero of their own: gravity counts from the first frame.
+    curves["total"] = curves["total"] - energy.gravity[0]
+    curves["gravity"] = curves["gravity"] - energy.gravity[0]
+    largest = max(float(np.abs(values).max()) for values in curves.values())
+    factor, prefix = _prefix(largest, (1.0, 1e-3, 1e-6, 1e-9))
+    for name, values in curves.items():
+        if name == "total" or np.abs(values).max() > 1e-9 * largest:
+            width = 1.4 if name == "total" else 1.8
+            style = "--" if name == "total" else "-"
+            label = "gravity, from the start" if name == "gravity" else name
+            axes.plot(times, values * factor, style, color=_ENERGY_COLOURS[name], linewidth=width, label=label)
+    axes.set_xlabel("time [s]")
+    axes.set_ylabel(f"energy [{prefix}J]")
+    axes.margins(x=0.0)
+    axes.legend(loc="best")
+
+
+def _prefix(largest: float, units: tuple[float, ...]) -> tuple[float, str]:
+    """A factor and its prefix that bring the largest value to one or more."""
+    prefixes = {1.0: "", 1e-3: "m", 1e-6: "\N{MICRO SIGN}", 1e-9: "n"}
+    unit = next((unit for unit in units if largest >= unit), units[-1] if largest > 0.0 else 1.0)
+    return 1.0 / unit, prefixes[unit]
+
+
+def _plane(positions: FloatArray) -> list[int] | None:
+    """The two coordinates of a motion in a coordinate plane; None for any other."""
+    extents = np.ptp(positions.reshape(-1, 3), axis=0)
+    flat = extents <= 1e-6 * extents.max()
+    if not flat.any():
+        return None
+    missing = 1 if flat[1] else int(np.flatnonzero(flat)[0])
+    return [axis for axis in range(3) if axis != missing]
+
+
+def _frame(record: Record, frame: int) -> int:
+    count = len(record)
+    if int(frame) != frame or not -count <= frame < count:
+        raise ValueError(f"frame must lie in {-count}..{count - 1}, got {frame!r}")
+    return int(frame) % count
+
+
+def _path(path: str | os.PathLike[str], *suffixes: str) -> Path:
+    path = Path(path)
+    if path.suffix.lower() not in suffixes:
+        raise ValueError(f"path must end in {' or '.join(suffixes)}, got {str(path)!r}")
+    return path
+
+
+def _even(size: Sequence[int]) -> Sequence[int]:
+    """Films need even sides."""
+    try:
+        return [int(side) // 2 * 2 for side in size]
+    except (TypeError, ValueError):
+        return size
+
+
+def film_places(times: FloatArray, interval: float) -> FloatArray:
+    """Where in the record the pictures of a film lie, as fractional frame numbers.
+
+    Parameters
+    ----------
+    times : ndarray of shape (frames,) [s]
+    interval : float
+        Time of the simulation between two pictures [s].
+
+    Returns
+    -------
+    ndarray of shape (pictures,)
+        The frames themselves where time does not pass.
+    """
+    duration = float(times[-1] - times[0])
+    if duration <= 0.0 or np.any(np.diff(times) <= 0.0):
+        return np.arange(len(times), dtype=float)
+    moments = times[0] + interval * np.arange(int(np.floor(duration / interval + 1e-9)) + 1)
+    return np.asarray(np.interp(moments, times, np.arange(len(times))), float)
+
+
+def _in_notebook() -> bool:
+    """Whether this runs in a Jupyter kernel."""
+    try:
+        shell = require("IPython", "view").get_ipython()
+    except ImportError:
+        return False
+    return shell is not None and hasattr(shell, "kernel")
+
+
+class _Film:
+    """Pictures that go to ffmpeg as they are made."""
+
+    def __init__(self, encoder: str, path: Path, size: tuple[int, int], fps: float) -> None:
+        source = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}", "-r", f"{fps:g}", "-i", "-"]
+        if path.suffix.lower() == ".gif":
+            filters = "split[a][b];[a]palettegen=stats_mode=diff[p];[b][p]paletteuse=dither=none:diff_mode=rectangle"
+            target = ["-filter_complex", filters, "-loop", "0"]
+        else:
+            target = ["-c:v", "libx264", "-crf", "18", "-pix_fmt", "yuv420p", "-movflags", "+faststart"]
+        self._command = [encoder, "-y", "-loglevel", "error", *source, *target, os.fspath(path.absolute())]
+
+    def __enter__(self) -> _Film:
+        self._process = subprocess.Popen(
+            self._command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
+        )
+        return self
+
+    def write(self, image: npt.NDArray[np.uint8]) -> None:
+        """Append one picture, shape (height, width, 3)."""
+        assert self._process.stdin is not None
+        try:
+            self._process.stdin.write(np.ascontiguousarray(image).tobytes())
+        except BrokenPipeError:
+            self._finish()
+
+    def _finish(self) -> None:
+        _, errors = self._process.communicate()
+        if self._process.returncode != 0:
+            raise RuntimeError(f"ffmpeg failed: {errors.decode(errors='replace').strip()}")
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        if kind is None:
+            self._finish()
+        else:
+            self._process.kill()
+            self._process.communicate()

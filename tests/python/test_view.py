@@ -1,0 +1,320 @@
+"""Pictures: what is drawn is the record, options are checked, and what is missing is named."""
+
+import builtins
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from curling_motion import CURVATURE_RATE, CurlingSimulation
+from withe import rendering, view
+from withe.extras import require
+from withe.recording import Recorder, RodOutline, present
+from withe.tubes import Tube
+
+
+@pytest.fixture
+def record():
+    simulation = CurlingSimulation()
+    recorder = Recorder(simulation)
+    for _ in range(6):
+        recorder.capture()
+        simulation.step(0.1)
+    return recorder.record
+
+
+@pytest.fixture
+def renderer():
+    """Skips, and says so, where nothing can be rendered."""
+    pytest.importorskip("pyvista")
+    try:
+        rendering.probe_rendering()
+    except RuntimeError as error:
+        pytest.skip(str(error))
+
+
+def outline(nodes, radius=0.01, closed=False, widths=None):
+    edges = nodes if closed else nodes - 1
+    widths = None if widths is None else np.tile(widths, (edges, 1)).astype(float)
+    return RodOutline("rod", np.arange(nodes), closed, np.full(edges, radius), widths)
+
+
+# Surfaces of rods
+
+
+def enclosed_volume(tube, points):
+    """Volume inside a closed surface of quadrilaterals, positive where they face outwards."""
+    a, b, c, d = (points[tube.faces[:, corner]] for corner in range(4))
+    triangles = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+    return np.linalg.det(triangles).sum() / 6.0
+
+
+def test_a_straight_round_rod_encloses_a_cylinder_and_two_half_spheres():
+    nodes = np.linspace([0, 0, 0], [0, 0, 1.0], 11)
+    tube = Tube(outline(11, 0.1), nodes, 4, sides=96)
+    points, _ = tube.surface(nodes, np.tile([1.0, 0, 0], (10, 1)))
+    exact = np.pi * 0.1**2 * 1.0 + 4 / 3 * np.pi * 0.1**3
+    assert enclosed_volume(tube, points) == pytest.approx(exact, rel=3e-3)
+
+
+def test_a_ring_encloses_a_torus():
+    angles = 2 * np.pi * np.arange(24) / 24
+    nodes = np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1)
+    tube = Tube(outline(24, 0.1, closed=True), nodes, 6, sides=96)
+    points, _ = tube.surface(nodes, np.tile([0, 0, 1.0], (24, 1)))
+    assert enclosed_volume(tube, points) == pytest.approx(2 * np.pi**2 * 0.1**2, rel=3e-3)
+
+
+def test_a_rectangle_has_its_width_along_d1_and_its_height_along_d2():
+    nodes = np.linspace([0, 0, 0], [0, 0, 1.0], 5)
+    tube = Tube(outline(5, 0.1, widths=(0.2, 0.05)), nodes)
+    points, normals = tube.surface(nodes, np.tile([0, 1.0, 0], (4, 1)))
+    np.testing.assert_allclose(np.ptp(points, axis=0), [0.05, 0.2, 1.0], atol=1e-12)
+    assert enclosed_volume(tube, points) == pytest.approx(0.2 * 0.05 * 1.0)
+    np.testing.assert_allclose(np.abs(normals).max(axis=1), 1.0, atol=1e-12)
+
+
+def test_normals_are_of_unit_length_and_point_outwards():
+    simulation = CurlingSimulation(0.5)
+    rod = present(simulation).rods[0]
+    tube = Tube(rod, simulation.positions("arm"))
+    points, normals = tube.surface(simulation.positions("arm"), simulation.directors("arm")[:, 0])
+    np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1.0, atol=1e-12)
+    assert enclosed_volume(tube, points + 1e-4 * normals) > enclosed_volume(tube, points)
+
+
+def test_the_surface_lies_one_radius_from_a_circular_centreline():
+    kappa = CURVATURE_RATE * 0.8
+    simulation = CurlingSimulation(0.8)
+    nodes = simulation.positions("arm")
+    rod = outline(21, 0.004)
+    points, _ = Tube(rod, nodes, 5).surface(nodes, simulation.directors("arm")[:, 0])
+    body = points[(points[:, 2] < -0.01) & (points[:, 2] > nodes[-1, 2] + 0.01)]
+    to_axis = np.hypot(body[:, 0] - 1 / kappa, body[:, 2]) - 1 / kappa
+    np.testing.assert_allclose(np.hypot(to_axis, body[:, 1]), 0.004, rtol=1e-3)
+
+
+@pytest.mark.parametrize("count", [2, 3])
+def test_the_shortest_rods_have_a_surface(count):
+    nodes = np.linspace([0, 0, 0], [0.1, 0, 0], count)
+    points, _ = Tube(outline(count), nodes).surface(nodes, np.tile([0, 0, 1.0], (count - 1, 1)))
+    assert np.isfinite(points).all()
+
+
+# Figures
+
+
+def test_the_figure_has_shapes_and_energies_with_units(record):
+    pytest.importorskip("matplotlib").use("Agg")
+    figure = record.plot(shapes=4)
+    shapes, energies = figure.axes[0], figure.axes[1]
+    assert shapes.get_xlabel() == "x [mm]"
+    assert shapes.get_zlabel() == "z [mm]"
+    assert len(shapes.lines) == 4 * 3
+    labels = {axes.get_xlabel() for axes in figure.axes} | {axes.get_ylabel() for axes in figure.axes}
+    assert {"time [s]", "energy [mJ]"} <= labels
+    drawn = {line.get_label(): line for axes in figure.axes for line in axes.lines}
+    np.testing.assert_allclose(drawn["bend"].get_ydata(), 1e3 * record.energy().bend)
+    assert "stretch" not in drawn
+    assert energies is not shapes
+
+
+def test_a_planar_motion_is_drawn_in_its_plane(record):
+    pytest.importorskip("matplotlib").use("Agg")
+    simulation = CurlingSimulation()
+    simulation.rods = simulation.rods[:2]
+    simulation.positions = lambda rod=None: CurlingSimulation(simulation.time).positions(rod)[:31]
+    simulation.velocities = lambda rod=None: CurlingSimulation(simulation.time).velocities(rod)[:31]
+    recorder = Recorder(simulation)
+    for _ in range(3):
+        recorder.capture()
+        simulation.step(0.1)
+    axes = recorder.record.plot(shapes=2).axes[0]
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("x [mm]", "z [mm]")
+    assert axes.get_aspect() == 1.0
+    np.testing.assert_allclose(axes.lines[0].get_ydata(), 1e3 * recorder.record.positions("arm")[0, :, 2])
+
+
+def test_the_present_state_is_one_frame_without_energies_over_time():
+    pytest.importorskip("matplotlib").use("Agg")
+    figure = present(CurlingSimulation(0.3)).plot()
+    assert len(figure.axes) == 1
+
+
+# Pictures and films
+
+
+def test_a_picture_shows_the_rods_on_a_light_ground(record, renderer, tmp_path):
+    path = record.picture(tmp_path / "arm.png", size=(320, 240), label="t = 0.5 s")
+    image = require("matplotlib.image", "view").imread(path)[..., :3]
+    assert image.shape == (240, 320, 3)
+    assert np.median(image) > 0.85
+    teal = (image[..., 1] > image[..., 0] + 0.2) & (image[..., 1] > 0.3)
+    assert teal.sum() > 100
+
+
+def test_frames_differ_and_the_last_is_the_default(record, renderer, tmp_path):
+    first, last, default = (
+        record.picture(tmp_path / f"{name}.png", size=(160, 120), **options).read_bytes()
+        for name, options in (("first", {"frame": 0}), ("last", {"frame": 5}), ("default", {}))
+    )
+    assert first != last
+    assert last == default
+
+
+@pytest.mark.parametrize("color_by", ["tension", "curvature", "twist", "speed"])
+def test_every_quantity_can_colour_the_rods(record, renderer, tmp_path, color_by):
+    path = record.picture(tmp_path / "arm.png", size=(200, 150), color_by=color_by, camera="front")
+    assert path.stat().st_size > 1000
+
+
+@pytest.mark.parametrize("camera", [None, "front", "side", "top", "oblique", (1.0, 2.0, 3.0)])
+def test_all_frames_are_in_view_from_everywhere(record, renderer, camera):
+    stage = rendering.Stage(record, size=(320, 200), camera=camera)
+    try:
+        matrix = stage.plotter.camera.GetCompositeProjectionTransformMatrix(1.6, -1, 1)
+        projection = np.array([[matrix.GetElement(i, j) for j in range(4)] for i in range(4)])
+    finally:
+        stage.close()
+    points = record.positions().reshape(-1, 3)
+    seen = np.column_stack([points, np.ones(len(points))]) @ projection.T
+    across = np.abs(seen[:, :2] / seen[:, 3:])
+    assert across.max() < 0.95
+    assert across.max() > 0.6
+
+
+@pytest.mark.parametrize("suffix", [".mp4", ".gif"])
+def test_films_have_the_pictures_of_their_duration(record, renderer, tmp_path, suffix):
+    encoder = pytest.importorskip("imageio_ffmpeg")
+    path = record.animate(tmp_path / f"arm{suffix}", fps=10, size=(161, 120), progress=False)
+    reader = encoder.read_frames(str(path))
+    assert next(reader)["size"] == (160, 120)
+    pictures = list(reader)
+    assert len(pictures) == 6
+    assert pictures[0] != pictures[-1]
+
+
+def test_a_film_interpolates_between_frames_at_its_own_speed():
+    times = np.array([0.0, 0.1, 0.3])
+    np.testing.assert_allclose(view.film_places(times, 0.05), [0, 0.5, 1, 1.25, 1.5, 1.75, 2])
+    np.testing.assert_allclose(view.film_places(times, 0.2), [0, 1.5])
+    np.testing.assert_array_equal(view.film_places(np.zeros(3), 0.05), [0, 1, 2])
+    np.testing.assert_array_equal(view.film_places(np.zeros(1), 0.05), [0])
+
+
+def test_an_exception_while_rendering_ends_ffmpeg(record, renderer, tmp_path, monkeypatch):
+    pytest.importorskip("imageio_ffmpeg")
+
+    def interrupt(self):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(rendering.Stage, "image", interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        record.animate(tmp_path / "arm.mp4", size=(160, 120), progress=False)
+
+
+def test_a_failure_of_ffmpeg_is_told(record, renderer, tmp_path):
+    pytest.importorskip("imageio_ffmpeg")
+    with pytest.raises(RuntimeError, match="ffmpeg failed"):
+        record.animate(tmp_path / "missing" / "arm.mp4", size=(160, 120), progress=False)
+
+
+# What is refused
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"frame": 6}, r"frame must lie in -6\.\.5, got 6"),
+        ({"frame": 0.5}, "frame must lie in"),
+        ({"size": (10,)}, "size must be two integers"),
+        ({"size": (0, 100)}, "size must lie between"),
+        ({"color_by": "mood"}, "color_by must be one of 'rod', 'tension'"),
+        ({"camera": "below"}, "camera must be one of 'front'"),
+        ({"camera": (0, 0, 0)}, "camera must be a direction"),
+        ({"camera": (0, np.nan, 1)}, "camera must be a direction"),
+    ],
+)
+def test_options_out_of_range_are_refused_by_name(record, tmp_path, options, message):
+    with pytest.raises(ValueError, match=message):
+        record.picture(tmp_path / "arm.png", **options)
+
+
+@pytest.mark.parametrize("options", [{"fps": 0}, {"fps": np.inf}, {"speed": -1.0}, {"speed": np.nan}])
+def test_rates_must_be_positive(record, tmp_path, options):
+    with pytest.raises(ValueError, match="must be positive"):
+        record.animate(tmp_path / "arm.mp4", **options)
+
+
+def test_other_suffixes_are_refused(record, tmp_path):
+    with pytest.raises(ValueError, match=r"path must end in \.mp4 or \.gif"):
+        record.animate(tmp_path / "arm.avi")
+    with pytest.raises(ValueError, match=r"path must end in \.png"):
+        record.picture(tmp_path / "arm.jpg")
+
+
+def test_a_record_without_frames_has_nothing_to_show(tmp_path):
+    empty = Recorder(CurlingSimulation()).record
+    for show in (empty.plot, empty.view, lambda: empty.animate(tmp_path / "a.mp4")):
+        with pytest.raises(ValueError, match="no frames"):
+            show()
+
+
+def test_a_missing_package_names_its_extra(record, monkeypatch, tmp_path):
+    for name in [name for name in sys.modules if name.split(".")[0] in ("pyvista", "matplotlib")]:
+        monkeypatch.delitem(sys.modules, name)
+    real = builtins.__import__
+
+    def without(name, *args, **kwargs):
+        if name.split(".")[0] in ("pyvista", "matplotlib"):
+            raise ModuleNotFoundError(f"No module named {name!r}", name=name.split(".")[0])
+        return real(name, *args, **kwargs)
+
+    monkeypatch.setattr(builtins, "__import__", without)
+    monkeypatch.setattr("importlib.import_module", without)
+    with pytest.raises(ImportError, match=r'pip install "withe\[view\]"'):
+        record.plot()
+    with pytest.raises(ImportError, match=r'pip install "withe\[view\]"'):
+        record.picture(tmp_path / "arm.png")
+
+
+def test_a_missing_package_inside_a_package_is_not_blamed_on_the_extra(monkeypatch, tmp_path):
+    (tmp_path / "broken_package.py").write_text("import not_there_at_all")
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(ModuleNotFoundError, match="not_there_at_all"):
+        require("broken_package", "view")
+
+
+@pytest.mark.parametrize(
+    ("output", "package"),
+    [
+        ("ImportError: libGL.so.1: cannot open shared object file", "libgl1"),
+        ("ImportError: libXrender.so.1: cannot open shared object file", "libxrender1"),
+        ("vtkEGLRenderWindow: no devices found", "libegl1"),
+        ("", "libegl1"),
+    ],
+)
+@pytest.mark.skipif(sys.platform != "linux", reason="names packages of Debian")
+def test_a_first_render_that_fails_or_crashes_names_the_package_to_install(record, monkeypatch, output, package):
+    def crash(command, **options):
+        return subprocess.CompletedProcess(command, -11, "", output)
+
+    rendering.probe_rendering.cache_clear()
+    monkeypatch.setattr(subprocess, "run", crash)
+    try:
+        with pytest.raises(RuntimeError, match=f"apt install {package}"):
+            rendering.probe_rendering()
+    finally:
+        rendering.probe_rendering.cache_clear()
+
+
+def test_importing_the_views_imports_no_heavy_package():
+    code = (
+        "import sys, withe.view, withe.recording, withe.io, withe.shapes\n"
+        "heavy = {'matplotlib', 'pyvista', 'vtk', 'vtkmodules', 'imageio_ffmpeg', 'rich', 'IPython', 'scipy'}\n"
+        "print(sorted(heavy & {name.split('.')[0] for name in sys.modules}))"
+    )
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment, check=True)
+    assert result.stdout.strip() == "[]"
