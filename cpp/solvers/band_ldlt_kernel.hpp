@@ -37,7 +37,6 @@ void factorize(FixedBand<kHalfBandwidth>, int size, const Scalar* values, const 
     for (int m = kHalfBandwidth; m >= 1; --m) {
       const Scalar* earlier = factor - static_cast<std::ptrdiff_t>(m) * kStride;
       const Scalar weight = earlier[m] * earlier[0];
-#pragma GCC unroll 32
       for (int i = 0; i < (kHalfBandwidth - m + 2) / 2 * 2; ++i) column[i] -= earlier[m + i] * weight;
     }
     const Scalar inverse = Scalar(1) / column[0];

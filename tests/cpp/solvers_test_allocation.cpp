@@ -1,0 +1,91 @@
+// Counts every allocation of this executable. With glibc, malloc itself is replaced, so that C libraries count too;
+// elsewhere, and under sanitizers that own malloc, only operator new.
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <new>
+#include <vector>
+
+#include "solvers/linear_solver.hpp"
+
+namespace {
+std::size_t allocation_count = 0;
+}
+
+#if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+extern "C" {
+void* __libc_malloc(std::size_t size);
+void* __libc_calloc(std::size_t count, std::size_t size);
+void* __libc_realloc(void* block, std::size_t size);
+void* malloc(std::size_t size) {
+  ++allocation_count;
+  return __libc_malloc(size);
+}
+void* calloc(std::size_t count, std::size_t size) {
+  ++allocation_count;
+  return __libc_calloc(count, size);
+}
+void* realloc(void* block, std::size_t size) {
+  ++allocation_count;
+  return __libc_realloc(block, size);
+}
+}
+#else
+void* operator new(std::size_t size) {
+  ++allocation_count;
+  if (void* block = std::malloc(size)) return block;
+  throw std::bad_alloc();
+}
+void operator delete(void* block) noexcept { std::free(block); }
+void operator delete(void* block, std::size_t) noexcept { std::free(block); }
+#endif
+
+namespace withe {
+namespace {
+
+TEST(AllocationCounter, SeesAVector) {
+  const std::size_t before = allocation_count;
+  const std::vector<double> numbers(100, 1.0);
+  EXPECT_GT(allocation_count, before);
+  EXPECT_EQ(numbers.size(), 100u);
+}
+
+TEST(LinearSolver, DoesNotAllocateAfterTheFirstFactorisation) {
+  const int size = 300;
+  std::vector<std::vector<int>> cliques;
+  for (int i = 0; i + 10 < size; ++i) cliques.push_back({i, i + 3, i + 7, i + 10});
+  const SparsityPattern pattern = SparsityPattern::from_cliques(size, cliques);
+  const std::vector<double> shift(size, 1.0);
+  for (Symmetry symmetry : {Symmetry::symmetric, Symmetry::unsymmetric}) {
+    for (SolverKind kind : {SolverKind::band, SolverKind::sparse}) {
+      const auto solver = make_linear_solver(pattern, symmetry, kind);
+      const auto set = [&](double diagonal) {
+        for (double& value : solver->values()) value = 0.0;
+        for (int column = 0; column < size; ++column) {
+          for (int p = pattern.column_starts[column]; p < pattern.column_starts[column + 1]; ++p) {
+            const int row = pattern.row_indices[p];
+            if (symmetry == Symmetry::symmetric && row < column) continue;
+            solver->values()[solver->offset(row, column)] = row == column ? diagonal : 0.5 + 0.01 * (row % 7);
+          }
+        }
+      };
+      std::vector<double> x(size, 1.0), y(size, 0.0);
+      set(20.0);
+      ASSERT_EQ(solver->factorize().status, FactorStatus::ok);
+      const std::size_t before = allocation_count;
+      for (double diagonal : {30.0, -25.0}) {
+        set(diagonal);
+        solver->factorize();
+        solver->solve(x);
+        solver->factorize(shift);
+        solver->solve_transposed(x);
+        solver->multiply(x, y);
+      }
+      EXPECT_EQ(allocation_count, before) << solver->name();
+    }
+  }
+}
+
+}  // namespace
+}  // namespace withe
