@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+
 from withe import io
 
 __all__ = ["EnergyHistory", "Record", "Recorder", "RodOutline"]

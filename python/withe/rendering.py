@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import numpy.typing as npt
+
 from withe.extras import require
 from withe.io import edges_to_nodes, stencils_to_nodes
 from withe.tubes import Tube
@@ -42,7 +43,6 @@ _INK = "#33383d"
 _MAX_SAMPLES = 6000  # rings of all rods together
 _SHADOW_CELLS = 320
 _BLURS = (2.5, 5.0, 9.0, 14.0)  # [cells], by height above the ground
-_SUPERSAMPLING = 2  # pixels rendered for one shown, along each side
 
 
 class Stage:
@@ -58,6 +58,8 @@ class Stage:
         normal of a planar motion, and obliquely at any other.
     off_screen : bool
         Render into memory rather than into a window.
+    supersampling : int
+        Pixels rendered for one pixel shown, along each side.
 
     Raises
     ------
@@ -75,6 +77,7 @@ class Stage:
         color_by: ColorBy = "rod",
         camera: str | npt.ArrayLike | None = None,
         off_screen: bool = True,
+        supersampling: int = 2,
     ) -> None:
         if len(record) == 0:
             raise ValueError("record has no frames to show")
@@ -94,16 +97,16 @@ class Stage:
         direction = _direction(camera, self._positions)
 
         pyvista = require("pyvista", "view")
-        self._fineness = _SUPERSAMPLING if off_screen else 1
+        self._fineness = supersampling
         window = [side * self._fineness for side in self.size]
         with _window(off_screen):
             self.plotter = pyvista.Plotter(off_screen=off_screen, window_size=window, lighting="none")
-        self.plotter.set_background("#e4e9ee", top="#ffffff")
+        self.plotter.set_background("#f5f7f9")
         self._frame_camera(direction)
         self._add_lights(pyvista, direction)
         self._add_shadow(pyvista)
         self._add_rods(pyvista, color_by)
-        if not off_screen:
+        if supersampling == 1:
             self.plotter.enable_anti_aliasing("ssaa")
         self._label: Any = None
         self.show(0.0)

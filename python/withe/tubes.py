@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
+
 from withe.recording import RodOutline
 
 __all__ = ["Tube"]
@@ -113,7 +114,7 @@ class Tube:
 
 def _unit(vectors: FloatArray) -> FloatArray:
     lengths = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return np.divide(vectors, np.maximum(lengths, 1e-300))
+    return np.asarray(vectors / np.maximum(lengths, 1e-300), float)
 
 
 def _subdivide(knots: FloatArray, count: int) -> FloatArray:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import numpy.typing as npt
+
 from withe.extras import require
 from withe.progress import progress as progress_bar
 from withe.rendering import ColorBy, Stage
@@ -75,7 +76,7 @@ def picture(
         if label:
             stage.label(label)
         pyplot_image = require("matplotlib.image", "view")
-        pyplot_image.imsave(path, stage.image())
+        pyplot_image.imsave(path, stage.image(), pil_kwargs={"optimize": True})
     finally:
         stage.close()
     return path
@@ -175,7 +176,7 @@ def view(
         As in `picture`.
     """
     notebook = _in_notebook()
-    stage = Stage(record, size=size, color_by=color_by, camera=camera, off_screen=notebook)
+    stage = Stage(record, size=size, color_by=color_by, camera=camera, off_screen=notebook, supersampling=1)
     if len(record) > 1 and backend != "static":
         stage.plotter.add_slider_widget(
             lambda time: stage.show(float(np.interp(time, stage.times, np.arange(len(stage.times))))),
@@ -183,11 +184,14 @@ def view(
             value=float(stage.times[0]),
             title="time [s]",
             color="#33383d",
-            pointa=(0.06, 0.1),
-            pointb=(0.4, 0.1),
-            style="modern",
+            pointa=(0.3, 0.1),
+            pointb=(0.7, 0.1),
+            slider_width=0.02,
+            tube_width=0.004,
+            title_height=0.02,
+            fmt="%.2f",
         )
-    stage.plotter.add_axes(color="#33383d")
+    stage.plotter.add_axes(color="#33383d", viewport=(0.0, 0.0, 0.16, 0.2))
     options = {"jupyter_backend": backend} if notebook and backend else {}
     return stage.plotter.show(**options)
 

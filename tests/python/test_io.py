@@ -8,6 +8,7 @@ from dataclasses import fields
 
 import numpy as np
 import pytest
+
 from curling_motion import CurlingSimulation
 from withe.io import load_arrays, save_arrays
 from withe.recording import EnergyHistory, Record, Recorder

@@ -5,6 +5,7 @@ from dataclasses import fields
 
 import numpy as np
 import pytest
+
 from curling_motion import CURVATURE_RATE, CurlingSimulation
 from withe.recording import EnergyHistory, Recorder, present
 

@@ -7,6 +7,7 @@ import sys
 
 import numpy as np
 import pytest
+
 from curling_motion import CURVATURE_RATE, CurlingSimulation
 from withe import rendering, view
 from withe.extras import require

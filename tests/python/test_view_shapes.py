@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from withe.shapes import arc, circle, helix
 
 
