@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from withe.extras import require
 from withe.io import edges_to_nodes, stencils_to_nodes
-from withe.tubes import Tube
+from withe.surfaces import Surface
 
 if TYPE_CHECKING:
     from withe.recording import Record
@@ -89,9 +89,10 @@ class Stage:
         self._positions = record.positions()
         self._directors = [record.directors(rod)[:, :, 0] for rod in record.rods]
         samples = max(1, min(6, _MAX_SAMPLES // sum(len(rod.rows) for rod in record.rods)))
-        self._tubes = [Tube(rod, self._positions[0, rod.rows], samples) for rod in record.rods]
+        self._surfaces = [Surface(rod, self._positions[0, rod.rows], samples) for rod in record.rods]
         self._footprints = [
-            tube.footprint(self._positions[0, rod.rows]) for tube, rod in zip(self._tubes, record.rods, strict=True)
+            surface.footprint(self._positions[0, rod.rows])
+            for surface, rod in zip(self._surfaces, record.rods, strict=True)
         ]
         self._values = None if color_by == "rod" else [_nodal(record, rod, color_by) for rod in record.rods]
         direction = _direction(camera, self._positions)
@@ -116,10 +117,10 @@ class Stage:
         before = min(int(frame), len(self.times) - 1)
         after = min(before + 1, len(self.times) - 1)
         share = frame - before
-        surfaces = []
+        meshed = []
         for index, rod in enumerate(self._record.rods):
             nodes = self._mixed(self._positions, before, after, share)[rod.rows]
-            points, normals = self._tubes[index].surface(
+            points, normals = self._surfaces[index].mesh(
                 nodes, self._mixed(self._directors[index], before, after, share)
             )
             mesh = self._meshes[index]
@@ -127,9 +128,9 @@ class Stage:
             mesh.point_data["Normals"] = normals
             if self._values is not None:
                 nodal = self._mixed(self._values[index], before, after, share)
-                mesh.point_data["value"] = self._tubes[index].on_surface(nodal)
-            surfaces.append(points)
-        self._cast_shadow(surfaces)
+                mesh.point_data["value"] = self._surfaces[index].on_surface(nodal)
+            meshed.append(points)
+        self._cast_shadow(meshed)
 
     def label(self, text: str) -> None:
         """Write a line of text in the lower left corner, in place of the one before."""
@@ -201,7 +202,7 @@ class Stage:
             self.plotter.add_light(pyvista.Light(position=position, focal_point=focus, intensity=strength))
 
     def _add_rods(self, pyvista: Any, color_by: ColorBy) -> None:
-        self._meshes = [_empty_mesh(pyvista, tube) for tube in self._tubes]
+        self._meshes = [_empty_mesh(pyvista, surface) for surface in self._surfaces]
         options: dict[str, Any] = {"ambient": 0.35, "diffuse": 0.8, "specular": 0.3, "specular_power": 30.0}
         if self._values is not None:
             title, colours = _BARS[color_by]
@@ -269,9 +270,9 @@ class Stage:
         self._shadow.texture = texture
 
 
-def _empty_mesh(pyvista: Any, tube: Tube) -> Any:
-    faces = np.column_stack([np.full(len(tube.faces), 4), tube.faces])
-    mesh = pyvista.PolyData(np.zeros((int(tube.faces.max()) + 1, 3)), faces.ravel())
+def _empty_mesh(pyvista: Any, surface: Surface) -> Any:
+    faces = np.column_stack([np.full(len(surface.faces), 4), surface.faces])
+    mesh = pyvista.PolyData(np.zeros((int(surface.faces.max()) + 1, 3)), faces.ravel())
     mesh.point_data.active_normals = np.zeros((mesh.n_points, 3))
     return mesh
 

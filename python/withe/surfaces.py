@@ -11,14 +11,14 @@ import numpy.typing as npt
 
 from withe.recording import RodOutline
 
-__all__ = ["Tube"]
+__all__ = ["Surface"]
 
 FloatArray = npt.NDArray[np.float64]
 
 _CAP_RINGS = 6
 
 
-class Tube:
+class Surface:
     """The surface of one rod. Round sections end in half spheres, rectangular ones in flat faces.
 
     Parameters
@@ -59,7 +59,7 @@ class Tube:
         caps = len(self._caps)
         return np.concatenate([np.zeros(caps, int), np.arange(samples), np.full(caps, samples - 1)])
 
-    def surface(self, nodes: FloatArray, directors: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def mesh(self, nodes: FloatArray, directors: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Points and normals of the surface.
 
         Parameters

@@ -1,0 +1,134 @@
+"""Centrelines that are tedious to write by hand, as points for `Scene.add_rod(points=...)`."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+__all__ = ["arc", "circle", "helix"]
+
+FloatArray = npt.NDArray[np.float64]
+
+
+def helix(radius: float, pitch: float, length: float, nodes: int, *, left_handed: bool = False) -> FloatArray:
+    """Points on a helix about the z axis that starts at (radius, 0, 0) and rises.
+
+    Parameters
+    ----------
+    radius : float [m]
+        Of the cylinder that the helix is wound on.
+    pitch : float [m]
+        Rise in one turn.
+    length : float [m]
+        Along the helix.
+    nodes : int
+        Number of points, evenly spaced along it.
+    left_handed : bool
+
+    Returns
+    -------
+    ndarray of shape (nodes, 3) [m]
+
+    Raises
+    ------
+    ValueError
+        A length that is not positive, a negative pitch, or fewer than two nodes.
+
+    Examples
+    --------
+    >>> helix(radius=0.02, pitch=0.05, length=0.5, nodes=100)[0]
+    array([0.02, 0.  , 0.  ])
+    """
+    _positive("radius", radius)
+    _positive("length", length)
+    if not (np.isfinite(pitch) and pitch >= 0.0):
+        raise ValueError(f"pitch must be zero or more, got {pitch!r}")
+    turns = length / np.hypot(2.0 * np.pi * radius, pitch)
+    angles = 2.0 * np.pi * turns * np.linspace(0.0, 1.0, _count(nodes, 2))
+    sideways = -np.sin(angles) if left_handed else np.sin(angles)
+    return np.stack([radius * np.cos(angles), radius * sideways, pitch * angles / (2.0 * np.pi)], axis=1)
+
+
+def circle(radius: float, nodes: int) -> FloatArray:
+    """Points on a circle about the origin in the x-y plane, for a closed rod: the first is not repeated.
+
+    Parameters
+    ----------
+    radius : float [m]
+    nodes : int
+        Number of points, three or more.
+
+    Returns
+    -------
+    ndarray of shape (nodes, 3) [m]
+
+    Raises
+    ------
+    ValueError
+        A radius that is not positive, or fewer than three nodes.
+    """
+    _positive("radius", radius)
+    angles = 2.0 * np.pi * np.arange(_count(nodes, 3)) / nodes
+    return radius * np.stack([np.cos(angles), np.sin(angles), np.zeros_like(angles)], axis=1)
+
+
+def arc(
+    start: npt.ArrayLike, tangent: npt.ArrayLike, towards: npt.ArrayLike, curvature: float, length: float, nodes: int
+) -> FloatArray:
+    """Points on an arc of a circle, or on a straight line where the curvature is zero.
+
+    Parameters
+    ----------
+    start, tangent, towards : array_like of shape (3,)
+        Where the arc starts [m], which way it goes there, and to which side it bends; `towards` need
+        not be normal to `tangent`.
+    curvature : float [1/m]
+    length : float [m]
+    nodes : int
+        Number of points, evenly spaced along the arc.
+
+    Returns
+    -------
+    ndarray of shape (nodes, 3) [m]
+
+    Raises
+    ------
+    ValueError
+        A tangent of no length, a side along the tangent, a length that is not positive, or fewer than
+        two nodes.
+    """
+    _positive("length", length)
+    origin, along, side = (_vector(n, v) for n, v in (("start", start), ("tangent", tangent), ("towards", towards)))
+    if not np.any(along):
+        raise ValueError("tangent must not be zero")
+    along = along / np.linalg.norm(along)
+    side = side - (side @ along) * along
+    if np.linalg.norm(side) <= 1e-12:
+        raise ValueError("towards must not lie along tangent")
+    side = side / np.linalg.norm(side)
+    if not np.isfinite(curvature):
+        raise ValueError(f"curvature must be finite, got {curvature!r}")
+    distances = np.linspace(0.0, length, _count(nodes, 2))
+    half = 0.5 * curvature * distances
+    # sin(x) / x, so that a straight line needs no case of its own
+    chords = distances * np.sinc(half / np.pi)
+    points: FloatArray = origin + np.outer(chords * np.cos(half), along) + np.outer(chords * np.sin(half), side)
+    return points
+
+
+def _positive(name: str, value: float) -> None:
+    if not (np.isfinite(value) and value > 0.0):
+        raise ValueError(f"{name} must be positive, got {value!r}")
+
+
+def _count(nodes: int, least: int) -> int:
+    if int(nodes) != nodes or nodes < least:
+        raise ValueError(f"nodes must be an integer of at least {least}, got {nodes!r}")
+    return int(nodes)
+
+
+def _vector(name: str, value: npt.ArrayLike) -> FloatArray:
+    vector = np.asarray(value, float)
+    if vector.shape != (3,) or not np.all(np.isfinite(vector)):
+        raise ValueError(f"{name} must be three finite numbers, got {value!r}")
+    return vector
