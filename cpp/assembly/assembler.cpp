@@ -1,0 +1,194 @@
+#include "assembly/assembler.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace withe {
+namespace {
+
+std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+void append(std::vector<int>& dofs, int first, int count) {
+  for (int i = 0; i < count; ++i) dofs.push_back(first < 0 ? -1 : first + i);
+}
+
+std::vector<int> stretch_dofs(const Model& model) {
+  std::vector<int> dofs;
+  for (int e = 0; e < model.edge_count; ++e) {
+    append(dofs, model.node_dof[at(model.edge_tail[at(e)])], model.dimension);
+    append(dofs, model.node_dof[at(model.edge_head[at(e)])], model.dimension);
+  }
+  return dofs;
+}
+
+std::vector<int> bend_dofs(const Model& model) {
+  std::vector<int> dofs;
+  for (const BendStencil& s : model.bend)
+    for (int i = 0; i < 3; ++i) {
+      append(dofs, model.node_dof[at(s.node[i])], model.dimension);
+      if (i < 2 && !model.planar()) append(dofs, model.edge_dof[at(s.edge[i])], 1);
+    }
+  return dofs;
+}
+
+std::vector<int> half_dofs(const Model& model) {
+  std::vector<int> dofs;
+  for (const FrameStencil& s : model.half) {
+    append(dofs, model.node_dof[at(model.edge_tail[at(s.edge)])], model.dimension);
+    if (!model.planar()) append(dofs, model.edge_dof[at(s.edge)], 1);
+    append(dofs, model.node_dof[at(model.edge_head[at(s.edge)])], model.dimension);
+    append(dofs, model.frame_dof[at(s.frame)], model.frame_size());
+    if (!model.planar()) append(dofs, s.hinge < 0 ? -1 : model.hinges[at(s.hinge)].dof, 1);
+  }
+  return dofs;
+}
+
+}  // namespace
+
+void ElementTable::find_offsets(const LinearSolver& solver) {
+  symmetric_ = solver.symmetry() == Symmetry::symmetric;
+  offsets_.clear();
+  for (int e = 0; e < count(); ++e) {
+    const int* d = dofs(e);
+    for (int i = 0; i < width_; ++i)
+      for (int j = 0; j < (symmetric_ ? i + 1 : width_); ++j) {
+        if (d[i] < 0 || d[j] < 0)
+          offsets_.push_back(-1);
+        else
+          offsets_.push_back(symmetric_ ? solver.offset(std::max(d[i], d[j]), std::min(d[i], d[j]))
+                                        : solver.offset(d[i], d[j]));
+      }
+  }
+}
+
+void ElementTable::add_gradient(int element, const double* gradient, double scale, VectorX& residual,
+                                VectorX& magnitude) const {
+  const int* d = dofs(element);
+  for (int i = 0; i < width_; ++i) {
+    if (d[i] < 0) continue;
+    residual(d[i]) += scale * gradient[i];
+    magnitude(d[i]) += std::abs(scale * gradient[i]);
+  }
+}
+
+void ElementTable::add_hessian(int element, const double (&hessian)[kMaxLocal][kMaxLocal], double scale,
+                               std::span<double> values) const {
+  const int per_element = symmetric_ ? width_ * (width_ + 1) / 2 : width_ * width_;
+  const std::ptrdiff_t* offset = offsets_.data() + static_cast<std::ptrdiff_t>(element) * per_element;
+  for (int i = 0; i < width_; ++i) {
+    const int columns = symmetric_ ? i + 1 : width_;
+    for (int j = 0; j < columns; ++j, ++offset)
+      if (*offset >= 0) values[static_cast<std::size_t>(*offset)] += scale * hessian[i][j];
+  }
+}
+
+Assembler::Assembler(const Model& model, const Loads& load, Symmetry symmetry, SolverKind kind)
+    : stretch(2 * model.dimension, stretch_dofs(model)),
+      bend(model.planar() ? 6 : 11, bend_dofs(model)),
+      half(model.planar() ? 5 : 11, half_dofs(model)) {
+  for (const LoadPiece& piece : load.pieces) {
+    int dofs[kMaxLocal];
+    const int n = load_dofs(model, piece, dofs);
+    loads.emplace_back(n, std::vector<int>(dofs, dofs + n));
+  }
+  std::vector<std::vector<int>> cliques;
+  const auto add_cliques = [&](const ElementTable& table) {
+    for (int e = 0; e < table.count(); ++e) cliques.emplace_back(table.dofs(e), table.dofs(e) + table.width());
+  };
+  add_cliques(stretch);
+  add_cliques(bend);
+  add_cliques(half);
+  for (const ElementTable& table : loads) add_cliques(table);
+  for (int i = 0; i < model.dof_count; ++i) cliques.push_back({i});
+  for (const Constraint& c : model.constraints) {
+    std::vector<int> own;
+    for (int i = 0; i < c.size; ++i) own.push_back(c.first + i);
+    cliques.push_back(own);
+  }
+  const SparsityPattern pattern = SparsityPattern::from_cliques(model.dof_count, cliques);
+  solver_ = make_linear_solver(pattern, symmetry, kind);
+  stretch.find_offsets(*solver_);
+  bend.find_offsets(*solver_);
+  half.find_offsets(*solver_);
+  for (ElementTable& table : loads) table.find_offsets(*solver_);
+  for (int i = 0; i < model.dof_count; ++i) diagonal_.push_back(solver_->offset(i, i));
+
+  const bool symmetric = symmetry == Symmetry::symmetric;
+  const auto entry = [&](int r, int c) {
+    return symmetric ? solver_->offset(std::max(r, c), std::min(r, c)) : solver_->offset(r, c);
+  };
+  const auto coupled = [&](int r, int c) {
+    const auto first = pattern.row_indices.begin() + pattern.column_starts[at(c)];
+    const auto last = pattern.row_indices.begin() + pattern.column_starts[at(c) + 1];
+    return std::binary_search(first, last, r);
+  };
+  for (const Constraint& c : model.constraints) {
+    Block block{c, {}, {}, {}};
+    std::vector<int> others;
+    for (int i = 0; i < c.size; ++i)
+      for (int k = pattern.column_starts[at(c.first + i)]; k < pattern.column_starts[at(c.first + i) + 1]; ++k)
+        others.push_back(pattern.row_indices[at(k)]);
+    std::sort(others.begin(), others.end());
+    others.erase(std::unique(others.begin(), others.end()), others.end());
+    for (int other : others) {
+      if (other >= c.first && other < c.first + c.size) continue;
+      Coupling row{{-1, -1, -1}, false}, column{{-1, -1, -1}, false};
+      for (int i = 0; i < c.size; ++i) {
+        if (coupled(c.first + i, other)) row.offset[i] = entry(c.first + i, other);
+        if (!symmetric && coupled(other, c.first + i)) column.offset[i] = entry(other, c.first + i);
+      }
+      block.rows.push_back(row);
+      if (!symmetric) block.columns.push_back(column);
+    }
+    for (int i = 0; i < c.size; ++i)
+      for (int j = 0; j < c.size; ++j) block.own[i][j] = entry(c.first + i, c.first + j);
+    blocks_.push_back(block);
+  }
+}
+
+void Assembler::project_matrix() {
+  const std::span<double> values = solver_->values();
+  for (const Block& block : blocks_) {
+    const int n = block.constraint.size;
+    const Matrix3& P = block.constraint.free;
+    const auto apply = [&](const Coupling& c) {
+      double v[3] = {0, 0, 0}, w[3] = {0, 0, 0};
+      for (int i = 0; i < n; ++i) v[i] = c.offset[i] < 0 ? 0.0 : values[static_cast<std::size_t>(c.offset[i])];
+      for (int i = 0; i < n; ++i)
+        for (int j = 0; j < n; ++j) w[i] += P(i, j) * v[j];
+      for (int i = 0; i < n; ++i)
+        if (c.offset[i] >= 0) values[static_cast<std::size_t>(c.offset[i])] = w[i];
+    };
+    for (const Coupling& c : block.rows) apply(c);
+    for (const Coupling& c : block.columns) apply(c);
+    Matrix3 own = Matrix3::Zero(), p = Matrix3::Zero();
+    p.topLeftCorner(n, n) = P.topLeftCorner(n, n);
+    double scale = 0.0;
+    for (int i = 0; i < n; ++i)
+      for (int j = 0; j < n; ++j) {
+        own(i, j) = values[static_cast<std::size_t>(block.own[i][j])];
+        if (i == j) scale = std::max(scale, std::abs(own(i, i)));
+      }
+    if (scale == 0.0) scale = 1.0;
+    own = p * own * p + scale * (Matrix3::Identity() - p);
+    for (int i = 0; i < n; ++i)
+      for (int j = 0; j < n; ++j) values[static_cast<std::size_t>(block.own[i][j])] = own(i, j);
+  }
+}
+
+void Assembler::project(VectorX& vector) const {
+  for (const Block& block : blocks_) {
+    const int n = block.constraint.size;
+    Vector3 v = Vector3::Zero();
+    v.head(n) = vector.segment(block.constraint.first, n);
+    vector.segment(block.constraint.first, n) = (block.constraint.free * v).head(n);
+  }
+}
+
+VectorX Assembler::held_part(const VectorX& vector) const {
+  VectorX held = vector;
+  project(held);
+  return vector - held;
+}
+
+}  // namespace withe

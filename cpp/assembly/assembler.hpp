@@ -1,0 +1,72 @@
+#pragma once
+/// Stencil -> matrix: the pattern of a model, and where each stencil's numbers go, found once.
+
+#include <memory>
+#include <vector>
+
+#include "elasticity/elements.hpp"
+#include "forces/loads.hpp"
+#include "solvers/linear_solver.hpp"
+
+namespace withe {
+
+/// Unknowns and matrix offsets of many stencils of one width. A negative unknown is left out.
+class ElementTable {
+ public:
+  ElementTable() = default;
+  ElementTable(int width, std::vector<int> dofs) : width_(width), dofs_(std::move(dofs)) {}
+
+  void find_offsets(const LinearSolver& solver);
+  int count() const { return width_ == 0 ? 0 : static_cast<int>(dofs_.size()) / width_; }
+  int width() const { return width_; }
+  const int* dofs(int element) const { return dofs_.data() + static_cast<std::size_t>(element) * static_cast<std::size_t>(width_); }
+
+  /// residual += scale gradient, magnitude += |gradient|.
+  void add_gradient(int element, const double* gradient, double scale, VectorX& residual, VectorX& magnitude) const;
+  /// values += scale hessian.
+  void add_hessian(int element, const double (&hessian)[kMaxLocal][kMaxLocal], double scale,
+                   std::span<double> values) const;
+
+ private:
+  int width_ = 0;
+  bool symmetric_ = true;
+  std::vector<int> dofs_;
+  std::vector<std::ptrdiff_t> offsets_;
+};
+
+/// The matrix of a model with its tables.
+class Assembler {
+ public:
+  Assembler(const Model& model, const Loads& loads, Symmetry symmetry, SolverKind kind);
+
+  LinearSolver& solver() { return *solver_; }
+  const LinearSolver& solver() const { return *solver_; }
+  void add_to_diagonal(int dof, double value) { solver_->values()[static_cast<std::size_t>(diagonal_[static_cast<std::size_t>(dof)])] += value; }
+  double diagonal(int dof) const { return solver_->values()[static_cast<std::size_t>(diagonal_[static_cast<std::size_t>(dof)])]; }
+
+  /// Takes out what supports hold: rows and columns are projected onto the free directions, and the held
+  /// ones get a positive diagonal, so that the pattern stays and held increments vanish.
+  void project_matrix();
+  void project(VectorX& vector) const;
+  /// The part of a vector along held directions.
+  VectorX held_part(const VectorX& vector) const;
+
+  ElementTable stretch, bend, half;
+  std::vector<ElementTable> loads;
+
+ private:
+  struct Coupling {
+    std::ptrdiff_t offset[3];
+    bool diagonal_block;
+  };
+  struct Block {
+    Constraint constraint;
+    std::vector<Coupling> rows, columns;
+    std::ptrdiff_t own[3][3];
+  };
+  std::unique_ptr<LinearSolver> solver_;
+  std::vector<std::ptrdiff_t> diagonal_;
+  std::vector<Block> blocks_;
+};
+
+}  // namespace withe

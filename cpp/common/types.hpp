@@ -1,0 +1,18 @@
+#pragma once
+/// Eigen aliases shared by every room. Tables with one row per node, edge or stencil are row-major,
+/// so that they map onto C-contiguous NumPy arrays.
+
+#include <Eigen/Core>
+
+namespace withe {
+
+using Vector2 = Eigen::Vector2d;
+using Vector3 = Eigen::Vector3d;
+using Matrix3 = Eigen::Matrix3d;
+using VectorX = Eigen::VectorXd;
+using MatrixX2 = Eigen::Matrix<double, Eigen::Dynamic, 2, Eigen::RowMajor>;
+using MatrixX3 = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>;
+/// One row per edge: a 3 x 3 matrix with rows d1, d2, tangent, flattened row by row.
+using MatrixX9 = Eigen::Matrix<double, Eigen::Dynamic, 9, Eigen::RowMajor>;
+
+}  // namespace withe

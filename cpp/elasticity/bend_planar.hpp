@@ -1,0 +1,22 @@
+#pragma once
+/// Bending in a plane. The energy depends on the turn phi between two directions only:
+///   E = K (kappa - k)^2 / 2,  kappa = 2 tan(phi / 2), positive from the first axis to the second.
+/// [dissertation 3.3, 3.5 without the third coordinate].
+
+namespace withe {
+
+struct PlanarBend {
+  double energy;
+  double slope;      ///< dE / dphi [N m]
+  double curvature;  ///< d2E / dphi2 [N m]
+};
+
+/// Energy and its derivatives with respect to phi: kappa' = 1 + kappa^2 / 4, kappa'' = kappa kappa' / 2.
+inline PlanarBend planar_bend(double kappa, double natural, double stiffness) {
+  const double moment = stiffness * (kappa - natural);
+  const double first = 1.0 + 0.25 * kappa * kappa;
+  return {0.5 * moment * (kappa - natural), moment * first,
+          stiffness * first * first + 0.5 * moment * kappa * first};
+}
+
+}  // namespace withe

@@ -1,0 +1,176 @@
+#pragma once
+/// Bending and twisting between two frames: two edges, or an edge and the frame of a joint or a wall.
+///
+/// Strains [Bergou et al. 2010, section 3; dissertation 3.3-3.6], with t the tangents and d the directors:
+///   kb = 2 t0 x t1 / (1 + t0 . t1),  kappa1 = kb . (d2_0 + d2_1) / 2,  kappa2 = - kb . (d1_0 + d1_1) / 2,
+///   tau = angle about t1 from the transported d1_0 to d1_1.
+/// |kb| = 2 tan(phi / 2) for a turn by phi. kappa1 > 0 bends towards d1, kappa2 > 0 towards d2.
+/// Energy E = (K1 (kappa1 - k1)^2 + K2 (kappa2 - k2)^2 + Kt (tau - t)^2) / 2, stiffnesses K = EI / V and
+/// GJ / V in N m, V the Voronoi length.
+///
+/// Derivatives are taken with respect to y = (e0, psi0, e1, psi1): edge vectors, and turns of the
+/// directors beyond infinitesimal parallel transport; `apply_transport` changes from psi to theta.
+
+#include "geometry/curvature.hpp"
+
+namespace withe {
+
+template <class Scalar>
+struct BendTwistStiffness {
+  Scalar bend1, bend2, twist;  // [N m]
+};
+
+/// Energy, gradient and Hessian in y. Blocks of the Hessian: edge-edge (3 x 3), edge-angle (3), angle-angle.
+template <class Scalar>
+struct BendTwistDerivatives {
+  Scalar energy;
+  Vec3<Scalar> gradient_e[2];
+  Scalar gradient_angle[2];
+  Mat3<Scalar> ee[2][2];           // [1][0] is not filled: the transpose of [0][1]
+  Vec3<Scalar> e_angle[2][2];      // [i][j]: edge i, angle j
+  Scalar angle_angle[2][2];        // [1][0] is not filled
+};
+
+template <class Scalar>
+Scalar bend_twist_energy(const BendTwistStrain<Scalar>& s, const BendTwistStrain<Scalar>& natural,
+                         const BendTwistStiffness<Scalar>& k) {
+  const Scalar a = s.kappa1 - natural.kappa1, b = s.kappa2 - natural.kappa2, c = s.tau - natural.tau;
+  return 0.5 * (k.bend1 * a * a + k.bend2 * b * b + k.twist * c * c);
+}
+
+/// Energy and gradient only.
+template <class Scalar>
+void bend_twist_gradient(const EdgeFrame<Scalar>& f0, const EdgeFrame<Scalar>& f1, const BendTwistStrain<Scalar>& s,
+                         const BendTwistStrain<Scalar>& natural, const BendTwistStiffness<Scalar>& k,
+                         BendTwistDerivatives<Scalar>& out) {
+  const Scalar inverse_chi = 1.0 / (1.0 + dot(f0.tangent, f1.tangent));
+  const Vec3<Scalar> kb = (2.0 * inverse_chi) * cross(f0.tangent, f1.tangent);
+  const Vec3<Scalar> t = inverse_chi * (f0.tangent + f1.tangent);
+  const Scalar c1 = k.bend1 * (s.kappa1 - natural.kappa1);
+  const Scalar c2 = k.bend2 * (s.kappa2 - natural.kappa2);
+  const Scalar ct = k.twist * (s.tau - natural.tau);
+  // kappa2 follows from kappa1 by (d1, d2) -> (d2, -d1), so both appear through two combined directors.
+  const Vec3<Scalar> D = inverse_chi * (c1 * (f0.d2 + f1.d2) - c2 * (f0.d1 + f1.d1));
+  const Scalar K = c1 * s.kappa1 + c2 * s.kappa2;
+  out.energy = bend_twist_energy(s, natural, k);
+  out.gradient_e[0] = f0.inverse_length * (cross(f1.tangent, D) - K * t + (0.5 * ct) * kb);
+  out.gradient_e[1] = f1.inverse_length * ((0.5 * ct) * kb - K * t - cross(f0.tangent, D));
+  out.gradient_angle[0] = -0.5 * (c1 * dot(kb, f0.d1) + c2 * dot(kb, f0.d2)) - ct;
+  out.gradient_angle[1] = -0.5 * (c1 * dot(kb, f1.d1) + c2 * dot(kb, f1.d2)) + ct;
+}
+
+/// Energy, gradient and symmetric Hessian. [Bergou et al. 2010, appendix], combined over the two curvatures.
+template <class Scalar>
+void bend_twist_hessian(const EdgeFrame<Scalar>& f0, const EdgeFrame<Scalar>& f1, const BendTwistStrain<Scalar>& s,
+                        const BendTwistStrain<Scalar>& natural, const BendTwistStiffness<Scalar>& k,
+                        BendTwistDerivatives<Scalar>& out) {
+  const Vec3<Scalar>&t0 = f0.tangent, &t1 = f1.tangent;
+  const Scalar i0 = f0.inverse_length, i1 = f1.inverse_length;
+  const Scalar inverse_chi = 1.0 / (1.0 + dot(t0, t1));
+  const Vec3<Scalar> kb = (2.0 * inverse_chi) * cross(t0, t1);
+  const Vec3<Scalar> t = inverse_chi * (t0 + t1);
+  const Scalar c1 = k.bend1 * (s.kappa1 - natural.kappa1);
+  const Scalar c2 = k.bend2 * (s.kappa2 - natural.kappa2);
+  const Scalar ct = k.twist * (s.tau - natural.tau);
+  const Scalar half_ct = 0.5 * ct;
+  const Vec3<Scalar> D0 = c1 * f0.d2 - c2 * f0.d1, D1 = c1 * f1.d2 - c2 * f1.d1;
+  const Vec3<Scalar> C[2] = {c1 * f0.d1 + c2 * f0.d2, c1 * f1.d1 + c2 * f1.d2};
+  const Vec3<Scalar> D = inverse_chi * (D0 + D1);
+  const Scalar K = c1 * s.kappa1 + c2 * s.kappa2;
+  const Vec3<Scalar> t1D = cross(t1, D), t0D = cross(t0, D);
+
+  out.energy = bend_twist_energy(s, natural, k);
+  out.gradient_e[0] = i0 * (t1D - K * t + half_ct * kb);
+  out.gradient_e[1] = i1 * (half_ct * kb - K * t - t0D);
+  const Scalar kbC[2] = {dot(kb, C[0]), dot(kb, C[1])};
+  out.gradient_angle[0] = -0.5 * kbC[0] - ct;
+  out.gradient_angle[1] = -0.5 * kbC[1] + ct;
+
+  // Second derivatives of the strains, weighted by the moments.
+  Mat3<Scalar> A{}, B{}, F{};
+  const Scalar k_chi = K * inverse_chi;
+  add_outer(A, 2.0 * K, t, t);
+  F = A;
+  B = A;
+  add_symmetric_outer(A, Scalar(-1.0), t1D, t);
+  add_symmetric_outer(F, Scalar(1.0), t0D, t);
+  add_identity(A, -k_chi);
+  add_outer(A, k_chi, t0, t0);
+  add_identity(F, -k_chi);
+  add_outer(F, k_chi, t1, t1);
+  add_symmetric_outer(A, Scalar(0.25), kb, D0 - ct * (t0 + t));
+  add_symmetric_outer(F, Scalar(0.25), kb, D1 - ct * (t1 + t));
+  add_identity(B, -k_chi);
+  add_outer(B, -k_chi, t0, t1);
+  add_outer(B, Scalar(-1.0), t1D, t);
+  add_outer(B, Scalar(1.0), t, t0D);
+  add_cross(B, Scalar(-1.0), D);
+  add_cross(B, ct * inverse_chi, t0);
+  add_outer(B, -half_ct, kb, t);
+
+  // First derivatives of the strains: g1, g2 for the curvatures, kb / 2 for the twist.
+  const Vec3<Scalar> a1 = inverse_chi * (f0.d2 + f1.d2), a2 = -(inverse_chi * (f0.d1 + f1.d1));
+  const Vec3<Scalar> p1 = cross(t1, a1) - s.kappa1 * t, p2 = cross(t1, a2) - s.kappa2 * t;
+  const Vec3<Scalar> q1 = -(cross(t0, a1) + s.kappa1 * t), q2 = -(cross(t0, a2) + s.kappa2 * t);
+  const Vec3<Scalar> half_kb = 0.5 * kb;
+  add_outer(A, k.bend1, p1, p1);
+  add_outer(A, k.bend2, p2, p2);
+  add_outer(A, k.twist, half_kb, half_kb);
+  add_outer(F, k.bend1, q1, q1);
+  add_outer(F, k.bend2, q2, q2);
+  add_outer(F, k.twist, half_kb, half_kb);
+  add_outer(B, k.bend1, p1, q1);
+  add_outer(B, k.bend2, p2, q2);
+  add_outer(B, k.twist, half_kb, half_kb);
+  for (int i = 0; i < 3; ++i) {
+    out.ee[0][0].row[i] = (i0 * i0) * A.row[i];
+    out.ee[0][1].row[i] = (i0 * i1) * B.row[i];
+    out.ee[1][1].row[i] = (i1 * i1) * F.row[i];
+  }
+
+  const Vec3<Scalar> d1[2] = {f0.d1, f1.d1}, d2[2] = {f0.d2, f1.d2};
+  const Scalar w1[2] = {-0.5 * dot(kb, d1[0]), -0.5 * dot(kb, d1[1])};
+  const Scalar w2[2] = {-0.5 * dot(kb, d2[0]), -0.5 * dot(kb, d2[1])};
+  const Scalar wt[2] = {Scalar(-1.0), Scalar(1.0)};
+  for (int j = 0; j < 2; ++j) {
+    const Vec3<Scalar> common = (0.5 * kbC[j]) * t;
+    out.e_angle[0][j] = i0 * (common - inverse_chi * cross(t1, C[j]) + (k.bend1 * w1[j]) * p1 +
+                              (k.bend2 * w2[j]) * p2 + (k.twist * wt[j]) * half_kb);
+    out.e_angle[1][j] = i1 * (common + inverse_chi * cross(t0, C[j]) + (k.bend1 * w1[j]) * q1 +
+                              (k.bend2 * w2[j]) * q2 + (k.twist * wt[j]) * half_kb);
+  }
+  const Scalar own[2] = {-0.5 * dot(kb, D0), -0.5 * dot(kb, D1)};
+  for (int j = 0; j < 2; ++j)
+    out.angle_angle[j][j] = own[j] + k.bend1 * w1[j] * w1[j] + k.bend2 * w2[j] * w2[j] + k.twist;
+  out.angle_angle[0][1] = k.bend1 * w1[0] * w1[1] + k.bend2 * w2[0] * w2[1] - k.twist;
+}
+
+/// From psi to theta, psi = theta + (spin of direct transport): the term that a finite rotation within a
+/// step needs (see EdgeFrame). Changes the blocks in place.
+template <class Scalar>
+void apply_transport_gradient(const EdgeFrame<Scalar>& f0, const EdgeFrame<Scalar>& f1,
+                              BendTwistDerivatives<Scalar>& d) {
+  d.gradient_e[0] += d.gradient_angle[0] * f0.spin;
+  d.gradient_e[1] += d.gradient_angle[1] * f1.spin;
+}
+
+template <class Scalar>
+void apply_transport(const EdgeFrame<Scalar>& f0, const EdgeFrame<Scalar>& f1, BendTwistDerivatives<Scalar>& d) {
+  const Vec3<Scalar>&a0 = f0.spin, &a1 = f1.spin;
+  add_symmetric_outer(d.ee[0][0], Scalar(1.0), a0, d.e_angle[0][0]);
+  add_outer(d.ee[0][0], d.angle_angle[0][0], a0, a0);
+  add_symmetric_outer(d.ee[0][0], -0.5 * d.gradient_angle[0], a0, f0.bow);
+  add_symmetric_outer(d.ee[1][1], Scalar(1.0), a1, d.e_angle[1][1]);
+  add_outer(d.ee[1][1], d.angle_angle[1][1], a1, a1);
+  add_symmetric_outer(d.ee[1][1], -0.5 * d.gradient_angle[1], a1, f1.bow);
+  add_outer(d.ee[0][1], Scalar(1.0), a0, d.e_angle[1][0]);
+  add_outer(d.ee[0][1], Scalar(1.0), d.e_angle[0][1], a1);
+  add_outer(d.ee[0][1], d.angle_angle[0][1], a0, a1);
+  d.e_angle[0][0] += d.angle_angle[0][0] * a0;
+  d.e_angle[0][1] += d.angle_angle[0][1] * a0;
+  d.e_angle[1][0] += d.angle_angle[0][1] * a1;
+  d.e_angle[1][1] += d.angle_angle[1][1] * a1;
+  apply_transport_gradient(f0, f1, d);
+}
+
+}  // namespace withe

@@ -1,0 +1,53 @@
+#pragma once
+/// Elastic energy, gradient and Hessian of one stencil in its own unknowns.
+///
+/// Unknowns of each stencil, in this order (in space / in a plane):
+///   stretch: tail, head (6 / 4); bend: node 0, angle 0, node 1, angle 1, node 2 (11 / nodes only, 6);
+///   half: tail, angle, head, frame, hinge (11 / tail, head, frame, 5). A missing hinge stays zero.
+
+#include "model/state.hpp"
+
+namespace withe {
+
+constexpr int kMaxLocal = 11;
+
+/// Numbers of one stencil. The Hessian is full and symmetric.
+struct Local {
+  double energy;
+  double gradient[kMaxLocal];
+  double hessian[kMaxLocal][kMaxLocal];
+};
+
+/// Stiffnesses and natural strains of every stencil, as they act in one evaluation.
+struct ElasticCoefficients {
+  VectorX stretch_stiffness;               ///< EA [N]
+  VectorX stretch_natural;                 ///< natural strain [-]
+  MatrixX3 bend_stiffness, bend_natural;   ///< [N m]; kappa1, kappa2, tau
+  MatrixX3 half_stiffness, half_natural;
+};
+
+/// Elasticity alone.
+void set_elastic(const Parameters& parameters, ElasticCoefficients& out);
+/// Kelvin-Voigt viscosity alone over an interval h: the potential (eta / E) k (s - s0)^2 / (2 h) of the
+/// strain s has the form of an elastic one with natural strain s0.
+void set_viscous(const Model& model, const Parameters& parameters, const Configuration& start, double h,
+                 ElasticCoefficients& out);
+/// Sum of two quadratic energies in the strains, but for a constant.
+void add_coefficients(const ElasticCoefficients& other, ElasticCoefficients& sum);
+
+void stretch_local(const Model& model, const ElasticCoefficients& coefficients, const Configuration& c, int edge,
+                   bool with_hessian, const double* axial_force, Local& out);
+void bend_local(const Model& model, const ElasticCoefficients& coefficients, const Configuration& c, int stencil,
+                bool with_hessian, Local& out);
+void half_local(const Model& model, const VectorX& q, const ElasticCoefficients& coefficients,
+                const Configuration& c, int stencil, bool with_hessian, Local& out);
+
+/// Energies alone: stretch of an edge; bend and twist of a stencil [J].
+double stretch_energy_of(const Model& model, const ElasticCoefficients& coefficients, const Configuration& c, int edge);
+struct BendTwistEnergy {
+  double bend, twist;
+};
+BendTwistEnergy bend_energy_of(const ElasticCoefficients& coefficients, const Configuration& c, int stencil);
+BendTwistEnergy half_energy_of(const ElasticCoefficients& coefficients, const Configuration& c, int stencil);
+
+}  // namespace withe

@@ -1,0 +1,57 @@
+#pragma once
+/// Finite rotations: exponential, logarithm, and the Cayley map with its derivative.
+
+#include <Eigen/Geometry>
+
+#include "common/types.hpp"
+
+namespace withe {
+
+inline Matrix3 cross_matrix(const Vector3& a) {
+  Matrix3 m;
+  m << 0, -a.z(), a.y(), a.z(), 0, -a.x(), -a.y(), a.x(), 0;
+  return m;
+}
+
+/// Rotation by |vector| rad about vector.
+inline Matrix3 rotation_exp(const Vector3& vector) {
+  const double angle = vector.norm();
+  if (angle < 1e-300) return Matrix3::Identity();
+  return Eigen::AngleAxisd(angle, vector / angle).toRotationMatrix();
+}
+
+/// Rotation vector of a rotation, |result| <= pi.
+inline Vector3 rotation_log(const Matrix3& rotation) {
+  Eigen::Quaterniond q(rotation);
+  if (q.w() < 0.0) q.coeffs() = -q.coeffs();
+  const double s = q.vec().norm();
+  if (s < 1e-300) return 2.0 * q.vec();
+  return (2.0 * std::atan2(s, q.w()) / s) * q.vec();
+}
+
+/// Cayley map: rotation by 2 atan(|w| / 2) about w; equals the exponential up to third order, and its
+/// spin is a rational function, without a singular coefficient at w = 0.
+inline Matrix3 cayley(const Vector3& w) {
+  const double c = 1.0 / (1.0 + 0.25 * w.squaredNorm());
+  const Matrix3 W = cross_matrix(w);
+  return Matrix3::Identity() + c * (W + 0.5 * W * W);
+}
+
+/// Inverse of the Cayley map; needs an angle below pi.
+inline Vector3 cayley_inverse(const Matrix3& rotation) {
+  const Vector3 v = rotation_log(rotation);
+  const double angle = v.norm();
+  return angle < 1e-12 ? v : Vector3((2.0 * std::tan(0.5 * angle) / angle) * v);
+}
+
+/// Spatial spin = cayley_spin(w) dw.
+inline Matrix3 cayley_spin(const Vector3& w) {
+  return (Matrix3::Identity() + 0.5 * cross_matrix(w)) / (1.0 + 0.25 * w.squaredNorm());
+}
+
+/// Removes the rounding that products of rotations collect.
+inline Matrix3 orthonormalized(const Matrix3& rotation) {
+  return Eigen::Quaterniond(rotation).normalized().toRotationMatrix();
+}
+
+}  // namespace withe

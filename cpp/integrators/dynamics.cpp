@@ -1,0 +1,151 @@
+#include "integrators/dynamics.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace withe {
+namespace {
+
+/// Largest angle between the source tangents and those of a configuration; > pi/2 where an edge points back.
+double largest_turn(const Model& model, const Configuration& before, const Configuration& after) {
+  double smallest = 1.0;
+  for (int e = 0; e < model.edge_count; ++e) {
+    const auto i = static_cast<std::size_t>(e);
+    smallest = std::min(smallest, dot(before.edge[i].tangent, after.edge[i].tangent));
+  }
+  return std::acos(std::clamp(smallest, -1.0, 1.0));
+}
+
+/// Work of loads, drag and viscosity over the step, with the forces that acted in it.
+void book_work(const Equations& equations, const Parameters& parameters, StepResult& result) {
+  if (!equations.loads().pieces.empty() || (equations.custom_force.array() != 0.0).any())
+    result.load_work = equations.load_force().dot(result.change);
+  if (parameters.dragged || parameters.viscous) result.dissipated = -equations.dissipative_force().dot(result.change);
+}
+
+/// Forces over mass at q, with velocity v in drag, viscosity and the spin couple.
+VectorX explicit_acceleration(Equations& equations, const Parameters& parameters, double dt, const State& state,
+                              const VectorX& q, const VectorX& v, State& from, NewtonWorkspace& work) {
+  from = state;  // one that reaches q over dt with velocity v
+  from.q = q - dt * v;
+  from.v = v;
+  equations.begin(from, parameters, dt, false);
+  equations.evaluate(q, false, nullptr, work.evaluation);
+  VectorX force = -work.evaluation.full_residual;
+  equations.assembler().project(force);
+  return force.cwiseQuotient(equations.mass.cwiseMax(1e-300));
+}
+
+}  // namespace
+
+StepResult implicit_step(Equations& equations, const Newton& newton, const Options& options,
+                         const Parameters& parameters, double dt, const HeldTarget& held, State& state,
+                         NewtonWorkspace& work) {
+  StepResult result;
+  const Model& model = equations.model();
+  const bool euler = options.integrator == Integrator::backward_euler;
+  const double h = euler ? dt : 0.5 * dt;
+  equations.begin(state, parameters, h, options.integrator == Integrator::energy_momentum);
+  if (!held.reachable) return result;
+  const VectorX held_change = equations.assembler().held_part(held.q - state.q);
+  const auto start_at = [&](double weight) {
+    VectorX move = h * (state.v + (weight * h) * state.acceleration);
+    equations.assembler().project(move);
+    return VectorX(state.q + move * newton.cap(move) + (h / dt) * held_change);
+  };
+  VectorX z = start_at(1.0);
+  result.newton = newton.solve(equations, z, nullptr, options.max_iterations, work);
+  if (!result.newton.converged) {
+    z = start_at(0.0);
+    const int spent = result.newton.iterations;
+    result.newton = newton.solve(equations, z, nullptr, options.max_iterations, work);
+    result.newton.iterations += spent;
+    if (!result.newton.converged) return result;
+  }
+  const VectorX q1 = euler ? z : VectorX(2.0 * z - state.q);
+  Configuration before, after;
+  compute_configuration(model, state, state.q, before);
+  compute_configuration(model, state, q1, after);
+  if (!q1.allFinite() || !after.length.allFinite()) return result;
+  result.largest_turn = largest_turn(model, before, after);
+  if (result.largest_turn > 1.5) return result;
+  result.change = q1 - state.q;
+  const VectorX mean = result.change / dt;
+  VectorX v1 = euler ? mean : VectorX(2.0 * mean - state.v);
+  // Held unknowns have no dynamics of their own: midpoint's 2 v - v0 would ring for ever.
+  VectorX free_part = v1;
+  equations.assembler().project(free_part);
+  v1 = free_part + equations.assembler().held_part(mean);
+  const VectorX acceleration = (v1 - state.v) / dt;
+  const VectorX jerk = acceleration - state.acceleration;
+  result.error = euler ? 0.5 * dt * dt * newton.displacement(acceleration) : dt * dt / 12.0 * newton.displacement(jerk);
+  book_work(equations, parameters, result);
+  accept_configuration(model, q1, after, state);
+  state.v = v1;
+  state.acceleration = acceleration;
+  state.time += dt;
+  result.accepted = true;
+  return result;
+}
+
+StepResult verlet_step(Equations& equations, const Parameters& parameters, double dt, const HeldTarget& held,
+                       State& state, NewtonWorkspace& work) {
+  StepResult result;
+  const Model& model = equations.model();
+  if (!held.reachable) return result;
+  const VectorX q0 = state.q;
+  State from;
+  if (!state.acceleration_current)
+    state.acceleration = explicit_acceleration(equations, parameters, dt, state, q0, state.v, from, work);
+  VectorX half = state.v + 0.5 * dt * state.acceleration;
+  equations.assembler().project(half);
+  half += equations.assembler().held_part(held.q - q0) / dt;
+  const VectorX q1 = q0 + dt * half;
+  Configuration before, after;
+  compute_configuration(model, state, q0, before);
+  compute_configuration(model, state, q1, after);
+  if (!q1.allFinite() || !after.length.allFinite()) return result;
+  result.largest_turn = largest_turn(model, before, after);
+  if (result.largest_turn > 1.5) return result;
+  const VectorX acceleration = explicit_acceleration(equations, parameters, dt, state, q1, half, from, work);
+  result.change = q1 - q0;
+  VectorX v1 = half + 0.5 * dt * acceleration;
+  if (!v1.allFinite()) return result;
+  book_work(equations, parameters, result);
+  accept_configuration(model, q1, after, state);
+  state.v = v1;
+  state.acceleration = acceleration;
+  state.acceleration_current = true;
+  state.time += dt;
+  result.newton.converged = true;
+  result.accepted = true;
+  return result;
+}
+
+double stable_step(Equations& equations, const Parameters& parameters, const State& state, NewtonWorkspace& work) {
+  equations.begin(state, parameters, 0.0, false);
+  equations.evaluate(state.q, true, nullptr, work.evaluation);
+  const LinearSolver& solver = equations.assembler().solver();
+  const VectorX scale = equations.mass.cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  VectorX x(scale.size()), y(scale.size());
+  for (Eigen::Index i = 0; i < x.size(); ++i) x(i) = std::sin(1.0 + 7.0 * static_cast<double>(i)) + (i % 2 ? 1.0 : -1.0);
+  equations.assembler().project(x);
+  double greatest = 0.0;
+  for (int k = 0; k < 300; ++k) {
+    const double norm = x.norm();
+    if (norm == 0.0) break;
+    x = scale.cwiseProduct(x / norm);
+    solver.multiply({x.data(), static_cast<std::size_t>(x.size())}, {y.data(), static_cast<std::size_t>(y.size())});
+    x = scale.cwiseProduct(y);
+    equations.assembler().project(x);
+    const double value = x.norm();
+    if (k > 20 && std::abs(value - greatest) < 1e-5 * value) {
+      greatest = value;
+      break;
+    }
+    greatest = std::max(greatest, value);
+  }
+  return greatest > 0.0 ? 2.0 / std::sqrt(greatest) : INFINITY;
+}
+
+}  // namespace withe

@@ -1,0 +1,90 @@
+#pragma once
+/// The residual that one step must bring to zero, and its Jacobian.
+///
+/// Every implicit scheme solves for an inner configuration z over an interval h:
+///   M ((z - q0) / h^2 - v0 / h) + grad V(z) + D (z - q0) / h - f = 0,
+/// with z = q1, h = dt (backward Euler) or z = (q0 + q1) / 2, h = dt / 2 (implicit midpoint: backward Euler
+/// over half the step, then extrapolated). Statics is the same without mass. The energy-momentum scheme
+/// replaces grad V by a discrete gradient between q0 and q1 = 2 z - q0:
+///   stretching: EA (eps0 + eps1) / 2 (e0 + e1) / (|e0| + |e1|)   [Simo, Tarnow and Doblare 1995];
+///   bending, twisting: grad E(z) + r u / (u . D), D = q1 - q0, r = E(q1) - E(q0) - grad E(z) . D, with u a
+///   direction that neither moves nor (in a plane) turns the stencil [Gonzalez 1996].
+
+#include "assembly/assembler.hpp"
+#include "integrators/options.hpp"
+#include "model/state.hpp"
+
+namespace withe {
+
+/// What one evaluation left behind.
+struct Evaluation {
+  VectorX residual;      ///< projected onto free directions
+  VectorX full_residual; ///< before projection: minus the reactions
+  VectorX magnitude;     ///< per row, sum of the absolute contributions
+  VectorX floor;         ///< per row, what rounding alone leaves
+  double potential = 0;  ///< elastic + gravity - dead loads [J], where the scene has one
+};
+
+class Equations {
+ public:
+  Equations(const Model& model, const Options& options);
+
+  const Model& model() const { return model_; }
+  Assembler& assembler() { return assembler_; }
+  const Assembler& assembler() const { return assembler_; }
+  Loads& loads() { return loads_; }
+  const Loads& loads() const { return loads_; }
+  bool symmetric() const { return assembler_.solver().symmetry() == Symmetry::symmetric; }
+  /// True where statics minimise a potential.
+  bool has_potential() const { return has_potential_; }
+
+  /// Prepares a step from `state` over h (0: statics). Copies what it needs but the state itself, which
+  /// must outlive the step.
+  void begin(const State& state, const Parameters& parameters, double h, bool energy_momentum);
+  /// Explicit nodal forces (per unknown) that act in this step.
+  VectorX custom_force;
+
+  /// Residual at z, and the matrix when asked for. `axial_force`: see stretch_hessian.
+  void evaluate(const VectorX& z, bool with_matrix, const double* axial_force, Evaluation& out);
+  /// Configuration of the last evaluation.
+  const Configuration& configuration() const { return middle_; }
+  /// q1 = 2 z - q0 of an energy-momentum step.
+  const Configuration& end_configuration() const { return end_; }
+  /// Viscous, drag and load forces of the last evaluation, for the energy balance (per unknown).
+  VectorX dissipative_force() const;
+  VectorX load_force() const;
+
+  VectorX mass;  ///< per unknown [kg], [kg m^2]
+  ElasticCoefficients elastic;
+
+ private:
+  void add_elastic(const VectorX& z, bool with_matrix, const double* axial_force, Evaluation& out);
+  void add_discrete_gradient(const VectorX& z, bool with_matrix, Evaluation& out);
+  void correct(Local& local, const Local& end, double start_energy, const ElementTable& table, int element,
+               const double (*metric)[kMaxLocal]);
+  void add_planar_invariants(int stencil, Local& local, const Local& end, double start_energy) const;
+  void add_spin_couple(const VectorX& z, Evaluation& out) const;
+  void set_floor(const VectorX& z, VectorX& floor) const;
+  void gather_difference(const ElementTable& table, int element, double* difference) const;
+
+  const Model& model_;
+  Loads loads_;
+  bool has_potential_ = true;
+  Assembler assembler_;
+  const State* state_ = nullptr;
+  const Parameters* parameters_ = nullptr;
+  double h_ = 0.0;
+  bool energy_momentum_ = false;
+  ElasticCoefficients viscous_, total_;
+  Configuration start_, middle_, end_;
+  VectorX difference_;  ///< q1 - q0
+  VectorX end_q_, last_z_;
+  VectorX node_dof_drag_;
+};
+
+/// Per-unknown masses from the derived parameters.
+VectorX mass_vector(const Model& model, const Parameters& parameters);
+/// Gravity's force per unknown.
+VectorX gravity_force(const Model& model, const Parameters& parameters);
+
+}  // namespace withe

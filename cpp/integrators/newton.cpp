@@ -1,0 +1,174 @@
+#include "integrators/newton.hpp"
+
+#include <chrono>
+#include <cmath>
+
+namespace withe {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+}  // namespace
+
+Newton::Newton(const Model& model, const Options& options) : model_(model), options_(options) {
+  is_angle_.assign(static_cast<std::size_t>(model.dof_count), true);
+  for (int dof : model.node_dof)
+    for (int i = 0; i < model.dimension; ++i) is_angle_[static_cast<std::size_t>(dof + i)] = false;
+  edge_scale_ = model.edge_length.minCoeff();
+}
+
+bool Newton::balanced(const Evaluation& e, NewtonResult& result, bool& at_floor) const {
+  double force_scale = 0.0, moment_scale = 0.0;
+  for (Eigen::Index i = 0; i < e.residual.size(); ++i)
+    (is_angle_[static_cast<std::size_t>(i)] ? moment_scale : force_scale) =
+        std::max(is_angle_[static_cast<std::size_t>(i)] ? moment_scale : force_scale, e.magnitude(i));
+  moment_scale = std::max(moment_scale, force_scale * edge_scale_);
+  bool balanced = true;
+  at_floor = true;
+  result.residual = 0.0;
+  for (Eigen::Index i = 0; i < e.residual.size(); ++i) {
+    const bool angle = is_angle_[static_cast<std::size_t>(i)];
+    const double r = std::abs(e.residual(i));
+    if (!(r <= 10.0 * e.floor(i))) at_floor = false;
+    if (!(r <= std::max(options_.force_tolerance * (angle ? moment_scale : force_scale), 10.0 * e.floor(i))))
+      balanced = false;
+    const double as_force = angle ? r / edge_scale_ : r;
+    if (!(as_force <= result.residual)) {
+      result.residual = as_force;
+      result.worst_row = static_cast<int>(i);
+    }
+  }
+  return balanced;
+}
+
+double Newton::cap(const VectorX& step) const {
+  double move = 0.0, turn = 0.0;
+  for (Eigen::Index i = 0; i < step.size(); ++i)
+    (is_angle_[static_cast<std::size_t>(i)] ? turn : move) =
+        std::max(is_angle_[static_cast<std::size_t>(i)] ? turn : move, std::abs(step(i)));
+  // An edge may turn by about half a radian at once.
+  double edge_turn = 0.0;
+  for (int e = 0; e < model_.edge_count; ++e) {
+    const auto i = static_cast<std::size_t>(e);
+    const int a = model_.node_dof[static_cast<std::size_t>(model_.edge_tail[i])];
+    const int b = model_.node_dof[static_cast<std::size_t>(model_.edge_head[i])];
+    double d = 0.0;
+    for (int k = 0; k < model_.dimension; ++k) d += std::pow(step(b + k) - step(a + k), 2);
+    edge_turn = std::max(edge_turn, std::sqrt(d) / model_.edge_length(e));
+  }
+  double factor = 1.0;
+  if (move > 0.5 * model_.length_scale) factor = 0.5 * model_.length_scale / move;
+  if (turn * factor > 1.5) factor = 1.5 / turn;
+  if (edge_turn * factor > 1.0) factor = 1.0 / edge_turn;
+  return factor;
+}
+
+double Newton::displacement(const VectorX& step) const {
+  double move = 0.0;
+  for (Eigen::Index i = 0; i < step.size(); ++i)
+    move = std::max(move, std::abs(step(i)) * (is_angle_[static_cast<std::size_t>(i)] ? edge_scale_ : 1.0));
+  return move;
+}
+
+NewtonResult Newton::solve(Equations& equations, VectorX& z, const VectorX* target, int max_iterations,
+                           NewtonWorkspace& work) const {
+  NewtonResult result;
+  Evaluation& e = work.evaluation;
+  const double tolerance = options_.step_tolerance * model_.length_scale;
+  LinearSolver& solver = equations.assembler().solver();
+  bool axial_known = false;
+  double previous_step = INFINITY;
+  result.step = INFINITY;
+  int stagnant = 0;
+  for (;; ++result.iterations) {
+    const auto start = Clock::now();
+    const bool expect_end = result.step <= tolerance * 1e3;
+    const double* axial = options_.mixed && axial_known ? work.axial_force.data() : nullptr;
+    const auto evaluate = [&](bool matrix) {
+      equations.evaluate(z, matrix, axial, e);
+      if (target) e.residual -= *target;
+    };
+    evaluate(!expect_end);
+    bool at_floor = false;
+    if (!e.residual.allFinite()) return result;
+    const bool balanced = this->balanced(e, result, at_floor);
+    if (at_floor || (balanced && (result.step <= tolerance || stagnant >= 3))) {
+      work.counters.assembly_time += seconds_since(start);
+      result.converged = true;
+      return result;
+    }
+    if (result.iterations == max_iterations) return result;
+    if (expect_end) evaluate(true);
+    work.counters.assembly_time += seconds_since(start);
+
+    const auto solve_start = Clock::now();
+    ++work.counters.factorizations;
+    ++work.counters.iterations;
+    if (solver.factorize().status != FactorStatus::ok) {
+      // A free mode (a rod that may spin about its axis): hold it by a shift far below every stiffness.
+      double greatest = 0.0;
+      for (int i = 0; i < model_.dof_count; ++i)
+        greatest = std::max(greatest, std::abs(equations.assembler().diagonal(i)));
+      work.trial.setConstant(model_.dof_count, 1e-12 * greatest);
+      if (!(greatest > 0.0) ||
+          solver.factorize({work.trial.data(), static_cast<std::size_t>(work.trial.size())}).status != FactorStatus::ok)
+        return result;
+    }
+    work.step = -e.residual;
+    solver.solve({work.step.data(), static_cast<std::size_t>(work.step.size())});
+    work.counters.solve_time += seconds_since(solve_start);
+    if (!work.step.allFinite()) return result;
+    double factor = cap(work.step);
+    if (options_.line_search == LineSearch::goldstein_price)
+      factor *= line_search(equations, z, factor * work.step, target, work);
+    work.step *= factor;
+    if (options_.mixed) {
+      // n <- EA (eps + d eps . dx): linear from the present iterate.
+      work.axial_force.resize(model_.edge_count);
+      const Configuration& c = equations.configuration();
+      for (int k = 0; k < model_.edge_count; ++k) {
+        const auto i = static_cast<std::size_t>(k);
+        const int a = model_.node_dof[static_cast<std::size_t>(model_.edge_tail[i])];
+        const int b = model_.node_dof[static_cast<std::size_t>(model_.edge_head[i])];
+        const double t[3] = {c.edge[i].tangent.x, c.edge[i].tangent.y, c.edge[i].tangent.z};
+        double stretch = c.length(k);
+        for (int d = 0; d < model_.dimension; ++d) stretch += t[d] * (work.step(b + d) - work.step(a + d));
+        work.axial_force(k) = equations.elastic.stretch_stiffness(k) * (stretch / model_.edge_length(k) - 1.0);
+      }
+      axial_known = true;
+    }
+    z += work.step;
+    previous_step = result.step;
+    result.step = factor < 1.0 ? INFINITY : displacement(work.step);
+    stagnant = balanced && result.step > 0.25 * previous_step ? stagnant + 1 : 0;
+  }
+}
+
+/// [dissertation, Algorithm 4], with the sign of q + alpha dq and the bounds it leaves unset: Goldstein-Price on
+/// |F|^2 / 2.
+double Newton::line_search(Equations& equations, const VectorX& z, const VectorX& step, const VectorX* target,
+                           NewtonWorkspace& work) const {
+  const double before = 0.5 * work.evaluation.residual.squaredNorm();
+  const double slope = -2.0 * before;  // F^T (dF/dq) dq, with dq = -J^-1 F
+  double low = 0.0, high = 2.0, alpha = 1.0;
+  for (int n = 0; n < 20; ++n) {
+    work.trial = z + alpha * step;
+    equations.evaluate(work.trial, false, nullptr, work.evaluation);
+    if (target) work.evaluation.residual -= *target;
+    const double change = 0.5 * work.evaluation.residual.squaredNorm() - before;
+    if (!(change <= 0.1 * alpha * slope))
+      high = alpha;
+    else if (alpha < 1.0 && change < 0.9 * alpha * slope)
+      low = alpha;
+    else
+      break;
+    if (high - low < 1e-3) break;
+    alpha = 0.5 * (low + high);
+  }
+  equations.evaluate(z, false, nullptr, work.evaluation);
+  return alpha;
+}
+
+}  // namespace withe

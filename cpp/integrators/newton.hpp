@@ -1,0 +1,53 @@
+#pragma once
+/// Newton's method for one step, mixed in the axial forces.
+
+#include "integrators/equations.hpp"
+
+namespace withe {
+
+struct Counters {
+  long iterations = 0, factorizations = 0;
+  double assembly_time = 0, solve_time = 0;  ///< [s]
+};
+
+struct NewtonResult {
+  bool converged = false;
+  int iterations = 0;
+  double residual = 0;  ///< greatest force out of balance [N]
+  int worst_row = -1;
+  double step = 0;      ///< greatest displacement of the last iteration [m]
+};
+
+/// Scratch of the solver; owned by the world, so that a step does not allocate.
+struct NewtonWorkspace {
+  Evaluation evaluation;
+  VectorX step, axial_force, trial;
+  Counters counters;
+};
+
+class Newton {
+ public:
+  Newton(const Model& model, const Options& options);
+
+  /// Finds z with F(z) = target (nothing: zero), starting at z.
+  NewtonResult solve(Equations& equations, VectorX& z, const VectorX* target, int max_iterations,
+                     NewtonWorkspace& work) const;
+  /// Which residuals are small enough: relative to the forces in the scene, or to rounding.
+  bool balanced(const Evaluation& evaluation, NewtonResult& result, bool& at_floor) const;
+  /// Factor by which a step is shortened, so that nothing moves or turns too far at once.
+  double cap(const VectorX& step) const;
+  double displacement(const VectorX& step) const;
+
+  const std::vector<bool>& is_angle() const { return is_angle_; }
+
+ private:
+  double line_search(Equations& equations, const VectorX& z, const VectorX& step, const VectorX* target,
+                     NewtonWorkspace& work) const;
+
+  const Model& model_;
+  Options options_;
+  std::vector<bool> is_angle_;
+  double edge_scale_ = 1.0;
+};
+
+}  // namespace withe

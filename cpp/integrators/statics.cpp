@@ -1,0 +1,222 @@
+#include "integrators/statics.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+namespace withe {
+namespace {
+
+/// Greatest angle by which an edge has left its source frame [rad]; a load increment is cut beyond a right angle.
+bool turned_too_far(const State& state, const Configuration& c, bool planar) {
+  if (planar) return false;
+  for (std::size_t e = 0; e < c.edge.size(); ++e)
+    if (dot(state.tangent[e], c.edge[e].tangent) < 0.0) return true;
+  return false;
+}
+
+class Statics {
+ public:
+  Statics(Equations& equations, const Newton& newton, const Options& options, const Parameters& parameters,
+          State& state, NewtonWorkspace& work)
+      : equations_(equations), newton_(newton), options_(options), parameters_(parameters), state_(state), work_(work) {}
+
+  StaticResult run(const Boundary& boundary) {
+    StaticResult result;
+    const State start = state_;
+    result.converged = load_steps(boundary, start, result.newton);
+    if (!result.converged && equations_.has_potential()) {
+      state_ = start;
+      boundary(1.0, start, state_.q);
+      accept(state_.q);
+      result.converged = descend(400, result.newton);
+    }
+    if (!result.converged) return result;
+    result.stable = stable();
+    for (int tries = 0; tries < 4 && !result.stable && equations_.has_potential(); ++tries) {
+      leave_saddle(tries);
+      result.converged = descend(400, result.newton);
+      if (!result.converged) return result;
+      result.stable = stable();
+    }
+    return result;
+  }
+
+ private:
+  void begin() { equations_.begin(state_, parameters_, 0.0, false); }
+
+  void accept(const VectorX& q) {
+    Configuration& c = scratch_;
+    compute_configuration(equations_.model(), state_, q, c);
+    accept_configuration(equations_.model(), q, c, state_);
+  }
+
+  bool load_steps(const Boundary& boundary, const State& start, NewtonResult& last) {
+    begin();
+    equations_.evaluate(state_.q, false, nullptr, work_.evaluation);
+    const VectorX imbalance = work_.evaluation.residual;
+    VectorX target, z;
+    double reached = 0.0, increment = 1.0;
+    int halvings = 0;
+    while (reached < 1.0) {
+      const double next = std::min(1.0, reached + increment);
+      begin();
+      z = state_.q;
+      boundary(next, start, z);
+      target = (1.0 - next) * imbalance;
+      equations_.assembler().project(target);
+      const NewtonResult r = newton_.solve(equations_, z, &target, increment == 1.0 ? 25 : options_.max_iterations, work_);
+      last.iterations += r.iterations;
+      last.residual = r.residual;
+      last.worst_row = r.worst_row;
+      last.step = r.step;
+      if (r.converged && !turned_too_far(state_, equations_.configuration(), equations_.model().planar())) {
+        accept(z);
+        reached = next;
+        if (r.iterations <= 8) increment *= 2.0;
+      } else {
+        if (++halvings > 12 || increment < 1e-3) return false;
+        increment *= increment == 1.0 ? 0.2 : 0.5;
+      }
+    }
+    last.converged = true;
+    return true;
+  }
+
+  /// Levenberg-Marquardt on the potential: every accepted step lowers it.
+  bool descend(int max_steps, NewtonResult& last) {
+    const Model& model = equations_.model();
+    LinearSolver& solver = equations_.assembler().solver();
+    VectorX shift, z, step, weight;
+    begin();
+    weight = equations_.mass;
+    double damping = 0.0;
+    for (int k = 0; k < max_steps; ++k) {
+      begin();
+      equations_.evaluate(state_.q, true, nullptr, work_.evaluation);
+      const Evaluation here = work_.evaluation;
+      bool at_floor = false;
+      const bool balanced = newton_.balanced(here, last, at_floor);
+      if (damping == 0.0) {
+        double stiffness = 0.0;
+        for (int i = 0; i < model.dof_count; ++i)
+          stiffness = std::max(stiffness, equations_.assembler().diagonal(i) / std::max(weight(i), 1e-300));
+        damping = 1e-6 * stiffness;
+        lowest_ = 1e-12 * stiffness;
+      }
+      if ((at_floor || (balanced && damping <= lowest_ * 1e2)) || (k % 10 == 9 && damping <= lowest_ * 1e4)) {
+        // Near a minimum full Newton steps finish the work, if they stay near.
+        z = state_.q;
+        const double energy = here.potential;
+        const NewtonResult r = newton_.solve(equations_, z, nullptr, 30, work_);
+        last.iterations += r.iterations;
+        last.residual = r.residual;
+        if (r.converged && work_.evaluation.potential <= energy + 1e-9 * std::abs(energy) &&
+            !turned_too_far(state_, equations_.configuration(), model.planar())) {
+          accept(z);
+          return true;
+        }
+        begin();
+        equations_.evaluate(state_.q, true, nullptr, work_.evaluation);
+      }
+      bool accepted = false;
+      for (int tries = 0; tries < 40 && !accepted; ++tries) {
+        shift = damping * weight.cwiseMax(1e-300);
+        ++work_.counters.factorizations;
+        const Factorization f = solver.factorize({shift.data(), static_cast<std::size_t>(shift.size())});
+        if (f.status != FactorStatus::ok || f.negative_pivots > 0) {
+          damping *= 8.0;
+          continue;
+        }
+        step = -here.residual;
+        solver.solve({step.data(), static_cast<std::size_t>(step.size())});
+        if (newton_.cap(step) < 1.0) {
+          damping *= 4.0;
+          continue;
+        }
+        z = state_.q + step;
+        equations_.evaluate(z, false, nullptr, work_.evaluation);
+        const double gain = here.residual.dot(step);  // negative
+        const double rounding = 1e-13 * (std::abs(here.potential) + here.magnitude.cwiseAbs().dot(step.cwiseAbs()));
+        if (std::isfinite(work_.evaluation.potential) &&
+            work_.evaluation.potential - here.potential <= 0.1 * gain + rounding) {
+          accepted = true;
+        } else {
+          damping *= 4.0;
+        }
+      }
+      ++last.iterations;
+      ++work_.counters.iterations;
+      if (!accepted) return false;
+      accept(z);
+      damping = std::max(damping * 0.2, lowest_);
+    }
+    return false;
+  }
+
+  bool stable() {
+    begin();
+    equations_.evaluate(state_.q, true, nullptr, work_.evaluation);
+    ++work_.counters.factorizations;
+    LinearSolver& solver = equations_.assembler().solver();
+    if (solver.symmetry() == Symmetry::symmetric) {
+      // A neutral mode may come out on either side of zero by rounding, so it is pushed up a little.
+      double greatest = 0.0;
+      for (int i = 0; i < equations_.model().dof_count; ++i)
+        greatest = std::max(greatest, equations_.assembler().diagonal(i));
+      VectorX shift = VectorX::Constant(equations_.model().dof_count, 1e-13 * greatest);
+      const Factorization f = solver.factorize({shift.data(), static_cast<std::size_t>(shift.size())});
+      return f.status == FactorStatus::ok && f.negative_pivots == 0;
+    }
+    return solver.factorize().status == FactorStatus::ok;
+  }
+
+  /// Moves along the direction of most negative curvature, found by inverse iteration on a shifted matrix.
+  void leave_saddle(int seed) {
+    const Model& model = equations_.model();
+    begin();
+    equations_.evaluate(state_.q, true, nullptr, work_.evaluation);
+    LinearSolver& solver = equations_.assembler().solver();
+    const VectorX weight = equations_.mass.cwiseMax(1e-300);
+    double stiffness = 0.0;
+    for (int i = 0; i < model.dof_count; ++i) stiffness = std::max(stiffness, equations_.assembler().diagonal(i) / weight(i));
+    VectorX shift;
+    for (double damping = 1e-10 * stiffness; damping < 1e3 * stiffness; damping *= 2.0) {
+      shift = damping * weight;
+      const Factorization f = solver.factorize({shift.data(), static_cast<std::size_t>(shift.size())});
+      if (f.status == FactorStatus::ok && f.negative_pivots == 0) break;
+    }
+    std::mt19937 random(static_cast<unsigned>(seed + 1));
+    std::normal_distribution<double> normal;
+    VectorX direction(model.dof_count);
+    for (Eigen::Index i = 0; i < direction.size(); ++i) direction(i) = normal(random);
+    for (int k = 0; k < 12; ++k) {
+      direction = direction.cwiseProduct(weight);
+      equations_.assembler().project(direction);
+      solver.solve({direction.data(), static_cast<std::size_t>(direction.size())});
+      direction /= direction.norm();
+    }
+    direction *= 1e-3 * model.length_scale / std::max(newton_.displacement(direction), 1e-300);
+    direction *= newton_.cap(direction);
+    accept(state_.q + direction);
+  }
+
+  Equations& equations_;
+  const Newton& newton_;
+  const Options& options_;
+  const Parameters& parameters_;
+  State& state_;
+  NewtonWorkspace& work_;
+  Configuration scratch_;
+  double lowest_ = 0.0;
+};
+
+}  // namespace
+
+StaticResult find_equilibrium(Equations& equations, const Newton& newton, const Options& options,
+                              const Parameters& parameters, const Boundary& boundary, State& state,
+                              NewtonWorkspace& work) {
+  return Statics(equations, newton, options, parameters, state, work).run(boundary);
+}
+
+}  // namespace withe

@@ -1,0 +1,362 @@
+#include <algorithm>
+#include <map>
+
+#include "common/check.hpp"
+#include "geometry/curvature.hpp"
+#include "geometry/rotation.hpp"
+#include "model/layout.hpp"
+#include "model/model.hpp"
+
+namespace withe {
+namespace {
+
+using Key = std::pair<int, int>;  // rod, node within the rod
+
+/// Rods that meet rigidly at one node.
+struct Cluster {
+  std::vector<RodPass> passes;
+  int joint = -1;
+  JointForm form = JointForm::frame;
+  int frame = -1;
+  int hinge = -1;
+};
+
+class Builder {
+ public:
+  explicit Builder(Model& model) : model_(model), scene_(model.description) {}
+
+  void build() {
+    add_edges();
+    find_clusters();
+    add_frames();
+    add_stencils();
+    resolve_supports();
+    lay_out_unknowns(model_);
+    add_constraints(model_);
+    draw();
+  }
+
+ private:
+  const RodDescription& rod(int r) const { return scene_.rods[static_cast<std::size_t>(r)]; }
+  int edges_of(int r) const {
+    return static_cast<int>(rod(r).nodes.size()) - (rod(r).closed ? 0 : 1);
+  }
+  int first_edge(int r) const { return model_.rod_first_edge[static_cast<std::size_t>(r)]; }
+  int global_node(RodPass pass) const {
+    return rod(pass.rod).nodes[static_cast<std::size_t>(pass.node)];
+  }
+  /// Edges that arrive at and leave a node of a rod; -1 where there is none.
+  std::pair<int, int> edges_at(RodPass pass) const {
+    const int n = edges_of(pass.rod), first = first_edge(pass.rod);
+    const int in = pass.node > 0 ? pass.node - 1 : rod(pass.rod).closed ? n - 1 : -1;
+    const int out = pass.node < n ? pass.node : -1;
+    return {in < 0 ? -1 : first + in, out < 0 ? -1 : first + out};
+  }
+  Matrix3 drawn_frame(int edge) const {
+    const auto e = static_cast<std::size_t>(edge);
+    const Vector3 t = to_eigen(model_.initial_tangent[e]), d1 = to_eigen(model_.initial_director[e]);
+    Matrix3 frame;
+    frame << d1, t.cross(d1), t;
+    return frame;
+  }
+  EdgeFrame<double> strain_frame(int edge, int sign) const {
+    const Matrix3 f = drawn_frame(edge);
+    const double s = sign;
+    return {to_vec3(s * f.col(2)), to_vec3(f.col(0)), to_vec3(s * f.col(1)), 1.0, {}, {}};
+  }
+
+  void add_edges() {
+    model_.node_count = static_cast<int>(scene_.positions.rows());
+    model_.rod_first_edge = {0};
+    std::vector<double> lengths;
+    double longest = 0.0;
+    for (std::size_t r = 0; r < scene_.rods.size(); ++r) {
+      const RodDescription& d = scene_.rods[r];
+      const int count = static_cast<int>(d.nodes.size()) - (d.closed ? 0 : 1);
+      for (int e = 0; e < count; ++e) {
+        const int tail = d.nodes[static_cast<std::size_t>(e)];
+        const int head = d.nodes[static_cast<std::size_t>(e + 1) % d.nodes.size()];
+        const Vector3 t = (scene_.positions.row(head) - scene_.positions.row(tail)).normalized();
+        Vector3 director = d.directors.row(e);
+        director = (director - t * t.dot(director)).normalized();
+        model_.edge_tail.push_back(tail);
+        model_.edge_head.push_back(head);
+        model_.edge_rod.push_back(static_cast<int>(r));
+        model_.initial_tangent.push_back(to_vec3(t));
+        model_.initial_director.push_back(to_vec3(director));
+        lengths.push_back(d.rest_lengths(e));
+      }
+      longest = std::max(longest, d.rest_lengths.sum());
+      model_.rod_first_edge.push_back(static_cast<int>(lengths.size()));
+    }
+    model_.edge_count = static_cast<int>(lengths.size());
+    model_.edge_length = Eigen::Map<VectorX>(lengths.data(), static_cast<Eigen::Index>(lengths.size()));
+    model_.length_scale = longest;
+    if (!model_.planar()) return;
+    for (std::size_t r = 0; r < scene_.rods.size(); ++r) {
+      const Matrix3 f = drawn_frame(model_.rod_first_edge[r]);
+      const Vector3& n = model_.plane->normal;
+      model_.planar_components.emplace_back(f.col(1).dot(n), -f.col(0).dot(n));
+    }
+  }
+
+  void find_clusters() {
+    for (std::size_t j = 0; j < scene_.joints.size(); ++j) {
+      const JointDescription& joint = scene_.joints[j];
+      const int base = static_cast<int>(clusters_.size());
+      for (const auto& passes : joint.clusters) {
+        clusters_.push_back({passes, static_cast<int>(j), joint.form});
+        for (const RodPass& pass : passes) cluster_of_[{pass.rod, pass.node}] = static_cast<int>(clusters_.size()) - 1;
+      }
+      for (const RevoluteLink& link : joint.links) add_link(base + link.parent, base + link.child, link.axis);
+    }
+  }
+
+  void add_link(int parent, int child, const Vector3& axis) {
+    if (model_.planar()) {
+      if (axis.cross(model_.plane->normal).norm() < 1e-9) return;  // in its plane a hinge is a pin
+      Cluster& to = clusters_[static_cast<std::size_t>(parent)];
+      for (const RodPass& pass : clusters_[static_cast<std::size_t>(child)].passes) {
+        to.passes.push_back(pass);
+        cluster_of_[{pass.rod, pass.node}] = parent;
+      }
+      clusters_[static_cast<std::size_t>(child)].passes.clear();
+      return;
+    }
+    // Every hinge turns against one root, so a chain of hinges at one node starts at its middle.
+    if (clusters_[static_cast<std::size_t>(child)].hinge >= 0) std::swap(parent, child);
+    Cluster& c = clusters_[static_cast<std::size_t>(child)];
+    require(c.hinge < 0 && clusters_[static_cast<std::size_t>(parent)].hinge < 0,
+            "revolute joints at one node must all turn against the same rod");
+    c.hinge = static_cast<int>(model_.hinges.size());
+    model_.hinges.push_back({-1, axis.normalized(), -1});
+    hinge_parent_.push_back(parent);
+  }
+
+  Cluster& cluster_at(RodPass pass) {
+    const auto found = cluster_of_.find({pass.rod, pass.node});
+    if (found != cluster_of_.end()) return clusters_[static_cast<std::size_t>(found->second)];
+    cluster_of_[{pass.rod, pass.node}] = static_cast<int>(clusters_.size());
+    clusters_.push_back({{pass}, -1, JointForm::frame});
+    return clusters_.back();
+  }
+
+  int frame_of(Cluster& cluster) {
+    if (cluster.frame < 0) {
+      cluster.frame = model_.frame_count++;
+      frame_node_.push_back(global_node(cluster.passes.front()));
+    }
+    return cluster.frame;
+  }
+
+  /// Two ends that continue each other, with aligned directors, are one rod.
+  bool continues(const Cluster& c) const {
+    if (c.passes.size() != 2 || c.form != JointForm::frame) return false;
+    const auto [a, b] = ordered(c);
+    const int in = edges_at(a).first, out = edges_at(b).second;
+    if (in < 0 || out < 0 || edges_at(a).second >= 0 || edges_at(b).first >= 0) return false;
+    const auto i = static_cast<std::size_t>(in), o = static_cast<std::size_t>(out);
+    if (dot(model_.initial_tangent[i], model_.initial_tangent[o]) < -0.5) return false;
+    const Vec3d carried = parallel_transport(model_.initial_director[i], model_.initial_tangent[i],
+                                             model_.initial_tangent[o]);
+    return dot(carried, model_.initial_director[o]) > 1.0 - 1e-9;
+  }
+  std::pair<RodPass, RodPass> ordered(const Cluster& c) const {
+    const RodPass a = c.passes[0], b = c.passes[1];
+    return edges_at(a).first >= 0 ? std::pair{a, b} : std::pair{b, a};
+  }
+
+  void add_frames() {
+    for (const SupportDescription& support : scene_.supports)
+      if (support.kind == SupportKind::clamp) {
+        Cluster& cluster = cluster_at(support.pass);
+        require(cluster.hinge < 0, "a clamp must hold the fixed side of a revolute joint, not the side that turns");
+        frame_of(cluster);
+      }
+    for (std::size_t h = 0; h < model_.hinges.size(); ++h)
+      model_.hinges[h].frame = frame_of(clusters_[static_cast<std::size_t>(hinge_parent_[h])]);
+    for (Cluster& cluster : clusters_)
+      if (cluster.hinge < 0 && cluster.passes.size() > 1 && cluster.form == JointForm::frame && !continues(cluster))
+        frame_of(cluster);
+    for (Cluster& cluster : clusters_)
+      if (cluster.hinge >= 0) cluster.frame = model_.hinges[static_cast<std::size_t>(cluster.hinge)].frame;
+  }
+
+  /// Frame of the rod at a node, extrapolated by half an edge from how it was drawn: columns d1, d2, t.
+  Matrix3 drawn_frame_at(RodPass pass) const {
+    auto [in, out] = edges_at(pass);
+    const int n = edges_of(pass.rod), first = first_edge(pass.rod);
+    const bool start = in < 0;
+    if (start && n > 1) in = out, out = first + 1;
+    if (out < 0 && n > 1) out = in, in = first + n - 2;
+    if (in < 0 || out < 0) return drawn_frame(start ? out : in);
+    const Matrix3 a = drawn_frame(in), b = drawn_frame(out);
+    const Vector3 turn = rotation_log(b * a.transpose());
+    const double la = model_.edge_length(in), lb = model_.edge_length(out);
+    if (start) return rotation_exp(-turn * (la / (la + lb))) * a;
+    if (pass.node == n && !rod(pass.rod).closed) return rotation_exp(turn * (lb / (la + lb))) * b;
+    return rotation_exp(turn * (la / (la + lb))) * a;
+  }
+
+  void add_half(const Cluster& cluster, RodPass pass, int edge, bool frame_first) {
+    const int stencils = static_cast<int>(rod(pass.rod).natural_twist.size());
+    const int shift = rod(pass.rod).closed ? 0 : 1;
+    const int nearest = stencils == 0 ? -1 : std::clamp(pass.node - shift, 0, stencils - 1);
+    const int index = static_cast<int>(model_.half.size());
+    model_.half.push_back({cluster.frame, edge, cluster.hinge, frame_first, drawn_frame_at(pass)});
+    half_voronoi_.push_back(0.5 * model_.edge_length(edge));
+    model_.half_owner.emplace_back(pass.rod, nearest);
+    const int own = pass.node - shift;
+    if (own >= 0 && own < stencils) {
+      StencilPlace& place = model_.place[static_cast<std::size_t>(pass.rod)][static_cast<std::size_t>(own)];
+      place.half[frame_first ? 1 : 0] = index;
+    }
+    if (pass.node == 0 && frame_first && !rod(pass.rod).closed)
+      model_.wall_half[static_cast<std::size_t>(pass.rod)][0] = index;
+    if (pass.node == edges_of(pass.rod) && !rod(pass.rod).closed)
+      model_.wall_half[static_cast<std::size_t>(pass.rod)][1] = index;
+  }
+
+  int add_bend(int e0, int e1, int s0, int s1, std::pair<int, int> owner, bool keep_drawn) {
+    const auto end = [&](int e, bool far, int sign) {
+      const auto i = static_cast<std::size_t>(e);
+      return far == (sign > 0) ? model_.edge_tail[i] : model_.edge_head[i];
+    };
+    model_.bend.push_back({{e0, e1}, {end(e0, true, s0), end(e0, false, s0), end(e1, false, s1)}, {s0, s1}});
+    model_.bend_owner.push_back(owner);
+    bend_voronoi_.push_back(0.5 * (model_.edge_length(e0) + model_.edge_length(e1)));
+    offsets_keep_drawn_.push_back(keep_drawn);
+    return static_cast<int>(model_.bend.size()) - 1;
+  }
+
+  void add_stencils() {
+    for (std::size_t r = 0; r < scene_.rods.size(); ++r) {
+      const int index = static_cast<int>(r), n = edges_of(index), shift = rod(index).closed ? 0 : 1;
+      model_.place.emplace_back(static_cast<std::size_t>(rod(index).natural_twist.size()));
+      model_.wall_half.push_back({-1, -1});
+      for (int node = 0; node < n + shift; ++node) {
+        const RodPass pass{index, node};
+        const auto [in, out] = edges_at(pass);
+        const auto found = cluster_of_.find({index, node});
+        const Cluster* c = found == cluster_of_.end() ? nullptr : &clusters_[static_cast<std::size_t>(found->second)];
+        if (c && c->frame >= 0) {
+          if (in >= 0) add_half(*c, pass, in, false);
+          if (out >= 0) add_half(*c, pass, out, true);
+        } else if (in >= 0 && out >= 0) {
+          model_.place[r][static_cast<std::size_t>(node - shift)].bend = add_bend(in, out, 1, 1, {index, node - shift}, false);
+        }
+      }
+    }
+    for (const Cluster& cluster : clusters_) {
+      if (cluster.frame >= 0 || cluster.passes.size() < 2) continue;
+      if (cluster.form == JointForm::pairs) {
+        add_pairs(cluster);
+      } else {
+        const auto [a, b] = ordered(cluster);
+        add_bend(edges_at(a).first, edges_at(b).second, 1, 1, {-1, -1}, true);
+      }
+    }
+    const auto map = [](const std::vector<double>& v) {
+      return VectorX(Eigen::Map<const VectorX>(v.data(), static_cast<Eigen::Index>(v.size())));
+    };
+    model_.bend_voronoi = map(bend_voronoi_);
+    model_.half_voronoi = map(half_voronoi_);
+  }
+
+  /// [dissertation 6.2.2]: every pair of edges at the node that is not a rod's own stencil.
+  void add_pairs(const Cluster& cluster) {
+    struct End { int rod, edge; bool arrives; };
+    std::vector<End> ends;
+    for (const RodPass& pass : cluster.passes) {
+      const auto [in, out] = edges_at(pass);
+      if (in >= 0) ends.push_back({pass.rod, in, true});
+      if (out >= 0) ends.push_back({pass.rod, out, false});
+    }
+    for (std::size_t i = 0; i < ends.size(); ++i)
+      for (std::size_t j = i + 1; j < ends.size(); ++j) {
+        if (ends[i].rod == ends[j].rod) continue;
+        add_bend(ends[i].edge, ends[j].edge, ends[i].arrives ? 1 : -1, ends[j].arrives ? -1 : 1, {-1, -2}, true);
+      }
+  }
+
+  void resolve_supports() {
+    for (const SupportDescription& description : scene_.supports) {
+      Support s;
+      s.active = true;
+      s.description = description;
+      s.node = global_node(description.pass);
+      if (description.kind == SupportKind::clamp) {
+        s.frame = cluster_at(description.pass).frame;
+      } else if (description.kind == SupportKind::hold_edge) {
+        const auto [in, out] = edges_at(description.pass);
+        s.edge = out >= 0 ? out : in;
+        const auto e = static_cast<std::size_t>(s.edge);
+        s.other_node = model_.edge_tail[e] == s.node ? model_.edge_head[e] : model_.edge_tail[e];
+      }
+      model_.supports.push_back(s);
+    }
+    model_.frame_dof.assign(static_cast<std::size_t>(model_.frame_count), -1);
+    model_.frame_node = frame_node_;
+  }
+
+  /// Unknowns, strains and offsets of the drawn state.
+  void draw() {
+    model_.initial_q = VectorX::Zero(model_.dof_count);
+    for (int i = 0; i < model_.node_count; ++i) {
+      const Vector3 x = scene_.positions.row(i);
+      const int dof = model_.node_dof[static_cast<std::size_t>(i)];
+      if (model_.planar())
+        model_.initial_q.segment<2>(dof) << (x - model_.plane->origin).dot(model_.plane->first),
+            (x - model_.plane->origin).dot(model_.plane->second);
+      else
+        model_.initial_q.segment<3>(dof) = x;
+    }
+    const auto n = static_cast<Eigen::Index>(model_.bend.size());
+    model_.bend_offset = MatrixX3::Zero(n, 3);
+    model_.initial_bend_tau = VectorX::Zero(n);
+    for (Eigen::Index b = 0; b < n; ++b) {
+      const BendStencil& s = model_.bend[static_cast<std::size_t>(b)];
+      const auto strain = bend_twist_strain(strain_frame(s.edge[0], s.sign[0]), strain_frame(s.edge[1], s.sign[1]), 0.0);
+      model_.initial_bend_tau(b) = strain.tau;
+      if (!offsets_keep_drawn_[static_cast<std::size_t>(b)]) continue;
+      if (model_.planar()) {
+        const Vec3d t0 = strain_frame(s.edge[0], s.sign[0]).tangent, t1 = strain_frame(s.edge[1], s.sign[1]).tangent;
+        const double turn = to_eigen(cross(t0, t1)).dot(model_.plane->normal);
+        model_.bend_offset(b, 0) = 2.0 * turn / (1.0 + dot(t0, t1));
+      } else {
+        model_.bend_offset.row(b) << strain.kappa1, strain.kappa2, strain.tau;
+      }
+    }
+    // Natural strains of the rods come on top, so those of the drawing are taken off here.
+    const MatrixX3 drawn = model_.bend_offset;
+    model_.bend_offset.setZero();
+    const Parameters natural = initial_parameters(model_);
+    for (Eigen::Index b = 0; b < n; ++b)
+      if (offsets_keep_drawn_[static_cast<std::size_t>(b)])
+        model_.bend_offset.row(b) = drawn.row(b) - natural.bend_natural.row(b);
+    model_.initial_half_tau = VectorX::Zero(static_cast<Eigen::Index>(model_.half.size()));
+  }
+
+  Model& model_;
+  const SceneDescription& scene_;
+  std::vector<Cluster> clusters_;
+  std::map<Key, int> cluster_of_;
+  std::vector<int> hinge_parent_, frame_node_;
+  std::vector<double> bend_voronoi_, half_voronoi_;
+  std::vector<bool> offsets_keep_drawn_;
+};
+
+}  // namespace
+
+Model build_model(const SceneDescription& description, std::optional<bool> planar) {
+  require(!description.rods.empty(), "the scene has no rods: add one with add_rod");
+  Model model;
+  model.description = description;
+  if (planar.value_or(true)) model.plane = find_plane(description, model.plane_reason);
+  require(!planar.value_or(false) || model.plane, "planar=True, but " + model.plane_reason);
+  model.dimension = model.plane ? 2 : 3;
+  Builder(model).build();
+  return model;
+}
+
+}  // namespace withe

@@ -1,0 +1,97 @@
+#pragma once
+/// What the scene layer hands to the engine: plain arrays in SI units, one struct per thing that a user
+/// adds. Nodes that are joined already share one index here. Nothing in it changes after `build`.
+
+#include <string>
+#include <vector>
+
+#include "common/types.hpp"
+
+namespace withe {
+
+/// A rod as a chain of nodes. Arrays have one row per edge, or per stencil where said so.
+/// An open rod of N nodes has N - 1 edges and N - 2 stencils (the inner nodes); a closed one has N, N
+/// and N (stencil i sits at node i, between edges i - 1 and i).
+struct RodDescription {
+  std::string name;
+  std::vector<int> nodes;       ///< rows of SceneDescription::positions, in order; closed: the first is not repeated
+  bool closed = false;
+  MatrixX3 directors;           ///< first director of each edge, unit length, normal to the edge
+  VectorX rest_lengths;         ///< [m]
+  VectorX stretch_stiffness;    ///< EA [N]
+  MatrixX2 bend_stiffness;      ///< EI1, EI2 [N m^2]: resisting curvature towards d1 and d2
+  VectorX twist_stiffness;      ///< GJ [N m^2]
+  VectorX line_density;         ///< mass per length [kg/m]
+  VectorX rotary_inertia;       ///< rho (I1 + I2), polar inertia per length [kg m]
+  VectorX viscous_time;         ///< Kelvin-Voigt: viscosity / Young's modulus [s]
+  VectorX drag;                 ///< force per length and velocity [Pa s]
+  MatrixX2 natural_curvature;   ///< per stencil, of the smooth rod, towards d1 and d2 [1/m]
+  VectorX natural_twist;        ///< per stencil [rad/m]
+};
+
+/// One rod passing through, starting or ending at a shared node: rod index and node index within the rod.
+struct RodPass {
+  int rod = 0;
+  int node = 0;
+};
+
+/// A revolute link inside a joint: the second cluster turns about `axis` relative to the first.
+struct RevoluteLink {
+  int parent = 0;  ///< index of a cluster of the joint
+  int child = 0;
+  Vector3 axis = Vector3::UnitZ();  ///< unit length, in the drawn configuration
+};
+
+enum class JointForm {
+  frame,  ///< the joint owns a frame; every attached edge has one stencil of half length to it
+  pairs,  ///< one stencil for every pair of edges, [dissertation 6.2.2]; archival
+};
+
+/// A node that several rods share. Passes in one cluster are rigidly connected; clusters are connected by
+/// revolute links, or (pinned) only by the shared node.
+struct JointDescription {
+  std::vector<std::vector<RodPass>> clusters;
+  std::vector<RevoluteLink> links;
+  JointForm form = JointForm::frame;
+};
+
+enum class SupportKind {
+  pin,        ///< position only
+  clamp,      ///< position and the frame of the wall, by a stencil of half length
+  hold_edge,  ///< both nodes of the end edge and its angle, the source's clamp
+};
+
+/// Something that holds a node of a rod.
+struct SupportDescription {
+  SupportKind kind = SupportKind::pin;
+  RodPass pass;
+  Matrix3 free = Matrix3::Zero();  ///< projector onto the directions along which the node may slide
+  bool spin = false;               ///< clamp: may turn about its tangent
+};
+
+enum class LoadKind {
+  force,        ///< at a node [N]
+  moment,       ///< at a node [N m]
+  distributed,  ///< along a rod [N/m]; pass.node is ignored
+};
+
+struct LoadDescription {
+  LoadKind kind = LoadKind::force;
+  RodPass pass;
+  Vector3 value = Vector3::Zero();  ///< world axes; a follower load keeps its direction in the edge's frame
+  bool follower = false;
+  bool varies = false;  ///< set by a callback while running, so `value` is only its first one
+};
+
+struct SceneDescription {
+  MatrixX3 positions;  ///< every node once [m]
+  VectorX added_mass;  ///< per node [kg]
+  Vector3 gravity = Vector3(0.0, 0.0, -9.81);
+  std::vector<RodDescription> rods;
+  std::vector<JointDescription> joints;
+  std::vector<SupportDescription> supports;
+  std::vector<LoadDescription> loads;
+  bool has_custom_force = false;  ///< an explicit nodal force comes from a callback
+};
+
+}  // namespace withe

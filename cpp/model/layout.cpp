@@ -1,0 +1,89 @@
+#include "model/layout.hpp"
+
+#include "common/check.hpp"
+
+namespace withe {
+
+void lay_out_unknowns(Model& model) {
+  const auto& rods = model.description.rods;
+  const auto at = [](int i) { return static_cast<std::size_t>(i); };
+  int next = 0;
+  model.node_dof.assign(at(model.node_count), -1);
+  model.frame_dof.assign(at(model.frame_count), -1);
+  if (!model.planar()) model.edge_dof.assign(at(model.edge_count), -1);
+  std::vector<std::vector<int>> frames_at(at(model.node_count));
+  for (int f = 0; f < model.frame_count; ++f) frames_at[at(model.frame_node[at(f)])].push_back(f);
+
+  const auto place_node = [&](int node) {
+    if (model.node_dof[at(node)] >= 0) return;
+    for (int f : frames_at[at(node)]) {
+      model.frame_dof[at(f)] = next;
+      next += model.frame_size();
+      for (Hinge& hinge : model.hinges)
+        if (hinge.frame == f) hinge.dof = next++;
+    }
+    model.node_dof[at(node)] = next;
+    next += model.dimension;
+  };
+  const auto place_rod = [&](std::size_t r) {
+    const RodDescription& rod = rods[r];
+    for (std::size_t i = 0; i < rod.nodes.size(); ++i) {
+      place_node(rod.nodes[i]);
+      const int edge = model.rod_first_edge[r] + static_cast<int>(i);
+      if (edge < model.rod_first_edge[r + 1] && !model.planar()) model.edge_dof[at(edge)] = next++;
+    }
+  };
+  std::vector<bool> placed(rods.size(), false);
+  // A chain starts at a rod whose first node no other rod ends at, where there is one.
+  std::vector<bool> is_end(at(model.node_count), false);
+  for (const RodDescription& rod : rods)
+    if (!rod.closed) is_end[at(rod.nodes.back())] = true;
+  for (bool only_heads : {true, false})
+    for (std::size_t r = 0; r < rods.size(); ++r) {
+      if (placed[r] || (only_heads && is_end[at(rods[r].nodes.front())])) continue;
+      for (std::size_t current = r; current < rods.size();) {
+        placed[current] = true;
+        place_rod(current);
+        const int last = rods[current].nodes.back();
+        std::size_t following = rods.size();
+        for (std::size_t k = 0; k < rods.size() && following == rods.size(); ++k)
+          if (!placed[k] && rods[k].nodes.front() == last) following = k;
+        current = following;
+      }
+    }
+  for (int node = 0; node < model.node_count; ++node) place_node(node);
+  model.dof_count = next;
+}
+
+void add_constraints(Model& model) {
+  const auto at = [](int i) { return static_cast<std::size_t>(i); };
+  std::vector<bool> node_held(at(model.node_count), false), frame_held(at(model.frame_count), false);
+  model.constraints.clear();
+  for (Support& support : model.supports) {
+    support.first_constraint = static_cast<int>(model.constraints.size());
+    if (!support.active) continue;
+    const auto hold_node = [&](int node, const Matrix3& free) {
+      require(!node_held[at(node)], "node is already held: release the support that is there first");
+      node_held[at(node)] = true;
+      Constraint c{model.node_dof[at(node)], model.dimension, free};
+      if (model.planar()) {
+        Eigen::Matrix<double, 3, 2> axes;
+        axes << model.plane->first, model.plane->second;
+        c.free.setZero();
+        c.free.topLeftCorner<2, 2>() = axes.transpose() * free * axes;
+      }
+      model.constraints.push_back(c);
+    };
+    hold_node(support.node, support.description.free);
+    if (support.other_node >= 0) hold_node(support.other_node, support.description.free);
+    if (support.edge >= 0 && !model.planar())
+      model.constraints.push_back({model.edge_dof[at(support.edge)], 1, Matrix3::Zero()});
+    if (support.frame >= 0) {
+      require(!frame_held[at(support.frame)], "joint is already clamped: release the clamp that is there first");
+      frame_held[at(support.frame)] = true;
+      model.constraints.push_back({model.frame_dof[at(support.frame)], model.frame_size(), Matrix3::Zero()});
+    }
+  }
+}
+
+}  // namespace withe

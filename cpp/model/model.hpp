@@ -1,0 +1,149 @@
+#pragma once
+/// The scene as flat arrays: everything that is decided once, in `build`, and the parameters that may be
+/// changed while it runs. Built by `build_model`; immutable but for `Parameters`.
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/types.hpp"
+#include "geometry/frames.hpp"
+#include "model/description.hpp"
+
+namespace withe {
+
+using Vec3d = Vec3<double>;
+
+inline Vec3d to_vec3(const Vector3& v) { return {v.x(), v.y(), v.z()}; }
+inline Vector3 to_eigen(const Vec3d& v) { return {v.x, v.y, v.z}; }
+
+/// The plane of a planar scene: x = origin + u first + v second.
+struct Plane {
+  Vector3 origin, first, second, normal;
+};
+
+/// An inner node of a rod, with the ordinary stencil of two edges. Edges are oriented along the stencil;
+/// a sign of -1 marks one that runs against its rod (only where rods meet, in joints of form `pairs`).
+struct BendStencil {
+  int edge[2];
+  int node[3];
+  int sign[2];
+};
+
+/// A stencil of half length between a frame (of a joint, or of a wall) and an edge.
+struct FrameStencil {
+  int frame;
+  int edge;
+  int hinge;          ///< -1, or the hinge between the frame and what this edge is attached to
+  bool frame_first;   ///< the edge leaves the node (the rod goes from the frame to the edge)
+  Matrix3 attachment; ///< columns d1, d2, t of the attached end, in the axes of the drawn scene
+};
+
+struct Hinge {
+  int frame;
+  Vector3 axis;  ///< in the axes of the drawn scene
+  int dof;
+};
+
+/// Where the curvature of a rod's stencil is: an ordinary stencil, or one or two halves at a frame.
+struct StencilPlace {
+  int bend = -1;
+  int half[2] = {-1, -1};
+};
+
+/// Unknowns that a support holds: `size` numbers from `first`, free along the projector only.
+struct Constraint {
+  int first = 0;
+  int size = 0;
+  Matrix3 free = Matrix3::Zero();
+};
+
+/// One support, resolved: what it holds.
+struct Support {
+  bool active = false;
+  SupportDescription description;
+  int node = -1;          ///< global node
+  int frame = -1;         ///< of a clamp
+  int other_node = -1;    ///< hold_edge
+  int edge = -1;          ///< hold_edge
+  int first_constraint = 0;
+};
+
+/// Numbers that may change while running; one entry per edge, stencil or node.
+struct Parameters {
+  VectorX edge_stretch;                    ///< EA [N]
+  MatrixX2 edge_bend;                      ///< EI1, EI2 [N m^2]
+  VectorX edge_twist;                      ///< GJ [N m^2]
+  VectorX edge_density, edge_rotary, edge_viscous_time, edge_drag;
+  VectorX added_mass;
+  Vector3 gravity;
+  std::vector<MatrixX2> natural_curvature; ///< per rod and stencil, smooth [1/m]
+  std::vector<VectorX> natural_twist;      ///< per rod and stencil [rad/m]
+
+  // Derived from the above by `update_derived`.
+  VectorX node_mass, node_drag;            ///< [kg], [N s/m]
+  VectorX edge_inertia;                    ///< of theta [kg m^2]
+  VectorX frame_inertia, hinge_inertia;    ///< [kg m^2]
+  MatrixX3 bend_stiffness, half_stiffness; ///< per stencil: EI1 / V, EI2 / V, GJ / V [N m]
+  MatrixX3 bend_natural, half_natural;     ///< per stencil: discrete kappa1, kappa2, turn of twist
+  VectorX bend_viscous_time, half_viscous_time;  ///< [s]
+  bool viscous = false, dragged = false;
+};
+
+struct Model {
+  SceneDescription description;
+  std::optional<Plane> plane;
+  std::string plane_reason;                 ///< why there is no plane
+  int dimension = 3;  ///< unknowns a node
+  int node_count = 0, edge_count = 0, frame_count = 0;
+  std::vector<int> rod_first_edge;          ///< edges of rod r: rod_first_edge[r] .. rod_first_edge[r + 1]
+  std::vector<int> edge_rod;
+  std::vector<int> edge_tail, edge_head;
+  VectorX edge_length;                      ///< at rest [m]
+  std::vector<BendStencil> bend;
+  std::vector<FrameStencil> half;
+  VectorX bend_voronoi, half_voronoi;       ///< [m]
+  std::vector<Hinge> hinges;
+  std::vector<std::vector<StencilPlace>> place;  ///< [rod][stencil]
+  std::vector<Vector2> planar_components;   ///< per rod: kappa = p . (kappa1, kappa2)
+  std::vector<std::vector<int>> wall_half;  ///< [rod]: halves at its first and last node, or -1
+  // Drawn values that only joints of form `pairs`, and rods joined at an angle, have.
+  MatrixX3 bend_offset;                     ///< per stencil: discrete strains that the drawing adds to the natural ones
+  std::vector<std::pair<int, int>> bend_owner;   ///< (rod, stencil), or (-1, -1) across rods
+  std::vector<std::pair<int, int>> half_owner;   ///< (rod, nearest stencil); (rod, -1) where the rod has none
+
+  // Layout of the unknowns.
+  int dof_count = 0;
+  std::vector<int> frame_node;
+  std::vector<int> node_dof, edge_dof, frame_dof;  ///< first unknown of each; edge_dof is empty in a plane
+  std::vector<Constraint> constraints;
+  std::vector<Support> supports;
+
+  // The drawn state.
+  VectorX initial_q;
+  std::vector<Vec3d> initial_tangent, initial_director;
+  VectorX initial_bend_tau, initial_half_tau;
+  double length_scale = 1.0;                ///< [m]
+
+  bool planar() const { return plane.has_value(); }
+  int frame_size() const { return planar() ? 1 : 3; }
+};
+
+/// Resolves joints and supports, lays out the unknowns, finds the plane. Throws std::invalid_argument.
+Model build_model(const SceneDescription& description, std::optional<bool> planar);
+/// Parameters as described, derived ones included.
+Parameters initial_parameters(const Model& model);
+/// Masses, stencil stiffnesses and discrete natural strains from the rest.
+void update_derived(const Model& model, Parameters& parameters);
+/// Only the discrete natural strains.
+void update_natural(const Model& model, Parameters& parameters);
+
+/// The plane that holds the whole scene, or nothing (with the reason).
+std::optional<Plane> find_plane(const SceneDescription& description, std::string& reason);
+
+/// Discrete strain 2 tan(|kappa| V / 2) along kappa. Needs |kappa| V < pi.
+Vector2 discrete_curvature(const Vector2& smooth, double voronoi);
+/// Its inverse.
+Vector2 smooth_curvature(const Vector2& discrete, double voronoi);
+
+}  // namespace withe

@@ -1,0 +1,146 @@
+#include <cmath>
+#include <numbers>
+
+#include "common/check.hpp"
+#include "model/model.hpp"
+
+namespace withe {
+
+Vector2 discrete_curvature(const Vector2& smooth, double voronoi) {
+  const double k = smooth.norm();
+  if (k == 0.0) return Vector2::Zero();
+  const double phi = k * voronoi;
+  require(phi < std::numbers::pi, "natural curvature turns an edge by " + std::to_string(phi) +
+                                      " rad; it must stay below pi: use more nodes");
+  return (2.0 * std::tan(0.5 * phi) / k) * smooth;
+}
+
+Vector2 smooth_curvature(const Vector2& discrete, double voronoi) {
+  const double k = discrete.norm();
+  if (k == 0.0) return Vector2::Zero();
+  return (2.0 * std::atan(0.5 * k) / (k * voronoi)) * discrete;
+}
+
+Parameters initial_parameters(const Model& model) {
+  const SceneDescription& scene = model.description;
+  Parameters p;
+  const Eigen::Index edges = model.edge_count;
+  p.edge_stretch.resize(edges);
+  p.edge_bend.resize(edges, 2);
+  for (VectorX* v : {&p.edge_twist, &p.edge_density, &p.edge_rotary, &p.edge_viscous_time, &p.edge_drag})
+    v->resize(edges);
+  for (std::size_t r = 0; r < scene.rods.size(); ++r) {
+    const RodDescription& rod = scene.rods[r];
+    const int first = model.rod_first_edge[r], count = model.rod_first_edge[r + 1] - first;
+    p.edge_stretch.segment(first, count) = rod.stretch_stiffness;
+    p.edge_bend.middleRows(first, count) = rod.bend_stiffness;
+    p.edge_twist.segment(first, count) = rod.twist_stiffness;
+    p.edge_density.segment(first, count) = rod.line_density;
+    p.edge_rotary.segment(first, count) = rod.rotary_inertia;
+    p.edge_viscous_time.segment(first, count) = rod.viscous_time;
+    p.edge_drag.segment(first, count) = rod.drag;
+    p.natural_curvature.push_back(rod.natural_curvature);
+    p.natural_twist.push_back(rod.natural_twist);
+  }
+  p.added_mass = scene.added_mass;
+  p.gravity = scene.gravity;
+  update_derived(model, p);
+  return p;
+}
+
+void update_natural(const Model& model, Parameters& p) {
+  const bool planar = model.planar();
+  const auto strain = [&](int rod, int stencil, double voronoi) -> Vector3 {
+    Vector3 out = Vector3::Zero();
+    if (rod < 0 || stencil < 0) return out;
+    const auto r = static_cast<std::size_t>(rod);
+    const Vector2 k = p.natural_curvature[r].row(stencil);
+    const Vector2 d = discrete_curvature(k, voronoi);
+    out << d, p.natural_twist[r](stencil) * voronoi;
+    if (planar) out = Vector3(model.planar_components[r].dot(d), 0.0, 0.0);
+    return out;
+  };
+  p.bend_natural = model.bend_offset;
+  for (std::size_t r = 0; r < model.place.size(); ++r)
+    for (std::size_t s = 0; s < model.place[r].size(); ++s) {
+      const StencilPlace& place = model.place[r][s];
+      if (place.bend >= 0)
+        p.bend_natural.row(place.bend) +=
+            strain(static_cast<int>(r), static_cast<int>(s), model.bend_voronoi(place.bend));
+    }
+  // Stencils across two rods: each rod's nearest natural strain over its half of the length.
+  for (std::size_t b = 0; b < model.bend.size(); ++b) {
+    if (model.bend_owner[b].first >= 0) continue;
+    for (int i = 0; i < 2; ++i) {
+      const int edge = model.bend[b].edge[i];
+      const int rod = model.edge_rod[static_cast<std::size_t>(edge)];
+      const int stencils = static_cast<int>(p.natural_twist[static_cast<std::size_t>(rod)].size());
+      if (stencils == 0 || model.bend_owner[b].second < -1) continue;
+      const int nearest = edge == model.rod_first_edge[static_cast<std::size_t>(rod)] ? 0 : stencils - 1;
+      p.bend_natural.row(static_cast<Eigen::Index>(b)) += strain(rod, nearest, 0.5 * model.edge_length(edge));
+    }
+  }
+  p.half_natural.resize(static_cast<Eigen::Index>(model.half.size()), 3);
+  for (std::size_t h = 0; h < model.half.size(); ++h)
+    p.half_natural.row(static_cast<Eigen::Index>(h)) =
+        strain(model.half_owner[h].first, model.half_owner[h].second, model.half_voronoi(static_cast<Eigen::Index>(h)));
+}
+
+void update_derived(const Model& model, Parameters& p) {
+  const auto at = [](int i) { return static_cast<Eigen::Index>(i); };
+  p.node_mass = p.added_mass;
+  p.node_drag = VectorX::Zero(model.node_count);
+  p.edge_inertia.resize(model.edge_count);
+  for (int e = 0; e < model.edge_count; ++e) {
+    const double half = 0.5 * model.edge_length(e);
+    for (int node : {model.edge_tail[static_cast<std::size_t>(e)], model.edge_head[static_cast<std::size_t>(e)]}) {
+      p.node_mass(node) += half * p.edge_density(e);
+      p.node_drag(node) += half * p.edge_drag(e);
+    }
+    p.edge_inertia(e) = model.edge_length(e) * p.edge_rotary(e);
+  }
+  p.dragged = (p.node_drag.array() != 0.0).any();
+  p.viscous = (p.edge_viscous_time.array() != 0.0).any();
+
+  // In a plane the one bending stiffness stands in the first column.
+  const auto bend_of = [&](int e) -> Vector2 {
+    if (!model.planar()) return p.edge_bend.row(e);
+    const Vector2 c = model.planar_components[static_cast<std::size_t>(model.edge_rod[static_cast<std::size_t>(e)])];
+    const Vector2 b = p.edge_bend.row(e);
+    return Vector2(c(0) * c(0) * b(0) + c(1) * c(1) * b(1), 0.0);
+  };
+  // Two half edges in series: V / K = (l0 / 2) / K0 + (l1 / 2) / K1.
+  const auto series = [](double k0, double l0, double k1, double l1) {
+    return k0 == 0.0 && k1 == 0.0 ? 0.0 : 1.0 / (0.5 * l0 / k0 + 0.5 * l1 / k1);
+  };
+  const auto n = static_cast<Eigen::Index>(model.bend.size());
+  p.bend_stiffness.resize(n, 3);
+  p.bend_viscous_time.resize(n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const BendStencil& s = model.bend[static_cast<std::size_t>(i)];
+    const int a = s.edge[0], b = s.edge[1];
+    const double la = model.edge_length(a), lb = model.edge_length(b);
+    const Vector2 ba = bend_of(a), bb = bend_of(b);
+    p.bend_stiffness.row(i) << series(ba(0), la, bb(0), lb), series(ba(1), la, bb(1), lb),
+        series(p.edge_twist(a), la, p.edge_twist(b), lb);
+    p.bend_viscous_time(i) = (la * p.edge_viscous_time(a) + lb * p.edge_viscous_time(b)) / (la + lb);
+  }
+  const auto m = static_cast<Eigen::Index>(model.half.size());
+  p.half_stiffness.resize(m, 3);
+  p.half_viscous_time.resize(m);
+  p.frame_inertia = VectorX::Zero(model.frame_count);
+  p.hinge_inertia = VectorX::Zero(at(static_cast<int>(model.hinges.size())));
+  for (Eigen::Index i = 0; i < m; ++i) {
+    const FrameStencil& s = model.half[static_cast<std::size_t>(i)];
+    const Vector2 b = bend_of(s.edge);
+    p.half_stiffness.row(i) << b(0), b(1), p.edge_twist(s.edge);
+    p.half_stiffness.row(i) /= model.half_voronoi(i);
+    p.half_viscous_time(i) = p.edge_viscous_time(s.edge);
+    // A frame carries the rotary inertia of the half edges attached to it.
+    (s.hinge < 0 ? p.frame_inertia(s.frame) : p.hinge_inertia(s.hinge)) += 0.5 * p.edge_inertia(s.edge);
+    if (s.hinge >= 0) p.frame_inertia(s.frame) += 0.5 * p.edge_inertia(s.edge);
+  }
+  update_natural(model, p);
+}
+
+}  // namespace withe

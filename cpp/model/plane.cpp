@@ -1,0 +1,126 @@
+#include <Eigen/Geometry>
+#include <Eigen/SVD>
+#include <cmath>
+
+#include "model/model.hpp"
+
+namespace withe {
+namespace {
+
+constexpr double kTolerance = 1e-10;
+
+bool isotropic(const RodDescription& rod) {
+  return ((rod.bend_stiffness.col(0) - rod.bend_stiffness.col(1)).array().abs() <=
+          kTolerance * rod.bend_stiffness.col(0).array().abs())
+      .all();
+}
+
+/// Collects unit directions that must lie in the plane.
+void collect_directions(const SceneDescription& scene, std::vector<Vector3>& directions) {
+  const auto add = [&](const Vector3& v, double scale) {
+    if (v.norm() > kTolerance * scale) directions.push_back(v.normalized());
+  };
+  for (const RodDescription& rod : scene.rods) {
+    const Vector3 start = scene.positions.row(rod.nodes.front());
+    const double size = rod.rest_lengths.sum();
+    for (int node : rod.nodes) add(Vector3(scene.positions.row(node).transpose()) - start, 1e3 * size);
+    add(start - Vector3(scene.positions.row(scene.rods.front().nodes.front()).transpose()), 1e3 * size);
+  }
+  add(scene.gravity, 0.0);
+  for (const LoadDescription& load : scene.loads)
+    if (load.kind != LoadKind::moment) add(load.value, 0.0);
+}
+
+}  // namespace
+
+std::optional<Plane> find_plane(const SceneDescription& scene, std::string& reason) {
+  if (scene.has_custom_force) {
+    reason = "a custom force may point anywhere";
+    return std::nullopt;
+  }
+  for (const LoadDescription& load : scene.loads)
+    if (load.varies) {
+      reason = "a load that varies may leave any plane";
+      return std::nullopt;
+    }
+  std::vector<Vector3> directions;
+  collect_directions(scene, directions);
+  Matrix3 spread = Matrix3::Zero();
+  for (const Vector3& d : directions) spread += d * d.transpose();
+  spread /= static_cast<double>(std::max<std::size_t>(directions.size(), 1));
+  const Eigen::JacobiSVD<Matrix3> svd(spread, Eigen::ComputeFullU);
+  if (svd.singularValues()(1) < 1e-20) {
+    reason = "a straight scene lies in no plane of its own";
+    return std::nullopt;
+  }
+  Vector3 normal = svd.matrixU().col(2);
+  // The two directions that differ most give the normal to rounding, where the mean above gives it to its root.
+  double best = 0.0;
+  for (const Vector3& d : directions) {
+    const Vector3 candidate = directions.front().cross(d);
+    if (candidate.norm() > best) {
+      best = candidate.norm();
+      normal = candidate.normalized();
+    }
+  }
+  const auto off_plane = [&](const Vector3& v) { return std::abs(v.dot(normal)) > kTolerance * 100 * v.norm(); };
+  for (const Vector3& d : directions)
+    if (off_plane(d)) {
+      reason = "rods, gravity and forces do not share a plane";
+      return std::nullopt;
+    }
+  const auto across = [&](const Vector3& v) { return v.cross(normal).norm() > kTolerance * 100 * v.norm(); };
+  for (const LoadDescription& load : scene.loads)
+    if (load.kind == LoadKind::moment && across(load.value)) {
+      reason = "a moment turns out of the plane";
+      return std::nullopt;
+    }
+  for (const RodDescription& rod : scene.rods) {
+    if ((rod.natural_twist.array() != 0.0).any()) {
+      reason = "rod '" + rod.name + "' has natural twist";
+      return std::nullopt;
+    }
+    for (Eigen::Index e = 0; e < rod.directors.rows(); ++e) {
+      const double c = std::abs(Vector3(rod.directors.row(e)).dot(normal));
+      if (!isotropic(rod) && c > 1e-9 && c < 1.0 - 1e-9) {
+        reason = "the section of rod '" + rod.name + "' lies at an angle to the plane";
+        return std::nullopt;
+      }
+    }
+    // Directors must keep their angle to the plane, or the rod is drawn with twist.
+    for (Eigen::Index e = 1; e < rod.directors.rows(); ++e)
+      if (std::abs((rod.directors.row(e) - rod.directors.row(0)).dot(normal)) > 1e-8) {
+        reason = "rod '" + rod.name + "' is drawn with twist";
+        return std::nullopt;
+      }
+    const Vector3 d1 = rod.directors.row(0);
+    const int next = rod.nodes[1];
+    const Vector3 t = (scene.positions.row(next) - scene.positions.row(rod.nodes[0])).normalized();
+    const Vector3 d2 = t.cross(d1);
+    const Vector2 p(d2.dot(normal), -d1.dot(normal));
+    for (Eigen::Index s = 0; s < rod.natural_curvature.rows(); ++s) {
+      const Vector2 k = rod.natural_curvature.row(s);
+      if (std::abs(k(0) * p(1) - k(1) * p(0)) > 1e-8 * k.norm()) {
+        reason = "the natural curvature of rod '" + rod.name + "' leaves the plane";
+        return std::nullopt;
+      }
+    }
+  }
+  for (const SupportDescription& support : scene.supports) {
+    const Vector3 image = support.free * normal;
+    if ((image - normal * normal.dot(image)).norm() > 1e-9 || support.spin) {
+      reason = "a support may slide or turn out of the plane";
+      return std::nullopt;
+    }
+  }
+  Plane plane;
+  plane.normal = normal;
+  plane.origin = scene.positions.row(scene.rods.front().nodes.front());
+  plane.origin = normal * normal.dot(plane.origin);
+  plane.first = directions.front() - normal * normal.dot(directions.front());
+  plane.first.normalize();
+  plane.second = normal.cross(plane.first);
+  return plane;
+}
+
+}  // namespace withe

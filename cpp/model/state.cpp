@@ -1,0 +1,134 @@
+#include "model/state.hpp"
+
+#include "geometry/curvature.hpp"
+#include "geometry/rotation.hpp"
+
+namespace withe {
+namespace {
+
+Vec3d node_position(const Model& model, const VectorX& q, int node) {
+  const double* x = q.data() + model.node_dof[static_cast<std::size_t>(node)];
+  return {x[0], x[1], model.planar() ? 0.0 : x[2]};
+}
+
+EdgeFrame<double> with_sign(const EdgeFrame<double>& f, int sign) {
+  if (sign > 0) return f;
+  return {-f.tangent, f.d1, -f.d2, f.inverse_length, f.spin, -f.bow};
+}
+
+void compute_planar(const Model& model, const VectorX& q, Configuration& out) {
+  for (std::size_t e = 0; e < out.edge.size(); ++e) {
+    const Vec3d d = node_position(model, q, model.edge_head[e]) - node_position(model, q, model.edge_tail[e]);
+    const double length = std::sqrt(dot(d, d));
+    out.length(static_cast<Eigen::Index>(e)) = length;
+    out.edge[e].inverse_length = 1.0 / length;
+    out.edge[e].tangent = (1.0 / length) * d;
+  }
+  for (std::size_t b = 0; b < model.bend.size(); ++b) {
+    const BendStencil& s = model.bend[b];
+    const Vec3d t0 = static_cast<double>(s.sign[0]) * out.edge[static_cast<std::size_t>(s.edge[0])].tangent;
+    const Vec3d t1 = static_cast<double>(s.sign[1]) * out.edge[static_cast<std::size_t>(s.edge[1])].tangent;
+    out.bend_strain(static_cast<Eigen::Index>(b), 0) = planar_kappa(t0.x, t0.y, t1.x, t1.y);
+  }
+  for (std::size_t h = 0; h < model.half.size(); ++h) {
+    const FrameStencil& s = model.half[h];
+    const double angle = q(model.frame_dof[static_cast<std::size_t>(s.frame)]);
+    const Vector3 drawn = s.attachment.col(2);
+    const double x = drawn.dot(model.plane->first), y = drawn.dot(model.plane->second);
+    const double c = std::cos(angle), sn = std::sin(angle);
+    const Vec3d a{c * x - sn * y, sn * x + c * y, 0.0};
+    const Vec3d& t = out.edge[static_cast<std::size_t>(s.edge)].tangent;
+    out.attached[h].tangent = a;
+    out.attached[h].inverse_length = 1.0;
+    out.half_strain(static_cast<Eigen::Index>(h), 0) =
+        s.frame_first ? planar_kappa(a.x, a.y, t.x, t.y) : planar_kappa(t.x, t.y, a.x, a.y);
+  }
+}
+
+void compute_spatial(const Model& model, const State& state, const VectorX& q, Configuration& out) {
+  for (std::size_t e = 0; e < out.edge.size(); ++e) {
+    const Vec3d d = node_position(model, q, model.edge_head[e]) - node_position(model, q, model.edge_tail[e]);
+    const double length = std::sqrt(dot(d, d));
+    const double theta = q(model.edge_dof[e]);
+    out.length(static_cast<Eigen::Index>(e)) = length;
+    out.edge[e] = edge_frame(d, length, state.tangent[e], state.director[e], std::cos(theta), std::sin(theta));
+  }
+  for (std::size_t b = 0; b < model.bend.size(); ++b) {
+    const BendStencil& s = model.bend[b];
+    const auto i = static_cast<Eigen::Index>(b);
+    const auto strain = bend_twist_strain(with_sign(out.edge[static_cast<std::size_t>(s.edge[0])], s.sign[0]),
+                                          with_sign(out.edge[static_cast<std::size_t>(s.edge[1])], s.sign[1]),
+                                          state.bend_tau(i));
+    out.bend_strain.row(i) << strain.kappa1, strain.kappa2, strain.tau;
+  }
+  for (int f = 0; f < model.frame_count; ++f) {
+    const auto i = static_cast<std::size_t>(f);
+    out.frame[i] = cayley(q.segment<3>(model.frame_dof[i])) * state.frame[i];
+  }
+  for (std::size_t h = 0; h < model.half.size(); ++h) {
+    const FrameStencil& s = model.half[h];
+    Matrix3 m = s.attachment;
+    if (s.hinge >= 0) {
+      const Hinge& hinge = model.hinges[static_cast<std::size_t>(s.hinge)];
+      m = rotation_exp(q(hinge.dof) * hinge.axis) * m;
+    }
+    m = out.frame[static_cast<std::size_t>(s.frame)] * m;
+    out.attached[h] = {to_vec3(m.col(2)), to_vec3(m.col(0)), to_vec3(m.col(1)), 1.0, {}, {}};
+    const EdgeFrame<double>& edge = out.edge[static_cast<std::size_t>(s.edge)];
+    const auto i = static_cast<Eigen::Index>(h);
+    const auto strain = s.frame_first ? bend_twist_strain(out.attached[h], edge, state.half_tau(i))
+                                      : bend_twist_strain(edge, out.attached[h], state.half_tau(i));
+    out.half_strain.row(i) << strain.kappa1, strain.kappa2, strain.tau;
+  }
+}
+
+}  // namespace
+
+State initial_state(const Model& model) {
+  State state;
+  state.q = model.initial_q;
+  state.v = VectorX::Zero(model.dof_count);
+  state.acceleration = VectorX::Zero(model.dof_count);
+  state.tangent = model.initial_tangent;
+  state.director = model.initial_director;
+  state.frame.assign(static_cast<std::size_t>(model.frame_count), Matrix3::Identity());
+  state.bend_tau = model.initial_bend_tau;
+  state.half_tau = model.initial_half_tau;
+  return state;
+}
+
+void compute_configuration(const Model& model, const State& state, const VectorX& q, Configuration& out) {
+  if (out.edge.size() != static_cast<std::size_t>(model.edge_count)) {
+    out.edge.assign(static_cast<std::size_t>(model.edge_count), EdgeFrame<double>{});
+    out.length.resize(model.edge_count);
+    out.frame.assign(static_cast<std::size_t>(model.frame_count), Matrix3::Identity());
+    out.attached.assign(model.half.size(), EdgeFrame<double>{});
+    out.bend_strain = MatrixX3::Zero(static_cast<Eigen::Index>(model.bend.size()), 3);
+    out.half_strain = MatrixX3::Zero(static_cast<Eigen::Index>(model.half.size()), 3);
+  }
+  if (model.planar())
+    compute_planar(model, q, out);
+  else
+    compute_spatial(model, state, q, out);
+}
+
+void accept_configuration(const Model& model, const VectorX& q, const Configuration& configuration, State& state) {
+  state.q = q;
+  if (model.planar()) return;
+  for (std::size_t e = 0; e < state.tangent.size(); ++e) {
+    const Vec3d& t = configuration.edge[e].tangent;
+    Vec3d d = parallel_transport(state.director[e], state.tangent[e], t);
+    d -= dot(d, t) * t;
+    state.director[e] = (1.0 / std::sqrt(dot(d, d))) * d;
+    state.tangent[e] = t;
+  }
+  for (int f = 0; f < model.frame_count; ++f) {
+    const auto i = static_cast<std::size_t>(f);
+    state.frame[i] = orthonormalized(configuration.frame[i]);
+    state.q.segment<3>(model.frame_dof[i]).setZero();
+  }
+  state.bend_tau = configuration.bend_strain.col(2);
+  state.half_tau = configuration.half_strain.col(2);
+}
+
+}  // namespace withe

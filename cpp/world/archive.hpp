@@ -1,0 +1,62 @@
+#pragma once
+/// Bytes of a snapshot: plain numbers one after the other, checked when read.
+
+#include <cstdint>
+#include <cstring>
+#include <string>
+#include <vector>
+
+#include "common/check.hpp"
+#include "common/types.hpp"
+
+namespace withe {
+
+class Writer {
+ public:
+  std::string bytes;
+
+  void raw(const void* data, std::size_t size) { bytes.append(static_cast<const char*>(data), size); }
+  template <class Number>
+    requires std::is_arithmetic_v<Number>
+  void operator()(const Number& number) {
+    raw(&number, sizeof number);
+  }
+  template <class Derived>
+  void operator()(const Eigen::PlainObjectBase<Derived>& m) {
+    (*this)(static_cast<std::int64_t>(m.rows()));
+    (*this)(static_cast<std::int64_t>(m.cols()));
+    raw(m.data(), static_cast<std::size_t>(m.size()) * sizeof(double));
+  }
+};
+
+class Reader {
+ public:
+  explicit Reader(const std::string& bytes) : bytes_(bytes) {}
+
+  void raw(void* data, std::size_t size) {
+    require(size <= bytes_.size() - position_, "snapshot is damaged: it ends too early");
+    std::memcpy(data, bytes_.data() + position_, size);
+    position_ += size;
+  }
+  template <class Number>
+    requires std::is_arithmetic_v<Number>
+  void operator()(Number& number) {
+    raw(&number, sizeof number);
+  }
+  /// Sizes must be those that the matrix has already.
+  template <class Derived>
+  void operator()(Eigen::PlainObjectBase<Derived>& m) {
+    std::int64_t rows = 0, columns = 0;
+    (*this)(rows);
+    (*this)(columns);
+    require(rows == m.rows() && columns == m.cols(), "snapshot belongs to another scene: sizes differ");
+    raw(m.data(), static_cast<std::size_t>(m.size()) * sizeof(double));
+  }
+  void expect_end() const { require(position_ == bytes_.size(), "snapshot is damaged: it is too long"); }
+
+ private:
+  const std::string& bytes_;
+  std::size_t position_ = 0;
+};
+
+}  // namespace withe

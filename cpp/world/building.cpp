@@ -1,0 +1,280 @@
+#include <cmath>
+
+#include "common/check.hpp"
+#include "geometry/rotation.hpp"
+#include "world/implementation.hpp"
+
+namespace withe {
+namespace {
+
+std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+}  // namespace
+
+Vector3 node_position(const Model& model, const VectorX& q, int node) {
+  const int dof = model.node_dof[at(node)];
+  if (!model.planar()) return q.segment<3>(dof);
+  return model.plane->origin + q(dof) * model.plane->first + q(dof + 1) * model.plane->second;
+}
+
+Vector3 node_velocity(const Model& model, const VectorX& v, int node) {
+  const int dof = model.node_dof[at(node)];
+  if (!model.planar()) return v.segment<3>(dof);
+  return v(dof) * model.plane->first + v(dof + 1) * model.plane->second;
+}
+
+Matrix3 edge_directors(const Model& model, const State& state, const Configuration& c, int edge) {
+  Matrix3 out;
+  const EdgeFrame<double>& f = c.edge[at(edge)];
+  (void)state;
+  if (!model.planar()) {
+    out << to_eigen(f.d1), to_eigen(f.d2), to_eigen(f.tangent);
+    return out;
+  }
+  // In its plane an edge turns its drawn directors about the normal.
+  const Vector3 drawn = to_eigen(model.initial_tangent[at(edge)]), d1 = to_eigen(model.initial_director[at(edge)]);
+  const Vector3 t = f.tangent.x * model.plane->first + f.tangent.y * model.plane->second;
+  const Vector3& n = model.plane->normal;
+  const double angle = std::atan2(drawn.cross(t).dot(n), drawn.dot(t));
+  const Vector3 now = rotation_exp(angle * n) * d1;
+  out << now, t.cross(now), t;
+  return out;
+}
+
+Matrix3 frame_rotation(const Model& model, const State& state, int frame) {
+  if (model.planar()) return rotation_exp(state.q(model.frame_dof[at(frame)]) * model.plane->normal);
+  return cayley(state.q.segment<3>(model.frame_dof[at(frame)])) * state.frame[at(frame)];
+}
+
+World::Implementation::Implementation(SceneDescription scene, Options choice)
+    : description(std::move(scene)), options(choice) {
+  require(options.time_step > 0.0 && std::isfinite(options.time_step), "time_step must be positive and finite");
+  for (const LoadDescription& load : description.loads) load_values.push_back(load.value);
+  rebuild(true);
+  if (options.integrator == Integrator::verlet) {
+    plan.stable_step = stable_step(*equations, parameters, state, work);
+    require(options.time_step <= plan.stable_step,
+            "time_step must not exceed the stable step of the explicit scheme, " + std::to_string(plan.stable_step) +
+                " s, got " + std::to_string(options.time_step) + " s");
+  }
+}
+
+World::Implementation::Implementation(const Implementation& other)
+    : description(other.description),
+      options(other.options),
+      model(other.model),
+      parameters(other.parameters),
+      work(other.work),
+      state(other.state),
+      plan(other.plan),
+      statistics(other.statistics),
+      motions(other.motions),
+      ramps(other.ramps),
+      load_values(other.load_values),
+      custom_force(other.custom_force),
+      spatial(other.spatial),
+      level(other.level),
+      easy_steps(other.easy_steps),
+      support_work(other.support_work),
+      actuation_work(other.actuation_work),
+      dissipated(other.dissipated),
+      load_work(other.load_work),
+      alarm(other.alarm),
+      reaction_residual(other.reaction_residual),
+      reaction_current(other.reaction_current) {
+  newton = std::make_unique<Newton>(model, options);
+  equations = std::make_unique<Equations>(model, options);
+  equations->loads().values = load_values;
+}
+
+/// Builds the model for the present supports and plane; a running state is carried over.
+void World::Implementation::rebuild(bool first) {
+  SceneDescription active = description;
+  // Released supports keep their index but hold nothing.
+  std::vector<bool> released(description.supports.size(), false);
+  for (std::size_t s = 0; s < model.supports.size(); ++s) released[s] = !model.supports[s].active;
+  active.supports.clear();
+  std::vector<std::size_t> index;
+  for (std::size_t s = 0; s < description.supports.size(); ++s)
+    if (!released[s]) {
+      active.supports.push_back(description.supports[s]);
+      index.push_back(s);
+    }
+  Model fresh = build_model(active, spatial ? std::optional<bool>(false) : options.planar);
+  std::vector<Support> all(description.supports.size());
+  for (std::size_t s = 0; s < all.size(); ++s) all[s].description = description.supports[s];
+  for (std::size_t k = 0; k < index.size(); ++k) all[index[k]] = fresh.supports[k];
+  fresh.supports = all;
+  static_equations.reset();
+  if (first) {
+    model = std::move(fresh);
+    parameters = initial_parameters(model);
+    state = initial_state(model);
+    ramps.assign(description.rods.size(), NaturalRamp{});
+    motions.assign(description.supports.size(), SupportMotion{});
+    custom_force = MatrixX3::Zero(model.node_count, 3);
+    for (std::size_t s = 0; s < motions.size(); ++s) {
+      motions[s].position = motions[s].from_position = motions[s].to_position =
+          node_position(model, state.q, model.supports[s].node);
+    }
+  } else {
+    const Model old = std::move(model);
+    const State from = state;
+    model = std::move(fresh);
+    std::vector<bool> is_new(at(model.frame_count), true);
+    for (int f = 0; f < model.frame_count; ++f)
+      for (int g = 0; g < old.frame_count; ++g)
+        if (model.frame_node[at(f)] == old.frame_node[at(g)]) is_new[at(f)] = false;
+    state = transferred(old, from);
+    update_derived(model, parameters);
+    newton = std::make_unique<Newton>(model, options);
+    equations = std::make_unique<Equations>(model, options);
+    relax_frames(is_new);
+  }
+  newton = std::make_unique<Newton>(model, options);
+  equations = std::make_unique<Equations>(model, options);
+  equations->loads().values = load_values;
+  reaction_current = false;
+  make_plan();
+}
+
+State World::Implementation::transferred(const Model& old, const State& from) const {
+  State to = initial_state(model);
+  to.time = from.time;
+  Configuration c;
+  compute_configuration(old, from, from.q, c);
+  const auto copy = [&](int old_dof, int new_dof, int n) {
+    to.q.segment(new_dof, n) = from.q.segment(old_dof, n);
+    to.v.segment(new_dof, n) = from.v.segment(old_dof, n);
+    to.acceleration.segment(new_dof, n) = from.acceleration.segment(old_dof, n);
+  };
+  const bool lifted = old.planar() && !model.planar();
+  for (int i = 0; i < model.node_count; ++i) {
+    const int dof = model.node_dof[at(i)];
+    if (lifted) {
+      to.q.segment<3>(dof) = node_position(old, from.q, i);
+      to.v.segment<3>(dof) = node_velocity(old, from.v, i);
+      to.acceleration.segment<3>(dof) = node_velocity(old, from.acceleration, i);
+    } else {
+      copy(old.node_dof[at(i)], dof, model.dimension);
+    }
+  }
+  for (int e = 0; e < model.edge_count; ++e) {
+    if (lifted) {
+      const Matrix3 d = edge_directors(old, from, c, e);
+      to.tangent[at(e)] = to_vec3(d.col(2));
+      to.director[at(e)] = to_vec3(d.col(0));
+    } else if (!model.planar()) {
+      to.tangent[at(e)] = from.tangent[at(e)];
+      to.director[at(e)] = from.director[at(e)];
+      copy(old.edge_dof[at(e)], model.edge_dof[at(e)], 1);
+    }
+  }
+  for (int f = 0; f < model.frame_count; ++f)
+    for (int g = 0; g < old.frame_count; ++g) {
+      if (model.frame_node[at(f)] != old.frame_node[at(g)]) continue;
+      const int dof = model.frame_dof[at(f)];
+      if (lifted) {
+        to.frame[at(f)] = frame_rotation(old, from, g);
+        to.v.segment<3>(dof) = from.v(old.frame_dof[at(g)]) * old.plane->normal;
+      } else {
+        to.frame[at(f)] = from.frame[at(g)];
+        copy(old.frame_dof[at(g)], dof, model.frame_size());
+      }
+    }
+  for (std::size_t h = 0; h < model.hinges.size() && h < old.hinges.size(); ++h)
+    if (!lifted) copy(old.hinges[h].dof, model.hinges[h].dof, 1);
+  if (!lifted && !model.planar()) {
+    for (std::size_t b = 0; b < model.bend.size(); ++b)
+      for (std::size_t k = 0; k < old.bend.size(); ++k)
+        if (old.bend[k].edge[0] == model.bend[b].edge[0] && old.bend[k].edge[1] == model.bend[b].edge[1])
+          to.bend_tau(static_cast<Eigen::Index>(b)) = from.bend_tau(static_cast<Eigen::Index>(k));
+    for (std::size_t h = 0; h < model.half.size(); ++h)
+      for (std::size_t k = 0; k < old.half.size(); ++k)
+        if (old.half[k].edge == model.half[h].edge && old.half[k].frame_first == model.half[h].frame_first)
+          to.half_tau(static_cast<Eigen::Index>(h)) = from.half_tau(static_cast<Eigen::Index>(k));
+  }
+  return to;
+}
+
+/// A new frame takes the orientation that stresses its halves least, with the edges where they are.
+void World::Implementation::relax_frames(const std::vector<bool>& is_new) {
+  ElasticCoefficients elastic;
+  set_elastic(parameters, elastic);
+  Configuration c;
+  Local local;
+  for (int f = 0; f < model.frame_count; ++f) {
+    if (!is_new[at(f)]) continue;
+    const int dof = model.frame_dof[at(f)], n = model.frame_size(), row = model.planar() ? 4 : 7;
+    // Start from the rotation of the first attached edge since it was drawn.
+    compute_configuration(model, state, state.q, c);
+    for (std::size_t h = 0; h < model.half.size(); ++h) {
+      if (model.half[h].frame != f) continue;
+      const int e = model.half[h].edge;
+      const Matrix3 now = edge_directors(model, state, c, e);
+      const Vector3 t = to_eigen(model.initial_tangent[at(e)]), d1 = to_eigen(model.initial_director[at(e)]);
+      Matrix3 drawn;
+      drawn << d1, t.cross(d1), t;
+      const Matrix3 rotation = now * drawn.transpose();
+      if (model.planar())
+        state.q(dof) = rotation_log(rotation).dot(model.plane->normal);
+      else
+        state.frame[at(f)] = rotation;
+      break;
+    }
+    for (int k = 0; k < 20; ++k) {
+      compute_configuration(model, state, state.q, c);
+      Matrix3 H = Matrix3::Identity() * 1e-300;
+      Vector3 g = Vector3::Zero();
+      for (std::size_t h = 0; h < model.half.size(); ++h) {
+        if (model.half[h].frame != f) continue;
+        half_local(model, state.q, elastic, c, static_cast<int>(h), true, local);
+        for (int i = 0; i < n; ++i) {
+          g(i) += local.gradient[row + i];
+          for (int j = 0; j < n; ++j) H(i, j) += local.hessian[row + i][row + j];
+        }
+      }
+      const VectorX step = H.topLeftCorner(n, n).ldlt().solve(-g.head(n));
+      if (!step.allFinite()) break;
+      state.q.segment(dof, n) += step * std::min(1.0, 0.5 / std::max(step.norm(), 1e-300));
+      if (!model.planar()) {
+        state.frame[at(f)] = orthonormalized(cayley(state.q.segment<3>(dof)) * state.frame[at(f)]);
+        state.q.segment<3>(dof).setZero();
+      }
+      if (step.norm() < 1e-13) break;
+    }
+  }
+}
+
+void World::Implementation::leave_plane(const std::string& why) {
+  require(!options.planar.value_or(false), why + " leaves the plane of the scene: build it with planar=False");
+  spatial = true;
+  rebuild(false);
+  plan.notes.push_back("left the plane while running: " + why);
+}
+
+void World::Implementation::make_plan() {
+  const double stable = plan.stable_step;
+  plan = Plan{};
+  plan.stable_step = stable;
+  plan.planar = model.planar();
+  plan.unknowns = model.dof_count;
+  plan.solver = options.integrator == Integrator::verlet ? "none (explicit)" : equations->assembler().solver().name();
+  auto& notes = plan.notes;
+  if (model.planar()) {
+    plan.plane_normal = model.plane->normal;
+    notes.push_back("planar: 2 unknowns a node, no twist; a scene that could buckle out of its plane stays in it "
+                    "(build(planar=False) to force 3D)");
+  } else {
+    notes.push_back("3D: " + (options.planar.has_value() && !*options.planar ? std::string("planar=False")
+                              : spatial ? std::string("the scene left its plane") : model.plane_reason));
+  }
+  if (!equations->symmetric())
+    notes.push_back("unsymmetric Jacobian: follower loads, moments in 3D, or energy-momentum steps");
+  if (!parameters.dragged) notes.push_back("no drag: its terms are left out");
+  if (!parameters.viscous) notes.push_back("no viscosity: its terms are left out");
+  if (description.loads.empty()) notes.push_back("no loads but gravity");
+  notes.push_back("no contact: no broad phase");
+}
+
+}  // namespace withe

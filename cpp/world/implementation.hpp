@@ -1,0 +1,92 @@
+#pragma once
+/// What World is made of; private to this room.
+
+#include <atomic>
+
+#include "integrators/dynamics.hpp"
+#include "integrators/statics.hpp"
+#include "world/world.hpp"
+
+namespace withe {
+
+/// Where a support is, and where it is going.
+struct SupportMotion {
+  Vector3 position = Vector3::Zero();      ///< now [m]
+  Matrix3 rotation = Matrix3::Identity();  ///< now, from the drawn orientation
+  Vector3 from_position = Vector3::Zero(), to_position = Vector3::Zero();
+  Matrix3 from_rotation = Matrix3::Identity(), to_rotation = Matrix3::Identity();
+  double start = 0, end = 0;               ///< of the ramp [s]
+};
+
+/// Natural shape of a rod on its way from one value to another.
+struct NaturalRamp {
+  MatrixX2 from_curvature, to_curvature;
+  VectorX from_twist, to_twist;
+  double curvature_start = 0, curvature_end = 0, twist_start = 0, twist_end = 0;
+  bool curvature_active = false, twist_active = false;
+};
+
+struct World::Implementation {
+  Implementation(SceneDescription description, Options options);
+  Implementation(const Implementation& other);
+
+  SceneDescription description;
+  Options options;
+  Model model;
+  Parameters parameters;
+  std::unique_ptr<Newton> newton;
+  std::unique_ptr<Equations> equations;
+  std::unique_ptr<Equations> static_equations;  ///< symmetric ones, made when first needed
+  NewtonWorkspace work;
+  State state;
+  Plan plan;
+  Statistics statistics;
+  std::vector<SupportMotion> motions;
+  std::vector<NaturalRamp> ramps;
+  std::vector<Vector3> load_values;
+  MatrixX3 custom_force;
+  std::function<void(double, double)> callback;  ///< StepCallback, bound to its world
+  std::atomic<bool> interrupted{false};
+  bool spatial = false;         ///< left its plane while running
+  int level = 0;                ///< present halvings of the time step
+  int easy_steps = 0;
+  double support_work = 0, actuation_work = 0, dissipated = 0, load_work = 0;
+  std::optional<Energy> alarm;  ///< energies at the start, for the explicit scheme's alarm
+  NewtonResult last_newton;
+  VectorX reaction_residual;    ///< full residual of the last solve
+  bool reaction_current = false;
+
+  // building.cpp
+  void rebuild(bool first);
+  void make_plan();
+  /// Drops the plane; throws when the user asked for it. `why` names the argument that leaves the plane.
+  void leave_plane(const std::string& why);
+  State transferred(const Model& old, const State& from) const;
+  void relax_frames(const std::vector<bool>& is_new);
+
+  // stepping.cpp
+  void advance(double duration);
+  void inner_step(double dt, bool& accepted, double& error);
+  void apply_ramps(double time);
+  HeldTarget held_target(double time);
+  HeldTarget held_now() const;
+  void set_motion_at(SupportMotion& motion, double time) const;
+  [[noreturn]] void fail(const NewtonResult& newton, double dt, const std::string& what) const;
+  EquilibriumResult equilibrium(double dt);
+  Equations& statics();
+  void update_custom_force(Equations& target) const;
+  void refresh_reactions();
+  Energy energy() const;
+  double actuation_energy(const State& at, const Parameters& p) const;
+  void check_explicit();
+};
+
+/// Position of a node in space, from any configuration vector.
+Vector3 node_position(const Model& model, const VectorX& q, int node);
+Vector3 node_velocity(const Model& model, const VectorX& v, int node);
+/// Directors of an edge: columns d1, d2, t.
+Matrix3 edge_directors(const Model& model, const State& state, const Configuration& c, int edge);
+/// Rotation of a joint frame from the drawn axes.
+Matrix3 frame_rotation(const Model& model, const State& state, int frame);
+
+}  // namespace withe

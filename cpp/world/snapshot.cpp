@@ -1,0 +1,175 @@
+#include "geometry/rotation.hpp"
+#include "world/archive.hpp"
+#include "world/implementation.hpp"
+
+namespace withe {
+namespace {
+
+constexpr std::uint64_t kMagic = 0x3153454854495755ull;
+
+/// FNV-1a over the drawn scene: what must be equal for a snapshot to fit.
+std::uint64_t fingerprint(const SceneDescription& scene) {
+  Writer w;
+  w(scene.positions);
+  for (const RodDescription& rod : scene.rods) {
+    w(static_cast<std::int64_t>(rod.nodes.size()));
+    for (int node : rod.nodes) w(node);
+    w(rod.rest_lengths);
+    w(rod.directors);
+  }
+  w(static_cast<std::int64_t>(scene.joints.size()));
+  w(static_cast<std::int64_t>(scene.loads.size()));
+  std::uint64_t hash = 14695981039346656037ull;
+  for (const char c : w.bytes) hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211ull;
+  return hash;
+}
+
+/// The numbers of a state that any world of the scene has, in a fixed order.
+template <class Archive, class Self>
+void exchange(Archive& io, Self& self) {
+  auto& p = self.parameters;
+  for (auto* v : {&p.edge_stretch, &p.edge_twist, &p.edge_density, &p.edge_rotary, &p.edge_viscous_time, &p.edge_drag,
+                  &p.added_mass})
+    io(*v);
+  io(p.edge_bend);
+  io(p.gravity);
+  for (auto& m : p.natural_curvature) io(m);
+  for (auto& v : p.natural_twist) io(v);
+  for (auto& r : self.ramps) {
+    io(r.from_curvature);
+    io(r.to_curvature);
+    io(r.from_twist);
+    io(r.to_twist);
+    io(r.curvature_start);
+    io(r.curvature_end);
+    io(r.twist_start);
+    io(r.twist_end);
+    io(r.curvature_active);
+    io(r.twist_active);
+  }
+  for (auto& v : self.load_values) io(v);
+  io(self.custom_force);
+  for (auto* x : {&self.support_work, &self.actuation_work, &self.dissipated, &self.load_work}) io(*x);
+  io(self.level);
+  io(self.easy_steps);
+  for (auto& m : self.motions) {
+    io(m.position);
+    io(m.rotation);
+    io(m.from_position);
+    io(m.to_position);
+    io(m.from_rotation);
+    io(m.to_rotation);
+    io(m.start);
+    io(m.end);
+  }
+  auto& s = self.state;
+  io(s.time);
+  io(s.q);
+  io(s.v);
+  io(s.acceleration);
+  io(s.acceleration_current);
+  for (auto& t : s.tangent) io(t.x), io(t.y), io(t.z);
+  for (auto& d : s.director) io(d.x), io(d.y), io(d.z);
+  for (auto& f : s.frame) io(f);
+  io(s.bend_tau);
+  io(s.half_tau);
+  io(self.reaction_current);
+  io(self.reaction_residual);
+}
+
+/// Ramps have no size until they are used.
+void give_sizes(World::Implementation& self) {
+  for (std::size_t r = 0; r < self.ramps.size(); ++r) {
+    NaturalRamp& ramp = self.ramps[r];
+    const auto& rod = self.description.rods[r];
+    for (MatrixX2* m : {&ramp.from_curvature, &ramp.to_curvature})
+      if (m->rows() != rod.natural_curvature.rows()) *m = rod.natural_curvature;
+    for (VectorX* v : {&ramp.from_twist, &ramp.to_twist})
+      if (v->size() != rod.natural_twist.size()) *v = rod.natural_twist;
+  }
+  if (self.reaction_residual.size() != self.model.dof_count) self.reaction_residual.setZero(self.model.dof_count);
+}
+
+}  // namespace
+
+std::string World::snapshot() const {
+  Implementation& self = *implementation_;
+  give_sizes(self);
+  Writer w;
+  w(kMagic);
+  w(fingerprint(self.description));
+  w(self.spatial);
+  w(static_cast<std::int64_t>(self.description.supports.size()));
+  for (std::size_t s = 0; s < self.description.supports.size(); ++s) {
+    const SupportDescription& d = self.description.supports[s];
+    w(self.model.supports[s].active);
+    w(static_cast<int>(d.kind));
+    w(d.pass.rod);
+    w(d.pass.node);
+    w(d.free);
+    w(d.spin);
+  }
+  exchange(w, self);
+  return w.bytes;
+}
+
+void World::restore(const std::string& bytes) {
+  Reader r(bytes);
+  std::uint64_t magic = 0, print = 0;
+  r(magic);
+  require(magic == kMagic, "snapshot is damaged, or not one of ours");
+  r(print);
+  require(print == fingerprint(implementation_->description), "snapshot belongs to another scene");
+  // Everything is read into a copy, so that a damaged file changes nothing.
+  auto fresh = std::make_unique<Implementation>(*implementation_);
+  fresh->callback = implementation_->callback;
+  bool spatial = false;
+  std::int64_t count = 0;
+  r(spatial);
+  r(count);
+  require(count >= 0 && count < 1 << 20, "snapshot is damaged: impossible number of supports");
+  std::vector<SupportDescription> supports;
+  std::vector<bool> active;
+  for (std::int64_t s = 0; s < count; ++s) {
+    SupportDescription d;
+    bool on = false;
+    int kind = 0;
+    r(on);
+    r(kind);
+    require(kind >= 0 && kind <= 2, "snapshot is damaged: unknown support");
+    d.kind = static_cast<SupportKind>(kind);
+    r(d.pass.rod);
+    r(d.pass.node);
+    const auto& rods = fresh->description.rods;
+    require(d.pass.rod >= 0 && d.pass.rod < static_cast<int>(rods.size()) && d.pass.node >= 0 &&
+                d.pass.node < static_cast<int>(rods[static_cast<std::size_t>(d.pass.rod)].nodes.size()),
+            "snapshot is damaged: support of a node that is not there");
+    r(d.free);
+    r(d.spin);
+    supports.push_back(d);
+    active.push_back(on);
+  }
+  const bool same = spatial == fresh->spatial && supports.size() == fresh->description.supports.size() && [&] {
+    for (std::size_t s = 0; s < supports.size(); ++s)
+      if (active[s] != fresh->model.supports[s].active) return false;
+    return true;
+  }();
+  if (!same) {
+    fresh->spatial = spatial;
+    fresh->description.supports = supports;
+    fresh->motions.assign(supports.size(), SupportMotion{});
+    fresh->model.supports.assign(supports.size(), Support{});
+    for (std::size_t s = 0; s < supports.size(); ++s) fresh->model.supports[s].active = active[s];
+    fresh->rebuild(false);
+  }
+  give_sizes(*fresh);
+  exchange(r, *fresh);
+  r.expect_end();
+  require(fresh->state.q.allFinite() && fresh->state.v.allFinite(), "snapshot is damaged: not finite");
+  update_derived(fresh->model, fresh->parameters);
+  fresh->equations->loads().values = fresh->load_values;
+  fresh->alarm.reset();
+  implementation_ = std::move(fresh);
+}
+
+}  // namespace withe

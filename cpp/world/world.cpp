@@ -1,0 +1,475 @@
+#include "world/world.hpp"
+
+#include <chrono>
+#include <cmath>
+
+#include "common/check.hpp"
+#include "geometry/curvature.hpp"
+#include "geometry/rotation.hpp"
+#include "world/implementation.hpp"
+
+namespace withe {
+namespace {
+
+std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+/// Adds the time of a call to a statistic.
+class Timer {
+ public:
+  explicit Timer(double& total) : total_(total), start_(std::chrono::steady_clock::now()) {}
+  ~Timer() { total_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
+
+ private:
+  double& total_;
+  std::chrono::steady_clock::time_point start_;
+};
+
+}  // namespace
+
+World::World(SceneDescription description, Options options)
+    : implementation_(std::make_unique<Implementation>(std::move(description), options)) {}
+World::World(const World& other) : implementation_(std::make_unique<Implementation>(*other.implementation_)) {}
+World::~World() = default;
+
+const SceneDescription& World::description() const { return implementation_->description; }
+const Options& World::options() const { return implementation_->options; }
+const Plan& World::plan() const { return implementation_->plan; }
+double World::time() const { return implementation_->state.time; }
+void World::interrupt() { implementation_->interrupted = true; }
+
+const Statistics& World::statistics() const {
+  Statistics& s = implementation_->statistics;
+  const Counters& c = implementation_->work.counters;
+  s.iterations = c.iterations;
+  s.factorizations = c.factorizations;
+  s.assembly_time = c.assembly_time;
+  s.solve_time = c.solve_time;
+  return s;
+}
+
+void World::step(int count) {
+  require(count >= 0, "number of steps must not be negative, got " + std::to_string(count));
+  Implementation& self = *implementation_;
+  const Timer timer(self.statistics.total_time);
+  for (int i = 0; i < count; ++i) {
+    if (self.options.integrator == Integrator::statics) {
+      if (self.interrupted.exchange(false)) throw Interrupted();
+      const double end = self.state.time + self.options.time_step;
+      if (self.callback) self.callback(end, end);
+      self.equilibrium(self.options.time_step);
+    } else {
+      self.advance(self.options.time_step);
+    }
+  }
+}
+
+void World::advance_to(double time) {
+  Implementation& self = *implementation_;
+  const double span = time - self.state.time;
+  require(std::isfinite(time) && span >= 0.0, "time must not lie before the present, got " + std::to_string(time));
+  if (span == 0.0) return;
+  const Timer timer(self.statistics.total_time);
+  const double steps = std::max(1.0, std::ceil(span / self.options.time_step - 1e-9));
+  const double start = self.state.time;
+  for (double i = 1.0; i <= steps; i += 1.0) {
+    const double next = i == steps ? time : start + span * i / steps;
+    if (self.options.integrator == Integrator::statics) {
+      if (self.interrupted.exchange(false)) throw Interrupted();
+      if (self.callback) self.callback(next, next);
+      self.equilibrium(next - self.state.time);
+    } else {
+      self.advance(next - self.state.time);
+    }
+    self.state.time = next;
+  }
+}
+
+EquilibriumResult World::equilibrium() {
+  Implementation& self = *implementation_;
+  const Timer timer(self.statistics.total_time);
+  if (self.callback) self.callback(self.state.time, self.state.time);
+  return self.equilibrium(0.0);
+}
+
+void World::set_step_callback(StepCallback callback) {
+  if (!callback) {
+    implementation_->callback = nullptr;
+    return;
+  }
+  implementation_->callback = [this, callback](double force_time, double end_time) {
+    callback(*this, force_time, end_time);
+  };
+}
+
+void World::set_custom_force(const MatrixX3& force) {
+  Implementation& self = *implementation_;
+  require(force.rows() == self.model.node_count, "custom force must have one row a node, " +
+                                                     std::to_string(self.model.node_count) + ", got " +
+                                                     std::to_string(force.rows()));
+  require(force.allFinite(), "custom force must be finite");
+  self.custom_force = force;
+  self.state.acceleration_current = false;
+}
+
+void World::set_load(int load, const Vector3& value) {
+  Implementation& self = *implementation_;
+  require(load >= 0 && load < static_cast<int>(self.load_values.size()), "no such load: " + std::to_string(load));
+  require(value.allFinite(), "load must be finite");
+  if (self.model.planar()) {
+    const Vector3& n = self.model.plane->normal;
+    const bool moment = self.description.loads[at(load)].kind == LoadKind::moment;
+    const double off = moment ? value.cross(n).norm() : std::abs(value.dot(n));
+    if (off > 1e-8 * value.norm()) self.leave_plane("a load");
+  }
+  self.load_values[at(load)] = value;
+  self.equations->loads().values = self.load_values;
+  self.reaction_current = false;
+  self.state.acceleration_current = false;
+}
+Vector3 World::load(int load) const {
+  require(load >= 0 && load < static_cast<int>(implementation_->load_values.size()),
+          "no such load: " + std::to_string(load));
+  return implementation_->load_values[at(load)];
+}
+
+void World::set_natural_curvature(int rod, const MatrixX2& curvature, double over) {
+  Implementation& self = *implementation_;
+  require(rod >= 0 && rod < static_cast<int>(self.ramps.size()), "no such rod: " + std::to_string(rod));
+  MatrixX2& now = self.parameters.natural_curvature[at(rod)];
+  require(curvature.rows() == now.rows(), "natural curvature needs one row a stencil, " + std::to_string(now.rows()) +
+                                              ", got " + std::to_string(curvature.rows()));
+  require(curvature.allFinite() && std::isfinite(over) && over >= 0.0, "natural curvature must be finite, over >= 0");
+  if (self.model.planar()) {
+    const Vector2 p = self.model.planar_components[at(rod)];
+    for (Eigen::Index i = 0; i < curvature.rows(); ++i)
+      if (std::abs(curvature(i, 0) * p(1) - curvature(i, 1) * p(0)) > 1e-8 * curvature.row(i).norm()) {
+        self.leave_plane("natural curvature of rod '" + self.description.rods[at(rod)].name + "'");
+        break;
+      }
+  }
+  for (std::size_t s = 0; s < self.model.place[at(rod)].size(); ++s) {
+    const auto row = static_cast<Eigen::Index>(s);
+    const int b = self.model.place[at(rod)][s].bend;
+    if (b >= 0) discrete_curvature(curvature.row(row), self.model.bend_voronoi(b));  // refuses a turn of pi
+  }
+  NaturalRamp& ramp = self.ramps[at(rod)];
+  if (over == 0.0) {
+    const double before = self.actuation_energy(self.state, self.parameters);
+    ramp.curvature_active = false;
+    self.parameters.natural_curvature[at(rod)] = curvature;
+    update_natural(self.model, self.parameters);
+    self.actuation_work += self.actuation_energy(self.state, self.parameters) - before;
+  } else {
+    ramp.from_curvature = now;
+    ramp.to_curvature = curvature;
+    ramp.curvature_start = self.state.time;
+    ramp.curvature_end = self.state.time + over;
+    ramp.curvature_active = true;
+  }
+  self.reaction_current = false;
+  self.state.acceleration_current = false;
+}
+
+void World::set_natural_twist(int rod, const VectorX& twist, double over) {
+  Implementation& self = *implementation_;
+  require(rod >= 0 && rod < static_cast<int>(self.ramps.size()), "no such rod: " + std::to_string(rod));
+  require(twist.size() == self.parameters.natural_twist[at(rod)].size(), "natural twist needs one number a stencil");
+  require(twist.allFinite() && std::isfinite(over) && over >= 0.0, "natural twist must be finite, over >= 0");
+  if (self.model.planar() && (twist.array() != 0.0).any())
+    self.leave_plane("natural twist of rod '" + self.description.rods[at(rod)].name + "'");
+  NaturalRamp& ramp = self.ramps[at(rod)];
+  if (over == 0.0) {
+    const double before = self.actuation_energy(self.state, self.parameters);
+    ramp.twist_active = false;
+    self.parameters.natural_twist[at(rod)] = twist;
+    update_natural(self.model, self.parameters);
+    self.actuation_work += self.actuation_energy(self.state, self.parameters) - before;
+  } else {
+    ramp.from_twist = self.parameters.natural_twist[at(rod)];
+    ramp.to_twist = twist;
+    ramp.twist_start = self.state.time;
+    ramp.twist_end = self.state.time + over;
+    ramp.twist_active = true;
+  }
+  self.reaction_current = false;
+  self.state.acceleration_current = false;
+}
+
+MatrixX2 World::natural_curvature(int rod) const { return implementation_->parameters.natural_curvature.at(at(rod)); }
+VectorX World::natural_twist(int rod) const { return implementation_->parameters.natural_twist.at(at(rod)); }
+
+void World::set_rod_parameters(int rod, const RodDescription& d) {
+  Implementation& self = *implementation_;
+  require(rod >= 0 && rod < static_cast<int>(self.ramps.size()), "no such rod: " + std::to_string(rod));
+  const int first = self.model.rod_first_edge[at(rod)], count = self.model.rod_first_edge[at(rod) + 1] - first;
+  for (const VectorX* v : {&d.stretch_stiffness, &d.twist_stiffness, &d.line_density, &d.rotary_inertia,
+                           &d.viscous_time, &d.drag})
+    require(v->size() == count && v->allFinite(), "rod parameters need one finite number an edge");
+  require(d.bend_stiffness.rows() == count && d.bend_stiffness.allFinite(), "bend_stiffness needs one row an edge");
+  Parameters& p = self.parameters;
+  const double before = self.actuation_energy(self.state, p);
+  p.edge_stretch.segment(first, count) = d.stretch_stiffness;
+  p.edge_bend.middleRows(first, count) = d.bend_stiffness;
+  p.edge_twist.segment(first, count) = d.twist_stiffness;
+  p.edge_density.segment(first, count) = d.line_density;
+  p.edge_rotary.segment(first, count) = d.rotary_inertia;
+  p.edge_viscous_time.segment(first, count) = d.viscous_time;
+  p.edge_drag.segment(first, count) = d.drag;
+  update_derived(self.model, p);
+  self.actuation_work += self.actuation_energy(self.state, p) - before;
+  self.reaction_current = false;
+  self.state.acceleration_current = false;
+  self.make_plan();
+}
+
+void World::set_added_mass(const VectorX& mass) {
+  Implementation& self = *implementation_;
+  require(mass.size() == self.model.node_count && mass.allFinite() && (mass.array() >= 0.0).all(),
+          "added mass needs one finite number >= 0 a node");
+  self.parameters.added_mass = mass;
+  update_derived(self.model, self.parameters);
+  self.state.acceleration_current = false;
+}
+
+void World::set_gravity(const Vector3& gravity) {
+  Implementation& self = *implementation_;
+  require(gravity.allFinite(), "gravity must be finite");
+  if (self.model.planar() && std::abs(gravity.dot(self.model.plane->normal)) > 1e-8 * gravity.norm())
+    self.leave_plane("gravity");
+  self.parameters.gravity = gravity;
+  self.reaction_current = false;
+  self.state.acceleration_current = false;
+}
+
+int World::add_support(const SupportDescription& support) {
+  Implementation& self = *implementation_;
+  const Implementation backup(self);
+  self.description.supports.push_back(support);
+  Support placeholder;
+  placeholder.active = true;
+  self.model.supports.push_back(placeholder);
+  self.motions.emplace_back();
+  try {
+    if (self.model.planar()) {
+      const Vector3& n = self.model.plane->normal;
+      const Vector3 image = support.free * n;
+      if ((image - n * n.dot(image)).norm() > 1e-9) self.spatial = true;
+    }
+    self.rebuild(false);
+  } catch (...) {
+    auto callback = self.callback;
+    implementation_ = std::make_unique<Implementation>(backup);
+    implementation_->callback = callback;
+    throw;
+  }
+  const int index = static_cast<int>(self.description.supports.size()) - 1;
+  const Support& s = self.model.supports[at(index)];
+  SupportMotion& m = self.motions[at(index)];
+  m.position = node_position(self.model, self.state.q, s.node);
+  if (s.frame >= 0) {
+    m.rotation = frame_rotation(self.model, self.state, s.frame);
+  } else if (s.edge >= 0) {
+    Configuration c;
+    compute_configuration(self.model, self.state, self.state.q, c);
+    const Vector3 t = to_eigen(self.model.initial_tangent[at(s.edge)]), d1 = to_eigen(self.model.initial_director[at(s.edge)]);
+    Matrix3 drawn;
+    drawn << d1, t.cross(d1), t;
+    m.rotation = edge_directors(self.model, self.state, c, s.edge) * drawn.transpose();
+  }
+  m.from_position = m.to_position = m.position;
+  m.from_rotation = m.to_rotation = m.rotation;
+  m.start = m.end = self.state.time;
+  return index;
+}
+
+void World::remove_support(int support) {
+  Implementation& self = *implementation_;
+  require(support >= 0 && support < static_cast<int>(self.model.supports.size()) && self.model.supports[at(support)].active,
+          "no such support, or it is released already: " + std::to_string(support));
+  self.model.supports[at(support)].active = false;
+  self.rebuild(false);
+}
+
+void World::move_support(int support, const Vector3& position, const Matrix3& rotation, double over) {
+  Implementation& self = *implementation_;
+  require(std::isfinite(over) && over >= 0.0, "over must be finite and not negative");
+  prescribe_support(support, position, rotation);
+  SupportMotion& m = self.motions[at(support)];
+  m.from_position = m.position;
+  m.from_rotation = m.rotation;
+  m.start = self.state.time;
+  m.end = self.state.time + over;
+}
+
+void World::prescribe_support(int support, const Vector3& position, const Matrix3& rotation) {
+  Implementation& self = *implementation_;
+  require(support >= 0 && support < static_cast<int>(self.model.supports.size()) && self.model.supports[at(support)].active,
+          "no such support, or it is released: " + std::to_string(support));
+  require(position.allFinite() && rotation.allFinite(), "position and rotation must be finite");
+  require((rotation.transpose() * rotation - Matrix3::Identity()).norm() < 1e-6 && rotation.determinant() > 0.0,
+          "rotation must be a proper rotation matrix");
+  if (self.model.planar()) {
+    const Plane& plane = *self.model.plane;
+    if (std::abs((position - plane.origin).dot(plane.normal)) > 1e-9 * self.model.length_scale ||
+        (rotation * plane.normal - plane.normal).norm() > 1e-9)
+      self.leave_plane("a moving support");
+  }
+  SupportMotion& m = self.motions[at(support)];
+  m.to_position = m.from_position = position;
+  m.to_rotation = m.from_rotation = rotation;
+  m.start = m.end = self.state.time;
+}
+
+Vector3 World::support_position(int support) const { return implementation_->motions.at(at(support)).position; }
+Matrix3 World::support_rotation(int support) const { return implementation_->motions.at(at(support)).rotation; }
+
+Reaction World::reaction(int support) const {
+  Implementation& self = *implementation_;
+  require(support >= 0 && support < static_cast<int>(self.model.supports.size()) && self.model.supports[at(support)].active,
+          "no such support, or it is released: " + std::to_string(support));
+  self.refresh_reactions();
+  const Model& model = self.model;
+  const Support& s = model.supports[at(support)];
+  const VectorX held = self.equations->assembler().held_part(self.reaction_residual);
+  Reaction out;
+  out.force = node_velocity(model, held, s.node);
+  if (s.frame >= 0) {
+    const int dof = model.frame_dof[at(s.frame)];
+    // In space the residual of the frame's unknowns is J(w)^T moment; w is zero but for the step's own turn.
+    out.moment = model.planar() ? Vector3(held(dof) * model.plane->normal) : Vector3(held.segment<3>(dof));
+  }
+  if (s.other_node >= 0) {
+    const Vector3 other = node_velocity(model, held, s.other_node);
+    const Vector3 arm = node_position(model, self.state.q, s.other_node) - node_position(model, self.state.q, s.node);
+    out.force += other;
+    out.moment = arm.cross(other);
+    if (!model.planar())
+      out.moment += held(model.edge_dof[at(s.edge)]) * to_eigen(self.state.tangent[at(s.edge)]);
+  }
+  return out;
+}
+
+MatrixX3 World::positions() const {
+  const Implementation& self = *implementation_;
+  MatrixX3 out(self.model.node_count, 3);
+  for (int i = 0; i < self.model.node_count; ++i) out.row(i) = node_position(self.model, self.state.q, i);
+  return out;
+}
+
+MatrixX3 World::velocities() const {
+  const Implementation& self = *implementation_;
+  MatrixX3 out(self.model.node_count, 3);
+  for (int i = 0; i < self.model.node_count; ++i) out.row(i) = node_velocity(self.model, self.state.v, i);
+  return out;
+}
+
+void World::set_velocities(const MatrixX3& velocities) {
+  Implementation& self = *implementation_;
+  require(velocities.rows() == self.model.node_count, "velocities need one row a node");
+  require(velocities.allFinite(), "velocities must be finite");
+  if (self.model.planar()) {
+    const VectorX off = velocities * self.model.plane->normal;
+    if (off.cwiseAbs().maxCoeff() > 1e-9 * velocities.cwiseAbs().maxCoeff()) self.leave_plane("a velocity");
+  }
+  for (int i = 0; i < self.model.node_count; ++i) {
+    const int dof = self.model.node_dof[at(i)];
+    const Vector3 v = velocities.row(i);
+    if (self.model.planar())
+      self.state.v.segment<2>(dof) << v.dot(self.model.plane->first), v.dot(self.model.plane->second);
+    else
+      self.state.v.segment<3>(dof) = v;
+  }
+  self.equations->assembler().project(self.state.v);
+  self.state.acceleration.setZero();
+  self.state.acceleration_current = false;
+  self.alarm.reset();
+}
+
+MatrixX9 World::directors(int rod) const {
+  const Implementation& self = *implementation_;
+  Configuration c;
+  compute_configuration(self.model, self.state, self.state.q, c);
+  const int first = self.model.rod_first_edge.at(at(rod)), count = self.model.rod_first_edge.at(at(rod) + 1) - first;
+  MatrixX9 out(count, 9);
+  for (int e = 0; e < count; ++e) {
+    const Matrix3 d = edge_directors(self.model, self.state, c, first + e);
+    out.row(e) << d.col(0).transpose(), d.col(1).transpose(), d.col(2).transpose();
+  }
+  return out;
+}
+
+MatrixX2 World::curvatures(int rod) const {
+  const Implementation& self = *implementation_;
+  Configuration c;
+  compute_configuration(self.model, self.state, self.state.q, c);
+  const auto& places = self.model.place.at(at(rod));
+  MatrixX2 out = MatrixX2::Zero(static_cast<Eigen::Index>(places.size()), 2);
+  const auto smooth = [&](const MatrixX3& strain, int i, double voronoi) {
+    Vector2 d = strain.row(i).head<2>();
+    if (self.model.planar()) d = strain(i, 0) * self.model.planar_components[at(rod)];
+    return smooth_curvature(d, voronoi);
+  };
+  for (std::size_t s = 0; s < places.size(); ++s) {
+    const auto row = static_cast<Eigen::Index>(s);
+    if (places[s].bend >= 0) {
+      out.row(row) = smooth(c.bend_strain, places[s].bend, self.model.bend_voronoi(places[s].bend));
+      continue;
+    }
+    double length = 0.0;
+    for (int h : places[s].half)
+      if (h >= 0) {
+        const double v = self.model.half_voronoi(h);
+        out.row(row) += v * smooth(c.half_strain, h, v);
+        length += v;
+      }
+    if (length > 0.0) out.row(row) /= length;
+  }
+  return out;
+}
+
+VectorX World::twists(int rod) const {
+  const Implementation& self = *implementation_;
+  const auto& places = self.model.place.at(at(rod));
+  VectorX out = VectorX::Zero(static_cast<Eigen::Index>(places.size()));
+  if (self.model.planar()) return out;
+  Configuration c;
+  compute_configuration(self.model, self.state, self.state.q, c);
+  for (std::size_t s = 0; s < places.size(); ++s) {
+    double turn = 0.0, length = 0.0;
+    if (places[s].bend >= 0) {
+      turn = c.bend_strain(places[s].bend, 2);
+      length = self.model.bend_voronoi(places[s].bend);
+    }
+    for (int h : places[s].half)
+      if (h >= 0) {
+        turn += c.half_strain(h, 2);
+        length += self.model.half_voronoi(h);
+      }
+    out(static_cast<Eigen::Index>(s)) = length > 0.0 ? turn / length : 0.0;
+  }
+  return out;
+}
+
+VectorX World::tensions(int rod) const {
+  const Implementation& self = *implementation_;
+  Configuration c;
+  compute_configuration(self.model, self.state, self.state.q, c);
+  const int first = self.model.rod_first_edge.at(at(rod)), count = self.model.rod_first_edge.at(at(rod) + 1) - first;
+  VectorX out(count);
+  for (int e = 0; e < count; ++e)
+    out(e) = self.parameters.edge_stretch(first + e) * (c.length(first + e) / self.model.edge_length(first + e) - 1.0);
+  return out;
+}
+
+VectorX World::spins(int rod) const {
+  const Implementation& self = *implementation_;
+  const int first = self.model.rod_first_edge.at(at(rod)), count = self.model.rod_first_edge.at(at(rod) + 1) - first;
+  VectorX out = VectorX::Zero(count);
+  if (!self.model.planar())
+    for (int e = 0; e < count; ++e) out(e) = self.state.v(self.model.edge_dof[at(first + e)]);
+  return out;
+}
+
+Energy World::energy() const { return implementation_->energy(); }
+
+}  // namespace withe

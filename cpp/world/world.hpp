@@ -1,0 +1,144 @@
+#pragma once
+/// A scene while it runs: model + state + workspace behind one object; step, read out, snapshot, restore.
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "common/types.hpp"
+#include "integrators/options.hpp"
+#include "model/description.hpp"
+
+namespace withe {
+
+struct Energy {  // [J]
+  double kinetic = 0, stretch = 0, bend = 0, twist = 0, gravity = 0;
+  double loads = 0;       ///< minus the work done by loads and custom forces since the start
+  double contact = 0;
+  double total = 0;       ///< sum of the above
+  double work = 0;        ///< done by supports and actuation since the start
+  double dissipated = 0;  ///< by viscosity and drag since the start
+};
+
+struct Statistics {
+  long steps = 0;              ///< inner steps accepted
+  long rejected_steps = 0;
+  long iterations = 0;         ///< Newton iterations
+  long factorizations = 0;
+  double largest_turn = 0;     ///< of an edge in one step [rad]; plain midpoint loses energy balance above about 0.1
+  double assembly_time = 0, solve_time = 0, total_time = 0;  ///< [s]
+};
+
+struct Reaction {
+  Vector3 force = Vector3::Zero();   ///< of the support on the rod [N]
+  Vector3 moment = Vector3::Zero();  ///< of the support on the rod, about the node [N m]
+};
+
+struct EquilibriumResult {
+  bool stable = false;
+  int iterations = 0;
+  double residual = 0;  ///< greatest force out of balance [N]
+};
+
+/// What `build` decided.
+struct Plan {
+  bool planar = false;
+  Vector3 plane_normal = Vector3::Zero();  ///< of a planar scene
+  int unknowns = 0;
+  std::string solver;                      ///< LinearSolver::name()
+  double stable_step = 0;                  ///< of the explicit scheme [s]; 0 when not computed
+  std::vector<std::string> notes;          ///< one line per thing that was skipped or decided, and why
+};
+
+/// Non-convergence below the smallest step. Becomes withe.ConvergenceError.
+class ConvergenceFailure : public std::runtime_error {
+ public:
+  ConvergenceFailure(const std::string& message, double time, double step, int rod, int node, double residual)
+      : std::runtime_error(message), time(time), step(step), rod(rod), node(node), residual(residual) {}
+  double time, step;  ///< [s]
+  int rod, node;      ///< where the residual is greatest; -1: not known
+  double residual;    ///< [N]
+};
+
+class World {
+ public:
+  World(SceneDescription description, Options options);
+  World(const World&);
+  World& operator=(const World&) = delete;
+  ~World();
+
+  const SceneDescription& description() const;
+  const Options& options() const;
+  const Plan& plan() const;
+  const Statistics& statistics() const;
+  double time() const;
+
+  /// Advances exactly `count` time_steps. Throws ConvergenceFailure; the state is then the last accepted one.
+  void step(int count = 1);
+  /// Advances to `time`, with time_steps stretched or shortened evenly to land on it.
+  void advance_to(double time);
+  EquilibriumResult equilibrium();
+  /// From another thread or a signal: ends a running step() at the next inner step (throws Interrupted).
+  void interrupt();
+
+  // Called before every inner step. `force_time`: when loads act in this step; `end_time`: where supports
+  // shall be at its end. May call set_load, prescribe and set_custom_force. Empty: none.
+  using StepCallback = std::function<void(World&, double force_time, double end_time)>;
+  void set_step_callback(StepCallback callback);
+  /// Explicit nodal forces (nodes x 3) [N] used from now on.
+  void set_custom_force(const MatrixX3& force);
+
+  void set_load(int load, const Vector3& value);
+  Vector3 load(int load) const;
+  /// Ramped linearly over `over` seconds from now (0: at once).
+  void set_natural_curvature(int rod, const MatrixX2& curvature, double over);
+  void set_natural_twist(int rod, const VectorX& twist, double over);
+  MatrixX2 natural_curvature(int rod) const;  ///< present value, of the smooth rod [1/m]
+  VectorX natural_twist(int rod) const;       ///< [rad/m]
+  /// Replaces the parameters of a rod that may change while running: stiffnesses, line density, rotary
+  /// inertia, viscous time, drag. Shape, nodes and natural shape are ignored.
+  void set_rod_parameters(int rod, const RodDescription& parameters);
+  void set_added_mass(const VectorX& mass);
+  void set_gravity(const Vector3& gravity);
+
+  // Supports; indices are rows of description().supports.
+  int add_support(const SupportDescription& support);  ///< holds the present position and orientation
+  void remove_support(int support);                    ///< the index stays taken
+  /// Target position [m] and rotation relative to the drawn orientation, reached `over` seconds from now.
+  void move_support(int support, const Vector3& position, const Matrix3& rotation, double over);
+  /// Position and rotation at the end of the coming inner step (from the step callback).
+  void prescribe_support(int support, const Vector3& position, const Matrix3& rotation);
+  Vector3 support_position(int support) const;
+  Matrix3 support_rotation(int support) const;
+  Reaction reaction(int support) const;
+
+  // Read-outs: copies.
+  MatrixX3 positions() const;   ///< every node once [m]
+  MatrixX3 velocities() const;  ///< [m/s]
+  void set_velocities(const MatrixX3& velocities);
+  MatrixX9 directors(int rod) const;   ///< per edge
+  MatrixX2 curvatures(int rod) const;  ///< per stencil, of the smooth rod [1/m]
+  VectorX twists(int rod) const;       ///< per stencil [rad/m]
+  VectorX tensions(int rod) const;     ///< per edge [N]
+  VectorX spins(int rod) const;        ///< per edge, angular velocity about the tangent [rad/s]
+  Energy energy() const;
+
+  /// The whole state as bytes, for a description and options equal to this world's (supports may differ).
+  std::string snapshot() const;
+  /// Throws std::invalid_argument when the bytes are damaged or belong to another scene.
+  void restore(const std::string& bytes);
+
+  struct Implementation;
+
+ private:
+  std::unique_ptr<Implementation> implementation_;
+};
+
+/// Thrown by step() after interrupt(). Becomes KeyboardInterrupt.
+class Interrupted : public std::runtime_error {
+ public:
+  Interrupted() : std::runtime_error("interrupted") {}
+};
+
+}  // namespace withe
