@@ -363,22 +363,20 @@ class _Column:
 
     def __init__(self, first: npt.NDArray[Any]) -> None:
         self._values = np.empty((16, *first.shape), first.dtype)
-        self._count = 0
 
     def check(self, name: str, value: npt.NDArray[Any]) -> None:
         if value.shape != self._values.shape[1:]:
             raise ValueError(f"record[{name!r}] must keep its shape {self._values.shape[1:]}, got {value.shape}")
 
-    def append(self, value: npt.NDArray[Any]) -> None:
-        if self._count == len(self._values):
+    def write(self, frame: int, value: npt.NDArray[Any]) -> None:
+        if frame == len(self._values):
             self._values = np.concatenate([self._values, np.empty_like(self._values)])
         if not np.can_cast(value.dtype, self._values.dtype):
             self._values = self._values.astype(np.result_type(value, self._values))
-        self._values[self._count] = value
-        self._count += 1
+        self._values[frame] = value
 
-    def values(self) -> npt.NDArray[Any]:
-        return self._values[: self._count].copy()
+    def values(self, frames: int) -> npt.NDArray[Any]:
+        return self._values[:frames].copy()
 
 
 class Recorder:
@@ -407,6 +405,7 @@ class Recorder:
                 raise ValueError(f"record[{name!r}] must be a function, got {function!r}")
         self._rods = outlines(simulation)
         self._columns: dict[str, _Column] = {}
+        self._frames = 0
 
     def capture(self) -> None:
         """Take one frame. A callback's exception propagates, and then no part of the frame is kept.
@@ -423,7 +422,8 @@ class Recorder:
         if not self._columns:
             self._columns = {name: _Column(values) for name, values in frame.items()}
         for name, values in frame.items():
-            self._columns[name].append(values)
+            self._columns[name].write(self._frames, values)
+        self._frames += 1  # last, so that an interrupt leaves no half of a frame
 
     def _frame(self) -> dict[str, npt.NDArray[Any]]:
         simulation = self._simulation
@@ -446,7 +446,7 @@ class Recorder:
     def record(self) -> Record:
         """The frames taken so far."""
         if self._columns:
-            arrays = {name: column.values() for name, column in self._columns.items()}
+            arrays = {name: column.values(self._frames) for name, column in self._columns.items()}
         else:
             arrays = {name: values[None][:0].copy() for name, values in self._frame().items()}
         return Record(self._rods, arrays, self._extra)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from curling_motion import CURVATURE_RATE, CurlingSimulation
+from withe import recording
 from withe.recording import EnergyHistory, Recorder, present
 
 
@@ -179,3 +180,24 @@ def test_outlines_tell_radii_sections_and_units(simulation):
     assert ring.closed
     assert ring.radii.shape == (24,)
     assert record.units["curvatures"] == "1/m"
+
+
+def test_an_interrupt_within_a_frame_leaves_whole_frames_only(simulation, monkeypatch):
+    recorder = Recorder(simulation)
+    recorder.capture()
+    simulation.step(0.1)
+    write, calls = recording._Column.write, []
+
+    def interrupted(self, frame, value):
+        calls.append(frame)
+        if len(calls) == 5:
+            raise KeyboardInterrupt
+        write(self, frame, value)
+
+    monkeypatch.setattr(recording._Column, "write", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        recorder.capture()
+    assert len(recorder.record) == 1
+    recorder.capture()
+    assert len(recorder.record) == 2
+    np.testing.assert_array_equal(recorder.record.times, [0.0, 0.1])
