@@ -1,0 +1,59 @@
+"""What the package promises as a package: a light import, types, and wheels that carry only what they may."""
+
+import importlib.metadata
+import importlib.util
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import withe
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+LATE = ("scipy", "matplotlib", "pyvista", "imageio_ffmpeg", "IPython", "torch", "cv2", "dask")
+
+
+def load_tool(name):
+    spec = importlib.util.spec_from_file_location(name, ROOT / "tools" / f"{name}.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_import_loads_numpy_and_nothing_slower(tmp_path):
+    code = f"import sys, withe; print([name for name in {LATE} if name in sys.modules])"
+    output = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert output.stdout.strip() == "[]"
+
+
+def test_the_installed_package_is_tested_and_typed():
+    folder = Path(withe.__file__).parent
+    assert ROOT / "python" not in folder.parents
+    assert (folder / "py.typed").is_file()
+    assert (folder / "_core.pyi").is_file()
+
+
+def test_version_is_the_same_everywhere():
+    assert withe.__version__ == importlib.metadata.version("withe") == withe._core.__version__
+
+
+GOOD = "withe-0.1.0-cp311-cp311-manylinux_2_34_x86_64.whl"
+
+
+@pytest.mark.parametrize(
+    ("name", "members", "reason"),
+    [
+        (GOOD, ["withe.libs/libcholmod-1.so.3"], "libcholmod"),
+        (GOOD, ["withe.libs/libklu-1.so", "withe.libs/libgfortran-2.so.5"], "libgfortran"),
+        ("withe-0.1.0-cp311-cp311-manylinux_2_35_x86_64.whl", [], "glibc 2.35"),
+        ("withe-0.1.0-cp311-cp311-linux_x86_64.whl", [], "manylinux tag"),
+    ],
+)
+def test_a_wheel_that_carries_or_needs_too_much_is_refused(name, members, reason):
+    (refusal,) = load_tool("make_wheel").refusals(name, members)
+    assert reason in refusal
+
+
+def test_a_wheel_with_klu_alone_is_accepted():
+    tags = "withe-0.1.0-cp311-cp311-manylinux_2_27_x86_64.manylinux_2_34_x86_64.whl"
+    assert load_tool("make_wheel").refusals(tags, ["withe.libs/libklu-1.so.1", "withe/_core.so"]) == []
