@@ -62,11 +62,13 @@ def save_arrays(
     for name, array in arrays.items():
         if array.dtype.hasobject:
             raise ValueError(f"array {name!r} for {path} must hold numbers, got objects")
+    named: dict[str, Any] = {**arrays}
     text = json.dumps({"format": f"withe {kind}", "version": version, **header})
+    named[_HEADER] = np.array(text)
     temporary = path.with_name(f".{path.name}.{uuid.uuid4().hex}.part")
     try:
         with temporary.open("xb") as stream:
-            np.savez(stream, allow_pickle=False, **{_HEADER: np.array(text)}, **dict(arrays))
+            np.savez(stream, **named)
         os.replace(temporary, path)
     except BaseException:
         temporary.unlink(missing_ok=True)
