@@ -48,20 +48,28 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
   equations.begin(state, parameters, h, options.integrator == Integrator::energy_momentum);
   if (!held.reachable) return result;
   const VectorX held_change = equations.assembler().held_part(held.q - state.q);
-  const auto start_at = [&](double weight) {
-    VectorX move = h * (state.v + (weight * h) * state.acceleration);
-    equations.assembler().project(move);
-    return VectorX(state.q + move * newton.cap(move) + (h / dt) * held_change);
+  // From the extrapolated motion first; where that is too far off, from less and less of it.
+  struct Start {
+    double velocity, acceleration;
+    bool mixed;
   };
-  VectorX z = start_at(1.0);
-  result.newton = newton.solve(equations, z, nullptr, options.max_iterations, work);
-  if (!result.newton.converged) {
-    z = start_at(0.0);
-    const int spent = result.newton.iterations;
-    result.newton = newton.solve(equations, z, nullptr, options.max_iterations, work);
-    result.newton.iterations += spent;
-    if (!result.newton.converged) return result;
+  VectorX z;
+  int spent = 0;
+  // An acceleration that outweighs the velocity belongs to ringing, not to the motion.
+  const bool smooth = h * newton.displacement(state.acceleration) < 0.5 * newton.displacement(state.v);
+  const bool mixed = options.integrator != Integrator::energy_momentum;
+  for (const Start& start : {Start{1.0, 1.0, mixed}, Start{1.0, 0.0, mixed}, Start{1.0, 0.0, !mixed}, Start{0.0, 0.0, true}}) {
+    if (start.acceleration > 0.0 && !smooth) continue;
+    VectorX move = h * (start.velocity * state.v + (start.acceleration * h) * state.acceleration);
+    equations.assembler().project(move);
+    z = state.q + move * newton.cap(move) + (h / dt) * held_change;
+    const int limit = start.acceleration > 0.0 ? std::min(12, options.max_iterations) : options.max_iterations;
+    result.newton = newton.solve(equations, z, nullptr, limit, work, start.mixed);
+    spent += result.newton.iterations;
+    if (result.newton.converged) break;
   }
+  result.newton.iterations = spent;
+  if (!result.newton.converged) return result;
   const VectorX q1 = euler ? z : VectorX(2.0 * z - state.q);
   Configuration before, after;
   compute_configuration(model, state, state.q, before);

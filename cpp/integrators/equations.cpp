@@ -87,7 +87,7 @@ void Equations::evaluate(const VectorX& z, bool with_matrix, const double* axial
     difference_ = 2.0 * (z - state_->q);
     end_q_ = 2.0 * z - state_->q;
     compute_configuration(model_, *state_, end_q_, end_);
-    add_discrete_gradient(z, with_matrix, out);
+    add_discrete_gradient(z, with_matrix, axial_force, out);
   } else {
     add_elastic(z, with_matrix, axial_force, out);
   }
@@ -241,7 +241,8 @@ void Equations::gather_difference(const ElementTable& table, int element, double
   for (int i = 0; i < table.width(); ++i) difference[i] = dofs[i] < 0 ? 0.0 : difference_(dofs[i]);
 }
 
-void Equations::add_discrete_gradient(const VectorX& z, bool with_matrix, Evaluation& out) {
+void Equations::add_discrete_gradient(const VectorX& z, bool with_matrix, const double* axial_force,
+                                      Evaluation& out) {
   const std::span<double> values = assembler_.solver().values();
   Local local, end;
   const auto add = [&](const ElementTable& table, int i) {
@@ -252,7 +253,7 @@ void Equations::add_discrete_gradient(const VectorX& z, bool with_matrix, Evalua
   for (int e = 0; e < model_.edge_count; ++e) {
     const double rest = model_.edge_length(e), EA = elastic.stretch_stiffness(e);
     const double l0 = start_.length(e), l1 = end_.length(e), sum = l0 + l1;
-    const double force = EA * (0.5 * sum / rest - 1.0);
+    const double force = EA * (0.5 * sum / rest - 1.0), geometric = axial_force ? axial_force[e] : force;
     const int* dofs = assembler_.stretch.dofs(e);
     double mean[3];
     for (int i = 0; i < dim; ++i) mean[i] = 2.0 * (z(dofs[dim + i]) - z(dofs[i])) / sum;
@@ -262,14 +263,15 @@ void Equations::add_discrete_gradient(const VectorX& z, bool with_matrix, Evalua
       local.gradient[i] = -force * mean[i];
       local.gradient[dim + i] = force * mean[i];
       for (int j = 0; j < dim; ++j) {
-        const double h = mean[i] * t[j] * (EA / rest - 2.0 * force / sum) + (i == j ? 2.0 * force / sum : 0.0);
+        const double h =
+            mean[i] * t[j] * (EA / rest - 2.0 * geometric / sum) + (i == j ? 2.0 * geometric / sum : 0.0);
         local.hessian[i][j] = local.hessian[dim + i][dim + j] = h;
         local.hessian[i][dim + j] = local.hessian[dim + i][j] = -h;
       }
     }
     add(assembler_.stretch, e);
   }
-  double metric[kMaxLocal][kMaxLocal];
+  double metric[kMaxLocal][kMaxLocal] = {};
   const auto clear = [&] {
     for (auto& row : metric)
       for (double& m : row) m = 0.0;
@@ -317,6 +319,19 @@ void Equations::add_discrete_gradient(const VectorX& z, bool with_matrix, Evalua
   total_ = viscous_;
   add_elastic(z, with_matrix, nullptr, out);
   total_ = kept;
+}
+
+void Equations::predict_axial_force(const VectorX& step, VectorX& out) const {
+  const ElasticCoefficients& k = energy_momentum_ ? elastic : total_;
+  out.resize(model_.edge_count);
+  for (int e = 0; e < model_.edge_count; ++e) {
+    const int a = model_.node_dof[at(model_.edge_tail[at(e)])], b = model_.node_dof[at(model_.edge_head[at(e)])];
+    const Vec3d& tangent = (energy_momentum_ ? end_ : middle_).edge[at(e)].tangent;
+    const double t[3] = {tangent.x, tangent.y, tangent.z};
+    double length = energy_momentum_ ? 0.5 * (start_.length(e) + end_.length(e)) : middle_.length(e);
+    for (int i = 0; i < model_.dimension; ++i) length += t[i] * (step(b + i) - step(a + i));
+    out(e) = k.stretch_stiffness(e) * (length / model_.edge_length(e) - 1.0 - k.stretch_natural(e));
+  }
 }
 
 /// An edge that spins at omega and turns also needs the couple I omega t x dt/dt: nodal forces

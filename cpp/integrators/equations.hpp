@@ -54,12 +54,16 @@ class Equations {
   VectorX dissipative_force() const;
   VectorX load_force() const;
 
+  /// Axial forces [N] as the mixed method wants them: linearly extrapolated from the last evaluation by a
+  /// Newton step, n <- EA (eps + d eps . dz).
+  void predict_axial_force(const VectorX& step, VectorX& out) const;
+
   VectorX mass;  ///< per unknown [kg], [kg m^2]
   ElasticCoefficients elastic;
 
  private:
   void add_elastic(const VectorX& z, bool with_matrix, const double* axial_force, Evaluation& out);
-  void add_discrete_gradient(const VectorX& z, bool with_matrix, Evaluation& out);
+  void add_discrete_gradient(const VectorX& z, bool with_matrix, const double* axial_force, Evaluation& out);
   void correct(Local& local, const Local& end, double start_energy, const ElementTable& table, int element,
                const double (*metric)[kMaxLocal]);
   void add_planar_invariants(int stencil, Local& local, const Local& end, double start_energy) const;

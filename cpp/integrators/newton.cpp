@@ -73,7 +73,8 @@ double Newton::displacement(const VectorX& step) const {
 }
 
 NewtonResult Newton::solve(Equations& equations, VectorX& z, const VectorX* target, int max_iterations,
-                           NewtonWorkspace& work) const {
+                           NewtonWorkspace& work, bool mixed) const {
+  mixed = mixed && options_.mixed;
   NewtonResult result;
   Evaluation& e = work.evaluation;
   const double tolerance = options_.step_tolerance * model_.length_scale;
@@ -85,7 +86,7 @@ NewtonResult Newton::solve(Equations& equations, VectorX& z, const VectorX* targ
   for (;; ++result.iterations) {
     const auto start = Clock::now();
     const bool expect_end = result.step <= tolerance * 1e3;
-    const double* axial = options_.mixed && axial_known ? work.axial_force.data() : nullptr;
+    const double* axial = mixed && axial_known ? work.axial_force.data() : nullptr;
     const auto evaluate = [&](bool matrix) {
       equations.evaluate(z, matrix, axial, e);
       if (target) e.residual -= *target;
@@ -124,21 +125,8 @@ NewtonResult Newton::solve(Equations& equations, VectorX& z, const VectorX* targ
     if (options_.line_search == LineSearch::goldstein_price)
       factor *= line_search(equations, z, factor * work.step, target, work);
     work.step *= factor;
-    if (options_.mixed) {
-      // n <- EA (eps + d eps . dx): linear from the present iterate.
-      work.axial_force.resize(model_.edge_count);
-      const Configuration& c = equations.configuration();
-      for (int k = 0; k < model_.edge_count; ++k) {
-        const auto i = static_cast<std::size_t>(k);
-        const int a = model_.node_dof[static_cast<std::size_t>(model_.edge_tail[i])];
-        const int b = model_.node_dof[static_cast<std::size_t>(model_.edge_head[i])];
-        const double t[3] = {c.edge[i].tangent.x, c.edge[i].tangent.y, c.edge[i].tangent.z};
-        double stretch = c.length(k);
-        for (int d = 0; d < model_.dimension; ++d) stretch += t[d] * (work.step(b + d) - work.step(a + d));
-        work.axial_force(k) = equations.elastic.stretch_stiffness(k) * (stretch / model_.edge_length(k) - 1.0);
-      }
-      axial_known = true;
-    }
+    if (mixed) equations.predict_axial_force(work.step, work.axial_force);
+    axial_known = mixed;
     z += work.step;
     previous_step = result.step;
     result.step = factor < 1.0 ? INFINITY : displacement(work.step);

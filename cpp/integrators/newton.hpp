@@ -29,9 +29,10 @@ class Newton {
  public:
   Newton(const Model& model, const Options& options);
 
-  /// Finds z with F(z) = target (nothing: zero), starting at z.
+  /// Finds z with F(z) = target (nothing: zero), starting at z. `mixed`: with the axial forces as unknowns of
+  /// their own, where the options allow it.
   NewtonResult solve(Equations& equations, VectorX& z, const VectorX* target, int max_iterations,
-                     NewtonWorkspace& work) const;
+                     NewtonWorkspace& work, bool mixed = true) const;
   /// Which residuals are small enough: relative to the forces in the scene, or to rounding.
   bool balanced(const Evaluation& evaluation, NewtonResult& result, bool& at_floor) const;
   /// Factor by which a step is shortened, so that nothing moves or turns too far at once.

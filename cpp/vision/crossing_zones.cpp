@@ -1,0 +1,336 @@
+#include "vision/crossing_zones.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <numeric>
+
+#include <Eigen/Dense>
+
+namespace withe {
+
+namespace {
+
+constexpr double kForbidden = std::numeric_limits<double>::infinity();
+
+double signed_angle(const Vector2& from, const Vector2& to) {
+  return std::atan2(from.x() * to.y() - from.y() * to.x(), from.dot(to));
+}
+
+/// Disjoint sets of nodes.
+class Union {
+ public:
+  explicit Union(std::size_t count) : parent_(count) { std::iota(parent_.begin(), parent_.end(), 0); }
+  int root(int a) {
+    while (parent_[static_cast<std::size_t>(a)] != a) {
+      int& parent = parent_[static_cast<std::size_t>(a)];
+      parent = parent_[static_cast<std::size_t>(parent)];
+      a = parent;
+    }
+    return a;
+  }
+  void join(int a, int b) { parent_[static_cast<std::size_t>(root(a))] = root(b); }
+
+ private:
+  std::vector<int> parent_;
+};
+
+bool is_junction(const SkeletonGraph& graph, int node) {
+  return node >= 0 && graph.nodes[static_cast<std::size_t>(node)].edges.size() >= 3;
+}
+
+/// Half width of the mask along the middle of an edge, away from the crossings at its ends.
+double inner_half_width(const SkeletonEdge& edge) {
+  const std::size_t n = edge.points.size();
+  const std::size_t margin = std::min(n / 4, static_cast<std::size_t>(edge.half_width));
+  std::vector<float> values;
+  for (std::size_t i = margin; i + margin < n; ++i) values.push_back(edge.points[i].half_width);
+  if (values.empty()) return edge.half_width;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// Widest of the edges that leave a set of nodes; edges that join it with itself do not count.
+double widest_branch(const SkeletonGraph& graph, Union& sets, int node, std::size_t except) {
+  double widest = 0;
+  const int a = sets.root(node);
+  for (std::size_t e = 0; e < graph.edges.size(); ++e) {
+    const SkeletonEdge& edge = graph.edges[e];
+    if (edge.removed || e == except || edge.nodes[0] < 0) continue;
+    const int first = sets.root(edge.nodes[0]);
+    const int second = sets.root(edge.nodes[1]);
+    if (first == second || (first != a && second != a)) continue;
+    widest = std::max(widest, inner_half_width(edge));
+  }
+  return widest;
+}
+
+/// Joins nodes to zones and says which edges are inside.
+void find_zones(const SkeletonGraph& graph, const ZoneOptions& options, Continuations& result) {
+  Union sets(graph.nodes.size());
+  std::vector<std::size_t> long_links;
+  for (std::size_t e = 0; e < graph.edges.size(); ++e) {
+    const SkeletonEdge& edge = graph.edges[e];
+    if (edge.removed || !is_junction(graph, edge.nodes[0]) || !is_junction(graph, edge.nodes[1])) continue;
+    // Between two crossings the mask is wider than the cable: the narrowest place tells its width.
+    const double width = 2 * inner_half_width(edge);
+    if (edge.length < options.short_link * width) {
+      sets.join(edge.nodes[0], edge.nodes[1]);
+      result.inside[e] = 1;
+    } else if (edge.length < options.merged_link * width) {
+      long_links.push_back(e);
+    }
+  }
+  std::vector<std::size_t> merged;
+  for (const std::size_t e : long_links) {
+    const SkeletonEdge& edge = graph.edges[e];
+    const double widest = std::max(widest_branch(graph, sets, edge.nodes[0], e),
+                                   widest_branch(graph, sets, edge.nodes[1], e));
+    if (widest > 0 && inner_half_width(edge) > options.merged_widening * widest) merged.push_back(e);
+  }
+  for (const std::size_t e : merged) {
+    sets.join(graph.edges[e].nodes[0], graph.edges[e].nodes[1]);
+    result.inside[e] = 1;
+  }
+
+  std::vector<int> zone_of_root(graph.nodes.size(), -1);
+  for (std::size_t n = 0; n < graph.nodes.size(); ++n) {
+    if (graph.nodes[n].edges.size() < 2) continue;
+    const auto root = static_cast<std::size_t>(sets.root(static_cast<int>(n)));
+    if (zone_of_root[root] < 0) {
+      zone_of_root[root] = static_cast<int>(result.zones.size());
+      result.zones.emplace_back();
+    }
+    Zone& zone = result.zones[static_cast<std::size_t>(zone_of_root[root])];
+    zone.nodes.push_back(static_cast<int>(n));
+    zone.center += graph.nodes[n].position;
+  }
+  for (Zone& zone : result.zones) zone.center /= static_cast<double>(zone.nodes.size());
+  for (std::size_t e = 0; e < graph.edges.size(); ++e) {
+    const SkeletonEdge& edge = graph.edges[e];
+    if (edge.removed || result.inside[e] || edge.nodes[0] < 0) continue;
+    for (int end = 0; end < 2; ++end) {
+      const int node = edge.nodes[static_cast<std::size_t>(end)];
+      if (graph.nodes[static_cast<std::size_t>(node)].edges.size() < 2) continue;
+      const int zone = zone_of_root[static_cast<std::size_t>(sets.root(node))];
+      const HalfEdge half = 2 * static_cast<int>(e) + end;
+      result.zone_of[static_cast<std::size_t>(half)] = zone;
+      result.zones[static_cast<std::size_t>(zone)].branches.push_back(half);
+    }
+  }
+}
+
+/// Pixels at an end of an edge that the crossing or the tip has displaced.
+int distorted_pixels(const SkeletonEdge& edge, int end, bool tip) {
+  const int n = static_cast<int>(edge.points.size());
+  const auto at = [&](int i) { return edge.points[static_cast<std::size_t>(end == 0 ? i : n - 1 - i)]; };
+  const double half_width = inner_half_width(edge);
+  if (tip) return std::min(n / 3, static_cast<int>(half_width));
+  int skip = 0;
+  const int most = std::min(n / 2 - 2, static_cast<int>(8 * half_width));
+  while (skip < most && (at(skip).half_width > 1.12 * half_width || skip < 0.5 * half_width)) ++skip;
+  return std::max(skip, 0);
+}
+
+/// Point and direction at an end of an edge, from a parabola through its pixels.
+Branch measure_branch(const SkeletonGraph& graph, const SkeletonEdge& edge, int end, int skip, int skip_other,
+                      double tangent_length) {
+  Branch branch;
+  branch.half_width = inner_half_width(edge);
+  branch.skip = skip;
+  const int n = static_cast<int>(edge.points.size());
+  const auto at = [&](int i) { return edge.points[static_cast<std::size_t>(end == 0 ? i : n - 1 - i)].position(); };
+  const int last = n - 1 - skip_other;
+  const double reach = 2 * tangent_length * branch.half_width;
+  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+  Eigen::Matrix<double, 3, 2> right = Eigen::Matrix<double, 3, 2>::Zero();
+  double s = 0;
+  int used = 0;
+  Vector2 far_point = Vector2::Zero();
+  for (int i = skip; i <= last; ++i) {
+    if (i > skip) s += (at(i) - at(i - 1)).norm();
+    if (s > reach && used > 4) break;
+    const Eigen::Vector3d basis(1, s / reach, s * s / (reach * reach));
+    normal += basis * basis.transpose();
+    right += basis * at(i).transpose();
+    far_point = at(i);
+    ++used;
+  }
+  const Vector2 node = graph.nodes[static_cast<std::size_t>(edge.nodes[static_cast<std::size_t>(end)])].position;
+  const Vector2 other =
+      graph.nodes[static_cast<std::size_t>(edge.nodes[static_cast<std::size_t>(1 - end)])].position;
+  if (used < 4) {
+    branch.point = n > 0 ? at(std::clamp(skip, 0, n - 1)) : Vector2(0.5 * (node + other));
+    branch.tangent = node - other;
+  } else if (s < 2 * branch.half_width || used < 8) {  // too short for a parabola
+    branch.point = at(skip);
+    branch.tangent = at(skip) - far_point;
+  } else {
+    const Eigen::Matrix<double, 3, 2> c = normal.ldlt().solve(right);
+    branch.point = c.row(0).transpose();
+    branch.tangent = -c.row(1).transpose();
+  }
+  const double norm = branch.tangent.norm();
+  branch.tangent = norm > 0 ? Vector2(branch.tangent / norm) : Vector2(1, 0);
+  return branch;
+}
+
+/// Energy of a pair, or infinity where the turn is that of two tips that touch: over 90 degrees within a width.
+double pair_energy(const Branch& a, const Branch& b) {
+  const Vector2 chord = b.point - a.point;
+  const double width = a.half_width + b.half_width;
+  const double turn = std::abs(signed_angle(a.tangent, -b.tangent));
+  if (turn > 0.5 * std::numbers::pi && chord.norm() < 1.5 * width) return kForbidden;
+  return bending_energy(a, b);
+}
+
+struct Matching {
+  std::vector<std::pair<int, int>> pairs;
+  double energy = kForbidden;
+};
+
+/// The best and the second best way to pair branches; one more stays single where their number is odd, others only
+/// at the price of a sharp turn.
+class PairSearch {
+ public:
+  PairSearch(const std::vector<Branch>& branches) : count_(static_cast<int>(branches.size())) {
+    energies_.assign(static_cast<std::size_t>(count_ * count_), kForbidden);
+    double width = 0;
+    for (const Branch& branch : branches) width = std::max(width, 2 * branch.half_width);
+    // Half of the energy of a turn of 90 degrees within a width.
+    single_ = 0.25 * std::pow(0.5 * std::numbers::pi, 2) / std::max(width, 1.0);
+    for (int i = 0; i < count_; ++i) {
+      for (int j = i + 1; j < count_; ++j) {
+        const double energy = pair_energy(branches[static_cast<std::size_t>(i)], branches[static_cast<std::size_t>(j)]);
+        energies_[static_cast<std::size_t>(i * count_ + j)] = energy;
+        energies_[static_cast<std::size_t>(j * count_ + i)] = energy;
+      }
+    }
+  }
+
+  Matching best;
+  double second = kForbidden;
+
+  void run() {
+    if (count_ > 10) {
+      run_greedy();
+      return;
+    }
+    used_.assign(static_cast<std::size_t>(count_), 0);
+    descend(0, 0);
+  }
+
+ private:
+  double energy(int i, int j) const { return energies_[static_cast<std::size_t>(i * count_ + j)]; }
+
+  void descend(int first, double sum) {
+    if (sum >= second) return;
+    while (first < count_ && used_[static_cast<std::size_t>(first)]) ++first;
+    if (first == count_) {
+      if (sum < best.energy) {
+        second = best.energy;
+        best = {pairs_, sum};
+      } else {
+        second = sum;
+      }
+      return;
+    }
+    used_[static_cast<std::size_t>(first)] = 1;
+    for (int j = first + 1; j < count_; ++j) {
+      if (used_[static_cast<std::size_t>(j)] || energy(first, j) == kForbidden) continue;
+      used_[static_cast<std::size_t>(j)] = 1;
+      pairs_.emplace_back(first, j);
+      descend(first + 1, sum + energy(first, j));
+      pairs_.pop_back();
+      used_[static_cast<std::size_t>(j)] = 0;
+    }
+    descend(first + 1, sum + single_);
+    used_[static_cast<std::size_t>(first)] = 0;
+  }
+
+  void run_greedy() {
+    std::vector<std::pair<double, std::pair<int, int>>> candidates;
+    for (int i = 0; i < count_; ++i) {
+      for (int j = i + 1; j < count_; ++j) {
+        if (energy(i, j) < 2 * single_) candidates.push_back({energy(i, j), {i, j}});
+      }
+    }
+    std::sort(candidates.begin(), candidates.end());
+    std::vector<char> used(static_cast<std::size_t>(count_), 0);
+    for (const auto& [energy, pair] : candidates) {
+      char& a = used[static_cast<std::size_t>(pair.first)];
+      char& b = used[static_cast<std::size_t>(pair.second)];
+      if (a || b) continue;
+      a = b = 1;
+      best.pairs.push_back(pair);
+    }
+  }
+
+  int count_;
+  double single_ = 0;
+  std::vector<double> energies_;
+  std::vector<char> used_;
+  std::vector<std::pair<int, int>> pairs_;
+};
+
+}  // namespace
+
+double bending_energy(const Branch& from, const Branch& to) {
+  const Vector2 chord = to.point - from.point;
+  const double shortest = 0.5 * (from.half_width + to.half_width);
+  const double length = chord.norm();
+  if (length < 1e-9) {
+    const double turn = signed_angle(from.tangent, -to.tangent);
+    return 0.5 * turn * turn / std::max(shortest, 1.0);
+  }
+  const double a = signed_angle(from.tangent, chord);
+  const double b = signed_angle(-to.tangent, chord);
+  return 2 / std::max({length, shortest, 1.0}) * (a * a + a * b + b * b);
+}
+
+Continuations find_continuations(const SkeletonGraph& graph, const ZoneOptions& options) {
+  Continuations result;
+  const std::size_t halves = 2 * graph.edges.size();
+  result.branches.resize(halves);
+  result.zone_of.assign(halves, -1);
+  result.partner.assign(halves, -1);
+  result.inside.assign(graph.edges.size(), 0);
+  find_zones(graph, options, result);
+
+  for (std::size_t e = 0; e < graph.edges.size(); ++e) {
+    const SkeletonEdge& edge = graph.edges[e];
+    if (edge.removed || result.inside[e] || edge.nodes[0] < 0) continue;
+    std::array<int, 2> skips{};
+    for (int end = 0; end < 2; ++end) {
+      const bool tip = result.zone_of[2 * e + static_cast<std::size_t>(end)] < 0;
+      skips[static_cast<std::size_t>(end)] = distorted_pixels(edge, end, tip);
+    }
+    for (int end = 0; end < 2; ++end) {
+      result.branches[2 * e + static_cast<std::size_t>(end)] =
+          measure_branch(graph, edge, end, skips[static_cast<std::size_t>(end)],
+                         skips[static_cast<std::size_t>(1 - end)], options.tangent_length);
+    }
+  }
+  for (const Zone& zone : result.zones) {
+    std::vector<Branch> branches;
+    for (const HalfEdge half : zone.branches) branches.push_back(result.branches[static_cast<std::size_t>(half)]);
+    PairSearch search(branches);
+    search.run();
+    for (const auto& [a, b] : search.best.pairs) {
+      const HalfEdge first = zone.branches[static_cast<std::size_t>(a)];
+      const HalfEdge second = zone.branches[static_cast<std::size_t>(b)];
+      result.partner[static_cast<std::size_t>(first)] = second;
+      result.partner[static_cast<std::size_t>(second)] = first;
+    }
+    const double best = search.best.energy;
+    if (zone.branches.size() > 2 && search.second < kForbidden &&
+        search.second - best < options.similar_energies * search.second) {
+      result.doubts.push_back({zone.center, Doubt::similar_energies});
+    }
+  }
+  return result;
+}
+
+}  // namespace withe

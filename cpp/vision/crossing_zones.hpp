@@ -1,0 +1,63 @@
+#pragma once
+/// Where cables meet: zones of the skeleton that say nothing about single cables, and the pairs of branches that
+/// continue each other through them with the least bending energy.
+
+#include <vector>
+
+#include "vision/skeleton_graph.hpp"
+
+namespace withe {
+
+/// One end of an edge: 2 edge + end.
+using HalfEdge = int;
+inline int edge_of(HalfEdge half) { return half / 2; }
+inline int end_of(HalfEdge half) { return half % 2; }
+inline HalfEdge opposite(HalfEdge half) { return half ^ 1; }
+
+/// An end of an edge as it looks from the place that it leads into.
+struct Branch {
+  Vector2 point = Vector2::Zero();    ///< last place that the skeleton is trusted at
+  Vector2 tangent = Vector2::Zero();  ///< unit vector into the zone, or out of the cable's tip
+  double half_width = 0;              ///< [px]
+  int skip = 0;                       ///< pixels between the point and the end of the edge
+};
+
+struct Zone {
+  std::vector<int> nodes;
+  std::vector<HalfEdge> branches;
+  Vector2 center = Vector2::Zero();
+};
+
+/// Why a result may be another one.
+enum class Doubt { similar_energies, parallel_strands };
+
+struct DoubtfulZone {
+  Vector2 point = Vector2::Zero();
+  Doubt reason = Doubt::similar_energies;
+};
+
+struct ZoneOptions {
+  double short_link = 2;          ///< links up to this long join zones [widths]
+  double merged_link = 12;        ///< also links up to this long, where the mask is wider than the cables [widths]
+  double merged_widening = 1.1;   ///< by this factor
+  double tangent_length = 4;      ///< length that tangents are fitted over [widths]
+  double similar_energies = 0.2;  ///< two matchings closer than this are ambiguous, relative
+};
+
+/// What continues what.
+struct Continuations {
+  std::vector<Zone> zones;
+  std::vector<Branch> branches;   ///< by half-edge
+  std::vector<int> zone_of;       ///< by half-edge; -1 at a tip
+  std::vector<HalfEdge> partner;  ///< by half-edge; -1 at an end of a cable
+  std::vector<char> inside;       ///< by edge: part of a zone
+  std::vector<DoubtfulZone> doubts;
+};
+
+/// Bending energy of the least bent line from one branch into another, 2/L (a^2 + a b + b^2) for a chord of length L
+/// that the ends leave at the signed angles a and b [1/px]: the beam of unit stiffness clamped at both ends.
+double bending_energy(const Branch& from, const Branch& to);
+
+Continuations find_continuations(const SkeletonGraph& graph, const ZoneOptions& options);
+
+}  // namespace withe
