@@ -25,16 +25,6 @@ def record():
     return recorder.record
 
 
-@pytest.fixture
-def renderer():
-    """Skips, and says so, where nothing can be rendered."""
-    pytest.importorskip("pyvista")
-    try:
-        rendering.probe_rendering()
-    except RuntimeError as error:
-        pytest.skip(str(error))
-
-
 def outline(nodes, radius=0.01, closed=False, widths=None):
     edges = nodes if closed else nodes - 1
     widths = None if widths is None else np.tile(widths, (edges, 1)).astype(float)
