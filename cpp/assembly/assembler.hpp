@@ -19,7 +19,9 @@ class ElementTable {
   void find_offsets(const LinearSolver& solver);
   int count() const { return width_ == 0 ? 0 : static_cast<int>(dofs_.size()) / width_; }
   int width() const { return width_; }
-  const int* dofs(int element) const { return dofs_.data() + static_cast<std::size_t>(element) * static_cast<std::size_t>(width_); }
+  const int* dofs(int element) const {
+    return dofs_.data() + static_cast<std::size_t>(element) * static_cast<std::size_t>(width_);
+  }
 
   /// residual += scale gradient, magnitude += |gradient|.
   void add_gradient(int element, const double* gradient, double scale, VectorX& residual, VectorX& magnitude) const;
@@ -41,8 +43,12 @@ class Assembler {
 
   LinearSolver& solver() { return *solver_; }
   const LinearSolver& solver() const { return *solver_; }
-  void add_to_diagonal(int dof, double value) { solver_->values()[static_cast<std::size_t>(diagonal_[static_cast<std::size_t>(dof)])] += value; }
-  double diagonal(int dof) const { return solver_->values()[static_cast<std::size_t>(diagonal_[static_cast<std::size_t>(dof)])]; }
+  void add_to_diagonal(int dof, double value) {
+    solver_->values()[static_cast<std::size_t>(diagonal_[static_cast<std::size_t>(dof)])] += value;
+  }
+  double diagonal(int dof) const {
+    return solver_->values()[static_cast<std::size_t>(diagonal_[static_cast<std::size_t>(dof)])];
+  }
 
   /// Takes out what supports hold: rows and columns are projected onto the free directions, and the held
   /// ones get a positive diagonal, so that the pattern stays and held increments vanish.

@@ -15,8 +15,7 @@ struct PlanarBend {
 inline PlanarBend planar_bend(double kappa, double natural, double stiffness) {
   const double moment = stiffness * (kappa - natural);
   const double first = 1.0 + 0.25 * kappa * kappa;
-  return {0.5 * moment * (kappa - natural), moment * first,
-          stiffness * first * first + 0.5 * moment * kappa * first};
+  return {0.5 * moment * (kappa - natural), moment * first, stiffness * first * first + 0.5 * moment * kappa * first};
 }
 
 }  // namespace withe

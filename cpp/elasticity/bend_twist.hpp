@@ -26,9 +26,9 @@ struct BendTwistDerivatives {
   Scalar energy;
   Vec3<Scalar> gradient_e[2];
   Scalar gradient_angle[2];
-  Mat3<Scalar> ee[2][2];           // [1][0] is not filled: the transpose of [0][1]
-  Vec3<Scalar> e_angle[2][2];      // [i][j]: edge i, angle j
-  Scalar angle_angle[2][2];        // [1][0] is not filled
+  Mat3<Scalar> ee[2][2];       // [1][0] is not filled: the transpose of [0][1]
+  Vec3<Scalar> e_angle[2][2];  // [i][j]: edge i, angle j
+  Scalar angle_angle[2][2];    // [1][0] is not filled
 };
 
 template <class Scalar>
@@ -134,10 +134,10 @@ void bend_twist_hessian(const EdgeFrame<Scalar>& f0, const EdgeFrame<Scalar>& f1
   const Scalar wt[2] = {Scalar(-1.0), Scalar(1.0)};
   for (int j = 0; j < 2; ++j) {
     const Vec3<Scalar> common = (0.5 * kbC[j]) * t;
-    out.e_angle[0][j] = i0 * (common - inverse_chi * cross(t1, C[j]) + (k.bend1 * w1[j]) * p1 +
-                              (k.bend2 * w2[j]) * p2 + (k.twist * wt[j]) * half_kb);
-    out.e_angle[1][j] = i1 * (common + inverse_chi * cross(t0, C[j]) + (k.bend1 * w1[j]) * q1 +
-                              (k.bend2 * w2[j]) * q2 + (k.twist * wt[j]) * half_kb);
+    out.e_angle[0][j] = i0 * (common - inverse_chi * cross(t1, C[j]) + (k.bend1 * w1[j]) * p1 + (k.bend2 * w2[j]) * p2 +
+                              (k.twist * wt[j]) * half_kb);
+    out.e_angle[1][j] = i1 * (common + inverse_chi * cross(t0, C[j]) + (k.bend1 * w1[j]) * q1 + (k.bend2 * w2[j]) * q2 +
+                              (k.twist * wt[j]) * half_kb);
   }
   const Scalar own[2] = {-0.5 * dot(kb, D0), -0.5 * dot(kb, D1)};
   for (int j = 0; j < 2; ++j)

@@ -48,7 +48,7 @@ Mat3<double> plus(const Mat3<double>& a, const Mat3<double>& b) {
   return {{a.row[0] + b.row[0], a.row[1] + b.row[1], a.row[2] + b.row[2]}};
 }
 Mat3<double> transposed(const Mat3<double>& a) {
-  const Vec3d *r = a.row;
+  const Vec3d* r = a.row;
   return {{{r[0].x, r[1].x, r[2].x}, {r[0].y, r[1].y, r[2].y}, {r[0].z, r[1].z, r[2].z}}};
 }
 Matrix3 dense(const Mat3<double>& a) {
@@ -247,8 +247,8 @@ void bend_local(const Model& model, const ElasticCoefficients& k, const Configur
   out.hessian[3][7] = out.hessian[7][3] = s0 * s1 * d.angle_angle[0][1];
 }
 
-void half_local(const Model& model, const VectorX& q, const ElasticCoefficients& k,
-                const Configuration& c, int stencil, bool with_hessian, Local& out) {
+void half_local(const Model& model, const VectorX& q, const ElasticCoefficients& k, const Configuration& c, int stencil,
+                bool with_hessian, Local& out) {
   const FrameStencil& s = model.half[static_cast<std::size_t>(stencil)];
   const auto i = static_cast<Eigen::Index>(stencil);
   if (model.planar()) return half_planar_local(k, c, s, i, out);
@@ -281,17 +281,17 @@ void half_local(const Model& model, const VectorX& q, const ElasticCoefficients&
   const Matrix3 X = cross_matrix(T);  // X^T-side of eta -> eta x T
   const Matrix3 Haa = dense(d.ee[a][a]);
   const Matrix3 Hab = a == 0 ? dense(d.ee[0][1]) : Matrix3(dense(d.ee[0][1]).transpose());  // frame edge, real edge
-  const Vector3 haa = to_eigen(d.e_angle[a][a]);   // frame edge, frame angle
-  const Vector3 hab = to_eigen(d.e_angle[a][b]);   // frame edge, edge's angle
-  const Vector3 hba = to_eigen(d.e_angle[b][a]);   // real edge, frame angle
+  const Vector3 haa = to_eigen(d.e_angle[a][a]);                                            // frame edge, frame angle
+  const Vector3 hab = to_eigen(d.e_angle[a][b]);                                            // frame edge, edge's angle
+  const Vector3 hba = to_eigen(d.e_angle[b][a]);                                            // real edge, frame angle
   const Vector3 hbb = to_eigen(d.e_angle[b][b]);
   const double cross_angle = d.angle_angle[0][1];
   Matrix3 S = X * Haa * X.transpose() + d.angle_angle[a][a] * T * T.transpose();
   const Vector3 Xh = X * haa;
   S += Xh * T.transpose() + T * Xh.transpose() + 0.5 * (ge * T.transpose() + T * ge.transpose());
   S.diagonal().array() -= ge.dot(T);
-  const Matrix3 Se = X * Hab + T * hba.transpose();          // spin against the real edge
-  const Vector3 Sangle = X * hab + cross_angle * T;          // spin against its angle
+  const Matrix3 Se = X * Hab + T * hba.transpose();  // spin against the real edge
+  const Vector3 Sangle = X * hab + cross_angle * T;  // spin against its angle
 
   const Vector3 u = moment - 0.5 * w.cross(moment);
   const double cay = 1.0 / (1.0 + 0.25 * w.squaredNorm());

@@ -20,9 +20,9 @@ struct Local {
 
 /// Stiffnesses and natural strains of every stencil, as they act in one evaluation.
 struct ElasticCoefficients {
-  VectorX stretch_stiffness;               ///< EA [N]
-  VectorX stretch_natural;                 ///< natural strain [-]
-  MatrixX3 bend_stiffness, bend_natural;   ///< [N m]; kappa1, kappa2, tau
+  VectorX stretch_stiffness;              ///< EA [N]
+  VectorX stretch_natural;                ///< natural strain [-]
+  MatrixX3 bend_stiffness, bend_natural;  ///< [N m]; kappa1, kappa2, tau
   MatrixX3 half_stiffness, half_natural;
 };
 
@@ -39,8 +39,8 @@ void stretch_local(const Model& model, const ElasticCoefficients& coefficients, 
                    bool with_hessian, const double* axial_force, Local& out);
 void bend_local(const Model& model, const ElasticCoefficients& coefficients, const Configuration& c, int stencil,
                 bool with_hessian, Local& out);
-void half_local(const Model& model, const VectorX& q, const ElasticCoefficients& coefficients,
-                const Configuration& c, int stencil, bool with_hessian, Local& out);
+void half_local(const Model& model, const VectorX& q, const ElasticCoefficients& coefficients, const Configuration& c,
+                int stencil, bool with_hessian, Local& out);
 
 /// Energies alone: stretch of an edge; bend and twist of a stencil [J].
 double stretch_energy_of(const Model& model, const ElasticCoefficients& coefficients, const Configuration& c, int edge);

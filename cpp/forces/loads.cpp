@@ -131,16 +131,16 @@ Loads resolve_loads(const Model& model) {
     if (load.kind == LoadKind::distributed) {
       for (int e = first; e <= last; ++e)
         for (int node : {model.edge_tail[at(e)], model.edge_head[at(e)]})
-          loads.pieces.push_back({load.follower ? LoadShape::follower : LoadShape::dead_node, index,
-                                  0.5 * model.edge_length(e), node, e});
+          loads.pieces.push_back(
+              {load.follower ? LoadShape::follower : LoadShape::dead_node, index, 0.5 * model.edge_length(e), node, e});
     } else {
       const int node = rod.nodes[at(load.pass.node)];
       const int count = last - first + 1;
       int in = load.pass.node > 0 ? first + load.pass.node - 1 : rod.closed ? last : -1;
       int out = load.pass.node < count ? first + load.pass.node : -1;
       if (load.kind == LoadKind::force) {
-        loads.pieces.push_back({load.follower ? LoadShape::follower : LoadShape::dead_node, index, 1.0, node,
-                                in >= 0 ? in : out});
+        loads.pieces.push_back(
+            {load.follower ? LoadShape::follower : LoadShape::dead_node, index, 1.0, node, in >= 0 ? in : out});
       } else {
         require(!load.follower, "a moment cannot follow: give it in world axes, or as a function of time");
         int frame = -1;
@@ -158,8 +158,7 @@ Loads resolve_loads(const Model& model) {
     }
   }
   for (const LoadPiece& piece : loads.pieces)
-    if (piece.shape == LoadShape::follower ||
-        (!model.planar() && piece.shape != LoadShape::dead_node))
+    if (piece.shape == LoadShape::follower || (!model.planar() && piece.shape != LoadShape::dead_node))
       loads.unsymmetric = true;
   return loads;
 }
@@ -195,9 +194,15 @@ void load_local(const Model& model, const State& state, const VectorX& q, const 
         for (int i = 0; i < 3; ++i) out.gradient[i] = -value(i);
       }
       break;
-    case LoadShape::follower: follower(model, c, piece.edge, value, out); break;
-    case LoadShape::edge_moment: moment_on_edge(model, state, c, piece.edge, value, out); break;
-    case LoadShape::frame_moment: moment_on_frame(model, q, piece.frame, value, out); break;
+    case LoadShape::follower:
+      follower(model, c, piece.edge, value, out);
+      break;
+    case LoadShape::edge_moment:
+      moment_on_edge(model, state, c, piece.edge, value, out);
+      break;
+    case LoadShape::frame_moment:
+      moment_on_frame(model, q, piece.frame, value, out);
+      break;
   }
 }
 

@@ -13,16 +13,16 @@ enum class LoadShape { dead_node, follower, edge_moment, frame_moment };
 /// One piece of a load: what it acts on, and how much of the load's value it is.
 struct LoadPiece {
   LoadShape shape;
-  int load;        ///< index of the load
-  double weight;   ///< [-], or a length [m] for distributed loads
+  int load;       ///< index of the load
+  double weight;  ///< [-], or a length [m] for distributed loads
   int node = -1;
-  int edge = -1;   ///< that carries a follower or takes a moment
+  int edge = -1;  ///< that carries a follower or takes a moment
   int frame = -1;
 };
 
 struct Loads {
   std::vector<LoadPiece> pieces;
-  std::vector<Vector3> values;   ///< per load, world axes of the drawn scene [N], [N m], [N/m]
+  std::vector<Vector3> values;  ///< per load, world axes of the drawn scene [N], [N m], [N/m]
   bool unsymmetric = false;
 };
 

@@ -35,8 +35,8 @@ struct EdgeFrame {
   Vec3<Scalar> spin, bow;
 };
 
-/// The frame of an edge with vector e, turned by theta (given by cosine and sine) from the reference director `reference`
-/// that belongs to the source tangent `source`.
+/// The frame of an edge with vector e, turned by theta (given by cosine and sine) from the reference director
+/// `reference` that belongs to the source tangent `source`.
 template <class Scalar>
 EdgeFrame<Scalar> edge_frame(const Vec3<Scalar>& e, const Scalar& length, const Vec3<Scalar>& source,
                              const Vec3<Scalar>& reference, const Scalar& cosine, const Scalar& sine) {

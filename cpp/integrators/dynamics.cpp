@@ -58,7 +58,8 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
   // An acceleration that outweighs the velocity belongs to ringing, not to the motion.
   const bool smooth = h * newton.displacement(state.acceleration) < 0.5 * newton.displacement(state.v);
   const bool mixed = options.integrator != Integrator::energy_momentum;
-  for (const Start& start : {Start{1.0, 1.0, mixed}, Start{1.0, 0.0, mixed}, Start{1.0, 0.0, !mixed}, Start{0.0, 0.0, true}}) {
+  for (const Start& start :
+       {Start{1.0, 1.0, mixed}, Start{1.0, 0.0, mixed}, Start{1.0, 0.0, !mixed}, Start{0.0, 0.0, true}}) {
     if (start.acceleration > 0.0 && !smooth) continue;
     VectorX move = h * (start.velocity * state.v + (start.acceleration * h) * state.acceleration);
     equations.assembler().project(move);
@@ -136,7 +137,8 @@ double stable_step(Equations& equations, const Parameters& parameters, const Sta
   const LinearSolver& solver = equations.assembler().solver();
   const VectorX scale = equations.mass.cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
   VectorX x(scale.size()), y(scale.size());
-  for (Eigen::Index i = 0; i < x.size(); ++i) x(i) = std::sin(1.0 + 7.0 * static_cast<double>(i)) + (i % 2 ? 1.0 : -1.0);
+  for (Eigen::Index i = 0; i < x.size(); ++i)
+    x(i) = std::sin(1.0 + 7.0 * static_cast<double>(i)) + (i % 2 ? 1.0 : -1.0);
   equations.assembler().project(x);
   double greatest = 0.0;
   for (int k = 0; k < 300; ++k) {

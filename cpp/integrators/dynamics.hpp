@@ -7,7 +7,7 @@ namespace withe {
 
 /// Where supports put the held unknowns at the end of a step.
 struct HeldTarget {
-  VectorX q;        ///< end of step; meaningful where `held` is set
+  VectorX q;  ///< end of step; meaningful where `held` is set
   bool moving = false;
   bool reachable = true;  ///< false: a frame would have to turn by half a turn at once
 };

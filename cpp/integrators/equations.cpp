@@ -14,7 +14,7 @@ std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
 Symmetry symmetry_of(const Loads& loads, const Options& options) {
   return loads.unsymmetric || options.integrator == Integrator::energy_momentum ? Symmetry::unsymmetric
-                                                                                 : Symmetry::symmetric;
+                                                                                : Symmetry::symmetric;
 }
 
 }  // namespace
@@ -37,7 +37,8 @@ VectorX gravity_force(const Model& model, const Parameters& p) {
   for (int i = 0; i < model.node_count; ++i) {
     const int dof = model.node_dof[at(i)];
     if (model.planar())
-      force.segment<2>(dof) = p.node_mass(i) * Vector2(p.gravity.dot(model.plane->first), p.gravity.dot(model.plane->second));
+      force.segment<2>(dof) =
+          p.node_mass(i) * Vector2(p.gravity.dot(model.plane->first), p.gravity.dot(model.plane->second));
     else
       force.segment<3>(dof) = p.node_mass(i) * p.gravity;
   }
@@ -181,11 +182,10 @@ void Equations::add_planar_invariants(int stencil, Local& local, const Local& en
   const double e0[2] = {zm[2] - zm[0], zm[3] - zm[1]}, e1[2] = {zm[4] - zm[2], zm[5] - zm[3]};
   const double d0[2] = {D[2] - D[0], D[3] - D[1]}, d1[2] = {D[4] - D[2], D[5] - D[3]};
   // Gradients in (e0, e1); each invariant is bilinear with matrix B: value = e^T B e / 2, gradient B e.
-  static constexpr double B[4][4][4] = {
-      {{2, 0, 0, 0}, {0, 2, 0, 0}, {0, 0, 0, 0}, {0, 0, 0, 0}},
-      {{0, 0, 1, 0}, {0, 0, 0, 1}, {1, 0, 0, 0}, {0, 1, 0, 0}},
-      {{0, 0, 0, 0}, {0, 0, 0, 0}, {0, 0, 2, 0}, {0, 0, 0, 2}},
-      {{0, 0, 0, 1}, {0, 0, -1, 0}, {0, -1, 0, 0}, {1, 0, 0, 0}}};
+  static constexpr double B[4][4][4] = {{{2, 0, 0, 0}, {0, 2, 0, 0}, {0, 0, 0, 0}, {0, 0, 0, 0}},
+                                        {{0, 0, 1, 0}, {0, 0, 0, 1}, {1, 0, 0, 0}, {0, 1, 0, 0}},
+                                        {{0, 0, 0, 0}, {0, 0, 0, 0}, {0, 0, 2, 0}, {0, 0, 0, 2}},
+                                        {{0, 0, 0, 1}, {0, 0, -1, 0}, {0, -1, 0, 0}, {1, 0, 0, 0}}};
   const double e[4] = {e0[0], e0[1], e1[0], e1[1]}, d[4] = {d0[0], d0[1], d1[0], d1[1]};
   double change[4] = {}, gradient[4][4] = {}, s = 0.0;
   for (int k = 0; k < 4; ++k) {
@@ -241,8 +241,7 @@ void Equations::gather_difference(const ElementTable& table, int element, double
   for (int i = 0; i < table.width(); ++i) difference[i] = dofs[i] < 0 ? 0.0 : difference_(dofs[i]);
 }
 
-void Equations::add_discrete_gradient(const VectorX& z, bool with_matrix, const double* axial_force,
-                                      Evaluation& out) {
+void Equations::add_discrete_gradient(const VectorX& z, bool with_matrix, const double* axial_force, Evaluation& out) {
   const std::span<double> values = assembler_.solver().values();
   Local local, end;
   const auto add = [&](const ElementTable& table, int i) {
@@ -263,8 +262,7 @@ void Equations::add_discrete_gradient(const VectorX& z, bool with_matrix, const 
       local.gradient[i] = -force * mean[i];
       local.gradient[dim + i] = force * mean[i];
       for (int j = 0; j < dim; ++j) {
-        const double h =
-            mean[i] * t[j] * (EA / rest - 2.0 * geometric / sum) + (i == j ? 2.0 * geometric / sum : 0.0);
+        const double h = mean[i] * t[j] * (EA / rest - 2.0 * geometric / sum) + (i == j ? 2.0 * geometric / sum : 0.0);
         local.hessian[i][j] = local.hessian[dim + i][dim + j] = h;
         local.hessian[i][dim + j] = local.hessian[dim + i][j] = -h;
       }

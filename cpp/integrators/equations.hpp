@@ -18,11 +18,11 @@ namespace withe {
 
 /// What one evaluation left behind.
 struct Evaluation {
-  VectorX residual;      ///< projected onto free directions
-  VectorX full_residual; ///< before projection: minus the reactions
-  VectorX magnitude;     ///< per row, sum of the absolute contributions
-  VectorX floor;         ///< per row, what rounding alone leaves
-  double potential = 0;  ///< elastic + gravity - dead loads [J], where the scene has one
+  VectorX residual;       ///< projected onto free directions
+  VectorX full_residual;  ///< before projection: minus the reactions
+  VectorX magnitude;      ///< per row, sum of the absolute contributions
+  VectorX floor;          ///< per row, what rounding alone leaves
+  double potential = 0;   ///< elastic + gravity - dead loads [J], where the scene has one
 };
 
 class Equations {

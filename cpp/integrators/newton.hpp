@@ -15,7 +15,7 @@ struct NewtonResult {
   int iterations = 0;
   double residual = 0;  ///< greatest force out of balance [N]
   int worst_row = -1;
-  double step = 0;      ///< greatest displacement of the last iteration [m]
+  double step = 0;  ///< greatest displacement of the last iteration [m]
 };
 
 /// Scratch of the solver; owned by the world, so that a step does not allocate.
@@ -31,8 +31,8 @@ class Newton {
 
   /// Finds z with F(z) = target (nothing: zero), starting at z. `mixed`: with the axial forces as unknowns of
   /// their own, where the options allow it.
-  NewtonResult solve(Equations& equations, VectorX& z, const VectorX* target, int max_iterations,
-                     NewtonWorkspace& work, bool mixed = true) const;
+  NewtonResult solve(Equations& equations, VectorX& z, const VectorX* target, int max_iterations, NewtonWorkspace& work,
+                     bool mixed = true) const;
   /// Which residuals are small enough: relative to the forces in the scene, or to rounding.
   bool balanced(const Evaluation& evaluation, NewtonResult& result, bool& at_floor) const;
   /// Factor by which a step is shortened, so that nothing moves or turns too far at once.

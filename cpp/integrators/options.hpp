@@ -17,18 +17,18 @@ enum class LineSearch {
 
 struct Options {
   Integrator integrator = Integrator::implicit_midpoint;
-  double time_step = 5e-3;                 ///< [s]
-  bool adaptive = true;                    ///< halve on failure, grow back
-  std::optional<double> tolerance;         ///< [m], error-controlled steps
-  std::optional<double> duration;          ///< [s], over which `tolerance` holds; else 1 s
-  std::optional<bool> planar;              ///< nothing: decide
+  double time_step = 5e-3;          ///< [s]
+  bool adaptive = true;             ///< halve on failure, grow back
+  std::optional<double> tolerance;  ///< [m], error-controlled steps
+  std::optional<double> duration;   ///< [s], over which `tolerance` holds; else 1 s
+  std::optional<bool> planar;       ///< nothing: decide
   SolverKind solver = SolverKind::automatic;
   LineSearch line_search = LineSearch::automatic;
-  bool mixed = true;                       ///< Newton with the axial force as its own unknown
-  double step_tolerance = 1e-9;            ///< Newton step, relative to the length of the scene
-  double force_tolerance = 1e-8;           ///< residual, relative to the forces in the scene
-  int max_iterations = 40;                 ///< per Newton solve
-  int max_halvings = 12;                   ///< smallest step is time_step / 2^max_halvings
+  bool mixed = true;              ///< Newton with the axial force as its own unknown
+  double step_tolerance = 1e-9;   ///< Newton step, relative to the length of the scene
+  double force_tolerance = 1e-8;  ///< residual, relative to the forces in the scene
+  int max_iterations = 40;        ///< per Newton solve
+  int max_halvings = 12;          ///< smallest step is time_step / 2^max_halvings
 };
 
 }  // namespace withe

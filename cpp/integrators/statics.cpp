@@ -19,7 +19,12 @@ class Statics {
  public:
   Statics(Equations& equations, const Newton& newton, const Options& options, const Parameters& parameters,
           State& state, NewtonWorkspace& work)
-      : equations_(equations), newton_(newton), options_(options), parameters_(parameters), state_(state), work_(work) {}
+      : equations_(equations),
+        newton_(newton),
+        options_(options),
+        parameters_(parameters),
+        state_(state),
+        work_(work) {}
 
   StaticResult run(const Boundary& boundary) {
     StaticResult result;
@@ -29,13 +34,13 @@ class Statics {
       state_ = start;
       boundary(1.0, start, state_.q);
       accept(state_.q);
-      result.converged = descend(400, result.newton);
+      result.converged = settle(result.newton) || descend(1000, result.newton);
     }
     if (!result.converged) return result;
     result.stable = stable();
     for (int tries = 0; tries < 4 && !result.stable && equations_.has_potential(); ++tries) {
       leave_saddle(tries);
-      result.converged = descend(400, result.newton);
+      result.converged = settle(result.newton) || descend(1000, result.newton);
       if (!result.converged) return result;
       result.stable = stable();
     }
@@ -65,7 +70,7 @@ class Statics {
       boundary(next, start, z);
       target = (1.0 - next) * imbalance;
       equations_.assembler().project(target);
-      const NewtonResult r = newton_.solve(equations_, z, &target, increment == 1.0 ? 25 : options_.max_iterations, work_);
+      const NewtonResult r = newton_.solve(equations_, z, &target, std::min(25, options_.max_iterations), work_);
       last.iterations += r.iterations;
       last.residual = r.residual;
       last.worst_row = r.worst_row;
@@ -75,12 +80,49 @@ class Statics {
         reached = next;
         if (r.iterations <= 8) increment *= 2.0;
       } else {
-        if (++halvings > 12 || increment < 1e-3) return false;
+        if (++halvings > (equations_.has_potential() ? 4 : 12)) return false;
         increment *= increment == 1.0 ? 0.2 : 0.5;
       }
     }
     last.converged = true;
     return true;
+  }
+
+  /// Pseudo-transient: backward Euler from rest, over and over, with intervals that grow as the scene settles. Each
+  /// one minimises the potential plus M |z - q|^2 / (2 h^2), so the potential falls; mixed Newton keeps slender
+  /// rods from crawling.
+  bool settle(NewtonResult& last) {
+    const Model& model = equations_.model();
+    begin();
+    equations_.evaluate(state_.q, true, nullptr, work_.evaluation);
+    double stiffness = 0.0;
+    for (int i = 0; i < model.dof_count; ++i)
+      stiffness = std::max(stiffness, equations_.assembler().diagonal(i) / std::max(equations_.mass(i), 1e-300));
+    double potential = work_.evaluation.potential;
+    double h = 1e2 / std::sqrt(stiffness);
+    const double longest = 1e12 * h, shortest = 1e-6 * h;
+    VectorX z;
+    for (int k = 0; k < 400 && h > shortest; ++k) {
+      state_.v.setZero();
+      const bool at_rest = h >= longest;
+      equations_.begin(state_, parameters_, at_rest ? 0.0 : h, false);
+      z = state_.q;
+      const NewtonResult r = newton_.solve(equations_, z, nullptr, at_rest ? 30 : 15, work_);
+      last.iterations += r.iterations;
+      last.residual = r.residual;
+      last.worst_row = r.worst_row;
+      const double rounding = 1e-10 * (std::abs(potential) + std::abs(work_.evaluation.potential));
+      if (r.converged && work_.evaluation.potential <= potential + rounding &&
+          !turned_too_far(state_, equations_.configuration(), model.planar())) {
+        accept(z);
+        if (at_rest) return true;
+        potential = work_.evaluation.potential;
+        h *= r.iterations <= 4 ? 10.0 : r.iterations <= 8 ? 3.0 : 1.0;
+      } else {
+        h = std::min(h, longest) * 0.25;
+      }
+    }
+    return false;
   }
 
   /// Levenberg-Marquardt on the potential: every accepted step lowers it.
@@ -179,7 +221,8 @@ class Statics {
     LinearSolver& solver = equations_.assembler().solver();
     const VectorX weight = equations_.mass.cwiseMax(1e-300);
     double stiffness = 0.0;
-    for (int i = 0; i < model.dof_count; ++i) stiffness = std::max(stiffness, equations_.assembler().diagonal(i) / weight(i));
+    for (int i = 0; i < model.dof_count; ++i)
+      stiffness = std::max(stiffness, equations_.assembler().diagonal(i) / weight(i));
     VectorX shift;
     for (double damping = 1e-10 * stiffness; damping < 1e3 * stiffness; damping *= 2.0) {
       shift = damping * weight;

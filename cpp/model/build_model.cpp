@@ -38,13 +38,9 @@ class Builder {
 
  private:
   const RodDescription& rod(int r) const { return scene_.rods[static_cast<std::size_t>(r)]; }
-  int edges_of(int r) const {
-    return static_cast<int>(rod(r).nodes.size()) - (rod(r).closed ? 0 : 1);
-  }
+  int edges_of(int r) const { return static_cast<int>(rod(r).nodes.size()) - (rod(r).closed ? 0 : 1); }
   int first_edge(int r) const { return model_.rod_first_edge[static_cast<std::size_t>(r)]; }
-  int global_node(RodPass pass) const {
-    return rod(pass.rod).nodes[static_cast<std::size_t>(pass.node)];
-  }
+  int global_node(RodPass pass) const { return rod(pass.rod).nodes[static_cast<std::size_t>(pass.node)]; }
   /// Edges that arrive at and leave a node of a rod; -1 where there is none.
   std::pair<int, int> edges_at(RodPass pass) const {
     const int n = edges_of(pass.rod), first = first_edge(pass.rod);
@@ -157,8 +153,8 @@ class Builder {
     if (in < 0 || out < 0 || edges_at(a).second >= 0 || edges_at(b).first >= 0) return false;
     const auto i = static_cast<std::size_t>(in), o = static_cast<std::size_t>(out);
     if (dot(model_.initial_tangent[i], model_.initial_tangent[o]) < -0.5) return false;
-    const Vec3d carried = parallel_transport(model_.initial_director[i], model_.initial_tangent[i],
-                                             model_.initial_tangent[o]);
+    const Vec3d carried =
+        parallel_transport(model_.initial_director[i], model_.initial_tangent[i], model_.initial_tangent[o]);
     return dot(carried, model_.initial_director[o]) > 1.0 - 1e-9;
   }
   std::pair<RodPass, RodPass> ordered(const Cluster& c) const {
@@ -243,7 +239,8 @@ class Builder {
           if (in >= 0) add_half(*c, pass, in, false);
           if (out >= 0) add_half(*c, pass, out, true);
         } else if (in >= 0 && out >= 0) {
-          model_.place[r][static_cast<std::size_t>(node - shift)].bend = add_bend(in, out, 1, 1, {index, node - shift}, false);
+          model_.place[r][static_cast<std::size_t>(node - shift)].bend =
+              add_bend(in, out, 1, 1, {index, node - shift}, false);
         }
       }
     }
@@ -265,7 +262,10 @@ class Builder {
 
   /// [dissertation 6.2.2]: every pair of edges at the node that is not a rod's own stencil.
   void add_pairs(const Cluster& cluster) {
-    struct End { int rod, edge; bool arrives; };
+    struct End {
+      int rod, edge;
+      bool arrives;
+    };
     std::vector<End> ends;
     for (const RodPass& pass : cluster.passes) {
       const auto [in, out] = edges_at(pass);
@@ -316,7 +316,8 @@ class Builder {
     model_.initial_bend_tau = VectorX::Zero(n);
     for (Eigen::Index b = 0; b < n; ++b) {
       const BendStencil& s = model_.bend[static_cast<std::size_t>(b)];
-      const auto strain = bend_twist_strain(strain_frame(s.edge[0], s.sign[0]), strain_frame(s.edge[1], s.sign[1]), 0.0);
+      const auto strain =
+          bend_twist_strain(strain_frame(s.edge[0], s.sign[0]), strain_frame(s.edge[1], s.sign[1]), 0.0);
       model_.initial_bend_tau(b) = strain.tau;
       if (!offsets_keep_drawn_[static_cast<std::size_t>(b)]) continue;
       if (model_.planar()) {

@@ -14,19 +14,19 @@ namespace withe {
 /// and N (stencil i sits at node i, between edges i - 1 and i).
 struct RodDescription {
   std::string name;
-  std::vector<int> nodes;       ///< rows of SceneDescription::positions, in order; closed: the first is not repeated
+  std::vector<int> nodes;  ///< rows of SceneDescription::positions, in order; closed: the first is not repeated
   bool closed = false;
-  MatrixX3 directors;           ///< first director of each edge, unit length, normal to the edge
-  VectorX rest_lengths;         ///< [m]
-  VectorX stretch_stiffness;    ///< EA [N]
-  MatrixX2 bend_stiffness;      ///< EI1, EI2 [N m^2]: resisting curvature towards d1 and d2
-  VectorX twist_stiffness;      ///< GJ [N m^2]
-  VectorX line_density;         ///< mass per length [kg/m]
-  VectorX rotary_inertia;       ///< rho (I1 + I2), polar inertia per length [kg m]
-  VectorX viscous_time;         ///< Kelvin-Voigt: viscosity / Young's modulus [s]
-  VectorX drag;                 ///< force per length and velocity [Pa s]
-  MatrixX2 natural_curvature;   ///< per stencil, of the smooth rod, towards d1 and d2 [1/m]
-  VectorX natural_twist;        ///< per stencil [rad/m]
+  MatrixX3 directors;          ///< first director of each edge, unit length, normal to the edge
+  VectorX rest_lengths;        ///< [m]
+  VectorX stretch_stiffness;   ///< EA [N]
+  MatrixX2 bend_stiffness;     ///< EI1, EI2 [N m^2]: resisting curvature towards d1 and d2
+  VectorX twist_stiffness;     ///< GJ [N m^2]
+  VectorX line_density;        ///< mass per length [kg/m]
+  VectorX rotary_inertia;      ///< rho (I1 + I2), polar inertia per length [kg m]
+  VectorX viscous_time;        ///< Kelvin-Voigt: viscosity / Young's modulus [s]
+  VectorX drag;                ///< force per length and velocity [Pa s]
+  MatrixX2 natural_curvature;  ///< per stencil, of the smooth rod, towards d1 and d2 [1/m]
+  VectorX natural_twist;       ///< per stencil [rad/m]
 };
 
 /// One rod passing through, starting or ending at a shared node: rod index and node index within the rod.

@@ -34,9 +34,9 @@ struct BendStencil {
 struct FrameStencil {
   int frame;
   int edge;
-  int hinge;          ///< -1, or the hinge between the frame and what this edge is attached to
-  bool frame_first;   ///< the edge leaves the node (the rod goes from the frame to the edge)
-  Matrix3 attachment; ///< columns d1, d2, t of the attached end, in the axes of the drawn scene
+  int hinge;           ///< -1, or the hinge between the frame and what this edge is attached to
+  bool frame_first;    ///< the edge leaves the node (the rod goes from the frame to the edge)
+  Matrix3 attachment;  ///< columns d1, d2, t of the attached end, in the axes of the drawn scene
 };
 
 struct Hinge {
@@ -62,30 +62,30 @@ struct Constraint {
 struct Support {
   bool active = false;
   SupportDescription description;
-  int node = -1;          ///< global node
-  int frame = -1;         ///< of a clamp
-  int other_node = -1;    ///< hold_edge
-  int edge = -1;          ///< hold_edge
+  int node = -1;        ///< global node
+  int frame = -1;       ///< of a clamp
+  int other_node = -1;  ///< hold_edge
+  int edge = -1;        ///< hold_edge
   int first_constraint = 0;
 };
 
 /// Numbers that may change while running; one entry per edge, stencil or node.
 struct Parameters {
-  VectorX edge_stretch;                    ///< EA [N]
-  MatrixX2 edge_bend;                      ///< EI1, EI2 [N m^2]
-  VectorX edge_twist;                      ///< GJ [N m^2]
+  VectorX edge_stretch;  ///< EA [N]
+  MatrixX2 edge_bend;    ///< EI1, EI2 [N m^2]
+  VectorX edge_twist;    ///< GJ [N m^2]
   VectorX edge_density, edge_rotary, edge_viscous_time, edge_drag;
   VectorX added_mass;
   Vector3 gravity;
-  std::vector<MatrixX2> natural_curvature; ///< per rod and stencil, smooth [1/m]
-  std::vector<VectorX> natural_twist;      ///< per rod and stencil [rad/m]
+  std::vector<MatrixX2> natural_curvature;  ///< per rod and stencil, smooth [1/m]
+  std::vector<VectorX> natural_twist;       ///< per rod and stencil [rad/m]
 
   // Derived from the above by `update_derived`.
-  VectorX node_mass, node_drag;            ///< [kg], [N s/m]
-  VectorX edge_inertia;                    ///< of theta [kg m^2]
-  VectorX frame_inertia, hinge_inertia;    ///< [kg m^2]
-  MatrixX3 bend_stiffness, half_stiffness; ///< per stencil: EI1 / V, EI2 / V, GJ / V [N m]
-  MatrixX3 bend_natural, half_natural;     ///< per stencil: discrete kappa1, kappa2, turn of twist
+  VectorX node_mass, node_drag;                  ///< [kg], [N s/m]
+  VectorX edge_inertia;                          ///< of theta [kg m^2]
+  VectorX frame_inertia, hinge_inertia;          ///< [kg m^2]
+  MatrixX3 bend_stiffness, half_stiffness;       ///< per stencil: EI1 / V, EI2 / V, GJ / V [N m]
+  MatrixX3 bend_natural, half_natural;           ///< per stencil: discrete kappa1, kappa2, turn of twist
   VectorX bend_viscous_time, half_viscous_time;  ///< [s]
   bool viscous = false, dragged = false;
 };
@@ -93,24 +93,24 @@ struct Parameters {
 struct Model {
   SceneDescription description;
   std::optional<Plane> plane;
-  std::string plane_reason;                 ///< why there is no plane
-  int dimension = 3;  ///< unknowns a node
+  std::string plane_reason;  ///< why there is no plane
+  int dimension = 3;         ///< unknowns a node
   int node_count = 0, edge_count = 0, frame_count = 0;
-  std::vector<int> rod_first_edge;          ///< edges of rod r: rod_first_edge[r] .. rod_first_edge[r + 1]
+  std::vector<int> rod_first_edge;  ///< edges of rod r: rod_first_edge[r] .. rod_first_edge[r + 1]
   std::vector<int> edge_rod;
   std::vector<int> edge_tail, edge_head;
-  VectorX edge_length;                      ///< at rest [m]
+  VectorX edge_length;  ///< at rest [m]
   std::vector<BendStencil> bend;
   std::vector<FrameStencil> half;
-  VectorX bend_voronoi, half_voronoi;       ///< [m]
+  VectorX bend_voronoi, half_voronoi;  ///< [m]
   std::vector<Hinge> hinges;
   std::vector<std::vector<StencilPlace>> place;  ///< [rod][stencil]
-  std::vector<Vector2> planar_components;   ///< per rod: kappa = p . (kappa1, kappa2)
-  std::vector<std::vector<int>> wall_half;  ///< [rod]: halves at its first and last node, or -1
+  std::vector<Vector2> planar_components;        ///< per rod: kappa = p . (kappa1, kappa2)
+  std::vector<std::vector<int>> wall_half;       ///< [rod]: halves at its first and last node, or -1
   // Drawn values that only joints of form `pairs`, and rods joined at an angle, have.
-  MatrixX3 bend_offset;                     ///< per stencil: discrete strains that the drawing adds to the natural ones
-  std::vector<std::pair<int, int>> bend_owner;   ///< (rod, stencil), or (-1, -1) across rods
-  std::vector<std::pair<int, int>> half_owner;   ///< (rod, nearest stencil); (rod, -1) where the rod has none
+  MatrixX3 bend_offset;  ///< per stencil: discrete strains that the drawing adds to the natural ones
+  std::vector<std::pair<int, int>> bend_owner;  ///< (rod, stencil), or (-1, -1) across rods
+  std::vector<std::pair<int, int>> half_owner;  ///< (rod, nearest stencil); (rod, -1) where the rod has none
 
   // Layout of the unknowns.
   int dof_count = 0;
@@ -123,7 +123,7 @@ struct Model {
   VectorX initial_q;
   std::vector<Vec3d> initial_tangent, initial_director;
   VectorX initial_bend_tau, initial_half_tau;
-  double length_scale = 1.0;                ///< [m]
+  double length_scale = 1.0;  ///< [m]
 
   bool planar() const { return plane.has_value(); }
   int frame_size() const { return planar() ? 1 : 3; }

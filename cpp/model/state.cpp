@@ -56,9 +56,9 @@ void compute_spatial(const Model& model, const State& state, const VectorX& q, C
   for (std::size_t b = 0; b < model.bend.size(); ++b) {
     const BendStencil& s = model.bend[b];
     const auto i = static_cast<Eigen::Index>(b);
-    const auto strain = bend_twist_strain(with_sign(out.edge[static_cast<std::size_t>(s.edge[0])], s.sign[0]),
-                                          with_sign(out.edge[static_cast<std::size_t>(s.edge[1])], s.sign[1]),
-                                          state.bend_tau(i));
+    const auto strain =
+        bend_twist_strain(with_sign(out.edge[static_cast<std::size_t>(s.edge[0])], s.sign[0]),
+                          with_sign(out.edge[static_cast<std::size_t>(s.edge[1])], s.sign[1]), state.bend_tau(i));
     out.bend_strain.row(i) << strain.kappa1, strain.kappa2, strain.tau;
   }
   for (int f = 0; f < model.frame_count; ++f) {

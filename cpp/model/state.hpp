@@ -10,14 +10,14 @@ namespace withe {
 /// Configuration, velocities and the frames they are measured from. The frames advance by time-parallel
 /// transport once per accepted step or load increment.
 struct State {
-  double time = 0.0;             ///< [s]
-  VectorX q, v;                  ///< positions [m], angles [rad]; frames of joints: increments from `frame`
-  VectorX acceleration;          ///< of the last step, to predict the next one (explicit: to begin it)
+  double time = 0.0;                  ///< [s]
+  VectorX q, v;                       ///< positions [m], angles [rad]; frames of joints: increments from `frame`
+  VectorX acceleration;               ///< of the last step, to predict the next one (explicit: to begin it)
   bool acceleration_current = false;  ///< explicit scheme: `acceleration` belongs to q and the present forces
-  std::vector<Vec3d> tangent;    ///< per edge: source of the reference director
-  std::vector<Vec3d> director;   ///< per edge: reference director, normal to `tangent`
-  std::vector<Matrix3> frame;    ///< per joint frame (in a plane: not used, q holds the angle)
-  VectorX bend_tau, half_tau;    ///< twist of each stencil, which fixes the branch of the angle [rad]
+  std::vector<Vec3d> tangent;         ///< per edge: source of the reference director
+  std::vector<Vec3d> director;        ///< per edge: reference director, normal to `tangent`
+  std::vector<Matrix3> frame;         ///< per joint frame (in a plane: not used, q holds the angle)
+  VectorX bend_tau, half_tau;         ///< twist of each stencil, which fixes the branch of the angle [rad]
 };
 
 State initial_state(const Model& model);
@@ -25,10 +25,10 @@ State initial_state(const Model& model);
 /// Everything that follows from q and the source frames of a state.
 struct Configuration {
   std::vector<EdgeFrame<double>> edge;
-  VectorX length;                               ///< per edge [m]
-  std::vector<Matrix3> frame;                   ///< per joint frame, rotation from the drawn axes
-  std::vector<EdgeFrame<double>> attached;      ///< per frame stencil: the attached end as an edge of unit length
-  MatrixX3 bend_strain, half_strain;            ///< kappa1, kappa2, tau; in a plane: kappa, -, -
+  VectorX length;                           ///< per edge [m]
+  std::vector<Matrix3> frame;               ///< per joint frame, rotation from the drawn axes
+  std::vector<EdgeFrame<double>> attached;  ///< per frame stencil: the attached end as an edge of unit length
+  MatrixX3 bend_strain, half_strain;        ///< kappa1, kappa2, tau; in a plane: kappa, -, -
 };
 
 /// Fills `out` from q, measured from the frames of `state`. Does not allocate after the first call.

@@ -17,10 +17,8 @@ class Writer {
 
   void raw(const void* data, std::size_t size) { bytes.append(static_cast<const char*>(data), size); }
   template <class Number>
-    requires std::is_arithmetic_v<Number>
-  void operator()(const Number& number) {
-    raw(&number, sizeof number);
-  }
+  requires std::is_arithmetic_v<Number>
+  void operator()(const Number& number) { raw(&number, sizeof number); }
   template <class Derived>
   void operator()(const Eigen::PlainObjectBase<Derived>& m) {
     (*this)(static_cast<std::int64_t>(m.rows()));
@@ -39,10 +37,8 @@ class Reader {
     position_ += size;
   }
   template <class Number>
-    requires std::is_arithmetic_v<Number>
-  void operator()(Number& number) {
-    raw(&number, sizeof number);
-  }
+  requires std::is_arithmetic_v<Number>
+  void operator()(Number& number) { raw(&number, sizeof number); }
   /// Sizes must be those that the matrix has already.
   template <class Derived>
   void operator()(Eigen::PlainObjectBase<Derived>& m) {

@@ -263,11 +263,13 @@ void World::Implementation::make_plan() {
   auto& notes = plan.notes;
   if (model.planar()) {
     plan.plane_normal = model.plane->normal;
-    notes.push_back("planar: 2 unknowns a node, no twist; a scene that could buckle out of its plane stays in it "
-                    "(build(planar=False) to force 3D)");
+    notes.push_back(
+        "planar: 2 unknowns a node, no twist; a scene that could buckle out of its plane stays in it "
+        "(build(planar=False) to force 3D)");
   } else {
     notes.push_back("3D: " + (options.planar.has_value() && !*options.planar ? std::string("planar=False")
-                              : spatial ? std::string("the scene left its plane") : model.plane_reason));
+                              : spatial                                      ? std::string("the scene left its plane")
+                                                                             : model.plane_reason));
   }
   if (!equations->symmetric())
     notes.push_back("unsymmetric Jacobian: follower loads, moments in 3D, or energy-momentum steps");

@@ -15,7 +15,7 @@ struct SupportMotion {
   Matrix3 rotation = Matrix3::Identity();  ///< now, from the drawn orientation
   Vector3 from_position = Vector3::Zero(), to_position = Vector3::Zero();
   Matrix3 from_rotation = Matrix3::Identity(), to_rotation = Matrix3::Identity();
-  double start = 0, end = 0;               ///< of the ramp [s]
+  double start = 0, end = 0;  ///< of the ramp [s]
 };
 
 /// Natural shape of a rod on its way from one value to another.
@@ -47,13 +47,13 @@ struct World::Implementation {
   MatrixX3 custom_force;
   std::function<void(double, double)> callback;  ///< StepCallback, bound to its world
   std::atomic<bool> interrupted{false};
-  bool spatial = false;         ///< left its plane while running
-  int level = 0;                ///< present halvings of the time step
+  bool spatial = false;  ///< left its plane while running
+  int level = 0;         ///< present halvings of the time step
   int easy_steps = 0;
   double support_work = 0, actuation_work = 0, dissipated = 0, load_work = 0;
   std::optional<Energy> alarm;  ///< energies at the start, for the explicit scheme's alarm
   NewtonResult last_newton;
-  VectorX reaction_residual;    ///< full residual of the last solve
+  VectorX reaction_residual;  ///< full residual of the last solve
   bool reaction_current = false;
 
   // building.cpp

@@ -4,6 +4,8 @@
 #include <numbers>
 #include <tuple>
 
+#include <Eigen/LU>
+
 #include "geometry/rotation.hpp"
 #include "world/implementation.hpp"
 
@@ -40,8 +42,8 @@ void World::Implementation::apply_ramps(double time) {
 void World::Implementation::set_motion_at(SupportMotion& motion, double time) const {
   const double s = ramp_fraction(time, motion.start, motion.end);
   motion.position = (1.0 - s) * motion.from_position + s * motion.to_position;
-  motion.rotation = rotation_exp(s * rotation_log(motion.to_rotation * motion.from_rotation.transpose())) *
-                    motion.from_rotation;
+  motion.rotation =
+      rotation_exp(s * rotation_log(motion.to_rotation * motion.from_rotation.transpose())) * motion.from_rotation;
 }
 
 HeldTarget World::Implementation::held_target(double time) {
@@ -129,7 +131,8 @@ double World::Implementation::actuation_energy(const State& s, const Parameters&
 
 void World::Implementation::inner_step(double dt, bool& accepted, double& error) {
   const bool explicit_scheme = options.integrator == Integrator::verlet;
-  const bool mid = options.integrator == Integrator::implicit_midpoint || options.integrator == Integrator::energy_momentum;
+  const bool mid =
+      options.integrator == Integrator::implicit_midpoint || options.integrator == Integrator::energy_momentum;
   const double start = state.time, end = start + dt, force_time = mid ? start + 0.5 * dt : end;
   bool actuated = false;
   for (const NaturalRamp& ramp : ramps)
@@ -145,9 +148,8 @@ void World::Implementation::inner_step(double dt, bool& accepted, double& error)
   std::vector<SupportMotion> kept = motions;
   const HeldTarget held = held_target(end);
   update_custom_force(*equations);
-  const StepResult r = explicit_scheme
-                           ? verlet_step(*equations, parameters, dt, held, state, work)
-                           : implicit_step(*equations, *newton, options, parameters, dt, held, state, work);
+  const StepResult r = explicit_scheme ? verlet_step(*equations, parameters, dt, held, state, work)
+                                       : implicit_step(*equations, *newton, options, parameters, dt, held, state, work);
   accepted = r.accepted;
   error = r.error;
   last_newton = r.newton;
@@ -162,8 +164,15 @@ void World::Implementation::inner_step(double dt, bool& accepted, double& error)
   statistics.largest_turn = std::max(statistics.largest_turn, r.largest_turn);
   load_work += r.load_work;
   dissipated += r.dissipated;
-  if (!model.constraints.empty())
-    support_work += equations->assembler().held_part(reaction_residual).dot(r.change);
+  if (!model.constraints.empty()) support_work += equations->assembler().held_part(reaction_residual).dot(r.change);
+  // The residual of a frame's unknowns is J(w)^T moment, w its turn where the forces act.
+  if (!model.planar())
+    for (const Support& support : model.supports) {
+      if (!support.active || support.frame < 0) continue;
+      const int dof = model.frame_dof[at(support.frame)];
+      const Matrix3 J = cayley_spin((mid ? 0.5 : 1.0) * held.q.segment<3>(dof));
+      reaction_residual.segment<3>(dof) = J.transpose().inverse() * reaction_residual.segment<3>(dof);
+    }
   if (actuated) {
     double after = -actuation_energy(state, parameters);
     apply_ramps(end);
@@ -188,8 +197,8 @@ void World::Implementation::advance(double duration) {
     while (position % size != 0) size >>= 1;
     const double dt = duration * static_cast<double>(size) / static_cast<double>(units);
     if (callback) {
-      const bool mid = options.integrator == Integrator::implicit_midpoint ||
-                       options.integrator == Integrator::energy_momentum;
+      const bool mid =
+          options.integrator == Integrator::implicit_midpoint || options.integrator == Integrator::energy_momentum;
       callback(state.time + (mid ? 0.5 : 1.0) * dt, state.time + dt);
     }
     const State backup = options.tolerance ? state : State{};
@@ -214,7 +223,8 @@ void World::Implementation::advance(double duration) {
     if (!accepted) {
       statistics.rejected_steps += 1;
       if (!may_halve)
-        fail(last_newton, dt, options.integrator == Integrator::verlet ? "the explicit step broke down" : "the step did not converge");
+        fail(last_newton, dt,
+             options.integrator == Integrator::verlet ? "the explicit step broke down" : "the step did not converge");
       while ((units >> level) > size) ++level;
       ++level;
       easy_steps = 0;

@@ -202,8 +202,8 @@ void World::set_rod_parameters(int rod, const RodDescription& d) {
   Implementation& self = *implementation_;
   require(rod >= 0 && rod < static_cast<int>(self.ramps.size()), "no such rod: " + std::to_string(rod));
   const int first = self.model.rod_first_edge[at(rod)], count = self.model.rod_first_edge[at(rod) + 1] - first;
-  for (const VectorX* v : {&d.stretch_stiffness, &d.twist_stiffness, &d.line_density, &d.rotary_inertia,
-                           &d.viscous_time, &d.drag})
+  for (const VectorX* v :
+       {&d.stretch_stiffness, &d.twist_stiffness, &d.line_density, &d.rotary_inertia, &d.viscous_time, &d.drag})
     require(v->size() == count && v->allFinite(), "rod parameters need one finite number an edge");
   require(d.bend_stiffness.rows() == count && d.bend_stiffness.allFinite(), "bend_stiffness needs one row an edge");
   Parameters& p = self.parameters;
@@ -271,7 +271,8 @@ int World::add_support(const SupportDescription& support) {
   } else if (s.edge >= 0) {
     Configuration c;
     compute_configuration(self.model, self.state, self.state.q, c);
-    const Vector3 t = to_eigen(self.model.initial_tangent[at(s.edge)]), d1 = to_eigen(self.model.initial_director[at(s.edge)]);
+    const Vector3 t = to_eigen(self.model.initial_tangent[at(s.edge)]),
+                  d1 = to_eigen(self.model.initial_director[at(s.edge)]);
     Matrix3 drawn;
     drawn << d1, t.cross(d1), t;
     m.rotation = edge_directors(self.model, self.state, c, s.edge) * drawn.transpose();
@@ -284,8 +285,9 @@ int World::add_support(const SupportDescription& support) {
 
 void World::remove_support(int support) {
   Implementation& self = *implementation_;
-  require(support >= 0 && support < static_cast<int>(self.model.supports.size()) && self.model.supports[at(support)].active,
-          "no such support, or it is released already: " + std::to_string(support));
+  require(
+      support >= 0 && support < static_cast<int>(self.model.supports.size()) && self.model.supports[at(support)].active,
+      "no such support, or it is released already: " + std::to_string(support));
   self.model.supports[at(support)].active = false;
   self.rebuild(false);
 }
@@ -303,8 +305,9 @@ void World::move_support(int support, const Vector3& position, const Matrix3& ro
 
 void World::prescribe_support(int support, const Vector3& position, const Matrix3& rotation) {
   Implementation& self = *implementation_;
-  require(support >= 0 && support < static_cast<int>(self.model.supports.size()) && self.model.supports[at(support)].active,
-          "no such support, or it is released: " + std::to_string(support));
+  require(
+      support >= 0 && support < static_cast<int>(self.model.supports.size()) && self.model.supports[at(support)].active,
+      "no such support, or it is released: " + std::to_string(support));
   require(position.allFinite() && rotation.allFinite(), "position and rotation must be finite");
   require((rotation.transpose() * rotation - Matrix3::Identity()).norm() < 1e-6 && rotation.determinant() > 0.0,
           "rotation must be a proper rotation matrix");
@@ -325,8 +328,9 @@ Matrix3 World::support_rotation(int support) const { return implementation_->mot
 
 Reaction World::reaction(int support) const {
   Implementation& self = *implementation_;
-  require(support >= 0 && support < static_cast<int>(self.model.supports.size()) && self.model.supports[at(support)].active,
-          "no such support, or it is released: " + std::to_string(support));
+  require(
+      support >= 0 && support < static_cast<int>(self.model.supports.size()) && self.model.supports[at(support)].active,
+      "no such support, or it is released: " + std::to_string(support));
   self.refresh_reactions();
   const Model& model = self.model;
   const Support& s = model.supports[at(support)];
@@ -335,7 +339,6 @@ Reaction World::reaction(int support) const {
   out.force = node_velocity(model, held, s.node);
   if (s.frame >= 0) {
     const int dof = model.frame_dof[at(s.frame)];
-    // In space the residual of the frame's unknowns is J(w)^T moment; w is zero but for the step's own turn.
     out.moment = model.planar() ? Vector3(held(dof) * model.plane->normal) : Vector3(held.segment<3>(dof));
   }
   if (s.other_node >= 0) {
@@ -343,8 +346,7 @@ Reaction World::reaction(int support) const {
     const Vector3 arm = node_position(model, self.state.q, s.other_node) - node_position(model, self.state.q, s.node);
     out.force += other;
     out.moment = arm.cross(other);
-    if (!model.planar())
-      out.moment += held(model.edge_dof[at(s.edge)]) * to_eigen(self.state.tangent[at(s.edge)]);
+    if (!model.planar()) out.moment += held(model.edge_dof[at(s.edge)]) * to_eigen(self.state.tangent[at(s.edge)]);
   }
   return out;
 }

@@ -14,7 +14,7 @@ namespace withe {
 
 struct Energy {  // [J]
   double kinetic = 0, stretch = 0, bend = 0, twist = 0, gravity = 0;
-  double loads = 0;       ///< minus the work done by loads and custom forces since the start
+  double loads = 0;  ///< minus the work done by loads and custom forces since the start
   double contact = 0;
   double total = 0;       ///< sum of the above
   double work = 0;        ///< done by supports and actuation since the start
@@ -22,11 +22,11 @@ struct Energy {  // [J]
 };
 
 struct Statistics {
-  long steps = 0;              ///< inner steps accepted
+  long steps = 0;  ///< inner steps accepted
   long rejected_steps = 0;
-  long iterations = 0;         ///< Newton iterations
+  long iterations = 0;  ///< Newton iterations
   long factorizations = 0;
-  double largest_turn = 0;     ///< of an edge in one step [rad]; plain midpoint loses energy balance above about 0.1
+  double largest_turn = 0;  ///< of an edge in one step [rad]; plain midpoint loses energy balance above about 0.1
   double assembly_time = 0, solve_time = 0, total_time = 0;  ///< [s]
 };
 
@@ -46,9 +46,16 @@ struct Plan {
   bool planar = false;
   Vector3 plane_normal = Vector3::Zero();  ///< of a planar scene
   int unknowns = 0;
-  std::string solver;                      ///< LinearSolver::name()
-  double stable_step = 0;                  ///< of the explicit scheme [s]; 0 when not computed
-  std::vector<std::string> notes;          ///< one line per thing that was skipped or decided, and why
+  std::string solver;              ///< LinearSolver::name()
+  double stable_step = 0;          ///< of the explicit scheme [s]; 0 when not computed
+  std::vector<std::string> notes;  ///< one line per thing that was skipped or decided, and why
+};
+
+/// Equations linearised about the present configuration, without what supports hold: mass x'' + stiffness x = 0.
+struct Linearisation {
+  Eigen::MatrixXd stiffness;     ///< free unknowns x free unknowns; at an equilibrium, its tangent stiffness
+  VectorX mass;                  ///< diagonal, per free unknown
+  Eigen::MatrixXd displacement;  ///< (3 nodes) x free unknowns: node displacements [m] of each unknown
 };
 
 /// Non-convergence below the smallest step. Becomes withe.ConvergenceError.
@@ -123,6 +130,7 @@ class World {
   VectorX tensions(int rod) const;     ///< per edge [N]
   VectorX spins(int rod) const;        ///< per edge, angular velocity about the tangent [rad/s]
   Energy energy() const;
+  Linearisation linearise() const;
 
   /// The whole state as bytes, for a description and options equal to this world's (supports may differ).
   std::string snapshot() const;
