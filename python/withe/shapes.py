@@ -51,7 +51,7 @@ def check_edges(points: FloatArray, closed: bool, owner: str) -> FloatArray:
     folded = np.flatnonzero(turn < -1.0 + 1e-12)
     if len(folded):
         raise ValueError(f"points of {owner} fold straight back after edge {folded[0]}")
-    return lengths
+    return np.asarray(lengths, np.float64)
 
 
 def resample(points: FloatArray, nodes: int, closed: bool) -> FloatArray:
@@ -59,11 +59,11 @@ def resample(points: FloatArray, nodes: int, closed: bool) -> FloatArray:
     chain = np.concatenate([points, points[:1]]) if closed else points
     arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(chain, axis=0), axis=1))])
     places = np.linspace(0.0, arc[-1], nodes + 1 if closed else nodes)[:nodes]
-    result = np.stack([np.interp(places, arc, chain[:, axis]) for axis in range(3)], axis=1)
+    result: FloatArray = np.stack([np.interp(places, arc, chain[:, axis]) for axis in range(3)], axis=1)
     result[0] = points[0]
     if not closed:
         result[-1] = points[-1]
-    return result
+    return np.asarray(result, np.float64)
 
 
 def default_normal(tangent: FloatArray) -> FloatArray:
@@ -111,7 +111,7 @@ def smooth_curvature(discrete: FloatArray, voronoi: FloatArray) -> FloatArray:
 
 
 def natural_shape(
-    tangents: FloatArray, directors: FloatArray, voronoi: FloatArray, closed: bool
+    tangents: FloatArray, directors: FloatArray, voronoi: FloatArray, closed: bool, rounding: float = 0.0
 ) -> tuple[FloatArray, FloatArray]:
     """Curvature and twist of a rod as it is drawn.
 
@@ -121,6 +121,9 @@ def natural_shape(
         Unit tangents and first directors.
     voronoi : ndarray of shape (stencils,) [m]
     closed : bool
+    rounding : float [rad]
+        Turns and twists below it are taken for zero: what rounding leaves of a straight rod must not
+        make it curved.
 
     Returns
     -------
@@ -141,8 +144,8 @@ def natural_shape(
     )
     carried = _transport(d1_before, before, after)
     angle = np.arctan2(-np.sum(carried * d2_after, axis=1), np.sum(carried * d1_after, axis=1))
-    # Transport leaves rounding, not twist: a rod drawn without twist has none.
-    angle[np.abs(angle) < 1e-14] = 0.0
+    discrete[np.sqrt(np.sum(discrete**2, axis=1)) <= rounding] = 0.0
+    angle[np.abs(angle) <= rounding] = 0.0
     return smooth_curvature(discrete, voronoi), angle / voronoi
 
 

@@ -1,0 +1,90 @@
+#include <pybind11/eigen.h>
+#include <pybind11/stl.h>
+
+#include "bindings.hpp"
+#include "model/description.hpp"
+
+namespace withe::bindings {
+namespace {
+
+constexpr Words<JointForm, 2> kJointForms{{{"frame", JointForm::frame}, {"pairs", JointForm::pairs}}};
+constexpr Words<SupportKind, 3> kSupportKinds{
+    {{"pin", SupportKind::pin}, {"clamp", SupportKind::clamp}, {"hold_edge", SupportKind::hold_edge}}};
+constexpr Words<LoadKind, 3> kLoadKinds{
+    {{"force", LoadKind::force}, {"moment", LoadKind::moment}, {"distributed", LoadKind::distributed}}};
+
+void register_rod(py::module_& module) {
+  py::class_<RodDescription>(module, "RodDescription", "A rod as a chain of nodes.")
+      .def(py::init<>())
+      .def_readwrite("name", &RodDescription::name)
+      .def_readwrite("nodes", &RodDescription::nodes)
+      .def_readwrite("closed", &RodDescription::closed)
+      .def_readwrite("directors", &RodDescription::directors)
+      .def_readwrite("rest_lengths", &RodDescription::rest_lengths)
+      .def_readwrite("stretch_stiffness", &RodDescription::stretch_stiffness)
+      .def_readwrite("bend_stiffness", &RodDescription::bend_stiffness)
+      .def_readwrite("twist_stiffness", &RodDescription::twist_stiffness)
+      .def_readwrite("line_density", &RodDescription::line_density)
+      .def_readwrite("rotary_inertia", &RodDescription::rotary_inertia)
+      .def_readwrite("viscous_time", &RodDescription::viscous_time)
+      .def_readwrite("drag", &RodDescription::drag)
+      .def_readwrite("natural_curvature", &RodDescription::natural_curvature)
+      .def_readwrite("natural_twist", &RodDescription::natural_twist);
+}
+
+void register_joints_and_supports(py::module_& module) {
+  py::class_<RodPass>(module, "RodPass", "A node of a rod.")
+      .def(py::init([](int rod, int node) { return RodPass{rod, node}; }), py::arg("rod"), py::arg("node"))
+      .def_readwrite("rod", &RodPass::rod)
+      .def_readwrite("node", &RodPass::node);
+
+  py::class_<RevoluteLink>(module, "RevoluteLink", "The child cluster turns about an axis relative to the parent.")
+      .def(py::init([](int parent, int child, const Vector3& axis) { return RevoluteLink{parent, child, axis}; }),
+           py::arg("parent"), py::arg("child"), py::arg("axis"))
+      .def_readwrite("parent", &RevoluteLink::parent)
+      .def_readwrite("child", &RevoluteLink::child)
+      .def_readwrite("axis", &RevoluteLink::axis);
+
+  py::class_<JointDescription> joint(module, "JointDescription", "A node that several rods share.");
+  joint.def(py::init<>())
+      .def_readwrite("clusters", &JointDescription::clusters)
+      .def_readwrite("links", &JointDescription::links);
+  def_word(joint, "form", &JointDescription::form, kJointForms);
+
+  py::class_<SupportDescription> support(module, "SupportDescription", "Something that holds a node.");
+  support.def(py::init<>())
+      .def_readwrite("pass_", &SupportDescription::pass)
+      .def_readwrite("free", &SupportDescription::free)
+      .def_readwrite("spin", &SupportDescription::spin);
+  def_word(support, "kind", &SupportDescription::kind, kSupportKinds);
+}
+
+void register_loads(py::module_& module) {
+  py::class_<LoadDescription> load(module, "LoadDescription", "A force, a moment or a distributed load.");
+  load.def(py::init<>())
+      .def_readwrite("pass_", &LoadDescription::pass)
+      .def_readwrite("value", &LoadDescription::value)
+      .def_readwrite("follower", &LoadDescription::follower)
+      .def_readwrite("varies", &LoadDescription::varies);
+  def_word(load, "kind", &LoadDescription::kind, kLoadKinds);
+}
+
+}  // namespace
+
+void register_model(py::module_& module) {
+  register_rod(module);
+  register_joints_and_supports(module);
+  register_loads(module);
+  py::class_<SceneDescription>(module, "SceneDescription", "What the scene layer hands to the engine.")
+      .def(py::init<>())
+      .def_readwrite("positions", &SceneDescription::positions)
+      .def_readwrite("added_mass", &SceneDescription::added_mass)
+      .def_readwrite("gravity", &SceneDescription::gravity)
+      .def_readwrite("rods", &SceneDescription::rods)
+      .def_readwrite("joints", &SceneDescription::joints)
+      .def_readwrite("supports", &SceneDescription::supports)
+      .def_readwrite("loads", &SceneDescription::loads)
+      .def_readwrite("has_custom_force", &SceneDescription::has_custom_force);
+}
+
+}  // namespace withe::bindings

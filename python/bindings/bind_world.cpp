@@ -1,0 +1,204 @@
+#include <pybind11/eigen.h>
+#include <pybind11/stl.h>
+
+#include <memory>
+
+#include "guarded_world.hpp"
+
+namespace withe::bindings {
+namespace {
+
+void register_results(py::module_& module) {
+  py::class_<Energy>(module, "Energy", "Energies [J].")
+      .def_readonly("kinetic", &Energy::kinetic)
+      .def_readonly("stretch", &Energy::stretch)
+      .def_readonly("bend", &Energy::bend)
+      .def_readonly("twist", &Energy::twist)
+      .def_readonly("gravity", &Energy::gravity)
+      .def_readonly("loads", &Energy::loads)
+      .def_readonly("contact", &Energy::contact)
+      .def_readonly("total", &Energy::total)
+      .def_readonly("work", &Energy::work)
+      .def_readonly("dissipated", &Energy::dissipated);
+  py::class_<Statistics>(module, "Statistics", "What the work so far took.")
+      .def_readonly("steps", &Statistics::steps)
+      .def_readonly("rejected_steps", &Statistics::rejected_steps)
+      .def_readonly("iterations", &Statistics::iterations)
+      .def_readonly("factorizations", &Statistics::factorizations)
+      .def_readonly("largest_turn", &Statistics::largest_turn)
+      .def_readonly("assembly_time", &Statistics::assembly_time)
+      .def_readonly("solve_time", &Statistics::solve_time)
+      .def_readonly("total_time", &Statistics::total_time);
+  py::class_<Reaction>(module, "Reaction", "Of a support on the rod.")
+      .def_readonly("force", &Reaction::force)
+      .def_readonly("moment", &Reaction::moment);
+  py::class_<EquilibriumResult>(module, "EquilibriumResult", "How an equilibrium was found.")
+      .def_readonly("stable", &EquilibriumResult::stable)
+      .def_readonly("iterations", &EquilibriumResult::iterations)
+      .def_readonly("residual", &EquilibriumResult::residual);
+  py::class_<Plan>(module, "Plan", "What build decided.")
+      .def_readonly("planar", &Plan::planar)
+      .def_readonly("plane_normal", &Plan::plane_normal)
+      .def_readonly("unknowns", &Plan::unknowns)
+      .def_readonly("solver", &Plan::solver)
+      .def_readonly("stable_step", &Plan::stable_step)
+      .def_readonly("notes", &Plan::notes);
+}
+
+/// ConvergenceFailure keeps its numbers in args; Interrupted is Ctrl-C.
+void register_exceptions(py::module_& module) {
+  static PyObject* failure =
+      PyErr_NewException((py::str(module.attr("__name__")).cast<std::string>() + ".ConvergenceFailure").c_str(),
+                         PyExc_RuntimeError, nullptr);
+  module.attr("ConvergenceFailure") = py::handle(failure);
+  py::register_exception_translator([](std::exception_ptr pointer) {
+    try {
+      if (pointer) std::rethrow_exception(pointer);
+    } catch (const ConvergenceFailure& e) {
+      const py::tuple args = py::make_tuple(e.what(), e.time, e.step, e.rod, e.node, e.residual);
+      PyErr_SetObject(failure, args.ptr());
+    } catch (const Interrupted&) {
+      PyErr_SetNone(PyExc_KeyboardInterrupt);
+    }
+  });
+}
+
+using WorldClass = py::class_<GuardedWorld>;
+
+void define_steps(WorldClass& world) {
+  world.def(
+      "step",
+      [](GuardedWorld& self, int count, const py::object& callback) {
+        self.run([count](World& w) { w.step(count); }, callback);
+      },
+      py::arg("count"), py::arg("callback"), "Advance exactly `count` time steps.");
+  world.def(
+      "advance_to",
+      [](GuardedWorld& self, double time, const py::object& callback) {
+        self.run([time](World& w) { w.advance_to(time); }, callback);
+      },
+      py::arg("time"), py::arg("callback"), "Advance to a time [s].");
+  world.def(
+      "equilibrium",
+      [](GuardedWorld& self, const py::object& callback) {
+        return self.run([](World& w) { return w.equilibrium(); }, callback);
+      },
+      py::arg("callback"), "Find the static equilibrium.");
+  world.def("interrupt", &GuardedWorld::interrupt, "End a running step.");
+  world.def(
+      "snapshot", [](const GuardedWorld& self) { return py::bytes(self.reading().snapshot()); }, "The whole state.");
+  world.def(
+      "restore", [](GuardedWorld& self, const py::bytes& state) { self.changing().restore(std::string(state)); },
+      py::arg("state"), "Go back to a snapshot.");
+  world.def(
+      "copy", [](const GuardedWorld& self) { return std::make_unique<GuardedWorld>(self); },
+      "Another world like this.");
+}
+
+void define_parameters(WorldClass& world) {
+  world.def(
+      "set_load", [](GuardedWorld& self, int load, const Vector3& value) { self.steering().set_load(load, value); },
+      py::arg("load"), py::arg("value"));
+  world.def("load", [](const GuardedWorld& self, int load) { return self.reading().load(load); }, py::arg("load"));
+  world.def(
+      "set_custom_force", [](GuardedWorld& self, const MatrixX3& force) { self.steering().set_custom_force(force); },
+      py::arg("force"));
+  world.def(
+      "set_natural_curvature",
+      [](GuardedWorld& self, int rod, const MatrixX2& curvature, double over) {
+        self.changing().set_natural_curvature(rod, curvature, over);
+      },
+      py::arg("rod"), py::arg("curvature"), py::arg("over"));
+  world.def(
+      "set_natural_twist",
+      [](GuardedWorld& self, int rod, const VectorX& twist, double over) {
+        self.changing().set_natural_twist(rod, twist, over);
+      },
+      py::arg("rod"), py::arg("twist"), py::arg("over"));
+  world.def(
+      "natural_curvature", [](const GuardedWorld& self, int rod) { return self.reading().natural_curvature(rod); },
+      py::arg("rod"));
+  world.def(
+      "natural_twist", [](const GuardedWorld& self, int rod) { return self.reading().natural_twist(rod); },
+      py::arg("rod"));
+  world.def(
+      "set_rod_parameters",
+      [](GuardedWorld& self, int rod, const RodDescription& parameters) {
+        self.changing().set_rod_parameters(rod, parameters);
+      },
+      py::arg("rod"), py::arg("parameters"));
+  world.def(
+      "set_added_mass", [](GuardedWorld& self, const VectorX& mass) { self.changing().set_added_mass(mass); },
+      py::arg("mass"));
+  world.def(
+      "set_gravity", [](GuardedWorld& self, const Vector3& gravity) { self.changing().set_gravity(gravity); },
+      py::arg("gravity"));
+}
+
+void define_supports(WorldClass& world) {
+  world.def(
+      "add_support",
+      [](GuardedWorld& self, const SupportDescription& support) { return self.changing().add_support(support); },
+      py::arg("support"));
+  world.def(
+      "remove_support", [](GuardedWorld& self, int support) { self.changing().remove_support(support); },
+      py::arg("support"));
+  world.def(
+      "move_support",
+      [](GuardedWorld& self, int support, const Vector3& position, const Matrix3& rotation, double over) {
+        self.changing().move_support(support, position, rotation, over);
+      },
+      py::arg("support"), py::arg("position"), py::arg("rotation"), py::arg("over"));
+  world.def(
+      "prescribe_support",
+      [](GuardedWorld& self, int support, const Vector3& position, const Matrix3& rotation) {
+        self.steering().prescribe_support(support, position, rotation);
+      },
+      py::arg("support"), py::arg("position"), py::arg("rotation"));
+  world.def(
+      "support_position",
+      [](const GuardedWorld& self, int support) { return self.reading().support_position(support); },
+      py::arg("support"));
+  world.def(
+      "support_rotation",
+      [](const GuardedWorld& self, int support) { return self.reading().support_rotation(support); },
+      py::arg("support"));
+  world.def(
+      "reaction", [](const GuardedWorld& self, int support) { return self.reading().reaction(support); },
+      py::arg("support"));
+}
+
+void define_readouts(WorldClass& world) {
+  world.def_property_readonly("time", [](const GuardedWorld& self) { return self.reading().time(); });
+  world.def_property_readonly("plan", [](const GuardedWorld& self) { return self.reading().plan(); });
+  world.def_property_readonly("statistics", [](const GuardedWorld& self) { return self.reading().statistics(); });
+  world.def("positions", [](const GuardedWorld& self) { return self.reading().positions(); });
+  world.def("velocities", [](const GuardedWorld& self) { return self.reading().velocities(); });
+  world.def(
+      "set_velocities",
+      [](GuardedWorld& self, const MatrixX3& velocities) { self.changing().set_velocities(velocities); },
+      py::arg("velocities"));
+  world.def(
+      "directors", [](const GuardedWorld& self, int rod) { return self.reading().directors(rod); }, py::arg("rod"));
+  world.def(
+      "curvatures", [](const GuardedWorld& self, int rod) { return self.reading().curvatures(rod); }, py::arg("rod"));
+  world.def("twists", [](const GuardedWorld& self, int rod) { return self.reading().twists(rod); }, py::arg("rod"));
+  world.def("tensions", [](const GuardedWorld& self, int rod) { return self.reading().tensions(rod); }, py::arg("rod"));
+  world.def("spins", [](const GuardedWorld& self, int rod) { return self.reading().spins(rod); }, py::arg("rod"));
+  world.def("energy", [](const GuardedWorld& self) { return self.reading().energy(); });
+}
+
+}  // namespace
+
+void register_world(py::module_& module) {
+  register_results(module);
+  register_exceptions(module);
+  WorldClass world(module, "World", "A scene while it runs.");
+  world.def(py::init<const SceneDescription&, const Options&>(), py::arg("description"), py::arg("options"));
+  define_steps(world);
+  define_parameters(world);
+  define_supports(world);
+  define_readouts(world);
+}
+
+}  // namespace withe::bindings

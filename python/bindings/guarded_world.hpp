@@ -1,0 +1,91 @@
+#pragma once
+/// A World as Python may hold it: the GIL is released while it steps, Ctrl-C is noticed, and a call that
+/// would disturb a running step, from another thread or from a callback, is refused instead of crashing.
+
+#include <chrono>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "bindings.hpp"
+#include "world/world.hpp"
+
+namespace withe::bindings {
+
+/// Every member is called with the GIL held, which is what makes the plain flags safe.
+class GuardedWorld {
+ public:
+  GuardedWorld(const SceneDescription& description, const Options& options) : world_(description, options) {}
+  explicit GuardedWorld(const GuardedWorld& other) : world_(other.reading()) {}
+
+  /// For read-outs: allowed between steps, and in callbacks.
+  const World& reading() const {
+    refuse(stepping_ && !in_own_callback());
+    return world_;
+  }
+  /// For what a callback is there to set: loads, prescribed motion and custom forces.
+  World& steering() {
+    refuse(stepping_ && !in_own_callback());
+    return world_;
+  }
+  /// For everything else: between steps only.
+  World& changing() {
+    refuse(stepping_);
+    return world_;
+  }
+  /// Allowed at any time, from any thread.
+  void interrupt() { world_.interrupt(); }
+
+  /// Runs `advance(world)` without the GIL. `callback(force_time, end_time)`, or None, is called before
+  /// every inner step; signals are looked at every 50 ms.
+  template <class Advance>
+  auto run(Advance advance, const py::object& callback) {
+    refuse(stepping_);
+    Stepping stepping(*this);
+    auto polled = Clock::now();
+    world_.set_step_callback([&](World&, double force_time, double end_time) {
+      const auto now = Clock::now();
+      const bool poll = now - polled >= std::chrono::milliseconds(50);
+      if (!poll && callback.is_none()) return;
+      const py::gil_scoped_acquire gil;
+      const InCallback mark(*this);
+      if (poll) {
+        polled = now;
+        if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+      }
+      if (!callback.is_none()) callback(force_time, end_time);
+    });
+    const py::gil_scoped_release release;
+    return advance(world_);
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  struct Stepping {
+    explicit Stepping(GuardedWorld& owner) : self(owner) { self.stepping_ = true; }
+    ~Stepping() {
+      self.world_.set_step_callback({});
+      self.stepping_ = false;
+    }
+    GuardedWorld& self;
+  };
+  struct InCallback {
+    explicit InCallback(GuardedWorld& owner) : self(owner) { self.callback_thread_ = PyThread_get_thread_ident(); }
+    ~InCallback() { self.callback_thread_.reset(); }
+    GuardedWorld& self;
+  };
+
+  bool in_own_callback() const { return callback_thread_ == PyThread_get_thread_ident(); }
+  static void refuse(bool busy) {
+    if (busy)
+      throw std::runtime_error(
+          "the simulation is in the middle of a step: a callback may read it and no more, and other threads must wait");
+  }
+
+  World world_;
+  bool stepping_ = false;
+  std::optional<unsigned long> callback_thread_;
+};
+
+}  // namespace withe::bindings

@@ -1,0 +1,47 @@
+"""withe: soft robots made of slender rods, simulated implicitly, fast and accurately.
+
+A scene is described rod by rod (`Scene`), built into a `Simulation`, stepped or run, and what happened is
+kept in a `Record`. SI units, angles in radians.
+"""
+
+from withe import centrelines
+from withe._core import __version__
+from withe.errors import ConvergenceError
+from withe.handles import CustomForce, Drag, EdgeHandle, Joint, Load, Mass, NodeHandle, Rod, Support
+from withe.materials import Circle, Material, Rectangle, Stiffness, Tube
+from withe.readouts import Energy, Equilibrium, Plan, Reaction, Statistics
+from withe.recording import Record
+from withe.running import run_many
+from withe.scene import Scene
+from withe.simulation import Simulation
+from withe.snapshots import Snapshot
+
+__all__ = [
+    "Circle",
+    "ConvergenceError",
+    "CustomForce",
+    "Drag",
+    "EdgeHandle",
+    "Energy",
+    "Equilibrium",
+    "Joint",
+    "Load",
+    "Mass",
+    "Material",
+    "NodeHandle",
+    "Plan",
+    "Reaction",
+    "Record",
+    "Rectangle",
+    "Rod",
+    "Scene",
+    "Simulation",
+    "Snapshot",
+    "Statistics",
+    "Stiffness",
+    "Support",
+    "Tube",
+    "__version__",
+    "centrelines",
+    "run_many",
+]

@@ -1,0 +1,478 @@
+"""What may be changed on a simulation while it runs: the half of `Simulation` that acts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Literal, cast
+
+import numpy as np
+import numpy.typing as npt
+
+from withe import _core, shapes, validation
+from withe.description import added_mass, describe_support, drag, rod_parameters
+from withe.directory import Directory
+from withe.handles import Drag, Load, Mass, NodeHandle, Rod, Support
+from withe.motion import Path, Turn, evaluate_path, oriented
+from withe.parameters import ROD_WORDS, RodParameters
+from withe.parts import (
+    CustomForcePart,
+    DragPart,
+    LoadPart,
+    MassPart,
+    RodPart,
+    SupportPart,
+    handle_of,
+)
+from withe.rods import curvature_array, twist_array
+from withe.snapshots import Settings
+from withe.supports import check_not_held, make_clamp, make_pin
+
+__all__ = ["Control"]
+
+FloatArray = npt.NDArray[np.float64]
+_NATURAL_WORDS = ("natural_curvature", "natural_twist")
+
+
+class Control:
+    """Actuation, loads, supports and parameters of a running simulation."""
+
+    _scene: Directory
+    _scene_gravity: FloatArray
+    _options: dict[str, Any]
+    _directory: Directory
+    _settings: Settings
+    _world: _core.World
+
+    # Natural shape
+
+    def set_natural_curvature(
+        self, rod: Rod | str, curvature: npt.ArrayLike, *, over: float = 0.0, discrete: bool = False
+    ) -> None:
+        """Actuate a rod by changing the curvature at which it is free of stress.
+
+        A curvature out of the plane of a planar simulation makes it three-dimensional, unless it was
+        built with planar=True.
+
+        Parameters
+        ----------
+        rod : Rod or str
+        curvature : array_like of shape (2,) or (stencils, 2) [1/m]
+            Towards the two directors; one pair for the whole rod, or one a stencil.
+        over : float [s]
+            Reached after so long, evenly; at once by default.
+        discrete : bool
+            Whether the curvature is 2 tan(phi / 2) [-], phi the angle between two edges.
+
+        Raises
+        ------
+        ValueError
+            Wrong shape, not finite, a turn of pi or more at a node, or out of the plane of a simulation
+            that was built with planar=True.
+
+        Examples
+        --------
+        >>> simulation.set_natural_curvature(arm, (0.0, 12.5), over=0.2)      # doctest: +SKIP
+        """
+        part = self._directory.rod(rod)
+        values = curvature_array(curvature, part.voronoi, validation.truth(discrete, "discrete"), part.owner)
+        self._world.set_natural_curvature(part.index, values, validation.non_negative(over, "over"))
+
+    def set_natural_twist(self, rod: Rod | str, twist: npt.ArrayLike, *, over: float = 0.0) -> None:
+        """Actuate a rod by changing the twist at which it is free of stress.
+
+        Parameters
+        ----------
+        rod : Rod or str
+        twist : float or array_like of shape (stencils,) [rad/m]
+        over : float [s]
+            Reached after so long, evenly; at once by default.
+
+        Raises
+        ------
+        ValueError
+            Wrong shape, not finite, or not zero in a simulation that was built with planar=True.
+        """
+        part = self._directory.rod(rod)
+        values = twist_array(twist, part.voronoi, part.owner)
+        self._world.set_natural_twist(part.index, values, validation.non_negative(over, "over"))
+
+    # Parameters
+
+    def set(self, target: Rod | Load | Mass | Drag | str | None = None, /, **values: Any) -> None:
+        """Change parameters while the simulation runs.
+
+        Parameters
+        ----------
+        target : handle or str
+            None for what belongs to the whole scene.
+        **values
+            Of a rod: youngs_modulus, poisson_ratio, density, viscosity, stretch_stiffness,
+            bend_stiffness, twist_stiffness, line_density, viscous_time, drag (numbers, or one an edge),
+            natural_curvature, natural_twist. Of a load: force, moment or load, constant or a function of
+            time. Of a mass: mass. Of a drag: drag. Of the scene: gravity.
+
+        Raises
+        ------
+        ValueError
+            A word that the target does not have, or a value out of range; then nothing is changed.
+
+        Examples
+        --------
+        >>> simulation.set(arm, youngs_modulus=2e6)                            # doctest: +SKIP
+        >>> simulation.set(tip_load, force=lambda t: (0, 0, -t))               # doctest: +SKIP
+        """
+        if not values:
+            raise ValueError("set must be given what to set, such as youngs_modulus=1e6")
+        if target is None:
+            _only(values, ("gravity",), "the scene")
+            gravity = validation.vector(values["gravity"], "gravity")
+            self._world.set_gravity(gravity)
+            self._settings.gravity = gravity
+            return
+        part = self._directory.find_any(target, "target")
+        if isinstance(part, RodPart):
+            self._set_rod(part, values)
+        elif isinstance(part, LoadPart):
+            _only(values, (part.kind,), f"{part.kind} {part.name!r}")
+            self._set_load(part, values[part.kind])
+        elif isinstance(part, MassPart):
+            _only(values, ("mass",), f"mass {part.name!r}")
+            masses = self._settings.masses | {part.name: validation.non_negative(values["mass"], f"mass {part.name!r}")}
+            self._world.set_added_mass(added_mass(self._directory, masses))
+            self._settings.masses = masses
+        elif isinstance(part, DragPart):
+            _only(values, ("drag",), f"drag {part.name!r}")
+            self._set_drag(part, validation.non_negative(values["drag"], f"drag {part.name!r}"))
+        else:
+            raise ValueError(f"{part.name!r} has nothing to set")
+
+    def get(self, target: Rod | Load | Mass | Drag | str, word: str | None = None) -> Any:
+        """The present value of what `set` sets.
+
+        Parameters
+        ----------
+        target : handle or str
+            Or "gravity".
+        word : str
+            As in `set`.
+
+        Returns
+        -------
+        float or ndarray
+            Stiffnesses and what else belongs to edges one an edge, (edges,); natural curvature
+            (stencils, 2) and twist (stencils,); loads (3,). What belongs to a material as it was set.
+
+        Raises
+        ------
+        ValueError
+            A word that the target does not have.
+
+        Examples
+        --------
+        >>> simulation.get(arm, "natural_curvature")                           # doctest: +SKIP
+        """
+        if word is None:
+            if not isinstance(target, str) or target != "gravity":
+                raise ValueError("word must be given, such as get(arm, 'youngs_modulus')")
+            return self._settings.gravity.copy()
+        part = self._directory.find_any(target, "target")
+        if isinstance(part, RodPart):
+            if word in _NATURAL_WORDS:
+                readout = self._world.natural_curvature if word == _NATURAL_WORDS[0] else self._world.natural_twist
+                return np.array(readout(part.index))
+            if word in ROD_WORDS:
+                return self._settings.rods[part.index].get(word)
+            if word == "radius":
+                return part.section.radii.copy()
+        elif isinstance(part, LoadPart) and word == part.kind:
+            return np.array(self._world.load(self._load_index(part)))
+        elif isinstance(part, MassPart) and word == "mass":
+            return self._settings.masses[part.name]
+        elif isinstance(part, DragPart) and word == "drag":
+            return self._settings.drags[part.name]
+        raise ValueError(f"{part.name!r} has no {word!r}")
+
+    def _set_rod(self, part: RodPart, values: dict[str, Any]) -> None:
+        _only(values, (*ROD_WORDS, *_NATURAL_WORDS), part.owner)
+        parameters = self._settings.rods[part.index]
+        for word, value in values.items():
+            if word in ROD_WORDS:
+                parameters = parameters.changed(word, value, part.section, part.owner)
+        curvature = twist = None
+        if "natural_curvature" in values:
+            curvature = curvature_array(values["natural_curvature"], part.voronoi, False, part.owner)
+        if "natural_twist" in values:
+            twist = twist_array(values["natural_twist"], part.voronoi, part.owner)
+        self._apply_parameters(part.index, parameters)
+        if curvature is not None:
+            self._world.set_natural_curvature(part.index, curvature, 0.0)
+        if twist is not None:
+            self._world.set_natural_twist(part.index, twist, 0.0)
+
+    def _apply_parameters(self, rod: int, parameters: RodParameters) -> None:
+        if parameters is not self._settings.rods[rod]:
+            self._world.set_rod_parameters(rod, rod_parameters(parameters))
+            self._settings.rods[rod] = parameters
+
+    def _set_drag(self, part: DragPart, coefficient: float) -> None:
+        drags = self._settings.drags | {part.name: coefficient}
+        for rod in self._directory.all(RodPart):
+            if part.rods is None or rod.index in part.rods:
+                total = drag(self._directory, drags, rod)
+                changed = self._settings.rods[rod.index].changed("drag", total, rod.section, rod.owner)
+                self._apply_parameters(rod.index, changed)
+        self._settings.drags = drags
+
+    def _load_index(self, part: LoadPart) -> int:
+        return self._directory.all(LoadPart).index(part)
+
+    def _set_load(self, part: LoadPart, value: Any) -> None:
+        what = f"{part.kind} {part.name!r}"
+        function = value if callable(value) else None
+        now = validation.vector(value(self._world.time) if callable(value) else value, what)
+        self._world.set_load(self._load_index(part), now)
+        if function is None:
+            self._settings.functions.pop(part.name, None)
+        else:
+            self._settings.functions[part.name] = function
+
+    def set_velocities(self, rod: Rod | str | None, velocities: npt.ArrayLike) -> None:
+        """Set the velocities of the nodes of a rod; those that are held stay at rest.
+
+        Parameters
+        ----------
+        rod : Rod or str
+            None for every node of the scene.
+        velocities : array_like of shape (nodes, 3) or (3,) [m/s]
+
+        Raises
+        ------
+        ValueError
+            Wrong shape, or not finite.
+        """
+        now = np.array(self._world.velocities())
+        if rod is None:
+            now[:] = validation.number_array(velocities, "velocities", now.shape, (3,))
+        else:
+            part = self._directory.rod(rod)
+            shape = part.points.shape
+            now[self._directory.layout.rows(part.index)] = validation.number_array(
+                velocities, f"velocities of {part.owner}", shape, (3,)
+            )
+        self._world.set_velocities(now)
+
+    # Supports
+
+    def clamp(
+        self,
+        node: NodeHandle | str,
+        *,
+        hold: Literal["frame", "edge"] = "frame",
+        free: npt.ArrayLike | None = None,
+        name: str | None = None,
+    ) -> Support:
+        """Hold a node where it is now, and the direction and roll of its rod. See `Scene.clamp`.
+
+        Raises
+        ------
+        ValueError
+            A node that is held already.
+        """
+        return self._hold(make_clamp(self._directory, node, hold, free, name))
+
+    def pin(self, node: NodeHandle | str, *, free: npt.ArrayLike | None = None, name: str | None = None) -> Support:
+        """Hold a node where it is now. See `Scene.pin`.
+
+        Raises
+        ------
+        ValueError
+            A node that is held already.
+        """
+        return self._hold(make_pin(self._directory, node, free, name))
+
+    def _hold(self, part: SupportPart) -> Support:
+        check_not_held(self._directory, part, (other for _, other in self._settings.supports.values()))
+        index = self._world.add_support(describe_support(part))
+        self._settings.supports[part.name] = index, part
+        self._settings.added_supports = index + 1
+        self._directory.parts[part.name] = part
+        return cast(Support, handle_of(part, self._directory.scene_id, self._directory.layout))
+
+    def release(self, support: Support | NodeHandle | str) -> None:
+        """Let go of a node.
+
+        Parameters
+        ----------
+        support : Support, NodeHandle or str
+            A support, or the node that it holds.
+
+        Raises
+        ------
+        ValueError
+            Nothing holds that node.
+        """
+        index, part = self._support(support)
+        self._world.remove_support(index)
+        del self._settings.supports[part.name]
+        self._settings.paths.pop(part.name, None)
+        if part.name not in self._scene.parts:
+            del self._directory.parts[part.name]
+
+    def move(
+        self,
+        support: Support | NodeHandle | str,
+        position: npt.ArrayLike | None = None,
+        rotation: Any = None,
+        *,
+        tangent: npt.ArrayLike | None = None,
+        roll: float | None = None,
+        over: float = 0.0,
+        path: Path | None = None,
+    ) -> None:
+        """Move a support, or let it move along a path from now on. What is not given stays as it is.
+
+        Parameters
+        ----------
+        support : Support, NodeHandle or str
+            A support, or the node that it holds.
+        position : array_like of shape (3,) [m]
+        rotation : array_like of shape (3, 3), or a SciPy Rotation
+            Relative to the orientation as drawn.
+        tangent : array_like of shape (3,)
+            Where the rod is to point, instead: the smallest turn from the drawn tangent, and then ...
+        roll : float [rad]
+            ... a turn about it. Full turns count.
+        over : float [s]
+            Reached after so long, evenly; within the next step by default.
+        path : callable
+            Instead of all these: a function of time [s] that returns a position, or a position and a
+            rotation.
+
+        Raises
+        ------
+        ValueError
+            Nothing holds that node, a direction for a pin, or arguments that contradict each other.
+
+        Examples
+        --------
+        >>> simulation.move(arm.end, position=(0.1, 0, 0.2), roll=np.pi, over=0.5)      # doctest: +SKIP
+        """
+        index, part = self._support(support)
+        turns = part.kind != "pin"
+        owner = f"support {part.name!r}"
+        if path is not None:
+            if any(value is not None for value in (position, rotation, tangent, roll)) or over != 0.0:
+                raise ValueError(f"path of {owner} must be given alone")
+            validation.function(path, f"path of {owner}")
+            now = self._world.time
+            evaluate_path(path, now, self._world.support_rotation(index), turns, owner)
+            self._settings.paths[part.name] = path
+            return
+        if rotation is not None and (tangent is not None or roll is not None):
+            raise ValueError(f"rotation of {owner} must not be given together with tangent or roll")
+        if not turns and any(value is not None for value in (rotation, tangent, roll)):
+            raise ValueError(f"rotation, tangent and roll of {owner} must be None: a pin holds no direction")
+        over = validation.non_negative(over, "over")
+        target = np.array(self._world.support_position(index))
+        if position is not None:
+            target = validation.vector(position, f"position of {owner}")
+        if tangent is None and roll is None:
+            matrix = np.array(self._world.support_rotation(index))
+            if rotation is not None:
+                matrix = validation.rotation_matrix(rotation, f"rotation of {owner}")
+            self._world.move_support(index, target, matrix, over)
+            self._settings.paths.pop(part.name, None)
+            return
+        self._settings.paths[part.name] = self._turn(index, part, target, tangent, roll, over)
+
+    def _turn(self, index: int, part: SupportPart, target: FloatArray, tangent: Any, roll: Any, over: float) -> Turn:
+        """The way of a support from where it is to a tangent and a roll."""
+        rod = self._directory.rod(self._directory.layout.rods[part.node[0]].name)
+        if part.kind == "clamp":
+            drawn = shapes.drawn_frame(rod.tangents, rod.directors, rod.lengths, part.node[1], rod.closed)
+        else:
+            edge = min(part.node[1], len(rod.tangents) - 1)
+            drawn = rod.tangents[edge], rod.directors[edge]
+        now = self._world.time
+        matrix = np.array(self._world.support_rotation(index))
+        start_tangent = matrix @ drawn[0]
+        start_tangent /= np.linalg.norm(start_tangent)
+        flat = oriented(drawn[0], drawn[1], start_tangent, 0.0) @ drawn[1]
+        turned = matrix @ drawn[1]
+        start_roll = float(np.arctan2(np.cross(flat, turned) @ start_tangent, flat @ turned))
+        before = self._settings.paths.get(part.name)
+        if isinstance(before, Turn):
+            full_turn = 2.0 * np.pi
+            start_roll += full_turn * float(np.round((before.roll_at(now) - start_roll) / full_turn))
+        owner = f"support {part.name!r}"
+        end_tangent = start_tangent if tangent is None else validation.unit_vector(tangent, f"tangent of {owner}")
+        end_roll = start_roll if roll is None else validation.number(roll, f"roll of {owner}")
+        return Turn(
+            positions=np.stack([np.array(self._world.support_position(index)), target]),
+            tangents=np.stack([start_tangent, end_tangent]),
+            rolls=np.array([start_roll, end_roll]),
+            times=np.array([now, now + over]),
+            drawn=np.stack(drawn),
+        )
+
+    def _support(self, support: Any) -> tuple[int, SupportPart]:
+        """Index and part of a support, given by itself or by its node."""
+        if isinstance(support, NodeHandle) or (
+            isinstance(support, str) and support not in self._directory.parts and "." in support
+        ):
+            node, name = self._directory.node(support, "node")
+            row = self._directory.row(node)
+            for index, part in self._settings.supports.values():
+                if self._directory.row(part.node) == row:
+                    return index, part
+            raise ValueError(f"node {name!r} is not held: clamp or pin it first")
+        part = self._directory.find(support, SupportPart, "support")
+        if part.name not in self._settings.supports:
+            raise ValueError(f"support {part.name!r} is released")
+        return self._settings.supports[part.name]
+
+    # Functions of time
+
+    def _step_callback(self) -> Callable[[float, float], None] | None:
+        """What to call before every inner step, if anything."""
+        now = self._world.time
+        moving = any(not _finished(path, now) for path in self._settings.paths.values())
+        if moving or self._settings.functions or self._directory.all(CustomForcePart):
+            return self._apply_functions
+        return None
+
+    def _apply_functions(self, force_time: float, end_time: float) -> None:
+        """Evaluate loads, paths and custom forces for the coming inner step."""
+        if self._settings.functions:
+            for index, part in enumerate(self._directory.all(LoadPart)):
+                function = self._settings.functions.get(part.name)
+                if function is not None:
+                    what = f"{part.kind} {part.name!r} at t = {force_time:g}"
+                    self._world.set_load(index, validation.vector(function(force_time), what))
+        for name, path in self._settings.paths.items():
+            index, support = self._settings.supports[name]
+            if _finished(path, self._world.time):
+                continue
+            present = np.array(self._world.support_rotation(index))
+            owner = f"support {name!r}"
+            position, rotation = evaluate_path(path, end_time, present, support.kind != "pin", owner)
+            self._world.prescribe_support(index, position, rotation)
+        forces = self._directory.all(CustomForcePart)
+        if forces:
+            positions, velocities = self._world.positions(), self._world.velocities()
+            total = np.zeros_like(positions)
+            for force in forces:
+                value = force.function(self._world.time, positions.copy(), velocities.copy())
+                total += validation.number_array(value, f"custom force {force.name!r}", total.shape)
+            self._world.set_custom_force(total)
+
+
+def _finished(path: Path, time: float) -> bool:
+    """Whether a path has come to its end, and was followed there."""
+    return isinstance(path, Turn) and time >= path.times[1] and path.times[1] > path.times[0]
+
+
+def _only(values: dict[str, Any], words: tuple[str, ...], owner: str) -> None:
+    for word in values:
+        if word not in words:
+            raise ValueError(f"{owner} has no {word!r} to set; it has {', '.join(words)}")

@@ -1,0 +1,137 @@
+"""What a scene remembers of everything that was added to it: values, never changed in place."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from withe import handles
+from withe.parameters import RodParameters
+from withe.sections import SectionProperties
+
+__all__ = [
+    "CustomForcePart",
+    "DragPart",
+    "JoinPart",
+    "LoadPart",
+    "MassPart",
+    "Part",
+    "Pass",
+    "RodPart",
+    "SupportPart",
+    "handle_of",
+]
+
+FloatArray = npt.NDArray[np.float64]
+Pass = tuple[int, int]  # rod, node of the rod
+JoinKind = Literal["rigid", "pinned", "revolute"]
+JointForm = Literal["frame", "pairs"]
+LoadKind = Literal["force", "moment", "load"]
+SupportKind = Literal["pin", "clamp", "hold_edge"]
+
+
+@dataclass(frozen=True, eq=False)
+class RodPart:
+    """A rod as it was drawn."""
+
+    name: str
+    index: int
+    closed: bool
+    points: FloatArray  # (nodes, 3) [m]
+    tangents: FloatArray  # (edges, 3)
+    directors: FloatArray  # first directors, (edges, 3)
+    lengths: FloatArray  # (edges,) [m]
+    voronoi: FloatArray  # (stencils,) [m]
+    section: SectionProperties
+    parameters: RodParameters
+    natural_curvature: FloatArray  # (stencils, 2) [1/m]
+    natural_twist: FloatArray  # (stencils,) [rad/m]
+
+    @property
+    def owner(self) -> str:
+        """How errors call it."""
+        return f"rod {self.name!r}"
+
+
+@dataclass(frozen=True, eq=False)
+class JoinPart:
+    """Two nodes that are one."""
+
+    name: str
+    nodes: tuple[Pass, Pass]
+    node_names: tuple[str, str]
+    kind: JoinKind
+    axis: FloatArray | None
+    form: JointForm
+
+
+@dataclass(frozen=True, eq=False)
+class SupportPart:
+    """What holds a node."""
+
+    name: str
+    kind: SupportKind
+    node: Pass
+    node_name: str
+    free: FloatArray  # projector onto the directions along which the node may slide, (3, 3)
+
+
+@dataclass(frozen=True, eq=False)
+class LoadPart:
+    """A force at a node, a moment at a node, or a load along a rod."""
+
+    name: str
+    kind: LoadKind
+    node: Pass
+    value: FloatArray  # (3,), the value at t = 0 of one that varies
+    function: Callable[[float], npt.ArrayLike] | None
+    follower: bool
+
+
+@dataclass(frozen=True, eq=False)
+class MassPart:
+    """A mass at a node."""
+
+    name: str
+    node: Pass
+    mass: float
+
+
+@dataclass(frozen=True, eq=False)
+class DragPart:
+    """Viscous drag along rods; None: all of them."""
+
+    name: str
+    coefficient: float
+    rods: tuple[int, ...] | None
+
+
+@dataclass(frozen=True, eq=False)
+class CustomForcePart:
+    """Forces that a function computes."""
+
+    name: str
+    function: Callable[[float, FloatArray, FloatArray], npt.ArrayLike]
+
+
+Part = RodPart | JoinPart | SupportPart | LoadPart | MassPart | DragPart | CustomForcePart
+
+_HANDLES: dict[type[Any], type[handles.Handle]] = {
+    JoinPart: handles.Joint,
+    SupportPart: handles.Support,
+    LoadPart: handles.Load,
+    MassPart: handles.Mass,
+    DragPart: handles.Drag,
+    CustomForcePart: handles.CustomForce,
+}
+
+
+def handle_of(part: Part, scene_id: str, layout: handles.Layout) -> handles.Handle:
+    """The handle of a part."""
+    if isinstance(part, RodPart):
+        return handles.Rod(scene_id, part.name, layout, part.index)
+    return _HANDLES[type(part)](scene_id, part.name)

@@ -1,0 +1,135 @@
+"""What a simulation answers: small values that do not change any more."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+__all__ = ["Energy", "Equilibrium", "Plan", "Reaction", "Statistics"]
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Energy:
+    """Energies [J].
+
+    Attributes
+    ----------
+    kinetic, stretch, bend, twist, gravity, contact
+    loads
+        Minus the work done by loads and custom forces since the start.
+    total
+        Sum of the above.
+    work
+        Done by supports and actuation since the start.
+    dissipated
+        By viscosity and drag since the start.
+    """
+
+    kinetic: float
+    stretch: float
+    bend: float
+    twist: float
+    gravity: float
+    loads: float
+    contact: float
+    total: float
+    work: float
+    dissipated: float
+
+
+@dataclass(frozen=True, eq=False)
+class Reaction:
+    """What a support does to the rod.
+
+    Attributes
+    ----------
+    force : ndarray of shape (3,) [N]
+    moment : ndarray of shape (3,) [N m]
+        About the node.
+    """
+
+    force: FloatArray
+    moment: FloatArray
+
+
+@dataclass(frozen=True)
+class Equilibrium:
+    """How a static equilibrium was found.
+
+    Attributes
+    ----------
+    stable : bool
+        Whether every small motion would be pushed back.
+    iterations : int
+        Of Newton's method.
+    residual : float [N]
+        Greatest force out of balance that is left.
+    """
+
+    stable: bool
+    iterations: int
+    residual: float
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """What the work of a simulation took so far.
+
+    Attributes
+    ----------
+    steps, rejected_steps : int
+        Inner steps: a time step that had to be cut counts several.
+    iterations, factorizations : int
+        Of Newton's method.
+    largest_turn : float [rad]
+        Greatest turn of an edge within one inner step.
+    assembly_time, solve_time, total_time : float [s]
+    """
+
+    steps: int
+    rejected_steps: int
+    iterations: int
+    factorizations: int
+    largest_turn: float
+    assembly_time: float
+    solve_time: float
+    total_time: float
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """What was decided for a scene. `print(plan)` says it in a few lines.
+
+    Attributes
+    ----------
+    planar : bool
+    plane_normal : ndarray of shape (3,), or None
+    unknowns : int
+    solver : str
+        Of the linear equations.
+    stable_step : float or None
+        Of the explicit scheme [s].
+    notes : tuple of str
+        What is left out or was decided, and why.
+    """
+
+    planar: bool
+    plane_normal: FloatArray | None
+    unknowns: int
+    solver: str
+    stable_step: float | None
+    notes: tuple[str, ...]
+
+    def __str__(self) -> str:
+        where = "3D"
+        if self.plane_normal is not None:
+            normal = ", ".join(f"{value + 0.0:.3g}" for value in self.plane_normal)
+            where = f"planar, normal ({normal})"
+        lines = [f"{where}; {self.unknowns} unknowns; solver: {self.solver}"]
+        if self.stable_step is not None:
+            lines.append(f"explicit steps are stable up to {self.stable_step:.3g} s")
+        return "\n".join([*lines, *(f"- {note}" for note in self.notes)])

@@ -1,0 +1,497 @@
+"""Scenes: soft robots described rod by rod."""
+
+from __future__ import annotations
+
+import uuid
+from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING, Any, Literal, cast
+
+import numpy as np
+import numpy.typing as npt
+
+from withe import validation
+from withe.directory import Directory
+from withe.handles import CustomForce, Drag, Joint, Load, Mass, NodeHandle, Rod, RodPlace, Support
+from withe.joints import connected, gather
+from withe.materials import Material, Section, Stiffness
+from withe.parts import (
+    CustomForcePart,
+    DragPart,
+    JoinKind,
+    JoinPart,
+    JointForm,
+    LoadKind,
+    LoadPart,
+    MassPart,
+    Part,
+    Pass,
+    SupportPart,
+    handle_of,
+)
+from withe.rods import Natural, make_rod
+from withe.supports import check_not_held, make_clamp, make_pin
+
+if TYPE_CHECKING:
+    from withe.simulation import Integrator, LineSearch, Simulation, Solver
+
+__all__ = ["Scene"]
+
+FloatArray = npt.NDArray[np.float64]
+Value = npt.ArrayLike | Callable[[float], npt.ArrayLike]
+
+
+class Scene:
+    """A description of rods, joints, supports and loads, from which simulations are built.
+
+    Parameters
+    ----------
+    gravity : array_like of shape (3,) [m/s^2]
+
+    Examples
+    --------
+    >>> import withe
+    >>> scene = withe.Scene()
+    >>> rubber = withe.Material(youngs_modulus=1e6, density=1000.0)
+    >>> arm = scene.add_rod(start=(0, 0, 0), end=(0.3, 0, 0), nodes=31, radius=5e-3, material=rubber, name="arm")
+    >>> scene.clamp(arm.start)
+    Support(name='clamp 1')
+    >>> simulation = scene.build(integrator="static")                   # doctest: +SKIP
+    """
+
+    def __init__(self, *, gravity: npt.ArrayLike = (0.0, 0.0, -9.81)) -> None:
+        self._directory = Directory(uuid.uuid4().hex)
+        self._joins_at: dict[Pass, list[JoinPart]] = {}
+        self._low = np.full(3, np.inf)
+        self._high = np.full(3, -np.inf)
+        self.gravity = gravity
+
+    @property
+    def gravity(self) -> FloatArray:
+        """Acceleration of free fall, shape (3,) [m/s^2]."""
+        return self._gravity.copy()
+
+    @gravity.setter
+    def gravity(self, value: npt.ArrayLike) -> None:
+        self._gravity = validation.vector(value, "gravity")
+
+    @property
+    def rods(self) -> tuple[Rod, ...]:
+        """Handles of all rods, in the order they were added."""
+        return self._directory.rods
+
+    def __getitem__(self, name: str) -> Any:
+        """The handle of the part, node or edge of that name: ``scene["arm"]``, ``scene["arm.end"]``.
+
+        Raises
+        ------
+        ValueError
+            There is none.
+        """
+        return self._directory.handle(name)
+
+    def __repr__(self) -> str:
+        return f"Scene({', '.join(part.name for part in self._directory.parts.values())})"
+
+    # Rods and joints
+
+    def add_rod(
+        self,
+        *,
+        start: npt.ArrayLike | None = None,
+        end: npt.ArrayLike | None = None,
+        points: npt.ArrayLike | None = None,
+        nodes: int | None = None,
+        closed: bool = False,
+        normal: npt.ArrayLike | None = None,
+        radius: npt.ArrayLike | None = None,
+        section: Section | None = None,
+        material: Material | None = None,
+        stiffness: Stiffness | None = None,
+        line_density: npt.ArrayLike | None = None,
+        natural: Natural = "as_built",
+        natural_curvature: npt.ArrayLike | None = None,
+        natural_twist: npt.ArrayLike | None = None,
+        discrete: bool = False,
+        name: str | None = None,
+    ) -> Rod:
+        """Add a rod, from end to end or along any centreline.
+
+        Parameters
+        ----------
+        start, end : array_like of shape (3,) [m]
+            Ends of a straight rod of `nodes` nodes.
+        points : array_like of shape (n, 3) [m]
+            Centreline instead. Its points are the nodes, unless `nodes` asks for so many evenly spaced
+            by arc length along it.
+        nodes : int
+            Number of nodes, ends included.
+        closed : bool
+            Whether the last point is joined to the first (which may be repeated at the end).
+        normal : array_like of shape (3,) or (edges, 3)
+            First director of the first edge, which the others get by parallel transport, or of every
+            edge; made normal to the edge. By default the first coordinate axis not close to the edge.
+        radius : float or array_like of shape (edges,) [m]
+            Of a circular section.
+        section : Circle, Tube or Rectangle
+            Section instead of a radius; a rectangle's width lies along the first director.
+        material : Material
+        stiffness : Stiffness
+            Stiffnesses instead of a material, with `line_density`.
+        line_density : float or array_like of shape (edges,) [kg/m]
+            Mass per length.
+        natural : {"as_built", "straight"}
+            Shape that is free of stress: the one drawn, or straight.
+        natural_curvature : array_like of shape (2,) or (stencils, 2) [1/m]
+            Stress-free curvature towards d1 and d2 instead, that of the smooth rod.
+        natural_twist : float or array_like of shape (stencils,) [rad/m]
+            Stress-free twist instead.
+        discrete : bool
+            Whether natural_curvature is 2 tan(phi / 2) [-], phi the angle between two edges.
+        name : str
+            By default "rod 1", "rod 2", ...
+
+        Returns
+        -------
+        Rod
+
+        Raises
+        ------
+        ValueError
+            What cannot be a rod: the message names the argument, what was expected and what came.
+
+        Examples
+        --------
+        >>> scene = Scene()
+        >>> stiff = Stiffness(stretch=100.0, bend=(2e-3, 1e-3), twist=1e-3)
+        >>> scene.add_rod(start=(0, 0, 0), end=(0, 0, 1), nodes=11, radius=0.01, stiffness=stiff, line_density=0.1)
+        Rod(name='rod 1')
+        """
+        name = self._directory.new_name(name, "rod")
+        rod = make_rod(
+            name,
+            len(self._directory.layout.rods),
+            start=start,
+            end=end,
+            points=points,
+            nodes=nodes,
+            closed=closed,
+            normal=normal,
+            radius=radius,
+            section=section,
+            material=material,
+            stiffness=stiffness,
+            line_density=line_density,
+            natural=natural,
+            natural_curvature=natural_curvature,
+            natural_twist=natural_twist,
+            discrete=discrete,
+        )
+        place = RodPlace(name, len(rod.points), rod.closed, rod.section.radii, rod.section.widths)
+        self._directory.layout.add(place)
+        self._low = np.minimum(self._low, rod.points.min(axis=0))
+        self._high = np.maximum(self._high, rod.points.max(axis=0))
+        return cast(Rod, self._add(rod))
+
+    def join(
+        self,
+        a: NodeHandle | str,
+        b: NodeHandle | str,
+        kind: JoinKind = "rigid",
+        *,
+        axis: npt.ArrayLike | None = None,
+        form: JointForm = "frame",
+        name: str | None = None,
+    ) -> Joint:
+        """Make two nodes that coincide one.
+
+        Joins at the same node add up: any number of rods may meet there.
+
+        Parameters
+        ----------
+        a, b : NodeHandle or str
+            Ends or inner nodes, of two rods or of one.
+        kind : {"rigid", "pinned", "revolute"}
+            Whether the rods keep their angles, may turn freely, or about one axis.
+        axis : array_like of shape (3,)
+            Of a revolute joint, as it is drawn; it turns with a.
+        form : {"frame", "pairs"}
+            A rigid joint as a body of its own, bent against every edge, or as one bending element for
+            every pair of edges (archival; stiffer).
+        name : str
+
+        Returns
+        -------
+        Joint
+
+        Raises
+        ------
+        ValueError
+            Nodes that are apart by more than 1e-9 of the scene, one and the same node, joins that
+            contradict each other, or an axis without a revolute joint.
+        """
+        name = self._directory.new_name(name, "joint")
+        node_a, name_a = self._directory.node(a, "first node to join")
+        node_b, name_b = self._directory.node(b, "second node to join")
+        validation.choice(kind, "kind of the joint", ("rigid", "pinned", "revolute"))
+        validation.choice(form, "form of the joint", ("frame", "pairs"))
+        if (kind == "revolute") != (axis is not None):
+            raise ValueError(f"axis of the joint must be given when kind='revolute', and only then; kind is {kind!r}")
+        if form == "pairs" and kind != "rigid":
+            raise ValueError(f"form of the joint must be 'frame' when kind={kind!r}")
+        if node_a == node_b:
+            raise ValueError(f"nodes to join must be two, got {name_a!r} twice")
+        distance = float(np.linalg.norm(self._point(node_a) - self._point(node_b)))
+        if distance > 1e-9 * float(np.linalg.norm(self._high - self._low)):
+            raise ValueError(
+                f"nodes {name_a!r} and {name_b!r} must coincide to be joined, they are {distance:g} m apart"
+            )
+        direction = None if axis is None else validation.unit_vector(axis, "axis of the joint")
+        part = JoinPart(name, (node_a, node_b), (name_a, name_b), kind, direction, form)
+        joins = {join.name: join for node in part.nodes for join in connected(self._joins_at, node)}
+        gather([*joins.values(), part])
+        for node in part.nodes:
+            self._joins_at.setdefault(node, []).append(part)
+        self._directory.layout.merge(node_a, node_b)
+        return cast(Joint, self._add(part))
+
+    # Supports
+
+    def clamp(
+        self,
+        node: NodeHandle | str,
+        *,
+        hold: Literal["frame", "edge"] = "frame",
+        free: npt.ArrayLike | None = None,
+        name: str | None = None,
+    ) -> Support:
+        """Hold a node in place, and the direction and roll of its rod.
+
+        Parameters
+        ----------
+        node : NodeHandle or str
+        hold : {"frame", "edge"}
+            Clamp the rod at the node itself, as a wall does, or hold its end edge: both its nodes and
+            its angle.
+        free : array_like of shape (3,) or (2, 3)
+            Directions along which the clamp may slide.
+        name : str
+
+        Returns
+        -------
+        Support
+
+        Raises
+        ------
+        ValueError
+            A node that is held already.
+        """
+        return self._hold(make_clamp(self._directory, node, hold, free, name))
+
+    def pin(self, node: NodeHandle | str, *, free: npt.ArrayLike | None = None, name: str | None = None) -> Support:
+        """Hold a node in place, and leave its rod free to turn.
+
+        Arguments, result and refusals are those of `clamp`.
+        """
+        return self._hold(make_pin(self._directory, node, free, name))
+
+    def _hold(self, part: SupportPart) -> Support:
+        check_not_held(self._directory, part, self._directory.all(SupportPart))
+        return cast(Support, self._add(part))
+
+    # Loads
+
+    def add_force(
+        self, node: NodeHandle | str, force: Value, *, follower: bool = False, name: str | None = None
+    ) -> Load:
+        """Add a force at a node.
+
+        Parameters
+        ----------
+        node : NodeHandle or str
+        force : array_like of shape (3,) [N], or a function of time [s] that returns it
+        follower : bool
+            Whether it turns with the edge that ends at the node (or starts there, at the first node).
+        name : str
+
+        Returns
+        -------
+        Load
+        """
+        place, _ = self._directory.node(node, "node of the force")
+        return self._load("force", place, force, validation.truth(follower, "follower"), name)
+
+    def add_moment(self, node: NodeHandle | str, moment: Value, *, name: str | None = None) -> Load:
+        """Add a moment at a node, in world axes.
+
+        Parameters
+        ----------
+        node : NodeHandle or str
+        moment : array_like of shape (3,) [N m], or a function of time [s] that returns it
+        name : str
+
+        Returns
+        -------
+        Load
+        """
+        place, _ = self._directory.node(node, "node of the moment")
+        return self._load("moment", place, moment, False, name)
+
+    def add_load(self, rod: Rod | str, load: Value, *, follower: bool = False, name: str | None = None) -> Load:
+        """Add a force spread evenly along a rod.
+
+        Parameters
+        ----------
+        rod : Rod or str
+        load : array_like of shape (3,) [N/m], or a function of time [s] that returns it
+        follower : bool
+            Whether it turns with the edges.
+        name : str
+
+        Returns
+        -------
+        Load
+        """
+        part = self._directory.rod(rod, "rod of the load")
+        return self._load("load", (part.index, 0), load, validation.truth(follower, "follower"), name)
+
+    def _load(self, kind: LoadKind, node: Pass, value: Value, follower: bool, name: str | None) -> Load:
+        name = self._directory.new_name(name, kind)
+        what = f"{kind} {name!r}"
+        function = value if callable(value) else None
+        first = validation.vector(value(0.0) if callable(value) else value, what + (" at t = 0" if function else ""))
+        return cast(Load, self._add(LoadPart(name, kind, node, first, function, follower)))
+
+    def add_mass(self, node: NodeHandle | str, mass: float, *, name: str | None = None) -> Mass:
+        """Add a point mass [kg] to a node."""
+        name = self._directory.new_name(name, "mass")
+        place, node_name = self._directory.node(node, "node of the mass")
+        part = MassPart(name, place, validation.non_negative(mass, f"mass at {node_name!r}"))
+        return cast(Mass, self._add(part))
+
+    def add_drag(self, coefficient: float, *, rods: Iterable[Rod | str] | None = None, name: str | None = None) -> Drag:
+        """Add viscous drag: a force per length against the velocity. Drags on one rod add up.
+
+        Parameters
+        ----------
+        coefficient : float [Pa s]
+        rods : iterable of Rod or str
+            By default every rod, those added later included.
+        name : str
+
+        Returns
+        -------
+        Drag
+        """
+        name = self._directory.new_name(name, "drag")
+        coefficient = validation.non_negative(coefficient, "drag coefficient")
+        indices = None
+        if rods is not None:
+            if isinstance(rods, str) or not isinstance(rods, Iterable):
+                raise ValueError(f"rods of the drag must be a list of rods, got {rods!r:.80}")
+            indices = tuple(dict.fromkeys(self._directory.rod(rod, "rod of the drag").index for rod in rods))
+        return cast(Drag, self._add(DragPart(name, coefficient, indices)))
+
+    def add_custom_force(
+        self, function: Callable[[float, FloatArray, FloatArray], npt.ArrayLike], *, name: str | None = None
+    ) -> CustomForce:
+        """Add forces that a function computes, once before every step (explicitly).
+
+        Parameters
+        ----------
+        function : callable
+            ``function(time, positions, velocities)`` returns the force on every node of the scene,
+            shape (nodes, 3) [N]; time [s], positions [m] and velocities [m/s] are those before the step.
+        name : str
+
+        Returns
+        -------
+        CustomForce
+        """
+        name = self._directory.new_name(name, "custom force")
+        part = CustomForcePart(name, validation.function(function, "custom force"))
+        return cast(CustomForce, self._add(part))
+
+    # Simulations
+
+    def build(
+        self,
+        *,
+        integrator: Integrator = "implicit_midpoint",
+        time_step: float = 5e-3,
+        adaptive: bool = True,
+        tolerance: float | None = None,
+        planar: bool | None = None,
+        duration: float | None = None,
+        solver: Solver = "automatic",
+        line_search: LineSearch = "automatic",
+        mixed: bool = True,
+        step_tolerance: float = 1e-9,
+        force_tolerance: float = 1e-8,
+        max_iterations: int = 40,
+        max_halvings: int = 12,
+    ) -> Simulation:
+        """Turn the scene into the equations that it needs, ready to run. The scene may go on changing.
+
+        Parameters
+        ----------
+        integrator : {"implicit_midpoint", "backward_euler", "energy_momentum", "verlet", "static"}
+        time_step : float [s]
+        adaptive : bool
+            Whether an implicit step that fails is halved; steps grow back.
+        tolerance : float [m]
+            Cut steps so that the error of positions stays below it, over `duration`.
+        planar : bool
+            Force two or three dimensions; by default a scene that lies in a plane is solved in it.
+        duration : float [s]
+            Over which `tolerance` holds; 1 s by default.
+        solver : {"automatic", "band", "sparse"}
+        line_search : {"automatic", "goldstein_price", "none"}
+        mixed : bool
+            Newton's method with the axial forces as unknowns of their own.
+        step_tolerance : float
+            A Newton step below it, relative to the length of the scene, has converged.
+        force_tolerance : float
+            And forces out of balance below it, relative to those in the scene.
+        max_iterations : int
+            Of one Newton solve.
+        max_halvings : int
+            The smallest step is time_step / 2^max_halvings.
+
+        Returns
+        -------
+        Simulation
+
+        Raises
+        ------
+        ValueError
+            A scene without rods, planar=True for one that lies in no plane, an explicit step above
+            the stable limit, or an option out of range.
+        """
+        from withe.simulation import Simulation, make_options
+
+        options = make_options(
+            integrator=integrator,
+            time_step=time_step,
+            adaptive=adaptive,
+            tolerance=tolerance,
+            planar=planar,
+            duration=duration,
+            solver=solver,
+            line_search=line_search,
+            mixed=mixed,
+            step_tolerance=step_tolerance,
+            force_tolerance=force_tolerance,
+            max_iterations=max_iterations,
+            max_halvings=max_halvings,
+        )
+        return Simulation._build(self._directory.copy(), self._gravity.copy(), options)
+
+    # Helpers
+
+    def _add(self, part: Part) -> Any:
+        self._directory.parts[part.name] = part
+        return handle_of(part, self._directory.scene_id, self._directory.layout)
+
+    def _point(self, node: Pass) -> FloatArray:
+        rod = self._directory.layout.rods[node[0]].name
+        return np.asarray(self._directory.rod(rod).points[node[1]])

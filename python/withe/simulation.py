@@ -1,0 +1,466 @@
+"""Simulations: a scene while it runs."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path as FilePath
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from withe import _core, validation
+from withe.control import Control
+from withe.description import describe, parameters_of
+from withe.directory import Directory
+from withe.errors import ConvergenceError
+from withe.handles import NodeHandle, Rod, Support
+from withe.parts import DragPart, LoadPart, MassPart, SupportPart
+from withe.readouts import Energy, Equilibrium, Plan, Reaction, Statistics
+from withe.snapshots import Settings, Snapshot
+
+if TYPE_CHECKING:
+    from withe.recording import Record, Recorder
+
+__all__ = ["Integrator", "LineSearch", "Simulation", "Solver", "make_options"]
+
+FloatArray = npt.NDArray[np.float64]
+Integrator = Literal["implicit_midpoint", "backward_euler", "energy_momentum", "verlet", "static"]
+LineSearch = Literal["automatic", "goldstein_price", "none"]
+Solver = Literal["automatic", "band", "sparse"]
+
+_MAX_STEPS = 2**31 - 1
+
+
+class Simulation(Control):
+    """A scene while it runs. Made by `Scene.build`.
+
+    Read-outs are copies. Rods, nodes, supports and loads are given by their handles or their names.
+
+    Examples
+    --------
+    >>> import withe
+    >>> scene = withe.Scene()
+    >>> rubber = withe.Material(youngs_modulus=1e6, density=1000.0)
+    >>> arm = scene.add_rod(start=(0, 0, 0), end=(0, 0, -0.3), nodes=31, radius=5e-3, material=rubber, name="arm")
+    >>> support = scene.clamp(arm.start)
+    >>> simulation = scene.build(time_step=5e-3)
+    >>> simulation.step(10)
+    >>> round(simulation.time, 6)
+    0.05
+    """
+
+    def __init__(self) -> None:
+        raise TypeError("a Simulation is made by Scene.build")
+
+    @classmethod
+    def _build(cls, directory: Directory, gravity: FloatArray, options: dict[str, Any]) -> Simulation:
+        """A simulation of a directory that nobody else changes."""
+        self = cls.__new__(cls)
+        self._scene = directory
+        self._scene_gravity = gravity
+        self._options = options
+        self._directory = directory.copy()
+        description = describe(directory, gravity)
+        supports = {part.name: (index, part) for index, part in enumerate(directory.all(SupportPart))}
+        self._settings = Settings(
+            rods=parameters_of(directory),
+            masses={part.name: part.mass for part in directory.all(MassPart)},
+            drags={part.name: part.coefficient for part in directory.all(DragPart)},
+            gravity=gravity.copy(),
+            supports=supports,
+            added_supports=len(supports),
+            functions={part.name: part.function for part in directory.all(LoadPart) if part.function is not None},
+        )
+        self._world = _core.World(description, _engine_options(options))
+        self._recorder = None
+        self._exact_time = None
+        self._initial = self.snapshot()
+        return self
+
+    # Stepping
+
+    @property
+    def time(self) -> float:
+        """Time since the start [s]."""
+        now = self._world.time
+        if self._exact_time is not None and self._exact_time[0] == now:
+            return self._exact_time[1]
+        return now
+
+    @property
+    def time_step(self) -> float:
+        """As it was given to `Scene.build` [s]."""
+        return float(self._options["time_step"])
+
+    def step(self, count: int = 1) -> None:
+        """Advance by exactly `count` time steps, whatever is cut inside.
+
+        Raises
+        ------
+        ConvergenceError
+            A step that cannot be solved even when cut; the state is then the last accepted one.
+        ValueError
+            A count that is not a whole number, or negative.
+        """
+        count = validation.integer(count, "number of steps", 0, _MAX_STEPS)
+        with self._convergence():
+            self._world.step(count, self._step_callback())
+
+    def _advance_to(self, time: float) -> None:
+        """Advance to a time, with steps of equal length that are no longer than the time step."""
+        with self._convergence():
+            self._world.advance_to(time, self._step_callback())
+
+    def equilibrium(self) -> Equilibrium:
+        """Find the static equilibrium that the present state leads to, and go there. Time stands still.
+
+        Saddles are left, so that a straight column that carries too much buckles.
+
+        Returns
+        -------
+        Equilibrium
+
+        Raises
+        ------
+        ConvergenceError
+            None was found, or there is none (a free rod under gravity).
+        """
+        self._apply_functions(self._world.time, self._world.time)
+        with self._convergence():
+            found = self._world.equilibrium(None)
+        return Equilibrium(found.stable, found.iterations, found.residual)
+
+    def run(
+        self,
+        duration: float,
+        *,
+        record_every: float | None = None,
+        progress: bool | Literal["always"] = True,
+        before_step: Callable[[Simulation], object] | None = None,
+        until: Callable[[Simulation], object] | None = None,
+        record: Mapping[str, Callable[[Simulation], npt.ArrayLike]] | None = None,
+    ) -> Record:
+        """Advance by a duration and record what happens.
+
+        Frames are taken at the start, at every multiple of `record_every` after it, and at the end. Where
+        that is no multiple of the time step, steps are shortened evenly to land on the frames.
+
+        Parameters
+        ----------
+        duration : float [s]
+        record_every : float [s]
+            By default a hundredth of the duration, rounded up to whole time steps.
+        progress : bool or "always"
+            Whether to show a progress bar; True shows one on a terminal and in a notebook.
+        before_step : callable
+            Called with the simulation once before every time step, never before an inner or repeated one:
+            the place for a controller.
+        until : callable
+            Called with the simulation after every time step; the run ends when it returns true.
+        record : mapping of str to callable
+            What else to record: each is called with the simulation at every frame, and its results are
+            ``record[name]``.
+
+        Returns
+        -------
+        Record
+            Also kept as `simulation.record`.
+
+        Raises
+        ------
+        ConvergenceError, KeyboardInterrupt, or what a callback raised
+            What was recorded until then is `simulation.record`.
+        ValueError
+            A duration or record_every that is not positive, or a callback that cannot be called.
+        """
+        from withe.running import run
+
+        return run(
+            self,
+            duration,
+            record_every=record_every,
+            progress=progress,
+            before_step=before_step,
+            until=until,
+            record=record,
+        )
+
+    @property
+    def record(self) -> Record:
+        """What the last `run` recorded, also when it ended early.
+
+        Raises
+        ------
+        RuntimeError
+            There was none.
+        """
+        if self._recorder is None:
+            raise RuntimeError("there is no record: call run first")
+        return self._recorder.record
+
+    @contextmanager
+    def _convergence(self) -> Iterator[None]:
+        """Give the engine's failures the names of this scene."""
+        try:
+            yield
+        except _core.ConvergenceFailure as failure:
+            message, time, step, rod, node, residual = failure.args
+            name = self._directory.layout.rods[rod].name if rod >= 0 else None
+            raise ConvergenceError(message, time, step, name, node if node >= 0 else None, residual) from None
+
+    # Read-outs
+
+    @property
+    def rods(self) -> tuple[Rod, ...]:
+        """Handles of all rods, in the order of the scene."""
+        return self._directory.rods
+
+    def _rod(self, rod: Rod | str) -> int:
+        return self._directory.rod(rod).index
+
+    def positions(self, rod: Rod | str | None = None) -> FloatArray:
+        """Positions of the nodes of a rod, or of every node of the scene once.
+
+        Returns
+        -------
+        ndarray of shape (nodes, 3) [m]
+            Of the whole scene without a rod; `rod.rows` are a rod's rows there.
+
+        Raises
+        ------
+        ValueError
+            Not a rod of this scene.
+        """
+        positions = self._world.positions()
+        return positions if rod is None else positions[self._directory.layout.rows(self._rod(rod))]
+
+    def velocities(self, rod: Rod | str | None = None) -> FloatArray:
+        """Velocities of the nodes of a rod, or of every node once, shape (nodes, 3) [m/s]."""
+        velocities = self._world.velocities()
+        return velocities if rod is None else velocities[self._directory.layout.rows(self._rod(rod))]
+
+    def directors(self, rod: Rod | str) -> FloatArray:
+        """Material frames of the edges, shape (edges, 3, 3), rows d1, d2, tangent."""
+        return self._world.directors(self._rod(rod)).reshape(-1, 3, 3)
+
+    def curvatures(self, rod: Rod | str) -> FloatArray:
+        """Curvatures towards d1 and d2, shape (stencils, 2) [1/m]."""
+        return self._world.curvatures(self._rod(rod))
+
+    def twists(self, rod: Rod | str) -> FloatArray:
+        """Twists, shape (stencils,) [rad/m]."""
+        return self._world.twists(self._rod(rod))
+
+    def tensions(self, rod: Rod | str) -> FloatArray:
+        """Axial forces of the edges, pulling is positive, shape (edges,) [N]."""
+        return self._world.tensions(self._rod(rod))
+
+    def spins(self, rod: Rod | str) -> FloatArray:
+        """Angular velocities of the edges about their tangents, shape (edges,) [rad/s]."""
+        return self._world.spins(self._rod(rod))
+
+    def energy(self) -> Energy:
+        """Energies of the whole scene."""
+        energy = self._world.energy()
+        return Energy(**{name: getattr(energy, name) for name in Energy.__dataclass_fields__})
+
+    def reaction(self, support: Support | NodeHandle | str) -> Reaction:
+        """Force and moment of a support on the rod.
+
+        Parameters
+        ----------
+        support : Support, NodeHandle or str
+            A support, or the node that it holds.
+
+        Raises
+        ------
+        ValueError
+            Nothing holds that node.
+        """
+        index, _ = self._support(support)
+        reaction = self._world.reaction(index)
+        return Reaction(np.array(reaction.force), np.array(reaction.moment))
+
+    @property
+    def statistics(self) -> Statistics:
+        """What the work so far took."""
+        statistics = self._world.statistics
+        return Statistics(**{name: getattr(statistics, name) for name in Statistics.__dataclass_fields__})
+
+    @property
+    def plan(self) -> Plan:
+        """What was decided for this scene: ``print(simulation.plan)``."""
+        plan = self._world.plan
+        return Plan(
+            planar=plan.planar,
+            plane_normal=np.array(plan.plane_normal) if plan.planar else None,
+            unknowns=plan.unknowns,
+            solver=plan.solver,
+            stable_step=plan.stable_step or None,
+            notes=tuple(plan.notes),
+        )
+
+    def __getitem__(self, name: str) -> Any:
+        """The handle of the part, node or edge of that name."""
+        return self._directory.handle(name)
+
+    def __repr__(self) -> str:
+        rods = ", ".join(rod.name for rod in self.rods)
+        return f"Simulation(t = {self.time:g} s; rods {rods})"
+
+    # State
+
+    def snapshot(self) -> Snapshot:
+        """The whole state, to go back to with `restore`, bit by bit."""
+        return Snapshot(self._world.snapshot(), self._world.time, self._settings.copy())
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Go back to a snapshot, of this simulation or another of the same scene.
+
+        Raises
+        ------
+        ValueError
+            A snapshot of another scene, a damaged one, or one from a file that needs functions of time
+            that this simulation does not have.
+        """
+        if not isinstance(snapshot, Snapshot):
+            raise ValueError(f"snapshot must be a withe.Snapshot, got {type(snapshot).__name__}")
+        settings = self._matched(snapshot)
+        self._world.restore(snapshot._state)
+        for name in set(self._directory.parts) - set(self._scene.parts) - set(settings.supports):
+            del self._directory.parts[name]
+        for name, (_, part) in settings.supports.items():
+            self._directory.parts[name] = part
+        self._settings = settings
+        self._exact_time = None
+
+    def _matched(self, snapshot: Snapshot) -> Settings:
+        """Settings of a snapshot, made whole with what only this simulation knows."""
+        settings = snapshot._settings.copy()
+        mine = self._settings
+        counts = [len(rod.stretch_stiffness) for rod in mine.rods]
+        if (
+            [len(rod.stretch_stiffness) for rod in settings.rods] != counts
+            or settings.masses.keys() != mine.masses.keys()
+            or settings.drags.keys() != mine.drags.keys()
+        ):
+            raise ValueError("snapshot belongs to another scene")
+        for name, (index, part) in settings.supports.items():
+            node, _ = self._directory.node(part.node_name, f"node held by {name!r}")
+            settings.supports[name] = index, SupportPart(name, part.kind, node, part.node_name, part.free)
+            known = self._scene.parts.get(name)
+            if known is not None and not isinstance(known, SupportPart):
+                raise ValueError(f"snapshot belongs to another scene: {name!r} is no support in this one")
+        for name in snapshot._missing:
+            part_of_scene = self._scene.parts.get(name)
+            if name in settings.supports and name in mine.paths:
+                settings.paths[name] = mine.paths[name]
+            elif name in mine.functions:
+                settings.functions[name] = mine.functions[name]
+            elif isinstance(part_of_scene, LoadPart) and part_of_scene.function is not None:
+                settings.functions[name] = part_of_scene.function
+            else:
+                raise ValueError(
+                    f"snapshot needs the function of time of {name!r}, which no file holds: "
+                    "set it on this simulation first"
+                )
+        return settings
+
+    def reset(self) -> None:
+        """Go back to the scene as it was drawn, and undo everything that was set since."""
+        self.restore(self._initial)
+
+    def copy(self) -> Simulation:
+        """Another simulation in the same state, which goes its own way from here."""
+        other = Simulation.__new__(Simulation)
+        other.__dict__.update(self.__dict__)
+        other._directory = self._directory.copy()
+        other._settings = self._settings.copy()
+        other._world = self._world.copy()
+        other._recorder = None
+        return other
+
+    def __copy__(self) -> Simulation:
+        return self.copy()
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Simulation:
+        return self.copy()
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {
+            "scene": self._scene,
+            "gravity": self._scene_gravity,
+            "options": self._options,
+            "snapshot": self.snapshot(),
+        }
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        built = Simulation._build(state["scene"], state["gravity"], state["options"])
+        self.__dict__.update(built.__dict__)
+        self.restore(state["snapshot"])
+
+    # Pictures
+
+    def plot(self, **options: Any) -> Any:
+        """The present shape as a matplotlib figure; see `withe.view.plot` for the options."""
+        return self._frame().plot(**options)
+
+    def view(self, **options: Any) -> Any:
+        """The present shape to turn about, in a notebook or a window; see `withe.view.view`."""
+        return self._frame().view(**options)
+
+    def picture(self, path: str | os.PathLike[str], **options: Any) -> FilePath:
+        """Render the present shape into a .png file; see `withe.view.picture`."""
+        return self._frame().picture(path, **options)
+
+    def _frame(self) -> Record:
+        from withe.recording import present
+
+        return present(self)
+
+    _recorder: Recorder | None
+    _exact_time: tuple[float, float] | None
+    _initial: Snapshot
+
+
+def make_options(**options: Any) -> dict[str, Any]:
+    """Options of `Scene.build`, checked.
+
+    Raises
+    ------
+    ValueError
+        An option out of range, or tolerance with a scheme that takes none.
+    """
+    checked = dict(options)
+    words = {
+        "integrator": ("implicit_midpoint", "backward_euler", "energy_momentum", "verlet", "static"),
+        "solver": ("automatic", "band", "sparse"),
+        "line_search": ("automatic", "goldstein_price", "none"),
+    }
+    for name, known in words.items():
+        validation.choice(options[name], name, known)
+    for name in ("time_step", "step_tolerance", "force_tolerance"):
+        checked[name] = validation.positive(options[name], name)
+    for name in ("tolerance", "duration"):
+        checked[name] = None if options[name] is None else validation.positive(options[name], name)
+    for name in ("adaptive", "mixed"):
+        checked[name] = validation.truth(options[name], name)
+    if options["planar"] is not None:
+        checked["planar"] = validation.truth(options["planar"], "planar")
+    checked["max_iterations"] = validation.integer(options["max_iterations"], "max_iterations", 1, 10_000)
+    checked["max_halvings"] = validation.integer(options["max_halvings"], "max_halvings", 0, 40)
+    if checked["tolerance"] is not None and options["integrator"] in ("verlet", "static"):
+        raise ValueError(f"tolerance must be None with integrator={options['integrator']!r}")
+    if checked["duration"] is not None and checked["tolerance"] is None:
+        raise ValueError("duration must be given with a tolerance, and only then")
+    return checked
+
+
+def _engine_options(options: dict[str, Any]) -> _core.Options:
+    result = _core.Options()
+    for name, value in options.items():
+        setattr(result, name, value)
+    return result

@@ -1,0 +1,194 @@
+"""Snapshots: the whole state of a simulation at one moment, to go back to bit by bit."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path as FilePath
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from withe import io, validation
+from withe.motion import Path, Turn
+from withe.parameters import RodParameters
+from withe.parts import SupportPart
+
+__all__ = ["Settings", "Snapshot"]
+
+FloatArray = npt.NDArray[np.float64]
+
+_FILE_VERSION = 1
+
+
+@dataclass
+class Settings:
+    """What was set on a simulation that the engine does not keep in its state, or keeps in another form.
+
+    Attributes
+    ----------
+    rods : list of RodParameters
+    masses, drags : dict
+        Present value of each part, by name.
+    gravity : ndarray of shape (3,) [m/s^2]
+    supports : dict of str to (int, SupportPart)
+        Those that hold, with their index in the engine.
+    added_supports : int
+        How many supports the engine has had.
+    functions : dict of str to callable
+        Loads that vary, by name.
+    paths : dict of str to callable
+        Supports that move along a path, by name.
+    """
+
+    rods: list[RodParameters]
+    masses: dict[str, float]
+    drags: dict[str, float]
+    gravity: FloatArray
+    supports: dict[str, tuple[int, SupportPart]]
+    added_supports: int
+    functions: dict[str, Callable[[float], npt.ArrayLike]] = field(default_factory=dict)
+    paths: dict[str, Path] = field(default_factory=dict)
+
+    def copy(self) -> Settings:
+        """Settings that no longer change with these. What they hold is never changed in place."""
+        return Settings(
+            list(self.rods),
+            dict(self.masses),
+            dict(self.drags),
+            self.gravity.copy(),
+            dict(self.supports),
+            self.added_supports,
+            dict(self.functions),
+            dict(self.paths),
+        )
+
+
+class Snapshot:
+    """The whole state of a simulation at one moment. Made by `Simulation.snapshot`, or read with `load`.
+
+    It can be restored in any simulation of the same scene with the same options, and continues there bit
+    by bit. Functions of time (of loads and paths) are not stored in files: a simulation that restores a
+    loaded snapshot must have them already.
+    """
+
+    def __init__(self, state: bytes, time: float, settings: Settings, missing: tuple[str, ...] = ()) -> None:
+        self._state = state
+        self._time = time
+        self._settings = settings
+        self._missing = missing  # names of loads and supports whose functions are not in the file
+
+    @property
+    def time(self) -> float:
+        """When it was taken [s]."""
+        return self._time
+
+    def __repr__(self) -> str:
+        return f"Snapshot(t = {self._time:g} s)"
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Snapshot):
+            return NotImplemented
+        return self._state == other._state
+
+    def __hash__(self) -> int:
+        return hash(self._state)
+
+    def save(self, path: str | os.PathLike[str]) -> FilePath:
+        """Write the snapshot to one .npz file.
+
+        Raises
+        ------
+        OSError
+            The file cannot be written.
+        """
+        settings = self._settings
+        arrays: dict[str, npt.NDArray[Any]] = {
+            "state": np.frombuffer(self._state, np.uint8),
+            "gravity": settings.gravity,
+        }
+        for index, rod in enumerate(settings.rods):
+            arrays |= {f"rod_{index}_{word}": values for word, values in rod.arrays().items()}
+        supports = []
+        for number, (name, (index, part)) in enumerate(settings.supports.items()):
+            supports.append({"name": name, "index": index, "kind": part.kind, "node": part.node_name})
+            arrays[f"support_{number}_free"] = part.free
+            turn = settings.paths.get(name)
+            if isinstance(turn, Turn):
+                arrays |= {f"support_{number}_{word}": values for word, values in turn.arrays().items()}
+        paths = [name for name, path in settings.paths.items() if not isinstance(path, Turn)]
+        header = {
+            "time": self._time,
+            "rods": len(settings.rods),
+            "masses": settings.masses,
+            "drags": settings.drags,
+            "supports": supports,
+            "added_supports": settings.added_supports,
+            "functions": sorted({*settings.functions, *paths, *self._missing}),
+        }
+        return io.save_arrays(path, "snapshot", _FILE_VERSION, header, arrays)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Snapshot:
+        """Read a snapshot that `save` wrote. Nothing in the file is ever run.
+
+        Raises
+        ------
+        ValueError
+            A file that is damaged, not a snapshot, or of another version.
+        OSError
+            The file cannot be opened.
+        """
+        header, arrays = io.load_arrays(path, "snapshot", _FILE_VERSION)
+        try:
+            return cls._from_file(header, arrays)
+        except (KeyError, TypeError, AttributeError, ValueError, OverflowError) as error:
+            raise ValueError(f"{path} is a damaged snapshot: {error}") from error
+
+    @classmethod
+    def _from_file(cls, header: dict[str, Any], arrays: dict[str, npt.NDArray[Any]]) -> Snapshot:
+        rods = []
+        for index in range(validation.integer(header["rods"], "rods", 1, 10_000_000)):
+            mine = {
+                name.removeprefix(f"rod_{index}_"): values
+                for name, values in arrays.items()
+                if name.startswith(f"rod_{index}_")
+            }
+            rods.append(RodParameters.from_arrays(mine, len(mine["stretch_stiffness"]), f"rod {index}"))
+        supports: dict[str, tuple[int, SupportPart]] = {}
+        paths: dict[str, Path] = {}
+        for number, entry in enumerate(header["supports"]):
+            name, kind = str(entry["name"]), validation.choice(entry["kind"], "kind", ("pin", "clamp", "hold_edge"))
+            free = validation.number_array(arrays[f"support_{number}_free"], "free", (3, 3))
+            index = validation.integer(entry["index"], "index", 0, 10_000_000)
+            # Which node that is, the simulation that restores it knows by the name.
+            supports[name] = index, SupportPart(name, kind, (-1, -1), str(entry["node"]), free)  # type: ignore[arg-type]
+            if f"support_{number}_drawn" in arrays:
+                paths[name] = Turn(
+                    *(
+                        validation.number_array(arrays[f"support_{number}_{word}"], word, shape)
+                        for word, shape in (
+                            ("positions", (2, 3)),
+                            ("tangents", (2, 3)),
+                            ("rolls", (2,)),
+                            ("times", (2,)),
+                            ("drawn", (2, 3)),
+                        )
+                    )
+                )
+        settings = Settings(
+            rods=rods,
+            masses={str(name): validation.non_negative(mass, name) for name, mass in header["masses"].items()},
+            drags={str(name): validation.non_negative(drag, name) for name, drag in header["drags"].items()},
+            gravity=validation.vector(arrays["gravity"], "gravity"),
+            supports=supports,
+            added_supports=validation.integer(header["added_supports"], "added_supports", 0, 10_000_000),
+            paths=paths,
+        )
+        missing = tuple(str(name) for name in header["functions"])
+        state = arrays["state"]
+        if state.dtype != np.uint8 or state.ndim != 1:
+            raise ValueError("its state must be bytes")
+        return cls(state.tobytes(), validation.number(header["time"], "time"), settings, missing)

@@ -1,0 +1,59 @@
+"""Turns what a user says about a support into a `SupportPart`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from withe import validation
+from withe.directory import Directory
+from withe.parts import SupportPart
+
+__all__ = ["check_not_held", "make_clamp", "make_pin"]
+
+FloatArray = npt.NDArray[np.float64]
+
+
+def make_clamp(directory: Directory, node: Any, hold: Any, free: Any, name: Any) -> SupportPart:
+    """A clamp, checked; not yet in the directory."""
+    name = directory.new_name(name, "clamp")
+    place, node_name = directory.node(node, "node to clamp")
+    validation.choice(hold, "hold of the clamp", ("frame", "edge"))
+    kind: Literal["clamp", "hold_edge"] = "clamp" if hold == "frame" else "hold_edge"
+    return SupportPart(name, kind, place, node_name, _projector(free, "free of the clamp"))
+
+
+def make_pin(directory: Directory, node: Any, free: Any, name: Any) -> SupportPart:
+    """A pin, checked; not yet in the directory."""
+    name = directory.new_name(name, "pin")
+    place, node_name = directory.node(node, "node to pin")
+    return SupportPart(name, "pin", place, node_name, _projector(free, "free of the pin"))
+
+
+def check_not_held(directory: Directory, part: SupportPart, others: Iterable[SupportPart]) -> None:
+    """Refuse a second support of one node.
+
+    Raises
+    ------
+    ValueError
+        The node, or one that is joined to it, is held by one of the others.
+    """
+    row = directory.row(part.node)
+    for other in others:
+        if directory.row(other.node) == row:
+            raise ValueError(f"node {part.node_name!r} is already held by {other.name!r}: release that first")
+
+
+def _projector(free: Any, what: str) -> FloatArray:
+    """Projector onto the span of one or two directions."""
+    if free is None:
+        return np.zeros((3, 3))
+    directions = validation.number_array(free, what, (3,), (1, 3), (2, 3)).reshape(-1, 3)
+    units = np.array([validation.unit_vector(row, what) for row in directions])
+    u, sizes, _ = np.linalg.svd(units.T, full_matrices=False)
+    if sizes.min() < 1e-6:
+        raise ValueError(f"{what} must be directions that differ")
+    return np.asarray(u @ u.T, np.float64)

@@ -1,0 +1,218 @@
+"""Checks of what users hand in, at the border: each says which argument, what was expected and what came."""
+
+from __future__ import annotations
+
+import math
+import numbers
+import reprlib
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+__all__ = [
+    "choice",
+    "function",
+    "integer",
+    "non_negative",
+    "number",
+    "number_array",
+    "per_item",
+    "positive",
+    "rotation_matrix",
+    "truth",
+    "unit_vector",
+    "vector",
+]
+
+FloatArray = npt.NDArray[np.float64]
+
+
+def number(value: Any, what: str) -> float:
+    """A finite real number.
+
+    Raises
+    ------
+    ValueError
+        Not a real number, or not finite.
+    """
+    if isinstance(value, np.ndarray) and value.ndim == 0:
+        value = value[()]
+    if isinstance(value, bool | np.bool_) or not isinstance(value, numbers.Real):
+        raise ValueError(f"{what} must be a number, got {_short(value)}")
+    try:
+        result = float(value)
+    except OverflowError:
+        result = math.inf
+    if not math.isfinite(result):
+        raise ValueError(f"{what} must be finite, got {result}")
+    return result
+
+
+def positive(value: Any, what: str) -> float:
+    """A finite number above zero."""
+    result = number(value, what)
+    if result <= 0.0:
+        raise ValueError(f"{what} must be positive, got {result:g}")
+    return result
+
+
+def non_negative(value: Any, what: str) -> float:
+    """A finite number, zero or more."""
+    result = number(value, what)
+    if result < 0.0:
+        raise ValueError(f"{what} must not be negative, got {result:g}")
+    return result
+
+
+def integer(value: Any, what: str, low: int, high: int) -> int:
+    """A whole number in low..high, both included."""
+    if isinstance(value, np.ndarray) and value.ndim == 0:
+        value = value[()]
+    if isinstance(value, bool | np.bool_) or not isinstance(value, numbers.Integral):
+        raise ValueError(f"{what} must be a whole number, got {_short(value)}")
+    result = int(value)
+    if not low <= result <= high:
+        raise ValueError(f"{what} must lie in {low}..{high}, got {result}")
+    return result
+
+
+def truth(value: Any, what: str) -> bool:
+    """True or False, and nothing that merely counts as one of them."""
+    if not isinstance(value, bool | np.bool_):
+        raise ValueError(f"{what} must be True or False, got {_short(value)}")
+    return bool(value)
+
+
+def choice(value: Any, what: str, options: Sequence[str]) -> str:
+    """One of several words."""
+    if not isinstance(value, str) or value not in options:
+        raise ValueError(f"{what} must be {' or '.join(map(repr, options))}, got {_short(value)}")
+    return value
+
+
+def function(value: Any, what: str) -> Callable[..., Any]:
+    """Something that can be called."""
+    if not callable(value):
+        raise ValueError(f"{what} must be a function, got {_short(value)}")
+    return value  # type: ignore[no-any-return]
+
+
+def number_array(value: Any, what: str, *shapes: tuple[int | str, ...]) -> FloatArray:
+    """A copy of an array of finite numbers in one of several shapes.
+
+    Parameters
+    ----------
+    value : array_like
+    what : str
+        Named in errors.
+    *shapes : tuple of int or str
+        Sizes; a word stands for any size, and is used in errors.
+
+    Raises
+    ------
+    ValueError
+        Not numbers, another shape, or not finite.
+    """
+    wanted = " or ".join(_shape(shape) for shape in shapes)
+    try:
+        raw = np.asarray(value)
+    except (ValueError, TypeError, OverflowError) as error:
+        raise ValueError(f"{what} must be numbers of shape {wanted}, got {_short(value)}") from error
+    if raw.dtype.kind == "O" and raw.size and all(_is_real(item) for item in raw.flat):
+        try:
+            raw = raw.astype(np.float64)
+        except (OverflowError, TypeError, ValueError) as error:
+            raise ValueError(f"{what} must be finite numbers, got {_short(value)}") from error
+    if raw.dtype.kind not in "iuf":
+        raise ValueError(f"{what} must be numbers of shape {wanted}, got {_short(value)}")
+    if not any(_fits(raw.shape, shape) for shape in shapes):
+        raise ValueError(f"{what} must have shape {wanted}, got {raw.shape}")
+    result = np.array(raw, np.float64, order="C")
+    bad = ~np.isfinite(result)
+    if bad.any():
+        place = tuple(int(i) for i in np.argwhere(bad)[0])
+        where = f" at {list(place)}" if place else ""
+        raise ValueError(f"{what} must be finite, got {result[place]}{where}")
+    return result
+
+
+def per_item(value: Any, what: str, count: int, item: str, *, zero: bool = False, sign: bool = False) -> FloatArray:
+    """One number for all, or one an item, as an array of shape (count,).
+
+    Parameters
+    ----------
+    value : float or array_like of shape (count,)
+    what : str
+        Named in errors.
+    count : int
+    item : str
+        What the items are, in the plural: "edges".
+    zero, sign : bool
+        Whether zero is allowed, and negative numbers too.
+    """
+    if np.ndim(value) == 0 and not isinstance(value, str):
+        check = number if sign else non_negative if zero else positive
+        return np.full(count, check(value, what))
+    result = number_array(value, what, (count,))
+    bad = np.zeros(count, bool) if sign else result < 0.0 if zero else result <= 0.0
+    if bad.any():
+        place = int(np.flatnonzero(bad)[0])
+        rule = "must not be negative" if zero else "must be positive"
+        raise ValueError(f"{what} {rule}, got {result[place]:g} at {item} [{place}]")
+    return result
+
+
+def vector(value: Any, what: str) -> FloatArray:
+    """Three finite numbers."""
+    return number_array(value, what, (3,))
+
+
+def unit_vector(value: Any, what: str) -> FloatArray:
+    """A direction, scaled to unit length."""
+    direction = vector(value, what)
+    largest = np.abs(direction).max()
+    if largest == 0.0:
+        raise ValueError(f"{what} must not be zero")
+    direction /= largest
+    return direction / float(np.sqrt(direction @ direction))
+
+
+def rotation_matrix(value: Any, what: str) -> FloatArray:
+    """A rotation, as a matrix of shape (3, 3), from such a matrix or a SciPy Rotation.
+
+    Raises
+    ------
+    ValueError
+        Not orthogonal to 1e-6, or a reflection.
+    """
+    as_matrix = getattr(value, "as_matrix", None)
+    matrix = number_array(as_matrix() if callable(as_matrix) else value, what, (3, 3))
+    if np.abs(matrix @ matrix.T - np.eye(3)).max() > 1e-6:
+        raise ValueError(f"{what} must be a rotation: its rows are not orthonormal")
+    if np.linalg.det(matrix) < 0.0:
+        raise ValueError(f"{what} must be a rotation, got a reflection")
+    u, _, vt = np.linalg.svd(matrix)
+    return np.asarray(u @ vt, np.float64)
+
+
+def _is_real(item: Any) -> bool:
+    return isinstance(item, numbers.Real) and not isinstance(item, bool)
+
+
+def _fits(shape: tuple[int, ...], wanted: tuple[int | str, ...]) -> bool:
+    return len(shape) == len(wanted) and all(
+        isinstance(want, str) or size == want for size, want in zip(shape, wanted, strict=True)
+    )
+
+
+def _shape(shape: tuple[int | str, ...]) -> str:
+    return f"({', '.join(map(str, shape))}{',' if len(shape) == 1 else ''})"
+
+
+def _short(value: Any) -> str:
+    try:
+        return reprlib.repr(value)
+    except Exception:  # an object whose repr fails is bad input like any other
+        return f"a {type(value).__name__}"
