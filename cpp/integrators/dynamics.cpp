@@ -23,6 +23,17 @@ void book_work(const Equations& equations, const Parameters& parameters, StepRes
   if (parameters.dragged || parameters.viscous) result.dissipated = -equations.dissipative_force().dot(result.change);
 }
 
+/// Held unknowns move as they are told, so their inertia is what changes their velocity, not what the scheme's formula
+/// (`assumed`) says: mends the reactions, and gives the supports' work, exact in the kinetic energy.
+void book_supports(const Equations& equations, const VectorX& assumed, const VectorX& v0, const VectorX& v1, double dt,
+                   VectorX& full_residual, StepResult& result) {
+  const Assembler& assembler = equations.assembler();
+  const VectorX held = assembler.held_part(full_residual - assumed);
+  const VectorX held0 = assembler.held_part(v0), held1 = assembler.held_part(v1);
+  result.support_work = held.dot(result.change) + 0.5 * equations.mass.dot(held1.cwiseAbs2() - held0.cwiseAbs2());
+  full_residual += equations.mass.cwiseProduct(held1 - held0) / dt - assembler.held_part(assumed);
+}
+
 /// Forces over mass at q, with velocity v in drag, viscosity and the spin couple.
 VectorX explicit_acceleration(Equations& equations, const Parameters& parameters, double dt, const State& state,
                               const VectorX& q, const VectorX& v, State& from, NewtonWorkspace& work) {
@@ -89,6 +100,10 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
   const VectorX jerk = acceleration - state.acceleration;
   result.error = euler ? 0.5 * dt * dt * newton.displacement(acceleration) : dt * dt / 12.0 * newton.displacement(jerk);
   book_work(equations, parameters, result);
+  if (!model.constraints.empty()) {
+    const VectorX assumed = equations.mass.cwiseProduct((z - state.q) / (h * h) - state.v / h);
+    book_supports(equations, assumed, state.v, v1, dt, work.evaluation.full_residual, result);
+  }
   accept_configuration(model, q1, after, state);
   state.v = v1;
   state.acceleration = acceleration;
@@ -121,6 +136,8 @@ StepResult verlet_step(Equations& equations, const Parameters& parameters, doubl
   VectorX v1 = half + 0.5 * dt * acceleration;
   if (!v1.allFinite()) return result;
   book_work(equations, parameters, result);
+  if (!model.constraints.empty())
+    book_supports(equations, VectorX::Zero(model.dof_count), state.v, v1, dt, work.evaluation.full_residual, result);
   accept_configuration(model, q1, after, state);
   state.v = v1;
   state.acceleration = acceleration;

@@ -20,6 +20,7 @@ struct StepResult {
   double error = 0;         ///< estimated local error [m]
   double load_work = 0;     ///< of loads and custom forces [J]
   double dissipated = 0;    ///< by drag and viscosity [J]
+  double support_work = 0;  ///< [J]
 };
 
 /// Advances `state` by dt, or leaves it as it was when the step is not accepted.

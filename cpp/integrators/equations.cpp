@@ -61,6 +61,7 @@ void Equations::begin(const State& state, const Parameters& parameters, double h
   h_ = h;
   energy_momentum_ = energy_momentum;
   mass = mass_vector(model_, parameters);
+  gravity_ = gravity_force(model_, parameters);
   set_elastic(parameters, elastic);
   total_ = elastic;
   const bool viscous = parameters.viscous && h > 0.0;
@@ -69,6 +70,7 @@ void Equations::begin(const State& state, const Parameters& parameters, double h
     set_viscous(model_, parameters, start_, h, viscous_);
     if (!energy_momentum) add_coefficients(viscous_, total_);
   }
+  floor_current_ = false;
   node_dof_drag_.setZero();
   if (parameters.dragged && h > 0.0)
     for (int i = 0; i < model_.node_count; ++i)
@@ -103,14 +105,13 @@ void Equations::evaluate(const VectorX& z, bool with_matrix, const double* axial
     if (loads_.pieces[k].shape == LoadShape::dead_node)
       for (int i = 0; i < model_.dimension; ++i) out.potential += local.gradient[i] * z(dofs[i]);
   }
-  const VectorX gravity = gravity_force(model_, *parameters_);
-  out.potential -= gravity.dot(z);
+  out.potential -= gravity_.dot(z);
   const double inverse = h_ > 0.0 ? 1.0 / h_ : 0.0;
   const VectorX move = z - state_->q;
   const VectorX inertia = mass.cwiseProduct(inverse * inverse * move - inverse * state_->v);
   const VectorX drag = inverse * node_dof_drag_.cwiseProduct(move);
-  out.residual += inertia * (h_ > 0.0 ? 1.0 : 0.0) + drag - gravity - custom_force;
-  out.magnitude += drag.cwiseAbs() + gravity.cwiseAbs() + custom_force.cwiseAbs();
+  out.residual += inertia * (h_ > 0.0 ? 1.0 : 0.0) + drag - gravity_ - custom_force;
+  out.magnitude += drag.cwiseAbs() + gravity_.cwiseAbs() + custom_force.cwiseAbs();
   if (h_ > 0.0) {
     out.magnitude += inertia.cwiseAbs();
     if (!model_.planar()) add_spin_couple(z, out);
@@ -121,7 +122,9 @@ void Equations::evaluate(const VectorX& z, bool with_matrix, const double* axial
   out.full_residual = out.residual;
   assembler_.project(out.residual);
   if (with_matrix) assembler_.project_matrix();
-  set_floor(z, out.floor);
+  if (!floor_current_) set_floor(z, floor_);
+  floor_current_ = true;
+  out.floor = floor_;
 }
 
 void Equations::add_elastic(const VectorX& z, bool with_matrix, const double* axial_force, Evaluation& out) {

@@ -83,7 +83,9 @@ class Equations {
   Configuration start_, middle_, end_;
   VectorX difference_;  ///< q1 - q0
   VectorX end_q_, last_z_;
-  VectorX node_dof_drag_;
+  VectorX node_dof_drag_, gravity_;
+  VectorX floor_;
+  bool floor_current_ = false;
 };
 
 /// Per-unknown masses from the derived parameters.

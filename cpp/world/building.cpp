@@ -23,10 +23,9 @@ Vector3 node_velocity(const Model& model, const VectorX& v, int node) {
   return v(dof) * model.plane->first + v(dof + 1) * model.plane->second;
 }
 
-Matrix3 edge_directors(const Model& model, const State& state, const Configuration& c, int edge) {
+Matrix3 edge_directors(const Model& model, const Configuration& c, int edge) {
   Matrix3 out;
   const EdgeFrame<double>& f = c.edge[at(edge)];
-  (void)state;
   if (!model.planar()) {
     out << to_eigen(f.d1), to_eigen(f.d2), to_eigen(f.tangent);
     return out;
@@ -161,7 +160,7 @@ State World::Implementation::transferred(const Model& old, const State& from) co
   }
   for (int e = 0; e < model.edge_count; ++e) {
     if (lifted) {
-      const Matrix3 d = edge_directors(old, from, c, e);
+      const Matrix3 d = edge_directors(old, c, e);
       to.tangent[at(e)] = to_vec3(d.col(2));
       to.director[at(e)] = to_vec3(d.col(0));
     } else if (!model.planar()) {
@@ -211,7 +210,7 @@ void World::Implementation::relax_frames(const std::vector<bool>& is_new) {
     for (std::size_t h = 0; h < model.half.size(); ++h) {
       if (model.half[h].frame != f) continue;
       const int e = model.half[h].edge;
-      const Matrix3 now = edge_directors(model, state, c, e);
+      const Matrix3 now = edge_directors(model, c, e);
       const Vector3 t = to_eigen(model.initial_tangent[at(e)]), d1 = to_eigen(model.initial_director[at(e)]);
       Matrix3 drawn;
       drawn << d1, t.cross(d1), t;

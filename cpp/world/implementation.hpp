@@ -85,7 +85,7 @@ struct World::Implementation {
 Vector3 node_position(const Model& model, const VectorX& q, int node);
 Vector3 node_velocity(const Model& model, const VectorX& v, int node);
 /// Directors of an edge: columns d1, d2, t.
-Matrix3 edge_directors(const Model& model, const State& state, const Configuration& c, int edge);
+Matrix3 edge_directors(const Model& model, const Configuration& c, int edge);
 /// Rotation of a joint frame from the drawn axes.
 Matrix3 frame_rotation(const Model& model, const State& state, int frame);
 

@@ -164,7 +164,7 @@ void World::Implementation::inner_step(double dt, bool& accepted, double& error)
   statistics.largest_turn = std::max(statistics.largest_turn, r.largest_turn);
   load_work += r.load_work;
   dissipated += r.dissipated;
-  if (!model.constraints.empty()) support_work += equations->assembler().held_part(reaction_residual).dot(r.change);
+  support_work += r.support_work;
   // The residual of a frame's unknowns is J(w)^T moment, w its turn where the forces act.
   if (!model.planar())
     for (const Support& support : model.supports) {

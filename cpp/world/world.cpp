@@ -275,7 +275,7 @@ int World::add_support(const SupportDescription& support) {
                   d1 = to_eigen(self.model.initial_director[at(s.edge)]);
     Matrix3 drawn;
     drawn << d1, t.cross(d1), t;
-    m.rotation = edge_directors(self.model, self.state, c, s.edge) * drawn.transpose();
+    m.rotation = edge_directors(self.model, c, s.edge) * drawn.transpose();
   }
   m.from_position = m.to_position = m.position;
   m.from_rotation = m.to_rotation = m.rotation;
@@ -394,7 +394,7 @@ MatrixX9 World::directors(int rod) const {
   const int first = self.model.rod_first_edge.at(at(rod)), count = self.model.rod_first_edge.at(at(rod) + 1) - first;
   MatrixX9 out(count, 9);
   for (int e = 0; e < count; ++e) {
-    const Matrix3 d = edge_directors(self.model, self.state, c, first + e);
+    const Matrix3 d = edge_directors(self.model, c, first + e);
     out.row(e) << d.col(0).transpose(), d.col(1).transpose(), d.col(2).transpose();
   }
   return out;
