@@ -129,7 +129,7 @@ def _centreline(start: Any, end: Any, points: Any, nodes: Any, closed: bool, own
         with np.errstate(over="ignore", invalid="ignore"):
             return np.asarray((1.0 - share) * first + share * last, np.float64)
     line = validation.number_array(points, f"points of {owner}", ("n", 3))
-    if closed and len(line) > 1 and np.array_equal(line[0], line[-1]):
+    if closed and len(line) > 1 and np.abs(line[0] - line[-1]).max() <= 1e-9 * np.ptp(line, axis=0).max():
         line = line[:-1]
     if len(line) < (least if nodes is None else 2):
         raise ValueError(f"points of {owner} must be {least} or more, got {len(line)}")
