@@ -36,7 +36,7 @@ inline MatrixX central_difference(const Function& f, const VectorX& x, double in
 /// `largest`: first and largest increment, in the units of x.
 inline ::testing::AssertionResult derivative_matches(const Function& f, const VectorX& x, const MatrixX& claimed,
                                                      double largest = 1e-2) {
-  constexpr int kPoints = 7;           // two a decade, three decades
+  constexpr int kPoints = 7;  // two a decade, three decades
   constexpr double kTolerance = 1e-7;
   const double scale = claimed.cwiseAbs().maxCoeff();
   if (!claimed.allFinite()) return ::testing::AssertionFailure() << "the claimed derivative is not finite";

@@ -130,8 +130,8 @@ TEST(EdgeFrame, SpinIsTheDerivativeOfTheDirectorsTurn) {
     const Vector3 source = random.unit();
     const Vector3 e = 1.4 * (source + 0.9 * random.unit());
     const auto f = frame_of(e, source, source.unitOrthogonal(), 0.3);
-    EXPECT_TRUE(gradient_matches([&](const VectorX& d) { return lead(e, d, source); }, VectorX::Zero(3),
-                                 eigen(f.spin)));
+    EXPECT_TRUE(
+        gradient_matches([&](const VectorX& d) { return lead(e, d, source); }, VectorX::Zero(3), eigen(f.spin)));
   }
 }
 

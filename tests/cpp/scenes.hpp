@@ -17,13 +17,13 @@ constexpr double kPi = std::numbers::pi;
 
 /// What a rod is made of, the same along its length.
 struct RodMaterial {
-  double stretch = 30.0;                   ///< EA [N]
-  double bend1 = 1.0, bend2 = 0.7;         ///< EI1, EI2 [N m^2]
-  double twist = 0.8;                      ///< GJ [N m^2]
-  double density = 1.3, rotary = 0.0;      ///< [kg/m], [kg m]
-  double viscous_time = 0.0, drag = 0.0;   ///< [s], [Pa s]
-  Vector2 curvature = Vector2::Zero();     ///< natural [1/m]
-  double natural_twist = 0.0;              ///< [rad/m]
+  double stretch = 30.0;                  ///< EA [N]
+  double bend1 = 1.0, bend2 = 0.7;        ///< EI1, EI2 [N m^2]
+  double twist = 0.8;                     ///< GJ [N m^2]
+  double density = 1.3, rotary = 0.0;     ///< [kg/m], [kg m]
+  double viscous_time = 0.0, drag = 0.0;  ///< [s], [Pa s]
+  Vector2 curvature = Vector2::Zero();    ///< natural [1/m]
+  double natural_twist = 0.0;             ///< [rad/m]
 };
 
 /// A description that grows rod by rod.
