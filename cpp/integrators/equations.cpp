@@ -124,7 +124,15 @@ void Equations::evaluate(const VectorX& z, bool with_matrix, const double* axial
   if (with_matrix) assembler_.project_matrix();
   if (!floor_current_) set_floor(z, floor_);
   floor_current_ = true;
-  out.floor = floor_;
+  out.floor = floor_ + rounding_ * out.magnitude;
+  // An axial strain rounds along its edge only.
+  for (int e = 0; e < model_.edge_count; ++e) {
+    const Vec3d& t = middle_.edge[at(e)].tangent;
+    const double component[3] = {std::abs(t.x), std::abs(t.y), std::abs(t.z)};
+    for (int node : {model_.edge_tail[at(e)], model_.edge_head[at(e)]})
+      for (int i = 0; i < model_.dimension; ++i)
+        out.floor(model_.node_dof[at(node)] + i) += axial_floor_(e) * component[i];
+  }
 }
 
 void Equations::add_elastic(const VectorX& z, bool with_matrix, const double* axial_force, Evaluation& out) {
@@ -352,7 +360,7 @@ void Equations::add_spin_couple(const VectorX& z, Evaluation& out) const {
 }
 
 /// Rounding of a strain is about eps |x| / l; its stiffness turns it into a force that no iteration removes.
-void Equations::set_floor(const VectorX& z, VectorX& floor) const {
+void Equations::set_floor(const VectorX& z, VectorX& floor) {
   floor.setZero(model_.dof_count);
   double reach = 0.0;
   for (int i = 0; i < model_.node_count; ++i)
@@ -362,11 +370,10 @@ void Equations::set_floor(const VectorX& z, VectorX& floor) const {
     for (int i = 0; i < model_.dimension; ++i) floor(dof + i) += value;
   };
   const double unit = 4.0 * kEpsilon;
-  for (int e = 0; e < model_.edge_count; ++e) {
-    const double value = unit * total_.stretch_stiffness(e) * (reach / model_.edge_length(e) + 1.0);
-    node_add(model_.edge_tail[at(e)], value);
-    node_add(model_.edge_head[at(e)], value);
-  }
+  rounding_ = unit * (reach / model_.edge_length.minCoeff() + 1.0);
+  axial_floor_.resize(model_.edge_count);
+  for (int e = 0; e < model_.edge_count; ++e)
+    axial_floor_(e) = unit * total_.stretch_stiffness(e) * (reach / model_.edge_length(e) + 1.0);
   const auto bend_add = [&](double stiffness, double length, std::initializer_list<int> nodes,
                             std::initializer_list<int> angles) {
     const double moment = 2.0 * unit * stiffness * (reach / length + 1.0);

@@ -68,7 +68,7 @@ class Equations {
                const double (*metric)[kMaxLocal]);
   void add_planar_invariants(int stencil, Local& local, const Local& end, double start_energy) const;
   void add_spin_couple(const VectorX& z, Evaluation& out) const;
-  void set_floor(const VectorX& z, VectorX& floor) const;
+  void set_floor(const VectorX& z, VectorX& floor);
   void gather_difference(const ElementTable& table, int element, double* difference) const;
 
   const Model& model_;
@@ -84,7 +84,9 @@ class Equations {
   VectorX difference_;  ///< q1 - q0
   VectorX end_q_, last_z_;
   VectorX node_dof_drag_, gravity_;
-  VectorX floor_;
+  VectorX floor_;        ///< what bending, twisting and inertia leave by rounding
+  VectorX axial_floor_;  ///< per edge [N]
+  double rounding_ = 0;  ///< relative, of a direction in space
   bool floor_current_ = false;
 };
 

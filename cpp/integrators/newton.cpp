@@ -19,28 +19,29 @@ Newton::Newton(const Model& model, const Options& options) : model_(model), opti
   edge_scale_ = model.edge_length.minCoeff();
 }
 
-bool Newton::balanced(const Evaluation& e, NewtonResult& result, bool& at_floor) const {
+Balance Newton::balance(const Evaluation& e, NewtonResult& result) const {
   double force_scale = 0.0, moment_scale = 0.0;
   for (Eigen::Index i = 0; i < e.residual.size(); ++i)
     (is_angle_[static_cast<std::size_t>(i)] ? moment_scale : force_scale) =
         std::max(is_angle_[static_cast<std::size_t>(i)] ? moment_scale : force_scale, e.magnitude(i));
   moment_scale = std::max(moment_scale, force_scale * edge_scale_);
-  bool balanced = true;
-  at_floor = true;
+  Balance balance;
   result.residual = 0.0;
   for (Eigen::Index i = 0; i < e.residual.size(); ++i) {
     const bool angle = is_angle_[static_cast<std::size_t>(i)];
     const double r = std::abs(e.residual(i));
-    if (!(r <= 10.0 * e.floor(i))) at_floor = false;
-    if (!(r <= std::max(options_.force_tolerance * (angle ? moment_scale : force_scale), 10.0 * e.floor(i))))
-      balanced = false;
+    const bool floor = r <= 10.0 * e.floor(i);
+    const bool relative = r <= options_.force_tolerance * (angle ? moment_scale : force_scale);
+    balance.floor = balance.floor && floor;
+    balance.relative = balance.relative && relative;
+    balance.either = balance.either && (floor || relative);
     const double as_force = angle ? r / edge_scale_ : r;
     if (!(as_force <= result.residual)) {
       result.residual = as_force;
       result.worst_row = static_cast<int>(i);
     }
   }
-  return balanced;
+  return balance;
 }
 
 double Newton::cap(const VectorX& step) const {
@@ -92,10 +93,11 @@ NewtonResult Newton::solve(Equations& equations, VectorX& z, const VectorX* targ
       if (target) e.residual -= *target;
     };
     evaluate(!expect_end);
-    bool at_floor = false;
     if (!e.residual.allFinite()) return result;
-    const bool balanced = this->balanced(e, result, at_floor);
-    if (at_floor || (balanced && (result.step <= tolerance || stagnant >= 3))) {
+    const Balance balance = this->balance(e, result);
+    // Rounding alone is no proof before the first step: a light load on a stiff rod hides in it.
+    if ((balance.floor && (result.iterations > 0 || balance.relative)) ||
+        (balance.either && (result.step <= tolerance || stagnant >= 3))) {
       work.counters.assembly_time += seconds_since(start);
       result.converged = true;
       return result;
@@ -130,7 +132,7 @@ NewtonResult Newton::solve(Equations& equations, VectorX& z, const VectorX* targ
     z += work.step;
     previous_step = result.step;
     result.step = factor < 1.0 ? INFINITY : displacement(work.step);
-    stagnant = balanced && result.step > 0.25 * previous_step ? stagnant + 1 : 0;
+    stagnant = balance.either && result.step > 0.25 * previous_step ? stagnant + 1 : 0;
   }
 }
 

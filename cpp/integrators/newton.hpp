@@ -18,6 +18,13 @@ struct NewtonResult {
   double step = 0;  ///< greatest displacement of the last iteration [m]
 };
 
+/// How small the residuals are.
+struct Balance {
+  bool relative = true;  ///< all below the tolerance times the forces in the scene
+  bool floor = true;     ///< all within what rounding leaves
+  bool either = true;    ///< each one or the other
+};
+
 /// Scratch of the solver; owned by the world, so that a step does not allocate.
 struct NewtonWorkspace {
   Evaluation evaluation;
@@ -33,8 +40,8 @@ class Newton {
   /// their own, where the options allow it.
   NewtonResult solve(Equations& equations, VectorX& z, const VectorX* target, int max_iterations, NewtonWorkspace& work,
                      bool mixed = true) const;
-  /// Which residuals are small enough: relative to the forces in the scene, or to rounding.
-  bool balanced(const Evaluation& evaluation, NewtonResult& result, bool& at_floor) const;
+  /// Whether residuals are small enough; also notes the worst one in `result`.
+  Balance balance(const Evaluation& evaluation, NewtonResult& result) const;
   /// Factor by which a step is shortened, so that nothing moves or turns too far at once.
   double cap(const VectorX& step) const;
   double displacement(const VectorX& step) const;

@@ -137,8 +137,7 @@ class Statics {
       begin();
       equations_.evaluate(state_.q, true, nullptr, work_.evaluation);
       const Evaluation here = work_.evaluation;
-      bool at_floor = false;
-      const bool balanced = newton_.balanced(here, last, at_floor);
+      const Balance balance = newton_.balance(here, last);
       if (damping == 0.0) {
         double stiffness = 0.0;
         for (int i = 0; i < model.dof_count; ++i)
@@ -146,7 +145,7 @@ class Statics {
         damping = 1e-6 * stiffness;
         lowest_ = 1e-12 * stiffness;
       }
-      if ((at_floor || (balanced && damping <= lowest_ * 1e2)) || (k % 10 == 9 && damping <= lowest_ * 1e4)) {
+      if ((balance.floor || (balance.either && damping <= lowest_ * 1e2)) || (k % 10 == 9 && damping <= lowest_ * 1e4)) {
         // Near a minimum full Newton steps finish the work, if they stay near.
         z = state_.q;
         const double energy = here.potential;

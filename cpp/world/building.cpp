@@ -74,6 +74,8 @@ World::Implementation::Implementation(const Implementation& other)
       spatial(other.spatial),
       level(other.level),
       easy_steps(other.easy_steps),
+      patience(other.patience),
+      guard(other.guard),
       support_work(other.support_work),
       actuation_work(other.actuation_work),
       dissipated(other.dissipated),

@@ -26,6 +26,14 @@ struct NaturalRamp {
   bool curvature_active = false, twist_active = false;
 };
 
+/// Books of the watch over plain midpoint's energy.
+struct EnergyGuard {
+  double turn = 0;       ///< of the last step [rad]
+  double scale = 0;      ///< [J]
+  double excess = 0;     ///< out of nowhere so far [J]
+  double step_gain = 0;  ///< in the last step [J]
+};
+
 struct World::Implementation {
   Implementation(SceneDescription description, Options options);
   Implementation(const Implementation& other);
@@ -50,6 +58,8 @@ struct World::Implementation {
   bool spatial = false;  ///< left its plane while running
   int level = 0;         ///< present halvings of the time step
   int easy_steps = 0;
+  int patience = 4;             ///< easy steps before a longer one is tried
+  EnergyGuard guard;
   double support_work = 0, actuation_work = 0, dissipated = 0, load_work = 0;
   std::optional<Energy> alarm;  ///< energies at the start, for the explicit scheme's alarm
   NewtonResult last_newton;
@@ -79,6 +89,7 @@ struct World::Implementation {
   Energy energy() const;
   double actuation_energy(const State& at, const Parameters& p) const;
   void check_explicit();
+  bool gains_energy(const Energy& then);
 };
 
 /// Position of a node in space, from any configuration vector.

@@ -52,6 +52,8 @@ void exchange(Archive& io, Self& self) {
   for (auto* x : {&self.support_work, &self.actuation_work, &self.dissipated, &self.load_work}) io(*x);
   io(self.level);
   io(self.easy_steps);
+  io(self.patience);
+  for (auto* x : {&self.guard.turn, &self.guard.scale, &self.guard.excess}) io(*x);
   for (auto& m : self.motions) {
     io(m.position);
     io(m.rotation);

@@ -162,6 +162,7 @@ void World::Implementation::inner_step(double dt, bool& accepted, double& error)
   reaction_current = true;
   statistics.steps += 1;
   statistics.largest_turn = std::max(statistics.largest_turn, r.largest_turn);
+  guard.turn = r.largest_turn;
   load_work += r.load_work;
   dissipated += r.dissipated;
   support_work += r.support_work;
@@ -201,7 +202,12 @@ void World::Implementation::advance(double duration) {
           options.integrator == Integrator::implicit_midpoint || options.integrator == Integrator::energy_momentum;
       callback(state.time + (mid ? 0.5 : 1.0) * dt, state.time + dt);
     }
-    const State backup = options.tolerance ? state : State{};
+    const bool guarded = options.adaptive && options.integrator == Integrator::implicit_midpoint;
+    const State backup = options.tolerance || guarded ? state : State{};
+    // Where edges hardly turn, there is nothing to gain and nothing to look at.
+    const bool watched = guarded && guard.turn > 0.01;
+    const Energy then = watched ? energy() : Energy{};
+    guard.step_gain = 0.0;
     bool accepted = false;
     double error = 0.0;
     const auto books = std::tuple{support_work, actuation_work, dissipated, load_work};
@@ -214,6 +220,12 @@ void World::Implementation::advance(double duration) {
     }
     const bool may_halve = (options.adaptive || options.tolerance) && level < options.max_halvings &&
                            options.integrator != Integrator::verlet;
+    if (accepted && watched && gains_energy(then)) {
+      too_coarse = true;
+      patience = 64;
+    }
+    if (accepted && too_coarse && watched && !may_halve)
+      fail(last_newton, dt, "the midpoint rule gains energy at this step: use integrator='energy_momentum'");
     if (accepted && too_coarse && may_halve) {
       state = backup;
       std::tie(support_work, actuation_work, dissipated, load_work) = books;
@@ -233,13 +245,23 @@ void World::Implementation::advance(double duration) {
     position += size;
     state.time = position == units ? base + duration
                                    : base + duration * static_cast<double>(position) / static_cast<double>(units);
-    if (very_fine && ++easy_steps >= 4 && level > 0) {
+    guard.excess += guard.step_gain;
+    if (very_fine && ++easy_steps >= patience && level > 0) {
       --level;
       easy_steps = 0;
+      patience = 4;
     }
     if (!very_fine) easy_steps = 0;
   }
   if (options.integrator == Integrator::verlet) check_explicit();
+}
+
+/// Plain midpoint pumps energy into stretching when edges turn far within a step: whether the step just taken did.
+bool World::Implementation::gains_energy(const Energy& then) {
+  const Energy now = energy();
+  guard.scale = std::max({guard.scale, now.kinetic, then.kinetic, 0.1 * (now.stretch + now.bend + now.twist)});
+  guard.step_gain = (now.total - now.work + now.dissipated) - (then.total - then.work + then.dissipated);
+  return guard.step_gain > 1e-6 * guard.scale && guard.excess + guard.step_gain > 5e-3 * guard.scale;
 }
 
 /// An explicit scheme that is about to blow up gains energy long before it shows as NaN.
@@ -256,19 +278,22 @@ void World::Implementation::fail(const NewtonResult& r, double dt, const std::st
   int rod = -1, node = -1;
   std::string place;
   if (r.worst_row >= 0) {
+    const auto holds = [&](int first, int count) { return first <= r.worst_row && r.worst_row < first + count; };
+    int where = -1;
+    for (int i = 0; i < model.node_count; ++i)
+      if (holds(model.node_dof[at(i)], model.dimension)) where = i;
+    for (int f = 0; f < model.frame_count; ++f)
+      if (holds(model.frame_dof[at(f)], model.frame_size())) where = model.frame_node[at(f)];
+    for (const Hinge& hinge : model.hinges)
+      if (holds(hinge.dof, 1)) where = model.frame_node[at(hinge.frame)];
+    for (std::size_t e = 0; e < model.edge_dof.size(); ++e)
+      if (holds(model.edge_dof[e], 1)) where = model.edge_tail[e];
     for (std::size_t k = 0; k < description.rods.size() && rod < 0; ++k) {
       const auto& nodes = description.rods[k].nodes;
-      for (std::size_t i = 0; i < nodes.size(); ++i) {
-        const int first = model.node_dof[at(nodes[i])];
-        int last = first + model.dimension;
-        const int edge = model.rod_first_edge[k] + static_cast<int>(i);
-        if (!model.planar() && edge < model.rod_first_edge[k + 1]) last = std::max(last, model.edge_dof[at(edge)] + 1);
-        if (r.worst_row >= first - (i == 0 ? 3 : 0) && r.worst_row < last) {
-          rod = static_cast<int>(k);
-          node = static_cast<int>(i);
-          break;
-        }
-      }
+      const auto found = std::find(nodes.begin(), nodes.end(), where);
+      if (found == nodes.end()) continue;
+      rod = static_cast<int>(k);
+      node = static_cast<int>(found - nodes.begin());
     }
     if (rod >= 0) place = " at node " + std::to_string(node) + " of rod '" + description.rods[at(rod)].name + "'";
   }
@@ -340,8 +365,7 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
   system.evaluate(state.q, false, nullptr, work.evaluation);
   reaction_residual = work.evaluation.full_residual;
   reaction_current = true;
-  bool floor = false;
-  newton->balanced(work.evaluation, r.newton, floor);
+  newton->balance(work.evaluation, r.newton);
   return {r.stable, r.newton.iterations, r.newton.residual};
 }
 
