@@ -14,21 +14,26 @@ void lay_out_unknowns(Model& model) {
   std::vector<std::vector<int>> frames_at(at(model.node_count));
   for (int f = 0; f < model.frame_count; ++f) frames_at[at(model.frame_node[at(f)])].push_back(f);
 
-  const auto place_node = [&](int node) {
-    if (model.node_dof[at(node)] >= 0) return;
+  const auto place_frames = [&](int node) {
     for (int f : frames_at[at(node)]) {
       model.frame_dof[at(f)] = next;
       next += model.frame_size();
       for (Hinge& hinge : model.hinges)
         if (hinge.frame == f) hinge.dof = next++;
     }
+  };
+  // A frame at the far end of a rod stands outside the stencil of the node before, so that the band stays as narrow.
+  const auto place_node = [&](int node, bool far_end) {
+    if (model.node_dof[at(node)] >= 0) return;
+    if (!far_end) place_frames(node);
     model.node_dof[at(node)] = next;
     next += model.dimension;
+    if (far_end) place_frames(node);
   };
   const auto place_rod = [&](std::size_t r) {
     const RodDescription& rod = rods[r];
     for (std::size_t i = 0; i < rod.nodes.size(); ++i) {
-      place_node(rod.nodes[i]);
+      place_node(rod.nodes[i], i > 0 && i + 1 == rod.nodes.size() && !rod.closed);
       const int edge = model.rod_first_edge[r] + static_cast<int>(i);
       if (edge < model.rod_first_edge[r + 1] && !model.planar()) model.edge_dof[at(edge)] = next++;
     }
@@ -51,7 +56,7 @@ void lay_out_unknowns(Model& model) {
         current = following;
       }
     }
-  for (int node = 0; node < model.node_count; ++node) place_node(node);
+  for (int node = 0; node < model.node_count; ++node) place_node(node, false);
   model.dof_count = next;
 }
 
