@@ -1,0 +1,88 @@
+"""Loads at which straight columns buckle: Euler's four cases and Greenhill's column under its own weight.
+
+A small side load measures the stiffness that is left; it is read off where it would vanish. The same columns are
+then loaded just below and just above, where they must stay straight and must not.
+"""
+
+import numpy as np
+import pytest
+import rods
+import theory
+import withe
+from convergence import assert_order, zero_crossing
+
+SIDE = 1e-5
+SHARES = (0.93, 0.95, 0.97, 0.98, 0.99)
+
+
+def column(case, edges, load, side):
+    """A vertical column, pressed at its upper end."""
+    scene = rods.weightless()
+    rod = rods.straight(scene, edges, direction=(0.0, 0.0, 1.0))
+    (scene.pin if case == "pinned" else scene.clamp)(rod.start)
+    if case in ("pinned", "clamped-pinned"):
+        scene.pin(rod.end, free=(0.0, 0.0, 1.0))
+    elif case == "clamped":
+        scene.clamp(rod.end, free=(0.0, 0.0, 1.0))
+    scene.add_force(rod.end, (0.0, 0.0, -load))
+    probe = rod.end if case == "free" else rod.node(edges // 2)
+    if side:
+        scene.add_force(probe, (side, 0.0, 0.0))
+    return scene, rod, -1 if case == "free" else edges // 2
+
+
+def heavy_column(edges, load, side):
+    scene = withe.Scene(gravity=(0.0, 0.0, -load))
+    rod = rods.straight(scene, edges, direction=(0.0, 0.0, 1.0))
+    scene.clamp(rod.start)
+    if side:
+        scene.add_force(rod.end, (side, 0.0, 0.0))
+    return scene, rod, -1
+
+
+def buckling_load(make, exact):
+    loads = [share * exact for share in SHARES]
+    deflections = []
+    for load in loads:
+        scene, rod, probe = make(load, SIDE)
+        simulation = rods.sharp(scene, planar=True)
+        simulation.equilibrium()
+        deflections.append(simulation.positions(rod)[probe, 0] / SIDE)
+    return zero_crossing(loads, deflections)
+
+
+@pytest.mark.parametrize("case", theory.EULER_LOADS)
+def test_euler_load_converges_at_second_order(case):
+    exact = theory.EULER_LOADS[case]
+    errors = [buckling_load(lambda p, s, n=n: column(case, n, p, s), exact) / exact - 1.0 for n in (16, 32, 64)]
+    assert_order(errors)
+    assert abs(errors[-1]) < 1e-3
+
+
+@pytest.mark.parametrize(("case", "K"), [("pinned", 1.0), ("free", 2.0), ("clamped", 0.5), ("clamped-pinned", 0.699)])
+def test_effective_lengths_are_eulers(case, K):
+    assert theory.EULER_LOADS[case] == pytest.approx((np.pi / K) ** 2, rel=1.5e-3)
+
+
+def test_self_weight_at_which_a_column_buckles_converges_at_second_order():
+    assert pytest.approx(7.837, abs=5e-4) == theory.GREENHILL
+    errors = [
+        buckling_load(lambda p, s, n=n: heavy_column(n, p, s), theory.GREENHILL) / theory.GREENHILL - 1.0
+        for n in (16, 32, 64)
+    ]
+    assert_order(errors)
+    assert abs(errors[-1]) < 1e-3
+
+
+@pytest.mark.parametrize("planar", [True, False], ids=["planar", "spatial"])
+@pytest.mark.parametrize("case", [*theory.EULER_LOADS, "own weight"])
+def test_column_stands_below_its_load_and_leaves_the_saddle_above(case, planar):
+    exact = theory.GREENHILL if case == "own weight" else theory.EULER_LOADS[case]
+    for share, straight in ((0.98, True), (1.02, False)):
+        make = heavy_column if case == "own weight" else lambda *a: column(case, *a)
+        scene, rod, _ = make(64, share * exact, 0.0)
+        simulation = rods.sharp(scene, planar=planar)
+        result = simulation.equilibrium()
+        sway = np.abs(simulation.positions(rod)[:, :2]).max()
+        assert result.stable
+        assert sway < 1e-9 if straight else sway > 0.01

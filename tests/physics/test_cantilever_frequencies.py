@@ -1,0 +1,64 @@
+"""Natural frequencies of a cantilever against Euler and Bernoulli.
+
+The linearised eigenproblem is put together from the answers of the engine alone: column j of the flexibility is
+the deflection under a small force at node j, and masses follow from the kinetic energy of one moving node.
+"""
+
+import numpy as np
+import pytest
+import rods
+import theory
+from convergence import assert_order
+
+PROBE = 1e-7
+
+
+def frequencies(nodes, hold):
+    scene = rods.weightless()
+    arm = rods.straight(scene, nodes - 1)
+    scene.clamp(arm.start, hold=hold)
+    push = scene.add_force(arm.end, (0.0, 0.0, 0.0))
+    free = np.arange(1 if hold == "frame" else 2, nodes)
+    pushes = {int(i): scene.add_force(arm.node(int(i)), (0.0, 0.0, 0.0)) for i in free[:-1]}
+    pushes[nodes - 1] = push
+    simulation = rods.sharp(scene)
+
+    flexibility = np.empty((len(free), len(free)))
+    for column, i in enumerate(free):
+        simulation.set(pushes[int(i)], force=(0.0, 0.0, PROBE))
+        simulation.equilibrium()
+        flexibility[:, column] = simulation.positions(arm)[free, 2] / PROBE
+        simulation.set(pushes[int(i)], force=(0.0, 0.0, 0.0))
+    np.testing.assert_allclose(flexibility, flexibility.T, atol=1e-6 * flexibility.max())
+
+    masses = np.empty(len(free))
+    for row, i in enumerate(free):
+        velocities = np.zeros((nodes, 3))
+        velocities[i, 2] = 1.0
+        simulation.set_velocities(arm, velocities)
+        masses[row] = 2.0 * simulation.energy().kinetic
+    root = np.sqrt(masses)
+    values = np.linalg.eigvalsh(root[:, None] * flexibility * root)
+    return 1.0 / np.sqrt(values[::-1][:3])
+
+
+EXACT = np.square(theory.CANTILEVER_ROOTS)
+
+
+def test_first_three_frequencies_are_theirs_at_201_nodes():
+    assert theory.CANTILEVER_ROOTS == pytest.approx((1.87510, 4.69409, 7.85476), abs=1e-5)
+    errors = frequencies(201, "frame") / EXACT - 1.0
+    assert np.all(np.abs(errors) < (0.5e-4, 2e-4, 4e-4)), errors
+
+
+def test_frequencies_of_a_cantilever_converge_at_second_order():
+    errors = np.array([frequencies(n, "frame") for n in (26, 51, 101)]) / EXACT - 1.0
+    for mode in errors.T:
+        assert_order(mode)
+
+
+def test_frequencies_of_a_rod_held_by_its_first_edge_converge_at_first_order_only():
+    errors = np.array([frequencies(n, "edge") for n in (51, 101, 201)]) / EXACT - 1.0
+    for mode in errors.T:
+        assert_order(mode, order=1.0)
+    np.testing.assert_allclose(errors[-1], (0.0050, 0.0050, 0.0049), atol=1e-4)

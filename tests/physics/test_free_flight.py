@@ -1,0 +1,143 @@
+"""A free rod that tumbles keeps its momentum, its angular momentum and its energy, scheme by scheme."""
+
+import numpy as np
+import pytest
+import rods
+from convergence import assert_order
+
+EDGES = 16
+RADIUS = 0.08
+SCHEMES = ("backward_euler", "implicit_midpoint", "energy_momentum", "verlet")
+
+
+def rod_points(planar):
+    s = np.linspace(-0.5, 0.5, EDGES + 1)
+    return np.stack([s, np.zeros_like(s) if planar else 0.3 * s**3, 0.25 * s**2], axis=1)
+
+
+def flight(integrator, step, planar, spin_rate=1.0, stretch=2e3):
+    """A free rod, bent when drawn and straight by nature, that tumbles, drifts and, in space, twists."""
+    scene = rods.weightless()
+    points = rod_points(planar)
+    rod = scene.add_rod(
+        points=points,
+        natural="straight",
+        stiffness=rods.stiffness(bend=(1.0, 1.0) if planar else (1.0, 1.6), twist=0.8, stretch=stretch),
+        line_density=1.0,
+        radius=RADIUS,
+    )
+    simulation = scene.build(
+        integrator=integrator,
+        time_step=step,
+        planar=None if planar else False,
+        step_tolerance=1e-13,
+        force_tolerance=1e-13,
+        adaptive=False,
+    )
+    velocities = np.cross((0.0, spin_rate, 0.0), points) + (0.1, 0.0, 0.2)
+    if not planar:
+        velocities += np.cross((0.7 * spin_rate, 0.0, 0.4 * spin_rate), points) + (0.0, 0.3, 0.0)
+    simulation.set_velocities(rod, velocities)
+    return simulation, rod
+
+
+def masses(simulation, rod):
+    """Half of each edge next to a node, taken from the kinetic energy of one moving node at a time."""
+    kept = simulation.snapshot()
+    out = np.empty(EDGES + 1)
+    for i in range(EDGES + 1):
+        velocities = np.zeros((EDGES + 1, 3))
+        velocities[i, 0] = 1.0
+        simulation.set_velocities(rod, velocities)
+        spinning = simulation.energy().kinetic
+        simulation.set_velocities(rod, 2.0 * velocities)
+        out[i] = 2.0 * (simulation.energy().kinetic - spinning) / 3.0
+        simulation.restore(kept)
+    return out
+
+
+def momenta(simulation, rod, mass):
+    x, v = simulation.positions(rod), simulation.velocities(rod)
+    return mass @ v, np.cross(x, v).T @ mass
+
+
+@pytest.mark.parametrize("planar", [True, False], ids=["planar", "spatial"])
+@pytest.mark.parametrize("integrator", SCHEMES)
+def test_linear_momentum_is_kept_to_solver_tolerance(integrator, planar):
+    simulation, rod = flight(integrator, 2e-3, planar)
+    mass = masses(simulation, rod)
+    before, _ = momenta(simulation, rod, mass)
+    simulation.step(500)
+    after, _ = momenta(simulation, rod, mass)
+    np.testing.assert_allclose(after, before, atol=1e-10)
+
+
+@pytest.mark.parametrize("integrator", ["implicit_midpoint", "energy_momentum"])
+def test_angular_momentum_is_kept_to_solver_tolerance_in_a_plane(integrator):
+    simulation, rod = flight(integrator, 5e-3, True)
+    mass = masses(simulation, rod)
+    _, before = momenta(simulation, rod, mass)
+    simulation.step(1000)
+    _, after = momenta(simulation, rod, mass)
+    assert abs(before[1]) > 0.05
+    np.testing.assert_allclose(after, before, atol=1e-10)
+
+
+@pytest.mark.parametrize("integrator", ["implicit_midpoint", "energy_momentum"])
+def test_angular_momentum_with_twist_is_kept_at_second_order_in_the_step(integrator):
+    """Spin about the tangents included: rho J l omega t."""
+    drifts = []
+    for steps in (100, 200, 400):
+        simulation, rod = flight(integrator, 1.0 / steps, False, spin_rate=2.0)
+        mass = masses(simulation, rod)
+        totals = []
+        for count in (0, steps):
+            simulation.step(count)
+            lengths = np.linalg.norm(np.diff(rod_points(False), axis=0), axis=1)
+            inertia = 0.5 * RADIUS**2 * lengths
+            spin = (inertia * simulation.spins(rod)) @ simulation.directors(rod)[:, 2]
+            totals.append(momenta(simulation, rod, mass)[1] + spin)
+        drifts.append(np.linalg.norm(totals[1] - totals[0]))
+    # The spin matters: it is far more than what may be lost.
+    assert np.linalg.norm(spin) > 10.0 * drifts[-1]
+    assert_order(drifts, slack=0.25)
+    assert drifts[-1] < 1e-3 * np.linalg.norm(totals[0])
+
+
+@pytest.mark.parametrize("planar", [True, False], ids=["planar", "spatial"])
+@pytest.mark.parametrize("step", [2e-3, 2e-2])
+def test_energy_momentum_keeps_the_energy_of_a_free_rod(step, planar):
+    simulation, _ = flight("energy_momentum", step, planar, spin_rate=3.0)
+    before = simulation.energy()
+    drift, swing = 0.0, 0.0
+    for _ in range(50):
+        simulation.step(10)
+        energy = simulation.energy()
+        drift = max(drift, abs(energy.total - before.total))
+        swing = max(swing, abs(energy.kinetic - before.kinetic))
+    assert simulation.statistics.rejected_steps == 0
+    assert swing > 1e-3 * before.kinetic
+    assert drift < 1e-9 * before.kinetic
+
+
+def test_midpoint_keeps_the_energy_of_a_free_rod_over_ten_thousand_steps():
+    """Steps of a twentieth of the bending period, and edges that turn by less than 0.1 rad in each."""
+    period = 2.0 * np.pi / 4.7300408**2  # free-free beam, b = 4.7300
+    simulation, _ = flight("implicit_midpoint", period / 20.0, False, spin_rate=1.0)
+    before = simulation.energy()
+    totals = []
+    for _ in range(200):
+        simulation.step(50)
+        totals.append(simulation.energy().total)
+    assert simulation.statistics.rejected_steps == 0
+    assert simulation.statistics.largest_turn < 0.1
+    totals = np.array(totals)
+    assert np.ptp(totals) < 0.01 * before.kinetic
+    slope = np.polyfit(np.linspace(0.0, 1.0, len(totals)), totals, 1)[0]
+    assert abs(slope) < 0.01 * before.kinetic
+
+
+def test_midpoint_says_so_when_edges_turn_too_far_in_a_step():
+    simulation, _ = flight("implicit_midpoint", 5e-2, False, spin_rate=4.0, stretch=2e2)
+    simulation.step(10)
+    assert simulation.statistics.largest_turn > 0.1

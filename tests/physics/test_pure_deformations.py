@@ -1,0 +1,159 @@
+"""Uniform bending, stretching and twisting, where closed forms hold, and sections as a user gives them."""
+
+import numpy as np
+import pytest
+import rods
+import withe
+from convergence import assert_order
+
+
+@pytest.mark.parametrize("planar", [None, False], ids=["planar", "spatial"])
+def test_end_moment_closes_a_circle_at_second_order(planar):
+    gaps = []
+    for edges in (32, 64, 128):
+        scene = rods.weightless()
+        rod = rods.straight(scene, edges)
+        scene.clamp(rod.start)
+        moment = scene.add_moment(rod.end, (0.0, 0.0, 0.0))
+        simulation = rods.sharp(scene, planar=planar)
+        for share in np.linspace(0.1, 1.0, 10):
+            simulation.set(moment, moment=(0.0, -2.0 * np.pi * share, 0.0))
+            simulation.equilibrium()
+        positions = simulation.positions(rod)
+        gaps.append(np.linalg.norm(positions[-1] - positions[0]))
+        assert np.ptp(positions[:, 2]) == pytest.approx(1.0 / np.pi, rel=2e-2)
+    assert_order(gaps)
+
+
+@pytest.mark.parametrize("planar", [None, False], ids=["planar", "spatial"])
+def test_end_moment_at_once_finds_the_same_circle(planar):
+    scene = rods.weightless()
+    rod = rods.straight(scene, 64)
+    scene.clamp(rod.start)
+    scene.add_moment(rod.end, (0.0, -2.0 * np.pi, 0.0))
+    simulation = rods.sharp(scene, planar=planar)
+    simulation.equilibrium()
+    np.testing.assert_allclose(simulation.positions(rod)[-1], 0.0, atol=5e-3)
+
+
+@pytest.mark.parametrize("component", [0, 1])
+def test_natural_curvature_closes_a_circle_to_rounding(component):
+    scene = rods.weightless()
+    rod = rods.straight(scene, 50, normal=(0.0, 1.0, 0.0), stiffness=rods.stiffness(bend=(1.0, 2.0)))
+    scene.clamp(rod.start)
+    simulation = rods.sharp(scene)
+    curvature = np.zeros(2)
+    curvature[component] = 2.0 * np.pi
+    for share in np.linspace(0.1, 1.0, 10):
+        simulation.set_natural_curvature(rod, share * curvature)
+        assert simulation.equilibrium().stable
+    positions = simulation.positions(rod)
+    np.testing.assert_allclose(positions[-1], positions[0], atol=1e-9)
+    # The rod bends towards the director: d1 is +y, d2 = t x d1 is +z.
+    assert np.mean(positions[:, 1 + component]) == pytest.approx(0.5 / np.pi, rel=1e-2)
+    np.testing.assert_allclose(simulation.curvatures(rod)[:, component], 2.0 * np.pi, rtol=1e-9)
+    assert simulation.energy().total == pytest.approx(0.0, abs=1e-12)
+
+
+def round_bar(**more):
+    scene = rods.weightless()
+    rubber = withe.Material(youngs_modulus=2e6, poisson_ratio=0.3, density=1000.0)
+    bar = scene.add_rod(
+        start=(0, 0, 0), end=(0.4, 0, 0), nodes=21, radius=5e-3, material=rubber, normal=(0, 1, 0), name="bar"
+    )
+    return scene, bar
+
+
+@pytest.mark.parametrize("planar", [None, False], ids=["planar", "spatial"])
+def test_pulled_bar_stretches_by_FL_over_EA(planar):
+    scene, bar = round_bar()
+    wall = scene.clamp(bar.start)
+    scene.add_force(bar.end, (3.0, 0.0, 0.0))
+    simulation = rods.sharp(scene, planar=planar)
+    simulation.equilibrium()
+    area = np.pi * 5e-3**2
+    assert simulation.positions(bar)[-1, 0] - 0.4 == pytest.approx(3.0 * 0.4 / (2e6 * area), rel=1e-9)
+    np.testing.assert_allclose(simulation.tensions(bar), 3.0, rtol=1e-9)
+    np.testing.assert_allclose(simulation.reaction(wall).force, (-3.0, 0.0, 0.0), atol=1e-9)
+    assert simulation.energy().stretch == pytest.approx(3.0**2 * 0.4 / (2.0 * 2e6 * area), rel=1e-9)
+
+
+def angle_about_x(directors):
+    return np.arctan2(directors[:, 0, 2], directors[:, 0, 1])
+
+
+def test_torque_at_the_end_turns_it_by_TL_over_GJ():
+    scene, bar = round_bar()
+    wall = scene.clamp(bar.start)
+    twist_stiffness = 2e6 / (2.0 * 1.3) * np.pi * 5e-3**4 / 2.0
+    torque = 0.8 * twist_stiffness / 0.4
+    scene.add_moment(bar.end, (torque, 0.0, 0.0))
+    simulation = rods.sharp(scene)
+    simulation.equilibrium()
+    # Directors are those of the middles of edges.
+    middles = (np.arange(20) + 0.5) * 0.02
+    np.testing.assert_allclose(angle_about_x(simulation.directors(bar)), torque * middles / twist_stiffness, rtol=1e-9)
+    np.testing.assert_allclose(simulation.twists(bar), torque / twist_stiffness, rtol=1e-9)
+    np.testing.assert_allclose(simulation.reaction(wall).moment, (-torque, 0.0, 0.0), atol=1e-9 * torque)
+
+
+def test_turned_clamp_is_resisted_by_GJ_over_L_times_its_angle():
+    scene, bar = round_bar()
+    scene.clamp(bar.start)
+    grip = scene.clamp(bar.end)
+    simulation = rods.sharp(scene)
+    simulation.move(bar.end, rotation=rods.rotation((1, 0, 0), 0.8))
+    simulation.equilibrium()
+    twist_stiffness = 2e6 / (2.0 * 1.3) * np.pi * 5e-3**4 / 2.0
+    np.testing.assert_allclose(
+        simulation.reaction(grip).moment, (0.8 * twist_stiffness / 0.4, 0.0, 0.0), atol=1e-9 * twist_stiffness
+    )
+    assert simulation.energy().twist == pytest.approx(0.5 * twist_stiffness / 0.4 * 0.8**2, rel=1e-9)
+
+
+def test_clamp_that_turns_ten_times_winds_ten_turns():
+    scene, bar = round_bar()
+    scene.clamp(bar.start)
+    grip = scene.clamp(bar.end, free=(1, 0, 0))
+    scene.add_force(bar.end, (30.0, 0.0, 0.0))
+    simulation = scene.build(integrator="static", time_step=0.01)
+    simulation.move(bar.end, path=lambda t: ((0.4, 0, 0), rods.rotation((1, 0, 0), 20.0 * np.pi * min(t, 1.0))))
+    simulation.step(100)
+    twist_stiffness = 2e6 / (2.0 * 1.3) * np.pi * 5e-3**4 / 2.0
+    assert simulation.reaction(grip).moment[0] == pytest.approx(20.0 * np.pi * twist_stiffness / 0.4, rel=1e-6)
+
+
+@pytest.mark.parametrize(("push", "moment"), [((0, 0, 1), "height"), ((0, 1, 0), "width")])
+def test_rectangle_bends_over_the_side_that_is_pushed(push, moment):
+    width, height = 2e-2, 1e-3
+    scene = rods.weightless()
+    steel = withe.Material(youngs_modulus=2e9, poisson_ratio=0.3, density=1000.0)
+    tape = scene.add_rod(
+        start=(0, 0, 0),
+        end=(0.2, 0, 0),
+        nodes=201,
+        section=withe.Rectangle(width=width, height=height),
+        material=steel,
+        normal=(0, 1, 0),
+    )
+    scene.clamp(tape.start)
+    # Width lies along d1 = +y, height along d2 = +z.
+    inertia = width * height**3 / 12.0 if moment == "height" else height * width**3 / 12.0
+    load = 1e-3 * 3.0 * 2e9 * inertia / 0.2**3 * 0.2
+    scene.add_force(tape.end, load * np.array(push))
+    simulation = rods.sharp(scene, planar=False)
+    simulation.equilibrium()
+    deflection = simulation.positions(tape)[-1] @ push
+    assert deflection == pytest.approx(load * 0.2**3 / (3.0 * 2e9 * inertia), rel=1e-4)
+
+
+def test_tapered_rod_stretches_edge_by_edge():
+    scene = rods.weightless()
+    moduli = np.linspace(1.0, 2.0, 10)
+    rod = rods.straight(scene, 10, stiffness=rods.stiffness(stretch=moduli * 1e3))
+    scene.clamp(rod.start)
+    scene.add_force(rod.end, (5.0, 0.0, 0.0))
+    simulation = rods.sharp(scene)
+    simulation.equilibrium()
+    strains = np.diff(simulation.positions(rod)[:, 0]) / 0.1 - 1.0
+    np.testing.assert_allclose(strains, 5.0 / (moduli * 1e3), rtol=1e-8)

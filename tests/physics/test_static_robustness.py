@@ -1,0 +1,96 @@
+"""Equilibria are found from far away, at any slenderness, and what has none is an error."""
+
+import numpy as np
+import pytest
+import rods
+import withe
+
+
+@pytest.mark.parametrize("planar", [None, False], ids=["planar", "spatial"])
+def test_slender_rods_take_no_more_iterations_than_stout_ones(planar):
+    """L / h = 100, 1e3, 1e4: EA L^2 / B = 4 (L / h)^2."""
+    iterations = []
+    for slenderness in (1e2, 1e3, 1e4):
+        scene = withe.Scene(gravity=(0.0, 0.0, -10.0))
+        arm = rods.straight(scene, 100, stiffness=rods.stiffness(stretch=4.0 * slenderness**2))
+        scene.clamp(arm.start)
+        simulation = scene.build(integrator="static", planar=planar)
+        result = simulation.equilibrium()
+        assert result.stable
+        iterations.append(result.iterations)
+    assert max(iterations) <= 1.2 * min(iterations), iterations
+
+
+def smooth_curve(random, nodes):
+    """Unit-length curve that starts along +x and wanders through space."""
+    s = (np.arange(nodes - 1) + 0.5) / (nodes - 1)
+    waves = np.arange(1, 4)
+    sines = np.sin(0.5 * np.pi * np.outer(s, waves))
+    yaw, pitch = (sines @ (random.normal(size=3) * 1.5 / waves) for _ in range(2))
+    tangents = np.stack([np.cos(yaw) * np.cos(pitch), np.sin(yaw) * np.cos(pitch), np.sin(pitch)], axis=1)
+    return np.vstack([np.zeros(3), np.cumsum(tangents, axis=0) / (nodes - 1)])
+
+
+def ragged_curve(random, nodes):
+    """The straight rod with every node but the first two thrown off by up to half an edge."""
+    points = np.zeros((nodes, 3))
+    points[:, 0] = np.linspace(0.0, 1.0, nodes)
+    points[2:] += random.uniform(-0.5, 0.5, size=(nodes - 2, 3)) / (nodes - 1)
+    return points
+
+
+@pytest.mark.parametrize("curve", [smooth_curve, ragged_curve])
+def test_of_fifty_random_starts_nearly_all_reach_a_stable_equilibrium(curve):
+    """With its twin, a hundred starts; at least 95 % reach one, and the rest say that they did not."""
+    random = np.random.default_rng(20240607)
+    failures = 0
+    for _ in range(50):
+        scene = withe.Scene(gravity=(0.0, 0.0, -10.0))
+        arm = scene.add_rod(
+            points=curve(random, 41),
+            natural="straight",
+            stiffness=rods.stiffness(stretch=4e4),
+            line_density=1.0,
+            radius=1e-2,
+        )
+        scene.clamp(arm.start)
+        simulation = scene.build(integrator="static")
+        try:
+            result = simulation.equilibrium()
+        except withe.ConvergenceError:
+            failures += 1
+            continue
+        assert np.isfinite(simulation.positions(arm)).all()
+        failures += not result.stable
+        # An equilibrium indeed: the wall carries the weight.
+        weight = 10.0 * np.linalg.norm(np.diff(simulation.positions(arm), axis=0), axis=1).sum()
+        assert simulation.reaction(arm.start).force[2] == pytest.approx(weight, rel=2e-2)
+    assert failures <= 2
+
+
+def test_rod_that_is_thrown_about_comes_back_to_its_one_stable_shape():
+    random = np.random.default_rng(7)
+    scene = withe.Scene(gravity=(0.0, 0.0, -10.0))
+    arm = rods.straight(scene, 40, stiffness=rods.stiffness(stretch=4e4))
+    scene.clamp(arm.start)
+    grip = scene.add_force(arm.end, (0.0, 0.0, 0.0))
+    simulation = scene.build(integrator="static", planar=False)
+    tips = []
+    for _ in range(10):
+        simulation.set(grip, force=random.normal(size=3) * 20.0)
+        simulation.equilibrium()
+        simulation.set(grip, force=(0.0, 0.0, 0.0))
+        assert simulation.equilibrium().stable
+        tips.append(simulation.positions(arm)[-1])
+    np.testing.assert_allclose(tips, np.tile(tips[0], (10, 1)), atol=1e-6)
+
+
+@pytest.mark.parametrize("planar", [None, False], ids=["planar", "spatial"])
+def test_free_rod_under_gravity_has_no_equilibrium(planar):
+    scene = withe.Scene()
+    rods.straight(scene, 10)
+    simulation = scene.build(integrator="static", planar=planar)
+    before = simulation.positions()
+    with pytest.raises(withe.ConvergenceError):
+        simulation.equilibrium()
+    np.testing.assert_array_equal(simulation.positions(), before)

@@ -1,0 +1,82 @@
+"""Halving the step divides the error by two (backward Euler) or four (midpoint, energy-momentum, Verlet)."""
+
+import numpy as np
+import pytest
+import rods
+import theory
+import withe
+from convergence import assert_order
+
+DURATION = 0.4
+
+
+def waving(integrator, step, planar, viscosity=0.0):
+    """A soft cantilever let go level, which sinks and, in space, swings aside."""
+    scene = withe.Scene(gravity=(0.0, 0.0, -6.0))
+    arm = rods.straight(scene, 10, stiffness=rods.stiffness(twist=0.7, stretch=400.0, viscous_time=viscosity), radius=0.05)
+    scene.clamp(arm.start)
+    simulation = scene.build(
+        integrator=integrator,
+        time_step=step,
+        planar=None if planar else False,
+        adaptive=False,
+        step_tolerance=1e-12,
+        force_tolerance=1e-12,
+    )
+    velocities = np.zeros((11, 3))
+    velocities[:, 2] = 0.3 * np.linspace(0.0, 1.0, 11) ** 2
+    if not planar:
+        velocities[:, 1] = 0.6 * np.linspace(0.0, 1.0, 11) ** 2
+    simulation.set_velocities(arm, velocities)
+    simulation.step(round(DURATION / step))
+    assert simulation.time == pytest.approx(DURATION, rel=1e-12)
+    return simulation.positions(arm)
+
+
+@pytest.mark.parametrize("planar", [True, False], ids=["planar", "spatial"])
+@pytest.mark.parametrize(
+    ("integrator", "order", "steps"),
+    [
+        ("backward_euler", 1.0, (800, 1600, 3200)),
+        ("implicit_midpoint", 2.0, (200, 400, 800)),
+        ("energy_momentum", 2.0, (200, 400, 800)),
+        ("verlet", 2.0, (800, 1600, 3200)),
+    ],
+)
+def test_error_falls_at_the_order_of_the_scheme(integrator, order, steps, planar):
+    results = [waving(integrator, DURATION / n, planar) for n in steps]
+    # Differences of successive runs fall at the same order as the error.
+    assert_order([np.abs(b - a).max() for a, b in zip(results[:-1], results[1:], strict=True)], order)
+    assert_order([np.abs(a[-1] - b[-1]).max() for a, b in zip(results[:-1], results[1:], strict=True)], order)
+
+
+def test_schemes_agree_in_the_limit():
+    reference = waving("implicit_midpoint", DURATION / 3200, False)
+    for integrator, steps, allowed in (("energy_momentum", 3200, 2e-5), ("verlet", 6400, 2e-5), ("backward_euler", 6400, 5e-3)):
+        np.testing.assert_allclose(waving(integrator, DURATION / steps, False), reference, atol=allowed)
+
+
+def test_period_of_a_cantilever_is_theorys_and_the_midpoint_rule_stretches_it_at_second_order():
+    """The phase error of midpoint is known: tan(W dt / 2) = w dt / 2 for the frequency W that is seen."""
+    exact = theory.CANTILEVER_ROOTS[0] ** 2
+    seen = []
+    for steps in (20, 40, 80):
+        scene = rods.weightless()
+        arm = rods.straight(scene, 50)
+        scene.clamp(arm.start)
+        simulation = scene.build(time_step=2.0 * np.pi / exact / steps, step_tolerance=1e-12, force_tolerance=1e-12)
+        velocities = np.zeros((51, 3))
+        velocities[:, 2] = 1e-4 * theory.cantilever_mode(np.linspace(0.0, 1.0, 51))
+        simulation.set_velocities(arm, velocities)
+        heights = []
+        for _ in range(4 * steps):
+            simulation.step()
+            heights.append(simulation.positions(arm)[-1, 2])
+        # A harmonic obeys x[n+1] + x[n-1] = 2 cos(W dt) x[n].
+        x = np.array(heights)
+        cosine = 0.5 * (x[2:] + x[:-2]) @ x[1:-1] / (x[1:-1] @ x[1:-1])
+        dt = 2.0 * np.pi / exact / steps
+        W = np.arccos(cosine) / dt
+        seen.append(W / exact - 1.0)
+        assert 2.0 / dt * np.tan(0.5 * W * dt) == pytest.approx(exact, rel=5e-4)
+    assert_order(np.array(seen), slack=0.2)

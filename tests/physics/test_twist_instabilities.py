@@ -1,0 +1,173 @@
+"""Twisted rods and rings leave their axis or plane: Michell's ring, and clamped and pinned rods.
+
+As for columns, a small side load measures the stiffness that is left.
+"""
+
+import numpy as np
+import pytest
+import rods
+import theory
+from convergence import assert_order, zero_crossing
+
+SIDE = 1e-5
+SHARES = np.array((0.93, 0.95, 0.97, 0.98, 0.99))
+BEND, TWIST = 1.0, 2.5
+
+
+def ring(nodes, side):
+    """A naturally straight rod closed to a ring of unit length, held at one node."""
+    angles = 2.0 * np.pi * np.arange(nodes) / nodes
+    points = np.stack([np.cos(angles), np.sin(angles), np.zeros(nodes)], axis=1)
+    points /= nodes * np.linalg.norm(points[1] - points[0])
+    scene = rods.weightless()
+    rod = scene.add_rod(
+        points=points,
+        closed=True,
+        natural="straight",
+        normal=(0.0, 0.0, 1.0),
+        radius=1e-3,
+        stiffness=rods.stiffness(bend=BEND, twist=TWIST),
+        line_density=1.0,
+    )
+    scene.clamp(rod.node(0))
+    if side:
+        scene.add_force(rod.node(nodes // 2), (0.0, 0.0, side))
+    return scene, rod
+
+
+MICHELL = 2.0 * np.pi * np.sqrt(3.0) * BEND / TWIST  # total twist [rad], [Michell 1889, Zajac 1962]
+
+
+def ring_out_of_plane(nodes, twist, side):
+    scene, rod = ring(nodes, side)
+    simulation = rods.sharp(scene, planar=False)
+    simulation.set_natural_twist(rod, twist)
+    simulation.equilibrium()
+    return simulation.positions(rod)[nodes // 2, 2]
+
+
+def test_twist_at_which_a_ring_leaves_its_plane_converges_at_second_order():
+    errors = []
+    for nodes in (16, 32, 64):
+        twists = SHARES * MICHELL
+        sways = [ring_out_of_plane(nodes, twist, SIDE) for twist in twists]
+        errors.append(zero_crossing(twists, sways) / MICHELL - 1.0)
+    assert_order(errors)
+    assert abs(errors[-1]) < 5e-3
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_ring_stays_flat_below_michells_twist_and_leaves_its_plane_above(sign):
+    assert abs(ring_out_of_plane(60, sign * 0.97 * MICHELL, 0.0)) < 1e-9
+    scene, rod = ring(60, 0.0)
+    simulation = rods.sharp(scene, planar=False)
+    simulation.set_natural_twist(rod, sign * 1.03 * MICHELL)
+    assert simulation.equilibrium().stable
+    assert np.ptp(simulation.positions(rod)[:, 2]) > 0.01
+
+
+def test_free_ring_cut_and_turned_has_the_same_critical_twist():
+    """Both ends of a cut ring clamped where they meet, one of them turned about its tangent."""
+    angles = 2.0 * np.pi * np.arange(49) / 48
+    line = np.stack([np.sin(angles), 1.0 - np.cos(angles), np.zeros(49)], axis=1)
+    line /= 48 * np.linalg.norm(line[1] - line[0])
+    sways = []
+    for share in SHARES:
+        scene = rods.weightless()
+        rod = scene.add_rod(
+            points=line,
+            natural="straight",
+            normal=(0.0, 0.0, 1.0),
+            radius=1e-3,
+            stiffness=rods.stiffness(bend=BEND, twist=TWIST),
+            line_density=1.0,
+        )
+        scene.clamp(rod.start)
+        scene.clamp(rod.end)
+        scene.add_force(rod.node(24), (0.0, 0.0, SIDE))
+        simulation = rods.sharp(scene, planar=False)
+        for part in (0.5, 1.0):
+            simulation.move(rod.end, rotation=rods.rotation((1, 0, 0), part * share * MICHELL))
+            simulation.equilibrium()
+        sways.append(simulation.positions(rod)[24, 2])
+    assert zero_crossing(SHARES, sways) == pytest.approx(1.0, abs=5e-3)
+
+
+def clamped_rod(edges, tension, side):
+    scene = rods.weightless()
+    # So stiff in twist that the ends turn by less than a radian.
+    rod = rods.straight(scene, edges, stiffness=rods.stiffness(twist=10.0), normal=(0.0, 1.0, 0.0))
+    scene.clamp(rod.start)
+    scene.clamp(rod.end, free=(1.0, 0.0, 0.0))
+    scene.add_force(rod.end, (tension, 0.0, 0.0))
+    if side:
+        scene.add_force(rod.node(edges // 2), (0.0, side, 0.0))
+    return scene, rod
+
+
+def twisted(edges, tension, moment, side):
+    scene, rod = clamped_rod(edges, tension, side)
+    simulation = rods.sharp(scene, planar=False)
+    turns = max(1, int(np.ceil(moment / 10.0)))
+    for k in range(turns):
+        simulation.move(rod.end, rotation=rods.rotation((1, 0, 0), moment / 10.0 * (k + 1) / turns))
+        result = simulation.equilibrium()
+    return simulation, rod, result
+
+
+@pytest.mark.parametrize(("tension", "edges"), [(0.0, (16, 32, 64)), (100.0, (32, 64, 128))])
+def test_critical_moment_of_a_clamped_rod_converges_at_second_order(tension, edges):
+    exact = theory.critical_twisting_moment(tension)
+    errors = []
+    for n in edges:
+        sways = []
+        for share in SHARES:
+            simulation, rod, _ = twisted(n, tension, share * exact, SIDE)
+            sways.append(simulation.positions(rod)[n // 2, 1])
+        errors.append(zero_crossing(SHARES, sways) - 1.0)
+    assert_order(errors)
+    assert abs(errors[-1]) < 5e-3
+
+
+def test_critical_moment_of_a_clamped_rod_without_tension_is_8_987():
+    assert theory.critical_twisting_moment(0.0) == pytest.approx(8.987, abs=5e-4)
+    simulation, rod, result = twisted(128, 0.0, 0.99 * 8.987, 0.0)
+    assert result.stable
+    assert np.abs(simulation.positions(rod)[:, 1:]).max() < 1e-9
+    assert simulation.reaction(rod.end).moment[0] == pytest.approx(0.99 * 8.987, rel=1e-9)
+    simulation, rod, result = twisted(128, 0.0, 1.01 * 8.987, 0.0)
+    assert result.stable
+    assert np.abs(simulation.positions(rod)[:, 1:]).max() > 0.01
+
+
+def test_critical_moment_of_a_long_rod_under_tension_is_the_root_of_4BT():
+    """M^2 = 4 B T for an endless rod; at T L^2 / B = 2500 clamped ends add .2 % to M, and more tension less."""
+    assert theory.critical_twisting_moment(2500.0) ** 2 == pytest.approx(4.0 * 2500.0, rel=5e-3)
+    exact = theory.critical_twisting_moment(2500.0)
+    sways = []
+    for share in SHARES:
+        simulation, rod, _ = twisted(400, 2500.0, share * exact, SIDE)
+        sways.append(np.abs(simulation.positions(rod)[:, 1]).max())
+    assert zero_crossing(SHARES, sways) ** 2 * exact**2 == pytest.approx(4.0 * 2500.0, rel=1e-2)
+
+
+def test_critical_axial_torque_of_a_pinned_rod_converges_to_two_pi():
+    """Torques that keep the direction of the axis have no potential: the stiffness is read off before it vanishes."""
+    exact = 2.0 * np.pi
+    errors = []
+    for edges in (16, 32, 64):
+        sways = []
+        for share in SHARES:
+            scene = rods.weightless()
+            rod = rods.straight(scene, edges, normal=(0.0, 1.0, 0.0))
+            scene.pin(rod.start)
+            scene.pin(rod.end, free=(1.0, 0.0, 0.0))
+            scene.add_moment(rod.end, (share * exact, 0.0, 0.0))
+            scene.add_moment(rod.start, (-share * exact, 0.0, 0.0))
+            scene.add_force(rod.node(edges // 2), (0.0, SIDE, 0.0))
+            simulation = rods.sharp(scene, planar=False)
+            simulation.equilibrium()
+            sways.append(simulation.positions(rod)[edges // 2, 1])
+        errors.append(zero_crossing(SHARES, sways) - 1.0)
+    assert_order(errors)
+    assert abs(errors[-1]) < 5e-3
