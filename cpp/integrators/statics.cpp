@@ -107,7 +107,7 @@ class Statics {
       const bool at_rest = h >= longest;
       equations_.begin(state_, parameters_, at_rest ? 0.0 : h, false);
       z = state_.q;
-      const NewtonResult r = newton_.solve(equations_, z, nullptr, at_rest ? 30 : 15, work_);
+      const NewtonResult r = newton_.solve(equations_, z, nullptr, at_rest ? 40 : 25, work_);
       last.iterations += r.iterations;
       last.residual = r.residual;
       last.worst_row = r.worst_row;
