@@ -340,6 +340,10 @@ class World:
         """
         Advance to a time [s].
         """
+    def check_idle(self) -> None:
+        """
+        Raises in the middle of a step.
+        """
     def copy(self) -> World:
         """
         Another world like this.

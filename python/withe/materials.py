@@ -91,7 +91,7 @@ class Stiffness:
 
 def bend_stiffness(value: npt.ArrayLike, what: str, edges: int) -> FloatArray:
     """Bending stiffnesses as an array of shape (edges, 2) [N m^2]."""
-    if np.ndim(value) == 0:
+    if validation.is_scalar(value):
         return np.full((edges, 2), validation.positive(value, what))
     array = validation.number_array(value, what, (2,), (edges, 2))
     if np.any(array <= 0.0):

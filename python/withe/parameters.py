@@ -103,7 +103,7 @@ class RodParameters:
         zero = word in ("viscosity", "viscous_time", "drag")
         array = validation.per_item(value, what, edges, "edges", zero=zero)
         if word in MATERIAL_WORDS:
-            given = float(array[0]) if np.ndim(value) == 0 else array
+            given = float(array[0]) if validation.is_scalar(value) else array
             return self._derived({word: given}, section)._checked(owner)
         if word == "line_density":
             changed = replace(self, line_density=array, rotary_inertia=_rotary_inertia(array, section))

@@ -128,6 +128,7 @@ class Simulation(Control):
         ConvergenceError
             None was found, or there is none (a free rod under gravity).
         """
+        self._world.check_idle()
         self._apply_functions(self._world.time, self._world.time)
         with self._convergence():
             found = self._world.equilibrium(None)

@@ -15,6 +15,7 @@ __all__ = [
     "choice",
     "function",
     "integer",
+    "is_scalar",
     "non_negative",
     "number",
     "number_array",
@@ -152,7 +153,7 @@ def per_item(value: Any, what: str, count: int, item: str, *, zero: bool = False
     zero, sign : bool
         Whether zero is allowed, and negative numbers too.
     """
-    if np.ndim(value) == 0 and not isinstance(value, str):
+    if is_scalar(value):
         check = number if sign else non_negative if zero else positive
         return np.full(count, check(value, what))
     result = number_array(value, what, (count,))
@@ -195,6 +196,14 @@ def rotation_matrix(value: Any, what: str) -> FloatArray:
         raise ValueError(f"{what} must be a rotation, got a reflection")
     u, _, vt = np.linalg.svd(matrix)
     return np.asarray(u @ vt, np.float64)
+
+
+def is_scalar(value: Any) -> bool:
+    """Whether a value stands for itself, and not for several."""
+    try:
+        return np.ndim(value) == 0
+    except (ValueError, TypeError):  # lists of unequal length
+        return False
 
 
 def _is_real(item: Any) -> bool:

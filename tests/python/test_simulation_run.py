@@ -1,0 +1,240 @@
+"""Runs: frames on their times, callbacks, progress, interruption; many simulations side by side."""
+
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+import threading
+import time
+
+import numpy as np
+import pytest
+
+import withe
+from simple_scenes import cantilever, same_state, tripod
+
+
+@pytest.mark.parametrize("integrator", ["implicit_midpoint", "static", "backward_euler"])
+@pytest.mark.parametrize("every", [0.02, 0.005, 0.01])
+def test_frames_land_exactly_on_their_times(integrator, every):
+    _, _, simulation = cantilever(integrator=integrator)
+    record = simulation.run(0.1, record_every=every, progress=False)
+    assert np.array_equal(record.times, np.arange(round(0.1 / every) + 1) * every)
+    _, _, stepped = cantilever(integrator=integrator)
+    stepped.step(20)
+    assert np.array_equal(record.positions()[-1], stepped.positions())
+    assert same_state(simulation, stepped)
+
+
+def test_frames_between_time_steps_shorten_the_steps_evenly():
+    _, _, simulation = cantilever(time_step=0.01)
+    times = []
+    record = simulation.run(0.1, record_every=0.025, before_step=lambda s: times.append(s.time), progress=False)
+    assert np.array_equal(record.times, [0.0, 0.025, 0.05, 0.025 * 3, 0.1])
+    assert np.allclose(np.diff(times), 0.025 / 3)
+    _, _, plain = cantilever(time_step=0.01)
+    plain.run(0.1, record_every=0.025, progress=False)
+    assert same_state(simulation, plain)
+
+
+def test_a_second_run_goes_on_where_the_first_ended():
+    _, _, simulation = cantilever()
+    simulation.run(0.1, record_every=0.02, progress=False)
+    record = simulation.run(0.1, record_every=0.02, progress=False)
+    assert record.times[0] == pytest.approx(0.1)
+    assert record.times[-1] == pytest.approx(0.2)
+    assert len(record) == 6
+
+
+@pytest.mark.parametrize(
+    ("duration", "every", "frames"), [(0.1, None, 21), (2.0, None, 101), (0.1, np.inf, 2), (0.1, 0.03, 5)]
+)
+def test_frames_by_default_and_at_the_end(duration, every, frames):
+    _, _, simulation = cantilever(nodes=4)
+    record = simulation.run(duration, record_every=every, progress=False)
+    assert len(record) == frames
+    assert record.times[-1] == duration
+
+
+def test_before_step_is_called_once_a_time_step():
+    _, arm, simulation = cantilever()
+    calls = []
+
+    def controller(s):
+        assert s is simulation
+        calls.append(s.time)
+        s.set_natural_curvature(arm, (0.0, 100 * np.sin(20 * s.time)))
+
+    record = simulation.run(0.1, record_every=0.05, before_step=controller, progress=False)
+    assert np.allclose(calls, 0.005 * np.arange(20))
+    assert simulation.statistics.steps >= 20
+    assert np.ptp(record.curvatures(arm)) > 0.1
+
+
+def test_until_ends_the_run_after_the_step_that_fulfils_it():
+    _, arm, simulation = cantilever()
+    record = simulation.run(10.0, record_every=0.02, until=lambda s: s.positions(arm)[-1, 2] < -0.02, progress=False)
+    tips = record.positions(arm)[:, -1, 2]
+    assert tips[-1] < -0.02
+    assert np.all(tips[:-1] >= -0.02)
+    assert simulation.time == record.times[-1] < 0.5
+
+
+def test_record_takes_more_than_the_readouts():
+    _, arm, simulation = cantilever()
+    record = simulation.run(
+        0.05,
+        record_every=0.01,
+        record={"grip": lambda s: s.reaction(arm.start).force, "t": lambda s: s.time},
+        progress=False,
+    )
+    assert record["grip"].shape == (6, 3)
+    assert np.array_equal(record["t"], record.times)
+    assert record.positions(arm).shape == (6, 11, 3)
+    assert record.directors("arm").shape == (6, 10, 3, 3)
+
+
+@pytest.mark.parametrize("place", ["before_step", "until", "record", "force"])
+def test_what_was_recorded_survives_an_exception(place):
+    scene, arm, simulation = cantilever()
+
+    def fail(*_):
+        if simulation.time > 0.031:
+            raise ArithmeticError("enough")
+        return (0, 0, 0) if place == "force" else 0
+
+    options = {"record": {"x": fail}} if place == "record" else {} if place == "force" else {place: fail}
+    if place == "force":
+        scene.add_force(arm.end, fail)
+        simulation = scene.build()
+    with pytest.raises(ArithmeticError, match="enough"):
+        simulation.run(1.0, record_every=0.01, progress=False, **options)
+    assert np.allclose(simulation.record.times, [0, 0.01, 0.02, 0.03])
+    if place != "force":
+        simulation.step()
+
+
+def test_there_is_no_record_before_a_run():
+    _, _, simulation = cantilever()
+    with pytest.raises(RuntimeError, match="call run first"):
+        _ = simulation.record
+
+
+def test_progress_counts_up_to_the_duration(capsys):
+    _, _, simulation = cantilever(nodes=4)
+    simulation.run(0.5, progress="always")
+    assert "0.5" in capsys.readouterr().err
+    simulation.run(0.5)
+    assert capsys.readouterr().err == ""
+
+
+def test_ctrl_c_ends_a_long_step_and_a_run_with_the_record_kept():
+    code = textwrap.dedent("""
+        import os, signal, threading, time
+        import withe
+        scene = withe.Scene()
+        rubber = withe.Material(youngs_modulus=1e6, density=1000.0)
+        arm = scene.add_rod(start=(0, 0, 0), end=(1, 0, 0), nodes=201, radius=5e-3, material=rubber)
+        scene.clamp(arm.start)
+        for act in ("step", "run"):
+            simulation = scene.build(time_step=1e-3, planar=False)
+            threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT)).start()
+            clock = time.monotonic()
+            try:
+                simulation.step(10**9) if act == "step" else simulation.run(1e4, record_every=0.01, progress=False)
+            except KeyboardInterrupt:
+                print(act, time.monotonic() - clock < 3.0, simulation.time > 0)
+            if act == "run":
+                print(len(simulation.record) > 2)
+            simulation.step()
+    """)
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True)
+    assert result.stdout.split() == ["step", "True", "True", "run", "True", "True", "True"]
+
+
+def test_other_threads_run_while_a_simulation_steps():
+    _, _, simulation = cantilever(nodes=201, planar=False)
+    ticks, stop = [], threading.Event()
+
+    def tick():
+        while not stop.is_set():
+            ticks.append(time.monotonic())
+            time.sleep(0.001)
+
+    thread = threading.Thread(target=tick)
+    thread.start()
+    begin = time.monotonic()
+    simulation.step(400)
+    end = time.monotonic()
+    stop.set()
+    thread.join()
+    inside = [t for t in ticks if begin < t < end]
+    assert len(inside) > 5
+
+
+def test_a_simulation_that_steps_in_another_thread_refuses_to_be_read():
+    _, _, simulation = cantilever(nodes=201, planar=False)
+    outcomes = set()
+    thread = threading.Thread(target=simulation.step, args=(200,))
+    thread.start()
+    while thread.is_alive():
+        for act in (simulation.positions, simulation.step, simulation.snapshot, simulation.energy):
+            try:
+                act()
+            except RuntimeError as error:
+                outcomes.add(str(error)[:43])
+    thread.join()
+    assert outcomes <= {"the simulation is in the middle of a step: "}
+    simulation.step()
+
+
+def test_run_many_gives_what_single_runs_give():
+    singles, many = [], []
+    for i in range(5):
+        _, _arm, simulation = cantilever(nodes=6 + i)
+        many.append(simulation)
+        singles.append(simulation.copy().run(0.1, record_every=0.02, progress=False))
+    records = withe.run_many(many, 0.1, record_every=0.02, workers=3, progress=False)
+    for a, b in zip(records, singles, strict=True):
+        assert np.array_equal(a.positions(), b.positions())
+    assert [s.record.times[-1] for s in many] == [0.1] * 5
+    assert withe.run_many([], 1.0) == []
+
+
+def test_run_many_returns_or_raises_errors():
+    def build():
+        simulations = [cantilever(nodes=4)[2] for _ in range(4)]
+        scene, arm, _ = cantilever(nodes=4)
+        scene.add_force(arm.end, lambda t: (0, 0, 0 if t < 0.02 else 1 / 0), name="bad")
+        simulations.insert(2, scene.build())
+        return simulations
+
+    results = withe.run_many(build(), 0.1, record_every=0.01, errors="return", progress=False)
+    assert isinstance(results[2], ZeroDivisionError)
+    assert all(isinstance(result, withe.Record) for i, result in enumerate(results) if i != 2)
+    simulations = build()
+    with pytest.raises(ZeroDivisionError):
+        withe.run_many(simulations, 0.1, record_every=0.01, progress=False)
+    assert len(simulations[2].record) == 3
+    simulations[0].step()
+
+
+def test_run_many_stops_on_ctrl_c():
+    _, _, slow = cantilever(nodes=101, planar=False)
+    simulations = [slow, slow.copy()]
+    timer = threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT))
+    timer.start()
+    clock = time.monotonic()
+    with pytest.raises(KeyboardInterrupt):
+        withe.run_many(simulations, 1e5, record_every=0.1, workers=2, progress=False)
+    assert time.monotonic() - clock < 10.0
+    assert all(len(simulation.record) >= 1 for simulation in simulations)
+    slow.step()
+
+
+def test_run_many_shows_one_bar(capsys):
+    simulations = [tripod()[2] for _ in range(3)]
+    withe.run_many(simulations, 0.2, progress="always")
+    shown = capsys.readouterr().err
+    assert "0.6" in shown
