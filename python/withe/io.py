@@ -151,8 +151,8 @@ def write_vtk(record: Record, folder: str | os.PathLike[str]) -> Path:
 
     Every rod is one polyline. Its points carry radius [m], tension [N] (mean of the two edges at a
     node), curvature (towards d1 and d2) [1/m], twist [rad/m], the first director and the velocity
-    [m/s]; curvature and twist are zero at the ends of an open rod. The polyline carries the number of
-    its rod, and the file the names.
+    [m/s]; at the ends of an open rod, curvature and twist are those of the nearest inner node. The
+    polyline carries the number of its rod, and the file the names.
 
     Parameters
     ----------
@@ -295,8 +295,8 @@ def edges_to_nodes(values: npt.NDArray[np.float64], closed: bool) -> npt.NDArray
 
 
 def stencils_to_nodes(values: npt.NDArray[np.float64], closed: bool) -> npt.NDArray[np.float64]:
-    """Values of the inner nodes of an open rod, with zeros at its ends; shape (frames, nodes, ...)."""
+    """Values at the inner nodes of an open rod, carried on to its ends; shape (frames, nodes, ...)."""
     if closed:
         return values
     padding = [(0, 0), (1, 1)] + [(0, 0)] * (values.ndim - 2)
-    return np.pad(values, padding)
+    return np.pad(values, padding, mode="edge" if values.shape[1] else "constant")

@@ -39,6 +39,7 @@ _DIRECTIONS = {
     "oblique": (0.6, -1.0, 0.55),
 }
 _VIEW_ANGLE = 24.0  # [degrees]
+_BAR_SHARE = 0.16
 _INK = "#33383d"
 _MAX_SAMPLES = 6000  # rings of all rods together
 _SHADOW_CELLS = 320
@@ -56,6 +57,12 @@ class Stage:
     camera : str or array_like of shape (3,), optional
         From where to look: "front", "side", "top", "oblique" or a direction. By default along the
         normal of a planar motion, and obliquely at any other.
+    frames : sequence of int, optional
+        What the camera has in view; all frames by default.
+    ghosts : sequence of int
+        Frames that stand behind the others, faintly, the first one most.
+    ground : float, optional [m]
+        Height at which the shadow falls; a little below the rods by default.
     off_screen : bool
         Render into memory rather than into a window.
     supersampling : int
@@ -76,6 +83,9 @@ class Stage:
         size: Sequence[int] = (1280, 720),
         color_by: ColorBy = "rod",
         camera: str | npt.ArrayLike | None = None,
+        frames: Sequence[int] | None = None,
+        ghosts: Sequence[int] = (),
+        ground: float | None = None,
         off_screen: bool = True,
         supersampling: int = 2,
     ) -> None:
@@ -95,7 +105,10 @@ class Stage:
             for surface, rod in zip(self._surfaces, record.rods, strict=True)
         ]
         self._values = None if color_by == "rod" else [_nodal(record, rod, color_by) for rod in record.rods]
-        direction = _direction(camera, self._positions)
+        in_view = self._positions if frames is None else self._positions[list(frames)]
+        direction = _direction(camera, in_view)
+        if ground is not None and not np.isfinite(ground):
+            raise ValueError(f"ground must be a height in metres, got {ground!r}")
 
         pyvista = require("pyvista", "view")
         self._fineness = supersampling
@@ -103,10 +116,11 @@ class Stage:
         with _window(off_screen):
             self.plotter = pyvista.Plotter(off_screen=off_screen, window_size=window, lighting="none")
         self.plotter.set_background("#f5f7f9")
-        self._frame_camera(direction)
+        self._frame_camera(direction, in_view.reshape(-1, 3), ground, 0.0 if color_by == "rod" else _BAR_SHARE)
         self._add_lights(pyvista, direction)
         self._add_shadow(pyvista)
         self._add_rods(pyvista, color_by)
+        self._ghosts = [points for frame in ghosts for points in self._add_ghost(pyvista, frame, list(ghosts))]
         if supersampling == 1:
             self.plotter.enable_anti_aliasing("ssaa")
         self._label: Any = None
@@ -117,7 +131,7 @@ class Stage:
         before = min(int(frame), len(self.times) - 1)
         after = min(before + 1, len(self.times) - 1)
         share = frame - before
-        meshed = []
+        meshed = list(self._ghosts)
         for index, rod in enumerate(self._record.rods):
             nodes = self._mixed(self._positions, before, after, share)[rod.rows]
             points, normals = self._surfaces[index].mesh(
@@ -159,16 +173,18 @@ class Stage:
         mixed: FloatArray = (1.0 - share) * values[before] + share * values[after]
         return mixed
 
-    def _frame_camera(self, direction: FloatArray) -> None:
-        """Look from a direction at the middle of all frames, from as near as all of them are in view."""
+    def _frame_camera(self, direction: FloatArray, points: FloatArray, ground: float | None, aside: float) -> None:
+        """Look from a direction at the middle of all points, from as near as all are in view.
+
+        A share of the picture, `aside`, is left to the scale on the right.
+        """
         reach = max(float(rod.radii.max()) for rod in self._record.rods)
-        points = self._positions.reshape(-1, 3)
         low, high = points.min(axis=0), points.max(axis=0)
         extent = float(np.linalg.norm(high - low)) + 2.0 * reach
         self._extent = extent
-        self._ground = float(low[2]) - reach - 0.03 * extent
-        margin = 0.15 * extent
-        self._shadow_bounds = low[:2] - margin, high[:2] + margin
+        self._ground = float(low[2]) - reach - 0.03 * extent if ground is None else float(ground)
+        middle, half = 0.5 * (low + high)[:2], 0.5 * float((high - low)[:2].max()) + 0.15 * extent
+        self._shadow_bounds = middle - half, middle + half
         corners = [points + reach * sign * axis for axis in np.eye(3) for sign in (-1.0, 1.0)]
         shadows = np.column_stack([points[:, :2], np.full(len(points), self._ground)])
         seen = np.concatenate([*corners, shadows])
@@ -182,11 +198,13 @@ class Stage:
         slope = np.tan(np.radians(0.5 * _VIEW_ANGLE))
         local = seen - focus
         needed = np.maximum(
-            np.abs(local @ up) / (0.82 * slope), np.abs(local @ right) / (0.86 * slope * self.size[0] / self.size[1])
+            np.abs(local @ up) / (0.82 * slope),
+            np.abs(local @ right) / ((0.86 - aside) * slope * self.size[0] / self.size[1]),
         )
         distance = float((needed + local @ direction).max())
         view = self.plotter.camera
         view.view_angle = _VIEW_ANGLE
+        view.SetWindowCenter(aside, 0.0)
         view.focal_point, view.position, view.up = focus, focus + distance * direction, up
         view.clipping_range = (0.05 * distance, 10.0 * (distance + extent))
 
@@ -218,7 +236,7 @@ class Stage:
                     "title": f"{title}\n",
                     "color": _INK,
                     "vertical": True,
-                    "position_x": 0.88,
+                    "position_x": 0.98 - 0.5 * (0.05 + 0.0132 * len(title) * self.size[1] / self.size[0]),
                     "position_y": 0.25,
                     "width": 0.05,
                     "height": 0.5,
@@ -230,11 +248,28 @@ class Stage:
             }
         for index, mesh in enumerate(self._meshes):
             if self._values is None:
-                options["color"] = _PALETTE[index % len(_PALETTE)]
+                options["color"] = _color(index)
             else:
                 mesh.point_data["value"] = np.zeros(mesh.n_points)
             actor = self.plotter.add_mesh(mesh, reset_camera=False, **options)
             actor.prop.interpolation = "Phong"
+
+    def _add_ghost(self, pyvista: Any, frame: int, ghosts: list[int]) -> list[FloatArray]:
+        """Rods of one frame in pale colours, which do not move; returns the points of their surfaces."""
+        strength = 0.2 + 0.3 * ghosts.index(frame) / max(1, len(ghosts) - 1)
+        ghost = []
+        for index, rod in enumerate(self._record.rods):
+            surface = self._surfaces[index]
+            points, normals = surface.mesh(self._positions[frame, rod.rows], self._directors[index][frame])
+            mesh = _empty_mesh(pyvista, surface)
+            mesh.points = points
+            mesh.point_data["Normals"] = normals
+            paint = _color(index) if self._values is None else np.array([0.5, 0.53, 0.56])
+            pale = strength * paint + (1.0 - strength) * np.array([0.93, 0.94, 0.95])
+            actor = self.plotter.add_mesh(mesh, color=pale, ambient=0.5, diffuse=0.6, reset_camera=False)
+            actor.prop.interpolation = "Phong"
+            ghost.append(points)
+        return ghost
 
     def _add_shadow(self, pyvista: Any) -> None:
         """A plane under the rods, clear where no shadow falls."""
@@ -254,8 +289,9 @@ class Stage:
         shade = np.zeros((_SHADOW_CELLS, _SHADOW_CELLS))
         heights = np.concatenate(points)[:, 2] - self._ground
         places = (np.concatenate(points)[:, :2] - low) / (high - low) * _SHADOW_CELLS
-        weights = np.concatenate(self._footprints) / np.prod((high - low) / _SHADOW_CELLS)
-        level = np.minimum(heights / self._extent * len(_BLURS), len(_BLURS) - 1).astype(int)
+        footprints = self._footprints * (len(points) // len(self._footprints))
+        weights = np.concatenate(footprints) / np.prod((high - low) / _SHADOW_CELLS)
+        level = np.clip(heights / self._extent * len(_BLURS), 0, len(_BLURS) - 1).astype(int)
         box = [[0, _SHADOW_CELLS]] * 2
         for index, blur in enumerate(_BLURS):
             here = level == index
@@ -275,6 +311,11 @@ def _empty_mesh(pyvista: Any, surface: Surface) -> Any:
     mesh = pyvista.PolyData(np.zeros((int(surface.faces.max()) + 1, 3)), faces.ravel())
     mesh.point_data.active_normals = np.zeros((mesh.n_points, 3))
     return mesh
+
+
+def _color(rod: int) -> FloatArray:
+    code = _PALETTE[rod % len(_PALETTE)]
+    return np.array([int(code[place : place + 2], 16) / 255.0 for place in (1, 3, 5)])
 
 
 def _nodal(record: Record, rod: Any, color_by: ColorBy) -> FloatArray:

@@ -31,9 +31,11 @@ def picture(
     path: str | os.PathLike[str],
     *,
     frame: int = -1,
+    ghosts: Sequence[int] = (),
     size: Sequence[int] = (1280, 960),
     color_by: ColorBy = "rod",
     camera: str | npt.ArrayLike | None = None,
+    ground: float | None = None,
     label: str | None = None,
 ) -> Path:
     """Render one frame as tubes into a .png file.
@@ -45,12 +47,16 @@ def picture(
         The file, ending in .png.
     frame : int
         Which frame; negative numbers count from the last one.
+    ghosts : sequence of int
+        Other frames, drawn faintly.
     size : pair of int [px]
     color_by : {"rod", "tension", "curvature", "twist", "speed"}
         One colour a rod, or the quantity with its scale, the same for all frames.
     camera : str or array_like of shape (3,), optional
         From where to look: "front", "side", "top", "oblique" or a direction. By default along the
-        normal of a planar motion, and obliquely at any other. All frames fit into the picture.
+        normal of a planar motion, and obliquely at any other.
+    ground : float, optional [m]
+        Height at which the shadow falls; a little below the rods by default.
     label : str, optional
         Text in the lower left corner.
 
@@ -70,7 +76,10 @@ def picture(
     """
     path = _path(path, ".png")
     number = _frame(record, frame)
-    stage = Stage(record, size=size, color_by=color_by, camera=camera)
+    others = [_frame(record, ghost) for ghost in ghosts]
+    stage = Stage(
+        record, size=size, color_by=color_by, camera=camera, ground=ground, frames=[*others, number], ghosts=others
+    )
     try:
         stage.show(number)
         if label:
@@ -91,6 +100,7 @@ def animate(
     size: Sequence[int] = (1280, 720),
     color_by: ColorBy = "rod",
     camera: str | npt.ArrayLike | None = None,
+    ground: float | None = None,
     progress: bool | Literal["always"] = True,
 ) -> Path:
     """Render the rods as tubes into a film.
@@ -105,8 +115,8 @@ def animate(
         are drawn in between.
     speed : float
         Seconds of the simulation shown in one second of film.
-    size, color_by, camera
-        As in `picture`.
+    size, color_by, camera, ground
+        As in `picture`; the camera stands still and has all frames in view.
     progress : bool or "always"
         Whether to show a progress bar, as in `Simulation.run`.
 
@@ -130,7 +140,7 @@ def animate(
         if not (np.isfinite(value) and value > 0.0):
             raise ValueError(f"{name} must be positive, got {value!r}")
     encoder = require("imageio_ffmpeg", "view").get_ffmpeg_exe()
-    stage = Stage(record, size=_even(size), color_by=color_by, camera=camera)
+    stage = Stage(record, size=_even(size), color_by=color_by, camera=camera, ground=ground)
     try:
         places = film_places(stage.times, speed / fps)
         with (
@@ -153,6 +163,7 @@ def view(
     size: Sequence[int] = (1024, 640),
     color_by: ColorBy = "rod",
     camera: str | npt.ArrayLike | None = None,
+    ground: float | None = None,
     backend: str | None = None,
 ) -> Any:
     """Turn the rods about and slide through time, in a notebook or a window.
@@ -160,8 +171,8 @@ def view(
     Parameters
     ----------
     record : Record
-    size, color_by, camera
-        As in `picture`.
+    size, color_by, camera, ground
+        As in `picture`; the camera has all frames in view at first.
     backend : str, optional
         PyVista's way to show it in a notebook, such as "trame" or "static"; its own choice by default.
 
@@ -176,7 +187,9 @@ def view(
         As in `picture`.
     """
     notebook = _in_notebook()
-    stage = Stage(record, size=size, color_by=color_by, camera=camera, off_screen=notebook, supersampling=1)
+    stage = Stage(
+        record, size=size, color_by=color_by, camera=camera, ground=ground, off_screen=notebook, supersampling=1
+    )
     if len(record) > 1 and backend != "static":
         stage.plotter.add_slider_widget(
             lambda time: stage.show(float(np.interp(time, stage.times, np.arange(len(stage.times))))),
@@ -290,16 +303,30 @@ def _plot_shapes(figure: Any, place: Any, record: Record, count: int) -> None:
     axes.set_xlabel(f"{names[shown[0]]} [{prefix}m]")
     axes.set_ylabel(f"{names[shown[1]]} [{prefix}m]")
     if three:
-        axes.set_zlabel(f"z [{prefix}m]")
-        for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
-            axis.set_pane_color((1.0, 1.0, 1.0, 0.0))
-            axis.set_major_locator(require("matplotlib.ticker", "view").MaxNLocator(4))
-    axes.set_aspect("equal", adjustable="datalim" if not three else None)
+        axes.set_zlabel(f"z [{prefix}m]", labelpad=14.0)
+        axes.xaxis.labelpad = axes.yaxis.labelpad = 8.0
+        _box(axes, positions * factor)
+    else:
+        axes.set_aspect("equal", adjustable="datalim")
     if len(frames) > 1:
         bar = figure.colorbar(scale, ax=axes, shrink=0.75, pad=0.12 if three else 0.03, ticks=times[frames])
         bar.set_label("time [s]")
         bar.ax.set_yticklabels([f"{time:.3g}" for time in times[frames]])
         bar.outline.set_visible(False)
+
+
+def _box(axes: Any, positions: FloatArray) -> None:
+    """Three axes of one scale around all positions, with few ticks where there is little room."""
+    points = positions.reshape(-1, 3)
+    size = np.ptp(points, axis=0)
+    spans = np.maximum(1.05 * size, 0.1 * size.max())
+    middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    for axis, centre, span in zip((axes.xaxis, axes.yaxis, axes.zaxis), middle, spans, strict=True):
+        axis.set_view_interval(centre - 0.5 * span, centre + 0.5 * span, ignore=True)
+        axis.set_pane_color((1.0, 1.0, 1.0, 0.0))
+        count = max(1, round(4.0 * span / spans.max()))
+        axis.set_major_locator(require("matplotlib.ticker", "view").MaxNLocator(count))
+    axes.set_box_aspect(spans, zoom=0.95)
 
 
 def _plot_energies(axes: Any, record: Record) -> None:
@@ -311,7 +338,7 @@ def _plot_energies(axes: Any, record: Record) -> None:
     largest = max(float(np.abs(values).max()) for values in curves.values())
     factor, prefix = _prefix(largest, (1.0, 1e-3, 1e-6, 1e-9))
     for name, values in curves.items():
-        if name == "total" or np.abs(values).max() > 1e-9 * largest:
+        if name == "total" or np.abs(values).max() > 2e-3 * largest:
             width = 1.4 if name == "total" else 1.8
             style = "--" if name == "total" else "-"
             label = "gravity, from the start" if name == "gravity" else name
@@ -319,7 +346,7 @@ def _plot_energies(axes: Any, record: Record) -> None:
     axes.set_xlabel("time [s]")
     axes.set_ylabel(f"energy [{prefix}J]")
     axes.margins(x=0.0)
-    axes.legend(loc="best")
+    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
 
 
 def _prefix(largest: float, units: tuple[float, ...]) -> tuple[float, str]:

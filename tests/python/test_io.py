@@ -9,7 +9,7 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
-from curling_motion import CurlingSimulation
+from curling_motion import CurlingSimulation, Handle
 from withe.io import load_arrays, save_arrays
 from withe.recording import EnergyHistory, Record, Recorder
 
@@ -191,7 +191,7 @@ def test_vtk_frames_are_read_back_by_vtk(record, tmp_path):
     np.testing.assert_array_equal(mesh.cell_data["rod"], [0, 1, 2])
     np.testing.assert_array_equal(mesh["radius"][21:32], 4e-3)
     np.testing.assert_array_equal(mesh["curvature"][1:20], record.curvatures("arm")[3])
-    np.testing.assert_array_equal(mesh["curvature"][[0, 20]], 0.0)
+    np.testing.assert_array_equal(mesh["curvature"][[0, 20]], mesh["curvature"][[1, 19]])
     tensions = record.tensions("arm")[3]
     np.testing.assert_allclose(mesh["tension"][1:20], (tensions[1:] + tensions[:-1]) / 2)
     assert mesh["tension"][0] == tensions[0]
@@ -201,3 +201,13 @@ def test_vtk_frames_are_read_back_by_vtk(record, tmp_path):
 def test_vtk_of_no_frames_is_refused(tmp_path):
     with pytest.raises(ValueError, match="no frames"):
         Recorder(CurlingSimulation()).record.to_vtk(tmp_path)
+
+
+def test_a_rod_of_two_nodes_has_no_curvature_in_vtk(tmp_path):
+    pyvista = pytest.importorskip("pyvista")
+    simulation = CurlingSimulation()
+    simulation.rods = [Handle("stub", np.arange(2), False, 1e-3)]
+    recorder = Recorder(simulation)
+    recorder.capture()
+    mesh = pyvista.PVDReader(str(recorder.record.to_vtk(tmp_path))).read()[0]
+    np.testing.assert_array_equal(mesh["curvature"], np.zeros((2, 2)))
