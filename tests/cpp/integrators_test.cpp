@@ -1,0 +1,300 @@
+// The whole residual of a step against its matrix, for every scheme, and what Newton's method promises.
+
+#include <gtest/gtest.h>
+
+#include "derivative_check.hpp"
+#include "integrators/dynamics.hpp"
+#include "integrators/statics.hpp"
+#include "states.hpp"
+
+namespace withe {
+namespace {
+
+using testing::at;
+using testing::Case;
+using testing::derivative_matches;
+using testing::MatrixX;
+using testing::RodMaterial;
+using testing::SceneBuilder;
+
+enum class Scheme { statics, backward_euler, implicit_midpoint, energy_momentum };
+constexpr Scheme kSchemes[] = {Scheme::statics, Scheme::backward_euler, Scheme::implicit_midpoint,
+                               Scheme::energy_momentum};
+
+Options options_of(Scheme scheme) {
+  Options options;
+  options.integrator = scheme == Scheme::statics             ? Integrator::statics
+                       : scheme == Scheme::backward_euler    ? Integrator::backward_euler
+                       : scheme == Scheme::implicit_midpoint ? Integrator::implicit_midpoint
+                                                             : Integrator::energy_momentum;
+  return options;
+}
+
+double interval_of(Scheme scheme, double dt) {
+  return scheme == Scheme::statics ? 0.0 : scheme == Scheme::backward_euler ? dt : 0.5 * dt;
+}
+
+/// Compares d(residual) / dz with the solver's matrix, on the directions that supports leave free.
+void expect_matrix_is_exact(Case c, Scheme scheme, double dt) {
+  // The discrete gradient divides by the step, so differences about a step of nothing are rounding.
+  if (scheme == Scheme::energy_momentum && c.q == c.state.q)
+    c.q += 10.0 * c.increment * testing::RandomNumbers(8).vector(c.q.size());
+  Equations equations(c.model, options_of(scheme));
+  const Parameters parameters = initial_parameters(c.model);
+  equations.begin(c.state, parameters, interval_of(scheme, dt), scheme == Scheme::energy_momentum);
+  Evaluation evaluation;
+  const Eigen::Index n = c.model.dof_count;
+  MatrixX free(n, n), J(n, n);
+  equations.evaluate(c.q, true, nullptr, evaluation);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    VectorX e = VectorX::Unit(n, i), y(n);
+    equations.assembler().project(e);
+    free.col(i) = e;
+    equations.assembler().solver().multiply({e.data(), static_cast<std::size_t>(n)},
+                                            {y.data(), static_cast<std::size_t>(n)});
+    J.col(i) = y;
+  }
+  const auto residual = [&](const VectorX& d) {
+    equations.evaluate(c.q + free * d, false, nullptr, evaluation);
+    return evaluation.residual;
+  };
+  EXPECT_TRUE(derivative_matches(residual, VectorX::Zero(n), J, c.increment))
+      << c.name << ", scheme " << static_cast<int>(scheme) << ", dt " << dt;
+}
+
+RodMaterial lossy() {
+  RodMaterial m;
+  m.viscous_time = 0.05;
+  m.drag = 0.4;
+  return m;
+}
+
+/// Gravity and velocities everywhere.
+std::vector<Case> moving_cases(const RodMaterial& material) {
+  std::vector<Case> cases = testing::all_cases(material);
+  testing::RandomNumbers random(21);
+  for (Case& c : cases) {
+    c.model.description.gravity = c.model.planar() ? Vector3(1.0, 0.0, -3.0) : Vector3(1.0, 0.5, -3.0);
+    c.state.v = 0.3 * random.vector(c.model.dof_count);
+  }
+  return cases;
+}
+
+TEST(Equations, MatrixIsTheDerivativeOfTheResidualForEverySchemeAndScene) {
+  for (const Case& c : moving_cases(lossy()))
+    for (Scheme scheme : kSchemes) expect_matrix_is_exact(c, scheme, 0.3);
+}
+
+TEST(Equations, MatrixIsExactWithoutDragAndViscosity) {
+  for (const Case& c : moving_cases({}))
+    for (Scheme scheme : kSchemes) expect_matrix_is_exact(c, scheme, 0.3);
+}
+
+TEST(Equations, MatrixIsExactUnderEveryKindOfLoad) {
+  for (bool planar : {false, true}) {
+    SceneBuilder builder;
+    RodMaterial material = lossy();
+    if (planar) material.bend2 = material.bend1;
+    const MatrixX3 points = planar ? testing::arc(6) : testing::helix(6);
+    builder.add_rod(points, material, false, Vector3(0.0, 1.0, 0.0));
+    builder.scene.gravity = planar ? Vector3(1, 0, -3) : Vector3(1, 0.5, -3);
+    builder.scene.added_mass(3) = 0.7;
+    const Vector3 direction = planar ? Vector3(0.4, 0, -0.9) : Vector3(0.4, 0.3, -0.9);
+    const Vector3 moment = planar ? Vector3(0, 0.8, 0) : Vector3(0.3, 0.8, -0.5);
+    builder.load(LoadKind::force, {0, 5}, direction);
+    builder.load(LoadKind::force, {0, 4}, direction, true);
+    builder.load(LoadKind::distributed, {0, 0}, direction, true);
+    builder.load(LoadKind::distributed, {0, 0}, direction);
+    builder.load(LoadKind::moment, {0, 0}, moment);
+    builder.load(LoadKind::moment, {0, 3}, moment);
+    builder.support(SupportKind::clamp, {0, 0});
+    for (const Case& c : testing::states_of("loads", builder.scene))
+      for (Scheme scheme : kSchemes) expect_matrix_is_exact(c, scheme, 0.3);
+  }
+}
+
+TEST(Equations, MatrixIsExactBetweenSupportsOfEveryKind) {
+  const Vector3 axis(0.6, 0.0, 0.8);
+  for (bool slides : {false, true}) {
+    const Matrix3 free = slides ? Matrix3(axis * axis.transpose()) : Matrix3::Zero();
+    SceneBuilder builder = testing::tee(JointForm::frame, false, lossy());
+    builder.support(SupportKind::clamp, {0, 0}, free);
+    builder.support(SupportKind::pin, {1, 0}, free);
+    builder.support(SupportKind::hold_edge, {2, 2}, free);
+    for (const Case& c : testing::states_of("supports", builder.scene))
+      for (Scheme scheme : kSchemes) expect_matrix_is_exact(c, scheme, 0.3);
+  }
+}
+
+TEST(Equations, MatrixWithRotaryInertiaIsExactWhereNothingMovesYet) {
+  // The couple of an edge that spins and turns is left out of the matrix; it vanishes at the start of a step.
+  RodMaterial material;
+  material.rotary = 0.3;
+  for (Case c : testing::all_cases(material)) {
+    c.state.v.setZero();
+    c.state.q = c.q;
+    for (Scheme scheme : {Scheme::backward_euler, Scheme::implicit_midpoint}) expect_matrix_is_exact(c, scheme, 0.3);
+  }
+}
+
+TEST(Equations, EnergyMomentumIsMidpointWhereNothingMovesYet) {
+  for (Case c : testing::all_cases()) {
+    c.state.q = c.q;
+    const Parameters parameters = initial_parameters(c.model);
+    Equations a(c.model, options_of(Scheme::energy_momentum)), b(c.model, options_of(Scheme::implicit_midpoint));
+    a.begin(c.state, parameters, 0.15, true);
+    b.begin(c.state, parameters, 0.15, false);
+    Evaluation ea, eb;
+    a.evaluate(c.q, true, nullptr, ea);
+    b.evaluate(c.q, true, nullptr, eb);
+    EXPECT_LT((ea.residual - eb.residual).norm(), 1e-12 * (1.0 + eb.magnitude.norm())) << c.name;
+    const VectorX x = testing::RandomNumbers(2).vector(c.model.dof_count);
+    const auto n = static_cast<std::size_t>(x.size());
+    VectorX ya(x.size()), yb(x.size());
+    a.assembler().solver().multiply({x.data(), n}, {ya.data(), n});
+    b.assembler().solver().multiply({x.data(), n}, {yb.data(), n});
+    EXPECT_LT((ya - yb).norm(), 1e-12 * yb.norm()) << c.name;
+  }
+}
+
+TEST(Equations, MixedNewtonSharesTheResidual) {
+  for (const Case& c : moving_cases(lossy())) {
+    Equations equations(c.model, options_of(Scheme::backward_euler));
+    const Parameters parameters = initial_parameters(c.model);
+    equations.begin(c.state, parameters, 0.1, false);
+    Evaluation plain, mixed;
+    const VectorX axial = VectorX::Constant(c.model.edge_count, 2.5);
+    equations.evaluate(c.q, true, nullptr, plain);
+    equations.evaluate(c.q, true, axial.data(), mixed);
+    EXPECT_EQ((plain.residual - mixed.residual).norm(), 0.0) << c.name;
+  }
+}
+
+TEST(Equations, EnergyMomentumForcesDoTheWorkOfTheEnergyTheyChange) {
+  // The discrete gradient times the change of q is the change of the energy, whatever the step: without masses,
+  // drag and gravity the residual of statics is all there is.
+  for (const Case& c : testing::all_cases()) {
+    if (c.increment < 1e-2) continue;
+    Equations equations(c.model, options_of(Scheme::energy_momentum));
+    Parameters parameters = initial_parameters(c.model);
+    parameters.gravity.setZero();
+    equations.begin(c.state, parameters, 0.0, true);
+    Evaluation evaluation;
+    const VectorX z = 0.5 * (c.state.q + c.q);
+    equations.evaluate(z, false, nullptr, evaluation);
+    const auto energy_at = [&](const VectorX& q) {
+      Configuration configuration;
+      compute_configuration(c.model, c.state, q, configuration);
+      double sum = 0.0;
+      for (int e = 0; e < c.model.edge_count; ++e)
+        sum += stretch_energy_of(c.model, equations.elastic, configuration, e);
+      for (int b = 0; b < static_cast<int>(c.model.bend.size()); ++b) {
+        const BendTwistEnergy part = bend_energy_of(equations.elastic, configuration, b);
+        sum += part.bend + part.twist;
+      }
+      for (int h = 0; h < static_cast<int>(c.model.half.size()); ++h) {
+        const BendTwistEnergy part = half_energy_of(equations.elastic, configuration, h);
+        sum += part.bend + part.twist;
+      }
+      return sum;
+    };
+    const double change = energy_at(c.q) - energy_at(c.state.q);
+    EXPECT_NEAR(evaluation.full_residual.dot(c.q - c.state.q), change, 1e-11 * (1.0 + energy_at(c.q))) << c.name;
+  }
+}
+
+TEST(Equations, SpinCoupleDoesNoWorkAndAddsNoForce) {
+  RodMaterial still, spinning;
+  spinning.rotary = 0.3;
+  SceneBuilder a, b;
+  a.add_rod(testing::helix(6), still);
+  b.add_rod(testing::helix(6), spinning);
+  const Case with = testing::states_of("spin", b.scene)[3], without = testing::states_of("still", a.scene)[3];
+  const auto residual = [](const Case& c) {
+    Equations equations(c.model, options_of(Scheme::backward_euler));
+    const Parameters parameters = initial_parameters(c.model);
+    equations.begin(c.state, parameters, 0.2, false);
+    Evaluation evaluation;
+    equations.evaluate(c.q, false, nullptr, evaluation);
+    return evaluation.full_residual;
+  };
+  const VectorX difference = residual(with) - residual(without);
+  Vector3 force = Vector3::Zero();
+  double work = 0.0, size = 0.0;
+  for (int i = 0; i < with.model.node_count; ++i) {
+    const int dof = with.model.node_dof[at(i)];
+    const Vector3 f = difference.segment<3>(dof);
+    force += f;
+    size += f.norm();
+    work += f.dot(with.q.segment<3>(dof) - with.state.q.segment<3>(dof));
+  }
+  EXPECT_GT(size, 1e-2);
+  EXPECT_LT(force.norm(), 1e-12);
+  EXPECT_NEAR(work, 0.0, 1e-12);
+}
+
+TEST(Newton, ConvergesQuadraticallyWithTheExactMatrix) {
+  SceneBuilder builder;
+  builder.add_rod(testing::helix(8));
+  builder.scene.gravity = Vector3(0, 0, -0.2);
+  builder.support(SupportKind::clamp, {0, 0});
+  const Model model = build_model(builder.scene, false);
+  Options options = options_of(Scheme::backward_euler);
+  options.mixed = false;
+  options.force_tolerance = 1e-13;
+  Equations equations(model, options);
+  const Newton newton(model, options);
+  const Parameters parameters = initial_parameters(model);
+  const State state = initial_state(model);
+  equations.begin(state, parameters, 0.1, false);
+  NewtonWorkspace work;
+  std::vector<double> residuals;
+  for (int count = 1; count <= 8; ++count) {
+    VectorX z = state.q;
+    newton.solve(equations, z, nullptr, count, work);
+    residuals.push_back(work.evaluation.residual.norm());
+  }
+  bool quadratic = false;
+  for (std::size_t i = 1; i < residuals.size(); ++i)
+    quadratic =
+        quadratic || (residuals[i - 1] < 1e-2 && residuals[i] < 10.0 * residuals[i - 1] * residuals[i - 1] + 1e-13);
+  EXPECT_TRUE(quadratic);
+  EXPECT_LT(residuals.back(), 1e-11);
+}
+
+TEST(StableStep, IsTwoOverTheHighestFrequency) {
+  SceneBuilder builder;
+  RodMaterial material;
+  material.rotary = 0.3;
+  builder.add_rod(testing::helix(6), material);
+  builder.support(SupportKind::pin, {0, 0});
+  const Model model = build_model(builder.scene, false);
+  Equations equations(model, options_of(Scheme::statics));
+  const Parameters parameters = initial_parameters(model);
+  const State state = initial_state(model);
+  NewtonWorkspace work;
+  const double step = stable_step(equations, parameters, state, work);
+  // The same by a dense eigenproblem, by repeated multiplication of the dense matrix.
+  const Eigen::Index n = model.dof_count;
+  MatrixX K(n, n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    VectorX e = VectorX::Unit(n, i), y(n);
+    equations.assembler().project(e);
+    equations.assembler().solver().multiply({e.data(), static_cast<std::size_t>(n)},
+                                            {y.data(), static_cast<std::size_t>(n)});
+    K.col(i) = y;
+  }
+  const VectorX scale = mass_vector(model, parameters).cwiseSqrt().cwiseInverse();
+  const MatrixX A = scale.asDiagonal() * K * scale.asDiagonal();
+  VectorX x = testing::RandomNumbers(4).vector(n);
+  double value = 0.0;
+  for (int k = 0; k < 5000; ++k) {
+    const VectorX y = A * x;
+    value = y.norm();
+    x = y / value;
+  }
+  EXPECT_NEAR(step, 2.0 / std::sqrt(value), 2e-3 * step);
+}
+
+}  // namespace
+}  // namespace withe
