@@ -1,6 +1,7 @@
 """Examples and notebooks run as a user runs them, in an empty folder."""
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -8,15 +9,26 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent.parent
-EXAMPLES = {"helix.py": [], "ring_buckling.py": ["--nodes", "40"], "robot.py": ["--steps", "2"]}
+# Options of each example, the number that it prints, and between what that number must lie.
+EXAMPLES = {
+    "helix.py": ([], r"(\d+) um from the public code", 0.0, 100.0),
+    "ring_buckling.py": (["--nodes", "40"], r"\(([-+.\d]+) %\)", -3.0, 3.0),
+    "robot.py": (["--steps", "2"], r"walked ([-.\d]+) cm", 4.0, 10.0),
+}
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(EXAMPLES))
-def test_an_example_runs_and_writes_its_pictures(name, tmp_path, renderer):
-    command = [sys.executable, ROOT / "examples" / name, *EXAMPLES[name], "--out", tmp_path]
+def test_an_example_finds_what_it_claims_and_writes_its_pictures(name, tmp_path, renderer):
+    options, pattern, low, high = EXAMPLES[name]
+    command = [sys.executable, ROOT / "examples" / name, *options, "--out", tmp_path]
     environment = {**os.environ, "MPLBACKEND": "Agg"}
-    subprocess.run(command, cwd=tmp_path, env=environment, check=True, timeout=300)
+    result = subprocess.run(
+        command, cwd=tmp_path, env=environment, check=True, timeout=300, stdout=subprocess.PIPE, text=True
+    )
+    match = re.search(pattern, result.stdout)
+    assert match, result.stdout
+    assert low <= float(match[1]) <= high
     assert list(tmp_path.glob("*.png"))
 
 
