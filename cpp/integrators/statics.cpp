@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <random>
+#include <span>
 
 namespace withe {
 namespace {
@@ -200,30 +202,32 @@ class Statics {
     equations_.evaluate(state_.q, true, nullptr, work_.evaluation);
     ++work_.counters.factorizations;
     LinearSolver& solver = equations_.assembler().solver();
-    if (solver.symmetry() == Symmetry::symmetric) {
-      // A neutral mode may come out on either side of zero by rounding, so it is pushed up a little.
-      double greatest = 0.0;
-      for (int i = 0; i < equations_.model().dof_count; ++i)
-        greatest = std::max(greatest, equations_.assembler().diagonal(i));
-      VectorX shift = VectorX::Constant(equations_.model().dof_count, 1e-13 * greatest);
-      const Factorization f = solver.factorize({shift.data(), static_cast<std::size_t>(shift.size())});
-      return f.status == FactorStatus::ok && f.negative_pivots == 0;
-    }
-    return solver.factorize().status == FactorStatus::ok;
+    const Factorization f = solver.factorize();
+    if (solver.symmetry() == Symmetry::unsymmetric) return f.status == FactorStatus::ok;
+    if (f.status == FactorStatus::ok && f.negative_pivots == 0) return true;
+    // A neutral mode (a rod that may spin about its axis) comes out on either side of zero by rounding.
+    const VectorX mode = lowest_mode(0);
+    VectorX image(mode.size()), greatest(mode.size());
+    const auto view = [](VectorX& v) { return std::span<double>(v.data(), static_cast<std::size_t>(v.size())); };
+    const std::span<const double> direction(mode.data(), static_cast<std::size_t>(mode.size()));
+    solver.multiply(direction, view(image));
+    const VectorX size = mode.cwiseAbs();
+    for (double& value : solver.values()) value = std::abs(value);
+    solver.multiply({size.data(), static_cast<std::size_t>(size.size())}, view(greatest));
+    return mode.dot(image) > -64.0 * std::numeric_limits<double>::epsilon() * size.dot(greatest);
   }
 
-  /// Moves along the direction of most negative curvature, found by inverse iteration on a shifted matrix.
-  void leave_saddle(int seed) {
+  /// Direction of most negative curvature against mass, by inverse iteration on a matrix shifted until it is
+  /// definite. Needs the matrix of the last evaluation.
+  VectorX lowest_mode(int seed) {
     const Model& model = equations_.model();
-    begin();
-    equations_.evaluate(state_.q, true, nullptr, work_.evaluation);
     LinearSolver& solver = equations_.assembler().solver();
     const VectorX weight = equations_.mass.cwiseMax(1e-300);
     double stiffness = 0.0;
     for (int i = 0; i < model.dof_count; ++i)
       stiffness = std::max(stiffness, equations_.assembler().diagonal(i) / weight(i));
     VectorX shift;
-    for (double damping = 1e-10 * stiffness; damping < 1e3 * stiffness; damping *= 2.0) {
+    for (double damping = 1e-16 * stiffness; damping < 1e3 * stiffness; damping *= 2.0) {
       shift = damping * weight;
       const Factorization f = solver.factorize({shift.data(), static_cast<std::size_t>(shift.size())});
       if (f.status == FactorStatus::ok && f.negative_pivots == 0) break;
@@ -232,13 +236,20 @@ class Statics {
     std::normal_distribution<double> normal;
     VectorX direction(model.dof_count);
     for (Eigen::Index i = 0; i < direction.size(); ++i) direction(i) = normal(random);
-    for (int k = 0; k < 12; ++k) {
+    for (int k = 0; k < 20; ++k) {
       direction = direction.cwiseProduct(weight);
       equations_.assembler().project(direction);
       solver.solve({direction.data(), static_cast<std::size_t>(direction.size())});
       direction /= direction.norm();
     }
-    direction *= 1e-3 * model.length_scale / std::max(newton_.displacement(direction), 1e-300);
+    return direction;
+  }
+
+  void leave_saddle(int seed) {
+    begin();
+    equations_.evaluate(state_.q, true, nullptr, work_.evaluation);
+    VectorX direction = lowest_mode(seed);
+    direction *= 1e-3 * equations_.model().length_scale / std::max(newton_.displacement(direction), 1e-300);
     direction *= newton_.cap(direction);
     accept(state_.q + direction);
   }

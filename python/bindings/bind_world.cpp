@@ -9,6 +9,10 @@ namespace withe::bindings {
 namespace {
 
 void register_results(py::module_& module) {
+  py::class_<Linearisation>(module, "Linearisation", "Equations linearised about the present configuration.")
+      .def_readonly("stiffness", &Linearisation::stiffness)
+      .def_readonly("mass", &Linearisation::mass)
+      .def_readonly("displacement", &Linearisation::displacement);
   py::class_<Energy>(module, "Energy", "Energies [J].")
       .def_readonly("kinetic", &Energy::kinetic)
       .def_readonly("stretch", &Energy::stretch)
@@ -187,6 +191,7 @@ void define_readouts(WorldClass& world) {
   world.def("tensions", [](const GuardedWorld& self, int rod) { return self.reading().tensions(rod); }, py::arg("rod"));
   world.def("spins", [](const GuardedWorld& self, int rod) { return self.reading().spins(rod); }, py::arg("rod"));
   world.def("energy", [](const GuardedWorld& self) { return self.reading().energy(); });
+  world.def("linearise", [](const GuardedWorld& self) { return self.reading().linearise(); });
 }
 
 }  // namespace

@@ -9,7 +9,7 @@ from withe._core import __version__
 from withe.errors import ConvergenceError
 from withe.handles import CustomForce, Drag, EdgeHandle, Joint, Load, Mass, NodeHandle, Rod, Support
 from withe.materials import Circle, Material, Rectangle, Stiffness, Tube
-from withe.readouts import Energy, Equilibrium, Plan, Reaction, Statistics
+from withe.readouts import Energy, Equilibrium, Linearisation, Plan, Reaction, Statistics
 from withe.recording import Record
 from withe.running import run_many
 from withe.scene import Scene
@@ -24,6 +24,7 @@ __all__ = [
     "EdgeHandle",
     "Energy",
     "Equilibrium",
+    "Linearisation",
     "Joint",
     "Load",
     "Mass",

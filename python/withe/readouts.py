@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["Energy", "Equilibrium", "Plan", "Reaction", "Statistics"]
+__all__ = ["Energy", "Equilibrium", "Linearisation", "Plan", "Reaction", "Statistics"]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -98,6 +98,58 @@ class Statistics:
     assembly_time: float
     solve_time: float
     total_time: float
+
+
+@dataclass(frozen=True, eq=False)
+class Linearisation:
+    """Equations linearised about a configuration, mass x'' + stiffness x = 0, without what supports hold.
+
+    Attributes
+    ----------
+    stiffness : ndarray of shape (unknowns, unknowns)
+        Tangent stiffness: node positions [m] and angles [rad] against forces [N] and moments [N m].
+    mass : ndarray of shape (unknowns,)
+        Its diagonal: masses [kg] and moments of inertia [kg m^2].
+    displacement : ndarray of shape (3 nodes, unknowns)
+        Displacement of every node [m] that goes with each unknown.
+    """
+
+    stiffness: FloatArray
+    mass: FloatArray
+    displacement: FloatArray
+
+    def _solve(self, count: int) -> tuple[FloatArray, FloatArray]:
+        from scipy.linalg import eigh
+
+        if not 1 <= count <= self.mass.size:
+            raise ValueError(f"count must be between 1 and {self.mass.size}, got {count}")
+        scale = 1.0 / np.sqrt(self.mass)
+        squares, shapes = eigh(scale[:, None] * self.stiffness * scale, subset_by_index=[0, count - 1])
+        return squares, scale[:, None] * shapes
+
+    def frequencies(self, count: int = 6) -> FloatArray:
+        """Lowest natural frequencies, shape (count,) [Hz]; negative where the configuration is unstable.
+
+        Raises
+        ------
+        ValueError
+            `count` is not between 1 and the number of unknowns.
+        """
+        squares, _ = self._solve(count)
+        return np.asarray(np.sign(squares) * np.sqrt(np.abs(squares)) / (2.0 * np.pi))
+
+    def modes(self, count: int = 6) -> FloatArray:
+        """Node displacements of the lowest modes, greatest one scaled to 1, shape (count, nodes, 3).
+
+        Raises
+        ------
+        ValueError
+            `count` is not between 1 and the number of unknowns.
+        """
+        _, shapes = self._solve(count)
+        displaced = (self.displacement @ shapes).T.reshape(count, -1, 3)
+        greatest = np.linalg.norm(displaced, axis=2).max(axis=1)
+        return np.asarray(displaced / np.where(greatest > 0.0, greatest, 1.0)[:, None, None])
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,7 +18,7 @@ from withe.directory import Directory
 from withe.errors import ConvergenceError
 from withe.handles import NodeHandle, Rod, Support
 from withe.parts import DragPart, LoadPart, MassPart, SupportPart
-from withe.readouts import Energy, Equilibrium, Plan, Reaction, Statistics
+from withe.readouts import Energy, Equilibrium, Linearisation, Plan, Reaction, Statistics
 from withe.snapshots import Settings, Snapshot
 
 if TYPE_CHECKING:
@@ -285,6 +285,27 @@ class Simulation(Control):
         reaction = self._world.reaction(index)
         return Reaction(np.array(reaction.force), np.array(reaction.moment))
 
+    def linearise(self) -> Linearisation:
+        """Equations of motion linearised about the present configuration, with supports held.
+
+        Returns
+        -------
+        Linearisation
+            Tangent stiffness, masses, natural frequencies and modes. Meaningful at an equilibrium.
+
+        Examples
+        --------
+        >>> import withe
+        >>> scene = withe.Scene(gravity=(0, 0, 0))
+        >>> steel = withe.Material(youngs_modulus=2e11, poisson_ratio=0.3, density=7850.0)
+        >>> beam = scene.add_rod(start=(0, 0, 0), end=(1, 0, 0), nodes=51, radius=5e-3, material=steel)
+        >>> wall = scene.clamp(beam.start)
+        >>> print(f"{scene.build().linearise().frequencies(1)[0]:.2f} Hz")
+        7.06 Hz
+        """
+        linearised = self._world.linearise()
+        return Linearisation(linearised.stiffness, linearised.mass, linearised.displacement)
+
     @property
     def statistics(self) -> Statistics:
         """What the work so far took."""
@@ -396,11 +417,15 @@ class Simulation(Control):
             "gravity": self._scene_gravity,
             "options": self._options,
             "snapshot": self.snapshot(),
+            "functions": self._settings.functions,
+            "paths": self._settings.paths,
         }
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         built = Simulation._build(state["scene"], state["gravity"], state["options"])
         self.__dict__.update(built.__dict__)
+        self._settings.functions = state["functions"]
+        self._settings.paths = state["paths"]
         self.restore(state["snapshot"])
 
     # Pictures
