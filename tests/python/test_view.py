@@ -1,6 +1,7 @@
 """Pictures: what is drawn is the record, options are checked, and what is missing is named."""
 
 import builtins
+import importlib
 import os
 import subprocess
 import sys
@@ -255,15 +256,17 @@ def test_a_record_without_frames_has_nothing_to_show(tmp_path):
 def test_a_missing_package_names_its_extra(record, monkeypatch, tmp_path):
     for name in [name for name in sys.modules if name.split(".")[0] in ("pyvista", "matplotlib")]:
         monkeypatch.delitem(sys.modules, name)
-    real = builtins.__import__
 
-    def without(name, *args, **kwargs):
-        if name.split(".")[0] in ("pyvista", "matplotlib"):
-            raise ModuleNotFoundError(f"No module named {name!r}", name=name.split(".")[0])
-        return real(name, *args, **kwargs)
+    def without(real):
+        def imported(name, *args, **kwargs):
+            if name.split(".")[0] in ("pyvista", "matplotlib"):
+                raise ModuleNotFoundError(f"No module named {name!r}", name=name.split(".")[0])
+            return real(name, *args, **kwargs)
 
-    monkeypatch.setattr(builtins, "__import__", without)
-    monkeypatch.setattr("importlib.import_module", without)
+        return imported
+
+    monkeypatch.setattr(builtins, "__import__", without(builtins.__import__))
+    monkeypatch.setattr("importlib.import_module", without(importlib.import_module))
     with pytest.raises(ImportError, match=r'pip install "withe\[view\]"'):
         record.plot()
     with pytest.raises(ImportError, match=r'pip install "withe\[view\]"'):
