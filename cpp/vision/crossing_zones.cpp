@@ -52,19 +52,106 @@ double inner_half_width(const SkeletonEdge& edge) {
   return *middle;
 }
 
-/// Widest of the edges that leave a set of nodes; edges that join it with itself do not count.
-double widest_branch(const SkeletonGraph& graph, Union& sets, int node, std::size_t except) {
-  double widest = 0;
-  const int a = sets.root(node);
+/// For every set of nodes, the edges that leave it; edges that join it with itself do not count.
+std::vector<std::vector<int>> edges_leaving(const SkeletonGraph& graph, Union& sets) {
+  std::vector<std::vector<int>> leaving(graph.nodes.size());
   for (std::size_t e = 0; e < graph.edges.size(); ++e) {
     const SkeletonEdge& edge = graph.edges[e];
-    if (edge.removed || e == except || edge.nodes[0] < 0) continue;
+    if (edge.removed || edge.nodes[0] < 0) continue;
     const int first = sets.root(edge.nodes[0]);
     const int second = sets.root(edge.nodes[1]);
-    if (first == second || (first != a && second != a)) continue;
-    widest = std::max(widest, inner_half_width(edge));
+    if (first == second) continue;
+    leaving[static_cast<std::size_t>(first)].push_back(static_cast<int>(e));
+    leaving[static_cast<std::size_t>(second)].push_back(static_cast<int>(e));
   }
-  return widest;
+  return leaving;
+}
+
+/// Pixels at an end of an edge that the crossing or the tip has displaced.
+int distorted_pixels(const SkeletonEdge& edge, int end, const SkeletonNode& node) {
+  const int n = static_cast<int>(edge.points.size());
+  const auto at = [&](int i) { return edge.points[static_cast<std::size_t>(end == 0 ? i : n - 1 - i)]; };
+  const double half_width = inner_half_width(edge);
+  if (node.edges.size() < 2) return std::min(n / 3, static_cast<int>(half_width));
+  // Within the largest disc around the node the skeleton leads to the node, not along the cable.
+  const double disc = 1.25 * node.half_width;
+  int skip = 0;
+  const int most = std::min(n / 2 - 2, static_cast<int>(8 * half_width));
+  while (skip < most &&
+         (at(skip).half_width > 1.12 * half_width || (at(skip).position() - node.position).norm() < disc)) {
+    ++skip;
+  }
+  return std::max(skip, 0);
+}
+
+/// Point and direction at an end of an edge, from a parabola through its pixels.
+Branch measure_branch(const SkeletonGraph& graph, const SkeletonEdge& edge, int end, int skip, int skip_other,
+                      double tangent_length) {
+  Branch branch;
+  branch.half_width = inner_half_width(edge);
+  branch.skip = skip;
+  const int n = static_cast<int>(edge.points.size());
+  const auto at = [&](int i) { return edge.points[static_cast<std::size_t>(end == 0 ? i : n - 1 - i)].position(); };
+  const int last = n - 1 - skip_other;
+  const double reach = 2 * tangent_length * branch.half_width;
+  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+  Eigen::Matrix<double, 3, 2> right = Eigen::Matrix<double, 3, 2>::Zero();
+  double s = 0;
+  int used = 0;
+  Vector2 far_point = Vector2::Zero();
+  for (int i = skip; i <= last; ++i) {
+    if (i > skip) s += (at(i) - at(i - 1)).norm();
+    if (s > reach && used > 4) break;
+    const Eigen::Vector3d basis(1, s / reach, s * s / (reach * reach));
+    normal += basis * basis.transpose();
+    right += basis * at(i).transpose();
+    far_point = at(i);
+    ++used;
+  }
+  const Vector2 node = graph.nodes[static_cast<std::size_t>(edge.nodes[static_cast<std::size_t>(end)])].position;
+  const Vector2 other = graph.nodes[static_cast<std::size_t>(edge.nodes[static_cast<std::size_t>(1 - end)])].position;
+  if (used < 4) {
+    branch.point = n > 0 ? at(std::clamp(skip, 0, n - 1)) : Vector2(0.5 * (node + other));
+    branch.tangent = node - other;
+  } else if (s < 2 * branch.half_width || used < 8) {  // too short for a parabola
+    branch.point = at(skip);
+    branch.tangent = at(skip) - far_point;
+  } else {
+    const Eigen::Matrix<double, 3, 2> c = normal.ldlt().solve(right);
+    branch.point = c.row(0).transpose();
+    branch.tangent = -c.row(1).transpose();
+    // Along the way into the zone the first derivative turns its sign, the second does not.
+    const Vector2 second = 2 * c.row(2).transpose();
+    const double speed = branch.tangent.norm();
+    if (speed > 0) {
+      branch.curvature = (branch.tangent.x() * second.y() - branch.tangent.y() * second.x()) / (speed * speed * speed);
+    }
+  }
+  const double norm = branch.tangent.norm();
+  branch.tangent = norm > 0 ? Vector2(branch.tangent / norm) : Vector2(1, 0);
+  return branch;
+}
+
+/// Whether a link splits at both ends like a fork with a narrow angle: two cables that lie on each other for a while.
+bool is_forked(std::size_t link, const SkeletonGraph& graph, Union& sets, const std::vector<std::vector<int>>& leaving,
+               const std::vector<Branch>& branches) {
+  const SkeletonEdge& edge = graph.edges[link];
+  const Vector2 start = graph.nodes[static_cast<std::size_t>(edge.nodes[0])].position;
+  const Vector2 direction = (graph.nodes[static_cast<std::size_t>(edge.nodes[1])].position - start).normalized();
+  for (std::size_t end = 0; end < 2; ++end) {
+    const int set = sets.root(edge.nodes[end]);
+    int prongs = 0;
+    for (const int other : leaving[static_cast<std::size_t>(set)]) {
+      if (other == static_cast<int>(link)) continue;
+      const SkeletonEdge& prong = graph.edges[static_cast<std::size_t>(other)];
+      const std::size_t side = sets.root(prong.nodes[0]) == set ? 0 : 1;
+      const Vector2 outwards = -branches[2 * static_cast<std::size_t>(other) + side].tangent;
+      if (outwards.dot(end == 0 ? -direction : direction) < 0.8) return false;
+      ++prongs;
+    }
+    if (prongs != 2) return false;
+  }
+  return true;
 }
 
 /// Joins nodes to zones and says which edges are inside.
@@ -83,12 +170,22 @@ void find_zones(const SkeletonGraph& graph, const ZoneOptions& options, Continua
       long_links.push_back(e);
     }
   }
+  const std::vector<std::vector<int>> leaving = edges_leaving(graph, sets);
   std::vector<std::size_t> merged;
   for (const std::size_t e : long_links) {
     const SkeletonEdge& edge = graph.edges[e];
-    const double widest = std::max(widest_branch(graph, sets, edge.nodes[0], e),
-                                   widest_branch(graph, sets, edge.nodes[1], e));
-    if (widest > 0 && inner_half_width(edge) > options.merged_widening * widest) merged.push_back(e);
+    double widest = 0;
+    for (const int node : edge.nodes) {
+      for (const int other : leaving[static_cast<std::size_t>(sets.root(node))]) {
+        if (other == static_cast<int>(e)) continue;
+        widest = std::max(widest, inner_half_width(graph.edges[static_cast<std::size_t>(other)]));
+      }
+    }
+    const double widening = widest > 0 ? inner_half_width(edge) / widest : 0;
+    if (widening > options.merged_widening ||
+        (widening > 0.85 && is_forked(e, graph, sets, leaving, result.branches))) {
+      merged.push_back(e);
+    }
   }
   for (const std::size_t e : merged) {
     sets.join(graph.edges[e].nodes[0], graph.edges[e].nodes[1]);
@@ -120,61 +217,6 @@ void find_zones(const SkeletonGraph& graph, const ZoneOptions& options, Continua
       result.zones[static_cast<std::size_t>(zone)].branches.push_back(half);
     }
   }
-}
-
-/// Pixels at an end of an edge that the crossing or the tip has displaced.
-int distorted_pixels(const SkeletonEdge& edge, int end, bool tip) {
-  const int n = static_cast<int>(edge.points.size());
-  const auto at = [&](int i) { return edge.points[static_cast<std::size_t>(end == 0 ? i : n - 1 - i)]; };
-  const double half_width = inner_half_width(edge);
-  if (tip) return std::min(n / 3, static_cast<int>(half_width));
-  int skip = 0;
-  const int most = std::min(n / 2 - 2, static_cast<int>(8 * half_width));
-  while (skip < most && (at(skip).half_width > 1.12 * half_width || skip < 0.5 * half_width)) ++skip;
-  return std::max(skip, 0);
-}
-
-/// Point and direction at an end of an edge, from a parabola through its pixels.
-Branch measure_branch(const SkeletonGraph& graph, const SkeletonEdge& edge, int end, int skip, int skip_other,
-                      double tangent_length) {
-  Branch branch;
-  branch.half_width = inner_half_width(edge);
-  branch.skip = skip;
-  const int n = static_cast<int>(edge.points.size());
-  const auto at = [&](int i) { return edge.points[static_cast<std::size_t>(end == 0 ? i : n - 1 - i)].position(); };
-  const int last = n - 1 - skip_other;
-  const double reach = 2 * tangent_length * branch.half_width;
-  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
-  Eigen::Matrix<double, 3, 2> right = Eigen::Matrix<double, 3, 2>::Zero();
-  double s = 0;
-  int used = 0;
-  Vector2 far_point = Vector2::Zero();
-  for (int i = skip; i <= last; ++i) {
-    if (i > skip) s += (at(i) - at(i - 1)).norm();
-    if (s > reach && used > 4) break;
-    const Eigen::Vector3d basis(1, s / reach, s * s / (reach * reach));
-    normal += basis * basis.transpose();
-    right += basis * at(i).transpose();
-    far_point = at(i);
-    ++used;
-  }
-  const Vector2 node = graph.nodes[static_cast<std::size_t>(edge.nodes[static_cast<std::size_t>(end)])].position;
-  const Vector2 other =
-      graph.nodes[static_cast<std::size_t>(edge.nodes[static_cast<std::size_t>(1 - end)])].position;
-  if (used < 4) {
-    branch.point = n > 0 ? at(std::clamp(skip, 0, n - 1)) : Vector2(0.5 * (node + other));
-    branch.tangent = node - other;
-  } else if (s < 2 * branch.half_width || used < 8) {  // too short for a parabola
-    branch.point = at(skip);
-    branch.tangent = at(skip) - far_point;
-  } else {
-    const Eigen::Matrix<double, 3, 2> c = normal.ldlt().solve(right);
-    branch.point = c.row(0).transpose();
-    branch.tangent = -c.row(1).transpose();
-  }
-  const double norm = branch.tangent.norm();
-  branch.tangent = norm > 0 ? Vector2(branch.tangent / norm) : Vector2(1, 0);
-  return branch;
 }
 
 /// Energy of a pair, or infinity where the turn is that of two tips that touch: over 90 degrees within a width.
@@ -287,7 +329,15 @@ double bending_energy(const Branch& from, const Branch& to) {
   }
   const double a = signed_angle(from.tangent, chord);
   const double b = signed_angle(-to.tangent, chord);
-  return 2 / std::max({length, shortest, 1.0}) * (a * a + a * b + b * b);
+  const double scale = 2 / std::max({length, shortest, 1.0});
+  const double straight = scale * (a * a + a * b + b * b);
+  // Curvatures along the way from one branch to the other; extrapolated over at most half a radian.
+  const double most = 0.5 / length;
+  const double k1 = std::clamp(from.curvature, -most, most);
+  const double k2 = std::clamp(-to.curvature, -most, most);
+  const double c = a - length * (k1 / 3 + k2 / 6);
+  const double d = b + length * (k1 / 6 + k2 / 3);
+  return 0.25 * straight + 0.75 * scale * (c * c + c * d + d * d);
 }
 
 Continuations find_continuations(const SkeletonGraph& graph, const ZoneOptions& options) {
@@ -297,15 +347,13 @@ Continuations find_continuations(const SkeletonGraph& graph, const ZoneOptions& 
   result.zone_of.assign(halves, -1);
   result.partner.assign(halves, -1);
   result.inside.assign(graph.edges.size(), 0);
-  find_zones(graph, options, result);
-
   for (std::size_t e = 0; e < graph.edges.size(); ++e) {
     const SkeletonEdge& edge = graph.edges[e];
-    if (edge.removed || result.inside[e] || edge.nodes[0] < 0) continue;
+    if (edge.removed || edge.nodes[0] < 0) continue;
     std::array<int, 2> skips{};
     for (int end = 0; end < 2; ++end) {
-      const bool tip = result.zone_of[2 * e + static_cast<std::size_t>(end)] < 0;
-      skips[static_cast<std::size_t>(end)] = distorted_pixels(edge, end, tip);
+      const int node = edge.nodes[static_cast<std::size_t>(end)];
+      skips[static_cast<std::size_t>(end)] = distorted_pixels(edge, end, graph.nodes[static_cast<std::size_t>(node)]);
     }
     for (int end = 0; end < 2; ++end) {
       result.branches[2 * e + static_cast<std::size_t>(end)] =
@@ -313,6 +361,7 @@ Continuations find_continuations(const SkeletonGraph& graph, const ZoneOptions& 
                          skips[static_cast<std::size_t>(1 - end)], options.tangent_length);
     }
   }
+  find_zones(graph, options, result);
   for (const Zone& zone : result.zones) {
     std::vector<Branch> branches;
     for (const HalfEdge half : zone.branches) branches.push_back(result.branches[static_cast<std::size_t>(half)]);

@@ -18,6 +18,7 @@ inline HalfEdge opposite(HalfEdge half) { return half ^ 1; }
 struct Branch {
   Vector2 point = Vector2::Zero();    ///< last place that the skeleton is trusted at
   Vector2 tangent = Vector2::Zero();  ///< unit vector into the zone, or out of the cable's tip
+  double curvature = 0;               ///< to the left of the tangent [1/px]
   double half_width = 0;              ///< [px]
   int skip = 0;                       ///< pixels between the point and the end of the edge
 };
@@ -54,8 +55,10 @@ struct Continuations {
   std::vector<DoubtfulZone> doubts;
 };
 
-/// Bending energy of the least bent line from one branch into another, 2/L (a^2 + a b + b^2) for a chord of length L
-/// that the ends leave at the signed angles a and b [1/px]: the beam of unit stiffness clamped at both ends.
+/// Bending energy of the least bent line from one branch into another [1/px]: a beam of unit stiffness clamped at both
+/// ends, 2/L (a^2 + a b + b^2) for a chord of length L and the signed angles a and b between chord and ends. Cables
+/// that are bent before and after a crossing are bent inside it too, so three quarters of the energy are counted from
+/// the curvatures k1 and k2 of the two branches: a is then less by L (k1/3 + k2/6), b more by L (k1/6 + k2/3).
 double bending_energy(const Branch& from, const Branch& to);
 
 Continuations find_continuations(const SkeletonGraph& graph, const ZoneOptions& options);

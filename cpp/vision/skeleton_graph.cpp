@@ -17,8 +17,7 @@ struct NeighbourList {
 };
 
 NeighbourList neighbours(const BitImage& skeleton, const PixelIndex& index, Pixel p) {
-  static constexpr std::array<Pixel, 8> kSteps{
-      {{1, 0}, {0, 1}, {-1, 0}, {0, -1}, {1, 1}, {-1, 1}, {-1, -1}, {1, -1}}};
+  static constexpr std::array<Pixel, 8> kSteps{{{1, 0}, {0, 1}, {-1, 0}, {0, -1}, {1, 1}, {-1, 1}, {-1, -1}, {1, -1}}};
   NeighbourList list;
   for (const Pixel step : kSteps) {
     const int x = p.x + step.x;

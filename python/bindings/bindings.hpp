@@ -15,6 +15,7 @@ namespace py = pybind11;
 void register_model(py::module_& module);
 void register_integrators(py::module_& module);
 void register_world(py::module_& module);
+void register_vision(py::module_& module);
 
 /// Words for the values of an enum.
 template <class Enum, std::size_t count>

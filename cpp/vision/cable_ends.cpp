@@ -1,0 +1,68 @@
+#include "vision/cable_ends.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+namespace withe {
+
+namespace {
+
+bool inside(const BitImage& mask, const Vector2& point) {
+  return mask.at(static_cast<int>(std::lround(point.x())), static_cast<int>(std::lround(point.y())));
+}
+
+}  // namespace
+
+double reach_border(const BitImage& mask, const Vector2& from, const Vector2& direction, double limit) {
+  constexpr double step = 0.25;
+  double distance = step;
+  while (distance < limit && inside(mask, from + distance * direction)) distance += step;
+  return distance - 0.5 * step;
+}
+
+std::vector<Vector2> grow_end(const BitImage& mask, const Branch& tip) {
+  std::vector<Vector2> points;
+  const double half_width = tip.half_width;
+  const double wide = 2 * half_width + 1;
+  const double longest = 8 * half_width + 30;
+  Vector2 point = tip.point;
+  Vector2 tangent = tip.tangent;
+  if (!inside(mask, point)) return points;
+  double left_to_go = 0;
+  double way = 0;
+  while (true) {
+    left_to_go = reach_border(mask, point, tangent, 3 * half_width + 2);
+    // Beyond this place the border in front would pull the point aside.
+    if (left_to_go < half_width + 1 || way > longest) break;
+    const Vector2 normal(-tangent.y(), tangent.x());
+    Vector2 next = point + tangent;
+    const double left = reach_border(mask, next, normal, wide);
+    const double right = reach_border(mask, next, -normal, wide);
+    if (left + right > 3 * half_width + 2) break;  // not this cable alone
+    next += std::clamp(0.5 * (left - right), -0.3, 0.3) * normal;
+    const Vector2 turned = 0.9 * tangent + 0.1 * (next - point).normalized();
+    tangent = turned.normalized();
+    point = next;
+    points.push_back(point);
+    way += 1;
+  }
+  // How far the mask goes beyond the point, along the middle and nearer to the flanks.
+  const Vector2 normal(-tangent.y(), tangent.x());
+  const double limit = 3 * half_width + 2;
+  const double middle = reach_border(mask, point, tangent, limit);
+  if (middle >= limit - 1) return points;  // runs into something else
+  const auto ahead = [&](double aside) {
+    const Vector2 start = point + aside * half_width * normal;
+    return inside(mask, start) ? reach_border(mask, start, tangent, limit) : 0.0;
+  };
+  const double flanks = 0.25 * (ahead(-0.8) + ahead(0.8) + ahead(-0.6) + ahead(0.6));
+  // A half disc of radius r falls back by .3 r there on average.
+  const double roundness = std::clamp(((middle - flanks) / half_width - 0.06) / 0.22, 0.0, 1.0);
+  const double rest = middle - roundness * half_width;
+  for (double s = 1; s < rest; s += 1) points.push_back(point + s * tangent);
+  if (rest > 0) points.push_back(point + rest * tangent);
+  return points;
+}
+
+}  // namespace withe

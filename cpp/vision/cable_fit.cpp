@@ -1,0 +1,236 @@
+#include "vision/cable_fit.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "vision/cable_ends.hpp"
+
+namespace withe {
+
+CableOutline::CableOutline(const SkeletonGraph& graph, const Continuations& links, const CablePath& path)
+    : closed_(path.closed) {
+  for (const HalfEdge entry : path.entries) {
+    const SkeletonEdge& edge = graph.edges[static_cast<std::size_t>(edge_of(entry))];
+    const int n = static_cast<int>(edge.points.size());
+    int first = 0;
+    int last = n - 1;
+    if (edge.nodes[0] >= 0) {
+      first = links.branches[static_cast<std::size_t>(entry)].skip;
+      last -= links.branches[static_cast<std::size_t>(opposite(entry))].skip;
+    }
+    if (last < first) first = last = n / 2;
+    int gap = kNoGap;
+    if (!points_.empty() || (closed_ && edge.nodes[0] >= 0)) {
+      const int zone = links.zone_of[static_cast<std::size_t>(entry)];
+      gap = zone >= 0 ? zone : kBridge;
+    }
+    if (points_.empty()) {
+      closing_zone_ = gap;
+      gap = kNoGap;
+    }
+    if (n == 0) {
+      const Vector2 middle = links.branches[static_cast<std::size_t>(entry)].point;
+      points_.push_back({middle, edge.half_width, gap});
+      continue;
+    }
+    for (int i = first; i <= last; ++i) {
+      const SkeletonPoint& point = edge.points[static_cast<std::size_t>(end_of(entry) == 0 ? i : n - 1 - i)];
+      points_.push_back({point.position(), point.half_width, i == first ? gap : kNoGap});
+    }
+  }
+}
+
+void CableOutline::extend(bool at_end, const std::vector<Vector2>& points) {
+  if (points_.empty() || points.empty()) return;
+  std::vector<Point> more;
+  more.reserve(points.size());
+  const double half_width = (at_end ? points_.back() : points_.front()).half_width;
+  for (const Vector2& point : points) more.push_back({point, half_width, kNoGap});
+  if (at_end) {
+    points_.insert(points_.end(), more.begin(), more.end());
+  } else {
+    points_.front().zone_before = kNoGap;
+    points_.insert(points_.begin(), more.rbegin(), more.rend());
+  }
+}
+
+double CableOutline::length() const {
+  double sum = 0;
+  for (std::size_t i = 1; i < points_.size(); ++i) sum += (points_[i].position - points_[i - 1].position).norm();
+  return sum;
+}
+
+std::vector<double> CableOutline::stations(double& total) const {
+  // A chain of pixels is longer than the line it stands for, so steps are measured over five pixels.
+  const int n = static_cast<int>(points_.size());
+  std::vector<double> result(points_.size(), 0.0);
+  int run_start = 0;
+  for (int i = 1; i < n; ++i) {
+    const Point& here = points_[static_cast<std::size_t>(i)];
+    double step = 0;
+    if (here.zone_before != kNoGap) {
+      run_start = i;
+      step = (here.position - points_[static_cast<std::size_t>(i - 1)].position).norm();
+    } else {
+      int from = std::max(i - 3, run_start);
+      int to = i;
+      while (to + 1 < n && to < i + 2 && points_[static_cast<std::size_t>(to + 1)].zone_before == kNoGap) ++to;
+      step =
+          (points_[static_cast<std::size_t>(to)].position - points_[static_cast<std::size_t>(from)].position).norm() /
+          (to - from);
+    }
+    result[static_cast<std::size_t>(i)] = result[static_cast<std::size_t>(i - 1)] + std::max(step, 0.05);
+  }
+  total = result.back();
+  if (closed_) total += std::max((points_.front().position - points_.back().position).norm(), 0.5);
+  return result;
+}
+
+std::vector<FitSample> CableOutline::flank_samples(const BitImage& mask, const MatrixX2& line, double spacing,
+                                                   const std::vector<double>& station) const {
+  struct Flanks {
+    double left, right;
+  };
+  const std::ptrdiff_t n = line.rows();
+  const auto measure = [&](std::ptrdiff_t row, double limit, Vector2& point, Vector2& normal) -> Flanks {
+    const std::ptrdiff_t before = closed_ ? (row + n - 1) % n : std::max<std::ptrdiff_t>(row - 1, 0);
+    const std::ptrdiff_t after = closed_ ? (row + 1) % n : std::min(row + 1, n - 1);
+    const Vector2 tangent = (line.row(after) - line.row(before)).transpose().normalized();
+    point = line.row(row).transpose();
+    normal = Vector2(-tangent.y(), tangent.x());
+    return {reach_border(mask, point, normal, limit), reach_border(mask, point, -normal, limit)};
+  };
+  std::vector<FitSample> samples;
+  Vector2 point, normal;
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    const int zone = i > 0 ? points_[i].zone_before : closing_zone_;
+    if (zone < 0) continue;
+    const double from = i > 0 ? station[i - 1] : station.back();
+    const double to = i > 0 ? station[i] : spacing * static_cast<double>(n);
+    const double half_width = 0.5 * ((i > 0 ? points_[i - 1] : points_.back()).half_width + points_[i].half_width);
+    // What the same measurement gives for the whole cable, just outside.
+    const double margin = half_width;
+    double width = 0;
+    int count = 0;
+    for (double s = margin; s < margin + 6 * half_width; s += spacing) {
+      for (const double place : {(from - s) / spacing, (to + s) / spacing}) {
+        const auto row = static_cast<std::ptrdiff_t>(std::lround(place));
+        if (row < 0 || row >= n) continue;
+        const Flanks flanks = measure(row, 2 * half_width + 1, point, normal);
+        if (flanks.left + flanks.right > 2.6 * half_width + 1) continue;
+        width += flanks.left + flanks.right;
+        ++count;
+      }
+    }
+    if (count < 3) continue;
+    const double own = 0.5 * width / count;
+    for (double s = from; s <= to; s += spacing) {
+      const auto row = std::min(static_cast<std::ptrdiff_t>(std::lround(s / spacing)), n - 1);
+      const Flanks flanks = measure(row, 2 * half_width + 1, point, normal);
+      const double nearer = std::min(flanks.left, flanks.right);
+      if (std::abs(nearer - own) > 0.4 * own) continue;
+      const double aside = flanks.left < flanks.right ? flanks.left - own : own - flanks.right;
+      samples.push_back({point + aside * normal, s, 0.5 * spacing});
+    }
+  }
+  return samples;
+}
+
+Cable CableOutline::fit(const BitImage& mask, const TraceOptions& options, int number,
+                        std::vector<HiddenStretch>& stretches) const {
+  Cable cable;
+  cable.closed = closed_ && points_.size() >= 8;
+  double total = 0;
+  std::vector<double> station = stations(total);
+  std::vector<double> half_widths;
+  for (const Point& point : points_) half_widths.push_back(point.half_width);
+  const auto middle = half_widths.begin() + static_cast<std::ptrdiff_t>(half_widths.size() / 2);
+  std::nth_element(half_widths.begin(), middle, half_widths.end());
+  const double half_width = std::max(*middle, 0.5);
+  const double stiffness = options.stiffness_length * std::clamp(half_width, 1.5, 12.0);
+  const double spacing = std::min(2.0, stiffness);
+
+  std::vector<FitSample> samples;
+  const auto make_samples = [&] {
+    samples.clear();
+    for (std::size_t i = 0; i < points_.size(); ++i) samples.push_back({points_[i].position, station[i], 1.0});
+    // One more sample keeps the line determined where there are fewer than two.
+    if (samples.size() == 1) samples.push_back({samples[0].point + Vector2(1, 0), samples[0].station + 1, 1.0});
+  };
+  make_samples();
+  total = std::max(total, 1.0);
+  MatrixX2 line = fit_least_bending(samples, total, spacing, stiffness, cable.closed);
+
+  // The way through a gap is longer than its chord: measured on the first fit, it moves the samples behind it.
+  bool gaps = closing_zone_ != kNoGap;
+  for (const Point& point : points_) gaps = gaps || point.zone_before != kNoGap;
+  if (gaps) {
+    const std::ptrdiff_t n = line.rows();
+    const double h = total / static_cast<double>(cable.closed ? n : n - 1);
+    std::vector<double> arc(static_cast<std::size_t>(n) + 1, 0.0);
+    for (std::ptrdiff_t i = 0; i < n; ++i) {
+      const double step = i + 1 < n || cable.closed ? (line.row((i + 1) % n) - line.row(i)).norm() : 0.0;
+      arc[static_cast<std::size_t>(i) + 1] = arc[static_cast<std::size_t>(i)] + step;
+    }
+    const auto arc_at = [&](double s) {
+      const double place = std::clamp(s / h, 0.0, static_cast<double>(n) - 1e-9);
+      const auto i = static_cast<std::size_t>(place);
+      return arc[i] + (place - static_cast<double>(i)) * (arc[i + 1] - arc[i]);
+    };
+    const double closing = total - station.back();
+    const double closing_arc = arc_at(total) - arc_at(station.back());
+    double shift = 0;
+    std::vector<double> moved = station;
+    for (std::size_t i = 1; i < points_.size(); ++i) {
+      if (points_[i].zone_before != kNoGap) {
+        const double gap = station[i] - station[i - 1];
+        shift += std::clamp(arc_at(station[i]) - arc_at(station[i - 1]), gap, 3 * gap) - gap;
+      }
+      moved[i] = station[i] + shift;
+    }
+    total = moved.back() + (cable.closed ? std::max(closing, closing_arc) : 0.0);
+    total = std::max(total, 1.0);
+    station = moved;
+    for (int round = 0; round < 2; ++round) {
+      make_samples();
+      const double step = total / static_cast<double>(cable.closed ? line.rows() : line.rows() - 1);
+      if (round > 0) {
+        const std::vector<FitSample> flanks = flank_samples(mask, line, step, station);
+        samples.insert(samples.end(), flanks.begin(), flanks.end());
+      }
+      line = fit_least_bending(samples, total, spacing, stiffness, cable.closed);
+    }
+  }
+
+  std::vector<double> rows;
+  const double h = total / static_cast<double>(cable.closed ? line.rows() : line.rows() - 1);
+  cable.centreline = resample(line, options.spacing, cable.closed, &rows);
+  const auto count = static_cast<std::size_t>(cable.centreline.rows());
+  cable.widths.resize(count);
+  cable.hidden.assign(count, 0);
+  std::size_t next = 0;
+  for (std::size_t r = 0; r < count; ++r) {
+    const double s = rows[r] * h;
+    while (next < points_.size() && station[next] < s) ++next;
+    const bool wraps = next == points_.size() || next == 0;
+    const Point& after = points_[next == points_.size() ? (cable.closed ? 0 : next - 1) : next];
+    const Point& before = points_[next == 0 ? 0 : next - 1];
+    const int gap = !wraps ? after.zone_before : (cable.closed ? closing_zone_ : kNoGap);
+    double t = 1;
+    if (!wraps && station[next] > station[next - 1]) t = (s - station[next - 1]) / (station[next] - station[next - 1]);
+    cable.widths[r] = std::max(1.0, 2 * ((1 - t) * before.half_width + t * after.half_width));
+    if (gap == kNoGap) continue;
+    cable.hidden[r] = 1;
+    if (gap < 0) continue;
+    const int row = static_cast<int>(r);
+    if (!stretches.empty() && stretches.back().cable == number && stretches.back().zone == gap &&
+        stretches.back().last == row - 1) {
+      stretches.back().last = row;
+    } else {
+      stretches.push_back({gap, number, row, row});
+    }
+  }
+  return cable;
+}
+
+}  // namespace withe

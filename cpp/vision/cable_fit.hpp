@@ -1,0 +1,54 @@
+#pragma once
+/// One cable from its edges: the skeleton inside zones and gaps is dropped and the whole cable fitted again.
+
+#include <vector>
+
+#include "vision/bending_fit.hpp"
+#include "vision/cable_paths.hpp"
+#include "vision/tracing.hpp"
+
+namespace withe {
+
+/// A stretch of a cable that passes through a zone, as rows of its centreline.
+struct HiddenStretch {
+  int zone = -1;
+  int cable = -1;
+  int first = 0;
+  int last = 0;
+};
+
+/// What a cable is fitted to: points in order, with their half widths; a gap before a point is marked by its zone.
+class CableOutline {
+ public:
+  CableOutline(const SkeletonGraph& graph, const Continuations& links, const CablePath& path);
+
+  /// Adds points before the first or behind the last, from there outwards.
+  void extend(bool at_end, const std::vector<Vector2>& points);
+  /// Length of the points in order [px].
+  double length() const;
+  bool empty() const { return points_.empty(); }
+  bool closed() const { return closed_; }
+
+  /// The line of least bending; `stretches` receives where it passes through zones. Where one flank of the cable shows
+  /// inside a zone, as it does for long where two cables cross at a small angle, the line keeps its distance from it.
+  Cable fit(const BitImage& mask, const TraceOptions& options, int number, std::vector<HiddenStretch>& stretches) const;
+
+ private:
+  struct Point {
+    Vector2 position;
+    double half_width;
+    int zone_before;  ///< kNoGap, kBridge or the zone between the point before and this one
+  };
+  static constexpr int kNoGap = -2;
+  static constexpr int kBridge = -1;
+
+  std::vector<double> stations(double& total) const;
+  std::vector<FitSample> flank_samples(const BitImage& mask, const MatrixX2& line, double spacing,
+                                       const std::vector<double>& station) const;
+
+  std::vector<Point> points_;
+  bool closed_ = false;
+  int closing_zone_ = kNoGap;
+};
+
+}  // namespace withe

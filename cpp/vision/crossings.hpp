@@ -1,0 +1,23 @@
+#pragma once
+/// Where the fitted cables cross, and where one ends on the flank of another.
+
+#include <vector>
+
+#include "vision/cable_fit.hpp"
+#include "vision/tracing.hpp"
+
+namespace withe {
+
+/// Crossings of cables inside zones. Two cables that meet an even number of times within one zone only touch there.
+std::vector<Crossing> find_crossings(const std::vector<Cable>& cables, const std::vector<HiddenStretch>& stretches);
+
+/// Where a ray first meets one of the stretches; `row` is -1 where it meets none within `longest`.
+struct RayHit {
+  CableRow through;
+  double distance = 0;
+  double sine = 1;  ///< of the angle between ray and cable
+};
+RayHit cast_ray(const std::vector<Cable>& cables, const std::vector<HiddenStretch>& stretches, int zone,
+                const Vector2& from, const Vector2& direction, double longest);
+
+}  // namespace withe

@@ -1,0 +1,203 @@
+#include "vision/tracing.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "vision/cable_ends.hpp"
+#include "vision/cable_fit.hpp"
+#include "vision/cable_paths.hpp"
+#include "vision/crossings.hpp"
+#include "vision/skeleton_graph.hpp"
+#include "vision/thinning.hpp"
+
+namespace withe {
+
+namespace {
+
+class Stopwatch {
+ public:
+  explicit Stopwatch(std::vector<Timing>& timings) : timings_(&timings) {}
+  /// Books the time since the last call.
+  void lap(const char* step) {
+    const auto now = std::chrono::steady_clock::now();
+    timings_->push_back({step, std::chrono::duration<double>(now - last_).count()});
+    last_ = now;
+  }
+
+ private:
+  std::vector<Timing>* timings_;
+  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+};
+
+/// Frays and pinholes go, unless the lines are so thin that much of them would go too.
+BitImage smooth(const BitImage& mask) {
+  BitImage result = majority(mask);
+  if (10 * result.count() < 8 * mask.count()) return mask;
+  return majority(result);
+}
+
+/// Whether there is a square of four pixels: lines a single pixel wide are no cables.
+bool has_width(const BitImage& mask) {
+  for (int y = 1; y < mask.height(); ++y) {
+    const std::uint64_t* above = mask.row(y - 1);
+    const std::uint64_t* row = mask.row(y);
+    for (int w = 0; w < mask.words(); ++w) {
+      const std::uint64_t pair = above[w] & row[w];
+      const std::uint64_t right = (pair >> 1) | ((above[w + 1] & row[w + 1]) << 63);
+      if ((pair & right) != 0) return true;
+    }
+  }
+  return false;
+}
+
+/// The half width that half of the skeleton's length exceeds.
+double typical_half_width(const SkeletonGraph& graph) {
+  std::vector<std::pair<double, double>> entries;
+  double total = 0;
+  for (const SkeletonEdge& edge : graph.edges) {
+    if (edge.removed) continue;
+    entries.emplace_back(edge.half_width, edge.length + 1);
+    total += edge.length + 1;
+  }
+  std::sort(entries.begin(), entries.end());
+  double sum = 0;
+  for (const auto& [half_width, length] : entries) {
+    sum += length;
+    if (2 * sum >= total) return half_width;
+  }
+  return 0;
+}
+
+/// Tips by half-edge, grown to the end of the mask. Lines too short to be cables are removed.
+std::vector<std::vector<Vector2>> grow_tips(const BitImage& mask, SkeletonGraph& graph, const Continuations& links,
+                                            double shortest) {
+  std::vector<std::vector<Vector2>> ends(2 * graph.edges.size());
+  for (std::size_t e = 0; e < graph.edges.size(); ++e) {
+    SkeletonEdge& edge = graph.edges[e];
+    if (edge.removed || links.inside[e]) continue;
+    if (edge.nodes[0] < 0) {
+      edge.removed = edge.length < shortest;
+      continue;
+    }
+    bool alone = true;
+    double length = edge.length;
+    for (std::size_t end = 0; end < 2; ++end) {
+      const std::size_t half = 2 * e + end;
+      if (links.zone_of[half] >= 0) {
+        alone = false;
+        continue;
+      }
+      const Branch& branch = links.branches[half];
+      ends[half] = grow_end(mask, branch);
+      if (ends[half].empty()) ends[half].push_back(branch.point);
+      length += static_cast<double>(ends[half].size()) - branch.skip;
+    }
+    if (alone && length < shortest) {
+      edge.removed = true;
+      ends[2 * e].clear();
+      ends[2 * e + 1].clear();
+    }
+  }
+  return ends;
+}
+
+struct CableEnd {
+  int cable;
+  bool at_end;
+  HalfEdge half;
+};
+
+}  // namespace
+
+Tracing trace_lines(const BitImage& mask, const TraceOptions& options) {
+  Tracing tracing;
+  Stopwatch watch(tracing.timings);
+  if (!has_width(mask)) return tracing;
+  const BitImage smoothed = smooth(mask);
+  watch.lap("smooth");
+  const BitImage skeleton = thin(smoothed);
+  watch.lap("thin");
+  SkeletonGraph graph = build_graph(skeleton, smoothed, 200);
+  prune_spurs(graph, options.spur_ratio);
+  watch.lap("graph");
+  Continuations links = find_continuations(graph, options.zones);
+  tracing.doubts = links.doubts;
+  watch.lap("cross");
+
+  const double shortest = options.shortest_cable * 2 * typical_half_width(graph);
+  const auto ends = grow_tips(smoothed, graph, links, shortest);
+  bridge_gaps(links, ends, options.longest_gap, options.gap_angle);
+  const std::vector<CablePath> paths = collect_paths(graph, links);
+  watch.lap("paths");
+
+  std::vector<CableOutline> outlines;
+  std::vector<HiddenStretch> stretches;
+  std::vector<CableEnd> on_flanks;
+  for (const CablePath& path : paths) {
+    CableOutline outline(graph, links, path);
+    std::vector<CableEnd> flanks;
+    const int number = static_cast<int>(outlines.size());
+    if (!path.closed) {
+      for (const bool at_end : {false, true}) {
+        const HalfEdge half = at_end ? opposite(path.entries.back()) : path.entries.front();
+        if (links.zone_of[static_cast<std::size_t>(half)] < 0) {
+          outline.extend(at_end, ends[static_cast<std::size_t>(half)]);
+        } else {
+          flanks.push_back({number, at_end, half});
+        }
+      }
+    }
+    if (outline.empty() || outline.length() < shortest) continue;
+    on_flanks.insert(on_flanks.end(), flanks.begin(), flanks.end());
+    tracing.cables.push_back(outline.fit(smoothed, options, number, stretches));
+    outlines.push_back(std::move(outline));
+  }
+
+  // Ends on the flank of another cable, which had to be known first.
+  std::vector<char> again(outlines.size(), 0);
+  std::vector<std::pair<CableEnd, CableRow>> joints;
+  const std::vector<HiddenStretch> before = stretches;
+  for (const CableEnd& end : on_flanks) {
+    const Branch& branch = links.branches[static_cast<std::size_t>(end.half)];
+    const int zone = links.zone_of[static_cast<std::size_t>(end.half)];
+    const double longest = 12 * 2 * branch.half_width;
+    const RayHit hit = cast_ray(tracing.cables, before, zone, branch.point, branch.tangent, longest);
+    CableOutline& outline = outlines[static_cast<std::size_t>(end.cable)];
+    again[static_cast<std::size_t>(end.cable)] = 1;
+    if (hit.through.cable < 0) {
+      outline.extend(end.at_end, grow_end(smoothed, branch));
+      continue;
+    }
+    const Cable& through = tracing.cables[static_cast<std::size_t>(hit.through.cable)];
+    const double half_width = 0.5 * through.widths[static_cast<std::size_t>(hit.through.row)];
+    const double distance = hit.distance - half_width / std::max(hit.sine, 0.3);
+    std::vector<Vector2> points;
+    for (double s = 1; s < distance; s += 1) points.push_back(branch.point + s * branch.tangent);
+    if (distance > 0) points.push_back(branch.point + distance * branch.tangent);
+    outline.extend(end.at_end, points);
+    joints.emplace_back(end, hit.through);
+  }
+  for (std::size_t c = 0; c < outlines.size(); ++c) {
+    if (!again[c]) continue;
+    const int number = static_cast<int>(c);
+    std::erase_if(stretches, [number](const HiddenStretch& stretch) { return stretch.cable == number; });
+    tracing.cables[c] = outlines[c].fit(smoothed, options, number, stretches);
+  }
+  for (const auto& [end, through] : joints) {
+    const Cable& cable = tracing.cables[static_cast<std::size_t>(end.cable)];
+    const int row = end.at_end ? static_cast<int>(cable.centreline.rows()) - 1 : 0;
+    const Vector2 point = cable.centreline.row(row).transpose();
+    // The other cable may have been fitted again as well, so its row is looked up anew.
+    const Cable& other = tracing.cables[static_cast<std::size_t>(through.cable)];
+    Eigen::Index nearest = through.row;
+    (other.centreline.rowwise() - point.transpose()).rowwise().squaredNorm().minCoeff(&nearest);
+    if (through.cable == end.cable) nearest = std::min<Eigen::Index>(through.row, other.centreline.rows() - 1);
+    tracing.joints.push_back({point, {end.cable, row}, {through.cable, static_cast<int>(nearest)}});
+  }
+  tracing.crossings = find_crossings(tracing.cables, stretches);
+  watch.lap("fit");
+  return tracing;
+}
+
+}  // namespace withe

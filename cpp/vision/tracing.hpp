@@ -1,0 +1,69 @@
+#pragma once
+/// From a mask to cables: every cable one ordered line of points, with its widths, crossings and joints.
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "common/types.hpp"
+#include "vision/bit_image.hpp"
+#include "vision/crossing_zones.hpp"
+
+namespace withe {
+
+/// One cable, end to end.
+struct Cable {
+  MatrixX2 centreline;         ///< x, y [px]
+  std::vector<double> widths;  ///< by row [px]
+  std::vector<char> hidden;    ///< by row: in a crossing or a gap, where the skeleton says nothing
+  bool closed = false;         ///< the first row is not repeated
+};
+
+/// A row of a cable's centreline.
+struct CableRow {
+  int cable = -1;
+  int row = -1;
+};
+
+/// Two cables, or a cable and itself, one over the other.
+struct Crossing {
+  Vector2 point = Vector2::Zero();
+  CableRow over;
+  CableRow under;
+  double confidence = 0;  ///< that `over` is over, 0 for unknown to 1
+};
+
+/// The end of one cable on the flank of another.
+struct Joint {
+  Vector2 point = Vector2::Zero();
+  CableRow end;
+  CableRow through;
+};
+
+struct Timing {
+  std::string step;
+  double seconds = 0;
+};
+
+struct TraceOptions {
+  double spur_ratio = 1.5;      ///< ends of the skeleton shorter than this are frays [local half widths]
+  double shortest_cable = 2;    ///< shorter lines are specks [widths of the cables in the image]
+  double longest_gap = 16;      ///< [px]
+  double gap_angle = 25;        ///< of each end to the bridge [degrees]
+  double spacing = 1.8;         ///< of rows, at most [px]
+  double stiffness_length = 1;  ///< bumps shorter than this are smoothed away [half widths]
+  ZoneOptions zones;
+};
+
+struct Tracing {
+  std::vector<Cable> cables;
+  std::vector<Crossing> crossings;
+  std::vector<Joint> joints;
+  std::vector<DoubtfulZone> doubts;
+  std::vector<Timing> timings;
+};
+
+/// Finds every cable in a mask.
+Tracing trace_lines(const BitImage& mask, const TraceOptions& options);
+
+}  // namespace withe
