@@ -5,6 +5,7 @@
 #include <limits>
 #include <random>
 #include <span>
+#include <vector>
 
 namespace withe {
 namespace {
@@ -58,16 +59,35 @@ class Statics {
     accept_configuration(equations_.model(), q, c, state_);
   }
 
+  /// Moments and followers turn with the rod, so their dead imbalance would pull where they do not: they grow instead.
+  void scale_turning_loads(double fraction) {
+    Loads& loads = equations_.loads();
+    for (const LoadPiece& piece : loads.pieces)
+      if (piece.shape != LoadShape::dead_node)
+        loads.values[static_cast<std::size_t>(piece.load)] = fraction * full_loads_[static_cast<std::size_t>(piece.load)];
+  }
+
   bool load_steps(const Boundary& boundary, const State& start, NewtonResult& last) {
-    begin();
-    equations_.evaluate(state_.q, false, nullptr, work_.evaluation);
-    const VectorX imbalance = work_.evaluation.residual;
-    VectorX target, z;
+    full_loads_ = equations_.loads().values;
+    const bool reached = load_steps_scaled(boundary, start, last);
+    equations_.loads().values = full_loads_;
+    return reached;
+  }
+
+  bool load_steps_scaled(const Boundary& boundary, const State& start, NewtonResult& last) {
+    VectorX imbalance, target, z;
     double reached = 0.0, increment = 1.0;
-    int halvings = 0;
-    while (reached < 1.0) {
+    const int patience = equations_.has_potential() ? 4 : 12;
+    for (int failures = 0; reached < 1.0;) {
       const double next = std::min(1.0, reached + increment);
       begin();
+      if (imbalance.size() == 0) {
+        // All at once first; on the way in steps, from what the start is out of balance by.
+        scale_turning_loads(0.0);
+        equations_.evaluate(state_.q, false, nullptr, work_.evaluation);
+        imbalance = work_.evaluation.residual;
+      }
+      scale_turning_loads(next);
       z = state_.q;
       boundary(next, start, z);
       target = (1.0 - next) * imbalance;
@@ -80,9 +100,10 @@ class Statics {
       if (r.converged && !turned_too_far(state_, equations_.configuration(), equations_.model().planar())) {
         accept(z);
         reached = next;
+        failures = 0;
         if (r.iterations <= 8) increment *= 2.0;
       } else {
-        if (++halvings > (equations_.has_potential() ? 4 : 12)) return false;
+        if (++failures > patience || increment < 1e-4) return false;
         increment *= increment == 1.0 ? 0.2 : 0.5;
       }
     }
@@ -261,6 +282,7 @@ class Statics {
   State& state_;
   NewtonWorkspace& work_;
   Configuration scratch_;
+  std::vector<Vector3> full_loads_;
   double lowest_ = 0.0;
 };
 
