@@ -126,8 +126,7 @@ def _centreline(start: Any, end: Any, points: Any, nodes: Any, closed: bool, own
             raise ValueError(f"nodes of {owner} must be given for a rod from start to end")
         count = validation.integer(nodes, f"nodes of {owner}", least, _MAX_NODES)
         share = np.linspace(0.0, 1.0, count)[:, None]
-        with np.errstate(over="ignore", invalid="ignore"):
-            return np.asarray((1.0 - share) * first + share * last, np.float64)
+        return np.asarray((1.0 - share) * first + share * last, np.float64)
     line = validation.number_array(points, f"points of {owner}", ("n", 3))
     if closed and len(line) > 1 and np.abs(line[0] - line[-1]).max() <= 1e-9 * np.ptp(line, axis=0).max():
         line = line[:-1]

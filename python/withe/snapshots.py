@@ -70,8 +70,8 @@ class Snapshot:
     """The whole state of a simulation at one moment. Made by `Simulation.snapshot`, or read with `load`.
 
     It can be restored in any simulation of the same scene with the same options, and continues there bit
-    by bit. Functions of time (of loads and paths) are not stored in files: a simulation that restores a
-    loaded snapshot must have them already.
+    by bit. Functions of time (of loads and paths) are not stored in files and pickles: a simulation that
+    restores such a snapshot must have them already.
     """
 
     def __init__(self, state: bytes, time: float, settings: Settings, missing: tuple[str, ...] = ()) -> None:
@@ -87,6 +87,22 @@ class Snapshot:
 
     def __repr__(self) -> str:
         return f"Snapshot(t = {self._time:g} s)"
+
+    def _function_names(self) -> tuple[str, ...]:
+        """Loads and supports whose functions no file can hold."""
+        paths = (name for name, path in self._settings.paths.items() if not isinstance(path, Turn))
+        return tuple(sorted({*self._settings.functions, *paths, *self._missing}))
+
+    def __getstate__(self) -> dict[str, Any]:
+        settings = self._settings.copy()
+        settings.functions = {}
+        settings.paths = {name: path for name, path in settings.paths.items() if isinstance(path, Turn)}
+        return {
+            "_state": self._state,
+            "_time": self._time,
+            "_settings": settings,
+            "_missing": self._function_names(),
+        }
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Snapshot):
@@ -118,7 +134,6 @@ class Snapshot:
             turn = settings.paths.get(name)
             if isinstance(turn, Turn):
                 arrays |= {f"support_{number}_{word}": values for word, values in turn.arrays().items()}
-        paths = [name for name, path in settings.paths.items() if not isinstance(path, Turn)]
         header = {
             "time": self._time,
             "rods": len(settings.rods),
@@ -126,7 +141,7 @@ class Snapshot:
             "drags": settings.drags,
             "supports": supports,
             "added_supports": settings.added_supports,
-            "functions": sorted({*settings.functions, *paths, *self._missing}),
+            "functions": self._function_names(),
         }
         return io.save_arrays(path, "snapshot", _FILE_VERSION, header, arrays)
 

@@ -29,6 +29,9 @@ __all__ = [
 
 FloatArray = npt.NDArray[np.float64]
 
+# Beyond any quantity of this world in SI units; products of a few such numbers are still finite.
+_LARGEST = 1e50
+
 
 def number(value: Any, what: str) -> float:
     """A finite real number.
@@ -48,6 +51,8 @@ def number(value: Any, what: str) -> float:
         result = math.inf
     if not math.isfinite(result):
         raise ValueError(f"{what} must be finite, got {result}")
+    if abs(result) > _LARGEST:
+        raise ValueError(f"{what} must be less than {_LARGEST:g} in size, got {result:g}")
     return result
 
 
@@ -136,6 +141,8 @@ def number_array(value: Any, what: str, *shapes: tuple[int | str, ...]) -> Float
         place = tuple(int(i) for i in np.argwhere(bad)[0])
         where = f" at {list(place)}" if place else ""
         raise ValueError(f"{what} must be finite, got {result[place]}{where}")
+    if result.size and np.abs(result).max() > _LARGEST:
+        raise ValueError(f"{what} must be less than {_LARGEST:g} in size, got {np.abs(result).max():g}")
     return result
 
 

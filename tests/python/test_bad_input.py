@@ -42,7 +42,7 @@ RODS = [
     (lambda: rod(radius=[1, 2]), "radius of rod 'arm' must have shape (4,), got (2,)"),
     (lambda: rod(radius=[1, 2, 0, 3]), "radius of rod 'arm' must be positive, got 0 at edges [2]"),
     (lambda: rod(radius=[1, NAN, 2, 3]), "radius of rod 'arm' must be finite, got nan at [1]"),
-    (lambda: rod(radius=1e200), "of rod 'arm' must be positive and finite"),
+    (lambda: rod(radius=1e200), "radius of rod 'arm' must be less than 1e+50 in size, got 1e+200"),
     (lambda: rod(radius=1e-200), "of rod 'arm' must be positive and finite"),
     (lambda: rod(radius=10**400), "radius of rod 'arm' must be finite"),
     (lambda: rod(radius=None), "rod 'arm' must have either a radius or a section"),
@@ -62,7 +62,7 @@ RODS = [
     (lambda: rod(end=(1, 0, NAN)), "end of rod 'arm' must be finite, got nan at [2]"),
     (lambda: rod(end=("a", 0, 0)), "end of rod 'arm' must be numbers of shape (3,)"),
     (lambda: rod(end=None), "end of rod 'arm' must be numbers of shape (3,), got None"),
-    (lambda: rod(end=(1e308, 1e308, 1e308)), "points of rod 'arm' are too far apart"),
+    (lambda: rod(end=(0, 1e60, 0)), "end of rod 'arm' must be less than 1e+50 in size, got 1e+60"),
     (lambda: rod(points=RINGS), "rod 'arm' must have either points, or start and end"),
     (lambda: rod(start=None, end=None), "rod 'arm' must have either points, or start and end"),
     (lambda: rod(closed=True), "closed of rod 'arm' must be False for a rod from start to end"),
@@ -300,7 +300,7 @@ def test_a_static_problem_without_an_answer_is_a_convergence_error(load):
     assert simulation.snapshot() == before
 
 
-@pytest.mark.parametrize("force", [1e3, 1e9, 1e200])
+@pytest.mark.parametrize("force", [1e3, 1e9, 1e49])
 @pytest.mark.parametrize("integrator", ["implicit_midpoint", "energy_momentum", "backward_euler", "static"])
 def test_absurd_forces_end_in_a_result_or_a_convergence_error(force, integrator):
     _, _rods, simulation = tripod(integrator=integrator)

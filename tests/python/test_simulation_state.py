@@ -208,3 +208,30 @@ def test_a_record_is_no_snapshot(tmp_path):
     simulation.run(0.01, progress=False).save(tmp_path / "r.npz")
     with pytest.raises(ValueError, match="expected a withe snapshot"):
         withe.Snapshot.load(tmp_path / "r.npz")
+
+
+def rising(t):
+    return (0, 0, 0.1 * t)
+
+
+def test_a_simulation_pickles_with_functions_that_pickle(tmp_path):
+    scene, arm, _ = cantilever(planar=False)
+    scene.add_force(arm.end, (0, 0, 0))
+    simulation = scene.build(planar=False)
+    simulation.set("force 1", force=rising)
+    simulation.move("wall", path=rising)
+    simulation.step(3)
+    again = pickle.loads(pickle.dumps(simulation))
+    simulation.step(3)
+    again.step(3)
+    assert same_state(simulation, again)
+
+
+def test_a_snapshot_pickles_also_with_functions_that_do_not():
+    _, _, simulation = cantilever(planar=False)
+    simulation.move("wall", path=lambda t: (0, 0, 0.1 * t))
+    simulation.step(3)
+    state = pickle.loads(pickle.dumps(simulation.snapshot()))
+    assert state == simulation.snapshot()
+    simulation.restore(state)
+    simulation.step(3)

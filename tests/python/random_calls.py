@@ -1,0 +1,271 @@
+"""Random sequences of calls, good and bad, on small scenes; run by test_random_calls.py in a process of its own.
+
+Every call must end in a result or in an exception that the interface promises, and what can be read must be
+finite. A crash of the interpreter is what this looks for.
+"""
+
+from __future__ import annotations
+
+import copy
+import faulthandler
+import math
+import pickle
+import sys
+import warnings
+
+import numpy as np
+from hypothesis import HealthCheck, given, seed, settings
+from hypothesis import strategies as st
+
+import withe
+
+ALLOWED = (ValueError, withe.ConvergenceError)
+RUBBER = withe.Material(youngs_modulus=1e6, density=1000.0, viscosity=10.0)
+SPECIAL = [0.0, -1.0, 1e-300, 1e-40, 1e300, 1e40, 1e12, -1e9, math.nan, math.inf, -math.inf]
+calls = {"sequences": 0, "results": 0, "refusals": 0}
+
+sensible = st.floats(-2, 2, allow_nan=False)
+number = st.one_of(sensible, sensible, st.sampled_from(SPECIAL), st.sampled_from([None, "x", True, 3]))
+positive = st.one_of(st.floats(1e-3, 10), st.floats(1e-3, 10), number)
+triple = st.one_of(
+    st.tuples(sensible, sensible, sensible),
+    st.tuples(sensible, sensible, sensible),
+    st.tuples(number, number, number),
+    st.sampled_from([(), (1, 2), None, "up", np.zeros((3, 3)), (0, 0, 0)]),
+)
+small_triple = triple.map(lambda v: tuple(0.01 * x for x in v) if _plain(v) else v)
+index = st.integers(-6, 6)
+node = st.tuples(st.sampled_from("abc"), st.sampled_from(["start", "end", "node(1)", "node(-1)", "node(9)"])).map(
+    ".".join
+)
+rod = st.sampled_from(["a", "a", "b", "b", "c", "nobody"])
+
+
+def _plain(value):
+    return isinstance(value, tuple) and all(isinstance(x, float) for x in value)
+
+
+def add_rod(world, data):
+    kind = data.draw(st.integers(0, 4))
+    options = {"radius": 5e-3, "material": RUBBER, "name": data.draw(st.sampled_from([None, "c", "a"]))}
+    if kind == 0:
+        options |= {"start": data.draw(triple), "end": data.draw(triple), "nodes": data.draw(index)}
+    elif kind == 1:
+        count = data.draw(st.integers(0, 5))
+        options |= {
+            "points": [data.draw(triple) for _ in range(count)],
+            "closed": data.draw(st.booleans()),
+            "natural": data.draw(st.sampled_from(["straight", "as_built", "bent"])),
+        }
+    elif kind == 2:
+        options |= {"start": (0, 0, 0), "end": (0, 0.3, 0), "nodes": 4, "radius": data.draw(positive)}
+    elif kind == 3:
+        options |= {"start": (0, 0, 0), "end": (0, 0.3, 0.1), "nodes": 4, "normal": data.draw(triple)}
+    else:
+        section = withe.Rectangle(width=data.draw(positive), height=data.draw(positive))
+        options |= {"start": (0, 0, 0), "end": (0, 0.3, 0), "nodes": 4, "radius": None, "section": section}
+    world.scene.add_rod(**options)
+
+
+def function_of_time(data):
+    """A function that never raises of itself, but may return anything."""
+    a, b = data.draw(small_triple), data.draw(small_triple)
+    if not (_plain(a) and _plain(b)):
+        return lambda t: a
+
+    def line(t):
+        with np.errstate(all="ignore"):
+            return np.add(a, np.multiply(t, b))
+
+    return line
+
+
+def custom(data):
+    scale = data.draw(st.one_of(sensible, st.sampled_from(SPECIAL)))
+
+    def wind(t, x, v):
+        with np.errstate(all="ignore"):
+            return np.multiply(scale, 0.001 * v)
+
+    return wind
+
+
+ON_SCENE = {
+    "add_rod": add_rod,
+    "join": lambda w, d: w.scene.join(
+        d.draw(node),
+        d.draw(node),
+        kind=d.draw(st.sampled_from(["rigid", "rigid", "pinned", "revolute", "glued"])),
+        axis=d.draw(st.one_of(st.none(), triple)),
+        form=d.draw(st.sampled_from(["frame", "frame", "pairs"])),
+    ),
+    "clamp": lambda w, d: w.scene.clamp(
+        d.draw(node), hold=d.draw(st.sampled_from(["frame", "edge"])), free=d.draw(st.one_of(st.none(), triple))
+    ),
+    "pin": lambda w, d: w.scene.pin(d.draw(node), free=d.draw(st.one_of(st.none(), triple))),
+    "add_force": lambda w, d: w.scene.add_force(d.draw(node), d.draw(small_triple), follower=d.draw(st.booleans())),
+    "add_moment": lambda w, d: w.scene.add_moment(d.draw(node), d.draw(small_triple)),
+    "add_load": lambda w, d: w.scene.add_load(d.draw(rod), d.draw(small_triple), follower=d.draw(st.booleans())),
+    "add_varying": lambda w, d: w.scene.add_force(d.draw(node), function_of_time(d), name="varying"),
+    "add_mass": lambda w, d: w.scene.add_mass(d.draw(node), d.draw(positive)),
+    "add_drag": lambda w, d: w.scene.add_drag(d.draw(positive)),
+    "add_custom_force": lambda w, d: w.scene.add_custom_force(custom(d)),
+    "gravity": lambda w, d: setattr(w.scene, "gravity", d.draw(triple)),
+    "pickle": lambda w, d: setattr(w, "scene", copy.deepcopy(w.scene)),
+}
+
+
+def build(world, data):
+    integrator = data.draw(
+        st.sampled_from(["implicit_midpoint", "backward_euler", "energy_momentum", "verlet", "static"])
+    )
+    options = {
+        "integrator": integrator,
+        "time_step": data.draw(st.sampled_from([1e-3, 1e-2, 1e-3])) * (1e-3 if integrator == "verlet" else 1.0),
+        "planar": data.draw(st.sampled_from([None, None, True, False])),
+        "adaptive": data.draw(st.booleans()),
+        "max_halvings": 4,
+    }
+    if data.draw(st.integers(0, 4)) == 0:
+        options |= {"time_step": data.draw(positive), "tolerance": data.draw(positive)}
+    world.simulation = world.scene.build(**options)
+
+
+def snapshot(world, data):
+    world.snapshot = world.simulation.snapshot()
+
+
+def set_rod(world, data):
+    word = data.draw(
+        st.sampled_from(
+            ["youngs_modulus", "density", "viscosity", "drag", "stretch_stiffness", "bend_stiffness",
+             "twist_stiffness", "line_density", "viscous_time", "poisson_ratio", "colour"]
+        )
+    )  # fmt: skip
+    value = data.draw(positive)
+    if word == "youngs_modulus" and isinstance(value, float) and 0 < value < 100:
+        value *= 1e6
+    world.simulation.set(data.draw(rod), **{word: value})
+
+
+def move(world, data):
+    options = {}
+    for word, strategy in [("position", triple), ("tangent", triple), ("roll", number), ("over", positive)]:
+        if data.draw(st.integers(0, 2)) == 0:
+            options[word] = data.draw(strategy)
+    world.simulation.move(data.draw(node), **options)
+
+
+def read(world, data):
+    simulation = world.simulation
+    name = data.draw(st.sampled_from(["directors", "curvatures", "twists", "tensions", "spins", "positions"]))
+    values = getattr(simulation, name)(data.draw(rod))
+    assert np.isfinite(values).all(), f"{name} holds {values}"
+    assert np.isfinite(list(vars(simulation.energy()).values())).all()
+    assert str(simulation.plan)
+
+
+ON_SIMULATION = {
+    "step": lambda w, d: w.simulation.step(d.draw(st.integers(-1, 3))),
+    "run": lambda w, d: w.simulation.run(
+        d.draw(st.sampled_from([1e-3, 2.5e-3, 0.0, math.nan])), record_every=d.draw(st.sampled_from([None, 1e-3])),
+        progress=False,
+    ),
+    "equilibrium": lambda w, d: w.simulation.equilibrium(),
+    "read": read,
+    "set_rod": set_rod,
+    "set_force": lambda w, d: w.simulation.set("force 1", force=d.draw(small_triple)),
+    "set_moment": lambda w, d: w.simulation.set("moment 1", moment=d.draw(small_triple)),
+    "set_function": lambda w, d: w.simulation.set("force 1", force=function_of_time(d)),
+    "set_gravity": lambda w, d: w.simulation.set(gravity=d.draw(triple)),
+    "natural_curvature": lambda w, d: w.simulation.set_natural_curvature(
+        d.draw(rod), d.draw(st.tuples(number, number)), over=d.draw(st.sampled_from([0.0, 0.01, -1, math.nan]))
+    ),
+    "natural_twist": lambda w, d: w.simulation.set_natural_twist(d.draw(rod), d.draw(number)),
+    "velocities": lambda w, d: w.simulation.set_velocities(d.draw(rod), d.draw(triple)),
+    "clamp": lambda w, d: w.simulation.clamp(d.draw(node), hold=d.draw(st.sampled_from(["frame", "edge"]))),
+    "pin": lambda w, d: w.simulation.pin(d.draw(node)),
+    "release": lambda w, d: w.simulation.release(d.draw(node)),
+    "move": move,
+    "path": lambda w, d: w.simulation.move(d.draw(node), path=function_of_time(d)),
+    "reaction": lambda w, d: w.simulation.reaction(d.draw(node)),
+    "snapshot": snapshot,
+    "restore": lambda w, d: w.simulation.restore(w.snapshot),
+    "reset": lambda w, d: w.simulation.reset(),
+    "copy": lambda w, d: setattr(w, "simulation", w.simulation.copy()),
+    "pickle": lambda w, d: pickle.loads(pickle.dumps(w.simulation.snapshot())),
+}  # fmt: skip
+
+
+class World:
+    """A scene of two joined rods, and the simulation built from it last."""
+
+    def __init__(self):
+        self.scene = withe.Scene()
+        self.scene.add_rod(start=(0, 0, 0), end=(0.2, 0, 0), nodes=4, radius=5e-3, material=RUBBER, name="a")
+        self.scene.add_rod(start=(0.2, 0, 0), end=(0.2, 0.1, 0.1), nodes=3, radius=5e-3, material=RUBBER, name="b")
+        self.scene.join("a.end", "b.start")
+        self.simulation = None
+        self.snapshot = None
+
+    def call(self, what, data):
+        try:
+            what(self, data)
+            calls["results"] += 1
+        except ALLOWED:
+            calls["refusals"] += 1
+        if self.simulation is not None:
+            assert np.isfinite(self.simulation.positions()).all()
+            assert np.isfinite(self.simulation.velocities()).all()
+
+
+@st.composite
+def names(draw):
+    before = draw(st.lists(st.sampled_from(sorted(ON_SCENE)), max_size=4))
+    after = draw(st.lists(st.sampled_from(sorted(ON_SIMULATION)), min_size=1, max_size=5))
+    return before, after
+
+
+def make_test(examples: int, number: int):
+    @seed(number)
+    @settings(
+        max_examples=examples,
+        database=None,
+        deadline=None,
+        suppress_health_check=list(HealthCheck),
+        phases=_phases(),
+    )
+    @given(names(), st.data())
+    def sequence(plan, data):
+        calls["sequences"] += 1
+        world = World()
+        for name in plan[0]:
+            world.call(ON_SCENE[name], data)
+        if data.draw(st.integers(0, 3)):
+            world.call(lambda w, d: w.scene.clamp("a.start"), data)
+        world.call(build, data)
+        if world.simulation is not None:
+            for name in plan[1]:
+                world.call(ON_SIMULATION[name], data)
+
+    return sequence
+
+
+def _phases():
+    from hypothesis import Phase
+
+    return [Phase.generate, Phase.shrink] if "--shrink" in sys.argv else [Phase.generate]
+
+
+def main() -> None:
+    """`random_calls.py COUNT SEED`: run so many sequences, and print what came of them."""
+    faulthandler.enable()
+    warnings.simplefilter("error")
+    warnings.simplefilter("ignore", category=DeprecationWarning)
+    count, number = int(sys.argv[1]), int(sys.argv[2])
+    make_test(count, number)()
+    print(f"{calls['sequences']} sequences, {calls['results']} results, {calls['refusals']} refusals")
+
+
+if __name__ == "__main__":
+    main()
