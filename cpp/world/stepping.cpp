@@ -204,6 +204,7 @@ void World::Implementation::advance(double duration) {
     }
     const bool guarded = options.adaptive && options.integrator == Integrator::implicit_midpoint;
     const State backup = options.tolerance || guarded ? state : State{};
+    const std::vector<NaturalRamp> ramps_before = options.tolerance || guarded ? ramps : std::vector<NaturalRamp>{};
     // Where edges hardly turn, there is nothing to gain and nothing to look at.
     const bool watched = guarded && guard.turn > 0.01;
     const Energy then = watched ? energy() : Energy{};
@@ -229,6 +230,9 @@ void World::Implementation::advance(double duration) {
     if (accepted && too_coarse && may_halve) {
       state = backup;
       std::tie(support_work, actuation_work, dissipated, load_work) = books;
+      ramps = ramps_before;  // one that ended within the step has not ended yet
+      apply_ramps(state.time);
+      reaction_current = false;
       accepted = false;
       statistics.steps -= 1;
     }
