@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <cstring>
 #include <string>
-#include <vector>
+#include <utility>
 
 #include "common/check.hpp"
 #include "common/types.hpp"
@@ -29,7 +29,7 @@ class Writer {
 
 class Reader {
  public:
-  explicit Reader(const std::string& bytes) : bytes_(bytes) {}
+  explicit Reader(std::string bytes) : bytes_(std::move(bytes)) {}
 
   void raw(void* data, std::size_t size) {
     require(size <= bytes_.size() - position_, "snapshot is damaged: it ends too early");
@@ -39,6 +39,12 @@ class Reader {
   template <class Number>
   requires std::is_arithmetic_v<Number>
   void operator()(Number& number) { raw(&number, sizeof number); }
+  void operator()(bool& flag) {
+    unsigned char byte = 0;
+    raw(&byte, sizeof byte);
+    require(byte <= 1, "snapshot is damaged: a flag is neither on nor off");
+    flag = byte == 1;
+  }
   /// Sizes must be those that the matrix has already.
   template <class Derived>
   void operator()(Eigen::PlainObjectBase<Derived>& m) {
@@ -51,7 +57,7 @@ class Reader {
   void expect_end() const { require(position_ == bytes_.size(), "snapshot is damaged: it is too long"); }
 
  private:
-  const std::string& bytes_;
+  std::string bytes_;
   std::size_t position_ = 0;
 };
 

@@ -9,6 +9,16 @@ namespace {
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
+/// Frames are the same when the same end of an edge is attached to both: a node may have several.
+bool same_frame(const Model& a, int frame_a, const Model& b, int frame_b) {
+  for (const FrameStencil& s : a.half) {
+    if (s.frame != frame_a) continue;
+    for (const FrameStencil& t : b.half)
+      if (t.frame == frame_b && t.edge == s.edge && t.frame_first == s.frame_first) return true;
+  }
+  return false;
+}
+
 }  // namespace
 
 Vector3 node_position(const Model& model, const VectorX& q, int node) {
@@ -49,7 +59,7 @@ World::Implementation::Implementation(SceneDescription scene, Options choice)
     : description(std::move(scene)), options(choice) {
   require(options.time_step > 0.0 && std::isfinite(options.time_step), "time_step must be positive and finite");
   for (const LoadDescription& load : description.loads) load_values.push_back(load.value);
-  rebuild(true);
+  rebuild(Rebuild::first);
   if (options.integrator == Integrator::verlet) {
     plan.stable_step = stable_step(*equations, parameters, state, work);
     require(options.time_step <= plan.stable_step,
@@ -89,7 +99,7 @@ World::Implementation::Implementation(const Implementation& other)
 }
 
 /// Builds the model for the present supports and plane; a running state is carried over.
-void World::Implementation::rebuild(bool first) {
+void World::Implementation::rebuild(Rebuild why) {
   SceneDescription active = description;
   // Released supports keep their index but hold nothing.
   std::vector<bool> released(description.supports.size(), false);
@@ -102,12 +112,16 @@ void World::Implementation::rebuild(bool first) {
       index.push_back(s);
     }
   Model fresh = build_model(active, spatial ? std::optional<bool>(false) : options.planar);
+  if (why == Rebuild::running && !model.planar() && fresh.planar()) {
+    spatial = true;  // what kept the drawing from being planar is gone, but the state need not be in the plane
+    fresh = build_model(active, false);
+  }
   std::vector<Support> all(description.supports.size());
   for (std::size_t s = 0; s < all.size(); ++s) all[s].description = description.supports[s];
   for (std::size_t k = 0; k < index.size(); ++k) all[index[k]] = fresh.supports[k];
   fresh.supports = all;
   static_equations.reset();
-  if (first) {
+  if (why == Rebuild::first) {
     model = std::move(fresh);
     parameters = initial_parameters(model);
     state = initial_state(model);
@@ -125,7 +139,7 @@ void World::Implementation::rebuild(bool first) {
     std::vector<bool> is_new(at(model.frame_count), true);
     for (int f = 0; f < model.frame_count; ++f)
       for (int g = 0; g < old.frame_count; ++g)
-        if (model.frame_node[at(f)] == old.frame_node[at(g)]) is_new[at(f)] = false;
+        if (same_frame(model, f, old, g)) is_new[at(f)] = false;
     state = transferred(old, from);
     update_derived(model, parameters);
     newton = std::make_unique<Newton>(model, options);
@@ -173,7 +187,7 @@ State World::Implementation::transferred(const Model& old, const State& from) co
   }
   for (int f = 0; f < model.frame_count; ++f)
     for (int g = 0; g < old.frame_count; ++g) {
-      if (model.frame_node[at(f)] != old.frame_node[at(g)]) continue;
+      if (!same_frame(model, f, old, g)) continue;
       const int dof = model.frame_dof[at(f)];
       if (lifted) {
         to.frame[at(f)] = frame_rotation(old, from, g);
@@ -250,7 +264,7 @@ void World::Implementation::relax_frames(const std::vector<bool>& is_new) {
 void World::Implementation::leave_plane(const std::string& why) {
   require(!options.planar.value_or(false), why + " leaves the plane of the scene: build it with planar=False");
   spatial = true;
-  rebuild(false);
+  rebuild(Rebuild::running);
   plan.notes.push_back("left the plane while running: " + why);
 }
 

@@ -34,6 +34,9 @@ struct EnergyGuard {
   double step_gain = 0;  ///< in the last step [J]
 };
 
+/// Why a model is built: at first, because supports changed or the plane was left, or to take a snapshot's state.
+enum class Rebuild { first, running, restored };
+
 struct World::Implementation {
   Implementation(SceneDescription description, Options options);
   Implementation(const Implementation& other);
@@ -58,7 +61,7 @@ struct World::Implementation {
   bool spatial = false;  ///< left its plane while running
   int level = 0;         ///< present halvings of the time step
   int easy_steps = 0;
-  int patience = 4;             ///< easy steps before a longer one is tried
+  int patience = 4;  ///< easy steps before a longer one is tried
   EnergyGuard guard;
   double support_work = 0, actuation_work = 0, dissipated = 0, load_work = 0;
   std::optional<Energy> alarm;  ///< energies at the start, for the explicit scheme's alarm
@@ -67,7 +70,7 @@ struct World::Implementation {
   bool reaction_current = false;
 
   // building.cpp
-  void rebuild(bool first);
+  void rebuild(Rebuild why);
   void make_plan();
   /// Drops the plane; throws when the user asked for it. `why` names the argument that leaves the plane.
   void leave_plane(const std::string& why);

@@ -1,4 +1,5 @@
-#include "geometry/rotation.hpp"
+#include <string_view>
+
 #include "world/archive.hpp"
 #include "world/implementation.hpp"
 
@@ -7,7 +8,14 @@ namespace {
 
 constexpr std::uint64_t kMagic = 0x3153454854495755ull;
 
-/// FNV-1a over the drawn scene: what must be equal for a snapshot to fit.
+/// FNV-1a.
+std::uint64_t hash_of(std::string_view bytes) {
+  std::uint64_t hash = 14695981039346656037ull;
+  for (const char c : bytes) hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211ull;
+  return hash;
+}
+
+/// Hash of the drawn scene: what must be equal for a snapshot to fit.
 std::uint64_t fingerprint(const SceneDescription& scene) {
   Writer w;
   w(scene.positions);
@@ -19,9 +27,7 @@ std::uint64_t fingerprint(const SceneDescription& scene) {
   }
   w(static_cast<std::int64_t>(scene.joints.size()));
   w(static_cast<std::int64_t>(scene.loads.size()));
-  std::uint64_t hash = 14695981039346656037ull;
-  for (const char c : w.bytes) hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211ull;
-  return hash;
+  return hash_of(w.bytes);
 }
 
 /// The numbers of a state that any world of the scene has, in a fixed order.
@@ -112,14 +118,19 @@ std::string World::snapshot() const {
     w(d.spin);
   }
   exchange(w, self);
+  w(hash_of(w.bytes));
   return w.bytes;
 }
 
 void World::restore(const std::string& bytes) {
-  Reader r(bytes);
-  std::uint64_t magic = 0, print = 0;
+  std::uint64_t magic = 0, print = 0, check = 0;
+  require(bytes.size() > sizeof magic + sizeof check, "snapshot is damaged: it ends too early");
+  const std::string body = bytes.substr(0, bytes.size() - sizeof check);
+  Reader(bytes.substr(body.size()))(check);
+  Reader r(body);
   r(magic);
   require(magic == kMagic, "snapshot is damaged, or not one of ours");
+  require(check == hash_of(body), "snapshot is damaged: its bytes have changed");
   r(print);
   require(print == fingerprint(implementation_->description), "snapshot belongs to another scene");
   // Everything is read into a copy, so that a damaged file changes nothing.
@@ -152,8 +163,12 @@ void World::restore(const std::string& bytes) {
     active.push_back(on);
   }
   const bool same = spatial == fresh->spatial && supports.size() == fresh->description.supports.size() && [&] {
-    for (std::size_t s = 0; s < supports.size(); ++s)
-      if (active[s] != fresh->model.supports[s].active) return false;
+    for (std::size_t s = 0; s < supports.size(); ++s) {
+      const SupportDescription &a = supports[s], &b = fresh->description.supports[s];
+      if (active[s] != fresh->model.supports[s].active || a.kind != b.kind || a.pass.rod != b.pass.rod ||
+          a.pass.node != b.pass.node || a.free != b.free || a.spin != b.spin)
+        return false;
+    }
     return true;
   }();
   if (!same) {
@@ -162,11 +177,14 @@ void World::restore(const std::string& bytes) {
     fresh->motions.assign(supports.size(), SupportMotion{});
     fresh->model.supports.assign(supports.size(), Support{});
     for (std::size_t s = 0; s < supports.size(); ++s) fresh->model.supports[s].active = active[s];
-    fresh->rebuild(false);
+    fresh->rebuild(Rebuild::restored);
   }
   give_sizes(*fresh);
   exchange(r, *fresh);
   r.expect_end();
+  require(fresh->level >= 0 && fresh->level <= fresh->options.max_halvings && fresh->easy_steps >= 0 &&
+              fresh->easy_steps < 1 << 20 && fresh->patience > 0,
+          "snapshot is damaged: impossible step size");
   require(fresh->state.q.allFinite() && fresh->state.v.allFinite(), "snapshot is damaged: not finite");
   update_derived(fresh->model, fresh->parameters);
   fresh->equations->loads().values = fresh->load_values;

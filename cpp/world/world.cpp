@@ -259,7 +259,7 @@ int World::add_support(const SupportDescription& support) {
         self.spatial = true;
       }
     }
-    self.rebuild(false);
+    self.rebuild(Rebuild::running);
   } catch (...) {
     auto callback = self.callback;
     implementation_ = std::make_unique<Implementation>(backup);
@@ -293,7 +293,7 @@ void World::remove_support(int support) {
       support >= 0 && support < static_cast<int>(self.model.supports.size()) && self.model.supports[at(support)].active,
       "no such support, or it is released already: " + std::to_string(support));
   self.model.supports[at(support)].active = false;
-  self.rebuild(false);
+  self.rebuild(Rebuild::running);
 }
 
 void World::move_support(int support, const Vector3& position, const Matrix3& rotation, double over) {
