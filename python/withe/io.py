@@ -11,7 +11,6 @@ import zlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-from xml.sax.saxutils import quoteattr
 
 import numpy as np
 import numpy.typing as npt
@@ -172,6 +171,8 @@ def write_vtk(record: Record, folder: str | os.PathLike[str]) -> Path:
     OSError
         The folder cannot be written.
     """
+    from xml.sax.saxutils import quoteattr  # imports half of the network, so not with the module
+
     if len(record) == 0:
         raise ValueError("record has no frames to write")
     folder = Path(folder)
