@@ -50,7 +50,8 @@ def test_natural_curvature_closes_a_circle_to_rounding(component):
     positions = simulation.positions(rod)
     np.testing.assert_allclose(positions[-1], positions[0], atol=1e-9)
     # The rod bends towards the director: d1 is +y, d2 = t x d1 is +z.
-    assert np.mean(positions[:, 1 + component]) == pytest.approx(0.5 / np.pi, rel=1e-2)
+    assert positions[:, 1 + component].max() == pytest.approx(1.0 / np.pi, rel=1e-2)
+    assert positions[:, 1 + component].min() > -1e-2
     np.testing.assert_allclose(simulation.curvatures(rod)[:, component], 2.0 * np.pi, rtol=1e-9)
     assert simulation.energy().total == pytest.approx(0.0, abs=1e-12)
 

@@ -10,10 +10,11 @@ from convergence import assert_order
 DURATION = 0.4
 
 
-def waving(integrator, step, planar, viscosity=0.0):
+def waving(integrator, step, planar):
     """A soft cantilever let go level, which sinks and, in space, swings aside."""
     scene = withe.Scene(gravity=(0.0, 0.0, -6.0))
-    arm = rods.straight(scene, 10, stiffness=rods.stiffness(twist=0.7, stretch=400.0, viscous_time=viscosity), radius=0.05)
+    # So coarse and so stretchable that the fastest motion is resolved by every step below.
+    arm = rods.straight(scene, 6, stiffness=rods.stiffness(twist=0.7, stretch=40.0), radius=0.2)
     scene.clamp(arm.start)
     simulation = scene.build(
         integrator=integrator,
@@ -23,10 +24,10 @@ def waving(integrator, step, planar, viscosity=0.0):
         step_tolerance=1e-12,
         force_tolerance=1e-12,
     )
-    velocities = np.zeros((11, 3))
-    velocities[:, 2] = 0.3 * np.linspace(0.0, 1.0, 11) ** 2
+    velocities = np.zeros((7, 3))
+    velocities[:, 2] = 0.3 * np.linspace(0.0, 1.0, 7) ** 2
     if not planar:
-        velocities[:, 1] = 0.6 * np.linspace(0.0, 1.0, 11) ** 2
+        velocities[:, 1] = 0.6 * np.linspace(0.0, 1.0, 7) ** 2
     simulation.set_velocities(arm, velocities)
     simulation.step(round(DURATION / step))
     assert simulation.time == pytest.approx(DURATION, rel=1e-12)
@@ -37,9 +38,9 @@ def waving(integrator, step, planar, viscosity=0.0):
 @pytest.mark.parametrize(
     ("integrator", "order", "steps"),
     [
-        ("backward_euler", 1.0, (800, 1600, 3200)),
-        ("implicit_midpoint", 2.0, (200, 400, 800)),
-        ("energy_momentum", 2.0, (200, 400, 800)),
+        ("backward_euler", 1.0, (3200, 6400, 12800)),
+        ("implicit_midpoint", 2.0, (400, 800, 1600)),
+        ("energy_momentum", 2.0, (400, 800, 1600)),
         ("verlet", 2.0, (800, 1600, 3200)),
     ],
 )
@@ -60,7 +61,7 @@ def test_period_of_a_cantilever_is_theorys_and_the_midpoint_rule_stretches_it_at
     """The phase error of midpoint is known: tan(W dt / 2) = w dt / 2 for the frequency W that is seen."""
     exact = theory.CANTILEVER_ROOTS[0] ** 2
     seen = []
-    for steps in (20, 40, 80):
+    for steps in (20, 40, 80, 160):
         scene = rods.weightless()
         arm = rods.straight(scene, 50)
         scene.clamp(arm.start)
@@ -79,4 +80,5 @@ def test_period_of_a_cantilever_is_theorys_and_the_midpoint_rule_stretches_it_at
         W = np.arccos(cosine) / dt
         seen.append(W / exact - 1.0)
         assert 2.0 / dt * np.tan(0.5 * W * dt) == pytest.approx(exact, rel=5e-4)
-    assert_order(np.array(seen), slack=0.2)
+    # Differences, so that the small error of the mesh drops out.
+    assert_order(np.diff(seen))

@@ -1,0 +1,128 @@
+"""What is stored, done from outside and dissipated adds up: total - work + dissipated stays what it was."""
+
+import numpy as np
+import pytest
+import rods
+import withe
+from convergence import assert_order
+
+DURATION = 0.5
+
+
+def driven(integrator, step, what, planar=False):
+    """A robot of two joined rods: its wall moves and turns, its arm is actuated, its hand is loaded, all of it damped."""
+    scene = withe.Scene(gravity=(0.0, 0.0, -3.0))
+    viscous = 0.02 if "viscosity" in what else 0.0
+    parts = {"stiffness": rods.stiffness(twist=0.8, stretch=2e2, viscous_time=viscous), "line_density": 1.0, "radius": 0.05}
+    arm = scene.add_rod(start=(0, 0, 0), end=(0.6, 0, 0), nodes=7, name="arm", **parts)
+    hand = scene.add_rod(start=(0.6, 0, 0), end=(0.6, 0, 0.4), nodes=5, name="hand", **parts)
+    scene.join(arm.end, hand.start)
+    hold = "edge" if "edge" in what else "frame"
+    scene.clamp(arm.start, hold=hold)
+    if "drag" in what:
+        scene.add_drag(0.4)
+    if "load" in what:
+        scene.add_force(hand.end, lambda t: (0.5 * np.sin(9.0 * t), 0.0, 0.3) if planar else (0.5, np.sin(9.0 * t), 0.3))
+        scene.add_load(arm, (0.0, 0.0, 0.4))
+    if "follower" in what:
+        scene.add_force(hand.end, (0.0, 0.0, -0.7), follower=True)
+    simulation = scene.build(
+        integrator=integrator,
+        time_step=step,
+        planar=None if planar else False,
+        step_tolerance=1e-12,
+        force_tolerance=1e-12,
+        adaptive=False,
+    )
+    if "wall" in what:
+        turn = (0.0, 1.0, 0.0) if planar else (0.4, 1.0, 0.2)
+        simulation.move(
+            arm.start,
+            path=lambda t: ((0.1 * np.sin(5.0 * t) ** 2, 0.0, 0.2 * t**2), rods.rotation(turn, 0.8 * t**2)),
+        )
+    if "actuation" in what:
+        simulation.set_natural_curvature(arm, (2.0, 0.0) if planar else (1.5, 1.0), over=0.3)
+        if not planar:
+            simulation.set_natural_twist(hand, 1.2, over=0.4)
+    return simulation
+
+
+def balance(simulation):
+    energy = simulation.energy()
+    return energy.total - energy.work + energy.dissipated
+
+
+def worst_imbalance(integrator, step, what, planar=False):
+    """Greatest change of the balance, and of its greatest part."""
+    simulation = driven(integrator, step, what, planar)
+    before = balance(simulation)
+    worst = size = 0.0
+    for _ in range(round(DURATION / step) // 10):
+        simulation.step(10)
+        worst = max(worst, abs(balance(simulation) - before))
+        energy = simulation.energy()
+        size = max(size, energy.kinetic, abs(energy.work), abs(energy.loads), energy.dissipated)
+    return worst, size
+
+
+CASES = ["drag", "viscosity", "load", "follower", "wall", "wall edge", "actuation", "drag viscosity load wall actuation"]
+
+
+@pytest.mark.parametrize("planar", [True, False], ids=["planar", "spatial"])
+@pytest.mark.parametrize("what", CASES)
+def test_energy_of_energy_momentum_steps_adds_up_to_solver_tolerance(what, planar):
+    for step in (1e-2, 2.5e-3):
+        worst, size = worst_imbalance("energy_momentum", step, what, planar)
+        assert size > 1e-2
+        assert worst < 1e-9 * size
+
+
+@pytest.mark.parametrize("planar", [True, False], ids=["planar", "spatial"])
+@pytest.mark.parametrize("what", CASES)
+def test_energy_of_midpoint_steps_adds_up_at_second_order(what, planar):
+    errors = [worst_imbalance("implicit_midpoint", DURATION / n, what, planar)[0] for n in (200, 400, 800)]
+    assert_order(errors, slack=0.3)
+
+
+def test_energy_of_a_cantilever_at_rest_is_what_its_parts_say():
+    """Work of gravity is what bending and stretching store, and half of it where all is linear."""
+    simulation, _ = rods.heavy_cantilever(1e-3, 40)
+    simulation.equilibrium()
+    energy = simulation.energy()
+    assert energy.bend == pytest.approx(-0.5 * energy.gravity, rel=1e-5)
+    assert energy.kinetic == 0.0
+
+
+def soft_helix():
+    from test_helices_statics import soft_helix as build
+
+    return build()
+
+
+def test_soft_helix_takes_steps_of_60_ms_uncut_and_keeps_its_energy():
+    """10 s from rest, where the published code gives up at 12 ms."""
+    scene, _ = soft_helix()
+    simulation = scene.build(integrator="energy_momentum", time_step=6e-2, step_tolerance=1e-12, force_tolerance=1e-12)
+    before = simulation.energy().total
+    drift = greatest = 0.0
+    for _ in range(round(10.0 / 6e-2)):
+        simulation.step()
+        energy = simulation.energy()
+        drift, greatest = max(drift, abs(energy.total - before)), max(greatest, energy.kinetic)
+    assert simulation.statistics.rejected_steps == 0
+    assert greatest > 1e-4
+    assert drift < 1e-6 * greatest
+
+
+# Height of the tip after rest, from the published code, to 1e-4 m.
+HELIX_HEIGHTS = {0.3: -0.20881, 0.6: -0.19466, 1.0: -0.20712, 2.0: -0.20140}
+
+
+def test_soft_helix_swings_as_in_published_code():
+    scene, arm = soft_helix()
+    simulation = scene.build(integrator="implicit_midpoint", time_step=1e-3)
+    record = simulation.run(duration=2.0, record_every=0.1, progress=False)
+    for time, height in HELIX_HEIGHTS.items():
+        frame = int(np.argmin(np.abs(record.times - time)))
+        assert record.times[frame] == pytest.approx(time, abs=1e-9)
+        assert record.positions(arm)[frame, -1, 2] == pytest.approx(height, abs=1.5e-4)
