@@ -2,6 +2,8 @@
 
 import importlib.metadata
 import importlib.util
+import platform
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -36,6 +38,15 @@ def test_the_installed_package_is_tested_and_typed():
 
 def test_version_is_the_same_everywhere():
     assert withe.__version__ == importlib.metadata.version("withe") == withe._core.__version__
+
+
+@pytest.mark.skipif(platform.libc_ver() != ("glibc", "2.36"), reason="wheels are built on Debian 12, with glibc 2.36")
+def test_the_compiled_module_needs_no_newer_system_than_wheels_promise():
+    names = set(re.findall(rb"(GLIBC|GLIBCXX)_(\d+)\.(\d+)(?:\.(\d+))?\0", Path(withe._core.__file__).read_bytes()))
+    versions = [(library, tuple(int(part) for part in version if part)) for library, *version in names]
+    assert versions
+    limits = {b"GLIBC": (2, 34), b"GLIBCXX": (3, 4, 29)}
+    assert [found for found in versions if found[1] > limits[found[0]]] == []
 
 
 GOOD = "withe-0.1.0-cp311-cp311-manylinux_2_34_x86_64.whl"
