@@ -348,14 +348,18 @@ void Equations::predict_axial_force(const VectorX& step, VectorX& out) const {
 void Equations::add_spin_couple(const VectorX& z, Evaluation& out) const {
   for (int e = 0; e < model_.edge_count; ++e) {
     const double omega = (z(model_.edge_dof[at(e)]) - state_->q(model_.edge_dof[at(e)])) / h_;
-    if (omega == 0.0) continue;
     const int a = model_.node_dof[at(model_.edge_tail[at(e)])], b = model_.node_dof[at(model_.edge_head[at(e)])];
     const EdgeFrame<double>& f = middle_.edge[at(e)];
     const Vector3 change = (z.segment<3>(b) - z.segment<3>(a) - state_->q.segment<3>(b) + state_->q.segment<3>(a)) / h_;
     const Vector3 pair = (parameters_->edge_inertia(e) * omega * f.inverse_length * f.inverse_length) *
                          change.cross(to_eigen(f.tangent));
-    out.residual.segment<3>(b) += pair;
-    out.residual.segment<3>(a) -= pair;
+    // psi = theta + spin . e is what turns: the edge's inertia acts on the nodes as its elastic torque does. It does no
+    // work either, since spin is normal to the edge before and now.
+    const int dof = model_.edge_dof[at(e)];
+    const double torque = parameters_->edge_inertia(e) * (omega - state_->v(dof)) / h_;
+    const Vector3 total = pair + torque * to_eigen(f.spin);
+    out.residual.segment<3>(b) += total;
+    out.residual.segment<3>(a) -= total;
   }
 }
 
