@@ -30,11 +30,12 @@ PYTHON_SOURCES := $(shell find python/withe -name '*.py' -o -name '*.pyi' -o -na
 # Folders too: a deleted file is a change.
 SOURCE_FOLDERS := $(wildcard cpp/*/) $(shell find python/withe -type d -not -name __pycache__)
 
-.PHONY: help demo test ctest-build ctest pytest asan bench wheel lint format format-check types stubs stub-check \
+.PHONY: help demo view test ctest-build ctest pytest asan bench wheel lint format format-check types stubs stub-check \
     tidy tidy-changed clean distclean
 
 help:
 	@echo "make demo          install what is missing, build, simulate a cantilever, compare with theory"
+	@echo "make view          install what pictures, films and notebooks need"
 	@echo "make test          all tests, C++ and Python"
 	@echo "make asan          C++ tests under the address and undefined-behaviour sanitizers"
 	@echo "make wheel         dist/*.whl for machines without compiler"
@@ -56,6 +57,11 @@ $(STAMPS)/venv: tools/install_system_packages.sh tools/find_python.sh
 $(STAMPS)/build_tools: $(STAMPS)/venv pyproject.toml constraints.txt tools/requirements.py
 	@echo "Installing build tools, NumPy, SciPy and matplotlib into .venv"
 	@$(PIP_INSTALL) $(call requirements,build runtime) matplotlib
+	@touch $@
+
+$(STAMPS)/view_tools: $(STAMPS)/build_tools
+	@echo "Installing what pictures, films and notebooks need into .venv"
+	@$(PIP_INSTALL) $(call requirements,view) jupyterlab
 	@touch $@
 
 $(STAMPS)/test_tools: $(STAMPS)/build_tools
@@ -80,6 +86,8 @@ $(STAMPS)/installed: $(STAMPS)/build_tools $(CXX_SOURCES) $(CMAKE_FILES) $(PYTHO
 demo: $(STAMPS)/installed
 	@mkdir -p out
 	@python examples/cantilever.py
+
+view: $(STAMPS)/installed $(STAMPS)/view_tools
 
 test: ctest pytest
 
