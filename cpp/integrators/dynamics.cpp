@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace withe {
 namespace {
@@ -131,18 +132,20 @@ StepResult verlet_step(Equations& equations, const Parameters& parameters, doubl
   if (!q1.allFinite() || !after.length.allFinite()) return result;
   result.largest_turn = largest_turn(model, before, after);
   if (result.largest_turn > 1.5) return result;
-  const VectorX acceleration = explicit_acceleration(equations, parameters, dt, state, q1, half, from, work);
+  // Forces want the frames at q1 itself: measured from the start of the step, the turn of direct transport would come
+  // in at first order, with nothing to cancel it.
+  State next = state;
+  accept_configuration(model, q1, after, next);
+  next.acceleration = explicit_acceleration(equations, parameters, dt, next, next.q, half, from, work);
+  next.acceleration_current = true;
+  next.v = half + 0.5 * dt * next.acceleration;
+  if (!next.v.allFinite()) return result;
   result.change = q1 - q0;
-  VectorX v1 = half + 0.5 * dt * acceleration;
-  if (!v1.allFinite()) return result;
   book_work(equations, parameters, result);
   if (!model.constraints.empty())
-    book_supports(equations, VectorX::Zero(model.dof_count), state.v, v1, dt, work.evaluation.full_residual, result);
-  accept_configuration(model, q1, after, state);
-  state.v = v1;
-  state.acceleration = acceleration;
-  state.acceleration_current = true;
-  state.time += dt;
+    book_supports(equations, VectorX::Zero(model.dof_count), state.v, next.v, dt, work.evaluation.full_residual, result);
+  next.time += dt;
+  state = std::move(next);
   result.newton.converged = true;
   result.accepted = true;
   return result;

@@ -66,7 +66,6 @@ struct SupportDescription {
   SupportKind kind = SupportKind::pin;
   RodPass pass;
   Matrix3 free = Matrix3::Zero();  ///< projector onto the directions along which the node may slide
-  bool spin = false;               ///< clamp: may turn about its tangent
 };
 
 enum class LoadKind {

@@ -108,8 +108,8 @@ std::optional<Plane> find_plane(const SceneDescription& scene, std::string& reas
   }
   for (const SupportDescription& support : scene.supports) {
     const Vector3 image = support.free * normal;
-    if ((image - normal * normal.dot(image)).norm() > 1e-9 || support.spin) {
-      reason = "a support may slide or turn out of the plane";
+    if ((image - normal * normal.dot(image)).norm() > 1e-9) {
+      reason = "a support may slide out of the plane";
       return std::nullopt;
     }
   }

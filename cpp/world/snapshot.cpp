@@ -115,7 +115,6 @@ std::string World::snapshot() const {
     w(d.pass.rod);
     w(d.pass.node);
     w(d.free);
-    w(d.spin);
   }
   exchange(w, self);
   w(hash_of(w.bytes));
@@ -158,7 +157,6 @@ void World::restore(const std::string& bytes) {
                 d.pass.node < static_cast<int>(rods[static_cast<std::size_t>(d.pass.rod)].nodes.size()),
             "snapshot is damaged: support of a node that is not there");
     r(d.free);
-    r(d.spin);
     supports.push_back(d);
     active.push_back(on);
   }
@@ -166,7 +164,7 @@ void World::restore(const std::string& bytes) {
     for (std::size_t s = 0; s < supports.size(); ++s) {
       const SupportDescription &a = supports[s], &b = fresh->description.supports[s];
       if (active[s] != fresh->model.supports[s].active || a.kind != b.kind || a.pass.rod != b.pass.rod ||
-          a.pass.node != b.pass.node || a.free != b.free || a.spin != b.spin)
+          a.pass.node != b.pass.node || a.free != b.free)
         return false;
     }
     return true;

@@ -54,8 +54,7 @@ void register_joints_and_supports(py::module_& module) {
   py::class_<SupportDescription> support(module, "SupportDescription", "Something that holds a node.");
   support.def(py::init<>())
       .def_readwrite("pass_", &SupportDescription::pass)
-      .def_readwrite("free", &SupportDescription::free)
-      .def_readwrite("spin", &SupportDescription::spin);
+      .def_readwrite("free", &SupportDescription::free);
   def_word(support, "kind", &SupportDescription::kind, kSupportKinds);
 }
 

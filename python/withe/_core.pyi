@@ -145,7 +145,6 @@ class SupportDescription:
 
     kind: str
     pass_: RodPass
-    spin: bool
     def __init__(self) -> None: ...
     @property
     def free(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 3]"]: ...
