@@ -145,17 +145,15 @@ class Builder {
     return cluster.frame;
   }
 
-  /// Two ends that continue each other, with aligned directors, are one rod.
+  /// Two ends that continue each other smoothly, with aligned directors, are one rod.
   bool continues(const Cluster& c) const {
     if (c.passes.size() != 2 || c.form != JointForm::frame) return false;
     const auto [a, b] = ordered(c);
     const int in = edges_at(a).first, out = edges_at(b).second;
     if (in < 0 || out < 0 || edges_at(a).second >= 0 || edges_at(b).first >= 0) return false;
-    const auto i = static_cast<std::size_t>(in), o = static_cast<std::size_t>(out);
-    if (dot(model_.initial_tangent[i], model_.initial_tangent[o]) < -0.5) return false;
-    const Vec3d carried =
-        parallel_transport(model_.initial_director[i], model_.initial_tangent[i], model_.initial_tangent[o]);
-    return dot(carried, model_.initial_director[o]) > 1.0 - 1e-9;
+    // A stencil across a drawn corner would be stiffer by 1 / cos^4 of half its angle, so corners get a frame.
+    constexpr double kSmooth = 1e-2;
+    return rotation_log(drawn_frame_at(b) * drawn_frame_at(a).transpose()).norm() < kSmooth;
   }
   std::pair<RodPass, RodPass> ordered(const Cluster& c) const {
     const RodPass a = c.passes[0], b = c.passes[1];
