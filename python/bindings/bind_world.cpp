@@ -89,7 +89,6 @@ void define_steps(WorldClass& world) {
       },
       py::arg("callback"), "Find the static equilibrium.");
   world.def("check_idle", [](GuardedWorld& self) { (void)self.changing(); }, "Raises in the middle of a step.");
-  world.def("interrupt", &GuardedWorld::interrupt, "End a running step.");
   world.def(
       "snapshot", [](const GuardedWorld& self) { return py::bytes(self.reading().snapshot()); }, "The whole state.");
   world.def(

@@ -33,9 +33,6 @@ class GuardedWorld {
     refuse(stepping_);
     return world_;
   }
-  /// Allowed at any time, from any thread.
-  void interrupt() { world_.interrupt(); }
-
   /// Runs `advance(world)` without the GIL. `callback(force_time, end_time)`, or None, is called before
   /// every inner step; signals are looked at every 50 ms.
   template <class Advance>

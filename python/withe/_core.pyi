@@ -13,6 +13,7 @@ __all__: list[str] = [
     "Energy",
     "EquilibriumResult",
     "JointDescription",
+    "Linearisation",
     "LoadDescription",
     "Options",
     "Plan",
@@ -24,6 +25,11 @@ __all__: list[str] = [
     "Statistics",
     "SupportDescription",
     "World",
+    "close_and_open",
+    "foreground_mask",
+    "hsv_mask",
+    "thin",
+    "trace_lines",
 ]
 
 class RodDescription:
@@ -243,6 +249,17 @@ class Options:
     @tolerance.setter
     def tolerance(self, arg0: typing.SupportsFloat | typing.SupportsIndex | None) -> None: ...
 
+class Linearisation:
+    """
+    Equations linearised about the present configuration.
+    """
+    @property
+    def displacement(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]: ...
+    @property
+    def mass(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+    @property
+    def stiffness(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]: ...
+
 class Energy:
     """
     Energies [J].
@@ -358,10 +375,7 @@ class World:
         """
         Find the static equilibrium.
         """
-    def interrupt(self) -> None:
-        """
-        End a running step.
-        """
+    def linearise(self) -> Linearisation: ...
     def load(
         self, load: typing.SupportsInt | typing.SupportsIndex
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]: ...
@@ -445,5 +459,44 @@ class World:
     def statistics(self) -> Statistics: ...
     @property
     def time(self) -> float: ...
+
+def close_and_open(mask: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8]) -> numpy.typing.NDArray[numpy.uint8]:
+    """
+    Closing, then opening, by a square of 3 x 3 pixels.
+    """
+
+def foreground_mask(
+    image: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8], contrast: typing.SupportsInt | typing.SupportsIndex
+) -> numpy.typing.NDArray[numpy.uint8]:
+    """
+    Pixels whose colour is far from that of the border.
+    """
+
+def hsv_mask(
+    image: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8],
+    ranges: collections.abc.Sequence[
+        tuple[
+            typing.Annotated[collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], "FixedSize(3)"],
+            typing.Annotated[collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], "FixedSize(3)"],
+        ]
+    ],
+) -> numpy.typing.NDArray[numpy.uint8]:
+    """
+    Pixels whose colour is in a range.
+    """
+
+def thin(mask: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8]) -> numpy.typing.NDArray[numpy.uint8]:
+    """
+    Skeleton of a mask by Zhang and Suen's rule as scikit-image has it.
+    """
+
+def trace_lines(
+    mask: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8],
+    image: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8] | None = None,
+    method: str = "withe",
+) -> dict:
+    """
+    Every line in a mask, in order, and labels.
+    """
 
 __version__: str = "0.1.0"

@@ -46,7 +46,7 @@ class Control:
     # Natural shape
 
     def set_natural_curvature(
-        self, rod: Rod | str, curvature: npt.ArrayLike, *, over: float = 0.0, discrete: bool = False
+        self, rod: Rod | str, curvature: npt.ArrayLike, over: float = 0.0, *, discrete: bool = False
     ) -> None:
         """Actuate a rod by changing the curvature at which it is free of stress.
 
@@ -77,7 +77,7 @@ class Control:
         values = curvature_array(curvature, part.voronoi, validation.truth(discrete, "discrete"), part.owner)
         self._world.set_natural_curvature(part.index, values, validation.non_negative(over, "over"))
 
-    def set_natural_twist(self, rod: Rod | str, twist: npt.ArrayLike, *, over: float = 0.0) -> None:
+    def set_natural_twist(self, rod: Rod | str, twist: npt.ArrayLike, over: float = 0.0) -> None:
         """Actuate a rod by changing the twist at which it is free of stress.
 
         Parameters

@@ -58,7 +58,7 @@ class Scene:
     >>> simulation = scene.build(integrator="static")                   # doctest: +SKIP
     """
 
-    def __init__(self, *, gravity: npt.ArrayLike = (0.0, 0.0, -9.81)) -> None:
+    def __init__(self, gravity: npt.ArrayLike = (0.0, 0.0, -9.81)) -> None:
         self._directory = Directory(uuid.uuid4().hex)
         self._joins_at: dict[Pass, list[JoinPart]] = {}
         self._low = np.full(3, np.inf)

@@ -137,8 +137,8 @@ class Simulation(Control):
     def run(
         self,
         duration: float,
-        *,
         record_every: float | None = None,
+        *,
         progress: bool | Literal["always"] = True,
         before_step: Callable[[Simulation], object] | None = None,
         until: Callable[[Simulation], object] | None = None,
