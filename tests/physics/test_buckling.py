@@ -8,6 +8,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+
 import rods
 import theory
 import withe

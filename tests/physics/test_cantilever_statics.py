@@ -5,6 +5,7 @@ Numbers: [Bisshopp and Drucker 1945] for the tip load; the heavy elastica solved
 
 import numpy as np
 import pytest
+
 import rods
 import theory
 from convergence import assert_order

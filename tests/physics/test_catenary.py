@@ -1,6 +1,7 @@
 """A soft rope between two pins hangs as a catenary."""
 
 import numpy as np
+
 import rods
 import withe
 from convergence import assert_order

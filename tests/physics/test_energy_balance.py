@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 import rods
 import withe
 from convergence import assert_order
@@ -10,10 +11,14 @@ DURATION = 0.5
 
 
 def driven(integrator, step, what, planar=False):
-    """A robot of two joined rods: its wall moves and turns, its arm is actuated, its hand is loaded, all of it damped."""
+    """A robot of two joined rods: its wall moves, its arm is actuated, its hand is loaded, all is damped."""
     scene = withe.Scene(gravity=(0.0, 0.0, -3.0))
     viscous = 0.02 if "viscosity" in what else 0.0
-    parts = {"stiffness": rods.stiffness(twist=0.8, stretch=2e2, viscous_time=viscous), "line_density": 1.0, "radius": 0.05}
+    parts = {
+        "stiffness": rods.stiffness(twist=0.8, stretch=2e2, viscous_time=viscous),
+        "line_density": 1.0,
+        "radius": 0.05,
+    }
     arm = scene.add_rod(start=(0, 0, 0), end=(0.6, 0, 0), nodes=7, name="arm", **parts)
     hand = scene.add_rod(start=(0.6, 0, 0), end=(0.6, 0, 0.4), nodes=5, name="hand", **parts)
     scene.join(arm.end, hand.start)
@@ -22,7 +27,9 @@ def driven(integrator, step, what, planar=False):
     if "drag" in what:
         scene.add_drag(0.4)
     if "load" in what:
-        scene.add_force(hand.end, lambda t: (0.5 * np.sin(9.0 * t), 0.0, 0.3) if planar else (0.5, np.sin(9.0 * t), 0.3))
+        scene.add_force(
+            hand.end, lambda t: (0.5 * np.sin(9.0 * t), 0.0, 0.3) if planar else (0.5, np.sin(9.0 * t), 0.3)
+        )
         scene.add_load(arm, (0.0, 0.0, 0.4))
     if "follower" in what:
         scene.add_force(hand.end, (0.0, 0.0, -0.7), follower=True)
@@ -65,7 +72,16 @@ def worst_imbalance(integrator, step, what, planar=False):
     return worst, size
 
 
-CASES = ["drag", "viscosity", "load", "follower", "wall", "wall edge", "actuation", "drag viscosity load wall actuation"]
+CASES = [
+    "drag",
+    "viscosity",
+    "load",
+    "follower",
+    "wall",
+    "wall edge",
+    "actuation",
+    "drag viscosity load wall actuation",
+]
 
 
 @pytest.mark.parametrize("planar", [True, False], ids=["planar", "spatial"])

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 import rods
 from convergence import assert_order
 
@@ -34,9 +35,9 @@ def flight(integrator, step, planar, spin_rate=1.0, stretch=2e3, natural="straig
         force_tolerance=1e-13,
         adaptive=False,
     )
-    velocities = np.cross((0.0, spin_rate, 0.0), points) + (0.1, 0.0, 0.2)
+    velocities = np.cross((0.0, spin_rate, 0.0), points) + np.array((0.1, 0.0, 0.2))
     if not planar:
-        velocities += np.cross((0.7 * spin_rate, 0.0, 0.4 * spin_rate), points) + (0.0, 0.3, 0.0)
+        velocities += np.cross((0.7 * spin_rate, 0.0, 0.4 * spin_rate), points) + np.array((0.0, 0.3, 0.0))
     simulation.set_velocities(rod, velocities)
     return simulation, rod
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 import rods
 import withe
 from convergence import assert_order
@@ -66,7 +67,7 @@ def round_bar(**more):
 
 
 @pytest.mark.parametrize("planar", [None, False], ids=["planar", "spatial"])
-def test_pulled_bar_stretches_by_FL_over_EA(planar):
+def test_pulled_bar_stretches_by_force_times_length_over_stiffness(planar):
     scene, bar = round_bar()
     wall = scene.clamp(bar.start)
     scene.add_force(bar.end, (3.0, 0.0, 0.0))
@@ -83,7 +84,7 @@ def angle_about_x(directors):
     return np.arctan2(directors[:, 0, 2], directors[:, 0, 1])
 
 
-def test_torque_at_the_end_turns_it_by_TL_over_GJ():
+def test_torque_at_the_end_turns_it_by_torque_times_length_over_stiffness():
     scene, bar = round_bar()
     wall = scene.clamp(bar.start)
     twist_stiffness = 2e6 / (2.0 * 1.3) * np.pi * 5e-3**4 / 2.0
@@ -98,7 +99,7 @@ def test_torque_at_the_end_turns_it_by_TL_over_GJ():
     np.testing.assert_allclose(simulation.reaction(wall).moment, (-torque, 0.0, 0.0), atol=1e-9 * torque)
 
 
-def test_turned_clamp_is_resisted_by_GJ_over_L_times_its_angle():
+def test_turned_clamp_is_resisted_by_stiffness_over_length_times_its_angle():
     scene, bar = round_bar()
     scene.clamp(bar.start)
     grip = scene.clamp(bar.end)
