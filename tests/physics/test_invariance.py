@@ -133,6 +133,7 @@ def test_micrometre_millimetre_and_metre_scenes_move_alike(integrator):
         simulation = scene.build(integrator=integrator, time_step=step, step_tolerance=1e-12, force_tolerance=1e-12)
         simulation.step(20)
         shapes.append(simulation.positions(arm) / length)
+        iterations.append(simulation.statistics.iterations)
     assert max(iterations) <= 1.05 * min(iterations), iterations
     for shape in shapes[:-1]:
         np.testing.assert_allclose(shape, shapes[-1], atol=1e-8)

@@ -69,7 +69,7 @@ def test_joint_of_the_source_is_stiffer_where_three_rods_meet():
         beam(10, load, True, stub=2, form="pairs"),
     )
     assert frame[2] == pytest.approx(whole[2], rel=1e-6)
-    # Two thirds of the bend at the joint are missing; it is l M / B, with the lever and the moment half of those at the wall.
+    # Two thirds of the bend at the joint are missing: of l M / B, with lever and moment half of those at the wall.
     assert (pairs[2] - whole[2]) / load[2] == pytest.approx(-0.1 * 0.5**2 * 2.0 / 3.0, rel=1e-3)
 
 

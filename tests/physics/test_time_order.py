@@ -44,7 +44,7 @@ def waving(integrator, step, planar):
         ("backward_euler", 1.0, (3200, 6400, 12800)),
         ("implicit_midpoint", 2.0, (400, 800, 1600)),
         ("energy_momentum", 2.0, (400, 800, 1600)),
-        ("verlet", 2.0, (800, 1600, 3200)),
+        ("verlet", 2.0, (1600, 3200, 6400)),
     ],
 )
 def test_error_falls_at_the_order_of_the_scheme(integrator, order, steps, planar):
