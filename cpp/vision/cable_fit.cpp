@@ -21,8 +21,9 @@ CableOutline::CableOutline(const SkeletonGraph& graph, const Continuations& link
     if (last < first) first = last = n / 2;
     int gap = kNoGap;
     if (!points_.empty() || (closed_ && edge.nodes[0] >= 0)) {
-      const int zone = links.zone_of[static_cast<std::size_t>(entry)];
-      gap = zone >= 0 ? zone : kBridge;
+      const HalfEdge exit = links.partner[static_cast<std::size_t>(entry)];
+      gap = links.zone_of[static_cast<std::size_t>(entry)];
+      if (exit >= 0) gap = std::max(gap, links.zone_of[static_cast<std::size_t>(exit)]);
     }
     if (points_.empty()) {
       closing_zone_ = gap;

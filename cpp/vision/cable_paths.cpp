@@ -17,9 +17,23 @@ void bridge_gaps(Continuations& links, const std::vector<std::vector<Vector2>>& 
   const double cosine = std::cos(angle * std::numbers::pi / 180);
   // Tips in cells of the size of the longest gap, so that only near ones are compared.
   std::unordered_map<std::int64_t, std::vector<HalfEdge>> cells;
+  // An end at the flank of a cable was measured before that cable, which the bridge crosses.
+  double widest = 0;
+  for (std::size_t h = 0; h < ends.size(); ++h) {
+    if (!ends[h].empty() && links.zone_of[h] >= 0) widest = std::max(widest, 2 * links.branches[h].half_width);
+  }
+  const auto reach_of = [&](HalfEdge a, HalfEdge b) {
+    double reach = longest;
+    for (const HalfEdge half : {a, b}) {
+      const auto h = static_cast<std::size_t>(half);
+      if (links.zone_of[h] >= 0) reach += 4 * links.branches[h].half_width;
+    }
+    return reach;
+  };
+  const double size = longest + 4 * widest;
   const auto cell = [&](const Vector2& point, int dx, int dy) {
-    const auto column = static_cast<std::int64_t>(std::floor(point.x() / longest)) + dx;
-    const auto row = static_cast<std::int64_t>(std::floor(point.y() / longest)) + dy;
+    const auto column = static_cast<std::int64_t>(std::floor(point.x() / size)) + dx;
+    const auto row = static_cast<std::int64_t>(std::floor(point.y() / size)) + dy;
     return (row << 32) + column;
   };
   std::vector<Bridge> bridges;
@@ -37,7 +51,7 @@ void bridge_gaps(Continuations& links, const std::vector<std::vector<Vector2>>& 
         for (const HalfEdge other : found->second) {
           const Vector2 bridge = ends[static_cast<std::size_t>(other)].back() - tip;
           const double length = bridge.norm();
-          if (length > longest) continue;
+          if (length > reach_of(half, other)) continue;
           if (length > 0 &&
               (direction(half).dot(bridge) < cosine * length || direction(other).dot(bridge) > -cosine * length)) {
             continue;

@@ -15,7 +15,7 @@ struct CablePath {
 };
 
 /// Bridges gaps between tips: at most `longest` px long, both ends within `angle` degrees of the bridge, the shortest
-/// first. `ends` holds the grown end of every tip, by half-edge.
+/// first. `ends` holds the grown end of every tip, by half-edge; ends on the flank of a cable may be bridged across it.
 void bridge_gaps(Continuations& links, const std::vector<std::vector<Vector2>>& ends, double longest, double angle);
 
 /// Every edge outside zones in exactly one path; open paths first.

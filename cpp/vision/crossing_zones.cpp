@@ -155,7 +155,8 @@ bool is_forked(std::size_t link, const SkeletonGraph& graph, Union& sets, const 
 }
 
 /// Joins nodes to zones and says which edges are inside.
-void find_zones(const SkeletonGraph& graph, const ZoneOptions& options, Continuations& result) {
+void find_zones(const SkeletonGraph& graph, const ZoneOptions& options, const std::vector<char>& known_links,
+                Continuations& result) {
   Union sets(graph.nodes.size());
   std::vector<std::size_t> long_links;
   for (std::size_t e = 0; e < graph.edges.size(); ++e) {
@@ -163,7 +164,7 @@ void find_zones(const SkeletonGraph& graph, const ZoneOptions& options, Continua
     if (edge.removed || !is_junction(graph, edge.nodes[0]) || !is_junction(graph, edge.nodes[1])) continue;
     // Between two crossings the mask is wider than the cable: the narrowest place tells its width.
     const double width = 2 * inner_half_width(edge);
-    if (edge.length < options.short_link * width) {
+    if (known_links[e] || edge.length < options.short_link * width) {
       sets.join(edge.nodes[0], edge.nodes[1]);
       result.inside[e] = 1;
     } else if (edge.length < options.merged_link * width) {
@@ -317,6 +318,79 @@ class PairSearch {
   std::vector<std::pair<int, int>> pairs_;
 };
 
+/// Point and direction of both ends of every edge.
+std::vector<Branch> measure_branches(const SkeletonGraph& graph, const ZoneOptions& options) {
+  std::vector<Branch> branches(2 * graph.edges.size());
+  for (std::size_t e = 0; e < graph.edges.size(); ++e) {
+    const SkeletonEdge& edge = graph.edges[e];
+    if (edge.removed || edge.nodes[0] < 0) continue;
+    std::array<int, 2> skips{};
+    for (std::size_t end = 0; end < 2; ++end) {
+      const SkeletonNode& node = graph.nodes[static_cast<std::size_t>(edge.nodes[end])];
+      skips[end] = distorted_pixels(edge, static_cast<int>(end), node);
+    }
+    for (std::size_t end = 0; end < 2; ++end) {
+      branches[2 * e + end] =
+          measure_branch(graph, edge, static_cast<int>(end), skips[end], skips[1 - end], options.tangent_length);
+    }
+  }
+  return branches;
+}
+
+void match_zone(const Zone& zone, const ZoneOptions& options, Continuations& result) {
+  std::vector<Branch> branches;
+  for (const HalfEdge half : zone.branches) branches.push_back(result.branches[static_cast<std::size_t>(half)]);
+  PairSearch search(branches);
+  search.run();
+  for (const auto& [a, b] : search.best.pairs) {
+    const HalfEdge first = zone.branches[static_cast<std::size_t>(a)];
+    const HalfEdge second = zone.branches[static_cast<std::size_t>(b)];
+    result.partner[static_cast<std::size_t>(first)] = second;
+    result.partner[static_cast<std::size_t>(second)] = first;
+  }
+  const double best = search.best.energy;
+  if (zone.branches.size() > 2 && search.second < kForbidden &&
+      search.second - best < options.similar_energies * search.second) {
+    result.doubts.push_back({zone.center, Doubt::similar_energies});
+  }
+}
+
+/// Two ends on opposite flanks of a cable, in line with each other, are one cable that crosses it: the edge between
+/// their zones becomes a link. Says whether there was one more.
+bool find_split_crossings(const SkeletonGraph& graph, const ZoneOptions& options, const Continuations& links,
+                          std::vector<char>& known_links) {
+  const auto singles = [&](int zone) {
+    std::vector<HalfEdge> result;
+    for (const HalfEdge half : links.zones[static_cast<std::size_t>(zone)].branches) {
+      if (links.partner[static_cast<std::size_t>(half)] < 0) result.push_back(half);
+    }
+    return result;
+  };
+  constexpr double in_line = 0.866;  // 30 degrees
+  bool found = false;
+  for (std::size_t e = 0; e < graph.edges.size(); ++e) {
+    const SkeletonEdge& edge = graph.edges[e];
+    const int first = links.zone_of[2 * e];
+    const int second = links.zone_of[2 * e + 1];
+    if (edge.removed || links.inside[e] || known_links[e] || first < 0 || second < 0 || first == second) continue;
+    const double longest = options.merged_link * 2 * inner_half_width(edge);
+    if (edge.length > longest) continue;
+    for (const HalfEdge a : singles(first)) {
+      for (const HalfEdge b : singles(second)) {
+        const Branch& from = links.branches[static_cast<std::size_t>(a)];
+        const Branch& to = links.branches[static_cast<std::size_t>(b)];
+        const Vector2 chord = to.point - from.point;
+        const double length = chord.norm();
+        if (edge_of(a) == static_cast<int>(e) || edge_of(b) == static_cast<int>(e) || length > longest) continue;
+        if (from.tangent.dot(chord) < in_line * length || to.tangent.dot(chord) > -in_line * length) continue;
+        known_links[e] = 1;
+        found = true;
+      }
+    }
+  }
+  return found;
+}
+
 }  // namespace
 
 double bending_energy(const Branch& from, const Branch& to) {
@@ -341,45 +415,18 @@ double bending_energy(const Branch& from, const Branch& to) {
 }
 
 Continuations find_continuations(const SkeletonGraph& graph, const ZoneOptions& options) {
-  Continuations result;
-  const std::size_t halves = 2 * graph.edges.size();
-  result.branches.resize(halves);
-  result.zone_of.assign(halves, -1);
-  result.partner.assign(halves, -1);
-  result.inside.assign(graph.edges.size(), 0);
-  for (std::size_t e = 0; e < graph.edges.size(); ++e) {
-    const SkeletonEdge& edge = graph.edges[e];
-    if (edge.removed || edge.nodes[0] < 0) continue;
-    std::array<int, 2> skips{};
-    for (int end = 0; end < 2; ++end) {
-      const int node = edge.nodes[static_cast<std::size_t>(end)];
-      skips[static_cast<std::size_t>(end)] = distorted_pixels(edge, end, graph.nodes[static_cast<std::size_t>(node)]);
-    }
-    for (int end = 0; end < 2; ++end) {
-      result.branches[2 * e + static_cast<std::size_t>(end)] =
-          measure_branch(graph, edge, end, skips[static_cast<std::size_t>(end)],
-                         skips[static_cast<std::size_t>(1 - end)], options.tangent_length);
-    }
+  const std::vector<Branch> branches = measure_branches(graph, options);
+  std::vector<char> known_links(graph.edges.size(), 0);
+  while (true) {
+    Continuations result;
+    result.branches = branches;
+    result.zone_of.assign(branches.size(), -1);
+    result.partner.assign(branches.size(), -1);
+    result.inside.assign(graph.edges.size(), 0);
+    find_zones(graph, options, known_links, result);
+    for (const Zone& zone : result.zones) match_zone(zone, options, result);
+    if (!find_split_crossings(graph, options, result, known_links)) return result;
   }
-  find_zones(graph, options, result);
-  for (const Zone& zone : result.zones) {
-    std::vector<Branch> branches;
-    for (const HalfEdge half : zone.branches) branches.push_back(result.branches[static_cast<std::size_t>(half)]);
-    PairSearch search(branches);
-    search.run();
-    for (const auto& [a, b] : search.best.pairs) {
-      const HalfEdge first = zone.branches[static_cast<std::size_t>(a)];
-      const HalfEdge second = zone.branches[static_cast<std::size_t>(b)];
-      result.partner[static_cast<std::size_t>(first)] = second;
-      result.partner[static_cast<std::size_t>(second)] = first;
-    }
-    const double best = search.best.energy;
-    if (zone.branches.size() > 2 && search.second < kForbidden &&
-        search.second - best < options.similar_energies * search.second) {
-      result.doubts.push_back({zone.center, Doubt::similar_energies});
-    }
-  }
-  return result;
 }
 
 }  // namespace withe

@@ -27,7 +27,11 @@ NeighbourList neighbours(const BitImage& skeleton, const PixelIndex& index, Pixe
   return list;
 }
 
-double step_length(const SkeletonPoint& a, const SkeletonPoint& b) { return std::hypot(a.x - b.x, a.y - b.y); }
+/// Not std::hypot: it asks for glibc 2.35, and a wheel must do with 2.34.
+double step_length(const SkeletonPoint& a, const SkeletonPoint& b) {
+  const double x = a.x - b.x, y = a.y - b.y;
+  return std::sqrt(x * x + y * y);
+}
 
 double median_half_width(const std::vector<SkeletonPoint>& points) {
   if (points.empty()) return 0;
@@ -228,6 +232,25 @@ void join_at(SkeletonGraph& graph, int number) {
   }
 }
 
+/// The node at which an edge sprouts, or -1 where it is no spur.
+int root_of_spur(const SkeletonGraph& graph, const SkeletonEdge& edge) {
+  if (edge.removed || edge.nodes[0] < 0) return -1;
+  for (int end = 0; end < 2; ++end) {
+    const SkeletonNode& tip = graph.nodes[static_cast<std::size_t>(edge.nodes[static_cast<std::size_t>(end)])];
+    const int node = other_end(edge, end);
+    if (tip.edges.size() == 1 && graph.nodes[static_cast<std::size_t>(node)].edges.size() >= 3) return node;
+  }
+  return -1;
+}
+
+void remove_spur(SkeletonGraph& graph, int number, int root) {
+  SkeletonEdge& edge = graph.edges[static_cast<std::size_t>(number)];
+  edge.removed = true;
+  edge.points.clear();
+  for (const int end : edge.nodes) std::erase(graph.nodes[static_cast<std::size_t>(end)].edges, number);
+  join_at(graph, root);
+}
+
 }  // namespace
 
 SkeletonGraph build_graph(const BitImage& skeleton, const BitImage& mask, double limit) {
@@ -235,39 +258,35 @@ SkeletonGraph build_graph(const BitImage& skeleton, const BitImage& mask, double
 }
 
 void prune_spurs(SkeletonGraph& graph, double ratio) {
-  // The node at which an edge sprouts, or -1 where it is no spur.
-  const auto root = [&](const SkeletonEdge& edge) {
-    if (edge.removed || edge.nodes[0] < 0) return -1;
-    for (int end = 0; end < 2; ++end) {
-      const SkeletonNode& tip = graph.nodes[static_cast<std::size_t>(edge.nodes[static_cast<std::size_t>(end)])];
-      const int node = other_end(edge, end);
-      if (tip.edges.size() == 1 && graph.nodes[static_cast<std::size_t>(node)].edges.size() >= 3) return node;
-    }
-    return -1;
-  };
   using Entry = std::pair<double, int>;
   std::priority_queue<Entry, std::vector<Entry>, std::greater<>> queue;
   for (std::size_t e = 0; e < graph.edges.size(); ++e) {
-    if (root(graph.edges[e]) >= 0) queue.emplace(graph.edges[e].length, static_cast<int>(e));
+    if (root_of_spur(graph, graph.edges[e]) >= 0) queue.emplace(graph.edges[e].length, static_cast<int>(e));
   }
   while (!queue.empty()) {
     const auto [length, number] = queue.top();
     queue.pop();
-    SkeletonEdge& edge = graph.edges[static_cast<std::size_t>(number)];
-    const int node = root(edge);
+    const SkeletonEdge& edge = graph.edges[static_cast<std::size_t>(number)];
+    const int node = root_of_spur(graph, edge);
     if (node < 0) continue;
     if (edge.length > length) {  // grew since: another spur went, and two lines became one
       queue.emplace(edge.length, number);
       continue;
     }
-    if (length >= ratio * graph.nodes[static_cast<std::size_t>(node)].half_width) continue;
-    edge.removed = true;
-    edge.points.clear();
-    for (const int end : edge.nodes) {
-      auto& edges = graph.nodes[static_cast<std::size_t>(end)].edges;
-      std::erase(edges, number);
-    }
-    join_at(graph, node);
+    if (length < ratio * graph.nodes[static_cast<std::size_t>(node)].half_width) remove_spur(graph, number, node);
+  }
+}
+
+void prune_short_ends(SkeletonGraph& graph, double length) {
+  for (std::size_t e = 0; e < graph.edges.size(); ++e) {
+    if (graph.edges[e].length > length) continue;
+    const int node = root_of_spur(graph, graph.edges[e]);
+    if (node >= 0) remove_spur(graph, static_cast<int>(e), node);
+  }
+  for (SkeletonEdge& edge : graph.edges) {
+    const bool alone = edge.nodes[0] >= 0 && graph.nodes[static_cast<std::size_t>(edge.nodes[0])].edges.size() == 1 &&
+                       graph.nodes[static_cast<std::size_t>(edge.nodes[1])].edges.size() == 1;
+    if (alone && edge.length <= length) edge.removed = true;
   }
 }
 

@@ -45,6 +45,9 @@ SkeletonGraph build_graph(const BitImage& skeleton, const BitImage& mask, double
 /// the two lines that remain at a node.
 void prune_spurs(SkeletonGraph& graph, double ratio);
 
+/// Removes ends of lines up to `length` px long one after the other, as they come.
+void prune_short_ends(SkeletonGraph& graph, double length);
+
 /// The nodes where an edge starts (0) or ends (1), read from either side.
 inline int other_end(const SkeletonEdge& edge, int end) { return edge.nodes[static_cast<std::size_t>(1 - end)]; }
 

@@ -86,6 +86,7 @@ std::vector<std::vector<Vector2>> grow_tips(const BitImage& mask, SkeletonGraph&
       const std::size_t half = 2 * e + end;
       if (links.zone_of[half] >= 0) {
         alone = false;
+        if (links.partner[half] < 0) ends[half] = {links.branches[half].point};
         continue;
       }
       const Branch& branch = links.branches[half];

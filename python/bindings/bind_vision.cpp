@@ -3,12 +3,19 @@
 #include <pybind11/numpy.h>
 #include <pybind11/stl.h>
 
+#include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "bindings.hpp"
 #include "common/check.hpp"
+#include "vision/color_image.hpp"
+#include "vision/crossing_order.hpp"
 #include "vision/labels.hpp"
+#include "vision/mbest.hpp"
 #include "vision/thinning.hpp"
 #include "vision/tracing.hpp"
 
@@ -72,18 +79,54 @@ py::dict to_python(const Tracing& tracing, const py::array_t<std::int32_t>& labe
   return result;
 }
 
-py::dict trace_lines(const Bytes& mask) {
+/// A picture that NumPy owns.
+ColorImage to_image(const Bytes& image) {
+  require(image.ndim() == 3 && image.shape(2) == 3, "image must have shape (height, width, 3)");
+  return {image.data(), static_cast<int>(image.shape(0)), static_cast<int>(image.shape(1)), image.strides(0)};
+}
+
+py::dict trace_lines(const Bytes& mask, const std::optional<Bytes>& image, const std::string& method) {
+  const bool published = method == "mbest";
+  require(published || method == "withe", "method must be 'withe' or 'mbest', got '" + method + "'");
   const BitImage bits = to_bits(mask);
+  ColorImage picture;
+  if (image) {
+    picture = to_image(*image);
+    require(picture.height == bits.height() && picture.width == bits.width(), "image and mask must have equal sizes");
+  }
   py::array_t<std::int32_t> labels({bits.height(), bits.width()});
-  std::fill(labels.mutable_data(), labels.mutable_data() + labels.size(), 0);
   std::int32_t* pixels = labels.mutable_data();
   Tracing tracing;
   {
     const py::gil_scoped_release release;
-    tracing = withe::trace_lines(bits, {});
-    paint_labels(bits, tracing, pixels);
+    std::fill(pixels, pixels + labels.size(), 0);
+    if (published) {
+      tracing = trace_mbest(bits);
+      if (image) decide_order_mbest(picture, tracing);
+      paint_discs(bits, tracing, pixels);
+    } else {
+      tracing = withe::trace_lines(bits, {});
+      if (image) decide_order(picture, tracing);
+      paint_labels(bits, tracing, pixels);
+    }
   }
   return to_python(tracing, labels);
+}
+
+Bytes hsv_mask(const Bytes& image, const std::vector<std::pair<std::array<int, 3>, std::array<int, 3>>>& ranges) {
+  const ColorImage picture = to_image(image);
+  std::vector<HsvRange> list;
+  for (const auto& [low, high] : ranges) list.push_back({low, high});
+  Bytes mask({picture.height, picture.width});
+  withe::hsv_mask(picture, list, mask.mutable_data());
+  return mask;
+}
+
+Bytes foreground_mask(const Bytes& image, int contrast) {
+  const ColorImage picture = to_image(image);
+  Bytes mask({picture.height, picture.width});
+  if (picture.height > 0 && picture.width > 0) withe::foreground_mask(picture, contrast, mask.mutable_data());
+  return mask;
 }
 
 }  // namespace
@@ -92,7 +135,14 @@ void register_vision(py::module_& module) {
   module.def(
       "thin", [](const Bytes& mask) { return to_array(withe::thin(to_bits(mask))); }, py::arg("mask"),
       "Skeleton of a mask by Zhang and Suen's rule as scikit-image has it.");
-  module.def("trace_lines", &trace_lines, py::arg("mask"), "Every line in a mask, in order, and labels.");
+  module.def(
+      "close_and_open", [](const Bytes& mask) { return to_array(dilate(erode(erode(dilate(to_bits(mask)))))); },
+      py::arg("mask"), "Closing, then opening, by a square of 3 x 3 pixels.");
+  module.def("hsv_mask", &hsv_mask, py::arg("image"), py::arg("ranges"), "Pixels whose colour is in a range.");
+  module.def("foreground_mask", &foreground_mask, py::arg("image"), py::arg("contrast"),
+             "Pixels whose colour is far from that of the border.");
+  module.def("trace_lines", &trace_lines, py::arg("mask"), py::arg("image") = py::none(), py::arg("method") = "withe",
+             "Every line in a mask, in order, and labels.");
 }
 
 }  // namespace withe::bindings

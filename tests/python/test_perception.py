@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from scoring import score
 from withe import _core
 from withe.perception import trace_mask

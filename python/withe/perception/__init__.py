@@ -1,6 +1,26 @@
-"""Find every rope or cable in an image, in order, and which one lies on top."""
+"""Find every rope or cable in an image, in order, and which one lies on top.
 
+>>> import withe
+>>> tracing = withe.perception.trace("cables.jpg")  # doctest: +SKIP
+>>> tracing.centrelines[0]                          # (n, 2) pixels, end to end # doctest: +SKIP
+"""
+
+from withe.perception.camera import Camera
+from withe.perception.drawing import draw
+from withe.perception.masks import border_filter, color_filter, network_mask
 from withe.perception.results import Ambiguity, Crossing, Joint, Tracing
-from withe.perception.tracing import trace_mask
+from withe.perception.tracing import trace, trace_mask
 
-__all__ = ["Ambiguity", "Crossing", "Joint", "Tracing", "trace_mask"]
+__all__ = [
+    "Ambiguity",
+    "Camera",
+    "Crossing",
+    "Joint",
+    "Tracing",
+    "border_filter",
+    "color_filter",
+    "draw",
+    "network_mask",
+    "trace",
+    "trace_mask",
+]

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from withe.perception.camera import Camera
+
 __all__ = ["Ambiguity", "Crossing", "Joint", "Tracing"]
 
 Array = NDArray[np.float64]
+
+FORMAT_VERSION = 1
 
 
 @dataclass
@@ -94,8 +99,141 @@ class Tracing:
     ambiguous: list[Ambiguity] = field(default_factory=list)
     timings: dict[str, float] = field(default_factory=dict)
 
+    def points(self, cable: int, camera: Camera, height: float = 0.0, radius: float | None = None) -> Array:
+        """The centreline of a cable in metres, for ``Scene.add_rod(points=...)``.
+
+        Parameters
+        ----------
+        cable : int
+        camera : Camera
+        height : float [m]
+            z of the plane that the cables lie in (their centrelines).
+        radius : float, optional [m]
+            Of the cables: upper strands are lifted over lower ones by two radii and a tenth, so that rods do not
+            start inside each other.
+
+        Returns
+        -------
+        ndarray of shape (n, 3) [m]
+
+        Raises
+        ------
+        ValueError
+            No such cable, a radius that is not positive, or pixels that do not see the plane.
+        """
+        if not -len(self) <= cable < len(self):
+            raise ValueError(f"cable must be from 0 to {len(self) - 1}, got {cable}")
+        if radius is None:
+            return camera.to_plane(self.centrelines[cable], height)
+        if not radius > 0:
+            raise ValueError(f"radius must be positive, got {radius}")
+        return camera.to_plane(self.centrelines[cable], height + lifts(self, camera, height, radius)[cable])
+
+    def to_dict(self) -> dict[str, Any]:
+        """Every field in plain Python objects that JSON can hold; labels as runs (label, length) row by row."""
+        flat = self.labels.ravel()
+        starts = np.flatnonzero(np.diff(flat, prepend=-1)) if len(flat) else np.zeros(0, int)
+        lengths = np.diff(np.append(starts, len(flat)))
+        return {
+            "format": "withe tracing",
+            "version": FORMAT_VERSION,
+            "shape": list(self.labels.shape),
+            "cables": [
+                {"centreline": line.tolist(), "widths": np.asarray(widths).tolist(), "closed": bool(closed)}
+                for line, widths, closed in zip(self.centrelines, self.widths, self.closed, strict=True)
+            ],
+            "crossings": [
+                {"point": c.point.tolist(), "over": list(c.over), "under": list(c.under), "confidence": c.confidence}
+                for c in self.crossings
+            ],
+            "joints": [
+                {"point": j.point.tolist(), "end": list(j.end), "through": list(j.through)} for j in self.joints
+            ],
+            "ambiguous": [{"point": a.point.tolist(), "reason": a.reason} for a in self.ambiguous],
+            "timings": dict(self.timings),
+            "label_runs": [[int(flat[s]), int(n)] for s, n in zip(starts, lengths, strict=True)],
+        }
+
+    @classmethod
+    def from_dict(cls, fields: dict[str, Any]) -> Tracing:
+        """What `to_dict` made, read again.
+
+        Raises
+        ------
+        ValueError
+            Another format, or a version that this one does not know.
+        """
+        if fields.get("format") != "withe tracing" or fields.get("version") != FORMAT_VERSION:
+            raise ValueError(
+                f"fields must be a withe tracing of version {FORMAT_VERSION}, "
+                f"got {fields.get('format')!r} of version {fields.get('version')!r}"
+            )
+        runs = np.array(fields["label_runs"], np.int64).reshape(-1, 2)
+        return cls(
+            centrelines=[np.array(c["centreline"], float).reshape(-1, 2) for c in fields["cables"]],
+            widths=[np.array(c["widths"], float) for c in fields["cables"]],
+            closed=[c["closed"] for c in fields["cables"]],
+            labels=np.repeat(runs[:, 0], runs[:, 1]).astype(np.int32).reshape(fields["shape"]),
+            crossings=[
+                Crossing(np.array(c["point"]), tuple(c["over"]), tuple(c["under"]), c["confidence"])
+                for c in fields["crossings"]
+            ],
+            joints=[Joint(np.array(j["point"]), tuple(j["end"]), tuple(j["through"])) for j in fields["joints"]],
+            ambiguous=[Ambiguity(np.array(a["point"]), a["reason"]) for a in fields["ambiguous"]],
+            timings=fields["timings"],
+        )
+
     def __len__(self) -> int:
         return len(self.centrelines)
 
     def __repr__(self) -> str:
-        return f"<Tracing: {len(self)} cables, {len(self.crossings)} crossings, {len(self.joints)} joints>"
+        counts = {"cable": len(self), "crossing": len(self.crossings), "joint": len(self.joints)}
+        words = [f"{count} {word}" + ("" if count == 1 else "s") for word, count in counts.items()]
+        return f"<Tracing: {', '.join(words)}>"
+
+
+def lifts(tracing: Tracing, camera: Camera, height: float, radius: float) -> list[Array]:
+    """How far every row of every cable is lifted so that upper strands clear lower ones [m].
+
+    At a crossing the upper strand lies 2.1 radii above the lower one, over the length in which their outlines
+    overlap, and comes down over as much again on both sides; strands that cross several others are lifted over the
+    highest.
+    """
+    lines = [camera.to_plane(line, height)[:, :2] for line in tracing.centrelines]
+    result = [np.zeros(len(line)) for line in lines]
+    bumps = []
+    for crossing in tracing.crossings:
+        (over, row), (under, other) = crossing.over, crossing.under
+        closed = tracing.closed[over]
+        directions = []
+        for cable, at in (crossing.over, crossing.under):
+            line = lines[cable]
+            rows = (
+                [(at - 3) % len(line), (at + 3) % len(line)]
+                if tracing.closed[cable]
+                else [
+                    max(at - 3, 0),
+                    min(at + 3, len(line) - 1),
+                ]
+            )
+            way = line[rows[1]] - line[rows[0]]
+            directions.append(way / max(np.hypot(*way), 1e-300))
+        sine = abs(directions[0][0] * directions[1][1] - directions[0][1] * directions[1][0])
+        reach = 2.2 * radius / max(sine, 0.15)
+        steps = np.hypot(*np.diff(np.vstack([lines[over], lines[over][:1]]) if closed else lines[over], axis=0).T)
+        arc = np.concatenate([[0.0], np.cumsum(steps)])
+        apart = np.abs(arc[: len(lines[over])] - arc[row])
+        if closed:
+            apart = np.minimum(apart, arc[-1] - apart)
+        fall = np.clip((apart - reach) / (2 * reach), 0, 1)
+        bumps.append((over, row, under, other, 0.5 + 0.5 * np.cos(np.pi * fall)))
+    for _ in range(len(bumps) + 1):
+        changed = False
+        for over, row, under, other, shape in bumps:
+            wanted = result[under][other] + 2.1 * radius
+            if result[over][row] < wanted - 1e-12:
+                result[over] = np.maximum(result[over], wanted * shape)
+                changed = True
+        if not changed:
+            break
+    return result

@@ -179,10 +179,10 @@ def _grow(
     return np.vstack([start, start + np.cumsum(steps, axis=0)])
 
 
-def _through(rng: np.random.Generator, point: Array, heading: float, before: float, after: float, bend: float) -> Array:
+def _through(rng: np.random.Generator, point: Array, heading: float, reach: tuple[float, float], bend: float) -> Array:
     """A curve through a point in a direction."""
-    forward = _grow(rng, point, heading, after, bend)
-    backward = _grow(rng, point, heading + np.pi, before, bend)
+    forward = _grow(rng, point, heading, reach[1], bend)
+    backward = _grow(rng, point, heading + np.pi, reach[0], bend)
     return np.vstack([backward[:0:-1], forward])
 
 
@@ -272,22 +272,28 @@ def _random_lines(
     kind, _, number = case.rpartition(" ") if case[-1].isdigit() else (case, "", "")
     bend = rng.uniform(0.0, 1 / 120) / scale
     base = rng.uniform(0, 2 * np.pi)
+    lines: list[Array] = []
+
+    def reach() -> tuple[float, float]:
+        before, after = rng.uniform(110, 190, 2) * scale
+        return before, after
+
     if kind in ("crossing", "ragged", "specks"):
         degrees = float(number or rng.choice([60.0, 90.0]))
         headings = [base, base + np.radians(degrees)]
         bend *= min(1.0, degrees / 45)
-        lines = [_through(rng, center, heading, *(rng.uniform(110, 190, 2) * scale), bend) for heading in headings]
+        lines = [_through(rng, center, heading, reach(), bend) for heading in headings]
         return lines, [False, False], np.radians(0.7 * degrees)
     if kind == "three at a point":
-        headings = base + np.radians([0, 60, 120]) + np.radians(rng.uniform(-8, 8, 3))
-        lines = [_through(rng, center, h, *(rng.uniform(110, 190, 2) * scale), bend) for h in headings]
+        spread = base + np.radians([0, 60, 120]) + np.radians(rng.uniform(-8, 8, 3))
+        lines = [_through(rng, center, heading, reach(), bend) for heading in spread]
         return lines, [False] * 3, np.radians(35)
     if kind == "T":
-        through = _through(rng, center, base, *(rng.uniform(110, 190, 2) * scale), bend)
+        through = _through(rng, center, base, reach(), bend)
         stem = _grow(rng, center, base + np.radians(rng.uniform(60, 120)), rng.uniform(110, 190) * scale, bend)
         return [through, stem], [False] * 2, 0.0
     if kind == "gap":
-        line = _through(rng, center, base, *(rng.uniform(110, 190, 2) * scale), bend)
+        line = _through(rng, center, base, reach(), bend)
         return [line], [False], 0.0
     if kind == "loop":
         t = np.linspace(0, 2 * np.pi, 500, endpoint=False)
@@ -304,7 +310,6 @@ def _random_lines(
         line += center - line.mean(axis=0)
         return [line], [False], np.radians(25)
     if kind == "six cables":
-        lines: list[Array] = []
         for _ in range(400):
             start = rng.uniform([20, 20], [width - 20, height - 20])
             line = _grow(rng, start, rng.uniform(0, 6.3), rng.uniform(250, 550) * scale, 1 / 120 / scale)
@@ -484,4 +489,5 @@ def render(
         shade[np.isfinite(shifted) & (shifted > top + 0.6)] -= shadow
     picture *= shade[..., None]
     picture += rng.normal(0, grain, picture.shape)
-    return np.clip(np.round(picture), 0, 255).astype(np.uint8)
+    result: NDArray[np.uint8] = np.clip(np.round(picture), 0, 255).astype(np.uint8)
+    return result

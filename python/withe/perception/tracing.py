@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Any
+import os
+import time
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from withe import _core
+from withe.extras import require
+from withe.perception.masks import MaskFunction, border_filter
 from withe.perception.results import Ambiguity, Crossing, Joint, Tracing
 
-__all__ = ["trace_mask"]
+__all__ = ["check_image", "check_mask", "read_image", "trace", "trace_mask"]
+
+Method = Literal["withe", "mbest"]
 
 
 def check_mask(mask: ArrayLike, name: str = "mask") -> NDArray[np.uint8]:
@@ -44,13 +50,107 @@ def _tracing(found: dict[str, Any]) -> Tracing:
     )
 
 
-def trace_mask(mask: ArrayLike) -> Tracing:
+def check_image(image: ArrayLike, name: str = "image") -> NDArray[np.uint8]:
+    """A picture as RGB bytes, row by row, or a ValueError that says what is wrong with it."""
+    array = np.asarray(image)
+    if array.ndim == 2:
+        array = array[..., None]
+    if array.ndim != 3 or array.shape[2] not in (1, 3, 4) or 0 in array.shape:
+        raise ValueError(f"{name} must have shape (height, width, 3) and hold a pixel, got {np.shape(image)}")
+    if array.dtype.kind == "f" and not np.isfinite(array).all():
+        raise ValueError(f"{name} must be finite, got NaN or infinity")
+    if array.dtype == np.bool_:
+        array = array.astype(np.uint8) * 255
+    if array.dtype != np.uint8:
+        raise ValueError(f"{name} must be of type uint8, got {array.dtype}")
+    if array.shape[2] == 1:
+        array = np.repeat(array, 3, axis=2)
+    return np.ascontiguousarray(array[..., :3])
+
+
+def read_image(path: str | os.PathLike[str], name: str = "image") -> NDArray[np.uint8]:
+    """The picture in a file as RGB bytes.
+
+    Raises
+    ------
+    ValueError
+        No such file, or none that OpenCV can read.
+    """
+    cv2 = require("cv2", "vision")
+    try:
+        content = np.fromfile(path, np.uint8)
+    except OSError as error:
+        raise ValueError(f"{name} must be a file that can be read, got {os.fspath(path)!r}: {error.strerror}") from None
+    picture = cv2.imdecode(content, cv2.IMREAD_COLOR) if len(content) else None
+    if picture is None:
+        raise ValueError(f"{name} must be a picture that can be read, got {os.fspath(path)!r}, which is none")
+    return np.ascontiguousarray(picture[..., ::-1])
+
+
+def _check_method(method: str) -> None:
+    if method not in ("withe", "mbest"):
+        raise ValueError(f"method must be 'withe' or 'mbest', got {method!r}")
+
+
+def trace(
+    image: ArrayLike | str | os.PathLike[str],
+    mask: ArrayLike | MaskFunction | None = None,
+    method: Method = "withe",
+) -> Tracing:
+    """Find every cable in a picture, and which one lies on top where they cross.
+
+    Parameters
+    ----------
+    image : str, Path or array_like of shape (height, width, 3)
+        A file, or red, green, blue as uint8; one channel (grey) or a fourth (alpha, ignored) will do.
+    mask : array_like of shape (height, width), or callable, optional
+        Which pixels belong to cables: booleans or numbers, or a function from the picture to such an array, as
+        `color_filter` and `network_mask` make. By default what differs from the border (`border_filter`).
+    method : {"withe", "mbest"}
+        Ours, or the published one as it is described, for comparison.
+
+    Returns
+    -------
+    Tracing
+
+    Raises
+    ------
+    ValueError
+        A picture that cannot be read or has another shape or type, or a mask of another size.
+    ImportError
+        A file was given and OpenCV is not installed: ``pip install "withe[vision]"``.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> image = np.zeros((60, 200, 3), np.uint8)
+    >>> image[26:34, 20:180] = (200, 60, 60)
+    >>> trace(image)
+    <Tracing: 1 cable, 0 crossings, 0 joints>
+    """
+    _check_method(method)
+    picture = read_image(image) if isinstance(image, str | os.PathLike) else check_image(image)
+    started = time.perf_counter()
+    if mask is None:
+        mask = border_filter
+    pixels = check_mask(mask(picture) if callable(mask) else mask)
+    masked = time.perf_counter() - started
+    if pixels.shape != picture.shape[:2]:
+        raise ValueError(f"mask must be as large as the image, {picture.shape[:2]}, got {pixels.shape}")
+    tracing = _tracing(_core.trace_lines(pixels, picture, method))
+    tracing.timings = {"mask": masked, **tracing.timings}
+    return tracing
+
+
+def trace_mask(mask: ArrayLike, method: Method = "withe") -> Tracing:
     """Find every cable in a mask.
 
     Parameters
     ----------
     mask : array_like of shape (height, width)
         Booleans, or numbers of which zero is background.
+    method : {"withe", "mbest"}
+        Ours, or the published one as it is described, for comparison.
 
     Returns
     -------
@@ -68,9 +168,10 @@ def trace_mask(mask: ArrayLike) -> Tracing:
     >>> mask = np.zeros((60, 200), bool)
     >>> mask[26:34, 20:180] = True
     >>> trace_mask(mask)
-    <Tracing: 1 cables, 0 crossings, 0 joints>
+    <Tracing: 1 cable, 0 crossings, 0 joints>
     """
+    _check_method(method)
     pixels = check_mask(mask)
     if 0 in pixels.shape:
         return Tracing(labels=np.zeros(pixels.shape, np.int32))
-    return _tracing(_core.trace_lines(pixels))
+    return _tracing(_core.trace_lines(pixels, None, method))

@@ -1,0 +1,272 @@
+#include "vision/mbest.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "vision/cable_paths.hpp"
+#include "vision/skeleton_graph.hpp"
+#include "vision/thinning.hpp"
+
+namespace withe {
+
+namespace {
+
+/// Nodes of one intersection, the middle of which replaces them.
+struct Intersection {
+  std::vector<int> nodes;
+  Vector2 center = Vector2::Zero();
+  std::vector<HalfEdge> ends;
+};
+
+double largest_half_width(const SkeletonGraph& graph) {
+  double largest = 0;
+  for (const SkeletonNode& node : graph.nodes) largest = std::max(largest, node.half_width);
+  for (const SkeletonEdge& edge : graph.edges) {
+    for (const SkeletonPoint& point : edge.points) largest = std::max(largest, static_cast<double>(point.half_width));
+  }
+  return largest;
+}
+
+/// Discrete curvature (8.1) of the way from one place over a second to a third.
+double curvature(const Vector2& from, const Vector2& over, const Vector2& to) {
+  const Vector2 a = (over - from).normalized();
+  const Vector2 b = (to - over).normalized();
+  const double cross = a.x() * b.y() - a.y() * b.x();
+  const double denominator = 1 + a.dot(b);
+  return denominator > 1e-9 ? std::abs(2 * cross) / denominator : 1e9;
+}
+
+/// Clusters nodes and matches Y-shaped ones; says for every edge whether it lies inside an intersection.
+std::vector<Intersection> match_intersections(const SkeletonGraph& graph, double reach, std::vector<char>& inside) {
+  std::vector<int> junctions;
+  for (std::size_t n = 0; n < graph.nodes.size(); ++n) {
+    if (graph.nodes[n].edges.size() >= 3) junctions.push_back(static_cast<int>(n));
+  }
+  const auto node = [&](int number) -> const SkeletonNode& { return graph.nodes[static_cast<std::size_t>(number)]; };
+  struct Pair {
+    double distance;
+    int a, b;
+    bool operator<(const Pair& other) const { return distance < other.distance; }
+  };
+  std::vector<Pair> pairs;
+  for (std::size_t i = 0; i < junctions.size(); ++i) {
+    for (std::size_t j = i + 1; j < junctions.size(); ++j) {
+      const int a = junctions[i];
+      const int b = junctions[j];
+      if (node(a).edges.size() != 3 || node(b).edges.size() != 3) continue;
+      const double distance = (node(a).position - node(b).position).norm();
+      if (distance <= reach) pairs.push_back({distance, a, b});
+    }
+  }
+  std::sort(pairs.begin(), pairs.end());
+  std::vector<int> partner(graph.nodes.size(), -1);
+  for (const Pair& pair : pairs) {
+    int& a = partner[static_cast<std::size_t>(pair.a)];
+    int& b = partner[static_cast<std::size_t>(pair.b)];
+    if (a >= 0 || b >= 0) continue;
+    a = pair.b;
+    b = pair.a;
+  }
+  std::vector<Intersection> result;
+  for (const int number : junctions) {
+    const int other = partner[static_cast<std::size_t>(number)];
+    if (other >= 0 && other < number) continue;
+    Intersection intersection;
+    intersection.nodes = {number};
+    intersection.center = node(number).position;
+    if (other >= 0) {
+      intersection.nodes.push_back(other);
+      intersection.center = 0.5 * (node(number).position + node(other).position);
+      // The shortest line between both is the middle of the crossing.
+      int link = -1;
+      for (const int e : node(number).edges) {
+        const SkeletonEdge& edge = graph.edges[static_cast<std::size_t>(e)];
+        if ((edge.nodes[0] == other || edge.nodes[1] == other) && edge.nodes[0] != edge.nodes[1] &&
+            (link < 0 || edge.length < graph.edges[static_cast<std::size_t>(link)].length)) {
+          link = e;
+        }
+      }
+      if (link >= 0) inside[static_cast<std::size_t>(link)] = 1;
+    }
+    result.push_back(std::move(intersection));
+  }
+  for (Intersection& intersection : result) {
+    for (const int number : intersection.nodes) {
+      int seen = -1;
+      for (const int e : node(number).edges) {
+        if (inside[static_cast<std::size_t>(e)] || e == seen) continue;
+        seen = e;
+        for (int end = 0; end < 2; ++end) {
+          if (graph.edges[static_cast<std::size_t>(e)].nodes[static_cast<std::size_t>(end)] == number) {
+            intersection.ends.push_back(2 * e + end);
+          }
+        }
+      }
+    }
+    std::sort(intersection.ends.begin(), intersection.ends.end());
+    intersection.ends.erase(std::unique(intersection.ends.begin(), intersection.ends.end()), intersection.ends.end());
+  }
+  return result;
+}
+
+/// The pairs of the first four ends with the least sum of curvatures; of three ends one pair.
+void pair_ends(const std::vector<Vector2>& points, const Intersection& intersection, std::vector<HalfEdge>& partner) {
+  const std::size_t n = intersection.ends.size();
+  std::vector<std::size_t> order(n);
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  const auto cost = [&](std::size_t a, std::size_t b) { return curvature(points[a], intersection.center, points[b]); };
+  const auto join = [&](std::size_t a, std::size_t b) {
+    partner[static_cast<std::size_t>(intersection.ends[a])] = intersection.ends[b];
+    partner[static_cast<std::size_t>(intersection.ends[b])] = intersection.ends[a];
+  };
+  if (n >= 4) {
+    double best = std::numeric_limits<double>::infinity();
+    std::size_t mate = 1;
+    for (std::size_t k = 1; k < 4; ++k) {
+      const std::size_t c = k == 1 ? 2 : 1;
+      const std::size_t d = k == 3 ? 2 : 3;
+      const double sum = cost(0, k) + cost(c, d);
+      if (sum < best) {
+        best = sum;
+        mate = k;
+      }
+    }
+    join(0, mate);
+    join(mate == 1 ? 2 : 1, mate == 3 ? 2 : 3);
+  } else if (n >= 2) {
+    std::size_t a = 0;
+    std::size_t b = 1;
+    for (std::size_t i = 0; i < n; ++i) {
+      for (std::size_t j = i + 1; j < n; ++j) {
+        if (cost(i, j) < cost(a, b)) a = i, b = j;
+      }
+    }
+    join(a, b);
+  }
+}
+
+}  // namespace
+
+Tracing trace_mbest(const BitImage& mask) {
+  Tracing tracing;
+  const BitImage skeleton = thin(mask);
+  SkeletonGraph graph = build_graph(skeleton, mask, 200);
+  const double widest = largest_half_width(graph) + 0.5;
+
+  // Split ends: shorter than the diameter of the widest cable.
+  prune_short_ends(graph, 2 * widest);
+
+  Continuations links;
+  links.partner.assign(2 * graph.edges.size(), -1);
+  links.inside.assign(graph.edges.size(), 0);
+  const std::vector<Intersection> intersections = match_intersections(graph, 10 * widest, links.inside);
+  std::vector<int> intersection_of(2 * graph.edges.size(), -1);
+  std::vector<int> trimmed(2 * graph.edges.size(), 0);
+  for (std::size_t i = 0; i < intersections.size(); ++i) {
+    std::vector<Vector2> points;
+    for (const HalfEdge half : intersections[i].ends) {
+      intersection_of[static_cast<std::size_t>(half)] = static_cast<int>(i);
+      const SkeletonEdge& edge = graph.edges[static_cast<std::size_t>(edge_of(half))];
+      const int n = static_cast<int>(edge.points.size());
+      // New ends where the line has left the widened part of the mask.
+      const int trim = std::clamp(static_cast<int>(widest), 0, std::max(n / 2 - 1, 0));
+      trimmed[static_cast<std::size_t>(half)] = trim;
+      points.push_back(n == 0
+                           ? intersections[i].center
+                           : edge.points[static_cast<std::size_t>(end_of(half) == 0 ? trim : n - 1 - trim)].position());
+    }
+    pair_ends(points, intersections[i], links.partner);
+  }
+
+  for (const CablePath& path : collect_paths(graph, links)) {
+    std::vector<Vector2> rows;
+    Cable cable;
+    cable.closed = path.closed;
+    const auto add_segment = [&](const Vector2& to) {
+      const Vector2 from = rows.back();
+      const double width = cable.widths.back();
+      const int steps = static_cast<int>((to - from).norm());
+      for (int k = 1; k < steps; ++k) {
+        rows.push_back(from + static_cast<double>(k) / steps * (to - from));
+        cable.widths.push_back(width);
+        cable.hidden.push_back(1);
+      }
+    };
+    for (const HalfEdge entry : path.entries) {
+      const SkeletonEdge& edge = graph.edges[static_cast<std::size_t>(edge_of(entry))];
+      const int n = static_cast<int>(edge.points.size());
+      const int first = trimmed[static_cast<std::size_t>(entry)];
+      const int last = n - 1 - trimmed[static_cast<std::size_t>(opposite(entry))];
+      const int at = intersection_of[static_cast<std::size_t>(entry)];
+      for (int i = first; i <= last; ++i) {
+        const SkeletonPoint& point = edge.points[static_cast<std::size_t>(end_of(entry) == 0 ? i : n - 1 - i)];
+        if (i == first && !rows.empty()) {
+          if (at >= 0) {
+            add_segment(intersections[static_cast<std::size_t>(at)].center);
+            rows.push_back(intersections[static_cast<std::size_t>(at)].center);
+            cable.widths.push_back(cable.widths.back());
+            cable.hidden.push_back(1);
+          }
+          add_segment(point.position());
+        }
+        rows.push_back(point.position());
+        cable.widths.push_back(2 * point.half_width + 1);
+        cable.hidden.push_back(0);
+      }
+    }
+    if (rows.empty()) continue;
+    cable.centreline.resize(static_cast<Eigen::Index>(rows.size()), 2);
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      cable.centreline.row(static_cast<Eigen::Index>(i)) = rows[i].transpose();
+    }
+    tracing.cables.push_back(std::move(cable));
+  }
+
+  // Where two strands run over the same middle they cross.
+  for (const Intersection& intersection : intersections) {
+    std::vector<CableRow> visits;
+    for (std::size_t c = 0; c < tracing.cables.size(); ++c) {
+      const MatrixX2& line = tracing.cables[c].centreline;
+      for (Eigen::Index row = 0; row < line.rows(); ++row) {
+        if (line.row(row).transpose() == intersection.center)
+          visits.push_back({static_cast<int>(c), static_cast<int>(row)});
+      }
+    }
+    if (visits.size() == 2) tracing.crossings.push_back({intersection.center, visits[0], visits[1], 0});
+  }
+  return tracing;
+}
+
+void decide_order_mbest(const ColorImage& image, Tracing& tracing) {
+  const auto spread = [&](const CableRow& at) {
+    const Cable& cable = tracing.cables[static_cast<std::size_t>(at.cable)];
+    const int n = static_cast<int>(cable.centreline.rows());
+    int first = at.row;
+    int last = at.row;
+    while (first > 0 && cable.hidden[static_cast<std::size_t>(first - 1)]) --first;
+    while (last + 1 < n && cable.hidden[static_cast<std::size_t>(last + 1)]) ++last;
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    Eigen::Vector3d squares = Eigen::Vector3d::Zero();
+    for (int row = first; row <= last; ++row) {
+      const Vector2 center = cable.centreline.row(row).transpose();
+      Eigen::Vector3d color = Eigen::Vector3d::Zero();
+      for (int dy = -2; dy <= 2; ++dy) {
+        for (int dx = -2; dx <= 2; ++dx) color += image.sample(center + Vector2(dx, dy)).cast<double>() / 25;
+      }
+      sum += color;
+      squares += color.cwiseProduct(color);
+    }
+    const double count = last - first + 1;
+    return (squares / count - (sum / count).cwiseProduct(sum / count)).cwiseMax(0).cwiseSqrt().sum();
+  };
+  for (Crossing& crossing : tracing.crossings) {
+    const double a = spread(crossing.over);
+    const double b = spread(crossing.under);
+    if (b < a) std::swap(crossing.over, crossing.under);
+    crossing.confidence = a + b > 0 ? std::abs(a - b) / (a + b) : 0;
+  }
+}
+
+}  // namespace withe

@@ -1,0 +1,250 @@
+"""From pixels to metres."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+__all__ = ["Camera"]
+
+Array = NDArray[np.float64]
+
+
+def _checked(values: ArrayLike, shape: tuple[int | None, ...], name: str) -> Array:
+    array = np.asarray(values, dtype=float)
+    fits = array.ndim == len(shape) and all(n is None or n == m for n, m in zip(shape, array.shape, strict=True))
+    if not fits:
+        wanted = ", ".join("n" if n is None else str(n) for n in shape)
+        raise ValueError(f"{name} must have shape ({wanted}), got {array.shape}")
+    if not np.isfinite(array).all():
+        raise ValueError(f"{name} must be finite, got NaN or infinity")
+    return array
+
+
+class Camera:
+    """A pinhole camera with lens distortion (the model of OpenCV).
+
+    A point X of the world is seen at R X + t = (x, y, z) from the camera, z forwards; x/z and y/z are distorted and
+    multiplied by the matrix.
+
+    Parameters
+    ----------
+    matrix : array_like of shape (3, 3) [px]
+        Focal lengths and principal point.
+    distortion : array_like of shape (4,) or (5,), optional
+        k1, k2, p1, p2 and k3.
+    rotation : array_like of shape (3, 3), optional
+        R, from the world to the camera.
+    translation : array_like of shape (3,), optional [m]
+        t, where the camera sees the origin of the world.
+
+    Raises
+    ------
+    ValueError
+        A wrong shape, not finite, a singular matrix or a rotation that is none.
+    """
+
+    def __init__(
+        self,
+        matrix: ArrayLike,
+        distortion: ArrayLike | None = None,
+        rotation: ArrayLike | None = None,
+        translation: ArrayLike | None = None,
+    ) -> None:
+        self.matrix = _checked(matrix, (3, 3), "matrix")
+        if abs(np.linalg.det(self.matrix)) < 1e-12:
+            raise ValueError("matrix must be invertible, got a singular one")
+        coefficients = np.zeros(5)
+        if distortion is not None:
+            given = _checked(np.ravel(np.asarray(distortion, dtype=float)), (None,), "distortion")
+            if len(given) not in (4, 5):
+                raise ValueError(f"distortion must have 4 or 5 coefficients, got {len(given)}")
+            coefficients[: len(given)] = given
+        self.distortion = coefficients
+        self.rotation = np.eye(3) if rotation is None else _checked(rotation, (3, 3), "rotation")
+        if not np.allclose(self.rotation @ self.rotation.T, np.eye(3), atol=1e-6) or np.linalg.det(self.rotation) < 0:
+            raise ValueError("rotation must be a rotation matrix, got one that is not orthogonal or mirrors")
+        self.translation = np.zeros(3) if translation is None else _checked(translation, (3,), "translation")
+        self._pose = np.column_stack([self.rotation, self.translation])
+        self._flat = False
+
+    @classmethod
+    def from_points(
+        cls,
+        pixels: ArrayLike,
+        metres: ArrayLike,
+        matrix: ArrayLike | None = None,
+        distortion: ArrayLike | None = None,
+    ) -> Camera:
+        """Calibrate by points whose places are known.
+
+        Parameters
+        ----------
+        pixels : array_like of shape (n, 2) [px]
+        metres : array_like of shape (n, 2) or (n, 3) [m]
+            On the plane z = 0 (at least four points, no three on a line), or anywhere (at least six, not in one
+            plane).
+        matrix, distortion : optional
+            Of the camera, where they are known. Points on a plane alone tell nothing about other heights; with the
+            matrix they do.
+
+        Raises
+        ------
+        ValueError
+            Wrong shapes, too few points, or points that do not determine the camera.
+        """
+        seen = _checked(pixels, (None, 2), "pixels")
+        known = np.asarray(metres, dtype=float)
+        if known.ndim != 2 or known.shape[1] not in (2, 3) or len(known) != len(seen):
+            raise ValueError(f"metres must have shape ({len(seen)}, 2) or ({len(seen)}, 3), got {known.shape}")
+        known = _checked(known, (len(seen), known.shape[1]), "metres")
+        flat = known.shape[1] == 2 or bool((known[:, 2] == 0).all())
+        if flat:
+            known = known[:, :2]
+        needed = 4 if flat else 6
+        if len(seen) < needed:
+            raise ValueError(f"pixels must hold at least {needed} points, got {len(seen)}")
+        camera = cls(np.eye(3) if matrix is None else matrix, distortion if matrix is not None else None)
+        if matrix is None and distortion is not None:
+            raise ValueError("distortion needs the matrix as well, got None")
+        map_ = _direct_linear_transform(camera._normalised(seen), known)
+        if flat and matrix is None:
+            camera._pose = np.column_stack([map_[:, 0], map_[:, 1], np.full(3, np.nan), map_[:, 2]])
+            camera._flat = True
+        elif flat:
+            camera._set_pose(*_pose_of_plane(map_, known))
+        else:
+            camera._pose = map_
+            if matrix is not None:
+                scale = np.cbrt(np.linalg.det(map_[:, :3]))
+                u, _, v = np.linalg.svd(map_[:, :3] / scale)
+                camera._set_pose(u @ v, map_[:, 3] / scale)
+        return camera
+
+    def _set_pose(self, rotation: Array, translation: Array) -> None:
+        self.rotation, self.translation = rotation, translation
+        self._pose = np.column_stack([rotation, translation])
+
+    def project(self, points: ArrayLike) -> Array:
+        """Pixels of points of the world.
+
+        Parameters
+        ----------
+        points : array_like of shape (n, 3) [m]
+
+        Returns
+        -------
+        ndarray of shape (n, 2) [px]
+        """
+        world = _checked(points, (None, 3), "points")
+        if self._flat:
+            if world[:, 2].any():
+                raise ValueError("points must lie at height 0: the camera is calibrated on that plane only")
+            seen = world[:, :2] @ self._pose[:, :2].T + self._pose[:, 3]
+        else:
+            seen = world @ self._pose[:, :3].T + self._pose[:, 3]
+        distorted = self._distort(seen[:, :2] / seen[:, 2:])
+        return distorted @ self.matrix[:2, :2].T + self.matrix[:2, 2]
+
+    def to_plane(self, pixels: ArrayLike, height: ArrayLike = 0.0) -> Array:
+        """Points of the world where lines of sight meet a horizontal plane.
+
+        Parameters
+        ----------
+        pixels : array_like of shape (n, 2) [px]
+        height : float or array_like of shape (n,) [m]
+            z of the plane, for all or for each.
+
+        Returns
+        -------
+        ndarray of shape (n, 3) [m]
+
+        Raises
+        ------
+        ValueError
+            A line of sight that does not meet its plane in front of the camera, or a height other than 0 of a
+            camera that is calibrated on the plane only.
+        """
+        seen = self._normalised(_checked(pixels, (None, 2), "pixels"))
+        z = np.broadcast_to(np.asarray(height, dtype=float), (len(seen),))
+        if not np.isfinite(z).all():
+            raise ValueError("height must be finite, got NaN or infinity")
+        if self._flat and z.any():
+            raise ValueError("height must be 0: the camera is calibrated on that plane only; give its matrix as well")
+        lift = np.zeros((len(seen), 3)) if self._flat else z[:, None] * self._pose[:, 2]
+        # A x + B y + C = lambda (u, v, 1): three equations for x, y, lambda.
+        system = np.empty((len(seen), 3, 3))
+        system[:, :, 0], system[:, :, 1] = self._pose[:, 0], self._pose[:, 1]
+        system[:, :2, 2], system[:, 2, 2] = -seen, -1
+        constant = -(self._pose[:, 3] + lift)
+        if (np.abs(np.linalg.det(system)) < 1e-12 * np.linalg.norm(self._pose[:, 0]) ** 2).any():
+            raise ValueError("pixels must see the plane, got a line of sight parallel to it")
+        solution = np.linalg.solve(system, constant[..., None])[..., 0]
+        if not self._flat and (solution[:, 2] <= 0).any():
+            raise ValueError("pixels must see the plane in front of the camera, got some that look above it")
+        return np.column_stack([solution[:, :2], z])
+
+    def _normalised(self, pixels: Array) -> Array:
+        """Directions (x/z, y/z) of pixels, distortion removed by fixed-point iteration."""
+        distorted = (pixels - self.matrix[:2, 2]) @ np.linalg.inv(self.matrix[:2, :2]).T
+        if not self.distortion.any():
+            return distorted
+        ideal = distorted.copy()
+        for _ in range(50):
+            change = distorted - self._distort(ideal)
+            ideal += change
+            if np.abs(change).max(initial=0) < 1e-12:
+                break
+        return ideal
+
+    def _distort(self, ideal: Array) -> Array:
+        k1, k2, p1, p2, k3 = self.distortion
+        x, y = ideal.T
+        r2 = x * x + y * y
+        radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
+        return np.column_stack(
+            [
+                x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x),
+                y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y,
+            ]
+        )
+
+
+def _scaled(points: Array) -> tuple[Array, Array]:
+    """Points moved and scaled to the unit ball, homogeneous, and the matrix that does so."""
+    center = points.mean(axis=0)
+    size = np.sqrt(((points - center) ** 2).sum(axis=1).mean()) or 1.0
+    dimension = points.shape[1]
+    matrix = np.eye(dimension + 1) / size
+    matrix[:dimension, dimension] = -center / size
+    matrix[dimension, dimension] = 1
+    return np.column_stack([(points - center) / size, np.ones(len(points))]), matrix
+
+
+def _direct_linear_transform(seen: Array, known: Array) -> Array:
+    """The matrix that maps homogeneous known points to seen directions, least squares."""
+    left, left_scale = _scaled(seen)
+    right, right_scale = _scaled(known)
+    zero = np.zeros_like(right)
+    rows = np.vstack(
+        [
+            np.column_stack([right, zero, -left[:, :1] * right]),
+            np.column_stack([zero, right, -left[:, 1:2] * right]),
+        ]
+    )
+    _, values, vectors = np.linalg.svd(rows)
+    if len(values) < vectors.shape[0] - 1 or values[vectors.shape[0] - 2] < 1e-9 * values[0]:
+        raise ValueError("metres must determine the camera, got points on a line or in a plane")
+    scaled = vectors[-1].reshape(3, right.shape[1])
+    found: Array = np.linalg.inv(left_scale) @ scaled @ right_scale
+    sample = np.append(known[0], 1.0)
+    sign: float = np.sign(found[2] @ sample)
+    return found * sign
+
+
+def _pose_of_plane(map_: Array, known: Array) -> tuple[Array, Array]:
+    """Rotation and translation of a camera with known matrix from its map of the plane z = 0."""
+    scale = np.sqrt(np.linalg.norm(map_[:, 0]) * np.linalg.norm(map_[:, 1]))
+    first, second, translation = (map_ / scale).T
+    u, _, v = np.linalg.svd(np.column_stack([first, second, np.cross(first, second)]))
+    return u @ v, translation

@@ -1,0 +1,79 @@
+"""A picture with what was found in it."""
+
+from __future__ import annotations
+
+import colorsys
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from withe.extras import require
+from withe.perception.results import Tracing
+from withe.perception.tracing import check_image
+
+__all__ = ["draw"]
+
+_FRACTION_BITS = 4  # OpenCV draws between pixels when coordinates are scaled by a power of two
+
+
+def cable_colour(index: int) -> tuple[int, int, int]:
+    """A bright colour of its own for every cable, red, green, blue."""
+    red, green, blue = colorsys.hsv_to_rgb((0.58 + 0.618034 * index) % 1.0, 0.85, 1.0)
+    return round(255 * red), round(255 * green), round(255 * blue)
+
+
+def draw(image: ArrayLike, tracing: Tracing) -> NDArray[np.uint8]:
+    """Draw cables, their direction, crossings, joints and doubts over a picture.
+
+    Parameters
+    ----------
+    image : array_like of shape (height, width, 3)
+        Red, green, blue as uint8; grey and alpha will do.
+    tracing : Tracing
+
+    Returns
+    -------
+    ndarray of uint8, shape (height, width, 3)
+        A dot marks the first row of an open cable, a ring its last; at a crossing the upper cable is drawn last, with
+        a dark seam; squares are joints, triangles ambiguous places.
+
+    Raises
+    ------
+    ValueError
+        An image that is none.
+    """
+    cv2 = require("cv2", "vision")
+    picture = np.ascontiguousarray(check_image(image) // 2 + 20)
+
+    def fixed(points: NDArray[np.float64]) -> NDArray[np.int32]:
+        return np.round(np.atleast_2d(points) * (1 << _FRACTION_BITS)).astype(np.int32)
+
+    def line(points: NDArray[np.float64], closed: bool, colour: tuple[int, int, int], thickness: int) -> None:
+        cv2.polylines(picture, [fixed(points)[:, None]], closed, colour, thickness, cv2.LINE_AA, _FRACTION_BITS)
+
+    for index, (points, closed) in enumerate(zip(tracing.centrelines, tracing.closed, strict=True)):
+        line(points, closed, cable_colour(index), 2)
+    for crossing in tracing.crossings:
+        cable, row = crossing.over
+        points = tracing.centrelines[cable]
+        reach = max(3, int(tracing.widths[cable][row]))
+        rows = np.arange(row - reach, row + reach + 1)
+        if tracing.closed[cable]:
+            rows %= len(points)
+        else:
+            rows = rows[(rows >= 0) & (rows < len(points))]
+        line(points[rows], False, (0, 0, 0), 5)
+        line(points[rows], False, cable_colour(cable), 3)
+    for index, (points, closed) in enumerate(zip(tracing.centrelines, tracing.closed, strict=True)):
+        if closed:
+            continue
+        for point, filled in ((points[0], -1), (points[-1], 2)):
+            center = tuple(int(v) for v in fixed(point)[0])
+            cv2.circle(picture, center, 5 << _FRACTION_BITS, cable_colour(index), filled, cv2.LINE_AA, _FRACTION_BITS)
+    for joint in tracing.joints:
+        x, y = (int(v) for v in np.round(joint.point))
+        cv2.rectangle(picture, (x - 6, y - 6), (x + 6, y + 6), (255, 255, 255), 1)
+    for doubt in tracing.ambiguous:
+        corners = doubt.point + 10 * np.array([[0.0, -1.0], [0.87, 0.5], [-0.87, 0.5]])
+        line(corners, True, (255, 255, 0), 1)
+    return picture

@@ -1,0 +1,177 @@
+"""Which pixels belong to cables: by colour, by contrast with the border, or by a network."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from withe import _core
+from withe.extras import require
+
+__all__ = ["MaskFunction", "border_filter", "color_filter", "network_mask"]
+
+Image = NDArray[np.uint8]
+MaskFunction = Callable[[Image], Any]
+Range = tuple[Sequence[int], Sequence[int]]
+
+_HIGHEST = (180, 255, 255)
+
+
+def border_filter(image: Image, contrast: int = 25) -> NDArray[np.bool_]:
+    """Pixels that differ from the median colour of the image's border: the filter where none is given.
+
+    The threshold on the largest difference of a channel is that which separates two classes best (Otsu), on
+    square roots, so that dark cables are not lost among bright ones.
+
+    Parameters
+    ----------
+    image : ndarray of uint8, shape (height, width, 3)
+        Red, green, blue.
+    contrast : int
+        Nothing is found where the two classes differ by less [grey levels].
+
+    Returns
+    -------
+    ndarray of bool, shape (height, width)
+    """
+    mask: NDArray[np.bool_] = _core.foreground_mask(image, contrast).view(np.bool_)
+    return mask
+
+
+def color_filter(ranges: Sequence[Range], clean: bool = True) -> MaskFunction:
+    """A filter that takes the pixels whose colour lies in one of several ranges.
+
+    Parameters
+    ----------
+    ranges : sequence of (lowest, highest)
+        Hue 0 to 180 (half degrees), saturation and value 0 to 255, all inclusive, as OpenCV counts them. Where the
+        lowest hue exceeds the highest, the range goes over red.
+    clean : bool
+        Close, then open, the mask by a square of 3 x 3 pixels.
+
+    Returns
+    -------
+    callable
+        From an image of shape (height, width, 3), uint8 RGB, to a mask; give it to `trace` as `mask`.
+
+    Raises
+    ------
+    ValueError
+        No range, or bounds that are no three numbers in their limits.
+
+    Examples
+    --------
+    >>> reds = color_filter([((170, 60, 60), (10, 255, 255))])
+    >>> bool(reds(np.full((1, 1, 3), (200, 30, 30), np.uint8))[0, 0])
+    True
+    """
+    checked: list[tuple[list[int], list[int]]] = []
+    if len(ranges) == 0:
+        raise ValueError("ranges must hold at least one pair of colours, got none")
+    for index, pair in enumerate(ranges):
+        bounds = np.asarray(pair, dtype=object)
+        if bounds.shape != (2, 3):
+            raise ValueError(f"ranges[{index}] must be a pair of (hue, saturation, value), got {pair!r}")
+        values = np.asarray(pair, dtype=float)
+        if not ((values >= 0) & (values <= _HIGHEST)).all() or (values != np.round(values)).any():
+            raise ValueError(f"ranges[{index}] must hold integers from 0 to (180, 255, 255), got {pair!r}")
+        low, high = values.astype(int).tolist()
+        if (values[0, 1:] > values[1, 1:]).any():
+            raise ValueError(f"ranges[{index}] must go from the lowest to the highest, got {pair!r}")
+        if low[0] > high[0]:
+            checked += [(low, [180, *high[1:]]), ([0, *low[1:]], high)]
+        else:
+            checked.append((low, high))
+
+    def apply(image: Image) -> NDArray[np.bool_]:
+        mask = _core.hsv_mask(image, checked)
+        result: NDArray[np.bool_] = (_core.close_and_open(mask) if clean else mask).view(np.bool_)
+        return result
+
+    return apply
+
+
+def network_mask(model: Any, threshold: float = 0.5, size: tuple[int, int] | None = None) -> MaskFunction:
+    """A filter that asks a segmentation network.
+
+    Parameters
+    ----------
+    model : str, Path, or torch.nn.Module
+        An ONNX file (run by OpenCV), a TorchScript file (.pt), or a module. It takes one image of shape
+        (1, 3, height, width), RGB from 0 to 1, and gives one value a pixel, shape (1, 1, height, width) or without
+        leading ones; of more than one channel the last counts.
+    threshold : float
+        Pixels above it belong to cables.
+    size : (int, int), optional
+        Height and width that the network wants; the image is resized to it and the answer back.
+
+    Raises
+    ------
+    ValueError
+        A file that cannot be read, or (when used) an answer of another shape.
+    ImportError
+        OpenCV or torch is not installed.
+    """
+    run = _onnx_runner(Path(model)) if _is_onnx(model) else _torch_runner(model)
+
+    def apply(image: Image) -> NDArray[np.bool_]:
+        given = image.shape[:2]
+        if size is not None:
+            image = require("cv2", "vision").resize(image, (size[1], size[0]))
+        blob = np.ascontiguousarray(image.transpose(2, 0, 1)[None], dtype=np.float32) / np.float32(255)
+        answer = np.asarray(run(blob), dtype=np.float32)
+        answer = answer.reshape(answer.shape[-3:]) if answer.ndim > 3 else answer
+        score = answer[-1] if answer.ndim == 3 else answer
+        if score.shape != image.shape[:2]:
+            raise ValueError(f"model must answer with one value a pixel, {image.shape[:2]}, got {score.shape}")
+        if score.shape != given:
+            score = require("cv2", "vision").resize(score, (given[1], given[0]))
+        mask: NDArray[np.bool_] = score > threshold
+        return mask
+
+    return apply
+
+
+def _is_onnx(model: Any) -> bool:
+    if isinstance(model, str | Path):
+        if not Path(model).is_file():
+            raise ValueError(f"model must be a file or a torch module, got {str(model)!r}, which is no file")
+        return Path(model).suffix.lower() == ".onnx"
+    if not callable(model):
+        raise ValueError(f"model must be a file or a torch module, got {type(model).__name__}")
+    return False
+
+
+def _onnx_runner(path: Path) -> Callable[[NDArray[np.float32]], Any]:
+    cv2 = require("cv2", "vision")
+    try:
+        network = cv2.dnn.readNetFromONNX(str(path))
+    except cv2.error as error:
+        raise ValueError(f"model must be an ONNX file that OpenCV can read, got {str(path)!r}: {error}") from error
+
+    def run(blob: NDArray[np.float32]) -> Any:
+        network.setInput(blob)
+        return network.forward()
+
+    return run
+
+
+def _torch_runner(model: Any) -> Callable[[NDArray[np.float32]], Any]:
+    torch = require("torch", "learn")
+    if isinstance(model, str | Path):
+        try:
+            model = torch.jit.load(str(model), map_location="cpu")
+        except RuntimeError as error:
+            raise ValueError(f"model must be an ONNX or TorchScript file, got {str(model)!r}: {error}") from error
+    if hasattr(model, "eval"):
+        model.eval()
+
+    def run(blob: NDArray[np.float32]) -> Any:
+        with torch.no_grad():
+            return model(torch.from_numpy(blob)).cpu().numpy()
+
+    return run
