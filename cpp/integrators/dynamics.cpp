@@ -136,7 +136,9 @@ StepResult verlet_step(Equations& equations, const Parameters& parameters, doubl
   // in at first order, with nothing to cancel it.
   State next = state;
   accept_configuration(model, q1, after, next);
-  next.acceleration = explicit_acceleration(equations, parameters, dt, next, next.q, half, from, work);
+  // Drag, viscosity and the spin couple want the velocity at the end; a predicted one is second order.
+  const VectorX arriving = half + 0.5 * dt * state.acceleration;
+  next.acceleration = explicit_acceleration(equations, parameters, dt, next, next.q, arriving, from, work);
   next.acceleration_current = true;
   next.v = half + 0.5 * dt * next.acceleration;
   if (!next.v.allFinite()) return result;

@@ -16,6 +16,10 @@ Newton::Newton(const Model& model, const Options& options) : model_(model), opti
   is_angle_.assign(static_cast<std::size_t>(model.dof_count), true);
   for (int dof : model.node_dof)
     for (int i = 0; i < model.dimension; ++i) is_angle_[static_cast<std::size_t>(dof + i)] = false;
+  for (int dof : model.node_dof) blocks_.push_back({dof, model.dimension, false});
+  for (int dof : model.frame_dof) blocks_.push_back({dof, model.frame_size(), true});
+  for (int dof : model.edge_dof) blocks_.push_back({dof, 1, true});
+  for (const Hinge& hinge : model.hinges) blocks_.push_back({hinge.dof, 1, true});
   edge_scale_ = model.edge_length.minCoeff();
 }
 
@@ -46,9 +50,10 @@ Balance Newton::balance(const Evaluation& e, NewtonResult& result) const {
 
 double Newton::cap(const VectorX& step) const {
   double move = 0.0, turn = 0.0;
-  for (Eigen::Index i = 0; i < step.size(); ++i)
-    (is_angle_[static_cast<std::size_t>(i)] ? turn : move) =
-        std::max(is_angle_[static_cast<std::size_t>(i)] ? turn : move, std::abs(step(i)));
+  for (const Block& block : blocks_) {
+    double& greatest = block.angle ? turn : move;
+    greatest = std::max(greatest, step.segment(block.first, block.size).norm());
+  }
   // An edge may turn by about half a radian at once.
   double edge_turn = 0.0;
   for (int e = 0; e < model_.edge_count; ++e) {
@@ -68,8 +73,8 @@ double Newton::cap(const VectorX& step) const {
 
 double Newton::displacement(const VectorX& step) const {
   double move = 0.0;
-  for (Eigen::Index i = 0; i < step.size(); ++i)
-    move = std::max(move, std::abs(step(i)) * (is_angle_[static_cast<std::size_t>(i)] ? edge_scale_ : 1.0));
+  for (const Block& block : blocks_)
+    move = std::max(move, step.segment(block.first, block.size).norm() * (block.angle ? edge_scale_ : 1.0));
   return move;
 }
 

@@ -54,7 +54,13 @@ class Newton {
 
   const Model& model_;
   Options options_;
+  /// Unknowns that are one vector: a node's position, a frame's rotation, an angle.
+  struct Block {
+    int first, size;
+    bool angle;
+  };
   std::vector<bool> is_angle_;
+  std::vector<Block> blocks_;
   double edge_scale_ = 1.0;
 };
 
