@@ -42,6 +42,8 @@ class Control:
     _directory: Directory
     _settings: Settings
     _world: _core.World
+    _loads: list[LoadPart]
+    _custom_forces: list[CustomForcePart]
 
     # Natural shape
 
@@ -203,11 +205,16 @@ class Control:
             curvature = curvature_array(values["natural_curvature"], part.voronoi, False, part.owner)
         if "natural_twist" in values:
             twist = twist_array(values["natural_twist"], part.voronoi, part.owner)
-        self._apply_parameters(part.index, parameters)
-        if curvature is not None:
-            self._world.set_natural_curvature(part.index, curvature, 0.0)
-        if twist is not None:
-            self._world.set_natural_twist(part.index, twist, 0.0)
+        before = self._world.snapshot()
+        try:
+            if curvature is not None:
+                self._world.set_natural_curvature(part.index, curvature, 0.0)
+            if twist is not None:
+                self._world.set_natural_twist(part.index, twist, 0.0)
+            self._apply_parameters(part.index, parameters)
+        except ValueError:  # out of the plane of a simulation that is to stay in it
+            self._world.restore(before)
+            raise
 
     def _apply_parameters(self, rod: int, parameters: RodParameters) -> None:
         if parameters is not self._settings.rods[rod]:
@@ -224,7 +231,7 @@ class Control:
         self._settings.drags = drags
 
     def _load_index(self, part: LoadPart) -> int:
-        return self._directory.all(LoadPart).index(part)
+        return self._loads.index(part)
 
     def _set_load(self, part: LoadPart, value: Any) -> None:
         what = f"{part.kind} {part.name!r}"
@@ -294,7 +301,6 @@ class Control:
         check_not_held(self._directory, part, (other for _, other in self._settings.supports.values()))
         index = self._world.add_support(describe_support(part))
         self._settings.supports[part.name] = index, part
-        self._settings.added_supports = index + 1
         self._directory.parts[part.name] = part
         return cast(Support, handle_of(part, self._directory.scene_id, self._directory.layout))
 
@@ -437,14 +443,14 @@ class Control:
         """What to call before every inner step, if anything."""
         now = self._world.time
         moving = any(not _finished(path, now) for path in self._settings.paths.values())
-        if moving or self._settings.functions or self._directory.all(CustomForcePart):
+        if moving or self._settings.functions or self._custom_forces:
             return self._apply_functions
         return None
 
     def _apply_functions(self, force_time: float, end_time: float) -> None:
         """Evaluate loads, paths and custom forces for the coming inner step."""
         if self._settings.functions:
-            for index, part in enumerate(self._directory.all(LoadPart)):
+            for index, part in enumerate(self._loads):
                 function = self._settings.functions.get(part.name)
                 if function is not None:
                     what = f"{part.kind} {part.name!r} at t = {force_time:g}"
@@ -457,11 +463,10 @@ class Control:
             owner = f"support {name!r}"
             position, rotation = evaluate_path(path, end_time, present, support.kind != "pin", owner)
             self._world.prescribe_support(index, position, rotation)
-        forces = self._directory.all(CustomForcePart)
-        if forces:
+        if self._custom_forces:
             positions, velocities = self._world.positions(), self._world.velocities()
             total = np.zeros_like(positions)
-            for force in forces:
+            for force in self._custom_forces:
                 value = force.function(self._world.time, positions.copy(), velocities.copy())
                 total += validation.number_array(value, f"custom force {force.name!r}", total.shape)
             self._world.set_custom_force(total)
@@ -469,7 +474,10 @@ class Control:
 
 def _finished(path: Path, time: float) -> bool:
     """Whether a path has come to its end, and was followed there."""
-    return isinstance(path, Turn) and time >= path.times[1] and path.times[1] > path.times[0]
+    if not isinstance(path, Turn):
+        return False
+    begin, end = path.times
+    return bool(time > end or (time == end and begin < end))
 
 
 def _only(values: dict[str, Any], words: tuple[str, ...], owner: str) -> None:

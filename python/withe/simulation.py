@@ -17,7 +17,7 @@ from withe.description import describe, parameters_of
 from withe.directory import Directory
 from withe.errors import ConvergenceError
 from withe.handles import NodeHandle, Rod, Support
-from withe.parts import DragPart, LoadPart, MassPart, SupportPart
+from withe.parts import CustomForcePart, DragPart, LoadPart, MassPart, SupportPart
 from withe.readouts import Energy, Equilibrium, Linearisation, Plan, Reaction, Statistics
 from withe.snapshots import Settings, Snapshot
 
@@ -63,6 +63,8 @@ class Simulation(Control):
         self._scene_gravity = gravity
         self._options = options
         self._directory = directory.copy()
+        self._loads = directory.all(LoadPart)
+        self._custom_forces = directory.all(CustomForcePart)
         description = describe(directory, gravity)
         supports = {part.name: (index, part) for index, part in enumerate(directory.all(SupportPart))}
         self._settings = Settings(
@@ -71,7 +73,6 @@ class Simulation(Control):
             drags={part.name: part.coefficient for part in directory.all(DragPart)},
             gravity=gravity.copy(),
             supports=supports,
-            added_supports=len(supports),
             functions={part.name: part.function for part in directory.all(LoadPart) if part.function is not None},
         )
         self._world = _core.World(description, _engine_options(options))

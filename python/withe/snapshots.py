@@ -35,8 +35,6 @@ class Settings:
     gravity : ndarray of shape (3,) [m/s^2]
     supports : dict of str to (int, SupportPart)
         Those that hold, with their index in the engine.
-    added_supports : int
-        How many supports the engine has had.
     functions : dict of str to callable
         Loads that vary, by name.
     paths : dict of str to callable
@@ -48,7 +46,6 @@ class Settings:
     drags: dict[str, float]
     gravity: FloatArray
     supports: dict[str, tuple[int, SupportPart]]
-    added_supports: int
     functions: dict[str, Callable[[float], npt.ArrayLike]] = field(default_factory=dict)
     paths: dict[str, Path] = field(default_factory=dict)
 
@@ -60,7 +57,6 @@ class Settings:
             dict(self.drags),
             self.gravity.copy(),
             dict(self.supports),
-            self.added_supports,
             dict(self.functions),
             dict(self.paths),
         )
@@ -140,7 +136,6 @@ class Snapshot:
             "masses": settings.masses,
             "drags": settings.drags,
             "supports": supports,
-            "added_supports": settings.added_supports,
             "functions": self._function_names(),
         }
         return io.save_arrays(path, "snapshot", _FILE_VERSION, header, arrays)
@@ -199,7 +194,6 @@ class Snapshot:
             drags={str(name): validation.non_negative(drag, name) for name, drag in header["drags"].items()},
             gravity=validation.vector(arrays["gravity"], "gravity"),
             supports=supports,
-            added_supports=validation.integer(header["added_supports"], "added_supports", 0, 10_000_000),
             paths=paths,
         )
         missing = tuple(str(name) for name in header["functions"])

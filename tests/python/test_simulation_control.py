@@ -167,6 +167,11 @@ def test_a_refused_set_changes_nothing():
         simulation.set(arm, youngs_modulus=2e6, natural_twist="left")
     assert simulation.get(arm, "youngs_modulus") == 1e6
     assert simulation.snapshot() == before
+    _, arm, simulation = cantilever(planar=True)
+    before = simulation.snapshot()
+    with pytest.raises(ValueError, match="leaves the plane"):
+        simulation.set(arm, natural_curvature=(0.0, 1.0), natural_twist=1.0, density=10.0)
+    assert simulation.snapshot() == before
 
 
 def test_viscosity_and_drag_dissipate():
