@@ -88,6 +88,7 @@ demo: $(STAMPS)/installed
 	@python examples/cantilever.py
 
 view: $(STAMPS)/installed $(STAMPS)/view_tools
+	@python tools/check_view.py
 
 test: ctest pytest
 
