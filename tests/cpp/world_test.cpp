@@ -168,7 +168,7 @@ TEST(Supports, CanBeAddedReleasedAndAddedAgain) {
     World world(scene, options(Integrator::implicit_midpoint));
     world.step(10);
     const MatrixX3 before = world.positions();
-    const int pin = world.add_support({SupportKind::pin, {0, 11}, Matrix3::Zero(), false});
+    const int pin = world.add_support({SupportKind::pin, {0, 11}, Matrix3::Zero()});
     EXPECT_EQ(pin, 1);
     EXPECT_TRUE(testing::same_bits(before, world.positions()));
     world.step(10);
@@ -179,7 +179,7 @@ TEST(Supports, CanBeAddedReleasedAndAddedAgain) {
     EXPECT_THROW(world.reaction(pin), std::invalid_argument);
     EXPECT_THROW(world.remove_support(pin), std::invalid_argument);
     EXPECT_THROW(world.move_support(pin, Vector3::Zero(), Matrix3::Identity(), 0.0), std::invalid_argument);
-    const int again = world.add_support({SupportKind::clamp, {0, 11}, Matrix3::Zero(), false});
+    const int again = world.add_support({SupportKind::clamp, {0, 11}, Matrix3::Zero()});
     EXPECT_EQ(again, 2);
     const Vector3 held = world.positions().row(11);
     world.step(5);
@@ -193,7 +193,7 @@ TEST(Supports, AddedToARodAtRestExertNothing) {
       World world(scene, options(Integrator::statics));
       world.equilibrium();
       const MatrixX3 before = world.positions();
-      const int added = world.add_support({kind, {0, 11}, Matrix3::Zero(), false});
+      const int added = world.add_support({kind, {0, 11}, Matrix3::Zero()});
       world.equilibrium();
       // A held edge is held at its drawn length, from which its own weight hardly stretches it.
       const double size = kind == SupportKind::hold_edge ? 1e-3 : 1e-7;
@@ -206,7 +206,7 @@ TEST(Supports, OfANodeThatIsHeldAreRefusedAndNothingChanges) {
   World world(testing::hanging_arm().scene, Options{});
   world.step(3);
   const World before(world);
-  EXPECT_THROW(world.add_support({SupportKind::pin, {0, 0}, Matrix3::Zero(), false}), std::invalid_argument);
+  EXPECT_THROW(world.add_support({SupportKind::pin, {0, 0}, Matrix3::Zero()}), std::invalid_argument);
   EXPECT_TRUE(same_state(world, before));
   world.step(2);
 }
@@ -240,7 +240,7 @@ TEST(Supports, LeaveTwoFramesOfOneNodeAsTheyAre) {
   World world(builder.scene, options(Integrator::implicit_midpoint));
   world.step(20);
   const Energy before = world.energy();
-  world.add_support({SupportKind::pin, {1, 4}, Matrix3::Zero(), false});
+  world.add_support({SupportKind::pin, {1, 4}, Matrix3::Zero()});
   const Energy after = world.energy();
   EXPECT_NEAR(after.bend, before.bend, 1e-12 * before.bend);
   EXPECT_NEAR(after.twist, before.twist, 1e-12 * before.bend);
@@ -271,8 +271,7 @@ TEST(Plane, IsNotLeftWhereTheUserAskedForIt) {
   EXPECT_THROW(world.set_gravity(Vector3(0, 2.0, -9.81)), std::invalid_argument);
   EXPECT_THROW(world.move_support(0, Vector3(0, 0.1, 0), Matrix3::Identity(), 0.0), std::invalid_argument);
   const Vector3 tilted = Vector3(0, 1, 1).normalized();
-  EXPECT_THROW(world.add_support({SupportKind::pin, {0, 11}, tilted * tilted.transpose(), false}),
-               std::invalid_argument);
+  EXPECT_THROW(world.add_support({SupportKind::pin, {0, 11}, tilted * tilted.transpose()}), std::invalid_argument);
   EXPECT_TRUE(same_state(world, before));
 }
 
