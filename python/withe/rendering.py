@@ -430,7 +430,7 @@ def _advice(output: str) -> str:
     ):
         if f"{library}" in output and "ImportError" in output:
             return message + f"{library} is missing; install it with: apt install {package}"
-    return message + "no working EGL library was found; install it with: apt install libegl1"
+    return message + "no working EGL library was found; install it with: apt install libegl1 libgl1-mesa-dri"
 
 
 @contextlib.contextmanager
