@@ -145,7 +145,8 @@ StepResult verlet_step(Equations& equations, const Parameters& parameters, doubl
   result.change = q1 - q0;
   book_work(equations, parameters, result);
   if (!model.constraints.empty())
-    book_supports(equations, VectorX::Zero(model.dof_count), state.v, next.v, dt, work.evaluation.full_residual, result);
+    book_supports(equations, VectorX::Zero(model.dof_count), state.v, next.v, dt, work.evaluation.full_residual,
+                  result);
   next.time += dt;
   state = std::move(next);
   result.newton.converged = true;

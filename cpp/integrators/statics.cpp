@@ -64,7 +64,8 @@ class Statics {
     Loads& loads = equations_.loads();
     for (const LoadPiece& piece : loads.pieces)
       if (piece.shape != LoadShape::dead_node)
-        loads.values[static_cast<std::size_t>(piece.load)] = fraction * full_loads_[static_cast<std::size_t>(piece.load)];
+        loads.values[static_cast<std::size_t>(piece.load)] =
+            fraction * full_loads_[static_cast<std::size_t>(piece.load)];
   }
 
   bool load_steps(const Boundary& boundary, const State& start, NewtonResult& last) {
@@ -168,7 +169,8 @@ class Statics {
         damping = 1e-6 * stiffness;
         lowest_ = 1e-12 * stiffness;
       }
-      if ((balance.floor || (balance.either && damping <= lowest_ * 1e2)) || (k % 10 == 9 && damping <= lowest_ * 1e4)) {
+      if ((balance.floor || (balance.either && damping <= lowest_ * 1e2)) ||
+          (k % 10 == 9 && damping <= lowest_ * 1e4)) {
         // Near a minimum full Newton steps finish the work, if they stay near.
         z = state_.q;
         const double energy = here.potential;

@@ -17,8 +17,10 @@ class Writer {
 
   void raw(const void* data, std::size_t size) { bytes.append(static_cast<const char*>(data), size); }
   template <class Number>
-  requires std::is_arithmetic_v<Number>
-  void operator()(const Number& number) { raw(&number, sizeof number); }
+    requires std::is_arithmetic_v<Number>
+  void operator()(const Number& number) {
+    raw(&number, sizeof number);
+  }
   template <class Derived>
   void operator()(const Eigen::PlainObjectBase<Derived>& m) {
     (*this)(static_cast<std::int64_t>(m.rows()));
@@ -37,8 +39,10 @@ class Reader {
     position_ += size;
   }
   template <class Number>
-  requires std::is_arithmetic_v<Number>
-  void operator()(Number& number) { raw(&number, sizeof number); }
+    requires std::is_arithmetic_v<Number>
+  void operator()(Number& number) {
+    raw(&number, sizeof number);
+  }
   void operator()(bool& flag) {
     unsigned char byte = 0;
     raw(&byte, sizeof byte);

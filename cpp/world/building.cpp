@@ -84,7 +84,6 @@ World::Implementation::Implementation(const Implementation& other)
       spatial(other.spatial),
       level(other.level),
       easy_steps(other.easy_steps),
-      patience(other.patience),
       guard(other.guard),
       support_work(other.support_work),
       actuation_work(other.actuation_work),
@@ -121,6 +120,7 @@ void World::Implementation::rebuild(Rebuild why) {
   for (std::size_t k = 0; k < index.size(); ++k) all[index[k]] = fresh.supports[k];
   fresh.supports = all;
   static_equations.reset();
+  rescue_equations.reset();
   if (why == Rebuild::first) {
     model = std::move(fresh);
     parameters = initial_parameters(model);

@@ -32,6 +32,7 @@ struct EnergyGuard {
   double scale = 0;      ///< [J]
   double excess = 0;     ///< out of nowhere so far [J]
   double step_gain = 0;  ///< in the last step [J]
+  int rescue = 0;        ///< energy-momentum steps still to take in its place
 };
 
 /// Why a model is built: at first, because supports changed or the plane was left, or to take a snapshot's state.
@@ -47,6 +48,7 @@ struct World::Implementation {
   Parameters parameters;
   std::unique_ptr<Newton> newton;
   std::unique_ptr<Equations> equations;
+  std::unique_ptr<Equations> rescue_equations;  ///< energy-momentum ones, made when plain midpoint gains energy
   std::unique_ptr<Equations> static_equations;  ///< symmetric ones, made when first needed
   NewtonWorkspace work;
   State state;
@@ -61,7 +63,6 @@ struct World::Implementation {
   bool spatial = false;  ///< left its plane while running
   int level = 0;         ///< present halvings of the time step
   int easy_steps = 0;
-  int patience = 4;  ///< easy steps before a longer one is tried
   EnergyGuard guard;
   double support_work = 0, actuation_work = 0, dissipated = 0, load_work = 0;
   std::optional<Energy> alarm;  ///< energies at the start, for the explicit scheme's alarm
@@ -87,6 +88,7 @@ struct World::Implementation {
   [[noreturn]] void fail(const NewtonResult& newton, double dt, const std::string& what) const;
   EquilibriumResult equilibrium(double dt);
   Equations& statics();
+  Equations& rescue();
   void update_custom_force(Equations& target) const;
   void refresh_reactions();
   Energy energy() const;

@@ -58,7 +58,7 @@ void exchange(Archive& io, Self& self) {
   for (auto* x : {&self.support_work, &self.actuation_work, &self.dissipated, &self.load_work}) io(*x);
   io(self.level);
   io(self.easy_steps);
-  io(self.patience);
+  io(self.guard.rescue);
   for (auto* x : {&self.guard.turn, &self.guard.scale, &self.guard.excess}) io(*x);
   for (auto& m : self.motions) {
     io(m.position);
@@ -181,7 +181,7 @@ void World::restore(const std::string& bytes) {
   exchange(r, *fresh);
   r.expect_end();
   require(fresh->level >= 0 && fresh->level <= fresh->options.max_halvings && fresh->easy_steps >= 0 &&
-              fresh->easy_steps < 1 << 20 && fresh->patience > 0,
+              fresh->easy_steps < 1 << 20 && fresh->guard.rescue >= 0 && fresh->guard.rescue <= 256,
           "snapshot is damaged: impossible step size");
   require(fresh->state.q.allFinite() && fresh->state.v.allFinite(), "snapshot is damaged: not finite");
   update_derived(fresh->model, fresh->parameters);

@@ -147,9 +147,13 @@ void World::Implementation::inner_step(double dt, bool& accepted, double& error)
   }
   std::vector<SupportMotion> kept = motions;
   const HeldTarget held = held_target(end);
-  update_custom_force(*equations);
-  const StepResult r = explicit_scheme ? verlet_step(*equations, parameters, dt, held, state, work)
-                                       : implicit_step(*equations, *newton, options, parameters, dt, held, state, work);
+  const bool rescued = guard.rescue > 0;
+  Equations& system = rescued ? rescue() : *equations;
+  Options choice = options;
+  if (rescued) choice.integrator = Integrator::energy_momentum;
+  update_custom_force(system);
+  const StepResult r = explicit_scheme ? verlet_step(system, parameters, dt, held, state, work)
+                                       : implicit_step(system, *newton, choice, parameters, dt, held, state, work);
   accepted = r.accepted;
   error = r.error;
   last_newton = r.newton;
@@ -163,6 +167,10 @@ void World::Implementation::inner_step(double dt, bool& accepted, double& error)
   statistics.steps += 1;
   statistics.largest_turn = std::max(statistics.largest_turn, r.largest_turn);
   guard.turn = r.largest_turn;
+  if (rescued) {
+    --guard.rescue;
+    statistics.energy_momentum_steps += 1;
+  }
   load_work += r.load_work;
   dissipated += r.dissipated;
   support_work += r.support_work;
@@ -206,7 +214,7 @@ void World::Implementation::advance(double duration) {
     const State backup = options.tolerance || guarded ? state : State{};
     const std::vector<NaturalRamp> ramps_before = options.tolerance || guarded ? ramps : std::vector<NaturalRamp>{};
     // Where edges hardly turn, there is nothing to gain and nothing to look at.
-    const bool watched = guarded && guard.turn > 0.01;
+    const bool watched = guarded && guard.turn > 0.01 && guard.rescue == 0;
     const Energy then = watched ? energy() : Energy{};
     guard.step_gain = 0.0;
     bool accepted = false;
@@ -222,11 +230,14 @@ void World::Implementation::advance(double duration) {
     const bool may_halve = (options.adaptive || options.tolerance) && level < options.max_halvings &&
                            options.integrator != Integrator::verlet;
     if (accepted && watched && gains_energy(then)) {
-      too_coarse = true;
-      patience = 64;
+      // The same step again, and a while of them, without the flaw.
+      state = backup;
+      std::tie(support_work, actuation_work, dissipated, load_work) = books;
+      statistics.steps -= 1;
+      statistics.rejected_steps += 1;
+      guard.rescue = 256;
+      continue;
     }
-    if (accepted && too_coarse && watched && !may_halve)
-      fail(last_newton, dt, "the midpoint rule gains energy at this step: use integrator='energy_momentum'");
     if (accepted && too_coarse && may_halve) {
       state = backup;
       std::tie(support_work, actuation_work, dissipated, load_work) = books;
@@ -250,10 +261,9 @@ void World::Implementation::advance(double duration) {
     state.time = position == units ? base + duration
                                    : base + duration * static_cast<double>(position) / static_cast<double>(units);
     guard.excess += guard.step_gain;
-    if (very_fine && ++easy_steps >= patience && level > 0) {
+    if (very_fine && ++easy_steps >= 4 && level > 0) {
       --level;
       easy_steps = 0;
-      patience = 4;
     }
     if (!very_fine) easy_steps = 0;
   }
@@ -317,6 +327,17 @@ Equations& World::Implementation::statics() {
   }
   static_equations->loads().values = load_values;
   return *static_equations;
+}
+
+/// Energy-momentum steps, which take over where plain midpoint gains energy.
+Equations& World::Implementation::rescue() {
+  if (!rescue_equations) {
+    Options conserving = options;
+    conserving.integrator = Integrator::energy_momentum;
+    rescue_equations = std::make_unique<Equations>(model, conserving);
+  }
+  rescue_equations->loads().values = load_values;
+  return *rescue_equations;
 }
 
 /// Equilibrium after `dt` (0: at the present time, with supports and actuation as they are).

@@ -254,8 +254,7 @@ int World::add_support(const SupportDescription& support) {
       const Vector3& n = self.model.plane->normal;
       const Vector3 image = support.free * n;
       if ((image - n * n.dot(image)).norm() > 1e-9) {
-        require(!self.options.planar.value_or(false),
-                "a support that slides out of the plane needs planar=False");
+        require(!self.options.planar.value_or(false), "a support that slides out of the plane needs planar=False");
         self.spatial = true;
       }
     }

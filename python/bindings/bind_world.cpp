@@ -30,6 +30,7 @@ void register_results(py::module_& module) {
       .def_readonly("iterations", &Statistics::iterations)
       .def_readonly("factorizations", &Statistics::factorizations)
       .def_readonly("largest_turn", &Statistics::largest_turn)
+      .def_readonly("energy_momentum_steps", &Statistics::energy_momentum_steps)
       .def_readonly("assembly_time", &Statistics::assembly_time)
       .def_readonly("solve_time", &Statistics::solve_time)
       .def_readonly("total_time", &Statistics::total_time);

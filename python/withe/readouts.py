@@ -87,6 +87,8 @@ class Statistics:
         Of Newton's method.
     largest_turn : float [rad]
         Greatest turn of an edge within one inner step.
+    energy_momentum_steps : int
+        Taken in place of implicit midpoint steps that gained energy (with `adaptive`).
     assembly_time, solve_time, total_time : float [s]
     """
 
@@ -95,6 +97,7 @@ class Statistics:
     iterations: int
     factorizations: int
     largest_turn: float
+    energy_momentum_steps: int
     assembly_time: float
     solve_time: float
     total_time: float

@@ -76,9 +76,8 @@ TEST(Plane, IsNotFoundWhereAnythingLeavesIt) {
   }));
   EXPECT_FALSE(spoiled([](SceneBuilder& b) { b.load(LoadKind::moment, {0, 7}, Vector3(0, 1, 0)); }));
   EXPECT_FALSE(spoiled([](SceneBuilder& b) { b.scene.rods[0].natural_curvature(2, 1) = 0.1; }));
-  EXPECT_FALSE(spoiled([](SceneBuilder& b) {
-    b.support(SupportKind::pin, {0, 0}, Vector3::UnitZ() * Vector3::UnitZ().transpose());
-  }));
+  EXPECT_FALSE(spoiled(
+      [](SceneBuilder& b) { b.support(SupportKind::pin, {0, 0}, Vector3::UnitZ() * Vector3::UnitZ().transpose()); }));
 }
 
 TEST(Plane, IsNotFoundForASectionAtAnAngleToIt) {

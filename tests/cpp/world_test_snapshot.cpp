@@ -116,10 +116,8 @@ TEST(Snapshot, RemembersThatAWorldLeftItsPlane) {
     w.set_gravity(Vector3(0, 1.0, -9.81));
     w.step(4);
   };
-  expect_same_continuation(
-      scene, Integrator::implicit_midpoint, leave, [](World& w) { w.step(4); }, "plane left");
-  expect_same_continuation(
-      scene, Integrator::implicit_midpoint, [](World& w) { w.step(4); }, leave, "plane to leave");
+  expect_same_continuation(scene, Integrator::implicit_midpoint, leave, [](World& w) { w.step(4); }, "plane left");
+  expect_same_continuation(scene, Integrator::implicit_midpoint, [](World& w) { w.step(4); }, leave, "plane to leave");
 }
 
 TEST(Snapshot, RemembersRampsLoadsAndMotions) {
@@ -135,8 +133,7 @@ TEST(Snapshot, RemembersRampsLoadsAndMotions) {
     w.step(4);
   };
   for (Integrator integrator : {Integrator::implicit_midpoint, Integrator::energy_momentum})
-    expect_same_continuation(
-        builder.scene, integrator, act, [](World& w) { w.step(12); }, "actuation");
+    expect_same_continuation(builder.scene, integrator, act, [](World& w) { w.step(12); }, "actuation");
 }
 
 TEST(Snapshot, OfAnotherSceneIsRefused) {
