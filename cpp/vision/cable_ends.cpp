@@ -50,15 +50,25 @@ std::vector<Vector2> grow_end(const BitImage& mask, const Branch& tip) {
   // How far the mask goes beyond the point, along the middle and nearer to the flanks.
   const Vector2 normal(-tangent.y(), tangent.x());
   const double limit = 3 * half_width + 2;
-  const double middle = reach_border(mask, point, tangent, limit);
-  if (middle >= limit - 1) return points;  // runs into something else
   const auto ahead = [&](double aside) {
     const Vector2 start = point + aside * half_width * normal;
     return inside(mask, start) ? reach_border(mask, start, tangent, limit) : 0.0;
   };
-  const double flanks = 0.25 * (ahead(-0.8) + ahead(0.8) + ahead(-0.6) + ahead(0.6));
-  // A half disc of radius r falls back by .3 r there on average.
-  const double roundness = std::clamp(((middle - flanks) / half_width - 0.06) / 0.22, 0.0, 1.0);
+  const auto mean_ahead = [&](double from, double to) {
+    double sum = 0;
+    for (int k = 0; k < 4; ++k) {
+      const double aside = from + (to - from) * k / 3;
+      sum += ahead(aside) + ahead(-aside);
+    }
+    return sum / 8;
+  };
+  const double middle = mean_ahead(0.0, 0.3);
+  if (middle >= limit - 1) return points;  // runs into something else
+  // Between .5 and .8 of the half width from the middle a half disc falls back by .24 half widths on average; the
+  // pixels of a straight cut by some .06.
+  const double fallen = (middle - mean_ahead(0.5, 0.8)) / half_width;
+  // A few pixels decide, so the estimate stays away from either extreme: a wrong one costs less than a half width.
+  const double roundness = std::clamp(0.2 + 0.6 * (fallen - 0.08) / 0.14, 0.2, 0.8);
   const double rest = middle - roundness * half_width;
   for (double s = 1; s < rest; s += 1) points.push_back(point + s * tangent);
   if (rest > 0) points.push_back(point + rest * tangent);

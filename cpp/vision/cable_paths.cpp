@@ -20,13 +20,14 @@ void bridge_gaps(Continuations& links, const std::vector<std::vector<Vector2>>& 
   // An end at the flank of a cable was measured before that cable, which the bridge crosses.
   double widest = 0;
   for (std::size_t h = 0; h < ends.size(); ++h) {
-    if (!ends[h].empty() && links.zone_of[h] >= 0) widest = std::max(widest, 2 * links.branches[h].half_width);
+    if (!ends[h].empty()) widest = std::max(widest, 2 * links.branches[h].half_width);
   }
   const auto reach_of = [&](HalfEdge a, HalfEdge b) {
     double reach = longest;
     for (const HalfEdge half : {a, b}) {
       const auto h = static_cast<std::size_t>(half);
-      if (links.zone_of[h] >= 0) reach += 4 * links.branches[h].half_width;
+      // Where it may be round, an end is assumed a little before the mask ends.
+      reach += (links.zone_of[h] >= 0 ? 4.0 : 0.25) * links.branches[h].half_width;
     }
     return reach;
   };

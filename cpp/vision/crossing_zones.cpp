@@ -12,6 +12,8 @@ namespace withe {
 
 namespace {
 
+/// Two cables that touch side by side are rarer than two that cross: their energy counts this much more.
+constexpr double kTouching = 1.5;
 constexpr double kForbidden = std::numeric_limits<double>::infinity();
 
 double signed_angle(const Vector2& from, const Vector2& to) {
@@ -238,7 +240,8 @@ struct Matching {
 /// at the price of a sharp turn.
 class PairSearch {
  public:
-  PairSearch(const std::vector<Branch>& branches) : count_(static_cast<int>(branches.size())) {
+  explicit PairSearch(const std::vector<Branch>& branches)
+      : branches_(branches), count_(static_cast<int>(branches.size())) {
     energies_.assign(static_cast<std::size_t>(count_ * count_), kForbidden);
     double width = 0;
     for (const Branch& branch : branches) width = std::max(width, 2 * branch.half_width);
@@ -272,11 +275,12 @@ class PairSearch {
     if (sum >= second) return;
     while (first < count_ && used_[static_cast<std::size_t>(first)]) ++first;
     if (first == count_) {
+      if (count_ == 4 && pairs_.size() == 2 && !interleaved()) sum *= kTouching;
       if (sum < best.energy) {
         second = best.energy;
         best = {pairs_, sum};
       } else {
-        second = sum;
+        second = std::min(second, sum);
       }
       return;
     }
@@ -291,6 +295,23 @@ class PairSearch {
     }
     descend(first + 1, sum + single_);
     used_[static_cast<std::size_t>(first)] = 0;
+  }
+
+  /// Whether the two pairs of four branches separate each other, seen from their middle.
+  bool interleaved() const {
+    Vector2 middle = Vector2::Zero();
+    for (const Branch& branch : branches_) middle += 0.25 * branch.point;
+    const auto direction = [&](int i) {
+      const Vector2 d = branches_[static_cast<std::size_t>(i)].point - middle;
+      return std::atan2(d.y(), d.x());
+    };
+    const double start = direction(pairs_[0].first);
+    const auto turn = [&](int i) {
+      const double angle = direction(i) - start;
+      return angle < 0 ? angle + 2 * std::numbers::pi : angle;
+    };
+    const double end = turn(pairs_[0].second);
+    return (turn(pairs_[1].first) < end) != (turn(pairs_[1].second) < end);
   }
 
   void run_greedy() {
@@ -311,6 +332,7 @@ class PairSearch {
     }
   }
 
+  const std::vector<Branch>& branches_;
   int count_;
   double single_ = 0;
   std::vector<double> energies_;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
 
 namespace withe {
 
@@ -13,7 +14,8 @@ class Painter {
   Painter(const BitImage& mask, std::int32_t* labels)
       : mask_(mask),
         labels_(labels),
-        nearest_(static_cast<std::size_t>(mask.height()) * static_cast<std::size_t>(mask.width())) {}
+        nearest_(std::make_unique_for_overwrite<float[]>(static_cast<std::size_t>(mask.height()) *
+                                                         static_cast<std::size_t>(mask.width()))) {}
 
   /// Gives the pixels of the mask near a segment to a label where no other centreline is nearer.
   void paint_nearest(const Vector2& a, const Vector2& b, double half_width, std::int32_t label) {
@@ -129,7 +131,7 @@ class Painter {
 
   const BitImage& mask_;
   std::int32_t* labels_;
-  std::vector<float> nearest_;
+  std::unique_ptr<float[]> nearest_;  // only read where there is a label: pages without mask are never touched
   std::vector<int> unlabelled_;
 };
 
@@ -192,20 +194,30 @@ void paint_labels(const BitImage& mask, const Tracing& tracing, std::int32_t* la
 
 void paint_discs(const BitImage& mask, const Tracing& tracing, std::int32_t* labels) {
   const int width = mask.width();
+  std::vector<int> radii;
+  const auto paint = [&](int number, std::ptrdiff_t row) {
+    const Vector2 at = row_of(tracing.cables[static_cast<std::size_t>(number)], row);
+    const auto cx = static_cast<int>(std::lround(at.x()));
+    const auto cy = static_cast<int>(std::lround(at.y()));
+    const int radius = radii[static_cast<std::size_t>(number)];
+    for (int y = std::max(0, cy - radius); y <= std::min(mask.height() - 1, cy + radius); ++y) {
+      const auto reach = static_cast<int>(std::sqrt(radius * radius - (y - cy) * (y - cy)));
+      std::int32_t* line = labels + static_cast<std::ptrdiff_t>(y) * width;
+      for (int x = std::max(0, cx - reach); x <= std::min(width - 1, cx + reach); ++x) line[x] = number + 1;
+    }
+  };
   for (std::size_t c = 0; c < tracing.cables.size(); ++c) {
-    const Cable& cable = tracing.cables[c];
-    for (Eigen::Index row = 0; row < cable.centreline.rows(); ++row) {
-      const Vector2 center = row_of(cable, row);
-      const double radius = half_width_of(cable, row);
-      const int top = std::max(0, static_cast<int>(std::ceil(center.y() - radius)));
-      const int bottom = std::min(mask.height() - 1, static_cast<int>(std::floor(center.y() + radius)));
-      for (int y = top; y <= bottom; ++y) {
-        const double reach = std::sqrt(std::max(0.0, radius * radius - (y - center.y()) * (y - center.y())));
-        const int left = std::max(0, static_cast<int>(std::ceil(center.x() - reach)));
-        const int right = std::min(width - 1, static_cast<int>(std::floor(center.x() + reach)));
-        for (int x = left; x <= right; ++x)
-          labels[static_cast<std::ptrdiff_t>(y) * width + x] = static_cast<std::int32_t>(c) + 1;
-      }
+    std::vector<double> widths = tracing.cables[c].widths;
+    const auto middle = widths.begin() + static_cast<std::ptrdiff_t>(widths.size() / 2);
+    std::nth_element(widths.begin(), middle, widths.end());
+    radii.push_back(static_cast<int>(std::lround(0.5 * *middle)));
+    for (Eigen::Index row = 0; row < tracing.cables[c].centreline.rows(); ++row) paint(static_cast<int>(c), row);
+  }
+  for (const Crossing& crossing : tracing.crossings) {
+    if (crossing.confidence <= 0) continue;
+    const Cable& over = tracing.cables[static_cast<std::size_t>(crossing.over.cable)];
+    for (int row = crossing.over.row - 8; row <= crossing.over.row + 8; ++row) {
+      if (over.closed || (row >= 0 && row < over.centreline.rows())) paint(crossing.over.cable, row);
     }
   }
 }

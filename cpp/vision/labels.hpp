@@ -13,7 +13,8 @@ namespace withe {
 /// Parts of the mask that no cable runs through stay 0.
 void paint_labels(const BitImage& mask, const Tracing& tracing, std::int32_t* labels);
 
-/// The same by discs of the local width around every row, later cables over earlier ones.
+/// The published way: discs around every row, as wide as half of the cable's rows or more, in whole pixels; later
+/// cables over earlier ones, then the upper cable of every crossing.
 void paint_discs(const BitImage& mask, const Tracing& tracing, std::int32_t* labels);
 
 }  // namespace withe

@@ -1,7 +1,6 @@
 #include "vision/tracing.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 
 #include "vision/cable_ends.hpp"
@@ -14,21 +13,6 @@
 namespace withe {
 
 namespace {
-
-class Stopwatch {
- public:
-  explicit Stopwatch(std::vector<Timing>& timings) : timings_(&timings) {}
-  /// Books the time since the last call.
-  void lap(const char* step) {
-    const auto now = std::chrono::steady_clock::now();
-    timings_->push_back({step, std::chrono::duration<double>(now - last_).count()});
-    last_ = now;
-  }
-
- private:
-  std::vector<Timing>* timings_;
-  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
-};
 
 /// Frays and pinholes go, unless the lines are so thin that much of them would go too.
 BitImage smooth(const BitImage& mask) {

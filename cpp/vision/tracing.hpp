@@ -1,6 +1,7 @@
 #pragma once
 /// From a mask to cables: every cable one ordered line of points, with its widths, crossings and joints.
 
+#include <chrono>
 #include <string>
 #include <utility>
 #include <vector>
@@ -43,6 +44,22 @@ struct Joint {
 struct Timing {
   std::string step;
   double seconds = 0;
+};
+
+/// Books time by step.
+class Stopwatch {
+ public:
+  explicit Stopwatch(std::vector<Timing>& timings) : timings_(&timings) {}
+  /// Books the time since the last call.
+  void lap(const char* step) {
+    const auto now = std::chrono::steady_clock::now();
+    timings_->push_back({step, std::chrono::duration<double>(now - last_).count()});
+    last_ = now;
+  }
+
+ private:
+  std::vector<Timing>* timings_;
+  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
 };
 
 struct TraceOptions {

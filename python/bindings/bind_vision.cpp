@@ -94,20 +94,25 @@ py::dict trace_lines(const Bytes& mask, const std::optional<Bytes>& image, const
     picture = to_image(*image);
     require(picture.height == bits.height() && picture.width == bits.width(), "image and mask must have equal sizes");
   }
-  py::array_t<std::int32_t> labels({bits.height(), bits.width()});
+  // numpy.zeros leaves it to the system to clear pages when they are first used.
+  auto labels = py::module_::import("numpy")
+                    .attr("zeros")(py::make_tuple(bits.height(), bits.width()), "int32")
+                    .cast<py::array_t<std::int32_t>>();
   std::int32_t* pixels = labels.mutable_data();
   Tracing tracing;
   {
     const py::gil_scoped_release release;
-    std::fill(pixels, pixels + labels.size(), 0);
     if (published) {
       tracing = trace_mbest(bits);
       if (image) decide_order_mbest(picture, tracing);
       paint_discs(bits, tracing, pixels);
     } else {
       tracing = withe::trace_lines(bits, {});
+      Stopwatch watch(tracing.timings);
       if (image) decide_order(picture, tracing);
+      watch.lap("order");
       paint_labels(bits, tracing, pixels);
+      watch.lap("labels");
     }
   }
   return to_python(tracing, labels);

@@ -1,0 +1,228 @@
+"""Perception: every figure beside its goal, on one thread.
+
+    python benchmarks/perception.py [--quick]
+
+Labelled photographs are read from WITHE_DATA/mbest and left out, with a word, where they are missing. Synthetic
+scenes come from seeds that nothing was tuned on. Speed is a ratio to one 3 x 3 distance transform of OpenCV in the
+same run (d), medians of interleaved runs, so that it means the same on another machine.
+"""
+
+import argparse
+import os
+import statistics
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+from withe import _core
+from withe.perception import Camera, color_filter, trace, trace_mask
+from withe.perception.synthetic import CASES, SyntheticScene, make_case, render, render_mask
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests" / "python"))
+from labelled import RANGES, dice, orders, pictures
+from scoring import score
+
+FIRST_SEED = 90_000
+GOALS = {
+    "crossing 90": 100,
+    "crossing 60": 100,
+    "crossing 45": 100,
+    "crossing 30": 100,
+    "crossing 20": 97,
+    "crossing 15": 90,
+    "ragged 60": 100,
+    "ragged 30": 100,
+    "three at a point": 100,
+    "T": 100,
+    "gap": 97,
+    "loop": 100,
+    "self": 100,
+    "six cables": 95,
+    "specks": 100,
+}
+
+
+def line(name, value, goal):
+    """Print one figure beside its goal."""
+    print(f"  {name:42s} {value:>22s}   goal {goal}")
+
+
+def photographs(folder):
+    """Counts, DICE and order on the labelled images."""
+    mask = color_filter(RANGES)
+    found = {}
+    right = total = 0
+    for tier, name, image, labels in pictures(folder):
+        tracing = trace(image, mask=mask)
+        published = trace(image, mask=mask, method="mbest")
+        default = trace(image)
+        good, count = orders(tracing, labels)
+        right, total = right + good, total + count
+        found.setdefault(tier, []).append(
+            (
+                len(tracing) == labels.max(),
+                len(default) == labels.max(),
+                100 * dice(tracing.labels, labels)[0],
+                100 * dice(published.labels, labels)[0],
+                100 * dice(default.labels, labels)[0],
+                name,
+            )
+        )
+    print(f"Photographs ({sum(map(len, found.values()))})")
+    for (tier, rows), ours, theirs in zip(found.items(), (99.9, 99.8, 99.7), (98.2, 97.1, 97.0), strict=True):
+        line(f"{tier}: exact counts", f"{sum(row[0] for row in rows)} of {len(rows)}", "all")
+        line(f"{tier}: exact counts, default filter", f"{sum(row[1] for row in rows)} of {len(rows)}", "beside it")
+        line(f"{tier}: DICE, mean", f"{statistics.mean(row[2] for row in rows):.2f}", f"{ours}")
+        worst = min(rows, key=lambda row: row[2])
+        line(f"{tier}: DICE, worst", f"{worst[2]:.2f} ({worst[-1]})", "99.5")
+        line(f"{tier}: DICE, mbest", f"{statistics.mean(row[3] for row in rows):.2f}", f"{theirs} +- .1")
+        line(f"{tier}: DICE, default filter", f"{statistics.mean(row[4] for row in rows):.2f}", "beside it")
+    line("order right where labels tell", f"{right} of {total}", "all of at least 280")
+
+
+def synthetic(count, scale):
+    """How many scenes of every kind are found right."""
+    print(f"Synthetic masks, {count} a case, scale {scale:g}")
+    for case in CASES:
+        right = touching = tips = 0
+        for seed in range(FIRST_SEED, FIRST_SEED + count):
+            scene = make_case(case, seed, scale)
+            tracing = trace_mask(scene.mask)
+            result = score(scene, tracing, tip_tolerance=5.0 * max(scale, 1.0))
+            right += result.right
+            touching += not result.right and result.count > len(scene.centrelines)
+            tips += not result.right and result.distance <= 2.0
+        goal = GOALS[case] - (0 if scale == 1 else 5)
+        extra = "".join(f", {n} {word}" for n, word in ((touching, "split"), (tips, "by tips only")) if n)
+        line(case, f"{100 * right / count:.1f} %{extra}", f"{goal} %")
+
+
+def order_of_self_crossings(count):
+    """Which strand is on top where a cable of one colour crosses itself."""
+    right = total = 0
+    for seed in range(FIRST_SEED, FIRST_SEED + count):
+        scene = make_case("self", seed)
+        tracing = trace(render(scene, np.random.default_rng(seed)), mask=scene.mask)
+        total += 1
+        if len(tracing.crossings) != 1 or len(tracing) != 1:
+            continue
+        crossing, true = tracing.crossings[0], scene.crossings[0]
+        # Whether the upper strand is nearer to the start, in a direction that both lines share.
+        ours = tracing.centrelines[0]
+        same = np.hypot(*(ours[0] - scene.centrelines[0][0])) < np.hypot(*(ours[-1] - scene.centrelines[0][0]))
+        first = (crossing.over[1] < crossing.under[1]) == same
+        right += first == (true.over[1] < true.under[1])
+    print("Order")
+    line("self-crossings, rendered", f"{100 * right / total:.1f} % of {total}", "95 %")
+
+
+def metres():
+    """How far a scene seen by a tilted camera comes back from the truth."""
+    angle = np.radians(30)
+    tilt = np.array([[1, 0, 0], [0, np.cos(angle), -np.sin(angle)], [0, np.sin(angle), np.cos(angle)]])
+    camera = Camera(
+        [[900, 0, 320], [0, 905, 240], [0, 0, 1]],
+        (-0.18, 0.05, 0.001, -0.0015, 0.004),
+        tilt @ np.diag([1.0, -1.0, -1.0]),
+        (0, 0, 0.9),
+    )
+    t = np.linspace(-0.2, 0.2, 400)
+    world = [
+        np.column_stack([t, 0.05 * np.sin(9 * t) + 0.02, 0 * t]),
+        np.column_stack([0.03 * np.cos(11 * t), 0.7 * t, 0 * t]),
+    ]
+    lines = [camera.project(points) for points in world]
+    mask = render_mask(lines, [9.0, 9.0], [False, False], (480, 640))
+    scene = SyntheticScene(mask, lines, [9.0, 9.0], [False, False], [], [True, True])
+    tracing = trace(render(scene, np.random.default_rng(0)))
+    means, worsts = [], []
+    for i in range(len(tracing)):
+        points = tracing.points(i, camera)[:, :2]
+        apart = [np.hypot(*(points[:, None] - truth[None, :, :2]).transpose(2, 0, 1)).min(axis=1) for truth in world]
+        error = min(apart, key=np.mean) / (0.9 / 900)
+        means.append(error.mean())
+        worsts.append(error.max())
+    print("Metres, camera tilted 30 degrees with distortion")
+    line("error, mean and worst", f"{max(means):.2f} and {max(worsts):.2f} px", "1 and 3 px's worth")
+
+
+def speed(folder, rounds):
+    """Medians in units of one distance transform."""
+    import cv2
+
+    cv2.setNumThreads(1)
+    filter_ = color_filter(RANGES)
+    images = [image for _, _, image, _ in pictures(folder)][::5]
+    ratios = {}
+    unit = []
+    for image in images:
+        mask = np.ascontiguousarray(filter_(image)).view(np.uint8)
+        times = {}
+
+        def timed(name, action, times=times):
+            start = time.perf_counter()
+            result = action()
+            times.setdefault(name, []).append(time.perf_counter() - start)
+            return result
+
+        for _ in range(rounds):
+            timed("d", lambda mask=mask: cv2.distanceTransform(mask, cv2.DIST_L2, 3))
+            steps = trace_mask(mask).timings
+            paths = sum(seconds for step, seconds in steps.items() if step not in ("order", "labels"))
+            times.setdefault("thinning", []).append(steps.get("thin", 0.0))
+            times.setdefault("mask to ordered paths", []).append(paths)
+            timed("image to labels", lambda image=image: trace(image, mask=filter_))
+            timed("image to labels, default filter", lambda image=image: trace(image))
+            timed("colour filter", lambda image=image: filter_(image))
+        d = statistics.median(times["d"])
+        unit.append(d)
+        for name, values in times.items():
+            ratios.setdefault(name, []).append(statistics.median(values) / d)
+    goals = {"thinning": ".8 d", "mask to ordered paths": "3.5 d", "image to labels": "7 d"}
+    print(f"Speed at 896 x 672, d = {1e3 * statistics.median(unit):.2f} ms")
+    for name, values in ratios.items():
+        if name != "d":
+            line(name, f"{statistics.mean(values):.2f} d", goals.get(name, "beside it"))
+    whole = statistics.mean(ratios["image to labels"]) * statistics.median(unit)
+    line("frames a second", f"{1 / whole:.0f}", "145 where d is .98 ms")
+
+
+def thinning_is_exact(folder):
+    """Compare thinning pixel by pixel."""
+    try:
+        from skimage.morphology import skeletonize
+    except ImportError:
+        print("scikit-image is not installed: thinning is not compared")
+        return
+    equal = [
+        np.array_equal(_core.thin((labels > 0).view(np.uint8)) > 0, skeletonize(labels > 0))
+        for _, _, _, labels in pictures(folder)
+    ]
+    line("thinning, bit-equal to scikit-image", f"{sum(equal)} of {len(equal)}", "all")
+
+
+def main():
+    """Run all."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--quick", action="store_true", help="ten scenes a case, normal scale only")
+    quick = parser.parse_args().quick
+    folder = Path(os.environ.get("WITHE_DATA", "")) / "mbest"
+    present = bool(os.environ.get("WITHE_DATA")) and folder.is_dir()
+    if present:
+        speed(folder, 5 if quick else 15)
+        thinning_is_exact(folder)
+        photographs(folder)
+    else:
+        print("No labelled images: WITHE_DATA does not name a folder with mbest in it")
+    metres()
+    order_of_self_crossings(20 if quick else 100)
+    synthetic(10 if quick else 40, 1.0)
+    if not quick:
+        synthetic(40, 0.5)
+        synthetic(40, 2.0)
+
+
+if __name__ == "__main__":
+    main()
