@@ -85,6 +85,8 @@ World::Implementation::Implementation(const Implementation& other)
       level(other.level),
       easy_steps(other.easy_steps),
       guard(other.guard),
+      grid_origin(other.grid_origin),
+      grid_steps(other.grid_steps),
       support_work(other.support_work),
       actuation_work(other.actuation_work),
       dissipated(other.dissipated),

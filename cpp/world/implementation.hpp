@@ -2,6 +2,7 @@
 /// What World is made of; private to this room.
 
 #include <atomic>
+#include <cstdint>
 
 #include "integrators/dynamics.hpp"
 #include "integrators/statics.hpp"
@@ -64,6 +65,8 @@ struct World::Implementation {
   int level = 0;         ///< present halvings of the time step
   int easy_steps = 0;
   EnergyGuard guard;
+  double grid_origin = 0;  ///< time = grid_origin + grid_steps time_step after whole steps, free of summed rounding
+  std::int64_t grid_steps = 0;
   double support_work = 0, actuation_work = 0, dissipated = 0, load_work = 0;
   std::optional<Energy> alarm;  ///< energies at the start, for the explicit scheme's alarm
   NewtonResult last_newton;

@@ -51,15 +51,23 @@ void World::step(int count) {
   require(count >= 0, "number of steps must not be negative, got " + std::to_string(count));
   Implementation& self = *implementation_;
   const Timer timer(self.statistics.total_time);
+  const double dt = self.options.time_step;
+  const auto on_grid = [&](std::int64_t steps) { return self.grid_origin + static_cast<double>(steps) * dt; };
   for (int i = 0; i < count; ++i) {
+    if (self.state.time != on_grid(self.grid_steps)) {
+      self.grid_origin = self.state.time;
+      self.grid_steps = 0;
+    }
+    const double end = on_grid(self.grid_steps + 1);
     if (self.options.integrator == Integrator::statics) {
       if (self.interrupted.exchange(false)) throw Interrupted();
-      const double end = self.state.time + self.options.time_step;
       if (self.callback) self.callback(end, end);
-      self.equilibrium(self.options.time_step);
+      self.equilibrium(dt);
     } else {
-      self.advance(self.options.time_step);
+      self.advance(dt);
     }
+    self.state.time = end;
+    ++self.grid_steps;
   }
 }
 
