@@ -99,7 +99,7 @@ EquilibriumResult World::equilibrium() {
   return self.equilibrium(0.0);
 }
 
-void World::set_step_callback(StepCallback callback) {
+void World::set_step_callback(const StepCallback& callback) {
   if (!callback) {
     implementation_->callback = nullptr;
     return;

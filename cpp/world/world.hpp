@@ -93,7 +93,7 @@ class World {
   // Called before every inner step. `force_time`: when loads act in this step; `end_time`: where supports
   // shall be at its end. May call set_load, prescribe and set_custom_force. Empty: none.
   using StepCallback = std::function<void(World&, double force_time, double end_time)>;
-  void set_step_callback(StepCallback callback);
+  void set_step_callback(const StepCallback& callback);
   /// Explicit nodal forces (nodes x 3) [N] used from now on.
   void set_custom_force(const MatrixX3& force);
 
