@@ -229,16 +229,7 @@ void World::Implementation::advance(double duration) {
     }
     const bool may_halve = (options.adaptive || options.tolerance) && level < options.max_halvings &&
                            options.integrator != Integrator::verlet;
-    if (accepted && watched && gains_energy(then)) {
-      // The same step again, and a while of them, without the flaw.
-      state = backup;
-      std::tie(support_work, actuation_work, dissipated, load_work) = books;
-      statistics.steps -= 1;
-      statistics.rejected_steps += 1;
-      guard.rescue = 256;
-      continue;
-    }
-    if (accepted && too_coarse && may_halve) {
+    const auto take_back = [&] {
       state = backup;
       std::tie(support_work, actuation_work, dissipated, load_work) = books;
       ramps = ramps_before;  // one that ended within the step has not ended yet
@@ -246,7 +237,15 @@ void World::Implementation::advance(double duration) {
       reaction_current = false;
       accepted = false;
       statistics.steps -= 1;
+    };
+    if (accepted && watched && gains_energy(then)) {
+      // The same step again, and a while of them, without the flaw.
+      take_back();
+      statistics.rejected_steps += 1;
+      guard.rescue = 256;
+      continue;
     }
+    if (accepted && too_coarse && may_halve) take_back();
     if (!accepted) {
       statistics.rejected_steps += 1;
       if (!may_halve)
