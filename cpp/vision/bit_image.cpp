@@ -83,41 +83,66 @@ BitImage pack(const std::uint8_t* pixels, int height, int width, std::ptrdiff_t 
 }
 
 void unpack(const BitImage& image, std::uint8_t* pixels) {
+  constexpr std::uint64_t low = 0x7f7f7f7f7f7f7f7fULL;
+  constexpr std::uint64_t spread = 0x8040201008040201ULL;
   for (int y = 0; y < image.height(); ++y) {
     const std::uint64_t* row = image.row(y);
     std::uint8_t* target = pixels + static_cast<std::size_t>(y) * image.width();
-    for (int x = 0; x < image.width(); ++x) target[x] = (row[x >> 6] >> (x & 63)) & 1U;
+    int x = 0;
+    if constexpr (std::endian::native == std::endian::little) {
+      for (; x + 8 <= image.width(); x += 8) {
+        const std::uint64_t eight = (((row[x >> 6] >> (x & 63)) & 0xff) * 0x0101010101010101ULL) & spread;
+        const std::uint64_t ones = (((eight & low) + low) | eight) >> 7 & 0x0101010101010101ULL;
+        std::memcpy(target + x, &ones, 8);
+      }
+    }
+    for (; x < image.width(); ++x) target[x] = (row[x >> 6] >> (x & 63)) & 1U;
   }
 }
 
 BitImage dilate(const BitImage& image) {
   BitImage result(image.height(), image.width());
   for (int y = 0; y < image.height(); ++y) {
-    std::uint64_t* out = result.row(y);
+    const std::uint64_t* row = image.row(y);
+    // Every row reaches three; what has no pixels is passed over.
     for (int w = 0; w < image.words(); ++w) {
-      std::uint64_t any = 0;
-      for (int dy = -1; dy <= 1; ++dy) {
-        const std::uint64_t* row = image.row(y + dy);
-        any |= row[w] | from_left(row, w) | from_right(row, w);
-      }
-      out[w] = any;
+      const std::uint64_t any = row[w] | from_left(row, w) | from_right(row, w);
+      if (any == 0) continue;
+      for (int dy = -1; dy <= 1; ++dy) result.row(y + dy)[w] |= any;
     }
-    out[image.words() - 1] &= image.last_word();
+  }
+  for (int y = -1; y <= image.height(); ++y) {
+    std::uint64_t* out = result.row(y);
+    if (y < 0 || y == image.height()) {
+      std::fill(out, out + image.words(), 0);
+    } else {
+      out[image.words() - 1] &= image.last_word();
+    }
   }
   return result;
 }
 
 BitImage erode(const BitImage& image) {
-  // The pixels of the complement, padding included, grow; outside the image there are none.
-  BitImage complement(image.height(), image.width());
+  BitImage result(image.height(), image.width());
+  const int words = image.words();
+  const std::uint64_t last_pixel = std::uint64_t{1} << ((image.width() - 1) & 63);
+  const auto all_three = [&](const std::uint64_t* row, int w) {
+    std::uint64_t left = from_left(row, w);
+    std::uint64_t right = from_right(row, w);
+    if (w == 0) left |= 1U;
+    if (w == words - 1) right |= last_pixel;
+    return row[w] & left & right;
+  };
   for (int y = 0; y < image.height(); ++y) {
-    for (int w = 0; w < image.words(); ++w) complement.row(y)[w] = ~image.row(y)[w];
-    complement.row(y)[image.words() - 1] &= image.last_word();
-  }
-  BitImage result = dilate(complement);
-  for (int y = 0; y < image.height(); ++y) {
-    for (int w = 0; w < image.words(); ++w) result.row(y)[w] = ~result.row(y)[w];
-    result.row(y)[image.words() - 1] &= image.last_word();
+    const std::uint64_t* row = image.row(y);
+    std::uint64_t* out = result.row(y);
+    for (int w = 0; w < words; ++w) {
+      if (row[w] == 0) continue;
+      std::uint64_t all = all_three(row, w);
+      if (y > 0) all &= all_three(image.row(y - 1), w);
+      if (y + 1 < image.height()) all &= all_three(image.row(y + 1), w);
+      out[w] = all;
+    }
   }
   return result;
 }

@@ -95,7 +95,8 @@ Branch measure_branch(const SkeletonGraph& graph, const SkeletonEdge& edge, int 
   const int n = static_cast<int>(edge.points.size());
   const auto at = [&](int i) { return edge.points[static_cast<std::size_t>(end == 0 ? i : n - 1 - i)].position(); };
   const int last = n - 1 - skip_other;
-  const double reach = 2 * tangent_length * branch.half_width;
+  // On thin cables the pixels' noise wants more of them.
+  const double reach = std::max(2 * tangent_length * branch.half_width, 30.0);
   Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
   Eigen::Matrix<double, 3, 2> right = Eigen::Matrix<double, 3, 2>::Zero();
   double s = 0;
@@ -185,6 +186,11 @@ void find_zones(const SkeletonGraph& graph, const ZoneOptions& options, const st
       }
     }
     const double widening = widest > 0 ? inner_half_width(edge) / widest : 0;
+    // Where two cables cross, the mask is widest at the ends of the link; twice as wide all along, they lie side by
+    // side.
+    if (widening > 1.6 && edge.length > 4 * 2 * widest) {
+      result.doubts.push_back({edge.points[edge.points.size() / 2].position(), Doubt::parallel_strands});
+    }
     if (widening > options.merged_widening ||
         (widening > 0.85 && is_forked(e, graph, sets, leaving, result.branches))) {
       merged.push_back(e);

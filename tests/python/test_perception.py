@@ -125,3 +125,22 @@ def test_thinning_is_that_of_scikit_image():
     for _ in range(200):
         mask = random_mask(rng)
         assert np.array_equal(_core.thin(mask.astype(np.uint8)) > 0, skeletonize(mask))
+
+
+def test_sixty_cables_in_a_large_picture_are_all_found():
+    mask = np.zeros((1500, 2000), bool)
+    for k in range(60):
+        row = 20 + 24 * k
+        mask[row : row + 9, 10 + 5 * k : 1600 + 5 * k] = True
+    tracing = trace_mask(mask)
+    assert len(tracing) == 60
+    assert np.array_equal(np.unique(tracing.labels), np.arange(61))
+    assert np.array_equal(tracing.labels > 0, mask)
+
+
+def test_cables_that_leave_the_picture_end_at_its_border():
+    mask = np.zeros((100, 300), bool)
+    mask[46:54] = True
+    (line,) = trace_mask(mask).centrelines
+    assert sorted([line[0, 0], line[-1, 0]]) == pytest.approx([0, 299], abs=3)
+    assert line[:, 1] == pytest.approx(49.5, abs=0.6)

@@ -377,7 +377,7 @@ def make_case(case: str, seed: int, scale: float = 1.0, shape: tuple[int, int] =
     cut = [bool(rng.random() < 0.5) for _ in lines]
     mask = render_mask(lines, widths, closed, shape, cut)
     if case.startswith("ragged"):
-        mask = add_frays(mask, rng)
+        mask = add_frays(mask, rng, min(scale, 1.0))
     if case == "specks":
         mask = add_specks(mask, rng)
     if case == "gap":
