@@ -135,9 +135,7 @@ void World::Implementation::inner_step(double dt, bool& accepted, double& error)
       options.integrator == Integrator::implicit_midpoint || options.integrator == Integrator::energy_momentum;
   const double start = state.time, end = start + dt, force_time = mid ? start + 0.5 * dt : end;
   bool actuated = false;
-  for (const NaturalRamp& ramp : ramps)
-    actuated = actuated || (ramp.curvature_active && start < ramp.curvature_end) ||
-               (ramp.twist_active && start < ramp.twist_end);
+  for (const NaturalRamp& ramp : ramps) actuated = actuated || ramp.curvature_active || ramp.twist_active;
   double before = 0.0;
   if (actuated) {
     apply_ramps(start);
