@@ -351,7 +351,7 @@ Model build_model(const SceneDescription& description, std::optional<bool> plana
   require(!description.rods.empty(), "the scene has no rods: add one with add_rod");
   Model model;
   model.description = description;
-  if (planar.value_or(true)) model.plane = find_plane(description, model.plane_reason);
+  if (planar.value_or(true)) model.plane = find_plane(description, planar, model.plane_reason);
   require(!planar.value_or(false) || model.plane, "planar=True, but " + model.plane_reason);
   model.dimension = model.plane ? 2 : 3;
   Builder(model).build();

@@ -138,8 +138,9 @@ void update_derived(const Model& model, Parameters& parameters);
 /// Only the discrete natural strains.
 void update_natural(const Model& model, Parameters& parameters);
 
-/// The plane that holds the whole scene, or nothing (with the reason).
-std::optional<Plane> find_plane(const SceneDescription& description, std::string& reason);
+/// The plane that holds the whole scene, or nothing (with the reason). A straight scene has one only when `asked`: that
+/// of its first director.
+std::optional<Plane> find_plane(const SceneDescription& description, std::optional<bool> asked, std::string& reason);
 
 /// Discrete strain 2 tan(|kappa| V / 2) along kappa. Needs |kappa| V < pi.
 Vector2 discrete_curvature(const Vector2& smooth, double voronoi);

@@ -33,7 +33,7 @@ void collect_directions(const SceneDescription& scene, std::vector<Vector3>& dir
 
 }  // namespace
 
-std::optional<Plane> find_plane(const SceneDescription& scene, std::string& reason) {
+std::optional<Plane> find_plane(const SceneDescription& scene, std::optional<bool> asked, std::string& reason) {
   if (scene.has_custom_force) {
     reason = "a custom force may point anywhere";
     return std::nullopt;
@@ -48,7 +48,13 @@ std::optional<Plane> find_plane(const SceneDescription& scene, std::string& reas
   Matrix3 spread = Matrix3::Zero();
   for (const Vector3& d : directions) spread += d * d.transpose();
   spread /= static_cast<double>(std::max<std::size_t>(directions.size(), 1));
-  const Eigen::JacobiSVD<Matrix3> svd(spread, Eigen::ComputeFullU);
+  Eigen::JacobiSVD<Matrix3> svd(spread, Eigen::ComputeFullU);
+  if (svd.singularValues()(1) < 1e-20 && asked.value_or(false)) {
+    // A straight scene lies in many planes: the one asked for holds the first director.
+    directions.emplace_back(scene.rods.front().directors.row(0));
+    spread += directions.back() * directions.back().transpose();
+    svd.compute(spread, Eigen::ComputeFullU);
+  }
   if (svd.singularValues()(1) < 1e-20) {
     reason = "a straight scene lies in no plane of its own";
     return std::nullopt;

@@ -441,7 +441,8 @@ class Scene:
         tolerance : float [m]
             Cut steps so that the error of positions stays below it, over `duration`.
         planar : bool
-            Force two or three dimensions; by default a scene that lies in a plane is solved in it.
+            Force two or three dimensions; by default a scene that lies in a plane is solved in it. A
+            straight scene without gravity lies in many, and ``True`` takes that of its first director.
         duration : float [s]
             Over which `tolerance` holds; 1 s by default.
         solver : {"automatic", "band", "sparse"}

@@ -100,6 +100,25 @@ def test_a_simulation_that_was_asked_to_be_planar_refuses_to_leave_its_plane(act
     assert simulation.snapshot() == before
 
 
+def test_a_straight_scene_can_be_asked_into_the_plane_of_its_first_director():
+    scene = withe.Scene(gravity=(0, 0, 0))
+    rubber = withe.Material(youngs_modulus=1e6, density=1000.0)
+    beam = scene.add_rod(start=(0, 0, 0), end=(1, 0, 0), nodes=11, radius=0.02, material=rubber, normal=(0, 0.6, 0.8))
+    scene.clamp(beam.start)
+    velocities = np.outer(np.linspace(0, 1, 11) ** 2, (0, 0.6, 0.8))
+    motions = []
+    for planar in (True, None):
+        simulation = scene.build(planar=planar, time_step=0.01)
+        assert simulation.plan.planar == (planar is True)
+        simulation.set_velocities(beam, velocities)
+        simulation.step(20)
+        motions.append(simulation.positions())
+    assert np.allclose(*motions, atol=1e-9)
+    assert np.abs(motions[0] - scene.build().positions()).max() > 0.05
+    with pytest.raises(ValueError, match="leaves the plane"):
+        scene.build(planar=True).set_velocities(beam, velocities[:, [0, 2, 1]] * (1, 1, -1))
+
+
 # Parameters
 
 
