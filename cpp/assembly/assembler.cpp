@@ -191,4 +191,14 @@ VectorX Assembler::held_part(const VectorX& vector) const {
   return vector - held;
 }
 
+void Assembler::add_held_part(const VectorX& from, double factor, VectorX& to) const {
+  for (const Block& block : blocks_) {
+    const int n = block.constraint.size;
+    Vector3 v = Vector3::Zero();
+    v.head(n) = from.segment(block.constraint.first, n);
+    v -= block.constraint.free * v;
+    to.segment(block.constraint.first, n) += factor * v.head(n);
+  }
+}
+
 }  // namespace withe

@@ -56,6 +56,8 @@ class Assembler {
   void project(VectorX& vector) const;
   /// The part of a vector along held directions.
   VectorX held_part(const VectorX& vector) const;
+  /// to += factor x the part of `from` along held directions.
+  void add_held_part(const VectorX& from, double factor, VectorX& to) const;
 
   ElementTable stretch, bend, half;
   std::vector<ElementTable> loads;

@@ -7,105 +7,146 @@
 namespace withe {
 namespace {
 
-/// Largest angle between the source tangents and those of a configuration; > pi/2 where an edge points back.
-double largest_turn(const Model& model, const Configuration& before, const Configuration& after) {
+std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+/// Largest angle by which an edge turns on the way from a state to q; > pi/2 where it ends pointing back.
+double largest_turn(const Model& model, const State& state, const VectorX& q) {
   double smallest = 1.0;
   for (int e = 0; e < model.edge_count; ++e) {
-    const auto i = static_cast<std::size_t>(e);
-    smallest = std::min(smallest, dot(before.edge[i].tangent, after.edge[i].tangent));
+    const int a = model.node_dof[at(model.edge_tail[at(e)])], b = model.node_dof[at(model.edge_head[at(e)])];
+    double across = 0.0, before = 0.0, after = 0.0;
+    for (int i = 0; i < model.dimension; ++i) {
+      const double d0 = state.q(b + i) - state.q(a + i), d1 = q(b + i) - q(a + i);
+      across += d0 * d1;
+      before += d0 * d0;
+      after += d1 * d1;
+    }
+    const double cosine = across / std::sqrt(before * after);
+    if (!std::isfinite(cosine)) return INFINITY;
+    smallest = std::min(smallest, cosine);
   }
   return std::acos(std::clamp(smallest, -1.0, 1.0));
 }
 
 /// Work of loads, drag and viscosity over the step, with the forces that acted in it.
-void book_work(const Equations& equations, const Parameters& parameters, StepResult& result) {
+void book_work(const Equations& equations, const Parameters& parameters, const VectorX& change, StepResult& result) {
   if (!equations.loads().pieces.empty() || (equations.custom_force.array() != 0.0).any())
-    result.load_work = equations.load_force().dot(result.change);
-  if (parameters.dragged || parameters.viscous) result.dissipated = -equations.dissipative_force().dot(result.change);
+    result.load_work = equations.load_force().dot(change);
+  if (parameters.dragged || parameters.viscous) result.dissipated = -equations.dissipative_force().dot(change);
 }
 
 /// Held unknowns move as they are told, so their inertia is what changes their velocity, not what the scheme's formula
-/// (`assumed`) says: mends the reactions, and gives the supports' work, exact in the kinetic energy.
-void book_supports(const Equations& equations, const VectorX& assumed, const VectorX& v0, const VectorX& v1, double dt,
-                   VectorX& full_residual, StepResult& result) {
+/// (`work.assumed`) says: mends the reactions, and gives the supports' work, exact in the kinetic energy.
+void book_supports(const Equations& equations, const VectorX& v0, const VectorX& v1, double dt, StepWorkspace& work,
+                   StepResult& result) {
   const Assembler& assembler = equations.assembler();
-  const VectorX held = assembler.held_part(full_residual - assumed);
-  const VectorX held0 = assembler.held_part(v0), held1 = assembler.held_part(v1);
-  result.support_work = held.dot(result.change) + 0.5 * equations.mass.dot(held1.cwiseAbs2() - held0.cwiseAbs2());
-  full_residual += equations.mass.cwiseProduct(held1 - held0) / dt - assembler.held_part(assumed);
+  VectorX& full_residual = work.newton.evaluation.full_residual;
+  VectorX& held = work.held_vector;
+  const auto take = [&](const VectorX& vector) {
+    held.setZero(vector.size());
+    assembler.add_held_part(vector, 1.0, held);
+  };
+  take(full_residual);
+  result.support_work = held.dot(work.change);
+  take(work.assumed);
+  result.support_work -= held.dot(work.change);
+  full_residual -= held;
+  take(v1);
+  result.support_work += 0.5 * equations.mass.dot(held.cwiseAbs2());
+  full_residual += equations.mass.cwiseProduct(held) / dt;
+  take(v0);
+  result.support_work -= 0.5 * equations.mass.dot(held.cwiseAbs2());
+  full_residual -= equations.mass.cwiseProduct(held) / dt;
 }
 
-/// Forces over mass at q, with velocity v in drag, viscosity and the spin couple.
-VectorX explicit_acceleration(Equations& equations, const Parameters& parameters, double dt, const State& state,
-                              const VectorX& q, const VectorX& v, State& from, NewtonWorkspace& work) {
-  from = state;  // one that reaches q over dt with velocity v
-  from.q = q - dt * v;
-  from.v = v;
-  equations.begin(from, parameters, dt, false);
-  equations.evaluate(q, false, nullptr, work.evaluation);
-  VectorX force = -work.evaluation.full_residual;
-  equations.assembler().project(force);
-  return force.cwiseQuotient(equations.mass.cwiseMax(1e-300));
-}
-
-}  // namespace
-
-StepResult implicit_step(Equations& equations, const Newton& newton, const Options& options,
-                         const Parameters& parameters, double dt, const HeldTarget& held, State& state,
-                         NewtonWorkspace& work) {
-  StepResult result;
-  const Model& model = equations.model();
-  const bool euler = options.integrator == Integrator::backward_euler;
-  const double h = euler ? dt : 0.5 * dt;
-  equations.begin(state, parameters, h, options.integrator == Integrator::energy_momentum);
-  if (!held.reachable) return result;
-  const VectorX held_change = equations.assembler().held_part(held.q - state.q);
-  // From the extrapolated motion first; where that is too far off, from less and less of it.
+/// Finds the inner configuration, `work.z`: from the extrapolated motion first; where that is too far off, from less
+/// and less of it.
+NewtonResult find_inner(Equations& equations, const Newton& newton, const Options& options, StepRule rule, double dt,
+                        double h, const State& state, StepWorkspace& work) {
   struct Start {
     double velocity, acceleration;
     bool mixed;
   };
-  VectorX z;
+  NewtonResult found;
   int spent = 0;
   // An acceleration that outweighs the velocity belongs to ringing, not to the motion.
-  const bool smooth = h * newton.displacement(state.acceleration) < 0.5 * newton.displacement(state.v);
-  const bool mixed = options.integrator != Integrator::energy_momentum;
+  const bool smooth = std::abs(h) * newton.displacement(state.acceleration) < 0.5 * newton.displacement(state.v);
+  const bool mixed = rule != StepRule::energy_momentum;
   for (const Start& start :
        {Start{1.0, 1.0, mixed}, Start{1.0, 0.0, mixed}, Start{1.0, 0.0, !mixed}, Start{0.0, 0.0, true}}) {
     if (start.acceleration > 0.0 && !smooth) continue;
-    VectorX move = h * (start.velocity * state.v + (start.acceleration * h) * state.acceleration);
-    equations.assembler().project(move);
-    z = state.q + move * newton.cap(move) + (h / dt) * held_change;
+    work.move = h * (start.velocity * state.v + (start.acceleration * h) * state.acceleration);
+    equations.assembler().project(work.move);
+    work.z = state.q + work.move * newton.cap(work.move);
+    work.change = work.held.q - state.q;
+    equations.assembler().add_held_part(work.change, h / dt, work.z);
     const int limit = start.acceleration > 0.0 ? std::min(12, options.max_iterations) : options.max_iterations;
-    result.newton = newton.solve(equations, z, nullptr, limit, work, start.mixed);
-    spent += result.newton.iterations;
-    if (result.newton.converged) break;
+    found = newton.solve(equations, work.z, nullptr, limit, work.newton, start.mixed);
+    spent += found.iterations;
+    if (found.converged) break;
   }
-  result.newton.iterations = spent;
+  found.iterations = spent;
+  return found;
+}
+
+/// Forces over mass at q, with velocity v in drag, viscosity and the spin couple.
+void explicit_acceleration(Equations& equations, const Parameters& parameters, double dt, const State& state,
+                           const VectorX& v, StepWorkspace& work, VectorX& acceleration) {
+  work.from = state;  // one that reaches q over dt with velocity v
+  work.from.q -= dt * v;
+  work.from.v = v;
+  equations.begin(work.from, parameters, dt, false);
+  equations.evaluate(state.q, false, nullptr, work.newton.evaluation);
+  acceleration = -work.newton.evaluation.full_residual;
+  equations.assembler().project(acceleration);
+  acceleration = acceleration.cwiseQuotient(equations.mass.cwiseMax(1e-300));
+}
+
+}  // namespace
+
+StepResult implicit_step(Equations& equations, const Newton& newton, const Options& options, StepRule rule,
+                         const Parameters& parameters, double dt, State& state, StepWorkspace& work) {
+  StepResult result;
+  const Model& model = equations.model();
+  const Assembler& assembler = equations.assembler();
+  const bool euler = rule == StepRule::backward_euler;
+  const double h = euler ? dt : 0.5 * dt;
+  if (!work.held.reachable) return result;
+  equations.begin(state, parameters, h, rule == StepRule::energy_momentum);
+  result.newton = find_inner(equations, newton, options, rule, dt, h, state, work);
   if (!result.newton.converged) return result;
-  const VectorX q1 = euler ? z : VectorX(2.0 * z - state.q);
-  Configuration before, after;
-  compute_configuration(model, state, state.q, before);
-  compute_configuration(model, state, q1, after);
-  if (!q1.allFinite() || !after.length.allFinite()) return result;
-  result.largest_turn = largest_turn(model, before, after);
-  if (result.largest_turn > 1.5) return result;
-  result.change = q1 - state.q;
-  const VectorX mean = result.change / dt;
-  VectorX v1 = euler ? mean : VectorX(2.0 * mean - state.v);
+  VectorX& q1 = work.move;
+  if (euler)
+    q1 = work.z;
+  else
+    q1 = 2.0 * work.z - state.q;
+  result.largest_turn = largest_turn(model, state, q1);
+  if (!q1.allFinite() || !(result.largest_turn <= 1.5)) return result;
+  work.change = q1 - state.q;
+  work.mean = work.change / dt;
+  VectorX& v1 = work.velocity;
+  if (euler)
+    v1 = work.mean;
+  else
+    v1 = 2.0 * work.mean - state.v;
   // Held unknowns have no dynamics of their own: midpoint's 2 v - v0 would ring for ever.
-  VectorX free_part = v1;
-  equations.assembler().project(free_part);
-  v1 = free_part + equations.assembler().held_part(mean);
-  const VectorX acceleration = (v1 - state.v) / dt;
-  const VectorX jerk = acceleration - state.acceleration;
-  result.error = euler ? 0.5 * dt * dt * newton.displacement(acceleration) : dt * dt / 12.0 * newton.displacement(jerk);
-  book_work(equations, parameters, result);
+  assembler.project(v1);
+  assembler.add_held_part(work.mean, 1.0, v1);
+  book_work(equations, parameters, work.change, result);
   if (!model.constraints.empty()) {
-    const VectorX assumed = equations.mass.cwiseProduct((z - state.q) / (h * h) - state.v / h);
-    book_supports(equations, assumed, state.v, v1, dt, work.evaluation.full_residual, result);
+    work.assumed = equations.mass.cwiseProduct((work.z - state.q) / (h * h) - state.v / h);
+    book_supports(equations, state.v, v1, dt, work, result);
   }
-  accept_configuration(model, q1, after, state);
+  VectorX& acceleration = work.mean;
+  acceleration = (v1 - state.v) / dt;
+  if (euler) {
+    result.error = 0.5 * dt * dt * newton.displacement(acceleration);
+  } else {
+    work.assumed = acceleration - state.acceleration;
+    result.error = dt * dt / 12.0 * newton.displacement(work.assumed);
+  }
+  if (!model.planar()) compute_configuration(model, state, q1, work.after);
+  accept_configuration(model, q1, work.after, state);
   state.v = v1;
   state.acceleration = acceleration;
   state.time += dt;
@@ -113,42 +154,43 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
   return result;
 }
 
-StepResult verlet_step(Equations& equations, const Parameters& parameters, double dt, const HeldTarget& held,
-                       State& state, NewtonWorkspace& work) {
+StepResult verlet_step(Equations& equations, const Parameters& parameters, double dt, State& state,
+                       StepWorkspace& work) {
   StepResult result;
   const Model& model = equations.model();
-  if (!held.reachable) return result;
-  const VectorX q0 = state.q;
-  State from;
+  const Assembler& assembler = equations.assembler();
+  if (!work.held.reachable) return result;
   if (!state.acceleration_current)
-    state.acceleration = explicit_acceleration(equations, parameters, dt, state, q0, state.v, from, work);
-  VectorX half = state.v + 0.5 * dt * state.acceleration;
-  equations.assembler().project(half);
-  half += equations.assembler().held_part(held.q - q0) / dt;
-  const VectorX q1 = q0 + dt * half;
-  Configuration before, after;
-  compute_configuration(model, state, q0, before);
-  compute_configuration(model, state, q1, after);
-  if (!q1.allFinite() || !after.length.allFinite()) return result;
-  result.largest_turn = largest_turn(model, before, after);
-  if (result.largest_turn > 1.5) return result;
+    explicit_acceleration(equations, parameters, dt, state, state.v, work, state.acceleration);
+  VectorX& half = work.mean;
+  half = state.v + 0.5 * dt * state.acceleration;
+  assembler.project(half);
+  work.change = work.held.q - state.q;
+  assembler.add_held_part(work.change, 1.0 / dt, half);
+  VectorX& q1 = work.z;
+  q1 = state.q + dt * half;
+  result.largest_turn = largest_turn(model, state, q1);
+  if (!q1.allFinite() || !(result.largest_turn <= 1.5)) return result;
   // Forces want the frames at q1 itself: measured from the start of the step, the turn of direct transport would come
   // in at first order, with nothing to cancel it.
-  State next = state;
-  accept_configuration(model, q1, after, next);
+  State& next = work.next;
+  next = state;
+  if (!model.planar()) compute_configuration(model, state, q1, work.after);
+  accept_configuration(model, q1, work.after, next);
   // Drag, viscosity and the spin couple want the velocity at the end; a predicted one is second order.
-  const VectorX arriving = half + 0.5 * dt * state.acceleration;
-  next.acceleration = explicit_acceleration(equations, parameters, dt, next, next.q, arriving, from, work);
+  work.velocity = half + 0.5 * dt * state.acceleration;
+  explicit_acceleration(equations, parameters, dt, next, work.velocity, work, next.acceleration);
   next.acceleration_current = true;
   next.v = half + 0.5 * dt * next.acceleration;
   if (!next.v.allFinite()) return result;
-  result.change = q1 - q0;
-  book_work(equations, parameters, result);
-  if (!model.constraints.empty())
-    book_supports(equations, VectorX::Zero(model.dof_count), state.v, next.v, dt, work.evaluation.full_residual,
-                  result);
+  work.change = q1 - state.q;
+  book_work(equations, parameters, work.change, result);
+  if (!model.constraints.empty()) {
+    work.assumed.setZero(model.dof_count);
+    book_supports(equations, state.v, next.v, dt, work, result);
+  }
   next.time += dt;
-  state = std::move(next);
+  std::swap(state, next);
   result.newton.converged = true;
   result.accepted = true;
   return result;

@@ -7,15 +7,16 @@ namespace withe {
 
 /// Where supports put the held unknowns at the end of a step.
 struct HeldTarget {
-  VectorX q;  ///< end of step; meaningful where `held` is set
-  bool moving = false;
+  VectorX q;              ///< end of step; meaningful where held
   bool reachable = true;  ///< false: a frame would have to turn by half a turn at once
 };
+
+/// How one implicit step goes from q0 to q1.
+enum class StepRule { backward_euler, midpoint, energy_momentum };
 
 struct StepResult {
   bool accepted = false;
   NewtonResult newton;
-  VectorX change;           ///< q1 - q0
   double largest_turn = 0;  ///< of an edge [rad]
   double error = 0;         ///< estimated local error [m]
   double load_work = 0;     ///< of loads and custom forces [J]
@@ -23,14 +24,22 @@ struct StepResult {
   double support_work = 0;  ///< [J]
 };
 
-/// Advances `state` by dt, or leaves it as it was when the step is not accepted.
-StepResult implicit_step(Equations& equations, const Newton& newton, const Options& options,
-                         const Parameters& parameters, double dt, const HeldTarget& held, State& state,
-                         NewtonWorkspace& work);
+/// Scratch of a step; owned by the world, so that a step does not allocate.
+struct StepWorkspace {
+  NewtonWorkspace newton;
+  HeldTarget held;
+  VectorX z, move, change, mean, velocity, assumed, held_vector;
+  Configuration after;
+  State from, next;  ///< explicit steps
+};
+
+/// Advances `state` by dt to where `work.held` says, or leaves it as it was when the step is not accepted.
+StepResult implicit_step(Equations& equations, const Newton& newton, const Options& options, StepRule rule,
+                         const Parameters& parameters, double dt, State& state, StepWorkspace& work);
 
 /// Velocity Verlet; velocity-dependent forces are taken at the half step.
-StepResult verlet_step(Equations& equations, const Parameters& parameters, double dt, const HeldTarget& held,
-                       State& state, NewtonWorkspace& work);
+StepResult verlet_step(Equations& equations, const Parameters& parameters, double dt, State& state,
+                       StepWorkspace& work);
 
 /// Largest stable step of the explicit scheme, 2 / omega_max of the linearised equations, by power iteration.
 double stable_step(Equations& equations, const Parameters& parameters, const State& state, NewtonWorkspace& work);

@@ -61,7 +61,7 @@ World::Implementation::Implementation(SceneDescription scene, Options choice)
   for (const LoadDescription& load : description.loads) load_values.push_back(load.value);
   rebuild(Rebuild::first);
   if (options.integrator == Integrator::verlet) {
-    plan.stable_step = stable_step(*equations, parameters, state, work);
+    plan.stable_step = stable_step(*equations, parameters, state, work.newton);
     require(options.time_step <= plan.stable_step,
             "time_step must not exceed the stable step of the explicit scheme, " + std::to_string(plan.stable_step) +
                 " s, got " + std::to_string(options.time_step) + " s");
@@ -123,6 +123,11 @@ void World::Implementation::rebuild(Rebuild why) {
   fresh.supports = all;
   static_equations.reset();
   rescue_equations.reset();
+  // Scratch has the sizes of the old model.
+  const Counters counters = work.newton.counters;
+  work = StepWorkspace{};
+  work.newton.counters = counters;
+  energy_scratch = EnergyScratch{};
   if (why == Rebuild::first) {
     model = std::move(fresh);
     parameters = initial_parameters(model);

@@ -29,11 +29,24 @@ struct NaturalRamp {
 
 /// Books of the watch over plain midpoint's energy.
 struct EnergyGuard {
-  double turn = 0;       ///< of the last step [rad]
-  double scale = 0;      ///< [J]
-  double excess = 0;     ///< out of nowhere so far [J]
-  double step_gain = 0;  ///< in the last step [J]
-  int rescue = 0;        ///< energy-momentum steps still to take in its place
+  double turn = 0;               ///< of the last step [rad]
+  double scale = 0;              ///< [J]
+  double excess = 0;             ///< out of nowhere so far [J]
+  int rescue = 0;                ///< energy-momentum steps still to take in its place
+  std::optional<Energy> energy;  ///< at the present state, where a step has just found it
+};
+
+/// What a step that is taken back returns to.
+struct StepStart {
+  State state;
+  std::vector<SupportMotion> motions;
+  double support_work = 0, actuation_work = 0, dissipated = 0, load_work = 0;
+};
+
+/// Scratch for energies.
+struct EnergyScratch {
+  Configuration configuration;
+  ElasticCoefficients elastic;
 };
 
 /// Why a model is built: at first, because supports changed or the plane was left, or to take a snapshot's state.
@@ -51,7 +64,10 @@ struct World::Implementation {
   std::unique_ptr<Equations> equations;
   std::unique_ptr<Equations> rescue_equations;  ///< energy-momentum ones, made when plain midpoint gains energy
   std::unique_ptr<Equations> static_equations;  ///< symmetric ones, made when first needed
-  NewtonWorkspace work;
+  StepWorkspace work;
+  mutable EnergyScratch energy_scratch;
+  StepStart kept;
+  std::vector<SupportMotion> kept_motions;
   State state;
   Plan plan;
   Statistics statistics;
@@ -81,23 +97,47 @@ struct World::Implementation {
   State transferred(const Model& old, const State& from) const;
   void relax_frames(const std::vector<bool>& is_new);
 
-  // stepping.cpp
-  void advance(double duration);
-  void inner_step(double dt, bool& accepted, double& error);
+  // prescribed.cpp
   void apply_ramps(double time);
-  HeldTarget held_target(double time);
-  HeldTarget held_now() const;
+  void retire_ramps();
+  bool actuated() const;
+  void aim_supports(double time);
+  void hold_now(HeldTarget& target) const;
   void set_motion_at(SupportMotion& motion, double time) const;
+  void update_custom_force(Equations& target) const;
+
+  // stepping.cpp
+  enum class Attempt { failed, gained_energy, hard, easy };
+  struct Place {
+    int rod = -1, node = -1;
+    std::string words;
+  };
+  void advance(double duration);
+  bool may_cut() const;
+  void cut(long size, double dt);
+  void grow(Attempt attempt);
+  Attempt try_step(double dt);
+  void keep_for_return();
+  void take_back();
+  void commit_step();
+  double force_time(double start, double dt) const;
+  bool inner_step(double dt, double& error);
+  StepResult step_by_rule(double dt);
+  void keep_reactions(double part);
+  Place place_of(int row) const;
   [[noreturn]] void fail(const NewtonResult& newton, double dt, const std::string& what) const;
+
+  // equilibrium.cpp
   EquilibriumResult equilibrium(double dt);
   Equations& statics();
   Equations& rescue();
-  void update_custom_force(Equations& target) const;
   void refresh_reactions();
+
+  // energy.cpp
   Energy energy() const;
-  double actuation_energy(const State& at, const Parameters& p) const;
+  double actuation_energy() const;
+  bool gains_energy();
   void check_explicit();
-  bool gains_energy(const Energy& then);
 };
 
 /// Position of a node in space, from any configuration vector.

@@ -11,7 +11,7 @@ Linearisation World::linearise() const {
   Equations& system = self.statics();
   self.update_custom_force(system);
   system.begin(self.state, self.parameters, 0.0, false);
-  system.evaluate(self.state.q, true, nullptr, self.work.evaluation);
+  system.evaluate(self.state.q, true, nullptr, self.work.newton.evaluation);
   self.reaction_current = false;
 
   // An orthonormal basis of what supports leave free.

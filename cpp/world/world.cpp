@@ -39,7 +39,7 @@ void World::interrupt() { implementation_->interrupted = true; }
 
 const Statistics& World::statistics() const {
   Statistics& s = implementation_->statistics;
-  const Counters& c = implementation_->work.counters;
+  const Counters& c = implementation_->work.newton.counters;
   s.iterations = c.iterations;
   s.factorizations = c.factorizations;
   s.assembly_time = c.assembly_time;
@@ -52,6 +52,7 @@ void World::step(int count) {
   Implementation& self = *implementation_;
   const Timer timer(self.statistics.total_time);
   const double dt = self.options.time_step;
+  self.guard.energy.reset();
   const auto on_grid = [&](std::int64_t steps) { return self.grid_origin + static_cast<double>(steps) * dt; };
   for (int i = 0; i < count; ++i) {
     if (self.state.time != on_grid(self.grid_steps)) {
@@ -76,6 +77,7 @@ void World::advance_to(double time) {
   const double span = time - self.state.time;
   require(std::isfinite(time) && span >= 0.0, "time must not lie before the present, got " + std::to_string(time));
   if (span == 0.0) return;
+  self.guard.energy.reset();
   const Timer timer(self.statistics.total_time);
   const double steps = std::max(1.0, std::ceil(span / self.options.time_step - 1e-9));
   const double start = self.state.time;
@@ -162,11 +164,11 @@ void World::set_natural_curvature(int rod, const MatrixX2& curvature, double ove
   }
   NaturalRamp& ramp = self.ramps[at(rod)];
   if (over == 0.0) {
-    const double before = self.actuation_energy(self.state, self.parameters);
+    const double before = self.actuation_energy();
     ramp.curvature_active = false;
     self.parameters.natural_curvature[at(rod)] = curvature;
     update_natural(self.model, self.parameters);
-    self.actuation_work += self.actuation_energy(self.state, self.parameters) - before;
+    self.actuation_work += self.actuation_energy() - before;
   } else {
     ramp.from_curvature = now;
     ramp.to_curvature = curvature;
@@ -187,11 +189,11 @@ void World::set_natural_twist(int rod, const VectorX& twist, double over) {
     self.leave_plane("natural twist of rod '" + self.description.rods[at(rod)].name + "'");
   NaturalRamp& ramp = self.ramps[at(rod)];
   if (over == 0.0) {
-    const double before = self.actuation_energy(self.state, self.parameters);
+    const double before = self.actuation_energy();
     ramp.twist_active = false;
     self.parameters.natural_twist[at(rod)] = twist;
     update_natural(self.model, self.parameters);
-    self.actuation_work += self.actuation_energy(self.state, self.parameters) - before;
+    self.actuation_work += self.actuation_energy() - before;
   } else {
     ramp.from_twist = self.parameters.natural_twist[at(rod)];
     ramp.to_twist = twist;
@@ -215,7 +217,7 @@ void World::set_rod_parameters(int rod, const RodDescription& d) {
     require(v->size() == count && v->allFinite(), "rod parameters need one finite number an edge");
   require(d.bend_stiffness.rows() == count && d.bend_stiffness.allFinite(), "bend_stiffness needs one row an edge");
   Parameters& p = self.parameters;
-  const double before = self.actuation_energy(self.state, p);
+  const double before = self.actuation_energy();
   p.edge_stretch.segment(first, count) = d.stretch_stiffness;
   p.edge_bend.middleRows(first, count) = d.bend_stiffness;
   p.edge_twist.segment(first, count) = d.twist_stiffness;
@@ -224,7 +226,7 @@ void World::set_rod_parameters(int rod, const RodDescription& d) {
   p.edge_viscous_time.segment(first, count) = d.viscous_time;
   p.edge_drag.segment(first, count) = d.drag;
   update_derived(self.model, p);
-  self.actuation_work += self.actuation_energy(self.state, p) - before;
+  self.actuation_work += self.actuation_energy() - before;
   self.reaction_current = false;
   self.state.acceleration_current = false;
   self.make_plan();

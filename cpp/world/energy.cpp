@@ -1,0 +1,103 @@
+#include <algorithm>
+#include <cmath>
+
+#include "world/implementation.hpp"
+
+namespace withe {
+namespace {
+
+std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+double kinetic_energy(const Model& model, const Parameters& p, const VectorX& v) {
+  double twice = 0.0;
+  for (int i = 0; i < model.node_count; ++i) {
+    const int dof = model.node_dof[at(i)];
+    for (int k = 0; k < model.dimension; ++k) twice += p.node_mass(i) * v(dof + k) * v(dof + k);
+  }
+  for (int f = 0; f < model.frame_count; ++f) {
+    const int dof = model.frame_dof[at(f)];
+    for (int k = 0; k < model.frame_size(); ++k) twice += p.frame_inertia(f) * v(dof + k) * v(dof + k);
+  }
+  for (std::size_t h = 0; h < model.hinges.size(); ++h)
+    twice += p.hinge_inertia(static_cast<Eigen::Index>(h)) * v(model.hinges[h].dof) * v(model.hinges[h].dof);
+  for (std::size_t e = 0; e < model.edge_dof.size(); ++e)
+    twice += p.edge_inertia(static_cast<Eigen::Index>(e)) * v(model.edge_dof[e]) * v(model.edge_dof[e]);
+  return 0.5 * twice;
+}
+
+double gravity_energy(const Model& model, const Parameters& p, const VectorX& q) {
+  Vector3 g = p.gravity;
+  if (model.planar()) g << p.gravity.dot(model.plane->first), p.gravity.dot(model.plane->second), 0.0;
+  double energy = 0.0;
+  for (int i = 0; i < model.node_count; ++i) {
+    const int dof = model.node_dof[at(i)];
+    for (int k = 0; k < model.dimension; ++k) energy -= p.node_mass(i) * g(k) * q(dof + k);
+  }
+  return energy;
+}
+
+BendTwistEnergy bend_twist_energy(const Model& model, const ElasticCoefficients& k, const Configuration& c) {
+  BendTwistEnergy sum{0.0, 0.0};
+  const auto add = [&](const BendTwistEnergy& part) {
+    sum.bend += part.bend;
+    sum.twist += part.twist;
+  };
+  for (int b = 0; b < static_cast<int>(model.bend.size()); ++b) add(bend_energy_of(k, c, b));
+  for (int h = 0; h < static_cast<int>(model.half.size()); ++h) add(half_energy_of(k, c, h));
+  return sum;
+}
+
+}  // namespace
+
+/// What actuation changes at a state that stays: bending and twisting [J].
+double World::Implementation::actuation_energy() const {
+  auto& [c, k] = energy_scratch;
+  compute_configuration(model, state, state.q, c);
+  set_elastic(parameters, k);
+  const BendTwistEnergy e = bend_twist_energy(model, k, c);
+  return e.bend + e.twist;
+}
+
+Energy World::Implementation::energy() const {
+  Energy e;
+  auto& [c, k] = energy_scratch;
+  compute_configuration(model, state, state.q, c);
+  set_elastic(parameters, k);
+  e.kinetic = kinetic_energy(model, parameters, state.v);
+  for (int i = 0; i < model.edge_count; ++i) e.stretch += stretch_energy_of(model, k, c, i);
+  const BendTwistEnergy turned = bend_twist_energy(model, k, c);
+  e.bend = turned.bend;
+  e.twist = turned.twist;
+  e.gravity = gravity_energy(model, parameters, state.q);
+  e.loads = -load_work;
+  e.total = e.kinetic + e.stretch + e.bend + e.twist + e.gravity + e.loads + e.contact;
+  e.work = support_work + actuation_work;
+  e.dissipated = dissipated;
+  return e;
+}
+
+/// Plain midpoint pumps energy into stretching when edges turn far within a step: whether the step just taken did.
+bool World::Implementation::gains_energy() {
+  const Energy then = *guard.energy, now = energy();
+  guard.energy = now;
+  guard.scale = std::max({guard.scale, now.kinetic, then.kinetic, 0.1 * (now.stretch + now.bend + now.twist)});
+  const double gain = (now.total - now.work + now.dissipated) - (then.total - then.work + then.dissipated);
+  if (gain > 1e-6 * guard.scale && guard.excess + gain > 5e-3 * guard.scale) {
+    guard.energy = then;
+    return true;
+  }
+  guard.excess += gain;
+  return false;
+}
+
+/// An explicit scheme that is about to blow up gains energy long before it shows as NaN.
+void World::Implementation::check_explicit() {
+  const Energy e = energy();
+  const double gain = (e.total - e.work + e.dissipated) - (alarm->total - alarm->work + alarm->dissipated);
+  const double scale = std::max({alarm->kinetic, std::abs(e.gravity - alarm->gravity), std::abs(e.loads - alarm->loads),
+                                 std::abs(e.work - alarm->work), alarm->stretch + alarm->bend + alarm->twist, 1e-300});
+  if (!std::isfinite(e.total) || gain > 0.5 * scale)
+    fail(NewtonResult{}, options.time_step, "the explicit scheme gains energy: take a smaller time_step");
+}
+
+}  // namespace withe

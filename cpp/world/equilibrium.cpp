@@ -1,0 +1,89 @@
+#include "geometry/rotation.hpp"
+#include "world/implementation.hpp"
+
+namespace withe {
+
+Equations& World::Implementation::statics() {
+  const bool same = options.integrator != Integrator::energy_momentum;
+  if (same) return *equations;
+  if (!static_equations) {
+    Options symmetric = options;
+    symmetric.integrator = Integrator::statics;
+    static_equations = std::make_unique<Equations>(model, symmetric);
+  }
+  static_equations->loads().values = load_values;
+  return *static_equations;
+}
+
+/// Energy-momentum steps, which take over where plain midpoint gains energy.
+Equations& World::Implementation::rescue() {
+  if (!rescue_equations) {
+    Options conserving = options;
+    conserving.integrator = Integrator::energy_momentum;
+    rescue_equations = std::make_unique<Equations>(model, conserving);
+  }
+  rescue_equations->loads().values = load_values;
+  return *rescue_equations;
+}
+
+/// Equilibrium after `dt` (0: at the present time, with supports and actuation as they are).
+EquilibriumResult World::Implementation::equilibrium(double dt) {
+  const State before = state;
+  const std::vector<SupportMotion> motions_before = motions;
+  const double time = state.time + dt, work_before = actuation_work;
+  if (actuated()) {
+    actuation_work -= actuation_energy();
+    apply_ramps(time);
+    actuation_work += actuation_energy();
+  }
+  aim_supports(time);
+  const bool reachable = work.held.reachable;
+  Equations& system = statics();
+  update_custom_force(system);
+  const Boundary boundary = [&](double fraction, const State& start, VectorX& q) {
+    // Frames count from where they are now, so only what is left of the way is asked for.
+    (void)start;
+    const std::vector<SupportMotion> target = motions;
+    for (std::size_t s = 0; s < motions.size(); ++s) {
+      const SupportMotion &a = motions_before[s], &b = target[s];
+      motions[s].position = a.position + fraction * (b.position - a.position);
+      motions[s].rotation = rotation_exp(fraction * rotation_log(b.rotation * a.rotation.transpose())) * a.rotation;
+    }
+    hold_now(work.held);
+    q += system.assembler().held_part(work.held.q - q);
+    motions = target;
+  };
+  state.v.setZero();
+  state.acceleration.setZero();
+  state.acceleration_current = false;
+  StaticResult r;
+  if (reachable) r = find_equilibrium(system, *newton, options, parameters, boundary, state, work.newton);
+  if (!r.converged) {
+    state = before;
+    motions = motions_before;
+    actuation_work = work_before;
+    apply_ramps(state.time);
+    fail(r.newton, dt, "no static equilibrium was found");
+  }
+  state.time = time;
+  retire_ramps();
+  statistics.steps += 1;
+  system.begin(state, parameters, 0.0, false);
+  system.evaluate(state.q, false, nullptr, work.newton.evaluation);
+  reaction_residual = work.newton.evaluation.full_residual;
+  reaction_current = true;
+  newton->balance(work.newton.evaluation, r.newton);
+  return {r.stable, r.newton.iterations, r.newton.residual};
+}
+
+void World::Implementation::refresh_reactions() {
+  if (reaction_current) return;
+  Equations& system = statics();
+  update_custom_force(system);
+  system.begin(state, parameters, 0.0, false);
+  system.evaluate(state.q, false, nullptr, work.newton.evaluation);
+  reaction_residual = work.newton.evaluation.full_residual;
+  reaction_current = true;
+}
+
+}  // namespace withe

@@ -1,0 +1,125 @@
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "geometry/rotation.hpp"
+#include "world/implementation.hpp"
+
+namespace withe {
+namespace {
+
+std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+double ramp_fraction(double time, double start, double end) {
+  if (time >= end) return 1.0;
+  return std::clamp((time - start) / (end - start), 0.0, 1.0);
+}
+
+}  // namespace
+
+void World::Implementation::apply_ramps(double time) {
+  bool changed = false;
+  for (std::size_t r = 0; r < ramps.size(); ++r) {
+    NaturalRamp& ramp = ramps[r];
+    if (ramp.curvature_active) {
+      const double s = ramp_fraction(time, ramp.curvature_start, ramp.curvature_end);
+      parameters.natural_curvature[r].noalias() = (1.0 - s) * ramp.from_curvature + s * ramp.to_curvature;
+      changed = true;
+    }
+    if (ramp.twist_active) {
+      const double s = ramp_fraction(time, ramp.twist_start, ramp.twist_end);
+      parameters.natural_twist[r] = (1.0 - s) * ramp.from_twist + s * ramp.to_twist;
+      changed = true;
+    }
+  }
+  if (changed) update_natural(model, parameters);
+}
+
+/// Those that have come to their end are at rest from now on.
+void World::Implementation::retire_ramps() {
+  for (NaturalRamp& ramp : ramps) {
+    if (state.time >= ramp.curvature_end) ramp.curvature_active = false;
+    if (state.time >= ramp.twist_end) ramp.twist_active = false;
+  }
+}
+
+bool World::Implementation::actuated() const {
+  for (const NaturalRamp& ramp : ramps)
+    if (ramp.curvature_active || ramp.twist_active) return true;
+  return false;
+}
+
+void World::Implementation::set_motion_at(SupportMotion& motion, double time) const {
+  const double s = ramp_fraction(time, motion.start, motion.end);
+  motion.position = (1.0 - s) * motion.from_position + s * motion.to_position;
+  motion.rotation =
+      rotation_exp(s * rotation_log(motion.to_rotation * motion.from_rotation.transpose())) * motion.from_rotation;
+}
+
+/// Moves supports to where they shall be at a time, and notes what that says of the held unknowns.
+void World::Implementation::aim_supports(double time) {
+  for (SupportMotion& motion : motions) set_motion_at(motion, time);
+  hold_now(work.held);
+}
+
+/// The held unknowns when supports are where `motions` say.
+void World::Implementation::hold_now(HeldTarget& target) const {
+  target.q = state.q;
+  target.reachable = true;
+  for (std::size_t s = 0; s < model.supports.size(); ++s) {
+    const Support& support = model.supports[s];
+    if (!support.active) continue;
+    const SupportMotion& motion = motions[s];
+    const auto put = [&](int node, const Vector3& position) {
+      const int dof = model.node_dof[at(node)];
+      if (model.planar())
+        target.q.segment<2>(dof) << (position - model.plane->origin).dot(model.plane->first),
+            (position - model.plane->origin).dot(model.plane->second);
+      else
+        target.q.segment<3>(dof) = position;
+    };
+    put(support.node, motion.position);
+    if (support.frame >= 0) {
+      const int dof = model.frame_dof[at(support.frame)];
+      if (model.planar()) {
+        const double now = state.q(dof);
+        const Matrix3 rest = motion.rotation * rotation_exp(now * model.plane->normal).transpose();
+        target.q(dof) = now + rotation_log(rest).dot(model.plane->normal);
+      } else {
+        const Matrix3 rest = motion.rotation * state.frame[at(support.frame)].transpose();
+        if (rotation_log(rest).norm() > 2.5) target.reachable = false;
+        target.q.segment<3>(dof) = cayley_inverse(rest);
+      }
+    }
+    if (support.other_node >= 0) {
+      // The held edge moves rigidly with the node.
+      const auto& drawn = description.positions;
+      const Vector3 arm = (drawn.row(support.other_node) - drawn.row(support.node)).transpose();
+      put(support.other_node, motion.position + motion.rotation * arm);
+      if (!model.planar()) {
+        // Its angle is what the rotated drawn director measures against direct transport of the reference.
+        const auto e = at(support.edge);
+        const Vec3d t = to_vec3(motion.rotation * to_eigen(model.initial_tangent[e]));
+        const Vec3d d = to_vec3(motion.rotation * to_eigen(model.initial_director[e]));
+        const int dof = model.edge_dof[e];
+        if (dot(state.tangent[e], t) < -0.5) target.reachable = false;
+        const double angle = signed_angle(parallel_transport(state.director[e], state.tangent[e], t), d, t);
+        target.q(dof) += std::remainder(angle - state.q(dof), 2.0 * std::numbers::pi);
+      }
+    }
+  }
+}
+
+void World::Implementation::update_custom_force(Equations& target) const {
+  if (!description.has_custom_force) return;
+  for (int i = 0; i < model.node_count; ++i) {
+    const int dof = model.node_dof[at(i)];
+    const Vector3 f = custom_force.row(i);
+    if (model.planar())
+      target.custom_force.segment<2>(dof) << f.dot(model.plane->first), f.dot(model.plane->second);
+    else
+      target.custom_force.segment<3>(dof) = f;
+  }
+}
+
+}  // namespace withe
