@@ -90,6 +90,7 @@ NewtonResult Newton::solve(Equations& equations, VectorX& z, const VectorX* targ
   result.step = INFINITY;
   int stagnant = 0;
   for (;; ++result.iterations) {
+    work.poll();
     const auto start = Clock::now();
     const bool expect_end = result.step <= tolerance * 1e3;
     const double* axial = mixed && axial_known ? work.axial_force.data() : nullptr;

@@ -1,6 +1,8 @@
 #pragma once
 /// Newton's method for one step, mixed in the axial forces.
 
+#include <functional>
+
 #include "integrators/equations.hpp"
 
 namespace withe {
@@ -30,6 +32,7 @@ struct NewtonWorkspace {
   Evaluation evaluation;
   VectorX step, axial_force, trial;
   Counters counters;
+  std::function<void()> poll = [] {};  ///< asked once an iteration; what it throws ends the solve
 };
 
 class Newton {

@@ -33,11 +33,11 @@ class Statics {
     StaticResult result;
     const State start = state_;
     result.converged = load_steps(boundary, start, result.newton);
-    if (!result.converged && equations_.has_potential()) {
+    if (!result.converged) {
       state_ = start;
       boundary(1.0, start, state_.q);
       accept(state_.q);
-      result.converged = settle(result.newton) || descend(1000, result.newton);
+      result.converged = settle(result.newton) || (equations_.has_potential() && descend(1000, result.newton));
     }
     if (!result.converged) return result;
     result.stable = stable();
@@ -114,7 +114,7 @@ class Statics {
 
   /// Pseudo-transient: backward Euler from rest, over and over, with intervals that grow as the scene settles. Each
   /// one minimises the potential plus M |z - q|^2 / (2 h^2), so the potential falls; mixed Newton keeps slender
-  /// rods from crawling.
+  /// rods from crawling. Where turning loads leave no potential, inertia still keeps each interval solvable.
   bool settle(NewtonResult& last) {
     const Model& model = equations_.model();
     begin();
@@ -136,8 +136,8 @@ class Statics {
       last.residual = r.residual;
       last.worst_row = r.worst_row;
       const double rounding = 1e-10 * (std::abs(potential) + std::abs(work_.evaluation.potential));
-      if (r.converged && work_.evaluation.potential <= potential + rounding &&
-          !turned_too_far(state_, equations_.configuration(), model.planar())) {
+      const bool falls = !equations_.has_potential() || work_.evaluation.potential <= potential + rounding;
+      if (r.converged && falls && !turned_too_far(state_, equations_.configuration(), model.planar())) {
         accept(z);
         if (at_rest) return true;
         potential = work_.evaluation.potential;
@@ -158,6 +158,7 @@ class Statics {
     weight = equations_.mass;
     double damping = 0.0;
     for (int k = 0; k < max_steps; ++k) {
+      work_.poll();
       begin();
       equations_.evaluate(state_.q, true, nullptr, work_.evaluation);
       const Evaluation here = work_.evaluation;

@@ -94,9 +94,17 @@ World::Implementation::Implementation(const Implementation& other)
       alarm(other.alarm),
       reaction_residual(other.reaction_residual),
       reaction_current(other.reaction_current) {
+  listen();
   newton = std::make_unique<Newton>(model, options);
   equations = std::make_unique<Equations>(model, options);
   equations->loads().values = load_values;
+}
+
+void World::Implementation::listen() {
+  work.newton.poll = [this] {
+    if (interrupted.exchange(false)) throw Interrupted();
+    if (poll) poll();
+  };
 }
 
 /// Builds the model for the present supports and plane; a running state is carried over.
@@ -126,6 +134,7 @@ void World::Implementation::rebuild(Rebuild why) {
   // Scratch has the sizes of the old model.
   const Counters counters = work.newton.counters;
   work = StepWorkspace{};
+  listen();
   work.newton.counters = counters;
   energy_scratch = EnergyScratch{};
   if (why == Rebuild::first) {

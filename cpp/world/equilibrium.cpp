@@ -40,6 +40,13 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
   const bool reachable = work.held.reachable;
   Equations& system = statics();
   update_custom_force(system);
+  const auto undo = [&] {
+    state = before;
+    motions = motions_before;
+    actuation_work = work_before;
+    apply_ramps(state.time);
+    system.loads().values = load_values;
+  };
   const Boundary boundary = [&](double fraction, const State& start, VectorX& q) {
     // Frames count from where they are now, so only what is left of the way is asked for.
     (void)start;
@@ -57,12 +64,14 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
   state.acceleration.setZero();
   state.acceleration_current = false;
   StaticResult r;
-  if (reachable) r = find_equilibrium(system, *newton, options, parameters, boundary, state, work.newton);
+  try {
+    if (reachable) r = find_equilibrium(system, *newton, options, parameters, boundary, state, work.newton);
+  } catch (...) {
+    undo();
+    throw;
+  }
   if (!r.converged) {
-    state = before;
-    motions = motions_before;
-    actuation_work = work_before;
-    apply_ramps(state.time);
+    undo();
     fail(r.newton, dt, "no static equilibrium was found");
   }
   state.time = time;

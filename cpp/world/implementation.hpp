@@ -76,6 +76,7 @@ struct World::Implementation {
   std::vector<Vector3> load_values;
   MatrixX3 custom_force;
   std::function<void(double, double)> callback;  ///< StepCallback, bound to its world
+  std::function<void()> poll;
   std::atomic<bool> interrupted{false};
   bool spatial = false;  ///< left its plane while running
   int level = 0;         ///< present halvings of the time step
@@ -90,6 +91,8 @@ struct World::Implementation {
   bool reaction_current = false;
 
   // building.cpp
+  /// Lets interruptions reach the solver.
+  void listen();
   void rebuild(Rebuild why);
   void make_plan();
   /// Drops the plane; throws when the user asked for it. `why` names the argument that leaves the plane.

@@ -21,7 +21,7 @@ void World::Implementation::advance(double duration) {
   if (!options.adaptive && !options.tolerance) level = 0;
   const long units = 1L << options.max_halvings;
   for (long position = 0; position < units;) {
-    if (interrupted.exchange(false)) throw Interrupted();
+    work.newton.poll();
     long size = units >> level;
     while (position % size != 0) size >>= 1;
     const double dt = duration * static_cast<double>(size) / static_cast<double>(units);
@@ -147,11 +147,20 @@ bool World::Implementation::inner_step(double dt, double& error) {
   }
   kept_motions = motions;
   aim_supports(end);
-  const StepResult r = step_by_rule(dt);
-  last_newton = r.newton;
-  if (!r.accepted) {
+  const auto undo = [&] {
     motions = kept_motions;
     if (ramped) apply_ramps(start);
+  };
+  StepResult r;
+  try {
+    r = step_by_rule(dt);
+  } catch (...) {
+    undo();
+    throw;
+  }
+  last_newton = r.newton;
+  if (!r.accepted) {
+    undo();
     return false;
   }
   error = r.error;

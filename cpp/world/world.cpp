@@ -61,7 +61,7 @@ void World::step(int count) {
     }
     const double end = on_grid(self.grid_steps + 1);
     if (self.options.integrator == Integrator::statics) {
-      if (self.interrupted.exchange(false)) throw Interrupted();
+      self.work.newton.poll();
       if (self.callback) self.callback(end, end);
       self.equilibrium(dt);
     } else {
@@ -84,7 +84,7 @@ void World::advance_to(double time) {
   for (double i = 1.0; i <= steps; i += 1.0) {
     const double next = i == steps ? time : start + span * i / steps;
     if (self.options.integrator == Integrator::statics) {
-      if (self.interrupted.exchange(false)) throw Interrupted();
+      self.work.newton.poll();
       if (self.callback) self.callback(next, next);
       self.equilibrium(next - self.state.time);
     } else {
@@ -110,6 +110,8 @@ void World::set_step_callback(const StepCallback& callback) {
     callback(*this, force_time, end_time);
   };
 }
+
+void World::set_poll(const std::function<void()>& poll) { implementation_->poll = poll; }
 
 void World::set_custom_force(const MatrixX3& force) {
   Implementation& self = *implementation_;
@@ -271,8 +273,10 @@ int World::add_support(const SupportDescription& support) {
     self.rebuild(Rebuild::running);
   } catch (...) {
     auto callback = self.callback;
+    auto poll = self.poll;
     implementation_ = std::make_unique<Implementation>(backup);
     implementation_->callback = callback;
+    implementation_->poll = poll;
     throw;
   }
   const int index = static_cast<int>(self.description.supports.size()) - 1;

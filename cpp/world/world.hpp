@@ -87,13 +87,17 @@ class World {
   /// Advances to `time`, with time_steps stretched or shortened evenly to land on it.
   void advance_to(double time);
   EquilibriumResult equilibrium();
-  /// From another thread or a signal: ends a running step() at the next inner step (throws Interrupted).
+  /// From another thread or a signal: ends a running step() or equilibrium() within one Newton iteration (throws
+  /// Interrupted), with the state the last accepted one.
   void interrupt();
 
   // Called before every inner step. `force_time`: when loads act in this step; `end_time`: where supports
   // shall be at its end. May call set_load, prescribe and set_custom_force. Empty: none.
   using StepCallback = std::function<void(World&, double force_time, double end_time)>;
   void set_step_callback(const StepCallback& callback);
+  /// Asked before every inner step and Newton iteration; what it throws ends the call, with the state the last
+  /// accepted one. Must leave the world alone. Empty: none.
+  void set_poll(const std::function<void()>& poll);
   /// Explicit nodal forces (nodes x 3) [N] used from now on.
   void set_custom_force(const MatrixX3& force);
 
@@ -144,7 +148,7 @@ class World {
   std::unique_ptr<Implementation> implementation_;
 };
 
-/// Thrown by step() after interrupt(). Becomes KeyboardInterrupt.
+/// Thrown by step() and equilibrium() after interrupt(). Becomes KeyboardInterrupt.
 class Interrupted : public std::runtime_error {
  public:
   Interrupted() : std::runtime_error("interrupted") {}

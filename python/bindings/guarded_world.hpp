@@ -34,23 +34,29 @@ class GuardedWorld {
     return world_;
   }
   /// Runs `advance(world)` without the GIL. `callback(force_time, end_time)`, or None, is called before
-  /// every inner step; signals are looked at every 50 ms.
+  /// every inner step. Signals are looked at every 50 ms between inner steps, where their handlers may read the
+  /// world, and every 100 ms within a step that takes so long, where they may not.
   template <class Advance>
   auto run(Advance advance, const py::object& callback) {
     refuse(stepping_);
     Stepping stepping(*this);
     auto polled = Clock::now();
+    const auto check_signals = [&] {
+      polled = Clock::now();
+      if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+    };
     world_.set_step_callback([&](World&, double force_time, double end_time) {
-      const auto now = Clock::now();
-      const bool poll = now - polled >= std::chrono::milliseconds(50);
+      const bool poll = Clock::now() - polled >= std::chrono::milliseconds(50);
       if (!poll && callback.is_none()) return;
       const py::gil_scoped_acquire gil;
       const InCallback mark(*this);
-      if (poll) {
-        polled = now;
-        if (PyErr_CheckSignals() != 0) throw py::error_already_set();
-      }
+      if (poll) check_signals();
       if (!callback.is_none()) callback(force_time, end_time);
+    });
+    world_.set_poll([&] {
+      if (Clock::now() - polled < std::chrono::milliseconds(100)) return;
+      const py::gil_scoped_acquire gil;
+      check_signals();
     });
     const py::gil_scoped_release release;
     return advance(world_);
@@ -63,6 +69,7 @@ class GuardedWorld {
     explicit Stepping(GuardedWorld& owner) : self(owner) { self.stepping_ = true; }
     ~Stepping() {
       self.world_.set_step_callback({});
+      self.world_.set_poll({});
       self.stepping_ = false;
     }
     GuardedWorld& self;

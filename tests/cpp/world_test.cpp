@@ -424,6 +424,38 @@ TEST(Interrupt, EndsStepAndLeavesAWorldThatGoesOn) {
   EXPECT_GT(world.time(), 0.0);
 }
 
+TEST(Interrupt, InAnyIterationLeavesTheLastAcceptedState) {
+  // Ramps, moving supports and loads that grow are all under way when the iteration is cut off.
+  for (Integrator integrator : {Integrator::implicit_midpoint, Integrator::backward_euler, Integrator::statics}) {
+    SceneBuilder builder = testing::hanging_arm();
+    builder.load(LoadKind::moment, {0, 11}, Vector3(0, 1e-4, 0));
+    World world(builder.scene, options(integrator));
+    world.step();
+    world.set_natural_curvature(0, MatrixX2::Constant(10, 2, 4.0), 0.1);
+    world.move_support(0, world.support_position(0) + Vector3(0, 0, 0.01), turn(0.3, Vector3::UnitY()), 0.1);
+    const World before(world);
+    long asked = 0;
+    for (long cut = 1; cut < 100; ++cut) {
+      asked = 0;
+      world.set_poll([&] {
+        if (++asked == cut) throw Interrupted();
+      });
+      try {
+        world.step();
+        break;
+      } catch (const Interrupted&) {
+        ASSERT_TRUE(same_state(world, before)) << cut;
+        ASSERT_TRUE(testing::same_bits(world.support_position(0), before.support_position(0)));
+        ASSERT_EQ(world.load(0), before.load(0));
+      }
+    }
+    EXPECT_GT(asked, 2);
+    World fresh(before);
+    fresh.step();
+    EXPECT_TRUE(same_state(world, fresh));
+  }
+}
+
 TEST(Verlet, RefusesAStepAboveTheStableOne) {
   EXPECT_THROW(World(testing::hanging_arm().scene, options(Integrator::verlet, 0.1)), std::invalid_argument);
   World fine(testing::hanging_arm().scene, options(Integrator::verlet, 5e-5));

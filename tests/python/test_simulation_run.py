@@ -153,6 +153,43 @@ def test_ctrl_c_ends_a_long_step_and_a_run_with_the_record_kept():
     assert result.stdout.split() == ["step", "True", "True", "run", "True", "True", "True"]
 
 
+@pytest.mark.parametrize("act", ["equilibrium", "step"])
+def test_ctrl_c_ends_a_static_solve_and_leaves_the_last_accepted_state(act):
+    code = textwrap.dedent(f"""
+        import os, signal, threading
+        import numpy as np
+        import withe
+
+        solving = threading.Event()
+
+        def weightless(time, positions, velocities):  # asked once, when the solve begins
+            solving.set()
+            return np.zeros_like(positions)
+
+        def press_ctrl_c():
+            solving.wait()
+            os.kill(os.getpid(), signal.SIGINT)
+
+        scene = withe.Scene()
+        rubber = withe.Material(youngs_modulus=1e6, density=1000.0)
+        arm = scene.add_rod(start=(0, 0, 0), end=(1, 0, 0), nodes=30_001, radius=5e-3, material=rubber)
+        scene.clamp(arm.start)
+        scene.add_custom_force(weightless)
+        simulation = scene.build(integrator="static", time_step=0.1, planar=False)
+        simulation.set_natural_curvature(arm, (3.0, 2.0), over=0.2)
+        before = simulation.positions()
+        thread = threading.Thread(target=press_ctrl_c)
+        thread.start()
+        try:
+            simulation.{act}()
+        except KeyboardInterrupt:
+            print("interrupted", np.array_equal(simulation.positions(), before), simulation.time == 0.0)
+        thread.join()
+    """)
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True)
+    assert result.stdout.split() == ["interrupted", "True", "True"]
+
+
 def test_other_threads_run_while_a_simulation_steps():
     _, _, simulation = cantilever(nodes=201, planar=False)
     ticks, stop = [], threading.Event()
