@@ -11,12 +11,6 @@ namespace {
 BendTwistStrain<double> strain_row(const MatrixX3& m, Eigen::Index i) { return {m(i, 0), m(i, 1), m(i, 2)}; }
 BendTwistStiffness<double> stiffness_row(const MatrixX3& m, Eigen::Index i) { return {m(i, 0), m(i, 1), m(i, 2)}; }
 
-EdgeFrame<double> oriented(const EdgeFrame<double>& f, int sign) {
-  if (sign > 0) return f;
-  // Against its rod an edge's angle counts backwards, and so does the spin of its directors.
-  return {-f.tangent, f.d1, -f.d2, f.inverse_length, f.spin, -f.bow};
-}
-
 void put(Local& out, int at, const Vec3d& v) {
   out.gradient[at] = v.x;
   out.gradient[at + 1] = v.y;

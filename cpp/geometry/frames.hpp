@@ -54,4 +54,12 @@ EdgeFrame<Scalar> edge_frame(const Vec3<Scalar>& e, const Scalar& length, const 
   return f;
 }
 
+/// The frame of an edge gone along (sign > 0) or against its rod. Against it, the edge's angle counts backwards, and
+/// so does the spin of its directors.
+template <class Scalar>
+EdgeFrame<Scalar> oriented(const EdgeFrame<Scalar>& f, int sign) {
+  if (sign > 0) return f;
+  return {-f.tangent, f.d1, -f.d2, f.inverse_length, f.spin, -f.bow};
+}
+
 }  // namespace withe

@@ -133,6 +133,8 @@ struct Model {
 Model build_model(const SceneDescription& description, std::optional<bool> planar);
 /// Parameters as described, derived ones included.
 Parameters initial_parameters(const Model& model);
+/// Stiffnesses, densities, viscous time and drag of one rod, from one value an edge; update_derived must follow.
+void set_rod(const Model& model, int rod, const RodDescription& description, Parameters& parameters);
 /// Masses, stencil stiffnesses and discrete natural strains from the rest.
 void update_derived(const Model& model, Parameters& parameters);
 /// Only the discrete natural strains.

@@ -23,6 +23,18 @@ Vector2 smooth_curvature(const Vector2& discrete, double voronoi) {
   return (2.0 * std::atan(0.5 * k) / (k * voronoi)) * discrete;
 }
 
+void set_rod(const Model& model, int rod, const RodDescription& description, Parameters& p) {
+  const auto r = static_cast<std::size_t>(rod);
+  const int first = model.rod_first_edge[r], count = model.rod_first_edge[r + 1] - first;
+  p.edge_stretch.segment(first, count) = description.stretch_stiffness;
+  p.edge_bend.middleRows(first, count) = description.bend_stiffness;
+  p.edge_twist.segment(first, count) = description.twist_stiffness;
+  p.edge_density.segment(first, count) = description.line_density;
+  p.edge_rotary.segment(first, count) = description.rotary_inertia;
+  p.edge_viscous_time.segment(first, count) = description.viscous_time;
+  p.edge_drag.segment(first, count) = description.drag;
+}
+
 Parameters initial_parameters(const Model& model) {
   const SceneDescription& scene = model.description;
   Parameters p;
@@ -33,14 +45,7 @@ Parameters initial_parameters(const Model& model) {
     v->resize(edges);
   for (std::size_t r = 0; r < scene.rods.size(); ++r) {
     const RodDescription& rod = scene.rods[r];
-    const int first = model.rod_first_edge[r], count = model.rod_first_edge[r + 1] - first;
-    p.edge_stretch.segment(first, count) = rod.stretch_stiffness;
-    p.edge_bend.middleRows(first, count) = rod.bend_stiffness;
-    p.edge_twist.segment(first, count) = rod.twist_stiffness;
-    p.edge_density.segment(first, count) = rod.line_density;
-    p.edge_rotary.segment(first, count) = rod.rotary_inertia;
-    p.edge_viscous_time.segment(first, count) = rod.viscous_time;
-    p.edge_drag.segment(first, count) = rod.drag;
+    set_rod(model, static_cast<int>(r), rod, p);
     p.natural_curvature.push_back(rod.natural_curvature);
     p.natural_twist.push_back(rod.natural_twist);
   }

@@ -11,11 +11,6 @@ Vec3d node_position(const Model& model, const VectorX& q, int node) {
   return {x[0], x[1], model.planar() ? 0.0 : x[2]};
 }
 
-EdgeFrame<double> with_sign(const EdgeFrame<double>& f, int sign) {
-  if (sign > 0) return f;
-  return {-f.tangent, f.d1, -f.d2, f.inverse_length, f.spin, -f.bow};
-}
-
 void compute_planar(const Model& model, const VectorX& q, Configuration& out) {
   for (std::size_t e = 0; e < out.edge.size(); ++e) {
     const Vec3d d = node_position(model, q, model.edge_head[e]) - node_position(model, q, model.edge_tail[e]);
@@ -57,8 +52,8 @@ void compute_spatial(const Model& model, const State& state, const VectorX& q, C
     const BendStencil& s = model.bend[b];
     const auto i = static_cast<Eigen::Index>(b);
     const auto strain =
-        bend_twist_strain(with_sign(out.edge[static_cast<std::size_t>(s.edge[0])], s.sign[0]),
-                          with_sign(out.edge[static_cast<std::size_t>(s.edge[1])], s.sign[1]), state.bend_tau(i));
+        bend_twist_strain(oriented(out.edge[static_cast<std::size_t>(s.edge[0])], s.sign[0]),
+                          oriented(out.edge[static_cast<std::size_t>(s.edge[1])], s.sign[1]), state.bend_tau(i));
     out.bend_strain.row(i) << strain.kappa1, strain.kappa2, strain.tau;
   }
   for (int f = 0; f < model.frame_count; ++f) {

@@ -17,6 +17,7 @@ struct SupportMotion {
   Vector3 from_position = Vector3::Zero(), to_position = Vector3::Zero();
   Matrix3 from_rotation = Matrix3::Identity(), to_rotation = Matrix3::Identity();
   double start = 0, end = 0;  ///< of the ramp [s]
+  double stretch = 1;         ///< of a held edge: its length when it was gripped, over the drawn one
 };
 
 /// Natural shape of a rod on its way from one value to another.

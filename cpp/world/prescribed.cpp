@@ -94,7 +94,7 @@ void World::Implementation::hold_now(HeldTarget& target) const {
     if (support.other_node >= 0) {
       // The held edge moves rigidly with the node.
       const auto& drawn = description.positions;
-      const Vector3 arm = (drawn.row(support.other_node) - drawn.row(support.node)).transpose();
+      const Vector3 arm = motion.stretch * (drawn.row(support.other_node) - drawn.row(support.node)).transpose();
       put(support.other_node, motion.position + motion.rotation * arm);
       if (!model.planar()) {
         // Its angle is what the rotated drawn director measures against direct transport of the reference.

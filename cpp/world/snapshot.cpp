@@ -6,7 +6,7 @@
 namespace withe {
 namespace {
 
-constexpr std::uint64_t kMagic = 0x3153454854495755ull;
+constexpr std::uint64_t kMagic = 0x3253454854495755ull;
 
 /// FNV-1a.
 std::uint64_t hash_of(std::string_view bytes) {
@@ -64,6 +64,7 @@ void exchange(Archive& io, Self& self) {
   for (auto* x : {&self.guard.turn, &self.guard.scale, &self.guard.excess}) io(*x);
   for (auto& m : self.motions) {
     io(m.position);
+    io(m.stretch);
     io(m.rotation);
     io(m.from_position);
     io(m.to_position);

@@ -213,20 +213,14 @@ VectorX World::natural_twist(int rod) const { return implementation_->parameters
 void World::set_rod_parameters(int rod, const RodDescription& d) {
   Implementation& self = *implementation_;
   require(rod >= 0 && rod < static_cast<int>(self.ramps.size()), "no such rod: " + std::to_string(rod));
-  const int first = self.model.rod_first_edge[at(rod)], count = self.model.rod_first_edge[at(rod) + 1] - first;
+  const int count = self.model.rod_first_edge[at(rod) + 1] - self.model.rod_first_edge[at(rod)];
   for (const VectorX* v :
        {&d.stretch_stiffness, &d.twist_stiffness, &d.line_density, &d.rotary_inertia, &d.viscous_time, &d.drag})
     require(v->size() == count && v->allFinite(), "rod parameters need one finite number an edge");
   require(d.bend_stiffness.rows() == count && d.bend_stiffness.allFinite(), "bend_stiffness needs one row an edge");
   Parameters& p = self.parameters;
   const double before = self.actuation_energy();
-  p.edge_stretch.segment(first, count) = d.stretch_stiffness;
-  p.edge_bend.middleRows(first, count) = d.bend_stiffness;
-  p.edge_twist.segment(first, count) = d.twist_stiffness;
-  p.edge_density.segment(first, count) = d.line_density;
-  p.edge_rotary.segment(first, count) = d.rotary_inertia;
-  p.edge_viscous_time.segment(first, count) = d.viscous_time;
-  p.edge_drag.segment(first, count) = d.drag;
+  set_rod(self.model, rod, d, p);
   update_derived(self.model, p);
   self.actuation_work += self.actuation_energy() - before;
   self.reaction_current = false;
@@ -293,6 +287,8 @@ int World::add_support(const SupportDescription& support) {
     Matrix3 drawn;
     drawn << d1, t.cross(d1), t;
     m.rotation = edge_directors(self.model, c, s.edge) * drawn.transpose();
+    const auto& x = self.description.positions;
+    m.stretch = c.length(s.edge) / (x.row(s.other_node) - x.row(s.node)).norm();
   }
   m.from_position = m.to_position = m.position;
   m.from_rotation = m.to_rotation = m.rotation;

@@ -427,6 +427,33 @@ def test_a_support_moves_and_turns_to_where_it_is_told(hold, planar):
 
 
 @pytest.mark.parametrize("hold", ["frame", "edge"])
+@pytest.mark.parametrize("planar", [True, False])
+def test_a_stretched_and_turned_end_is_gripped_as_it_is(hold, planar):
+    scene = withe.Scene(gravity=(0, 0, 0))
+    soft = withe.Material(youngs_modulus=1e4, poisson_ratio=0.5, density=1000.0)
+    arm = scene.add_rod(start=(0, 0, 0), end=(0.2, 0, 0), nodes=11, radius=5e-3, material=soft, normal=(0, 1, 0))
+    scene.clamp(arm.start)
+    pull = scene.add_force(arm.end, (0.1, 0, 0.1))
+    simulation = scene.build(integrator="static", time_step=0.1, planar=planar)
+    simulation.equilibrium()
+    before, directors = simulation.positions(arm), simulation.directors(arm)
+    stretched = np.linalg.norm(before[-1] - before[-2])
+    assert stretched > 1.1 * 0.02
+    grip = simulation.clamp(arm.end, hold=hold)
+    simulation.step()
+    assert np.allclose(simulation.positions(arm), before, atol=1e-9)
+    assert np.allclose(simulation.directors(arm), directors, atol=1e-7)
+    simulation.restore(simulation.snapshot())
+    simulation.set(pull, force=(0, 0, 0))
+    simulation.move(grip, position=before[-1] + (0.01, 0, 0), over=0.1)
+    simulation.step()
+    after = simulation.positions(arm)
+    if hold == "edge":
+        assert np.allclose(after[-2:], before[-2:] + (0.01, 0, 0), atol=1e-12)
+        assert simulation.tensions(arm)[-1] == pytest.approx(1e4 * np.pi * 5e-3**2 * (stretched / 0.02 - 1.0))
+
+
+@pytest.mark.parametrize("hold", ["frame", "edge"])
 def test_rolls_count_full_turns(hold):
     scene = withe.Scene(gravity=(0, 0, 0))
     arm = scene.add_rod(start=(0, 0, 0), end=(0.2, 0, 0), nodes=11, radius=5e-3, material=RUBBER)
