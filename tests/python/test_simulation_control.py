@@ -449,7 +449,7 @@ def test_a_stretched_and_turned_end_is_gripped_as_it_is(hold, planar):
     simulation.step()
     after = simulation.positions(arm)
     if hold == "edge":
-        assert np.allclose(after[-2:], before[-2:] + (0.01, 0, 0), atol=1e-12)
+        assert np.allclose(after[-2:] - before[-2:], (0.01, 0, 0), atol=1e-12)
         assert simulation.tensions(arm)[-1] == pytest.approx(1e4 * np.pi * 5e-3**2 * (stretched / 0.02 - 1.0))
 
 
