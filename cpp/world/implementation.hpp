@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <limits>
 
 #include "integrators/dynamics.hpp"
 #include "integrators/statics.hpp"
@@ -30,11 +31,11 @@ struct NaturalRamp {
 
 /// Books of the watch over plain midpoint's energy.
 struct EnergyGuard {
-  double turn = 0;               ///< of the last step [rad]
-  double scale = 0;              ///< [J]
-  double excess = 0;             ///< out of nowhere so far [J]
-  int rescue = 0;                ///< energy-momentum steps still to take in its place
-  std::optional<Energy> energy;  ///< at the present state, where a step has just found it
+  double turn = std::numeric_limits<double>::infinity();  ///< of the last step [rad]; before the first, not known
+  double scale = 0;                                       ///< [J]
+  double excess = 0;                                      ///< out of nowhere so far [J]
+  int rescue = 0;                                         ///< energy-momentum steps still to take in its place
+  std::optional<Energy> energy;                           ///< at the present state, where a step has just found it
 };
 
 /// What a step that is taken back returns to.

@@ -398,6 +398,7 @@ void World::set_velocities(const MatrixX3& velocities) {
   self.state.acceleration.setZero();
   self.state.acceleration_current = false;
   self.alarm.reset();
+  self.guard.turn = EnergyGuard{}.turn;
 }
 
 MatrixX9 World::directors(int rod) const {
