@@ -39,7 +39,7 @@ help:
 	@echo "make test          all tests, C++ and Python"
 	@echo "make asan          C++ tests under the address and undefined-behaviour sanitizers"
 	@echo "make wheel         dist/*.whl for machines without compiler"
-	@echo "make bench         benchmarks/*.py"
+	@echo "make bench         all benchmarks (half an hour and more); NAME=work_precision runs one"
 	@echo "make lint          ruff; make format applies formatters, make format-check only looks"
 	@echo "make types         mypy --strict"
 	@echo "make stubs         regenerate the stubs of the compiled module (make stub-check compares)"
@@ -72,6 +72,11 @@ $(STAMPS)/test_tools: $(STAMPS)/build_tools
 $(STAMPS)/dev_tools: $(STAMPS)/test_tools
 	@echo "Installing developers' tools into .venv"
 	@$(PIP_INSTALL) $(call requirements,dev)
+	@touch $@
+
+$(STAMPS)/bench_tools: $(STAMPS)/build_tools
+	@echo "Installing what the benchmarks compare with into .venv"
+	@$(PIP_INSTALL) $(call requirements,bench vision) rich
 	@touch $@
 
 # One build folder serves the installed module and the C++ tests, so the engine is compiled once.
@@ -107,8 +112,8 @@ asan: $(STAMPS)/build_tools
 	@cmake --build --preset asan-ubsan
 	@ctest --preset asan-ubsan --parallel $(JOBS)
 
-bench: $(STAMPS)/installed
-	@shopt -s nullglob; for script in benchmarks/*.py; do echo "== $$script"; python "$$script"; done
+bench: $(STAMPS)/installed $(STAMPS)/bench_tools
+	@python benchmarks $(NAME)
 
 wheel: $(STAMPS)/dev_tools
 	@python tools/make_wheel.py

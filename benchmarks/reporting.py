@@ -1,0 +1,182 @@
+"""What every benchmark shares: how it times, what it prints, and the JSON file that it leaves.
+
+``out/benchmarks/NAME.json`` holds machine, compiler, command, date, every figure with its spread, and `goals`: a list
+of ``{name, value, target, met}``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import datetime
+import json
+import os
+import platform
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+import withe
+from withe.progress import Progress, progress
+
+__all__ = ["DATA", "OUT", "Report", "Timing", "arguments", "bar", "interleaved", "once"]
+
+ROOT = Path(__file__).resolve().parent.parent
+DATA = ROOT / "benchmarks" / "data"
+OUT = Path(os.environ.get("WITHE_BENCHMARK_OUT", ROOT / "out" / "benchmarks"))
+
+
+def arguments(doc: str | None, *extra: tuple[str, dict]) -> argparse.Namespace:
+    """Command line of a benchmark: ``--quick`` for all, and what it adds."""
+    parser = argparse.ArgumentParser(description=doc, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--quick", action="store_true", help="a few seconds: shows that it works, measures nothing")
+    for flag, options in extra:
+        parser.add_argument(flag, **options)
+    return parser.parse_args()
+
+
+def bar(total: float, description: str, unit: str = "runs") -> Progress:
+    """A progress bar on a terminal, by rich where it is installed; a context manager."""
+    return progress(total, description, unit=unit)
+
+
+# --- time ------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Timing:
+    """Seconds of several runs of the same thing."""
+
+    seconds: tuple[float, ...]
+
+    @property
+    def median(self) -> float:
+        """Middle of all runs [s]."""
+        return float(np.median(self.seconds))
+
+    @property
+    def spread(self) -> float:
+        """Half the distance between quartiles, over the median."""
+        low, high = np.percentile(self.seconds, (25, 75))
+        return float(0.5 * (high - low) / self.median) if self.median > 0 else 0.0
+
+    def as_json(self) -> dict:
+        """For the report."""
+        return {"median": self.median, "spread": self.spread, "runs": len(self.seconds)}
+
+
+def once(action: Callable[[], object]) -> float:
+    """Processor time of one run of an action on this thread [s].
+
+    Not the time on the wall: another program on the machine would count, and differently for each of those that are
+    compared. For work on one thread of a quiet machine both are the same.
+    """
+    start = time.thread_time()
+    action()
+    return time.thread_time() - start
+
+
+def interleaved(actions: dict[str, Callable[[], float]], rounds: int, advance: Callable[[], object] = lambda: None):
+    """Timings of actions that each return seconds, taken in turns so that a slow spell of the machine meets all."""
+    seconds: dict[str, list[float]] = {name: [] for name in actions}
+    for _ in range(rounds):
+        for name, action in actions.items():
+            seconds[name].append(action())
+            advance()
+    return {name: Timing(tuple(values)) for name, values in seconds.items()}
+
+
+# --- the report ------------------------------------------------------------------------------------------------
+
+
+def _first_line(*command: str) -> str:
+    if shutil.which(command[0]) is None:
+        return "none"
+    return subprocess.run(command, capture_output=True, text=True, check=False).stdout.partition("\n")[0]
+
+
+def _processor() -> str:
+    try:
+        text = Path("/proc/cpuinfo").read_text()
+    except OSError:
+        return platform.processor() or platform.machine()
+    found = {key.strip(): value.strip() for key, _, value in (line.partition(":") for line in text.splitlines())}
+    flags = found.get("flags", "").split()
+    widest = next((name for name in ("avx512f", "avx2", "sse2") if name in flags), platform.machine())
+    return f"{found.get('model name', platform.machine())}, {widest}"
+
+
+def _load() -> float | None:
+    return round(os.getloadavg()[0], 2) if hasattr(os, "getloadavg") else None
+
+
+class Report:
+    """Figures of one benchmark as they come in, then a file and a text.
+
+    Parameters
+    ----------
+    name : str
+        Of the file in ``out/benchmarks``.
+    quick : bool
+        Whether this was the short form, whose figures say nothing.
+    """
+
+    def __init__(self, name: str, *, quick: bool = False) -> None:
+        self.name = name
+        self.goals: list[dict] = []
+        self.figures: dict[str, object] = {}
+        self.tables: dict[str, list[list[str]]] = {}
+        self._quick = quick
+        self._start = time.monotonic()
+        self._load = _load()
+
+    def goal(self, name: str, value: float | None, target: float, *, at_least: bool = True) -> None:
+        """Hold a figure against its target. No value: it could not be measured, and is not met."""
+        value = None if value is None or not np.isfinite(value) else float(value)
+        met = value is not None and (value >= target if at_least else value <= target)
+        sign = "at least" if at_least else "at most"
+        self.goals.append({"name": name, "value": value, "target": target, "sign": sign, "met": bool(met)})
+
+    def table(self, title: str, header: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
+        """Print a table, and keep it."""
+        cells = [list(map(str, header)), *([str(cell) for cell in row] for row in rows)]
+        self.tables[title] = cells
+        widths = [max(len(row[i]) for row in cells) for i in range(len(header))]
+        print(f"\n{title}")
+        for row in cells:
+            print("  " + "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip())
+
+    def write(self) -> Path:
+        """Print goals, and write the file."""
+        print(f"\nGoals of {self.name}" + (" (quick: these figures say nothing)" if self._quick else ""))
+        for goal in self.goals:
+            value = "not measured" if goal["value"] is None else f"{goal['value']:.4g}"
+            word = "met" if goal["met"] else "NOT MET"
+            print(f"  {goal['name']:60s} {value:>14s}   {goal['sign']} {goal['target']:g}   {word}")
+        OUT.mkdir(parents=True, exist_ok=True)
+        path = OUT / f"{self.name}.json"
+        path.write_text(json.dumps(self._content(), indent=1, default=float) + "\n")
+        print(f"  written to {path}")
+        return path
+
+    def _content(self) -> dict:
+        return {
+            "name": self.name,
+            "date": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
+            "command": " ".join(["python", *sys.argv]),
+            "quick": self._quick,
+            "machine": {"processor": _processor(), "processors": os.cpu_count(), "system": platform.platform()},
+            "load": {"at the start": self._load, "at the end": _load()},
+            "compiler": _first_line("c++", "--version"),
+            "versions": {"withe": withe.__version__, "python": platform.python_version(), "numpy": np.__version__},
+            "simd": os.environ.get("WITHE_SIMD", "chosen by the engine"),
+            "took": round(time.monotonic() - self._start, 1),
+            "goals": self.goals,
+            "figures": self.figures,
+            "tables": self.tables,
+        }
