@@ -1,0 +1,109 @@
+"""The short form of each benchmark runs, and leaves a file that says what it should. Nothing is timed here."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+FOLDER = Path(__file__).resolve().parents[2] / "benchmarks"
+sys.path.insert(0, str(FOLDER))
+
+
+def run(name, folder, *arguments):
+    environment = os.environ | {"WITHE_BENCHMARK_OUT": str(folder)}
+    command = [sys.executable, str(FOLDER / f"{name}.py"), *arguments]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False, timeout=300)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+@pytest.mark.parametrize("name", ["work_precision", "robustness", "skips", "parallel"])
+def test_the_short_form_writes_its_figures(name, tmp_path):
+    printed = run(name, tmp_path, "--quick")
+    content = json.loads((tmp_path / f"{name}.json").read_text())
+    assert content["name"] == name
+    assert content["quick"] is True
+    assert content["machine"]["processor"]
+    assert content["tables"]
+    assert f"Goals of {name}" in printed
+    assert content["goals"]
+    for goal in content["goals"]:
+        assert set(goal) == {"name", "value", "target", "sign", "met"}
+        assert goal["met"] in (True, False)
+        assert goal["value"] is not None or not goal["met"]
+
+
+def test_times_at_an_error_are_read_between_points_of_the_front():
+    from work_precision import Point, front, time_at
+
+    def point(error, time):
+        return Point("beam a", "implicit_midpoint", 10, 0.1, error, time)
+
+    points = [point(1e-1, 1.0), point(1e-2, 10.0), point(3e-2, 20.0), point(1e-3, 100.0), point(0.7, 0.1)]
+    assert [p.time for p in front(points)] == [1.0, 10.0, 100.0]
+    assert time_at(points, 1e-2) == pytest.approx(10.0)
+    assert time_at(points, 10**-1.5) == pytest.approx(10**0.5)
+    assert time_at(points, 0.3) == pytest.approx(1.0)
+    assert time_at(points, 1e-4) is None
+
+
+def test_errors_are_measured_against_the_limit_and_its_motion():
+    from rods_in_motion import Motion
+
+    times = np.linspace(0.0, 2.0 * np.pi, 401)
+    limit = Motion(times, np.column_stack([np.sin(times), 0 * times, 0 * times]))
+    shifted = Motion(times[::4], limit.tip[::4] + np.array([0.0, 0.1, 0.0]))
+    assert limit.size == pytest.approx(np.sqrt(0.5), rel=1e-2)
+    assert shifted.error(limit) == pytest.approx(0.1 / limit.size, rel=1e-6)
+    assert Motion(times, np.full((401, 3), np.nan)).error(limit) == np.inf
+
+
+def test_our_beam_approaches_its_stored_limit():
+    from limits import load_limits
+    from rods_in_motion import CASES, record
+
+    limit, apart = load_limits("withe")["beam a"]
+    assert apart < 1e-3
+    errors = [record(CASES["beam a"], edges, 20.0, time_step=0.05).error(limit) for edges in (20, 40)]
+    assert errors[1] < 0.4 * errors[0] < 0.02
+
+
+def test_a_case_of_the_stress_test_is_the_same_every_time():
+    from stress_cases import draw_case
+
+    first, again = draw_case(17), draw_case(17)
+    assert {name: value for name, value in vars(first).items() if name != "direction"} == {
+        name: value for name, value in vars(again).items() if name != "direction"
+    }
+    assert np.array_equal(first.direction, again.direction)
+    assert draw_case(18).length != first.length
+
+
+@pytest.mark.parametrize("method", ["static", "backward_euler"])
+def test_forces_summed_again_balance_and_a_wrong_load_shows(method):
+    import dataclasses
+
+    import balance
+    from stress_cases import build, draw_case, events
+
+    case = dataclasses.replace(draw_case(24), method=method, coarseness=5.0, nodes=22)  # a tip load in space
+
+    def imbalance(judged):
+        simulation = build(case)
+        if method == "static":
+            events(case, simulation, 0)
+            simulation.equilibrium()
+            return balance.static_residual(judged, simulation, 0)
+        for i in range(case.steps):
+            if i in (0, case.steps // 2):
+                events(case, simulation, int(i > 0))
+            before = balance.look(simulation)
+            simulation.step()
+        return balance.residual(judged, simulation, before)
+
+    assert imbalance(case) < 1.0
+    assert imbalance(dataclasses.replace(case, strength=1.001 * case.strength)) > 1.0
