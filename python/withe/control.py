@@ -73,7 +73,7 @@ class Control:
 
         Examples
         --------
-        >>> simulation.set_natural_curvature(arm, (0.0, 12.5), over=0.2)      # doctest: +SKIP
+        >>> simulation.set_natural_curvature(arm, (0.0, 12.5), over=0.2)
         """
         part = self._directory.rod(rod)
         values = curvature_array(curvature, part.voronoi, validation.truth(discrete, "discrete"), part.owner)
@@ -120,8 +120,8 @@ class Control:
 
         Examples
         --------
-        >>> simulation.set(arm, youngs_modulus=2e6)                            # doctest: +SKIP
-        >>> simulation.set(tip_load, force=lambda t: (0, 0, -t))               # doctest: +SKIP
+        >>> simulation.set(arm, youngs_modulus=2e6)
+        >>> simulation.set(tip_load, force=lambda t: (0, 0, -t))
         """
         if not values:
             raise ValueError("set must be given what to set, such as youngs_modulus=1e6")
@@ -171,7 +171,8 @@ class Control:
 
         Examples
         --------
-        >>> simulation.get(arm, "natural_curvature")                           # doctest: +SKIP
+        >>> simulation.get(arm, "natural_curvature").shape
+        (29, 2)
         """
         if word is None:
             if not isinstance(target, str) or target != "gravity":
@@ -361,7 +362,8 @@ class Control:
 
         Examples
         --------
-        >>> simulation.move(arm.end, position=(0.1, 0, 0.2), roll=np.pi, over=0.5)      # doctest: +SKIP
+        >>> hand = simulation.clamp(arm.end)
+        >>> simulation.move(hand, position=(0.1, 0, 0.2), roll=np.pi, over=0.5)
         """
         index, part = self._support(support)
         turns = part.kind != "pin"

@@ -55,7 +55,9 @@ class Scene:
     >>> arm = scene.add_rod(start=(0, 0, 0), end=(0.3, 0, 0), nodes=31, radius=5e-3, material=rubber, name="arm")
     >>> scene.clamp(arm.start)
     Support(name='clamp 1')
-    >>> simulation = scene.build(integrator="static")                   # doctest: +SKIP
+    >>> simulation = scene.build(integrator="static")
+    >>> simulation.equilibrium().stable
+    True
     """
 
     def __init__(self, gravity: npt.ArrayLike = (0.0, 0.0, -9.81)) -> None:

@@ -232,7 +232,7 @@ def plot(record: Record, *, shapes: int = 6) -> Any:
 
     Examples
     --------
-    >>> record.plot(shapes=4).savefig("arm.png")      # doctest: +SKIP
+    >>> record.plot(shapes=4).savefig("arm.png")
     """
     if len(record) == 0:
         raise ValueError("record has no frames to plot")
