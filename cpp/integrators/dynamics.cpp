@@ -59,31 +59,57 @@ void book_supports(const Equations& equations, const VectorX& v0, const VectorX&
   full_residual -= equations.mass.cwiseProduct(held) / dt;
 }
 
+/// Axial forces at the start of a step [N]: where the mixed method sets out from, for those of an extrapolated motion,
+/// whose edges turn along straight lines and so stretch, mean nothing.
+void start_axial_force(const Equations& equations, const VectorX& q, VectorX& out) {
+  const Model& model = equations.model();
+  out.resize(model.edge_count);
+  for (int e = 0; e < model.edge_count; ++e) {
+    const int a = model.node_dof[at(model.edge_tail[at(e)])], b = model.node_dof[at(model.edge_head[at(e)])];
+    double square = 0.0;
+    for (int i = 0; i < model.dimension; ++i) square += (q(b + i) - q(a + i)) * (q(b + i) - q(a + i));
+    out(e) = equations.elastic.stretch_stiffness(e) * (std::sqrt(square) / model.edge_length(e) - 1.0);
+  }
+}
+
 /// Finds the inner configuration, `work.z`: from the extrapolated motion first; where that is too far off, from less
 /// and less of it.
-NewtonResult find_inner(Equations& equations, const Newton& newton, const Options& options, StepRule rule, double dt,
-                        double h, const State& state, StepWorkspace& work) {
+NewtonResult find_inner(Equations& equations, const Newton& newton, const Options& options, const StepPlan& plan,
+                        double h, const State& state, const Predictor& predictor, StepWorkspace& work) {
   struct Start {
-    double velocity, acceleration;
-    bool mixed;
+    bool moving, accelerated, mixed;
   };
   NewtonResult found;
   int spent = 0;
-  // An acceleration that outweighs the velocity belongs to ringing, not to the motion.
-  const bool smooth = std::abs(h) * newton.displacement(state.acceleration) < 0.5 * newton.displacement(state.v);
-  const bool mixed = rule != StepRule::energy_momentum;
+  const int points = predictor.points(plan.slot);
+  // Where edges turn by a radian in an energy-momentum step, the mixed method may circle for ever: then the plain one
+  // comes first for a while.
+  const bool circling = plan.rule == StepRule::energy_momentum;
+  int& plain = work.newton.factor.plain_solves;
+  const bool mixed = !circling || plain == 0;
+  if (circling && plain > 0) --plain;
   for (const Start& start :
-       {Start{1.0, 1.0, mixed}, Start{1.0, 0.0, mixed}, Start{1.0, 0.0, !mixed}, Start{0.0, 0.0, true}}) {
-    if (start.acceleration > 0.0 && !smooth) continue;
-    work.move = h * (start.velocity * state.v + (start.acceleration * h) * state.acceleration);
+       {Start{true, true, mixed}, Start{true, false, mixed}, Start{true, false, !mixed}, Start{false, false, true}}) {
+    if (start.accelerated && points == 0) continue;
+    if (start.accelerated) {
+      predictor.extrapolate(state.time + 0.5 * plan.dt, points, work.mean);
+      work.move = h * state.v + (h * h) * work.mean;
+    } else {
+      work.move = (start.moving ? h : 0.0) * state.v;
+    }
     equations.assembler().project(work.move);
     work.z = state.q + work.move * newton.cap(work.move);
     work.change = work.held.q - state.q;
-    equations.assembler().add_held_part(work.change, h / dt, work.z);
-    const int limit = start.acceleration > 0.0 ? std::min(12, options.max_iterations) : options.max_iterations;
-    found = newton.solve(equations, work.z, nullptr, limit, work.newton, start.mixed);
+    equations.assembler().add_held_part(work.change, h / plan.dt, work.z);
+    const bool trial = start.accelerated || (circling && start.mixed && start.moving);
+    const int limit = trial ? std::min(12, options.max_iterations) : options.max_iterations;
+    start_axial_force(equations, state.q, work.newton.axial_force);
+    found = newton.solve(equations, work.z, nullptr, limit, work.newton, start.mixed, h);
     spent += found.iterations;
-    if (found.converged) break;
+    if (found.converged) {
+      if (circling && mixed && !start.mixed) plain = 16;
+      break;
+    }
   }
   found.iterations = spent;
   return found;
@@ -104,16 +130,17 @@ void explicit_acceleration(Equations& equations, const Parameters& parameters, d
 
 }  // namespace
 
-StepResult implicit_step(Equations& equations, const Newton& newton, const Options& options, StepRule rule,
-                         const Parameters& parameters, double dt, State& state, StepWorkspace& work) {
+StepResult implicit_step(Equations& equations, const Newton& newton, const Options& options,
+                         const Parameters& parameters, const StepPlan& plan, State& state, Predictor& predictor,
+                         StepWorkspace& work) {
   StepResult result;
   const Model& model = equations.model();
   const Assembler& assembler = equations.assembler();
-  const bool euler = rule == StepRule::backward_euler;
-  const double h = euler ? dt : 0.5 * dt;
+  const bool euler = plan.rule == StepRule::backward_euler;
+  const double dt = plan.dt, h = euler ? dt : 0.5 * dt;
   if (!work.held.reachable) return result;
-  equations.begin(state, parameters, h, rule == StepRule::energy_momentum);
-  result.newton = find_inner(equations, newton, options, rule, dt, h, state, work);
+  equations.begin(state, parameters, h, plan.rule == StepRule::energy_momentum);
+  result.newton = find_inner(equations, newton, options, plan, h, state, predictor, work);
   if (!result.newton.converged) return result;
   VectorX& q1 = work.move;
   if (euler)
@@ -145,6 +172,7 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
     work.assumed = acceleration - state.acceleration;
     result.error = dt * dt / 12.0 * newton.displacement(work.assumed);
   }
+  predictor.record(state.time + 0.5 * dt, plan.slot, acceleration, equations.mass, work.assumed);
   if (!model.planar()) compute_configuration(model, state, q1, work.after);
   accept_configuration(model, q1, work.after, state);
   state.v = v1;

@@ -1,7 +1,10 @@
 #pragma once
 /// One time step: backward Euler, implicit midpoint, energy-momentum, and Verlet.
 
+#include <array>
+
 #include "integrators/newton.hpp"
+#include "integrators/predictor.hpp"
 
 namespace withe {
 
@@ -13,6 +16,18 @@ struct HeldTarget {
 
 /// How one implicit step goes from q0 to q1.
 enum class StepRule { backward_euler, midpoint, energy_momentum };
+
+/// Parts of a fourth-order step, each a symmetric step of second order; the third goes back in time.
+/// [Suzuki 1990; Hairer, Lubich and Wanner: Geometric numerical integration, 2006, II.4].
+inline constexpr double kSuzuki = 0.41449077179437573714;  // 1 / (4 - 4^(1/3))
+inline constexpr std::array<double, 5> kFourthOrderParts = {kSuzuki, kSuzuki, 1.0 - 4.0 * kSuzuki, kSuzuki, kSuzuki};
+
+/// One implicit step: its rule and its length; `slot` tells the parts of a composition apart.
+struct StepPlan {
+  StepRule rule = StepRule::midpoint;
+  double dt = 0;  ///< [s]
+  int slot = 0;
+};
 
 struct StepResult {
   bool accepted = false;
@@ -33,9 +48,10 @@ struct StepWorkspace {
   State from, next;  ///< explicit steps
 };
 
-/// Advances `state` by dt to where `work.held` says, or leaves it as it was when the step is not accepted.
-StepResult implicit_step(Equations& equations, const Newton& newton, const Options& options, StepRule rule,
-                         const Parameters& parameters, double dt, State& state, StepWorkspace& work);
+/// Advances `state` to where `work.held` says, or leaves it as it was when the step is not accepted.
+StepResult implicit_step(Equations& equations, const Newton& newton, const Options& options,
+                         const Parameters& parameters, const StepPlan& plan, State& state, Predictor& predictor,
+                         StepWorkspace& work);
 
 /// Velocity Verlet; velocity-dependent forces are taken at the half step.
 StepResult verlet_step(Equations& equations, const Parameters& parameters, double dt, State& state,

@@ -64,7 +64,7 @@ void Equations::begin(const State& state, const Parameters& parameters, double h
   gravity_ = gravity_force(model_, parameters);
   set_elastic(parameters, elastic);
   total_ = elastic;
-  const bool viscous = parameters.viscous && h > 0.0;
+  const bool viscous = parameters.viscous && h != 0.0;
   if (viscous || energy_momentum) compute_configuration(model_, state, state.q, start_);
   if (viscous) {
     set_viscous(model_, parameters, start_, h, viscous_);
@@ -72,7 +72,7 @@ void Equations::begin(const State& state, const Parameters& parameters, double h
   }
   floor_current_ = false;
   node_dof_drag_.setZero();
-  if (parameters.dragged && h > 0.0)
+  if (parameters.dragged && h != 0.0)
     for (int i = 0; i < model_.node_count; ++i)
       node_dof_drag_.segment(model_.node_dof[at(i)], model_.dimension).setConstant(parameters.node_drag(i));
 }
@@ -106,13 +106,13 @@ void Equations::evaluate(const VectorX& z, bool with_matrix, const double* axial
       for (int i = 0; i < model_.dimension; ++i) out.potential += local.gradient[i] * z(dofs[i]);
   }
   out.potential -= gravity_.dot(z);
-  const double inverse = h_ > 0.0 ? 1.0 / h_ : 0.0;
+  const double inverse = h_ != 0.0 ? 1.0 / h_ : 0.0;
   const VectorX move = z - state_->q;
   const VectorX inertia = mass.cwiseProduct(inverse * inverse * move - inverse * state_->v);
   const VectorX drag = inverse * node_dof_drag_.cwiseProduct(move);
-  out.residual += inertia * (h_ > 0.0 ? 1.0 : 0.0) + drag - gravity_ - custom_force;
+  out.residual += inertia * (h_ != 0.0 ? 1.0 : 0.0) + drag - gravity_ - custom_force;
   out.magnitude += drag.cwiseAbs() + gravity_.cwiseAbs() + custom_force.cwiseAbs();
-  if (h_ > 0.0) {
+  if (h_ != 0.0) {
     out.magnitude += inertia.cwiseAbs();
     if (!model_.planar()) add_spin_couple(z, out);
     if (with_matrix)
@@ -400,11 +400,11 @@ void Equations::set_floor(const VectorX& z, VectorX& floor) {
     for (int i = 0; i < model_.frame_size(); ++i) floor(model_.frame_dof[at(s.frame)] + i) += moment;
     if (s.hinge >= 0) floor(model_.hinges[at(s.hinge)].dof) += moment;
   }
-  if (h_ > 0.0) floor += (4.0 * kEpsilon * std::max(reach, 1e-300) / (h_ * h_)) * mass;
+  if (h_ != 0.0) floor += (4.0 * kEpsilon * std::max(reach, 1e-300) / (h_ * h_)) * mass;
 }
 
 VectorX Equations::dissipative_force() const {
-  const double inverse = h_ > 0.0 ? 1.0 / h_ : 0.0;
+  const double inverse = h_ != 0.0 ? 1.0 / h_ : 0.0;
   VectorX force = -inverse * node_dof_drag_.cwiseProduct(last_z_ - state_->q);
   if (!parameters_->viscous || h_ == 0.0) return force;
   VectorX gradient = VectorX::Zero(model_.dof_count), unused = gradient;

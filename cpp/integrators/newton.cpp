@@ -1,5 +1,6 @@
 #include "integrators/newton.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 
@@ -7,6 +8,15 @@ namespace withe {
 namespace {
 
 using Clock = std::chrono::steady_clock;
+
+// A matrix of an earlier time step that leaves more than this of an error has served badly, and is tried again after
+// so many steps.
+constexpr double kSlow = 0.15;
+constexpr int kPatience = 16;
+// So many iterations cost as much as a new matrix.
+constexpr int kTiring = 3;
+// An iteration with an old matrix costs about a quarter of one with a new one.
+constexpr double kWorth = 2.5;
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
@@ -16,10 +26,10 @@ Newton::Newton(const Model& model, const Options& options) : model_(model), opti
   is_angle_.assign(static_cast<std::size_t>(model.dof_count), true);
   for (int dof : model.node_dof)
     for (int i = 0; i < model.dimension; ++i) is_angle_[static_cast<std::size_t>(dof + i)] = false;
-  for (int dof : model.node_dof) blocks_.push_back({dof, model.dimension, false});
-  for (int dof : model.frame_dof) blocks_.push_back({dof, model.frame_size(), true});
-  for (int dof : model.edge_dof) blocks_.push_back({dof, 1, true});
-  for (const Hinge& hinge : model.hinges) blocks_.push_back({hinge.dof, 1, true});
+  for (int dof : model.node_dof) nodes_.push_back({dof, model.dimension});
+  for (int dof : model.frame_dof) angles_.push_back({dof, model.frame_size()});
+  for (int dof : model.edge_dof) angles_.push_back({dof, 1});
+  for (const Hinge& hinge : model.hinges) angles_.push_back({hinge.dof, 1});
   edge_scale_ = model.edge_length.minCoeff();
 }
 
@@ -48,22 +58,30 @@ Balance Newton::balance(const Evaluation& e, NewtonResult& result) const {
   return balance;
 }
 
-double Newton::cap(const VectorX& step) const {
-  double move = 0.0, turn = 0.0;
-  for (const Block& block : blocks_) {
-    double& greatest = block.angle ? turn : move;
-    greatest = std::max(greatest, step.segment(block.first, block.size).norm());
+/// Length of the longest of some blocks of a step.
+double Newton::greatest(const std::vector<Block>& blocks, const VectorX& step) const {
+  double square = 0.0;
+  for (const Block& block : blocks) {
+    double sum = 0.0;
+    for (int i = 0; i < block.size; ++i) sum += step(block.first + i) * step(block.first + i);
+    square = std::max(square, sum);
   }
+  return std::sqrt(square);
+}
+
+double Newton::cap(const VectorX& step) const {
+  const double move = greatest(nodes_, step), turn = greatest(angles_, step);
   // An edge may turn by about half a radian at once.
   double edge_turn = 0.0;
   for (int e = 0; e < model_.edge_count; ++e) {
     const auto i = static_cast<std::size_t>(e);
     const int a = model_.node_dof[static_cast<std::size_t>(model_.edge_tail[i])];
     const int b = model_.node_dof[static_cast<std::size_t>(model_.edge_head[i])];
-    double d = 0.0;
-    for (int k = 0; k < model_.dimension; ++k) d += std::pow(step(b + k) - step(a + k), 2);
-    edge_turn = std::max(edge_turn, std::sqrt(d) / model_.edge_length(e));
+    double square = 0.0;
+    for (int k = 0; k < model_.dimension; ++k) square += (step(b + k) - step(a + k)) * (step(b + k) - step(a + k));
+    edge_turn = std::max(edge_turn, square / (model_.edge_length(e) * model_.edge_length(e)));
   }
+  edge_turn = std::sqrt(edge_turn);
   double factor = 1.0;
   if (move > 0.5 * model_.length_scale) factor = 0.5 * model_.length_scale / move;
   if (turn * factor > 1.5) factor = 1.5 / turn;
@@ -72,73 +90,130 @@ double Newton::cap(const VectorX& step) const {
 }
 
 double Newton::displacement(const VectorX& step) const {
-  double move = 0.0;
-  for (const Block& block : blocks_)
-    move = std::max(move, step.segment(block.first, block.size).norm() * (block.angle ? edge_scale_ : 1.0));
-  return move;
+  return std::max(greatest(nodes_, step), edge_scale_ * greatest(angles_, step));
+}
+
+/// Of the matrix as it is; a free mode (a rod that may spin about its axis) is held by a shift far below every
+/// stiffness.
+bool Newton::factorize(Equations& equations, NewtonWorkspace& work) const {
+  LinearSolver& solver = equations.assembler().solver();
+  ++work.counters.factorizations;
+  if (solver.factorize().status == FactorStatus::ok) return true;
+  double greatest = 0.0;
+  for (int i = 0; i < model_.dof_count; ++i)
+    greatest = std::max(greatest, std::abs(equations.assembler().diagonal(i)));
+  work.trial.setConstant(model_.dof_count, 1e-12 * greatest);
+  return greatest > 0.0 &&
+         solver.factorize({work.trial.data(), static_cast<std::size_t>(work.trial.size())}).status == FactorStatus::ok;
+}
+
+/// Where a solve with matrices that may be old stands.
+struct Newton::Progress {
+  bool may_reuse = false;
+  bool fresh = true;  ///< whether the coming iteration makes a matrix
+  MatrixAge age = MatrixAge::fresh, last_age = MatrixAge::fresh;
+  double step = INFINITY, last_step = INFINITY;  ///< [m]
+  double rest = INFINITY;                        ///< estimated distance from the solution [m]
+  bool made_here = false;
+};
+
+/// After an iteration: learns how well matrices serve, and decides about the next one.
+void Newton::plan_next(Progress& p, FactorRecord& factor) const {
+  const auto at = [](MatrixAge age) { return static_cast<std::size_t>(age); };
+  const double tolerance = options_.step_tolerance * model_.length_scale;
+  p.rest = p.step;
+  if (!p.may_reuse) return;
+  bool measured = false;
+  if (std::isfinite(p.last_step) && std::isfinite(p.step)) {
+    // Steps near the tolerance are rounding as much as progress.
+    const double rate = p.step / p.last_step;
+    double& known = factor.contraction[at(p.last_age)];
+    if (p.last_step > 1e2 * tolerance || rate < known) known = rate;
+    measured = p.last_age == p.age;
+  }
+  const double here = std::min(0.5, (measured ? 1.0 : 4.0) * factor.contraction[at(p.age)]);
+  p.rest = p.step * here / (1.0 - here);
+  const double next = factor.contraction[at(p.age == MatrixAge::across ? MatrixAge::across : MatrixAge::within)];
+  p.fresh = !std::isfinite(p.step) || next > 0.5 ||
+            (p.rest > tolerance && std::log(p.rest / tolerance) > kWorth * std::log(1.0 / next));
 }
 
 NewtonResult Newton::solve(Equations& equations, VectorX& z, const VectorX* target, int max_iterations,
-                           NewtonWorkspace& work, bool mixed) const {
+                           NewtonWorkspace& work, bool mixed, double interval) const {
   mixed = mixed && options_.mixed;
   NewtonResult result;
   Evaluation& e = work.evaluation;
+  FactorRecord& factor = work.factor;
   const double tolerance = options_.step_tolerance * model_.length_scale;
   LinearSolver& solver = equations.assembler().solver();
-  bool axial_known = false;
-  double previous_step = INFINITY;
-  result.step = INFINITY;
+  Progress p;
+  p.may_reuse = interval != 0.0 && options_.line_search != LineSearch::goldstein_price;
+  if (p.may_reuse && factor.owner == &equations && factor.interval == std::abs(interval)) {
+    const bool slow = factor.contraction[static_cast<std::size_t>(MatrixAge::across)] > kSlow;
+    p.fresh = factor.tired || (slow && ++factor.waited < kPatience);
+    if (!p.fresh) factor.waited = 0;
+  }
+  factor.tired = false;
+  if (!p.may_reuse) factor.owner = nullptr;
+  bool axial_known = mixed && interval != 0.0;
   int stagnant = 0;
+  const auto give_up = [&] {
+    factor.owner = nullptr;
+    return result;
+  };
   for (;; ++result.iterations) {
     work.poll();
     const auto start = Clock::now();
-    const bool expect_end = result.step <= tolerance * 1e3;
+    const bool expect_end = p.rest <= tolerance * 1e3;
     const double* axial = mixed && axial_known ? work.axial_force.data() : nullptr;
     const auto evaluate = [&](bool matrix) {
       equations.evaluate(z, matrix, axial, e);
       if (target) e.residual -= *target;
     };
-    evaluate(!expect_end);
-    if (!e.residual.allFinite()) return result;
+    evaluate(p.fresh && !expect_end);
+    result.step = p.step;
+    if (!e.residual.allFinite()) return give_up();
     const Balance balance = this->balance(e, result);
     // Rounding alone is no proof before the first step: a light load on a stiff rod hides in it.
     if ((balance.floor && (result.iterations > 0 || balance.relative)) ||
-        (balance.either && (result.step <= tolerance || stagnant >= 3))) {
+        (balance.either && (p.rest <= tolerance || stagnant >= 3))) {
       work.counters.assembly_time += seconds_since(start);
       result.converged = true;
+      factor.tired = p.age == MatrixAge::across && result.iterations >= kTiring;
       return result;
     }
-    if (result.iterations == max_iterations) return result;
-    if (expect_end) evaluate(true);
+    if (result.iterations == max_iterations) return give_up();
+    if (p.fresh && expect_end) evaluate(true);
     work.counters.assembly_time += seconds_since(start);
 
     const auto solve_start = Clock::now();
-    ++work.counters.factorizations;
     ++work.counters.iterations;
-    if (solver.factorize().status != FactorStatus::ok) {
-      // A free mode (a rod that may spin about its axis): hold it by a shift far below every stiffness.
-      double greatest = 0.0;
-      for (int i = 0; i < model_.dof_count; ++i)
-        greatest = std::max(greatest, std::abs(equations.assembler().diagonal(i)));
-      work.trial.setConstant(model_.dof_count, 1e-12 * greatest);
-      if (!(greatest > 0.0) ||
-          solver.factorize({work.trial.data(), static_cast<std::size_t>(work.trial.size())}).status != FactorStatus::ok)
-        return result;
+    if (p.fresh) {
+      if (!factorize(equations, work)) return give_up();
+      p.made_here = true;
+      factor.owner = p.may_reuse ? &equations : nullptr;
+      factor.interval = std::abs(interval);
     }
     work.step = -e.residual;
     solver.solve({work.step.data(), static_cast<std::size_t>(work.step.size())});
     work.counters.solve_time += seconds_since(solve_start);
-    if (!work.step.allFinite()) return result;
-    double factor = cap(work.step);
-    if (options_.line_search == LineSearch::goldstein_price)
-      factor *= line_search(equations, z, factor * work.step, target, work);
-    work.step *= factor;
+    if (!work.step.allFinite()) return give_up();
+    double shorten = cap(work.step);
+    work.step *= shorten;
+    if (options_.line_search == LineSearch::goldstein_price) {
+      const double alpha = line_search(equations, z, work.step, target, work);
+      work.step *= alpha;
+      shorten *= alpha;
+    }
     if (mixed) equations.predict_axial_force(work.step, work.axial_force);
     axial_known = mixed;
     z += work.step;
-    previous_step = result.step;
-    result.step = factor < 1.0 ? INFINITY : displacement(work.step);
-    stagnant = balance.either && result.step > 0.25 * previous_step ? stagnant + 1 : 0;
+    p.last_step = p.step;
+    p.last_age = p.age;
+    p.step = shorten < 1.0 ? INFINITY : displacement(work.step);
+    p.age = p.fresh ? MatrixAge::fresh : p.made_here ? MatrixAge::within : MatrixAge::across;
+    stagnant = balance.either && p.step > 0.25 * p.last_step ? stagnant + 1 : 0;
+    plan_next(p, factor);
   }
 }
 

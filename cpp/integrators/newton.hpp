@@ -1,6 +1,7 @@
 #pragma once
 /// Newton's method for one step, mixed in the axial forces.
 
+#include <array>
 #include <functional>
 
 #include "integrators/equations.hpp"
@@ -27,10 +28,24 @@ struct Balance {
   bool either = true;    ///< each one or the other
 };
 
+/// Where the matrix of an iteration was made: there, at an earlier iterate, or in an earlier time step.
+enum class MatrixAge { fresh, within, across };
+
+/// What the factorisation in a solver belongs to, and how well old ones have served.
+struct FactorRecord {
+  const Equations* owner = nullptr;  ///< nothing: not to be used again
+  double interval = 0;               ///< [s]
+  std::array<double, 3> contraction{1e-2, 1e-2, 1e-2};  ///< per MatrixAge: error after an iteration over error before
+  int waited = 0;                                       ///< time steps since one was last tried across
+  bool tired = false;                                   ///< served the last time step slowly
+  int plain_solves = 0;                                 ///< still to come before the mixed method is tried again
+};
+
 /// Scratch of the solver; owned by the world, so that a step does not allocate.
 struct NewtonWorkspace {
   Evaluation evaluation;
   VectorX step, axial_force, trial;
+  FactorRecord factor;
   Counters counters;
   std::function<void()> poll = [] {};  ///< asked once an iteration; what it throws ends the solve
 };
@@ -40,9 +55,11 @@ class Newton {
   Newton(const Model& model, const Options& options);
 
   /// Finds z with F(z) = target (nothing: zero), starting at z. `mixed`: with the axial forces as unknowns of
-  /// their own, where the options allow it.
+  /// their own, where the options allow it. `interval`: of a time step, whose matrix may serve several iterations and
+  /// the steps to come, as long as it makes steps small fast (0: a new one every iteration); the mixed method then sets
+  /// out from work.axial_force.
   NewtonResult solve(Equations& equations, VectorX& z, const VectorX* target, int max_iterations, NewtonWorkspace& work,
-                     bool mixed = true) const;
+                     bool mixed = true, double interval = 0.0) const;
   /// Whether residuals are small enough; also notes the worst one in `result`.
   Balance balance(const Evaluation& evaluation, NewtonResult& result) const;
   /// Factor by which a step is shortened, so that nothing moves or turns too far at once.
@@ -52,6 +69,9 @@ class Newton {
   const std::vector<bool>& is_angle() const { return is_angle_; }
 
  private:
+  bool factorize(Equations& equations, NewtonWorkspace& work) const;
+  struct Progress;
+  void plan_next(Progress& progress, FactorRecord& factor) const;
   double line_search(Equations& equations, const VectorX& z, const VectorX& step, const VectorX* target,
                      NewtonWorkspace& work) const;
 
@@ -60,10 +80,10 @@ class Newton {
   /// Unknowns that are one vector: a node's position, a frame's rotation, an angle.
   struct Block {
     int first, size;
-    bool angle;
   };
+  double greatest(const std::vector<Block>& blocks, const VectorX& step) const;
   std::vector<bool> is_angle_;
-  std::vector<Block> blocks_;
+  std::vector<Block> nodes_, angles_;
   double edge_scale_ = 1.0;
 };
 

@@ -7,7 +7,7 @@
 
 namespace withe {
 
-enum class Integrator { statics, backward_euler, implicit_midpoint, energy_momentum, verlet };
+enum class Integrator { statics, backward_euler, implicit_midpoint, energy_momentum, fourth_order, verlet };
 
 enum class LineSearch {
   automatic,        ///< full steps with a cap; falls back to the energy line search

@@ -60,6 +60,7 @@ World::Implementation::Implementation(SceneDescription scene, Options choice)
   require(options.time_step > 0.0 && std::isfinite(options.time_step), "time_step must be positive and finite");
   for (const LoadDescription& load : description.loads) load_values.push_back(load.value);
   rebuild(Rebuild::first);
+  check_reversible(parameters);
   if (options.integrator == Integrator::verlet) {
     plan.stable_step = stable_step(*equations, parameters, state, work.newton);
     require(options.time_step <= plan.stable_step,
@@ -75,6 +76,7 @@ World::Implementation::Implementation(const Implementation& other)
       parameters(other.parameters),
       work(other.work),
       state(other.state),
+      predictor(other.predictor),
       plan(other.plan),
       statistics(other.statistics),
       motions(other.motions),
@@ -98,6 +100,7 @@ World::Implementation::Implementation(const Implementation& other)
   newton = std::make_unique<Newton>(model, options);
   equations = std::make_unique<Equations>(model, options);
   equations->loads().values = load_values;
+  forget_matrix();
 }
 
 void World::Implementation::listen() {
@@ -137,6 +140,7 @@ void World::Implementation::rebuild(Rebuild why) {
   listen();
   work.newton.counters = counters;
   energy_scratch = EnergyScratch{};
+  predictor.clear();
   if (why == Rebuild::first) {
     model = std::move(fresh);
     parameters = initial_parameters(model);

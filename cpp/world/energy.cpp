@@ -59,26 +59,35 @@ double World::Implementation::actuation_energy() const {
 }
 
 Energy World::Implementation::energy() const {
+  return energy_of(state, load_work, support_work + actuation_work, dissipated);
+}
+
+/// Energy of a state, with books as they were kept there.
+Energy World::Implementation::energy_of(const State& at, double loads, double work_done, double lost) const {
   Energy e;
   auto& [c, k] = energy_scratch;
-  compute_configuration(model, state, state.q, c);
+  compute_configuration(model, at, at.q, c);
   set_elastic(parameters, k);
-  e.kinetic = kinetic_energy(model, parameters, state.v);
+  e.kinetic = kinetic_energy(model, parameters, at.v);
   for (int i = 0; i < model.edge_count; ++i) e.stretch += stretch_energy_of(model, k, c, i);
   const BendTwistEnergy turned = bend_twist_energy(model, k, c);
   e.bend = turned.bend;
   e.twist = turned.twist;
-  e.gravity = gravity_energy(model, parameters, state.q);
-  e.loads = -load_work;
+  e.gravity = gravity_energy(model, parameters, at.q);
+  e.loads = -loads;
   e.total = e.kinetic + e.stretch + e.bend + e.twist + e.gravity + e.loads + e.contact;
-  e.work = support_work + actuation_work;
-  e.dissipated = dissipated;
+  e.work = work_done;
+  e.dissipated = lost;
   return e;
 }
 
-/// Plain midpoint pumps energy into stretching when edges turn far within a step: whether the step just taken did.
+/// Plain midpoint pumps energy into stretching when edges turn far within a step: whether the step just taken, from
+/// where `keep_for_return` was called, did.
 bool World::Implementation::gains_energy() {
-  const Energy then = *guard.energy, now = energy();
+  const Energy then = guard.energy ? *guard.energy
+                                   : energy_of(kept.state, kept.load_work, kept.support_work + kept.actuation_work,
+                                               kept.dissipated);
+  const Energy now = energy();
   guard.energy = now;
   guard.scale = std::max({guard.scale, now.kinetic, then.kinetic, 0.1 * (now.stretch + now.bend + now.twist)});
   const double gain = (now.total - now.work + now.dissipated) - (then.total - then.work + then.dissipated);

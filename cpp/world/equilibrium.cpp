@@ -63,6 +63,8 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
   state.v.setZero();
   state.acceleration.setZero();
   state.acceleration_current = false;
+  predictor.clear();
+  forget_matrix();
   StaticResult r;
   try {
     if (reachable) r = find_equilibrium(system, *newton, options, parameters, boundary, state, work.newton);

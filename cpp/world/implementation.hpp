@@ -41,6 +41,7 @@ struct EnergyGuard {
 /// What a step that is taken back returns to.
 struct StepStart {
   State state;
+  Predictor predictor;
   std::vector<SupportMotion> motions;
   double support_work = 0, actuation_work = 0, dissipated = 0, load_work = 0;
 };
@@ -68,6 +69,7 @@ struct World::Implementation {
   std::unique_ptr<Equations> static_equations;  ///< symmetric ones, made when first needed
   StepWorkspace work;
   mutable EnergyScratch energy_scratch;
+  Predictor predictor;
   StepStart kept;
   std::vector<SupportMotion> kept_motions;
   State state;
@@ -125,10 +127,16 @@ struct World::Implementation {
   void keep_for_return();
   void take_back();
   void commit_step();
+  void return_to_start();
+  bool scheme_step(double dt, double& error);
+  bool composed_step(double dt, double& error);
+  bool conserving() const;
   double force_time(double start, double dt) const;
-  bool inner_step(double dt, double& error);
-  StepResult step_by_rule(double dt);
-  void keep_reactions(double part);
+  bool inner_step(double dt, int slot, double& error);
+  StepResult step_by_rule(double dt, int slot);
+  void keep_reactions();
+  void check_reversible(const Parameters& p) const;
+  void forget_matrix() { work.newton.factor = FactorRecord{}; }
   Place place_of(int row) const;
   [[noreturn]] void fail(const NewtonResult& newton, double dt, const std::string& what) const;
 
@@ -140,6 +148,7 @@ struct World::Implementation {
 
   // energy.cpp
   Energy energy() const;
+  Energy energy_of(const State& at, double loads, double work_done, double lost) const;
   double actuation_energy() const;
   bool gains_energy();
   void check_explicit();

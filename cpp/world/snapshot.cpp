@@ -84,6 +84,7 @@ void exchange(Archive& io, Self& self) {
   for (auto& f : s.frame) io(f);
   io(s.bend_tau);
   io(s.half_tau);
+  self.predictor.exchange(io);
   io(self.reaction_current);
   io(self.reaction_residual);
 }
@@ -98,6 +99,7 @@ void give_sizes(World::Implementation& self) {
     for (VectorX* v : {&ramp.from_twist, &ramp.to_twist})
       if (v->size() != rod.natural_twist.size()) *v = rod.natural_twist;
   }
+  self.predictor.resize(self.model.dof_count);
   if (self.reaction_residual.size() != self.model.dof_count) self.reaction_residual.setZero(self.model.dof_count);
 }
 
@@ -106,6 +108,7 @@ void give_sizes(World::Implementation& self) {
 std::string World::snapshot() const {
   Implementation& self = *implementation_;
   give_sizes(self);
+  self.forget_matrix();  // who restores has none, and goes on with the same bits
   Writer w;
   w(kMagic);
   w(fingerprint(self.description));
@@ -187,7 +190,10 @@ void World::restore(const std::string& bytes) {
               fresh->easy_steps < 1 << 20 && fresh->guard.rescue >= 0 && fresh->guard.rescue <= 256,
           "snapshot is damaged: impossible step size");
   require(fresh->state.q.allFinite() && fresh->state.v.allFinite(), "snapshot is damaged: not finite");
+  require(fresh->predictor.plausible(), "snapshot is damaged: impossible history");
   update_derived(fresh->model, fresh->parameters);
+  fresh->check_reversible(fresh->parameters);
+  fresh->forget_matrix();
   fresh->equations->loads().values = fresh->load_values;
   fresh->alarm.reset();
   implementation_ = std::move(fresh);

@@ -1,9 +1,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <utility>
 
 #include <Eigen/LU>
 
+#include "common/check.hpp"
 #include "geometry/rotation.hpp"
 #include "world/implementation.hpp"
 
@@ -66,20 +68,21 @@ void World::Implementation::grow(Attempt attempt) {
 
 /// One step of dt, taken back where it gains energy from nowhere or is not accurate enough.
 World::Implementation::Attempt World::Implementation::try_step(double dt) {
-  const bool guarded = options.adaptive && options.integrator == Integrator::implicit_midpoint;
-  // Where edges hardly turn, there is nothing to gain and nothing to look at.
-  const bool watched = guarded && guard.turn > 0.01 && guard.rescue == 0;
-  if (watched || options.tolerance) keep_for_return();
-  if (!watched)
-    guard.energy.reset();
-  else if (!guard.energy)
-    guard.energy = energy();
+  const bool fourth = options.integrator == Integrator::fourth_order;
+  const bool guarded = options.adaptive && guard.rescue == 0 &&
+                       (options.integrator == Integrator::implicit_midpoint || fourth);
+  if (guarded || options.tolerance || fourth) keep_for_return();
+  // Actuation changes what is stored without a motion, so the start is looked at while it is as it was.
+  if (guarded && !guard.energy && actuated()) guard.energy = energy();
   double error = 0.0;
-  if (!inner_step(dt, error)) {
+  if (!scheme_step(dt, error)) {
     statistics.rejected_steps += 1;
     return Attempt::failed;
   }
-  if (watched && gains_energy()) {
+  // Where edges hardly turn, there is nothing to gain and nothing to look at.
+  if (!guarded || guard.turn <= 0.01) {
+    guard.energy.reset();
+  } else if (gains_energy()) {
     // The same step again, and a while of them, without the flaw.
     take_back();
     guard.rescue = 256;
@@ -88,6 +91,7 @@ World::Implementation::Attempt World::Implementation::try_step(double dt) {
   const double allowed = options.tolerance ? *options.tolerance * dt / options.duration.value_or(1.0) : INFINITY;
   if (error > allowed && may_cut()) {
     take_back();
+    guard.energy.reset();
     return Attempt::failed;
   }
   commit_step();
@@ -96,6 +100,7 @@ World::Implementation::Attempt World::Implementation::try_step(double dt) {
 
 void World::Implementation::keep_for_return() {
   kept.state = state;
+  kept.predictor = predictor;
   kept.motions = motions;
   kept.support_work = support_work;
   kept.actuation_work = actuation_work;
@@ -103,7 +108,14 @@ void World::Implementation::keep_for_return() {
   kept.load_work = load_work;
 }
 
+/// Undoes an accepted step.
 void World::Implementation::take_back() {
+  return_to_start();
+  reaction_current = false;
+  statistics.rejected_steps += 1;
+}
+
+void World::Implementation::return_to_start() {
   state = kept.state;
   motions = kept.motions;
   support_work = kept.support_work;
@@ -111,8 +123,7 @@ void World::Implementation::take_back() {
   dissipated = kept.dissipated;
   load_work = kept.load_work;
   apply_ramps(state.time);
-  reaction_current = false;
-  statistics.rejected_steps += 1;
+  predictor = kept.predictor;
 }
 
 /// What only steps that stay may do.
@@ -126,15 +137,48 @@ void World::Implementation::commit_step() {
   retire_ramps();
 }
 
+/// Whether each implicit step conserves or pumps like the midpoint rule, with forces at its middle.
+bool World::Implementation::conserving() const {
+  return options.integrator == Integrator::implicit_midpoint || options.integrator == Integrator::energy_momentum ||
+         options.integrator == Integrator::fourth_order;
+}
+
 /// When loads and actuation act in a step: at its middle under the midpoint rules, else at its end.
 double World::Implementation::force_time(double start, double dt) const {
-  const bool mid =
-      options.integrator == Integrator::implicit_midpoint || options.integrator == Integrator::energy_momentum;
-  return start + (mid ? 0.5 : 1.0) * dt;
+  return start + (conserving() ? 0.5 : 1.0) * dt;
+}
+
+/// One step of the scheme; changes nothing where it does not converge.
+bool World::Implementation::scheme_step(double dt, double& error) {
+  const double turn = std::exchange(guard.turn, 0.0);
+  const bool done =
+      options.integrator == Integrator::fourth_order ? composed_step(dt, error) : inner_step(dt, 0, error);
+  if (!done) guard.turn = turn;
+  return done;
+}
+
+/// Reactions are those in the middle of the part in the middle, which is the middle of the step.
+bool World::Implementation::composed_step(double dt, double& error) {
+  const double start = state.time;
+  double reached = 0.0;
+  try {
+    for (std::size_t i = 0; i < kFourthOrderParts.size(); ++i) {
+      reached += kFourthOrderParts[i];
+      if (!inner_step(kFourthOrderParts[i] * dt, static_cast<int>(i), error)) {
+        return_to_start();
+        return false;
+      }
+      state.time = start + reached * dt;
+    }
+  } catch (...) {
+    return_to_start();
+    throw;
+  }
+  return true;
 }
 
 /// Asks for what is prescribed, and steps by dt; changes nothing where the step does not converge.
-bool World::Implementation::inner_step(double dt, double& error) {
+bool World::Implementation::inner_step(double dt, int slot, double& error) {
   const double start = state.time, end = start + dt, middle = force_time(start, dt);
   if (callback) callback(middle, end);
   const bool ramped = actuated();
@@ -153,9 +197,10 @@ bool World::Implementation::inner_step(double dt, double& error) {
   };
   StepResult r;
   try {
-    r = step_by_rule(dt);
+    r = step_by_rule(dt, slot);
   } catch (...) {
     undo();
+    forget_matrix();  // the step that comes next is the same whether this one was tried or not
     throw;
   }
   last_newton = r.newton;
@@ -164,11 +209,11 @@ bool World::Implementation::inner_step(double dt, double& error) {
     return false;
   }
   error = r.error;
-  guard.turn = r.largest_turn;
+  guard.turn = std::max(guard.turn, r.largest_turn);
   load_work += r.load_work;
   dissipated += r.dissipated;
   support_work += r.support_work;
-  keep_reactions(middle == end ? 1.0 : 0.5);
+  if (options.integrator != Integrator::fourth_order || slot == 2) keep_reactions();
   if (ramped) {
     actuation -= actuation_energy();
     apply_ramps(end);
@@ -178,7 +223,7 @@ bool World::Implementation::inner_step(double dt, double& error) {
   return true;
 }
 
-StepResult World::Implementation::step_by_rule(double dt) {
+StepResult World::Implementation::step_by_rule(double dt, int slot) {
   const bool rescued = guard.rescue > 0;
   Equations& system = rescued ? rescue() : *equations;
   update_custom_force(system);
@@ -186,21 +231,35 @@ StepResult World::Implementation::step_by_rule(double dt) {
   const StepRule rule = rescued || options.integrator == Integrator::energy_momentum ? StepRule::energy_momentum
                         : options.integrator == Integrator::backward_euler           ? StepRule::backward_euler
                                                                                      : StepRule::midpoint;
-  return implicit_step(system, *newton, options, rule, parameters, dt, state, work);
+  return implicit_step(system, *newton, options, parameters, {rule, dt, slot}, state, predictor, work);
 }
 
-/// The residual of a frame's unknowns is J(w)^T moment, w its turn where the forces act: `part` of the step's.
-void World::Implementation::keep_reactions(double part) {
+/// The residual of a frame's unknowns is J(w)^T moment, w its turn where the forces act.
+void World::Implementation::keep_reactions() {
   reaction_residual = work.newton.evaluation.full_residual;
   reaction_current = true;
   if (model.planar()) return;
   for (const Support& support : model.supports) {
     if (!support.active || support.frame < 0) continue;
     const int dof = model.frame_dof[at(support.frame)];
-    const Matrix3 J = cayley_spin(part * work.held.q.segment<3>(dof));
+    const Matrix3 J = cayley_spin((conserving() ? 0.5 : 1.0) * work.held.q.segment<3>(dof));
     const Vector3 moment = reaction_residual.segment<3>(dof);
     reaction_residual.segment<3>(dof) = J.transpose().inverse() * moment;
   }
+}
+
+/// A scheme that steps back in time asks for forces that can be run backwards.
+void World::Implementation::check_reversible(const Parameters& p) const {
+  if (options.integrator != Integrator::fourth_order) return;
+  const std::string instead = ": take integrator 'implicit_midpoint' or 'energy_momentum'";
+  require(!p.viscous, "integrator 'fourth_order' goes back in time within each step, which viscosity does not allow" +
+                          instead);
+  if (!p.dragged) return;
+  for (int i = 0; i < model.node_count; ++i)
+    require(p.node_drag(i) * options.time_step <= p.node_mass(i),
+            "integrator 'fourth_order' goes back in time within each step, which drag allows for time_step up to mass "
+            "over drag only, " +
+                std::to_string(p.node_mass(i) / p.node_drag(i)) + " s at node " + std::to_string(i) + instead);
 }
 
 /// Rod and node of a row of the residual, and how to say it; -1 and nothing where it is not known.

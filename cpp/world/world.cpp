@@ -28,7 +28,10 @@ class Timer {
 
 World::World(SceneDescription description, Options options)
     : implementation_(std::make_unique<Implementation>(std::move(description), options)) {}
-World::World(const World& other) : implementation_(std::make_unique<Implementation>(*other.implementation_)) {}
+World::World(const World& other) : implementation_(std::make_unique<Implementation>(*other.implementation_)) {
+  // A copy has no factorised matrix, so the original lets go of its own: both go on with the same bits.
+  other.implementation_->forget_matrix();
+}
 World::~World() = default;
 
 const SceneDescription& World::description() const { return implementation_->description; }
@@ -218,10 +221,12 @@ void World::set_rod_parameters(int rod, const RodDescription& d) {
        {&d.stretch_stiffness, &d.twist_stiffness, &d.line_density, &d.rotary_inertia, &d.viscous_time, &d.drag})
     require(v->size() == count && v->allFinite(), "rod parameters need one finite number an edge");
   require(d.bend_stiffness.rows() == count && d.bend_stiffness.allFinite(), "bend_stiffness needs one row an edge");
-  Parameters& p = self.parameters;
-  const double before = self.actuation_energy();
+  Parameters p = self.parameters;
   set_rod(self.model, rod, d, p);
   update_derived(self.model, p);
+  self.check_reversible(p);
+  const double before = self.actuation_energy();
+  self.parameters = std::move(p);
   self.actuation_work += self.actuation_energy() - before;
   self.reaction_current = false;
   self.state.acceleration_current = false;
@@ -232,8 +237,11 @@ void World::set_added_mass(const VectorX& mass) {
   Implementation& self = *implementation_;
   require(mass.size() == self.model.node_count && mass.allFinite() && (mass.array() >= 0.0).all(),
           "added mass needs one finite number >= 0 a node");
-  self.parameters.added_mass = mass;
-  update_derived(self.model, self.parameters);
+  Parameters p = self.parameters;
+  p.added_mass = mass;
+  update_derived(self.model, p);
+  self.check_reversible(p);
+  self.parameters = std::move(p);
   self.state.acceleration_current = false;
 }
 
@@ -397,6 +405,7 @@ void World::set_velocities(const MatrixX3& velocities) {
   self.equations->assembler().project(self.state.v);
   self.state.acceleration.setZero();
   self.state.acceleration_current = false;
+  self.predictor.clear();
   self.alarm.reset();
   self.guard.turn = EnergyGuard{}.turn;
 }

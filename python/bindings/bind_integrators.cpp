@@ -6,10 +6,11 @@
 namespace withe::bindings {
 namespace {
 
-constexpr Words<Integrator, 5> kIntegrators{{{"static", Integrator::statics},
+constexpr Words<Integrator, 6> kIntegrators{{{"static", Integrator::statics},
                                              {"backward_euler", Integrator::backward_euler},
                                              {"implicit_midpoint", Integrator::implicit_midpoint},
                                              {"energy_momentum", Integrator::energy_momentum},
+                                             {"fourth_order", Integrator::fourth_order},
                                              {"verlet", Integrator::verlet}}};
 constexpr Words<LineSearch, 3> kLineSearches{{{"automatic", LineSearch::automatic},
                                               {"goldstein_price", LineSearch::goldstein_price},

@@ -459,7 +459,7 @@ class Control:
                     self._world.set_load(index, validation.vector(function(force_time), what))
         for name, path in self._settings.paths.items():
             index, support = self._settings.supports[name]
-            if _finished(path, self._world.time):
+            if _finished(path, min(self._world.time, end_time)):
                 continue
             present = np.array(self._world.support_rotation(index))
             owner = f"support {name!r}"

@@ -436,7 +436,9 @@ class Scene:
 
         Parameters
         ----------
-        integrator : {"implicit_midpoint", "backward_euler", "energy_momentum", "verlet", "static"}
+        integrator : {"implicit_midpoint", "backward_euler", "energy_momentum", "fourth_order", "verlet", "static"}
+            "fourth_order" is five midpoint steps in one, the third back in time; it takes no viscosity, and
+            drag only up to mass over time_step.
         time_step : float [s]
         adaptive : bool
             Whether an implicit step that fails is halved; steps grow back.
@@ -468,7 +470,7 @@ class Scene:
         ------
         ValueError
             A scene without rods, planar=True for one that lies in no plane, an explicit step above
-            the stable limit, or an option out of range.
+            the stable limit, "fourth_order" with viscosity or strong drag, or an option out of range.
         """
         from withe.simulation import Simulation, make_options
 

@@ -27,7 +27,9 @@ if TYPE_CHECKING:
 __all__ = ["Integrator", "LineSearch", "Simulation", "Solver", "make_options"]
 
 FloatArray = npt.NDArray[np.float64]
-Integrator = Literal["implicit_midpoint", "backward_euler", "energy_momentum", "verlet", "static"]
+Integrator = Literal[
+    "implicit_midpoint", "backward_euler", "energy_momentum", "fourth_order", "verlet", "static"
+]
 LineSearch = Literal["automatic", "goldstein_price", "none"]
 Solver = Literal["automatic", "band", "sparse"]
 
@@ -463,7 +465,7 @@ def make_options(**options: Any) -> dict[str, Any]:
     """
     checked = dict(options)
     words = {
-        "integrator": ("implicit_midpoint", "backward_euler", "energy_momentum", "verlet", "static"),
+        "integrator": ("implicit_midpoint", "backward_euler", "energy_momentum", "fourth_order", "verlet", "static"),
         "solver": ("automatic", "band", "sparse"),
         "line_search": ("automatic", "goldstein_price", "none"),
     }

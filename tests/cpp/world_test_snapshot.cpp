@@ -14,7 +14,14 @@ using testing::same_state;
 using testing::SceneBuilder;
 
 constexpr Integrator kDynamic[] = {Integrator::backward_euler, Integrator::implicit_midpoint,
-                                   Integrator::energy_momentum, Integrator::verlet};
+                                   Integrator::energy_momentum, Integrator::fourth_order, Integrator::verlet};
+
+/// Whether a scene can run backwards, as parts of fourth-order steps do.
+bool reversible(const SceneDescription& scene) {
+  for (const RodDescription& rod : scene.rods)
+    if ((rod.viscous_time.array() > 0.0).any()) return false;
+  return true;
+}
 
 Options options_for(Integrator integrator) {
   return options(integrator, integrator == Integrator::verlet ? 5e-5 : 5e-3);
@@ -35,6 +42,7 @@ std::vector<SceneDescription> scenes() {
 TEST(Snapshot, ContinuesWithTheSameBitsInTheSameWorldAndInANewOne) {
   for (const SceneDescription& scene : scenes())
     for (Integrator integrator : kDynamic) {
+      if (integrator == Integrator::fourth_order && !reversible(scene)) continue;
       World world(scene, options_for(integrator));
       world.step(6);
       const std::string bytes = world.snapshot();
@@ -199,6 +207,7 @@ TEST(Snapshot, ForgedWithAValidSealEndsInAnErrorOrInAWorldThatRuns) {
 TEST(Copy, GoesOnLikeItsOriginalBitForBit) {
   for (const SceneDescription& scene : scenes())
     for (Integrator integrator : kDynamic) {
+      if (integrator == Integrator::fourth_order && !reversible(scene)) continue;
       World world(scene, options_for(integrator));
       world.step(5);
       World copy(world);
@@ -223,6 +232,7 @@ TEST(Copy, IsIndependentOfItsOriginal) {
 TEST(Step, IsRepeatableBitForBit) {
   for (const SceneDescription& scene : scenes())
     for (Integrator integrator : kDynamic) {
+      if (integrator == Integrator::fourth_order && !reversible(scene)) continue;
       World a(scene, options_for(integrator)), b(scene, options_for(integrator));
       a.step(10);
       for (int k = 0; k < 10; ++k) b.step();

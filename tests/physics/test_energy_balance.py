@@ -100,6 +100,17 @@ def test_energy_of_midpoint_steps_adds_up_at_second_order(what, planar):
     assert_order(errors, slack=0.3)
 
 
+@pytest.mark.parametrize("planar", [True, False], ids=["planar", "spatial"])
+@pytest.mark.parametrize("what", ["drag", "load", "wall", "actuation"])
+def test_energy_of_fourth_order_steps_adds_up_far_better_than_midpoints(what, planar):
+    """Books are kept part by part, each at second order in a part's length."""
+    fourth, _ = worst_imbalance("fourth_order", DURATION / 200, what, planar)
+    midpoint, _ = worst_imbalance("implicit_midpoint", DURATION / 200, what, planar)
+    finer, _ = worst_imbalance("fourth_order", DURATION / 400, what, planar)
+    assert finer < fourth / 3.5
+    assert fourth < midpoint
+
+
 def test_energy_of_a_cantilever_at_rest_is_what_its_parts_say():
     """Work of gravity is what bending and stretching store, and half of it where all is linear."""
     simulation, _ = rods.heavy_cantilever(1e-3, 40)

@@ -8,7 +8,7 @@ from convergence import assert_order
 
 EDGES = 16
 RADIUS = 0.08
-SCHEMES = ("backward_euler", "implicit_midpoint", "energy_momentum", "verlet")
+SCHEMES = ("backward_euler", "implicit_midpoint", "energy_momentum", "fourth_order", "verlet")
 
 
 def rod_points(planar, edges=EDGES):
@@ -73,7 +73,7 @@ def test_linear_momentum_is_kept_to_solver_tolerance(integrator, planar):
     np.testing.assert_allclose(after, before, atol=1e-10)
 
 
-@pytest.mark.parametrize("integrator", ["implicit_midpoint", "energy_momentum"])
+@pytest.mark.parametrize("integrator", ["implicit_midpoint", "energy_momentum", "fourth_order"])
 def test_angular_momentum_is_kept_to_solver_tolerance_in_a_plane(integrator):
     simulation, rod = flight(integrator, 5e-3, True)
     mass = masses(simulation, rod)

@@ -1,4 +1,5 @@
-"""Halving the step divides the error by two (backward Euler) or four (midpoint, energy-momentum, Verlet)."""
+"""Halving the step divides the error by two (backward Euler), four (midpoint, energy-momentum, Verlet) or sixteen
+(fourth order)."""
 
 from itertools import pairwise
 
@@ -44,6 +45,7 @@ def waving(integrator, step, planar):
         ("backward_euler", 1.0, (3200, 6400, 12800)),
         ("implicit_midpoint", 2.0, (400, 800, 1600)),
         ("energy_momentum", 2.0, (400, 800, 1600)),
+        ("fourth_order", 4.0, (50, 100, 200)),
         ("verlet", 2.0, (1600, 3200, 6400)),
     ],
 )
@@ -57,10 +59,100 @@ def test_schemes_agree_in_the_limit():
     reference = waving("implicit_midpoint", DURATION / 3200, False)
     for integrator, steps, allowed in (
         ("energy_momentum", 3200, 2e-5),
+        ("fourth_order", 200, 2e-5),
         ("verlet", 6400, 2e-5),
         ("backward_euler", 6400, 5e-3),
     ):
         np.testing.assert_allclose(waving(integrator, DURATION / steps, False), reference, atol=allowed)
+
+
+def driven(integrator, step, planar):
+    """A curved rod whose clamp moves and turns while a force at its tip comes and goes, drag and actuation included."""
+    scene = withe.Scene(gravity=(0.0, 0.0, -3.0))
+    s = np.linspace(0.0, 1.0, 7)
+    points = np.stack([s, np.zeros_like(s) if planar else 0.2 * s**3, 0.3 * s**2], axis=1)
+    arm = scene.add_rod(
+        points=points,
+        stiffness=rods.stiffness(bend=(1.0, 1.0) if planar else (1.0, 1.5), twist=0.7, stretch=40.0),
+        line_density=1.0,
+        radius=0.2,
+    )
+    scene.clamp(arm.start)
+    scene.add_drag(0.3)
+    scene.add_force(arm.end, lambda t: (0.5 * np.sin(9.0 * t), 0.0 if planar else 0.4 * np.cos(7.0 * t), 0.3 * t))
+    simulation = scene.build(
+        integrator=integrator,
+        time_step=step,
+        planar=None if planar else False,
+        adaptive=False,
+        step_tolerance=1e-12,
+        force_tolerance=1e-12,
+    )
+    axis = (0.0, 1.0, 0.0) if planar else (0.4, 1.0, 0.2)
+    simulation.move(
+        arm.start, path=lambda t: ((0.1 * np.sin(5.0 * t) ** 2, 0.0, 0.2 * t**2), rods.rotation(axis, 0.8 * t**2))
+    )
+    simulation.set_natural_curvature(arm, (0.0, -2.0) if planar else (1.0, -2.0), over=2.0 * DURATION)
+    simulation.step(round(DURATION / step))
+    return simulation.positions(arm)
+
+
+@pytest.mark.parametrize("planar", [True, False], ids=["planar", "spatial"])
+@pytest.mark.parametrize(
+    ("integrator", "order", "steps"),
+    [("implicit_midpoint", 2.0, (200, 400, 800)), ("fourth_order", 4.0, (50, 100, 200))],
+)
+def test_error_falls_at_the_order_of_the_scheme_where_everything_changes_in_time(integrator, order, steps, planar):
+    results = [driven(integrator, DURATION / n, planar) for n in steps]
+    assert_order([np.abs(b - a).max() for a, b in pairwise(results)], order, slack=0.3)
+
+
+def test_fourth_order_steps_can_be_taken_back():
+    """Symmetric: with velocities turned around, a free motion goes back to where it began, to solver tolerance."""
+    scene = rods.weightless()
+    s = np.linspace(0.0, 1.0, 9)
+    arm = scene.add_rod(
+        points=np.stack([s, 0.2 * s**3, 0.3 * s**2], axis=1),
+        natural="straight",
+        stiffness=rods.stiffness(twist=0.7, stretch=400.0),
+        line_density=1.0,
+        radius=1e-3,
+    )
+    scene.clamp(arm.start)
+    simulation = scene.build(
+        integrator="fourth_order", time_step=0.02, adaptive=False, step_tolerance=1e-13, force_tolerance=1e-13
+    )
+    start = simulation.positions(arm)
+    simulation.step(20)
+    far = np.abs(simulation.positions(arm) - start).max()
+    simulation.set_velocities(arm, -simulation.velocities(arm))
+    simulation.step(20)
+    assert far > 0.05
+    np.testing.assert_allclose(simulation.positions(arm), start, atol=1e-6 * far)
+
+
+def test_phase_error_of_fourth_order_is_that_of_five_midpoint_steps():
+    """9.3e-4 (w dt)^4, where midpoint has (w dt)^2 / 12."""
+    exact = theory.CANTILEVER_ROOTS[0] ** 2
+    seen = []
+    for steps in (6, 12, 400):
+        scene = rods.weightless()
+        arm = rods.straight(scene, 30)
+        scene.clamp(arm.start)
+        dt = 2.0 * np.pi / exact / steps
+        simulation = scene.build(
+            integrator="fourth_order", time_step=dt, step_tolerance=1e-12, force_tolerance=1e-12
+        )
+        velocities = np.zeros((31, 3))
+        velocities[:, 2] = 1e-5 * theory.cantilever_mode(np.linspace(0.0, 1.0, 31))
+        simulation.set_velocities(arm, velocities)
+        x = np.empty(8 * min(steps, 40))
+        for i in range(len(x)):
+            simulation.step()
+            x[i] = simulation.positions(arm)[-1, 2]
+        seen.append(np.arccos(0.5 * (x[2:] + x[:-2]) @ x[1:-1] / (x[1:-1] @ x[1:-1])) / dt / exact)
+    for steps, value in zip((6, 12), seen, strict=False):
+        assert abs(value / seen[-1] - 1.0) == pytest.approx(9.3e-4 * (2.0 * np.pi / steps) ** 4, rel=0.3)
 
 
 def test_period_of_a_cantilever_is_theorys_and_the_midpoint_rule_stretches_it_at_second_order():

@@ -117,7 +117,7 @@ ON_SCENE = {
 
 def build(world, data):
     integrator = data.draw(
-        st.sampled_from(["implicit_midpoint", "backward_euler", "energy_momentum", "verlet", "static"])
+        st.sampled_from(["implicit_midpoint", "backward_euler", "energy_momentum", "fourth_order", "verlet", "static"])
     )
     options = {
         "integrator": integrator,

@@ -319,3 +319,18 @@ def test_an_explicit_blow_up_is_found_by_its_energy():
     with pytest.raises(withe.ConvergenceError, match=r"gains energy|broke down"):
         simulation.step(100_000)
     assert np.isfinite(simulation.positions()).all()
+
+
+def test_fourth_order_refuses_what_cannot_go_back_in_time_and_nothing_changes():
+    scene, arm, _ = cantilever()
+    scene.build(integrator="fourth_order")
+    simulation = scene.build(integrator="fourth_order", time_step=1e-3)
+    with pytest.raises(ValueError, match=r"'fourth_order'.*viscosity.*'implicit_midpoint'"):
+        simulation.set(arm, viscosity=10.0)
+    with pytest.raises(ValueError, match=r"'fourth_order'.*drag"):
+        simulation.set(arm, drag=1e6)
+    assert simulation.get(arm, "viscosity") == 0.0
+    simulation.step(3)
+    scene.add_drag(1e6)
+    with pytest.raises(ValueError, match=r"'fourth_order'.*time_step"):
+        scene.build(integrator="fourth_order")

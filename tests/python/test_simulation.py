@@ -6,7 +6,7 @@ import pytest
 import withe
 from simple_scenes import RUBBER, cantilever, tripod
 
-INTEGRATORS = ["implicit_midpoint", "backward_euler", "energy_momentum", "verlet", "static"]
+INTEGRATORS = ["implicit_midpoint", "backward_euler", "energy_momentum", "fourth_order", "verlet", "static"]
 
 
 @pytest.mark.parametrize("integrator", INTEGRATORS)

@@ -1,0 +1,53 @@
+#include "integrators/predictor.hpp"
+
+#include <algorithm>
+
+namespace withe {
+
+void Predictor::extrapolate(double time, int points, VectorX& out) const {
+  out.setZero(acceleration_[0].size());
+  for (int i = 0; i < points; ++i) {
+    const auto a = static_cast<std::size_t>(i);
+    double weight = 1.0;  // Lagrange's
+    for (int j = 0; j < points; ++j) {
+      const auto b = static_cast<std::size_t>(j);
+      if (j != i) weight *= (time - time_[b]) / (time_[a] - time_[b]);
+    }
+    out += weight * acceleration_[a];
+  }
+}
+
+void Predictor::record(double time, int slot, const VectorX& acceleration, const VectorX& weight, VectorX& scratch) {
+  resize(acceleration.size());
+  for (int i = 0; i < count_; ++i)
+    if (time_[static_cast<std::size_t>(i)] == time) count_ = i;  // the same step again
+  double least = INFINITY;
+  for (int points = 0; points <= count_; ++points) {
+    extrapolate(time, points, scratch);
+    scratch -= acceleration;
+    const double error = scratch.cwiseAbs2().dot(weight);
+    if (error < least) {
+      least = error;
+      best_[static_cast<std::size_t>(slot)] = points;
+    }
+  }
+  // With a longer history the next degree up is worth a trial.
+  if (count_ < kDepth && best_[static_cast<std::size_t>(slot)] == count_) ++best_[static_cast<std::size_t>(slot)];
+  std::rotate(acceleration_.begin(), acceleration_.end() - 1, acceleration_.end());
+  std::rotate(time_.begin(), time_.end() - 1, time_.end());
+  acceleration_[0] = acceleration;
+  time_[0] = time;
+  count_ = std::min(count_ + 1, kDepth);
+}
+
+bool Predictor::plausible() const {
+  bool fine = count_ >= 0 && count_ <= kDepth;
+  for (const int b : best_) fine = fine && b >= 0 && b <= kDepth;
+  for (int i = 0; i < kDepth; ++i)
+    for (int j = 0; j < i && i < count_; ++j)
+      fine = fine && time_[static_cast<std::size_t>(i)] != time_[static_cast<std::size_t>(j)];
+  for (const VectorX& a : acceleration_) fine = fine && a.allFinite();
+  return fine;
+}
+
+}  // namespace withe
