@@ -100,8 +100,7 @@ bool Newton::factorize(Equations& equations, NewtonWorkspace& work) const {
   ++work.counters.factorizations;
   if (solver.factorize().status == FactorStatus::ok) return true;
   double greatest = 0.0;
-  for (int i = 0; i < model_.dof_count; ++i)
-    greatest = std::max(greatest, std::abs(equations.assembler().diagonal(i)));
+  for (int i = 0; i < model_.dof_count; ++i) greatest = std::max(greatest, std::abs(equations.assembler().diagonal(i)));
   work.trial.setConstant(model_.dof_count, 1e-12 * greatest);
   return greatest > 0.0 &&
          solver.factorize({work.trial.data(), static_cast<std::size_t>(work.trial.size())}).status == FactorStatus::ok;

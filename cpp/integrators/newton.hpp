@@ -33,8 +33,8 @@ enum class MatrixAge { fresh, within, across };
 
 /// What the factorisation in a solver belongs to, and how well old ones have served.
 struct FactorRecord {
-  const Equations* owner = nullptr;  ///< nothing: not to be used again
-  double interval = 0;               ///< [s]
+  const Equations* owner = nullptr;                     ///< nothing: not to be used again
+  double interval = 0;                                  ///< [s]
   std::array<double, 3> contraction{1e-2, 1e-2, 1e-2};  ///< per MatrixAge: error after an iteration over error before
   int waited = 0;                                       ///< time steps since one was last tried across
   bool tired = false;                                   ///< served the last time step slowly

@@ -84,9 +84,9 @@ Energy World::Implementation::energy_of(const State& at, double loads, double wo
 /// Plain midpoint pumps energy into stretching when edges turn far within a step: whether the step just taken, from
 /// where `keep_for_return` was called, did.
 bool World::Implementation::gains_energy() {
-  const Energy then = guard.energy ? *guard.energy
-                                   : energy_of(kept.state, kept.load_work, kept.support_work + kept.actuation_work,
-                                               kept.dissipated);
+  const Energy then =
+      guard.energy ? *guard.energy
+                   : energy_of(kept.state, kept.load_work, kept.support_work + kept.actuation_work, kept.dissipated);
   const Energy now = energy();
   guard.energy = now;
   guard.scale = std::max({guard.scale, now.kinetic, then.kinetic, 0.1 * (now.stretch + now.bend + now.twist)});

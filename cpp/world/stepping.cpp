@@ -69,8 +69,8 @@ void World::Implementation::grow(Attempt attempt) {
 /// One step of dt, taken back where it gains energy from nowhere or is not accurate enough.
 World::Implementation::Attempt World::Implementation::try_step(double dt) {
   const bool fourth = options.integrator == Integrator::fourth_order;
-  const bool guarded = options.adaptive && guard.rescue == 0 &&
-                       (options.integrator == Integrator::implicit_midpoint || fourth);
+  const bool guarded =
+      options.adaptive && guard.rescue == 0 && (options.integrator == Integrator::implicit_midpoint || fourth);
   if (guarded || options.tolerance || fourth) keep_for_return();
   // Actuation changes what is stored without a motion, so the start is looked at while it is as it was.
   if (guarded && !guard.energy && actuated()) guard.energy = energy();
@@ -252,8 +252,8 @@ void World::Implementation::keep_reactions() {
 void World::Implementation::check_reversible(const Parameters& p) const {
   if (options.integrator != Integrator::fourth_order) return;
   const std::string instead = ": take integrator 'implicit_midpoint' or 'energy_momentum'";
-  require(!p.viscous, "integrator 'fourth_order' goes back in time within each step, which viscosity does not allow" +
-                          instead);
+  require(!p.viscous,
+          "integrator 'fourth_order' goes back in time within each step, which viscosity does not allow" + instead);
   if (!p.dragged) return;
   for (int i = 0; i < model.node_count; ++i)
     require(p.node_drag(i) * options.time_step <= p.node_mass(i),

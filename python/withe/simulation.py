@@ -27,9 +27,7 @@ if TYPE_CHECKING:
 __all__ = ["Integrator", "LineSearch", "Simulation", "Solver", "make_options"]
 
 FloatArray = npt.NDArray[np.float64]
-Integrator = Literal[
-    "implicit_midpoint", "backward_euler", "energy_momentum", "fourth_order", "verlet", "static"
-]
+Integrator = Literal["implicit_midpoint", "backward_euler", "energy_momentum", "fourth_order", "verlet", "static"]
 LineSearch = Literal["automatic", "goldstein_price", "none"]
 Solver = Literal["automatic", "band", "sparse"]
 

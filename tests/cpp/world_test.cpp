@@ -424,8 +424,8 @@ TEST(Interrupt, EndsStepAndLeavesAWorldThatGoesOn) {
 
 TEST(Interrupt, InAnyIterationLeavesTheLastAcceptedState) {
   // Ramps, moving supports and loads that grow are all under way when the iteration is cut off.
-  for (Integrator integrator : {Integrator::implicit_midpoint, Integrator::fourth_order, Integrator::backward_euler,
-                                Integrator::statics}) {
+  for (Integrator integrator :
+       {Integrator::implicit_midpoint, Integrator::fourth_order, Integrator::backward_euler, Integrator::statics}) {
     SceneBuilder builder = testing::hanging_arm();
     builder.load(LoadKind::moment, {0, 11}, Vector3(0, 1e-4, 0));
     World world(builder.scene, options(integrator));
