@@ -43,6 +43,28 @@ std::vector<int> half_dofs(const Model& model) {
   return dofs;
 }
 
+RegularStencils regular_stencils(const Model& model, const ElementTable& bend) {
+  RegularStencils out;
+  std::vector<bool> taken(at(model.edge_count), false);
+  for (int b = 0; b < bend.count(); ++b) {
+    const BendStencil& s = model.bend[at(b)];
+    if (s.sign[0] < 0 || s.sign[1] < 0 || !bend.regular(b, out.lines)) {
+      out.other_bend.push_back(b);
+      continue;
+    }
+    out.stencil.push_back(b);
+    out.first_unknown.push_back(bend.dofs(b)[0]);
+    for (int edge : s.edge) {
+      out.edges.push_back(edge);
+      out.owned.push_back(taken[at(edge)] ? 0.0 : 1.0);
+      taken[at(edge)] = true;
+    }
+  }
+  for (int e = 0; e < model.edge_count; ++e)
+    if (!taken[at(e)]) out.other_edges.push_back(e);
+  return out;
+}
+
 }  // namespace
 
 void ElementTable::find_offsets(const LinearSolver& solver) {
@@ -61,6 +83,24 @@ void ElementTable::find_offsets(const LinearSolver& solver) {
   }
 }
 
+bool ElementTable::regular(int element, std::vector<std::ptrdiff_t>& lines) const {
+  const int* d = dofs(element);
+  for (int i = 0; i < width_; ++i)
+    if (d[i] < 0 || d[i] != d[0] + i) return false;
+  const std::ptrdiff_t* offset = offsets_.data() + entry_start(element);
+  const auto entry = [&](int i, int j) { return offset[symmetric_ ? i * (i + 1) / 2 + j : i * width_ + j]; };
+  bool by_rows = !symmetric_, by_columns = true;
+  for (int i = 0; i < width_; ++i)
+    for (int j = 0; j < (symmetric_ ? i + 1 : width_); ++j) {
+      by_rows = by_rows && entry(i, j) == entry(i, 0) + j;
+      by_columns = by_columns && entry(i, j) == (symmetric_ ? entry(j, j) + i - j : entry(0, j) + i);
+    }
+  if (!by_rows && !by_columns) return false;
+  for (int i = 0; i < width_; ++i)
+    lines.push_back(symmetric_ ? entry(i, i) : by_rows ? entry(i, 0) : entry(0, i));
+  return true;
+}
+
 void ElementTable::add_gradient(int element, const double* gradient, double scale, VectorX& residual,
                                 VectorX& magnitude) const {
   const int* d = dofs(element);
@@ -73,8 +113,7 @@ void ElementTable::add_gradient(int element, const double* gradient, double scal
 
 void ElementTable::add_hessian(int element, const double (&hessian)[kMaxLocal][kMaxLocal], double scale,
                                std::span<double> values) const {
-  const int per_element = symmetric_ ? width_ * (width_ + 1) / 2 : width_ * width_;
-  const std::ptrdiff_t* offset = offsets_.data() + static_cast<std::ptrdiff_t>(element) * per_element;
+  const std::ptrdiff_t* offset = offsets_.data() + entry_start(element);
   for (int i = 0; i < width_; ++i) {
     const int columns = symmetric_ ? i + 1 : width_;
     for (int j = 0; j < columns; ++j, ++offset)
@@ -112,6 +151,7 @@ Assembler::Assembler(const Model& model, const Loads& load, Symmetry symmetry, S
   half.find_offsets(*solver_);
   for (ElementTable& table : loads) table.find_offsets(*solver_);
   for (int i = 0; i < model.dof_count; ++i) diagonal_.push_back(solver_->offset(i, i));
+  regular = regular_stencils(model, bend);
 
   const bool symmetric = symmetry == Symmetry::symmetric;
   const auto entry = [&](int r, int c) {

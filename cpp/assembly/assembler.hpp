@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "elasticity/elements.hpp"
+#include "elasticity/stencil_kernels.hpp"
 #include "forces/loads.hpp"
 #include "solvers/linear_solver.hpp"
 
@@ -23,6 +24,10 @@ class ElementTable {
     return dofs_.data() + static_cast<std::size_t>(element) * static_cast<std::size_t>(width_);
   }
 
+  /// Whether an element's unknowns follow one another, and so do its numbers in each line of the matrix (columns of
+  /// the lower triangle, or whole lines); then where its lines begin.
+  bool regular(int element, std::vector<std::ptrdiff_t>& lines) const;
+
   /// residual += scale gradient, magnitude += |gradient|.
   void add_gradient(int element, const double* gradient, double scale, VectorX& residual, VectorX& magnitude) const;
   /// values += scale hessian.
@@ -30,10 +35,23 @@ class ElementTable {
                    std::span<double> values) const;
 
  private:
+  std::ptrdiff_t entry_start(int element) const {
+    return static_cast<std::ptrdiff_t>(element) * (symmetric_ ? width_ * (width_ + 1) / 2 : width_ * width_);
+  }
+
   int width_ = 0;
   bool symmetric_ = true;
   std::vector<int> dofs_;
   std::vector<std::ptrdiff_t> offsets_;
+};
+
+/// Ordinary stencils that the kernels of stencil_kernels.hpp take, and what is left for others.
+struct RegularStencils {
+  std::vector<int> stencil, first_unknown, edges;
+  std::vector<double> owned;
+  std::vector<std::ptrdiff_t> lines;
+  std::vector<int> other_bend;   ///< stencils left over
+  std::vector<int> other_edges;  ///< edges whose stretching no regular stencil owns
 };
 
 /// The matrix of a model with its tables.
@@ -43,9 +61,8 @@ class Assembler {
 
   LinearSolver& solver() { return *solver_; }
   const LinearSolver& solver() const { return *solver_; }
-  void add_to_diagonal(int dof, double value) {
-    solver_->values()[static_cast<std::size_t>(diagonal_[static_cast<std::size_t>(dof)])] += value;
-  }
+  /// Where the diagonal lives in the solver's values, per unknown.
+  const std::vector<std::ptrdiff_t>& diagonal_offsets() const { return diagonal_; }
   double diagonal(int dof) const {
     return solver_->values()[static_cast<std::size_t>(diagonal_[static_cast<std::size_t>(dof)])];
   }
@@ -60,6 +77,7 @@ class Assembler {
   void add_held_part(const VectorX& from, double factor, VectorX& to) const;
 
   ElementTable stretch, bend, half;
+  RegularStencils regular;
   std::vector<ElementTable> loads;
 
  private:

@@ -12,6 +12,8 @@ using Matrix3 = Eigen::Matrix3d;
 using VectorX = Eigen::VectorXd;
 using MatrixX2 = Eigen::Matrix<double, Eigen::Dynamic, 2, Eigen::RowMajor>;
 using MatrixX3 = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>;
+/// One row per stencil, each column together, so that packs load neighbours at once.
+using Columns3 = Eigen::Matrix<double, Eigen::Dynamic, 3>;
 /// One row per edge: a 3 x 3 matrix with rows d1, d2, tangent, flattened row by row.
 using MatrixX9 = Eigen::Matrix<double, Eigen::Dynamic, 9, Eigen::RowMajor>;
 

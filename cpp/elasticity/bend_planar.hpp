@@ -5,16 +5,18 @@
 
 namespace withe {
 
+template <class Scalar>
 struct PlanarBend {
-  double energy;
-  double slope;      ///< dE / dphi [N m]
-  double curvature;  ///< d2E / dphi2 [N m]
+  Scalar energy;
+  Scalar slope;      ///< dE / dphi [N m]
+  Scalar curvature;  ///< d2E / dphi2 [N m]
 };
 
 /// Energy and its derivatives with respect to phi: kappa' = 1 + kappa^2 / 4, kappa'' = kappa kappa' / 2.
-inline PlanarBend planar_bend(double kappa, double natural, double stiffness) {
-  const double moment = stiffness * (kappa - natural);
-  const double first = 1.0 + 0.25 * kappa * kappa;
+template <class Scalar>
+PlanarBend<Scalar> planar_bend(const Scalar& kappa, const Scalar& natural, const Scalar& stiffness) {
+  const Scalar moment = stiffness * (kappa - natural);
+  const Scalar first = 1.0 + 0.25 * kappa * kappa;
   return {0.5 * moment * (kappa - natural), moment * first, stiffness * first * first + 0.5 * moment * kappa * first};
 }
 

@@ -8,8 +8,8 @@
 namespace withe {
 namespace {
 
-BendTwistStrain<double> strain_row(const MatrixX3& m, Eigen::Index i) { return {m(i, 0), m(i, 1), m(i, 2)}; }
-BendTwistStiffness<double> stiffness_row(const MatrixX3& m, Eigen::Index i) { return {m(i, 0), m(i, 1), m(i, 2)}; }
+BendTwistStrain<double> strain_row(const Columns3& m, Eigen::Index i) { return {m(i, 0), m(i, 1), m(i, 2)}; }
+BendTwistStiffness<double> stiffness_row(const Columns3& m, Eigen::Index i) { return {m(i, 0), m(i, 1), m(i, 2)}; }
 
 void put(Local& out, int at, const Vec3d& v) {
   out.gradient[at] = v.x;
@@ -66,7 +66,7 @@ void add_angle_hessian(double (&m)[2][2], double weight, const Direction2& d, do
 
 void bend_planar_local(const ElasticCoefficients& k, const Configuration& c, const BendStencil& s, Eigen::Index i,
                        Local& out) {
-  const PlanarBend p = planar_bend(c.bend_strain(i, 0), k.bend_natural(i, 0), k.bend_stiffness(i, 0));
+  const PlanarBend<double> p = planar_bend(c.bend_strain(i, 0), k.bend_natural(i, 0), k.bend_stiffness(i, 0));
   const EdgeFrame<double>&f0 = c.edge[static_cast<std::size_t>(s.edge[0])],
         &f1 = c.edge[static_cast<std::size_t>(s.edge[1])];
   Direction2 a = direction2(f0), b = direction2(f1);
@@ -96,7 +96,7 @@ void bend_planar_local(const ElasticCoefficients& k, const Configuration& c, con
 
 void half_planar_local(const ElasticCoefficients& k, const Configuration& c, const FrameStencil& s, Eigen::Index i,
                        Local& out) {
-  const PlanarBend p = planar_bend(c.half_strain(i, 0), k.half_natural(i, 0), k.half_stiffness(i, 0));
+  const PlanarBend<double> p = planar_bend(c.half_strain(i, 0), k.half_natural(i, 0), k.half_stiffness(i, 0));
   const EdgeFrame<double>& f = c.edge[static_cast<std::size_t>(s.edge)];
   const Direction2 a = direction2(f);
   const double sign = s.frame_first ? 1.0 : -1.0;
@@ -199,8 +199,8 @@ void bend_local(const Model& model, const ElasticCoefficients& k, const Configur
   const BendStencil& s = model.bend[static_cast<std::size_t>(stencil)];
   const auto i = static_cast<Eigen::Index>(stencil);
   if (model.planar()) return bend_planar_local(k, c, s, i, out);
-  EdgeFrame<double> f0 = oriented(c.edge[static_cast<std::size_t>(s.edge[0])], s.sign[0]);
-  EdgeFrame<double> f1 = oriented(c.edge[static_cast<std::size_t>(s.edge[1])], s.sign[1]);
+  const EdgeFrame<double> f0 = oriented(c.edge[static_cast<std::size_t>(s.edge[0])], s.sign[0]);
+  const EdgeFrame<double> f1 = oriented(c.edge[static_cast<std::size_t>(s.edge[1])], s.sign[1]);
   BendTwistDerivatives<double> d;
   const auto strain = strain_row(c.bend_strain, i), natural = strain_row(k.bend_natural, i);
   const auto stiffness = stiffness_row(k.bend_stiffness, i);

@@ -22,8 +22,8 @@ struct Local {
 struct ElasticCoefficients {
   VectorX stretch_stiffness;              ///< EA [N]
   VectorX stretch_natural;                ///< natural strain [-]
-  MatrixX3 bend_stiffness, bend_natural;  ///< [N m]; kappa1, kappa2, tau
-  MatrixX3 half_stiffness, half_natural;
+  Columns3 bend_stiffness, bend_natural;  ///< [N m]; kappa1, kappa2, tau
+  Columns3 half_stiffness, half_natural;
 };
 
 /// Elasticity alone.

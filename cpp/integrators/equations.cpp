@@ -50,41 +50,48 @@ Equations::Equations(const Model& model, const Options& options)
       loads_(resolve_loads(model)),
       assembler_(model, loads_, symmetry_of(loads_, options), options.solver) {
   custom_force = VectorX::Zero(model.dof_count);
+  inverse_rest_ = model.edge_length.cwiseInverse();
   node_dof_drag_ = VectorX::Zero(model.dof_count);
   for (const LoadPiece& piece : loads_.pieces)
     if (piece.shape != LoadShape::dead_node) has_potential_ = false;
 }
 
-void Equations::begin(const State& state, const Parameters& parameters, double h, bool energy_momentum) {
-  state_ = &state;
+void Equations::set_parameters(const Parameters& parameters) {
   parameters_ = &parameters;
-  h_ = h;
-  energy_momentum_ = energy_momentum;
+  if (version_ == parameters.version) return;
+  version_ = parameters.version;
   mass = mass_vector(model_, parameters);
   gravity_ = gravity_force(model_, parameters);
   set_elastic(parameters, elastic);
-  total_ = elastic;
+  for (int i = 0; i < model_.node_count; ++i)
+    node_dof_drag_.segment(model_.node_dof[at(i)], model_.dimension).setConstant(parameters.node_drag(i));
+}
+
+void Equations::begin(const State& state, const Parameters& parameters, double h, bool energy_momentum) {
+  state_ = &state;
+  h_ = h;
+  energy_momentum_ = energy_momentum;
+  set_parameters(parameters);
   const bool viscous = parameters.viscous && h != 0.0;
   if (viscous || energy_momentum) compute_configuration(model_, state, state.q, start_);
   if (viscous) {
     set_viscous(model_, parameters, start_, h, viscous_);
-    if (!energy_momentum) add_coefficients(viscous_, total_);
+    if (!energy_momentum) {
+      total_ = elastic;
+      add_coefficients(viscous_, total_);
+    }
   }
+  acting_ = viscous && !energy_momentum ? &total_ : &elastic;
   floor_current_ = false;
-  node_dof_drag_.setZero();
-  if (parameters.dragged && h != 0.0)
-    for (int i = 0; i < model_.node_count; ++i)
-      node_dof_drag_.segment(model_.node_dof[at(i)], model_.dimension).setConstant(parameters.node_drag(i));
 }
 
 void Equations::evaluate(const VectorX& z, bool with_matrix, const double* axial_force, Evaluation& out) {
-  const Eigen::Index n = model_.dof_count;
-  out.residual.setZero(n);
-  out.magnitude.setZero(n);
   out.potential = 0.0;
+  gradient_.setZero(model_.dof_count + kPadding);
+  magnitude_.setZero(model_.dof_count + kPadding);
   last_z_ = z;
-  LinearSolver& solver = assembler_.solver();
-  if (with_matrix) std::fill(solver.values().begin(), solver.values().end(), 0.0);
+  const std::span<double> values = assembler_.solver().values();
+  if (with_matrix) std::fill(values.begin(), values.end(), 0.0);
   compute_configuration(model_, *state_, z, middle_);
   if (energy_momentum_) {
     difference_ = 2.0 * (z - state_->q);
@@ -92,67 +99,128 @@ void Equations::evaluate(const VectorX& z, bool with_matrix, const double* axial
     compute_configuration(model_, *state_, end_q_, end_);
     add_discrete_gradient(z, with_matrix, axial_force, out);
   } else {
-    add_elastic(z, with_matrix, axial_force, out);
+    add_elastic(*acting_, z, with_matrix, axial_force, out);
   }
-
-  Local local;
-  for (std::size_t k = 0; k < loads_.pieces.size(); ++k) {
-    load_local(model_, *state_, z, middle_, loads_, loads_.pieces[k], local);
-    assembler_.loads[k].add_gradient(0, local.gradient, 1.0, out.residual, out.magnitude);
-    if (with_matrix && loads_.pieces[k].shape != LoadShape::dead_node)
-      assembler_.loads[k].add_hessian(0, local.hessian, 1.0, solver.values());
-    const int* dofs = assembler_.loads[k].dofs(0);
-    if (loads_.pieces[k].shape == LoadShape::dead_node)
-      for (int i = 0; i < model_.dimension; ++i) out.potential += local.gradient[i] * z(dofs[i]);
-  }
-  out.potential -= gravity_.dot(z);
-  const double inverse = h_ != 0.0 ? 1.0 / h_ : 0.0;
-  const VectorX move = z - state_->q;
-  const VectorX inertia = mass.cwiseProduct(inverse * inverse * move - inverse * state_->v);
-  const VectorX drag = inverse * node_dof_drag_.cwiseProduct(move);
-  out.residual += inertia * (h_ != 0.0 ? 1.0 : 0.0) + drag - gravity_ - custom_force;
-  out.magnitude += drag.cwiseAbs() + gravity_.cwiseAbs() + custom_force.cwiseAbs();
-  if (h_ != 0.0) {
-    out.magnitude += inertia.cwiseAbs();
-    if (!model_.planar()) add_spin_couple(z, out);
-    if (with_matrix)
-      for (int i = 0; i < n; ++i)
-        assembler_.add_to_diagonal(i, mass(i) * inverse * inverse + node_dof_drag_(i) * inverse);
-  }
-  out.full_residual = out.residual;
+  add_loads(z, with_matrix, out);
+  if (h_ != 0.0 && !model_.planar()) add_spin_couple(z);
+  add_step(z, with_matrix, out);
   assembler_.project(out.residual);
   if (with_matrix) assembler_.project_matrix();
-  if (!floor_current_) set_floor(z, floor_);
-  floor_current_ = true;
-  out.floor = floor_ + rounding_ * out.magnitude;
-  // An axial strain rounds along its edge only.
-  for (int e = 0; e < model_.edge_count; ++e) {
-    const Vec3d& t = middle_.edge[at(e)].tangent;
-    const double component[3] = {std::abs(t.x), std::abs(t.y), std::abs(t.z)};
-    for (int node : {model_.edge_tail[at(e)], model_.edge_head[at(e)]})
-      for (int i = 0; i < model_.dimension; ++i)
-        out.floor(model_.node_dof[at(node)] + i) += axial_floor_(e) * component[i];
+}
+
+void Equations::add_loads(const VectorX& z, bool with_matrix, Evaluation& out) {
+  Local local;
+  for (std::size_t k = 0; k < loads_.pieces.size(); ++k) {
+    const bool dead = loads_.pieces[k].shape == LoadShape::dead_node;
+    load_local(model_, *state_, z, middle_, loads_, loads_.pieces[k], local);
+    assembler_.loads[k].add_gradient(0, local.gradient, 1.0, gradient_, magnitude_);
+    if (with_matrix && !dead) assembler_.loads[k].add_hessian(0, local.hessian, 1.0, assembler_.solver().values());
+    const int* dofs = assembler_.loads[k].dofs(0);
+    if (dead)
+      for (int i = 0; i < model_.dimension; ++i) out.potential += local.gradient[i] * z(dofs[i]);
   }
 }
 
-void Equations::add_elastic(const VectorX& z, bool with_matrix, const double* axial_force, Evaluation& out) {
+/// Inertia, drag, gravity and custom forces, and what rounding leaves, in one pass over the unknowns.
+void Equations::add_step(const VectorX& z, bool with_matrix, Evaluation& out) {
+  const int n = model_.dof_count;
+  if (!floor_current_) set_floor(z, floor_);
+  floor_current_ = true;
+  out.full_residual.resize(n);
+  out.magnitude.resize(n);
+  out.floor.resize(n);
+  const double inverse = h_ != 0.0 ? 1.0 / h_ : 0.0;
+  const auto x = z.array(), q0 = state_->q.array(), v0 = state_->v.array();
+  const auto inertia = (inverse * mass.array()) * (inverse * (x - q0) - v0);
+  const auto drag = (inverse * node_dof_drag_.array()) * (x - q0);
+  out.full_residual = (gradient_.head(n).array() + inertia + drag - gravity_.array() - custom_force.array()).matrix();
+  out.magnitude = (magnitude_.head(n).array() + inertia.abs() + drag.abs() + gravity_.array().abs() +
+                   custom_force.array().abs())
+                      .matrix();
+  out.floor = floor_ + rounding_ * out.magnitude;
+  out.potential -= gravity_.dot(z);
+  out.residual = out.full_residual;
+  if (with_matrix && h_ != 0.0) {
+    const std::span<double> values = assembler_.solver().values();
+    const std::vector<std::ptrdiff_t>& diagonal = assembler_.diagonal_offsets();
+    for (int i = 0; i < n; ++i)
+      values[static_cast<std::size_t>(diagonal[at(i)])] += (mass[i] * inverse + node_dof_drag_[i]) * inverse;
+  }
+  // An axial strain rounds along its edge only.
+  const bool planar = model_.planar();
+  for (int e = 0; e < model_.edge_count; ++e) {
+    const Vec3d& t = middle_.edge[at(e)].tangent;
+    const double floor = axial_floor_[e], x = floor * std::abs(t.x), y = floor * std::abs(t.y);
+    double *tail = &out.floor[model_.tail_dof[at(e)]], *head = &out.floor[model_.head_dof[at(e)]];
+    tail[0] += x, tail[1] += y;
+    head[0] += x, head[1] += y;
+    if (planar) continue;
+    const double along_z = floor * std::abs(t.z);
+    tail[2] += along_z, head[2] += along_z;
+  }
+}
+
+/// Axial forces of all edges and their energy.
+void Equations::set_axial_forces(const ElasticCoefficients& k, Evaluation& out) {
+  const int n = model_.edge_count;
+  force_.resize(n);
+  modulus_.resize(n);
+  double energy = 0.0;
+  for (int e = 0; e < n; ++e) {
+    const double strain = middle_.length[e] * inverse_rest_[e] - 1.0 - k.stretch_natural[e];
+    force_[e] = k.stretch_stiffness[e] * strain;
+    modulus_[e] = k.stretch_stiffness[e] * inverse_rest_[e];
+    energy += force_[e] * strain * model_.edge_length[e];
+  }
+  out.potential += 0.5 * energy;
+}
+
+StencilBatch Equations::regular_batch(const ElasticCoefficients& k, const double* axial_force, double* values) {
+  const RegularStencils& regular = assembler_.regular;
+  return {.count = static_cast<int>(regular.stencil.size()),
+          .stencil = regular.stencil.data(),
+          .first_unknown = regular.first_unknown.data(),
+          .edges = regular.edges.data(),
+          .owned = regular.owned.data(),
+          .lines = regular.lines.data(),
+          .lower = symmetric(),
+          .frames = &middle_.edge.data()->tangent.x,
+          .strain = middle_.bend_strain.data(),
+          .natural = k.bend_natural.data(),
+          .stiffness = k.bend_stiffness.data(),
+          .column = middle_.bend_strain.rows(),
+          .force = force_.data(),
+          .geometric = axial_force ? axial_force : force_.data(),
+          .modulus = modulus_.data(),
+          .residual = gradient_.data(),
+          .magnitude = magnitude_.data(),
+          .values = values};
+}
+
+void Equations::add_elastic(const ElasticCoefficients& k, const VectorX& z, bool with_matrix, const double* axial_force,
+                            Evaluation& out) {
   const std::span<double> values = assembler_.solver().values();
+  set_axial_forces(k, out);
+  const StencilBatch batch = regular_batch(k, axial_force, with_matrix ? values.data() : nullptr);
+  out.potential += model_.planar() ? stencil_kernels().planar_bend(batch) : stencil_kernels().bend(batch);
+
   Local local;
   const auto add = [&](const ElementTable& table, int i) {
-    out.potential += local.energy;
-    table.add_gradient(i, local.gradient, 1.0, out.residual, out.magnitude);
+    table.add_gradient(i, local.gradient, 1.0, gradient_, magnitude_);
     if (with_matrix) table.add_hessian(i, local.hessian, 1.0, values);
   };
-  for (int e = 0; e < model_.edge_count; ++e) {
-    stretch_local(model_, total_, middle_, e, with_matrix, axial_force, local);
+  for (int e : assembler_.regular.other_edges) {
+    stretch_local(model_, k, middle_, e, with_matrix, axial_force, local);
     add(assembler_.stretch, e);
   }
-  for (int b = 0; b < static_cast<int>(model_.bend.size()); ++b) {
-    bend_local(model_, total_, middle_, b, with_matrix, local);
+  for (int b : assembler_.regular.other_bend) {
+    bend_local(model_, k, middle_, b, with_matrix, local);
+    out.potential += local.energy;
     add(assembler_.bend, b);
   }
   for (int h = 0; h < static_cast<int>(model_.half.size()); ++h) {
-    half_local(model_, z, total_, middle_, h, with_matrix, local);
+    half_local(model_, z, k, middle_, h, with_matrix, local);
+    out.potential += local.energy;
     add(assembler_.half, h);
   }
 }
@@ -256,7 +324,7 @@ void Equations::add_discrete_gradient(const VectorX& z, bool with_matrix, const 
   const std::span<double> values = assembler_.solver().values();
   Local local, end;
   const auto add = [&](const ElementTable& table, int i) {
-    table.add_gradient(i, local.gradient, 1.0, out.residual, out.magnitude);
+    table.add_gradient(i, local.gradient, 1.0, gradient_, magnitude_);
     if (with_matrix) table.add_hessian(i, local.hessian, 1.0, values);
   };
   const int dim = model_.dimension;
@@ -324,14 +392,11 @@ void Equations::add_discrete_gradient(const VectorX& z, bool with_matrix, const 
     add(assembler_.half, h);
   }
   if (!parameters_->viscous || h_ == 0.0) return;
-  const ElasticCoefficients kept = std::move(total_);
-  total_ = viscous_;
-  add_elastic(z, with_matrix, nullptr, out);
-  total_ = kept;
+  add_elastic(viscous_, z, with_matrix, nullptr, out);
 }
 
 void Equations::predict_axial_force(const VectorX& step, VectorX& out) const {
-  const ElasticCoefficients& k = energy_momentum_ ? elastic : total_;
+  const ElasticCoefficients& k = *acting_;
   out.resize(model_.edge_count);
   for (int e = 0; e < model_.edge_count; ++e) {
     const int a = model_.node_dof[at(model_.edge_tail[at(e)])], b = model_.node_dof[at(model_.edge_head[at(e)])];
@@ -345,21 +410,25 @@ void Equations::predict_axial_force(const VectorX& step, VectorX& out) const {
 
 /// An edge that spins at omega and turns also needs the couple I omega t x dt/dt: nodal forces
 /// +- I omega (dt/dt x t) / l, which do no work. Its Jacobian is left out: it is a small part of the mass term.
-void Equations::add_spin_couple(const VectorX& z, Evaluation& out) const {
+void Equations::add_spin_couple(const VectorX& z) {
+  const double inverse = 1.0 / h_;
+  const double *q0 = state_->q.data(), *v0 = state_->v.data();
   for (int e = 0; e < model_.edge_count; ++e) {
-    const double omega = (z(model_.edge_dof[at(e)]) - state_->q(model_.edge_dof[at(e)])) / h_;
-    const int a = model_.node_dof[at(model_.edge_tail[at(e)])], b = model_.node_dof[at(model_.edge_head[at(e)])];
+    const int a = model_.tail_dof[at(e)], b = model_.head_dof[at(e)], angle = model_.edge_dof[at(e)];
+    const double omega = (z[angle] - q0[angle]) * inverse, inertia = parameters_->edge_inertia[e];
     const EdgeFrame<double>& f = middle_.edge[at(e)];
-    const Vector3 change = (z.segment<3>(b) - z.segment<3>(a) - state_->q.segment<3>(b) + state_->q.segment<3>(a)) / h_;
-    const Vector3 pair = (parameters_->edge_inertia(e) * omega * f.inverse_length * f.inverse_length) *
-                         change.cross(to_eigen(f.tangent));
+    const Vec3d change{z[b] - z[a] - q0[b] + q0[a], z[b + 1] - z[a + 1] - q0[b + 1] + q0[a + 1],
+                       z[b + 2] - z[a + 2] - q0[b + 2] + q0[a + 2]};
+    const double couple = inertia * omega * f.inverse_length * f.inverse_length * inverse;
     // psi = theta + spin . e is what turns: the edge's inertia acts on the nodes as its elastic torque does. It does no
     // work either, since spin is normal to the edge before and now.
-    const int dof = model_.edge_dof[at(e)];
-    const double torque = parameters_->edge_inertia(e) * (omega - state_->v(dof)) / h_;
-    const Vector3 total = pair + torque * to_eigen(f.spin);
-    out.residual.segment<3>(b) += total;
-    out.residual.segment<3>(a) -= total;
+    const double torque = inertia * (omega - v0[angle]) * inverse;
+    const Vec3d total = couple * cross(change, f.tangent) + torque * f.spin;
+    const double component[3] = {total.x, total.y, total.z};
+    for (int i = 0; i < 3; ++i) {
+      gradient_[b + i] += component[i];
+      gradient_[a + i] -= component[i];
+    }
   }
 }
 
@@ -377,7 +446,7 @@ void Equations::set_floor(const VectorX& z, VectorX& floor) {
   rounding_ = unit * (reach / model_.edge_length.minCoeff() + 1.0);
   axial_floor_.resize(model_.edge_count);
   for (int e = 0; e < model_.edge_count; ++e)
-    axial_floor_(e) = unit * total_.stretch_stiffness(e) * (reach / model_.edge_length(e) + 1.0);
+    axial_floor_(e) = unit * acting_->stretch_stiffness(e) * (reach / model_.edge_length(e) + 1.0);
   const auto bend_add = [&](double stiffness, double length, std::initializer_list<int> nodes,
                             std::initializer_list<int> angles) {
     const double moment = 2.0 * unit * stiffness * (reach / length + 1.0);
@@ -387,13 +456,13 @@ void Equations::set_floor(const VectorX& z, VectorX& floor) {
   };
   for (std::size_t b = 0; b < model_.bend.size(); ++b) {
     const BendStencil& s = model_.bend[b];
-    bend_add(total_.bend_stiffness.row(static_cast<Eigen::Index>(b)).maxCoeff(),
+    bend_add(acting_->bend_stiffness.row(static_cast<Eigen::Index>(b)).maxCoeff(),
              std::min(model_.edge_length(s.edge[0]), model_.edge_length(s.edge[1])), {s.node[0], s.node[1], s.node[2]},
              {s.edge[0], s.edge[1]});
   }
   for (std::size_t h = 0; h < model_.half.size(); ++h) {
     const FrameStencil& s = model_.half[h];
-    const double stiffness = total_.half_stiffness.row(static_cast<Eigen::Index>(h)).maxCoeff();
+    const double stiffness = acting_->half_stiffness.row(static_cast<Eigen::Index>(h)).maxCoeff();
     const double length = model_.edge_length(s.edge);
     bend_add(stiffness, length, {model_.edge_tail[at(s.edge)], model_.edge_head[at(s.edge)]}, {s.edge});
     const double moment = 2.0 * unit * stiffness * (reach / length + 1.0);

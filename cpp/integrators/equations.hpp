@@ -62,12 +62,17 @@ class Equations {
   ElasticCoefficients elastic;
 
  private:
-  void add_elastic(const VectorX& z, bool with_matrix, const double* axial_force, Evaluation& out);
+  void set_parameters(const Parameters& parameters);
+  void set_axial_forces(const ElasticCoefficients& k, Evaluation& out);
+  StencilBatch regular_batch(const ElasticCoefficients& k, const double* axial_force, double* values);
+  void add_step(const VectorX& z, bool with_matrix, Evaluation& out);
+  void add_loads(const VectorX& z, bool with_matrix, Evaluation& out);
+  void add_elastic(const ElasticCoefficients& k, const VectorX& z, bool with_matrix, const double* axial_force, Evaluation& out);
   void add_discrete_gradient(const VectorX& z, bool with_matrix, const double* axial_force, Evaluation& out);
   void correct(Local& local, const Local& end, double start_energy, const ElementTable& table, int element,
                const double (*metric)[kMaxLocal]);
   void add_planar_invariants(int stencil, Local& local, const Local& end, double start_energy) const;
-  void add_spin_couple(const VectorX& z, Evaluation& out) const;
+  void add_spin_couple(const VectorX& z);
   void set_floor(const VectorX& z, VectorX& floor);
   void gather_difference(const ElementTable& table, int element, double* difference) const;
 
@@ -80,10 +85,14 @@ class Equations {
   double h_ = 0.0;
   bool energy_momentum_ = false;
   ElasticCoefficients viscous_, total_;
+  const ElasticCoefficients* acting_ = &elastic;  ///< elasticity, with viscosity where the scheme takes both as one
   Configuration start_, middle_, end_;
   VectorX difference_;  ///< q1 - q0
   VectorX end_q_, last_z_;
   VectorX node_dof_drag_, gravity_;
+  long version_ = -1;                     ///< of the parameters that mass, elastic, gravity_ and drag belong to
+  VectorX gradient_, magnitude_;          ///< forces but for inertia, drag and gravity; padded by kPadding
+  VectorX force_, modulus_, inverse_rest_;  ///< per edge: EA eps [N], EA / L [N / m], 1 / L [1 / m]
   VectorX floor_;        ///< what bending, twisting and inertia leave by rounding
   VectorX axial_floor_;  ///< per edge [N]
   double rounding_ = 0;  ///< relative, of a direction in space

@@ -88,6 +88,7 @@ struct Parameters {
   MatrixX3 bend_natural, half_natural;           ///< per stencil: discrete kappa1, kappa2, turn of twist
   VectorX bend_viscous_time, half_viscous_time;  ///< [s]
   bool viscous = false, dragged = false;
+  long version = 0;  ///< another number whenever anything above has changed; never used twice
 };
 
 struct Model {
@@ -101,6 +102,7 @@ struct Model {
   std::vector<int> edge_tail, edge_head;
   VectorX edge_length;  ///< at rest [m]
   std::vector<BendStencil> bend;
+  std::vector<int> reversed_bend;  ///< stencils with an edge against its rod
   std::vector<FrameStencil> half;
   VectorX bend_voronoi, half_voronoi;  ///< [m]
   std::vector<Hinge> hinges;
@@ -116,6 +118,7 @@ struct Model {
   int dof_count = 0;
   std::vector<int> frame_node;
   std::vector<int> node_dof, edge_dof, frame_dof;  ///< first unknown of each; edge_dof is empty in a plane
+  std::vector<int> tail_dof, head_dof;             ///< per edge: first unknown of its nodes
   std::vector<Constraint> constraints;
   std::vector<Support> supports;
 

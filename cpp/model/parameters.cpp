@@ -1,3 +1,4 @@
+#include <atomic>
 #include <cmath>
 #include <numbers>
 
@@ -56,6 +57,8 @@ Parameters initial_parameters(const Model& model) {
 }
 
 void update_natural(const Model& model, Parameters& p) {
+  static std::atomic<long> versions{0};
+  p.version = ++versions;
   const bool planar = model.planar();
   const auto strain = [&](int rod, int stencil, double voronoi) -> Vector3 {
     Vector3 out = Vector3::Zero();

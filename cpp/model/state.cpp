@@ -1,29 +1,46 @@
 #include "model/state.hpp"
 
 #include "geometry/curvature.hpp"
+#include "geometry/frame_kernels.hpp"
 #include "geometry/rotation.hpp"
 
 namespace withe {
 namespace {
 
-Vec3d node_position(const Model& model, const VectorX& q, int node) {
-  const double* x = q.data() + model.node_dof[static_cast<std::size_t>(node)];
-  return {x[0], x[1], model.planar() ? 0.0 : x[2]};
+static_assert(sizeof(Vec3d) == 3 * sizeof(double));
+static_assert(sizeof(EdgeFrame<double>) == kFrameNumbers * sizeof(double));
+
+EdgeBatch edge_batch(const Model& model, const VectorX& q, Configuration& out) {
+  return {.count = model.edge_count,
+          .tail = model.tail_dof.data(),
+          .head = model.head_dof.data(),
+          .angle = model.edge_dof.data(),
+          .q = q.data(),
+          .source = nullptr,
+          .reference = nullptr,
+          .frames = &out.edge.data()->tangent.x,
+          .length = out.length.data()};
+}
+
+StrainBatch strain_batch(const Model& model, Configuration& out) {
+  static_assert(sizeof(BendStencil) % sizeof(int) == 0);
+  return {.count = static_cast<int>(model.bend.size()),
+          .edges = model.bend.empty() ? nullptr : model.bend.data()->edge,
+          .edge_stride = sizeof(BendStencil) / sizeof(int),
+          .frames = &out.edge.data()->tangent.x,
+          .previous_tau = nullptr,
+          .strain = out.bend_strain.data(),
+          .column = out.bend_strain.rows()};
 }
 
 void compute_planar(const Model& model, const VectorX& q, Configuration& out) {
-  for (std::size_t e = 0; e < out.edge.size(); ++e) {
-    const Vec3d d = node_position(model, q, model.edge_head[e]) - node_position(model, q, model.edge_tail[e]);
-    const double length = std::sqrt(dot(d, d));
-    out.length(static_cast<Eigen::Index>(e)) = length;
-    out.edge[e].inverse_length = 1.0 / length;
-    out.edge[e].tangent = (1.0 / length) * d;
-  }
-  for (std::size_t b = 0; b < model.bend.size(); ++b) {
-    const BendStencil& s = model.bend[b];
-    const Vec3d t0 = static_cast<double>(s.sign[0]) * out.edge[static_cast<std::size_t>(s.edge[0])].tangent;
-    const Vec3d t1 = static_cast<double>(s.sign[1]) * out.edge[static_cast<std::size_t>(s.edge[1])].tangent;
-    out.bend_strain(static_cast<Eigen::Index>(b), 0) = planar_kappa(t0.x, t0.y, t1.x, t1.y);
+  frame_kernels().planar_edges(edge_batch(model, q, out));
+  frame_kernels().planar_strains(strain_batch(model, out));
+  for (int b : model.reversed_bend) {
+    const BendStencil& s = model.bend[static_cast<std::size_t>(b)];
+    const Vec3d t0 = s.sign[0] * out.edge[static_cast<std::size_t>(s.edge[0])].tangent;
+    const Vec3d t1 = s.sign[1] * out.edge[static_cast<std::size_t>(s.edge[1])].tangent;
+    out.bend_strain(b, 0) = planar_kappa(t0.x, t0.y, t1.x, t1.y);
   }
   for (std::size_t h = 0; h < model.half.size(); ++h) {
     const FrameStencil& s = model.half[h];
@@ -41,20 +58,19 @@ void compute_planar(const Model& model, const VectorX& q, Configuration& out) {
 }
 
 void compute_spatial(const Model& model, const State& state, const VectorX& q, Configuration& out) {
-  for (std::size_t e = 0; e < out.edge.size(); ++e) {
-    const Vec3d d = node_position(model, q, model.edge_head[e]) - node_position(model, q, model.edge_tail[e]);
-    const double length = std::sqrt(dot(d, d));
-    const double theta = q(model.edge_dof[e]);
-    out.length(static_cast<Eigen::Index>(e)) = length;
-    out.edge[e] = edge_frame(d, length, state.tangent[e], state.director[e], std::cos(theta), std::sin(theta));
-  }
-  for (std::size_t b = 0; b < model.bend.size(); ++b) {
-    const BendStencil& s = model.bend[b];
-    const auto i = static_cast<Eigen::Index>(b);
+  EdgeBatch edges = edge_batch(model, q, out);
+  edges.source = &state.tangent.data()->x;
+  edges.reference = &state.director.data()->x;
+  frame_kernels().edges(edges);
+  StrainBatch strains = strain_batch(model, out);
+  strains.previous_tau = state.bend_tau.data();
+  frame_kernels().strains(strains);
+  for (int b : model.reversed_bend) {
+    const BendStencil& s = model.bend[static_cast<std::size_t>(b)];
     const auto strain =
         bend_twist_strain(oriented(out.edge[static_cast<std::size_t>(s.edge[0])], s.sign[0]),
-                          oriented(out.edge[static_cast<std::size_t>(s.edge[1])], s.sign[1]), state.bend_tau(i));
-    out.bend_strain.row(i) << strain.kappa1, strain.kappa2, strain.tau;
+                          oriented(out.edge[static_cast<std::size_t>(s.edge[1])], s.sign[1]), state.bend_tau(b));
+    out.bend_strain.row(b) << strain.kappa1, strain.kappa2, strain.tau;
   }
   for (int f = 0; f < model.frame_count; ++f) {
     const auto i = static_cast<std::size_t>(f);
@@ -98,8 +114,8 @@ void compute_configuration(const Model& model, const State& state, const VectorX
     out.length.resize(model.edge_count);
     out.frame.assign(static_cast<std::size_t>(model.frame_count), Matrix3::Identity());
     out.attached.assign(model.half.size(), EdgeFrame<double>{});
-    out.bend_strain = MatrixX3::Zero(static_cast<Eigen::Index>(model.bend.size()), 3);
-    out.half_strain = MatrixX3::Zero(static_cast<Eigen::Index>(model.half.size()), 3);
+    out.bend_strain = Columns3::Zero(static_cast<Eigen::Index>(model.bend.size()), 3);
+    out.half_strain = Columns3::Zero(static_cast<Eigen::Index>(model.half.size()), 3);
   }
   if (model.planar())
     compute_planar(model, q, out);

@@ -28,7 +28,7 @@ struct Configuration {
   VectorX length;                           ///< per edge [m]
   std::vector<Matrix3> frame;               ///< per joint frame, rotation from the drawn axes
   std::vector<EdgeFrame<double>> attached;  ///< per frame stencil: the attached end as an edge of unit length
-  MatrixX3 bend_strain, half_strain;        ///< kappa1, kappa2, tau; in a plane: kappa, -, -
+  Columns3 bend_strain, half_strain;        ///< kappa1, kappa2, tau; in a plane: kappa, -, -
 };
 
 /// Fills `out` from q, measured from the frames of `state`. Does not allocate after the first call.

@@ -18,7 +18,7 @@ class BandLdlt final : public LinearSolver {
       : pattern_(pattern),
         band_(band),
         half_bandwidth_(pattern.half_bandwidth()),
-        values_(static_cast<std::size_t>(pattern.size) * band.stride, 0.0),
+        values_(static_cast<std::size_t>(pattern.size) * band.stride + kPadding, 0.0),
         factor_(static_cast<std::size_t>(pattern.size + band.half_bandwidth) * band.stride, 0.0),
         inverse_pivots_(pattern.size, 0.0) {}
 
@@ -30,8 +30,8 @@ class BandLdlt final : public LinearSolver {
     find_lower_entry(pattern_, row, column);
     return static_cast<std::ptrdiff_t>(column) * band_.stride + (row - column);
   }
-  std::span<double> values() override { return values_; }
-  std::span<const double> values() const override { return values_; }
+  std::span<double> values() override { return {values_.data(), values_.size() - kPadding}; }
+  std::span<const double> values() const override { return {values_.data(), values_.size() - kPadding}; }
 
   Factorization factorize(std::span<const double> shift) override {
     require_shift(shift, size());

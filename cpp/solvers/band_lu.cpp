@@ -23,7 +23,7 @@ class BandLu final : public LinearSolver {
         width_(pattern.half_bandwidth()),
         value_stride_(2 * width_ + 1),
         work_stride_(3 * width_ + 1),
-        values_(static_cast<std::size_t>(pattern.size) * value_stride_, 0.0),
+        values_(static_cast<std::size_t>(pattern.size) * value_stride_ + kPadding, 0.0),
         work_(static_cast<std::size_t>(pattern.size) * work_stride_, 0.0),
         multipliers_(static_cast<std::size_t>(pattern.size) * width_, 0.0),
         inverse_pivots_(pattern.size, 0.0),
@@ -38,8 +38,8 @@ class BandLu final : public LinearSolver {
     find_entry(pattern_, row, column);
     return static_cast<std::ptrdiff_t>(row) * value_stride_ + (column - row + width_);
   }
-  std::span<double> values() override { return values_; }
-  std::span<const double> values() const override { return values_; }
+  std::span<double> values() override { return {values_.data(), values_.size() - kPadding}; }
+  std::span<const double> values() const override { return {values_.data(), values_.size() - kPadding}; }
 
   Factorization factorize(std::span<const double> shift) override {
     require_shift(shift, size());

@@ -25,7 +25,7 @@ constexpr double kSmallestPivotGrowth = 1e-4;
 class KluSolver final : public LinearSolver {
  public:
   explicit KluSolver(const SparsityPattern& pattern)
-      : pattern_(pattern), values_(pattern.row_indices.size(), 0.0), shifted_(pattern.row_indices.size(), 0.0) {
+      : pattern_(pattern), values_(pattern.row_indices.size() + kPadding, 0.0), shifted_(pattern.row_indices.size(), 0.0) {
     diagonal_.reserve(pattern.size);
     for (int i = 0; i < pattern.size; ++i) diagonal_.push_back(find_entry(pattern, i, i));
     klu_defaults(&common_);
@@ -51,12 +51,12 @@ class KluSolver final : public LinearSolver {
   Symmetry symmetry() const override { return Symmetry::unsymmetric; }
   std::string name() const override { return "KLU"; }
   std::ptrdiff_t offset(int row, int column) const override { return find_entry(pattern_, row, column); }
-  std::span<double> values() override { return values_; }
-  std::span<const double> values() const override { return values_; }
+  std::span<double> values() override { return {values_.data(), values_.size() - kPadding}; }
+  std::span<const double> values() const override { return {values_.data(), values_.size() - kPadding}; }
 
   Factorization factorize(std::span<const double> shift) override {
     require_shift(shift, size());
-    std::copy(values_.begin(), values_.end(), shifted_.begin());
+    std::copy_n(values_.begin(), shifted_.size(), shifted_.begin());
     for (std::size_t i = 0; i < shift.size(); ++i) shifted_[diagonal_[i]] += shift[i];
     return factorize_shifted();
   }

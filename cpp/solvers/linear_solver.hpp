@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "common/instruction_set.hpp"
+
 namespace withe {
 
 /// Pattern of a square matrix, structurally symmetric, column by column, rows sorted, diagonal included.
@@ -47,7 +49,7 @@ class LinearSolver {
   /// Where entry (row, column) lives in values(). Symmetric: only row >= column may be asked for.
   /// Throws std::invalid_argument outside the pattern.
   virtual std::ptrdiff_t offset(int row, int column) const = 0;
-  /// The matrix's entries; kept intact by factorize().
+  /// The matrix's entries; kept intact by factorize(). Zeros may be added to kPadding numbers past their end.
   virtual std::span<double> values() = 0;
   virtual std::span<const double> values() const = 0;
   /// Factorises values() plus `shift` (empty, or one number a row) on the diagonal. Does not allocate

@@ -35,7 +35,7 @@ class SparseLdlt final : public LinearSolver {
       const int count = pattern.column_starts[column + 1] - pattern.column_starts[column];
       lower_starts_.push_back(lower_starts_.back() + count - above);
     }
-    values_.assign(lower_starts_.back(), 0.0);
+    values_.assign(static_cast<std::size_t>(lower_starts_.back()) + kPadding, 0.0);
     analyze();
   }
 
@@ -47,8 +47,8 @@ class SparseLdlt final : public LinearSolver {
     const std::ptrdiff_t place = find_lower_entry(pattern_, row, column);
     return place - pattern_.column_starts[column + 1] + lower_starts_[column + 1];
   }
-  std::span<double> values() override { return values_; }
-  std::span<const double> values() const override { return values_; }
+  std::span<double> values() override { return {values_.data(), values_.size() - kPadding}; }
+  std::span<const double> values() const override { return {values_.data(), values_.size() - kPadding}; }
 
   Factorization factorize(std::span<const double> shift) override {
     require_shift(shift, size());

@@ -251,6 +251,7 @@ void World::set_gravity(const Vector3& gravity) {
   if (self.model.planar() && std::abs(gravity.dot(self.model.plane->normal)) > 1e-8 * gravity.norm())
     self.leave_plane("gravity");
   self.parameters.gravity = gravity;
+  update_derived(self.model, self.parameters);
   self.reaction_current = false;
   self.state.acceleration_current = false;
 }

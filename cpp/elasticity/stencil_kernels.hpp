@@ -1,0 +1,43 @@
+#pragma once
+/// Energies, gradients and Hessians of many ordinary stencils at once, added straight to the residual and to the
+/// matrix, by the instruction set in use. Raw pointers only: the kernels behind share no code with the rest.
+///
+/// A stencil here has consecutive unknowns (11 in space: node, angle, node, angle, node; 6 in a plane), and the
+/// matrix keeps each of its lines (columns of the lower triangle, or whole lines of an unsymmetric matrix) together.
+/// It brings along the stretching of those of its edges that it owns, which saves a round through the matrix.
+
+#include <cstddef>
+
+#include "common/instruction_set.hpp"
+
+namespace withe {
+
+struct StencilBatch {
+  int count;
+  const int* stencil;            ///< which row of the tables below
+  const int* first_unknown;      ///< of each
+  const int* edges;              ///< two of each
+  const double* owned;           ///< two of each: 1 where it brings the edge's stretching, else 0
+  const std::ptrdiff_t* lines;   ///< per unknown of each: where its line begins in `values`
+  bool lower;                    ///< lines hold the lower triangle, else all of it
+
+  const double* frames;          ///< table of EdgeFrame<double>
+  const double *strain, *natural, *stiffness;  ///< tables of three columns, a row per stencil
+  std::ptrdiff_t column;         ///< numbers from one column to the next
+  const double* force;           ///< per edge: axial force EA eps [N]
+  const double* geometric;       ///< per edge: axial force in the Hessian [N]
+  const double* modulus;         ///< per edge: EA / L [N / m]
+
+  double* residual;              ///< per unknown; padded by kPadding
+  double* magnitude;             ///< sum of absolute contributions; padded by kPadding
+  double* values;                ///< null: no Hessian; padded by kPadding
+};
+
+struct StencilKernels {
+  double (*bend)(const StencilBatch&);  ///< returns the energy of bending and twisting [J]
+  double (*planar_bend)(const StencilBatch&);
+};
+
+const StencilKernels& stencil_kernels();
+
+}  // namespace withe
