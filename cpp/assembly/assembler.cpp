@@ -96,8 +96,7 @@ bool ElementTable::regular(int element, std::vector<std::ptrdiff_t>& lines) cons
       by_columns = by_columns && entry(i, j) == (symmetric_ ? entry(j, j) + i - j : entry(0, j) + i);
     }
   if (!by_rows && !by_columns) return false;
-  for (int i = 0; i < width_; ++i)
-    lines.push_back(symmetric_ ? entry(i, i) : by_rows ? entry(i, 0) : entry(0, i));
+  for (int i = 0; i < width_; ++i) lines.push_back(symmetric_ ? entry(i, i) : by_rows ? entry(i, 0) : entry(0, i));
   return true;
 }
 

@@ -38,8 +38,6 @@ InstructionSet instruction_set() {
   return set;
 }
 
-const char* name_of(InstructionSet set) {
-  return set == InstructionSet::baseline ? "baseline" : "avx2";
-}
+const char* name_of(InstructionSet set) { return set == InstructionSet::baseline ? "baseline" : "avx2"; }
 
 }  // namespace withe

@@ -12,7 +12,8 @@ enum class InstructionSet {
 /// Kernels that add to an array may read and write this many numbers past its end (adding zeros).
 constexpr int kPadding = 8;
 
-/// The one in use: the best of this machine, or what the environment variable WITHE_SIMD (baseline or avx2) asks for. Throws std::invalid_argument for another word or one that this machine cannot run.
+/// The one in use: the best of this machine, or what the environment variable WITHE_SIMD (baseline or avx2) asks for.
+/// Throws std::invalid_argument for another word or one that this machine cannot run.
 InstructionSet instruction_set();
 const char* name_of(InstructionSet set);
 

@@ -100,8 +100,8 @@ inline double sum(Pack a) {
   return s;
 }
 
-/// Transposes kLanes packs: lane j of the i-th becomes lane i of the j-th. From one place to another, because a loop that
-/// copies packs becomes a memcpy, which moves them by halves.
+/// Transposes kLanes packs: lane j of the i-th becomes lane i of the j-th. From one place to another, because a loop
+/// that copies packs becomes a memcpy, which moves them by halves.
 inline void transpose(const Pack* in, Pack* out) {
 #if WITHE_LANES == 4
   const Pack::Native a = in[0].v, b = in[1].v, c = in[2].v, d = in[3].v;
@@ -150,8 +150,8 @@ inline SineCosine sine_cosine(Pack angle) {
   // pi / 2 in three parts whose first two have room for n.
   const Pack r = ((angle - n * Pack(0x1.921fb544p+0)) - n * Pack(0x1.0b4611a6p-34)) - n * Pack(0x1.3198a2e037073p-69);
   const Pack u = r * r;
-  constexpr double kSine[] = {-7.578090160922686e-13,   1.6058352428871255e-10, -2.5052104779095043e-08,
-                              2.7557319213562225e-06,   -0.00019841269841253478, 0.008333333333333321,
+  constexpr double kSine[] = {-7.578090160922686e-13, 1.6058352428871255e-10,  -2.5052104779095043e-08,
+                              2.7557319213562225e-06, -0.00019841269841253478, 0.008333333333333321,
                               -0.16666666666666666};
   constexpr double kCosine[] = {4.7458719020432915e-14,  -1.1470460887609959e-11, 2.087675579108042e-09,
                                 -2.7557319221402824e-07, 2.4801587301584645e-05,  -0.0013888888888888887,

@@ -14,23 +14,23 @@ namespace withe {
 
 struct StencilBatch {
   int count;
-  const int* stencil;            ///< which row of the tables below
-  const int* first_unknown;      ///< of each
-  const int* edges;              ///< two of each
-  const double* owned;           ///< two of each: 1 where it brings the edge's stretching, else 0
-  const std::ptrdiff_t* lines;   ///< per unknown of each: where its line begins in `values`
-  bool lower;                    ///< lines hold the lower triangle, else all of it
+  const int* stencil;           ///< which row of the tables below
+  const int* first_unknown;     ///< of each
+  const int* edges;             ///< two of each
+  const double* owned;          ///< two of each: 1 where it brings the edge's stretching, else 0
+  const std::ptrdiff_t* lines;  ///< per unknown of each: where its line begins in `values`
+  bool lower;                   ///< lines hold the lower triangle, else all of it
 
-  const double* frames;          ///< table of EdgeFrame<double>
+  const double* frames;                        ///< table of EdgeFrame<double>
   const double *strain, *natural, *stiffness;  ///< tables of three columns, a row per stencil
-  std::ptrdiff_t column;         ///< numbers from one column to the next
-  const double* force;           ///< per edge: axial force EA eps [N]
-  const double* geometric;       ///< per edge: axial force in the Hessian [N]
-  const double* modulus;         ///< per edge: EA / L [N / m]
+  std::ptrdiff_t column;                       ///< numbers from one column to the next
+  const double* force;                         ///< per edge: axial force EA eps [N]
+  const double* geometric;                     ///< per edge: axial force in the Hessian [N]
+  const double* modulus;                       ///< per edge: EA / L [N / m]
 
-  double* residual;              ///< per unknown; padded by kPadding
-  double* magnitude;             ///< sum of absolute contributions; padded by kPadding
-  double* values;                ///< null: no Hessian; padded by kPadding
+  double* residual;   ///< per unknown; padded by kPadding
+  double* magnitude;  ///< sum of absolute contributions; padded by kPadding
+  double* values;     ///< null: no Hessian; padded by kPadding
 };
 
 struct StencilKernels {

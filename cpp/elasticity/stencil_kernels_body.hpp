@@ -56,8 +56,9 @@ EdgeFrame<Pack> frames_of(const double* frames, const int (&edge)[kLanes]) {
   for (int l = 0; l < kLanes; ++l) place[l] = frames + std::ptrdiff_t{kFrameNumbers} * edge[l];
   Pack number[kFrameNumbers];
   load_rows<kFrameNumbers>(place, number);
-  return {{number[0], number[1], number[2]},    {number[3], number[4], number[5]},    {number[6], number[7], number[8]},
-          number[9],                             {number[10], number[11], number[12]}, {number[13], number[14], number[15]}};
+  return {{number[0], number[1], number[2]},    {number[3], number[4], number[5]},
+          {number[6], number[7], number[8]},    number[9],
+          {number[10], number[11], number[12]}, {number[13], number[14], number[15]}};
 }
 
 /// place(lane) += `count` numbers of that lane; `numbers` has zeros beyond its end up to a whole number of packs. Moves
@@ -157,114 +158,114 @@ void fill(const BendTwistDerivatives<Pack>& d, Pack (&H)[11][kWidth]) {
 /// The pack of stencils from number `first`; everything within is inlined. Returns their energy.
 template <bool with_matrix, bool inner>
 [[gnu::flatten]] double bend_pack(const StencilBatch& batch, int first) {
-    const Lanes<inner> lanes(batch, first);
-    const int live = inner ? kLanes : lanes.live;
-    const EdgeFrame<Pack> f0 = frames_of(batch.frames, lanes.edge[0]), f1 = frames_of(batch.frames, lanes.edge[1]);
-    const Vec3<Pack> s = lanes.three(batch.strain, batch.column), n = lanes.three(batch.natural, batch.column);
-    const Vec3<Pack> k = lanes.three(batch.stiffness, batch.column);
-    BendTwistDerivatives<Pack> d;
-    if constexpr (with_matrix) {
-      bend_twist_hessian<Pack>(f0, f1, {s.x, s.y, s.z}, {n.x, n.y, n.z}, {k.x, k.y, k.z}, d);
-      apply_transport(f0, f1, d);
-    } else {
-      bend_twist_gradient<Pack>(f0, f1, {s.x, s.y, s.z}, {n.x, n.y, n.z}, {k.x, k.y, k.z}, d);
-      apply_transport_gradient(f0, f1, d);
-    }
-    const double energy = sum_of_live(d.energy, live);
+  const Lanes<inner> lanes(batch, first);
+  const int live = inner ? kLanes : lanes.live;
+  const EdgeFrame<Pack> f0 = frames_of(batch.frames, lanes.edge[0]), f1 = frames_of(batch.frames, lanes.edge[1]);
+  const Vec3<Pack> s = lanes.three(batch.strain, batch.column), n = lanes.three(batch.natural, batch.column);
+  const Vec3<Pack> k = lanes.three(batch.stiffness, batch.column);
+  BendTwistDerivatives<Pack> d;
+  if constexpr (with_matrix) {
+    bend_twist_hessian<Pack>(f0, f1, {s.x, s.y, s.z}, {n.x, n.y, n.z}, {k.x, k.y, k.z}, d);
+    apply_transport(f0, f1, d);
+  } else {
+    bend_twist_gradient<Pack>(f0, f1, {s.x, s.y, s.z}, {n.x, n.y, n.z}, {k.x, k.y, k.z}, d);
+    apply_transport_gradient(f0, f1, d);
+  }
+  const double energy = sum_of_live(d.energy, live);
 
-    const Vec3<Pack> tension[2] = {(lanes.owned[0] * lanes.of_edge(batch.force, 0)) * f0.tangent,
-                                   (lanes.owned[1] * lanes.of_edge(batch.force, 1)) * f1.tangent};
-    Pack gradient[11 + kLanes], magnitude[11 + kLanes];
-    for (int i = 11; i < 11 + kLanes; ++i) gradient[i] = magnitude[i] = 0.0;
-    const Vec3<Pack> bending = d.gradient_e[0] - d.gradient_e[1];
-    put(gradient, -(d.gradient_e[0] + tension[0]));
-    put(gradient + 4, bending + tension[0] - tension[1]);
-    put(gradient + 8, d.gradient_e[1] + tension[1]);
-    put_absolute(magnitude, d.gradient_e[0]);
-    put_absolute(magnitude + 4, bending);
-    put_absolute(magnitude + 8, d.gradient_e[1]);
-    add_absolute(magnitude, tension[0]);
-    add_absolute(magnitude + 4, tension[0]);
-    add_absolute(magnitude + 4, tension[1]);
-    add_absolute(magnitude + 8, tension[1]);
+  const Vec3<Pack> tension[2] = {(lanes.owned[0] * lanes.of_edge(batch.force, 0)) * f0.tangent,
+                                 (lanes.owned[1] * lanes.of_edge(batch.force, 1)) * f1.tangent};
+  Pack gradient[11 + kLanes], magnitude[11 + kLanes];
+  for (int i = 11; i < 11 + kLanes; ++i) gradient[i] = magnitude[i] = 0.0;
+  const Vec3<Pack> bending = d.gradient_e[0] - d.gradient_e[1];
+  put(gradient, -(d.gradient_e[0] + tension[0]));
+  put(gradient + 4, bending + tension[0] - tension[1]);
+  put(gradient + 8, d.gradient_e[1] + tension[1]);
+  put_absolute(magnitude, d.gradient_e[0]);
+  put_absolute(magnitude + 4, bending);
+  put_absolute(magnitude + 8, d.gradient_e[1]);
+  add_absolute(magnitude, tension[0]);
+  add_absolute(magnitude + 4, tension[0]);
+  add_absolute(magnitude + 4, tension[1]);
+  add_absolute(magnitude + 8, tension[1]);
+  for (int j = 0; j < 2; ++j) {
+    gradient[3 + 4 * j] = d.gradient_angle[j];
+    magnitude[3 + 4 * j] = absolute(d.gradient_angle[j]);
+  }
+  add_vectors<Block, 11>(batch, first, live, gradient, magnitude);
+  if constexpr (with_matrix) {
     for (int j = 0; j < 2; ++j) {
-      gradient[3 + 4 * j] = d.gradient_angle[j];
-      magnitude[3 + 4 * j] = absolute(d.gradient_angle[j]);
+      const EdgeFrame<Pack>& f = j == 0 ? f0 : f1;
+      const Pack g = lanes.owned[j] * (lanes.of_edge(batch.geometric, j) * f.inverse_length);
+      add_identity(d.ee[j][j], g);
+      add_outer(d.ee[j][j], lanes.owned[j] * lanes.of_edge(batch.modulus, j) - g, f.tangent, f.tangent);
     }
-    add_vectors<Block, 11>(batch, first, live, gradient, magnitude);
-    if constexpr (with_matrix) {
-      for (int j = 0; j < 2; ++j) {
-        const EdgeFrame<Pack>& f = j == 0 ? f0 : f1;
-        const Pack g = lanes.owned[j] * (lanes.of_edge(batch.geometric, j) * f.inverse_length);
-        add_identity(d.ee[j][j], g);
-        add_outer(d.ee[j][j], lanes.owned[j] * lanes.of_edge(batch.modulus, j) - g, f.tangent, f.tangent);
-      }
-      Pack H[11][11 + kLanes];
-      for (auto& row : H)
-        for (int i = 11; i < 11 + kLanes; ++i) row[i] = 0.0;
-      fill(d, H);
-      add_matrix<Block>(batch, first, live, H);
-    }
+    Pack H[11][11 + kLanes];
+    for (auto& row : H)
+      for (int i = 11; i < 11 + kLanes; ++i) row[i] = 0.0;
+    fill(d, H);
+    add_matrix<Block>(batch, first, live, H);
+  }
   return energy;
 }
 
 template <bool with_matrix, bool inner>
 [[gnu::flatten]] double planar_pack(const StencilBatch& batch, int first) {
-    const Lanes<inner> lanes(batch, first);
-    const int live = inner ? kLanes : lanes.live;
-    const PlanarBend<Pack> p = withe::planar_bend(lanes.of(batch.strain), lanes.of(batch.natural),
-                                           lanes.of(batch.stiffness));
-    const double energy = sum_of_live(p.energy, live);
-    // phi = angle(e1) - angle(e0): an edge's angle has the gradient n = (-ty, tx) / l and the Hessian
-    // -(t n^T + n t^T) / l.
-    Pack tx[2], ty[2], nx[2], ny[2], inverse[2], fx[2], fy[2];
+  const Lanes<inner> lanes(batch, first);
+  const int live = inner ? kLanes : lanes.live;
+  const PlanarBend<Pack> p =
+      withe::planar_bend(lanes.of(batch.strain), lanes.of(batch.natural), lanes.of(batch.stiffness));
+  const double energy = sum_of_live(p.energy, live);
+  // phi = angle(e1) - angle(e0): an edge's angle has the gradient n = (-ty, tx) / l and the Hessian
+  // -(t n^T + n t^T) / l.
+  Pack tx[2], ty[2], nx[2], ny[2], inverse[2], fx[2], fy[2];
+  for (int j = 0; j < 2; ++j) {
+    tx[j] = gather(batch.frames, lanes.edge[j], kFrameNumbers, 0);
+    ty[j] = gather(batch.frames, lanes.edge[j], kFrameNumbers, 1);
+    inverse[j] = gather(batch.frames, lanes.edge[j], kFrameNumbers, kInverseLength);
+    nx[j] = -(ty[j] * inverse[j]);
+    ny[j] = tx[j] * inverse[j];
+    const Pack force = lanes.owned[j] * lanes.of_edge(batch.force, j);
+    fx[j] = force * tx[j], fy[j] = force * ty[j];
+  }
+  const Pack m = p.slope;
+  const Pack turn[6] = {nx[0], ny[0], -(nx[0] + nx[1]), -(ny[0] + ny[1]), nx[1], ny[1]};
+  const Pack pull[6] = {-fx[0], -fy[0], fx[0] - fx[1], fy[0] - fy[1], fx[1], fy[1]};
+  Pack gradient[6 + kLanes], magnitude[6 + kLanes];
+  for (int i = 6; i < 6 + kLanes; ++i) gradient[i] = magnitude[i] = 0.0;
+  for (int i = 0; i < 6; ++i) {
+    gradient[i] = m * turn[i] + pull[i];
+    magnitude[i] = absolute(m * turn[i]);
+  }
+  magnitude[0] += absolute(fx[0]), magnitude[1] += absolute(fy[0]);
+  magnitude[2] += absolute(fx[0]) + absolute(fx[1]), magnitude[3] += absolute(fy[0]) + absolute(fy[1]);
+  magnitude[4] += absolute(fx[1]), magnitude[5] += absolute(fy[1]);
+  add_vectors<Pair, 6>(batch, first, live, gradient, magnitude);
+  if constexpr (with_matrix) {
+    // Blocks of the two edge vectors: xx, xy, yy.
+    Pack E[2][3];
     for (int j = 0; j < 2; ++j) {
-      tx[j] = gather(batch.frames, lanes.edge[j], kFrameNumbers, 0);
-      ty[j] = gather(batch.frames, lanes.edge[j], kFrameNumbers, 1);
-      inverse[j] = gather(batch.frames, lanes.edge[j], kFrameNumbers, kInverseLength);
-      nx[j] = -(ty[j] * inverse[j]);
-      ny[j] = tx[j] * inverse[j];
-      const Pack force = lanes.owned[j] * lanes.of_edge(batch.force, j);
-      fx[j] = force * tx[j], fy[j] = force * ty[j];
+      const Pack g = lanes.owned[j] * (lanes.of_edge(batch.geometric, j) * inverse[j]);
+      const Pack axial = lanes.owned[j] * lanes.of_edge(batch.modulus, j) - g;
+      const Pack w = (j == 0 ? m : -m) * inverse[j];
+      E[j][0] = g + axial * (tx[j] * tx[j]) + (2.0 * w) * (tx[j] * nx[j]);
+      E[j][1] = axial * (tx[j] * ty[j]) + w * (tx[j] * ny[j] + nx[j] * ty[j]);
+      E[j][2] = g + axial * (ty[j] * ty[j]) + (2.0 * w) * (ty[j] * ny[j]);
     }
-    const Pack m = p.slope;
-    const Pack turn[6] = {nx[0], ny[0], -(nx[0] + nx[1]), -(ny[0] + ny[1]), nx[1], ny[1]};
-    const Pack pull[6] = {-fx[0], -fy[0], fx[0] - fx[1], fy[0] - fy[1], fx[1], fy[1]};
-    Pack gradient[6 + kLanes], magnitude[6 + kLanes];
-    for (int i = 6; i < 6 + kLanes; ++i) gradient[i] = magnitude[i] = 0.0;
-    for (int i = 0; i < 6; ++i) {
-      gradient[i] = m * turn[i] + pull[i];
-      magnitude[i] = absolute(m * turn[i]);
-    }
-    magnitude[0] += absolute(fx[0]), magnitude[1] += absolute(fy[0]);
-    magnitude[2] += absolute(fx[0]) + absolute(fx[1]), magnitude[3] += absolute(fy[0]) + absolute(fy[1]);
-    magnitude[4] += absolute(fx[1]), magnitude[5] += absolute(fy[1]);
-    add_vectors<Pair, 6>(batch, first, live, gradient, magnitude);
-    if constexpr (with_matrix) {
-      // Blocks of the two edge vectors: xx, xy, yy.
-      Pack E[2][3];
-      for (int j = 0; j < 2; ++j) {
-        const Pack g = lanes.owned[j] * (lanes.of_edge(batch.geometric, j) * inverse[j]);
-        const Pack axial = lanes.owned[j] * lanes.of_edge(batch.modulus, j) - g;
-        const Pack w = (j == 0 ? m : -m) * inverse[j];
-        E[j][0] = g + axial * (tx[j] * tx[j]) + (2.0 * w) * (tx[j] * nx[j]);
-        E[j][1] = axial * (tx[j] * ty[j]) + w * (tx[j] * ny[j] + nx[j] * ty[j]);
-        E[j][2] = g + axial * (ty[j] * ty[j]) + (2.0 * w) * (ty[j] * ny[j]);
+    Pack H[6][6 + kLanes];
+    for (auto& row : H)
+      for (int i = 6; i < 6 + kLanes; ++i) row[i] = 0.0;
+    for (int i = 0; i < 6; ++i)
+      for (int j = 0; j <= i; ++j) {
+        Pack h = p.curvature * (turn[i] * turn[j]);
+        const int part = i % 2 + j % 2, a = i / 2, b = j / 2;  // nodes of the row and of the column
+        if (a == b && a < 2) h += E[0][part];
+        if (a == b && a > 0) h += E[1][part];
+        if (a == b + 1) h -= E[b][part];
+        H[i][j] = H[j][i] = h;
       }
-      Pack H[6][6 + kLanes];
-      for (auto& row : H)
-        for (int i = 6; i < 6 + kLanes; ++i) row[i] = 0.0;
-      for (int i = 0; i < 6; ++i)
-        for (int j = 0; j <= i; ++j) {
-          Pack h = p.curvature * (turn[i] * turn[j]);
-          const int part = i % 2 + j % 2, a = i / 2, b = j / 2;  // nodes of the row and of the column
-          if (a == b && a < 2) h += E[0][part];
-          if (a == b && a > 0) h += E[1][part];
-          if (a == b + 1) h -= E[b][part];
-          H[i][j] = H[j][i] = h;
-        }
-      add_matrix<Pair>(batch, first, live, H);
-    }
+    add_matrix<Pair>(batch, first, live, H);
+  }
   return energy;
 }
 

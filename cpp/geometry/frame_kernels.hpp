@@ -35,8 +35,8 @@ struct StrainBatch {
 };
 
 struct FrameKernels {
-  void (*edges)(const EdgeBatch&);           ///< see edge_frame
-  void (*strains)(const StrainBatch&);       ///< see bend_twist_strain
+  void (*edges)(const EdgeBatch&);      ///< see edge_frame
+  void (*strains)(const StrainBatch&);  ///< see bend_twist_strain
   void (*planar_edges)(const EdgeBatch&);
   void (*planar_strains)(const StrainBatch&);  ///< see planar_kappa
 };

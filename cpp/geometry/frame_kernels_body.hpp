@@ -26,7 +26,8 @@ Vec3<Pack> gather_rows(const double* table, const int (&row)[kLanes]) {
   for (int first = 0; first < batch.count; first += kLanes) {
     int e[kLanes], tail[kLanes], head[kLanes], angle[kLanes];
     const int live = lanes_from(first, batch.count, e);
-    for (int l = 0; l < kLanes; ++l) tail[l] = batch.tail[e[l]], head[l] = batch.head[e[l]], angle[l] = batch.angle[e[l]];
+    for (int l = 0; l < kLanes; ++l)
+      tail[l] = batch.tail[e[l]], head[l] = batch.head[e[l]], angle[l] = batch.angle[e[l]];
     const double* q = batch.q;
     const Vec3<Pack> d{gather(q, head) - gather(q, tail), gather(q + 1, head) - gather(q + 1, tail),
                        gather(q + 2, head) - gather(q + 2, tail)};
@@ -34,7 +35,7 @@ Vec3<Pack> gather_rows(const double* table, const int (&row)[kLanes]) {
     const SineCosine turn = sine_cosine(gather(q, angle));
     const EdgeFrame<Pack> frame =
         edge_frame(d, length, gather_rows(batch.source, e), gather_rows(batch.reference, e), turn.cosine, turn.sine);
-    const Vec3<Pack>*part[5] = {&frame.tangent, &frame.d1, &frame.d2, &frame.spin, &frame.bow};
+    const Vec3<Pack>* part[5] = {&frame.tangent, &frame.d1, &frame.d2, &frame.spin, &frame.bow};
     Pack number[kFrameNumbers];
     for (int i = 0; i < 5; ++i) {
       const int k = 3 * i + (i > 2);
@@ -75,8 +76,9 @@ EdgeFrame<Pack> frames_of(const double* frames, const int (&edge)[kLanes]) {
   for (int l = 0; l < kLanes; ++l) place[l] = frames + std::ptrdiff_t{kFrameNumbers} * edge[l];
   Pack number[kFrameNumbers];
   load_rows<kFrameNumbers>(place, number);
-  return {{number[0], number[1], number[2]},    {number[3], number[4], number[5]},    {number[6], number[7], number[8]},
-          number[9],                             {number[10], number[11], number[12]}, {number[13], number[14], number[15]}};
+  return {{number[0], number[1], number[2]},    {number[3], number[4], number[5]},
+          {number[6], number[7], number[8]},    number[9],
+          {number[10], number[11], number[12]}, {number[13], number[14], number[15]}};
 }
 
 [[gnu::flatten]] void strains(const StrainBatch& batch) {

@@ -63,7 +63,8 @@ void add_outer(Mat3<Scalar>& A, const std::type_identity_t<Scalar>& s, const Vec
 }
 /// A += s (a b^T + b a^T).
 template <class Scalar>
-void add_symmetric_outer(Mat3<Scalar>& A, const std::type_identity_t<Scalar>& s, const Vec3<Scalar>& a, const Vec3<Scalar>& b) {
+void add_symmetric_outer(Mat3<Scalar>& A, const std::type_identity_t<Scalar>& s, const Vec3<Scalar>& a,
+                         const Vec3<Scalar>& b) {
   add_outer(A, s, a, b);
   add_outer(A, s, b, a);
 }

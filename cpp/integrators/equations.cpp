@@ -134,9 +134,9 @@ void Equations::add_step(const VectorX& z, bool with_matrix, Evaluation& out) {
   const auto inertia = (inverse * mass.array()) * (inverse * (x - q0) - v0);
   const auto drag = (inverse * node_dof_drag_.array()) * (x - q0);
   out.full_residual = (gradient_.head(n).array() + inertia + drag - gravity_.array() - custom_force.array()).matrix();
-  out.magnitude = (magnitude_.head(n).array() + inertia.abs() + drag.abs() + gravity_.array().abs() +
-                   custom_force.array().abs())
-                      .matrix();
+  out.magnitude =
+      (magnitude_.head(n).array() + inertia.abs() + drag.abs() + gravity_.array().abs() + custom_force.array().abs())
+          .matrix();
   out.floor = floor_ + rounding_ * out.magnitude;
   out.potential -= gravity_.dot(z);
   out.residual = out.full_residual;
@@ -150,13 +150,13 @@ void Equations::add_step(const VectorX& z, bool with_matrix, Evaluation& out) {
   const bool planar = model_.planar();
   for (int e = 0; e < model_.edge_count; ++e) {
     const Vec3d& t = middle_.edge[at(e)].tangent;
-    const double floor = axial_floor_[e], x = floor * std::abs(t.x), y = floor * std::abs(t.y);
+    const double part[3] = {axial_floor_[e] * std::abs(t.x), axial_floor_[e] * std::abs(t.y),
+                            planar ? 0.0 : axial_floor_[e] * std::abs(t.z)};
     double *tail = &out.floor[model_.tail_dof[at(e)]], *head = &out.floor[model_.head_dof[at(e)]];
-    tail[0] += x, tail[1] += y;
-    head[0] += x, head[1] += y;
-    if (planar) continue;
-    const double along_z = floor * std::abs(t.z);
-    tail[2] += along_z, head[2] += along_z;
+    for (int i = 0; i < (planar ? 2 : 3); ++i) {
+      tail[i] += part[i];
+      head[i] += part[i];
+    }
   }
 }
 

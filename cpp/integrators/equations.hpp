@@ -67,7 +67,8 @@ class Equations {
   StencilBatch regular_batch(const ElasticCoefficients& k, const double* axial_force, double* values);
   void add_step(const VectorX& z, bool with_matrix, Evaluation& out);
   void add_loads(const VectorX& z, bool with_matrix, Evaluation& out);
-  void add_elastic(const ElasticCoefficients& k, const VectorX& z, bool with_matrix, const double* axial_force, Evaluation& out);
+  void add_elastic(const ElasticCoefficients& k, const VectorX& z, bool with_matrix, const double* axial_force,
+                   Evaluation& out);
   void add_discrete_gradient(const VectorX& z, bool with_matrix, const double* axial_force, Evaluation& out);
   void correct(Local& local, const Local& end, double start_energy, const ElementTable& table, int element,
                const double (*metric)[kMaxLocal]);
@@ -90,12 +91,12 @@ class Equations {
   VectorX difference_;  ///< q1 - q0
   VectorX end_q_, last_z_;
   VectorX node_dof_drag_, gravity_;
-  long version_ = -1;                     ///< of the parameters that mass, elastic, gravity_ and drag belong to
-  VectorX gradient_, magnitude_;          ///< forces but for inertia, drag and gravity; padded by kPadding
+  long version_ = -1;                       ///< of the parameters that mass, elastic, gravity_ and drag belong to
+  VectorX gradient_, magnitude_;            ///< forces but for inertia, drag and gravity; padded by kPadding
   VectorX force_, modulus_, inverse_rest_;  ///< per edge: EA eps [N], EA / L [N / m], 1 / L [1 / m]
-  VectorX floor_;        ///< what bending, twisting and inertia leave by rounding
-  VectorX axial_floor_;  ///< per edge [N]
-  double rounding_ = 0;  ///< relative, of a direction in space
+  VectorX floor_;                           ///< what bending, twisting and inertia leave by rounding
+  VectorX axial_floor_;                     ///< per edge [N]
+  double rounding_ = 0;                     ///< relative, of a direction in space
   bool floor_current_ = false;
 };
 

@@ -25,7 +25,9 @@ constexpr double kSmallestPivotGrowth = 1e-4;
 class KluSolver final : public LinearSolver {
  public:
   explicit KluSolver(const SparsityPattern& pattern)
-      : pattern_(pattern), values_(pattern.row_indices.size() + kPadding, 0.0), shifted_(pattern.row_indices.size(), 0.0) {
+      : pattern_(pattern),
+        values_(pattern.row_indices.size() + kPadding, 0.0),
+        shifted_(pattern.row_indices.size(), 0.0) {
     diagonal_.reserve(pattern.size);
     for (int i = 0; i < pattern.size; ++i) diagonal_.push_back(find_entry(pattern, i, i));
     klu_defaults(&common_);

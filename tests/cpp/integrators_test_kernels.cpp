@@ -1,0 +1,110 @@
+// The kernels on packs against the same sums stencil by stencil, in every scene and state.
+
+#include <gtest/gtest.h>
+
+#include "integrators/equations.hpp"
+#include "states.hpp"
+
+namespace withe {
+namespace {
+
+using testing::at;
+using testing::Case;
+
+/// Elastic forces and matrix, each stencil by itself.
+void add_stencil_by_stencil(const Case& c, Assembler& assembler, const ElasticCoefficients& k, VectorX& force,
+                            VectorX& magnitude) {
+  Configuration configuration;
+  compute_configuration(c.model, c.state, c.q, configuration);
+  std::fill(assembler.solver().values().begin(), assembler.solver().values().end(), 0.0);
+  force.setZero(c.model.dof_count);
+  magnitude.setZero(c.model.dof_count);
+  Local local;
+  const auto add = [&](const ElementTable& table, int i) {
+    table.add_gradient(i, local.gradient, 1.0, force, magnitude);
+    table.add_hessian(i, local.hessian, 1.0, assembler.solver().values());
+  };
+  for (int e = 0; e < c.model.edge_count; ++e) {
+    stretch_local(c.model, k, configuration, e, true, nullptr, local);
+    add(assembler.stretch, e);
+  }
+  for (int b = 0; b < static_cast<int>(c.model.bend.size()); ++b) {
+    bend_local(c.model, k, configuration, b, true, local);
+    add(assembler.bend, b);
+  }
+  for (int h = 0; h < static_cast<int>(c.model.half.size()); ++h) {
+    half_local(c.model, c.q, k, configuration, h, true, local);
+    add(assembler.half, h);
+  }
+  assembler.project(force);
+  assembler.project_matrix();
+}
+
+/// More stencils than a pack has lanes, and a remainder.
+std::vector<Case> long_cases() {
+  std::vector<Case> cases;
+  testing::RodMaterial curved;
+  curved.curvature = {0.4, -0.3};
+  curved.natural_twist = 0.5;
+  testing::RodMaterial round = curved;
+  round.bend2 = round.bend1;
+  round.natural_twist = 0.0;
+  for (int nodes : {3, 4, 6, 7, 23}) {
+    testing::SceneBuilder open, flat, closed;
+    open.add_rod(testing::helix(nodes), curved);
+    open.add_rod(testing::line(Vector3(3, 0, 0), Vector3(4, 0, 1), nodes + 2), curved);
+    flat.add_rod(testing::arc(nodes), round, false, Vector3::UnitY());
+    closed.add_rod(testing::ring(nodes, 1.0, 0.3), curved, true);
+    for (const auto& [name, builder] : {std::pair{"open", &open}, std::pair{"flat", &flat}, std::pair{"ring", &closed}})
+      for (Case& c : testing::states_of(name + std::to_string(nodes), builder->scene)) cases.push_back(std::move(c));
+  }
+  return cases;
+}
+
+void expect_same_sums(const Case& c, Integrator integrator) {
+  Options options;
+  options.integrator = integrator;  // energy-momentum: whole lines instead of triangles
+  Equations equations(c.model, options);
+  Assembler reference(c.model, equations.loads(), equations.symmetric() ? Symmetry::symmetric : Symmetry::unsymmetric,
+                      SolverKind::automatic);
+  const Parameters parameters = initial_parameters(c.model);
+  Evaluation evaluation, alone;
+  equations.begin(c.state, parameters, 0.0, false);
+  equations.evaluate(c.q, true, nullptr, evaluation);
+  VectorX force, magnitude;
+  add_stencil_by_stencil(c, reference, equations.elastic, force, magnitude);
+  const double scale = magnitude.maxCoeff() + 1.0;
+  EXPECT_LT((evaluation.residual - force).cwiseAbs().maxCoeff(), 1e-12 * scale) << c.name;
+  EXPECT_LT((evaluation.magnitude - magnitude).cwiseAbs().maxCoeff(), 1e-12 * scale) << c.name;
+  const std::span<const double> a = equations.assembler().solver().values(), b = reference.solver().values();
+  double greatest = 0.0, difference = 0.0;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    greatest = std::max(greatest, std::abs(b[i]));
+    difference = std::max(difference, std::abs(a[i] - b[i]));
+  }
+  EXPECT_LT(difference, 1e-12 * greatest) << c.name;
+  equations.evaluate(c.q, false, nullptr, alone);
+  EXPECT_LT((evaluation.residual - alone.residual).cwiseAbs().maxCoeff(), 1e-13 * scale) << c.name;
+}
+
+TEST(StencilKernels, AddUpToWhatStencilsGiveOneByOne) {
+  for (const Case& c : testing::all_cases()) expect_same_sums(c, Integrator::implicit_midpoint);
+  for (const Case& c : long_cases()) expect_same_sums(c, Integrator::implicit_midpoint);
+}
+
+TEST(StencilKernels, FillUnsymmetricMatricesToo) {
+  for (const Case& c : testing::all_cases()) expect_same_sums(c, Integrator::energy_momentum);
+  for (const Case& c : long_cases()) expect_same_sums(c, Integrator::energy_momentum);
+}
+
+TEST(StencilKernels, TakeTheOrdinaryStencilsOfOpenRods) {
+  for (const Case& c : long_cases()) {
+    if (c.name.rfind("ring", 0) == 0) continue;
+    const Assembler assembler(c.model, resolve_loads(c.model), Symmetry::symmetric, SolverKind::automatic);
+    EXPECT_EQ(assembler.regular.stencil.size(), c.model.bend.size()) << c.name;
+    EXPECT_TRUE(assembler.regular.other_edges.empty()) << c.name;
+  }
+}
+
+}  // namespace
+}  // namespace withe
