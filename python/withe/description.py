@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import cast
 
 import numpy as np
 import numpy.typing as npt
@@ -64,8 +65,10 @@ def added_mass(directory: Directory, masses: dict[str, float]) -> FloatArray:
 
 def drag(directory: Directory, coefficients: dict[str, float], rod: RodPart) -> float:
     """Drag of a rod [Pa s], the sum of all parts that act on it."""
+    # By name: a look through all parts for every rod would take most of the time of a build.
+    found = [(cast(DragPart, directory.parts[name]), value) for name, value in coefficients.items()]
     return sum(
-        (coefficients[part.name] for part in directory.all(DragPart) if part.rods is None or rod.index in part.rods),
+        (value for part, value in found if part.rods is None or rod.index in part.rods),
         0.0,
     )
 
