@@ -16,6 +16,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+from reporting import Report
 
 from withe import _core
 from withe.perception import Camera, color_filter, trace, trace_mask
@@ -45,8 +46,13 @@ GOALS = {
 }
 
 
+REPORT = Report("perception")
+ROWS = []
+
+
 def line(name, value, goal):
-    """Print one figure beside its goal."""
+    """Print one figure beside its goal, and keep it."""
+    ROWS.append((name, value, goal))
     print(f"  {name:42s} {value:>22s}   goal {goal}")
 
 
@@ -98,6 +104,7 @@ def synthetic(count, scale):
         goal = GOALS[case] - (0 if scale == 1 else 5)
         extra = "".join(f", {n} {word}" for n, word in ((touching, "split"), (tips, "by tips only")) if n)
         line(case, f"{100 * right / count:.1f} %{extra}", f"{goal} %")
+        REPORT.goal(f"synthetic masks at scale {scale:g}, {case}: right [%]", 100 * right / count, goal)
 
 
 def order_of_self_crossings(count):
@@ -117,6 +124,7 @@ def order_of_self_crossings(count):
         right += first == (true.over[1] < true.under[1])
     print("Order")
     line("self-crossings, rendered", f"{100 * right / total:.1f} % of {total}", "95 %")
+    REPORT.goal("order of self-crossings right [%]", 100 * right / total, 95)
 
 
 def metres():
@@ -224,6 +232,8 @@ def main():
     if not quick:
         synthetic(40, 0.5)
         synthetic(40, 2.0)
+    REPORT.tables["Figures beside their goals"] = [list(map(str, row)) for row in ROWS]
+    REPORT.write()
 
 
 if __name__ == "__main__":
