@@ -31,8 +31,8 @@ double largest_turn(const Model& model, const State& state, const VectorX& q) {
 /// Work of loads, drag and viscosity over the step, with the forces that acted in it.
 void book_work(const Equations& equations, const Parameters& parameters, const VectorX& change, StepResult& result) {
   if (!equations.loads().pieces.empty() || (equations.custom_force.array() != 0.0).any())
-    result.load_work = equations.load_force().dot(change);
-  if (parameters.dragged || parameters.viscous) result.dissipated = -equations.dissipative_force().dot(change);
+    result.load_work = equations.load_work(change);
+  if (parameters.dragged || parameters.viscous) result.dissipated = equations.dissipated(change);
 }
 
 /// Held unknowns move as they are told, so their inertia is what changes their velocity, not what the scheme's formula

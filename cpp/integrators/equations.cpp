@@ -19,8 +19,8 @@ Symmetry symmetry_of(const Loads& loads, const Options& options) {
 
 }  // namespace
 
-VectorX mass_vector(const Model& model, const Parameters& p) {
-  VectorX mass = VectorX::Zero(model.dof_count);
+void set_mass(const Model& model, const Parameters& p, VectorX& mass) {
+  mass.setZero(model.dof_count);
   for (int i = 0; i < model.node_count; ++i)
     mass.segment(model.node_dof[at(i)], model.dimension).setConstant(p.node_mass(i));
   for (int f = 0; f < model.frame_count; ++f)
@@ -29,11 +29,10 @@ VectorX mass_vector(const Model& model, const Parameters& p) {
     mass(model.hinges[h].dof) = p.hinge_inertia(static_cast<Eigen::Index>(h));
   if (!model.planar())
     for (int e = 0; e < model.edge_count; ++e) mass(model.edge_dof[at(e)]) = p.edge_inertia(e);
-  return mass;
 }
 
-VectorX gravity_force(const Model& model, const Parameters& p) {
-  VectorX force = VectorX::Zero(model.dof_count);
+void set_gravity_force(const Model& model, const Parameters& p, VectorX& force) {
+  force.setZero(model.dof_count);
   for (int i = 0; i < model.node_count; ++i) {
     const int dof = model.node_dof[at(i)];
     if (model.planar())
@@ -42,7 +41,6 @@ VectorX gravity_force(const Model& model, const Parameters& p) {
     else
       force.segment<3>(dof) = p.node_mass(i) * p.gravity;
   }
-  return force;
 }
 
 Equations::Equations(const Model& model, const Options& options)
@@ -60,8 +58,8 @@ void Equations::set_parameters(const Parameters& parameters) {
   parameters_ = &parameters;
   if (version_ == parameters.version) return;
   version_ = parameters.version;
-  mass = mass_vector(model_, parameters);
-  gravity_ = gravity_force(model_, parameters);
+  set_mass(model_, parameters, mass);
+  set_gravity_force(model_, parameters, gravity_);
   set_elastic(parameters, elastic);
   for (int i = 0; i < model_.node_count; ++i)
     node_dof_drag_.segment(model_.node_dof[at(i)], model_.dimension).setConstant(parameters.node_drag(i));
@@ -93,7 +91,10 @@ void Equations::evaluate(const VectorX& z, bool with_matrix, const double* axial
   const std::span<double> values = assembler_.solver().values();
   if (with_matrix) std::fill(values.begin(), values.end(), 0.0);
   compute_configuration(model_, *state_, z, middle_);
+  if (!floor_current_) set_floor(z, floor_);
+  floor_current_ = true;
   if (energy_momentum_) {
+    correction_floor_.setZero(model_.dof_count);
     difference_ = 2.0 * (z - state_->q);
     end_q_ = 2.0 * z - state_->q;
     compute_configuration(model_, *state_, end_q_, end_);
@@ -124,8 +125,6 @@ void Equations::add_loads(const VectorX& z, bool with_matrix, Evaluation& out) {
 /// Inertia, drag, gravity and custom forces, and what rounding leaves, in one pass over the unknowns.
 void Equations::add_step(const VectorX& z, bool with_matrix, Evaluation& out) {
   const int n = model_.dof_count;
-  if (!floor_current_) set_floor(z, floor_);
-  floor_current_ = true;
   out.full_residual.resize(n);
   out.magnitude.resize(n);
   out.floor.resize(n);
@@ -138,6 +137,7 @@ void Equations::add_step(const VectorX& z, bool with_matrix, Evaluation& out) {
       (magnitude_.head(n).array() + inertia.abs() + drag.abs() + gravity_.array().abs() + custom_force.array().abs())
           .matrix();
   out.floor = floor_ + rounding_ * out.magnitude;
+  if (energy_momentum_) out.floor += correction_floor_;
   out.potential -= gravity_.dot(z);
   out.residual = out.full_residual;
   if (with_matrix && h_ != 0.0) {
@@ -225,176 +225,6 @@ void Equations::add_elastic(const ElasticCoefficients& k, const VectorX& z, bool
   }
 }
 
-/// Gonzalez's correction with G = `metric` and u = G D: adds r u / (u . D) to the gradient and its derivative with
-/// respect to z to the Hessian.
-void Equations::correct(Local& local, const Local& end, double start_energy, const ElementTable& table, int element,
-                        const double (*metric)[kMaxLocal]) {
-  const int n = table.width();
-  double D[kMaxLocal], u[kMaxLocal] = {}, HD[kMaxLocal] = {};
-  gather_difference(table, element, D);
-  double s = 0.0, r = end.energy - start_energy;
-  for (int i = 0; i < n; ++i) {
-    for (int j = 0; j < n; ++j) {
-      u[i] += metric[i][j] * D[j];
-      HD[i] += local.hessian[i][j] * D[j];
-    }
-    s += u[i] * D[i];
-    r -= local.gradient[i] * D[i];
-  }
-  if (!(s > 1e-24)) return;
-  for (int i = 0; i < n; ++i)
-    for (int j = 0; j < n; ++j)
-      local.hessian[i][j] += u[i] * (2.0 * (end.gradient[j] - local.gradient[j]) - HD[j]) / s +
-                             2.0 * r * (metric[i][j] / s - 2.0 * u[i] * u[j] / (s * s));
-  for (int i = 0; i < n; ++i) local.gradient[i] += r * u[i] / s;
-}
-
-/// The same in a plane with the quadratic invariants of the stencil (e0 . e0, e0 . e1, e1 . e1, e0 x e1), whose
-/// derivatives at the middle times D are exactly their changes: it conserves angular momentum too.
-void Equations::add_planar_invariants(int stencil, Local& local, const Local& end, double start_energy) const {
-  constexpr int n = 6;
-  double D[kMaxLocal], zm[n];
-  gather_difference(assembler_.bend, stencil, D);
-  const int* dofs = assembler_.bend.dofs(stencil);
-  for (int i = 0; i < n; ++i) zm[i] = last_z_(dofs[i]);
-  // Edges as linear maps of the six unknowns.
-  const double e0[2] = {zm[2] - zm[0], zm[3] - zm[1]}, e1[2] = {zm[4] - zm[2], zm[5] - zm[3]};
-  const double d0[2] = {D[2] - D[0], D[3] - D[1]}, d1[2] = {D[4] - D[2], D[5] - D[3]};
-  // Gradients in (e0, e1); each invariant is bilinear with matrix B: value = e^T B e / 2, gradient B e.
-  static constexpr double B[4][4][4] = {{{2, 0, 0, 0}, {0, 2, 0, 0}, {0, 0, 0, 0}, {0, 0, 0, 0}},
-                                        {{0, 0, 1, 0}, {0, 0, 0, 1}, {1, 0, 0, 0}, {0, 1, 0, 0}},
-                                        {{0, 0, 0, 0}, {0, 0, 0, 0}, {0, 0, 2, 0}, {0, 0, 0, 2}},
-                                        {{0, 0, 0, 1}, {0, 0, -1, 0}, {0, -1, 0, 0}, {1, 0, 0, 0}}};
-  const double e[4] = {e0[0], e0[1], e1[0], e1[1]}, d[4] = {d0[0], d0[1], d1[0], d1[1]};
-  double change[4] = {}, gradient[4][4] = {}, s = 0.0;
-  for (int k = 0; k < 4; ++k) {
-    for (int i = 0; i < 4; ++i)
-      for (int j = 0; j < 4; ++j) gradient[k][i] += B[k][i][j] * e[j];
-    for (int i = 0; i < 4; ++i) change[k] += gradient[k][i] * d[i];
-    s += change[k] * change[k];
-  }
-  const double length4 = (e[0] * e[0] + e[1] * e[1]) * (e[2] * e[2] + e[3] * e[3]);
-  if (!(s > 1e-26 * length4)) return;
-  double r = end.energy - start_energy, HD[n] = {};
-  for (int i = 0; i < n; ++i) {
-    r -= local.gradient[i] * D[i];
-    for (int j = 0; j < n; ++j) HD[i] += local.hessian[i][j] * D[j];
-  }
-  // With respect to z: u = sum g_k c_k, du = sum c_k B_k + g_k (dc_k)^T, dc_k = 2 B_k e1 (q1), ds = 2 sum c_k dc_k.
-  double u[4] = {}, du[4][4] = {}, ds[4] = {};
-  for (int k = 0; k < 4; ++k) {
-    double dc[4] = {};
-    for (int i = 0; i < 4; ++i)
-      for (int j = 0; j < 4; ++j) dc[i] += B[k][i][j] * (2.0 * e[j] + d[j]);
-    for (int i = 0; i < 4; ++i) {
-      u[i] += gradient[k][i] * change[k];
-      ds[i] += 2.0 * change[k] * dc[i];
-      for (int j = 0; j < 4; ++j) du[i][j] += change[k] * B[k][i][j] + gradient[k][i] * dc[j];
-    }
-  }
-  // From edges to nodes: node rows of e0 are (-1, +1, 0), of e1 (0, -1, +1).
-  const auto spread = [](const double* edge, double* node) {
-    node[0] = -edge[0], node[1] = -edge[1];
-    node[2] = edge[0] - edge[2], node[3] = edge[1] - edge[3];
-    node[4] = edge[2], node[5] = edge[3];
-  };
-  double un[n], dsn[n], half[4][n], dun[n][n];
-  spread(u, un);
-  spread(ds, dsn);
-  for (int i = 0; i < 4; ++i) spread(du[i], half[i]);
-  for (int j = 0; j < n; ++j) {
-    const double column[4] = {half[0][j], half[1][j], half[2][j], half[3][j]};
-    double full[n];
-    spread(column, full);
-    for (int i = 0; i < n; ++i) dun[i][j] = full[i];
-  }
-  for (int i = 0; i < n; ++i)
-    for (int j = 0; j < n; ++j)
-      local.hessian[i][j] += un[i] * (2.0 * (end.gradient[j] - local.gradient[j]) - HD[j]) / s +
-                             r * (dun[i][j] / s - un[i] * dsn[j] / (s * s));
-  for (int i = 0; i < n; ++i) local.gradient[i] += r * un[i] / s;
-}
-
-void Equations::gather_difference(const ElementTable& table, int element, double* difference) const {
-  const int* dofs = table.dofs(element);
-  for (int i = 0; i < table.width(); ++i) difference[i] = dofs[i] < 0 ? 0.0 : difference_(dofs[i]);
-}
-
-void Equations::add_discrete_gradient(const VectorX& z, bool with_matrix, const double* axial_force, Evaluation& out) {
-  const std::span<double> values = assembler_.solver().values();
-  Local local, end;
-  const auto add = [&](const ElementTable& table, int i) {
-    table.add_gradient(i, local.gradient, 1.0, gradient_, magnitude_);
-    if (with_matrix) table.add_hessian(i, local.hessian, 1.0, values);
-  };
-  const int dim = model_.dimension;
-  for (int e = 0; e < model_.edge_count; ++e) {
-    const double rest = model_.edge_length(e), EA = elastic.stretch_stiffness(e);
-    const double l0 = start_.length(e), l1 = end_.length(e), sum = l0 + l1;
-    const double force = EA * (0.5 * sum / rest - 1.0), geometric = axial_force ? axial_force[e] : force;
-    const int* dofs = assembler_.stretch.dofs(e);
-    double mean[3];
-    for (int i = 0; i < dim; ++i) mean[i] = 2.0 * (z(dofs[dim + i]) - z(dofs[i])) / sum;
-    const Vec3d& t1 = end_.edge[at(e)].tangent;
-    const double t[3] = {t1.x, t1.y, t1.z};
-    for (int i = 0; i < dim; ++i) {
-      local.gradient[i] = -force * mean[i];
-      local.gradient[dim + i] = force * mean[i];
-      for (int j = 0; j < dim; ++j) {
-        const double h = mean[i] * t[j] * (EA / rest - 2.0 * geometric / sum) + (i == j ? 2.0 * geometric / sum : 0.0);
-        local.hessian[i][j] = local.hessian[dim + i][dim + j] = h;
-        local.hessian[i][dim + j] = local.hessian[dim + i][j] = -h;
-      }
-    }
-    add(assembler_.stretch, e);
-  }
-  double metric[kMaxLocal][kMaxLocal] = {};
-  const auto clear = [&] {
-    for (auto& row : metric)
-      for (double& m : row) m = 0.0;
-  };
-  const auto couple = [&](int a, int b, double weight) {
-    for (int i = 0; i < dim; ++i) {
-      metric[a + i][a + i] += weight;
-      metric[b + i][b + i] += weight;
-      metric[a + i][b + i] -= weight;
-      metric[b + i][a + i] -= weight;
-    }
-  };
-  for (int b = 0; b < static_cast<int>(model_.bend.size()); ++b) {
-    bend_local(model_, elastic, middle_, b, true, local);
-    bend_local(model_, elastic, end_, b, false, end);
-    const BendTwistEnergy before = bend_energy_of(elastic, start_, b);
-    if (model_.planar()) {
-      add_planar_invariants(b, local, end, before.bend + before.twist);
-    } else {
-      const BendStencil& s = model_.bend[at(b)];
-      clear();
-      couple(0, 4, 1.0 / std::pow(model_.edge_length(s.edge[0]), 2));
-      couple(4, 8, 1.0 / std::pow(model_.edge_length(s.edge[1]), 2));
-      metric[3][3] = metric[7][7] = 1.0;
-      correct(local, end, before.bend + before.twist, assembler_.bend, b, metric);
-    }
-    add(assembler_.bend, b);
-  }
-  for (int h = 0; h < static_cast<int>(model_.half.size()); ++h) {
-    half_local(model_, z, elastic, middle_, h, true, local);
-    half_local(model_, end_q_, elastic, end_, h, false, end);
-    const BendTwistEnergy before = half_energy_of(elastic, start_, h);
-    const double weight = 1.0 / std::pow(model_.edge_length(model_.half[at(h)].edge), 2);
-    clear();
-    couple(0, dim == 2 ? 2 : 4, weight);
-    if (dim == 2)
-      metric[4][4] = 1.0;
-    else
-      for (int i : {3, 7, 8, 9, 10}) metric[i][i] = 1.0;
-    correct(local, end, before.bend + before.twist, assembler_.half, h, metric);
-    add(assembler_.half, h);
-  }
-  if (!parameters_->viscous || h_ == 0.0) return;
-  add_elastic(viscous_, z, with_matrix, nullptr, out);
-}
-
 void Equations::predict_axial_force(const VectorX& step, VectorX& out) const {
   const ElasticCoefficients& k = *acting_;
   out.resize(model_.edge_count);
@@ -472,35 +302,42 @@ void Equations::set_floor(const VectorX& z, VectorX& floor) {
   if (h_ != 0.0) floor += (4.0 * kEpsilon * std::max(reach, 1e-300) / (h_ * h_)) * mass;
 }
 
-VectorX Equations::dissipative_force() const {
+double Equations::dissipated(const VectorX& change) const {
   const double inverse = h_ != 0.0 ? 1.0 / h_ : 0.0;
-  VectorX force = -inverse * node_dof_drag_.cwiseProduct(last_z_ - state_->q);
-  if (!parameters_->viscous || h_ == 0.0) return force;
-  VectorX gradient = VectorX::Zero(model_.dof_count), unused = gradient;
+  double work = inverse * (node_dof_drag_.array() * (last_z_ - state_->q).array() * change.array()).sum();
+  if (!parameters_->viscous || h_ == 0.0) return work;
   Local local;
+  const auto add = [&](const ElementTable& table, int i) {
+    const int* dofs = table.dofs(i);
+    for (int k = 0; k < table.width(); ++k)
+      if (dofs[k] >= 0) work += local.gradient[k] * change[dofs[k]];
+  };
   for (int e = 0; e < model_.edge_count; ++e) {
     stretch_local(model_, viscous_, middle_, e, false, nullptr, local);
-    assembler_.stretch.add_gradient(e, local.gradient, 1.0, gradient, unused);
+    add(assembler_.stretch, e);
   }
   for (int b = 0; b < static_cast<int>(model_.bend.size()); ++b) {
     bend_local(model_, viscous_, middle_, b, false, local);
-    assembler_.bend.add_gradient(b, local.gradient, 1.0, gradient, unused);
+    add(assembler_.bend, b);
   }
   for (int h = 0; h < static_cast<int>(model_.half.size()); ++h) {
     half_local(model_, last_z_, viscous_, middle_, h, false, local);
-    assembler_.half.add_gradient(h, local.gradient, 1.0, gradient, unused);
+    add(assembler_.half, h);
   }
-  return force - gradient;
+  return work;
 }
 
-VectorX Equations::load_force() const {
-  VectorX gradient = VectorX::Zero(model_.dof_count), unused = gradient;
+double Equations::load_work(const VectorX& change) const {
+  double work = custom_force.dot(change);
   Local local;
   for (std::size_t k = 0; k < loads_.pieces.size(); ++k) {
     load_local(model_, *state_, last_z_, middle_, loads_, loads_.pieces[k], local);
-    assembler_.loads[k].add_gradient(0, local.gradient, 1.0, gradient, unused);
+    const ElementTable& table = assembler_.loads[k];
+    const int* dofs = table.dofs(0);
+    for (int i = 0; i < table.width(); ++i)
+      if (dofs[i] >= 0) work -= local.gradient[i] * change[dofs[i]];
   }
-  return custom_force - gradient;
+  return work;
 }
 
 }  // namespace withe

@@ -50,9 +50,10 @@ class Equations {
   const Configuration& configuration() const { return middle_; }
   /// q1 = 2 z - q0 of an energy-momentum step.
   const Configuration& end_configuration() const { return end_; }
-  /// Viscous, drag and load forces of the last evaluation, for the energy balance (per unknown).
-  VectorX dissipative_force() const;
-  VectorX load_force() const;
+  /// What drag and viscosity take, and what loads and custom forces give, over `change`, with the forces of the last
+  /// evaluation [J].
+  double dissipated(const VectorX& change) const;
+  double load_work(const VectorX& change) const;
 
   /// Axial forces [N] as the mixed method wants them: linearly extrapolated from the last evaluation by a
   /// Newton step, n <- EA (eps + d eps . dz).
@@ -70,9 +71,10 @@ class Equations {
   void add_elastic(const ElasticCoefficients& k, const VectorX& z, bool with_matrix, const double* axial_force,
                    Evaluation& out);
   void add_discrete_gradient(const VectorX& z, bool with_matrix, const double* axial_force, Evaluation& out);
-  void correct(Local& local, const Local& end, double start_energy, const ElementTable& table, int element,
-               const double (*metric)[kMaxLocal]);
-  void add_planar_invariants(int stencil, Local& local, const Local& end, double start_energy) const;
+  void correct(Local& local, const Local& end, double start_energy, double stiffness, const ElementTable& table,
+               int element, const double (*metric)[kMaxLocal]);
+  void add_planar_invariants(int stencil, Local& local, const Local& end, double start_energy, double stiffness);
+  void add_correction_floor(const int* dofs, const double* u, int count, double s, double energy, double stiffness);
   void add_spin_couple(const VectorX& z);
   void set_floor(const VectorX& z, VectorX& floor);
   void gather_difference(const ElementTable& table, int element, double* difference) const;
@@ -96,13 +98,14 @@ class Equations {
   VectorX force_, modulus_, inverse_rest_;  ///< per edge: EA eps [N], EA / L [N / m], 1 / L [1 / m]
   VectorX floor_;                           ///< what bending, twisting and inertia leave by rounding
   VectorX axial_floor_;                     ///< per edge [N]
+  VectorX correction_floor_;                ///< what the discrete gradient leaves by rounding
   double rounding_ = 0;                     ///< relative, of a direction in space
   bool floor_current_ = false;
 };
 
 /// Per-unknown masses from the derived parameters.
-VectorX mass_vector(const Model& model, const Parameters& parameters);
+void set_mass(const Model& model, const Parameters& parameters, VectorX& mass);
 /// Gravity's force per unknown.
-VectorX gravity_force(const Model& model, const Parameters& parameters);
+void set_gravity_force(const Model& model, const Parameters& parameters, VectorX& force);
 
 }  // namespace withe

@@ -51,7 +51,7 @@ const Statistics& World::statistics() const {
 }
 
 void World::step(int count) {
-  require(count >= 0, "number of steps must not be negative, got " + std::to_string(count));
+  if (count < 0) throw std::invalid_argument("number of steps must not be negative, got " + std::to_string(count));
   Implementation& self = *implementation_;
   const Timer timer(self.statistics.total_time);
   const double dt = self.options.time_step;

@@ -286,7 +286,9 @@ TEST(StableStep, IsTwoOverTheHighestFrequency) {
                                             {y.data(), static_cast<std::size_t>(n)});
     K.col(i) = y;
   }
-  const VectorX scale = mass_vector(model, parameters).cwiseSqrt().cwiseInverse();
+  VectorX mass;
+  set_mass(model, parameters, mass);
+  const VectorX scale = mass.cwiseSqrt().cwiseInverse();
   const MatrixX A = scale.asDiagonal() * K * scale.asDiagonal();
   VectorX x = testing::RandomNumbers(4).vector(n);
   double value = 0.0;
