@@ -30,13 +30,14 @@ PYTHON_SOURCES := $(shell find python/withe -name '*.py' -o -name '*.pyi' -o -na
 # Folders too: a deleted file is a change.
 SOURCE_FOLDERS := $(wildcard cpp/*/) $(shell find python/withe -type d -not -name __pycache__)
 
-.PHONY: help demo view test ctest-build ctest pytest asan bench wheel lint format format-check types stubs stub-check \
+.PHONY: help demo view test ctest-build ctest ctest-baseline pytest asan bench wheel lint format format-check types stubs stub-check \
     tidy tidy-changed clean distclean
 
 help:
 	@echo "make demo          install what is missing, build, simulate a cantilever, compare with theory"
 	@echo "make view          install what pictures, films and notebooks need"
 	@echo "make test          all tests, C++ and Python"
+	@echo "make ctest-baseline  C++ tests on an emulated machine without AVX (qemu-user)"
 	@echo "make asan          C++ tests under the address and undefined-behaviour sanitizers"
 	@echo "make wheel         dist/*.whl for machines without compiler"
 	@echo "make bench         all benchmarks (half an hour and more); NAME=work_precision runs one"
@@ -103,6 +104,12 @@ ctest-build: $(STAMPS)/installed
 
 ctest: ctest-build
 	@ctest --test-dir $(BUILD) --output-on-failure --no-tests=error --parallel $(JOBS) --progress
+
+# What only runs on newer machines must not be run on older ones: the engine's tests on an emulated first x86-64.
+ctest-baseline: ctest-build
+	@command -v qemu-x86_64 >/dev/null || { echo "make ctest-baseline needs qemu-x86_64: apt-get install qemu-user"; exit 1; }
+	@for room in common geometry model elasticity assembly integrators; do \
+	    qemu-x86_64 -cpu qemu64 $(BUILD)/tests/cpp/test_$$room --gtest_brief=1; done
 
 pytest: $(STAMPS)/installed $(STAMPS)/test_tools
 	@python -m pytest --numprocesses $(TEST_JOBS) --dist worksteal
