@@ -1,6 +1,14 @@
 """Fixtures of the Python tests."""
 
+import signal
+
 import pytest
+
+
+def pytest_configure():
+    """Where a script started the tests in the background, Ctrl-C is ignored; some tests press it."""
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture
