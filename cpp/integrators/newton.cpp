@@ -108,6 +108,7 @@ bool Newton::factorize(Equations& equations, NewtonWorkspace& work) const {
 
 /// Where a solve with matrices that may be old stands.
 struct Newton::Progress {
+  double tolerance = 0;  ///< [m]
   bool may_reuse = false;
   bool fresh = true;  ///< whether the coming iteration makes a matrix
   MatrixAge age = MatrixAge::fresh, last_age = MatrixAge::fresh;
@@ -119,7 +120,7 @@ struct Newton::Progress {
 /// After an iteration: learns how well matrices serve, and decides about the next one.
 void Newton::plan_next(Progress& p, FactorRecord& factor) const {
   const auto at = [](MatrixAge age) { return static_cast<std::size_t>(age); };
-  const double tolerance = options_.step_tolerance * model_.length_scale;
+  const double tolerance = p.tolerance;
   p.rest = p.step;
   if (!p.may_reuse) return;
   bool measured = false;
@@ -143,9 +144,10 @@ NewtonResult Newton::solve(Equations& equations, VectorX& z, const VectorX* targ
   NewtonResult result;
   Evaluation& e = work.evaluation;
   FactorRecord& factor = work.factor;
-  const double tolerance = options_.step_tolerance * model_.length_scale;
+  const double tolerance = this->tolerance(work);
   LinearSolver& solver = equations.assembler().solver();
   Progress p;
+  p.tolerance = tolerance;
   p.may_reuse = interval != 0.0 && options_.line_search != LineSearch::goldstein_price;
   if (p.may_reuse && factor.owner == &equations && factor.interval == std::abs(interval)) {
     const bool slow = factor.contraction[static_cast<std::size_t>(MatrixAge::across)] > kSlow;

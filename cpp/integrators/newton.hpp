@@ -1,7 +1,9 @@
 #pragma once
 /// Newton's method for one step, mixed in the axial forces.
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <functional>
 
 #include "integrators/equations.hpp"
@@ -46,6 +48,7 @@ struct NewtonWorkspace {
   Evaluation evaluation;
   VectorX step, axial_force, trial;
   FactorRecord factor;
+  double finest = INFINITY;  ///< [m], a step tolerance that error control wants; that of the options is an upper bound
   Counters counters;
   std::function<void()> poll = [] {};  ///< asked once an iteration; what it throws ends the solve
 };
@@ -72,6 +75,9 @@ class Newton {
   bool factorize(Equations& equations, NewtonWorkspace& work) const;
   struct Progress;
   void plan_next(Progress& progress, FactorRecord& factor) const;
+  double tolerance(const NewtonWorkspace& work) const {
+    return std::min(options_.step_tolerance * model_.length_scale, work.finest);
+  }
   double line_search(Equations& equations, const VectorX& z, const VectorX& step, const VectorX* target,
                      NewtonWorkspace& work) const;
 

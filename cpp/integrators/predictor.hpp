@@ -16,6 +16,8 @@ class Predictor {
   static constexpr int kDepth = 4, kSlots = 5;
 
   void clear() { count_ = 0; }
+  bool empty() const { return count_ == 0; }
+  double last_time() const { return time_[0]; }  ///< of the latest step; not if empty
   /// Number of steps that the coming prediction in `slot` uses; 0: none is better.
   int points(int slot) const { return std::min(best_[static_cast<std::size_t>(slot)], count_); }
   /// Acceleration expected at `time` from the last `points` steps.

@@ -87,6 +87,7 @@ World::Implementation::Implementation(const Implementation& other)
       level(other.level),
       easy_steps(other.easy_steps),
       guard(other.guard),
+      error_rate(other.error_rate),
       grid_origin(other.grid_origin),
       grid_steps(other.grid_steps),
       support_work(other.support_work),

@@ -65,6 +65,7 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
   state.acceleration_current = false;
   predictor.clear();
   forget_matrix();
+  work.newton.finest = INFINITY;
   StaticResult r;
   try {
     if (reachable) r = find_equilibrium(system, *newton, options, parameters, boundary, state, work.newton);

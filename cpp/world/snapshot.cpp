@@ -59,6 +59,7 @@ void exchange(Archive& io, Self& self) {
   io(self.level);
   io(self.easy_steps);
   io(self.guard.rescue);
+  io(self.error_rate);
   io(self.grid_origin);
   io(self.grid_steps);
   for (auto* x : {&self.guard.turn, &self.guard.scale, &self.guard.excess}) io(*x);

@@ -21,6 +21,8 @@ void World::Implementation::advance(double duration) {
   const double base = state.time;
   if (options.integrator == Integrator::verlet && !alarm) alarm = energy();
   if (!options.adaptive && !options.tolerance) level = 0;
+  // Without a step before there is no estimate, so error control begins with a step too small to need one.
+  if (options.tolerance && predictor.empty()) level = std::max(level, std::min(options.max_halvings, 8));
   const long units = 1L << options.max_halvings;
   for (long position = 0; position < units;) {
     work.newton.poll();
@@ -74,6 +76,8 @@ World::Implementation::Attempt World::Implementation::try_step(double dt) {
   if (guarded || options.tolerance || fourth) keep_for_return();
   // Actuation changes what is stored without a motion, so the start is looked at while it is as it was.
   if (guarded && !guard.energy && actuated()) guard.energy = energy();
+  const double allowed = options.tolerance ? *options.tolerance * dt / options.duration.value_or(1.0) : INFINITY;
+  work.newton.finest = 0.01 * allowed;  // so that what Newton leaves is no part of the error
   double error = 0.0;
   if (!scheme_step(dt, error)) {
     statistics.rejected_steps += 1;
@@ -88,14 +92,19 @@ World::Implementation::Attempt World::Implementation::try_step(double dt) {
     guard.rescue = 256;
     return Attempt::gained_energy;
   }
-  const double allowed = options.tolerance ? *options.tolerance * dt / options.duration.value_or(1.0) : INFINITY;
   if (error > allowed && may_cut()) {
     take_back();
     guard.energy.reset();
     return Attempt::failed;
   }
   commit_step();
-  return error < allowed / 10.0 ? Attempt::easy : Attempt::hard;
+  if (!options.tolerance) return Attempt::easy;
+  // An oscillation has no error twice a period: what counts is the greatest of the last steps, were they twice as long.
+  const double order = options.integrator == Integrator::backward_euler ? 2.0 : 3.0;
+  // Far below what is allowed an estimate is mostly rounding.
+  const double seen = error > 0.01 * allowed ? error / std::pow(dt, order) : 0.0;
+  error_rate = std::max(seen, error_rate * (1.0 - 1.0 / 256.0));
+  return error_rate * std::pow(2.0 * dt, order) < 1.6 * allowed ? Attempt::easy : Attempt::hard;
 }
 
 void World::Implementation::keep_for_return() {
