@@ -12,7 +12,6 @@ namespace withe {
 namespace {
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
-
 /// Adds the time of a call to a statistic.
 class Timer {
  public:
@@ -29,8 +28,7 @@ class Timer {
 World::World(SceneDescription description, Options options)
     : implementation_(std::make_unique<Implementation>(std::move(description), options)) {}
 World::World(const World& other) : implementation_(std::make_unique<Implementation>(*other.implementation_)) {
-  // A copy has no factorised matrix, so the original lets go of its own: both go on with the same bits.
-  other.implementation_->forget_matrix();
+  other.implementation_->forget_matrix();  // the copy has none either, and both go on with the same bits
 }
 World::~World() = default;
 
@@ -54,8 +52,8 @@ void World::step(int count) {
   if (count < 0) throw std::invalid_argument("number of steps must not be negative, got " + std::to_string(count));
   Implementation& self = *implementation_;
   const Timer timer(self.statistics.total_time);
-  const double dt = self.options.time_step;
   self.guard.energy.reset();
+  const double dt = self.options.time_step;
   const auto on_grid = [&](std::int64_t steps) { return self.grid_origin + static_cast<double>(steps) * dt; };
   for (int i = 0; i < count; ++i) {
     if (self.state.time != on_grid(self.grid_steps)) {
