@@ -29,7 +29,7 @@ double largest_turn(const Model& model, const State& state, const VectorX& q) {
 }
 
 /// Work of loads, drag and viscosity over the step, with the forces that acted in it.
-void book_work(const Equations& equations, const Parameters& parameters, const VectorX& change, StepResult& result) {
+void book_work(Equations& equations, const Parameters& parameters, const VectorX& change, StepResult& result) {
   if (!equations.loads().pieces.empty() || (equations.custom_force.array() != 0.0).any())
     result.load_work = equations.load_work(change);
   if (parameters.dragged || parameters.viscous) result.dissipated = equations.dissipated(change);
@@ -115,10 +115,10 @@ NewtonResult find_inner(Equations& equations, const Newton& newton, const Option
   return found;
 }
 
-/// Estimated error of the step just taken [m]: dt^2 / 2 times the mean acceleration (backward Euler), or dt^2 / 12 times
-/// its change since the step before (midpoint); filtered by (M / h^2 + K)^-1 M / h^2, so that modes which the step does not
-/// resolve, and which it therefore leaves bounded, count for as little as they move [Hosea and Shampine 1996]. Without
-/// a step before there is nothing to compare with.
+/// Estimated error of the step just taken [m]: dt^2 / 2 times the mean acceleration (backward Euler), or dt^2 / 12
+/// times its change since the step before (midpoint); filtered by (M / h^2 + K)^-1 M / h^2, so that modes which the
+/// step does not resolve, and which it therefore leaves bounded, count for as little as they move [Hosea and Shampine
+/// 1996]. Without a step before there is nothing to compare with.
 double estimated_error(Equations& equations, const Newton& newton, const StepPlan& plan, const State& state,
                        const Predictor& predictor, StepWorkspace& work) {
   VectorX& error = work.assumed;
@@ -132,6 +132,13 @@ double estimated_error(Equations& equations, const Newton& newton, const StepPla
     error = (1.0 / (3.0 * apart)) * equations.mass.cwiseProduct(acceleration - state.acceleration);  // h = dt / 2
   }
   equations.assembler().project(error);
+  const double h = (plan.rule == StepRule::backward_euler ? 1.0 : 0.5) * plan.dt;
+  const FactorRecord& factor = work.newton.factor;
+  if (factor.owner != &equations || factor.interval != std::abs(h)) {
+    // Nothing moved, and no matrix was made.
+    error = (h * h) * error.cwiseQuotient(equations.mass.cwiseMax(1e-300));
+    return newton.displacement(error);
+  }
   equations.assembler().solver().solve({error.data(), static_cast<std::size_t>(error.size())});
   return newton.displacement(error);
 }

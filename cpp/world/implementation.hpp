@@ -86,7 +86,7 @@ struct World::Implementation {
   int level = 0;         ///< present halvings of the time step
   int easy_steps = 0;
   EnergyGuard guard;
-  double error_rate = 0;  ///< greatest estimated error of the last steps over the power of the step that it goes with
+  double error_rate = 0;   ///< greatest estimated error of the last steps over the power of the step that it goes with
   double grid_origin = 0;  ///< time = grid_origin + grid_steps time_step after whole steps, free of summed rounding
   std::int64_t grid_steps = 0;
   double support_work = 0, actuation_work = 0, dissipated = 0, load_work = 0;
