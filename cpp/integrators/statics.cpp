@@ -123,6 +123,7 @@ class Statics {
     for (int i = 0; i < model.dof_count; ++i)
       stiffness = std::max(stiffness, equations_.assembler().diagonal(i) / std::max(equations_.mass(i), 1e-300));
     double potential = work_.evaluation.potential;
+    energy_scale_ = std::max(energy_scale_, std::abs(potential));
     double h = 1e2 / std::sqrt(stiffness);
     const double longest = 1e12 * h, shortest = 1e-6 * h;
     VectorX z;
@@ -135,7 +136,7 @@ class Statics {
       last.iterations += r.iterations;
       last.residual = r.residual;
       last.worst_row = r.worst_row;
-      const double rounding = 1e-10 * (std::abs(potential) + std::abs(work_.evaluation.potential));
+      const double rounding = 1e-10 * (std::abs(potential) + std::abs(work_.evaluation.potential)) + least_energy();
       const bool falls = !equations_.has_potential() || work_.evaluation.potential <= potential + rounding;
       if (r.converged && falls && !turned_too_far(state_, equations_.configuration(), model.planar())) {
         accept(z);
@@ -178,7 +179,7 @@ class Statics {
         const NewtonResult r = newton_.solve(equations_, z, nullptr, 30, work_);
         last.iterations += r.iterations;
         last.residual = r.residual;
-        if (r.converged && work_.evaluation.potential <= energy + 1e-9 * std::abs(energy) &&
+        if (r.converged && work_.evaluation.potential <= energy + 1e-9 * std::abs(energy) + least_energy() &&
             !turned_too_far(state_, equations_.configuration(), model.planar())) {
           accept(z);
           return true;
@@ -278,12 +279,16 @@ class Statics {
     accept(state_.q + direction);
   }
 
+  /// What the potential rounds to where little of it is left: a coil that relaxes into its natural shape ends at none.
+  double least_energy() const { return 1e-14 * energy_scale_; }
+
   Equations& equations_;
   const Newton& newton_;
   const Options& options_;
   const Parameters& parameters_;
   State& state_;
   NewtonWorkspace& work_;
+  double energy_scale_ = 0.0;  ///< greatest potential met [J]
   Configuration scratch_;
   std::vector<Vector3> full_loads_;
   double lowest_ = 0.0;

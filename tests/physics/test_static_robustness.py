@@ -22,6 +22,19 @@ def test_slender_rods_take_no_more_iterations_than_stout_ones(planar):
     assert max(iterations) <= 1.2 * min(iterations), iterations
 
 
+@pytest.mark.parametrize(("nodes", "turns_per_edge"), [(42, 0.19), (20, 0.24), (408, 0.02)])
+def test_a_straight_rod_coils_into_its_natural_shape_where_no_force_is_left_to_measure_by(nodes, turns_per_edge):
+    scene = withe.Scene(gravity=(0.0, 0.0, 0.0))
+    arm = rods.straight(scene, nodes, stiffness=rods.stiffness(stretch=4e4))
+    scene.clamp(arm.start)
+    simulation = scene.build(integrator="static", planar=False)
+    before = simulation.energy().total
+    simulation.set_natural_curvature(arm, (0.0, 2.0 * np.pi * turns_per_edge * (nodes - 1)))
+    strained = simulation.energy().total
+    assert simulation.equilibrium().stable
+    assert simulation.energy().bend < 1e-18 * (strained - before)
+
+
 def smooth_curve(random, nodes):
     """Unit-length curve that starts along +x and wanders through space."""
     s = (np.arange(nodes - 1) + 0.5) / (nodes - 1)
