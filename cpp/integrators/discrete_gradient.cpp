@@ -9,30 +9,56 @@ namespace {
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
+/// Gradients of e0 . e0, e0 . e1, e1 . e1 and e0 x e1 with respect to e = (e0, e1), each linear in e.
+void invariant_gradients(const double (&e)[4], double (&g)[4][4]) {
+  const double rows[4][4] = {{2.0 * e[0], 2.0 * e[1], 0.0, 0.0},
+                             {e[2], e[3], e[0], e[1]},
+                             {0.0, 0.0, 2.0 * e[2], 2.0 * e[3]},
+                             {e[3], -e[2], -e[1], e[0]}};
+  for (int k = 0; k < 4; ++k)
+    for (int i = 0; i < 4; ++i) g[k][i] = rows[k][i];
+}
+
 }  // namespace
 
-/// Gonzalez's correction with G = `metric` and u = G D: adds r u / (u . D) to the gradient and its derivative with
+/// Gonzalez's correction with u = G D: adds r u / (u . D) to the gradient and its derivative with
 /// respect to z to the Hessian.
 void Equations::correct(Local& local, const Local& end, double start_energy, double stiffness,
-                        const ElementTable& table, int element, const double (*metric)[kMaxLocal]) {
+                        const ElementTable& table, int element, const Metric& metric) {
   const int n = table.width();
-  double D[kMaxLocal], u[kMaxLocal] = {}, HD[kMaxLocal] = {};
+  double D[kMaxLocal], u[kMaxLocal], change[kMaxLocal];
   gather_difference(table, element, D);
+  for (int i = 0; i < n; ++i) u[i] = metric.own[i] * D[i];
+  for (const Metric::Pair& pair : metric.pairs)
+    for (int i = 0; i < pair.size; ++i) {
+      const double pull = pair.weight * (D[pair.a + i] - D[pair.b + i]);
+      u[pair.a + i] += pull;
+      u[pair.b + i] -= pull;
+    }
   double s = 0.0, r = end.energy - start_energy;
   for (int i = 0; i < n; ++i) {
-    for (int j = 0; j < n; ++j) {
-      u[i] += metric[i][j] * D[j];
-      HD[i] += local.hessian[i][j] * D[j];
-    }
+    double HD = 0.0;
+    for (int j = 0; j < n; ++j) HD += local.hessian[i][j] * D[j];
+    change[i] = 2.0 * (end.gradient[i] - local.gradient[i]) - HD;
     s += u[i] * D[i];
     r -= local.gradient[i] * D[i];
   }
   if (!(s > 1e-24)) return;
-  for (int i = 0; i < n; ++i)
-    for (int j = 0; j < n; ++j)
-      local.hessian[i][j] += u[i] * (2.0 * (end.gradient[j] - local.gradient[j]) - HD[j]) / s +
-                             2.0 * r * (metric[i][j] / s - 2.0 * u[i] * u[j] / (s * s));
-  for (int i = 0; i < n; ++i) local.gradient[i] += r * u[i] / s;
+  const double inverse = 1.0 / s, weight = 2.0 * r * inverse;
+  for (int j = 0; j < n; ++j) change[j] = inverse * (change[j] - 2.0 * weight * u[j]);
+  for (int i = 0; i < n; ++i) {
+    for (int j = 0; j < n; ++j) local.hessian[i][j] += u[i] * change[j];
+    local.hessian[i][i] += weight * metric.own[i];
+    local.gradient[i] += r * inverse * u[i];
+  }
+  for (const Metric::Pair& pair : metric.pairs)
+    for (int i = 0; i < pair.size; ++i) {
+      const int a = pair.a + i, b = pair.b + i;
+      local.hessian[a][a] += weight * pair.weight;
+      local.hessian[b][b] += weight * pair.weight;
+      local.hessian[a][b] -= weight * pair.weight;
+      local.hessian[b][a] -= weight * pair.weight;
+    }
   add_correction_floor(table.dofs(element), u, n, s, std::max(end.energy, start_energy), stiffness);
 }
 
@@ -55,61 +81,58 @@ void Equations::add_planar_invariants(int stencil, Local& local, const Local& en
   const int* dofs = assembler_.bend.dofs(stencil);
   for (int i = 0; i < n; ++i) zm[i] = last_z_(dofs[i]);
   // Edges as linear maps of the six unknowns.
-  const double e0[2] = {zm[2] - zm[0], zm[3] - zm[1]}, e1[2] = {zm[4] - zm[2], zm[5] - zm[3]};
-  const double d0[2] = {D[2] - D[0], D[3] - D[1]}, d1[2] = {D[4] - D[2], D[5] - D[3]};
-  // Gradients in (e0, e1); each invariant is bilinear with matrix B: value = e^T B e / 2, gradient B e.
-  static constexpr double B[4][4][4] = {{{2, 0, 0, 0}, {0, 2, 0, 0}, {0, 0, 0, 0}, {0, 0, 0, 0}},
-                                        {{0, 0, 1, 0}, {0, 0, 0, 1}, {1, 0, 0, 0}, {0, 1, 0, 0}},
-                                        {{0, 0, 0, 0}, {0, 0, 0, 0}, {0, 0, 2, 0}, {0, 0, 0, 2}},
-                                        {{0, 0, 0, 1}, {0, 0, -1, 0}, {0, -1, 0, 0}, {1, 0, 0, 0}}};
-  const double e[4] = {e0[0], e0[1], e1[0], e1[1]}, d[4] = {d0[0], d0[1], d1[0], d1[1]};
-  double change[4] = {}, gradient[4][4] = {}, s = 0.0;
+  const double e[4] = {zm[2] - zm[0], zm[3] - zm[1], zm[4] - zm[2], zm[5] - zm[3]};
+  const double d[4] = {D[2] - D[0], D[3] - D[1], D[4] - D[2], D[5] - D[3]};
+  double gradient[4][4], change[4], s = 0.0;
+  invariant_gradients(e, gradient);
   for (int k = 0; k < 4; ++k) {
-    for (int i = 0; i < 4; ++i)
-      for (int j = 0; j < 4; ++j) gradient[k][i] += B[k][i][j] * e[j];
+    change[k] = 0.0;
     for (int i = 0; i < 4; ++i) change[k] += gradient[k][i] * d[i];
     s += change[k] * change[k];
   }
   const double length4 = (e[0] * e[0] + e[1] * e[1]) * (e[2] * e[2] + e[3] * e[3]);
   if (!(s > 1e-26 * length4)) return;
-  double r = end.energy - start_energy, HD[n] = {};
+  double r = end.energy - start_energy, bent[n];
   for (int i = 0; i < n; ++i) {
     r -= local.gradient[i] * D[i];
-    for (int j = 0; j < n; ++j) HD[i] += local.hessian[i][j] * D[j];
+    double HD = 0.0;
+    for (int j = 0; j < n; ++j) HD += local.hessian[i][j] * D[j];
+    bent[i] = 2.0 * (end.gradient[i] - local.gradient[i]) - HD;
   }
   // With respect to z: u = sum g_k c_k, du = sum c_k B_k + g_k (dc_k)^T, dc_k = 2 B_k e1 (q1), ds = 2 sum c_k dc_k.
-  double u[4] = {}, du[4][4] = {}, ds[4] = {};
-  for (int k = 0; k < 4; ++k) {
-    double dc[4] = {};
-    for (int i = 0; i < 4; ++i)
-      for (int j = 0; j < 4; ++j) dc[i] += B[k][i][j] * (2.0 * e[j] + d[j]);
+  const double doubled[4] = {2.0 * e[0] + d[0], 2.0 * e[1] + d[1], 2.0 * e[2] + d[2], 2.0 * e[3] + d[3]};
+  double dc[4][4], u[4] = {}, ds[4] = {};
+  invariant_gradients(doubled, dc);
+  const double* c = change;
+  double du[4][4] = {{2.0 * c[0], 0.0, c[1], c[3]},
+                     {0.0, 2.0 * c[0], -c[3], c[1]},
+                     {c[1], -c[3], 2.0 * c[2], 0.0},
+                     {c[3], c[1], 0.0, 2.0 * c[2]}};
+  for (int k = 0; k < 4; ++k)
     for (int i = 0; i < 4; ++i) {
-      u[i] += gradient[k][i] * change[k];
-      ds[i] += 2.0 * change[k] * dc[i];
-      for (int j = 0; j < 4; ++j) du[i][j] += change[k] * B[k][i][j] + gradient[k][i] * dc[j];
+      u[i] += gradient[k][i] * c[k];
+      ds[i] += 2.0 * c[k] * dc[k][i];
+      for (int j = 0; j < 4; ++j) du[i][j] += gradient[k][i] * dc[k][j];
     }
-  }
   // From edges to nodes: node rows of e0 are (-1, +1, 0), of e1 (0, -1, +1).
   const auto spread = [](const double* edge, double* node) {
     node[0] = -edge[0], node[1] = -edge[1];
     node[2] = edge[0] - edge[2], node[3] = edge[1] - edge[3];
     node[4] = edge[2], node[5] = edge[3];
   };
-  double un[n], dsn[n], half[4][n], dun[n][n];
+  const double inverse = 1.0 / s, weight = r * inverse;
+  double un[n], dsn[n], half[4][n];
   spread(u, un);
   spread(ds, dsn);
   for (int i = 0; i < 4; ++i) spread(du[i], half[i]);
   for (int j = 0; j < n; ++j) {
     const double column[4] = {half[0][j], half[1][j], half[2][j], half[3][j]};
+    const double along = inverse * (bent[j] - weight * dsn[j]);
     double full[n];
     spread(column, full);
-    for (int i = 0; i < n; ++i) dun[i][j] = full[i];
+    for (int i = 0; i < n; ++i) local.hessian[i][j] += un[i] * along + weight * full[i];
   }
-  for (int i = 0; i < n; ++i)
-    for (int j = 0; j < n; ++j)
-      local.hessian[i][j] += un[i] * (2.0 * (end.gradient[j] - local.gradient[j]) - HD[j]) / s +
-                             r * (dun[i][j] / s - un[i] * dsn[j] / (s * s));
-  for (int i = 0; i < n; ++i) local.gradient[i] += r * un[i] / s;
+  for (int i = 0; i < n; ++i) local.gradient[i] += weight * un[i];
   add_correction_floor(dofs, un, n, s, std::max(end.energy, start_energy), stiffness);
 }
 
@@ -146,19 +169,6 @@ void Equations::add_discrete_gradient(const VectorX& z, bool with_matrix, const 
     }
     add(assembler_.stretch, e);
   }
-  double metric[kMaxLocal][kMaxLocal] = {};
-  const auto clear = [&] {
-    for (auto& row : metric)
-      for (double& m : row) m = 0.0;
-  };
-  const auto couple = [&](int a, int b, double weight) {
-    for (int i = 0; i < dim; ++i) {
-      metric[a + i][a + i] += weight;
-      metric[b + i][b + i] += weight;
-      metric[a + i][b + i] -= weight;
-      metric[b + i][a + i] -= weight;
-    }
-  };
   for (int b = 0; b < static_cast<int>(model_.bend.size()); ++b) {
     bend_local(model_, elastic, middle_, b, true, local);
     bend_local(model_, elastic, end_, b, false, end);
@@ -168,10 +178,10 @@ void Equations::add_discrete_gradient(const VectorX& z, bool with_matrix, const 
       add_planar_invariants(b, local, end, before.bend + before.twist, stiffness);
     } else {
       const BendStencil& s = model_.bend[at(b)];
-      clear();
-      couple(0, 4, 1.0 / std::pow(model_.edge_length(s.edge[0]), 2));
-      couple(4, 8, 1.0 / std::pow(model_.edge_length(s.edge[1]), 2));
-      metric[3][3] = metric[7][7] = 1.0;
+      Metric metric;
+      for (int k = 0; k < 2; ++k)
+        metric.pairs[k] = {4 * k, 4 * k + 4, 3, inverse_rest_[s.edge[k]] * inverse_rest_[s.edge[k]]};
+      metric.own[3] = metric.own[7] = 1.0;
       correct(local, end, before.bend + before.twist, stiffness, assembler_.bend, b, metric);
     }
     add(assembler_.bend, b);
@@ -181,13 +191,13 @@ void Equations::add_discrete_gradient(const VectorX& z, bool with_matrix, const 
     half_local(model_, end_q_, elastic, end_, h, false, end);
     const BendTwistEnergy before = half_energy_of(elastic, start_, h);
     const double stiffness = elastic.half_stiffness.row(h).maxCoeff();
-    const double weight = 1.0 / std::pow(model_.edge_length(model_.half[at(h)].edge), 2);
-    clear();
-    couple(0, dim == 2 ? 2 : 4, weight);
+    const int edge = model_.half[at(h)].edge;
+    Metric metric;
+    metric.pairs[0] = {0, dim == 2 ? 2 : 4, dim, inverse_rest_[edge] * inverse_rest_[edge]};
     if (dim == 2)
-      metric[4][4] = 1.0;
+      metric.own[4] = 1.0;
     else
-      for (int i : {3, 7, 8, 9, 10}) metric[i][i] = 1.0;
+      for (int i : {3, 7, 8, 9, 10}) metric.own[i] = 1.0;
     correct(local, end, before.bend + before.twist, stiffness, assembler_.half, h, metric);
     add(assembler_.half, h);
   }

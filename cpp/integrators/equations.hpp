@@ -71,8 +71,17 @@ class Equations {
   void add_elastic(const ElasticCoefficients& k, const VectorX& z, bool with_matrix, const double* axial_force,
                    Evaluation& out);
   void add_discrete_gradient(const VectorX& z, bool with_matrix, const double* axial_force, Evaluation& out);
+  /// A quadratic form that neither moves nor turns the stencil: squares of single unknowns, and of differences.
+  struct Metric {
+    struct Pair {
+      int a = 0, b = 0, size = 0;
+      double weight = 0.0;
+    };
+    double own[kMaxLocal] = {};
+    Pair pairs[2];
+  };
   void correct(Local& local, const Local& end, double start_energy, double stiffness, const ElementTable& table,
-               int element, const double (*metric)[kMaxLocal]);
+               int element, const Metric& metric);
   void add_planar_invariants(int stencil, Local& local, const Local& end, double start_energy, double stiffness);
   void add_correction_floor(const int* dofs, const double* u, int count, double s, double energy, double stiffness);
   void add_spin_couple(const VectorX& z);
