@@ -22,8 +22,8 @@ std::unique_ptr<World> busy_world(SceneBuilder builder, Options options) {
 }
 
 TEST(Step, DoesNotAllocateAfterWarmUp) {
-  for (Integrator integrator :
-       {Integrator::backward_euler, Integrator::implicit_midpoint, Integrator::energy_momentum, Integrator::verlet})
+  for (Integrator integrator : {Integrator::backward_euler, Integrator::implicit_midpoint, Integrator::energy_momentum,
+                                Integrator::fourth_order, Integrator::verlet})
     for (const SceneBuilder& builder : {testing::cantilever(), testing::hanging_arm()}) {
       const double dt = integrator == Integrator::verlet ? 2e-5 : 2e-3;
       const auto world = busy_world(builder, testing::options(integrator, dt));
