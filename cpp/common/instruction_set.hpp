@@ -19,7 +19,7 @@ const char* name_of(InstructionSet set);
 
 /// The table of kernels for the instruction set in use.
 template <class Kernels>
-const Kernels& pick(const Kernels& baseline, const Kernels& avx2) {
+const Kernels* pick(const Kernels* baseline, const Kernels* avx2) {
   return instruction_set() == InstructionSet::avx2 ? avx2 : baseline;
 }
 

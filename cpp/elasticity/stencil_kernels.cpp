@@ -13,7 +13,7 @@ extern const StencilKernels kStencilKernels;
 
 const StencilKernels& stencil_kernels() {
 #ifdef WITHE_X86_KERNELS
-  static const StencilKernels& kernels = pick(baseline::kStencilKernels, avx2::kStencilKernels);
+  static const StencilKernels& kernels = *pick(&baseline::kStencilKernels, &avx2::kStencilKernels);
 #else
   static const StencilKernels& kernels = baseline::kStencilKernels;
 #endif

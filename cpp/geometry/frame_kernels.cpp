@@ -13,7 +13,7 @@ extern const FrameKernels kFrameKernels;
 
 const FrameKernels& frame_kernels() {
 #ifdef WITHE_X86_KERNELS
-  static const FrameKernels& kernels = pick(baseline::kFrameKernels, avx2::kFrameKernels);
+  static const FrameKernels& kernels = *pick(&baseline::kFrameKernels, &avx2::kFrameKernels);
 #else
   static const FrameKernels& kernels = baseline::kFrameKernels;
 #endif
