@@ -15,8 +15,10 @@ if [[ -z "$base" ]]; then
   exit 0
 fi
 
+# Benchmarks are not part of the build whose commands are used.
+sources=('cpp/*.cpp' 'python/*.cpp' 'tests/*.cpp')
 mapfile -t files < <(
-  { git diff --name-only --diff-filter=d "$base" -- '*.cpp'; git ls-files --others --exclude-standard -- '*.cpp'; } | sort -u
+  { git diff --name-only --diff-filter=d "$base" -- "${sources[@]}"; git ls-files --others --exclude-standard -- "${sources[@]}"; } | sort -u
 )
 echo "clang-tidy: ${#files[@]} files changed since ${base:0:9}"
 [[ ${#files[@]} -eq 0 ]] && exit 0

@@ -8,7 +8,6 @@
 namespace withe {
 namespace {
 
-using testing::at;
 using testing::Case;
 
 /// Elastic forces and matrix, each stencil by itself.
