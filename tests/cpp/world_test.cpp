@@ -11,7 +11,6 @@
 namespace withe {
 namespace {
 
-using testing::kPi;
 using testing::options;
 using testing::same_state;
 using testing::SceneBuilder;
