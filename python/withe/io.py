@@ -97,6 +97,10 @@ def load_arrays(
     """
     path = Path(path)
     with path.open("rb") as stream:
+        # NumPy would take anything else for a pickle, and advise to load it unsafely.
+        if stream.read(2) != b"PK":
+            raise ValueError(f"{path} is not a withe file, or damaged: it is no npz archive")
+        stream.seek(0)
         try:
             with np.load(stream, allow_pickle=False) as archive:
                 if not isinstance(archive, np.lib.npyio.NpzFile) or _HEADER not in archive.files:
