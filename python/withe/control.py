@@ -21,7 +21,6 @@ from withe.parts import (
     MassPart,
     RodPart,
     SupportPart,
-    handle_of,
 )
 from withe.rods import curvature_array, twist_array
 from withe.snapshots import Settings
@@ -302,8 +301,7 @@ class Control:
         check_not_held(self._directory, part, (other for _, other in self._settings.supports.values()))
         index = self._world.add_support(describe_support(part))
         self._settings.supports[part.name] = index, part
-        self._directory.parts[part.name] = part
-        return cast(Support, handle_of(part, self._directory.scene_id, self._directory.layout))
+        return cast(Support, self._directory.add(part))
 
     def release(self, support: Support | NodeHandle | str) -> None:
         """Let go of a node.

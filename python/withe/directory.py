@@ -57,6 +57,11 @@ class Directory:
         """Handles of all rods."""
         return tuple(Rod(self.scene_id, part.name, self.layout, part.index) for part in self.all(RodPart))
 
+    def add(self, part: Part) -> Handle:
+        """Take in a part whose name is new, and return its handle."""
+        self.parts[part.name] = part
+        return handle_of(part, self.scene_id, self.layout)
+
     def new_name(self, name: Any, word: str) -> str:
         """A name that is free: the one given, or the word and a number.
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import uuid
-from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any, Literal, cast
 
 import numpy as np
@@ -11,23 +10,11 @@ import numpy.typing as npt
 
 from withe import validation
 from withe.directory import Directory
-from withe.handles import CustomForce, Drag, Joint, Load, Mass, NodeHandle, Rod, RodPlace, Support
+from withe.handles import Joint, NodeHandle, Rod, RodPlace, Support
 from withe.joints import connected, gather
+from withe.loads import Loads
 from withe.materials import Material, Section, Stiffness
-from withe.parts import (
-    CustomForcePart,
-    DragPart,
-    JoinKind,
-    JoinPart,
-    JointForm,
-    LoadKind,
-    LoadPart,
-    MassPart,
-    Part,
-    Pass,
-    SupportPart,
-    handle_of,
-)
+from withe.parts import JoinKind, JoinPart, JointForm, Pass, SupportPart
 from withe.rods import Natural, make_rod
 from withe.supports import check_not_held, make_clamp, make_pin
 
@@ -37,10 +24,9 @@ if TYPE_CHECKING:
 __all__ = ["Scene"]
 
 FloatArray = npt.NDArray[np.float64]
-Value = npt.ArrayLike | Callable[[float], npt.ArrayLike]
 
 
-class Scene:
+class Scene(Loads):
     """A description of rods, joints, supports and loads, from which simulations are built.
 
     Parameters
@@ -192,7 +178,7 @@ class Scene:
         self._directory.layout.add(place)
         self._low = np.minimum(self._low, rod.points.min(axis=0))
         self._high = np.maximum(self._high, rod.points.max(axis=0))
-        return cast(Rod, self._add(rod))
+        return cast(Rod, self._directory.add(rod))
 
     def join(
         self,
@@ -254,7 +240,7 @@ class Scene:
         for node in part.nodes:
             self._joins_at.setdefault(node, []).append(part)
         self._directory.layout.merge(node_a, node_b)
-        return cast(Joint, self._add(part))
+        return cast(Joint, self._directory.add(part))
 
     # Supports
 
@@ -298,120 +284,7 @@ class Scene:
 
     def _hold(self, part: SupportPart) -> Support:
         check_not_held(self._directory, part, self._directory.all(SupportPart))
-        return cast(Support, self._add(part))
-
-    # Loads
-
-    def add_force(
-        self, node: NodeHandle | str, force: Value, *, follower: bool = False, name: str | None = None
-    ) -> Load:
-        """Add a force at a node.
-
-        Parameters
-        ----------
-        node : NodeHandle or str
-        force : array_like of shape (3,) [N], or a function of time [s] that returns it
-        follower : bool
-            Whether it turns with the edge that ends at the node (or starts there, at the first node).
-        name : str
-
-        Returns
-        -------
-        Load
-        """
-        place, _ = self._directory.node(node, "node of the force")
-        return self._load("force", place, force, validation.truth(follower, "follower"), name)
-
-    def add_moment(self, node: NodeHandle | str, moment: Value, *, name: str | None = None) -> Load:
-        """Add a moment at a node, in world axes.
-
-        Parameters
-        ----------
-        node : NodeHandle or str
-        moment : array_like of shape (3,) [N m], or a function of time [s] that returns it
-        name : str
-
-        Returns
-        -------
-        Load
-        """
-        place, _ = self._directory.node(node, "node of the moment")
-        return self._load("moment", place, moment, False, name)
-
-    def add_load(self, rod: Rod | str, load: Value, *, follower: bool = False, name: str | None = None) -> Load:
-        """Add a force spread evenly along a rod.
-
-        Parameters
-        ----------
-        rod : Rod or str
-        load : array_like of shape (3,) [N/m], or a function of time [s] that returns it
-        follower : bool
-            Whether it turns with the edges.
-        name : str
-
-        Returns
-        -------
-        Load
-        """
-        part = self._directory.rod(rod, "rod of the load")
-        return self._load("load", (part.index, 0), load, validation.truth(follower, "follower"), name)
-
-    def _load(self, kind: LoadKind, node: Pass, value: Value, follower: bool, name: str | None) -> Load:
-        name = self._directory.new_name(name, kind)
-        what = f"{kind} {name!r}"
-        function = value if callable(value) else None
-        first = validation.vector(value(0.0) if callable(value) else value, what + (" at t = 0" if function else ""))
-        return cast(Load, self._add(LoadPart(name, kind, node, first, function, follower)))
-
-    def add_mass(self, node: NodeHandle | str, mass: float, *, name: str | None = None) -> Mass:
-        """Add a point mass [kg] to a node."""
-        name = self._directory.new_name(name, "mass")
-        place, node_name = self._directory.node(node, "node of the mass")
-        part = MassPart(name, place, validation.non_negative(mass, f"mass at {node_name!r}"))
-        return cast(Mass, self._add(part))
-
-    def add_drag(self, coefficient: float, *, rods: Iterable[Rod | str] | None = None, name: str | None = None) -> Drag:
-        """Add viscous drag: a force per length against the velocity. Drags on one rod add up.
-
-        Parameters
-        ----------
-        coefficient : float [Pa s]
-        rods : iterable of Rod or str
-            By default every rod, those added later included.
-        name : str
-
-        Returns
-        -------
-        Drag
-        """
-        name = self._directory.new_name(name, "drag")
-        coefficient = validation.non_negative(coefficient, "drag coefficient")
-        indices = None
-        if rods is not None:
-            if isinstance(rods, str) or not isinstance(rods, Iterable):
-                raise ValueError(f"rods of the drag must be a list of rods, got {rods!r:.80}")
-            indices = tuple(dict.fromkeys(self._directory.rod(rod, "rod of the drag").index for rod in rods))
-        return cast(Drag, self._add(DragPart(name, coefficient, indices)))
-
-    def add_custom_force(
-        self, function: Callable[[float, FloatArray, FloatArray], npt.ArrayLike], *, name: str | None = None
-    ) -> CustomForce:
-        """Add forces that a function computes, once before every step (explicitly).
-
-        Parameters
-        ----------
-        function : callable
-            ``function(time, positions, velocities)`` returns the force on every node of the scene,
-            shape (nodes, 3) [N]; time [s], positions [m] and velocities [m/s] are those before the step.
-        name : str
-
-        Returns
-        -------
-        CustomForce
-        """
-        name = self._directory.new_name(name, "custom force")
-        part = CustomForcePart(name, validation.function(function, "custom force"))
-        return cast(CustomForce, self._add(part))
+        return cast(Support, self._directory.add(part))
 
     # Simulations
 
@@ -492,10 +365,6 @@ class Scene:
         return Simulation._build(self._directory.copy(), self._gravity.copy(), options)
 
     # Helpers
-
-    def _add(self, part: Part) -> Any:
-        self._directory.parts[part.name] = part
-        return handle_of(part, self._directory.scene_id, self._directory.layout)
 
     def _point(self, node: Pass) -> FloatArray:
         rod = self._directory.layout.rods[node[0]].name

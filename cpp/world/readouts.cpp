@@ -1,0 +1,113 @@
+/// What a scene answers: copies, in world coordinates.
+
+#include "world/implementation.hpp"
+
+namespace withe {
+namespace {
+
+std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+}  // namespace
+
+MatrixX3 World::positions() const {
+  const Implementation& self = *implementation_;
+  MatrixX3 out(self.model.node_count, 3);
+  for (int i = 0; i < self.model.node_count; ++i) out.row(i) = node_position(self.model, self.state.q, i);
+  return out;
+}
+
+MatrixX3 World::velocities() const {
+  const Implementation& self = *implementation_;
+  MatrixX3 out(self.model.node_count, 3);
+  for (int i = 0; i < self.model.node_count; ++i) out.row(i) = node_velocity(self.model, self.state.v, i);
+  return out;
+}
+
+MatrixX9 World::directors(int rod) const {
+  const Implementation& self = *implementation_;
+  Configuration c;
+  compute_configuration(self.model, self.state, self.state.q, c);
+  const int first = self.model.rod_first_edge.at(at(rod)), count = self.model.rod_first_edge.at(at(rod) + 1) - first;
+  MatrixX9 out(count, 9);
+  for (int e = 0; e < count; ++e) {
+    const Matrix3 d = edge_directors(self.model, c, first + e);
+    out.row(e) << d.col(0).transpose(), d.col(1).transpose(), d.col(2).transpose();
+  }
+  return out;
+}
+
+MatrixX2 World::curvatures(int rod) const {
+  const Implementation& self = *implementation_;
+  Configuration c;
+  compute_configuration(self.model, self.state, self.state.q, c);
+  const auto& places = self.model.place.at(at(rod));
+  MatrixX2 out = MatrixX2::Zero(static_cast<Eigen::Index>(places.size()), 2);
+  const auto smooth = [&](const MatrixX3& strain, int i, double voronoi) {
+    Vector2 d = strain.row(i).head<2>();
+    if (self.model.planar()) d = strain(i, 0) * self.model.planar_components[at(rod)];
+    return smooth_curvature(d, voronoi);
+  };
+  for (std::size_t s = 0; s < places.size(); ++s) {
+    const auto row = static_cast<Eigen::Index>(s);
+    if (places[s].bend >= 0) {
+      out.row(row) = smooth(c.bend_strain, places[s].bend, self.model.bend_voronoi(places[s].bend));
+      continue;
+    }
+    double length = 0.0;
+    for (int h : places[s].half)
+      if (h >= 0) {
+        const double v = self.model.half_voronoi(h);
+        out.row(row) += v * smooth(c.half_strain, h, v);
+        length += v;
+      }
+    if (length > 0.0) out.row(row) /= length;
+  }
+  return out;
+}
+
+VectorX World::twists(int rod) const {
+  const Implementation& self = *implementation_;
+  const auto& places = self.model.place.at(at(rod));
+  VectorX out = VectorX::Zero(static_cast<Eigen::Index>(places.size()));
+  if (self.model.planar()) return out;
+  Configuration c;
+  compute_configuration(self.model, self.state, self.state.q, c);
+  for (std::size_t s = 0; s < places.size(); ++s) {
+    double turn = 0.0, length = 0.0;
+    if (places[s].bend >= 0) {
+      turn = c.bend_strain(places[s].bend, 2);
+      length = self.model.bend_voronoi(places[s].bend);
+    }
+    for (int h : places[s].half)
+      if (h >= 0) {
+        turn += c.half_strain(h, 2);
+        length += self.model.half_voronoi(h);
+      }
+    out(static_cast<Eigen::Index>(s)) = length > 0.0 ? turn / length : 0.0;
+  }
+  return out;
+}
+
+VectorX World::tensions(int rod) const {
+  const Implementation& self = *implementation_;
+  Configuration c;
+  compute_configuration(self.model, self.state, self.state.q, c);
+  const int first = self.model.rod_first_edge.at(at(rod)), count = self.model.rod_first_edge.at(at(rod) + 1) - first;
+  VectorX out(count);
+  for (int e = 0; e < count; ++e)
+    out(e) = self.parameters.edge_stretch(first + e) * (c.length(first + e) / self.model.edge_length(first + e) - 1.0);
+  return out;
+}
+
+VectorX World::spins(int rod) const {
+  const Implementation& self = *implementation_;
+  const int first = self.model.rod_first_edge.at(at(rod)), count = self.model.rod_first_edge.at(at(rod) + 1) - first;
+  VectorX out = VectorX::Zero(count);
+  if (!self.model.planar())
+    for (int e = 0; e < count; ++e) out(e) = self.state.v(self.model.edge_dof[at(first + e)]);
+  return out;
+}
+
+Energy World::energy() const { return implementation_->energy(); }
+
+}  // namespace withe

@@ -1,0 +1,132 @@
+/// Supports of a running scene: added, released, moved, and what they hold.
+
+#include <Eigen/Geometry>
+
+#include "common/check.hpp"
+#include "world/implementation.hpp"
+
+namespace withe {
+namespace {
+
+std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+}  // namespace
+
+int World::add_support(const SupportDescription& support) {
+  Implementation& self = *implementation_;
+  const Implementation backup(self);
+  self.description.supports.push_back(support);
+  Support placeholder;
+  placeholder.active = true;
+  self.model.supports.push_back(placeholder);
+  self.motions.emplace_back();
+  try {
+    if (self.model.planar()) {
+      const Vector3& n = self.model.plane->normal;
+      const Vector3 image = support.free * n;
+      if ((image - n * n.dot(image)).norm() > 1e-9) {
+        require(!self.options.planar.value_or(false), "a support that slides out of the plane needs planar=False");
+        self.spatial = true;
+      }
+    }
+    self.rebuild(Rebuild::running);
+  } catch (...) {
+    auto callback = self.callback;
+    auto poll = self.poll;
+    implementation_ = std::make_unique<Implementation>(backup);
+    implementation_->callback = callback;
+    implementation_->poll = poll;
+    throw;
+  }
+  const int index = static_cast<int>(self.description.supports.size()) - 1;
+  const Support& s = self.model.supports[at(index)];
+  SupportMotion& m = self.motions[at(index)];
+  m.position = node_position(self.model, self.state.q, s.node);
+  if (s.frame >= 0) {
+    m.rotation = frame_rotation(self.model, self.state, s.frame);
+  } else if (s.edge >= 0) {
+    Configuration c;
+    compute_configuration(self.model, self.state, self.state.q, c);
+    const Vector3 t = to_eigen(self.model.initial_tangent[at(s.edge)]),
+                  d1 = to_eigen(self.model.initial_director[at(s.edge)]);
+    Matrix3 drawn;
+    drawn << d1, t.cross(d1), t;
+    m.rotation = edge_directors(self.model, c, s.edge) * drawn.transpose();
+    const auto& x = self.description.positions;
+    m.stretch = c.length(s.edge) / (x.row(s.other_node) - x.row(s.node)).norm();
+  }
+  m.from_position = m.to_position = m.position;
+  m.from_rotation = m.to_rotation = m.rotation;
+  m.start = m.end = self.state.time;
+  return index;
+}
+
+void World::remove_support(int support) {
+  Implementation& self = *implementation_;
+  require(
+      support >= 0 && support < static_cast<int>(self.model.supports.size()) && self.model.supports[at(support)].active,
+      "no such support, or it is released already: " + std::to_string(support));
+  self.model.supports[at(support)].active = false;
+  self.rebuild(Rebuild::running);
+}
+
+void World::move_support(int support, const Vector3& position, const Matrix3& rotation, double over) {
+  Implementation& self = *implementation_;
+  require(std::isfinite(over) && over >= 0.0, "over must be finite and not negative");
+  prescribe_support(support, position, rotation);
+  SupportMotion& m = self.motions[at(support)];
+  m.from_position = m.position;
+  m.from_rotation = m.rotation;
+  m.start = self.state.time;
+  m.end = self.state.time + over;
+}
+
+void World::prescribe_support(int support, const Vector3& position, const Matrix3& rotation) {
+  Implementation& self = *implementation_;
+  require(
+      support >= 0 && support < static_cast<int>(self.model.supports.size()) && self.model.supports[at(support)].active,
+      "no such support, or it is released: " + std::to_string(support));
+  require(position.allFinite() && rotation.allFinite(), "position and rotation must be finite");
+  require((rotation.transpose() * rotation - Matrix3::Identity()).norm() < 1e-6 && rotation.determinant() > 0.0,
+          "rotation must be a proper rotation matrix");
+  if (self.model.planar()) {
+    const Plane& plane = *self.model.plane;
+    if (std::abs((position - plane.origin).dot(plane.normal)) > 1e-9 * self.model.length_scale ||
+        (rotation * plane.normal - plane.normal).norm() > 1e-9)
+      self.leave_plane("a moving support");
+  }
+  SupportMotion& m = self.motions[at(support)];
+  m.to_position = m.from_position = position;
+  m.to_rotation = m.from_rotation = rotation;
+  m.start = m.end = self.state.time;
+}
+
+Vector3 World::support_position(int support) const { return implementation_->motions.at(at(support)).position; }
+Matrix3 World::support_rotation(int support) const { return implementation_->motions.at(at(support)).rotation; }
+
+Reaction World::reaction(int support) const {
+  Implementation& self = *implementation_;
+  require(
+      support >= 0 && support < static_cast<int>(self.model.supports.size()) && self.model.supports[at(support)].active,
+      "no such support, or it is released: " + std::to_string(support));
+  self.refresh_reactions();
+  const Model& model = self.model;
+  const Support& s = model.supports[at(support)];
+  const VectorX held = self.equations->assembler().held_part(self.reaction_residual);
+  Reaction out;
+  out.force = node_velocity(model, held, s.node);
+  if (s.frame >= 0) {
+    const int dof = model.frame_dof[at(s.frame)];
+    out.moment = model.planar() ? Vector3(held(dof) * model.plane->normal) : Vector3(held.segment<3>(dof));
+  }
+  if (s.other_node >= 0) {
+    const Vector3 other = node_velocity(model, held, s.other_node);
+    const Vector3 arm = node_position(model, self.state.q, s.other_node) - node_position(model, self.state.q, s.node);
+    out.force += other;
+    out.moment = arm.cross(other);
+    if (!model.planar()) out.moment += held(model.edge_dof[at(s.edge)]) * to_eigen(self.state.tangent[at(s.edge)]);
+  }
+  return out;
+}
+
+}  // namespace withe
