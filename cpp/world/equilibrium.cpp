@@ -1,3 +1,5 @@
+#include <algorithm>
+
 #include "geometry/rotation.hpp"
 #include "world/implementation.hpp"
 
@@ -75,7 +77,11 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
   }
   if (!r.converged) {
     undo();
-    fail(r.newton, dt, "no static equilibrium was found");
+    const bool held =
+        std::any_of(model.supports.begin(), model.supports.end(), [](const Support& s) { return s.active; });
+    fail(r.newton, dt,
+         held ? "no static equilibrium was found"
+              : "no static equilibrium was found, and no support holds the scene: clamp or pin a node");
   }
   state.time = time;
   retire_ramps();

@@ -39,12 +39,28 @@ def check_not_held(directory: Directory, part: SupportPart, others: Iterable[Sup
     Raises
     ------
     ValueError
-        The node, or one that is joined to it, is held by one of the others.
+        A node that it would hold, or one that is joined to it, is held by one of the others.
     """
-    row = directory.row(part.node)
+    held = _held_rows(directory, part)
     for other in others:
-        if directory.row(other.node) == row:
+        if directory.row(other.node) == directory.row(part.node):
             raise ValueError(f"node {part.node_name!r} is already held by {other.name!r}: release that first")
+        if not held.isdisjoint(_held_rows(directory, other)):
+            raise ValueError(
+                f"{part.name!r} at {part.node_name!r} would hold a node that {other.name!r} at {other.node_name!r} "
+                "holds: hold='edge' takes both nodes of an edge"
+            )
+
+
+def _held_rows(directory: Directory, part: SupportPart) -> set[int]:
+    """Rows of the nodes that a support holds: with hold="edge" also that at the other end of the edge."""
+    index, node = part.node
+    held = {directory.row(part.node)}
+    if part.kind == "hold_edge":
+        rod = directory.layout.rods[index]
+        beyond = node + 1 if node + 1 < rod.nodes or rod.closed else node - 1
+        held.add(directory.row((index, beyond % rod.nodes)))
+    return held
 
 
 def _projector(free: Any, what: str) -> FloatArray:

@@ -134,7 +134,8 @@ def number_array(value: Any, what: str, *shapes: tuple[int | str, ...]) -> Float
     if raw.dtype.kind not in "iuf":
         raise ValueError(f"{what} must be numbers of shape {wanted}, got {_short(value)}")
     if not any(_fits(raw.shape, shape) for shape in shapes):
-        raise ValueError(f"{what} must have shape {wanted}, got {raw.shape}")
+        came = _shape(raw.shape) if raw.shape else "a single number"
+        raise ValueError(f"{what} must have shape {wanted}, got {came}")
     result = np.array(raw, np.float64, order="C")
     bad = ~np.isfinite(result)
     if bad.any():

@@ -93,7 +93,10 @@ RODS = [
     ),
     (lambda: rod(**STIFF, stiffness=stiff(viscous_time=-1)), "viscous_time of rod 'arm' must not be negative, got -1"),
     (lambda: rod(natural="curly"), "natural of rod 'arm' must be 'as_built' or 'straight', got 'curly'"),
-    (lambda: rod(natural_curvature=1.0), "natural_curvature of rod 'arm' must have shape (2,) or (3, 2), got ()"),
+    (
+        lambda: rod(natural_curvature=1.0),
+        "natural_curvature of rod 'arm' must have shape (2,) or (3, 2), got a single number",
+    ),
     (lambda: rod(natural_curvature=(0, 13)), "natural_curvature of rod 'arm' must turn the rod by less than pi"),
     (lambda: rod(natural_twist=[1, 2]), "natural_twist of rod 'arm' must have shape (3,), got (2,)"),
     (lambda: rod(natural_twist=NAN), "natural_twist of rod 'arm' must be finite, got nan"),
@@ -161,7 +164,10 @@ SCENES = [
     (lambda s, a, b: s.pin(a.start, free=(0, 0, 0)), "free of the pin must not be zero"),
     (lambda s, a, b: s.pin(a.start, free=[(0, 0, 1), (0, 0, 2)]), "free of the pin must be directions that differ"),
     (lambda s, a, b: s.add_force(a.end, (0, 1)), "force 'force 1' must have shape (3,), got (2,)"),
-    (lambda s, a, b: s.add_force(a.end, lambda t: NAN), "force 'force 1' at t = 0 must have shape (3,), got ()"),
+    (
+        lambda s, a, b: s.add_force(a.end, lambda t: NAN),
+        "force 'force 1' at t = 0 must have shape (3,), got a single number",
+    ),
     (lambda s, a, b: s.add_force(a.end, (0, 0, 1), follower="yes"), "follower must be True or False, got 'yes'"),
     (lambda s, a, b: s.add_force(a, (0, 0, 1)), "node of the force must be a node of a rod"),
     (lambda s, a, b: s.add_load(a.end, (0, 0, 1)), "rod of the load must not be a node or an edge, got 'arm.end'"),

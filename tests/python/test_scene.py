@@ -255,6 +255,19 @@ def test_a_node_is_held_once_also_when_it_was_joined_later():
         scene.build()
 
 
+def test_a_held_edge_takes_both_its_nodes():
+    scene = withe.Scene()
+    a = add_rod(scene, (0, 0, 0), (1, 0, 0))
+    scene.clamp(a.start, hold="edge")
+    with pytest.raises(ValueError, match=r"'pin 1' at .* would hold a node that 'clamp 1' at 'rod 1.start' holds"):
+        scene.pin(a.node(1))
+    scene.pin(a.node(-2))
+    with pytest.raises(ValueError, match=r"'clamp 2' at 'rod 1.end' would hold a node that 'pin 1'"):
+        scene.clamp(a.end, hold="edge")
+    scene.pin(a.node(2))
+    assert scene.build(integrator="static").equilibrium().stable
+
+
 def test_a_scene_pickles_with_all_its_parts():
     scene = withe.Scene()
     a = add_rod(scene, (0, 0, 0), (1, 0, 0), name="arm")

@@ -193,6 +193,7 @@ def test_a_failed_static_problem_is_a_convergence_error_that_says_where():
     assert isinstance(error, RuntimeError)
     assert error.time == 0.0
     assert error.rod in (None, "free rod")
+    assert "no support holds the scene: clamp or pin a node" in str(error)
     assert error.residual > 0 or np.isnan(error.residual)
     assert simulation.snapshot() == before
     assert np.isfinite(simulation.positions(rod)).all()
