@@ -1,6 +1,6 @@
 #pragma once
 /// Counts every allocation of an executable; for one of its files only. With glibc, malloc itself is replaced, so that
-/// C libraries count too; elsewhere, and under sanitizers that own malloc, only operator new.
+/// C libraries count too; sanitizers own malloc and offer a hook instead; elsewhere only operator new counts.
 
 #include <cstdlib>
 #include <new>
@@ -9,7 +9,15 @@ namespace {
 std::size_t allocation_count = 0;
 }
 
-#if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+#if defined(WITHE_SANITIZED)
+// Declared here, because not every compiler comes with sanitizer/allocator_interface.h.
+extern "C" int __sanitizer_install_malloc_and_free_hooks(void (*malloc_hook)(const volatile void*, std::size_t),
+                                                         void (*free_hook)(const volatile void*));
+namespace {
+[[maybe_unused]] const int hooks_installed = __sanitizer_install_malloc_and_free_hooks(
+    [](const volatile void*, std::size_t) { ++allocation_count; }, [](const volatile void*) {});
+}  // namespace
+#elif defined(__GLIBC__)
 extern "C" {
 void* __libc_malloc(std::size_t size);
 void* __libc_calloc(std::size_t count, std::size_t size);
