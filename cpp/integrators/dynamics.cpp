@@ -9,9 +9,14 @@ namespace {
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
-/// Largest angle by which an edge turns on the way from a state to q; > pi/2 where it ends pointing back.
-double largest_turn(const Model& model, const State& state, const VectorX& q) {
-  double smallest = 1.0;
+/// Largest angle by which an edge turns on the way from a state to q [rad], > pi/2 where it ends pointing back; and by
+/// how much the energy in stretching grows beyond the work of the axial forces in the middle [J],
+/// EA (l1 - l0) (l1 + l0 - 2 lm) / (2 lm) an edge, where EA is given.
+struct Turning {
+  double largest = 0.0, stretch_gain = 0.0;
+};
+Turning turning(const Model& model, const double* stretch_stiffness, const State& state, const VectorX& q) {
+  double smallest = 1.0, gain = 0.0;
   for (int e = 0; e < model.edge_count; ++e) {
     const int a = model.node_dof[at(model.edge_tail[at(e)])], b = model.node_dof[at(model.edge_head[at(e)])];
     double across = 0.0, before = 0.0, after = 0.0;
@@ -21,11 +26,14 @@ double largest_turn(const Model& model, const State& state, const VectorX& q) {
       before += d0 * d0;
       after += d1 * d1;
     }
-    const double cosine = across / std::sqrt(before * after);
-    if (!std::isfinite(cosine)) return INFINITY;
+    const double l0 = std::sqrt(before), l1 = std::sqrt(after), cosine = across / (l0 * l1);
+    if (!std::isfinite(cosine)) return {INFINITY, INFINITY};
     smallest = std::min(smallest, cosine);
+    if (!stretch_stiffness) continue;
+    const double middle = 0.5 * std::sqrt(std::max(before + after + 2.0 * across, 0.0));
+    if (middle > 0.0) gain += 0.5 * stretch_stiffness[e] * (l1 - l0) * (l1 + l0 - 2.0 * middle) / middle;
   }
-  return std::acos(std::clamp(smallest, -1.0, 1.0));
+  return {std::acos(std::clamp(smallest, -1.0, 1.0)), gain};
 }
 
 /// Work of loads, drag and viscosity over the step, with the forces that acted in it.
@@ -115,32 +123,44 @@ NewtonResult find_inner(Equations& equations, const Newton& newton, const Option
   return found;
 }
 
-/// Estimated error of the step just taken [m]: dt^2 / 2 times the mean acceleration (backward Euler), or dt^2 / 12
-/// times its change since the step before (midpoint); filtered by (M / h^2 + K)^-1 M / h^2, so that modes which the
-/// step does not resolve, and which it therefore leaves bounded, count for as little as they move [Hosea and Shampine
-/// 1996]. Without a step before there is nothing to compare with.
-double estimated_error(Equations& equations, const Newton& newton, const StepPlan& plan, const State& state,
-                       const Predictor& predictor, StepWorkspace& work) {
-  VectorX& error = work.assumed;
-  const VectorX& acceleration = work.mean;
-  if (plan.rule == StepRule::backward_euler) {
-    error = 0.5 * equations.mass.cwiseProduct(acceleration);  // h = dt
-  } else {
-    if (predictor.empty()) return 0.0;
-    // Mean accelerations belong to the middles of their steps.
-    const double apart = std::abs((state.time + 0.5 * plan.dt - predictor.last_time()) / plan.dt);
-    error = (1.0 / (3.0 * apart)) * equations.mass.cwiseProduct(acceleration - state.acceleration);  // h = dt / 2
-  }
-  equations.assembler().project(error);
-  const double h = (plan.rule == StepRule::backward_euler ? 1.0 : 0.5) * plan.dt;
+/// How far a force that acts over a step moves things [m]: filtered by (M / h^2 + K)^-1, so that modes which the step
+/// does not resolve, and which it therefore leaves bounded, count for as little as they move [Hosea and Shampine 1996].
+double moved_by(VectorX& force, Equations& equations, const Newton& newton, double h, StepWorkspace& work) {
+  equations.assembler().project(force);
   const FactorRecord& factor = work.newton.factor;
   if (factor.owner != &equations || factor.interval != std::abs(h)) {
     // Nothing moved, and no matrix was made.
-    error = (h * h) * error.cwiseQuotient(equations.mass.cwiseMax(1e-300));
-    return newton.displacement(error);
+    force = (h * h) * force.cwiseQuotient(equations.mass.cwiseMax(1e-300));
+    return newton.displacement(force);
   }
-  equations.assembler().solver().solve({error.data(), static_cast<std::size_t>(error.size())});
-  return newton.displacement(error);
+  equations.assembler().solver().solve({force.data(), static_cast<std::size_t>(force.size())});
+  return newton.displacement(force);
+}
+
+/// Estimated error of the step just taken [m]: dt^2 / 2 times the mean acceleration (backward Euler), or dt^3 / 12
+/// times its rate (midpoint). Without a step before there is nothing to compare with.
+///
+/// The rate is taken over two steps: what rings from one step to the next is an error too, but one that stays as it is
+/// and does not add up, so it is held against the whole tolerance.
+double estimated_error(Equations& equations, const Newton& newton, const Options& options, const StepPlan& plan,
+                       const State& state, const Predictor& predictor, StepWorkspace& work) {
+  VectorX& error = work.assumed;
+  const VectorX& acceleration = work.mean;
+  if (plan.rule == StepRule::backward_euler) {
+    error = 0.5 * equations.mass.cwiseProduct(acceleration);
+    return moved_by(error, equations, newton, plan.dt, work);
+  }
+  if (predictor.empty()) return 0.0;
+  const double h = 0.5 * plan.dt, middle = state.time + 0.5 * plan.dt;
+  const auto error_by = [&](const VectorX& before, double time) {
+    const double apart = std::abs((middle - time) / plan.dt);
+    error = (1.0 / (3.0 * apart)) * equations.mass.cwiseProduct(acceleration - before);
+    return moved_by(error, equations, newton, h, work);
+  };
+  const double whole = error_by(predictor.acceleration(0), predictor.time(0));
+  if (options.integrator == Integrator::fourth_order || predictor.count() < 2) return whole;
+  const double share = std::abs(plan.dt) / options.duration.value_or(1.0);
+  return std::max(error_by(predictor.acceleration(1), predictor.time(1)), std::min(whole, 2.0 * share * whole));
 }
 
 /// Forces over mass at q, with velocity v in drag, viscosity and the spin couple.
@@ -175,8 +195,11 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
     q1 = work.z;
   else
     q1 = 2.0 * work.z - state.q;
-  result.largest_turn = largest_turn(model, state, q1);
+  const double* watched = plan.rule == StepRule::midpoint ? equations.elastic.stretch_stiffness.data() : nullptr;
+  const Turning turned = turning(model, watched, state, q1);
+  result.largest_turn = turned.largest;
   if (!q1.allFinite() || !(result.largest_turn <= 1.5)) return result;
+  result.stretch_gain = turned.stretch_gain;
   work.change = q1 - state.q;
   work.mean = work.change / dt;
   VectorX& v1 = work.velocity;
@@ -194,7 +217,7 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
   }
   VectorX& acceleration = work.mean;
   acceleration = (v1 - state.v) / dt;
-  if (options.tolerance) result.error = estimated_error(equations, newton, plan, state, predictor, work);
+  if (options.tolerance) result.error = estimated_error(equations, newton, options, plan, state, predictor, work);
   predictor.record(state.time + 0.5 * dt, plan.slot, acceleration, equations.mass, work.assumed);
   if (!model.planar()) compute_configuration(model, state, q1, work.after);
   accept_configuration(model, q1, work.after, state);
@@ -220,7 +243,7 @@ StepResult verlet_step(Equations& equations, const Parameters& parameters, doubl
   assembler.add_held_part(work.change, 1.0 / dt, half);
   VectorX& q1 = work.z;
   q1 = state.q + dt * half;
-  result.largest_turn = largest_turn(model, state, q1);
+  result.largest_turn = turning(model, nullptr, state, q1).largest;
   if (!q1.allFinite() || !(result.largest_turn <= 1.5)) return result;
   // Forces want the frames at q1 itself: measured from the start of the step, the turn of direct transport would come
   // in at first order, with nothing to cancel it.

@@ -33,6 +33,7 @@ struct StepResult {
   bool accepted = false;
   NewtonResult newton;
   double largest_turn = 0;  ///< of an edge [rad]
+  double stretch_gain = 0;  ///< energy that midpoint brings into stretching from nowhere [J]
   double error = 0;         ///< estimated local error [m]
   double load_work = 0;     ///< of loads and custom forces [J]
   double dissipated = 0;    ///< by drag and viscosity [J]

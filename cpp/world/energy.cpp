@@ -84,17 +84,25 @@ Energy World::Implementation::energy_of(const State& at, double loads, double wo
 /// Plain midpoint pumps energy into stretching when edges turn far within a step: whether the step just taken, from
 /// where `keep_for_return` was called, did.
 bool World::Implementation::gains_energy() {
+  // Where edges hardly turn, bending gains nothing, and stretching what the step has found.
+  if (guard.turn <= 0.01 && std::abs(guard.stretch_gain) <= 1e-6 * guard.scale) {
+    guard.energy.reset();
+    return false;
+  }
   const Energy then =
       guard.energy ? *guard.energy
                    : energy_of(kept.state, kept.load_work, kept.support_work + kept.actuation_work, kept.dissipated);
   const Energy now = energy();
-  guard.energy = now;
-  guard.scale = std::max({guard.scale, now.kinetic, then.kinetic, 0.1 * (now.stretch + now.bend + now.twist)});
   const double gain = (now.total - now.work + now.dissipated) - (then.total - then.work + then.dissipated);
-  if (gain > 1e-6 * guard.scale && guard.excess + gain > 5e-3 * guard.scale) {
-    guard.energy = then;
-    return true;
-  }
+  // What came from nowhere is no measure of what there is.
+  const auto elastic = [](const Energy& e) { return e.stretch + e.bend + e.twist; };
+  const double put_in = now.kinetic + elastic(now) - std::max(gain, 0.0);
+  const double scale = std::max(
+      {guard.scale, then.kinetic, 0.1 * elastic(then), std::min(std::max(now.kinetic, 0.1 * elastic(now)), put_in)});
+  guard.energy = then;
+  if (gain > 1e-6 * scale && guard.excess + gain > 5e-3 * scale) return true;
+  guard.energy = now;
+  guard.scale = scale;
   guard.excess += gain;
   return false;
 }

@@ -34,6 +34,7 @@ struct EnergyGuard {
   double turn = std::numeric_limits<double>::infinity();  ///< of the last step [rad]; before the first, not known
   double scale = 0;                                       ///< [J]
   double excess = 0;                                      ///< out of nowhere so far [J]
+  double stretch_gain = 0;                                ///< of the last step, into stretching [J]
   int rescue = 0;                                         ///< energy-momentum steps still to take in its place
   std::optional<Energy> energy;                           ///< at the present state, where a step has just found it
 };
@@ -83,7 +84,7 @@ struct World::Implementation {
   std::function<void()> poll;
   std::atomic<bool> interrupted{false};
   bool spatial = false;  ///< left its plane while running
-  int level = 0;         ///< present halvings of the time step
+  int level = 0;         ///< present halvings of the time step, in `notches()` to each
   int easy_steps = 0;
   EnergyGuard guard;
   double error_rate = 0;   ///< greatest estimated error of the last steps over the power of the step that it goes with
@@ -115,15 +116,25 @@ struct World::Implementation {
   void update_custom_force(Equations& target) const;
 
   // stepping.cpp
-  enum class Attempt { failed, gained_energy, hard, easy };
+  enum class Attempt { failed, gained_energy, inaccurate, hard, easy };
+  /// Equal parts in which the rest of a time step, from a fraction of it on, is taken.
+  struct Division {
+    double from = 0.0;
+    long parts = 1, done = 0;
+    double reached() const { return from + (1.0 - from) * (static_cast<double>(done) / static_cast<double>(parts)); }
+  };
   struct Place {
     int rod = -1, node = -1;
     std::string words;
   };
   void advance(double duration);
   bool may_cut() const;
-  void cut(long size, double dt);
-  void grow(Attempt attempt);
+  int notches() const;
+  void divide_rest(Division& division) const;
+  void cut(Attempt why, Division& division, double dt);
+  bool grow(Attempt attempt, double dt);
+  double local_order() const;
+  bool may_grow(double dt, double times) const;
   Attempt try_step(double dt);
   void keep_for_return();
   void take_back();

@@ -187,8 +187,9 @@ void World::restore(const std::string& bytes) {
   give_sizes(*fresh);
   exchange(r, *fresh);
   r.expect_end();
-  require(fresh->level >= 0 && fresh->level <= fresh->options.max_halvings && fresh->easy_steps >= 0 &&
-              fresh->easy_steps < 1 << 20 && fresh->guard.rescue >= 0 && fresh->guard.rescue <= 256,
+  require(fresh->level >= 0 && fresh->level <= fresh->notches() * fresh->options.max_halvings &&
+              fresh->easy_steps >= 0 && fresh->easy_steps < 1 << 20 && fresh->guard.rescue >= 0 &&
+              fresh->guard.rescue <= 256,
           "snapshot is damaged: impossible step size");
   require(fresh->state.q.allFinite() && fresh->state.v.allFinite(), "snapshot is damaged: not finite");
   require(fresh->predictor.plausible(), "snapshot is damaged: impossible history");

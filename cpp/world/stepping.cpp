@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <numbers>
 #include <utility>
 
 #include <Eigen/LU>
@@ -16,56 +17,85 @@ std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
 }  // namespace
 
-/// One time step of `duration`, cut by powers of two where it does not converge or is not accurate enough.
+/// One time step of `duration`, in equal parts where it does not converge or is not accurate enough.
 void World::Implementation::advance(double duration) {
   const double base = state.time;
   if (options.integrator == Integrator::verlet && !alarm) alarm = energy();
   if (!options.adaptive && !options.tolerance) level = 0;
   // Without a step before there is no estimate, so error control begins with a step too small to need one.
-  if (options.tolerance && predictor.empty()) level = std::max(level, std::min(options.max_halvings, 8));
-  const long units = 1L << options.max_halvings;
-  for (long position = 0; position < units;) {
+  if (options.tolerance && predictor.empty()) level = std::max(level, notches() * std::min(options.max_halvings, 8));
+  Division division;
+  divide_rest(division);
+  for (;;) {
     work.newton.poll();
-    long size = units >> level;
-    while (position % size != 0) size >>= 1;
-    const double dt = duration * static_cast<double>(size) / static_cast<double>(units);
+    const double dt = duration * ((1.0 - division.from) / static_cast<double>(division.parts));
     const Attempt attempt = try_step(dt);
     if (attempt == Attempt::gained_energy) continue;
-    if (attempt == Attempt::failed) {
-      cut(size, dt);
+    if (attempt == Attempt::failed || attempt == Attempt::inaccurate) {
+      cut(attempt, division, dt);
       continue;
     }
-    position += size;
-    state.time = position == units ? base + duration
-                                   : base + duration * static_cast<double>(position) / static_cast<double>(units);
-    grow(attempt);
+    ++division.done;
+    const bool finished = division.done == division.parts;
+    state.time = finished ? base + duration : base + duration * division.reached();
+    const bool grown = grow(attempt, dt);
+    if (finished) break;
+    if (grown) divide_rest(division);
   }
   if (options.integrator == Integrator::verlet) check_explicit();
 }
 
+/// Steps change by powers of two and rarely, or symmetry and energy suffer; under error control, whose error would
+/// change by four, by the square root of two.
+int World::Implementation::notches() const { return options.tolerance ? 2 : 1; }
+
+/// What is left of a time step, in equal parts no longer than `level` says.
+void World::Implementation::divide_rest(Division& division) const {
+  division.from = division.reached();
+  const double wanted = std::exp2(static_cast<double>(level) / notches());
+  division.parts = std::max(1L, static_cast<long>(std::ceil((1.0 - division.from) * wanted - 1e-9)));
+  division.done = 0;
+}
+
 bool World::Implementation::may_cut() const {
-  return (options.adaptive || options.tolerance) && level < options.max_halvings &&
+  return (options.adaptive || options.tolerance) && level < notches() * options.max_halvings &&
          options.integrator != Integrator::verlet;
 }
 
-/// After a step of `size` units that was not accepted: half of it next, or the end.
-void World::Implementation::cut(long size, double dt) {
+/// After a step of dt that was not accepted: shorter ones next, or the end.
+void World::Implementation::cut(Attempt why, Division& division, double dt) {
   if (!may_cut())
     fail(last_newton, dt,
          options.integrator == Integrator::verlet ? "the explicit step broke down" : "the step did not converge");
-  while (((1L << options.max_halvings) >> level) > size) ++level;
-  ++level;
+  const long left = division.parts - division.done;
+  level += why == Attempt::failed ? notches() : 1;
+  for (divide_rest(division); division.parts <= left && may_cut(); divide_rest(division)) ++level;
   easy_steps = 0;
 }
 
-/// Steps grow back after a few that had more accuracy than was asked for.
-void World::Implementation::grow(Attempt attempt) {
+/// Steps grow back after a few that had more accuracy than was asked for. Whether they do.
+bool World::Implementation::grow(Attempt attempt, double dt) {
   if (attempt != Attempt::easy) {
     easy_steps = 0;
-  } else if (++easy_steps >= 4 && level > 0) {
-    --level;
-    easy_steps = 0;
+    return false;
   }
+  if (++easy_steps < 4 || level == 0) return false;
+  easy_steps = 0;
+  const bool twice = notches() > 1 && may_grow(dt, 2.0);
+  level = std::max(0, level - (twice ? 2 : 1));
+  return true;
+}
+
+/// Power of a step's length that its error goes with.
+double World::Implementation::local_order() const {
+  return options.integrator == Integrator::backward_euler ? 2.0 : 3.0;
+}
+
+/// Whether a step of dt `times` longer would be accurate enough, the tolerance too growing with it.
+bool World::Implementation::may_grow(double dt, double times) const {
+  if (!options.tolerance) return true;
+  const double allowed = *options.tolerance * dt / options.duration.value_or(1.0);
+  return error_rate * std::pow(times * dt, local_order()) < 0.8 * times * allowed;
 }
 
 /// One step of dt, taken back where it gains energy from nowhere or is not accurate enough.
@@ -83,28 +113,23 @@ World::Implementation::Attempt World::Implementation::try_step(double dt) {
     statistics.rejected_steps += 1;
     return Attempt::failed;
   }
-  // Where edges hardly turn, there is nothing to gain and nothing to look at.
-  if (!guarded || guard.turn <= 0.01) {
-    guard.energy.reset();
-  } else if (gains_energy()) {
+  if (error > allowed && may_cut()) {
+    take_back();
+    return Attempt::inaccurate;
+  }
+  if (guarded && gains_energy()) {
     // The same step again, and a while of them, without the flaw.
     take_back();
     guard.rescue = 256;
     return Attempt::gained_energy;
   }
-  if (error > allowed && may_cut()) {
-    take_back();
-    guard.energy.reset();
-    return Attempt::failed;
-  }
   commit_step();
   if (!options.tolerance) return Attempt::easy;
-  // An oscillation has no error twice a period: what counts is the greatest of the last steps, were they twice as long.
-  const double order = options.integrator == Integrator::backward_euler ? 2.0 : 3.0;
+  // An oscillation has no error twice a period: what counts is the greatest of the last steps, were they longer.
   // Far below what is allowed an estimate is mostly rounding.
-  const double seen = error > 0.01 * allowed ? error / std::pow(dt, order) : 0.0;
+  const double seen = error > 0.01 * allowed ? error / std::pow(dt, local_order()) : 0.0;
   error_rate = std::max(seen, error_rate * (1.0 - 1.0 / 256.0));
-  return error_rate * std::pow(2.0 * dt, order) < 1.6 * allowed ? Attempt::easy : Attempt::hard;
+  return may_grow(dt, std::numbers::sqrt2) ? Attempt::easy : Attempt::hard;
 }
 
 void World::Implementation::keep_for_return() {
@@ -159,10 +184,10 @@ double World::Implementation::force_time(double start, double dt) const {
 
 /// One step of the scheme; changes nothing where it does not converge.
 bool World::Implementation::scheme_step(double dt, double& error) {
-  const double turn = std::exchange(guard.turn, 0.0);
+  const double turn = std::exchange(guard.turn, 0.0), gain = std::exchange(guard.stretch_gain, 0.0);
   const bool done =
       options.integrator == Integrator::fourth_order ? composed_step(dt, error) : inner_step(dt, 0, error);
-  if (!done) guard.turn = turn;
+  if (!done) guard.turn = turn, guard.stretch_gain = gain;
   return done;
 }
 
@@ -219,6 +244,7 @@ bool World::Implementation::inner_step(double dt, int slot, double& error) {
   }
   error = r.error;
   guard.turn = std::max(guard.turn, r.largest_turn);
+  guard.stretch_gain += r.stretch_gain;
   load_work += r.load_work;
   dissipated += r.dissipated;
   support_work += r.support_work;
