@@ -58,6 +58,14 @@ std::size_t BitImage::count() const {
   return sum;
 }
 
+std::size_t count_differences(const BitImage& a, const BitImage& b) {
+  std::size_t count = 0;
+  for (int y = 0; y < a.height(); ++y) {
+    for (int w = 0; w < a.words(); ++w) count += static_cast<std::size_t>(std::popcount(a.row(y)[w] ^ b.row(y)[w]));
+  }
+  return count;
+}
+
 BitImage pack(const std::uint8_t* pixels, int height, int width, std::ptrdiff_t stride) {
   BitImage image(height, width);
   constexpr std::uint64_t low = 0x7f7f7f7f7f7f7f7fULL;

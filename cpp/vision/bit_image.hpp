@@ -57,6 +57,9 @@ class BitImage {
   std::vector<std::uint64_t> bits_;
 };
 
+/// Number of pixels that differ between two images of one size.
+std::size_t count_differences(const BitImage& a, const BitImage& b);
+
 /// From one byte a pixel, zero is background. `stride` is the number of bytes from one row to the next.
 BitImage pack(const std::uint8_t* pixels, int height, int width, std::ptrdiff_t stride);
 /// To one byte a pixel, 0 or 1, rows one after the other.

@@ -14,11 +14,20 @@ namespace withe {
 
 namespace {
 
-/// Frays and pinholes go, unless the lines are so thin that much of them would go too.
+/// Frays and pinholes go, unless the lines are so thin that much of them would go too. A clean border settles at once,
+/// bays of a ragged one get shallower by a pixel a round.
 BitImage smooth(const BitImage& mask) {
   BitImage result = majority(mask);
-  if (10 * result.count() < 8 * mask.count()) return mask;
-  return majority(result);
+  const std::size_t count = result.count();
+  if (10 * count < 8 * mask.count()) return mask;
+  constexpr int most_rounds = 6;
+  for (int round = 1; round < most_rounds; ++round) {
+    BitImage next = majority(result);
+    const bool settled = 200 * count_differences(result, next) < count;
+    result = std::move(next);
+    if (settled) break;
+  }
+  return result;
 }
 
 /// Whether there is a square of four pixels: lines a single pixel wide are no cables.
