@@ -12,8 +12,15 @@ namespace withe {
 
 namespace {
 
-/// Two cables that touch side by side are rarer than two that cross: their energy counts this much more.
-constexpr double kTouching = 1.5;
+/// Two cables that touch side by side are rarer than two that cross: their energy counts this much more. Where the mask
+/// is hardly wider than one of them at their waist they would have to lie on each other and part again to the same
+/// side, which is rarer still.
+double touching_weight(double widening) {
+  constexpr double side_by_side = 1.6, on_each_other = 1.2, weight = 1.5, heaviest = 6;
+  const double t = std::clamp((side_by_side - widening) / (side_by_side - on_each_other), 0.0, 1.0);
+  return weight + t * (heaviest - weight);
+}
+
 constexpr double kForbidden = std::numeric_limits<double>::infinity();
 
 double signed_angle(const Vector2& from, const Vector2& to) {
@@ -213,7 +220,19 @@ void find_zones(const SkeletonGraph& graph, const ZoneOptions& options, const st
     zone.nodes.push_back(static_cast<int>(n));
     zone.center += graph.nodes[n].position;
   }
-  for (Zone& zone : result.zones) zone.center /= static_cast<double>(zone.nodes.size());
+  for (Zone& zone : result.zones) {
+    zone.center /= static_cast<double>(zone.nodes.size());
+    zone.waist = std::numeric_limits<double>::infinity();
+    for (const int node : zone.nodes) {
+      zone.waist = std::min(zone.waist, graph.nodes[static_cast<std::size_t>(node)].half_width);
+    }
+  }
+  for (std::size_t e = 0; e < graph.edges.size(); ++e) {
+    if (!result.inside[e]) continue;
+    const auto root = static_cast<std::size_t>(sets.root(graph.edges[e].nodes[0]));
+    double& waist = result.zones[static_cast<std::size_t>(zone_of_root[root])].waist;
+    for (const SkeletonPoint& point : graph.edges[e].points) waist = std::min<double>(waist, point.half_width);
+  }
   for (std::size_t e = 0; e < graph.edges.size(); ++e) {
     const SkeletonEdge& edge = graph.edges[e];
     if (edge.removed || result.inside[e] || edge.nodes[0] < 0) continue;
@@ -246,11 +265,12 @@ struct Matching {
 /// at the price of a sharp turn.
 class PairSearch {
  public:
-  explicit PairSearch(const std::vector<Branch>& branches)
+  PairSearch(const std::vector<Branch>& branches, double waist)
       : branches_(branches), count_(static_cast<int>(branches.size())) {
     energies_.assign(static_cast<std::size_t>(count_ * count_), kForbidden);
     double width = 0;
     for (const Branch& branch : branches) width = std::max(width, 2 * branch.half_width);
+    touching_ = touching_weight(width > 0 ? 2 * waist / width : 0);
     // Half of the energy of a turn of 90 degrees within a width.
     single_ = 0.25 * std::pow(0.5 * std::numbers::pi, 2) / std::max(width, 1.0);
     for (int i = 0; i < count_; ++i) {
@@ -281,7 +301,7 @@ class PairSearch {
     if (sum >= second) return;
     while (first < count_ && used_[static_cast<std::size_t>(first)]) ++first;
     if (first == count_) {
-      if (count_ == 4 && pairs_.size() == 2 && !interleaved()) sum *= kTouching;
+      if (count_ == 4 && pairs_.size() == 2 && !interleaved()) sum *= touching_;
       if (sum < best.energy) {
         second = best.energy;
         best = {pairs_, sum};
@@ -341,6 +361,7 @@ class PairSearch {
   const std::vector<Branch>& branches_;
   int count_;
   double single_ = 0;
+  double touching_ = 1;
   std::vector<double> energies_;
   std::vector<char> used_;
   std::vector<std::pair<int, int>> pairs_;
@@ -368,7 +389,7 @@ std::vector<Branch> measure_branches(const SkeletonGraph& graph, const ZoneOptio
 void match_zone(const Zone& zone, const ZoneOptions& options, Continuations& result) {
   std::vector<Branch> branches;
   for (const HalfEdge half : zone.branches) branches.push_back(result.branches[static_cast<std::size_t>(half)]);
-  PairSearch search(branches);
+  PairSearch search(branches, zone.waist);
   search.run();
   for (const auto& [a, b] : search.best.pairs) {
     const HalfEdge first = zone.branches[static_cast<std::size_t>(a)];

@@ -27,6 +27,7 @@ struct Zone {
   std::vector<int> nodes;
   std::vector<HalfEdge> branches;
   Vector2 center = Vector2::Zero();
+  double waist = 0;  ///< half width of the mask at the narrowest place of its skeleton [px]
 };
 
 /// Why a result may be another one.
