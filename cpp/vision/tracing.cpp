@@ -119,7 +119,7 @@ Tracing trace_lines(const BitImage& mask, const TraceOptions& options) {
   tracing.doubts = links.doubts;
   watch.lap("cross");
 
-  const double shortest = options.shortest_cable * 2 * typical_half_width(graph);
+  const double shortest = std::max(options.shortest_cable * 2 * typical_half_width(graph), options.shortest_line);
   const auto ends = grow_tips(smoothed, graph, links, shortest);
   bridge_gaps(links, ends, options.longest_gap, options.gap_angle);
   const std::vector<CablePath> paths = collect_paths(graph, links);

@@ -65,6 +65,7 @@ class Stopwatch {
 struct TraceOptions {
   double spur_ratio = 1.5;      ///< ends of the skeleton shorter than this are frays [local half widths]
   double shortest_cable = 2;    ///< shorter lines are specks [widths of the cables in the image]
+  double shortest_line = 16;    ///< nor is a line that is shorter than a gap that would be bridged [px]
   double longest_gap = 16;      ///< [px]
   double gap_angle = 25;        ///< of each end to the bridge [degrees]
   double spacing = 1.8;         ///< of rows, at most [px]

@@ -21,6 +21,19 @@ def test_synthetic_cables_are_found_in_order_within_two_pixels(case, seed):
         assert nearest < 6
 
 
+@pytest.mark.parametrize(
+    ("case", "seed", "scale"),
+    [
+        ("ragged 30", 1172, 1),  # a bay reaches into the crossing, and the skeleton runs around it
+        ("ragged 30", 1250, 1),  # as wide as one cable at its waist: two that cross, not two that touch
+        ("specks", 1049, 0.5),  # two specks side by side are twice as long as the cables are wide
+    ],
+)
+def test_noise_as_large_as_the_cables_does_not_mislead(case, seed, scale):
+    scene = make_case(case, seed, scale)
+    assert score(scene, trace_mask(scene.mask)).right
+
+
 def test_the_stem_of_a_t_is_a_joint():
     tracing = trace_mask(make_case("T", 1).mask)
     (joint,) = tracing.joints
