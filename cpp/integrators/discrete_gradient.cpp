@@ -26,7 +26,7 @@ void invariant_gradients(const double (&e)[4], double (&g)[4][4]) {
 void Equations::correct(Local& local, const Local& end, double start_energy, double stiffness,
                         const ElementTable& table, int element, const Metric& metric) {
   const int n = table.width();
-  double D[kMaxLocal], u[kMaxLocal], change[kMaxLocal];
+  double D[kMaxLocal]{}, u[kMaxLocal]{}, change[kMaxLocal]{};
   gather_difference(table, element, D);
   for (int i = 0; i < n; ++i) u[i] = metric.own[i] * D[i];
   for (const Metric::Pair& pair : metric.pairs)

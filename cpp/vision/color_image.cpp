@@ -12,14 +12,14 @@ namespace {
 constexpr int kShift = 12;
 
 /// round(2^12 * scale / i): divisions become multiplications.
-std::array<int, 256> reciprocals(double scale) {
+constexpr std::array<int, 256> reciprocals(int scale) {
   std::array<int, 256> table{};
-  for (int i = 1; i < 256; ++i)
-    table[static_cast<std::size_t>(i)] = static_cast<int>(std::lround((1 << kShift) * scale / i));
+  const int dividend = (1 << kShift) * scale;
+  for (int i = 1; i < 256; ++i) table[static_cast<std::size_t>(i)] = (2 * dividend + i) / (2 * i);  // rounded
   return table;
 }
-const std::array<int, 256> kSaturation = reciprocals(255);
-const std::array<int, 256> kHue = reciprocals(30);
+constexpr std::array<int, 256> kSaturation = reciprocals(255);
+constexpr std::array<int, 256> kHue = reciprocals(30);
 
 /// Whether any of eight bytes is at least `level`, 1 <= level <= 128.
 bool any_reaches(std::uint64_t bytes, int level) {
