@@ -10,6 +10,7 @@ from scoring import score
 from withe import _core
 from withe.__main__ import main
 from withe.perception import Tracing, border_filter, color_filter, draw, network_mask, trace, trace_mask
+from withe.perception.disturbances import add_occluder, strip_across
 from withe.perception.synthetic import make_case, render
 
 
@@ -100,6 +101,20 @@ def test_grey_alpha_and_any_layout_give_the_same_as_rgb(scene, picture):
 def test_bad_pictures_are_refused_by_name(image, mask, problem):
     with pytest.raises(ValueError, match=problem):
         trace(image, mask=mask)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_cable_goes_on_under_what_hides_a_piece_of_it(seed):
+    case = make_case("crossing 60", 40 + seed)
+    line = case.centrelines[seed % 2]
+    from_crossing = np.hypot(*(line - case.crossings[0].point).T)
+    free = np.flatnonzero((from_crossing > 50) & (np.minimum(np.arange(len(line)), np.arange(len(line))[::-1]) > 40))
+    strip = strip_across(line, int(free[len(free) // 2]), 4 + 1.5 * seed, 20, case.mask.shape)
+    rng = np.random.default_rng(seed)
+    picture = add_occluder(render(case, rng, colours=[(220, 60, 60), (60, 90, 230)]), strip, rng)
+    tracing = trace(picture, mask=lambda image: np.ptp(image.astype(int), axis=2) > 40)
+    assert score(case, tracing).right, score(case, tracing)
+    assert not tracing.labels[strip].any()
 
 
 def test_an_unknown_method_is_refused():
@@ -216,6 +231,27 @@ def test_a_network_makes_the_mask(tmp_path):
     mask = network_mask(path)(image)
     assert np.array_equal(mask, image[..., 0] > 0)
     assert len(trace(image, mask=network_mask(str(path)))) == 1
+
+
+def test_a_torch_network_makes_the_mask_as_module_and_as_file(tmp_path):
+    torch = pytest.importorskip("torch")
+    network = torch.nn.Sequential(torch.nn.Conv2d(3, 1, 1), torch.nn.Sigmoid())
+    with torch.no_grad():
+        network[0].weight.fill_(10)
+        network[0].bias.fill_(-15)
+    path = tmp_path / "two_layers.pt"
+    torch.jit.trace(network, torch.zeros(1, 3, 40, 60)).save(str(path))
+    image = np.zeros((40, 60, 3), np.uint8)
+    image[16:24, 4:56] = 220
+    for model in (network, path, str(path)):
+        assert np.array_equal(network_mask(model)(image), image[..., 0] > 0)
+    assert len(trace(image, mask=network_mask(network))) == 1
+    pytest.importorskip("cv2")
+    assert np.array_equal(network_mask(network, size=(80, 120))(image), image[..., 0] > 0)
+    broken = tmp_path / "broken.pt"
+    broken.write_bytes(b"no network")
+    with pytest.raises(ValueError, match="model must be an ONNX or TorchScript file"):
+        network_mask(broken)
 
 
 def test_networks_that_are_none_are_refused(tmp_path):

@@ -1,8 +1,7 @@
 """Pictures of cables whose centrelines and order are known, for tests and benchmarks.
 
 Masks are exact: a pixel belongs to a cable when its centre is within half a width of the centreline, cut straight
-at the ends. Pictures are shaded like round cables under a lamp, with grain, shadows of the upper cable on the lower
-and, where wanted, something that hides part of a cable.
+at the ends. Pictures are shaded like round cables under a lamp, with grain and shadows of the upper cable on the lower.
 """
 
 from __future__ import annotations
@@ -13,7 +12,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["SyntheticScene", "TrueCrossing", "add_frays", "add_specks", "make_case", "render", "render_mask"]
+from withe.perception.disturbances import add_frays, add_specks, strip_across
+
+__all__ = ["SyntheticScene", "TrueCrossing", "make_case", "render", "render_mask"]
 
 CASES = (
     "crossing 90",
@@ -133,35 +134,6 @@ def _smooth_noise(rng: np.random.Generator, shape: tuple[int, ...], sigma: float
     for axis in range(len(shape)):
         noise = np.apply_along_axis(np.convolve, axis, noise, kernel, "same")
     return noise
-
-
-def add_frays(mask: NDArray[np.bool_], rng: np.random.Generator, amount: float = 1.0) -> NDArray[np.bool_]:
-    """Make the border of a mask ragged: pixels within about 1.5 px of it flip at random, `amount` scales how many."""
-    result = mask.copy()
-    for _ in range(2):
-        padded = np.pad(result, 1, mode="edge")
-        near = np.zeros(mask.shape, int)
-        for dy in range(3):
-            for dx in range(3):
-                near += padded[dy : dy + mask.shape[0], dx : dx + mask.shape[1]]
-        border = (near > 0) & (near < 9)
-        flip = border & (rng.random(mask.shape) < 0.18 * amount)
-        result ^= flip
-    return result
-
-
-def add_specks(mask: NDArray[np.bool_], rng: np.random.Generator, count: int = 40) -> NDArray[np.bool_]:
-    """Add small blobs to the background and pinholes to the cables."""
-    result = mask.copy()
-    height, width = mask.shape
-    y, x = np.mgrid[:height, :width]
-    for _ in range(count):
-        cx, cy, radius = rng.uniform(0, width), rng.uniform(0, height), rng.uniform(0.5, 3.5)
-        result |= np.hypot(x - cx, y - cy) < radius
-    for _ in range(count):
-        cx, cy, radius = rng.uniform(0, width), rng.uniform(0, height), rng.uniform(0.4, 1.2)
-        result &= np.hypot(x - cx, y - cy) >= radius
-    return result
 
 
 # Curves
@@ -384,12 +356,7 @@ def make_case(case: str, seed: int, scale: float = 1.0, shape: tuple[int, int] =
         line = lines[0]
         at = int(len(line) * rng.uniform(0.3, 0.7))
         length = rng.uniform(4, 14) * min(scale, 1)
-        y, x = np.mgrid[: shape[0], : shape[1]]
-        tangent = line[at + 2] - line[at - 2]
-        tangent /= np.hypot(*tangent)
-        along = (x - line[at, 0]) * tangent[0] + (y - line[at, 1]) * tangent[1]
-        across = -(x - line[at, 0]) * tangent[1] + (y - line[at, 1]) * tangent[0]
-        mask &= ~((np.abs(along) < length / 2) & (np.abs(across) < 3 * widths[0]))
+        mask &= ~strip_across(line, at, length, 3 * widths[0], shape)
     true = []
     for point, first, second, _ in crossings:
         over, under = (first, second) if rng.random() < 0.5 else (second, first)
