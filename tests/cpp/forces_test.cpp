@@ -37,19 +37,19 @@ Sum sum_of(const Case& c, const Loads& loads, const VectorX& q) {
 }
 
 struct LoadCase {
-  std::string name;
+  const char* name;
   LoadKind kind;
   RodPass pass;
   bool follower;
 };
 
-const LoadCase kLoads[] = {{"follower at the start", LoadKind::force, {0, 0}, true},
-                           {"follower inside", LoadKind::force, {0, 2}, true},
-                           {"follower at the end", LoadKind::force, {0, 5}, true},
-                           {"distributed follower", LoadKind::distributed, {0, 0}, true},
-                           {"moment on two edges", LoadKind::moment, {0, 3}, false},
-                           {"moment on the last edge", LoadKind::moment, {0, 5}, false},
-                           {"moment on a frame", LoadKind::moment, {0, 0}, false}};
+constexpr LoadCase kLoads[] = {{"follower at the start", LoadKind::force, {0, 0}, true},
+                               {"follower inside", LoadKind::force, {0, 2}, true},
+                               {"follower at the end", LoadKind::force, {0, 5}, true},
+                               {"distributed follower", LoadKind::distributed, {0, 0}, true},
+                               {"moment on two edges", LoadKind::moment, {0, 3}, false},
+                               {"moment on the last edge", LoadKind::moment, {0, 5}, false},
+                               {"moment on a frame", LoadKind::moment, {0, 0}, false}};
 
 std::vector<Case> cases_with(const LoadCase& load, bool planar) {
   testing::SceneBuilder builder;
