@@ -24,6 +24,7 @@ CableOutline::CableOutline(const SkeletonGraph& graph, const Continuations& link
       const HalfEdge exit = links.partner[static_cast<std::size_t>(entry)];
       gap = links.zone_of[static_cast<std::size_t>(entry)];
       if (exit >= 0) gap = std::max(gap, links.zone_of[static_cast<std::size_t>(exit)]);
+      if (exit >= 0 && !points_.empty()) add_way(links.ways[static_cast<std::size_t>(exit)], gap);
     }
     if (points_.empty()) {
       closing_zone_ = gap;
@@ -39,6 +40,13 @@ CableOutline::CableOutline(const SkeletonGraph& graph, const Continuations& link
       points_.push_back({point.position(), point.half_width, i == first ? gap : kNoGap});
     }
   }
+  if (closed_ && closing_zone_ >= 0) {
+    add_way(links.ways[static_cast<std::size_t>(opposite(path.entries.back()))], closing_zone_);
+  }
+}
+
+void CableOutline::add_way(const std::vector<Vector2>& way, int zone) {
+  for (const Vector2& point : way) points_.push_back({point, points_.back().half_width, zone});
 }
 
 void CableOutline::extend(bool at_end, const std::vector<Vector2>& points) {

@@ -42,6 +42,7 @@ class CableOutline {
   static constexpr int kNoGap = -2;
   static constexpr int kBridge = -1;
 
+  void add_way(const std::vector<Vector2>& way, int zone);
   std::vector<double> stations(double& total) const;
   std::vector<FitSample> flank_samples(const BitImage& mask, const MatrixX2& line, double spacing,
                                        const std::vector<double>& station) const;

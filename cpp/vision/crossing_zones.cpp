@@ -3,29 +3,16 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <numeric>
 
 #include <Eigen/Dense>
 
+#include "vision/branch_matching.hpp"
+#include "vision/parallel_strands.hpp"
+
 namespace withe {
 
 namespace {
-
-/// Two cables that touch side by side are rarer than two that cross: their energy counts this much more. Where the mask
-/// is hardly wider than one of them at their waist they would have to lie on each other and part again to the same
-/// side, which is rarer still.
-double touching_weight(double widening) {
-  constexpr double side_by_side = 1.6, on_each_other = 1.2, weight = 1.5, heaviest = 6;
-  const double t = std::clamp((side_by_side - widening) / (side_by_side - on_each_other), 0.0, 1.0);
-  return weight + t * (heaviest - weight);
-}
-
-constexpr double kForbidden = std::numeric_limits<double>::infinity();
-
-double signed_angle(const Vector2& from, const Vector2& to) {
-  return std::atan2(from.x() * to.y() - from.y() * to.x(), from.dot(to));
-}
 
 /// Disjoint sets of nodes.
 class Union {
@@ -177,14 +164,36 @@ void find_zones(const SkeletonGraph& graph, const ZoneOptions& options, const st
     if (known_links[e] || edge.length < options.short_link * width) {
       sets.join(edge.nodes[0], edge.nodes[1]);
       result.inside[e] = 1;
-    } else if (edge.length < options.merged_link * width) {
+    } else {
       long_links.push_back(e);
     }
   }
   const std::vector<std::vector<int>> leaving = edges_leaving(graph, sets);
+  const auto ends_at = [&](std::size_t link) {
+    std::array<std::vector<HalfEdge>, 2> ends;
+    const std::array<int, 2>& nodes = graph.edges[link].nodes;
+    if (sets.root(nodes[0]) == sets.root(nodes[1])) return ends;
+    for (const std::size_t end : {0U, 1U}) {
+      const int set = sets.root(nodes[end]);
+      for (const int other : leaving[static_cast<std::size_t>(set)]) {
+        if (other == static_cast<int>(link)) continue;
+        const bool starts = sets.root(graph.edges[static_cast<std::size_t>(other)].nodes[0]) == set;
+        ends[end].push_back(2 * other + (starts ? 0 : 1));
+      }
+    }
+    return ends;
+  };
   std::vector<std::size_t> merged;
   for (const std::size_t e : long_links) {
     const SkeletonEdge& edge = graph.edges[e];
+    const auto strands = find_side_by_side(graph, static_cast<int>(e), result.branches, ends_at(e));
+    if (strands) {
+      result.doubts.push_back({edge.points[edge.points.size() / 2].position(), Doubt::parallel_strands});
+      result.side_by_side.push_back(*strands);
+      merged.push_back(e);
+      continue;
+    }
+    if (edge.length > options.merged_link * 2 * inner_half_width(edge)) continue;
     double widest = 0;
     for (const int node : edge.nodes) {
       for (const int other : leaving[static_cast<std::size_t>(sets.root(node))]) {
@@ -193,11 +202,6 @@ void find_zones(const SkeletonGraph& graph, const ZoneOptions& options, const st
       }
     }
     const double widening = widest > 0 ? inner_half_width(edge) / widest : 0;
-    // Where two cables cross, the mask is widest at the ends of the link; twice as wide all along, they lie side by
-    // side.
-    if (widening > 1.6 && edge.length > 4 * 2 * widest) {
-      result.doubts.push_back({edge.points[edge.points.size() / 2].position(), Doubt::parallel_strands});
-    }
     if (widening > options.merged_widening ||
         (widening > 0.85 && is_forked(e, graph, sets, leaving, result.branches))) {
       merged.push_back(e);
@@ -247,126 +251,6 @@ void find_zones(const SkeletonGraph& graph, const ZoneOptions& options, const st
   }
 }
 
-/// Energy of a pair, or infinity where the turn is that of two tips that touch: over 90 degrees within a width.
-double pair_energy(const Branch& a, const Branch& b) {
-  const Vector2 chord = b.point - a.point;
-  const double width = a.half_width + b.half_width;
-  const double turn = std::abs(signed_angle(a.tangent, -b.tangent));
-  if (turn > 0.5 * std::numbers::pi && chord.norm() < 1.5 * width) return kForbidden;
-  return bending_energy(a, b);
-}
-
-struct Matching {
-  std::vector<std::pair<int, int>> pairs;
-  double energy = kForbidden;
-};
-
-/// The best and the second best way to pair branches; one more stays single where their number is odd, others only
-/// at the price of a sharp turn.
-class PairSearch {
- public:
-  PairSearch(const std::vector<Branch>& branches, double waist)
-      : branches_(branches), count_(static_cast<int>(branches.size())) {
-    energies_.assign(static_cast<std::size_t>(count_ * count_), kForbidden);
-    double width = 0;
-    for (const Branch& branch : branches) width = std::max(width, 2 * branch.half_width);
-    touching_ = touching_weight(width > 0 ? 2 * waist / width : 0);
-    // Half of the energy of a turn of 90 degrees within a width.
-    single_ = 0.25 * std::pow(0.5 * std::numbers::pi, 2) / std::max(width, 1.0);
-    for (int i = 0; i < count_; ++i) {
-      for (int j = i + 1; j < count_; ++j) {
-        const double energy = pair_energy(branches[static_cast<std::size_t>(i)], branches[static_cast<std::size_t>(j)]);
-        energies_[static_cast<std::size_t>(i * count_ + j)] = energy;
-        energies_[static_cast<std::size_t>(j * count_ + i)] = energy;
-      }
-    }
-  }
-
-  Matching best;
-  double second = kForbidden;
-
-  void run() {
-    if (count_ > 10) {
-      run_greedy();
-      return;
-    }
-    used_.assign(static_cast<std::size_t>(count_), 0);
-    descend(0, 0);
-  }
-
- private:
-  double energy(int i, int j) const { return energies_[static_cast<std::size_t>(i * count_ + j)]; }
-
-  void descend(int first, double sum) {
-    if (sum >= second) return;
-    while (first < count_ && used_[static_cast<std::size_t>(first)]) ++first;
-    if (first == count_) {
-      if (count_ == 4 && pairs_.size() == 2 && !interleaved()) sum *= touching_;
-      if (sum < best.energy) {
-        second = best.energy;
-        best = {pairs_, sum};
-      } else {
-        second = std::min(second, sum);
-      }
-      return;
-    }
-    used_[static_cast<std::size_t>(first)] = 1;
-    for (int j = first + 1; j < count_; ++j) {
-      if (used_[static_cast<std::size_t>(j)] || energy(first, j) == kForbidden) continue;
-      used_[static_cast<std::size_t>(j)] = 1;
-      pairs_.emplace_back(first, j);
-      descend(first + 1, sum + energy(first, j));
-      pairs_.pop_back();
-      used_[static_cast<std::size_t>(j)] = 0;
-    }
-    descend(first + 1, sum + single_);
-    used_[static_cast<std::size_t>(first)] = 0;
-  }
-
-  /// Whether the two pairs of four branches separate each other, seen from their middle.
-  bool interleaved() const {
-    Vector2 middle = Vector2::Zero();
-    for (const Branch& branch : branches_) middle += 0.25 * branch.point;
-    const auto direction = [&](int i) {
-      const Vector2 d = branches_[static_cast<std::size_t>(i)].point - middle;
-      return std::atan2(d.y(), d.x());
-    };
-    const double start = direction(pairs_[0].first);
-    const auto turn = [&](int i) {
-      const double angle = direction(i) - start;
-      return angle < 0 ? angle + 2 * std::numbers::pi : angle;
-    };
-    const double end = turn(pairs_[0].second);
-    return (turn(pairs_[1].first) < end) != (turn(pairs_[1].second) < end);
-  }
-
-  void run_greedy() {
-    std::vector<std::pair<double, std::pair<int, int>>> candidates;
-    for (int i = 0; i < count_; ++i) {
-      for (int j = i + 1; j < count_; ++j) {
-        if (energy(i, j) < 2 * single_) candidates.push_back({energy(i, j), {i, j}});
-      }
-    }
-    std::sort(candidates.begin(), candidates.end());
-    std::vector<char> used(static_cast<std::size_t>(count_), 0);
-    for (const auto& [energy, pair] : candidates) {
-      char& a = used[static_cast<std::size_t>(pair.first)];
-      char& b = used[static_cast<std::size_t>(pair.second)];
-      if (a || b) continue;
-      a = b = 1;
-      best.pairs.push_back(pair);
-    }
-  }
-
-  const std::vector<Branch>& branches_;
-  int count_;
-  double single_ = 0;
-  double touching_ = 1;
-  std::vector<double> energies_;
-  std::vector<char> used_;
-  std::vector<std::pair<int, int>> pairs_;
-};
-
 /// Point and direction of both ends of every edge.
 std::vector<Branch> measure_branches(const SkeletonGraph& graph, const ZoneOptions& options) {
   std::vector<Branch> branches(2 * graph.edges.size());
@@ -389,17 +273,15 @@ std::vector<Branch> measure_branches(const SkeletonGraph& graph, const ZoneOptio
 void match_zone(const Zone& zone, const ZoneOptions& options, Continuations& result) {
   std::vector<Branch> branches;
   for (const HalfEdge half : zone.branches) branches.push_back(result.branches[static_cast<std::size_t>(half)]);
-  PairSearch search(branches, zone.waist);
-  search.run();
-  for (const auto& [a, b] : search.best.pairs) {
+  const Matching matching = match_branches(branches, zone.waist);
+  for (const auto& [a, b] : matching.pairs) {
     const HalfEdge first = zone.branches[static_cast<std::size_t>(a)];
     const HalfEdge second = zone.branches[static_cast<std::size_t>(b)];
     result.partner[static_cast<std::size_t>(first)] = second;
     result.partner[static_cast<std::size_t>(second)] = first;
   }
-  const double best = search.best.energy;
-  if (zone.branches.size() > 2 && search.second < kForbidden &&
-      search.second - best < options.similar_energies * search.second) {
+  if (zone.branches.size() > 2 && std::isfinite(matching.second) &&
+      matching.second - matching.energy < options.similar_energies * matching.second) {
     result.doubts.push_back({zone.center, Doubt::similar_energies});
   }
 }
@@ -442,28 +324,7 @@ bool find_split_crossings(const SkeletonGraph& graph, const ZoneOptions& options
 
 }  // namespace
 
-double bending_energy(const Branch& from, const Branch& to) {
-  const Vector2 chord = to.point - from.point;
-  const double shortest = 0.5 * (from.half_width + to.half_width);
-  const double length = chord.norm();
-  if (length < 1e-9) {
-    const double turn = signed_angle(from.tangent, -to.tangent);
-    return 0.5 * turn * turn / std::max(shortest, 1.0);
-  }
-  const double a = signed_angle(from.tangent, chord);
-  const double b = signed_angle(-to.tangent, chord);
-  const double scale = 2 / std::max({length, shortest, 1.0});
-  const double straight = scale * (a * a + a * b + b * b);
-  // Curvatures along the way from one branch to the other; extrapolated over at most half a radian.
-  const double most = 0.5 / length;
-  const double k1 = std::clamp(from.curvature, -most, most);
-  const double k2 = std::clamp(-to.curvature, -most, most);
-  const double c = a - length * (k1 / 3 + k2 / 6);
-  const double d = b + length * (k1 / 6 + k2 / 3);
-  return 0.25 * straight + 0.75 * scale * (c * c + c * d + d * d);
-}
-
-Continuations find_continuations(const SkeletonGraph& graph, const ZoneOptions& options) {
+Continuations find_continuations(const SkeletonGraph& graph, const ZoneOptions& options, const ColorImage* image) {
   const std::vector<Branch> branches = measure_branches(graph, options);
   std::vector<char> known_links(graph.edges.size(), 0);
   while (true) {
@@ -472,8 +333,10 @@ Continuations find_continuations(const SkeletonGraph& graph, const ZoneOptions& 
     result.zone_of.assign(branches.size(), -1);
     result.partner.assign(branches.size(), -1);
     result.inside.assign(graph.edges.size(), 0);
+    result.ways.resize(branches.size());
     find_zones(graph, options, known_links, result);
     for (const Zone& zone : result.zones) match_zone(zone, options, result);
+    for (const SideBySide& strands : result.side_by_side) split_side_by_side(graph, strands, image, result);
     if (!find_split_crossings(graph, options, result, known_links)) return result;
   }
 }

@@ -2,8 +2,10 @@
 /// Where cables meet: zones of the skeleton that say nothing about single cables, and the pairs of branches that
 /// continue each other through them with the least bending energy.
 
+#include <array>
 #include <vector>
 
+#include "vision/color_image.hpp"
 #include "vision/skeleton_graph.hpp"
 
 namespace withe {
@@ -30,6 +32,12 @@ struct Zone {
   double waist = 0;  ///< half width of the mask at the narrowest place of its skeleton [px]
 };
 
+/// A link of the skeleton that two cables go through side by side, and the two branches at either end of it.
+struct SideBySide {
+  int link = -1;
+  std::array<std::array<HalfEdge, 2>, 2> branches{};
+};
+
 /// Why a result may be another one.
 enum class Doubt { similar_energies, parallel_strands };
 
@@ -53,15 +61,13 @@ struct Continuations {
   std::vector<int> zone_of;       ///< by half-edge; -1 at a tip
   std::vector<HalfEdge> partner;  ///< by half-edge; -1 at an end of a cable
   std::vector<char> inside;       ///< by edge: part of a zone
+  std::vector<SideBySide> side_by_side;
+  std::vector<std::vector<Vector2>> ways;  ///< by half-edge: places on the way to its partner, where they are known
   std::vector<DoubtfulZone> doubts;
 };
 
-/// Bending energy of the least bent line from one branch into another [1/px]: a beam of unit stiffness clamped at both
-/// ends, 2/L (a^2 + a b + b^2) for a chord of length L and the signed angles a and b between chord and ends. Cables
-/// that are bent before and after a crossing are bent inside it too, so three quarters of the energy are counted from
-/// the curvatures k1 and k2 of the two branches: a is then less by L (k1/3 + k2/6), b more by L (k1/6 + k2/3).
-double bending_energy(const Branch& from, const Branch& to);
-
-Continuations find_continuations(const SkeletonGraph& graph, const ZoneOptions& options);
+/// The picture, if there is one, tells strands that lie side by side from each other.
+Continuations find_continuations(const SkeletonGraph& graph, const ZoneOptions& options,
+                                 const ColorImage* image = nullptr);
 
 }  // namespace withe

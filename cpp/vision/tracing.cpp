@@ -104,7 +104,7 @@ struct CableEnd {
 
 }  // namespace
 
-Tracing trace_lines(const BitImage& mask, const TraceOptions& options) {
+Tracing trace_lines(const BitImage& mask, const TraceOptions& options, const ColorImage* image) {
   Tracing tracing;
   Stopwatch watch(tracing.timings);
   if (!has_width(mask)) return tracing;
@@ -115,7 +115,7 @@ Tracing trace_lines(const BitImage& mask, const TraceOptions& options) {
   SkeletonGraph graph = build_graph(skeleton, smoothed, 200);
   prune_spurs(graph, options.spur_ratio);
   watch.lap("graph");
-  Continuations links = find_continuations(graph, options.zones);
+  Continuations links = find_continuations(graph, options.zones, image);
   tracing.doubts = links.doubts;
   watch.lap("cross");
 

@@ -81,7 +81,7 @@ struct Tracing {
   std::vector<Timing> timings;
 };
 
-/// Finds every cable in a mask.
-Tracing trace_lines(const BitImage& mask, const TraceOptions& options);
+/// Finds every cable in a mask. The picture, if there is one, tells strands that lie side by side from each other.
+Tracing trace_lines(const BitImage& mask, const TraceOptions& options, const ColorImage* image = nullptr);
 
 }  // namespace withe

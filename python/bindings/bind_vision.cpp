@@ -107,7 +107,7 @@ py::dict trace_lines(const Bytes& mask, const std::optional<Bytes>& image, const
       if (image) decide_order_mbest(picture, tracing);
       paint_discs(bits, tracing, pixels);
     } else {
-      tracing = withe::trace_lines(bits, {});
+      tracing = withe::trace_lines(bits, {}, image ? &picture : nullptr);
       Stopwatch watch(tracing.timings);
       if (image) decide_order(picture, tracing);
       watch.lap("order");

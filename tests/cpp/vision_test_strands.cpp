@@ -5,6 +5,7 @@
 #include <cmath>
 #include <random>
 
+#include "vision/branch_matching.hpp"
 #include "vision/cable_paths.hpp"
 #include "vision/color_image.hpp"
 #include "vision/crossing_order.hpp"
