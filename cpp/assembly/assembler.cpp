@@ -110,63 +110,92 @@ void ElementTable::add_gradient(int element, const double* gradient, double scal
   }
 }
 
-void ElementTable::add_hessian(int element, const double (&hessian)[kMaxLocal][kMaxLocal], double scale,
+void ElementTable::add_hessian(int element, const double* hessian, int stride, double scale,
                                std::span<double> values) const {
   const std::ptrdiff_t* offset = offsets_.data() + entry_start(element);
   for (int i = 0; i < width_; ++i) {
     const int columns = symmetric_ ? i + 1 : width_;
     for (int j = 0; j < columns; ++j, ++offset)
-      if (*offset >= 0) values[static_cast<std::size_t>(*offset)] += scale * hessian[i][j];
+      if (*offset >= 0) values[static_cast<std::size_t>(*offset)] += scale * hessian[i * stride + j];
   }
 }
 
 Assembler::Assembler(const Model& model, const Loads& load, Symmetry symmetry, SolverKind kind)
     : stretch(2 * model.dimension, stretch_dofs(model)),
       bend(model.planar() ? 6 : 11, bend_dofs(model)),
-      half(model.planar() ? 5 : 11, half_dofs(model)) {
+      half(model.planar() ? 5 : 11, half_dofs(model)),
+      model_(model),
+      symmetry_(symmetry),
+      kind_(kind) {
   for (const LoadPiece& piece : load.pieces) {
     int dofs[kMaxLocal];
     const int n = load_dofs(model, piece, dofs);
     loads.emplace_back(n, std::vector<int>(dofs, dofs + n));
   }
-  std::vector<std::vector<int>> cliques;
   const auto add_cliques = [&](const ElementTable& table) {
-    for (int e = 0; e < table.count(); ++e) cliques.emplace_back(table.dofs(e), table.dofs(e) + table.width());
+    for (int e = 0; e < table.count(); ++e) cliques_.emplace_back(table.dofs(e), table.dofs(e) + table.width());
   };
   add_cliques(stretch);
   add_cliques(bend);
   add_cliques(half);
   for (const ElementTable& table : loads) add_cliques(table);
-  for (int i = 0; i < model.dof_count; ++i) cliques.push_back({i});
+  for (int i = 0; i < model.dof_count; ++i) cliques_.push_back({i});
   for (const Constraint& c : model.constraints) {
     std::vector<int> own;
     for (int i = 0; i < c.size; ++i) own.push_back(c.first + i);
-    cliques.push_back(own);
+    cliques_.push_back(own);
   }
-  const SparsityPattern pattern = SparsityPattern::from_cliques(model.dof_count, cliques);
-  solver_ = make_linear_solver(pattern, symmetry, kind);
-  stretch.find_offsets(*solver_);
-  bend.find_offsets(*solver_);
-  half.find_offsets(*solver_);
-  for (ElementTable& table : loads) table.find_offsets(*solver_);
-  for (int i = 0; i < model.dof_count; ++i) diagonal_.push_back(solver_->offset(i, i));
-  regular = regular_stencils(model, bend);
+  analyse();
+}
 
-  const bool symmetric = symmetry == Symmetry::symmetric;
+void Assembler::couple(const std::vector<int>& contact_unknowns, int width) {
+  contact = ElementTable(width, contact_unknowns);
+  for (int e = 0; e < contact.count(); ++e)
+    for (int i = 0; i < width; ++i)
+      for (int j = 0; j < i; ++j) {
+        const int row = contact.dofs(e)[i], column = contact.dofs(e)[j];
+        if (row >= 0 && column >= 0 && !pattern_.contains(row, column)) {
+          analyse();
+          return;
+        }
+      }
+  contact.find_offsets(*solver_);
+}
+
+void Assembler::forget_contacts(const std::vector<int>& contact_unknowns, int width) {
+  contact = ElementTable(width, contact_unknowns);
+  analyse();
+}
+
+/// The pattern of all tables, its solver, and where everything goes.
+void Assembler::analyse() {
+  std::vector<std::vector<int>> cliques = cliques_;
+  for (int e = 0; e < contact.count(); ++e) cliques.emplace_back(contact.dofs(e), contact.dofs(e) + contact.width());
+  pattern_ = SparsityPattern::from_cliques(model_.dof_count, cliques);
+  solver_ = make_linear_solver(pattern_, symmetry_, kind_);
+  ++generation_;
+  for (ElementTable* table : {&stretch, &bend, &half, &contact}) table->find_offsets(*solver_);
+  for (ElementTable& table : loads) table.find_offsets(*solver_);
+  diagonal_.clear();
+  for (int i = 0; i < model_.dof_count; ++i) diagonal_.push_back(solver_->offset(i, i));
+  regular = regular_stencils(model_, bend);
+  find_blocks();
+}
+
+/// Rows and columns of what supports hold.
+void Assembler::find_blocks() {
+  blocks_.clear();
+  const bool symmetric = symmetry_ == Symmetry::symmetric;
   const auto entry = [&](int r, int c) {
     return symmetric ? solver_->offset(std::max(r, c), std::min(r, c)) : solver_->offset(r, c);
   };
-  const auto coupled = [&](int r, int c) {
-    const auto first = pattern.row_indices.begin() + pattern.column_starts[at(c)];
-    const auto last = pattern.row_indices.begin() + pattern.column_starts[at(c) + 1];
-    return std::binary_search(first, last, r);
-  };
-  for (const Constraint& c : model.constraints) {
+  const auto coupled = [&](int r, int c) { return pattern_.contains(r, c); };
+  for (const Constraint& c : model_.constraints) {
     Block block{c, {}, {}, {}};
     std::vector<int> others;
     for (int i = 0; i < c.size; ++i)
-      for (int k = pattern.column_starts[at(c.first + i)]; k < pattern.column_starts[at(c.first + i) + 1]; ++k)
-        others.push_back(pattern.row_indices[at(k)]);
+      for (int k = pattern_.column_starts[at(c.first + i)]; k < pattern_.column_starts[at(c.first + i) + 1]; ++k)
+        others.push_back(pattern_.row_indices[at(k)]);
     std::sort(others.begin(), others.end());
     others.erase(std::unique(others.begin(), others.end()), others.end());
     for (int other : others) {

@@ -31,10 +31,13 @@ class ElementTable {
   /// residual += scale gradient, magnitude += |gradient|.
   void add_gradient(int element, const double* gradient, double scale, VectorX& residual, VectorX& magnitude) const;
   /// values += scale hessian.
-  void add_hessian(int element, const double (&hessian)[kMaxLocal][kMaxLocal], double scale,
-                   std::span<double> values) const;
+  template <int Stride>
+  void add_hessian(int element, const double (&hessian)[Stride][Stride], double scale, std::span<double> values) const {
+    add_hessian(element, &hessian[0][0], Stride, scale, values);
+  }
 
  private:
+  void add_hessian(int element, const double* hessian, int stride, double scale, std::span<double> values) const;
   std::ptrdiff_t entry_start(int element) const {
     return static_cast<std::ptrdiff_t>(element) * (symmetric_ ? width_ * (width_ + 1) / 2 : width_ * width_);
   }
@@ -67,6 +70,14 @@ class Assembler {
     return solver_->values()[static_cast<std::size_t>(diagonal_[static_cast<std::size_t>(dof)])];
   }
 
+  /// Takes in the unknowns of contacts, one after the other (-1: none), and finds a new order of elimination where they
+  /// couple what was not coupled yet. The solver is then another one.
+  void couple(const std::vector<int>& contact_unknowns, int width);
+  /// As it was before rods came near each other.
+  void forget_contacts(const std::vector<int>& contact_unknowns, int width);
+  /// Another number whenever the solver is.
+  int generation() const { return generation_; }
+
   /// Takes out what supports hold: rows and columns are projected onto the free directions, and the held
   /// ones get a positive diagonal, so that the pattern stays and held increments vanish.
   void project_matrix();
@@ -76,7 +87,7 @@ class Assembler {
   /// to += factor x the part of `from` along held directions.
   void add_held_part(const VectorX& from, double factor, VectorX& to) const;
 
-  ElementTable stretch, bend, half;
+  ElementTable stretch, bend, half, contact;
   RegularStencils regular;
   std::vector<ElementTable> loads;
 
@@ -90,6 +101,15 @@ class Assembler {
     std::vector<Coupling> rows, columns;
     std::ptrdiff_t own[3][3];
   };
+  void analyse();
+  void find_blocks();
+
+  const Model& model_;
+  Symmetry symmetry_;
+  SolverKind kind_;
+  int generation_ = 0;
+  std::vector<std::vector<int>> cliques_;  ///< without contact
+  SparsityPattern pattern_;
   std::unique_ptr<LinearSolver> solver_;
   std::vector<std::ptrdiff_t> diagonal_;
   std::vector<Block> blocks_;

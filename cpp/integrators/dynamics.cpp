@@ -9,6 +9,9 @@ namespace {
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
+// Surfaces may be this deep in each other, over the smaller radius.
+constexpr double kDeepest = 0.04;
+
 /// Largest angle by which an edge turns on the way from a state to q [rad], > pi/2 where it ends pointing back; and by
 /// how much the energy in stretching grows beyond the work of the axial forces in the middle [J],
 /// EA (l1 - l0) (l1 + l0 - 2 lm) / (2 lm) an edge, where EA is given.
@@ -41,6 +44,7 @@ void book_work(Equations& equations, const Parameters& parameters, const VectorX
   if (!equations.loads().pieces.empty() || (equations.custom_force.array() != 0.0).any())
     result.load_work = equations.load_work(change);
   if (parameters.dragged || parameters.viscous) result.dissipated = equations.dissipated(change);
+  result.dissipated += equations.contact_loss(change);
 }
 
 /// Held unknowns move as they are told, so their inertia is what changes their velocity, not what the scheme's formula
@@ -106,9 +110,11 @@ NewtonResult find_inner(Equations& equations, const Newton& newton, const Option
       work.move = (start.moving ? h : 0.0) * state.v;
     }
     equations.assembler().project(work.move);
-    work.z = state.q + work.move * newton.cap(work.move);
+    work.move *= newton.cap(work.move);
+    if (equations.contact()) equations.contact()->hold_sticking(state, work.move);
     work.change = work.held.q - state.q;
-    equations.assembler().add_held_part(work.change, h / plan.dt, work.z);
+    equations.assembler().add_held_part(work.change, h / plan.dt, work.move);
+    work.z = state.q + work.move * equations.allowed(state.q, work.move);
     const bool trial = start.accelerated || (circling && start.mixed && start.moving);
     const int limit = trial ? std::min(12, options.max_iterations) : options.max_iterations;
     start_axial_force(equations, state.q, work.newton.axial_force);
@@ -187,7 +193,7 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
   const bool euler = plan.rule == StepRule::backward_euler;
   const double dt = plan.dt, h = euler ? dt : 0.5 * dt;
   if (!work.held.reachable) return result;
-  equations.begin(state, parameters, h, plan.rule == StepRule::energy_momentum);
+  equations.begin(state, parameters, h, plan.rule == StepRule::energy_momentum, euler ? Inner::end : Inner::middle);
   result.newton = find_inner(equations, newton, options, plan, h, state, predictor, work);
   if (!result.newton.converged) return result;
   VectorX& q1 = work.move;
@@ -200,6 +206,10 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
   result.largest_turn = turned.largest;
   if (!q1.allFinite() || !(result.largest_turn <= 1.5)) return result;
   result.stretch_gain = turned.stretch_gain;
+  if (equations.contact() && equations.contact()->depth() > kDeepest) {
+    result.too_deep = true;
+    return result;
+  }
   work.change = q1 - state.q;
   work.mean = work.change / dt;
   VectorX& v1 = work.velocity;
@@ -219,6 +229,7 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
   acceleration = (v1 - state.v) / dt;
   if (options.tolerance) result.error = estimated_error(equations, newton, options, plan, state, predictor, work);
   predictor.record(state.time + 0.5 * dt, plan.slot, acceleration, equations.mass, work.assumed);
+  if (equations.contact()) result.stiffness_work = equations.contact()->accept(state);
   if (!model.planar()) compute_configuration(model, state, q1, work.after);
   accept_configuration(model, q1, work.after, state);
   state.v = v1;

@@ -31,13 +31,15 @@ struct StepPlan {
 
 struct StepResult {
   bool accepted = false;
+  bool too_deep = false;  ///< surfaces are too deep in each other: contact must be stiffer
   NewtonResult newton;
-  double largest_turn = 0;  ///< of an edge [rad]
-  double stretch_gain = 0;  ///< energy that midpoint brings into stretching from nowhere [J]
-  double error = 0;         ///< estimated local error [m]
-  double load_work = 0;     ///< of loads and custom forces [J]
-  double dissipated = 0;    ///< by drag and viscosity [J]
-  double support_work = 0;  ///< [J]
+  double largest_turn = 0;    ///< of an edge [rad]
+  double stretch_gain = 0;    ///< energy that midpoint brings into stretching from nowhere [J]
+  double error = 0;           ///< estimated local error [m]
+  double load_work = 0;       ///< of loads and custom forces [J]
+  double dissipated = 0;      ///< by drag and viscosity [J]
+  double support_work = 0;    ///< [J]
+  double stiffness_work = 0;  ///< put in where contact became stiffer or softer under load [J]
 };
 
 /// Scratch of a step; owned by the world, so that a step does not allocate.

@@ -12,9 +12,14 @@ constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
-Symmetry symmetry_of(const Loads& loads, const Options& options) {
-  return loads.unsymmetric || options.integrator == Integrator::energy_momentum ? Symmetry::unsymmetric
-                                                                                : Symmetry::symmetric;
+Symmetry symmetry_of(const Loads& loads, const Contact* contact, const Options& options) {
+  const bool unsymmetric = loads.unsymmetric || options.integrator == Integrator::energy_momentum ||
+                           (contact != nullptr && contact->unsymmetric());
+  return unsymmetric ? Symmetry::unsymmetric : Symmetry::symmetric;
+}
+
+std::unique_ptr<Contact> make_contact(const Model& model) {
+  return model.description.contact.any() ? std::make_unique<Contact>(model) : nullptr;
 }
 
 }  // namespace
@@ -46,7 +51,13 @@ void set_gravity_force(const Model& model, const Parameters& p, VectorX& force) 
 Equations::Equations(const Model& model, const Options& options)
     : model_(model),
       loads_(resolve_loads(model)),
-      assembler_(model, loads_, symmetry_of(loads_, options), options.solver) {
+      contact_(make_contact(model)),
+      assembler_(model, loads_, symmetry_of(loads_, contact_.get(), options), options.solver),
+      static_duration_(options.time_step) {
+  if (contact_) {
+    assembler_.couple(contact_->element_unknowns(), kContactUnknowns);
+    if (contact_->frictional()) has_potential_ = false;
+  }
   custom_force = VectorX::Zero(model.dof_count);
   inverse_rest_ = model.edge_length.cwiseInverse();
   node_dof_drag_ = VectorX::Zero(model.dof_count);
@@ -61,13 +72,15 @@ void Equations::set_parameters(const Parameters& parameters) {
   set_mass(model_, parameters, mass);
   set_gravity_force(model_, parameters, gravity_);
   set_elastic(parameters, elastic);
+  if (contact_) contact_->set_parameters(parameters);
   for (int i = 0; i < model_.node_count; ++i)
     node_dof_drag_.segment(model_.node_dof[at(i)], model_.dimension).setConstant(parameters.node_drag(i));
 }
 
-void Equations::begin(const State& state, const Parameters& parameters, double h, bool energy_momentum) {
+void Equations::begin(const State& state, const Parameters& parameters, double h, bool energy_momentum, Inner inner) {
   state_ = &state;
   h_ = h;
+  inner_ = inner;
   energy_momentum_ = energy_momentum;
   set_parameters(parameters);
   const bool viscous = parameters.viscous && h != 0.0;
@@ -81,6 +94,57 @@ void Equations::begin(const State& state, const Parameters& parameters, double h
   }
   acting_ = viscous && !energy_momentum ? &total_ : &elastic;
   floor_current_ = false;
+  if (contact_) contact_->begin(state, h == 0.0 ? static_duration_ : inner == Inner::middle ? 2.0 * h : h);
+}
+
+void Equations::forget_contacts() {
+  contact_->forget();
+  assembler_.forget_contacts(contact_->element_unknowns(), kContactUnknowns);
+}
+
+void Equations::find_contacts(const VectorX& z, bool with_matrix) {
+  contact_end_ = inner_ == Inner::middle ? VectorX(2.0 * z - state_->q) : z;
+  contact_->update(contact_end_);
+  if (!with_matrix || contact_->coupled()) return;
+  contact_->couple();
+  assembler_.couple(contact_->element_unknowns(), kContactUnknowns);
+}
+
+/// Contact acts at the end of the step: its forces are those there, and its matrix counts twice where z is the middle.
+void Equations::add_contacts(bool with_matrix, Evaluation& out) {
+  contact_gradient_.setZero(model_.dof_count);
+  contact_floor_.setZero(model_.dof_count);
+  const double twice = inner_ == Inner::middle ? 2.0 : 1.0;
+  ContactLocal local;
+  int dofs[kContactUnknowns];
+  for (int i = 0; i < contact_->count(); ++i) {
+    contact_->local(i, with_matrix, local);
+    contact_->unknowns(i, dofs);
+    const double rounding = contact_->rounding(i, reach_);
+    for (int k = 0; k < kContactUnknowns; ++k) {
+      if (dofs[k] < 0) continue;
+      contact_gradient_[dofs[k]] += local.gradient[k];
+      magnitude_[dofs[k]] += std::abs(local.gradient[k]);
+      contact_floor_[dofs[k]] += rounding;
+    }
+    if (with_matrix)
+      assembler_.contact.add_hessian(contact_->element(i), local.hessian, twice, assembler_.solver().values());
+  }
+  gradient_.head(model_.dof_count) += contact_gradient_;
+  if (inner_ == Inner::end) out.potential += contact_->energy();
+}
+
+double Equations::allowed(const VectorX& z, const VectorX& step) {
+  if (!contact_) return 1.0;
+  const bool middle = inner_ == Inner::middle;
+  contact_end_ = middle ? VectorX(2.0 * z - state_->q) : z;
+  contact_change_ = (middle ? 2.0 : 1.0) * step;
+  return contact_->allowed(contact_end_, contact_change_);
+}
+
+double Equations::contact_loss(const VectorX& change) const {
+  if (!contact_) return 0.0;
+  return contact_gradient_.dot(change) - (contact_->energy() - contact_->start_energy());
 }
 
 void Equations::evaluate(const VectorX& z, bool with_matrix, const double* axial_force, Evaluation& out) {
@@ -88,6 +152,7 @@ void Equations::evaluate(const VectorX& z, bool with_matrix, const double* axial
   gradient_.setZero(model_.dof_count + kPadding);
   magnitude_.setZero(model_.dof_count + kPadding);
   last_z_ = z;
+  if (contact_) find_contacts(z, with_matrix);
   const std::span<double> values = assembler_.solver().values();
   if (with_matrix) std::fill(values.begin(), values.end(), 0.0);
   compute_configuration(model_, *state_, z, middle_);
@@ -103,6 +168,7 @@ void Equations::evaluate(const VectorX& z, bool with_matrix, const double* axial
     add_elastic(*acting_, z, with_matrix, axial_force, out);
   }
   add_loads(z, with_matrix, out);
+  if (contact_) add_contacts(with_matrix, out);
   if (h_ != 0.0 && !model_.planar()) add_spin_couple(z);
   add_step(z, with_matrix, out);
   assembler_.project(out.residual);
@@ -138,6 +204,7 @@ void Equations::add_step(const VectorX& z, bool with_matrix, Evaluation& out) {
           .matrix();
   out.floor = floor_ + rounding_ * out.magnitude;
   if (energy_momentum_) out.floor += correction_floor_;
+  if (contact_) out.floor += contact_floor_;
   out.potential -= gravity_.dot(z);
   out.residual = out.full_residual;
   if (with_matrix && h_ != 0.0) {
@@ -268,6 +335,7 @@ void Equations::set_floor(const VectorX& z, VectorX& floor) {
   double reach = 0.0;
   for (int i = 0; i < model_.node_count; ++i)
     reach = std::max(reach, z.segment(model_.node_dof[at(i)], model_.dimension).cwiseAbs().maxCoeff());
+  reach_ = reach;
   const auto node_add = [&](int node, double value) {
     const int dof = model_.node_dof[at(node)];
     for (int i = 0; i < model_.dimension; ++i) floor(dof + i) += value;

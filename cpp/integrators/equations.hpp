@@ -10,7 +10,10 @@
 ///   bending, twisting: grad E(z) + r u / (u . D), D = q1 - q0, r = E(q1) - E(q0) - grad E(z) . D, with u a
 ///   direction that neither moves nor (in a plane) turns the stencil [Gonzalez 1996].
 
+#include <memory>
+
 #include "assembly/assembler.hpp"
+#include "contact/contact.hpp"
 #include "integrators/options.hpp"
 #include "model/state.hpp"
 
@@ -25,6 +28,9 @@ struct Evaluation {
   double potential = 0;   ///< elastic + gravity - dead loads [J], where the scene has one
 };
 
+/// What z is of the step from q0 to q1.
+enum class Inner { end, middle };
+
 class Equations {
  public:
   Equations(const Model& model, const Options& options);
@@ -38,9 +44,16 @@ class Equations {
   /// True where statics minimise a potential.
   bool has_potential() const { return has_potential_; }
 
+  /// Nothing where nothing can touch.
+  Contact* contact() { return contact_.get(); }
+  void forget_contacts();
+  /// How much of a step of z contact allows, from 0 to 1.
+  double allowed(const VectorX& z, const VectorX& step);
+
   /// Prepares a step from `state` over h (0: statics). Copies what it needs but the state itself, which
   /// must outlive the step.
-  void begin(const State& state, const Parameters& parameters, double h, bool energy_momentum);
+  void begin(const State& state, const Parameters& parameters, double h, bool energy_momentum,
+             Inner inner = Inner::end);
   /// Explicit nodal forces (per unknown) that act in this step.
   VectorX custom_force;
 
@@ -54,6 +67,8 @@ class Equations {
   /// evaluation [J].
   double dissipated(const VectorX& change) const;
   double load_work(const VectorX& change) const;
+  /// What contact takes from the motion over `change` and does not store [J].
+  double contact_loss(const VectorX& change) const;
 
   /// Axial forces [N] as the mixed method wants them: linearly extrapolated from the last evaluation by a
   /// Newton step, n <- EA (eps + d eps . dz).
@@ -68,6 +83,8 @@ class Equations {
   StencilBatch regular_batch(const ElasticCoefficients& k, const double* axial_force, double* values);
   void add_step(const VectorX& z, bool with_matrix, Evaluation& out);
   void add_loads(const VectorX& z, bool with_matrix, Evaluation& out);
+  void find_contacts(const VectorX& z, bool with_matrix);
+  void add_contacts(bool with_matrix, Evaluation& out);
   void add_elastic(const ElasticCoefficients& k, const VectorX& z, bool with_matrix, const double* axial_force,
                    Evaluation& out);
   void add_discrete_gradient(const VectorX& z, bool with_matrix, const double* axial_force, Evaluation& out);
@@ -90,8 +107,11 @@ class Equations {
 
   const Model& model_;
   Loads loads_;
+  std::unique_ptr<Contact> contact_;
   bool has_potential_ = true;
   Assembler assembler_;
+  double static_duration_ = 0;  ///< in which slip happens in statics [s]
+  Inner inner_ = Inner::end;
   const State* state_ = nullptr;
   const Parameters* parameters_ = nullptr;
   double h_ = 0.0;
@@ -105,10 +125,13 @@ class Equations {
   long version_ = -1;                       ///< of the parameters that mass, elastic, gravity_ and drag belong to
   VectorX gradient_, magnitude_;            ///< forces but for inertia, drag and gravity; padded by kPadding
   VectorX force_, modulus_, inverse_rest_;  ///< per edge: EA eps [N], EA / L [N / m], 1 / L [1 / m]
-  VectorX floor_;                           ///< what bending, twisting and inertia leave by rounding
-  VectorX axial_floor_;                     ///< per edge [N]
-  VectorX correction_floor_;                ///< what the discrete gradient leaves by rounding
-  double rounding_ = 0;                     ///< relative, of a direction in space
+  VectorX contact_end_, contact_change_;    ///< q1 and its coming change
+  VectorX contact_gradient_, contact_floor_;
+  double reach_ = 0;          ///< greatest coordinate [m]
+  VectorX floor_;             ///< what bending, twisting and inertia leave by rounding
+  VectorX axial_floor_;       ///< per edge [N]
+  VectorX correction_floor_;  ///< what the discrete gradient leaves by rounding
+  double rounding_ = 0;       ///< relative, of a direction in space
   bool floor_current_ = false;
 };
 

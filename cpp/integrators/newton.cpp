@@ -17,6 +17,8 @@ constexpr int kPatience = 16;
 constexpr int kTiring = 3;
 // An iteration with an old matrix costs about a quarter of one with a new one.
 constexpr double kWorth = 2.5;
+// Halvings of a step between surfaces before it is taken as it is.
+constexpr int kMostCuts = 10;
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
@@ -145,11 +147,11 @@ NewtonResult Newton::solve(Equations& equations, VectorX& z, const VectorX* targ
   Evaluation& e = work.evaluation;
   FactorRecord& factor = work.factor;
   const double tolerance = this->tolerance(work);
-  LinearSolver& solver = equations.assembler().solver();
   Progress p;
   p.tolerance = tolerance;
   p.may_reuse = interval != 0.0 && options_.line_search != LineSearch::goldstein_price;
-  if (p.may_reuse && factor.owner == &equations && factor.interval == std::abs(interval)) {
+  if (p.may_reuse && factor.owner == &equations && factor.interval == std::abs(interval) &&
+      factor.generation == equations.assembler().generation()) {
     const bool slow = factor.contraction[static_cast<std::size_t>(MatrixAge::across)] > kSlow;
     p.fresh = factor.tired || (slow && ++factor.waited < kPatience);
     if (!p.fresh) factor.waited = 0;
@@ -194,13 +196,22 @@ NewtonResult Newton::solve(Equations& equations, VectorX& z, const VectorX* targ
       p.made_here = true;
       factor.owner = p.may_reuse ? &equations : nullptr;
       factor.interval = std::abs(interval);
+      factor.generation = equations.assembler().generation();
     }
     work.step = -e.residual;
-    solver.solve({work.step.data(), static_cast<std::size_t>(work.step.size())});
+    equations.assembler().solver().solve({work.step.data(), static_cast<std::size_t>(work.step.size())});
     work.counters.solve_time += seconds_since(solve_start);
     if (!work.step.allFinite()) return give_up();
     double shorten = cap(work.step);
     work.step *= shorten;
+    if (equations.contact()) {
+      const double allowed = equations.allowed(z, work.step);
+      work.step *= allowed;
+      shorten *= allowed;
+      const double kept = monotone(equations, z, target, shorten, work);
+      work.step *= kept;
+      shorten *= kept;
+    }
     if (options_.line_search == LineSearch::goldstein_price) {
       const double alpha = line_search(equations, z, work.step, target, work);
       work.step *= alpha;
@@ -216,6 +227,29 @@ NewtonResult Newton::solve(Equations& equations, VectorX& z, const VectorX* targ
     stagnant = balance.either && p.step > 0.25 * p.last_step ? stagnant + 1 : 0;
     plan_next(p, factor);
   }
+}
+
+/// Contact and friction turn on and off, so that full steps may go to and fro for ever. A step is kept at a length
+/// where the same matrix asks for a smaller one next: the natural monotonicity test [Deuflhard 2011, section 3.3],
+/// which sees displacements only and so no difference between forces and moments. `shorten`: what the step has lost
+/// already.
+double Newton::monotone(Equations& equations, const VectorX& z, const VectorX* target, double shorten,
+                        NewtonWorkspace& work) const {
+  const double full = displacement(work.step) / shorten;
+  if (full <= 1e2 * tolerance(work)) return 1.0;
+  double kept = 1.0;
+  for (int tries = 0; tries < kMostCuts; ++tries) {
+    work.trial = z + kept * work.step;
+    equations.evaluate(work.trial, false, nullptr, work.evaluation);
+    work.next_step = work.evaluation.residual;
+    if (target) work.next_step -= *target;
+    if (work.next_step.allFinite()) {
+      equations.assembler().solver().solve({work.next_step.data(), static_cast<std::size_t>(work.next_step.size())});
+      if (displacement(work.next_step) <= (1.0 - 0.25 * kept * shorten) * full) return kept;
+    }
+    kept *= 0.5;
+  }
+  return kept;
 }
 
 /// [dissertation, Algorithm 4], with the sign of q + alpha dq and the bounds it leaves unset: Goldstein-Price on

@@ -37,6 +37,7 @@ enum class MatrixAge { fresh, within, across };
 struct FactorRecord {
   const Equations* owner = nullptr;                     ///< nothing: not to be used again
   double interval = 0;                                  ///< [s]
+  int generation = 0;                                   ///< of the solver
   std::array<double, 3> contraction{1e-2, 1e-2, 1e-2};  ///< per MatrixAge: error after an iteration over error before
   int waited = 0;                                       ///< time steps since one was last tried across
   bool tired = false;                                   ///< served the last time step slowly
@@ -46,7 +47,7 @@ struct FactorRecord {
 /// Scratch of the solver; owned by the world, so that a step does not allocate.
 struct NewtonWorkspace {
   Evaluation evaluation;
-  VectorX step, axial_force, trial;
+  VectorX step, axial_force, trial, next_step;
   FactorRecord factor;
   double finest = INFINITY;  ///< [m], a step tolerance that error control wants; that of the options is an upper bound
   Counters counters;
@@ -78,6 +79,8 @@ class Newton {
   double tolerance(const NewtonWorkspace& work) const {
     return std::min(options_.step_tolerance * model_.length_scale, work.finest);
   }
+  double monotone(Equations& equations, const VectorX& z, const VectorX* target, double shorten,
+                  NewtonWorkspace& work) const;
   double line_search(Equations& equations, const VectorX& z, const VectorX& step, const VectorX* target,
                      NewtonWorkspace& work) const;
 

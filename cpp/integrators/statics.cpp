@@ -54,9 +54,18 @@ class Statics {
   void begin() { equations_.begin(state_, parameters_, 0.0, false); }
 
   void accept(const VectorX& q) {
+    if (Contact* contact = equations_.contact()) {
+      contact->update(q);
+      contact->accept(state_);
+    }
     Configuration& c = scratch_;
     compute_configuration(equations_.model(), state_, q, c);
     accept_configuration(equations_.model(), q, c, state_);
+  }
+
+  /// Whether supports may move at once to where z has them without pushing centrelines through each other.
+  bool clear_way(const VectorX& z) {
+    return !equations_.contact() || equations_.allowed(state_.q, z - state_.q) == 1.0;
   }
 
   /// Moments and followers turn with the rod, so their dead imbalance would pull where they do not: they grow instead.
@@ -93,7 +102,8 @@ class Statics {
       boundary(next, start, z);
       target = (1.0 - next) * imbalance;
       equations_.assembler().project(target);
-      const NewtonResult r = newton_.solve(equations_, z, &target, std::min(25, options_.max_iterations), work_);
+      NewtonResult r;
+      if (clear_way(z)) r = newton_.solve(equations_, z, &target, std::min(25, options_.max_iterations), work_);
       last.iterations += r.iterations;
       last.residual = r.residual;
       last.worst_row = r.worst_row;
@@ -153,7 +163,6 @@ class Statics {
   /// Levenberg-Marquardt on the potential: every accepted step lowers it.
   bool descend(int max_steps, NewtonResult& last) {
     const Model& model = equations_.model();
-    LinearSolver& solver = equations_.assembler().solver();
     VectorX shift, z, step, weight;
     begin();
     weight = equations_.mass;
@@ -191,6 +200,7 @@ class Statics {
       for (int tries = 0; tries < 40 && !accepted; ++tries) {
         shift = damping * weight.cwiseMax(1e-300);
         ++work_.counters.factorizations;
+        LinearSolver& solver = equations_.assembler().solver();
         const Factorization f = solver.factorize({shift.data(), static_cast<std::size_t>(shift.size())});
         if (f.status != FactorStatus::ok || f.negative_pivots > 0) {
           damping *= 8.0;
@@ -198,7 +208,7 @@ class Statics {
         }
         step = -here.residual;
         solver.solve({step.data(), static_cast<std::size_t>(step.size())});
-        if (newton_.cap(step) < 1.0) {
+        if (newton_.cap(step) < 1.0 || equations_.allowed(state_.q, step) < 1.0) {
           damping *= 4.0;
           continue;
         }

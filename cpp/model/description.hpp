@@ -27,6 +27,7 @@ struct RodDescription {
   VectorX drag;                ///< force per length and velocity [Pa s]
   MatrixX2 natural_curvature;  ///< per stencil, of the smooth rod, towards d1 and d2 [1/m]
   VectorX natural_twist;       ///< per stencil [rad/m]
+  VectorX contact_radius;      ///< of the round surface that touches others [m]; empty: it touches nothing
 };
 
 /// One rod passing through, starting or ending at a shared node: rod index and node index within the rod.
@@ -82,6 +83,51 @@ struct LoadDescription {
   bool varies = false;  ///< set by a callback while running, so `value` is only its first one
 };
 
+enum class ContactLaw { imcv2, barrier };
+
+enum class FrictionLaw {
+  implicit,  ///< normal force and slip at the end of the step, exact (unsymmetric) Jacobian
+  lagged,    ///< normal force and directions from the start of the step: symmetric
+  anchored,  ///< an elastic stick that holds a load without creep, by return mapping
+};
+
+enum class ObstacleKind {
+  plane,    ///< fills the half-space behind it
+  capsule,  ///< a segment with a radius; a sphere where its ends coincide
+};
+
+/// Something solid that does not move.
+struct ObstacleDescription {
+  ObstacleKind kind = ObstacleKind::plane;
+  Vector3 point = Vector3::Zero();   ///< on the plane; start of the segment [m]
+  Vector3 other = Vector3::UnitZ();  ///< unit normal of the plane, away from the solid; end of the segment [m]
+  double radius = 0;                 ///< of a capsule [m]
+  std::string name;
+};
+
+/// What a pair of bodies has of its own. Bodies are rods (their index) and obstacles (-1 - index).
+struct ContactPairDescription {
+  int first = 0, second = 0;
+  bool ignored = false;
+  double friction = 0;  ///< coefficient [-]
+};
+
+struct ContactDescription {
+  bool rods = false;          ///< whether rods touch each other and themselves
+  double friction = 0;        ///< coefficient between rods [-]
+  VectorX obstacle_friction;  ///< per obstacle [-]
+  ContactLaw law = ContactLaw::imcv2;
+  FrictionLaw friction_law = FrictionLaw::implicit;
+  double distance_tolerance = 0;     ///< delta [m]; 0: a tenth of the smaller radius of a pair
+  double slip_tolerance = 1e-3;      ///< nu [m/s]
+  double stiffness = 0;              ///< [N/m]; 0: follows the forces
+  bool centreline_friction = false;  ///< friction acts on the centrelines, as in the source
+  std::vector<ObstacleDescription> obstacles;
+  std::vector<ContactPairDescription> pairs;
+
+  bool any() const { return rods || !obstacles.empty(); }
+};
+
 struct SceneDescription {
   MatrixX3 positions;  ///< every node once [m]
   VectorX added_mass;  ///< per node [kg]
@@ -91,6 +137,7 @@ struct SceneDescription {
   std::vector<SupportDescription> supports;
   std::vector<LoadDescription> loads;
   bool has_custom_force = false;  ///< an explicit nodal force comes from a callback
+  ContactDescription contact;
 };
 
 }  // namespace withe

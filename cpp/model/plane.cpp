@@ -31,6 +31,17 @@ void collect_directions(const SceneDescription& scene, std::vector<Vector3>& dir
     if (load.kind != LoadKind::moment) add(load.value, 0.0);
 }
 
+/// Whether an obstacle meets rods in a plane as its cut by the plane does: a plane that stands on it, a capsule whose
+/// axis lies in it or stands on it and goes through.
+bool fits(const ObstacleDescription& o, const Vector3& corner, const Vector3& normal) {
+  if (o.kind == ObstacleKind::plane) return std::abs(o.other.dot(normal)) < 1e-9;
+  const double start = (o.point - corner).dot(normal), end = (o.other - corner).dot(normal);
+  const double size = 1e-9 * (o.radius + (o.other - o.point).norm());
+  if (std::abs(start) <= size && std::abs(end) <= size) return true;
+  const Vector3 axis = o.other - o.point;
+  return axis.cross(normal).norm() <= size && start * end < 0.0;
+}
+
 }  // namespace
 
 std::optional<Plane> find_plane(const SceneDescription& scene, std::optional<bool> asked, std::string& reason) {
@@ -119,6 +130,12 @@ std::optional<Plane> find_plane(const SceneDescription& scene, std::optional<boo
       return std::nullopt;
     }
   }
+  const Vector3 corner = scene.positions.row(scene.rods.front().nodes.front());
+  for (const ObstacleDescription& o : scene.contact.obstacles)
+    if (!fits(o, corner, normal)) {
+      reason = "an obstacle reaches out of the plane";
+      return std::nullopt;
+    }
   Plane plane;
   plane.normal = normal;
   plane.origin = scene.positions.row(scene.rods.front().nodes.front());

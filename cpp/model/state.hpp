@@ -1,23 +1,42 @@
 #pragma once
 /// What changes while a scene runs.
 
+#include <compare>
 #include <vector>
 
 #include "model/model.hpp"
 
 namespace withe {
 
+/// Whose surfaces meet: edge `a` (its end `end` against a plane; else -1) and edge `b`, or an obstacle as -1 - index.
+struct ContactKey {
+  int a = 0, b = 0, end = -1;
+  friend auto operator<=>(const ContactKey&, const ContactKey&) = default;
+};
+
+/// What a contact remembers from one step to the next.
+struct ContactRecord {
+  ContactKey key;
+  double force = 0;      ///< pressing the surfaces apart [N]
+  double stiffness = 0;  ///< [N/m]
+  Vec3d stick{};         ///< elastic slip of an anchored contact, of a's surface over b's [m]
+  Vec3d friction{};      ///< on a [N]
+  bool sticking = false;
+};
+
 /// Configuration, velocities and the frames they are measured from. The frames advance by time-parallel
 /// transport once per accepted step or load increment.
 struct State {
-  double time = 0.0;                  ///< [s]
-  VectorX q, v;                       ///< positions [m], angles [rad]; frames of joints: increments from `frame`
-  VectorX acceleration;               ///< of the last step, to predict the next one (explicit: to begin it)
-  bool acceleration_current = false;  ///< explicit scheme: `acceleration` belongs to q and the present forces
-  std::vector<Vec3d> tangent;         ///< per edge: source of the reference director
-  std::vector<Vec3d> director;        ///< per edge: reference director, normal to `tangent`
-  std::vector<Matrix3> frame;         ///< per joint frame (in a plane: not used, q holds the angle)
-  VectorX bend_tau, half_tau;         ///< twist of each stencil, which fixes the branch of the angle [rad]
+  double time = 0.0;                    ///< [s]
+  VectorX q, v;                         ///< positions [m], angles [rad]; frames of joints: increments from `frame`
+  VectorX acceleration;                 ///< of the last step, to predict the next one (explicit: to begin it)
+  bool acceleration_current = false;    ///< explicit scheme: `acceleration` belongs to q and the present forces
+  std::vector<Vec3d> tangent;           ///< per edge: source of the reference director
+  std::vector<Vec3d> director;          ///< per edge: reference director, normal to `tangent`
+  std::vector<Matrix3> frame;           ///< per joint frame (in a plane: not used, q holds the angle)
+  VectorX bend_tau, half_tau;           ///< twist of each stencil, which fixes the branch of the angle [rad]
+  std::vector<ContactRecord> contacts;  ///< sorted by key
+  VectorX contact_stiffness;            ///< per rod, of contacts that begin [N/m]; where a scene has contact
 };
 
 State initial_state(const Model& model);

@@ -61,6 +61,11 @@ SparsityPattern SparsityPattern::from_cliques(int size, const std::vector<std::v
   return pattern;
 }
 
+bool SparsityPattern::contains(int row, int column) const {
+  const auto begin = row_indices.begin() + column_starts[column];
+  return std::binary_search(begin, row_indices.begin() + column_starts[column + 1], row);
+}
+
 int SparsityPattern::half_bandwidth() const {
   int widest = 0;
   for (int column = 0; column < size; ++column) {

@@ -20,6 +20,7 @@ struct SparsityPattern {
 
   /// Pattern from cliques: every group of unknowns couples fully. Entries < 0 are skipped.
   static SparsityPattern from_cliques(int size, const std::vector<std::vector<int>>& cliques);
+  bool contains(int row, int column) const;
   /// Greatest |row - column| of any entry.
   int half_bandwidth() const;
 };

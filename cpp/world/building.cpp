@@ -61,6 +61,7 @@ World::Implementation::Implementation(SceneDescription scene, Options choice)
   for (const LoadDescription& load : description.loads) load_values.push_back(load.value);
   rebuild(Rebuild::first);
   check_reversible(parameters);
+  check_overlap();
   if (options.integrator == Integrator::verlet) {
     plan.stable_step = stable_step(*equations, parameters, state, work.newton);
     require(options.time_step <= plan.stable_step,
@@ -102,6 +103,12 @@ World::Implementation::Implementation(const Implementation& other)
   equations = std::make_unique<Equations>(model, options);
   equations->loads().values = load_values;
   forget_matrix();
+}
+
+/// Candidates and the order of elimination follow from the past: who goes on from here with none has the same bits.
+void World::Implementation::forget_contacts() {
+  for (Equations* system : {equations.get(), rescue_equations.get(), static_equations.get()})
+    if (system && system->contact()) system->forget_contacts();
 }
 
 void World::Implementation::listen() {
@@ -170,6 +177,10 @@ void World::Implementation::rebuild(Rebuild why) {
   newton = std::make_unique<Newton>(model, options);
   equations = std::make_unique<Equations>(model, options);
   equations->loads().values = load_values;
+  if (Contact* contact = equations->contact()) {
+    contact->set_parameters(parameters);
+    contact->initialise(state);
+  }
   reaction_current = false;
   make_plan();
 }
@@ -177,6 +188,8 @@ void World::Implementation::rebuild(Rebuild why) {
 State World::Implementation::transferred(const Model& old, const State& from) const {
   State to = initial_state(model);
   to.time = from.time;
+  to.contacts = from.contacts;
+  to.contact_stiffness = from.contact_stiffness;
   Configuration c;
   compute_configuration(old, from, from.q, c);
   const auto copy = [&](int old_dof, int new_dof, int n) {
@@ -289,6 +302,20 @@ void World::Implementation::leave_plane(const std::string& why) {
   plan.notes.push_back("left the plane while running: " + why);
 }
 
+void World::Implementation::add_contact_notes() {
+  const ContactDescription& contact = description.contact;
+  if (!contact.any()) {
+    plan.notes.emplace_back("no contact: no broad phase");
+    return;
+  }
+  if (!contact.obstacles.empty())
+    plan.notes.push_back(std::to_string(contact.obstacles.size()) +
+                         " obstacle(s): their terms stay between neighbouring nodes");
+  plan.notes.push_back(contact.rods ? "rods touch each other: they are coupled only where they are near"
+                                    : "rods do not touch each other: no broad phase");
+  if (!equations->contact()->frictional()) plan.notes.emplace_back("no friction: contact stays symmetric");
+}
+
 void World::Implementation::make_plan() {
   const double stable = plan.stable_step;
   plan = Plan{};
@@ -312,7 +339,7 @@ void World::Implementation::make_plan() {
   if (!parameters.dragged) notes.push_back("no drag: its terms are left out");
   if (!parameters.viscous) notes.push_back("no viscosity: its terms are left out");
   if (description.loads.empty()) notes.push_back("no loads but gravity");
-  notes.push_back("no contact: no broad phase");
+  add_contact_notes();
   notes.push_back("kernels: " + std::string(name_of(instruction_set())) +
                   (instruction_set() == InstructionSet::baseline ? ", 2 numbers at once" : ", 4 numbers at once"));
 }

@@ -75,6 +75,7 @@ Energy World::Implementation::energy_of(const State& at, double loads, double wo
   e.twist = turned.twist;
   e.gravity = gravity_energy(model, parameters, at.q);
   e.loads = -loads;
+  if (equations->contact()) e.contact = equations->contact()->energy_of(at);
   e.total = e.kinetic + e.stretch + e.bend + e.twist + e.gravity + e.loads + e.contact;
   e.work = work_done;
   e.dissipated = lost;

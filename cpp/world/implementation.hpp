@@ -101,6 +101,7 @@ struct World::Implementation {
   void listen();
   void rebuild(Rebuild why);
   void make_plan();
+  void add_contact_notes();
   /// Drops the plane; throws when the user asked for it. `why` names the argument that leaves the plane.
   void leave_plane(const std::string& why);
   State transferred(const Model& old, const State& from) const;
@@ -145,10 +146,12 @@ struct World::Implementation {
   bool conserving() const;
   double force_time(double start, double dt) const;
   bool inner_step(double dt, int slot, double& error);
+  Equations& equations_of_step();
   StepResult step_by_rule(double dt, int slot);
   void keep_reactions();
   void check_reversible(const Parameters& p) const;
   void forget_matrix() { work.newton.factor = FactorRecord{}; }
+  void forget_contacts();
   Place place_of(int row) const;
   [[noreturn]] void fail(const NewtonResult& newton, double dt, const std::string& what) const;
 
@@ -157,6 +160,9 @@ struct World::Implementation {
   Equations& statics();
   Equations& rescue();
   void refresh_reactions();
+
+  // contacts.cpp
+  void check_overlap() const;
 
   // energy.cpp
   Energy energy() const;

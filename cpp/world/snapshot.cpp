@@ -30,6 +30,23 @@ std::uint64_t fingerprint(const SceneDescription& scene) {
   return hash_of(w.bytes);
 }
 
+template <class Archive>
+void exchange_contacts(Archive& io, std::vector<ContactRecord>& contacts) {
+  auto count = static_cast<std::int64_t>(contacts.size());
+  io(count);
+  require(count >= 0 && count < 1 << 28, "snapshot is damaged: impossible number of contacts");
+  contacts.resize(static_cast<std::size_t>(count));
+  for (ContactRecord& c : contacts) {
+    io(c.key.a);
+    io(c.key.b);
+    io(c.key.end);
+    io(c.force);
+    io(c.stiffness);
+    for (Vec3d* v : {&c.stick, &c.friction}) io(v->x), io(v->y), io(v->z);
+    io(c.sticking);
+  }
+}
+
 /// The numbers of a state that any world of the scene has, in a fixed order.
 template <class Archive, class Self>
 void exchange(Archive& io, Self& self) {
@@ -85,6 +102,8 @@ void exchange(Archive& io, Self& self) {
   for (auto& f : s.frame) io(f);
   io(s.bend_tau);
   io(s.half_tau);
+  io(s.contact_stiffness);
+  exchange_contacts(io, s.contacts);
   self.predictor.exchange(io);
   io(self.reaction_current);
   io(self.reaction_residual);
@@ -109,6 +128,7 @@ void give_sizes(World::Implementation& self) {
 std::string World::snapshot() const {
   Implementation& self = *implementation_;
   give_sizes(self);
+  self.forget_contacts();
   self.forget_matrix();  // who restores has none, and goes on with the same bits
   Writer w;
   w(kMagic);

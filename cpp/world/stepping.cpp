@@ -15,6 +15,9 @@ namespace {
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
+// Times that contact may be made stiffer, by up to a hundred each, before a step counts as failed.
+constexpr int kMostStiffenings = 8;
+
 }  // namespace
 
 /// One time step of `duration`, in equal parts where it does not converge or is not accurate enough.
@@ -232,6 +235,11 @@ bool World::Implementation::inner_step(double dt, int slot, double& error) {
   StepResult r;
   try {
     r = step_by_rule(dt, slot);
+    for (int tries = 0; r.too_deep && tries < kMostStiffenings; ++tries) {
+      support_work += equations_of_step().contact()->stiffen(state);
+      forget_matrix();
+      r = step_by_rule(dt, slot);
+    }
   } catch (...) {
     undo();
     forget_matrix();  // the step that comes next is the same whether this one was tried or not
@@ -247,7 +255,7 @@ bool World::Implementation::inner_step(double dt, int slot, double& error) {
   guard.stretch_gain += r.stretch_gain;
   load_work += r.load_work;
   dissipated += r.dissipated;
-  support_work += r.support_work;
+  support_work += r.support_work + r.stiffness_work;
   if (options.integrator != Integrator::fourth_order || slot == 2) keep_reactions();
   if (ramped) {
     actuation -= actuation_energy();
@@ -258,9 +266,11 @@ bool World::Implementation::inner_step(double dt, int slot, double& error) {
   return true;
 }
 
+Equations& World::Implementation::equations_of_step() { return guard.rescue > 0 ? rescue() : *equations; }
+
 StepResult World::Implementation::step_by_rule(double dt, int slot) {
   const bool rescued = guard.rescue > 0;
-  Equations& system = rescued ? rescue() : *equations;
+  Equations& system = equations_of_step();
   update_custom_force(system);
   if (options.integrator == Integrator::verlet) return verlet_step(system, parameters, dt, state, work);
   const StepRule rule = rescued || options.integrator == Integrator::energy_momentum ? StepRule::energy_momentum
@@ -286,6 +296,9 @@ void World::Implementation::keep_reactions() {
 /// A scheme that steps back in time asks for forces that can be run backwards.
 void World::Implementation::check_reversible(const Parameters& p) const {
   if (options.integrator != Integrator::fourth_order) return;
+  require(!description.contact.any(),
+          "integrator 'fourth_order' goes back in time within each step, which contact does not allow: take integrator "
+          "'implicit_midpoint' or 'energy_momentum'");
   const std::string instead = ": take integrator 'implicit_midpoint' or 'energy_momentum'";
   require(!p.viscous,
           "integrator 'fourth_order' goes back in time within each step, which viscosity does not allow" + instead);

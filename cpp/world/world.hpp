@@ -42,6 +42,15 @@ struct EquilibriumResult {
   double residual = 0;  ///< greatest force out of balance [N]
 };
 
+/// What touches, a row each.
+struct ContactTable {
+  /// Rod and edge of a; rod and edge of b, or -1 - obstacle and -1; whether it sticks.
+  Eigen::Matrix<int, Eigen::Dynamic, 5, Eigen::RowMajor> bodies;
+  /// Distance of the centrelines (of a centreline and an obstacle's plane or axis), gap of the surfaces, point (3),
+  /// normal from b to a (3), normal force, friction on a (3), place along a, along b from 0 to 1.
+  Eigen::Matrix<double, Eigen::Dynamic, 14, Eigen::RowMajor> numbers;
+};
+
 /// What `build` decided.
 struct Plan {
   bool planar = false;
@@ -135,6 +144,7 @@ class World {
   VectorX tensions(int rod) const;     ///< per edge [N]
   VectorX spins(int rod) const;        ///< per edge, angular velocity about the tangent [rad/s]
   Energy energy() const;
+  ContactTable contacts() const;
   Linearisation linearise() const;
 
   /// The whole state as bytes, for a description and options equal to this world's (supports may differ).

@@ -13,6 +13,11 @@ constexpr Words<SupportKind, 3> kSupportKinds{
 constexpr Words<LoadKind, 3> kLoadKinds{
     {{"force", LoadKind::force}, {"moment", LoadKind::moment}, {"distributed", LoadKind::distributed}}};
 
+constexpr Words<ContactLaw, 2> kContactLaws{{{"imcv2", ContactLaw::imcv2}, {"barrier", ContactLaw::barrier}}};
+constexpr Words<FrictionLaw, 3> kFrictionLaws{
+    {{"implicit", FrictionLaw::implicit}, {"lagged", FrictionLaw::lagged}, {"anchored", FrictionLaw::anchored}}};
+constexpr Words<ObstacleKind, 2> kObstacleKinds{{{"plane", ObstacleKind::plane}, {"capsule", ObstacleKind::capsule}}};
+
 void register_rod(py::module_& module) {
   py::class_<RodDescription>(module, "RodDescription", "A rod as a chain of nodes.")
       .def(py::init<>())
@@ -29,7 +34,37 @@ void register_rod(py::module_& module) {
       .def_readwrite("viscous_time", &RodDescription::viscous_time)
       .def_readwrite("drag", &RodDescription::drag)
       .def_readwrite("natural_curvature", &RodDescription::natural_curvature)
-      .def_readwrite("natural_twist", &RodDescription::natural_twist);
+      .def_readwrite("natural_twist", &RodDescription::natural_twist)
+      .def_readwrite("contact_radius", &RodDescription::contact_radius);
+}
+
+void register_contact(py::module_& module) {
+  py::class_<ObstacleDescription> obstacle(module, "ObstacleDescription", "Something solid that does not move.");
+  obstacle.def(py::init<>())
+      .def_readwrite("point", &ObstacleDescription::point)
+      .def_readwrite("other", &ObstacleDescription::other)
+      .def_readwrite("radius", &ObstacleDescription::radius)
+      .def_readwrite("name", &ObstacleDescription::name);
+  def_word(obstacle, "kind", &ObstacleDescription::kind, kObstacleKinds);
+  py::class_<ContactPairDescription>(module, "ContactPairDescription", "What two bodies have of their own.")
+      .def(py::init<>())
+      .def_readwrite("first", &ContactPairDescription::first)
+      .def_readwrite("second", &ContactPairDescription::second)
+      .def_readwrite("ignored", &ContactPairDescription::ignored)
+      .def_readwrite("friction", &ContactPairDescription::friction);
+  py::class_<ContactDescription> contact(module, "ContactDescription", "What touches, and how.");
+  contact.def(py::init<>())
+      .def_readwrite("rods", &ContactDescription::rods)
+      .def_readwrite("friction", &ContactDescription::friction)
+      .def_readwrite("obstacle_friction", &ContactDescription::obstacle_friction)
+      .def_readwrite("distance_tolerance", &ContactDescription::distance_tolerance)
+      .def_readwrite("slip_tolerance", &ContactDescription::slip_tolerance)
+      .def_readwrite("stiffness", &ContactDescription::stiffness)
+      .def_readwrite("centreline_friction", &ContactDescription::centreline_friction)
+      .def_readwrite("obstacles", &ContactDescription::obstacles)
+      .def_readwrite("pairs", &ContactDescription::pairs);
+  def_word(contact, "law", &ContactDescription::law, kContactLaws);
+  def_word(contact, "friction_law", &ContactDescription::friction_law, kFrictionLaws);
 }
 
 void register_joints_and_supports(py::module_& module) {
@@ -74,6 +109,7 @@ void register_model(py::module_& module) {
   register_rod(module);
   register_joints_and_supports(module);
   register_loads(module);
+  register_contact(module);
   py::class_<SceneDescription>(module, "SceneDescription", "What the scene layer hands to the engine.")
       .def(py::init<>())
       .def_readwrite("positions", &SceneDescription::positions)
@@ -83,7 +119,8 @@ void register_model(py::module_& module) {
       .def_readwrite("joints", &SceneDescription::joints)
       .def_readwrite("supports", &SceneDescription::supports)
       .def_readwrite("loads", &SceneDescription::loads)
-      .def_readwrite("has_custom_force", &SceneDescription::has_custom_force);
+      .def_readwrite("has_custom_force", &SceneDescription::has_custom_force)
+      .def_readwrite("contact", &SceneDescription::contact);
 }
 
 }  // namespace withe::bindings

@@ -37,6 +37,9 @@ void register_results(py::module_& module) {
   py::class_<Reaction>(module, "Reaction", "Of a support on the rod.")
       .def_readonly("force", &Reaction::force)
       .def_readonly("moment", &Reaction::moment);
+  py::class_<ContactTable>(module, "ContactTable", "What touches, a row each.")
+      .def_readonly("bodies", &ContactTable::bodies)
+      .def_readonly("numbers", &ContactTable::numbers);
   py::class_<EquilibriumResult>(module, "EquilibriumResult", "How an equilibrium was found.")
       .def_readonly("stable", &EquilibriumResult::stable)
       .def_readonly("iterations", &EquilibriumResult::iterations)
@@ -191,6 +194,7 @@ void define_readouts(WorldClass& world) {
   world.def("tensions", [](const GuardedWorld& self, int rod) { return self.reading().tensions(rod); }, py::arg("rod"));
   world.def("spins", [](const GuardedWorld& self, int rod) { return self.reading().spins(rod); }, py::arg("rod"));
   world.def("energy", [](const GuardedWorld& self) { return self.reading().energy(); });
+  world.def("contacts", [](const GuardedWorld& self) { return self.reading().contacts(); });
   world.def("linearise", [](const GuardedWorld& self) { return self.reading().linearise(); });
 }
 

@@ -9,12 +9,16 @@ import numpy.typing
 import typing
 
 __all__: list[str] = [
+    "ContactDescription",
+    "ContactPairDescription",
+    "ContactTable",
     "ConvergenceFailure",
     "Energy",
     "EquilibriumResult",
     "JointDescription",
     "Linearisation",
     "LoadDescription",
+    "ObstacleDescription",
     "Options",
     "Plan",
     "Reaction",
@@ -44,6 +48,10 @@ class RodDescription:
     def bend_stiffness(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 2]"]: ...
     @bend_stiffness.setter
     def bend_stiffness(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 2]"]) -> None: ...
+    @property
+    def contact_radius(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+    @contact_radius.setter
+    def contact_radius(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> None: ...
     @property
     def directors(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
     @directors.setter
@@ -172,11 +180,92 @@ class LoadDescription:
     @value.setter
     def value(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None: ...
 
+class ObstacleDescription:
+    """
+    Something solid that does not move.
+    """
+
+    kind: str
+    name: str
+    def __init__(self) -> None: ...
+    @property
+    def other(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]: ...
+    @other.setter
+    def other(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None: ...
+    @property
+    def point(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]: ...
+    @point.setter
+    def point(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None: ...
+    @property
+    def radius(self) -> float: ...
+    @radius.setter
+    def radius(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+
+class ContactPairDescription:
+    """
+    What two bodies have of their own.
+    """
+
+    ignored: bool
+    def __init__(self) -> None: ...
+    @property
+    def first(self) -> int: ...
+    @first.setter
+    def first(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    @property
+    def friction(self) -> float: ...
+    @friction.setter
+    def friction(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    @property
+    def second(self) -> int: ...
+    @second.setter
+    def second(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+
+class ContactDescription:
+    """
+    What touches, and how.
+    """
+
+    centreline_friction: bool
+    friction_law: str
+    law: str
+    rods: bool
+    def __init__(self) -> None: ...
+    @property
+    def distance_tolerance(self) -> float: ...
+    @distance_tolerance.setter
+    def distance_tolerance(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    @property
+    def friction(self) -> float: ...
+    @friction.setter
+    def friction(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    @property
+    def obstacle_friction(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+    @obstacle_friction.setter
+    def obstacle_friction(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> None: ...
+    @property
+    def obstacles(self) -> list[ObstacleDescription]: ...
+    @obstacles.setter
+    def obstacles(self, arg0: collections.abc.Sequence[ObstacleDescription]) -> None: ...
+    @property
+    def pairs(self) -> list[ContactPairDescription]: ...
+    @pairs.setter
+    def pairs(self, arg0: collections.abc.Sequence[ContactPairDescription]) -> None: ...
+    @property
+    def slip_tolerance(self) -> float: ...
+    @slip_tolerance.setter
+    def slip_tolerance(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    @property
+    def stiffness(self) -> float: ...
+    @stiffness.setter
+    def stiffness(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+
 class SceneDescription:
     """
     What the scene layer hands to the engine.
     """
 
+    contact: ContactDescription
     has_custom_force: bool
     def __init__(self) -> None: ...
     @property
@@ -317,6 +406,15 @@ class Reaction:
     @property
     def moment(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]: ...
 
+class ContactTable:
+    """
+    What touches, a row each.
+    """
+    @property
+    def bodies(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 5]"]: ...
+    @property
+    def numbers(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 14]"]: ...
+
 class EquilibriumResult:
     """
     How an equilibrium was found.
@@ -362,6 +460,7 @@ class World:
         """
         Raises in the middle of a step.
         """
+    def contacts(self) -> ContactTable: ...
     def copy(self) -> World:
         """
         Another world like this.

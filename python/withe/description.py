@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe import _core
+from withe.contacts import describe_contact
 from withe.directory import Directory
 from withe.joints import JointGroup, connected, gather
 from withe.parameters import RodParameters
@@ -52,6 +53,7 @@ def describe(directory: Directory, gravity: FloatArray) -> _core.SceneDescriptio
     scene.supports = _describe_supports(directory)
     scene.loads = [_describe_load(load) for load in directory.all(LoadPart)]
     scene.has_custom_force = bool(directory.all(CustomForcePart))
+    scene.contact = describe_contact(directory)
     return scene
 
 
@@ -107,6 +109,7 @@ def _describe_rod(directory: Directory, rod: RodPart, coefficient: float) -> _co
     description.rest_lengths = rod.lengths
     description.natural_curvature = rod.natural_curvature
     description.natural_twist = rod.natural_twist
+    description.contact_radius = rod.section.radii
     _fill(description, rod.parameters.changed("drag", coefficient, rod.section, rod.owner))
     return description
 

@@ -6,11 +6,13 @@ from typing import Any, TypeVar
 
 from withe.handles import EdgeHandle, Handle, Layout, NodeHandle, Rod, parse_place
 from withe.parts import (
+    ContactSettings,
     CustomForcePart,
     DragPart,
     JoinPart,
     LoadPart,
     MassPart,
+    ObstaclePart,
     Part,
     Pass,
     RodPart,
@@ -30,6 +32,7 @@ _WORDS: dict[type[Any], str] = {
     MassPart: "mass",
     DragPart: "drag",
     CustomForcePart: "custom force",
+    ObstaclePart: "obstacle",
 }
 
 
@@ -40,12 +43,14 @@ class Directory:
         self.scene_id = scene_id
         self.layout = Layout()
         self.parts: dict[str, Part] = {}
+        self.contact = ContactSettings()
 
     def copy(self) -> Directory:
         """A directory that no longer changes with this one."""
         other = Directory(self.scene_id)
         other.layout = self.layout.copy()
         other.parts = dict(self.parts)
+        other.contact = self.contact
         return other
 
     def all(self, kind: type[P]) -> list[P]:

@@ -24,6 +24,7 @@ __all__ = [
     "Load",
     "Mass",
     "NodeHandle",
+    "Obstacle",
     "Rod",
     "RodPlace",
     "Support",
@@ -149,6 +150,11 @@ class Drag(Handle):
 @dataclass(frozen=True)
 class CustomForce(Handle):
     """Forces computed by a function of the user's."""
+
+
+@dataclass(frozen=True)
+class Obstacle(Handle):
+    """Something solid that rods touch."""
 
 
 @dataclass(frozen=True)

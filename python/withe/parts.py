@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
@@ -14,11 +14,15 @@ from withe.parameters import RodParameters
 from withe.sections import SectionProperties
 
 __all__ = [
+    "ContactModel",
+    "ContactSettings",
     "CustomForcePart",
     "DragPart",
+    "FrictionModel",
     "JoinPart",
     "LoadPart",
     "MassPart",
+    "ObstaclePart",
     "Part",
     "Pass",
     "RodPart",
@@ -30,6 +34,8 @@ FloatArray = npt.NDArray[np.float64]
 Pass = tuple[int, int]  # rod, node of the rod
 JoinKind = Literal["rigid", "pinned", "revolute"]
 JointForm = Literal["frame", "pairs"]
+ContactModel = Literal["imcv2", "barrier"]
+FrictionModel = Literal["implicit", "lagged", "anchored"]
 LoadKind = Literal["force", "moment", "load"]
 SupportKind = Literal["pin", "clamp", "hold_edge"]
 
@@ -118,7 +124,35 @@ class CustomForcePart:
     function: Callable[[float, FloatArray, FloatArray], npt.ArrayLike]
 
 
-Part = RodPart | JoinPart | SupportPart | LoadPart | MassPart | DragPart | CustomForcePart
+@dataclass(frozen=True, eq=False)
+class ObstaclePart:
+    """Something solid that does not move."""
+
+    name: str
+    kind: Literal["plane", "capsule"]
+    point: FloatArray  # on the plane; start of the axis (3,) [m]
+    other: FloatArray  # normal; end of the axis (3,)
+    radius: float
+    friction: float
+
+
+@dataclass(frozen=True, eq=False)
+class ContactSettings:
+    """Whether rods touch, and how."""
+
+    rods: bool = False
+    friction: float = 0.0
+    model: ContactModel = "imcv2"
+    friction_model: FrictionModel = "implicit"
+    distance_tolerance: float | None = None
+    slip_tolerance: float = 1e-3
+    stiffness: float | None = None
+    centreline_friction: bool = False
+    pairs: Mapping[tuple[str, str], float | None] = field(default_factory=dict)  # friction; None: pass through
+    groups: Mapping[str, str] = field(default_factory=dict)  # of rods
+
+
+Part = RodPart | JoinPart | SupportPart | LoadPart | MassPart | DragPart | CustomForcePart | ObstaclePart
 
 _HANDLES: dict[type[Any], type[handles.Handle]] = {
     JoinPart: handles.Joint,
@@ -127,6 +161,7 @@ _HANDLES: dict[type[Any], type[handles.Handle]] = {
     MassPart: handles.Mass,
     DragPart: handles.Drag,
     CustomForcePart: handles.CustomForce,
+    ObstaclePart: handles.Obstacle,
 }
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe import validation
+from withe.contacts import Contacts
 from withe.directory import Directory
 from withe.handles import Joint, NodeHandle, Rod, RodPlace, Support
 from withe.joints import connected, gather
@@ -26,7 +27,7 @@ __all__ = ["Scene"]
 FloatArray = npt.NDArray[np.float64]
 
 
-class Scene(Loads):
+class Scene(Loads, Contacts):
     """A description of rods, joints, supports and loads, from which simulations are built.
 
     Parameters

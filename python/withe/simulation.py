@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe import _core, validation
+from withe.contacts import contact_table
 from withe.control import Control
 from withe.description import describe, parameters_of
 from withe.directory import Directory
@@ -285,6 +286,18 @@ class Simulation(Control):
         index, _ = self._support(support)
         reaction = self._world.reaction(index)
         return Reaction(np.array(reaction.force), np.array(reaction.moment))
+
+    def contacts(self) -> npt.NDArray[np.void]:
+        """What touches now.
+
+        Returns
+        -------
+        structured ndarray, a row per contact
+            "pair" (two names) and "edge" (their edges, -1 for an obstacle), "distance" of the centrelines
+            and "gap" of the surfaces [m], "point" between them [m], "normal" from the second to the first,
+            "normal_force" [N], "friction" on the first [N], "sticking".
+        """
+        return contact_table(self._directory, self._world.contacts())
 
     def linearise(self) -> Linearisation:
         """Equations of motion linearised about the present configuration, with supports held.

@@ -1,0 +1,96 @@
+#include "contact/broad_phase.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+namespace withe {
+namespace {
+
+constexpr int kMostCells = 64;        // a box that covers more is compared with every other one
+constexpr long long kSide = 1 << 20;  // cells along an axis, at most
+
+}  // namespace
+
+Box Box::around(const Vec3<double>& p, const Vec3<double>& q, double margin) {
+  return {{std::min(p.x, q.x) - margin, std::min(p.y, q.y) - margin, std::min(p.z, q.z) - margin},
+          {std::max(p.x, q.x) + margin, std::max(p.y, q.y) + margin, std::max(p.z, q.z) + margin}};
+}
+
+void Box::include(const Box& other) {
+  for (int k = 0; k < 3; ++k) {
+    low[k] = std::min(low[k], other.low[k]);
+    high[k] = std::max(high[k], other.high[k]);
+  }
+}
+
+const std::vector<BroadPhase::Pair>& BroadPhase::find(const std::vector<Box>& boxes) {
+  pairs_.clear();
+  entries_.clear();
+  large_.clear();
+  if (boxes.size() < 2) return pairs_;
+  double size = 0.0, origin[3], end[3];
+  for (int k = 0; k < 3; ++k) {
+    origin[k] = INFINITY;
+    end[k] = -INFINITY;
+  }
+  for (const Box& box : boxes) {
+    double longest = 0.0;
+    for (int k = 0; k < 3; ++k) {
+      longest = std::max(longest, box.high[k] - box.low[k]);
+      origin[k] = std::min(origin[k], box.low[k]);
+      end[k] = std::max(end[k], box.high[k]);
+    }
+    size += longest;
+  }
+  const double extent = std::max({end[0] - origin[0], end[1] - origin[1], end[2] - origin[2]});
+  const double width =
+      std::max({size / static_cast<double>(boxes.size()), extent / static_cast<double>(kSide - 2), 1e-300});
+  const auto cell_of = [&](double x, int k) { return static_cast<long long>((x - origin[k]) / width); };
+  for (std::size_t i = 0; i < boxes.size(); ++i) {
+    long long first[3], last[3], count = 1;
+    for (int k = 0; k < 3; ++k) {
+      first[k] = cell_of(boxes[i].low[k], k);
+      last[k] = cell_of(boxes[i].high[k], k);
+      count *= last[k] - first[k] + 1;
+    }
+    if (count > kMostCells) {
+      large_.push_back(static_cast<int>(i));
+      continue;
+    }
+    for (long long x = first[0]; x <= last[0]; ++x)
+      for (long long y = first[1]; y <= last[1]; ++y)
+        for (long long z = first[2]; z <= last[2]; ++z)
+          entries_.push_back({(x * kSide + y) * kSide + z, static_cast<int>(i)});
+  }
+  std::sort(entries_.begin(), entries_.end(),
+            [](const Entry& a, const Entry& b) { return a.cell != b.cell ? a.cell < b.cell : a.box < b.box; });
+  for (std::size_t begin = 0; begin < entries_.size();) {
+    std::size_t stop = begin + 1;
+    while (stop < entries_.size() && entries_[stop].cell == entries_[begin].cell) ++stop;
+    for (std::size_t i = begin; i < stop; ++i)
+      for (std::size_t j = i + 1; j < stop; ++j) {
+        const Box &a = boxes[static_cast<std::size_t>(entries_[i].box)],
+                  &b = boxes[static_cast<std::size_t>(entries_[j].box)];
+        if (!a.overlaps(b)) continue;
+        // Boxes that share several cells are a pair in the first of them only.
+        long long first = 0;
+        for (int k = 0; k < 3; ++k) first = first * kSide + cell_of(std::max(a.low[k], b.low[k]), k);
+        if (first == entries_[begin].cell) pairs_.push_back({entries_[i].box, entries_[j].box});
+      }
+    begin = stop;
+  }
+  for (std::size_t l = 0; l < large_.size(); ++l)
+    for (int other = 0; other < static_cast<int>(boxes.size()); ++other) {
+      const int mine = large_[l];
+      const bool other_large = std::binary_search(large_.begin(), large_.end(), other);
+      if (other == mine || (other_large && other < mine)) continue;
+      if (boxes[static_cast<std::size_t>(mine)].overlaps(boxes[static_cast<std::size_t>(other)]))
+        pairs_.push_back({std::min(mine, other), std::max(mine, other)});
+    }
+  std::sort(pairs_.begin(), pairs_.end(),
+            [](const Pair& a, const Pair& b) { return a.a != b.a ? a.a < b.a : a.b < b.b; });
+  return pairs_;
+}
+
+}  // namespace withe

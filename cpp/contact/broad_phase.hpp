@@ -1,0 +1,43 @@
+#pragma once
+/// Which boxes overlap, in a time that grows with their number and that of the pairs found.
+
+#include <vector>
+
+#include "geometry/vec3.hpp"
+
+namespace withe {
+
+/// An axis-aligned box.
+struct Box {
+  double low[3], high[3];
+
+  /// The smallest that holds two points, grown by `margin` on every side.
+  static Box around(const Vec3<double>& p, const Vec3<double>& q, double margin);
+  void include(const Box& other);
+  bool overlaps(const Box& other) const {
+    for (int k = 0; k < 3; ++k)
+      if (low[k] > other.high[k] || other.low[k] > high[k]) return false;
+    return true;
+  }
+};
+
+/// Finds overlaps by sorting boxes into the cells of a grid about as wide as a box. Keeps its memory between calls.
+class BroadPhase {
+ public:
+  struct Pair {
+    int a, b;  ///< a < b
+  };
+  /// Every overlapping pair once, sorted.
+  const std::vector<Pair>& find(const std::vector<Box>& boxes);
+
+ private:
+  struct Entry {
+    long long cell;
+    int box;
+  };
+  std::vector<Entry> entries_;
+  std::vector<int> large_;
+  std::vector<Pair> pairs_;
+};
+
+}  // namespace withe

@@ -1,0 +1,192 @@
+#include "contact/contact.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace withe {
+namespace {
+
+std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+// The elastic give of an anchor at its limit, over the distance tolerance.
+constexpr double kGive = 0.05;
+// Pairs farther apart than this beyond their reach, over it, are of no interest.
+constexpr double kFar = 0.6;
+
+}  // namespace
+
+Contact::Contact(const Model& model) : model_(model), surfaces_(model) {
+  const ContactDescription& contact = model.description.contact;
+  pairs_ = surfaces_.obstacle_pairs();
+  for (const ContactPair& p : pairs_) frictional_ = frictional_ || p.friction > 0.0;
+  if (contact.rods) {
+    frictional_ = frictional_ || contact.friction > 0.0;
+    for (const ContactPairDescription& p : contact.pairs) frictional_ = frictional_ || p.friction > 0.0;
+  }
+  couple();
+}
+
+const ContactPair& Contact::pair_of(int i) const { return pairs_[at(touching_[at(i)].pair)]; }
+
+void Contact::set_parameters(const Parameters& parameters) {
+  const double given = model_.description.contact.stiffness;
+  const std::size_t rods = model_.description.rods.size();
+  least_stiffness_.setConstant(static_cast<Eigen::Index>(rods), given);
+  for (int e = 0; e < model_.edge_count && !(given > 0.0); ++e) {
+    const double r = surfaces_.radius(e);
+    if (!(r > 0.0)) continue;
+    const double weight = parameters.edge_density(e) * model_.edge_length(e) * parameters.gravity.norm();
+    const double force = weight + 1e-4 * parameters.edge_bend.row(e).maxCoeff() / (r * r);
+    double& least = least_stiffness_(model_.edge_rod[at(e)]);
+    least = std::max(least, force / (2.0 * kDepth * r));
+  }
+}
+
+void Contact::initialise(State& state) const {
+  if (state.contact_stiffness.size() == 0) state.contact_stiffness = least_stiffness_;
+}
+
+/// Of a contact that begins, for a whole node.
+double Contact::start_stiffness(const ContactPair& pair, const VectorX& stiffness) const {
+  const double a = stiffness(pair.rod_a);
+  return pair.rod_b < 0 ? a : std::max(a, stiffness(pair.rod_b));
+}
+
+double Contact::tangential_stiffness(const ContactPair& pair, double stiffness) const {
+  const double pressing = stiffness * 2.0 * kDepth * pair.small_radius();
+  return pair.friction * pressing / (kGive * pair.tolerance);
+}
+
+void Contact::end_points(const ContactPair& pair, const VectorX& q, Vec3d (&x)[4]) const {
+  x[0] = local_position(model_, q, model_.edge_tail[at(pair.key.a)]);
+  x[1] = local_position(model_, q, model_.edge_head[at(pair.key.a)]);
+  if (pair.key.b >= 0) {
+    x[2] = local_position(model_, q, model_.edge_tail[at(pair.key.b)]);
+    x[3] = local_position(model_, q, model_.edge_head[at(pair.key.b)]);
+  } else {
+    const Obstacle& o = surfaces_.obstacles()[at(-1 - pair.key.b)];
+    x[2] = o.point;
+    x[3] = o.other;
+  }
+}
+
+Contact::Touching Contact::touch(int index, const VectorX& q) const {
+  const ContactPair& pair = pairs_[at(index)];
+  Touching t;
+  t.pair = index;
+  Vec3d x[4];
+  end_points(pair, q, x);
+  if (pair.plane()) {
+    t.points.s = pair.key.end;
+    t.normal = x[3];
+    t.distance = dot(x[3], x[pair.key.end] - x[2]);
+    return t;
+  }
+  // Far apart by their middles: no need for more.
+  const Vec3d middle = 0.5 * (x[0] + x[1] - x[2] - x[3]), u = x[1] - x[0], v = x[3] - x[2];
+  const double size = 0.5 * (std::sqrt(dot(u, u)) + std::sqrt(dot(v, v))) + (1.0 + kFar) * pair.reach();
+  if (dot(middle, middle) > size * size) {
+    t.distance = INFINITY;
+    return t;
+  }
+  t.points = closest_points(x[0], x[1], x[2], x[3], pair.weight_a, pair.weight_b);
+  t.distance = std::sqrt(t.points.square);
+  const double length = std::sqrt(dot(t.points.between, t.points.between));
+  t.normal = (1.0 / std::max(length, 1e-300)) * t.points.between;
+  return t;
+}
+
+const ContactRecord* Contact::record_of(const ContactKey& key) const {
+  const auto found = std::lower_bound(state_->contacts.begin(), state_->contacts.end(), key,
+                                      [](const ContactRecord& r, const ContactKey& k) { return r.key < k; });
+  return found != state_->contacts.end() && found->key == key ? &*found : nullptr;
+}
+
+void Contact::begin(const State& state, double duration) {
+  state_ = &state;
+  duration_ = duration;
+  lagged_.clear();
+  if (outgrown(state.q, nullptr)) find_pairs(state.q, state.q);
+  touching_.clear();
+  update(state.q);
+  start_energy_ = energy();
+  if (frictional_ && model_.description.contact.friction_law == FrictionLaw::lagged) freeze();
+}
+
+void Contact::update(const VectorX& q1) {
+  if (outgrown(q1, nullptr)) find_pairs(q1, q1);
+  q1_ = q1;
+  touching_ = lagged_;
+  const ContactDescription& contact = model_.description.contact;
+  for (int p = 0; p < static_cast<int>(pairs_.size()); ++p) {
+    const ContactPair& pair = pairs_[at(p)];
+    Touching t = touch(p, q1);
+    if (t.distance >= pair.reach()) continue;
+    const ContactRecord* record = record_of(pair.key);
+    t.stiffness = pair.share * (record ? record->stiffness : start_stiffness(pair, state_->contact_stiffness));
+    t.energy = contact_energy(contact.law, t.distance, pair.radii(), pair.tolerance);
+    t.energy.value *= t.stiffness;
+    t.energy.first *= t.stiffness;
+    t.energy.second *= t.stiffness;
+    if (record) t.stick = record->stick;
+    touching_.push_back(t);
+  }
+}
+
+void Contact::unknowns(int i, int (&dofs)[kContactUnknowns]) const {
+  const ContactPair& pair = pair_of(i);
+  std::fill(std::begin(dofs), std::end(dofs), -1);
+  const bool obstacle = pair.key.b < 0;
+  for (int side = 0; side < (obstacle ? 1 : 2); ++side) {
+    const auto edge = at(side == 0 ? pair.key.a : pair.key.b);
+    for (int k = 0; k < model_.dimension; ++k) {
+      dofs[6 * side + k] = model_.tail_dof[edge] + k;
+      dofs[6 * side + 3 + k] = model_.head_dof[edge] + k;
+    }
+    if (frictional_ && !model_.planar()) dofs[12 + side] = model_.edge_dof[edge];
+  }
+}
+
+void Contact::local(int i, bool with_hessian, ContactLocal& out) const {
+  const Touching& t = touching_[at(i)];
+  std::fill(std::begin(out.gradient), std::end(out.gradient), 0.0);
+  if (with_hessian)
+    for (auto& row : out.hessian) std::fill(std::begin(row), std::end(row), 0.0);
+  if (t.frozen >= 0) {
+    add_frozen_friction(t, with_hessian, out);
+    return;
+  }
+  add_pressing(t, with_hessian, out);
+  if (pairs_[at(t.pair)].friction > 0.0 && model_.description.contact.friction_law != FrictionLaw::lagged)
+    add_friction(t, with_hessian, out);
+}
+
+void Contact::add_pressing(const Touching& t, bool with_hessian, ContactLocal& out) const {
+  const ContactPair& pair = pairs_[at(t.pair)];
+  double w[4], g[12];
+  end_weights(t.points.s, t.points.t, w);
+  if (pair.plane()) w[2] = w[3] = 0.0;
+  // dD = sum w_i (between / D) . dx_i: |between| differs from D by the weights of closest_points.
+  const Vec3d direction = pair.plane() ? t.normal : (1.0 / t.distance) * t.points.between;
+  const double n[3] = {direction.x, direction.y, direction.z};
+  for (int i = 0; i < 12; ++i) {
+    g[i] = w[i / 3] * n[i % 3];
+    out.gradient[i] += t.energy.first * g[i];
+  }
+  if (!with_hessian) return;
+  if (pair.plane()) {
+    for (int i = 0; i < 6; ++i)
+      for (int j = 0; j < 6; ++j) out.hessian[i][j] += t.energy.second * g[i] * g[j];
+    return;
+  }
+  Vec3d x[4];
+  end_points(pair, q1_, x);
+  double H[12][12];
+  half_square_hessian(t.points, x[1] - x[0], x[3] - x[2], pair.weight_a, pair.weight_b, H);
+  const double turn = t.energy.first / t.distance;
+  for (int i = 0; i < 12; ++i)
+    for (int j = 0; j < 12; ++j) out.hessian[i][j] += turn * H[i][j] + (t.energy.second - turn) * g[i] * g[j];
+}
+
+}  // namespace withe

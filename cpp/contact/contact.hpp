@@ -1,0 +1,144 @@
+#pragma once
+/// Contact of a scene in one step: what touches, its energy and forces, friction, and how far an iterate may go.
+///
+/// Contact acts at the end configuration q1 of every scheme. Its potential k E(D) stays finite where centrelines cross,
+/// so every iterate is shortened until no pair of centrelines passes through another on its way (`allowed`): the path
+/// from one accepted state to the next keeps every knot.
+
+#include <span>
+#include <vector>
+
+#include "contact/broad_phase.hpp"
+#include "contact/friction.hpp"
+#include "contact/surfaces.hpp"
+
+namespace withe {
+
+/// Surfaces that carry the greatest force of their rod are this deep in each other, over the smaller radius.
+inline constexpr double kDepth = 0.01;
+
+/// Gradient and Hessian of one contact in its own unknowns.
+struct ContactLocal {
+  double gradient[kContactUnknowns];
+  double hessian[kContactUnknowns][kContactUnknowns];
+};
+
+/// One contact as a person wants it.
+struct ContactReport {
+  ContactKey key;
+  double distance = 0;      ///< of the centrelines, or of a centreline and the obstacle [m]
+  double gap = 0;           ///< of the surfaces [m]
+  double s = 0, t = 0;      ///< along the edges
+  Vec3d point{}, normal{};  ///< between the surfaces; from b to a
+  double force = 0;         ///< normal force [N]
+  Vec3d friction{};         ///< on a [N]
+  bool sticking = false;
+};
+
+class Contact {
+ public:
+  explicit Contact(const Model& model);
+
+  const Surfaces& surfaces() const { return surfaces_; }
+  /// Whether friction is there at all, and its Jacobian unsymmetric.
+  bool frictional() const { return frictional_; }
+  bool unsymmetric() const { return frictional_ && model_.description.contact.friction_law != FrictionLaw::lagged; }
+
+  /// A step begins at `state`, which must outlive it. `duration`: the time in which slip happens [s].
+  void begin(const State& state, double duration);
+  /// Finds what touches at q1.
+  void update(const VectorX& q1);
+  int count() const { return static_cast<int>(touching_.size()); }
+  /// Unknowns of contact i, -1 where there is none.
+  void unknowns(int i, int (&dofs)[kContactUnknowns]) const;
+  /// Row of contact i in the table of elements; -1 until `couple` has given it one.
+  int element(int i) const { return pair_of(i).element; }
+  void local(int i, bool with_hessian, ContactLocal& out) const;
+  /// Rounding of contact i's force for coordinates up to `reach` [N].
+  double rounding(int i, double reach) const;
+  /// Energy of contact and of anchors at q1, and at the start of the step [J].
+  double energy() const;
+  double start_energy() const { return start_energy_; }
+  /// Greatest depth of surfaces in each other, over the smaller radius.
+  double depth() const;
+
+  /// Whether everything that touches has an element; if not, `couple` gives elements to it and to what is near.
+  bool coupled() const;
+  void couple();
+  /// Unknowns of all elements, one after the other.
+  const std::vector<int>& element_unknowns() const { return element_unknowns_; }
+
+  /// How much of a change of q1 may be made before centrelines come too close, from 0 to 1.
+  double allowed(const VectorX& q1, const VectorX& change);
+
+  /// Takes from a predicted change of q what would move surfaces that stick: friction is steep there, and from outside
+  /// Newton's method would fall past it.
+  void hold_sticking(const State& state, VectorX& change) const;
+
+  /// Keeps in `state`, still where the step began, what contacts at q1 must remember; their stiffness follows the
+  /// forces. Returns the energy that the change of stiffness put in [J].
+  double accept(State& state);
+  /// Makes contacts of bodies that are too deep in each other stiffer; returns the energy put in [J].
+  double stiffen(State& state);
+  /// Stiffness that no rod falls below; that of a state that has none yet.
+  void set_parameters(const Parameters& parameters);
+  void initialise(State& state) const;
+  /// Contacts of a state at rest, for read-outs; and their energy.
+  std::vector<ContactReport> report(const State& state);
+  double energy_of(const State& state);
+  /// The next step finds everything anew.
+  void forget();
+
+ private:
+  struct Touching {
+    int pair = 0;  ///< index in pairs_
+    ClosestPoints points;
+    Vec3d normal{};
+    double distance = 0;
+    ContactEnergy energy;  ///< times the stiffness
+    double stiffness = 0;
+    Vec3d stick{};
+    int frozen = -1;  ///< friction of the start and no pressing: index in frozen_
+  };
+  /// Lagged friction: J and N of the start of the step.
+  struct Frozen {
+    double slip[3][kContactUnknowns];
+    double pressing = 0;  ///< [N]
+  };
+  const ContactPair& pair_of(int i) const;
+  Touching touch(int pair, const VectorX& q) const;
+  double start_stiffness(const ContactPair& pair, const VectorX& stiffness) const;
+  double tangential_stiffness(const ContactPair& pair, double stiffness) const;
+  void end_points(const ContactPair& pair, const VectorX& q, Vec3d (&x)[4]) const;
+  FrictionSetting setting(const Touching& t) const;
+  void add_pressing(const Touching& t, bool with_hessian, ContactLocal& out) const;
+  void add_friction(const Touching& t, bool with_hessian, ContactLocal& out) const;
+  void add_frozen_friction(const Touching& t, bool with_hessian, ContactLocal& out) const;
+  void freeze();
+  /// Unknowns of a pair at q (obstacles' points where there are none).
+  void values_at(const ContactPair& pair, const VectorX& q, double (&x)[kContactUnknowns]) const;
+  void find_pairs(const VectorX& from, const VectorX& to);
+  bool outgrown(const VectorX& q, const VectorX* change) const;
+  double allowed_of(const ContactPair& pair, const VectorX& q, const VectorX& change) const;
+  const ContactRecord* record_of(const ContactKey& key) const;
+  double change_stiffness(const Touching& t, double ratio, ContactRecord& record) const;
+
+  const Model& model_;
+  Surfaces surfaces_;
+  bool frictional_ = false;
+  BroadPhase broad_phase_;
+  std::vector<Box> boxes_;
+  std::vector<ContactPair> pairs_;  ///< obstacles' first, then candidates of the broad phase
+  VectorX reference_;               ///< where the candidates belong
+  double margin_ = 0, travel_ = 0;
+  const State* state_ = nullptr;
+  double duration_ = 0, start_energy_ = 0;
+  VectorX q1_;
+  std::vector<Touching> touching_, lagged_;
+  std::vector<Frozen> frozen_;
+  std::vector<std::pair<ContactKey, int>> elements_;  ///< sorted
+  std::vector<int> element_unknowns_;
+  VectorX least_stiffness_;
+};
+
+}  // namespace withe

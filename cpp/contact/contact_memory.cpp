@@ -1,0 +1,182 @@
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "contact/contact.hpp"
+
+namespace withe {
+namespace {
+
+std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+// A stiffness follows forces that outgrow it at once, and those that are so many times too small.
+constexpr double kSlack = 32.0;
+// What presses already becomes stiffer by so much at once, for it springs back.
+constexpr double kBoldest = 4.0;
+
+}  // namespace
+
+double Contact::energy() const {
+  double sum = 0.0;
+  const ContactDescription& contact = model_.description.contact;
+  for (const Touching& t : touching_) {
+    if (t.frozen >= 0) continue;
+    sum += t.energy.value;
+    const ContactPair& pair = pairs_[at(t.pair)];
+    if (contact.friction_law != FrictionLaw::anchored || !(pair.friction > 0.0)) continue;
+    double now[kContactUnknowns], unused[kContactUnknowns] = {};
+    values_at(pair, q1_, now);
+    const FrictionSetting f = setting(t);
+    const Vec3d stick = friction_gradient(f, now, unused).stick;
+    sum += 0.5 * f.tangential_stiffness * dot(stick, stick);
+  }
+  return sum;
+}
+
+double Contact::depth() const {
+  double deepest = 0.0;
+  for (const Touching& t : touching_) {
+    const ContactPair& pair = pairs_[at(t.pair)];
+    if (t.frozen < 0) deepest = std::max(deepest, (pair.radii() - t.distance) / pair.small_radius());
+  }
+  return deepest;
+}
+
+double Contact::rounding(int i, double reach) const {
+  const Touching& t = touching_[at(i)];
+  return 8.0 * std::numeric_limits<double>::epsilon() * reach * t.energy.second;
+}
+
+/// Gives a contact another stiffness, under its load: an anchor keeps its force, and so its elastic slip changes.
+/// Returns the energy put in.
+double Contact::change_stiffness(const Touching& t, double ratio, ContactRecord& record) const {
+  const double anchor = tangential_stiffness(pairs_[at(t.pair)], t.stiffness);
+  const double put_in =
+      (ratio - 1.0) * t.energy.value + 0.5 * anchor * dot(record.stick, record.stick) * (1.0 / ratio - 1.0);
+  record.stick = (1.0 / ratio) * record.stick;
+  record.stiffness *= ratio;
+  return put_in;
+}
+
+double Contact::accept(State& state) {
+  std::vector<ContactRecord> records;
+  const ContactDescription& contact = model_.description.contact;
+  const bool given = contact.stiffness > 0.0;
+  VectorX greatest = least_stiffness_;
+  double put_in = 0.0;
+  for (const Touching& t : touching_) {
+    if (t.frozen >= 0) continue;
+    const ContactPair& pair = pairs_[at(t.pair)];
+    ContactRecord record;
+    record.key = pair.key;
+    record.force = -t.energy.first;
+    record.stiffness = t.stiffness / pair.share;
+    if (frictional_ && contact.friction_law != FrictionLaw::lagged && pair.friction > 0.0) {
+      double now[kContactUnknowns], unused[kContactUnknowns] = {};
+      values_at(pair, q1_, now);
+      const FrictionForce<double> f = friction_gradient(setting(t), now, unused);
+      record.stick = f.stick;
+      record.friction = -f.force;
+      record.sticking = f.sticking;
+    }
+    const double wanted = record.force / (2.0 * kDepth * pair.small_radius() * pair.share);
+    const double least = start_stiffness(pair, least_stiffness_);
+    if (!given && wanted > record.stiffness)
+      put_in += change_stiffness(t, 1.5 * wanted / record.stiffness, record);
+    else if (!given && kSlack * std::max(wanted, least) < record.stiffness)
+      put_in += change_stiffness(t, 2.0 * std::max(wanted, least) / record.stiffness, record);
+    for (int rod : {pair.rod_a, pair.rod_b})
+      if (rod >= 0) greatest(rod) = std::max(greatest(rod), wanted);
+    records.push_back(record);
+  }
+  std::sort(records.begin(), records.end(),
+            [](const ContactRecord& a, const ContactRecord& b) { return a.key < b.key; });
+  state.contacts = std::move(records);
+  // A contact that is yet to come starts as stiff as its rods' greatest force wants; that fades.
+  if (!given) state.contact_stiffness = (0.8 * state.contact_stiffness).cwiseMax(greatest);
+  return put_in;
+}
+
+double Contact::stiffen(State& state) {
+  const std::vector<Touching> deep = touching_;
+  begin(state, duration_);
+  double put_in = 0.0;
+  for (const Touching& t : deep) {
+    if (t.frozen >= 0) continue;
+    const ContactPair& pair = pairs_[at(t.pair)];
+    const double depth = (pair.radii() - t.distance) / pair.small_radius();
+    if (depth <= 2.0 * kDepth) continue;
+    const double factor = std::min(100.0, depth / kDepth);
+    const auto found = std::find_if(state.contacts.begin(), state.contacts.end(),
+                                    [&](const ContactRecord& r) { return r.key == pair.key; });
+    const auto pressed = std::find_if(touching_.begin(), touching_.end(),
+                                      [&](const Touching& s) { return pairs_[at(s.pair)].key == pair.key; });
+    if (found != state.contacts.end() && pressed != touching_.end()) {
+      put_in += change_stiffness(*pressed, std::min(factor, kBoldest), *found);
+      continue;
+    }
+    for (int rod : {pair.rod_a, pair.rod_b})
+      if (rod >= 0)
+        state.contact_stiffness(rod) = std::max(state.contact_stiffness(rod), factor * t.stiffness / pair.share);
+  }
+  return put_in;
+}
+
+void Contact::hold_sticking(const State& state, VectorX& change) const {
+  for (const ContactRecord& record : state.contacts) {
+    if (!record.sticking) continue;
+    for (int edge : {record.key.a, record.key.b}) {
+      if (edge < 0) continue;
+      change.segment(model_.tail_dof[at(edge)], model_.dimension).setZero();
+      change.segment(model_.head_dof[at(edge)], model_.dimension).setZero();
+      if (!model_.planar()) change(model_.edge_dof[at(edge)]) = 0.0;
+    }
+  }
+}
+
+double Contact::energy_of(const State& state) {
+  const State* kept = state_;
+  const double duration = duration_;
+  begin(state, 1.0);
+  state_ = kept;
+  duration_ = duration;
+  return start_energy_;
+}
+
+std::vector<ContactReport> Contact::report(const State& state) {
+  begin(state, 1.0);
+  std::vector<ContactReport> reports;
+  for (const Touching& t : touching_) {
+    const ContactPair& pair = pairs_[at(t.pair)];
+    ContactReport r;
+    r.key = pair.key;
+    r.distance = t.distance;
+    r.gap = t.distance - pair.radii();
+    r.s = t.points.s;
+    r.t = t.points.t;
+    r.normal = t.normal;
+    r.force = -t.energy.first;
+    Vec3d x[4];
+    end_points(pair, state.q, x);
+    const Vec3d on_a = x[0] + r.s * (x[1] - x[0]);
+    r.point = on_a - (pair.radius_a + 0.5 * r.gap) * t.normal;
+    if (const ContactRecord* record = record_of(pair.key)) {
+      r.friction = record->friction;
+      r.sticking = record->sticking;
+    }
+    reports.push_back(r);
+  }
+  return reports;
+}
+
+void Contact::forget() {
+  pairs_ = surfaces_.obstacle_pairs();
+  elements_.clear();
+  reference_.resize(0);
+  travel_ = 0.0;
+  touching_.clear();
+  lagged_.clear();
+  couple();
+}
+
+}  // namespace withe

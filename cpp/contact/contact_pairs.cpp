@@ -1,0 +1,162 @@
+#include <algorithm>
+#include <cmath>
+
+#include "contact/contact.hpp"
+
+namespace withe {
+namespace {
+
+std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+// Pairs nearer than this beyond their reach, over the sum of their radii, are part of the matrix's pattern.
+constexpr double kNear = 0.5;
+// Centrelines may come as near as this, over their distance or the sum of their radii, within an iteration.
+constexpr double kNearest = 0.5;
+
+}  // namespace
+
+/// Whether some node has left, or would leave, what the candidates were found for.
+bool Contact::outgrown(const VectorX& q, const VectorX* change) const {
+  if (surfaces_.edges().empty()) return false;
+  if (reference_.size() != q.size()) return true;
+  const double most = 0.25 * margin_ * margin_;
+  for (int dof : model_.node_dof) {
+    double square = 0.0, later = 0.0;
+    for (int k = 0; k < model_.dimension; ++k) {
+      const double d = q(dof + k) - reference_(dof + k);
+      square += d * d;
+      if (change) later += (d + (*change)(dof + k)) * (d + (*change)(dof + k));
+    }
+    if (!(std::max(square, later) <= most)) return true;
+  }
+  return false;
+}
+
+/// Candidates for the way from one configuration to another, and beyond by a margin that grows with the last travel.
+void Contact::find_pairs(const VectorX& from, const VectorX& to) {
+  if (surfaces_.edges().empty()) return;
+  if (reference_.size() == to.size()) {
+    travel_ = 0.0;
+    for (int dof : model_.node_dof)
+      travel_ =
+          std::max(travel_, (to.segment(dof, model_.dimension) - reference_.segment(dof, model_.dimension)).norm());
+  }
+  const double reach = surfaces_.greatest_reach();
+  margin_ = std::clamp(4.0 * travel_, 0.25 * reach, 2.0 * reach);
+  boxes_.clear();
+  for (int e : surfaces_.edges()) {
+    const int tail = model_.edge_tail[at(e)], head = model_.edge_head[at(e)];
+    const double grow = surfaces_.radius(e) + 0.5 * surfaces_.tolerance(e) + 0.5 * margin_;
+    Box box = Box::around(local_position(model_, from, tail), local_position(model_, from, head), grow);
+    if (&from != &to)
+      box.include(Box::around(local_position(model_, to, tail), local_position(model_, to, head), grow));
+    boxes_.push_back(box);
+  }
+  // What touches is known by the key of its pair while pairs are renumbered.
+  std::vector<ContactKey> keys;
+  for (const Touching& t : lagged_) keys.push_back(pairs_[at(t.pair)].key);
+  const std::size_t fixed = surfaces_.obstacle_pairs().size();
+  pairs_.resize(fixed);
+  for (const BroadPhase::Pair& found : broad_phase_.find(boxes_)) {
+    const int a = surfaces_.edges()[at(found.a)], b = surfaces_.edges()[at(found.b)];
+    if (!surfaces_.may_touch(a, b)) continue;
+    ContactPair pair = surfaces_.pair(a, b);
+    const auto known = std::lower_bound(elements_.begin(), elements_.end(), std::pair(pair.key, -1));
+    if (known != elements_.end() && known->first == pair.key) pair.element = known->second;
+    pairs_.push_back(pair);
+  }
+  for (std::size_t i = 0; i < keys.size(); ++i) {
+    const auto place =
+        std::find_if(pairs_.begin(), pairs_.end(), [&](const ContactPair& p) { return p.key == keys[i]; });
+    if (place == pairs_.end()) {
+      // Gone out of reach within a step: its friction of the start still acts.
+      pairs_.push_back(surfaces_.pair(keys[i].a, keys[i].b));
+      const auto known = std::lower_bound(elements_.begin(), elements_.end(), std::pair(keys[i], -1));
+      if (known != elements_.end() && known->first == keys[i]) pairs_.back().element = known->second;
+      lagged_[i].pair = static_cast<int>(pairs_.size()) - 1;
+    } else {
+      lagged_[i].pair = static_cast<int>(place - pairs_.begin());
+    }
+  }
+  reference_ = to;
+}
+
+bool Contact::coupled() const {
+  return std::all_of(touching_.begin(), touching_.end(),
+                     [&](const Touching& t) { return pairs_[at(t.pair)].element >= 0; });
+}
+
+void Contact::couple() {
+  elements_.clear();
+  element_unknowns_.clear();
+  std::vector<bool> now(pairs_.size(), false);
+  for (const Touching& t : touching_) now[at(t.pair)] = true;
+  const std::vector<Touching> kept = touching_;
+  for (std::size_t p = 0; p < pairs_.size(); ++p) {
+    ContactPair& pair = pairs_[p];
+    pair.element = -1;
+    const bool near =
+        pair.key.b < 0 || now[p] ||
+        (q1_.size() > 0 && touch(static_cast<int>(p), q1_).distance < pair.reach() + kNear * pair.radii());
+    if (!near) continue;
+    pair.element = static_cast<int>(elements_.size());
+    elements_.emplace_back(pair.key, pair.element);
+    touching_.assign(1, Touching{});
+    touching_.front().pair = static_cast<int>(p);
+    int dofs[kContactUnknowns];
+    unknowns(0, dofs);
+    element_unknowns_.insert(element_unknowns_.end(), std::begin(dofs), std::end(dofs));
+  }
+  touching_ = kept;
+  std::sort(elements_.begin(), elements_.end());
+}
+
+double Contact::allowed(const VectorX& q1, const VectorX& change) {
+  const std::size_t planes_only = surfaces_.obstacle_pairs().size();
+  if (outgrown(q1, &change)) {
+    const VectorX end = q1 + change;
+    find_pairs(q1, end);
+  }
+  double least = 1.0;
+  for (std::size_t p = 0; p < pairs_.size(); ++p) {
+    if (p < planes_only && pairs_[p].plane()) continue;
+    least = std::min(least, allowed_of(pairs_[p], q1, change));
+  }
+  return least;
+}
+
+/// Conservative advancement along straight lines: the distance falls no faster than the ends move against each other.
+double Contact::allowed_of(const ContactPair& pair, const VectorX& q, const VectorX& change) const {
+  Vec3d x[4], d[4] = {};
+  end_points(pair, q, x);
+  const int edges[2] = {pair.key.a, pair.key.b};
+  for (int side = 0; side < (pair.key.b < 0 ? 1 : 2); ++side) {
+    d[2 * side] = local_position(model_, change, model_.edge_tail[at(edges[side])]);
+    d[2 * side + 1] = local_position(model_, change, model_.edge_head[at(edges[side])]);
+  }
+  double speed = 0.0;
+  for (int a = 0; a < 2; ++a)
+    for (int b = 2; b < 4; ++b) speed = std::max(speed, dot(d[a] - d[b], d[a] - d[b]));
+  speed = std::sqrt(speed);
+  const Vec3d middle = 0.5 * (x[0] + x[1] - x[2] - x[3]), u = x[1] - x[0], v = x[3] - x[2];
+  const double bound =
+      std::sqrt(dot(middle, middle)) - 0.5 * (std::sqrt(dot(u, u)) + std::sqrt(dot(v, v))) - kNearest * pair.radii();
+  if (speed <= bound) return 1.0;
+  const auto distance_at = [&](double tau) {
+    const ClosestPoints c = closest_points(x[0] + tau * d[0], x[1] + tau * d[1], x[2] + tau * d[2], x[3] + tau * d[3],
+                                           pair.weight_a, pair.weight_b);
+    return std::sqrt(dot(c.between, c.between));
+  };
+  const double start = distance_at(0.0);
+  const double least = kNearest * std::min(start, pair.radii());
+  double tau = 0.0, distance = start;
+  for (int k = 0; k < 100; ++k) {
+    tau += (distance - 0.99 * least) / speed;
+    if (tau >= 1.0) return 1.0;
+    distance = distance_at(tau);
+    if (distance <= least) break;
+  }
+  return tau;
+}
+
+}  // namespace withe

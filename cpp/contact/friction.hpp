@@ -1,0 +1,161 @@
+#pragma once
+/// Friction of two surfaces that press against each other.
+///
+/// The slip of a step is that of the two material points at the contact, S = J (q1 - q0), without its part along the
+/// normal: what the closest points of the centrelines move, and what their edges turn and spin,
+///   S = sum_i w_i (x_i - x_i^0) + phi_a x r_a - phi_b x r_b,   phi = t x (e - e^0) / |e| + t (theta - theta^0),
+/// with r from the centreline to the surface. The force F on S goes back through the same J, so its work, F . S, is
+/// never negative, whatever the integrator.
+///   implicit, lagged: F = mu N tanh(K |S| / (2 dt)) S / |S|, K = 15 / nu [dissertation, (5.7)-(5.14), there between
+///                     centrelines]
+///   anchored:         F = k_t (stick + S), of length mu N at most: an elastic stick that slips [Simo and Hughes 1998]
+
+#include <cmath>
+
+#include "common/dual.hpp"
+#include "contact/contact_law.hpp"
+#include "contact/surfaces.hpp"
+#include "geometry/segment_distance.hpp"
+
+namespace withe {
+
+/// Unknowns of a contact: a0, a1, b0, b1 (3 each), angle of a, angle of b.
+inline constexpr int kContactUnknowns = 14;
+
+/// What stays the same while the unknowns of one contact change.
+struct FrictionSetting {
+  const ContactPair* pair = nullptr;
+  const Obstacle* obstacle = nullptr;
+  ClosestPoints points;                 ///< whose class is kept
+  double start[kContactUnknowns] = {};  ///< unknowns at the start of the step
+  Vec3d source[2];                      ///< tangents that the frames of a and b are transported from
+  ContactLaw contact_law = ContactLaw::imcv2;
+  FrictionLaw law = FrictionLaw::implicit;
+  double stiffness = 0;             ///< [N/m]
+  double tangential_stiffness = 0;  ///< of an anchor [N/m]
+  double rate = 0;                  ///< K / (2 dt) [1/m]
+  Vec3d stick{};                    ///< at the start of the step [m]
+  bool spatial = true, centreline = false;
+};
+
+template <class Scalar>
+struct FrictionForce {
+  Vec3<Scalar> force;    ///< of b on a, and back, turned round [N]
+  Vec3<Scalar> stick{};  ///< at the end of the step [m]
+  bool sticking = false;
+};
+
+/// tanh(c |S|) / |S| as a function of |S|^2.
+template <class Scalar>
+Scalar slip_factor(const Scalar& square, double c) {
+  using std::sqrt;
+  const double x2 = c * c * value_of(square);
+  if (x2 < 1e-8) return chain(square, c * (1.0 - x2 / 3.0), -c * c * c / 3.0);
+  const double x = std::sqrt(x2), t = std::tanh(x);
+  return chain(square, c * t / x, 0.5 * c * c * c * ((1.0 - t * t) - t / x) / x2);
+}
+
+/// The force F for a slip S and a normal force N.
+template <class Scalar>
+FrictionForce<Scalar> friction_force(const FrictionSetting& f, const Vec3<Scalar>& normal, const Vec3<Scalar>& slip,
+                                     const Scalar& pressing) {
+  using std::sqrt;
+  FrictionForce<Scalar> out;
+  const double mu = f.pair->friction;
+  if (f.law != FrictionLaw::anchored) {
+    const Scalar square = dot(slip, slip);
+    out.force = (mu * pressing * slip_factor(square, f.rate)) * slip;
+    out.sticking = f.rate * std::sqrt(value_of(square)) < 7.5;  // slower than the slip tolerance
+    return out;
+  }
+  Vec3<Scalar> stick{f.stick.x, f.stick.y, f.stick.z};
+  stick = stick - dot(stick, normal) * normal + slip;
+  const Scalar square = dot(stick, stick);
+  const Scalar limit = (mu / f.tangential_stiffness) * pressing;
+  const double most = std::max(value_of(limit), 0.0);
+  out.sticking = value_of(square) <= most * most;
+  if (!out.sticking) stick = (limit / sqrt(square)) * stick;
+  out.stick = stick;
+  out.force = Scalar(f.tangential_stiffness) * stick;
+  return out;
+}
+
+/// Adds to `gradient` the generalised forces J^T F (minus the friction on the rods), with F and S as they are at
+/// `unknown`; returns F. `pressing`: a normal force to use instead of that of the energy, or nothing.
+template <class Scalar>
+FrictionForce<Scalar> friction_gradient(const FrictionSetting& f, const Scalar (&unknown)[kContactUnknowns],
+                                        Scalar (&gradient)[kContactUnknowns]) {
+  using std::sqrt;
+  const auto point = [&](int i) { return Vec3<Scalar>{unknown[3 * i], unknown[3 * i + 1], unknown[3 * i + 2]}; };
+  const auto before = [&](int i) { return Vec3d{f.start[3 * i], f.start[3 * i + 1], f.start[3 * i + 2]}; };
+  const auto lift = [](const Vec3d& v) { return Vec3<Scalar>{Scalar(v.x), Scalar(v.y), Scalar(v.z)}; };
+  const ContactPair& pair = *f.pair;
+  const Vec3<Scalar> x[4] = {point(0), point(1), point(2), point(3)};
+  const Vec3<Scalar> edge[2] = {x[1] - x[0], x[3] - x[2]};
+  Scalar s = f.points.s, t = f.points.t, distance;
+  Vec3<Scalar> normal;
+  if (pair.plane()) {
+    normal = lift(f.obstacle->other);
+    distance = dot(normal, x[pair.key.end] - lift(f.obstacle->point));
+  } else {
+    const Vec3<Scalar> r = x[0] - x[2];
+    solve_parameters(r, edge[0], edge[1], pair.weight_a, pair.weight_b, f.points.s_free, f.points.t_free, s, t);
+    const Vec3<Scalar> between = r + s * edge[0] - t * edge[1];
+    const Scalar square = dot(between, between);
+    distance = sqrt(square + pair.weight_a * (s - 0.5) * (s - 0.5) + pair.weight_b * (t - 0.5) * (t - 0.5));
+    normal = (1.0 / sqrt(square)) * between;
+  }
+  const ContactEnergy e = contact_energy(f.contact_law, value_of(distance), pair.radii(), pair.tolerance);
+  const Scalar pressing = chain(distance, -f.stiffness * e.first, -f.stiffness * e.second);
+  Scalar w[4];
+  end_weights(s, t, w);
+  if (pair.rod_b < 0) w[2] = w[3] = Scalar(0.0);
+
+  Vec3<Scalar> slip{Scalar(0.0), Scalar(0.0), Scalar(0.0)};
+  for (int i = 0; i < 4; ++i) slip += w[i] * (x[i] - lift(before(i)));
+  struct Side {
+    Vec3<Scalar> arm, tangent, spin;
+    Scalar inverse;
+  };
+  Side sides[2];
+  const int bodies = f.centreline ? 0 : pair.rod_b < 0 ? 1 : 2;
+  for (int b = 0; b < bodies; ++b) {
+    Side& side = sides[b];
+    const double sign = b == 0 ? 1.0 : -1.0;
+    side.inverse = 1.0 / sqrt(dot(edge[b], edge[b]));
+    side.tangent = side.inverse * edge[b];
+    side.arm = Scalar(-sign * (b == 0 ? pair.radius_a : pair.radius_b)) * normal;
+    const Vec3<Scalar> change = edge[b] - lift(before(2 * b + 1) - before(2 * b));
+    Vec3<Scalar> turn = side.inverse * cross(side.tangent, change);
+    if (f.spatial) {
+      turn += (unknown[12 + b] - f.start[12 + b]) * side.tangent;
+      const Vec3<Scalar> source = lift(f.source[b]);
+      side.spin = -((side.inverse / (1.0 + dot(source, side.tangent))) * cross(source, side.tangent));
+    }
+    slip += Scalar(sign) * cross(turn, side.arm);
+  }
+  slip -= dot(slip, normal) * normal;
+  const FrictionForce<Scalar> out = friction_force(f, normal, slip, pressing);
+
+  const auto add = [&](int i, const Vec3<Scalar>& v) {
+    gradient[3 * i] += v.x;
+    gradient[3 * i + 1] += v.y;
+    gradient[3 * i + 2] += v.z;
+  };
+  for (int i = 0; i < 4; ++i) add(i, w[i] * out.force);
+  for (int b = 0; b < bodies; ++b) {
+    const Side& side = sides[b];
+    const Vec3<Scalar> torque = Scalar(b == 0 ? 1.0 : -1.0) * cross(side.arm, out.force);
+    Vec3<Scalar> couple = side.inverse * cross(torque, side.tangent);
+    if (f.spatial) {
+      const Scalar axial = dot(side.tangent, torque);
+      couple += axial * side.spin;
+      gradient[12 + b] += axial;
+    }
+    add(2 * b + 1, couple);
+    add(2 * b, -couple);
+  }
+  return out;
+}
+
+}  // namespace withe

@@ -1,0 +1,162 @@
+#include "contact/surfaces.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <numbers>
+#include <queue>
+#include <utility>
+
+#include "geometry/segment_distance.hpp"
+
+namespace withe {
+namespace {
+
+std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+double parallel_weight(double length, double radii) {
+  const double size = std::min(length, radii);
+  return kParallelWeight * size * size;
+}
+
+Vec3d in_axes(const Model& model, const Vector3& x, bool is_point) {
+  if (!model.planar()) return to_vec3(x);
+  const Vector3 from = is_point ? Vector3(x - model.plane->origin) : x;
+  return {from.dot(model.plane->first), from.dot(model.plane->second), 0.0};
+}
+
+}  // namespace
+
+Surfaces::Surfaces(const Model& model) : model_(model) {
+  const ContactDescription& contact = model.description.contact;
+  for (const RodDescription& rod : model.description.rods)
+    for (Eigen::Index e = 0; e < rod.rest_lengths.size(); ++e)
+      radius_.push_back(rod.contact_radius.size() > 0 ? rod.contact_radius(e) : 0.0);
+  if (contact.rods) {
+    for (int e = 0; e < model.edge_count; ++e)
+      if (radius(e) > 0.0) edges_.push_back(e);
+    for (int e : edges_) greatest_reach_ = std::max(greatest_reach_, 2.0 * radius(e) + tolerance(e));
+    find_neighbours();
+  }
+  add_obstacles();
+}
+
+double Surfaces::tolerance(int edge) const {
+  const double given = model_.description.contact.distance_tolerance;
+  return given > 0.0 ? given : 0.1 * radius(edge);
+}
+
+double Surfaces::pair_friction(int first, int second, double otherwise, bool& ignored) const {
+  ignored = false;
+  for (const ContactPairDescription& p : model_.description.contact.pairs)
+    if ((p.first == first && p.second == second) || (p.first == second && p.second == first)) {
+      ignored = p.ignored;
+      otherwise = p.friction;
+    }
+  return otherwise;
+}
+
+/// Edges that a walk along rods, through joints too, reaches before it has gone too far for a rod to touch itself.
+void Surfaces::find_neighbours() {
+  std::vector<std::vector<int>> edges_at(at(model_.node_count));
+  for (int e = 0; e < model_.edge_count; ++e) {
+    edges_at[at(model_.edge_tail[at(e)])].push_back(e);
+    edges_at[at(model_.edge_head[at(e)])].push_back(e);
+  }
+  neighbours_.resize(at(model_.edge_count));
+  std::vector<double> distance(at(model_.node_count), INFINITY);
+  using Visit = std::pair<double, int>;
+  for (int e : edges_) {
+    const double limit = 0.5 * std::numbers::pi * (2.0 * radius(e) + tolerance(e));
+    std::priority_queue<Visit, std::vector<Visit>, std::greater<>> queue;
+    std::vector<int> seen;
+    const auto reach = [&](int node, double d) {
+      if (d >= limit || d >= distance[at(node)]) return;
+      if (!std::isfinite(distance[at(node)])) seen.push_back(node);
+      distance[at(node)] = d;
+      queue.emplace(d, node);
+    };
+    reach(model_.edge_tail[at(e)], 0.0);
+    reach(model_.edge_head[at(e)], 0.0);
+    std::vector<int>& found = neighbours_[at(e)];
+    while (!queue.empty()) {
+      const auto [d, node] = queue.top();
+      queue.pop();
+      if (d > distance[at(node)]) continue;
+      for (int other : edges_at[at(node)]) {
+        found.push_back(other);
+        reach(model_.edge_tail[at(other)], d + model_.edge_length(other));
+        reach(model_.edge_head[at(other)], d + model_.edge_length(other));
+      }
+    }
+    for (int node : seen) distance[at(node)] = INFINITY;
+    std::sort(found.begin(), found.end());
+    found.erase(std::unique(found.begin(), found.end()), found.end());
+  }
+}
+
+bool Surfaces::may_touch(int a, int b) const {
+  if (a == b || std::binary_search(neighbours_[at(a)].begin(), neighbours_[at(a)].end(), b) ||
+      std::binary_search(neighbours_[at(b)].begin(), neighbours_[at(b)].end(), a))
+    return false;
+  bool ignored = false;
+  pair_friction(model_.edge_rod[at(a)], model_.edge_rod[at(b)], 0.0, ignored);
+  return !ignored;
+}
+
+ContactPair Surfaces::pair(int a, int b) const {
+  ContactPair p;
+  p.key = {a, b, -1};
+  p.rod_a = model_.edge_rod[at(a)];
+  p.rod_b = model_.edge_rod[at(b)];
+  p.radius_a = radius(a);
+  p.radius_b = radius(b);
+  p.tolerance = std::min(tolerance(a), tolerance(b));
+  p.weight_a = parallel_weight(model_.edge_length(a), p.radii());
+  p.weight_b = parallel_weight(model_.edge_length(b), p.radii());
+  bool ignored = false;
+  p.friction = pair_friction(p.rod_a, p.rod_b, model_.description.contact.friction, ignored);
+  return p;
+}
+
+void Surfaces::add_obstacles() {
+  const ContactDescription& contact = model_.description.contact;
+  std::vector<int> degree(at(model_.node_count), 0);
+  for (int e = 0; e < model_.edge_count; ++e) {
+    ++degree[at(model_.edge_tail[at(e)])];
+    ++degree[at(model_.edge_head[at(e)])];
+  }
+  for (std::size_t o = 0; o < contact.obstacles.size(); ++o) {
+    const ObstacleDescription& d = contact.obstacles[o];
+    const bool plane = d.kind == ObstacleKind::plane;
+    obstacles_.push_back({d.kind, in_axes(model_, d.point, true), in_axes(model_, d.other, !plane), d.radius});
+    const int body = -1 - static_cast<int>(o);
+    for (int e = 0; e < model_.edge_count; ++e) {
+      if (!(radius(e) > 0.0)) continue;
+      ContactPair p;
+      p.key = {e, body, -1};
+      p.rod_a = model_.edge_rod[at(e)];
+      p.radius_a = radius(e);
+      p.radius_b = d.radius;
+      p.tolerance = tolerance(e);
+      bool ignored = false;
+      p.friction = pair_friction(p.rod_a, body, contact.obstacle_friction(static_cast<Eigen::Index>(o)), ignored);
+      if (ignored) continue;
+      if (!plane) {
+        p.weight_a = parallel_weight(model_.edge_length(e), p.radii());
+        p.weight_b = parallel_weight((d.other - d.point).norm(), p.radii());
+        if (p.weight_b == 0.0) p.weight_b = p.weight_a;  // a sphere: any point of its segment is the same
+        obstacle_pairs_.push_back(p);
+        continue;
+      }
+      for (int end = 0; end < 2; ++end) {
+        const int node = (end == 0 ? model_.edge_tail : model_.edge_head)[at(e)];
+        p.key.end = end;
+        p.share = 1.0 / degree[at(node)];
+        obstacle_pairs_.push_back(p);
+      }
+    }
+  }
+}
+
+}  // namespace withe

@@ -1,0 +1,71 @@
+#pragma once
+/// What may touch what: radii, obstacles in the model's own axes, and pairs that are left out. Built once.
+
+#include <vector>
+
+#include "geometry/vec3.hpp"
+#include "model/state.hpp"
+
+namespace withe {
+
+/// Two surfaces that may touch, and all that does not change while they do.
+struct ContactPair {
+  ContactKey key;
+  int rod_a = 0, rod_b = -1;          ///< -1: an obstacle
+  double radius_a = 0, radius_b = 0;  ///< [m]
+  double tolerance = 0;               ///< delta [m]
+  double weight_a = 0, weight_b = 0;  ///< of closest_points [m^2]
+  double share = 1;                   ///< of a node's contact with a plane, which its two edges share
+  double friction = 0;                ///< [-]
+  int element = -1;                   ///< row of its unknowns in the matrix's table; -1: none yet
+
+  double radii() const { return radius_a + radius_b; }
+  double reach() const { return radii() + tolerance; }
+  double small_radius() const { return rod_b < 0 || radius_a < radius_b ? radius_a : radius_b; }
+  bool plane() const { return key.end >= 0; }
+};
+
+/// An obstacle in the axes of the unknowns (in a plane: its two, and zero).
+struct Obstacle {
+  ObstacleKind kind = ObstacleKind::plane;
+  Vec3d point{}, other{};  ///< of a plane: its normal
+  double radius = 0;
+};
+
+class Surfaces {
+ public:
+  explicit Surfaces(const Model& model);
+
+  const std::vector<Obstacle>& obstacles() const { return obstacles_; }
+  /// Pairs with obstacles: every edge that has a surface with every obstacle that is not ignored.
+  const std::vector<ContactPair>& obstacle_pairs() const { return obstacle_pairs_; }
+  /// Edges that may touch other edges.
+  const std::vector<int>& edges() const { return edges_; }
+  double radius(int edge) const { return radius_[static_cast<std::size_t>(edge)]; }
+  double tolerance(int edge) const;
+  /// Whether two edges may touch: not neighbours along the rod nearer than (pi / 2) (2 h + delta), not ignored.
+  bool may_touch(int a, int b) const;
+  ContactPair pair(int a, int b) const;
+  double greatest_reach() const { return greatest_reach_; }
+
+ private:
+  void find_neighbours();
+  void add_obstacles();
+  double pair_friction(int first, int second, double otherwise, bool& ignored) const;
+
+  const Model& model_;
+  std::vector<double> radius_;
+  std::vector<int> edges_;
+  std::vector<std::vector<int>> neighbours_;  ///< per edge, sorted
+  std::vector<Obstacle> obstacles_;
+  std::vector<ContactPair> obstacle_pairs_;
+  double greatest_reach_ = 0;
+};
+
+/// Position of a node as a vector of three numbers, in the axes of the unknowns.
+inline Vec3d local_position(const Model& model, const VectorX& q, int node) {
+  const int dof = model.node_dof[static_cast<std::size_t>(node)];
+  return {q(dof), q(dof + 1), model.planar() ? 0.0 : q(dof + 2)};
+}
+
+}  // namespace withe

@@ -1,0 +1,77 @@
+#include <cstdio>
+#include <string>
+
+#include "common/check.hpp"
+#include "world/implementation.hpp"
+
+namespace withe {
+namespace {
+
+std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+// Surfaces may be this deep in each other when drawn, over the smaller radius: as deep as contact lets them be.
+constexpr double kDrawnDepth = 0.04;
+
+Vector3 in_space(const Model& model, const Vec3d& v, bool is_point) {
+  if (!model.planar()) return to_eigen(v);
+  const Plane& p = *model.plane;
+  return v.x * p.first + v.y * p.second + (is_point ? p.origin : Vector3(Vector3::Zero()));
+}
+
+}  // namespace
+
+ContactTable World::contacts() const {
+  const Implementation& self = *implementation_;
+  ContactTable table;
+  table.bodies.resize(0, 5);
+  table.numbers.resize(0, 14);
+  Contact* contact = self.equations->contact();
+  if (contact == nullptr) return table;
+  const Model& model = self.model;
+  const std::vector<ContactReport> reports = contact->report(self.state);
+  const auto rows = static_cast<Eigen::Index>(reports.size());
+  table.bodies.resize(rows, 5);
+  table.numbers.resize(rows, 14);
+  for (Eigen::Index i = 0; i < rows; ++i) {
+    const ContactReport& r = reports[static_cast<std::size_t>(i)];
+    const int rod_a = model.edge_rod[at(r.key.a)], rod_b = r.key.b < 0 ? r.key.b : model.edge_rod[at(r.key.b)];
+    table.bodies.row(i) << rod_a, r.key.a - model.rod_first_edge[at(rod_a)], rod_b,
+        r.key.b < 0 ? -1 : r.key.b - model.rod_first_edge[at(rod_b)], r.sticking ? 1 : 0;
+    const Vector3 point = in_space(model, r.point, true), normal = in_space(model, r.normal, false),
+                  friction = in_space(model, r.friction, false);
+    table.numbers.row(i) << r.distance, r.gap, point.transpose(), normal.transpose(), r.force, friction.transpose(),
+        r.s, r.t;
+  }
+  return table;
+}
+
+/// Refuses a drawing in which surfaces are inside each other.
+void World::Implementation::check_overlap() const {
+  Contact* contact = equations->contact();
+  if (contact == nullptr) return;
+  const ContactReport* deepest = nullptr;
+  const std::vector<ContactReport> reports = contact->report(state);
+  double depth = kDrawnDepth;
+  for (const ContactReport& r : reports) {
+    const double radius = r.key.b < 0
+                              ? contact->surfaces().radius(r.key.a)
+                              : std::min(contact->surfaces().radius(r.key.a), contact->surfaces().radius(r.key.b));
+    if (-r.gap <= depth * radius) continue;
+    depth = -r.gap / radius;
+    deepest = &r;
+  }
+  if (deepest == nullptr) return;
+  const auto name = [&](int edge) {
+    const int rod = model.edge_rod[at(edge)];
+    return "edge " + std::to_string(edge - model.rod_first_edge[at(rod)]) + " of rod '" +
+           description.rods[at(rod)].name + "'";
+  };
+  const std::string other = deepest->key.b < 0 ? "'" + description.contact.obstacles[at(-1 - deepest->key.b)].name + "'"
+                                               : name(deepest->key.b);
+  char depth_text[32];
+  std::snprintf(depth_text, sizeof depth_text, "%.3g", -deepest->gap);
+  require(false, name(deepest->key.a) + " and " + other + " overlap by " + depth_text +
+                     " m at the start: draw them apart, or leave the pair out with ignore_contact");
+}
+
+}  // namespace withe

@@ -1,0 +1,327 @@
+"""What the rods of a scene may touch: the part of `Scene` that is about contact and friction."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, Literal, cast
+
+import numpy as np
+import numpy.typing as npt
+
+from withe import _core, validation
+from withe.directory import Directory
+from withe.handles import Obstacle, Rod
+from withe.parts import ContactModel, ContactSettings, FrictionModel, ObstaclePart, RodPart
+
+__all__ = ["CONTACT", "Contacts", "contact_table", "describe_contact"]
+
+FloatArray = npt.NDArray[np.float64]
+
+CONTACT = np.dtype(
+    [
+        ("pair", "U64", (2,)),
+        ("edge", np.int64, (2,)),
+        ("distance", float),
+        ("gap", float),
+        ("point", float, (3,)),
+        ("normal", float, (3,)),
+        ("normal_force", float),
+        ("friction", float, (3,)),
+        ("sticking", bool),
+    ]
+)
+
+
+class Contacts:
+    """Obstacles, contact of rods, and friction of a scene."""
+
+    _directory: Directory
+
+    def add_floor(self, height: float = 0.0, *, friction: float = 0.0, name: str | None = None) -> Obstacle:
+        """Add a floor at a height [m], with its normal along +z.
+
+        Parameters
+        ----------
+        height : float [m]
+        friction : float
+            Coefficient between the floor and every rod; see `set_friction` for single rods.
+        name : str
+
+        Returns
+        -------
+        Obstacle
+
+        Raises
+        ------
+        ValueError
+            A height that is no number, or negative friction.
+        """
+        height = validation.number(height, "height of the floor")
+        name = self._directory.new_name(name, "floor")
+        return self._obstacle(name, "plane", np.array([0.0, 0.0, height]), np.array([0.0, 0.0, 1.0]), 0.0, friction)
+
+    def add_plane(
+        self, point: npt.ArrayLike, normal: npt.ArrayLike, *, friction: float = 0.0, name: str | None = None
+    ) -> Obstacle:
+        """Add a plane through a point; what is behind it, against its normal, is solid.
+
+        Parameters
+        ----------
+        point : array_like of shape (3,) [m]
+        normal : array_like of shape (3,)
+            Of any length.
+        friction : float
+        name : str
+
+        Returns
+        -------
+        Obstacle
+        """
+        name = self._directory.new_name(name, "plane")
+        where = validation.vector(point, f"point of {name!r}")
+        return self._obstacle(
+            name, "plane", where, validation.unit_vector(normal, f"normal of {name!r}"), 0.0, friction
+        )
+
+    def add_sphere(
+        self, center: npt.ArrayLike, radius: float, *, friction: float = 0.0, name: str | None = None
+    ) -> Obstacle:
+        """Add a solid sphere.
+
+        Parameters
+        ----------
+        center : array_like of shape (3,) [m]
+        radius : float [m]
+        friction : float
+        name : str
+
+        Returns
+        -------
+        Obstacle
+        """
+        name = self._directory.new_name(name, "sphere")
+        where = validation.vector(center, f"center of {name!r}")
+        return self._obstacle(
+            name, "capsule", where, where, validation.positive(radius, f"radius of {name!r}"), friction
+        )
+
+    def add_capsule(
+        self,
+        start: npt.ArrayLike,
+        end: npt.ArrayLike,
+        radius: float,
+        *,
+        friction: float = 0.0,
+        name: str | None = None,
+    ) -> Obstacle:
+        """Add a solid cylinder with round ends.
+
+        Parameters
+        ----------
+        start, end : array_like of shape (3,) [m]
+            Of its axis.
+        radius : float [m]
+        friction : float
+        name : str
+
+        Returns
+        -------
+        Obstacle
+        """
+        name = self._directory.new_name(name, "capsule")
+        first, last = validation.vector(start, f"start of {name!r}"), validation.vector(end, f"end of {name!r}")
+        return self._obstacle(
+            name, "capsule", first, last, validation.positive(radius, f"radius of {name!r}"), friction
+        )
+
+    def enable_contact(
+        self,
+        *,
+        friction: float = 0.0,
+        model: ContactModel = "imcv2",
+        friction_model: FrictionModel = "implicit",
+        distance_tolerance: float | None = None,
+        slip_tolerance: float = 1e-3,
+        stiffness: float | None = None,
+        centreline_friction: bool = False,
+    ) -> None:
+        """Let rods touch each other and themselves. Obstacles need no such word; its tolerances are theirs too.
+
+        A rod does not touch itself within (pi / 2) (2 radius + tolerance) along it, joints included.
+
+        Parameters
+        ----------
+        friction : float
+            Coefficient between rods.
+        model : {"imcv2", "barrier"}
+            Energy of contact: the smooth penalty of the dissertation's (5.2), or a barrier, (5.1).
+        friction_model : {"implicit", "lagged", "anchored"}
+            At the end of the step, exactly; with the forces of its start, which keeps the equations
+            symmetric; or an elastic stick that holds a load without creep.
+        distance_tolerance : float [m]
+            Surfaces nearer than this press on each other; by default a tenth of the smaller radius.
+        slip_tolerance : float [m/s]
+            Slip slower than this counts as sticking, with less friction than the coefficient allows.
+        stiffness : float [N/m]
+            Of contact; by default it follows the forces, so that surfaces are about a hundredth of the
+            smaller radius deep in each other.
+        centreline_friction : bool
+            Let friction act on the centrelines, as in the dissertation, and not where surfaces touch.
+
+        Raises
+        ------
+        ValueError
+            Negative friction, a tolerance or stiffness that is not positive, a tolerance above a radius.
+
+        Examples
+        --------
+        >>> import withe
+        >>> scene = withe.Scene()
+        >>> rubber = withe.Material(youngs_modulus=1e6, density=1000.0)
+        >>> rod = scene.add_rod(start=(0, 0, 0.01), end=(0.3, 0, 0.01), nodes=31, radius=5e-3, material=rubber)
+        >>> floor = scene.add_floor(friction=0.4)
+        >>> scene.enable_contact(friction=0.3)
+        >>> simulation = scene.build(time_step=5e-3)
+        >>> simulation.step(40)
+        >>> len(simulation.contacts()) > 0
+        True
+        """
+        settings = self._directory.contact
+        self._directory.contact = replace(
+            settings,
+            rods=True,
+            friction=validation.non_negative(friction, "friction"),
+            model=cast(ContactModel, validation.choice(model, "model of contact", ("imcv2", "barrier"))),
+            friction_model=cast(
+                FrictionModel,
+                validation.choice(friction_model, "friction_model", ("implicit", "lagged", "anchored")),
+            ),
+            distance_tolerance=_optional(distance_tolerance, "distance_tolerance"),
+            slip_tolerance=validation.positive(slip_tolerance, "slip_tolerance"),
+            stiffness=_optional(stiffness, "stiffness of contact"),
+            centreline_friction=validation.truth(centreline_friction, "centreline_friction"),
+        )
+
+    def set_friction(self, a: Rod | Obstacle | str, b: Rod | Obstacle | str, friction: float) -> None:
+        """Give two rods, or a rod and an obstacle, a friction coefficient of their own."""
+        self._set_pair(a, b, validation.non_negative(friction, "friction"))
+
+    def ignore_contact(self, a: Rod | Obstacle | str, b: Rod | Obstacle | str) -> None:
+        """Let two rods, or a rod and an obstacle, pass through each other; a rod and itself too."""
+        self._set_pair(a, b, None)
+
+    def set_contact_group(self, rod: Rod | str, group: str) -> None:
+        """Put a rod into a group, whose members do not touch each other or themselves.
+
+        Raises
+        ------
+        ValueError
+            Not a rod, or a group whose name is no text.
+        """
+        part = self._directory.rod(rod)
+        if not isinstance(group, str) or not group:
+            raise ValueError(f"group of rod {part.name!r} must be text, got {group!r:.80}")
+        settings = self._directory.contact
+        self._directory.contact = replace(settings, groups={**settings.groups, part.name: group})
+
+    def _set_pair(self, a: Any, b: Any, friction: float | None) -> None:
+        first, second = self._touching(a), self._touching(b)
+        if isinstance(first, ObstaclePart) and isinstance(second, ObstaclePart):
+            raise ValueError(f"{first.name!r} and {second.name!r} are both obstacles, which never touch")
+        settings = self._directory.contact
+        key = (first.name, second.name) if first.name <= second.name else (second.name, first.name)
+        self._directory.contact = replace(settings, pairs={**settings.pairs, key: friction})
+
+    def _touching(self, handle: Any) -> RodPart | ObstaclePart:
+        part = self._directory.find_any(handle, "what touches")
+        if not isinstance(part, RodPart | ObstaclePart):
+            raise ValueError(f"what touches must be a rod or an obstacle, got {part.name!r}")
+        return part
+
+    def _obstacle(
+        self,
+        name: str,
+        kind: Literal["plane", "capsule"],
+        point: FloatArray,
+        other: FloatArray,
+        radius: float,
+        friction: float,
+    ) -> Obstacle:
+        friction = validation.non_negative(friction, f"friction of {name!r}")
+        return cast(Obstacle, self._directory.add(ObstaclePart(name, kind, point, other, radius, friction)))
+
+
+def _optional(value: float | None, what: str) -> float | None:
+    return None if value is None else validation.positive(value, what)
+
+
+def describe_contact(directory: Directory) -> _core.ContactDescription:
+    """What touches, for the engine.
+
+    Raises
+    ------
+    ValueError
+        A distance tolerance above the radius of a rod.
+    """
+    settings: ContactSettings = directory.contact
+    contact = _core.ContactDescription()
+    contact.rods = settings.rods
+    contact.friction = settings.friction
+    contact.law = settings.model
+    contact.friction_law = settings.friction_model
+    contact.distance_tolerance = settings.distance_tolerance or 0.0
+    contact.slip_tolerance = settings.slip_tolerance
+    contact.stiffness = settings.stiffness or 0.0
+    contact.centreline_friction = settings.centreline_friction
+    obstacles = directory.all(ObstaclePart)
+    rods = directory.all(RodPart)
+    for rod in rods:
+        smallest = float(rod.section.radii.min())
+        if settings.distance_tolerance is not None and settings.distance_tolerance > smallest:
+            raise ValueError(
+                f"distance_tolerance must not exceed the radius of rod {rod.name!r}, {smallest:g} m, "
+                f"got {settings.distance_tolerance:g} m"
+            )
+    contact.obstacles = [_describe_obstacle(part) for part in obstacles]
+    contact.obstacle_friction = np.array([part.friction for part in obstacles], dtype=float)
+    bodies = {rod.name: rod.index for rod in rods} | {part.name: -1 - i for i, part in enumerate(obstacles)}
+    pairs = [_pair(bodies[a], bodies[b], friction) for (a, b), friction in settings.pairs.items()]
+    members = list(settings.groups.items())
+    for i, (a, group) in enumerate(members):
+        pairs += [_pair(bodies[a], bodies[b], None) for b, other in members[i:] if other == group]
+    contact.pairs = pairs
+    return contact
+
+
+def _describe_obstacle(part: ObstaclePart) -> _core.ObstacleDescription:
+    obstacle = _core.ObstacleDescription()
+    obstacle.kind = part.kind
+    obstacle.point = part.point
+    obstacle.other = part.other
+    obstacle.radius = part.radius
+    obstacle.name = part.name
+    return obstacle
+
+
+def _pair(first: int, second: int, friction: float | None) -> _core.ContactPairDescription:
+    pair = _core.ContactPairDescription()
+    pair.first, pair.second = first, second
+    pair.ignored = friction is None
+    pair.friction = friction or 0.0
+    return pair
+
+
+def contact_table(directory: Directory, table: _core.ContactTable) -> npt.NDArray[np.void]:
+    """Contacts of the engine as a structured array with names."""
+    rods = [rod.name for rod in directory.layout.rods]
+    obstacles = [part.name for part in directory.all(ObstaclePart)]
+    contacts = np.zeros(len(table.bodies), CONTACT)
+    bodies, numbers = table.bodies, table.numbers
+    for i, (a, _, b, _, _) in enumerate(bodies):
+        contacts["pair"][i] = rods[a], rods[b] if b >= 0 else obstacles[-1 - b]
+    contacts["edge"] = bodies[:, [1, 3]]
+    contacts["sticking"] = bodies[:, 4] != 0
+    contacts["distance"], contacts["gap"] = numbers[:, 0], numbers[:, 1]
+    contacts["point"], contacts["normal"] = numbers[:, 2:5], numbers[:, 5:8]
+    contacts["normal_force"], contacts["friction"] = numbers[:, 8], numbers[:, 9:12]
+    return contacts

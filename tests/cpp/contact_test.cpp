@@ -1,0 +1,145 @@
+// What touches what, against brute force. The oracles:
+//   - closest points: the least of |p - q|^2 plus the small weights over a fine grid of both parameters;
+//   - overlaps of boxes: every pair, one by one.
+// Invariants: the distance is symmetric in its segments and its gradient continuous across classes and at parallel
+// segments; each law's derivatives are those of its energy.
+
+#include "contact/contact.hpp"
+
+#include <gtest/gtest.h>
+
+#include <set>
+
+#include "contact/contact_law.hpp"
+#include "derivative_check.hpp"
+#include "scenes.hpp"
+
+namespace withe {
+namespace {
+
+using testing::RandomNumbers;
+
+Vec3d random_point(RandomNumbers& random) {
+  const Vector3 v = random.vector();
+  return {v.x(), v.y(), v.z()};
+}
+
+double weighted_square(const Vec3d (&x)[4], double s, double t, double A, double B) {
+  const Vec3d d = x[0] + s * (x[1] - x[0]) - x[2] - t * (x[3] - x[2]);
+  return dot(d, d) + A * (s - 0.5) * (s - 0.5) + B * (t - 0.5) * (t - 0.5);
+}
+
+TEST(SegmentDistance, IsTheLeastOverBothSegments) {
+  RandomNumbers random(3);
+  for (int k = 0; k < 300; ++k) {
+    Vec3d x[4] = {random_point(random), random_point(random), random_point(random), random_point(random)};
+    if (k % 3 == 0) x[3] = x[2] + x[1] - x[0];  // parallel
+    if (k % 7 == 0) x[3] = x[2];                // a point
+    const double A = 1e-3, B = 2e-3;
+    const ClosestPoints p = closest_points(x[0], x[1], x[2], x[3], A, B);
+    EXPECT_NEAR(p.square, weighted_square(x, p.s, p.t, A, B), 1e-12);
+    const int n = 60;
+    for (int i = 0; i <= n; ++i)
+      for (int j = 0; j <= n; ++j)
+        ASSERT_LE(p.square, weighted_square(x, i / double(n), j / double(n), A, B) + 1e-12) << "case " << k;
+  }
+}
+
+TEST(SegmentDistance, GradientIsContinuousThroughParallel) {
+  const Vec3d a0{-0.5, 0, 0}, a1{0.5, 0, 0};
+  Vec3d last{};
+  for (int k = -20; k <= 20; ++k) {
+    const double turn = 1e-3 * k;
+    const Vec3d b0{-0.4, -0.4 * turn, 0.2}, b1{0.6, 0.6 * turn, 0.2};
+    const ClosestPoints p = closest_points(a0, a1, b0, b1, 1e-3, 1e-3);
+    double w[4];
+    end_weights(p.s, p.t, w);
+    const Vec3d g = w[0] * p.between;
+    if (k > -20) {
+      const Vec3d step = g - last;
+      EXPECT_LT(std::sqrt(dot(step, step)), 0.02 * 0.2) << "turned by " << turn;
+    }
+    last = g;
+  }
+}
+
+TEST(ContactLaw, DerivativesAreThoseOfTheEnergy) {
+  const double radii = 1.0, tolerance = 0.1;
+  for (ContactLaw law : {ContactLaw::imcv2, ContactLaw::barrier})
+    for (double distance : {0.5, 0.89, 0.91, 0.97, 1.0, 1.003, 1.02, 1.05, 1.09}) {
+      if (law == ContactLaw::barrier && distance <= 1.001) continue;
+      const ContactEnergy e = contact_energy(law, distance, radii, tolerance);
+      const auto value = [&](const VectorX& x) { return contact_energy(law, x(0), radii, tolerance).value; };
+      const auto slope = [&](const VectorX& x) {
+        return VectorX::Constant(1, contact_energy(law, x(0), radii, tolerance).first);
+      };
+      const double h = distance < 1.01 ? 3e-4 : 5e-4;
+      EXPECT_TRUE(testing::gradient_matches(value, VectorX::Constant(1, distance), VectorX::Constant(1, e.first), h))
+          << "law " << static_cast<int>(law) << ", distance " << distance;
+      EXPECT_TRUE(testing::derivative_matches(slope, VectorX::Constant(1, distance),
+                                              Eigen::MatrixXd::Constant(1, 1, e.second), h))
+          << "law " << static_cast<int>(law) << ", distance " << distance;
+    }
+}
+
+TEST(ContactLaw, IsNothingBeyondItsReach) {
+  for (ContactLaw law : {ContactLaw::imcv2, ContactLaw::barrier})
+    EXPECT_EQ(contact_energy(law, 1.1 + 1e-12, 1.0, 0.1).value, 0.0);
+}
+
+TEST(BroadPhase, FindsTheOverlapsThatBruteForceFinds) {
+  RandomNumbers random(9);
+  BroadPhase broad_phase;
+  for (int round = 0; round < 60; ++round) {
+    std::vector<Box> boxes;
+    const double spread = round % 3 == 0 ? 0.3 : 3.0;
+    for (int i = 0; i < 120; ++i) {
+      const Vec3d at = spread * random_point(random);
+      const double size = round % 4 == 0 && i % 10 == 0 ? 3.0 : 0.3;
+      boxes.push_back(Box::around(at, at + size * random_point(random), 0.05));
+    }
+    std::set<std::pair<int, int>> expected, found;
+    for (int i = 0; i < 120; ++i)
+      for (int j = i + 1; j < 120; ++j)
+        if (boxes[static_cast<std::size_t>(i)].overlaps(boxes[static_cast<std::size_t>(j)])) expected.insert({i, j});
+    const std::vector<BroadPhase::Pair>& pairs = broad_phase.find(boxes);
+    for (const BroadPhase::Pair& p : pairs) found.insert({p.a, p.b});
+    EXPECT_EQ(found, expected);
+    EXPECT_EQ(pairs.size(), found.size()) << "a pair came twice";
+  }
+}
+
+/// A rod with a surface, closed or not.
+SceneDescription tube(const MatrixX3& points, bool closed, double radius) {
+  testing::SceneBuilder builder;
+  builder.add_rod(points, {}, closed);
+  RodDescription& rod = builder.scene.rods.back();
+  rod.contact_radius.setConstant(rod.rest_lengths.size(), radius);
+  builder.scene.contact.rods = true;
+  return builder.scene;
+}
+
+TEST(Surfaces, NeighboursAlongTheRodDoNotTouchHoweverFineItIs) {
+  for (int nodes : {11, 41, 161}) {
+    const double radius = 0.1, length = 4.0;
+    const Model model =
+        build_model(tube(testing::line(Vector3::Zero(), Vector3(length, 0, 0), nodes), false, radius), std::nullopt);
+    const Surfaces surfaces(model);
+    const double limit = 0.5 * testing::kPi * 2.1 * radius, edge = length / (nodes - 1);
+    for (int other = 1; other < nodes - 1; ++other) {
+      const double between = (other - 1) * edge;  // of the nearest ends of edges 0 and `other`
+      EXPECT_EQ(surfaces.may_touch(0, other), between >= limit) << nodes << " nodes, edge " << other;
+    }
+  }
+}
+
+TEST(Surfaces, NeighboursAreCountedRoundAClosedRod) {
+  const Model model = build_model(tube(testing::ring(40, 1.0, 0.0), true, 0.1), std::nullopt);
+  const Surfaces surfaces(model);
+  EXPECT_FALSE(surfaces.may_touch(0, 39));
+  EXPECT_FALSE(surfaces.may_touch(0, 38));
+  EXPECT_TRUE(surfaces.may_touch(0, 20));
+}
+
+}  // namespace
+}  // namespace withe

@@ -1,0 +1,114 @@
+"""Contact and friction against what a block, a slope and a knot would do."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+import withe
+
+FloatArray = npt.NDArray[np.float64]
+
+RUBBER = withe.Material(youngs_modulus=1e6, poisson_ratio=0.5, density=1200.0)
+RADIUS = 5e-3
+IMPLICIT = ["backward_euler", "implicit_midpoint", "energy_momentum"]
+
+
+def excess(simulation: withe.Simulation, start: float) -> float:
+    """Energy that nothing has put in [J]."""
+    now = simulation.energy()
+    return now.total - now.work + now.dissipated - start
+
+
+@pytest.mark.parametrize("integrator", IMPLICIT)
+def test_a_rod_that_falls_on_a_floor_comes_to_rest_on_it_and_never_gains_energy(integrator: Any) -> None:
+    scene = withe.Scene()
+    rod = scene.add_rod(start=(0, 0, 0.02), end=(0.3, 0, 0.03), nodes=21, radius=RADIUS, material=RUBBER)
+    scene.add_floor()
+    simulation = scene.build(integrator=integrator, time_step=2e-3)
+    start = simulation.energy().total
+    gained = 0.0
+    for _ in range(400):
+        simulation.step()
+        gained = max(gained, excess(simulation, start))
+    weight = 1200.0 * np.pi * RADIUS**2 * 0.3 * 9.81
+    fallen = weight * 0.02
+    assert gained < 0.01 * fallen
+    height = simulation.positions(rod)[:, 2]
+    assert height.min() > 0.96 * RADIUS
+    if integrator == "backward_euler":
+        assert simulation.contacts()["normal_force"].sum() == pytest.approx(weight, rel=2e-3)
+        assert height.max() < 1.1 * RADIUS  # the distance tolerance
+
+
+@pytest.mark.parametrize("integrator", IMPLICIT)
+@pytest.mark.parametrize("speed", [1.0, 100.0])
+def test_nothing_passes_through_a_floor_however_fast(integrator: Any, speed: float) -> None:
+    scene = withe.Scene(gravity=(0, 0, 0))
+    rod = scene.add_rod(start=(0, 0, 0.05), end=(0.3, 0, 0.06), nodes=21, radius=RADIUS, material=RUBBER)
+    scene.add_floor()
+    simulation = scene.build(integrator=integrator, time_step=2.5e-3)
+    simulation.set_velocities(rod, np.tile([0.0, 0.0, -speed], (21, 1)))
+    start = simulation.energy()
+    for _ in range(30):
+        simulation.step()
+        assert simulation.positions(rod)[:, 2].min() > 0.95 * RADIUS
+        assert excess(simulation, start.total) < 0.01 * start.kinetic
+
+
+@pytest.mark.parametrize("integrator", IMPLICIT)
+def test_rods_that_cross_stop_each_other(integrator: Any) -> None:
+    scene = withe.Scene(gravity=(0, 0, 0))
+    stiff = withe.Material(youngs_modulus=1e9, poisson_ratio=0.5, density=1200.0)
+    moving = scene.add_rod(start=(-0.05, 0.011, 0.03), end=(0.05, 0.01, 0.03), nodes=11, radius=RADIUS, material=stiff)
+    bar = scene.add_rod(start=(0.003, -0.05, 0), end=(0, 0.05, 0), nodes=11, radius=RADIUS, material=stiff)
+    scene.clamp(bar.start)
+    scene.clamp(bar.end)
+    scene.enable_contact()
+    simulation = scene.build(integrator=integrator, time_step=2.5e-3)
+    simulation.set_velocities(moving, np.tile([0.0, 0.0, -100.0], (11, 1)))
+    start = simulation.energy()
+    simulation.step(8)
+    assert simulation.positions(moving)[5, 2] > 0.0
+    assert excess(simulation, start.total) < 0.01 * start.kinetic
+
+
+def heavy_rod(friction_model: Any) -> tuple[withe.Scene, withe.Rod]:
+    """A kilogram of rod on a floor, its limit of friction 3.92 N (dissertation, section 6.3.3)."""
+    scene = withe.Scene(gravity=(0, 0, -9.8))
+    material = withe.Material(youngs_modulus=1e5, poisson_ratio=0.5, density=509.2985)
+    rod = scene.add_rod(start=(0, 0, 2.5e-2), end=(1, 0, 2.5e-2), nodes=26, radius=2.5e-2, material=material)
+    scene.add_floor(friction=0.4)
+    scene.enable_contact(friction_model=friction_model, distance_tolerance=5e-4)
+    return scene, rod
+
+
+@pytest.mark.parametrize("friction_model", ["implicit", "lagged"])
+def test_a_rod_pushed_along_a_floor_slides_as_a_block_does(friction_model: Any) -> None:
+    scene, rod = heavy_rod(friction_model)
+    push = scene.add_load(rod, (0, 0, 0))
+    simulation = scene.build(time_step=5e-3)
+    simulation.equilibrium()
+    at_rest = simulation.snapshot()
+    for force in (3.0, 4.121, 6.0):
+        simulation.restore(at_rest)
+        simulation.set(push, load=(force, 0, 0))
+        simulation.step(300)
+        kinetic = 1.5**2 / 2.0 * max(force - 0.4 * 9.8, 0.0) ** 2
+        assert simulation.energy().kinetic == pytest.approx(kinetic, rel=0.01, abs=1e-4)
+
+
+def test_an_anchored_contact_does_not_creep_under_half_its_limit() -> None:
+    scene, rod = heavy_rod("anchored")
+    scene.add_load(rod, lambda t: (1.96 * min(t / 0.5, 1.0), 0, 0))
+    simulation = scene.build(integrator="backward_euler", time_step=5e-3)
+    simulation.equilibrium()
+    start = simulation.positions()[:, 0].mean()
+    simulation.step(200)
+    loaded = simulation.positions()[:, 0].mean()
+    assert 0.0 < loaded - start < 5e-5
+    simulation.step(2000)  # 10 s
+    assert abs(simulation.positions()[:, 0].mean() - loaded) < 1e-5 * 2.5e-2

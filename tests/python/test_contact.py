@@ -1,0 +1,129 @@
+"""Contact in scripts: what a scene accepts and refuses, what a simulation answers, and that it repeats to the bit."""
+
+from __future__ import annotations
+
+import pickle
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import withe
+
+RUBBER = withe.Material(youngs_modulus=1e6, poisson_ratio=0.5, density=1200.0)
+
+
+def crossing(**contact: Any) -> tuple[withe.Scene, withe.Rod, withe.Rod]:
+    """A rod that falls on a clamped one."""
+    scene = withe.Scene()
+    top = scene.add_rod(
+        start=(-0.1, 0.01, 0.012), end=(0.1, 0, 0.012), nodes=15, radius=5e-3, material=RUBBER, name="top"
+    )
+    bar = scene.add_rod(start=(0, -0.1, 0), end=(0.01, 0.1, 0), nodes=15, radius=5e-3, material=RUBBER, name="bar")
+    scene.clamp(bar.start)
+    scene.clamp(bar.end)
+    scene.enable_contact(**contact)
+    return scene, top, bar
+
+
+def test_contacts_name_the_pair_and_balance_the_weight_of_a_block() -> None:
+    scene = withe.Scene()
+    scene.add_rod(start=(0, 0, 0.005), end=(0.1, 0, 0.005), nodes=5, radius=5e-3, material=RUBBER, name="block")
+    scene.add_floor(name="table")
+    simulation = scene.build(integrator="backward_euler")
+    simulation.step(200)
+    contacts = simulation.contacts()
+    assert {tuple(pair) for pair in contacts["pair"]} == {("block", "table")}
+    weight = 1200.0 * np.pi * 5e-3**2 * 0.1 * 9.81
+    assert contacts["normal_force"].sum() == pytest.approx(weight, rel=1e-3)
+    np.testing.assert_allclose(contacts["normal"], np.tile([0.0, 0.0, 1.0], (len(contacts), 1)), atol=1e-12)
+    assert np.abs(contacts["point"][:, 2]).max() < 5e-4
+    assert (contacts["edge"][:, 1] == -1).all()
+
+
+@pytest.mark.parametrize("friction_model", ["implicit", "lagged", "anchored"])
+def test_a_restored_a_copied_and_a_pickled_simulation_go_on_with_the_same_bits(friction_model: Any) -> None:
+    scene, _, _ = crossing(friction=0.3, friction_model=friction_model)
+    simulation = scene.build(integrator="backward_euler", time_step=2e-3)
+    simulation.step(30)
+    assert len(simulation.contacts()) > 0
+    snapshot = simulation.snapshot()
+    copies = [simulation.copy(), pickle.loads(pickle.dumps(simulation))]
+    simulation.step(10)
+    expected = simulation.positions()
+    simulation.restore(snapshot)
+    for one in [simulation, *copies]:
+        if one is not simulation:
+            one.restore(snapshot)
+        one.step(10)
+        np.testing.assert_array_equal(one.positions(), expected)
+
+
+def test_ignored_pairs_and_groups_pass_through_each_other() -> None:
+    for leave_out in (
+        lambda scene: scene.ignore_contact("top", "bar"),
+        lambda scene: [scene.set_contact_group(rod, "ghosts") for rod in ("top", "bar")],
+    ):
+        scene, top, bar = crossing()
+        leave_out(scene)
+        simulation = scene.build(integrator="backward_euler", time_step=2e-3)
+        simulation.step(60)
+        assert len(simulation.contacts()) == 0
+        assert simulation.positions(top)[:, 2].max() < simulation.positions(bar)[7, 2]
+
+
+def test_the_plan_says_what_contact_adds_and_what_is_skipped() -> None:
+    scene, _, _ = crossing()
+    assert any("rods touch each other" in note for note in scene.build().plan.notes)
+    floor_only = withe.Scene()
+    floor_only.add_rod(start=(0, 0, 0.1), end=(0.1, 0, 0.1), nodes=5, radius=5e-3, material=RUBBER)
+    floor_only.add_floor()
+    assert any("no broad phase" in note for note in floor_only.build().plan.notes)
+
+
+def overlapping(scene: withe.Scene) -> None:
+    scene.add_rod(start=(-0.1, 0, 0.007), end=(0.1, 0, 0.007), nodes=5, radius=5e-3, material=RUBBER, name="a")
+    scene.add_rod(start=(0, -0.1, 0), end=(0, 0.1, 0), nodes=5, radius=5e-3, material=RUBBER, name="b")
+    scene.enable_contact()
+    scene.build()
+
+
+def buried(scene: withe.Scene) -> None:
+    scene.add_rod(start=(-0.1, 0, 0), end=(0.1, 0, 0), nodes=5, radius=5e-3, material=RUBBER, name="a")
+    scene.add_floor(name="table")
+    scene.build()
+
+
+def coarse_tolerance(scene: withe.Scene) -> None:
+    scene.add_rod(start=(-0.1, 0, 1), end=(0.1, 0, 1), nodes=5, radius=5e-3, material=RUBBER, name="a")
+    scene.enable_contact(distance_tolerance=0.1)
+    scene.build()
+
+
+REFUSED: list[tuple[Callable[[withe.Scene], Any], str]] = [
+    (lambda scene: scene.add_floor(friction=-0.1), "friction of 'floor 1'"),
+    (lambda scene: scene.add_floor(friction=float("nan")), "friction of 'floor 1'"),
+    (lambda scene: scene.add_plane((0, 0, 0), (0, 0, 0)), "normal of 'plane 1'"),
+    (lambda scene: scene.add_sphere((0, 0, 0), -1.0), "radius of 'sphere 1'"),
+    (lambda scene: scene.add_capsule((0, 0, 0), (0, 0), 1.0), "end of 'capsule 1'"),
+    (lambda scene: scene.enable_contact(friction=-1), "friction"),
+    (lambda scene: scene.enable_contact(slip_tolerance=0), "slip_tolerance"),
+    (lambda scene: scene.enable_contact(friction_model="sticky"), "friction_model"),
+    (lambda scene: scene.set_friction("nobody", "noone", 0.1), "what touches 'nobody' is not in the scene"),
+    (overlapping, "edge . of rod 'a' and edge . of rod 'b' overlap by 0.003"),
+    (buried, "edge . of rod 'a' and 'table' overlap by 0.005"),
+    (coarse_tolerance, "distance_tolerance must not exceed the radius of rod 'a'"),
+]
+
+
+@pytest.mark.parametrize(("call", "message"), REFUSED)
+def test_what_cannot_be_is_refused_by_name(call: Callable[[withe.Scene], Any], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        call(withe.Scene())
+
+
+def test_fourth_order_steps_refuse_contact() -> None:
+    scene, _, _ = crossing()
+    with pytest.raises(ValueError, match="fourth_order"):
+        scene.build(integrator="fourth_order")
