@@ -212,6 +212,17 @@ void find_zones(const SkeletonGraph& graph, const ZoneOptions& options, const st
     result.inside[e] = 1;
   }
 
+  // A hole in a zone has two sides: what runs beside a link is inside as well. A cable's loop is no straight way.
+  for (std::size_t e = 0; e < graph.edges.size(); ++e) {
+    const SkeletonEdge& edge = graph.edges[e];
+    if (edge.removed || result.inside[e] || edge.nodes[0] < 0) continue;
+    if (sets.root(edge.nodes[0]) != sets.root(edge.nodes[1])) continue;
+    const Vector2 chord = graph.nodes[static_cast<std::size_t>(edge.nodes[1])].position -
+                          graph.nodes[static_cast<std::size_t>(edge.nodes[0])].position;
+    const double longest = options.merged_link * 2 * inner_half_width(edge);
+    if (edge.length < std::min(longest, 1.6 * chord.norm())) result.inside[e] = 1;
+  }
+
   std::vector<int> zone_of_root(graph.nodes.size(), -1);
   for (std::size_t n = 0; n < graph.nodes.size(); ++n) {
     if (graph.nodes[n].edges.size() < 2) continue;
