@@ -89,8 +89,10 @@ std::optional<SideBySide> find_side_by_side(const SkeletonGraph& graph, int link
   for (const auto& end : leaving) both += branches[at(end[0])].half_width + branches[at(end[1])].half_width;
   if (line.count() < 8 || graph.edges[at(link)].length < 4 * 0.5 * both) return std::nullopt;
   const int margin = std::min(line.count() / 4, static_cast<int>(0.5 * both));
+  // The skeleton of a line with an even number of pixels lies half a pixel beside its middle: counted for two, not one.
+  const double full = 0.5 * both + 0.5;
   int wide = 0;
-  for (int i = margin; i < line.count() - margin; ++i) wide += line.half_width(i) > 0.8 * 0.5 * both ? 1 : 0;
+  for (int i = margin; i < line.count() - margin; ++i) wide += line.half_width(i) > 0.8 * full ? 1 : 0;
   // Of two cables that cross at a small angle less than half of the link is as wide as that.
   if (wide < 0.6 * (line.count() - 2 * margin)) return std::nullopt;
   return SideBySide{link, {{{leaving[0][0], leaving[0][1]}, {leaving[1][0], leaving[1][1]}}}};
