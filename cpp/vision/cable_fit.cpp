@@ -7,6 +7,38 @@
 
 namespace withe {
 
+/// Seen from one branch to the other, the flank that the cable which crosses does not cover where the gap starts.
+CableOutline::Flank CableOutline::flank_that_shows(const Continuations& links, HalfEdge from, HalfEdge to) {
+  const auto zone_of = [&](HalfEdge half) { return links.zone_of[static_cast<std::size_t>(half)]; };
+  const int first = zone_of(from);
+  const int last = zone_of(to);
+  if (first < 0 || last < 0) return Flank::unknown;
+  std::vector<Vector2> others;
+  const auto collect = [&](int zone) {
+    for (const HalfEdge half : links.zones[static_cast<std::size_t>(zone)].branches) {
+      const int beyond = zone_of(opposite(half));
+      const bool link = first != last && (beyond == first || beyond == last);
+      if (half != from && half != to && !link) others.push_back(links.branches[static_cast<std::size_t>(half)].point);
+    }
+  };
+  collect(first);
+  if (last != first) collect(last);
+  if (others.size() != 2) return Flank::unknown;
+  const Vector2& start = links.branches[static_cast<std::size_t>(from)].point;
+  const Vector2& end = links.branches[static_cast<std::size_t>(to)].point;
+  const auto aside = [&](const Vector2& point) {
+    const Vector2 a = end - start, b = point - start;
+    return a.x() * b.y() - a.y() * b.x();
+  };
+  if ((aside(others[0]) > 0) == (aside(others[1]) > 0)) return Flank::unknown;  // they touch
+  const double straight = (others[0] - start).norm() + (others[1] - end).norm();
+  const double crosswise = (others[1] - start).norm() + (others[0] - end).norm();
+  const Vector2& beside_start = straight < crosswise ? others[0] : others[1];
+  // At more than some 37 degrees the gap is short, and both flanks are hidden for most of it.
+  if (std::max(straight, crosswise) < 3 * std::min(straight, crosswise)) return Flank::unknown;
+  return aside(beside_start) > 0 ? Flank::right : Flank::left;
+}
+
 CableOutline::CableOutline(const SkeletonGraph& graph, const Continuations& links, const CablePath& path)
     : closed_(path.closed) {
   for (const HalfEdge entry : path.entries) {
@@ -20,24 +52,28 @@ CableOutline::CableOutline(const SkeletonGraph& graph, const Continuations& link
     }
     if (last < first) first = last = n / 2;
     int gap = kNoGap;
+    Flank shows = Flank::unknown;
     if (!points_.empty() || (closed_ && edge.nodes[0] >= 0)) {
       const HalfEdge exit = links.partner[static_cast<std::size_t>(entry)];
       gap = links.zone_of[static_cast<std::size_t>(entry)];
       if (exit >= 0) gap = std::max(gap, links.zone_of[static_cast<std::size_t>(exit)]);
+      if (exit >= 0 && links.ways[static_cast<std::size_t>(exit)].empty()) shows = flank_that_shows(links, exit, entry);
       if (exit >= 0 && !points_.empty()) add_way(links.ways[static_cast<std::size_t>(exit)], gap);
     }
     if (points_.empty()) {
       closing_zone_ = gap;
+      closing_shows_ = shows;
       gap = kNoGap;
+      shows = Flank::unknown;
     }
     if (n == 0) {
       const Vector2 middle = links.branches[static_cast<std::size_t>(entry)].point;
-      points_.push_back({middle, edge.half_width, gap});
+      points_.push_back({middle, edge.half_width, gap, shows});
       continue;
     }
     for (int i = first; i <= last; ++i) {
       const SkeletonPoint& point = edge.points[static_cast<std::size_t>(end_of(entry) == 0 ? i : n - 1 - i)];
-      points_.push_back({point.position(), point.half_width, i == first ? gap : kNoGap});
+      points_.push_back({point.position(), point.half_width, i == first ? gap : kNoGap, shows});
     }
   }
   if (closed_ && closing_zone_ >= 0) {
@@ -133,13 +169,44 @@ std::vector<FitSample> CableOutline::flank_samples(const BitImage& mask, const M
     }
     if (count < 3) continue;
     const double own = 0.5 * width / count;
+    struct Place {
+      Vector2 point, normal;
+      Flanks flanks;
+    };
+    std::vector<Place> places;
     for (double s = from; s <= to; s += spacing) {
+      Place place;
       const auto row = std::min(static_cast<std::ptrdiff_t>(std::lround(s / spacing)), n - 1);
-      const Flanks flanks = measure(row, 2 * half_width + 1, point, normal);
-      const double nearer = std::min(flanks.left, flanks.right);
-      if (std::abs(nearer - own) > 0.4 * own) continue;
-      const double aside = flanks.left < flanks.right ? flanks.left - own : own - flanks.right;
-      samples.push_back({point + aside * normal, s, 0.5 * spacing});
+      place.flanks = measure(row, 2 * half_width + 1, place.point, place.normal);
+      places.push_back(place);
+    }
+    // The flank that shows changes where the mask is narrowest: in the middle of where it is hardly wider than there.
+    const std::size_t size = places.size();
+    const auto wide = [&](std::size_t k) {
+      double sum = 0;
+      for (std::size_t j = k - 2; j <= k + 2; ++j) sum += places[j].flanks.left + places[j].flanks.right;
+      return sum / 5;
+    };
+    std::size_t waist = size / 2;
+    for (std::size_t k = size / 5 + 2; k + size / 5 + 2 < size; ++k) {
+      if (wide(k) < wide(waist)) waist = k;
+    }
+    if (size > 8) {
+      const double level = wide(waist) + own;
+      std::size_t first = waist, last = waist;
+      while (first > 2 && wide(first - 1) < level) --first;
+      while (last + 3 < size && wide(last + 1) < level) ++last;
+      waist = (first + last) / 2;
+    }
+    const Flank shows = i > 0 ? points_[i].shows : closing_shows_;
+    for (std::size_t k = 0; k < size; ++k) {
+      const auto& [place, normal_here, flanks] = places[k];
+      const bool known = shows != Flank::unknown;
+      const bool left = known ? (shows == Flank::left) == (k < waist) : flanks.left < flanks.right;
+      const double beyond = (left ? flanks.left : flanks.right) - own;
+      if (std::abs(beyond) > std::max(0.4 * own, known ? 2.0 : 0.0)) continue;
+      samples.push_back(
+          {place + (left ? beyond : -beyond) * normal_here, from + static_cast<double>(k) * spacing, 0.5 * spacing});
     }
   }
   return samples;
@@ -200,7 +267,8 @@ Cable CableOutline::fit(const BitImage& mask, const TraceOptions& options, int n
     total = moved.back() + (cable.closed ? std::max(closing, closing_arc) : 0.0);
     total = std::max(total, 1.0);
     station = moved;
-    for (int round = 0; round < 2; ++round) {
+    // Flanks are looked for from the line without them, and again from the line that they gave.
+    for (int round = 0; round < 3; ++round) {
       make_samples();
       const double step = total / static_cast<double>(cable.closed ? line.rows() : line.rows() - 1);
       if (round > 0) {

@@ -34,14 +34,18 @@ class CableOutline {
   Cable fit(const BitImage& mask, const TraceOptions& options, int number, std::vector<HiddenStretch>& stretches) const;
 
  private:
+  /// Where two cables cross, one flank of each shows before the crossing and the other one behind it.
+  enum class Flank { unknown, left, right };
   struct Point {
     Vector2 position;
     double half_width;
-    int zone_before;  ///< kNoGap, kBridge or the zone between the point before and this one
+    int zone_before;               ///< kNoGap, kBridge or the zone between the point before and this one
+    Flank shows = Flank::unknown;  ///< which flank shows where the gap before this point starts
   };
   static constexpr int kNoGap = -2;
   static constexpr int kBridge = -1;
 
+  static Flank flank_that_shows(const Continuations& links, HalfEdge from, HalfEdge to);
   void add_way(const std::vector<Vector2>& way, int zone);
   std::vector<double> stations(double& total) const;
   std::vector<FitSample> flank_samples(const BitImage& mask, const MatrixX2& line, double spacing,
@@ -50,6 +54,7 @@ class CableOutline {
   std::vector<Point> points_;
   bool closed_ = false;
   int closing_zone_ = kNoGap;
+  Flank closing_shows_ = Flank::unknown;
 };
 
 }  // namespace withe
