@@ -26,7 +26,7 @@ def build(nodes: int, integrator: str = "static") -> tuple[withe.Simulation, wit
     scene = withe.Scene(gravity=(0.0, 0.0, 0.0))
     stiffness = withe.Stiffness(stretch=500.0, bend=(BENDING, BENDING), twist=TWISTING)
     ring = scene.add_rod(
-        points=withe.centrelines.circle(RADIUS, nodes),
+        points=withe.shapes.circle(RADIUS, nodes),
         closed=True,
         normal=(0.0, 0.0, 1.0),
         natural="straight",

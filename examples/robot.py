@@ -72,7 +72,7 @@ def leg_centreline(azimuth: float) -> np.ndarray:
     """An arch from the body to the ground, shape (nodes, 3) [m]."""
     outward = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
     upward = np.array([0.0, 0.0, 1.0])
-    points = withe.centrelines.arc(
+    points = withe.shapes.arc(
         start=(0.0, 0.0, 0.0),
         tangent=np.cos(RISE) * outward + np.sin(RISE) * upward,
         towards=upward,

@@ -162,7 +162,7 @@ class Builder {
 
   void add_frames() {
     for (const SupportDescription& support : scene_.supports)
-      if (support.kind == SupportKind::clamp) {
+      if (holds_frame(support.kind)) {
         Cluster& cluster = cluster_at(support.pass);
         require(cluster.hinge < 0, "a clamp must hold the fixed side of a revolute joint, not the side that turns");
         frame_of(cluster);
@@ -283,12 +283,15 @@ class Builder {
       s.active = true;
       s.description = description;
       s.node = global_node(description.pass);
-      if (description.kind == SupportKind::clamp) {
+      const auto [in, out] = edges_at(description.pass);
+      const auto e = static_cast<std::size_t>(out >= 0 ? out : in);
+      s.tangent = (scene_.positions.row(model_.edge_head[e]) - scene_.positions.row(model_.edge_tail[e]))
+                      .transpose()
+                      .normalized();
+      if (holds_frame(description.kind)) {
         s.frame = cluster_at(description.pass).frame;
-      } else if (description.kind == SupportKind::hold_edge) {
-        const auto [in, out] = edges_at(description.pass);
-        s.edge = out >= 0 ? out : in;
-        const auto e = static_cast<std::size_t>(s.edge);
+      } else if (holds_edge(description.kind)) {
+        s.edge = static_cast<int>(e);
         s.other_node = model_.edge_tail[e] == s.node ? model_.edge_head[e] : model_.edge_tail[e];
       }
       model_.supports.push_back(s);

@@ -57,10 +57,20 @@ struct JointDescription {
 };
 
 enum class SupportKind {
-  pin,        ///< position only
-  clamp,      ///< position and the frame of the wall, by a stencil of half length
-  hold_edge,  ///< both nodes of the end edge and its angle, the source's clamp
+  pin,             ///< position only
+  clamp,           ///< position and the frame of the wall, by a stencil of half length
+  hold_edge,       ///< both nodes of the end edge and its angle, the source's clamp
+  spinning_clamp,  ///< a clamp that may turn about the rod's tangent
+  spinning_edge,   ///< both nodes of the end edge
 };
+
+inline bool holds_frame(SupportKind kind) { return kind == SupportKind::clamp || kind == SupportKind::spinning_clamp; }
+inline bool holds_edge(SupportKind kind) {
+  return kind == SupportKind::hold_edge || kind == SupportKind::spinning_edge;
+}
+inline bool may_spin(SupportKind kind) {
+  return kind == SupportKind::spinning_clamp || kind == SupportKind::spinning_edge;
+}
 
 /// Something that holds a node of a rod.
 struct SupportDescription {

@@ -90,12 +90,15 @@ void add_constraints(Model& model) {
     };
     hold_node(support.node, support.description.free);
     if (support.other_node >= 0) hold_node(support.other_node, support.description.free);
-    if (support.edge >= 0 && !model.planar())
+    const bool spinning = may_spin(support.description.kind);
+    if (support.edge >= 0 && !model.planar() && !spinning)
       model.constraints.push_back({model.edge_dof[at(support.edge)], 1, Matrix3::Zero()});
     if (support.frame >= 0) {
       require(!frame_held[at(support.frame)], "joint is already clamped: release the clamp that is there first");
       frame_held[at(support.frame)] = true;
-      model.constraints.push_back({model.frame_dof[at(support.frame)], model.frame_size(), Matrix3::Zero()});
+      const bool turns = spinning && !model.planar();
+      const Matrix3 free = turns ? Matrix3(support.tangent * support.tangent.transpose()) : Matrix3(Matrix3::Zero());
+      model.constraints.push_back({model.frame_dof[at(support.frame)], model.frame_size(), free});
     }
   }
 }

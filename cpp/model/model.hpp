@@ -62,10 +62,11 @@ struct Constraint {
 struct Support {
   bool active = false;
   SupportDescription description;
-  int node = -1;        ///< global node
-  int frame = -1;       ///< of a clamp
-  int other_node = -1;  ///< hold_edge
-  int edge = -1;        ///< hold_edge
+  int node = -1;                       ///< global node
+  int frame = -1;                      ///< of a clamp
+  int other_node = -1;                 ///< hold_edge
+  int edge = -1;                       ///< hold_edge
+  Vector3 tangent = Vector3::UnitX();  ///< drawn, at the end that is held
   int first_constraint = 0;
 };
 

@@ -79,7 +79,8 @@ void World::Implementation::hold_now(HeldTarget& target) const {
         target.q.segment<3>(dof) = position;
     };
     put(support.node, motion.position);
-    if (support.frame >= 0) {
+    const bool spinning = may_spin(support.description.kind);
+    if (support.frame >= 0 && !(spinning && !model.planar())) {
       const int dof = model.frame_dof[at(support.frame)];
       if (model.planar()) {
         const double now = state.q(dof);
@@ -96,7 +97,7 @@ void World::Implementation::hold_now(HeldTarget& target) const {
       const auto& drawn = description.positions;
       const Vector3 arm = motion.stretch * (drawn.row(support.other_node) - drawn.row(support.node)).transpose();
       put(support.other_node, motion.position + motion.rotation * arm);
-      if (!model.planar()) {
+      if (!model.planar() && !spinning) {
         // Its angle is what the rotated drawn director measures against direct transport of the reference.
         const auto e = at(support.edge);
         const Vec3d t = to_vec3(motion.rotation * to_eigen(model.initial_tangent[e]));

@@ -175,7 +175,7 @@ void World::restore(const std::string& bytes) {
     int kind = 0;
     r(on);
     r(kind);
-    require(kind >= 0 && kind <= 2, "snapshot is damaged: unknown support");
+    require(kind >= 0 && kind <= 4, "snapshot is damaged: unknown support");
     d.kind = static_cast<SupportKind>(kind);
     r(d.pass.rod);
     r(d.pass.node);

@@ -89,6 +89,10 @@ void World::prescribe_support(int support, const Vector3& position, const Matrix
   require(position.allFinite() && rotation.allFinite(), "position and rotation must be finite");
   require((rotation.transpose() * rotation - Matrix3::Identity()).norm() < 1e-6 && rotation.determinant() > 0.0,
           "rotation must be a proper rotation matrix");
+  const Support& held = self.model.supports[at(support)];
+  if (held.description.kind == SupportKind::spinning_clamp)
+    require((rotation * held.tangent - self.motions[at(support)].rotation * held.tangent).norm() < 1e-9,
+            "a clamp that may spin keeps its tangent: take hold='edge' to turn it");
   if (self.model.planar()) {
     const Plane& plane = *self.model.plane;
     if (std::abs((position - plane.origin).dot(plane.normal)) > 1e-9 * self.model.length_scale ||

@@ -8,8 +8,11 @@ namespace withe::bindings {
 namespace {
 
 constexpr Words<JointForm, 2> kJointForms{{{"frame", JointForm::frame}, {"pairs", JointForm::pairs}}};
-constexpr Words<SupportKind, 3> kSupportKinds{
-    {{"pin", SupportKind::pin}, {"clamp", SupportKind::clamp}, {"hold_edge", SupportKind::hold_edge}}};
+constexpr Words<SupportKind, 5> kSupportKinds{{{"pin", SupportKind::pin},
+                                               {"clamp", SupportKind::clamp},
+                                               {"hold_edge", SupportKind::hold_edge},
+                                               {"spinning_clamp", SupportKind::spinning_clamp},
+                                               {"spinning_edge", SupportKind::spinning_edge}}};
 constexpr Words<LoadKind, 3> kLoadKinds{
     {{"force", LoadKind::force}, {"moment", LoadKind::moment}, {"distributed", LoadKind::distributed}}};
 

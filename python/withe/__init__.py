@@ -4,7 +4,7 @@ A scene is described rod by rod (`Scene`), built into a `Simulation`, stepped or
 kept in a `Record`. SI units, angles in radians.
 """
 
-from withe import centrelines, perception
+from withe import perception, shapes
 from withe._core import __version__
 from withe.errors import ConvergenceError
 from withe.handles import CustomForce, Drag, EdgeHandle, Joint, Load, Mass, NodeHandle, Obstacle, Rod, Support
@@ -44,7 +44,7 @@ __all__ = [
     "Support",
     "Tube",
     "__version__",
-    "centrelines",
     "perception",
     "run_many",
+    "shapes",
 ]

@@ -8,7 +8,7 @@ from typing import Any, Literal, cast
 import numpy as np
 import numpy.typing as npt
 
-from withe import _core, shapes, validation
+from withe import _core, drawing, validation
 from withe.description import added_mass, describe_support, drag, rod_parameters
 from withe.directory import Directory
 from withe.handles import Drag, Load, Mass, NodeHandle, Rod, Support
@@ -276,6 +276,7 @@ class Control:
         *,
         hold: Literal["frame", "edge"] = "frame",
         free: npt.ArrayLike | None = None,
+        spin: bool = False,
         name: str | None = None,
     ) -> Support:
         """Hold a node where it is now, and the direction and roll of its rod. See `Scene.clamp`.
@@ -283,9 +284,11 @@ class Control:
         Raises
         ------
         ValueError
-            A node that is held already.
+            A node that is held already, or spin=True with hold="frame", which only a scene may be built with.
         """
-        return self._hold(make_clamp(self._directory, node, hold, free, name))
+        if spin and hold == "frame":
+            raise ValueError("spin of a clamp put on while running needs hold='edge'")
+        return self._hold(make_clamp(self._directory, node, hold, free, spin, name))
 
     def pin(self, node: NodeHandle | str, *, free: npt.ArrayLike | None = None, name: str | None = None) -> Support:
         """Hold a node where it is now. See `Scene.pin`.
@@ -394,8 +397,8 @@ class Control:
     def _turn(self, index: int, part: SupportPart, target: FloatArray, tangent: Any, roll: Any, over: float) -> Turn:
         """The way of a support from where it is to a tangent and a roll."""
         rod = self._directory.rod(self._directory.layout.rods[part.node[0]].name)
-        if part.kind == "clamp":
-            drawn = shapes.drawn_frame(rod.tangents, rod.directors, rod.lengths, part.node[1], rod.closed)
+        if part.kind in ("clamp", "spinning_clamp"):
+            drawn = drawing.drawn_frame(rod.tangents, rod.directors, rod.lengths, part.node[1], rod.closed)
         else:
             edge = min(part.node[1], len(rod.tangents) - 1)
             drawn = rod.tangents[edge], rod.directors[edge]

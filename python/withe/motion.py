@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from withe import shapes, validation
+from withe import drawing, validation
 
 __all__ = ["Path", "Pose", "Turn", "evaluate_path", "oriented"]
 
@@ -20,8 +20,8 @@ Path = Callable[[float], Any]
 
 def oriented(drawn_tangent: FloatArray, drawn_director: FloatArray, tangent: FloatArray, roll: float) -> FloatArray:
     """Rotation that takes the drawn tangent to another by the smallest turn, and then rolls about it."""
-    swing = shapes.rotation_between(drawn_tangent, tangent, drawn_director)
-    return np.asarray(shapes.rotation_about(roll * tangent) @ swing, np.float64)
+    swing = drawing.rotation_between(drawn_tangent, tangent, drawn_director)
+    return np.asarray(drawing.rotation_about(roll * tangent) @ swing, np.float64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,9 +48,9 @@ class Turn:
         """Position and rotation at a time."""
         span = float(self.times[1] - self.times[0])
         share = min(max((time - float(self.times[0])) / span, 0.0), 1.0) if span > 0.0 else 1.0
-        swing = shapes.rotation_between(self.tangents[0], self.tangents[1], self._spare())
+        swing = drawing.rotation_between(self.tangents[0], self.tangents[1], self._spare())
         axis, angle = _axis_angle(swing)
-        tangent = shapes.rotation_about(share * angle * axis) @ self.tangents[0]
+        tangent = drawing.rotation_about(share * angle * axis) @ self.tangents[0]
         position = (1.0 - share) * self.positions[0] + share * self.positions[1]
         roll = (1.0 - share) * float(self.rolls[0]) + share * float(self.rolls[1])
         return position, oriented(self.drawn[0], self.drawn[1], tangent, roll)
@@ -60,7 +60,7 @@ class Turn:
         return float(np.interp(time, self.times, self.rolls)) if self.times[1] > self.times[0] else float(self.rolls[1])
 
     def _spare(self) -> FloatArray:
-        return shapes.default_normal(self.tangents[0])
+        return drawing.default_normal(self.tangents[0])
 
     def arrays(self) -> dict[str, FloatArray]:
         """Its numbers, for a file."""

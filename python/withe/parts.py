@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +14,7 @@ from withe.parameters import RodParameters
 from withe.sections import SectionProperties
 
 __all__ = [
+    "SUPPORT_KINDS",
     "ContactModel",
     "ContactSettings",
     "CustomForcePart",
@@ -37,7 +38,8 @@ JointForm = Literal["frame", "pairs"]
 ContactModel = Literal["imcv2", "barrier"]
 FrictionModel = Literal["implicit", "lagged", "anchored"]
 LoadKind = Literal["force", "moment", "load"]
-SupportKind = Literal["pin", "clamp", "hold_edge"]
+SupportKind = Literal["pin", "clamp", "hold_edge", "spinning_clamp", "spinning_edge"]
+SUPPORT_KINDS: tuple[str, ...] = get_args(SupportKind)
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,7 +7,7 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from withe import shapes, validation
+from withe import drawing, validation
 from withe.materials import Material, Stiffness
 from withe.parameters import RodParameters
 from withe.parts import RodPart
@@ -51,19 +51,19 @@ def make_rod(
     owner = f"rod {name!r}"
     closed = validation.truth(closed, f"closed of {owner}")
     centreline = _centreline(start, end, points, nodes, closed, owner)
-    lengths = shapes.check_edges(centreline, closed, owner)
-    tangents = shapes.edge_vectors(centreline, closed) / lengths[:, None]
+    lengths = drawing.check_edges(centreline, closed, owner)
+    tangents = drawing.edge_vectors(centreline, closed) / lengths[:, None]
     directors = _directors(normal, tangents, owner)
     properties = _section(radius, section, len(lengths), owner)
     parameters = _parameters(material, stiffness, line_density, properties, owner)
 
-    voronoi = shapes.voronoi_lengths(lengths, closed)
+    voronoi = drawing.voronoi_lengths(lengths, closed)
     validation.choice(natural, f"natural of {owner}", ("as_built", "straight"))
     curvature, twist = np.zeros((len(voronoi), 2)), np.zeros(len(voronoi))
     if natural == "as_built":
         # Differences of coordinates leave this much of a turn in a straight rod.
         rounding = 16.0 * np.finfo(float).eps * max(1.0, float(np.abs(centreline).max() / lengths.min()))
-        curvature, twist = shapes.natural_shape(tangents, directors, voronoi, closed, rounding)
+        curvature, twist = drawing.natural_shape(tangents, directors, voronoi, closed, rounding)
     discrete = validation.truth(discrete, "discrete")
     if natural_curvature is not None:
         curvature = curvature_array(natural_curvature, voronoi, discrete, owner)
@@ -97,7 +97,7 @@ def curvature_array(value: Any, voronoi: FloatArray, discrete: bool, owner: str)
     stencils = len(voronoi)
     given = np.broadcast_to(validation.number_array(value, what, (2,), (stencils, 2)), (stencils, 2))
     if discrete:
-        return shapes.smooth_curvature(given, voronoi)
+        return drawing.smooth_curvature(given, voronoi)
     turn = np.hypot(given[:, 0], given[:, 1]) * voronoi
     sharp = np.flatnonzero(turn >= np.pi)
     if len(sharp):
@@ -137,13 +137,13 @@ def _centreline(start: Any, end: Any, points: Any, nodes: Any, closed: bool, own
     count = validation.integer(nodes, f"nodes of {owner}", least, _MAX_NODES)
     if closed and len(line) < least:
         raise ValueError(f"points of {owner} must be {least} or more, got {len(line)}")
-    shapes.check_edges(line, closed, owner)
-    return shapes.resample(line, count, closed)
+    drawing.check_edges(line, closed, owner)
+    return drawing.resample(line, count, closed)
 
 
 def _directors(normal: Any, tangents: FloatArray, owner: str) -> FloatArray:
     if normal is None:
-        return shapes.transport_directors(tangents, shapes.default_normal(tangents[0]))
+        return drawing.transport_directors(tangents, drawing.default_normal(tangents[0]))
     what = f"normal of {owner}"
     given = validation.number_array(normal, what, (3,), tangents.shape)
     single = given.ndim == 1
@@ -155,7 +155,7 @@ def _directors(normal: Any, tangents: FloatArray, owner: str) -> FloatArray:
     if np.any(sizes < 1e-6):
         raise ValueError(f"{what} must not lie along edge {int(np.argmin(sizes))}")
     rows /= sizes
-    return shapes.transport_directors(tangents, rows[0]) if single else rows
+    return drawing.transport_directors(tangents, rows[0]) if single else rows
 
 
 def _section(radius: Any, section: Any, edges: int, owner: str) -> SectionProperties:

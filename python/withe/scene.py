@@ -251,6 +251,7 @@ class Scene(Loads, Contacts):
         *,
         hold: Literal["frame", "edge"] = "frame",
         free: npt.ArrayLike | None = None,
+        spin: bool = False,
         name: str | None = None,
     ) -> Support:
         """Hold a node in place, and the direction and roll of its rod.
@@ -263,6 +264,8 @@ class Scene(Loads, Contacts):
             its angle.
         free : array_like of shape (3,) or (2, 3)
             Directions along which the clamp may slide.
+        spin : bool
+            Whether it may turn about the rod's tangent, which it goes on holding.
         name : str
 
         Returns
@@ -274,7 +277,7 @@ class Scene(Loads, Contacts):
         ValueError
             A node that is held already.
         """
-        return self._hold(make_clamp(self._directory, node, hold, free, name))
+        return self._hold(make_clamp(self._directory, node, hold, free, spin, name))
 
     def pin(self, node: NodeHandle | str, *, free: npt.ArrayLike | None = None, name: str | None = None) -> Support:
         """Hold a node in place, and leave its rod free to turn.

@@ -18,6 +18,7 @@ from withe.description import describe, parameters_of
 from withe.directory import Directory
 from withe.errors import ConvergenceError
 from withe.handles import NodeHandle, Rod, Support
+from withe.knots import link
 from withe.parts import CustomForcePart, DragPart, LoadPart, MassPart, SupportPart
 from withe.readouts import Energy, Equilibrium, Linearisation, Plan, Reaction, Statistics
 from withe.snapshots import Settings, Snapshot
@@ -298,6 +299,20 @@ class Simulation(Control):
             "normal_force" [N], "friction" on the first [N], "sticking".
         """
         return contact_table(self._directory, self._world.contacts())
+
+    def link(self, rod: Rod | str) -> float:
+        """Link of a rod [turns]: its twist and its writhe.
+
+        Kept by a closed rod, and by an open one whose ends are held and do not spin, as long as nothing
+        passes through it [Calugareanu 1961]. An open rod is carried on straight from both ends.
+
+        Returns
+        -------
+        float
+        """
+        index = self._rod(rod)
+        closed = self._directory.layout.rods[index].closed
+        return link(self.positions(rod), self.directors(rod), closed)
 
     def linearise(self) -> Linearisation:
         """Equations of motion linearised about the present configuration, with supports held.

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from withe import io, validation
 from withe.motion import Path, Turn
 from withe.parameters import RodParameters
-from withe.parts import SupportPart
+from withe.parts import SUPPORT_KINDS, SupportPart
 
 __all__ = ["Settings", "Snapshot"]
 
@@ -170,7 +170,7 @@ class Snapshot:
         supports: dict[str, tuple[int, SupportPart]] = {}
         paths: dict[str, Path] = {}
         for number, entry in enumerate(header["supports"]):
-            name, kind = str(entry["name"]), validation.choice(entry["kind"], "kind", ("pin", "clamp", "hold_edge"))
+            name, kind = str(entry["name"]), validation.choice(entry["kind"], "kind", SUPPORT_KINDS)
             free = validation.number_array(arrays[f"support_{number}_free"], "free", (3, 3))
             index = validation.integer(entry["index"], "index", 0, 10_000_000)
             # Which node that is, the simulation that restores it knows by the name.

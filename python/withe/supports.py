@@ -3,26 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from withe import validation
 from withe.directory import Directory
-from withe.parts import SupportPart
+from withe.parts import SupportKind, SupportPart
 
 __all__ = ["check_not_held", "make_clamp", "make_pin"]
 
 FloatArray = npt.NDArray[np.float64]
 
 
-def make_clamp(directory: Directory, node: Any, hold: Any, free: Any, name: Any) -> SupportPart:
+def make_clamp(directory: Directory, node: Any, hold: Any, free: Any, spin: Any, name: Any) -> SupportPart:
     """A clamp, checked; not yet in the directory."""
     name = directory.new_name(name, "clamp")
     place, node_name = directory.node(node, "node to clamp")
     validation.choice(hold, "hold of the clamp", ("frame", "edge"))
-    kind: Literal["clamp", "hold_edge"] = "clamp" if hold == "frame" else "hold_edge"
+    kinds: dict[tuple[str, bool], SupportKind] = {
+        ("frame", False): "clamp",
+        ("frame", True): "spinning_clamp",
+        ("edge", False): "hold_edge",
+        ("edge", True): "spinning_edge",
+    }
+    kind = kinds[hold, validation.truth(spin, "spin of the clamp")]
     return SupportPart(name, kind, place, node_name, _projector(free, "free of the clamp"))
 
 
@@ -56,7 +62,7 @@ def _held_rows(directory: Directory, part: SupportPart) -> set[int]:
     """Rows of the nodes that a support holds: with hold="edge" also that at the other end of the edge."""
     index, node = part.node
     held = {directory.row(part.node)}
-    if part.kind == "hold_edge":
+    if part.kind in ("hold_edge", "spinning_edge"):
         rod = directory.layout.rods[index]
         beyond = node + 1 if node + 1 < rod.nodes or rod.closed else node - 1
         held.add(directory.row((index, beyond % rod.nodes)))

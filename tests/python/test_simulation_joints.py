@@ -160,3 +160,35 @@ def test_a_joint_in_the_middle_of_a_rod_leaves_its_own_stencil():
         simulation.equilibrium()
         results.append(simulation.positions(beam))
     assert np.allclose(*results, atol=1e-5)
+
+
+@pytest.mark.parametrize("hold", ["frame", "edge"])
+def test_a_clamp_that_may_spin_carries_no_torque_along_the_rod(hold):
+    twist = 3.0
+    torques = {}
+    for spin in (False, True):
+        scene = withe.Scene(gravity=(0, 0, 0))
+        material = withe.Material(youngs_modulus=1e6, poisson_ratio=0.5, density=1000.0)
+        rod = scene.add_rod(
+            start=(0, 0, 0), end=(0.2, 0.1, 0), nodes=11, radius=5e-3, material=material, natural_twist=twist
+        )
+        scene.clamp(rod.start, hold=hold)
+        end = scene.clamp(rod.end, hold=hold, spin=spin)
+        simulation = scene.build(integrator="static", planar=False)
+        simulation.equilibrium()
+        tangent = np.array([0.2, 0.1, 0.0]) / np.hypot(0.2, 0.1)
+        torques[spin] = abs(simulation.reaction(end).moment @ tangent)
+        if spin:
+            np.testing.assert_allclose(simulation.twists(rod), twist, rtol=1e-6)
+    assert torques[True] < 1e-9 * torques[False]
+
+
+def test_a_clamp_that_spins_is_put_on_by_the_scene_or_holds_an_edge():
+    scene = withe.Scene()
+    rod = scene.add_rod(
+        start=(0, 0, 0), end=(0.2, 0, 0), nodes=5, radius=5e-3, material=withe.Material(youngs_modulus=1e6, density=1e3)
+    )
+    simulation = scene.build()
+    with pytest.raises(ValueError, match="hold='edge'"):
+        simulation.clamp(rod.start, spin=True)
+    simulation.clamp(rod.start, hold="edge", spin=True)

@@ -305,7 +305,7 @@ def test_a_first_render_that_fails_or_crashes_names_the_package_to_install(recor
 
 def test_importing_the_views_imports_no_heavy_package():
     code = (
-        "import sys, withe.view, withe.recording, withe.io, withe.centrelines\n"
+        "import sys, withe.view, withe.recording, withe.io, withe.shapes\n"
         "heavy = {'matplotlib', 'pyvista', 'vtk', 'vtkmodules', 'imageio_ffmpeg', 'rich', 'IPython', 'scipy'}\n"
         "print(sorted(heavy & {name.split('.')[0] for name in sys.modules}))"
     )

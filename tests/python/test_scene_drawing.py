@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import withe
-from withe import shapes
+from withe import drawing
 from withe.parts import RodPart
 
 RUBBER = withe.Material(youngs_modulus=1e6, poisson_ratio=0.3, density=1000.0, viscosity=50.0)
@@ -218,18 +218,18 @@ def test_bend_stiffness_may_be_one_number_or_a_pair(bend):
 def test_the_smallest_rotation_takes_one_vector_to_another(seed):
     a, b, _ = random_rotation(seed)
     b = (a + 0.3 * b) / np.linalg.norm(a + 0.3 * b)
-    turn = shapes.rotation_between(a, b, shapes.default_normal(a))
+    turn = drawing.rotation_between(a, b, drawing.default_normal(a))
     assert np.allclose(turn @ a, b)
     assert np.allclose(turn @ turn.T, np.eye(3))
     axis = np.cross(a, b)
     assert np.allclose(turn @ axis, axis)
-    back = shapes.rotation_between(a, -a, shapes.default_normal(a))
+    back = drawing.rotation_between(a, -a, drawing.default_normal(a))
     assert np.allclose(back @ a, -a)
 
 
 def test_the_drawn_frame_at_an_end_is_extrapolated_by_half_an_edge():
     part = rod(points=arc(1.0, 1.0, 21), normal=(0, 1, 0))
     for node, angle in [(0, 0.0), (10, 0.5), (20, 1.0)]:
-        tangent, director = shapes.drawn_frame(part.tangents, part.directors, part.lengths, node, False)
+        tangent, director = drawing.drawn_frame(part.tangents, part.directors, part.lengths, node, False)
         assert np.allclose(tangent, (np.cos(angle), 0, np.sin(angle)), atol=1e-12)
         assert np.allclose(director, (0, 1, 0))

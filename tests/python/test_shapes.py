@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from withe.centrelines import arc, circle, helix
+from withe.shapes import arc, circle, helix
 
 
 def test_a_helix_has_its_radius_pitch_and_length():

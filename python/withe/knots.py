@@ -1,0 +1,309 @@
+"""Centrelines of knots, and what tells one from another: writhe and crossings."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from withe import validation
+
+__all__ = ["granny_knot", "link", "overhand_knot", "reef_knot", "signed_crossings", "writhe"]
+
+FloatArray = npt.NDArray[np.float64]
+
+# Of the helices that two strands wind about each other, over the radius of the rod: they do not touch yet.
+_BRAID_RADIUS = 2.5
+# Rise of a strand along the braid while it turns by pi, over the circumference of half a turn.
+_BRAID_SLOPE = 1.5
+
+
+def overhand_knot(
+    n: int = 1, *, length: float = 1.0, radius: float = 1.6e-3, shortening: float = 0.6, nodes: int = 301
+) -> FloatArray:
+    """Points of a loose overhand knot along the x axis, its tails straight, to be pulled tight at its ends.
+
+    Two strands wind about each other by (2 n + 1) half turns: n = 1 is the trefoil, and closed it is the
+    torus knot (2, 2 n + 1).
+
+    Parameters
+    ----------
+    n : int
+        Times that the tail passes through the loop.
+    length : float [m]
+        Of the whole rod.
+    radius : float [m]
+        Of its section.
+    shortening : float [m]
+        Length minus the distance of its ends.
+    nodes : int
+
+    Returns
+    -------
+    ndarray of shape (nodes, 3) [m]
+        Evenly spaced.
+
+    Raises
+    ------
+    ValueError
+        A shortening too small for the knot, or a length too small for the shortening.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> x = overhand_knot(length=1.0, shortening=0.6)
+    >>> x.shape
+    (301, 3)
+    >>> bool(abs(np.linalg.norm(x[-1] - x[0]) - 0.4) < 1e-2)
+    True
+    """
+    n = validation.integer(n, "n of the knot", 1, 50)
+    length = validation.positive(length, "length of the rod")
+    radius = validation.positive(radius, "radius of the rod")
+    shortening = validation.positive(shortening, "shortening")
+    nodes = validation.integer(nodes, "nodes", 10, 10**7)
+    braid_radius = _BRAID_RADIUS * radius
+    half_turns = 2 * n + 1
+    braid = _BRAID_SLOPE * np.pi * braid_radius * half_turns
+
+    def whole(loop: float, tail: float) -> FloatArray:
+        phase = np.linspace(0.0, half_turns * np.pi, 40 * half_turns)
+        along = phase / phase[-1] * braid
+        first = np.stack([along, braid_radius * np.cos(phase), braid_radius * np.sin(phase)], axis=1)
+        second = first * [1.0, -1.0, -1.0]
+        turn = np.linspace(0.0, np.pi, 60)[1:-1]
+        right = np.stack(
+            [
+                braid + 2.0 * radius + loop * np.sin(turn),
+                -braid_radius - loop * (1.0 - np.cos(turn)),
+                np.zeros_like(turn),
+            ],
+            axis=1,
+        )
+        left = np.stack(
+            [
+                -2.0 * radius - loop * np.sin(turn),
+                -braid_radius - loop * (1.0 + np.cos(turn)),
+                np.zeros_like(turn),
+            ],
+            axis=1,
+        )
+        ends = np.array([[-tail, braid_radius, 0.0]]), np.array([[braid + tail, braid_radius, 0.0]])
+        return np.concatenate([ends[0], first, right, left, second, ends[1]])
+
+    def excess(loop: float) -> float:
+        return _length(whole(loop, 0.1 * length)) - braid - 0.2 * length
+
+    smallest = 3.0 * braid_radius
+    if excess(smallest) > shortening:
+        raise ValueError(f"shortening must be at least {excess(smallest):.3g} m for this knot, got {shortening:g} m")
+    low, high = smallest, length
+    for _ in range(100):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if excess(middle) < shortening else (low, middle)
+    tail = 0.5 * (length - shortening - braid)
+    if tail <= 2.0 * low:
+        raise ValueError(f"length of the rod must leave tails beside the loop: {length:g} m is too short")
+    return _even(whole(low, tail), nodes, length)
+
+
+def reef_knot(*, length: float = 1.0, radius: float = 2e-3, nodes: int = 301) -> FloatArray:
+    """Points of a loose reef knot: two half knots of opposite hands on one rod, whose middle is the first one's loop.
+
+    Parameters
+    ----------
+    length : float [m]
+        Of the whole rod.
+    radius : float [m]
+        Of its section.
+    nodes : int
+
+    Returns
+    -------
+    ndarray of shape (nodes, 3) [m]
+        Evenly spaced; the ends go off upwards (+z), the loop hangs below.
+
+    Raises
+    ------
+    ValueError
+        A length too small for the knot.
+    """
+    return _two_half_knots(-1.0, length, radius, nodes)
+
+
+def granny_knot(*, length: float = 1.0, radius: float = 2e-3, nodes: int = 301) -> FloatArray:
+    """Points of a loose granny knot: like `reef_knot`, with two half knots of the same hand."""
+    return _two_half_knots(1.0, length, radius, nodes)
+
+
+def _two_half_knots(second_hand: float, length: float, radius: float, nodes: int) -> FloatArray:
+    length = validation.positive(length, "length of the rod")
+    radius = validation.positive(radius, "radius of the rod")
+    nodes = validation.integer(nodes, "nodes", 10, 10**7)
+    r = _BRAID_RADIUS * radius
+    width = _BRAID_SLOPE * np.pi * r * 3.0
+    rise = 8.0 * r  # between the braids
+
+    def strand(height: float, hand: float) -> FloatArray:
+        """From the left end below to the right end above, by three half turns about the x axis."""
+        phase = np.linspace(0.0, 3.0 * np.pi, 120)
+        return np.stack(
+            [width * (phase / phase[-1] - 0.5), hand * r * np.sin(phase), height - r * np.cos(phase)], axis=1
+        )
+
+    mirror = np.array([-1.0, -1.0, 1.0])  # half a turn about z takes one strand into the other
+    first, second = strand(0.0, 1.0), strand(rise, second_hand)
+
+    def side(start: FloatArray, end: FloatArray, reach: float) -> FloatArray:
+        """From an end of one braid to the end of the next above it, out to one side and back."""
+        angle = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 30)[1:-1]
+        sign = np.sign(start[0])
+        middle, half = 0.5 * (start + end), 0.5 * (end[2] - start[2])
+        return np.stack(
+            [middle[0] + sign * reach * np.cos(angle), np.zeros_like(angle), middle[2] + half * np.sin(angle)], axis=1
+        )
+
+    # One half: up through the first braid to the right, out and back, through the second to the left; and its tail.
+    begin, end = first[0], second[0] * mirror
+    half = np.concatenate([first, side(first[-1], end, rise), second * mirror])
+    top = half[-1]
+    used = 2.0 * _length(half)
+    loop = 0.3 * (length - used)
+    if loop < rise:
+        least = used + 4.0 * rise
+        raise ValueError(f"length of the rod must be at least {least:.3g} m for this knot, got {length:g} m")
+    # The loop below: half an ellipse from one braid's left end to its right end.
+    angle = np.linspace(0.0, 0.5 * np.pi, 60)
+    depth = 0.5 * loop
+    bottom = np.stack(
+        [
+            begin[0] * np.cos(angle) - 0.25 * loop * np.sin(2.0 * angle),
+            np.zeros_like(angle),
+            begin[2] - depth * np.sin(angle),
+        ],
+        axis=1,
+    )[1:]
+    arm = np.concatenate([bottom[::-1], half])
+    tail = 0.5 * length - _length(arm)
+    if tail <= 0.0:
+        raise ValueError(f"length of the rod must be greater for this knot, got {length:g} m")
+    angle = np.linspace(0.0, 0.5 * np.pi, 30)[1:]
+    bend = top + 4.0 * r * np.stack([-np.sin(angle), np.zeros_like(angle), 1.0 - np.cos(angle)], axis=1)
+    up = bend[-1] + np.array([[0.0, 0.0, max(tail - 2.0 * np.pi * r, radius)]])
+    arm = np.concatenate([arm, bend, up])
+    return _even(np.concatenate([(arm * mirror)[::-1], arm[1:]]), nodes, length)
+
+
+def _length(points: FloatArray) -> float:
+    return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
+
+
+def _even(points: FloatArray, nodes: int, length: float) -> FloatArray:
+    """Points at even distances along a smoothed line, as long as it should be."""
+    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    places = np.concatenate([[0.0], np.cumsum(steps)])
+    fine = np.linspace(0.0, places[-1], 20 * nodes)
+    line = np.stack([np.interp(fine, places, points[:, k]) for k in range(3)], axis=1)
+    # Corners between the pieces: a running mean over the width of a braid, ends kept.
+    width = max(3, int(0.006 * len(fine)) | 1)
+    ends = line[:1], line[-1:]
+    half = width // 2
+    padded = np.concatenate([2 * ends[0] - line[half:0:-1], line, 2 * ends[1] - line[-2 : -half - 2 : -1]])
+    kernel = np.ones(width) / width
+    line = np.stack([np.convolve(padded[:, k], kernel, "valid") for k in range(3)], axis=1)
+    steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
+    places = np.concatenate([[0.0], np.cumsum(steps)])
+    even = np.linspace(0.0, places[-1], nodes)
+    line = np.stack([np.interp(even, places, line[:, k]) for k in range(3)], axis=1)
+    return line * (length / _length(line))
+
+
+def writhe(points: npt.ArrayLike, closed: bool = False) -> float:
+    """Writhe of a polygon [turns]; of an open one, with its ends carried on straight to far away.
+
+    The Gauss integral over each pair of edges is the area that their directions sweep on the sphere
+    [Klenin and Langowski 2000, method 1a].
+
+    Parameters
+    ----------
+    points : array_like of shape (nodes, 3) [m]
+    closed : bool
+        Whether the last point is joined to the first.
+
+    Returns
+    -------
+    float
+    """
+    x = validation.number_array(points, "points", ("nodes", 3))
+    if not closed:
+        far = 1e4 * _length(x)
+        first, last = x[0] - x[1], x[-1] - x[-2]
+        x = np.concatenate([x[:1] + far * first / np.linalg.norm(first), x, x[-1:] + far * last / np.linalg.norm(last)])
+    start, end = (x, np.roll(x, -1, axis=0)) if closed else (x[:-1], x[1:])
+    total = 0.0
+    for i in range(len(start) - 2):  # edges that share a node lie in a plane and sweep nothing
+        last = len(start) - (1 if closed and i == 0 else 0)
+        total += float(_gauss(start[i], end[i], start[i + 2 : last], end[i + 2 : last]).sum())
+    return total / (2.0 * np.pi)
+
+
+def link(points: FloatArray, directors: FloatArray, closed: bool) -> float:
+    """Twist of material frames, shape (edges, 3, 3), over parallel transport, and writhe of the polygon [turns]."""
+    first, tangent = directors[:, 0], directors[:, 2]
+    pairs = zip(range(len(first)), np.roll(np.arange(len(first)), -1), strict=True)
+    twist = 0.0
+    for i, j in pairs:
+        if j == 0 and not closed:
+            continue
+        carried = first[i] - (first[i] @ tangent[j]) / (1.0 + tangent[i] @ tangent[j]) * (tangent[i] + tangent[j])
+        twist += float(np.arctan2(np.cross(carried, first[j]) @ tangent[j], carried @ first[j]))
+    return twist / (2.0 * np.pi) + writhe(points, closed)
+
+
+def _gauss(a0: FloatArray, a1: FloatArray, b0: FloatArray, b1: FloatArray) -> FloatArray:
+    """Signed area on the sphere that the directions from one edge to others sweep, shape (edges,)."""
+    sides = [b0 - a0, b1 - a0, b1 - a1, b0 - a1]
+    normals = []
+    for k in range(4):
+        normal = np.cross(sides[k], sides[(k + 1) % 4])
+        size = np.linalg.norm(normal, axis=1, keepdims=True)
+        normals.append(np.divide(normal, size, out=np.zeros_like(normal), where=size > 0.0))
+    area = np.zeros(len(b0))
+    for k in range(4):
+        area += np.arcsin(np.clip(np.sum(normals[k] * normals[(k + 1) % 4], axis=1), -1.0, 1.0))
+    sign = np.sign(np.einsum("ij,j,ij->i", np.cross(b1 - b0, a1 - a0), np.ones(3), sides[0]))
+    return np.where(sign == 0.0, 0.0, sign * area)
+
+
+def signed_crossings(points: npt.ArrayLike, direction: npt.ArrayLike = (0.0, 0.0, 1.0)) -> int:
+    """Sum of the signs of the crossings that a curve shows from a direction: the writhe of its diagram.
+
+    Parameters
+    ----------
+    points : array_like of shape (nodes, 3)
+    direction : array_like of shape (3,)
+        From which it is looked at.
+
+    Returns
+    -------
+    int
+    """
+    x = validation.number_array(points, "points", ("nodes", 3))
+    view = validation.unit_vector(direction, "direction")
+    first = np.cross(view, np.eye(3)[int(np.argmin(np.abs(view)))])
+    first /= np.linalg.norm(first)
+    flat = np.stack([x @ first, x @ np.cross(view, first)], axis=1)
+    height = x @ view
+    a, edge = flat[:-1], np.diff(flat, axis=0)
+    count = 0
+    for i in range(len(a)):
+        j = np.arange(i + 2, len(a))
+        area = edge[i, 0] * edge[j, 1] - edge[i, 1] * edge[j, 0]
+        gap = a[j] - a[i]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            s = (gap[:, 0] * edge[j, 1] - gap[:, 1] * edge[j, 0]) / area
+            t = (gap[:, 0] * edge[i, 1] - gap[:, 1] * edge[i, 0]) / area
+        for k in np.flatnonzero((s >= 0) & (s < 1) & (t >= 0) & (t < 1)):
+            above = height[i] + s[k] * (height[i + 1] - height[i])
+            below = height[j[k]] + t[k] * (height[j[k] + 1] - height[j[k]])
+            count += int(np.sign(area[k]) * np.sign(above - below))
+    return count
