@@ -101,8 +101,8 @@ def overhand_knot(
         middle = 0.5 * (low + high)
         low, high = (middle, high) if excess(middle) < shortening else (low, middle)
     tail = 0.5 * (length - shortening - braid)
-    if tail <= 2.0 * low:
-        raise ValueError(f"length of the rod must leave tails beside the loop: {length:g} m is too short")
+    if tail <= 4.0 * braid_radius:
+        raise ValueError(f"length of the rod must leave tails beside the braid: {length:g} m is too short")
     return _even(whole(low, tail), nodes, length)
 
 
