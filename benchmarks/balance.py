@@ -191,7 +191,14 @@ class _Sum:
     def add_inertia(self, moved: FloatArray, before: Look, h: float, turned: FloatArray) -> None:
         """Of a step over h, from `before`: nodes, spin of edges, and the couple of edges that spin and turn."""
         case = self._case
-        self._on_nodes(-self._mass[:, None] * (moved / h - before.velocities) / h, slice(None))
+        acceleration = (moved / h - before.velocities) / h
+        self._on_nodes(-self._mass[:, None] * acceleration, slice(None))
+        # An edge carries its mass along it: m / 3, m / 6, m / 3; but at a wall half of it sits at either node.
+        shared = np.full((len(self._couple), 1), case.line_density * self._edge / 6)
+        shared[0] = 0.0
+        if case.both_ends and case.nodes > 2:
+            shared[-1] = 0.0
+        self._pair(shared * np.diff(acceleration, axis=0))
         rotary = 1000.0 * math.pi * case.radius**4 / 2 * self._edge
         torque = rotary * (turned / h - before.spins) / h
         self._along(-torque, slice(None))

@@ -100,6 +100,11 @@ bool ElementTable::regular(int element, std::vector<std::ptrdiff_t>& lines) cons
   return true;
 }
 
+std::ptrdiff_t ElementTable::offset(int element, int i, int j) const {
+  const std::ptrdiff_t* offset = offsets_.data() + entry_start(element);
+  return symmetric_ ? offset[std::max(i, j) * (std::max(i, j) + 1) / 2 + std::min(i, j)] : offset[i * width_ + j];
+}
+
 void ElementTable::add_gradient(int element, const double* gradient, double scale, VectorX& residual,
                                 VectorX& magnitude) const {
   const int* d = dofs(element);
@@ -176,10 +181,23 @@ void Assembler::analyse() {
   ++generation_;
   for (ElementTable* table : {&stretch, &bend, &half, &contact}) table->find_offsets(*solver_);
   for (ElementTable& table : loads) table.find_offsets(*solver_);
+  find_edge_couplings();
   diagonal_.clear();
   for (int i = 0; i < model_.dof_count; ++i) diagonal_.push_back(solver_->offset(i, i));
   regular = regular_stencils(model_, bend);
   find_blocks();
+}
+
+void Assembler::find_edge_couplings() {
+  edge_couplings.clear();
+  const int size = model_.dimension;
+  for (int e = 0; e < model_.edge_count; ++e)
+    for (int i = 0; i < size; ++i) {
+      const std::ptrdiff_t between = stretch.offset(e, i, size + i), other = stretch.offset(e, size + i, i);
+      for (std::ptrdiff_t entry :
+           {stretch.offset(e, i, i), stretch.offset(e, size + i, size + i), between, other == between ? -1 : other})
+        edge_couplings.push_back(entry);
+    }
 }
 
 /// Rows and columns of what supports hold.

@@ -28,6 +28,8 @@ class ElementTable {
   /// the lower triangle, or whole lines); then where its lines begin.
   bool regular(int element, std::vector<std::ptrdiff_t>& lines) const;
 
+  /// Where the entry of row i and column j of an element's square stands in the solver's values.
+  std::ptrdiff_t offset(int element, int i, int j) const;
   /// residual += scale gradient, magnitude += |gradient|.
   void add_gradient(int element, const double* gradient, double scale, VectorX& residual, VectorX& magnitude) const;
   /// values += scale hessian.
@@ -90,6 +92,8 @@ class Assembler {
   ElementTable stretch, bend, half, contact;
   RegularStencils regular;
   std::vector<ElementTable> loads;
+  /// Per edge and direction, where its nodes' own entries stand, and the one or (unsymmetric) two between them, or -1.
+  std::vector<std::ptrdiff_t> edge_couplings;
 
  private:
   struct Coupling {
@@ -103,6 +107,7 @@ class Assembler {
   };
   void analyse();
   void find_blocks();
+  void find_edge_couplings();
 
   const Model& model_;
   Symmetry symmetry_;

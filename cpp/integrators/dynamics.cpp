@@ -52,6 +52,7 @@ void book_work(Equations& equations, const Parameters& parameters, const VectorX
 void book_supports(const Equations& equations, const VectorX& v0, const VectorX& v1, double dt, StepWorkspace& work,
                    StepResult& result) {
   const Assembler& assembler = equations.assembler();
+  const VectorX& mass = equations.mass().rows;  // which couples nothing that is held
   VectorX& full_residual = work.newton.evaluation.full_residual;
   VectorX& held = work.held_vector;
   const auto take = [&](const VectorX& vector) {
@@ -64,11 +65,11 @@ void book_supports(const Equations& equations, const VectorX& v0, const VectorX&
   result.support_work -= held.dot(work.change);
   full_residual -= held;
   take(v1);
-  result.support_work += 0.5 * equations.mass.dot(held.cwiseAbs2());
-  full_residual += equations.mass.cwiseProduct(held) / dt;
+  result.support_work += 0.5 * mass.dot(held.cwiseAbs2());
+  full_residual += mass.cwiseProduct(held) / dt;
   take(v0);
-  result.support_work -= 0.5 * equations.mass.dot(held.cwiseAbs2());
-  full_residual -= equations.mass.cwiseProduct(held) / dt;
+  result.support_work -= 0.5 * mass.dot(held.cwiseAbs2());
+  full_residual -= mass.cwiseProduct(held) / dt;
 }
 
 /// Axial forces at the start of a step [N]: where the mixed method sets out from, for those of an extrapolated motion,
@@ -136,7 +137,7 @@ double moved_by(VectorX& force, Equations& equations, const Newton& newton, doub
   const FactorRecord& factor = work.newton.factor;
   if (factor.owner != &equations || factor.interval != std::abs(h)) {
     // Nothing moved, and no matrix was made.
-    force = (h * h) * force.cwiseQuotient(equations.mass.cwiseMax(1e-300));
+    force = (h * h) * force.cwiseQuotient(equations.mass().rows.cwiseMax(1e-300));
     return newton.displacement(force);
   }
   equations.assembler().solver().solve({force.data(), static_cast<std::size_t>(force.size())});
@@ -146,27 +147,33 @@ double moved_by(VectorX& force, Equations& equations, const Newton& newton, doub
 /// Estimated error of the step just taken [m]: dt^2 / 2 times the mean acceleration (backward Euler), or dt^3 / 12
 /// times its rate (midpoint). Without a step before there is nothing to compare with.
 ///
-/// The rate is taken over two steps: what rings from one step to the next is an error too, but one that stays as it is
-/// and does not add up, so it is held against the whole tolerance.
+/// The rate is that between two pairs of steps: what rings from one step to the next is an error too, but one that
+/// stays as it is and does not add up, so it is held against the whole tolerance.
 double estimated_error(Equations& equations, const Newton& newton, const Options& options, const StepPlan& plan,
                        const State& state, const Predictor& predictor, StepWorkspace& work) {
   VectorX& error = work.assumed;
   const VectorX& acceleration = work.mean;
   if (plan.rule == StepRule::backward_euler) {
-    error = 0.5 * equations.mass.cwiseProduct(acceleration);
+    work.difference = 0.5 * acceleration;
+    multiply(equations.model(), equations.mass(), work.difference, error);
     return moved_by(error, equations, newton, plan.dt, work);
   }
   if (predictor.empty()) return 0.0;
   const double h = 0.5 * plan.dt, middle = state.time + 0.5 * plan.dt;
-  const auto error_by = [&](const VectorX& before, double time) {
-    const double apart = std::abs((middle - time) / plan.dt);
-    error = (1.0 / (3.0 * apart)) * equations.mass.cwiseProduct(acceleration - before);
+  // Of a difference of accelerations that lie so far apart in time.
+  const auto error_of = [&](double apart) {
+    work.difference *= std::abs(plan.dt / (3.0 * apart));
+    multiply(equations.model(), equations.mass(), work.difference, error);
     return moved_by(error, equations, newton, h, work);
   };
-  const double whole = error_by(predictor.acceleration(0), predictor.time(0));
-  if (options.integrator == Integrator::fourth_order || predictor.count() < 2) return whole;
+  work.difference = acceleration - predictor.acceleration(0);
+  const double whole = error_of(middle - predictor.time(0));
+  if (options.integrator == Integrator::fourth_order || predictor.count() < 3) return whole;
+  work.difference =
+      0.5 * (acceleration + predictor.acceleration(0)) - 0.5 * (predictor.acceleration(1) + predictor.acceleration(2));
+  const double drifting = error_of(0.5 * (middle + predictor.time(0) - predictor.time(1) - predictor.time(2)));
   const double share = std::abs(plan.dt) / options.duration.value_or(1.0);
-  return std::max(error_by(predictor.acceleration(1), predictor.time(1)), std::min(whole, 2.0 * share * whole));
+  return std::max(drifting, std::min(whole, 2.0 * share * whole));
 }
 
 /// Forces over mass at q, with velocity v in drag, viscosity and the spin couple.
@@ -179,7 +186,7 @@ void explicit_acceleration(Equations& equations, const Parameters& parameters, d
   equations.evaluate(state.q, false, nullptr, work.newton.evaluation);
   acceleration = -work.newton.evaluation.full_residual;
   equations.assembler().project(acceleration);
-  acceleration = acceleration.cwiseQuotient(equations.mass.cwiseMax(1e-300));
+  acceleration = acceleration.cwiseQuotient(equations.mass().rows.cwiseMax(1e-300));
 }
 
 }  // namespace
@@ -222,13 +229,13 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
   assembler.add_held_part(work.mean, 1.0, v1);
   book_work(equations, parameters, work.change, result);
   if (!model.constraints.empty()) {
-    work.assumed = equations.mass.cwiseProduct((work.z - state.q) / (h * h) - state.v / h);
+    work.assumed = equations.mass().rows.cwiseProduct((work.z - state.q) / (h * h) - state.v / h);
     book_supports(equations, state.v, v1, dt, work, result);
   }
   VectorX& acceleration = work.mean;
   acceleration = (v1 - state.v) / dt;
   if (options.tolerance) result.error = estimated_error(equations, newton, options, plan, state, predictor, work);
-  predictor.record(state.time + 0.5 * dt, plan.slot, acceleration, equations.mass, work.assumed);
+  predictor.record(state.time + 0.5 * dt, plan.slot, acceleration, equations.mass().rows, work.assumed);
   if (equations.contact()) result.stiffness_work = equations.contact()->accept(state);
   if (!model.planar()) compute_configuration(model, state, q1, work.after);
   accept_configuration(model, q1, work.after, state);
@@ -285,7 +292,7 @@ double stable_step(Equations& equations, const Parameters& parameters, const Sta
   equations.begin(state, parameters, 0.0, false);
   equations.evaluate(state.q, true, nullptr, work.evaluation);
   const LinearSolver& solver = equations.assembler().solver();
-  const VectorX scale = equations.mass.cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  const VectorX scale = equations.mass().rows.cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
   VectorX x(scale.size()), y(scale.size());
   for (Eigen::Index i = 0; i < x.size(); ++i)
     x(i) = std::sin(1.0 + 7.0 * static_cast<double>(i)) + (i % 2 ? 1.0 : -1.0);

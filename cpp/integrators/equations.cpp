@@ -24,18 +24,6 @@ std::unique_ptr<Contact> make_contact(const Model& model) {
 
 }  // namespace
 
-void set_mass(const Model& model, const Parameters& p, VectorX& mass) {
-  mass.setZero(model.dof_count);
-  for (int i = 0; i < model.node_count; ++i)
-    mass.segment(model.node_dof[at(i)], model.dimension).setConstant(p.node_mass(i));
-  for (int f = 0; f < model.frame_count; ++f)
-    mass.segment(model.frame_dof[at(f)], model.frame_size()).setConstant(p.frame_inertia(f));
-  for (std::size_t h = 0; h < model.hinges.size(); ++h)
-    mass(model.hinges[h].dof) = p.hinge_inertia(static_cast<Eigen::Index>(h));
-  if (!model.planar())
-    for (int e = 0; e < model.edge_count; ++e) mass(model.edge_dof[at(e)]) = p.edge_inertia(e);
-}
-
 void set_gravity_force(const Model& model, const Parameters& p, VectorX& force) {
   force.setZero(model.dof_count);
   for (int i = 0; i < model.node_count; ++i) {
@@ -69,7 +57,7 @@ void Equations::set_parameters(const Parameters& parameters) {
   parameters_ = &parameters;
   if (version_ == parameters.version) return;
   version_ = parameters.version;
-  set_mass(model_, parameters, mass);
+  set_mass(model_, parameters, mass_);
   set_gravity_force(model_, parameters, gravity_);
   set_elastic(parameters, elastic);
   if (contact_) contact_->set_parameters(parameters);
@@ -196,7 +184,9 @@ void Equations::add_step(const VectorX& z, bool with_matrix, Evaluation& out) {
   out.floor.resize(n);
   const double inverse = h_ != 0.0 ? 1.0 / h_ : 0.0;
   const auto x = z.array(), q0 = state_->q.array(), v0 = state_->v.array();
-  const auto inertia = (inverse * mass.array()) * (inverse * (x - q0) - v0);
+  acceleration_ = (inverse * (inverse * (x - q0) - v0)).matrix();
+  multiply(model_, mass_, acceleration_, inertia_);
+  const auto inertia = inertia_.array();
   const auto drag = (inverse * node_dof_drag_.array()) * (x - q0);
   out.full_residual = (gradient_.head(n).array() + inertia + drag - gravity_.array() - custom_force.array()).matrix();
   out.magnitude =
@@ -211,7 +201,8 @@ void Equations::add_step(const VectorX& z, bool with_matrix, Evaluation& out) {
     const std::span<double> values = assembler_.solver().values();
     const std::vector<std::ptrdiff_t>& diagonal = assembler_.diagonal_offsets();
     for (int i = 0; i < n; ++i)
-      values[static_cast<std::size_t>(diagonal[at(i)])] += (mass[i] * inverse + node_dof_drag_[i]) * inverse;
+      values[static_cast<std::size_t>(diagonal[at(i)])] += (mass_.rows[i] * inverse + node_dof_drag_[i]) * inverse;
+    add_mass_coupling(inverse * inverse, values);
   }
   // An axial strain rounds along its edge only.
   const bool planar = model_.planar();
@@ -223,6 +214,21 @@ void Equations::add_step(const VectorX& z, bool with_matrix, Evaluation& out) {
     for (int i = 0; i < (planar ? 2 : 3); ++i) {
       tail[i] += part[i];
       head[i] += part[i];
+    }
+  }
+}
+
+/// The mass matrix off the diagonal, and what that takes from it.
+void Equations::add_mass_coupling(double factor, std::span<double> values) {
+  const auto size = static_cast<std::size_t>(model_.dimension);
+  for (int e = 0; e < model_.edge_count; ++e) {
+    const double coupling = factor * mass_.coupling[e];
+    const std::ptrdiff_t* entry = assembler_.edge_couplings.data() + at(e) * 4 * size;
+    for (std::size_t i = 0; i < size; ++i, entry += 4) {
+      values[static_cast<std::size_t>(entry[0])] -= coupling;
+      values[static_cast<std::size_t>(entry[1])] -= coupling;
+      values[static_cast<std::size_t>(entry[2])] += coupling;
+      if (entry[3] >= 0) values[static_cast<std::size_t>(entry[3])] += coupling;
     }
   }
 }
@@ -367,7 +373,7 @@ void Equations::set_floor(const VectorX& z, VectorX& floor) {
     for (int i = 0; i < model_.frame_size(); ++i) floor(model_.frame_dof[at(s.frame)] + i) += moment;
     if (s.hinge >= 0) floor(model_.hinges[at(s.hinge)].dof) += moment;
   }
-  if (h_ != 0.0) floor += (4.0 * kEpsilon * std::max(reach, 1e-300) / (h_ * h_)) * mass;
+  if (h_ != 0.0) floor += (4.0 * kEpsilon * std::max(reach, 1e-300) / (h_ * h_)) * mass_.rows;
 }
 
 double Equations::dissipated(const VectorX& change) const {

@@ -15,6 +15,7 @@
 #include "assembly/assembler.hpp"
 #include "contact/contact.hpp"
 #include "integrators/options.hpp"
+#include "model/mass_matrix.hpp"
 #include "model/state.hpp"
 
 namespace withe {
@@ -74,7 +75,7 @@ class Equations {
   /// Newton step, n <- EA (eps + d eps . dz).
   void predict_axial_force(const VectorX& step, VectorX& out) const;
 
-  VectorX mass;  ///< per unknown [kg], [kg m^2]
+  const MassMatrix& mass() const { return mass_; }
   ElasticCoefficients elastic;
 
  private:
@@ -82,6 +83,7 @@ class Equations {
   void set_axial_forces(const ElasticCoefficients& k, Evaluation& out);
   StencilBatch regular_batch(const ElasticCoefficients& k, const double* axial_force, double* values);
   void add_step(const VectorX& z, bool with_matrix, Evaluation& out);
+  void add_mass_coupling(double factor, std::span<double> values);
   void add_loads(const VectorX& z, bool with_matrix, Evaluation& out);
   void find_contacts(const VectorX& z, bool with_matrix);
   void add_contacts(bool with_matrix, Evaluation& out);
@@ -121,6 +123,8 @@ class Equations {
   Configuration start_, middle_, end_;
   VectorX difference_;  ///< q1 - q0
   VectorX end_q_, last_z_;
+  MassMatrix mass_;
+  VectorX acceleration_, inertia_;
   VectorX node_dof_drag_, gravity_;
   long version_ = -1;                       ///< of the parameters that mass, elastic, gravity_ and drag belong to
   VectorX gradient_, magnitude_;            ///< forces but for inertia, drag and gravity; padded by kPadding
@@ -135,8 +139,6 @@ class Equations {
   bool floor_current_ = false;
 };
 
-/// Per-unknown masses from the derived parameters.
-void set_mass(const Model& model, const Parameters& parameters, VectorX& mass);
 /// Gravity's force per unknown.
 void set_gravity_force(const Model& model, const Parameters& parameters, VectorX& force);
 

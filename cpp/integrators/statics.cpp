@@ -131,7 +131,7 @@ class Statics {
     equations_.evaluate(state_.q, true, nullptr, work_.evaluation);
     double stiffness = 0.0;
     for (int i = 0; i < model.dof_count; ++i)
-      stiffness = std::max(stiffness, equations_.assembler().diagonal(i) / std::max(equations_.mass(i), 1e-300));
+      stiffness = std::max(stiffness, equations_.assembler().diagonal(i) / std::max(equations_.mass().rows(i), 1e-300));
     double potential = work_.evaluation.potential;
     energy_scale_ = std::max(energy_scale_, std::abs(potential));
     double h = 1e2 / std::sqrt(stiffness);
@@ -165,7 +165,7 @@ class Statics {
     const Model& model = equations_.model();
     VectorX shift, z, step, weight;
     begin();
-    weight = equations_.mass;
+    weight = equations_.mass().rows;
     double damping = 0.0;
     for (int k = 0; k < max_steps; ++k) {
       work_.poll();
@@ -257,7 +257,7 @@ class Statics {
   VectorX lowest_mode(int seed) {
     const Model& model = equations_.model();
     LinearSolver& solver = equations_.assembler().solver();
-    const VectorX weight = equations_.mass.cwiseMax(1e-300);
+    const VectorX weight = equations_.mass().rows.cwiseMax(1e-300);
     double stiffness = 0.0;
     for (int i = 0; i < model.dof_count; ++i)
       stiffness = std::max(stiffness, equations_.assembler().diagonal(i) / weight(i));

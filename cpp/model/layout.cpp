@@ -101,6 +101,9 @@ void add_constraints(Model& model) {
       model.constraints.push_back({model.frame_dof[at(support.frame)], model.frame_size(), free});
     }
   }
+  model.edge_lumped.clear();
+  for (int e = 0; e < model.edge_count; ++e)
+    model.edge_lumped.push_back(node_held[at(model.edge_tail[at(e)])] || node_held[at(model.edge_head[at(e)])]);
 }
 
 }  // namespace withe

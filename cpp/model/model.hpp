@@ -80,9 +80,10 @@ struct Parameters {
   Vector3 gravity;
   std::vector<MatrixX2> natural_curvature;  ///< per rod and stencil, smooth [1/m]
   std::vector<VectorX> natural_twist;       ///< per rod and stencil [rad/m]
+  bool lumped = false;                      ///< whether masses sit at nodes alone; see mass_matrix.hpp
 
   // Derived from the above by `update_derived`.
-  VectorX node_mass, node_drag;                  ///< [kg], [N s/m]
+  VectorX node_mass, node_drag;                  ///< of the half edges around a node, and added ones [kg], [N s/m]
   VectorX edge_inertia;                          ///< of theta [kg m^2]
   VectorX frame_inertia, hinge_inertia;          ///< [kg m^2]
   MatrixX3 bend_stiffness, half_stiffness;       ///< per stencil: EI1 / V, EI2 / V, GJ / V [N m]
@@ -101,7 +102,8 @@ struct Model {
   std::vector<int> rod_first_edge;  ///< edges of rod r: rod_first_edge[r] .. rod_first_edge[r + 1]
   std::vector<int> edge_rod;
   std::vector<int> edge_tail, edge_head;
-  VectorX edge_length;  ///< at rest [m]
+  VectorX edge_length;            ///< at rest [m]
+  std::vector<bool> edge_lumped;  ///< whether a support holds one of its nodes; see mass_matrix.hpp
   std::vector<BendStencil> bend;
   std::vector<int> reversed_bend;  ///< stencils with an edge against its rod
   std::vector<FrameStencil> half;

@@ -152,6 +152,7 @@ void World::Implementation::rebuild(Rebuild why) {
   if (why == Rebuild::first) {
     model = std::move(fresh);
     parameters = initial_parameters(model);
+    parameters.lumped = options.integrator == Integrator::verlet;
     state = initial_state(model);
     ramps.assign(description.rods.size(), NaturalRamp{});
     motions.assign(description.supports.size(), SupportMotion{});
@@ -169,10 +170,16 @@ void World::Implementation::rebuild(Rebuild why) {
       for (int g = 0; g < old.frame_count; ++g)
         if (same_frame(model, f, old, g)) is_new[at(f)] = false;
     state = transferred(old, from);
+    // A support changes where the mass of the edges at it sits, and with that what kinetic energy there is.
+    EnergyScratch& scratch = energy_scratch;
+    set_mass(old, parameters, scratch.mass);
+    const double before = kinetic_energy(old, scratch.mass, from.v);
     update_derived(model, parameters);
     newton = std::make_unique<Newton>(model, options);
     equations = std::make_unique<Equations>(model, options);
     relax_frames(is_new);
+    set_mass(model, parameters, scratch.mass);
+    support_work += kinetic_energy(model, scratch.mass, state.v) - before;
   }
   newton = std::make_unique<Newton>(model, options);
   equations = std::make_unique<Equations>(model, options);

@@ -8,23 +8,6 @@ namespace {
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
-double kinetic_energy(const Model& model, const Parameters& p, const VectorX& v) {
-  double twice = 0.0;
-  for (int i = 0; i < model.node_count; ++i) {
-    const int dof = model.node_dof[at(i)];
-    for (int k = 0; k < model.dimension; ++k) twice += p.node_mass(i) * v(dof + k) * v(dof + k);
-  }
-  for (int f = 0; f < model.frame_count; ++f) {
-    const int dof = model.frame_dof[at(f)];
-    for (int k = 0; k < model.frame_size(); ++k) twice += p.frame_inertia(f) * v(dof + k) * v(dof + k);
-  }
-  for (std::size_t h = 0; h < model.hinges.size(); ++h)
-    twice += p.hinge_inertia(static_cast<Eigen::Index>(h)) * v(model.hinges[h].dof) * v(model.hinges[h].dof);
-  for (std::size_t e = 0; e < model.edge_dof.size(); ++e)
-    twice += p.edge_inertia(static_cast<Eigen::Index>(e)) * v(model.edge_dof[e]) * v(model.edge_dof[e]);
-  return 0.5 * twice;
-}
-
 double gravity_energy(const Model& model, const Parameters& p, const VectorX& q) {
   Vector3 g = p.gravity;
   if (model.planar()) g << p.gravity.dot(model.plane->first), p.gravity.dot(model.plane->second), 0.0;
@@ -51,7 +34,7 @@ BendTwistEnergy bend_twist_energy(const Model& model, const ElasticCoefficients&
 
 /// What actuation changes at a state that stays: bending and twisting [J].
 double World::Implementation::actuation_energy() const {
-  auto& [c, k] = energy_scratch;
+  auto& [c, k, mass] = energy_scratch;
   compute_configuration(model, state, state.q, c);
   set_elastic(parameters, k);
   const BendTwistEnergy e = bend_twist_energy(model, k, c);
@@ -65,10 +48,11 @@ Energy World::Implementation::energy() const {
 /// Energy of a state, with books as they were kept there.
 Energy World::Implementation::energy_of(const State& at, double loads, double work_done, double lost) const {
   Energy e;
-  auto& [c, k] = energy_scratch;
+  auto& [c, k, mass] = energy_scratch;
   compute_configuration(model, at, at.q, c);
   set_elastic(parameters, k);
-  e.kinetic = kinetic_energy(model, parameters, at.v);
+  set_mass(model, parameters, mass);
+  e.kinetic = kinetic_energy(model, mass, at.v);
   for (int i = 0; i < model.edge_count; ++i) e.stretch += stretch_energy_of(model, k, c, i);
   const BendTwistEnergy turned = bend_twist_energy(model, k, c);
   e.bend = turned.bend;

@@ -51,6 +51,7 @@ struct StepStart {
 struct EnergyScratch {
   Configuration configuration;
   ElasticCoefficients elastic;
+  MassMatrix mass;
 };
 
 /// Why a model is built: at first, because supports changed or the plane was left, or to take a snapshot's state.

@@ -35,7 +35,13 @@ Linearisation World::linearise() const {
                                          {product.col(i).data(), static_cast<std::size_t>(n)});
   const auto B = basis.leftCols(count);
   out.stiffness = B.transpose() * product;
-  out.mass = (B.transpose() * system.mass.asDiagonal() * B).diagonal();
+  VectorX column, times;
+  for (Eigen::Index i = 0; i < count; ++i) {
+    column = basis.col(i);
+    multiply(model, system.mass(), column, times);
+    product.col(i) = times;
+  }
+  out.mass = B.transpose() * product;
   out.displacement.setZero(3 * model.node_count, count);
   for (int node = 0; node < model.node_count; ++node)
     for (Eigen::Index i = 0; i < count; ++i)

@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <numbers>
 #include <utility>
 
 #include <Eigen/LU>
@@ -49,8 +48,8 @@ void World::Implementation::advance(double duration) {
 }
 
 /// Steps change by powers of two and rarely, or symmetry and energy suffer; under error control, whose error would
-/// change by four, by the square root of two.
-int World::Implementation::notches() const { return options.tolerance ? 2 : 1; }
+/// change by four, by the fourth root of two.
+int World::Implementation::notches() const { return options.tolerance ? 4 : 1; }
 
 /// What is left of a time step, in equal parts no longer than `level` says.
 void World::Implementation::divide_rest(Division& division) const {
@@ -71,7 +70,7 @@ void World::Implementation::cut(Attempt why, Division& division, double dt) {
     fail(last_newton, dt,
          options.integrator == Integrator::verlet ? "the explicit step broke down" : "the step did not converge");
   const long left = division.parts - division.done;
-  level += why == Attempt::failed ? notches() : 1;
+  level += why == Attempt::failed ? notches() : (notches() + 1) / 2;
   for (divide_rest(division); division.parts <= left && may_cut(); divide_rest(division)) ++level;
   easy_steps = 0;
 }
@@ -84,8 +83,9 @@ bool World::Implementation::grow(Attempt attempt, double dt) {
   }
   if (++easy_steps < 4 || level == 0) return false;
   easy_steps = 0;
-  const bool twice = notches() > 1 && may_grow(dt, 2.0);
-  level = std::max(0, level - (twice ? 2 : 1));
+  int up = notches();
+  while (up > 1 && !may_grow(dt, std::exp2(static_cast<double>(up) / notches()))) --up;
+  level = std::max(0, level - up);
   return true;
 }
 
@@ -132,7 +132,7 @@ World::Implementation::Attempt World::Implementation::try_step(double dt) {
   // Far below what is allowed an estimate is mostly rounding.
   const double seen = error > 0.01 * allowed ? error / std::pow(dt, local_order()) : 0.0;
   error_rate = std::max(seen, error_rate * (1.0 - 1.0 / 256.0));
-  return may_grow(dt, std::numbers::sqrt2) ? Attempt::easy : Attempt::hard;
+  return may_grow(dt, std::exp2(1.0 / notches())) ? Attempt::easy : Attempt::hard;
 }
 
 void World::Implementation::keep_for_return() {

@@ -63,8 +63,8 @@ struct Plan {
 
 /// Equations linearised about the present configuration, without what supports hold: mass x'' + stiffness x = 0.
 struct Linearisation {
-  Eigen::MatrixXd stiffness;     ///< free unknowns x free unknowns; at an equilibrium, its tangent stiffness
-  VectorX mass;                  ///< diagonal, per free unknown
+  Eigen::MatrixXd stiffness;  ///< free unknowns x free unknowns; at an equilibrium, its tangent stiffness
+  Eigen::MatrixXd mass;
   Eigen::MatrixXd displacement;  ///< (3 nodes) x free unknowns: node displacements [m] of each unknown
 };
 

@@ -111,8 +111,9 @@ class Linearisation:
     ----------
     stiffness : ndarray of shape (unknowns, unknowns)
         Tangent stiffness: node positions [m] and angles [rad] against forces [N] and moments [N m].
-    mass : ndarray of shape (unknowns,)
-        Its diagonal: masses [kg] and moments of inertia [kg m^2].
+    mass : ndarray of shape (unknowns, unknowns)
+        Masses [kg] and moments of inertia [kg m^2]. Velocity varies linearly along an edge, so the matrix couples its
+        nodes; with integrator "verlet" half of each edge's mass sits at either node.
     displacement : ndarray of shape (3 nodes, unknowns)
         Displacement of every node [m] that goes with each unknown.
     """
@@ -124,10 +125,12 @@ class Linearisation:
     def _solve(self, count: int) -> tuple[FloatArray, FloatArray]:
         from scipy.linalg import eigh
 
-        if not 1 <= count <= self.mass.size:
-            raise ValueError(f"count must be between 1 and {self.mass.size}, got {count}")
-        scale = 1.0 / np.sqrt(self.mass)
-        squares, shapes = eigh(scale[:, None] * self.stiffness * scale, subset_by_index=[0, count - 1])
+        if not 1 <= count <= len(self.mass):
+            raise ValueError(f"count must be between 1 and {len(self.mass)}, got {count}")
+        scale = 1.0 / np.sqrt(np.diag(self.mass))
+        squares, shapes = eigh(
+            scale[:, None] * self.stiffness * scale, scale[:, None] * self.mass * scale, subset_by_index=[0, count - 1]
+        )
         return squares, scale[:, None] * shapes
 
     def frequencies(self, count: int = 6) -> FloatArray:

@@ -248,7 +248,7 @@ TEST(Newton, ConvergesQuadraticallyWithTheExactMatrix) {
   const Newton newton(model, options);
   const Parameters parameters = initial_parameters(model);
   const State state = initial_state(model);
-  equations.begin(state, parameters, 0.1, false);
+  equations.begin(state, parameters, 0.05, false);
   NewtonWorkspace work;
   std::vector<double> residuals;
   for (int count = 1; count <= 8; ++count) {
@@ -286,9 +286,9 @@ TEST(StableStep, IsTwoOverTheHighestFrequency) {
                                             {y.data(), static_cast<std::size_t>(n)});
     K.col(i) = y;
   }
-  VectorX mass;
+  MassMatrix mass;
   set_mass(model, parameters, mass);
-  const VectorX scale = mass.cwiseSqrt().cwiseInverse();
+  const VectorX scale = mass.rows.cwiseSqrt().cwiseInverse();
   const MatrixX A = scale.asDiagonal() * K * scale.asDiagonal();
   VectorX x = testing::RandomNumbers(4).vector(n);
   double value = 0.0;

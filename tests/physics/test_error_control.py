@@ -35,5 +35,5 @@ def test_error_is_within_the_tolerance_and_proportional_to_it(integrator, tolera
         tip = waving_tip(integrator, 0.02, tolerance)
         ratios.append(np.abs(tip - reference).max() / tolerance)
     assert all(0.05 < ratio < 3.0 for ratio in ratios)
-    # Steps change by the square root of two, and the error with their square.
+    # Steps change by the fourth root of two, and the error with their square.
     assert max(ratios) < 3.0 * min(ratios)

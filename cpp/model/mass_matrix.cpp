@@ -1,0 +1,50 @@
+#include "model/mass_matrix.hpp"
+
+namespace withe {
+namespace {
+
+std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+}  // namespace
+
+void set_mass(const Model& model, const Parameters& p, MassMatrix& mass) {
+  VectorX& rows = mass.rows;
+  rows.setZero(model.dof_count);
+  for (int i = 0; i < model.node_count; ++i)
+    rows.segment(model.node_dof[at(i)], model.dimension).setConstant(p.node_mass(i));
+  for (int f = 0; f < model.frame_count; ++f)
+    rows.segment(model.frame_dof[at(f)], model.frame_size()).setConstant(p.frame_inertia(f));
+  for (std::size_t h = 0; h < model.hinges.size(); ++h)
+    rows(model.hinges[h].dof) = p.hinge_inertia(static_cast<Eigen::Index>(h));
+  if (!model.planar())
+    for (int e = 0; e < model.edge_count; ++e) rows(model.edge_dof[at(e)]) = p.edge_inertia(e);
+  if (p.lumped)
+    mass.coupling.setZero(model.edge_count);
+  else
+    mass.coupling = p.edge_density.cwiseProduct(model.edge_length) / 6.0;
+  for (int e = 0; e < model.edge_count; ++e)
+    if (model.edge_lumped[at(e)]) mass.coupling(e) = 0.0;
+}
+
+void multiply(const Model& model, const MassMatrix& mass, const VectorX& x, VectorX& out) {
+  out = mass.rows.cwiseProduct(x);
+  for (int e = 0; e < model.edge_count; ++e) {
+    const int a = model.tail_dof[at(e)], b = model.head_dof[at(e)];
+    for (int i = 0; i < model.dimension; ++i) {
+      const double apart = mass.coupling[e] * (x[b + i] - x[a + i]);
+      out[a + i] += apart;
+      out[b + i] -= apart;
+    }
+  }
+}
+
+double kinetic_energy(const Model& model, const MassMatrix& mass, const VectorX& v) {
+  double twice = mass.rows.dot(v.cwiseAbs2());
+  for (int e = 0; e < model.edge_count; ++e) {
+    const int a = model.tail_dof[at(e)], b = model.head_dof[at(e)];
+    for (int i = 0; i < model.dimension; ++i) twice -= mass.coupling[e] * (v[b + i] - v[a + i]) * (v[b + i] - v[a + i]);
+  }
+  return 0.5 * twice;
+}
+
+}  // namespace withe
