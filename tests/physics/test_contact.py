@@ -96,9 +96,15 @@ def test_a_rod_pushed_along_a_floor_slides_as_a_block_does(friction_model: Any) 
     for force in (3.0, 4.121, 6.0):
         simulation.restore(at_rest)
         simulation.set(push, load=(force, 0, 0))
-        simulation.step(300)
-        kinetic = 1.5**2 / 2.0 * max(force - 0.4 * 9.8, 0.0) ** 2
-        assert simulation.energy().kinetic == pytest.approx(kinetic, rel=0.01, abs=1e-4)
+        speeds = []
+        for _ in range(3):
+            simulation.step(100)
+            v = simulation.velocities()[:, 0]
+            speeds.append(0.5 * (v[1:] + v[:-1]).mean())  # momentum over mass
+        # The sudden push shakes the rod, whose tail friction lifts; from then on it gains what a block does.
+        pace = max(force - 0.4 * 9.8, 0.0)
+        assert speeds[2] - speeds[0] == pytest.approx(pace, rel=5e-3, abs=1e-4)
+        assert simulation.energy().kinetic == pytest.approx(1.5**2 / 2.0 * pace**2, rel=0.02, abs=1e-4)
 
 
 def test_an_anchored_contact_does_not_creep_under_half_its_limit() -> None:
