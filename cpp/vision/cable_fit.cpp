@@ -73,7 +73,8 @@ CableOutline::CableOutline(const SkeletonGraph& graph, const Continuations& link
     }
     for (int i = first; i <= last; ++i) {
       const SkeletonPoint& point = edge.points[static_cast<std::size_t>(end_of(entry) == 0 ? i : n - 1 - i)];
-      points_.push_back({point.position(), point.half_width, i == first ? gap : kNoGap, shows});
+      points_.push_back(
+          {point.position(), point.half_width, i == first ? gap : kNoGap, i == first ? shows : Flank::unknown});
     }
   }
   if (closed_ && closing_zone_ >= 0) {
@@ -131,11 +132,41 @@ std::vector<double> CableOutline::stations(double& total) const {
   return result;
 }
 
+namespace {
+
+/// Distances from a line to both flanks [px].
+struct Flanks {
+  double left, right;
+};
+struct Place {
+  Vector2 point, normal;
+  Flanks flanks;
+};
+
+/// Where the flank that shows changes: in the middle of where the mask is hardly wider than at its narrowest place.
+std::size_t find_waist(const std::vector<Place>& places, double half_width) {
+  const std::size_t size = places.size();
+  if (size <= 8) return size / 2;
+  const auto wide = [&](std::size_t k) {
+    double sum = 0;
+    for (std::size_t j = k - 2; j <= k + 2; ++j) sum += places[j].flanks.left + places[j].flanks.right;
+    return sum / 5;
+  };
+  std::size_t waist = size / 2;
+  for (std::size_t k = size / 5 + 2; k + size / 5 + 2 < size; ++k) {
+    if (wide(k) < wide(waist)) waist = k;
+  }
+  const double level = wide(waist) + half_width;
+  std::size_t first = waist, last = waist;
+  while (first > 2 && wide(first - 1) < level) --first;
+  while (last + 3 < size && wide(last + 1) < level) ++last;
+  return (first + last) / 2;
+}
+
+}  // namespace
+
 std::vector<FitSample> CableOutline::flank_samples(const BitImage& mask, const MatrixX2& line, double spacing,
                                                    const std::vector<double>& station) const {
-  struct Flanks {
-    double left, right;
-  };
   const std::ptrdiff_t n = line.rows();
   const auto measure = [&](std::ptrdiff_t row, double limit, Vector2& point, Vector2& normal) -> Flanks {
     const std::ptrdiff_t before = closed_ ? (row + n - 1) % n : std::max<std::ptrdiff_t>(row - 1, 0);
@@ -169,10 +200,6 @@ std::vector<FitSample> CableOutline::flank_samples(const BitImage& mask, const M
     }
     if (count < 3) continue;
     const double own = 0.5 * width / count;
-    struct Place {
-      Vector2 point, normal;
-      Flanks flanks;
-    };
     std::vector<Place> places;
     for (double s = from; s <= to; s += spacing) {
       Place place;
@@ -180,25 +207,9 @@ std::vector<FitSample> CableOutline::flank_samples(const BitImage& mask, const M
       place.flanks = measure(row, 2 * half_width + 1, place.point, place.normal);
       places.push_back(place);
     }
-    // The flank that shows changes where the mask is narrowest: in the middle of where it is hardly wider than there.
     const std::size_t size = places.size();
-    const auto wide = [&](std::size_t k) {
-      double sum = 0;
-      for (std::size_t j = k - 2; j <= k + 2; ++j) sum += places[j].flanks.left + places[j].flanks.right;
-      return sum / 5;
-    };
-    std::size_t waist = size / 2;
-    for (std::size_t k = size / 5 + 2; k + size / 5 + 2 < size; ++k) {
-      if (wide(k) < wide(waist)) waist = k;
-    }
-    if (size > 8) {
-      const double level = wide(waist) + own;
-      std::size_t first = waist, last = waist;
-      while (first > 2 && wide(first - 1) < level) --first;
-      while (last + 3 < size && wide(last + 1) < level) ++last;
-      waist = (first + last) / 2;
-    }
     const Flank shows = i > 0 ? points_[i].shows : closing_shows_;
+    const std::size_t waist = shows == Flank::unknown ? 0 : find_waist(places, own);
     for (std::size_t k = 0; k < size; ++k) {
       const auto& [place, normal_here, flanks] = places[k];
       const bool known = shows != Flank::unknown;
@@ -239,7 +250,11 @@ Cable CableOutline::fit(const BitImage& mask, const TraceOptions& options, int n
 
   // The way through a gap is longer than its chord: measured on the first fit, it moves the samples behind it.
   bool gaps = closing_zone_ != kNoGap;
-  for (const Point& point : points_) gaps = gaps || point.zone_before != kNoGap;
+  bool shallow = closing_shows_ != Flank::unknown;
+  for (const Point& point : points_) {
+    gaps = gaps || point.zone_before != kNoGap;
+    shallow = shallow || point.shows != Flank::unknown;
+  }
   if (gaps) {
     const std::ptrdiff_t n = line.rows();
     const double h = total / static_cast<double>(cable.closed ? n : n - 1);
@@ -267,8 +282,9 @@ Cable CableOutline::fit(const BitImage& mask, const TraceOptions& options, int n
     total = moved.back() + (cable.closed ? std::max(closing, closing_arc) : 0.0);
     total = std::max(total, 1.0);
     station = moved;
-    // Flanks are looked for from the line without them, and again from the line that they gave.
-    for (int round = 0; round < 3; ++round) {
+    // Flanks are looked for from the line without them; those of shallow crossings again from the line that they gave.
+    const int rounds = shallow ? 3 : 2;
+    for (int round = 0; round < rounds; ++round) {
       make_samples();
       const double step = total / static_cast<double>(cable.closed ? line.rows() : line.rows() - 1);
       if (round > 0) {
