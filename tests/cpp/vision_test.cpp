@@ -26,7 +26,7 @@ BitImage random_image(int height, int width, double density, unsigned seed) {
 }
 
 /// Pixels within half a width of a segment.
-void draw(BitImage& image, Vector2 a, Vector2 b, double width) {
+void draw(BitImage& image, const Vector2& a, const Vector2& b, double width) {
   const Vector2 along = b - a;
   for (int y = 0; y < image.height(); ++y) {
     for (int x = 0; x < image.width(); ++x) {
