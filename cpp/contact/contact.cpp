@@ -33,6 +33,7 @@ void Contact::set_parameters(const Parameters& parameters) {
   const double given = model_.description.contact.stiffness;
   const std::size_t rods = model_.description.rods.size();
   least_stiffness_.setConstant(static_cast<Eigen::Index>(rods), given);
+  edge_mass_ = parameters.edge_density.cwiseProduct(model_.edge_length);
   for (int e = 0; e < model_.edge_count && !(given > 0.0); ++e) {
     const double r = surfaces_.radius(e);
     if (!(r > 0.0)) continue;
@@ -45,6 +46,26 @@ void Contact::set_parameters(const Parameters& parameters) {
 
 void Contact::initialise(State& state) const {
   if (state.contact_stiffness.size() == 0) state.contact_stiffness = least_stiffness_;
+}
+
+/// What stops an edge's mass within the step, at the speed at which the ends meet.
+double Contact::impact_stiffness(const ContactPair& pair) const {
+  if (model_.description.contact.stiffness > 0.0) return 0.0;
+  const bool obstacle = pair.key.b < 0;
+  double square = 0.0;
+  for (int node_a : {model_.edge_tail[at(pair.key.a)], model_.edge_head[at(pair.key.a)]}) {
+    const Vec3d v = local_position(model_, state_->v, node_a);
+    if (obstacle) {
+      square = std::max(square, dot(v, v));
+      continue;
+    }
+    for (int node_b : {model_.edge_tail[at(pair.key.b)], model_.edge_head[at(pair.key.b)]}) {
+      const Vec3d relative = v - local_position(model_, state_->v, node_b);
+      square = std::max(square, dot(relative, relative));
+    }
+  }
+  const double mass = obstacle ? edge_mass_(pair.key.a) : std::min(edge_mass_(pair.key.a), edge_mass_(pair.key.b));
+  return mass * std::sqrt(square) / (duration_ * 2.0 * kDepth * pair.small_radius());
 }
 
 /// Of a contact that begins, for a whole node.
@@ -124,8 +145,11 @@ void Contact::update(const VectorX& q1) {
     Touching t = touch(p, q1);
     if (t.distance >= pair.reach()) continue;
     const ContactRecord* record = record_of(pair.key);
-    t.stiffness = pair.share * (record ? record->stiffness : start_stiffness(pair, state_->contact_stiffness));
-    t.energy = contact_energy(contact.law, t.distance, pair.radii(), pair.tolerance);
+    t.stiffness =
+        record ? record->stiffness : std::max(start_stiffness(pair, state_->contact_stiffness), impact_stiffness(pair));
+    t.stiffness *= pair.share;
+    t.yielded = record ? record->yielded : 0.0;
+    t.energy = contact_energy(contact.law, t.distance + t.yielded, pair.radii(), pair.tolerance);
     t.energy.value *= t.stiffness;
     t.energy.first *= t.stiffness;
     t.energy.second *= t.stiffness;

@@ -96,7 +96,7 @@ class Contact {
     Vec3d normal{};
     double distance = 0;
     ContactEnergy energy;  ///< times the stiffness
-    double stiffness = 0;
+    double stiffness = 0, yielded = 0;
     Vec3d stick{};
     int frozen = -1;  ///< friction of the start and no pressing: index in frozen_
   };
@@ -108,6 +108,7 @@ class Contact {
   const ContactPair& pair_of(int i) const;
   Touching touch(int pair, const VectorX& q) const;
   double start_stiffness(const ContactPair& pair, const VectorX& stiffness) const;
+  double impact_stiffness(const ContactPair& pair) const;
   double tangential_stiffness(const ContactPair& pair, double stiffness) const;
   void end_points(const ContactPair& pair, const VectorX& q, Vec3d (&x)[4]) const;
   FrictionSetting setting(const Touching& t) const;
@@ -121,7 +122,8 @@ class Contact {
   bool outgrown(const VectorX& q, const VectorX* change) const;
   double allowed_of(const ContactPair& pair, const VectorX& q, const VectorX& change) const;
   const ContactRecord* record_of(const ContactKey& key) const;
-  double change_stiffness(const Touching& t, double ratio, ContactRecord& record) const;
+  double change_stiffness(const Touching& t, double ratio, double yielded, ContactRecord& record) const;
+  double yielded_at(const Touching& t, double ratio) const;
 
   const Model& model_;
   Surfaces surfaces_;
@@ -139,6 +141,7 @@ class Contact {
   std::vector<std::pair<ContactKey, int>> elements_;  ///< sorted
   std::vector<int> element_unknowns_;
   VectorX least_stiffness_;
+  VectorX edge_mass_;  ///< [kg]
 };
 
 }  // namespace withe

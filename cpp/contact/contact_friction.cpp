@@ -36,6 +36,7 @@ FrictionSetting Contact::setting(const Touching& t) const {
   f.contact_law = contact.law;
   f.law = contact.friction_law;
   f.stiffness = t.stiffness;
+  f.yielded = t.yielded;
   f.tangential_stiffness = tangential_stiffness(pair, t.stiffness);
   f.rate = 7.5 / (contact.slip_tolerance * duration_);
   f.stick = t.stick;

@@ -11,8 +11,10 @@ std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
 // A stiffness follows forces that outgrow it at once, and those that are so many times too small.
 constexpr double kSlack = 32.0;
-// What presses already becomes stiffer by so much at once, for it springs back.
-constexpr double kBoldest = 4.0;
+// What has yielded presses again little by little: this much is left after a step.
+constexpr double kFading = 0.9;
+// Greatest depth that has yielded, over the smaller radius.
+constexpr double kMostYield = 0.02;
 
 }  // namespace
 
@@ -47,14 +49,32 @@ double Contact::rounding(int i, double reach) const {
   return 8.0 * std::numeric_limits<double>::epsilon() * reach * t.energy.second;
 }
 
-/// Gives a contact another stiffness, under its load: an anchor keeps its force, and so its elastic slip changes.
-/// Returns the energy put in.
-double Contact::change_stiffness(const Touching& t, double ratio, ContactRecord& record) const {
-  const double anchor = tangential_stiffness(pairs_[at(t.pair)], t.stiffness);
-  const double put_in =
-      (ratio - 1.0) * t.energy.value + 0.5 * anchor * dot(record.stick, record.stick) * (1.0 / ratio - 1.0);
+/// The depth that must press no more for a contact that becomes stiffer to press as hard as before; not so much that
+/// surfaces could sink into each other for good.
+double Contact::yielded_at(const Touching& t, double ratio) const {
+  const ContactPair& pair = pairs_[at(t.pair)];
+  const ContactLaw law = model_.description.contact.law;
+  const double wanted = t.energy.first / (t.stiffness * ratio);  // of E'(D), negative
+  double low = t.distance + t.yielded, high = pair.reach();
+  for (int k = 0; k < 60; ++k) {
+    const double middle = 0.5 * (low + high);
+    (contact_energy(law, middle, pair.radii(), pair.tolerance).first < wanted ? low : high) = middle;
+  }
+  return std::min(low - t.distance, kMostYield * pair.small_radius());
+}
+
+/// Gives a contact another stiffness, and another depth that presses no more. Anchors keep their force, and so their
+/// elastic slip changes. Returns the energy put in.
+double Contact::change_stiffness(const Touching& t, double ratio, double yielded, ContactRecord& record) const {
+  const ContactPair& pair = pairs_[at(t.pair)];
+  const double anchor = tangential_stiffness(pair, t.stiffness);
+  const double energy =
+      ratio * t.stiffness *
+      contact_energy(model_.description.contact.law, t.distance + yielded, pair.radii(), pair.tolerance).value;
+  const double put_in = energy - t.energy.value + 0.5 * anchor * dot(record.stick, record.stick) * (1.0 / ratio - 1.0);
   record.stick = (1.0 / ratio) * record.stick;
   record.stiffness *= ratio;
+  record.yielded = yielded;
   return put_in;
 }
 
@@ -81,10 +101,15 @@ double Contact::accept(State& state) {
     }
     const double wanted = record.force / (2.0 * kDepth * pair.small_radius() * pair.share);
     const double least = start_stiffness(pair, least_stiffness_);
-    if (!given && wanted > record.stiffness)
-      put_in += change_stiffness(t, 1.5 * wanted / record.stiffness, record);
-    else if (!given && kSlack * std::max(wanted, least) < record.stiffness)
-      put_in += change_stiffness(t, 2.0 * std::max(wanted, least) / record.stiffness, record);
+    record.yielded = t.yielded;
+    if (!given && wanted > record.stiffness) {
+      const double ratio = 1.5 * wanted / record.stiffness;
+      put_in += change_stiffness(t, ratio, yielded_at(t, ratio), record);
+    } else if (!given && kSlack * std::max(wanted, least) < record.stiffness) {
+      put_in += change_stiffness(t, 2.0 * std::max(wanted, least) / record.stiffness, kFading * t.yielded, record);
+    } else if (t.yielded > 0.0) {
+      put_in += change_stiffness(t, 1.0, kFading * t.yielded, record);
+    }
     for (int rod : {pair.rod_a, pair.rod_b})
       if (rod >= 0) greatest(rod) = std::max(greatest(rod), wanted);
     records.push_back(record);
@@ -112,7 +137,7 @@ double Contact::stiffen(State& state) {
     const auto pressed = std::find_if(touching_.begin(), touching_.end(),
                                       [&](const Touching& s) { return pairs_[at(s.pair)].key == pair.key; });
     if (found != state.contacts.end() && pressed != touching_.end()) {
-      put_in += change_stiffness(*pressed, std::min(factor, kBoldest), *found);
+      put_in += change_stiffness(*pressed, factor, yielded_at(*pressed, factor), *found);
       continue;
     }
     for (int rod : {pair.rod_a, pair.rod_b})

@@ -32,6 +32,7 @@ struct FrictionSetting {
   ContactLaw contact_law = ContactLaw::imcv2;
   FrictionLaw law = FrictionLaw::implicit;
   double stiffness = 0;             ///< [N/m]
+  double yielded = 0;               ///< [m]
   double tangential_stiffness = 0;  ///< of an anchor [N/m]
   double rate = 0;                  ///< K / (2 dt) [1/m]
   Vec3d stick{};                    ///< at the start of the step [m]
@@ -105,7 +106,7 @@ FrictionForce<Scalar> friction_gradient(const FrictionSetting& f, const Scalar (
     distance = sqrt(square + pair.weight_a * (s - 0.5) * (s - 0.5) + pair.weight_b * (t - 0.5) * (t - 0.5));
     normal = (1.0 / sqrt(square)) * between;
   }
-  const ContactEnergy e = contact_energy(f.contact_law, value_of(distance), pair.radii(), pair.tolerance);
+  const ContactEnergy e = contact_energy(f.contact_law, value_of(distance) + f.yielded, pair.radii(), pair.tolerance);
   const Scalar pressing = chain(distance, -f.stiffness * e.first, -f.stiffness * e.second);
   Scalar w[4];
   end_weights(s, t, w);

@@ -213,9 +213,13 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
   result.largest_turn = turned.largest;
   if (!q1.allFinite() || !(result.largest_turn <= 1.5)) return result;
   result.stretch_gain = turned.stretch_gain;
-  if (equations.contact() && equations.contact()->depth() > kDeepest) {
-    result.too_deep = true;
-    return result;
+  if (Contact* contact = equations.contact()) {
+    // Iterates pass through nothing, but they may find a way around what a rod would have met.
+    work.change = work.z - state.q;
+    if (equations.allowed(state.q, work.change) < 1.0) return result;
+    contact->update(q1);
+    result.too_deep = contact->depth() > kDeepest;
+    if (result.too_deep) return result;
   }
   work.change = q1 - state.q;
   work.mean = work.change / dt;

@@ -19,6 +19,7 @@ struct ContactRecord {
   ContactKey key;
   double force = 0;      ///< pressing the surfaces apart [N]
   double stiffness = 0;  ///< [N/m]
+  double yielded = 0;    ///< depth that presses no more, since the contact became stiffer under load; fades [m]
   Vec3d stick{};         ///< elastic slip of an anchored contact, of a's surface over b's [m]
   Vec3d friction{};      ///< on a [N]
   bool sticking = false;

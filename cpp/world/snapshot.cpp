@@ -42,6 +42,7 @@ void exchange_contacts(Archive& io, std::vector<ContactRecord>& contacts) {
     io(c.key.end);
     io(c.force);
     io(c.stiffness);
+    io(c.yielded);
     for (Vec3d* v : {&c.stick, &c.friction}) io(v->x), io(v->y), io(v->z);
     io(c.sticking);
   }

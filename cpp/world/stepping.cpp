@@ -14,8 +14,8 @@ namespace {
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
-// Times that contact may be made stiffer, by up to a hundred each, before a step counts as failed.
-constexpr int kMostStiffenings = 8;
+// Times that contact may be made stiffer before a step counts as failed.
+constexpr int kMostStiffenings = 4;
 
 }  // namespace
 

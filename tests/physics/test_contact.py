@@ -63,16 +63,17 @@ def test_nothing_passes_through_a_floor_however_fast(integrator: Any, speed: flo
 def test_rods_that_cross_stop_each_other(integrator: Any) -> None:
     scene = withe.Scene(gravity=(0, 0, 0))
     stiff = withe.Material(youngs_modulus=1e9, poisson_ratio=0.5, density=1200.0)
-    moving = scene.add_rod(start=(-0.05, 0.011, 0.03), end=(0.05, 0.01, 0.03), nodes=11, radius=RADIUS, material=stiff)
-    bar = scene.add_rod(start=(0.003, -0.05, 0), end=(0, 0.05, 0), nodes=11, radius=RADIUS, material=stiff)
+    moving = scene.add_rod(start=(-0.15, 0.011, 0.03), end=(0.15, 0.01, 0.03), nodes=31, radius=RADIUS, material=stiff)
+    bar = scene.add_rod(start=(0.003, -0.15, 0), end=(0, 0.15, 0), nodes=31, radius=RADIUS, material=stiff)
     scene.clamp(bar.start)
     scene.clamp(bar.end)
     scene.enable_contact()
     simulation = scene.build(integrator=integrator, time_step=2.5e-3)
-    simulation.set_velocities(moving, np.tile([0.0, 0.0, -100.0], (11, 1)))
+    simulation.set_velocities(moving, np.tile([0.0, 0.0, -100.0], (31, 1)))
     start = simulation.energy()
     simulation.step(8)
-    assert simulation.positions(moving)[5, 2] > 0.0
+    assert simulation.positions(moving)[15, 2] > simulation.positions(bar)[15, 2]
+    assert simulation.energy().work < 0.01 * start.kinetic
     assert excess(simulation, start.total) < 0.01 * start.kinetic
 
 
