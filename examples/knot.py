@@ -85,7 +85,7 @@ def draw(measured: np.ndarray, path: Path) -> None:
 def main() -> None:
     """Pull, compare, and draw."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--nodes", type=int, default=301)
+    parser.add_argument("--nodes", type=int, default=601, help="601: edges about as long as the radius")
     parser.add_argument("--points", type=int, default=len(INDEPENDENT), help="how many of the pulls to measure")
     parser.add_argument("--out", type=Path, default=Path("out"))
     arguments = parser.parse_args()

@@ -13,7 +13,7 @@ ROOT = Path(__file__).resolve().parent.parent.parent
 EXAMPLES = {
     "friction.py": (["--forces", "11"], r"at most ([.\d]+)% off", 0.0, 1.0),
     "helix.py": ([], r"(\d+) um from the public code", 0.0, 100.0),
-    "knot.py": (["--points", "2"], r" 200 .* ([-+.\d]+)% ", -6.0, 6.0),
+    "knot.py": (["--nodes", "301", "--points", "2"], r" 200 .* ([-+.\d]+)% ", -6.0, 6.0),
     "ring_buckling.py": (["--nodes", "40"], r"\(([-+.\d]+) %\)", -3.0, 3.0),
     "robot.py": (["--steps", "2"], r"walked ([-.\d]+) cm", 4.0, 10.0),
 }
