@@ -20,7 +20,8 @@ from withe.rods import Natural, make_rod
 from withe.supports import check_not_held, make_clamp, make_pin
 
 if TYPE_CHECKING:
-    from withe.simulation import Integrator, LineSearch, Simulation, Solver
+    from withe.options import Integrator, LineSearch, Solver
+    from withe.simulation import Simulation
 
 __all__ = ["Scene"]
 
@@ -349,7 +350,8 @@ class Scene(Loads, Contacts):
             A scene without rods, planar=True for one that lies in no plane, an explicit step above
             the stable limit, "fourth_order" with viscosity or strong drag, or an option out of range.
         """
-        from withe.simulation import Simulation, make_options
+        from withe.options import make_options
+        from withe.simulation import Simulation
 
         options = make_options(
             integrator=integrator,

@@ -19,6 +19,7 @@ from withe.directory import Directory
 from withe.errors import ConvergenceError
 from withe.handles import NodeHandle, Rod, Support
 from withe.knots import link
+from withe.options import engine_options
 from withe.parts import CustomForcePart, DragPart, LoadPart, MassPart, SupportPart
 from withe.readouts import Energy, Equilibrium, Linearisation, Plan, Reaction, Statistics
 from withe.snapshots import Settings, Snapshot
@@ -26,12 +27,9 @@ from withe.snapshots import Settings, Snapshot
 if TYPE_CHECKING:
     from withe.recording import Record, Recorder
 
-__all__ = ["Integrator", "LineSearch", "Simulation", "Solver", "make_options"]
+__all__ = ["Simulation"]
 
 FloatArray = npt.NDArray[np.float64]
-Integrator = Literal["implicit_midpoint", "backward_euler", "energy_momentum", "fourth_order", "verlet", "static"]
-LineSearch = Literal["automatic", "goldstein_price", "none"]
-Solver = Literal["automatic", "band", "sparse"]
 
 _MAX_STEPS = 2**31 - 1
 
@@ -77,7 +75,7 @@ class Simulation(Control):
             supports=supports,
             functions={part.name: part.function for part in directory.all(LoadPart) if part.function is not None},
         )
-        self._world = _core.World(description, _engine_options(options))
+        self._world = _core.World(description, engine_options(options))
         self._recorder = None
         self._exact_time = None
         self._initial = self.snapshot()
@@ -479,43 +477,3 @@ class Simulation(Control):
     _recorder: Recorder | None
     _exact_time: tuple[float, float] | None
     _initial: Snapshot
-
-
-def make_options(**options: Any) -> dict[str, Any]:
-    """Options of `Scene.build`, checked.
-
-    Raises
-    ------
-    ValueError
-        An option out of range, or tolerance with a scheme that takes none.
-    """
-    checked = dict(options)
-    words = {
-        "integrator": ("implicit_midpoint", "backward_euler", "energy_momentum", "fourth_order", "verlet", "static"),
-        "solver": ("automatic", "band", "sparse"),
-        "line_search": ("automatic", "goldstein_price", "none"),
-    }
-    for name, known in words.items():
-        validation.choice(options[name], name, known)
-    for name in ("time_step", "step_tolerance", "force_tolerance"):
-        checked[name] = validation.positive(options[name], name)
-    for name in ("tolerance", "duration"):
-        checked[name] = None if options[name] is None else validation.positive(options[name], name)
-    for name in ("adaptive", "mixed"):
-        checked[name] = validation.truth(options[name], name)
-    if options["planar"] is not None:
-        checked["planar"] = validation.truth(options["planar"], "planar")
-    checked["max_iterations"] = validation.integer(options["max_iterations"], "max_iterations", 1, 10_000)
-    checked["max_halvings"] = validation.integer(options["max_halvings"], "max_halvings", 0, 40)
-    if checked["tolerance"] is not None and options["integrator"] in ("verlet", "static"):
-        raise ValueError(f"tolerance must be None with integrator={options['integrator']!r}")
-    if checked["duration"] is not None and checked["tolerance"] is None:
-        raise ValueError("duration must be given with a tolerance, and only then")
-    return checked
-
-
-def _engine_options(options: dict[str, Any]) -> _core.Options:
-    result = _core.Options()
-    for name, value in options.items():
-        setattr(result, name, value)
-    return result

@@ -1,0 +1,54 @@
+"""Options of `Scene.build`: their words, and what is refused."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from withe import _core, validation
+
+__all__ = ["Integrator", "LineSearch", "Solver", "engine_options", "make_options"]
+
+Integrator = Literal["implicit_midpoint", "backward_euler", "energy_momentum", "fourth_order", "verlet", "static"]
+LineSearch = Literal["automatic", "goldstein_price", "none"]
+Solver = Literal["automatic", "band", "sparse"]
+
+
+def make_options(**options: Any) -> dict[str, Any]:
+    """Options of `Scene.build`, checked.
+
+    Raises
+    ------
+    ValueError
+        An option out of range, or tolerance with a scheme that takes none.
+    """
+    checked = dict(options)
+    words = {
+        "integrator": ("implicit_midpoint", "backward_euler", "energy_momentum", "fourth_order", "verlet", "static"),
+        "solver": ("automatic", "band", "sparse"),
+        "line_search": ("automatic", "goldstein_price", "none"),
+    }
+    for name, known in words.items():
+        validation.choice(options[name], name, known)
+    for name in ("time_step", "step_tolerance", "force_tolerance"):
+        checked[name] = validation.positive(options[name], name)
+    for name in ("tolerance", "duration"):
+        checked[name] = None if options[name] is None else validation.positive(options[name], name)
+    for name in ("adaptive", "mixed"):
+        checked[name] = validation.truth(options[name], name)
+    if options["planar"] is not None:
+        checked["planar"] = validation.truth(options["planar"], "planar")
+    checked["max_iterations"] = validation.integer(options["max_iterations"], "max_iterations", 1, 10_000)
+    checked["max_halvings"] = validation.integer(options["max_halvings"], "max_halvings", 0, 40)
+    if checked["tolerance"] is not None and options["integrator"] in ("verlet", "static"):
+        raise ValueError(f"tolerance must be None with integrator={options['integrator']!r}")
+    if checked["duration"] is not None and checked["tolerance"] is None:
+        raise ValueError("duration must be given with a tolerance, and only then")
+    return checked
+
+
+def engine_options(options: dict[str, Any]) -> _core.Options:
+    """Checked options as the engine takes them."""
+    result = _core.Options()
+    for name, value in options.items():
+        setattr(result, name, value)
+    return result
