@@ -10,7 +10,6 @@
 namespace withe {
 namespace {
 
-using testing::at;
 using testing::Case;
 using testing::derivative_matches;
 using testing::line;
