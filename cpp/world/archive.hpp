@@ -35,7 +35,7 @@ class Reader {
 
   void raw(void* data, std::size_t size) {
     require(size <= bytes_.size() - position_, "snapshot is damaged: it ends too early");
-    std::memcpy(data, bytes_.data() + position_, size);
+    if (size > 0) std::memcpy(data, bytes_.data() + position_, size);  // nothing has no address
     position_ += size;
   }
   template <class Number>
