@@ -118,11 +118,7 @@ Contact::Touching Contact::touch(int index, const VectorX& q) const {
   return t;
 }
 
-const ContactRecord* Contact::record_of(const ContactKey& key) const {
-  const auto found = std::lower_bound(state_->contacts.begin(), state_->contacts.end(), key,
-                                      [](const ContactRecord& r, const ContactKey& k) { return r.key < k; });
-  return found != state_->contacts.end() && found->key == key ? &*found : nullptr;
-}
+const ContactRecord* Contact::record_of(const ContactKey& key) const { return find_record(state_->contacts, key); }
 
 void Contact::begin(const State& state, double duration) {
   state_ = &state;
@@ -158,8 +154,9 @@ void Contact::update(const VectorX& q1) {
   }
 }
 
-void Contact::unknowns(int i, int (&dofs)[kContactUnknowns]) const {
-  const ContactPair& pair = pair_of(i);
+void Contact::unknowns(int i, int (&dofs)[kContactUnknowns]) const { unknowns_of(pair_of(i), dofs); }
+
+void Contact::unknowns_of(const ContactPair& pair, int (&dofs)[kContactUnknowns]) const {
   std::fill(std::begin(dofs), std::end(dofs), -1);
   const bool obstacle = pair.key.b < 0;
   for (int side = 0; side < (obstacle ? 1 : 2); ++side) {

@@ -16,6 +16,8 @@ namespace withe {
 
 /// Surfaces that carry the greatest force of their rod are this deep in each other, over the smaller radius.
 inline constexpr double kDepth = 0.01;
+/// No deeper than this where a step, an equilibrium or a drawing is accepted.
+inline constexpr double kDeepest = 0.04;
 
 /// Gradient and Hessian of one contact in its own unknowns.
 struct ContactLocal {
@@ -106,6 +108,12 @@ class Contact {
     double pressing = 0;  ///< [N]
   };
   const ContactPair& pair_of(int i) const;
+  void unknowns_of(const ContactPair& pair, int (&dofs)[kContactUnknowns]) const;
+  /// Row of a pair in the table of elements, or -1.
+  int element_of(const ContactKey& key) const;
+  static double depth_of(const ContactPair& pair, double distance) {
+    return (pair.radii() - distance) / pair.small_radius();
+  }
   Touching touch(int pair, const VectorX& q) const;
   double start_stiffness(const ContactPair& pair, const VectorX& stiffness) const;
   double impact_stiffness(const ContactPair& pair) const;
@@ -132,7 +140,7 @@ class Contact {
   std::vector<Box> boxes_;
   std::vector<ContactPair> pairs_;  ///< obstacles' first, then candidates of the broad phase
   VectorX reference_;               ///< where the candidates belong
-  double margin_ = 0, travel_ = 0;
+  double margin_ = 0;
   const State* state_ = nullptr;
   double duration_ = 0, start_energy_ = 0;
   VectorX q1_;

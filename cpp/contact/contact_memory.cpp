@@ -39,7 +39,7 @@ double Contact::depth() const {
   double deepest = 0.0;
   for (const Touching& t : touching_) {
     const ContactPair& pair = pairs_[at(t.pair)];
-    if (t.frozen < 0) deepest = std::max(deepest, (pair.radii() - t.distance) / pair.small_radius());
+    if (t.frozen < 0) deepest = std::max(deepest, depth_of(pair, t.distance));
   }
   return deepest;
 }
@@ -123,26 +123,31 @@ double Contact::accept(State& state) {
 }
 
 double Contact::stiffen(State& state) {
-  const std::vector<Touching> deep = touching_;
+  // Pairs are renumbered when candidates are found anew for the start of the step.
+  struct Deep {
+    ContactPair pair;
+    double factor, stiffness;
+  };
+  std::vector<Deep> deep;
+  for (const Touching& t : touching_) {
+    const ContactPair& pair = pairs_[at(t.pair)];
+    const double depth = depth_of(pair, t.distance);
+    if (t.frozen < 0 && depth > 2.0 * kDepth) deep.push_back({pair, std::min(100.0, depth / kDepth), t.stiffness});
+  }
   begin(state, duration_);
   double put_in = 0.0;
-  for (const Touching& t : deep) {
-    if (t.frozen >= 0) continue;
-    const ContactPair& pair = pairs_[at(t.pair)];
-    const double depth = (pair.radii() - t.distance) / pair.small_radius();
-    if (depth <= 2.0 * kDepth) continue;
-    const double factor = std::min(100.0, depth / kDepth);
-    const auto found = std::find_if(state.contacts.begin(), state.contacts.end(),
-                                    [&](const ContactRecord& r) { return r.key == pair.key; });
-    const auto pressed = std::find_if(touching_.begin(), touching_.end(),
-                                      [&](const Touching& s) { return pairs_[at(s.pair)].key == pair.key; });
-    if (found != state.contacts.end() && pressed != touching_.end()) {
-      put_in += change_stiffness(*pressed, factor, yielded_at(*pressed, factor), *found);
+  for (const auto& [pair, factor, stiffness] : deep) {
+    ContactRecord* record = find_record(state.contacts, pair.key);
+    const auto pressed = std::find_if(touching_.begin(), touching_.end(), [&, &key = pair.key](const Touching& s) {
+      return pairs_[at(s.pair)].key == key;
+    });
+    if (record && pressed != touching_.end()) {
+      put_in += change_stiffness(*pressed, factor, yielded_at(*pressed, factor), *record);
       continue;
     }
     for (int rod : {pair.rod_a, pair.rod_b})
       if (rod >= 0)
-        state.contact_stiffness(rod) = std::max(state.contact_stiffness(rod), factor * t.stiffness / pair.share);
+        state.contact_stiffness(rod) = std::max(state.contact_stiffness(rod), factor * stiffness / pair.share);
   }
   return put_in;
 }
@@ -198,7 +203,6 @@ void Contact::forget() {
   pairs_ = surfaces_.obstacle_pairs();
   elements_.clear();
   reference_.resize(0);
-  travel_ = 0.0;
   touching_.clear();
   lagged_.clear();
   couple();

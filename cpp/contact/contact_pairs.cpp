@@ -35,14 +35,12 @@ bool Contact::outgrown(const VectorX& q, const VectorX* change) const {
 /// Candidates for the way from one configuration to another, and beyond by a margin that grows with the last travel.
 void Contact::find_pairs(const VectorX& from, const VectorX& to) {
   if (surfaces_.edges().empty()) return;
-  if (reference_.size() == to.size()) {
-    travel_ = 0.0;
+  double travel = 0.0;
+  if (reference_.size() == to.size())
     for (int dof : model_.node_dof)
-      travel_ =
-          std::max(travel_, (to.segment(dof, model_.dimension) - reference_.segment(dof, model_.dimension)).norm());
-  }
+      travel = std::max(travel, (to.segment(dof, model_.dimension) - reference_.segment(dof, model_.dimension)).norm());
   const double reach = surfaces_.greatest_reach();
-  margin_ = std::clamp(4.0 * travel_, 0.25 * reach, 2.0 * reach);
+  margin_ = std::clamp(4.0 * travel, 0.25 * reach, 2.0 * reach);
   boxes_.clear();
   for (int e : surfaces_.edges()) {
     const int tail = model_.edge_tail[at(e)], head = model_.edge_head[at(e)];
@@ -60,10 +58,8 @@ void Contact::find_pairs(const VectorX& from, const VectorX& to) {
   for (const BroadPhase::Pair& found : broad_phase_.find(boxes_)) {
     const int a = surfaces_.edges()[at(found.a)], b = surfaces_.edges()[at(found.b)];
     if (!surfaces_.may_touch(a, b)) continue;
-    ContactPair pair = surfaces_.pair(a, b);
-    const auto known = std::lower_bound(elements_.begin(), elements_.end(), std::pair(pair.key, -1));
-    if (known != elements_.end() && known->first == pair.key) pair.element = known->second;
-    pairs_.push_back(pair);
+    pairs_.push_back(surfaces_.pair(a, b));
+    pairs_.back().element = element_of(pairs_.back().key);
   }
   for (std::size_t i = 0; i < keys.size(); ++i) {
     const auto place =
@@ -71,14 +67,18 @@ void Contact::find_pairs(const VectorX& from, const VectorX& to) {
     if (place == pairs_.end()) {
       // Gone out of reach within a step: its friction of the start still acts.
       pairs_.push_back(surfaces_.pair(keys[i].a, keys[i].b));
-      const auto known = std::lower_bound(elements_.begin(), elements_.end(), std::pair(keys[i], -1));
-      if (known != elements_.end() && known->first == keys[i]) pairs_.back().element = known->second;
+      pairs_.back().element = element_of(keys[i]);
       lagged_[i].pair = static_cast<int>(pairs_.size()) - 1;
     } else {
       lagged_[i].pair = static_cast<int>(place - pairs_.begin());
     }
   }
   reference_ = to;
+}
+
+int Contact::element_of(const ContactKey& key) const {
+  const auto known = std::lower_bound(elements_.begin(), elements_.end(), std::pair(key, -1));
+  return known != elements_.end() && known->first == key ? known->second : -1;
 }
 
 bool Contact::coupled() const {
@@ -91,7 +91,6 @@ void Contact::couple() {
   element_unknowns_.clear();
   std::vector<bool> now(pairs_.size(), false);
   for (const Touching& t : touching_) now[at(t.pair)] = true;
-  const std::vector<Touching> kept = touching_;
   for (std::size_t p = 0; p < pairs_.size(); ++p) {
     ContactPair& pair = pairs_[p];
     pair.element = -1;
@@ -101,13 +100,10 @@ void Contact::couple() {
     if (!near) continue;
     pair.element = static_cast<int>(elements_.size());
     elements_.emplace_back(pair.key, pair.element);
-    touching_.assign(1, Touching{});
-    touching_.front().pair = static_cast<int>(p);
     int dofs[kContactUnknowns];
-    unknowns(0, dofs);
+    unknowns_of(pair, dofs);
     element_unknowns_.insert(element_unknowns_.end(), std::begin(dofs), std::end(dofs));
   }
-  touching_ = kept;
   std::sort(elements_.begin(), elements_.end());
 }
 

@@ -82,7 +82,7 @@ FrictionForce<Scalar> friction_force(const FrictionSetting& f, const Vec3<Scalar
 }
 
 /// Adds to `gradient` the generalised forces J^T F (minus the friction on the rods), with F and S as they are at
-/// `unknown`; returns F. `pressing`: a normal force to use instead of that of the energy, or nothing.
+/// `unknown`; returns F.
 template <class Scalar>
 FrictionForce<Scalar> friction_gradient(const FrictionSetting& f, const Scalar (&unknown)[kContactUnknowns],
                                         Scalar (&gradient)[kContactUnknowns]) {

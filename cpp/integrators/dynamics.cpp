@@ -9,9 +9,6 @@ namespace {
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
-// Surfaces may be this deep in each other, over the smaller radius.
-constexpr double kDeepest = 0.04;
-
 /// Largest angle by which an edge turns on the way from a state to q [rad], > pi/2 where it ends pointing back; and by
 /// how much the energy in stretching grows beyond the work of the axial forces in the middle [J],
 /// EA (l1 - l0) (l1 + l0 - 2 lm) / (2 lm) an edge, where EA is given.

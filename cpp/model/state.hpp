@@ -1,6 +1,7 @@
 #pragma once
 /// What changes while a scene runs.
 
+#include <algorithm>
 #include <compare>
 #include <vector>
 
@@ -24,6 +25,14 @@ struct ContactRecord {
   Vec3d friction{};      ///< on a [N]
   bool sticking = false;
 };
+
+/// The record of a contact among sorted ones, or nothing.
+template <class Records>
+auto find_record(Records& records, const ContactKey& key) -> decltype(records.data()) {
+  const auto found = std::lower_bound(records.begin(), records.end(), key,
+                                      [](const ContactRecord& r, const ContactKey& k) { return r.key < k; });
+  return found != records.end() && found->key == key ? &*found : nullptr;
+}
 
 /// Configuration, velocities and the frames they are measured from. The frames advance by time-parallel
 /// transport once per accepted step or load increment.

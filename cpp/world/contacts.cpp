@@ -9,9 +9,6 @@ namespace {
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
-// Surfaces may be this deep in each other when drawn, over the smaller radius: as deep as contact lets them be.
-constexpr double kDrawnDepth = 0.04;
-
 Vector3 in_space(const Model& model, const Vec3d& v, bool is_point) {
   if (!model.planar()) return to_eigen(v);
   const Plane& p = *model.plane;
@@ -51,7 +48,7 @@ void World::Implementation::check_overlap() const {
   if (contact == nullptr) return;
   const ContactReport* deepest = nullptr;
   const std::vector<ContactReport> reports = contact->report(state);
-  double depth = kDrawnDepth;
+  double depth = kDeepest;
   for (const ContactReport& r : reports) {
     const double radius = r.key.b < 0
                               ? contact->surfaces().radius(r.key.a)

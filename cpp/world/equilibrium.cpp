@@ -72,7 +72,7 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
   try {
     if (reachable) r = find_equilibrium(system, *newton, options, parameters, boundary, state, work.newton);
     // Contact that turns out too soft is made stiffer, from where it has settled.
-    for (int tries = 0; r.converged && system.contact() && system.contact()->depth() > 0.04 && tries < 8; ++tries) {
+    for (int tries = 0; r.converged && system.contact() && system.contact()->depth() > kDeepest && tries < 8; ++tries) {
       system.contact()->stiffen(state);
       r = find_equilibrium(system, *newton, options, parameters, boundary, state, work.newton);
     }

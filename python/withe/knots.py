@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe import validation
+from withe.drawing import natural_shape
 
 __all__ = ["granny_knot", "link", "overhand_knot", "reef_knot", "signed_crossings", "writhe"]
 
@@ -249,14 +250,9 @@ def writhe(points: npt.ArrayLike, closed: bool = False) -> float:
 def link(points: FloatArray, directors: FloatArray, closed: bool) -> float:
     """Twist of material frames, shape (edges, 3, 3), over parallel transport, and writhe of the polygon [turns]."""
     first, tangent = directors[:, 0], directors[:, 2]
-    pairs = zip(range(len(first)), np.roll(np.arange(len(first)), -1), strict=True)
-    twist = 0.0
-    for i, j in pairs:
-        if j == 0 and not closed:
-            continue
-        carried = first[i] - (first[i] @ tangent[j]) / (1.0 + tangent[i] @ tangent[j]) * (tangent[i] + tangent[j])
-        twist += float(np.arctan2(np.cross(carried, first[j]) @ tangent[j], carried @ first[j]))
-    return twist / (2.0 * np.pi) + writhe(points, closed)
+    stencils = len(first) - (0 if closed else 1)
+    _, twists = natural_shape(tangent, first, np.ones(stencils), closed)
+    return float(twists.sum()) / (2.0 * np.pi) + writhe(points, closed)
 
 
 def _gauss(a0: FloatArray, a1: FloatArray, b0: FloatArray, b1: FloatArray) -> FloatArray:

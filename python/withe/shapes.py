@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.knots import granny_knot, overhand_knot, reef_knot
+from withe.validation import integer, non_negative, number, positive, unit_vector, vector
 
 __all__ = ["arc", "circle", "granny_knot", "helix", "overhand_knot", "reef_knot"]
 
@@ -41,12 +42,11 @@ def helix(radius: float, pitch: float, length: float, nodes: int, *, left_handed
     >>> helix(radius=0.02, pitch=0.05, length=0.5, nodes=100)[0]
     array([0.02, 0.  , 0.  ])
     """
-    _positive("radius", radius)
-    _positive("length", length)
-    if not (np.isfinite(pitch) and pitch >= 0.0):
-        raise ValueError(f"pitch must be zero or more, got {pitch!r}")
+    positive(radius, "radius")
+    positive(length, "length")
+    non_negative(pitch, "pitch")
     turns = length / np.hypot(2.0 * np.pi * radius, pitch)
-    angles = 2.0 * np.pi * turns * np.linspace(0.0, 1.0, _count(nodes, 2))
+    angles = 2.0 * np.pi * turns * np.linspace(0.0, 1.0, integer(nodes, "nodes", 2, 10**7))
     sideways = -np.sin(angles) if left_handed else np.sin(angles)
     return np.stack([radius * np.cos(angles), radius * sideways, pitch * angles / (2.0 * np.pi)], axis=1)
 
@@ -69,8 +69,8 @@ def circle(radius: float, nodes: int) -> FloatArray:
     ValueError
         A radius that is not positive, or fewer than three nodes.
     """
-    _positive("radius", radius)
-    angles = 2.0 * np.pi * np.arange(_count(nodes, 3)) / nodes
+    positive(radius, "radius")
+    angles = 2.0 * np.pi * np.arange(integer(nodes, "nodes", 3, 10**7)) / nodes
     return radius * np.stack([np.cos(angles), np.sin(angles), np.zeros_like(angles)], axis=1)
 
 
@@ -99,38 +99,16 @@ def arc(
         A tangent of no length, a side along the tangent, a length that is not positive, or fewer than
         two nodes.
     """
-    _positive("length", length)
-    origin, along, side = (_vector(n, v) for n, v in (("start", start), ("tangent", tangent), ("towards", towards)))
-    if not np.any(along):
-        raise ValueError("tangent must not be zero")
-    along = along / np.linalg.norm(along)
+    positive(length, "length")
+    origin, along, side = vector(start, "start"), unit_vector(tangent, "tangent"), vector(towards, "towards")
     side = side - (side @ along) * along
     if np.linalg.norm(side) <= 1e-12:
         raise ValueError("towards must not lie along tangent")
     side = side / np.linalg.norm(side)
-    if not np.isfinite(curvature):
-        raise ValueError(f"curvature must be finite, got {curvature!r}")
-    distances = np.linspace(0.0, length, _count(nodes, 2))
+    number(curvature, "curvature")
+    distances = np.linspace(0.0, length, integer(nodes, "nodes", 2, 10**7))
     half = 0.5 * curvature * distances
     # sin(x) / x, so that a straight line needs no case of its own
     chords = distances * np.sinc(half / np.pi)
     points: FloatArray = origin + np.outer(chords * np.cos(half), along) + np.outer(chords * np.sin(half), side)
     return points
-
-
-def _positive(name: str, value: float) -> None:
-    if not (np.isfinite(value) and value > 0.0):
-        raise ValueError(f"{name} must be positive, got {value!r}")
-
-
-def _count(nodes: int, least: int) -> int:
-    if int(nodes) != nodes or nodes < least:
-        raise ValueError(f"nodes must be an integer of at least {least}, got {nodes!r}")
-    return int(nodes)
-
-
-def _vector(name: str, value: npt.ArrayLike) -> FloatArray:
-    vector = np.asarray(value, float)
-    if vector.shape != (3,) or not np.all(np.isfinite(vector)):
-        raise ValueError(f"{name} must be three finite numbers, got {value!r}")
-    return vector
