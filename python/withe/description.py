@@ -23,6 +23,7 @@ from withe.parts import (
     RodPart,
     SupportPart,
 )
+from withe.supports import held_rows
 
 __all__ = ["added_mass", "describe", "describe_support", "drag", "parameters_of", "rod_parameters"]
 
@@ -149,15 +150,25 @@ def _describe_joint(group: JointGroup) -> _core.JointDescription:
 
 
 def _describe_supports(directory: Directory) -> list[_core.SupportDescription]:
-    held: dict[int, SupportPart] = {}
+    holder: dict[int, SupportPart] = {}
     for part in directory.all(SupportPart):
-        other = held.setdefault(directory.row(part.node), part)
-        if other is not part:
-            raise ValueError(
-                f"nodes {other.node_name!r} and {part.node_name!r} are joined, and held by both "
-                f"{other.name!r} and {part.name!r}: hold them once"
-            )
+        for row in held_rows(directory, part):
+            other = holder.setdefault(row, part)
+            if other is not part:
+                raise ValueError(_held_twice(directory, other, part))
     return [describe_support(part) for part in directory.all(SupportPart)]
+
+
+def _held_twice(directory: Directory, first: SupportPart, second: SupportPart) -> str:
+    if directory.row(first.node) == directory.row(second.node):
+        return (
+            f"nodes {first.node_name!r} and {second.node_name!r} are joined, and held by both "
+            f"{first.name!r} and {second.name!r}: hold them once"
+        )
+    return (
+        f"since rods were joined, {first.name!r} at {first.node_name!r} and {second.name!r} at {second.node_name!r} "
+        "hold the same node (hold='edge' takes both nodes of an edge): hold it once"
+    )
 
 
 def _describe_load(part: LoadPart) -> _core.LoadDescription:

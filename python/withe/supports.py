@@ -12,7 +12,7 @@ from withe import validation
 from withe.directory import Directory
 from withe.parts import SupportKind, SupportPart
 
-__all__ = ["check_not_held", "make_clamp", "make_pin"]
+__all__ = ["check_not_held", "held_rows", "make_clamp", "make_pin"]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -47,18 +47,18 @@ def check_not_held(directory: Directory, part: SupportPart, others: Iterable[Sup
     ValueError
         A node that it would hold, or one that is joined to it, is held by one of the others.
     """
-    held = _held_rows(directory, part)
+    held = held_rows(directory, part)
     for other in others:
         if directory.row(other.node) == directory.row(part.node):
             raise ValueError(f"node {part.node_name!r} is already held by {other.name!r}: release that first")
-        if not held.isdisjoint(_held_rows(directory, other)):
+        if not held.isdisjoint(held_rows(directory, other)):
             raise ValueError(
                 f"{part.name!r} at {part.node_name!r} would hold a node that {other.name!r} at {other.node_name!r} "
                 "holds: hold='edge' takes both nodes of an edge"
             )
 
 
-def _held_rows(directory: Directory, part: SupportPart) -> set[int]:
+def held_rows(directory: Directory, part: SupportPart) -> set[int]:
     """Rows of the nodes that a support holds: with hold="edge" also that at the other end of the edge."""
     index, node = part.node
     held = {directory.row(part.node)}

@@ -268,6 +268,18 @@ def test_a_held_edge_takes_both_its_nodes():
     assert scene.build(integrator="static").equilibrium().stable
 
 
+@pytest.mark.parametrize("hold", ["frame", "edge"])
+def test_a_held_edge_whose_other_node_is_joined_to_a_held_one_names_both_supports(hold):
+    scene = withe.Scene()
+    a = add_rod(scene, (0, 0, 0), (1, 0, 0))
+    b = add_rod(scene, (0.25, 0, 0), (0.25, 1, 0))
+    scene.clamp(a.start, hold="edge")
+    scene.clamp(b.start, hold=hold)
+    scene.join(a.node(1), b.start)
+    with pytest.raises(ValueError, match=r"'clamp 1' at .*start' and 'clamp 2' at .* hold the same node"):
+        scene.build()
+
+
 def test_a_scene_pickles_with_all_its_parts():
     scene = withe.Scene()
     a = add_rod(scene, (0, 0, 0), (1, 0, 0), name="arm")
