@@ -17,6 +17,14 @@ def cantilever(nodes: int = 11, **build):
     return scene, arm, scene.build(**build)
 
 
+def weightless(nodes: int = 21, **build):
+    """The same without gravity, and a finer mesh: scene, rod, simulation."""
+    scene = withe.Scene(gravity=(0, 0, 0))
+    arm = scene.add_rod(start=(0, 0, 0), end=(0.2, 0, 0), nodes=nodes, radius=5e-3, material=RUBBER, name="arm")
+    scene.clamp(arm.start, name="wall")
+    return scene, arm, scene.build(**build)
+
+
 def tripod(**build):
     """Three rods at one joint, two of them clamped, out of any plane, with a tip load: scene, rods, simulation."""
     scene = withe.Scene()

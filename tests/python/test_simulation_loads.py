@@ -1,0 +1,150 @@
+"""Loads on a simulation: constant, functions of time, follower, custom."""
+
+import numpy as np
+import pytest
+
+from simple_scenes import cantilever, weightless
+
+
+def test_a_load_may_be_a_function_of_time():
+    scene, arm, _ = cantilever()
+    times = []
+
+    def force(t):
+        times.append(t)
+        return (0, 0, 0.05 * np.sin(20 * t))
+
+    load = scene.add_force(arm.end, force)
+    simulation = scene.build(integrator="backward_euler", time_step=0.01, adaptive=False)
+    times.clear()
+    simulation.step(3)
+    assert times == pytest.approx([0.01, 0.02, 0.03])
+    assert simulation.get(load, "force")[2] == pytest.approx(0.05 * np.sin(0.6))
+    simulation.set(load, force=(0, 0, 0.01))
+    simulation.step(1)
+    assert np.array_equal(simulation.get(load, "force"), (0, 0, 0.01))
+
+
+def test_midpoint_steps_take_loads_at_the_midpoint():
+    scene, arm, _ = cantilever()
+    times = []
+    scene.add_force(arm.end, lambda t: times.append(t) or (0, 0, 0))
+    simulation = scene.build(time_step=0.01)
+    times.clear()
+    simulation.step(2)
+    assert times == pytest.approx([0.005, 0.015])
+
+
+def test_equilibrium_takes_loads_at_the_present_time():
+    scene, arm, _ = cantilever()
+    scene.add_force(arm.end, lambda t: (0, 0, 0.1 + t))
+    simulation = scene.build(integrator="static", time_step=0.5)
+    simulation.equilibrium()
+    mass = simulation.get(arm, "line_density")[0] * 0.2
+    assert simulation.reaction("wall").force[2] == pytest.approx(9.81 * mass - 0.1)
+    simulation.step()
+    assert simulation.reaction("wall").force[2] == pytest.approx(9.81 * mass - 0.6)
+
+
+def test_a_constant_load_and_a_constant_function_are_the_same():
+    ends = []
+    for force in [(0, 0.01, 0.1), lambda t: (0, 0.01, 0.1)]:
+        scene, arm, _ = cantilever()
+        scene.add_force(arm.end, force)
+        simulation = scene.build(planar=False)
+        simulation.step(20)
+        ends.append(simulation.positions())
+    assert np.allclose(*ends, atol=1e-12)
+
+
+@pytest.mark.parametrize("planar", [True, False])
+def test_follower_forces_turn_with_their_edge(planar):
+    scene, arm, _ = weightless()
+    scene.add_force(arm.end, (0, 0, 0.05), follower=True)
+    simulation = scene.build(integrator="static", planar=planar)
+    simulation.equilibrium()
+    tangent = simulation.directors(arm)[-1, 2]
+    force = -simulation.reaction("wall").force
+    assert np.linalg.norm(force) == pytest.approx(0.05, rel=1e-6)
+    assert force @ tangent == pytest.approx(0, abs=1e-8)
+
+
+def test_a_moment_bends_into_an_arc():
+    scene, arm, _ = weightless()
+    scene.add_moment(arm.end, (0, -1e-3, 0))
+    simulation = scene.build(integrator="static")
+    simulation.equilibrium()
+    stiffness = simulation.get(arm, "bend_stiffness")[0, 0]
+    assert np.allclose(np.linalg.norm(simulation.curvatures(arm), axis=1), 1e-3 / stiffness, rtol=1e-3)
+    assert np.allclose(simulation.reaction("wall").moment, (0, 1e-3, 0), atol=1e-10)
+
+
+def test_a_distributed_load_can_carry_the_weight():
+    scene, arm, _ = cantilever()
+    scene.add_load(arm, (0, 0, 9.81 * 1000 * np.pi * 25e-6))
+    simulation = scene.build(integrator="static")
+    simulation.equilibrium()
+    assert np.allclose(simulation.positions(arm)[:, 2], 0, atol=1e-10)
+
+
+def test_custom_forces_add_up_and_see_the_state():
+    scene, _arm, _ = weightless()
+    seen = []
+
+    def push(time, positions, velocities):
+        seen.append((time, positions.copy(), velocities.copy()))
+        force = np.zeros_like(positions)
+        force[-1, 2] = 0.005
+        positions[:] = np.nan  # a copy: no harm
+        return force
+
+    scene.add_custom_force(push)
+    scene.add_custom_force(push)
+    simulation = scene.build(integrator="static")
+    simulation.step(1)
+    assert seen[0][0] == 0.0
+    assert seen[0][1].shape == seen[0][2].shape == (21, 3)
+    assert simulation.reaction("wall").force == pytest.approx((0, 0, -0.01), abs=1e-9)
+
+
+@pytest.mark.parametrize("force", [lambda t, x, v: np.zeros(3), lambda t, x, v: x * np.nan, lambda t, x, v: None])
+def test_a_custom_force_of_the_wrong_kind_is_named(force):
+    scene, _arm, _ = weightless()
+    scene.add_custom_force(force, name="wind")
+    simulation = scene.build()
+    before = simulation.positions()
+    with pytest.raises(ValueError, match="custom force 'wind' must"):
+        simulation.step()
+    assert np.array_equal(simulation.positions(), before)
+
+
+def test_an_exception_in_a_function_of_time_propagates_and_the_simulation_lives_on():
+    scene, arm, _ = cantilever()
+    scene.add_force(arm.end, lambda t: (0, 0, 1 / (0.0 if t > 0.02 else 1.0)))
+    simulation = scene.build()
+    with pytest.raises(ZeroDivisionError):
+        simulation.step(10)
+    assert simulation.time == pytest.approx(0.02)
+    simulation.set("force 1", force=(0, 0, 0))
+    simulation.step(2)
+    assert simulation.time == pytest.approx(0.03)
+
+
+def test_a_callback_may_read_but_not_step():
+    scene, arm, _ = cantilever()
+    outcome = []
+
+    def force(t):
+        if "simulation" in globals_:
+            s = globals_["simulation"]
+            outcome.append(s.positions(arm).shape)
+            for act in (s.step, s.equilibrium, s.reset, lambda: s.release("wall"), lambda: s.set(gravity=(0, 0, 0))):
+                with pytest.raises(RuntimeError, match="in the middle of a step"):
+                    act()
+        return (0, 0, 0)
+
+    globals_ = {}
+    scene.add_force(arm.end, force)
+    simulation = globals_["simulation"] = scene.build()
+    simulation.step(2)
+    assert outcome == [(11, 3)] * 2

@@ -1,0 +1,156 @@
+"""Supports while a simulation runs: held, moved, turned, released, and what they bear."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import withe
+from simple_scenes import RUBBER, cantilever, tripod
+
+
+def test_supports_can_be_added_and_released_at_any_time():
+    _, arm, simulation = cantilever(planar=False, time_step=2e-3)
+    simulation.step(20)
+    here = simulation.positions(arm)
+    grip = simulation.clamp(arm.end, name="grip")
+    assert np.allclose(simulation.positions(arm), here, atol=1e-14)
+    simulation.release("wall")
+    with pytest.raises(ValueError, match=r"'arm.start' is not held"):
+        simulation.reaction(arm.start)
+    simulation.step(50)
+    after = simulation.positions(arm)
+    assert np.allclose(after[-1], here[-1], atol=1e-12)
+    assert after[0, 2] < -0.01
+    simulation.release(arm.end)
+    with pytest.raises(ValueError, match="not in the scene"):
+        simulation.release(grip)
+    simulation.step(50)
+    assert simulation.positions(arm)[-1, 2] < here[-1, 2] - 0.01
+    simulation.clamp(arm.start, name="again")
+    simulation.step(5)
+
+
+def test_a_released_name_of_the_scene_stays_its_own():
+    _, arm, simulation = cantilever()
+    simulation.release("wall")
+    with pytest.raises(ValueError, match="'wall' is released"):
+        simulation.reaction("wall")
+    with pytest.raises(ValueError, match="must be new"):
+        simulation.pin(arm.start, name="wall")
+
+
+def test_a_support_slides_along_its_free_direction():
+    scene = withe.Scene()
+    rod = scene.add_rod(start=(0, 0, 0), end=(0.2, 0, 0), nodes=11, radius=5e-3, material=RUBBER)
+    scene.clamp(rod.start, free=(0, 0, 1))
+    simulation = scene.build(time_step=1e-3)
+    simulation.step(100)
+    fall = 0.5 * 9.81 * 0.1**2
+    assert np.allclose(simulation.positions(rod)[:, 2], -fall, rtol=1e-3)
+    assert np.allclose(simulation.positions(rod)[0, :2], 0, atol=1e-14)
+
+
+@pytest.mark.parametrize("hold", ["frame", "edge"])
+@pytest.mark.parametrize("planar", [True, False])
+def test_a_support_moves_and_turns_to_where_it_is_told(hold, planar):
+    scene = withe.Scene(gravity=(0, 0, -1e-3))
+    arm = scene.add_rod(start=(0, 0, 0), end=(0.2, 0, 0), nodes=11, radius=5e-3, material=RUBBER)
+    support = scene.clamp(arm.start, hold=hold)
+    simulation = scene.build(integrator="static", time_step=0.05, planar=planar)
+    simulation.move(arm.start, position=(0.1, 0, 0.2), rotation=Rotation.from_euler("y", -90, degrees=True), over=0.5)
+    simulation.step(5)
+    assert np.allclose(simulation.positions(arm)[0], (0.05, 0, 0.1), atol=1e-12)
+    simulation.step(5)
+    assert np.allclose(simulation.positions(arm), [(0.1, 0, 0.2 + z) for z in np.linspace(0, 0.2, 11)], atol=1e-4)
+    simulation.move(support, tangent=(-1, 0, 0))
+    simulation.step()
+    assert np.allclose(simulation.positions(arm)[0], (0.1, 0, 0.2), atol=1e-12)
+    assert simulation.positions(arm)[-1] == pytest.approx((-0.1, 0, 0.2), abs=1e-2)
+
+
+@pytest.mark.parametrize("hold", ["frame", "edge"])
+@pytest.mark.parametrize("planar", [True, False])
+def test_a_stretched_and_turned_end_is_gripped_as_it_is(hold, planar):
+    scene = withe.Scene(gravity=(0, 0, 0))
+    soft = withe.Material(youngs_modulus=1e4, poisson_ratio=0.5, density=1000.0)
+    arm = scene.add_rod(start=(0, 0, 0), end=(0.2, 0, 0), nodes=11, radius=5e-3, material=soft, normal=(0, 1, 0))
+    scene.clamp(arm.start)
+    pull = scene.add_force(arm.end, (0.1, 0, 0.1))
+    simulation = scene.build(integrator="static", time_step=0.1, planar=planar)
+    simulation.equilibrium()
+    before, directors = simulation.positions(arm), simulation.directors(arm)
+    stretched = np.linalg.norm(before[-1] - before[-2])
+    assert stretched > 1.1 * 0.02
+    grip = simulation.clamp(arm.end, hold=hold)
+    simulation.step()
+    assert np.allclose(simulation.positions(arm), before, atol=1e-9)
+    assert np.allclose(simulation.directors(arm), directors, atol=1e-7)
+    simulation.restore(simulation.snapshot())
+    simulation.set(pull, force=(0, 0, 0))
+    simulation.move(grip, position=before[-1] + (0.01, 0, 0), over=0.1)
+    simulation.step()
+    after = simulation.positions(arm)
+    if hold == "edge":
+        assert np.allclose(after[-2:] - before[-2:], (0.01, 0, 0), atol=1e-12)
+        assert simulation.tensions(arm)[-1] == pytest.approx(1e4 * np.pi * 5e-3**2 * (stretched / 0.02 - 1.0))
+
+
+@pytest.mark.parametrize("hold", ["frame", "edge"])
+def test_rolls_count_full_turns(hold):
+    scene = withe.Scene(gravity=(0, 0, 0))
+    arm = scene.add_rod(start=(0, 0, 0), end=(0.2, 0, 0), nodes=11, radius=5e-3, material=RUBBER)
+    scene.clamp(arm.start, hold=hold)
+    scene.clamp(arm.end, hold=hold)
+    simulation = scene.build(integrator="static", time_step=0.02, planar=False)
+    length = 0.2 if hold == "frame" else 0.2 - 0.02
+    for target in (7.0, 9.0, -3.0):
+        simulation.move(arm.end, roll=target, over=1.0)
+        simulation.step(50)
+        assert np.allclose(simulation.twists(arm), target / length, rtol=1e-6)
+    simulation.move(arm.end, position=(0.21, 0, 0))
+    simulation.step()
+    assert np.allclose(simulation.twists(arm), -3.0 / length, rtol=1e-6)
+
+
+def test_a_path_gives_the_position_at_the_end_of_every_step():
+    _, arm, simulation = cantilever(planar=False, time_step=0.01)
+
+    def path(t):
+        return (0.1 * t, 0, 0), Rotation.from_rotvec([t, 0, 0]).as_matrix()
+
+    simulation.move("wall", path=path)
+    simulation.step(7)
+    assert simulation.positions(arm)[0] == pytest.approx((0.007, 0, 0), abs=1e-14)
+    simulation.move(arm.start, path=lambda t: np.array([0.1 * t, 0, t - 0.07]))
+    simulation.step(3)
+    assert simulation.positions(arm)[0] == pytest.approx((0.01, 0, 0.03), abs=1e-14)
+    simulation.move(arm.start, position=(0, 0, 0))
+    simulation.step(3)
+    assert simulation.positions(arm)[0] == pytest.approx((0, 0, 0), abs=1e-14)
+
+
+def test_a_pin_moves_but_does_not_turn():
+    scene = withe.Scene()
+    rod = scene.add_rod(start=(0, 0, 0), end=(0.2, 0, 0), nodes=5, radius=5e-3, material=RUBBER)
+    scene.pin(rod.start)
+    simulation = scene.build()
+    simulation.move(rod.start, (0, 0, 0.1), over=0.05)
+    simulation.step(10)
+    assert simulation.positions(rod)[0] == pytest.approx((0, 0, 0.1), abs=1e-14)
+    with pytest.raises(ValueError, match="a pin holds no direction"):
+        simulation.move(rod.start, roll=1.0)
+    with pytest.raises(ValueError, match="a pin holds no direction"):
+        simulation.move(rod.start, path=lambda t: ((0, 0, 0), np.eye(3)))
+
+
+def test_reactions_balance_the_loads_at_every_support():
+    _, _, simulation = tripod(integrator="static")
+    simulation.equilibrium()
+    total = sum(simulation.reaction(name).force for name in ("clamp 1", "clamp 2"))
+    weight = sum(
+        float(
+            simulation.get(rod, "line_density")[0] * np.linalg.norm(np.ptp(simulation._scene.rod(rod).points, axis=0))
+        )
+        for rod in simulation.rods
+    )
+    assert total == pytest.approx((-0.01, -0.02, 9.81 * weight), abs=1e-7)
