@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.integrate import solve_ivp
-from scipy.optimize import brentq
+from scipy.optimize import brentq, root
 from scipy.special import jv
 
 
@@ -48,6 +49,45 @@ def tip_loaded(load: float) -> Elastica:
 def self_weight(weight: float) -> Elastica:
     """Cantilever under its own weight, G = w L^3 / B."""
     return elastica(lambda s, theta: -weight * (1.0 - s) * np.cos(theta), highest=400.0)
+
+
+@dataclass(frozen=True)
+class FoldLoop:
+    """Lengths in units of Lgb = (B / 2w)^(1/3), forces in w Lgb."""
+
+    length: float
+    end: float  # how far behind lift-off it comes down
+    height: float
+    greatest_curvature: float
+    lift: float  # force at lift-off, upwards
+    pull: float  # force at lift-off, along the strip
+    angle: Callable[[np.ndarray], np.ndarray]  # of the tangent, over arc length
+
+    def tangents(self, edges: int) -> np.ndarray:
+        """Directions at the middle of every edge, shape (edges, 3)."""
+        theta = self.angle((np.arange(edges) + 0.5) / edges * self.length)
+        return np.stack([np.cos(theta), np.zeros(edges), np.sin(theta)], axis=1)
+
+
+def fold_loop() -> FoldLoop:
+    """theta'' = [(R - s) cos theta + H sin theta] / 2, theta from 0 to pi, level and free of moment at both ends."""
+
+    def strip(lift: float, pull: float, length: float) -> Any:
+        def rates(s: float, y: np.ndarray) -> list[float]:
+            theta, curvature = y[:2]
+            moment_rate = (lift - s) * np.cos(theta) + pull * np.sin(theta)
+            return [curvature, 0.5 * moment_rate, np.cos(theta), np.sin(theta)]
+
+        return solve_ivp(rates, (0.0, length), np.zeros(4), rtol=1e-12, atol=1e-13, method="DOP853", dense_output=True)
+
+    def missed(unknowns: np.ndarray) -> np.ndarray:
+        theta, curvature, _, z = strip(*unknowns).y[:, -1]
+        return np.array([theta - np.pi, curvature, z])
+
+    lift, pull, length = root(missed, (4.5, 0.3, 6.0), tol=1e-12).x
+    shape = strip(lift, pull, length).sol
+    _, curvature, x, z = shape(np.linspace(0.0, length, 20001))
+    return FoldLoop(length, x[-1], z.max(), curvature.max(), lift, pull, lambda s: shape(s)[0])
 
 
 # Smallest P L^2 / B of a column [Euler]; clamped-pinned solves tan x = x.
