@@ -262,25 +262,6 @@ void find_zones(const SkeletonGraph& graph, const ZoneOptions& options, const st
   }
 }
 
-/// Point and direction of both ends of every edge.
-std::vector<Branch> measure_branches(const SkeletonGraph& graph, const ZoneOptions& options) {
-  std::vector<Branch> branches(2 * graph.edges.size());
-  for (std::size_t e = 0; e < graph.edges.size(); ++e) {
-    const SkeletonEdge& edge = graph.edges[e];
-    if (edge.removed || edge.nodes[0] < 0) continue;
-    std::array<int, 2> skips{};
-    for (std::size_t end = 0; end < 2; ++end) {
-      const SkeletonNode& node = graph.nodes[static_cast<std::size_t>(edge.nodes[end])];
-      skips[end] = distorted_pixels(edge, static_cast<int>(end), node);
-    }
-    for (std::size_t end = 0; end < 2; ++end) {
-      branches[2 * e + end] =
-          measure_branch(graph, edge, static_cast<int>(end), skips[end], skips[1 - end], options.tangent_length);
-    }
-  }
-  return branches;
-}
-
 void match_zone(const Zone& zone, const ZoneOptions& options, Continuations& result) {
   std::vector<Branch> branches;
   for (const HalfEdge half : zone.branches) branches.push_back(result.branches[static_cast<std::size_t>(half)]);
@@ -334,6 +315,24 @@ bool find_split_crossings(const SkeletonGraph& graph, const ZoneOptions& options
 }
 
 }  // namespace
+
+std::vector<Branch> measure_branches(const SkeletonGraph& graph, const ZoneOptions& options) {
+  std::vector<Branch> branches(2 * graph.edges.size());
+  for (std::size_t e = 0; e < graph.edges.size(); ++e) {
+    const SkeletonEdge& edge = graph.edges[e];
+    if (edge.removed || edge.nodes[0] < 0) continue;
+    std::array<int, 2> skips{};
+    for (std::size_t end = 0; end < 2; ++end) {
+      const SkeletonNode& node = graph.nodes[static_cast<std::size_t>(edge.nodes[end])];
+      skips[end] = distorted_pixels(edge, static_cast<int>(end), node);
+    }
+    for (std::size_t end = 0; end < 2; ++end) {
+      branches[2 * e + end] =
+          measure_branch(graph, edge, static_cast<int>(end), skips[end], skips[1 - end], options.tangent_length);
+    }
+  }
+  return branches;
+}
 
 Continuations find_continuations(const SkeletonGraph& graph, const ZoneOptions& options, const ColorImage* image) {
   const std::vector<Branch> branches = measure_branches(graph, options);

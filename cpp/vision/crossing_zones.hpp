@@ -66,6 +66,9 @@ struct Continuations {
   std::vector<DoubtfulZone> doubts;
 };
 
+/// Point and direction of both ends of every edge.
+std::vector<Branch> measure_branches(const SkeletonGraph& graph, const ZoneOptions& options);
+
 /// The picture, if there is one, tells strands that lie side by side from each other.
 Continuations find_continuations(const SkeletonGraph& graph, const ZoneOptions& options,
                                  const ColorImage* image = nullptr);

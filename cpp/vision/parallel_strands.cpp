@@ -4,33 +4,13 @@
 #include <cmath>
 #include <utility>
 
+#include "vision/skeleton_line.hpp"
+
 namespace withe {
 
 namespace {
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
-double cross(const Vector2& a, const Vector2& b) { return a.x() * b.y() - a.y() * b.x(); }
-
-/// The pixels of a link as a smooth line.
-class LinkLine {
- public:
-  explicit LinkLine(const SkeletonEdge& edge) : points_(edge.points) {}
-  int count() const { return static_cast<int>(points_.size()); }
-  double half_width(int i) const { return points_[at(clamp(i))].half_width; }
-  Vector2 position(int i) const {
-    Vector2 sum = Vector2::Zero();
-    for (int k = -2; k <= 2; ++k) sum += points_[at(clamp(i + k))].position();
-    return sum / 5;
-  }
-  Vector2 tangent(int i) const {
-    const Vector2 way = points_[at(clamp(i + 5))].position() - points_[at(clamp(i - 5))].position();
-    return way.norm() > 0 ? Vector2(way.normalized()) : Vector2(1, 0);
-  }
-
- private:
-  int clamp(int i) const { return std::clamp(i, 0, count() - 1); }
-  const std::vector<SkeletonPoint>& points_;
-};
 
 /// Mean colour of a branch where it leaves the zone.
 Eigen::Vector3f mean_color(const ColorImage& image, const SkeletonEdge& edge, int end, const Branch& branch) {
@@ -42,7 +22,7 @@ Eigen::Vector3f mean_color(const ColorImage& image, const SkeletonEdge& edge, in
 }
 
 /// Rows, from the first to the last, at which the mask is as narrow as one strand: there they change sides.
-std::vector<std::pair<int, int>> find_waists(const LinkLine& line, double both) {
+std::vector<std::pair<int, int>> find_waists(const SkeletonLine& line, double both) {
   std::vector<std::pair<int, int>> waists;
   const int apart = static_cast<int>(std::lround(0.5 * both));
   for (int i = 0; i < line.count(); ++i) {
@@ -84,7 +64,7 @@ bool change_sides(const SkeletonGraph& graph, const std::array<HalfEdge, 2>& fir
 std::optional<SideBySide> find_side_by_side(const SkeletonGraph& graph, int link, const std::vector<Branch>& branches,
                                             const std::array<std::vector<HalfEdge>, 2>& leaving) {
   if (leaving[0].size() != 2 || leaving[1].size() != 2) return std::nullopt;
-  const LinkLine line(graph.edges[at(link)]);
+  const SkeletonLine line(graph.edges[at(link)]);
   double both = 0;  // widths of both strands, or half widths of all four branches
   for (const auto& end : leaving) both += branches[at(end[0])].half_width + branches[at(end[1])].half_width;
   if (line.count() < 8 || graph.edges[at(link)].length < 4 * 0.5 * both) return std::nullopt;
@@ -107,7 +87,7 @@ void split_side_by_side(const SkeletonGraph& graph, const SideBySide& strands, c
     }
   }
   if (zone < 0 || links.zones[at(zone)].branches.size() != 4) return;
-  const LinkLine line(graph.edges[at(strands.link)]);
+  const SkeletonLine line(graph.edges[at(strands.link)]);
 
   // Left and right are seen along the link.
   std::array<std::array<HalfEdge, 2>, 2> sides = strands.branches;
@@ -146,8 +126,7 @@ void split_side_by_side(const SkeletonGraph& graph, const SideBySide& strands, c
     std::vector<Vector2> way;
     for (int i = margin; i < line.count() - margin; i += step) {
       const double aside = start * side(i) * std::max(0.0, line.half_width(i) - half_width);
-      const Vector2 tangent = line.tangent(i);
-      way.push_back(line.position(i) + aside * Vector2(-tangent.y(), tangent.x()));
+      way.push_back(line.position(i) + aside * line.normal(i));
     }
     links.ways[at(from)] = way;
     std::reverse(way.begin(), way.end());

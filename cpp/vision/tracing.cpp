@@ -8,6 +8,7 @@
 #include "vision/cable_paths.hpp"
 #include "vision/crossings.hpp"
 #include "vision/skeleton_graph.hpp"
+#include "vision/strand_seams.hpp"
 #include "vision/thinning.hpp"
 
 namespace withe {
@@ -108,15 +109,21 @@ Tracing trace_lines(const BitImage& mask, const TraceOptions& options, const Col
   Tracing tracing;
   Stopwatch watch(tracing.timings);
   if (!has_width(mask)) return tracing;
-  const BitImage smoothed = smooth(mask);
+  BitImage smoothed = smooth(mask);
   watch.lap("smooth");
-  const BitImage skeleton = thin(smoothed);
+  BitImage skeleton = thin(smoothed);
   watch.lap("thin");
   SkeletonGraph graph = build_graph(skeleton, smoothed, 200);
   prune_spurs(graph, options.spur_ratio);
   watch.lap("graph");
+  if (cut_seams(graph, options.zones, image, smoothed, tracing.doubts)) {
+    skeleton = thin(smoothed);
+    graph = build_graph(skeleton, smoothed, 200);
+    prune_spurs(graph, options.spur_ratio);
+  }
+  watch.lap("strands");
   Continuations links = find_continuations(graph, options.zones, image);
-  tracing.doubts = links.doubts;
+  tracing.doubts.insert(tracing.doubts.end(), links.doubts.begin(), links.doubts.end());
   watch.lap("cross");
 
   const double shortest = std::max(options.shortest_cable * 2 * typical_half_width(graph), options.shortest_line);
