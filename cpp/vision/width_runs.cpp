@@ -10,9 +10,11 @@ namespace {
 
 /// Mean distance from flank to flank: half widths of single pixels are too coarse to compare thin cables by.
 double measure_width(const BitImage& mask, const SkeletonLine& line, int first, int last, double half_width) {
+  constexpr int places = 12;
+  const int step = std::max(3, (last - first) / places);
   double sum = 0;
   int count = 0;
-  for (int i = first + (last - first) % 3 / 2; i <= last; i += 3) {
+  for (int i = first + (last - first) % step / 2; i <= last; i += step) {
     const Flanks flanks = measure_flanks(mask, line, i, 2 * half_width + 2);
     sum += flanks.left + flanks.right;
     ++count;

@@ -12,6 +12,7 @@
 #include "vision/mbest.hpp"
 #include "vision/thinning.hpp"
 #include "vision/tracing.hpp"
+#include "vision/width_runs.hpp"
 
 namespace withe {
 namespace {
@@ -58,6 +59,34 @@ TEST(Tracing, StrandsThatLieSideBySideAreCalledAmbiguous) {
   bool parallel = false;
   for (const DoubtfulZone& doubt : tracing.doubts) parallel = parallel || doubt.reason == Doubt::parallel_strands;
   EXPECT_TRUE(parallel);
+}
+
+TEST(WidthRuns, FollowEachOtherWhereTheMaskBecomesNarrower) {
+  BitImage mask(100, 500);
+  draw_line(mask, {40, 50}, {460, 50}, 10);
+  draw_line(mask, {40, 60}, {260, 60}, 10);
+  SkeletonGraph graph = build_graph(thin(mask), mask, 200);
+  prune_spurs(graph, 1.5);
+  const std::vector<WidthRun> runs = find_width_runs(graph, mask);
+  ASSERT_EQ(runs.size(), 2U);
+  EXPECT_EQ(runs[0].edge, runs[1].edge);
+  const WidthRun& wide = runs[0].width > runs[1].width ? runs[0] : runs[1];
+  const WidthRun& narrow = runs[0].width > runs[1].width ? runs[1] : runs[0];
+  EXPECT_NEAR(wide.width, 21, 0.7);  // rows from 45 to 65
+  EXPECT_NEAR(narrow.width, 11, 0.7);
+  EXPECT_GT(wide.length(), 170);
+  EXPECT_GT(narrow.length(), 150);
+}
+
+TEST(WidthRuns, AWidthIsComparedWithThatOfSingleCablesIfAllAgree) {
+  const std::vector<WidthRun> agree{{0, 0, 199, 10.4}, {1, 0, 149, 9.8}, {2, 0, 199, 20.3}};
+  EXPECT_NEAR(narrower_cable(agree, 20.3), 10.1, 0.4);
+  EXPECT_EQ(narrower_cable(agree, 10.4), 0);
+  const std::vector<WidthRun> differ{{0, 0, 199, 8.0}, {1, 0, 149, 12.0}, {2, 0, 199, 20.0}};
+  EXPECT_EQ(narrower_cable(differ, 20.0), 0);
+  EXPECT_EQ(count_strands(20.3, 10.1), 2);
+  EXPECT_EQ(count_strands(31.0, 10.0), 3);
+  EXPECT_EQ(count_strands(15.0, 10.0), 0);
 }
 
 TEST(Tracing, ThreeCablesAtOnePointAreThreeCrossings) {
