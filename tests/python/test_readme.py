@@ -4,17 +4,51 @@ import re
 from pathlib import Path
 
 import numpy as np
+import pytest
+
+import withe
+from withe.perception.synthetic import make_case, render
 
 README = Path(__file__).resolve().parent.parent.parent / "README.md"
 
 
+def blocks(with_word):
+    """Code of the sections in which a word occurs."""
+    found = [
+        block
+        for section in README.read_text().split("\n## ")
+        for block in re.findall(r"```python\n(.*?)```", section, re.DOTALL)
+        if with_word in section
+    ]
+    assert found
+    return found
+
+
 def test_the_robot_of_the_readme_curls_its_fingers():
-    blocks = re.findall(r"```python\n(.*?)```", README.read_text(), re.DOTALL)
-    assert len(blocks) >= 2
     names = {}
-    for block in blocks:
+    for block in blocks("natural_curvature"):
         exec(compile(block.replace("record.plot()", "pass"), str(README), "exec"), names)
     tips = np.array([names["record"].positions(finger)[:, -1, :2] for finger in names["simulation"].rods[1:]])
     first, last = (np.linalg.norm(tips[:, frame], axis=-1) for frame in (0, -1))
     np.testing.assert_allclose(first, 0.06, rtol=1e-3)
     assert np.all(last < 0.5 * first)
+
+
+def test_cables_of_a_picture_become_rods(tmp_path, monkeypatch):
+    cv2 = pytest.importorskip("cv2")
+    monkeypatch.chdir(tmp_path)
+    case = make_case("crossing 60", 1)
+    cv2.imwrite("cables.jpg", render(case, np.random.default_rng(0))[..., ::-1])
+    corners = np.array([(0, 0), (640, 0), (640, 480), (0, 480)])
+    names = {
+        "withe": withe,
+        "scene": withe.Scene(),
+        "silicone": withe.Material(youngs_modulus=1e6, poisson_ratio=0.5, density=1200.0),
+        "pixels": corners,
+        "metres": 1e-3 * corners,
+    }
+    for block in blocks("withe.perception.trace"):
+        exec(compile(block, str(README), "exec"), names)
+    assert len(names["tracing"]) == 2
+    (rod,) = names["scene"].build().rods
+    assert rod.nodes == 101
