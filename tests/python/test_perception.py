@@ -36,6 +36,14 @@ def test_noise_as_large_as_the_cables_does_not_mislead(case, seed, scale):
     assert score(scene, trace_mask(scene.mask)).right
 
 
+@pytest.mark.parametrize("scale", [0.5, 2])
+def test_a_cable_that_crosses_itself_is_found_at_any_scale(scale):
+    scene = make_case("self", 1, scale)
+    tracing = trace_mask(scene.mask)
+    assert score(scene, tracing, tip_tolerance=5 * max(scale, 1)).right
+    assert len(tracing.crossings) == 1
+
+
 def test_the_stem_of_a_t_is_a_joint():
     tracing = trace_mask(make_case("T", 1).mask)
     (joint,) = tracing.joints
@@ -79,6 +87,7 @@ def test_what_holds_no_cable_gives_an_empty_tracing(mask):
         (np.full((4, 5), np.nan), "mask must be finite"),
         (np.full((4, 5), "a"), "mask must hold"),
         (None, "mask must"),
+        ([[1, 2], [3]], "mask must be an array"),
     ],
 )
 def test_bad_masks_are_refused_by_name(mask, problem):

@@ -93,6 +93,8 @@ def test_grey_alpha_and_any_layout_give_the_same_as_rgb(scene, picture):
         (np.zeros((0, 5, 3), np.uint8), None, "image must have shape"),
         (np.zeros((4, 5, 3)), None, "image must be of type uint8"),
         (np.full((4, 5, 3), np.nan), None, "image must be finite"),
+        ([[1, 2], [3]], None, "image must be an array"),
+        ("zero\0byte.png", None, "image must be a file"),
         (np.zeros((4, 5, 3), np.uint8), np.zeros((5, 4), bool), "mask must be as large as the image"),
         (np.zeros((4, 5, 3), np.uint8), np.full((4, 5), np.inf), "mask must be finite"),
         (np.zeros((4, 5, 3), np.uint8), lambda image: image, "mask must have shape"),

@@ -224,7 +224,8 @@ def _is_clear(
             for j, foreign in enumerate(lines):
                 distance = np.hypot(*(foreign - end).T)
                 if j == i:
-                    distance = distance[np.hypot(*(foreign - other).T) > 45]
+                    own = max(45.0, 1.3 * np.hypot(*(other - end)))  # the end itself, however far apart rows are
+                    distance = distance[np.hypot(*(foreign - other).T) > own]
                 if len(distance) and distance.min() < 3 * max(widths):
                     return False
     return True

@@ -19,9 +19,16 @@ __all__ = ["check_image", "check_mask", "read_image", "trace", "trace_mask"]
 Method = Literal["withe", "mbest"]
 
 
+def _as_array(values: ArrayLike, name: str) -> NDArray[Any]:
+    try:
+        return np.asarray(values)
+    except (ValueError, TypeError) as error:
+        raise ValueError(f"{name} must be an array, got rows of different lengths or no numbers: {error}") from None
+
+
 def check_mask(mask: ArrayLike, name: str = "mask") -> NDArray[np.uint8]:
     """A mask as bytes, row by row, or a ValueError that says what is wrong with it."""
-    array = np.asarray(mask)
+    array = _as_array(mask, name)
     if array.ndim != 2:
         raise ValueError(f"{name} must have shape (height, width), got {array.shape}")
     if array.dtype == np.bool_:
@@ -52,11 +59,12 @@ def _tracing(found: dict[str, Any]) -> Tracing:
 
 def check_image(image: ArrayLike, name: str = "image") -> NDArray[np.uint8]:
     """A picture as RGB bytes, row by row, or a ValueError that says what is wrong with it."""
-    array = np.asarray(image)
+    array = _as_array(image, name)
+    shape = array.shape
     if array.ndim == 2:
         array = array[..., None]
     if array.ndim != 3 or array.shape[2] not in (1, 3, 4) or 0 in array.shape:
-        raise ValueError(f"{name} must have shape (height, width, 3) and hold a pixel, got {np.shape(image)}")
+        raise ValueError(f"{name} must have shape (height, width, 3) and hold a pixel, got {shape}")
     if array.dtype.kind == "f" and not np.isfinite(array).all():
         raise ValueError(f"{name} must be finite, got NaN or infinity")
     if array.dtype == np.bool_:
@@ -79,8 +87,9 @@ def read_image(path: str | os.PathLike[str], name: str = "image") -> NDArray[np.
     cv2 = require("cv2", "vision")
     try:
         content = np.fromfile(path, np.uint8)
-    except OSError as error:
-        raise ValueError(f"{name} must be a file that can be read, got {os.fspath(path)!r}: {error.strerror}") from None
+    except (OSError, ValueError) as error:  # ValueError: a path with a zero byte in it
+        reason = error.strerror if isinstance(error, OSError) else error
+        raise ValueError(f"{name} must be a file that can be read, got {os.fspath(path)!r}: {reason}") from None
     picture = cv2.imdecode(content, cv2.IMREAD_COLOR) if len(content) else None
     if picture is None:
         raise ValueError(f"{name} must be a picture that can be read, got {os.fspath(path)!r}, which is none")
