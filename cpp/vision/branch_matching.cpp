@@ -55,7 +55,7 @@ class PairSearch {
   }
 
   Matching run() {
-    best_.energy = best_.second = kForbidden;
+    best_.energy = best_.second = best_.plain = best_.second_plain = kForbidden;
     if (count_ > 10) {
       run_greedy();
     } else {
@@ -72,11 +72,13 @@ class PairSearch {
     if (sum >= best_.second) return;
     while (first < count_ && used_[static_cast<std::size_t>(first)]) ++first;
     if (first == count_) {
+      const double plain = sum;
       if (count_ == 4 && pairs_.size() == 2 && !interleaved()) sum *= touching_;
       if (sum < best_.energy) {
-        best_ = {pairs_, sum, best_.energy};
+        best_ = {pairs_, sum, best_.energy, plain, std::min(best_.plain, best_.second_plain)};
       } else {
         best_.second = std::min(best_.second, sum);
+        best_.second_plain = std::min(best_.second_plain, plain);
       }
       return;
     }

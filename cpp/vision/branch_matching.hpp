@@ -18,6 +18,8 @@ struct Matching {
   std::vector<std::pair<int, int>> pairs;  ///< of branches; those left over end here
   double energy = 0;                       ///< [1/px]; infinite where none was found, or there are too many branches
   double second = 0;                       ///< of the second best
+  double plain = 0;                        ///< energy if to touch were as likely as to cross
+  double second_plain = 0;                 ///< the least of any other matching
 };
 
 /// The best way to pair branches; one more stays single where their number is odd, others only at the price of a sharp

@@ -272,8 +272,12 @@ void match_zone(const Zone& zone, const ZoneOptions& options, Continuations& res
     result.partner[static_cast<std::size_t>(first)] = second;
     result.partner[static_cast<std::size_t>(second)] = first;
   }
-  if (zone.branches.size() > 2 && std::isfinite(matching.second) &&
-      matching.second - matching.energy < options.similar_energies * matching.second) {
+  // Also where only what is assumed about cables that touch decides.
+  const auto close = [&](double best, double second) {
+    return std::isfinite(second) && second - best < options.similar_energies * second;
+  };
+  if (zone.branches.size() > 2 &&
+      (close(matching.energy, matching.second) || close(matching.plain, matching.second_plain))) {
     result.doubts.push_back({zone.center, Doubt::similar_energies});
   }
 }

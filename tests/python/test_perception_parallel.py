@@ -5,7 +5,7 @@ import pytest
 
 from scoring import score
 from withe.perception import trace, trace_mask
-from withe.perception.synthetic import SyntheticScene, render, render_mask
+from withe.perception.synthetic import CASES, SyntheticScene, make_case, render, render_mask
 
 
 def strand(radius, length, aside, crosses):
@@ -67,6 +67,22 @@ def test_widths_tell_strands_that_change_sides_unseen():
     assert len(tracing.crossings) == 1
     for line in tracing.centrelines:
         assert (line[0, 1] < 240) != (line[-1, 1] < 240)
+
+
+@pytest.mark.parametrize("radius", [150, 300])
+@pytest.mark.parametrize("overlap", [0, 6])
+def test_two_bends_that_lie_on_each_other_may_touch_or_cross(radius, overlap):
+    x = np.linspace(-150, 150, 300)
+    bends = [np.stack([320 + x, 240 + side * (x**2 / 2 / radius - overlap / 2)], axis=1) for side in (1, -1)]
+    tracing = trace_mask(render_mask(bends, [10, 10], [False, False], (480, 640)))
+    assert len(tracing) == 2
+    assert [doubt.reason for doubt in tracing.ambiguous] == ["similar energies"]
+    assert np.hypot(*(tracing.ambiguous[0].point - [320, 240])) < 10
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_plain_scenes_are_not_ambiguous(case):
+    assert trace_mask(make_case(case, 3).mask).ambiguous == []
 
 
 # Along their whole length, or to the end of one of them: no fork at both ends
