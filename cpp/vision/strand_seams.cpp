@@ -24,7 +24,7 @@ struct Narrowing {
 
 /// None where two runs do not follow each other closely, or the second one is not much narrower.
 std::optional<Narrowing> narrowing(const SkeletonLine& line, const WidthRun& wide, const WidthRun& narrow) {
-  constexpr double thinnest = 0.2, widest = 0.8;
+  constexpr double thinnest = 0.3, widest = 0.7;  // so is the other strand; a ragged border is a fifth of a width
   if (narrow.width < thinnest * wide.width || narrow.width > widest * wide.width) return std::nullopt;
   const bool behind = narrow.first > wide.last;
   const auto inset = [](const WidthRun& run) { return std::min(static_cast<int>(0.5 * run.width), run.length() / 3); };

@@ -26,6 +26,7 @@ def test_synthetic_cables_are_found_in_order_within_two_pixels(case, seed):
     [
         ("ragged 30", 1172, 1),  # a bay reaches into the crossing, and the skeleton runs around it
         ("ragged 30", 1250, 1),  # as wide as one cable at its waist: two that cross, not two that touch
+        ("ragged 60", 6130, 1),  # a border that falls back by a fifth of the width is no strand that ends
         ("ragged 30", 3012, 1),  # a hole in the crossing has two sides
         ("crossing 15", 1126, 0.5),  # which flank shows, left or right, differs by less than a pixel
         ("specks", 1049, 0.5),  # two specks side by side are twice as long as the cables are wide
