@@ -111,6 +111,16 @@ def _strains(f0: np.ndarray, f1: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return bent, np.stack([_dot(carried, f1[:, 0]), -_dot(carried, f1[:, 1])], axis=1)
 
 
+def _factor(bent: np.ndarray) -> np.ndarray:
+    """(phi / 2) / tan(phi / 2) as the engine has it, from curvatures (..., 2) of length 2 tan(phi / 2)."""
+    square = np.sum(bent**2, axis=-1)
+    return (1.0 + square / 15.0) / (1.0 + 0.15 * square)
+
+
+def _measured(bent: np.ndarray) -> np.ndarray:
+    return _factor(bent)[..., None] * bent
+
+
 class _Sum:
     """Forces on nodes and moments along edges as they add up, and their absolute values."""
 
@@ -158,35 +168,50 @@ class _Sum:
             self._along(along, where)
 
         if case.nodes > 2:
-            moment = self._stencil_moments(frames[:-1], frames[1:], self._edge)
+            # Of the bending of an edge at a wall, a twelfth is carried by the next stencil.
+            carrying = np.full(case.nodes - 2, self._edge)
+            carrying[0] += self._edge / 12
+            if case.both_ends:
+                carrying[-1] += self._edge / 12
+            moment = self._stencil_moments(frames[:-1], frames[1:], self._edge, carrying)
             moments(moment, slice(1, None))
             moments(-moment, slice(None, -1))
-        wall = wall_of(case, self._moment)
-        moments(self._stencil_moments(wall[None], frames[:1], self._edge / 2), slice(0, 1))
+        wall, half = wall_of(case, self._moment), self._edge / 2
+        carrying = np.array([half - self._edge / 12 if case.nodes > 2 else half])
+        moments(self._stencil_moments(wall[None], frames[:1], half, carrying), slice(0, 1))
         if case.both_ends and case.nodes > 2:
-            last = self._stencil_moments(frames[-1:], wall_of(case, -1)[None], self._edge / 2)
+            last = self._stencil_moments(frames[-1:], wall_of(case, -1)[None], half, carrying)
             moments(-last, slice(case.nodes - 2, None))
         self._on_nodes(self._mass[:, None] * case.gravity * case.direction, slice(None))
         node, load = load_of(case, self._moment)
         self._on_nodes(load[None], slice(node, node + 1))
         return self
 
-    def _stencil_moments(self, f0: FloatArray, f1: FloatArray, length: float) -> np.ndarray:
-        """Moment of each stencil on its second edge; the first gets the opposite [N m]."""
+    def _stencil_moments(self, f0: FloatArray, f1: FloatArray, length: float, carrying: FloatArray) -> np.ndarray:
+        """Moment of each stencil on its second edge; the first gets the opposite [N m].
+
+        It twists over its length and bends over what it is `carrying` of the rod.
+        """
         case = self._case
         smooth = np.asarray(natural_curvature_of(case, self._moment))
         bend = float(np.linalg.norm(smooth))
-        natural = 2.0 * math.tan(bend * length / 2) / bend * smooth if bend > 0 else smooth
+        natural = _measured(2.0 * math.tan(bend * length / 2) / bend * smooth if bend > 0 else smooth)
         bent, twist = _strains(f0, f1)
         tau = np.arctan2(twist[:, 1], twist[:, 0])
         twist_stiffness = case.stiffness * 2.0 / 3.0
+        factor = _factor(bent)
+        strain = factor[:, None] * bent - natural
         moment = np.empty((len(f1), 3))
         for axis in range(3):
             turned = f1 + 1e-30j * np.cross(np.eye(3)[axis], f1)
-            bent_by, twist_by = (value.imag / 1e-30 for value in _strains(f0, turned))
+            bent_there, twist_there = _strains(f0, turned)
+            strain_by = _measured(bent_there).imag / 1e-30
+            twist_by = twist_there.imag / 1e-30
             tau_by = twist[:, 0] * twist_by[:, 1] - twist[:, 1] * twist_by[:, 0]
-            moment[:, axis] = -(case.stiffness * _dot(bent - natural, bent_by) + twist_stiffness * tau * tau_by)
-        return moment / length
+            twisted_by = factor * tau_by + _factor(bent_there).imag / 1e-30 * tau
+            bending = case.stiffness * _dot(strain, strain_by) / carrying
+            moment[:, axis] = -(bending + twist_stiffness / length * factor * tau * twisted_by)
+        return moment
 
     def add_inertia(self, moved: FloatArray, before: Look, h: float, turned: FloatArray) -> None:
         """Of a step over h, from `before`: nodes, spin of edges, and the couple of edges that spin and turn."""

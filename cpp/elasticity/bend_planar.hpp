@@ -1,7 +1,9 @@
 #pragma once
 /// Bending in a plane. The energy depends on the turn phi between two directions only:
-///   E = K (kappa - k)^2 / 2,  kappa = 2 tan(phi / 2), positive from the first axis to the second.
-/// [dissertation 3.3, 3.5 without the third coordinate].
+///   E = K (beta - n)^2 / 2,  beta = f(kappa^2) kappa,  kappa = 2 tan(phi / 2), positive from the first axis to the
+/// second. [dissertation 3.3, 3.5 without the third coordinate; f: geometry/bend_measure.hpp].
+
+#include "geometry/bend_measure.hpp"
 
 namespace withe {
 
@@ -14,10 +16,17 @@ struct PlanarBend {
 
 /// Energy and its derivatives with respect to phi: kappa' = 1 + kappa^2 / 4, kappa'' = kappa kappa' / 2.
 template <class Scalar>
-PlanarBend<Scalar> planar_bend(const Scalar& kappa, const Scalar& natural, const Scalar& stiffness) {
-  const Scalar moment = stiffness * (kappa - natural);
-  const Scalar first = 1.0 + 0.25 * kappa * kappa;
-  return {0.5 * moment * (kappa - natural), moment * first, stiffness * first * first + 0.5 * moment * kappa * first};
+PlanarBend<Scalar> planar_bend(const BendMeasure& measure, const Scalar& kappa, const Scalar& natural,
+                               const Scalar& stiffness) {
+  const Scalar x = kappa * kappa;
+  const BendFactor<Scalar> f = bend_factor(measure, x);
+  const Scalar strain = f.value * kappa - natural;
+  const Scalar moment = stiffness * strain;
+  const Scalar by_kappa = f.value + 2.0 * (x * f.first);
+  const Scalar turn = 1.0 + 0.25 * x;
+  const Scalar first = by_kappa * turn;
+  const Scalar second = kappa * turn * ((6.0 * f.first + 4.0 * (x * f.second)) * turn + 0.5 * by_kappa);
+  return {0.5 * moment * strain, moment * first, stiffness * first * first + moment * second};
 }
 
 }  // namespace withe

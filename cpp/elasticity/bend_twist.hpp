@@ -5,12 +5,13 @@
 ///   kb = 2 t0 x t1 / (1 + t0 . t1),  kappa1 = kb . (d2_0 + d2_1) / 2,  kappa2 = - kb . (d1_0 + d1_1) / 2,
 ///   tau = angle about t1 from the transported d1_0 to d1_1.
 /// |kb| = 2 tan(phi / 2) for a turn by phi. kappa1 > 0 bends towards d1, kappa2 > 0 towards d2.
-/// Energy E = (K1 (kappa1 - k1)^2 + K2 (kappa2 - k2)^2 + Kt (tau - t)^2) / 2, stiffnesses K = EI / V and
-/// GJ / V in N m, V the Voronoi length.
+/// Energy E = (K1 (f kappa1 - n1)^2 + K2 (f kappa2 - n2)^2 + Kt (f tau - nt)^2) / 2, f(|kappa|^2) of
+/// geometry/bend_measure.hpp, stiffnesses K = EI / V and GJ / V in N m, V the Voronoi length.
 ///
 /// Derivatives are taken with respect to y = (e0, psi0, e1, psi1): edge vectors, and turns of the
 /// directors beyond infinitesimal parallel transport; `apply_transport` changes from psi to theta.
 
+#include "geometry/bend_measure.hpp"
 #include "geometry/curvature.hpp"
 
 namespace withe {
@@ -31,28 +32,66 @@ struct BendTwistDerivatives {
   Scalar angle_angle[2][2];    // [1][0] is not filled
 };
 
+/// Energy [J] and its derivatives with respect to (kappa1, kappa2, tau) [N m].
 template <class Scalar>
-Scalar bend_twist_energy(const BendTwistStrain<Scalar>& s, const BendTwistStrain<Scalar>& natural,
-                         const BendTwistStiffness<Scalar>& k) {
-  const Scalar a = s.kappa1 - natural.kappa1, b = s.kappa2 - natural.kappa2, c = s.tau - natural.tau;
-  return 0.5 * (k.bend1 * a * a + k.bend2 * b * b + k.twist * c * c);
+struct BendTwistMoments {
+  Scalar energy, by[3];
+  Scalar second[3][3];  ///< where asked for
+};
+
+template <bool second_too, class Scalar>
+BendTwistMoments<Scalar> bend_twist_moments(const BendMeasure& measure, const BendTwistStrain<Scalar>& s,
+                                            const BendTwistStrain<Scalar>& natural,
+                                            const BendTwistStiffness<Scalar>& k) {
+  const Scalar u[3] = {s.kappa1, s.kappa2, s.tau}, n[3] = {natural.kappa1, natural.kappa2, natural.tau};
+  const Scalar K[3] = {k.bend1, k.bend2, k.twist};
+  const BendFactor<Scalar> f = bend_factor(measure, u[0] * u[0] + u[1] * u[1]);
+  Scalar strain[3], moment[3];
+  for (int i = 0; i < 3; ++i) {
+    strain[i] = f.value * u[i] - n[i];
+    moment[i] = K[i] * strain[i];
+  }
+  const Scalar work = moment[0] * u[0] + moment[1] * u[1] + moment[2] * u[2], pull = 2.0 * (f.first * work);
+  BendTwistMoments<Scalar> m;
+  m.energy = 0.5 * (moment[0] * strain[0] + moment[1] * strain[1] + moment[2] * strain[2]);
+  for (int i = 0; i < 3; ++i) m.by[i] = f.value * moment[i];
+  for (int i = 0; i < 2; ++i) m.by[i] += pull * u[i];
+  if constexpr (second_too) {
+    // d2E = f^2 K + f' (...): `lean` is how a moment changes with x = |kappa|^2, halved, and the factor's change on
+    // top.
+    Scalar lean[3], stiff[3], sum{0.0};
+    for (int i = 0; i < 3; ++i) {
+      stiff[i] = K[i] * u[i];
+      lean[i] = (2.0 * f.first) * (moment[i] + f.value * stiff[i]);
+      sum += stiff[i] * u[i];
+    }
+    const Scalar common = 4.0 * (f.second * work + (f.first * f.first) * sum), square = f.value * f.value;
+    for (int i = 0; i < 2; ++i)
+      for (int j = i; j < 2; ++j) m.second[i][j] = u[i] * lean[j] + lean[i] * u[j] + common * (u[i] * u[j]);
+    for (int i = 0; i < 2; ++i) {
+      m.second[i][i] += square * K[i] + pull;
+      m.second[i][2] = m.second[2][i] = u[i] * lean[2];
+    }
+    m.second[1][0] = m.second[0][1];
+    m.second[2][2] = square * K[2];
+  }
+  return m;
 }
 
 /// Energy and gradient only.
 template <class Scalar>
-void bend_twist_gradient(const EdgeFrame<Scalar>& f0, const EdgeFrame<Scalar>& f1, const BendTwistStrain<Scalar>& s,
-                         const BendTwistStrain<Scalar>& natural, const BendTwistStiffness<Scalar>& k,
-                         BendTwistDerivatives<Scalar>& out) {
+void bend_twist_gradient(const BendMeasure& measure, const EdgeFrame<Scalar>& f0, const EdgeFrame<Scalar>& f1,
+                         const BendTwistStrain<Scalar>& s, const BendTwistStrain<Scalar>& natural,
+                         const BendTwistStiffness<Scalar>& k, BendTwistDerivatives<Scalar>& out) {
+  const BendTwistMoments<Scalar> m = bend_twist_moments<false>(measure, s, natural, k);
+  const Scalar &c1 = m.by[0], &c2 = m.by[1], &ct = m.by[2];
   const Scalar inverse_chi = 1.0 / (1.0 + dot(f0.tangent, f1.tangent));
   const Vec3<Scalar> kb = (2.0 * inverse_chi) * cross(f0.tangent, f1.tangent);
   const Vec3<Scalar> t = inverse_chi * (f0.tangent + f1.tangent);
-  const Scalar c1 = k.bend1 * (s.kappa1 - natural.kappa1);
-  const Scalar c2 = k.bend2 * (s.kappa2 - natural.kappa2);
-  const Scalar ct = k.twist * (s.tau - natural.tau);
   // kappa2 follows from kappa1 by (d1, d2) -> (d2, -d1), so both appear through two combined directors.
   const Vec3<Scalar> D = inverse_chi * (c1 * (f0.d2 + f1.d2) - c2 * (f0.d1 + f1.d1));
   const Scalar K = c1 * s.kappa1 + c2 * s.kappa2;
-  out.energy = bend_twist_energy(s, natural, k);
+  out.energy = m.energy;
   out.gradient_e[0] = f0.inverse_length * (cross(f1.tangent, D) - K * t + (0.5 * ct) * kb);
   out.gradient_e[1] = f1.inverse_length * ((0.5 * ct) * kb - K * t - cross(f0.tangent, D));
   out.gradient_angle[0] = -0.5 * (c1 * dot(kb, f0.d1) + c2 * dot(kb, f0.d2)) - ct;
@@ -61,17 +100,16 @@ void bend_twist_gradient(const EdgeFrame<Scalar>& f0, const EdgeFrame<Scalar>& f
 
 /// Energy, gradient and symmetric Hessian. [Bergou et al. 2010, appendix], combined over the two curvatures.
 template <class Scalar>
-void bend_twist_hessian(const EdgeFrame<Scalar>& f0, const EdgeFrame<Scalar>& f1, const BendTwistStrain<Scalar>& s,
-                        const BendTwistStrain<Scalar>& natural, const BendTwistStiffness<Scalar>& k,
-                        BendTwistDerivatives<Scalar>& out) {
+void bend_twist_hessian(const BendMeasure& measure, const EdgeFrame<Scalar>& f0, const EdgeFrame<Scalar>& f1,
+                        const BendTwistStrain<Scalar>& s, const BendTwistStrain<Scalar>& natural,
+                        const BendTwistStiffness<Scalar>& k, BendTwistDerivatives<Scalar>& out) {
+  const BendTwistMoments<Scalar> m = bend_twist_moments<true>(measure, s, natural, k);
+  const Scalar &c1 = m.by[0], &c2 = m.by[1], &ct = m.by[2];
   const Vec3<Scalar>&t0 = f0.tangent, &t1 = f1.tangent;
   const Scalar i0 = f0.inverse_length, i1 = f1.inverse_length;
   const Scalar inverse_chi = 1.0 / (1.0 + dot(t0, t1));
   const Vec3<Scalar> kb = (2.0 * inverse_chi) * cross(t0, t1);
   const Vec3<Scalar> t = inverse_chi * (t0 + t1);
-  const Scalar c1 = k.bend1 * (s.kappa1 - natural.kappa1);
-  const Scalar c2 = k.bend2 * (s.kappa2 - natural.kappa2);
-  const Scalar ct = k.twist * (s.tau - natural.tau);
   const Scalar half_ct = 0.5 * ct;
   const Vec3<Scalar> D0 = c1 * f0.d2 - c2 * f0.d1, D1 = c1 * f1.d2 - c2 * f1.d1;
   const Vec3<Scalar> C[2] = {c1 * f0.d1 + c2 * f0.d2, c1 * f1.d1 + c2 * f1.d2};
@@ -79,7 +117,7 @@ void bend_twist_hessian(const EdgeFrame<Scalar>& f0, const EdgeFrame<Scalar>& f1
   const Scalar K = c1 * s.kappa1 + c2 * s.kappa2;
   const Vec3<Scalar> t1D = cross(t1, D), t0D = cross(t0, D);
 
-  out.energy = bend_twist_energy(s, natural, k);
+  out.energy = m.energy;
   out.gradient_e[0] = i0 * (t1D - K * t + half_ct * kb);
   out.gradient_e[1] = i1 * (half_ct * kb - K * t - t0D);
   const Scalar kbC[2] = {dot(kb, C[0]), dot(kb, C[1])};
@@ -113,15 +151,13 @@ void bend_twist_hessian(const EdgeFrame<Scalar>& f0, const EdgeFrame<Scalar>& f1
   const Vec3<Scalar> p1 = cross(t1, a1) - s.kappa1 * t, p2 = cross(t1, a2) - s.kappa2 * t;
   const Vec3<Scalar> q1 = -(cross(t0, a1) + s.kappa1 * t), q2 = -(cross(t0, a2) + s.kappa2 * t);
   const Vec3<Scalar> half_kb = 0.5 * kb;
-  add_outer(A, k.bend1, p1, p1);
-  add_outer(A, k.bend2, p2, p2);
-  add_outer(A, k.twist, half_kb, half_kb);
-  add_outer(F, k.bend1, q1, q1);
-  add_outer(F, k.bend2, q2, q2);
-  add_outer(F, k.twist, half_kb, half_kb);
-  add_outer(B, k.bend1, p1, q1);
-  add_outer(B, k.bend2, p2, q2);
-  add_outer(B, k.twist, half_kb, half_kb);
+  const Vec3<Scalar> p[3] = {p1, p2, half_kb}, q[3] = {q1, q2, half_kb};
+  for (int i = 0; i < 3; ++i) {
+    const Vec3<Scalar> u = m.second[i][0] * p1 + m.second[i][1] * p2 + m.second[i][2] * half_kb;
+    add_outer(A, Scalar(1.0), u, p[i]);
+    add_outer(B, Scalar(1.0), u, q[i]);
+    add_outer(F, Scalar(1.0), m.second[i][0] * q1 + m.second[i][1] * q2 + m.second[i][2] * half_kb, q[i]);
+  }
   for (int i = 0; i < 3; ++i) {
     out.ee[0][0].row[i] = (i0 * i0) * A.row[i];
     out.ee[0][1].row[i] = (i0 * i1) * B.row[i];
@@ -129,20 +165,21 @@ void bend_twist_hessian(const EdgeFrame<Scalar>& f0, const EdgeFrame<Scalar>& f1
   }
 
   const Vec3<Scalar> d1[2] = {f0.d1, f1.d1}, d2[2] = {f0.d2, f1.d2};
-  const Scalar w1[2] = {-0.5 * dot(kb, d1[0]), -0.5 * dot(kb, d1[1])};
-  const Scalar w2[2] = {-0.5 * dot(kb, d2[0]), -0.5 * dot(kb, d2[1])};
-  const Scalar wt[2] = {Scalar(-1.0), Scalar(1.0)};
+  Scalar w[2][3], v[2][3];  // first derivatives in the angles, and the second derivatives times these
   for (int j = 0; j < 2; ++j) {
-    const Vec3<Scalar> common = (0.5 * kbC[j]) * t;
-    out.e_angle[0][j] = i0 * (common - inverse_chi * cross(t1, C[j]) + (k.bend1 * w1[j]) * p1 + (k.bend2 * w2[j]) * p2 +
-                              (k.twist * wt[j]) * half_kb);
-    out.e_angle[1][j] = i1 * (common + inverse_chi * cross(t0, C[j]) + (k.bend1 * w1[j]) * q1 + (k.bend2 * w2[j]) * q2 +
-                              (k.twist * wt[j]) * half_kb);
+    w[j][0] = -0.5 * dot(kb, d1[j]);
+    w[j][1] = -0.5 * dot(kb, d2[j]);
+    w[j][2] = Scalar(j == 0 ? -1.0 : 1.0);
+    for (int i = 0; i < 3; ++i)
+      v[j][i] = m.second[i][0] * w[j][0] + m.second[i][1] * w[j][1] + m.second[i][2] * w[j][2];
+    const Vec3<Scalar> common = (0.5 * kbC[j]) * t + v[j][2] * half_kb;
+    out.e_angle[0][j] = i0 * (common - inverse_chi * cross(t1, C[j]) + v[j][0] * p1 + v[j][1] * p2);
+    out.e_angle[1][j] = i1 * (common + inverse_chi * cross(t0, C[j]) + v[j][0] * q1 + v[j][1] * q2);
   }
   const Scalar own[2] = {-0.5 * dot(kb, D0), -0.5 * dot(kb, D1)};
-  for (int j = 0; j < 2; ++j)
-    out.angle_angle[j][j] = own[j] + k.bend1 * w1[j] * w1[j] + k.bend2 * w2[j] * w2[j] + k.twist;
-  out.angle_angle[0][1] = k.bend1 * w1[0] * w1[1] + k.bend2 * w2[0] * w2[1] - k.twist;
+  const auto both = [&](int i, int j) { return v[i][0] * w[j][0] + v[i][1] * w[j][1] + v[i][2] * w[j][2]; };
+  for (int j = 0; j < 2; ++j) out.angle_angle[j][j] = own[j] + both(j, j);
+  out.angle_angle[0][1] = both(0, 1);
 }
 
 /// From psi to theta, psi = theta + (spin of direct transport): the term that a finite rotation within a

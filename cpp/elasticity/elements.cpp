@@ -11,6 +11,20 @@ namespace {
 BendTwistStrain<double> strain_row(const Columns3& m, Eigen::Index i) { return {m(i, 0), m(i, 1), m(i, 2)}; }
 BendTwistStiffness<double> stiffness_row(const Columns3& m, Eigen::Index i) { return {m(i, 0), m(i, 1), m(i, 2)}; }
 
+/// Rows (kappa1, kappa2, tau) become strains; in a plane the other columns are zero.
+void measure_rows(const BendMeasure& measure, Columns3& rows) {
+  for (Eigen::Index i = 0; i < rows.rows(); ++i)
+    rows.row(i) *= bend_factor(measure, rows.row(i).head<2>().squaredNorm()).value;
+}
+
+BendTwistEnergy energy_of_row(const BendMeasure& measure, const Columns3& strain, const Columns3& natural,
+                              const Columns3& stiffness, Eigen::Index i) {
+  const double factor = bend_factor(measure, strain.row(i).head<2>().squaredNorm()).value;
+  const double a = factor * strain(i, 0) - natural(i, 0), b = factor * strain(i, 1) - natural(i, 1);
+  const double c = factor * strain(i, 2) - natural(i, 2);
+  return {0.5 * (stiffness(i, 0) * a * a + stiffness(i, 1) * b * b), 0.5 * stiffness(i, 2) * c * c};
+}
+
 void put(Local& out, int at, const Vec3d& v) {
   out.gradient[at] = v.x;
   out.gradient[at + 1] = v.y;
@@ -66,7 +80,8 @@ void add_angle_hessian(double (&m)[2][2], double weight, const Direction2& d, do
 
 void bend_planar_local(const ElasticCoefficients& k, const Configuration& c, const BendStencil& s, Eigen::Index i,
                        Local& out) {
-  const PlanarBend<double> p = planar_bend(c.bend_strain(i, 0), k.bend_natural(i, 0), k.bend_stiffness(i, 0));
+  const PlanarBend<double> p =
+      planar_bend(k.measure, c.bend_strain(i, 0), k.bend_natural(i, 0), k.bend_stiffness(i, 0));
   const EdgeFrame<double>&f0 = c.edge[static_cast<std::size_t>(s.edge[0])],
         &f1 = c.edge[static_cast<std::size_t>(s.edge[1])];
   Direction2 a = direction2(f0), b = direction2(f1);
@@ -96,7 +111,8 @@ void bend_planar_local(const ElasticCoefficients& k, const Configuration& c, con
 
 void half_planar_local(const ElasticCoefficients& k, const Configuration& c, const FrameStencil& s, Eigen::Index i,
                        Local& out) {
-  const PlanarBend<double> p = planar_bend(c.half_strain(i, 0), k.half_natural(i, 0), k.half_stiffness(i, 0));
+  const PlanarBend<double> p =
+      planar_bend(k.measure, c.half_strain(i, 0), k.half_natural(i, 0), k.half_stiffness(i, 0));
   const EdgeFrame<double>& f = c.edge[static_cast<std::size_t>(s.edge)];
   const Direction2 a = direction2(f);
   const double sign = s.frame_first ? 1.0 : -1.0;
@@ -120,6 +136,7 @@ void half_planar_local(const ElasticCoefficients& k, const Configuration& c, con
 }  // namespace
 
 void set_elastic(const Parameters& p, ElasticCoefficients& out) {
+  out.measure = p.measure;
   out.stretch_stiffness = p.edge_stretch;
   out.stretch_natural.setZero(p.edge_stretch.size());
   out.bend_stiffness = p.bend_stiffness;
@@ -130,12 +147,15 @@ void set_elastic(const Parameters& p, ElasticCoefficients& out) {
 
 void set_viscous(const Model& model, const Parameters& p, const Configuration& start, double h,
                  ElasticCoefficients& out) {
+  out.measure = p.measure;
   out.stretch_stiffness = p.edge_stretch.cwiseProduct(p.edge_viscous_time) / h;
   out.stretch_natural = start.length.cwiseQuotient(model.edge_length).array() - 1.0;
   out.bend_stiffness = (p.bend_viscous_time / h).asDiagonal() * p.bend_stiffness;
   out.bend_natural = start.bend_strain;
+  measure_rows(p.measure, out.bend_natural);
   out.half_stiffness = (p.half_viscous_time / h).asDiagonal() * p.half_stiffness;
   out.half_natural = start.half_strain;
+  measure_rows(p.measure, out.half_natural);
 }
 
 void add_coefficients(const ElasticCoefficients& other, ElasticCoefficients& sum) {
@@ -159,15 +179,11 @@ double stretch_energy_of(const Model& model, const ElasticCoefficients& k, const
 }
 
 BendTwistEnergy bend_energy_of(const ElasticCoefficients& k, const Configuration& c, int stencil) {
-  const Eigen::Array3d d = (c.bend_strain.row(stencil) - k.bend_natural.row(stencil)).array();
-  const Eigen::Array3d e = 0.5 * k.bend_stiffness.row(stencil).transpose().array() * d * d;
-  return {e(0) + e(1), e(2)};
+  return energy_of_row(k.measure, c.bend_strain, k.bend_natural, k.bend_stiffness, stencil);
 }
 
 BendTwistEnergy half_energy_of(const ElasticCoefficients& k, const Configuration& c, int stencil) {
-  const Eigen::Array3d d = (c.half_strain.row(stencil) - k.half_natural.row(stencil)).array();
-  const Eigen::Array3d e = 0.5 * k.half_stiffness.row(stencil).transpose().array() * d * d;
-  return {e(0) + e(1), e(2)};
+  return energy_of_row(k.measure, c.half_strain, k.half_natural, k.half_stiffness, stencil);
 }
 
 void stretch_local(const Model& model, const ElasticCoefficients& k, const Configuration& c, int edge,
@@ -205,10 +221,10 @@ void bend_local(const Model& model, const ElasticCoefficients& k, const Configur
   const auto strain = strain_row(c.bend_strain, i), natural = strain_row(k.bend_natural, i);
   const auto stiffness = stiffness_row(k.bend_stiffness, i);
   if (with_hessian) {
-    bend_twist_hessian(f0, f1, strain, natural, stiffness, d);
+    bend_twist_hessian(k.measure, f0, f1, strain, natural, stiffness, d);
     apply_transport(f0, f1, d);
   } else {
-    bend_twist_gradient(f0, f1, strain, natural, stiffness, d);
+    bend_twist_gradient(k.measure, f0, f1, strain, natural, stiffness, d);
     apply_transport_gradient(f0, f1, d);
   }
   out.energy = d.energy;
@@ -251,7 +267,7 @@ void half_local(const Model& model, const VectorX& q, const ElasticCoefficients&
   const EdgeFrame<double>&f0 = s.frame_first ? end : edge, &f1 = s.frame_first ? edge : end;
   const int a = s.frame_first ? 0 : 1, b = 1 - a;  // slots of the frame and of the edge
   BendTwistDerivatives<double> d;
-  bend_twist_hessian(f0, f1, strain_row(c.half_strain, i), strain_row(k.half_natural, i),
+  bend_twist_hessian(k.measure, f0, f1, strain_row(c.half_strain, i), strain_row(k.half_natural, i),
                      stiffness_row(k.half_stiffness, i), d);
   apply_transport(f0, f1, d);
   out.energy = d.energy;

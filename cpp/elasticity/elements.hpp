@@ -20,9 +20,10 @@ struct Local {
 
 /// Stiffnesses and natural strains of every stencil, as they act in one evaluation.
 struct ElasticCoefficients {
+  BendMeasure measure;
   VectorX stretch_stiffness;              ///< EA [N]
   VectorX stretch_natural;                ///< natural strain [-]
-  Columns3 bend_stiffness, bend_natural;  ///< [N m]; kappa1, kappa2, tau
+  Columns3 bend_stiffness, bend_natural;  ///< [N m]; natural strains f (kappa1, kappa2, tau)
   Columns3 half_stiffness, half_natural;
 };
 

@@ -9,6 +9,7 @@
 #include <cstddef>
 
 #include "common/instruction_set.hpp"
+#include "geometry/bend_measure.hpp"
 
 namespace withe {
 
@@ -21,6 +22,7 @@ struct StencilBatch {
   const std::ptrdiff_t* lines;  ///< per unknown of each: where its line begins in `values`
   bool lower;                   ///< lines hold the lower triangle, else all of it
 
+  BendMeasure measure;
   const double* frames;                        ///< table of EdgeFrame<double>
   const double *strain, *natural, *stiffness;  ///< tables of three columns, a row per stencil
   std::ptrdiff_t column;                       ///< numbers from one column to the next

@@ -165,10 +165,10 @@ template <bool with_matrix, bool inner>
   const Vec3<Pack> k = lanes.three(batch.stiffness, batch.column);
   BendTwistDerivatives<Pack> d;
   if constexpr (with_matrix) {
-    bend_twist_hessian<Pack>(f0, f1, {s.x, s.y, s.z}, {n.x, n.y, n.z}, {k.x, k.y, k.z}, d);
+    bend_twist_hessian<Pack>(batch.measure, f0, f1, {s.x, s.y, s.z}, {n.x, n.y, n.z}, {k.x, k.y, k.z}, d);
     apply_transport(f0, f1, d);
   } else {
-    bend_twist_gradient<Pack>(f0, f1, {s.x, s.y, s.z}, {n.x, n.y, n.z}, {k.x, k.y, k.z}, d);
+    bend_twist_gradient<Pack>(batch.measure, f0, f1, {s.x, s.y, s.z}, {n.x, n.y, n.z}, {k.x, k.y, k.z}, d);
     apply_transport_gradient(f0, f1, d);
   }
   const double energy = sum_of_live(d.energy, live);
@@ -214,7 +214,7 @@ template <bool with_matrix, bool inner>
   const Lanes<inner> lanes(batch, first);
   const int live = inner ? kLanes : lanes.live;
   const PlanarBend<Pack> p =
-      withe::planar_bend(lanes.of(batch.strain), lanes.of(batch.natural), lanes.of(batch.stiffness));
+      withe::planar_bend(batch.measure, lanes.of(batch.strain), lanes.of(batch.natural), lanes.of(batch.stiffness));
   const double energy = sum_of_live(p.energy, live);
   // phi = angle(e1) - angle(e0): an edge's angle has the gradient n = (-ty, tx) / l and the Hessian
   // -(t n^T + n t^T) / l.

@@ -257,6 +257,7 @@ StencilBatch Equations::regular_batch(const ElasticCoefficients& k, const double
           .owned = regular.owned.data(),
           .lines = regular.lines.data(),
           .lower = symmetric(),
+          .measure = k.measure,
           .frames = &middle_.edge.data()->tangent.x,
           .strain = middle_.bend_strain.data(),
           .natural = k.bend_natural.data(),

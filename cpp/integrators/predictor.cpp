@@ -40,6 +40,20 @@ void Predictor::record(double time, int slot, const VectorX& acceleration, const
   count_ = std::min(count_ + 1, kDepth);
 }
 
+void Predictor::differentiate(int order, double share, double dt, const VectorX& acceleration, VectorX& out) {
+  if (slow_[0].size() != acceleration.size())
+    for (std::size_t k = 0; k < slow_.size(); ++k)
+      slow_[k] = (k < 3 ? 1.0 : 0.0) * acceleration;  // it has always been so
+  slow_[0] += share * (acceleration - slow_[0]);
+  slow_[1] += share * (slow_[0] - slow_[1]);
+  out = slow_[1];
+  for (int k = 0; k < order; ++k) {
+    VectorX& mean = slow_[static_cast<std::size_t>(2 + k)];
+    out = (share / dt) * (out - mean);
+    mean += dt * out;
+  }
+}
+
 bool Predictor::plausible() const {
   bool fine = count_ >= 0 && count_ <= kDepth;
   for (const int b : best_) fine = fine && b >= 0 && b <= kDepth;
@@ -47,6 +61,7 @@ bool Predictor::plausible() const {
     for (int j = 0; j < i && i < count_; ++j)
       fine = fine && time_[static_cast<std::size_t>(i)] != time_[static_cast<std::size_t>(j)];
   for (const VectorX& a : acceleration_) fine = fine && a.allFinite();
+  for (const VectorX& a : slow_) fine = fine && a.allFinite() && a.size() == slow_[0].size();
   return fine;
 }
 

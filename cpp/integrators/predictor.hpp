@@ -15,7 +15,10 @@ class Predictor {
  public:
   static constexpr int kDepth = 4, kSlots = 5;
 
-  void clear() { count_ = 0; }
+  void clear() {
+    count_ = 0;
+    for (VectorX& a : slow_) a.resize(0);
+  }
   bool empty() const { return count_ == 0; }
   int count() const { return count_; }
   /// Of the step `back` steps before the latest one; `back` < count().
@@ -27,6 +30,10 @@ class Predictor {
   void extrapolate(double time, int points, VectorX& out) const;
   /// Takes in the mean acceleration of a step about `time`; `weight` per unknown says how much an error there matters.
   void record(double time, int slot, const VectorX& acceleration, const VectorX& weight, VectorX& scratch);
+
+  /// Derivative of the accelerations in time, of an odd `order` up to three, through order + 2 running means that each
+  /// forget `share` of the past in a step of dt. To be asked for in every step or in none.
+  void differentiate(int order, double share, double dt, const VectorX& acceleration, VectorX& out);
 
   void resize(Eigen::Index size) {
     for (VectorX& a : acceleration_)
@@ -40,6 +47,7 @@ class Predictor {
     for (int& b : best_) io(b);
     for (double& t : time_) io(t);
     for (VectorX& a : acceleration_) io(a);
+    for (VectorX& a : slow_) io(a);
   }
 
  private:
@@ -47,6 +55,7 @@ class Predictor {
   std::array<int, kSlots> best_{1, 1, 1, 1, 1};
   std::array<double, kDepth> time_{};  ///< latest first
   std::array<VectorX, kDepth> acceleration_;
+  std::array<VectorX, 5> slow_;  ///< running means, empty until wanted
 };
 
 }  // namespace withe

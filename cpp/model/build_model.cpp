@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <map>
+#include <set>
 
 #include "common/check.hpp"
 #include "geometry/curvature.hpp"
@@ -166,6 +167,7 @@ class Builder {
         Cluster& cluster = cluster_at(support.pass);
         require(cluster.hinge < 0, "a clamp must hold the fixed side of a revolute joint, not the side that turns");
         frame_of(cluster);
+        if (support.gripped && cluster.passes.size() == 1) gripped_frames_.insert(cluster.frame);
       }
     for (std::size_t h = 0; h < model_.hinges.size(); ++h)
       model_.hinges[h].frame = frame_of(clusters_[static_cast<std::size_t>(hinge_parent_[h])]);
@@ -256,6 +258,7 @@ class Builder {
     };
     model_.bend_voronoi = map(bend_voronoi_);
     model_.half_voronoi = map(half_voronoi_);
+    share_bending();
   }
 
   /// [dissertation 6.2.2]: every pair of edges at the node that is not a rod's own stencil.
@@ -300,6 +303,28 @@ class Builder {
     model_.frame_node = frame_node_;
   }
 
+  /// Strains at nodes are a trapezoidal rule along the rod. At a frame the moment ends with a slope, and the first of
+  /// Gregory's end corrections to that rule (weights 5/12, 13/12, 1, 1, ... edges) makes it third order there: the node
+  /// next to a frame carries a twelfth of an edge for it. Not so where a rod is gripped while it runs, which must leave
+  /// it as it is.
+  void share_bending() {
+    model_.bend_share = MatrixX2::Constant(static_cast<Eigen::Index>(model_.bend.size()), 2, 0.5);
+    model_.half_share = VectorX::Constant(static_cast<Eigen::Index>(model_.half.size()), 0.5);
+    std::vector<std::vector<std::pair<Eigen::Index, int>>> bends(static_cast<std::size_t>(model_.edge_count));
+    for (std::size_t b = 0; b < model_.bend.size(); ++b)
+      for (int k : {0, 1})
+        bends[static_cast<std::size_t>(model_.bend[b].edge[k])].emplace_back(static_cast<Eigen::Index>(b), k);
+    for (Eigen::Index h = 0; h < model_.half_share.size(); ++h) {
+      const FrameStencil& half = model_.half[static_cast<std::size_t>(h)];
+      const auto& next = bends[static_cast<std::size_t>(half.edge)];
+      if (gripped_frames_.contains(half.frame)) continue;
+      if (next.size() != 1) continue;  // nobody to carry it, or an end in a joint of pairs
+      constexpr double kCarried = 1.0 / 12.0;
+      model_.half_share(h) -= kCarried;
+      model_.bend_share(next.front().first, next.front().second) += kCarried;
+    }
+  }
+
   /// Unknowns, strains and offsets of the drawn state.
   void draw() {
     model_.initial_q = VectorX::Zero(model_.dof_count);
@@ -333,9 +358,11 @@ class Builder {
     const MatrixX3 drawn = model_.bend_offset;
     model_.bend_offset.setZero();
     const Parameters natural = initial_parameters(model_);
-    for (Eigen::Index b = 0; b < n; ++b)
-      if (offsets_keep_drawn_[static_cast<std::size_t>(b)])
-        model_.bend_offset.row(b) = drawn.row(b) - natural.bend_natural.row(b);
+    for (Eigen::Index b = 0; b < n; ++b) {
+      if (!offsets_keep_drawn_[static_cast<std::size_t>(b)]) continue;
+      const double factor = bend_factor(natural.measure, drawn.row(b).head<2>().squaredNorm()).value;
+      model_.bend_offset.row(b) = factor * drawn.row(b) - natural.bend_natural.row(b);
+    }
     model_.initial_half_tau = VectorX::Zero(static_cast<Eigen::Index>(model_.half.size()));
   }
 
@@ -343,6 +370,7 @@ class Builder {
   const SceneDescription& scene_;
   std::vector<Cluster> clusters_;
   std::map<Key, int> cluster_of_;
+  std::set<int> gripped_frames_;
   std::vector<int> hinge_parent_, frame_node_;
   std::vector<double> bend_voronoi_, half_voronoi_;
   std::vector<bool> offsets_keep_drawn_;

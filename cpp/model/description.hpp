@@ -77,6 +77,7 @@ struct SupportDescription {
   SupportKind kind = SupportKind::pin;
   RodPass pass;
   Matrix3 free = Matrix3::Zero();  ///< projector onto the directions along which the node may slide
+  bool gripped = false;            ///< put on while the scene runs, so that it must not change what is stored
 };
 
 enum class LoadKind {
@@ -138,10 +139,14 @@ struct ContactDescription {
   bool any() const { return rods || !obstacles.empty(); }
 };
 
+/// What bending strain is: the angle between two edges (nearly; see geometry/bend_measure.hpp), or 2 tan of its half.
+enum class Bending { angle, tangent };
+
 struct SceneDescription {
   MatrixX3 positions;  ///< every node once [m]
   VectorX added_mass;  ///< per node [kg]
   Vector3 gravity = Vector3(0.0, 0.0, -9.81);
+  Bending bending = Bending::angle;
   std::vector<RodDescription> rods;
   std::vector<JointDescription> joints;
   std::vector<SupportDescription> supports;

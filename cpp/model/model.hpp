@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "common/types.hpp"
+#include "geometry/bend_measure.hpp"
 #include "geometry/frames.hpp"
 #include "model/description.hpp"
 
@@ -80,14 +81,15 @@ struct Parameters {
   Vector3 gravity;
   std::vector<MatrixX2> natural_curvature;  ///< per rod and stencil, smooth [1/m]
   std::vector<VectorX> natural_twist;       ///< per rod and stencil [rad/m]
-  bool lumped = false;                      ///< whether masses sit at nodes alone; see mass_matrix.hpp
+  BendMeasure measure;
+  bool lumped = false;  ///< whether masses sit at nodes alone; see mass_matrix.hpp
 
   // Derived from the above by `update_derived`.
   VectorX node_mass, node_drag;                  ///< of the half edges around a node, and added ones [kg], [N s/m]
   VectorX edge_inertia;                          ///< of theta [kg m^2]
   VectorX frame_inertia, hinge_inertia;          ///< [kg m^2]
   MatrixX3 bend_stiffness, half_stiffness;       ///< per stencil: EI1 / V, EI2 / V, GJ / V [N m]
-  MatrixX3 bend_natural, half_natural;           ///< per stencil: discrete kappa1, kappa2, turn of twist
+  MatrixX3 bend_natural, half_natural;           ///< per stencil: f (kappa1, kappa2, tau)
   VectorX bend_viscous_time, half_viscous_time;  ///< [s]
   bool viscous = false, dragged = false;
   long version = 0;  ///< another number whenever anything above has changed; never used twice
@@ -108,6 +110,8 @@ struct Model {
   std::vector<int> reversed_bend;  ///< stencils with an edge against its rod
   std::vector<FrameStencil> half;
   VectorX bend_voronoi, half_voronoi;  ///< [m]
+  MatrixX2 bend_share;                 ///< per stencil: the part of each of its edges whose bending it carries; 1/2,
+  VectorX half_share;                  ///< but 5/12 at a frame and 7/12 at the edge's other end; see build_model.cpp
   std::vector<Hinge> hinges;
   std::vector<std::vector<StencilPlace>> place;  ///< [rod][stencil]
   std::vector<Vector2> planar_components;        ///< per rod: kappa = p . (kappa1, kappa2)
@@ -150,7 +154,7 @@ void update_natural(const Model& model, Parameters& parameters);
 /// of its first director.
 std::optional<Plane> find_plane(const SceneDescription& description, std::optional<bool> asked, std::string& reason);
 
-/// Discrete strain 2 tan(|kappa| V / 2) along kappa. Needs |kappa| V < pi.
+/// Discrete curvature 2 tan(|kappa| V / 2) along kappa. Needs |kappa| V < pi.
 Vector2 discrete_curvature(const Vector2& smooth, double voronoi);
 /// Its inverse.
 Vector2 smooth_curvature(const Vector2& discrete, double voronoi);

@@ -52,6 +52,7 @@ Parameters initial_parameters(const Model& model) {
   }
   p.added_mass = scene.added_mass;
   p.gravity = scene.gravity;
+  if (scene.bending == Bending::tangent) p.measure = {0.0, 0.0};
   update_derived(model, p);
   return p;
 }
@@ -65,8 +66,10 @@ void update_natural(const Model& model, Parameters& p) {
     if (rod < 0 || stencil < 0) return out;
     const auto r = static_cast<std::size_t>(rod);
     const Vector2 k = p.natural_curvature[r].row(stencil);
-    const Vector2 d = discrete_curvature(k, voronoi);
-    out << d, p.natural_twist[r](stencil) * voronoi;
+    const Vector2 kappa = discrete_curvature(k, voronoi);
+    const double factor = bend_factor(p.measure, kappa.squaredNorm()).value;
+    const Vector2 d = factor * kappa;
+    out << d, factor * p.natural_twist[r](stencil) * voronoi;
     if (planar) out = Vector3(model.planar_components[r].dot(d), 0.0, 0.0);
     return out;
   };
@@ -119,9 +122,9 @@ void update_derived(const Model& model, Parameters& p) {
     const Vector2 b = p.edge_bend.row(e);
     return Vector2(c(0) * c(0) * b(0) + c(1) * c(1) * b(1), 0.0);
   };
-  // Two half edges in series: V / K = (l0 / 2) / K0 + (l1 / 2) / K1.
-  const auto series = [](double k0, double l0, double k1, double l1) {
-    return k0 == 0.0 && k1 == 0.0 ? 0.0 : 1.0 / (0.5 * l0 / k0 + 0.5 * l1 / k1);
+  // Two parts of edges in series: V / K = V0 / K0 + V1 / K1.
+  const auto series = [](double k0, double v0, double k1, double v1) {
+    return k0 == 0.0 && k1 == 0.0 ? 0.0 : 1.0 / (v0 / k0 + v1 / k1);
   };
   const auto n = static_cast<Eigen::Index>(model.bend.size());
   p.bend_stiffness.resize(n, 3);
@@ -131,8 +134,9 @@ void update_derived(const Model& model, Parameters& p) {
     const int a = s.edge[0], b = s.edge[1];
     const double la = model.edge_length(a), lb = model.edge_length(b);
     const Vector2 ba = bend_of(a), bb = bend_of(b);
-    p.bend_stiffness.row(i) << series(ba(0), la, bb(0), lb), series(ba(1), la, bb(1), lb),
-        series(p.edge_twist(a), la, p.edge_twist(b), lb);
+    const double va = model.bend_share(i, 0) * la, vb = model.bend_share(i, 1) * lb;
+    p.bend_stiffness.row(i) << series(ba(0), va, bb(0), vb), series(ba(1), va, bb(1), vb),
+        series(p.edge_twist(a), 0.5 * la, p.edge_twist(b), 0.5 * lb);
     p.bend_viscous_time(i) = (la * p.edge_viscous_time(a) + lb * p.edge_viscous_time(b)) / (la + lb);
   }
   const auto m = static_cast<Eigen::Index>(model.half.size());
@@ -143,8 +147,8 @@ void update_derived(const Model& model, Parameters& p) {
   for (Eigen::Index i = 0; i < m; ++i) {
     const FrameStencil& s = model.half[static_cast<std::size_t>(i)];
     const Vector2 b = bend_of(s.edge);
-    p.half_stiffness.row(i) << b(0), b(1), p.edge_twist(s.edge);
-    p.half_stiffness.row(i) /= model.half_voronoi(i);
+    const double bending = 1.0 / (model.half_share(i) * model.edge_length(s.edge));
+    p.half_stiffness.row(i) << b(0) * bending, b(1) * bending, p.edge_twist(s.edge) / model.half_voronoi(i);
     p.half_viscous_time(i) = p.edge_viscous_time(s.edge);
     // A frame carries the rotary inertia of the half edges attached to it.
     (s.hinge < 0 ? p.frame_inertia(s.frame) : p.hinge_inertia(s.hinge)) += 0.5 * p.edge_inertia(s.edge);

@@ -42,22 +42,30 @@ MatrixX2 World::curvatures(int rod) const {
   compute_configuration(self.model, self.state, self.state.q, c);
   const auto& places = self.model.place.at(at(rod));
   MatrixX2 out = MatrixX2::Zero(static_cast<Eigen::Index>(places.size()), 2);
-  const auto smooth = [&](const MatrixX3& strain, int i, double voronoi) {
+  // What bends beyond the natural curvature is spread over as much of the rod as the stencil carries.
+  const MatrixX2& natural = self.parameters.natural_curvature[at(rod)];
+  const auto smooth = [&](const MatrixX3& strain, int i, double voronoi, double carried, Eigen::Index row) -> Vector2 {
     Vector2 d = strain.row(i).head<2>();
     if (self.model.planar()) d = strain(i, 0) * self.model.planar_components[at(rod)];
-    return smooth_curvature(d, voronoi);
+    const Vector2 rest = natural.row(row);
+    return rest + (voronoi / carried) * (smooth_curvature(d, voronoi) - rest);
   };
   for (std::size_t s = 0; s < places.size(); ++s) {
     const auto row = static_cast<Eigen::Index>(s);
     if (places[s].bend >= 0) {
-      out.row(row) = smooth(c.bend_strain, places[s].bend, self.model.bend_voronoi(places[s].bend));
+      const int b = places[s].bend;
+      const auto& edge = self.model.bend[at(b)].edge;
+      const double carried = self.model.bend_share(b, 0) * self.model.edge_length(edge[0]) +
+                             self.model.bend_share(b, 1) * self.model.edge_length(edge[1]);
+      out.row(row) = smooth(c.bend_strain, b, self.model.bend_voronoi(b), carried, row);
       continue;
     }
     double length = 0.0;
     for (int h : places[s].half)
       if (h >= 0) {
         const double v = self.model.half_voronoi(h);
-        out.row(row) += v * smooth(c.half_strain, h, v);
+        const double carried = self.model.half_share(h) * self.model.edge_length(self.model.half[at(h)].edge);
+        out.row(row) += v * smooth(c.half_strain, h, v, carried, row);
         length += v;
       }
     if (length > 0.0) out.row(row) /= length;

@@ -6,7 +6,7 @@
 namespace withe {
 namespace {
 
-constexpr std::uint64_t kMagic = 0x3253454854495755ull;
+constexpr std::uint64_t kMagic = 0x3353454854495755ull;
 
 /// FNV-1a.
 std::uint64_t hash_of(std::string_view bytes) {
@@ -19,6 +19,7 @@ std::uint64_t hash_of(std::string_view bytes) {
 std::uint64_t fingerprint(const SceneDescription& scene) {
   Writer w;
   w(scene.positions);
+  w(static_cast<int>(scene.bending));
   for (const RodDescription& rod : scene.rods) {
     w(static_cast<std::int64_t>(rod.nodes.size()));
     for (int node : rod.nodes) w(node);
@@ -143,6 +144,7 @@ std::string World::snapshot() const {
     w(d.pass.rod);
     w(d.pass.node);
     w(d.free);
+    w(d.gripped);
   }
   exchange(w, self);
   w(hash_of(w.bytes));
@@ -185,6 +187,7 @@ void World::restore(const std::string& bytes) {
                 d.pass.node < static_cast<int>(rods[static_cast<std::size_t>(d.pass.rod)].nodes.size()),
             "snapshot is damaged: support of a node that is not there");
     r(d.free);
+    r(d.gripped);
     supports.push_back(d);
     active.push_back(on);
   }
@@ -192,7 +195,7 @@ void World::restore(const std::string& bytes) {
     for (std::size_t s = 0; s < supports.size(); ++s) {
       const SupportDescription &a = supports[s], &b = fresh->description.supports[s];
       if (active[s] != fresh->model.supports[s].active || a.kind != b.kind || a.pass.rod != b.pass.rod ||
-          a.pass.node != b.pass.node || a.free != b.free)
+          a.pass.node != b.pass.node || a.free != b.free || a.gripped != b.gripped)
         return false;
     }
     return true;

@@ -91,7 +91,14 @@ bool World::Implementation::grow(Attempt attempt, double dt) {
 
 /// Power of a step's length that its error goes with.
 double World::Implementation::local_order() const {
-  return options.integrator == Integrator::backward_euler ? 2.0 : 3.0;
+  switch (options.integrator) {
+    case Integrator::backward_euler:
+      return 2.0;
+    case Integrator::fourth_order:
+      return 5.0;
+    default:
+      return 3.0;
+  }
 }
 
 /// Whether a step of dt `times` longer would be accurate enough, the tolerance too growing with it.

@@ -16,6 +16,7 @@ int World::add_support(const SupportDescription& support) {
   Implementation& self = *implementation_;
   const Implementation backup(self);
   self.description.supports.push_back(support);
+  self.description.supports.back().gripped = true;
   Support placeholder;
   placeholder.active = true;
   self.model.supports.push_back(placeholder);

@@ -16,6 +16,7 @@ constexpr Words<SupportKind, 5> kSupportKinds{{{"pin", SupportKind::pin},
 constexpr Words<LoadKind, 3> kLoadKinds{
     {{"force", LoadKind::force}, {"moment", LoadKind::moment}, {"distributed", LoadKind::distributed}}};
 
+constexpr Words<Bending, 2> kBendings{{{"angle", Bending::angle}, {"tangent", Bending::tangent}}};
 constexpr Words<ContactLaw, 2> kContactLaws{{{"imcv2", ContactLaw::imcv2}, {"barrier", ContactLaw::barrier}}};
 constexpr Words<FrictionLaw, 3> kFrictionLaws{
     {{"implicit", FrictionLaw::implicit}, {"lagged", FrictionLaw::lagged}, {"anchored", FrictionLaw::anchored}}};
@@ -113,8 +114,9 @@ void register_model(py::module_& module) {
   register_joints_and_supports(module);
   register_loads(module);
   register_contact(module);
-  py::class_<SceneDescription>(module, "SceneDescription", "What the scene layer hands to the engine.")
-      .def(py::init<>())
+  py::class_<SceneDescription> scene(module, "SceneDescription", "What the scene layer hands to the engine.");
+  def_word(scene, "bending", &SceneDescription::bending, kBendings);
+  scene.def(py::init<>())
       .def_readwrite("positions", &SceneDescription::positions)
       .def_readwrite("added_mass", &SceneDescription::added_mass)
       .def_readwrite("gravity", &SceneDescription::gravity)

@@ -12,6 +12,7 @@ from withe import _core
 from withe.contacts import describe_contact
 from withe.directory import Directory
 from withe.joints import JointGroup, connected, gather
+from withe.options import Bending
 from withe.parameters import RodParameters
 from withe.parts import (
     CustomForcePart,
@@ -30,7 +31,7 @@ __all__ = ["added_mass", "describe", "describe_support", "drag", "parameters_of"
 FloatArray = npt.NDArray[np.float64]
 
 
-def describe(directory: Directory, gravity: FloatArray) -> _core.SceneDescription:
+def describe(directory: Directory, gravity: FloatArray, bending: Bending = "angle") -> _core.SceneDescription:
     """The whole scene.
 
     Raises
@@ -47,6 +48,7 @@ def describe(directory: Directory, gravity: FloatArray) -> _core.SceneDescriptio
         positions[directory.layout.rows(rod.index)] = rod.points
     scene.positions = positions
     scene.gravity = gravity
+    scene.bending = bending
     scene.added_mass = added_mass(directory, {mass.name: mass.mass for mass in directory.all(MassPart)})
     coefficients = {part.name: part.coefficient for part in directory.all(DragPart)}
     scene.rods = [_describe_rod(directory, rod, drag(directory, coefficients, rod)) for rod in rods]

@@ -6,11 +6,12 @@ from typing import Any, Literal
 
 from withe import _core, validation
 
-__all__ = ["Integrator", "LineSearch", "Solver", "engine_options", "make_options"]
+__all__ = ["Bending", "Integrator", "LineSearch", "Solver", "engine_options", "make_options"]
 
 Integrator = Literal["implicit_midpoint", "backward_euler", "energy_momentum", "fourth_order", "verlet", "static"]
 LineSearch = Literal["automatic", "goldstein_price", "none"]
 Solver = Literal["automatic", "band", "sparse"]
+Bending = Literal["angle", "tangent"]
 
 
 def make_options(**options: Any) -> dict[str, Any]:
@@ -26,6 +27,7 @@ def make_options(**options: Any) -> dict[str, Any]:
         "integrator": ("implicit_midpoint", "backward_euler", "energy_momentum", "fourth_order", "verlet", "static"),
         "solver": ("automatic", "band", "sparse"),
         "line_search": ("automatic", "goldstein_price", "none"),
+        "bending": ("angle", "tangent"),
     }
     for name, known in words.items():
         validation.choice(options[name], name, known)
@@ -47,8 +49,9 @@ def make_options(**options: Any) -> dict[str, Any]:
 
 
 def engine_options(options: dict[str, Any]) -> _core.Options:
-    """Checked options as the engine takes them."""
+    """Checked options as the engine takes them; what bending is belongs to the description of the scene."""
     result = _core.Options()
     for name, value in options.items():
-        setattr(result, name, value)
+        if name != "bending":
+            setattr(result, name, value)
     return result

@@ -20,7 +20,7 @@ from withe.rods import Natural, make_rod
 from withe.supports import check_not_held, make_clamp, make_pin
 
 if TYPE_CHECKING:
-    from withe.options import Integrator, LineSearch, Solver
+    from withe.options import Bending, Integrator, LineSearch, Solver
     from withe.simulation import Simulation
 
 __all__ = ["Scene"]
@@ -302,6 +302,7 @@ class Scene(Loads, Contacts):
         tolerance: float | None = None,
         planar: bool | None = None,
         duration: float | None = None,
+        bending: Bending = "angle",
         solver: Solver = "automatic",
         line_search: LineSearch = "automatic",
         mixed: bool = True,
@@ -327,6 +328,9 @@ class Scene(Loads, Contacts):
             straight scene without gravity lies in many, and ``True`` takes that of its first director.
         duration : float [s]
             Over which `tolerance` holds; 1 s by default.
+        bending : {"angle", "tangent"}
+            What bending strain is: the angle phi between two edges, to sixth order, or 2 tan(phi / 2) as in
+            [Bergou et al. 2008], which bends too stiffly on coarse meshes.
         solver : {"automatic", "band", "sparse"}
         line_search : {"automatic", "goldstein_price", "none"}
         mixed : bool
@@ -360,6 +364,7 @@ class Scene(Loads, Contacts):
             tolerance=tolerance,
             planar=planar,
             duration=duration,
+            bending=bending,
             solver=solver,
             line_search=line_search,
             mixed=mixed,

@@ -65,7 +65,7 @@ class Simulation(Control):
         self._directory = directory.copy()
         self._loads = directory.all(LoadPart)
         self._custom_forces = directory.all(CustomForcePart)
-        description = describe(directory, gravity)
+        description = describe(directory, gravity, options["bending"])
         supports = {part.name: (index, part) for index, part in enumerate(directory.all(SupportPart))}
         self._settings = Settings(
             rods=parameters_of(directory),

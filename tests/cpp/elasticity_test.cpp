@@ -239,15 +239,27 @@ TEST(StretchEnergy, IsHalfOfStiffnessTimesStrainSquaredTimesLength) {
 }
 
 TEST(PlanarBend, DerivativesInTheTurnAreExact) {
-  for (double phi : {0.0, 0.4, -1.1, 150.0 * testing::kPi / 180.0, 170.0 * testing::kPi / 180.0}) {
-    const auto bend = [](double angle) { return planar_bend(2.0 * std::tan(0.5 * angle), 0.3, 2.0); };
-    const PlanarBend b = bend(phi);
-    const auto energy = [&](const VectorX& x) { return bend(x(0)).energy; };
-    const auto slope = [&](const VectorX& x) { return VectorX::Constant(1, bend(x(0)).slope); };
-    const VectorX x = VectorX::Constant(1, phi);
-    EXPECT_TRUE(gradient_matches(energy, x, VectorX::Constant(1, b.slope))) << phi;
-    EXPECT_TRUE(derivative_matches(slope, x, MatrixX::Constant(1, 1, b.curvature))) << phi;
-  }
+  for (const BendMeasure& measure : {BendMeasure{}, BendMeasure{0.0, 0.0}})
+    for (double phi : {0.0, 0.4, -1.1, 150.0 * testing::kPi / 180.0, 170.0 * testing::kPi / 180.0}) {
+      const auto bend = [&](double angle) { return planar_bend(measure, 2.0 * std::tan(0.5 * angle), 0.3, 2.0); };
+      const PlanarBend b = bend(phi);
+      const auto energy = [&](const VectorX& x) { return bend(x(0)).energy; };
+      const auto slope = [&](const VectorX& x) { return VectorX::Constant(1, bend(x(0)).slope); };
+      const VectorX x = VectorX::Constant(1, phi);
+      EXPECT_TRUE(gradient_matches(energy, x, VectorX::Constant(1, b.slope))) << phi;
+      EXPECT_TRUE(derivative_matches(slope, x, MatrixX::Constant(1, 1, b.curvature))) << phi;
+    }
+}
+
+TEST(BendMeasure, IsTheAngleToSixthOrderAndGrowsWithoutEnd) {
+  const auto strain = [](double phi) {
+    const double kappa = 2.0 * std::tan(0.5 * phi);
+    return bend_factor(BendMeasure{}, kappa * kappa).value * kappa;
+  };
+  // beta - phi = phi^7 (1/448 - 3/1600) + ...
+  for (double phi : {0.1, 0.2, 0.4})
+    EXPECT_NEAR((strain(phi) - phi) / std::pow(phi, 7), 1.0 / 448.0 - 3.0 / 1600.0, 1e-3 * phi * phi) << phi;
+  EXPECT_GT(strain(testing::kPi - 1e-3), 100.0);
 }
 
 TEST(Elements, APlanarSceneHasTheEnergyAndForcesOfTheSameSceneInSpace) {

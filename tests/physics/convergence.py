@@ -19,6 +19,12 @@ def assert_order(errors: Sequence[float], order: float = 2.0, slack: float = 0.1
     assert np.all(np.abs(orders - order) <= slack), f"errors {list(errors)} fall at orders {orders}, not {order}"
 
 
+def assert_order_at_least(errors: Sequence[float], order: float, slack: float = 0.15, ratio: float = 2.0) -> None:
+    """The errors fall at the order given or faster, less the slack, in every refinement."""
+    orders = observed_orders(errors, ratio)
+    assert np.all(orders >= order - slack), f"errors {list(errors)} fall at orders {orders}, less than {order}"
+
+
 def zero_crossing(loads: Sequence[float], responses: Sequence[float]) -> float:
     """Load at which the stiffness against a small disturbance, 1 / response, would vanish.
 

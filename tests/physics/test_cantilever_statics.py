@@ -8,7 +8,7 @@ import pytest
 
 import rods
 import theory
-from convergence import assert_order
+from convergence import assert_order, assert_order_at_least
 
 EDGES = (40, 80, 160)
 SPACES = pytest.mark.parametrize("planar", [None, False], ids=["planar", "spatial"])
@@ -58,15 +58,15 @@ def test_tip_loaded_cantilever_converges_at_second_order(load, planar):
 
 @SPACES
 @pytest.mark.parametrize("weight", [1.0, 10.0])
-def test_tip_of_a_self_weight_cantilever_converges_at_second_order(weight, planar):
+def test_tip_of_a_self_weight_cantilever_converges_at_second_order_or_better(weight, planar):
     exact = theory.self_weight(weight)
     errors = []
     for edges in EDGES:
         simulation, arm = rods.heavy_cantilever(weight, edges, planar=planar)
         assert simulation.equilibrium().stable
         errors.append(np.subtract(tip(simulation, arm), (exact.down, exact.inward, exact.tip_angle)))
-    assert_order(np.linalg.norm(errors, axis=1))
-    assert np.all(np.abs(errors[-1]) < 3e-5)
+    assert_order_at_least(np.linalg.norm(errors, axis=1), order=2.0)
+    assert np.all(np.abs(errors[-1]) < {1.0: 3e-7, 10.0: 1e-5}[weight])
 
 
 def test_small_self_weight_sinks_by_an_eighth_of_it():
@@ -75,8 +75,8 @@ def test_small_self_weight_sinks_by_an_eighth_of_it():
         simulation, arm = rods.heavy_cantilever(1e-4, edges)
         simulation.equilibrium()
         errors.append(tip(simulation, arm)[0] / (1e-4 / 8.0) - 1.0)
-    assert_order(errors)
-    assert abs(errors[-1]) < 1e-4
+    assert_order(errors, order=3.0)
+    assert abs(errors[-1]) < 1e-6
 
 
 def test_support_of_a_cantilever_carries_its_load_exactly():
