@@ -265,6 +265,7 @@ class SceneDescription:
     What the scene layer hands to the engine.
     """
 
+    bending: str
     contact: ContactDescription
     has_custom_force: bool
     def __init__(self) -> None: ...

@@ -26,7 +26,11 @@ def waving_tip(integrator, step, tolerance=None):
 
 @pytest.mark.parametrize(
     ("integrator", "tolerances"),
-    [("implicit_midpoint", 10.0 ** np.arange(-6.0, -1.9, 0.5)), ("energy_momentum", (1e-5, 1e-4, 1e-3)), ("backward_euler", (1e-3, 1e-2))],
+    [
+        ("implicit_midpoint", 10.0 ** np.arange(-6.0, -1.9, 0.5)),
+        ("energy_momentum", (1e-5, 1e-4, 1e-3)),
+        ("backward_euler", (1e-3, 1e-2)),
+    ],
 )
 def test_error_is_within_the_tolerance_and_proportional_to_it(integrator, tolerances):
     reference = waving_tip("fourth_order", 1e-3)

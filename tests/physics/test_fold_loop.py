@@ -10,7 +10,7 @@ import pytest
 
 import rods
 import theory
-from convergence import assert_order
+from convergence import assert_order_at_least
 
 LOOP = theory.fold_loop()
 
@@ -53,7 +53,7 @@ def peak(values):
     return top - slope**2 / (4.0 * square)
 
 
-def test_free_fold_loop_converges_at_second_order():
+def test_free_fold_loop_converges_at_second_order_or_better():
     """Errors of height, greatest curvature and lift-off force; horizontal force and moments at the ends, all zero."""
     errors = []
     for edges in (50, 100, 200):
@@ -66,5 +66,5 @@ def test_free_fold_loop_converges_at_second_order():
         sizes = (height / LOOP.height, curvature / LOOP.greatest_curvature, lift / LOOP.lift)
         errors.append([*np.subtract(sizes, 1.0), pull, *moments])
     for error in np.transpose(errors):
-        assert_order(error)
+        assert_order_at_least(error, order=2.0)
     assert np.all(np.abs(errors[-1]) < (5e-4, 1e-3, 3e-4, 6e-4, 2e-3, 1e-3)), errors[-1]
