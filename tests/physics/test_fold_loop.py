@@ -56,7 +56,7 @@ def peak(values):
 def test_free_fold_loop_converges_at_second_order_or_better():
     """Errors of height, greatest curvature and lift-off force; horizontal force and moments at the ends, all zero."""
     errors = []
-    for edges in (50, 100, 200):
+    for edges in (100, 200, 400):
         simulation, strip, weight = held_loop(edges)
         height = peak(simulation.positions(strip)[:, 2]) * LOOP.length
         curvature = peak(np.linalg.norm(simulation.curvatures(strip), axis=1)) / LOOP.length
@@ -67,4 +67,4 @@ def test_free_fold_loop_converges_at_second_order_or_better():
         errors.append([*np.subtract(sizes, 1.0), pull, *moments])
     for error in np.transpose(errors):
         assert_order_at_least(error, order=2.0)
-    assert np.all(np.abs(errors[-1]) < (5e-4, 1e-3, 3e-4, 6e-4, 2e-3, 1e-3)), errors[-1]
+    assert np.all(np.abs(errors[-2]) < (5e-4, 1e-3, 3e-4, 6e-4, 2e-3, 1e-3)), errors[-2]
