@@ -182,6 +182,13 @@ double estimated_error(Equations& equations, const Newton& newton, const Options
   return moved_by(error, equations, newton, h, work);
 }
 
+/// Forces of the last evaluation over mass, where nothing holds.
+void set_acceleration(const Equations& equations, const StepWorkspace& work, VectorX& acceleration) {
+  acceleration = -work.newton.evaluation.full_residual;
+  equations.assembler().project(acceleration);
+  acceleration = acceleration.cwiseQuotient(equations.mass().rows.cwiseMax(1e-300));
+}
+
 /// Forces over mass at q, with velocity v in drag, viscosity and the spin couple.
 void explicit_acceleration(Equations& equations, const Parameters& parameters, double dt, const State& state,
                            const VectorX& v, StepWorkspace& work, VectorX& acceleration) {
@@ -190,9 +197,7 @@ void explicit_acceleration(Equations& equations, const Parameters& parameters, d
   work.from.v = v;
   equations.begin(work.from, parameters, dt, false);
   equations.evaluate(state.q, false, nullptr, work.newton.evaluation);
-  acceleration = -work.newton.evaluation.full_residual;
-  equations.assembler().project(acceleration);
-  acceleration = acceleration.cwiseQuotient(equations.mass().rows.cwiseMax(1e-300));
+  set_acceleration(equations, work, acceleration);
 }
 
 }  // namespace
@@ -277,11 +282,18 @@ StepResult verlet_step(Equations& equations, const Parameters& parameters, doubl
   // in at first order, with nothing to cancel it.
   State& next = work.next;
   next = state;
-  if (!model.planar()) compute_configuration(model, state, q1, work.after);
-  accept_configuration(model, q1, work.after, next);
   // Drag, viscosity and the spin couple want the velocity at the end; a predicted one is second order.
   work.velocity = half + 0.5 * dt * state.acceleration;
-  explicit_acceleration(equations, parameters, dt, next, work.velocity, work, next.acceleration);
+  if (equations.contact() || parameters.viscous || parameters.dragged) {
+    if (!model.planar()) compute_configuration(model, state, q1, work.after);
+    accept_configuration(model, q1, work.after, next);
+    explicit_acceleration(equations, parameters, dt, next, work.velocity, work, next.acceleration);
+  } else {
+    equations.configure(state, q1);
+    accept_configuration(model, q1, equations.configuration(), next);
+    equations.evaluate_forces(next, parameters, work.velocity, work.newton.evaluation);
+    set_acceleration(equations, work, next.acceleration);
+  }
   next.acceleration_current = true;
   next.v = half + 0.5 * dt * next.acceleration;
   if (!next.v.allFinite()) return result;

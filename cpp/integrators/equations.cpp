@@ -313,27 +313,60 @@ void Equations::predict_axial_force(const VectorX& step, VectorX& out) const {
 }
 
 /// An edge that spins at omega and turns also needs the couple I omega t x dt/dt: nodal forces
-/// +- I omega (dt/dt x t) / l, which do no work. Its Jacobian is left out: it is a small part of the mass term.
+/// +- I omega (dt/dt x t) / l, which do no work; this one acts at its head.
+Vec3d Equations::spin_couple(int edge, double omega, const Vec3d& rate) const {
+  const EdgeFrame<double>& f = middle_.edge[at(edge)];
+  return (parameters_->edge_inertia[edge] * omega * f.inverse_length * f.inverse_length) * cross(rate, f.tangent);
+}
+
+void Equations::add_couple(int edge, const Vec3d& force) {
+  double *tail = &gradient_[model_.tail_dof[at(edge)]], *head = &gradient_[model_.head_dof[at(edge)]];
+  const double component[3] = {force.x, force.y, force.z};
+  for (int i = 0; i < 3; ++i) {
+    head[i] += component[i];
+    tail[i] -= component[i];
+  }
+}
+
+/// Its Jacobian is left out: it is a small part of the mass term.
 void Equations::add_spin_couple(const VectorX& z) {
   const double inverse = 1.0 / h_;
   const double *q0 = state_->q.data(), *v0 = state_->v.data();
   for (int e = 0; e < model_.edge_count; ++e) {
     const int a = model_.tail_dof[at(e)], b = model_.head_dof[at(e)], angle = model_.edge_dof[at(e)];
-    const double omega = (z[angle] - q0[angle]) * inverse, inertia = parameters_->edge_inertia[e];
-    const EdgeFrame<double>& f = middle_.edge[at(e)];
+    const double omega = (z[angle] - q0[angle]) * inverse;
     const Vec3d change{z[b] - z[a] - q0[b] + q0[a], z[b + 1] - z[a + 1] - q0[b + 1] + q0[a + 1],
                        z[b + 2] - z[a + 2] - q0[b + 2] + q0[a + 2]};
-    const double couple = inertia * omega * f.inverse_length * f.inverse_length * inverse;
     // psi = theta + spin . e is what turns: the edge's inertia acts on the nodes as its elastic torque does. It does no
     // work either, since spin is normal to the edge before and now.
-    const double torque = inertia * (omega - v0[angle]) * inverse;
-    const Vec3d total = couple * cross(change, f.tangent) + torque * f.spin;
-    const double component[3] = {total.x, total.y, total.z};
-    for (int i = 0; i < 3; ++i) {
-      gradient_[b + i] += component[i];
-      gradient_[a + i] -= component[i];
-    }
+    const double torque = parameters_->edge_inertia[e] * (omega - v0[angle]) * inverse;
+    add_couple(e, spin_couple(e, omega, inverse * change) + torque * middle_.edge[at(e)].spin);
   }
+}
+
+void Equations::configure(const State& state, const VectorX& q) { compute_configuration(model_, state, q, middle_); }
+
+void Equations::evaluate_forces(const State& state, const Parameters& parameters, const VectorX& v, Evaluation& out) {
+  set_parameters(parameters);
+  state_ = &state;
+  h_ = 0.0;
+  energy_momentum_ = floor_current_ = false;
+  acting_ = &elastic;
+  out.potential = 0.0;
+  const int n = model_.dof_count;
+  gradient_.setZero(n + kPadding);
+  magnitude_.setZero(n + kPadding);
+  last_z_ = state.q;
+  const Vec3d none{0.0, 0.0, 0.0};
+  for (EdgeFrame<double>& f : middle_.edge) f.spin = f.bow = none;  // measured from where the edges are now
+  add_elastic(elastic, last_z_, false, nullptr, out);
+  add_loads(last_z_, false, out);
+  if (!model_.planar())
+    for (int e = 0; e < model_.edge_count; ++e) {
+      const int a = model_.tail_dof[at(e)], b = model_.head_dof[at(e)];
+      add_couple(e, spin_couple(e, v[model_.edge_dof[at(e)]], {v[b] - v[a], v[b + 1] - v[a + 1], v[b + 2] - v[a + 2]}));
+    }
+  out.full_residual = gradient_.head(n) - gravity_ - custom_force;
 }
 
 /// Rounding of a strain is about eps |x| / l; its stiffness turns it into a force that no iteration removes.

@@ -60,6 +60,11 @@ class Equations {
 
   /// Residual at z, and the matrix when asked for. `axial_force`: see stretch_hessian.
   void evaluate(const VectorX& z, bool with_matrix, const double* axial_force, Evaluation& out);
+  /// The configuration at q, measured from `state`, as that of an evaluation.
+  void configure(const State& state, const VectorX& q);
+  /// Forces without inertia, for an explicit step: `full_residual` of a state whose frames have been moved to the
+  /// configuration that `configure` found, with velocities v. No contact, viscosity or drag.
+  void evaluate_forces(const State& state, const Parameters& parameters, const VectorX& v, Evaluation& out);
   /// Configuration of the last evaluation.
   const Configuration& configuration() const { return middle_; }
   /// q1 = 2 z - q0 of an energy-momentum step.
@@ -104,6 +109,8 @@ class Equations {
   void add_planar_invariants(int stencil, Local& local, const Local& end, double start_energy, double stiffness);
   void add_correction_floor(const int* dofs, const double* u, int count, double s, double energy, double stiffness);
   void add_spin_couple(const VectorX& z);
+  Vec3d spin_couple(int edge, double omega, const Vec3d& rate) const;
+  void add_couple(int edge, const Vec3d& force);
   void set_floor(const VectorX& z, VectorX& floor);
   void gather_difference(const ElementTable& table, int element, double* difference) const;
 

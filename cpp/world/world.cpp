@@ -70,6 +70,7 @@ void World::step(int count) {
     self.state.time = end;
     ++self.grid_steps;
   }
+  if (self.options.integrator == Integrator::verlet && count > 0) self.check_explicit();
 }
 
 void World::advance_to(double time) {
@@ -92,6 +93,7 @@ void World::advance_to(double time) {
     }
     self.state.time = next;
   }
+  if (self.options.integrator == Integrator::verlet) self.check_explicit();
 }
 
 EquilibriumResult World::equilibrium() {

@@ -453,12 +453,6 @@ TEST(Interrupt, InAnyIterationLeavesTheLastAcceptedState) {
   }
 }
 
-TEST(Verlet, RefusesAStepAboveTheStableOne) {
-  EXPECT_THROW(World(testing::hanging_arm().scene, options(Integrator::verlet, 0.1)), std::invalid_argument);
-  World fine(testing::hanging_arm().scene, options(Integrator::verlet, 5e-5));
-  EXPECT_GT(fine.plan().stable_step, 5e-5);
-}
-
 TEST(Equilibrium, OfAFreeRodUnderGravityIsAFailure) {
   SceneBuilder builder;
   builder.add_rod(testing::helix(8));

@@ -1,0 +1,42 @@
+// Explicit steps.
+
+#include <gtest/gtest.h>
+
+#include "worlds.hpp"
+
+namespace withe {
+namespace {
+
+using testing::options;
+using testing::SceneBuilder;
+
+TEST(Verlet, RefusesAStepAboveTheStableOne) {
+  EXPECT_THROW(World(testing::hanging_arm().scene, options(Integrator::verlet, 0.1)), std::invalid_argument);
+  World fine(testing::hanging_arm().scene, options(Integrator::verlet, 5e-5));
+  EXPECT_GT(fine.plan().stable_step, 5e-5);
+}
+
+/// What no explicit step needs is skipped where nothing drags; a drag too small to count asks for all of it.
+TEST(Verlet, WithoutDragTakesTheSameStepsAsTheGeneralPath) {
+  SceneBuilder joint = testing::tee(JointForm::frame, false, testing::rubber());
+  joint.scene.gravity = Vector3(0, 0, -1.0);
+  joint.support(SupportKind::clamp, {0, 0});
+  SceneBuilder loaded = testing::hanging_arm();
+  loaded.load(LoadKind::force, {0, 11}, Vector3(0.01, 0.02, 0), true);
+  for (const SceneDescription& scene :
+       {testing::cantilever().scene, testing::hanging_arm().scene, joint.scene, loaded.scene}) {
+    SceneDescription dragged = scene;
+    for (RodDescription& rod : dragged.rods) rod.drag.setConstant(1e-290);
+    World lean(scene, options(Integrator::verlet, 2e-5)), general(dragged, options(Integrator::verlet, 2e-5));
+    const MatrixX3 start = lean.positions();
+    lean.step(400);
+    general.step(400);
+    const double moved = (lean.positions() - start).norm();
+    EXPECT_GT(moved, 1e-5);
+    EXPECT_LT((lean.positions() - general.positions()).norm(), 1e-7 * moved);
+    EXPECT_LT((lean.reaction(0).force - general.reaction(0).force).norm(), 1e-7 * general.reaction(0).force.norm());
+  }
+}
+
+}  // namespace
+}  // namespace withe
