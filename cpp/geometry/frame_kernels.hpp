@@ -34,11 +34,19 @@ struct StrainBatch {
   std::ptrdiff_t column;       ///< numbers from one column to the next
 };
 
+/// Reference frames carried to where the edges are now.
+struct CarryBatch {
+  int count;
+  const double* frames;        ///< per edge, kFrameNumbers
+  double *source, *reference;  ///< per edge, 3 numbers: tangent and director, before and after
+};
+
 struct FrameKernels {
   void (*edges)(const EdgeBatch&);      ///< see edge_frame
   void (*strains)(const StrainBatch&);  ///< see bend_twist_strain
   void (*planar_edges)(const EdgeBatch&);
   void (*planar_strains)(const StrainBatch&);  ///< see planar_kappa
+  void (*carry)(const CarryBatch&);            ///< see parallel_transport; rounding does not add up
 };
 
 const FrameKernels& frame_kernels();

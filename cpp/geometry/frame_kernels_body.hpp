@@ -112,9 +112,26 @@ EdgeFrame<Pack> frames_of(const double* frames, const int (&edge)[kLanes]) {
   }
 }
 
+[[gnu::flatten]] void carry(const CarryBatch& batch) {
+  for (int first = 0; first < batch.count; first += kLanes) {
+    int e[kLanes];
+    const int live = lanes_from(first, batch.count, e);
+    const double* f = batch.frames;
+    const Vec3<Pack> t{gather(f, e, kFrameNumbers, 0), gather(f, e, kFrameNumbers, 1), gather(f, e, kFrameNumbers, 2)};
+    Vec3<Pack> d = parallel_transport(gather_rows(batch.reference, e), gather_rows(batch.source, e), t);
+    d = d - dot(d, t) * t;
+    d = (1.0 / square_root(dot(d, d))) * d;
+    for (int l = 0; l < live; ++l) {
+      double *source = batch.source + std::ptrdiff_t{3} * e[l], *reference = batch.reference + std::ptrdiff_t{3} * e[l];
+      source[0] = t.x[l], source[1] = t.y[l], source[2] = t.z[l];
+      reference[0] = d.x[l], reference[1] = d.y[l], reference[2] = d.z[l];
+    }
+  }
+}
+
 }  // namespace
 
 extern const FrameKernels kFrameKernels;
-const FrameKernels kFrameKernels{edges, strains, planar_edges, planar_strains};
+const FrameKernels kFrameKernels{edges, strains, planar_edges, planar_strains, carry};
 
 }  // namespace withe::WITHE_INSTRUCTION_SET

@@ -26,19 +26,20 @@ Turning turning(const Model& model, const double* stretch_stiffness, const State
       before += d0 * d0;
       after += d1 * d1;
     }
-    const double l0 = std::sqrt(before), l1 = std::sqrt(after), cosine = across / (l0 * l1);
-    if (!std::isfinite(cosine)) return {INFINITY, INFINITY};
-    smallest = std::min(smallest, cosine);
+    const double square = across * std::abs(across) / (before * after);  // of the cosine, with its sign
+    if (!std::isfinite(square)) return {INFINITY, INFINITY};
+    smallest = std::min(smallest, square);
     if (!stretch_stiffness) continue;
+    const double l0 = std::sqrt(before), l1 = std::sqrt(after);
     const double middle = 0.5 * std::sqrt(std::max(before + after + 2.0 * across, 0.0));
     if (middle > 0.0) gain += 0.5 * stretch_stiffness[e] * (l1 - l0) * (l1 + l0 - 2.0 * middle) / middle;
   }
-  return {std::acos(std::clamp(smallest, -1.0, 1.0)), gain};
+  return {std::acos(std::copysign(std::sqrt(std::min(std::abs(smallest), 1.0)), smallest)), gain};
 }
 
 /// Work of loads, drag and viscosity over the step, with the forces that acted in it.
 void book_work(Equations& equations, const Parameters& parameters, const VectorX& change, StepResult& result) {
-  if (!equations.loads().pieces.empty() || (equations.custom_force.array() != 0.0).any())
+  if (!equations.loads().pieces.empty() || equations.model().description.has_custom_force)
     result.load_work = equations.load_work(change);
   if (parameters.dragged || parameters.viscous) result.dissipated = equations.dissipated(change);
   result.dissipated += equations.contact_loss(change);
@@ -48,25 +49,20 @@ void book_work(Equations& equations, const Parameters& parameters, const VectorX
 /// (`work.assumed`) says: mends the reactions, and gives the supports' work, exact in the kinetic energy.
 void book_supports(const Equations& equations, const VectorX& v0, const VectorX& v1, double dt, StepWorkspace& work,
                    StepResult& result) {
-  const Assembler& assembler = equations.assembler();
-  const VectorX& mass = equations.mass().rows;  // which couples nothing that is held
   VectorX& full_residual = work.newton.evaluation.full_residual;
-  VectorX& held = work.held_vector;
-  const auto take = [&](const VectorX& vector) {
-    held.setZero(vector.size());
-    assembler.add_held_part(vector, 1.0, held);
-  };
-  take(full_residual);
-  result.support_work = held.dot(work.change);
-  take(work.assumed);
-  result.support_work -= held.dot(work.change);
-  full_residual -= held;
-  take(v1);
-  result.support_work += 0.5 * mass.dot(held.cwiseAbs2());
-  full_residual += mass.cwiseProduct(held) / dt;
-  take(v0);
-  result.support_work -= 0.5 * mass.dot(held.cwiseAbs2());
-  full_residual -= mass.cwiseProduct(held) / dt;
+  for (const Constraint& c : equations.model().constraints) {
+    const auto held = [&c](const VectorX& vector) {
+      Vector3 part = Vector3::Zero();
+      part.head(c.size) = vector.segment(c.first, c.size);
+      return Vector3(part - c.free * part);
+    };
+    Vector3 mass = Vector3::Zero(), change = Vector3::Zero();
+    mass.head(c.size) = equations.mass().rows.segment(c.first, c.size);  // couples nothing that is held
+    change.head(c.size) = work.change.segment(c.first, c.size);
+    const Vector3 force = held(full_residual), assumed = held(work.assumed), before = held(v0), after = held(v1);
+    result.support_work += (force - assumed).dot(change) + 0.5 * mass.dot(after.cwiseAbs2() - before.cwiseAbs2());
+    full_residual.segment(c.first, c.size) += (mass.cwiseProduct(after - before) / dt - assumed).head(c.size);
+  }
 }
 
 /// Axial forces at the start of a step [N]: where the mixed method sets out from, for those of an extrapolated motion,
@@ -277,7 +273,7 @@ StepResult verlet_step(Equations& equations, const Parameters& parameters, doubl
   VectorX& q1 = work.z;
   q1 = state.q + dt * half;
   result.largest_turn = turning(model, nullptr, state, q1).largest;
-  if (!q1.allFinite() || !(result.largest_turn <= 1.5)) return result;
+  if (!(result.largest_turn <= 1.5)) return result;
   // Forces want the frames at q1 itself: measured from the start of the step, the turn of direct transport would come
   // in at first order, with nothing to cancel it.
   State& next = work.next;

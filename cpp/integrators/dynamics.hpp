@@ -46,7 +46,7 @@ struct StepResult {
 struct StepWorkspace {
   NewtonWorkspace newton;
   HeldTarget held;
-  VectorX z, move, change, mean, velocity, assumed, difference, held_vector, whole_acceleration;
+  VectorX z, move, change, mean, velocity, assumed, difference, whole_acceleration;
   Configuration after;
   State from, next;  ///< explicit steps
 };

@@ -357,15 +357,14 @@ void Equations::evaluate_forces(const State& state, const Parameters& parameters
   gradient_.setZero(n + kPadding);
   magnitude_.setZero(n + kPadding);
   last_z_ = state.q;
-  const Vec3d none{0.0, 0.0, 0.0};
-  for (EdgeFrame<double>& f : middle_.edge) f.spin = f.bow = none;  // measured from where the edges are now
-  add_elastic(elastic, last_z_, false, nullptr, out);
-  add_loads(last_z_, false, out);
   if (!model_.planar())
     for (int e = 0; e < model_.edge_count; ++e) {
+      middle_.edge[at(e)].spin = {0.0, 0.0, 0.0};  // measured from where the edge is now
       const int a = model_.tail_dof[at(e)], b = model_.head_dof[at(e)];
       add_couple(e, spin_couple(e, v[model_.edge_dof[at(e)]], {v[b] - v[a], v[b + 1] - v[a + 1], v[b + 2] - v[a + 2]}));
     }
+  add_elastic(elastic, last_z_, false, nullptr, out);
+  add_loads(last_z_, false, out);
   out.full_residual = gradient_.head(n) - gravity_ - custom_force;
 }
 

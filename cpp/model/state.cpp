@@ -126,13 +126,10 @@ void compute_configuration(const Model& model, const State& state, const VectorX
 void accept_configuration(const Model& model, const VectorX& q, const Configuration& configuration, State& state) {
   state.q = q;
   if (model.planar()) return;
-  for (std::size_t e = 0; e < state.tangent.size(); ++e) {
-    const Vec3d& t = configuration.edge[e].tangent;
-    Vec3d d = parallel_transport(state.director[e], state.tangent[e], t);
-    d -= dot(d, t) * t;
-    state.director[e] = (1.0 / std::sqrt(dot(d, d))) * d;
-    state.tangent[e] = t;
-  }
+  frame_kernels().carry({.count = model.edge_count,
+                         .frames = &configuration.edge.data()->tangent.x,
+                         .source = &state.tangent.data()->x,
+                         .reference = &state.director.data()->x});
   for (int f = 0; f < model.frame_count; ++f) {
     const auto i = static_cast<std::size_t>(f);
     state.frame[i] = orthonormalized(configuration.frame[i]);
