@@ -58,7 +58,9 @@ class Point:
 
 def _our_points(case: Case, quick: bool) -> list[Point]:
     """A grid over meshes and steps for each integrator, and the source's choice."""
-    meshes = (6, 8, 10, 12, 16, 24, 32, 45, 64, 90, 128) if case.kind == "beam" else (28, 40, 56, 80, 113, 160, 226, 320)
+    meshes = (
+        (6, 8, 10, 12, 16, 24, 32, 45, 64, 90, 128) if case.kind == "beam" else (28, 40, 56, 80, 113, 160, 226, 320)
+    )
     halvings = range(-2, 8)
     if quick:
         meshes, halvings = (16, 24), range(-1, 1)

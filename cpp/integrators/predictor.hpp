@@ -47,7 +47,12 @@ class Predictor {
     for (int& b : best_) io(b);
     for (double& t : time_) io(t);
     for (VectorX& a : acceleration_) io(a);
-    for (VectorX& a : slow_) io(a);
+    bool smoothed = slow_[0].size() > 0;
+    io(smoothed);
+    for (VectorX& a : slow_) {
+      a.resize(smoothed ? acceleration_[0].size() : 0);
+      io(a);
+    }
   }
 
  private:

@@ -57,6 +57,29 @@ TEST(Snapshot, ContinuesWithTheSameBitsInTheSameWorldAndInANewOne) {
     }
 }
 
+TEST(Snapshot, OfErrorControlledStepsGoesBackToTheStartAndToTheMiddle) {
+  for (Integrator integrator : {Integrator::backward_euler, Integrator::implicit_midpoint, Integrator::energy_momentum,
+                                Integrator::fourth_order}) {
+    Options controlled = options_for(integrator);
+    controlled.tolerance = 1e-3;
+    World world(testing::hanging_arm().scene, controlled);
+    const std::string start = world.snapshot();
+    world.step(3);
+    const std::string middle = world.snapshot();
+    world.step(3);
+    World fresh(testing::hanging_arm().scene, controlled);
+    fresh.restore(middle);
+    fresh.step(3);
+    EXPECT_TRUE(same_state(world, fresh)) << static_cast<int>(integrator);
+    world.restore(start);
+    EXPECT_TRUE(world.snapshot() == start) << static_cast<int>(integrator);
+    world.step(3);
+    EXPECT_TRUE(world.snapshot() == middle) << static_cast<int>(integrator);
+    world.step(3);
+    EXPECT_TRUE(same_state(world, fresh)) << static_cast<int>(integrator);
+  }
+}
+
 TEST(Snapshot, IsTheSameBytesAfterARestore) {
   for (const SceneDescription& scene : scenes()) {
     World world(scene, options_for(Integrator::implicit_midpoint));
