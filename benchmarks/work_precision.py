@@ -300,7 +300,7 @@ def _plot(points: list[Point]) -> None:
     import matplotlib.pyplot as plt
 
     cases = [case for case in CASES.values() if case.name in {p.case for p in points}]
-    size = (3 + 3 * len(cases), 4.2)
+    size = (4 + 3 * len(cases), 4.2)
     figure, axes = plt.subplots(1, len(cases), figsize=size, sharey=True, squeeze=False, layout="constrained")
     axes = axes[0]
     methods = sorted({p.method for p in points}, key=lambda m: (m.startswith("PyElastica"), m))
@@ -314,7 +314,7 @@ def _plot(points: list[Point]) -> None:
         for mark in case.marks:
             axis.axhline(mark, color="0.8", lw=0.7, zorder=0)
     axes[0].set_ylabel("error of the tip / motion")
-    axes[-1].legend(fontsize=7, loc="upper right")
+    figure.legend(*axes[0].get_legend_handles_labels(), fontsize=8, loc="outside right center")
     OUT.mkdir(parents=True, exist_ok=True)
     figure.savefig(OUT / "work_precision.png", dpi=130)
     plt.close(figure)

@@ -107,3 +107,25 @@ def test_forces_summed_again_balance_and_a_wrong_load_shows(method):
 
     assert imbalance(case) < 1.0
     assert imbalance(dataclasses.replace(case, strength=1.001 * case.strength)) > 1.0
+
+
+def test_a_page_shows_tables_and_goals_of_a_run():
+    from tables import section
+
+    content = {
+        "name": "skips",
+        "date": "2026-01-02T03:04:05+00:00",
+        "command": "python benchmarks/skips.py",
+        "machine": {"processor": "a processor", "processors": 2},
+        "compiler": "a compiler",
+        "versions": {"withe": "0.1.0", "python": "3.11"},
+        "took": 12.0,
+        "tables": {"Saved": [["row", "times"], ["planar | 2D", "3.1"]], "Fronts, long": [["a"], ["b"]]},
+        "goals": [{"name": "planar", "value": 3.14159, "target": 2, "sign": "at least", "met": True}],
+    }
+    page = section(content)
+    assert "| planar \\| 2D | 3.1 |" in page
+    assert "| planar | 3.142 | at least 2 | met |" in page
+    assert "a compiler" in page
+    assert "2026-01-02" in page
+    assert "Fronts" not in page
