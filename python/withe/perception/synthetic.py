@@ -167,27 +167,38 @@ def _crossings(
         a, b = _segments(first, closed[i])
         for j in range(i, len(lines)):
             c, d = _segments(lines[j], closed[j])
-            u, v = (b - a)[:, None], (d - c)[None]
-            w = c[None] - a[:, None]
+            near_p, near_q = _near_segments(a, b, c, d)
+            u, v, w = (b - a)[near_p], (d - c)[near_q], c[near_q] - a[near_p]
             with np.errstate(divide="ignore", invalid="ignore"):
-                denominator = u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
-                s = (w[..., 0] * v[..., 1] - w[..., 1] * v[..., 0]) / denominator
-                t = (w[..., 0] * u[..., 1] - w[..., 1] * u[..., 0]) / denominator
+                denominator = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
+                s = (w[:, 0] * v[:, 1] - w[:, 1] * v[:, 0]) / denominator
+                t = (w[:, 0] * u[:, 1] - w[:, 1] * u[:, 0]) / denominator
                 hit = (s >= 0) & (s < 1) & (t >= 0) & (t < 1)
             if i == j:
-                k = np.arange(len(a))
-                apart = np.abs(k[:, None] - k[None])
+                apart = np.abs(near_p - near_q)
                 if closed[i]:
                     apart = np.minimum(apart, len(a) - apart)
-                hit &= (apart > 2) & (k[:, None] < k[None])
+                hit &= (apart > 2) & (near_p < near_q)
             arcs = _arc(first, closed[i]), _arc(lines[j], closed[j])
-            for p, q in np.argwhere(hit):
-                point = a[p] + s[p, q] * (b[p] - a[p])
-                cosine = abs(u[p, 0] @ v[0, q]) / np.linalg.norm(u[p, 0]) / np.linalg.norm(v[0, q])
-                first_arc = arcs[0][p] + s[p, q] * (arcs[0][p + 1] - arcs[0][p])
-                second_arc = arcs[1][q] + t[p, q] * (arcs[1][q + 1] - arcs[1][q])
+            for k in np.flatnonzero(hit):
+                p, q = near_p[k], near_q[k]
+                point = a[p] + s[k] * (b[p] - a[p])
+                cosine = abs(u[k] @ v[k]) / np.linalg.norm(u[k]) / np.linalg.norm(v[k])
+                first_arc = arcs[0][p] + s[k] * (arcs[0][p + 1] - arcs[0][p])
+                second_arc = arcs[1][q] + t[k] * (arcs[1][q + 1] - arcs[1][q])
                 found.append((point, (i, first_arc), (j, second_arc), float(np.arccos(min(1.0, cosine)))))
     return found
+
+
+def _near_segments(a: Array, b: Array, c: Array, d: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Numbers of segments a-b and c-d whose middles are near enough for them to meet, in order."""
+    reach = 0.5 * (np.linalg.norm(b - a, axis=1).max() + np.linalg.norm(d - c, axis=1).max())
+    from scipy.spatial import cKDTree
+
+    by_first = cKDTree(0.5 * (a + b)).query_ball_point(0.5 * (c + d), reach * (1.0 + 1e-9))
+    pairs = np.array([(p, q) for q, near in enumerate(by_first) for p in near], np.intp).reshape(-1, 2)
+    pairs = pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
+    return pairs[:, 0], pairs[:, 1]
 
 
 def _is_clear(
