@@ -264,10 +264,8 @@ void Assembler::project_matrix() {
 
 void Assembler::project(VectorX& vector) const {
   for (const Block& block : blocks_) {
-    const int n = block.constraint.size;
-    Vector3 v = Vector3::Zero();
-    v.head(n) = vector.segment(block.constraint.first, n);
-    vector.segment(block.constraint.first, n) = (block.constraint.free * v).head(n);
+    const Constraint& c = block.constraint;
+    vector.segment(c.first, c.size) = (c.free * c.part(vector)).head(c.size);
   }
 }
 
@@ -279,11 +277,8 @@ VectorX Assembler::held_part(const VectorX& vector) const {
 
 void Assembler::add_held_part(const VectorX& from, double factor, VectorX& to) const {
   for (const Block& block : blocks_) {
-    const int n = block.constraint.size;
-    Vector3 v = Vector3::Zero();
-    v.head(n) = from.segment(block.constraint.first, n);
-    v -= block.constraint.free * v;
-    to.segment(block.constraint.first, n) += factor * v.head(n);
+    const Constraint& c = block.constraint;
+    to.segment(c.first, c.size) += factor * c.held(from).head(c.size);
   }
 }
 

@@ -17,4 +17,7 @@ using Columns3 = Eigen::Matrix<double, Eigen::Dynamic, 3>;
 /// One row per edge: a 3 x 3 matrix with rows d1, d2, tangent, flattened row by row.
 using MatrixX9 = Eigen::Matrix<double, Eigen::Dynamic, 9, Eigen::RowMajor>;
 
+/// The component of the cross product that leaves the plane.
+inline double cross(const Vector2& a, const Vector2& b) { return a.x() * b.y() - a.y() * b.x(); }
+
 }  // namespace withe

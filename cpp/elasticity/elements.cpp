@@ -13,16 +13,14 @@ BendTwistStiffness<double> stiffness_row(const Columns3& m, Eigen::Index i) { re
 
 /// Rows (kappa1, kappa2, tau) become strains; in a plane the other columns are zero.
 void measure_rows(const BendMeasure& measure, Columns3& rows) {
-  for (Eigen::Index i = 0; i < rows.rows(); ++i)
-    rows.row(i) *= bend_factor(measure, rows.row(i).head<2>().squaredNorm()).value;
+  for (Eigen::Index i = 0; i < rows.rows(); ++i) rows.row(i) = measured(measure, rows.row(i));
 }
 
 BendTwistEnergy energy_of_row(const BendMeasure& measure, const Columns3& strain, const Columns3& natural,
                               const Columns3& stiffness, Eigen::Index i) {
-  const double factor = bend_factor(measure, strain.row(i).head<2>().squaredNorm()).value;
-  const double a = factor * strain(i, 0) - natural(i, 0), b = factor * strain(i, 1) - natural(i, 1);
-  const double c = factor * strain(i, 2) - natural(i, 2);
-  return {0.5 * (stiffness(i, 0) * a * a + stiffness(i, 1) * b * b), 0.5 * stiffness(i, 2) * c * c};
+  const auto off = (measured(measure, strain.row(i)) - natural.row(i)).eval();
+  const auto energy = (0.5 * stiffness.row(i).cwiseProduct(off.cwiseAbs2())).eval();
+  return {energy(0) + energy(1), energy(2)};
 }
 
 void put(Local& out, int at, const Vec3d& v) {

@@ -28,4 +28,10 @@ BendFactor<Scalar> bend_factor(const BendMeasure& m, const Scalar& x) {
   return {(1.0 + m.a * x) * inverse, first, (-2.0 * m.b) * (first * inverse)};
 }
 
+/// Strains of a row (kappa1, kappa2, tau); in a plane the last two are zero.
+template <class Row>
+auto measured(const BendMeasure& m, const Row& row) {
+  return (bend_factor(m, row(0) * row(0) + row(1) * row(1)).value * row).eval();
+}
+
 }  // namespace withe

@@ -51,15 +51,9 @@ void book_supports(const Equations& equations, const VectorX& v0, const VectorX&
                    StepResult& result) {
   VectorX& full_residual = work.newton.evaluation.full_residual;
   for (const Constraint& c : equations.model().constraints) {
-    const auto held = [&c](const VectorX& vector) {
-      Vector3 part = Vector3::Zero();
-      part.head(c.size) = vector.segment(c.first, c.size);
-      return Vector3(part - c.free * part);
-    };
-    Vector3 mass = Vector3::Zero(), change = Vector3::Zero();
-    mass.head(c.size) = equations.mass().rows.segment(c.first, c.size);  // couples nothing that is held
-    change.head(c.size) = work.change.segment(c.first, c.size);
-    const Vector3 force = held(full_residual), assumed = held(work.assumed), before = held(v0), after = held(v1);
+    const Vector3 mass = c.part(equations.mass().rows), change = c.part(work.change);  // mass couples nothing held
+    const Vector3 force = c.held(full_residual), assumed = c.held(work.assumed);
+    const Vector3 before = c.held(v0), after = c.held(v1);
     result.support_work += (force - assumed).dot(change) + 0.5 * mass.dot(after.cwiseAbs2() - before.cwiseAbs2());
     full_residual.segment(c.first, c.size) += (mass.cwiseProduct(after - before) / dt - assumed).head(c.size);
   }
@@ -164,9 +158,7 @@ double estimated_error(Equations& equations, const Newton& newton, const Options
     if (plan.slot + 1 < static_cast<int>(kFourthOrderParts.size())) return 0.0;
     dt = plan.dt / part;
     order = 4;
-    constant = 0.0;
-    for (double g : kFourthOrderParts) constant += g * g * g * g * g / 80.0;
-    constant = std::abs(constant);
+    constant = kFourthOrderError;
     whole = &work.whole_acceleration;
   }
   constexpr double kCaution = 2.0;  // fast modes are taken to shift so much further

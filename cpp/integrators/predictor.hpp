@@ -20,10 +20,6 @@ class Predictor {
     for (VectorX& a : slow_) a.resize(0);
   }
   bool empty() const { return count_ == 0; }
-  int count() const { return count_; }
-  /// Of the step `back` steps before the latest one; `back` < count().
-  double time(std::size_t back) const { return time_[back]; }
-  const VectorX& acceleration(std::size_t back) const { return acceleration_[back]; }
   /// Number of steps that the coming prediction in `slot` uses; 0: none is better.
   int points(int slot) const { return std::min(best_[static_cast<std::size_t>(slot)], count_); }
   /// Acceleration expected at `time` from the last `points` steps.

@@ -360,8 +360,7 @@ class Builder {
     const Parameters natural = initial_parameters(model_);
     for (Eigen::Index b = 0; b < n; ++b) {
       if (!offsets_keep_drawn_[static_cast<std::size_t>(b)]) continue;
-      const double factor = bend_factor(natural.measure, drawn.row(b).head<2>().squaredNorm()).value;
-      model_.bend_offset.row(b) = factor * drawn.row(b) - natural.bend_natural.row(b);
+      model_.bend_offset.row(b) = measured(natural.measure, drawn.row(b)) - natural.bend_natural.row(b);
     }
     model_.initial_half_tau = VectorX::Zero(static_cast<Eigen::Index>(model_.half.size()));
   }

@@ -57,6 +57,18 @@ struct Constraint {
   int first = 0;
   int size = 0;
   Matrix3 free = Matrix3::Zero();
+
+  /// Its numbers of a vector over all unknowns, with zeros behind where they are fewer than three.
+  Vector3 part(const VectorX& vector) const {
+    Vector3 own = Vector3::Zero();
+    own.head(size) = vector.segment(first, size);
+    return own;
+  }
+  /// What of them is held.
+  Vector3 held(const VectorX& vector) const {
+    const Vector3 own = part(vector);
+    return own - free * own;
+  }
 };
 
 /// One support, resolved: what it holds.

@@ -62,15 +62,13 @@ void update_natural(const Model& model, Parameters& p) {
   p.version = ++versions;
   const bool planar = model.planar();
   const auto strain = [&](int rod, int stencil, double voronoi) -> Vector3 {
-    Vector3 out = Vector3::Zero();
-    if (rod < 0 || stencil < 0) return out;
+    if (rod < 0 || stencil < 0) return Vector3::Zero();
     const auto r = static_cast<std::size_t>(rod);
     const Vector2 k = p.natural_curvature[r].row(stencil);
-    const Vector2 kappa = discrete_curvature(k, voronoi);
-    const double factor = bend_factor(p.measure, kappa.squaredNorm()).value;
-    const Vector2 d = factor * kappa;
-    out << d, factor * p.natural_twist[r](stencil) * voronoi;
-    if (planar) out = Vector3(model.planar_components[r].dot(d), 0.0, 0.0);
+    Vector3 drawn;
+    drawn << discrete_curvature(k, voronoi), p.natural_twist[r](stencil) * voronoi;
+    const Vector3 out = measured(p.measure, drawn);
+    if (planar) return {model.planar_components[r].dot(out.head<2>()), 0.0, 0.0};
     return out;
   };
   p.bend_natural = model.bend_offset;

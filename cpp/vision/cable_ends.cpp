@@ -21,6 +21,10 @@ double reach_border(const BitImage& mask, const Vector2& from, const Vector2& di
   return distance - 0.5 * step;
 }
 
+Flanks measure_flanks(const BitImage& mask, const Vector2& from, const Vector2& normal, double limit) {
+  return {reach_border(mask, from, normal, limit), reach_border(mask, from, -normal, limit)};
+}
+
 std::vector<Vector2> grow_end(const BitImage& mask, const Branch& tip) {
   std::vector<Vector2> points;
   const double half_width = tip.half_width;
@@ -37,10 +41,9 @@ std::vector<Vector2> grow_end(const BitImage& mask, const Branch& tip) {
     if (left_to_go < half_width + 1 || way > longest) break;
     const Vector2 normal(-tangent.y(), tangent.x());
     Vector2 next = point + tangent;
-    const double left = reach_border(mask, next, normal, wide);
-    const double right = reach_border(mask, next, -normal, wide);
-    if (left + right > 3 * half_width + 2) break;  // not this cable alone
-    next += std::clamp(0.5 * (left - right), -0.3, 0.3) * normal;
+    const Flanks flanks = measure_flanks(mask, next, normal, wide);
+    if (flanks.left + flanks.right > 3 * half_width + 2) break;  // not this cable alone
+    next += std::clamp(0.5 * (flanks.left - flanks.right), -0.3, 0.3) * normal;
     const Vector2 turned = 0.9 * tangent + 0.1 * (next - point).normalized();
     tangent = turned.normalized();
     point = next;

@@ -13,4 +13,11 @@ std::vector<Vector2> grow_end(const BitImage& mask, const Branch& tip);
 /// Distance from a point of the mask to its border along a unit vector, at most `limit` [px].
 double reach_border(const BitImage& mask, const Vector2& from, const Vector2& direction, double limit);
 
+/// Distances along and against a unit normal from a point of the mask to its flanks [px].
+struct Flanks {
+  double left = 0;
+  double right = 0;
+};
+Flanks measure_flanks(const BitImage& mask, const Vector2& from, const Vector2& normal, double limit);
+
 }  // namespace withe

@@ -134,10 +134,6 @@ std::vector<double> CableOutline::stations(double& total) const {
 
 namespace {
 
-/// Distances from a line to both flanks [px].
-struct Flanks {
-  double left, right;
-};
 struct Place {
   Vector2 point, normal;
   Flanks flanks;
@@ -174,7 +170,7 @@ std::vector<FitSample> CableOutline::flank_samples(const BitImage& mask, const M
     const Vector2 tangent = (line.row(after) - line.row(before)).transpose().normalized();
     point = line.row(row).transpose();
     normal = Vector2(-tangent.y(), tangent.x());
-    return {reach_border(mask, point, normal, limit), reach_border(mask, point, -normal, limit)};
+    return measure_flanks(mask, point, normal, limit);
   };
   std::vector<FitSample> samples;
   Vector2 point, normal;

@@ -8,8 +8,6 @@ namespace withe {
 
 namespace {
 
-double cross(const Vector2& a, const Vector2& b) { return a.x() * b.y() - a.y() * b.x(); }
-
 Vector2 row_of(const Cable& cable, int row) {
   const auto n = static_cast<int>(cable.centreline.rows());
   return cable.centreline.row(cable.closed ? (row + n) % n : std::clamp(row, 0, n - 1)).transpose();

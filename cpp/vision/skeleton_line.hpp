@@ -43,6 +43,4 @@ class SkeletonLine {
   bool closed_;
 };
 
-inline double cross(const Vector2& a, const Vector2& b) { return a.x() * b.y() - a.y() * b.x(); }
-
 }  // namespace withe

@@ -166,7 +166,7 @@ class SeamCutter {
   std::vector<Vector2> seam(const SkeletonLine& line, const WidthRun& run, double fraction) {
     std::vector<Vector2> raw;
     for (int i = run.first; i <= run.last; i += 2) {
-      const Flanks flanks = measure_flanks(mask_, line, i, 1.5 * run.width);
+      const Flanks flanks = measure_flanks(mask_, line.position(i), line.normal(i), 1.5 * run.width);
       const double width = flanks.left + flanks.right;
       if (std::abs(width - run.width) > 0.25 * run.width) continue;
       raw.push_back(line.position(i) + (flanks.left - fraction * width) * line.normal(i));

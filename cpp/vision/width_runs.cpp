@@ -15,7 +15,7 @@ double measure_width(const BitImage& mask, const SkeletonLine& line, int first, 
   double sum = 0;
   int count = 0;
   for (int i = first + (last - first) % step / 2; i <= last; i += step) {
-    const Flanks flanks = measure_flanks(mask, line, i, 2 * half_width + 2);
+    const Flanks flanks = measure_flanks(mask, line.position(i), line.normal(i), 2 * half_width + 2);
     sum += flanks.left + flanks.right;
     ++count;
   }
@@ -57,12 +57,6 @@ void find_runs_of(int number, const SkeletonLine& line, const BitImage& mask, st
 }
 
 }  // namespace
-
-Flanks measure_flanks(const BitImage& mask, const SkeletonLine& line, int i, double limit) {
-  const Vector2 point = line.position(i);
-  const Vector2 normal = line.normal(i);
-  return {reach_border(mask, point, normal, limit), reach_border(mask, point, -normal, limit)};
-}
 
 std::vector<WidthRun> find_width_runs(const SkeletonGraph& graph, const BitImage& mask) {
   std::vector<WidthRun> runs;

@@ -15,13 +15,6 @@ struct WidthRun {
   int length() const { return last - first + 1; }
 };
 
-/// Distances along the normal from a pixel of a line to both flanks of the mask [px].
-struct Flanks {
-  double left = 0;
-  double right = 0;
-};
-Flanks measure_flanks(const BitImage& mask, const SkeletonLine& line, int i, double limit);
-
 /// Runs of every edge that is not removed, edge by edge and in order along each. Stretches shorter than one and a half
 /// widths are none.
 std::vector<WidthRun> find_width_runs(const SkeletonGraph& graph, const BitImage& mask);

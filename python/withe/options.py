@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 from withe import _core, validation
 
@@ -23,14 +23,9 @@ def make_options(**options: Any) -> dict[str, Any]:
         An option out of range, or tolerance with a scheme that takes none.
     """
     checked = dict(options)
-    words = {
-        "integrator": ("implicit_midpoint", "backward_euler", "energy_momentum", "fourth_order", "verlet", "static"),
-        "solver": ("automatic", "band", "sparse"),
-        "line_search": ("automatic", "goldstein_price", "none"),
-        "bending": ("angle", "tangent"),
-    }
-    for name, known in words.items():
-        validation.choice(options[name], name, known)
+    words = {"integrator": Integrator, "solver": Solver, "line_search": LineSearch, "bending": Bending}
+    for name, literal in words.items():
+        validation.choice(options[name], name, get_args(literal))
     for name in ("time_step", "step_tolerance", "force_tolerance"):
         checked[name] = validation.positive(options[name], name)
     for name in ("tolerance", "duration"):

@@ -180,9 +180,7 @@ def test_a_damaged_snapshot_file_is_a_value_error_or_the_same_state(place, tmp_p
     _, _, simulation = cantilever(nodes=3)
     path = simulation.snapshot().save(tmp_path / "s.npz")
     data = bytearray(path.read_bytes())
-    if place >= len(data):
-        pytest.skip("beyond the end of the file")
-    data[place] ^= 0xFF
+    data[place % len(data)] ^= 0xFF
     path.write_bytes(data)
     try:
         state = withe.Snapshot.load(path)

@@ -192,9 +192,9 @@ def _crossings(
 
 def _near_segments(a: Array, b: Array, c: Array, d: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Numbers of segments a-b and c-d whose middles are near enough for them to meet, in order."""
-    reach = 0.5 * (np.linalg.norm(b - a, axis=1).max() + np.linalg.norm(d - c, axis=1).max())
     from scipy.spatial import cKDTree
 
+    reach = 0.5 * (np.linalg.norm(b - a, axis=1).max() + np.linalg.norm(d - c, axis=1).max())
     by_first = cKDTree(0.5 * (a + b)).query_ball_point(0.5 * (c + d), reach * (1.0 + 1e-9))
     pairs = np.array([(p, q) for q, near in enumerate(by_first) for p in near], np.intp).reshape(-1, 2)
     pairs = pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
