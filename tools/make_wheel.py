@@ -4,6 +4,7 @@ KLU, AMD, COLAMD and BTF travel inside as shared libraries; a wheel with a libra
 drags in BLAS or Fortran is refused, and so is one that needs a newer glibc than 2.34.
 """
 
+import platform
 import re
 import shutil
 import subprocess
@@ -15,6 +16,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 REFUSED = ("libcholmod", "libumfpack", "libblas", "libopenblas", "libgfortran")
 NEWEST_GLIBC = (2, 34)
+BUILD_GLIBC = (2, 36)  # whose libraries still run with 2.34
 
 
 def run(*command: str | Path, cwd: Path = ROOT) -> str:
@@ -44,6 +46,9 @@ def main() -> None:
     """Build, repair, check, install and try."""
     if shutil.which("patchelf") is None:
         sys.exit("make wheel needs patchelf on the PATH")
+    library, version = platform.libc_ver()
+    if library == "glibc" and tuple(map(int, version.split("."))) > BUILD_GLIBC:
+        sys.exit(f"make wheel needs Debian 12 (glibc 2.36): libraries of glibc {version} would travel inside")
     raw, dist = ROOT / "build" / "wheel_raw", ROOT / "dist"
     shutil.rmtree(raw, ignore_errors=True)
     shutil.rmtree(dist, ignore_errors=True)
