@@ -39,6 +39,7 @@ node = st.tuples(st.sampled_from("abc"), st.sampled_from(["start", "end", "node(
     ".".join
 )
 rod = st.sampled_from(["a", "a", "b", "b", "c", "nobody"])
+touched = st.sampled_from(["a", "b", "floor 1", "plane 1", "sphere 1", "capsule 1"])
 
 
 def _plain(value):
@@ -90,8 +91,39 @@ def custom(data):
     return wind
 
 
+def add_obstacle(world, data):
+    friction = data.draw(st.one_of(st.just(0.3), number))
+    kind = data.draw(st.integers(0, 3))
+    if kind == 0:
+        world.scene.add_floor(data.draw(number), friction=friction)
+    elif kind == 1:
+        world.scene.add_plane(data.draw(triple), data.draw(triple), friction=friction)
+    elif kind == 2:
+        world.scene.add_sphere(data.draw(triple), data.draw(positive), friction=friction)
+    else:
+        world.scene.add_capsule(data.draw(triple), data.draw(triple), data.draw(positive), friction=friction)
+
+
+def enable_contact(world, data):
+    options = {
+        "friction": data.draw(st.one_of(st.floats(0, 1), number)),
+        "model": data.draw(st.sampled_from(["imcv2", "imcv2", "barrier", "springs"])),
+        "friction_model": data.draw(st.sampled_from(["implicit", "lagged", "anchored", "dry"])),
+        "distance_tolerance": data.draw(st.one_of(st.none(), st.none(), st.floats(1e-5, 1e-2), number)),
+        "slip_tolerance": data.draw(st.one_of(st.just(1e-3), positive)),
+        "centreline_friction": data.draw(st.booleans()),
+    }
+    if data.draw(st.integers(0, 3)) == 0:
+        options["stiffness"] = data.draw(positive)
+    world.scene.enable_contact(**options)
+
+
 ON_SCENE = {
     "add_rod": add_rod,
+    "add_obstacle": add_obstacle,
+    "enable_contact": enable_contact,
+    "set_friction": lambda w, d: w.scene.set_friction(d.draw(rod), d.draw(touched), d.draw(number)),
+    "ignore_contact": lambda w, d: w.scene.ignore_contact(d.draw(rod), d.draw(touched)),
     "join": lambda w, d: w.scene.join(
         d.draw(node),
         d.draw(node),
@@ -162,6 +194,9 @@ def read(world, data):
     values = getattr(simulation, name)(data.draw(rod))
     assert np.isfinite(values).all(), f"{name} holds {values}"
     assert np.isfinite(list(vars(simulation.energy()).values())).all()
+    contacts = simulation.contacts()
+    for field in ("distance", "gap", "point", "normal", "normal_force", "friction"):
+        assert np.isfinite(contacts[field]).all(), f"{field} holds {contacts[field]}"
     assert str(simulation.plan)
 
 
