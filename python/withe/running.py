@@ -54,14 +54,17 @@ class _Run:
     ) -> None:
         self.duration = validation.positive(duration, "duration")
         step = simulation.time_step
+        steps = self.duration / step
+        if steps > 2.0**53:
+            raise ValueError(f"time_step must fit the duration, {self.duration:g} s, got {step:g}")
         if record_every is None:
-            self._interval = step * max(1, math.ceil(self.duration / (100.0 * step) - 1e-9))
+            self._interval = step * max(1, math.ceil(0.01 * steps - 1e-9))
         elif isinstance(record_every, float) and record_every == math.inf:
             self._interval = self.duration
         else:
             self._interval = validation.positive(record_every, "record_every")
-        if self.duration / self._interval > _MAX_FRAMES or self.duration / step > 2.0**53:
-            raise ValueError(f"record_every and time_step must fit the duration, {self.duration:g} s")
+        if self.duration / self._interval > _MAX_FRAMES:
+            raise ValueError(f"record_every must fit the duration, {self.duration:g} s, got {self._interval:g}")
         for name, value in (("before_step", before_step), ("until", until)):
             if value is not None:
                 validation.function(value, name)
