@@ -186,4 +186,19 @@ inline Pack arctangent(Pack y, Pack x) {
   return with_sign_of(angle, y);
 }
 
+/// atanh(u), 0 <= u < 1: with (1 + u) / (1 - u) = 2^k m, m within sqrt(2) of 1, it is k ln(2) / 2 + atanh(t), where
+/// t = (m - 1) / (m + 1); to an ulp of the result and what the rounding of 1 - u makes of it.
+inline Pack inverse_tanh(Pack u) {
+  using Unsigned = unsigned long long __attribute__((vector_size(8 * WITHE_LANES)));
+  const Pack up = Pack(1.0) + u, down = Pack(1.0) - u;
+  const auto bits = reinterpret_cast<Unsigned>((up / down * Pack(1.41421356237309504880)).v) & 0x7ff0000000000000ULL;
+  // 2^52 and an integer below that, put together by their bits; an exponent is stored with 1023 added.
+  const Pack k = Pack(reinterpret_cast<Pack::Native>((bits >> 52) | 0x4330000000000000ULL)) - Pack(4503599627371519.0);
+  const Pack scaled = Pack(reinterpret_cast<Pack::Native>(bits)) * down;
+  const Pack t = select(k.v < Pack(0.5).v, u, (up - scaled) / (up + scaled)), t2 = t * t;
+  constexpr double kSeries[] = {1.0 / 21.0, 1.0 / 19.0, 1.0 / 17.0, 1.0 / 15.0, 1.0 / 13.0,
+                                1.0 / 11.0, 1.0 / 9.0,  1.0 / 7.0,  1.0 / 5.0,  1.0 / 3.0};
+  return k * Pack(0.34657359027997265471) + (t + t * (t2 * polynomial(kSeries, t2)));
+}
+
 }  // namespace withe::WITHE_INSTRUCTION_SET

@@ -41,7 +41,8 @@ Turning turning(const Model& model, const double* stretch_stiffness, const State
 void book_work(Equations& equations, const Parameters& parameters, const VectorX& change, StepResult& result) {
   if (!equations.loads().pieces.empty() || equations.model().description.has_custom_force)
     result.load_work = equations.load_work(change);
-  if (parameters.dragged || parameters.viscous) result.dissipated = equations.dissipated(change);
+  const bool in_fluid = equations.model().description.fluid.model != FluidModel::none;
+  if (parameters.dragged || parameters.viscous || in_fluid) result.dissipated = equations.dissipated(change);
   result.dissipated += equations.contact_loss(change);
 }
 
@@ -177,6 +178,35 @@ void set_acceleration(const Equations& equations, const StepWorkspace& work, Vec
   acceleration = acceleration.cwiseQuotient(equations.mass().rows.cwiseMax(1e-300));
 }
 
+/// Finds the fluid's force for a step of dt: that on velocities as they are taken to be within the step, to the order
+/// of the scheme, at the positions that go with them. Under the midpoint rules those of the last two steps are carried
+/// on: velocities at their ends would ring on stiff modes, and the guess with them.
+bool begin_flow(Equations& equations, double dt, bool euler, const State& state, StepWorkspace& work) {
+  if (!equations.flows()) return true;
+  VectorX &v = work.mean, &q = work.z;
+  const Motion& past = state.motion;
+  if (euler || past.known < 2)
+    v = state.v;
+  else
+    v = past.velocity[0] + ((state.time + 0.5 * dt - past.time[0]) / (past.time[0] - past.time[1])) *
+                               (past.velocity[0] - past.velocity[1]);
+  equations.assembler().project(v);
+  work.change = work.held.q - state.q;
+  equations.assembler().add_held_part(work.change, 1.0 / dt, v);
+  q = state.q;
+  if (!euler) q += 0.5 * dt * v;
+  return equations.begin_flow(q, v);
+}
+
+void remember_motion(const VectorX& q1, double dt, State& state) {
+  Motion& motion = state.motion;
+  motion.velocity[1].swap(motion.velocity[0]);
+  motion.velocity[0] = (q1 - state.q) / dt;
+  motion.time[1] = motion.time[0];
+  motion.time[0] = state.time + 0.5 * dt;
+  motion.known = std::min(motion.known + 1, 2);
+}
+
 /// Forces over mass at q, with velocity v in drag, viscosity and the spin couple.
 void explicit_acceleration(Equations& equations, const Parameters& parameters, double dt, const State& state,
                            const VectorX& v, StepWorkspace& work, VectorX& acceleration) {
@@ -184,6 +214,10 @@ void explicit_acceleration(Equations& equations, const Parameters& parameters, d
   work.from.q -= dt * v;
   work.from.v = v;
   equations.begin(work.from, parameters, dt, false);
+  if (equations.flows() && !equations.begin_flow(state.q, v)) {
+    acceleration.setConstant(state.q.size(), std::nan(""));
+    return;
+  }
   equations.evaluate(state.q, false, nullptr, work.newton.evaluation);
   set_acceleration(equations, work, acceleration);
 }
@@ -200,6 +234,7 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
   const double dt = plan.dt, h = euler ? dt : 0.5 * dt;
   if (!work.held.reachable) return result;
   equations.begin(state, parameters, h, plan.rule == StepRule::energy_momentum, euler ? Inner::end : Inner::middle);
+  if (!begin_flow(equations, dt, euler, state, work)) return result;
   result.newton = find_inner(equations, newton, options, plan, h, state, predictor, work);
   if (!result.newton.converged) return result;
   VectorX& q1 = work.move;
@@ -241,6 +276,7 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
   predictor.record(state.time + 0.5 * dt, plan.slot, acceleration, equations.mass().rows, work.assumed);
   if (equations.contact()) result.stiffness_work = equations.contact()->accept(state);
   if (!model.planar()) compute_configuration(model, state, q1, work.after);
+  if (equations.flows()) remember_motion(q1, dt, state);
   accept_configuration(model, q1, work.after, state);
   state.v = v1;
   state.acceleration = acceleration;
@@ -272,7 +308,8 @@ StepResult verlet_step(Equations& equations, const Parameters& parameters, doubl
   next = state;
   // Drag, viscosity and the spin couple want the velocity at the end; a predicted one is second order.
   work.velocity = half + 0.5 * dt * state.acceleration;
-  if (equations.contact() || parameters.viscous || parameters.dragged) {
+  const bool in_fluid = model.description.fluid.model != FluidModel::none;
+  if (equations.contact() || parameters.viscous || parameters.dragged || in_fluid) {
     if (!model.planar()) compute_configuration(model, state, q1, work.after);
     accept_configuration(model, q1, work.after, next);
     explicit_acceleration(equations, parameters, dt, next, work.velocity, work, next.acceleration);

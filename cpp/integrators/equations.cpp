@@ -12,9 +12,10 @@ constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
-Symmetry symmetry_of(const Loads& loads, const Contact* contact, const Options& options) {
+Symmetry symmetry_of(const Loads& loads, const Contact* contact, FluidModel fluid, const Options& options) {
   const bool unsymmetric = loads.unsymmetric || options.integrator == Integrator::energy_momentum ||
-                           (contact != nullptr && contact->unsymmetric());
+                           (contact != nullptr && contact->unsymmetric()) ||
+                           (fluid == FluidModel::resistive && options.integrator != Integrator::statics);
   return unsymmetric ? Symmetry::unsymmetric : Symmetry::symmetric;
 }
 
@@ -40,7 +41,8 @@ Equations::Equations(const Model& model, const Options& options)
     : model_(model),
       loads_(resolve_loads(model)),
       contact_(make_contact(model)),
-      assembler_(model, loads_, symmetry_of(loads_, contact_.get(), options), options.solver),
+      assembler_(model, loads_, symmetry_of(loads_, contact_.get(), model.description.fluid.model, options),
+                 options.solver),
       static_duration_(options.time_step) {
   if (contact_) {
     assembler_.couple(contact_->element_unknowns(), kContactUnknowns);
@@ -51,6 +53,10 @@ Equations::Equations(const Model& model, const Options& options)
   node_dof_drag_ = VectorX::Zero(model.dof_count);
   for (const LoadPiece& piece : loads_.pieces)
     if (piece.shape != LoadShape::dead_node) has_potential_ = false;
+  if (options.integrator == Integrator::statics) return;
+  const FluidModel fluid = model.description.fluid.model;
+  if (fluid == FluidModel::stokeslets) fluid_ = std::make_unique<StokesletFluid>(model);
+  if (fluid == FluidModel::resistive) find_resistance();
 }
 
 void Equations::set_parameters(const Parameters& parameters) {
@@ -63,6 +69,7 @@ void Equations::set_parameters(const Parameters& parameters) {
   if (contact_) contact_->set_parameters(parameters);
   for (int i = 0; i < model_.node_count; ++i)
     node_dof_drag_.segment(model_.node_dof[at(i)], model_.dimension).setConstant(parameters.node_drag(i));
+  if (fluid_) fluid_->set_local_drag(parameters.fluid_viscosity, flow_drag_);
 }
 
 void Equations::begin(const State& state, const Parameters& parameters, double h, bool energy_momentum, Inner inner) {
@@ -82,6 +89,7 @@ void Equations::begin(const State& state, const Parameters& parameters, double h
   }
   acting_ = viscous && !energy_momentum ? &total_ : &elastic;
   floor_current_ = false;
+  flowing_ = false;
   if (contact_) contact_->begin(state, h == 0.0 ? static_duration_ : inner == Inner::middle ? 2.0 * h : h);
 }
 
@@ -156,6 +164,7 @@ void Equations::evaluate(const VectorX& z, bool with_matrix, const double* axial
     add_elastic(*acting_, z, with_matrix, axial_force, out);
   }
   add_loads(z, with_matrix, out);
+  if (!resistance_.empty() && h_ != 0.0) add_resistance(z, with_matrix);
   if (contact_) add_contacts(with_matrix, out);
   if (h_ != 0.0 && !model_.planar()) add_spin_couple(z);
   add_step(z, with_matrix, out);
@@ -192,6 +201,7 @@ void Equations::add_step(const VectorX& z, bool with_matrix, Evaluation& out) {
   out.magnitude =
       (magnitude_.head(n).array() + inertia.abs() + drag.abs() + gravity_.array().abs() + custom_force.array().abs())
           .matrix();
+  if (flowing_) add_flow(z, with_matrix, out);
   out.floor = floor_ + rounding_ * out.magnitude;
   if (energy_momentum_) out.floor += correction_floor_;
   if (contact_) out.floor += contact_floor_;
@@ -202,7 +212,7 @@ void Equations::add_step(const VectorX& z, bool with_matrix, Evaluation& out) {
     const std::vector<std::ptrdiff_t>& diagonal = assembler_.diagonal_offsets();
     for (int i = 0; i < n; ++i)
       values[static_cast<std::size_t>(diagonal[at(i)])] += (mass_.rows[i] * inverse + node_dof_drag_[i]) * inverse;
-    add_mass_coupling(inverse * inverse, values);
+    add_coupling(mass_.coupling, inverse * inverse, values);
   }
   // An axial strain rounds along its edge only.
   const bool planar = model_.planar();
@@ -218,11 +228,11 @@ void Equations::add_step(const VectorX& z, bool with_matrix, Evaluation& out) {
   }
 }
 
-/// The mass matrix off the diagonal, and what that takes from it.
-void Equations::add_mass_coupling(double factor, std::span<double> values) {
+/// A matrix such as that of masses off the diagonal, and what that takes from it.
+void Equations::add_coupling(const VectorX& all, double factor, std::span<double> values) {
   const auto size = static_cast<std::size_t>(model_.dimension);
   for (int e = 0; e < model_.edge_count; ++e) {
-    const double coupling = factor * mass_.coupling[e];
+    const double coupling = factor * all[e];
     const std::ptrdiff_t* entry = assembler_.edge_couplings.data() + at(e) * 4 * size;
     for (std::size_t i = 0; i < size; ++i, entry += 4) {
       values[static_cast<std::size_t>(entry[0])] -= coupling;
@@ -412,6 +422,7 @@ void Equations::set_floor(const VectorX& z, VectorX& floor) {
 double Equations::dissipated(const VectorX& change) const {
   const double inverse = h_ != 0.0 ? 1.0 / h_ : 0.0;
   double work = inverse * (node_dof_drag_.array() * (last_z_ - state_->q).array() * change.array()).sum();
+  work += flow_loss(change);
   if (!parameters_->viscous || h_ == 0.0) return work;
   Local local;
   const auto add = [&](const ElementTable& table, int i) {

@@ -14,6 +14,8 @@
 
 #include "assembly/assembler.hpp"
 #include "contact/contact.hpp"
+#include "forces/resistive.hpp"
+#include "forces/stokeslets.hpp"
 #include "integrators/options.hpp"
 #include "model/mass_matrix.hpp"
 #include "model/state.hpp"
@@ -57,6 +59,13 @@ class Equations {
              Inner inner = Inner::end);
   /// Explicit nodal forces (per unknown) that act in this step.
   VectorX custom_force;
+  /// Whether Stokeslets act: then `begin_flow` follows `begin`. The fluid's force is that on velocities `v` at
+  /// positions `q`, and a local drag for what the velocities of the step differ from them; see flow.cpp. False where no
+  /// solution was found.
+  bool flows() const { return fluid_ != nullptr; }
+  bool begin_flow(const VectorX& q, const VectorX& v);
+  /// What earlier solutions left behind.
+  void forget_flow();
 
   /// Residual at z, and the matrix when asked for. `axial_force`: see stretch_hessian.
   void evaluate(const VectorX& z, bool with_matrix, const double* axial_force, Evaluation& out);
@@ -88,8 +97,13 @@ class Equations {
   void set_axial_forces(const ElasticCoefficients& k, Evaluation& out);
   StencilBatch regular_batch(const ElasticCoefficients& k, const double* axial_force, double* values);
   void add_step(const VectorX& z, bool with_matrix, Evaluation& out);
-  void add_mass_coupling(double factor, std::span<double> values);
+  void add_coupling(const VectorX& coupling, double factor, std::span<double> values);
+  void add_flow(const VectorX& z, bool with_matrix, Evaluation& out);
   void add_loads(const VectorX& z, bool with_matrix, Evaluation& out);
+  void find_resistance();
+  void add_resistance(const VectorX& z, bool with_matrix);
+  void resistive_local_at(int edge, const VectorX& z, bool with_hessian, Local& local) const;
+  double flow_loss(const VectorX& change) const;
   void find_contacts(const VectorX& z, bool with_matrix);
   void add_contacts(bool with_matrix, Evaluation& out);
   void add_elastic(const ElasticCoefficients& k, const VectorX& z, bool with_matrix, const double* axial_force,
@@ -133,6 +147,11 @@ class Equations {
   MassMatrix mass_;
   VectorX acceleration_, inertia_;
   VectorX node_dof_drag_, gravity_;
+  std::unique_ptr<StokesletFluid> fluid_;
+  MassMatrix flow_drag_;                     ///< [N s/m]
+  VectorX flow_start_, flow_, flow_change_;  ///< the fluid's force but for the local drag, and with it [N]
+  bool flowing_ = false;
+  std::vector<ResistiveCoefficients> resistance_;  ///< per edge; empty: none
   long version_ = -1;                       ///< of the parameters that mass, elastic, gravity_ and drag belong to
   VectorX gradient_, magnitude_;            ///< forces but for inertia, drag and gravity; padded by kPadding
   VectorX force_, modulus_, inverse_rest_;  ///< per edge: EA eps [N], EA / L [N / m], 1 / L [1 / m]

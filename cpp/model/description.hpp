@@ -27,7 +27,8 @@ struct RodDescription {
   VectorX drag;                ///< force per length and velocity [Pa s]
   MatrixX2 natural_curvature;  ///< per stencil, of the smooth rod, towards d1 and d2 [1/m]
   VectorX natural_twist;       ///< per stencil [rad/m]
-  VectorX contact_radius;      ///< of the round surface that touches others [m]; empty: it touches nothing
+  VectorX contact_radius;      ///< of the round surface that touches others, and that a fluid flows around [m]; empty:
+                               ///< it touches nothing
 };
 
 /// One rod passing through, starting or ending at a shared node: rod index and node index within the rod.
@@ -139,6 +140,20 @@ struct ContactDescription {
   bool any() const { return rods || !obstacles.empty(); }
 };
 
+enum class FluidModel {
+  none,
+  resistive,   ///< resistive-force theory: drag along and across each edge; see forces/resistive.hpp
+  stokeslets,  ///< regularized Stokeslet segments: every edge moves the fluid at all others; see forces/stokeslets.hpp
+};
+
+/// A viscous fluid around all rods, at rest far away, without inertia.
+struct FluidDescription {
+  FluidModel model = FluidModel::none;
+  double viscosity = 0;       ///< [Pa s]
+  double regularization = 0;  ///< of Stokeslets [m]
+  double wavelength = 0;      ///< of waves along rods, for resistive-force theory [m]; 0: rods are straight
+};
+
 /// What bending strain is: the angle between two edges (nearly; see geometry/bend_measure.hpp), or 2 tan of its half.
 enum class Bending { angle, tangent };
 
@@ -153,6 +168,7 @@ struct SceneDescription {
   std::vector<LoadDescription> loads;
   bool has_custom_force = false;  ///< an explicit nodal force comes from a callback
   ContactDescription contact;
+  FluidDescription fluid;
 };
 
 }  // namespace withe

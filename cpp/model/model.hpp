@@ -91,6 +91,7 @@ struct Parameters {
   VectorX edge_density, edge_rotary, edge_viscous_time, edge_drag;
   VectorX added_mass;
   Vector3 gravity;
+  double fluid_viscosity = 0;               ///< [Pa s]
   std::vector<MatrixX2> natural_curvature;  ///< per rod and stencil, smooth [1/m]
   std::vector<VectorX> natural_twist;       ///< per rod and stencil [rad/m]
   BendMeasure measure;

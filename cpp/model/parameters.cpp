@@ -52,6 +52,7 @@ Parameters initial_parameters(const Model& model) {
   }
   p.added_mass = scene.added_mass;
   p.gravity = scene.gravity;
+  p.fluid_viscosity = scene.fluid.viscosity;
   if (scene.bending == Bending::tangent) p.measure = {0.0, 0.0};
   update_derived(model, p);
   return p;

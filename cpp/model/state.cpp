@@ -105,6 +105,8 @@ State initial_state(const Model& model) {
   state.frame.assign(static_cast<std::size_t>(model.frame_count), Matrix3::Identity());
   state.bend_tau = model.initial_bend_tau;
   state.half_tau = model.initial_half_tau;
+  if (model.description.fluid.model == FluidModel::stokeslets)
+    for (VectorX& v : state.motion.velocity) v = VectorX::Zero(model.dof_count);
   return state;
 }
 

@@ -36,6 +36,13 @@ auto find_record(Records& records, const ContactKey& key) -> decltype(records.da
 
 /// Configuration, velocities and the frames they are measured from. The frames advance by time-parallel
 /// transport once per accepted step or load increment.
+/// Mean velocities over the last two steps, the later one first, by which a fluid's force is predicted.
+struct Motion {
+  int known = 0;
+  VectorX velocity[2];  ///< [m/s]; empty where no fluid asks for them
+  double time[2] = {};  ///< middles of these steps [s]
+};
+
 struct State {
   double time = 0.0;                    ///< [s]
   VectorX q, v;                         ///< positions [m], angles [rad]; frames of joints: increments from `frame`
@@ -47,6 +54,7 @@ struct State {
   VectorX bend_tau, half_tau;           ///< twist of each stencil, which fixes the branch of the angle [rad]
   std::vector<ContactRecord> contacts;  ///< sorted by key
   VectorX contact_stiffness;            ///< per rod, of contacts that begin [N/m]; where a scene has contact
+  Motion motion;
 };
 
 State initial_state(const Model& model);

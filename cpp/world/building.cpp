@@ -111,6 +111,12 @@ void World::Implementation::forget_contacts() {
     if (system && system->contact()) system->forget_contacts();
 }
 
+void World::Implementation::forget_matrix() {
+  work.newton.factor = FactorRecord{};
+  for (Equations* system : {equations.get(), rescue_equations.get(), static_equations.get()})
+    if (system) system->forget_flow();
+}
+
 void World::Implementation::listen() {
   work.newton.poll = [this] {
     if (interrupted.exchange(false)) throw Interrupted();
@@ -323,6 +329,19 @@ void World::Implementation::add_contact_notes() {
   if (!equations->contact()->frictional()) plan.notes.emplace_back("no friction: contact stays symmetric");
 }
 
+std::string World::Implementation::fluid_note() const {
+  switch (description.fluid.model) {
+    case FluidModel::resistive:
+      return "fluid: resistive-force theory, implicit; rods do not feel each other through it";
+    case FluidModel::stokeslets:
+      return "fluid: regularized Stokeslet segments couple all " + std::to_string(model.node_count) +
+             " nodes, once a step by conjugate gradients; the matrix of the steps stays as it is";
+    case FluidModel::none:
+      break;
+  }
+  return "no fluid: its terms are left out";
+}
+
 void World::Implementation::make_plan() {
   const double stable = plan.stable_step;
   plan = Plan{};
@@ -342,8 +361,10 @@ void World::Implementation::make_plan() {
                                                                              : model.plane_reason));
   }
   if (!equations->symmetric())
-    notes.push_back("unsymmetric Jacobian: follower loads, moments in 3D, or energy-momentum steps");
+    notes.push_back(
+        "unsymmetric Jacobian: follower loads, moments in 3D, resistive-force theory, or energy-momentum steps");
   if (!parameters.dragged) notes.push_back("no drag: its terms are left out");
+  notes.push_back(fluid_note());
   if (!parameters.viscous) notes.push_back("no viscosity: its terms are left out");
   if (description.loads.empty()) notes.push_back("no loads but gravity");
   add_contact_notes();

@@ -6,7 +6,8 @@
 namespace withe {
 
 Equations& World::Implementation::statics() {
-  const bool same = options.integrator != Integrator::energy_momentum;
+  const bool same = options.integrator != Integrator::energy_momentum &&
+                    (description.fluid.model != FluidModel::resistive || options.integrator == Integrator::statics);
   if (same) return *equations;
   if (!static_equations) {
     Options symmetric = options;
@@ -65,6 +66,7 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
   state.v.setZero();
   state.acceleration.setZero();
   state.acceleration_current = false;
+  state.motion.known = 0;
   predictor.clear();
   forget_matrix();
   work.newton.finest = INFINITY;

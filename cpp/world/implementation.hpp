@@ -103,6 +103,7 @@ struct World::Implementation {
   void rebuild(Rebuild why);
   void make_plan();
   void add_contact_notes();
+  std::string fluid_note() const;
   /// Drops the plane; throws when the user asked for it. `why` names the argument that leaves the plane.
   void leave_plane(const std::string& why);
   State transferred(const Model& old, const State& from) const;
@@ -151,7 +152,8 @@ struct World::Implementation {
   StepResult step_by_rule(double dt, int slot);
   void keep_reactions();
   void check_reversible(const Parameters& p) const;
-  void forget_matrix() { work.newton.factor = FactorRecord{}; }
+  /// Matrices of earlier steps.
+  void forget_matrix();
   void forget_contacts();
   Place place_of(int row) const;
   [[noreturn]] void fail(const NewtonResult& newton, double dt, const std::string& what) const;

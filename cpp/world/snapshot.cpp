@@ -6,7 +6,7 @@
 namespace withe {
 namespace {
 
-constexpr std::uint64_t kMagic = 0x3353454854495755ull;
+constexpr std::uint64_t kMagic = 0x3453454854495755ull;
 
 /// FNV-1a.
 std::uint64_t hash_of(std::string_view bytes) {
@@ -28,6 +28,9 @@ std::uint64_t fingerprint(const SceneDescription& scene) {
   }
   w(static_cast<std::int64_t>(scene.joints.size()));
   w(static_cast<std::int64_t>(scene.loads.size()));
+  w(static_cast<int>(scene.fluid.model));
+  w(scene.fluid.regularization);
+  w(scene.fluid.wavelength);
   return hash_of(w.bytes);
 }
 
@@ -58,6 +61,7 @@ void exchange(Archive& io, Self& self) {
     io(*v);
   io(p.edge_bend);
   io(p.gravity);
+  io(p.fluid_viscosity);
   for (auto& m : p.natural_curvature) io(m);
   for (auto& v : p.natural_twist) io(v);
   for (auto& r : self.ramps) {
@@ -106,6 +110,8 @@ void exchange(Archive& io, Self& self) {
   io(s.half_tau);
   io(s.contact_stiffness);
   exchange_contacts(io, s.contacts);
+  io(s.motion.known);
+  for (int i : {0, 1}) io(s.motion.velocity[i]), io(s.motion.time[i]);
   self.predictor.exchange(io);
   io(self.reaction_current);
   io(self.reaction_residual);
@@ -216,6 +222,9 @@ void World::restore(const std::string& bytes) {
               fresh->guard.rescue <= 256,
           "snapshot is damaged: impossible step size");
   require(fresh->state.q.allFinite() && fresh->state.v.allFinite(), "snapshot is damaged: not finite");
+  require(std::isfinite(fresh->parameters.fluid_viscosity) && fresh->parameters.fluid_viscosity >= 0.0,
+          "snapshot is damaged: impossible viscosity");
+  require(fresh->state.motion.known >= 0 && fresh->state.motion.known <= 2, "snapshot is damaged: impossible history");
   require(fresh->predictor.plausible(), "snapshot is damaged: impossible history");
   update_derived(fresh->model, fresh->parameters);
   fresh->check_reversible(fresh->parameters);

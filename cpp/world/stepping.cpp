@@ -310,6 +310,8 @@ void World::Implementation::check_reversible(const Parameters& p) const {
   const std::string instead = ": take integrator 'implicit_midpoint' or 'energy_momentum'";
   require(!p.viscous,
           "integrator 'fourth_order' goes back in time within each step, which viscosity does not allow" + instead);
+  require(description.fluid.model == FluidModel::none,
+          "integrator 'fourth_order' goes back in time within each step, which a fluid does not allow" + instead);
   if (!p.dragged) return;
   for (int i = 0; i < model.node_count; ++i)
     require(p.node_drag(i) * options.time_step <= p.node_mass(i),

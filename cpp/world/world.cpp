@@ -255,6 +255,16 @@ void World::set_gravity(const Vector3& gravity) {
   self.state.acceleration_current = false;
 }
 
+void World::set_fluid_viscosity(double viscosity) {
+  Implementation& self = *implementation_;
+  require(self.description.fluid.model != FluidModel::none, "the scene has no fluid");
+  require(std::isfinite(viscosity) && viscosity > 0.0,
+          "viscosity of the fluid must be positive and finite, got " + std::to_string(viscosity));
+  self.parameters.fluid_viscosity = viscosity;
+  update_derived(self.model, self.parameters);
+  self.state.acceleration_current = false;
+}
+
 void World::set_velocities(const MatrixX3& velocities) {
   Implementation& self = *implementation_;
   require(velocities.rows() == self.model.node_count, "velocities need one row a node");
@@ -275,6 +285,7 @@ void World::set_velocities(const MatrixX3& velocities) {
   self.state.acceleration.setZero();
   self.state.acceleration_current = false;
   self.predictor.clear();
+  self.state.motion.known = 0;
   self.alarm.reset();
   self.guard.turn = EnergyGuard{}.turn;
 }

@@ -122,6 +122,7 @@ class World {
   void set_rod_parameters(int rod, const RodDescription& parameters);
   void set_added_mass(const VectorX& mass);
   void set_gravity(const Vector3& gravity);
+  void set_fluid_viscosity(double viscosity);
 
   // Supports; indices are rows of description().supports.
   int add_support(const SupportDescription& support);  ///< holds the present position and orientation

@@ -20,6 +20,8 @@ constexpr Words<Bending, 2> kBendings{{{"angle", Bending::angle}, {"tangent", Be
 constexpr Words<ContactLaw, 2> kContactLaws{{{"imcv2", ContactLaw::imcv2}, {"barrier", ContactLaw::barrier}}};
 constexpr Words<FrictionLaw, 3> kFrictionLaws{
     {{"implicit", FrictionLaw::implicit}, {"lagged", FrictionLaw::lagged}, {"anchored", FrictionLaw::anchored}}};
+constexpr Words<FluidModel, 3> kFluidModels{
+    {{"none", FluidModel::none}, {"resistive", FluidModel::resistive}, {"stokeslets", FluidModel::stokeslets}}};
 constexpr Words<ObstacleKind, 2> kObstacleKinds{{{"plane", ObstacleKind::plane}, {"capsule", ObstacleKind::capsule}}};
 
 void register_rod(py::module_& module) {
@@ -71,6 +73,15 @@ void register_contact(py::module_& module) {
   def_word(contact, "friction_law", &ContactDescription::friction_law, kFrictionLaws);
 }
 
+void register_fluid(py::module_& module) {
+  py::class_<FluidDescription> fluid(module, "FluidDescription", "A viscous fluid around all rods.");
+  fluid.def(py::init<>())
+      .def_readwrite("viscosity", &FluidDescription::viscosity)
+      .def_readwrite("regularization", &FluidDescription::regularization)
+      .def_readwrite("wavelength", &FluidDescription::wavelength);
+  def_word(fluid, "model", &FluidDescription::model, kFluidModels);
+}
+
 void register_joints_and_supports(py::module_& module) {
   py::class_<RodPass>(module, "RodPass", "A node of a rod.")
       .def(py::init([](int rod, int node) { return RodPass{rod, node}; }), py::arg("rod"), py::arg("node"))
@@ -114,6 +125,7 @@ void register_model(py::module_& module) {
   register_joints_and_supports(module);
   register_loads(module);
   register_contact(module);
+  register_fluid(module);
   py::class_<SceneDescription> scene(module, "SceneDescription", "What the scene layer hands to the engine.");
   def_word(scene, "bending", &SceneDescription::bending, kBendings);
   scene.def(py::init<>())
@@ -125,7 +137,8 @@ void register_model(py::module_& module) {
       .def_readwrite("supports", &SceneDescription::supports)
       .def_readwrite("loads", &SceneDescription::loads)
       .def_readwrite("has_custom_force", &SceneDescription::has_custom_force)
-      .def_readwrite("contact", &SceneDescription::contact);
+      .def_readwrite("contact", &SceneDescription::contact)
+      .def_readwrite("fluid", &SceneDescription::fluid);
 }
 
 }  // namespace withe::bindings

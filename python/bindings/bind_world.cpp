@@ -139,6 +139,10 @@ void define_parameters(WorldClass& world) {
       "set_added_mass", [](GuardedWorld& self, const VectorX& mass) { self.changing().set_added_mass(mass); },
       py::arg("mass"));
   world.def(
+      "set_fluid_viscosity",
+      [](GuardedWorld& self, double viscosity) { self.changing().set_fluid_viscosity(viscosity); },
+      py::arg("viscosity"));
+  world.def(
       "set_gravity", [](GuardedWorld& self, const Vector3& gravity) { self.changing().set_gravity(gravity); },
       py::arg("gravity"));
 }

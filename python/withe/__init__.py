@@ -7,7 +7,7 @@ kept in a `Record`. SI units, angles in radians.
 from withe import perception, shapes
 from withe._core import __version__
 from withe.errors import ConvergenceError
-from withe.handles import CustomForce, Drag, EdgeHandle, Joint, Load, Mass, NodeHandle, Obstacle, Rod, Support
+from withe.handles import CustomForce, Drag, EdgeHandle, Fluid, Joint, Load, Mass, NodeHandle, Obstacle, Rod, Support
 from withe.materials import Circle, Material, Rectangle, Stiffness, Tube
 from withe.readouts import Energy, Equilibrium, Linearisation, Plan, Reaction, Statistics
 from withe.recording import Record
@@ -24,6 +24,7 @@ __all__ = [
     "EdgeHandle",
     "Energy",
     "Equilibrium",
+    "Fluid",
     "Joint",
     "Linearisation",
     "Load",

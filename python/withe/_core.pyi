@@ -15,6 +15,7 @@ __all__: list[str] = [
     "ConvergenceFailure",
     "Energy",
     "EquilibriumResult",
+    "FluidDescription",
     "JointDescription",
     "Linearisation",
     "LoadDescription",
@@ -260,6 +261,26 @@ class ContactDescription:
     @stiffness.setter
     def stiffness(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
 
+class FluidDescription:
+    """
+    A viscous fluid around all rods.
+    """
+
+    model: str
+    def __init__(self) -> None: ...
+    @property
+    def regularization(self) -> float: ...
+    @regularization.setter
+    def regularization(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    @property
+    def viscosity(self) -> float: ...
+    @viscosity.setter
+    def viscosity(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    @property
+    def wavelength(self) -> float: ...
+    @wavelength.setter
+    def wavelength(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+
 class SceneDescription:
     """
     What the scene layer hands to the engine.
@@ -267,6 +288,7 @@ class SceneDescription:
 
     bending: str
     contact: ContactDescription
+    fluid: FluidDescription
     has_custom_force: bool
     def __init__(self) -> None: ...
     @property
@@ -509,6 +531,7 @@ class World:
         """
     def set_added_mass(self, mass: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> None: ...
     def set_custom_force(self, force: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"]) -> None: ...
+    def set_fluid_viscosity(self, viscosity: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
     def set_gravity(self, gravity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None: ...
     def set_load(
         self,

@@ -11,12 +11,13 @@ import numpy.typing as npt
 from withe import _core, drawing, validation
 from withe.description import added_mass, describe_support, drag, rod_parameters
 from withe.directory import Directory
-from withe.handles import Drag, Load, Mass, NodeHandle, Rod, Support
+from withe.handles import Drag, Fluid, Load, Mass, NodeHandle, Rod, Support
 from withe.motion import Path, Turn, evaluate_path, oriented
 from withe.parameters import ROD_WORDS, RodParameters
 from withe.parts import (
     CustomForcePart,
     DragPart,
+    FluidPart,
     LoadPart,
     MassPart,
     RodPart,
@@ -99,7 +100,7 @@ class Control:
 
     # Parameters
 
-    def set(self, target: Rod | Load | Mass | Drag | str | None = None, /, **values: Any) -> None:
+    def set(self, target: Rod | Load | Mass | Drag | Fluid | str | None = None, /, **values: Any) -> None:
         """Change parameters while the simulation runs.
 
         Parameters
@@ -110,7 +111,7 @@ class Control:
             Of a rod: youngs_modulus, poisson_ratio, density, viscosity, stretch_stiffness,
             bend_stiffness, twist_stiffness, line_density, viscous_time, drag (numbers, or one an edge),
             natural_curvature, natural_twist. Of a load: force, moment or load, constant or a function of
-            time. Of a mass: mass. Of a drag: drag. Of the scene: gravity.
+            time. Of a mass: mass. Of a drag: drag. Of a fluid: viscosity. Of the scene: gravity.
 
         Raises
         ------
@@ -144,10 +145,15 @@ class Control:
         elif isinstance(part, DragPart):
             _only(values, ("drag",), f"drag {part.name!r}")
             self._set_drag(part, validation.non_negative(values["drag"], f"drag {part.name!r}"))
+        elif isinstance(part, FluidPart):
+            _only(values, ("viscosity",), f"fluid {part.name!r}")
+            viscosity = validation.positive(values["viscosity"], f"viscosity of {part.name!r}")
+            self._world.set_fluid_viscosity(viscosity)
+            self._settings.fluids = self._settings.fluids | {part.name: viscosity}
         else:
             raise ValueError(f"{part.name!r} has nothing to set")
 
-    def get(self, target: Rod | Load | Mass | Drag | str, word: str | None = None) -> Any:
+    def get(self, target: Rod | Load | Mass | Drag | Fluid | str, word: str | None = None) -> Any:
         """The present value of what `set` sets.
 
         Parameters
@@ -192,6 +198,8 @@ class Control:
             return self._settings.masses[part.name]
         elif isinstance(part, DragPart) and word == "drag":
             return self._settings.drags[part.name]
+        elif isinstance(part, FluidPart) and word == "viscosity":
+            return self._settings.fluids[part.name]
         raise ValueError(f"{part.name!r} has no {word!r}")
 
     def _set_rod(self, part: RodPart, values: dict[str, Any]) -> None:

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from withe import _core
 from withe.contacts import describe_contact
 from withe.directory import Directory
+from withe.fluid import describe_fluid
 from withe.joints import JointGroup, connected, gather
 from withe.options import Bending
 from withe.parameters import RodParameters
@@ -57,6 +58,7 @@ def describe(directory: Directory, gravity: FloatArray, bending: Bending = "angl
     scene.loads = [_describe_load(load) for load in directory.all(LoadPart)]
     scene.has_custom_force = bool(directory.all(CustomForcePart))
     scene.contact = describe_contact(directory)
+    scene.fluid = describe_fluid(directory)
     return scene
 
 

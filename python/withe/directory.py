@@ -9,6 +9,7 @@ from withe.parts import (
     ContactSettings,
     CustomForcePart,
     DragPart,
+    FluidPart,
     JoinPart,
     LoadPart,
     MassPart,
@@ -31,6 +32,7 @@ _WORDS: dict[type[Any], str] = {
     LoadPart: "load",
     MassPart: "mass",
     DragPart: "drag",
+    FluidPart: "fluid",
     CustomForcePart: "custom force",
     ObstaclePart: "obstacle",
 }

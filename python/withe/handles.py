@@ -18,6 +18,7 @@ __all__ = [
     "CustomForce",
     "Drag",
     "EdgeHandle",
+    "Fluid",
     "Handle",
     "Joint",
     "Layout",
@@ -145,6 +146,11 @@ class Mass(Handle):
 @dataclass(frozen=True)
 class Drag(Handle):
     """Viscous drag on some rods."""
+
+
+@dataclass(frozen=True)
+class Fluid(Handle):
+    """A viscous fluid around all rods."""
 
 
 @dataclass(frozen=True)

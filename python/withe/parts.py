@@ -19,6 +19,8 @@ __all__ = [
     "ContactSettings",
     "CustomForcePart",
     "DragPart",
+    "FluidModel",
+    "FluidPart",
     "FrictionModel",
     "JoinPart",
     "LoadPart",
@@ -37,6 +39,7 @@ JoinKind = Literal["rigid", "pinned", "revolute"]
 JointForm = Literal["frame", "pairs"]
 ContactModel = Literal["imcv2", "barrier"]
 FrictionModel = Literal["implicit", "lagged", "anchored"]
+FluidModel = Literal["stokeslets", "resistive"]
 LoadKind = Literal["force", "moment", "load"]
 SupportKind = Literal["pin", "clamp", "hold_edge", "spinning_clamp", "spinning_edge"]
 SUPPORT_KINDS: tuple[str, ...] = get_args(SupportKind)
@@ -119,6 +122,17 @@ class DragPart:
 
 
 @dataclass(frozen=True, eq=False)
+class FluidPart:
+    """A viscous fluid around all rods."""
+
+    name: str
+    model: FluidModel
+    viscosity: float  # [Pa s]
+    regularization: float | None  # [m]
+    wavelength: float | None  # [m]
+
+
+@dataclass(frozen=True, eq=False)
 class CustomForcePart:
     """Forces that a function computes."""
 
@@ -154,7 +168,7 @@ class ContactSettings:
     groups: Mapping[str, str] = field(default_factory=dict)  # of rods
 
 
-Part = RodPart | JoinPart | SupportPart | LoadPart | MassPart | DragPart | CustomForcePart | ObstaclePart
+Part = RodPart | JoinPart | SupportPart | LoadPart | MassPart | DragPart | FluidPart | CustomForcePart | ObstaclePart
 
 _HANDLES: dict[type[Any], type[handles.Handle]] = {
     JoinPart: handles.Joint,
@@ -162,6 +176,7 @@ _HANDLES: dict[type[Any], type[handles.Handle]] = {
     LoadPart: handles.Load,
     MassPart: handles.Mass,
     DragPart: handles.Drag,
+    FluidPart: handles.Fluid,
     CustomForcePart: handles.CustomForce,
     ObstaclePart: handles.Obstacle,
 }

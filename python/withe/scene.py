@@ -11,6 +11,7 @@ import numpy.typing as npt
 from withe import validation
 from withe.contacts import Contacts
 from withe.directory import Directory
+from withe.fluid import Fluids
 from withe.handles import Joint, NodeHandle, Rod, RodPlace, Support
 from withe.joints import connected, gather
 from withe.loads import Loads
@@ -28,7 +29,7 @@ __all__ = ["Scene"]
 FloatArray = npt.NDArray[np.float64]
 
 
-class Scene(Loads, Contacts):
+class Scene(Loads, Contacts, Fluids):
     """A description of rods, joints, supports and loads, from which simulations are built.
 
     Parameters

@@ -20,7 +20,7 @@ from withe.errors import ConvergenceError
 from withe.handles import NodeHandle, Rod, Support
 from withe.knots import link
 from withe.options import engine_options
-from withe.parts import CustomForcePart, DragPart, LoadPart, MassPart, SupportPart
+from withe.parts import CustomForcePart, DragPart, FluidPart, LoadPart, MassPart, SupportPart
 from withe.readouts import Energy, Equilibrium, Linearisation, Plan, Reaction, Statistics
 from withe.snapshots import Settings, Snapshot
 
@@ -71,6 +71,7 @@ class Simulation(Control):
             rods=parameters_of(directory),
             masses={part.name: part.mass for part in directory.all(MassPart)},
             drags={part.name: part.coefficient for part in directory.all(DragPart)},
+            fluids={part.name: part.viscosity for part in directory.all(FluidPart)},
             gravity=gravity.copy(),
             supports=supports,
             functions={part.name: part.function for part in directory.all(LoadPart) if part.function is not None},
@@ -395,6 +396,7 @@ class Simulation(Control):
             [len(rod.stretch_stiffness) for rod in settings.rods] != counts
             or settings.masses.keys() != mine.masses.keys()
             or settings.drags.keys() != mine.drags.keys()
+            or settings.fluids.keys() != mine.fluids.keys()
         ):
             raise ValueError("snapshot belongs to another scene")
         for name, (index, part) in settings.supports.items():

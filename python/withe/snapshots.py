@@ -20,7 +20,7 @@ __all__ = ["Settings", "Snapshot"]
 
 FloatArray = npt.NDArray[np.float64]
 
-_FILE_VERSION = 1
+_FILE_VERSION = 2
 
 
 @dataclass
@@ -30,7 +30,7 @@ class Settings:
     Attributes
     ----------
     rods : list of RodParameters
-    masses, drags : dict
+    masses, drags, fluids : dict
         Present value of each part, by name.
     gravity : ndarray of shape (3,) [m/s^2]
     supports : dict of str to (int, SupportPart)
@@ -44,6 +44,7 @@ class Settings:
     rods: list[RodParameters]
     masses: dict[str, float]
     drags: dict[str, float]
+    fluids: dict[str, float]
     gravity: FloatArray
     supports: dict[str, tuple[int, SupportPart]]
     functions: dict[str, Callable[[float], npt.ArrayLike]] = field(default_factory=dict)
@@ -55,6 +56,7 @@ class Settings:
             list(self.rods),
             dict(self.masses),
             dict(self.drags),
+            dict(self.fluids),
             self.gravity.copy(),
             dict(self.supports),
             dict(self.functions),
@@ -135,6 +137,7 @@ class Snapshot:
             "rods": len(settings.rods),
             "masses": settings.masses,
             "drags": settings.drags,
+            "fluids": settings.fluids,
             "supports": supports,
             "functions": self._function_names(),
         }
@@ -192,6 +195,7 @@ class Snapshot:
             rods=rods,
             masses={str(name): validation.non_negative(mass, name) for name, mass in header["masses"].items()},
             drags={str(name): validation.non_negative(drag, name) for name, drag in header["drags"].items()},
+            fluids={str(name): validation.positive(fluid, name) for name, fluid in header["fluids"].items()},
             gravity=validation.vector(arrays["gravity"], "gravity"),
             supports=supports,
             paths=paths,

@@ -34,5 +34,20 @@ TEST(Step, DoesNotAllocateAfterWarmUp) {
     }
 }
 
+TEST(Step, InAFluidDoesNotAllocateAfterWarmUp) {
+  for (FluidModel model : {FluidModel::resistive, FluidModel::stokeslets})
+    for (Integrator integrator :
+         {Integrator::backward_euler, Integrator::implicit_midpoint, Integrator::energy_momentum, Integrator::verlet}) {
+      SceneBuilder builder = testing::hanging_arm();
+      builder.scene.rods[0].contact_radius.setConstant(builder.scene.rods[0].rest_lengths.size(), 5e-3);
+      builder.scene.fluid = {model, 0.1, 5e-3, 0.0};
+      World world(builder.scene, testing::options(integrator, integrator == Integrator::verlet ? 2e-5 : 2e-3));
+      world.step(20);
+      const std::size_t before = allocation_count;
+      world.step(20);
+      EXPECT_EQ(allocation_count - before, 0u) << static_cast<int>(integrator);
+    }
+}
+
 }  // namespace
 }  // namespace withe

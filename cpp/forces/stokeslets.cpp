@@ -1,0 +1,276 @@
+#include "forces/stokeslets.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "common/check.hpp"
+
+namespace withe {
+namespace {
+
+constexpr int kMostNodes = 128;  // whose mobility is factorised as one
+constexpr int kMostIterations = 1000;
+constexpr double kTolerance = 1e-9;  // of the velocity, relative
+constexpr int kEntry[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
+// Where edges are much shorter than the regularization, forces that differ from node to node do not move the fluid.
+constexpr double kFinest = 1.0 / 3.0;
+
+std::size_t at(std::ptrdiff_t i) { return static_cast<std::size_t>(i); }
+
+/// Modified Bessel function of the second kind, of order 0 or 1: the integral of exp(-x cosh t) cosh(order t) over t >
+/// 0, by the trapezoidal rule, whose error falls faster than any power of its step.
+double bessel_k(int order, double x) {
+  constexpr double kStep = 0.1;
+  double sum = 0.5 * std::exp(-x);
+  for (double t = kStep; t < 8.0; t += kStep) sum += std::exp(-x * std::cosh(t)) * std::cosh(order * t);
+  return kStep * sum;
+}
+
+}  // namespace
+
+double wave_resistance(double x) {
+  const double k0 = bessel_k(0, x), k1 = bessel_k(1, x);
+  return 8.0 * std::numbers::pi / std::min(4.0 * k0, 2.0 * (k0 + x * k1));
+}
+
+void StokesletFluid::set_local_drag(double viscosity, MassMatrix& drag) const {
+  const double across = 8.0 * std::numbers::pi / (2.0 * bessel_k(0, 1.0) + 2.0 * bessel_k(1, 1.0));
+  drag.rows.setZero(model_.dof_count);
+  for (int i = 0; i < model_.node_count; ++i)
+    drag.rows.segment(model_.node_dof[at(i)], model_.dimension).setConstant(viscosity * across * node_length_[i]);
+  // The shortest wave that edges can tell moves them less than a smooth one: the transform of the hats, and its images.
+  constexpr double kHats = 8.0 / (std::numbers::pi * std::numbers::pi);
+  drag.coupling.resize(model_.edge_count);
+  for (int e = 0; e < model_.edge_count; ++e) {
+    const double length = model_.edge_length[e];
+    const double shortest = wave_resistance(std::numbers::pi * regularization_ / length) / kHats;
+    drag.coupling[e] = -0.25 * viscosity * length * std::max(shortest - across, 0.0);
+  }
+}
+
+StokesletFluid::StokesletFluid(const Model& model)
+    : model_(model),
+      regularization_(model.description.fluid.regularization),
+      line_(line_length(model.node_count)),
+      node_length_(VectorX::Zero(model.node_count)) {
+  require(regularization_ > 0.0,
+          "regularization of the fluid must be positive, got " + std::to_string(regularization_));
+  const double shortest = model.edge_length.minCoeff();
+  require(shortest >= kFinest * regularization_,
+          "regularization of the fluid must not exceed 3 edges, or velocities do not tell forces: got " +
+              std::to_string(regularization_) + " m with edges of " + std::to_string(shortest) + " m");
+  for (int e = 0; e < model.edge_count; ++e)
+    for (int node : {model.edge_tail[at(e)], model.edge_head[at(e)]}) node_length_[node] += 0.5 * model.edge_length[e];
+  inverse_length_ = node_length_.cwiseInverse();
+  std::vector<bool> taken(at(model.node_count), false);
+  for (std::size_t r = 0; r + 1 < model.rod_first_edge.size(); ++r) {
+    const int first = model.rod_first_edge[r], end = model.rod_first_edge[r + 1];
+    std::vector<int> own;
+    const auto add_slot = [&](int node, int edge) {
+      slot_node_.push_back(node);
+      segment_edge_.push_back(edge);
+      if (!taken[at(node)]) own.push_back(node);
+      taken[at(node)] = true;
+    };
+    for (int e = first; e < end; ++e) add_slot(model.edge_tail[at(e)], e);
+    add_slot(model.edge_head[at(end - 1)], -1);
+    const int parts = (static_cast<int>(own.size()) + kMostNodes - 1) / kMostNodes;
+    for (int k = 0; k < parts; ++k) {
+      const auto from = own.begin() + static_cast<std::ptrdiff_t>(own.size()) * k / parts;
+      const auto to = own.begin() + static_cast<std::ptrdiff_t>(own.size()) * (k + 1) / parts;
+      chunks_.push_back({std::vector<int>(from, to), {}, {}, {}});
+    }
+  }
+  segments_ = line_length(static_cast<std::ptrdiff_t>(slot_node_.size()));
+  for (VectorX* v : {&start_, &direction_}) v->setZero(3 * segments_);
+  for (VectorX* v : {&length_, &inverse_segment_}) v->setZero(segments_);
+  for (VectorX* v : {&of_start_, &of_end_}) v->setZero(kBlockEntries * segments_);
+  std::ptrdiff_t size = 0;
+  for (std::ptrdiff_t i = 0; i < model.node_count; ++i) {
+    row_start_.push_back(size);
+    size += kBlockEntries * line_length(i);
+  }
+  lower_.setZero(size);
+  diagonal_.setZero(kBlockEntries * line_);
+  for (VectorX* v : {&position_, &right_, &solution_, &residual_, &scaled_, &search_, &image_, &past_[0], &past_[1]})
+    v->setZero(3 * line_);
+  for (Chunk& chunk : chunks_) {
+    const auto n = static_cast<Eigen::Index>(3 * chunk.nodes.size());
+    chunk.matrix.resize(n, n);
+    chunk.part.resize(n);
+  }
+}
+
+void StokesletFluid::forget() {
+  known_ = 0;
+  factorized_ = false;
+}
+
+double* StokesletFluid::row(int node, int entry) {
+  return lower_.data() + row_start_[at(node)] + entry * line_length(node);
+}
+
+/// Segments between the nodes at q.
+void StokesletFluid::place(const VectorX& q) {
+  for (int i = 0; i < model_.node_count; ++i)
+    for (int k = 0; k < model_.dimension; ++k) position_[k * line_ + i] = q[model_.node_dof[at(i)] + k];
+  for (std::size_t s = 0; s < segment_edge_.size(); ++s) {
+    const int edge = segment_edge_[s];
+    if (edge < 0) continue;
+    const int tail = model_.edge_tail[at(edge)], head = model_.edge_head[at(edge)];
+    const auto to = static_cast<Eigen::Index>(s);
+    Vector3 d;
+    for (int k = 0; k < 3; ++k) d[k] = position_[k * line_ + head] - position_[k * line_ + tail];
+    const double length = d.norm();
+    length_[to] = length;
+    inverse_segment_[to] = 1.0 / length;
+    for (int k = 0; k < 3; ++k) {
+      start_[k * segments_ + to] = position_[k * line_ + tail];
+      direction_[k * segments_ + to] = d[k] / length;
+    }
+  }
+}
+
+/// What unit forces on all nodes do to one, half of it to each of the two places that a block has in B + B^T.
+void StokesletFluid::add_row(int node) {
+  const double x[3] = {position_[node], position_[line_ + node], position_[2 * line_ + node]};
+  const auto column = [this](const VectorX& v, int k) { return v.data() + k * segments_; };
+  const SegmentBatch batch{segments_,
+                           {column(start_, 0), column(start_, 1), column(start_, 2)},
+                           {column(direction_, 0), column(direction_, 1), column(direction_, 2)},
+                           length_.data(),
+                           inverse_segment_.data()};
+  stokeslet_kernels().velocity(batch, x, regularization_, of_start_.data(), of_end_.data());
+  const auto slots = static_cast<std::ptrdiff_t>(slot_node_.size());
+  for (int k = 0; k < kBlockEntries; ++k) {
+    double* own = row(node, k);
+    const double *starts = column(of_start_, k), *ends = column(of_end_, k);
+    for (std::ptrdiff_t s = 0; s < slots; ++s) {
+      const int j = slot_node_[at(s)];
+      const double value = (starts[s] + (s > 0 ? ends[s - 1] : 0.0)) * inverse_length_[j];
+      if (j < node)
+        own[j] += 0.5 * value;
+      else if (j > node)
+        row(j, k)[node] += 0.5 * value;
+      else
+        diagonal_[k * line_ + node] += value;
+    }
+  }
+}
+
+void StokesletFluid::assemble() {
+  lower_.setZero();
+  diagonal_.setZero();
+  for (int i = 0; i < model_.node_count; ++i) add_row(i);
+}
+
+bool StokesletFluid::factorize() {
+  for (Chunk& chunk : chunks_) {
+    const auto n = static_cast<int>(chunk.nodes.size());
+    for (int b = 0; b < n; ++b)
+      for (int a = b; a < n; ++a) {
+        const int i = std::max(chunk.nodes[at(a)], chunk.nodes[at(b)]);
+        const int j = std::min(chunk.nodes[at(a)], chunk.nodes[at(b)]);
+        for (int k = 0; k < 3; ++k)
+          for (int l = 0; l < 3; ++l)
+            chunk.matrix(3 * a + k, 3 * b + l) = i == j ? diagonal_[kEntry[k][l] * line_ + i] : row(i, kEntry[k][l])[j];
+      }
+    chunk.factor.compute(chunk.matrix);
+    if (chunk.factor.info() != Eigen::Success) return false;
+  }
+  factorized_ = true;
+  return true;
+}
+
+/// to = (factorised parts of A)^-1 from.
+void StokesletFluid::precondition(const VectorX& from, VectorX& to) {
+  for (Chunk& chunk : chunks_) {
+    for (std::size_t a = 0; a < chunk.nodes.size(); ++a)
+      for (int k = 0; k < 3; ++k) chunk.part[static_cast<Eigen::Index>(3 * a) + k] = from[k * line_ + chunk.nodes[a]];
+    chunk.factor.solveInPlace(chunk.part);
+    for (std::size_t a = 0; a < chunk.nodes.size(); ++a)
+      for (int k = 0; k < 3; ++k) to[k * line_ + chunk.nodes[a]] = chunk.part[static_cast<Eigen::Index>(3 * a) + k];
+  }
+}
+
+/// Sets out from the parabola through the last three solutions, or what there is of it.
+void StokesletFluid::guess() {
+  image_ = solution_;
+  if (known_ == 0)
+    solution_.setZero();
+  else if (known_ == 2)
+    solution_ = 2.0 * image_ - past_[0];
+  else if (known_ == 3)
+    solution_ = 3.0 * (image_ - past_[0]) + past_[1];
+  if (known_ >= 2) past_[1].swap(past_[0]);
+  if (known_ >= 1) past_[0].swap(image_);
+  known_ = std::min(known_ + 1, 3);
+}
+
+/// Conjugate gradients.
+bool StokesletFluid::iterate() {
+  const BlockMatrix matrix{model_.node_count, line_, lower_.data(), diagonal_.data()};
+  const auto multiply = [&](const VectorX& x, VectorX& y) { stokeslet_kernels().multiply(matrix, x.data(), y.data()); };
+  const double wanted = kTolerance * right_.norm();
+  multiply(solution_, residual_);
+  residual_ = right_ - residual_;
+  double before = 0.0;
+  for (iterations_ = 0; iterations_ < kMostIterations; ++iterations_) {
+    if (residual_.norm() <= wanted) return true;
+    precondition(residual_, scaled_);
+    const double now = residual_.dot(scaled_);
+    if (!std::isfinite(now)) return false;
+    if (iterations_ == 0)
+      search_ = scaled_;
+    else
+      search_ = scaled_ + (now / before) * search_;
+    before = now;
+    multiply(search_, image_);
+    const double step = now / search_.dot(image_);
+    solution_ += step * search_;
+    residual_ -= step * image_;
+  }
+  return false;
+}
+
+bool StokesletFluid::solve(const VectorX& q, const VectorX& velocity, VectorX& force) {
+  place(q);
+  assemble();
+  for (int i = 0; i < model_.node_count; ++i)
+    for (int k = 0; k < model_.dimension; ++k) right_[k * line_ + i] = velocity[model_.node_dof[at(i)] + k];
+  // An old factorisation serves until it has become half as slow again as it was.
+  const bool fresh = !factorized_ || iterations_ > fresh_iterations_ + std::max(3, fresh_iterations_ / 2);
+  if (fresh && !factorize()) {
+    forget();
+    return false;
+  }
+  guess();
+  const bool found = iterate();
+  if (fresh) fresh_iterations_ = iterations_;
+  if (!found) {
+    forget();
+    return false;
+  }
+  force.setZero(velocity.size());
+  for (int i = 0; i < model_.node_count; ++i)
+    for (int k = 0; k < model_.dimension; ++k)
+      force[model_.node_dof[at(i)] + k] = -8.0 * std::numbers::pi * solution_[k * line_ + i];
+  return true;
+}
+
+Eigen::MatrixXd StokesletFluid::mobility(const VectorX& q) {
+  place(q);
+  assemble();
+  const int n = model_.node_count;
+  Eigen::MatrixXd out(3 * n, 3 * n);
+  for (int i = 0; i < n; ++i)
+    for (int j = 0; j <= i; ++j)
+      for (int k = 0; k < 3; ++k)
+        for (int l = 0; l < 3; ++l)
+          out(3 * i + k, 3 * j + l) = out(3 * j + l, 3 * i + k) =
+              i == j ? diagonal_[kEntry[k][l] * line_ + i] : row(i, kEntry[k][l])[j];
+  return out;
+}
+
+}  // namespace withe

@@ -1,0 +1,81 @@
+#pragma once
+/// The force of a viscous fluid on slender rods that move each other through it.
+///
+/// Regularized Stokeslet segments [Cortez 2018, J. Comput. Phys. 375]: the fluid moves as a force per length on the
+/// centrelines makes it move, linear along each edge, and nodes move with it. With f_j the force per length at node j
+/// and w_j its length (half of its edges), that is 8 pi mu v_i = sum of M_ij f_j. The forces on nodes are w_j f_j, so
+/// their mobility is B_ij = M_ij / w_j: by reciprocity it is symmetric but for what its quadrature leaves, and what is
+/// solved here is A = (B + B^T) / 2, which is positive definite: rods never gain energy from a fluid at rest, and what
+/// one rod does to another, that does to it. The change is of the order of the quadrature.
+///
+/// Without inertia the fluid answers at once: force = -8 pi mu A^-1 v, with A at given positions. Spin about tangents
+/// meets no resistance.
+
+#include <Eigen/Cholesky>
+#include <vector>
+
+#include "forces/stokeslet_kernels.hpp"
+#include "model/mass_matrix.hpp"
+
+namespace withe {
+
+/// Resistance per length and viscosity to waves of wavenumber k along an infinite line: the smaller mobility is that
+/// along it or across it, 8 pi / min(4 K0(x), 2 K0(x) + 2 x K1(x)), x = k times the regularization, K modified Bessel
+/// functions; from the transform of the kernel in stokeslet_kernels.hpp.
+double wave_resistance(double x);
+
+class StokesletFluid {
+ public:
+  explicit StokesletFluid(const Model& model);
+
+  /// Force per viscosity, -8 pi A^-1 v, on the nodes at q that move with `velocity`; both per unknown. False where no
+  /// solution was found.
+  bool solve(const VectorX& q, const VectorX& velocity, VectorX& force);
+  /// A drag that couples neighbours only and is no smaller than the fluid's on any motion of a rod, but for a quarter
+  /// at its ends [N s / m]: that of waves of wavenumber 1 / regularization across, and for shorter ones, up to two
+  /// edges long, what they meet more.
+  void set_local_drag(double viscosity, MassMatrix& drag) const;
+  /// A at q, three rows a node [1 / m]: 8 pi mu times velocity per force.
+  Eigen::MatrixXd mobility(const VectorX& q);
+  /// As it was before its first solution.
+  void forget();
+  /// Of the last solution.
+  int iterations() const { return iterations_; }
+
+ private:
+  /// Nodes next to each other, whose own mobility is factorised.
+  struct Chunk {
+    std::vector<int> nodes;
+    Eigen::LLT<Eigen::MatrixXd> factor;
+    Eigen::MatrixXd matrix;
+    VectorX part;
+  };
+  void place(const VectorX& q);
+  void assemble();
+  void add_row(int node);
+  double* row(int node, int entry);
+  bool factorize();
+  void precondition(const VectorX& from, VectorX& to);
+  void guess();
+  bool iterate();
+
+  const Model& model_;
+  double regularization_;
+  std::ptrdiff_t line_;  ///< numbers a component
+  VectorX node_length_, inverse_length_;
+  // One slot for each node of each rod, one after the other; segment s runs from slot s to s + 1, or is none.
+  std::vector<int> slot_node_;
+  std::vector<int> segment_edge_;  ///< -1: none
+  std::ptrdiff_t segments_;        ///< with those that fill the last line
+  VectorX start_, direction_, length_, inverse_segment_, of_start_, of_end_;
+  VectorX lower_, diagonal_;
+  std::vector<std::ptrdiff_t> row_start_;
+  std::vector<Chunk> chunks_;
+  VectorX position_, right_, solution_, residual_, scaled_, search_, image_;
+  VectorX past_[2];  ///< solutions before the last
+  int known_ = 0;    ///< how many there are
+  bool factorized_ = false;
+  int iterations_ = 0, fresh_iterations_ = 0;
+};
+
+}  // namespace withe

@@ -1,0 +1,124 @@
+"""Fluids through the scene: what is refused, settings, snapshots, the plan."""
+
+import pickle
+
+import numpy as np
+import pytest
+
+import withe
+
+RUBBER = withe.Material(youngs_modulus=1e6, density=1100.0)
+
+
+def scene_with(radius=2e-3, **fluid):
+    scene = withe.Scene()
+    arm = scene.add_rod(start=(0, 0, 0), end=(0.2, 0, 0), nodes=16, radius=radius, material=RUBBER, name="arm")
+    scene.clamp(arm.start)
+    if fluid:
+        scene.add_fluid(**fluid)
+    return scene
+
+
+@pytest.mark.parametrize("model", ["stokeslets", "resistive"])
+def test_a_fluid_slows_a_falling_arm_and_its_work_is_dissipated(model):
+    dry, wet = (s.build(time_step=2e-3) for s in (scene_with(), scene_with(viscosity=0.5, model=model)))
+    for simulation in (dry, wet):
+        simulation.step(50)
+    assert wet.energy().kinetic < 0.5 * dry.energy().kinetic
+    assert dry.energy().dissipated == 0.0
+    assert wet.energy().dissipated > wet.energy().kinetic
+    assert wet.energy().total + wet.energy().dissipated == pytest.approx(0.0, abs=1e-4 * wet.energy().dissipated)
+
+
+def test_the_regularization_is_that_of_cylinders_unless_it_is_given():
+    given = scene_with(viscosity=0.5, regularization=np.sqrt(np.e) * 2e-3).build(time_step=2e-3)
+    default = scene_with(viscosity=0.5).build(time_step=2e-3)
+    given.step(5)
+    default.step(5)
+    assert given.positions() == pytest.approx(default.positions(), rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("fluid", "message"),
+    [
+        ({"viscosity": 0.0}, "viscosity of the fluid must be positive, got 0"),
+        ({"viscosity": float("nan")}, "viscosity of the fluid must be finite"),
+        ({"viscosity": 1.0, "model": "air"}, "model of the fluid must be 'stokeslets' or 'resistive', got 'air'"),
+        ({"viscosity": 1.0, "regularization": -1.0}, "regularization of the fluid must be positive, got -1"),
+        ({"viscosity": 1.0, "wavelength": 0.0}, "wavelength of the fluid must be positive, got 0"),
+    ],
+)
+def test_numbers_out_of_range_are_named(fluid, message):
+    with pytest.raises(ValueError, match=message):
+        scene_with().add_fluid(**fluid)
+
+
+def test_a_scene_has_one_fluid():
+    scene = scene_with(viscosity=1.0, name="honey")
+    with pytest.raises(ValueError, match="fluid must be the only one: the scene has 'honey'"):
+        scene.add_fluid(viscosity=2.0)
+
+
+@pytest.mark.parametrize(
+    ("fluid", "message"),
+    [
+        ({"regularization": 0.05}, "regularization of the fluid must not exceed 3 edges"),
+        ({"model": "resistive", "wavelength": 5e-3}, "wavelength of the fluid must exceed 5.6 radii of every rod"),
+    ],
+)
+def test_numbers_that_do_not_go_with_the_rods_are_refused_by_build(fluid, message):
+    with pytest.raises(ValueError, match=message):
+        scene_with(viscosity=1.0, **fluid).build()
+
+
+def test_rods_of_several_radii_want_a_regularization():
+    scene = scene_with(viscosity=1.0)
+    scene.add_rod(start=(0, 1, 0), end=(0.2, 1, 0), nodes=8, radius=4e-3, material=RUBBER)
+    with pytest.raises(ValueError, match="regularization of the fluid must be given where radii differ"):
+        scene.build()
+
+
+def test_steps_that_go_back_in_time_refuse_a_fluid():
+    with pytest.raises(ValueError, match="goes back in time within each step, which a fluid does not allow"):
+        scene_with(viscosity=1.0).build(integrator="fourth_order")
+
+
+def test_viscosity_is_set_while_running_and_nothing_else_is():
+    simulation = scene_with(viscosity=1.0, name="honey").build(time_step=2e-3)
+    fluid = simulation.get("honey", "viscosity")
+    assert fluid == 1.0
+    simulation.set("honey", viscosity=2.0)
+    assert simulation.get("honey", "viscosity") == 2.0
+    with pytest.raises(ValueError, match="viscosity of 'honey' must be positive"):
+        simulation.set("honey", viscosity=-1.0)
+    with pytest.raises(ValueError, match="regularization"):
+        simulation.set("honey", regularization=1e-3)
+    simulation.reset()
+    assert simulation.get("honey", "viscosity") == 1.0
+
+
+@pytest.mark.parametrize("model", ["stokeslets", "resistive"])
+def test_copies_pickles_and_snapshots_go_on_with_the_same_bits(model, tmp_path):
+    simulation = scene_with(viscosity=0.5, model=model, name="honey").build(time_step=2e-3)
+    simulation.step(7)
+    simulation.set("honey", viscosity=0.3)
+    state = simulation.snapshot()
+    loaded = withe.Snapshot.load(state.save(tmp_path / "state.npz"))
+    others = [simulation.copy(), pickle.loads(pickle.dumps(simulation))]
+    simulation.step(7)
+    for other in others:
+        other.step(7)
+        assert np.array_equal(other.positions(), simulation.positions())
+    assert loaded == state
+    simulation.restore(loaded)
+    assert simulation.get("honey", "viscosity") == 0.3
+    simulation.step(7)
+    assert np.array_equal(others[0].positions(), simulation.positions())
+
+
+def test_the_plan_tells_of_the_fluid():
+    assert "no fluid" in str(scene_with().build().plan)
+    assert "Stokeslet segments couple all 16 nodes" in str(scene_with(viscosity=1.0).build().plan)
+    resistive = str(scene_with(viscosity=1.0, model="resistive").build().plan)
+    assert "resistive-force theory, implicit" in resistive
+    assert "unsymmetric" in resistive
