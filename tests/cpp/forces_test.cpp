@@ -64,7 +64,15 @@ std::vector<Case> cases_with(const LoadCase& load, bool planar) {
                         : load.kind == LoadKind::moment ? Vector3(0.0, 0.9, 0.0)
                                                         : Vector3(0.7, 0.0, -0.4);
   builder.load(load.kind, load.pass, value, load.follower);
-  return testing::states_of(load.name, builder.scene);
+  std::vector<Case> cases = testing::states_of(load.name, builder.scene);
+  // As far from its source frame as a Newton iterate may try: transport is singular at 180 degrees.
+  for (double turn : {150.0, 170.0}) {
+    cases.push_back(cases.front());
+    cases.back().name = std::string(load.name) + ", turned by " + std::to_string(turn) + " degrees within the step";
+    cases.back().increment = 1e-3;
+    testing::turn_within_step(cases.back(), turn * testing::kPi / 180.0);
+  }
+  return cases;
 }
 
 TEST(Loads, JacobiansAreExactInEveryState) {

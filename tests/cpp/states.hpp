@@ -18,9 +18,8 @@ struct Case {
 
 inline std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
-/// Moves every unknown by `size` times a normal number; the twist branch of the state goes along.
-inline void perturb(Case& c, RandomNumbers& random, double size) {
-  c.q += size * random.vector(c.q.size());
+/// Takes the branch of every twist from where the case is.
+inline void follow_twists(Case& c) {
   Configuration configuration;
   compute_configuration(c.model, c.state, c.q, configuration);
   if (c.model.planar()) return;
@@ -28,9 +27,14 @@ inline void perturb(Case& c, RandomNumbers& random, double size) {
   c.state.half_tau = configuration.half_strain.col(2);
 }
 
-/// Turns the positions by 30 degrees, the source frames staying where they are.
-inline void turn_within_step(Case& c) {
-  const double angle = kPi / 6.0;
+/// Moves every unknown by `size` times a normal number; the twist branch of the state goes along.
+inline void perturb(Case& c, RandomNumbers& random, double size) {
+  c.q += size * random.vector(c.q.size());
+  follow_twists(c);
+}
+
+/// Turns the positions by an angle, 30 degrees by default, the source frames staying where they are.
+inline void turn_within_step(Case& c, double angle = kPi / 6.0) {
   for (int i = 0; i < c.model.node_count; ++i) {
     const int dof = c.model.node_dof[at(i)];
     if (c.model.planar())
@@ -70,6 +74,28 @@ inline std::vector<Case> states_of(const std::string& name, const SceneDescripti
   return cases;
 }
 
+/// The drawn state, but joints and clamps have turned until they nearly point back along their first edge.
+inline Case with_frames_turned(const std::string& name, const SceneDescription& scene, double degrees) {
+  Case c = states_of(name, scene).front();
+  c.name = name + ", frames turned by " + std::to_string(degrees) + " degrees";
+  c.increment = 1e-3;
+  const double angle = degrees * kPi / 180.0;
+  Configuration drawn;
+  compute_configuration(c.model, c.state, c.q, drawn);
+  for (std::size_t h = c.model.half.size(); h-- > 0;) {
+    const FrameStencil& s = c.model.half[h];
+    if (c.model.planar()) {
+      c.q(c.model.frame_dof[at(s.frame)]) = angle;
+      continue;
+    }
+    const Vector3 tangent = to_eigen(drawn.edge[at(s.edge)].tangent), attached = to_eigen(drawn.attached[h].tangent);
+    const Vector3 back = rotation_exp(angle * tangent.unitOrthogonal()) * tangent;
+    c.state.frame[at(s.frame)] = Eigen::Quaterniond::FromTwoVectors(attached, back).toRotationMatrix();
+  }
+  follow_twists(c);
+  return c;
+}
+
 /// A revolute joint in space: a bar in two rods, rigidly joined, and a stem that turns about an axis.
 inline SceneBuilder hinged(const RodMaterial& material = {}) {
   SceneBuilder builder;
@@ -95,6 +121,8 @@ inline std::vector<Case> all_cases(const RodMaterial& given = {}) {
   std::vector<Case> cases;
   const auto add = [&](const std::string& name, const SceneDescription& scene) {
     for (Case& c : states_of(name, scene)) cases.push_back(std::move(c));
+    if (cases.back().model.frame_count == 0) return;
+    for (double turn : {150.0, 165.0}) cases.push_back(with_frames_turned(name, scene, turn));
   };
   SceneBuilder open;
   open.add_rod(helix(6), curved);
