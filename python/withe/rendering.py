@@ -158,11 +158,11 @@ class Stage:
         """What the camera sees, shape (height, width, 3)."""
         self.plotter.render()
         fine = self.plotter.screenshot(return_img=True)[..., :3]
-        if self._fineness == 1:
-            return np.asarray(fine, np.uint8)
-        height, width = fine.shape[0] // self._fineness, fine.shape[1] // self._fineness
-        blocks = fine.reshape(height, self._fineness, width, self._fineness, 3)
-        return np.asarray(blocks.mean(axis=(1, 3), dtype=np.float32) + 0.5, np.uint8)
+        step, area = self._fineness, self._fineness**2
+        sums = np.full((self.size[1], self.size[0], 3), area // 2, np.uint16)
+        for row, column in np.ndindex(step, step):  # many times faster than the mean over blocks
+            sums += fine[row::step, column::step]
+        return np.asarray(sums // area, np.uint8)
 
     def close(self) -> None:
         """Free the window."""
