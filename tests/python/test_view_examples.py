@@ -11,6 +11,7 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent.parent
 # Options of each example, the number that it prints, and between what that number must lie.
 EXAMPLES = {
+    "flagella.py": (["--step", "2e-3", "--duration", "6"], r"drawn together by (\d+)%", 20.0, 80.0),
     "friction.py": (["--forces", "11"], r"at most ([.\d]+)% off", 0.0, 1.0),
     "helix.py": ([], r"(\d+) um from the public code", 0.0, 100.0),
     "knot.py": (["--nodes", "301", "--points", "2"], r" 200 .* ([-+.\d]+)% ", -6.0, 6.0),
