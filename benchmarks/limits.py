@@ -1,16 +1,16 @@
 """Limits in space and time of the motions of `rods_in_motion`, ours and PyElastica's.
 
-    python benchmarks/limits.py
+    python benchmarks/limits.py [withe | elastica]
 
-computes them anew (some minutes) and writes ``benchmarks/data/limits.npz``: for every case the displacement of the tip
-at even times, and how far two extrapolations from different meshes are apart. The two limits differ, because the rods
-of PyElastica shear and turn with inertia, and ours do neither.
+computes them anew (some minutes; of one side only, where it is named) and writes ``benchmarks/data/limits.npz``:
+for every case the displacement of the tip at even times, and how far two extrapolations from different meshes are
+apart. The two limits differ, because the rods of PyElastica shear and turn with inertia, and ours do neither.
 """
 
 from __future__ import annotations
 
+import argparse
 import concurrent.futures
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -67,9 +67,9 @@ def _job(key: tuple[str, str, int]) -> np.ndarray:
     return (_ours if side == "withe" else _elastica)(CASES[name], level)
 
 
-def compute(path: Path = LIMITS) -> None:
-    """Compute all limits on all processors, and write them."""
-    keys = [(side, name, level) for level in (2, 1, 0) for side in ("elastica", "withe") for name in CASES]
+def compute(sides: list[str], path: Path = LIMITS) -> None:
+    """Compute the limits of some sides on all processors, and write them beside the others."""
+    keys = [(side, name, level) for level in (2, 1, 0) for side in sides for name in CASES]
     tips: dict[tuple[str, str, int], np.ndarray] = {}
     with bar(len(keys), "limits") as shown, concurrent.futures.ProcessPoolExecutor() as pool:
         futures = {pool.submit(_job, key): key for key in keys}
@@ -77,7 +77,10 @@ def compute(path: Path = LIMITS) -> None:
             tips[futures[future]] = future.result()
             shown.advance(1)
     arrays: dict[str, np.ndarray] = {}
-    for side in ("withe", "elastica"):
+    if path.exists():
+        with np.load(path) as kept:
+            arrays.update(kept)
+    for side in sides:
         for name, case in CASES.items():
             # PyElastica's first edge is half behind the wall.
             sizes = [
@@ -107,4 +110,7 @@ def load_limits(side: str) -> dict[str, tuple[Motion, float]]:
 
 
 if __name__ == "__main__":
-    sys.exit(compute())
+    parser = argparse.ArgumentParser(description="Limits in space and time of the motions that are compared.")
+    parser.add_argument("side", nargs="?", choices=["elastica", "withe"])
+    asked = parser.parse_args().side
+    compute([asked] if asked else ["elastica", "withe"])

@@ -107,8 +107,13 @@ def simulation(case: Case, edges: int, **options: object) -> withe.Simulation:
     material = withe.Material(youngs_modulus=case.youngs_modulus, poisson_ratio=0.5, density=case.density)
     s = np.linspace(0.0, case.length, edges + 1)
     beam = case.kind == "beam"
+    fine = np.linspace(0.0, case.length, edges * (1 if beam else 200) + 1)
     rod = scene.add_rod(
-        points=centreline(case, s), radius=case.radius, material=material, normal=(0, 0, 1) if beam else None
+        points=centreline(case, fine),
+        nodes=edges + 1,
+        radius=case.radius,
+        material=material,
+        normal=(0, 0, 1) if beam else None,
     )
     scene.clamp(rod.start)
     if beam:

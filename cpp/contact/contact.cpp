@@ -33,11 +33,11 @@ void Contact::set_parameters(const Parameters& parameters) {
   const double given = model_.description.contact.stiffness;
   const std::size_t rods = model_.description.rods.size();
   least_stiffness_.setConstant(static_cast<Eigen::Index>(rods), given);
-  edge_mass_ = parameters.edge_density.cwiseProduct(model_.edge_length);
+  edge_mass_ = parameters.edge_density.cwiseProduct(model_.edge_arc);
   for (int e = 0; e < model_.edge_count && !(given > 0.0); ++e) {
     const double r = surfaces_.radius(e);
     if (!(r > 0.0)) continue;
-    const double weight = parameters.edge_density(e) * model_.edge_length(e) * parameters.gravity.norm();
+    const double weight = parameters.edge_density(e) * model_.edge_arc(e) * parameters.gravity.norm();
     const double force = weight + 1e-4 * parameters.edge_bend.row(e).maxCoeff() / (r * r);
     double& least = least_stiffness_(model_.edge_rod[at(e)]);
     least = std::max(least, force / (2.0 * kDepth * r));

@@ -132,7 +132,7 @@ Loads resolve_loads(const Model& model) {
       for (int e = first; e <= last; ++e)
         for (int node : {model.edge_tail[at(e)], model.edge_head[at(e)]})
           loads.pieces.push_back(
-              {load.follower ? LoadShape::follower : LoadShape::dead_node, index, 0.5 * model.edge_length(e), node, e});
+              {load.follower ? LoadShape::follower : LoadShape::dead_node, index, 0.5 * model.edge_arc(e), node, e});
     } else {
       const int node = rod.nodes[at(load.pass.node)];
       const int count = last - first + 1;

@@ -22,6 +22,10 @@ struct Cluster {
   int hinge = -1;
 };
 
+VectorX to_vector(const std::vector<double>& v) {
+  return Eigen::Map<const VectorX>(v.data(), static_cast<Eigen::Index>(v.size()));
+}
+
 class Builder {
  public:
   explicit Builder(Model& model) : model_(model), scene_(model.description) {}
@@ -65,11 +69,12 @@ class Builder {
   void add_edges() {
     model_.node_count = static_cast<int>(scene_.positions.rows());
     model_.rod_first_edge = {0};
-    std::vector<double> lengths;
+    std::vector<double> lengths, arcs;
     double longest = 0.0;
     for (std::size_t r = 0; r < scene_.rods.size(); ++r) {
       const RodDescription& d = scene_.rods[r];
       const int count = static_cast<int>(d.nodes.size()) - (d.closed ? 0 : 1);
+      double turn = 0.0;
       for (int e = 0; e < count; ++e) {
         const int tail = d.nodes[static_cast<std::size_t>(e)];
         const int head = d.nodes[static_cast<std::size_t>(e + 1) % d.nodes.size()];
@@ -82,12 +87,16 @@ class Builder {
         model_.initial_tangent.push_back(to_vec3(t));
         model_.initial_director.push_back(to_vec3(director));
         lengths.push_back(d.rest_lengths(e));
+        arcs.push_back(d.arc_lengths.size() > 0 ? d.arc_lengths(e) : d.rest_lengths(e));
+        turn += std::sqrt(square_of_turn(lengths.back(), arcs.back()));
       }
+      model_.rod_curved.push_back(turn > 1.0);
       longest = std::max(longest, d.rest_lengths.sum());
       model_.rod_first_edge.push_back(static_cast<int>(lengths.size()));
     }
     model_.edge_count = static_cast<int>(lengths.size());
-    model_.edge_length = Eigen::Map<VectorX>(lengths.data(), static_cast<Eigen::Index>(lengths.size()));
+    model_.edge_length = to_vector(lengths);
+    model_.edge_arc = to_vector(arcs);
     model_.length_scale = longest;
     if (!model_.planar()) return;
     for (std::size_t r = 0; r < scene_.rods.size(); ++r) {
@@ -200,7 +209,7 @@ class Builder {
     const int nearest = stencils == 0 ? -1 : std::clamp(pass.node - shift, 0, stencils - 1);
     const int index = static_cast<int>(model_.half.size());
     model_.half.push_back({cluster.frame, edge, cluster.hinge, frame_first, drawn_frame_at(pass)});
-    half_voronoi_.push_back(0.5 * model_.edge_length(edge));
+    half_voronoi_.push_back(0.5 * model_.edge_arc(edge));
     model_.half_owner.emplace_back(pass.rod, nearest);
     const int own = pass.node - shift;
     if (own >= 0 && own < stencils) {
@@ -220,7 +229,7 @@ class Builder {
     };
     model_.bend.push_back({{e0, e1}, {end(e0, true, s0), end(e0, false, s0), end(e1, false, s1)}, {s0, s1}});
     model_.bend_owner.push_back(owner);
-    bend_voronoi_.push_back(0.5 * (model_.edge_length(e0) + model_.edge_length(e1)));
+    bend_voronoi_.push_back(0.5 * (model_.edge_arc(e0) + model_.edge_arc(e1)));
     offsets_keep_drawn_.push_back(keep_drawn);
     return static_cast<int>(model_.bend.size()) - 1;
   }
@@ -253,11 +262,8 @@ class Builder {
         add_bend(edges_at(a).first, edges_at(b).second, 1, 1, {-1, -1}, true);
       }
     }
-    const auto map = [](const std::vector<double>& v) {
-      return VectorX(Eigen::Map<const VectorX>(v.data(), static_cast<Eigen::Index>(v.size())));
-    };
-    model_.bend_voronoi = map(bend_voronoi_);
-    model_.half_voronoi = map(half_voronoi_);
+    model_.bend_voronoi = to_vector(bend_voronoi_);
+    model_.half_voronoi = to_vector(half_voronoi_);
     share_bending();
   }
 

@@ -18,6 +18,7 @@ struct RodDescription {
   bool closed = false;
   MatrixX3 directors;          ///< first director of each edge, unit length, normal to the edge
   VectorX rest_lengths;        ///< [m]
+  VectorX arc_lengths;         ///< of the curve that the edges are chords of [m]; empty: the edges are the rod
   VectorX stretch_stiffness;   ///< EA [N]
   MatrixX2 bend_stiffness;     ///< EI1, EI2 [N m^2]: resisting curvature towards d1 and d2
   VectorX twist_stiffness;     ///< GJ [N m^2]

@@ -103,7 +103,8 @@ void add_constraints(Model& model) {
   }
   model.edge_lumped.clear();
   for (int e = 0; e < model.edge_count; ++e)
-    model.edge_lumped.push_back(node_held[at(model.edge_tail[at(e)])] || node_held[at(model.edge_head[at(e)])]);
+    model.edge_lumped.push_back(model.rod_curved[at(model.edge_rod[at(e)])] || node_held[at(model.edge_tail[at(e)])] ||
+                                node_held[at(model.edge_head[at(e)])]);
 }
 
 }  // namespace withe

@@ -21,7 +21,7 @@ void set_mass(const Model& model, const Parameters& p, MassMatrix& mass) {
   if (p.lumped)
     mass.coupling.setZero(model.edge_count);
   else
-    mass.coupling = p.edge_density.cwiseProduct(model.edge_length) / 6.0;
+    mass.coupling = p.edge_density.cwiseProduct(model.edge_arc) / 6.0;
   for (int e = 0; e < model.edge_count; ++e)
     if (model.edge_lumped[at(e)]) mass.coupling(e) = 0.0;
 }

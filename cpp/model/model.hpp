@@ -118,7 +118,9 @@ struct Model {
   std::vector<int> edge_rod;
   std::vector<int> edge_tail, edge_head;
   VectorX edge_length;            ///< at rest [m]
-  std::vector<bool> edge_lumped;  ///< whether a support holds one of its nodes; see mass_matrix.hpp
+  VectorX edge_arc;               ///< of the rod that an edge is the chord of [m]
+  std::vector<bool> rod_curved;   ///< whether its edges are chords of arcs of more than a radian in all
+  std::vector<bool> edge_lumped;  ///< whether its mass is at its nodes; see mass_matrix.hpp
   std::vector<BendStencil> bend;
   std::vector<int> reversed_bend;  ///< stencils with an edge against its rod
   std::vector<FrameStencil> half;
@@ -166,6 +168,9 @@ void update_natural(const Model& model, Parameters& parameters);
 /// The plane that holds the whole scene, or nothing (with the reason). A straight scene has one only when `asked`: that
 /// of its first director.
 std::optional<Plane> find_plane(const SceneDescription& description, std::optional<bool> asked, std::string& reason);
+
+/// Square of the angle by which an arc of `arc` over a chord of `chord` turns [rad^2], to its fourth power.
+inline double square_of_turn(double chord, double arc) { return 24.0 * (arc / chord - 1.0); }
 
 /// Discrete curvature 2 tan(|kappa| V / 2) along kappa. Needs |kappa| V < pi.
 Vector2 discrete_curvature(const Vector2& smooth, double voronoi);

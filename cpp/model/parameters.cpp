@@ -89,7 +89,7 @@ void update_natural(const Model& model, Parameters& p) {
       const int stencils = static_cast<int>(p.natural_twist[static_cast<std::size_t>(rod)].size());
       if (stencils == 0 || model.bend_owner[b].second < -1) continue;
       const int nearest = edge == model.rod_first_edge[static_cast<std::size_t>(rod)] ? 0 : stencils - 1;
-      p.bend_natural.row(static_cast<Eigen::Index>(b)) += strain(rod, nearest, 0.5 * model.edge_length(edge));
+      p.bend_natural.row(static_cast<Eigen::Index>(b)) += strain(rod, nearest, 0.5 * model.edge_arc(edge));
     }
   }
   p.half_natural.resize(static_cast<Eigen::Index>(model.half.size()), 3);
@@ -104,12 +104,12 @@ void update_derived(const Model& model, Parameters& p) {
   p.node_drag = VectorX::Zero(model.node_count);
   p.edge_inertia.resize(model.edge_count);
   for (int e = 0; e < model.edge_count; ++e) {
-    const double half = 0.5 * model.edge_length(e);
+    const double half = 0.5 * model.edge_arc(e);
     for (int node : {model.edge_tail[static_cast<std::size_t>(e)], model.edge_head[static_cast<std::size_t>(e)]}) {
       p.node_mass(node) += half * p.edge_density(e);
       p.node_drag(node) += half * p.edge_drag(e);
     }
-    p.edge_inertia(e) = model.edge_length(e) * p.edge_rotary(e);
+    p.edge_inertia(e) = model.edge_arc(e) * p.edge_rotary(e);
   }
   p.dragged = (p.node_drag.array() != 0.0).any();
   p.viscous = (p.edge_viscous_time.array() != 0.0).any();
@@ -125,17 +125,29 @@ void update_derived(const Model& model, Parameters& p) {
   const auto series = [](double k0, double v0, double k1, double v1) {
     return k0 == 0.0 && k1 == 0.0 ? 0.0 : 1.0 / (v0 / k0 + v1 / k1);
   };
+  // A moment along the middle of an arc that turns by phi bends its ends, to either side: 1 / Kt + phi^2 / (12 K), K
+  // against bending about the arc's normal.
+  const auto twist_of_arc = [&](double twist, const Vector2& bend, std::pair<int, int> owner, double square) {
+    if (!(square > 0.0) || owner.first < 0 || owner.second < 0 || twist == 0.0 || bend.minCoeff() <= 0.0) return twist;
+    const Vector2 k = model.description.rods[static_cast<std::size_t>(owner.first)].natural_curvature.row(owner.second);
+    if (k.squaredNorm() == 0.0) return twist;
+    const Vector2 share = k.cwiseAbs2() / k.squaredNorm();
+    return 1.0 / (1.0 / twist + square / 12.0 * (share(0) / bend(1) + share(1) / bend(0)));
+  };
+  const auto turn = [&](int e) { return square_of_turn(model.edge_length(e), model.edge_arc(e)); };
   const auto n = static_cast<Eigen::Index>(model.bend.size());
   p.bend_stiffness.resize(n, 3);
   p.bend_viscous_time.resize(n);
   for (Eigen::Index i = 0; i < n; ++i) {
     const BendStencil& s = model.bend[static_cast<std::size_t>(i)];
     const int a = s.edge[0], b = s.edge[1];
-    const double la = model.edge_length(a), lb = model.edge_length(b);
+    const double la = model.edge_arc(a), lb = model.edge_arc(b);
     const Vector2 ba = bend_of(a), bb = bend_of(b);
     const double va = model.bend_share(i, 0) * la, vb = model.bend_share(i, 1) * lb;
-    p.bend_stiffness.row(i) << series(ba(0), va, bb(0), vb), series(ba(1), va, bb(1), vb),
-        series(p.edge_twist(a), 0.5 * la, p.edge_twist(b), 0.5 * lb);
+    const Vector2 bending(series(ba(0), va, bb(0), vb), series(ba(1), va, bb(1), vb));
+    const double twist = series(p.edge_twist(a), 0.5 * la, p.edge_twist(b), 0.5 * lb);
+    const auto& owner = model.bend_owner[static_cast<std::size_t>(i)];
+    p.bend_stiffness.row(i) << bending.transpose(), twist_of_arc(twist, bending, owner, 0.5 * (turn(a) + turn(b)));
     p.bend_viscous_time(i) = (la * p.edge_viscous_time(a) + lb * p.edge_viscous_time(b)) / (la + lb);
   }
   const auto m = static_cast<Eigen::Index>(model.half.size());
@@ -145,9 +157,10 @@ void update_derived(const Model& model, Parameters& p) {
   p.hinge_inertia = VectorX::Zero(at(static_cast<int>(model.hinges.size())));
   for (Eigen::Index i = 0; i < m; ++i) {
     const FrameStencil& s = model.half[static_cast<std::size_t>(i)];
-    const Vector2 b = bend_of(s.edge);
-    const double bending = 1.0 / (model.half_share(i) * model.edge_length(s.edge));
-    p.half_stiffness.row(i) << b(0) * bending, b(1) * bending, p.edge_twist(s.edge) / model.half_voronoi(i);
+    const Vector2 bending = bend_of(s.edge) / (model.half_share(i) * model.edge_arc(s.edge));
+    const double twist = p.edge_twist(s.edge) / model.half_voronoi(i);
+    const auto& owner = model.half_owner[static_cast<std::size_t>(i)];
+    p.half_stiffness.row(i) << bending.transpose(), twist_of_arc(twist, bending, owner, 0.25 * turn(s.edge));
     p.half_viscous_time(i) = p.edge_viscous_time(s.edge);
     // A frame carries the rotary inertia of the half edges attached to it.
     (s.hinge < 0 ? p.frame_inertia(s.frame) : p.hinge_inertia(s.hinge)) += 0.5 * p.edge_inertia(s.edge);

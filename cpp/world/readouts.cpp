@@ -55,8 +55,8 @@ MatrixX2 World::curvatures(int rod) const {
     if (places[s].bend >= 0) {
       const int b = places[s].bend;
       const auto& edge = self.model.bend[at(b)].edge;
-      const double carried = self.model.bend_share(b, 0) * self.model.edge_length(edge[0]) +
-                             self.model.bend_share(b, 1) * self.model.edge_length(edge[1]);
+      const double carried = self.model.bend_share(b, 0) * self.model.edge_arc(edge[0]) +
+                             self.model.bend_share(b, 1) * self.model.edge_arc(edge[1]);
       out.row(row) = smooth(c.bend_strain, b, self.model.bend_voronoi(b), carried, row);
       continue;
     }
@@ -64,7 +64,7 @@ MatrixX2 World::curvatures(int rod) const {
     for (int h : places[s].half)
       if (h >= 0) {
         const double v = self.model.half_voronoi(h);
-        const double carried = self.model.half_share(h) * self.model.edge_length(self.model.half[at(h)].edge);
+        const double carried = self.model.half_share(h) * self.model.edge_arc(self.model.half[at(h)].edge);
         out.row(row) += v * smooth(c.half_strain, h, v, carried, row);
         length += v;
       }

@@ -24,6 +24,7 @@ std::uint64_t fingerprint(const SceneDescription& scene) {
     w(static_cast<std::int64_t>(rod.nodes.size()));
     for (int node : rod.nodes) w(node);
     w(rod.rest_lengths);
+    w(rod.arc_lengths);
     w(rod.directors);
   }
   w(static_cast<std::int64_t>(scene.joints.size()));

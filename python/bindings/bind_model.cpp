@@ -32,6 +32,7 @@ void register_rod(py::module_& module) {
       .def_readwrite("closed", &RodDescription::closed)
       .def_readwrite("directors", &RodDescription::directors)
       .def_readwrite("rest_lengths", &RodDescription::rest_lengths)
+      .def_readwrite("arc_lengths", &RodDescription::arc_lengths)
       .def_readwrite("stretch_stiffness", &RodDescription::stretch_stiffness)
       .def_readwrite("bend_stiffness", &RodDescription::bend_stiffness)
       .def_readwrite("twist_stiffness", &RodDescription::twist_stiffness)

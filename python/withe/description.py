@@ -112,6 +112,7 @@ def _describe_rod(directory: Directory, rod: RodPart, coefficient: float) -> _co
     description.closed = rod.closed
     description.directors = rod.directors
     description.rest_lengths = rod.lengths
+    description.arc_lengths = rod.arcs
     description.natural_curvature = rod.natural_curvature
     description.natural_twist = rod.natural_twist
     description.contact_radius = rod.section.radii

@@ -52,16 +52,17 @@ def check_edges(points: FloatArray, closed: bool, owner: str) -> FloatArray:
     return np.asarray(lengths, np.float64)
 
 
-def resample(points: FloatArray, nodes: int, closed: bool) -> FloatArray:
-    """Points evenly spaced by arc length along a polyline; the ends of an open one are kept."""
+def resample(points: FloatArray, nodes: int, closed: bool) -> tuple[FloatArray, float]:
+    """Points evenly spaced by arc length along a polyline, and how far apart [m]; the ends of an open one are kept."""
     chain = np.concatenate([points, points[:1]]) if closed else points
     arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(chain, axis=0), axis=1))])
-    places = np.linspace(0.0, arc[-1], nodes + 1 if closed else nodes)[:nodes]
+    edges = nodes if closed else nodes - 1
+    places = np.linspace(0.0, arc[-1], edges + 1)[:nodes]
     result: FloatArray = np.stack([np.interp(places, arc, chain[:, axis]) for axis in range(3)], axis=1)
     result[0] = points[0]
     if not closed:
         result[-1] = points[-1]
-    return np.asarray(result, np.float64)
+    return np.asarray(result, np.float64), float(arc[-1]) / edges
 
 
 def default_normal(tangent: FloatArray) -> FloatArray:

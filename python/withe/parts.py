@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
 
 from withe import handles
+from withe.drawing import voronoi_lengths
 from withe.parameters import RodParameters
 from withe.sections import SectionProperties
 
@@ -56,6 +57,7 @@ class RodPart:
     tangents: FloatArray  # (edges, 3)
     directors: FloatArray  # first directors, (edges, 3)
     lengths: FloatArray  # (edges,) [m]
+    arcs: FloatArray  # of the curve that they are chords of, (edges,) [m]
     voronoi: FloatArray  # (stencils,) [m]
     section: SectionProperties
     parameters: RodParameters
@@ -66,6 +68,18 @@ class RodPart:
     def owner(self) -> str:
         """How errors call it."""
         return f"rod {self.name!r}"
+
+    def without_arcs(self) -> RodPart:
+        """The same shape, made of its edges instead of the arcs over them."""
+        voronoi = voronoi_lengths(self.lengths, self.closed)
+        longer = self.voronoi / voronoi
+        return replace(
+            self,
+            arcs=self.lengths,
+            voronoi=voronoi,
+            natural_curvature=self.natural_curvature * longer[:, None],
+            natural_twist=self.natural_twist * longer,
+        )
 
 
 @dataclass(frozen=True, eq=False)

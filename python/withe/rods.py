@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -50,17 +50,21 @@ def make_rod(
     """
     owner = f"rod {name!r}"
     closed = validation.truth(closed, f"closed of {owner}")
-    centreline = _centreline(start, end, points, nodes, closed, owner)
+    centreline, spacing = _centreline(start, end, points, nodes, closed, owner)
     lengths = drawing.check_edges(centreline, closed, owner)
     tangents = drawing.edge_vectors(centreline, closed) / lengths[:, None]
     directors = _directors(normal, tangents, owner)
     properties = _section(radius, section, len(lengths), owner)
     parameters = _parameters(material, stiffness, line_density, properties, owner)
 
-    voronoi = drawing.voronoi_lengths(lengths, closed)
-    validation.choice(natural, f"natural of {owner}", ("as_built", "straight"))
+    validation.choice(natural, f"natural of {owner}", get_args(Natural))
+    as_built = natural == "as_built"
+    arcs = lengths
+    if spacing is not None and as_built and natural_curvature is None:
+        arcs = np.maximum(lengths, spacing)
+    voronoi = drawing.voronoi_lengths(arcs, closed)
     curvature, twist = np.zeros((len(voronoi), 2)), np.zeros(len(voronoi))
-    if natural == "as_built":
+    if as_built:
         # Differences of coordinates leave this much of a turn in a straight rod.
         rounding = 16.0 * np.finfo(float).eps * max(1.0, float(np.abs(centreline).max() / lengths.min()))
         curvature, twist = drawing.natural_shape(tangents, directors, voronoi, closed, rounding)
@@ -77,6 +81,7 @@ def make_rod(
         tangents=tangents,
         directors=directors,
         lengths=lengths,
+        arcs=arcs,
         voronoi=voronoi,
         section=properties,
         parameters=parameters,
@@ -113,7 +118,10 @@ def twist_array(value: Any, voronoi: FloatArray, owner: str) -> FloatArray:
     return validation.per_item(value, f"natural_twist of {owner}", len(voronoi), "stencils", sign=True)
 
 
-def _centreline(start: Any, end: Any, points: Any, nodes: Any, closed: bool, owner: str) -> FloatArray:
+def _centreline(
+    start: Any, end: Any, points: Any, nodes: Any, closed: bool, owner: str
+) -> tuple[FloatArray, float | None]:
+    """Nodes, and how far they are apart along the curve that they were taken from, if they were."""
     if (points is None) == (start is None and end is None):
         raise ValueError(f"{owner} must have either points, or start and end")
     least = 3 if closed else 2
@@ -126,14 +134,14 @@ def _centreline(start: Any, end: Any, points: Any, nodes: Any, closed: bool, own
             raise ValueError(f"nodes of {owner} must be given for a rod from start to end")
         count = validation.integer(nodes, f"nodes of {owner}", least, _MAX_NODES)
         share = np.linspace(0.0, 1.0, count)[:, None]
-        return np.asarray((1.0 - share) * first + share * last, np.float64)
+        return np.asarray((1.0 - share) * first + share * last, np.float64), None
     line = validation.number_array(points, f"points of {owner}", ("n", 3))
     if closed and len(line) > 1 and np.abs(line[0] - line[-1]).max() <= 1e-9 * np.ptp(line, axis=0).max():
         line = line[:-1]
     if len(line) < (least if nodes is None else 2):
         raise ValueError(f"points of {owner} must be {least} or more, got {len(line)}")
     if nodes is None:
-        return line
+        return line, None
     count = validation.integer(nodes, f"nodes of {owner}", least, _MAX_NODES)
     if closed and len(line) < least:
         raise ValueError(f"points of {owner} must be {least} or more, got {len(line)}")

@@ -16,7 +16,7 @@ from withe.handles import Joint, NodeHandle, Rod, RodPlace, Support
 from withe.joints import connected, gather
 from withe.loads import Loads
 from withe.materials import Material, Section, Stiffness
-from withe.parts import JoinKind, JoinPart, JointForm, Pass, SupportPart
+from withe.parts import JoinKind, JoinPart, JointForm, Pass, RodPart, SupportPart
 from withe.rods import Natural, make_rod
 from withe.supports import check_not_held, make_clamp, make_pin
 
@@ -112,8 +112,9 @@ class Scene(Loads, Contacts, Fluids):
         start, end : array_like of shape (3,) [m]
             Ends of a straight rod of `nodes` nodes.
         points : array_like of shape (n, 3) [m]
-            Centreline instead. Its points are the nodes, unless `nodes` asks for so many evenly spaced
-            by arc length along it.
+            Centreline instead. Its points are the nodes, and the edges between them the rod; or `nodes`
+            asks for so many evenly spaced by arc length along it. Edges are then chords, and have the mass
+            and, where the rod is curved by nature, the compliance of their arcs: give smooth curves so.
         nodes : int
             Number of nodes, ends included.
         closed : bool
@@ -331,7 +332,8 @@ class Scene(Loads, Contacts, Fluids):
             Over which `tolerance` holds; 1 s by default.
         bending : {"angle", "tangent"}
             What bending strain is: the angle phi between two edges, to sixth order, or 2 tan(phi / 2) as in
-            [Bergou et al. 2008], which bends too stiffly on coarse meshes.
+            [Bergou et al. 2008], which bends too stiffly on coarse meshes, and with which edges are always the
+            rod and never chords of its arcs.
         solver : {"automatic", "band", "sparse"}
         line_search : {"automatic", "goldstein_price", "none"}
         mixed : bool
@@ -374,7 +376,10 @@ class Scene(Loads, Contacts, Fluids):
             max_iterations=max_iterations,
             max_halvings=max_halvings,
         )
-        return Simulation._build(self._directory.copy(), self._gravity.copy(), options)
+        directory = self._directory.copy()
+        if bending == "tangent":
+            directory.parts.update({rod.name: rod.without_arcs() for rod in directory.all(RodPart)})
+        return Simulation._build(directory, self._gravity.copy(), options)
 
     # Helpers
 

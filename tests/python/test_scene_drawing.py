@@ -117,6 +117,21 @@ def test_curvature_as_built_is_that_of_the_smooth_rod():
     assert np.allclose(fine.natural_curvature[:, 0], 1 / 0.25, rtol=1e-6)
     chord = 2 * 0.25 * np.sin(0.2)
     assert np.allclose(coarse.natural_curvature[:, 0], 0.4 / chord)
+    assert np.array_equal(coarse.arcs, coarse.lengths)
+
+
+def test_nodes_along_a_curve_have_its_lengths_and_curvature():
+    curve, chord = arc(1.2, 0.25, 10_001), 2 * 0.25 * np.sin(0.2)
+    part = rod(points=curve, nodes=4, normal=(0, 0, 1))
+    assert np.allclose(part.arcs, 0.25 * 0.4, rtol=1e-8)
+    assert np.allclose(part.lengths, chord, rtol=1e-7)
+    assert np.allclose(part.natural_curvature[:, 0], 1 / 0.25, rtol=1e-7)
+    edges = part.without_arcs()
+    assert np.allclose(edges.natural_curvature[:, 0], 0.4 / chord, rtol=1e-7)
+    assert np.array_equal(edges.arcs, part.lengths)
+    # What is straight, or curved as told, has the length of its edges.
+    for more in ({"natural": "straight"}, {"natural_curvature": (4.0, 0.0)}):
+        assert np.array_equal(rod(points=curve, nodes=4, normal=(0, 0, 1), **more).arcs, part.lengths)
 
 
 def test_twist_as_built_is_the_turn_of_the_directors_per_length():
