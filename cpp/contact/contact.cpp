@@ -13,6 +13,8 @@ std::size_t at(int i) { return static_cast<std::size_t>(i); }
 constexpr double kGive = 0.05;
 // Pairs farther apart than this beyond their reach, over it, are of no interest.
 constexpr double kFar = 0.6;
+// What rounding leaves of a distance to go.
+constexpr double kSafe = 1.0 - 1e-9;
 
 }  // namespace
 
@@ -92,6 +94,18 @@ void Contact::end_points(const ContactPair& pair, const VectorX& q, Vec3d (&x)[4
   }
 }
 
+/// The longest way of a node; NaN where one is.
+double Contact::farthest(const VectorX& change) const {
+  double most = 0.0;
+  for (int dof : model_.node_dof) {
+    double square = 0.0;
+    for (int k = 0; k < model_.dimension; ++k) square += change(dof + k) * change(dof + k);
+    if (std::isnan(square)) return square;
+    most = std::max(most, square);
+  }
+  return std::sqrt(most);
+}
+
 Contact::Touching Contact::touch(int index, const VectorX& q) const {
   const ContactPair& pair = pairs_[at(index)];
   Touching t;
@@ -108,7 +122,7 @@ Contact::Touching Contact::touch(int index, const VectorX& q) const {
   const Vec3d middle = 0.5 * (x[0] + x[1] - x[2] - x[3]), u = x[1] - x[0], v = x[3] - x[2];
   const double size = 0.5 * (std::sqrt(dot(u, u)) + std::sqrt(dot(v, v))) + (1.0 + kFar) * pair.reach();
   if (dot(middle, middle) > size * size) {
-    t.distance = INFINITY;
+    t.distance = std::sqrt(dot(middle, middle)) - size + (1.0 + kFar) * pair.reach();  // or more
     return t;
   }
   t.points = closest_points(x[0], x[1], x[2], x[3], pair.weight_a, pair.weight_b);
@@ -132,14 +146,25 @@ void Contact::begin(const State& state, double duration) {
 }
 
 void Contact::update(const VectorX& q1) {
+  moved_ += q1_.size() == q1.size() ? farthest(q1 - q1_) : INFINITY;
   if (outgrown(q1, nullptr)) find_pairs(q1, q1);
+  if (!std::isfinite(moved_)) {
+    moved_ = 0.0;
+    clear_.clear();
+  }
   q1_ = q1;
+  clear_.resize(pairs_.size(), -1.0);
   touching_ = lagged_;
   const ContactDescription& contact = model_.description.contact;
   for (int p = 0; p < static_cast<int>(pairs_.size()); ++p) {
+    if (clear_[at(p)] > moved_) continue;
     const ContactPair& pair = pairs_[at(p)];
     Touching t = touch(p, q1);
-    if (t.distance >= pair.reach()) continue;
+    if (t.distance >= pair.reach()) {
+      // A distance changes by no more than both edges move.
+      clear_[at(p)] = moved_ + kSafe * 0.5 * (t.distance - pair.reach());
+      continue;
+    }
     const ContactRecord* record = record_of(pair.key);
     t.stiffness =
         record ? record->stiffness : std::max(start_stiffness(pair, state_->contact_stiffness), impact_stiffness(pair));

@@ -128,6 +128,7 @@ class Contact {
   void values_at(const ContactPair& pair, const VectorX& q, double (&x)[kContactUnknowns]) const;
   void find_pairs(const VectorX& from, const VectorX& to);
   bool outgrown(const VectorX& q, const VectorX* change) const;
+  double farthest(const VectorX& change) const;
   double allowed_of(const ContactPair& pair, const VectorX& q, const VectorX& change) const;
   const ContactRecord* record_of(const ContactKey& key) const;
   double change_stiffness(const Touching& t, double ratio, double yielded, ContactRecord& record) const;
@@ -141,6 +142,8 @@ class Contact {
   std::vector<ContactPair> pairs_;  ///< obstacles' first, then candidates of the broad phase
   VectorX reference_;               ///< where the candidates belong
   double margin_ = 0;
+  std::vector<double> clear_;  ///< per pair: it touches nothing while `moved_` stays below [m]
+  double moved_ = 0;           ///< farthest that a node may have gone, summed over all q1 so far [m]
   const State* state_ = nullptr;
   double duration_ = 0, start_energy_ = 0;
   VectorX q1_;

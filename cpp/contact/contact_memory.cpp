@@ -203,6 +203,7 @@ void Contact::forget() {
   pairs_ = surfaces_.obstacle_pairs();
   elements_.clear();
   reference_.resize(0);
+  clear_.clear();
   touching_.clear();
   lagged_.clear();
   couple();

@@ -74,6 +74,7 @@ void Contact::find_pairs(const VectorX& from, const VectorX& to) {
     }
   }
   reference_ = to;
+  clear_.assign(pairs_.size(), -1.0);
 }
 
 int Contact::element_of(const ContactKey& key) const {
@@ -114,8 +115,11 @@ double Contact::allowed(const VectorX& q1, const VectorX& change) {
     find_pairs(q1, end);
   }
   double least = 1.0;
+  clear_.resize(pairs_.size(), -1.0);
+  const double here = moved_ + (q1_.size() == q1.size() ? farthest(q1 - q1_) : INFINITY), coming = farthest(change);
   for (std::size_t p = 0; p < pairs_.size(); ++p) {
     if (p < planes_only && pairs_[p].plane()) continue;
+    if (clear_[p] - here >= coming) continue;  // nothing will even touch
     least = std::min(least, allowed_of(pairs_[p], q1, change));
   }
   return least;
