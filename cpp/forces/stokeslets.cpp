@@ -13,6 +13,8 @@ constexpr int kMostNodes = 128;  // whose mobility is factorised as one
 constexpr int kMostIterations = 1000;
 constexpr double kTolerance = 1e-9;  // of the velocity, relative
 constexpr int kEntry[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
+constexpr double kRough = 0.03;  // of a motion that is resisted much
+constexpr int kWait = 12;        // solutions until it is looked for again
 // Where edges are much shorter than the regularization, forces that differ from node to node do not move the fluid.
 constexpr double kFinest = 1.0 / 3.0;
 
@@ -35,18 +37,10 @@ double wave_resistance(double x) {
 }
 
 void StokesletFluid::set_local_drag(double viscosity, MassMatrix& drag) const {
-  const double across = 8.0 * std::numbers::pi / (2.0 * bessel_k(0, 1.0) + 2.0 * bessel_k(1, 1.0));
   drag.rows.setZero(model_.dof_count);
   for (int i = 0; i < model_.node_count; ++i)
-    drag.rows.segment(model_.node_dof[at(i)], model_.dimension).setConstant(viscosity * across * node_length_[i]);
-  // The shortest wave that edges can tell moves them less than a smooth one: the transform of the hats, and its images.
-  constexpr double kHats = 8.0 / (std::numbers::pi * std::numbers::pi);
-  drag.coupling.resize(model_.edge_count);
-  for (int e = 0; e < model_.edge_count; ++e) {
-    const double length = model_.edge_length[e];
-    const double shortest = wave_resistance(std::numbers::pi * regularization_ / length) / kHats;
-    drag.coupling[e] = -0.25 * viscosity * length * std::max(shortest - across, 0.0);
-  }
+    drag.rows.segment(model_.node_dof[at(i)], model_.dimension).setConstant(viscosity * node_drag_[i]);
+  drag.coupling = -viscosity * edge_drag_;
 }
 
 StokesletFluid::StokesletFluid(const Model& model)
@@ -63,6 +57,16 @@ StokesletFluid::StokesletFluid(const Model& model)
   for (int e = 0; e < model.edge_count; ++e)
     for (int node : {model.edge_tail[at(e)], model.edge_head[at(e)]}) node_length_[node] += 0.5 * model.edge_length[e];
   inverse_length_ = node_length_.cwiseInverse();
+  const double across = 8.0 * std::numbers::pi / (2.0 * bessel_k(0, 1.0) + 2.0 * bessel_k(1, 1.0));
+  node_drag_ = across * node_length_;
+  // The shortest wave that edges can tell moves them less than a smooth one: the transform of the hats, and its images.
+  constexpr double kHats = 8.0 / (std::numbers::pi * std::numbers::pi);
+  edge_drag_.resize(model.edge_count);
+  for (int e = 0; e < model.edge_count; ++e) {
+    const double length = model.edge_length[e];
+    const double shortest = wave_resistance(std::numbers::pi * regularization_ / length) / kHats;
+    edge_drag_[e] = 0.25 * length * std::max(shortest - across, 0.0);
+  }
   std::vector<bool> taken(at(model.node_count), false);
   for (std::size_t r = 0; r + 1 < model.rod_first_edge.size(); ++r) {
     const int first = model.rod_first_edge[r], end = model.rod_first_edge[r + 1];
@@ -93,7 +97,8 @@ StokesletFluid::StokesletFluid(const Model& model)
   }
   lower_.setZero(size);
   diagonal_.setZero(kBlockEntries * line_);
-  for (VectorX* v : {&position_, &right_, &solution_, &residual_, &scaled_, &search_, &image_, &past_[0], &past_[1]})
+  for (VectorX* v :
+       {&position_, &right_, &solution_, &residual_, &scaled_, &search_, &image_, &past_[0], &past_[1], &wave_, &kept_})
     v->setZero(3 * line_);
   for (Chunk& chunk : chunks_) {
     const auto n = static_cast<Eigen::Index>(3 * chunk.nodes.size());
@@ -105,6 +110,9 @@ StokesletFluid::StokesletFluid(const Model& model)
 void StokesletFluid::forget() {
   known_ = 0;
   factorized_ = false;
+  waited_ = 0;
+  excess_ = 1.0;
+  wave_.setZero();
 }
 
 double* StokesletFluid::row(int node, int entry) {
@@ -209,10 +217,10 @@ void StokesletFluid::guess() {
 }
 
 /// Conjugate gradients.
-bool StokesletFluid::iterate() {
+bool StokesletFluid::iterate(double tolerance) {
   const BlockMatrix matrix{model_.node_count, line_, lower_.data(), diagonal_.data()};
   const auto multiply = [&](const VectorX& x, VectorX& y) { stokeslet_kernels().multiply(matrix, x.data(), y.data()); };
-  const double wanted = kTolerance * right_.norm();
+  const double wanted = tolerance * right_.norm();
   multiply(solution_, residual_);
   residual_ = right_ - residual_;
   double before = 0.0;
@@ -246,7 +254,7 @@ bool StokesletFluid::solve(const VectorX& q, const VectorX& velocity, VectorX& f
     return false;
   }
   guess();
-  const bool found = iterate();
+  const bool found = iterate(kTolerance);
   if (fresh) fresh_iterations_ = iterations_;
   if (!found) {
     forget();
@@ -257,6 +265,78 @@ bool StokesletFluid::solve(const VectorX& q, const VectorX& velocity, VectorX& f
     for (int k = 0; k < model_.dimension; ++k)
       force[model_.node_dof[at(i)] + k] = -8.0 * std::numbers::pi * solution_[k * line_ + i];
   return true;
+}
+
+/// y = what local drag and inertia do to x.
+void StokesletFluid::multiply_held(const VectorX& x, VectorX& y) const {
+  for (int k = 0; k < model_.dimension; ++k) {
+    const double* from = x.data() + k * line_;
+    double* to = y.data() + k * line_;
+    for (int i = 0; i < model_.node_count; ++i) to[i] = held_[i] * from[i];
+    for (int e = 0; e < model_.edge_count; ++e) {
+      const int a = model_.edge_tail[at(e)], b = model_.edge_head[at(e)];
+      const double pair = edge_drag_[e] * (from[a] - from[b]);
+      to[a] += pair;
+      to[b] -= pair;
+    }
+  }
+}
+
+/// Its inverse, roughly, by conjugate gradients.
+void StokesletFluid::solve_held(VectorX& x) {
+  residual_ = x;
+  x.setZero();
+  double before = 0.0;
+  const double wanted = kRough * residual_.norm();
+  for (int i = 0; i < kMostIterations && residual_.norm() > wanted; ++i) {
+    for (int k = 0; k < 3; ++k)
+      scaled_.segment(k * line_, model_.node_count) =
+          residual_.segment(k * line_, model_.node_count).cwiseQuotient(held_);
+    const double now = residual_.dot(scaled_);
+    search_ = scaled_ + (i == 0 ? 0.0 : now / before) * search_;
+    before = now;
+    multiply_held(search_, image_);
+    const double step = now / search_.dot(image_);
+    x += step * search_;
+    residual_ -= step * image_;
+  }
+}
+
+/// One power iteration; resistance of the motion that it finds over what local drag and inertia do.
+double StokesletFluid::sharpen_wave() {
+  right_ = wave_;
+  solution_.setZero();
+  if (!iterate(kRough)) return 1.0;
+  multiply_held(wave_, image_);
+  const double ratio = 8.0 * std::numbers::pi * wave_.dot(solution_) / wave_.dot(image_);
+  wave_ = solution_;
+  solve_held(wave_);
+  wave_ /= wave_.norm();
+  return ratio;
+}
+
+double StokesletFluid::excess(const VectorX& inertia, double limit) {
+  if (waited_ > 0) {
+    --waited_;
+    return excess_;
+  }
+  const bool first = wave_.isZero(0.0);
+  if (first)
+    for (int k = 0; k < model_.dimension; ++k)
+      for (int i = 0; i < model_.node_count; ++i) wave_[k * line_ + i] = std::sin(1.0 + 7.0 * i + 2.0 * k) + (i % 2);
+  held_ = node_drag_ + inertia;
+  kept_.swap(solution_);
+  const int iterations = iterations_;
+  double ratio = 0.0;
+  for (int i = 0; i < (first ? 12 : 2); ++i) ratio = sharpen_wave();
+  kept_.swap(solution_);
+  iterations_ = iterations;
+  // R <= ratio (D + M) is to be <= limit (excess D + M). An iteration comes from below.
+  const double wanted = 1.05 * ratio, share = inertia.cwiseQuotient(node_drag_).maxCoeff();
+  const double needed = (wanted + std::max(wanted - limit, 0.0) * share) / limit;
+  excess_ = needed <= 1.0 ? 1.0 : std::exp2(0.5 * std::ceil(2.0 * std::log2(needed)));
+  waited_ = kWait;
+  return excess_;
 }
 
 Eigen::MatrixXd StokesletFluid::mobility(const VectorX& q) {

@@ -31,6 +31,10 @@ class StokesletFluid {
   /// Force per viscosity, -8 pi A^-1 v, on the nodes at q that move with `velocity`; both per unknown. False where no
   /// solution was found.
   bool solve(const VectorX& q, const VectorX& velocity, VectorX& force);
+  /// Factor by which the local drag must grow, where rods nearly touch and move against each other, so that the
+  /// resistance is at most `limit` times that and the inertia, mass over viscosity and step (per node) [m]. Looked for
+  /// once in a while, at the positions of the last solution; a power of sqrt(2), or 1.
+  double excess(const VectorX& inertia, double limit);
   /// A drag that couples neighbours only and is no smaller than the fluid's on any motion of a rod, but for a quarter
   /// at its ends [N s / m]: that of waves of wavenumber 1 / regularization across, and for shorter ones, up to two
   /// edges long, what they meet more.
@@ -57,7 +61,10 @@ class StokesletFluid {
   bool factorize();
   void precondition(const VectorX& from, VectorX& to);
   void guess();
-  bool iterate();
+  bool iterate(double tolerance);
+  void multiply_held(const VectorX& x, VectorX& y) const;
+  void solve_held(VectorX& x);
+  double sharpen_wave();
 
   const Model& model_;
   double regularization_;
@@ -76,6 +83,11 @@ class StokesletFluid {
   int known_ = 0;    ///< how many there are
   bool factorized_ = false;
   int iterations_ = 0, fresh_iterations_ = 0;
+  VectorX node_drag_, edge_drag_;  ///< the local drag for unit viscosity: of nodes, and between them [m]
+  VectorX held_;                   ///< per node, local drag and inertia [m]
+  VectorX wave_, kept_;            ///< the motion that is resisted most compared with these
+  double excess_ = 1.0;
+  int waited_ = 0;
 };
 
 }  // namespace withe

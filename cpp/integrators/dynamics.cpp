@@ -187,6 +187,8 @@ bool begin_flow(Equations& equations, double dt, bool euler, const State& state,
   const Motion& past = state.motion;
   if (euler || past.known < 2)
     v = state.v;
+  else if (equations.flow_excess() > 1.0)
+    v = past.velocity[0];
   else
     v = past.velocity[0] + ((state.time + 0.5 * dt - past.time[0]) / (past.time[0] - past.time[1])) *
                                (past.velocity[0] - past.velocity[1]);

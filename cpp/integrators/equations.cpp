@@ -69,7 +69,6 @@ void Equations::set_parameters(const Parameters& parameters) {
   if (contact_) contact_->set_parameters(parameters);
   for (int i = 0; i < model_.node_count; ++i)
     node_dof_drag_.segment(model_.node_dof[at(i)], model_.dimension).setConstant(parameters.node_drag(i));
-  if (fluid_) fluid_->set_local_drag(parameters.fluid_viscosity, flow_drag_);
 }
 
 void Equations::begin(const State& state, const Parameters& parameters, double h, bool energy_momentum, Inner inner) {

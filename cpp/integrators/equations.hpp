@@ -64,6 +64,8 @@ class Equations {
   /// solution was found.
   bool flows() const { return fluid_ != nullptr; }
   bool begin_flow(const VectorX& q, const VectorX& v);
+  /// By which the local drag of the last step was greater than that of single rods; 0: not known.
+  double flow_excess() const { return flow_excess_; }
   /// What earlier solutions left behind.
   void forget_flow();
 
@@ -151,6 +153,9 @@ class Equations {
   MassMatrix flow_drag_;                     ///< [N s/m]
   VectorX flow_start_, flow_, flow_change_;  ///< the fluid's force but for the local drag, and with it [N]
   bool flowing_ = false;
+  VectorX flow_inertia_;                           ///< per node, mass over viscosity and step [m]
+  double flow_excess_ = 0;                         ///< by which the local drag is greater than that of single rods
+  long flow_version_ = -1;                         ///< of the parameters that it belongs to
   std::vector<ResistiveCoefficients> resistance_;  ///< per edge; empty: none
   long version_ = -1;                       ///< of the parameters that mass, elastic, gravity_ and drag belong to
   VectorX gradient_, magnitude_;            ///< forces but for inertia, drag and gravity; padded by kPadding

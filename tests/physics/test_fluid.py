@@ -265,3 +265,26 @@ def test_rods_almost_without_mass_are_stable_at_steps_far_above_mass_over_drag(i
         tips.append(simulation.positions(arm)[-1])
     assert np.linalg.norm(tips[0] - (1.0, 0.0, 0.0)) > 0.02
     assert tips[0] == pytest.approx(tips[1], abs=2e-3)
+
+
+@pytest.mark.parametrize("density", [1.0, 1000.0])
+@pytest.mark.parametrize("integrator", ["backward_euler", "implicit_midpoint"])
+def test_light_rods_that_nearly_touch_move_together_and_steadily(integrator, density):
+    """What presses fluid out of a gap of a twentieth of the radius is resisted far more than what moves a rod alone."""
+    scene = rods.weightless()
+    rubber = withe.Material(youngs_modulus=3e6, poisson_ratio=0.5, density=density)
+    scene.add_fluid(1.0, regularization=1.02e-3)
+    near = [
+        scene.add_rod(start=(x, y, 0.0), end=(x, y, -0.2), nodes=41, radius=1e-3, material=rubber)
+        for x, y in ((0.0, 0.0), (2.05e-3, 0.0), (1.025e-3, 1.775e-3))
+    ]
+    for rod in near:
+        scene.clamp(rod.start)
+    scene.add_load(near[0], (2e-3, 1e-3, 0.0))
+    simulation = scene.build(integrator=integrator, time_step=2e-3, planar=False)
+    speeds = []
+    for _ in range(8):
+        simulation.step(25)
+        speeds.append(np.abs(np.concatenate([simulation.velocities(rod) for rod in near])).max())
+    assert max(speeds) < 1.2e-3
+    assert speeds[-1] == pytest.approx(speeds[-2], rel=0.1)
