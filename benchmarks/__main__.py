@@ -13,7 +13,7 @@ from pathlib import Path
 
 from reporting import OUT, bar
 
-NAMES = ("newton_iteration", "skips", "parallel", "work_precision", "robustness", "perception")
+NAMES = ("newton_iteration", "skips", "parallel", "work_precision", "robustness", "contact", "perception")
 
 
 def main() -> int:

@@ -13,6 +13,7 @@ ROOT = Path(__file__).resolve().parent.parent.parent
 EXAMPLES = {
     "flagella.py": (["--step", "2e-3", "--duration", "6"], r"drawn together by (\d+)%", 20.0, 80.0),
     "friction.py": (["--forces", "11"], r"at most ([.\d]+)% off", 0.0, 1.0),
+    "gripper.py": (["--duration", "4"], r"friction 0.5: \d+ contacts, nearest ([-+.\d]+) radii", -0.05, 0.1),
     "helix.py": ([], r"(\d+) um from the public code", 0.0, 100.0),
     "knot.py": (["--nodes", "301", "--points", "2"], r" 200 .* ([-+.\d]+)% ", -6.0, 6.0),
     "ring_buckling.py": (["--nodes", "40"], r"\(([-+.\d]+) %\)", -3.0, 3.0),
