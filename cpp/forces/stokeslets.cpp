@@ -83,7 +83,7 @@ StokesletFluid::StokesletFluid(const Model& model)
     for (int k = 0; k < parts; ++k) {
       const auto from = own.begin() + static_cast<std::ptrdiff_t>(own.size()) * k / parts;
       const auto to = own.begin() + static_cast<std::ptrdiff_t>(own.size()) * (k + 1) / parts;
-      chunks_.push_back({std::vector<int>(from, to), {}, {}, {}});
+      chunks_.emplace_back().nodes.assign(from, to);
     }
   }
   segments_ = line_length(static_cast<std::ptrdiff_t>(slot_node_.size()));

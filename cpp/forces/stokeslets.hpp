@@ -50,7 +50,7 @@ class StokesletFluid {
   /// Nodes next to each other, whose own mobility is factorised.
   struct Chunk {
     std::vector<int> nodes;
-    Eigen::LLT<Eigen::MatrixXd> factor;
+    Eigen::LLT<Eigen::MatrixXd> factor{Eigen::MatrixXd::Identity(1, 1)};  // an empty one copies a status never set
     Eigen::MatrixXd matrix;
     VectorX part;
   };
