@@ -118,10 +118,20 @@ def enable_contact(world, data):
     world.scene.enable_contact(**options)
 
 
+def add_fluid(world, data):
+    world.scene.add_fluid(
+        data.draw(positive),
+        model=data.draw(st.sampled_from(["stokeslets", "resistive", "honey"])),
+        regularization=data.draw(st.one_of(st.none(), st.just(0.02), positive)),
+        wavelength=data.draw(st.one_of(st.none(), positive)),
+    )
+
+
 ON_SCENE = {
     "add_rod": add_rod,
     "add_obstacle": add_obstacle,
     "enable_contact": enable_contact,
+    "add_fluid": add_fluid,
     "set_friction": lambda w, d: w.scene.set_friction(d.draw(rod), d.draw(touched), d.draw(number)),
     "ignore_contact": lambda w, d: w.scene.ignore_contact(d.draw(rod), d.draw(touched)),
     "join": lambda w, d: w.scene.join(
