@@ -68,7 +68,7 @@ void update_natural(const Model& model, Parameters& p) {
     const Vector2 k = p.natural_curvature[r].row(stencil);
     Vector3 drawn;
     drawn << discrete_curvature(k, voronoi), p.natural_twist[r](stencil) * voronoi;
-    const Vector3 out = measured(p.measure, drawn);
+    Vector3 out = measured(p.measure, drawn);
     if (planar) return {model.planar_components[r].dot(out.head<2>()), 0.0, 0.0};
     return out;
   };
