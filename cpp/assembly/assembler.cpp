@@ -282,4 +282,12 @@ void Assembler::add_held_part(const VectorX& from, double factor, VectorX& to) c
   }
 }
 
+void Assembler::add_held_change(const VectorX& from, const VectorX& to, double factor, VectorX& out) const {
+  for (const Block& block : blocks_) {
+    const Constraint& c = block.constraint;
+    const Vector3 change = c.part(to) - c.part(from);
+    out.segment(c.first, c.size) += factor * (change - c.free * change).head(c.size);
+  }
+}
+
 }  // namespace withe

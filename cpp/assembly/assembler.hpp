@@ -88,6 +88,8 @@ class Assembler {
   VectorX held_part(const VectorX& vector) const;
   /// to += factor x the part of `from` along held directions.
   void add_held_part(const VectorX& from, double factor, VectorX& to) const;
+  /// out += factor x the part of `to` - `from` along held directions.
+  void add_held_change(const VectorX& from, const VectorX& to, double factor, VectorX& out) const;
 
   ElementTable stretch, bend, half, contact;
   RegularStencils regular;

@@ -129,6 +129,33 @@ inline void load_rows(const double* const* place, Pack* out) {
   }
 }
 
+/// `count` <= kLanes rows of three numbers that follow one another, the last one repeated.
+inline void load_threes(const double* p, int count, Pack (&out)[3]) {
+#if WITHE_LANES == 4
+  if (count == kLanes) {
+    const Pack::Native a = load(p).v, b = load(p + 4).v, c = load(p + 8).v;
+    out[0].v = __builtin_shufflevector(__builtin_shufflevector(a, b, 0, 3, 6, 6), c, 0, 1, 2, 5);
+    out[1].v = __builtin_shufflevector(__builtin_shufflevector(a, b, 1, 4, 7, 7), c, 0, 1, 2, 6);
+    out[2].v = __builtin_shufflevector(__builtin_shufflevector(a, b, 2, 5, 5, 5), c, 0, 1, 4, 7);
+    return;
+  }
+#endif
+  for (int i = 0; i < 3; ++i) out[i] = from_lanes([&](int l) { return p[3 * (l < count ? l : count - 1) + i]; });
+}
+inline void store_threes(double* p, int count, const Pack (&in)[3]) {
+#if WITHE_LANES == 4
+  if (count == kLanes) {
+    const Pack::Native x = in[0].v, y = in[1].v, z = in[2].v;
+    store(p, Pack(__builtin_shufflevector(__builtin_shufflevector(x, y, 0, 4, 1, 1), z, 0, 1, 4, 2)));
+    store(p + 4, Pack(__builtin_shufflevector(__builtin_shufflevector(y, z, 1, 5, 2, 2), x, 0, 1, 6, 2)));
+    store(p + 8, Pack(__builtin_shufflevector(z, __builtin_shufflevector(x, y, 3, 3, 7, 7), 2, 4, 6, 3)));
+    return;
+  }
+#endif
+  for (int l = 0; l < count; ++l)
+    for (int i = 0; i < 3; ++i) p[3 * l + i] = in[i][l];
+}
+
 /// Highest power first.
 template <int count>
 inline Pack polynomial(const double (&coefficient)[count], Pack u) {

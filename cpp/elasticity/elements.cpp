@@ -23,6 +23,22 @@ BendTwistEnergy energy_of_row(const BendMeasure& measure, const Columns3& strain
   return {energy(0) + energy(1), energy(2)};
 }
 
+/// Derivatives with respect to edges and thetas.
+BendTwistDerivatives<double> bend_twist(const BendMeasure& measure, const EdgeFrame<double>& f0,
+                                        const EdgeFrame<double>& f1, const BendTwistStrain<double>& strain,
+                                        const BendTwistStrain<double>& natural,
+                                        const BendTwistStiffness<double>& stiffness, bool with_hessian) {
+  BendTwistDerivatives<double> d;
+  if (with_hessian) {
+    bend_twist_hessian(measure, f0, f1, strain, natural, stiffness, d);
+    apply_transport(f0, f1, d);
+  } else {
+    bend_twist_gradient(measure, f0, f1, strain, natural, stiffness, d);
+    apply_transport_gradient(f0, f1, d);
+  }
+  return d;
+}
+
 void put(Local& out, int at, const Vec3d& v) {
   out.gradient[at] = v.x;
   out.gradient[at + 1] = v.y;
@@ -215,16 +231,9 @@ void bend_local(const Model& model, const ElasticCoefficients& k, const Configur
   if (model.planar()) return bend_planar_local(k, c, s, i, out);
   const EdgeFrame<double> f0 = oriented(c.edge[static_cast<std::size_t>(s.edge[0])], s.sign[0]);
   const EdgeFrame<double> f1 = oriented(c.edge[static_cast<std::size_t>(s.edge[1])], s.sign[1]);
-  BendTwistDerivatives<double> d;
-  const auto strain = strain_row(c.bend_strain, i), natural = strain_row(k.bend_natural, i);
-  const auto stiffness = stiffness_row(k.bend_stiffness, i);
-  if (with_hessian) {
-    bend_twist_hessian(k.measure, f0, f1, strain, natural, stiffness, d);
-    apply_transport(f0, f1, d);
-  } else {
-    bend_twist_gradient(k.measure, f0, f1, strain, natural, stiffness, d);
-    apply_transport_gradient(f0, f1, d);
-  }
+  const BendTwistDerivatives<double> d =
+      bend_twist(k.measure, f0, f1, strain_row(c.bend_strain, i), strain_row(k.bend_natural, i),
+                 stiffness_row(k.bend_stiffness, i), with_hessian);
   out.energy = d.energy;
   const double s0 = s.sign[0], s1 = s.sign[1];
   put(out, 0, -d.gradient_e[0]);
@@ -264,10 +273,9 @@ void half_local(const Model& model, const VectorX& q, const ElasticCoefficients&
   const EdgeFrame<double>& end = c.attached[static_cast<std::size_t>(stencil)];
   const EdgeFrame<double>&f0 = s.frame_first ? end : edge, &f1 = s.frame_first ? edge : end;
   const int a = s.frame_first ? 0 : 1, b = 1 - a;  // slots of the frame and of the edge
-  BendTwistDerivatives<double> d;
-  bend_twist_hessian(k.measure, f0, f1, strain_row(c.half_strain, i), strain_row(k.half_natural, i),
-                     stiffness_row(k.half_stiffness, i), d);
-  apply_transport(f0, f1, d);
+  const BendTwistDerivatives<double> d =
+      bend_twist(k.measure, f0, f1, strain_row(c.half_strain, i), strain_row(k.half_natural, i),
+                 stiffness_row(k.half_stiffness, i), with_hessian);
   out.energy = d.energy;
   put(out, 0, -d.gradient_e[b]);
   out.gradient[3] = d.gradient_angle[b];

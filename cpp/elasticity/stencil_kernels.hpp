@@ -33,11 +33,18 @@ struct StencilBatch {
   double* residual;   ///< per unknown; padded by kPadding
   double* magnitude;  ///< sum of absolute contributions; padded by kPadding
   double* values;     ///< null: no Hessian; padded by kPadding
+
+  const double* velocity;      ///< per unknown: of an explicit step in space, else null
+  const double* edge_inertia;  ///< per edge, of theta [kg m^2]: likewise
 };
 
 struct StencilKernels {
   double (*bend)(const StencilBatch&);  ///< returns the energy of bending and twisting [J]
   double (*planar_bend)(const StencilBatch&);
+  /// Of an explicit step: the gradient alone, without the absolute sums, where edges' frames are measured from where
+  /// they are; with the couples of edges that spin and turn, see Equations::spin_couple.
+  void (*bend_forces)(const StencilBatch&);
+  void (*planar_bend_forces)(const StencilBatch&);
 };
 
 const StencilKernels& stencil_kernels();

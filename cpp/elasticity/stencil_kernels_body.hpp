@@ -103,11 +103,11 @@ void add_matrix(const StencilBatch& batch, int first, int live, const Pack (&mat
     add_lines<Piece, false>(batch, first, live, matrix);
 }
 
+/// Adds to one number per unknown.
 template <class Piece, int count>
-void add_vectors(const StencilBatch& batch, int first, int live, const Pack* gradient, const Pack* magnitude) {
+void add_vector(const StencilBatch& batch, int first, int live, const Pack* numbers, double* out) {
   const int* unknown = batch.first_unknown + first;
-  add_rows<Piece, count>([&](int l) { return batch.residual + unknown[l]; }, live, gradient);
-  add_rows<Piece, count>([&](int l) { return batch.magnitude + unknown[l]; }, live, magnitude);
+  add_rows<Piece, count>([&](int l) { return out + unknown[l]; }, live, numbers);
 }
 
 double sum_of_live(Pack energy, int live) {
@@ -155,9 +155,39 @@ void fill(const BendTwistDerivatives<Pack>& d, Pack (&H)[11][kWidth]) {
   both(3, 7, d.angle_angle[0][1]);
 }
 
+/// What is wanted of a pack: forces of an explicit step; the gradient and its absolute sums; the matrix with them.
+enum class Wanted { forces, gradient, matrix };
+
+/// The forces at their heads by which two edges that spin and turn get their couples.
+template <class Lanes>
+void spin_couples(const StencilBatch& batch, int first, const Lanes& lanes, const EdgeFrame<Pack>& f0,
+                  const EdgeFrame<Pack>& f1, Vec3<Pack> (&out)[2]) {
+  const double* place[kLanes];
+  for (int l = 0; l < kLanes; ++l)
+    place[l] = batch.velocity + batch.first_unknown[first + l < batch.count ? first + l : batch.count - 1];
+  const auto numbers_from = [&](int at, Pack* into) {
+    const double* from[kLanes];
+    for (int l = 0; l < kLanes; ++l) from[l] = place[l] + at;
+    load_rows<4>(from, into);
+  };
+  Pack v[12];  // the last angle comes twice
+  numbers_from(0, v);
+  numbers_from(4, v + 4);
+  numbers_from(7, v + 8);
+  const EdgeFrame<Pack>* frame[2] = {&f0, &f1};
+  for (int k = 0; k < 2; ++k) {
+    const EdgeFrame<Pack>& f = *frame[k];
+    const Pack *tail = v + 4 * k, *head = v + (k == 0 ? 4 : 9);
+    const Vec3<Pack> rate{head[0] - tail[0], head[1] - tail[1], head[2] - tail[2]};
+    const Pack factor = lanes.of_edge(batch.edge_inertia, k) * v[4 * k + 3] * (f.inverse_length * f.inverse_length);
+    out[k] = factor * cross(rate, f.tangent);
+  }
+}
+
 /// The pack of stencils from number `first`; everything within is inlined. Returns their energy.
-template <bool with_matrix, bool inner>
+template <Wanted wanted, bool inner>
 [[gnu::flatten]] double bend_pack(const StencilBatch& batch, int first) {
+  constexpr bool with_matrix = wanted == Wanted::matrix, forces_only = wanted == Wanted::forces;
   const Lanes<inner> lanes(batch, first);
   const int live = inner ? kLanes : lanes.live;
   const EdgeFrame<Pack> f0 = frames_of(batch.frames, lanes.edge[0]), f1 = frames_of(batch.frames, lanes.edge[1]);
@@ -169,18 +199,28 @@ template <bool with_matrix, bool inner>
     apply_transport(f0, f1, d);
   } else {
     bend_twist_gradient<Pack>(batch.measure, f0, f1, {s.x, s.y, s.z}, {n.x, n.y, n.z}, {k.x, k.y, k.z}, d);
-    apply_transport_gradient(f0, f1, d);
+    if constexpr (!forces_only) apply_transport_gradient(f0, f1, d);
   }
-  const double energy = sum_of_live(d.energy, live);
 
-  const Vec3<Pack> tension[2] = {(lanes.owned[0] * lanes.of_edge(batch.force, 0)) * f0.tangent,
-                                 (lanes.owned[1] * lanes.of_edge(batch.force, 1)) * f1.tangent};
-  Pack gradient[11 + kLanes], magnitude[11 + kLanes];
-  for (int i = 11; i < 11 + kLanes; ++i) gradient[i] = magnitude[i] = 0.0;
+  Vec3<Pack> tension[2] = {lanes.of_edge(batch.force, 0) * f0.tangent, lanes.of_edge(batch.force, 1) * f1.tangent};
+  if constexpr (forces_only) {
+    Vec3<Pack> couple[2];
+    spin_couples(batch, first, lanes, f0, f1, couple);
+    for (int j = 0; j < 2; ++j) tension[j] += couple[j];
+  }
+  for (int j = 0; j < 2; ++j) tension[j] = lanes.owned[j] * tension[j];
+  Pack gradient[11 + kLanes];
+  for (int i = 11; i < 11 + kLanes; ++i) gradient[i] = 0.0;
   const Vec3<Pack> bending = d.gradient_e[0] - d.gradient_e[1];
   put(gradient, -(d.gradient_e[0] + tension[0]));
   put(gradient + 4, bending + tension[0] - tension[1]);
   put(gradient + 8, d.gradient_e[1] + tension[1]);
+  for (int j = 0; j < 2; ++j) gradient[3 + 4 * j] = d.gradient_angle[j];
+  add_vector<Block, 11>(batch, first, live, gradient, batch.residual);
+  if constexpr (forces_only) return 0.0;
+
+  Pack magnitude[11 + kLanes];
+  for (int i = 11; i < 11 + kLanes; ++i) magnitude[i] = 0.0;
   put_absolute(magnitude, d.gradient_e[0]);
   put_absolute(magnitude + 4, bending);
   put_absolute(magnitude + 8, d.gradient_e[1]);
@@ -188,11 +228,8 @@ template <bool with_matrix, bool inner>
   add_absolute(magnitude + 4, tension[0]);
   add_absolute(magnitude + 4, tension[1]);
   add_absolute(magnitude + 8, tension[1]);
-  for (int j = 0; j < 2; ++j) {
-    gradient[3 + 4 * j] = d.gradient_angle[j];
-    magnitude[3 + 4 * j] = absolute(d.gradient_angle[j]);
-  }
-  add_vectors<Block, 11>(batch, first, live, gradient, magnitude);
+  for (int j = 0; j < 2; ++j) magnitude[3 + 4 * j] = absolute(d.gradient_angle[j]);
+  add_vector<Block, 11>(batch, first, live, magnitude, batch.magnitude);
   if constexpr (with_matrix) {
     for (int j = 0; j < 2; ++j) {
       const EdgeFrame<Pack>& f = j == 0 ? f0 : f1;
@@ -206,16 +243,15 @@ template <bool with_matrix, bool inner>
     fill(d, H);
     add_matrix<Block>(batch, first, live, H);
   }
-  return energy;
+  return sum_of_live(d.energy, live);
 }
 
-template <bool with_matrix, bool inner>
+template <Wanted wanted, bool inner>
 [[gnu::flatten]] double planar_pack(const StencilBatch& batch, int first) {
   const Lanes<inner> lanes(batch, first);
   const int live = inner ? kLanes : lanes.live;
   const PlanarBend<Pack> p =
       withe::planar_bend(batch.measure, lanes.of(batch.strain), lanes.of(batch.natural), lanes.of(batch.stiffness));
-  const double energy = sum_of_live(p.energy, live);
   // phi = angle(e1) - angle(e0): an edge's angle has the gradient n = (-ty, tx) / l and the Hessian
   // -(t n^T + n t^T) / l.
   Pack tx[2], ty[2], nx[2], ny[2], inverse[2], fx[2], fy[2];
@@ -231,17 +267,20 @@ template <bool with_matrix, bool inner>
   const Pack m = p.slope;
   const Pack turn[6] = {nx[0], ny[0], -(nx[0] + nx[1]), -(ny[0] + ny[1]), nx[1], ny[1]};
   const Pack pull[6] = {-fx[0], -fy[0], fx[0] - fx[1], fy[0] - fy[1], fx[1], fy[1]};
-  Pack gradient[6 + kLanes], magnitude[6 + kLanes];
-  for (int i = 6; i < 6 + kLanes; ++i) gradient[i] = magnitude[i] = 0.0;
-  for (int i = 0; i < 6; ++i) {
-    gradient[i] = m * turn[i] + pull[i];
-    magnitude[i] = absolute(m * turn[i]);
-  }
+  Pack gradient[6 + kLanes];
+  for (int i = 6; i < 6 + kLanes; ++i) gradient[i] = 0.0;
+  for (int i = 0; i < 6; ++i) gradient[i] = m * turn[i] + pull[i];
+  add_vector<Pair, 6>(batch, first, live, gradient, batch.residual);
+  if constexpr (wanted == Wanted::forces) return 0.0;
+
+  Pack magnitude[6 + kLanes];
+  for (int i = 6; i < 6 + kLanes; ++i) magnitude[i] = 0.0;
+  for (int i = 0; i < 6; ++i) magnitude[i] = absolute(m * turn[i]);
   magnitude[0] += absolute(fx[0]), magnitude[1] += absolute(fy[0]);
   magnitude[2] += absolute(fx[0]) + absolute(fx[1]), magnitude[3] += absolute(fy[0]) + absolute(fy[1]);
   magnitude[4] += absolute(fx[1]), magnitude[5] += absolute(fy[1]);
-  add_vectors<Pair, 6>(batch, first, live, gradient, magnitude);
-  if constexpr (with_matrix) {
+  add_vector<Pair, 6>(batch, first, live, magnitude, batch.magnitude);
+  if constexpr (wanted == Wanted::matrix) {
     // Blocks of the two edge vectors: xx, xy, yy.
     Pack E[2][3];
     for (int j = 0; j < 2; ++j) {
@@ -266,7 +305,7 @@ template <bool with_matrix, bool inner>
       }
     add_matrix<Pair>(batch, first, live, H);
   }
-  return energy;
+  return sum_of_live(p.energy, live);
 }
 
 /// Whether the kLanes stencils from `first` follow one another.
@@ -279,31 +318,34 @@ bool are_inner(const StencilBatch& batch, int first) {
   return true;
 }
 
-template <bool with_matrix>
+template <Wanted wanted>
 double bend_packs(const StencilBatch& batch) {
   double energy = 0.0;
   for (int first = 0; first < batch.count; first += kLanes)
-    energy += are_inner(batch, first) ? bend_pack<with_matrix, true>(batch, first)
-                                      : bend_pack<with_matrix, false>(batch, first);
+    energy += are_inner(batch, first) ? bend_pack<wanted, true>(batch, first) : bend_pack<wanted, false>(batch, first);
   return energy;
 }
-template <bool with_matrix>
+template <Wanted wanted>
 double planar_packs(const StencilBatch& batch) {
   double energy = 0.0;
   for (int first = 0; first < batch.count; first += kLanes)
-    energy += are_inner(batch, first) ? planar_pack<with_matrix, true>(batch, first)
-                                      : planar_pack<with_matrix, false>(batch, first);
+    energy +=
+        are_inner(batch, first) ? planar_pack<wanted, true>(batch, first) : planar_pack<wanted, false>(batch, first);
   return energy;
 }
 
-double bend(const StencilBatch& batch) { return batch.values ? bend_packs<true>(batch) : bend_packs<false>(batch); }
-double planar_bend(const StencilBatch& batch) {
-  return batch.values ? planar_packs<true>(batch) : planar_packs<false>(batch);
+double bend(const StencilBatch& batch) {
+  return batch.values ? bend_packs<Wanted::matrix>(batch) : bend_packs<Wanted::gradient>(batch);
 }
+double planar_bend(const StencilBatch& batch) {
+  return batch.values ? planar_packs<Wanted::matrix>(batch) : planar_packs<Wanted::gradient>(batch);
+}
+void bend_forces(const StencilBatch& batch) { bend_packs<Wanted::forces>(batch); }
+void planar_bend_forces(const StencilBatch& batch) { planar_packs<Wanted::forces>(batch); }
 
 }  // namespace
 
 extern const StencilKernels kStencilKernels;
-const StencilKernels kStencilKernels{bend, planar_bend};
+const StencilKernels kStencilKernels{bend, planar_bend, bend_forces, planar_bend_forces};
 
 }  // namespace withe::WITHE_INSTRUCTION_SET

@@ -41,12 +41,20 @@ struct CarryBatch {
   double *source, *reference;  ///< per edge, 3 numbers: tangent and director, before and after
 };
 
+/// Edges of an explicit step: their frames measured from where they are now, to which the reference frames are carried.
+struct AdvanceBatch {
+  EdgeBatch edges;                       ///< source and reference as before
+  double *next_source, *next_reference;  ///< per edge, 3 numbers
+};
+
 struct FrameKernels {
   void (*edges)(const EdgeBatch&);      ///< see edge_frame
   void (*strains)(const StrainBatch&);  ///< see bend_twist_strain
   void (*planar_edges)(const EdgeBatch&);
   void (*planar_strains)(const StrainBatch&);  ///< see planar_kappa
   void (*carry)(const CarryBatch&);            ///< see parallel_transport; rounding does not add up
+  /// Both at once, and neither spin nor bow: returns the smallest cosine of the angles by which edges turn.
+  double (*advance)(const AdvanceBatch&);
 };
 
 const FrameKernels& frame_kernels();

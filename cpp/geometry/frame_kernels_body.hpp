@@ -18,8 +18,33 @@ void store_first(double* place, Pack a, int count) {
   for (int l = 0; l < count; ++l) place[l] = a[l];
 }
 
-Vec3<Pack> gather_rows(const double* table, const int (&row)[kLanes]) {
-  return {gather(table, row, 3, 0), gather(table, row, 3, 1), gather(table, row, 3, 2)};
+/// Rows of a table of three columns.
+Vec3<Pack> rows_from(const double* table, int first, int live) {
+  Pack number[3];
+  load_threes(table + std::ptrdiff_t{3} * first, live, number);
+  return {number[0], number[1], number[2]};
+}
+void store_rows(double* table, int first, int live, const Vec3<Pack>& v) {
+  store_threes(table + std::ptrdiff_t{3} * first, live, {v.x, v.y, v.z});
+}
+
+/// Three unknowns from each index on; read with the one before, as there may be none behind.
+Vec3<Pack> three_unknowns(const double* q, const int (&index)[kLanes]) {
+  const double* place[kLanes];
+  for (int l = 0; l < kLanes; ++l) {
+    if (index[l] == 0) return {gather(q, index), gather(q + 1, index), gather(q + 2, index)};
+    place[l] = q + index[l] - 1;
+  }
+  Pack number[4];
+  load_rows<4>(place, number);
+  return {number[1], number[2], number[3]};
+}
+
+/// A director carried along with its edge, normal to it and of unit length to rounding.
+Vec3<Pack> carried(const Vec3<Pack>& reference, const Vec3<Pack>& source, const Vec3<Pack>& t) {
+  Vec3<Pack> d = parallel_transport(reference, source, t);
+  d = d - dot(d, t) * t;
+  return (1.0 / square_root(dot(d, d))) * d;
 }
 
 [[gnu::flatten]] void edges(const EdgeBatch& batch) {
@@ -29,12 +54,11 @@ Vec3<Pack> gather_rows(const double* table, const int (&row)[kLanes]) {
     for (int l = 0; l < kLanes; ++l)
       tail[l] = batch.tail[e[l]], head[l] = batch.head[e[l]], angle[l] = batch.angle[e[l]];
     const double* q = batch.q;
-    const Vec3<Pack> d{gather(q, head) - gather(q, tail), gather(q + 1, head) - gather(q + 1, tail),
-                       gather(q + 2, head) - gather(q + 2, tail)};
+    const Vec3<Pack> d = three_unknowns(q, head) - three_unknowns(q, tail);
     const Pack length = square_root(dot(d, d));
     const SineCosine turn = sine_cosine(gather(q, angle));
-    const EdgeFrame<Pack> frame =
-        edge_frame(d, length, gather_rows(batch.source, e), gather_rows(batch.reference, e), turn.cosine, turn.sine);
+    const EdgeFrame<Pack> frame = edge_frame(d, length, rows_from(batch.source, first, live),
+                                             rows_from(batch.reference, first, live), turn.cosine, turn.sine);
     const Vec3<Pack>* part[5] = {&frame.tangent, &frame.d1, &frame.d2, &frame.spin, &frame.bow};
     Pack number[kFrameNumbers];
     for (int i = 0; i < 5; ++i) {
@@ -68,6 +92,38 @@ Vec3<Pack> gather_rows(const double* table, const int (&row)[kLanes]) {
     }
     store_first(batch.length + first, length, live);
   }
+}
+
+[[gnu::flatten]] double advance(const AdvanceBatch& batch) {
+  const EdgeBatch& edges = batch.edges;
+  const double* q = edges.q;
+  Pack smallest = 1.0;
+  for (int first = 0; first < edges.count; first += kLanes) {
+    int e[kLanes], tail[kLanes], head[kLanes], angle[kLanes];
+    const int live = lanes_from(first, edges.count, e);
+    for (int l = 0; l < kLanes; ++l)
+      tail[l] = edges.tail[e[l]], head[l] = edges.head[e[l]], angle[l] = edges.angle[e[l]];
+    const Vec3<Pack> d = three_unknowns(q, head) - three_unknowns(q, tail);
+    const Pack length = square_root(dot(d, d)), inverse = 1.0 / length;
+    const Vec3<Pack> t = inverse * d, source = rows_from(edges.source, first, live);
+    smallest = smaller(dot(source, t), smallest);
+    const Vec3<Pack> r1 = carried(rows_from(edges.reference, first, live), source, t), r2 = cross(t, r1);
+    const SineCosine turn = sine_cosine(gather(q, angle));
+    const Vec3<Pack> d1 = turn.cosine * r1 + turn.sine * r2, d2 = turn.cosine * r2 - turn.sine * r1;
+    Pack number[kFrameNumbers] = {t.x, t.y, t.z, d1.x, d1.y, d1.z, d2.x, d2.y, d2.z, inverse};
+    for (int k = kInverseLength + 1; k < kFrameNumbers; ++k) number[k] = 0.0;
+    for (int k = 0; k < kFrameNumbers; k += kLanes) {
+      Pack block[kLanes];
+      transpose(number + k, block);
+      for (int l = 0; l < live; ++l) store(edges.frames + std::ptrdiff_t{kFrameNumbers} * e[l] + k, block[l]);
+    }
+    store_rows(batch.next_source, first, live, t);
+    store_rows(batch.next_reference, first, live, r1);
+    store_first(edges.length + first, length, live);
+  }
+  double least = smallest[0];
+  for (int l = 1; l < kLanes; ++l) least = smallest[l] < least ? smallest[l] : least;
+  return least;
 }
 
 /// The frames of kLanes edges.
@@ -118,20 +174,15 @@ EdgeFrame<Pack> frames_of(const double* frames, const int (&edge)[kLanes]) {
     const int live = lanes_from(first, batch.count, e);
     const double* f = batch.frames;
     const Vec3<Pack> t{gather(f, e, kFrameNumbers, 0), gather(f, e, kFrameNumbers, 1), gather(f, e, kFrameNumbers, 2)};
-    Vec3<Pack> d = parallel_transport(gather_rows(batch.reference, e), gather_rows(batch.source, e), t);
-    d = d - dot(d, t) * t;
-    d = (1.0 / square_root(dot(d, d))) * d;
-    for (int l = 0; l < live; ++l) {
-      double *source = batch.source + std::ptrdiff_t{3} * e[l], *reference = batch.reference + std::ptrdiff_t{3} * e[l];
-      source[0] = t.x[l], source[1] = t.y[l], source[2] = t.z[l];
-      reference[0] = d.x[l], reference[1] = d.y[l], reference[2] = d.z[l];
-    }
+    const Vec3<Pack> d = carried(rows_from(batch.reference, first, live), rows_from(batch.source, first, live), t);
+    store_rows(batch.source, first, live, t);
+    store_rows(batch.reference, first, live, d);
   }
 }
 
 }  // namespace
 
 extern const FrameKernels kFrameKernels;
-const FrameKernels kFrameKernels{edges, strains, planar_edges, planar_strains, carry};
+const FrameKernels kFrameKernels{edges, strains, planar_edges, planar_strains, carry, advance};
 
 }  // namespace withe::WITHE_INSTRUCTION_SET

@@ -101,8 +101,7 @@ NewtonResult find_inner(Equations& equations, const Newton& newton, const Option
     equations.assembler().project(work.move);
     work.move *= newton.cap(work.move);
     if (equations.contact()) equations.contact()->hold_sticking(state, work.move);
-    work.change = work.held.q - state.q;
-    equations.assembler().add_held_part(work.change, h / plan.dt, work.move);
+    equations.assembler().add_held_change(state.q, work.held.q, h / plan.dt, work.move);
     work.z = state.q + work.move * equations.allowed(state.q, work.move);
     const bool trial = start.accelerated || (circling && start.mixed && start.moving);
     const int limit = trial ? std::min(12, options.max_iterations) : options.max_iterations;
@@ -125,7 +124,7 @@ double moved_by(VectorX& force, Equations& equations, const Newton& newton, doub
   const FactorRecord& factor = work.newton.factor;
   if (factor.owner != &equations || factor.interval != std::abs(h)) {
     // Nothing moved, and no matrix was made.
-    force = (h * h) * force.cwiseQuotient(equations.mass().rows.cwiseMax(1e-300));
+    force = (h * h) * force.cwiseProduct(equations.mass().inverse);
     return newton.displacement(force);
   }
   equations.assembler().solver().solve({force.data(), static_cast<std::size_t>(force.size())});
@@ -173,9 +172,8 @@ double estimated_error(Equations& equations, const Newton& newton, const Options
 
 /// Forces of the last evaluation over mass, where nothing holds.
 void set_acceleration(const Equations& equations, const StepWorkspace& work, VectorX& acceleration) {
-  acceleration = -work.newton.evaluation.full_residual;
-  equations.assembler().project(acceleration);
-  acceleration = acceleration.cwiseQuotient(equations.mass().rows.cwiseMax(1e-300));
+  acceleration = -work.newton.evaluation.full_residual.cwiseProduct(equations.mass().inverse);
+  equations.assembler().project(acceleration);  // what a support holds has one mass
 }
 
 /// Finds the fluid's force for a step of dt: that on velocities as they are taken to be within the step, to the order
@@ -193,8 +191,7 @@ bool begin_flow(Equations& equations, double dt, bool euler, const State& state,
     v = past.velocity[0] + ((state.time + 0.5 * dt - past.time[0]) / (past.time[0] - past.time[1])) *
                                (past.velocity[0] - past.velocity[1]);
   equations.assembler().project(v);
-  work.change = work.held.q - state.q;
-  equations.assembler().add_held_part(work.change, 1.0 / dt, v);
+  equations.assembler().add_held_change(state.q, work.held.q, 1.0 / dt, v);
   q = state.q;
   if (!euler) q += 0.5 * dt * v;
   return equations.begin_flow(q, v);
@@ -222,6 +219,31 @@ void explicit_acceleration(Equations& equations, const Parameters& parameters, d
   }
   equations.evaluate(state.q, false, nullptr, work.newton.evaluation);
   set_acceleration(equations, work, acceleration);
+}
+
+/// Where nothing resists motion but inertia: `work.next` at q = work.z, with accelerations there, velocities being
+/// work.velocity. Returns by how much edges turn at most [rad].
+double free_acceleration(Equations& equations, const Parameters& parameters, const State& state, StepWorkspace& work) {
+  State& next = work.next;
+  if (next.q.size() != state.q.size()) next = state;  // once: what an explicit step leaves as it is, and room
+  const double turn = equations.advance(state, work.z, next);
+  equations.evaluate_forces(next, parameters, work.velocity, work.newton.evaluation);
+  set_acceleration(equations, work, next.acceleration);
+  return equations.model().planar() ? turning(equations.model(), nullptr, state, work.z).largest : turn;
+}
+
+/// The same under contact, drag, viscosity or in a fluid.
+double resisted_acceleration(Equations& equations, const Parameters& parameters, double dt, const State& state,
+                             StepWorkspace& work) {
+  const Model& model = equations.model();
+  const double turn = turning(model, nullptr, state, work.z).largest;
+  if (!(turn <= 1.5)) return turn;
+  State& next = work.next;
+  next = state;
+  if (!model.planar()) compute_configuration(model, state, work.z, work.after);
+  accept_configuration(model, work.z, work.after, next);
+  explicit_acceleration(equations, parameters, dt, next, work.velocity, work, next.acceleration);
+  return turn;
 }
 
 }  // namespace
@@ -295,42 +317,29 @@ StepResult verlet_step(Equations& equations, const Parameters& parameters, doubl
   if (!work.held.reachable) return result;
   if (!state.acceleration_current)
     explicit_acceleration(equations, parameters, dt, state, state.v, work, state.acceleration);
-  VectorX& half = work.mean;
+  VectorX &half = work.mean, &q1 = work.z, &v1 = work.velocity;
   half = state.v + 0.5 * dt * state.acceleration;
   assembler.project(half);
-  work.change = work.held.q - state.q;
-  assembler.add_held_part(work.change, 1.0 / dt, half);
-  VectorX& q1 = work.z;
+  assembler.add_held_change(state.q, work.held.q, 1.0 / dt, half);
   q1 = state.q + dt * half;
-  result.largest_turn = turning(model, nullptr, state, q1).largest;
-  if (!(result.largest_turn <= 1.5)) return result;
-  // Forces want the frames at q1 itself: measured from the start of the step, the turn of direct transport would come
-  // in at first order, with nothing to cancel it.
-  State& next = work.next;
-  next = state;
   // Drag, viscosity and the spin couple want the velocity at the end; a predicted one is second order.
-  work.velocity = half + 0.5 * dt * state.acceleration;
+  v1 = half + 0.5 * dt * state.acceleration;
+  State& next = work.next;
   const bool in_fluid = model.description.fluid.model != FluidModel::none;
-  if (equations.contact() || parameters.viscous || parameters.dragged || in_fluid) {
-    if (!model.planar()) compute_configuration(model, state, q1, work.after);
-    accept_configuration(model, q1, work.after, next);
-    explicit_acceleration(equations, parameters, dt, next, work.velocity, work, next.acceleration);
-  } else {
-    equations.configure(state, q1);
-    accept_configuration(model, q1, equations.configuration(), next);
-    equations.evaluate_forces(next, parameters, work.velocity, work.newton.evaluation);
-    set_acceleration(equations, work, next.acceleration);
-  }
-  next.acceleration_current = true;
+  const bool resisted = equations.contact() || parameters.viscous || parameters.dragged || in_fluid;
+  result.largest_turn = resisted ? resisted_acceleration(equations, parameters, dt, state, work)
+                                 : free_acceleration(equations, parameters, state, work);
+  if (!(result.largest_turn <= 1.5)) return result;
   next.v = half + 0.5 * dt * next.acceleration;
-  if (!next.v.allFinite()) return result;
+  if (!std::isfinite(next.v.squaredNorm())) return result;
   work.change = q1 - state.q;
   book_work(equations, parameters, work.change, result);
   if (!model.constraints.empty()) {
     work.assumed.setZero(model.dof_count);
     book_supports(equations, state.v, next.v, dt, work, result);
   }
-  next.time += dt;
+  next.acceleration_current = true;
+  next.time = state.time + dt;
   std::swap(state, next);
   result.newton.converged = true;
   result.accepted = true;
@@ -341,7 +350,7 @@ double stable_step(Equations& equations, const Parameters& parameters, const Sta
   equations.begin(state, parameters, 0.0, false);
   equations.evaluate(state.q, true, nullptr, work.evaluation);
   const LinearSolver& solver = equations.assembler().solver();
-  const VectorX scale = equations.mass().rows.cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  const VectorX scale = equations.mass().inverse.cwiseSqrt();
   VectorX x(scale.size()), y(scale.size());
   for (Eigen::Index i = 0; i < x.size(); ++i)
     x(i) = std::sin(1.0 + 7.0 * static_cast<double>(i)) + (i % 2 ? 1.0 : -1.0);

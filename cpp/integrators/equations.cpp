@@ -277,7 +277,9 @@ StencilBatch Equations::regular_batch(const ElasticCoefficients& k, const double
           .modulus = modulus_.data(),
           .residual = gradient_.data(),
           .magnitude = magnitude_.data(),
-          .values = values};
+          .values = values,
+          .velocity = nullptr,
+          .edge_inertia = nullptr};
 }
 
 void Equations::add_elastic(const ElasticCoefficients& k, const VectorX& z, bool with_matrix, const double* axial_force,
@@ -286,7 +288,13 @@ void Equations::add_elastic(const ElasticCoefficients& k, const VectorX& z, bool
   set_axial_forces(k, out);
   const StencilBatch batch = regular_batch(k, axial_force, with_matrix ? values.data() : nullptr);
   out.potential += model_.planar() ? stencil_kernels().planar_bend(batch) : stencil_kernels().bend(batch);
+  add_other_elastic(k, z, with_matrix, axial_force, out);
+}
 
+/// What the kernels do not take: edges and stencils of joints and of rods' ends at walls.
+void Equations::add_other_elastic(const ElasticCoefficients& k, const VectorX& z, bool with_matrix,
+                                  const double* axial_force, Evaluation& out) {
+  const std::span<double> values = assembler_.solver().values();
   Local local;
   const auto add = [&](const ElementTable& table, int i) {
     table.add_gradient(i, local.gradient, 1.0, gradient_, magnitude_);
@@ -353,7 +361,12 @@ void Equations::add_spin_couple(const VectorX& z) {
   }
 }
 
-void Equations::configure(const State& state, const VectorX& q) { compute_configuration(model_, state, q, middle_); }
+double Equations::advance(const State& state, const VectorX& q, State& next) {
+  if (!model_.planar()) return std::acos(std::min(advance_configuration(model_, state, q, middle_, next), 1.0));
+  compute_configuration(model_, state, q, middle_);
+  next.q = q;
+  return 0.0;
+}
 
 void Equations::evaluate_forces(const State& state, const Parameters& parameters, const VectorX& v, Evaluation& out) {
   set_parameters(parameters);
@@ -361,19 +374,26 @@ void Equations::evaluate_forces(const State& state, const Parameters& parameters
   h_ = 0.0;
   energy_momentum_ = floor_current_ = false;
   acting_ = &elastic;
-  out.potential = 0.0;
+  last_z_ = state.q;
   const int n = model_.dof_count;
   gradient_.setZero(n + kPadding);
   magnitude_.setZero(n + kPadding);
-  last_z_ = state.q;
-  if (!model_.planar())
-    for (int e = 0; e < model_.edge_count; ++e) {
-      middle_.edge[at(e)].spin = {0.0, 0.0, 0.0};  // measured from where the edge is now
+  set_axial_forces(elastic, out);
+  StencilBatch batch = regular_batch(elastic, nullptr, nullptr);
+  if (model_.planar()) {
+    stencil_kernels().planar_bend_forces(batch);
+  } else {
+    batch.velocity = v.data();
+    batch.edge_inertia = parameters.edge_inertia.data();
+    stencil_kernels().bend_forces(batch);
+    for (int e : assembler_.regular.other_edges) {
       const int a = model_.tail_dof[at(e)], b = model_.head_dof[at(e)];
-      add_couple(e, spin_couple(e, v[model_.edge_dof[at(e)]], {v[b] - v[a], v[b + 1] - v[a + 1], v[b + 2] - v[a + 2]}));
+      const Vec3d rate{v[b] - v[a], v[b + 1] - v[a + 1], v[b + 2] - v[a + 2]};
+      add_couple(e, spin_couple(e, v[model_.edge_dof[at(e)]], rate));
     }
-  add_elastic(elastic, last_z_, false, nullptr, out);
-  add_loads(last_z_, false, out);
+  }
+  add_other_elastic(elastic, state.q, false, nullptr, out);
+  add_loads(state.q, false, out);
   out.full_residual = gradient_.head(n) - gravity_ - custom_force;
 }
 

@@ -71,10 +71,11 @@ class Equations {
 
   /// Residual at z, and the matrix when asked for. `axial_force`: see stretch_hessian.
   void evaluate(const VectorX& z, bool with_matrix, const double* axial_force, Evaluation& out);
-  /// The configuration at q, measured from `state`, as that of an evaluation.
-  void configure(const State& state, const VectorX& q);
-  /// Forces without inertia, for an explicit step: `full_residual` of a state whose frames have been moved to the
-  /// configuration that `configure` found, with velocities v. No contact, viscosity or drag.
+  /// Of an explicit step from `state` to q: the configuration there, and that of `next`. Returns by how much edges turn
+  /// at most [rad]; in a plane 0.
+  double advance(const State& state, const VectorX& q, State& next);
+  /// Forces without inertia, for an explicit step: `full_residual` of a state to which `advance` has come, with
+  /// velocities v. No contact, viscosity or drag.
   void evaluate_forces(const State& state, const Parameters& parameters, const VectorX& v, Evaluation& out);
   /// Configuration of the last evaluation.
   const Configuration& configuration() const { return middle_; }
@@ -110,6 +111,8 @@ class Equations {
   void add_contacts(bool with_matrix, Evaluation& out);
   void add_elastic(const ElasticCoefficients& k, const VectorX& z, bool with_matrix, const double* axial_force,
                    Evaluation& out);
+  void add_other_elastic(const ElasticCoefficients& k, const VectorX& z, bool with_matrix, const double* axial_force,
+                         Evaluation& out);
   void add_discrete_gradient(const VectorX& z, bool with_matrix, const double* axial_force, Evaluation& out);
   /// A quadratic form that neither moves nor turns the stencil: squares of single unknowns, and of differences.
   struct Metric {

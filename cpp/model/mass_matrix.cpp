@@ -18,6 +18,7 @@ void set_mass(const Model& model, const Parameters& p, MassMatrix& mass) {
     rows(model.hinges[h].dof) = p.hinge_inertia(static_cast<Eigen::Index>(h));
   if (!model.planar())
     for (int e = 0; e < model.edge_count; ++e) rows(model.edge_dof[at(e)]) = p.edge_inertia(e);
+  mass.inverse = rows.cwiseMax(1e-300).cwiseInverse();
   if (p.lumped)
     mass.coupling.setZero(model.edge_count);
   else

@@ -20,6 +20,7 @@ namespace withe {
 
 struct MassMatrix {
   VectorX rows;      ///< per unknown, row sums [kg], [kg m^2]
+  VectorX inverse;   ///< of `rows`
   VectorX coupling;  ///< per edge: m / 6 off the diagonal between its nodes, less on it [kg]
 };
 

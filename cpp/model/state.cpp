@@ -57,11 +57,15 @@ void compute_planar(const Model& model, const VectorX& q, Configuration& out) {
   }
 }
 
-void compute_spatial(const Model& model, const State& state, const VectorX& q, Configuration& out) {
+EdgeBatch spatial_batch(const Model& model, const State& state, const VectorX& q, Configuration& out) {
   EdgeBatch edges = edge_batch(model, q, out);
   edges.source = &state.tangent.data()->x;
   edges.reference = &state.director.data()->x;
-  frame_kernels().edges(edges);
+  return edges;
+}
+
+/// All that follows from the frames of the edges, in space.
+void compute_strains(const Model& model, const State& state, const VectorX& q, Configuration& out) {
   StrainBatch strains = strain_batch(model, out);
   strains.previous_tau = state.bend_tau.data();
   frame_kernels().strains(strains);
@@ -110,7 +114,9 @@ State initial_state(const Model& model) {
   return state;
 }
 
-void compute_configuration(const Model& model, const State& state, const VectorX& q, Configuration& out) {
+namespace {
+
+void allocate(const Model& model, Configuration& out) {
   if (out.edge.size() != static_cast<std::size_t>(model.edge_count)) {
     out.edge.assign(static_cast<std::size_t>(model.edge_count), EdgeFrame<double>{});
     out.length.resize(model.edge_count);
@@ -119,10 +125,41 @@ void compute_configuration(const Model& model, const State& state, const VectorX
     out.bend_strain = Columns3::Zero(static_cast<Eigen::Index>(model.bend.size()), 3);
     out.half_strain = Columns3::Zero(static_cast<Eigen::Index>(model.half.size()), 3);
   }
-  if (model.planar())
+}
+
+/// Joints' frames and the branches of twists, of a configuration in space.
+void accept_frames(const Model& model, const Configuration& configuration, State& state) {
+  for (int f = 0; f < model.frame_count; ++f) {
+    const auto i = static_cast<std::size_t>(f);
+    state.frame[i] = orthonormalized(configuration.frame[i]);
+    state.q.segment<3>(model.frame_dof[i]).setZero();
+  }
+  state.bend_tau = configuration.bend_strain.col(2);
+  state.half_tau = configuration.half_strain.col(2);
+}
+
+}  // namespace
+
+void compute_configuration(const Model& model, const State& state, const VectorX& q, Configuration& out) {
+  allocate(model, out);
+  if (model.planar()) {
     compute_planar(model, q, out);
-  else
-    compute_spatial(model, state, q, out);
+    return;
+  }
+  frame_kernels().edges(spatial_batch(model, state, q, out));
+  compute_strains(model, state, q, out);
+}
+
+double advance_configuration(const Model& model, const State& state, const VectorX& q, Configuration& out,
+                             State& next) {
+  allocate(model, out);
+  const double cosine = frame_kernels().advance({.edges = spatial_batch(model, state, q, out),
+                                                 .next_source = &next.tangent.data()->x,
+                                                 .next_reference = &next.director.data()->x});
+  compute_strains(model, state, q, out);
+  next.q = q;
+  accept_frames(model, out, next);
+  return cosine;
 }
 
 void accept_configuration(const Model& model, const VectorX& q, const Configuration& configuration, State& state) {
@@ -132,13 +169,7 @@ void accept_configuration(const Model& model, const VectorX& q, const Configurat
                          .frames = &configuration.edge.data()->tangent.x,
                          .source = &state.tangent.data()->x,
                          .reference = &state.director.data()->x});
-  for (int f = 0; f < model.frame_count; ++f) {
-    const auto i = static_cast<std::size_t>(f);
-    state.frame[i] = orthonormalized(configuration.frame[i]);
-    state.q.segment<3>(model.frame_dof[i]).setZero();
-  }
-  state.bend_tau = configuration.bend_strain.col(2);
-  state.half_tau = configuration.half_strain.col(2);
+  accept_frames(model, configuration, state);
 }
 
 }  // namespace withe

@@ -71,6 +71,10 @@ struct Configuration {
 /// Fills `out` from q, measured from the frames of `state`. Does not allocate after the first call.
 void compute_configuration(const Model& model, const State& state, const VectorX& q, Configuration& out);
 
+/// Both of an explicit step, in space: `out` from q, measured from where the edges are there, and of `next` all that
+/// `accept_configuration` sets. Returns the smallest cosine of the angles by which edges turn on the way from `state`.
+double advance_configuration(const Model& model, const State& state, const VectorX& q, Configuration& out, State& next);
+
 /// Makes q the configuration of the state: transports the frames and the twists along.
 void accept_configuration(const Model& model, const VectorX& q, const Configuration& configuration, State& state);
 

@@ -105,5 +105,60 @@ TEST(StencilKernels, TakeTheOrdinaryStencilsOfOpenRods) {
   }
 }
 
+/// Couples of edges that spin and turn, edge by edge: at its head I omega (dt/dt x t) / l, and the opposite at its
+/// tail.
+VectorX spin_couples(const Model& model, const Parameters& parameters, const Configuration& c, const VectorX& v) {
+  VectorX force = VectorX::Zero(model.dof_count);
+  for (std::size_t e = 0; e < c.edge.size(); ++e) {
+    const int a = model.tail_dof[e], b = model.head_dof[e];
+    const Vector3 t = to_eigen(c.edge[e].tangent), rate = v.segment<3>(b) - v.segment<3>(a);
+    const double l = c.length[static_cast<Eigen::Index>(e)];
+    const double spin = parameters.edge_inertia[static_cast<Eigen::Index>(e)] * v[model.edge_dof[e]];
+    const Vector3 head = (spin / (l * l)) * rate.cross(t);
+    force.segment<3>(b) += head;
+    force.segment<3>(a) -= head;
+  }
+  return force;
+}
+
+void expect_explicit_forces(const Case& c) {
+  Options options;
+  options.integrator = Integrator::verlet;
+  Equations equations(c.model, options), implicit(c.model, options);
+  const Parameters parameters = initial_parameters(c.model);
+  VectorX v(c.model.dof_count);
+  for (Eigen::Index i = 0; i < v.size(); ++i) v[i] = std::sin(1.0 + 3.0 * static_cast<double>(i));
+  State next = c.state;
+  const double turn = equations.advance(c.state, c.q, next);
+  Evaluation lean, general;
+  equations.evaluate_forces(next, parameters, v, lean);
+
+  State moved = c.state;
+  Configuration configuration;
+  compute_configuration(c.model, c.state, c.q, configuration);
+  accept_configuration(c.model, c.q, configuration, moved);
+  implicit.begin(moved, parameters, 0.0, false);
+  implicit.evaluate(moved.q, false, nullptr, general);
+  VectorX expected = general.full_residual;
+  if (!c.model.planar()) {
+    expected += spin_couples(c.model, parameters, configuration, v);
+    double largest = 0.0;
+    for (std::size_t e = 0; e < moved.tangent.size(); ++e)
+      largest = std::max(largest, std::acos(std::min(dot(c.state.tangent[e], moved.tangent[e]), 1.0)));
+    EXPECT_NEAR(turn, largest, 1e-7) << c.name;
+    for (std::size_t e = 0; e < moved.tangent.size(); ++e)
+      EXPECT_LT((to_eigen(next.director[e]) - to_eigen(moved.director[e])).norm(), 1e-14) << c.name;
+    EXPECT_LT((next.bend_tau - moved.bend_tau).cwiseAbs().sum(), 1e-12) << c.name;
+  }
+  const double scale = general.magnitude.maxCoeff() + 1.0;
+  EXPECT_LT((next.q - moved.q).norm(), 1e-15) << c.name;
+  EXPECT_LT((lean.full_residual - expected).cwiseAbs().maxCoeff(), 1e-11 * scale) << c.name;
+}
+
+TEST(StencilKernels, GiveTheForcesOfExplicitSteps) {
+  for (const Case& c : testing::all_cases()) expect_explicit_forces(c);
+  for (const Case& c : long_cases()) expect_explicit_forces(c);
+}
+
 }  // namespace
 }  // namespace withe
