@@ -104,7 +104,7 @@ def overhand_knot(
     tail = 0.5 * (length - shortening - braid)
     if tail <= 4.0 * braid_radius:
         raise ValueError(f"length of the rod must leave tails beside the braid: {length:g} m is too short")
-    return _even(whole(low, tail), nodes, length)
+    return _even(whole(low, tail), nodes, length, braid_radius)
 
 
 def reef_knot(*, length: float = 1.0, radius: float = 2e-3, nodes: int = 301) -> FloatArray:
@@ -191,21 +191,21 @@ def _two_half_knots(second_hand: float, length: float, radius: float, nodes: int
     bend = top + 4.0 * r * np.stack([-np.sin(angle), np.zeros_like(angle), 1.0 - np.cos(angle)], axis=1)
     up = bend[-1] + np.array([[0.0, 0.0, max(tail - 2.0 * np.pi * r, radius)]])
     arm = np.concatenate([arm, bend, up])
-    return _even(np.concatenate([(arm * mirror)[::-1], arm[1:]]), nodes, length)
+    return _even(np.concatenate([(arm * mirror)[::-1], arm[1:]]), nodes, length, r)
 
 
 def _length(points: FloatArray) -> float:
     return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
 
 
-def _even(points: FloatArray, nodes: int, length: float) -> FloatArray:
+def _even(points: FloatArray, nodes: int, length: float, braid_radius: float) -> FloatArray:
     """Points at even distances along a smoothed line, as long as it should be."""
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     places = np.concatenate([[0.0], np.cumsum(steps)])
-    fine = np.linspace(0.0, places[-1], 20 * nodes)
+    fine = np.linspace(0.0, places[-1], 20 * max(nodes, int(places[-1] / braid_radius)))
     line = np.stack([np.interp(fine, places, points[:, k]) for k in range(3)], axis=1)
-    # Corners between the pieces: a running mean over the width of a braid, ends kept.
-    width = max(3, int(0.006 * len(fine)) | 1)
+    # Corners between the pieces: a running mean over the width of a braid, however long the rod is; ends kept.
+    width = max(3, int(1.5 * braid_radius / places[-1] * len(fine)) | 1)
     ends = line[:1], line[-1:]
     half = width // 2
     padded = np.concatenate([2 * ends[0] - line[half:0:-1], line, 2 * ends[1] - line[-2 : -half - 2 : -1]])

@@ -16,6 +16,7 @@ EXAMPLES = {
     "gripper.py": (["--duration", "4"], r"friction 0.5: \d+ contacts, nearest ([-+.\d]+) radii", -0.05, 0.1),
     "helix.py": ([], r"(\d+) um from the public code", 0.0, 100.0),
     "knot.py": (["--nodes", "301", "--points", "2"], r" 200 .* ([-+.\d]+)% ", -6.0, 6.0),
+    "knot_limit.py": (["--points", "4"], r"at epsilon = 0: pull ([.\d]+) of the limit", 0.97, 1.03),
     "plectoneme.py": (["--forces", ".01", "--turns", "2"], r"moment at most ([.\d]+)% off", 0.0, 3.0),
     "ring_buckling.py": (["--nodes", "40"], r"\(([-+.\d]+) %\)", -3.0, 3.0),
     "robot.py": (["--steps", "2"], r"walked ([-.\d]+) cm", 4.0, 10.0),
