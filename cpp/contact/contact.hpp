@@ -63,6 +63,9 @@ class Contact {
   double start_energy() const { return start_energy_; }
   /// Greatest depth of surfaces in each other, over the smaller radius.
   double depth() const;
+  /// Whether that is more than a step may end with.
+  bool too_deep() const { return depth() > deepest_; }
+  void allow_depth(double deepest) { deepest_ = deepest; }
 
   /// Whether everything that touches has an element; if not, `couple` gives elements to it and to what is near.
   bool coupled() const;
@@ -123,6 +126,8 @@ class Contact {
   void add_pressing(const Touching& t, bool with_hessian, ContactLocal& out) const;
   void add_friction(const Touching& t, bool with_hessian, ContactLocal& out) const;
   void add_frozen_friction(const Touching& t, bool with_hessian, ContactLocal& out) const;
+  Vec3d frozen_slip(const Touching& t) const;
+  void record_frozen(std::vector<ContactRecord>& records) const;
   void freeze();
   /// Unknowns of a pair at q (obstacles' points where there are none).
   void values_at(const ContactPair& pair, const VectorX& q, double (&x)[kContactUnknowns]) const;
@@ -145,7 +150,7 @@ class Contact {
   std::vector<double> clear_;  ///< per pair: it touches nothing while `moved_` stays below [m]
   double moved_ = 0;           ///< farthest that a node may have gone, summed over all q1 so far [m]
   const State* state_ = nullptr;
-  double duration_ = 0, start_energy_ = 0;
+  double duration_ = 0, start_energy_ = 0, deepest_ = kDeepest;
   VectorX q1_;
   std::vector<Touching> touching_, lagged_;
   std::vector<Frozen> frozen_;

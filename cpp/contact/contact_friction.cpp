@@ -110,16 +110,42 @@ void Contact::freeze() {
   }
 }
 
+/// How far the surfaces have slipped, with J of the start.
+Vec3d Contact::frozen_slip(const Touching& t) const {
+  const ContactPair& pair = pairs_[at(t.pair)];
+  const Frozen& frozen = frozen_[at(t.frozen)];
+  double now[kContactUnknowns], before[kContactUnknowns];
+  values_at(pair, q1_, now);
+  values_at(pair, state_->q, before);
+  Vec3d slip{};
+  for (int i = 0; i < kContactUnknowns; ++i)
+    slip += (now[i] - before[i]) * Vec3d{frozen.slip[0][i], frozen.slip[1][i], frozen.slip[2][i]};
+  return slip;
+}
+
+/// Friction of the step, for the records of contacts that still press at its end.
+void Contact::record_frozen(std::vector<ContactRecord>& records) const {
+  const double rate = 7.5 / (model_.description.contact.slip_tolerance * duration_);
+  for (const Touching& t : touching_) {
+    if (t.frozen < 0) continue;
+    const ContactPair& pair = pairs_[at(t.pair)];
+    ContactRecord* record = find_record(records, pair.key);
+    if (record == nullptr) continue;
+    const Vec3d slip = frozen_slip(t);
+    const double square = dot(slip, slip);
+    const double limit = pair.friction * frozen_[at(t.frozen)].pressing;
+    record->friction = (-limit * slip_factor(Dual<1>(square), rate).value) * slip;
+    record->sticking = rate * std::sqrt(square) < 7.5;
+  }
+}
+
 void Contact::add_frozen_friction(const Touching& t, bool with_hessian, ContactLocal& out) const {
   const ContactPair& pair = pairs_[at(t.pair)];
   const Frozen& frozen = frozen_[at(t.frozen)];
   const ContactDescription& contact = model_.description.contact;
-  double now[kContactUnknowns], before[kContactUnknowns], slip[3] = {};
-  values_at(pair, q1_, now);
-  values_at(pair, state_->q, before);
-  for (int k = 0; k < 3; ++k)
-    for (int i = 0; i < kContactUnknowns; ++i) slip[k] += frozen.slip[k][i] * (now[i] - before[i]);
-  const double square = slip[0] * slip[0] + slip[1] * slip[1] + slip[2] * slip[2];
+  const Vec3d slipped = frozen_slip(t);
+  const double slip[3] = {slipped.x, slipped.y, slipped.z};
+  const double square = dot(slipped, slipped);
   const Dual<1> factor = slip_factor(Dual<1>::unknown(square, 0), 7.5 / (contact.slip_tolerance * duration_));
   const double limit = pair.friction * frozen.pressing;
   double back[3][kContactUnknowns];  // derivative of the force by the unknowns

@@ -116,6 +116,7 @@ double Contact::accept(State& state) {
   }
   std::sort(records.begin(), records.end(),
             [](const ContactRecord& a, const ContactRecord& b) { return a.key < b.key; });
+  if (!frozen_.empty()) record_frozen(records);
   state.contacts = std::move(records);
   // A contact that is yet to come starts as stiff as its rods' greatest force wants; that fades.
   if (!given) state.contact_stiffness = (0.8 * state.contact_stiffness).cwiseMax(greatest);
@@ -153,6 +154,7 @@ double Contact::stiffen(State& state) {
 }
 
 void Contact::hold_sticking(const State& state, VectorX& change) const {
+  if (!unsymmetric()) return;
   for (const ContactRecord& record : state.contacts) {
     if (!record.sticking) continue;
     for (int edge : {record.key.a, record.key.b}) {

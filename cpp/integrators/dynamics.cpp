@@ -276,7 +276,7 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
     work.change = work.z - state.q;
     if (equations.allowed(state.q, work.change) < 1.0) return result;
     contact->update(q1);
-    result.too_deep = contact->depth() > kDeepest;
+    result.too_deep = contact->too_deep();
     if (result.too_deep) return result;
   }
   work.change = q1 - state.q;

@@ -104,6 +104,12 @@ enum class FrictionLaw {
   anchored,  ///< an elastic stick that holds a load without creep, by return mapping
 };
 
+/// What to do with surfaces that are inside each other where the scene is drawn.
+enum class Overlap {
+  error,     ///< refuse the scene
+  separate,  ///< move rods apart
+};
+
 enum class ObstacleKind {
   plane,    ///< fills the half-space behind it
   capsule,  ///< a segment with a radius; a sphere where its ends coincide
@@ -135,6 +141,7 @@ struct ContactDescription {
   double slip_tolerance = 1e-3;      ///< nu [m/s]
   double stiffness = 0;              ///< [N/m]; 0: follows the forces
   bool centreline_friction = false;  ///< friction acts on the centrelines, as in the source
+  Overlap overlap = Overlap::error;
   std::vector<ObstacleDescription> obstacles;
   std::vector<ContactPairDescription> pairs;
 

@@ -1,4 +1,5 @@
 #include <cmath>
+#include <cstdio>
 
 #include "common/check.hpp"
 #include "geometry/rotation.hpp"
@@ -61,6 +62,7 @@ World::Implementation::Implementation(SceneDescription scene, Options choice)
   for (const LoadDescription& load : description.loads) load_values.push_back(load.value);
   rebuild(Rebuild::first);
   check_reversible(parameters);
+  if (description.contact.overlap == Overlap::separate) separate();
   check_overlap();
   if (options.integrator == Integrator::verlet) {
     plan.stable_step = stable_step(*equations, parameters, state, work.newton);
@@ -84,6 +86,7 @@ World::Implementation::Implementation(const Implementation& other)
       ramps(other.ramps),
       load_values(other.load_values),
       custom_force(other.custom_force),
+      separated(other.separated),
       spatial(other.spatial),
       level(other.level),
       easy_steps(other.easy_steps),
@@ -326,7 +329,26 @@ void World::Implementation::add_contact_notes() {
                          " obstacle(s): their terms stay between neighbouring nodes");
   plan.notes.push_back(contact.rods ? "rods touch each other: they are coupled only where they are near"
                                     : "rods do not touch each other: no broad phase");
+  if (contact.rods) add_coarse_notes();
+  if (separated > 0.0)
+    plan.notes.push_back("rods that overlapped as drawn were moved apart, by up to " + std::to_string(separated) +
+                         " m: they are stressed there");
   if (!equations->contact()->frictional()) plan.notes.emplace_back("no friction: contact stays symmetric");
+}
+
+/// Warns of rods whose edges are longer than they are thick: to contact they are chains of straight pieces.
+void World::Implementation::add_coarse_notes() {
+  for (std::size_t r = 0; r < description.rods.size(); ++r) {
+    const VectorX& radius = description.rods[r].contact_radius;
+    if (radius.size() == 0 || !(radius.minCoeff() > 0.0)) continue;
+    const int first = model.rod_first_edge[r];
+    const double ratio = (model.edge_length.segment(first, radius.size()).array() / (2.0 * radius.array())).maxCoeff();
+    if (ratio <= 1.0 + 1e-9) continue;
+    char number[32];
+    std::snprintf(number, sizeof number, "%.3g", ratio);
+    plan.notes.push_back("warning: edges of rod '" + description.rods[r].name + "' are " + number +
+                         " times as long as it is thick, and touch as straight pieces: more nodes make contact smooth");
+  }
 }
 
 std::string World::Implementation::fluid_note() const {

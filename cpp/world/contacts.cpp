@@ -67,8 +67,14 @@ void World::Implementation::check_overlap() const {
                                                : name(deepest->key.b);
   char depth_text[32];
   std::snprintf(depth_text, sizeof depth_text, "%.3g", -deepest->gap);
-  require(false, name(deepest->key.a) + " and " + other + " overlap by " + depth_text +
-                     " m at the start: draw them apart, or leave the pair out with ignore_contact");
+  const std::string advice =
+      description.contact.overlap == Overlap::separate
+          ? std::string(" m at the start and cannot be moved apart") +
+                (model.planar() && deepest->key.b >= 0 ? " within their plane: build with planar=False, " : ": ") +
+                "draw them apart, or leave the pair out with ignore_contact"
+          : " m at the start: draw them apart, leave the pair out with ignore_contact, or take "
+            "enable_contact(overlap='separate')";
+  require(false, name(deepest->key.a) + " and " + other + " overlap by " + depth_text + advice);
 }
 
 }  // namespace withe

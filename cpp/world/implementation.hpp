@@ -84,6 +84,7 @@ struct World::Implementation {
   std::function<void(double, double)> callback;  ///< StepCallback, bound to its world
   std::function<void()> poll;
   std::atomic<bool> interrupted{false};
+  double separated = 0;  ///< how far overlapping rods were moved before the start [m]
   bool spatial = false;  ///< left its plane while running
   int level = 0;         ///< present halvings of the time step, in `notches()` to each
   int easy_steps = 0;
@@ -103,6 +104,7 @@ struct World::Implementation {
   void rebuild(Rebuild why);
   void make_plan();
   void add_contact_notes();
+  void add_coarse_notes();
   std::string fluid_note() const;
   /// Drops the plane; throws when the user asked for it. `why` names the argument that leaves the plane.
   void leave_plane(const std::string& why);
@@ -166,6 +168,9 @@ struct World::Implementation {
 
   // contacts.cpp
   void check_overlap() const;
+
+  // separation.cpp
+  void separate();
 
   // energy.cpp
   Energy energy() const;

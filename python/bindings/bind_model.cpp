@@ -20,6 +20,7 @@ constexpr Words<Bending, 2> kBendings{{{"angle", Bending::angle}, {"tangent", Be
 constexpr Words<ContactLaw, 2> kContactLaws{{{"imcv2", ContactLaw::imcv2}, {"barrier", ContactLaw::barrier}}};
 constexpr Words<FrictionLaw, 3> kFrictionLaws{
     {{"implicit", FrictionLaw::implicit}, {"lagged", FrictionLaw::lagged}, {"anchored", FrictionLaw::anchored}}};
+constexpr Words<Overlap, 2> kOverlaps{{{"error", Overlap::error}, {"separate", Overlap::separate}}};
 constexpr Words<FluidModel, 3> kFluidModels{
     {{"none", FluidModel::none}, {"resistive", FluidModel::resistive}, {"stokeslets", FluidModel::stokeslets}}};
 constexpr Words<ObstacleKind, 2> kObstacleKinds{{{"plane", ObstacleKind::plane}, {"capsule", ObstacleKind::capsule}}};
@@ -72,6 +73,7 @@ void register_contact(py::module_& module) {
       .def_readwrite("pairs", &ContactDescription::pairs);
   def_word(contact, "law", &ContactDescription::law, kContactLaws);
   def_word(contact, "friction_law", &ContactDescription::friction_law, kFrictionLaws);
+  def_word(contact, "overlap", &ContactDescription::overlap, kOverlaps);
 }
 
 void register_fluid(py::module_& module) {

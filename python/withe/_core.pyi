@@ -234,6 +234,7 @@ class ContactDescription:
     centreline_friction: bool
     friction_law: str
     law: str
+    overlap: str
     rods: bool
     def __init__(self) -> None: ...
     @property

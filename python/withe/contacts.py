@@ -11,7 +11,7 @@ import numpy.typing as npt
 from withe import _core, validation
 from withe.directory import Directory
 from withe.handles import Obstacle, Rod
-from withe.parts import ContactModel, ContactSettings, FrictionModel, ObstaclePart, RodPart
+from withe.parts import ContactModel, ContactSettings, FrictionModel, ObstaclePart, Overlap, RodPart
 
 __all__ = ["CONTACT", "Contacts", "contact_table", "describe_contact"]
 
@@ -144,6 +144,7 @@ class Contacts:
         slip_tolerance: float = 1e-3,
         stiffness: float | None = None,
         centreline_friction: bool = False,
+        overlap: Overlap = "error",
     ) -> None:
         """Let rods touch each other and themselves. Obstacles need no such word; its tolerances are theirs too.
 
@@ -167,11 +168,16 @@ class Contacts:
             smaller radius deep in each other.
         centreline_friction : bool
             Let friction act on the centrelines, as in the dissertation, and not where surfaces touch.
+        overlap : {"error", "separate"}
+            What `build` does with surfaces that are drawn inside each other: refuse them, or move rods apart,
+            quasi-statically, with supports where they are. What is moved is stressed: its natural shape stays
+            that of the drawing.
 
         Raises
         ------
         ValueError
-            Negative friction, a tolerance or stiffness that is not positive, a tolerance above a radius.
+            Negative friction, a tolerance or stiffness that is not positive, a tolerance above a radius; from
+            `build`, surfaces inside each other, with both edges and the depth.
 
         Examples
         --------
@@ -200,6 +206,7 @@ class Contacts:
             slip_tolerance=validation.positive(slip_tolerance, "slip_tolerance"),
             stiffness=_optional(stiffness, "stiffness of contact"),
             centreline_friction=validation.truth(centreline_friction, "centreline_friction"),
+            overlap=cast(Overlap, validation.choice(overlap, "overlap", ("error", "separate"))),
         )
 
     def set_friction(self, a: Rod | Obstacle | str, b: Rod | Obstacle | str, friction: float) -> None:
@@ -273,6 +280,7 @@ def describe_contact(directory: Directory) -> _core.ContactDescription:
     contact.slip_tolerance = settings.slip_tolerance
     contact.stiffness = settings.stiffness or 0.0
     contact.centreline_friction = settings.centreline_friction
+    contact.overlap = settings.overlap
     obstacles = directory.all(ObstaclePart)
     rods = directory.all(RodPart)
     for rod in rods:

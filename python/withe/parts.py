@@ -27,6 +27,7 @@ __all__ = [
     "LoadPart",
     "MassPart",
     "ObstaclePart",
+    "Overlap",
     "Part",
     "Pass",
     "RodPart",
@@ -40,6 +41,7 @@ JoinKind = Literal["rigid", "pinned", "revolute"]
 JointForm = Literal["frame", "pairs"]
 ContactModel = Literal["imcv2", "barrier"]
 FrictionModel = Literal["implicit", "lagged", "anchored"]
+Overlap = Literal["error", "separate"]
 FluidModel = Literal["stokeslets", "resistive"]
 LoadKind = Literal["force", "moment", "load"]
 SupportKind = Literal["pin", "clamp", "hold_edge", "spinning_clamp", "spinning_edge"]
@@ -178,6 +180,7 @@ class ContactSettings:
     slip_tolerance: float = 1e-3
     stiffness: float | None = None
     centreline_friction: bool = False
+    overlap: Overlap = "error"
     pairs: Mapping[tuple[str, str], float | None] = field(default_factory=dict)  # friction; None: pass through
     groups: Mapping[str, str] = field(default_factory=dict)  # of rods
 

@@ -108,6 +108,27 @@ def test_a_rod_pushed_along_a_floor_slides_as_a_block_does(friction_model: Any) 
         assert simulation.energy().kinetic == pytest.approx(1.5**2 / 2.0 * pace**2, rel=0.01, abs=1e-4)
 
 
+@pytest.mark.parametrize("friction_model", ["implicit", "lagged", "anchored"])
+@pytest.mark.parametrize(("force", "sticks"), [(1.5, True), (6.0, False)])
+def test_friction_read_out_holds_a_block_or_is_at_its_limit(friction_model: Any, force: float, sticks: bool) -> None:
+    scene, rod = heavy_rod(friction_model)
+    push = scene.add_load(rod, (0, 0, 0))
+    simulation = scene.build(integrator="backward_euler", time_step=5e-3)
+    simulation.equilibrium()
+    simulation.set(push, load=(force, 0, 0))
+    simulation.step(100)
+    contacts = simulation.contacts()
+    assert (contacts["sticking"] == sticks).all()
+    friction = contacts["friction"].sum(axis=0)
+    np.testing.assert_allclose(friction, (-force if sticks else -0.4 * 9.8, 0.0, 0.0), atol=0.01)
+    limits = 0.4 * contacts["normal_force"]
+    sizes = np.linalg.norm(contacts["friction"], axis=1)
+    if sticks:
+        assert (sizes < limits).all()
+    else:
+        np.testing.assert_allclose(sizes, limits, rtol=0.01)
+
+
 def test_an_anchored_contact_does_not_creep_under_half_its_limit() -> None:
     scene, rod = heavy_rod("anchored")
     scene.add_load(rod, lambda t: (1.96 * min(t / 0.5, 1.0), 0, 0))

@@ -60,6 +60,58 @@ def test_a_restored_a_copied_and_a_pickled_simulation_go_on_with_the_same_bits(f
         np.testing.assert_array_equal(one.positions(), expected)
 
 
+def parallel_pair() -> withe.Scene:
+    scene = withe.Scene(gravity=(0, 0, 0))
+    for name, height in (("a", 0.0), ("b", 0.007)):
+        scene.add_rod(start=(0, 0, height), end=(0.3, 0, height), nodes=31, radius=5e-3, material=RUBBER, name=name)
+    return scene
+
+
+def clamped_cross() -> withe.Scene:
+    """Centrelines that meet, between walls: both rods must bend."""
+    scene = withe.Scene(gravity=(0, 0, 0))
+    for name, end in (("a", (0.15, 0.0, 0.0)), ("b", (0.0, 0.15, 1e-9))):
+        start = -np.array(end)
+        rod = scene.add_rod(start=start, end=end, nodes=31, radius=5e-3, material=RUBBER, name=name)
+        scene.clamp(rod.start)
+        scene.clamp(rod.end)
+    return scene
+
+
+def loop() -> withe.Scene:
+    """A rod that meets itself after a turn."""
+    scene = withe.Scene(gravity=(0, 0, 0))
+    t = np.linspace(0.0, 1.15, 80)
+    angle = 2.0 * np.pi * t
+    points = np.column_stack([0.05 * np.cos(angle), 0.05 * np.sin(angle), 4e-3 * t])
+    scene.add_rod(points=points, nodes=80, radius=5e-3, material=RUBBER, name="a")
+    return scene
+
+
+@pytest.mark.parametrize("drawn", [parallel_pair, clamped_cross, loop])
+def test_rods_that_overlap_are_moved_apart_on_request(drawn: Callable[[], withe.Scene]) -> None:
+    scene = drawn()
+    as_drawn = scene.build(planar=False).positions()
+    scene.enable_contact()
+    with pytest.raises(ValueError, match=r"overlap by .* m at the start"):
+        scene.build(planar=False)
+    scene.enable_contact(overlap="separate")
+    simulation = scene.build(integrator="backward_euler", planar=False)
+    start = simulation.positions()
+    assert any("moved apart" in note for note in simulation.plan.notes)
+    contacts = simulation.contacts()
+    assert len(contacts) > 0
+    assert contacts["gap"].min() > -1e-12
+    np.testing.assert_array_equal(simulation.velocities(), 0.0)
+    assert np.linalg.norm(start - as_drawn, axis=1).max() < 0.01
+    for rod in simulation.rods:
+        strain = simulation.tensions(rod) / (1e6 * np.pi * 5e-3**2)
+        assert np.abs(strain).max() < 0.01
+    simulation.step(20)
+    simulation.reset()
+    np.testing.assert_array_equal(simulation.positions(), start)
+
+
 def test_ignored_pairs_and_groups_pass_through_each_other() -> None:
     for leave_out in (
         lambda scene: scene.ignore_contact("top", "bar"),
@@ -71,6 +123,18 @@ def test_ignored_pairs_and_groups_pass_through_each_other() -> None:
         simulation.step(60)
         assert len(simulation.contacts()) == 0
         assert simulation.positions(top)[:, 2].max() < simulation.positions(bar)[7, 2]
+
+
+def test_the_plan_warns_of_edges_that_are_too_long_for_contact() -> None:
+    def warnings(nodes: int) -> list[str]:
+        scene = withe.Scene()
+        scene.add_rod(start=(0, 0, 0), end=(0.2, 0, 0), nodes=nodes, radius=5e-3, material=RUBBER, name="rope")
+        scene.enable_contact()
+        return [note for note in scene.build().plan.notes if "warning" in note]
+
+    assert warnings(21) == []
+    (warning,) = warnings(11)
+    assert "edges of rod 'rope' are 2 times as long as it is thick" in warning
 
 
 def test_the_plan_says_what_contact_adds_and_what_is_skipped() -> None:
@@ -95,6 +159,26 @@ def buried(scene: withe.Scene) -> None:
     scene.build()
 
 
+def floor_through_a_clamp(scene: withe.Scene) -> None:
+    rod = scene.add_rod(start=(0, 0, 0), end=(0, 0, 0.2), nodes=5, radius=5e-3, material=RUBBER, name="a")
+    scene.clamp(rod.start)
+    scene.add_floor(name="table")
+    scene.enable_contact(overlap="separate")
+    scene.build()
+
+
+def crossing_in_a_plane(scene: withe.Scene) -> None:
+    scene.add_rod(start=(-0.1, 0, 0), end=(0.1, 0, 0), nodes=6, radius=5e-3, material=RUBBER, name="a")
+    scene.add_rod(start=(0, 0, -0.1), end=(0, 0, 0.1), nodes=6, radius=5e-3, material=RUBBER, name="b")
+    scene.enable_contact(overlap="separate")
+    scene.build(planar=True)
+
+
+def unknown_group(scene: withe.Scene) -> None:
+    scene.add_rod(start=(-0.1, 0, 1), end=(0.1, 0, 1), nodes=5, radius=5e-3, material=RUBBER, name="a")
+    scene.set_contact_group("a", None)  # type: ignore[arg-type]
+
+
 def coarse_tolerance(scene: withe.Scene) -> None:
     scene.add_rod(start=(-0.1, 0, 1), end=(0.1, 0, 1), nodes=5, radius=5e-3, material=RUBBER, name="a")
     scene.enable_contact(distance_tolerance=0.1)
@@ -113,6 +197,13 @@ REFUSED: list[tuple[Callable[[withe.Scene], Any], str]] = [
     (lambda scene: scene.set_friction("nobody", "noone", 0.1), "what touches 'nobody' is not in the scene"),
     (overlapping, "edge . of rod 'a' and edge . of rod 'b' overlap by 0.003"),
     (buried, "edge . of rod 'a' and 'table' overlap by 0.005"),
+    (floor_through_a_clamp, "edge 0 of rod 'a' and 'table' overlap by 0.005 m at the start and cannot be moved apart"),
+    (crossing_in_a_plane, "cannot be moved apart within their plane"),
+    (lambda scene: scene.enable_contact(friction=float("nan")), "friction"),
+    (lambda scene: scene.enable_contact(overlap="push"), "overlap"),
+    (lambda scene: scene.set_contact_group("nobody", "inner"), "'nobody'"),
+    (lambda scene: scene.ignore_contact("inner", "inner"), "what touches 'inner' is not in the scene"),
+    (unknown_group, "group of rod 'a' must be text, got None"),
     (coarse_tolerance, "distance_tolerance must not exceed the radius of rod 'a'"),
 ]
 
