@@ -52,7 +52,7 @@ void Contact::initialise(State& state) const {
 
 /// What stops an edge's mass within the step, at the speed at which the ends meet.
 double Contact::impact_stiffness(const ContactPair& pair) const {
-  if (model_.description.contact.stiffness > 0.0) return 0.0;
+  if (fixed(pair)) return 0.0;
   const bool obstacle = pair.key.b < 0;
   double square = 0.0;
   for (int node_a : {model_.edge_tail[at(pair.key.a)], model_.edge_head[at(pair.key.a)]}) {
@@ -72,8 +72,22 @@ double Contact::impact_stiffness(const ContactPair& pair) const {
 
 /// Of a contact that begins, for a whole node.
 double Contact::start_stiffness(const ContactPair& pair, const VectorX& stiffness) const {
-  const double a = stiffness(pair.rod_a);
-  return pair.rod_b < 0 ? a : std::max(a, stiffness(pair.rod_b));
+  if (pair.stiffness > 0.0) return pair.stiffness;
+  double start = stiffness(pair.rod_a);
+  if (pair.rod_b >= 0) start = std::max(start, stiffness(pair.rod_b));
+  if (model_.description.contact.law != ContactLaw::spillmann_teschner) return start;
+  // A force 2 k d leads out of the depth d within the step.
+  const double a = edge_mass_(pair.key.a);
+  const double mass = pair.key.b < 0 ? a : a * edge_mass_(pair.key.b) / (a + edge_mass_(pair.key.b));
+  return std::max(start, 0.5 * mass / (duration_ * duration_));
+}
+
+/// Of a contact without a record. What touches already when the step begins does not become stiffer by its speed, which
+/// would put energy in.
+double Contact::first_stiffness(const ContactPair& pair) const {
+  const double start = start_stiffness(pair, state_->contact_stiffness);
+  const bool before = starting_ || std::find(unrecorded_.begin(), unrecorded_.end(), pair.key) != unrecorded_.end();
+  return before ? start : std::max(start, impact_stiffness(pair));
 }
 
 double Contact::tangential_stiffness(const ContactPair& pair, double stiffness) const {
@@ -140,9 +154,14 @@ void Contact::begin(const State& state, double duration) {
   lagged_.clear();
   if (outgrown(state.q, nullptr)) find_pairs(state.q, state.q);
   touching_.clear();
+  unrecorded_.clear();
+  starting_ = true;
   update(state.q);
+  starting_ = false;
+  for (const Touching& t : touching_)
+    if (record_of(pairs_[at(t.pair)].key) == nullptr) unrecorded_.push_back(pairs_[at(t.pair)].key);
   start_energy_ = energy();
-  if (frictional_ && model_.description.contact.friction_law == FrictionLaw::lagged) freeze();
+  if (frictional_ && freezes()) freeze();
 }
 
 void Contact::update(const VectorX& q1) {
@@ -166,9 +185,7 @@ void Contact::update(const VectorX& q1) {
       continue;
     }
     const ContactRecord* record = record_of(pair.key);
-    t.stiffness =
-        record ? record->stiffness : std::max(start_stiffness(pair, state_->contact_stiffness), impact_stiffness(pair));
-    t.stiffness *= pair.share;
+    t.stiffness = pair.share * (record ? record->stiffness : first_stiffness(pair));
     t.yielded = record ? record->yielded : 0.0;
     t.energy = contact_energy(contact.law, t.distance + t.yielded, pair.radii(), pair.tolerance);
     t.energy.value *= t.stiffness;
@@ -204,8 +221,7 @@ void Contact::local(int i, bool with_hessian, ContactLocal& out) const {
     return;
   }
   add_pressing(t, with_hessian, out);
-  if (pairs_[at(t.pair)].friction > 0.0 && model_.description.contact.friction_law != FrictionLaw::lagged)
-    add_friction(t, with_hessian, out);
+  if (pairs_[at(t.pair)].friction > 0.0 && !freezes()) add_friction(t, with_hessian, out);
 }
 
 void Contact::add_pressing(const Touching& t, bool with_hessian, ContactLocal& out) const {

@@ -44,7 +44,7 @@ class Contact {
   const Surfaces& surfaces() const { return surfaces_; }
   /// Whether friction is there at all, and its Jacobian unsymmetric.
   bool frictional() const { return frictional_; }
-  bool unsymmetric() const { return frictional_ && model_.description.contact.friction_law != FrictionLaw::lagged; }
+  bool unsymmetric() const { return frictional_ && !freezes(); }
 
   /// A step begins at `state`, which must outlive it. `duration`: the time in which slip happens [s].
   void begin(const State& state, double duration);
@@ -95,6 +95,11 @@ class Contact {
   void forget();
 
  private:
+  /// Whether friction is that of contacts at the start of the step.
+  bool freezes() const {
+    const FrictionLaw law = model_.description.contact.friction_law;
+    return law == FrictionLaw::lagged || law == FrictionLaw::semi_explicit;
+  }
   struct Touching {
     int pair = 0;  ///< index in pairs_
     ClosestPoints points;
@@ -105,10 +110,16 @@ class Contact {
     Vec3d stick{};
     int frozen = -1;  ///< friction of the start and no pressing: index in frozen_
   };
-  /// Lagged friction: J and N of the start of the step.
+  /// Friction with J and N of the start of the step; semi-explicit: along the slip velocity there, where it has one.
   struct Frozen {
     double slip[3][kContactUnknowns];
-    double pressing = 0;  ///< [N]
+    double pressing = 0;  ///< times how far from sticking the contact starts, if semi-explicit [N]
+    Vec3d direction{};
+  };
+  struct FrozenForce {
+    Vec3d force{};       ///< on the slip, against it: minus friction on a [N]
+    double slope[3][3];  ///< by the slip [N/m]
+    bool sticking = false;
   };
   const ContactPair& pair_of(int i) const;
   void unknowns_of(const ContactPair& pair, int (&dofs)[kContactUnknowns]) const;
@@ -117,16 +128,23 @@ class Contact {
   static double depth_of(const ContactPair& pair, double distance) {
     return (pair.radii() - distance) / pair.small_radius();
   }
+  /// Whether a stiffness is given.
+  bool fixed(const ContactPair& pair) const {
+    return pair.stiffness > 0.0 || model_.description.contact.stiffness > 0.0;
+  }
   Touching touch(int pair, const VectorX& q) const;
   double start_stiffness(const ContactPair& pair, const VectorX& stiffness) const;
   double impact_stiffness(const ContactPair& pair) const;
+  double first_stiffness(const ContactPair& pair) const;
   double tangential_stiffness(const ContactPair& pair, double stiffness) const;
   void end_points(const ContactPair& pair, const VectorX& q, Vec3d (&x)[4]) const;
   FrictionSetting setting(const Touching& t) const;
   void add_pressing(const Touching& t, bool with_hessian, ContactLocal& out) const;
   void add_friction(const Touching& t, bool with_hessian, ContactLocal& out) const;
   void add_frozen_friction(const Touching& t, bool with_hessian, ContactLocal& out) const;
+  FrozenForce frozen_force(const Touching& t) const;
   Vec3d frozen_slip(const Touching& t) const;
+  void set_direction(const ContactPair& pair, Frozen& frozen) const;
   void record_frozen(std::vector<ContactRecord>& records) const;
   void freeze();
   /// Unknowns of a pair at q (obstacles' points where there are none).
@@ -138,6 +156,13 @@ class Contact {
   const ContactRecord* record_of(const ContactKey& key) const;
   double change_stiffness(const Touching& t, double ratio, double yielded, ContactRecord& record) const;
   double yielded_at(const Touching& t, double ratio) const;
+  /// Of a whole node, for a force to press surfaces no deeper than `kDepth` [N/m].
+  static double wanted_stiffness(const ContactPair& pair, double force) {
+    return force / (2.0 * kDepth * pair.small_radius() * pair.share);
+  }
+  double follow_force(const Touching& t, ContactRecord& record) const;
+  double source_stiffness() const;
+  void record_friction(const Touching& t, ContactRecord& record) const;
 
   const Model& model_;
   Surfaces surfaces_;
@@ -147,8 +172,10 @@ class Contact {
   std::vector<ContactPair> pairs_;  ///< obstacles' first, then candidates of the broad phase
   VectorX reference_;               ///< where the candidates belong
   double margin_ = 0;
-  std::vector<double> clear_;  ///< per pair: it touches nothing while `moved_` stays below [m]
-  double moved_ = 0;           ///< farthest that a node may have gone, summed over all q1 so far [m]
+  std::vector<double> clear_;           ///< per pair: it touches nothing while `moved_` stays below [m]
+  double moved_ = 0;                    ///< farthest that a node may have gone, summed over all q1 so far [m]
+  std::vector<ContactKey> unrecorded_;  ///< what touches at the start of the step and has no record
+  bool starting_ = false;
   const State* state_ = nullptr;
   double duration_ = 0, start_energy_ = 0, deepest_ = kDeepest;
   VectorX q1_;

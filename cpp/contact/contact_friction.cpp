@@ -89,7 +89,7 @@ void Contact::freeze() {
       const Vec3d e = x[2 * side + 1] - x[2 * side];
       const double inverse = 1.0 / std::sqrt(dot(e, e));
       const Vec3d tangent = inverse * e;
-      const Vec3d arm = (-sign * (side == 0 ? pair.radius_a : pair.radius_b)) * t.normal;
+      const Vec3d arm = contact_arm(pair, side, t.normal, t.points.between);
       for (int k = 0; k < 3; ++k) {
         const Vec3d turned = (sign * inverse) * cross(cross(tangent, axes[k]), arm);
         column[6 * side + 3 + k] += turned;
@@ -103,6 +103,7 @@ void Contact::freeze() {
       frozen.slip[1][i] = c.y;
       frozen.slip[2][i] = c.z;
     }
+    if (model_.description.contact.friction_law == FrictionLaw::semi_explicit) set_direction(pair, frozen);
     lagged_.push_back(t);
     lagged_.back().frozen = static_cast<int>(frozen_.size());
     lagged_.back().energy = ContactEnergy{};
@@ -123,40 +124,75 @@ Vec3d Contact::frozen_slip(const Touching& t) const {
   return slip;
 }
 
+/// The direction of slip at the start, and how much of friction there is at its speed, tanh(K u / 2) [dissertation,
+/// (4.12), (4.13), with the weight (5.10) in place of (4.14)].
+void Contact::set_direction(const ContactPair& pair, Frozen& frozen) const {
+  double velocity[kContactUnknowns];
+  values_at(pair, state_->v, velocity);
+  Vec3d u{};
+  for (int i = 0; i < kContactUnknowns; ++i)
+    u += velocity[i] * Vec3d{frozen.slip[0][i], frozen.slip[1][i], frozen.slip[2][i]};
+  const double speed = std::sqrt(dot(u, u));
+  if (speed > 0.0) frozen.direction = (1.0 / speed) * u;
+  frozen.pressing *= std::tanh(7.5 * speed / model_.description.contact.slip_tolerance);
+}
+
+/// Lagged: mu N tanh(K |S| / (2 dt)) along the slip S of the step. Semi-explicit: mu N gamma tanh(K s / (2 dt)) along
+/// the direction at the start, s = S . direction where that is positive: constant while surfaces slip on, and nothing
+/// where they would slip back, so that it never pushes them.
+Contact::FrozenForce Contact::frozen_force(const Touching& t) const {
+  const ContactPair& pair = pairs_[at(t.pair)];
+  const Frozen& frozen = frozen_[at(t.frozen)];
+  const ContactDescription& contact = model_.description.contact;
+  const double rate = 7.5 / (contact.slip_tolerance * duration_), limit = pair.friction * frozen.pressing;
+  const Vec3d slip = frozen_slip(t);
+  FrozenForce out{};
+  if (contact.friction_law == FrictionLaw::semi_explicit) {
+    const Vec3d& d = frozen.direction;
+    const double along = std::max(dot(slip, d), 0.0), share = std::tanh(rate * along);
+    const double slope = along > 0.0 ? limit * rate * (1.0 - share * share) : 0.0;
+    const double n[3] = {d.x, d.y, d.z};
+    out.force = (limit * share) * d;
+    for (int k = 0; k < 3; ++k)
+      for (int l = 0; l < 3; ++l) out.slope[k][l] = slope * n[k] * n[l];
+    out.sticking = rate * along < 7.5;
+    return out;
+  }
+  const double square = dot(slip, slip), s[3] = {slip.x, slip.y, slip.z};
+  const Dual<1> factor = slip_factor(Dual<1>::unknown(square, 0), rate);
+  out.force = (limit * factor.value) * slip;
+  for (int k = 0; k < 3; ++k)
+    for (int l = 0; l < 3; ++l)
+      out.slope[k][l] = limit * ((k == l ? factor.value : 0.0) + 2.0 * factor.slope[0] * s[k] * s[l]);
+  out.sticking = rate * std::sqrt(square) < 7.5;
+  return out;
+}
+
 /// Friction of the step, for the records of contacts that still press at its end.
 void Contact::record_frozen(std::vector<ContactRecord>& records) const {
-  const double rate = 7.5 / (model_.description.contact.slip_tolerance * duration_);
   for (const Touching& t : touching_) {
     if (t.frozen < 0) continue;
-    const ContactPair& pair = pairs_[at(t.pair)];
-    ContactRecord* record = find_record(records, pair.key);
+    ContactRecord* record = find_record(records, pairs_[at(t.pair)].key);
     if (record == nullptr) continue;
-    const Vec3d slip = frozen_slip(t);
-    const double square = dot(slip, slip);
-    const double limit = pair.friction * frozen_[at(t.frozen)].pressing;
-    record->friction = (-limit * slip_factor(Dual<1>(square), rate).value) * slip;
-    record->sticking = rate * std::sqrt(square) < 7.5;
+    const FrozenForce f = frozen_force(t);
+    record->friction = -f.force;
+    record->sticking = f.sticking;
   }
 }
 
 void Contact::add_frozen_friction(const Touching& t, bool with_hessian, ContactLocal& out) const {
-  const ContactPair& pair = pairs_[at(t.pair)];
   const Frozen& frozen = frozen_[at(t.frozen)];
-  const ContactDescription& contact = model_.description.contact;
-  const Vec3d slipped = frozen_slip(t);
-  const double slip[3] = {slipped.x, slipped.y, slipped.z};
-  const double square = dot(slipped, slipped);
-  const Dual<1> factor = slip_factor(Dual<1>::unknown(square, 0), 7.5 / (contact.slip_tolerance * duration_));
-  const double limit = pair.friction * frozen.pressing;
+  const FrozenForce f = frozen_force(t);
+  const double force[3] = {f.force.x, f.force.y, f.force.z};
+  for (int i = 0; i < kContactUnknowns; ++i)
+    for (int k = 0; k < 3; ++k) out.gradient[i] += frozen.slip[k][i] * force[k];
+  if (!with_hessian) return;
   double back[3][kContactUnknowns];  // derivative of the force by the unknowns
   for (int k = 0; k < 3; ++k)
     for (int i = 0; i < kContactUnknowns; ++i) {
-      double along = 0.0;
-      for (int l = 0; l < 3; ++l) along += slip[l] * frozen.slip[l][i];
-      back[k][i] = limit * (factor.value * frozen.slip[k][i] + 2.0 * factor.slope[0] * slip[k] * along);
-      out.gradient[i] += frozen.slip[k][i] * limit * factor.value * slip[k];
+      back[k][i] = 0.0;
+      for (int l = 0; l < 3; ++l) back[k][i] += f.slope[k][l] * frozen.slip[l][i];
     }
-  if (!with_hessian) return;
   for (int i = 0; i < kContactUnknowns; ++i)
     for (int j = 0; j < kContactUnknowns; ++j)
       for (int k = 0; k < 3; ++k) out.hessian[i][j] += frozen.slip[k][i] * back[k][j];

@@ -6,6 +6,11 @@
 ///            [dissertation, (5.2), with the range of its first line ending at C - delta]
 ///   barrier: -(D - C - delta)^2 ln((D - C) / delta), infinite at D = C [Li et al. 2020; dissertation, (5.1), whose
 ///            barrier as printed stands at D = 0]
+///   imcv1:   (h / K) log(1 + e^(K (C - D))), h = C / 2, whose force goes up to k h and no further; from it, so that it
+///            begins at C + delta without a step, its tangent there [dissertation, (4.16), h^2 E with K1 = K h: its
+///            K1 = 50 is delta = 0.3 h]
+///   spillmann_teschner: (C - D)^2 where D < C, with no tolerance, and as stiff as it takes a force to lead out of a
+///            depth within one step [Spillmann and Teschner 2008; the baseline of dissertation, 4.7, there explicit]
 /// E has the unit m^2, so its stiffness is in N/m.
 
 #include <cmath>
@@ -40,9 +45,37 @@ inline ContactEnergy barrier_energy(double distance, double radii, double tolera
   return {-x * x * log, -2.0 * x * log - x * x / gap, -2.0 * log - 4.0 * x / gap + x * x / (gap * gap)};
 }
 
+inline ContactEnergy imcv1_energy(double distance, double radii, double tolerance) {
+  const double x = radii - distance;
+  if (x <= -tolerance) return {};
+  constexpr double kEnd = 15.0;
+  const double size = 0.5 * radii, steepness = kEnd / tolerance;
+  const double y = steepness * x, decay = std::exp(-std::abs(y)), end = std::exp(-kEnd);
+  const double softplus = std::max(y, 0.0) + std::log1p(decay);
+  const double logistic = y >= 0.0 ? 1.0 / (1.0 + decay) : decay / (1.0 + decay);
+  const double least = end / (1.0 + end);  // the logistic at the end
+  return {size * ((softplus - std::log1p(end)) / steepness - least * (x + tolerance)), size * (least - logistic),
+          size * steepness * logistic * (1.0 - logistic)};
+}
+
+inline ContactEnergy spillmann_teschner_energy(double distance, double radii) {
+  const double x = radii - distance;
+  if (x <= 0.0) return {};
+  return {x * x, -2.0 * x, 2.0};
+}
+
 inline ContactEnergy contact_energy(ContactLaw law, double distance, double radii, double tolerance) {
-  return law == ContactLaw::barrier ? barrier_energy(distance, radii, tolerance)
-                                    : imcv2_energy(distance, radii, tolerance);
+  switch (law) {
+    case ContactLaw::barrier:
+      return barrier_energy(distance, radii, tolerance);
+    case ContactLaw::imcv1:
+      return imcv1_energy(distance, radii, tolerance);
+    case ContactLaw::spillmann_teschner:
+      return spillmann_teschner_energy(distance, radii);
+    case ContactLaw::imcv2:
+      break;
+  }
+  return imcv2_energy(distance, radii, tolerance);
 }
 
 }  // namespace withe

@@ -78,10 +78,49 @@ double Contact::change_stiffness(const Touching& t, double ratio, double yielded
   return put_in;
 }
 
+/// Stiffness from one step to the next, by the force that it carries; returns the energy put in.
+double Contact::follow_force(const Touching& t, ContactRecord& record) const {
+  const ContactPair& pair = pairs_[at(t.pair)];
+  const double wanted = wanted_stiffness(pair, record.force), least = start_stiffness(pair, least_stiffness_);
+  if (wanted > record.stiffness) {
+    const double ratio = 1.5 * wanted / record.stiffness;
+    return change_stiffness(t, ratio, yielded_at(t, ratio), record);
+  }
+  if (kSlack * std::max(wanted, least) < record.stiffness)
+    return change_stiffness(t, 2.0 * std::max(wanted, least) / record.stiffness, kFading * t.yielded, record);
+  return t.yielded > 0.0 ? change_stiffness(t, 1.0, kFading * t.yielded, record) : 0.0;
+}
+
+/// The greatest force that contact has to hold at a node, times 1e5 / m [dissertation, (5.16), (5.17)]: what all other
+/// forces there add up to, inertia among them, is what contact and friction are.
+double Contact::source_stiffness() const {
+  constexpr double kSource = 1e5;  // [1/m]
+  VectorX force = VectorX::Zero(model_.dof_count);
+  ContactLocal local;
+  int dofs[kContactUnknowns];
+  for (int i = 0; i < count(); ++i) {
+    this->local(i, false, local);
+    unknowns(i, dofs);
+    for (int k = 0; k < 12; ++k)
+      if (dofs[k] >= 0) force(dofs[k]) += local.gradient[k];
+  }
+  return kSource * farthest(force);
+}
+
+void Contact::record_friction(const Touching& t, ContactRecord& record) const {
+  double now[kContactUnknowns], unused[kContactUnknowns] = {};
+  values_at(pairs_[at(t.pair)], q1_, now);
+  const FrictionForce<double> f = friction_gradient(setting(t), now, unused);
+  record.stick = f.stick;
+  record.friction = -f.force;
+  record.sticking = f.sticking;
+}
+
 double Contact::accept(State& state) {
   std::vector<ContactRecord> records;
   const ContactDescription& contact = model_.description.contact;
-  const bool given = contact.stiffness > 0.0;
+  const bool source = contact.stiffness_rule == StiffnessRule::source && !(contact.stiffness > 0.0);
+  const double common = source ? std::max(source_stiffness(), least_stiffness_.minCoeff()) : 0.0;
   VectorX greatest = least_stiffness_;
   double put_in = 0.0;
   for (const Touching& t : touching_) {
@@ -91,27 +130,18 @@ double Contact::accept(State& state) {
     record.key = pair.key;
     record.force = -t.energy.first;
     record.stiffness = t.stiffness / pair.share;
-    if (frictional_ && contact.friction_law != FrictionLaw::lagged && pair.friction > 0.0) {
-      double now[kContactUnknowns], unused[kContactUnknowns] = {};
-      values_at(pair, q1_, now);
-      const FrictionForce<double> f = friction_gradient(setting(t), now, unused);
-      record.stick = f.stick;
-      record.friction = -f.force;
-      record.sticking = f.sticking;
-    }
-    const double wanted = record.force / (2.0 * kDepth * pair.small_radius() * pair.share);
-    const double least = start_stiffness(pair, least_stiffness_);
     record.yielded = t.yielded;
-    if (!given && wanted > record.stiffness) {
-      const double ratio = 1.5 * wanted / record.stiffness;
-      put_in += change_stiffness(t, ratio, yielded_at(t, ratio), record);
-    } else if (!given && kSlack * std::max(wanted, least) < record.stiffness) {
-      put_in += change_stiffness(t, 2.0 * std::max(wanted, least) / record.stiffness, kFading * t.yielded, record);
+    if (frictional_ && !freezes() && pair.friction > 0.0) record_friction(t, record);
+    if (source && !fixed(pair)) {
+      const double ratio = common / record.stiffness;
+      put_in += change_stiffness(t, ratio, ratio > 1.0 ? yielded_at(t, ratio) : kFading * t.yielded, record);
+    } else if (!fixed(pair)) {
+      put_in += follow_force(t, record);
     } else if (t.yielded > 0.0) {
       put_in += change_stiffness(t, 1.0, kFading * t.yielded, record);
     }
     for (int rod : {pair.rod_a, pair.rod_b})
-      if (rod >= 0) greatest(rod) = std::max(greatest(rod), wanted);
+      if (rod >= 0) greatest(rod) = std::max(greatest(rod), source ? common : wanted_stiffness(pair, -t.energy.first));
     records.push_back(record);
   }
   std::sort(records.begin(), records.end(),
@@ -119,7 +149,7 @@ double Contact::accept(State& state) {
   if (!frozen_.empty()) record_frozen(records);
   state.contacts = std::move(records);
   // A contact that is yet to come starts as stiff as its rods' greatest force wants; that fades.
-  if (!given) state.contact_stiffness = (0.8 * state.contact_stiffness).cwiseMax(greatest);
+  if (!(contact.stiffness > 0.0)) state.contact_stiffness = (0.8 * state.contact_stiffness).cwiseMax(greatest);
   return put_in;
 }
 
@@ -144,6 +174,16 @@ double Contact::stiffen(State& state) {
     });
     if (record && pressed != touching_.end()) {
       put_in += change_stiffness(*pressed, factor, yielded_at(*pressed, factor), *record);
+      continue;
+    }
+    if (pair.stiffness > 0.0) {
+      ContactRecord own;
+      own.key = pair.key;
+      own.stiffness = factor * stiffness / pair.share;
+      state.contacts.insert(
+          std::lower_bound(state.contacts.begin(), state.contacts.end(), own,
+                           [](const ContactRecord& a, const ContactRecord& b) { return a.key < b.key; }),
+          own);
       continue;
     }
     for (int rod : {pair.rod_a, pair.rod_b})

@@ -46,6 +46,14 @@ struct FrictionForce {
   bool sticking = false;
 };
 
+/// From the centreline of a (side 0) or of b to where they touch. Two rods share that point, so that friction turns
+/// them by nothing, however deep they are in each other: it divides the way between their centrelines as radii do.
+template <class Scalar>
+Vec3<Scalar> contact_arm(const ContactPair& pair, int side, const Vec3<Scalar>& normal, const Vec3<Scalar>& between) {
+  if (pair.rod_b < 0) return Scalar(-pair.radius_a) * normal;
+  return Scalar(side == 0 ? -pair.radius_a / pair.radii() : pair.radius_b / pair.radii()) * between;
+}
+
 /// tanh(c |S|) / |S| as a function of |S|^2.
 template <class Scalar>
 Scalar slip_factor(const Scalar& square, double c) {
@@ -94,14 +102,14 @@ FrictionForce<Scalar> friction_gradient(const FrictionSetting& f, const Scalar (
   const Vec3<Scalar> x[4] = {point(0), point(1), point(2), point(3)};
   const Vec3<Scalar> edge[2] = {x[1] - x[0], x[3] - x[2]};
   Scalar s = f.points.s, t = f.points.t, distance;
-  Vec3<Scalar> normal;
+  Vec3<Scalar> normal, between;
   if (pair.plane()) {
     normal = lift(f.obstacle->other);
     distance = dot(normal, x[pair.key.end] - lift(f.obstacle->point));
   } else {
     const Vec3<Scalar> r = x[0] - x[2];
     solve_parameters(r, edge[0], edge[1], pair.weight_a, pair.weight_b, f.points.s_free, f.points.t_free, s, t);
-    const Vec3<Scalar> between = r + s * edge[0] - t * edge[1];
+    between = r + s * edge[0] - t * edge[1];
     const Scalar square = dot(between, between);
     distance = sqrt(square + pair.weight_a * (s - 0.5) * (s - 0.5) + pair.weight_b * (t - 0.5) * (t - 0.5));
     normal = (1.0 / sqrt(square)) * between;
@@ -125,7 +133,7 @@ FrictionForce<Scalar> friction_gradient(const FrictionSetting& f, const Scalar (
     const double sign = b == 0 ? 1.0 : -1.0;
     side.inverse = 1.0 / sqrt(dot(edge[b], edge[b]));
     side.tangent = side.inverse * edge[b];
-    side.arm = Scalar(-sign * (b == 0 ? pair.radius_a : pair.radius_b)) * normal;
+    side.arm = contact_arm(pair, b, normal, between);
     const Vec3<Scalar> change = edge[b] - lift(before(2 * b + 1) - before(2 * b));
     Vec3<Scalar> turn = side.inverse * cross(side.tangent, change);
     if (f.spatial) {

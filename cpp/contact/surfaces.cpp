@@ -46,14 +46,15 @@ double Surfaces::tolerance(int edge) const {
   return given > 0.0 ? given : 0.1 * radius(edge);
 }
 
-double Surfaces::pair_friction(int first, int second, double otherwise, bool& ignored) const {
-  ignored = false;
+bool Surfaces::set_own(int first, int second, ContactPair& pair) const {
+  bool touches = true;
   for (const ContactPairDescription& p : model_.description.contact.pairs)
     if ((p.first == first && p.second == second) || (p.first == second && p.second == first)) {
-      ignored = p.ignored;
-      otherwise = p.friction;
+      touches = !p.ignored;
+      if (p.friction >= 0.0) pair.friction = p.friction;
+      pair.stiffness = p.stiffness;
     }
-  return otherwise;
+  return touches;
 }
 
 /// Edges that a walk along rods, through joints too, reaches before it has gone too far for a rod to touch itself.
@@ -99,9 +100,8 @@ bool Surfaces::may_touch(int a, int b) const {
   if (a == b || std::binary_search(neighbours_[at(a)].begin(), neighbours_[at(a)].end(), b) ||
       std::binary_search(neighbours_[at(b)].begin(), neighbours_[at(b)].end(), a))
     return false;
-  bool ignored = false;
-  pair_friction(model_.edge_rod[at(a)], model_.edge_rod[at(b)], 0.0, ignored);
-  return !ignored;
+  ContactPair unused;
+  return set_own(model_.edge_rod[at(a)], model_.edge_rod[at(b)], unused);
 }
 
 ContactPair Surfaces::pair(int a, int b) const {
@@ -114,8 +114,8 @@ ContactPair Surfaces::pair(int a, int b) const {
   p.tolerance = std::min(tolerance(a), tolerance(b));
   p.weight_a = parallel_weight(model_.edge_length(a), p.radii());
   p.weight_b = parallel_weight(model_.edge_length(b), p.radii());
-  bool ignored = false;
-  p.friction = pair_friction(p.rod_a, p.rod_b, model_.description.contact.friction, ignored);
+  p.friction = model_.description.contact.friction;
+  set_own(p.rod_a, p.rod_b, p);
   return p;
 }
 
@@ -139,9 +139,8 @@ void Surfaces::add_obstacles() {
       p.radius_a = radius(e);
       p.radius_b = d.radius;
       p.tolerance = tolerance(e);
-      bool ignored = false;
-      p.friction = pair_friction(p.rod_a, body, contact.obstacle_friction(static_cast<Eigen::Index>(o)), ignored);
-      if (ignored) continue;
+      p.friction = contact.obstacle_friction(static_cast<Eigen::Index>(o));
+      if (!set_own(p.rod_a, body, p)) continue;
       if (!plane) {
         p.weight_a = parallel_weight(model_.edge_length(e), p.radii());
         p.weight_b = parallel_weight((d.other - d.point).norm(), p.radii());

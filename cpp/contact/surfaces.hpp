@@ -17,6 +17,7 @@ struct ContactPair {
   double weight_a = 0, weight_b = 0;  ///< of closest_points [m^2]
   double share = 1;                   ///< of a node's contact with a plane, which its two edges share
   double friction = 0;                ///< [-]
+  double stiffness = 0;               ///< of its own [N/m]; 0: none
   int element = -1;                   ///< row of its unknowns in the matrix's table; -1: none yet
 
   double radii() const { return radius_a + radius_b; }
@@ -51,7 +52,8 @@ class Surfaces {
  private:
   void find_neighbours();
   void add_obstacles();
-  double pair_friction(int first, int second, double otherwise, bool& ignored) const;
+  /// Sets what two bodies have of their own; whether they may touch.
+  bool set_own(int first, int second, ContactPair& pair) const;
 
   const Model& model_;
   std::vector<double> radius_;

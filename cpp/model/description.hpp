@@ -96,12 +96,19 @@ struct LoadDescription {
   bool varies = false;  ///< set by a callback while running, so `value` is only its first one
 };
 
-enum class ContactLaw { imcv2, barrier };
+enum class ContactLaw { imcv2, imcv1, barrier, spillmann_teschner };
+
+/// How the stiffness of contact is found where no number is given.
+enum class StiffnessRule {
+  forces,  ///< each contact follows its force, so that surfaces are about a hundredth of the smaller radius deep
+  source,  ///< one for all, the greatest force on a node in contact times 1e5 / m [dissertation, (5.17)]
+};
 
 enum class FrictionLaw {
-  implicit,  ///< normal force and slip at the end of the step, exact (unsymmetric) Jacobian
-  lagged,    ///< normal force and directions from the start of the step: symmetric
-  anchored,  ///< an elastic stick that holds a load without creep, by return mapping
+  implicit,       ///< normal force and slip at the end of the step, exact (unsymmetric) Jacobian
+  lagged,         ///< normal force and directions from the start of the step: symmetric
+  anchored,       ///< an elastic stick that holds a load without creep, by return mapping
+  semi_explicit,  ///< normal force and direction of slip from the start of the step [dissertation, 4.5]
 };
 
 /// What to do with surfaces that are inside each other where the scene is drawn.
@@ -115,7 +122,7 @@ enum class ObstacleKind {
   capsule,  ///< a segment with a radius; a sphere where its ends coincide
 };
 
-/// Something solid that does not move.
+/// Something solid, where it is drawn.
 struct ObstacleDescription {
   ObstacleKind kind = ObstacleKind::plane;
   Vector3 point = Vector3::Zero();   ///< on the plane; start of the segment [m]
@@ -128,7 +135,8 @@ struct ObstacleDescription {
 struct ContactPairDescription {
   int first = 0, second = 0;
   bool ignored = false;
-  double friction = 0;  ///< coefficient [-]
+  double friction = -1;  ///< coefficient [-]; negative: that of the scene
+  double stiffness = 0;  ///< [N/m]; 0: that of the scene
 };
 
 struct ContactDescription {
@@ -137,9 +145,10 @@ struct ContactDescription {
   VectorX obstacle_friction;  ///< per obstacle [-]
   ContactLaw law = ContactLaw::imcv2;
   FrictionLaw friction_law = FrictionLaw::implicit;
-  double distance_tolerance = 0;     ///< delta [m]; 0: a tenth of the smaller radius of a pair
-  double slip_tolerance = 1e-3;      ///< nu [m/s]
-  double stiffness = 0;              ///< [N/m]; 0: follows the forces
+  double distance_tolerance = 0;  ///< delta [m]; 0: a tenth of the smaller radius of a pair
+  double slip_tolerance = 1e-3;   ///< nu [m/s]
+  double stiffness = 0;           ///< [N/m]; 0: found by the rule
+  StiffnessRule stiffness_rule = StiffnessRule::forces;
   bool centreline_friction = false;  ///< friction acts on the centrelines, as in the source
   Overlap overlap = Overlap::error;
   std::vector<ObstacleDescription> obstacles;

@@ -26,6 +26,11 @@ struct ContactRecord {
   bool sticking = false;
 };
 
+/// Where an obstacle is, in the axes of the unknowns (in a plane: its two, and zero).
+struct ObstaclePlace {
+  Vec3d point{}, other{};  ///< of a plane: a point, and its normal; of a capsule: its ends [m]
+};
+
 /// The record of a contact among sorted ones, or nothing.
 template <class Records>
 auto find_record(Records& records, const ContactKey& key) -> decltype(records.data()) {
@@ -53,7 +58,8 @@ struct State {
   std::vector<Matrix3> frame;           ///< per joint frame (in a plane: not used, q holds the angle)
   VectorX bend_tau, half_tau;           ///< twist of each stencil, which fixes the branch of the angle [rad]
   std::vector<ContactRecord> contacts;  ///< sorted by key
-  VectorX contact_stiffness;            ///< per rod, of contacts that begin [N/m]; where a scene has contact
+  std::vector<ObstaclePlace> obstacles;
+  VectorX contact_stiffness;  ///< per rod, of contacts that begin [N/m]; where a scene has contact
   Motion motion;
 };
 

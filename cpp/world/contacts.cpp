@@ -48,12 +48,13 @@ void World::Implementation::check_overlap() const {
   if (contact == nullptr) return;
   const ContactReport* deepest = nullptr;
   const std::vector<ContactReport> reports = contact->report(state);
-  double depth = kDeepest;
+  const bool bars = description.contact.law == ContactLaw::barrier;  // which is infinite where surfaces touch
+  double depth = bars ? 0.0 : kDeepest;
   for (const ContactReport& r : reports) {
     const double radius = r.key.b < 0
                               ? contact->surfaces().radius(r.key.a)
                               : std::min(contact->surfaces().radius(r.key.a), contact->surfaces().radius(r.key.b));
-    if (-r.gap <= depth * radius) continue;
+    if (-r.gap <= depth * radius && !(bars && r.gap <= 0.0)) continue;
     depth = -r.gap / radius;
     deepest = &r;
   }
@@ -66,7 +67,7 @@ void World::Implementation::check_overlap() const {
   const std::string other = deepest->key.b < 0 ? "'" + description.contact.obstacles[at(-1 - deepest->key.b)].name + "'"
                                                : name(deepest->key.b);
   char depth_text[32];
-  std::snprintf(depth_text, sizeof depth_text, "%.3g", -deepest->gap);
+  std::snprintf(depth_text, sizeof depth_text, "%.3g", 0.0 - deepest->gap);
   const std::string advice =
       description.contact.overlap == Overlap::separate
           ? std::string(" m at the start and cannot be moved apart") +

@@ -25,7 +25,8 @@ class Separation {
         options_(descent(options)),
         newton_(model_, options_),
         equations_(model_, options_),
-        state_(start) {
+        state_(start),
+        barred_(model.description.contact.law == ContactLaw::barrier) {
     contact().allow_depth(INFINITY);
     contact().set_parameters(parameters_);
     soft_ = 100.0 * (parameters_.edge_bend.rowwise().maxCoeff().array() / model_.edge_arc.array().cube()).minCoeff() *
@@ -68,7 +69,7 @@ class Separation {
     ContactDescription& contact = scene.contact;
     contact.friction = 0.0;
     contact.obstacle_friction.setZero();
-    for (ContactPairDescription& pair : contact.pairs) pair.friction = 0.0;
+    for (ContactPairDescription& pair : contact.pairs) pair.friction = pair.stiffness = 0.0;
     contact.law = ContactLaw::imcv2;  // finite where surfaces overlap
     contact.stiffness = 1.0;          // given: each step sets it
     return model;
@@ -101,10 +102,11 @@ class Separation {
 
   Contact& contact() { return *equations_.contact(); }
 
-  /// Greatest depth of two surfaces in each other [m].
+  /// Greatest depth of two surfaces in each other [m]; a barrier wants them to be a little apart.
   double overlap() {
     double deepest = 0.0;
-    for (const ContactReport& r : contact().report(state_)) deepest = std::max(deepest, -r.gap);
+    for (const ContactReport& r : contact().report(state_))
+      deepest = std::max(deepest, (barred_ ? 1e-2 * contact().surfaces().tolerance(r.key.a) : 0.0) - r.gap);
     return deepest;
   }
 
@@ -146,6 +148,7 @@ class Separation {
   Newton newton_;
   Equations equations_;
   State state_;
+  bool barred_ = false;
   Predictor predictor_;
   StepWorkspace work_;
   double soft_ = 0, stiff_ = 0;  ///< stiffness of contact at first and at most [N/m]

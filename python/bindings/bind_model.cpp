@@ -17,9 +17,16 @@ constexpr Words<LoadKind, 3> kLoadKinds{
     {{"force", LoadKind::force}, {"moment", LoadKind::moment}, {"distributed", LoadKind::distributed}}};
 
 constexpr Words<Bending, 2> kBendings{{{"angle", Bending::angle}, {"tangent", Bending::tangent}}};
-constexpr Words<ContactLaw, 2> kContactLaws{{{"imcv2", ContactLaw::imcv2}, {"barrier", ContactLaw::barrier}}};
-constexpr Words<FrictionLaw, 3> kFrictionLaws{
-    {{"implicit", FrictionLaw::implicit}, {"lagged", FrictionLaw::lagged}, {"anchored", FrictionLaw::anchored}}};
+constexpr Words<ContactLaw, 4> kContactLaws{{{"imcv2", ContactLaw::imcv2},
+                                             {"imcv1", ContactLaw::imcv1},
+                                             {"barrier", ContactLaw::barrier},
+                                             {"spillmann_teschner", ContactLaw::spillmann_teschner}}};
+constexpr Words<StiffnessRule, 2> kStiffnessRules{
+    {{"forces", StiffnessRule::forces}, {"source", StiffnessRule::source}}};
+constexpr Words<FrictionLaw, 4> kFrictionLaws{{{"implicit", FrictionLaw::implicit},
+                                               {"lagged", FrictionLaw::lagged},
+                                               {"anchored", FrictionLaw::anchored},
+                                               {"semi_explicit", FrictionLaw::semi_explicit}}};
 constexpr Words<Overlap, 2> kOverlaps{{{"error", Overlap::error}, {"separate", Overlap::separate}}};
 constexpr Words<FluidModel, 3> kFluidModels{
     {{"none", FluidModel::none}, {"resistive", FluidModel::resistive}, {"stokeslets", FluidModel::stokeslets}}};
@@ -59,7 +66,8 @@ void register_contact(py::module_& module) {
       .def_readwrite("first", &ContactPairDescription::first)
       .def_readwrite("second", &ContactPairDescription::second)
       .def_readwrite("ignored", &ContactPairDescription::ignored)
-      .def_readwrite("friction", &ContactPairDescription::friction);
+      .def_readwrite("friction", &ContactPairDescription::friction)
+      .def_readwrite("stiffness", &ContactPairDescription::stiffness);
   py::class_<ContactDescription> contact(module, "ContactDescription", "What touches, and how.");
   contact.def(py::init<>())
       .def_readwrite("rods", &ContactDescription::rods)
@@ -73,6 +81,7 @@ void register_contact(py::module_& module) {
       .def_readwrite("pairs", &ContactDescription::pairs);
   def_word(contact, "law", &ContactDescription::law, kContactLaws);
   def_word(contact, "friction_law", &ContactDescription::friction_law, kFrictionLaws);
+  def_word(contact, "stiffness_rule", &ContactDescription::stiffness_rule, kStiffnessRules);
   def_word(contact, "overlap", &ContactDescription::overlap, kOverlaps);
 }
 

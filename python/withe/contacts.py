@@ -11,7 +11,15 @@ import numpy.typing as npt
 from withe import _core, validation
 from withe.directory import Directory
 from withe.handles import Obstacle, Rod
-from withe.parts import ContactModel, ContactSettings, FrictionModel, ObstaclePart, Overlap, RodPart
+from withe.parts import (
+    ContactModel,
+    ContactSettings,
+    FrictionModel,
+    ObstaclePart,
+    Overlap,
+    PairSettings,
+    RodPart,
+)
 
 __all__ = ["CONTACT", "Contacts", "contact_table", "describe_contact"]
 
@@ -142,7 +150,7 @@ class Contacts:
         friction_model: FrictionModel = "implicit",
         distance_tolerance: float | None = None,
         slip_tolerance: float = 1e-3,
-        stiffness: float | None = None,
+        stiffness: float | Literal["source"] | None = None,
         centreline_friction: bool = False,
         overlap: Overlap = "error",
     ) -> None:
@@ -154,18 +162,22 @@ class Contacts:
         ----------
         friction : float
             Coefficient between rods.
-        model : {"imcv2", "barrier"}
-            Energy of contact: the smooth penalty of the dissertation's (5.2), or a barrier, (5.1).
-        friction_model : {"implicit", "lagged", "anchored"}
+        model : {"imcv2", "barrier", "imcv1", "spillmann_teschner"}
+            Energy of contact: the smooth penalty of the dissertation's (5.2), or a barrier, (5.1). Archival, for
+            comparison: its first penalty, (4.16), and the baseline of its 4.7, a penalty without a tolerance
+            that leads out of a depth within one step.
+        friction_model : {"implicit", "lagged", "anchored", "semi_explicit"}
             At the end of the step, exactly; with the forces of its start, which keeps the equations
-            symmetric; or an elastic stick that holds a load without creep.
+            symmetric; an elastic stick that holds a load without creep; or, archival, with the forces and the
+            direction of slip of its start (the dissertation's 4.5), which holds nothing that is at rest.
         distance_tolerance : float [m]
             Surfaces nearer than this press on each other; by default a tenth of the smaller radius.
         slip_tolerance : float [m/s]
             Slip slower than this counts as sticking, with less friction than the coefficient allows.
-        stiffness : float [N/m]
+        stiffness : float [N/m] or "source"
             Of contact; by default it follows the forces, so that surfaces are about a hundredth of the
-            smaller radius deep in each other.
+            smaller radius deep in each other. "source" is the dissertation's rule (5.17): 1e5 / m times the
+            greatest force on a node in contact, for all contacts; it has a scale, that of its flagella.
         centreline_friction : bool
             Let friction act on the centrelines, as in the dissertation, and not where surfaces touch.
         overlap : {"error", "separate"}
@@ -197,25 +209,37 @@ class Contacts:
             settings,
             rods=True,
             friction=validation.non_negative(friction, "friction"),
-            model=cast(ContactModel, validation.choice(model, "model of contact", ("imcv2", "barrier"))),
+            model=cast(
+                ContactModel,
+                validation.choice(model, "model of contact", ("imcv2", "barrier", "imcv1", "spillmann_teschner")),
+            ),
             friction_model=cast(
                 FrictionModel,
-                validation.choice(friction_model, "friction_model", ("implicit", "lagged", "anchored")),
+                validation.choice(
+                    friction_model, "friction_model", ("implicit", "lagged", "anchored", "semi_explicit")
+                ),
             ),
             distance_tolerance=_optional(distance_tolerance, "distance_tolerance"),
             slip_tolerance=validation.positive(slip_tolerance, "slip_tolerance"),
-            stiffness=_optional(stiffness, "stiffness of contact"),
+            stiffness=stiffness if stiffness == "source" else _optional(stiffness, "stiffness of contact"),
             centreline_friction=validation.truth(centreline_friction, "centreline_friction"),
             overlap=cast(Overlap, validation.choice(overlap, "overlap", ("error", "separate"))),
         )
 
     def set_friction(self, a: Rod | Obstacle | str, b: Rod | Obstacle | str, friction: float) -> None:
         """Give two rods, or a rod and an obstacle, a friction coefficient of their own."""
-        self._set_pair(a, b, validation.non_negative(friction, "friction"))
+        self._set_pair(a, b, ignored=False, friction=validation.non_negative(friction, "friction"))
+
+    def set_contact_stiffness(self, a: Rod | Obstacle | str, b: Rod | Obstacle | str, stiffness: float) -> None:
+        """Give two rods, or a rod and an obstacle, a contact stiffness of their own [N/m].
+
+        It stays as it is, and grows only where a step would end with surfaces too deep in each other.
+        """
+        self._set_pair(a, b, ignored=False, stiffness=validation.positive(stiffness, "stiffness of contact"))
 
     def ignore_contact(self, a: Rod | Obstacle | str, b: Rod | Obstacle | str) -> None:
         """Let two rods, or a rod and an obstacle, pass through each other; a rod and itself too."""
-        self._set_pair(a, b, None)
+        self._set_pair(a, b, ignored=True)
 
     def set_contact_group(self, rod: Rod | str, group: str) -> None:
         """Put a rod into a group, whose members do not touch each other or themselves.
@@ -231,13 +255,14 @@ class Contacts:
         settings = self._directory.contact
         self._directory.contact = replace(settings, groups={**settings.groups, part.name: group})
 
-    def _set_pair(self, a: Any, b: Any, friction: float | None) -> None:
+    def _set_pair(self, a: Any, b: Any, **own: Any) -> None:
         first, second = self._touching(a), self._touching(b)
         if isinstance(first, ObstaclePart) and isinstance(second, ObstaclePart):
             raise ValueError(f"{first.name!r} and {second.name!r} are both obstacles, which never touch")
         settings = self._directory.contact
         key = (first.name, second.name) if first.name <= second.name else (second.name, first.name)
-        self._directory.contact = replace(settings, pairs={**settings.pairs, key: friction})
+        pair = replace(settings.pairs.get(key, PairSettings()), **own)
+        self._directory.contact = replace(settings, pairs={**settings.pairs, key: pair})
 
     def _touching(self, handle: Any) -> RodPart | ObstaclePart:
         part = self._directory.find_any(handle, "what touches")
@@ -278,7 +303,9 @@ def describe_contact(directory: Directory) -> _core.ContactDescription:
     contact.friction_law = settings.friction_model
     contact.distance_tolerance = settings.distance_tolerance or 0.0
     contact.slip_tolerance = settings.slip_tolerance
-    contact.stiffness = settings.stiffness or 0.0
+    by_rule = settings.stiffness is None or settings.stiffness == "source"
+    contact.stiffness = 0.0 if by_rule else float(settings.stiffness or 0.0)
+    contact.stiffness_rule = "source" if settings.stiffness == "source" else "forces"
     contact.centreline_friction = settings.centreline_friction
     contact.overlap = settings.overlap
     obstacles = directory.all(ObstaclePart)
@@ -293,10 +320,10 @@ def describe_contact(directory: Directory) -> _core.ContactDescription:
     contact.obstacles = [_describe_obstacle(part) for part in obstacles]
     contact.obstacle_friction = np.array([part.friction for part in obstacles], dtype=float)
     bodies = {rod.name: rod.index for rod in rods} | {part.name: -1 - i for i, part in enumerate(obstacles)}
-    pairs = [_pair(bodies[a], bodies[b], friction) for (a, b), friction in settings.pairs.items()]
+    pairs = [_pair(bodies[a], bodies[b], own) for (a, b), own in settings.pairs.items()]
     members = list(settings.groups.items())
     for i, (a, group) in enumerate(members):
-        pairs += [_pair(bodies[a], bodies[b], None) for b, other in members[i:] if other == group]
+        pairs += [_pair(bodies[a], bodies[b], PairSettings(ignored=True)) for b, other in members[i:] if other == group]
     contact.pairs = pairs
     return contact
 
@@ -311,11 +338,12 @@ def _describe_obstacle(part: ObstaclePart) -> _core.ObstacleDescription:
     return obstacle
 
 
-def _pair(first: int, second: int, friction: float | None) -> _core.ContactPairDescription:
+def _pair(first: int, second: int, own: PairSettings) -> _core.ContactPairDescription:
     pair = _core.ContactPairDescription()
     pair.first, pair.second = first, second
-    pair.ignored = friction is None
-    pair.friction = friction or 0.0
+    pair.ignored = own.ignored
+    pair.friction = -1.0 if own.friction is None else own.friction
+    pair.stiffness = own.stiffness or 0.0
     return pair
 
 

@@ -28,6 +28,7 @@ __all__ = [
     "MassPart",
     "ObstaclePart",
     "Overlap",
+    "PairSettings",
     "Part",
     "Pass",
     "RodPart",
@@ -39,8 +40,8 @@ FloatArray = npt.NDArray[np.float64]
 Pass = tuple[int, int]  # rod, node of the rod
 JoinKind = Literal["rigid", "pinned", "revolute"]
 JointForm = Literal["frame", "pairs"]
-ContactModel = Literal["imcv2", "barrier"]
-FrictionModel = Literal["implicit", "lagged", "anchored"]
+ContactModel = Literal["imcv2", "imcv1", "barrier", "spillmann_teschner"]
+FrictionModel = Literal["implicit", "lagged", "anchored", "semi_explicit"]
 Overlap = Literal["error", "separate"]
 FluidModel = Literal["stokeslets", "resistive"]
 LoadKind = Literal["force", "moment", "load"]
@@ -168,6 +169,15 @@ class ObstaclePart:
     friction: float
 
 
+@dataclass(frozen=True)
+class PairSettings:
+    """What two bodies have of their own; None: what the scene has."""
+
+    ignored: bool = False
+    friction: float | None = None
+    stiffness: float | None = None  # [N/m]
+
+
 @dataclass(frozen=True, eq=False)
 class ContactSettings:
     """Whether rods touch, and how."""
@@ -178,10 +188,10 @@ class ContactSettings:
     friction_model: FrictionModel = "implicit"
     distance_tolerance: float | None = None
     slip_tolerance: float = 1e-3
-    stiffness: float | None = None
+    stiffness: float | Literal["source"] | None = None
     centreline_friction: bool = False
     overlap: Overlap = "error"
-    pairs: Mapping[tuple[str, str], float | None] = field(default_factory=dict)  # friction; None: pass through
+    pairs: Mapping[tuple[str, str], PairSettings] = field(default_factory=dict)
     groups: Mapping[str, str] = field(default_factory=dict)  # of rods
 
 

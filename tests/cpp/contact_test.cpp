@@ -65,9 +65,10 @@ TEST(SegmentDistance, GradientIsContinuousThroughParallel) {
 
 TEST(ContactLaw, DerivativesAreThoseOfTheEnergy) {
   const double radii = 1.0, tolerance = 0.1;
-  for (ContactLaw law : {ContactLaw::imcv2, ContactLaw::barrier})
+  for (ContactLaw law : {ContactLaw::imcv2, ContactLaw::barrier, ContactLaw::imcv1, ContactLaw::spillmann_teschner})
     for (double distance : {0.5, 0.89, 0.91, 0.97, 1.0, 1.003, 1.02, 1.05, 1.09}) {
       if (law == ContactLaw::barrier && distance <= 1.001) continue;
+      if (law == ContactLaw::spillmann_teschner && distance >= 1.0) continue;
       const ContactEnergy e = contact_energy(law, distance, radii, tolerance);
       const auto value = [&](const VectorX& x) { return contact_energy(law, x(0), radii, tolerance).value; };
       const auto slope = [&](const VectorX& x) {
@@ -83,8 +84,29 @@ TEST(ContactLaw, DerivativesAreThoseOfTheEnergy) {
 }
 
 TEST(ContactLaw, IsNothingBeyondItsReach) {
-  for (ContactLaw law : {ContactLaw::imcv2, ContactLaw::barrier})
+  for (ContactLaw law : {ContactLaw::imcv2, ContactLaw::barrier, ContactLaw::imcv1})
     EXPECT_EQ(contact_energy(law, 1.1 + 1e-12, 1.0, 0.1).value, 0.0);
+  EXPECT_EQ(contact_energy(ContactLaw::spillmann_teschner, 1.0, 1.0, 0.1).value, 0.0);
+}
+
+TEST(ContactLaw, BeginsWithoutAStepInEnergyOrForce) {
+  const double tolerance = 0.1;
+  for (ContactLaw law : {ContactLaw::imcv2, ContactLaw::barrier, ContactLaw::imcv1, ContactLaw::spillmann_teschner}) {
+    const double reach = law == ContactLaw::spillmann_teschner ? 1.0 : 1.0 + tolerance;
+    const ContactEnergy e = contact_energy(law, reach - 1e-9, 1.0, tolerance);
+    EXPECT_NEAR(e.value, 0.0, 1e-15) << "law " << static_cast<int>(law);
+    EXPECT_NEAR(e.first, 0.0, 3e-8) << "law " << static_cast<int>(law);
+  }
+}
+
+/// [dissertation, (4.16)]: in lengths of h, with K1 = 50, h = 1 and C = 2.
+TEST(ContactLaw, Imcv1IsThatOfTheSource) {
+  const double h = 1.6e-3, tolerance = 0.3 * h;
+  for (double depth : {-0.02, 0.0, 0.02, 0.1}) {
+    const double source = std::log1p(std::exp(50.0 * depth)) / 50.0;
+    EXPECT_NEAR(contact_energy(ContactLaw::imcv1, (2.0 - depth) * h, 2.0 * h, tolerance).value, source * h * h,
+                2e-5 * source * h * h);  // the tangent at its end
+  }
 }
 
 TEST(BroadPhase, FindsTheOverlapsThatBruteForceFinds) {

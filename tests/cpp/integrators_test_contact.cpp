@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
+
 #include "derivative_check.hpp"
 #include "integrators/dynamics.hpp"
 #include "states.hpp"
@@ -75,8 +77,8 @@ std::vector<Named> touching_scenes() {
 }
 
 /// A state with velocities, and a configuration that has slipped, spun and turned since the start of the step.
-Case slipped(const Named& named, double size) {
-  const Model model = build_model(named.scene, std::nullopt);
+Case slipped(const Named& named, double size, std::optional<bool> planar = std::nullopt) {
+  const Model model = build_model(named.scene, planar);
   Case c{named.name, model, initial_state(model), {}, 1e-3};
   testing::RandomNumbers random(5);
   c.state.v = 0.3 * random.vector(model.dof_count);
@@ -124,13 +126,145 @@ void expect_exact(const Case& c, Integrator integrator, Inner inner) {
       << static_cast<int>(inner);
 }
 
+constexpr FrictionLaw kFrictionLaws[] = {FrictionLaw::implicit, FrictionLaw::lagged, FrictionLaw::anchored,
+                                         FrictionLaw::semi_explicit};
+
+/// Pairs at either side of a border between classes, and ever nearer to parallel.
+std::vector<Named> border_scenes() {
+  std::vector<Named> scenes;
+  const auto pair = [&](const std::string& name, const Vector3& start, const Vector3& end) {
+    SceneBuilder b = touching_scene(false);
+    add_rod(b, Vector3(-0.5, 0, 0), Vector3(0.5, 0, 0), 2);
+    add_rod(b, start, end, 2);
+    scenes.push_back({name, b.scene});
+  };
+  for (double past : {-2e-3, 2e-3}) {
+    const double s_ends = 0.5 * (1.0 + kParallelWeight * 4.0 * kRadius * kRadius) + past;  // edge a, beyond its end
+    pair("end on edge and end on end", Vector3(s_ends, 0, 0.5), Vector3(s_ends, 0.3, 1.5));
+    const double t_ends = 0.5 * kParallelWeight * 4.0 * kRadius * kRadius + past;  // edge b, before its start
+    pair("crossing and end on edge", Vector3(0.1, t_ends, 0.5), Vector3(0.1, 1.0 + t_ends, 0.5));
+  }
+  for (double turn : {1e-2, 1e-4, 1e-8})
+    pair("nearly parallel", Vector3(-0.3, -0.5 * turn, 0.5), Vector3(0.7, 0.5 * turn, 0.5));
+  return scenes;
+}
+
+TEST(Contact, MatrixIsExactNextToTheBordersOfClassesAndToParallelEdges) {
+  for (Named named : border_scenes())
+    for (FrictionLaw law : kFrictionLaws) {
+      named.scene.contact.friction_law = law;
+      Case c = slipped(named, 2e-4);
+      c.increment = 3e-5;
+      expect_exact(c, Integrator::backward_euler, Inner::end);
+    }
+}
+
+TEST(Contact, MatrixIsExactForEveryEnergy) {
+  for (Named named : touching_scenes())
+    for (ContactLaw law : {ContactLaw::imcv1, ContactLaw::barrier, ContactLaw::spillmann_teschner}) {
+      named.scene.contact.law = law;
+      if (law == ContactLaw::barrier)
+        for (RodDescription& rod : named.scene.rods) rod.contact_radius *= 0.6;
+      Case c = slipped(named, 0.02);
+      if (law == ContactLaw::barrier) c.increment = 2e-4;
+      expect_exact(c, Integrator::backward_euler, Inner::end);
+    }
+}
+
 TEST(Contact, MatrixIsExactForEveryClassLawAndScheme) {
   for (Named named : touching_scenes())
-    for (FrictionLaw law : {FrictionLaw::implicit, FrictionLaw::lagged, FrictionLaw::anchored}) {
+    for (FrictionLaw law : kFrictionLaws) {
       named.scene.contact.friction_law = law;
       const Case c = slipped(named, 0.02);
       expect_exact(c, Integrator::backward_euler, Inner::end);
       expect_exact(c, Integrator::implicit_midpoint, Inner::middle);
+    }
+}
+
+/// Generalised forces of the contact of two edges at c.q, over a0, a1, b0, b1 and both angles.
+std::array<double, kContactUnknowns> forces_of_pair(const Case& c) {
+  Contact contact(c.model);
+  State state = c.state;
+  contact.set_parameters(initial_parameters(c.model));
+  contact.initialise(state);
+  contact.begin(state, 0.3);
+  contact.update(c.q);
+  std::array<double, kContactUnknowns> sum{};
+  for (int i = 0; i < contact.count(); ++i) {
+    ContactLocal local;
+    contact.local(i, false, local);
+    for (std::size_t k = 0; k < sum.size(); ++k) sum[k] += local.gradient[k];
+  }
+  return sum;
+}
+
+/// What all contacts take over the step to c.q, pressing included [J].
+double work_of_contact(const Case& c) {
+  Contact contact(c.model);
+  State state = c.state;
+  contact.set_parameters(initial_parameters(c.model));
+  contact.initialise(state);
+  contact.begin(state, 0.3);
+  contact.update(c.q);
+  double work = 0.0;
+  for (int i = 0; i < contact.count(); ++i) {
+    ContactLocal local;
+    int dofs[kContactUnknowns];
+    contact.local(i, false, local);
+    contact.unknowns(i, dofs);
+    for (int k = 0; k < kContactUnknowns; ++k)
+      if (dofs[k] >= 0) work += local.gradient[k] * (c.q(dofs[k]) - c.state.q(dofs[k]));
+  }
+  return work;
+}
+
+TEST(Contact, ForcesAndMomentsOfAPairAddUpToNothingUnderEveryLaw) {
+  for (Named named : touching_scenes()) {
+    if (named.scene.rods.size() != 2) continue;
+    for (FrictionLaw law : kFrictionLaws) {
+      named.scene.contact.friction_law = law;
+      Case c = slipped(named, 0.02, false);
+      if (law == FrictionLaw::lagged || law == FrictionLaw::semi_explicit) c.q = c.state.q;  // whose J they use
+      if (law == FrictionLaw::semi_explicit) c.state.v *= 10.0;
+      const auto at = [&](int node) -> Vector3 {
+        return c.q.segment<3>(c.model.node_dof[static_cast<std::size_t>(node)]);
+      };
+      // Measured from where they are, edges turn with the pair by what its spin has along them.
+      for (int e : {0, 1})
+        c.state.tangent[static_cast<std::size_t>(e)] = to_vec3((at(2 * e + 1) - at(2 * e)).normalized());
+      const auto g = forces_of_pair(c);
+      Vector3 force = Vector3::Zero(), moment = Vector3::Zero();
+      double size = 0.0;
+      for (int node = 0; node < 4; ++node) {
+        const Vector3 f(g[static_cast<std::size_t>(3 * node)], g[static_cast<std::size_t>(3 * node + 1)],
+                        g[static_cast<std::size_t>(3 * node + 2)]);
+        force += f;
+        moment += at(node).cross(f);
+        size = std::max(size, f.norm());
+      }
+      for (int e : {0, 1})
+        moment += g[static_cast<std::size_t>(12 + e)] * to_eigen(c.state.tangent[static_cast<std::size_t>(e)]);
+      ASSERT_GT(size, 0.1) << named.name;
+      EXPECT_LT(force.norm(), 1e-13 * size) << named.name << ", law " << static_cast<int>(law);
+      EXPECT_LT(moment.norm(), 1e-12 * size) << named.name << ", law " << static_cast<int>(law);
+    }
+  }
+}
+
+TEST(Contact, FrictionTakesWorkUnderEveryLawHoweverSurfacesSlip) {
+  for (Named named : touching_scenes())
+    for (FrictionLaw law : {FrictionLaw::implicit, FrictionLaw::lagged, FrictionLaw::semi_explicit}) {
+      named.scene.contact.friction_law = law;
+      for (double size : {-0.1, -0.01, 0.01, 0.1}) {
+        const Case c = slipped(named, size);
+        const auto with = work_of_contact(c);
+        Named smooth = named;
+        smooth.scene.contact.friction = 0.0;
+        smooth.scene.contact.obstacle_friction.setZero();
+        Case without = slipped(smooth, size);
+        EXPECT_GE(with - work_of_contact(without), -1e-14 * std::abs(with))
+            << named.name << ", law " << static_cast<int>(law);
+      }
     }
 }
 

@@ -87,14 +87,15 @@ def heavy_rod(friction_model: Any) -> tuple[withe.Scene, withe.Rod]:
     return scene, rod
 
 
-@pytest.mark.parametrize("friction_model", ["implicit", "lagged"])
+@pytest.mark.parametrize("friction_model", ["implicit", "lagged", "semi_explicit"])
 def test_a_rod_pushed_along_a_floor_slides_as_a_block_does(friction_model: Any) -> None:
     scene, rod = heavy_rod(friction_model)
     push = scene.add_load(rod, (0, 0, 0))
     simulation = scene.build(time_step=5e-3)
     simulation.equilibrium()
     at_rest = simulation.snapshot()
-    for force in (3.0, 4.121, 6.0):
+    # With the direction of the step's start nothing sticks: it holds what moves, step by step.
+    for force in (4.121, 6.0) if friction_model == "semi_explicit" else (3.0, 4.121, 6.0):
         simulation.restore(at_rest)
         simulation.set(push, load=(force, 0, 0))
         speeds = []
@@ -105,7 +106,9 @@ def test_a_rod_pushed_along_a_floor_slides_as_a_block_does(friction_model: Any) 
         # The sudden push shakes the rod, whose tail friction lifts; from then on it gains what a block does.
         pace = max(force - 0.4 * 9.8, 0.0)
         assert speeds[2] - speeds[0] == pytest.approx(pace, rel=5e-3, abs=1e-4)
-        assert simulation.energy().kinetic == pytest.approx(1.5**2 / 2.0 * pace**2, rel=0.01, abs=1e-4)
+        free = 5e-3 if friction_model == "semi_explicit" else 0.0  # the first step, from rest, is one without friction
+        speed = 1.5 * pace + 0.4 * 9.8 * free
+        assert simulation.energy().kinetic == pytest.approx(0.5 * speed**2, rel=0.01, abs=1e-4)
 
 
 @pytest.mark.parametrize("friction_model", ["implicit", "lagged", "anchored"])
@@ -127,6 +130,31 @@ def test_friction_read_out_holds_a_block_or_is_at_its_limit(friction_model: Any,
         assert (sizes < limits).all()
     else:
         np.testing.assert_allclose(sizes, limits, rtol=0.01)
+
+
+@pytest.mark.parametrize(
+    "contact", [{"model": "imcv1"}, {"model": "barrier"}, {"model": "spillmann_teschner"}, {"stiffness": "source"}]
+)
+def test_every_energy_and_stiffness_stops_a_rod_that_falls_on_another(contact: Any) -> None:
+    scene = withe.Scene()
+    bar = scene.add_rod(start=(0, -0.1, 0), end=(0, 0.1, 0), nodes=21, radius=RADIUS, material=RUBBER)
+    scene.clamp(bar.start)
+    scene.clamp(bar.end)
+    rod = scene.add_rod(
+        start=(-0.05, 0.0, 0.0102), end=(0.05, 0.0, 0.0102), nodes=11, radius=RADIUS, material=RUBBER, name="top"
+    )
+    scene.enable_contact(friction=0.5, **contact)
+    simulation = scene.build(integrator="backward_euler", time_step=1e-3)
+    simulation.set_velocities(rod, np.tile([0.0, 0.0, -0.5], (11, 1)))
+    start = simulation.energy()
+    lowest = np.inf
+    for _ in range(40):
+        simulation.step(10)
+        gaps = simulation.contacts()["gap"]
+        lowest = min(lowest, gaps.min(initial=np.inf))
+        assert excess(simulation, start.total) < 0.01 * start.kinetic
+    assert -0.05 * RADIUS < lowest < 0.1 * RADIUS
+    assert (simulation.positions(rod)[5] > simulation.positions(bar)[10])[2]
 
 
 def test_an_anchored_contact_does_not_creep_under_half_its_limit() -> None:

@@ -125,6 +125,24 @@ def test_ignored_pairs_and_groups_pass_through_each_other() -> None:
         assert simulation.positions(top)[:, 2].max() < simulation.positions(bar)[7, 2]
 
 
+def test_a_pair_may_have_a_stiffness_of_its_own() -> None:
+    depths = []
+    for stiffness in (50.0, 500.0):
+        scene = withe.Scene()
+        scene.add_rod(start=(0, 0, 0.005), end=(0.1, 0, 0.005), nodes=5, radius=5e-3, material=RUBBER, name="block")
+        scene.add_floor(name="table")
+        scene.set_contact_stiffness("block", "table", stiffness)
+        scene.set_friction("block", "table", 0.3)
+        simulation = scene.build(integrator="backward_euler")
+        simulation.step(200)
+        contacts = simulation.contacts()
+        # Each edge has a share of the stiffness at its nodes; 2 k depth is the force, where the penalty is not bent.
+        totals = contacts["normal_force"].sum()
+        assert totals == pytest.approx(1200.0 * np.pi * 5e-3**2 * 0.1 * 9.81, rel=1e-3)
+        depths.append(-contacts["gap"].min())
+    assert depths[0] > depths[1] + 1e-5
+
+
 def test_the_plan_warns_of_edges_that_are_too_long_for_contact() -> None:
     def warnings(nodes: int) -> list[str]:
         scene = withe.Scene()
@@ -174,6 +192,13 @@ def crossing_in_a_plane(scene: withe.Scene) -> None:
     scene.build(planar=True)
 
 
+def touching_barrier(scene: withe.Scene) -> None:
+    scene.add_rod(start=(-0.1, 0, 5e-3), end=(0.1, 0, 5e-3), nodes=5, radius=5e-3, material=RUBBER, name="a")
+    scene.add_floor(name="table")
+    scene.enable_contact(model="barrier")
+    scene.build()
+
+
 def unknown_group(scene: withe.Scene) -> None:
     scene.add_rod(start=(-0.1, 0, 1), end=(0.1, 0, 1), nodes=5, radius=5e-3, material=RUBBER, name="a")
     scene.set_contact_group("a", None)  # type: ignore[arg-type]
@@ -201,6 +226,10 @@ REFUSED: list[tuple[Callable[[withe.Scene], Any], str]] = [
     (crossing_in_a_plane, "cannot be moved apart within their plane"),
     (lambda scene: scene.enable_contact(friction=float("nan")), "friction"),
     (lambda scene: scene.enable_contact(overlap="push"), "overlap"),
+    (lambda scene: scene.enable_contact(stiffness="hard"), "stiffness of contact"),
+    (lambda scene: scene.enable_contact(stiffness=0.0), "stiffness of contact"),
+    (lambda scene: scene.set_contact_stiffness("a", "b", -1.0), "stiffness of contact"),
+    (touching_barrier, "edge . of rod 'a' and 'table' overlap by 0 m"),
     (lambda scene: scene.set_contact_group("nobody", "inner"), "'nobody'"),
     (lambda scene: scene.ignore_contact("inner", "inner"), "what touches 'inner' is not in the scene"),
     (unknown_group, "group of rod 'a' must be text, got None"),
