@@ -13,7 +13,16 @@ from pathlib import Path
 
 from reporting import OUT, bar
 
-NAMES = ("newton_iteration", "skips", "parallel", "work_precision", "robustness", "contact", "perception")
+NAMES = (
+    "newton_iteration",
+    "skips",
+    "parallel",
+    "work_precision",
+    "robustness",
+    "contact",
+    "contact_robustness",
+    "perception",
+)
 
 
 def main() -> int:

@@ -21,7 +21,7 @@ def run(name, folder, *arguments):
     return done.stdout
 
 
-@pytest.mark.parametrize("name", ["work_precision", "robustness", "skips", "parallel", "contact"])
+@pytest.mark.parametrize("name", ["work_precision", "robustness", "skips", "parallel", "contact", "contact_robustness"])
 def test_the_short_form_writes_its_figures(name, tmp_path):
     printed = run(name, tmp_path, "--quick")
     content = json.loads((tmp_path / f"{name}.json").read_text())

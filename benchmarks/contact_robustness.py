@@ -1,0 +1,157 @@
+"""The stress test of contact: impacts, piles and knots over the whole range of parameters, every step judged.
+
+    python benchmarks/contact_robustness.py [--cases 100] [--first 0] [--case 12]
+
+A case is accepted when its 60 steps end within 10 s (processor time) with default settings, and after every step
+- no surfaces are deeper in each other than a twentieth of a radius;
+- the energy, less what supports have put in, has not grown by more than 1 % of the greatest;
+- every number is finite.
+A named error is not accepted, but is no defect. A knot cannot be pulled as far as its grips are asked to go: there an
+error is accepted where nothing else was wrong until then, once the grips have come to where it is tight.
+"""
+
+from __future__ import annotations
+
+import collections
+import concurrent.futures
+import sys
+import time
+from dataclasses import asdict, dataclass
+
+import numpy as np
+from contact_cases import KINDS, LAWS, METHODS, STEPS, ContactCase, build, draw_case
+from reporting import Report, arguments, bar
+
+import withe
+
+LIMIT = 10.0  # [s]
+DEEPEST, GROWTH = 0.05, 0.01
+# Length minus distance of the ends of a tight knot, over the radius: n = 1, 2.
+TIGHT = (45.0, 80.0)
+
+
+@dataclass
+class Verdict:
+    """What became of a case: `reason` is empty where it was accepted."""
+
+    number: int
+    reason: str = ""
+    detail: str = ""
+    seconds: float = 0.0
+    steps: int = 0
+    deepest: float = 0.0
+    growth: float = 0.0
+
+
+def _is_tight(case: ContactCase, simulation: withe.Simulation) -> bool:
+    if case.kind != "knot":
+        return False
+    x = simulation.positions("rope")
+    return bool(case.length - np.linalg.norm(x[-1] - x[0]) < TIGHT[case.number % 2] * case.radius)
+
+
+def judge(number: int) -> Verdict:
+    """Run a case and say what became of it."""
+    case, verdict = draw_case(number), Verdict(number)
+    simulation = build(case)
+    energy = simulation.energy()
+    least = energy.total - energy.work
+    greatest = abs(energy.kinetic + energy.stretch + energy.bend + energy.twist)
+    start = time.thread_time()
+    try:
+        for _ in range(STEPS):
+            simulation.step()
+            verdict.steps += 1
+            verdict.seconds = time.thread_time() - start
+            energy = simulation.energy()
+            if not np.isfinite(energy.total) or not np.isfinite(simulation.positions()).all():
+                verdict.reason = "not finite"
+            gaps = simulation.contacts()["gap"]
+            verdict.deepest = max(verdict.deepest, -float(gaps.min(initial=0.0)) / case.radius)
+            greatest = max(greatest, energy.kinetic + energy.stretch + energy.bend + energy.twist)
+            kept = energy.total - energy.work
+            verdict.growth = max(verdict.growth, (kept - least) / greatest)
+            least = min(least, kept)
+            if verdict.deepest > DEEPEST:
+                verdict.reason, verdict.detail = "too deep", f"{verdict.deepest:.3f} of a radius"
+            elif verdict.growth > GROWTH:
+                verdict.reason, verdict.detail = "energy grows", f"{100.0 * verdict.growth:.2g} %"
+            elif verdict.seconds > LIMIT:
+                verdict.reason, verdict.detail = "slow", f"{verdict.steps} of {STEPS} steps in {LIMIT:g} s"
+            if verdict.reason:
+                break
+    except withe.ConvergenceError as error:
+        if not _is_tight(case, simulation):
+            verdict.reason, verdict.detail = "ConvergenceError", str(error)
+    except Exception as error:
+        verdict.reason, verdict.detail = type(error).__name__, str(error)
+    return verdict
+
+
+def judge_all(numbers: list[int]) -> list[Verdict]:
+    """All cases, on all processors."""
+    verdicts = {}
+    with (
+        bar(len(numbers), "stress test of contact", "cases") as shown,
+        concurrent.futures.ProcessPoolExecutor() as pool,
+    ):
+        for verdict in pool.map(judge, numbers):
+            verdicts[verdict.number] = verdict
+            shown.advance(1)
+    return [verdicts[number] for number in numbers]
+
+
+def main() -> None:
+    """Judge cases and report."""
+    options = arguments(
+        __doc__,
+        ("--cases", {"type": int, "default": 100, "help": "how many (default: %(default)s)"}),
+        ("--first", {"type": int, "default": 0, "help": "number of the first"}),
+        ("--case", {"type": int, "help": "only this one, and everything about it"}),
+    )
+    if options.case is not None:
+        verdict = judge(options.case)
+        for name, value in {**asdict(draw_case(verdict.number)), **asdict(verdict)}.items():
+            print(f"  {name:16s} {value}")
+        sys.exit(bool(verdict.reason))
+    count = len(KINDS) if options.quick else options.cases
+    verdicts = judge_all(list(range(options.first, options.first + count)))
+    cases = [draw_case(verdict.number) for verdict in verdicts]
+    report = Report("contact_robustness", quick=options.quick)
+
+    def share(of: str, value: str) -> tuple[str, str]:
+        chosen = [v for v, case in zip(verdicts, cases, strict=True) if getattr(case, of) == value]
+        return value, f"{sum(not v.reason for v in chosen)} of {len(chosen)}"
+
+    report.table("Accepted, by kind", ("kind", "accepted"), [share("kind", name) for name in KINDS])
+    report.table("Accepted, by integrator", ("integrator", "accepted"), [share("method", name) for name in METHODS])
+    report.table("Accepted, by friction", ("model", "accepted"), [share("law", name) for name in LAWS])
+    reasons = collections.Counter(verdict.reason for verdict in verdicts if verdict.reason)
+    report.table("Not accepted", ("reason", "cases"), reasons.most_common())
+    report.table(
+        "Case by case (run one with --case NUMBER)",
+        ("case", "kind", "method", "friction", "nodes", "speed", "coarseness", "reason"),
+        [
+            (
+                c.number,
+                c.kind,
+                c.method,
+                f"{c.law} {c.friction:.2f}",
+                c.nodes,
+                f"{c.speed:.3g}",
+                f"{c.coarseness:.3g}",
+                f"{v.reason}: {v.detail}",
+            )
+            for c, v in zip(cases, verdicts, strict=True)
+            if v.reason
+        ],
+    )
+    report.figures["verdicts"] = [asdict(verdict) for verdict in verdicts]
+    report.goal("accepted of all cases", sum(not v.reason for v in verdicts) / count, 0.9)
+    report.goal("too deep where accepted", reasons["too deep"], 0, at_least=False)
+    report.goal("energy grows", reasons["energy grows"], 0, at_least=False)
+    report.write()
+
+
+if __name__ == "__main__":
+    main()
