@@ -54,9 +54,10 @@ void Contact::initialise(State& state) const {
 double Contact::impact_stiffness(const ContactPair& pair) const {
   if (fixed(pair)) return 0.0;
   const bool obstacle = pair.key.b < 0;
+  const Vec3d shift = shift_of(pair);
   double square = 0.0;
   for (int node_a : {model_.edge_tail[at(pair.key.a)], model_.edge_head[at(pair.key.a)]}) {
-    const Vec3d v = local_position(model_, state_->v, node_a);
+    const Vec3d v = local_position(model_, state_->v, node_a) - (1.0 / duration_) * shift;
     if (obstacle) {
       square = std::max(square, dot(v, v));
       continue;
@@ -151,6 +152,9 @@ const ContactRecord* Contact::record_of(const ContactKey& key) const { return fi
 void Contact::begin(const State& state, double duration) {
   state_ = &state;
   duration_ = duration;
+  shift_.clear();
+  blocked_ = false;
+  place_obstacles(state.obstacles);
   lagged_.clear();
   if (outgrown(state.q, nullptr)) find_pairs(state.q, state.q);
   touching_.clear();
@@ -161,7 +165,41 @@ void Contact::begin(const State& state, double duration) {
   for (const Touching& t : touching_)
     if (record_of(pairs_[at(t.pair)].key) == nullptr) unrecorded_.push_back(pairs_[at(t.pair)].key);
   start_energy_ = energy();
+  if (!target_.empty()) move_obstacles();
   if (frictional_ && freezes()) freeze();
+  if (!shift_.empty()) place_obstacles(target_);
+}
+
+void Contact::place_obstacles(const std::vector<ObstaclePlace>& places) { moved_ += 2.0 * surfaces_.place(places); }
+
+/// Finds the ways of obstacles. Rods follow once these are at their ends: a step in which one would pass through a
+/// centreline that stays is too long.
+void Contact::move_obstacles() {
+  double most = 0.0;
+  for (std::size_t o = 0; o < target_.size(); ++o) {
+    shift_.push_back(target_[o].point - state_->obstacles[o].point);
+    most = std::max(most, dot(shift_.back(), shift_.back()));
+  }
+  if (most == 0.0) {
+    shift_.clear();
+    return;
+  }
+  for (const ContactPair& pair : surfaces_.obstacle_pairs())
+    if (!pair.plane() && allowed_of(pair, state_->q, nullptr, shift_of(pair)) < 1.0) blocked_ = true;
+}
+
+double Contact::obstacle_work() const {
+  if (shift_.empty()) return 0.0;
+  double work = 0.0;
+  ContactLocal local;
+  for (int i = 0; i < count(); ++i) {
+    const Vec3d shift = shift_of(pair_of(i));
+    if (dot(shift, shift) == 0.0) continue;
+    this->local(i, false, local);
+    const double* g = local.gradient;  // of the edge's two nodes; the obstacle's is the opposite of their sum
+    work -= dot(shift, Vec3d{g[0] + g[3], g[1] + g[4], g[2] + g[5]});
+  }
+  return work;
 }
 
 void Contact::update(const VectorX& q1) {

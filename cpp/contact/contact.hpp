@@ -6,6 +6,7 @@
 /// from one accepted state to the next keeps every knot.
 
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "contact/broad_phase.hpp"
@@ -45,6 +46,17 @@ class Contact {
   /// Whether friction is there at all, and its Jacobian unsymmetric.
   bool frictional() const { return frictional_; }
   bool unsymmetric() const { return frictional_ && !freezes(); }
+
+  /// Where obstacles shall be at the end of the steps to come; nothing: where they are.
+  void aim(std::vector<ObstaclePlace> places) { target_ = std::move(places); }
+  /// Notes in a state that obstacles have come to where they were to go.
+  void leave_obstacles(State& state) const {
+    if (!target_.empty()) state.obstacles = target_;
+  }
+  /// Whether an obstacle would pass through a rod on its way through this step.
+  bool blocked() const { return blocked_; }
+  /// Work of moving obstacles on rods and on what contact stores, with the forces at q1 [J].
+  double obstacle_work() const;
 
   /// A step begins at `state`, which must outlive it. `duration`: the time in which slip happens [s].
   void begin(const State& state, double duration);
@@ -115,6 +127,7 @@ class Contact {
     double slip[3][kContactUnknowns];
     double pressing = 0;  ///< times how far from sticking the contact starts, if semi-explicit [N]
     Vec3d direction{};
+    Vec3d drift{};  ///< what an obstacle moves along the surface [m]
   };
   struct FrozenForce {
     Vec3d force{};       ///< on the slip, against it: minus friction on a [N]
@@ -152,7 +165,13 @@ class Contact {
   void find_pairs(const VectorX& from, const VectorX& to);
   bool outgrown(const VectorX& q, const VectorX* change) const;
   double farthest(const VectorX& change) const;
-  double allowed_of(const ContactPair& pair, const VectorX& q, const VectorX& change) const;
+  double allowed_of(const ContactPair& pair, const VectorX& q, const VectorX* change, const Vec3d& shift) const;
+  void move_obstacles();
+  void place_obstacles(const std::vector<ObstaclePlace>& places);
+  /// Way of a pair's obstacle in this step [m].
+  Vec3d shift_of(const ContactPair& pair) const {
+    return pair.key.b < 0 && !shift_.empty() ? shift_[static_cast<std::size_t>(-1 - pair.key.b)] : Vec3d{};
+  }
   const ContactRecord* record_of(const ContactKey& key) const;
   double change_stiffness(const Touching& t, double ratio, double yielded, ContactRecord& record) const;
   double yielded_at(const Touching& t, double ratio) const;
@@ -172,8 +191,11 @@ class Contact {
   std::vector<ContactPair> pairs_;  ///< obstacles' first, then candidates of the broad phase
   VectorX reference_;               ///< where the candidates belong
   double margin_ = 0;
-  std::vector<double> clear_;           ///< per pair: it touches nothing while `moved_` stays below [m]
-  double moved_ = 0;                    ///< farthest that a node may have gone, summed over all q1 so far [m]
+  std::vector<double> clear_;  ///< per pair: it touches nothing while `moved_` stays below [m]
+  double moved_ = 0;           ///< farthest that a node may have gone, summed over all q1 so far [m]
+  std::vector<ObstaclePlace> target_;
+  std::vector<Vec3d> shift_;  ///< of each obstacle in this step [m]; empty: none moves
+  bool blocked_ = false;
   std::vector<ContactKey> unrecorded_;  ///< what touches at the start of the step and has no record
   bool starting_ = false;
   const State* state_ = nullptr;

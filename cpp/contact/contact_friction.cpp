@@ -42,6 +42,7 @@ FrictionSetting Contact::setting(const Touching& t) const {
   f.stick = t.stick;
   f.spatial = !model_.planar();
   f.centreline = contact.centreline_friction;
+  f.drift = shift_of(pair);
   values_at(pair, state_->q, f.start);
   if (!f.spatial) return f;
   f.source[0] = state_->tangent[at(pair.key.a)];
@@ -103,6 +104,8 @@ void Contact::freeze() {
       frozen.slip[1][i] = c.y;
       frozen.slip[2][i] = c.z;
     }
+    const Vec3d shift = shift_of(pair);
+    frozen.drift = shift - dot(shift, t.normal) * t.normal;
     if (model_.description.contact.friction_law == FrictionLaw::semi_explicit) set_direction(pair, frozen);
     lagged_.push_back(t);
     lagged_.back().frozen = static_cast<int>(frozen_.size());
@@ -118,7 +121,7 @@ Vec3d Contact::frozen_slip(const Touching& t) const {
   double now[kContactUnknowns], before[kContactUnknowns];
   values_at(pair, q1_, now);
   values_at(pair, state_->q, before);
-  Vec3d slip{};
+  Vec3d slip = -frozen.drift;
   for (int i = 0; i < kContactUnknowns; ++i)
     slip += (now[i] - before[i]) * Vec3d{frozen.slip[0][i], frozen.slip[1][i], frozen.slip[2][i]};
   return slip;
@@ -129,7 +132,7 @@ Vec3d Contact::frozen_slip(const Touching& t) const {
 void Contact::set_direction(const ContactPair& pair, Frozen& frozen) const {
   double velocity[kContactUnknowns];
   values_at(pair, state_->v, velocity);
-  Vec3d u{};
+  Vec3d u = (-1.0 / duration_) * frozen.drift;
   for (int i = 0; i < kContactUnknowns; ++i)
     u += velocity[i] * Vec3d{frozen.slip[0][i], frozen.slip[1][i], frozen.slip[2][i]};
   const double speed = std::sqrt(dot(u, u));

@@ -148,6 +148,7 @@ double Contact::accept(State& state) {
             [](const ContactRecord& a, const ContactRecord& b) { return a.key < b.key; });
   if (!frozen_.empty()) record_frozen(records);
   state.contacts = std::move(records);
+  leave_obstacles(state);
   // A contact that is yet to come starts as stiff as its rods' greatest force wants; that fades.
   if (!(contact.stiffness > 0.0)) state.contact_stiffness = (0.8 * state.contact_stiffness).cwiseMax(greatest);
   return put_in;
@@ -209,14 +210,18 @@ void Contact::hold_sticking(const State& state, VectorX& change) const {
 double Contact::energy_of(const State& state) {
   const State* kept = state_;
   const double duration = duration_;
+  const std::vector<ObstaclePlace> target = std::exchange(target_, {});
   begin(state, 1.0);
+  target_ = target;
   state_ = kept;
   duration_ = duration;
   return start_energy_;
 }
 
 std::vector<ContactReport> Contact::report(const State& state) {
+  const std::vector<ObstaclePlace> target = std::exchange(target_, {});
   begin(state, 1.0);
+  target_ = target;
   std::vector<ContactReport> reports;
   for (const Touching& t : touching_) {
     const ContactPair& pair = pairs_[at(t.pair)];

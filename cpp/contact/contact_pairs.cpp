@@ -120,19 +120,20 @@ double Contact::allowed(const VectorX& q1, const VectorX& change) {
   for (std::size_t p = 0; p < pairs_.size(); ++p) {
     if (p < planes_only && pairs_[p].plane()) continue;
     if (clear_[p] - here >= coming) continue;  // nothing will even touch
-    least = std::min(least, allowed_of(pairs_[p], q1, change));
+    least = std::min(least, allowed_of(pairs_[p], q1, &change, Vec3d{}));
   }
   return least;
 }
 
 /// Conservative advancement along straight lines: the distance falls no faster than the ends move against each other.
-double Contact::allowed_of(const ContactPair& pair, const VectorX& q, const VectorX& change) const {
-  Vec3d x[4], d[4] = {};
+/// `change`: of q; nothing: rods stay. `shift`: of the obstacle.
+double Contact::allowed_of(const ContactPair& pair, const VectorX& q, const VectorX* change, const Vec3d& shift) const {
+  Vec3d x[4], d[4] = {Vec3d{}, Vec3d{}, shift, shift};
   end_points(pair, q, x);
   const int edges[2] = {pair.key.a, pair.key.b};
-  for (int side = 0; side < (pair.key.b < 0 ? 1 : 2); ++side) {
-    d[2 * side] = local_position(model_, change, model_.edge_tail[at(edges[side])]);
-    d[2 * side + 1] = local_position(model_, change, model_.edge_head[at(edges[side])]);
+  for (int side = 0; change && side < (pair.key.b < 0 ? 1 : 2); ++side) {
+    d[2 * side] = local_position(model_, *change, model_.edge_tail[at(edges[side])]);
+    d[2 * side + 1] = local_position(model_, *change, model_.edge_head[at(edges[side])]);
   }
   double speed = 0.0;
   for (int a = 0; a < 2; ++a)

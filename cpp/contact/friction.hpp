@@ -2,7 +2,7 @@
 /// Friction of two surfaces that press against each other.
 ///
 /// The slip of a step is that of the two material points at the contact, S = J (q1 - q0), without its part along the
-/// normal: what the closest points of the centrelines move, and what their edges turn and spin,
+/// normal: what the closest points of the centrelines (and an obstacle) move, and what their edges turn and spin,
 ///   S = sum_i w_i (x_i - x_i^0) + phi_a x r_a - phi_b x r_b,   phi = t x (e - e^0) / |e| + t (theta - theta^0),
 /// with r from the centreline to the surface. The force F on S goes back through the same J, so its work, F . S, is
 /// never negative, whatever the integrator.
@@ -35,6 +35,7 @@ struct FrictionSetting {
   double yielded = 0;               ///< [m]
   double tangential_stiffness = 0;  ///< of an anchor [N/m]
   double rate = 0;                  ///< K / (2 dt) [1/m]
+  Vec3d drift{};                    ///< way of an obstacle in the step [m]
   Vec3d stick{};                    ///< at the start of the step [m]
   bool spatial = true, centreline = false;
 };
@@ -120,7 +121,7 @@ FrictionForce<Scalar> friction_gradient(const FrictionSetting& f, const Scalar (
   end_weights(s, t, w);
   if (pair.rod_b < 0) w[2] = w[3] = Scalar(0.0);
 
-  Vec3<Scalar> slip{Scalar(0.0), Scalar(0.0), Scalar(0.0)};
+  Vec3<Scalar> slip = -lift(f.drift);
   for (int i = 0; i < 4; ++i) slip += w[i] * (x[i] - lift(before(i)));
   struct Side {
     Vec3<Scalar> arm, tangent, spin;

@@ -19,12 +19,6 @@ double parallel_weight(double length, double radii) {
   return kParallelWeight * size * size;
 }
 
-Vec3d in_axes(const Model& model, const Vector3& x, bool is_point) {
-  if (!model.planar()) return to_vec3(x);
-  const Vector3 from = is_point ? Vector3(x - model.plane->origin) : x;
-  return {from.dot(model.plane->first), from.dot(model.plane->second), 0.0};
-}
-
 }  // namespace
 
 Surfaces::Surfaces(const Model& model) : model_(model) {
@@ -104,6 +98,17 @@ bool Surfaces::may_touch(int a, int b) const {
   return set_own(model_.edge_rod[at(a)], model_.edge_rod[at(b)], unused);
 }
 
+double Surfaces::place(const std::vector<ObstaclePlace>& places) {
+  double square = 0.0;
+  for (std::size_t o = 0; o < places.size(); ++o) {
+    const Vec3d shift = places[o].point - obstacles_[o].point;
+    square = std::max(square, dot(shift, shift));
+    obstacles_[o].point = places[o].point;
+    obstacles_[o].other = places[o].other;
+  }
+  return std::sqrt(square);
+}
+
 ContactPair Surfaces::pair(int a, int b) const {
   ContactPair p;
   p.key = {a, b, -1};
@@ -129,7 +134,8 @@ void Surfaces::add_obstacles() {
   for (std::size_t o = 0; o < contact.obstacles.size(); ++o) {
     const ObstacleDescription& d = contact.obstacles[o];
     const bool plane = d.kind == ObstacleKind::plane;
-    obstacles_.push_back({d.kind, in_axes(model_, d.point, true), in_axes(model_, d.other, !plane), d.radius});
+    const ObstaclePlace place = drawn_place(model_, d);
+    obstacles_.push_back({d.kind, place.point, place.other, d.radius});
     const int body = -1 - static_cast<int>(o);
     for (int e = 0; e < model_.edge_count; ++e) {
       if (!(radius(e) > 0.0)) continue;

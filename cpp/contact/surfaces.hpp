@@ -38,6 +38,8 @@ class Surfaces {
   explicit Surfaces(const Model& model);
 
   const std::vector<Obstacle>& obstacles() const { return obstacles_; }
+  /// Puts obstacles where they are now; how far the farthest of them came [m].
+  double place(const std::vector<ObstaclePlace>& places);
   /// Pairs with obstacles: every edge that has a surface with every obstacle that is not ignored.
   const std::vector<ContactPair>& obstacle_pairs() const { return obstacle_pairs_; }
   /// Edges that may touch other edges.

@@ -44,6 +44,7 @@ void book_work(Equations& equations, const Parameters& parameters, const VectorX
   const bool in_fluid = equations.model().description.fluid.model != FluidModel::none;
   if (parameters.dragged || parameters.viscous || in_fluid) result.dissipated = equations.dissipated(change);
   result.dissipated += equations.contact_loss(change);
+  if (equations.contact()) result.support_work += equations.contact()->obstacle_work();
 }
 
 /// Held unknowns move as they are told, so their inertia is what changes their velocity, not what the scheme's formula
@@ -258,6 +259,7 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
   const double dt = plan.dt, h = euler ? dt : 0.5 * dt;
   if (!work.held.reachable) return result;
   equations.begin(state, parameters, h, plan.rule == StepRule::energy_momentum, euler ? Inner::end : Inner::middle);
+  if (equations.contact() && equations.contact()->blocked()) return result;
   if (!begin_flow(equations, dt, euler, state, work)) return result;
   result.newton = find_inner(equations, newton, options, plan, h, state, predictor, work);
   if (!result.newton.converged) return result;
@@ -332,6 +334,7 @@ StepResult verlet_step(Equations& equations, const Parameters& parameters, doubl
   if (!(result.largest_turn <= 1.5)) return result;
   next.v = half + 0.5 * dt * next.acceleration;
   if (!std::isfinite(next.v.squaredNorm())) return result;
+  if (equations.contact()) equations.contact()->leave_obstacles(next);
   work.change = q1 - state.q;
   book_work(equations, parameters, work.change, result);
   if (!model.constraints.empty()) {

@@ -139,7 +139,7 @@ double Equations::allowed(const VectorX& z, const VectorX& step) {
 
 double Equations::contact_loss(const VectorX& change) const {
   if (!contact_) return 0.0;
-  return contact_gradient_.dot(change) - (contact_->energy() - contact_->start_energy());
+  return contact_gradient_.dot(change) + contact_->obstacle_work() - (contact_->energy() - contact_->start_energy());
 }
 
 void Equations::evaluate(const VectorX& z, bool with_matrix, const double* axial_force, Evaluation& out) {

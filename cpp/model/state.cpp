@@ -99,6 +99,15 @@ void compute_strains(const Model& model, const State& state, const VectorX& q, C
 
 }  // namespace
 
+ObstaclePlace drawn_place(const Model& model, const ObstacleDescription& obstacle) {
+  const auto in_axes = [&](const Vector3& x, bool is_point) -> Vec3d {
+    if (!model.planar()) return to_vec3(x);
+    const Vector3 from = is_point ? Vector3(x - model.plane->origin) : x;
+    return {from.dot(model.plane->first), from.dot(model.plane->second), 0.0};
+  };
+  return {in_axes(obstacle.point, true), in_axes(obstacle.other, obstacle.kind != ObstacleKind::plane)};
+}
+
 State initial_state(const Model& model) {
   State state;
   state.q = model.initial_q;
@@ -109,6 +118,8 @@ State initial_state(const Model& model) {
   state.frame.assign(static_cast<std::size_t>(model.frame_count), Matrix3::Identity());
   state.bend_tau = model.initial_bend_tau;
   state.half_tau = model.initial_half_tau;
+  for (const ObstacleDescription& o : model.description.contact.obstacles)
+    state.obstacles.push_back(drawn_place(model, o));
   if (model.description.fluid.model == FluidModel::stokeslets)
     for (VectorX& v : state.motion.velocity) v = VectorX::Zero(model.dof_count);
   return state;

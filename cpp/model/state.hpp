@@ -64,6 +64,8 @@ struct State {
 };
 
 State initial_state(const Model& model);
+/// An obstacle where it is drawn.
+ObstaclePlace drawn_place(const Model& model, const ObstacleDescription& obstacle);
 
 /// Everything that follows from q and the source frames of a state.
 struct Configuration {

@@ -83,6 +83,7 @@ World::Implementation::Implementation(const Implementation& other)
       plan(other.plan),
       statistics(other.statistics),
       motions(other.motions),
+      obstacle_motions(other.obstacle_motions),
       ramps(other.ramps),
       load_values(other.load_values),
       custom_force(other.custom_force),
@@ -204,6 +205,15 @@ void World::Implementation::rebuild(Rebuild why) {
 State World::Implementation::transferred(const Model& old, const State& from) const {
   State to = initial_state(model);
   to.time = from.time;
+  for (std::size_t o = 0; o < from.obstacles.size(); ++o) {
+    const ObstacleDescription& drawn = description.contact.obstacles[o];
+    const Vec3d way = from.obstacles[o].point - drawn_place(old, drawn).point;
+    ObstacleDescription moved = drawn;
+    const Vector3 shift = old.planar() ? Vector3(way.x * old.plane->first + way.y * old.plane->second) : to_eigen(way);
+    moved.point += shift;
+    if (moved.kind != ObstacleKind::plane) moved.other += shift;
+    to.obstacles[o] = drawn_place(model, moved);
+  }
   to.contacts = from.contacts;
   to.contact_stiffness = from.contact_stiffness;
   Configuration c;

@@ -44,6 +44,7 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
   Equations& system = statics();
   update_custom_force(system);
   const auto undo = [&] {
+    release_obstacles(system);
     state = before;
     motions = motions_before;
     actuation_work = work_before;
@@ -72,6 +73,7 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
   work.newton.finest = INFINITY;
   StaticResult r;
   try {
+    aim_obstacles(system, time);
     if (reachable) r = find_equilibrium(system, *newton, options, parameters, boundary, state, work.newton);
     // Contact that turns out too soft is made stiffer, from where it has settled.
     for (int tries = 0; r.converged && system.contact() && system.contact()->depth() > kDeepest && tries < 8; ++tries) {
@@ -82,6 +84,7 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
     undo();
     throw;
   }
+  release_obstacles(system);
   if (!r.converged) {
     undo();
     const bool held =

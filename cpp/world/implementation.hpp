@@ -21,6 +21,12 @@ struct SupportMotion {
   double stretch = 1;         ///< of a held edge: its length when it was gripped, over the drawn one
 };
 
+/// Where an obstacle goes, as a way from where it is drawn.
+struct ObstacleMotion {
+  Vector3 from = Vector3::Zero(), to = Vector3::Zero();  ///< [m]
+  double start = 0, end = 0;                             ///< [s]
+};
+
 /// Natural shape of a rod on its way from one value to another.
 struct NaturalRamp {
   MatrixX2 from_curvature, to_curvature;
@@ -78,6 +84,7 @@ struct World::Implementation {
   Plan plan;
   Statistics statistics;
   std::vector<SupportMotion> motions;
+  std::vector<ObstacleMotion> obstacle_motions;  ///< none until one moves
   std::vector<NaturalRamp> ramps;
   std::vector<Vector3> load_values;
   MatrixX3 custom_force;
@@ -168,6 +175,13 @@ struct World::Implementation {
 
   // contacts.cpp
   void check_overlap() const;
+
+  // obstacles.cpp
+  /// Tells the contact of a step where obstacles are at its end; `release_obstacles`: that there is no step.
+  void aim_obstacles(Equations& system, double time) const;
+  static void release_obstacles(Equations& system);
+  Vector3 obstacle_way(int obstacle) const;
+  std::vector<ObstaclePlace> obstacle_places(const std::function<Vector3(int)>& way) const;
 
   // separation.cpp
   void separate();

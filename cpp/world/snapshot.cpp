@@ -6,7 +6,7 @@
 namespace withe {
 namespace {
 
-constexpr std::uint64_t kMagic = 0x3453454854495755ull;
+constexpr std::uint64_t kMagic = 0x3553454854495755ull;
 
 /// FNV-1a.
 std::uint64_t hash_of(std::string_view bytes) {
@@ -109,6 +109,9 @@ void exchange(Archive& io, Self& self) {
   for (auto& f : s.frame) io(f);
   io(s.bend_tau);
   io(s.half_tau);
+  for (auto& o : s.obstacles)
+    for (Vec3d* x : {&o.point, &o.other}) io(x->x), io(x->y), io(x->z);
+  for (auto& m : self.obstacle_motions) io(m.from), io(m.to), io(m.start), io(m.end);
   io(s.contact_stiffness);
   exchange_contacts(io, s.contacts);
   io(s.motion.known);
@@ -143,6 +146,7 @@ std::string World::snapshot() const {
   w(kMagic);
   w(fingerprint(self.description));
   w(self.spatial);
+  w(!self.obstacle_motions.empty());
   w(static_cast<std::int64_t>(self.description.supports.size()));
   for (std::size_t s = 0; s < self.description.supports.size(); ++s) {
     const SupportDescription& d = self.description.supports[s];
@@ -172,9 +176,10 @@ void World::restore(const std::string& bytes) {
   // Everything is read into a copy, so that a damaged file changes nothing.
   auto fresh = std::make_unique<Implementation>(*implementation_);
   fresh->callback = implementation_->callback;
-  bool spatial = false;
+  bool spatial = false, obstacles_move = false;
   std::int64_t count = 0;
   r(spatial);
+  r(obstacles_move);
   r(count);
   require(count >= 0 && count < 1 << 20, "snapshot is damaged: impossible number of supports");
   std::vector<SupportDescription> supports;
@@ -215,6 +220,7 @@ void World::restore(const std::string& bytes) {
     for (std::size_t s = 0; s < supports.size(); ++s) fresh->model.supports[s].active = active[s];
     fresh->rebuild(Rebuild::restored);
   }
+  fresh->obstacle_motions.assign(obstacles_move ? fresh->state.obstacles.size() : 0, ObstacleMotion{});
   give_sizes(*fresh);
   exchange(r, *fresh);
   r.expect_end();

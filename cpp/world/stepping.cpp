@@ -236,7 +236,10 @@ bool World::Implementation::inner_step(double dt, int slot, double& error) {
   }
   kept_motions = motions;
   aim_supports(end);
+  Equations& system = equations_of_step();
+  aim_obstacles(system, end);
   const auto undo = [&] {
+    release_obstacles(system);
     motions = kept_motions;
     if (ramped) apply_ramps(start);
   };
@@ -244,7 +247,7 @@ bool World::Implementation::inner_step(double dt, int slot, double& error) {
   try {
     r = step_by_rule(dt, slot);
     for (int tries = 0; r.too_deep && tries < kMostStiffenings; ++tries) {
-      support_work += equations_of_step().contact()->stiffen(state);
+      support_work += system.contact()->stiffen(state);
       forget_matrix();
       r = step_by_rule(dt, slot);
     }
@@ -258,6 +261,7 @@ bool World::Implementation::inner_step(double dt, int slot, double& error) {
     undo();
     return false;
   }
+  release_obstacles(system);
   error = r.error;
   guard.turn = std::max(guard.turn, r.largest_turn);
   guard.stretch_gain += r.stretch_gain;

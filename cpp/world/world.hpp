@@ -135,6 +135,11 @@ class World {
   Matrix3 support_rotation(int support) const;
   Reaction reaction(int support) const;
 
+  // Obstacles. Their place is that of the point they are drawn with: a plane's, a sphere's centre, a capsule's start.
+  void move_obstacle(int obstacle, const Vector3& position, double over);  ///< reached `over` seconds from now
+  void prescribe_obstacle(int obstacle, const Vector3& position);          ///< at the end of the coming inner step
+  Vector3 obstacle_position(int obstacle) const;                           ///< [m]
+
   // Read-outs: copies.
   MatrixX3 positions() const;   ///< every node once [m]
   MatrixX3 velocities() const;  ///< [m/s]

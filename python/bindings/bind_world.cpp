@@ -168,6 +168,22 @@ void define_supports(WorldClass& world) {
       },
       py::arg("support"), py::arg("position"), py::arg("rotation"));
   world.def(
+      "move_obstacle",
+      [](GuardedWorld& self, int obstacle, const Vector3& position, double over) {
+        self.changing().move_obstacle(obstacle, position, over);
+      },
+      py::arg("obstacle"), py::arg("position"), py::arg("over"));
+  world.def(
+      "prescribe_obstacle",
+      [](GuardedWorld& self, int obstacle, const Vector3& position) {
+        self.steering().prescribe_obstacle(obstacle, position);
+      },
+      py::arg("obstacle"), py::arg("position"));
+  world.def(
+      "obstacle_position",
+      [](const GuardedWorld& self, int obstacle) { return self.reading().obstacle_position(obstacle); },
+      py::arg("obstacle"));
+  world.def(
       "support_position",
       [](const GuardedWorld& self, int support) { return self.reading().support_position(support); },
       py::arg("support"));

@@ -513,6 +513,12 @@ class World:
     def load(
         self, load: typing.SupportsInt | typing.SupportsIndex
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]: ...
+    def move_obstacle(
+        self,
+        obstacle: typing.SupportsInt | typing.SupportsIndex,
+        position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"],
+        over: typing.SupportsFloat | typing.SupportsIndex,
+    ) -> None: ...
     def move_support(
         self,
         support: typing.SupportsInt | typing.SupportsIndex,
@@ -526,7 +532,15 @@ class World:
     def natural_twist(
         self, rod: typing.SupportsInt | typing.SupportsIndex
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+    def obstacle_position(
+        self, obstacle: typing.SupportsInt | typing.SupportsIndex
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]: ...
     def positions(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
+    def prescribe_obstacle(
+        self,
+        obstacle: typing.SupportsInt | typing.SupportsIndex,
+        position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"],
+    ) -> None: ...
     def prescribe_support(
         self,
         support: typing.SupportsInt | typing.SupportsIndex,

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from withe import _core, drawing, validation
 from withe.description import added_mass, describe_support, drag, rod_parameters
 from withe.directory import Directory
-from withe.handles import Drag, Fluid, Load, Mass, NodeHandle, Rod, Support
+from withe.handles import Drag, Fluid, Load, Mass, NodeHandle, Obstacle, Rod, Support
 from withe.motion import Path, Turn, evaluate_path, oriented
 from withe.parameters import ROD_WORDS, RodParameters
 from withe.parts import (
@@ -20,6 +20,7 @@ from withe.parts import (
     FluidPart,
     LoadPart,
     MassPart,
+    ObstaclePart,
     RodPart,
     SupportPart,
 )
@@ -336,7 +337,7 @@ class Control:
 
     def move(
         self,
-        support: Support | NodeHandle | str,
+        support: Support | NodeHandle | Obstacle | str,
         position: npt.ArrayLike | None = None,
         rotation: Any = None,
         *,
@@ -345,12 +346,14 @@ class Control:
         over: float = 0.0,
         path: Path | None = None,
     ) -> None:
-        """Move a support, or let it move along a path from now on. What is not given stays as it is.
+        """Move a support or an obstacle, or let it move along a path from now on. What is not given stays as it is.
 
         Parameters
         ----------
-        support : Support, NodeHandle or str
-            A support, or the node that it holds.
+        support : Support, NodeHandle, Obstacle or str
+            A support, the node that it holds, or a floor, plane, sphere or capsule, which moves without turning:
+            its position is that of the point of a plane, the centre of a sphere, the start of a capsule. What it
+            does to rods is part of ``energy().work``.
         position : array_like of shape (3,) [m]
         rotation : array_like of shape (3, 3), or a SciPy Rotation
             Relative to the orientation as drawn.
@@ -367,13 +370,21 @@ class Control:
         Raises
         ------
         ValueError
-            Nothing holds that node, a direction for a pin, or arguments that contradict each other.
+            Nothing holds that node, a direction for a pin or an obstacle, or arguments that contradict each other.
 
         Examples
         --------
         >>> hand = simulation.clamp(arm.end)
         >>> simulation.move(hand, position=(0.1, 0, 0.2), roll=np.pi, over=0.5)
         """
+        obstacle = self._obstacle(support)
+        if obstacle is not None:
+            if any(value is not None for value in (rotation, tangent, roll)):
+                raise ValueError(
+                    f"rotation, tangent and roll of {obstacle[1]!r} must be None: an obstacle does not turn"
+                )
+            self._move_obstacle(*obstacle, position, over, path)
+            return
         index, part = self._support(support)
         turns = part.kind != "pin"
         owner = f"support {part.name!r}"
@@ -401,6 +412,29 @@ class Control:
             self._settings.paths.pop(part.name, None)
             return
         self._settings.paths[part.name] = self._turn(index, part, target, tangent, roll, over)
+
+    def _obstacle(self, handle: Any) -> tuple[int, str] | None:
+        """Index and name of an obstacle; None where it is something else."""
+        name = self._directory.find(handle, ObstaclePart, "obstacle").name if isinstance(handle, Obstacle) else handle
+        names = [part.name for part in self._directory.all(ObstaclePart)]
+        return (names.index(name), name) if isinstance(name, str) and name in names else None
+
+    def _move_obstacle(
+        self, index: int, name: str, position: npt.ArrayLike | None, over: float, path: Path | None
+    ) -> None:
+        over = validation.non_negative(over, "over")
+        if path is not None:
+            if position is not None or over != 0.0:
+                raise ValueError(f"path of {name!r} must be given alone")
+            validation.function(path, f"path of {name!r}")
+            now = self._world.time
+            validation.vector(path(now), f"path of {name!r} at t = {now:g}")
+            self._settings.paths[name] = path
+            return
+        if position is None:
+            raise ValueError(f"position or path of {name!r} must be given")
+        self._world.move_obstacle(index, validation.vector(position, f"position of {name!r}"), over)
+        self._settings.paths.pop(name, None)
 
     def _turn(self, index: int, part: SupportPart, target: FloatArray, tangent: Any, roll: Any, over: float) -> Turn:
         """The way of a support from where it is to a tangent and a roll."""
@@ -467,6 +501,11 @@ class Control:
                     what = f"{part.kind} {part.name!r} at t = {force_time:g}"
                     self._world.set_load(index, validation.vector(function(force_time), what))
         for name, path in self._settings.paths.items():
+            obstacle = self._obstacle(name)
+            if obstacle is not None:
+                what = f"path of {name!r} at t = {end_time:g}"
+                self._world.prescribe_obstacle(obstacle[0], validation.vector(path(end_time), what))
+                continue
             index, support = self._settings.supports[name]
             if _finished(path, min(self._world.time, end_time)):
                 continue

@@ -20,7 +20,7 @@ from withe.errors import ConvergenceError
 from withe.handles import NodeHandle, Rod, Support
 from withe.knots import link
 from withe.options import engine_options
-from withe.parts import CustomForcePart, DragPart, FluidPart, LoadPart, MassPart, SupportPart
+from withe.parts import CustomForcePart, DragPart, FluidPart, LoadPart, MassPart, ObstaclePart, SupportPart
 from withe.readouts import Energy, Equilibrium, Linearisation, Plan, Reaction, Statistics
 from withe.snapshots import Settings, Snapshot
 
@@ -407,7 +407,7 @@ class Simulation(Control):
                 raise ValueError(f"snapshot belongs to another scene: {name!r} is no support in this one")
         for name in snapshot._missing:
             part_of_scene = self._scene.parts.get(name)
-            if name in settings.supports and name in mine.paths:
+            if (name in settings.supports or isinstance(part_of_scene, ObstaclePart)) and name in mine.paths:
                 settings.paths[name] = mine.paths[name]
             elif name in mine.functions:
                 settings.functions[name] = mine.functions[name]

@@ -1,0 +1,117 @@
+"""Floors, belts and spheres that move: what they lift, drag and shove, and the work that it takes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import withe
+
+RUBBER = withe.Material(youngs_modulus=1e6, poisson_ratio=0.5, density=1200.0)
+RADIUS = 5e-3
+
+
+def lying(friction: float = 0.0) -> tuple[withe.Scene, withe.Rod, withe.Obstacle]:
+    scene = withe.Scene()
+    rod = scene.add_rod(start=(0, 0, RADIUS), end=(0.3, 0, RADIUS), nodes=21, radius=RADIUS, material=RUBBER)
+    return scene, rod, scene.add_floor(friction=friction, name="table")
+
+
+@pytest.mark.parametrize("integrator", ["implicit_midpoint", "energy_momentum"])
+def test_a_floor_that_lifts_a_rod_works_as_much_as_the_rod_gains(integrator: Any) -> None:
+    scene, rod, table = lying()
+    simulation = scene.build(integrator=integrator, time_step=2e-3)
+    simulation.step(100)
+    start = simulation.energy()
+    simulation.move(table, position=(0, 0, 0.1), over=0.5)
+    simulation.step(350)
+    end = simulation.energy()
+    assert simulation.positions(rod)[:, 2].mean() == pytest.approx(0.1 + RADIUS, abs=0.1 * RADIUS)
+    weight = 1200.0 * np.pi * RADIUS**2 * 0.3 * 9.81
+    assert end.gravity - start.gravity == pytest.approx(0.1 * weight, rel=0.01)
+    work, lost = end.work - start.work, end.dissipated - start.dissipated
+    assert lost > 0.0
+    assert end.total - start.total == pytest.approx(work - lost, rel=1e-6)
+
+
+@pytest.mark.parametrize("friction_model", ["implicit", "lagged", "anchored", "semi_explicit"])
+def test_a_belt_drags_a_rod_to_its_own_speed(friction_model: Any) -> None:
+    scene, _, table = lying(friction=0.4)
+    scene.enable_contact(friction_model=friction_model)
+    simulation = scene.build(integrator="backward_euler", time_step=1e-3)
+    simulation.step(200)
+    start = simulation.energy()
+    simulation.move(table, path=lambda t: (0.5 * (t - 0.2), 0.0, 0.0))
+    for steps in range(1, 5):
+        simulation.step(50)
+        v = simulation.velocities()[:, 0]
+        speed = 0.5 * (v[1:] + v[:-1]).mean()
+        assert speed == pytest.approx(min(0.4 * 9.81 * 0.05 * steps, 0.5), rel=2e-3)
+    end = simulation.energy()
+    kinetic = 0.5 * 1200.0 * np.pi * RADIUS**2 * 0.3 * 0.5**2
+    # While it slips a belt at constant speed gives twice what the rod gains.
+    assert end.work - start.work == pytest.approx(2.0 * kinetic, rel=0.01)
+    assert end.dissipated - start.dissipated == pytest.approx(kinetic, rel=0.02)
+
+
+@pytest.mark.parametrize("speed", [1.0, 45.0])
+def test_a_sphere_never_passes_through_the_rod_that_it_shoves(speed: float) -> None:
+    scene = withe.Scene(gravity=(0, 0, 0))
+    rod = scene.add_rod(start=(-0.15, 0.001, 0), end=(0.15, 0.001, 0), nodes=31, radius=RADIUS, material=RUBBER)
+    ball = scene.add_sphere((0.0, -0.05, 0.0), 0.02)
+    simulation = scene.build(integrator="backward_euler", time_step=5e-3)
+    simulation.move(ball, position=(0.0, 0.45, 0.0), over=0.5 / speed)
+    for _ in range(int(0.5 / speed / 5e-3) + 4):
+        simulation.step()
+        gaps = simulation.contacts()["gap"]
+        assert gaps.min(initial=0.0) > -0.05 * RADIUS
+    assert simulation.positions(rod)[15, 1] > 0.45
+    assert simulation.energy().work > 0.0
+
+
+def test_a_moved_obstacle_is_part_of_the_state() -> None:
+    scene, _, table = lying(friction=0.2)
+    simulation = scene.build(integrator="backward_euler", time_step=2e-3)
+    simulation.move(table, position=(0.02, 0, 0.05), over=0.2)
+    simulation.step(50)
+    half_way = simulation.snapshot()
+    simulation.step(60)
+    expected = simulation.positions()
+    simulation.restore(half_way)
+    copy = simulation.copy()
+    for one in (simulation, copy):
+        one.step(60)
+        np.testing.assert_array_equal(one.positions(), expected)
+    simulation.reset()
+    simulation.step(50)
+    assert simulation.positions()[:, 2].max() < 1.1 * RADIUS
+
+
+def test_a_cantilever_follows_the_floor_that_bends_it() -> None:
+    scene = withe.Scene()
+    rod = scene.add_rod(start=(0, 0, 0), end=(0.3, 0, 0), nodes=21, radius=RADIUS, material=RUBBER)
+    scene.clamp(rod.start)
+    floor = scene.add_floor(height=-0.15)
+    simulation = scene.build(integrator="static", time_step=1.0)
+    simulation.move(floor, position=(0, 0, -0.02), over=4.0)
+    for height in (-0.1175, -0.085, -0.0525, -0.02):
+        simulation.step()
+        if height > -0.1:
+            assert simulation.positions(rod)[-1, 2] == pytest.approx(height + RADIUS, abs=0.02 * RADIUS)
+
+
+def test_what_an_obstacle_cannot_do_is_refused() -> None:
+    scene, _, table = lying()
+    simulation = scene.build()
+    with pytest.raises(ValueError, match="an obstacle does not turn"):
+        simulation.move(table, position=(0, 0, 0), roll=1.0)
+    with pytest.raises(ValueError, match="position or path of 'table' must be given"):
+        simulation.move(table)
+    with pytest.raises(ValueError, match="position of 'table'"):
+        simulation.move("table", position=(0, 0))
+    with pytest.raises(ValueError, match="path of 'table' must be given alone"):
+        simulation.move(table, position=(0, 0, 0), path=lambda t: (0, 0, t))
+    with pytest.raises(ValueError, match="over"):
+        simulation.move(table, position=(0, 0, 0.1), over=-1.0)
