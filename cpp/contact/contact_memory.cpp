@@ -195,7 +195,6 @@ double Contact::stiffen(State& state) {
 }
 
 void Contact::hold_sticking(const State& state, VectorX& change) const {
-  if (!unsymmetric()) return;
   for (const ContactRecord& record : state.contacts) {
     if (!record.sticking) continue;
     for (int edge : {record.key.a, record.key.b}) {

@@ -90,8 +90,11 @@ NewtonResult find_inner(Equations& equations, const Newton& newton, const Option
   int& plain = work.newton.factor.plain_solves;
   const bool mixed = !circling || plain == 0;
   if (circling && plain > 0) --plain;
-  for (const Start& start :
-       {Start{true, true, mixed}, Start{true, false, mixed}, Start{true, false, !mixed}, Start{false, false, true}}) {
+  std::array<Start, 4> starts{
+      {{true, true, mixed}, {true, false, mixed}, {true, false, !mixed}, {false, false, true}}};
+  // Where surfaces stick, a motion that lets them slip leads far off, and from rest Newton's method finds its way soon.
+  if (equations.contact() && equations.contact()->frictional()) std::swap(starts[1], starts[3]);
+  for (const Start& start : starts) {
     if (start.accelerated && points == 0) continue;
     if (start.accelerated) {
       predictor.extrapolate(state.time + 0.5 * plan.dt, points, work.mean);

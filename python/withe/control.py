@@ -13,6 +13,7 @@ from withe.description import added_mass, describe_support, drag, rod_parameters
 from withe.directory import Directory
 from withe.handles import Drag, Fluid, Load, Mass, NodeHandle, Obstacle, Rod, Support
 from withe.motion import Path, Turn, evaluate_path, oriented
+from withe.obstacles import MovingObstacles
 from withe.parameters import ROD_WORDS, RodParameters
 from withe.parts import (
     CustomForcePart,
@@ -20,7 +21,6 @@ from withe.parts import (
     FluidPart,
     LoadPart,
     MassPart,
-    ObstaclePart,
     RodPart,
     SupportPart,
 )
@@ -34,7 +34,7 @@ FloatArray = npt.NDArray[np.float64]
 _NATURAL_WORDS = ("natural_curvature", "natural_twist")
 
 
-class Control:
+class Control(MovingObstacles):
     """Actuation, loads, supports and parameters of a running simulation."""
 
     _scene: Directory
@@ -412,29 +412,6 @@ class Control:
             self._settings.paths.pop(part.name, None)
             return
         self._settings.paths[part.name] = self._turn(index, part, target, tangent, roll, over)
-
-    def _obstacle(self, handle: Any) -> tuple[int, str] | None:
-        """Index and name of an obstacle; None where it is something else."""
-        name = self._directory.find(handle, ObstaclePart, "obstacle").name if isinstance(handle, Obstacle) else handle
-        names = [part.name for part in self._directory.all(ObstaclePart)]
-        return (names.index(name), name) if isinstance(name, str) and name in names else None
-
-    def _move_obstacle(
-        self, index: int, name: str, position: npt.ArrayLike | None, over: float, path: Path | None
-    ) -> None:
-        over = validation.non_negative(over, "over")
-        if path is not None:
-            if position is not None or over != 0.0:
-                raise ValueError(f"path of {name!r} must be given alone")
-            validation.function(path, f"path of {name!r}")
-            now = self._world.time
-            validation.vector(path(now), f"path of {name!r} at t = {now:g}")
-            self._settings.paths[name] = path
-            return
-        if position is None:
-            raise ValueError(f"position or path of {name!r} must be given")
-        self._world.move_obstacle(index, validation.vector(position, f"position of {name!r}"), over)
-        self._settings.paths.pop(name, None)
 
     def _turn(self, index: int, part: SupportPart, target: FloatArray, tangent: Any, roll: Any, over: float) -> Turn:
         """The way of a support from where it is to a tangent and a roll."""
