@@ -90,8 +90,7 @@ NewtonResult find_inner(Equations& equations, const Newton& newton, const Option
   int& plain = work.newton.factor.plain_solves;
   const bool mixed = !circling || plain == 0;
   if (circling && plain > 0) --plain;
-  std::array<Start, 4> starts{
-      {{true, true, mixed}, {true, false, mixed}, {true, false, !mixed}, {false, false, true}}};
+  std::array<Start, 4> starts{{{true, true, mixed}, {true, false, mixed}, {true, false, !mixed}, {false, false, true}}};
   // Where surfaces stick, a motion that lets them slip leads far off, and from rest Newton's method finds its way soon.
   if (equations.contact() && equations.contact()->frictional()) std::swap(starts[1], starts[3]);
   for (const Start& start : starts) {
