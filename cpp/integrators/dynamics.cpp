@@ -94,7 +94,7 @@ NewtonResult find_inner(Equations& equations, const Newton& newton, const Option
   // Where surfaces stick, a motion that lets them slip leads far off, and from rest Newton's method finds its way soon.
   if (equations.contact() && equations.contact()->frictional()) std::swap(starts[1], starts[3]);
   for (const Start& start : starts) {
-    if (start.accelerated && points == 0) continue;
+    if (start.accelerated && (points == 0 || work.repeated)) continue;
     if (start.accelerated) {
       predictor.extrapolate(state.time + 0.5 * plan.dt, points, work.mean);
       work.move = h * state.v + (h * h) * work.mean;

@@ -239,6 +239,7 @@ bool World::Implementation::inner_step(double dt, int slot, double& error) {
   Equations& system = equations_of_step();
   aim_obstacles(system, end);
   const auto undo = [&] {
+    work.repeated = false;
     release_obstacles(system);
     motions = kept_motions;
     if (ramped) apply_ramps(start);
@@ -249,7 +250,9 @@ bool World::Implementation::inner_step(double dt, int slot, double& error) {
     for (int tries = 0; r.too_deep && tries < kMostStiffenings; ++tries) {
       support_work += system.contact()->stiffen(state);
       forget_matrix();
+      work.repeated = true;
       r = step_by_rule(dt, slot);
+      work.repeated = false;
     }
   } catch (...) {
     undo();
