@@ -14,19 +14,31 @@ struct PlanarBend {
   Scalar curvature;  ///< d2E / dphi2 [N m]
 };
 
-/// Energy and its derivatives with respect to phi: kappa' = 1 + kappa^2 / 4, kappa'' = kappa kappa' / 2.
+/// beta and its derivatives with respect to phi.
 template <class Scalar>
-PlanarBend<Scalar> planar_bend(const BendMeasure& measure, const Scalar& kappa, const Scalar& natural,
-                               const Scalar& stiffness) {
+struct PlanarStrain {
+  Scalar value, first, second;
+};
+
+/// kappa' = 1 + kappa^2 / 4, kappa'' = kappa kappa' / 2.
+template <class Scalar>
+PlanarStrain<Scalar> planar_strain(const BendMeasure& measure, const Scalar& kappa) {
   const Scalar x = kappa * kappa;
   const BendFactor<Scalar> f = bend_factor(measure, x);
-  const Scalar strain = f.value * kappa - natural;
-  const Scalar moment = stiffness * strain;
   const Scalar by_kappa = f.value + 2.0 * (x * f.first);
   const Scalar turn = 1.0 + 0.25 * x;
   const Scalar first = by_kappa * turn;
   const Scalar second = kappa * turn * ((6.0 * f.first + 4.0 * (x * f.second)) * turn + 0.5 * by_kappa);
-  return {0.5 * moment * strain, moment * first, stiffness * first * first + moment * second};
+  return {f.value * kappa, first, second};
+}
+
+template <class Scalar>
+PlanarBend<Scalar> planar_bend(const BendMeasure& measure, const Scalar& kappa, const Scalar& natural,
+                               const Scalar& stiffness) {
+  const PlanarStrain<Scalar> beta = planar_strain(measure, kappa);
+  const Scalar strain = beta.value - natural;
+  const Scalar moment = stiffness * strain;
+  return {0.5 * moment * strain, moment * beta.first, stiffness * beta.first * beta.first + moment * beta.second};
 }
 
 }  // namespace withe

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "elasticity/bend_planar.hpp"
 #include "integrators/equations.hpp"
 
 namespace withe {
@@ -9,14 +10,84 @@ namespace {
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
-/// Gradients of e0 . e0, e0 . e1, e1 . e1 and e0 x e1 with respect to e = (e0, e1), each linear in e.
-void invariant_gradients(const double (&e)[4], double (&g)[4][4]) {
-  const double rows[4][4] = {{2.0 * e[0], 2.0 * e[1], 0.0, 0.0},
-                             {e[2], e[3], e[0], e[1]},
-                             {0.0, 0.0, 2.0 * e[2], 2.0 * e[3]},
-                             {e[3], -e[2], -e[1], e[0]}};
-  for (int k = 0; k < 4; ++k)
-    for (int i = 0; i < 4; ++i) g[k][i] = rows[k][i];
+Vector2 along(const EdgeFrame<double>& f, double sign) { return {sign * f.tangent.x, sign * f.tangent.y}; }
+Vector2 across(const Vector2& v) { return {-v.y(), v.x()}; }
+
+/// (sin x) / x, and its derivative over x.
+struct Sinc {
+  double value, slope;
+};
+Sinc sinc(double x) {
+  const double square = x * x;
+  if (square < 1e-6) return {1.0 - square / 6.0, -1.0 / 3.0 + square / 30.0};
+  const double value = std::sin(x) / x;
+  return {value, (std::cos(x) - value) / square};
+}
+
+/// How an edge in a plane turns in a step from a to b = 2 m - a; derivatives by m.
+struct TurningEdge {
+  Vector2 normal;           ///< gradient of its angle at m
+  Vector2 by_psi;           ///< of psi
+  Eigen::Matrix2d hessian;  ///< of its angle at m
+  double psi;               ///< the angle by which it turns [rad]
+  double part;              ///< normal . (b - a): 2 tan(psi / 2) where it keeps its length
+  Vector2 by_part;          ///< of part
+  double share;             ///< psi / part
+  Vector2 by_share;         ///< of share
+  double stretch;           ///< |b| / |a| - 1
+  Vector2 by_stretch;       ///< of stretch
+};
+
+TurningEdge turning_edge(const EdgeFrame<double>& start, const EdgeFrame<double>& middle, const EdgeFrame<double>& end,
+                         double sign, const Vector2& change) {
+  const Vector2 a = along(start, sign), m = along(middle, sign), b = along(end, sign);
+  const double inverse = middle.inverse_length;
+  TurningEdge e;
+  e.normal = inverse * across(m);
+  e.by_psi = 2.0 * end.inverse_length * across(b);
+  e.hessian = -inverse * (m * e.normal.transpose() + e.normal * m.transpose());
+  e.psi = std::atan2(across(a).dot(b), a.dot(b));
+  e.part = e.normal.dot(change);
+  e.by_part = 2.0 * e.normal + e.hessian * change;
+  // part = |a| |b| sin(psi) / |m|^2.
+  const Sinc s = sinc(e.psi);
+  e.share = start.inverse_length * end.inverse_length / (inverse * inverse * s.value);
+  e.by_share = e.share * (2.0 * inverse * m - 2.0 * end.inverse_length * b - (s.slope * e.psi / s.value) * e.by_psi);
+  e.stretch = start.inverse_length / end.inverse_length - 1.0;
+  e.by_stretch = 2.0 * start.inverse_length * b;
+  return e;
+}
+
+/// 1 / T, but where T is no more than what edges turn by times what they stretch by: there T may vanish before phi is
+/// what it was, and the quotient goes smoothly to zero.
+struct Quotient {
+  double value, by_T, by_width;
+  double turn, stretch;  ///< sums of squares; `reach` times their product is the square of that width
+};
+
+Quotient quotient(double T, const TurningEdge& a, const TurningEdge& b, double reach) {
+  constexpr double kLeastWidth = 1e-16;
+  Quotient q;
+  q.turn = a.part * a.part + b.part * b.part;
+  q.stretch = a.stretch * a.stretch + b.stretch * b.stretch;
+  const double width = reach * q.turn * q.stretch + kLeastWidth, ratio = T * T / width;
+  const bool outside = ratio >= 1.0;
+  q.value = outside ? 1.0 / T : T * (2.0 - ratio) / width;
+  q.by_T = outside ? -1.0 / (T * T) : (2.0 - 3.0 * ratio) / width;
+  q.by_width = outside ? 0.0 : -2.0 * T * (1.0 - ratio) / (width * width);
+  return q;
+}
+
+/// (beta1 - beta0) / (phi1 - phi0) without a difference, and its derivative by phi1.
+struct DividedStrain {
+  double value, by_end;
+};
+DividedStrain divided_strain(const BendMeasure& measure, double kappa0, double kappa1, double turn) {
+  const double a = measure.a, b = measure.b, x0 = kappa0 * kappa0, x1 = kappa1 * kappa1, both = kappa0 * kappa1;
+  const double factor = (1.0 + a * (x0 + both + x1) - b * both + a * b * x0 * x1) / ((1.0 + b * x0) * (1.0 + b * x1));
+  const double value = sinc(0.5 * turn).value * std::sqrt((1.0 + 0.25 * x0) * (1.0 + 0.25 * x1)) * factor;
+  const PlanarStrain<double> end = planar_strain(measure, kappa1);
+  return {value, std::abs(turn) < 1e-5 ? 0.5 * end.second : (end.first - value) / turn};
 }
 
 }  // namespace
@@ -59,81 +130,81 @@ void Equations::correct(Local& local, const Local& end, double start_energy, dou
       local.hessian[a][b] -= weight * pair.weight;
       local.hessian[b][a] -= weight * pair.weight;
     }
-  add_correction_floor(table.dofs(element), u, n, s, std::max(end.energy, start_energy), stiffness);
+  // A strain rounds as positions do, and its moment sqrt(2 K E) makes it an energy: the rounding of r.
+  const double energy = std::max(end.energy, start_energy);
+  add_correction_floor(table.dofs(element), u, n, rounding_ * (std::sqrt(2.0 * stiffness * energy) + energy) / s);
 }
 
-/// Rounding of r: a strain rounds as positions do, and its moment sqrt(2 K E) makes it an energy. Where hardly
-/// anything moves, r u / (u . D) makes that a force that no iteration removes.
-void Equations::add_correction_floor(const int* dofs, const double* u, int count, double s, double energy,
-                                     double stiffness) {
-  const double rounding = rounding_ * (std::sqrt(2.0 * stiffness * energy) + energy) / s;
+/// Where hardly anything moves, a quotient of differences makes their rounding a force that no iteration removes.
+void Equations::add_correction_floor(const int* dofs, const double* u, int count, double rounding) {
   for (int i = 0; i < count; ++i)
     if (dofs[i] >= 0) correction_floor_[dofs[i]] += rounding * std::abs(u[i]);
 }
 
-/// The same in a plane with the quadratic invariants of the stencil (e0 . e0, e0 . e1, e1 . e1, e0 x e1), whose
-/// derivatives at the middle times D are exactly their changes: it conserves angular momentum too.
-void Equations::add_planar_invariants(int stencil, Local& local, const Local& end, double start_energy,
-                                      double stiffness) {
+/// Bending in a plane: moment x (beta1 - beta0) / (phi1 - phi0), moment K (b - n) with b the mean of both beta, times a
+/// discrete gradient of phi = angle(e1) - angle(e0). psi / part of the gradient at the middle is one of an edge's
+/// angle; it turns the stencil unless both edges have the same share. Forces that do no work take the difference of the
+/// shares away, all of it but where T = part1 - part0 vanishes before phi is what it was, as edges also change their
+/// lengths.
+void Equations::add_planar_bend(int stencil, Local& local) {
   constexpr int n = 6;
-  double D[kMaxLocal], zm[n];
+  const BendStencil& s = model_.bend[at(stencil)];
+  double D[kMaxLocal];
   gather_difference(assembler_.bend, stencil, D);
-  const int* dofs = assembler_.bend.dofs(stencil);
-  for (int i = 0; i < n; ++i) zm[i] = last_z_(dofs[i]);
-  // Edges as linear maps of the six unknowns.
-  const double e[4] = {zm[2] - zm[0], zm[3] - zm[1], zm[4] - zm[2], zm[5] - zm[3]};
-  const double d[4] = {D[2] - D[0], D[3] - D[1], D[4] - D[2], D[5] - D[3]};
-  double gradient[4][4], change[4], s = 0.0;
-  invariant_gradients(e, gradient);
-  for (int k = 0; k < 4; ++k) {
-    change[k] = 0.0;
-    for (int i = 0; i < 4; ++i) change[k] += gradient[k][i] * d[i];
-    s += change[k] * change[k];
+  TurningEdge edge[2];
+  for (int k = 0; k < 2; ++k) {
+    const auto e = at(s.edge[k]);
+    edge[k] = turning_edge(start_.edge[e], middle_.edge[e], end_.edge[e], s.sign[k],
+                           {D[2 * k + 2] - D[2 * k], D[2 * k + 3] - D[2 * k + 1]});
   }
-  const double length4 = (e[0] * e[0] + e[1] * e[1]) * (e[2] * e[2] + e[3] * e[3]);
-  if (!(s > 1e-26 * length4)) return;
-  double r = end.energy - start_energy, bent[n];
+  const double kappa0 = start_.bend_strain(stencil, 0), kappa1 = end_.bend_strain(stencil, 0);
+  const PlanarStrain<double> start = planar_strain(elastic.measure, kappa0),
+                             end = planar_strain(elastic.measure, kappa1);
+  const DividedStrain slope = divided_strain(elastic.measure, kappa0, kappa1, edge[1].psi - edge[0].psi);
+  const double stiffness = elastic.bend_stiffness(stencil, 0);
+  const double moment = stiffness * (0.5 * (start.value + end.value) - elastic.bend_natural(stencil, 0));
+  const double by_moment = 0.5 * stiffness * end.first;
+
+  const double T = edge[1].part - edge[0].part, difference = edge[1].share - edge[0].share;
+  const double reach = keep_momentum_ ? 0.1 : 25.0;  // wide windows are easy to solve in
+  const Quotient w = quotient(T, edge[0], edge[1], reach);
+  Eigen::Vector4d by_phi, by_w, by_difference, force;
+  for (int k = 0; k < 2; ++k) {
+    const double sign = k == 0 ? -1.0 : 1.0;
+    by_phi.segment<2>(2 * k) = sign * edge[k].by_psi;
+    by_difference.segment<2>(2 * k) = sign * edge[k].by_share;
+    by_w.segment<2>(2 * k) = (sign * w.by_T + w.by_width * 2.0 * reach * w.stretch * edge[k].part) * edge[k].by_part +
+                             (w.by_width * 2.0 * reach * w.turn * edge[k].stretch) * edge[k].by_stretch;
+  }
+  const double scale = moment * slope.value;
+  const Eigen::Vector4d by_scale = (by_moment * slope.value + moment * slope.by_end) * by_phi;
+  Eigen::Matrix4d H;
+  for (int k = 0; k < 2; ++k) {
+    const TurningEdge &own = edge[k], &other = edge[1 - k];
+    const double sign = k == 0 ? -1.0 : 1.0, share = own.share + difference * other.part * w.value;
+    Eigen::Vector4d by_share = other.part * (w.value * by_difference + difference * by_w);
+    by_share.segment<2>(2 * k) += own.by_share;
+    by_share.segment<2>(2 - 2 * k) += difference * w.value * other.by_part;
+    force.segment<2>(2 * k) = (sign * scale * share) * own.normal;
+    H.middleRows<2>(2 * k) = sign * own.normal * (share * by_scale + scale * by_share).transpose();
+    H.block<2, 2>(2 * k, 2 * k) += (sign * scale * share) * own.hessian;
+  }
+  constexpr double kRounding = 1e-15;  // of `difference`
+  const double u[n] = {-force[0], -force[1], force[0] - force[2], force[1] - force[3], force[2], force[3]};
+  add_correction_floor(assembler_.bend.dofs(stencil), u, n,
+                       kRounding * std::abs(w.value) * (std::abs(edge[0].part) + std::abs(edge[1].part)));
   for (int i = 0; i < n; ++i) {
-    r -= local.gradient[i] * D[i];
-    double HD = 0.0;
-    for (int j = 0; j < n; ++j) HD += local.hessian[i][j] * D[j];
-    bent[i] = 2.0 * (end.gradient[i] - local.gradient[i]) - HD;
+    local.gradient[i] = u[i];
+    for (int j = 0; j < n; ++j) local.hessian[i][j] = 0.0;
   }
-  // With respect to z: u = sum g_k c_k, du = sum c_k B_k + g_k (dc_k)^T, dc_k = 2 B_k e1 (q1), ds = 2 sum c_k dc_k.
-  const double doubled[4] = {2.0 * e[0] + d[0], 2.0 * e[1] + d[1], 2.0 * e[2] + d[2], 2.0 * e[3] + d[3]};
-  double dc[4][4], u[4] = {}, ds[4] = {};
-  invariant_gradients(doubled, dc);
-  const double* c = change;
-  double du[4][4] = {{2.0 * c[0], 0.0, c[1], c[3]},
-                     {0.0, 2.0 * c[0], -c[3], c[1]},
-                     {c[1], -c[3], 2.0 * c[2], 0.0},
-                     {c[3], c[1], 0.0, 2.0 * c[2]}};
-  for (int k = 0; k < 4; ++k)
-    for (int i = 0; i < 4; ++i) {
-      u[i] += gradient[k][i] * c[k];
-      ds[i] += 2.0 * c[k] * dc[k][i];
-      for (int j = 0; j < 4; ++j) du[i][j] += gradient[k][i] * dc[k][j];
+  // From edges to nodes: rows and columns of an edge are those of its head less those of its tail.
+  for (int i = 0; i < 4; ++i)
+    for (int j = 0; j < 4; ++j) {
+      local.hessian[i][j] += H(i, j);
+      local.hessian[i + 2][j + 2] += H(i, j);
+      local.hessian[i][j + 2] -= H(i, j);
+      local.hessian[i + 2][j] -= H(i, j);
     }
-  // From edges to nodes: node rows of e0 are (-1, +1, 0), of e1 (0, -1, +1).
-  const auto spread = [](const double* edge, double* node) {
-    node[0] = -edge[0], node[1] = -edge[1];
-    node[2] = edge[0] - edge[2], node[3] = edge[1] - edge[3];
-    node[4] = edge[2], node[5] = edge[3];
-  };
-  const double inverse = 1.0 / s, weight = r * inverse;
-  double un[n], dsn[n], half[4][n];
-  spread(u, un);
-  spread(ds, dsn);
-  for (int i = 0; i < 4; ++i) spread(du[i], half[i]);
-  for (int j = 0; j < n; ++j) {
-    const double column[4] = {half[0][j], half[1][j], half[2][j], half[3][j]};
-    const double along = inverse * (bent[j] - weight * dsn[j]);
-    double full[n];
-    spread(column, full);
-    for (int i = 0; i < n; ++i) local.hessian[i][j] += un[i] * along + weight * full[i];
-  }
-  for (int i = 0; i < n; ++i) local.gradient[i] += weight * un[i];
-  add_correction_floor(dofs, un, n, s, std::max(end.energy, start_energy), stiffness);
 }
 
 void Equations::gather_difference(const ElementTable& table, int element, double* difference) const {
@@ -170,19 +241,19 @@ void Equations::add_discrete_gradient(const VectorX& z, bool with_matrix, const 
     add(assembler_.stretch, e);
   }
   for (int b = 0; b < static_cast<int>(model_.bend.size()); ++b) {
-    bend_local(model_, elastic, middle_, b, true, local);
-    bend_local(model_, elastic, end_, b, false, end);
-    const BendTwistEnergy before = bend_energy_of(elastic, start_, b);
-    const double stiffness = elastic.bend_stiffness.row(b).maxCoeff();
     if (model_.planar()) {
-      add_planar_invariants(b, local, end, before.bend + before.twist, stiffness);
+      add_planar_bend(b, local);
     } else {
+      bend_local(model_, elastic, middle_, b, true, local);
+      bend_local(model_, elastic, end_, b, false, end);
+      const BendTwistEnergy before = bend_energy_of(elastic, start_, b);
       const BendStencil& s = model_.bend[at(b)];
       Metric metric;
       for (int k = 0; k < 2; ++k)
         metric.pairs[k] = {4 * k, 4 * k + 4, 3, inverse_rest_[s.edge[k]] * inverse_rest_[s.edge[k]]};
       metric.own[3] = metric.own[7] = 1.0;
-      correct(local, end, before.bend + before.twist, stiffness, assembler_.bend, b, metric);
+      correct(local, end, before.bend + before.twist, elastic.bend_stiffness.row(b).maxCoeff(), assembler_.bend, b,
+              metric);
     }
     add(assembler_.bend, b);
   }

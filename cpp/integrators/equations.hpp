@@ -8,7 +8,8 @@
 /// replaces grad V by a discrete gradient between q0 and q1 = 2 z - q0:
 ///   stretching: EA (eps0 + eps1) / 2 (e0 + e1) / (|e0| + |e1|)   [Simo, Tarnow and Doblare 1995];
 ///   bending, twisting: grad E(z) + r u / (u . D), D = q1 - q0, r = E(q1) - E(q0) - grad E(z) . D, with u a
-///   direction that neither moves nor (in a plane) turns the stencil [Gonzalez 1996].
+///   direction that does not move the stencil [Gonzalez 1996];
+///   in a plane: quotients of differences of the moment's angle alone, see Equations::add_planar_bend.
 
 #include <memory>
 
@@ -69,6 +70,10 @@ class Equations {
   /// What earlier solutions left behind.
   void forget_flow();
 
+  /// Whether energy-momentum steps in a plane keep angular momentum exactly, however hard that makes them to solve for;
+  /// else to where edges stretch by more within a step than a stencil bends.
+  void keep_angular_momentum(bool exactly) { keep_momentum_ = exactly; }
+
   /// Residual at z, and the matrix when asked for. `axial_force`: see stretch_hessian.
   void evaluate(const VectorX& z, bool with_matrix, const double* axial_force, Evaluation& out);
   /// Of an explicit step from `state` to q: the configuration there, and that of `next`. Returns by how much edges turn
@@ -125,8 +130,8 @@ class Equations {
   };
   void correct(Local& local, const Local& end, double start_energy, double stiffness, const ElementTable& table,
                int element, const Metric& metric);
-  void add_planar_invariants(int stencil, Local& local, const Local& end, double start_energy, double stiffness);
-  void add_correction_floor(const int* dofs, const double* u, int count, double s, double energy, double stiffness);
+  void add_planar_bend(int stencil, Local& local);
+  void add_correction_floor(const int* dofs, const double* u, int count, double rounding);
   void add_spin_couple(const VectorX& z);
   Vec3d spin_couple(int edge, double omega, const Vec3d& rate) const;
   void add_couple(int edge, const Vec3d& force);
@@ -143,7 +148,7 @@ class Equations {
   const State* state_ = nullptr;
   const Parameters* parameters_ = nullptr;
   double h_ = 0.0;
-  bool energy_momentum_ = false;
+  bool energy_momentum_ = false, keep_momentum_ = false;
   ElasticCoefficients viscous_, total_;
   const ElasticCoefficients* acting_ = &elastic;  ///< elasticity, with viscosity where the scheme takes both as one
   Configuration start_, middle_, end_;

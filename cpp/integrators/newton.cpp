@@ -17,6 +17,10 @@ constexpr int kPatience = 16;
 constexpr int kTiring = 3;
 // An iteration with an old matrix costs about a quarter of one with a new one.
 constexpr double kWorth = 2.5;
+// After so many iterations, steps that are still too long to be taken whole and a residual that has grown by so much
+// lead nowhere in time.
+constexpr int kFirstIterations = 4;
+constexpr double kHopeless = 1e3;
 // Halvings of a step between surfaces before it is taken as it is.
 constexpr int kMostCuts = 10;
 
@@ -160,6 +164,7 @@ NewtonResult Newton::solve(Equations& equations, VectorX& z, const VectorX* targ
   if (!p.may_reuse) factor.owner = nullptr;
   bool axial_known = mixed && interval != 0.0;
   int stagnant = 0;
+  double first_residual = 0.0;
   const auto give_up = [&] {
     factor.owner = nullptr;
     return result;
@@ -186,6 +191,10 @@ NewtonResult Newton::solve(Equations& equations, VectorX& z, const VectorX* targ
       return result;
     }
     if (result.iterations == max_iterations) return give_up();
+    if (result.iterations == 0) first_residual = result.residual;
+    if (interval != 0.0 && result.iterations >= kFirstIterations && std::isinf(p.step) && std::isinf(p.last_step) &&
+        result.residual > kHopeless * first_residual)
+      return give_up();
     if (p.fresh && expect_end) evaluate(true);
     work.counters.assembly_time += seconds_since(start);
 

@@ -42,6 +42,7 @@ struct FactorRecord {
   int waited = 0;                                       ///< time steps since one was last tried across
   bool tired = false;                                   ///< served the last time step slowly
   int plain_solves = 0;                                 ///< still to come before the mixed method is tried again
+  int relaxed_solves = 0;                               ///< and before angular momentum is kept exactly again
 };
 
 /// Scratch of the solver; owned by the world, so that a step does not allocate.
