@@ -74,8 +74,33 @@ void start_axial_force(const Equations& equations, const VectorX& q, VectorX& ou
   }
 }
 
-/// Finds the inner configuration, `work.z`: from the extrapolated motion first; where that is too far off, from less
-/// and less of it.
+/// Adds to `work.move` what supports do within a part of the step. Where that is more than the edges next to them bear,
+/// the others follow as they would by the linear step.
+void follow_supports(Equations& equations, const Newton& newton, double part, const State& state, StepWorkspace& work) {
+  VectorX& held = work.difference;
+  held.setZero(state.q.size());
+  equations.assembler().add_held_change(state.q, work.held.q, part, held);
+  const double bearable = newton.cap(held);
+  if (bearable < 1.0) {
+    Evaluation& e = work.newton.evaluation;
+    work.newton.factor.owner = nullptr;
+    work.z = state.q + work.move;
+    equations.evaluate(work.z, true, nullptr, e);
+    VectorX& force = work.change;
+    force = -e.residual;
+    const bool solvable = equations.assembler().solver().factorize().status == FactorStatus::ok;
+    const double little = 1e-6 * bearable;
+    work.z += little * held;
+    equations.evaluate(work.z, false, nullptr, e);
+    force = force - (e.residual + force) / little;
+    equations.assembler().solver().solve({force.data(), static_cast<std::size_t>(force.size())});
+    if (solvable && force.allFinite()) work.move += force;
+  }
+  work.move += held;
+}
+
+/// Finds the inner configuration, `work.z`: from the extrapolated motion first; where that is too far off, from a
+/// steady one, or from rest, whose first iteration is the linear step.
 NewtonResult find_inner(Equations& equations, const Newton& newton, const Options& options, const StepPlan& plan,
                         double h, const State& state, const Predictor& predictor, StepWorkspace& work) {
   struct Start {
@@ -87,12 +112,16 @@ NewtonResult find_inner(Equations& equations, const Newton& newton, const Option
   // Where edges turn by a radian in an energy-momentum step, the mixed method may circle for ever: then the plain one
   // comes first for a while.
   const bool circling = plan.rule == StepRule::energy_momentum;
-  int& plain = work.newton.factor.plain_solves;
-  const bool mixed = !circling || plain == 0;
-  if (circling && plain > 0) --plain;
-  std::array<Start, 4> starts{{{true, true, mixed}, {true, false, mixed}, {true, false, !mixed}, {false, false, true}}};
+  FactorRecord& known = work.newton.factor;
+  const bool mixed = !circling || known.plain_solves == 0, exact = known.relaxed_solves == 0;
+  if (circling && !mixed) --known.plain_solves;
+  if (circling && !exact) --known.relaxed_solves;
+  constexpr int kWait = 16;
+  bool first = true;
+  std::array<Start, 4> starts{
+      {{true, true, mixed}, {true, false, mixed}, {false, false, mixed}, {true, false, !mixed}}};
   // Where surfaces stick, a motion that lets them slip leads far off, and from rest Newton's method finds its way soon.
-  if (equations.contact() && equations.contact()->frictional()) std::swap(starts[1], starts[3]);
+  if (equations.contact() && equations.contact()->frictional()) std::swap(starts[1], starts[2]);
   for (const Start& start : starts) {
     if (start.accelerated && (points == 0 || work.repeated)) continue;
     if (start.accelerated) {
@@ -104,15 +133,18 @@ NewtonResult find_inner(Equations& equations, const Newton& newton, const Option
     equations.assembler().project(work.move);
     work.move *= newton.cap(work.move);
     if (equations.contact()) equations.contact()->hold_sticking(state, work.move);
-    equations.assembler().add_held_change(state.q, work.held.q, h / plan.dt, work.move);
+    follow_supports(equations, newton, h / plan.dt, state, work);
     work.z = state.q + work.move * equations.allowed(state.q, work.move);
-    const bool trial = start.accelerated || (circling && start.mixed && start.moving);
+    const bool trial = start.accelerated || (circling && start.mixed && start.moving), keep_momentum = exact && first;
+    equations.keep_angular_momentum(keep_momentum);
+    first = false;
     const int limit = trial ? std::min(12, options.max_iterations) : options.max_iterations;
     start_axial_force(equations, state.q, work.newton.axial_force);
     found = newton.solve(equations, work.z, nullptr, limit, work.newton, start.mixed, h);
     spent += found.iterations;
     if (found.converged) {
-      if (circling && mixed && !start.mixed) plain = 16;
+      if (circling && mixed && !start.mixed) known.plain_solves = kWait;
+      if (circling && exact && !keep_momentum) known.relaxed_solves = kWait;
       break;
     }
   }

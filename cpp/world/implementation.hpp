@@ -79,7 +79,7 @@ struct World::Implementation {
   mutable EnergyScratch energy_scratch;
   Predictor predictor;
   StepStart kept;
-  std::vector<SupportMotion> kept_motions;
+  std::vector<SupportMotion> motions_before, kept_motions;  ///< at the start of a time step, of a part of it
   State state;
   Plan plan;
   Statistics statistics;
@@ -123,6 +123,7 @@ struct World::Implementation {
   void retire_ramps();
   bool actuated() const;
   void aim_supports(double time);
+  void spread_jumps(double duration);
   void hold_now(HeldTarget& target) const;
   void set_motion_at(SupportMotion& motion, double time) const;
   void update_custom_force(Equations& target) const;
@@ -140,6 +141,7 @@ struct World::Implementation {
     std::string words;
   };
   void advance(double duration);
+  void advance_in_parts(double duration);
   bool may_cut() const;
   int notches() const;
   void divide_rest(Division& division) const;

@@ -56,6 +56,18 @@ void World::Implementation::set_motion_at(SupportMotion& motion, double time) co
       rotation_exp(s * rotation_log(motion.to_rotation * motion.from_rotation.transpose())) * motion.from_rotation;
 }
 
+/// A support that is to be elsewhere at once gets there evenly in the course of the time step: shorter steps meet less
+/// of a jump, or cutting them would be in vain.
+void World::Implementation::spread_jumps(double duration) {
+  for (SupportMotion& m : motions)
+    if (m.start == m.end && (m.position != m.to_position || m.rotation != m.to_rotation)) {
+      m.from_position = m.position;
+      m.from_rotation = m.rotation;
+      m.start = state.time;
+      m.end = state.time + duration;
+    }
+}
+
 /// Moves supports to where they shall be at a time, and notes what that says of the held unknowns.
 void World::Implementation::aim_supports(double time) {
   for (SupportMotion& motion : motions) set_motion_at(motion, time);

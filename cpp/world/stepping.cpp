@@ -26,6 +26,20 @@ void World::Implementation::advance(double duration) {
   if (!options.adaptive && !options.tolerance) level = 0;
   // Without a step before there is no estimate, so error control begins with a step too small to need one.
   if (options.tolerance && predictor.empty()) level = std::max(level, notches() * std::min(options.max_halvings, 8));
+  motions_before = motions;
+  spread_jumps(duration);
+  try {
+    advance_in_parts(duration);
+  } catch (...) {
+    if (state.time == base) motions = motions_before;
+    throw;
+  }
+  // An energy costs as much as a step.
+  if (options.integrator == Integrator::verlet && statistics.steps % 16 == 0) check_explicit();
+}
+
+void World::Implementation::advance_in_parts(double duration) {
+  const double base = state.time;
   Division division;
   divide_rest(division);
   for (;;) {
@@ -44,8 +58,6 @@ void World::Implementation::advance(double duration) {
     if (finished) break;
     if (grown) divide_rest(division);
   }
-  // An energy costs as much as a step.
-  if (options.integrator == Integrator::verlet && statistics.steps % 16 == 0) check_explicit();
 }
 
 /// Steps change by powers of two and rarely, or symmetry and energy suffer; under error control, whose error would

@@ -154,3 +154,36 @@ def test_reactions_balance_the_loads_at_every_support():
         for rod in simulation.rods
     )
     assert total == pytest.approx((-0.01, -0.02, 9.81 * weight), abs=1e-7)
+
+
+@pytest.mark.parametrize("integrator", ["backward_euler", "implicit_midpoint"])
+def test_a_clamp_may_jump_by_a_hundred_edges_at_once(integrator):
+    scene = withe.Scene(gravity=(0, 0, 0))
+    rod = scene.add_rod(start=(0, 0, 0), end=(1, 0, 0), nodes=401, radius=0.01, material=RUBBER)
+    scene.clamp(rod.start, name="wall")
+    simulation = scene.build(integrator=integrator, time_step=0.02)
+    simulation.move("wall", position=(0, 0, 0.3))
+    simulation.step()
+    assert simulation.positions(rod)[0] == pytest.approx((0, 0, 0.3), abs=1e-12)
+    assert simulation.statistics.steps == 1
+    assert simulation.statistics.iterations < 40
+
+
+def test_parts_of_a_step_share_a_jump_evenly():
+    """Shorter steps would be in vain if the first of them met all of it."""
+    scene = withe.Scene(gravity=(0, 0, 0))
+    rod = scene.add_rod(start=(0, 0, 0), end=(1, 0, 0), nodes=21, radius=0.01, material=RUBBER)
+    scene.clamp(rod.start, name="wall")
+    simulation = scene.build(time_step=0.02, tolerance=1e-4, duration=0.04)
+    simulation.step()
+    simulation.move("wall", position=(0, 0, 0.1))
+    kept = simulation.snapshot()
+    jump = simulation.statistics.steps
+    simulation.step()
+    jump = simulation.statistics.steps - jump
+    simulation.restore(kept)
+    simulation.move("wall", position=(0, 0, 0.1), over=0.02)
+    evenly = simulation.statistics.steps
+    simulation.step()
+    assert simulation.statistics.steps - evenly == jump > 1
+    assert simulation.positions(rod)[0] == pytest.approx((0, 0, 0.1), abs=1e-12)
