@@ -72,6 +72,23 @@ def _follower(scene: withe.Scene, arm: withe.Rod) -> None:
     scene.add_force(arm.end, (0, 0, 0), follower=True)
 
 
+def _nothing_to_touch(scene: withe.Scene, arm: withe.Rod) -> None:
+    scene.enable_contact()
+
+
+def _floor(scene: withe.Scene, arm: withe.Rod, friction: float = 0.0) -> None:
+    """Reached by the arm within the run."""
+    scene.add_floor(height=-0.01, friction=friction)
+
+
+def _rough_floor(scene: withe.Scene, arm: withe.Rod) -> None:
+    _floor(scene, arm, friction=1e-12)
+
+
+def _thin_fluid(scene: withe.Scene, arm: withe.Rod) -> None:
+    scene.add_fluid(1e-30, model="resistive")
+
+
 def _moving(simulation: withe.Simulation) -> withe.Simulation:
     """A boundary that moves to where it is, for longer than the run."""
     simulation.move(simulation.rods[0].start, position=(0, 0, 0), over=1e3)
@@ -116,6 +133,25 @@ def skips(nodes: int) -> list[Skip]:
             lambda: _simulation(nodes, _nothing_more),
             lambda: _simulation(nodes),
         ),
+        Skip(
+            "contact",
+            "broad phase, candidates",
+            lambda: _simulation(nodes, _nothing_to_touch),
+            lambda: _simulation(nodes),
+        ),
+        Skip(
+            "contact but with a floor",
+            "sparse solver",
+            lambda: _simulation(nodes, _floor, solver="sparse"),
+            lambda: _simulation(nodes, _floor),
+        ),
+        Skip(
+            "friction, on a floor",
+            "unsymmetric solver, slip",
+            lambda: _simulation(nodes, _rough_floor),
+            lambda: _simulation(nodes, _floor),
+        ),
+        Skip("a fluid", "its terms", lambda: _simulation(nodes, _thin_fluid), lambda: _simulation(nodes)),
         Skip("moving boundaries", "their terms", lambda: _moving(_simulation(nodes)), lambda: _simulation(nodes)),
         Skip("actuation", "its terms", lambda: _actuated(_simulation(nodes)), lambda: _simulation(nodes)),
     ]
