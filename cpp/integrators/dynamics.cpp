@@ -88,13 +88,14 @@ void follow_supports(Equations& equations, const Newton& newton, double part, co
     equations.evaluate(work.z, true, nullptr, e);
     VectorX& force = work.change;
     force = -e.residual;
-    const bool solvable = equations.assembler().solver().factorize().status == FactorStatus::ok;
-    const double little = 1e-6 * bearable;
-    work.z += little * held;
-    equations.evaluate(work.z, false, nullptr, e);
-    force = force - (e.residual + force) / little;
-    equations.assembler().solver().solve({force.data(), static_cast<std::size_t>(force.size())});
-    if (solvable && force.allFinite()) work.move += force;
+    if (equations.assembler().solver().factorize().status == FactorStatus::ok) {
+      const double little = 1e-6 * bearable;
+      work.z += little * held;
+      equations.evaluate(work.z, false, nullptr, e);
+      force = force - (e.residual + force) / little;
+      equations.assembler().solver().solve({force.data(), static_cast<std::size_t>(force.size())});
+      if (force.allFinite()) work.move += force;
+    }
   }
   work.move += held;
 }
