@@ -13,6 +13,7 @@ using Clock = std::chrono::steady_clock;
 // so many steps.
 constexpr double kSlow = 0.15;
 constexpr int kPatience = 16;
+constexpr double kForgetting = 0.96;  // a step, of how badly a matrix served within one
 // So many iterations cost as much as a new matrix.
 constexpr int kTiring = 3;
 // An iteration with an old matrix costs about a quarter of one with a new one.
@@ -161,9 +162,11 @@ NewtonResult Newton::solve(Equations& equations, VectorX& z, const VectorX* targ
     if (!p.fresh) factor.waited = 0;
   }
   factor.tired = false;
+  // What served badly once is tried again in time.
+  factor.contraction[static_cast<std::size_t>(MatrixAge::within)] *= kForgetting;
   if (!p.may_reuse) factor.owner = nullptr;
   bool axial_known = mixed && interval != 0.0;
-  int stagnant = 0;
+  int stagnant = 0, overdue = 0;
   double first_residual = 0.0;
   const auto give_up = [&] {
     factor.owner = nullptr;
@@ -195,6 +198,9 @@ NewtonResult Newton::solve(Equations& equations, VectorX& z, const VectorX* targ
     if (interval != 0.0 && result.iterations >= kFirstIterations && std::isinf(p.step) && std::isinf(p.last_step) &&
         result.residual > kHopeless * first_residual)
       return give_up();
+    // By what is known of the matrix this should have been the end: it serves worse than that.
+    overdue = p.rest <= tolerance ? overdue + 1 : 0;
+    if (p.may_reuse && overdue >= kTiring) p.fresh = true;
     if (p.fresh && expect_end) evaluate(true);
     work.counters.assembly_time += seconds_since(start);
 

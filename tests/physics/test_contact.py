@@ -168,3 +168,20 @@ def test_an_anchored_contact_does_not_creep_under_half_its_limit() -> None:
     assert 0.0 < loaded - start < 5e-5
     simulation.step(2000)  # 10 s
     assert abs(simulation.positions()[:, 0].mean() - loaded) < 1e-5 * 2.5e-2
+
+
+def test_a_rod_that_friction_holds_takes_few_iterations():
+    """A matrix kept from one iteration to the next may serve worse than the first ones say."""
+    scene = withe.Scene()
+    soft = withe.Material(youngs_modulus=1e5, poisson_ratio=0.5, density=509.3)
+    rod = scene.add_rod(start=(0, 0, 0.025), end=(1, 0, 0.025), nodes=26, radius=0.025, material=soft)
+    scene.add_floor(friction=0.4)
+    scene.enable_contact(distance_tolerance=5e-4)
+    push = scene.add_load(rod, (0, 0, 0))
+    simulation = scene.build(time_step=5e-3)
+    simulation.equilibrium()
+    simulation.set(push, load=(3.0, 0, 0))
+    before = simulation.statistics.iterations
+    simulation.step(60)
+    assert simulation.statistics.iterations - before < 60 * 20
+    assert abs(simulation.velocities(rod)).max() < 1e-3
