@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Literal, cast
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from withe import _core, drawing, validation
-from withe.description import added_mass, describe_support, drag, rod_parameters
-from withe.directory import Directory
-from withe.handles import Drag, Fluid, Load, Mass, NodeHandle, Obstacle, Rod, Support
-from withe.motion import Path, Turn, evaluate_path, oriented
-from withe.obstacles import MovingObstacles
+from withe import validation
+from withe.boundaries import Boundaries
+from withe.description import added_mass, drag, rod_parameters
+from withe.handles import Drag, Fluid, Load, Mass, Rod
+from withe.motion import Path, Turn, evaluate_path
 from withe.parameters import ROD_WORDS, RodParameters
 from withe.parts import (
     CustomForcePart,
@@ -22,11 +21,8 @@ from withe.parts import (
     LoadPart,
     MassPart,
     RodPart,
-    SupportPart,
 )
 from withe.rods import curvature_array, twist_array
-from withe.snapshots import Settings
-from withe.supports import check_not_held, make_clamp, make_pin
 
 __all__ = ["Control"]
 
@@ -34,15 +30,11 @@ FloatArray = npt.NDArray[np.float64]
 _NATURAL_WORDS = ("natural_curvature", "natural_twist")
 
 
-class Control(MovingObstacles):
-    """Actuation, loads, supports and parameters of a running simulation."""
+class Control(Boundaries):
+    """Actuation, loads and parameters of a running simulation."""
 
-    _scene: Directory
     _scene_gravity: FloatArray
     _options: dict[str, Any]
-    _directory: Directory
-    _settings: Settings
-    _world: _core.World
     _loads: list[LoadPart]
     _custom_forces: list[CustomForcePart]
 
@@ -276,188 +268,6 @@ class Control(MovingObstacles):
                 velocities, f"velocities of {part.owner}", shape, (3,)
             )
         self._world.set_velocities(now)
-
-    # Supports
-
-    def clamp(
-        self,
-        node: NodeHandle | str,
-        *,
-        hold: Literal["frame", "edge"] = "frame",
-        free: npt.ArrayLike | None = None,
-        spin: bool = False,
-        name: str | None = None,
-    ) -> Support:
-        """Hold a node where it is now, and the direction and roll of its rod. See `Scene.clamp`.
-
-        Raises
-        ------
-        ValueError
-            A node that is held already, or spin=True with hold="frame", which only a scene may be built with.
-        """
-        if spin and hold == "frame":
-            raise ValueError("spin of a clamp put on while running needs hold='edge'")
-        return self._hold(make_clamp(self._directory, node, hold, free, spin, name))
-
-    def pin(self, node: NodeHandle | str, *, free: npt.ArrayLike | None = None, name: str | None = None) -> Support:
-        """Hold a node where it is now. See `Scene.pin`.
-
-        Raises
-        ------
-        ValueError
-            A node that is held already.
-        """
-        return self._hold(make_pin(self._directory, node, free, name))
-
-    def _hold(self, part: SupportPart) -> Support:
-        check_not_held(self._directory, part, (other for _, other in self._settings.supports.values()))
-        index = self._world.add_support(describe_support(part))
-        self._settings.supports[part.name] = index, part
-        return cast(Support, self._directory.add(part))
-
-    def release(self, support: Support | NodeHandle | str) -> None:
-        """Let go of a node.
-
-        Parameters
-        ----------
-        support : Support, NodeHandle or str
-            A support, or the node that it holds.
-
-        Raises
-        ------
-        ValueError
-            Nothing holds that node.
-        """
-        index, part = self._support(support)
-        self._world.remove_support(index)
-        del self._settings.supports[part.name]
-        self._settings.paths.pop(part.name, None)
-        if part.name not in self._scene.parts:
-            del self._directory.parts[part.name]
-
-    def move(
-        self,
-        support: Support | NodeHandle | Obstacle | str,
-        position: npt.ArrayLike | None = None,
-        rotation: Any = None,
-        *,
-        tangent: npt.ArrayLike | None = None,
-        roll: float | None = None,
-        over: float = 0.0,
-        path: Path | None = None,
-    ) -> None:
-        """Move a support or an obstacle, or let it move along a path from now on. What is not given stays as it is.
-
-        Parameters
-        ----------
-        support : Support, NodeHandle, Obstacle or str
-            A support, the node that it holds, or a floor, plane, sphere or capsule, which moves without turning:
-            its position is that of the point of a plane, the centre of a sphere, the start of a capsule. What it
-            does to rods is part of ``energy().work``.
-        position : array_like of shape (3,) [m]
-        rotation : array_like of shape (3, 3), or a SciPy Rotation
-            Relative to the orientation as drawn.
-        tangent : array_like of shape (3,)
-            Where the rod is to point, instead: the smallest turn from the drawn tangent, and then ...
-        roll : float [rad]
-            ... a turn about it. Full turns count.
-        over : float [s]
-            Reached after so long, evenly; within the next step by default.
-        path : callable
-            Instead of all these: a function of time [s] that returns a position, or a position and a
-            rotation.
-
-        Raises
-        ------
-        ValueError
-            Nothing holds that node, a direction for a pin or an obstacle, or arguments that contradict each other.
-
-        Examples
-        --------
-        >>> hand = simulation.clamp(arm.end)
-        >>> simulation.move(hand, position=(0.1, 0, 0.2), roll=np.pi, over=0.5)
-        """
-        obstacle = self._obstacle(support)
-        if obstacle is not None:
-            if any(value is not None for value in (rotation, tangent, roll)):
-                raise ValueError(
-                    f"rotation, tangent and roll of {obstacle[1]!r} must be None: an obstacle does not turn"
-                )
-            self._move_obstacle(*obstacle, position, over, path)
-            return
-        index, part = self._support(support)
-        turns = part.kind != "pin"
-        owner = f"support {part.name!r}"
-        if path is not None:
-            if any(value is not None for value in (position, rotation, tangent, roll)) or over != 0.0:
-                raise ValueError(f"path of {owner} must be given alone")
-            validation.function(path, f"path of {owner}")
-            now = self._world.time
-            evaluate_path(path, now, self._world.support_rotation(index), turns, owner)
-            self._settings.paths[part.name] = path
-            return
-        if rotation is not None and (tangent is not None or roll is not None):
-            raise ValueError(f"rotation of {owner} must not be given together with tangent or roll")
-        if not turns and any(value is not None for value in (rotation, tangent, roll)):
-            raise ValueError(f"rotation, tangent and roll of {owner} must be None: a pin holds no direction")
-        over = validation.non_negative(over, "over")
-        target = np.array(self._world.support_position(index))
-        if position is not None:
-            target = validation.vector(position, f"position of {owner}")
-        if tangent is None and roll is None:
-            matrix = np.array(self._world.support_rotation(index))
-            if rotation is not None:
-                matrix = validation.rotation_matrix(rotation, f"rotation of {owner}")
-            self._world.move_support(index, target, matrix, over)
-            self._settings.paths.pop(part.name, None)
-            return
-        self._settings.paths[part.name] = self._turn(index, part, target, tangent, roll, over)
-
-    def _turn(self, index: int, part: SupportPart, target: FloatArray, tangent: Any, roll: Any, over: float) -> Turn:
-        """The way of a support from where it is to a tangent and a roll."""
-        rod = self._directory.rod(self._directory.layout.rods[part.node[0]].name)
-        if part.kind in ("clamp", "spinning_clamp"):
-            drawn = drawing.drawn_frame(rod.tangents, rod.directors, rod.lengths, part.node[1], rod.closed)
-        else:
-            edge = min(part.node[1], len(rod.tangents) - 1)
-            drawn = rod.tangents[edge], rod.directors[edge]
-        now = self._world.time
-        matrix = np.array(self._world.support_rotation(index))
-        start_tangent = matrix @ drawn[0]
-        start_tangent /= np.linalg.norm(start_tangent)
-        flat = oriented(drawn[0], drawn[1], start_tangent, 0.0) @ drawn[1]
-        turned = matrix @ drawn[1]
-        start_roll = float(np.arctan2(np.cross(flat, turned) @ start_tangent, flat @ turned))
-        before = self._settings.paths.get(part.name)
-        if isinstance(before, Turn):
-            full_turn = 2.0 * np.pi
-            start_roll += full_turn * float(np.round((before.roll_at(now) - start_roll) / full_turn))
-        owner = f"support {part.name!r}"
-        end_tangent = start_tangent if tangent is None else validation.unit_vector(tangent, f"tangent of {owner}")
-        end_roll = start_roll if roll is None else validation.number(roll, f"roll of {owner}")
-        return Turn(
-            positions=np.stack([np.array(self._world.support_position(index)), target]),
-            tangents=np.stack([start_tangent, end_tangent]),
-            rolls=np.array([start_roll, end_roll]),
-            times=np.array([now, now + over]),
-            drawn=np.stack(drawn),
-        )
-
-    def _support(self, support: Any) -> tuple[int, SupportPart]:
-        """Index and part of a support, given by itself or by its node."""
-        if isinstance(support, NodeHandle) or (
-            isinstance(support, str) and support not in self._directory.parts and "." in support
-        ):
-            node, name = self._directory.node(support, "node")
-            row = self._directory.row(node)
-            for index, part in self._settings.supports.values():
-                if self._directory.row(part.node) == row:
-                    return index, part
-            raise ValueError(f"node {name!r} is not held: clamp or pin it first")
-        part = self._directory.find(support, SupportPart, "support")
-        if part.name not in self._settings.supports:
-            raise ValueError(f"support {part.name!r} is released")
-        return self._settings.supports[part.name]
 
     # Functions of time
 
