@@ -196,7 +196,8 @@ double Contact::stiffen(State& state) {
 
 void Contact::hold_sticking(const State& state, VectorX& change) const {
   for (const ContactRecord& record : state.contacts) {
-    if (!record.sticking) continue;
+    // Rods that stick to each other may well move together, which lagged friction is content with.
+    if (!record.sticking || (record.key.b >= 0 && !unsymmetric())) continue;
     for (int edge : {record.key.a, record.key.b}) {
       if (edge < 0) continue;
       change.segment(model_.tail_dof[at(edge)], model_.dimension).setZero();
