@@ -285,9 +285,14 @@ void Assembler::add_held_part(const VectorX& from, double factor, VectorX& to) c
 void Assembler::add_held_change(const VectorX& from, const VectorX& to, double factor, VectorX& out) const {
   for (const Block& block : blocks_) {
     const Constraint& c = block.constraint;
-    const Vector3 change = c.part(to) - c.part(from);
-    out.segment(c.first, c.size) += factor * (change - c.free * change).head(c.size);
+    out.segment(c.first, c.size) += factor * c.held_change(from, to).head(c.size);
   }
+}
+
+double Assembler::greatest_held_change(const VectorX& from, const VectorX& to) const {
+  double greatest = 0.0;
+  for (const Block& block : blocks_) greatest = std::max(greatest, block.constraint.held_change(from, to).norm());
+  return greatest;
 }
 
 }  // namespace withe

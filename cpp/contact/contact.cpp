@@ -87,7 +87,7 @@ double Contact::start_stiffness(const ContactPair& pair, const VectorX& stiffnes
 /// would put energy in.
 double Contact::first_stiffness(const ContactPair& pair) const {
   const double start = start_stiffness(pair, state_->contact_stiffness);
-  const bool before = starting_ || std::find(unrecorded_.begin(), unrecorded_.end(), pair.key) != unrecorded_.end();
+  const bool before = starting_ || std::binary_search(unrecorded_.begin(), unrecorded_.end(), pair.key);
   return before ? start : std::max(start, impact_stiffness(pair));
 }
 
@@ -164,6 +164,7 @@ void Contact::begin(const State& state, double duration) {
   starting_ = false;
   for (const Touching& t : touching_)
     if (record_of(pairs_[at(t.pair)].key) == nullptr) unrecorded_.push_back(pairs_[at(t.pair)].key);
+  std::sort(unrecorded_.begin(), unrecorded_.end());
   start_energy_ = energy();
   if (!target_.empty()) move_obstacles();
   if (frictional_ && freezes()) freeze();

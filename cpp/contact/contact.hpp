@@ -166,6 +166,7 @@ class Contact {
   bool outgrown(const VectorX& q, const VectorX* change) const;
   double farthest(const VectorX& change) const;
   double allowed_of(const ContactPair& pair, const VectorX& q, const VectorX* change, const Vec3d& shift) const;
+  void look_at(const State& state);
   void move_obstacles();
   void place_obstacles(const std::vector<ObstaclePlace>& places);
   /// Way of a pair's obstacle in this step [m].

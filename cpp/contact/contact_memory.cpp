@@ -9,6 +9,8 @@ namespace {
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
+bool by_key(const ContactRecord& a, const ContactRecord& b) { return a.key < b.key; }
+
 // A stiffness follows forces that outgrow it at once, and those that are so many times too small.
 constexpr double kSlack = 32.0;
 // What has yielded presses again little by little: this much is left after a step.
@@ -144,8 +146,7 @@ double Contact::accept(State& state) {
       if (rod >= 0) greatest(rod) = std::max(greatest(rod), source ? common : wanted_stiffness(pair, -t.energy.first));
     records.push_back(record);
   }
-  std::sort(records.begin(), records.end(),
-            [](const ContactRecord& a, const ContactRecord& b) { return a.key < b.key; });
+  std::sort(records.begin(), records.end(), by_key);
   if (!frozen_.empty()) record_frozen(records);
   state.contacts = std::move(records);
   leave_obstacles(state);
@@ -181,10 +182,7 @@ double Contact::stiffen(State& state) {
       ContactRecord own;
       own.key = pair.key;
       own.stiffness = factor * stiffness / pair.share;
-      state.contacts.insert(
-          std::lower_bound(state.contacts.begin(), state.contacts.end(), own,
-                           [](const ContactRecord& a, const ContactRecord& b) { return a.key < b.key; }),
-          own);
+      state.contacts.insert(std::lower_bound(state.contacts.begin(), state.contacts.end(), own, by_key), own);
       continue;
     }
     for (int rod : {pair.rod_a, pair.rod_b})
@@ -207,21 +205,24 @@ void Contact::hold_sticking(const State& state, VectorX& change) const {
   }
 }
 
+/// A step that goes nowhere: obstacles stay where they are in the state.
+void Contact::look_at(const State& state) {
+  std::vector<ObstaclePlace> target = std::exchange(target_, {});
+  begin(state, 1.0);
+  target_ = std::move(target);
+}
+
 double Contact::energy_of(const State& state) {
   const State* kept = state_;
   const double duration = duration_;
-  const std::vector<ObstaclePlace> target = std::exchange(target_, {});
-  begin(state, 1.0);
-  target_ = target;
+  look_at(state);
   state_ = kept;
   duration_ = duration;
   return start_energy_;
 }
 
 std::vector<ContactReport> Contact::report(const State& state) {
-  const std::vector<ObstaclePlace> target = std::exchange(target_, {});
-  begin(state, 1.0);
-  target_ = target;
+  look_at(state);
   std::vector<ContactReport> reports;
   for (const Touching& t : touching_) {
     const ContactPair& pair = pairs_[at(t.pair)];

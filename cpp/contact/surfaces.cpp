@@ -134,7 +134,7 @@ void Surfaces::add_obstacles() {
   for (std::size_t o = 0; o < contact.obstacles.size(); ++o) {
     const ObstacleDescription& d = contact.obstacles[o];
     const bool plane = d.kind == ObstacleKind::plane;
-    const ObstaclePlace place = drawn_place(model_, d);
+    const ObstaclePlace place = obstacle_place(model_, d);
     obstacles_.push_back({d.kind, place.point, place.other, d.radius});
     const int body = -1 - static_cast<int>(o);
     for (int e = 0; e < model_.edge_count; ++e) {

@@ -159,8 +159,8 @@ void fill(const BendTwistDerivatives<Pack>& d, Pack (&H)[11][kWidth]) {
 enum class Wanted { forces, gradient, matrix };
 
 /// The forces at their heads by which two edges that spin and turn get their couples.
-template <class Lanes>
-void spin_couples(const StencilBatch& batch, int first, const Lanes& lanes, const EdgeFrame<Pack>& f0,
+template <bool inner>
+void spin_couples(const StencilBatch& batch, int first, const Lanes<inner>& lanes, const EdgeFrame<Pack>& f0,
                   const EdgeFrame<Pack>& f1, Vec3<Pack> (&out)[2]) {
   const double* place[kLanes];
   for (int l = 0; l < kLanes; ++l)

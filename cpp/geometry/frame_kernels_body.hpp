@@ -40,6 +40,14 @@ Vec3<Pack> three_unknowns(const double* q, const int (&index)[kLanes]) {
   return {number[1], number[2], number[3]};
 }
 
+void store_frames(double* frames, int first, int live, const Pack (&number)[kFrameNumbers]) {
+  for (int k = 0; k < kFrameNumbers; k += kLanes) {
+    Pack block[kLanes];
+    transpose(number + k, block);
+    for (int l = 0; l < live; ++l) store(frames + std::ptrdiff_t{kFrameNumbers} * (first + l) + k, block[l]);
+  }
+}
+
 /// A director carried along with its edge, normal to it and of unit length to rounding.
 Vec3<Pack> carried(const Vec3<Pack>& reference, const Vec3<Pack>& source, const Vec3<Pack>& t) {
   Vec3<Pack> d = parallel_transport(reference, source, t);
@@ -66,11 +74,7 @@ Vec3<Pack> carried(const Vec3<Pack>& reference, const Vec3<Pack>& source, const 
       number[k] = part[i]->x, number[k + 1] = part[i]->y, number[k + 2] = part[i]->z;
     }
     number[kInverseLength] = frame.inverse_length;
-    for (int k = 0; k < kFrameNumbers; k += kLanes) {
-      Pack block[kLanes];
-      transpose(number + k, block);
-      for (int l = 0; l < live; ++l) store(batch.frames + std::ptrdiff_t{kFrameNumbers} * e[l] + k, block[l]);
-    }
+    store_frames(batch.frames, first, live, number);
     store_first(batch.length + first, length, live);
   }
 }
@@ -112,11 +116,7 @@ Vec3<Pack> carried(const Vec3<Pack>& reference, const Vec3<Pack>& source, const 
     const Vec3<Pack> d1 = turn.cosine * r1 + turn.sine * r2, d2 = turn.cosine * r2 - turn.sine * r1;
     Pack number[kFrameNumbers] = {t.x, t.y, t.z, d1.x, d1.y, d1.z, d2.x, d2.y, d2.z, inverse};
     for (int k = kInverseLength + 1; k < kFrameNumbers; ++k) number[k] = 0.0;
-    for (int k = 0; k < kFrameNumbers; k += kLanes) {
-      Pack block[kLanes];
-      transpose(number + k, block);
-      for (int l = 0; l < live; ++l) store(edges.frames + std::ptrdiff_t{kFrameNumbers} * e[l] + k, block[l]);
-    }
+    store_frames(edges.frames, first, live, number);
     store_rows(batch.next_source, first, live, t);
     store_rows(batch.next_reference, first, live, r1);
     store_first(edges.length + first, length, live);

@@ -82,11 +82,11 @@ Quotient quotient(double T, const TurningEdge& a, const TurningEdge& b, double r
 struct DividedStrain {
   double value, by_end;
 };
-DividedStrain divided_strain(const BendMeasure& measure, double kappa0, double kappa1, double turn) {
+DividedStrain divided_strain(const BendMeasure& measure, double kappa0, double kappa1, const PlanarStrain<double>& end,
+                             double turn) {
   const double a = measure.a, b = measure.b, x0 = kappa0 * kappa0, x1 = kappa1 * kappa1, both = kappa0 * kappa1;
   const double factor = (1.0 + a * (x0 + both + x1) - b * both + a * b * x0 * x1) / ((1.0 + b * x0) * (1.0 + b * x1));
   const double value = sinc(0.5 * turn).value * std::sqrt((1.0 + 0.25 * x0) * (1.0 + 0.25 * x1)) * factor;
-  const PlanarStrain<double> end = planar_strain(measure, kappa1);
   return {value, std::abs(turn) < 1e-5 ? 0.5 * end.second : (end.first - value) / turn};
 }
 
@@ -160,7 +160,7 @@ void Equations::add_planar_bend(int stencil, Local& local) {
   const double kappa0 = start_.bend_strain(stencil, 0), kappa1 = end_.bend_strain(stencil, 0);
   const PlanarStrain<double> start = planar_strain(elastic.measure, kappa0),
                              end = planar_strain(elastic.measure, kappa1);
-  const DividedStrain slope = divided_strain(elastic.measure, kappa0, kappa1, edge[1].psi - edge[0].psi);
+  const DividedStrain slope = divided_strain(elastic.measure, kappa0, kappa1, end, edge[1].psi - edge[0].psi);
   const double stiffness = elastic.bend_stiffness(stencil, 0);
   const double moment = stiffness * (0.5 * (start.value + end.value) - elastic.bend_natural(stencil, 0));
   const double by_moment = 0.5 * stiffness * end.first;
@@ -168,26 +168,27 @@ void Equations::add_planar_bend(int stencil, Local& local) {
   const double T = edge[1].part - edge[0].part, difference = edge[1].share - edge[0].share;
   const double reach = keep_momentum_ ? 0.1 : 25.0;  // wide windows are easy to solve in
   const Quotient w = quotient(T, edge[0], edge[1], reach);
+  constexpr double kSign[2] = {-1.0, 1.0};  // phi is the second edge's angle less the first one's
   Eigen::Vector4d by_phi, by_w, by_difference, force;
   for (int k = 0; k < 2; ++k) {
-    const double sign = k == 0 ? -1.0 : 1.0;
-    by_phi.segment<2>(2 * k) = sign * edge[k].by_psi;
-    by_difference.segment<2>(2 * k) = sign * edge[k].by_share;
-    by_w.segment<2>(2 * k) = (sign * w.by_T + w.by_width * 2.0 * reach * w.stretch * edge[k].part) * edge[k].by_part +
-                             (w.by_width * 2.0 * reach * w.turn * edge[k].stretch) * edge[k].by_stretch;
+    by_phi.segment<2>(2 * k) = kSign[k] * edge[k].by_psi;
+    by_difference.segment<2>(2 * k) = kSign[k] * edge[k].by_share;
+    by_w.segment<2>(2 * k) =
+        (kSign[k] * w.by_T + w.by_width * 2.0 * reach * w.stretch * edge[k].part) * edge[k].by_part +
+        (w.by_width * 2.0 * reach * w.turn * edge[k].stretch) * edge[k].by_stretch;
   }
   const double scale = moment * slope.value;
   const Eigen::Vector4d by_scale = (by_moment * slope.value + moment * slope.by_end) * by_phi;
   Eigen::Matrix4d H;
   for (int k = 0; k < 2; ++k) {
     const TurningEdge &own = edge[k], &other = edge[1 - k];
-    const double sign = k == 0 ? -1.0 : 1.0, share = own.share + difference * other.part * w.value;
+    const double share = own.share + difference * other.part * w.value;
     Eigen::Vector4d by_share = other.part * (w.value * by_difference + difference * by_w);
     by_share.segment<2>(2 * k) += own.by_share;
     by_share.segment<2>(2 - 2 * k) += difference * w.value * other.by_part;
-    force.segment<2>(2 * k) = (sign * scale * share) * own.normal;
-    H.middleRows<2>(2 * k) = sign * own.normal * (share * by_scale + scale * by_share).transpose();
-    H.block<2, 2>(2 * k, 2 * k) += (sign * scale * share) * own.hessian;
+    force.segment<2>(2 * k) = (kSign[k] * scale * share) * own.normal;
+    H.middleRows<2>(2 * k) = kSign[k] * own.normal * (share * by_scale + scale * by_share).transpose();
+    H.block<2, 2>(2 * k, 2 * k) += (kSign[k] * scale * share) * own.hessian;
   }
   constexpr double kRounding = 1e-15;  // of `difference`
   const double u[n] = {-force[0], -force[1], force[0] - force[2], force[1] - force[3], force[2], force[3]};

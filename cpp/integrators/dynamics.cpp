@@ -43,8 +43,11 @@ void book_work(Equations& equations, const Parameters& parameters, const VectorX
     result.load_work = equations.load_work(change);
   const bool in_fluid = equations.model().description.fluid.model != FluidModel::none;
   if (parameters.dragged || parameters.viscous || in_fluid) result.dissipated = equations.dissipated(change);
-  result.dissipated += equations.contact_loss(change);
-  if (equations.contact()) result.support_work += equations.contact()->obstacle_work();
+  if (const Contact* contact = equations.contact()) {
+    const double by_obstacles = contact->obstacle_work();
+    result.dissipated += equations.contact_loss(change, by_obstacles);
+    result.support_work += by_obstacles;
+  }
 }
 
 /// Held unknowns move as they are told, so their inertia is what changes their velocity, not what the scheme's formula
@@ -77,9 +80,14 @@ void start_axial_force(const Equations& equations, const VectorX& q, VectorX& ou
 /// Adds to `work.move` what supports do within a part of the step. Where that is more than the edges next to them bear,
 /// the others follow as they would by the linear step.
 void follow_supports(Equations& equations, const Newton& newton, double part, const State& state, StepWorkspace& work) {
+  const Assembler& assembler = equations.assembler();
+  if (newton.leaves_alone(part * assembler.greatest_held_change(state.q, work.held.q))) {
+    assembler.add_held_change(state.q, work.held.q, part, work.move);
+    return;
+  }
   VectorX& held = work.difference;
   held.setZero(state.q.size());
-  equations.assembler().add_held_change(state.q, work.held.q, part, held);
+  assembler.add_held_change(state.q, work.held.q, part, held);
   const double bearable = newton.cap(held);
   if (bearable < 1.0) {
     Evaluation& e = work.newton.evaluation;

@@ -137,9 +137,8 @@ double Equations::allowed(const VectorX& z, const VectorX& step) {
   return contact_->allowed(contact_end_, contact_change_);
 }
 
-double Equations::contact_loss(const VectorX& change) const {
-  if (!contact_) return 0.0;
-  return contact_gradient_.dot(change) + contact_->obstacle_work() - (contact_->energy() - contact_->start_energy());
+double Equations::contact_loss(const VectorX& change, double obstacle_work) const {
+  return contact_gradient_.dot(change) + obstacle_work - (contact_->energy() - contact_->start_energy());
 }
 
 void Equations::evaluate(const VectorX& z, bool with_matrix, const double* axial_force, Evaluation& out) {
@@ -375,6 +374,7 @@ void Equations::evaluate_forces(const State& state, const Parameters& parameters
   energy_momentum_ = floor_current_ = false;
   acting_ = &elastic;
   last_z_ = state.q;
+  out.potential = 0.0;
   const int n = model_.dof_count;
   gradient_.setZero(n + kPadding);
   magnitude_.setZero(n + kPadding);

@@ -90,8 +90,9 @@ class Equations {
   /// evaluation [J].
   double dissipated(const VectorX& change) const;
   double load_work(const VectorX& change) const;
-  /// What contact takes from the motion over `change` and does not store [J].
-  double contact_loss(const VectorX& change) const;
+  /// What contact takes from the motion over `change`, and from obstacles that move, and does not store [J]; where
+  /// there is contact.
+  double contact_loss(const VectorX& change, double obstacle_work) const;
 
   /// Axial forces [N] as the mixed method wants them: linearly extrapolated from the last evaluation by a
   /// Newton step, n <- EA (eps + d eps . dz).

@@ -25,6 +25,8 @@ constexpr double kHopeless = 1e3;
 // Halvings of a step between surfaces before it is taken as it is.
 constexpr int kMostCuts = 10;
 
+std::size_t at(MatrixAge age) { return static_cast<std::size_t>(age); }
+
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 }  // namespace
@@ -126,7 +128,6 @@ struct Newton::Progress {
 
 /// After an iteration: learns how well matrices serve, and decides about the next one.
 void Newton::plan_next(Progress& p, FactorRecord& factor) const {
-  const auto at = [](MatrixAge age) { return static_cast<std::size_t>(age); };
   const double tolerance = p.tolerance;
   p.rest = p.step;
   if (!p.may_reuse) return;
@@ -157,13 +158,13 @@ NewtonResult Newton::solve(Equations& equations, VectorX& z, const VectorX* targ
   p.may_reuse = interval != 0.0 && options_.line_search != LineSearch::goldstein_price;
   if (p.may_reuse && factor.owner == &equations && factor.interval == std::abs(interval) &&
       factor.generation == equations.assembler().generation()) {
-    const bool slow = factor.contraction[static_cast<std::size_t>(MatrixAge::across)] > kSlow;
+    const bool slow = factor.contraction[at(MatrixAge::across)] > kSlow;
     p.fresh = factor.tired || (slow && ++factor.waited < kPatience);
     if (!p.fresh) factor.waited = 0;
   }
   factor.tired = false;
   // What served badly once is tried again in time.
-  factor.contraction[static_cast<std::size_t>(MatrixAge::within)] *= kForgetting;
+  factor.contraction[at(MatrixAge::within)] *= kForgetting;
   if (!p.may_reuse) factor.owner = nullptr;
   bool axial_known = mixed && interval != 0.0;
   int stagnant = 0, overdue = 0;

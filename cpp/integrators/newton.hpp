@@ -70,6 +70,8 @@ class Newton {
   /// Factor by which a step is shortened, so that nothing moves or turns too far at once.
   double cap(const VectorX& step) const;
   double displacement(const VectorX& step) const;
+  /// Whether `cap` surely leaves a step alone in which no node moves, and nothing turns, by more than `most`.
+  bool leaves_alone(double most) const { return most <= 0.5 * std::min({edge_scale_, model_.length_scale, 3.0}); }
 
   const std::vector<bool>& is_angle() const { return is_angle_; }
 

@@ -65,10 +65,11 @@ struct Constraint {
     return own;
   }
   /// What of them is held.
-  Vector3 held(const VectorX& vector) const {
-    const Vector3 own = part(vector);
-    return own - free * own;
-  }
+  Vector3 held(const VectorX& vector) const { return held_of(part(vector)); }
+  /// What is held of their change from one vector to another.
+  Vector3 held_change(const VectorX& from, const VectorX& to) const { return held_of(part(to) - part(from)); }
+
+  Vector3 held_of(const Vector3& own) const { return own - free * own; }
 };
 
 /// One support, resolved: what it holds.

@@ -99,13 +99,20 @@ void compute_strains(const Model& model, const State& state, const VectorX& q, C
 
 }  // namespace
 
-ObstaclePlace drawn_place(const Model& model, const ObstacleDescription& obstacle) {
+ObstaclePlace obstacle_place(const Model& model, const ObstacleDescription& drawn, const Vector3& way) {
   const auto in_axes = [&](const Vector3& x, bool is_point) -> Vec3d {
     if (!model.planar()) return to_vec3(x);
     const Vector3 from = is_point ? Vector3(x - model.plane->origin) : x;
     return {from.dot(model.plane->first), from.dot(model.plane->second), 0.0};
   };
-  return {in_axes(obstacle.point, true), in_axes(obstacle.other, obstacle.kind != ObstacleKind::plane)};
+  const bool plane = drawn.kind == ObstacleKind::plane;
+  return {in_axes(drawn.point + way, true), plane ? in_axes(drawn.other, false) : in_axes(drawn.other + way, true)};
+}
+
+Vector3 way_from_drawn(const Model& model, const ObstacleDescription& drawn, const ObstaclePlace& place) {
+  const Vec3d way = place.point - obstacle_place(model, drawn).point;
+  if (!model.planar()) return to_eigen(way);
+  return way.x * model.plane->first + way.y * model.plane->second;
 }
 
 State initial_state(const Model& model) {
@@ -119,7 +126,7 @@ State initial_state(const Model& model) {
   state.bend_tau = model.initial_bend_tau;
   state.half_tau = model.initial_half_tau;
   for (const ObstacleDescription& o : model.description.contact.obstacles)
-    state.obstacles.push_back(drawn_place(model, o));
+    state.obstacles.push_back(obstacle_place(model, o));
   if (model.description.fluid.model == FluidModel::stokeslets)
     for (VectorX& v : state.motion.velocity) v = VectorX::Zero(model.dof_count);
   return state;

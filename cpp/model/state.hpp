@@ -64,8 +64,11 @@ struct State {
 };
 
 State initial_state(const Model& model);
-/// An obstacle where it is drawn.
-ObstaclePlace drawn_place(const Model& model, const ObstacleDescription& obstacle);
+/// An obstacle `way` from where it is drawn [m].
+ObstaclePlace obstacle_place(const Model& model, const ObstacleDescription& drawn,
+                             const Vector3& way = Vector3::Zero());
+/// How far it is from there [m]; in a plane, within it.
+Vector3 way_from_drawn(const Model& model, const ObstacleDescription& drawn, const ObstaclePlace& place);
 
 /// Everything that follows from q and the source frames of a state.
 struct Configuration {

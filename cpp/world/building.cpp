@@ -207,12 +207,7 @@ State World::Implementation::transferred(const Model& old, const State& from) co
   to.time = from.time;
   for (std::size_t o = 0; o < from.obstacles.size(); ++o) {
     const ObstacleDescription& drawn = description.contact.obstacles[o];
-    const Vec3d way = from.obstacles[o].point - drawn_place(old, drawn).point;
-    ObstacleDescription moved = drawn;
-    const Vector3 shift = old.planar() ? Vector3(way.x * old.plane->first + way.y * old.plane->second) : to_eigen(way);
-    moved.point += shift;
-    if (moved.kind != ObstacleKind::plane) moved.other += shift;
-    to.obstacles[o] = drawn_place(model, moved);
+    to.obstacles[o] = obstacle_place(model, drawn, way_from_drawn(old, drawn, from.obstacles[o]));
   }
   to.contacts = from.contacts;
   to.contact_stiffness = from.contact_stiffness;

@@ -21,6 +21,9 @@ struct SupportMotion {
   double stretch = 1;         ///< of a held edge: its length when it was gripped, over the drawn one
 };
 
+/// How far something has come that goes evenly from a start to an end, at a time; from 0 to 1.
+double ramp_fraction(double time, double start, double end);
+
 /// Where an obstacle goes, as a way from where it is drawn.
 struct ObstacleMotion {
   Vector3 from = Vector3::Zero(), to = Vector3::Zero();  ///< [m]

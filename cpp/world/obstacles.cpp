@@ -1,6 +1,5 @@
 /// Obstacles that move.
 
-#include <algorithm>
 #include <cmath>
 
 #include "common/check.hpp"
@@ -12,7 +11,7 @@ namespace {
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
 Vector3 way_at(const ObstacleMotion& m, double time) {
-  const double share = time >= m.end ? 1.0 : std::clamp((time - m.start) / (m.end - m.start), 0.0, 1.0);
+  const double share = ramp_fraction(time, m.start, m.end);
   return (1.0 - share) * m.from + share * m.to;
 }
 
@@ -20,22 +19,14 @@ Vector3 way_at(const ObstacleMotion& m, double time) {
 
 /// How far an obstacle is from where it is drawn [m]; in a plane, within it.
 Vector3 World::Implementation::obstacle_way(int obstacle) const {
-  const Vec3d way =
-      state.obstacles[at(obstacle)].point - drawn_place(model, description.contact.obstacles[at(obstacle)]).point;
-  if (!model.planar()) return to_eigen(way);
-  return way.x * model.plane->first + way.y * model.plane->second;
+  return way_from_drawn(model, description.contact.obstacles[at(obstacle)], state.obstacles[at(obstacle)]);
 }
 
 /// Places of all obstacles, each as far from where it is drawn as `way` says.
 std::vector<ObstaclePlace> World::Implementation::obstacle_places(const std::function<Vector3(int)>& way) const {
   std::vector<ObstaclePlace> places;
-  for (const ObstacleDescription& drawn : description.contact.obstacles) {
-    ObstacleDescription moved = drawn;
-    const Vector3 shift = way(static_cast<int>(places.size()));
-    moved.point += shift;
-    if (moved.kind != ObstacleKind::plane) moved.other += shift;
-    places.push_back(drawn_place(model, moved));
-  }
+  for (const ObstacleDescription& drawn : description.contact.obstacles)
+    places.push_back(obstacle_place(model, drawn, way(static_cast<int>(places.size()))));
   return places;
 }
 

@@ -44,14 +44,19 @@ struct Named {
   SceneDescription scene;
 };
 
+/// An edge from start to end beside one along x.
+Named edge_pair(const std::string& name, const Vector3& start, const Vector3& end) {
+  SceneBuilder b = touching_scene(false);
+  add_rod(b, Vector3(-0.5, 0, 0), Vector3(0.5, 0, 0), 2);
+  add_rod(b, start, end, 2);
+  return {name, b.scene};
+}
+
 /// Every class of contact: edges that cross, ends on edges, ends on ends, parallel edges; planes, spheres, capsules.
 std::vector<Named> touching_scenes() {
   std::vector<Named> scenes;
   const auto pair = [&](const std::string& name, const Vector3& start, const Vector3& end) {
-    SceneBuilder b = touching_scene(false);
-    add_rod(b, Vector3(-0.5, 0, 0), Vector3(0.5, 0, 0), 2);
-    add_rod(b, start, end, 2);
-    scenes.push_back({name, b.scene});
+    scenes.push_back(edge_pair(name, start, end));
   };
   pair("crossing", Vector3(0.1, -0.4, 0.5), Vector3(0.2, 0.5, 0.6));
   pair("nearly parallel", Vector3(-0.4, 0.02, 0.5), Vector3(0.6, -0.03, 0.52));
@@ -133,10 +138,7 @@ constexpr FrictionLaw kFrictionLaws[] = {FrictionLaw::implicit, FrictionLaw::lag
 std::vector<Named> border_scenes() {
   std::vector<Named> scenes;
   const auto pair = [&](const std::string& name, const Vector3& start, const Vector3& end) {
-    SceneBuilder b = touching_scene(false);
-    add_rod(b, Vector3(-0.5, 0, 0), Vector3(0.5, 0, 0), 2);
-    add_rod(b, start, end, 2);
-    scenes.push_back({name, b.scene});
+    scenes.push_back(edge_pair(name, start, end));
   };
   for (double past : {-2e-3, 2e-3}) {
     const double s_ends = 0.5 * (1.0 + kParallelWeight * 4.0 * kRadius * kRadius) + past;  // edge a, beyond its end
