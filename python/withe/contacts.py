@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any, Literal, cast
+from typing import Any, Literal, cast, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -209,21 +209,15 @@ class Contacts:
             settings,
             rods=True,
             friction=validation.non_negative(friction, "friction"),
-            model=cast(
-                ContactModel,
-                validation.choice(model, "model of contact", ("imcv2", "barrier", "imcv1", "spillmann_teschner")),
-            ),
+            model=cast(ContactModel, validation.choice(model, "model of contact", get_args(ContactModel))),
             friction_model=cast(
-                FrictionModel,
-                validation.choice(
-                    friction_model, "friction_model", ("implicit", "lagged", "anchored", "semi_explicit")
-                ),
+                FrictionModel, validation.choice(friction_model, "friction_model", get_args(FrictionModel))
             ),
             distance_tolerance=_optional(distance_tolerance, "distance_tolerance"),
             slip_tolerance=validation.positive(slip_tolerance, "slip_tolerance"),
             stiffness=stiffness if stiffness == "source" else _optional(stiffness, "stiffness of contact"),
             centreline_friction=validation.truth(centreline_friction, "centreline_friction"),
-            overlap=cast(Overlap, validation.choice(overlap, "overlap", ("error", "separate"))),
+            overlap=cast(Overlap, validation.choice(overlap, "overlap", get_args(Overlap))),
         )
 
     def set_friction(self, a: Rod | Obstacle | str, b: Rod | Obstacle | str, friction: float) -> None:
@@ -303,9 +297,10 @@ def describe_contact(directory: Directory) -> _core.ContactDescription:
     contact.friction_law = settings.friction_model
     contact.distance_tolerance = settings.distance_tolerance or 0.0
     contact.slip_tolerance = settings.slip_tolerance
-    by_rule = settings.stiffness is None or settings.stiffness == "source"
-    contact.stiffness = 0.0 if by_rule else float(settings.stiffness or 0.0)
-    contact.stiffness_rule = "source" if settings.stiffness == "source" else "forces"
+    if settings.stiffness == "source":
+        contact.stiffness_rule = "source"
+    else:
+        contact.stiffness = settings.stiffness or 0.0
     contact.centreline_friction = settings.centreline_friction
     contact.overlap = settings.overlap
     obstacles = directory.all(ObstaclePart)

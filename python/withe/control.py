@@ -288,8 +288,7 @@ class Control(Boundaries):
                     what = f"{part.kind} {part.name!r} at t = {force_time:g}"
                     self._world.set_load(index, validation.vector(function(force_time), what))
         for name, path in self._settings.paths.items():
-            obstacle = self._obstacle(name)
-            if obstacle is not None:
+            if name not in self._settings.supports and (obstacle := self._obstacle(name)) is not None:
                 what = f"path of {name!r} at t = {end_time:g}"
                 self._world.prescribe_obstacle(obstacle[0], validation.vector(path(end_time), what))
                 continue
