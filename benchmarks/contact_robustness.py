@@ -12,15 +12,13 @@ error is accepted where nothing else was wrong until then, once the grips have c
 
 from __future__ import annotations
 
-import collections
-import concurrent.futures
-import sys
 import time
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 from contact_cases import KINDS, LAWS, METHODS, STEPS, ContactCase, build, draw_case
-from reporting import Report, arguments, bar
+from judging import case_options, judge_all, judge_one, report_verdicts
+from reporting import Report
 
 import withe
 
@@ -88,65 +86,29 @@ def judge(number: int) -> Verdict:
     return verdict
 
 
-def judge_all(numbers: list[int]) -> list[Verdict]:
-    """All cases, on all processors."""
-    verdicts = {}
-    with (
-        bar(len(numbers), "stress test of contact", "cases") as shown,
-        concurrent.futures.ProcessPoolExecutor() as pool,
-    ):
-        for verdict in pool.map(judge, numbers):
-            verdicts[verdict.number] = verdict
-            shown.advance(1)
-    return [verdicts[number] for number in numbers]
-
-
 def main() -> None:
     """Judge cases and report."""
-    options = arguments(
-        __doc__,
-        ("--cases", {"type": int, "default": 100, "help": "how many (default: %(default)s)"}),
-        ("--first", {"type": int, "default": 0, "help": "number of the first"}),
-        ("--case", {"type": int, "help": "only this one, and everything about it"}),
-    )
+    options = case_options(__doc__, 100)
     if options.case is not None:
-        verdict = judge(options.case)
-        for name, value in {**asdict(draw_case(verdict.number)), **asdict(verdict)}.items():
-            print(f"  {name:16s} {value}")
-        sys.exit(bool(verdict.reason))
+        judge_one(judge, draw_case, options.case)
     count = len(KINDS) if options.quick else options.cases
-    verdicts = judge_all(list(range(options.first, options.first + count)))
-    cases = [draw_case(verdict.number) for verdict in verdicts]
+    numbers = list(range(options.first, options.first + count))
+    verdicts = judge_all(judge, Verdict, numbers, "stress test of contact")
     report = Report("contact_robustness", quick=options.quick)
-
-    def share(of: str, value: str) -> tuple[str, str]:
-        chosen = [v for v, case in zip(verdicts, cases, strict=True) if getattr(case, of) == value]
-        return value, f"{sum(not v.reason for v in chosen)} of {len(chosen)}"
-
-    report.table("Accepted, by kind", ("kind", "accepted"), [share("kind", name) for name in KINDS])
-    report.table("Accepted, by integrator", ("integrator", "accepted"), [share("method", name) for name in METHODS])
-    report.table("Accepted, by friction", ("model", "accepted"), [share("law", name) for name in LAWS])
-    reasons = collections.Counter(verdict.reason for verdict in verdicts if verdict.reason)
-    report.table("Not accepted", ("reason", "cases"), reasons.most_common())
-    report.table(
-        "Case by case (run one with --case NUMBER)",
-        ("case", "kind", "method", "friction", "nodes", "speed", "coarseness", "reason"),
-        [
-            (
-                c.number,
-                c.kind,
-                c.method,
-                f"{c.law} {c.friction:.2f}",
-                c.nodes,
-                f"{c.speed:.3g}",
-                f"{c.coarseness:.3g}",
-                f"{v.reason}: {v.detail}",
-            )
-            for c, v in zip(cases, verdicts, strict=True)
-            if v.reason
-        ],
+    reasons = report_verdicts(
+        report,
+        [draw_case(number) for number in numbers],
+        verdicts,
+        {"kind": ("kind", KINDS), "integrator": ("method", METHODS), "friction model": ("law", LAWS)},
+        {
+            "kind": lambda c: c.kind,
+            "method": lambda c: c.method,
+            "friction": lambda c: f"{c.law} {c.friction:.2f}",
+            "nodes": lambda c: c.nodes,
+            "speed": lambda c: f"{c.speed:.3g}",
+            "coarseness": lambda c: f"{c.coarseness:.3g}",
+        },
     )
-    report.figures["verdicts"] = [asdict(verdict) for verdict in verdicts]
     report.goal("accepted of all cases", sum(not v.reason for v in verdicts) / count, 0.9)
     report.goal("too deep where accepted", reasons["too deep"], 0, at_least=False)
     report.goal("energy grows", reasons["energy grows"], 0, at_least=False)

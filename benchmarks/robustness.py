@@ -12,27 +12,22 @@ A named error is not accepted, but is no defect as long as the world stays usabl
 
 from __future__ import annotations
 
-import collections
-import concurrent.futures
-import faulthandler
 import math
 import signal
-import sys
 import time
 from collections.abc import Iterator
-from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 import balance
 import numpy as np
-from reporting import Report, arguments, bar
+from judging import CRASH, case_options, judge_all, judge_one, report_verdicts
+from reporting import Report
 from stress_cases import METHODS, StressCase, build, draw_case, events
 
 import withe
 
 LIMIT = 5.0  # [s]
-HANG = 180.0  # [s], on the wall
 
 
 @dataclass
@@ -228,7 +223,6 @@ def _usable(case: StressCase) -> str:
 def judge(number: int) -> Verdict:
     """Run a case and say what became of it."""
     case, verdict = draw_case(number), Verdict(number)
-    faulthandler.dump_traceback_later(HANG, exit=True)
     try:
         with _clock(1.5 * LIMIT):
             shapes = (_static if case.method == "static" else _run)(case, verdict)
@@ -242,96 +236,34 @@ def judge(number: int) -> Verdict:
             verdict.reason = trouble or verdict.reason
     except Exception as error:
         verdict.reason, verdict.detail = type(error).__name__, str(error)
-    finally:
-        faulthandler.cancel_dump_traceback_later()
     return verdict
-
-
-def _alone(number: int) -> Verdict:
-    """A case in a process of its own, after one in company took the process down."""
-    with concurrent.futures.ProcessPoolExecutor(1) as pool:
-        try:
-            return pool.submit(judge, number).result()
-        except BrokenProcessPool:
-            return Verdict(number, "crash or hang", f"the process ended, or ran longer than {HANG:g} s")
-
-
-def judge_all(numbers: list[int], workers: int | None = None) -> list[Verdict]:
-    """All cases, on all processors; a crash or a hang costs one case."""
-    verdicts: dict[int, Verdict] = {}
-    with bar(len(numbers), "stress test", "cases") as shown:
-        while len(verdicts) < len(numbers):
-            waiting = [number for number in numbers if number not in verdicts]
-            with concurrent.futures.ProcessPoolExecutor(workers) as pool:
-                futures = {pool.submit(judge, number): number for number in waiting}
-                broken = []
-                for future in concurrent.futures.as_completed(futures):
-                    try:
-                        verdicts[futures[future]] = future.result()
-                        shown.advance(1)
-                    except BrokenProcessPool:
-                        broken.append(futures[future])
-            # Those that were running when the process went down stand first among the broken ones.
-            for number in sorted(broken, key=waiting.index)[:4]:
-                verdicts[number] = _alone(number)
-                shown.advance(1)
-    return [verdicts[number] for number in numbers]
-
-
-def _show(verdict: Verdict) -> None:
-    for name, value in {**asdict(draw_case(verdict.number)), **asdict(verdict)}.items():
-        print(f"  {name:16s} {value}")
 
 
 def main() -> None:
     """Judge cases and report."""
-    options = arguments(
-        __doc__,
-        ("--cases", {"type": int, "default": 500, "help": "how many (default: %(default)s)"}),
-        ("--first", {"type": int, "default": 0, "help": "number of the first"}),
-        ("--case", {"type": int, "help": "only this one, and everything about it"}),
-    )
+    options = case_options(__doc__, 500)
     if options.case is not None:
-        verdict = judge(options.case)
-        _show(verdict)
-        sys.exit(bool(verdict.reason))
+        judge_one(judge, draw_case, options.case)
     count = 10 if options.quick else options.cases
-    verdicts = judge_all(list(range(options.first, options.first + count)))
+    verdicts = judge_all(judge, Verdict, list(range(options.first, options.first + count)), "stress test")
     report = Report("robustness", quick=options.quick)
     cases = [draw_case(verdict.number) for verdict in verdicts]
-    accepted = sum(not verdict.reason for verdict in verdicts)
-
-    def share(of: str, value: str) -> tuple[str, str]:
-        chosen = [v for v, case in zip(verdicts, cases, strict=True) if getattr(case, of) == value]
-        good = sum(not v.reason for v in chosen)
-        return value, f"{good} of {len(chosen)}"
-
-    report.table("Accepted, by method", ("method", "accepted"), [share("method", name) for name in METHODS])
-    names = sorted({case.event for case in cases})
-    report.table("Accepted, by event", ("event", "accepted"), [share("event", name) for name in names])
-    reasons = collections.Counter(verdict.reason for verdict in verdicts if verdict.reason)
-    report.table("Not accepted", ("reason", "cases"), reasons.most_common())
-    report.table(
-        "Case by case (run one with --case NUMBER)",
-        ("case", "method", "event", "nodes", "slenderness", "coarseness", "strength", "reason"),
-        [
-            (
-                c.number,
-                c.method,
-                c.event,
-                c.nodes,
-                f"{c.slenderness:.0f}",
-                f"{c.coarseness:.3g}",
-                f"{c.strength:.3g}",
-                f"{v.reason}: {v.detail}",
-            )
-            for c, v in zip(cases, verdicts, strict=True)
-            if v.reason
-        ],
+    reasons = report_verdicts(
+        report,
+        cases,
+        verdicts,
+        {"method": ("method", METHODS), "event": ("event", sorted({case.event for case in cases}))},
+        {
+            "method": lambda c: c.method,
+            "event": lambda c: c.event,
+            "nodes": lambda c: c.nodes,
+            "slenderness": lambda c: f"{c.slenderness:.0f}",
+            "coarseness": lambda c: f"{c.coarseness:.3g}",
+            "strength": lambda c: f"{c.strength:.3g}",
+        },
     )
-    report.figures["verdicts"] = [asdict(verdict) for verdict in verdicts]
-    report.goal("accepted of all cases", accepted / count, 0.95)
-    report.goal("crashes, hangs, NaN", reasons["crash or hang"] + reasons["not finite"], 0, at_least=False)
+    report.goal("accepted of all cases", sum(not verdict.reason for verdict in verdicts) / count, 0.95)
+    report.goal("crashes, hangs, NaN", reasons[CRASH] + reasons["not finite"], 0, at_least=False)
     report.goal("energy out of nowhere", reasons["energy out of nowhere"], 0, at_least=False)
     report.write()
 
