@@ -15,6 +15,7 @@ from __future__ import annotations
 import argparse
 import itertools
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -43,18 +44,31 @@ class Way(NamedTuple):
     energy: np.ndarray  # stored, U h / B
 
     def near(self, shortening: float) -> float:
-        """Mean force within 2 %: edges that slide over edges catch, and the pull has teeth."""
-        return float(self.force[np.abs(self.shortening / shortening - 1.0) < 0.02].mean())
+        """Mean force about an e / h."""
+        return mean_near(self.shortening, self.force, shortening)
 
 
-def tie(nodes: int, friction: float) -> tuple[withe.Simulation, withe.Rod, list[withe.Support]]:
-    """A loose trefoil, at rest, its end edges held by grips that spin."""
+def mean_near(shortening: np.ndarray, force: np.ndarray, at: float) -> float:
+    """Mean force within 2 %: edges that slide over edges catch, and the pull has teeth."""
+    return float(force[np.abs(shortening / at - 1.0) < 0.02].mean())
+
+
+class Tied(NamedTuple):
+    """A knot in a rope, and the grips at its ends."""
+
+    simulation: withe.Simulation
+    rope: withe.Rod
+    grips: list[withe.Support]
+
+
+def tie(n: int, nodes: int, shortening: float, friction: float, drag: float) -> Tied:
+    """A loose overhand knot, at rest, its end edges held by grips that spin; drawn at e / h, with a drag for later."""
     scene = withe.Scene(gravity=(0.0, 0.0, 0.0))
     rubber = withe.Material(youngs_modulus=MODULUS, poisson_ratio=0.5, density=1180.0)
-    points = withe.shapes.overhand_knot(1, length=LENGTH, radius=RADIUS, shortening=DRAWN * RADIUS, nodes=nodes)
+    points = withe.shapes.overhand_knot(n, length=LENGTH, radius=RADIUS, shortening=shortening * RADIUS, nodes=nodes)
     rope = scene.add_rod(points=points, radius=RADIUS, material=rubber, natural="straight", name="rope")
     grips = [scene.clamp(node, hold="edge", spin=True) for node in (rope.start, rope.end)]
-    drag = scene.add_drag(0.2)
+    damping = scene.add_drag(0.2)
     # The slip tolerance is far below the speed of the grips. Stiffness: a depth of a hundredth of a radius, in a tight
     # knot.
     scene.enable_contact(
@@ -62,25 +76,41 @@ def tie(nodes: int, friction: float) -> tuple[withe.Simulation, withe.Rod, list[
     )
     simulation = scene.build(integrator="backward_euler", time_step=TIME_STEP)
     simulation.step(800)
-    simulation.set(drag, drag=5e-4)
-    return simulation, rope, grips
+    simulation.set(damping, drag=drag)
+    return Tied(simulation, rope, grips)
 
 
-def move(simulation: withe.Simulation, rope: withe.Rod, grips: list[withe.Support], target: float, speed: float) -> Way:
-    """Move both grips along their line until e / h is `target`, each at a speed [m/s]."""
+def pulled(knot: Tied, target: float, speed: float) -> Iterator[tuple[np.ndarray, float]]:
+    """Move both grips along their line until e / h is `target`, each at a speed [m/s].
+
+    After every time step: where the rope lies (nodes, 3) [m], and the mean pull of the grips [N].
+    """
+    simulation, rope, grips = knot
     x = simulation.positions(rope)
     distance = float(np.linalg.norm(x[-1] - x[0]))
     axis = (x[-1] - x[0]) / distance
     way = 0.5 * (LENGTH - distance - target * RADIUS)
     for grip, at, sign in zip(grips, (x[0], x[-1]), (-1.0, 1.0), strict=True):
         simulation.move(grip, position=at + sign * way * axis, over=abs(way) / speed)
-    rows = np.zeros((round(abs(way) / speed / TIME_STEP), 3))
-    for row in rows:
+    for _ in range(round(abs(way) / speed / TIME_STEP)):
         simulation.step()
-        x, energy = simulation.positions(rope), simulation.energy()
-        pull = 0.5 * (simulation.reaction(grips[1]).force - simulation.reaction(grips[0]).force) @ axis
-        row[:] = LENGTH - np.linalg.norm(x[-1] - x[0]), pull, energy.total - energy.kinetic
-    return Way(rows[:, 0] / RADIUS, rows[:, 1] * RADIUS**2 / BENDING, rows[:, 2] * RADIUS / BENDING)
+        difference = simulation.reaction(grips[1]).force - simulation.reaction(grips[0]).force
+        yield simulation.positions(rope), 0.5 * float(difference @ axis)
+
+
+def shortening_of(x: np.ndarray) -> float:
+    """Length minus distance of the ends [m]."""
+    return LENGTH - float(np.linalg.norm(x[-1] - x[0]))
+
+
+def move(knot: Tied, target: float, speed: float) -> Way:
+    """Move the grips until e / h is `target`, each at a speed [m/s], and note the pull and the energy on the way."""
+    rows = []
+    for x, pull in pulled(knot, target, speed):
+        energy = knot.simulation.energy()
+        rows.append((shortening_of(x), pull, energy.total - energy.kinetic))
+    shortening, force, stored = np.array(rows).T
+    return Way(shortening / RADIUS, force * RADIUS**2 / BENDING, stored * RADIUS / BENDING)
 
 
 def energy_gap(way: Way, targets: list[int]) -> float:
@@ -142,8 +172,8 @@ def main() -> None:
     loosened = None
     for friction, known in INDEPENDENT.items():
         targets = list(known)[: arguments.points]
-        simulation, rope, grips = tie(arguments.nodes, friction)
-        way = move(simulation, rope, grips, 0.975 * targets[-1], arguments.speed)
+        knot = tie(1, arguments.nodes, DRAWN, friction, drag=5e-4)
+        way = move(knot, 0.975 * targets[-1], arguments.speed)
         tightened[friction] = way
         print(f"friction {friction:g}\n  e / h    F h^2 / B   independent   difference")
         for target in targets:
@@ -155,13 +185,13 @@ def main() -> None:
             gap = energy_gap(way, targets)
             print(f"the pull is that of the stored energy, -dU/de, within {gap:.1%}")
         elif arguments.points == 5:
-            simulation.picture(arguments.out / "knot.png")
-            loosened = move(simulation, rope, grips, LOOSE, arguments.speed)
+            knot.simulation.picture(arguments.out / "knot.png")
+            loosened = move(knot, LOOSE, arguments.speed)
             places = np.arange(100, int(0.97 * LOOSE))
             locked = next((e for e in places if loosened.near(e) <= 0.0), None)
             print(f"loosened, it locks at e / h = {locked}: no pull is left that would open it farther")
     if loosened is None:
-        simulation.picture(arguments.out / "knot.png")
+        knot.simulation.picture(arguments.out / "knot.png")
     draw(tightened, loosened, arguments.out / "knot_plot.png")
     print(f"Wrote {arguments.out / 'knot_plot.png'} and {arguments.out / 'knot.png'}.")
     if worst > TOLERANCE or gap > ENERGY_TOLERANCE:

@@ -18,18 +18,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from knot import BENDING, RADIUS, mean_near, pulled, shortening_of, tie
 from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk
-
-import withe
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-LENGTH, RADIUS, MODULUS = 1.0, 1.6e-3, 1.8e5  # [m], [m], [Pa]
-BENDING = MODULUS * np.pi * RADIUS**4 / 4.0  # [N m^2]
 FRICTION = 0.07
-TIME_STEP = 5e-3  # [s]
 # Shortening over radius, drawn and pulled to.
 RANGES = {1: (375, 100), 2: (375, 120), 3: (400, 125), 4: (450, 200)}
 POINTS = (350, 325, 300, 275, 250, 225, 200, 175, 150, 125)
@@ -59,43 +55,21 @@ class Pull(NamedTuple):
     shapes: dict[int, np.ndarray]  # (nodes, 3) [m]
 
     def near(self, shortening: float) -> float:
-        """Mean within 2 %: edges that slide over edges catch, and the pull has teeth."""
-        return float(self.force[np.abs(self.shortening / shortening - 1.0) < 0.02].mean())
+        """Mean force about an e / h."""
+        return mean_near(self.shortening, self.force, shortening)
 
 
 def pull(n: int, nodes: int, speed: float) -> Pull:
     """Pull a knot through its range at a speed of each grip [m/s]."""
     start, end = RANGES[n]
-    scene = withe.Scene(gravity=(0.0, 0.0, 0.0))
-    rubber = withe.Material(youngs_modulus=MODULUS, poisson_ratio=0.5, density=1180.0)
-    points = withe.shapes.overhand_knot(n, length=LENGTH, radius=RADIUS, shortening=start * RADIUS, nodes=nodes)
-    rope = scene.add_rod(points=points, radius=RADIUS, material=rubber, natural="straight", name="rope")
-    grips = [scene.clamp(node, hold="edge", spin=True) for node in (rope.start, rope.end)]
-    drag = scene.add_drag(0.2)
-    scene.enable_contact(
-        friction=FRICTION, friction_model="lagged", slip_tolerance=1e-5, stiffness=9.0 * BENDING / RADIUS**3
-    )
-    simulation = scene.build(integrator="backward_euler", time_step=TIME_STEP)
-    simulation.step(800)
-    simulation.set(drag, drag=2e-3)
-
-    x = simulation.positions(rope)
-    distance = float(np.linalg.norm(x[-1] - x[0]))
-    axis = (x[-1] - x[0]) / distance
-    way = 0.5 * (LENGTH - distance - end * RADIUS)
-    for grip, at, sign in zip(grips, (x[0], x[-1]), (-1.0, 1.0), strict=True):
-        simulation.move(grip, position=at + sign * way * axis, over=way / speed)
-    steps = round(way / speed / TIME_STEP)
-    shortening, force, shapes = np.zeros(steps), np.zeros(steps), {}
-    for k in range(steps):
-        simulation.step()
-        x = simulation.positions(rope)
-        shortening[k] = (LENGTH - np.linalg.norm(x[-1] - x[0])) / RADIUS
-        force[k] = 0.5 * (simulation.reaction(grips[1]).force - simulation.reaction(grips[0]).force) @ axis
+    shortening, force, shapes = [], [], {}
+    for x, pull_now in pulled(tie(n, nodes, start, FRICTION, drag=2e-3), end, speed):
+        shortening.append(shortening_of(x) / RADIUS)
+        force.append(pull_now * RADIUS**2 / BENDING)
         for e in SHOWN.get(n, ()):
-            if shortening[k] <= e and e not in shapes:
+            if shortening[-1] <= e and e not in shapes:
                 shapes[e] = x
-    return Pull(shortening, force * RADIUS**2 / BENDING, shapes)
+    return Pull(np.array(shortening), np.array(force), shapes)
 
 
 def draw_knot(axes: Axes, x: np.ndarray, color: str) -> None:
