@@ -180,7 +180,9 @@ class Contact {
   static double wanted_stiffness(const ContactPair& pair, double force) {
     return force / (2.0 * kDepth * pair.small_radius() * pair.share);
   }
+  double faded(const Touching& t) const;
   double follow_force(const Touching& t, ContactRecord& record) const;
+  void follow_forces(const VectorX& greatest, VectorX& stiffness) const;
   double source_stiffness() const;
   void record_friction(const Touching& t, ContactRecord& record) const;
 

@@ -11,12 +11,13 @@ std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
 bool by_key(const ContactRecord& a, const ContactRecord& b) { return a.key < b.key; }
 
-// A stiffness follows forces that outgrow it at once, and those that are so many times too small.
-constexpr double kSlack = 32.0;
-// What has yielded presses again little by little: this much is left after a step.
+// A stiffness follows forces that outgrow it at once, and is then so many times what they want; and it follows those
+// for which it is so many times too great.
+constexpr double kAhead = 1.5, kSlack = 32.0;
+// Greatest depth that has yielded, over the smaller radius; what is beyond the depth that lasts presses again little by
+// little: this much of it is left after a step.
+constexpr double kMostYield = 0.02, kLastingYield = 0.01;
 constexpr double kFading = 0.9;
-// Greatest depth that has yielded, over the smaller radius.
-constexpr double kMostYield = 0.02;
 
 }  // namespace
 
@@ -80,17 +81,26 @@ double Contact::change_stiffness(const Touching& t, double ratio, double yielded
   return put_in;
 }
 
+/// What has yielded wears off where surfaces that separate press no more, without work, and fades where it is deep.
+double Contact::faded(const Touching& t) const {
+  const ContactPair& pair = pairs_[at(t.pair)];
+  const double lasting = kLastingYield * pair.small_radius();
+  const double left = t.yielded > lasting ? lasting + kFading * (t.yielded - lasting) : t.yielded;
+  return std::clamp(pair.reach() - t.distance, 0.0, left);
+}
+
 /// Stiffness from one step to the next, by the force that it carries; returns the energy put in.
 double Contact::follow_force(const Touching& t, ContactRecord& record) const {
   const ContactPair& pair = pairs_[at(t.pair)];
-  const double wanted = wanted_stiffness(pair, record.force), least = start_stiffness(pair, least_stiffness_);
+  const double wanted = wanted_stiffness(pair, record.force);
   if (wanted > record.stiffness) {
-    const double ratio = 1.5 * wanted / record.stiffness;
+    const double ratio = kAhead * wanted / record.stiffness;
     return change_stiffness(t, ratio, yielded_at(t, ratio), record);
   }
-  if (kSlack * std::max(wanted, least) < record.stiffness)
-    return change_stiffness(t, 2.0 * std::max(wanted, least) / record.stiffness, kFading * t.yielded, record);
-  return t.yielded > 0.0 ? change_stiffness(t, 1.0, kFading * t.yielded, record) : 0.0;
+  // A contact that is about to open wants next to nothing, and more when it presses again.
+  const double common = std::max(wanted, start_stiffness(pair, state_->contact_stiffness));
+  if (kSlack * common < record.stiffness) return change_stiffness(t, 2.0 * common / record.stiffness, faded(t), record);
+  return t.yielded > 0.0 ? change_stiffness(t, 1.0, faded(t), record) : 0.0;
 }
 
 /// The greatest force that contact has to hold at a node, times 1e5 / m [dissertation, (5.16), (5.17)]: what all other
@@ -118,6 +128,18 @@ void Contact::record_friction(const Touching& t, ContactRecord& record) const {
   record.sticking = f.sticking;
 }
 
+/// A contact that is yet to come starts as stiff as its rods' greatest force has wanted, so that those which take over
+/// from each other while surfaces slide have no need to change; that fades where it is much more than is wanted now.
+void Contact::follow_forces(const VectorX& greatest, VectorX& stiffness) const {
+  for (Eigen::Index rod = 0; rod < greatest.size(); ++rod) {
+    double& own = stiffness(rod);
+    if (greatest(rod) > own)
+      own = kAhead * greatest(rod);
+    else if (own > kSlack * greatest(rod))
+      own *= 0.8;
+  }
+}
+
 double Contact::accept(State& state) {
   std::vector<ContactRecord> records;
   const ContactDescription& contact = model_.description.contact;
@@ -136,11 +158,11 @@ double Contact::accept(State& state) {
     if (frictional_ && !freezes() && pair.friction > 0.0) record_friction(t, record);
     if (source && !fixed(pair)) {
       const double ratio = common / record.stiffness;
-      put_in += change_stiffness(t, ratio, ratio > 1.0 ? yielded_at(t, ratio) : kFading * t.yielded, record);
+      put_in += change_stiffness(t, ratio, ratio > 1.0 ? yielded_at(t, ratio) : faded(t), record);
     } else if (!fixed(pair)) {
       put_in += follow_force(t, record);
     } else if (t.yielded > 0.0) {
-      put_in += change_stiffness(t, 1.0, kFading * t.yielded, record);
+      put_in += change_stiffness(t, 1.0, faded(t), record);
     }
     for (int rod : {pair.rod_a, pair.rod_b})
       if (rod >= 0) greatest(rod) = std::max(greatest(rod), source ? common : wanted_stiffness(pair, -t.energy.first));
@@ -150,8 +172,7 @@ double Contact::accept(State& state) {
   if (!frozen_.empty()) record_frozen(records);
   state.contacts = std::move(records);
   leave_obstacles(state);
-  // A contact that is yet to come starts as stiff as its rods' greatest force wants; that fades.
-  if (!(contact.stiffness > 0.0)) state.contact_stiffness = (0.8 * state.contact_stiffness).cwiseMax(greatest);
+  if (!(contact.stiffness > 0.0)) follow_forces(greatest, state.contact_stiffness);
   return put_in;
 }
 

@@ -185,3 +185,24 @@ def test_a_rod_that_friction_holds_takes_few_iterations():
     simulation.step(60)
     assert simulation.statistics.iterations - before < 60 * 20
     assert abs(simulation.velocities(rod)).max() < 1e-3
+
+
+def test_a_rope_that_runs_over_a_post_takes_no_energy_from_what_its_contacts_remember() -> None:
+    post, radius = 0.05, 3e-3  # [m]
+    angle = np.linspace(np.pi, 0.0, 60)
+    arc = (post + 1.05 * radius) * np.stack([np.cos(angle), 0.0 * angle, np.sin(angle)], axis=1)
+    drop = np.array([0.0, 0.0, 0.25])
+    scene = withe.Scene(gravity=(0, 0, 0))
+    scene.add_capsule((0, -1, 0), (0, 1, 0), post)
+    points = np.concatenate([[arc[0] - drop], arc, [arc[-1] - drop]])
+    rope = scene.add_rod(points=points, nodes=81, radius=radius, material=RUBBER)
+    scene.add_force(rope.start, (0, 0, -1.0))
+    scene.add_force(rope.end, (0, 0, -1.3))
+    scene.add_drag(0.5)
+    simulation = scene.build(integrator="backward_euler", time_step=2e-3)
+    simulation.step(75)  # until it hugs the post
+    before = simulation.energy()
+    simulation.step(75)  # nearly every edge on the post is another one now
+    after = simulation.energy()
+    assert before.loads - after.loads > 0.03  # [J]
+    assert abs(after.work - before.work) < 1e-3 * (before.loads - after.loads)
