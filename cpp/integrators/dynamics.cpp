@@ -9,13 +9,23 @@ namespace {
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
-/// Largest angle by which an edge turns on the way from a state to q [rad], > pi/2 where it ends pointing back; and by
-/// how much the energy in stretching grows beyond the work of the axial forces in the middle [J],
-/// EA (l1 - l0) (l1 + l0 - 2 lm) / (2 lm) an edge, where EA is given.
+/// By how much the energy in stretching an edge of stiffness 1 N grows beyond the work of the axial force of a step
+/// [J], that in its middle or at its end. An edge under pressure that turns gains by the latter: it gives way by l0 (1
+/// - cos).
+double stretch_gain(double before, double after, double across, double rest, bool at_end) {
+  const double l0 = std::sqrt(before), l1 = std::sqrt(after);
+  if (at_end) return (l0 * l1 - across) / l1 - 0.5 * (before + after - 2.0 * across) / rest;
+  const double middle = 0.5 * std::sqrt(std::max(before + after + 2.0 * across, 0.0));
+  return middle > 0.0 ? 0.5 * (l1 - l0) * (l1 + l0 - 2.0 * middle) / middle : 0.0;
+}
+
+/// Largest angle by which an edge turns on the way from a state to q [rad], > pi/2 where it ends pointing back; and
+/// what all edges gain in stretching, where their stiffness EA is given.
 struct Turning {
   double largest = 0.0, stretch_gain = 0.0;
 };
-Turning turning(const Model& model, const double* stretch_stiffness, const State& state, const VectorX& q) {
+Turning turning(const Model& model, const State& state, const VectorX& q, const double* stretch_stiffness = nullptr,
+                bool at_end = false) {
   double smallest = 1.0, gain = 0.0;
   for (int e = 0; e < model.edge_count; ++e) {
     const int a = model.node_dof[at(model.edge_tail[at(e)])], b = model.node_dof[at(model.edge_head[at(e)])];
@@ -29,10 +39,8 @@ Turning turning(const Model& model, const double* stretch_stiffness, const State
     const double square = across * std::abs(across) / (before * after);  // of the cosine, with its sign
     if (!std::isfinite(square)) return {INFINITY, INFINITY};
     smallest = std::min(smallest, square);
-    if (!stretch_stiffness) continue;
-    const double l0 = std::sqrt(before), l1 = std::sqrt(after);
-    const double middle = 0.5 * std::sqrt(std::max(before + after + 2.0 * across, 0.0));
-    if (middle > 0.0) gain += 0.5 * stretch_stiffness[e] * (l1 - l0) * (l1 + l0 - 2.0 * middle) / middle;
+    if (stretch_stiffness)
+      gain += stretch_stiffness[e] * stretch_gain(before, after, across, model.edge_length(e), at_end);
   }
   return {std::acos(std::copysign(std::sqrt(std::min(std::abs(smallest), 1.0)), smallest)), gain};
 }
@@ -273,14 +281,14 @@ double free_acceleration(Equations& equations, const Parameters& parameters, con
   const double turn = equations.advance(state, work.z, next);
   equations.evaluate_forces(next, parameters, work.velocity, work.newton.evaluation);
   set_acceleration(equations, work, next.acceleration);
-  return equations.model().planar() ? turning(equations.model(), nullptr, state, work.z).largest : turn;
+  return equations.model().planar() ? turning(equations.model(), state, work.z).largest : turn;
 }
 
 /// The same under contact, drag, viscosity or in a fluid.
 double resisted_acceleration(Equations& equations, const Parameters& parameters, double dt, const State& state,
                              StepWorkspace& work) {
   const Model& model = equations.model();
-  const double turn = turning(model, nullptr, state, work.z).largest;
+  const double turn = turning(model, state, work.z).largest;
   if (!(turn <= 1.5)) return turn;
   State& next = work.next;
   next = state;
@@ -311,8 +319,8 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
     q1 = work.z;
   else
     q1 = 2.0 * work.z - state.q;
-  const double* watched = plan.rule == StepRule::midpoint ? equations.elastic.stretch_stiffness.data() : nullptr;
-  const Turning turned = turning(model, watched, state, q1);
+  const double* watched = plan.rule == StepRule::energy_momentum ? nullptr : equations.elastic.stretch_stiffness.data();
+  const Turning turned = turning(model, state, q1, watched, euler);
   result.largest_turn = turned.largest;
   if (!q1.allFinite() || !(result.largest_turn <= 1.5)) return result;
   result.stretch_gain = turned.stretch_gain;

@@ -66,11 +66,16 @@ Energy World::Implementation::energy_of(const State& at, double loads, double wo
   return e;
 }
 
-/// Plain midpoint pumps energy into stretching when edges turn far within a step: whether the step just taken, from
-/// where `keep_for_return` was called, did.
+/// Plain midpoint pumps energy into stretching when edges turn far within a step, and backward Euler gains where it
+/// should lose, from edges under pressure that give way: whether the step just taken, from where `keep_for_return` was
+/// called, did.
 bool World::Implementation::gains_energy() {
-  // Where edges hardly turn, bending gains nothing, and stretching what the step has found.
-  if (guard.turn <= 0.01 && std::abs(guard.stretch_gain) <= 1e-6 * guard.scale) {
+  // Where edges hardly turn, bending gains nothing, and stretching what the step has found. Backward Euler forgets what
+  // it gains, so only much counts.
+  const bool euler = options.integrator == Integrator::backward_euler;
+  const bool still = euler ? guard.turn <= 0.3 && guard.stretch_gain <= 1e-3 * guard.scale
+                           : guard.turn <= 0.01 && std::abs(guard.stretch_gain) <= 1e-6 * guard.scale;
+  if (still) {
     guard.energy.reset();
     return false;
   }
@@ -89,6 +94,7 @@ bool World::Implementation::gains_energy() {
   guard.energy = now;
   guard.scale = scale;
   guard.excess += gain;
+  if (euler) guard.excess = std::max(guard.excess, 0.0);  // what it lost is no stock to gain from
   return false;
 }
 

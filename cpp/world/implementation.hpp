@@ -132,7 +132,7 @@ struct World::Implementation {
   void update_custom_force(Equations& target) const;
 
   // stepping.cpp
-  enum class Attempt { failed, gained_energy, inaccurate, hard, easy };
+  enum class Attempt { failed, gained_energy, rescued, inaccurate, hard, easy };
   /// Equal parts in which the rest of a time step, from a fraction of it on, is taken.
   struct Division {
     double from = 0.0;

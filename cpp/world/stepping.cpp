@@ -46,8 +46,8 @@ void World::Implementation::advance_in_parts(double duration) {
     work.newton.poll();
     const double dt = duration * ((1.0 - division.from) / static_cast<double>(division.parts));
     const Attempt attempt = try_step(dt);
-    if (attempt == Attempt::gained_energy) continue;
-    if (attempt == Attempt::failed || attempt == Attempt::inaccurate) {
+    if (attempt == Attempt::rescued) continue;
+    if (attempt != Attempt::easy && attempt != Attempt::hard) {
       cut(attempt, division, dt);
       continue;
     }
@@ -81,9 +81,13 @@ bool World::Implementation::may_cut() const {
 void World::Implementation::cut(Attempt why, Division& division, double dt) {
   if (!may_cut())
     fail(last_newton, dt,
-         options.integrator == Integrator::verlet ? "the explicit step broke down" : "the step did not converge");
+         options.integrator == Integrator::verlet ? "the explicit step broke down"
+         : why == Attempt::gained_energy          ? "the step gains energy from nowhere"
+         : why == Attempt::inaccurate
+             ? "the smallest step misses the tolerance: allow a larger one, or more max_halvings"
+             : "the step did not converge");
   const long left = division.parts - division.done;
-  level += why == Attempt::failed ? notches() : (notches() + 1) / 2;
+  level += why == Attempt::inaccurate ? (notches() + 1) / 2 : notches();
   for (divide_rest(division); division.parts <= left && may_cut(); divide_rest(division)) ++level;
   easy_steps = 0;
 }
@@ -124,8 +128,9 @@ bool World::Implementation::may_grow(double dt, double times) const {
 /// One step of dt, taken back where it gains energy from nowhere or is not accurate enough.
 World::Implementation::Attempt World::Implementation::try_step(double dt) {
   const bool fourth = options.integrator == Integrator::fourth_order;
+  const bool euler = options.integrator == Integrator::backward_euler;
   const bool guarded =
-      options.adaptive && guard.rescue == 0 && (options.integrator == Integrator::implicit_midpoint || fourth);
+      options.adaptive && guard.rescue == 0 && (options.integrator == Integrator::implicit_midpoint || fourth || euler);
   if (guarded || options.tolerance || fourth) keep_for_return();
   // Actuation changes what is stored without a motion, so the start is looked at while it is as it was.
   if (guarded && !guard.energy && actuated()) guard.energy = energy();
@@ -136,15 +141,16 @@ World::Implementation::Attempt World::Implementation::try_step(double dt) {
     statistics.rejected_steps += 1;
     return Attempt::failed;
   }
-  if (error > allowed && may_cut()) {
+  if (error > allowed) {
     take_back();
     return Attempt::inaccurate;
   }
   if (guarded && gains_energy()) {
-    // The same step again, and a while of them, without the flaw.
     take_back();
+    if (euler) return Attempt::gained_energy;
+    // The same step again, and a while of them, without the flaw.
     guard.rescue = 256;
-    return Attempt::gained_energy;
+    return Attempt::rescued;
   }
   commit_step();
   if (!options.tolerance) return Attempt::easy;

@@ -35,7 +35,10 @@ def make_options(**options: Any) -> dict[str, Any]:
     if options["planar"] is not None:
         checked["planar"] = validation.truth(options["planar"], "planar")
     checked["max_iterations"] = validation.integer(options["max_iterations"], "max_iterations", 1, 10_000)
-    checked["max_halvings"] = validation.integer(options["max_halvings"], "max_halvings", 0, 40)
+    if options["max_halvings"] is None:
+        checked["max_halvings"] = 12 if options["tolerance"] is None else 20
+    else:
+        checked["max_halvings"] = validation.integer(options["max_halvings"], "max_halvings", 0, 40)
     if checked["tolerance"] is not None and options["integrator"] in ("verlet", "static"):
         raise ValueError(f"tolerance must be None with integrator={options['integrator']!r}")
     if checked["duration"] is not None and checked["tolerance"] is None:

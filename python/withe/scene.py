@@ -311,7 +311,7 @@ class Scene(Loads, Contacts, Fluids):
         step_tolerance: float = 1e-9,
         force_tolerance: float = 1e-8,
         max_iterations: int = 40,
-        max_halvings: int = 12,
+        max_halvings: int | None = None,
     ) -> Simulation:
         """Turn the scene into the equations that it needs, ready to run. The scene may go on changing.
 
@@ -345,7 +345,8 @@ class Scene(Loads, Contacts, Fluids):
         max_iterations : int
             Of one Newton solve.
         max_halvings : int
-            The smallest step is time_step / 2^max_halvings.
+            The smallest step is time_step / 2^max_halvings; 12 by default, 20 with a tolerance. A run that needs
+            smaller ones ends in a :class:`withe.ConvergenceError`.
 
         Returns
         -------

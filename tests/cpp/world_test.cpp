@@ -301,6 +301,7 @@ TEST(Actuation, GoesThroughARampAgainWhenAStepIsTakenBack) {
   // Whatever error control does inside, after half of the ramp half of it is there.
   Options o = options(Integrator::implicit_midpoint, 0.1);
   o.tolerance = 1e-5;
+  o.max_halvings = 20;
   World world(testing::hanging_arm().scene, o);
   MatrixX2 target = world.natural_curvature(0);
   target.setConstant(10.0);

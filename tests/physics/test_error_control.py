@@ -5,6 +5,7 @@ import pytest
 
 import rods
 import theory
+import withe
 
 PERIODS = 3.0
 
@@ -41,3 +42,16 @@ def test_error_is_within_the_tolerance_and_proportional_to_it(integrator, tolera
     assert all(0.05 < ratio < 3.0 for ratio in ratios)
     # Steps change by the fourth root of two, and the error with their square.
     assert max(ratios) < 3.0 * min(ratios)
+
+
+def test_a_tolerance_that_the_smallest_step_misses_ends_in_an_error():
+    scene = rods.weightless()
+    arm = rods.straight(scene, 20)
+    scene.clamp(arm.start)
+    scene.add_force(arm.end, (0.0, 0.0, 1.0))
+    simulation = scene.build(time_step=0.1, tolerance=1e-6, max_halvings=2)
+    with pytest.raises(withe.ConvergenceError, match="misses the tolerance"):
+        simulation.step(10)
+    simulation = scene.build(time_step=0.1, tolerance=1e-6)
+    simulation.step(10)
+    assert simulation.statistics.steps > 40
