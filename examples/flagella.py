@@ -5,7 +5,7 @@ segments every flagellum stirs the fluid around the others, and they wind around
 resistive-force theory none knows of the others: each does exactly what its neighbour does, and they stay as far apart
 as they were. Both are checked. Writes out/flagella.png.
 
-At 15 turns a minute, `--count 3 --rate 1.5708 --duration 60 --step 1e-2`, three flagella first touch after 49.6 s.
+How contact is handled once they bundle is compared in flagella_contact.py. At 15 turns a minute, `--count 3 --rate 1.5708 --duration 60 --step 1e-2`, three flagella first touch after 49.6 s.
 Choi's dissertation, section 5.6, says 15 rad/s, at which they touch within seconds; but its table 5.1 has 6.04e5
 iterations at 3.01 a step of 1 ms with contact, in 250 s: contact began after 49.3 s there.
 """
@@ -34,7 +34,15 @@ def turn(angle: float) -> np.ndarray:
     return np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
 
 
-def build(count: int, fluid: str, time_step: float, rate: float = RATE) -> withe.Simulation:
+def build(
+    count: int,
+    fluid: withe.parts.FluidModel,
+    time_step: float,
+    rate: float = RATE,
+    *,
+    contact: withe.parts.ContactModel = "imcv2",
+    friction: float = 0.0,
+) -> withe.Simulation:
     """Right-handed helices, free of stress as drawn; contact only where the fluid can bring them together."""
     scene = withe.Scene(gravity=(0.0, 0.0, 0.0))
     rubber = withe.Material(youngs_modulus=3e6, poisson_ratio=0.5, density=1000.0)
@@ -48,7 +56,7 @@ def build(count: int, fluid: str, time_step: float, rate: float = RATE) -> withe
         flagellum = scene.add_rod(points=helix + centre, radius=THICKNESS, material=rubber)
         grips.append(scene.clamp(flagellum.start))
     if fluid == "stokeslets":
-        scene.enable_contact(distance_tolerance=1e-5)
+        scene.enable_contact(model=contact, friction=friction, distance_tolerance=1e-5, slip_tolerance=1e-4)
     simulation = scene.build(integrator="backward_euler", time_step=time_step)
     for grip, centre in zip(grips, centres, strict=True):
         simulation.move(grip, path=lambda t, centre=centre: (centre + turn(rate * t) @ helix[0], turn(rate * t)))

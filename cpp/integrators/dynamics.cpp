@@ -1,6 +1,7 @@
 #include "integrators/dynamics.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <utility>
 
@@ -228,6 +229,14 @@ void set_acceleration(const Equations& equations, const StepWorkspace& work, Vec
   equations.assembler().project(acceleration);  // what a support holds has one mass
 }
 
+/// Finds the fluid's force at q on velocities v, and the time that takes.
+bool solve_flow(Equations& equations, const VectorX& q, const VectorX& v, Counters& counters) {
+  const auto start = std::chrono::steady_clock::now();
+  const bool found = equations.begin_flow(q, v);
+  counters.fluid_time += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return found;
+}
+
 /// Finds the fluid's force for a step of dt: that on velocities as they are taken to be within the step, to the order
 /// of the scheme, at the positions that go with them. Under the midpoint rules those of the last two steps are carried
 /// on: velocities at their ends would ring on stiff modes, and the guess with them.
@@ -246,7 +255,7 @@ bool begin_flow(Equations& equations, double dt, bool euler, const State& state,
   equations.assembler().add_held_change(state.q, work.held.q, 1.0 / dt, v);
   q = state.q;
   if (!euler) q += 0.5 * dt * v;
-  return equations.begin_flow(q, v);
+  return solve_flow(equations, q, v, work.newton.counters);
 }
 
 void remember_motion(const VectorX& q1, double dt, State& state) {
@@ -265,7 +274,7 @@ void explicit_acceleration(Equations& equations, const Parameters& parameters, d
   work.from.q -= dt * v;
   work.from.v = v;
   equations.begin(work.from, parameters, dt, false);
-  if (equations.flows() && !equations.begin_flow(state.q, v)) {
+  if (equations.flows() && !solve_flow(equations, state.q, v, work.newton.counters)) {
     acceleration.setConstant(state.q.size(), std::nan(""));
     return;
   }

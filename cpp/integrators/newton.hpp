@@ -12,7 +12,7 @@ namespace withe {
 
 struct Counters {
   long iterations = 0, factorizations = 0;
-  double assembly_time = 0, solve_time = 0;  ///< [s]
+  double assembly_time = 0, solve_time = 0, fluid_time = 0;  ///< [s]
 };
 
 struct NewtonResult {

@@ -44,6 +44,7 @@ const Statistics& World::statistics() const {
   s.factorizations = c.factorizations;
   s.assembly_time = c.assembly_time;
   s.solve_time = c.solve_time;
+  s.fluid_time = c.fluid_time;
   return s;
 }
 

@@ -28,7 +28,7 @@ struct Statistics {
   long factorizations = 0;
   double largest_turn = 0;  ///< of an edge in one step [rad]; plain midpoint loses energy balance above about 0.1
   long energy_momentum_steps = 0;                            ///< taken in place of midpoint steps that gained energy
-  double assembly_time = 0, solve_time = 0, total_time = 0;  ///< [s]
+  double assembly_time = 0, solve_time = 0, fluid_time = 0, total_time = 0;  ///< [s]
 };
 
 struct Reaction {

@@ -33,6 +33,7 @@ void register_results(py::module_& module) {
       .def_readonly("energy_momentum_steps", &Statistics::energy_momentum_steps)
       .def_readonly("assembly_time", &Statistics::assembly_time)
       .def_readonly("solve_time", &Statistics::solve_time)
+      .def_readonly("fluid_time", &Statistics::fluid_time)
       .def_readonly("total_time", &Statistics::total_time);
   py::class_<Reaction>(module, "Reaction", "Of a support on the rod.")
       .def_readonly("force", &Reaction::force)

@@ -89,7 +89,8 @@ class Statistics:
         Greatest turn of an edge within one inner step.
     energy_momentum_steps : int
         Taken in place of implicit midpoint steps that gained energy (with `adaptive`).
-    assembly_time, solve_time, total_time : float [s]
+    assembly_time, solve_time, fluid_time, total_time : float [s]
+        Fluid: of Stokeslets, whose equations are solved once a step.
     """
 
     steps: int
@@ -100,6 +101,7 @@ class Statistics:
     energy_momentum_steps: int
     assembly_time: float
     solve_time: float
+    fluid_time: float
     total_time: float
 
 

@@ -1,0 +1,219 @@
+"""Flagella in a bundle, under two energies of contact from the same state: IMCv2, which is finite, and a barrier.
+
+The comparison of section 5.6.2 of Choi's dissertation, and its friction example, 5.6.3: steps of 1 ms at 15 rad/s from
+states in which the flagella touch, made by 9 s of turning under the barrier, which keeps surfaces apart, and kept in
+out/. Printed are iterations and processor time a step, with the fluid and without what its Stokeslets take, and the
+mean distance of the same nodes over the radius, (5.18). Fails when that exceeds .05, or when flagella do not touch.
+
+`--full` runs from the drawn shape for 250 s as the source did, for its tables 5.1 and 5.2: hours; `--duration` shortens
+it. Only steps with a contact count there, as in the source. Writes out/flagella_contact.png.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import flagella
+import numpy as np
+
+import withe
+
+PREPARED, PREPARED_STEP = 9.0, 5e-3  # [s]
+STEP = 1e-3  # [s]
+MODELS: tuple[withe.parts.ContactModel, ...] = ("imcv2", "barrier")
+LABELS = {"imcv2": "IMCv2", "barrier": "barrier"}
+BLOCK = 50  # steps that one model takes before the other goes on
+MOST_APART = 0.05  # of the radius
+
+
+@dataclass
+class Run:
+    """One simulation and what its steps took: arrays with an entry a step, those without contact too."""
+
+    simulation: withe.Simulation
+    contacts: list[int] = field(default_factory=list)
+    iterations: list[int] = field(default_factory=list)
+    seconds: list[float] = field(default_factory=list)
+    fluid: list[float] = field(default_factory=list)  # share of the step
+    positions: list[np.ndarray] = field(default_factory=list)
+    failure: str = ""
+
+    def step(self, keep: bool) -> None:
+        """One time step."""
+        before, started = self.simulation.statistics, time.thread_time()
+        self.simulation.step()
+        self.seconds.append(time.thread_time() - started)
+        after = self.simulation.statistics
+        self.iterations.append(after.iterations - before.iterations)
+        self.fluid.append((after.fluid_time - before.fluid_time) / (after.total_time - before.total_time))
+        self.contacts.append(flagella.touching(self.simulation))
+        if keep:
+            self.positions.append(self.simulation.positions())
+
+    def advance(self, steps: int, keep: bool) -> None:
+        """Steps until one fails."""
+        for _ in range(0 if self.failure else steps):
+            try:
+                self.step(keep)
+            except withe.ConvergenceError as error:
+                self.failure = str(error)
+                return
+
+    def means(self) -> tuple[float, float, float, float]:
+        """Contacts, iterations, milliseconds, and those without the fluid, over the steps with contact."""
+        touching = np.array(self.contacts) > 0
+        if not touching.any():
+            return 0.0, np.nan, np.nan, np.nan
+        seconds = np.array(self.seconds)[touching]
+        without = seconds * (1.0 - np.array(self.fluid)[touching])
+        return (
+            float(np.mean(np.array(self.contacts)[touching])),
+            float(np.mean(np.array(self.iterations)[touching])),
+            1e3 * float(seconds.mean()),
+            1e3 * float(without.mean()),
+        )
+
+
+def in_contact(count: int, folder: Path) -> withe.Snapshot:
+    """Flagella that touch: read, or made."""
+    path = folder / f"flagella_{count}.npz"
+    if not path.exists():
+        print(f"turning {count} flagella for {PREPARED:g} s until they touch", flush=True)
+        simulation = flagella.build(count, "stokeslets", PREPARED_STEP, contact="barrier")
+        simulation.step(round(PREPARED / PREPARED_STEP))
+        simulation.snapshot().save(path)
+    return withe.Snapshot.load(path)
+
+
+def compare(
+    count: int, friction: float, steps: int, start: withe.Snapshot | None, models: tuple[withe.parts.ContactModel, ...]
+) -> dict[str, Run]:
+    """Both models by turns, from a state or from the drawn shape, and a row of the table each."""
+    runs = {}
+    for model in models:
+        simulation = flagella.build(count, "stokeslets", STEP, contact=model, friction=friction)
+        if start is not None:
+            simulation.restore(start)
+        runs[model] = Run(simulation)
+    for done in range(0, steps, BLOCK):
+        for run in runs.values():
+            run.advance(min(BLOCK, steps - done), keep=start is not None)
+    for model, run in runs.items():
+        contacts, iterations, whole, without = run.means()
+        touching = np.mean(np.array(run.contacts) > 0) if run.contacts else 0.0
+        print(
+            f"{count:8d} {friction:9g}  {LABELS[model]:8s} {touching:8.1%} {contacts:9.1f} {iterations:11.2f} "
+            f"{whole:10.2f} {without:14.2f} {sum(run.iterations):11d} {sum(run.seconds) / 3600:8.4f} h "
+            f"{run.simulation.time:8.2f} s {run.failure}",
+            flush=True,
+        )
+    return runs
+
+
+def apart(runs: dict[str, Run]) -> np.ndarray:
+    """Mean distance of the same nodes over the radius, in every step, (5.18)."""
+    first, second = (run.positions for run in runs.values())
+    both = min(len(first), len(second))
+    difference = np.array(first[:both]) - np.array(second[:both])
+    return np.asarray(np.linalg.norm(difference, axis=2).mean(axis=1) / flagella.THICKNESS)
+
+
+def draw(results: dict[tuple[int, float], dict[str, Run]], path: Path) -> None:
+    """A bundle under both models, how far apart they are, and iterations over friction."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    figure = plt.figure(figsize=(11.0, 4.2), layout="constrained")
+    axes = figure.add_subplot(1, 3, 1, projection="3d")
+    count, friction = max(results, key=lambda key: (-key[1], key[0]))
+    runs = results[count, friction]
+    for model, style in (("imcv2", "-"), ("barrier", "k:")):
+        x = 1e2 * runs[model].simulation.positions().reshape(count, flagella.NODES, 3)
+        for k, rod in enumerate(x):
+            axes.plot(*rod.T, style, linewidth=2.0 if model == "imcv2" else 1.2, label=LABELS[model] if k == 0 else None)
+    axes.set(xlim=(-4, 4), ylim=(-4, 4), zlim=(-20, 0), xticks=(-4, 0, 4), yticks=(-4, 0, 4))
+    axes.set_title(f"{count} flagella after {runs['imcv2'].simulation.time:.0f} s")
+    axes.set_zlabel("cm", labelpad=-2)
+    axes.set_box_aspect((8, 8, 20))
+    axes.view_init(elev=8, azim=-70)
+    axes.legend(frameon=False, fontsize=8, loc="upper left")
+
+    middle, right = figure.add_subplot(1, 3, 2), figure.add_subplot(1, 3, 3)
+    for (count, friction), runs in results.items():
+        if friction == 0.0:
+            distance = apart(runs)
+            middle.semilogy(STEP * np.arange(1, len(distance) + 1), distance, label=f"{count} flagella")
+    middle.axhline(MOST_APART, color="0.6", linestyle="--", linewidth=1.0)
+    middle.set(xlabel="time in contact [s]", ylabel="mean distance of the same nodes, over the radius")
+    for number, (key, runs) in enumerate(results.items()):
+        for place, (model, color) in enumerate((("imcv2", "#00798c"), ("barrier", "#edae49"))):
+            value = runs[model].means()[1]
+            right.bar(number + 0.4 * place - 0.2, value, 0.38, color=color, label=LABELS[model] if number == 0 else None)
+    names = [f"M = {count}" + (f"\nfriction {friction:g}" if friction else "") for count, friction in results]
+    right.set_xticks(range(len(names)), names, fontsize=7)
+    right.set(ylabel="iterations a step")
+    for axes in (middle, right):
+        axes.grid(True, color="#e3e7ea")
+        axes.set_axisbelow(True)
+        axes.legend(frameon=False, fontsize=8)
+    figure.savefig(path, dpi=150)
+    plt.close(figure)
+
+
+def run_in_full(counts: list[int], frictions: list[float], duration: float) -> None:
+    """Tables 5.1 and 5.2: from the drawn shape, both models without friction, IMCv2 with it."""
+    steps = round(duration / STEP)
+    for count in counts:
+        runs = compare(count, 0.0, steps, None, MODELS)
+        seconds = [sum(run.seconds) for run in runs.values()]
+        print(f"{count:8d} flagella: the barrier takes {seconds[1] / seconds[0]:.2f} of the time of IMCv2")
+    for friction in frictions:
+        compare(2, friction, steps, None, ("imcv2",))
+
+
+def main() -> None:
+    """Compare, print, draw."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--counts", type=int, nargs="+", default=[2, 3], help="numbers of flagella")
+    parser.add_argument("--frictions", type=float, nargs="*", default=[0.3, 0.7], help="for two flagella, beside none")
+    parser.add_argument("--steps", type=int, default=2000, help="of 1 ms, in contact")
+    parser.add_argument("--full", action="store_true", help="from the drawn shape, for --duration")
+    parser.add_argument("--duration", type=float, default=250.0, help="seconds of turning with --full")
+    parser.add_argument("--out", type=Path, default=Path("out"))
+    arguments = parser.parse_args()
+    if min(arguments.counts) < 2:
+        parser.error("--counts must be 2 or more")
+    arguments.out.mkdir(parents=True, exist_ok=True)
+
+    print("flagella  friction  model    touching  contacts  iterations  ms a step  without fluid  iterations, time, end")
+    if arguments.full:
+        run_in_full(arguments.counts, arguments.frictions, arguments.duration)
+        return
+    results, wrong = {}, []
+    for count, friction in [(n, 0.0) for n in arguments.counts] + [(2, mu) for mu in arguments.frictions]:
+        runs = compare(count, friction, arguments.steps, in_contact(count, arguments.out), MODELS)
+        results[count, friction] = runs
+        most = apart(runs).max()
+        imcv2, barrier = (runs[model].means() for model in MODELS)
+        print(
+            f"{count:8d} {friction:9g}  at most {most:.4f} radii apart; the barrier takes {barrier[2] / imcv2[2]:.2f} of "
+            f"the time of IMCv2, {barrier[3] / imcv2[3]:.2f} without the fluid"
+        )
+        if friction == 0.0 and most > MOST_APART:
+            wrong.append(f"{count} flagella end {most:.3f} radii apart")
+        if any(run.failure or not any(run.contacts) for run in runs.values()):
+            wrong.append(f"{count} flagella, friction {friction:g}: stopped, or never touched")
+    draw(results, arguments.out / "flagella_contact.png")
+    print(f"Wrote {arguments.out / 'flagella_contact.png'}.")
+    if wrong:
+        sys.exit("Not as contact should be: " + "; ".join(wrong))
+
+
+if __name__ == "__main__":
+    main()
