@@ -12,6 +12,12 @@ ROOT = Path(__file__).resolve().parent.parent.parent
 # Options of each example, the number that it prints, and between what that number must lie.
 EXAMPLES = {
     "flagella.py": (["--step", "2e-3", "--duration", "6"], r"drawn together by (\d+)%", 20.0, 80.0),
+    "flagella_contact.py": (
+        ["--counts", "2", "--frictions", "0.3", "--steps", "200"],
+        r"2 +0  at most ([.\d]+) radii apart",
+        1e-6,
+        0.05,
+    ),
     "friction.py": (["--forces", "11"], r"at most ([.\d]+)% off", 0.0, 1.0),
     "gripper.py": (["--duration", "4"], r"friction 0.5: \d+ contacts, nearest ([-+.\d]+) radii", -0.05, 0.1),
     "helix.py": ([], r"(\d+) um from the public code", 0.0, 100.0),
