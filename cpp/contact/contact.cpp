@@ -166,6 +166,7 @@ void Contact::begin(const State& state, double duration) {
     if (record_of(pairs_[at(t.pair)].key) == nullptr) unrecorded_.push_back(pairs_[at(t.pair)].key);
   std::sort(unrecorded_.begin(), unrecorded_.end());
   start_energy_ = energy();
+  start_pressing_ = pressing_energy();
   if (!target_.empty()) move_obstacles();
   if (frictional_ && freezes()) freeze();
   if (!shift_.empty()) place_obstacles(target_);

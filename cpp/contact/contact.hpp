@@ -73,6 +73,9 @@ class Contact {
   /// Energy of contact and of anchors at q1, and at the start of the step [J].
   double energy() const;
   double start_energy() const { return start_energy_; }
+  /// What pressing has put in over a step that ends at q1, `change` after its start: more than it stored before, and
+  /// friction apart [J]. Below zero along a straight way onto a surface; above it where surfaces slide over a summit.
+  double pressing_gain(const VectorX& change) const;
   /// Greatest depth of surfaces in each other, over the smaller radius.
   double depth() const;
   /// Whether that is more than a step may end with.
@@ -152,6 +155,7 @@ class Contact {
   double tangential_stiffness(const ContactPair& pair, double stiffness) const;
   void end_points(const ContactPair& pair, const VectorX& q, Vec3d (&x)[4]) const;
   FrictionSetting setting(const Touching& t) const;
+  double pressing_energy() const;
   void add_pressing(const Touching& t, bool with_hessian, ContactLocal& out) const;
   void add_friction(const Touching& t, bool with_hessian, ContactLocal& out) const;
   void add_frozen_friction(const Touching& t, bool with_hessian, ContactLocal& out) const;
@@ -202,7 +206,7 @@ class Contact {
   std::vector<ContactKey> unrecorded_;  ///< what touches at the start of the step and has no record
   bool starting_ = false;
   const State* state_ = nullptr;
-  double duration_ = 0, start_energy_ = 0, deepest_ = kDeepest;
+  double duration_ = 0, start_energy_ = 0, start_pressing_ = 0, deepest_ = kDeepest;
   VectorX q1_;
   std::vector<Touching> touching_, lagged_;
   std::vector<Frozen> frozen_;

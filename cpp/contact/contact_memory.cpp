@@ -38,6 +38,31 @@ double Contact::energy() const {
   return sum;
 }
 
+double Contact::pressing_energy() const {
+  double sum = 0.0;
+  for (const Touching& t : touching_)
+    if (t.frozen < 0) sum += t.energy.value;
+  return sum;
+}
+
+double Contact::pressing_gain(const VectorX& change) const {
+  double gain = pressing_energy() - start_pressing_;
+  for (int i = 0; i < count(); ++i) {
+    const Touching& t = touching_[at(i)];
+    if (t.frozen >= 0) continue;
+    ContactLocal local{};
+    int dofs[kContactUnknowns];
+    add_pressing(t, false, local);
+    unknowns(i, dofs);
+    const double* g = local.gradient;
+    for (int k = 0; k < 12; ++k)
+      if (dofs[k] >= 0) gain -= g[k] * change(dofs[k]);
+    const Vec3d shift = shift_of(pairs_[at(t.pair)]);
+    gain += dot(shift, Vec3d{g[0] + g[3], g[1] + g[4], g[2] + g[5]});
+  }
+  return gain;
+}
+
 double Contact::depth() const {
   double deepest = 0.0;
   for (const Touching& t : touching_) {

@@ -342,6 +342,7 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
     if (result.too_deep) return result;
   }
   work.change = q1 - state.q;
+  if (equations.contact()) result.pressing_gain = equations.contact()->pressing_gain(work.change);
   work.mean = work.change / dt;
   VectorX& v1 = work.velocity;
   if (euler)

@@ -46,6 +46,7 @@ struct StepResult {
   double dissipated = 0;      ///< by drag and viscosity [J]
   double support_work = 0;    ///< [J]
   double stiffness_work = 0;  ///< put in where contact became stiffer or softer under load [J]
+  double pressing_gain = 0;   ///< put in by surfaces that press, `Contact::pressing_gain` [J]
 };
 
 /// Scratch of a step; owned by the world, so that a step does not allocate.

@@ -92,6 +92,7 @@ World::Implementation::Implementation(const Implementation& other)
       level(other.level),
       easy_steps(other.easy_steps),
       guard(other.guard),
+      contact_guard(other.contact_guard),
       error_rate(other.error_rate),
       grid_origin(other.grid_origin),
       grid_steps(other.grid_steps),

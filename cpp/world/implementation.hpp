@@ -48,6 +48,13 @@ struct EnergyGuard {
   std::optional<Energy> energy;                           ///< at the present state, where a step has just found it
 };
 
+/// Books of the watch over what contact puts in where surfaces slide by much within a step.
+struct ContactGuard {
+  double scale = 0;   ///< greatest energy so far, as it was looked at [J]
+  double excess = 0;  ///< put in and not lost since, as far as it is not long ago [J]
+  double put_in = 0;  ///< in the last step, by surfaces that press [J]
+};
+
 /// What a step that is taken back returns to.
 struct StepStart {
   State state;
@@ -99,6 +106,7 @@ struct World::Implementation {
   int level = 0;         ///< present halvings of the time step, in `notches()` to each
   int easy_steps = 0;
   EnergyGuard guard;
+  ContactGuard contact_guard;
   double error_rate = 0;   ///< greatest estimated error of the last steps over the power of the step that it goes with
   double grid_origin = 0;  ///< time = grid_origin + grid_steps time_step after whole steps, free of summed rounding
   std::int64_t grid_steps = 0;
@@ -196,6 +204,7 @@ struct World::Implementation {
   Energy energy_of(const State& at, double loads, double work_done, double lost) const;
   double actuation_energy() const;
   bool gains_energy();
+  bool contact_pumps(double dt);
   void check_explicit();
 };
 

@@ -6,7 +6,7 @@
 namespace withe {
 namespace {
 
-constexpr std::uint64_t kMagic = 0x3553454854495755ull;
+constexpr std::uint64_t kMagic = 0x3653454854495755ull;
 
 /// FNV-1a.
 std::uint64_t hash_of(std::string_view bytes) {
@@ -87,6 +87,7 @@ void exchange(Archive& io, Self& self) {
   io(self.grid_origin);
   io(self.grid_steps);
   for (auto* x : {&self.guard.turn, &self.guard.scale, &self.guard.excess}) io(*x);
+  for (auto* x : {&self.contact_guard.scale, &self.contact_guard.excess}) io(*x);
   for (auto& m : self.motions) {
     io(m.position);
     io(m.stretch);

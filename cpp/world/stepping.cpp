@@ -131,9 +131,11 @@ World::Implementation::Attempt World::Implementation::try_step(double dt) {
   const bool euler = options.integrator == Integrator::backward_euler;
   const bool guarded =
       options.adaptive && guard.rescue == 0 && (options.integrator == Integrator::implicit_midpoint || fourth || euler);
-  if (guarded || options.tolerance || fourth) keep_for_return();
+  const bool watched = options.adaptive && equations->contact() && options.integrator != Integrator::verlet;
+  if (guarded || watched || options.tolerance || fourth) keep_for_return();
   // Actuation changes what is stored without a motion, so the start is looked at while it is as it was.
   if (guarded && !guard.energy && actuated()) guard.energy = energy();
+  const EnergyGuard books = guard;
   const double allowed = options.tolerance ? *options.tolerance * dt / options.duration.value_or(1.0) : INFINITY;
   work.newton.finest = 0.01 * allowed;  // so that what Newton leaves is no part of the error
   double error = 0.0;
@@ -151,6 +153,11 @@ World::Implementation::Attempt World::Implementation::try_step(double dt) {
     // The same step again, and a while of them, without the flaw.
     guard.rescue = 256;
     return Attempt::rescued;
+  }
+  if (watched && contact_pumps(dt)) {
+    take_back();
+    guard = books;
+    return Attempt::gained_energy;
   }
   commit_step();
   if (!options.tolerance) return Attempt::easy;
@@ -289,6 +296,7 @@ bool World::Implementation::inner_step(double dt, int slot, double& error) {
   load_work += r.load_work;
   dissipated += r.dissipated;
   support_work += r.support_work + r.stiffness_work;
+  contact_guard.put_in = r.pressing_gain;
   if (options.integrator != Integrator::fourth_order || slot == 2) keep_reactions();
   if (ramped) {
     actuation -= actuation_energy();

@@ -206,3 +206,24 @@ def test_a_rope_that_runs_over_a_post_takes_no_energy_from_what_its_contacts_rem
     after = simulation.energy()
     assert before.loads - after.loads > 0.03  # [J]
     assert abs(after.work - before.work) < 1e-3 * (before.loads - after.loads)
+
+
+@pytest.mark.parametrize("integrator", IMPLICIT)
+@pytest.mark.parametrize("post", [6e-3, 12e-3])  # [m]
+def test_a_rod_that_wraps_a_post_within_a_step_gains_nothing_from_its_edges(integrator: Any, post: float) -> None:
+    length, radius, speed = 0.31, 2.4e-3, 5.0  # [m], [m], [m/s]
+    scene = withe.Scene(gravity=(0, 0, 0))
+    scene.add_capsule((0, -1, 0), (0, 1, 0), post)
+    middle = np.array([0.27 * length, 0.0, post + 1.5 * radius])
+    half = np.array([0.5 * length, 0.0, 0.0])
+    soft = withe.Material(youngs_modulus=2.77e5, poisson_ratio=0.5, density=1000.0)
+    rod = scene.add_rod(start=middle - half, end=middle + half, nodes=7, radius=radius, material=soft)
+    simulation = scene.build(integrator=integrator, time_step=0.01)
+    simulation.set_velocities(rod, np.tile([0.0, 0.0, -speed], (7, 1)))
+    least = greatest = simulation.energy().total
+    for _ in range(12):
+        simulation.step()
+        energy = simulation.energy()
+        kept = energy.total - energy.work
+        assert kept - least < 5e-3 * greatest
+        least = min(least, kept)
