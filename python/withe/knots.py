@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 import numpy.typing as npt
 
@@ -11,6 +13,7 @@ from withe.drawing import natural_shape
 __all__ = ["granny_knot", "link", "overhand_knot", "reef_knot", "signed_crossings", "writhe"]
 
 FloatArray = npt.NDArray[np.float64]
+Tails = Literal["up", "sideways"]
 
 # Of the helices that two strands wind about each other, over the radius of the rod: they do not touch yet.
 _BRAID_RADIUS = 2.5
@@ -107,7 +110,7 @@ def overhand_knot(
     return _even(whole(low, tail), nodes, length, braid_radius)
 
 
-def reef_knot(*, length: float = 1.0, radius: float = 2e-3, nodes: int = 301) -> FloatArray:
+def reef_knot(*, length: float = 1.0, radius: float = 2e-3, nodes: int = 301, tails: Tails = "up") -> FloatArray:
     """Points of a loose reef knot: two half knots of opposite hands on one rod, whose middle is the first one's loop.
 
     Parameters
@@ -117,29 +120,32 @@ def reef_knot(*, length: float = 1.0, radius: float = 2e-3, nodes: int = 301) ->
     radius : float [m]
         Of its section.
     nodes : int
+    tails : {"up", "sideways"}
+        Where the ends go off: along +z, or along x, away from each other, as they do when they are pulled apart.
 
     Returns
     -------
     ndarray of shape (nodes, 3) [m]
-        Evenly spaced; the ends go off upwards (+z), the loop hangs below.
+        Evenly spaced; the loop hangs below. Half a turn about z takes one half into the other.
 
     Raises
     ------
     ValueError
-        A length too small for the knot.
+        A length too small for the knot, or unknown tails.
     """
-    return _two_half_knots(-1.0, length, radius, nodes)
+    return _two_half_knots(-1.0, length, radius, nodes, tails)
 
 
-def granny_knot(*, length: float = 1.0, radius: float = 2e-3, nodes: int = 301) -> FloatArray:
+def granny_knot(*, length: float = 1.0, radius: float = 2e-3, nodes: int = 301, tails: Tails = "up") -> FloatArray:
     """Points of a loose granny knot: like `reef_knot`, with two half knots of the same hand."""
-    return _two_half_knots(1.0, length, radius, nodes)
+    return _two_half_knots(1.0, length, radius, nodes, tails)
 
 
-def _two_half_knots(second_hand: float, length: float, radius: float, nodes: int) -> FloatArray:
+def _two_half_knots(second_hand: float, length: float, radius: float, nodes: int, tails: Tails) -> FloatArray:
     length = validation.positive(length, "length of the rod")
     radius = validation.positive(radius, "radius of the rod")
     nodes = validation.integer(nodes, "nodes", 10, 10**7)
+    validation.choice(tails, "tails of the knot", ("up", "sideways"))
     r = _BRAID_RADIUS * radius
     width = _BRAID_SLOPE * np.pi * r * 3.0
     rise = 8.0 * r  # between the braids
@@ -187,10 +193,13 @@ def _two_half_knots(second_hand: float, length: float, radius: float, nodes: int
     tail = 0.5 * length - _length(arm)
     if tail <= 0.0:
         raise ValueError(f"length of the rod must be greater for this knot, got {length:g} m")
-    angle = np.linspace(0.0, 0.5 * np.pi, 30)[1:]
-    bend = top + 4.0 * r * np.stack([-np.sin(angle), np.zeros_like(angle), 1.0 - np.cos(angle)], axis=1)
-    up = bend[-1] + np.array([[0.0, 0.0, max(tail - 2.0 * np.pi * r, radius)]])
-    arm = np.concatenate([arm, bend, up])
+    if tails == "sideways":
+        arm = np.concatenate([arm, top + np.array([[-tail, 0.0, 0.0]])])
+    else:
+        angle = np.linspace(0.0, 0.5 * np.pi, 30)[1:]
+        bend = top + 4.0 * r * np.stack([-np.sin(angle), np.zeros_like(angle), 1.0 - np.cos(angle)], axis=1)
+        up = bend[-1] + np.array([[0.0, 0.0, max(tail - 2.0 * np.pi * r, radius)]])
+        arm = np.concatenate([arm, bend, up])
     return _even(np.concatenate([(arm * mirror)[::-1], arm[1:]]), nodes, length, r)
 
 

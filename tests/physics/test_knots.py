@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -82,10 +83,24 @@ def test_overhand_knots_are_torus_knots_and_do_not_touch_themselves(n: int) -> N
     assert len(scene.build().contacts()) == 0
 
 
-def test_reef_and_granny_differ_by_their_crossings() -> None:
+@pytest.mark.parametrize("tails", ["up", "sideways"])
+def test_reef_and_granny_differ_by_their_crossings(tails: Literal["up", "sideways"]) -> None:
     view = (0.02, 1.0, 0.01)
-    assert signed_crossings(withe.shapes.reef_knot(), view) == 0
-    assert abs(signed_crossings(withe.shapes.granny_knot(), view)) == 6
+    assert signed_crossings(withe.shapes.reef_knot(tails=tails), view) == 0
+    assert abs(signed_crossings(withe.shapes.granny_knot(tails=tails), view)) == 6
+
+
+@pytest.mark.parametrize("draw", [withe.shapes.reef_knot, withe.shapes.granny_knot])
+def test_knots_with_tails_sideways_are_two_alike_halves_that_do_not_touch(draw: Callable[..., FloatArray]) -> None:
+    points = draw(length=1.0, radius=2e-3, tails="sideways")
+    assert np.linalg.norm(np.diff(points, axis=0), axis=1).sum() == pytest.approx(1.0, abs=1e-9)
+    assert points == pytest.approx(points[::-1] * [-1.0, -1.0, 1.0], abs=1e-12)
+    assert points[0, 2] == pytest.approx(points[1, 2], abs=1e-12)
+    assert abs(points[0, 0] - points[-1, 0]) == pytest.approx(np.ptp(points[:, 0]), rel=1e-12)
+    scene = withe.Scene()
+    scene.add_rod(points=points, radius=2e-3, material=withe.Material(youngs_modulus=1e6, density=1000.0))
+    scene.enable_contact()
+    assert len(scene.build().contacts()) == 0
 
 
 def test_a_pulled_knot_stays_the_knot_that_it_is() -> None:

@@ -19,6 +19,12 @@ EXAMPLES = {
         0.05,
     ),
     "friction.py": (["--forces", "11"], r"at most ([.\d]+)% off", 0.0, 1.0),
+    "granny_reef.py": (
+        ["--frictions", "0.5", "--moduli", "--leaning", "--step", "5e-3"],
+        r"granny [-.\de]+: \+([.\d]+)%; half the step changes 0",
+        8.0,
+        12.0,
+    ),
     "gripper.py": (["--duration", "4"], r"friction 0.5: \d+ contacts, nearest ([-+.\d]+) radii", -0.05, 0.1),
     "helix.py": ([], r"(\d+) um from the public code", 0.0, 100.0),
     "knot.py": (["--nodes", "301", "--points", "2"], r" 200 .*?([-+.\d]+)%", -6.0, 6.0),
