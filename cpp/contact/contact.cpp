@@ -152,6 +152,7 @@ const ContactRecord* Contact::record_of(const ContactKey& key) const { return fi
 void Contact::begin(const State& state, double duration) {
   state_ = &state;
   duration_ = duration;
+  eased_ = 1.0;
   shift_.clear();
   blocked_ = false;
   place_obstacles(state.obstacles);

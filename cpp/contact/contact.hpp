@@ -91,6 +91,10 @@ class Contact {
   /// How much of a change of q1 may be made before centrelines come too close, from 0 to 1.
   double allowed(const VectorX& q1, const VectorX& change);
 
+  /// Whether friction grows with slip, so that it can be eased: by how much the slip tolerance is greater for a while.
+  bool eases() const;
+  void ease(double times) { eased_ = times; }
+
   /// Takes from a predicted change of q what would move surfaces that stick: friction is steep there, and from outside
   /// Newton's method would fall past it.
   void hold_sticking(const State& state, VectorX& change) const;
@@ -161,6 +165,9 @@ class Contact {
   void add_frozen_friction(const Touching& t, bool with_hessian, ContactLocal& out) const;
   FrozenForce frozen_force(const Touching& t) const;
   Vec3d frozen_slip(const Touching& t) const;
+  double slip_rate() const;
+  /// Of friction by the slip, at most [N/m].
+  double friction_slope(const Touching& t) const;
   void set_direction(const ContactPair& pair, Frozen& frozen) const;
   void record_frozen(std::vector<ContactRecord>& records) const;
   void freeze();
@@ -206,7 +213,7 @@ class Contact {
   std::vector<ContactKey> unrecorded_;  ///< what touches at the start of the step and has no record
   bool starting_ = false;
   const State* state_ = nullptr;
-  double duration_ = 0, start_energy_ = 0, start_pressing_ = 0, deepest_ = kDeepest;
+  double duration_ = 0, eased_ = 1, start_energy_ = 0, start_pressing_ = 0, deepest_ = kDeepest;
   VectorX q1_;
   std::vector<Touching> touching_, lagged_;
   std::vector<Frozen> frozen_;

@@ -26,6 +26,23 @@ void Contact::values_at(const ContactPair& pair, const VectorX& q, double (&valu
   if (pair.key.b >= 0) values[13] = q(model_.edge_dof[at(pair.key.b)]);
 }
 
+bool Contact::eases() const {
+  const FrictionLaw law = model_.description.contact.friction_law;
+  return frictional_ && (law == FrictionLaw::implicit || law == FrictionLaw::lagged);
+}
+
+/// K / (2 dt), over the slip tolerance [1/m].
+double Contact::slip_rate() const { return 7.5 / (eased_ * model_.description.contact.slip_tolerance * duration_); }
+
+double Contact::friction_slope(const Touching& t) const {
+  const ContactPair& pair = pairs_[at(t.pair)];
+  if (!(pair.friction > 0.0)) return 0.0;
+  if (t.frozen >= 0) return pair.friction * frozen_[at(t.frozen)].pressing * slip_rate();
+  if (freezes()) return 0.0;
+  if (model_.description.contact.friction_law == FrictionLaw::anchored) return tangential_stiffness(pair, t.stiffness);
+  return -pair.friction * t.energy.first * slip_rate();
+}
+
 FrictionSetting Contact::setting(const Touching& t) const {
   const ContactDescription& contact = model_.description.contact;
   const ContactPair& pair = pairs_[at(t.pair)];
@@ -38,7 +55,7 @@ FrictionSetting Contact::setting(const Touching& t) const {
   f.stiffness = t.stiffness;
   f.yielded = t.yielded;
   f.tangential_stiffness = tangential_stiffness(pair, t.stiffness);
-  f.rate = 7.5 / (contact.slip_tolerance * duration_);
+  f.rate = slip_rate();
   f.stick = t.stick;
   f.spatial = !model_.planar();
   f.centreline = contact.centreline_friction;
@@ -147,7 +164,7 @@ Contact::FrozenForce Contact::frozen_force(const Touching& t) const {
   const ContactPair& pair = pairs_[at(t.pair)];
   const Frozen& frozen = frozen_[at(t.frozen)];
   const ContactDescription& contact = model_.description.contact;
-  const double rate = 7.5 / (contact.slip_tolerance * duration_), limit = pair.friction * frozen.pressing;
+  const double rate = slip_rate(), limit = pair.friction * frozen.pressing;
   const Vec3d slip = frozen_slip(t);
   FrozenForce out{};
   if (contact.friction_law == FrictionLaw::semi_explicit) {

@@ -74,7 +74,8 @@ double Contact::depth() const {
 
 double Contact::rounding(int i, double reach) const {
   const Touching& t = touching_[at(i)];
-  return 8.0 * std::numeric_limits<double>::epsilon() * reach * t.energy.second;
+  const double stiffness = std::max(t.energy.second, friction_slope(t));
+  return 8.0 * std::numeric_limits<double>::epsilon() * reach * stiffness;
 }
 
 /// The depth that must press no more for a contact that becomes stiffer to press as hard as before; not so much that

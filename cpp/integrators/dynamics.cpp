@@ -117,12 +117,40 @@ void follow_supports(Equations& equations, const Newton& newton, double part, co
   work.move += held;
 }
 
+/// Where surfaces stop or turn round, friction jumps within a slip far smaller than an iteration, and Newton's method
+/// goes to and fro across it. So the slip over which it grows is made great first, and small little by little: what
+/// sticks slips in proportion to it, which leads from one solution to the next.
+NewtonResult solve_eased(Equations& equations, const Newton& newton, bool mixed, double h, StepWorkspace& work) {
+  constexpr std::array<double, 7> kEasing{8192.0, 4096.0, 512.0, 64.0, 16.0, 4.0, 1.0};
+  constexpr int kMost = 20;  // iterations
+  NewtonResult found;
+  VectorX &last = work.velocity, &next = work.assumed;
+  int spent = 0;
+  for (std::size_t k = 0; k < kEasing.size(); ++k) {
+    if (k > 1) {
+      next = work.z + ((kEasing[k] - kEasing[k - 1]) / (kEasing[k - 1] - kEasing[k - 2])) * (work.z - last);
+      last = work.z;
+      work.move = next - work.z;
+      work.z += equations.allowed(work.z, work.move) * work.move;
+    } else {
+      last = work.z;
+    }
+    equations.contact()->ease(kEasing[k]);
+    found = newton.solve(equations, work.z, nullptr, kMost, work.newton, mixed, h);
+    spent += found.iterations;
+    if (!found.converged) break;
+  }
+  equations.contact()->ease(1.0);
+  found.iterations = spent;
+  return found;
+}
+
 /// Finds the inner configuration, `work.z`: from the extrapolated motion first; where that is too far off, from a
 /// steady one, or from rest, whose first iteration is the linear step.
 NewtonResult find_inner(Equations& equations, const Newton& newton, const Options& options, const StepPlan& plan,
                         double h, const State& state, const Predictor& predictor, StepWorkspace& work) {
   struct Start {
-    bool moving, accelerated, mixed;
+    bool moving, accelerated, mixed, eased = false;
   };
   NewtonResult found;
   int spent = 0;
@@ -136,11 +164,17 @@ NewtonResult find_inner(Equations& equations, const Newton& newton, const Option
   if (circling && !exact) --known.relaxed_solves;
   constexpr int kWait = 16;
   bool first = true;
-  std::array<Start, 4> starts{
-      {{true, true, mixed}, {true, false, mixed}, {false, false, mixed}, {true, false, !mixed}}};
+  std::array<Start, 5> starts{{{true, true, mixed},
+                               {true, false, mixed},
+                               {false, false, mixed},
+                               {true, false, !mixed},
+                               {false, false, mixed, true}}};
   // Where surfaces stick, a motion that lets them slip leads far off, and from rest Newton's method finds its way soon.
+  const bool eases = equations.contact() && equations.contact()->eases();
   if (equations.contact() && equations.contact()->frictional()) std::swap(starts[1], starts[2]);
+  if (eases) std::rotate(starts.begin() + 2, starts.end() - 1, starts.end());
   for (const Start& start : starts) {
+    if (start.eased && !eases) continue;
     if (start.accelerated && (points == 0 || work.repeated)) continue;
     if (start.accelerated) {
       predictor.extrapolate(state.time + 0.5 * plan.dt, points, work.mean);
@@ -158,7 +192,8 @@ NewtonResult find_inner(Equations& equations, const Newton& newton, const Option
     first = false;
     const int limit = trial ? std::min(12, options.max_iterations) : options.max_iterations;
     start_axial_force(equations, state.q, work.newton.axial_force);
-    found = newton.solve(equations, work.z, nullptr, limit, work.newton, start.mixed, h);
+    found = start.eased ? solve_eased(equations, newton, start.mixed, h, work)
+                        : newton.solve(equations, work.z, nullptr, limit, work.newton, start.mixed, h);
     spent += found.iterations;
     if (found.converged) {
       if (circling && mixed && !start.mixed) known.plain_solves = kWait;

@@ -27,7 +27,7 @@ struct Statistics {
   long iterations = 0;  ///< Newton iterations
   long factorizations = 0;
   double largest_turn = 0;  ///< of an edge in one step [rad]; plain midpoint loses energy balance above about 0.1
-  long energy_momentum_steps = 0;                            ///< taken in place of midpoint steps that gained energy
+  long energy_momentum_steps = 0;  ///< taken in place of midpoint steps that gained energy
   double assembly_time = 0, solve_time = 0, fluid_time = 0, total_time = 0;  ///< [s]
 };
 

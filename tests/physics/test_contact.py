@@ -227,3 +227,26 @@ def test_a_rod_that_wraps_a_post_within_a_step_gains_nothing_from_its_edges(inte
         kept = energy.total - energy.work
         assert kept - least < 5e-3 * greatest
         least = min(least, kept)
+
+
+@pytest.mark.parametrize("integrator", ["backward_euler", "implicit_midpoint"])
+@pytest.mark.parametrize("on_a_post", [False, True])
+def test_fast_rods_that_friction_stops_within_a_step_need_no_shorter_ones(integrator: Any, on_a_post: bool) -> None:
+    length, modulus, nodes, speed, step = (0.175, 1.3e7, 18, 42.0, 2.5e-4) if on_a_post else (0.4, 1e8, 30, 30.0, 1e-5)
+    scene = withe.Scene(gravity=(0, 0, 0))
+    if on_a_post:
+        scene.add_capsule((0, -1, 0), (0, 1, 0), 0.02, friction=0.7)
+        middle, direction, along = np.array([0.227 * length, 0.0, 0.0275]), np.array([1.0, 0.0, 0.0]), 0.0
+    else:
+        scene.add_floor(friction=0.7)
+        direction, along = np.array([1.0, 0.0, 0.3]) / np.hypot(1.0, 0.3), 0.5
+        middle = np.array([0.0, 0.0, 0.5 * length * direction[2] + 0.0075])
+    half = 0.5 * length * direction
+    stiff = withe.Material(youngs_modulus=modulus, poisson_ratio=0.5, density=1000.0)
+    rod = scene.add_rod(start=middle - half, end=middle + half, nodes=nodes, radius=RADIUS, material=stiff)
+    scene.enable_contact(friction=0.7, friction_model="implicit")
+    simulation = scene.build(integrator=integrator, time_step=step)
+    simulation.set_velocities(rod, np.tile([along * speed, 0.0, -speed], (nodes, 1)))
+    simulation.step(20)
+    assert simulation.statistics.rejected_steps < 5
+    assert simulation.energy().dissipated > 0.0
