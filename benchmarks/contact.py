@@ -9,6 +9,7 @@ hundredth of a radius apart, that fall onto each other.
 
 from __future__ import annotations
 
+import importlib.util
 import math
 import sys
 import time
@@ -24,6 +25,9 @@ import flagella
 import gripper
 
 PILE_LENGTH, PILE_RADIUS, PILE_LAYERS = 0.1, 2e-3, 10  # [m]
+KNOT = {"length": 1.0, "radius": 1.6e-3, "shortening": 0.6}  # [m]
+KNOT_MODULUS, KNOT_DENSITY, KNOT_SPEED, KNOT_STEP = 1.8e5, 1180.0, 1e-2, 2.5e-3  # [Pa], [kg/m^3], of a grip [m/s], [s]
+HAVE_ELASTICA = importlib.util.find_spec("elastica") is not None
 
 
 def _timed(simulation: withe.Simulation, steps: int, warm: int = 0) -> tuple[float, int]:
@@ -51,16 +55,16 @@ def grippers(report: Report, quick: bool) -> None:
 def _knot(friction: float, law: withe.parts.FrictionModel) -> withe.Simulation:
     """An overhand knot of 301 nodes whose ends are pulled apart at 2 cm/s."""
     scene = withe.Scene(gravity=(0.0, 0.0, 0.0))
-    rubber = withe.Material(youngs_modulus=1.8e5, poisson_ratio=0.5, density=1180.0)
-    points = withe.shapes.overhand_knot(n=1, length=1.0, radius=1.6e-3, shortening=0.6)
-    rope = scene.add_rod(points=points, nodes=301, radius=1.6e-3, material=rubber, natural="straight")
+    rubber = withe.Material(youngs_modulus=KNOT_MODULUS, poisson_ratio=0.5, density=KNOT_DENSITY)
+    points = withe.shapes.overhand_knot(n=1, **KNOT)
+    rope = scene.add_rod(points=points, nodes=301, radius=KNOT["radius"], material=rubber, natural="straight")
     grips = [scene.clamp(end, hold="edge", spin=True) for end in (rope.start, rope.end)]
     scene.enable_contact(friction=friction, friction_model=law)
-    simulation = scene.build(integrator="backward_euler", time_step=2.5e-3)
+    simulation = scene.build(integrator="backward_euler", time_step=KNOT_STEP)
     ends = simulation.positions(rope)[[0, -1]]
     along = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
     for grip, end, sign in zip(grips, ends, (-1.0, 1.0), strict=True):
-        simulation.move(grip, position=end + sign * 0.2 * along, over=20.0)
+        simulation.move(grip, position=end + sign * 20.0 * KNOT_SPEED * along, over=20.0)
     return simulation
 
 
@@ -77,6 +81,35 @@ def knots(report: Report, quick: bool) -> None:
         rows.append((name, f"{1e3 * seconds:.2f}", contacts))
         report.goal(f"knot, friction {name} [ms a step]", None if quick else 1e3 * seconds, most, at_least=False)
     report.table("Overhand knot, 301 nodes", ("friction", "ms a step", "contacts"), rows)
+
+
+def beside_elastica(report: Report, quick: bool) -> None:
+    """The knot without friction, and the same in PyElastica at the largest step that survives half a second."""
+    if not HAVE_ELASTICA or quick:
+        return
+    from elastica_contact import KnotRun, largest_stable_step
+
+    radius, points = KNOT["radius"], withe.shapes.overhand_knot(n=1, **KNOT)
+    run = {
+        "points": points,
+        "radius": radius,
+        "youngs_modulus": KNOT_MODULUS,
+        "density": KNOT_DENSITY,
+        "stiffness": 9.0 * KNOT_MODULUS * math.pi * radius / 4.0,  # as in the examples: 9 B / radius^3
+        "speed": KNOT_SPEED,
+    }
+    sound = float(np.linalg.norm(points[1] - points[0])) / math.sqrt(KNOT_MODULUS / KNOT_DENSITY)
+    step = largest_stable_step(run, 0.6 * sound, 0.5)
+    other = KnotRun(**run, time_step=step)
+    other.seconds_per_step(200)
+    theirs, (ours, _) = other.seconds_per_step(500), _timed(_knot(0.0, "lagged"), 200, 200)
+    rows = [
+        (name, f"{1e3 * size:.3g}", f"{1e3 * seconds:.2f}", f"{seconds / size:.2f}")
+        for name, size, seconds in (("ours", KNOT_STEP, ours), ("PyElastica", step, theirs))
+    ]
+    report.table(
+        "The knot without friction, beside PyElastica's rod on itself", ("", "step [ms]", "ms a step", "s per s"), rows
+    )
 
 
 def fluids(report: Report, quick: bool) -> None:
@@ -125,10 +158,10 @@ def piles(report: Report, quick: bool) -> None:
 
 
 def main() -> None:
-    """All four."""
+    """All five."""
     quick = arguments(__doc__).quick
     report = Report("contact", quick=quick)
-    parts: tuple[Callable[[Report, bool], None], ...] = (grippers, knots, fluids, piles)
+    parts: tuple[Callable[[Report, bool], None], ...] = (grippers, knots, beside_elastica, fluids, piles)
     with bar(len(parts), "contact", "parts") as shown:
         for part in parts:
             part(report, quick)

@@ -14,7 +14,7 @@ import numpy as np
 from elastica.timestepper.symplectic_steppers import PositionVerlet
 from rods_in_motion import Case, Motion, centreline, first_mode, steps_of
 
-__all__ = ["ElasticaRun", "largest_stable_step", "version"]
+__all__ = ["ElasticaRun", "frames_along", "largest_stable_step", "version"]
 
 
 class _System(elastica.BaseSystemCollection, elastica.Constraints, elastica.Forcing):
@@ -28,7 +28,7 @@ def version() -> str:
     return f"PyElastica {of('pyelastica')}, numba {of('numba')}"
 
 
-def _directors(tangents: np.ndarray) -> np.ndarray:
+def frames_along(tangents: np.ndarray) -> np.ndarray:
     """Frames (3, 3, elements) without twist: the first director is carried along by parallel transport."""
     normal = np.cross(tangents[0], (0.0, 1.0, 0.0))
     normal /= np.linalg.norm(normal)
@@ -66,7 +66,7 @@ class ElasticaRun:
         points = centreline(case, s)
         tangents = np.diff(points, axis=0)
         tangents /= np.linalg.norm(tangents, axis=1)[:, None]
-        frames = _directors(tangents)
+        frames = frames_along(tangents)
         self._system = _System()
         self.rod = elastica.CosseratRod.straight_rod(
             elements,
