@@ -102,20 +102,20 @@ bool World::Implementation::gains_energy() {
 /// on the way would have. Whether the step just taken, from where `keep_for_return` was called, gained by that more
 /// than half of what is left of a share of the greatest energy; losses make room, and so does time.
 bool World::Implementation::contact_pumps(double dt) {
-  constexpr double kMost = 3e-3, kLeast = 1e-6, kMemory = 256.0;  // of the greatest energy; time steps
+  constexpr double kMost = 3e-3, kRoom = 2e-5;  // of the greatest energy; that a time step makes
   auto& [scale, excess, put_in] = contact_guard;
   double gain = put_in;
-  const auto too_much = [&] { return gain > kLeast * scale && gain > 0.5 * (kMost * scale - excess); };
+  const auto room = [&] { return kRoom * scale * dt / options.time_step; };
+  const auto too_much = [&] { return gain > room() + 0.5 * std::max(kMost * scale - excess, 0.0); };
   if (too_much()) {
     // What other parts lose makes up for it, but what drag, viscosity and friction take does not.
-    const Energy now = energy(),
-                 then = energy_of(kept.state, kept.load_work, kept.support_work + kept.actuation_work, kept.dissipated);
+    const Energy now = energy();
+    const Energy then = energy_of(kept.state, kept.load_work, kept.support_work + kept.actuation_work, kept.dissipated);
     gain = put_in + (now.total - now.work + now.dissipated) - (then.total - then.work + then.dissipated);
-    for (const Energy& e : {now, then})
-      scale = std::max({scale, e.kinetic, 0.1 * (e.stretch + e.bend + e.twist), e.contact});
+    for (const Energy& e : {now, then}) scale = std::max(scale, e.kinetic + e.stretch + e.bend + e.twist + e.contact);
     if (too_much()) return true;
   }
-  excess = std::max(std::exp(-dt / (kMemory * options.time_step)) * excess + gain, 0.0);
+  excess = std::max(excess + gain - room(), 0.0);
   return false;
 }
 
