@@ -30,7 +30,7 @@ enum class Symmetry { symmetric, unsymmetric };
 enum class SolverKind {
   automatic,  ///< band where the half bandwidth is small, otherwise sparse
   band,       ///< LDL^T of fixed half bandwidth, or band LU with partial pivoting
-  sparse,     ///< Eigen SimplicialLDLT, or KLU
+  sparse,     ///< multifrontal LDL^T, or KLU
 };
 
 enum class FactorStatus { ok, singular };

@@ -1,33 +1,25 @@
 #include "solvers/sparse_ldlt.hpp"
 
-#include <Eigen/OrderingMethods>
-#include <Eigen/SparseCore>
 #include <algorithm>
 #include <vector>
 
+#include "solvers/front_kernels.hpp"
 #include "solvers/pattern_lookup.hpp"
+#include "solvers/supernodes.hpp"
 
 namespace withe {
 namespace {
 
-/// New order of the unknowns that keeps L sparse: order[new] = old.
-std::vector<int> minimum_degree_order(const SparsityPattern& pattern) {
-  const std::vector<double> ones(pattern.row_indices.size(), 1.0);
-  const Eigen::Map<const Eigen::SparseMatrix<double>> matrix(
-      pattern.size, pattern.size, static_cast<Eigen::Index>(pattern.row_indices.size()), pattern.column_starts.data(),
-      pattern.row_indices.data(), ones.data());
-  Eigen::AMDOrdering<int>::PermutationType order;
-  Eigen::AMDOrdering<int>()(Eigen::SparseMatrix<double>(matrix), order);
-  return {order.indices().begin(), order.indices().end()};
-}
+int padded(int length) { return (length + kFrontPadding - 1) / kFrontPadding * kFrontPadding; }
 
 /// values(): lower triangle column by column, in the order of the pattern.
 ///
-/// Up-looking: row k of L follows from rows 0 ... k - 1. Its pattern is found once, in `analyze`; the numeric
-/// phase only walks through it and appends the row to the columns of L.
+/// Multifrontal [Liu 1992]: a supernode's columns are eliminated in a dense front, what is left of the front waits on a
+/// stack, and its parent adds it to its own. Patterns and places are found once; the numeric phase follows them.
 class SparseLdlt final : public LinearSolver {
  public:
-  explicit SparseLdlt(const SparsityPattern& pattern) : pattern_(pattern), work_(pattern.size, 0.0) {
+  explicit SparseLdlt(const SparsityPattern& pattern)
+      : pattern_(pattern), nodes_(find_supernodes(pattern)), inverse_pivots_(pattern.size, 0.0) {
     lower_starts_.reserve(pattern.size + 1);
     lower_starts_.push_back(0);
     for (int column = 0; column < pattern.size; ++column) {
@@ -36,7 +28,7 @@ class SparseLdlt final : public LinearSolver {
       lower_starts_.push_back(lower_starts_.back() + count - above);
     }
     values_.assign(static_cast<std::size_t>(lower_starts_.back()) + kPadding, 0.0);
-    analyze();
+    find_places();
   }
 
   int size() const override { return pattern_.size; }
@@ -54,26 +46,30 @@ class SparseLdlt final : public LinearSolver {
     require_shift(shift, size());
     factorized_ = false;
     Factorization result;
-    std::copy(column_starts_.begin(), column_starts_.end() - 1, column_ends_.begin());
-    std::fill(work_.begin(), work_.end(), 0.0);
-    for (int k = 0; k < size(); ++k) {
-      for (int p = upper_starts_[k]; p < upper_starts_[k + 1]; ++p)
-        work_[upper_columns_[p]] = values_[upper_sources_[p]];
-      double pivot = values_[lower_starts_[order_[k]]];
-      if (!shift.empty()) pivot += shift[order_[k]];
-      for (int p = row_starts_[k]; p < row_starts_[k + 1]; ++p) {
-        const int column = row_columns_[p];
-        const double unscaled = work_[column];
-        work_[column] = 0.0;
-        const int end = column_ends_[column];
-        for (int q = column_starts_[column]; q < end; ++q) work_[row_indices_[q]] -= lower_[q] * unscaled;
-        lower_[end] = unscaled * inverse_pivots_[column];
-        pivot -= lower_[end] * unscaled;
-        column_ends_[column] = end + 1;
+    std::fill(factor_.begin(), factor_.end(), 0.0);
+    for (std::size_t p = 0; p < places_.size(); ++p) factor_[places_[p]] = values_[p];
+    if (!shift.empty())
+      for (int k = 0; k < size(); ++k) factor_[pivots_[k]] += shift[nodes_.order[k]];
+    std::ptrdiff_t top = 0;  // of the stack
+    for (int s = 0; s < nodes_.count(); ++s) {
+      Front front = front_of(s);
+      front.rest = rest_.data() + top;
+      const int rest = nodes_.rest(s);
+      const std::ptrdiff_t size_of_rest = std::ptrdiff_t{front.rest_length} * rest;
+      std::fill_n(front.rest, size_of_rest, 0.0);
+      std::ptrdiff_t below = top;
+      for (int child = last_child_[s]; child >= 0; child = sibling_[child]) {
+        below -= std::ptrdiff_t{padded(nodes_.rest(child))} * nodes_.rest(child);
+        add_rest(child, rest_.data() + below, front);
       }
-      if (!is_usable_pivot(pivot)) return {FactorStatus::singular, 0};
-      result.negative_pivots += pivot < 0.0;
-      inverse_pivots_[k] = 1.0 / pivot;
+      front_kernels().eliminate(front);
+      for (int c = 0; c < front.columns; ++c) {
+        const double pivot = front.factor[std::ptrdiff_t{front.length} * c + c];
+        if (!is_usable_pivot(pivot)) return {FactorStatus::singular, 0};
+        result.negative_pivots += pivot < 0.0;
+      }
+      if (below < top) std::copy_n(front.rest, size_of_rest, rest_.data() + below);
+      top = below + size_of_rest;
     }
     factorized_ = true;
     return result;
@@ -81,17 +77,13 @@ class SparseLdlt final : public LinearSolver {
 
   void solve(std::span<double> right_hand_side) const override {
     require_solvable(factorized_, right_hand_side, size());
-    for (int k = 0; k < size(); ++k) work_[k] = right_hand_side[order_[k]];
-    for (int k = 0; k < size(); ++k) {
-      const double x = work_[k];
-      for (int q = column_starts_[k]; q < column_starts_[k + 1]; ++q) work_[row_indices_[q]] -= lower_[q] * x;
-    }
-    for (int k = size() - 1; k >= 0; --k) {
-      double sum = work_[k] * inverse_pivots_[k];
-      for (int q = column_starts_[k]; q < column_starts_[k + 1]; ++q) sum -= lower_[q] * work_[row_indices_[q]];
-      work_[k] = sum;
-    }
-    for (int k = 0; k < size(); ++k) right_hand_side[order_[k]] = work_[k];
+    for (int k = 0; k < size(); ++k) work_[k] = right_hand_side[nodes_.order[k]];
+    const FrontKernels& kernels = front_kernels();
+    const auto x = [&](int s) { return work_.data() + nodes_.column_starts[s]; };
+    const auto rows = [&](int s) { return nodes_.rows.data() + nodes_.row_starts[s]; };
+    for (int s = 0; s < nodes_.count(); ++s) kernels.solve_down(front_of(s), x(s), rows(s), work_.data());
+    for (int s = nodes_.count() - 1; s >= 0; --s) kernels.solve_up(front_of(s), x(s), rows(s), work_.data());
+    for (int k = 0; k < size(); ++k) right_hand_side[nodes_.order[k]] = work_[k];
   }
   void solve_transposed(std::span<double> right_hand_side) const override { solve(right_hand_side); }
 
@@ -115,61 +107,96 @@ class SparseLdlt final : public LinearSolver {
   std::unique_ptr<LinearSolver> clone() const override { return std::make_unique<SparseLdlt>(*this); }
 
  private:
-  /// Patterns of the permuted matrix and of L, from the elimination tree [Liu 1990, sec. 3 and 5].
-  void analyze() {
-    const int n = size();
-    order_ = minimum_degree_order(pattern_);
-    std::vector<int> place(n);
-    for (int k = 0; k < n; ++k) place[order_[k]] = k;
+  Front front_of(int s) const {
+    Front front;
+    front.columns = nodes_.columns(s);
+    front.rows = front.columns + nodes_.rest(s);
+    front.length = padded(front.rows);
+    front.rest_length = padded(nodes_.rest(s));
+    front.factor = factor_.data() + factor_starts_[s];
+    front.inverse_pivots = inverse_pivots_.data() + nodes_.column_starts[s];
+    front.scratch = scratch_.data();
+    return front;
+  }
 
-    std::vector<int> parent(n, -1);
-    std::vector<int> visitor(n, -1);
-    std::vector<int> counts(n, 0);
-    upper_starts_.assign(1, 0);
-    row_starts_.assign(1, 0);
-    for (int k = 0; k < n; ++k) {
-      visitor[k] = k;
-      const int old = order_[k];
-      for (int p = pattern_.column_starts[old]; p < pattern_.column_starts[old + 1]; ++p) {
-        const int other = pattern_.row_indices[p];
-        const int column = place[other];
-        if (column >= k) continue;
-        upper_columns_.push_back(column);
-        upper_sources_.push_back(static_cast<int>(offset(std::max(old, other), std::min(old, other))));
-        for (int node = column; visitor[node] != k; node = parent[node]) {
-          if (parent[node] < 0) parent[node] = k;
-          visitor[node] = k;
-          row_columns_.push_back(node);
-          ++counts[node];
+  /// Adds what is left of a child to its parent's front.
+  void add_rest(int child, const double* rest, const Front& parent) const {
+    const int rows = nodes_.rest(child), length = padded(rows);
+    const int* place = rows_in_parent_.data() + nodes_.row_starts[child];
+    for (int column = 0; column < rows; ++column, rest += length) {
+      const int to = place[column];
+      double* target = to < parent.columns
+                           ? parent.factor + std::ptrdiff_t{parent.length} * to
+                           : parent.rest + std::ptrdiff_t{parent.rest_length} * (to - parent.columns) - parent.columns;
+      for (int row = column; row < rows; ++row) target[place[row]] += rest[row];
+    }
+  }
+
+  void find_places() {
+    const int n = size(), count = nodes_.count();
+    last_child_.assign(count, -1);
+    sibling_.assign(count, -1);
+    rows_in_parent_.resize(nodes_.rows.size());
+    std::ptrdiff_t stored = 0, top = 0, highest = 0, widest = 0;
+    std::vector<int> owner(n), row_of(n);
+    for (int s = 0; s < count; ++s) {
+      factor_starts_.push_back(stored);
+      std::fill_n(owner.begin() + nodes_.column_starts[s], nodes_.columns(s), s);
+      const int rest = nodes_.rest(s), length = padded(nodes_.columns(s) + rest);
+      stored += std::ptrdiff_t{length} * nodes_.columns(s);
+      widest = std::max<std::ptrdiff_t>(widest, std::max(length * nodes_.columns(s), padded(rest)));
+      highest = std::max(highest, top + std::ptrdiff_t{padded(rest)} * rest);
+      for (int child = last_child_[s]; child >= 0; child = sibling_[child])
+        top -= std::ptrdiff_t{padded(nodes_.rest(child))} * nodes_.rest(child);
+      top += std::ptrdiff_t{padded(rest)} * rest;
+      const int parent = nodes_.parent[s];
+      if (parent < 0) continue;
+      sibling_[s] = last_child_[parent];
+      last_child_[parent] = s;
+    }
+    factor_.assign(static_cast<std::size_t>(stored) + kPadding, 0.0);
+    rest_.assign(static_cast<std::size_t>(highest) + kPadding, 0.0);
+    scratch_.assign(static_cast<std::size_t>(widest) + kPadding, 0.0);
+
+    std::vector<int> place(n);
+    for (int k = 0; k < n; ++k) place[nodes_.order[k]] = k;
+    places_.resize(values_.size() - kPadding);
+    pivots_.resize(n);
+    for (int s = 0; s < count; ++s) {
+      const int first = nodes_.column_starts[s], columns = nodes_.columns(s), length = front_of(s).length;
+      const int* rows = nodes_.rows.data() + nodes_.row_starts[s];
+      for (int c = 0; c < columns; ++c) row_of[first + c] = c;
+      for (int r = 0; r < nodes_.rest(s); ++r) row_of[rows[r]] = columns + r;
+      for (int child = last_child_[s]; child >= 0; child = sibling_[child])
+        for (int r = nodes_.row_starts[child]; r < nodes_.row_starts[child + 1]; ++r)
+          rows_in_parent_[r] = row_of[nodes_.rows[r]];
+      for (int c = 0; c < columns; ++c) {
+        const int old = nodes_.order[first + c];
+        const std::ptrdiff_t column = factor_starts_[s] + std::ptrdiff_t{length} * c;
+        pivots_[first + c] = column + c;
+        for (int p = pattern_.column_starts[old]; p < pattern_.column_starts[old + 1]; ++p) {
+          const int other = pattern_.row_indices[p];
+          if (place[other] < first + c) continue;
+          places_[offset(std::max(old, other), std::min(old, other))] = column + row_of[place[other]];
         }
       }
-      std::sort(row_columns_.begin() + row_starts_.back(), row_columns_.end());
-      upper_starts_.push_back(static_cast<int>(upper_columns_.size()));
-      row_starts_.push_back(static_cast<int>(row_columns_.size()));
     }
-
-    column_starts_.assign(1, 0);
-    for (int k = 0; k < n; ++k) column_starts_.push_back(column_starts_.back() + counts[k]);
-    column_ends_.assign(column_starts_.begin(), column_starts_.end() - 1);
-    row_indices_.resize(row_columns_.size());
-    lower_.assign(row_columns_.size(), 0.0);
-    inverse_pivots_.assign(n, 0.0);
-    for (int k = 0; k < n; ++k) {
-      for (int p = row_starts_[k]; p < row_starts_[k + 1]; ++p) row_indices_[column_ends_[row_columns_[p]]++] = k;
-    }
+    work_.assign(n, 0.0);
   }
 
   SparsityPattern pattern_;
   std::vector<int> lower_starts_;  // of the columns in values_; the diagonal comes first
   std::vector<double> values_;
 
-  std::vector<int> order_;                                         // new -> old
-  std::vector<int> upper_starts_, upper_columns_, upper_sources_;  // row k of the permuted matrix, left of the diagonal
-  std::vector<int> row_starts_, row_columns_;                      // pattern of L by rows, columns ascending
-  std::vector<int> column_starts_, row_indices_;                   // pattern of L by columns, diagonal left out
-  std::vector<double> lower_, inverse_pivots_;
-  std::vector<int> column_ends_;
-  mutable std::vector<double> work_;
+  Supernodes nodes_;
+  std::vector<int> last_child_, sibling_;      // of each supernode; a sibling comes before
+  std::vector<int> rows_in_parent_;            // of each of its rows below, the row in its parent's front
+  std::vector<std::ptrdiff_t> factor_starts_;  // of each supernode
+  std::vector<std::ptrdiff_t> places_;         // of each value in factor_
+  std::vector<std::ptrdiff_t> pivots_;         // of each column, in the new order
+  mutable std::vector<double> factor_, inverse_pivots_;
+  std::vector<double> rest_;
+  mutable std::vector<double> work_, scratch_;
   bool factorized_ = false;
 };
 

@@ -7,10 +7,12 @@
 #include <cmath>
 #include <limits>
 #include <random>
+#include <set>
 #include <string>
 #include <vector>
 
 #include "solvers/linear_solver.hpp"
+#include "solvers/supernodes.hpp"
 
 namespace withe {
 namespace {
@@ -129,6 +131,8 @@ std::vector<Case> cases() {
     result.push_back({prefix + "BandOfSizeOne", symmetry, SolverKind::band, 1, 1});
     result.push_back({prefix + "SparseOfSizeOne", symmetry, SolverKind::sparse, 1, 1});
     result.push_back({prefix + "SparseOfBand", symmetry, SolverKind::sparse, 10, 97});
+    result.push_back({prefix + "SparseOfWideBand", symmetry, SolverKind::sparse, 60, 300});
+    result.push_back({prefix + "SparseOfFull", symmetry, SolverKind::sparse, 109, 110});
     result.push_back({prefix + "SparseOfScattered", symmetry, SolverKind::sparse, 0, 120});
   }
   return result;
@@ -372,6 +376,49 @@ TEST(UnsymmetricSolvers, PivotWhereTheDiagonalIsZeroOrTiny) {
       EXPECT_LT(backward_error(a, x, b), 1e-13) << solver->name() << ", diagonal " << diagonal;
     }
   }
+}
+
+TEST(Supernodes, HaveRoomForTheMatrixAndWhatTheirChildrenLeave) {
+  Random random(3);
+  for (int size : {1, 2, 40, 200}) {
+    const SparsityPattern p = size % 40 == 0 ? scattered_pattern(size, random) : band_pattern(size, size - 1);
+    const Supernodes nodes = find_supernodes(p);
+    std::vector<int> place(size, -1), stack;
+    for (int k = 0; k < size; ++k) place[nodes.order[k]] = k;
+    EXPECT_EQ(std::count(place.begin(), place.end(), -1), 0);
+    ASSERT_EQ(nodes.column_starts.back(), size);
+    const auto front = [&](int s) {
+      std::set<int> rows(nodes.rows.begin() + nodes.row_starts[s], nodes.rows.begin() + nodes.row_starts[s + 1]);
+      for (int c = nodes.column_starts[s]; c < nodes.column_starts[s + 1]; ++c) rows.insert(c);
+      return rows;
+    };
+    for (int s = 0; s < nodes.count(); ++s) {
+      const std::set<int> rows = front(s);
+      EXPECT_EQ(*rows.begin(), nodes.column_starts[s]);
+      EXPECT_TRUE(
+          std::is_sorted(nodes.rows.begin() + nodes.row_starts[s], nodes.rows.begin() + nodes.row_starts[s + 1]));
+      for (int c = nodes.column_starts[s]; c < nodes.column_starts[s + 1]; ++c)
+        for (int q = p.column_starts[nodes.order[c]]; q < p.column_starts[nodes.order[c] + 1]; ++q)
+          EXPECT_TRUE(place[p.row_indices[q]] < c || rows.count(place[p.row_indices[q]]));
+      // Children wait on top of a stack.
+      while (!stack.empty() && nodes.parent[stack.back()] == s) {
+        for (int r = nodes.row_starts[stack.back()]; r < nodes.row_starts[stack.back() + 1]; ++r)
+          EXPECT_TRUE(rows.count(nodes.rows[r]));
+        stack.pop_back();
+      }
+      EXPECT_EQ(nodes.parent[s] < 0, nodes.rest(s) == 0);
+      if (nodes.parent[s] >= 0) stack.push_back(s);
+    }
+    EXPECT_TRUE(stack.empty());
+  }
+}
+
+TEST(Supernodes, OfAnOpenRodHoldLittleMoreThanItsBand) {
+  const SparsityPattern p = band_pattern(400, 10);
+  const Supernodes nodes = find_supernodes(p);
+  double stored = 0.0;
+  for (int s = 0; s < nodes.count(); ++s) stored += nodes.columns(s) * (0.5 * (nodes.columns(s) + 1) + nodes.rest(s));
+  EXPECT_LT(stored, 1.6 * 400 * 11);
 }
 
 TEST(SymmetricSolvers, CountTheNegativePivotsOfAShiftedMatrix) {

@@ -1,0 +1,140 @@
+// The kernels of front_kernels.hpp on packs; included once by the translation unit of each instruction set.
+
+#include "common/pack.hpp"
+#include "solvers/front_kernels.hpp"
+
+namespace withe::WITHE_INSTRUCTION_SET {
+namespace {
+
+static_assert(kFrontPadding % kLanes == 0);
+
+/// `packs` packs of a column that is eliminated: less what earlier columns take from it, then scaled.
+template <int packs>
+void finish_rows(const Front& a, int column, int row, double inverse) {
+  double* own = a.factor + std::ptrdiff_t{a.length} * column + row;
+  Pack sum[packs];
+  for (int p = 0; p < packs; ++p) sum[p] = load(own + p * kLanes);
+  const double* earlier = a.factor + row;
+  const double* weight = a.scratch + column;
+  for (int j = 0; j < column; ++j, earlier += a.length, weight += a.length) {
+    const Pack w = *weight;
+    for (int p = 0; p < packs; ++p) sum[p] -= load(earlier + p * kLanes) * w;
+  }
+  double* unscaled = a.scratch + std::ptrdiff_t{a.length} * column + row;
+  const Pack scale = inverse;
+  for (int p = 0; p < packs; ++p) {
+    store(unscaled + p * kLanes, sum[p]);
+    store(own + p * kLanes, sum[p] * scale);
+  }
+}
+
+/// Columns of L from left to right; `scratch` gets L D.
+void eliminate_columns(const Front& a) {
+  for (int c = 0; c < a.columns; ++c) {
+    double* own = a.factor + std::ptrdiff_t{a.length} * c;
+    double pivot = own[c];
+    for (int j = 0; j < c; ++j) {
+      const std::ptrdiff_t place = std::ptrdiff_t{a.length} * j + c;
+      pivot -= a.factor[place] * a.scratch[place];
+    }
+    const double inverse = 1.0 / pivot;
+    a.inverse_pivots[c] = inverse;
+    int row = c / kLanes * kLanes;
+    for (; row + 4 * kLanes <= a.length; row += 4 * kLanes) finish_rows<4>(a, c, row, inverse);
+    for (; row < a.length; row += kLanes) finish_rows<1>(a, c, row, inverse);
+    own[c] = pivot;
+  }
+}
+
+/// A block of `rest`, less what all eliminated columns take from it.
+template <int columns, int packs>
+void update_block(const Front& a, int column, int row) {
+  double* place = a.rest + std::ptrdiff_t{a.rest_length} * column + row;
+  Pack sum[columns][packs];
+  for (int c = 0; c < columns; ++c)
+    for (int p = 0; p < packs; ++p) sum[c][p] = load(place + std::ptrdiff_t{a.rest_length} * c + p * kLanes);
+  const double* left = a.factor + a.columns + row;
+  const double* weight = a.scratch + a.columns + column;
+  for (int j = 0; j < a.columns; ++j, left += a.length, weight += a.length) {
+    Pack l[packs];
+    for (int p = 0; p < packs; ++p) l[p] = load(left + p * kLanes);
+    for (int c = 0; c < columns; ++c) {
+      const Pack w = weight[c];
+      for (int p = 0; p < packs; ++p) sum[c][p] -= l[p] * w;
+    }
+  }
+  for (int c = 0; c < columns; ++c)
+    for (int p = 0; p < packs; ++p) store(place + std::ptrdiff_t{a.rest_length} * c + p * kLanes, sum[c][p]);
+}
+
+template <int columns>
+void update_columns(const Front& a, int column) {
+  int row = column / kLanes * kLanes;
+  for (; row + 2 * kLanes <= a.rest_length; row += 2 * kLanes) update_block<columns, 2>(a, column, row);
+  for (; row < a.rest_length; row += kLanes) update_block<columns, 1>(a, column, row);
+}
+
+void eliminate(const Front& a) {
+  eliminate_columns(a);
+  const int rest = a.rows - a.columns;
+  int column = 0;
+  for (; column + 4 <= rest; column += 4) update_columns<4>(a, column);
+  for (; column < rest; ++column) update_columns<1>(a, column);
+}
+
+void solve_down(const Front& a, double* x, const int* rows, double* all) {
+  for (int c = 0; c < a.columns; ++c) {
+    const double* own = a.factor + std::ptrdiff_t{a.length} * c;
+    for (int i = c + 1; i < a.columns; ++i) x[i] -= own[i] * x[c];
+  }
+  const int rest = a.rows - a.columns;
+  for (int row = 0; row < rest; row += kLanes) {
+    const double* own = a.factor + a.columns + row;
+    Pack taken[2] = {0.0, 0.0};
+    int c = 0;
+    for (; c + 2 <= a.columns; c += 2, own += 2 * std::ptrdiff_t{a.length}) {
+      taken[0] += load(own) * Pack(x[c]);
+      taken[1] += load(own + a.length) * Pack(x[c + 1]);
+    }
+    if (c < a.columns) taken[0] += load(own) * Pack(x[c]);
+    const Pack sum = taken[0] + taken[1];
+    for (int l = 0; l < kLanes && row + l < rest; ++l) all[rows[row + l]] -= sum[l];
+  }
+}
+
+/// `columns` columns from one on: less what rows below the front's columns take from them.
+template <int columns>
+void take_rest(const Front& a, int column, double* x, const double* below) {
+  const double* own = a.factor + std::ptrdiff_t{a.length} * column + a.columns;
+  Pack taken[columns];
+  for (int c = 0; c < columns; ++c) taken[c] = 0.0;
+  for (int row = 0; row < a.rows - a.columns; row += kLanes) {
+    const Pack y = load(below + row);
+    for (int c = 0; c < columns; ++c) taken[c] += load(own + std::ptrdiff_t{a.length} * c + row) * y;
+  }
+  for (int c = 0; c < columns; ++c) x[column + c] -= sum(taken[c]);
+}
+
+void solve_up(const Front& a, double* x, const int* rows, const double* all) {
+  double* below = a.scratch;
+  const int rest = a.rows - a.columns;
+  for (int row = 0; row < rest; ++row) below[row] = all[rows[row]];
+  for (int row = rest; row < a.rest_length; ++row) below[row] = 0.0;
+  for (int c = 0; c < a.columns; ++c) x[c] *= a.inverse_pivots[c];
+  int column = 0;
+  for (; column + 4 <= a.columns; column += 4) take_rest<4>(a, column, x, below);
+  for (; column < a.columns; ++column) take_rest<1>(a, column, x, below);
+  for (int c = a.columns - 1; c >= 0; --c) {
+    const double* own = a.factor + std::ptrdiff_t{a.length} * c;
+    double value = x[c];
+    for (int i = c + 1; i < a.columns; ++i) value -= own[i] * x[i];
+    x[c] = value;
+  }
+}
+
+}  // namespace
+
+extern const FrontKernels kFrontKernels;
+const FrontKernels kFrontKernels{&eliminate, &solve_down, &solve_up};
+
+}  // namespace withe::WITHE_INSTRUCTION_SET

@@ -1,0 +1,180 @@
+#include "solvers/supernodes.hpp"
+
+#include <Eigen/OrderingMethods>
+#include <Eigen/SparseCore>
+#include <algorithm>
+
+namespace withe {
+namespace {
+
+// Wider ones are taken in pieces, so that what a column is updated by stays in the cache.
+constexpr int kMostColumns = 48;
+
+/// New order of the unknowns that keeps L sparse: order[new] = old.
+std::vector<int> minimum_degree_order(const SparsityPattern& pattern) {
+  const std::vector<double> ones(pattern.row_indices.size(), 1.0);
+  const Eigen::Map<const Eigen::SparseMatrix<double>> matrix(
+      pattern.size, pattern.size, static_cast<Eigen::Index>(pattern.row_indices.size()), pattern.column_starts.data(),
+      pattern.row_indices.data(), ones.data());
+  Eigen::AMDOrdering<int>::PermutationType order;
+  Eigen::AMDOrdering<int>()(Eigen::SparseMatrix<double>(matrix), order);
+  return {order.indices().begin(), order.indices().end()};
+}
+
+std::vector<int> inverse(const std::vector<int>& order) {
+  std::vector<int> place(order.size());
+  for (std::size_t k = 0; k < order.size(); ++k) place[order[k]] = static_cast<int>(k);
+  return place;
+}
+
+/// Of each column the first row below its diagonal in L, or -1 [Liu 1990, sec. 3].
+std::vector<int> elimination_tree(const SparsityPattern& pattern, const std::vector<int>& order) {
+  const std::vector<int> place = inverse(order);
+  std::vector<int> parent(pattern.size, -1), ancestor(pattern.size, -1);
+  for (int k = 0; k < pattern.size; ++k) {
+    for (int p = pattern.column_starts[order[k]]; p < pattern.column_starts[order[k] + 1]; ++p) {
+      for (int node = place[pattern.row_indices[p]]; node >= 0 && node < k;) {
+        const int next = ancestor[node];
+        ancestor[node] = k;
+        if (next < 0) parent[node] = k;
+        node = next;
+      }
+    }
+  }
+  return parent;
+}
+
+/// Columns in an order in which every subtree is together and its root comes last: new -> old.
+std::vector<int> postorder(const std::vector<int>& parent) {
+  const int n = static_cast<int>(parent.size());
+  std::vector<int> first_child(n, -1), sibling(n, -1), result, open;
+  for (int k = n - 1; k >= 0; --k) {
+    if (parent[k] < 0) continue;
+    sibling[k] = first_child[parent[k]];
+    first_child[parent[k]] = k;
+  }
+  for (int root = 0; root < n; ++root) {
+    if (parent[root] >= 0) continue;
+    open.push_back(root);
+    while (!open.empty()) {
+      const int node = open.back(), child = first_child[node];
+      if (child >= 0) {
+        first_child[node] = sibling[child];
+        open.push_back(child);
+      } else {
+        result.push_back(node);
+        open.pop_back();
+      }
+    }
+  }
+  return result;
+}
+
+/// Entries of each column of L, its diagonal included [Liu 1990, sec. 5].
+std::vector<int> column_counts(const SparsityPattern& pattern, const std::vector<int>& order,
+                               const std::vector<int>& parent) {
+  const std::vector<int> place = inverse(order);
+  std::vector<int> counts(pattern.size, 1), visitor(pattern.size, -1);
+  for (int k = 0; k < pattern.size; ++k) {
+    visitor[k] = k;
+    for (int p = pattern.column_starts[order[k]]; p < pattern.column_starts[order[k] + 1]; ++p) {
+      const int column = place[pattern.row_indices[p]];
+      if (column >= k) continue;
+      for (int node = column; visitor[node] != k; node = parent[node]) {
+        visitor[node] = k;
+        ++counts[node];
+      }
+    }
+  }
+  return counts;
+}
+
+/// Columns that become one supernode: what they hold, and how much of it is not zero.
+struct Group {
+  int first, columns, rest;
+  double entries;
+
+  double stored() const { return columns * (0.5 * (columns + 1.0) + rest); }
+};
+
+/// Whether one that takes in a child is worth its zeros.
+bool worth_merging(const Group& merged) {
+  const double zeros = 1.0 - merged.entries / merged.stored();
+  return zeros < (merged.columns <= 8 ? 0.3 : merged.columns <= 16 ? 0.2 : 0.1);
+}
+
+/// From the leaves up: columns join the next one where they have the same rows, and groups their parent where few zeros
+/// come in.
+std::vector<Group> group_columns(const std::vector<int>& parent, const std::vector<int>& counts) {
+  std::vector<Group> groups;
+  for (int column = 0; column < static_cast<int>(parent.size()); ++column) {
+    groups.push_back({column, 1, counts[column] - 1, static_cast<double>(counts[column])});
+    while (groups.size() > 1) {
+      const Group &child = groups[groups.size() - 2], &own = groups.back();
+      const int above = parent[own.first - 1];  // of the child's last column
+      if (above < 0 || above > column) break;   // it belongs to a group yet to come
+      const Group merged{child.first, child.columns + own.columns, own.rest, child.entries + own.entries};
+      const bool same_rows = own.columns == 1 && child.rest == own.rest + 1;
+      if (!same_rows && !worth_merging(merged)) break;
+      groups.pop_back();
+      groups.back() = merged;
+    }
+  }
+  return groups;
+}
+
+/// Rows of each group below its own columns: those of the matrix, and what its children leave.
+void add_groups(const SparsityPattern& pattern, const std::vector<Group>& groups, Supernodes& result) {
+  const std::vector<int> place = inverse(result.order);
+  std::vector<int> group_of(pattern.size), visitor(pattern.size, -1), rows;
+  for (std::size_t g = 0; g < groups.size(); ++g)
+    std::fill_n(group_of.begin() + groups[g].first, groups[g].columns, static_cast<int>(g));
+  std::vector<std::vector<int>> children(groups.size());  // as supernodes
+  result.column_starts.push_back(0);
+  result.row_starts.push_back(0);
+  for (std::size_t g = 0; g < groups.size(); ++g) {
+    const int end = groups[g].first + groups[g].columns;
+    rows.clear();
+    const auto add = [&](int row) {
+      if (row < end || visitor[row] == end) return;
+      visitor[row] = end;
+      rows.push_back(row);
+    };
+    for (int column = groups[g].first; column < end; ++column) {
+      const int old = result.order[column];
+      for (int p = pattern.column_starts[old]; p < pattern.column_starts[old + 1]; ++p)
+        add(place[pattern.row_indices[p]]);
+    }
+    for (int child : children[g]) {
+      for (int r = result.row_starts[child]; r < result.row_starts[child + 1]; ++r) add(result.rows[r]);
+      result.parent[child] = result.count();
+    }
+    std::sort(rows.begin(), rows.end());
+    for (int column = groups[g].first; column < end;) {
+      const int next = std::min(column + kMostColumns, end);
+      result.column_starts.push_back(next);
+      for (int row = next; row < end; ++row) result.rows.push_back(row);
+      result.rows.insert(result.rows.end(), rows.begin(), rows.end());
+      result.row_starts.push_back(static_cast<int>(result.rows.size()));
+      result.parent.push_back(next < end ? result.count() + 1 : -1);
+      column = next;
+    }
+    if (!rows.empty()) children[group_of[rows[0]]].push_back(result.count() - 1);
+  }
+}
+
+}  // namespace
+
+Supernodes find_supernodes(const SparsityPattern& pattern) {
+  Supernodes result;
+  result.order = minimum_degree_order(pattern);
+  const std::vector<int> sorted = postorder(elimination_tree(pattern, result.order));
+  std::vector<int> order;
+  for (int k : sorted) order.push_back(result.order[k]);
+  result.order = std::move(order);
+  const std::vector<int> parent = elimination_tree(pattern, result.order);
+  add_groups(pattern, group_columns(parent, column_counts(pattern, result.order, parent)), result);
+  return result;
+}
+
+}  // namespace withe

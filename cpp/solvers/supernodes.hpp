@@ -1,0 +1,26 @@
+#pragma once
+/// How a symmetric sparse matrix is eliminated, found once from its pattern: in which order, and which columns at once.
+
+#include <vector>
+
+#include "solvers/linear_solver.hpp"
+
+namespace withe {
+
+/// Supernodes: columns of L that follow one another and have their entries in the same rows, or nearly.
+struct Supernodes {
+  std::vector<int> order;          ///< of the unknowns: new -> old
+  std::vector<int> column_starts;  ///< first column of each, count + 1
+  std::vector<int> row_starts;     ///< of each in `rows`, count + 1
+  std::vector<int> rows;           ///< below its own columns, ascending
+  std::vector<int> parent;  ///< the one that the rest of each is added to, always a later one; -1: nothing is left
+
+  int count() const { return static_cast<int>(parent.size()); }
+  int columns(int s) const { return column_starts[s + 1] - column_starts[s]; }
+  int rest(int s) const { return row_starts[s + 1] - row_starts[s]; }
+};
+
+/// By approximate minimum degree; children come right before their parent.
+Supernodes find_supernodes(const SparsityPattern& pattern);
+
+}  // namespace withe
