@@ -233,7 +233,9 @@ def main() -> None:
     for modulus in arguments.leaning:
         collect("leaning", modulus, FRICTIONS[-1], modulus, SHORT)
     for knot, values in means["leaning"].items():
-        off = max(values.values()) / min(values.values()) - 1.0 if values else 0.0
+        if not values:
+            continue
+        off = max(values.values()) / min(values.values()) - 1.0
         print(f"{knot} that leans: pulls at {len(values)} moduli differ by {off:.2%}")
         if off > 0.05:
             wrong.append(f"{knot} that leans depends on the modulus")
