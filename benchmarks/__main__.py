@@ -15,6 +15,7 @@ from reporting import OUT, bar
 
 NAMES = (
     "newton_iteration",
+    "sparse_solvers",
     "skips",
     "parallel",
     "work_precision",

@@ -9,30 +9,15 @@ or the one that SciPy carries.
 from __future__ import annotations
 
 import ctypes
-import json
-import os
-import subprocess
-import tempfile
 from collections import defaultdict
 from pathlib import Path
 
+import compiled
 import scipy
-from reporting import ROOT, Report, Timing, arguments
+from reporting import Report, Timing, arguments
 
-BUILD = ROOT / "build" / "make"
 NODES = (101, 201, 1001, 10001)
 SYSTEM = [Path("/usr/lib", name) for name in ("x86_64-linux-gnu", "aarch64-linux-gnu")]
-
-
-def _build() -> Path:
-    """Configure with the benchmarks on, and build this one."""
-    subprocess.run(
-        ["cmake", "-S", str(ROOT), "-B", str(BUILD), "-DWITHE_BUILD_BENCHMARKS=ON"],
-        check=True,
-        stdout=subprocess.DEVNULL,
-    )
-    subprocess.run(["cmake", "--build", str(BUILD), "--target", "newton_iteration"], check=True)
-    return BUILD / "benchmarks" / "newton_iteration"
 
 
 def _lapack_version(library: ctypes.CDLL, symbol: str) -> str:
@@ -62,31 +47,14 @@ def _lapacks() -> dict[str, tuple[Path, str, str]]:
 
 def _run(executable: Path, lapacks: dict, quick: bool) -> dict[tuple[str, int], Timing]:
     """All of them in random order, again and again; seconds by name and number of nodes."""
-    environment = os.environ | {
-        "WITHE_LAPACKS": ";".join(f"{label}={path}={symbol}" for label, (path, symbol, _) in lapacks.items()),
-        "OPENBLAS_NUM_THREADS": "1",
+    environment = {
+        "WITHE_LAPACKS": ";".join(f"{label}={path}={symbol}" for label, (path, symbol, _) in lapacks.items())
     }
-    with tempfile.NamedTemporaryFile(suffix=".json") as file:
-        subprocess.run(
-            [
-                str(executable),
-                "--benchmark_enable_random_interleaving=true",
-                f"--benchmark_repetitions={1 if quick else 11}",
-                f"--benchmark_min_time={0.01 if quick else 0.2}",
-                f"--benchmark_out={file.name}",
-                "--benchmark_out_format=json",
-            ],
-            check=True,
-            env=environment,
-            stdout=subprocess.DEVNULL,
-        )
-        content = json.loads(Path(file.name).read_text())
     seconds = defaultdict(list)
-    for run in content["benchmarks"]:
-        if run["run_type"] == "iteration":
-            name, nodes = run["name"].split("/")[:2]
-            # Processor time of both; that of dpbsv is noted by hand, without copying the band, and called real.
-            seconds[name, int(nodes)].append(1e-6 * run["real_time" if "dpbsv" in name else "cpu_time"])
+    for run in compiled.repetitions(executable, environment, quick=quick):
+        name, nodes = run["name"].split("/")[:2]
+        # Processor time of both; that of dpbsv is noted by hand, without copying the band, and called real.
+        seconds[name, int(nodes)].append(1e-6 * run["real_time" if "dpbsv" in name else "cpu_time"])
     return {key: Timing(tuple(values)) for key, values in seconds.items()}
 
 
@@ -94,7 +62,7 @@ def main() -> None:
     """Build, run, report."""
     options = arguments(__doc__, ("--executable", {"type": Path, "help": "built already"}))
     lapacks = _lapacks()
-    timings = _run(options.executable or _build(), lapacks, options.quick)
+    timings = _run(options.executable or compiled.build("newton_iteration"), lapacks, options.quick)
     report = Report("newton_iteration", quick=options.quick)
     names = sorted({name for name, _ in timings}, key=lambda name: (name.startswith("dpbsv"), name))
 

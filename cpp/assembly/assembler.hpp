@@ -64,6 +64,7 @@ class Assembler {
  public:
   Assembler(const Model& model, const Loads& loads, Symmetry symmetry, SolverKind kind);
 
+  const SparsityPattern& pattern() const { return pattern_; }
   LinearSolver& solver() { return *solver_; }
   const LinearSolver& solver() const { return *solver_; }
   /// Where the diagonal lives in the solver's values, per unknown.
