@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <functional>
 #include <limits>
+#include <numeric>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -36,26 +37,33 @@ void require_length(std::string_view argument, std::size_t got, int expected) {
 
 SparsityPattern SparsityPattern::from_cliques(int size, const std::vector<std::vector<int>>& cliques) {
   require(size >= 1, "size of a sparsity pattern must be at least 1, got " + std::to_string(size));
-  std::vector<std::vector<int>> columns(size);
-  for (int i = 0; i < size; ++i) columns[i].push_back(i);
+  std::vector<int> ends(size, 1);  // of what each column is given, repetitions included
   for (const std::vector<int>& clique : cliques) {
     for (int column : clique) {
       require(column < size,
               "unknown in cliques must be below size " + std::to_string(size) + ", got " + std::to_string(column));
-      if (column < 0) continue;
-      for (int row : clique) {
-        if (row >= 0) columns[column].push_back(row);
-      }
+      if (column >= 0) ends[column] += static_cast<int>(clique.size());
     }
   }
+  std::exclusive_scan(ends.begin(), ends.end(), ends.begin(), 0);
+  const std::vector<int> starts = ends;
+  std::vector<int> given(size + std::accumulate(cliques.begin(), cliques.end(), std::size_t{0},
+                                                [](std::size_t sum, const std::vector<int>& clique) {
+                                                  return sum + clique.size() * clique.size();
+                                                }));
+  for (int i = 0; i < size; ++i) given[ends[i]++] = i;
+  for (const std::vector<int>& clique : cliques)
+    for (int column : clique)
+      for (int row : clique)
+        if (column >= 0 && row >= 0) given[ends[column]++] = row;
   SparsityPattern pattern;
   pattern.size = size;
   pattern.column_starts.reserve(size + 1);
   pattern.column_starts.push_back(0);
-  for (std::vector<int>& column : columns) {
-    std::sort(column.begin(), column.end());
-    column.erase(std::unique(column.begin(), column.end()), column.end());
-    pattern.row_indices.insert(pattern.row_indices.end(), column.begin(), column.end());
+  for (int column = 0; column < size; ++column) {
+    const auto first = given.begin() + starts[column], last = given.begin() + ends[column];
+    std::sort(first, last);
+    pattern.row_indices.insert(pattern.row_indices.end(), first, std::unique(first, last));
     pattern.column_starts.push_back(static_cast<int>(pattern.row_indices.size()));
   }
   return pattern;

@@ -19,15 +19,8 @@ int padded(int length) { return (length + kFrontPadding - 1) / kFrontPadding * k
 class SparseLdlt final : public LinearSolver {
  public:
   explicit SparseLdlt(const SparsityPattern& pattern)
-      : pattern_(pattern), nodes_(find_supernodes(pattern)), inverse_pivots_(pattern.size, 0.0) {
-    lower_starts_.reserve(pattern.size + 1);
-    lower_starts_.push_back(0);
-    for (int column = 0; column < pattern.size; ++column) {
-      const int above = static_cast<int>(find_entry(pattern, column, column)) - pattern.column_starts[column];
-      const int count = pattern.column_starts[column + 1] - pattern.column_starts[column];
-      lower_starts_.push_back(lower_starts_.back() + count - above);
-    }
-    values_.assign(static_cast<std::size_t>(lower_starts_.back()) + kPadding, 0.0);
+      : pattern_(pattern), nodes_(find_supernodes(pattern)), inverse_pivots_(pattern.size, 0.0), work_(pattern.size) {
+    make_room();
     find_places();
   }
 
@@ -54,12 +47,10 @@ class SparseLdlt final : public LinearSolver {
     for (int s = 0; s < nodes_.count(); ++s) {
       Front front = front_of(s);
       front.rest = rest_.data() + top;
-      const int rest = nodes_.rest(s);
-      const std::ptrdiff_t size_of_rest = std::ptrdiff_t{front.rest_length} * rest;
-      std::fill_n(front.rest, size_of_rest, 0.0);
+      std::fill_n(front.rest, rest_size(s), 0.0);
       std::ptrdiff_t below = top;
       for (int child = last_child_[s]; child >= 0; child = sibling_[child]) {
-        below -= std::ptrdiff_t{padded(nodes_.rest(child))} * nodes_.rest(child);
+        below -= rest_size(child);
         add_rest(child, rest_.data() + below, front);
       }
       front_kernels().eliminate(front);
@@ -68,8 +59,8 @@ class SparseLdlt final : public LinearSolver {
         if (!is_usable_pivot(pivot)) return {FactorStatus::singular, 0};
         result.negative_pivots += pivot < 0.0;
       }
-      if (below < top) std::copy_n(front.rest, size_of_rest, rest_.data() + below);
-      top = below + size_of_rest;
+      if (below < top) std::copy_n(front.rest, rest_size(s), rest_.data() + below);
+      top = below + rest_size(s);
     }
     factorized_ = true;
     return result;
@@ -119,6 +110,9 @@ class SparseLdlt final : public LinearSolver {
     return front;
   }
 
+  /// Numbers on the stack.
+  std::ptrdiff_t rest_size(int s) const { return std::ptrdiff_t{padded(nodes_.rest(s))} * nodes_.rest(s); }
+
   /// Adds what is left of a child to its parent's front.
   void add_rest(int child, const double* rest, const Front& parent) const {
     const int rows = nodes_.rest(child), length = padded(rows);
@@ -132,23 +126,20 @@ class SparseLdlt final : public LinearSolver {
     }
   }
 
-  void find_places() {
-    const int n = size(), count = nodes_.count();
+  /// For L, and for what waits on the stack when it is highest.
+  void make_room() {
+    const int count = nodes_.count();
     last_child_.assign(count, -1);
     sibling_.assign(count, -1);
-    rows_in_parent_.resize(nodes_.rows.size());
     std::ptrdiff_t stored = 0, top = 0, highest = 0, widest = 0;
-    std::vector<int> owner(n), row_of(n);
     for (int s = 0; s < count; ++s) {
       factor_starts_.push_back(stored);
-      std::fill_n(owner.begin() + nodes_.column_starts[s], nodes_.columns(s), s);
-      const int rest = nodes_.rest(s), length = padded(nodes_.columns(s) + rest);
-      stored += std::ptrdiff_t{length} * nodes_.columns(s);
-      widest = std::max<std::ptrdiff_t>(widest, std::max(length * nodes_.columns(s), padded(rest)));
-      highest = std::max(highest, top + std::ptrdiff_t{padded(rest)} * rest);
-      for (int child = last_child_[s]; child >= 0; child = sibling_[child])
-        top -= std::ptrdiff_t{padded(nodes_.rest(child))} * nodes_.rest(child);
-      top += std::ptrdiff_t{padded(rest)} * rest;
+      const std::ptrdiff_t length = padded(nodes_.columns(s) + nodes_.rest(s));
+      stored += length * nodes_.columns(s);
+      widest = std::max(widest, length * nodes_.columns(s));
+      highest = std::max(highest, top + rest_size(s));
+      for (int child = last_child_[s]; child >= 0; child = sibling_[child]) top -= rest_size(child);
+      top += rest_size(s);
       const int parent = nodes_.parent[s];
       if (parent < 0) continue;
       sibling_[s] = last_child_[parent];
@@ -157,12 +148,35 @@ class SparseLdlt final : public LinearSolver {
     factor_.assign(static_cast<std::size_t>(stored) + kPadding, 0.0);
     rest_.assign(static_cast<std::size_t>(highest) + kPadding, 0.0);
     scratch_.assign(static_cast<std::size_t>(widest) + kPadding, 0.0);
+  }
 
-    std::vector<int> place(n);
-    for (int k = 0; k < n; ++k) place[nodes_.order[k]] = k;
+  /// Of each entry of the pattern, the one in values_ that it is or mirrors; rows being sorted, those above a diagonal
+  /// come up in the order of their columns.
+  std::vector<int> number_values() {
+    std::vector<int> number(pattern_.row_indices.size()), next(pattern_.column_starts);
+    lower_starts_.assign(1, 0);
+    for (int column = 0; column < size(); ++column) {
+      int value = lower_starts_.back();
+      for (int p = next[column]; p < pattern_.column_starts[column + 1]; ++p, ++value) {
+        const int row = pattern_.row_indices[p];
+        number[p] = value;
+        if (row > column) number[next[row]++] = value;
+      }
+      lower_starts_.push_back(value);
+    }
+    values_.assign(static_cast<std::size_t>(lower_starts_.back()) + kPadding, 0.0);
+    return number;
+  }
+
+  /// Where values go in L, and the rests of children in their parents' fronts.
+  void find_places() {
+    const std::vector<int> number = number_values();
+    std::vector<int> place(size()), row_of(size());
+    for (int k = 0; k < size(); ++k) place[nodes_.order[k]] = k;
     places_.resize(values_.size() - kPadding);
-    pivots_.resize(n);
-    for (int s = 0; s < count; ++s) {
+    pivots_.resize(size());
+    rows_in_parent_.resize(nodes_.rows.size());
+    for (int s = 0; s < nodes_.count(); ++s) {
       const int first = nodes_.column_starts[s], columns = nodes_.columns(s), length = front_of(s).length;
       const int* rows = nodes_.rows.data() + nodes_.row_starts[s];
       for (int c = 0; c < columns; ++c) row_of[first + c] = c;
@@ -175,13 +189,11 @@ class SparseLdlt final : public LinearSolver {
         const std::ptrdiff_t column = factor_starts_[s] + std::ptrdiff_t{length} * c;
         pivots_[first + c] = column + c;
         for (int p = pattern_.column_starts[old]; p < pattern_.column_starts[old + 1]; ++p) {
-          const int other = pattern_.row_indices[p];
-          if (place[other] < first + c) continue;
-          places_[offset(std::max(old, other), std::min(old, other))] = column + row_of[place[other]];
+          const int row = place[pattern_.row_indices[p]];
+          if (row >= first + c) places_[number[p]] = column + row_of[row];
         }
       }
     }
-    work_.assign(n, 0.0);
   }
 
   SparsityPattern pattern_;
@@ -196,7 +208,7 @@ class SparseLdlt final : public LinearSolver {
   std::vector<std::ptrdiff_t> pivots_;         // of each column, in the new order
   mutable std::vector<double> factor_, inverse_pivots_;
   std::vector<double> rest_;
-  mutable std::vector<double> work_, scratch_;
+  mutable std::vector<double> scratch_, work_;
   bool factorized_ = false;
 };
 
