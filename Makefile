@@ -108,8 +108,8 @@ ctest: ctest-build
 # What only runs on newer machines must not be run on older ones: the engine's tests on an emulated first x86-64.
 ctest-baseline: ctest-build
 	@command -v qemu-x86_64 >/dev/null || { echo "make ctest-baseline needs qemu-x86_64: apt-get install qemu-user"; exit 1; }
-	@for room in common geometry model elasticity contact assembly integrators; do \
-	    qemu-x86_64 -cpu qemu64 $(BUILD)/tests/cpp/test_$$room --gtest_brief=1; done
+	@for room in common solvers geometry model elasticity contact assembly integrators; do \
+	    qemu-x86_64 -cpu qemu64 $(BUILD)/tests/cpp/test_$$room --gtest_brief=1 || exit 1; done
 
 pytest: $(STAMPS)/installed $(STAMPS)/test_tools
 	@python -m pytest --numprocesses $(TEST_JOBS) --dist worksteal
