@@ -81,14 +81,16 @@ class Run:
 def in_contact(count: int, folder: Path) -> withe.Snapshot:
     """Flagella that touch: read, or made."""
     path = folder / f"flagella_{count}.npz"
-    if not path.exists():
+    simulation = flagella.build(count, "stokeslets", PREPARED_STEP, contact="barrier")
+    try:
+        simulation.restore(withe.Snapshot.load(path))
+    except (OSError, ValueError):  # not there, or of another version
         print(f"turning {count} flagella for {PREPARED:g} s, and until they touch", flush=True)
-        simulation = flagella.build(count, "stokeslets", PREPARED_STEP, contact="barrier")
         simulation.step(round(PREPARED / PREPARED_STEP))
         while not flagella.touching(simulation):
             simulation.step()
         simulation.snapshot().save(path)
-    return withe.Snapshot.load(path)
+    return simulation.snapshot()
 
 
 def compare(
