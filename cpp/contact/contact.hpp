@@ -204,6 +204,7 @@ class Contact {
   std::vector<Box> boxes_;
   std::vector<ContactPair> pairs_;  ///< obstacles' first, then candidates of the broad phase
   VectorX reference_;               ///< where the candidates belong
+  VectorX low_, high_;              ///< bounds of the way there
   double margin_ = 0;
   std::vector<double> clear_;  ///< per pair: it touches nothing while `moved_` stays below [m]
   double moved_ = 0;           ///< farthest that a node may have gone, summed over all q1 so far [m]

@@ -13,6 +13,9 @@ constexpr double kNear = 0.5;
 // Centrelines may come as near as this, over their distance or the sum of their radii, within an iteration.
 constexpr double kNearest = 0.5;
 
+/// How far a coordinate is outside of two bounds; NaN where it is one.
+double outside(double x, double low, double high) { return x < low ? low - x : x - std::min(x, high); }
+
 }  // namespace
 
 /// Whether some node has left, or would leave, what the candidates were found for.
@@ -22,10 +25,12 @@ bool Contact::outgrown(const VectorX& q, const VectorX* change) const {
   const double most = 0.25 * margin_ * margin_;
   for (int dof : model_.node_dof) {
     double square = 0.0, later = 0.0;
-    for (int k = 0; k < model_.dimension; ++k) {
-      const double d = q(dof + k) - reference_(dof + k);
+    for (int k = dof; k < dof + model_.dimension; ++k) {
+      const double d = outside(q(k), low_(k), high_(k));
       square += d * d;
-      if (change) later += (d + (*change)(dof + k)) * (d + (*change)(dof + k));
+      if (!change) continue;
+      const double then = outside(q(k) + (*change)(k), low_(k), high_(k));
+      later += then * then;
     }
     if (!(std::max(square, later) <= most)) return true;
   }
@@ -73,6 +78,9 @@ void Contact::find_pairs(const VectorX& from, const VectorX& to) {
       lagged_[i].pair = static_cast<int>(place - pairs_.begin());
     }
   }
+  // Iterates go to and fro on a way whose candidates are all known.
+  low_ = from.cwiseMin(to);
+  high_ = from.cwiseMax(to);
   reference_ = to;
   clear_.assign(pairs_.size(), -1.0);
 }
