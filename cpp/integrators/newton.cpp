@@ -224,9 +224,13 @@ NewtonResult Newton::solve(Equations& equations, VectorX& z, const VectorX* targ
       const double allowed = equations.allowed(z, work.step);
       work.step *= allowed;
       shorten *= allowed;
-      const double kept = monotone(equations, z, target, shorten, work);
-      work.step *= kept;
-      shorten *= kept;
+      // Near the end every step is shorter than the last one, or friction's jump lies between.
+      const double full = displacement(work.step) / shorten;
+      if (full > 1e2 * tolerance || full > 0.5 * p.step) {
+        const double kept = monotone(equations, z, target, full, shorten, work);
+        work.step *= kept;
+        shorten *= kept;
+      }
     }
     if (options_.line_search == LineSearch::goldstein_price) {
       const double alpha = line_search(equations, z, work.step, target, work);
@@ -247,12 +251,10 @@ NewtonResult Newton::solve(Equations& equations, VectorX& z, const VectorX* targ
 
 /// Contact and friction turn on and off, so that full steps may go to and fro for ever. A step is kept at a length
 /// where the same matrix asks for a smaller one next: the natural monotonicity test [Deuflhard 2011, section 3.3],
-/// which sees displacements only and so no difference between forces and moments. `shorten`: what the step has lost
-/// already.
-double Newton::monotone(Equations& equations, const VectorX& z, const VectorX* target, double shorten,
+/// which sees displacements only and so no difference between forces and moments. `full` is the length of the whole
+/// step [m], `shorten` what it has lost already.
+double Newton::monotone(Equations& equations, const VectorX& z, const VectorX* target, double full, double shorten,
                         NewtonWorkspace& work) const {
-  const double full = displacement(work.step) / shorten;
-  if (full <= 1e2 * tolerance(work)) return 1.0;
   double kept = 1.0;
   for (int tries = 0; tries < kMostCuts; ++tries) {
     work.trial = z + kept * work.step;

@@ -82,7 +82,7 @@ class Newton {
   double tolerance(const NewtonWorkspace& work) const {
     return std::min(options_.step_tolerance * model_.length_scale, work.finest);
   }
-  double monotone(Equations& equations, const VectorX& z, const VectorX* target, double shorten,
+  double monotone(Equations& equations, const VectorX& z, const VectorX* target, double full, double shorten,
                   NewtonWorkspace& work) const;
   double line_search(Equations& equations, const VectorX& z, const VectorX& step, const VectorX* target,
                      NewtonWorkspace& work) const;

@@ -250,3 +250,19 @@ def test_fast_rods_that_friction_stops_within_a_step_need_no_shorter_ones(integr
     simulation.step(20)
     assert simulation.statistics.rejected_steps < 5
     assert simulation.energy().dissipated > 0.0
+
+
+def test_friction_that_turns_round_within_a_step_is_found_without_cutting_it():
+    # Over a slip of 1e-8 m, ten thousand times less than the rod moves in a step: Newton's method may go to and fro.
+    scene = withe.Scene()
+    rubber = withe.Material(youngs_modulus=1e6, poisson_ratio=0.5, density=1000.0)
+    rod = scene.add_rod(start=(0, 0, 5e-3), end=(1, 0, 5e-3), nodes=31, radius=5e-3, material=rubber)
+    scene.add_floor(friction=0.4)
+    scene.enable_contact(friction_model="lagged", slip_tolerance=1e-5)
+    push = scene.add_force(rod.end, (0.0, 0.3, 0.0))
+    simulation = scene.build(integrator="backward_euler", time_step=1e-3)
+    simulation.step(20)
+    simulation.set(push, force=(0.0, -0.3, 0.0))
+    simulation.step(20)
+    assert simulation.statistics.rejected_steps == 0
+    assert simulation.statistics.iterations < 40 * 100
