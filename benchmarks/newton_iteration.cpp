@@ -13,8 +13,8 @@
 #include <string>
 #include <vector>
 
-#include "integrators/newton.hpp"
 #include "scenes.hpp"
+#include "step_problem.hpp"
 
 namespace withe {
 namespace {
@@ -43,19 +43,10 @@ SceneDescription open_rod(int nodes, bool planar) {
 }
 
 /// The equations of one midpoint step of such a rod, at a configuration a little off their root.
-struct Problem {
-  Model model;
-  Options options;
-  Equations equations;
-  Parameters parameters;
-  State state;
+struct Problem : StepProblem {
   VectorX z;
 
-  Problem(int nodes, bool planar)
-      : model(build_model(open_rod(nodes, planar), planar)),
-        equations(model, options),
-        parameters(initial_parameters(model)),
-        state(initial_state(model)) {
+  Problem(int nodes, bool planar) : StepProblem(open_rod(nodes, planar), planar) {
     const auto size = static_cast<double>(state.v.size());
     for (Eigen::Index i = 0; i < state.v.size(); ++i) state.v(i) = 0.1 * std::sin(4.0 * static_cast<double>(i) / size);
     z = state.q + 0.5 * kStep * state.v;
@@ -67,7 +58,7 @@ void newton_iteration(benchmark::State& run, bool planar) {
   const auto nodes = static_cast<int>(run.range(0));
   Problem p(nodes, planar);
   NewtonWorkspace work;
-  LinearSolver& solver = p.equations.assembler().solver();
+  LinearSolver& solver = p.solver();
   VectorX next = p.z;
   work.step.setZero(p.z.size());
   p.equations.evaluate(p.z, true, nullptr, work.evaluation);
@@ -100,7 +91,7 @@ void dpbsv(benchmark::State& run, Dpbsv solve) {
   Problem p(static_cast<int>(run.range(0)), false);
   NewtonWorkspace work;
   p.equations.evaluate(p.z, true, nullptr, work.evaluation);
-  const LinearSolver& solver = p.equations.assembler().solver();
+  const LinearSolver& solver = p.solver();
   const int n = solver.size(), width = 10, rows = width + 1, one = 1;
   // The lower band, column by column: its entries come out of A x, x one at every 21st unknown.
   std::vector<double> band(static_cast<std::size_t>(n * rows), 0.0), matrix, right;

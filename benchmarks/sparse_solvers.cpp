@@ -10,8 +10,8 @@
 #include <utility>
 #include <vector>
 
-#include "integrators/newton.hpp"
 #include "scenes.hpp"
+#include "step_problem.hpp"
 
 #ifdef WITHE_HAS_CHOLMOD
 #include <cholmod.h>
@@ -82,19 +82,10 @@ SceneDescription pile(int rods, int layers) {
 }
 
 /// The matrix of a step that sets out from where a scene is drawn.
-struct Problem {
-  Model model;
-  Options options;
-  Equations equations;
-  Parameters parameters;
-  State state;
+struct Problem : StepProblem {
   VectorX force;
 
-  explicit Problem(const SceneDescription& scene)
-      : model(build_model(scene, false)),
-        equations(model, options),
-        parameters(initial_parameters(model)),
-        state(initial_state(model)) {
+  explicit Problem(const SceneDescription& scene) : StepProblem(scene, false) {
     if (Contact* contact = equations.contact()) {
       contact->set_parameters(parameters);
       contact->initialise(state);
@@ -104,8 +95,6 @@ struct Problem {
     equations.evaluate(state.q, true, nullptr, e);
     force = VectorX::Ones(state.q.size());
   }
-
-  LinearSolver& solver() { return equations.assembler().solver(); }
 
   /// Its lower triangle.
   Eigen::SparseMatrix<double> matrix() {
