@@ -124,13 +124,12 @@ NewtonResult solve_eased(Equations& equations, const Newton& newton, bool mixed,
   constexpr std::array<double, 7> kEasing{8192.0, 4096.0, 512.0, 64.0, 16.0, 4.0, 1.0};
   constexpr int kMost = 20;  // iterations
   NewtonResult found;
-  VectorX &last = work.velocity, &next = work.assumed;
+  VectorX& last = work.velocity;
   int spent = 0;
   for (std::size_t k = 0; k < kEasing.size(); ++k) {
     if (k > 1) {
-      next = work.z + ((kEasing[k] - kEasing[k - 1]) / (kEasing[k - 1] - kEasing[k - 2])) * (work.z - last);
+      work.move = ((kEasing[k] - kEasing[k - 1]) / (kEasing[k - 1] - kEasing[k - 2])) * (work.z - last);
       last = work.z;
-      work.move = next - work.z;
       work.z += equations.allowed(work.z, work.move) * work.move;
     } else {
       last = work.z;

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -145,7 +145,7 @@ def _two_half_knots(second_hand: float, length: float, radius: float, nodes: int
     length = validation.positive(length, "length of the rod")
     radius = validation.positive(radius, "radius of the rod")
     nodes = validation.integer(nodes, "nodes", 10, 10**7)
-    validation.choice(tails, "tails of the knot", ("up", "sideways"))
+    validation.choice(tails, "tails of the knot", get_args(Tails))
     r = _BRAID_RADIUS * radius
     width = _BRAID_SLOPE * np.pi * r * 3.0
     rise = 8.0 * r  # between the braids
