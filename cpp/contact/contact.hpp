@@ -193,7 +193,6 @@ class Contact {
   }
   double faded(const Touching& t) const;
   double follow_force(const Touching& t, ContactRecord& record) const;
-  void follow_forces(const VectorX& greatest, VectorX& stiffness) const;
   double source_stiffness() const;
   void record_friction(const Touching& t, ContactRecord& record) const;
 

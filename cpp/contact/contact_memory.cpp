@@ -19,6 +19,18 @@ constexpr double kAhead = 1.5, kSlack = 32.0;
 constexpr double kMostYield = 0.02, kLastingYield = 0.01;
 constexpr double kFading = 0.9;
 
+/// A contact that is yet to come starts as stiff as its rods' greatest force has wanted, so that those which take over
+/// from each other while surfaces slide have no need to change; that fades where it is much more than is wanted now.
+void follow_forces(const VectorX& greatest, VectorX& stiffness) {
+  for (Eigen::Index rod = 0; rod < greatest.size(); ++rod) {
+    double& own = stiffness(rod);
+    if (greatest(rod) > own)
+      own = kAhead * greatest(rod);
+    else if (own > kSlack * greatest(rod))
+      own *= 0.8;
+  }
+}
+
 }  // namespace
 
 double Contact::energy() const {
@@ -152,18 +164,6 @@ void Contact::record_friction(const Touching& t, ContactRecord& record) const {
   record.stick = f.stick;
   record.friction = -f.force;
   record.sticking = f.sticking;
-}
-
-/// A contact that is yet to come starts as stiff as its rods' greatest force has wanted, so that those which take over
-/// from each other while surfaces slide have no need to change; that fades where it is much more than is wanted now.
-void Contact::follow_forces(const VectorX& greatest, VectorX& stiffness) const {
-  for (Eigen::Index rod = 0; rod < greatest.size(); ++rod) {
-    double& own = stiffness(rod);
-    if (greatest(rod) > own)
-      own = kAhead * greatest(rod);
-    else if (own > kSlack * greatest(rod))
-      own *= 0.8;
-  }
 }
 
 double Contact::accept(State& state) {

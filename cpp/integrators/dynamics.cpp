@@ -1,9 +1,10 @@
 #include "integrators/dynamics.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <utility>
+
+#include "common/timer.hpp"
 
 namespace withe {
 namespace {
@@ -265,10 +266,8 @@ void set_acceleration(const Equations& equations, const StepWorkspace& work, Vec
 
 /// Finds the fluid's force at q on velocities v, and the time that takes.
 bool solve_flow(Equations& equations, const VectorX& q, const VectorX& v, Counters& counters) {
-  const auto start = std::chrono::steady_clock::now();
-  const bool found = equations.begin_flow(q, v);
-  counters.fluid_time += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  return found;
+  const Timer timer(counters.fluid_time);
+  return equations.begin_flow(q, v);
 }
 
 /// Finds the fluid's force for a step of dt: that on velocities as they are taken to be within the step, to the order

@@ -1,26 +1,16 @@
 #include "world/world.hpp"
 
 #include <Eigen/Geometry>
-#include <chrono>
 #include <cmath>
 
 #include "common/check.hpp"
+#include "common/timer.hpp"
 #include "world/implementation.hpp"
 
 namespace withe {
 namespace {
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
-/// Adds the time of a call to a statistic.
-class Timer {
- public:
-  explicit Timer(double& total) : total_(total), start_(std::chrono::steady_clock::now()) {}
-  ~Timer() { total_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
-
- private:
-  double& total_;
-  std::chrono::steady_clock::time_point start_;
-};
 
 }  // namespace
 
