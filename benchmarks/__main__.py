@@ -19,6 +19,7 @@ NAMES = (
     "skips",
     "parallel",
     "work_precision",
+    "friction_precision",
     "robustness",
     "contact",
     "contact_robustness",

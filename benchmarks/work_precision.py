@@ -240,7 +240,8 @@ def time_at(points: Iterable[Point], error: float) -> float | None:
     return None
 
 
-def _seconds(value: float | None) -> str:
+def shown_time(value: float | None) -> str:
+    """A time [s] for people."""
     if value is None:
         return "not reached"
     return f"{1e3 * value:.3g} ms" if value < 1.0 else f"{value:.3g} s"
@@ -282,7 +283,7 @@ def _report_fronts(report: Report, points: list[Point]) -> None:
                 default="-",
             )
             rows.append(
-                (case.name, f"{mark:g}", _seconds(ours), by, _seconds(theirs), f"{ratio:.0f}" if ratio else "-")
+                (case.name, f"{mark:g}", shown_time(ours), by, shown_time(theirs), f"{ratio:.0f}" if ratio else "-")
             )
             if mark == (1e-2 if case.kind == "beam" else 3e-2):
                 target = 300 if case.kind == "beam" else 50
@@ -293,7 +294,7 @@ def _report_fronts(report: Report, points: list[Point]) -> None:
 def _report_points(report: Report, points: list[Point]) -> None:
     def row(p: Point) -> tuple[object, ...]:
         error = "saturated" if not p.error < SATURATED else f"{p.error:.2e}"
-        time = f"{_seconds(p.time)}{'*' if p.scaled else ''}" if p.time < math.inf else "-"
+        time = f"{shown_time(p.time)}{'*' if p.scaled else ''}" if p.time < math.inf else "-"
         return p.case, p.method, p.edges, f"{p.step:.3g}", error, time, f"{100 * p.spread:.0f} %"
 
     header = ("case", "method", "edges", "step [s]", "error", "time", "spread")

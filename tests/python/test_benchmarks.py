@@ -21,7 +21,9 @@ def run(name, folder, *arguments):
     return done.stdout
 
 
-@pytest.mark.parametrize("name", ["work_precision", "robustness", "skips", "parallel", "contact", "contact_robustness"])
+@pytest.mark.parametrize(
+    "name", ["work_precision", "friction_precision", "robustness", "skips", "parallel", "contact", "contact_robustness"]
+)
 def test_the_short_form_writes_its_figures(name, tmp_path):
     printed = run(name, tmp_path, "--quick")
     content = json.loads((tmp_path / f"{name}.json").read_text())
@@ -60,6 +62,25 @@ def test_errors_are_measured_against_the_limit_and_its_motion():
     assert limit.size == pytest.approx(np.sqrt(0.5), rel=1e-2)
     assert shifted.error(limit) == pytest.approx(0.1 / limit.size, rel=1e-6)
     assert Motion(times, np.full((401, 3), np.nan)).error(limit) == np.inf
+
+
+def test_a_push_is_off_by_its_worst_force_above_the_limit():
+    from friction_precision import SLIDING, block, greatest_error
+
+    off = {force: 1.0 + 0.01 * i for i, force in enumerate(SLIDING)}
+    assert greatest_error(lambda force: (off[force] * block(force), 1.0)) == pytest.approx(0.06)
+    assert greatest_error(lambda force: (np.nan, 1.0)) == np.inf
+
+
+@pytest.mark.parametrize("method", ["backward_euler", "backward_euler, on centrelines", "PyElastica"])
+def test_a_rod_that_is_pushed_sticks_or_slides_as_a_block_does(method):
+    if method == "PyElastica":
+        pytest.importorskip("elastica")
+    from friction_precision import STICKING, Point, greatest_error, pusher
+
+    pushed = pusher(Point("friction", method, 2, 0.015))
+    assert greatest_error(pushed) < 1e-6
+    assert max(pushed(force)[0] for force in STICKING) < 1e-6
 
 
 def test_our_beam_approaches_its_stored_limit():
