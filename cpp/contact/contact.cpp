@@ -210,21 +210,20 @@ void Contact::update(const VectorX& q1) {
   if (outgrown(q1, nullptr)) find_pairs(q1, q1);
   if (!std::isfinite(moved_)) {
     moved_ = 0.0;
-    clear_.clear();
+    bounds_.clear();
   }
   q1_ = q1;
-  clear_.resize(pairs_.size(), -1.0);
+  bounds_.resize(pairs_.size());
   touching_ = lagged_;
   const ContactDescription& contact = model_.description.contact;
   for (int p = 0; p < static_cast<int>(pairs_.size()); ++p) {
-    if (clear_[at(p)] > moved_) continue;
+    if (bounds_[at(p)].clear > moved_) continue;
     const ContactPair& pair = pairs_[at(p)];
     Touching t = touch(p, q1);
-    if (t.distance >= pair.reach()) {
-      // A distance changes by no more than both edges move.
-      clear_[at(p)] = moved_ + kSafe * 0.5 * (t.distance - pair.reach());
-      continue;
-    }
+    // A distance changes by no more than both edges move.
+    const auto above = [&](double least) { return moved_ + kSafe * 0.5 * (t.distance - least); };
+    bounds_[at(p)] = {above(pair.reach()), above(pair.nearest())};
+    if (t.distance >= pair.reach()) continue;
     const ContactRecord* record = record_of(pair.key);
     t.stiffness = pair.share * (record ? record->stiffness : first_stiffness(pair));
     t.yielded = record ? record->yielded : 0.0;

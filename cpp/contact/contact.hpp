@@ -205,7 +205,11 @@ class Contact {
   VectorX reference_;               ///< where the candidates belong
   VectorX low_, high_;              ///< bounds of the way there
   double margin_ = 0;
-  std::vector<double> clear_;  ///< per pair: it touches nothing while `moved_` stays below [m]
+  struct Bounds {
+    double clear = -1.0;  ///< it touches nothing while `moved_` stays below [m]
+    double open = -1.0;   ///< nor do its centrelines come nearer than an iteration may bring them
+  };
+  std::vector<Bounds> bounds_;  ///< per pair
   double moved_ = 0;           ///< farthest that a node may have gone, summed over all q1 so far [m]
   std::vector<ObstaclePlace> target_;
   std::vector<Vec3d> shift_;  ///< of each obstacle in this step [m]; empty: none moves

@@ -298,7 +298,7 @@ void Contact::forget() {
   pairs_ = surfaces_.obstacle_pairs();
   elements_.clear();
   reference_.resize(0);
-  clear_.clear();
+  bounds_.clear();
   touching_.clear();
   lagged_.clear();
   couple();

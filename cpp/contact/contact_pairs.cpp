@@ -10,8 +10,6 @@ std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
 // Pairs nearer than this beyond their reach, over the sum of their radii, are part of the matrix's pattern.
 constexpr double kNear = 0.5;
-// Centrelines may come as near as this, over their distance or the sum of their radii, within an iteration.
-constexpr double kNearest = 0.5;
 
 /// How far a coordinate is outside of two bounds; NaN where it is one.
 double outside(double x, double low, double high) { return x < low ? low - x : x - std::min(x, high); }
@@ -82,7 +80,7 @@ void Contact::find_pairs(const VectorX& from, const VectorX& to) {
   low_ = from.cwiseMin(to);
   high_ = from.cwiseMax(to);
   reference_ = to;
-  clear_.assign(pairs_.size(), -1.0);
+  bounds_.assign(pairs_.size(), {});
 }
 
 int Contact::element_of(const ContactKey& key) const {
@@ -123,11 +121,11 @@ double Contact::allowed(const VectorX& q1, const VectorX& change) {
     find_pairs(q1, end);
   }
   double least = 1.0;
-  clear_.resize(pairs_.size(), -1.0);
+  bounds_.resize(pairs_.size());
   const double here = moved_ + (q1_.size() == q1.size() ? farthest(q1 - q1_) : INFINITY), coming = farthest(change);
   for (std::size_t p = 0; p < pairs_.size(); ++p) {
     if (p < planes_only && pairs_[p].plane()) continue;
-    if (clear_[p] - here >= coming) continue;  // nothing will even touch
+    if (bounds_[p].open - here >= coming) continue;
     least = std::min(least, allowed_of(pairs_[p], q1, &change, Vec3d{}));
   }
   return least;
@@ -149,7 +147,7 @@ double Contact::allowed_of(const ContactPair& pair, const VectorX& q, const Vect
   speed = std::sqrt(speed);
   const Vec3d middle = 0.5 * (x[0] + x[1] - x[2] - x[3]), u = x[1] - x[0], v = x[3] - x[2];
   const double bound =
-      std::sqrt(dot(middle, middle)) - 0.5 * (std::sqrt(dot(u, u)) + std::sqrt(dot(v, v))) - kNearest * pair.radii();
+      std::sqrt(dot(middle, middle)) - 0.5 * (std::sqrt(dot(u, u)) + std::sqrt(dot(v, v))) - pair.nearest();
   if (speed <= bound) return 1.0;
   const auto distance_at = [&](double tau) {
     const ClosestPoints c = closest_points(x[0] + tau * d[0], x[1] + tau * d[1], x[2] + tau * d[2], x[3] + tau * d[3],
@@ -157,7 +155,7 @@ double Contact::allowed_of(const ContactPair& pair, const VectorX& q, const Vect
     return std::sqrt(dot(c.between, c.between));
   };
   const double start = distance_at(0.0);
-  const double least = kNearest * std::min(start, pair.radii());
+  const double least = std::min(kNearest * start, pair.nearest());
   double tau = 0.0, distance = start;
   for (int k = 0; k < 100; ++k) {
     tau += (distance - 0.99 * least) / speed;

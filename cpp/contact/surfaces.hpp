@@ -8,6 +8,9 @@
 
 namespace withe {
 
+/// Centrelines may come as near as this, over their distance or the sum of their radii, within an iteration.
+constexpr double kNearest = 0.5;
+
 /// Two surfaces that may touch, and all that does not change while they do.
 struct ContactPair {
   ContactKey key;
@@ -22,6 +25,7 @@ struct ContactPair {
 
   double radii() const { return radius_a + radius_b; }
   double reach() const { return radii() + tolerance; }
+  double nearest() const { return kNearest * radii(); }
   double small_radius() const { return rod_b < 0 || radius_a < radius_b ? radius_a : radius_b; }
   bool plane() const { return key.end >= 0; }
 };

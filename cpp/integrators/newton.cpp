@@ -124,6 +124,7 @@ struct Newton::Progress {
   double step = INFINITY, last_step = INFINITY;  ///< [m]
   double rest = INFINITY;                        ///< estimated distance from the solution [m]
   bool made_here = false;
+  bool foreseen = false;  ///< `monotone` has evaluated the coming iteration, and solved for its step with the old matrix
 };
 
 /// After an iteration: learns how well matrices serve, and decides about the next one.
@@ -182,7 +183,7 @@ NewtonResult Newton::solve(Equations& equations, VectorX& z, const VectorX* targ
       equations.evaluate(z, matrix, axial, e);
       if (target) e.residual -= *target;
     };
-    evaluate(p.fresh && !expect_end);
+    if (!p.foreseen || (p.fresh && !expect_end)) evaluate(p.fresh && !expect_end);
     result.step = p.step;
     if (!e.residual.allFinite()) return give_up();
     const Balance balance = this->balance(e, result);
@@ -214,8 +215,13 @@ NewtonResult Newton::solve(Equations& equations, VectorX& z, const VectorX* targ
       factor.interval = std::abs(interval);
       factor.generation = equations.assembler().generation();
     }
-    work.step = -e.residual;
-    equations.assembler().solver().solve({work.step.data(), static_cast<std::size_t>(work.step.size())});
+    if (p.foreseen && !p.fresh) {
+      work.step = -work.next_step;
+    } else {
+      work.step = -e.residual;
+      equations.assembler().solver().solve({work.step.data(), static_cast<std::size_t>(work.step.size())});
+    }
+    p.foreseen = false;
     work.counters.solve_time += seconds_since(solve_start);
     if (!work.step.allFinite()) return give_up();
     double shorten = cap(work.step);
@@ -224,22 +230,31 @@ NewtonResult Newton::solve(Equations& equations, VectorX& z, const VectorX* targ
       const double allowed = equations.allowed(z, work.step);
       work.step *= allowed;
       shorten *= allowed;
+    }
+    if (mixed) equations.predict_axial_force(work.step, work.axial_force);
+    axial_known = mixed;
+    if (equations.contact()) {
       // Near the end every step is shorter than the last one, or friction's jump lies between.
       const double full = displacement(work.step) / shorten;
       if (full > 1e2 * tolerance || full > 0.5 * p.step) {
-        const double kept = monotone(equations, z, target, full, shorten, work);
+        double kept = 1.0;
+        p.foreseen = monotone(equations, z, target, full, shorten, work, kept);
         work.step *= kept;
         shorten *= kept;
+        axial_known = mixed && kept == 1.0;
       }
     }
     if (options_.line_search == LineSearch::goldstein_price) {
       const double alpha = line_search(equations, z, work.step, target, work);
       work.step *= alpha;
       shorten *= alpha;
+      axial_known = mixed && axial_known && alpha == 1.0;
+      p.foreseen = false;
     }
-    if (mixed) equations.predict_axial_force(work.step, work.axial_force);
-    axial_known = mixed;
-    z += work.step;
+    if (p.foreseen)
+      z.swap(work.trial);
+    else
+      z += work.step;
     p.last_step = p.step;
     p.last_age = p.age;
     p.step = shorten < 1.0 ? INFINITY : displacement(work.step);
@@ -252,22 +267,23 @@ NewtonResult Newton::solve(Equations& equations, VectorX& z, const VectorX* targ
 /// Contact and friction turn on and off, so that full steps may go to and fro for ever. A step is kept at a length
 /// where the same matrix asks for a smaller one next: the natural monotonicity test [Deuflhard 2011, section 3.3],
 /// which sees displacements only and so no difference between forces and moments. `full` is the length of the whole
-/// step [m], `shorten` what it has lost already.
-double Newton::monotone(Equations& equations, const VectorX& z, const VectorX* target, double full, double shorten,
-                        NewtonWorkspace& work) const {
-  double kept = 1.0;
+/// step [m], `shorten` what it has lost already. Returns whether there is one: then `work` holds where it leads, the
+/// evaluation there, and less the step from there.
+bool Newton::monotone(Equations& equations, const VectorX& z, const VectorX* target, double full, double shorten,
+                      NewtonWorkspace& work, double& kept) const {
+  kept = 1.0;
   for (int tries = 0; tries < kMostCuts; ++tries) {
     work.trial = z + kept * work.step;
     equations.evaluate(work.trial, false, nullptr, work.evaluation);
+    if (target) work.evaluation.residual -= *target;
     work.next_step = work.evaluation.residual;
-    if (target) work.next_step -= *target;
     if (work.next_step.allFinite()) {
       equations.assembler().solver().solve({work.next_step.data(), static_cast<std::size_t>(work.next_step.size())});
-      if (displacement(work.next_step) <= (1.0 - 0.25 * kept * shorten) * full) return kept;
+      if (displacement(work.next_step) <= (1.0 - 0.25 * kept * shorten) * full) return true;
     }
     kept *= 0.5;
   }
-  return kept;
+  return false;
 }
 
 /// [dissertation, Algorithm 4], with the sign of q + alpha dq and the bounds it leaves unset: Goldstein-Price on
@@ -291,7 +307,6 @@ double Newton::line_search(Equations& equations, const VectorX& z, const VectorX
     if (high - low < 1e-3) break;
     alpha = 0.5 * (low + high);
   }
-  equations.evaluate(z, false, nullptr, work.evaluation);
   return alpha;
 }
 

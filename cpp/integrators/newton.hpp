@@ -82,8 +82,8 @@ class Newton {
   double tolerance(const NewtonWorkspace& work) const {
     return std::min(options_.step_tolerance * model_.length_scale, work.finest);
   }
-  double monotone(Equations& equations, const VectorX& z, const VectorX* target, double full, double shorten,
-                  NewtonWorkspace& work) const;
+  bool monotone(Equations& equations, const VectorX& z, const VectorX* target, double full, double shorten,
+                NewtonWorkspace& work, double& kept) const;
   double line_search(Equations& equations, const VectorX& z, const VectorX& step, const VectorX* target,
                      NewtonWorkspace& work) const;
 
