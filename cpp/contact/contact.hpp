@@ -210,7 +210,7 @@ class Contact {
     double open = -1.0;   ///< nor do its centrelines come nearer than an iteration may bring them
   };
   std::vector<Bounds> bounds_;  ///< per pair
-  double moved_ = 0;           ///< farthest that a node may have gone, summed over all q1 so far [m]
+  double moved_ = 0;            ///< farthest that a node may have gone, summed over all q1 so far [m]
   std::vector<ObstaclePlace> target_;
   std::vector<Vec3d> shift_;  ///< of each obstacle in this step [m]; empty: none moves
   bool blocked_ = false;

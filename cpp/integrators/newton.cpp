@@ -124,7 +124,8 @@ struct Newton::Progress {
   double step = INFINITY, last_step = INFINITY;  ///< [m]
   double rest = INFINITY;                        ///< estimated distance from the solution [m]
   bool made_here = false;
-  bool foreseen = false;  ///< `monotone` has evaluated the coming iteration, and solved for its step with the old matrix
+  bool foreseen =
+      false;  ///< `monotone` has evaluated the coming iteration, and solved for its step with the old matrix
 };
 
 /// After an iteration: learns how well matrices serve, and decides about the next one.
