@@ -19,11 +19,13 @@ struct Front {
   double* factor = nullptr;  ///< `columns`: the matrix; becomes L below D on the diagonal
   double* rest = nullptr;    ///< rows - columns, square: becomes what is left to eliminate
   double* inverse_pivots = nullptr;
-  double* scratch = nullptr;  ///< as large as `factor`; to solve with, rest_length
+  double* scratch = nullptr;  ///< as large as `factor`: gets L D; to solve with, rest_length
 };
 
 struct FrontKernels {
-  void (*eliminate)(const Front& front);
+  /// A = L D W^T, W in place of L in `upper`: A's columns from the diagonal down in `lower`, its rows from the diagonal
+  /// on, without it, in `upper`. Where A is symmetric, W = L, and both are the same front.
+  void (*eliminate)(const Front& lower, const Front& upper);
   /// L x = x in place; takes what goes with x from `all`, at `rows`, those below the front's columns.
   void (*solve_down)(const Front& front, double* x, const int* rows, double* all);
   /// L^T x = D^-1 x in place, `all` being known at `rows`.

@@ -10,12 +10,12 @@ static_assert(kFrontPadding % kLanes == 0);
 
 /// `packs` packs of a column that is eliminated: less what earlier columns take from it, then scaled.
 template <int packs>
-void finish_rows(const Front& a, int column, int row, double inverse) {
+void finish_rows(const Front& a, const Front& other, int column, int row, double inverse) {
   double* own = a.factor + std::ptrdiff_t{a.length} * column + row;
   Pack sum[packs];
   for (int p = 0; p < packs; ++p) sum[p] = load(own + p * kLanes);
   const double* earlier = a.factor + row;
-  const double* weight = a.scratch + column;
+  const double* weight = other.scratch + column;
   for (int j = 0; j < column; ++j, earlier += a.length, weight += a.length) {
     const Pack w = *weight;
     for (int p = 0; p < packs; ++p) sum[p] -= load(earlier + p * kLanes) * w;
@@ -28,33 +28,38 @@ void finish_rows(const Front& a, int column, int row, double inverse) {
   }
 }
 
-/// Columns of L from left to right; `scratch` gets L D.
-void eliminate_columns(const Front& a) {
-  for (int c = 0; c < a.columns; ++c) {
-    double* own = a.factor + std::ptrdiff_t{a.length} * c;
+void finish_column(const Front& a, const Front& other, int column, double inverse) {
+  int row = column / kLanes * kLanes;
+  for (; row + 4 * kLanes <= a.length; row += 4 * kLanes) finish_rows<4>(a, other, column, row, inverse);
+  for (; row < a.length; row += kLanes) finish_rows<1>(a, other, column, row, inverse);
+}
+
+/// Columns of L and W from left to right.
+void eliminate_columns(const Front& lower, const Front& upper) {
+  for (int c = 0; c < lower.columns; ++c) {
+    double* own = lower.factor + std::ptrdiff_t{lower.length} * c;
     double pivot = own[c];
     for (int j = 0; j < c; ++j) {
-      const std::ptrdiff_t place = std::ptrdiff_t{a.length} * j + c;
-      pivot -= a.factor[place] * a.scratch[place];
+      const std::ptrdiff_t place = std::ptrdiff_t{lower.length} * j + c;
+      pivot -= lower.factor[place] * upper.scratch[place];
     }
     const double inverse = 1.0 / pivot;
-    a.inverse_pivots[c] = inverse;
-    int row = c / kLanes * kLanes;
-    for (; row + 4 * kLanes <= a.length; row += 4 * kLanes) finish_rows<4>(a, c, row, inverse);
-    for (; row < a.length; row += kLanes) finish_rows<1>(a, c, row, inverse);
+    lower.inverse_pivots[c] = inverse;
+    finish_column(lower, upper, c, inverse);
+    if (&upper != &lower) finish_column(upper, lower, c, inverse);
     own[c] = pivot;
   }
 }
 
 /// A block of `rest`, less what all eliminated columns take from it.
 template <int columns, int packs>
-void update_block(const Front& a, int column, int row) {
+void update_block(const Front& a, const Front& other, int column, int row) {
   double* place = a.rest + std::ptrdiff_t{a.rest_length} * column + row;
   Pack sum[columns][packs];
   for (int c = 0; c < columns; ++c)
     for (int p = 0; p < packs; ++p) sum[c][p] = load(place + std::ptrdiff_t{a.rest_length} * c + p * kLanes);
   const double* left = a.factor + a.columns + row;
-  const double* weight = a.scratch + a.columns + column;
+  const double* weight = other.scratch + a.columns + column;
   for (int j = 0; j < a.columns; ++j, left += a.length, weight += a.length) {
     Pack l[packs];
     for (int p = 0; p < packs; ++p) l[p] = load(left + p * kLanes);
@@ -68,18 +73,23 @@ void update_block(const Front& a, int column, int row) {
 }
 
 template <int columns>
-void update_columns(const Front& a, int column) {
+void update_columns(const Front& a, const Front& other, int column) {
   int row = column / kLanes * kLanes;
-  for (; row + 2 * kLanes <= a.rest_length; row += 2 * kLanes) update_block<columns, 2>(a, column, row);
-  for (; row < a.rest_length; row += kLanes) update_block<columns, 1>(a, column, row);
+  for (; row + 2 * kLanes <= a.rest_length; row += 2 * kLanes) update_block<columns, 2>(a, other, column, row);
+  for (; row < a.rest_length; row += kLanes) update_block<columns, 1>(a, other, column, row);
 }
 
-void eliminate(const Front& a) {
-  eliminate_columns(a);
+void update_rest(const Front& a, const Front& other) {
   const int rest = a.rows - a.columns;
   int column = 0;
-  for (; column + 4 <= rest; column += 4) update_columns<4>(a, column);
-  for (; column < rest; ++column) update_columns<1>(a, column);
+  for (; column + 4 <= rest; column += 4) update_columns<4>(a, other, column);
+  for (; column < rest; ++column) update_columns<1>(a, other, column);
+}
+
+void eliminate(const Front& lower, const Front& upper) {
+  eliminate_columns(lower, upper);
+  update_rest(lower, upper);
+  if (&upper != &lower) update_rest(upper, lower);
 }
 
 void solve_down(const Front& a, double* x, const int* rows, double* all) {

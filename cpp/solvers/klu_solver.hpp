@@ -1,13 +1,35 @@
 #pragma once
-/// Unsymmetric sparse solver over KLU [Davis and Palamadai Natarajan 2010]. The only header that knows of it.
+/// LU with pivots off the diagonal, by KLU [Davis and Palamadai Natarajan 2010]. The only header that knows of it.
 
 #include <memory>
+#include <span>
+#include <vector>
 
 #include "solvers/linear_solver.hpp"
 
 namespace withe {
 
-/// The pattern must be valid (require_valid); it is analysed here, once.
-std::unique_ptr<LinearSolver> make_klu_solver(const SparsityPattern& pattern);
+/// Pivots are sought anew for each matrix, which allocates: bit-exact restarts need factors that depend on the matrix
+/// alone, not on the pivots of an earlier one. A copy has the same factors.
+class KluSolver {
+ public:
+  /// The pattern must be valid (require_valid); it is analysed here, once.
+  explicit KluSolver(const SparsityPattern& pattern);
+  KluSolver(const KluSolver& other);
+  KluSolver& operator=(const KluSolver&) = delete;
+  ~KluSolver();
+
+  /// Column by column, in the order of the pattern; false where a pivot is zero or a value not finite.
+  bool factorize(std::vector<double> values);
+  bool factorized() const;
+  void solve(std::span<double> right_hand_side) const;
+  void solve_transposed(std::span<double> right_hand_side) const;
+
+ private:
+  struct Klu;
+  SparsityPattern pattern_;
+  std::vector<double> values_;
+  std::unique_ptr<Klu> klu_;
+};
 
 }  // namespace withe

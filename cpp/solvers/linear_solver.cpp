@@ -13,9 +13,9 @@
 #include "common/check.hpp"
 #include "solvers/band_ldlt.hpp"
 #include "solvers/band_lu.hpp"
-#include "solvers/klu_solver.hpp"
+#include "solvers/multifrontal.hpp"
 #include "solvers/pattern_lookup.hpp"
-#include "solvers/sparse_ldlt.hpp"
+#include "solvers/sparse_lu.hpp"
 
 namespace withe {
 namespace {
@@ -151,8 +151,8 @@ std::unique_ptr<LinearSolver> make_linear_solver(const SparsityPattern& pattern,
   require_valid(pattern);
   const bool band =
       kind == SolverKind::band || (kind == SolverKind::automatic && pattern.half_bandwidth() <= kWidestAutomaticBand);
-  if (symmetry == Symmetry::symmetric) return band ? make_band_ldlt(pattern) : make_sparse_ldlt(pattern);
-  return band ? make_band_lu(pattern) : make_klu_solver(pattern);
+  if (symmetry == Symmetry::symmetric) return band ? make_band_ldlt(pattern) : make_multifrontal(pattern, symmetry);
+  return band ? make_band_lu(pattern) : make_sparse_lu(pattern);
 }
 
 }  // namespace withe

@@ -30,7 +30,7 @@ enum class Symmetry { symmetric, unsymmetric };
 enum class SolverKind {
   automatic,  ///< band where the half bandwidth is small, otherwise sparse
   band,       ///< LDL^T of fixed half bandwidth, or band LU with partial pivoting
-  sparse,     ///< multifrontal LDL^T, or KLU
+  sparse,     ///< multifrontal LDL^T or LU
 };
 
 enum class FactorStatus { ok, singular };
@@ -45,7 +45,7 @@ class LinearSolver {
   virtual ~LinearSolver() = default;
   virtual int size() const = 0;
   virtual Symmetry symmetry() const = 0;
-  /// "band LDLT (half bandwidth 10)", "sparse LDLT", "band LU", "KLU": for `plan`.
+  /// "band LDLT (half bandwidth 10)", "sparse LDLT", "band LU", "sparse LU": for `plan`.
   virtual std::string name() const = 0;
   /// Where entry (row, column) lives in values(). Symmetric: only row >= column may be asked for.
   /// Throws std::invalid_argument outside the pattern.

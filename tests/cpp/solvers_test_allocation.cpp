@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <utility>
 #include <vector>
 
 #include "allocation_counter.hpp"
@@ -26,22 +27,25 @@ TEST(LinearSolver, DoesNotAllocateAfterTheFirstFactorisation) {
   for (Symmetry symmetry : {Symmetry::symmetric, Symmetry::unsymmetric}) {
     for (SolverKind kind : {SolverKind::band, SolverKind::sparse}) {
       const auto solver = make_linear_solver(pattern, symmetry, kind);
-      const auto set = [&](double diagonal) {
+      // Every third unknown is measured in another unit, as angles are beside positions.
+      const auto unit = [](double change, int i) { return i % 3 ? 1.0 : change; };
+      const auto set = [&](double diagonal, double change) {
         for (double& value : solver->values()) value = 0.0;
         for (int column = 0; column < size; ++column) {
           for (int p = pattern.column_starts[column]; p < pattern.column_starts[column + 1]; ++p) {
             const int row = pattern.row_indices[p];
             if (symmetry == Symmetry::symmetric && row < column) continue;
-            solver->values()[solver->offset(row, column)] = row == column ? diagonal : 0.5 + 0.01 * (row % 7);
+            const double value = row == column ? diagonal : 0.5 + 0.01 * (row % 7);
+            solver->values()[solver->offset(row, column)] = value * unit(change, row) * unit(change, column);
           }
         }
       };
       std::vector<double> x(size, 1.0), y(size, 0.0);
-      set(20.0);
+      set(20.0, 1.0);
       ASSERT_EQ(solver->factorize().status, FactorStatus::ok);
       const std::size_t before = allocation_count;
-      for (double diagonal : {30.0, -25.0}) {
-        set(diagonal);
+      for (auto [diagonal, change] : {std::pair{30.0, 1.0}, {-25.0, 1.0}, {30.0, 1e-6}, {30.0, 1e6}}) {
+        set(diagonal, change);
         solver->factorize();
         solver->solve(x);
         solver->factorize(shift);

@@ -1,5 +1,5 @@
 #pragma once
-/// Symmetric sparse solver: P A P^T = L D L^T, approximate minimum degree ordering, no pivoting.
+/// Unsymmetric sparse solver: without pivoting where that is accurate, by KLU where it is not.
 
 #include <memory>
 
@@ -8,6 +8,6 @@
 namespace withe {
 
 /// The pattern must be valid (require_valid); it is analysed here, once.
-std::unique_ptr<LinearSolver> make_sparse_ldlt(const SparsityPattern& pattern);
+std::unique_ptr<LinearSolver> make_sparse_lu(const SparsityPattern& pattern);
 
 }  // namespace withe
