@@ -19,7 +19,7 @@ struct Front {
   double* factor = nullptr;  ///< `columns`: the matrix; becomes L below D on the diagonal
   double* rest = nullptr;    ///< rows - columns, square: becomes what is left to eliminate
   double* inverse_pivots = nullptr;
-  double* scratch = nullptr;  ///< as large as `factor`: gets L D; to solve with, rest_length
+  double* scratch = nullptr;  ///< as large as `factor`: gets L D; to solve with, `length`
 };
 
 struct FrontKernels {

@@ -6,7 +6,7 @@
 namespace withe::WITHE_INSTRUCTION_SET {
 namespace {
 
-static_assert(kFrontPadding % kLanes == 0);
+static_assert(kFrontPadding == 4 && kFrontPadding % kLanes == 0);
 
 /// `packs` packs of a column that is eliminated: less what earlier columns take from it, then scaled.
 template <int packs>
@@ -112,34 +112,39 @@ void solve_down(const Front& a, double* x, const int* rows, double* all) {
   }
 }
 
-/// `columns` columns from one on: less what rows below the front's columns take from them.
+/// `columns` columns up to `end`, less what later rows take from them: one by one up to `row`, then in packs.
 template <int columns>
-void take_rest(const Front& a, int column, double* x, const double* below) {
-  const double* own = a.factor + std::ptrdiff_t{a.length} * column + a.columns;
+void take_known(const Front& a, int end, int row, double* x) {
+  const int first = end - columns;
+  const double* own = a.factor + std::ptrdiff_t{a.length} * first;
   Pack taken[columns];
   for (int c = 0; c < columns; ++c) taken[c] = 0.0;
-  for (int row = 0; row < a.rows - a.columns; row += kLanes) {
-    const Pack y = load(below + row);
-    for (int c = 0; c < columns; ++c) taken[c] += load(own + std::ptrdiff_t{a.length} * c + row) * y;
+  for (int r = row; r < a.length; r += kLanes) {
+    const Pack known = load(x + r);
+    for (int c = 0; c < columns; ++c) taken[c] += load(own + std::ptrdiff_t{a.length} * c + r) * known;
   }
-  for (int c = 0; c < columns; ++c) x[column + c] -= sum(taken[c]);
+  double value[columns];
+  for (int c = columns - 1; c >= 0; --c) {
+    const double* entry = own + std::ptrdiff_t{a.length} * c;
+    value[c] = x[first + c] - sum(taken[c]);
+    for (int r = end; r < row && r < a.rows; ++r) value[c] -= entry[r] * x[r];
+    for (int i = c + 1; i < columns; ++i) value[c] -= entry[first + i] * value[i];
+  }
+  for (int c = 0; c < columns; ++c) x[first + c] = value[c];
 }
 
 void solve_up(const Front& a, double* x, const int* rows, const double* all) {
-  double* below = a.scratch;
-  const int rest = a.rows - a.columns;
-  for (int row = 0; row < rest; ++row) below[row] = all[rows[row]];
-  for (int row = rest; row < a.rest_length; ++row) below[row] = 0.0;
-  for (int c = 0; c < a.columns; ++c) x[c] *= a.inverse_pivots[c];
-  int column = 0;
-  for (; column + 4 <= a.columns; column += 4) take_rest<4>(a, column, x, below);
-  for (; column < a.columns; ++column) take_rest<1>(a, column, x, below);
-  for (int c = a.columns - 1; c >= 0; --c) {
-    const double* own = a.factor + std::ptrdiff_t{a.length} * c;
-    double value = x[c];
-    for (int i = c + 1; i < a.columns; ++i) value -= own[i] * x[i];
-    x[c] = value;
-  }
+  double* known = a.scratch;
+  for (int c = 0; c < a.columns; ++c) known[c] = x[c] * a.inverse_pivots[c];
+  for (int row = a.columns; row < a.rows; ++row) known[row] = all[rows[row - a.columns]];
+  for (int row = a.rows; row < a.length; ++row) known[row] = 0.0;
+  const int last = a.columns % kFrontPadding;
+  int end = a.columns - last;
+  if (last == 1) take_known<1>(a, a.columns, end + kFrontPadding, known);
+  if (last == 2) take_known<2>(a, a.columns, end + kFrontPadding, known);
+  if (last == 3) take_known<3>(a, a.columns, end + kFrontPadding, known);
+  for (; end > 0; end -= kFrontPadding) take_known<kFrontPadding>(a, end, end, known);
+  for (int c = 0; c < a.columns; ++c) x[c] = known[c];
 }
 
 }  // namespace
