@@ -46,6 +46,8 @@ class Contact {
   /// Whether friction is there at all, and its Jacobian unsymmetric.
   bool frictional() const { return frictional_; }
   bool unsymmetric() const { return frictional_ && !freezes(); }
+  /// Whether friction goes with the way, and not with the velocity.
+  bool anchored() const { return model_.description.contact.friction_law == FrictionLaw::anchored; }
 
   /// Where obstacles shall be at the end of the steps to come; nothing: where they are.
   void aim(std::vector<ObstaclePlace> places) { target_ = std::move(places); }
@@ -76,6 +78,8 @@ class Contact {
   /// What pressing has put in over a step that ends at q1, `change` after its start: more than it stored before, and
   /// friction apart [J]. Below zero along a straight way onto a surface; above it where surfaces slide over a summit.
   double pressing_gain(const VectorX& change) const;
+  /// What friction takes over such a step, what anchors store apart [J].
+  double friction_loss(const VectorX& change) const;
   /// Greatest depth of surfaces in each other, over the smaller radius.
   double depth() const;
   /// Whether that is more than a step may end with.
@@ -102,6 +106,8 @@ class Contact {
   /// Keeps in `state`, still where the step began, what contacts at q1 must remember; their stiffness follows the
   /// forces. Returns the energy that the change of stiffness put in [J].
   double accept(State& state);
+  /// The same for a step so short that stiffness stays as it is.
+  void remember(State& state) const;
   /// Makes contacts of bodies that are too deep in each other stiffer; returns the energy put in [J].
   double stiffen(State& state);
   /// Stiffness that no rod falls below; that of a state that has none yet.
@@ -160,6 +166,7 @@ class Contact {
   void end_points(const ContactPair& pair, const VectorX& q, Vec3d (&x)[4]) const;
   FrictionSetting setting(const Touching& t) const;
   double pressing_energy() const;
+  double work_against(int i, const ContactLocal& local, const VectorX& change) const;
   void add_pressing(const Touching& t, bool with_hessian, ContactLocal& out) const;
   void add_friction(const Touching& t, bool with_hessian, ContactLocal& out) const;
   void add_frozen_friction(const Touching& t, bool with_hessian, ContactLocal& out) const;
@@ -195,6 +202,8 @@ class Contact {
   double follow_force(const Touching& t, ContactRecord& record) const;
   double source_stiffness() const;
   void record_friction(const Touching& t, ContactRecord& record) const;
+  ContactRecord record(const Touching& t) const;
+  void keep(std::vector<ContactRecord>& records, State& state) const;
 
   const Model& model_;
   Surfaces surfaces_;

@@ -57,22 +57,45 @@ double Contact::pressing_energy() const {
   return sum;
 }
 
+double Contact::work_against(int i, const ContactLocal& local, const VectorX& change) const {
+  int dofs[kContactUnknowns];
+  unknowns(i, dofs);
+  const double* g = local.gradient;  // of an edge's two nodes; an obstacle's is the opposite of their sum
+  double work = 0.0;
+  for (int k = 0; k < kContactUnknowns; ++k)
+    if (dofs[k] >= 0) work += g[k] * change(dofs[k]);
+  return work - dot(shift_of(pair_of(i)), Vec3d{g[0] + g[3], g[1] + g[4], g[2] + g[5]});
+}
+
 double Contact::pressing_gain(const VectorX& change) const {
   double gain = pressing_energy() - start_pressing_;
   for (int i = 0; i < count(); ++i) {
     const Touching& t = touching_[at(i)];
     if (t.frozen >= 0) continue;
     ContactLocal local{};
-    int dofs[kContactUnknowns];
     add_pressing(t, false, local);
-    unknowns(i, dofs);
-    const double* g = local.gradient;
-    for (int k = 0; k < 12; ++k)
-      if (dofs[k] >= 0) gain -= g[k] * change(dofs[k]);
-    const Vec3d shift = shift_of(pairs_[at(t.pair)]);
-    gain += dot(shift, Vec3d{g[0] + g[3], g[1] + g[4], g[2] + g[5]});
+    gain -= work_against(i, local, change);
   }
   return gain;
+}
+
+double Contact::friction_loss(const VectorX& change) const {
+  double loss = 0.0;
+  for (int i = 0; i < count(); ++i) {
+    const Touching& t = touching_[at(i)];
+    ContactLocal local{};
+    if (t.frozen >= 0)
+      add_frozen_friction(t, false, local);
+    else if (!freezes() && pair_of(i).friction > 0.0)
+      add_friction(t, false, local);
+    else
+      continue;
+    loss += work_against(i, local, change);
+    if (!anchored()) continue;
+    const ContactRecord end = record(t);
+    loss += dot(end.friction, end.stick - t.stick);
+  }
+  return loss;
 }
 
 double Contact::depth() const {
@@ -166,6 +189,35 @@ void Contact::record_friction(const Touching& t, ContactRecord& record) const {
   record.sticking = f.sticking;
 }
 
+ContactRecord Contact::record(const Touching& t) const {
+  const ContactPair& pair = pairs_[at(t.pair)];
+  ContactRecord record;
+  record.key = pair.key;
+  record.force = -t.energy.first;
+  record.stiffness = t.stiffness / pair.share;
+  record.yielded = t.yielded;
+  if (frictional_ && !freezes() && pair.friction > 0.0) record_friction(t, record);
+  return record;
+}
+
+void Contact::keep(std::vector<ContactRecord>& records, State& state) const {
+  std::sort(records.begin(), records.end(), by_key);
+  if (!frozen_.empty()) record_frozen(records);
+  state.contacts.swap(records);
+  leave_obstacles(state);
+}
+
+void Contact::remember(State& state) const {
+  std::vector<ContactRecord> records;
+  for (const Touching& t : touching_) {
+    if (t.frozen >= 0) continue;
+    const ContactPair& pair = pairs_[at(t.pair)];
+    records.push_back(record(t));
+    if (record_of(pair.key) == nullptr) records.back().stiffness = start_stiffness(pair, state.contact_stiffness);
+  }
+  keep(records, state);
+}
+
 double Contact::accept(State& state) {
   std::vector<ContactRecord> records;
   const ContactDescription& contact = model_.description.contact;
@@ -176,12 +228,7 @@ double Contact::accept(State& state) {
   for (const Touching& t : touching_) {
     if (t.frozen >= 0) continue;
     const ContactPair& pair = pairs_[at(t.pair)];
-    ContactRecord record;
-    record.key = pair.key;
-    record.force = -t.energy.first;
-    record.stiffness = t.stiffness / pair.share;
-    record.yielded = t.yielded;
-    if (frictional_ && !freezes() && pair.friction > 0.0) record_friction(t, record);
+    ContactRecord record = this->record(t);
     if (source && !fixed(pair)) {
       const double ratio = common / record.stiffness;
       put_in += change_stiffness(t, ratio, ratio > 1.0 ? yielded_at(t, ratio) : faded(t), record);
@@ -194,10 +241,7 @@ double Contact::accept(State& state) {
       if (rod >= 0) greatest(rod) = std::max(greatest(rod), source ? common : wanted_stiffness(pair, -t.energy.first));
     records.push_back(record);
   }
-  std::sort(records.begin(), records.end(), by_key);
-  if (!frozen_.empty()) record_frozen(records);
-  state.contacts = std::move(records);
-  leave_obstacles(state);
+  keep(records, state);
   if (!(contact.stiffness > 0.0)) follow_forces(greatest, state.contact_stiffness);
   return put_in;
 }

@@ -53,11 +53,6 @@ void book_work(Equations& equations, const Parameters& parameters, const VectorX
     result.load_work = equations.load_work(change);
   const bool in_fluid = equations.model().description.fluid.model != FluidModel::none;
   if (parameters.dragged || parameters.viscous || in_fluid) result.dissipated = equations.dissipated(change);
-  if (const Contact* contact = equations.contact()) {
-    const double by_obstacles = contact->obstacle_work();
-    result.dissipated += equations.contact_loss(change, by_obstacles);
-    result.support_work += by_obstacles;
-  }
 }
 
 /// Held unknowns move as they are told, so their inertia is what changes their velocity, not what the scheme's formula
@@ -300,13 +295,15 @@ void remember_motion(const VectorX& q1, double dt, State& state) {
   motion.known = std::min(motion.known + 1, 2);
 }
 
-/// Forces over mass at q, with velocity v in drag, viscosity and the spin couple.
-void explicit_acceleration(Equations& equations, const Parameters& parameters, double dt, const State& state,
-                           const VectorX& v, StepWorkspace& work, VectorX& acceleration) {
+/// Forces over mass at q, with velocity v in drag, viscosity, friction and the spin couple. Anchors have followed the
+/// way from `before`.
+void explicit_acceleration(Equations& equations, const Parameters& parameters, double dt, const State& before,
+                           const State& state, const VectorX& v, StepWorkspace& work, VectorX& acceleration) {
   work.from = state;  // one that reaches q over dt with velocity v
   work.from.q -= dt * v;
   work.from.v = v;
   equations.begin(work.from, parameters, dt, false);
+  if (Contact* contact = equations.contact(); contact && contact->anchored()) contact->begin(before, dt);
   if (equations.flows() && !solve_flow(equations, state.q, v, work.newton.counters)) {
     acceleration.setConstant(state.q.size(), std::nan(""));
     return;
@@ -336,8 +333,35 @@ double resisted_acceleration(Equations& equations, const Parameters& parameters,
   next = state;
   if (!model.planar()) compute_configuration(model, state, work.z, work.after);
   accept_configuration(model, work.z, work.after, next);
-  explicit_acceleration(equations, parameters, dt, next, work.velocity, work, next.acceleration);
+  explicit_acceleration(equations, parameters, dt, state, next, work.velocity, work, next.acceleration);
   return turn;
+}
+
+/// 2 / omega, omega^2 the greatest eigenvalue of the last matrix over mass, less `shift`; by power iteration.
+double undamped_step(const Equations& equations, double shift) {
+  const LinearSolver& solver = equations.assembler().solver();
+  const VectorX scale = equations.mass().inverse.cwiseSqrt();
+  VectorX x(scale.size()), y(scale.size());
+  for (Eigen::Index i = 0; i < x.size(); ++i)
+    x(i) = std::sin(1.0 + 7.0 * static_cast<double>(i)) + (i % 2 ? 1.0 : -1.0);
+  equations.assembler().project(x);
+  double greatest = 0.0;
+  for (int k = 0; k < 300; ++k) {
+    const double norm = x.norm();
+    if (norm == 0.0) break;
+    x = scale.cwiseProduct(x / norm);
+    solver.multiply({x.data(), static_cast<std::size_t>(x.size())}, {y.data(), static_cast<std::size_t>(y.size())});
+    y -= shift * equations.mass().rows.cwiseProduct(x);
+    x = scale.cwiseProduct(y);
+    equations.assembler().project(x);
+    const double value = x.norm();
+    if (k > 20 && std::abs(value - greatest) < 1e-5 * value) {
+      greatest = value;
+      break;
+    }
+    greatest = std::max(greatest, value);
+  }
+  return greatest > 0.0 ? 2.0 / std::sqrt(greatest) : INFINITY;
 }
 
 }  // namespace
@@ -386,6 +410,11 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
   assembler.project(v1);
   assembler.add_held_part(work.mean, 1.0, v1);
   book_work(equations, parameters, work.change, result);
+  if (const Contact* contact = equations.contact()) {
+    const double by_obstacles = contact->obstacle_work();
+    result.dissipated += equations.contact_loss(work.change, by_obstacles);
+    result.support_work += by_obstacles;
+  }
   if (!model.constraints.empty()) {
     work.assumed = equations.mass().rows.cwiseProduct((work.z - state.q) / (h * h) - state.v / h);
     book_supports(equations, state.v, v1, dt, work, result);
@@ -412,7 +441,7 @@ StepResult verlet_step(Equations& equations, const Parameters& parameters, doubl
   const Assembler& assembler = equations.assembler();
   if (!work.held.reachable) return result;
   if (!state.acceleration_current)
-    explicit_acceleration(equations, parameters, dt, state, state.v, work, state.acceleration);
+    explicit_acceleration(equations, parameters, dt, state, state, state.v, work, state.acceleration);
   VectorX &half = work.mean, &q1 = work.z, &v1 = work.velocity;
   half = state.v + 0.5 * dt * state.acceleration;
   assembler.project(half);
@@ -428,9 +457,14 @@ StepResult verlet_step(Equations& equations, const Parameters& parameters, doubl
   if (!(result.largest_turn <= 1.5)) return result;
   next.v = half + 0.5 * dt * next.acceleration;
   if (!std::isfinite(next.v.squaredNorm())) return result;
-  if (equations.contact()) equations.contact()->leave_obstacles(next);
   work.change = q1 - state.q;
   book_work(equations, parameters, work.change, result);
+  if (Contact* contact = equations.contact()) {
+    // What surfaces store by pressing Verlet keeps on the whole, which the force at the end alone does not show.
+    result.dissipated += contact->friction_loss(work.change);
+    result.support_work += contact->obstacle_work();
+    contact->remember(next);
+  }
   if (!model.constraints.empty()) {
     work.assumed.setZero(model.dof_count);
     book_supports(equations, state.v, next.v, dt, work, result);
@@ -443,31 +477,25 @@ StepResult verlet_step(Equations& equations, const Parameters& parameters, doubl
   return result;
 }
 
-double stable_step(Equations& equations, const Parameters& parameters, const State& state, NewtonWorkspace& work) {
+double stable_step(Equations& equations, const Parameters& parameters, const State& state, StepWorkspace& work) {
   equations.begin(state, parameters, 0.0, false);
-  equations.evaluate(state.q, true, nullptr, work.evaluation);
-  const LinearSolver& solver = equations.assembler().solver();
-  const VectorX scale = equations.mass().inverse.cwiseSqrt();
-  VectorX x(scale.size()), y(scale.size());
-  for (Eigen::Index i = 0; i < x.size(); ++i)
-    x(i) = std::sin(1.0 + 7.0 * static_cast<double>(i)) + (i % 2 ? 1.0 : -1.0);
-  equations.assembler().project(x);
-  double greatest = 0.0;
-  for (int k = 0; k < 300; ++k) {
-    const double norm = x.norm();
-    if (norm == 0.0) break;
-    x = scale.cwiseProduct(x / norm);
-    solver.multiply({x.data(), static_cast<std::size_t>(x.size())}, {y.data(), static_cast<std::size_t>(y.size())});
-    x = scale.cwiseProduct(y);
-    equations.assembler().project(x);
-    const double value = x.norm();
-    if (k > 20 && std::abs(value - greatest) < 1e-5 * value) {
-      greatest = value;
-      break;
+  equations.evaluate(state.q, true, nullptr, work.newton.evaluation);
+  double dt = undamped_step(equations, 0.0);
+  // The eigenvalue falls while a step grows, at most as one over it: each round halves the logarithm of the error.
+  for (int k = 0; k < 20 && std::isfinite(dt); ++k) {
+    const double h = 0.25 * dt;
+    work.from = state;  // as it moves: friction resists less, the faster it slips
+    work.from.q -= h * state.v;
+    equations.begin(work.from, parameters, h, false);
+    if (Contact* contact = equations.contact()) {
+      contact->begin(work.from, dt);
+      contact->ease(0.25);
     }
-    greatest = std::max(greatest, value);
+    equations.evaluate(state.q, true, nullptr, work.newton.evaluation);
+    const double before = std::exchange(dt, undamped_step(equations, 1.0 / (h * h)));
+    if (std::abs(dt - before) < 1e-3 * dt) break;
   }
-  return greatest > 0.0 ? 2.0 / std::sqrt(greatest) : INFINITY;
+  return dt;
 }
 
 }  // namespace withe

@@ -68,7 +68,10 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
 StepResult verlet_step(Equations& equations, const Parameters& parameters, double dt, State& state,
                        StepWorkspace& work);
 
-/// Largest stable step of the explicit scheme, 2 / omega_max of the linearised equations, by power iteration.
-double stable_step(Equations& equations, const Parameters& parameters, const State& state, NewtonWorkspace& work);
+/// Largest stable step of the explicit scheme at a state: a mode of frequency omega that resistance damps at the rate
+/// gamma, and which Verlet's predicted velocity feels, is stable while (omega dt)^2 / 4 + gamma dt <= 1. Found as the
+/// dt for which the greatest eigenvalue of M^-1 (K + 4 C / dt) is 4 / dt^2, resistance C that of friction, drag and
+/// viscosity.
+double stable_step(Equations& equations, const Parameters& parameters, const State& state, StepWorkspace& work);
 
 }  // namespace withe

@@ -65,7 +65,7 @@ World::Implementation::Implementation(SceneDescription scene, Options choice)
   if (description.contact.overlap == Overlap::separate) separate();
   check_overlap();
   if (options.integrator == Integrator::verlet) {
-    plan.stable_step = stable_step(*equations, parameters, state, work.newton);
+    plan.stable_step = stable_step(*equations, parameters, state, work);
     require(options.time_step <= plan.stable_step,
             "time_step must not exceed the stable step of the explicit scheme, " + std::to_string(plan.stable_step) +
                 " s, got " + std::to_string(options.time_step) + " s");
@@ -340,6 +340,11 @@ void World::Implementation::add_contact_notes() {
     plan.notes.push_back("rods that overlapped as drawn were moved apart, by up to " + std::to_string(separated) +
                          " m: they are stressed there");
   if (!equations->contact()->frictional()) plan.notes.emplace_back("no friction: contact stays symmetric");
+  if (options.integrator == Integrator::verlet && equations->contact()->eases())
+    plan.notes.emplace_back(
+        "friction that sticks allows explicit steps of at most about slip_tolerance / (7.5 mu) times a node's mass "
+        "over "
+        "the force that presses it, which the drawing does not know");
 }
 
 /// Warns of rods whose edges are longer than they are thick: to contact they are chains of straight pieces.

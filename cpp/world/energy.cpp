@@ -1,5 +1,7 @@
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <string>
 
 #include "world/implementation.hpp"
 
@@ -119,14 +121,34 @@ bool World::Implementation::contact_pumps(double dt) {
   return false;
 }
 
+/// Refuses a step that the drawing allowed, but not what has come since: forces that press surfaces, other material.
+void World::Implementation::begin_explicit() {
+  const std::string longest = longest_explicit_step();
+  if (!longest.empty()) fail(NewtonResult{}, options.time_step, "the explicit scheme is not stable here" + longest);
+  alarm = energy();
+}
+
+/// What to say where the time step is above the stable one at the present state; else nothing.
+std::string World::Implementation::longest_explicit_step() {
+  const double stable = stable_step(*equations, parameters, state, work);
+  if (!(options.time_step > stable)) return "";
+  char number[32];
+  std::snprintf(number, sizeof number, "%.3g", stable);
+  const bool slips = equations->contact() && equations->contact()->eases();
+  return std::string(": take a time_step below ") + number + " s" +
+         (slips ? ", or a greater slip_tolerance, which allows longer ones under friction" : "");
+}
+
 /// An explicit scheme that is about to blow up gains energy long before it shows as NaN.
 void World::Implementation::check_explicit() {
   const Energy e = energy();
   const double gain = (e.total - e.work + e.dissipated) - (alarm->total - alarm->work + alarm->dissipated);
   const double scale = std::max({alarm->kinetic, std::abs(e.gravity - alarm->gravity), std::abs(e.loads - alarm->loads),
                                  std::abs(e.work - alarm->work), alarm->stretch + alarm->bend + alarm->twist, 1e-300});
-  if (!std::isfinite(e.total) || gain > 0.5 * scale)
-    fail(NewtonResult{}, options.time_step, "the explicit scheme gains energy: take a smaller time_step");
+  if (std::isfinite(e.total) && gain <= 0.5 * scale) return;
+  const std::string longest = std::isfinite(e.total) ? longest_explicit_step() : "";
+  fail(NewtonResult{}, options.time_step,
+       "the explicit scheme gains energy" + (longest.empty() ? ": take a smaller time_step" : longest));
 }
 
 }  // namespace withe

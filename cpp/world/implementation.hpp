@@ -205,6 +205,8 @@ struct World::Implementation {
   double actuation_energy() const;
   bool gains_energy();
   bool contact_pumps(double dt);
+  void begin_explicit();
+  std::string longest_explicit_step();
   void check_explicit();
 };
 

@@ -22,7 +22,7 @@ constexpr int kMostStiffenings = 4;
 /// One time step of `duration`, in equal parts where it does not converge or is not accurate enough.
 void World::Implementation::advance(double duration) {
   const double base = state.time;
-  if (options.integrator == Integrator::verlet && !alarm) alarm = energy();
+  if (options.integrator == Integrator::verlet && !alarm) begin_explicit();
   if (!options.adaptive && !options.tolerance) level = 0;
   // Without a step before there is no estimate, so error control begins with a step too small to need one.
   if (options.tolerance && predictor.empty()) level = std::max(level, notches() * std::min(options.max_halvings, 8));

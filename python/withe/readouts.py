@@ -172,7 +172,7 @@ class Plan:
     solver : str
         Of the linear equations.
     stable_step : float or None
-        Of the explicit scheme [s].
+        Of the explicit scheme, as drawn [s].
     notes : tuple of str
         What is left out or was decided, and why.
     """

@@ -272,10 +272,13 @@ TEST(StableStep, IsTwoOverTheHighestFrequency) {
   builder.support(SupportKind::pin, {0, 0});
   const Model model = build_model(builder.scene, false);
   Equations equations(model, options_of(Scheme::statics));
-  const Parameters parameters = initial_parameters(model);
+  Parameters parameters = initial_parameters(model);
+  parameters.lumped = true;
   const State state = initial_state(model);
-  NewtonWorkspace work;
+  StepWorkspace work;
   const double step = stable_step(equations, parameters, state, work);
+  equations.begin(state, parameters, 0.0, false);
+  equations.evaluate(state.q, true, nullptr, work.newton.evaluation);
   // The same by a dense eigenproblem, by repeated multiplication of the dense matrix.
   const Eigen::Index n = model.dof_count;
   MatrixX K(n, n);
@@ -298,6 +301,39 @@ TEST(StableStep, IsTwoOverTheHighestFrequency) {
     x = y / value;
   }
   EXPECT_NEAR(step, 2.0 / std::sqrt(value), 2e-3 * step);
+}
+
+/// By how much a small motion has grown after many explicit steps, `of_stable` the stable one long.
+double growth(const RodMaterial& material, double of_stable) {
+  SceneBuilder builder;
+  builder.add_rod(testing::line(Vector3::Zero(), Vector3(1.0, 0.5, 0.2), 6), material);
+  const Model model = build_model(builder.scene, false);
+  Options options;
+  options.integrator = Integrator::verlet;
+  Equations equations(model, options);
+  Parameters parameters = initial_parameters(model);
+  parameters.lumped = true;
+  State state = initial_state(model);
+  StepWorkspace work;
+  const double dt = of_stable * stable_step(equations, parameters, state, work);
+  work.held.q = state.q;
+  state.v = 1e-10 * testing::RandomNumbers(4).vector(model.dof_count);
+  const double before = state.v.norm();
+  for (int k = 0; k < 1000; ++k)
+    if (!verlet_step(equations, parameters, dt, state, work).accepted) return INFINITY;
+  return state.v.norm() / before;
+}
+
+TEST(StableStep, IsWhereSmallMotionsBeginToGrowHoweverTheyAreDamped) {
+  for (double drag : {0.0, 0.4, 40.0, 4000.0})
+    for (double viscous_time : {0.0, 0.05}) {
+      RodMaterial material;
+      material.rotary = 0.3;
+      material.drag = drag;
+      material.viscous_time = viscous_time;
+      EXPECT_LT(growth(material, 0.98), 10.0) << drag << " " << viscous_time;
+      EXPECT_GT(growth(material, 1.02), 1e3) << drag << " " << viscous_time;
+    }
 }
 
 }  // namespace

@@ -266,3 +266,74 @@ def test_friction_that_turns_round_within_a_step_is_found_without_cutting_it():
     simulation.step(20)
     assert simulation.statistics.rejected_steps == 0
     assert simulation.statistics.iterations < 40 * 100
+
+
+def explicit_rod(friction_model: Any, time_step: float, slip_tolerance: float = 1e-3) -> tuple[withe.Simulation, Any]:
+    """The heavy rod, settled, and the push that it waits for."""
+    scene, rod = heavy_rod(friction_model)
+    scene.enable_contact(friction_model=friction_model, distance_tolerance=5e-4, slip_tolerance=slip_tolerance)
+    push = scene.add_load(rod, (0, 0, 0))
+    simulation = scene.build(integrator="verlet", time_step=time_step)
+    simulation.equilibrium()
+    return simulation, push
+
+
+def test_an_explicit_rod_that_bounces_keeps_its_energy_and_books_no_loss():
+    scene = withe.Scene()
+    rod = scene.add_rod(start=(0, 0, 8e-3), end=(0.3, 0, 9e-3), nodes=21, radius=RADIUS, material=RUBBER)
+    scene.add_floor()
+    simulation = scene.build(integrator="verlet", time_step=2e-5)
+    start = simulation.energy().total
+    lowest = 1.0
+    for _ in range(100):
+        simulation.step(50)
+        lowest = min(lowest, simulation.positions(rod)[:, 2].min())
+        assert abs(excess(simulation, start)) < 1e-3 * start
+    assert lowest < RADIUS
+    assert simulation.energy().dissipated == 0.0
+
+
+def test_an_explicit_rod_rests_on_its_anchors_and_swings_about_where_they_hold_a_push():
+    simulation, push = explicit_rod("anchored", 1e-4)
+    simulation.step(500)
+    assert np.abs(simulation.velocities()).max() < 1e-10
+    start, place = simulation.energy(), simulation.positions()[:, 0].mean()
+    simulation.set(push, load=(1.96, 0, 0))
+    greatest = 0.0
+    for _ in range(100):
+        simulation.step(20)
+        away = simulation.positions()[:, 0].mean() - place
+        greatest = max(greatest, simulation.energy().kinetic)
+        assert -1e-6 < away < 5e-5
+        assert abs(excess(simulation, start.total)) < 0.02 * greatest
+    assert greatest > 1e-6
+    assert simulation.contacts()["sticking"].all()
+
+
+@pytest.mark.parametrize("friction_model", ["implicit", "lagged"])
+def test_an_explicit_step_that_friction_forbids_is_refused_with_the_one_that_it_allows(friction_model: Any) -> None:
+    simulation, _ = explicit_rod(friction_model, 1e-4)
+    with pytest.raises(withe.ConvergenceError, match=r"time_step below .* slip_tolerance") as caught:
+        simulation.step()
+    allowed = float(str(caught.value).split("below ")[1].split(" s")[0])
+    # A node whose edges cannot turn: its mass over what slip at its speed meets, mu N K / 2.
+    assert allowed < 1e-3 / (7.5 * 0.4 * 9.8)
+    simulation, _ = explicit_rod(friction_model, 0.95 * allowed)
+    start = simulation.energy().total
+    simulation.step(5000)
+    assert simulation.energy().kinetic < 1e-7
+    assert abs(excess(simulation, start)) < 1e-7
+
+
+@pytest.mark.parametrize("friction_model", ["implicit", "lagged", "anchored"])
+def test_explicit_steps_let_a_rod_slide_as_a_block_does(friction_model: Any) -> None:
+    simulation, push = explicit_rod(friction_model, 1e-4, 2e-2)
+    start = simulation.energy().total
+    simulation.set(push, load=(6.0, 0, 0))
+    simulation.step(4000)
+    v = simulation.velocities()[:, 0]
+    assert 0.5 * (v[1:] + v[:-1]).mean() == pytest.approx(0.4 * (6.0 - 0.4 * 9.8), rel=0.015)  # momentum over mass
+    assert abs(excess(simulation, start)) < 1e-3 * simulation.energy().kinetic
+    contacts = simulation.contacts()
+    late = 0.03 if friction_model == "lagged" else 1e-3  # its normal forces are those of the step's start [N]
+    np.testing.assert_allclose(-contacts["friction"][:, 0], 0.4 * contacts["normal_force"], rtol=0.01, atol=late)

@@ -328,10 +328,21 @@ def test_an_explicit_blow_up_is_found_by_its_energy():
     _, arm, simulation = cantilever(integrator="verlet", time_step=1e-5)
     limit = simulation.plan.stable_step
     _, arm, simulation = cantilever(integrator="verlet", time_step=0.99 * limit)
+    simulation.step()
     simulation.set(arm, youngs_modulus=4e6)  # twice as fast: now the step is too long
     with pytest.raises(withe.ConvergenceError, match=r"gains energy|broke down"):
         simulation.step(100_000)
     assert np.isfinite(simulation.positions()).all()
+
+
+def test_an_explicit_run_that_would_blow_up_is_refused_before_its_first_step():
+    _, arm, simulation = cantilever(integrator="verlet", time_step=1e-5)
+    limit = simulation.plan.stable_step
+    _, arm, simulation = cantilever(integrator="verlet", time_step=0.99 * limit)
+    simulation.set(arm, youngs_modulus=4e6)
+    with pytest.raises(withe.ConvergenceError, match=r"not stable here: take a time_step below") as caught:
+        simulation.step()
+    assert float(str(caught.value).split("below ")[1].split(" s")[0]) == pytest.approx(0.5 * limit, rel=0.01)
 
 
 def test_fourth_order_refuses_what_cannot_go_back_in_time_and_nothing_changes():
