@@ -145,6 +145,7 @@ NewtonResult solve_eased(Equations& equations, const Newton& newton, bool mixed,
 NewtonResult find_inner(Equations& equations, const Newton& newton, const Options& options, const StepPlan& plan,
                         double h, const State& state, const Predictor& predictor, StepWorkspace& work) {
   struct Start {
+    std::size_t number;
     bool moving, accelerated, mixed, eased = false;
   };
   NewtonResult found;
@@ -159,18 +160,23 @@ NewtonResult find_inner(Equations& equations, const Newton& newton, const Option
   if (circling && !exact) --known.relaxed_solves;
   constexpr int kWait = 16;
   bool first = true;
-  std::array<Start, 5> starts{{{true, true, mixed},
-                               {true, false, mixed},
-                               {false, false, mixed},
-                               {true, false, !mixed},
-                               {false, false, mixed, true}}};
-  // Where surfaces stick, a motion that lets them slip leads far off, and from rest Newton's method finds its way soon.
-  const bool eases = equations.contact() && equations.contact()->eases();
-  if (equations.contact() && equations.contact()->frictional()) std::swap(starts[1], starts[2]);
+  std::array<Start, 5> starts{{{0, true, true, mixed},
+                               {1, true, false, mixed},
+                               {2, false, false, mixed},
+                               {3, true, false, !mixed},
+                               {4, false, false, mixed, true}}};
+  // Where surfaces stick, a motion that lets them slip leads far off, and from rest Newton's method finds its way soon,
+  // or else mostly within a shorter step.
+  const bool frictional = equations.contact() && equations.contact()->frictional();
+  const bool eases = frictional && equations.contact()->eases();
+  if (frictional) std::swap(starts[1], starts[2]);
   if (eases) std::rotate(starts.begin() + 2, starts.end() - 1, starts.end());
   for (const Start& start : starts) {
     if (start.eased && !eases) continue;
     if (start.accelerated && (points == 0 || work.repeated)) continue;
+    const bool sure = start.number == 2 || (!start.accelerated && !(frictional && options.adaptive));
+    StartRecord& record = known.starts[start.number];
+    if (!sure && record.skipped()) continue;
     if (start.accelerated) {
       predictor.extrapolate(state.time + 0.5 * plan.dt, points, work.mean);
       work.move = h * state.v + (h * h) * work.mean;
@@ -190,6 +196,7 @@ NewtonResult find_inner(Equations& equations, const Newton& newton, const Option
     found = start.eased ? solve_eased(equations, newton, start.mixed, h, work)
                         : newton.solve(equations, work.z, nullptr, limit, work.newton, start.mixed, h);
     spent += found.iterations;
+    if (!sure) record.note(found.converged);
     if (found.converged) {
       if (circling && mixed && !start.mixed) known.plain_solves = kWait;
       if (circling && exact && !keep_momentum) known.relaxed_solves = kWait;

@@ -242,7 +242,7 @@ NewtonResult Newton::solve(Equations& equations, VectorX& z, const VectorX* targ
         p.foreseen = monotone(equations, z, target, full, shorten, work, kept);
         work.step *= kept;
         shorten *= kept;
-        axial_known = mixed && kept == 1.0;
+        axial_known = false;
       }
     }
     if (options_.line_search == LineSearch::goldstein_price) {

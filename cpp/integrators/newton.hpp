@@ -33,6 +33,19 @@ struct Balance {
 /// Where the matrix of an iteration was made: there, at an earlier iterate, or in an earlier time step.
 enum class MatrixAge { fresh, within, across };
 
+/// How a start has served that need not lead to the solution: what misses time and again is tried ever more rarely.
+struct StartRecord {
+  int misses = 0;  ///< in a row
+  int waits = 0;   ///< solves to come without it
+
+  bool skipped() { return waits > 0 && waits-- > 0; }
+  void note(bool converged) {
+    constexpr int kMostMisses = 6;
+    misses = converged ? 0 : std::min(misses + 1, kMostMisses);
+    waits = (1 << misses) - 1;
+  }
+};
+
 /// What the factorisation in a solver belongs to, and how well old ones have served.
 struct FactorRecord {
   const Equations* owner = nullptr;                     ///< nothing: not to be used again
@@ -43,6 +56,7 @@ struct FactorRecord {
   bool tired = false;                                   ///< served the last time step slowly
   int plain_solves = 0;                                 ///< still to come before the mixed method is tried again
   int relaxed_solves = 0;                               ///< and before angular momentum is kept exactly again
+  std::array<StartRecord, 5> starts{};                  ///< per start of find_inner
 };
 
 /// Scratch of the solver; owned by the world, so that a step does not allocate.

@@ -32,6 +32,7 @@ void World::Implementation::advance(double duration) {
     advance_in_parts(duration);
   } catch (...) {
     if (state.time == base) motions = motions_before;
+    forget_matrix();  // nor does what was tried leave a trace
     throw;
   }
   // An energy costs as much as a step.
