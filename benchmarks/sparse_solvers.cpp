@@ -1,16 +1,22 @@
 // Factorising the matrix of a Newton iteration, and solving with it once, where rods are joined or touch: our sparse
-// LDL^T beside Eigen's SimplicialLDLT and CHOLMOD, each with its own approximate minimum degree, found beforehand.
+// LDL^T beside Eigen's SimplicialLDLT and CHOLMOD, each with its own approximate minimum degree, found beforehand; and
+// conjugate gradients on piles that have settled.
 
 #include <benchmark/benchmark.h>
 
 #include <Eigen/SparseCholesky>
+#include <cmath>
+#include <map>
 #include <memory>
 #include <random>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "common/check.hpp"
+#include "integrators/dynamics.hpp"
 #include "scenes.hpp"
+#include "solvers/band_ldlt.hpp"
 #include "step_problem.hpp"
 
 #ifdef WITHE_HAS_CHOLMOD
@@ -95,23 +101,24 @@ struct Problem : StepProblem {
     equations.evaluate(state.q, true, nullptr, e);
     force = VectorX::Ones(state.q.size());
   }
-
-  /// Its lower triangle.
-  Eigen::SparseMatrix<double> matrix() {
-    const SparsityPattern& pattern = equations.assembler().pattern();
-    std::vector<Eigen::Triplet<double>> entries;
-    for (int column = 0; column < pattern.size; ++column)
-      for (int p = pattern.column_starts[static_cast<std::size_t>(column)];
-           p < pattern.column_starts[static_cast<std::size_t>(column) + 1]; ++p) {
-        const int row = pattern.row_indices[static_cast<std::size_t>(p)];
-        if (row < column) continue;
-        entries.emplace_back(row, column, solver().values()[static_cast<std::size_t>(solver().offset(row, column))]);
-      }
-    Eigen::SparseMatrix<double> result(pattern.size, pattern.size);
-    result.setFromTriplets(entries.begin(), entries.end());
-    return result;
-  }
 };
+
+/// Of the last evaluation.
+Eigen::SparseMatrix<double> lower_triangle(StepProblem& p) {
+  const SparsityPattern& pattern = p.equations.assembler().pattern();
+  LinearSolver& solver = p.solver();
+  std::vector<Eigen::Triplet<double>> entries;
+  for (int column = 0; column < pattern.size; ++column)
+    for (int k = pattern.column_starts[static_cast<std::size_t>(column)];
+         k < pattern.column_starts[static_cast<std::size_t>(column) + 1]; ++k) {
+      const int row = pattern.row_indices[static_cast<std::size_t>(k)];
+      if (row < column) continue;
+      entries.emplace_back(row, column, solver.values()[static_cast<std::size_t>(solver.offset(row, column))]);
+    }
+  Eigen::SparseMatrix<double> result(pattern.size, pattern.size);
+  result.setFromTriplets(entries.begin(), entries.end());
+  return result;
+}
 
 void by_withe(benchmark::State& run, const SceneDescription& scene) {
   Problem p(scene);
@@ -127,9 +134,147 @@ void by_withe(benchmark::State& run, const SceneDescription& scene) {
   run.counters["unknowns"] = static_cast<double>(x.size());
 }
 
+/// Rods of 20 nodes, laid crosswise in ten layers on a floor, with lagged friction: the pile of contact.py.
+SceneDescription rods_on_a_floor(int rods) {
+  constexpr double kLength = 0.1, kThin = 2e-3, kModulus = 1e6, kDensity = 1000.0, kAcross = 0.2 * kLength;
+  constexpr int kLayers = 10;
+  const double area = testing::kPi * kThin * kThin, second = 0.25 * area * kThin * kThin;
+  const testing::RodMaterial rubber{.stretch = kModulus * area,
+                                    .bend1 = kModulus * second,
+                                    .bend2 = kModulus * second,
+                                    .twist = kModulus / 3.0 * 2.0 * second,
+                                    .density = kDensity * area,
+                                    .rotary = kDensity * 2.0 * second};
+  testing::SceneBuilder builder;
+  builder.scene.gravity = Vector3(0, 0, -9.81);
+  ContactDescription& contact = builder.scene.contact;
+  contact.rods = true;
+  contact.friction = 0.3;
+  contact.friction_law = FrictionLaw::lagged;
+  contact.obstacles.emplace_back();
+  contact.obstacle_friction = VectorX::Constant(1, 0.3);
+  std::mt19937 random(0);
+  std::uniform_real_distribution<double> uniform(0.0, 0.1 * kAcross);
+  const int rows = std::max(1, static_cast<int>(std::lround(std::sqrt(rods / kLayers * 0.2 / 1.1))));
+  for (int i = 0; i < rods; ++i) {
+    const int layer = i % kLayers, place = i / kLayers;
+    Vector3 middle(1.1 * kLength * (place % rows) + uniform(random), kAcross * (place / rows) + uniform(random),
+                   (1.005 + 2.005 * layer) * kThin);
+    Vector3 half(0.5 * kLength, 0, 0);
+    if (layer % 2) std::swap(middle.x(), middle.y()), std::swap(half.x(), half.y());
+    builder.add_rod(testing::line(middle - half, middle + half, 20), rubber);
+    RodDescription& rod = builder.scene.rods.back();
+    rod.contact_radius.setConstant(rod.rest_lengths.size(), kThin);
+  }
+  return builder.scene;
+}
+
+/// The system of a Newton iteration in a pile whose rods press on each other, after 8 ms.
+struct Settled : StepProblem {
+  static constexpr double kStep = 1e-3;  // [s]
+  Eigen::SparseMatrix<double> matrix;    // all of it
+  VectorX residual;
+
+  explicit Settled(const SceneDescription& scene) : StepProblem(scene, false) {
+    const Newton newton(model, options);
+    Predictor predictor;
+    StepWorkspace work;
+    predictor.resize(state.q.size());
+    equations.contact()->set_parameters(parameters);
+    equations.contact()->initialise(state);
+    for (int k = 0; k < 8; ++k) {
+      work.held.q = state.q;
+      const StepPlan plan{StepRule::backward_euler, kStep, 0};
+      for (int tries = 0; tries < 9; ++tries) {
+        const StepResult r = implicit_step(equations, newton, options, parameters, plan, state, predictor, work);
+        if (r.accepted) break;
+        require(r.too_deep && tries < 8, "the pile did not settle");
+        equations.contact()->stiffen(state);
+      }
+    }
+    equations.begin(state, parameters, kStep, false);
+    equations.evaluate(state.q, true, nullptr, work.newton.evaluation);
+    residual = work.newton.evaluation.residual;
+    const Eigen::SparseMatrix<double> lower = lower_triangle(*this);
+    matrix = lower.selfadjointView<Eigen::Lower>();
+  }
+
+  static Settled& of(int rods) {
+    static std::map<int, std::unique_ptr<Settled>> all;
+    std::unique_ptr<Settled>& one = all[rods];
+    if (!one) one = std::make_unique<Settled>(rods_on_a_floor(rods));
+    return *one;
+  }
+};
+
+/// What couples unknowns of one rod that are no farther apart than the stencils' band.
+std::unique_ptr<LinearSolver> bands_of_rods(const Settled& p) {
+  constexpr int kHalfBandwidth = 10;
+  const int unknowns = p.model.dof_count / static_cast<int>(p.model.description.rods.size());
+  const auto inside = [=](int i, int j) { return i / unknowns == j / unknowns && std::abs(i - j) <= kHalfBandwidth; };
+  SparsityPattern pattern{p.model.dof_count, {0}, {}};
+  for (int column = 0; column < pattern.size; ++column) {
+    for (Eigen::SparseMatrix<double>::InnerIterator entry(p.matrix, column); entry; ++entry)
+      if (inside(static_cast<int>(entry.row()), column)) pattern.row_indices.push_back(static_cast<int>(entry.row()));
+    pattern.column_starts.push_back(static_cast<int>(pattern.row_indices.size()));
+  }
+  std::unique_ptr<LinearSolver> bands = make_band_ldlt(pattern);
+  for (int column = 0; column < pattern.size; ++column)
+    for (Eigen::SparseMatrix<double>::InnerIterator entry(p.matrix, column); entry; ++entry)
+      if (entry.row() >= column && inside(static_cast<int>(entry.row()), column))
+        bands->values()[static_cast<std::size_t>(bands->offset(static_cast<int>(entry.row()), column))] = entry.value();
+  return bands;
+}
+
+void settled_by_factors(benchmark::State& run, int rods) {
+  Settled& p = Settled::of(rods);
+  VectorX x;
+  for ([[maybe_unused]] auto _ : run) {
+    if (p.solver().factorize().status != FactorStatus::ok) run.SkipWithError("singular");
+    x = p.residual;
+    p.solver().solve({x.data(), static_cast<std::size_t>(x.size())});
+    benchmark::DoNotOptimize(x.data());
+  }
+  run.counters["unknowns"] = static_cast<double>(x.size());
+  run.counters["error"] = (p.matrix * x - p.residual).norm() / p.residual.norm();
+}
+
+/// Until the residual has become `tolerance` times smaller.
+void settled_by_gradients(benchmark::State& run, int rods, double tolerance) {
+  Settled& p = Settled::of(rods);
+  const std::unique_ptr<LinearSolver> bands = bands_of_rods(p);
+  VectorX x, r, z, d, image;
+  int iterations = 0;
+  for ([[maybe_unused]] auto _ : run) {
+    if (bands->factorize().status != FactorStatus::ok) run.SkipWithError("singular");
+    const auto precondition = [&] {
+      z = r;
+      bands->solve({z.data(), static_cast<std::size_t>(z.size())});
+    };
+    x.setZero(p.residual.size());
+    r = p.residual;
+    precondition();
+    d = z;
+    const double least = tolerance * r.norm();
+    double product = r.dot(z);
+    for (iterations = 0; r.norm() > least && iterations < 5000; ++iterations) {
+      image.noalias() = p.matrix * d;
+      const double along = product / d.dot(image);
+      x += along * d;
+      r -= along * image;
+      precondition();
+      const double before = std::exchange(product, r.dot(z));
+      d = z + (product / before) * d;
+    }
+    benchmark::DoNotOptimize(x.data());
+  }
+  run.counters["iterations of CG"] = iterations;
+  run.counters["error"] = (p.matrix * x - p.residual).norm() / p.residual.norm();
+}
+
 void by_eigen(benchmark::State& run, const SceneDescription& scene) {
   Problem p(scene);
-  const Eigen::SparseMatrix<double> matrix = p.matrix();
+  const Eigen::SparseMatrix<double> matrix = lower_triangle(p);
   Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver;
   solver.analyzePattern(matrix);
   VectorX x;
@@ -144,7 +289,7 @@ void by_eigen(benchmark::State& run, const SceneDescription& scene) {
 #ifdef WITHE_HAS_CHOLMOD
 void by_cholmod(benchmark::State& run, const SceneDescription& scene, int supernodal) {
   Problem p(scene);
-  Eigen::SparseMatrix<double> matrix = p.matrix();
+  Eigen::SparseMatrix<double> matrix = lower_triangle(p);
   cholmod_common common;
   cholmod_start(&common);
   common.supernodal = supernodal;
@@ -199,6 +344,13 @@ int main(int argc, char** argv) {
       add(name + "/CHOLMOD " + how,
           [&scene, supernodal](benchmark::State& run) { withe::by_cholmod(run, scene, supernodal); });
 #endif
+  }
+  for (int rods : {60, 250, 1000}) {
+    const std::string name = "settled pile of " + std::to_string(rods) + " rods";
+    add(name + "/withe", [rods](benchmark::State& run) { withe::settled_by_factors(run, rods); });
+    for (const auto& [digits, tolerance] : {std::pair{"1e-6", 1e-6}, {"1e-10", 1e-10}})
+      add(name + "/conjugate gradients to " + digits,
+          [rods, tolerance](benchmark::State& run) { withe::settled_by_gradients(run, rods, tolerance); });
   }
   benchmark::Initialize(&argc, argv);
   if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 1;
