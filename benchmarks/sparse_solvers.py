@@ -75,7 +75,7 @@ def piles(
     rows: list[tuple[str, ...]] = []
     for scene, of in settled.items():
         counts = {s: f" ({iterations[scene, s]:.0f})" if (scene, s) in iterations else "" for s in solvers}
-        rows.append((scene, f"{unknowns[scene]:.0f}", *(f"{1e3 * of[s].median:.3g}{counts[s]}" for s in solvers)))
+        rows.append((scene, f"{unknowns[scene]:.0f}", *(f"{1e3 * of[s].median:.4g}{counts[s]}" for s in solvers)))
     if len(settled) > 1:
         sizes = np.log([unknowns[scene] for scene in settled])
         grows = {s: np.polyfit(sizes, np.log([of[s].median for of in settled.values()]), 1)[0] for s in solvers}
