@@ -95,9 +95,9 @@ DividedStrain divided_strain(const BendMeasure& measure, double kappa0, double k
 /// Gonzalez's correction with u = G D: adds r u / (u . D) to the gradient and its derivative with
 /// respect to z to the Hessian.
 void Equations::correct(Local& local, const Local& end, double start_energy, double stiffness,
-                        const ElementTable& table, int element, const Metric& metric) {
+                        const ElementTable& table, int element, const Metric& metric, bool with_matrix) {
   const int n = table.width();
-  double D[kMaxLocal]{}, u[kMaxLocal]{}, change[kMaxLocal]{};
+  double D[kMaxLocal]{}, u[kMaxLocal]{};
   gather_difference(table, element, D);
   for (int i = 0; i < n; ++i) u[i] = metric.own[i] * D[i];
   for (const Metric::Pair& pair : metric.pairs)
@@ -108,19 +108,30 @@ void Equations::correct(Local& local, const Local& end, double start_energy, dou
     }
   double s = 0.0, r = end.energy - start_energy;
   for (int i = 0; i < n; ++i) {
-    double HD = 0.0;
-    for (int j = 0; j < n; ++j) HD += local.hessian[i][j] * D[j];
-    change[i] = 2.0 * (end.gradient[i] - local.gradient[i]) - HD;
     s += u[i] * D[i];
     r -= local.gradient[i] * D[i];
   }
   if (!(s > 1e-24)) return;
-  const double inverse = 1.0 / s, weight = 2.0 * r * inverse;
-  for (int j = 0; j < n; ++j) change[j] = inverse * (change[j] - 2.0 * weight * u[j]);
+  const double inverse = 1.0 / s;
+  if (with_matrix) add_correction_hessian(local, end, metric, D, u, n, inverse, 2.0 * r * inverse);
+  for (int i = 0; i < n; ++i) local.gradient[i] += r * inverse * u[i];
+  // A strain rounds as positions do, and its moment sqrt(2 K E) makes it an energy: the rounding of r.
+  const double energy = std::max(end.energy, start_energy);
+  add_correction_floor(table.dofs(element), u, n, rounding_ * (std::sqrt(2.0 * stiffness * energy) + energy) / s);
+}
+
+/// How Gonzalez's correction changes with z, from what the Hessian and the gradients are without it.
+void Equations::add_correction_hessian(Local& local, const Local& end, const Metric& metric, const double* D,
+                                       const double* u, int n, double inverse, double weight) {
+  double change[kMaxLocal];
+  for (int i = 0; i < n; ++i) {
+    double HD = 0.0;
+    for (int j = 0; j < n; ++j) HD += local.hessian[i][j] * D[j];
+    change[i] = inverse * (2.0 * (end.gradient[i] - local.gradient[i]) - HD - 2.0 * weight * u[i]);
+  }
   for (int i = 0; i < n; ++i) {
     for (int j = 0; j < n; ++j) local.hessian[i][j] += u[i] * change[j];
     local.hessian[i][i] += weight * metric.own[i];
-    local.gradient[i] += r * inverse * u[i];
   }
   for (const Metric::Pair& pair : metric.pairs)
     for (int i = 0; i < pair.size; ++i) {
@@ -130,9 +141,6 @@ void Equations::correct(Local& local, const Local& end, double start_energy, dou
       local.hessian[a][b] -= weight * pair.weight;
       local.hessian[b][a] -= weight * pair.weight;
     }
-  // A strain rounds as positions do, and its moment sqrt(2 K E) makes it an energy: the rounding of r.
-  const double energy = std::max(end.energy, start_energy);
-  add_correction_floor(table.dofs(element), u, n, rounding_ * (std::sqrt(2.0 * stiffness * energy) + energy) / s);
 }
 
 /// Where hardly anything moves, a quotient of differences makes their rounding a force that no iteration removes.
@@ -146,7 +154,7 @@ void Equations::add_correction_floor(const int* dofs, const double* u, int count
 /// angle; it turns the stencil unless both edges have the same share. Forces that do no work take the difference of the
 /// shares away, all of it but where T = part1 - part0 vanishes before phi is what it was, as edges also change their
 /// lengths.
-void Equations::add_planar_bend(int stencil, Local& local) {
+void Equations::add_planar_bend(int stencil, bool with_matrix, Local& local) {
   constexpr int n = 6;
   const BendStencil& s = model_.bend[at(stencil)];
   double D[kMaxLocal];
@@ -194,10 +202,10 @@ void Equations::add_planar_bend(int stencil, Local& local) {
   const double u[n] = {-force[0], -force[1], force[0] - force[2], force[1] - force[3], force[2], force[3]};
   add_correction_floor(assembler_.bend.dofs(stencil), u, n,
                        kRounding * std::abs(w.value) * (std::abs(edge[0].part) + std::abs(edge[1].part)));
-  for (int i = 0; i < n; ++i) {
-    local.gradient[i] = u[i];
+  for (int i = 0; i < n; ++i) local.gradient[i] = u[i];
+  if (!with_matrix) return;
+  for (int i = 0; i < n; ++i)
     for (int j = 0; j < n; ++j) local.hessian[i][j] = 0.0;
-  }
   // From edges to nodes: rows and columns of an edge are those of its head less those of its tail.
   for (int i = 0; i < 4; ++i)
     for (int j = 0; j < 4; ++j) {
@@ -243,9 +251,9 @@ void Equations::add_discrete_gradient(const VectorX& z, bool with_matrix, const 
   }
   for (int b = 0; b < static_cast<int>(model_.bend.size()); ++b) {
     if (model_.planar()) {
-      add_planar_bend(b, local);
+      add_planar_bend(b, with_matrix, local);
     } else {
-      bend_local(model_, elastic, middle_, b, true, local);
+      bend_local(model_, elastic, middle_, b, with_matrix, local);
       bend_local(model_, elastic, end_, b, false, end);
       const BendTwistEnergy before = bend_energy_of(elastic, start_, b);
       const BendStencil& s = model_.bend[at(b)];
@@ -254,12 +262,12 @@ void Equations::add_discrete_gradient(const VectorX& z, bool with_matrix, const 
         metric.pairs[k] = {4 * k, 4 * k + 4, 3, inverse_rest_[s.edge[k]] * inverse_rest_[s.edge[k]]};
       metric.own[3] = metric.own[7] = 1.0;
       correct(local, end, before.bend + before.twist, elastic.bend_stiffness.row(b).maxCoeff(), assembler_.bend, b,
-              metric);
+              metric, with_matrix);
     }
     add(assembler_.bend, b);
   }
   for (int h = 0; h < static_cast<int>(model_.half.size()); ++h) {
-    half_local(model_, z, elastic, middle_, h, true, local);
+    half_local(model_, z, elastic, middle_, h, with_matrix, local);
     half_local(model_, end_q_, elastic, end_, h, false, end);
     const BendTwistEnergy before = half_energy_of(elastic, start_, h);
     const double stiffness = elastic.half_stiffness.row(h).maxCoeff();
@@ -270,7 +278,7 @@ void Equations::add_discrete_gradient(const VectorX& z, bool with_matrix, const 
       metric.own[4] = 1.0;
     else
       for (int i : {3, 7, 8, 9, 10}) metric.own[i] = 1.0;
-    correct(local, end, before.bend + before.twist, stiffness, assembler_.half, h, metric);
+    correct(local, end, before.bend + before.twist, stiffness, assembler_.half, h, metric, with_matrix);
     add(assembler_.half, h);
   }
   if (!parameters_->viscous || h_ == 0.0) return;

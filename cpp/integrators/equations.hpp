@@ -130,8 +130,10 @@ class Equations {
     Pair pairs[2];
   };
   void correct(Local& local, const Local& end, double start_energy, double stiffness, const ElementTable& table,
-               int element, const Metric& metric);
-  void add_planar_bend(int stencil, Local& local);
+               int element, const Metric& metric, bool with_matrix);
+  static void add_correction_hessian(Local& local, const Local& end, const Metric& metric, const double* D,
+                                     const double* u, int n, double inverse, double weight);
+  void add_planar_bend(int stencil, bool with_matrix, Local& local);
   void add_correction_floor(const int* dofs, const double* u, int count, double rounding);
   void add_spin_couple(const VectorX& z);
   Vec3d spin_couple(int edge, double omega, const Vec3d& rate) const;
