@@ -37,33 +37,37 @@ void require_length(std::string_view argument, std::size_t got, int expected) {
 
 SparsityPattern SparsityPattern::from_cliques(int size, const std::vector<std::vector<int>>& cliques) {
   require(size >= 1, "size of a sparsity pattern must be at least 1, got " + std::to_string(size));
-  std::vector<int> ends(size, 1);  // of what each column is given, repetitions included
+  std::vector<int> starts(size + 1, 0);  // of the cliques that each column is in
   for (const std::vector<int>& clique : cliques) {
     for (int column : clique) {
       require(column < size,
               "unknown in cliques must be below size " + std::to_string(size) + ", got " + std::to_string(column));
-      if (column >= 0) ends[column] += static_cast<int>(clique.size());
+      if (column >= 0) ++starts[column + 1];
     }
   }
-  std::exclusive_scan(ends.begin(), ends.end(), ends.begin(), 0);
-  const std::vector<int> starts = ends;
-  std::vector<int> given(size + std::accumulate(cliques.begin(), cliques.end(), std::size_t{0},
-                                                [](std::size_t sum, const std::vector<int>& clique) {
-                                                  return sum + clique.size() * clique.size();
-                                                }));
-  for (int i = 0; i < size; ++i) given[ends[i]++] = i;
+  std::partial_sum(starts.begin(), starts.end(), starts.begin());
+  std::vector<const std::vector<int>*> cliques_of(starts.back());
+  std::vector<int> ends(starts.begin(), starts.end() - 1);
   for (const std::vector<int>& clique : cliques)
     for (int column : clique)
-      for (int row : clique)
-        if (column >= 0 && row >= 0) given[ends[column]++] = row;
+      if (column >= 0) cliques_of[ends[column]++] = &clique;
   SparsityPattern pattern;
   pattern.size = size;
   pattern.column_starts.reserve(size + 1);
   pattern.column_starts.push_back(0);
+  std::vector<int> seen(size, -1), rows;
   for (int column = 0; column < size; ++column) {
-    const auto first = given.begin() + starts[column], last = given.begin() + ends[column];
-    std::sort(first, last);
-    pattern.row_indices.insert(pattern.row_indices.end(), first, std::unique(first, last));
+    rows.assign(1, column);
+    seen[column] = column;
+    for (int k = starts[column]; k < starts[column + 1]; ++k) {
+      for (int row : *cliques_of[k]) {
+        if (row < 0 || seen[row] == column) continue;
+        seen[row] = column;
+        rows.push_back(row);
+      }
+    }
+    std::sort(rows.begin(), rows.end());
+    pattern.row_indices.insert(pattern.row_indices.end(), rows.begin(), rows.end());
     pattern.column_starts.push_back(static_cast<int>(pattern.row_indices.size()));
   }
   return pattern;
@@ -100,17 +104,27 @@ void require_valid(const SparsityPattern& pattern) {
             "row_indices of column " + std::to_string(column) + " must lie within the matrix");
     require(std::binary_search(begin, end, column), "pattern lacks diagonal " + entry_text(column, column));
   }
+  // Column by column the mirrored entries come up in the order of their rows.
+  std::vector<int> next(starts.begin(), starts.end() - 1);
   for (int column = 0; column < pattern.size; ++column) {
-    for (int p = starts[column]; p < starts[column + 1]; ++p) find_entry(pattern, column, pattern.row_indices[p]);
+    for (int p = starts[column]; p < starts[column + 1]; ++p) {
+      const int row = pattern.row_indices[p], mirrored = next[row]++;
+      if (mirrored >= starts[row + 1] || pattern.row_indices[mirrored] != column)
+        find_entry(pattern, column, row);  // says what lacks its mirror image
+    }
   }
 }
 
 std::ptrdiff_t find_entry(const SparsityPattern& pattern, int row, int column) {
   if (row >= 0 && row < pattern.size && column >= 0 && column < pattern.size) {
-    const auto begin = pattern.row_indices.begin() + pattern.column_starts[column];
-    const auto end = pattern.row_indices.begin() + pattern.column_starts[column + 1];
-    const auto place = std::lower_bound(begin, end, row);
-    if (place != end && *place == row) return place - pattern.row_indices.begin();
+    // Without branches: all but one step of a short search would be mispredicted as often as not.
+    const int* first = pattern.row_indices.data() + pattern.column_starts[column];
+    for (int count = pattern.column_starts[column + 1] - pattern.column_starts[column]; count > 1;) {
+      const int half = count / 2;
+      first += first[half] <= row ? half : 0;
+      count -= half;
+    }
+    if (*first == row) return first - pattern.row_indices.data();
   }
   throw std::invalid_argument(entry_text(row, column) + " is outside the sparsity pattern of a matrix of size " +
                               std::to_string(pattern.size));
