@@ -145,7 +145,7 @@ NewtonResult solve_eased(Equations& equations, const Newton& newton, bool mixed,
 NewtonResult find_inner(Equations& equations, const Newton& newton, const Options& options, const StepPlan& plan,
                         double h, const State& state, const Predictor& predictor, StepWorkspace& work) {
   struct Start {
-    std::size_t number;
+    std::size_t number;  // among FactorRecord::starts
     bool moving, accelerated, mixed, eased = false;
   };
   NewtonResult found;
@@ -174,6 +174,7 @@ NewtonResult find_inner(Equations& equations, const Newton& newton, const Option
   for (const Start& start : starts) {
     if (start.eased && !eases) continue;
     if (start.accelerated && (points == 0 || work.repeated)) continue;
+    // From rest always; where friction lets surfaces jump, others only while they help.
     const bool sure = start.number == 2 || (!start.accelerated && !(frictional && options.adaptive));
     StartRecord& record = known.starts[start.number];
     if (!sure && record.skipped()) continue;

@@ -242,14 +242,14 @@ NewtonResult Newton::solve(Equations& equations, VectorX& z, const VectorX* targ
         p.foreseen = monotone(equations, z, target, full, shorten, work, kept);
         work.step *= kept;
         shorten *= kept;
-        axial_known = false;
+        axial_known = false;  // no prediction outlives a step that may lead elsewhere
       }
     }
     if (options_.line_search == LineSearch::goldstein_price) {
       const double alpha = line_search(equations, z, work.step, target, work);
       work.step *= alpha;
       shorten *= alpha;
-      axial_known = mixed && axial_known && alpha == 1.0;
+      axial_known = axial_known && alpha == 1.0;
       p.foreseen = false;
     }
     if (p.foreseen)
