@@ -14,7 +14,7 @@ namespace withe {
 namespace {
 
 /// Backward error of a row, |A x - b| / (|A| |x| + |b|), above which pivots off the diagonal are sought.
-constexpr double kGreatestError = 1e-12;
+constexpr double kGreatestError = 1e-13;
 
 /// values(): column by column, in the order of the pattern.
 ///
