@@ -52,6 +52,7 @@ RegularStencils regular_stencils(const Model& model, const ElementTable& bend) {
       out.other_bend.push_back(b);
       continue;
     }
+    out.by_rows = bend.by_rows(b);
     out.stencil.push_back(b);
     out.first_unknown.push_back(bend.dofs(b)[0]);
     for (int edge : s.edge) {

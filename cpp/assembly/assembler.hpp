@@ -28,6 +28,9 @@ class ElementTable {
   /// the lower triangle, or whole lines); then where its lines begin.
   bool regular(int element, std::vector<std::ptrdiff_t>& lines) const;
 
+  /// Whether a regular element's lines are rows.
+  bool by_rows(int element) const { return offset(element, 0, 1) == offset(element, 0, 0) + 1; }
+
   /// Where the entry of row i and column j of an element's square stands in the solver's values.
   std::ptrdiff_t offset(int element, int i, int j) const;
   /// residual += scale gradient, magnitude += |gradient|.
@@ -55,6 +58,7 @@ struct RegularStencils {
   std::vector<int> stencil, first_unknown, edges;
   std::vector<double> owned;
   std::vector<std::ptrdiff_t> lines;
+  bool by_rows = false;          ///< whether lines of an unsymmetric matrix are its rows, else its columns
   std::vector<int> other_bend;   ///< stencils left over
   std::vector<int> other_edges;  ///< edges whose stretching no regular stencil owns
 };

@@ -21,6 +21,7 @@ struct StencilBatch {
   const double* owned;          ///< two of each: 1 where it brings the edge's stretching, else 0
   const std::ptrdiff_t* lines;  ///< per unknown of each: where its line begins in `values`
   bool lower;                   ///< lines hold the lower triangle, else all of it
+  bool by_rows;                 ///< then whether they are rows
 
   BendMeasure measure;
   const double* frames;                        ///< table of EdgeFrame<double>
@@ -38,6 +39,18 @@ struct StencilBatch {
   const double* edge_inertia;  ///< per edge, of theta [kg m^2]: likewise
 };
 
+/// What an energy-momentum step needs beside the middle, see Equations::add_discrete_gradient. The batch's `force` is
+/// then that of the mean strain, `frames` and `strain` are in the middle.
+struct MomentumBatch {
+  const double* end_frames;
+  const double *start_strain, *end_strain;  ///< tables like `strain`
+  const double* change;                     ///< per unknown: q1 - q0
+  const double* inverse_rest;               ///< per edge [1/m]
+  const double* inverse_mean;               ///< per edge: 2 / (l0 + l1) [1/m]
+  double rounding;                          ///< relative, of a direction in space
+  double* floor;                            ///< per unknown, what rounding leaves; padded by kPadding
+};
+
 struct StencilKernels {
   double (*bend)(const StencilBatch&);  ///< returns the energy of bending and twisting [J]
   double (*planar_bend)(const StencilBatch&);
@@ -45,6 +58,7 @@ struct StencilKernels {
   /// they are; with the couples of edges that spin and turn, see Equations::spin_couple.
   void (*bend_forces)(const StencilBatch&);
   void (*planar_bend_forces)(const StencilBatch&);
+  void (*momentum_bend)(const StencilBatch&, const MomentumBatch&);  ///< in space
 };
 
 const StencilKernels& stencil_kernels();

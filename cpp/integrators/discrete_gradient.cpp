@@ -221,64 +221,106 @@ void Equations::gather_difference(const ElementTable& table, int element, double
   for (int i = 0; i < table.width(); ++i) difference[i] = dofs[i] < 0 ? 0.0 : difference_(dofs[i]);
 }
 
+/// Force of the mean strain, along the mean of the edge.
+void Equations::mean_stretch_local(const VectorX& z, int edge, const double* axial_force, Local& local) const {
+  const int dim = model_.dimension;
+  const double force = force_[edge], geometric = axial_force ? axial_force[edge] : force;
+  const int* dofs = assembler_.stretch.dofs(edge);
+  double mean[3];
+  for (int i = 0; i < dim; ++i) mean[i] = inverse_mean_[edge] * (z(dofs[dim + i]) - z(dofs[i]));
+  const Vec3d& t1 = end_.edge[at(edge)].tangent;
+  const double t[3] = {t1.x, t1.y, t1.z}, transverse = geometric * inverse_mean_[edge];
+  for (int i = 0; i < dim; ++i) {
+    local.gradient[i] = -force * mean[i];
+    local.gradient[dim + i] = force * mean[i];
+    for (int j = 0; j < dim; ++j) {
+      const double h = mean[i] * t[j] * (modulus_[edge] - transverse) + (i == j ? transverse : 0.0);
+      local.hessian[i][j] = local.hessian[dim + i][dim + j] = h;
+      local.hessian[i][dim + j] = local.hessian[dim + i][j] = -h;
+    }
+  }
+}
+
+void Equations::corrected_bend_local(int stencil, bool with_matrix, Local& local) {
+  Local end;
+  bend_local(model_, elastic, middle_, stencil, with_matrix, local);
+  bend_local(model_, elastic, end_, stencil, false, end);
+  const BendTwistEnergy before = bend_energy_of(elastic, start_, stencil);
+  const BendStencil& s = model_.bend[at(stencil)];
+  Metric metric;
+  for (int k = 0; k < 2; ++k)
+    metric.pairs[k] = {4 * k, 4 * k + 4, 3, inverse_rest_[s.edge[k]] * inverse_rest_[s.edge[k]]};
+  metric.own[3] = metric.own[7] = 1.0;
+  correct(local, end, before.bend + before.twist, elastic.bend_stiffness.row(stencil).maxCoeff(), assembler_.bend,
+          stencil, metric, with_matrix);
+}
+
+void Equations::corrected_half_local(const VectorX& z, int stencil, bool with_matrix, Local& local) {
+  Local end;
+  half_local(model_, z, elastic, middle_, stencil, with_matrix, local);
+  half_local(model_, end_q_, elastic, end_, stencil, false, end);
+  const BendTwistEnergy before = half_energy_of(elastic, start_, stencil);
+  const int dim = model_.dimension, edge = model_.half[at(stencil)].edge;
+  Metric metric;
+  metric.pairs[0] = {0, dim == 2 ? 2 : 4, dim, inverse_rest_[edge] * inverse_rest_[edge]};
+  if (dim == 2)
+    metric.own[4] = 1.0;
+  else
+    for (int i : {3, 7, 8, 9, 10}) metric.own[i] = 1.0;
+  correct(local, end, before.bend + before.twist, elastic.half_stiffness.row(stencil).maxCoeff(), assembler_.half,
+          stencil, metric, with_matrix);
+}
+
+/// Axial forces of the mean strain, and 2 / (l0 + l1).
+void Equations::set_mean_axial_forces() {
+  const int n = model_.edge_count;
+  force_.resize(n);
+  modulus_.resize(n);
+  inverse_mean_.resize(n);
+  for (int e = 0; e < n; ++e) {
+    const double EA = elastic.stretch_stiffness[e], sum = start_.length[e] + end_.length[e];
+    force_[e] = EA * (0.5 * sum / model_.edge_length[e] - 1.0);
+    modulus_[e] = EA / model_.edge_length[e];
+    inverse_mean_[e] = 2.0 / sum;
+  }
+}
+
 void Equations::add_discrete_gradient(const VectorX& z, bool with_matrix, const double* axial_force, Evaluation& out) {
   const std::span<double> values = assembler_.solver().values();
-  Local local, end;
+  Local local;
   const auto add = [&](const ElementTable& table, int i) {
     table.add_gradient(i, local.gradient, 1.0, gradient_, magnitude_);
     if (with_matrix) table.add_hessian(i, local.hessian, 1.0, values);
   };
-  const int dim = model_.dimension;
-  for (int e = 0; e < model_.edge_count; ++e) {
-    const double rest = model_.edge_length(e), EA = elastic.stretch_stiffness(e);
-    const double l0 = start_.length(e), l1 = end_.length(e), sum = l0 + l1;
-    const double force = EA * (0.5 * sum / rest - 1.0), geometric = axial_force ? axial_force[e] : force;
-    const int* dofs = assembler_.stretch.dofs(e);
-    double mean[3];
-    for (int i = 0; i < dim; ++i) mean[i] = 2.0 * (z(dofs[dim + i]) - z(dofs[i])) / sum;
-    const Vec3d& t1 = end_.edge[at(e)].tangent;
-    const double t[3] = {t1.x, t1.y, t1.z};
-    for (int i = 0; i < dim; ++i) {
-      local.gradient[i] = -force * mean[i];
-      local.gradient[dim + i] = force * mean[i];
-      for (int j = 0; j < dim; ++j) {
-        const double h = mean[i] * t[j] * (EA / rest - 2.0 * geometric / sum) + (i == j ? 2.0 * geometric / sum : 0.0);
-        local.hessian[i][j] = local.hessian[dim + i][dim + j] = h;
-        local.hessian[i][dim + j] = local.hessian[dim + i][j] = -h;
-      }
-    }
+  const auto add_edge = [&](int e) {
+    mean_stretch_local(z, e, axial_force, local);
     add(assembler_.stretch, e);
-  }
-  for (int b = 0; b < static_cast<int>(model_.bend.size()); ++b) {
-    if (model_.planar()) {
+  };
+  set_mean_axial_forces();
+  if (model_.planar()) {
+    for (int e = 0; e < model_.edge_count; ++e) add_edge(e);
+    for (int b = 0; b < static_cast<int>(model_.bend.size()); ++b) {
       add_planar_bend(b, with_matrix, local);
-    } else {
-      bend_local(model_, elastic, middle_, b, with_matrix, local);
-      bend_local(model_, elastic, end_, b, false, end);
-      const BendTwistEnergy before = bend_energy_of(elastic, start_, b);
-      const BendStencil& s = model_.bend[at(b)];
-      Metric metric;
-      for (int k = 0; k < 2; ++k)
-        metric.pairs[k] = {4 * k, 4 * k + 4, 3, inverse_rest_[s.edge[k]] * inverse_rest_[s.edge[k]]};
-      metric.own[3] = metric.own[7] = 1.0;
-      correct(local, end, before.bend + before.twist, elastic.bend_stiffness.row(b).maxCoeff(), assembler_.bend, b,
-              metric, with_matrix);
+      add(assembler_.bend, b);
     }
-    add(assembler_.bend, b);
+  } else {
+    stencil_kernels().momentum_bend(regular_batch(elastic, axial_force, with_matrix ? values.data() : nullptr),
+                                    {.end_frames = &end_.edge.data()->tangent.x,
+                                     .start_strain = start_.bend_strain.data(),
+                                     .end_strain = end_.bend_strain.data(),
+                                     .change = difference_.data(),
+                                     .inverse_rest = inverse_rest_.data(),
+                                     .inverse_mean = inverse_mean_.data(),
+                                     .rounding = rounding_,
+                                     .floor = correction_floor_.data()});
+    for (int e : assembler_.regular.other_edges) add_edge(e);
+    for (int b : assembler_.regular.other_bend) {
+      corrected_bend_local(b, with_matrix, local);
+      add(assembler_.bend, b);
+    }
   }
   for (int h = 0; h < static_cast<int>(model_.half.size()); ++h) {
-    half_local(model_, z, elastic, middle_, h, with_matrix, local);
-    half_local(model_, end_q_, elastic, end_, h, false, end);
-    const BendTwistEnergy before = half_energy_of(elastic, start_, h);
-    const double stiffness = elastic.half_stiffness.row(h).maxCoeff();
-    const int edge = model_.half[at(h)].edge;
-    Metric metric;
-    metric.pairs[0] = {0, dim == 2 ? 2 : 4, dim, inverse_rest_[edge] * inverse_rest_[edge]};
-    if (dim == 2)
-      metric.own[4] = 1.0;
-    else
-      for (int i : {3, 7, 8, 9, 10}) metric.own[i] = 1.0;
-    correct(local, end, before.bend + before.twist, stiffness, assembler_.half, h, metric, with_matrix);
+    corrected_half_local(z, h, with_matrix, local);
     add(assembler_.half, h);
   }
   if (!parameters_->viscous || h_ == 0.0) return;

@@ -153,7 +153,7 @@ void Equations::evaluate(const VectorX& z, bool with_matrix, const double* axial
   if (!floor_current_) set_floor(z, floor_);
   floor_current_ = true;
   if (energy_momentum_) {
-    correction_floor_.setZero(model_.dof_count);
+    correction_floor_.setZero(model_.dof_count + kPadding);
     difference_ = 2.0 * (z - state_->q);
     end_q_ = 2.0 * z - state_->q;
     compute_configuration(model_, *state_, end_q_, end_);
@@ -201,7 +201,7 @@ void Equations::add_step(const VectorX& z, bool with_matrix, Evaluation& out) {
           .matrix();
   if (flowing_) add_flow(z, with_matrix, out);
   out.floor = floor_ + rounding_ * out.magnitude;
-  if (energy_momentum_) out.floor += correction_floor_;
+  if (energy_momentum_) out.floor += correction_floor_.head(n);
   if (contact_) out.floor += contact_floor_;
   out.potential -= gravity_.dot(z);
   out.residual = out.full_residual;
@@ -265,6 +265,7 @@ StencilBatch Equations::regular_batch(const ElasticCoefficients& k, const double
           .owned = regular.owned.data(),
           .lines = regular.lines.data(),
           .lower = symmetric(),
+          .by_rows = regular.by_rows,
           .measure = k.measure,
           .frames = &middle_.edge.data()->tangent.x,
           .strain = middle_.bend_strain.data(),

@@ -133,6 +133,10 @@ class Equations {
                int element, const Metric& metric, bool with_matrix);
   static void add_correction_hessian(Local& local, const Local& end, const Metric& metric, const double* D,
                                      const double* u, int n, double inverse, double weight);
+  void set_mean_axial_forces();
+  void mean_stretch_local(const VectorX& z, int edge, const double* axial_force, Local& local) const;
+  void corrected_bend_local(int stencil, bool with_matrix, Local& local);
+  void corrected_half_local(const VectorX& z, int stencil, bool with_matrix, Local& local);
   void add_planar_bend(int stencil, bool with_matrix, Local& local);
   void add_correction_floor(const int* dofs, const double* u, int count, double rounding);
   void add_spin_couple(const VectorX& z);
@@ -171,12 +175,13 @@ class Equations {
   long version_ = -1;                       ///< of the parameters that mass, elastic, gravity_ and drag belong to
   VectorX gradient_, magnitude_;            ///< forces but for inertia, drag and gravity; padded by kPadding
   VectorX force_, modulus_, inverse_rest_;  ///< per edge: EA eps [N], EA / L [N / m], 1 / L [1 / m]
+  VectorX inverse_mean_;                    ///< per edge: 2 / (l0 + l1) of an energy-momentum step [1 / m]
   VectorX contact_end_, contact_change_;    ///< q1 and its coming change
   VectorX contact_gradient_, contact_floor_;
   double reach_ = 0;          ///< greatest coordinate [m]
   VectorX floor_;             ///< what bending, twisting and inertia leave by rounding
   VectorX axial_floor_;       ///< per edge [N]
-  VectorX correction_floor_;  ///< what the discrete gradient leaves by rounding
+  VectorX correction_floor_;  ///< what the discrete gradient leaves by rounding; padded by kPadding
   double rounding_ = 0;       ///< relative, of a direction in space
   bool floor_current_ = false;
 };

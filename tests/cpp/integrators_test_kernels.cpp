@@ -160,5 +160,87 @@ TEST(StencilKernels, GiveTheForcesOfExplicitSteps) {
   for (const Case& c : long_cases()) expect_explicit_forces(c);
 }
 
+/// Adds the discrete gradient of one bending stencil [Gonzalez 1996], in the direction of squared edges over their
+/// lengths and of angles.
+void add_gonzalez(const Case& c, const ElasticCoefficients& k, const Configuration (&at_step)[3], int stencil,
+                  const ElementTable& table, VectorX& force) {
+  const auto& [start, middle, end] = at_step;
+  Local local, last;
+  bend_local(c.model, k, middle, stencil, false, local);
+  bend_local(c.model, k, end, stencil, false, last);
+  const BendTwistEnergy before = bend_energy_of(k, start, stencil);
+  const int* dofs = table.dofs(stencil);
+  Eigen::Matrix<double, 11, 1> D, g, u;
+  for (int i = 0; i < 11; ++i) {
+    D[i] = dofs[i] < 0 ? 0.0 : c.q[dofs[i]] - c.state.q[dofs[i]];
+    g[i] = local.gradient[i];
+  }
+  u.setZero();
+  u[3] = D[3];
+  u[7] = D[7];
+  for (int edge : {0, 1}) {
+    const double rest = c.model.edge_length[c.model.bend[static_cast<std::size_t>(stencil)].edge[edge]];
+    const Vector3 pull = (D.segment<3>(4 * edge + 4) - D.segment<3>(4 * edge)) / (rest * rest);
+    u.segment<3>(4 * edge + 4) += pull;
+    u.segment<3>(4 * edge) -= pull;
+  }
+  if (u.dot(D) > 1e-24) g += (last.energy - before.bend - before.twist - g.dot(D)) / u.dot(D) * u;
+  for (int i = 0; i < 11; ++i)
+    if (dofs[i] >= 0) force[dofs[i]] += g[i];
+}
+
+void expect_discrete_gradient(const Case& c) {
+  Options options;
+  options.integrator = Integrator::energy_momentum;
+  Equations equations(c.model, options);
+  Parameters parameters = initial_parameters(c.model);
+  parameters.gravity.setZero();
+  equations.begin(c.state, parameters, 0.0, true);
+  const VectorX z = 0.5 * (c.state.q + c.q);
+  Evaluation evaluation, alone, ahead, behind;
+  equations.evaluate(z, true, nullptr, evaluation);
+
+  Configuration at_step[3];
+  const VectorX q[3] = {c.state.q, z, c.q};
+  for (int i = 0; i < 3; ++i) compute_configuration(c.model, c.state, q[i], at_step[i]);
+  VectorX force = VectorX::Zero(c.model.dof_count);
+  for (int e = 0; e < c.model.edge_count; ++e) {
+    const auto i = static_cast<std::size_t>(e);
+    const double sum = at_step[0].length[e] + at_step[2].length[e];
+    const double strain = 0.5 * sum / c.model.edge_length[e] - 1.0;
+    const int tail = c.model.tail_dof[i], head = c.model.head_dof[i];
+    const Vector3 pull =
+        equations.elastic.stretch_stiffness[e] * strain * 2.0 / sum * (z.segment<3>(head) - z.segment<3>(tail));
+    force.segment<3>(head) += pull;
+    force.segment<3>(tail) -= pull;
+  }
+  for (int b = 0; b < static_cast<int>(c.model.bend.size()); ++b)
+    add_gonzalez(c, equations.elastic, at_step, b, equations.assembler().bend, force);
+  const double scale = evaluation.magnitude.maxCoeff() + 1.0;
+  EXPECT_LT((evaluation.full_residual - force).cwiseAbs().maxCoeff(), 1e-11 * scale) << c.name;
+
+  const VectorX x = testing::RandomNumbers(5).vector(z.size());
+  VectorX expected(x.size()), y(x.size());
+  const auto n = static_cast<std::size_t>(x.size());
+  equations.assembler().solver().multiply({x.data(), n}, {y.data(), n});
+  equations.evaluate(z, false, nullptr, alone);
+  EXPECT_LT((evaluation.residual - alone.residual).cwiseAbs().maxCoeff(), 1e-13 * scale) << c.name;
+  const double step = 1e-6 * c.increment;
+  equations.evaluate(z + step * x, false, nullptr, ahead);
+  equations.evaluate(z - step * x, false, nullptr, behind);
+  expected = (ahead.residual - behind.residual) / (2.0 * step);
+  EXPECT_LT((y - expected).norm(), 1e-5 * expected.norm()) << c.name;
+}
+
+TEST(StencilKernels, GiveDiscreteGradientsInSpace) {
+  int count = 0;
+  for (const Case& c : long_cases()) {
+    if (c.model.planar() || (c.q - c.state.q).norm() < 1e-2) continue;
+    expect_discrete_gradient(c);
+    ++count;
+  }
+  EXPECT_GT(count, 20);
+}
+
 }  // namespace
 }  // namespace withe

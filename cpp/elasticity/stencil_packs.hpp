@@ -1,0 +1,222 @@
+#pragma once
+// Packs of stencils: what they read and where they add, for the kernels of stencil_kernels.hpp. Included by those only.
+
+#include "common/pack.hpp"
+#include "elasticity/bend_twist.hpp"
+#include "elasticity/stencil_kernels.hpp"
+#include "geometry/frame_kernels.hpp"
+
+namespace withe::WITHE_INSTRUCTION_SET {
+namespace {
+
+/// Numbers that travel together to and from memory. Neighbouring stencils overlap by whole blocks of four unknowns
+/// (in a plane: two), so reads find what was just written.
+constexpr int kBlock = kLanes < 4 ? kLanes : 4;
+using Block = double __attribute__((vector_size(8 * kBlock)));
+using Pair = double __attribute__((vector_size(16)));
+
+template <class Vector>
+void add_to(double* place, Vector v) {
+  struct [[gnu::packed, gnu::may_alias]] Anywhere {
+    Vector v;
+  };
+  reinterpret_cast<Anywhere*>(place)->v += v;
+}
+
+/// Which rows of the tables one pack of stencils reads. `inner`: kLanes stencils that follow one another.
+template <bool inner>
+struct Lanes {
+  int live, row[kLanes], edge[2][kLanes];
+  Pack owned[2];
+
+  Lanes(const StencilBatch& batch, int first)
+      : live(inner || batch.count - first > kLanes ? kLanes : batch.count - first) {
+    int entry[2][kLanes];
+    for (int l = 0; l < kLanes; ++l) {
+      const int s = inner || first + l < batch.count ? first + l : batch.count - 1;
+      row[l] = inner ? batch.stencil[first] + l : batch.stencil[s];
+      for (int k = 0; k < 2; ++k) {
+        entry[k][l] = 2 * s + k;
+        edge[k][l] = inner ? batch.edges[2 * first + k] + l : batch.edges[2 * s + k];
+      }
+    }
+    for (int k = 0; k < 2; ++k) owned[k] = gather(batch.owned, entry[k]);
+  }
+
+  Pack of(const double* table) const { return inner ? load(table + row[0]) : gather(table, row); }
+  Pack of_edge(const double* table, int k) const { return inner ? load(table + edge[k][0]) : gather(table, edge[k]); }
+  Vec3<Pack> three(const double* table, std::ptrdiff_t column) const {
+    return {of(table), of(table + column), of(table + 2 * column)};
+  }
+};
+
+EdgeFrame<Pack> frames_of(const double* frames, const int (&edge)[kLanes]) {
+  const double* place[kLanes];
+  for (int l = 0; l < kLanes; ++l) place[l] = frames + std::ptrdiff_t{kFrameNumbers} * edge[l];
+  Pack number[kFrameNumbers];
+  load_rows<kFrameNumbers>(place, number);
+  return {{number[0], number[1], number[2]},    {number[3], number[4], number[5]},
+          {number[6], number[7], number[8]},    number[9],
+          {number[10], number[11], number[12]}, {number[13], number[14], number[15]}};
+}
+
+/// place(lane) += `count` numbers of that lane; `numbers` has zeros beyond its end up to a whole number of packs. Moves
+/// in pieces of type Piece.
+template <class Piece, int count, class Place>
+void add_rows(const Place& place, int live, const Pack* numbers) {
+  constexpr int kPiece = sizeof(Piece) / sizeof(double);
+  for (int k = 0; k < count; k += kLanes) {
+    Pack block[kLanes];
+    transpose(numbers + k, block);
+    for (int l = 0; l < kLanes; ++l) {
+      if (l >= live) break;
+      if constexpr (kPiece == kLanes) {
+        add_to(place(l) + k, static_cast<Piece>(block[l].v));
+      } else {
+        static_assert(kLanes == 4 && kPiece == 2);
+        add_to(place(l) + k, static_cast<Piece>(__builtin_shufflevector(block[l].v, block[l].v, 0, 1)));
+        if (k + kPiece < count)
+          add_to(place(l) + k + kPiece, static_cast<Piece>(__builtin_shufflevector(block[l].v, block[l].v, 2, 3)));
+      }
+    }
+  }
+}
+
+template <class Piece, bool lower, int kSize, int kWidth, int line = 0>
+void add_lines(const StencilBatch& batch, int first, int live, const Pack (&matrix)[kSize][kWidth]) {
+  if constexpr (line < kSize) {
+    constexpr int kSkipped = lower ? line : 0;
+    const std::ptrdiff_t* lines = batch.lines + static_cast<std::ptrdiff_t>(kSize) * first + line;
+    add_rows<Piece, kSize - kSkipped>([&](int l) { return batch.values + lines[kSize * l]; }, live,
+                                      &matrix[line][kSkipped]);
+    add_lines<Piece, lower, kSize, kWidth, line + 1>(batch, first, live, matrix);
+  }
+}
+
+/// A symmetric matrix [kSize][kSize + zeros] line by line.
+template <class Piece, int kSize, int kWidth>
+void add_matrix(const StencilBatch& batch, int first, int live, const Pack (&matrix)[kSize][kWidth]) {
+  if (batch.lower)
+    add_lines<Piece, true>(batch, first, live, matrix);
+  else
+    add_lines<Piece, false>(batch, first, live, matrix);
+}
+
+/// Adds to one number per unknown.
+template <class Piece, int count>
+void add_vector(const StencilBatch& batch, int first, int live, const Pack* numbers, double* out) {
+  const int* unknown = batch.first_unknown + first;
+  add_rows<Piece, count>([&](int l) { return out + unknown[l]; }, live, numbers);
+}
+
+double sum_of_live(Pack energy, int live) {
+  double total = 0.0;
+  for (int l = 0; l < live; ++l) total += energy[l];
+  return total;
+}
+
+void put(Pack* out, const Vec3<Pack>& v) { out[0] = v.x, out[1] = v.y, out[2] = v.z; }
+void put_absolute(Pack* out, const Vec3<Pack>& v) {
+  out[0] = absolute(v.x), out[1] = absolute(v.y), out[2] = absolute(v.z);
+}
+void add_absolute(Pack* out, const Vec3<Pack>& v) {
+  out[0] += absolute(v.x), out[1] += absolute(v.y), out[2] += absolute(v.z);
+}
+
+/// Fills the lower and the upper triangle from the blocks of the two edges and angles.
+template <int kWidth>
+void fill(const BendTwistDerivatives<Pack>& d, Pack (&H)[11][kWidth]) {
+  const Mat3<Pack>&A = d.ee[0][0], &B = d.ee[0][1], &F = d.ee[1][1];
+  const auto entry = [](const Mat3<Pack>& m, int i, int j) {
+    return j == 0 ? m.row[i].x : j == 1 ? m.row[i].y : m.row[i].z;
+  };
+  const auto of = [](const Vec3<Pack>& v, int i) { return i == 0 ? v.x : i == 1 ? v.y : v.z; };
+  const auto both = [&](int i, int j, Pack value) { H[i][j] = H[j][i] = value; };
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) {
+      const Pack a = entry(A, i, j), b = entry(B, i, j), f = entry(F, i, j);
+      H[i][j] = a;
+      H[8 + i][8 + j] = f;
+      H[4 + i][4 + j] = (a + f) - (b + entry(B, j, i));
+      both(i, 4 + j, b - a);
+      both(i, 8 + j, -b);
+      both(4 + i, 8 + j, b - f);
+    }
+  for (int j = 0; j < 2; ++j)
+    for (int i = 0; i < 3; ++i) {
+      const Pack g0 = of(d.e_angle[0][j], i), g1 = of(d.e_angle[1][j], i);
+      both(i, 3 + 4 * j, -g0);
+      both(4 + i, 3 + 4 * j, g0 - g1);
+      both(8 + i, 3 + 4 * j, g1);
+    }
+  H[3][3] = d.angle_angle[0][0];
+  H[7][7] = d.angle_angle[1][1];
+  both(3, 7, d.angle_angle[0][1]);
+}
+
+/// Whether the kLanes stencils from `first` follow one another.
+bool are_inner(const StencilBatch& batch, int first) {
+  const int last = first + kLanes - 1;
+  if (last >= batch.count || batch.stencil[last] != batch.stencil[first] + kLanes - 1) return false;
+  for (int k = 0; k < 2; ++k)
+    for (int l = 1; l < kLanes; ++l)
+      if (batch.edges[2 * (first + l) + k] != batch.edges[2 * first + k] + l) return false;
+  return true;
+}
+
+/// What is wanted of a pack: forces of an explicit step; the gradient and its absolute sums; the matrix with them.
+enum class Wanted { forces, gradient, matrix };
+
+/// Adds the gradient of a pack of stencils in space, with the axial forces of the edges that they own, and its absolute
+/// sums.
+template <bool with_magnitude>
+void add_forces(const StencilBatch& batch, int first, int live, const BendTwistDerivatives<Pack>& d,
+                const Vec3<Pack> (&tension)[2]) {
+  Pack gradient[11 + kLanes];
+  for (int i = 11; i < 11 + kLanes; ++i) gradient[i] = 0.0;
+  const Vec3<Pack> bending = d.gradient_e[0] - d.gradient_e[1];
+  put(gradient, -(d.gradient_e[0] + tension[0]));
+  put(gradient + 4, bending + tension[0] - tension[1]);
+  put(gradient + 8, d.gradient_e[1] + tension[1]);
+  for (int j = 0; j < 2; ++j) gradient[3 + 4 * j] = d.gradient_angle[j];
+  add_vector<Block, 11>(batch, first, live, gradient, batch.residual);
+  if constexpr (!with_magnitude) return;
+
+  Pack magnitude[11 + kLanes];
+  for (int i = 11; i < 11 + kLanes; ++i) magnitude[i] = 0.0;
+  put_absolute(magnitude, d.gradient_e[0]);
+  put_absolute(magnitude + 4, bending);
+  put_absolute(magnitude + 8, d.gradient_e[1]);
+  add_absolute(magnitude, tension[0]);
+  add_absolute(magnitude + 4, tension[0]);
+  add_absolute(magnitude + 4, tension[1]);
+  add_absolute(magnitude + 8, tension[1]);
+  for (int j = 0; j < 2; ++j) magnitude[3 + 4 * j] = absolute(d.gradient_angle[j]);
+  add_vector<Block, 11>(batch, first, live, magnitude, batch.magnitude);
+}
+
+/// How the unknowns of two edges change, or at which rates.
+struct EdgeChanges {
+  Vec3<Pack> edge[2];
+  Pack angle[2];
+};
+
+/// From one number per unknown.
+EdgeChanges edge_changes(const StencilBatch& batch, int first, const double* table) {
+  const double* place[kLanes];
+  for (int l = 0; l < kLanes; ++l)
+    place[l] = table + batch.first_unknown[first + l < batch.count ? first + l : batch.count - 1];
+  const auto numbers_from = [&](int at, Pack* into) {
+    const double* from[kLanes];
+    for (int l = 0; l < kLanes; ++l) from[l] = place[l] + at;
+    load_rows<4>(from, into);
+  };
+  Pack v[12];  // the last angle comes twice
+  numbers_from(0, v);
+  numbers_from(4, v + 4);
+  numbers_from(7, v + 8);
+  return {{{v[4] - v[0], v[5] - v[1], v[6] - v[2]}, {v[9] - v[4], v[10] - v[5], v[11] - v[6]}}, {v[3], v[7]}};
+}
+
+}  // namespace
+}  // namespace withe::WITHE_INSTRUCTION_SET
