@@ -2,13 +2,12 @@
 #include <cmath>
 
 #include "contact/contact.hpp"
+#include "contact/friction_jacobian.hpp"
 
 namespace withe {
 namespace {
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
-
-using Dual14 = Dual<kContactUnknowns>;
 
 }  // namespace
 
@@ -72,17 +71,9 @@ void Contact::add_friction(const Touching& t, bool with_hessian, ContactLocal& o
   const FrictionSetting f = setting(t);
   double now[kContactUnknowns];
   values_at(pair, q1_, now);
-  if (!with_hessian) {
-    friction_gradient(f, now, out.gradient);
-    return;
-  }
-  Dual14 unknown[kContactUnknowns], gradient[kContactUnknowns];
-  for (int i = 0; i < kContactUnknowns; ++i) unknown[i] = Dual14::unknown(now[i], i);
-  friction_gradient(f, unknown, gradient);
-  for (int i = 0; i < kContactUnknowns; ++i) {
-    out.gradient[i] += gradient[i].value;
-    for (int j = 0; j < kContactUnknowns; ++j) out.hessian[i][j] += gradient[i].slope[j];
-  }
+  const SlippingSurfaces<double> surfaces = slipping_surfaces(f, now);
+  add_friction_gradient(f, surfaces, out.gradient);
+  if (with_hessian) add_friction_jacobian(f, surfaces, out.hessian);
 }
 
 /// Columns of J at the start, where frames have not turned yet, for all that touches there.

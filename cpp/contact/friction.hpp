@@ -47,12 +47,19 @@ struct FrictionForce {
   bool sticking = false;
 };
 
-/// From the centreline of a (side 0) or of b to where they touch. Two rods share that point, so that friction turns
-/// them by nothing, however deep they are in each other: it divides the way between their centrelines as radii do.
+/// Length of the arm from the centreline of a (side 0) or of b to where they touch, over the normal on an obstacle [m],
+/// over the way between both centrelines otherwise [-]. Two rods share that point, so that friction turns them by
+/// nothing, however deep they are in each other: it divides the way between their centrelines as radii do.
+inline double arm_length(const ContactPair& pair, int side) {
+  if (pair.rod_b < 0) return pair.radius_a;
+  return (side == 0 ? pair.radius_a : pair.radius_b) / pair.radii();
+}
+
+/// That arm.
 template <class Scalar>
 Vec3<Scalar> contact_arm(const ContactPair& pair, int side, const Vec3<Scalar>& normal, const Vec3<Scalar>& between) {
-  if (pair.rod_b < 0) return Scalar(-pair.radius_a) * normal;
-  return Scalar(side == 0 ? -pair.radius_a / pair.radii() : pair.radius_b / pair.radii()) * between;
+  const double length = arm_length(pair, side);
+  return Scalar(side == 0 ? -length : length) * (pair.rod_b < 0 ? normal : between);
 }
 
 /// tanh(c |S|) / |S| as a function of |S|^2.
@@ -90,72 +97,105 @@ FrictionForce<Scalar> friction_force(const FrictionSetting& f, const Vec3<Scalar
   return out;
 }
 
-/// Adds to `gradient` the generalised forces J^T F (minus the friction on the rods), with F and S as they are at
-/// `unknown`; returns F.
+/// One of the edges whose turning makes surfaces slip.
 template <class Scalar>
-FrictionForce<Scalar> friction_gradient(const FrictionSetting& f, const Scalar (&unknown)[kContactUnknowns],
-                                        Scalar (&gradient)[kContactUnknowns]) {
+struct SlippingEdge {
+  Vec3<Scalar> edge, change;  ///< now, and since the start of the step [m]
+  Vec3<Scalar> tangent, arm;
+  Vec3<Scalar> turn;    ///< phi
+  Vec3<Scalar> spin{};  ///< of the frame, by the edge [1/m]
+  Scalar inverse;       ///< of the length [1/m]
+};
+
+/// Two surfaces that press against each other, at given unknowns.
+template <class Scalar>
+struct SlippingSurfaces {
+  SlippingEdge<Scalar> sides[2];
+  int bodies = 0;  ///< with an arm
+  Scalar s, t, distance;
+  Vec3<Scalar> normal, between{};  ///< of the centrelines; nothing beside a plane
+  Scalar inverse = 0.0;            ///< of the length of `between` [1/m]; 0: nothing
+  Scalar pressing;                 ///< N
+  double pressing_slope;           ///< of N by the distance [N/m]
+  Scalar w[4];
+  Vec3<Scalar> way;  ///< slip, with its part along the normal [m]
+  FrictionForce<Scalar> friction;
+};
+
+/// Where the surfaces touch, and how hard they press.
+template <class Scalar>
+void find_contact(const FrictionSetting& f, const Vec3<Scalar> (&x)[4], SlippingSurfaces<Scalar>& c) {
+  using std::sqrt;
+  const auto lift = [](const Vec3d& v) { return Vec3<Scalar>{Scalar(v.x), Scalar(v.y), Scalar(v.z)}; };
+  const ContactPair& pair = *f.pair;
+  c.s = f.points.s;
+  c.t = f.points.t;
+  if (pair.plane()) {
+    c.normal = lift(f.obstacle->other);
+    c.distance = dot(c.normal, x[pair.key.end] - lift(f.obstacle->point));
+  } else {
+    const Vec3<Scalar> r = x[0] - x[2], &u = c.sides[0].edge, &v = c.sides[1].edge;
+    solve_parameters(r, u, v, pair.weight_a, pair.weight_b, f.points.s_free, f.points.t_free, c.s, c.t);
+    c.between = r + c.s * u - c.t * v;
+    const Scalar square = dot(c.between, c.between);
+    c.distance = sqrt(square + pair.weight_a * (c.s - 0.5) * (c.s - 0.5) + pair.weight_b * (c.t - 0.5) * (c.t - 0.5));
+    c.inverse = 1.0 / sqrt(square);
+    c.normal = c.inverse * c.between;
+  }
+  const ContactEnergy e = contact_energy(f.contact_law, value_of(c.distance) + f.yielded, pair.radii(), pair.tolerance);
+  c.pressing_slope = -f.stiffness * e.second;
+  c.pressing = chain(c.distance, -f.stiffness * e.first, c.pressing_slope);
+  end_weights(c.s, c.t, c.w);
+  if (pair.rod_b < 0) c.w[2] = c.w[3] = Scalar(0.0);
+}
+
+/// How far the surfaces have slipped, and the friction on that.
+template <class Scalar>
+SlippingSurfaces<Scalar> slipping_surfaces(const FrictionSetting& f, const Scalar (&unknown)[kContactUnknowns]) {
   using std::sqrt;
   const auto point = [&](int i) { return Vec3<Scalar>{unknown[3 * i], unknown[3 * i + 1], unknown[3 * i + 2]}; };
   const auto before = [&](int i) { return Vec3d{f.start[3 * i], f.start[3 * i + 1], f.start[3 * i + 2]}; };
   const auto lift = [](const Vec3d& v) { return Vec3<Scalar>{Scalar(v.x), Scalar(v.y), Scalar(v.z)}; };
-  const ContactPair& pair = *f.pair;
   const Vec3<Scalar> x[4] = {point(0), point(1), point(2), point(3)};
-  const Vec3<Scalar> edge[2] = {x[1] - x[0], x[3] - x[2]};
-  Scalar s = f.points.s, t = f.points.t, distance;
-  Vec3<Scalar> normal, between;
-  if (pair.plane()) {
-    normal = lift(f.obstacle->other);
-    distance = dot(normal, x[pair.key.end] - lift(f.obstacle->point));
-  } else {
-    const Vec3<Scalar> r = x[0] - x[2];
-    solve_parameters(r, edge[0], edge[1], pair.weight_a, pair.weight_b, f.points.s_free, f.points.t_free, s, t);
-    between = r + s * edge[0] - t * edge[1];
-    const Scalar square = dot(between, between);
-    distance = sqrt(square + pair.weight_a * (s - 0.5) * (s - 0.5) + pair.weight_b * (t - 0.5) * (t - 0.5));
-    normal = (1.0 / sqrt(square)) * between;
+  SlippingSurfaces<Scalar> c;
+  for (int b = 0; b < 2; ++b) {
+    c.sides[b].edge = x[2 * b + 1] - x[2 * b];
+    c.sides[b].change = c.sides[b].edge - lift(before(2 * b + 1) - before(2 * b));
   }
-  const ContactEnergy e = contact_energy(f.contact_law, value_of(distance) + f.yielded, pair.radii(), pair.tolerance);
-  const Scalar pressing = chain(distance, -f.stiffness * e.first, -f.stiffness * e.second);
-  Scalar w[4];
-  end_weights(s, t, w);
-  if (pair.rod_b < 0) w[2] = w[3] = Scalar(0.0);
-
-  Vec3<Scalar> slip = -lift(f.drift);
-  for (int i = 0; i < 4; ++i) slip += w[i] * (x[i] - lift(before(i)));
-  struct Side {
-    Vec3<Scalar> arm, tangent, spin;
-    Scalar inverse;
-  };
-  Side sides[2];
-  const int bodies = f.centreline ? 0 : pair.rod_b < 0 ? 1 : 2;
-  for (int b = 0; b < bodies; ++b) {
-    Side& side = sides[b];
-    const double sign = b == 0 ? 1.0 : -1.0;
-    side.inverse = 1.0 / sqrt(dot(edge[b], edge[b]));
-    side.tangent = side.inverse * edge[b];
-    side.arm = contact_arm(pair, b, normal, between);
-    const Vec3<Scalar> change = edge[b] - lift(before(2 * b + 1) - before(2 * b));
-    Vec3<Scalar> turn = side.inverse * cross(side.tangent, change);
+  find_contact(f, x, c);
+  c.way = -lift(f.drift);
+  for (int i = 0; i < 4; ++i) c.way += c.w[i] * (x[i] - lift(before(i)));
+  c.bodies = f.centreline ? 0 : f.pair->rod_b < 0 ? 1 : 2;
+  for (int b = 0; b < c.bodies; ++b) {
+    SlippingEdge<Scalar>& side = c.sides[b];
+    side.inverse = 1.0 / sqrt(dot(side.edge, side.edge));
+    side.tangent = side.inverse * side.edge;
+    side.arm = contact_arm(*f.pair, b, c.normal, c.between);
+    side.turn = side.inverse * cross(side.tangent, side.change);
     if (f.spatial) {
-      turn += (unknown[12 + b] - f.start[12 + b]) * side.tangent;
+      side.turn += (unknown[12 + b] - f.start[12 + b]) * side.tangent;
       const Vec3<Scalar> source = lift(f.source[b]);
       side.spin = -((side.inverse / (1.0 + dot(source, side.tangent))) * cross(source, side.tangent));
     }
-    slip += Scalar(sign) * cross(turn, side.arm);
+    c.way += Scalar(b == 0 ? 1.0 : -1.0) * cross(side.turn, side.arm);
   }
-  slip -= dot(slip, normal) * normal;
-  const FrictionForce<Scalar> out = friction_force(f, normal, slip, pressing);
+  c.friction = friction_force(f, c.normal, c.way - dot(c.way, c.normal) * c.normal, c.pressing);
+  return c;
+}
 
+/// Adds to `gradient` the generalised forces J^T F (minus the friction on the rods).
+template <class Scalar>
+void add_friction_gradient(const FrictionSetting& f, const SlippingSurfaces<Scalar>& c,
+                           Scalar (&gradient)[kContactUnknowns]) {
   const auto add = [&](int i, const Vec3<Scalar>& v) {
     gradient[3 * i] += v.x;
     gradient[3 * i + 1] += v.y;
     gradient[3 * i + 2] += v.z;
   };
-  for (int i = 0; i < 4; ++i) add(i, w[i] * out.force);
-  for (int b = 0; b < bodies; ++b) {
-    const Side& side = sides[b];
-    const Vec3<Scalar> torque = Scalar(b == 0 ? 1.0 : -1.0) * cross(side.arm, out.force);
+  for (int i = 0; i < 4; ++i) add(i, c.w[i] * c.friction.force);
+  for (int b = 0; b < c.bodies; ++b) {
+    const SlippingEdge<Scalar>& side = c.sides[b];
+    const Vec3<Scalar> torque = Scalar(b == 0 ? 1.0 : -1.0) * cross(side.arm, c.friction.force);
     Vec3<Scalar> couple = side.inverse * cross(torque, side.tangent);
     if (f.spatial) {
       const Scalar axial = dot(side.tangent, torque);
@@ -165,7 +205,15 @@ FrictionForce<Scalar> friction_gradient(const FrictionSetting& f, const Scalar (
     add(2 * b + 1, couple);
     add(2 * b, -couple);
   }
-  return out;
+}
+
+/// The same with F and S as they are at `unknown`; returns F.
+template <class Scalar>
+FrictionForce<Scalar> friction_gradient(const FrictionSetting& f, const Scalar (&unknown)[kContactUnknowns],
+                                        Scalar (&gradient)[kContactUnknowns]) {
+  const SlippingSurfaces<Scalar> c = slipping_surfaces(f, unknown);
+  add_friction_gradient(f, c, gradient);
+  return c.friction;
 }
 
 }  // namespace withe

@@ -82,6 +82,23 @@ void end_weights(const Scalar& s, const Scalar& t, Scalar (&w)[4]) {
   w[3] = -t;
 }
 
+/// Inverse of the second derivative of W / 2 by s and t, where they are free; nothing for those that are held.
+inline void parameter_inverse(bool s_free, bool t_free, const Vec3<double>& u, const Vec3<double>& v, double A,
+                              double B, double (&K)[2][2]) {
+  const double uu = dot(u, u) + A, vv = dot(v, v) + B, uv = dot(u, v);
+  K[0][0] = K[0][1] = K[1][0] = K[1][1] = 0.0;
+  if (s_free && t_free) {
+    const double inverse = 1.0 / (uu * vv - uv * uv);
+    K[0][0] = vv * inverse;
+    K[1][1] = uu * inverse;
+    K[0][1] = K[1][0] = uv * inverse;
+  } else if (s_free) {
+    K[0][0] = 1.0 / uu;
+  } else if (t_free) {
+    K[1][1] = 1.0 / vv;
+  }
+}
+
 /// Second derivative of W / 2 over (a0, a1, b0, b1), 12 x 12: w w^T (x) 1 minus what the free parameters give way.
 inline void half_square_hessian(const ClosestPoints& p, const Vec3<double>& u, const Vec3<double>& v, double A,
                                 double B, double (&H)[12][12]) {
@@ -97,18 +114,8 @@ inline void half_square_hessian(const ClosestPoints& p, const Vec3<double>& u, c
     P[0][i] = ws[i / 3] * d[i % 3] + w[i / 3] * uc[i % 3];
     P[1][i] = wt[i / 3] * d[i % 3] - w[i / 3] * vc[i % 3];
   }
-  const double uu = dot(u, u) + A, vv = dot(v, v) + B, uv = dot(u, v);
-  double K[2][2] = {{0, 0}, {0, 0}};  // inverse of the free parameters' own second derivative
-  if (p.s_free && p.t_free) {
-    const double inverse = 1.0 / (uu * vv - uv * uv);
-    K[0][0] = vv * inverse;
-    K[1][1] = uu * inverse;
-    K[0][1] = K[1][0] = uv * inverse;
-  } else if (p.s_free) {
-    K[0][0] = 1.0 / uu;
-  } else if (p.t_free) {
-    K[1][1] = 1.0 / vv;
-  }
+  double K[2][2];
+  parameter_inverse(p.s_free, p.t_free, u, v, A, B, K);
   for (int i = 0; i < 12; ++i) {
     const double a = K[0][0] * P[0][i] + K[0][1] * P[1][i], b = K[1][0] * P[0][i] + K[1][1] * P[1][i];
     for (int j = 0; j < 12; ++j) H[i][j] -= a * P[0][j] + b * P[1][j];

@@ -1,0 +1,187 @@
+#include "contact/friction_jacobian.hpp"
+
+#include <cmath>
+
+namespace withe {
+namespace {
+
+// Ways in which a contact moves: dp, du, dv (3 each), both angles.
+constexpr int kEdge[2] = {3, 6}, kAngle[2] = {9, 10}, kWays = 11;
+
+constexpr Vec3d kAxis[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+
+double part(const Vec3d& v, int k) { return k == 0 ? v.x : k == 1 ? v.y : v.z; }
+
+/// Derivatives by them.
+struct Slopes {
+  double s[kWays] = {}, t[kWays] = {}, pressing[kWays] = {};
+  Vec3d between[kWays] = {};
+  Vec3d lever[kWays] = {};  ///< c
+  Vec3d turn[kWays] = {};   ///< omega
+  Vec3d force[kWays];
+  Vec3d moment[kWays];  ///< m
+};
+
+/// F = g(|S|^2, N) S.
+struct ForceLaw {
+  double factor = 0, by_square = 0, by_pressing = 0;  ///< g, g', g_N
+};
+
+ForceLaw force_law(const FrictionSetting& f, const SlippingSurfaces<double>& c, double square) {
+  const double mu = f.pair->friction, limit = mu * c.pressing;
+  if (f.law != FrictionLaw::anchored) {
+    const Dual<1> factor = slip_factor(Dual<1>::unknown(square, 0), f.rate);
+    return {limit * factor.value, limit * factor.slope[0], mu * factor.value};
+  }
+  if (c.friction.sticking) return {f.tangential_stiffness, 0.0, 0.0};
+  const double inverse = 1.0 / std::sqrt(square);
+  return {limit * inverse, -0.5 * limit * inverse / square, mu * inverse};
+}
+
+/// Where they touch, and how hard they press: by all but the angles.
+void add_contact_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& c, Slopes& d) {
+  const ContactPair& pair = *f.pair;
+  if (pair.plane()) {
+    for (int k = 0; k < 3; ++k) d.pressing[k] = c.pressing_slope * part(c.normal, k);
+    return;
+  }
+  const Vec3d &u = c.sides[0].edge, &v = c.sides[1].edge;
+  double K[2][2];
+  parameter_inverse(f.points.s_free, f.points.t_free, u, v, pair.weight_a, pair.weight_b, K);
+  const Vec3d a = K[0][1] * v - K[0][0] * u, b = K[1][1] * v - K[1][0] * u;
+  for (int k = 0; k < 3; ++k) {
+    const double across = part(c.between, k);
+    d.pressing[k] = c.pressing_slope / c.distance * across;
+    d.s[k] = part(a, k);
+    d.t[k] = part(b, k);
+    d.between[k] = kAxis[k] + d.s[k] * u - d.t[k] * v;
+    d.s[kEdge[0] + k] = -K[0][0] * across;
+    d.t[kEdge[0] + k] = -K[1][0] * across;
+    d.between[kEdge[0] + k] = across * a;
+    if (pair.rod_b < 0) continue;
+    d.s[kEdge[1] + k] = K[0][1] * across;
+    d.t[kEdge[1] + k] = K[1][1] * across;
+    d.between[kEdge[1] + k] = -across * b;
+  }
+}
+
+/// By how much edges turn and spin, and on what lever.
+void add_turn_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& c, Slopes& d) {
+  for (int j = 0; j < kWays; ++j) {
+    const Vec3d& moved = d.between[j];
+    d.lever[j] = f.pair->rod_b < 0 ? c.inverse * (moved - dot(c.normal, moved) * c.normal) : moved;
+  }
+  for (int b = 0; b < c.bodies; ++b) {
+    const SlippingEdge<double>& side = c.sides[b];
+    const double rho = arm_length(*f.pair, b), inverse = side.inverse, angle = dot(side.turn, side.tangent);
+    const Vec3d start = side.edge - side.change, bend = side.turn - angle * side.tangent;
+    for (int k = 0; k < 3; ++k) {
+      const double along = part(side.tangent, k);
+      d.turn[kEdge[b] + k] = (rho * inverse) * (inverse * cross(start, kAxis[k]) - (2.0 * along) * bend +
+                                                angle * (kAxis[k] - along * side.tangent));
+    }
+    if (f.spatial) d.turn[kAngle[b]] = rho * side.tangent;
+  }
+}
+
+/// omega
+Vec3d turn_of(const FrictionSetting& f, const SlippingSurfaces<double>& c) {
+  Vec3d turn{};
+  for (int b = 0; b < c.bodies; ++b) turn += arm_length(*f.pair, b) * c.sides[b].turn;
+  return turn;
+}
+
+/// The slip, with the part along the normal that it loses as that turns, and the force on it.
+void add_force_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& c, const Vec3d& lever, Slopes& d) {
+  const Vec3d &n = c.normal, turn = turn_of(f, c);
+  const Vec3d way = f.law == FrictionLaw::anchored ? c.way + f.stick : c.way;
+  const double off = dot(way, n);
+  const Vec3d slip = way - off * n;
+  const ForceLaw g = force_law(f, c, dot(slip, slip));
+  const Vec3d change_a = c.sides[0].change, change_b = f.pair->rod_b < 0 ? Vec3d{} : c.sides[1].change;
+  for (int j = 0; j < kWays; ++j) {
+    const Vec3d across = c.inverse * d.between[j];
+    Vec3d moved = d.s[j] * change_a - d.t[j] * change_b + cross(lever, d.turn[j]) - cross(turn, d.lever[j]);
+    if (j < 3) moved += kAxis[j];
+    moved -= off * across;
+    d.force[j] = g.factor * moved - (g.factor * (dot(n, moved) + dot(slip, across))) * n +
+                 (2.0 * g.by_square * dot(slip, moved) + g.by_pressing * d.pressing[j]) * slip;
+  }
+}
+
+/// What the moment m does to an edge, rho (m x t / |e| + (t . m) spin) and rho t . m, by its ways.
+void add_couple_slopes(const FrictionSetting& f, const SlippingEdge<double>& side, int b, const Vec3d& m,
+                       const Vec3d (&moment)[kWays], Vec3d (&couple)[kWays], double (&axial)[kWays]) {
+  const Vec3d& t = side.tangent;
+  const double rho = arm_length(*f.pair, b), inverse = side.inverse, along = dot(t, m);
+  for (int j = 0; j < kWays; ++j) {
+    axial[j] = rho * dot(t, moment[j]);
+    couple[j] += (rho * inverse) * cross(moment[j], t) + axial[j] * side.spin;
+  }
+  // With p the tangent that frames are transported from, spin = -p x t / (|e| (1 + p . t)), and
+  // dspin = -(p x de / |e| + spin ((2 + p . t) t + p) . de) / (|e| (1 + p . t)).
+  const Vec3d& source = f.source[b];
+  const double facing = dot(source, t), share = inverse / (1.0 + facing);
+  const Vec3d bend = inverse * cross(m, t), mean = (2.0 + facing) * t + source;
+  for (int k = 0; k < 3; ++k) {
+    const double lean = inverse * (part(m, k) - along * part(t, k));
+    Vec3d& own = couple[kEdge[b] + k];
+    own += (rho * inverse) * (inverse * cross(m, kAxis[k]) - (2.0 * part(t, k)) * bend);
+    if (!f.spatial) continue;
+    axial[kEdge[b] + k] += rho * lean;
+    own += (rho * (lean - along * share * part(mean, k))) * side.spin -
+           (rho * along * share * inverse) * cross(source, kAxis[k]);
+  }
+}
+
+using Row = double[kContactUnknowns];
+
+/// From ways to unknowns: dp = sum_i w_i dx_i, du = da1 - da0, dv = db1 - db0.
+template <class Way>
+void spread(const double (&w)[4], const Way& way, Row& row) {
+  for (int i = 0; i < 4; ++i)
+    for (int k = 0; k < 3; ++k) {
+      const double edge = way(kEdge[i / 2] + k);
+      row[3 * i + k] = w[i] * way(k) + (i % 2 == 0 ? -edge : edge);
+    }
+  for (int b = 0; b < 2; ++b) row[12 + b] = way(kAngle[b]);
+}
+
+/// Forces on the ends of edge b, and on its angle.
+void add_rows(const FrictionSetting& f, const SlippingSurfaces<double>& c, int b, const Vec3d& m, const Slopes& d,
+              double (&jacobian)[kContactUnknowns][kContactUnknowns]) {
+  Vec3d couple[kWays];
+  double axial[kWays] = {};
+  // w_i F with s and t that give way, too
+  for (int j = 0; j < kWays; ++j) couple[j] = (b == 0 ? d.s[j] : -d.t[j]) * c.friction.force;
+  if (b < c.bodies) add_couple_slopes(f, c.sides[b], b, m, d.moment, couple, axial);
+  Row forces, couples;
+  for (int k = 0; k < 3; ++k) {
+    spread(c.w, [&](int j) { return part(d.force[j], k); }, forces);
+    spread(c.w, [&](int j) { return part(couple[j], k); }, couples);
+    Row &tail = jacobian[6 * b + k], &head = jacobian[6 * b + 3 + k];
+    for (int j = 0; j < kContactUnknowns; ++j) {
+      tail[j] += c.w[2 * b] * forces[j] - couples[j];
+      head[j] += c.w[2 * b + 1] * forces[j] + couples[j];
+    }
+  }
+  if (b >= c.bodies || !f.spatial) return;
+  spread(c.w, [&](int j) { return axial[j]; }, couples);
+  for (int j = 0; j < kContactUnknowns; ++j) jacobian[12 + b][j] += couples[j];
+}
+
+}  // namespace
+
+void add_friction_jacobian(const FrictionSetting& f, const SlippingSurfaces<double>& c,
+                           double (&jacobian)[kContactUnknowns][kContactUnknowns]) {
+  const bool obstacle = f.pair->rod_b < 0;
+  const Vec3d &force = c.friction.force, &lever = obstacle ? c.normal : c.between;
+  Slopes d;
+  add_contact_slopes(f, c, d);
+  add_turn_slopes(f, c, d);
+  add_force_slopes(f, c, lever, d);
+  for (int j = 0; j < kWays; ++j) d.moment[j] = cross(d.force[j], lever) + cross(force, d.lever[j]);
+  for (int b = 0; b < (obstacle ? 1 : 2); ++b) add_rows(f, c, b, cross(force, lever), d, jacobian);
+}
+
+}  // namespace withe

@@ -1,0 +1,174 @@
+// The Jacobian of friction, derived by hand, against dual numbers through the forces themselves, for every class of
+// contact, law and dimension.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <string>
+
+#include "contact/friction_jacobian.hpp"
+#include "scenes.hpp"
+
+namespace withe {
+namespace {
+
+using testing::RandomNumbers;
+
+constexpr int kN = kContactUnknowns;
+
+enum class Other { rod, plane, sphere, capsule };
+
+/// A contact somewhere within a step, its frames turned and its surfaces slipped.
+struct Touch {
+  ContactPair pair;
+  Obstacle obstacle;
+  FrictionSetting setting;
+  double now[kN] = {};
+};
+
+Vec3d random_point(RandomNumbers& random, bool planar) {
+  return {random.normal(), random.normal(), planar ? 0.0 : random.normal()};
+}
+
+/// Edges that are nearly parallel in one case of six, with centrelines that are apart.
+void place(RandomNumbers& random, Other other, bool planar, Touch& c, Vec3d (&x)[4]) {
+  c.pair.rod_b = other == Other::rod ? 0 : -1;
+  c.pair.key.end = other == Other::plane ? (random.normal() > 0.0 ? 1 : 0) : -1;
+  c.pair.weight_a = 0.01;
+  c.pair.weight_b = 0.02;
+  do {
+    for (Vec3d& p : x) p = random_point(random, planar);
+    if (random.normal() > 1.0) x[3] = x[2] + x[1] - x[0] + 0.05 * random_point(random, planar);
+    if (other == Other::sphere) x[3] = x[2];
+    c.setting.points = closest_points(x[0], x[1], x[2], x[3], c.pair.weight_a, c.pair.weight_b);
+  } while (dot(c.setting.points.between, c.setting.points.between) < 0.04);
+}
+
+/// Makes surfaces thick enough to touch.
+void press(const Vec3d (&x)[4], Touch& c) {
+  ContactPair& pair = c.pair;
+  double distance = std::sqrt(c.setting.points.square);
+  if (pair.plane()) {
+    c.setting.points = {};
+    c.setting.points.s = pair.key.end;
+    distance = 0.3;
+    c.obstacle.other = (1.0 / std::sqrt(dot(x[3], x[3]))) * x[3];
+    c.obstacle.point = x[pair.key.end] - distance * c.obstacle.other;
+  }
+  pair.radius_a = 0.42 * distance;
+  pair.radius_b = 0.6 * distance;
+  pair.tolerance = 0.1 * distance;
+  pair.friction = 0.4;
+}
+
+/// Moves, turns and spins edges since the start of the step; an obstacle has its way.
+void slip(RandomNumbers& random, const Vec3d (&x)[4], Touch& c) {
+  FrictionSetting& f = c.setting;
+  const bool rods = c.pair.rod_b >= 0, planar = !f.spatial;
+  for (int i = 0; i < 4; ++i) {
+    const Vec3d start = x[i] + (rods || i < 2 ? 0.1 : 0.0) * random_point(random, planar);
+    const double now[3] = {x[i].x, x[i].y, x[i].z}, before[3] = {start.x, start.y, start.z};
+    std::copy(now, now + 3, c.now + 3 * i);
+    std::copy(before, before + 3, f.start + 3 * i);
+  }
+  if (!rods) f.drift = 0.05 * random_point(random, planar);
+  f.stick = 0.03 * random_point(random, planar);
+  if (planar) return;
+  for (int b : {0, 1}) {
+    c.now[12 + b] = random.normal();
+    f.start[12 + b] = c.now[12 + b] + 0.1 * random.normal();
+    const Vec3d source = random_point(random, planar);
+    f.source[b] = (1.0 / std::sqrt(dot(source, source))) * source;
+  }
+}
+
+void random_touch(RandomNumbers& random, Other other, FrictionLaw law, bool planar, Touch& c) {
+  FrictionSetting& f = c.setting;
+  Vec3d x[4];
+  place(random, other, planar, c, x);
+  press(x, c);
+  f.pair = &c.pair;
+  f.obstacle = other == Other::rod ? nullptr : &c.obstacle;
+  f.law = law;
+  f.spatial = !planar;
+  f.centreline = random.normal() > 0.0;
+  f.stiffness = 40.0;
+  f.yielded = 0.01 * c.pair.tolerance;
+  f.tangential_stiffness = random.normal() > 0.0 ? 1.0 : 100.0;
+  f.rate = 3.0;
+  slip(random, x, c);
+}
+
+std::string class_of(const Touch& c, const FrictionForce<double>& friction) {
+  const FrictionSetting& f = c.setting;
+  std::string name = f.law == FrictionLaw::implicit ? "implicit" : friction.sticking ? "sticking" : "slipping";
+  name += f.centreline ? ", centreline" : "";
+  name += f.points.s_free ? ", s free" : "";
+  return name + (f.points.t_free ? ", t free" : "");
+}
+
+using Matrix = Eigen::Matrix<double, kN, kN>;
+
+Matrix by_dual_numbers(const Touch& c) {
+  using Dual14 = Dual<kN>;
+  Dual14 unknown[kN], gradient[kN];
+  for (int i = 0; i < kN; ++i) unknown[i] = Dual14::unknown(c.now[i], i);
+  friction_gradient(c.setting, unknown, gradient);
+  Matrix J;
+  for (int i = 0; i < kN; ++i)
+    for (int j = 0; j < kN; ++j) J(i, j) = gradient[i].slope[j];
+  return J;
+}
+
+Matrix by_hand(const Touch& c) {
+  double jacobian[kN][kN] = {};
+  add_friction_jacobian(c.setting, slipping_surfaces(c.setting, c.now), jacobian);
+  Matrix J;
+  for (int i = 0; i < kN; ++i)
+    for (int j = 0; j < kN; ++j) J(i, j) = jacobian[i][j];
+  return J;
+}
+
+/// Compares random contacts; returns how many classes there were.
+std::size_t compare(Other other, FrictionLaw law, bool planar) {
+  RandomNumbers random(11);
+  std::set<std::string> seen;
+  for (int k = 0; k < 1000; ++k) {
+    Touch c;
+    random_touch(random, other, law, planar, c);
+    Matrix expected = by_dual_numbers(c);
+    if (other != Other::rod) {  // an obstacle has no unknowns
+      expected.middleCols<6>(6).setZero();
+      expected.col(13).setZero();
+    }
+    double unused[kN] = {};
+    const std::string name = class_of(c, friction_gradient(c.setting, c.now, unused));
+    EXPECT_LT((by_hand(c) - expected).cwiseAbs().maxCoeff(), 1e-11 * expected.cwiseAbs().maxCoeff())
+        << name << ", case " << k;
+    seen.insert(name);
+  }
+  return seen.size();
+}
+
+/// Surfaces or centrelines that slip under the implicit law, and hold or slip under that with anchors.
+void expect_dual_numbers(Other other, bool planar, std::size_t classes) {
+  EXPECT_EQ(compare(other, FrictionLaw::implicit, planar), 2 * classes);
+  EXPECT_EQ(compare(other, FrictionLaw::anchored, planar), 4 * classes);
+}
+
+class FrictionJacobian : public ::testing::TestWithParam<bool> {};
+
+INSTANTIATE_TEST_SUITE_P(InSpaceAndInAPlane, FrictionJacobian, ::testing::Bool());
+
+TEST_P(FrictionJacobian, OfTwoRodsIsThatOfDualNumbers) { expect_dual_numbers(Other::rod, GetParam(), 4); }
+
+TEST_P(FrictionJacobian, OfAnObstacleIsThatOfDualNumbers) {
+  expect_dual_numbers(Other::plane, GetParam(), 1);
+  expect_dual_numbers(Other::sphere, GetParam(), 2);
+  expect_dual_numbers(Other::capsule, GetParam(), 4);
+}
+
+}  // namespace
+}  // namespace withe
