@@ -9,14 +9,13 @@ hundredth of a radius apart, that fall onto each other.
 
 from __future__ import annotations
 
-import importlib.util
 import math
 import sys
 import time
 from collections.abc import Callable
 
 import numpy as np
-from reporting import ROOT, Report, arguments, bar
+from reporting import HAVE_ELASTICA, ROOT, Report, arguments, bar
 
 import withe
 
@@ -27,7 +26,6 @@ import gripper
 PILE_LENGTH, PILE_RADIUS, PILE_LAYERS = 0.1, 2e-3, 10  # [m]
 KNOT = {"length": 1.0, "radius": 1.6e-3, "shortening": 0.6}  # [m]
 KNOT_MODULUS, KNOT_DENSITY, KNOT_SPEED, KNOT_STEP = 1.8e5, 1180.0, 1e-2, 2.5e-3  # [Pa], [kg/m^3], of a grip [m/s], [s]
-HAVE_ELASTICA = importlib.util.find_spec("elastica") is not None
 
 
 def _timed(simulation: withe.Simulation, steps: int, warm: int = 0) -> tuple[float, int]:

@@ -23,9 +23,9 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from reporting import OUT, ROOT, Report, arguments, bar, interleaved
+from reporting import HAVE_ELASTICA, OUT, ROOT, Report, arguments, bar, interleaved
 from rods_in_motion import steps_of
-from work_precision import HAVE_ELASTICA, ROUNDS, SATURATED, Point, front, shown_time, time_at
+from work_precision import ROUNDS, SATURATED, Point, front, shown_time, time_at
 
 import withe
 
@@ -251,11 +251,7 @@ def main() -> None:
     report = Report("friction_precision", quick=quick)
     _report_fronts(report, points)
     _report_points(report, points)
-    report.figures["points"] = [point.as_json() for point in points]
-    if HAVE_ELASTICA:
-        from elastica_rods import version
-
-        report.figures["PyElastica"] = version() if not quick else "not run"
+    report.keep_points(points)
     _plot(points)
     report.write()
 

@@ -5,16 +5,13 @@ python benchmarks/parallel.py [--quick]
 
 from __future__ import annotations
 
-import importlib.util
 import time
 
 import numpy as np
-from reporting import Report, Timing, arguments, bar, interleaved
+from reporting import HAVE_ELASTICA, Report, Timing, arguments, bar, interleaved
 from rods_in_motion import CASES, simulation
 
 import withe
-
-HAVE_ELASTICA = importlib.util.find_spec("elastica") is not None
 
 
 def _many(workers: int, count: int, duration: float) -> tuple[float, list[np.ndarray]]:

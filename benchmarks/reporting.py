@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import datetime
+import importlib.util
 import json
 import os
 import platform
@@ -18,17 +19,19 @@ import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 import withe
 from withe.progress import Progress, progress
 
-__all__ = ["DATA", "OUT", "Report", "Timing", "arguments", "bar", "interleaved", "once"]
+__all__ = ["DATA", "HAVE_ELASTICA", "OUT", "Report", "Timing", "arguments", "bar", "interleaved", "once"]
 
 ROOT = Path(__file__).resolve().parent.parent
 DATA = ROOT / "benchmarks" / "data"
 LOADED = time.monotonic()
+HAVE_ELASTICA = importlib.util.find_spec("elastica") is not None
 OUT = Path(os.environ.get("WITHE_BENCHMARK_OUT", ROOT / "out" / "benchmarks"))
 
 
@@ -151,6 +154,14 @@ class Report:
         print(f"\n{title}")
         for row in cells:
             print("  " + "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip())
+
+    def keep_points(self, points: Iterable[Any]) -> None:
+        """Keep each point of a diagram of error against time, and which PyElastica it was measured with."""
+        self.figures["points"] = [point.as_json() for point in points]
+        if HAVE_ELASTICA:
+            from elastica_rods import version
+
+            self.figures["PyElastica"] = "not run" if self._quick else version()
 
     def write(self) -> Path:
         """Print goals, and write the file."""

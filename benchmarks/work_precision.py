@@ -14,21 +14,19 @@ measured and scaled by steps (marked *).
 from __future__ import annotations
 
 import concurrent.futures
-import importlib.util
 import json
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass, field
 
 from limits import load_limits
-from reporting import OUT, Report, Timing, arguments, bar, interleaved
+from reporting import HAVE_ELASTICA, OUT, Report, Timing, arguments, bar, interleaved
 from rods_in_motion import CASES, Case, integrators, record, run_time, steps_of
 
 SATURATED = 0.5
 ROUNDS = 5
 SLICE = 2.0  # [s]
 _ENDLESS = 1e9  # a number that every reader of JSON knows
-HAVE_ELASTICA = importlib.util.find_spec("elastica") is not None
 
 
 @dataclass
@@ -375,11 +373,7 @@ def main() -> None:
     _report_fronts(report, points)
     _report_points(report, points)
     _report_limits(report)
-    report.figures["points"] = [p.as_json() for p in points]
-    if HAVE_ELASTICA:
-        from elastica_rods import version
-
-        report.figures["PyElastica"] = version() if not quick else "not run"
+    report.keep_points(points)
     _plot(points)
     report.write()
 
