@@ -342,9 +342,8 @@ void World::Implementation::add_contact_notes() {
   if (!equations->contact()->frictional()) plan.notes.emplace_back("no friction: contact stays symmetric");
   if (options.integrator == Integrator::verlet && equations->contact()->eases())
     plan.notes.emplace_back(
-        "friction that sticks allows explicit steps of at most about slip_tolerance / (7.5 mu) times a node's mass "
-        "over "
-        "the force that presses it, which the drawing does not know");
+        "friction that sticks allows explicit steps of at most about slip_tolerance / (7.5 mu) times a node's "
+        "mass over the force that presses it, which the drawing does not know");
 }
 
 /// Warns of rods whose edges are longer than they are thick: to contact they are chains of straight pieces.
