@@ -3,110 +3,31 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/Dense>
 #include <cmath>
 #include <limits>
-#include <random>
 #include <set>
 #include <string>
 #include <vector>
 
-#include "solvers/linear_solver.hpp"
+#include "matrices.hpp"
 #include "solvers/supernodes.hpp"
 
 namespace withe {
 namespace {
 
-using Matrix = Eigen::MatrixXd;
-using Vector = Eigen::VectorXd;
-using Random = std::mt19937_64;
-
-std::span<double> view(Vector& x) { return {x.data(), static_cast<std::size_t>(x.size())}; }
-std::span<const double> view(const Vector& x) { return {x.data(), static_cast<std::size_t>(x.size())}; }
-
-double uniform(Random& random) { return std::uniform_real_distribution<double>(-1.0, 1.0)(random); }
-
-Vector random_vector(int size, Random& random) {
-  return Vector::NullaryExpr(size, [&random](Eigen::Index) { return uniform(random); });
-}
-
-SparsityPattern band_pattern(int size, int half_bandwidth) {
-  std::vector<std::vector<int>> cliques;
-  for (int i = 0; i < size; ++i) {
-    std::vector<int> clique;
-    for (int j = i; j < std::min(size, i + half_bandwidth + 1); ++j) clique.push_back(j);
-    cliques.push_back(clique);
-  }
-  return SparsityPattern::from_cliques(size, cliques);
-}
-
-SparsityPattern scattered_pattern(int size, Random& random) {
-  std::uniform_int_distribution<int> unknown(0, size - 1);
-  std::vector<std::vector<int>> cliques;
-  for (int i = 0; i < size; ++i) cliques.push_back({unknown(random), unknown(random), unknown(random)});
-  return SparsityPattern::from_cliques(size, cliques);
-}
-
-/// Rods of 60 unknowns with half bandwidth 10, joined to the first one and touching one another at random.
-SparsityPattern rods_pattern(int size, Random& random) {
-  std::uniform_int_distribution<int> place(0, size - 6);
-  std::vector<std::vector<int>> cliques;
-  for (int i = 0; i < size; ++i) {
-    if (i % 60 == 0) cliques.push_back({0, 1, 2, i});
-    std::vector<int> clique;
-    for (int j = i; j <= std::min(size - 1, i + 10) && j / 60 == i / 60; ++j) clique.push_back(j);
-    cliques.push_back(clique);
-  }
-  for (int contact = 0; contact < size / 20; ++contact) {
-    const int a = place(random), b = place(random);
-    cliques.push_back({a, a + 1, a + 2, a + 3, a + 4, a + 5, b, b + 1, b + 2, b + 3, b + 4, b + 5});
-  }
-  return SparsityPattern::from_cliques(size, cliques);
-}
-
-enum class Nature { definite, indefinite };
-
-/// Random entries; off-diagonal ones at most 1, diagonal ones large enough for elimination without pivoting, or
-/// (unsymmetric and indefinite) about as small as the others, so that pivoting is needed.
-Matrix random_matrix(const SparsityPattern& pattern, Symmetry symmetry, Nature nature, Random& random) {
-  Matrix matrix = Matrix::Zero(pattern.size, pattern.size);
-  for (int column = 0; column < pattern.size; ++column) {
-    const int count = pattern.column_starts[column + 1] - pattern.column_starts[column];
-    for (int p = pattern.column_starts[column]; p < pattern.column_starts[column + 1]; ++p) {
-      const int row = pattern.row_indices[p];
-      if (row == column) {
-        const bool negative = nature == Nature::indefinite && uniform(random) < 0.0;
-        matrix(row, row) = (negative ? -1.0 : 1.0) * count;
-        if (symmetry == Symmetry::unsymmetric && nature == Nature::indefinite) matrix(row, row) = uniform(random);
-      } else if (symmetry == Symmetry::unsymmetric) {
-        matrix(row, column) = uniform(random);
-      } else if (row > column) {
-        matrix(row, column) = matrix(column, row) = uniform(random);
-      }
-    }
-  }
-  return matrix;
-}
-
-void fill(LinearSolver& solver, const SparsityPattern& pattern, const Matrix& matrix) {
-  for (int column = 0; column < pattern.size; ++column) {
-    for (int p = pattern.column_starts[column]; p < pattern.column_starts[column + 1]; ++p) {
-      const int row = pattern.row_indices[p];
-      if (solver.symmetry() == Symmetry::symmetric && row < column) continue;
-      solver.values()[solver.offset(row, column)] = matrix(row, column);
-    }
-  }
-}
-
-int count_negative_eigenvalues(const Matrix& matrix) {
-  const Vector eigenvalues = Eigen::SelfAdjointEigenSolver<Matrix>(matrix, Eigen::EigenvaluesOnly).eigenvalues();
-  return static_cast<int>((eigenvalues.array() < 0.0).count());
-}
-
-double backward_error(const Matrix& matrix, const Vector& x, const Vector& b) {
-  return (matrix * x - b).lpNorm<Eigen::Infinity>() /
-         (matrix.cwiseAbs().rowwise().sum().maxCoeff() * x.lpNorm<Eigen::Infinity>());
-}
+using testing::backward_error;
+using testing::band_pattern;
+using testing::count_negative_eigenvalues;
+using testing::fill;
+using testing::Matrix;
+using testing::Nature;
+using testing::Random;
+using testing::random_matrix;
+using testing::random_vector;
+using testing::rods_pattern;
+using testing::scattered_pattern;
+using testing::Vector;
+using testing::view;
 
 struct Case {
   std::string label;
@@ -118,7 +39,7 @@ struct Case {
 
 void PrintTo(const Case& c, std::ostream* out) { *out << c.label; }
 
-class EverySolver : public testing::TestWithParam<Case> {
+class EverySolver : public ::testing::TestWithParam<Case> {
  protected:
   SparsityPattern pattern() {
     const Case& c = GetParam();
@@ -157,7 +78,7 @@ std::vector<Case> cases() {
   return result;
 }
 
-INSTANTIATE_TEST_SUITE_P(LinearSolver, EverySolver, testing::ValuesIn(cases()),
+INSTANTIATE_TEST_SUITE_P(LinearSolver, EverySolver, ::testing::ValuesIn(cases()),
                          [](const auto& instance) { return instance.param.label; });
 
 TEST_P(EverySolver, AgreesWithDenseOnDefiniteAndIndefiniteMatrices) {
@@ -379,83 +300,6 @@ TEST(MakeLinearSolver, RefusesADamagedPattern) {
   EXPECT_NO_THROW(make_linear_solver(good, Symmetry::symmetric));
 }
 
-TEST(UnsymmetricSolvers, PivotWhereTheDiagonalIsZeroOrTiny) {
-  for (double diagonal : {0.0, 1e-18, 1e-9}) {
-    for (SolverKind kind : {SolverKind::band, SolverKind::sparse}) {
-      Random random(7);
-      const SparsityPattern p = band_pattern(60, 6);
-      Matrix a = random_matrix(p, Symmetry::unsymmetric, Nature::indefinite, random);
-      a.diagonal().setConstant(diagonal);
-      const auto solver = make_linear_solver(p, Symmetry::unsymmetric, kind);
-      fill(*solver, p, a);
-      ASSERT_EQ(solver->factorize().status, FactorStatus::ok);
-      const Vector b = random_vector(p.size, random);
-      Vector x = b;
-      solver->solve(view(x));
-      EXPECT_LT(backward_error(a, x, b), 1e-13) << solver->name() << ", diagonal " << diagonal;
-    }
-  }
-}
-
-/// Greatest over the rows, each measured by its own terms.
-double backward_error_by_rows(const Matrix& matrix, const Vector& x, const Vector& b) {
-  return ((matrix * x - b).cwiseAbs().array() / (matrix.cwiseAbs() * x.cwiseAbs() + b.cwiseAbs()).array()).maxCoeff();
-}
-
-TEST(UnsymmetricSolvers, PivotWhereOneDiagonalEntryIsZeroOrTinyWhateverTheUnits) {
-  Random random(8);
-  const SparsityPattern p = rods_pattern(180, random);
-  const auto solver = make_linear_solver(p, Symmetry::unsymmetric, SolverKind::sparse);
-  for (double diagonal : {0.0, 1e-18, 1e-14, 1e-10, 1e-6}) {
-    for (double unit : {1.0, 1e-7, 1e7}) {
-      Vector units = Vector::Ones(p.size);
-      for (int i = 0; i < p.size; i += 3) units[i] = unit;
-      for (int where : {0, 59, 60, 101, 179}) {
-        Matrix a = random_matrix(p, Symmetry::unsymmetric, Nature::definite, random);
-        a(where, where) = diagonal;
-        a = Matrix(units.asDiagonal() * a * units.asDiagonal());
-        fill(*solver, p, a);
-        ASSERT_EQ(solver->factorize().status, FactorStatus::ok);
-        const Vector b = units.cwiseProduct(random_vector(p.size, random));
-        Vector x = b, transposed = b;
-        solver->solve(view(x));
-        solver->solve_transposed(view(transposed));
-        SCOPED_TRACE(testing::Message() << "diagonal " << diagonal << " at " << where << ", unit " << unit);
-        EXPECT_LT(backward_error_by_rows(a, x, b), 1e-11);
-        EXPECT_LT(backward_error_by_rows(a.transpose(), transposed, b), 1e-11);
-      }
-    }
-  }
-}
-
-TEST(UnsymmetricSolvers, ForgetThatAnEarlierMatrixNeededPivots) {
-  Random random(9);
-  const SparsityPattern p = rods_pattern(180, random);
-  const Matrix plain = random_matrix(p, Symmetry::unsymmetric, Nature::definite, random);
-  Matrix zero_diagonal = random_matrix(p, Symmetry::unsymmetric, Nature::definite, random);
-  zero_diagonal.diagonal().setZero();
-  const Vector b = random_vector(p.size, random);
-  const auto solution = [&](LinearSolver& solver, const Matrix& a) {
-    fill(solver, p, a);
-    EXPECT_EQ(solver.factorize().status, FactorStatus::ok);
-    Vector x = b;
-    solver.solve(view(x));
-    return x;
-  };
-  const auto make = [&] { return make_linear_solver(p, Symmetry::unsymmetric, SolverKind::sparse); };
-  const auto solver = make();
-  for (bool pivots : {false, true, false, true}) {
-    const Matrix& a = pivots ? zero_diagonal : plain;
-    const Vector x = solution(*solver, a);
-    EXPECT_EQ(x, solution(*make(), a));
-    const auto clone = solver->clone();
-    Vector again = b;
-    clone->solve(view(again));
-    EXPECT_EQ(again, x);
-    EXPECT_EQ(solution(*clone, plain), solution(*make(), plain));
-  }
-}
-
 TEST(Supernodes, HaveRoomForTheMatrixAndWhatTheirChildrenLeave) {
   Random random(3);
   for (int size : {1, 2, 40, 120}) {
@@ -497,25 +341,6 @@ TEST(Supernodes, OfAnOpenRodHoldLittleMoreThanItsBand) {
   double stored = 0.0;
   for (int s = 0; s < nodes.count(); ++s) stored += nodes.columns(s) * (0.5 * (nodes.columns(s) + 1) + nodes.rest(s));
   EXPECT_LT(stored, 1.6 * 400 * 11);
-}
-
-TEST(SymmetricSolvers, CountTheNegativePivotsOfAShiftedMatrix) {
-  Random random(11);
-  const SparsityPattern p = band_pattern(80, 10);
-  const Matrix a = random_matrix(p, Symmetry::symmetric, Nature::definite, random);
-  const Vector eigenvalues = Eigen::SelfAdjointEigenSolver<Matrix>(a).eigenvalues();
-  for (SolverKind kind : {SolverKind::band, SolverKind::sparse}) {
-    const auto solver = make_linear_solver(p, Symmetry::symmetric, kind);
-    fill(*solver, p, a);
-    for (int below : {0, 1, 17, 40, 79, 80}) {
-      const double left = below == 0 ? eigenvalues[0] - 1.0 : eigenvalues[below - 1];
-      const double right = below == 80 ? eigenvalues[79] + 1.0 : eigenvalues[below];
-      const Vector shift = Vector::Constant(p.size, -0.5 * (left + right));
-      const Factorization factorization = solver->factorize(view(shift));
-      EXPECT_EQ(factorization.status, FactorStatus::ok);
-      EXPECT_EQ(factorization.negative_pivots, below) << solver->name();
-    }
-  }
 }
 
 }  // namespace
