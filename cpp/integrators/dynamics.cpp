@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "common/timer.hpp"
+#include "integrators/step_parts.hpp"
 
 namespace withe {
 namespace {
@@ -19,54 +20,6 @@ double stretch_gain(double before, double after, double across, double rest, boo
   if (at_end) return (l0 * l1 - across) / l1 - 0.5 * (before + after - 2.0 * across) / rest;
   const double middle = 0.5 * std::sqrt(std::max(before + after + 2.0 * across, 0.0));
   return middle > 0.0 ? 0.5 * (l1 - l0) * (l1 + l0 - 2.0 * middle) / middle : 0.0;
-}
-
-/// Largest angle by which an edge turns on the way from a state to q [rad], > pi/2 where it ends pointing back; and
-/// what all edges gain in stretching, where their stiffness EA is given.
-struct Turning {
-  double largest = 0.0, stretch_gain = 0.0;
-};
-Turning turning(const Model& model, const State& state, const VectorX& q, const double* stretch_stiffness = nullptr,
-                bool at_end = false) {
-  double smallest = 1.0, gain = 0.0;
-  for (int e = 0; e < model.edge_count; ++e) {
-    const int a = model.node_dof[at(model.edge_tail[at(e)])], b = model.node_dof[at(model.edge_head[at(e)])];
-    double across = 0.0, before = 0.0, after = 0.0;
-    for (int i = 0; i < model.dimension; ++i) {
-      const double d0 = state.q(b + i) - state.q(a + i), d1 = q(b + i) - q(a + i);
-      across += d0 * d1;
-      before += d0 * d0;
-      after += d1 * d1;
-    }
-    const double square = across * std::abs(across) / (before * after);  // of the cosine, with its sign
-    if (!std::isfinite(square)) return {INFINITY, INFINITY};
-    smallest = std::min(smallest, square);
-    if (stretch_stiffness)
-      gain += stretch_stiffness[e] * stretch_gain(before, after, across, model.edge_length(e), at_end);
-  }
-  return {std::acos(std::copysign(std::sqrt(std::min(std::abs(smallest), 1.0)), smallest)), gain};
-}
-
-/// Work of loads, drag and viscosity over the step, with the forces that acted in it.
-void book_work(Equations& equations, const Parameters& parameters, const VectorX& change, StepResult& result) {
-  if (!equations.loads().pieces.empty() || equations.model().description.has_custom_force)
-    result.load_work = equations.load_work(change);
-  const bool in_fluid = equations.model().description.fluid.model != FluidModel::none;
-  if (parameters.dragged || parameters.viscous || in_fluid) result.dissipated = equations.dissipated(change);
-}
-
-/// Held unknowns move as they are told, so their inertia is what changes their velocity, not what the scheme's formula
-/// (`work.assumed`) says: mends the reactions, and gives the supports' work, exact in the kinetic energy.
-void book_supports(const Equations& equations, const VectorX& v0, const VectorX& v1, double dt, StepWorkspace& work,
-                   StepResult& result) {
-  VectorX& full_residual = work.newton.evaluation.full_residual;
-  for (const Constraint& c : equations.model().constraints) {
-    const Vector3 mass = c.part(equations.mass().rows), change = c.part(work.change);  // mass couples nothing held
-    const Vector3 force = c.held(full_residual), assumed = c.held(work.assumed);
-    const Vector3 before = c.held(v0), after = c.held(v1);
-    result.support_work += (force - assumed).dot(change) + 0.5 * mass.dot(after.cwiseAbs2() - before.cwiseAbs2());
-    full_residual.segment(c.first, c.size) += (mass.cwiseProduct(after - before) / dt - assumed).head(c.size);
-  }
 }
 
 /// Axial forces at the start of a step [N]: where the mixed method sets out from, for those of an extrapolated motion,
@@ -261,18 +214,6 @@ double estimated_error(Equations& equations, const Newton& newton, const Options
   return moved_by(error, equations, newton, h, work);
 }
 
-/// Forces of the last evaluation over mass, where nothing holds.
-void set_acceleration(const Equations& equations, const StepWorkspace& work, VectorX& acceleration) {
-  acceleration = -work.newton.evaluation.full_residual.cwiseProduct(equations.mass().inverse);
-  equations.assembler().project(acceleration);  // what a support holds has one mass
-}
-
-/// Finds the fluid's force at q on velocities v, and the time that takes.
-bool solve_flow(Equations& equations, const VectorX& q, const VectorX& v, Counters& counters) {
-  const Timer timer(counters.fluid_time);
-  return equations.begin_flow(q, v);
-}
-
 /// Finds the fluid's force for a step of dt: that on velocities as they are taken to be within the step, to the order
 /// of the scheme, at the positions that go with them. Under the midpoint rules those of the last two steps are carried
 /// on: velocities at their ends would ring on stiff modes, and the guess with them.
@@ -303,76 +244,52 @@ void remember_motion(const VectorX& q1, double dt, State& state) {
   motion.known = std::min(motion.known + 1, 2);
 }
 
-/// Forces over mass at q, with velocity v in drag, viscosity, friction and the spin couple. Anchors have followed the
-/// way from `before`.
-void explicit_acceleration(Equations& equations, const Parameters& parameters, double dt, const State& before,
-                           const State& state, const VectorX& v, StepWorkspace& work, VectorX& acceleration) {
-  work.from = state;  // one that reaches q over dt with velocity v
-  work.from.q -= dt * v;
-  work.from.v = v;
-  equations.begin(work.from, parameters, dt, false);
-  if (Contact* contact = equations.contact(); contact && contact->anchored()) contact->begin(before, dt);
-  if (equations.flows() && !solve_flow(equations, state.q, v, work.newton.counters)) {
-    acceleration.setConstant(state.q.size(), std::nan(""));
-    return;
-  }
-  equations.evaluate(state.q, false, nullptr, work.newton.evaluation);
-  set_acceleration(equations, work, acceleration);
-}
-
-/// Where nothing resists motion but inertia: `work.next` at q = work.z, with accelerations there, velocities being
-/// work.velocity. Returns by how much edges turn at most [rad].
-double free_acceleration(Equations& equations, const Parameters& parameters, const State& state, StepWorkspace& work) {
-  State& next = work.next;
-  if (next.q.size() != state.q.size()) next = state;  // once: what an explicit step leaves as it is, and room
-  const double turn = equations.advance(state, work.z, next);
-  equations.evaluate_forces(next, parameters, work.velocity, work.newton.evaluation);
-  set_acceleration(equations, work, next.acceleration);
-  return equations.model().planar() ? turning(equations.model(), state, work.z).largest : turn;
-}
-
-/// The same under contact, drag, viscosity or in a fluid.
-double resisted_acceleration(Equations& equations, const Parameters& parameters, double dt, const State& state,
-                             StepWorkspace& work) {
-  const Model& model = equations.model();
-  const double turn = turning(model, state, work.z).largest;
-  if (!(turn <= 1.5)) return turn;
-  State& next = work.next;
-  next = state;
-  if (!model.planar()) compute_configuration(model, state, work.z, work.after);
-  accept_configuration(model, work.z, work.after, next);
-  explicit_acceleration(equations, parameters, dt, state, next, work.velocity, work, next.acceleration);
-  return turn;
-}
-
-/// 2 / omega, omega^2 the greatest eigenvalue of the last matrix over mass, less `shift`; by power iteration.
-double undamped_step(const Equations& equations, double shift) {
-  const LinearSolver& solver = equations.assembler().solver();
-  const VectorX scale = equations.mass().inverse.cwiseSqrt();
-  VectorX x(scale.size()), y(scale.size());
-  for (Eigen::Index i = 0; i < x.size(); ++i)
-    x(i) = std::sin(1.0 + 7.0 * static_cast<double>(i)) + (i % 2 ? 1.0 : -1.0);
-  equations.assembler().project(x);
-  double greatest = 0.0;
-  for (int k = 0; k < 300; ++k) {
-    const double norm = x.norm();
-    if (norm == 0.0) break;
-    x = scale.cwiseProduct(x / norm);
-    solver.multiply({x.data(), static_cast<std::size_t>(x.size())}, {y.data(), static_cast<std::size_t>(y.size())});
-    y -= shift * equations.mass().rows.cwiseProduct(x);
-    x = scale.cwiseProduct(y);
-    equations.assembler().project(x);
-    const double value = x.norm();
-    if (k > 20 && std::abs(value - greatest) < 1e-5 * value) {
-      greatest = value;
-      break;
-    }
-    greatest = std::max(greatest, value);
-  }
-  return greatest > 0.0 ? 2.0 / std::sqrt(greatest) : INFINITY;
-}
-
 }  // namespace
+
+Turning turning(const Model& model, const State& state, const VectorX& q, const double* stretch_stiffness,
+                bool at_end) {
+  double smallest = 1.0, gain = 0.0;
+  for (int e = 0; e < model.edge_count; ++e) {
+    const int a = model.node_dof[at(model.edge_tail[at(e)])], b = model.node_dof[at(model.edge_head[at(e)])];
+    double across = 0.0, before = 0.0, after = 0.0;
+    for (int i = 0; i < model.dimension; ++i) {
+      const double d0 = state.q(b + i) - state.q(a + i), d1 = q(b + i) - q(a + i);
+      across += d0 * d1;
+      before += d0 * d0;
+      after += d1 * d1;
+    }
+    const double square = across * std::abs(across) / (before * after);  // of the cosine, with its sign
+    if (!std::isfinite(square)) return {INFINITY, INFINITY};
+    smallest = std::min(smallest, square);
+    if (stretch_stiffness)
+      gain += stretch_stiffness[e] * stretch_gain(before, after, across, model.edge_length(e), at_end);
+  }
+  return {std::acos(std::copysign(std::sqrt(std::min(std::abs(smallest), 1.0)), smallest)), gain};
+}
+
+void book_work(Equations& equations, const Parameters& parameters, const VectorX& change, StepResult& result) {
+  if (!equations.loads().pieces.empty() || equations.model().description.has_custom_force)
+    result.load_work = equations.load_work(change);
+  const bool in_fluid = equations.model().description.fluid.model != FluidModel::none;
+  if (parameters.dragged || parameters.viscous || in_fluid) result.dissipated = equations.dissipated(change);
+}
+
+void book_supports(const Equations& equations, const VectorX& v0, const VectorX& v1, double dt, StepWorkspace& work,
+                   StepResult& result) {
+  VectorX& full_residual = work.newton.evaluation.full_residual;
+  for (const Constraint& c : equations.model().constraints) {
+    const Vector3 mass = c.part(equations.mass().rows), change = c.part(work.change);  // mass couples nothing held
+    const Vector3 force = c.held(full_residual), assumed = c.held(work.assumed);
+    const Vector3 before = c.held(v0), after = c.held(v1);
+    result.support_work += (force - assumed).dot(change) + 0.5 * mass.dot(after.cwiseAbs2() - before.cwiseAbs2());
+    full_residual.segment(c.first, c.size) += (mass.cwiseProduct(after - before) / dt - assumed).head(c.size);
+  }
+}
+
+bool solve_flow(Equations& equations, const VectorX& q, const VectorX& v, Counters& counters) {
+  const Timer timer(counters.fluid_time);
+  return equations.begin_flow(q, v);
+}
 
 StepResult implicit_step(Equations& equations, const Newton& newton, const Options& options,
                          const Parameters& parameters, const StepPlan& plan, State& state, Predictor& predictor,
@@ -440,70 +357,6 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
   state.time += dt;
   result.accepted = true;
   return result;
-}
-
-StepResult verlet_step(Equations& equations, const Parameters& parameters, double dt, State& state,
-                       StepWorkspace& work) {
-  StepResult result;
-  const Model& model = equations.model();
-  const Assembler& assembler = equations.assembler();
-  if (!work.held.reachable) return result;
-  if (!state.acceleration_current)
-    explicit_acceleration(equations, parameters, dt, state, state, state.v, work, state.acceleration);
-  VectorX &half = work.mean, &q1 = work.z, &v1 = work.velocity;
-  half = state.v + 0.5 * dt * state.acceleration;
-  assembler.project(half);
-  assembler.add_held_change(state.q, work.held.q, 1.0 / dt, half);
-  q1 = state.q + dt * half;
-  // Drag, viscosity and the spin couple want the velocity at the end; a predicted one is second order.
-  v1 = half + 0.5 * dt * state.acceleration;
-  State& next = work.next;
-  const bool in_fluid = model.description.fluid.model != FluidModel::none;
-  const bool resisted = equations.contact() || parameters.viscous || parameters.dragged || in_fluid;
-  result.largest_turn = resisted ? resisted_acceleration(equations, parameters, dt, state, work)
-                                 : free_acceleration(equations, parameters, state, work);
-  if (!(result.largest_turn <= 1.5)) return result;
-  next.v = half + 0.5 * dt * next.acceleration;
-  if (!std::isfinite(next.v.squaredNorm())) return result;
-  work.change = q1 - state.q;
-  book_work(equations, parameters, work.change, result);
-  if (Contact* contact = equations.contact()) {
-    // What surfaces store by pressing Verlet keeps on the whole, which the force at the end alone does not show.
-    result.dissipated += contact->friction_loss(work.change);
-    result.support_work += contact->obstacle_work();
-    contact->remember(next);
-  }
-  if (!model.constraints.empty()) {
-    work.assumed.setZero(model.dof_count);
-    book_supports(equations, state.v, next.v, dt, work, result);
-  }
-  next.acceleration_current = true;
-  next.time = state.time + dt;
-  std::swap(state, next);
-  result.newton.converged = true;
-  result.accepted = true;
-  return result;
-}
-
-double stable_step(Equations& equations, const Parameters& parameters, const State& state, StepWorkspace& work) {
-  equations.begin(state, parameters, 0.0, false);
-  equations.evaluate(state.q, true, nullptr, work.newton.evaluation);
-  double dt = undamped_step(equations, 0.0);
-  // The eigenvalue falls while a step grows, at most as one over it: each round halves the logarithm of the error.
-  for (int k = 0; k < 20 && std::isfinite(dt); ++k) {
-    const double h = 0.25 * dt;
-    work.from = state;  // as it moves: friction resists less, the faster it slips
-    work.from.q -= h * state.v;
-    equations.begin(work.from, parameters, h, false);
-    if (Contact* contact = equations.contact()) {
-      contact->begin(work.from, dt);
-      contact->ease(0.25);
-    }
-    equations.evaluate(state.q, true, nullptr, work.newton.evaluation);
-    const double before = std::exchange(dt, undamped_step(equations, 1.0 / (h * h)));
-    if (std::abs(dt - before) < 1e-3 * dt) break;
-  }
-  return dt;
 }
 
 }  // namespace withe

@@ -1,0 +1,151 @@
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "integrators/step_parts.hpp"
+
+namespace withe {
+namespace {
+
+/// Forces of the last evaluation over mass, where nothing holds.
+void set_acceleration(const Equations& equations, const StepWorkspace& work, VectorX& acceleration) {
+  acceleration = -work.newton.evaluation.full_residual.cwiseProduct(equations.mass().inverse);
+  equations.assembler().project(acceleration);  // what a support holds has one mass
+}
+
+/// Forces over mass at q, with velocity v in drag, viscosity, friction and the spin couple. Anchors have followed the
+/// way from `before`.
+void explicit_acceleration(Equations& equations, const Parameters& parameters, double dt, const State& before,
+                           const State& state, const VectorX& v, StepWorkspace& work, VectorX& acceleration) {
+  work.from = state;  // one that reaches q over dt with velocity v
+  work.from.q -= dt * v;
+  work.from.v = v;
+  equations.begin(work.from, parameters, dt, false);
+  if (Contact* contact = equations.contact(); contact && contact->anchored()) contact->begin(before, dt);
+  if (equations.flows() && !solve_flow(equations, state.q, v, work.newton.counters)) {
+    acceleration.setConstant(state.q.size(), std::nan(""));
+    return;
+  }
+  equations.evaluate(state.q, false, nullptr, work.newton.evaluation);
+  set_acceleration(equations, work, acceleration);
+}
+
+/// Where nothing resists motion but inertia: `work.next` at q = work.z, with accelerations there, velocities being
+/// work.velocity. Returns by how much edges turn at most [rad].
+double free_acceleration(Equations& equations, const Parameters& parameters, const State& state, StepWorkspace& work) {
+  State& next = work.next;
+  if (next.q.size() != state.q.size()) next = state;  // once: what an explicit step leaves as it is, and room
+  const double turn = equations.advance(state, work.z, next);
+  equations.evaluate_forces(next, parameters, work.velocity, work.newton.evaluation);
+  set_acceleration(equations, work, next.acceleration);
+  return equations.model().planar() ? turning(equations.model(), state, work.z).largest : turn;
+}
+
+/// The same under contact, drag, viscosity or in a fluid.
+double resisted_acceleration(Equations& equations, const Parameters& parameters, double dt, const State& state,
+                             StepWorkspace& work) {
+  const Model& model = equations.model();
+  const double turn = turning(model, state, work.z).largest;
+  if (!(turn <= 1.5)) return turn;
+  State& next = work.next;
+  next = state;
+  if (!model.planar()) compute_configuration(model, state, work.z, work.after);
+  accept_configuration(model, work.z, work.after, next);
+  explicit_acceleration(equations, parameters, dt, state, next, work.velocity, work, next.acceleration);
+  return turn;
+}
+
+/// 2 / omega, omega^2 the greatest eigenvalue of the last matrix over mass, less `shift`; by power iteration.
+double undamped_step(const Equations& equations, double shift) {
+  const LinearSolver& solver = equations.assembler().solver();
+  const VectorX scale = equations.mass().inverse.cwiseSqrt();
+  VectorX x(scale.size()), y(scale.size());
+  for (Eigen::Index i = 0; i < x.size(); ++i)
+    x(i) = std::sin(1.0 + 7.0 * static_cast<double>(i)) + (i % 2 ? 1.0 : -1.0);
+  equations.assembler().project(x);
+  double greatest = 0.0;
+  for (int k = 0; k < 300; ++k) {
+    const double norm = x.norm();
+    if (norm == 0.0) break;
+    x = scale.cwiseProduct(x / norm);
+    solver.multiply({x.data(), static_cast<std::size_t>(x.size())}, {y.data(), static_cast<std::size_t>(y.size())});
+    y -= shift * equations.mass().rows.cwiseProduct(x);
+    x = scale.cwiseProduct(y);
+    equations.assembler().project(x);
+    const double value = x.norm();
+    if (k > 20 && std::abs(value - greatest) < 1e-5 * value) {
+      greatest = value;
+      break;
+    }
+    greatest = std::max(greatest, value);
+  }
+  return greatest > 0.0 ? 2.0 / std::sqrt(greatest) : INFINITY;
+}
+
+}  // namespace
+
+StepResult verlet_step(Equations& equations, const Parameters& parameters, double dt, State& state,
+                       StepWorkspace& work) {
+  StepResult result;
+  const Model& model = equations.model();
+  const Assembler& assembler = equations.assembler();
+  if (!work.held.reachable) return result;
+  if (!state.acceleration_current)
+    explicit_acceleration(equations, parameters, dt, state, state, state.v, work, state.acceleration);
+  VectorX &half = work.mean, &q1 = work.z, &v1 = work.velocity;
+  half = state.v + 0.5 * dt * state.acceleration;
+  assembler.project(half);
+  assembler.add_held_change(state.q, work.held.q, 1.0 / dt, half);
+  q1 = state.q + dt * half;
+  // Drag, viscosity and the spin couple want the velocity at the end; a predicted one is second order.
+  v1 = half + 0.5 * dt * state.acceleration;
+  State& next = work.next;
+  const bool in_fluid = model.description.fluid.model != FluidModel::none;
+  const bool resisted = equations.contact() || parameters.viscous || parameters.dragged || in_fluid;
+  result.largest_turn = resisted ? resisted_acceleration(equations, parameters, dt, state, work)
+                                 : free_acceleration(equations, parameters, state, work);
+  if (!(result.largest_turn <= 1.5)) return result;
+  next.v = half + 0.5 * dt * next.acceleration;
+  if (!std::isfinite(next.v.squaredNorm())) return result;
+  work.change = q1 - state.q;
+  book_work(equations, parameters, work.change, result);
+  if (Contact* contact = equations.contact()) {
+    // What surfaces store by pressing Verlet keeps on the whole, which the force at the end alone does not show.
+    result.dissipated += contact->friction_loss(work.change);
+    result.support_work += contact->obstacle_work();
+    contact->remember(next);
+  }
+  if (!model.constraints.empty()) {
+    work.assumed.setZero(model.dof_count);
+    book_supports(equations, state.v, next.v, dt, work, result);
+  }
+  next.acceleration_current = true;
+  next.time = state.time + dt;
+  std::swap(state, next);
+  result.newton.converged = true;
+  result.accepted = true;
+  return result;
+}
+
+double stable_step(Equations& equations, const Parameters& parameters, const State& state, StepWorkspace& work) {
+  equations.begin(state, parameters, 0.0, false);
+  equations.evaluate(state.q, true, nullptr, work.newton.evaluation);
+  double dt = undamped_step(equations, 0.0);
+  // The eigenvalue falls while a step grows, at most as one over it: each round halves the logarithm of the error.
+  for (int k = 0; k < 20 && std::isfinite(dt); ++k) {
+    const double h = 0.25 * dt;
+    work.from = state;  // as it moves: friction resists less, the faster it slips
+    work.from.q -= h * state.v;
+    equations.begin(work.from, parameters, h, false);
+    if (Contact* contact = equations.contact()) {
+      contact->begin(work.from, dt);
+      contact->ease(0.25);
+    }
+    equations.evaluate(state.q, true, nullptr, work.newton.evaluation);
+    const double before = std::exchange(dt, undamped_step(equations, 1.0 / (h * h)));
+    if (std::abs(dt - before) < 1e-3 * dt) break;
+  }
+  return dt;
+}
+
+}  // namespace withe

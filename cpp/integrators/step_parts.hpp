@@ -1,0 +1,27 @@
+#pragma once
+/// What implicit and explicit steps share: how far edges turn, and the books of energy.
+
+#include "integrators/dynamics.hpp"
+
+namespace withe {
+
+/// Largest angle by which an edge turns on the way from a state to q [rad], > pi/2 where it ends pointing back; and
+/// what all edges gain in stretching, where their stiffness EA is given.
+struct Turning {
+  double largest = 0.0, stretch_gain = 0.0;
+};
+Turning turning(const Model& model, const State& state, const VectorX& q, const double* stretch_stiffness = nullptr,
+                bool at_end = false);
+
+/// Work of loads, drag and viscosity over the step, with the forces that acted in it.
+void book_work(Equations& equations, const Parameters& parameters, const VectorX& change, StepResult& result);
+
+/// Held unknowns move as they are told, so their inertia is what changes their velocity, not what the scheme's formula
+/// (`work.assumed`) says: mends the reactions, and gives the supports' work, exact in the kinetic energy.
+void book_supports(const Equations& equations, const VectorX& v0, const VectorX& v1, double dt, StepWorkspace& work,
+                   StepResult& result);
+
+/// Finds the fluid's force at q on velocities v, and the time that takes.
+bool solve_flow(Equations& equations, const VectorX& q, const VectorX& v, Counters& counters);
+
+}  // namespace withe
