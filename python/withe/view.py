@@ -243,9 +243,11 @@ def plot(record: Record, *, shapes: int = 6) -> Any:
         single = len(record) == 1
         figure = pyplot.figure(figsize=(5.5, 4.6) if single else (11.0, 4.6), layout="constrained")
         grid = figure.add_gridspec(1, 1 if single else 2, width_ratios=[1] if single else [1.1, 1.0])
-        _plot_shapes(figure, grid[0], record, int(shapes))
+        axes = _plot_shapes(figure, grid[0], record, int(shapes))
         if not single:
             _plot_energies(figure.add_subplot(grid[1]), record)
+        if axes.name == "3d":
+            _fit(axes)
     if "inline" in pyplot.get_backend():
         pyplot.close(figure)  # a notebook shows what the cell returns, and would show this twice
     return figure
@@ -278,7 +280,7 @@ _ENERGY_COLOURS = {
 }
 
 
-def _plot_shapes(figure: Any, place: Any, record: Record, count: int) -> None:
+def _plot_shapes(figure: Any, place: Any, record: Record, count: int) -> Any:
     colormaps = require("matplotlib", "view").colormaps
     colors = require("matplotlib.colors", "view")
     cm = require("matplotlib.cm", "view")
@@ -303,8 +305,7 @@ def _plot_shapes(figure: Any, place: Any, record: Record, count: int) -> None:
     axes.set_xlabel(f"{names[shown[0]]} [{prefix}m]")
     axes.set_ylabel(f"{names[shown[1]]} [{prefix}m]")
     if three:
-        axes.set_zlabel(f"z [{prefix}m]", labelpad=14.0)
-        axes.xaxis.labelpad = axes.yaxis.labelpad = 8.0
+        axes.set_zlabel(f"z [{prefix}m]")
         _box(axes, positions * factor)
     else:
         axes.set_aspect("equal", adjustable="datalim")
@@ -313,6 +314,7 @@ def _plot_shapes(figure: Any, place: Any, record: Record, count: int) -> None:
         bar.set_label("time [s]")
         bar.ax.set_yticklabels([f"{time:.3g}" for time in times[frames]])
         bar.outline.set_visible(False)
+    return axes
 
 
 def _box(axes: Any, positions: FloatArray) -> None:
@@ -322,11 +324,25 @@ def _box(axes: Any, positions: FloatArray) -> None:
     spans = np.maximum(1.05 * size, 0.1 * size.max())
     middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
     for axis, centre, span in zip((axes.xaxis, axes.yaxis, axes.zaxis), middle, spans, strict=True):
+        # matplotlib measures these distances, and its own 8 and 21 points, by the spans of the other two axes.
+        others = spans.max() / np.sqrt(0.5 * (spans @ spans - span**2))
+        axis.set_tick_params(pad=10.0 * others - 8.0)
+        axis.labelpad = 26.0 * others - 21.0
         axis.set_view_interval(centre - 0.5 * span, centre + 0.5 * span, ignore=True)
         axis.set_pane_color((1.0, 1.0, 1.0, 0.0))
         count = max(1, round(4.0 * span / spans.max()))
         axis.set_major_locator(require("matplotlib.ticker", "view").MaxNLocator(count))
-    axes.set_box_aspect(spans, zoom=0.95)
+
+
+def _fit(axes: Any) -> None:
+    """Make a box smaller until the page has room for its labels, of which the layout does not know."""
+    spans, page = np.ptp([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()], axis=1), axes.figure.bbox
+    for zoom in np.arange(1.0, 0.4, -0.05):
+        axes.set_box_aspect(spans, zoom=zoom)
+        axes.figure.draw_without_rendering()
+        drawn = axes.get_tightbbox()
+        if np.all(drawn.min >= page.min) and np.all(drawn.max <= page.max):
+            break
 
 
 def _plot_energies(axes: Any, record: Record) -> None:

@@ -112,6 +112,18 @@ def test_the_figure_has_shapes_and_energies_with_units(record):
     assert energies is not shapes
 
 
+@pytest.mark.parametrize("size", [(1.0, 1.0, 1.0), (1.0, 1.0, 8.0), (0.1, 1.0, 1.0), (8.0, 1.0, 1.0)])
+def test_no_label_of_a_box_is_cut_off(size):
+    pytest.importorskip("matplotlib").use("Agg")
+    simulation = CurlingSimulation(0.3)
+    simulation.positions = lambda rod=None: CurlingSimulation(0.3).positions(rod) * size
+    figure = present(simulation).plot()
+    figure.draw_without_rendering()
+    drawn, page = figure.axes[0].get_tightbbox(), figure.bbox
+    assert page.x0 <= drawn.x0 < drawn.x1 <= page.x1
+    assert page.y0 <= drawn.y0 < drawn.y1 <= page.y1
+
+
 def test_a_planar_motion_is_drawn_in_its_plane(record):
     pytest.importorskip("matplotlib").use("Agg")
     simulation = CurlingSimulation()
