@@ -91,7 +91,7 @@ def draw(simulation: withe.Simulation, path: Path) -> None:
     counts = np.array([11, 21, 41, 81, 161, 321])
     errors = [np.linalg.norm(shape(sagging_rod(count)[0])[-1] - theory[-1]) for count in counts]
     right.loglog(counts - 1, errors, "o-", color="#2a9d8f", linewidth=1.8, label="withe")
-    right.loglog(counts - 1, errors[0] * (10.0 / (counts - 1)) ** 2, "--", color="#8a9299", label="second order")
+    right.loglog(counts - 1, errors[-1] * (320.0 / (counts - 1)) ** 2, "--", color="#8a9299", label="second order")
     right.axhline(TOLERANCE, color="#e76f51", linewidth=1.2, label="what this example demands")
     right.set(xlabel="edges", ylabel="error of the tip / L", title="Edges half as long: a quarter of the error")
     right.legend()

@@ -93,7 +93,8 @@ def draw(records: dict[str, withe.Record], path: Path) -> None:
         for rod, color in zip(record.rods, itertools.cycle(plt.get_cmap("tab10").colors)):
             axes.plot(*(1e2 * record.positions(rod)[-1]).T, color=color, linewidth=2.0)
         axes.set(xlim=(-8, 8), ylim=(-8, 8), zlim=(-22, 0), xticks=(-8, 0, 8), yticks=(-8, 0, 8), title=titles[model])
-        axes.set_zlabel("cm", labelpad=-2)
+        axes.set(xlabel="x [cm]", ylabel="y [cm]")
+        axes.set_zlabel("z [cm]", labelpad=8)
         axes.set_box_aspect((16, 16, 22))
         axes.view_init(elev=8, azim=-70)
     axes = figure.add_subplot(1, 3, 3)
