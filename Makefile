@@ -37,6 +37,7 @@ help:
 	@echo "make demo          install what is missing, build, simulate a cantilever, compare with theory"
 	@echo "make view          install what pictures, films and notebooks need"
 	@echo "make test          all tests, C++ and Python"
+	@echo "make pytest        all tests in Python; TESTS=\"tests/physics -k knot\" runs some"
 	@echo "make ctest-baseline  C++ tests on an emulated machine without AVX (qemu-user)"
 	@echo "make asan          C++ tests under the address and undefined-behaviour sanitizers"
 	@echo "make wheel         dist/*.whl for machines without compiler"
@@ -112,7 +113,7 @@ ctest-baseline: ctest-build
 	    qemu-x86_64 -cpu qemu64 $(BUILD)/tests/cpp/test_$$room --gtest_brief=1 || exit 1; done
 
 pytest: $(STAMPS)/installed $(STAMPS)/test_tools
-	@python -m pytest --numprocesses $(TEST_JOBS) --dist worksteal
+	@python -m pytest $(or $(TESTS),--numprocesses $(TEST_JOBS) --dist worksteal)
 
 asan: $(STAMPS)/build_tools
 	@cmake --preset asan-ubsan
