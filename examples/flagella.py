@@ -95,7 +95,7 @@ def draw(records: dict[str, withe.Record], path: Path) -> None:
         axes.set(xlim=(-8, 8), ylim=(-8, 8), zlim=(-22, 0), xticks=(-8, 0, 8), yticks=(-8, 0, 8), title=titles[model])
         axes.set(xlabel="x [cm]", ylabel="y [cm]")
         axes.set_zlabel("z [cm]", labelpad=8)
-        axes.set_box_aspect((16, 16, 22))
+        axes.set_box_aspect((16, 16, 22), zoom=0.88)
         axes.view_init(elev=8, azim=-70)
     axes = figure.add_subplot(1, 3, 3)
     for model, record in records.items():
