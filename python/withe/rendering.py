@@ -20,7 +20,7 @@ from withe.surfaces import Surface
 if TYPE_CHECKING:
     from withe.recording import Record
 
-__all__ = ["Stage", "probe_rendering"]
+__all__ = ["Stage", "color_limits", "probe_rendering"]
 
 FloatArray = npt.NDArray[np.float64]
 ColorBy = Literal["rod", "tension", "curvature", "twist", "speed"]
@@ -224,14 +224,13 @@ class Stage:
         options: dict[str, Any] = {"ambient": 0.35, "diffuse": 0.8, "specular": 0.3, "specular_power": 30.0}
         if self._values is not None:
             title, colours = _BARS[color_by]
-            low = min(float(values.min()) for values in self._values)
-            high = max(float(values.max()) for values in self._values)
-            if low < -0.05 * high and high > 0.0:
-                low, high, colours = -max(-low, high), max(-low, high), "coolwarm"
+            low, high = color_limits(self._values)
+            if low == -high:
+                colours = "coolwarm"
             options |= {
                 "scalars": "value",
                 "cmap": colours,
-                "clim": (low, high if high > low else low + 1e-12),
+                "clim": (low, high),
                 "scalar_bar_args": {
                     "title": f"{title}\n",
                     "color": _INK,
@@ -304,6 +303,22 @@ class Stage:
         texture = require("pyvista", "view").Texture(pixels)
         texture.interpolate = True
         self._shadow.texture = texture
+
+
+def color_limits(values: Sequence[FloatArray]) -> tuple[float, float]:
+    """The ends of a scale for all values: zero in the middle where they go both ways, and never what rounding leaves.
+
+    Parameters
+    ----------
+    values : sequence of ndarray
+        One a rod.
+    """
+    low, high = min(float(v.min()) for v in values), max(float(v.max()) for v in values)
+    least = 1e-9 * max(-low, high)
+    low, high = (0.0 if abs(end) <= least else end for end in (low, high))
+    if low < -0.05 * high and high > 0.0:
+        return -max(-low, high), max(-low, high)
+    return low, high if high > low else low + 1e-12
 
 
 def _empty_mesh(pyvista: Any, surface: Surface) -> Any:

@@ -173,6 +173,25 @@ def test_every_quantity_can_colour_the_rods(record, renderer, tmp_path, color_by
     assert path.stat().st_size > 1000
 
 
+@pytest.mark.parametrize(
+    ("values", "limits"),
+    [
+        ([[7e-17, 2.0], [1.0]], (0.0, 2.0)),
+        ([[-3.0, -2.0], [-1e-16]], (-3.0, 0.0)),
+        ([[-1.0, 2.0]], (-2.0, 2.0)),
+        ([[-0.01, 2.0]], (-0.01, 2.0)),
+        ([[1.0, 2.0]], (1.0, 2.0)),
+    ],
+)
+def test_a_scale_of_colours_begins_and_ends_at_values_or_at_zero(values, limits):
+    assert rendering.color_limits([np.array(rod) for rod in values]) == limits
+
+
+def test_a_scale_of_colours_has_a_width():
+    low, high = rendering.color_limits([np.zeros(3)])
+    assert low < high
+
+
 @pytest.mark.parametrize("camera", [None, "front", "side", "top", "oblique", (1.0, 2.0, 3.0)])
 def test_all_frames_are_in_view_from_everywhere(record, renderer, camera):
     stage = rendering.Stage(record, size=(320, 200), camera=camera)
