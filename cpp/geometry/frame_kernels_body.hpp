@@ -137,14 +137,20 @@ EdgeFrame<Pack> frames_of(const double* frames, const int (&edge)[kLanes]) {
           {number[10], number[11], number[12]}, {number[13], number[14], number[15]}};
 }
 
+/// Numbers of kLanes stencils and of their two edges; returns how many of them there are.
+int stencils_from(int first, const StrainBatch& batch, int (&s)[kLanes], int (&a)[kLanes], int (&b)[kLanes]) {
+  const int live = lanes_from(first, batch.count, s);
+  for (int l = 0; l < kLanes; ++l) {
+    const int* pair = batch.edges + static_cast<std::ptrdiff_t>(batch.edge_stride) * s[l];
+    a[l] = pair[0], b[l] = pair[1];
+  }
+  return live;
+}
+
 [[gnu::flatten]] void strains(const StrainBatch& batch) {
   for (int first = 0; first < batch.count; first += kLanes) {
     int s[kLanes], a[kLanes], b[kLanes];
-    const int live = lanes_from(first, batch.count, s);
-    for (int l = 0; l < kLanes; ++l) {
-      const int* pair = batch.edges + static_cast<std::ptrdiff_t>(batch.edge_stride) * s[l];
-      a[l] = pair[0], b[l] = pair[1];
-    }
+    const int live = stencils_from(first, batch, s, a, b);
     const BendTwistStrain<Pack> strain =
         bend_twist_strain(frames_of(batch.frames, a), frames_of(batch.frames, b), gather(batch.previous_tau, s));
     store_first(batch.strain + first, strain.kappa1, live);
@@ -156,11 +162,7 @@ EdgeFrame<Pack> frames_of(const double* frames, const int (&edge)[kLanes]) {
 [[gnu::flatten]] void planar_strains(const StrainBatch& batch) {
   for (int first = 0; first < batch.count; first += kLanes) {
     int s[kLanes], a[kLanes], b[kLanes];
-    const int live = lanes_from(first, batch.count, s);
-    for (int l = 0; l < kLanes; ++l) {
-      const int* pair = batch.edges + static_cast<std::ptrdiff_t>(batch.edge_stride) * s[l];
-      a[l] = pair[0], b[l] = pair[1];
-    }
+    const int live = stencils_from(first, batch, s, a, b);
     const double* f = batch.frames;
     const Pack kappa = planar_kappa(gather(f, a, kFrameNumbers, 0), gather(f, a, kFrameNumbers, 1),
                                     gather(f, b, kFrameNumbers, 0), gather(f, b, kFrameNumbers, 1));
