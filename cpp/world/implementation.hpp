@@ -30,12 +30,31 @@ struct ObstacleMotion {
   double start = 0, end = 0;                             ///< [s]
 };
 
-/// Natural shape of a rod on its way from one value to another.
+/// What goes evenly from one value to another.
+template <class Value>
+struct Ramp {
+  Value from, to;
+  double start = 0, end = 0;  ///< [s]
+  bool active = false;
+
+  /// Sets what is on its way to where it is at a time; false where it is not.
+  bool apply(double time, Value& now) const {
+    if (!active) return false;
+    const double s = ramp_fraction(time, start, end);
+    now.noalias() = (1.0 - s) * from + s * to;
+    return true;
+  }
+
+  /// At rest from the end on.
+  void retire(double time) {
+    if (time >= end) active = false;
+  }
+};
+
+/// Natural shape of a rod: curvature [1/m] and twist [rad/m] of its stencils.
 struct NaturalRamp {
-  MatrixX2 from_curvature, to_curvature;
-  VectorX from_twist, to_twist;
-  double curvature_start = 0, curvature_end = 0, twist_start = 0, twist_end = 0;
-  bool curvature_active = false, twist_active = false;
+  Ramp<MatrixX2> curvature;
+  Ramp<VectorX> twist;
 };
 
 /// Books of the watch over plain midpoint's energy.
@@ -141,6 +160,9 @@ struct World::Implementation {
   void relax_frames(const std::vector<bool>& is_new);
 
   // prescribed.cpp
+  /// Gives a part of a natural shape another value, at once or over a time [s].
+  template <class Value>
+  void actuate(Ramp<Value>& ramp, Value& now, const Value& value, double over);
   void apply_ramps(double time);
   void retire_ramps();
   bool actuated() const;

@@ -20,17 +20,8 @@ double ramp_fraction(double time, double start, double end) {
 void World::Implementation::apply_ramps(double time) {
   bool changed = false;
   for (std::size_t r = 0; r < ramps.size(); ++r) {
-    NaturalRamp& ramp = ramps[r];
-    if (ramp.curvature_active) {
-      const double s = ramp_fraction(time, ramp.curvature_start, ramp.curvature_end);
-      parameters.natural_curvature[r].noalias() = (1.0 - s) * ramp.from_curvature + s * ramp.to_curvature;
-      changed = true;
-    }
-    if (ramp.twist_active) {
-      const double s = ramp_fraction(time, ramp.twist_start, ramp.twist_end);
-      parameters.natural_twist[r] = (1.0 - s) * ramp.from_twist + s * ramp.to_twist;
-      changed = true;
-    }
+    if (ramps[r].curvature.apply(time, parameters.natural_curvature[r])) changed = true;
+    if (ramps[r].twist.apply(time, parameters.natural_twist[r])) changed = true;
   }
   if (changed) update_natural(model, parameters);
 }
@@ -38,14 +29,14 @@ void World::Implementation::apply_ramps(double time) {
 /// Those that have come to their end are at rest from now on.
 void World::Implementation::retire_ramps() {
   for (NaturalRamp& ramp : ramps) {
-    if (state.time >= ramp.curvature_end) ramp.curvature_active = false;
-    if (state.time >= ramp.twist_end) ramp.twist_active = false;
+    ramp.curvature.retire(state.time);
+    ramp.twist.retire(state.time);
   }
 }
 
 bool World::Implementation::actuated() const {
   for (const NaturalRamp& ramp : ramps)
-    if (ramp.curvature_active || ramp.twist_active) return true;
+    if (ramp.curvature.active || ramp.twist.active) return true;
   return false;
 }
 

@@ -66,16 +66,16 @@ void exchange(Archive& io, Self& self) {
   for (auto& m : p.natural_curvature) io(m);
   for (auto& v : p.natural_twist) io(v);
   for (auto& r : self.ramps) {
-    io(r.from_curvature);
-    io(r.to_curvature);
-    io(r.from_twist);
-    io(r.to_twist);
-    io(r.curvature_start);
-    io(r.curvature_end);
-    io(r.twist_start);
-    io(r.twist_end);
-    io(r.curvature_active);
-    io(r.twist_active);
+    io(r.curvature.from);
+    io(r.curvature.to);
+    io(r.twist.from);
+    io(r.twist.to);
+    io(r.curvature.start);
+    io(r.curvature.end);
+    io(r.twist.start);
+    io(r.twist.end);
+    io(r.curvature.active);
+    io(r.twist.active);
   }
   for (auto& v : self.load_values) io(v);
   io(self.custom_force);
@@ -129,9 +129,9 @@ void give_sizes(World::Implementation& self) {
   for (std::size_t r = 0; r < self.ramps.size(); ++r) {
     NaturalRamp& ramp = self.ramps[r];
     const auto& rod = self.description.rods[r];
-    for (MatrixX2* m : {&ramp.from_curvature, &ramp.to_curvature})
+    for (MatrixX2* m : {&ramp.curvature.from, &ramp.curvature.to})
       if (m->rows() != rod.natural_curvature.rows()) *m = rod.natural_curvature;
-    for (VectorX* v : {&ramp.from_twist, &ramp.to_twist})
+    for (VectorX* v : {&ramp.twist.from, &ramp.twist.to})
       if (v->size() != rod.natural_twist.size()) *v = rod.natural_twist;
   }
   self.predictor.resize(self.model.dof_count);

@@ -137,6 +137,21 @@ Vector3 World::load(int load) const {
   return implementation_->load_values[at(load)];
 }
 
+template <class Value>
+void World::Implementation::actuate(Ramp<Value>& ramp, Value& now, const Value& value, double over) {
+  if (over == 0.0) {
+    const double before = actuation_energy();
+    ramp.active = false;
+    now = value;
+    update_natural(model, parameters);
+    actuation_work += actuation_energy() - before;
+  } else {
+    ramp = {now, value, state.time, state.time + over, true};
+  }
+  reaction_current = false;
+  state.acceleration_current = false;
+}
+
 void World::set_natural_curvature(int rod, const MatrixX2& curvature, double over) {
   Implementation& self = *implementation_;
   require(rod >= 0 && rod < static_cast<int>(self.ramps.size()), "no such rod: " + std::to_string(rod));
@@ -157,22 +172,7 @@ void World::set_natural_curvature(int rod, const MatrixX2& curvature, double ove
     const int b = self.model.place[at(rod)][s].bend;
     if (b >= 0) discrete_curvature(curvature.row(row), self.model.bend_voronoi(b));  // refuses a turn of pi
   }
-  NaturalRamp& ramp = self.ramps[at(rod)];
-  if (over == 0.0) {
-    const double before = self.actuation_energy();
-    ramp.curvature_active = false;
-    self.parameters.natural_curvature[at(rod)] = curvature;
-    update_natural(self.model, self.parameters);
-    self.actuation_work += self.actuation_energy() - before;
-  } else {
-    ramp.from_curvature = now;
-    ramp.to_curvature = curvature;
-    ramp.curvature_start = self.state.time;
-    ramp.curvature_end = self.state.time + over;
-    ramp.curvature_active = true;
-  }
-  self.reaction_current = false;
-  self.state.acceleration_current = false;
+  self.actuate(self.ramps[at(rod)].curvature, now, curvature, over);
 }
 
 void World::set_natural_twist(int rod, const VectorX& twist, double over) {
@@ -182,22 +182,7 @@ void World::set_natural_twist(int rod, const VectorX& twist, double over) {
   require(twist.allFinite() && std::isfinite(over) && over >= 0.0, "natural twist must be finite, over >= 0");
   if (self.model.planar() && (twist.array() != 0.0).any())
     self.leave_plane("natural twist of rod '" + self.description.rods[at(rod)].name + "'");
-  NaturalRamp& ramp = self.ramps[at(rod)];
-  if (over == 0.0) {
-    const double before = self.actuation_energy();
-    ramp.twist_active = false;
-    self.parameters.natural_twist[at(rod)] = twist;
-    update_natural(self.model, self.parameters);
-    self.actuation_work += self.actuation_energy() - before;
-  } else {
-    ramp.from_twist = self.parameters.natural_twist[at(rod)];
-    ramp.to_twist = twist;
-    ramp.twist_start = self.state.time;
-    ramp.twist_end = self.state.time + over;
-    ramp.twist_active = true;
-  }
-  self.reaction_current = false;
-  self.state.acceleration_current = false;
+  self.actuate(self.ramps[at(rod)].twist, self.parameters.natural_twist[at(rod)], twist, over);
 }
 
 MatrixX2 World::natural_curvature(int rod) const { return implementation_->parameters.natural_curvature.at(at(rod)); }
