@@ -116,6 +116,11 @@ def python_violations(package: Path) -> list[str]:
     return found
 
 
+def test_the_map_of_rooms_is_whole():
+    named = re.findall(r"^\| `(\w+)` \|", (ROOT / "CONTRIBUTING.md").read_text(), re.MULTILINE)
+    assert named == room_order(ROOT / "cpp")
+
+
 def test_no_cpp_room_includes_one_that_it_may_not_see():
     assert include_violations(ROOT / "cpp") == []
 
