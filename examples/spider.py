@@ -6,8 +6,9 @@ rule adds none, so that steps can be halved: backward Euler at 1 ms leaves nodes
 impact, and without viscosity steps of .1 and .05 ms part at the second one, by 3 % of a limb.
 
 Fails when half the step, or twice the edges, moves a node by more than 2 % of a limb at any time, when the top is more
-than 1 mm from where the public code has it before the floor acts, or when the spider does not come to rest. Writes
-out/spider.png and out/spider_plot.png.
+than 1 mm from where the public code has it before the floor acts, or when the spider does not come to rest. The fall
+that is its own mirror image is unstable: what a top 1e-9 m aside changes grows e times in .23 s, and is shown, not
+judged. Writes out/spider.png and out/spider_plot.png.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ FEET = ((1.0, 0.0), (0.0, 1.0), (0.0, -1.0), (-1.0, 0.0))
 HEIGHTS = {0.05: 0.18769, 0.10: 0.15088}  # of the top in the public code [m]
 APART, HEIGHT_OFF, MOVING = 0.02, 1e-3, 1e-3  # of a limb, [m], of the greatest kinetic energy
 FRAME = 0.01  # [s]
+ASIDE = "top 1e-9 m aside"
 
 
 def build(nodes: int, time_step: float, nudge: float) -> withe.Simulation:
@@ -106,13 +108,13 @@ def main() -> None:
         "as it is": first,
         "half the step": fall(arguments.duration, 0.5 * arguments.step),
         "twice the edges": fall(arguments.duration, arguments.step, nodes=2 * NODES - 1),
-        "top 1e-9 m aside": fall(arguments.duration, arguments.step, nudge=1e-9),
+        ASIDE: fall(arguments.duration, arguments.step, nudge=1e-9),
     }
     wrong = []
     for name, record in list(falls.items())[1:]:
         greatest = float(apart(first, record).max())
         print(f"{name:>16s}: no node moves by more than {100.0 * greatest:.2g}% of a limb")
-        if greatest > APART:
+        if name != ASIDE and greatest > APART:
             wrong.append(f"{name}: {greatest:.1%}")
     for time, known in HEIGHTS.items():
         height = float(first.positions("neck")[round(time / FRAME), 0, 2])
