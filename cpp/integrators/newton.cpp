@@ -126,7 +126,6 @@ struct Newton::Progress {
   bool made_here = false;
   /// `monotone` has evaluated the coming iteration, and solved for its step with the old matrix.
   bool foreseen = false;
-  double ahead = INFINITY;  ///< length of that step [m]
 };
 
 /// After an iteration: learns how well matrices serve, and decides about the next one.
@@ -147,16 +146,6 @@ void Newton::plan_next(Progress& p, FactorRecord& factor) const {
   const double next = factor.contraction[at(p.age == MatrixAge::across ? MatrixAge::across : MatrixAge::within)];
   p.fresh = !std::isfinite(p.step) || next > 0.5 ||
             (p.rest > tolerance && std::log(p.rest / tolerance) > kWorth * std::log(1.0 / next));
-  // Where iterations converge as the square, a matrix that is one step old leaves 2 s'^2 / s of a step s' after a step
-  // s [Deuflhard 2011, section 2.1].
-  if (!std::isfinite(p.step) || !std::isfinite(p.last_step)) return;
-  const double rate = p.step / p.last_step;
-  if (p.age == MatrixAge::fresh) {
-    const double ahead = p.foreseen ? p.ahead : rate * rate * p.step;
-    if (2.0 * ahead * ahead <= tolerance * p.step) p.fresh = false;
-  } else if (p.age == MatrixAge::within && p.last_age == MatrixAge::fresh) {
-    p.rest = std::min(p.rest, 2.0 * rate * p.step);
-  }
 }
 
 NewtonResult Newton::solve(Equations& equations, VectorX& z, const VectorX* target, int max_iterations,
@@ -251,7 +240,7 @@ NewtonResult Newton::solve(Equations& equations, VectorX& z, const VectorX* targ
       const bool follows = result.iterations == 0 || (std::isfinite(p.step) && full <= 0.5 * p.step);
       if (full > 1e2 * tolerance || !follows) {
         double kept = 1.0;
-        p.foreseen = monotone(equations, z, target, full, shorten, work, kept, p.ahead);
+        p.foreseen = monotone(equations, z, target, full, shorten, work, kept);
         work.step *= kept;
         shorten *= kept;
         axial_known = false;  // no prediction outlives a step that may lead elsewhere
@@ -281,9 +270,9 @@ NewtonResult Newton::solve(Equations& equations, VectorX& z, const VectorX* targ
 /// where the same matrix asks for a smaller one next: the natural monotonicity test [Deuflhard 2011, section 3.3],
 /// which sees displacements only and so no difference between forces and moments. `full` is the length of the whole
 /// step [m], `shorten` what it has lost already. Returns whether there is one: then `work` holds where it leads, the
-/// evaluation there, and less the step from there, of length `ahead`.
+/// evaluation there, and less the step from there.
 bool Newton::monotone(Equations& equations, const VectorX& z, const VectorX* target, double full, double shorten,
-                      NewtonWorkspace& work, double& kept, double& ahead) const {
+                      NewtonWorkspace& work, double& kept) const {
   kept = 1.0;
   for (int tries = 0; tries < kMostCuts; ++tries) {
     work.trial = z + kept * work.step;
@@ -292,8 +281,7 @@ bool Newton::monotone(Equations& equations, const VectorX& z, const VectorX* tar
     work.next_step = work.evaluation.residual;
     if (work.next_step.allFinite()) {
       equations.assembler().solver().solve({work.next_step.data(), static_cast<std::size_t>(work.next_step.size())});
-      ahead = displacement(work.next_step);
-      if (ahead <= (1.0 - 0.25 * kept * shorten) * full) return true;
+      if (displacement(work.next_step) <= (1.0 - 0.25 * kept * shorten) * full) return true;
     }
     kept *= 0.5;
   }

@@ -97,7 +97,7 @@ class Newton {
     return std::min(options_.step_tolerance * model_.length_scale, work.finest);
   }
   bool monotone(Equations& equations, const VectorX& z, const VectorX* target, double full, double shorten,
-                NewtonWorkspace& work, double& kept, double& ahead) const;
+                NewtonWorkspace& work, double& kept) const;
   double line_search(Equations& equations, const VectorX& z, const VectorX& step, const VectorX* target,
                      NewtonWorkspace& work) const;
 

@@ -90,7 +90,7 @@ World::Implementation::Implementation(const Implementation& other)
       separated(other.separated),
       spatial(other.spatial),
       level(other.level),
-      growth(other.growth),
+      easy_steps(other.easy_steps),
       guard(other.guard),
       contact_guard(other.contact_guard),
       error_rate(other.error_rate),

@@ -74,17 +74,6 @@ struct ContactGuard {
   double put_in = 0;  ///< in the last step, by surfaces that press [J]
 };
 
-/// When steps that were cut grow back.
-struct Growth {
-  static constexpr int kLeastPatience = 4, kMostPatience = 64;
-  int easy = 0;                   ///< easy steps of the present length
-  int patience = kLeastPatience;  ///< easy steps before they grow: more where longer ones failed at once
-  bool trial = false;             ///< whether they have just grown
-  bool plausible() const {
-    return easy >= 0 && easy < patience && patience >= kLeastPatience && patience <= kMostPatience;
-  }
-};
-
 /// What a step that is taken back returns to.
 struct StepStart {
   State state;
@@ -134,7 +123,7 @@ struct World::Implementation {
   double separated = 0;  ///< how far overlapping rods were moved before the start [m]
   bool spatial = false;  ///< left its plane while running
   int level = 0;         ///< present halvings of the time step, in `notches()` to each
-  Growth growth;
+  int easy_steps = 0;
   EnergyGuard guard;
   ContactGuard contact_guard;
   double error_rate = 0;   ///< greatest estimated error of the last steps over the power of the step that it goes with

@@ -6,7 +6,7 @@
 namespace withe {
 namespace {
 
-constexpr std::uint64_t kMagic = 0x3753454854495755ull;
+constexpr std::uint64_t kMagic = 0x3653454854495755ull;
 
 /// FNV-1a.
 std::uint64_t hash_of(std::string_view bytes) {
@@ -81,9 +81,7 @@ void exchange(Archive& io, Self& self) {
   io(self.custom_force);
   for (auto* x : {&self.support_work, &self.actuation_work, &self.dissipated, &self.load_work}) io(*x);
   io(self.level);
-  io(self.growth.easy);
-  io(self.growth.patience);
-  io(self.growth.trial);
+  io(self.easy_steps);
   io(self.guard.rescue);
   io(self.error_rate);
   io(self.grid_origin);
@@ -228,7 +226,8 @@ void World::restore(const std::string& bytes) {
   exchange(r, *fresh);
   r.expect_end();
   require(fresh->level >= 0 && fresh->level <= fresh->notches() * fresh->options.max_halvings &&
-              fresh->growth.plausible() && fresh->guard.rescue >= 0 && fresh->guard.rescue <= 256,
+              fresh->easy_steps >= 0 && fresh->easy_steps < 1 << 20 && fresh->guard.rescue >= 0 &&
+              fresh->guard.rescue <= 256,
           "snapshot is damaged: impossible step size");
   require(fresh->state.q.allFinite() && fresh->state.v.allFinite(), "snapshot is damaged: not finite");
   require(std::isfinite(fresh->parameters.fluid_viscosity) && fresh->parameters.fluid_viscosity >= 0.0,

@@ -90,28 +90,20 @@ void World::Implementation::cut(Attempt why, Division& division, double dt) {
   const long left = division.parts - division.done;
   level += why == Attempt::inaccurate ? (notches() + 1) / 2 : notches();
   for (divide_rest(division); division.parts <= left && may_cut(); divide_rest(division)) ++level;
-  // Steps that are too long now will be too long again: each trial costs a whole Newton iteration for nothing.
-  if (why != Attempt::inaccurate && growth.trial)
-    growth.patience = std::min(2 * growth.patience, Growth::kMostPatience);
-  growth.trial = false;
-  growth.easy = 0;
+  easy_steps = 0;
 }
 
 /// Steps grow back after a few that had more accuracy than was asked for. Whether they do.
 bool World::Implementation::grow(Attempt attempt, double dt) {
   if (attempt != Attempt::easy) {
-    growth.easy = 0;
+    easy_steps = 0;
     return false;
   }
-  if (++growth.easy < growth.patience) return false;
-  growth.easy = 0;
-  if (growth.trial || level == 0) growth.patience = std::max(growth.patience / 2, Growth::kLeastPatience);
-  growth.trial = false;
-  if (level == 0) return false;
+  if (level == 0 || ++easy_steps < 4) return false;
+  easy_steps = 0;
   int up = notches();
   while (up > 1 && !may_grow(dt, std::exp2(static_cast<double>(up) / notches()))) --up;
   level = std::max(0, level - up);
-  growth.trial = true;
   return true;
 }
 
