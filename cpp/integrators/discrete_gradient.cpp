@@ -191,10 +191,11 @@ void Equations::add_planar_bend(int stencil, bool with_matrix, Local& local) {
   for (int k = 0; k < 2; ++k) {
     const TurningEdge &own = edge[k], &other = edge[1 - k];
     const double share = own.share + difference * other.part * w.value;
+    force.segment<2>(2 * k) = (kSign[k] * scale * share) * own.normal;
+    if (!with_matrix) continue;
     Eigen::Vector4d by_share = other.part * (w.value * by_difference + difference * by_w);
     by_share.segment<2>(2 * k) += own.by_share;
     by_share.segment<2>(2 - 2 * k) += difference * w.value * other.by_part;
-    force.segment<2>(2 * k) = (kSign[k] * scale * share) * own.normal;
     H.middleRows<2>(2 * k) = kSign[k] * own.normal * (share * by_scale + scale * by_share).transpose();
     H.block<2, 2>(2 * k, 2 * k) += (kSign[k] * scale * share) * own.hessian;
   }
