@@ -4,7 +4,7 @@
 #include "common/pack.hpp"
 #include "elasticity/bend_twist.hpp"
 #include "elasticity/stencil_kernels.hpp"
-#include "geometry/frame_kernels.hpp"
+#include "geometry/frame_packs.hpp"
 
 namespace withe::WITHE_INSTRUCTION_SET {
 namespace {
@@ -49,16 +49,6 @@ struct Lanes {
     return {of(table), of(table + column), of(table + 2 * column)};
   }
 };
-
-EdgeFrame<Pack> frames_of(const double* frames, const int (&edge)[kLanes]) {
-  const double* place[kLanes];
-  for (int l = 0; l < kLanes; ++l) place[l] = frames + std::ptrdiff_t{kFrameNumbers} * edge[l];
-  Pack number[kFrameNumbers];
-  load_rows<kFrameNumbers>(place, number);
-  return {{number[0], number[1], number[2]},    {number[3], number[4], number[5]},
-          {number[6], number[7], number[8]},    number[9],
-          {number[10], number[11], number[12]}, {number[13], number[14], number[15]}};
-}
 
 /// place(lane) += `count` numbers of that lane; `numbers` has zeros beyond its end up to a whole number of packs. Moves
 /// in pieces of type Piece.

@@ -1,8 +1,6 @@
 // The kernels of frame_kernels.hpp on packs; included once by the translation unit of each instruction set.
 
-#include "common/pack.hpp"
-#include "geometry/curvature.hpp"
-#include "geometry/frame_kernels.hpp"
+#include "geometry/frame_packs.hpp"
 
 namespace withe::WITHE_INSTRUCTION_SET {
 namespace {
@@ -124,17 +122,6 @@ Vec3<Pack> carried(const Vec3<Pack>& reference, const Vec3<Pack>& source, const 
   double least = smallest[0];
   for (int l = 1; l < kLanes; ++l) least = smallest[l] < least ? smallest[l] : least;
   return least;
-}
-
-/// The frames of kLanes edges.
-EdgeFrame<Pack> frames_of(const double* frames, const int (&edge)[kLanes]) {
-  const double* place[kLanes];
-  for (int l = 0; l < kLanes; ++l) place[l] = frames + std::ptrdiff_t{kFrameNumbers} * edge[l];
-  Pack number[kFrameNumbers];
-  load_rows<kFrameNumbers>(place, number);
-  return {{number[0], number[1], number[2]},    {number[3], number[4], number[5]},
-          {number[6], number[7], number[8]},    number[9],
-          {number[10], number[11], number[12]}, {number[13], number[14], number[15]}};
 }
 
 /// Numbers of kLanes stencils and of their two edges; returns how many of them there are.
