@@ -41,7 +41,7 @@ help:
 	@echo "make ctest-baseline  C++ tests on an emulated machine without AVX (qemu-user)"
 	@echo "make asan          C++ tests under the address and undefined-behaviour sanitizers"
 	@echo "make wheel         dist/*.whl for machines without compiler"
-	@echo "make bench         all benchmarks (an hour); NAME=work_precision runs one"
+	@echo "make bench         all benchmarks (45 minutes); NAME=work_precision runs one"
 	@echo "make lint          ruff; make format applies formatters, make format-check only looks"
 	@echo "make types         mypy --strict"
 	@echo "make stubs         regenerate the stubs of the compiled module (make stub-check compares)"
