@@ -115,6 +115,12 @@ def _processor() -> str:
     return f"{found.get('model name', platform.machine())}, {widest}"
 
 
+def _command() -> str:
+    script, *rest = sys.argv
+    path = Path(script).resolve()
+    return " ".join(["python", str(path.relative_to(ROOT)) if path.is_relative_to(ROOT) else path.name, *rest])
+
+
 def _load() -> float | None:
     return round(os.getloadavg()[0], 2) if hasattr(os, "getloadavg") else None
 
@@ -180,7 +186,7 @@ class Report:
         return {
             "name": self.name,
             "date": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
-            "command": " ".join(["python", *sys.argv]),
+            "command": _command(),
             "quick": self._quick,
             "machine": {"processor": _processor(), "processors": os.cpu_count(), "system": platform.platform()},
             "load": {"at the start": self._load, "at the end": _load()},

@@ -28,6 +28,7 @@ def test_the_short_form_writes_its_figures(name, tmp_path):
     printed = run(name, tmp_path, "--quick")
     content = json.loads((tmp_path / f"{name}.json").read_text())
     assert content["name"] == name
+    assert content["command"] == f"python benchmarks/{name}.py --quick"  # that anybody can type
     assert content["quick"] is True
     assert content["machine"]["processor"]
     assert content["tables"]
