@@ -150,6 +150,7 @@ Contact::Touching Contact::touch(int index, const VectorX& q) const {
 const ContactRecord* Contact::record_of(const ContactKey& key) const { return find_record(state_->contacts, key); }
 
 void Contact::begin(const State& state, double duration) {
+  current_ = false;
   state_ = &state;
   duration_ = duration;
   eased_ = 1.0;
@@ -171,6 +172,7 @@ void Contact::begin(const State& state, double duration) {
   if (!target_.empty()) move_obstacles();
   if (frictional_ && freezes()) freeze();
   if (!shift_.empty()) place_obstacles(target_);
+  current_ = false;  // contacts that start are other ones than those of a step
 }
 
 void Contact::place_obstacles(const std::vector<ObstaclePlace>& places) { moved_ += 2.0 * surfaces_.place(places); }
@@ -206,6 +208,7 @@ double Contact::obstacle_work() const {
 }
 
 void Contact::update(const VectorX& q1) {
+  if (current_ && q1 == q1_) return;
   moved_ += q1_.size() == q1.size() ? farthest(q1 - q1_) : INFINITY;
   if (outgrown(q1, nullptr)) find_pairs(q1, q1);
   if (!std::isfinite(moved_)) {
@@ -234,6 +237,7 @@ void Contact::update(const VectorX& q1) {
     if (record) t.stick = record->stick;
     touching_.push_back(t);
   }
+  current_ = true;
 }
 
 void Contact::unknowns(int i, int (&dofs)[kContactUnknowns]) const { unknowns_of(pair_of(i), dofs); }
@@ -286,7 +290,7 @@ void Contact::add_pressing(const Touching& t, bool with_hessian, ContactLocal& o
   end_points(pair, q1_, x);
   double H[12][12];
   half_square_hessian(t.points, x[1] - x[0], x[3] - x[2], pair.weight_a, pair.weight_b, H);
-  const double turn = t.energy.first / t.distance;
+  const double turn = geometric_ ? t.energy.first / t.distance : 0.0;
   for (int i = 0; i < 12; ++i)
     for (int j = 0; j < 12; ++j) out.hessian[i][j] += turn * H[i][j] + (t.energy.second - turn) * g[i] * g[j];
 }

@@ -99,6 +99,9 @@ class Contact {
   bool eases() const;
   void ease(double times) { eased_ = times; }
 
+  /// Whether derivatives lack how pressing turns, the part by which it has negative stiffness.
+  void leave_out_geometric(bool left_out) { geometric_ = !left_out; }
+
   /// Takes from a predicted change of q what would move surfaces that stick: friction is steep there, and from outside
   /// Newton's method would fall past it.
   void hold_sticking(const State& state, VectorX& change) const;
@@ -225,7 +228,9 @@ class Contact {
   bool blocked_ = false;
   std::vector<ContactKey> unrecorded_;  ///< what touches at the start of the step and has no record
   bool starting_ = false;
+  bool current_ = false;  ///< touching_ is what touches at q1_
   const State* state_ = nullptr;
+  bool geometric_ = true;
   double duration_ = 0, eased_ = 1, start_energy_ = 0, start_pressing_ = 0, deepest_ = kDeepest;
   VectorX q1_;
   std::vector<Touching> touching_, lagged_;

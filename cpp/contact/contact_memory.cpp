@@ -339,6 +339,7 @@ std::vector<ContactReport> Contact::report(const State& state) {
 }
 
 void Contact::forget() {
+  current_ = false;
   pairs_ = surfaces_.obstacle_pairs();
   elements_.clear();
   reference_.resize(0);

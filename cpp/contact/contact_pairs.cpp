@@ -38,6 +38,7 @@ bool Contact::outgrown(const VectorX& q, const VectorX* change) const {
 /// Candidates for the way from one configuration to another, and beyond by a margin that grows with the last travel.
 void Contact::find_pairs(const VectorX& from, const VectorX& to) {
   if (surfaces_.edges().empty()) return;
+  current_ = false;
   double travel = 0.0;
   if (reference_.size() == to.size())
     for (int dof : model_.node_dof)

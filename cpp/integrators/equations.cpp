@@ -126,7 +126,7 @@ void Equations::add_contacts(bool with_matrix, Evaluation& out) {
       assembler_.contact.add_hessian(contact_->element(i), local.hessian, twice, assembler_.solver().values());
   }
   gradient_.head(model_.dof_count) += contact_gradient_;
-  if (inner_ == Inner::end) out.potential += contact_->energy();
+  if (has_potential_ && inner_ == Inner::end) out.potential += contact_->energy();
 }
 
 double Equations::allowed(const VectorX& z, const VectorX& step) {

@@ -24,6 +24,8 @@ constexpr int kFirstIterations = 4;
 constexpr double kHopeless = 1e3;
 // Halvings of a step between surfaces before it is taken as it is.
 constexpr int kMostCuts = 10;
+// That much of a step uphill is too little.
+constexpr double kLittle = 0.125;
 
 std::size_t at(MatrixAge age) { return static_cast<std::size_t>(age); }
 
@@ -115,6 +117,12 @@ bool Newton::factorize(Equations& equations, NewtonWorkspace& work) const {
          solver.factorize({work.trial.data(), static_cast<std::size_t>(work.trial.size())}).status == FactorStatus::ok;
 }
 
+/// step = -A^-1 residual, with the matrix as it is factorised.
+void Newton::solve_for_step(Equations& equations, const VectorX& residual, VectorX& step) {
+  step = -residual;
+  equations.assembler().solver().solve({step.data(), static_cast<std::size_t>(step.size())});
+}
+
 /// Where a solve with matrices that may be old stands.
 struct Newton::Progress {
   double tolerance = 0;  ///< [m]
@@ -124,8 +132,8 @@ struct Newton::Progress {
   double step = INFINITY, last_step = INFINITY;  ///< [m]
   double rest = INFINITY;                        ///< estimated distance from the solution [m]
   bool made_here = false;
-  /// `monotone` has evaluated the coming iteration, and solved for its step with the old matrix.
-  bool foreseen = false;
+  /// Of the last step; it may have evaluated the coming iteration, and solved for its step with the old matrix.
+  Search search;
 };
 
 /// After an iteration: learns how well matrices serve, and decides about the next one.
@@ -184,7 +192,7 @@ NewtonResult Newton::solve(Equations& equations, VectorX& z, const VectorX* targ
       equations.evaluate(z, matrix, axial, e);
       if (target) e.residual -= *target;
     };
-    if (!p.foreseen || (p.fresh && !expect_end)) evaluate(p.fresh && !expect_end);
+    if (!p.search.evaluated || (p.fresh && !expect_end)) evaluate(p.fresh && !expect_end);
     result.step = p.step;
     if (!e.residual.allFinite()) return give_up();
     const Balance balance = this->balance(e, result);
@@ -216,22 +224,14 @@ NewtonResult Newton::solve(Equations& equations, VectorX& z, const VectorX* targ
       factor.interval = std::abs(interval);
       factor.generation = equations.assembler().generation();
     }
-    if (p.foreseen && !p.fresh) {
-      work.step = -work.next_step;
-    } else {
-      work.step = -e.residual;
-      equations.assembler().solver().solve({work.step.data(), static_cast<std::size_t>(work.step.size())});
-    }
-    p.foreseen = false;
+    if (p.search.solved && !p.fresh)
+      work.step.swap(work.next_step);
+    else
+      solve_for_step(equations, e.residual, work.step);
+    p.search = {};
     work.counters.solve_time += seconds_since(solve_start);
     if (!work.step.allFinite()) return give_up();
-    double shorten = cap(work.step);
-    work.step *= shorten;
-    if (equations.contact()) {
-      const double allowed = equations.allowed(z, work.step);
-      work.step *= allowed;
-      shorten *= allowed;
-    }
+    double shorten = shortened(equations, z, work.step);
     if (mixed) equations.predict_axial_force(work.step, work.axial_force);
     axial_known = mixed;
     if (equations.contact()) {
@@ -239,10 +239,11 @@ NewtonResult Newton::solve(Equations& equations, VectorX& z, const VectorX* targ
       const double full = displacement(work.step) / shorten;
       const bool follows = result.iterations == 0 || (std::isfinite(p.step) && full <= 0.5 * p.step);
       if (full > 1e2 * tolerance || !follows) {
-        double kept = 1.0;
-        p.foreseen = monotone(equations, z, target, full, shorten, work, kept);
-        work.step *= kept;
-        shorten *= kept;
+        if (!step_between_surfaces(equations, z, target, shorten, work, p.search)) return give_up();
+        if (p.search.remade) {
+          p.fresh = p.made_here = true;
+          factor.owner = nullptr;
+        }
         axial_known = false;  // no prediction outlives a step that may lead elsewhere
       }
     }
@@ -251,9 +252,9 @@ NewtonResult Newton::solve(Equations& equations, VectorX& z, const VectorX* targ
       work.step *= alpha;
       shorten *= alpha;
       axial_known = axial_known && alpha == 1.0;
-      p.foreseen = false;
+      p.search = {};
     }
-    if (p.foreseen)
+    if (p.search.evaluated)
       z.swap(work.trial);
     else
       z += work.step;
@@ -266,26 +267,67 @@ NewtonResult Newton::solve(Equations& equations, VectorX& z, const VectorX* targ
   }
 }
 
-/// Contact and friction turn on and off, so that full steps may go to and fro for ever. A step is kept at a length
-/// where the same matrix asks for a smaller one next: the natural monotonicity test [Deuflhard 2011, section 3.3],
-/// which sees displacements only and so no difference between forces and moments. `full` is the length of the whole
-/// step [m], `shorten` what it has lost already. Returns whether there is one: then `work` holds where it leads, the
-/// evaluation there, and less the step from there.
-bool Newton::monotone(Equations& equations, const VectorX& z, const VectorX* target, double full, double shorten,
-                      NewtonWorkspace& work, double& kept) const {
-  kept = 1.0;
-  for (int tries = 0; tries < kMostCuts; ++tries) {
-    work.trial = z + kept * work.step;
-    equations.evaluate(work.trial, false, nullptr, work.evaluation);
-    if (target) work.evaluation.residual -= *target;
-    work.next_step = work.evaluation.residual;
-    if (work.next_step.allFinite()) {
-      equations.assembler().solver().solve({work.next_step.data(), static_cast<std::size_t>(work.next_step.size())});
-      if (displacement(work.next_step) <= (1.0 - 0.25 * kept * shorten) * full) return true;
-    }
-    kept *= 0.5;
+/// Shortens a step to what neither turns nor moves anything too far, and brings no surfaces too near; returns by how
+/// much.
+double Newton::shortened(Equations& equations, const VectorX& z, VectorX& step) const {
+  double kept = cap(step);
+  step *= kept;
+  const double allowed = equations.allowed(z, step);
+  step *= allowed;
+  return kept * allowed;
+}
+
+/// Pressing has negative stiffness where surfaces slide off each other, and with much of it a step may lead uphill, to
+/// where forces balance but do not hold. Where little of such a step can be kept, it is made anew without that
+/// stiffness. Whether there is one; `shorten` is what the step has lost.
+bool Newton::step_between_surfaces(Equations& equations, const VectorX& z, const VectorX* target, double& shorten,
+                                   NewtonWorkspace& work, Search& found) const {
+  Evaluation& e = work.evaluation;
+  const bool uphill = work.step.dot(e.residual) > 0.0;
+  found = search(equations, z, target, shorten, uphill ? kLittle : 0.0, work);
+  if (uphill && !found.evaluated) {
+    equations.contact()->leave_out_geometric(true);
+    equations.evaluate(z, true, nullptr, e);
+    equations.contact()->leave_out_geometric(false);
+    if (target) e.residual -= *target;
+    if (!factorize(equations, work)) return false;
+    solve_for_step(equations, e.residual, work.step);
+    if (!work.step.allFinite()) return false;
+    shorten = shortened(equations, z, work.step);
+    found = search(equations, z, target, shorten, 0.0, work);
+    found.remade = true;
   }
-  return false;
+  work.step *= found.kept;
+  shorten *= found.kept;
+  return true;
+}
+
+/// Contact and friction turn on and off, so that full steps may go to and fro for ever. A step is kept at a length to
+/// which it leads downhill, which needs no more than an evaluation, or from which the same matrix asks for a smaller
+/// step next: the natural monotonicity test [Deuflhard 2011, section 3.3], which sees displacements only and so no
+/// difference between forces and moments. `shorten` is what the step has lost already; no more than `least` of it is
+/// not worth having.
+Newton::Search Newton::search(Equations& equations, const VectorX& z, const VectorX* target, double shorten,
+                              double least, NewtonWorkspace& work) const {
+  Evaluation& e = work.evaluation;
+  const double full = displacement(work.step) / shorten, before = work.step.dot(e.residual);
+  Search found;
+  for (int tries = 0; tries < kMostCuts && found.kept > least; ++tries) {
+    work.trial = z + found.kept * work.step;
+    equations.evaluate(work.trial, false, nullptr, e);
+    if (target) e.residual -= *target;
+    found.evaluated = e.residual.allFinite();
+    if (found.evaluated) {
+      const double after = work.step.dot(e.residual);
+      if (before <= after && after <= 0.0) return found;
+      solve_for_step(equations, e.residual, work.next_step);
+      found.solved = displacement(work.next_step) <= (1.0 - 0.25 * found.kept * shorten) * full;
+      if (found.solved) return found;
+    }
+    found.kept *= 0.5;
+  }
+  found.evaluated = false;
+  return found;
 }
 
 /// [dissertation, Algorithm 4], with the sign of q + alpha dq and the bounds it leaves unset: Goldstein-Price on

@@ -96,8 +96,19 @@ class Newton {
   double tolerance(const NewtonWorkspace& work) const {
     return std::min(options_.step_tolerance * model_.length_scale, work.finest);
   }
-  bool monotone(Equations& equations, const VectorX& z, const VectorX* target, double full, double shorten,
-                NewtonWorkspace& work, double& kept) const;
+  static void solve_for_step(Equations& equations, const VectorX& residual, VectorX& step);
+  /// How much of a step between surfaces is kept, and what is known of where it leads.
+  struct Search {
+    double kept = 1.0;
+    bool evaluated = false;  ///< work.trial and work.evaluation
+    bool solved = false;     ///< work.next_step, with the same matrix
+    bool remade = false;     ///< the step, with a matrix that lacks geometric stiffness
+  };
+  bool step_between_surfaces(Equations& equations, const VectorX& z, const VectorX* target, double& shorten,
+                             NewtonWorkspace& work, Search& found) const;
+  Search search(Equations& equations, const VectorX& z, const VectorX* target, double shorten, double least,
+                NewtonWorkspace& work) const;
+  double shortened(Equations& equations, const VectorX& z, VectorX& step) const;
   double line_search(Equations& equations, const VectorX& z, const VectorX& step, const VectorX* target,
                      NewtonWorkspace& work) const;
 

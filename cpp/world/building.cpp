@@ -91,6 +91,8 @@ World::Implementation::Implementation(const Implementation& other)
       spatial(other.spatial),
       level(other.level),
       easy_steps(other.easy_steps),
+      patience(other.patience),
+      grown(other.grown),
       guard(other.guard),
       contact_guard(other.contact_guard),
       error_rate(other.error_rate),

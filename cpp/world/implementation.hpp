@@ -89,6 +89,9 @@ struct EnergyScratch {
   MassMatrix mass;
 };
 
+/// Easy steps before longer ones are tried, at least.
+inline constexpr int kLeastPatience = 4;
+
 /// Why a model is built: at first, because supports changed or the plane was left, or to take a snapshot's state.
 enum class Rebuild { first, running, restored };
 
@@ -120,10 +123,12 @@ struct World::Implementation {
   std::function<void(double, double)> callback;  ///< StepCallback, bound to its world
   std::function<void()> poll;
   std::atomic<bool> interrupted{false};
-  double separated = 0;  ///< how far overlapping rods were moved before the start [m]
-  bool spatial = false;  ///< left its plane while running
-  int level = 0;         ///< present halvings of the time step, in `notches()` to each
-  int easy_steps = 0;
+  double separated = 0;           ///< how far overlapping rods were moved before the start [m]
+  bool spatial = false;           ///< left its plane while running
+  int level = 0;                  ///< present halvings of the time step, in `notches()` to each
+  int easy_steps = 0;             ///< since it changed
+  int patience = kLeastPatience;  ///< of them before longer steps are tried
+  bool grown = false;             ///< fewer easy steps than the least patience ago
   EnergyGuard guard;
   ContactGuard contact_guard;
   double error_rate = 0;   ///< greatest estimated error of the last steps over the power of the step that it goes with

@@ -6,7 +6,7 @@
 namespace withe {
 namespace {
 
-constexpr std::uint64_t kMagic = 0x3653454854495755ull;
+constexpr std::uint64_t kMagic = 0x3753454854495755ull;
 
 /// FNV-1a.
 std::uint64_t hash_of(std::string_view bytes) {
@@ -82,6 +82,8 @@ void exchange(Archive& io, Self& self) {
   for (auto* x : {&self.support_work, &self.actuation_work, &self.dissipated, &self.load_work}) io(*x);
   io(self.level);
   io(self.easy_steps);
+  io(self.patience);
+  io(self.grown);
   io(self.guard.rescue);
   io(self.error_rate);
   io(self.grid_origin);
@@ -226,8 +228,8 @@ void World::restore(const std::string& bytes) {
   exchange(r, *fresh);
   r.expect_end();
   require(fresh->level >= 0 && fresh->level <= fresh->notches() * fresh->options.max_halvings &&
-              fresh->easy_steps >= 0 && fresh->easy_steps < 1 << 20 && fresh->guard.rescue >= 0 &&
-              fresh->guard.rescue <= 256,
+              fresh->easy_steps >= 0 && fresh->patience >= 1 && fresh->easy_steps <= fresh->patience &&
+              fresh->guard.rescue >= 0 && fresh->guard.rescue <= 256,
           "snapshot is damaged: impossible step size");
   require(fresh->state.q.allFinite() && fresh->state.v.allFinite(), "snapshot is damaged: not finite");
   require(std::isfinite(fresh->parameters.fluid_viscosity) && fresh->parameters.fluid_viscosity >= 0.0,

@@ -16,6 +16,8 @@ std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
 // Times that contact may be made stiffer before a step counts as failed.
 constexpr int kMostStiffenings = 4;
+// Easy steps before longer ones are tried, at most.
+constexpr int kMostPatience = 64;
 
 }  // namespace
 
@@ -90,17 +92,27 @@ void World::Implementation::cut(Attempt why, Division& division, double dt) {
   const long left = division.parts - division.done;
   level += why == Attempt::inaccurate ? (notches() + 1) / 2 : notches();
   for (divide_rest(division); division.parts <= left && may_cut(); divide_rest(division)) ++level;
+  if (why == Attempt::gained_energy && grown) patience = std::min(2 * patience, kMostPatience);
+  grown = false;
   easy_steps = 0;
 }
 
-/// Steps grow back after a few that had more accuracy than was asked for. Whether they do.
+/// Steps grow back after a few that had more accuracy than was asked for; where they then gain energy at once, after
+/// twice as many the next time. Whether they do.
 bool World::Implementation::grow(Attempt attempt, double dt) {
   if (attempt != Attempt::easy) {
     easy_steps = 0;
     return false;
   }
-  if (level == 0 || ++easy_steps < 4) return false;
+  if (level == 0 && !grown) return false;
+  ++easy_steps;
+  if (grown && easy_steps >= kLeastPatience) {
+    patience = std::max(patience / 2, kLeastPatience);
+    grown = false;
+  }
+  if (level == 0 || easy_steps < patience) return false;
   easy_steps = 0;
+  grown = true;
   int up = notches();
   while (up > 1 && !may_grow(dt, std::exp2(static_cast<double>(up) / notches()))) --up;
   level = std::max(0, level - up);

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Eigenvalues>
 #include <array>
 
 #include "derivative_check.hpp"
@@ -171,6 +172,36 @@ TEST(Contact, MatrixIsExactForEveryEnergy) {
       if (law == ContactLaw::barrier) c.increment = 2e-4;
       expect_exact(c, Integrator::backward_euler, Inner::end);
     }
+}
+
+/// Eigenvalues of pressing alone.
+VectorX pressing_eigenvalues(const Case& c, bool geometric) {
+  Contact contact(c.model);
+  State state = c.state;
+  contact.set_parameters(initial_parameters(c.model));
+  contact.initialise(state);
+  contact.begin(state, 0.3);
+  contact.update(c.q);
+  contact.leave_out_geometric(!geometric);
+  ContactLocal local;
+  contact.local(0, true, local);
+  MatrixX H(kContactUnknowns, kContactUnknowns);
+  for (int i = 0; i < kContactUnknowns; ++i)
+    for (int j = 0; j < kContactUnknowns; ++j) H(i, j) = local.hessian[i][j];
+  return Eigen::SelfAdjointEigenSolver<MatrixX>(H).eigenvalues();
+}
+
+TEST(Contact, WithoutGeometricStiffnessResistsOnlyWhereSurfacesNear) {
+  for (Named named : touching_scenes()) {
+    if (named.scene.rods.size() != 2) continue;
+    named.scene.contact.friction = 0.0;
+    const Case c = slipped(named, 0.02, false);
+    const VectorX exact = pressing_eigenvalues(c, true), straight = pressing_eigenvalues(c, false);
+    const double greatest = straight(kContactUnknowns - 1);
+    EXPECT_LT(exact(0), -1e-3 * greatest) << named.name;
+    EXPECT_GT(greatest, 0.0) << named.name;
+    EXPECT_LT(straight.head(kContactUnknowns - 1).cwiseAbs().maxCoeff(), 1e-12 * greatest) << named.name;
+  }
 }
 
 TEST(Contact, MatrixIsExactForEveryClassLawAndScheme) {
