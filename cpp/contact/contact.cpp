@@ -264,35 +264,8 @@ void Contact::local(int i, bool with_hessian, ContactLocal& out) const {
     add_frozen_friction(t, with_hessian, out);
     return;
   }
-  add_pressing(t, with_hessian, out);
+  press(t, with_hessian, out);
   if (pairs_[at(t.pair)].friction > 0.0 && !freezes()) add_friction(t, with_hessian, out);
-}
-
-void Contact::add_pressing(const Touching& t, bool with_hessian, ContactLocal& out) const {
-  const ContactPair& pair = pairs_[at(t.pair)];
-  double w[4], g[12];
-  end_weights(t.points.s, t.points.t, w);
-  if (pair.plane()) w[2] = w[3] = 0.0;
-  // dD = sum w_i (between / D) . dx_i: |between| differs from D by the weights of closest_points.
-  const Vec3d direction = pair.plane() ? t.normal : (1.0 / t.distance) * t.points.between;
-  const double n[3] = {direction.x, direction.y, direction.z};
-  for (int i = 0; i < 12; ++i) {
-    g[i] = w[i / 3] * n[i % 3];
-    out.gradient[i] += t.energy.first * g[i];
-  }
-  if (!with_hessian) return;
-  if (pair.plane()) {
-    for (int i = 0; i < 6; ++i)
-      for (int j = 0; j < 6; ++j) out.hessian[i][j] += t.energy.second * g[i] * g[j];
-    return;
-  }
-  Vec3d x[4];
-  end_points(pair, q1_, x);
-  double H[12][12];
-  half_square_hessian(t.points, x[1] - x[0], x[3] - x[2], pair.weight_a, pair.weight_b, H);
-  const double turn = geometric_ ? t.energy.first / t.distance : 0.0;
-  for (int i = 0; i < 12; ++i)
-    for (int j = 0; j < 12; ++j) out.hessian[i][j] += turn * H[i][j] + (t.energy.second - turn) * g[i] * g[j];
 }
 
 }  // namespace withe

@@ -60,6 +60,8 @@ class Contact {
   /// Work of moving obstacles on rods and on what contact stores, with the forces at q1 [J].
   double obstacle_work() const;
 
+  /// Whether the steps to come are energy-momentum ones, in which pressing may gain no energy.
+  void conserve(bool conserving) { conserving_ = conserving; }
   /// A step begins at `state`, which must outlive it. `duration`: the time in which slip happens [s].
   void begin(const State& state, double duration);
   /// Finds what touches at q1.
@@ -170,7 +172,9 @@ class Contact {
   FrictionSetting setting(const Touching& t) const;
   double pressing_energy() const;
   double work_against(int i, const ContactLocal& local, const VectorX& change) const;
+  void press(const Touching& t, bool with_hessian, ContactLocal& out) const;
   void add_pressing(const Touching& t, bool with_hessian, ContactLocal& out) const;
+  void add_mean_pressing(const Touching& t, bool with_hessian, ContactLocal& out) const;
   void add_friction(const Touching& t, bool with_hessian, ContactLocal& out) const;
   void add_frozen_friction(const Touching& t, bool with_hessian, ContactLocal& out) const;
   FrozenForce frozen_force(const Touching& t) const;
@@ -230,7 +234,7 @@ class Contact {
   bool starting_ = false;
   bool current_ = false;  ///< touching_ is what touches at q1_
   const State* state_ = nullptr;
-  bool geometric_ = true;
+  bool geometric_ = true, conserving_ = false;
   double duration_ = 0, eased_ = 1, start_energy_ = 0, start_pressing_ = 0, deepest_ = kDeepest;
   VectorX q1_;
   std::vector<Touching> touching_, lagged_;

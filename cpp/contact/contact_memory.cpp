@@ -73,7 +73,7 @@ double Contact::pressing_gain(const VectorX& change) const {
     const Touching& t = touching_[at(i)];
     if (t.frozen >= 0) continue;
     ContactLocal local{};
-    add_pressing(t, false, local);
+    press(t, false, local);
     gain -= work_against(i, local, change);
   }
   return gain;

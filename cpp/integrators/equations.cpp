@@ -89,7 +89,9 @@ void Equations::begin(const State& state, const Parameters& parameters, double h
   acting_ = viscous && !energy_momentum ? &total_ : &elastic;
   floor_current_ = false;
   flowing_ = false;
-  if (contact_) contact_->begin(state, h == 0.0 ? static_duration_ : inner == Inner::middle ? 2.0 * h : h);
+  if (!contact_) return;
+  contact_->conserve(energy_momentum);
+  contact_->begin(state, h == 0.0 ? static_duration_ : inner == Inner::middle ? 2.0 * h : h);
 }
 
 void Equations::forget_contacts() {

@@ -9,7 +9,8 @@
 ///   stretching: EA (eps0 + eps1) / 2 (e0 + e1) / (|e0| + |e1|)   [Simo, Tarnow and Doblare 1995];
 ///   bending, twisting: grad E(z) + r u / (u . D), D = q1 - q0, r = E(q1) - E(q0) - grad E(z) . D, with u a
 ///   direction that does not move the stencil [Gonzalez 1996];
-///   in a plane: quotients of differences of the moment's angle alone, see Equations::add_planar_bend.
+///   in a plane: quotients of differences of the moment's angle alone, see Equations::add_planar_bend;
+///   surfaces that press: along the mean of the ways between them, see Contact::add_mean_pressing.
 
 #include <memory>
 

@@ -160,17 +160,14 @@ World::Implementation::Attempt World::Implementation::try_step(double dt) {
     take_back();
     return Attempt::inaccurate;
   }
-  if (guarded && gains_energy()) {
+  const bool gained = guarded && gains_energy(), pumped = !gained && watched && contact_pumps(dt);
+  if (gained || pumped) {
     take_back();
-    if (euler) return Attempt::gained_energy;
+    if (pumped) guard = books;
+    if (euler || !guarded) return Attempt::gained_energy;
     // The same step again, and a while of them, without the flaw.
     guard.rescue = 256;
     return Attempt::rescued;
-  }
-  if (watched && contact_pumps(dt)) {
-    take_back();
-    guard = books;
-    return Attempt::gained_energy;
   }
   commit_step();
   if (!options.tolerance) return Attempt::easy;

@@ -211,6 +211,7 @@ TEST(Contact, MatrixIsExactForEveryClassLawAndScheme) {
       const Case c = slipped(named, 0.02);
       expect_exact(c, Integrator::backward_euler, Inner::end);
       expect_exact(c, Integrator::implicit_midpoint, Inner::middle);
+      if (!c.model.planar()) expect_exact(c, Integrator::energy_momentum, Inner::middle);
     }
 }
 
@@ -249,6 +250,46 @@ double work_of_contact(const Case& c) {
       if (dofs[k] >= 0) work += local.gradient[k] * (c.q(dofs[k]) - c.state.q(dofs[k]));
   }
   return work;
+}
+
+TEST(Contact, PressingGainsNothingAndTurnsNothingInAnEnergyMomentumStep) {
+  testing::RandomNumbers random(11);
+  int gained_else = 0;
+  for (Named named : touching_scenes()) {
+    named.scene.contact.friction = 0.0;
+    named.scene.contact.obstacle_friction.setZero();
+    for (int k = 0; k < 40; ++k) {
+      Case c = slipped(named, 0.0, false);
+      const VectorX change = (0.002 * (k + 1)) * random.vector(c.model.dof_count);
+      c.q = c.state.q + change;
+      for (bool conserving : {false, true}) {
+        Contact contact(c.model);
+        State state = c.state;
+        contact.set_parameters(initial_parameters(c.model));
+        contact.initialise(state);
+        contact.conserve(conserving);
+        contact.begin(state, 0.3);
+        contact.update(c.q);
+        const double gain = contact.pressing_gain(change);
+        if (!conserving) gained_else += gain > 1e-6;
+        if (!conserving) continue;
+        EXPECT_LT(gain, 1e-13) << named.name << ", " << k;
+        if (named.scene.rods.size() != 2) continue;
+        ContactLocal local;
+        int dofs[kContactUnknowns];
+        contact.local(0, false, local);
+        contact.unknowns(0, dofs);
+        Vector3 moment = Vector3::Zero();
+        for (int node = 0; node < 4; ++node) {
+          const Vector3 middle = c.state.q.segment<3>(dofs[3 * node]) + 0.5 * change.segment<3>(dofs[3 * node]);
+          moment += middle.cross(
+              Vector3(local.gradient[3 * node], local.gradient[3 * node + 1], local.gradient[3 * node + 2]));
+        }
+        EXPECT_LT(moment.norm(), 1e-12) << named.name << ", " << k;
+      }
+    }
+  }
+  EXPECT_GT(gained_else, 10);
 }
 
 TEST(Contact, ForcesAndMomentsOfAPairAddUpToNothingUnderEveryLaw) {
