@@ -172,7 +172,6 @@ void Contact::begin(const State& state, double duration) {
   if (!target_.empty()) move_obstacles();
   if (frictional_ && freezes()) freeze();
   if (!shift_.empty()) place_obstacles(target_);
-  current_ = false;  // contacts that start are other ones than those of a step
 }
 
 void Contact::place_obstacles(const std::vector<ObstaclePlace>& places) { moved_ += 2.0 * surfaces_.place(places); }
@@ -237,7 +236,7 @@ void Contact::update(const VectorX& q1) {
     if (record) t.stick = record->stick;
     touching_.push_back(t);
   }
-  current_ = true;
+  current_ = !starting_;  // what has no record begins otherwise in a step than before it
 }
 
 void Contact::unknowns(int i, int (&dofs)[kContactUnknowns]) const { unknowns_of(pair_of(i), dofs); }

@@ -174,14 +174,26 @@ TEST(Contact, MatrixIsExactForEveryEnergy) {
     }
 }
 
+/// Contact in the step from a case's state to its q.
+struct ContactStep {
+  explicit ContactStep(const Case& c, bool conserving = false) : state(c.state), contact(c.model) {
+    contact.set_parameters(initial_parameters(c.model));
+    contact.initialise(state);
+    contact.conserve(conserving);
+    contact.begin(state, 0.3);
+    contact.update(c.q);
+  }
+  ContactStep(const ContactStep&) = delete;
+  ContactStep& operator=(const ContactStep&) = delete;
+
+  State state;
+  Contact contact;
+};
+
 /// Eigenvalues of pressing alone.
 VectorX pressing_eigenvalues(const Case& c, bool geometric) {
-  Contact contact(c.model);
-  State state = c.state;
-  contact.set_parameters(initial_parameters(c.model));
-  contact.initialise(state);
-  contact.begin(state, 0.3);
-  contact.update(c.q);
+  ContactStep step(c);
+  Contact& contact = step.contact;
   contact.leave_out_geometric(!geometric);
   ContactLocal local;
   contact.local(0, true, local);
@@ -217,12 +229,8 @@ TEST(Contact, MatrixIsExactForEveryClassLawAndScheme) {
 
 /// Generalised forces of the contact of two edges at c.q, over a0, a1, b0, b1 and both angles.
 std::array<double, kContactUnknowns> forces_of_pair(const Case& c) {
-  Contact contact(c.model);
-  State state = c.state;
-  contact.set_parameters(initial_parameters(c.model));
-  contact.initialise(state);
-  contact.begin(state, 0.3);
-  contact.update(c.q);
+  ContactStep step(c);
+  const Contact& contact = step.contact;
   std::array<double, kContactUnknowns> sum{};
   for (int i = 0; i < contact.count(); ++i) {
     ContactLocal local;
@@ -234,12 +242,8 @@ std::array<double, kContactUnknowns> forces_of_pair(const Case& c) {
 
 /// What all contacts take over the step to c.q, pressing included [J].
 double work_of_contact(const Case& c) {
-  Contact contact(c.model);
-  State state = c.state;
-  contact.set_parameters(initial_parameters(c.model));
-  contact.initialise(state);
-  contact.begin(state, 0.3);
-  contact.update(c.q);
+  ContactStep step(c);
+  const Contact& contact = step.contact;
   double work = 0.0;
   for (int i = 0; i < contact.count(); ++i) {
     ContactLocal local;
@@ -262,31 +266,21 @@ TEST(Contact, PressingGainsNothingAndTurnsNothingInAnEnergyMomentumStep) {
       Case c = slipped(named, 0.0, false);
       const VectorX change = (0.002 * (k + 1)) * random.vector(c.model.dof_count);
       c.q = c.state.q + change;
-      for (bool conserving : {false, true}) {
-        Contact contact(c.model);
-        State state = c.state;
-        contact.set_parameters(initial_parameters(c.model));
-        contact.initialise(state);
-        contact.conserve(conserving);
-        contact.begin(state, 0.3);
-        contact.update(c.q);
-        const double gain = contact.pressing_gain(change);
-        if (!conserving) gained_else += gain > 1e-6;
-        if (!conserving) continue;
-        EXPECT_LT(gain, 1e-13) << named.name << ", " << k;
-        if (named.scene.rods.size() != 2) continue;
-        ContactLocal local;
-        int dofs[kContactUnknowns];
-        contact.local(0, false, local);
-        contact.unknowns(0, dofs);
-        Vector3 moment = Vector3::Zero();
-        for (int node = 0; node < 4; ++node) {
-          const Vector3 middle = c.state.q.segment<3>(dofs[3 * node]) + 0.5 * change.segment<3>(dofs[3 * node]);
-          moment += middle.cross(
-              Vector3(local.gradient[3 * node], local.gradient[3 * node + 1], local.gradient[3 * node + 2]));
-        }
-        EXPECT_LT(moment.norm(), 1e-12) << named.name << ", " << k;
+      gained_else += ContactStep(c).contact.pressing_gain(change) > 1e-6;
+      const ContactStep step(c, true);
+      EXPECT_LT(step.contact.pressing_gain(change), 1e-13) << named.name << ", " << k;
+      if (named.scene.rods.size() != 2) continue;
+      ContactLocal local;
+      int dofs[kContactUnknowns];
+      step.contact.local(0, false, local);
+      step.contact.unknowns(0, dofs);
+      Vector3 moment = Vector3::Zero();
+      for (int node = 0; node < 4; ++node) {
+        const double* g = local.gradient + 3 * node;
+        const Vector3 middle = c.state.q.segment<3>(dofs[3 * node]) + 0.5 * change.segment<3>(dofs[3 * node]);
+        moment += middle.cross(Vector3(g[0], g[1], g[2]));
       }
+      EXPECT_LT(moment.norm(), 1e-12) << named.name << ", " << k;
     }
   }
   EXPECT_GT(gained_else, 10);

@@ -231,14 +231,13 @@ def test_a_rod_that_wraps_a_post_within_a_step_gains_nothing_from_its_edges(inte
 
 def test_coarse_rods_that_slide_over_each_other_only_lose_energy_in_energy_momentum_steps() -> None:
     scene = withe.Scene(gravity=(0, 0, 0))
-    low = scene.add_rod(start=(0, -0.15, 0), end=(0, 0.15, 0), nodes=6, radius=RADIUS, material=RUBBER)
+    scene.add_rod(start=(0, -0.15, 0), end=(0, 0.15, 0), nodes=6, radius=RADIUS, material=RUBBER)
     top = scene.add_rod(start=(-0.15, 0.011, 0.012), end=(0.15, -0.02, 0.012), nodes=7, radius=RADIUS, material=RUBBER)
     scene.enable_contact()
     simulation = scene.build(integrator="energy_momentum", time_step=2e-3, adaptive=False)
     velocity = np.zeros((7, 3))
     velocity[:, 1], velocity[:, 2] = 3.0, -2.0
     simulation.set_velocities(top, velocity)
-    simulation.set_velocities(low, [[0.0, 0.0, 0.0]] * 6)
     energy = simulation.energy()
     greatest, least, touched = energy.kinetic, energy.total - energy.work, 0
     for _ in range(100):
