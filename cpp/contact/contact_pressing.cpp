@@ -8,8 +8,6 @@ namespace {
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
-double part(const Vec3d& v, int k) { return k == 0 ? v.x : k == 1 ? v.y : v.z; }
-
 }  // namespace
 
 /// What surfaces that press do. On a plane the end's direction is also the mean one.
@@ -75,7 +73,7 @@ void Contact::add_mean_pressing(const Touching& t, bool with_hessian, ContactLoc
   const double before = std::sqrt(std::max(dot(d0, d0) + t.distance * t.distance - dot(d1, d1), 0.0));
   const double sum = before + t.distance, force = t.energy.first / sum;
   const Vec3d mean = d0 + d1;
-  for (int i = 0; i < 12; ++i) out.gradient[i] += force * w[i / 3] * part(mean, i % 3);
+  for (int i = 0; i < 12; ++i) out.gradient[i] += force * w[i / 3] * mean[i % 3];
   if (!with_hessian) return;
   const Vec3d u = x[1] - x[0], v = x[3] - x[2], u0 = start[1] - start[0], v0 = start[3] - start[2];
   const double ws[4] = {-1, 1, 0, 0}, wt[4] = {0, 0, 1, -1};
@@ -83,16 +81,16 @@ void Contact::add_mean_pressing(const Touching& t, bool with_hessian, ContactLoc
   parameter_inverse(t.points.s_free, t.points.t_free, u, v, pair.weight_a, pair.weight_b, K);
   for (int j = 0; j < 12; ++j) {
     const int n = j / 3, k = j % 3;
-    const double by_s = ws[n] * part(d1, k) + w[n] * part(u, k), by_t = wt[n] * part(d1, k) - w[n] * part(v, k);
+    const double by_s = ws[n] * d1[k] + w[n] * u[k], by_t = wt[n] * d1[k] - w[n] * v[k];
     const double ds = -K[0][0] * by_s - K[0][1] * by_t, dt = -K[1][0] * by_s - K[1][1] * by_t;
     const Vec3d moved0 = ds * u0 - dt * v0, moved1 = ds * u - dt * v;
     const double spread = pair.weight_a * (t.points.s - 0.5) * ds + pair.weight_b * (t.points.t - 0.5) * dt;
-    const double distance = w[n] * part(d1, k) / t.distance;
+    const double distance = w[n] * d1[k] / t.distance;
     const double change = (t.energy.second * distance - force * (distance + (dot(d0, moved0) + spread) / before)) / sum;
     for (int i = 0; i < 12; ++i) {
       const double share = ws[i / 3] * ds + wt[i / 3] * dt;
-      const double turned = part(moved0, i % 3) + part(moved1, i % 3) + (i % 3 == k ? w[n] : 0.0);
-      out.hessian[i][j] += (w[i / 3] * change + force * share) * part(mean, i % 3) + force * w[i / 3] * turned;
+      const double turned = moved0[i % 3] + moved1[i % 3] + (i % 3 == k ? w[n] : 0.0);
+      out.hessian[i][j] += (w[i / 3] * change + force * share) * mean[i % 3] + force * w[i / 3] * turned;
     }
   }
 }

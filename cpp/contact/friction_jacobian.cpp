@@ -10,8 +10,6 @@ constexpr int kEdge[2] = {3, 6}, kAngle[2] = {9, 10}, kWays = 11;
 
 constexpr Vec3d kAxis[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
 
-double part(const Vec3d& v, int k) { return k == 0 ? v.x : k == 1 ? v.y : v.z; }
-
 /// Derivatives by them.
 struct Slopes {
   double s[kWays] = {}, t[kWays] = {}, pressing[kWays] = {};
@@ -42,7 +40,7 @@ ForceLaw force_law(const FrictionSetting& f, const SlippingSurfaces<double>& c, 
 void add_contact_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& c, Slopes& d) {
   const ContactPair& pair = *f.pair;
   if (pair.plane()) {
-    for (int k = 0; k < 3; ++k) d.pressing[k] = c.pressing_slope * part(c.normal, k);
+    for (int k = 0; k < 3; ++k) d.pressing[k] = c.pressing_slope * c.normal[k];
     return;
   }
   const Vec3d &u = c.sides[0].edge, &v = c.sides[1].edge;
@@ -50,10 +48,10 @@ void add_contact_slopes(const FrictionSetting& f, const SlippingSurfaces<double>
   parameter_inverse(f.points.s_free, f.points.t_free, u, v, pair.weight_a, pair.weight_b, K);
   const Vec3d a = K[0][1] * v - K[0][0] * u, b = K[1][1] * v - K[1][0] * u;
   for (int k = 0; k < 3; ++k) {
-    const double across = part(c.between, k);
+    const double across = c.between[k];
     d.pressing[k] = c.pressing_slope / c.distance * across;
-    d.s[k] = part(a, k);
-    d.t[k] = part(b, k);
+    d.s[k] = a[k];
+    d.t[k] = b[k];
     d.between[k] = kAxis[k] + d.s[k] * u - d.t[k] * v;
     d.s[kEdge[0] + k] = -K[0][0] * across;
     d.t[kEdge[0] + k] = -K[1][0] * across;
@@ -76,7 +74,7 @@ void add_turn_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& c
     const double rho = arm_length(*f.pair, b), inverse = side.inverse, angle = dot(side.turn, side.tangent);
     const Vec3d start = side.edge - side.change, bend = side.turn - angle * side.tangent;
     for (int k = 0; k < 3; ++k) {
-      const double along = part(side.tangent, k);
+      const double along = side.tangent[k];
       d.turn[kEdge[b] + k] = (rho * inverse) * (inverse * cross(start, kAxis[k]) - (2.0 * along) * bend +
                                                 angle * (kAxis[k] - along * side.tangent));
     }
@@ -124,12 +122,12 @@ void add_couple_slopes(const FrictionSetting& f, const SlippingEdge<double>& sid
   const double facing = dot(source, t), share = inverse / (1.0 + facing);
   const Vec3d bend = inverse * cross(m, t), mean = (2.0 + facing) * t + source;
   for (int k = 0; k < 3; ++k) {
-    const double lean = inverse * (part(m, k) - along * part(t, k));
+    const double lean = inverse * (m[k] - along * t[k]);
     Vec3d& own = couple[kEdge[b] + k];
-    own += (rho * inverse) * (inverse * cross(m, kAxis[k]) - (2.0 * part(t, k)) * bend);
+    own += (rho * inverse) * (inverse * cross(m, kAxis[k]) - (2.0 * t[k]) * bend);
     if (!f.spatial) continue;
     axial[kEdge[b] + k] += rho * lean;
-    own += (rho * (lean - along * share * part(mean, k))) * side.spin -
+    own += (rho * (lean - along * share * mean[k])) * side.spin -
            (rho * along * share * inverse) * cross(source, kAxis[k]);
   }
 }
@@ -157,8 +155,8 @@ void add_rows(const FrictionSetting& f, const SlippingSurfaces<double>& c, int b
   if (b < c.bodies) add_couple_slopes(f, c.sides[b], b, m, d.moment, couple, axial);
   Row forces, couples;
   for (int k = 0; k < 3; ++k) {
-    spread(c.w, [&](int j) { return part(d.force[j], k); }, forces);
-    spread(c.w, [&](int j) { return part(couple[j], k); }, couples);
+    spread(c.w, [&](int j) { return d.force[j][k]; }, forces);
+    spread(c.w, [&](int j) { return couple[j][k]; }, couples);
     Row &tail = jacobian[6 * b + k], &head = jacobian[6 * b + 3 + k];
     for (int j = 0; j < kContactUnknowns; ++j) {
       tail[j] += c.w[2 * b] * forces[j] - couples[j];

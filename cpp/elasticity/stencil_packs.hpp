@@ -117,24 +117,20 @@ void add_absolute(Pack* out, const Vec3<Pack>& v) {
 template <int kWidth>
 void fill(const BendTwistDerivatives<Pack>& d, Pack (&H)[11][kWidth]) {
   const Mat3<Pack>&A = d.ee[0][0], &B = d.ee[0][1], &F = d.ee[1][1];
-  const auto entry = [](const Mat3<Pack>& m, int i, int j) {
-    return j == 0 ? m.row[i].x : j == 1 ? m.row[i].y : m.row[i].z;
-  };
-  const auto of = [](const Vec3<Pack>& v, int i) { return i == 0 ? v.x : i == 1 ? v.y : v.z; };
   const auto both = [&](int i, int j, Pack value) { H[i][j] = H[j][i] = value; };
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) {
-      const Pack a = entry(A, i, j), b = entry(B, i, j), f = entry(F, i, j);
+      const Pack a = A.row[i][j], b = B.row[i][j], f = F.row[i][j];
       H[i][j] = a;
       H[8 + i][8 + j] = f;
-      H[4 + i][4 + j] = (a + f) - (b + entry(B, j, i));
+      H[4 + i][4 + j] = (a + f) - (b + B.row[j][i]);
       both(i, 4 + j, b - a);
       both(i, 8 + j, -b);
       both(4 + i, 8 + j, b - f);
     }
   for (int j = 0; j < 2; ++j)
     for (int i = 0; i < 3; ++i) {
-      const Pack g0 = of(d.e_angle[0][j], i), g1 = of(d.e_angle[1][j], i);
+      const Pack g0 = d.e_angle[0][j][i], g1 = d.e_angle[1][j][i];
       both(i, 3 + 4 * j, -g0);
       both(4 + i, 3 + 4 * j, g0 - g1);
       both(8 + i, 3 + 4 * j, g1);

@@ -10,6 +10,7 @@ template <class Scalar>
 struct Vec3 {
   Scalar x, y, z;
 
+  Scalar operator[](int k) const { return k == 0 ? x : k == 1 ? y : z; }
   Vec3& operator+=(const Vec3& b) {
     x += b.x;
     y += b.y;
