@@ -174,10 +174,6 @@ struct World::Implementation {
     long parts = 1, done = 0;
     double reached() const { return from + (1.0 - from) * (static_cast<double>(done) / static_cast<double>(parts)); }
   };
-  struct Place {
-    int rod = -1, node = -1;
-    std::string words;
-  };
   void advance(double duration);
   void advance_in_parts(double duration);
   bool may_cut() const;
@@ -204,7 +200,15 @@ struct World::Implementation {
   /// Matrices of earlier steps.
   void forget_matrix();
   void forget_contacts();
+
+  // failure.cpp
+  struct Place {
+    int rod = -1, node = -1;
+    std::string words;
+  };
   Place place_of(int row) const;
+  Place place_of_node(int node) const;
+  std::string crushed() const;
   [[noreturn]] void fail(const NewtonResult& newton, double dt, const std::string& what) const;
 
   // equilibrium.cpp

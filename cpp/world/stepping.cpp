@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <utility>
 
 #include <Eigen/LU>
@@ -361,39 +360,6 @@ void World::Implementation::check_reversible(const Parameters& p) const {
             "integrator 'fourth_order' goes back in time within each step, which drag allows for time_step up to mass "
             "over drag only, " +
                 std::to_string(p.node_mass(i) / p.node_drag(i)) + " s at node " + std::to_string(i) + instead);
-}
-
-/// Rod and node of a row of the residual, and how to say it; -1 and nothing where it is not known.
-World::Implementation::Place World::Implementation::place_of(int row) const {
-  Place place;
-  if (row < 0) return place;
-  const auto holds = [&](int first, int count) { return first <= row && row < first + count; };
-  int where = -1;
-  for (int i = 0; i < model.node_count; ++i)
-    if (holds(model.node_dof[at(i)], model.dimension)) where = i;
-  for (int f = 0; f < model.frame_count; ++f)
-    if (holds(model.frame_dof[at(f)], model.frame_size())) where = model.frame_node[at(f)];
-  for (const Hinge& hinge : model.hinges)
-    if (holds(hinge.dof, 1)) where = model.frame_node[at(hinge.frame)];
-  for (std::size_t e = 0; e < model.edge_dof.size(); ++e)
-    if (holds(model.edge_dof[e], 1)) where = model.edge_tail[e];
-  for (std::size_t k = 0; k < description.rods.size() && place.rod < 0; ++k) {
-    const auto& nodes = description.rods[k].nodes;
-    const auto found = std::find(nodes.begin(), nodes.end(), where);
-    if (found == nodes.end()) continue;
-    place.rod = static_cast<int>(k);
-    place.node = static_cast<int>(found - nodes.begin());
-    place.words = " at node " + std::to_string(place.node) + " of rod '" + description.rods[k].name + "'";
-  }
-  return place;
-}
-
-void World::Implementation::fail(const NewtonResult& r, double dt, const std::string& what) const {
-  const Place place = place_of(r.worst_row);
-  char numbers[128];
-  std::snprintf(numbers, sizeof numbers, " (time %.6g s, step %.3g s, residual %.3g N", state.time, dt, r.residual);
-  throw ConvergenceFailure(what + numbers + place.words + "); the world is left in its last accepted state", state.time,
-                           dt, place.rod, place.node, r.residual);
 }
 
 }  // namespace withe

@@ -1,0 +1,75 @@
+#include <algorithm>
+#include <cstdio>
+
+#include "world/implementation.hpp"
+
+namespace withe {
+namespace {
+
+/// An edge as short as this, over its length at rest, is one that the motion crushes.
+constexpr double kCrushed = 0.5;
+
+std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+std::string in_words(const char* format, double number) {
+  char words[64];
+  std::snprintf(words, sizeof words, format, number);
+  return words;
+}
+
+}  // namespace
+
+/// Rod and node of a row of the residual, and how to say it; -1 and nothing where it is not known.
+World::Implementation::Place World::Implementation::place_of(int row) const {
+  if (row < 0) return {};
+  const auto holds = [&](int first, int count) { return first <= row && row < first + count; };
+  int node = -1;
+  for (int i = 0; i < model.node_count; ++i)
+    if (holds(model.node_dof[at(i)], model.dimension)) node = i;
+  for (int f = 0; f < model.frame_count; ++f)
+    if (holds(model.frame_dof[at(f)], model.frame_size())) node = model.frame_node[at(f)];
+  for (const Hinge& hinge : model.hinges)
+    if (holds(hinge.dof, 1)) node = model.frame_node[at(hinge.frame)];
+  for (std::size_t e = 0; e < model.edge_dof.size(); ++e)
+    if (holds(model.edge_dof[e], 1)) node = model.edge_tail[e];
+  return place_of_node(node);
+}
+
+World::Implementation::Place World::Implementation::place_of_node(int node) const {
+  for (std::size_t k = 0; k < description.rods.size(); ++k) {
+    const auto& nodes = description.rods[k].nodes;
+    const auto found = std::find(nodes.begin(), nodes.end(), node);
+    if (found == nodes.end()) continue;
+    const int place = static_cast<int>(found - nodes.begin());
+    return {static_cast<int>(k), place,
+            " at node " + std::to_string(place) + " of rod '" + description.rods[k].name + "'"};
+  }
+  return {};
+}
+
+/// Says so where an edge is crushed; nothing elsewhere.
+std::string World::Implementation::crushed() const {
+  int shortest = -1;
+  double least = kCrushed;
+  for (int e = 0; e < model.edge_count; ++e) {
+    const int a = model.node_dof[at(model.edge_tail[at(e)])], b = model.node_dof[at(model.edge_head[at(e)])];
+    const double length = (state.q.segment(b, model.dimension) - state.q.segment(a, model.dimension)).norm();
+    if (length >= least * model.edge_length(e)) continue;
+    least = length / model.edge_length(e);
+    shortest = e;
+  }
+  if (shortest < 0) return "";
+  return "; an edge is crushed to " + in_words("%.2g", least) + " of its length" +
+         place_of_node(model.edge_tail[at(shortest)]).words +
+         ", as by a force above E A / 2 or a blow faster than sound in the rod, sqrt(E / density)";
+}
+
+void World::Implementation::fail(const NewtonResult& r, double dt, const std::string& what) const {
+  const Place place = place_of(r.worst_row);
+  throw ConvergenceFailure(what + in_words(" (time %.6g s", state.time) + in_words(", step %.3g s", dt) +
+                               in_words(", residual %.3g N", r.residual) + place.words + ")" + crushed() +
+                               "; the world is left in its last accepted state",
+                           state.time, dt, place.rod, place.node, r.residual);
+}
+
+}  // namespace withe
