@@ -12,11 +12,15 @@ constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
-Symmetry symmetry_of(const Loads& loads, const Contact* contact, FluidModel fluid, const Options& options) {
-  const bool unsymmetric = loads.unsymmetric || options.integrator == Integrator::energy_momentum ||
-                           (contact != nullptr && contact->unsymmetric()) ||
-                           (fluid == FluidModel::resistive && options.integrator != Integrator::statics);
-  return unsymmetric ? Symmetry::unsymmetric : Symmetry::symmetric;
+std::vector<std::string> asymmetries_of(const Loads& loads, const Contact* contact, FluidModel fluid,
+                                        const Options& options) {
+  std::vector<std::string> found;
+  if (loads.unsymmetric) found.emplace_back("follower loads or moments in 3D");
+  if (options.integrator == Integrator::energy_momentum) found.emplace_back("energy-momentum steps");
+  if (contact != nullptr && contact->unsymmetric()) found.emplace_back("implicit friction");
+  if (fluid == FluidModel::resistive && options.integrator != Integrator::statics)
+    found.emplace_back("resistive-force theory");
+  return found;
 }
 
 std::unique_ptr<Contact> make_contact(const Model& model) {
@@ -41,8 +45,8 @@ Equations::Equations(const Model& model, const Options& options)
     : model_(model),
       loads_(resolve_loads(model)),
       contact_(make_contact(model)),
-      assembler_(model, loads_, symmetry_of(loads_, contact_.get(), model.description.fluid.model, options),
-                 options.solver),
+      asymmetries_(asymmetries_of(loads_, contact_.get(), model.description.fluid.model, options)),
+      assembler_(model, loads_, asymmetries_.empty() ? Symmetry::symmetric : Symmetry::unsymmetric, options.solver),
       static_duration_(options.time_step) {
   if (contact_) {
     assembler_.couple(contact_->element_unknowns(), kContactUnknowns);

@@ -13,6 +13,8 @@
 ///   surfaces that press: along the mean of the ways between them, see Contact::add_mean_pressing.
 
 #include <memory>
+#include <string>
+#include <vector>
 
 #include "assembly/assembler.hpp"
 #include "contact/contact.hpp"
@@ -45,7 +47,9 @@ class Equations {
   const Assembler& assembler() const { return assembler_; }
   Loads& loads() { return loads_; }
   const Loads& loads() const { return loads_; }
-  bool symmetric() const { return assembler_.solver().symmetry() == Symmetry::symmetric; }
+  bool symmetric() const { return asymmetries_.empty(); }
+  /// In words, what makes the Jacobian unsymmetric.
+  const std::vector<std::string>& asymmetries() const { return asymmetries_; }
   /// True where statics minimise a potential.
   bool has_potential() const { return has_potential_; }
 
@@ -150,6 +154,7 @@ class Equations {
   Loads loads_;
   std::unique_ptr<Contact> contact_;
   bool has_potential_ = true;
+  std::vector<std::string> asymmetries_;
   Assembler assembler_;
   double static_duration_ = 0;  ///< in which slip happens in statics [s]
   Inner inner_ = Inner::end;

@@ -394,9 +394,7 @@ void World::Implementation::make_plan() {
                               : spatial                                      ? std::string("the scene left its plane")
                                                                              : model.plane_reason));
   }
-  if (!equations->symmetric())
-    notes.push_back(
-        "unsymmetric Jacobian: follower loads, moments in 3D, resistive-force theory, or energy-momentum steps");
+  for (const std::string& reason : equations->asymmetries()) notes.push_back("unsymmetric Jacobian: " + reason);
   if (!parameters.dragged) notes.push_back("no drag: its terms are left out");
   notes.push_back(fluid_note());
   if (!parameters.viscous) notes.push_back("no viscosity: its terms are left out");

@@ -164,6 +164,19 @@ def test_the_plan_says_what_contact_adds_and_what_is_skipped() -> None:
     assert any("no broad phase" in note for note in floor_only.build().plan.notes)
 
 
+@pytest.mark.parametrize(
+    ("friction", "friction_model", "unsymmetric"),
+    [(0.0, "implicit", False), (0.3, "lagged", False), (0.3, "implicit", True)],
+)
+def test_the_plan_says_that_implicit_friction_makes_the_jacobian_unsymmetric(
+    friction: float, friction_model: Any, unsymmetric: bool
+) -> None:
+    scene = withe.Scene()
+    scene.add_rod(start=(-0.1, 0, 0.01), end=(0.1, 0, 0.01), nodes=5, radius=5e-3, material=RUBBER)
+    scene.enable_contact(friction=friction, friction_model=friction_model)
+    assert ("unsymmetric Jacobian: implicit friction" in scene.build(planar=False).plan.notes) == unsymmetric
+
+
 def overlapping(scene: withe.Scene) -> None:
     scene.add_rod(start=(-0.1, 0, 0.007), end=(0.1, 0, 0.007), nodes=5, radius=5e-3, material=RUBBER, name="a")
     scene.add_rod(start=(0, -0.1, 0), end=(0, 0.1, 0), nodes=5, radius=5e-3, material=RUBBER, name="b")

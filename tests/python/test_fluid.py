@@ -121,4 +121,4 @@ def test_the_plan_tells_of_the_fluid():
     assert "Stokeslet segments couple all 16 nodes" in str(scene_with(viscosity=1.0).build().plan)
     resistive = str(scene_with(viscosity=1.0, model="resistive").build().plan)
     assert "resistive-force theory, implicit" in resistive
-    assert "unsymmetric" in resistive
+    assert "unsymmetric Jacobian: resistive-force theory" in resistive
