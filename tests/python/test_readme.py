@@ -38,6 +38,20 @@ def test_the_robot_of_the_readme_curls_its_fingers(tmp_path, monkeypatch):
     assert np.all(last < 0.5 * first)
 
 
+def test_the_knot_of_the_readme_is_pulled_tight():
+    names = {
+        "withe": withe,
+        "silicone": withe.Material(youngs_modulus=2e6, poisson_ratio=0.5, density=1200.0, viscosity=2e3),
+    }
+    for block in blocks("overhand_knot"):
+        exec(compile(block, str(README), "exec"), names)
+    contacts, pull = names["simulation"].contacts(), names["simulation"].reaction(names["grips"][1]).force[0]
+    assert len(contacts) > 3
+    assert contacts["gap"].min() > -0.05 * 4e-3
+    bending = 2e6 * np.pi * 4e-3**4 / 4.0
+    assert pull > 5.5e-3 * bending / 4e-3**2  # what the knot takes without friction, at e / h = 75
+
+
 def test_cables_of_a_picture_become_rods(tmp_path, monkeypatch):
     cv2 = pytest.importorskip("cv2")
     monkeypatch.chdir(tmp_path)
