@@ -83,6 +83,7 @@ def main() -> None:
             sys.exit(f"Energy appears from nowhere: {gained:.2e} J.")
         if not np.array_equal(simulation.positions(), again.positions()):
             sys.exit("The second run went elsewhere.")
+        print("              a second run ends on the same bits")
     simulation.picture(arguments.out / "gripper.png", camera=(0.4, -1.0, 0.1))
     print(f"Wrote {arguments.out / 'gripper.png'}.")
 

@@ -26,6 +26,8 @@ constexpr double kHopeless = 1e3;
 constexpr int kMostCuts = 10;
 // That much of a step uphill is too little.
 constexpr double kLittle = 0.125;
+// Friction has no potential, and may lead downhill in a circle; what has not converged after so many iterations does.
+constexpr int kLongestDescent = 20;
 
 std::size_t at(MatrixAge age) { return static_cast<std::size_t>(age); }
 
@@ -239,7 +241,8 @@ NewtonResult Newton::solve(Equations& equations, VectorX& z, const VectorX* targ
       const double full = displacement(work.step) / shorten;
       const bool follows = result.iterations == 0 || (std::isfinite(p.step) && full <= 0.5 * p.step);
       if (full > 1e2 * tolerance || !follows) {
-        if (!step_between_surfaces(equations, z, target, shorten, work, p.search)) return give_up();
+        const Demand demand{.nearer = result.iterations >= kLongestDescent};
+        if (!step_between_surfaces(equations, z, target, demand, shorten, work, p.search)) return give_up();
         if (p.search.remade) {
           p.fresh = p.made_here = true;
           factor.owner = nullptr;
@@ -280,11 +283,11 @@ double Newton::shortened(Equations& equations, const VectorX& z, VectorX& step) 
 /// Pressing has negative stiffness where surfaces slide off each other, and with much of it a step may lead uphill, to
 /// where forces balance but do not hold. Where little of such a step can be kept, it is made anew without that
 /// stiffness. Whether there is one; `shorten` is what the step has lost.
-bool Newton::step_between_surfaces(Equations& equations, const VectorX& z, const VectorX* target, double& shorten,
-                                   NewtonWorkspace& work, Search& found) const {
+bool Newton::step_between_surfaces(Equations& equations, const VectorX& z, const VectorX* target, Demand demand,
+                                   double& shorten, NewtonWorkspace& work, Search& found) const {
   Evaluation& e = work.evaluation;
   const bool uphill = work.step.dot(e.residual) > 0.0;
-  found = search(equations, z, target, shorten, uphill ? kLittle : 0.0, work);
+  found = search(equations, z, target, {.nearer = demand.nearer, .least = uphill ? kLittle : 0.0}, shorten, work);
   if (uphill && !found.evaluated) {
     equations.contact()->leave_out_geometric(true);
     equations.evaluate(z, true, nullptr, e);
@@ -294,7 +297,7 @@ bool Newton::step_between_surfaces(Equations& equations, const VectorX& z, const
     solve_for_step(equations, e.residual, work.step);
     if (!work.step.allFinite()) return false;
     shorten = shortened(equations, z, work.step);
-    found = search(equations, z, target, shorten, 0.0, work);
+    found = search(equations, z, target, demand, shorten, work);
     found.remade = true;
   }
   work.step *= found.kept;
@@ -305,21 +308,20 @@ bool Newton::step_between_surfaces(Equations& equations, const VectorX& z, const
 /// Contact and friction turn on and off, so that full steps may go to and fro for ever. A step is kept at a length to
 /// which it leads downhill, which needs no more than an evaluation, or from which the same matrix asks for a smaller
 /// step next: the natural monotonicity test [Deuflhard 2011, section 3.3], which sees displacements only and so no
-/// difference between forces and moments. `shorten` is what the step has lost already; no more than `least` of it is
-/// not worth having.
-Newton::Search Newton::search(Equations& equations, const VectorX& z, const VectorX* target, double shorten,
-                              double least, NewtonWorkspace& work) const {
+/// difference between forces and moments. `shorten` is what the step has lost already.
+Newton::Search Newton::search(Equations& equations, const VectorX& z, const VectorX* target, Demand demand,
+                              double shorten, NewtonWorkspace& work) const {
   Evaluation& e = work.evaluation;
   const double full = displacement(work.step) / shorten, before = work.step.dot(e.residual);
   Search found;
-  for (int tries = 0; tries < kMostCuts && found.kept > least; ++tries) {
+  for (int tries = 0; tries < kMostCuts && found.kept > demand.least; ++tries) {
     work.trial = z + found.kept * work.step;
     equations.evaluate(work.trial, false, nullptr, e);
     if (target) e.residual -= *target;
     found.evaluated = e.residual.allFinite();
     if (found.evaluated) {
       const double after = work.step.dot(e.residual);
-      if (before <= after && after <= 0.0) return found;
+      if (!demand.nearer && before <= after && after <= 0.0) return found;
       solve_for_step(equations, e.residual, work.next_step);
       found.solved = displacement(work.next_step) <= (1.0 - 0.25 * found.kept * shorten) * full;
       if (found.solved) return found;

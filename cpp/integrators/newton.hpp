@@ -104,9 +104,14 @@ class Newton {
     bool solved = false;     ///< work.next_step, with the same matrix
     bool remade = false;     ///< the step, with a matrix that lacks geometric stiffness
   };
-  bool step_between_surfaces(Equations& equations, const VectorX& z, const VectorX* target, double& shorten,
-                             NewtonWorkspace& work, Search& found) const;
-  Search search(Equations& equations, const VectorX& z, const VectorX* target, double shorten, double least,
+  /// What a step between surfaces must do to be kept.
+  struct Demand {
+    bool nearer = false;  ///< to the solution: to lead downhill is not enough
+    double least = 0.0;   ///< more than this share of it
+  };
+  bool step_between_surfaces(Equations& equations, const VectorX& z, const VectorX* target, Demand demand,
+                             double& shorten, NewtonWorkspace& work, Search& found) const;
+  Search search(Equations& equations, const VectorX& z, const VectorX* target, Demand demand, double shorten,
                 NewtonWorkspace& work) const;
   double shortened(Equations& equations, const VectorX& z, VectorX& step) const;
   double line_search(Equations& equations, const VectorX& z, const VectorX& step, const VectorX* target,
