@@ -118,7 +118,7 @@ def test_a_fast_rod_is_stopped_by_the_end_of_another(integrator: Any, friction: 
 
 def test_a_rod_that_a_blow_faster_than_sound_crushes_is_named() -> None:
     simulation = rods_end_to_end(1e6, "implicit_midpoint", 0.0)  # sound: 29 m/s
-    with pytest.raises(withe.ConvergenceError, match="crushed to .* of its length at node .* of rod 'rod [12]'"):
+    with pytest.raises(withe.ConvergenceError, match=r"crushed to .* of its length at node .* of rod 'rod [12]'"):
         simulation.step(10)
 
 
