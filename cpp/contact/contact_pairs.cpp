@@ -54,10 +54,11 @@ void Contact::find_pairs(const VectorX& from, const VectorX& to) {
       box.include(Box::around(local_position(model_, to, tail), local_position(model_, to, head), grow));
     boxes_.push_back(box);
   }
-  // What touches is known by the key of its pair while pairs are renumbered.
-  std::vector<ContactKey> keys;
-  for (const Touching& t : lagged_) keys.push_back(pairs_[at(t.pair)].key);
   const std::size_t fixed = surfaces_.obstacle_pairs().size();
+  // What touches is known by the key of its pair while pairs are renumbered; those with obstacles keep their number.
+  std::vector<std::pair<std::size_t, ContactKey>> renumbered;
+  for (std::size_t i = 0; i < lagged_.size(); ++i)
+    if (at(lagged_[i].pair) >= fixed) renumbered.emplace_back(i, pairs_[at(lagged_[i].pair)].key);
   pairs_.resize(fixed);
   for (const BroadPhase::Pair& found : broad_phase_.find(boxes_)) {
     const int a = surfaces_.edges()[at(found.a)], b = surfaces_.edges()[at(found.b)];
@@ -65,17 +66,19 @@ void Contact::find_pairs(const VectorX& from, const VectorX& to) {
     pairs_.push_back(surfaces_.pair(a, b));
     pairs_.back().element = element_of(pairs_.back().key);
   }
-  for (std::size_t i = 0; i < keys.size(); ++i) {
-    const auto place =
-        std::find_if(pairs_.begin(), pairs_.end(), [&](const ContactPair& p) { return p.key == keys[i]; });
-    if (place == pairs_.end()) {
+  const std::size_t found = pairs_.size();
+  for (const auto& [i, key] : renumbered) {
+    const auto place = std::lower_bound(pairs_.begin() + static_cast<std::ptrdiff_t>(fixed),
+                                        pairs_.begin() + static_cast<std::ptrdiff_t>(found), key,
+                                        [](const ContactPair& pair, const ContactKey& k) { return pair.key < k; });
+    auto number = static_cast<std::size_t>(place - pairs_.begin());
+    if (number == found || !(pairs_[number].key == key)) {
       // Gone out of reach within a step: its friction of the start still acts.
-      pairs_.push_back(surfaces_.pair(keys[i].a, keys[i].b));
-      pairs_.back().element = element_of(keys[i]);
-      lagged_[i].pair = static_cast<int>(pairs_.size()) - 1;
-    } else {
-      lagged_[i].pair = static_cast<int>(place - pairs_.begin());
+      number = pairs_.size();
+      pairs_.push_back(surfaces_.pair(key.a, key.b));
+      pairs_.back().element = element_of(key);
     }
+    lagged_[i].pair = static_cast<int>(number);
   }
   // Iterates go to and fro on a way whose candidates are all known.
   low_ = from.cwiseMin(to);

@@ -1,13 +1,12 @@
 #include "integrators/newton.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
+
+#include "common/timer.hpp"
 
 namespace withe {
 namespace {
-
-using Clock = std::chrono::steady_clock;
 
 // A matrix of an earlier time step that leaves more than this of an error has served badly, and is tried again after
 // so many steps.
@@ -30,8 +29,6 @@ constexpr double kLittle = 0.125;
 constexpr int kLongestDescent = 20;
 
 std::size_t at(MatrixAge age) { return static_cast<std::size_t>(age); }
-
-double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 }  // namespace
 
@@ -109,6 +106,7 @@ double Newton::displacement(const VectorX& step) const {
 /// Of the matrix as it is; a free mode (a rod that may spin about its axis) is held by a shift far below every
 /// stiffness.
 bool Newton::factorize(Equations& equations, NewtonWorkspace& work) const {
+  const Timer timer(work.counters.solve_time);
   LinearSolver& solver = equations.assembler().solver();
   ++work.counters.factorizations;
   if (solver.factorize().status == FactorStatus::ok) return true;
@@ -119,9 +117,18 @@ bool Newton::factorize(Equations& equations, NewtonWorkspace& work) const {
          solver.factorize({work.trial.data(), static_cast<std::size_t>(work.trial.size())}).status == FactorStatus::ok;
 }
 
+/// Residual, and matrix where it is asked for.
+void Newton::evaluate_at(Equations& equations, const VectorX& z, bool matrix, const double* axial,
+                         const VectorX* target, NewtonWorkspace& work) {
+  const Timer timer(work.counters.assembly_time);
+  equations.evaluate(z, matrix, axial, work.evaluation);
+  if (target) work.evaluation.residual -= *target;
+}
+
 /// step = -A^-1 residual, with the matrix as it is factorised.
-void Newton::solve_for_step(Equations& equations, const VectorX& residual, VectorX& step) {
-  step = -residual;
+void Newton::solve_for_step(Equations& equations, NewtonWorkspace& work, VectorX& step) {
+  const Timer timer(work.counters.solve_time);
+  step = -work.evaluation.residual;
   equations.assembler().solver().solve({step.data(), static_cast<std::size_t>(step.size())});
 }
 
@@ -187,13 +194,9 @@ NewtonResult Newton::solve(Equations& equations, VectorX& z, const VectorX* targ
   };
   for (;; ++result.iterations) {
     work.poll();
-    const auto start = Clock::now();
     const bool expect_end = p.rest <= tolerance * 1e3;
     const double* axial = mixed && axial_known ? work.axial_force.data() : nullptr;
-    const auto evaluate = [&](bool matrix) {
-      equations.evaluate(z, matrix, axial, e);
-      if (target) e.residual -= *target;
-    };
+    const auto evaluate = [&](bool matrix) { evaluate_at(equations, z, matrix, axial, target, work); };
     if (!p.search.evaluated || (p.fresh && !expect_end)) evaluate(p.fresh && !expect_end);
     result.step = p.step;
     if (!e.residual.allFinite()) return give_up();
@@ -201,7 +204,6 @@ NewtonResult Newton::solve(Equations& equations, VectorX& z, const VectorX* targ
     // Rounding alone is no proof before the first step: a light load on a stiff rod hides in it.
     if ((balance.floor && (result.iterations > 0 || balance.relative)) ||
         (balance.either && (p.rest <= tolerance || stagnant >= 3))) {
-      work.counters.assembly_time += seconds_since(start);
       result.converged = true;
       factor.tired = p.age == MatrixAge::across && result.iterations >= kTiring;
       return result;
@@ -215,9 +217,7 @@ NewtonResult Newton::solve(Equations& equations, VectorX& z, const VectorX* targ
     overdue = p.rest <= tolerance ? overdue + 1 : 0;
     if (p.may_reuse && overdue >= kTiring) p.fresh = true;
     if (p.fresh && expect_end) evaluate(true);
-    work.counters.assembly_time += seconds_since(start);
 
-    const auto solve_start = Clock::now();
     ++work.counters.iterations;
     if (p.fresh) {
       if (!factorize(equations, work)) return give_up();
@@ -229,9 +229,8 @@ NewtonResult Newton::solve(Equations& equations, VectorX& z, const VectorX* targ
     if (p.search.solved && !p.fresh)
       work.step.swap(work.next_step);
     else
-      solve_for_step(equations, e.residual, work.step);
+      solve_for_step(equations, work, work.step);
     p.search = {};
-    work.counters.solve_time += seconds_since(solve_start);
     if (!work.step.allFinite()) return give_up();
     double shorten = shortened(equations, z, work.step);
     if (mixed) equations.predict_axial_force(work.step, work.axial_force);
@@ -290,11 +289,10 @@ bool Newton::step_between_surfaces(Equations& equations, const VectorX& z, const
   found = search(equations, z, target, {.nearer = demand.nearer, .least = uphill ? kLittle : 0.0}, shorten, work);
   if (uphill && !found.evaluated) {
     equations.contact()->leave_out_geometric(true);
-    equations.evaluate(z, true, nullptr, e);
+    evaluate_at(equations, z, true, nullptr, target, work);
     equations.contact()->leave_out_geometric(false);
-    if (target) e.residual -= *target;
     if (!factorize(equations, work)) return false;
-    solve_for_step(equations, e.residual, work.step);
+    solve_for_step(equations, work, work.step);
     if (!work.step.allFinite()) return false;
     shorten = shortened(equations, z, work.step);
     found = search(equations, z, target, demand, shorten, work);
@@ -316,13 +314,12 @@ Newton::Search Newton::search(Equations& equations, const VectorX& z, const Vect
   Search found;
   for (int tries = 0; tries < kMostCuts && found.kept > demand.least; ++tries) {
     work.trial = z + found.kept * work.step;
-    equations.evaluate(work.trial, false, nullptr, e);
-    if (target) e.residual -= *target;
+    evaluate_at(equations, work.trial, false, nullptr, target, work);
     found.evaluated = e.residual.allFinite();
     if (found.evaluated) {
       const double after = work.step.dot(e.residual);
       if (!demand.nearer && before <= after && after <= 0.0) return found;
-      solve_for_step(equations, e.residual, work.next_step);
+      solve_for_step(equations, work, work.next_step);
       found.solved = displacement(work.next_step) <= (1.0 - 0.25 * found.kept * shorten) * full;
       if (found.solved) return found;
     }
@@ -341,8 +338,7 @@ double Newton::line_search(Equations& equations, const VectorX& z, const VectorX
   double low = 0.0, high = 2.0, alpha = 1.0;
   for (int n = 0; n < 20; ++n) {
     work.trial = z + alpha * step;
-    equations.evaluate(work.trial, false, nullptr, work.evaluation);
-    if (target) work.evaluation.residual -= *target;
+    evaluate_at(equations, work.trial, false, nullptr, target, work);
     const double change = 0.5 * work.evaluation.residual.squaredNorm() - before;
     if (!(change <= 0.1 * alpha * slope))
       high = alpha;

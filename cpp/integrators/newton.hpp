@@ -96,7 +96,9 @@ class Newton {
   double tolerance(const NewtonWorkspace& work) const {
     return std::min(options_.step_tolerance * model_.length_scale, work.finest);
   }
-  static void solve_for_step(Equations& equations, const VectorX& residual, VectorX& step);
+  static void evaluate_at(Equations& equations, const VectorX& z, bool matrix, const double* axial,
+                          const VectorX* target, NewtonWorkspace& work);
+  static void solve_for_step(Equations& equations, NewtonWorkspace& work, VectorX& step);
   /// How much of a step between surfaces is kept, and what is known of where it leads.
   struct Search {
     double kept = 1.0;
