@@ -151,20 +151,22 @@ def piles(report: Report, quick: bool) -> None:
         each, contacts = _timed(simulation, steps)
         after = simulation.statistics
         iterations = (after.iterations - before.iterations) / steps
-        others = after.total_time - before.total_time - (after.solve_time - before.solve_time)
+        unsolved = after.total_time - before.total_time - (after.solve_time - before.solve_time)
         seconds.append(each)
-        rest.append(others / steps / max(iterations, 1.0))
+        rest.append(unsolved / steps / max(iterations, 1.0))
         rows.append((count, f"{1e3 * each:.0f}", f"{iterations:.1f}", f"{1e3 * rest[-1]:.2f}", contacts))
     report.table(
         "Piles of rods of 20 nodes that settle",
         ("rods", "ms a step", "iterations", "ms an iteration but for linear solves", "contacts"),
         rows,
     )
-    exponent, others = (float(np.polyfit(np.log(counts), np.log(values), 1)[0]) for values in (seconds, rest))
+    exponent, exponent_of_rest = (float(np.polyfit(np.log(counts), np.log(values), 1)[0]) for values in (seconds, rest))
     expected = seconds[-1] * (1000 / counts[-1]) ** exponent
     report.goal("1,000 rods, extrapolated [s a step]", None if quick else expected, 2.0, at_least=False)
     report.goal("exponent of a step over rods", None if quick else exponent, 1.4, at_least=False)
-    report.goal("the same but for linear solves, an iteration", None if quick else others, 1.15, at_least=False)
+    report.goal(
+        "the same but for linear solves, an iteration", None if quick else exponent_of_rest, 1.15, at_least=False
+    )
 
 
 def main() -> None:

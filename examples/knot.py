@@ -187,14 +187,13 @@ def main() -> None:
         if friction == 0.0:
             gap = energy_gap(way, targets)
             print(f"the pull is that of the stored energy, -dU/de, within {gap:.1%}")
-        elif arguments.points == 5:
-            knot.simulation.picture(arguments.out / "knot.png", size=(1280, 360), camera="top")
+            continue
+        knot.simulation.picture(arguments.out / "knot.png", size=(1280, 360), camera="top")
+        if arguments.points == 5:
             loosened = move(knot, LOOSE, arguments.speed)
             places = np.arange(100, int(0.97 * LOOSE))
             locked = next((e for e in places if loosened.near(e) <= 0.0), None)
             print(f"loosened, it locks at e / h = {locked}: no pull is left that would open it farther")
-    if loosened is None:
-        knot.simulation.picture(arguments.out / "knot.png", size=(1280, 360), camera="top")
     draw(tightened, loosened, arguments.out / "knot_plot.png")
     print(f"Wrote {arguments.out / 'knot_plot.png'} and {arguments.out / 'knot.png'}.")
     if worst > TOLERANCE or gap > ENERGY_TOLERANCE:

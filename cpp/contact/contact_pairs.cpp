@@ -72,7 +72,7 @@ void Contact::find_pairs(const VectorX& from, const VectorX& to) {
                                         pairs_.begin() + static_cast<std::ptrdiff_t>(found), key,
                                         [](const ContactPair& pair, const ContactKey& k) { return pair.key < k; });
     auto number = static_cast<std::size_t>(place - pairs_.begin());
-    if (number == found || !(pairs_[number].key == key)) {
+    if (number == found || pairs_[number].key != key) {
       // Gone out of reach within a step: its friction of the start still acts.
       number = pairs_.size();
       pairs_.push_back(surfaces_.pair(key.a, key.b));

@@ -1,7 +1,7 @@
 #include <cmath>
-#include <cstdio>
 
 #include "common/check.hpp"
+#include "common/text.hpp"
 #include "geometry/rotation.hpp"
 #include "world/implementation.hpp"
 
@@ -356,9 +356,7 @@ void World::Implementation::add_coarse_notes() {
     const int first = model.rod_first_edge[r];
     const double ratio = (model.edge_length.segment(first, radius.size()).array() / (2.0 * radius.array())).maxCoeff();
     if (ratio <= 1.0 + 1e-9) continue;
-    char number[32];
-    std::snprintf(number, sizeof number, "%.3g", ratio);
-    plan.notes.push_back("warning: edges of rod '" + description.rods[r].name + "' are " + number +
+    plan.notes.push_back("warning: edges of rod '" + description.rods[r].name + "' are " + text(ratio) +
                          " times as long as it is thick, and touch as straight pieces: more nodes make contact smooth");
   }
 }

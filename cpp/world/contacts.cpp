@@ -1,7 +1,7 @@
-#include <cstdio>
 #include <string>
 
 #include "common/check.hpp"
+#include "common/text.hpp"
 #include "world/implementation.hpp"
 
 namespace withe {
@@ -66,8 +66,6 @@ void World::Implementation::check_overlap() const {
   };
   const std::string other = deepest->key.b < 0 ? "'" + description.contact.obstacles[at(-1 - deepest->key.b)].name + "'"
                                                : name(deepest->key.b);
-  char depth_text[32];
-  std::snprintf(depth_text, sizeof depth_text, "%.3g", 0.0 - deepest->gap);
   const std::string advice =
       description.contact.overlap == Overlap::separate
           ? std::string(" m at the start and cannot be moved apart") +
@@ -75,7 +73,7 @@ void World::Implementation::check_overlap() const {
                 "draw them apart, or leave the pair out with ignore_contact"
           : " m at the start: draw them apart, leave the pair out with ignore_contact, or take "
             "enable_contact(overlap='separate')";
-  require(false, name(deepest->key.a) + " and " + other + " overlap by " + depth_text + advice);
+  require(false, name(deepest->key.a) + " and " + other + " overlap by " + text(0.0 - deepest->gap) + advice);
 }
 
 }  // namespace withe

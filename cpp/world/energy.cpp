@@ -1,8 +1,8 @@
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <string>
 
+#include "common/text.hpp"
 #include "world/implementation.hpp"
 
 namespace withe {
@@ -137,10 +137,8 @@ void World::Implementation::begin_explicit() {
 std::string World::Implementation::longest_explicit_step() {
   const double stable = stable_step(*equations, parameters, state, work);
   if (!(options.time_step > stable)) return "";
-  char number[32];
-  std::snprintf(number, sizeof number, "%.3g", stable);
   const bool slips = equations->contact() && equations->contact()->eases();
-  return std::string(": take a time_step below ") + number + " s" +
+  return ": take a time_step below " + text(stable) + " s" +
          (slips ? ", or a greater slip_tolerance, which allows longer ones under friction" : "");
 }
 

@@ -1,6 +1,6 @@
 #include <algorithm>
-#include <cstdio>
 
+#include "common/text.hpp"
 #include "world/implementation.hpp"
 
 namespace withe {
@@ -10,12 +10,6 @@ namespace {
 constexpr double kCrushed = 0.5;
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
-
-std::string in_words(const char* format, double number) {
-  char words[64];
-  std::snprintf(words, sizeof words, format, number);
-  return words;
-}
 
 }  // namespace
 
@@ -59,15 +53,15 @@ std::string World::Implementation::crushed() const {
     shortest = e;
   }
   if (shortest < 0) return "";
-  return "; an edge is crushed to " + in_words("%.2g", least) + " of its length" +
+  return "; an edge is crushed to " + text(least, 2) + " of its length" +
          place_of_node(model.edge_tail[at(shortest)]).words +
          ", as by a force above E A / 2 or a blow faster than sound in the rod, sqrt(E / density)";
 }
 
 void World::Implementation::fail(const NewtonResult& r, double dt, const std::string& what) const {
   const Place place = place_of(r.worst_row);
-  throw ConvergenceFailure(what + in_words(" (time %.6g s", state.time) + in_words(", step %.3g s", dt) +
-                               in_words(", residual %.3g N", r.residual) + place.words + ")" + crushed() +
+  throw ConvergenceFailure(what + " (time " + text(state.time, 6) + " s, step " + text(dt) + " s, residual " +
+                               text(r.residual) + " N" + place.words + ")" + crushed() +
                                "; the world is left in its last accepted state",
                            state.time, dt, place.rod, place.node, r.residual);
 }

@@ -121,7 +121,7 @@ def test_writhe_of_a_polygon_is_the_mean_of_what_its_diagrams_show() -> None:
     assert writhe(points) == pytest.approx(np.mean(shown), abs=3.0 * float(np.std(shown)) / 20.0)
 
 
-@pytest.mark.parametrize("time_step", [2e-3, 2e-2])
+@pytest.mark.parametrize("time_step", [2e-3, 5e-3, 2e-2])
 def test_link_of_a_held_rod_is_kept_while_it_is_wound_into_a_plectoneme(time_step: float) -> None:
     turns, length = 5.0, 0.4
     scene = withe.Scene(gravity=(0, 0, 0))
