@@ -158,6 +158,7 @@ void Contact::begin(const State& state, double duration) {
   blocked_ = false;
   place_obstacles(state.obstacles);
   lagged_.clear();
+  forget_foreseen();
   if (outgrown(state.q, nullptr)) find_pairs(state.q, state.q);
   touching_.clear();
   unrecorded_.clear();

@@ -104,6 +104,11 @@ class Contact {
   /// Whether derivatives lack how pressing turns, the part by which it has negative stiffness.
   void leave_out_geometric(bool left_out) { geometric_ = !left_out; }
 
+  /// Notes the friction that a step of Newton's method reckons with, by which `change` is to be added to q1.
+  /// Derivatives are then what such steps need, and no longer those of the forces, until it is forgotten.
+  void foresee_friction(const VectorX& change);
+  void forget_foreseen() { foreseen_.clear(); }
+
   /// Takes from a predicted change of q what would move surfaces that stick: friction is steep there, and from outside
   /// Newton's method would fall past it.
   void hold_sticking(const State& state, VectorX& change) const;
@@ -179,6 +184,18 @@ class Contact {
   void add_frozen_friction(const Touching& t, bool with_hessian, ContactLocal& out) const;
   FrozenForce frozen_force(const Touching& t) const;
   Vec3d frozen_slip(const Touching& t) const;
+  ForceLaw frozen_law(double limit, const Vec3d& slip) const;
+  /// A contact's slip, what a change of q1 adds to it, and the friction on it.
+  struct Slipping {
+    Vec3d slip{}, change{};
+    ForceLaw law;
+    double limit = 0;  ///< [N]
+  };
+  Slipping frozen_slipping(const Touching& t, const VectorX& change) const;
+  Slipping slipping(const Touching& t, const VectorX& change) const;
+  const Vec3d* foreseen(const Touching& t) const {
+    return foreseen_.empty() ? nullptr : &foreseen_[static_cast<std::size_t>(t.pair)];
+  }
   double slip_rate() const;
   /// Of friction by the slip, at most [N/m].
   double friction_slope(const Touching& t) const;
@@ -237,6 +254,8 @@ class Contact {
   bool geometric_ = true, conserving_ = false;
   double duration_ = 0, eased_ = 1, start_energy_ = 0, start_pressing_ = 0, deepest_ = kDeepest;
   VectorX q1_;
+  /// Friction of each pair over its limit, empty where it is not known; and the next.
+  std::vector<Vec3d> foreseen_, next_foreseen_;
   std::vector<Touching> touching_, lagged_;
   std::vector<Frozen> frozen_;
   std::vector<std::pair<ContactKey, int>> elements_;  ///< sorted

@@ -59,6 +59,7 @@ FrictionSetting Contact::setting(const Touching& t) const {
   f.spatial = !model_.planar();
   f.centreline = contact.centreline_friction;
   f.drift = shift_of(pair);
+  f.foreseen = foreseen(t);
   values_at(pair, state_->q, f.start);
   if (!f.spatial) return f;
   f.source[0] = state_->tangent[at(pair.key.a)];
@@ -122,6 +123,11 @@ void Contact::freeze() {
   }
 }
 
+ForceLaw Contact::frozen_law(double limit, const Vec3d& slip) const {
+  const Dual<1> factor = slip_factor(Dual<1>::unknown(dot(slip, slip), 0), slip_rate());
+  return {limit * factor.value, limit * factor.slope[0], 0.0};
+}
+
 /// How far the surfaces have slipped, with J of the start.
 Vec3d Contact::frozen_slip(const Touching& t) const {
   const ContactPair& pair = pairs_[at(t.pair)];
@@ -133,6 +139,52 @@ Vec3d Contact::frozen_slip(const Touching& t) const {
   for (int i = 0; i < kContactUnknowns; ++i)
     slip += (now[i] - before[i]) * Vec3d{frozen.slip[0][i], frozen.slip[1][i], frozen.slip[2][i]};
   return slip;
+}
+
+Contact::Slipping Contact::frozen_slipping(const Touching& t, const VectorX& change) const {
+  const ContactPair& pair = pairs_[at(t.pair)];
+  const Frozen& frozen = frozen_[at(t.frozen)];
+  Slipping out;
+  out.limit = pair.friction * frozen.pressing;
+  out.slip = frozen_slip(t);
+  int dofs[kContactUnknowns];
+  unknowns_of(pair, dofs);
+  for (int i = 0; i < kContactUnknowns; ++i)
+    if (dofs[i] >= 0) out.change += change(dofs[i]) * Vec3d{frozen.slip[0][i], frozen.slip[1][i], frozen.slip[2][i]};
+  out.law = frozen_law(out.limit, out.slip);
+  return out;
+}
+
+Contact::Slipping Contact::slipping(const Touching& t, const VectorX& change) const {
+  const ContactPair& pair = pairs_[at(t.pair)];
+  const FrictionSetting f = setting(t);
+  int dofs[kContactUnknowns];
+  unknowns_of(pair, dofs);
+  double now[kContactUnknowns];
+  values_at(pair, q1_, now);
+  Dual<1> unknown[kContactUnknowns];
+  for (int i = 0; i < kContactUnknowns; ++i) unknown[i] = Dual<1>(now[i], {dofs[i] >= 0 ? change(dofs[i]) : 0.0});
+  const SlippingSurfaces<Dual<1>> surfaces = slipping_surfaces(f, unknown);
+  const Vec3<Dual<1>> slip = whole_slip(f, surfaces);
+  Slipping out;
+  out.limit = pair.friction * surfaces.pressing.value;
+  out.slip = {slip.x.value, slip.y.value, slip.z.value};
+  out.change = {slip.x.slope[0], slip.y.slope[0], slip.z.slope[0]};
+  out.law = force_law(f, surfaces.pressing.value, dot(out.slip, out.slip), surfaces.friction.sticking);
+  return out;
+}
+
+void Contact::foresee_friction(const VectorX& change) {
+  if (!frictional_ || model_.description.contact.friction_law == FrictionLaw::semi_explicit) return;
+  update(q1_);  // pairs may have been found anew since
+  next_foreseen_.assign(pairs_.size(), {});
+  for (const Touching& t : touching_) {
+    const bool frozen = t.frozen >= 0;
+    if (frozen != freezes() || !(pairs_[at(t.pair)].friction > 0.0)) continue;
+    const Slipping s = frozen ? frozen_slipping(t, change) : slipping(t, change);
+    if (s.limit > 0.0) next_foreseen_[at(t.pair)] = s.law.foresee(s.slip, s.change, foreseen(t), s.limit);
+  }
+  foreseen_.swap(next_foreseen_);
 }
 
 /// The direction of slip at the start, and how much of friction there is at its speed, tanh(K u / 2) [dissertation,
@@ -169,13 +221,13 @@ Contact::FrozenForce Contact::frozen_force(const Touching& t) const {
     out.sticking = rate * along < 7.5;
     return out;
   }
-  const double square = dot(slip, slip), s[3] = {slip.x, slip.y, slip.z};
-  const Dual<1> factor = slip_factor(Dual<1>::unknown(square, 0), rate);
-  out.force = (limit * factor.value) * slip;
+  const ForceLaw g = frozen_law(limit, slip);
+  const Vec3d reckoned = g.reckoned(slip, foreseen(t), limit);
+  out.force = g.factor * slip;
   for (int k = 0; k < 3; ++k)
     for (int l = 0; l < 3; ++l)
-      out.slope[k][l] = limit * ((k == l ? factor.value : 0.0) + 2.0 * factor.slope[0] * s[k] * s[l]);
-  out.sticking = rate * std::sqrt(square) < 7.5;
+      out.slope[k][l] = (k == l ? g.factor : 0.0) + g.by_square * (slip[k] * reckoned[l] + reckoned[k] * slip[l]);
+  out.sticking = rate * std::sqrt(dot(slip, slip)) < 7.5;
   return out;
 }
 

@@ -39,6 +39,7 @@ bool Contact::outgrown(const VectorX& q, const VectorX* change) const {
 void Contact::find_pairs(const VectorX& from, const VectorX& to) {
   if (surfaces_.edges().empty()) return;
   current_ = false;
+  forget_foreseen();
   double travel = 0.0;
   if (reference_.size() == to.size())
     for (int dof : model_.node_dof)

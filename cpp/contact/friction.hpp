@@ -38,6 +38,7 @@ struct FrictionSetting {
   Vec3d drift{};                    ///< way of an obstacle in the step [m]
   Vec3d stick{};                    ///< at the start of the step [m]
   bool spatial = true, centreline = false;
+  const Vec3d* foreseen = nullptr;  ///< friction over its limit, as a step of Newton's method reckons with it
 };
 
 template <class Scalar>
@@ -95,6 +96,39 @@ FrictionForce<Scalar> friction_force(const FrictionSetting& f, const Vec3<Scalar
   out.stick = stick;
   out.force = Scalar(f.tangential_stiffness) * stick;
   return out;
+}
+
+/// F = g(|S|^2, N) S, where an anchor's S has its stick in it.
+///
+/// Friction has a corner where surfaces stop, and Newton's method goes to and fro round it: the tangent on one side knows
+/// nothing of the other. So F and S are linearised as unknowns of their own, F / g = S in place of F = g S [Chan, Golub
+/// and Mulet 1999]: where balance asks for less than the limit, a step foresees that while surfaces still slip, and the
+/// next derivative, g dS + 2 g' (S . dS) F / g with that F, holds them.
+struct ForceLaw {
+  double factor = 0, by_square = 0, by_pressing = 0;  ///< g, g', g_N
+
+  /// F / g of a derivative; `foreseen`, where known, times `limit` is F.
+  Vec3d reckoned(const Vec3d& slip, const Vec3d* foreseen, double limit) const {
+    return foreseen != nullptr && factor > 0.0 ? (limit / factor) * *foreseen : slip;
+  }
+  /// F over its limit after a step that changes S: as the linear equations have it, but 1 at most.
+  Vec3d foresee(const Vec3d& slip, const Vec3d& change, const Vec3d* foreseen, double limit) const {
+    const Vec3d force =
+        factor * (slip + change) + (2.0 * by_square * dot(slip, change)) * reckoned(slip, foreseen, limit);
+    return (1.0 / std::max(limit, std::sqrt(dot(force, force)))) * force;
+  }
+};
+
+/// At a normal force N.
+inline ForceLaw force_law(const FrictionSetting& f, double pressing, double square, bool sticking) {
+  const double mu = f.pair->friction, limit = mu * pressing;
+  if (f.law != FrictionLaw::anchored) {
+    const Dual<1> factor = slip_factor(Dual<1>::unknown(square, 0), f.rate);
+    return {limit * factor.value, limit * factor.slope[0], mu * factor.value};
+  }
+  if (sticking) return {f.tangential_stiffness, 0.0, 0.0};
+  const double inverse = 1.0 / std::sqrt(square);
+  return {limit * inverse, -0.5 * limit * inverse / square, mu * inverse};
 }
 
 /// One of the edges whose turning makes surfaces slip.
@@ -205,6 +239,14 @@ void add_friction_gradient(const FrictionSetting& f, const SlippingSurfaces<Scal
     add(2 * b + 1, couple);
     add(2 * b, -couple);
   }
+}
+
+/// S, an anchor's stick included.
+template <class Scalar>
+Vec3<Scalar> whole_slip(const FrictionSetting& f, const SlippingSurfaces<Scalar>& c) {
+  Vec3<Scalar> way = c.way;
+  if (f.law == FrictionLaw::anchored) way += Vec3<Scalar>{Scalar(f.stick.x), Scalar(f.stick.y), Scalar(f.stick.z)};
+  return way - dot(way, c.normal) * c.normal;
 }
 
 /// The same with F and S as they are at `unknown`; returns F.

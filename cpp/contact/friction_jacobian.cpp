@@ -20,22 +20,6 @@ struct Slopes {
   Vec3d moment[kWays];  ///< m
 };
 
-/// F = g(|S|^2, N) S.
-struct ForceLaw {
-  double factor = 0, by_square = 0, by_pressing = 0;  ///< g, g', g_N
-};
-
-ForceLaw force_law(const FrictionSetting& f, const SlippingSurfaces<double>& c, double square) {
-  const double mu = f.pair->friction, limit = mu * c.pressing;
-  if (f.law != FrictionLaw::anchored) {
-    const Dual<1> factor = slip_factor(Dual<1>::unknown(square, 0), f.rate);
-    return {limit * factor.value, limit * factor.slope[0], mu * factor.value};
-  }
-  if (c.friction.sticking) return {f.tangential_stiffness, 0.0, 0.0};
-  const double inverse = 1.0 / std::sqrt(square);
-  return {limit * inverse, -0.5 * limit * inverse / square, mu * inverse};
-}
-
 /// Where they touch, and how hard they press: by all but the angles.
 void add_contact_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& c, Slopes& d) {
   const ContactPair& pair = *f.pair;
@@ -95,7 +79,8 @@ void add_force_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& 
   const Vec3d way = f.law == FrictionLaw::anchored ? c.way + f.stick : c.way;
   const double off = dot(way, n);
   const Vec3d slip = way - off * n;
-  const ForceLaw g = force_law(f, c, dot(slip, slip));
+  const ForceLaw g = force_law(f, c.pressing, dot(slip, slip), c.friction.sticking);
+  const Vec3d reckoned = g.reckoned(slip, f.foreseen, f.pair->friction * c.pressing);
   const Vec3d change_a = c.sides[0].change, change_b = f.pair->rod_b < 0 ? Vec3d{} : c.sides[1].change;
   for (int j = 0; j < kWays; ++j) {
     const Vec3d across = c.inverse * d.between[j];
@@ -103,7 +88,7 @@ void add_force_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& 
     if (j < 3) moved += kAxis[j];
     moved -= off * across;
     d.force[j] = g.factor * moved - (g.factor * (dot(n, moved) + dot(slip, across))) * n +
-                 (2.0 * g.by_square * dot(slip, moved) + g.by_pressing * d.pressing[j]) * slip;
+                 (2.0 * g.by_square * dot(slip, moved)) * reckoned + (g.by_pressing * d.pressing[j]) * slip;
   }
 }
 

@@ -143,6 +143,12 @@ double Equations::allowed(const VectorX& z, const VectorX& step) {
   return contact_->allowed(contact_end_, contact_change_);
 }
 
+void Equations::foresee(const VectorX& step, double kept) {
+  if (!contact_) return;
+  contact_change_ = ((inner_ == Inner::middle ? 2.0 : 1.0) / kept) * step;
+  contact_->foresee_friction(contact_change_);
+}
+
 double Equations::contact_loss(const VectorX& change, double obstacle_work) const {
   return contact_gradient_.dot(change) + obstacle_work - (contact_->energy() - contact_->start_energy());
 }

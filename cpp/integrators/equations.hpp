@@ -58,6 +58,8 @@ class Equations {
   void forget_contacts();
   /// How much of a step of z contact allows, from 0 to 1.
   double allowed(const VectorX& z, const VectorX& step);
+  /// Tells contact of a step of Newton's method from where it was last evaluated, of which `kept` is left.
+  void foresee(const VectorX& step, double kept);
 
   /// Prepares a step from `state` over h (0: statics). Copies what it needs but the state itself, which
   /// must outlive the step.

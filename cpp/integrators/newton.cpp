@@ -27,6 +27,8 @@ constexpr int kMostCuts = 10;
 constexpr double kLittle = 0.125;
 // Friction has no potential, and may lead downhill in a circle; what has not converged after so many iterations does.
 constexpr int kLongestDescent = 20;
+// While steps are longer than this, over the tolerance, surfaces may yet stick or slip, and an old matrix not know it.
+constexpr double kUnsettled = 1e4;
 
 std::size_t at(MatrixAge age) { return static_cast<std::size_t>(age); }
 
@@ -188,6 +190,7 @@ NewtonResult Newton::solve(Equations& equations, VectorX& z, const VectorX* targ
   bool axial_known = mixed && interval != 0.0;
   int stagnant = 0, overdue = 0;
   double first_residual = 0.0;
+  if (equations.contact()) equations.contact()->forget_foreseen();
   const auto give_up = [&] {
     factor.owner = nullptr;
     return result;
@@ -233,6 +236,7 @@ NewtonResult Newton::solve(Equations& equations, VectorX& z, const VectorX* targ
     p.search = {};
     if (!work.step.allFinite()) return give_up();
     double shorten = shortened(equations, z, work.step);
+    equations.foresee(work.step, shorten);
     if (mixed) equations.predict_axial_force(work.step, work.axial_force);
     axial_known = mixed;
     if (equations.contact()) {
@@ -266,6 +270,7 @@ NewtonResult Newton::solve(Equations& equations, VectorX& z, const VectorX* targ
     p.age = p.fresh ? MatrixAge::fresh : p.made_here ? MatrixAge::within : MatrixAge::across;
     stagnant = balance.either && p.step > 0.25 * p.last_step ? stagnant + 1 : 0;
     plan_next(p, factor);
+    if (equations.contact() && equations.contact()->eases() && p.step > kUnsettled * tolerance) p.fresh = true;
   }
 }
 

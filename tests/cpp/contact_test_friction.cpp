@@ -160,6 +160,48 @@ void expect_dual_numbers(Other other, bool planar, std::size_t classes) {
 
 class FrictionJacobian : public ::testing::TestWithParam<bool> {};
 
+/// A setting for `force_law`.
+FrictionSetting law_setting(const ContactPair& pair, FrictionLaw law) {
+  FrictionSetting f;
+  f.pair = &pair;
+  f.law = law;
+  f.rate = 3.0;
+  f.tangential_stiffness = 40.0;
+  return f;
+}
+
+TEST(ForceLaw, ForeseesTheForceOfTheLinearEquationsOfForceAndSlip) {
+  // F / g(|S|^2) - S = 0, linear in changes of F and S, at an F that is not that of S
+  ContactPair pair;
+  pair.friction = 0.5;
+  const double pressing = 2.0, limit = pair.friction * pressing, small = 1e-6;
+  const Vec3d slip{0.4, -0.3, 0.1}, change{-0.02, 0.03, 0.01}, share{0.1, 0.2, -0.3};
+  for (FrictionLaw law : {FrictionLaw::implicit, FrictionLaw::anchored}) {
+    const FrictionSetting f = law_setting(pair, law);
+    const auto inverse = [&](const Vec3d& s) { return 1.0 / force_law(f, pressing, dot(s, s), false).factor; };
+    const ForceLaw g = force_law(f, pressing, dot(slip, slip), false);
+    const Vec3d force = limit * g.foresee(slip, change, &share, limit);
+    const double turned = (inverse(slip + small * change) - inverse(slip - small * change)) / (2.0 * small);
+    const Vec3d unbalanced = inverse(slip) * force + (turned * limit) * share - slip - change;
+    EXPECT_LT(std::sqrt(dot(unbalanced, unbalanced)), 1e-8) << static_cast<int>(law);
+  }
+}
+
+TEST(ForceLaw, ForeseesNoMoreThanTheLimitAndHoldsWhatIsForeseenToStop) {
+  ContactPair pair;
+  pair.friction = 0.5;
+  const double pressing = 2.0, limit = pair.friction * pressing;
+  const Vec3d slip{3.0, 0.0, 0.0}, none{};
+  const ForceLaw g = force_law(law_setting(pair, FrictionLaw::implicit), pressing, dot(slip, slip), false);
+  const Vec3d most = g.foresee(slip, 100.0 * slip, &none, limit);
+  EXPECT_NEAR(std::sqrt(dot(most, most)), 1.0, 1e-12);
+  const auto stiffness = [&](const Vec3d* foreseen) {
+    return g.factor + 2.0 * g.by_square * dot(slip, g.reckoned(slip, foreseen, limit));
+  };
+  EXPECT_LT(stiffness(nullptr), 1e-6 * g.factor);  // that of the law: it slips
+  EXPECT_EQ(stiffness(&none), g.factor);           // a chord to the origin
+}
+
 INSTANTIATE_TEST_SUITE_P(InSpaceAndInAPlane, FrictionJacobian, ::testing::Bool());
 
 TEST_P(FrictionJacobian, OfTwoRodsIsThatOfDualNumbers) { expect_dual_numbers(Other::rod, GetParam(), 4); }
