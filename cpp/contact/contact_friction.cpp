@@ -7,6 +7,9 @@
 namespace withe {
 namespace {
 
+// On a way this short, over the slip that friction grows with, a tangent says enough.
+constexpr double kShortWay = 0.1;
+
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
 }  // namespace
@@ -176,6 +179,10 @@ Contact::Slipping Contact::slipping(const Touching& t, const VectorX& change) co
 
 void Contact::foresee_friction(const VectorX& change) {
   if (!frictional_ || model_.description.contact.friction_law == FrictionLaw::semi_explicit) return;
+  if (eases() && farthest(change) * slip_rate() < kShortWay) {
+    forget_foreseen();
+    return;
+  }
   update(q1_);  // pairs may have been found anew since
   next_foreseen_.assign(pairs_.size(), {});
   for (const Touching& t : touching_) {

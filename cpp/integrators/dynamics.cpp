@@ -94,7 +94,8 @@ NewtonResult solve_eased(Equations& equations, const Newton& newton, bool mixed,
 }
 
 /// Finds the inner configuration, `work.z`: from the extrapolated motion first; where that is too far off, from a
-/// steady one, or from rest, whose first iteration is the linear step.
+/// steady one, or from rest, whose first iteration is the linear step. A step that is repeated since contact was too
+/// soft sets out from where it led.
 NewtonResult find_inner(Equations& equations, const Newton& newton, const Options& options, const StepPlan& plan,
                         double h, const State& state, const Predictor& predictor, StepWorkspace& work) {
   struct Start {
@@ -124,6 +125,15 @@ NewtonResult find_inner(Equations& equations, const Newton& newton, const Option
   const bool eases = frictional && equations.contact()->eases();
   if (frictional) std::swap(starts[1], starts[2]);
   if (eases) std::rotate(starts.begin() + 2, starts.end() - 1, starts.end());
+  const int few = std::min(12, options.max_iterations);
+  if (work.repeated) {
+    work.z = work.deep;
+    equations.keep_angular_momentum(exact);
+    start_axial_force(equations, work.z, work.newton.axial_force);
+    found = newton.solve(equations, work.z, nullptr, few, work.newton, mixed, h, true);
+    if (found.converged) return found;
+    spent = found.iterations;
+  }
   for (const Start& start : starts) {
     if (start.eased && !eases) continue;
     if (start.accelerated && (points == 0 || work.repeated)) continue;
@@ -145,10 +155,10 @@ NewtonResult find_inner(Equations& equations, const Newton& newton, const Option
     const bool trial = start.accelerated || (circling && start.mixed && start.moving), keep_momentum = exact && first;
     equations.keep_angular_momentum(keep_momentum);
     first = false;
-    const int limit = trial ? std::min(12, options.max_iterations) : options.max_iterations;
+    const int limit = trial ? few : options.max_iterations;
     start_axial_force(equations, state.q, work.newton.axial_force);
     found = start.eased ? solve_eased(equations, newton, start.mixed, h, work)
-                        : newton.solve(equations, work.z, nullptr, limit, work.newton, start.mixed, h);
+                        : newton.solve(equations, work.z, nullptr, limit, work.newton, start.mixed, h, trial);
     spent += found.iterations;
     if (!sure) record.note(found.converged);
     if (found.converged) {
@@ -321,7 +331,10 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
     if (equations.allowed(state.q, work.change) < 1.0) return result;
     contact->update(q1);
     result.too_deep = contact->too_deep();
-    if (result.too_deep) return result;
+    if (result.too_deep) {
+      work.deep = work.z;
+      return result;
+    }
   }
   work.change = q1 - state.q;
   if (equations.contact()) result.pressing_gain = equations.contact()->pressing_gain(work.change);

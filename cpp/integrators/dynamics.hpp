@@ -53,7 +53,8 @@ struct StepResult {
 struct StepWorkspace {
   NewtonWorkspace newton;
   HeldTarget held;
-  bool repeated = false;  ///< the same step as before, with stiffer contact: its prediction has been seen to miss
+  bool repeated = false;  ///< the same step as before, with stiffer contact
+  VectorX deep;           ///< where that led
   VectorX z, move, change, mean, velocity, assumed, difference, whole_acceleration;
   Configuration after;
   State from, next;  ///< explicit steps

@@ -23,6 +23,8 @@ constexpr int kFirstIterations = 4;
 constexpr double kHopeless = 1e3;
 // Halvings of a step between surfaces before it is taken as it is.
 constexpr int kMostCuts = 10;
+// A start whose first step can be taken by less than this is far off.
+constexpr double kPromising = 0.5;
 // That much of a step uphill is too little.
 constexpr double kLittle = 0.125;
 // Friction has no potential, and may lead downhill in a circle; what has not converged after so many iterations does.
@@ -168,7 +170,7 @@ void Newton::plan_next(Progress& p, FactorRecord& factor) const {
 }
 
 NewtonResult Newton::solve(Equations& equations, VectorX& z, const VectorX* target, int max_iterations,
-                           NewtonWorkspace& work, bool mixed, double interval) const {
+                           NewtonWorkspace& work, bool mixed, double interval, bool tentative) const {
   mixed = mixed && options_.mixed;
   NewtonResult result;
   Evaluation& e = work.evaluation;
@@ -253,6 +255,7 @@ NewtonResult Newton::solve(Equations& equations, VectorX& z, const VectorX* targ
         axial_known = false;  // no prediction outlives a step that may lead elsewhere
       }
     }
+    if (tentative && equations.contact() && result.iterations == 0 && shorten < kPromising) return give_up();
     if (options_.line_search == LineSearch::goldstein_price) {
       const double alpha = line_search(equations, z, work.step, target, work);
       work.step *= alpha;

@@ -76,9 +76,10 @@ class Newton {
   /// Finds z with F(z) = target (nothing: zero), starting at z. `mixed`: with the axial forces as unknowns of
   /// their own, where the options allow it. `interval`: of a time step, whose matrix may serve several iterations and
   /// the steps to come, as long as it makes steps small fast (0: a new one every iteration); the mixed method then sets
-  /// out from work.axial_force.
+  /// out from work.axial_force. `tentative`: one of several starts, given up where surfaces leave less than half of its
+  /// first step.
   NewtonResult solve(Equations& equations, VectorX& z, const VectorX* target, int max_iterations, NewtonWorkspace& work,
-                     bool mixed = true, double interval = 0.0) const;
+                     bool mixed = true, double interval = 0.0, bool tentative = false) const;
   /// Whether residuals are small enough; also notes the worst one in `result`.
   Balance balance(const Evaluation& evaluation, NewtonResult& result) const;
   /// Factor by which a step is shortened, so that nothing moves or turns too far at once.
