@@ -142,7 +142,7 @@ def pile(rods: int) -> withe.Simulation:
 
 def piles(report: Report, quick: bool) -> None:
     """How a step of piles that settle grows with the number of rods, on the whole and but for linear solves."""
-    counts, steps = ((10, 20), 1) if quick else ((125, 250, 500), 20)
+    counts, steps = ((10, 20), 1) if quick else ((250, 500, 1000), 20)
     rows, seconds, rest = [], [], []
     for count in counts:
         simulation = pile(count)
@@ -161,8 +161,7 @@ def piles(report: Report, quick: bool) -> None:
         rows,
     )
     exponent, exponent_of_rest = (float(np.polyfit(np.log(counts), np.log(values), 1)[0]) for values in (seconds, rest))
-    expected = seconds[-1] * (1000 / counts[-1]) ** exponent
-    report.goal("1,000 rods, extrapolated [s a step]", None if quick else expected, 2.0, at_least=False)
+    report.goal("1,000 rods [s a step]", None if quick else seconds[-1], 2.0, at_least=False)
     report.goal("exponent of a step over rods", None if quick else exponent, 1.4, at_least=False)
     report.goal(
         "the same but for linear solves, an iteration", None if quick else exponent_of_rest, 1.15, at_least=False

@@ -78,8 +78,8 @@ void ElementTable::find_offsets(const LinearSolver& solver) {
         if (d[i] < 0 || d[j] < 0)
           offsets_.push_back(-1);
         else
-          offsets_.push_back(symmetric_ ? solver.offset(std::max(d[i], d[j]), std::min(d[i], d[j]))
-                                        : solver.offset(d[i], d[j]));
+          offsets_.push_back(static_cast<int>(symmetric_ ? solver.offset(std::max(d[i], d[j]), std::min(d[i], d[j]))
+                                                         : solver.offset(d[i], d[j])));
       }
   }
 }
@@ -88,7 +88,7 @@ bool ElementTable::regular(int element, std::vector<std::ptrdiff_t>& lines) cons
   const int* d = dofs(element);
   for (int i = 0; i < width_; ++i)
     if (d[i] < 0 || d[i] != d[0] + i) return false;
-  const std::ptrdiff_t* offset = offsets_.data() + entry_start(element);
+  const int* offset = offsets_.data() + entry_start(element);
   const auto entry = [&](int i, int j) { return offset[symmetric_ ? i * (i + 1) / 2 + j : i * width_ + j]; };
   bool by_rows = !symmetric_, by_columns = true;
   for (int i = 0; i < width_; ++i)
@@ -102,7 +102,7 @@ bool ElementTable::regular(int element, std::vector<std::ptrdiff_t>& lines) cons
 }
 
 std::ptrdiff_t ElementTable::offset(int element, int i, int j) const {
-  const std::ptrdiff_t* offset = offsets_.data() + entry_start(element);
+  const int* offset = offsets_.data() + entry_start(element);
   return symmetric_ ? offset[std::max(i, j) * (std::max(i, j) + 1) / 2 + std::min(i, j)] : offset[i * width_ + j];
 }
 
@@ -118,7 +118,7 @@ void ElementTable::add_gradient(int element, const double* gradient, double scal
 
 void ElementTable::add_hessian(int element, const double* hessian, int stride, double scale,
                                std::span<double> values) const {
-  const std::ptrdiff_t* offset = offsets_.data() + entry_start(element);
+  const int* offset = offsets_.data() + entry_start(element);
   for (int i = 0; i < width_; ++i) {
     const int columns = symmetric_ ? i + 1 : width_;
     for (int j = 0; j < columns; ++j, ++offset)
