@@ -168,7 +168,7 @@ Contact::Slipping Contact::slipping(const Touching& t, const VectorX& change) co
   Dual<1> unknown[kContactUnknowns];
   for (int i = 0; i < kContactUnknowns; ++i) unknown[i] = Dual<1>(now[i], {dofs[i] >= 0 ? change(dofs[i]) : 0.0});
   const SlippingSurfaces<Dual<1>> surfaces = slipping_surfaces(f, unknown);
-  const Vec3<Dual<1>> slip = whole_slip(f, surfaces);
+  const Vec3<Dual<1>> way = whole_way(f, surfaces), slip = way - dot(way, surfaces.normal) * surfaces.normal;
   Slipping out;
   out.limit = pair.friction * surfaces.pressing.value;
   out.slip = {slip.x.value, slip.y.value, slip.z.value};

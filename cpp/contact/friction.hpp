@@ -241,12 +241,11 @@ void add_friction_gradient(const FrictionSetting& f, const SlippingSurfaces<Scal
   }
 }
 
-/// S, an anchor's stick included.
+/// S with its part along the normal, an anchor's stick included.
 template <class Scalar>
-Vec3<Scalar> whole_slip(const FrictionSetting& f, const SlippingSurfaces<Scalar>& c) {
-  Vec3<Scalar> way = c.way;
-  if (f.law == FrictionLaw::anchored) way += Vec3<Scalar>{Scalar(f.stick.x), Scalar(f.stick.y), Scalar(f.stick.z)};
-  return way - dot(way, c.normal) * c.normal;
+Vec3<Scalar> whole_way(const FrictionSetting& f, const SlippingSurfaces<Scalar>& c) {
+  if (f.law != FrictionLaw::anchored) return c.way;
+  return c.way + Vec3<Scalar>{Scalar(f.stick.x), Scalar(f.stick.y), Scalar(f.stick.z)};
 }
 
 /// The same with F and S as they are at `unknown`; returns F.

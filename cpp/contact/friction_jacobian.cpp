@@ -76,7 +76,7 @@ Vec3d turn_of(const FrictionSetting& f, const SlippingSurfaces<double>& c) {
 /// The slip, with the part along the normal that it loses as that turns, and the force on it.
 void add_force_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& c, const Vec3d& lever, Slopes& d) {
   const Vec3d &n = c.normal, turn = turn_of(f, c);
-  const Vec3d way = f.law == FrictionLaw::anchored ? c.way + f.stick : c.way;
+  const Vec3d way = whole_way(f, c);
   const double off = dot(way, n);
   const Vec3d slip = way - off * n;
   const ForceLaw g = force_law(f, c.pressing, dot(slip, slip), c.friction.sticking);

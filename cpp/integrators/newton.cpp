@@ -192,10 +192,13 @@ NewtonResult Newton::solve(Equations& equations, VectorX& z, const VectorX* targ
   bool axial_known = mixed && interval != 0.0;
   int stagnant = 0, overdue = 0;
   double first_residual = 0.0;
-  if (equations.contact()) equations.contact()->forget_foreseen();
+  const auto end = [&] {
+    if (equations.contact()) equations.contact()->forget_foreseen();
+    return result;
+  };
   const auto give_up = [&] {
     factor.owner = nullptr;
-    return result;
+    return end();
   };
   for (;; ++result.iterations) {
     work.poll();
@@ -211,7 +214,7 @@ NewtonResult Newton::solve(Equations& equations, VectorX& z, const VectorX* targ
         (balance.either && (p.rest <= tolerance || stagnant >= 3))) {
       result.converged = true;
       factor.tired = p.age == MatrixAge::across && result.iterations >= kTiring;
-      return result;
+      return end();
     }
     if (result.iterations == max_iterations) return give_up();
     if (result.iterations == 0) first_residual = result.residual;
