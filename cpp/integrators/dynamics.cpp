@@ -130,7 +130,7 @@ NewtonResult find_inner(Equations& equations, const Newton& newton, const Option
     work.z = work.deep;
     equations.keep_angular_momentum(exact);
     start_axial_force(equations, work.z, work.newton.axial_force);
-    found = newton.solve(equations, work.z, nullptr, few, work.newton, mixed, h, true);
+    found = newton.solve(equations, work.z, nullptr, few, work.newton, mixed, h);
     if (found.converged) return found;
     spent = found.iterations;
   }
@@ -157,9 +157,12 @@ NewtonResult find_inner(Equations& equations, const Newton& newton, const Option
     first = false;
     const int limit = trial ? few : options.max_iterations;
     start_axial_force(equations, state.q, work.newton.axial_force);
+    // Starts that surfaces cut short soon converge in one scene, and lead nowhere in another.
+    const bool impatient = trial && known.cut.waits > 0;
     found = start.eased ? solve_eased(equations, newton, start.mixed, h, work)
-                        : newton.solve(equations, work.z, nullptr, limit, work.newton, start.mixed, h, trial);
+                        : newton.solve(equations, work.z, nullptr, limit, work.newton, start.mixed, h, impatient);
     spent += found.iterations;
+    if (trial && found.cut && !known.cut.skipped()) known.cut.note(found.converged);
     if (!sure) record.note(found.converged);
     if (found.converged) {
       if (circling && mixed && !start.mixed) known.plain_solves = kWait;

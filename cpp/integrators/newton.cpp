@@ -170,7 +170,7 @@ void Newton::plan_next(Progress& p, FactorRecord& factor) const {
 }
 
 NewtonResult Newton::solve(Equations& equations, VectorX& z, const VectorX* target, int max_iterations,
-                           NewtonWorkspace& work, bool mixed, double interval, bool tentative) const {
+                           NewtonWorkspace& work, bool mixed, double interval, bool impatient) const {
   mixed = mixed && options_.mixed;
   NewtonResult result;
   Evaluation& e = work.evaluation;
@@ -258,7 +258,8 @@ NewtonResult Newton::solve(Equations& equations, VectorX& z, const VectorX* targ
         axial_known = false;  // no prediction outlives a step that may lead elsewhere
       }
     }
-    if (tentative && equations.contact() && result.iterations == 0 && shorten < kPromising) return give_up();
+    if (result.iterations == 0) result.cut = equations.contact() && shorten < kPromising;
+    if (impatient && result.cut) return give_up();
     if (options_.line_search == LineSearch::goldstein_price) {
       const double alpha = line_search(equations, z, work.step, target, work);
       work.step *= alpha;

@@ -21,6 +21,7 @@ struct NewtonResult {
   double residual = 0;  ///< greatest force out of balance [N]
   int worst_row = -1;
   double step = 0;  ///< greatest displacement of the last iteration [m]
+  bool cut = false;  ///< surfaces left less than half of the first step
 };
 
 /// How small the residuals are.
@@ -57,6 +58,7 @@ struct FactorRecord {
   int plain_solves = 0;                                 ///< still to come before the mixed method is tried again
   int relaxed_solves = 0;                               ///< and before angular momentum is kept exactly again
   std::array<StartRecord, 5> starts{};                  ///< per start of find_inner
+  StartRecord cut;                                      ///< of those whose first step is cut
 };
 
 /// Scratch of the solver; owned by the world, so that a step does not allocate.
@@ -76,10 +78,9 @@ class Newton {
   /// Finds z with F(z) = target (nothing: zero), starting at z. `mixed`: with the axial forces as unknowns of
   /// their own, where the options allow it. `interval`: of a time step, whose matrix may serve several iterations and
   /// the steps to come, as long as it makes steps small fast (0: a new one every iteration); the mixed method then sets
-  /// out from work.axial_force. `tentative`: one of several starts, given up where surfaces leave less than half of its
-  /// first step.
+  /// out from work.axial_force. `impatient`: gives up where surfaces leave less than half of the first step.
   NewtonResult solve(Equations& equations, VectorX& z, const VectorX* target, int max_iterations, NewtonWorkspace& work,
-                     bool mixed = true, double interval = 0.0, bool tentative = false) const;
+                     bool mixed = true, double interval = 0.0, bool impatient = false) const;
   /// Whether residuals are small enough; also notes the worst one in `result`.
   Balance balance(const Evaluation& evaluation, NewtonResult& result) const;
   /// Factor by which a step is shortened, so that nothing moves or turns too far at once.
