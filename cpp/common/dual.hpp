@@ -1,7 +1,6 @@
 #pragma once
 /// A number with its derivatives by N unknowns: exact first derivatives of what is too long to derive by hand.
 
-#include <algorithm>
 #include <cmath>
 
 namespace withe {
@@ -12,7 +11,6 @@ struct Dual {
   double slope[N] = {};
 
   Dual() = default;
-  Dual(double at, const double (&slopes)[N]) : value(at) { std::copy_n(slopes, N, slope); }
   Dual(double constant) : value(constant) {}  // NOLINT(google-explicit-constructor): constants mix with duals
   static Dual unknown(double value, int index) {
     Dual d(value);

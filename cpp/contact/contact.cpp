@@ -97,12 +97,11 @@ double Contact::tangential_stiffness(const ContactPair& pair, double stiffness) 
 }
 
 void Contact::end_points(const ContactPair& pair, const VectorX& q, Vec3d (&x)[4]) const {
-  const auto place = [&](int dof) { return Vec3d{q(dof), q(dof + 1), model_.planar() ? 0.0 : q(dof + 2)}; };
-  x[0] = place(model_.tail_dof[at(pair.key.a)]);
-  x[1] = place(model_.head_dof[at(pair.key.a)]);
+  x[0] = local_vector(model_, q, model_.tail_dof[at(pair.key.a)]);
+  x[1] = local_vector(model_, q, model_.head_dof[at(pair.key.a)]);
   if (pair.key.b >= 0) {
-    x[2] = place(model_.tail_dof[at(pair.key.b)]);
-    x[3] = place(model_.head_dof[at(pair.key.b)]);
+    x[2] = local_vector(model_, q, model_.tail_dof[at(pair.key.b)]);
+    x[3] = local_vector(model_, q, model_.head_dof[at(pair.key.b)]);
   } else {
     const Obstacle& o = surfaces_.obstacles()[at(-1 - pair.key.b)];
     x[2] = o.point;

@@ -184,7 +184,6 @@ class Contact {
   void add_frozen_friction(const Touching& t, bool with_hessian, ContactLocal& out) const;
   FrozenForce frozen_force(const Touching& t) const;
   Vec3d frozen_slip(const Touching& t) const;
-  ForceLaw frozen_law(double limit, const Vec3d& slip) const;
   /// A contact's slip, what a change of q1 adds to it, and the friction on it.
   struct Slipping {
     Vec3d slip{}, change{};

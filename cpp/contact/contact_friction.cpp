@@ -126,11 +126,6 @@ void Contact::freeze() {
   }
 }
 
-ForceLaw Contact::frozen_law(double limit, const Vec3d& slip) const {
-  const Dual<1> factor = slip_factor(Dual<1>::unknown(dot(slip, slip), 0), slip_rate());
-  return {limit * factor.value, limit * factor.slope[0], 0.0};
-}
-
 /// How far the surfaces have slipped, with J of the start.
 Vec3d Contact::frozen_slip(const Touching& t) const {
   const ContactPair& pair = pairs_[at(t.pair)];
@@ -154,7 +149,7 @@ Contact::Slipping Contact::frozen_slipping(const Touching& t, const VectorX& cha
   unknowns_of(pair, dofs);
   for (int i = 0; i < kContactUnknowns; ++i)
     if (dofs[i] >= 0) out.change += change(dofs[i]) * Vec3d{frozen.slip[0][i], frozen.slip[1][i], frozen.slip[2][i]};
-  out.law = frozen_law(out.limit, out.slip);
+  out.law = tanh_law(pair.friction, frozen.pressing, dot(out.slip, out.slip), slip_rate());
   return out;
 }
 
@@ -166,7 +161,10 @@ Contact::Slipping Contact::slipping(const Touching& t, const VectorX& change) co
   double now[kContactUnknowns];
   values_at(pair, q1_, now);
   Dual<1> unknown[kContactUnknowns];
-  for (int i = 0; i < kContactUnknowns; ++i) unknown[i] = Dual<1>(now[i], {dofs[i] >= 0 ? change(dofs[i]) : 0.0});
+  for (int i = 0; i < kContactUnknowns; ++i) {
+    unknown[i] = now[i];
+    if (dofs[i] >= 0) unknown[i].slope[0] = change(dofs[i]);
+  }
   const SlippingSurfaces<Dual<1>> surfaces = slipping_surfaces(f, unknown);
   const Vec3<Dual<1>> way = whole_way(f, surfaces), slip = way - dot(way, surfaces.normal) * surfaces.normal;
   Slipping out;
@@ -228,13 +226,14 @@ Contact::FrozenForce Contact::frozen_force(const Touching& t) const {
     out.sticking = rate * along < 7.5;
     return out;
   }
-  const ForceLaw g = frozen_law(limit, slip);
+  const double square = dot(slip, slip);
+  const ForceLaw g = tanh_law(pair.friction, frozen.pressing, square, rate);
   const Vec3d reckoned = g.reckoned(slip, foreseen(t), limit);
   out.force = g.factor * slip;
   for (int k = 0; k < 3; ++k)
     for (int l = 0; l < 3; ++l)
       out.slope[k][l] = (k == l ? g.factor : 0.0) + g.by_square * (slip[k] * reckoned[l] + reckoned[k] * slip[l]);
-  out.sticking = rate * std::sqrt(dot(slip, slip)) < 7.5;
+  out.sticking = rate * std::sqrt(square) < 7.5;
   return out;
 }
 

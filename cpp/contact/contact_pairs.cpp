@@ -143,8 +143,8 @@ double Contact::allowed_of(const ContactPair& pair, const VectorX& q, const Vect
   end_points(pair, q, x);
   const int edges[2] = {pair.key.a, pair.key.b};
   for (int side = 0; change && side < (pair.key.b < 0 ? 1 : 2); ++side) {
-    d[2 * side] = local_position(model_, *change, model_.edge_tail[at(edges[side])]);
-    d[2 * side + 1] = local_position(model_, *change, model_.edge_head[at(edges[side])]);
+    d[2 * side] = local_vector(model_, *change, model_.tail_dof[at(edges[side])]);
+    d[2 * side + 1] = local_vector(model_, *change, model_.head_dof[at(edges[side])]);
   }
   double speed = 0.0;
   for (int a = 0; a < 2; ++a)

@@ -119,13 +119,16 @@ struct ForceLaw {
   }
 };
 
-/// At a normal force N.
+/// That of implicit and lagged friction at a normal force N, with K / (2 dt).
+inline ForceLaw tanh_law(double mu, double pressing, double square, double rate) {
+  const Dual<1> factor = slip_factor(Dual<1>::unknown(square, 0), rate);
+  const double limit = mu * pressing;
+  return {limit * factor.value, limit * factor.slope[0], mu * factor.value};
+}
+
 inline ForceLaw force_law(const FrictionSetting& f, double pressing, double square, bool sticking) {
   const double mu = f.pair->friction, limit = mu * pressing;
-  if (f.law != FrictionLaw::anchored) {
-    const Dual<1> factor = slip_factor(Dual<1>::unknown(square, 0), f.rate);
-    return {limit * factor.value, limit * factor.slope[0], mu * factor.value};
-  }
+  if (f.law != FrictionLaw::anchored) return tanh_law(mu, pressing, square, f.rate);
   if (sticking) return {f.tangential_stiffness, 0.0, 0.0};
   const double inverse = 1.0 / std::sqrt(square);
   return {limit * inverse, -0.5 * limit * inverse / square, mu * inverse};

@@ -70,10 +70,14 @@ class Surfaces {
   double greatest_reach_ = 0;
 };
 
-/// Position of a node as a vector of three numbers, in the axes of the unknowns.
-inline Vec3d local_position(const Model& model, const VectorX& q, int node) {
-  const int dof = model.node_dof[static_cast<std::size_t>(node)];
+/// What stands at a node's first unknown, as a vector of three numbers in the axes of the unknowns.
+inline Vec3d local_vector(const Model& model, const VectorX& q, int dof) {
   return {q(dof), q(dof + 1), model.planar() ? 0.0 : q(dof + 2)};
+}
+
+/// Position of a node, in the same axes.
+inline Vec3d local_position(const Model& model, const VectorX& q, int node) {
+  return local_vector(model, q, model.node_dof[static_cast<std::size_t>(node)]);
 }
 
 }  // namespace withe

@@ -103,8 +103,12 @@ void Equations::forget_contacts() {
   assembler_.forget_contacts(contact_->element_unknowns(), kContactUnknowns);
 }
 
-void Equations::find_contacts(const VectorX& z, bool with_matrix) {
+void Equations::set_contact_end(const VectorX& z) {
   contact_end_ = inner_ == Inner::middle ? VectorX(2.0 * z - state_->q) : z;
+}
+
+void Equations::find_contacts(const VectorX& z, bool with_matrix) {
+  set_contact_end(z);
   contact_->update(contact_end_);
   if (!with_matrix || contact_->coupled()) return;
   contact_->couple();
@@ -115,7 +119,7 @@ void Equations::find_contacts(const VectorX& z, bool with_matrix) {
 void Equations::add_contacts(bool with_matrix, Evaluation& out) {
   contact_gradient_.setZero(model_.dof_count);
   contact_floor_.setZero(model_.dof_count);
-  const double twice = inner_ == Inner::middle ? 2.0 : 1.0;
+  const double twice = end_rate();
   ContactLocal local;
   int dofs[kContactUnknowns];
   for (int i = 0; i < contact_->count(); ++i) {
@@ -137,15 +141,14 @@ void Equations::add_contacts(bool with_matrix, Evaluation& out) {
 
 double Equations::allowed(const VectorX& z, const VectorX& step) {
   if (!contact_) return 1.0;
-  const bool middle = inner_ == Inner::middle;
-  contact_end_ = middle ? VectorX(2.0 * z - state_->q) : z;
-  contact_change_ = (middle ? 2.0 : 1.0) * step;
+  set_contact_end(z);
+  contact_change_ = end_rate() * step;
   return contact_->allowed(contact_end_, contact_change_);
 }
 
 void Equations::foresee(const VectorX& step, double kept) {
   if (!contact_) return;
-  contact_change_ = ((inner_ == Inner::middle ? 2.0 : 1.0) / kept) * step;
+  contact_change_ = (end_rate() / kept) * step;
   contact_->foresee_friction(contact_change_);
 }
 

@@ -184,6 +184,9 @@ class Equations {
   VectorX gradient_, magnitude_;            ///< forces but for inertia, drag and gravity; padded by kPadding
   VectorX force_, modulus_, inverse_rest_;  ///< per edge: EA eps [N], EA / L [N / m], 1 / L [1 / m]
   VectorX inverse_mean_;                    ///< per edge: 2 / (l0 + l1) of an energy-momentum step [1 / m]
+  /// q1 that goes with z, and by how much it changes with z.
+  void set_contact_end(const VectorX& z);
+  double end_rate() const { return inner_ == Inner::middle ? 2.0 : 1.0; }
   VectorX contact_end_, contact_change_;    ///< q1 and its coming change
   VectorX contact_gradient_, contact_floor_;
   double reach_ = 0;          ///< greatest coordinate [m]

@@ -23,7 +23,7 @@ constexpr int kFirstIterations = 4;
 constexpr double kHopeless = 1e3;
 // Halvings of a step between surfaces before it is taken as it is.
 constexpr int kMostCuts = 10;
-// A start whose first step can be taken by less than this is far off.
+// A first step of which less is kept counts as cut.
 constexpr double kPromising = 0.5;
 // That much of a step uphill is too little.
 constexpr double kLittle = 0.125;
@@ -140,6 +140,7 @@ void Newton::solve_for_step(Equations& equations, NewtonWorkspace& work, VectorX
 struct Newton::Progress {
   double tolerance = 0;  ///< [m]
   bool may_reuse = false;
+  bool slipping = false;  ///< whether surfaces may turn round within a slip far smaller than a step
   bool fresh = true;  ///< whether the coming iteration makes a matrix
   MatrixAge age = MatrixAge::fresh, last_age = MatrixAge::fresh;
   double step = INFINITY, last_step = INFINITY;  ///< [m]
@@ -165,7 +166,7 @@ void Newton::plan_next(Progress& p, FactorRecord& factor) const {
   const double here = std::min(0.5, (measured ? 1.0 : 4.0) * factor.contraction[at(p.age)]);
   p.rest = p.step * here / (1.0 - here);
   const double next = factor.contraction[at(p.age == MatrixAge::across ? MatrixAge::across : MatrixAge::within)];
-  p.fresh = !std::isfinite(p.step) || next > 0.5 ||
+  p.fresh = !std::isfinite(p.step) || next > 0.5 || (p.slipping && p.step > kUnsettled * tolerance) ||
             (p.rest > tolerance && std::log(p.rest / tolerance) > kWorth * std::log(1.0 / next));
 }
 
@@ -178,6 +179,7 @@ NewtonResult Newton::solve(Equations& equations, VectorX& z, const VectorX* targ
   const double tolerance = this->tolerance(work);
   Progress p;
   p.tolerance = tolerance;
+  p.slipping = equations.contact() && equations.contact()->eases();
   p.may_reuse = interval != 0.0 && options_.line_search != LineSearch::goldstein_price;
   if (p.may_reuse && factor.owner == &equations && factor.interval == std::abs(interval) &&
       factor.generation == equations.assembler().generation()) {
@@ -277,7 +279,6 @@ NewtonResult Newton::solve(Equations& equations, VectorX& z, const VectorX* targ
     p.age = p.fresh ? MatrixAge::fresh : p.made_here ? MatrixAge::within : MatrixAge::across;
     stagnant = balance.either && p.step > 0.25 * p.last_step ? stagnant + 1 : 0;
     plan_next(p, factor);
-    if (equations.contact() && equations.contact()->eases() && p.step > kUnsettled * tolerance) p.fresh = true;
   }
 }
 

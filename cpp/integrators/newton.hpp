@@ -20,8 +20,8 @@ struct NewtonResult {
   int iterations = 0;
   double residual = 0;  ///< greatest force out of balance [N]
   int worst_row = -1;
-  double step = 0;  ///< greatest displacement of the last iteration [m]
-  bool cut = false;  ///< surfaces left less than half of the first step
+  double step = 0;   ///< greatest displacement of the last iteration [m]
+  bool cut = false;  ///< less than half of the first step was kept, beside surfaces
 };
 
 /// How small the residuals are.
@@ -78,7 +78,7 @@ class Newton {
   /// Finds z with F(z) = target (nothing: zero), starting at z. `mixed`: with the axial forces as unknowns of
   /// their own, where the options allow it. `interval`: of a time step, whose matrix may serve several iterations and
   /// the steps to come, as long as it makes steps small fast (0: a new one every iteration); the mixed method then sets
-  /// out from work.axial_force. `impatient`: gives up where surfaces leave less than half of the first step.
+  /// out from work.axial_force. `impatient`: gives up where the first step is `cut`.
   NewtonResult solve(Equations& equations, VectorX& z, const VectorX* target, int max_iterations, NewtonWorkspace& work,
                      bool mixed = true, double interval = 0.0, bool impatient = false) const;
   /// Whether residuals are small enough; also notes the worst one in `result`.
