@@ -413,45 +413,65 @@ void Equations::evaluate_forces(const State& state, const Parameters& parameters
   out.full_residual = gradient_.head(n) - gravity_ - custom_force;
 }
 
-/// Rounding of a strain is about eps |x| / l; its stiffness turns it into a force that no iteration removes.
+/// Rounding of a strain is about eps (|x| / l + |theta|); its stiffness turns it into a force that no iteration
+/// removes. What spins for long has turned by many radians. Curvature, 2 tan(phi / 2), grows by 2 / (1 + cos phi) a
+/// radian, and so does its slope.
 void Equations::set_floor(const VectorX& z, VectorX& floor) {
-  floor.setZero(model_.dof_count);
+  floor = z.cwiseAbs();
   double reach = 0.0;
-  for (int i = 0; i < model_.node_count; ++i)
-    reach = std::max(reach, z.segment(model_.node_dof[at(i)], model_.dimension).cwiseAbs().maxCoeff());
+  for (int dof : model_.node_dof) {
+    reach = std::max(reach, floor.segment(dof, model_.dimension).maxCoeff());
+    floor.segment(dof, model_.dimension).setZero();
+  }
   reach_ = reach;
+  const double turned = std::max(1.0, floor.maxCoeff());
+  floor.setConstant(turned);
+  for (int dof : model_.node_dof) floor.segment(dof, model_.dimension).setConstant(std::max(reach, 1e-300));
+  const double unit = 4.0 * kEpsilon, inertial = h_ != 0.0 ? unit / (h_ * h_) : 0.0;
+  floor.array() *= inertial * mass_.rows.array();
   const auto node_add = [&](int node, double value) {
     const int dof = model_.node_dof[at(node)];
     for (int i = 0; i < model_.dimension; ++i) floor(dof + i) += value;
   };
-  const double unit = 4.0 * kEpsilon;
-  rounding_ = unit * (reach / model_.edge_length.minCoeff() + 1.0);
+  for (int e = 0; e < (h_ != 0.0 && !model_.planar() ? model_.edge_count : 0); ++e) {
+    // add_spin_couple: `spin` of the torque, and no more than twice that of the couple.
+    const Vec3d& spin = middle_.edge[at(e)].spin;
+    const double couple = 3.0 * inertial * turned * parameters_->edge_inertia[e] * std::sqrt(dot(spin, spin));
+    node_add(model_.edge_tail[at(e)], couple);
+    node_add(model_.edge_head[at(e)], couple);
+  }
+  rounding_ = unit * (reach / model_.edge_length.minCoeff() + turned);
   axial_floor_.resize(model_.edge_count);
   for (int e = 0; e < model_.edge_count; ++e)
     axial_floor_(e) = unit * acting_->stretch_stiffness(e) * (reach / model_.edge_length(e) + 1.0);
-  const auto bend_add = [&](double stiffness, double length, std::initializer_list<int> nodes,
+  const auto moment_of = [&](double stiffness, double length, const Vec3d& before, const Vec3d& after) {
+    const double grown = 2.0 / (1.0 + dot(before, after));
+    return 2.0 * unit * stiffness * (reach / length + turned) * grown * grown;
+  };
+  const auto bend_add = [&](double moment, double length, std::initializer_list<int> nodes,
                             std::initializer_list<int> angles) {
-    const double moment = 2.0 * unit * stiffness * (reach / length + 1.0);
     for (int node : nodes) node_add(node, moment / length);
     if (!model_.planar())
       for (int edge : angles) floor(model_.edge_dof[at(edge)]) += moment;
   };
   for (std::size_t b = 0; b < model_.bend.size(); ++b) {
     const BendStencil& s = model_.bend[b];
-    bend_add(acting_->bend_stiffness.row(static_cast<Eigen::Index>(b)).maxCoeff(),
-             std::min(model_.edge_length(s.edge[0]), model_.edge_length(s.edge[1])), {s.node[0], s.node[1], s.node[2]},
-             {s.edge[0], s.edge[1]});
+    const auto i = static_cast<Eigen::Index>(b);
+    const double length = std::min(model_.edge_length(s.edge[0]), model_.edge_length(s.edge[1]));
+    const Vec3d before = static_cast<double>(s.sign[0] * s.sign[1]) * middle_.edge[at(s.edge[0])].tangent;
+    const double stiffness = acting_->bend_stiffness.row(i).maxCoeff();
+    bend_add(moment_of(stiffness, length, before, middle_.edge[at(s.edge[1])].tangent), length,
+             {s.node[0], s.node[1], s.node[2]}, {s.edge[0], s.edge[1]});
   }
   for (std::size_t h = 0; h < model_.half.size(); ++h) {
     const FrameStencil& s = model_.half[h];
-    const double stiffness = acting_->half_stiffness.row(static_cast<Eigen::Index>(h)).maxCoeff();
     const double length = model_.edge_length(s.edge);
-    bend_add(stiffness, length, {model_.edge_tail[at(s.edge)], model_.edge_head[at(s.edge)]}, {s.edge});
-    const double moment = 2.0 * unit * stiffness * (reach / length + 1.0);
+    const double moment = moment_of(acting_->half_stiffness.row(static_cast<Eigen::Index>(h)).maxCoeff(), length,
+                                    middle_.attached[h].tangent, middle_.edge[at(s.edge)].tangent);
+    bend_add(moment, length, {model_.edge_tail[at(s.edge)], model_.edge_head[at(s.edge)]}, {s.edge});
     for (int i = 0; i < model_.frame_size(); ++i) floor(model_.frame_dof[at(s.frame)] + i) += moment;
     if (s.hinge >= 0) floor(model_.hinges[at(s.hinge)].dof) += moment;
   }
-  if (h_ != 0.0) floor += (4.0 * kEpsilon * std::max(reach, 1e-300) / (h_ * h_)) * mass_.rows;
 }
 
 double Equations::dissipated(const VectorX& change) const {

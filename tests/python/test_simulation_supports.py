@@ -187,3 +187,22 @@ def test_parts_of_a_step_share_a_jump_evenly():
     simulation.step()
     assert simulation.statistics.steps - evenly == jump > 1
     assert simulation.positions(rod)[0] == pytest.approx((0, 0, 0.1), abs=1e-12)
+
+
+@pytest.mark.parametrize("time_step", [1e-5, 1e-7])
+def test_short_steps_after_many_turns_take_no_more_iterations(time_step):
+    def build(time_step):
+        scene = withe.Scene(gravity=(0, 0, 0))
+        arm = scene.add_rod(start=(0, 0, 0), end=(0.2, 0, 0), nodes=21, radius=1e-3, material=RUBBER)
+        grip = scene.clamp(arm.start)
+        simulation = scene.build(integrator="backward_euler", time_step=time_step)
+        simulation.move(grip, path=lambda t: (np.zeros(3), Rotation.from_euler("x", 20 * t).as_matrix()))
+        return simulation
+
+    spun = build(0.02)
+    spun.step(2000)
+    simulation = build(time_step)
+    simulation.restore(spun.snapshot())
+    simulation.step(5)
+    assert simulation.statistics.iterations <= 10
+    assert simulation.statistics.rejected_steps == 0
