@@ -283,7 +283,7 @@ bool World::Implementation::inner_step(double dt, int slot, double& error) {
     r = step_by_rule(dt, slot);
     for (int tries = 0; r.too_deep && tries < kMostStiffenings; ++tries) {
       support_work += system.contact()->stiffen(state);
-      forget_matrix();
+      work.newton.factor.owner = nullptr;
       work.repeated = true;
       r = step_by_rule(dt, slot);
       work.repeated = false;
