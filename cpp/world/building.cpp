@@ -103,6 +103,8 @@ World::Implementation::Implementation(const Implementation& other)
       dissipated(other.dissipated),
       load_work(other.load_work),
       alarm(other.alarm),
+      warning(other.warning),
+      warned(other.warned),
       reaction_residual(other.reaction_residual),
       reaction_current(other.reaction_current) {
   listen();

@@ -101,6 +101,7 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
   reaction_residual = work.newton.evaluation.full_residual;
   reaction_current = true;
   newton->balance(work.newton.evaluation, r.newton);
+  check_resolution();
   return {r.stable, r.newton.iterations, r.newton.residual};
 }
 

@@ -1,4 +1,8 @@
 #include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include <Eigen/Geometry>
 
 #include "common/text.hpp"
 #include "world/implementation.hpp"
@@ -8,6 +12,9 @@ namespace {
 
 /// An edge as short as this, over its length at rest, is one that the motion crushes.
 constexpr double kCrushed = 0.5;
+/// An edge that turns or twists by more than 120 degrees against the next is too long for the motion: a stencil that
+/// twists by tau bends with cos^2(tau / 2) of its stiffness.
+constexpr double kSharp = 2.0 / 3.0 * std::numbers::pi;
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
@@ -56,6 +63,40 @@ std::string World::Implementation::crushed() const {
   return "; an edge is crushed to " + text(least, 2) + " of its length" +
          place_of_node(model.edge_tail[at(shortest)]).words +
          ", as by a force above E A / 2 or a blow faster than sound in the rod, sqrt(E / density)";
+}
+
+/// Says so where an edge turns or twists too much against the next; nothing elsewhere.
+std::string World::Implementation::unresolved() const {
+  int node = -1;
+  double greatest = kSharp;
+  const char* how = "";
+  const auto see = [&](double angle, int where, const char* does) {
+    if (!(std::abs(angle) > greatest)) return;
+    greatest = std::abs(angle);
+    node = where;
+    how = does;
+  };
+  for (std::size_t b = 0; b < model.bend.size(); ++b) {
+    const int* n = model.bend[b].node;
+    const Vector3 middle = node_position(model, state.q, n[1]);
+    const Vector3 before = middle - node_position(model, state.q, n[0]),
+                  after = node_position(model, state.q, n[2]) - middle;
+    see(std::atan2(before.cross(after).norm(), before.dot(after)), n[1], "turns");
+    if (!model.planar()) see(state.bend_tau(static_cast<Eigen::Index>(b)), n[1], "twists");
+  }
+  for (std::size_t h = 0; h < (model.planar() ? 0 : model.half.size()); ++h)
+    see(state.half_tau(static_cast<Eigen::Index>(h)), model.frame_node[at(model.half[h].frame)], "twists");
+  if (node < 0) return "";
+  return std::string("an edge ") + how + " by " + text(greatest * 180.0 / std::numbers::pi, 3) +
+         " degrees against the next" + place_of_node(node).words + " (time " + text(state.time, 6) +
+         " s): a mesh this coarse does not resolve the motion, and bends and twists wrongly; use more nodes";
+}
+
+/// Warns once.
+void World::Implementation::check_resolution() {
+  if (warned) return;
+  warning = unresolved();
+  warned = !warning.empty();
 }
 
 void World::Implementation::fail(const NewtonResult& r, double dt, const std::string& what) const {

@@ -136,6 +136,8 @@ struct World::Implementation {
   std::int64_t grid_steps = 0;
   double support_work = 0, actuation_work = 0, dissipated = 0, load_work = 0;
   std::optional<Energy> alarm;  ///< energies at the start, for the explicit scheme's alarm
+  std::string warning;          ///< not yet heard
+  bool warned = false;
   NewtonResult last_newton;
   VectorX reaction_residual;  ///< full residual of the last solve
   bool reaction_current = false;
@@ -209,6 +211,8 @@ struct World::Implementation {
   Place place_of(int row) const;
   Place place_of_node(int node) const;
   std::string crushed() const;
+  std::string unresolved() const;
+  void check_resolution();
   [[noreturn]] void fail(const NewtonResult& newton, double dt, const std::string& what) const;
 
   // equilibrium.cpp

@@ -1,5 +1,7 @@
 /// What a scene answers: copies, in world coordinates.
 
+#include <utility>
+
 #include "world/implementation.hpp"
 
 namespace withe {
@@ -117,5 +119,7 @@ VectorX World::spins(int rod) const {
 }
 
 Energy World::energy() const { return implementation_->energy(); }
+
+std::string World::take_warning() { return std::exchange(implementation_->warning, {}); }
 
 }  // namespace withe

@@ -17,6 +17,8 @@ std::size_t at(int i) { return static_cast<std::size_t>(i); }
 constexpr int kMostStiffenings = 4;
 // Easy steps before longer ones are tried, at most.
 constexpr int kMostPatience = 64;
+// Steps from one look at how well the mesh resolves the motion to the next, and at the energy of an explicit one.
+constexpr int kResolutionPeriod = 64, kAlarmPeriod = 16;
 
 }  // namespace
 
@@ -37,7 +39,8 @@ void World::Implementation::advance(double duration) {
     throw;
   }
   // An energy costs as much as a step.
-  if (options.integrator == Integrator::verlet && statistics.steps % 16 == 0) check_explicit();
+  if (options.integrator == Integrator::verlet && statistics.steps % kAlarmPeriod == 0) check_explicit();
+  if (statistics.steps % kResolutionPeriod == 0) check_resolution();
 }
 
 void World::Implementation::advance_in_parts(double duration) {

@@ -150,6 +150,7 @@ class World {
   VectorX tensions(int rod) const;     ///< per edge [N]
   VectorX spins(int rod) const;        ///< per edge, angular velocity about the tangent [rad/s]
   Energy energy() const;
+  std::string take_warning();  ///< what has not been heard yet of a mesh too coarse for the motion; or nothing
   ContactTable contacts() const;
   Linearisation linearise() const;
 

@@ -6,7 +6,7 @@ kept in a `Record`. SI units, angles in radians.
 
 from withe import perception, shapes
 from withe._core import __version__
-from withe.errors import ConvergenceError
+from withe.errors import CoarseMeshWarning, ConvergenceError
 from withe.handles import CustomForce, Drag, EdgeHandle, Fluid, Joint, Load, Mass, NodeHandle, Obstacle, Rod, Support
 from withe.materials import Circle, Material, Rectangle, Stiffness, Tube
 from withe.readouts import Energy, Equilibrium, Linearisation, Plan, Reaction, Statistics
@@ -18,6 +18,7 @@ from withe.snapshots import Snapshot
 
 __all__ = [
     "Circle",
+    "CoarseMeshWarning",
     "ConvergenceError",
     "CustomForce",
     "Drag",

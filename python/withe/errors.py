@@ -1,8 +1,16 @@
-"""Exceptions that are withe's own. Bad input is a `ValueError`, Ctrl-C a `KeyboardInterrupt`."""
+"""Exceptions and warnings that are withe's own. Bad input is a `ValueError`, Ctrl-C a `KeyboardInterrupt`."""
 
 from __future__ import annotations
 
-__all__ = ["ConvergenceError"]
+__all__ = ["CoarseMeshWarning", "ConvergenceError"]
+
+
+class CoarseMeshWarning(UserWarning):
+    """Somewhere an edge turns or twists by more than 120 degrees against the next: the rod needs more nodes there.
+
+    A stencil that twists by tau bends with cos^2(tau / 2) of its stiffness, and one that folds over is far too stiff.
+    Given once a simulation, at an equilibrium or within 64 steps.
+    """
 
 
 class ConvergenceError(RuntimeError):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path as FilePath
@@ -16,7 +17,7 @@ from withe.contacts import contact_table
 from withe.control import Control
 from withe.description import describe, parameters_of
 from withe.directory import Directory
-from withe.errors import ConvergenceError
+from withe.errors import CoarseMeshWarning, ConvergenceError
 from withe.handles import NodeHandle, Rod, Support
 from withe.knots import link
 from withe.options import engine_options
@@ -213,6 +214,9 @@ class Simulation(Control):
             message, time, step, rod, node, residual = failure.args
             name = self._directory.layout.rods[rod].name if rod >= 0 else None
             raise ConvergenceError(message, time, step, name, node if node >= 0 else None, residual) from None
+        finally:
+            if warning := self._world.take_warning():
+                warnings.warn(warning, CoarseMeshWarning, stacklevel=4)
 
     # Read-outs
 

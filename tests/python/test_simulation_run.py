@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import withe
-from simple_scenes import cantilever, same_state, tripod
+from simple_scenes import RUBBER, cantilever, same_state, tripod
 
 
 @pytest.mark.parametrize("integrator", ["implicit_midpoint", "static", "backward_euler"])
@@ -275,3 +275,26 @@ def test_run_many_shows_one_bar(capsys):
     withe.run_many(simulations, 0.2, progress="always")
     shown = capsys.readouterr().err
     assert "0.6" in shown
+
+
+@pytest.mark.parametrize("moved", ["twisted", "folded", "resting"])
+def test_a_mesh_too_coarse_for_the_motion_warns_once(moved, recwarn):
+    scene = withe.Scene(gravity=(0, 0, 0))
+    arm = scene.add_rod(start=(0, 0, 0), end=(0.2, 0, 0), nodes=5, radius=1e-3, material=RUBBER, name="arm")
+    scene.clamp(arm.start)
+    if moved == "twisted":
+        scene.clamp(arm.end)
+    simulation = scene.build(time_step=0.01)
+    if moved == "twisted":
+        simulation.move(arm.end, roll=3.0 * np.pi, over=1.0)  # 135 degrees an edge
+    elif moved == "folded":
+        simulation.set_natural_curvature(arm, (2.5 / 0.05, 0.0), over=0.5, discrete=True)
+    simulation.run(2.0, progress=False)
+    simulation.equilibrium()
+    said = [str(warning.message) for warning in recwarn.list]
+    if moved == "resting":
+        assert not said
+    else:
+        assert len(said) == 1
+        assert ("an edge twists by" if moved == "twisted" else "an edge turns by") in said[0]
+        assert "of rod 'arm'" in said[0]
