@@ -8,7 +8,7 @@
 namespace withe {
 namespace {
 
-constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
+constexpr double kRounding = 4.0 * std::numeric_limits<double>::epsilon();  // of a number that some operations lead to
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
@@ -413,44 +413,47 @@ void Equations::evaluate_forces(const State& state, const Parameters& parameters
   out.full_residual = gradient_.head(n) - gravity_ - custom_force;
 }
 
-/// Rounding of a strain is about eps (|x| / l + |theta|); its stiffness turns it into a force that no iteration
-/// removes. What spins for long has turned by many radians. Curvature, 2 tan(phi / 2), grows by 2 / (1 + cos phi) a
-/// radian, and so does its slope.
-void Equations::set_floor(const VectorX& z, VectorX& floor) {
+/// What rounding leaves of inertia. What spins for long has turned by many radians. Sets the greatest coordinate, and
+/// returns the greatest angle, one radian at least.
+double Equations::set_inertial_floor(const VectorX& z, VectorX& floor) {
+  const auto of_node = [&](int node) { return floor.segment(model_.node_dof[at(node)], model_.dimension).array(); };
   floor = z.cwiseAbs();
-  double reach = 0.0;
-  for (int dof : model_.node_dof) {
-    reach = std::max(reach, floor.segment(dof, model_.dimension).maxCoeff());
-    floor.segment(dof, model_.dimension).setZero();
+  reach_ = 0.0;
+  for (int i = 0; i < model_.node_count; ++i) {
+    reach_ = std::max(reach_, of_node(i).maxCoeff());
+    of_node(i) = 0.0;
   }
-  reach_ = reach;
   const double turned = std::max(1.0, floor.maxCoeff());
   floor.setConstant(turned);
-  for (int dof : model_.node_dof) floor.segment(dof, model_.dimension).setConstant(std::max(reach, 1e-300));
-  const double unit = 4.0 * kEpsilon, inertial = h_ != 0.0 ? unit / (h_ * h_) : 0.0;
-  floor.array() *= inertial * mass_.rows.array();
-  const auto node_add = [&](int node, double value) {
-    const int dof = model_.node_dof[at(node)];
-    for (int i = 0; i < model_.dimension; ++i) floor(dof + i) += value;
-  };
-  for (int e = 0; e < (h_ != 0.0 && !model_.planar() ? model_.edge_count : 0); ++e) {
+  for (int i = 0; i < model_.node_count; ++i) of_node(i) = std::max(reach_, 1e-300);
+  const double rounding = h_ != 0.0 ? kRounding / (h_ * h_) : 0.0;
+  floor.array() *= rounding * mass_.rows.array();
+  if (h_ == 0.0 || model_.planar()) return turned;
+  for (int e = 0; e < model_.edge_count; ++e) {
     // add_spin_couple: `spin` of the torque, and no more than twice that of the couple.
     const Vec3d& spin = middle_.edge[at(e)].spin;
-    const double couple = 3.0 * inertial * turned * parameters_->edge_inertia[e] * std::sqrt(dot(spin, spin));
-    node_add(model_.edge_tail[at(e)], couple);
-    node_add(model_.edge_head[at(e)], couple);
+    const double couple = 3.0 * rounding * turned * parameters_->edge_inertia[e] * std::sqrt(dot(spin, spin));
+    of_node(model_.edge_tail[at(e)]) += couple;
+    of_node(model_.edge_head[at(e)]) += couple;
   }
-  rounding_ = unit * (reach / model_.edge_length.minCoeff() + turned);
+  return turned;
+}
+
+/// Rounding of a strain is about eps (|x| / l + |theta|); its stiffness turns it into a force that no iteration
+/// removes. Curvature, 2 tan(phi / 2), grows by 2 / (1 + cos phi) a radian, and so does its slope.
+void Equations::set_floor(const VectorX& z, VectorX& floor) {
+  const double turned = set_inertial_floor(z, floor);
+  rounding_ = kRounding * (reach_ / model_.edge_length.minCoeff() + turned);
   axial_floor_.resize(model_.edge_count);
   for (int e = 0; e < model_.edge_count; ++e)
-    axial_floor_(e) = unit * acting_->stretch_stiffness(e) * (reach / model_.edge_length(e) + 1.0);
+    axial_floor_(e) = kRounding * acting_->stretch_stiffness(e) * (reach_ / model_.edge_length(e) + 1.0);
   const auto moment_of = [&](double stiffness, double length, const Vec3d& before, const Vec3d& after) {
     const double grown = 2.0 / (1.0 + dot(before, after));
-    return 2.0 * unit * stiffness * (reach / length + turned) * grown * grown;
+    return 2.0 * kRounding * stiffness * (reach_ / length + turned) * grown * grown;
   };
   const auto bend_add = [&](double moment, double length, std::initializer_list<int> nodes,
                             std::initializer_list<int> angles) {
-    for (int node : nodes) node_add(node, moment / length);
+    for (int node : nodes) floor.segment(model_.node_dof[at(node)], model_.dimension).array() += moment / length;
     if (!model_.planar())
       for (int edge : angles) floor(model_.edge_dof[at(edge)]) += moment;
   };

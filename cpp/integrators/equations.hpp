@@ -149,6 +149,7 @@ class Equations {
   void add_spin_couple(const VectorX& z);
   Vec3d spin_couple(int edge, double omega, const Vec3d& rate) const;
   void add_couple(int edge, const Vec3d& force);
+  double set_inertial_floor(const VectorX& z, VectorX& floor);
   void set_floor(const VectorX& z, VectorX& floor);
   void gather_difference(const ElementTable& table, int element, double* difference) const;
 
