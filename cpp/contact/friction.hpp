@@ -100,10 +100,10 @@ FrictionForce<Scalar> friction_force(const FrictionSetting& f, const Vec3<Scalar
 
 /// F = g(|S|^2, N) S, where an anchor's S has its stick in it.
 ///
-/// Friction has a corner where surfaces stop, and Newton's method goes to and fro round it: the tangent on one side knows
-/// nothing of the other. So F and S are linearised as unknowns of their own, F / g = S in place of F = g S [Chan, Golub
-/// and Mulet 1999]: where balance asks for less than the limit, a step foresees that while surfaces still slip, and the
-/// next derivative, g dS + 2 g' (S . dS) F / g with that F, holds them.
+/// Friction has a corner where surfaces stop, and Newton's method goes to and fro round it: the tangent on one side
+/// knows nothing of the other. So F and S are linearised as unknowns of their own, F / g = S in place of F = g S [Chan,
+/// Golub and Mulet 1999]: where balance asks for less than the limit, a step foresees that while surfaces still slip,
+/// and the next derivative, g dS + 2 g' (S . dS) F / g with that F, holds them.
 struct ForceLaw {
   double factor = 0, by_square = 0, by_pressing = 0;  ///< g, g', g_N
 

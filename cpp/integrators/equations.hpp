@@ -188,7 +188,7 @@ class Equations {
   /// q1 that goes with z, and by how much it changes with z.
   void set_contact_end(const VectorX& z);
   double end_rate() const { return inner_ == Inner::middle ? 2.0 : 1.0; }
-  VectorX contact_end_, contact_change_;    ///< q1 and its coming change
+  VectorX contact_end_, contact_change_;  ///< q1 and its coming change
   VectorX contact_gradient_, contact_floor_;
   double reach_ = 0;          ///< greatest coordinate [m]
   VectorX floor_;             ///< what bending, twisting and inertia leave by rounding

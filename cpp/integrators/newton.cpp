@@ -141,7 +141,7 @@ struct Newton::Progress {
   double tolerance = 0;  ///< [m]
   bool may_reuse = false;
   bool slipping = false;  ///< whether surfaces may turn round within a slip far smaller than a step
-  bool fresh = true;  ///< whether the coming iteration makes a matrix
+  bool fresh = true;      ///< whether the coming iteration makes a matrix
   MatrixAge age = MatrixAge::fresh, last_age = MatrixAge::fresh;
   double step = INFINITY, last_step = INFINITY;  ///< [m]
   double rest = INFINITY;                        ///< estimated distance from the solution [m]
