@@ -269,6 +269,7 @@ def test_a_rod_that_wraps_a_post_within_a_step_gains_nothing_from_its_edges(inte
     assert steps_in_contact_without_gain(simulation, 12, 5e-3 * simulation.energy().total) > 0
 
 
+@pytest.mark.filterwarnings("ignore::withe.CoarseMeshWarning")
 def test_coarse_rods_that_slide_over_each_other_only_lose_energy_in_energy_momentum_steps() -> None:
     scene = withe.Scene(gravity=(0, 0, 0))
     scene.add_rod(start=(0, -0.15, 0), end=(0, 0.15, 0), nodes=6, radius=RADIUS, material=RUBBER)

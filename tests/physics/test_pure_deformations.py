@@ -113,6 +113,7 @@ def test_turned_clamp_is_resisted_by_stiffness_over_length_times_its_angle():
     assert simulation.energy().twist == pytest.approx(0.5 * twist_stiffness / 0.4 * 0.8**2, rel=1e-9)
 
 
+@pytest.mark.filterwarnings("ignore::withe.CoarseMeshWarning")
 def test_clamp_that_turns_ten_times_winds_ten_turns():
     scene, bar = round_bar()
     scene.clamp(bar.start)

@@ -313,6 +313,7 @@ def test_a_static_problem_without_an_answer_is_a_convergence_error(load):
     assert simulation.snapshot() == before
 
 
+@pytest.mark.filterwarnings("ignore::withe.CoarseMeshWarning")
 @pytest.mark.parametrize("force", [1e3, 1e9, 1e49])
 @pytest.mark.parametrize("integrator", ["implicit_midpoint", "energy_momentum", "backward_euler", "static"])
 def test_absurd_forces_end_in_a_result_or_a_convergence_error(force, integrator):
