@@ -142,11 +142,11 @@ def pile(rods: int) -> withe.Simulation:
 
 def piles(report: Report, quick: bool) -> None:
     """How a step of piles that settle grows with the number of rods, on the whole and but for linear solves."""
-    counts, steps = ((10, 20), 1) if quick else ((250, 500, 1000), 20)
+    counts, fall, steps = ((10, 20), 1, 1) if quick else ((250, 500, 1000), 20, 100)
     rows, seconds, rest = [], [], []
     for count in counts:
         simulation = pile(count)
-        simulation.step(steps)
+        simulation.step(fall)
         before = simulation.statistics
         each, contacts = _timed(simulation, steps)
         after = simulation.statistics
