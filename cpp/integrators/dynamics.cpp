@@ -130,7 +130,7 @@ NewtonResult find_inner(Equations& equations, const Newton& newton, const Option
     work.z = work.deep;
     equations.keep_angular_momentum(exact);
     start_axial_force(equations, work.z, work.newton.axial_force);
-    found = newton.solve(equations, work.z, nullptr, 2 * few, work.newton, mixed, h);
+    found = newton.solve(equations, work.z, nullptr, std::min(24, options.max_iterations), work.newton, mixed, h);
     if (found.converged) return found;
     spent = found.iterations;
   }

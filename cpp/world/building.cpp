@@ -104,7 +104,6 @@ World::Implementation::Implementation(const Implementation& other)
       load_work(other.load_work),
       alarm(other.alarm),
       warning(other.warning),
-      warned(other.warned),
       reaction_residual(other.reaction_residual),
       reaction_current(other.reaction_current) {
   listen();

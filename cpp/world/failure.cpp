@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include <Eigen/Geometry>
 
@@ -94,9 +95,13 @@ std::string World::Implementation::unresolved() const {
 
 /// Warns once.
 void World::Implementation::check_resolution() {
-  if (warned) return;
-  warning = unresolved();
-  warned = !warning.empty();
+  if (warning) return;
+  if (std::string found = unresolved(); !found.empty()) warning = std::move(found);
+}
+
+std::string World::take_warning() {
+  std::optional<std::string>& warning = implementation_->warning;
+  return warning ? std::exchange(*warning, {}) : "";
 }
 
 void World::Implementation::fail(const NewtonResult& r, double dt, const std::string& what) const {

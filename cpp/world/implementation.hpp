@@ -136,8 +136,8 @@ struct World::Implementation {
   std::int64_t grid_steps = 0;
   double support_work = 0, actuation_work = 0, dissipated = 0, load_work = 0;
   std::optional<Energy> alarm;  ///< energies at the start, for the explicit scheme's alarm
-  std::string warning;          ///< not yet heard
-  bool warned = false;
+  /// Of a mesh too coarse for the motion, and empty once it was heard; none yet where there was no reason.
+  std::optional<std::string> warning;
   NewtonResult last_newton;
   VectorX reaction_residual;  ///< full residual of the last solve
   bool reaction_current = false;

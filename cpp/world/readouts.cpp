@@ -1,7 +1,5 @@
 /// What a scene answers: copies, in world coordinates.
 
-#include <utility>
-
 #include "world/implementation.hpp"
 
 namespace withe {
@@ -119,7 +117,5 @@ VectorX World::spins(int rod) const {
 }
 
 Energy World::energy() const { return implementation_->energy(); }
-
-std::string World::take_warning() { return std::exchange(implementation_->warning, {}); }
 
 }  // namespace withe

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
+
 #include "derivative_check.hpp"
 #include "integrators/dynamics.hpp"
 #include "integrators/statics.hpp"
