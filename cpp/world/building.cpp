@@ -158,9 +158,11 @@ void World::Implementation::rebuild(Rebuild why) {
   rescue_equations.reset();
   // Scratch has the sizes of the old model.
   const Counters counters = work.newton.counters;
+  const double finest = work.newton.finest;
   work = StepWorkspace{};
   listen();
   work.newton.counters = counters;
+  work.newton.finest = finest;
   energy_scratch = EnergyScratch{};
   predictor.clear();
   if (why == Rebuild::first) {
@@ -184,6 +186,13 @@ void World::Implementation::rebuild(Rebuild why) {
       for (int g = 0; g < old.frame_count; ++g)
         if (same_frame(model, f, old, g)) is_new[at(f)] = false;
     state = transferred(old, from);
+    // A motion that is prescribed in the course of a step may leave the plane: the step still returns to its start.
+    if (why == Rebuild::running && kept.state.q.size() == old.dof_count) {
+      kept.state = transferred(old, kept.state);
+      kept.predictor.clear();
+    } else {
+      kept = StepStart{};
+    }
     // A support changes where the mass of the edges at it sits, and with that what kinetic energy there is.
     EnergyScratch& scratch = energy_scratch;
     set_mass(old, parameters, scratch.mass);

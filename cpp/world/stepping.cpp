@@ -92,7 +92,8 @@ void World::Implementation::cut(Attempt why, Division& division, double dt) {
              ? "the smallest step misses the tolerance: allow a larger one, or more max_halvings"
              : "the step did not converge");
   const long left = division.parts - division.done;
-  level += why == Attempt::inaccurate ? (notches() + 1) / 2 : notches();
+  level = std::min(level + (why == Attempt::inaccurate ? (notches() + 1) / 2 : notches()),
+                   notches() * options.max_halvings);
   for (divide_rest(division); division.parts <= left && may_cut(); divide_rest(division)) ++level;
   if (why == Attempt::gained_energy && grown) patience = std::min(2 * patience, kMostPatience);
   grown = false;

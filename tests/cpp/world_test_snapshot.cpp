@@ -3,6 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <functional>
+#include <optional>
+
+#include <Eigen/Geometry>
 
 #include "worlds.hpp"
 
@@ -149,6 +152,50 @@ TEST(Snapshot, RemembersThatAWorldLeftItsPlane) {
   };
   expect_same_continuation(scene, Integrator::implicit_midpoint, leave, [](World& w) { w.step(4); }, "plane left");
   expect_same_continuation(scene, Integrator::implicit_midpoint, [](World& w) { w.step(4); }, leave, "plane to leave");
+}
+
+/// What is prescribed is asked for within a step, which may have to be taken back to a start in the plane.
+TEST(Snapshot, OfAWorldThatLeavesItsPlaneWithinAStep) {
+  const SceneDescription scene = testing::cantilever(21).scene;
+  for (Integrator integrator : {Integrator::backward_euler, Integrator::implicit_midpoint, Integrator::energy_momentum,
+                                Integrator::fourth_order})
+    for (const std::optional<double>& tolerance : {std::optional<double>{}, std::optional<double>{1e-3}}) {
+      Options planar = options_for(integrator);
+      planar.tolerance = tolerance;
+      Options space = planar;
+      space.planar = false;
+      World a(scene, planar), b(scene, space);
+      for (World* world : {&a, &b}) {
+        world->step(2);
+        world->set_step_callback([](World& w, double, double end) {
+          const Vector3 turn = 8.0 * std::max(0.0, end - 0.013) * Vector3(0.0, -1.0, 0.7);
+          w.prescribe_support(0, Vector3::Zero(),
+                              Matrix3(Eigen::AngleAxisd(turn.norm(), Vector3(0, -1, 0.7).normalized())));
+        });
+        world->step(20);
+        world->set_step_callback({});
+      }
+      ASSERT_FALSE(a.plan().planar);
+      EXPECT_LT((a.positions() - b.positions()).cwiseAbs().maxCoeff(), tolerance ? 1e-3 : 1e-7)
+          << static_cast<int>(integrator);
+      World c(scene, planar);
+      c.restore(a.snapshot());
+      a.step(3);
+      c.step(3);
+      EXPECT_TRUE(same_state(a, c)) << static_cast<int>(integrator);
+    }
+}
+
+TEST(Snapshot, AfterAStepThatMissedItsToleranceIsNotRefused) {
+  for (int most : {1, 2, 3, 5}) {
+    Options o = options_for(Integrator::implicit_midpoint);
+    o.tolerance = 1e-13;
+    o.max_halvings = most;
+    World world(testing::hanging_arm().scene, o);
+    EXPECT_THROW(world.step(50), ConvergenceFailure) << most;
+    const std::string bytes = world.snapshot();
+    EXPECT_NO_THROW(world.restore(bytes)) << most;
+  }
 }
 
 TEST(Snapshot, RemembersRampsLoadsAndMotions) {

@@ -95,6 +95,17 @@ def test_a_stretched_and_turned_end_is_gripped_as_it_is(hold, planar):
         assert simulation.tensions(arm)[-1] == pytest.approx(1e4 * np.pi * 5e-3**2 * (stretched / 0.02 - 1.0))
 
 
+@pytest.mark.parametrize("integrator", ["implicit_midpoint", "backward_euler", "energy_momentum"])
+def test_a_clamp_that_turns_out_of_the_plane_within_a_step_moves_the_rod_as_in_space(integrator):
+    tips = []
+    for planar in (None, False):
+        _, arm, simulation = cantilever(21, planar=planar, integrator=integrator)
+        simulation.move("wall", tangent=(1, -0.15, 0.1), over=0.1)
+        simulation.step(20)
+        tips.append(simulation.positions(arm))
+    assert np.allclose(*tips, atol=1e-7)
+
+
 @pytest.mark.parametrize("hold", ["frame", "edge"])
 def test_rolls_count_full_turns(hold):
     scene = withe.Scene(gravity=(0, 0, 0))
