@@ -135,7 +135,7 @@ void World::Implementation::listen() {
 /// Builds the model for the present supports and plane; a running state is carried over.
 void World::Implementation::rebuild(Rebuild why) {
   SceneDescription active = description;
-  // Released supports keep their index but hold nothing.
+  // Released supports keep their row until another takes it, but hold nothing.
   std::vector<bool> released(description.supports.size(), false);
   for (std::size_t s = 0; s < model.supports.size(); ++s) released[s] = !model.supports[s].active;
   active.supports.clear();

@@ -1,5 +1,7 @@
 /// Supports of a running scene: added, released, moved, and what they hold.
 
+#include <algorithm>
+
 #include <Eigen/Geometry>
 
 #include "common/check.hpp"
@@ -15,12 +17,20 @@ std::size_t at(int i) { return static_cast<std::size_t>(i); }
 int World::add_support(const SupportDescription& support) {
   Implementation& self = *implementation_;
   const Implementation backup(self);
-  self.description.supports.push_back(support);
-  self.description.supports.back().gripped = true;
-  Support placeholder;
-  placeholder.active = true;
-  self.model.supports.push_back(placeholder);
-  self.motions.emplace_back();
+  // The first row that a released support has left, so that who clamps and lets go without end needs no more of them.
+  const auto& rows = self.model.supports;
+  const auto index = static_cast<int>(
+      std::find_if(rows.begin(), rows.end(), [](const Support& s) { return !s.active; }) - rows.begin());
+  if (index == static_cast<int>(rows.size())) {
+    self.description.supports.emplace_back();
+    self.model.supports.emplace_back();
+    self.motions.emplace_back();
+  }
+  self.description.supports[at(index)] = support;
+  self.description.supports[at(index)].gripped = true;
+  self.model.supports[at(index)] = Support{};
+  self.model.supports[at(index)].active = true;
+  self.motions[at(index)] = SupportMotion{};
   try {
     if (self.model.planar()) {
       const Vector3& n = self.model.plane->normal;
@@ -39,7 +49,6 @@ int World::add_support(const SupportDescription& support) {
     implementation_->poll = poll;
     throw;
   }
-  const int index = static_cast<int>(self.description.supports.size()) - 1;
   const Support& s = self.model.supports[at(index)];
   SupportMotion& m = self.motions[at(index)];
   m.position = node_position(self.model, self.state.q, s.node);

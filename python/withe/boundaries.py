@@ -83,7 +83,7 @@ class Boundaries:
         del self._settings.supports[part.name]
         self._settings.paths.pop(part.name, None)
         if part.name not in self._scene.parts:
-            del self._directory.parts[part.name]
+            self._directory.remove(part.name)
 
     def move(
         self,
@@ -204,10 +204,14 @@ class Boundaries:
                 if self._directory.row(part.node) == row:
                     return index, part
             raise ValueError(f"node {name!r} is not held: clamp or pin it first")
-        part = self._directory.find(support, SupportPart, "support")
-        if part.name not in self._settings.supports:
-            raise ValueError(f"support {part.name!r} is released")
-        return self._settings.supports[part.name]
+        # One that came while running leaves the directory when it goes.
+        gone = isinstance(support, Support) and support.name not in self._directory.parts
+        if not gone or support.scene_id != self._directory.scene_id:
+            part = self._directory.find(support, SupportPart, "support")
+            if part.name in self._settings.supports:
+                return self._settings.supports[part.name]
+        name = support if isinstance(support, str) else support.name
+        raise ValueError(f"support {name!r} is released: it is not in the scene any more")
 
     def _obstacle(self, handle: Any) -> tuple[int, str] | None:
         """Index and name of an obstacle; None where it is something else."""

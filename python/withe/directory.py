@@ -46,6 +46,7 @@ class Directory:
         self.layout = Layout()
         self.parts: dict[str, Part] = {}
         self.contact = ContactSettings()
+        self._retired: dict[str, int] = {}  # greatest number of a released part that was named by one, by its word
 
     def copy(self) -> Directory:
         """A directory that no longer changes with this one."""
@@ -53,6 +54,7 @@ class Directory:
         other.layout = self.layout.copy()
         other.parts = dict(self.parts)
         other.contact = self.contact
+        other._retired = dict(self._retired)
         return other
 
     def all(self, kind: type[P]) -> list[P]:
@@ -69,6 +71,13 @@ class Directory:
         self.parts[part.name] = part
         return handle_of(part, self.scene_id, self.layout)
 
+    def remove(self, name: str) -> None:
+        """Take a part out. A name that was made for it is not made again, so that its handle stays without a part."""
+        del self.parts[name]
+        word, _, number = name.rpartition(" ")
+        if number.isdecimal():
+            self._retired[word] = max(self._retired.get(word, 0), int(number))
+
     def new_name(self, name: Any, word: str) -> str:
         """A name that is free: the one given, or the word and a number.
 
@@ -78,7 +87,7 @@ class Directory:
             Not text, taken, or a name that nodes and edges have.
         """
         if name is None:
-            number = 1
+            number = self._retired.get(word, 0) + 1
             while f"{word} {number}" in self.parts:
                 number += 1
             return f"{word} {number}"

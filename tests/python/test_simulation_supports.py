@@ -217,3 +217,46 @@ def test_short_steps_after_many_turns_take_no_more_iterations(time_step):
     simulation.step(5)
     assert simulation.statistics.iterations <= 10
     assert simulation.statistics.rejected_steps == 0
+
+
+def test_clamping_and_letting_go_again_and_again_leaves_nothing_behind():
+    _, arm, simulation = cantilever()
+    simulation.release(simulation.pin(arm.end))
+    size = len(simulation.snapshot()._state)
+    for k in range(200):
+        simulation.release(simulation.clamp(arm.end) if k % 2 else simulation.pin(arm.node(k % 7 + 2)))
+    assert len(simulation.snapshot()._state) == size
+    assert list(simulation._directory.parts) == ["arm", "wall"]
+
+
+def test_the_handle_of_a_released_support_says_so_and_never_means_another():
+    _, arm, simulation = cantilever()
+    first = simulation.pin(arm.end)
+    simulation.release(first)
+    second = simulation.pin(arm.node(5))
+    assert second.name != first.name
+    for use in (simulation.move, simulation.reaction, simulation.release):
+        with pytest.raises(ValueError, match=f"support '{first.name}' is released"):
+            use(first)
+    simulation.move(second, position=(0.1, 0, 0.01), over=0.01)
+    simulation.step(5)
+    assert simulation.positions(arm)[5, 2] == pytest.approx(0.01, abs=1e-12)
+
+
+def test_a_support_in_the_row_of_another_survives_snapshots_and_copies():
+    _, arm, simulation = cantilever(planar=False)
+    first, second = simulation.pin(arm.end), simulation.pin(arm.node(5))
+    simulation.release(first)
+    third = simulation.clamp(arm.node(8))
+    simulation.move(third, position=(0.15, 0, 0.02), over=0.1)
+    simulation.step(3)
+    snapshot, twin = simulation.snapshot(), simulation.copy()
+    simulation.step(20)
+    twin.step(20)
+    assert np.array_equal(twin.positions(), simulation.positions())
+    assert simulation.positions(arm)[8, 2] == pytest.approx(0.02, abs=1e-12)
+    force = simulation.reaction(second).force
+    simulation.restore(snapshot)
+    simulation.step(20)
+    assert np.array_equal(simulation.reaction(second).force, force)
+    assert np.array_equal(twin.positions(), simulation.positions())
