@@ -7,8 +7,8 @@ import json
 import os
 import uuid
 import zipfile
-import zlib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,9 +18,38 @@ import numpy.typing as npt
 if TYPE_CHECKING:
     from withe.recording import Record
 
-__all__ = ["load_arrays", "save_arrays", "write_vtk"]
+__all__ = ["load_arrays", "save_arrays", "write_vtk", "written_beside"]
 
 _HEADER = "header"
+
+
+@contextmanager
+def written_beside(path: Path) -> Iterator[Path]:
+    """Where to write what shall become a file: beside it, and in its place only when it is whole.
+
+    Whatever ends the writing early, a full disk or Ctrl-C, leaves what was there before.
+
+    Yields
+    ------
+    pathlib.Path
+        In the same folder and with the same suffix, by which some writers choose a format.
+
+    Raises
+    ------
+    OSError
+        The file cannot be written; the error names `path`, and says why.
+    """
+    # Not made of the file's name, which may be as long as the system allows.
+    temporary = path.with_name(f".withe-{uuid.uuid4().hex}.part{path.suffix[:8]}")
+    try:
+        yield temporary
+        os.replace(temporary, path)
+    except OSError as error:
+        if error.errno is None:
+            raise
+        raise OSError(error.errno, f"{os.strerror(error.errno)}; nothing was written to", os.fspath(path)) from error
+    finally:
+        temporary.unlink(missing_ok=True)
 
 
 def save_arrays(
@@ -64,14 +93,8 @@ def save_arrays(
     named: dict[str, Any] = {**arrays}
     text = json.dumps({"format": f"withe {kind}", "version": version, **header})
     named[_HEADER] = np.array(text)
-    temporary = path.with_name(f".{path.name}.{uuid.uuid4().hex}.part")
-    try:
-        with temporary.open("xb") as stream:
-            np.savez(stream, **named)
-        os.replace(temporary, path)
-    except BaseException:
-        temporary.unlink(missing_ok=True)
-        raise
+    with written_beside(path) as temporary, temporary.open("xb") as stream:
+        np.savez(stream, **named)
     return path
 
 
@@ -102,6 +125,11 @@ def load_arrays(
             raise ValueError(f"{path} is not a withe file, or damaged: it is no npz archive")
         stream.seek(0)
         try:
+            with zipfile.ZipFile(stream) as packed:
+                # Before anything interprets the bytes: every member has a checksum.
+                if changed := packed.testzip():
+                    raise ValueError(f"{path} is damaged: the bytes of {changed!r} have changed")
+            stream.seek(0)
             with np.load(stream, allow_pickle=False) as archive:
                 if not isinstance(archive, np.lib.npyio.NpzFile) or _HEADER not in archive.files:
                     raise ValueError(f"{path} is not a withe file")
@@ -111,28 +139,10 @@ def load_arrays(
             if str(path) in str(error):
                 raise
             raise ValueError(f"{path} is not a withe file, or damaged: {error}") from error
-        except _DAMAGE as error:
+        except Exception as error:  # NumPy and zipfile raise nearly everything on bytes that they do not understand
             reason = str(error) or type(error).__name__
             raise ValueError(f"{path} is not a withe file, or damaged: {reason}") from error
     return header, arrays
-
-
-# What NumPy and zipfile raise on bytes that they do not understand.
-_DAMAGE = (
-    zipfile.BadZipFile,
-    zipfile.LargeZipFile,
-    zlib.error,
-    EOFError,
-    OSError,
-    KeyError,
-    IndexError,
-    AttributeError,
-    TypeError,
-    SyntaxError,
-    RuntimeError,
-    OverflowError,
-    MemoryError,
-)
 
 
 def _read_header(path: Path, text: npt.NDArray[Any], kind: str, version: int) -> dict[str, Any]:
@@ -186,18 +196,20 @@ def write_vtk(record: Record, folder: str | os.PathLike[str]) -> Path:
     names = [f"frame_{frame:0{digits}d}.vtp" for frame in range(len(record))]
     polylines = _Polylines(record)
     for frame, name in enumerate(names):
-        (folder / name).write_text(polylines.document(frame, float(times[frame])), encoding="utf-8")
+        with written_beside(folder / name) as temporary:
+            temporary.write_text(polylines.document(frame, float(times[frame])), encoding="utf-8")
     entries = "\n".join(
         f'    <DataSet timestep="{time!r}" group="" part="0" file={quoteattr(name)}/>'
         for time, name in zip(times.tolist(), names, strict=True)
     )
     collection = folder / "record.pvd"
-    collection.write_text(
-        '<?xml version="1.0"?>\n'
-        '<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">\n'
-        f"  <Collection>\n{entries}\n  </Collection>\n</VTKFile>\n",
-        encoding="utf-8",
-    )
+    with written_beside(collection) as temporary:
+        temporary.write_text(
+            '<?xml version="1.0"?>\n'
+            '<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">\n'
+            f"  <Collection>\n{entries}\n  </Collection>\n</VTKFile>\n",
+            encoding="utf-8",
+        )
     return collection
 
 

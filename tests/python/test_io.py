@@ -1,5 +1,6 @@
 """Files: what is saved comes back bit for bit, and nothing that is not ours gets in."""
 
+import errno
 import json
 import os
 import pickle
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 
 from curling_motion import CurlingSimulation, Handle
+from simple_scenes import cantilever
 from withe.io import load_arrays, save_arrays
 from withe.recording import EnergyHistory, Record, Recorder
 
@@ -212,3 +214,65 @@ def test_a_rod_of_two_nodes_has_no_curvature_in_vtk(tmp_path):
     recorder.capture()
     mesh = pyvista.PVDReader(str(recorder.record.to_vtk(tmp_path))).read()[0]
     np.testing.assert_array_equal(mesh["curvature"], np.zeros((2, 2)))
+
+
+def cut_and_flipped(data):
+    """A file with one byte changed, at every third place and in every other way, and ends cut off."""
+    for place in range(0, len(data), 3):
+        changed = bytearray(data)
+        changed[place] ^= (0xFF, 0x01, 0x20, 0x80)[place % 4]
+        yield bytes(changed)
+    for end in range(0, len(data), 97):
+        yield data[:end]
+
+
+@pytest.mark.parametrize("kind", ["record", "snapshot"])
+@pytest.mark.filterwarnings("error")
+def test_a_damaged_file_raises_one_error_or_holds_what_was_saved(kind, tmp_path):
+    _, _, simulation = cantilever(nodes=4)
+    saved = simulation.run(0.01, progress=False) if kind == "record" else simulation.snapshot()
+    path = saved.save(tmp_path / "file.npz")
+    data = path.read_bytes()
+    harmless = unnamed = 0
+    for damaged in cut_and_flipped(data):
+        path.write_bytes(damaged)
+        try:
+            loaded = type(saved).load(path)
+        except ValueError as error:
+            unnamed += str(path) not in str(error)
+            continue
+        harmless += 1  # a date in the archive, which says nothing
+        assert pickle.dumps(loaded) == pickle.dumps(saved) if kind == "record" else loaded == saved
+    assert unnamed == 0
+    assert harmless < len(data) / 10
+
+
+def test_a_header_that_no_tokenizer_reads_is_a_damaged_file(tmp_path):
+    path = tmp_path / "file.npz"
+    header = b"{'descr': '<f8', 'fortran_order': False, 'shape': (3,), '''".ljust(117) + b"\n"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("header.npy", b"\x93NUMPY\x01\x00" + len(header).to_bytes(2, "little") + header + bytes(24))
+    with pytest.raises(ValueError, match=r"file.npz is not a withe file, or damaged"):
+        Record.load(path)
+
+
+def test_a_full_disk_leaves_the_file_that_was_there(record, tmp_path, monkeypatch):
+    path = record.save(tmp_path / "arm.npz")
+    before = path.read_bytes()
+
+    def full(stream, **arrays):
+        stream.write(b"PK")
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(np, "savez", full)
+    with pytest.raises(OSError, match=r"No space left on device; nothing was written to.*arm.npz") as caught:
+        record.save(path)
+    assert caught.value.errno == errno.ENOSPC
+    assert path.read_bytes() == before
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_file_name_may_be_as_long_as_the_system_allows(record, tmp_path):
+    path = record.save(tmp_path / ("n" * 251 + ".npz"))
+    np.testing.assert_array_equal(Record.load(path).times, record.times)
+    assert list(tmp_path.iterdir()) == [path]
