@@ -89,9 +89,11 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
     undo();
     const bool held =
         std::any_of(model.supports.begin(), model.supports.end(), [](const Support& s) { return s.active; });
-    fail(r.newton, dt,
-         held ? "no static equilibrium was found"
-              : "no static equilibrium was found, and no support holds the scene: clamp or pin a node");
+    fail(
+        r.newton, dt,
+        held ? "no static equilibrium was found"
+             : "no static equilibrium was found, and no support holds the scene: clamp or pin a node",
+        dt > 0.0 ? "" : "Try to get there in parts: small changes of loads and supports, or time steps with viscosity");
   }
   state.time = time;
   retire_ramps();

@@ -13,9 +13,14 @@ namespace {
 
 /// An edge as short as this, over its length at rest, is one that the motion crushes.
 constexpr double kCrushed = 0.5;
-/// An edge that turns or twists by more than 120 degrees against the next is too long for the motion: a stencil that
-/// twists by tau bends with cos^2(tau / 2) of its stiffness.
+/// An edge that turns by more than 120 degrees against the next, or is twisted so far from its natural twist, is too
+/// long for the motion. So is one that is turned against the next by kSharp about its tangent, counted or not, and
+/// bent: a stencil that twists by tau bends with cos^2(tau / 2) of its stiffness. Where it is straight, as in a shaft
+/// whose natural twist turns it like a motor, that says nothing, and whole turns say nothing anywhere.
 constexpr double kSharp = 2.0 / 3.0 * std::numbers::pi;
+constexpr double kBent = 0.05;  // [rad]
+/// Stiffnesses of rods that differ by more leave few digits to the soft ones.
+constexpr double kMismatch = 1e6;
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
@@ -77,16 +82,31 @@ std::string World::Implementation::unresolved() const {
     node = where;
     how = does;
   };
+  Configuration& c = energy_scratch.configuration;
+  compute_configuration(model, state, state.q, c);
+  const auto see_twist = [&](double tau, const auto& kappa, double natural, double turn, int where) {
+    const double x = kappa(0) * kappa(0) + kappa(1) * kappa(1);
+    see(bend_factor(parameters.measure, x).value * tau - natural, where, "twists");
+    if (turn > kBent) see(std::remainder(tau, 2.0 * std::numbers::pi), where, "twists");
+  };
+  const auto angle = [](const Vec3d& a, const Vec3d& b) {
+    return std::atan2(to_eigen(a).cross(to_eigen(b)).norm(), dot(a, b));
+  };
   for (std::size_t b = 0; b < model.bend.size(); ++b) {
-    const int* n = model.bend[b].node;
-    const Vector3 middle = node_position(model, state.q, n[1]);
-    const Vector3 before = middle - node_position(model, state.q, n[0]),
-                  after = node_position(model, state.q, n[2]) - middle;
-    see(std::atan2(before.cross(after).norm(), before.dot(after)), n[1], "turns");
-    if (!model.planar()) see(state.bend_tau(static_cast<Eigen::Index>(b)), n[1], "twists");
+    const BendStencil& s = model.bend[b];
+    const auto row = static_cast<Eigen::Index>(b);
+    const double turn = angle(s.sign[0] * c.edge[at(s.edge[0])].tangent, s.sign[1] * c.edge[at(s.edge[1])].tangent);
+    see(turn, s.node[1], "turns");
+    if (!model.planar())
+      see_twist(state.bend_tau(row), c.bend_strain.row(row),
+                parameters.bend_natural(row, 2) + model.bend_offset(row, 2), turn, s.node[1]);
   }
-  for (std::size_t h = 0; h < (model.planar() ? 0 : model.half.size()); ++h)
-    see(state.half_tau(static_cast<Eigen::Index>(h)), model.frame_node[at(model.half[h].frame)], "twists");
+  for (std::size_t h = 0; h < (model.planar() ? 0 : model.half.size()); ++h) {
+    const FrameStencil& s = model.half[h];
+    const auto row = static_cast<Eigen::Index>(h);
+    see_twist(state.half_tau(row), c.half_strain.row(row), parameters.half_natural(row, 2),
+              angle(c.attached[h].tangent, c.edge[at(s.edge)].tangent), model.frame_node[at(s.frame)]);
+  }
   if (node < 0) return "";
   return std::string("an edge ") + how + " by " + text(greatest * 180.0 / std::numbers::pi, 3) +
          " degrees against the next" + place_of_node(node).words + " (time " + text(state.time, 6) +
@@ -104,11 +124,40 @@ std::string World::take_warning() {
   return warning ? std::exchange(*warning, {}) : "";
 }
 
-void World::Implementation::fail(const NewtonResult& r, double dt, const std::string& what) const {
+/// What may help where steps do not converge, by what is the matter; one sentence.
+std::string World::Implementation::what_to_try() const {
+  if (options.integrator == Integrator::verlet)
+    return "Try a smaller time_step, or an implicit integrator, which takes longer ones";
+  if (!unresolved().empty()) return "Try more nodes there, or a gentler load or motion";
+  if (!crushed().empty()) return "Try a smaller load, a slower motion, or a rod that stretches less easily";
+  if (!options.adaptive && !options.tolerance) return "Try adaptive=True, or a smaller time_step";
+  const VectorX& stretch = parameters.edge_stretch;
+  Eigen::Index soft = 0, stiff = 0;
+  const double least = stretch.minCoeff(&soft), greatest = stretch.maxCoeff(&stiff);
+  if (greatest > kMismatch * least)
+    return "Try stiffnesses that differ less: those against stretching of rods '" +
+           description.rods[at(model.edge_rod[at(static_cast<int>(soft))])].name + "' and '" +
+           description.rods[at(model.edge_rod[at(static_cast<int>(stiff))])].name + "' differ by " +
+           text(greatest / least, 2) + " times";
+  if (options.integrator == Integrator::statics)
+    return "Try smaller parts of the load or motion a step, or integrator='backward_euler' with viscosity, which comes "
+           "to rest beyond a jump";
+  if (equations->contact() && equations->contact()->frictional())
+    return "Try a smaller time_step, or a greater slip_tolerance of enable_contact";
+  if (!parameters.viscous && options.integrator != Integrator::backward_euler)
+    return "Try a smaller time_step, viscosity of the material, or integrator='backward_euler', which damps what is "
+           "too "
+           "fast for the step";
+  return "Try a smaller time_step, or more max_halvings";
+}
+
+void World::Implementation::fail(const NewtonResult& r, double dt, const std::string& what,
+                                 const std::string& hint) const {
   const Place place = place_of(r.worst_row);
   throw ConvergenceFailure(what + " (time " + text(state.time, 6) + " s, step " + text(dt) + " s, residual " +
                                text(r.residual) + " N" + place.words + ")" + crushed() +
-                               "; the world is left in its last accepted state",
+                               "; the world is left in its last accepted state. " +
+                               (hint.empty() ? what_to_try() : hint),
                            state.time, dt, place.rod, place.node, r.residual);
 }
 

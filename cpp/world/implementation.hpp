@@ -213,7 +213,10 @@ struct World::Implementation {
   std::string crushed() const;
   std::string unresolved() const;
   void check_resolution();
-  [[noreturn]] void fail(const NewtonResult& newton, double dt, const std::string& what) const;
+  std::string what_to_try() const;
+  /// `hint`: what to try, where the caller knows better than `what_to_try`.
+  [[noreturn]] void fail(const NewtonResult& newton, double dt, const std::string& what,
+                         const std::string& hint = "") const;
 
   // equilibrium.cpp
   EquilibriumResult equilibrium(double dt);
@@ -236,6 +239,7 @@ struct World::Implementation {
 
   // energy.cpp
   Energy energy() const;
+  Energy rod_energy(int rod) const;
   Energy energy_of(const State& at, double loads, double work_done, double lost) const;
   double actuation_energy() const;
   bool gains_energy();

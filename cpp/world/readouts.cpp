@@ -117,5 +117,6 @@ VectorX World::spins(int rod) const {
 }
 
 Energy World::energy() const { return implementation_->energy(); }
+Energy World::rod_energy(int rod) const { return implementation_->rod_energy(rod); }
 
 }  // namespace withe

@@ -88,9 +88,11 @@ void World::Implementation::cut(Attempt why, Division& division, double dt) {
     fail(last_newton, dt,
          options.integrator == Integrator::verlet ? "the explicit step broke down"
          : why == Attempt::gained_energy          ? "the step gains energy from nowhere"
-         : why == Attempt::inaccurate
-             ? "the smallest step misses the tolerance: allow a larger one, or more max_halvings"
-             : "the step did not converge");
+         : why == Attempt::inaccurate             ? "the smallest step misses the tolerance"
+                                                  : "the step did not converge",
+         why == Attempt::inaccurate      ? "Try a larger tolerance, or more max_halvings"
+         : why == Attempt::gained_energy ? "Try a smaller time_step, or integrator='energy_momentum'"
+                                         : "");
   const long left = division.parts - division.done;
   level = std::min(level + (why == Attempt::inaccurate ? (notches() + 1) / 2 : notches()),
                    notches() * options.max_halvings);

@@ -126,7 +126,7 @@ class World {
 
   // Supports; indices are rows of description().supports.
   int add_support(const SupportDescription& support);  ///< holds the present position and orientation
-  void remove_support(int support);                    ///< the index stays taken
+  void remove_support(int support);                    ///< the next one to be added takes its row
   /// Target position [m] and rotation relative to the drawn orientation, reached `over` seconds from now.
   void move_support(int support, const Vector3& position, const Matrix3& rotation, double over);
   /// Position and rotation at the end of the coming inner step (from the step callback).
@@ -150,6 +150,9 @@ class World {
   VectorX tensions(int rod) const;     ///< per edge [N]
   VectorX spins(int rod) const;        ///< per edge, angular velocity about the tangent [rad/s]
   Energy energy() const;
+  /// Of one rod: kinetic, stretch, bend, twist, gravity and their sum; what surrounds a joint belongs to the rods whose
+  /// edges meet there. All rods together have what the scene has, but for loads, contact and the energy balance.
+  Energy rod_energy(int rod) const;
   std::string take_warning();  ///< what has not been heard yet of a mesh too coarse for the motion; or nothing
   ContactTable contacts() const;
   Linearisation linearise() const;

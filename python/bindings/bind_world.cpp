@@ -216,6 +216,8 @@ void define_readouts(WorldClass& world) {
   world.def("spins", [](const GuardedWorld& self, int rod) { return self.reading().spins(rod); }, py::arg("rod"));
   world.def("take_warning", [](GuardedWorld& self) { return self.changing().take_warning(); });
   world.def("energy", [](const GuardedWorld& self) { return self.reading().energy(); });
+  world.def(
+      "rod_energy", [](const GuardedWorld& self, int rod) { return self.reading().rod_energy(rod); }, py::arg("rod"));
   world.def("contacts", [](const GuardedWorld& self) { return self.reading().contacts(); });
   world.def("linearise", [](const GuardedWorld& self) { return self.reading().linearise(); });
 }

@@ -6,15 +6,17 @@ __all__ = ["CoarseMeshWarning", "ConvergenceError"]
 
 
 class CoarseMeshWarning(UserWarning):
-    """Somewhere an edge turns or twists by more than 120 degrees against the next: the rod needs more nodes there.
+    """Somewhere an edge turns by more than 120 degrees against the next, or twists so: the rod needs more nodes there.
 
-    A stencil that twists by tau bends with cos^2(tau / 2) of its stiffness, and one that folds over is far too stiff.
+    What folds over is far too stiff. Twist counts beyond the natural twist, so that a rod whose natural twist grows
+    may turn as a motor does; and where a rod is bent, in whatever way it came, but for whole turns: a stencil that
+    twists by tau bends with cos^2(tau / 2) of its stiffness.
     Given once a simulation, at an equilibrium or within 64 steps.
     """
 
 
 class ConvergenceError(RuntimeError):
-    """No solution was found, not even with the smallest step.
+    """No solution was found, not even with the smallest step. The message ends with what to try.
 
     The simulation is left in its last accepted state, so it can be looked at, changed and continued.
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["Energy", "Equilibrium", "Linearisation", "Plan", "Reaction", "Statistics"]
+__all__ = ["Energy", "Equilibrium", "Linearisation", "Plan", "Reaction", "RodEnergy", "Statistics"]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -54,6 +54,29 @@ class Reaction:
 
     force: FloatArray
     moment: FloatArray
+
+
+@dataclass(frozen=True)
+class RodEnergy:
+    """Energies of one rod [J]; those of all rods sum up to what the scene has of each.
+
+    What rods share is divided: a node's kinetic energy and weight, with any mass added there, by the masses of the
+    half edges that meet at it, and bending across a joint by halves. Loads, contact, work and dissipation belong to
+    the scene: see `Energy`.
+
+    Attributes
+    ----------
+    kinetic, stretch, bend, twist, gravity
+    total
+        Sum of the above.
+    """
+
+    kinetic: float
+    stretch: float
+    bend: float
+    twist: float
+    gravity: float
+    total: float
 
 
 @dataclass(frozen=True)
