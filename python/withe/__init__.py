@@ -1,15 +1,21 @@
 """withe: soft robots made of slender rods, simulated implicitly, fast and accurately.
 
 A scene is described rod by rod (`Scene`), built into a `Simulation`, stepped or run, and what happened is
-kept in a `Record`. SI units, angles in radians.
+kept in a `Record`. SI units, angles in radians. Pictures need packages that are installed on demand; see
+`withe.view`.
+
+The engine picks the fastest instructions of the machine when it is loaded. The environment variable WITHE_SIMD, set
+before Python starts, asks for others: "baseline" (SSE2 or NEON, what every machine has) or "avx2". Results then differ
+by rounding, so set it to "baseline" everywhere to find the same bits on unlike machines; "kernels" in
+``print(simulation.plan)`` says which are in use.
 """
 
-from withe import perception, shapes
+from withe import perception, shapes, view
 from withe._core import __version__
 from withe.errors import CoarseMeshWarning, ConvergenceError
 from withe.handles import CustomForce, Drag, EdgeHandle, Fluid, Joint, Load, Mass, NodeHandle, Obstacle, Rod, Support
 from withe.materials import Circle, Material, Rectangle, Stiffness, Tube
-from withe.readouts import Energy, Equilibrium, Linearisation, Plan, Reaction, Statistics
+from withe.readouts import Energy, Equilibrium, Linearisation, Plan, Reaction, RodEnergy, Statistics
 from withe.recording import Record
 from withe.running import run_many
 from withe.scene import Scene
@@ -38,6 +44,7 @@ __all__ = [
     "Record",
     "Rectangle",
     "Rod",
+    "RodEnergy",
     "Scene",
     "Simulation",
     "Snapshot",
@@ -49,4 +56,5 @@ __all__ = [
     "perception",
     "run_many",
     "shapes",
+    "view",
 ]

@@ -18,9 +18,13 @@ from withe.parts import (
     CustomForcePart,
     DragPart,
     FluidPart,
+    JoinPart,
     LoadPart,
     MassPart,
+    ObstaclePart,
+    Part,
     RodPart,
+    SupportPart,
 )
 from withe.rods import curvature_array, twist_array
 
@@ -144,7 +148,7 @@ class Control(Boundaries):
             self._world.set_fluid_viscosity(viscosity)
             self._settings.fluids = self._settings.fluids | {part.name: viscosity}
         else:
-            raise ValueError(f"{part.name!r} has nothing to set")
+            raise ValueError(_nothing_to_set(part))
 
     def get(self, target: Rod | Load | Mass | Drag | Fluid | str, word: str | None = None) -> Any:
         """The present value of what `set` sets.
@@ -193,7 +197,10 @@ class Control(Boundaries):
             return self._settings.drags[part.name]
         elif isinstance(part, FluidPart) and word == "viscosity":
             return self._settings.fluids[part.name]
-        raise ValueError(f"{part.name!r} has no {word!r}")
+        words = _words_of(part)
+        if not words:
+            raise ValueError(_nothing_to_set(part))
+        raise ValueError(f"{part.name!r} has no {word!r}; it has {', '.join(words)}")
 
     def _set_rod(self, part: RodPart, values: dict[str, Any]) -> None:
         _only(values, (*ROD_WORDS, *_NATURAL_WORDS), part.owner)
@@ -314,6 +321,39 @@ def _finished(path: Path, time: float) -> bool:
         return False
     begin, end = path.times
     return bool(time > end or (time == end and begin < end))
+
+
+def _words_of(part: Part) -> tuple[str, ...]:
+    """The words of `get` that a part takes."""
+    if isinstance(part, RodPart):
+        return (*ROD_WORDS, *_NATURAL_WORDS, "radius")
+    if isinstance(part, LoadPart):
+        return (part.kind,)
+    words: dict[type[Any], tuple[str, ...]] = {MassPart: ("mass",), DragPart: ("drag",), FluidPart: ("viscosity",)}
+    return words.get(type(part), ())
+
+
+_SETTABLE = (
+    "set takes rods (youngs_modulus, natural_curvature, ...), loads (force, moment, load), masses (mass), "
+    "drags (drag), fluids (viscosity), and None for the scene (gravity)"
+)
+
+
+def _nothing_to_set(part: Part) -> str:
+    """What drives a part instead."""
+    if isinstance(part, JoinPart):
+        first, second = part.node_names
+        return (
+            f"joint {part.name!r} has no motor and nothing to set. To drive it: equal and opposite moments on the rods "
+            f"at both sides, scene.add_moment({first}, ...) and scene.add_moment({second}, ...), which "
+            "set(load, moment=...) changes or makes a function of time; set_natural_curvature or set_natural_twist of "
+            "a rod beside it; or, to prescribe where it is, clamp or pin its node and move that"
+        )
+    if isinstance(part, SupportPart):
+        return f"support {part.name!r} has nothing to set: move, release or reaction take it. {_SETTABLE}"
+    if isinstance(part, ObstaclePart):
+        return f"obstacle {part.name!r} has nothing to set: move takes it. {_SETTABLE}"
+    return f"{part.name!r} has nothing to set. {_SETTABLE}"
 
 
 def _only(values: dict[str, Any], words: tuple[str, ...], owner: str) -> None:

@@ -8,6 +8,11 @@ from typing import Any
 __all__ = ["require"]
 
 
+def _how(extra: str) -> str:
+    """How to install an extra: the package is on no index, so from a clone."""
+    return f'in a clone of withe, run pip install ".[{extra}]"' + (" or make view" if extra == "view" else "")
+
+
 def require(module: str, extra: str) -> Any:
     """Import a package of one of the extras.
 
@@ -25,7 +30,7 @@ def require(module: str, extra: str) -> Any:
     Raises
     ------
     ImportError
-        The package is not installed; the message says which extra to install.
+        The package is not installed; the message says how to install the extra from a clone of withe.
     """
     try:
         return importlib.import_module(module)
@@ -33,6 +38,4 @@ def require(module: str, extra: str) -> Any:
         package = module.split(".")[0]
         if error.name is None or error.name.split(".")[0] != package:
             raise
-        raise ImportError(
-            f'this needs {package}, which is not installed: pip install "withe[{extra}]"', name=package
-        ) from error
+        raise ImportError(f"this needs {package}, which is not installed: {_how(extra)}", name=package) from error

@@ -19,10 +19,17 @@ Tails = Literal["up", "sideways"]
 _BRAID_RADIUS = 2.5
 # Rise of a strand along the braid while it turns by pi, over the circumference of half a turn.
 _BRAID_SLOPE = 1.5
+# Length of a rod over what its knot takes of it, where nobody asks for a length.
+_TAIL_ROOM = 1.25
 
 
 def overhand_knot(
-    n: int = 1, *, length: float = 1.0, radius: float = 1.6e-3, shortening: float = 0.6, nodes: int = 301
+    n: int = 1,
+    *,
+    length: float | None = None,
+    radius: float = 1.6e-3,
+    shortening: float | None = None,
+    nodes: int = 301,
 ) -> FloatArray:
     """Points of a loose overhand knot along the x axis, its tails straight, to be pulled tight at its ends.
 
@@ -34,11 +41,11 @@ def overhand_knot(
     n : int
         Times that the tail passes through the loop.
     length : float [m]
-        Of the whole rod.
+        Of the whole rod. By default 1 m, or more where the knot and its tails need it.
     radius : float [m]
         Of its section.
     shortening : float [m]
-        Length minus the distance of its ends.
+        Length minus the distance of its ends. By default .6 of the length, or more where the knot needs it.
     nodes : int
 
     Returns
@@ -61,9 +68,7 @@ def overhand_knot(
     True
     """
     n = validation.integer(n, "n of the knot", 1, 50)
-    length = validation.positive(length, "length of the rod")
     radius = validation.positive(radius, "radius of the rod")
-    shortening = validation.positive(shortening, "shortening")
     nodes = validation.integer(nodes, "nodes", 10, 10**7)
     braid_radius = _BRAID_RADIUS * radius
     half_turns = 2 * n + 1
@@ -95,11 +100,17 @@ def overhand_knot(
         return np.concatenate([ends[0], first, right, left, second, ends[1]])
 
     def excess(loop: float) -> float:
-        return _length(whole(loop, 0.1 * length)) - braid - 0.2 * length
+        return _length(whole(loop, braid)) - 3.0 * braid
 
     smallest = 3.0 * braid_radius
-    if excess(smallest) > shortening:
-        raise ValueError(f"shortening must be at least {excess(smallest):.3g} m for this knot, got {shortening:g} m")
+    least = excess(smallest)
+    if length is None:
+        wanted = 1.2 * least if shortening is None else validation.positive(shortening, "shortening")
+        length = max(1.0, _TAIL_ROOM * (wanted + braid))
+    length = validation.positive(length, "length of the rod")
+    shortening = max(0.6 * length, 1.2 * least) if shortening is None else validation.positive(shortening, "shortening")
+    if least > shortening:
+        raise ValueError(f"shortening must be at least {least:.3g} m for this knot, got {shortening:g} m")
     low, high = smallest, length
     for _ in range(100):
         middle = 0.5 * (low + high)

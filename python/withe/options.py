@@ -6,7 +6,7 @@ from typing import Any, Literal, get_args
 
 from withe import _core, validation
 
-__all__ = ["Bending", "Integrator", "LineSearch", "Solver", "engine_options", "make_options"]
+__all__ = ["Bending", "Integrator", "LineSearch", "Solver", "check_tolerances", "engine_options", "make_options"]
 
 Integrator = Literal["implicit_midpoint", "backward_euler", "energy_momentum", "fourth_order", "verlet", "static"]
 LineSearch = Literal["automatic", "goldstein_price", "none"]
@@ -44,6 +44,35 @@ def make_options(**options: Any) -> dict[str, Any]:
     if checked["duration"] is not None and checked["tolerance"] is None:
         raise ValueError("duration must be given with a tolerance, and only then")
     return checked
+
+
+def check_tolerances(options: dict[str, Any], longest: float, shortest: float) -> None:
+    """Refuse tolerances with which any state is a solution.
+
+    Parameters
+    ----------
+    options : dict
+        As `make_options` returned them.
+    longest, shortest : float [m]
+        Length of the longest rod, and of the shortest edge.
+
+    Raises
+    ------
+    ValueError
+        A step_tolerance or tolerance that an edge or a rod fits into, or a force_tolerance of 1 or more.
+    """
+    greatest = shortest / longest
+    if options["step_tolerance"] > greatest:
+        raise ValueError(
+            f"step_tolerance must not exceed the shortest edge over the longest rod, {greatest:.3g}, "
+            f"got {options['step_tolerance']:g}"
+        )
+    if options["force_tolerance"] >= 1.0:
+        raise ValueError(f"force_tolerance must be less than 1, got {options['force_tolerance']:g}")
+    if options["tolerance"] is not None and options["tolerance"] > longest:
+        raise ValueError(
+            f"tolerance must not exceed the length of the longest rod, {longest:.3g} m, got {options['tolerance']:g} m"
+        )
 
 
 def engine_options(options: dict[str, Any]) -> _core.Options:

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from withe import io
+from withe import io, validation
 
 __all__ = ["EnergyHistory", "Record", "Recorder", "RodOutline"]
 
@@ -455,6 +455,8 @@ class Recorder:
 
 
 def _numbers(name: str, value: npt.ArrayLike) -> npt.NDArray[Any]:
+    if validation.has_masked(value):
+        raise ValueError(f"record[{name!r}] must have a value everywhere, got a masked array with masked entries")
     try:
         array = np.array(value)
     except ValueError:

@@ -55,6 +55,9 @@ class _Run:
         self.duration = validation.positive(duration, "duration")
         step = simulation.time_step
         steps = self.duration / step
+        # Shorter than what rounding leaves of the time or of a step: 1 / duration need not be a number.
+        if steps < 2.0**-53 or simulation.time + self.duration == simulation.time:
+            raise ValueError(f"duration must be long enough for the time_step, {step:g} s, got {self.duration:g} s")
         if steps > 2.0**53:
             raise ValueError(f"time_step must fit the duration, {self.duration:g} s, got {step:g}")
         if record_every is None:
@@ -79,6 +82,10 @@ class _Run:
 
     def go(self, report: Callable[[float], object], stopped: Callable[[], bool]) -> None:
         """Run to the end; `report` hears how much is done [s], and `stopped` may end it."""
+        with self._simulation._in_run():
+            self._go(report, stopped)
+
+    def _go(self, report: Callable[[float], object], stopped: Callable[[], bool]) -> None:
         simulation = self._simulation
         simulation._recorder = self._recorder
         self._report, self._stopped = report, stopped
@@ -125,7 +132,7 @@ class _Run:
             chunk = 1 if single else min(chunk, count - taken)
             self._before()
             clock = time.monotonic()
-            self._simulation.step(chunk)
+            self._simulation._step(chunk)
             taken += chunk
             self._after(begin + taken * step)
             # Few looks at the clock, but often enough for the bar and for Ctrl-C in other threads.

@@ -7,7 +7,7 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path as FilePath
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -20,9 +20,9 @@ from withe.directory import Directory
 from withe.errors import CoarseMeshWarning, ConvergenceError
 from withe.handles import NodeHandle, Rod, Support
 from withe.knots import link
-from withe.options import engine_options
-from withe.parts import CustomForcePart, DragPart, FluidPart, LoadPart, MassPart, ObstaclePart, SupportPart
-from withe.readouts import Energy, Equilibrium, Linearisation, Plan, Reaction, Statistics
+from withe.options import check_tolerances, engine_options
+from withe.parts import CustomForcePart, DragPart, FluidPart, LoadPart, MassPart, ObstaclePart, RodPart, SupportPart
+from withe.readouts import Energy, Equilibrium, Linearisation, Plan, Reaction, RodEnergy, Statistics
 from withe.snapshots import Settings, Snapshot
 
 if TYPE_CHECKING:
@@ -67,6 +67,10 @@ class Simulation(Control):
         self._loads = directory.all(LoadPart)
         self._custom_forces = directory.all(CustomForcePart)
         description = describe(directory, gravity, options["bending"])
+        if rods := directory.all(RodPart):
+            check_tolerances(
+                options, max(float(rod.lengths.sum()) for rod in rods), min(float(rod.lengths.min()) for rod in rods)
+            )
         supports = {part.name: (index, part) for index, part in enumerate(directory.all(SupportPart))}
         self._settings = Settings(
             rods=parameters_of(directory),
@@ -80,6 +84,7 @@ class Simulation(Control):
         self._world = _core.World(description, engine_options(options))
         self._recorder = None
         self._exact_time = None
+        self._running = False
         self._initial = self.snapshot()
         return self
 
@@ -107,8 +112,13 @@ class Simulation(Control):
             A step that cannot be solved even when cut; the state is then the last accepted one.
         ValueError
             A count that is not a whole number, or negative.
+        RuntimeError
+            Called by a callback of `run`, or while another thread runs the simulation.
         """
-        count = validation.integer(count, "number of steps", 0, _MAX_STEPS)
+        self._refuse_in_run("step")
+        self._step(validation.integer(count, "number of steps", 0, _MAX_STEPS))
+
+    def _step(self, count: int) -> None:
         with self._convergence():
             self._world.step(count, self._step_callback())
 
@@ -131,6 +141,7 @@ class Simulation(Control):
         ConvergenceError
             None was found, or there is none (a free rod under gravity).
         """
+        self._refuse_in_run("equilibrium")
         self._world.check_idle()
         self._apply_functions(self._world.time, self._world.time)
         with self._convergence():
@@ -178,8 +189,13 @@ class Simulation(Control):
         ConvergenceError, KeyboardInterrupt, or what a callback raised
             What was recorded until then is `simulation.record`.
         ValueError
-            A duration or record_every that is not positive, or a callback that cannot be called.
+            A duration or record_every that is not positive or too short to change the time, or a callback
+            that cannot be called.
+        RuntimeError
+            Called by a callback of a run: those may read, set, hold and copy the simulation, but not advance it
+            or take it back.
         """
+        self._refuse_in_run("run")
         from withe.running import run
 
         return run(
@@ -191,6 +207,24 @@ class Simulation(Control):
             until=until,
             record=record,
         )
+
+    @contextmanager
+    def _in_run(self) -> Iterator[None]:
+        """While this lasts, only the loop of `run` may advance the simulation."""
+        self._refuse_in_run("run")
+        self._running = True
+        try:
+            yield
+        finally:
+            self._running = False
+
+    def _refuse_in_run(self, what: str) -> None:
+        """Refuse what would change the time or the state behind the back of a run, whose record were wrong then."""
+        if self._running:
+            raise RuntimeError(
+                f"{what} cannot be called while the simulation runs: before_step may read, set and hold it, until and "
+                "record may read it, and all may go on with a copy()"
+            )
 
     @property
     def record(self) -> Record:
@@ -269,8 +303,29 @@ class Simulation(Control):
         """Angular velocities of the edges about their tangents, shape (edges,) [rad/s]."""
         return self._world.spins(self._rod(rod))
 
-    def energy(self) -> Energy:
-        """Energies of the whole scene."""
+    @overload
+    def energy(self) -> Energy: ...
+
+    @overload
+    def energy(self, rod: Rod | str) -> RodEnergy: ...
+
+    def energy(self, rod: Rod | str | None = None) -> Energy | RodEnergy:
+        """Energies of the whole scene, or of one rod [J].
+
+        Parameters
+        ----------
+        rod : Rod or str, optional
+
+        Returns
+        -------
+        Energy
+            Without a rod.
+        RodEnergy
+            Of a rod; loads, contact, work and dissipation belong to the scene.
+        """
+        if rod is not None:
+            part = self._world.rod_energy(self._rod(rod))
+            return RodEnergy(**{name: getattr(part, name) for name in RodEnergy.__dataclass_fields__})
         energy = self._world.energy()
         return Energy(**{name: getattr(energy, name) for name in Energy.__dataclass_fields__})
 
@@ -379,7 +434,10 @@ class Simulation(Control):
         ValueError
             A snapshot of another scene, a damaged one, or one from a file that needs functions of time
             that this simulation does not have.
+        RuntimeError
+            Called by a callback of `run`.
         """
+        self._refuse_in_run("restore")
         if not isinstance(snapshot, Snapshot):
             raise ValueError(f"snapshot must be a withe.Snapshot, got {type(snapshot).__name__}")
         settings = self._matched(snapshot)
@@ -425,7 +483,14 @@ class Simulation(Control):
         return settings
 
     def reset(self) -> None:
-        """Go back to the scene as it was drawn, and undo everything that was set since."""
+        """Go back to the scene as it was drawn, and undo everything that was set since.
+
+        Raises
+        ------
+        RuntimeError
+            Called by a callback of `run`.
+        """
+        self._refuse_in_run("reset")
         self.restore(self._initial)
 
     def copy(self) -> Simulation:
@@ -436,6 +501,7 @@ class Simulation(Control):
         other._settings = self._settings.copy()
         other._world = self._world.copy()
         other._recorder = None
+        other._running = False
         return other
 
     def __copy__(self) -> Simulation:
@@ -482,4 +548,5 @@ class Simulation(Control):
 
     _recorder: Recorder | None
     _exact_time: tuple[float, float] | None
+    _running: bool
     _initial: Snapshot

@@ -14,6 +14,7 @@ import numpy.typing as npt
 __all__ = [
     "choice",
     "function",
+    "has_masked",
     "integer",
     "is_scalar",
     "non_negative",
@@ -122,6 +123,8 @@ def number_array(value: Any, what: str, *shapes: tuple[int | str, ...]) -> Float
         Not numbers, another shape, or not finite.
     """
     wanted = " or ".join(_shape(shape) for shape in shapes)
+    if has_masked(value):
+        raise ValueError(f"{what} must have a value everywhere, got a masked array with masked entries")
     try:
         raw = np.asarray(value)
     except (ValueError, TypeError, OverflowError) as error:
@@ -145,6 +148,17 @@ def number_array(value: Any, what: str, *shapes: tuple[int | str, ...]) -> Float
     if result.size and np.abs(result).max() > _LARGEST:
         raise ValueError(f"{what} must be less than {_LARGEST:g} in size, got {np.abs(result).max():g}")
     return result
+
+
+def has_masked(value: Any) -> bool:
+    """Whether entries of a masked array, or of a sequence of such, are masked: NumPy would take what is under the mask.
+
+    Parameters
+    ----------
+    value : array_like
+    """
+    items = value if isinstance(value, list | tuple) else (value,)
+    return any(isinstance(item, np.ma.MaskedArray) and np.ma.is_masked(item) for item in items)
 
 
 def per_item(value: Any, what: str, count: int, item: str, *, zero: bool = False, sign: bool = False) -> FloatArray:

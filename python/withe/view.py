@@ -1,6 +1,6 @@
 """Pictures of a record: figures by matplotlib; pictures, films and a viewer by PyVista.
 
-Both are extras, imported when first used: ``pip install "withe[view]"``.
+Both are extras, imported when first used; ``make view`` or ``pip install ".[view]"`` in a clone of withe installs them.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.extras import require
+from withe.io import written_beside
 from withe.progress import progress as progress_bar
 from withe.rendering import ColorBy, Stage
 
@@ -85,7 +86,8 @@ def picture(
         if label:
             stage.label(label)
         pyplot_image = require("matplotlib.image", "view")
-        pyplot_image.imsave(path, stage.image(), pil_kwargs={"optimize": True})
+        with written_beside(path) as temporary:
+            pyplot_image.imsave(temporary, stage.image(), pil_kwargs={"optimize": True})
     finally:
         stage.close()
     return path
@@ -132,7 +134,8 @@ def animate(
     ImportError
         PyVista or imageio-ffmpeg is not installed.
     RuntimeError
-        Nothing can be rendered here, or ffmpeg fails; the message says why.
+        Nothing can be rendered here, or ffmpeg fails, as on a full disk; the message says why, and what was in
+        the file before is left.
     """
     path = _path(path, ".mp4", ".gif")
     fps = float(fps if fps is not None else (30.0 if path.suffix.lower() == ".mp4" else 20.0))
@@ -144,7 +147,8 @@ def animate(
     try:
         places = film_places(stage.times, speed / fps)
         with (
-            _Film(encoder, path, stage.size, fps) as film,
+            written_beside(path) as temporary,
+            _Film(encoder, temporary, stage.size, fps) as film,
             progress_bar(len(places), "rendering", progress, unit="pictures") as bar,
         ):
             for place in places:
@@ -463,7 +467,8 @@ class _Film:
     def _finish(self) -> None:
         _, errors = self._process.communicate()
         if self._process.returncode != 0:
-            raise RuntimeError(f"ffmpeg failed: {errors.decode(errors='replace').strip()}")
+            words = errors.decode(errors="replace").strip()
+            raise RuntimeError(f"ffmpeg failed, and no film was written: {words or 'it gave no reason'}")
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         if kind is None:

@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
-from withe.shapes import arc, circle, helix
+import withe
+from withe.knots import signed_crossings
+from withe.shapes import arc, circle, helix, overhand_knot
 
 
 def test_a_helix_has_its_radius_pitch_and_length():
@@ -54,3 +56,20 @@ def test_an_arc_has_its_curvature_and_length(curvature):
 def test_what_has_no_shape_is_refused_by_name(make, name):
     with pytest.raises(ValueError, match=f"^{name} must"):
         make()
+
+
+@pytest.mark.parametrize("n", range(1, 7))
+def test_an_overhand_knot_of_any_kind_has_defaults_that_leave_it_loose(n):
+    points = overhand_knot(n)
+    assert abs(signed_crossings(points, (0.0, 1.0, 0.01))) == 2 * n + 1
+    assert np.linalg.norm(points[-1] - points[0]) > 0.2
+    scene = withe.Scene()
+    scene.add_rod(points=points, radius=1.6e-3, material=withe.Material(youngs_modulus=1e6, density=1000.0))
+    scene.enable_contact()
+    assert len(scene.build().contacts()) == 0
+
+
+def test_an_overhand_knot_of_a_short_thin_rod_is_short():
+    points = overhand_knot(length=0.2, radius=2e-4)
+    assert np.linalg.norm(np.diff(points, axis=0), axis=1).sum() == pytest.approx(0.2)
+    assert np.linalg.norm(points[-1] - points[0]) == pytest.approx(0.08, rel=0.05)

@@ -206,3 +206,105 @@ def test_convergence_errors_pickle():
     again = pickle.loads(pickle.dumps(error))
     assert str(again) == "no"
     assert (again.time, again.step, again.rod, again.node, again.residual) == (1.0, 0.5, "arm", 3, 2.0)
+
+
+# What to try
+
+
+@pytest.mark.parametrize(
+    ("build", "hint"),
+    [
+        (
+            {"max_iterations": 1, "max_halvings": 0},
+            "Try a smaller time_step, viscosity of the material, or integrator=",
+        ),
+        ({"max_iterations": 1, "adaptive": False}, "Try adaptive=True, or a smaller time_step"),
+        (
+            {"max_iterations": 1, "max_halvings": 0, "integrator": "backward_euler"},
+            "Try a smaller time_step, or more max_halvings",
+        ),
+        ({"tolerance": 1e-13, "max_halvings": 1}, "Try a larger tolerance, or more max_halvings"),
+    ],
+)
+def test_a_step_that_fails_ends_with_what_to_try(build, hint):
+    _, _, simulation = cantilever(**build)
+    with pytest.raises(withe.ConvergenceError) as caught:
+        simulation.step(50)
+    assert str(caught.value).rpartition("state. ")[2].startswith(hint)
+
+
+def test_rods_of_unlike_stiffness_are_named_where_a_step_fails():
+    scene = withe.Scene()
+    soft = scene.add_rod(start=(0, 0, 0), end=(0.2, 0, 0), nodes=11, radius=5e-3, material=RUBBER, name="soft")
+    steel = withe.Material(youngs_modulus=2e13, density=8000.0)
+    stiff = scene.add_rod(start=(0.2, 0, 0), end=(0.3, 0, 0), nodes=6, radius=5e-3, material=steel, name="stiff")
+    scene.clamp(soft.start)
+    scene.join(soft.end, stiff.start)
+    simulation = scene.build(max_iterations=1, max_halvings=0)
+    with pytest.raises(
+        withe.ConvergenceError, match=r"Try stiffnesses .* rods 'soft' and 'stiff' differ by 2e\+07 times"
+    ):
+        simulation.step(50)
+
+
+# Tolerances with which anything is a solution
+
+
+@pytest.mark.parametrize(
+    ("build", "message"),
+    [
+        ({"step_tolerance": 1.0}, "step_tolerance must not exceed the shortest edge over the longest rod, 0.1, got 1"),
+        ({"force_tolerance": 1.0}, "force_tolerance must be less than 1, got 1"),
+        ({"tolerance": 0.3}, "tolerance must not exceed the length of the longest rod, 0.2 m, got 0.3 m"),
+    ],
+)
+def test_silly_tolerances_are_refused(build, message):
+    with pytest.raises(ValueError, match=message):
+        cantilever(**build)
+
+
+# Energy of a rod
+
+
+@pytest.mark.parametrize("planar", [None, False])
+def test_energies_of_all_rods_sum_up_to_that_of_the_scene(planar):
+    scene, rods, _ = tripod()
+    ring = withe.shapes.circle(0.03, 12) + np.array([0.5, 0.0, 0.0])
+    scene.add_rod(points=ring, closed=True, radius=2e-3, material=RUBBER, name="ring")
+    scene.add_mass(rods[0].start, 0.01)
+    if planar is None:
+        scene = withe.Scene(gravity=(0, -9.81, 0))
+        arm = scene.add_rod(start=(0, 0, 0), end=(0.1, 0, 0), nodes=6, radius=4e-3, material=RUBBER)
+        hand = scene.add_rod(start=(0.1, 0, 0), end=(0.2, 0, 0), nodes=9, radius=2e-3, material=RUBBER)
+        leg = scene.add_rod(start=(0.1, 0, 0), end=(0.1, -0.1, 0), nodes=5, radius=2e-3, material=RUBBER)
+        scene.clamp(arm.start)
+        scene.join(arm.end, hand.start, kind="revolute", axis=(0, 0, 1))
+        scene.join(arm.end, leg.start)
+    simulation = scene.build()
+    assert simulation.plan.planar == (planar is None)
+    simulation.step(20)
+    whole, parts = simulation.energy(), [simulation.energy(rod) for rod in simulation.rods]
+    scale = abs(whole.total) + whole.kinetic
+    for name in ("kinetic", "stretch", "bend", "twist", "gravity"):
+        assert sum(getattr(part, name) for part in parts) == pytest.approx(getattr(whole, name), abs=1e-12 * scale), (
+            name
+        )
+    for part in parts:
+        assert part.total == pytest.approx(part.kinetic + part.stretch + part.bend + part.twist + part.gravity)
+        assert part.kinetic > 0.0
+        assert part.bend >= 0.0
+
+
+def test_the_energy_of_a_rod_is_that_of_the_rod_alone():
+    _, _, simulation = cantilever()
+    far = withe.Scene()
+    same = far.add_rod(start=(0, 0, 0), end=(0.2, 0, 0), nodes=11, radius=5e-3, material=RUBBER, name="arm")
+    far.clamp(same.start)
+    far.add_rod(start=(0, 5, 0), end=(0.1, 5, 0), nodes=4, radius=5e-3, material=RUBBER, name="other")
+    other = far.build()
+    simulation.step(10)
+    other.step(10)
+    for name in ("kinetic", "bend", "gravity", "total"):
+        assert getattr(other.energy("arm"), name) == pytest.approx(getattr(simulation.energy(), name), rel=1e-6)
+    with pytest.raises(ValueError, match="rod must be a rod, got the support"):
+        simulation.energy("wall")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import withe
-from simple_scenes import cantilever, weightless
+from simple_scenes import RUBBER, cantilever, tripod, weightless
 
 # Natural shape
 
@@ -205,3 +205,66 @@ def test_initial_velocities_are_those_of_the_nodes():
     simulation.set_velocities(None, (0, 0, 1))
     assert np.array_equal(simulation.velocities(arm)[0], (0, 0, 0))  # held
     assert np.array_equal(simulation.velocities(arm)[1:], np.tile((0, 0, 1), (20, 1)))
+
+
+# What cannot be set
+
+
+def test_a_joint_that_is_to_be_set_says_how_to_drive_it():
+    _, _, simulation = tripod()
+    for act in (lambda: simulation.set("joint 1", angle=1.0), lambda: simulation.get("joint 1", "angle")):
+        with pytest.raises(ValueError, match=r"joint 'joint 1' has no motor .* scene.add_moment\(limb 0.start, ...\)"):
+            act()
+
+
+def test_moments_at_both_sides_drive_a_revolute_joint():
+    scene = withe.Scene(gravity=(0, 0, 0))
+    arm = scene.add_rod(start=(0, 0, 0), end=(0.1, 0, 0), nodes=6, radius=4e-3, material=RUBBER)
+    hand = scene.add_rod(start=(0.1, 0, 0), end=(0.2, 0, 0), nodes=6, radius=4e-3, material=RUBBER)
+    scene.clamp(arm.start)
+    scene.join(arm.end, hand.start, kind="revolute", axis=(0, 1, 0))
+    motor = scene.add_moment(hand.start, (0, 1e-5, 0)), scene.add_moment(arm.end, (0, -1e-5, 0))
+    simulation = scene.build(time_step=1e-3)
+    simulation.step(50)
+    assert simulation.velocities(hand)[-1, 2] < -0.001
+    for load, sign in zip(motor, (-1, 1), strict=True):
+        simulation.set(load, moment=(0, sign * 1e-5, 0))
+    before = simulation.velocities(hand)[-1, 2]
+    simulation.step(20)
+    assert simulation.velocities(hand)[-1, 2] > before
+
+
+# Meshes too coarse for the motion
+
+
+def shaft(nodes=11):
+    scene, arm, _ = weightless(nodes)
+    return arm, scene.build(planar=False)
+
+
+@pytest.mark.filterwarnings("error::withe.CoarseMeshWarning")
+def test_a_natural_twist_that_grows_like_a_motor_does_not_warn():
+    arm, simulation = shaft()
+    twist = np.zeros(arm.stencils)
+    twist[2] = 2 * np.pi * 5 / 0.02
+    simulation.set_natural_twist(arm, twist, over=1.0)
+    simulation.step(240)
+    turned = simulation.directors(arm)
+    assert np.abs(simulation.twists(arm)).max() == pytest.approx(twist[2], rel=0.01)
+    assert np.isfinite(turned).all()
+
+
+@pytest.mark.filterwarnings("error::withe.CoarseMeshWarning")
+def test_a_free_shaft_that_its_clamp_turns_many_times_does_not_warn():
+    arm, simulation = shaft()
+    simulation.move("wall", roll=2 * np.pi * 20, over=1.0)
+    simulation.step(240)
+    assert np.abs(simulation.twists(arm)).max() < 10.0
+
+
+def test_a_shaft_that_is_wound_up_between_two_clamps_warns():
+    arm, simulation = shaft(6)
+    simulation.clamp(arm.end)
+    simulation.move(arm.end, roll=2 * np.pi * 5, over=0.2)
+    with pytest.warns(withe.CoarseMeshWarning, match=r"twists by \d+ degrees against the next"):
+        simulation.step(70)

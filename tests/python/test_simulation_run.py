@@ -298,3 +298,59 @@ def test_a_mesh_too_coarse_for_the_motion_warns_once(moved, recwarn):
         assert len(said) == 1
         assert ("an edge twists by" if moved == "twisted" else "an edge turns by") in said[0]
         assert "of rod 'arm'" in said[0]
+
+
+BEHIND_ITS_BACK = {
+    "step": lambda s: s.step(),
+    "run": lambda s: s.run(0.01, progress=False),
+    "reset": lambda s: s.reset(),
+    "restore": lambda s: s.restore(s.snapshot()),
+    "equilibrium": lambda s: s.equilibrium(),
+}
+
+
+@pytest.mark.parametrize("what", BEHIND_ITS_BACK)
+@pytest.mark.parametrize("callback", ["before_step", "until", "record"])
+def test_a_callback_that_advances_the_simulation_or_takes_it_back_is_refused(what, callback):
+    _, _, simulation = cantilever()
+    simulation.step(2)
+    function = BEHIND_ITS_BACK[what]
+    with pytest.raises(RuntimeError, match=f"{what} cannot be called while the simulation runs"):
+        simulation.run(0.1, progress=False, **{callback: {"x": function} if callback == "record" else function})
+    assert simulation.time == 0.01 + (0.005 if callback == "until" else 0.0)
+    simulation.step()  # and the run is over
+    simulation.reset()
+
+
+def test_a_callback_may_go_on_with_a_copy_and_take_snapshots():
+    _, _, simulation = cantilever()
+    _, _, other = cantilever()
+
+    def ahead(s):
+        twin = s.copy()
+        twin.step(2)
+        twin.restore(s.snapshot())
+        return twin.run(0.01, progress=False).times[-1]
+
+    record = simulation.run(
+        0.05, 0.01, progress=False, before_step=ahead, until=lambda s: ahead(s) < 0, record={"t": ahead}
+    )
+    np.testing.assert_allclose(record["t"], record.times + 0.01, rtol=1e-12)
+    np.testing.assert_allclose(record.positions(), other.run(0.05, 0.01, progress=False).positions(), rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("duration", [5e-324, 1e-300, 1e-25])
+def test_a_duration_that_changes_no_time_is_refused(duration):
+    _, _, simulation = cantilever()
+    with pytest.raises(ValueError, match=r"duration must be long enough for the time_step, 0\.005 s"):
+        simulation.run(duration, progress=False)
+    assert np.isfinite(simulation.positions()).all()
+    simulation.step()
+    with pytest.raises(ValueError, match="duration must be long enough"):
+        simulation.run(1e-19, progress=False)
+
+
+def test_a_record_refuses_masked_entries():
+    _, _, simulation = cantilever()
+    with pytest.raises(ValueError, match="must have a value everywhere"):
+        simulation.run(0.01, progress=False, record={"x": lambda s: np.ma.masked_greater(s.positions(), 0.1)})

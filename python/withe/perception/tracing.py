@@ -127,7 +127,7 @@ def trace(
     ValueError
         A picture that cannot be read or has another shape or type, or a mask of another size.
     ImportError
-        A file was given and OpenCV is not installed: ``pip install "withe[vision]"``.
+        A file was given and OpenCV is not installed: ``pip install ".[vision]"`` in a clone of withe.
 
     Examples
     --------
