@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from withe import io, validation
 
-__all__ = ["EnergyHistory", "Record", "Recorder", "RodOutline"]
+__all__ = ["EnergyHistory", "ObstacleOutline", "Record", "Recorder", "RodOutline"]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -70,6 +70,26 @@ class RodOutline:
 
 
 @dataclass(frozen=True)
+class ObstacleOutline:
+    """What pictures need to know of an obstacle besides its motion.
+
+    Attributes
+    ----------
+    name : str
+    kind : {"plane", "capsule"}
+        A sphere is a capsule without length.
+    axis : ndarray of shape (3,)
+        Normal of a plane; from the start of a capsule's axis to its end [m].
+    radius : float [m]
+    """
+
+    name: str
+    kind: str
+    axis: FloatArray
+    radius: float
+
+
+@dataclass(frozen=True)
 class EnergyHistory:
     """Energies of every frame, arrays of shape (frames,) [J].
 
@@ -110,8 +130,10 @@ class Record:
         rods: Iterable[RodOutline],
         arrays: Mapping[str, npt.NDArray[Any]],
         extras: Iterable[str] = (),
+        obstacles: Iterable[ObstacleOutline] = (),
     ) -> None:
         self._rods = tuple(rods)
+        self._obstacles = tuple(obstacles)
         self._arrays = dict(arrays)
         self._extras = tuple(extras)
         self._check()
@@ -140,6 +162,10 @@ class Record:
             self._array(f"rod_{index}_curvatures", (frames, rod.stencils, 2))
             self._array(f"rod_{index}_twists", (frames, rod.stencils))
             self._array(f"rod_{index}_tensions", (frames, rod.edges))
+        for index, obstacle in enumerate(self._obstacles):
+            self._array(f"obstacle_{index}_place", (frames, 3))
+            if obstacle.kind not in ("plane", "capsule") or obstacle.axis.shape != (3,) or not obstacle.radius >= 0.0:
+                raise ValueError(f"obstacle {obstacle.name!r} must be a plane or a capsule with an axis and a radius")
         for name in _ENERGIES:
             self._array(f"energy_{name}", (frames,))
         for index, name in enumerate(self._extras):
@@ -172,6 +198,11 @@ class Record:
         return self._rods
 
     @property
+    def obstacles(self) -> tuple[ObstacleOutline, ...]:
+        """Planes, spheres and capsules, in the order of the scene."""
+        return self._obstacles
+
+    @property
     def units(self) -> dict[str, str]:
         """Units of the read-outs, by name."""
         return dict(_UNITS)
@@ -193,6 +224,17 @@ class Record:
             No rod of that name.
         """
         return self._nodal("positions", rod)
+
+    def obstacle_position(self, obstacle: Any) -> FloatArray:
+        """Positions of an obstacle: of the point of a plane, a sphere's centre, a capsule's start, (frames, 3) [m].
+
+        Raises
+        ------
+        ValueError
+            No obstacle of that name.
+        """
+        index = _index_of(self._obstacles, obstacle, "obstacle")
+        return self._arrays[f"obstacle_{index}_place"].copy()
 
     def velocities(self, rod: Any = None) -> FloatArray:
         """Velocities of the nodes of a rod, or of every node once, (frames, nodes, 3) [m/s]."""
@@ -249,13 +291,7 @@ class Record:
         return self._arrays[f"rod_{self._index(rod)}_{name}"].copy()
 
     def _index(self, rod: Any) -> int:
-        name = rod if isinstance(rod, str) else getattr(rod, "name", None)
-        for index, outline in enumerate(self._rods):
-            if outline.name == name:
-                return index
-        known = ", ".join(repr(outline.name) for outline in self._rods)
-        wanted = repr(rod) if name is None else repr(name)
-        raise ValueError(f"rod must be one of {known} or its handle, got {wanted}")
+        return _index_of(self._rods, rod, "rod")
 
     def __repr__(self) -> str:
         rods = ", ".join(rod.name for rod in self._rods)
@@ -278,6 +314,10 @@ class Record:
             "units": _UNITS,
             "rods": [{"name": rod.name, "closed": rod.closed} for rod in self._rods],
             "extras": list(self._extras),
+            "obstacles": [
+                {"name": each.name, "kind": each.kind, "axis": each.axis.tolist(), "radius": each.radius}
+                for each in self._obstacles
+            ],
         }
         arrays = dict(self._arrays)
         for index, rod in enumerate(self._rods):
@@ -310,7 +350,11 @@ class Record:
                 )
                 for index, rod in enumerate(header["rods"])
             ]
-            return cls(rods, arrays, [str(name) for name in header["extras"]])
+            obstacles = [
+                ObstacleOutline(str(o["name"]), str(o["kind"]), np.array(o["axis"], float), float(o["radius"]))
+                for o in header.get("obstacles", [])  # which files had none of at first
+            ]
+            return cls(rods, arrays, [str(name) for name in header["extras"]], obstacles)
         except (KeyError, TypeError, ValueError) as error:
             raise ValueError(f"{path} is a damaged record: {error}") from error
 
@@ -360,6 +404,17 @@ class Record:
         return view.picture(self, path, **options)
 
 
+def _index_of(outlines: tuple[RodOutline, ...] | tuple[ObstacleOutline, ...], handle: Any, what: str) -> int:
+    """Place of a rod or an obstacle among those of a record, by its name or its handle."""
+    name = handle if isinstance(handle, str) else getattr(handle, "name", None)
+    names = [outline.name for outline in outlines]
+    if name not in names:
+        known = ", ".join(map(repr, names)) or "none"
+        wanted = repr(handle) if name is None else repr(name)
+        raise ValueError(f"{what} must be one of {known} or its handle, got {wanted}")
+    return names.index(name)
+
+
 class _Column:
     """An array that grows by whole frames."""
 
@@ -390,6 +445,8 @@ class Recorder:
         Answers to the read-outs of `Simulation`.
     extra : mapping of str to callable
         Called with the simulation at every frame; each returns a number or an array, of one shape.
+    obstacles : iterable of ObstacleOutline
+        Whose positions to record.
 
     Raises
     ------
@@ -397,8 +454,14 @@ class Recorder:
         A name that is not text, or something that cannot be called.
     """
 
-    def __init__(self, simulation: Any, extra: Mapping[str, Callable[[Any], npt.ArrayLike]] | None = None) -> None:
+    def __init__(
+        self,
+        simulation: Any,
+        extra: Mapping[str, Callable[[Any], npt.ArrayLike]] | None = None,
+        obstacles: Iterable[ObstacleOutline] = (),
+    ) -> None:
         self._simulation = simulation
+        self._obstacles = tuple(obstacles)
         self._extra = dict(extra or {})
         for name, function in self._extra.items():
             if not isinstance(name, str):
@@ -437,6 +500,8 @@ class Recorder:
         for index, rod in enumerate(self._rods):
             for readout in _ROD_READOUTS:
                 frame[f"rod_{index}_{readout}"] = getattr(simulation, readout)(rod.name)
+        for index, obstacle in enumerate(self._obstacles):
+            frame[f"obstacle_{index}_place"] = simulation.obstacle_position(obstacle.name)
         energy = simulation.energy()
         for name in _ENERGIES:
             frame[f"energy_{name}"] = np.array(getattr(energy, name), float)
@@ -451,7 +516,7 @@ class Recorder:
             arrays = {name: column.values(self._frames) for name, column in self._columns.items()}
         else:
             arrays = {name: values[None][:0].copy() for name, values in self._frame().items()}
-        return Record(self._rods, arrays, self._extra)
+        return Record(self._rods, arrays, self._extra, self._obstacles)
 
 
 def _numbers(name: str, value: npt.ArrayLike) -> npt.NDArray[Any]:
@@ -484,8 +549,8 @@ def _outline(rod: Any) -> RodOutline:
     )
 
 
-def present(simulation: Any) -> Record:
+def present(simulation: Any, obstacles: Iterable[ObstacleOutline] = ()) -> Record:
     """A record of one frame: the present state of a simulation."""
-    recorder = Recorder(simulation)
+    recorder = Recorder(simulation, None, obstacles)
     recorder.capture()
     return recorder.record

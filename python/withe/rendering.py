@@ -1,4 +1,7 @@
-"""Rods as tubes on a light ground, rendered by PyVista: the stage that pictures, films and the viewer share."""
+"""Rods as tubes, and what they touch, on a light ground, rendered by PyVista.
+
+This is the stage that pictures, films and the viewer share.
+"""
 
 from __future__ import annotations
 
@@ -13,6 +16,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import numpy.typing as npt
 
+from withe import scenery
 from withe.extras import require
 from withe.io import edges_to_nodes, stencils_to_nodes
 from withe.surfaces import Surface
@@ -20,7 +24,7 @@ from withe.surfaces import Surface
 if TYPE_CHECKING:
     from withe.recording import Record
 
-__all__ = ["Stage", "color_limits", "probe_rendering"]
+__all__ = ["Stage", "color_limits", "nice_limits", "probe_rendering"]
 
 FloatArray = npt.NDArray[np.float64]
 ColorBy = Literal["rod", "tension", "curvature", "twist", "speed"]
@@ -41,6 +45,7 @@ _DIRECTIONS = {
 _VIEW_ANGLE = 24.0  # [degrees]
 _BAR_SHARE = 0.16
 _INK = "#33383d"
+_PLANE, _PLANE_EDGE, _SOLID = "#e3e8ec", "#c3cbd2", "#b4bdc5"
 _MAX_SAMPLES = 6000  # rings of all rods together
 _SHADOW_CELLS = 320
 _BLURS = (2.5, 5.0, 9.0, 14.0)  # [cells], by height above the ground
@@ -62,7 +67,7 @@ class Stage:
     ghosts : sequence of int
         Frames that stand behind the others, faintly, the first one most.
     ground : float, optional [m]
-        Height at which the shadow falls; a little below the rods by default.
+        Height at which the shadow falls; by default a level plane near the rods, or a little below them.
     off_screen : bool
         Render into memory rather than into a window.
     supersampling : int
@@ -106,6 +111,13 @@ class Stage:
         ]
         self._values = None if color_by == "rod" else [_nodal(record, rod, color_by) for rod in record.rods]
         in_view = self._positions if frames is None else self._positions[list(frames)]
+        self._footprints_of_obstacles: list[FloatArray] = []
+        self._places = [record.obstacle_position(obstacle) for obstacle in record.obstacles]
+        nodes = in_view.reshape(-1, 3)
+        around = [
+            scenery.framing(obstacle, places if frames is None else places[list(frames)], nodes)
+            for obstacle, places in zip(record.obstacles, self._places, strict=True)
+        ]
         direction = _direction(camera, in_view)
         if ground is not None and not np.isfinite(ground):
             raise ValueError(f"ground must be a height in metres, got {ground!r}")
@@ -116,8 +128,15 @@ class Stage:
         with _window(off_screen):
             self.plotter = pyvista.Plotter(off_screen=off_screen, window_size=window, lighting="none")
         self.plotter.set_background("#f5f7f9")
-        self._frame_camera(direction, in_view.reshape(-1, 3), ground, 0.0 if color_by == "rod" else _BAR_SHARE)
+        if ground is None:
+            ground = self._floor(nodes)
+        # Under a slope there is no ground to cast a shadow on.
+        kinds = [obstacle.kind for obstacle, seen in zip(record.obstacles, around, strict=True) if len(seen)]
+        self._casts = ground is not None or "plane" not in kinds
+        nearby = np.concatenate([nodes[:0], *around])
+        self._frame_camera(direction, nodes, nearby, ground, 0.0 if color_by == "rod" else _BAR_SHARE)
         self._add_lights(pyvista, direction)
+        self._add_obstacles(pyvista, np.concatenate([nodes, nearby]))
         self._add_shadow(pyvista)
         self._add_rods(pyvista, color_by)
         self._ghosts = [points for frame in ghosts for points in self._add_ghost(pyvista, frame, list(ghosts))]
@@ -132,6 +151,11 @@ class Stage:
         after = min(before + 1, len(self.times) - 1)
         share = frame - before
         meshed = list(self._ghosts)
+        self._obstacle_points = []
+        for actor, places, surface in self._obstacles:
+            way = self._mixed(places, before, after, share) - places[0]
+            actor.position = way
+            self._obstacle_points += [surface + way] if surface is not None else []
         for index, rod in enumerate(self._record.rods):
             nodes = self._mixed(self._positions, before, after, share)[rod.rows]
             points, normals = self._surfaces[index].mesh(
@@ -144,7 +168,8 @@ class Stage:
                 nodal = self._mixed(self._values[index], before, after, share)
                 mesh.point_data["value"] = self._surfaces[index].on_surface(nodal)
             meshed.append(points)
-        self._cast_shadow(meshed)
+        if self._casts:
+            self._cast_shadow(meshed)
 
     def label(self, text: str) -> None:
         """Write a line of text in the lower left corner, in place of the one before."""
@@ -173,13 +198,30 @@ class Stage:
         mixed: FloatArray = (1.0 - share) * values[before] + share * values[after]
         return mixed
 
-    def _frame_camera(self, direction: FloatArray, points: FloatArray, ground: float | None, aside: float) -> None:
+    def _floor(self, points: FloatArray) -> float | None:
+        """Height of the level plane on which the shadow of rods that are near it falls; None where there is none."""
+        heights = [
+            float(places[0, 2])
+            for obstacle, places in zip(self._record.obstacles, self._places, strict=True)
+            if obstacle.kind == "plane"
+            and obstacle.axis[2] > (1.0 - 1e-9) * np.linalg.norm(obstacle.axis)
+            and np.ptp(places[:, 2]) == 0.0
+            and len(scenery.framing(obstacle, places[:1], points))
+        ]
+        if not heights:
+            return None
+        return max(heights) + 1e-3 * float(np.linalg.norm(np.ptp(points, axis=0)))  # not in the plane itself
+
+    def _frame_camera(
+        self, direction: FloatArray, points: FloatArray, around: FloatArray, ground: float | None, aside: float
+    ) -> None:
         """Look from a direction at the middle of all points, from as near as all are in view.
 
-        A share of the picture, `aside`, is left to the scale on the right.
+        So is what is around the rods. A share of the picture, `aside`, is left to the scale on the right.
         """
         reach = max(float(rod.radii.max()) for rod in self._record.rods)
-        low, high = points.min(axis=0), points.max(axis=0)
+        everything = np.concatenate([points, around])
+        low, high = everything.min(axis=0), everything.max(axis=0)
         extent = float(np.linalg.norm(high - low)) + 2.0 * reach
         self._extent = extent
         self._ground = float(low[2]) - reach - 0.03 * extent if ground is None else float(ground)
@@ -187,7 +229,7 @@ class Stage:
         self._shadow_bounds = middle - half, middle + half
         corners = [points + reach * sign * axis for axis in np.eye(3) for sign in (-1.0, 1.0)]
         shadows = np.column_stack([points[:, :2], np.full(len(points), self._ground)])
-        seen = np.concatenate([*corners, shadows])
+        seen = np.concatenate([*corners, shadows, around])
         up = np.array([0.0, 1.0, 0.0]) if abs(direction[2]) > 0.99 else np.array([0.0, 0.0, 1.0])
         right = np.cross(up, direction)
         right /= np.linalg.norm(right)
@@ -224,7 +266,7 @@ class Stage:
         options: dict[str, Any] = {"ambient": 0.35, "diffuse": 0.8, "specular": 0.3, "specular_power": 30.0}
         if self._values is not None:
             title, colours = _BARS[color_by]
-            low, high = color_limits(self._values)
+            low, high, labels, digits = nice_limits(*color_limits(self._values))
             if low == -high:
                 colours = "coolwarm"
             options |= {
@@ -241,8 +283,8 @@ class Stage:
                     "height": 0.5,
                     "title_font_size": self.size[1] * self._fineness // 42,
                     "label_font_size": self.size[1] * self._fineness // 48,
-                    "fmt": "%.3g",
-                    "n_labels": 5,
+                    "fmt": digits,
+                    "n_labels": labels,
                 },
             }
         for index, mesh in enumerate(self._meshes):
@@ -252,6 +294,41 @@ class Stage:
                 mesh.point_data["value"] = np.zeros(mesh.n_points)
             actor = self.plotter.add_mesh(mesh, reset_camera=False, **options)
             actor.prop.interpolation = "Phong"
+
+    def _add_obstacles(self, pyvista: Any, nodes: FloatArray) -> None:
+        """Patches of planes, spheres and capsules, with where they are and, where they cast a shadow, their points."""
+        self._obstacles: list[tuple[Any, FloatArray, FloatArray | None]] = []
+        for obstacle, places in zip(self._record.obstacles, self._places, strict=True):
+            if obstacle.kind == "plane":
+                corners = scenery.patch(obstacle, places[0], nodes)
+                mesh = pyvista.PolyData(corners, [4, 0, 1, 2, 3])
+                options: dict[str, Any] = {"color": _PLANE, "ambient": 0.75, "diffuse": 0.3, "specular": 0.0}
+                normal = obstacle.axis / np.linalg.norm(obstacle.axis)
+                places = places[:1] + np.outer((places - places[0]) @ normal, normal)  # along itself it looks the same
+                self._obstacles.append((self.plotter.add_mesh(mesh, reset_camera=False, **options), places, None))
+                edge = pyvista.PolyData(corners, lines=[5, 0, 1, 2, 3, 0])
+                rim = self.plotter.add_mesh(edge, color=_PLANE_EDGE, reset_camera=False, lighting=False, line_width=2)
+                self._obstacles.append((rim, places, None))
+                continue
+            start, end = scenery.ends(obstacle, places[0])
+            length = float(np.linalg.norm(end - start))
+            if length <= 1e-9 * obstacle.radius:
+                mesh = pyvista.Sphere(radius=obstacle.radius, center=start, theta_resolution=64, phi_resolution=48)
+            else:
+                mesh = pyvista.Capsule(
+                    center=0.5 * (start + end),
+                    direction=(end - start) / length,
+                    radius=obstacle.radius,
+                    cylinder_length=length,
+                    resolution=64,
+                )
+            actor = self.plotter.add_mesh(
+                mesh, color=_SOLID, ambient=0.35, diffuse=0.75, specular=0.1, smooth_shading=True, reset_camera=False
+            )
+            area = np.pi * obstacle.radius**2 + 2.0 * obstacle.radius * length
+            points = scenery.cloud(obstacle, places[0])
+            self._obstacles.append((actor, places, points))
+            self._footprints_of_obstacles.append(np.full(len(points), area / len(points)))
 
     def _add_ghost(self, pyvista: Any, frame: int, ghosts: list[int]) -> list[FloatArray]:
         """Rods of one frame in pale colours, which do not move; returns the points of their surfaces."""
@@ -286,9 +363,10 @@ class Stage:
 
         low, high = self._shadow_bounds
         shade = np.zeros((_SHADOW_CELLS, _SHADOW_CELLS))
+        footprints = self._footprints * (len(points) // len(self._footprints)) + self._footprints_of_obstacles
+        points = points + self._obstacle_points
         heights = np.concatenate(points)[:, 2] - self._ground
         places = (np.concatenate(points)[:, :2] - low) / (high - low) * _SHADOW_CELLS
-        footprints = self._footprints * (len(points) // len(self._footprints))
         weights = np.concatenate(footprints) / np.prod((high - low) / _SHADOW_CELLS)
         level = np.clip(heights / self._extent * len(_BLURS), 0, len(_BLURS) - 1).astype(int)
         box = [[0, _SHADOW_CELLS]] * 2
@@ -319,6 +397,36 @@ def color_limits(values: Sequence[FloatArray]) -> tuple[float, float]:
     if low < -0.05 * high and high > 0.0:
         return -max(-low, high), max(-low, high)
     return low, high if high > low else low + 1e-12
+
+
+def nice_limits(low: float, high: float) -> tuple[float, float, int, str]:
+    """Ends of a scale that begins and ends at round numbers.
+
+    Parameters
+    ----------
+    low, high : float
+        What it must hold.
+
+    Returns
+    -------
+    low, high : float
+    labels : int
+        How many, ends among them, stand at round numbers.
+    format : str
+        With the digits that they need.
+    """
+    size = max(abs(low), abs(high), high - low)
+    if not (1e-9 * size < high - low and 1e-290 < size < 1e290):
+        return low, high, 2, "%.3g"
+    unit = 10.0 ** np.floor(np.log10(high - low))
+    even = low == -high  # keeps zero in the middle, with a label
+    for step in unit * np.array([0.2, 0.25, 0.5, 1.0, 2.0, 2.5]):
+        first, last = np.floor(low / step + 1e-9), np.ceil(high / step - 1e-9)
+        if last - first <= (4 if even else 5):
+            break
+    decimals = next((d for d in range(5) if abs(round(step, d) - step) < 1e-6 * step), None)
+    plain = decimals is not None and max(abs(first), abs(last)) * step < 1e5
+    return float(first * step), float(last * step), int(last - first) + 1, f"%.{decimals}f" if plain else "%.3g"
 
 
 def _empty_mesh(pyvista: Any, surface: Surface) -> Any:

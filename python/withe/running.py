@@ -76,7 +76,7 @@ class _Run:
         self._simulation = simulation
         self._before_step = before_step
         self._until = until
-        self._recorder = Recorder(simulation, record)
+        self._recorder = Recorder(simulation, record, simulation._obstacle_outlines())
         self._start = simulation.time
         self._ended = False
 

@@ -18,7 +18,7 @@ from withe.control import Control
 from withe.description import describe, parameters_of
 from withe.directory import Directory
 from withe.errors import CoarseMeshWarning, ConvergenceError
-from withe.handles import NodeHandle, Rod, Support
+from withe.handles import NodeHandle, Obstacle, Rod, Support
 from withe.knots import link
 from withe.options import check_tolerances, engine_options
 from withe.parts import CustomForcePart, DragPart, FluidPart, LoadPart, MassPart, ObstaclePart, RodPart, SupportPart
@@ -26,7 +26,7 @@ from withe.readouts import Energy, Equilibrium, Linearisation, Plan, Reaction, R
 from withe.snapshots import Settings, Snapshot
 
 if TYPE_CHECKING:
-    from withe.recording import Record, Recorder
+    from withe.recording import ObstacleOutline, Record, Recorder
 
 __all__ = ["Simulation"]
 
@@ -277,6 +277,17 @@ class Simulation(Control):
         """
         positions = self._world.positions()
         return positions if rod is None else positions[self._directory.layout.rows(self._rod(rod))]
+
+    def obstacle_position(self, obstacle: Obstacle | str) -> FloatArray:
+        """Where an obstacle is: the point of a plane, a sphere's centre, a capsule's start, shape (3,) [m].
+
+        Raises
+        ------
+        ValueError
+            Not an obstacle of this scene.
+        """
+        part = self._directory.find(obstacle, ObstaclePart, "obstacle")
+        return np.array(self._world.obstacle_position(self._directory.all(ObstaclePart).index(part)))
 
     def velocities(self, rod: Rod | str | None = None) -> FloatArray:
         """Velocities of the nodes of a rod, or of every node once, shape (nodes, 3) [m/s]."""
@@ -544,7 +555,20 @@ class Simulation(Control):
     def _frame(self) -> Record:
         from withe.recording import present
 
-        return present(self)
+        return present(self, self._obstacle_outlines())
+
+    def _obstacle_outlines(self) -> list[ObstacleOutline]:
+        from withe.recording import ObstacleOutline
+
+        return [
+            ObstacleOutline(
+                part.name,
+                part.kind,
+                np.array(part.other if part.kind == "plane" else part.other - part.point, float),
+                float(part.radius),
+            )
+            for part in self._directory.all(ObstaclePart)
+        ]
 
     _recorder: Recorder | None
     _exact_time: tuple[float, float] | None

@@ -14,13 +14,14 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import numpy.typing as npt
 
+from withe import scenery
 from withe.extras import require
 from withe.io import written_beside
 from withe.progress import progress as progress_bar
 from withe.rendering import ColorBy, Stage
 
 if TYPE_CHECKING:
-    from withe.recording import Record
+    from withe.recording import ObstacleOutline, Record
 
 __all__ = ["animate", "picture", "plot", "view"]
 
@@ -39,7 +40,10 @@ def picture(
     ground: float | None = None,
     label: str | None = None,
 ) -> Path:
-    """Render one frame as tubes into a .png file.
+    """Render one frame into a .png file: rods as tubes, and planes, spheres and capsules.
+
+    Of a plane a square around the rods is drawn, and what is far away, or much larger than the rods, does not move
+    the camera.
 
     Parameters
     ----------
@@ -57,7 +61,7 @@ def picture(
         From where to look: "front", "side", "top", "oblique" or a direction. By default along the
         normal of a planar motion, and obliquely at any other.
     ground : float, optional [m]
-        Height at which the shadow falls; a little below the rods by default.
+        Height at which the shadow falls; by default a level plane near the rods, or a little below them.
     label : str, optional
         Text in the lower left corner.
 
@@ -105,7 +109,7 @@ def animate(
     ground: float | None = None,
     progress: bool | Literal["always"] = True,
 ) -> Path:
-    """Render the rods as tubes into a film.
+    """Render the rods as tubes into a film, with planes, spheres and capsules, which move as they did.
 
     Parameters
     ----------
@@ -216,6 +220,9 @@ def view(
 def plot(record: Record, *, shapes: int = 6) -> Any:
     """Draw the shapes of the rods at several times, and the energies over time.
 
+    Obstacles near the rods are drawn too: in two dimensions planes as lines, spheres and capsules as outlines, in three
+    see-through. Those that move are drawn at the same times as the rods, in the same colours.
+
     Parameters
     ----------
     record : Record
@@ -272,6 +279,7 @@ _STYLE = {
     "lines.solid_capstyle": "round",
     "font.size": 10,
 }
+_OBSTACLE, _OBSTACLE_FILL = "#8a9299", "#d9dfe4"
 _ENERGY_COLOURS = {
     "kinetic": "#e76f51",
     "stretch": "#e9b44c",
@@ -305,20 +313,76 @@ def _plot_shapes(figure: Any, place: Any, record: Record, count: int) -> Any:
             if rod.closed:
                 points = np.concatenate([points, points[:1]])
             axes.plot(*points.T, color=scale.to_rgba(times[frame]), linewidth=2.2)
+    nodes = positions.reshape(-1, 3)
+    around = []
+    for obstacle in record.obstacles:
+        places = record.obstacle_position(obstacle)[frames]
+        around.append(scenery.framing(obstacle, places, nodes))
+        still = bool(np.all(places == places[0]))
+        for place, time in zip(places[: 1 if still else None], times[frames], strict=False):
+            ink = _OBSTACLE if still else scale.to_rgba(time)
+            if three:
+                _draw_solid(axes, obstacle, place, np.concatenate([nodes, *around]), factor, ink)
+            else:
+                _draw_section(axes, obstacle, place, nodes, shown, factor, ink)
     names = "xyz"
     axes.set_xlabel(f"{names[shown[0]]} [{prefix}m]")
     axes.set_ylabel(f"{names[shown[1]]} [{prefix}m]")
     if three:
         axes.set_zlabel(f"z [{prefix}m]")
-        _box(axes, positions * factor)
+        _box(axes, np.concatenate([nodes, *around]) * factor)
     else:
         axes.set_aspect("equal", adjustable="datalim")
     if len(frames) > 1:
-        bar = figure.colorbar(scale, ax=axes, shrink=0.75, pad=0.12 if three else 0.03, ticks=times[frames])
+        bar = figure.colorbar(scale, ax=axes, shrink=0.75, pad=0.12 if three else 0.03)
         bar.set_label("time [s]")
-        bar.ax.set_yticklabels([f"{time:.3g}" for time in times[frames]])
         bar.outline.set_visible(False)
     return axes
+
+
+def _draw_section(
+    axes: Any,
+    obstacle: ObstacleOutline,
+    place: FloatArray,
+    nodes: FloatArray,
+    shown: list[int],
+    factor: float,
+    ink: Any,
+) -> None:
+    """An obstacle where it is seen along one coordinate: the line of a plane, the outline of a sphere or capsule."""
+    if obstacle.kind == "capsule":
+        first, second = (end[shown] * factor for end in scenery.ends(obstacle, place))
+        outline = scenery.profile(first, second, obstacle.radius * factor)
+        shape = require("matplotlib.patches", "view").Polygon(
+            outline, facecolor=_OBSTACLE_FILL, edgecolor=ink, linewidth=1.2, zorder=1.5
+        )
+        axes.add_artist(shape)
+        if len(scenery.framing(obstacle, place[None], nodes)):
+            axes.update_datalim(outline)
+        return
+    normal = obstacle.axis[shown]
+    if np.linalg.norm(normal) <= 1e-9 * np.linalg.norm(obstacle.axis):
+        return  # it faces the reader
+    if len(scenery.framing(obstacle, place[None], nodes)):
+        foot = nodes[:, shown].mean(axis=0)
+        foot = foot - normal * (normal @ (foot - place[shown])) / (normal @ normal)
+        # The line has no ends; both points count for the limits, so they are near each other.
+        beside = 1e-3 * np.ptp(nodes[:, shown], axis=0).max() * np.array([-normal[1], normal[0]])
+        axes.axline(foot * factor, (foot + beside) * factor, color=ink, linewidth=1.6, zorder=1.5)
+
+
+def _draw_solid(
+    axes: Any, obstacle: ObstacleOutline, place: FloatArray, nodes: FloatArray, factor: float, ink: Any
+) -> None:
+    """An obstacle in three dimensions, see-through: a patch of a plane, a sphere or a capsule."""
+    if not len(scenery.framing(obstacle, place[None], nodes)):
+        return
+    if obstacle.kind == "plane":
+        corners = scenery.patch(obstacle, place, nodes, 0.3)[[0, 1, 3, 2]].reshape(2, 2, 3) * factor
+        axes.plot_surface(*np.moveaxis(corners, -1, 0), color=_OBSTACLE_FILL, alpha=0.5, shade=False)
+        return
+    grid = scenery.surface(obstacle, place) * factor
+    axes.plot_surface(*np.moveaxis(grid, -1, 0), color=ink, alpha=0.35, linewidth=0.0)
 
 
 def _box(axes: Any, positions: FloatArray) -> None:
@@ -334,8 +398,18 @@ def _box(axes: Any, positions: FloatArray) -> None:
         axis.labelpad = 26.0 * others - 21.0
         axis.set_view_interval(centre - 0.5 * span, centre + 0.5 * span, ignore=True)
         axis.set_pane_color((1.0, 1.0, 1.0, 0.0))
-        count = max(1, round(4.0 * span / spans.max()))
-        axis.set_major_locator(require("matplotlib.ticker", "view").MaxNLocator(count))
+        axis.set_ticks(_ticks(centre - 0.5 * span, centre + 0.5 * span, max(1, round(4.0 * span / spans.max()))))
+
+
+def _ticks(low: float, high: float, count: int) -> list[float]:
+    """Round numbers away from both ends, where their labels would meet those of the next axis."""
+    ticker = require("matplotlib.ticker", "view")
+    room = 0.1 * (high - low)
+    for wanted in range(count, count + 6):
+        ticks = [float(t) for t in ticker.MaxNLocator(wanted).tick_values(low, high) if low + room <= t <= high - room]
+        if len(ticks) >= min(2, count):
+            break
+    return ticks
 
 
 def _fit(axes: Any) -> None:
@@ -366,7 +440,7 @@ def _plot_energies(axes: Any, record: Record) -> None:
     axes.set_xlabel("time [s]")
     axes.set_ylabel(f"energy [{prefix}J]")
     axes.margins(x=0.0)
-    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
+    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, columnspacing=1.2, handlelength=1.6)
 
 
 def _prefix(largest: float, units: tuple[float, ...]) -> tuple[float, str]:

@@ -3,16 +3,18 @@
 import builtins
 import importlib
 import os
+import pickle
 import subprocess
 import sys
 
 import numpy as np
 import pytest
 
+import withe
 from curling_motion import CURVATURE_RATE, CurlingSimulation
-from withe import rendering, view
+from withe import rendering, scenery, view
 from withe.extras import require
-from withe.recording import Recorder, RodOutline, present
+from withe.recording import ObstacleOutline, Record, Recorder, RodOutline, present
 from withe.surfaces import Surface
 
 
@@ -343,3 +345,159 @@ def test_importing_the_views_imports_no_heavy_package():
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment, check=True)
     assert result.stdout.strip() == "[]"
+
+
+# Obstacles
+
+
+@pytest.fixture(scope="module")
+def scenes():
+    """Records of a rod among obstacles: in space, where a sphere moves, and in a plane."""
+    rubber = withe.Material(youngs_modulus=5e5, density=1000.0, viscosity=200.0)
+    space = withe.Scene()
+    space.add_rod(points=withe.shapes.helix(0.03, 0.02, 0.3, 30), radius=4e-3, material=rubber)
+    space.add_floor(height=-0.03, name="floor")
+    space.add_sphere((0.06, 0.02, 0.0), 0.02, name="ball")
+    space.add_capsule((-0.08, -0.05, 0), (-0.08, 0.06, 0), 0.012, name="bar")
+    simulation = space.build()
+    simulation.move("ball", (0.06, 0.02, 0.05), over=0.04)
+    plane = withe.Scene()
+    plane.add_rod(start=(0, 0, 0), end=(0.2, 0, 0), nodes=11, radius=4e-3, material=rubber)
+    plane.add_plane((0, 0, -0.12), (-0.3, 0, 1), name="slope")
+    plane.add_sphere((0.1, 0, -0.045), 0.03, name="ball")
+    plane.add_sphere((0, 0, -20.0), 19.8, name="hill")
+    return simulation.run(0.04, 0.01, progress=False), plane.build().run(0.04, 0.01, progress=False)
+
+
+def test_a_record_knows_where_obstacles_were(scenes, tmp_path):
+    record = scenes[0]
+    for kept in (record, Record.load(record.save(tmp_path / "kept.npz")), pickle.loads(pickle.dumps(record))):
+        assert [(o.name, o.kind, o.radius) for o in kept.obstacles] == [
+            ("floor", "plane", 0.0),
+            ("ball", "capsule", 0.02),
+            ("bar", "capsule", 0.012),
+        ]
+        np.testing.assert_allclose(kept.obstacles[2].axis, (0, 0.11, 0))
+        np.testing.assert_allclose(kept.obstacle_position("ball")[:, 2], 0.05 * np.arange(5) / 4, atol=1e-12)
+        np.testing.assert_array_equal(kept.obstacle_position("bar")[:, 1], -0.05)
+    with pytest.raises(ValueError, match="obstacle must be one of 'floor', 'ball', 'bar' or its handle, got 'wall'"):
+        record.obstacle_position("wall")
+
+
+def test_obstacles_stand_in_the_picture_and_move_with_their_record(scenes, renderer, tmp_path):
+    record = scenes[0]
+    bare = Record(record.rods, {k: v for k, v in record._arrays.items() if not k.startswith("obstacle")})
+    stage = rendering.Stage(record, size=(160, 120))
+    empty = rendering.Stage(bare, size=(160, 120))
+    try:
+        first = stage.image()
+        stage.show(4.0)
+        moved = [actor for actor, places, _ in stage._obstacles if np.ptp(places, axis=0).max() > 0.0]
+        assert [actor.position for actor in moved] == [pytest.approx((0, 0, 0.05), abs=1e-12)]
+        assert np.abs(stage.image().astype(int) - first).max() > 40
+        assert np.abs(empty.image().astype(int) - first).max() > 40
+        assert stage._ground == pytest.approx(-0.03, abs=1e-3)  # the shadow falls on the floor
+    finally:
+        stage.close()
+        empty.close()
+    assert record.picture(tmp_path / ("n" * 251 + ".png"), size=(64, 48)).stat().st_size > 500
+
+
+def test_figures_show_obstacles_near_the_rods(scenes):
+    space, plane = scenes
+    axes = plane.plot().axes[0]
+    assert len(axes.get_lines()) == 5 + 1  # five shapes, a slope
+    ball, hill = (a for a in axes.get_children() if type(a).__name__ == "Polygon")
+    np.testing.assert_allclose(np.ptp(ball.get_xy(), axis=0), 60.0, rtol=5e-3)
+    assert np.ptp(hill.get_xy()[:, 0]) > 1e4
+    assert np.ptp(axes.get_xlim()) < 1000.0  # which leaves the limits as they are
+    solids = [a for a in space.plot().axes[0].collections if type(a).__name__ == "Poly3DCollection"]
+    assert len(solids) == 1 + 5 + 1  # floor, ball at five times, bar
+
+
+def test_a_picture_keeps_away_from_what_is_far_or_large():
+    points = np.array([[0.0, 0, 0], [0.1, 0, 0.1]])
+    floor = ObstacleOutline("floor", "plane", np.array([0.0, 0, 2.0]), 0.0)
+    assert len(scenery.framing(floor, np.array([[5.0, 5.0, -10.0]]), points)) == 0
+    np.testing.assert_allclose(scenery.framing(floor, np.array([[5.0, 5.0, -0.1]]), points)[:, 2], -0.1)
+    corners = scenery.patch(floor, np.array([5.0, 5.0, -0.1]), points)
+    np.testing.assert_allclose(corners[:, 2], -0.1)
+    np.testing.assert_allclose(corners[:, :2].mean(axis=0), (0.05, 0.0), atol=1e-12)
+    earth = ObstacleOutline("earth", "capsule", np.zeros(3), 100.0)
+    assert len(scenery.framing(earth, np.array([[0.0, 0.0, -100.0]]), points)) == 0
+    ball = ObstacleOutline("ball", "capsule", np.zeros(3), 0.05)
+    assert np.ptp(scenery.framing(ball, np.zeros((1, 3)), points), axis=0) == pytest.approx([0.1, 0.1, 0.1])
+
+
+def test_a_capsule_is_drawn_at_its_radius_from_its_axis():
+    bar = ObstacleOutline("bar", "capsule", np.array([0.0, 0.2, 0.1]), 0.03)
+    place = np.array([1.0, 0.0, 0.0])
+    for points in (scenery.surface(bar, place).reshape(-1, 3), scenery.cloud(bar, place)):
+        share = np.clip((points - place) @ bar.axis / (bar.axis @ bar.axis), 0.0, 1.0)
+        distance = np.linalg.norm(points - place - share[:, None] * bar.axis, axis=1)
+        assert distance.max() == pytest.approx(0.03)
+    assert np.linalg.norm(scenery.surface(bar, place).reshape(-1, 3) - place, axis=1).max() > 0.2
+
+
+# Round numbers
+
+
+@pytest.mark.parametrize(
+    ("limits", "nice"),
+    [
+        ((0.0, 33.9), (0.0, 40.0, 5, "%.0f")),
+        ((0.0, 6.08), (0.0, 8.0, 5, "%.0f")),
+        ((-1.52, 1.52), (-2.0, 2.0, 5, "%.0f")),
+        ((0.0, 0.0152), (0.0, 0.02, 5, "%.3f")),
+        ((21.0, 47.0), (20.0, 50.0, 4, "%.0f")),
+        ((0.0, 3.04e7), (0.0, 4e7, 5, "%.3g")),
+        ((5.0, 5.0), (5.0, 5.0, 2, "%.3g")),
+    ],
+)
+def test_scales_begin_and_end_at_round_numbers(limits, nice):
+    assert rendering.nice_limits(*limits) == pytest.approx(nice)
+
+
+def test_every_label_of_a_scale_is_a_round_number():
+    rng = np.random.default_rng(3)
+    for _ in range(300):
+        low, high = np.sort(rng.normal(size=2) * 10.0 ** rng.uniform(-6, 6))
+        first, last, labels, digits = rendering.nice_limits(low, high)
+        assert first <= low + 1e-6 * (high - low)
+        assert last >= high - 1e-6 * (high - low)
+        assert 3 <= labels <= 6
+        for value in np.linspace(first, last, labels):
+            assert float(digits % value) == pytest.approx(value, abs=1e-6 * (high - low))
+
+
+@pytest.mark.parametrize("limits", [(-58.0, 65.0), (0.0, 1.0), (-0.3, 47.0)])
+def test_ticks_of_a_box_keep_away_from_the_corners_where_labels_would_meet(limits):
+    low, high = limits
+    for count in (1, 2, 4):
+        ticks = view._ticks(low, high, count)
+        assert len(ticks) >= min(count, 2)
+        assert low + 0.1 * (high - low) <= min(ticks)
+        assert max(ticks) <= high - 0.1 * (high - low)
+
+
+def test_a_film_that_fails_leaves_what_was_there(record, renderer, tmp_path, monkeypatch):
+    encoder = pytest.importorskip("imageio_ffmpeg")
+    broken = tmp_path / "encoder"
+    broken.write_text(
+        "#!/bin/sh\nfor target; do :; done\necho part > \"$target\"\necho 'No space left on device' >&2\nexit 1\n"
+    )
+    broken.chmod(0o755)
+    monkeypatch.setattr(encoder, "get_ffmpeg_exe", lambda: str(broken))
+    film = tmp_path / "arm.mp4"
+    film.write_bytes(b"an older film")
+    with pytest.raises(RuntimeError, match="ffmpeg failed, and no film was written: No space left on device"):
+        record.animate(film, size=(64, 48), progress=False)
+    assert film.read_bytes() == b"an older film"
+    assert sorted(tmp_path.iterdir()) == [film, broken]
+
+
+def test_the_views_have_help_without_another_import():
+    script = "import withe; assert 'matplotlib' in (withe.view.__doc__ or ''); help(withe.view.plot)"
+    result = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert result.returncode == 0, result.stderr
+    assert "Draw the shapes of the rods" in result.stdout
