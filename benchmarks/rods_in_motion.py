@@ -1,4 +1,4 @@
-"""The beams and helices of table 6.1 of the dissertation, for our engine: scenes, runs, the motion of the tip.
+"""The beams and helices of table 6.1 of A. Choi's dissertation, for our engine: scenes, runs, the motion of the tip.
 
 A beam starts straight with the velocity of its first mode and vibrates; a helix is let go in its natural shape and
 falls into its weight. Nothing damps them.

@@ -192,8 +192,8 @@ void Contact::foresee_friction(const VectorX& change) {
   foreseen_.swap(next_foreseen_);
 }
 
-/// The direction of slip at the start, and how much of friction there is at its speed, tanh(K u / 2) [dissertation,
-/// (4.12), (4.13), with the weight (5.10) in place of (4.14)].
+/// The direction of slip at the start, and how much of friction there is at its speed, tanh(K u / 2) [Choi,
+/// dissertation, (4.12), (4.13), with the weight (5.10) in place of (4.14)].
 void Contact::set_direction(const ContactPair& pair, Frozen& frozen) const {
   double velocity[kContactUnknowns];
   values_at(pair, state_->v, velocity);

@@ -164,8 +164,8 @@ double Contact::follow_force(const Touching& t, ContactRecord& record) const {
   return t.yielded > 0.0 ? change_stiffness(t, 1.0, faded(t), record) : 0.0;
 }
 
-/// The greatest force that contact has to hold at a node, times 1e5 / m [dissertation, (5.16), (5.17)]: what all other
-/// forces there add up to, inertia among them, is what contact and friction are.
+/// The greatest force that contact has to hold at a node, times 1e5 / m [Choi, dissertation, (5.16), (5.17)]: what all
+/// other forces there add up to, inertia among them, is what contact and friction are.
 double Contact::source_stiffness() const {
   constexpr double kSource = 1e5;  // [1/m]
   VectorX force = VectorX::Zero(model_.dof_count);

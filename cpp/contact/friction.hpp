@@ -6,8 +6,8 @@
 ///   S = sum_i w_i (x_i - x_i^0) + phi_a x r_a - phi_b x r_b,   phi = t x (e - e^0) / |e| + t (theta - theta^0),
 /// with r from the centreline to the surface. The force F on S goes back through the same J, so its work, F . S, is
 /// never negative, whatever the integrator.
-///   implicit, lagged: F = mu N tanh(K |S| / (2 dt)) S / |S|, K = 15 / nu [dissertation, (5.7)-(5.14), there between
-///                     centrelines]
+///   implicit, lagged: F = mu N tanh(K |S| / (2 dt)) S / |S|, K = 15 / nu [Choi, dissertation, (5.7)-(5.14),
+///                     there between centrelines]
 ///   anchored:         F = k_t (stick + S), of length mu N at most: an elastic stick that slips [Simo and Hughes 1998]
 
 #include <cmath>

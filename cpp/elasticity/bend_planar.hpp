@@ -1,7 +1,7 @@
 #pragma once
 /// Bending in a plane. The energy depends on the turn phi between two directions only:
 ///   E = K (beta - n)^2 / 2,  beta = f(kappa^2) kappa,  kappa = 2 tan(phi / 2), positive from the first axis to the
-/// second. [dissertation 3.3, 3.5 without the third coordinate; f: geometry/bend_measure.hpp].
+/// second. [Choi, dissertation 3.3, 3.5 without the third coordinate; f: geometry/bend_measure.hpp].
 
 #include "geometry/bend_measure.hpp"
 

@@ -1,7 +1,7 @@
 #pragma once
 /// Bending and twisting between two frames: two edges, or an edge and the frame of a joint or a wall.
 ///
-/// Strains [Bergou et al. 2010, section 3; dissertation 3.3-3.6], with t the tangents and d the directors:
+/// Strains [Bergou et al. 2010, section 3; Choi, dissertation 3.3-3.6], with t the tangents and d the directors:
 ///   kb = 2 t0 x t1 / (1 + t0 . t1),  kappa1 = kb . (d2_0 + d2_1) / 2,  kappa2 = - kb . (d1_0 + d1_1) / 2,
 ///   tau = angle about t1 from the transported d1_0 to d1_1.
 /// |kb| = 2 tan(phi / 2) for a turn by phi. kappa1 > 0 bends towards d1, kappa2 > 0 towards d2.

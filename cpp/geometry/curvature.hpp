@@ -8,7 +8,7 @@
 namespace withe {
 
 /// Curvature components [-] (2 tan(phi / 2) for a turn by phi, kappa1 towards d1, kappa2 towards d2) and
-/// twist [rad]. [Bergou et al. 2010, section 3; dissertation 3.3, 3.4, 3.6].
+/// twist [rad]. [Bergou et al. 2010, section 3; Choi, dissertation 3.3, 3.4, 3.6].
 template <class Scalar>
 struct BendTwistStrain {
   Scalar kappa1, kappa2, tau;

@@ -342,7 +342,7 @@ Newton::Search Newton::search(Equations& equations, const VectorX& z, const Vect
   return found;
 }
 
-/// [dissertation, Algorithm 4], with the sign of q + alpha dq and the bounds it leaves unset: Goldstein-Price on
+/// [Choi, dissertation, Algorithm 4], with the sign of q + alpha dq and the bounds it leaves unset: Goldstein-Price on
 /// |F|^2 / 2.
 double Newton::line_search(Equations& equations, const VectorX& z, const VectorX& step, const VectorX* target,
                            NewtonWorkspace& work) const {

@@ -11,7 +11,7 @@ enum class Integrator { statics, backward_euler, implicit_midpoint, energy_momen
 
 enum class LineSearch {
   automatic,        ///< full steps with a cap; falls back to the energy line search
-  goldstein_price,  ///< [dissertation, Algorithm 4] on |F|^2 / 2
+  goldstein_price,  ///< [Choi, dissertation, Algorithm 4] on |F|^2 / 2
   none,
 };
 

@@ -267,7 +267,7 @@ class Builder {
     share_bending();
   }
 
-  /// [dissertation 6.2.2]: every pair of edges at the node that is not a rod's own stencil.
+  /// [Choi, dissertation 6.2.2]: every pair of edges at the node that is not a rod's own stencil.
   void add_pairs(const Cluster& cluster) {
     struct End {
       int rod, edge;

@@ -47,7 +47,7 @@ struct RevoluteLink {
 
 enum class JointForm {
   frame,  ///< the joint owns a frame; every attached edge has one stencil of half length to it
-  pairs,  ///< one stencil for every pair of edges, [dissertation 6.2.2]; archival
+  pairs,  ///< one stencil for every pair of edges, [Choi, dissertation 6.2.2]; archival
 };
 
 /// A node that several rods share. Passes in one cluster are rigidly connected; clusters are connected by
@@ -101,14 +101,14 @@ enum class ContactLaw { imcv2, imcv1, barrier, spillmann_teschner };
 /// How the stiffness of contact is found where no number is given.
 enum class StiffnessRule {
   forces,  ///< each contact follows its force, so that surfaces are about a hundredth of the smaller radius deep
-  source,  ///< one for all, the greatest force on a node in contact times 1e5 / m [dissertation, (5.17)]
+  source,  ///< one for all, the greatest force on a node in contact times 1e5 / m [Choi, dissertation, (5.17)]
 };
 
 enum class FrictionLaw {
   implicit,       ///< normal force and slip at the end of the step, exact (unsymmetric) Jacobian
   lagged,         ///< normal force and directions from the start of the step: symmetric
   anchored,       ///< an elastic stick that holds a load without creep, by return mapping
-  semi_explicit,  ///< normal force and direction of slip from the start of the step [dissertation, 4.5]
+  semi_explicit,  ///< normal force and direction of slip from the start of the step [Choi, dissertation, 4.5]
 };
 
 /// What to do with surfaces that are inside each other where the scene is drawn.

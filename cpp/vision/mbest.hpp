@@ -1,5 +1,5 @@
 #pragma once
-/// The published method mBEST [Choi et al. 2023; dissertation chapter 8], for comparison.
+/// The published method mBEST [Choi et al. 2023; Choi, dissertation chapter 8], for comparison.
 
 #include "vision/color_image.hpp"
 #include "vision/tracing.hpp"

@@ -1,4 +1,9 @@
-"""What the rods of a scene may touch: the part of `Scene` that is about contact and friction."""
+"""What the rods of a scene may touch: the part of `Scene` that is about contact and friction.
+
+Its numbered equations are those of Andrew Choi's doctoral dissertation, University of California, Los Angeles, whose
+chapters on contact follow Tong, Choi, Joo, Jawed: A fully implicit method for robust frictional contact handling in
+elastic rods, Extreme Mechanics Letters 58, 2023.
+"""
 
 from __future__ import annotations
 
@@ -163,23 +168,23 @@ class Contacts:
         friction : float
             Coefficient between rods.
         model : {"imcv2", "barrier", "imcv1", "spillmann_teschner"}
-            Energy of contact: the smooth penalty of the dissertation's (5.2), or a barrier, (5.1). Archival, for
+            Energy of contact: the smooth penalty of Choi's dissertation, (5.2), or a barrier, (5.1). Archival, for
             comparison: its first penalty, (4.16), and the baseline of its 4.7, a penalty without a tolerance
             that leads out of a depth within one step.
         friction_model : {"implicit", "lagged", "anchored", "semi_explicit"}
             At the end of the step, exactly; with the forces of its start, which keeps the equations
             symmetric; an elastic stick that holds a load without creep; or, archival, with the forces and the
-            direction of slip of its start (the dissertation's 4.5), which holds nothing that is at rest.
+            direction of slip of its start (4.5 of Choi's dissertation), which holds nothing that is at rest.
         distance_tolerance : float [m]
             Surfaces nearer than this press on each other; by default a tenth of the smaller radius.
         slip_tolerance : float [m/s]
             Slip slower than this counts as sticking, with less friction than the coefficient allows.
         stiffness : float [N/m] or "source"
             Of contact; by default it follows the forces, so that surfaces are about a hundredth of the
-            smaller radius deep in each other. "source" is the dissertation's rule (5.17): 1e5 / m times the
+            smaller radius deep in each other. "source" is the rule (5.17) of Choi's dissertation: 1e5 / m times the
             greatest force on a node in contact, for all contacts; it has a scale, that of its flagella.
         centreline_friction : bool
-            Let friction act on the centrelines, as in the dissertation, and not where surfaces touch.
+            Let friction act on the centrelines, as in Choi's dissertation, and not where surfaces touch.
         overlap : {"error", "separate"}
             What `build` does with surfaces that are drawn inside each other: refuse them, or move rods apart,
             quasi-statically, with supports where they are. What is moved is stressed: its natural shape stays

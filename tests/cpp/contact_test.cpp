@@ -99,7 +99,7 @@ TEST(ContactLaw, BeginsWithoutAStepInEnergyOrForce) {
   }
 }
 
-/// [dissertation, (4.16)]: in lengths of h, with K1 = 50, h = 1 and C = 2.
+/// [Choi, dissertation, (4.16)]: in lengths of h, with K1 = 50, h = 1 and C = 2.
 TEST(ContactLaw, Imcv1IsThatOfTheSource) {
   const double h = 1.6e-3, tolerance = 0.3 * h;
   for (double depth : {-0.02, 0.0, 0.02, 0.1}) {

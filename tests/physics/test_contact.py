@@ -124,7 +124,7 @@ def test_a_rod_that_a_blow_faster_than_sound_crushes_is_named() -> None:
 
 
 def heavy_rod(friction_model: Any) -> tuple[withe.Scene, withe.Rod]:
-    """A kilogram of rod on a floor, its limit of friction 3.92 N (dissertation, section 6.3.3)."""
+    """A kilogram of rod on a floor, its limit of friction 3.92 N (Choi, dissertation, section 6.3.3)."""
     scene = withe.Scene(gravity=(0, 0, -9.8))
     material = withe.Material(youngs_modulus=1e5, poisson_ratio=0.5, density=509.2985)
     rod = scene.add_rod(start=(0, 0, 2.5e-2), end=(1, 0, 2.5e-2), nodes=26, radius=2.5e-2, material=material)

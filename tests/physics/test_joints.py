@@ -58,7 +58,7 @@ def test_t_joint_under_a_large_load_converges_to_the_whole_beam_at_second_order(
 
 
 def test_joint_of_the_source_is_stiffer_where_three_rods_meet():
-    """[dissertation 6.2.2] bends every pair of edges: two right angles in series stand beside the straight pair.
+    """[Choi, dissertation 6.2.2] bends every pair of edges: two right angles in series stand beside the straight pair.
 
     The strain 2 tan(phi / 2) is four times as stiff at a right angle, so that the joint is 1 + 4 / 2 times as stiff.
     """
