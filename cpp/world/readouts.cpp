@@ -1,5 +1,7 @@
 /// What a scene answers: copies, in world coordinates.
 
+#include <Eigen/Geometry>
+
 #include "world/implementation.hpp"
 
 namespace withe {
@@ -118,5 +120,34 @@ VectorX World::spins(int rod) const {
 
 Energy World::energy() const { return implementation_->energy(); }
 Energy World::rod_energy(int rod) const { return implementation_->rod_energy(rod); }
+
+/// What the kinetic energy changes by with a velocity common to all, and with an angular velocity about the origin:
+///   P = sum of (M v) over nodes,  J = sum of x x (M v) + sum of I omega t over edges + sum of I w over joints' frames.
+/// In a plane edges do not spin, and frames turn about its normal. A hinge's angle is relative: it adds nothing.
+Momentum World::momentum() const {
+  const Implementation& self = *implementation_;
+  const Model& model = self.model;
+  MassMatrix mass;
+  set_mass(model, self.parameters, mass);
+  VectorX carried;
+  multiply(model, mass, self.state.v, carried);
+  Momentum out;
+  for (int i = 0; i < model.node_count; ++i) {
+    const Vector3 p = node_velocity(model, carried, i);
+    out.linear += p;
+    out.angular += node_position(model, self.state.q, i).cross(p);
+  }
+  for (int f = 0; f < model.frame_count; ++f) {
+    const int dof = model.frame_dof[at(f)];
+    out.angular += model.planar() ? Vector3(carried(dof) * model.plane->normal) : Vector3(carried.segment<3>(dof));
+  }
+  if (model.planar()) return out;
+  for (int e = 0; e < model.edge_count; ++e) {
+    const Vector3 tail = node_position(model, self.state.q, model.edge_tail[at(e)]);
+    const Vector3 head = node_position(model, self.state.q, model.edge_head[at(e)]);
+    out.angular += carried(model.edge_dof[at(e)]) * (head - tail).normalized();
+  }
+  return out;
+}
 
 }  // namespace withe

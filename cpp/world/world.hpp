@@ -36,6 +36,11 @@ struct Reaction {
   Vector3 moment = Vector3::Zero();  ///< of the support on the rod, about the node [N m]
 };
 
+struct Momentum {
+  Vector3 linear = Vector3::Zero();   ///< [kg m/s]
+  Vector3 angular = Vector3::Zero();  ///< about the origin [kg m^2/s]
+};
+
 struct EquilibriumResult {
   bool stable = false;
   int iterations = 0;
@@ -153,6 +158,7 @@ class World {
   /// Of one rod: kinetic, stretch, bend, twist, gravity and their sum; what surrounds a joint belongs to the rods whose
   /// edges meet there. All rods together have what the scene has, but for loads, contact and the energy balance.
   Energy rod_energy(int rod) const;
+  Momentum momentum() const;
   std::string take_warning();  ///< what has not been heard yet of a mesh too coarse for the motion; or nothing
   ContactTable contacts() const;
   Linearisation linearise() const;

@@ -24,6 +24,9 @@ void register_results(py::module_& module) {
       .def_readonly("total", &Energy::total)
       .def_readonly("work", &Energy::work)
       .def_readonly("dissipated", &Energy::dissipated);
+  py::class_<Momentum>(module, "Momentum", "Of the whole scene, angular about the origin.")
+      .def_readonly("linear", &Momentum::linear)
+      .def_readonly("angular", &Momentum::angular);
   py::class_<Statistics>(module, "Statistics", "What the work so far took.")
       .def_readonly("steps", &Statistics::steps)
       .def_readonly("rejected_steps", &Statistics::rejected_steps)
@@ -218,6 +221,7 @@ void define_readouts(WorldClass& world) {
   world.def("energy", [](const GuardedWorld& self) { return self.reading().energy(); });
   world.def(
       "rod_energy", [](const GuardedWorld& self, int rod) { return self.reading().rod_energy(rod); }, py::arg("rod"));
+  world.def("momentum", [](const GuardedWorld& self) { return self.reading().momentum(); });
   world.def("contacts", [](const GuardedWorld& self) { return self.reading().contacts(); });
   world.def("linearise", [](const GuardedWorld& self) { return self.reading().linearise(); });
 }

@@ -19,6 +19,7 @@ __all__: list[str] = [
     "JointDescription",
     "Linearisation",
     "LoadDescription",
+    "Momentum",
     "ObstacleDescription",
     "Options",
     "Plan",
@@ -407,6 +408,15 @@ class Energy:
     @property
     def work(self) -> float: ...
 
+class Momentum:
+    """
+    Of the whole scene, angular about the origin.
+    """
+    @property
+    def angular(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]: ...
+    @property
+    def linear(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]: ...
+
 class Statistics:
     """
     What the work so far took.
@@ -515,6 +525,7 @@ class World:
     def load(
         self, load: typing.SupportsInt | typing.SupportsIndex
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]: ...
+    def momentum(self) -> Momentum: ...
     def move_obstacle(
         self,
         obstacle: typing.SupportsInt | typing.SupportsIndex,

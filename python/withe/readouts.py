@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["Energy", "Equilibrium", "Linearisation", "Plan", "Reaction", "RodEnergy", "Statistics"]
+__all__ = ["Energy", "Equilibrium", "Linearisation", "Momentum", "Plan", "Reaction", "RodEnergy", "Statistics"]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -39,6 +39,21 @@ class Energy:
     total: float
     work: float
     dissipated: float
+
+
+@dataclass(frozen=True, eq=False)
+class Momentum:
+    """Momenta of everything in a scene: nodes, the mass along edges, their spin, the frames of joints.
+
+    Attributes
+    ----------
+    linear : ndarray of shape (3,) [kg m/s]
+    angular : ndarray of shape (3,) [kg m^2/s]
+        About the origin.
+    """
+
+    linear: FloatArray
+    angular: FloatArray
 
 
 @dataclass(frozen=True, eq=False)

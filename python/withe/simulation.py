@@ -22,7 +22,7 @@ from withe.handles import NodeHandle, Obstacle, Rod, Support
 from withe.knots import link
 from withe.options import check_tolerances, engine_options
 from withe.parts import CustomForcePart, DragPart, FluidPart, LoadPart, MassPart, ObstaclePart, RodPart, SupportPart
-from withe.readouts import Energy, Equilibrium, Linearisation, Plan, Reaction, RodEnergy, Statistics
+from withe.readouts import Energy, Equilibrium, Linearisation, Momentum, Plan, Reaction, RodEnergy, Statistics
 from withe.snapshots import Settings, Snapshot
 
 if TYPE_CHECKING:
@@ -339,6 +339,31 @@ class Simulation(Control):
             return RodEnergy(**{name: getattr(part, name) for name in RodEnergy.__dataclass_fields__})
         energy = self._world.energy()
         return Energy(**{name: getattr(energy, name) for name in Energy.__dataclass_fields__})
+
+    def momentum(self) -> Momentum:
+        """Linear momentum, and angular momentum about the origin, of the whole scene.
+
+        By the masses that the equations of motion have, nodes that supports hold included. Sum of x cross (M v) over
+        nodes, M the mass matrix, of I omega t over edges that spin at omega about their tangents t, and of what the
+        frames of joints carry.
+
+        Returns
+        -------
+        Momentum
+
+        Examples
+        --------
+        >>> import withe
+        >>> scene = withe.Scene(gravity=(0, 0, 0))
+        >>> rubber = withe.Material(youngs_modulus=1e6, density=1000.0)
+        >>> baton = scene.add_rod(start=(-0.1, 0, 0), end=(0.1, 0, 0), nodes=5, radius=5e-3, material=rubber)
+        >>> simulation = scene.build()
+        >>> simulation.set_velocities(baton, [(0, 20 * x, 0) for x, _, _ in simulation.positions(baton)])
+        >>> print(f"{simulation.momentum().angular[2]:.6f} kg m^2/s")  # m L^2 / 12 times 20 rad/s
+        0.001047 kg m^2/s
+        """
+        momentum = self._world.momentum()
+        return Momentum(np.array(momentum.linear), np.array(momentum.angular))
 
     def reaction(self, support: Support | NodeHandle | str) -> Reaction:
         """Force and moment of a support on the rod.
