@@ -30,7 +30,7 @@ PYTHON_SOURCES := $(shell find python/withe -name '*.py' -o -name '*.pyi' -o -na
 # Folders too: a deleted file is a change.
 SOURCE_FOLDERS := $(wildcard cpp/*/) $(shell find python/withe -type d -not -name __pycache__)
 
-.PHONY: help demo view test ctest-build ctest ctest-baseline pytest asan bench wheel lint format format-check types stubs stub-check \
+.PHONY: help demo view test ctest-build ctest ctest-baseline pytest asan asan-python bench wheel lint format format-check types stubs stub-check \
     tidy tidy-changed clean distclean
 
 help:
@@ -40,6 +40,7 @@ help:
 	@echo "make pytest        all tests in Python; TESTS=\"tests/physics -k knot\" runs some"
 	@echo "make ctest-baseline  C++ tests on an emulated machine without AVX (qemu-user)"
 	@echo "make asan          C++ tests under the address and undefined-behaviour sanitizers"
+	@echo "make asan-python   random sequences of calls through Python under them; SEQUENCES=1000 SEED=7 runs others"
 	@echo "make wheel         dist/*.whl for machines without compiler"
 	@echo "make bench         all benchmarks (45 minutes); NAME=work_precision runs one"
 	@echo "make lint          ruff; make format applies formatters, make format-check only looks"
@@ -119,6 +120,15 @@ asan: $(STAMPS)/build_tools
 	@cmake --preset asan-ubsan
 	@cmake --build --preset asan-ubsan
 	@ctest --preset asan-ubsan --parallel $(JOBS)
+
+# The interpreter is not built for them, so the sanitizer's library must be loaded first; pybind11's exceptions need the
+# C++ library beside it. Python's own allocator would hide what runs past the end of small objects.
+SEQUENCES ?= 400
+SEED ?= 1
+asan-python: $(STAMPS)/build_tools
+	@cmake --preset asan-python -DPython_EXECUTABLE=$(VENV)/bin/python
+	@cmake --build --preset asan-python
+	@tools/asan_python.sh build/asan-python tests/python/random_sequences.py $(SEQUENCES) $(SEED)
 
 bench: $(STAMPS)/installed $(STAMPS)/bench_tools
 	@python benchmarks $(NAME)

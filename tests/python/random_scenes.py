@@ -1,0 +1,155 @@
+"""Scenes that random sequences run on, drawn from a number; and functions of time that pickle."""
+
+from __future__ import annotations
+
+import random
+
+import numpy as np
+
+import withe
+
+SOFT = withe.Material(youngs_modulus=1e6, density=1000.0, viscosity=100.0)
+ELASTIC = withe.Material(youngs_modulus=2e6, poisson_ratio=0.3, density=800.0)
+INTEGRATORS = ("implicit_midpoint", "implicit_midpoint", "backward_euler", "energy_momentum", "fourth_order", "static",
+               "verlet")  # fmt: skip
+
+
+JOINTS = ("rigid", "rigid", "pinned", "revolute", "none")
+
+
+class Wave:
+    """A force that swings."""
+
+    def __init__(self, amplitude, rate):
+        self.amplitude, self.rate = amplitude, rate
+
+    def __call__(self, t):
+        return np.multiply(self.amplitude, np.sin(self.rate * t))
+
+
+class Circle:
+    """A support that leaves its place along a line and comes back, and turns about an axis on the way."""
+
+    def __init__(self, way, axis, place):
+        self.way, self.axis, self.place = way, axis, place
+
+    def __call__(self, t):
+        position = np.add(self.place, np.multiply(self.way, np.sin(30.0 * t)))
+        if self.axis is None:
+            return position
+        from scipy.spatial.transform import Rotation
+
+        return position, Rotation.from_rotvec(np.multiply(self.axis, 0.3 * np.sin(20.0 * t))).as_matrix()
+
+
+class Wind:
+    """A custom force."""
+
+    def __call__(self, t, x, v):
+        return -1e-3 * v + 1e-4 * np.cos(20.0 * t)
+
+
+class Interrupting:
+    """What a user's Ctrl-C looks like from inside a callback, at its call of a number."""
+
+    def __init__(self, at):
+        self.left = at
+
+    def __call__(self, t):
+        if self.left is not None:
+            self.left -= 1
+            if self.left == 0:
+                raise KeyboardInterrupt
+
+
+def add_rods(scene, r, flat, material, joints):
+    """An arm along x and a limb at its end, that goes up or hangs; sometimes a ring above them."""
+    kind = r.choice(joints)
+    up = r.random() < 0.5
+    tip = 0.22 if kind == "none" else 0.2
+    a = scene.add_rod(
+        start=(0, 0, 0.1), end=(0.2, 0, 0.1), nodes=r.choice([3, 8, 13]), radius=4e-3, material=material, name="a",
+        normal=(0, 0, 1) if r.random() < 0.5 else None,
+    )  # fmt: skip
+    s = np.linspace(0.0, 1.0, r.choice([4, 7]))
+    if up:
+        points = np.stack([tip + 0 * s, 0.0 * s if flat else 0.1 * s, 0.1 + 0.1 * s], axis=1)
+    else:
+        points = np.stack([tip + 0.1 * s, 0 * s if flat else 0.05 * s**2, 0.1 - 0.06 * s**2], axis=1)
+    b = scene.add_rod(points=points, radius=3e-3, material=material, name="b")
+    if kind != "none":
+        axis = {"axis": (0, 1, 0)} if kind == "revolute" else {}
+        form = {"form": "pairs"} if kind == "rigid" and r.random() < 0.2 else {}
+        scene.join(a.end, b.start, kind, **axis, **form)
+    if r.random() < 0.2:
+        angle = np.linspace(0.0, 2.0 * np.pi, 9)[:-1]
+        ring = np.stack([0.1 + 0.03 * np.cos(angle), 0 * angle, 0.16 + 0.03 * np.sin(angle)], axis=1)
+        scene.add_rod(points=ring, closed=True, radius=3e-3, material=material, name="ring")
+    return a, b, 0.09 if up else 0.03
+
+
+def add_supports_and_loads(scene, r, flat, a, b, varying, clamped):
+    if r.random() < 0.9 or clamped:
+        scene.clamp(a.start, name="clamp", hold=r.choice(["frame", "frame", "edge"]))
+    if r.random() < 0.3:
+        scene.pin(b.end, name="pin", free=r.choice([None, None, (1, 0, 0)]))
+    size = (0.002, 0.0 if flat else 0.001, 0.003)
+    if r.random() < 0.5:
+        value = Wave(size, 60.0) if varying and r.random() < 0.4 else size
+        scene.add_force(a.node(1), value, follower=r.random() < 0.3, name="force")
+    if r.random() < 0.2:
+        scene.add_moment(b.end, (0, 1e-4, 0) if flat else (1e-4, 0, 1e-4))
+    if r.random() < 0.2:
+        scene.add_load(
+            a, Wave((0, 0, 0.02), 50.0) if varying and r.random() < 0.5 else (0, 0, 0.02), follower=r.random() < 0.3
+        )
+    if r.random() < 0.3:
+        scene.add_mass(a.node(1), 1e-3, name="mass")
+    if r.random() < 0.3:
+        scene.add_drag(0.05, name="drag")
+    if varying and r.random() < 0.15:
+        scene.add_custom_force(Wind())
+
+
+def add_surroundings(scene, r, flat, floor):
+    if r.random() < 0.3:
+        scene.add_floor(floor, friction=r.choice([0.0, 0.3]), name="floor")
+    if r.random() < 0.2:
+        scene.add_sphere((0.15, 0.0 if flat else 0.02, 0.05), 0.025, friction=0.3, name="ball")
+    if r.random() < 0.1:
+        scene.add_capsule((0.05, -0.1, 0.08), (0.05, 0.1, 0.08), 0.01, friction=0.2)
+    if r.random() < 0.4:
+        scene.enable_contact(
+            friction=r.choice([0.0, 0.3]),
+            friction_model=r.choice(["implicit", "anchored", "lagged"]),
+            model=r.choice(["imcv2", "imcv2", "barrier"]),
+        )
+    if r.random() < 0.2:
+        scene.add_fluid(0.5, model=r.choice(["resistive", "stokeslets"]), regularization=5e-3, name="fluid")
+
+
+def draw_scene(number: int):
+    """A scene, and what it is to be built with."""
+    r = random.Random(number)
+    flat = r.random() < 0.6
+    integrator = r.choice(INTEGRATORS)
+    scene = withe.Scene(gravity=(0, 0, -9.81) if r.random() < 0.7 else (0, 0, 0))
+    planar = r.choice([None, None, None, False, True]) if flat else None  # True takes no functions of time
+    static = integrator == "static"  # mechanisms have no equilibrium, and take long to say so
+    fourth = integrator == "fourth_order"  # goes back in time: no viscosity, no contact, no fluid
+    material = ELASTIC if fourth else r.choice([SOFT, ELASTIC])
+    a, b, floor = add_rods(scene, r, flat, material, ["rigid"] if static else JOINTS)
+    add_supports_and_loads(scene, r, flat, a, b, varying=not planar, clamped=static)
+    if not fourth:
+        add_surroundings(scene, r, flat, floor)
+    options = {
+        "integrator": integrator,
+        "time_step": 2e-5 if integrator == "verlet" else r.choice([1e-3, 2e-3, 5e-3]),
+        "planar": planar,
+    }
+    if integrator not in ("static", "verlet"):
+        options["adaptive"] = r.random() < 0.85
+        options["max_halvings"] = r.choice([6, 2])  # or what cannot be solved takes long to say so
+        if r.random() < 0.15:
+            options["tolerance"] = r.choice([1e-3, 1e-4])
+    return scene, options

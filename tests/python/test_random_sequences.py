@@ -1,0 +1,17 @@
+"""What a simulation does next follows from its state alone: random sequences, compared to the bit."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+
+def test_reset_copies_pickles_snapshots_and_files_go_on_to_the_bit():
+    script = Path(__file__).with_name("random_sequences.py")
+    result = subprocess.run([sys.executable, script, "30", "2"], capture_output=True, text=True, timeout=600)
+    assert result.returncode == 0, f"exit status {result.returncode}\n{result.stdout[-3000:]}\n{result.stderr[-3000:]}"
+    counted = {what: int(n) for n, what in re.findall(r"(\d+) ([a-zA-Z_ ]+)", result.stdout.rpartition("failed:")[2])}
+    assert counted["sequences that agree"] >= 28
+    assert counted["lifted out of the plane"] >= 2
+    assert counted["ConvergenceError"] >= 3
+    assert counted["KeyboardInterrupt"] >= 3
