@@ -22,7 +22,17 @@ def run(name, folder, *arguments):
 
 
 @pytest.mark.parametrize(
-    "name", ["work_precision", "friction_precision", "robustness", "skips", "parallel", "contact", "contact_robustness"]
+    "name",
+    [
+        "work_precision",
+        "friction_precision",
+        "robustness",
+        "conservation",
+        "skips",
+        "parallel",
+        "contact",
+        "contact_robustness",
+    ],
 )
 def test_the_short_form_writes_its_figures(name, tmp_path):
     printed = run(name, tmp_path, "--quick")
@@ -151,3 +161,33 @@ def test_a_page_shows_tables_and_goals_of_a_run():
     assert "a compiler" in page
     assert "2026-01-02" in page
     assert "Fronts" not in page
+
+
+def test_conservation_is_measured_by_what_theory_knows():
+    """What backward Euler loses of angular momentum is known step by step; midpoint in a plane loses nothing."""
+    from conservation import driven, euler_identity, midpoint_in_a_plane
+
+    coarse, apart = euler_identity(steps=100)
+    fine, _ = euler_identity(steps=200)
+    assert apart < 1e-10
+    assert coarse > 0.01
+    assert 1.6 < coarse / fine < 2.4
+    assert midpoint_in_a_plane() < 1e-11
+    assert driven("implicit_midpoint", True, steps=50)["impulse"] < 1e-9
+
+
+def test_drawn_flights_are_the_same_every_time_and_of_all_kinds():
+    from conservation import fly
+    from conservation_cases import KINDS, draw
+
+    cases = [draw(i) for i in range(50)]
+    assert {(c.kind, c.flat, c.viscous) for c in cases} == {
+        (kind, flat, viscous) for kind in KINDS for flat in (True, False) for viscous in (True, False)
+    }
+    first, again = (fly(draw(7), "implicit_midpoint", 20, 50) for _ in range(2))
+    assert first == again
+    assert not first.failure
+    assert first.linear < 1e-9
+    euler = fly(draw(0), "backward_euler", 20, 50)
+    assert euler.angular > 1e-6  # by its nature, which the instrument must see
+    assert euler.gained < 1e-3 < euler.lost

@@ -1,0 +1,293 @@
+"""What free scenes keep: momentum, angular momentum and energy, whatever the scheme, the step and the scene.
+
+    python benchmarks/conservation.py [--quick] [--cases COUNT] [--tight]
+
+Fifty drawn scenes (a rod, joined rods, a ring, a rod that springs into a curl, rods that meet; in a plane and in space;
+viscous and not) fly freely for 1,000 steps of 1/1000, 1/100, 1/20 and 1/5 of their slowest elastic period, by every
+implicit integrator that takes them, at default options. Written down is the greatest change along the way of
+
+- linear momentum, over sqrt(2 T m), T the kinetic energy at the start, m the mass;
+- angular momentum about the origin, over the same times the greatest distance of a node from the origin;
+- the energy balance, stored + dissipated - work, over what there is at the start.
+
+Momenta are read by `simulation.momentum()`. That the instrument is right is shown by what theory knows to the last
+digit: the midpoint rule keeps angular momentum in a plane, and in a torque-free step of backward Euler it changes by
+dt times the sum of v1 x (M v0), the mass matrix M made here. Of driven rods, the work of a support in a midpoint step
+is its mean force times its way and its mean moment times its turn, and impulses of supports are what momenta change by.
+
+--tight solves every step to rounding, which tells what a scheme loses from what the solver's tolerances leave.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from conservation_cases import KINDS, Case, draw, spinning_rod
+from reporting import OUT, Report, arguments, bar
+
+import withe
+
+INTEGRATORS = ("backward_euler", "implicit_midpoint", "energy_momentum", "fourth_order")
+STEPS_A_PERIOD = (1000, 100, 20, 5)
+LOOKS = 50
+
+
+@dataclass(frozen=True)
+class Flight:
+    """Greatest relative changes along a flight, of a case by a scheme."""
+
+    case: Case
+    integrator: str
+    steps_a_period: int
+    linear: float = math.nan
+    angular: float = math.nan
+    gained: float = math.nan
+    lost: float = math.nan
+    failure: str = ""
+
+    def as_json(self) -> dict:
+        """For the report."""
+        return vars(self) | {"case": self.case.number, "kind": self.case.kind}
+
+
+def books(simulation: withe.Simulation) -> tuple[float, np.ndarray, np.ndarray]:
+    """Energy balance [J], linear and angular momentum."""
+    energy, momentum = simulation.energy(), simulation.momentum()
+    return energy.total - energy.work + energy.dissipated, momentum.linear, momentum.angular
+
+
+def fly(case: Case, integrator: str, steps_a_period: int, steps: int, *, tight: bool = False) -> Flight:
+    """One flight."""
+    simulation, mass = case.build(integrator, case.period / steps_a_period, tight=tight)
+    energy, linear, angular = books(simulation)
+    start = simulation.energy()
+    stored = start.kinetic + start.stretch + start.bend + start.twist
+    impulse, far = math.sqrt(2.0 * start.kinetic * mass), 0.0
+    worst = dict.fromkeys(("linear", "angular", "gained", "lost"), 0.0)
+    failure = ""
+    for _ in range(LOOKS):
+        try:
+            simulation.step(steps // LOOKS)
+        except withe.ConvergenceError as error:
+            failure = f"ConvergenceError: {error}"
+        now = books(simulation)
+        far = max(far, float(np.linalg.norm(simulation.positions(), axis=1).max()))
+        worst["linear"] = max(worst["linear"], float(np.linalg.norm(now[1] - linear)) / impulse)
+        worst["angular"] = max(worst["angular"], float(np.linalg.norm(now[2] - angular)) / (impulse * far))
+        worst["gained"] = max(worst["gained"], (now[0] - energy) / stored)
+        worst["lost"] = max(worst["lost"], (energy - now[0]) / stored)
+        if failure:
+            break
+    return Flight(case, integrator, steps_a_period, **worst, failure=failure)
+
+
+def takes(integrator: str, case: Case) -> bool:
+    """Fourth order goes back in time: nothing that loses, no contact."""
+    return integrator != "fourth_order" or not (case.viscous or case.kind == "contact")
+
+
+def worst_of(flights: list[Flight], name: str) -> float:
+    """Greatest value of a column."""
+    return max((getattr(flight, name) for flight in flights), default=math.nan)
+
+
+def energy_off(flight: Flight) -> float:
+    """What the energy goal of a scheme looks at."""
+    return max(flight.gained, flight.lost) if flight.integrator == "energy_momentum" else flight.gained
+
+
+# --- whether the instrument is right --------------------------------------------------------------------------
+
+
+def euler_identity(periods: float = 0.5, steps: int = 200) -> tuple[float, float]:
+    """Backward Euler in a plane: what it lost of J, as a part of it, and how far theory is from that.
+
+    x1 = x0 + dt v1 and no torque, so sum of x1 x (M v1) - x0 x (M v0) = dt sum of v1 x (M v0).
+    """
+    simulation, rod, mass, period = spinning_rod("backward_euler", periods, steps)
+    step = periods * period / steps
+    start = simulation.momentum().angular
+    before, predicted = simulation.velocities(rod), np.zeros(3)
+    for _ in range(steps):
+        simulation.step()
+        now = simulation.velocities(rod)
+        predicted += step * np.cross(now, mass @ before).sum(axis=0)
+        before = now
+    change = simulation.momentum().angular - start
+    scale = float(np.linalg.norm(start))
+    return float(np.linalg.norm(change)) / scale, float(np.linalg.norm(change - predicted)) / scale
+
+
+def midpoint_in_a_plane() -> float:
+    """Greatest relative change of J of the same rod by the midpoint rule, over 1,000 steps."""
+    simulation, _, _, _ = spinning_rod("implicit_midpoint", 5.0, 1000)
+    start = simulation.momentum().angular
+    worst = 0.0
+    for _ in range(100):
+        simulation.step(10)
+        worst = max(worst, float(np.linalg.norm(simulation.momentum().angular - start)))
+    return worst / float(np.linalg.norm(start))
+
+
+# --- driven rods ----------------------------------------------------------------------------------------------
+
+
+def rotation(axis: np.ndarray, angle: float) -> np.ndarray:
+    """Rotation matrix [Rodrigues]."""
+    x, y, z = axis
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross
+
+
+def driven(integrator: str, planar: bool, steps: int = 200) -> dict[str, float]:
+    """A rod whose wall moves and turns: books of work and of impulses against integrated reactions, relative."""
+    scene = withe.Scene(gravity=(0, 0, 0))
+    material = withe.Material(youngs_modulus=1e6, poisson_ratio=0.4, density=1000.0)
+    rod = scene.add_rod(start=(0, 0, 0), end=(0.3, 0, 0), nodes=12, radius=5e-3, material=material, normal=(0, 0, 1))
+    wall = scene.clamp(rod.start)
+    step = 2e-3
+    simulation = scene.build(
+        integrator=integrator, time_step=step, planar=planar, adaptive=False, step_tolerance=1e-12,
+        force_tolerance=1e-12,
+    )  # fmt: skip
+    axis = np.array((0.0, 1.0, 0.0) if planar else (0.36, 0.8, 0.48))
+    angle = lambda t: 1.5 * np.sin(3.0 * t) ** 2  # noqa: E731
+    place = lambda t: np.array((0.05 * np.sin(4.0 * t) ** 2, 0.0, 0.3 * t**2))  # noqa: E731
+    simulation.move(wall, path=lambda t: (place(t), rotation(axis, angle(t))))
+    work = worst_step = work_scale = 0.0
+    impulse, twirl = np.zeros(3), np.zeros(3)
+    momentum = simulation.momentum()
+    moved = 0.0
+    for _ in range(steps):
+        t, before = simulation.time, simulation.energy().work
+        simulation.step()
+        reaction = simulation.reaction(wall)
+        way, turn = place(simulation.time) - place(t), angle(simulation.time) - angle(t)
+        done = reaction.force @ way + reaction.moment @ axis * turn
+        work += done
+        work_scale = max(work_scale, abs(done))
+        worst_step = max(worst_step, abs(simulation.energy().work - before - done))
+        impulse += step * reaction.force
+        middle = 0.5 * (place(simulation.time) + place(t))
+        twirl += step * (np.cross(middle, reaction.force) + reaction.moment)
+        moved = max(moved, float(np.linalg.norm(simulation.momentum().angular)))
+    end = simulation.momentum()
+    return {
+        "work of a step": worst_step / work_scale,
+        "work in all": abs(simulation.energy().work - work) / abs(work),
+        "impulse": float(np.linalg.norm(end.linear - momentum.linear - impulse) / np.linalg.norm(end.linear)),
+        "angular impulse": float(np.linalg.norm(end.angular - momentum.angular - twirl)) / moved,
+    }
+
+
+# --- what is printed and drawn ----------------------------------------------------------------------------------
+
+
+def plot(flights: list[Flight]) -> None:
+    """Changes against the step, a panel a quantity, a colour a scheme."""
+    try:
+        from matplotlib import pyplot as plt
+    except ImportError:
+        return
+    panels = (
+        ("linear", "linear momentum", 1e-9),
+        ("angular", "angular momentum", 1e-9),
+        ("gained", "energy gained", 1e-3),
+    )
+    figure, axes = plt.subplots(1, 3, figsize=(13, 4.2), sharex=True, layout="constrained")
+    for axis, (name, title, goal) in zip(axes, panels, strict=True):
+        for i, integrator in enumerate(INTEGRATORS):
+            own = [flight for flight in flights if flight.integrator == integrator]
+            x = [(1.0 + 0.12 * (i - 1.5)) / flight.steps_a_period for flight in own]
+            y = [max(getattr(flight, name), 1e-16) for flight in own]
+            axis.loglog(x, y, ".", alpha=0.5, label=integrator.replace("_", " "))
+        axis.axhline(goal, color="0.4", linewidth=0.8)
+        axis.set(title=title, xlabel="step over slowest period", ylabel="greatest relative change")
+    axes[0].legend(fontsize=8)
+    OUT.mkdir(parents=True, exist_ok=True)
+    figure.savefig(OUT / "conservation.png", dpi=130)
+    plt.close(figure)
+
+
+def figure(value: float) -> str:
+    """Of a table."""
+    return "-" if math.isnan(value) else f"{value:.1e}"
+
+
+def add_tables(report: Report, flights: list[Flight]) -> None:
+    """By scheme and step, and by kind of scene."""
+    names = ("linear", "angular", "gained", "lost")
+    for title, keys, key in (
+        ("Greatest changes, by integrator and steps a period", STEPS_A_PERIOD, lambda f: f.steps_a_period),
+        ("Greatest changes, by integrator and scene", KINDS, lambda f: f.case.kind),
+    ):
+        rows = []
+        for integrator in INTEGRATORS:
+            for wanted in keys:
+                own = [f for f in flights if f.integrator == integrator and key(f) == wanted]
+                if own:
+                    failures = sum(bool(f.failure) for f in own)
+                    rows.append([integrator, wanted, len(own), *(figure(worst_of(own, n)) for n in names), failures])
+        report.table(title, ["integrator", "", "flights", *names, "not converged"], rows)
+
+
+def add_goals(report: Report, flights: list[Flight]) -> None:
+    """What is asked of every flight."""
+    for integrator in INTEGRATORS:
+        own = [flight for flight in flights if flight.integrator == integrator]
+        report.goal(f"{integrator}: linear momentum", worst_of(own, "linear"), 1e-9, at_least=False)
+        if integrator != "backward_euler":  # which loses it by its nature, at first order in the step
+            report.goal(f"{integrator}: angular momentum", worst_of(own, "angular"), 1e-9, at_least=False)
+        limit = 1e-6 if integrator == "energy_momentum" else 1e-3
+        what = "energy, either way" if integrator == "energy_momentum" else "energy gained"
+        report.goal(f"{integrator}: {what}", max(map(energy_off, own), default=math.nan), limit, at_least=False)
+    report.goal("flights that did not converge", sum(bool(f.failure) for f in flights), 0, at_least=False)
+
+
+def main() -> None:
+    """Fly all."""
+    options = arguments(
+        __doc__,
+        ("--cases", {"type": int, "default": 50, "help": "how many"}),
+        ("--tight", {"action": "store_true", "help": "solve every step to rounding"}),
+    )
+    report = Report("conservation", quick=options.quick)
+    cases = [draw(i) for i in range(6 if options.quick else options.cases)]
+    steps = 100 if options.quick else 1000
+    plans = [(c, i, n) for c in cases for i in INTEGRATORS for n in STEPS_A_PERIOD if takes(i, c)]
+    flights = []
+    with bar(len(plans), "flights") as shown:
+        for case, integrator, steps_a_period in plans:
+            flights.append(fly(case, integrator, steps_a_period, steps, tight=options.tight))
+            shown.advance(1)
+    add_tables(report, flights)
+
+    losses = {n: euler_identity(steps=n) for n in (100, 200, 400)}
+    rows = [[n, f"{lost:.3e}", f"{apart:.1e}"] for n, (lost, apart) in losses.items()]
+    report.table("Angular momentum that backward Euler loses", ["steps", "lost of J", "theory apart by"], rows)
+    order = math.log2(losses[200][0] / losses[400][0])
+    supports = {(i, p): driven(i, p) for i in ("implicit_midpoint", "energy_momentum") for p in (True, False)}
+    rows = [[i, "plane" if p else "space", *map(figure, found.values())] for (i, p), found in supports.items()]
+    header = ["integrator", "in", *next(iter(supports.values()))]
+    report.table("Driven rods: work and impulses of a support against its reactions", header, rows)
+
+    add_goals(report, flights)
+    report.goal("backward Euler's loss of J: order", order, 0.9)
+    report.goal(
+        "backward Euler's loss of J: theory apart by", max(a for _, a in losses.values()), 1e-10, at_least=False
+    )
+    report.goal("midpoint in a plane: J", midpoint_in_a_plane(), 1e-12, at_least=False)
+    for (integrator, planar), found in supports.items():
+        where = "plane" if planar else "space"
+        for name in ("work of a step", "impulse", "angular impulse"):
+            report.goal(f"{integrator} driven in {where}: {name}", found[name], 1e-9, at_least=False)
+    report.figures["flights"] = [flight.as_json() for flight in flights]
+    report.figures["driven"] = {f"{i}, planar={p}": found for (i, p), found in supports.items()}
+    plot(flights)
+    report.write()
+
+
+if __name__ == "__main__":
+    main()
