@@ -42,13 +42,8 @@ struct StencilBatch {
 /// What an energy-momentum step needs beside the middle, see Equations::add_discrete_gradient. The batch's `force` is
 /// then that of the mean strain, `frames` and `strain` are in the middle.
 struct MomentumBatch {
-  const double* end_frames;
+  const double *start_frames, *end_frames;  ///< tables like `frames`
   const double *start_strain, *end_strain;  ///< tables like `strain`
-  const double* change;                     ///< per unknown: q1 - q0
-  const double* inverse_rest;               ///< per edge [1/m]
-  const double* inverse_mean;               ///< per edge: 2 / (l0 + l1) [1/m]
-  double rounding;                          ///< relative, of a direction in space
-  double* floor;                            ///< per unknown, what rounding leaves; padded by kPadding
 };
 
 struct StencilKernels {

@@ -1,8 +1,9 @@
-// Forces of the energy-momentum scheme: see equations.hpp.
+// Forces of the energy-momentum scheme: see equations.hpp and elasticity/discrete_gradient.hpp.
 
 #include <cmath>
 
-#include "elasticity/bend_planar.hpp"
+#include "elasticity/discrete_gradient.hpp"
+#include "geometry/rotation.hpp"
 #include "integrators/equations.hpp"
 
 namespace withe {
@@ -10,216 +11,300 @@ namespace {
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
-Vector2 along(const EdgeFrame<double>& f, double sign) { return {sign * f.tangent.x, sign * f.tangent.y}; }
-Vector2 across(const Vector2& v) { return {-v.y(), v.x()}; }
-
-/// (sin x) / x, and its derivative over x.
-struct Sinc {
-  double value, slope;
-};
-Sinc sinc(double x) {
-  const double square = x * x;
-  if (square < 1e-6) return {1.0 - square / 6.0, -1.0 / 3.0 + square / 30.0};
-  const double value = std::sin(x) / x;
-  return {value, (std::cos(x) - value) / square};
+Vec3d row_of(const Columns3& table, int i) { return {table(i, 0), table(i, 1), table(i, 2)}; }
+template <class Table>
+Vec3d row_of(const Table& table, int i) {
+  return {table(i, 0), table(i, 1), table(i, 2)};
 }
 
-/// How an edge in a plane turns in a step from a to b = 2 m - a; derivatives by m.
-struct TurningEdge {
-  Vector2 normal;           ///< gradient of its angle at m
-  Vector2 by_psi;           ///< of psi
-  Eigen::Matrix2d hessian;  ///< of its angle at m
-  double psi;               ///< the angle by which it turns [rad]
-  double part;              ///< normal . (b - a): 2 tan(psi / 2) where it keeps its length
-  Vector2 by_part;          ///< of part
-  double share;             ///< psi / part
-  Vector2 by_share;         ///< of share
-  double stretch;           ///< |b| / |a| - 1
-  Vector2 by_stretch;       ///< of stretch
-};
+Vec3d in_plane(const EdgeFrame<double>& f, double sign) { return {sign * f.tangent.x, sign * f.tangent.y, 0.0}; }
 
-TurningEdge turning_edge(const EdgeFrame<double>& start, const EdgeFrame<double>& middle, const EdgeFrame<double>& end,
-                         double sign, const Vector2& change) {
-  const Vector2 a = along(start, sign), m = along(middle, sign), b = along(end, sign);
-  const double inverse = middle.inverse_length;
-  TurningEdge e;
-  e.normal = inverse * across(m);
-  e.by_psi = 2.0 * end.inverse_length * across(b);
-  e.hessian = -inverse * (m * e.normal.transpose() + e.normal * m.transpose());
-  e.psi = std::atan2(across(a).dot(b), a.dot(b));
-  e.part = e.normal.dot(change);
-  e.by_part = 2.0 * e.normal + e.hessian * change;
-  // part = |a| |b| sin(psi) / |m|^2.
-  const Sinc s = sinc(e.psi);
-  e.share = start.inverse_length * end.inverse_length / (inverse * inverse * s.value);
-  e.by_share = e.share * (2.0 * inverse * m - 2.0 * end.inverse_length * b - (s.slope * e.psi / s.value) * e.by_psi);
-  e.stretch = start.inverse_length / end.inverse_length - 1.0;
-  e.by_stretch = 2.0 * start.inverse_length * b;
-  return e;
+/// An edge of a plane as one in space: what `edge_columns` asks for.
+EdgeFrame<double> flat(const Vec3d& tangent, double inverse_length) {
+  EdgeFrame<double> f{};
+  f.tangent = tangent;
+  f.inverse_length = inverse_length;
+  return f;
 }
 
-/// 1 / T, but where T is no more than what edges turn by times what they stretch by: there T may vanish before phi is
-/// what it was, and the quotient goes smoothly to zero.
-struct Quotient {
-  double value, by_T, by_width;
-  double turn, stretch;  ///< sums of squares; `reach` times their product is the square of that width
+/// The moment about a plane's normal with m (w_a - w_b) = E1 - E0, and its derivatives by the turns of both directions
+/// at the end: `discrete_moment` for kappa = 2 (t_a x t_b) / (1 + t_a . t_b).
+struct PlanarMoment {
+  double moment, by_a, by_b;
 };
 
-Quotient quotient(double T, const TurningEdge& a, const TurningEdge& b, double reach) {
-  constexpr double kLeastWidth = 1e-16;
-  Quotient q;
-  q.turn = a.part * a.part + b.part * b.part;
-  q.stretch = a.stretch * a.stretch + b.stretch * b.stretch;
-  const double width = reach * q.turn * q.stretch + kLeastWidth, ratio = T * T / width;
-  const bool outside = ratio >= 1.0;
-  q.value = outside ? 1.0 / T : T * (2.0 - ratio) / width;
-  q.by_T = outside ? -1.0 / (T * T) : (2.0 - 3.0 * ratio) / width;
-  q.by_width = outside ? 0.0 : -2.0 * T * (1.0 - ratio) / (width * width);
-  return q;
+PlanarMoment planar_moment(const BendMeasure& measure, const Vec3d& a0, const Vec3d& a1, const Vec3d& b0,
+                           const Vec3d& b1, double kappa0, double kappa1, double natural, double stiffness) {
+  const DividedMoments<double> h = divided_moments<true, double>(measure, {kappa0, 0.0, 0.0}, {kappa1, 0.0, 0.0},
+                                                                 {natural, 0.0, 0.0}, {stiffness, 0.0, 0.0});
+  const Vec3d a = 0.5 * (a0 + a1), b = 0.5 * (b0 + b1);
+  const double inverse = 2.0 / (2.0 + dot(a0, b0) + dot(a1, b1)), kappa = 0.5 * (kappa0 + kappa1);
+  const double along = dot(a, b), across = cross(a, b).z;
+  const double slope = -inverse * (2.0 * along + kappa * across);
+  PlanarMoment m;
+  m.moment = h.by[0] * slope;
+  // By a turn of a less that of b: kappa, and 1 + t_a . t_b.
+  const double by_kappa = -(1.0 + 0.25 * kappa1 * kappa1), by_chi = cross(a1, b1).z;
+  const double strained =
+      h.second[0][0] * slope * by_kappa - h.by[0] * inverse * (0.5 * by_kappa * across + 0.5 * by_chi * slope);
+  // d along = (da x b + db' ...) / 2: a turn of a moves it by w x a1.
+  const double along_a = 0.5 * cross(a1, b).z, along_b = -0.5 * cross(a, b1).z;
+  const double across_a = -0.5 * dot(a1, b), across_b = 0.5 * dot(a, b1);
+  m.by_a = strained - h.by[0] * inverse * (2.0 * along_a + kappa * across_a);
+  m.by_b = -strained - h.by[0] * inverse * (2.0 * along_b + kappa * across_b);
+  return m;
 }
 
-/// (beta1 - beta0) / (phi1 - phi0) without a difference, and its derivative by phi1.
-struct DividedStrain {
-  double value, by_end;
+void put(double* out, const Vec3d& v, int dimension) {
+  out[0] = v.x, out[1] = v.y;
+  if (dimension == 3) out[2] = v.z;
+}
+void add_block(Local& out, int row, int column, double factor, const Mat3<double>& m, int dimension) {
+  for (int i = 0; i < dimension; ++i)
+    for (int j = 0; j < dimension; ++j) out.hessian[row + i][column + j] += factor * m.row[i][j];
+}
+
+/// Where an edge's vector and angle are among the unknowns of a stencil: its head less its tail; the angle is -1 where
+/// there is none.
+struct EdgePlace {
+  int tail, head, angle, dimension;
 };
-DividedStrain divided_strain(const BendMeasure& measure, double kappa0, double kappa1, const PlanarStrain<double>& end,
-                             double turn) {
-  const double a = measure.a, b = measure.b, x0 = kappa0 * kappa0, x1 = kappa1 * kappa1, both = kappa0 * kappa1;
-  const double factor = (1.0 + a * (x0 + both + x1) - b * both + a * b * x0 * x1) / ((1.0 + b * x0) * (1.0 + b * x1));
-  const double value = sinc(0.5 * turn).value * std::sqrt((1.0 + 0.25 * x0) * (1.0 + 0.25 * x1)) * factor;
-  return {value, std::abs(turn) < 1e-5 ? 0.5 * end.second : (end.first - value) / turn};
+
+void add_edge_forces(Local& out, const EdgePlace& e, const MovingEdge<double>& edge, const EdgeFrame<double>& middle,
+                     const Vec3d& moment) {
+  Vec3d f = edge.force(moment);
+  if (e.angle >= 0) f += edge.torque(moment) * middle.spin;
+  const double component[3] = {f.x, f.y, f.z};
+  for (int i = 0; i < e.dimension; ++i) {
+    out.gradient[e.head + i] += component[i];
+    out.gradient[e.tail + i] -= component[i];
+  }
+  if (e.angle >= 0) out.gradient[e.angle] += edge.torque(moment);
+}
+
+/// What an edge makes of a moment that stays, and of its own change of it.
+void finish_block(const EdgePlace& e, const MovingEdge<double>& edge, const EdgeFrame<double>& middle,
+                  const Vec3d& moment, bool own, EdgeBlock<double>& block) {
+  if (own) add_edge_geometry(edge, moment, block);
+  if (e.angle < 0) return;
+  add_transport(middle, block);
+  if (own) add_spin_change(edge, middle, edge.torque(moment), block);
+}
+
+/// Rows of edge `r` by the vector and angle of edge `c`, twice: changes of the end are twice those of the middle.
+void add_edge_rows(Local& out, const EdgePlace& r, const EdgePlace& c, const EdgeBlock<double>& b) {
+  constexpr double kTwice = 2.0;
+  for (int s : {1, -1})
+    for (int t : {1, -1})
+      add_block(out, s > 0 ? r.head : r.tail, t > 0 ? c.head : c.tail, s * t * kTwice, b.ee, r.dimension);
+  if (r.angle < 0) return;
+  for (int i = 0; i < 3; ++i) {
+    out.hessian[r.head + i][c.angle] += kTwice * b.e_angle[i];
+    out.hessian[r.tail + i][c.angle] -= kTwice * b.e_angle[i];
+    out.hessian[r.angle][c.head + i] += kTwice * b.angle_e[i];
+    out.hessian[r.angle][c.tail + i] -= kTwice * b.angle_e[i];
+  }
+  out.hessian[r.angle][c.angle] += kTwice * b.angle_angle;
+}
+
+void clear(Local& out, int width) {
+  for (int i = 0; i < width; ++i) {
+    out.gradient[i] = 0.0;
+    for (int j = 0; j < width; ++j) out.hessian[i][j] = 0.0;
+  }
+}
+
+/// How the torque on a hinge follows from the moment m on what it carries: m . arm. Behind a frame that turns by the
+/// Cayley vector w the hinge turns by `angle` about `axis`, and what both make of the carried frame is a rotation with
+/// the Cayley vector w + angle arm.
+struct HingeArm {
+  Vector3 arm;
+  Matrix3 by_frame;  ///< by w
+  Vector3 by_angle;
+};
+
+HingeArm hinge_arm(const Vector3& w, const Vector3& axis, double angle) {
+  const Vector3 x = 0.5 * w;
+  const double t = std::tan(0.5 * angle), along = x.dot(axis), n = 1.0 / (1.0 - along * t);
+  const bool little = std::abs(angle) < 1e-4;
+  const double k = little ? 1.0 + angle * angle / 12.0 : 2.0 * t / angle;
+  const double by_k = little ? angle / 6.0 : ((1.0 + t * t) * angle - 2.0 * t) / (angle * angle);
+  const Vector3 a = n * (axis + x.cross(axis) + along * x);
+  HingeArm h;
+  h.arm = k * a;
+  h.by_frame =
+      0.5 * k *
+      (n * (-cross_matrix(axis) + along * Matrix3::Identity() + x * axis.transpose()) + n * t * a * axis.transpose());
+  h.by_angle = by_k * a + k * n * along * 0.5 * (1.0 + t * t) * a;
+  return h;
 }
 
 }  // namespace
 
-/// Gonzalez's correction with u = G D: adds r u / (u . D) to the gradient and its derivative with
-/// respect to z to the Hessian.
-void Equations::correct(Local& local, const Local& end, double start_energy, double stiffness,
-                        const ElementTable& table, int element, const Metric& metric, bool with_matrix) {
-  const int n = table.width();
-  double D[kMaxLocal]{}, u[kMaxLocal]{};
-  gather_difference(table, element, D);
-  for (int i = 0; i < n; ++i) u[i] = metric.own[i] * D[i];
-  for (const Metric::Pair& pair : metric.pairs)
-    for (int i = 0; i < pair.size; ++i) {
-      const double pull = pair.weight * (D[pair.a + i] - D[pair.b + i]);
-      u[pair.a + i] += pull;
-      u[pair.b + i] -= pull;
-    }
-  double s = 0.0, r = end.energy - start_energy;
-  for (int i = 0; i < n; ++i) {
-    s += u[i] * D[i];
-    r -= local.gradient[i] * D[i];
-  }
-  if (!(s > 1e-24)) return;
-  const double inverse = 1.0 / s;
-  if (with_matrix) add_correction_hessian(local, end, metric, D, u, n, inverse, 2.0 * r * inverse);
-  for (int i = 0; i < n; ++i) local.gradient[i] += r * inverse * u[i];
-  // A strain rounds as positions do, and its moment sqrt(2 K E) makes it an energy: the rounding of r.
-  const double energy = std::max(end.energy, start_energy);
-  add_correction_floor(table.dofs(element), u, n, rounding_ * (std::sqrt(2.0 * stiffness * energy) + energy) / s);
+MovingEdge<double> Equations::moving_edge(int edge) const {
+  const EdgeFrame<double>&start = start_.edge[at(edge)], &middle = middle_.edge[at(edge)], &end = end_.edge[at(edge)];
+  const bool planar = model_.planar();
+  const auto tangent = [&](const EdgeFrame<double>& f) { return planar ? in_plane(f, 1.0) : f.tangent; };
+  return {tangent(start),
+          start.inverse_length,
+          tangent(end),
+          end.inverse_length,
+          tangent(middle),
+          middle.inverse_length,
+          planar ? 0.0 : turn_of_directors(start, end)};
 }
 
-/// How Gonzalez's correction changes with z, from what the Hessian and the gradients are without it.
-void Equations::add_correction_hessian(Local& local, const Local& end, const Metric& metric, const double* D,
-                                       const double* u, int n, double inverse, double weight) {
-  double change[kMaxLocal];
-  for (int i = 0; i < n; ++i) {
-    double HD = 0.0;
-    for (int j = 0; j < n; ++j) HD += local.hessian[i][j] * D[j];
-    change[i] = inverse * (2.0 * (end.gradient[i] - local.gradient[i]) - HD - 2.0 * weight * u[i]);
-  }
-  for (int i = 0; i < n; ++i) {
-    for (int j = 0; j < n; ++j) local.hessian[i][j] += u[i] * change[j];
-    local.hessian[i][i] += weight * metric.own[i];
-  }
-  for (const Metric::Pair& pair : metric.pairs)
-    for (int i = 0; i < pair.size; ++i) {
-      const int a = pair.a + i, b = pair.b + i;
-      local.hessian[a][a] += weight * pair.weight;
-      local.hessian[b][b] += weight * pair.weight;
-      local.hessian[a][b] -= weight * pair.weight;
-      local.hessian[b][a] -= weight * pair.weight;
-    }
-}
-
-/// Where hardly anything moves, a quotient of differences makes their rounding a force that no iteration removes.
-void Equations::add_correction_floor(const int* dofs, const double* u, int count, double rounding) {
-  for (int i = 0; i < count; ++i)
-    if (dofs[i] >= 0) correction_floor_[dofs[i]] += rounding * std::abs(u[i]);
-}
-
-/// Bending in a plane: moment x (beta1 - beta0) / (phi1 - phi0), moment K (b - n) with b the mean of both beta, times a
-/// discrete gradient of phi = angle(e1) - angle(e0). psi / part of the gradient at the middle is one of an edge's
-/// angle; it turns the stencil unless both edges have the same share. Forces that do no work take the difference of the
-/// shares away, all of it but where T = part1 - part0 vanishes before phi is what it was, as edges also change their
-/// lengths.
-void Equations::add_planar_bend(int stencil, bool with_matrix, Local& local) {
-  constexpr int n = 6;
+/// Bending and twisting of a stencil.
+void Equations::discrete_bend_local(int stencil, Local& local) const {
   const BendStencil& s = model_.bend[at(stencil)];
-  double D[kMaxLocal];
-  gather_difference(assembler_.bend, stencil, D);
-  TurningEdge edge[2];
+  const bool planar = model_.planar();
+  const int step = planar ? 2 : 4;
+  clear(local, planar ? 6 : 11);
+  // An edge against its rod has its head where the stencil has its tail.
+  EdgePlace place[2];
   for (int k = 0; k < 2; ++k) {
-    const auto e = at(s.edge[k]);
-    edge[k] = turning_edge(start_.edge[e], middle_.edge[e], end_.edge[e], s.sign[k],
-                           {D[2 * k + 2] - D[2 * k], D[2 * k + 3] - D[2 * k + 1]});
+    const int first = step * k, second = step * (k + 1);
+    place[k] = {s.sign[k] > 0 ? first : second, s.sign[k] > 0 ? second : first, planar ? -1 : first + 3,
+                model_.dimension};
   }
-  const double kappa0 = start_.bend_strain(stencil, 0), kappa1 = end_.bend_strain(stencil, 0);
-  const PlanarStrain<double> start = planar_strain(elastic.measure, kappa0),
-                             end = planar_strain(elastic.measure, kappa1);
-  const DividedStrain slope = divided_strain(elastic.measure, kappa0, kappa1, end, edge[1].psi - edge[0].psi);
-  const double stiffness = elastic.bend_stiffness(stencil, 0);
-  const double moment = stiffness * (0.5 * (start.value + end.value) - elastic.bend_natural(stencil, 0));
-  const double by_moment = 0.5 * stiffness * end.first;
-
-  const double T = edge[1].part - edge[0].part, difference = edge[1].share - edge[0].share;
-  const double reach = keep_momentum_ ? 0.1 : 25.0;  // wide windows are easy to solve in
-  const Quotient w = quotient(T, edge[0], edge[1], reach);
-  constexpr double kSign[2] = {-1.0, 1.0};  // phi is the second edge's angle less the first one's
-  Eigen::Vector4d by_phi, by_w, by_difference, force;
-  for (int k = 0; k < 2; ++k) {
-    by_phi.segment<2>(2 * k) = kSign[k] * edge[k].by_psi;
-    by_difference.segment<2>(2 * k) = kSign[k] * edge[k].by_share;
-    by_w.segment<2>(2 * k) =
-        (kSign[k] * w.by_T + w.by_width * 2.0 * reach * w.stretch * edge[k].part) * edge[k].by_part +
-        (w.by_width * 2.0 * reach * w.turn * edge[k].stretch) * edge[k].by_stretch;
-  }
-  const double scale = moment * slope.value;
-  const Eigen::Vector4d by_scale = (by_moment * slope.value + moment * slope.by_end) * by_phi;
-  Eigen::Matrix4d H;
-  for (int k = 0; k < 2; ++k) {
-    const TurningEdge &own = edge[k], &other = edge[1 - k];
-    const double share = own.share + difference * other.part * w.value;
-    force.segment<2>(2 * k) = (kSign[k] * scale * share) * own.normal;
-    if (!with_matrix) continue;
-    Eigen::Vector4d by_share = other.part * (w.value * by_difference + difference * by_w);
-    by_share.segment<2>(2 * k) += own.by_share;
-    by_share.segment<2>(2 - 2 * k) += difference * w.value * other.by_part;
-    H.middleRows<2>(2 * k) = kSign[k] * own.normal * (share * by_scale + scale * by_share).transpose();
-    H.block<2, 2>(2 * k, 2 * k) += (kSign[k] * scale * share) * own.hessian;
-  }
-  constexpr double kRounding = 1e-15;  // of `difference`
-  const double u[n] = {-force[0], -force[1], force[0] - force[2], force[1] - force[3], force[2], force[3]};
-  add_correction_floor(assembler_.bend.dofs(stencil), u, n,
-                       kRounding * std::abs(w.value) * (std::abs(edge[0].part) + std::abs(edge[1].part)));
-  for (int i = 0; i < n; ++i) local.gradient[i] = u[i];
-  if (!with_matrix) return;
-  for (int i = 0; i < n; ++i)
-    for (int j = 0; j < n; ++j) local.hessian[i][j] = 0.0;
-  // From edges to nodes: rows and columns of an edge are those of its head less those of its tail.
-  for (int i = 0; i < 4; ++i)
-    for (int j = 0; j < 4; ++j) {
-      local.hessian[i][j] += H(i, j);
-      local.hessian[i + 2][j + 2] += H(i, j);
-      local.hessian[i][j + 2] -= H(i, j);
-      local.hessian[i + 2][j] -= H(i, j);
+  const MovingEdge<double> edge[2] = {moving_edge(s.edge[0]), moving_edge(s.edge[1])};
+  DiscreteMoment<double> m{};
+  EdgeColumns<double> columns[2];
+  if (planar) {
+    Vec3d t0[2], t1[2];
+    for (int k = 0; k < 2; ++k) {
+      t0[k] = in_plane(start_.edge[at(s.edge[k])], s.sign[k]);
+      t1[k] = in_plane(end_.edge[at(s.edge[k])], s.sign[k]);
     }
+    const PlanarMoment p = planar_moment(elastic.measure, t0[0], t1[0], t0[1], t1[1], start_.bend_strain(stencil, 0),
+                                         end_.bend_strain(stencil, 0), elastic.bend_natural(stencil, 0),
+                                         elastic.bend_stiffness(stencil, 0));
+    m.moment = {0.0, 0.0, p.moment};
+    m.by_a.row[2] = {0.0, 0.0, p.by_a};
+    m.by_b.row[2] = {0.0, 0.0, p.by_b};
+    for (int k = 0; k < 2; ++k)
+      columns[k] = edge_columns(k == 0 ? m.by_a : m.by_b, flat(edge[k].t1, edge[k].inverse_length1));
+  } else {
+    EdgeFrame<double> f0[2], f1[2];
+    for (int k = 0; k < 2; ++k) {
+      f0[k] = oriented(start_.edge[at(s.edge[k])], s.sign[k]);
+      f1[k] = oriented(end_.edge[at(s.edge[k])], s.sign[k]);
+    }
+    discrete_moment<true>(elastic.measure, f0[0], f1[0], f0[1], f1[1], row_of(start_.bend_strain, stencil),
+                          row_of(end_.bend_strain, stencil), row_of(elastic.bend_natural, stencil),
+                          row_of(elastic.bend_stiffness, stencil), m);
+    for (int k = 0; k < 2; ++k) columns[k] = edge_columns(k == 0 ? m.by_a : m.by_b, end_.edge[at(s.edge[k])]);
+  }
+  const Vec3d moment[2] = {m.moment, -m.moment};
+  for (int i = 0; i < 2; ++i) {
+    const EdgeFrame<double>& middle = middle_.edge[at(s.edge[i])];
+    add_edge_forces(local, place[i], edge[i], middle, moment[i]);
+    for (int j = 0; j < 2; ++j) {
+      EdgeBlock<double> block = edge_block(edge[i], i == 0 ? 1.0 : -1.0, columns[j]);
+      finish_block(place[i], edge[i], middle, moment[i], i == j, block);
+      add_edge_rows(local, place[i], place[j], block);
+    }
+  }
 }
 
-void Equations::gather_difference(const ElementTable& table, int element, double* difference) const {
-  const int* dofs = table.dofs(element);
-  for (int i = 0; i < table.width(); ++i) difference[i] = dofs[i] < 0 ? 0.0 : difference_(dofs[i]);
+/// Bending in a plane between a frame and an edge; the frame's row is a moment.
+void Equations::discrete_planar_half_local(int stencil, Local& local) const {
+  const FrameStencil& s = model_.half[at(stencil)];
+  clear(local, 5);
+  const MovingEdge<double> edge = moving_edge(s.edge);
+  const Vec3d f0 = in_plane(start_.attached[at(stencil)], 1.0), f1 = in_plane(end_.attached[at(stencil)], 1.0);
+  const double kappa0 = start_.half_strain(stencil, 0), kappa1 = end_.half_strain(stencil, 0);
+  const double natural = elastic.half_natural(stencil, 0), stiffness = elastic.half_stiffness(stencil, 0);
+  const PlanarMoment p =
+      s.frame_first ? planar_moment(elastic.measure, f0, f1, edge.t0, edge.t1, kappa0, kappa1, natural, stiffness)
+                    : planar_moment(elastic.measure, edge.t0, edge.t1, f0, f1, kappa0, kappa1, natural, stiffness);
+  const double sign = s.frame_first ? -1.0 : 1.0;  // of the moment on the edge
+  const double by_edge = s.frame_first ? p.by_b : p.by_a, by_frame = s.frame_first ? p.by_a : p.by_b;
+  const EdgePlace place{0, 2, -1, 2};
+  const Vec3d moment{0.0, 0.0, sign * p.moment};
+  Mat3<double> by_spin{};
+  by_spin.row[2].z = by_edge;
+  const EdgeColumns<double> columns = edge_columns(by_spin, flat(edge.t1, edge.inverse_length1));
+  EdgeBlock<double> block = edge_block(edge, sign, columns);
+  finish_block(place, edge, middle_.edge[at(s.edge)], moment, true, block);
+  add_edge_forces(local, place, edge, middle_.edge[at(s.edge)], moment);
+  add_edge_rows(local, place, place, block);
+  local.gradient[4] = -sign * p.moment;
+  const Vec3d by_turn = edge.force({0.0, 0.0, 2.0 * sign * by_frame});
+  const double f[2] = {by_turn.x, by_turn.y}, c[2] = {columns.edge.row[2].x, columns.edge.row[2].y};
+  for (int i = 0; i < 2; ++i) {
+    local.hessian[2 + i][4] += f[i];
+    local.hessian[i][4] -= f[i];
+    local.hessian[4][2 + i] -= 2.0 * sign * c[i];
+    local.hessian[4][i] += 2.0 * sign * c[i];
+  }
+  local.hessian[4][4] = -2.0 * sign * by_frame;
+}
+
+/// Bending and twisting in space between a frame and an edge. The frame's rows are the moment on it, whose work is that
+/// over its Cayley vector.
+void Equations::discrete_half_local(int stencil, Local& local) const {
+  const FrameStencil& s = model_.half[at(stencil)];
+  clear(local, 11);
+  const MovingEdge<double> edge = moving_edge(s.edge);
+  const EdgeFrame<double>&e0 = start_.edge[at(s.edge)], &e1 = end_.edge[at(s.edge)];
+  const EdgeFrame<double>&f0 = start_.attached[at(stencil)], &f1 = end_.attached[at(stencil)];
+  const bool first = s.frame_first;
+  DiscreteMoment<double> m;
+  discrete_moment<true>(elastic.measure, first ? f0 : e0, first ? f1 : e1, first ? e0 : f0, first ? e1 : f1,
+                        row_of(start_.half_strain, stencil), row_of(end_.half_strain, stencil),
+                        row_of(elastic.half_natural, stencil), row_of(elastic.half_stiffness, stencil), m);
+  const double sign = first ? -1.0 : 1.0;  // of the moment on the edge
+  const Mat3<double>&by_edge = first ? m.by_b : m.by_a, &by_frame = first ? m.by_a : m.by_b;
+  const EdgePlace place{0, 4, 3, 3};
+  const Vec3d moment = sign * m.moment;
+  const EdgeColumns<double> columns = edge_columns(by_edge, e1);
+  EdgeBlock<double> block = edge_block(edge, sign, columns);
+  finish_block(place, edge, middle_.edge[at(s.edge)], moment, true, block);
+  add_edge_forces(local, place, edge, middle_.edge[at(s.edge)], moment);
+  add_edge_rows(local, place, place, block);
+
+  // The frame turns at the end by J(w) dw, and by its hinge's angle about the hinge's axis there.
+  const int dof = model_.frame_dof[at(s.frame)];
+  const Vector3 w = end_q_.segment<3>(dof), on_frame = -sign * to_eigen(m.moment);
+  const Matrix3 J = cayley_spin(w);
+  Matrix3 by_spin, by_vector;  // of the moment m
+  for (int i = 0; i < 3; ++i) {
+    by_spin.row(i) << by_frame.row[i].x, by_frame.row[i].y, by_frame.row[i].z;
+    by_vector.row(i) << columns.edge.row[i].x, columns.edge.row[i].y, columns.edge.row[i].z;
+  }
+  Eigen::Matrix<double, 3, 11> by;  // m by the unknowns of the end
+  by.setZero();
+  by.middleCols<3>(4) = by_vector;
+  by.leftCols<3>() = -by_vector;
+  by.col(3) << columns.angle.x, columns.angle.y, columns.angle.z;
+  by.middleCols<3>(7) = by_spin * J;
+  HingeArm h{Vector3::Zero(), Matrix3::Zero(), Vector3::Zero()};
+  if (s.hinge >= 0) {
+    const Hinge& hinge = model_.hinges[at(s.hinge)];
+    by.col(10) = by_spin * (end_.frame[at(s.frame)] * hinge.axis);
+    h = hinge_arm(w, start_.frame[at(s.frame)] * hinge.axis, difference_(hinge.dof));
+  }
+  // Rows of the edge by the frame and its hinge.
+  for (int k = 7; k < 11; ++k) {
+    const Vec3d change = to_vec3(Vector3(2.0 * sign * by.col(k)));
+    const Vec3d f = edge.force(change) + edge.torque(change) * middle_.edge[at(s.edge)].spin;
+    for (int i = 0; i < 3; ++i) {
+      local.hessian[4 + i][k] += f[i];
+      local.hessian[i][k] -= f[i];
+    }
+    local.hessian[3][k] += edge.torque(change);
+  }
+  const Eigen::Matrix<double, 3, 11> frame_rows = (-2.0 * sign) * by;
+  Eigen::Matrix<double, 1, 11> hinge_row = h.arm.transpose() * frame_rows;
+  hinge_row.segment<3>(7) += 2.0 * on_frame.transpose() * h.by_frame;
+  hinge_row(10) += 2.0 * on_frame.dot(h.by_angle);
+  for (int i = 0; i < 3; ++i) {
+    local.gradient[7 + i] = on_frame(i);
+    for (int k = 0; k < 11; ++k) local.hessian[7 + i][k] = frame_rows(i, k);
+  }
+  local.gradient[10] = h.arm.dot(on_frame);
+  for (int k = 0; k < 11; ++k) local.hessian[10][k] = hinge_row(k);
 }
 
 /// Force of the mean strain, along the mean of the edge.
@@ -240,36 +325,6 @@ void Equations::mean_stretch_local(const VectorX& z, int edge, const double* axi
       local.hessian[i][dim + j] = local.hessian[dim + i][j] = -h;
     }
   }
-}
-
-void Equations::corrected_bend_local(int stencil, bool with_matrix, Local& local) {
-  Local end;
-  bend_local(model_, elastic, middle_, stencil, with_matrix, local);
-  bend_local(model_, elastic, end_, stencil, false, end);
-  const BendTwistEnergy before = bend_energy_of(elastic, start_, stencil);
-  const BendStencil& s = model_.bend[at(stencil)];
-  Metric metric;
-  for (int k = 0; k < 2; ++k)
-    metric.pairs[k] = {4 * k, 4 * k + 4, 3, inverse_rest_[s.edge[k]] * inverse_rest_[s.edge[k]]};
-  metric.own[3] = metric.own[7] = 1.0;
-  correct(local, end, before.bend + before.twist, elastic.bend_stiffness.row(stencil).maxCoeff(), assembler_.bend,
-          stencil, metric, with_matrix);
-}
-
-void Equations::corrected_half_local(const VectorX& z, int stencil, bool with_matrix, Local& local) {
-  Local end;
-  half_local(model_, z, elastic, middle_, stencil, with_matrix, local);
-  half_local(model_, end_q_, elastic, end_, stencil, false, end);
-  const BendTwistEnergy before = half_energy_of(elastic, start_, stencil);
-  const int dim = model_.dimension, edge = model_.half[at(stencil)].edge;
-  Metric metric;
-  metric.pairs[0] = {0, dim == 2 ? 2 : 4, dim, inverse_rest_[edge] * inverse_rest_[edge]};
-  if (dim == 2)
-    metric.own[4] = 1.0;
-  else
-    for (int i : {3, 7, 8, 9, 10}) metric.own[i] = 1.0;
-  correct(local, end, before.bend + before.twist, elastic.half_stiffness.row(stencil).maxCoeff(), assembler_.half,
-          stencil, metric, with_matrix);
 }
 
 /// Axial forces of the mean strain, and 2 / (l0 + l1).
@@ -293,37 +348,35 @@ void Equations::add_discrete_gradient(const VectorX& z, bool with_matrix, const 
     table.add_gradient(i, local.gradient, 1.0, gradient_, magnitude_);
     if (with_matrix) table.add_hessian(i, local.hessian, 1.0, values);
   };
+  set_mean_axial_forces();
   const auto add_edge = [&](int e) {
     mean_stretch_local(z, e, axial_force, local);
     add(assembler_.stretch, e);
   };
-  set_mean_axial_forces();
+  const auto add_bend = [&](int b) {
+    discrete_bend_local(b, local);
+    add(assembler_.bend, b);
+  };
   if (model_.planar()) {
     for (int e = 0; e < model_.edge_count; ++e) add_edge(e);
-    for (int b = 0; b < static_cast<int>(model_.bend.size()); ++b) {
-      add_planar_bend(b, with_matrix, local);
-      add(assembler_.bend, b);
-    }
+    for (int b = 0; b < static_cast<int>(model_.bend.size()); ++b) add_bend(b);
   } else {
     stencil_kernels().momentum_bend(regular_batch(elastic, axial_force, with_matrix ? values.data() : nullptr),
-                                    {.end_frames = &end_.edge.data()->tangent.x,
+                                    {.start_frames = &start_.edge.data()->tangent.x,
+                                     .end_frames = &end_.edge.data()->tangent.x,
                                      .start_strain = start_.bend_strain.data(),
-                                     .end_strain = end_.bend_strain.data(),
-                                     .change = difference_.data(),
-                                     .inverse_rest = inverse_rest_.data(),
-                                     .inverse_mean = inverse_mean_.data(),
-                                     .rounding = rounding_,
-                                     .floor = correction_floor_.data()});
+                                     .end_strain = end_.bend_strain.data()});
     for (int e : assembler_.regular.other_edges) add_edge(e);
-    for (int b : assembler_.regular.other_bend) {
-      corrected_bend_local(b, with_matrix, local);
-      add(assembler_.bend, b);
-    }
+    for (int b : assembler_.regular.other_bend) add_bend(b);
   }
   for (int h = 0; h < static_cast<int>(model_.half.size()); ++h) {
-    corrected_half_local(z, h, with_matrix, local);
+    if (model_.planar())
+      discrete_planar_half_local(h, local);
+    else
+      discrete_half_local(h, local);
     add(assembler_.half, h);
   }
+  elastic_rows_ = gradient_.head(model_.dof_count);
   if (!parameters_->viscous || h_ == 0.0) return;
   add_elastic(viscous_, z, with_matrix, nullptr, out);
 }

@@ -109,11 +109,9 @@ NewtonResult find_inner(Equations& equations, const Newton& newton, const Option
   // comes first for a while.
   const bool circling = plan.rule == StepRule::energy_momentum;
   FactorRecord& known = work.newton.factor;
-  const bool mixed = !circling || known.plain_solves == 0, exact = known.relaxed_solves == 0;
+  const bool mixed = !circling || known.plain_solves == 0;
   if (circling && !mixed) --known.plain_solves;
-  if (circling && !exact) --known.relaxed_solves;
   constexpr int kWait = 16;
-  bool first = true;
   std::array<Start, 5> starts{{{0, true, true, mixed},
                                {1, true, false, mixed},
                                {2, false, false, mixed},
@@ -128,7 +126,6 @@ NewtonResult find_inner(Equations& equations, const Newton& newton, const Option
   const int few = std::min(12, options.max_iterations);
   if (work.repeated) {
     work.z = work.deep;
-    equations.keep_angular_momentum(exact);
     start_axial_force(equations, work.z, work.newton.axial_force);
     found = newton.solve(equations, work.z, nullptr, std::min(24, options.max_iterations), work.newton, mixed, h);
     if (found.converged) return found;
@@ -152,9 +149,7 @@ NewtonResult find_inner(Equations& equations, const Newton& newton, const Option
     if (equations.contact()) equations.contact()->hold_sticking(state, work.move);
     follow_supports(equations, newton, h / plan.dt, state, work);
     work.z = state.q + work.move * equations.allowed(state.q, work.move);
-    const bool trial = start.accelerated || (circling && start.mixed && start.moving), keep_momentum = exact && first;
-    equations.keep_angular_momentum(keep_momentum);
-    first = false;
+    const bool trial = start.accelerated || (circling && start.mixed && start.moving);
     const int limit = trial ? few : options.max_iterations;
     start_axial_force(equations, state.q, work.newton.axial_force);
     // Starts that surfaces cut short soon converge in one scene, and lead nowhere in another.
@@ -166,7 +161,6 @@ NewtonResult find_inner(Equations& equations, const Newton& newton, const Option
     if (!sure) record.note(found.converged);
     if (found.converged) {
       if (circling && mixed && !start.mixed) known.plain_solves = kWait;
-      if (circling && exact && !keep_momentum) known.relaxed_solves = kWait;
       break;
     }
   }
@@ -340,24 +334,28 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
     }
   }
   work.change = q1 - state.q;
-  if (equations.contact()) result.pressing_gain = equations.contact()->pressing_gain(work.change);
+  const VectorX& working = plan.rule == StepRule::energy_momentum ? equations.working_change(work.change) : work.change;
+  if (equations.contact()) result.pressing_gain = equations.contact()->pressing_gain(working);
   work.mean = work.change / dt;
   VectorX& v1 = work.velocity;
   if (euler)
     v1 = work.mean;
   else
     v1 = 2.0 * work.mean - state.v;
+  if (plan.rule == StepRule::energy_momentum) equations.set_turning_velocities(work.change, dt, v1);
   // Held unknowns have no dynamics of their own: midpoint's 2 v - v0 would ring for ever.
   assembler.project(v1);
   assembler.add_held_part(work.mean, 1.0, v1);
-  book_work(equations, parameters, work.change, result);
+  book_work(equations, parameters, working, result);
   if (const Contact* contact = equations.contact()) {
     const double by_obstacles = contact->obstacle_work();
-    result.dissipated += equations.contact_loss(work.change, by_obstacles);
+    result.dissipated += equations.contact_loss(working, by_obstacles);
     result.support_work += by_obstacles;
   }
   if (!model.constraints.empty()) {
-    work.assumed = equations.mass().rows.cwiseProduct((work.z - state.q) / (h * h) - state.v / h);
+    work.assumed = equations.inertia();
+    if (plan.rule == StepRule::energy_momentum)
+      equations.set_working_rows(work.change, work.newton.evaluation.full_residual);
     book_supports(equations, state.v, v1, dt, work, result);
   }
   VectorX& acceleration = work.mean;

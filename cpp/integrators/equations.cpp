@@ -24,6 +24,9 @@ std::unique_ptr<Contact> make_contact(const Model& model) {
   return model.description.contact.any() ? std::make_unique<Contact>(model) : nullptr;
 }
 
+/// What an angle of a step counts for where the middle of the step is that of a rotation: of its Cayley vector.
+double finite_turn(double angle) { return 2.0 * std::tan(0.5 * angle); }
+
 }  // namespace
 
 void set_gravity_force(const Model& model, const Parameters& p, VectorX& force) {
@@ -165,7 +168,6 @@ void Equations::evaluate(const VectorX& z, bool with_matrix, const double* axial
   if (!floor_current_) set_floor(z, floor_);
   floor_current_ = true;
   if (energy_momentum_) {
-    correction_floor_.setZero(model_.dof_count + kPadding);
     difference_ = 2.0 * (z - state_->q);
     end_q_ = 2.0 * z - state_->q;
     compute_configuration(model_, *state_, end_q_, end_);
@@ -176,7 +178,7 @@ void Equations::evaluate(const VectorX& z, bool with_matrix, const double* axial
   add_loads(z, with_matrix, out);
   if (!resistance_.empty() && h_ != 0.0) add_resistance(z, with_matrix);
   if (contact_) add_contacts(with_matrix, out);
-  if (h_ != 0.0 && !model_.planar()) add_spin_couple(z);
+  if (h_ != 0.0 && inner_ == Inner::end && !model_.planar()) add_spin_couple(z);
   add_step(z, with_matrix, out);
   assembler_.project(out.residual);
   if (with_matrix) assembler_.project_matrix();
@@ -205,6 +207,7 @@ void Equations::add_step(const VectorX& z, bool with_matrix, Evaluation& out) {
   const auto x = z.array(), q0 = state_->q.array(), v0 = state_->v.array();
   acceleration_ = (inverse * (inverse * (x - q0) - v0)).matrix();
   multiply(model_, mass_, acceleration_, inertia_);
+  if (h_ != 0.0 && inner_ == Inner::middle) set_turning_inertia(z);
   const auto inertia = inertia_.array();
   const auto drag = (inverse * node_dof_drag_.array()) * (x - q0);
   out.full_residual = (gradient_.head(n).array() + inertia + drag - gravity_.array() - custom_force.array()).matrix();
@@ -213,7 +216,6 @@ void Equations::add_step(const VectorX& z, bool with_matrix, Evaluation& out) {
           .matrix();
   if (flowing_) add_flow(z, with_matrix, out);
   out.floor = floor_ + rounding_ * out.magnitude;
-  if (energy_momentum_) out.floor += correction_floor_.head(n);
   if (contact_) out.floor += contact_floor_;
   out.potential -= gravity_.dot(z);
   out.residual = out.full_residual;
@@ -370,6 +372,102 @@ void Equations::add_spin_couple(const VectorX& z) {
     // work either, since spin is normal to the edge before and now.
     const double torque = parameters_->edge_inertia[e] * (omega - v0[angle]) * inverse;
     add_couple(e, spin_couple(e, omega, inverse * change) + torque * middle_.edge[at(e)].spin);
+  }
+}
+
+/// Inertia of spinning edges and of frames in a step under the midpoint rules, such that angular momentum is kept
+/// exactly. The spin's part of it, I omega t, changes in a step by dt m, m = I (omega1 t1 - omega0 t0) / dt: nodes and
+/// angle of the edge take that moment like any other, about where the edge is in the middle. In energy-momentum steps
+/// omega is 2 tan(D theta / 2) / dt, as in a rigid rotation of the whole, and an axial force that vanishes with the
+/// square of the step makes the work of m what kinetic energy changes by. Jacobians are left out: they are a small part
+/// of the mass term.
+void Equations::set_turning_inertia(const VectorX& z) {
+  const double dt = 2.0 * h_, inverse = 1.0 / dt;
+  if (model_.planar()) {
+    for (int f = 0; energy_momentum_ && f < model_.frame_count; ++f) {
+      const int dof = model_.frame_dof[at(f)];
+      const double change = 2.0 * (z[dof] - state_->q[dof]);
+      inertia_[dof] += 2.0 * mass_.rows[dof] * inverse * inverse * (finite_turn(change) - change);
+    }
+    return;
+  }
+  const double *q0 = state_->q.data(), *v0 = state_->v.data();
+  for (int e = 0; e < model_.edge_count; ++e) {
+    const int a = model_.tail_dof[at(e)], b = model_.head_dof[at(e)], angle = model_.edge_dof[at(e)];
+    const EdgeFrame<double>& middle = middle_.edge[at(e)];
+    const Vec3d m{z[b] - z[a], z[b + 1] - z[a + 1], z[b + 2] - z[a + 2]};
+    const Vec3d e0{q0[b] - q0[a], q0[b + 1] - q0[a + 1], q0[b + 2] - q0[a + 2]}, e1 = 2.0 * m - e0;
+    const double l0 = std::sqrt(dot(e0, e0)), l1 = std::sqrt(dot(e1, e1));
+    const Vec3d t0 = (1.0 / l0) * e0, t1 = (1.0 / l1) * e1;
+    const double change = 2.0 * (z[angle] - q0[angle]);
+    const double turn = energy_momentum_ ? finite_turn(change) : change;
+    const double inertia = mass_.rows[angle];
+    const Vec3d moment = (inertia * inverse) * ((2.0 * inverse * turn - v0[angle]) * t1 - v0[angle] * t0);
+    const double torque = dot(moment, middle.tangent);
+    inertia_[angle] = torque;
+    Vec3d force = middle.inverse_length * cross(moment, middle.tangent);
+    // An edge's torque turns its nodes by spin . e as well; that of inertia takes back what all others do.
+    force += torque * middle.spin;
+    if (energy_momentum_) {
+      const Vec3d apart = t1 - t0;
+      const double mean = 0.5 * (l0 + l1), cosine = 0.5 * dot(t0 + t1, middle.tangent), rate = inverse * turn;
+      force -= (inertia * rate * rate * dot(apart, apart) / (4.0 * mean * cosine)) * middle.tangent;
+    }
+    add_couple(e, force);
+  }
+  for (int f = 0; f < model_.frame_count; ++f) {
+    const int dof = model_.frame_dof[at(f)];
+    const Matrix3 J = cayley_spin(z.segment<3>(dof)).transpose();
+    if (energy_momentum_) {  // whose rows are moments
+      const Vector3 other = gradient_.segment<3>(dof) - elastic_rows_.segment<3>(dof);
+      gradient_.segment<3>(dof) += J.inverse() * other - other;
+    } else {
+      inertia_.segment<3>(dof) = (J * inertia_.segment<3>(dof)).eval();
+    }
+  }
+}
+
+void Equations::set_turning_velocities(const VectorX& change, double dt, VectorX& v1) const {
+  const auto set = [&](int dof) { v1[dof] = 2.0 * finite_turn(change[dof]) / dt - state_->v[dof]; };
+  if (model_.planar())
+    for (int f = 0; f < model_.frame_count; ++f) set(model_.frame_dof[at(f)]);
+  else
+    for (int e = 0; e < model_.edge_count; ++e) set(model_.edge_dof[at(e)]);
+}
+
+/// 2 tan(D theta / 2) over how much of the mean of an edge's tangents lies along it in the middle.
+double Equations::working_turn(int edge, double change) const {
+  const Vec3d mean = 0.5 * (start_.edge[at(edge)].tangent + end_.edge[at(edge)].tangent);
+  return finite_turn(change) / dot(mean, middle_.edge[at(edge)].tangent);
+}
+
+const VectorX& Equations::working_change(const VectorX& change) {
+  working_change_ = change;
+  for (int f = 0; f < model_.frame_count; ++f) {
+    const int dof = model_.frame_dof[at(f)];
+    if (model_.planar())
+      working_change_[dof] = finite_turn(change[dof]);
+    else
+      working_change_.segment<3>(dof) *= 1.0 + 0.0625 * change.segment<3>(dof).squaredNorm();
+  }
+  for (int e = 0; !model_.planar() && e < model_.edge_count; ++e) {
+    const int dof = model_.edge_dof[at(e)];
+    working_change_[dof] = working_turn(e, change[dof]);
+  }
+  return working_change_;
+}
+
+void Equations::set_working_rows(const VectorX& change, VectorX& rows) const {
+  const auto ratio = [](double turn, double angle) { return std::abs(angle) < 1e-8 ? 1.0 : turn / angle; };
+  for (const Support& s : model_.supports) {
+    if (!s.active) continue;
+    if (model_.planar() && s.frame >= 0) {
+      const int dof = model_.frame_dof[at(s.frame)];
+      rows[dof] += elastic_rows_[dof] * (ratio(finite_turn(change[dof]), change[dof]) - 1.0);
+    } else if (!model_.planar() && s.other_node >= 0) {
+      const int dof = model_.edge_dof[at(s.edge)];
+      rows[dof] += elastic_rows_[dof] * (ratio(working_turn(s.edge, change[dof]), change[dof]) - 1.0);
+    }
   }
 }
 

@@ -7,9 +7,7 @@
 /// over half the step, then extrapolated). Statics is the same without mass. The energy-momentum scheme
 /// replaces grad V by a discrete gradient between q0 and q1 = 2 z - q0:
 ///   stretching: EA (eps0 + eps1) / 2 (e0 + e1) / (|e0| + |e1|)   [Simo, Tarnow and Doblare 1995];
-///   bending, twisting: grad E(z) + r u / (u . D), D = q1 - q0, r = E(q1) - E(q0) - grad E(z) . D, with u a
-///   direction that does not move the stencil [Gonzalez 1996];
-///   in a plane: quotients of differences of the moment's angle alone, see Equations::add_planar_bend;
+///   bending, twisting: moments whose work is what the energy changes by, see elasticity/discrete_gradient.hpp;
 ///   surfaces that press: along the mean of the ways between them, see Contact::add_mean_pressing.
 
 #include <memory>
@@ -18,6 +16,7 @@
 
 #include "assembly/assembler.hpp"
 #include "contact/contact.hpp"
+#include "elasticity/discrete_gradient.hpp"
 #include "forces/resistive.hpp"
 #include "forces/stokeslets.hpp"
 #include "integrators/options.hpp"
@@ -77,10 +76,6 @@ class Equations {
   /// What earlier solutions left behind.
   void forget_flow();
 
-  /// Whether energy-momentum steps in a plane keep angular momentum exactly, however hard that makes them to solve for;
-  /// else to where edges stretch by more within a step than a stencil bends.
-  void keep_angular_momentum(bool exactly) { keep_momentum_ = exactly; }
-
   /// Residual at z, and the matrix when asked for. `axial_force`: see stretch_hessian.
   void evaluate(const VectorX& z, bool with_matrix, const double* axial_force, Evaluation& out);
   /// Of an explicit step from `state` to q: the configuration there, and that of `next`. Returns by how much edges turn
@@ -106,6 +101,16 @@ class Equations {
   void predict_axial_force(const VectorX& step, VectorX& out) const;
 
   const MassMatrix& mass() const { return mass_; }
+  /// Inertia in the rows of the last evaluation [N], [N m].
+  const VectorX& inertia() const { return inertia_; }
+  /// Of an energy-momentum step that changes the unknowns by `change`: the velocities of angles at its end.
+  void set_turning_velocities(const VectorX& change, double dt, VectorX& v1) const;
+  /// What forces of an energy-momentum step do their work over: its change of the unknowns, but for angles and frames,
+  /// whose torques and moments are those about where they are in the middle.
+  const VectorX& working_change(const VectorX& change);
+  /// Makes of the rows of angles, after an energy-momentum step, what does the work over `change` that their torques
+  /// do.
+  void set_working_rows(const VectorX& change, VectorX& rows) const;
   ElasticCoefficients elastic;
 
  private:
@@ -127,31 +132,19 @@ class Equations {
   void add_other_elastic(const ElasticCoefficients& k, const VectorX& z, bool with_matrix, const double* axial_force,
                          Evaluation& out);
   void add_discrete_gradient(const VectorX& z, bool with_matrix, const double* axial_force, Evaluation& out);
-  /// A quadratic form that neither moves nor turns the stencil: squares of single unknowns, and of differences.
-  struct Metric {
-    struct Pair {
-      int a = 0, b = 0, size = 0;
-      double weight = 0.0;
-    };
-    double own[kMaxLocal] = {};
-    Pair pairs[2];
-  };
-  void correct(Local& local, const Local& end, double start_energy, double stiffness, const ElementTable& table,
-               int element, const Metric& metric, bool with_matrix);
-  static void add_correction_hessian(Local& local, const Local& end, const Metric& metric, const double* D,
-                                     const double* u, int n, double inverse, double weight);
   void set_mean_axial_forces();
   void mean_stretch_local(const VectorX& z, int edge, const double* axial_force, Local& local) const;
-  void corrected_bend_local(int stencil, bool with_matrix, Local& local);
-  void corrected_half_local(const VectorX& z, int stencil, bool with_matrix, Local& local);
-  void add_planar_bend(int stencil, bool with_matrix, Local& local);
-  void add_correction_floor(const int* dofs, const double* u, int count, double rounding);
+  MovingEdge<double> moving_edge(int edge) const;
+  double working_turn(int edge, double change) const;
+  void discrete_bend_local(int stencil, Local& local) const;
+  void discrete_planar_half_local(int stencil, Local& local) const;
+  void discrete_half_local(int stencil, Local& local) const;
   void add_spin_couple(const VectorX& z);
+  void set_turning_inertia(const VectorX& z);
   Vec3d spin_couple(int edge, double omega, const Vec3d& rate) const;
   void add_couple(int edge, const Vec3d& force);
   double set_inertial_floor(const VectorX& z, VectorX& floor);
   void set_floor(const VectorX& z, VectorX& floor);
-  void gather_difference(const ElementTable& table, int element, double* difference) const;
 
   const Model& model_;
   Loads loads_;
@@ -164,7 +157,7 @@ class Equations {
   const State* state_ = nullptr;
   const Parameters* parameters_ = nullptr;
   double h_ = 0.0;
-  bool energy_momentum_ = false, keep_momentum_ = false;
+  bool energy_momentum_ = false;
   ElasticCoefficients viscous_, total_;
   const ElasticCoefficients* acting_ = &elastic;  ///< elasticity, with viscosity where the scheme takes both as one
   Configuration start_, middle_, end_;
@@ -190,11 +183,12 @@ class Equations {
   double end_rate() const { return inner_ == Inner::middle ? 2.0 : 1.0; }
   VectorX contact_end_, contact_change_;  ///< q1 and its coming change
   VectorX contact_gradient_, contact_floor_;
-  double reach_ = 0;          ///< greatest coordinate [m]
-  VectorX floor_;             ///< what bending, twisting and inertia leave by rounding
-  VectorX axial_floor_;       ///< per edge [N]
-  VectorX correction_floor_;  ///< what the discrete gradient leaves by rounding; padded by kPadding
-  double rounding_ = 0;       ///< relative, of a direction in space
+  double reach_ = 0;      ///< greatest coordinate [m]
+  VectorX floor_;         ///< what bending, twisting and inertia leave by rounding
+  VectorX axial_floor_;   ///< per edge [N]
+  VectorX elastic_rows_;  ///< per unknown, the discrete gradient alone
+  VectorX working_change_;
+  double rounding_ = 0;  ///< relative, of a direction in space
   bool floor_current_ = false;
 };
 

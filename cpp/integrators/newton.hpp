@@ -56,7 +56,6 @@ struct FactorRecord {
   int waited = 0;                                       ///< time steps since one was last tried across
   bool tired = false;                                   ///< served the last time step slowly
   int plain_solves = 0;                                 ///< still to come before the mixed method is tried again
-  int relaxed_solves = 0;                               ///< and before angular momentum is kept exactly again
   std::array<StartRecord, 5> starts{};                  ///< per start of find_inner
   StartRecord cut;                                      ///< of those whose first step is cut
 };
