@@ -104,7 +104,8 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
   reaction_current = true;
   newton->balance(work.newton.evaluation, r.newton);
   check_resolution();
-  return {r.stable, r.newton.iterations, r.newton.residual};
+  const bool frictional = system.contact() && system.contact()->frictional();
+  return {r.stable, !system.loads().unsymmetric || frictional, r.newton.iterations, r.newton.residual};
 }
 
 void World::Implementation::refresh_reactions() {

@@ -1,51 +1,201 @@
+#include <algorithm>
+#include <utility>
+
 #include <Eigen/Eigenvalues>
 
 #include "world/implementation.hpp"
 
 namespace withe {
+namespace {
+
+using Entries = std::vector<Eigen::Triplet<double>>;
+
+std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+SparseMatrix assembled(Eigen::Index rows, Eigen::Index columns, const Entries& entries) {
+  SparseMatrix out(rows, columns);
+  out.setFromTriplets(entries.begin(), entries.end());
+  return out;
+}
+
+/// Columns: an orthonormal basis of what supports leave free.
+SparseMatrix free_basis(const Model& model) {
+  std::vector<bool> held(at(model.dof_count), false);
+  Entries entries;
+  int count = 0;
+  for (const Constraint& c : model.constraints) {
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(c.free.topLeftCorner(c.size, c.size));
+    for (int i = 0; i < c.size; ++i) {
+      held[at(c.first + i)] = true;
+      if (axes.eigenvalues()(i) <= 0.5) continue;
+      for (int k = 0; k < c.size; ++k) entries.emplace_back(c.first + k, count, axes.eigenvectors()(k, i));
+      ++count;
+    }
+  }
+  for (int i = 0; i < model.dof_count; ++i)
+    if (!held[at(i)]) entries.emplace_back(i, count++, 1.0);
+  return assembled(model.dof_count, count, entries);
+}
+
+SparseMatrix matrix_of(const Assembler& assembler) {
+  const SparsityPattern& pattern = assembler.pattern();
+  const LinearSolver& solver = assembler.solver();
+  const bool symmetric = solver.symmetry() == Symmetry::symmetric;
+  Entries entries;
+  entries.reserve(pattern.row_indices.size());
+  for (int column = 0; column < pattern.size; ++column)
+    for (int p = pattern.column_starts[at(column)]; p < pattern.column_starts[at(column + 1)]; ++p) {
+      const int row = pattern.row_indices[at(p)];
+      const std::ptrdiff_t place =
+          symmetric ? solver.offset(std::max(row, column), std::min(row, column)) : solver.offset(row, column);
+      entries.emplace_back(row, column, solver.values()[static_cast<std::size_t>(place)]);
+    }
+  return assembled(pattern.size, pattern.size, entries);
+}
+
+SparseMatrix matrix_of(const Model& model, const MassMatrix& mass) {
+  Entries entries;
+  for (int i = 0; i < model.dof_count; ++i) entries.emplace_back(i, i, mass.rows(i));
+  for (int e = 0; e < model.edge_count; ++e)
+    for (int i = 0; i < model.dimension; ++i) {
+      const int a = model.tail_dof[at(e)] + i, b = model.head_dof[at(e)] + i;
+      const double m = mass.coupling(e);
+      entries.emplace_back(a, a, -m);
+      entries.emplace_back(b, b, -m);
+      entries.emplace_back(a, b, m);
+      entries.emplace_back(b, a, m);
+    }
+  return assembled(model.dof_count, model.dof_count, entries);
+}
+
+/// Splits the stiffness into sum k g g^T over the strains of all stencils, g their gradients, and what is left where
+/// their stiffnesses are taken away but their forces are kept.
+class StrainParts {
+ public:
+  StrainParts(const Equations& system, const State& state)
+      : system_(system), state_(state), model_(system.model()), without_(system.elastic) {
+    for (int e = 0; e < model_.edge_count; ++e) add_stretch(e);
+    const ElasticCoefficients& k = system.elastic;
+    for (int b = 0; b < static_cast<int>(model_.bend.size()); ++b)
+      add_turning(system.assembler().bend, b, k.bend_stiffness, k.bend_natural, without_.bend_stiffness,
+                  without_.bend_natural, &StrainParts::bend);
+    for (int h = 0; h < static_cast<int>(model_.half.size()); ++h)
+      add_turning(system.assembler().half, h, k.half_stiffness, k.half_natural, without_.half_stiffness,
+                  without_.half_natural, &StrainParts::half);
+  }
+
+  SparseMatrix gradients() const { return assembled(count(), model_.dof_count, entries_); }
+  VectorX stiffnesses() const { return Eigen::Map<const VectorX>(stiffnesses_.data(), count()); }
+  /// With stiffnesses next to nothing, and natural strains for which forces are what they were.
+  const ElasticCoefficients& without() const { return without_; }
+
+ private:
+  static constexpr double kLittle = 0x1p-40;
+  using Evaluate = void (StrainParts::*)(const ElasticCoefficients& k, int stencil, Local& out) const;
+
+  Eigen::Index count() const { return static_cast<Eigen::Index>(stiffnesses_.size()); }
+
+  void add_row(const ElementTable& table, int element, const double* gradient, double stiffness) {
+    const int row = static_cast<int>(stiffnesses_.size());
+    const int* dofs = table.dofs(element);
+    for (int i = 0; i < table.width(); ++i)
+      if (dofs[i] >= 0 && gradient[i] != 0.0) entries_.emplace_back(row, dofs[i], gradient[i]);
+    stiffnesses_.push_back(stiffness);
+  }
+
+  /// The strain of a stretched edge is taken as its elongation [m].
+  void add_stretch(int edge) {
+    const ElasticCoefficients& k = system_.elastic;
+    const double stiffness = k.stretch_stiffness(edge);
+    if (stiffness == 0.0) return;
+    const Configuration& c = system_.configuration();
+    const Vec3d& t = c.edge[at(edge)].tangent;
+    const double along[3] = {t.x, t.y, t.z};
+    double gradient[kMaxLocal] = {};
+    for (int i = 0; i < model_.dimension; ++i) {
+      gradient[i] = -along[i];
+      gradient[model_.dimension + i] = along[i];
+    }
+    add_row(system_.assembler().stretch, edge, gradient, stiffness / model_.edge_length(edge));
+    const double strain = c.length(edge) / model_.edge_length(edge) - 1.0;
+    without_.stretch_stiffness(edge) = kLittle * stiffness;
+    without_.stretch_natural(edge) = strain - (strain - k.stretch_natural(edge)) / kLittle;
+  }
+
+  void bend(const ElasticCoefficients& k, int stencil, Local& out) const {
+    bend_local(model_, k, system_.configuration(), stencil, false, out);
+  }
+  void half(const ElasticCoefficients& k, int stencil, Local& out) const {
+    half_local(model_, state_.q, k, system_.configuration(), stencil, false, out);
+  }
+
+  /// Energies k (s - s0)^2 / 2 of unit stiffness differ by s + 1/2, and their gradients by that of s, between natural
+  /// strains -1 and 0.
+  void add_turning(const ElementTable& table, int stencil, const Columns3& stiffness, const Columns3& natural,
+                   Columns3& less, Columns3& shifted, Evaluate evaluate) {
+    const int strains = model_.planar() ? 1 : 3;
+    const VectorX own = stiffness.row(stencil), rest = natural.row(stencil);
+    VectorX strain(strains);
+    Local at_zero, at_one;
+    for (int s = 0; s < strains; ++s) {
+      less.row(stencil).setZero();
+      shifted.row(stencil).setZero();
+      less(stencil, s) = 1.0;
+      (this->*evaluate)(without_, stencil, at_zero);
+      shifted(stencil, s) = -1.0;
+      (this->*evaluate)(without_, stencil, at_one);
+      strain(s) = at_one.energy - at_zero.energy - 0.5;
+      for (int i = 0; i < table.width(); ++i) at_one.gradient[i] -= at_zero.gradient[i];
+      if (own(s) != 0.0) add_row(table, stencil, at_one.gradient, own(s));
+    }
+    less.row(stencil) = kLittle * own.transpose();
+    shifted.row(stencil) = rest.transpose();
+    for (int s = 0; s < strains; ++s) shifted(stencil, s) = strain(s) - (strain(s) - rest(s)) / kLittle;
+  }
+
+  const Equations& system_;
+  const State& state_;
+  const Model& model_;
+  ElasticCoefficients without_;
+  Entries entries_;
+  std::vector<double> stiffnesses_;
+};
+
+}  // namespace
 
 Linearisation World::linearise() const {
   Implementation& self = *implementation_;
   const Model& model = self.model;
-  const Eigen::Index n = model.dof_count;
   Equations& system = self.statics();
   self.update_custom_force(system);
   system.begin(self.state, self.parameters, 0.0, false);
-  system.evaluate(self.state.q, true, nullptr, self.work.newton.evaluation);
+  Evaluation& evaluation = self.work.newton.evaluation;
+  system.evaluate(self.state.q, false, nullptr, evaluation);
   self.reaction_current = false;
 
-  // An orthonormal basis of what supports leave free.
-  std::vector<bool> held(static_cast<std::size_t>(n), false);
-  Eigen::MatrixXd basis = Eigen::MatrixXd::Zero(n, n);
-  Eigen::Index count = 0;
-  for (const Constraint& c : model.constraints) {
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(c.free.topLeftCorner(c.size, c.size));
-    for (int i = 0; i < c.size; ++i) {
-      held[static_cast<std::size_t>(c.first + i)] = true;
-      if (axes.eigenvalues()(i) > 0.5) basis.col(count++).segment(c.first, c.size) = axes.eigenvectors().col(i);
-    }
+  const SparseMatrix basis = free_basis(model), back = basis.transpose();
+  const StrainParts parts(system, self.state);
+  const ElasticCoefficients whole = std::exchange(system.elastic, parts.without());
+  try {
+    system.evaluate(self.state.q, true, nullptr, evaluation);
+  } catch (...) {
+    system.elastic = whole;
+    throw;
   }
-  for (Eigen::Index i = 0; i < n; ++i)
-    if (!held[static_cast<std::size_t>(i)]) basis(i, count++) = 1.0;
+  system.elastic = whole;
 
   Linearisation out;
-  Eigen::MatrixXd product(n, count);
-  for (Eigen::Index i = 0; i < count; ++i)
-    system.assembler().solver().multiply({basis.col(i).data(), static_cast<std::size_t>(n)},
-                                         {product.col(i).data(), static_cast<std::size_t>(n)});
-  const auto B = basis.leftCols(count);
-  out.stiffness = B.transpose() * product;
-  VectorX column, times;
-  for (Eigen::Index i = 0; i < count; ++i) {
-    column = basis.col(i);
-    multiply(model, system.mass(), column, times);
-    product.col(i) = times;
-  }
-  out.mass = B.transpose() * product;
-  out.displacement.setZero(3 * model.node_count, count);
+  out.geometric = back * matrix_of(system.assembler()) * basis;
+  out.gradients = parts.gradients() * basis;
+  out.stiffnesses = parts.stiffnesses();
+  out.mass = back * matrix_of(model, system.mass()) * basis;
+  Entries moves;
+  Matrix3 axes = Matrix3::Identity();
+  if (model.planar()) axes << model.plane->first, model.plane->second, model.plane->normal;
   for (int node = 0; node < model.node_count; ++node)
-    for (Eigen::Index i = 0; i < count; ++i)
-      out.displacement.col(i).segment<3>(3 * node) = node_velocity(model, basis.col(i), node);
+    for (int i = 0; i < model.dimension; ++i)
+      for (int k = 0; k < 3; ++k) moves.emplace_back(3 * node + k, model.node_dof[at(node)] + i, axes(k, i));
+  out.displacement = assembled(3 * model.node_count, model.dof_count, moves) * basis;
   return out;
 }
 

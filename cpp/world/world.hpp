@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include <Eigen/SparseCore>
+
 #include "common/types.hpp"
 #include "integrators/options.hpp"
 #include "model/description.hpp"
@@ -43,6 +45,9 @@ struct Momentum {
 
 struct EquilibriumResult {
   bool stable = false;
+  /// Whether the stiffness says so by itself; else loads that turn with the rod make it unsymmetric, and where it
+  /// flutters is a matter of mass too.
+  bool decided = true;
   int iterations = 0;
   double residual = 0;  ///< greatest force out of balance [N]
 };
@@ -66,11 +71,18 @@ struct Plan {
   std::vector<std::string> notes;  ///< one line per thing that was skipped or decided, and why
 };
 
-/// Equations linearised about the present configuration, without what supports hold: mass x'' + stiffness x = 0.
+using SparseMatrix = Eigen::SparseMatrix<double>;
+
+/// Equations linearised about the present configuration, without what supports hold: mass x'' + stiffness x = 0. The
+/// stiffness is geometric + gradients^T diag(stiffnesses) gradients, kept apart since the sum rounds away slow motions:
+/// they bend N edges by 1 / N^2 of what a single node's motion would, so that its energy is some 1 / N^4 of the sum's
+/// entries.
 struct Linearisation {
-  Eigen::MatrixXd stiffness;  ///< free unknowns x free unknowns; at an equilibrium, its tangent stiffness
-  Eigen::MatrixXd mass;
-  Eigen::MatrixXd displacement;  ///< (3 nodes) x free unknowns: node displacements [m] of each unknown
+  SparseMatrix geometric;     ///< free unknowns x free unknowns: of forces in the rods, loads, contact
+  SparseMatrix gradients;     ///< strains x free unknowns: elongations [m], discrete curvatures and twists [-]
+  VectorX stiffnesses;        ///< per strain: [N/m], [N m]
+  SparseMatrix mass;          ///< free unknowns x free unknowns
+  SparseMatrix displacement;  ///< (3 nodes) x free unknowns: node displacements [m] of each unknown
 };
 
 /// Non-convergence below the smallest step. Becomes withe.ConvergenceError.

@@ -10,9 +10,11 @@ namespace {
 
 void register_results(py::module_& module) {
   py::class_<Linearisation>(module, "Linearisation", "Equations linearised about the present configuration.")
-      .def_readonly("stiffness", &Linearisation::stiffness)
-      .def_readonly("mass", &Linearisation::mass)
-      .def_readonly("displacement", &Linearisation::displacement);
+      .def_property_readonly("geometric", [](const Linearisation& self) { return self.geometric; })
+      .def_property_readonly("gradients", [](const Linearisation& self) { return self.gradients; })
+      .def_readonly("stiffnesses", &Linearisation::stiffnesses)
+      .def_property_readonly("mass", [](const Linearisation& self) { return self.mass; })
+      .def_property_readonly("displacement", [](const Linearisation& self) { return self.displacement; });
   py::class_<Energy>(module, "Energy", "Energies [J].")
       .def_readonly("kinetic", &Energy::kinetic)
       .def_readonly("stretch", &Energy::stretch)
@@ -46,6 +48,7 @@ void register_results(py::module_& module) {
       .def_readonly("numbers", &ContactTable::numbers);
   py::class_<EquilibriumResult>(module, "EquilibriumResult", "How an equilibrium was found.")
       .def_readonly("stable", &EquilibriumResult::stable)
+      .def_readonly("decided", &EquilibriumResult::decided)
       .def_readonly("iterations", &EquilibriumResult::iterations)
       .def_readonly("residual", &EquilibriumResult::residual);
   py::class_<Plan>(module, "Plan", "What build decided.")

@@ -14,8 +14,9 @@ from withe import perception, shapes, view
 from withe._core import __version__
 from withe.errors import CoarseMeshWarning, ConvergenceError
 from withe.handles import CustomForce, Drag, EdgeHandle, Fluid, Joint, Load, Mass, NodeHandle, Obstacle, Rod, Support
+from withe.linearisation import Linearisation
 from withe.materials import Circle, Material, Rectangle, Stiffness, Tube
-from withe.readouts import Energy, Equilibrium, Linearisation, Momentum, Plan, Reaction, RodEnergy, Statistics
+from withe.readouts import Energy, Equilibrium, Momentum, Plan, Reaction, RodEnergy, Statistics
 from withe.recording import Record
 from withe.running import run_many
 from withe.scene import Scene

@@ -6,6 +6,7 @@ from __future__ import annotations
 import collections.abc
 import numpy
 import numpy.typing
+import scipy.sparse
 import typing
 
 __all__: list[str] = [
@@ -377,11 +378,15 @@ class Linearisation:
     Equations linearised about the present configuration.
     """
     @property
-    def displacement(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]: ...
+    def displacement(self) -> scipy.sparse.csc_matrix: ...
     @property
-    def mass(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]: ...
+    def geometric(self) -> scipy.sparse.csc_matrix: ...
     @property
-    def stiffness(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]: ...
+    def gradients(self) -> scipy.sparse.csc_matrix: ...
+    @property
+    def mass(self) -> scipy.sparse.csc_matrix: ...
+    @property
+    def stiffnesses(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
 
 class Energy:
     """
@@ -464,6 +469,8 @@ class EquilibriumResult:
     """
     How an equilibrium was found.
     """
+    @property
+    def decided(self) -> bool: ...
     @property
     def iterations(self) -> int: ...
     @property

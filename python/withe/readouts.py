@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["Energy", "Equilibrium", "Linearisation", "Momentum", "Plan", "Reaction", "RodEnergy", "Statistics"]
+__all__ = ["Energy", "Equilibrium", "Momentum", "Plan", "Reaction", "RodEnergy", "Statistics"]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -101,7 +102,10 @@ class Equilibrium:
     Attributes
     ----------
     stable : bool
-        Whether every small motion would be pushed back.
+        Whether no small motion would grow.
+    stability : {"stable", "diverges", "flutters"}
+        Where one grows, whether steadily or swinging, which only loads that turn with the rod can make it do; see
+        `Linearisation.stability`. Friction counts as what it does to the stiffness.
     iterations : int
         Of Newton's method.
     residual : float [N]
@@ -109,6 +113,7 @@ class Equilibrium:
     """
 
     stable: bool
+    stability: Literal["stable", "diverges", "flutters"]
     iterations: int
     residual: float
 
@@ -141,61 +146,6 @@ class Statistics:
     solve_time: float
     fluid_time: float
     total_time: float
-
-
-@dataclass(frozen=True, eq=False)
-class Linearisation:
-    """Equations linearised about a configuration, mass x'' + stiffness x = 0, without what supports hold.
-
-    Attributes
-    ----------
-    stiffness : ndarray of shape (unknowns, unknowns)
-        Tangent stiffness: node positions [m] and angles [rad] against forces [N] and moments [N m].
-    mass : ndarray of shape (unknowns, unknowns)
-        Masses [kg] and moments of inertia [kg m^2]. Velocity varies linearly along an edge, so the matrix couples its
-        nodes; with integrator "verlet" half of each edge's mass sits at either node.
-    displacement : ndarray of shape (3 nodes, unknowns)
-        Displacement of every node [m] that goes with each unknown.
-    """
-
-    stiffness: FloatArray
-    mass: FloatArray
-    displacement: FloatArray
-
-    def _solve(self, count: int) -> tuple[FloatArray, FloatArray]:
-        from scipy.linalg import eigh
-
-        if not 1 <= count <= len(self.mass):
-            raise ValueError(f"count must be between 1 and {len(self.mass)}, got {count}")
-        scale = 1.0 / np.sqrt(np.diag(self.mass))
-        squares, shapes = eigh(
-            scale[:, None] * self.stiffness * scale, scale[:, None] * self.mass * scale, subset_by_index=[0, count - 1]
-        )
-        return squares, scale[:, None] * shapes
-
-    def frequencies(self, count: int = 6) -> FloatArray:
-        """Lowest natural frequencies, shape (count,) [Hz]; negative where the configuration is unstable.
-
-        Raises
-        ------
-        ValueError
-            `count` is not between 1 and the number of unknowns.
-        """
-        squares, _ = self._solve(count)
-        return np.asarray(np.sign(squares) * np.sqrt(np.abs(squares)) / (2.0 * np.pi))
-
-    def modes(self, count: int = 6) -> FloatArray:
-        """Node displacements of the lowest modes, greatest one scaled to 1, shape (count, nodes, 3).
-
-        Raises
-        ------
-        ValueError
-            `count` is not between 1 and the number of unknowns.
-        """
-        _, shapes = self._solve(count)
-        displaced = (self.displacement @ shapes).T.reshape(count, -1, 3)
-        greatest = np.linalg.norm(displaced, axis=2).max(axis=1)
-        return np.asarray(displaced / np.where(greatest > 0.0, greatest, 1.0)[:, None, None])
 
 
 @dataclass(frozen=True, eq=False)

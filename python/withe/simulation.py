@@ -20,9 +20,10 @@ from withe.directory import Directory
 from withe.errors import CoarseMeshWarning, ConvergenceError
 from withe.handles import NodeHandle, Obstacle, Rod, Support
 from withe.knots import link
+from withe.linearisation import Linearisation, Stability
 from withe.options import check_tolerances, engine_options
 from withe.parts import CustomForcePart, DragPart, FluidPart, LoadPart, MassPart, ObstaclePart, RodPart, SupportPart
-from withe.readouts import Energy, Equilibrium, Linearisation, Momentum, Plan, Reaction, RodEnergy, Statistics
+from withe.readouts import Energy, Equilibrium, Momentum, Plan, Reaction, RodEnergy, Statistics
 from withe.snapshots import Settings, Snapshot
 
 if TYPE_CHECKING:
@@ -146,7 +147,10 @@ class Simulation(Control):
         self._apply_functions(self._world.time, self._world.time)
         with self._convergence():
             found = self._world.equilibrium(None)
-        return Equilibrium(found.stable, found.iterations, found.residual)
+        stability: Stability = "stable" if found.stable else "diverges"
+        if not found.decided:
+            stability = self.linearise().stability
+        return Equilibrium(stability == "stable", stability, found.iterations, found.residual)
 
     def run(
         self,
@@ -426,8 +430,8 @@ class Simulation(Control):
         >>> print(f"{scene.build().linearise().frequencies(1)[0]:.2f} Hz")
         7.06 Hz
         """
-        linearised = self._world.linearise()
-        return Linearisation(linearised.stiffness, linearised.mass, linearised.displacement)
+        found = self._world.linearise()
+        return Linearisation(found.geometric, found.gradients, found.stiffnesses, found.mass, found.displacement)
 
     @property
     def statistics(self) -> Statistics:

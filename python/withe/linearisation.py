@@ -1,0 +1,310 @@
+"""Natural frequencies, modes and stability of the equations of motion linearised about a configuration.
+
+Slow motions bend N edges by 1 / N^2 of what the motion of a single node would, so their energy is 1 / N^4 of the
+entries of the stiffness matrix, which therefore rounds them away. Stiffness is kept as strains and their stiffnesses
+instead, K = Kg + G^T D G, and inverted with the forces D G x as unknowns of their own:
+
+    [Kg + s M, G^T; G, -D^-1] [x; f] = [b; 0],
+
+where no large number hides a small one [Hellinger and Reissner's principle; Golub and Van Loan: Matrix computations,
+2013, 4.4 on what such systems lose]. Eigenvalues nearest to -s are those of the inverse that are greatest, found in a
+block Krylov space that M-orthogonal vectors span [Saad: Numerical methods for large eigenvalue problems, 2011, ch. 6];
+blocks, since a round rod has every mode of bending twice, and a free one six at zero.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+__all__ = ["Linearisation"]
+
+FloatArray = npt.NDArray[np.float64]
+Stability = Literal["stable", "diverges", "flutters"]
+
+_BLOCK = 8
+_FULL = 8  # share of all modes, one in so many, from which on matrices are full
+_LOOK = 16  # slow modes among which stability is looked for
+_NEUTRAL = 1e-6  # of a frequency squared, what is none
+_RESIDUAL = 1e-9  # of an eigenvalue of the inverse
+
+
+@dataclass(frozen=True, eq=False)
+class Linearisation:
+    """Equations linearised about a configuration, mass x'' + stiffness x = 0, without what supports hold.
+
+    Drag and viscosity have no part in it. Loads that turn with the rod (follower forces, moments in space) make the
+    stiffness unsymmetric; then its frequencies may be complex, see `frequencies`.
+
+    Attributes
+    ----------
+    stiffness : ndarray of shape (unknowns, unknowns)
+        Tangent stiffness: node positions [m] and angles [rad] against forces [N] and moments [N m]. Made when asked
+        for; frequencies need no full matrix, and have digits that this one does not.
+    mass : ndarray of shape (unknowns, unknowns)
+        Masses [kg] and moments of inertia [kg m^2]. Velocity varies linearly along an edge, so the matrix couples its
+        nodes; with integrator "verlet" half of each edge's mass sits at either node.
+    displacement : ndarray of shape (3 nodes, unknowns)
+        Displacement of every node [m] that goes with each unknown.
+    """
+
+    _geometric: Any
+    _gradients: Any
+    _stiffnesses: FloatArray
+    _mass: Any
+    _displacement: Any
+
+    @property
+    def stiffness(self) -> FloatArray:
+        """See the class."""
+        return np.asarray(self._assembled.toarray())
+
+    @property
+    def mass(self) -> FloatArray:
+        """See the class."""
+        return np.asarray(self._mass.toarray())
+
+    @property
+    def displacement(self) -> FloatArray:
+        """See the class."""
+        return np.asarray(self._displacement.toarray())
+
+    def frequencies(self, count: int = 6) -> npt.NDArray[Any]:
+        """Lowest natural frequencies, shape (count,) [Hz].
+
+        Negative where the configuration diverges: such a mode grows with exp(2 pi |f| t). Complex where modes flutter,
+        in pairs f and its conjugate: they swing at the real part, and grow with exp(2 pi |imaginary part| t). Sorted
+        by the real part of the square, so that what diverges comes first.
+
+        Raises
+        ------
+        ValueError
+            `count` is not between 1 and the number of unknowns.
+        """
+        squares, _ = self._solve(count)
+        if np.iscomplexobj(squares):
+            roots = np.sqrt(squares)
+            roots = np.where((squares.imag == 0.0) & (squares.real < 0.0), -np.sqrt(np.abs(squares)), roots)
+            return np.asarray(roots / (2.0 * np.pi))
+        return np.asarray(np.sign(squares) * np.sqrt(np.abs(squares)) / (2.0 * np.pi))
+
+    def modes(self, count: int = 6) -> npt.NDArray[Any]:
+        """Node displacements of the lowest modes, greatest one scaled to 1, shape (count, nodes, 3).
+
+        Complex where modes flutter: nodes swing with different phases.
+
+        Raises
+        ------
+        ValueError
+            `count` is not between 1 and the number of unknowns.
+        """
+        _, shapes = self._solve(count)
+        displaced = (self._displacement @ shapes).T.reshape(count, -1, 3)
+        greatest = np.linalg.norm(displaced, axis=2).max(axis=1)
+        return np.asarray(displaced / np.where(greatest > 0.0, greatest, 1.0)[:, None, None])
+
+    @cached_property
+    def stability(self) -> Stability:
+        """Whether small motions stay small: "stable", or what the fastest that grows does.
+
+        "diverges" grows steadily, "flutters" swings and grows, which only loads that turn with the rod can do. Without
+        damping, which may make things better or worse [Ziegler 1952]. Neutral motions (of a rod that may spin about its
+        axis) do not count. Looked for among the lowest 16 modes.
+        """
+        if self._mass.shape[0] == 0:
+            return "stable"
+        squares, _ = self._solve(min(_LOOK, self._mass.shape[0]))
+        rates = np.sqrt(-squares.astype(complex))
+        growth = np.abs(rates.real)
+        neutral = np.abs(squares) <= _NEUTRAL * np.median(np.abs(squares))
+        growth = np.where(neutral, 0.0, growth)
+        if not growth.any():
+            return "stable"
+        return "flutters" if squares[np.argmax(growth)].imag != 0.0 else "diverges"
+
+    # Eigenvalues
+
+    @cached_property
+    def _assembled(self) -> Any:
+        return (self._geometric + self._gradients.T @ self._gradients.multiply(self._stiffnesses[:, None])).tocsc()
+
+    @cached_property
+    def _symmetric(self) -> bool:
+        difference = self._geometric - self._geometric.T
+        return bool(abs(difference).max() <= 1e-12 * max(abs(self._assembled).max(), 1e-300))
+
+    def _solve(self, count: int) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
+        """Squares of the lowest angular frequencies, and shapes as columns."""
+        size = self._mass.shape[0]
+        if not 1 <= count <= size:
+            raise ValueError(f"count must be between 1 and {size}, got {count}")
+        shift = self._shift()
+        if count > size // _FULL:
+            squares, shapes = self._full(shift)
+        else:
+            squares, shapes, _ = self._krylov(shift, count)
+        chosen = _lowest(squares, count, self._symmetric)
+        squares, shapes = squares[chosen], shapes[:, chosen]
+        if self._symmetric:
+            return self._rayleigh(shapes), shapes
+        # Two equal ones may come out as a pair by rounding: two real shapes span what theirs do.
+        real = np.abs(squares.imag) <= _NEUTRAL * np.abs(squares)
+        shapes = np.where(real, np.where(squares.imag < 0.0, shapes.imag, shapes.real), shapes)
+        squares = np.where(real, squares.real, squares)
+        return (squares.real, shapes.real) if real.all() else (squares, shapes)
+
+    def _rayleigh(self, shapes: FloatArray) -> FloatArray:
+        """Squares of frequencies from energies, which have the digits that an inverse has not got."""
+        strains = self._gradients @ shapes
+        twice = (shapes * (self._geometric @ shapes)).sum(axis=0) + self._stiffnesses @ strains**2
+        return np.asarray(twice / (shapes * (self._mass @ shapes)).sum(axis=0))
+
+    def _shift(self) -> float:
+        """A square of a frequency s near that of the slowest motion that is not neutral, and above any that diverges.
+
+        Within some powers of ten is near enough: what is neutral then is great in the inverse, and what is not has its
+        digits.
+        """
+        nodes = max(2, self._displacement.shape[0] // 3)
+        shift = float(np.median(np.abs(self._assembled.diagonal()) / self._mass.diagonal())) / nodes**4
+        for _ in range(40):
+            squares, _, _ = self._krylov(shift, 1, rounds=2)
+            moving = np.abs(squares[np.abs(squares) > _NEUTRAL * shift])
+            slowest = moving.min() if len(moving) else _NEUTRAL * shift
+            if 1e-7 * slowest < shift < 10.0 * slowest:
+                break
+            shift = 0.1 * slowest
+        while self._symmetric and self._falling(shift):
+            shift *= 4.0
+        return float(shift)
+
+    def _falling(self, shift: float) -> int:
+        """How many motions have a square below -shift: pivots that are negative [Sylvester's law of inertia]."""
+        from scipy.sparse import diags
+        from scipy.sparse.linalg import splu
+
+        scale = diags(1.0 / np.sqrt(np.abs(self._assembled.diagonal()) + shift * self._mass.diagonal()))
+        matrix = (scale @ (self._assembled + shift * self._mass) @ scale).tocsc()
+        factors = splu(matrix, "MMD_AT_PLUS_A", 0.0, options={"SymmetricMode": True, "Equil": False})
+        return int((factors.U.diagonal() < 0.0).sum())
+
+    def _inverse(self, shift: float) -> Callable[[FloatArray], FloatArray]:
+        """Answers b with (K + shift M)^-1 b; see the head of this file."""
+        from scipy.sparse import bmat, diags
+        from scipy.sparse.linalg import splu
+
+        size = self._mass.shape[0]
+        matrix = bmat(
+            [
+                [self._geometric + shift * self._mass, self._gradients.T],
+                [self._gradients, diags(-1.0 / self._stiffnesses)],
+            ],
+            format="csc",
+        )
+        factors = splu(matrix)
+
+        def solve(b: FloatArray) -> FloatArray:
+            right = np.zeros((matrix.shape[0], b.shape[1]))
+            right[:size] = b
+            x = factors.solve(right)
+            x += factors.solve(right - matrix @ x)
+            return np.asarray(x[:size])
+
+        return solve
+
+    def _krylov(
+        self, shift: float, count: int, rounds: int | None = None
+    ) -> tuple[npt.NDArray[Any], npt.NDArray[Any], FloatArray]:
+        """Squares nearest to -shift, shapes and residuals, from a Krylov space of (K + shift M)^-1 M.
+
+        Ends when `count` have converged, after some rounds, or where the space is whole.
+        """
+        size = self._mass.shape[0]
+        solve = self._inverse(shift)
+        start = np.random.default_rng(0).standard_normal((size, min(_BLOCK, size)))
+        block, _ = self._orthonormal(solve(self._mass @ start))
+        basis, images = block, self._mass @ block
+        projected = np.zeros((0, 0))
+        step = 0
+        while True:
+            step += 1
+            width = block.shape[1]
+            answer = solve(self._mass @ block)
+            column = images.T @ answer
+            answer -= basis @ column
+            again = images.T @ answer
+            answer -= basis @ again
+            column += again
+            grown = np.zeros((basis.shape[1], basis.shape[1]))
+            grown[: projected.shape[0], : projected.shape[1]] = projected
+            grown[:, -width:] = column
+            block, link = self._orthonormal(answer, scale=float(np.abs(column).max()))
+            if self._symmetric:
+                inverses, vectors = np.linalg.eigh(0.5 * (grown + grown.T))
+            else:
+                inverses, vectors = np.linalg.eig(grown)
+            residuals = np.linalg.norm(link @ vectors[-width:], axis=0)
+            order = np.argsort(-np.abs(inverses))
+            done = bool((residuals[order[: count + 1]] <= _RESIDUAL * np.abs(inverses[order[: count + 1]])).all())
+            whole = block.shape[1] == 0 or basis.shape[1] + block.shape[1] > size
+            if (done and len(order) > count) or whole or step == rounds:
+                kept = order[: max(count + 1, _BLOCK)]
+                return 1.0 / inverses[kept] - shift, basis @ vectors[:, kept], residuals[kept]
+            projected = np.zeros((basis.shape[1] + block.shape[1], basis.shape[1]))
+            projected[: basis.shape[1]] = grown
+            projected[basis.shape[1] :, -width:] = link
+            basis = np.hstack((basis, block))
+            images = np.hstack((images, self._mass @ block))
+
+    def _orthonormal(self, block: FloatArray, scale: float | None = None) -> tuple[FloatArray, FloatArray]:
+        """Q and R with block = Q R and Q^T M Q = 1, less what is rounding."""
+        squares, axes = np.linalg.eigh(block.T @ (self._mass @ block))
+        least = 1e-24 * squares.max() if scale is None else max(1e-24 * scale**2, 1e-24 * squares.max())
+        kept = squares > least
+        roots = np.sqrt(squares[kept])
+        axes = axes[:, kept]
+        first = block @ (axes / roots)
+        # Once more, since columns that nearly agree lose digits.
+        root = np.linalg.cholesky(first.T @ (self._mass @ first)).T if kept.any() else np.zeros((0, 0))
+        q = np.linalg.solve(root.T, first.T).T if kept.any() else first
+        return q, root @ (roots[:, None] * axes.T)
+
+    def _full(self, shift: float) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
+        """All of them: slow ones from the inverse, whose greatest eigenvalues they are, fast ones from the matrix."""
+        from scipy.linalg import eig, eigh
+
+        mass = self.mass
+        flexibility = self._inverse(shift)(np.eye(len(mass)))
+        scale = 1.0 / np.sqrt(np.diag(mass))[:, None]
+        stiffness, scaled = scale * self.stiffness * scale.T, scale * mass * scale.T
+        if self._symmetric:
+            root = np.linalg.cholesky(scaled)
+            inverses, vectors = np.linalg.eigh(root.T @ (flexibility / (scale * scale.T)) @ root)
+            slow, slow_shapes = 1.0 / inverses[::-1] - shift, scale * np.linalg.solve(root.T, vectors[:, ::-1])
+            fast, shapes = eigh(stiffness, scaled)
+        else:
+            inverses, vectors = np.linalg.eig(flexibility @ mass)
+            order = np.argsort(-np.abs(inverses))
+            slow, slow_shapes = 1.0 / inverses[order] - shift, vectors[:, order]
+            fast, shapes = eig(stiffness, scaled)
+            order = np.argsort(np.abs(fast + shift))
+            fast, shapes = fast[order], shapes[:, order].astype(complex)
+        shapes = scale * shapes
+        turn = int((np.abs(slow + shift) < np.sqrt(shift * np.abs(fast).max())).sum())
+        if not self._symmetric and 0 < turn < len(slow) and slow[turn - 1].imag > 0.0:
+            turn -= 1  # pairs stay together
+        fast[:turn] = slow[:turn]
+        shapes[:, :turn] = slow_shapes[:, :turn]
+        return fast, shapes
+
+
+def _lowest(squares: npt.NDArray[Any], count: int, symmetric: bool) -> npt.NDArray[np.intp]:
+    if symmetric:
+        return np.argsort(squares)[:count]
+    nearest = np.argsort(np.abs(squares), kind="stable")[:count]
+    return nearest[np.argsort(squares[nearest].real, kind="stable")]

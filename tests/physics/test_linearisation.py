@@ -1,0 +1,173 @@
+"""Frequencies, flutter and divergence of the linearised equations: slender, fine and free rods, turning loads."""
+
+import numpy as np
+import pytest
+from scipy.linalg import eig
+from scipy.special import jn_zeros
+
+import rods
+import theory
+import withe
+from convergence import assert_order
+
+STEEL = withe.Material(youngs_modulus=2e11, poisson_ratio=0.3, density=7850.0)
+
+
+def steel_rod(slenderness, nodes, direction=(1.0, 0.0, 0.0), held=True, planar=None):
+    """Angular frequencies of a rod over those of Euler's beam with wave number 1 / L: squares of its wave numbers."""
+    scene = rods.weightless()
+    radius = 1.0 / slenderness
+    end = np.array(direction) / np.linalg.norm(direction)
+    rod = scene.add_rod(start=(0, 0, 0), end=end, nodes=nodes, radius=radius, material=STEEL, normal=(0, 0, 1))
+    if held:
+        scene.clamp(rod.start)
+    unit = 0.5 * radius * np.sqrt(STEEL.youngs_modulus / STEEL.density)
+    return lambda count: scene.build(planar=planar).linearise().frequencies(count) * 2.0 * np.pi / unit
+
+
+@pytest.mark.parametrize("slenderness", [1e2, 1e4, 1e5])
+@pytest.mark.parametrize("direction", [(1.0, 0.0, 0.0), (1.0, 0.7, 0.0)])
+def test_slender_rods_have_the_frequencies_of_thick_ones(slenderness, direction):
+    roots = np.sqrt(steel_rod(slenderness, 201, direction, planar=True)(2))
+    np.testing.assert_allclose(roots, theory.CANTILEVER_ROOTS[:2], rtol=3e-7)
+
+
+def test_fine_rods_keep_their_digits():
+    """The energy of the first mode is 1e-14 of the entries of this stiffness matrix."""
+    np.testing.assert_allclose(steel_rod(1e3, 5001)(2), theory.CANTILEVER_ROOTS[0] ** 2, rtol=2e-7)
+
+
+@pytest.mark.parametrize("slenderness", [1e3, 1e5])
+def test_a_free_rod_has_six_motions_without_frequency_and_then_those_of_a_free_beam(slenderness):
+    found = steel_rod(slenderness, 201, (1.0, 0.7, 0.0), held=False, planar=False)(8)
+    # Coordinates round too: edges that are drawn askew pull by E A 1e-14, no little where E I / L^2 is E A 1e-11.
+    assert np.abs(found[:6]).max() < 1e-3 * found[6]
+    np.testing.assert_allclose(found[6:], 4.730040744862704**2, rtol=1e-7)
+
+
+def test_frequencies_and_modes_are_those_of_the_matrices():
+    scene = rods.weightless()
+    arm = rods.straight(scene, 12, stiffness=rods.stiffness(stretch=1e3, bend=(1.0, 2.0)), radius=0.1)
+    scene.clamp(arm.start)
+    found = scene.build(planar=False).linearise()
+    squares = np.sort(eig(found.stiffness, found.mass)[0].real)
+    np.testing.assert_allclose((2.0 * np.pi * found.frequencies(len(squares))) ** 2, squares, rtol=1e-7)
+    # A few come from a Krylov space.
+    np.testing.assert_allclose((2.0 * np.pi * found.frequencies(4)) ** 2, squares[:4], rtol=1e-9)
+    assert found.modes(4).shape == (4, 13, 3)
+    np.testing.assert_allclose(np.linalg.norm(found.modes(4), axis=2).max(axis=1), 1.0)
+
+
+def test_a_hanging_cable_swings_with_the_zeros_of_a_bessel_function():
+    length = 100.0
+    scene = withe.Scene()
+    cable = scene.add_rod(start=(0, 0, 0), end=(0, 0, -length), nodes=201, radius=5e-4, material=STEEL)
+    scene.pin(cable.start)
+    simulation = scene.build()
+    assert simulation.equilibrium().stability == "stable"
+    found = simulation.linearise().frequencies(7)[1::2]  # it may spin about itself, and swings both ways
+    np.testing.assert_allclose(found, jn_zeros(0, 3) / (4.0 * np.pi) * np.sqrt(9.81 / length), rtol=5e-4)
+
+
+@pytest.mark.parametrize("load", [6.0, 14.0])
+def test_a_hinged_column_swings_below_eulers_load_and_diverges_above(load):
+    """w^2 = pi^4 (1 - P / pi^2). At a hinge a follower force does as a dead one, which buckling would leave at once."""
+    scene = rods.weightless()
+    column = rods.straight(scene, 80, stiffness=rods.stiffness(stretch=1e9), normal=(0, 0, 1))
+    scene.pin(column.start)
+    scene.pin(column.end, free=(1, 0, 0))
+    scene.add_force(column.end, (-load, 0.0, 0.0), follower=True)
+    simulation = scene.build(planar=True, integrator="static")
+    found = simulation.equilibrium()
+    square = np.pi**4 * (1.0 - load / np.pi**2)
+    assert found.stability == ("stable" if square > 0.0 else "diverges")
+    assert found.stable == (square > 0.0)
+    frequency = 2.0 * np.pi * simulation.linearise().frequencies(1)[0]
+    assert frequency == pytest.approx(np.sign(square) * np.sqrt(abs(square)), rel=2e-3)
+
+
+def becks_column(load, nodes, planar=True, mass=0.0):
+    scene = rods.weightless()
+    column = rods.straight(scene, nodes - 1, stiffness=rods.stiffness(stretch=1e9), normal=(0, 0, 1))
+    scene.clamp(column.start)
+    scene.add_force(column.end, (-load, 0.0, 0.0), follower=True)
+    if mass:
+        scene.add_mass(column.end, mass)
+    simulation = scene.build(planar=planar, integrator="static")
+    return simulation.equilibrium(), simulation.linearise()
+
+
+def onset(says, low, high):
+    """Where what `says` finds stops being stable."""
+    for _ in range(16):
+        middle = 0.5 * (low + high)
+        if says(middle) == "stable":
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+def test_becks_column_flutters_from_twenty_on():
+    """[Beck 1952]: P L^2 / B = 20.0510."""
+    errors = [onset(lambda p, n=n: becks_column(p, n)[0].stability, 15.0, 25.0) / 20.0510 - 1.0 for n in (11, 21, 41)]
+    assert_order(np.array(errors), order=2.0, slack=0.2)
+    assert abs(errors[-1]) < 1.5e-3
+
+
+@pytest.mark.parametrize("planar", [True, False])
+def test_becks_column_swings_below_and_grows_above_as_its_matrices_say(planar):
+    found, linear = becks_column(10.0, 41, planar)
+    assert found.stable
+    assert np.isrealobj(linear.frequencies(4))
+    found, linear = becks_column(25.0, 41, planar)
+    assert not found.stable
+    assert found.stability == "flutters"
+    assert np.abs(2.0 * np.pi * linear.frequencies(4).imag).max() == pytest.approx(4.918, rel=4e-3)
+    assert np.iscomplexobj(linear.modes(2))
+    np.testing.assert_allclose(np.linalg.norm(linear.modes(2), axis=2).max(axis=1), 1.0)
+
+
+def test_modes_that_flutter_solve_the_equations_of_motion():
+    _, linear = becks_column(25.0, 21)
+    squares = (2.0 * np.pi * linear.frequencies(2)) ** 2
+    # In a plane every unknown moves a node.
+    moves = np.linalg.pinv(linear.displacement) @ linear.modes(2).reshape(2, -1).T
+    flexible = np.linalg.solve(linear.stiffness, linear.mass @ moves) * squares
+    np.testing.assert_allclose(flexible, moves, atol=1e-5)
+
+
+def test_a_mass_at_the_tip_makes_becks_column_flutter_earlier():
+    """[Pflueger 1955]: with a mass as great as the column's the load falls to about 16.2."""
+    assert onset(lambda p: becks_column(p, 41, mass=1.0)[0].stability, 10.0, 25.0) == pytest.approx(16.21, rel=3e-3)
+
+
+def twisted_shaft(moment, nodes, ends="hinged"):
+    scene = rods.weightless()
+    shaft = rods.straight(scene, nodes - 1, stiffness=rods.stiffness(stretch=1e6))
+    if ends == "hinged":
+        scene.pin(shaft.start)
+        scene.pin(shaft.end, free=(1, 0, 0))
+        scene.add_moment(shaft.start, (-moment, 0.0, 0.0))
+    else:
+        scene.clamp(shaft.start)
+    scene.add_moment(shaft.end, (moment, 0.0, 0.0))
+    simulation = scene.build(integrator="static")
+    return simulation.equilibrium(), simulation.linearise()
+
+
+def test_a_hinged_shaft_diverges_at_two_pi_of_moment():
+    """[Greenhill 1883]: M L / B = 2 pi."""
+    found = [onset(lambda m, n=n: twisted_shaft(m, n)[0].stability, 5.0, 7.0) for n in (21, 41, 81)]
+    assert_order(np.array(found) / (2.0 * np.pi) - 1.0, order=2.0, slack=0.15)
+    assert twisted_shaft(7.0, 21)[0].stability == "diverges"
+
+
+def test_a_moment_on_the_free_end_of_a_shaft_makes_it_flutter_however_small():
+    """[Ziegler 1952]: such a shaft has no other equilibrium at any moment, and is not stable at any."""
+    growth = []
+    for moment in (0.02, 0.1, 0.5):
+        found, linear = twisted_shaft(moment, 21, "free")
+        assert found.stability == "flutters"
+        growth.append(np.abs(linear.frequencies(4).imag).max() / moment)
+    np.testing.assert_allclose(growth, growth[0], rtol=0.05)
