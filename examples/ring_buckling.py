@@ -13,18 +13,23 @@ import argparse
 from pathlib import Path
 
 import numpy as np
+from scipy.optimize import brentq
 
 import withe
 
 RADIUS = 0.1  # of the ring [m]
 BENDING, TWISTING = 2.0e-3, 1.6e-3  # [N m^2]
-CRITICAL = 2.0 * np.pi * np.sqrt(3.0) * BENDING / TWISTING  # [rad]
 
 
-def build(nodes: int, integrator: str = "static") -> tuple[withe.Simulation, withe.Rod]:
+def michell(twisting: float) -> float:
+    """The critical total twist of a ring of that twisting stiffness [rad]."""
+    return float(2.0 * np.pi * np.sqrt(3.0) * BENDING / twisting)
+
+
+def build(nodes: int, integrator: str = "static", twisting: float = TWISTING) -> tuple[withe.Simulation, withe.Rod]:
     """A ring closed without twist. Holding one node takes away its rigid motions and nothing else."""
     scene = withe.Scene(gravity=(0.0, 0.0, 0.0))
-    stiffness = withe.Stiffness(stretch=500.0, bend=(BENDING, BENDING), twist=TWISTING)
+    stiffness = withe.Stiffness(stretch=500.0, bend=(BENDING, BENDING), twist=twisting)
     ring = scene.add_rod(
         points=withe.shapes.circle(RADIUS, nodes),
         closed=True,
@@ -40,24 +45,22 @@ def build(nodes: int, integrator: str = "static") -> tuple[withe.Simulation, wit
     return scene.build(integrator=integrator, time_step=0.01, planar=False), ring
 
 
-def is_flat(simulation: withe.Simulation, ring: withe.Rod) -> bool:
-    """A flat ring cannot change its twist: what it loses goes into writhe, the coiling of its centreline in space."""
-    return abs(simulation.twists(ring).mean()) * 2.0 * np.pi * RADIUS < 0.05
+def critical_twist(nodes: int, twisting: float = TWISTING) -> float:
+    """Total twist at which the flat ring stops being stable [rad]: where its lowest frequency passes zero.
 
+    A flat ring is in equilibrium at any twist. A ring of a round, straight rod may also turn inside out about any of
+    its tangents without an effort; holding the node opposite to the clamp in the plane takes that motion away.
+    """
+    simulation, ring = build(nodes, twisting=twisting)
+    simulation.pin(ring.node(nodes // 2), free=[(1.0, 0.0, 0.0), (0.0, 1.0, 0.0)])
 
-def critical_twist(nodes: int, tolerance: float = 1e-3) -> float:
-    """Total twist at which the flat ring stops being stable [rad], by bisection."""
-    low, high = 0.8 * CRITICAL, 1.2 * CRITICAL
-    while high - low > tolerance * CRITICAL:
-        middle = 0.5 * (low + high)
-        simulation, ring = build(nodes)
-        simulation.set_natural_twist(ring, middle / (2.0 * np.pi * RADIUS))
-        simulation.equilibrium()
-        if is_flat(simulation, ring):
-            low = middle
-        else:
-            high = middle
-    return 0.5 * (low + high)
+    def square(twist: float) -> float:
+        simulation.set_natural_twist(ring, twist / (2.0 * np.pi * RADIUS))
+        lowest = simulation.linearise().frequencies(1)[0]  # negative where it grows
+        return float(lowest * abs(lowest))
+
+    critical = michell(twisting)
+    return float(brentq(square, 0.8 * critical, 1.2 * critical, rtol=1e-6))
 
 
 def main() -> None:
@@ -68,11 +71,13 @@ def main() -> None:
     arguments = parser.parse_args()
     arguments.out.mkdir(parents=True, exist_ok=True)
 
-    measured = critical_twist(arguments.nodes)
-    print(f"critical twist   {measured:.3f} rad; Michell {CRITICAL:.3f} rad ({100 * (measured / CRITICAL - 1):+.2f} %)")
+    for ratio in (TWISTING / BENDING, 1.0, 2.0, 3.0):
+        expected, measured = michell(ratio * BENDING), critical_twist(arguments.nodes, ratio * BENDING)
+        share = 100.0 * (measured / expected - 1.0)
+        print(f"C/B = {ratio:3.1f}: critical twist {measured:6.3f} rad; Michell {expected:6.3f} rad ({share:+.3f} %)")
 
     simulation, ring = build(arguments.nodes, "backward_euler")
-    simulation.set_natural_twist(ring, 1.1 * CRITICAL / (2.0 * np.pi * RADIUS), over=1.0)
+    simulation.set_natural_twist(ring, 1.1 * michell(TWISTING) / (2.0 * np.pi * RADIUS), over=1.0)
     record = simulation.run(
         duration=3.0,
         record_every=0.01,
