@@ -104,6 +104,8 @@ World::Implementation::Implementation(const Implementation& other)
       load_work(other.load_work),
       alarm(other.alarm),
       warning(other.warning),
+      step_watch(other.step_watch),
+      step_warning(other.step_warning),
       reaction_residual(other.reaction_residual),
       reaction_current(other.reaction_current) {
   listen();
@@ -408,6 +410,7 @@ void World::Implementation::make_plan() {
   if (!parameters.viscous) notes.push_back("no viscosity: its terms are left out");
   if (description.loads.empty()) notes.push_back("no loads but gravity");
   add_contact_notes();
+  add_step_notes();
   notes.push_back("kernels: " + std::string(name_of(instruction_set())) +
                   (instruction_set() == InstructionSet::baseline ? ", 2 numbers at once" : ", 4 numbers at once"));
 }

@@ -74,6 +74,16 @@ struct ContactGuard {
   double put_in = 0;  ///< in the last step, by surfaces that press [J]
 };
 
+/// Sums over a few steps in a row, of squares of velocities weighed by mass; see step_length.cpp.
+struct StepWatch {
+  double change = 0;    ///< by how much they change within a step [J]
+  double motion = 0;    ///< what that is compared with [J]
+  double greatest = 0;  ///< of such sums so far [J]
+  // Under backward Euler:
+  double pull = 0, moved = 0;  ///< by how much forces change with the motion, over the step; the motion [J]
+  VectorX acceleration;        ///< in the step before
+};
+
 /// What a step that is taken back returns to.
 struct StepStart {
   State state;
@@ -138,6 +148,8 @@ struct World::Implementation {
   std::optional<Energy> alarm;  ///< energies at the start, for the explicit scheme's alarm
   /// Of a mesh too coarse for the motion, and empty once it was heard; none yet where there was no reason.
   std::optional<std::string> warning;
+  StepWatch step_watch;
+  std::optional<std::string> step_warning;  ///< likewise, of steps too long for the motion
   NewtonResult last_newton;
   VectorX reaction_residual;  ///< full residual of the last solve
   bool reaction_current = false;
@@ -217,6 +229,11 @@ struct World::Implementation {
   /// `hint`: what to try, where the caller knows better than `what_to_try`.
   [[noreturn]] void fail(const NewtonResult& newton, double dt, const std::string& what,
                          const std::string& hint = "") const;
+
+  // step_length.cpp
+  void watch_step(double dt, const Equations& system);
+  std::string unresolved_in_time(double dt) const;
+  void add_step_notes();
 
   // equilibrium.cpp
   EquilibriumResult equilibrium(double dt);

@@ -174,6 +174,7 @@ World::Implementation::Attempt World::Implementation::try_step(double dt) {
     guard.rescue = 256;
     return Attempt::rescued;
   }
+  watch_step(dt, equations_of_step());
   commit_step();
   if (!options.tolerance) return Attempt::easy;
   // An oscillation has no error twice a period: what counts is the greatest of the last steps, were they longer.

@@ -171,7 +171,8 @@ class World {
   /// edges meet there. All rods together have what the scene has, but for loads, contact and the energy balance.
   Energy rod_energy(int rod) const;
   Momentum momentum() const;
-  std::string take_warning();  ///< what has not been heard yet of a mesh too coarse for the motion; or nothing
+  std::string take_warning();       ///< what has not been heard yet of a mesh too coarse for the motion; or nothing
+  std::string take_step_warning();  ///< likewise, of steps too long for it
   ContactTable contacts() const;
   Linearisation linearise() const;
 

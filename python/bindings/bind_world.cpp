@@ -220,6 +220,7 @@ void define_readouts(WorldClass& world) {
   world.def("twists", [](const GuardedWorld& self, int rod) { return self.reading().twists(rod); }, py::arg("rod"));
   world.def("tensions", [](const GuardedWorld& self, int rod) { return self.reading().tensions(rod); }, py::arg("rod"));
   world.def("spins", [](const GuardedWorld& self, int rod) { return self.reading().spins(rod); }, py::arg("rod"));
+  world.def("take_step_warning", [](GuardedWorld& self) { return self.changing().take_step_warning(); });
   world.def("take_warning", [](GuardedWorld& self) { return self.changing().take_warning(); });
   world.def("energy", [](const GuardedWorld& self) { return self.reading().energy(); });
   world.def(

@@ -12,7 +12,7 @@ by rounding, so set it to "baseline" everywhere to find the same bits on unlike 
 
 from withe import perception, shapes, view
 from withe._core import __version__
-from withe.errors import CoarseMeshWarning, ConvergenceError
+from withe.errors import CoarseMeshWarning, CoarseStepWarning, ConvergenceError
 from withe.handles import CustomForce, Drag, EdgeHandle, Fluid, Joint, Load, Mass, NodeHandle, Obstacle, Rod, Support
 from withe.linearisation import Linearisation
 from withe.materials import Circle, Material, Rectangle, Stiffness, Tube
@@ -26,6 +26,7 @@ from withe.snapshots import Snapshot
 __all__ = [
     "Circle",
     "CoarseMeshWarning",
+    "CoarseStepWarning",
     "ConvergenceError",
     "CustomForce",
     "Drag",

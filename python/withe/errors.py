@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-__all__ = ["CoarseMeshWarning", "ConvergenceError"]
+__all__ = ["CoarseMeshWarning", "CoarseStepWarning", "ConvergenceError"]
 
 
 class CoarseMeshWarning(UserWarning):
@@ -12,6 +12,16 @@ class CoarseMeshWarning(UserWarning):
     may turn as a motor does; and where a rod is bent, in whatever way it came, but for whole turns: a stencil that
     twists by tau bends with cos^2(tau / 2) of its stiffness.
     Given once a simulation, at an equilibrium or within 64 steps.
+    """
+
+
+class CoarseStepWarning(UserWarning):
+    """Time steps are too long for what moves: much of its energy swings with w dt > 1, w the angular frequency.
+
+    Such vibrations are not resolved: midpoint steps give them other frequencies, and backward Euler damps them within a
+    step or two. Says which step would do. Stiff vibrations that carry no energy do not count, nor what touches.
+
+    Given once a simulation, within 64 steps.
     """
 
 

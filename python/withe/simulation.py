@@ -17,7 +17,7 @@ from withe.contacts import contact_table
 from withe.control import Control
 from withe.description import describe, parameters_of
 from withe.directory import Directory
-from withe.errors import CoarseMeshWarning, ConvergenceError
+from withe.errors import CoarseMeshWarning, CoarseStepWarning, ConvergenceError
 from withe.handles import NodeHandle, Obstacle, Rod, Support
 from withe.knots import link
 from withe.linearisation import Linearisation, Stability
@@ -255,6 +255,8 @@ class Simulation(Control):
         finally:
             if warning := self._world.take_warning():
                 warnings.warn(warning, CoarseMeshWarning, stacklevel=4)
+            if warning := self._world.take_step_warning():
+                warnings.warn(warning, CoarseStepWarning, stacklevel=4)
 
     # Read-outs
 

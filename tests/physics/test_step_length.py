@@ -1,0 +1,110 @@
+"""Steps that are too long for what moves are said so, once, with the step that would do; others are not."""
+
+import warnings
+
+import numpy as np
+import pytest
+
+import rods
+import withe
+
+STEEL = withe.Material(youngs_modulus=2e11, poisson_ratio=0.3, density=7850.0)
+SPEED = 0.5  # [m/s]
+
+
+def string(step, integrator="implicit_midpoint", mode=1):
+    """A string under tension that swings in one of its modes, and its frequency [Hz]."""
+    scene = rods.weightless()
+    wire = scene.add_rod(start=(0, 0, 0), end=(0.65, 0, 0), nodes=41, radius=2e-4, material=STEEL, normal=(0, 0, 1))
+    scene.pin(wire.start)
+    scene.pin(wire.end, free=(1, 0, 0))
+    scene.add_force(wire.end, (60.0, 0.0, 0.0))
+    simulation = scene.build(time_step=step, planar=True, integrator=integrator, adaptive=False)
+    simulation.equilibrium()
+    shape = simulation.linearise().modes(mode)[-1]
+    simulation.set_velocities(wire, SPEED * shape)
+    return simulation, simulation.linearise().frequencies(mode)[-1]
+
+
+def heard(simulation, steps=64):
+    """Warnings of steps, with the step that would do."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        simulation.step(steps)
+    found = [str(w.message) for w in caught if w.category is withe.CoarseStepWarning]
+    assert len(found) <= 1
+    return [(message, float(message.split("a time_step of ")[1].split(" s ")[0])) for message in found]
+
+
+@pytest.mark.parametrize("integrator", ["implicit_midpoint", "energy_momentum", "backward_euler"])
+@pytest.mark.parametrize("mode", [1, 3])
+def test_a_vibration_warns_where_a_step_turns_it_by_more_than_a_radian(integrator, mode):
+    _, frequency = string(1e-3, mode=mode)
+    radian = 1.0 / (2.0 * np.pi * frequency)
+    assert not heard(string(0.8 * radian, integrator, mode)[0])
+    for times in (1.25, 5.0, 50.0):
+        (found,) = heard(string(times * radian, integrator, mode)[0])
+        message, step = found
+        # The step that would do is that of half a radian, and does. Far too long midpoint steps see hardly more than
+        # that velocities turn round; then it may be shorter than it need be.
+        assert step < 0.55 * radian
+        if times < 10.0 or integrator == "backward_euler":
+            assert step > 0.45 * radian
+        assert ("damps" in message) == (integrator == "backward_euler")
+        assert not heard(string(step, integrator, mode)[0])
+
+
+def test_the_frequency_that_is_said_is_the_one_that_moves():
+    simulation, frequency = string(5e-3)
+    ((message, _),) = heard(simulation)
+    assert float(message.split("at about ")[1].split(" Hz")[0]) == pytest.approx(frequency, rel=0.05)
+
+
+def test_it_is_said_once():
+    simulation, _ = string(5e-3)
+    assert heard(simulation, 64)
+    assert not heard(simulation, 256)
+
+
+@pytest.mark.parametrize("integrator", ["implicit_midpoint", "energy_momentum", "backward_euler"])
+def test_slow_motions_of_stiff_rods_do_not_warn(integrator):
+    """An arm that falls and swings slowly has axial vibrations of w dt = 5,000, which carry no energy."""
+    scene = withe.Scene()
+    arm = rods.straight(scene, 30, stiffness=rods.stiffness(stretch=1e8, bend=5.0), radius=0.01)
+    scene.clamp(arm.start)
+    simulation = scene.build(time_step=0.02, integrator=integrator)
+    assert not heard(simulation, 600)
+
+
+def test_rest_does_not_warn():
+    scene = withe.Scene()
+    arm = rods.straight(scene, 30, stiffness=rods.stiffness(stretch=1e8, bend=20.0), radius=0.01)
+    scene.clamp(arm.start)
+    simulation = scene.build(time_step=1.0)
+    simulation.equilibrium()
+    assert not heard(simulation, 128)
+
+
+def test_a_rod_that_spins_freely_and_falls_does_not_warn():
+    scene = withe.Scene()
+    rod = rods.straight(scene, 20, stiffness=rods.stiffness(stretch=1e6, bend=10.0), radius=0.01)
+    simulation = scene.build(time_step=5e-3, planar=True)
+    x = simulation.positions(rod)[:, 0] - 0.5
+    simulation.set_velocities(rod, np.stack([0.0 * x, 0.0 * x, 10.0 * x], axis=1))
+    assert not heard(simulation, 128)
+
+
+@pytest.mark.parametrize("step", [1e-3, 1e-5])
+def test_a_plan_says_which_vibrations_steps_resolve(step):
+    scene = rods.weightless()
+    arm = scene.add_rod(start=(0, 0, 0), end=(0.3, 0, 0), nodes=31, radius=1e-3, material=STEEL)
+    scene.clamp(arm.start)
+    simulation = scene.build(time_step=step, integrator="backward_euler")
+    first = simulation.linearise().frequencies(1)[0]
+    (note,) = [note for note in simulation.plan.notes if "resolve" in note]
+    assert float(note.split("from ")[1].split(" Hz")[0]) == pytest.approx(first, rel=5e-3)
+    # What a period of it loses, by stepping through one.
+    angle = 2.0 * np.pi * first * step
+    lost = 100.0 * (1.0 - abs(1.0 / (1.0 - 1j * angle)) ** (2.0 * np.pi / np.arctan(angle)))
+    assert float(note.split("damps by ")[1].split(" %")[0]) == pytest.approx(lost, rel=0.05)
+    assert "resolve" not in str(scene.build(integrator="static").plan)
