@@ -19,7 +19,9 @@ class CoarseStepWarning(UserWarning):
     """Time steps are too long for what moves: much of its energy swings with w dt > 1, w the angular frequency.
 
     Such vibrations are not resolved: midpoint steps give them other frequencies, and backward Euler damps them within a
-    step or two. Says which step would do. Stiff vibrations that carry no energy do not count, nor what touches.
+    step or two. Says which step would do. Resistance that stops motion within a step counts too under the midpoint
+    rules, whose velocities then turn round from step to step. Stiff vibrations that carry no energy do not count, nor
+    what touches.
 
     Given once a simulation, within 64 steps.
     """

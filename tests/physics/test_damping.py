@@ -62,6 +62,7 @@ def test_viscous_bar_creeps_to_its_length_in_its_viscous_time():
     assert simulation.positions(bar)[-1, 0] - 1.0 == pytest.approx(0.01 * (1.0 - np.exp(-1.0)), rel=5e-3)
 
 
+@pytest.mark.filterwarnings("ignore::withe.CoarseStepWarning")
 def test_material_viscosity_is_that_of_its_modulus():
     """viscosity / youngs_modulus is the time by which every stiffness is delayed."""
     scene = rods.weightless()

@@ -126,6 +126,7 @@ def soft_helix():
     return build()
 
 
+@pytest.mark.filterwarnings("ignore::withe.CoarseStepWarning")
 def test_soft_helix_takes_steps_of_60_ms_uncut_and_keeps_its_energy():
     """10 s from rest, where the published code gives up at 12 ms."""
     scene, _ = soft_helix()
