@@ -122,13 +122,12 @@ void World::Implementation::add_step_notes() {
   const int resolved =
       angle > 1.0 ? 0 : std::max(1, static_cast<int>(0.5 + std::sqrt(1.0 / (slowest * dt)) / std::numbers::pi));
   const double per_period = 1.0 - std::pow(1.0 + angle * angle, -std::numbers::pi / std::atan(angle));
-  plan.notes.push_back(
-      "steps of " + text(dt) + " s resolve what swings at less than " + text(0.5 / (std::numbers::pi * dt), 3) +
-      " Hz: of rod '" + description.rods[which].name + "' alone, clamped and free of stress, " +
-      (resolved == 0 ? std::string("no bending") : std::to_string(resolved) + " mode(s) of bending") + " from " +
-      text(first / (2.0 * std::numbers::pi), 3) + " Hz on" +
-      (euler ? ", the first of which backward Euler damps by " + text(100.0 * per_period, 2) + " % a period"
-             : std::string()));
+  plan.notes.push_back("steps of " + text(dt) + " s resolve less than " + text(0.5 / (std::numbers::pi * dt)) +
+                       " Hz: of rod '" + description.rods[which].name + "' alone, clamped and unstressed, " +
+                       std::to_string(resolved) + " mode(s) of bending, from " +
+                       text(first / (2.0 * std::numbers::pi)) + " Hz on");
+  if (euler)
+    plan.notes.push_back("backward Euler damps the first of these by " + text(100.0 * per_period, 2) + " % a period");
 }
 
 }  // namespace withe
