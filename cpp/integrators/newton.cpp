@@ -32,6 +32,9 @@ constexpr int kLongestDescent = 20;
 // While steps are longer than this, over the tolerance, surfaces may yet stick or slip, and an old matrix not know it.
 constexpr double kUnsettled = 1e4;
 
+// Corrections of a prediction must shrink by this factor, while they are longer than this share of the prediction.
+constexpr double kMostContraction = 0.5, kNear = 0.05;
+
 std::size_t at(MatrixAge age) { return static_cast<std::size_t>(age); }
 
 }  // namespace
@@ -83,9 +86,8 @@ double Newton::greatest(const std::vector<Block>& blocks, const VectorX& step) c
   return std::sqrt(square);
 }
 
-double Newton::cap(const VectorX& step) const {
-  const double move = greatest(nodes_, step), turn = greatest(angles_, step);
-  // An edge may turn by about half a radian at once.
+/// Greatest change of an edge vector over its length.
+double Newton::greatest_edge_turn(const VectorX& step) const {
   double edge_turn = 0.0;
   for (int e = 0; e < model_.edge_count; ++e) {
     const auto i = static_cast<std::size_t>(e);
@@ -95,7 +97,11 @@ double Newton::cap(const VectorX& step) const {
     for (int k = 0; k < model_.dimension; ++k) square += (step(b + k) - step(a + k)) * (step(b + k) - step(a + k));
     edge_turn = std::max(edge_turn, square / (model_.edge_length(e) * model_.edge_length(e)));
   }
-  edge_turn = std::sqrt(edge_turn);
+  return std::sqrt(edge_turn);
+}
+
+double Newton::cap(const VectorX& step) const {
+  const double move = greatest(nodes_, step), turn = greatest(angles_, step), edge_turn = greatest_edge_turn(step);
   double factor = 1.0;
   if (move > 0.5 * model_.length_scale) factor = 0.5 * model_.length_scale / move;
   if (turn * factor > 1.5) factor = 1.5 / turn;
@@ -103,12 +109,14 @@ double Newton::cap(const VectorX& step) const {
   return factor;
 }
 
+double Newton::turn(const VectorX& step) const {
+  return std::max(greatest_edge_turn(step), 0.5 * greatest(angles_, step));
+}
+
 double Newton::displacement(const VectorX& step) const {
   return std::max(greatest(nodes_, step), edge_scale_ * greatest(angles_, step));
 }
 
-/// Of the matrix as it is; a free mode (a rod that may spin about its axis) is held by a shift far below every
-/// stiffness.
 bool Newton::factorize(Equations& equations, NewtonWorkspace& work) const {
   const Timer timer(work.counters.solve_time);
   LinearSolver& solver = equations.assembler().solver();
@@ -150,6 +158,12 @@ struct Newton::Progress {
   Search search;
 };
 
+/// Whether corrections of a prediction are too long, or do not shrink, for what they lead to to lie on the same path.
+bool Newton::loses_path(const Prediction& predicted, const Progress& p, bool first) {
+  if (p.step <= std::max(kNear * predicted.length, kUnsettled * p.tolerance)) return false;
+  return first ? !(p.step <= predicted.length) : !(p.step <= kMostContraction * p.last_step);
+}
+
 /// After an iteration: learns how well matrices serve, and decides about the next one.
 void Newton::plan_next(Progress& p, FactorRecord& factor) const {
   const double tolerance = p.tolerance;
@@ -171,7 +185,8 @@ void Newton::plan_next(Progress& p, FactorRecord& factor) const {
 }
 
 NewtonResult Newton::solve(Equations& equations, VectorX& z, const VectorX* target, int max_iterations,
-                           NewtonWorkspace& work, bool mixed, double interval, bool impatient) const {
+                           NewtonWorkspace& work, bool mixed, double interval, bool impatient,
+                           const Prediction* predicted) const {
   mixed = mixed && options_.mixed;
   NewtonResult result;
   Evaluation& e = work.evaluation;
@@ -191,7 +206,7 @@ NewtonResult Newton::solve(Equations& equations, VectorX& z, const VectorX* targ
   // What served badly once is tried again in time.
   factor.contraction[at(MatrixAge::within)] *= kForgetting;
   if (!p.may_reuse) factor.owner = nullptr;
-  bool axial_known = mixed && interval != 0.0;
+  bool axial_known = mixed && (interval != 0.0 || predicted);
   int stagnant = 0, overdue = 0;
   double first_residual = 0.0;
   const auto end = [&] {
@@ -276,6 +291,7 @@ NewtonResult Newton::solve(Equations& equations, VectorX& z, const VectorX* targ
     p.last_step = p.step;
     p.last_age = p.age;
     p.step = shorten < 1.0 ? INFINITY : displacement(work.step);
+    if (predicted && predicted->strict && loses_path(*predicted, p, result.iterations == 0)) return give_up();
     p.age = p.fresh ? MatrixAge::fresh : p.made_here ? MatrixAge::within : MatrixAge::across;
     stagnant = balance.either && p.step > 0.25 * p.last_step ? stagnant + 1 : 0;
     plan_next(p, factor);

@@ -70,6 +70,14 @@ struct NewtonWorkspace {
   std::function<void()> poll = [] {};  ///< asked once an iteration; what it throws ends the solve
 };
 
+/// A solution foreseen from another one on the same path, with its axial forces in work.axial_force. A guess that is near
+/// enough is drawn in fast: where the first correction is longer than the prediction, or the corrections do not halve,
+/// the path is lost, or another one not far [Deuflhard 2011, section 5.1].
+struct Prediction {
+  double length = 0;   ///< greatest displacement from the known solution [m]
+  bool strict = true;  ///< whether to give up where the path may be lost
+};
+
 class Newton {
  public:
   Newton(const Model& model, const Options& options);
@@ -77,22 +85,30 @@ class Newton {
   /// Finds z with F(z) = target (nothing: zero), starting at z. `mixed`: with the axial forces as unknowns of
   /// their own, where the options allow it. `interval`: of a time step, whose matrix may serve several iterations and
   /// the steps to come, as long as it makes steps small fast (0: a new one every iteration); the mixed method then sets
-  /// out from work.axial_force. `impatient`: gives up where the first step is `cut`.
+  /// out from work.axial_force. `impatient`: gives up where the first step is `cut`. `predicted`: how z was found, if it
+  /// was from another solution.
   NewtonResult solve(Equations& equations, VectorX& z, const VectorX* target, int max_iterations, NewtonWorkspace& work,
-                     bool mixed = true, double interval = 0.0, bool impatient = false) const;
+                     bool mixed = true, double interval = 0.0, bool impatient = false,
+                     const Prediction* predicted = nullptr) const;
   /// Whether residuals are small enough; also notes the worst one in `result`.
   Balance balance(const Evaluation& evaluation, NewtonResult& result) const;
   /// Factor by which a step is shortened, so that nothing moves or turns too far at once.
   double cap(const VectorX& step) const;
   double displacement(const VectorX& step) const;
+  /// Greatest turn of an edge against its length [rad], or half the greatest rotation about a tangent or of a frame.
+  double turn(const VectorX& step) const;
+  /// Of the matrix as it is; a free mode (a rod that may spin about its axis) is held by a shift far below every
+  /// stiffness.
+  bool factorize(Equations& equations, NewtonWorkspace& work) const;
   /// Whether `cap` surely leaves a step alone in which no node moves, and nothing turns, by more than `most`.
   bool leaves_alone(double most) const { return most <= 0.5 * std::min({edge_scale_, model_.length_scale, 3.0}); }
 
   const std::vector<bool>& is_angle() const { return is_angle_; }
 
  private:
-  bool factorize(Equations& equations, NewtonWorkspace& work) const;
+  double greatest_edge_turn(const VectorX& step) const;
   struct Progress;
+  static bool loses_path(const Prediction& predicted, const Progress& progress, bool first);
   void plan_next(Progress& progress, FactorRecord& factor) const;
   double tolerance(const NewtonWorkspace& work) const {
     return std::min(options_.step_tolerance * model_.length_scale, work.finest);

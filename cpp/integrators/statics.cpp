@@ -18,41 +18,61 @@ bool turned_too_far(const State& state, const Configuration& c, bool planar) {
   return false;
 }
 
+// Edges turn by no more than this between two points of a path, by the linear solution [rad].
+constexpr double kFarthestTurn = 0.5;
+// What has to be cut below this share of that leads to no point of the path: it has ended.
+constexpr double kShortest = 1.0 / 64.0;
+// Where no edge turns, the path ends after so many cuts.
+constexpr int kMostCuts = 6, kMostCutsOfFriction = 12;
+// Times that a path may end and be taken up again.
+constexpr int kMostJumps = 20;
+// Where a path has ended, the scene goes on from so many steps behind the last one that was tried.
+constexpr double kBeyond = 4.0;
+// A turn that is greater than this between two points of a path is a jump [rad].
+constexpr double kJump = 0.25 * kFarthestTurn;
+
 class Statics {
  public:
   Statics(Equations& equations, const Newton& newton, const Options& options, const Parameters& parameters,
-          State& state, NewtonWorkspace& work)
+          const Boundary& boundary, State& state, NewtonWorkspace& work)
       : equations_(equations),
         newton_(newton),
         options_(options),
         parameters_(parameters),
         state_(state),
-        work_(work) {}
+        work_(work),
+        full_loads_(equations.loads().values),
+        carried_(carried_share(boundary)),
+        path_(
+            equations, newton, parameters, boundary,
+            [this](double factor, std::vector<Vector3>& values) { scale_turning_loads(factor, values); }, state, work) {
+  }
 
-  StaticResult run(const Boundary& boundary) {
+  StaticResult run() {
     StaticResult result;
     const State start = state_;
-    result.converged = load_steps(boundary, start, result.newton);
+    result.converged = follow(result);
     if (!result.converged) {
+      result.branch_changed = true;
       state_ = start;
-      boundary(1.0, start, state_.q);
+      path_.go_to(1.0);
+      if (!path_.hold(1.0, state_.q)) return result;
       accept(state_.q);
-      result.converged = settle(result.newton) || (equations_.has_potential() && descend(1000, result.newton));
+      result.converged = settle(1.0, result.newton) || (equations_.has_potential() && descend(1000, result.newton));
     }
     if (!result.converged) return result;
-    result.stable = stable();
+    result.stable = stable(1.0);
     for (int tries = 0; tries < 4 && !result.stable && equations_.has_potential(); ++tries) {
-      leave_saddle(tries);
-      result.converged = settle(result.newton) || descend(1000, result.newton);
+      result.branch_changed = true;
+      leave_saddle(1.0, tries);
+      result.converged = settle(1.0, result.newton) || descend(1000, result.newton);
       if (!result.converged) return result;
-      result.stable = stable();
+      result.stable = stable(1.0);
     }
     return result;
   }
 
  private:
-  void begin() { equations_.begin(state_, parameters_, 0.0, false); }
-
   void accept(const VectorX& q) {
     if (Contact* contact = equations_.contact()) {
       contact->update(q);
@@ -63,72 +83,147 @@ class Statics {
     accept_configuration(equations_.model(), q, c, state_);
   }
 
-  /// Whether supports may move at once to where z has them without pushing centrelines through each other.
+  /// Moments and followers turn with the rod, so their dead imbalance would pull where they do not: they grow instead,
+  /// from the share of them that the start carries already.
+  void scale_turning_loads(double factor, std::vector<Vector3>& values) const {
+    const double share = carried_ + factor * (1.0 - carried_);
+    for (const LoadPiece& piece : equations_.loads().pieces)
+      if (piece.shape != LoadShape::dead_node)
+        values[static_cast<std::size_t>(piece.load)] = share * full_loads_[static_cast<std::size_t>(piece.load)];
+  }
+
+  /// By which share of them the start is least out of balance.
+  double carried_share(const Boundary& boundary) {
+    (void)boundary;
+    const std::vector<LoadPiece>& pieces = equations_.loads().pieces;
+    if (std::all_of(pieces.begin(), pieces.end(), [](const LoadPiece& p) { return p.shape == LoadShape::dead_node; }))
+      return 0.0;
+    carried_ = 0.0;
+    const auto out_of_balance = [&](double share) {
+      scale_turning_loads(share, equations_.loads().values);
+      equations_.begin(state_, parameters_, 0.0, false);
+      equations_.evaluate(state_.q, false, nullptr, work_.evaluation);
+      return work_.evaluation.residual;
+    };
+    const VectorX without = out_of_balance(0.0), change = out_of_balance(1.0) - without;
+    const double square = change.squaredNorm();
+    return square > 0.0 ? std::clamp(-without.dot(change) / square, 0.0, 1.0) : 0.0;
+  }
+
+  /// Follows the path from the present state to its end. False where not even a jump leads on.
+  bool follow(StaticResult& result) {
+    path_.start_out_of_balance();
+    NewtonResult& last = result.newton;
+    const int most_cuts = equations_.has_potential() ? kMostCuts : kMostCutsOfFriction;
+    double reached = 0.0, longest = 1.0;
+    bool was_stable = false;
+    for (int cuts = 0, jumps = 0; reached < 1.0;) {
+      if (cuts == 0) {
+        path_.go_to(reached);
+        path_.find_tangent(tangent_);
+        ++last.iterations;
+        if (reached > 0.0 && !firm()) {
+          // A branch that was stable and is so no more is left where that happens.
+          if (was_stable && equations_.has_potential() && !stable(reached)) {
+            result.branch_changed = true;
+            leave_saddle(reached, 0);
+            if (!settle(reached, last)) return false;
+            was_stable = false;
+            continue;
+          }
+        }
+        was_stable = firm();
+      }
+      const double by_turn = tangent_.found ? kFarthestTurn / tangent_.turn : 1.0;
+      const double increment = std::min({1.0 - reached, longest, by_turn});
+      const double next = increment == 1.0 - reached ? 1.0 : reached + increment;
+      if (reach(next, next - reached, last)) {
+        reached = next;
+        longest = cuts == 0 ? std::max(2.0 * longest, 2.0 * increment) : increment;
+        cuts = 0;
+        continue;
+      }
+      longest = increment * (cuts == 0 ? 0.25 : 0.5);
+      ++cuts;
+      if (cuts <= most_cuts && increment > kShortest * std::min(by_turn, 1.0)) continue;
+      if (++jumps > kMostJumps) return false;
+      const double beyond = std::min(1.0, reached + kBeyond * increment);
+      if (!jump(beyond, beyond - reached, result)) return false;
+      reached = beyond;
+      longest = kBeyond * increment;
+      cuts = 0;
+    }
+    last.converged = true;
+    return true;
+  }
+
+  bool firm() const { return tangent_.factorization.status == FactorStatus::ok && tangent_.factorization.negative_pivots == 0; }
+
+  /// The point of the path at the factor `next`, foreseen along the tangent.
+  bool reach(double next, double increment, NewtonResult& last) {
+    path_.go_to(next);
+    const bool touching = equations_.contact() && equations_.contact()->count() > 0;
+    Prediction prediction{.length = 0.0, .strict = !touching};
+    bool predicted = tangent_.found;
+    if (predicted) {
+      step_ = increment * tangent_.rate;
+      prediction.length = newton_.displacement(step_);
+      // Axial forces by the linear solution: those of the prediction are of edges that stretch as they turn.
+      equations_.evaluate(state_.q, false, nullptr, work_.evaluation);
+      equations_.predict_axial_force(step_, work_.axial_force);
+      z_ = state_.q + step_;
+      if (!path_.hold(next, z_)) return false;
+      predicted = clear_way(z_);
+    }
+    if (!predicted) {
+      z_ = state_.q;
+      if (!path_.hold(next, z_) || !clear_way(z_)) return false;
+    }
+    const NewtonResult r = newton_.solve(equations_, z_, &path_.target(), std::min(25, options_.max_iterations), work_,
+                                         true, 0.0, false, predicted ? &prediction : nullptr);
+    note(r, last);
+    last.step = r.step;
+    if (!r.converged || turned_too_far(state_, equations_.configuration(), equations_.model().planar())) return false;
+    accept(z_);
+    return true;
+  }
+
+  static void note(const NewtonResult& r, NewtonResult& last) {
+    last.iterations += r.iterations;
+    last.residual = r.residual;
+    last.worst_row = r.worst_row;
+  }
+
+  /// Whether the scene may go at once to z without pushing surfaces through each other.
   bool clear_way(const VectorX& z) {
     return !equations_.contact() || equations_.allowed(state_.q, z - state_.q) == 1.0;
   }
 
-  /// Moments and followers turn with the rod, so their dead imbalance would pull where they do not: they grow instead.
-  void scale_turning_loads(double fraction) {
-    Loads& loads = equations_.loads();
-    for (const LoadPiece& piece : loads.pieces)
-      if (piece.shape != LoadShape::dead_node)
-        loads.values[static_cast<std::size_t>(piece.load)] =
-            fraction * full_loads_[static_cast<std::size_t>(piece.load)];
-  }
-
-  bool load_steps(const Boundary& boundary, const State& start, NewtonResult& last) {
-    full_loads_ = equations_.loads().values;
-    const bool reached = load_steps_scaled(boundary, start, last);
-    equations_.loads().values = full_loads_;
-    return reached;
-  }
-
-  bool load_steps_scaled(const Boundary& boundary, const State& start, NewtonResult& last) {
-    VectorX imbalance, target, z;
-    double reached = 0.0, increment = 1.0;
-    const int patience = equations_.has_potential() ? 4 : 12;
-    for (int failures = 0; reached < 1.0;) {
-      const double next = std::min(1.0, reached + increment);
-      begin();
-      if (imbalance.size() == 0) {
-        // All at once first; on the way in steps, from what the start is out of balance by.
-        scale_turning_loads(0.0);
-        equations_.evaluate(state_.q, false, nullptr, work_.evaluation);
-        imbalance = work_.evaluation.residual;
-      }
-      scale_turning_loads(next);
-      z = state_.q;
-      boundary(next, start, z);
-      target = (1.0 - next) * imbalance;
-      equations_.assembler().project(target);
-      NewtonResult r;
-      if (clear_way(z)) r = newton_.solve(equations_, z, &target, std::min(25, options_.max_iterations), work_);
-      last.iterations += r.iterations;
-      last.residual = r.residual;
-      last.worst_row = r.worst_row;
-      last.step = r.step;
-      if (r.converged && !turned_too_far(state_, equations_.configuration(), equations_.model().planar())) {
-        accept(z);
-        reached = next;
-        failures = 0;
-        if (r.iterations <= 8) increment *= 2.0;
-      } else {
-        if (++failures > patience || increment < 1e-4) return false;
-        increment *= increment == 1.0 ? 0.2 : 0.5;
-      }
+  /// Where the path has ended: goes on dynamically, to what the scene settles in a little behind.
+  bool jump(double next, double increment, StaticResult& result) {
+    path_.go_to(next);
+    const VectorX before = state_.q;
+    z_ = state_.q;
+    if (tangent_.found) z_ += increment * tangent_.rate;
+    if (!path_.hold(next, z_)) return false;
+    if (!clear_way(z_)) {
+      z_ = state_.q;
+      if (!path_.hold(next, z_) || !clear_way(z_)) return false;
     }
-    last.converged = true;
+    accept(z_);
+    if (!settle(next, result.newton)) return false;
+    VectorX change = state_.q - before;
+    for (int dof : equations_.model().frame_dof) change.segment(dof, equations_.model().frame_size()).setZero();
+    if (newton_.turn(change) > kJump) result.branch_changed = true;
     return true;
   }
 
   /// Pseudo-transient: backward Euler from rest, over and over, with intervals that grow as the scene settles. Each
   /// one minimises the potential plus M |z - q|^2 / (2 h^2), so the potential falls; mixed Newton keeps slender
   /// rods from crawling. Where turning loads leave no potential, inertia still keeps each interval solvable.
-  bool settle(NewtonResult& last) {
+  bool settle(double factor, NewtonResult& last) {
     const Model& model = equations_.model();
-    begin();
-    equations_.evaluate(state_.q, true, nullptr, work_.evaluation);
+    evaluate(factor);
     double stiffness = 0.0;
     for (int i = 0; i < model.dof_count; ++i)
       stiffness = std::max(stiffness, equations_.assembler().diagonal(i) / std::max(equations_.mass().rows(i), 1e-300));
@@ -142,16 +237,15 @@ class Statics {
       const bool at_rest = h >= longest;
       equations_.begin(state_, parameters_, at_rest ? 0.0 : h, false);
       z = state_.q;
-      const NewtonResult r = newton_.solve(equations_, z, nullptr, at_rest ? 40 : 25, work_);
-      last.iterations += r.iterations;
-      last.residual = r.residual;
-      last.worst_row = r.worst_row;
-      const double rounding = 1e-10 * (std::abs(potential) + std::abs(work_.evaluation.potential)) + least_energy();
-      const bool falls = !equations_.has_potential() || work_.evaluation.potential <= potential + rounding;
+      const NewtonResult r = newton_.solve(equations_, z, &path_.target(), at_rest ? 40 : 25, work_);
+      note(r, last);
+      const double found = work_.evaluation.potential - path_.target().dot(z);
+      const double rounding = 1e-10 * (std::abs(potential) + std::abs(found)) + least_energy();
+      const bool falls = !equations_.has_potential() || found <= potential + rounding;
       if (r.converged && falls && !turned_too_far(state_, equations_.configuration(), model.planar())) {
         accept(z);
         if (at_rest) return true;
-        potential = work_.evaluation.potential;
+        potential = found;
         h *= r.iterations <= 4 ? 10.0 : r.iterations <= 8 ? 3.0 : 1.0;
       } else {
         h = std::min(h, longest) * 0.25;
@@ -164,13 +258,12 @@ class Statics {
   bool descend(int max_steps, NewtonResult& last) {
     const Model& model = equations_.model();
     VectorX shift, z, step, weight;
-    begin();
+    path_.go_to(1.0);
     weight = equations_.mass().rows;
     double damping = 0.0;
     for (int k = 0; k < max_steps; ++k) {
       work_.poll();
-      begin();
-      equations_.evaluate(state_.q, true, nullptr, work_.evaluation);
+      evaluate(1.0);
       const Evaluation here = work_.evaluation;
       const Balance balance = newton_.balance(here, last);
       if (damping == 0.0) {
@@ -193,8 +286,7 @@ class Statics {
           accept(z);
           return true;
         }
-        begin();
-        equations_.evaluate(state_.q, true, nullptr, work_.evaluation);
+        evaluate(1.0);
       }
       bool accepted = false;
       for (int tries = 0; tries < 40 && !accepted; ++tries) {
@@ -232,9 +324,15 @@ class Statics {
     return false;
   }
 
-  bool stable() {
-    begin();
-    equations_.evaluate(state_.q, true, nullptr, work_.evaluation);
+  /// At the present state, with loads and supports at a factor: what is left out of balance there, the matrix, and the
+  /// potential of the problem with it.
+  void evaluate(double factor) {
+    path_.go_to(factor);
+    path_.evaluate(state_.q, true, nullptr);
+  }
+
+  bool stable(double factor) {
+    evaluate(factor);
     ++work_.counters.factorizations;
     LinearSolver& solver = equations_.assembler().solver();
     const Factorization f = solver.factorize();
@@ -280,9 +378,8 @@ class Statics {
     return direction;
   }
 
-  void leave_saddle(int seed) {
-    begin();
-    equations_.evaluate(state_.q, true, nullptr, work_.evaluation);
+  void leave_saddle(double factor, int seed) {
+    evaluate(factor);
     VectorX direction = lowest_mode(seed);
     direction *= 1e-3 * equations_.model().length_scale / std::max(newton_.displacement(direction), 1e-300);
     direction *= newton_.cap(direction);
@@ -299,9 +396,13 @@ class Statics {
   State& state_;
   NewtonWorkspace& work_;
   double energy_scale_ = 0.0;  ///< greatest potential met [J]
+  double lowest_ = 0.0;
   Configuration scratch_;
   std::vector<Vector3> full_loads_;
-  double lowest_ = 0.0;
+  double carried_ = 0.0;  ///< share of turning loads that the start carries
+  Homotopy path_;
+  Homotopy::Tangent tangent_;
+  VectorX step_, z_;
 };
 
 }  // namespace
@@ -309,7 +410,10 @@ class Statics {
 StaticResult find_equilibrium(Equations& equations, const Newton& newton, const Options& options,
                               const Parameters& parameters, const Boundary& boundary, State& state,
                               NewtonWorkspace& work) {
-  return Statics(equations, newton, options, parameters, state, work).run(boundary);
+  const std::vector<Vector3> loads = equations.loads().values;
+  const StaticResult result = Statics(equations, newton, options, parameters, boundary, state, work).run();
+  equations.loads().values = loads;
+  return result;
 }
 
 }  // namespace withe

@@ -1,24 +1,21 @@
 #pragma once
-/// Static equilibrium from far away: load steps, then a descent that cannot fail to go down, then away
-/// from saddles.
+/// Static equilibrium: along the path of equilibria that leads on from the present one; where that ends, by a descent
+/// that cannot fail to go down; then away from saddles.
 
-#include <functional>
-
-#include "integrators/newton.hpp"
+#include "integrators/homotopy.hpp"
 
 namespace withe {
 
 struct StaticResult {
   bool converged = false;
   bool stable = false;
+  bool branch_changed = false;  ///< no path of equilibria without a jump or a saddle leads there
   NewtonResult newton;
 };
 
-/// Sets the held unknowns of q for a fraction of the way from the present supports to the wanted ones.
-using Boundary = std::function<void(double fraction, const State& start, VectorX& q)>;
-
-/// Brings `state` to equilibrium. Loads and natural shapes that are out of balance at the start are let in
-/// step by step: F(q) = (1 - fraction) F(start).
+/// Brings `state` to equilibrium, with supports where `boundary` has them at 1. Loads and natural shapes that are out
+/// of balance at the start, and the motion of supports, are let in as `Homotopy` has it, in steps in which no edge turns
+/// far.
 StaticResult find_equilibrium(Equations& equations, const Newton& newton, const Options& options,
                               const Parameters& parameters, const Boundary& boundary, State& state,
                               NewtonWorkspace& work);

@@ -29,6 +29,16 @@ Equations& World::Implementation::rescue() {
   return *rescue_equations;
 }
 
+namespace {
+
+/// A place between two of a support, or beyond.
+void put_between(const SupportMotion& from, const SupportMotion& to, double fraction, SupportMotion& out) {
+  out.position = from.position + fraction * (to.position - from.position);
+  out.rotation = rotation_exp(fraction * rotation_log(to.rotation * from.rotation.transpose())) * from.rotation;
+}
+
+}  // namespace
+
 /// Equilibrium after `dt` (0: at the present time, with supports and actuation as they are).
 EquilibriumResult World::Implementation::equilibrium(double dt) {
   const State before = state;
@@ -40,7 +50,6 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
     actuation_work += actuation_energy();
   }
   aim_supports(time);
-  const bool reachable = work.held.reachable;
   Equations& system = statics();
   update_custom_force(system);
   const auto undo = [&] {
@@ -51,18 +60,14 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
     apply_ramps(state.time);
     system.loads().values = load_values;
   };
-  const Boundary boundary = [&](double fraction, const State& start, VectorX& q) {
-    // Frames count from where they are now, so only what is left of the way is asked for.
-    (void)start;
-    const std::vector<SupportMotion> target = motions;
-    for (std::size_t s = 0; s < motions.size(); ++s) {
-      const SupportMotion &a = motions_before[s], &b = target[s];
-      motions[s].position = a.position + fraction * (b.position - a.position);
-      motions[s].rotation = rotation_exp(fraction * rotation_log(b.rotation * a.rotation.transpose())) * a.rotation;
-    }
+  std::vector<SupportMotion> from = motions_before;
+  const std::vector<SupportMotion> target = motions;
+  const Boundary boundary = [&](double fraction, VectorX& q) {
+    for (std::size_t s = 0; s < motions.size(); ++s) put_between(from[s], target[s], fraction, motions[s]);
     hold_now(work.held);
-    q += system.assembler().held_part(work.held.q - q);
+    system.assembler().add_held_change(q, work.held.q, 1.0, q);
     motions = target;
+    return work.held.reachable;
   };
   state.v.setZero();
   state.acceleration.setZero();
@@ -74,11 +79,14 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
   StaticResult r;
   try {
     aim_obstacles(system, time);
-    if (reachable) r = find_equilibrium(system, *newton, options, parameters, boundary, state, work.newton);
+    r = find_equilibrium(system, *newton, options, parameters, boundary, state, work.newton);
     // Contact that turns out too soft is made stiffer, from where it has settled.
+    from = target;
     for (int tries = 0; r.converged && system.contact() && system.contact()->depth() > kDeepest && tries < 8; ++tries) {
       system.contact()->stiffen(state);
+      const bool changed = r.branch_changed;
       r = find_equilibrium(system, *newton, options, parameters, boundary, state, work.newton);
+      r.branch_changed = r.branch_changed || changed;
     }
   } catch (...) {
     undo();
@@ -104,8 +112,10 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
   reaction_current = true;
   newton->balance(work.newton.evaluation, r.newton);
   check_resolution();
+  if (r.branch_changed) statistics.branch_changes += 1;
   const bool frictional = system.contact() && system.contact()->frictional();
-  return {r.stable, !system.loads().unsymmetric || frictional, r.newton.iterations, r.newton.residual};
+  return {r.stable, !system.loads().unsymmetric || frictional, r.branch_changed, r.newton.iterations,
+          r.newton.residual};
 }
 
 void World::Implementation::refresh_reactions() {

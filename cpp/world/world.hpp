@@ -29,6 +29,7 @@ struct Statistics {
   long iterations = 0;  ///< Newton iterations
   long factorizations = 0;
   double largest_turn = 0;  ///< of an edge in one step [rad]; plain midpoint loses energy balance above about 0.1
+  long branch_changes = 0;         ///< equilibria that were found on another branch
   long energy_momentum_steps = 0;  ///< taken in place of midpoint steps that gained energy
   double assembly_time = 0, solve_time = 0, fluid_time = 0, total_time = 0;  ///< [s]
 };
@@ -48,6 +49,7 @@ struct EquilibriumResult {
   /// Whether the stiffness says so by itself; else loads that turn with the rod make it unsymmetric, and where it
   /// flutters is a matter of mass too.
   bool decided = true;
+  bool branch_changed = false;  ///< a jump, or a saddle that was left, lies between the state before and this one
   int iterations = 0;
   double residual = 0;  ///< greatest force out of balance [N]
 };

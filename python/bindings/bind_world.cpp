@@ -35,6 +35,7 @@ void register_results(py::module_& module) {
       .def_readonly("iterations", &Statistics::iterations)
       .def_readonly("factorizations", &Statistics::factorizations)
       .def_readonly("largest_turn", &Statistics::largest_turn)
+      .def_readonly("branch_changes", &Statistics::branch_changes)
       .def_readonly("energy_momentum_steps", &Statistics::energy_momentum_steps)
       .def_readonly("assembly_time", &Statistics::assembly_time)
       .def_readonly("solve_time", &Statistics::solve_time)
@@ -49,6 +50,7 @@ void register_results(py::module_& module) {
   py::class_<EquilibriumResult>(module, "EquilibriumResult", "How an equilibrium was found.")
       .def_readonly("stable", &EquilibriumResult::stable)
       .def_readonly("decided", &EquilibriumResult::decided)
+      .def_readonly("branch_changed", &EquilibriumResult::branch_changed)
       .def_readonly("iterations", &EquilibriumResult::iterations)
       .def_readonly("residual", &EquilibriumResult::residual);
   py::class_<Plan>(module, "Plan", "What build decided.")

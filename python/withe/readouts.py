@@ -106,6 +106,10 @@ class Equilibrium:
     stability : {"stable", "diverges", "flutters"}
         Where one grows, whether steadily or swinging, which only loads that turn with the rod can make it do; see
         `Linearisation.stability`. Friction counts as what it does to the stiffness.
+    branch_changed : bool
+        Whether the equilibrium lies on another branch than the state before: the path of equilibria along which
+        supports move and loads change ended on the way (at a limit point), or lost its stability (at a bifurcation), and
+        the scene went on dynamically from there, losing energy, to what it settled in.
     iterations : int
         Of Newton's method.
     residual : float [N]
@@ -114,6 +118,7 @@ class Equilibrium:
 
     stable: bool
     stability: Literal["stable", "diverges", "flutters"]
+    branch_changed: bool
     iterations: int
     residual: float
 
@@ -130,6 +135,8 @@ class Statistics:
         Of Newton's method.
     largest_turn : float [rad]
         Greatest turn of an edge within one inner step.
+    branch_changes : int
+        Equilibria that lie on another branch than the state before; see `Equilibrium.branch_changed`.
     energy_momentum_steps : int
         Taken in place of implicit midpoint steps that gained energy (with `adaptive`).
     assembly_time, solve_time, fluid_time, total_time : float [s]
@@ -141,6 +148,7 @@ class Statistics:
     iterations: int
     factorizations: int
     largest_turn: float
+    branch_changes: int
     energy_momentum_steps: int
     assembly_time: float
     solve_time: float

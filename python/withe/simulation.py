@@ -150,7 +150,7 @@ class Simulation(Control):
         stability: Stability = "stable" if found.stable else "diverges"
         if not found.decided:
             stability = self.linearise().stability
-        return Equilibrium(stability == "stable", stability, found.iterations, found.residual)
+        return Equilibrium(stability == "stable", stability, found.branch_changed, found.iterations, found.residual)
 
     def run(
         self,

@@ -1,0 +1,71 @@
+#include "integrators/homotopy.hpp"
+
+#include <cmath>
+#include <span>
+
+namespace withe {
+namespace {
+
+// Edges turn by so much in the difference that stands for a derivative [rad]: what it leaves out and what rounding adds
+// are then both below a millionth.
+constexpr double kLittleTurn = 1e-6;
+
+}  // namespace
+
+void Homotopy::start_out_of_balance() {
+  imbalance_.setZero(state_.q.size());
+  go_to(0.0);
+  equations_.evaluate(state_.q, false, nullptr, work_.evaluation);
+  imbalance_ = work_.evaluation.residual;
+  go_to(0.0);
+}
+
+void Homotopy::go_to(double factor) {
+  factor_ = factor;
+  loads_(factor, equations_.loads().values);
+  equations_.begin(state_, parameters_, 0.0, false);
+  if (imbalance_.size() == 0) imbalance_.setZero(state_.q.size());
+  target_ = (1.0 - factor) * imbalance_;
+}
+
+void Homotopy::evaluate(const VectorX& z, bool with_matrix, const double* axial_force) {
+  equations_.evaluate(z, with_matrix, axial_force, work_.evaluation);
+  work_.evaluation.residual -= target_;
+  work_.evaluation.potential -= target_.dot(z);
+}
+
+void Homotopy::find_pull(const VectorX& z, VectorX& pull, VectorX& held) {
+  double little = 1.0;
+  for (int tries = 0; tries < 20; ++tries) {
+    moved_ = z;
+    const bool reached = boundary_(factor_ + little, moved_);
+    held = moved_ - z;
+    const double turn = reached ? newton_.turn(held) : INFINITY;
+    if (turn <= kLittleTurn) break;
+    little *= std::isfinite(turn) ? 0.9 * kLittleTurn / turn : 1e-3;
+  }
+  held /= little;
+  equations_.evaluate(z, false, nullptr, work_.evaluation);
+  pull = work_.evaluation.residual;
+  loads_(factor_ + little, equations_.loads().values);
+  equations_.evaluate(moved_, false, nullptr, work_.evaluation);
+  loads_(factor_, equations_.loads().values);
+  pull = (pull - work_.evaluation.residual) / little - imbalance_;
+}
+
+void Homotopy::find_tangent(Tangent& out) {
+  find_pull(state_.q, out.rate, held_);
+  evaluate(state_.q, true, nullptr);
+  LinearSolver& solver = equations_.assembler().solver();
+  ++work_.counters.iterations;
+  ++work_.counters.factorizations;
+  out.factorization = solver.factorize();
+  out.found = out.factorization.status == FactorStatus::ok || newton_.factorize(equations_, work_);
+  if (!out.found) return;
+  solver.solve({out.rate.data(), static_cast<std::size_t>(out.rate.size())});
+  out.rate += held_;
+  out.found = out.rate.allFinite();
+  out.turn = newton_.turn(out.rate);
+}
+
+}  // namespace withe

@@ -1,0 +1,64 @@
+#pragma once
+/// Equilibria that go with a factor s, along which supports move and loads change:
+///   F(q, s) = grad V(q) - f(s) - (1 - s) r = 0, with the held unknowns of q where they are to be at s.
+/// r is what the start, s = 0, is out of balance by, so that the path begins there and ends, at s = 1, in equilibrium.
+
+#include <functional>
+
+#include "integrators/newton.hpp"
+
+namespace withe {
+
+/// Sets the held unknowns of q to where supports are at a factor. False where the frames of the present state are too
+/// far from there.
+using Boundary = std::function<bool(double factor, VectorX& q)>;
+/// Sets the values of loads that grow with the factor.
+using LoadPath = std::function<void(double factor, std::vector<Vector3>& values)>;
+
+class Homotopy {
+ public:
+  Homotopy(Equations& equations, const Newton& newton, const Parameters& parameters, Boundary boundary, LoadPath loads,
+           State& state, NewtonWorkspace& work)
+      : equations_(equations),
+        newton_(newton),
+        parameters_(parameters),
+        boundary_(std::move(boundary)),
+        loads_(std::move(loads)),
+        state_(state),
+        work_(work) {}
+
+  /// Makes the present state that of s = 0, by what it is out of balance there.
+  void start_out_of_balance();
+  /// Loads and what is left out of balance at a factor; the frames count from the present state.
+  void go_to(double factor);
+  bool hold(double factor, VectorX& q) const { return boundary_(factor, q); }
+  /// What grad V - f is to be at the factor last gone to.
+  const VectorX& target() const { return target_; }
+
+  /// Where the path leads from the present state, and how firmly it stands.
+  struct Tangent {
+    VectorX rate;                ///< dq / ds
+    double turn = 0;             ///< of edges, per factor [rad]
+    Factorization factorization;  ///< of the stiffness
+    bool found = false;
+  };
+  /// At the factor last gone to: the linear solution K dq/ds = df/ds - r - K q_held', the last by a difference.
+  void find_tangent(Tangent& out);
+  /// -dF/ds at z, projected, at the factor last gone to; `held`: how the held unknowns change with it.
+  void find_pull(const VectorX& z, VectorX& pull, VectorX& held);
+  /// Residual F(z, s), and the matrix when asked for.
+  void evaluate(const VectorX& z, bool with_matrix, const double* axial_force);
+
+ private:
+  Equations& equations_;
+  const Newton& newton_;
+  const Parameters& parameters_;
+  Boundary boundary_;
+  LoadPath loads_;
+  State& state_;
+  NewtonWorkspace& work_;
+  VectorX imbalance_, target_, held_, moved_;
+  double factor_ = 0.0;
+};
+
+}  // namespace withe
