@@ -45,6 +45,7 @@ void Homotopy::find_pull(const VectorX& z, VectorX& pull, VectorX& held) {
     little *= std::isfinite(turn) ? 0.9 * kLittleTurn / turn : 1e-3;
   }
   held /= little;
+  moves_ = !held.isZero(0.0);
   equations_.evaluate(z, false, nullptr, work_.evaluation);
   pull = work_.evaluation.residual;
   loads_(factor_ + little, equations_.loads().values);

@@ -32,6 +32,8 @@ class Homotopy {
   /// Loads and what is left out of balance at a factor; the frames count from the present state.
   void go_to(double factor);
   bool hold(double factor, VectorX& q) const { return boundary_(factor, q); }
+  /// Whether supports did so where a tangent was last found.
+  bool supports_move() const { return moves_; }
   /// What grad V - f is to be at the factor last gone to.
   const VectorX& target() const { return target_; }
 
@@ -59,6 +61,7 @@ class Homotopy {
   NewtonWorkspace& work_;
   VectorX imbalance_, target_, held_, moved_;
   double factor_ = 0.0;
+  bool moves_ = false;
 };
 
 }  // namespace withe

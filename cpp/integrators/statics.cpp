@@ -19,7 +19,7 @@ bool turned_too_far(const State& state, const Configuration& c, bool planar) {
 }
 
 // Edges turn by no more than this between two points of a path, by the linear solution [rad].
-constexpr double kFarthestTurn = 0.5;
+constexpr double kFarthestTurn = 1.0;
 // What has to be cut below this share of that leads to no point of the path: it has ended.
 constexpr double kShortest = 1.0 / 64.0;
 // Where no edge turns, the path ends after so many cuts.
@@ -147,7 +147,8 @@ class Statics {
       ++cuts;
       if (cuts <= most_cuts && increment > kShortest * std::min(by_turn, 1.0)) continue;
       if (++jumps > kMostJumps) return false;
-      const double beyond = std::min(1.0, reached + kBeyond * increment);
+      // Forces may come all at once to a scene that goes on dynamically; supports may not.
+      const double beyond = path_.supports_move() ? std::min(1.0, reached + kBeyond * increment) : 1.0;
       if (!jump(beyond, beyond - reached, result)) return false;
       reached = beyond;
       longest = kBeyond * increment;
@@ -204,7 +205,7 @@ class Statics {
     path_.go_to(next);
     const VectorX before = state_.q;
     z_ = state_.q;
-    if (tangent_.found) z_ += increment * tangent_.rate;
+    if (tangent_.found && path_.supports_move()) z_ += increment * tangent_.rate;
     if (!path_.hold(next, z_)) return false;
     if (!clear_way(z_)) {
       z_ = state_.q;
