@@ -1,5 +1,6 @@
 #include "integrators/homotopy.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <span>
 
@@ -10,7 +11,34 @@ namespace {
 // are then both below a millionth.
 constexpr double kLittleTurn = 1e-6;
 
+bool turns(const LoadPiece& piece) { return piece.shape != LoadShape::dead_node; }
+
 }  // namespace
+
+LoadPath growing_loads(Equations& equations, const Parameters& parameters, const State& state, NewtonWorkspace& work) {
+  const std::vector<LoadPiece>& pieces = equations.loads().pieces;
+  if (std::none_of(pieces.begin(), pieces.end(), turns)) return [](double, std::vector<Vector3>&) {};
+  const auto scale = [&pieces, full = equations.loads().values](double share, std::vector<Vector3>& values) {
+    for (const LoadPiece& piece : pieces)
+      if (turns(piece)) {
+        const auto load = static_cast<std::size_t>(piece.load);
+        values[load] = share * full[load];
+      }
+  };
+  // The residual is linear in them: the share by which the state is least out of balance.
+  const auto out_of_balance = [&](double share) {
+    scale(share, equations.loads().values);
+    equations.begin(state, parameters, 0.0, false);
+    equations.evaluate(state.q, false, nullptr, work.evaluation);
+    return work.evaluation.residual;
+  };
+  const VectorX without = out_of_balance(0.0), change = out_of_balance(1.0) - without;
+  const double square = change.squaredNorm();
+  const double carried = square > 0.0 ? std::clamp(-without.dot(change) / square, 0.0, 1.0) : 0.0;
+  return [scale, carried](double factor, std::vector<Vector3>& values) {
+    scale(carried + factor * (1.0 - carried), values);
+  };
+}
 
 void Homotopy::start_out_of_balance() {
   imbalance_.setZero(state_.q.size());

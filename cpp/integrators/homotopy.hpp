@@ -15,6 +15,10 @@ using Boundary = std::function<bool(double factor, VectorX& q)>;
 /// Sets the values of loads that grow with the factor.
 using LoadPath = std::function<void(double factor, std::vector<Vector3>& values)>;
 
+/// Loads that turn with the rod (moments, followers) from the share of them that the state carries already to all of
+/// them: their dead imbalance would pull where they do not. Others stay, as they are part of what is out of balance.
+LoadPath growing_loads(Equations& equations, const Parameters& parameters, const State& state, NewtonWorkspace& work);
+
 class Homotopy {
  public:
   Homotopy(Equations& equations, const Newton& newton, const Parameters& parameters, Boundary boundary, LoadPath loads,
@@ -39,8 +43,8 @@ class Homotopy {
 
   /// Where the path leads from the present state, and how firmly it stands.
   struct Tangent {
-    VectorX rate;                ///< dq / ds
-    double turn = 0;             ///< of edges, per factor [rad]
+    VectorX rate;                 ///< dq / ds
+    double turn = 0;              ///< of edges, per factor [rad]
     Factorization factorization;  ///< of the stiffness
     bool found = false;
   };

@@ -70,9 +70,9 @@ struct NewtonWorkspace {
   std::function<void()> poll = [] {};  ///< asked once an iteration; what it throws ends the solve
 };
 
-/// A solution foreseen from another one on the same path, with its axial forces in work.axial_force. A guess that is near
-/// enough is drawn in fast: where the first correction is longer than the prediction, or the corrections do not halve,
-/// the path is lost, or another one not far [Deuflhard 2011, section 5.1].
+/// A solution foreseen from another one on the same path, with its axial forces in work.axial_force. A guess that is
+/// near enough is drawn in fast: where the first correction is longer than the prediction, or the corrections do not
+/// halve, the path is lost, or another one not far [Deuflhard 2011, section 5.1].
 struct Prediction {
   double length = 0;   ///< greatest displacement from the known solution [m]
   bool strict = true;  ///< whether to give up where the path may be lost
@@ -85,8 +85,8 @@ class Newton {
   /// Finds z with F(z) = target (nothing: zero), starting at z. `mixed`: with the axial forces as unknowns of
   /// their own, where the options allow it. `interval`: of a time step, whose matrix may serve several iterations and
   /// the steps to come, as long as it makes steps small fast (0: a new one every iteration); the mixed method then sets
-  /// out from work.axial_force. `impatient`: gives up where the first step is `cut`. `predicted`: how z was found, if it
-  /// was from another solution.
+  /// out from work.axial_force. `impatient`: gives up where the first step is `cut`. `predicted`: how z was found, if
+  /// it was from another solution.
   NewtonResult solve(Equations& equations, VectorX& z, const VectorX* target, int max_iterations, NewtonWorkspace& work,
                      bool mixed = true, double interval = 0.0, bool impatient = false,
                      const Prediction* predicted = nullptr) const;

@@ -41,11 +41,7 @@ class Statics {
         parameters_(parameters),
         state_(state),
         work_(work),
-        full_loads_(equations.loads().values),
-        carried_(carried_share(boundary)),
-        path_(
-            equations, newton, parameters, boundary,
-            [this](double factor, std::vector<Vector3>& values) { scale_turning_loads(factor, values); }, state, work) {
+        path_(equations, newton, parameters, boundary, growing_loads(equations, parameters, state, work), state, work) {
   }
 
   StaticResult run() {
@@ -81,33 +77,6 @@ class Statics {
     Configuration& c = scratch_;
     compute_configuration(equations_.model(), state_, q, c);
     accept_configuration(equations_.model(), q, c, state_);
-  }
-
-  /// Moments and followers turn with the rod, so their dead imbalance would pull where they do not: they grow instead,
-  /// from the share of them that the start carries already.
-  void scale_turning_loads(double factor, std::vector<Vector3>& values) const {
-    const double share = carried_ + factor * (1.0 - carried_);
-    for (const LoadPiece& piece : equations_.loads().pieces)
-      if (piece.shape != LoadShape::dead_node)
-        values[static_cast<std::size_t>(piece.load)] = share * full_loads_[static_cast<std::size_t>(piece.load)];
-  }
-
-  /// By which share of them the start is least out of balance.
-  double carried_share(const Boundary& boundary) {
-    (void)boundary;
-    const std::vector<LoadPiece>& pieces = equations_.loads().pieces;
-    if (std::all_of(pieces.begin(), pieces.end(), [](const LoadPiece& p) { return p.shape == LoadShape::dead_node; }))
-      return 0.0;
-    carried_ = 0.0;
-    const auto out_of_balance = [&](double share) {
-      scale_turning_loads(share, equations_.loads().values);
-      equations_.begin(state_, parameters_, 0.0, false);
-      equations_.evaluate(state_.q, false, nullptr, work_.evaluation);
-      return work_.evaluation.residual;
-    };
-    const VectorX without = out_of_balance(0.0), change = out_of_balance(1.0) - without;
-    const double square = change.squaredNorm();
-    return square > 0.0 ? std::clamp(-without.dot(change) / square, 0.0, 1.0) : 0.0;
   }
 
   /// Follows the path from the present state to its end. False where not even a jump leads on.
@@ -158,7 +127,9 @@ class Statics {
     return true;
   }
 
-  bool firm() const { return tangent_.factorization.status == FactorStatus::ok && tangent_.factorization.negative_pivots == 0; }
+  bool firm() const {
+    return tangent_.factorization.status == FactorStatus::ok && tangent_.factorization.negative_pivots == 0;
+  }
 
   /// The point of the path at the factor `next`, foreseen along the tangent.
   bool reach(double next, double increment, NewtonResult& last) {
@@ -399,8 +370,6 @@ class Statics {
   double energy_scale_ = 0.0;  ///< greatest potential met [J]
   double lowest_ = 0.0;
   Configuration scratch_;
-  std::vector<Vector3> full_loads_;
-  double carried_ = 0.0;  ///< share of turning loads that the start carries
   Homotopy path_;
   Homotopy::Tangent tangent_;
   VectorX step_, z_;

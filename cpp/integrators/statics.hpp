@@ -14,8 +14,8 @@ struct StaticResult {
 };
 
 /// Brings `state` to equilibrium, with supports where `boundary` has them at 1. Loads and natural shapes that are out
-/// of balance at the start, and the motion of supports, are let in as `Homotopy` has it, in steps in which no edge turns
-/// far.
+/// of balance at the start, and the motion of supports, are let in as `Homotopy` has it, in steps in which no edge
+/// turns far.
 StaticResult find_equilibrium(Equations& equations, const Newton& newton, const Options& options,
                               const Parameters& parameters, const Boundary& boundary, State& state,
                               NewtonWorkspace& work);

@@ -1,6 +1,9 @@
 #include <algorithm>
 
+#include "common/check.hpp"
+#include "common/timer.hpp"
 #include "geometry/rotation.hpp"
+#include "integrators/arc_length.hpp"
 #include "world/implementation.hpp"
 
 namespace withe {
@@ -39,6 +42,17 @@ void put_between(const SupportMotion& from, const SupportMotion& to, double frac
 
 }  // namespace
 
+/// Forgets that anything moved.
+void World::Implementation::rest() {
+  state.v.setZero();
+  state.acceleration.setZero();
+  state.acceleration_current = false;
+  state.motion.known = 0;
+  predictor.clear();
+  forget_matrix();
+  work.newton.finest = INFINITY;
+}
+
 /// Equilibrium after `dt` (0: at the present time, with supports and actuation as they are).
 EquilibriumResult World::Implementation::equilibrium(double dt) {
   const State before = state;
@@ -69,13 +83,7 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
     motions = target;
     return work.held.reachable;
   };
-  state.v.setZero();
-  state.acceleration.setZero();
-  state.acceleration_current = false;
-  state.motion.known = 0;
-  predictor.clear();
-  forget_matrix();
-  work.newton.finest = INFINITY;
+  rest();
   StaticResult r;
   try {
     aim_obstacles(system, time);
@@ -116,6 +124,91 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
   const bool frictional = system.contact() && system.contact()->frictional();
   return {r.stable, !system.loads().unsymmetric || frictional, r.branch_changed, r.newton.iterations,
           r.newton.residual};
+}
+
+EquilibriumPath World::equilibrium_path(const PathOptions& wanted) {
+  Implementation& self = *implementation_;
+  const Timer timer(self.statistics.total_time);
+  for (int load : wanted.loads)
+    require(load >= 0 && load < static_cast<int>(self.load_values.size()), "no such load: " + std::to_string(load));
+  require(std::isfinite(wanted.start) && std::isfinite(wanted.end) && wanted.start != wanted.end,
+          "a path needs two factors to lead from and to");
+  require(wanted.most_points > 0 && wanted.turn > 0.0, "a path needs points and turns that are positive");
+  const std::vector<Vector3> full = self.load_values;
+  const bool by_loads = !wanted.loads.empty();
+  const LoadPath scaled = [&](double factor, std::vector<Vector3>& values) {
+    for (int load : wanted.loads) {
+      const auto i = static_cast<std::size_t>(load);
+      values[i] = factor * full[i];
+    }
+  };
+  const State before = self.state;
+  const std::vector<SupportMotion> motions_before = self.motions;
+  EquilibriumPath out;
+  ArcResult r;
+  const auto set_loads = [&](const std::vector<Vector3>& values) {
+    self.load_values = self.equations->loads().values = values;
+    self.reaction_current = false;
+  };
+  try {
+    if (by_loads) {
+      std::vector<Vector3> first = full;
+      scaled(wanted.start, first);
+      set_loads(first);
+      out.iterations += equilibrium().iterations;
+    }
+    std::vector<SupportMotion> from = self.motions;
+    self.aim_supports(self.state.time);
+    const std::vector<SupportMotion> target = self.motions;
+    Equations& system = self.statics();
+    self.update_custom_force(system);
+    const auto move_to = [&](double factor) {
+      for (std::size_t s = 0; s < target.size(); ++s) put_between(from[s], target[s], factor, self.motions[s]);
+    };
+    const Boundary boundary = [&](double factor, VectorX& q) {
+      move_to(factor);
+      self.hold_now(self.work.held);
+      system.assembler().add_held_change(q, self.work.held.q, 1.0, q);
+      return self.work.held.reachable;
+    };
+    self.rest();
+    const LoadPath loads = by_loads ? scaled : growing_loads(system, self.parameters, self.state, self.work.newton);
+    Homotopy path(system, *self.newton, self.parameters, boundary, loads, self.state, self.work.newton);
+    if (!by_loads) path.start_out_of_balance();
+    const ArcVisitor visit = [&](const ArcPoint& point) {
+      self.reaction_residual = self.work.newton.evaluation.full_residual;
+      self.reaction_current = true;
+      MatrixX3 forces = MatrixX3::Zero(static_cast<Eigen::Index>(target.size()), 3), moments = forces;
+      for (std::size_t s = 0; s < target.size(); ++s) {
+        if (!self.model.supports[s].active) continue;
+        const Reaction held = reaction(static_cast<int>(s));
+        forces.row(static_cast<Eigen::Index>(s)) = held.force;
+        moments.row(static_cast<Eigen::Index>(s)) = held.moment;
+      }
+      out.points.push_back({point.factor, point.stable, point.limit, positions(), forces, moments});
+    };
+    r = follow_arc(system, *self.newton, self.options, path,
+                   {wanted.start, wanted.end, wanted.most_points, wanted.turn}, self.state, self.work.newton, visit);
+    move_to(r.factor);
+    for (std::size_t s = 0; s < target.size(); ++s) {
+      SupportMotion& m = self.motions[s];
+      m.from_position = m.to_position = m.position;
+      m.from_rotation = m.to_rotation = m.rotation;
+      m.start = m.end = self.state.time;
+    }
+  } catch (...) {
+    self.state = before;
+    self.motions = motions_before;
+    set_loads(full);
+    throw;
+  }
+  std::vector<Vector3> values = full;
+  scaled(r.factor, values);
+  set_loads(values);
+  out.finished = r.finished;
+  out.iterations += r.newton.iterations;
+  if (out.points.size() < 2 && !r.finished) self.fail(r.newton, 0.0, "no path of equilibria leads from here");
+  return out;
 }
 
 void World::Implementation::refresh_reactions() {

@@ -237,6 +237,7 @@ struct World::Implementation {
 
   // equilibrium.cpp
   EquilibriumResult equilibrium(double dt);
+  void rest();
   Equations& statics();
   Equations& rescue();
   void refresh_reactions();

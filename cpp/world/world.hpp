@@ -29,7 +29,7 @@ struct Statistics {
   long iterations = 0;  ///< Newton iterations
   long factorizations = 0;
   double largest_turn = 0;  ///< of an edge in one step [rad]; plain midpoint loses energy balance above about 0.1
-  long branch_changes = 0;         ///< equilibria that were found on another branch
+  long branch_changes = 0;  ///< equilibria that were found on another branch
   long energy_momentum_steps = 0;  ///< taken in place of midpoint steps that gained energy
   double assembly_time = 0, solve_time = 0, fluid_time = 0, total_time = 0;  ///< [s]
 };
@@ -52,6 +52,27 @@ struct EquilibriumResult {
   bool branch_changed = false;  ///< a jump, or a saddle that was left, lies between the state before and this one
   int iterations = 0;
   double residual = 0;  ///< greatest force out of balance [N]
+};
+
+/// A path of equilibria by arc length; see arc_length.hpp.
+struct PathOptions {
+  std::vector<int> loads;  ///< whose values go with the factor; none: the motion of supports and what is out of balance
+  double start = 0, end = 1;
+  int most_points = 1000;
+  double turn = 0.1;  ///< greatest turn of an edge between two points [rad]
+};
+
+struct PathPoint {
+  double factor = 0;
+  bool stable = false, limit = false;
+  MatrixX3 positions;        ///< every node once [m]
+  MatrixX3 forces, moments;  ///< per support, zero where it is released [N], [N m]
+};
+
+struct EquilibriumPath {
+  std::vector<PathPoint> points;
+  bool finished = false;
+  int iterations = 0;
 };
 
 /// What touches, a row each.
@@ -115,6 +136,8 @@ class World {
   /// Advances to `time`, with time_steps stretched or shortened evenly to land on it.
   void advance_to(double time);
   EquilibriumResult equilibrium();
+  /// Follows a path of equilibria through limit points, to its last point.
+  EquilibriumPath equilibrium_path(const PathOptions& wanted);
   /// From another thread or a signal: ends a running step() or equilibrium() within one Newton iteration (throws
   /// Interrupted), with the state the last accepted one.
   void interrupt();

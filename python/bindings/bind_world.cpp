@@ -53,6 +53,17 @@ void register_results(py::module_& module) {
       .def_readonly("branch_changed", &EquilibriumResult::branch_changed)
       .def_readonly("iterations", &EquilibriumResult::iterations)
       .def_readonly("residual", &EquilibriumResult::residual);
+  py::class_<PathPoint>(module, "PathPoint", "A point of a path of equilibria.")
+      .def_readonly("factor", &PathPoint::factor)
+      .def_readonly("stable", &PathPoint::stable)
+      .def_readonly("limit", &PathPoint::limit)
+      .def_readonly("positions", &PathPoint::positions)
+      .def_readonly("forces", &PathPoint::forces)
+      .def_readonly("moments", &PathPoint::moments);
+  py::class_<EquilibriumPath>(module, "EquilibriumPath", "A path of equilibria.")
+      .def_readonly("points", &EquilibriumPath::points)
+      .def_readonly("finished", &EquilibriumPath::finished)
+      .def_readonly("iterations", &EquilibriumPath::iterations);
   py::class_<Plan>(module, "Plan", "What build decided.")
       .def_readonly("planar", &Plan::planar)
       .def_readonly("plane_normal", &Plan::plane_normal)
@@ -101,6 +112,15 @@ void define_steps(WorldClass& world) {
         return self.run([](World& w) { return w.equilibrium(); }, callback);
       },
       py::arg("callback"), "Find the static equilibrium.");
+  world.def(
+      "equilibrium_path",
+      [](GuardedWorld& self, const std::vector<int>& loads, double start, double end, int most_points, double turn,
+         const py::object& callback) {
+        const PathOptions wanted{loads, start, end, most_points, turn};
+        return self.run([&wanted](World& w) { return w.equilibrium_path(wanted); }, callback);
+      },
+      py::arg("loads"), py::arg("start"), py::arg("end"), py::arg("most_points"), py::arg("turn"), py::arg("callback"),
+      "Follow a path of equilibria through limit points.");
   world.def("check_idle", [](GuardedWorld& self) { (void)self.changing(); }, "Raises in the middle of a step.");
   world.def(
       "snapshot", [](const GuardedWorld& self) { return py::bytes(self.reading().snapshot()); }, "The whole state.");

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any, Literal, overload
@@ -18,11 +18,12 @@ from withe.control import Control
 from withe.description import describe, parameters_of
 from withe.directory import Directory
 from withe.errors import CoarseMeshWarning, CoarseStepWarning, ConvergenceError
-from withe.handles import NodeHandle, Obstacle, Rod, Support
+from withe.handles import Load, NodeHandle, Obstacle, Rod, Support
 from withe.knots import link
 from withe.linearisation import Linearisation, Stability
 from withe.options import check_tolerances, engine_options
 from withe.parts import CustomForcePart, DragPart, FluidPart, LoadPart, MassPart, ObstaclePart, RodPart, SupportPart
+from withe.paths import EquilibriumPath
 from withe.readouts import Energy, Equilibrium, Momentum, Plan, Reaction, RodEnergy, Statistics
 from withe.snapshots import Settings, Snapshot
 
@@ -128,22 +129,94 @@ class Simulation(Control):
         with self._convergence():
             self._world.advance_to(time, self._step_callback())
 
-    def equilibrium(self) -> Equilibrium:
+    @overload
+    def equilibrium(self) -> Equilibrium: ...
+
+    @overload
+    def equilibrium(
+        self,
+        *,
+        path: Literal["arc_length"],
+        load: Load | str | Sequence[Load | str] | None = None,
+        start: float = 0.0,
+        to: float = 1.0,
+        steps: int = 1000,
+        turn: float = 0.1,
+    ) -> EquilibriumPath: ...
+
+    def equilibrium(
+        self,
+        *,
+        path: Literal["arc_length"] | None = None,
+        load: Load | str | Sequence[Load | str] | None = None,
+        start: float = 0.0,
+        to: float = 1.0,
+        steps: int = 1000,
+        turn: float = 0.1,
+    ) -> Equilibrium | EquilibriumPath:
         """Find the static equilibrium that the present state leads to, and go there. Time stands still.
 
-        Saddles are left, so that a straight column that carries too much buckles.
+        Supports that were moved go to their places, and loads that were changed come in, along the branch of equilibria
+        that begins at the present state, in steps in which no edge turns far. Where that branch ends (at a limit point)
+        or is not stable any more, the scene goes on dynamically: then `branch_changed` is true. Saddles are left, so
+        that a straight column that carries too much buckles.
+
+        With ``path="arc_length"`` the branch is followed through limit points, stable or not, by pseudo-arc-length
+        continuation [Riks 1979, Int. J. Solids Struct. 15; Crisfield 1981, Comput. Struct. 13], and all its points are
+        returned; the simulation ends at the last one.
+
+        Parameters
+        ----------
+        path : "arc_length", optional
+        load : Load, str, or several, optional
+            Loads whose present values the load factor multiplies. Without any, the factor is that of all that has been
+            changed since the last equilibrium (in the drawn state: of all loads), 0 before and 1 as it is asked for:
+            supports that were moved, loads, gravity, natural shapes; the last three as forces out of balance.
+        start : float
+            Load factor at which the path begins, with the equilibrium to which the present state leads there. Needs
+            loads.
+        to : float
+            Load factor at which the path ends, the first time that it is met. The loads keep that factor.
+        steps : int
+            The path also ends after so many steps.
+        turn : float [rad]
+            Greatest turn of an edge from one point of the path to the next.
 
         Returns
         -------
         Equilibrium
+            Or, along a path, `EquilibriumPath`.
 
         Raises
         ------
         ConvergenceError
             None was found, or there is none (a free rod under gravity).
+        ValueError
+            A load that is a function of time, or a load factor or number of steps that cannot be.
+
+        Examples
+        --------
+        A shallow arch snaps through at its first limit load:
+
+        >>> import numpy as np
+        >>> import withe
+        >>> scene = withe.Scene(gravity=(0, 0, 0))
+        >>> angle = np.linspace(-0.4, 0.4, 41)
+        >>> steel = withe.Material(youngs_modulus=2e11, poisson_ratio=0.3, density=7850.0)
+        >>> arc = np.stack([np.sin(angle), 0 * angle, np.cos(angle)], axis=1)
+        >>> arch = scene.add_rod(points=arc, radius=5e-3, material=steel)
+        >>> ends = scene.pin(arch.start), scene.pin(arch.end)
+        >>> load = scene.add_force(arch.node(20), (0, 0, -1.0))
+        >>> simulation = scene.build(integrator="static", planar=True)
+        >>> path = simulation.equilibrium(path="arc_length", load=load, to=2500.0)
+        >>> print(f"{path.load_factors[path.limit_points[0]]:.0f} N")
+        ??? N
         """
         self._refuse_in_run("equilibrium")
         self._world.check_idle()
+        if path is not None:
+            validation.choice(path, "path", ("arc_length",))
+            return self._arc_length(load, start, to, steps, turn)
         self._apply_functions(self._world.time, self._world.time)
         with self._convergence():
             found = self._world.equilibrium(None)
@@ -151,6 +224,37 @@ class Simulation(Control):
         if not found.decided:
             stability = self.linearise().stability
         return Equilibrium(stability == "stable", stability, found.branch_changed, found.iterations, found.residual)
+
+    def _arc_length(self, load: Any, start: Any, to: Any, steps: Any, turn: Any) -> EquilibriumPath:
+        handles = [] if load is None else [load] if isinstance(load, Load | str) else list(load)
+        parts = [self._directory.find(handle, LoadPart, "load") for handle in handles]
+        for part in parts:
+            if part.name in self._settings.functions:
+                raise ValueError(f"load {part.name!r} is a function of time, which a load factor has no place in")
+        begin, end = validation.number(start, "start"), validation.number(to, "to")
+        if begin == end:
+            raise ValueError(f"to must be another load factor than start, got {end} for both")
+        if begin != 0.0 and not parts:
+            raise ValueError(f"start must be 0 where no load is given, got {begin}")
+        count = validation.integer(steps, "steps", 1, _MAX_STEPS - 1)
+        widest = validation.positive(turn, "turn")
+        self._apply_functions(self._world.time, self._world.time)
+        with self._convergence():
+            found = self._world.equilibrium_path(
+                [self._load_index(part) for part in parts], begin, end, count + 1, widest, None
+            )
+        points = found.points
+        return EquilibriumPath(
+            load_factors=np.array([point.factor for point in points]),
+            stable=np.array([point.stable for point in points]),
+            limit_points=np.flatnonzero([point.limit for point in points]),
+            finished=found.finished,
+            iterations=found.iterations,
+            _positions=np.array([point.positions for point in points]),
+            _reactions=(np.array([point.forces for point in points]), np.array([point.moments for point in points])),
+            _rows=lambda rod: self._directory.layout.rows(self._rod(rod)),
+            _support=lambda support: self._support(support)[0],
+        )
 
     def run(
         self,
