@@ -228,7 +228,7 @@ NewtonResult Newton::solve(Equations& equations, VectorX& z, const VectorX* targ
     const Balance balance = this->balance(e, result);
     // Rounding alone is no proof before the first step: a light load on a stiff rod hides in it.
     if ((balance.floor && (result.iterations > 0 || balance.relative)) ||
-        (balance.either && (p.rest <= tolerance || stagnant >= 3))) {
+        (balance.either && (p.rest <= tolerance || stagnant >= 3)) || (predicted && p.step <= predicted->enough)) {
       result.converged = true;
       factor.tired = p.age == MatrixAge::across && result.iterations >= kTiring;
       return end();

@@ -76,6 +76,7 @@ struct NewtonWorkspace {
 struct Prediction {
   double length = 0;   ///< greatest displacement from the known solution [m]
   bool strict = true;  ///< whether to give up where the path may be lost
+  double enough = 0;   ///< a correction after which no other is needed, for a point on the way [m]
 };
 
 class Newton {

@@ -18,6 +18,8 @@ bool turned_too_far(const State& state, const Configuration& c, bool planar) {
   return false;
 }
 
+// Corrections of points on the way may be this long, over the length of the scene: Newton's method leaves their square.
+constexpr double kOnTheWay = 1e-6;
 // Edges turn by no more than this between two points of a path, by the linear solution [rad].
 constexpr double kFarthestTurn = 1.0;
 // What has to be cut below this share of that leads to no point of the path: it has ended.
@@ -140,6 +142,7 @@ class Statics {
     if (predicted) {
       step_ = increment * tangent_.rate;
       prediction.length = newton_.displacement(step_);
+      if (next < 1.0 && !touching) prediction.enough = kOnTheWay * equations_.model().length_scale;
       // Axial forces by the linear solution: those of the prediction are of edges that stretch as they turn.
       equations_.evaluate(state_.q, false, nullptr, work_.evaluation);
       equations_.predict_axial_force(step_, work_.axial_force);

@@ -108,8 +108,8 @@ class Equilibrium:
         `Linearisation.stability`. Friction counts as what it does to the stiffness.
     branch_changed : bool
         Whether the equilibrium lies on another branch than the state before: the path of equilibria along which
-        supports move and loads change ended on the way (at a limit point), or lost its stability (at a bifurcation), and
-        the scene went on dynamically from there, losing energy, to what it settled in.
+        supports move and loads change ended on the way (at a limit point), or lost its stability (at a bifurcation);
+        the scene then went on dynamically, losing energy, to what it settled in.
     iterations : int
         Of Newton's method.
     residual : float [N]

@@ -196,21 +196,21 @@ class Simulation(Control):
 
         Examples
         --------
-        A shallow arch snaps through at its first limit load:
+        Half a circle, pinned at both ends, snaps through at its first limit load:
 
         >>> import numpy as np
         >>> import withe
         >>> scene = withe.Scene(gravity=(0, 0, 0))
-        >>> angle = np.linspace(-0.4, 0.4, 41)
+        >>> angle = np.linspace(-np.pi / 2, np.pi / 2, 41)
         >>> steel = withe.Material(youngs_modulus=2e11, poisson_ratio=0.3, density=7850.0)
         >>> arc = np.stack([np.sin(angle), 0 * angle, np.cos(angle)], axis=1)
         >>> arch = scene.add_rod(points=arc, radius=5e-3, material=steel)
         >>> ends = scene.pin(arch.start), scene.pin(arch.end)
         >>> load = scene.add_force(arch.node(20), (0, 0, -1.0))
         >>> simulation = scene.build(integrator="static", planar=True)
-        >>> path = simulation.equilibrium(path="arc_length", load=load, to=2500.0)
+        >>> path = simulation.equilibrium(path="arc_length", load=load, to=1000.0)
         >>> print(f"{path.load_factors[path.limit_points[0]]:.0f} N")
-        ??? N
+        992 N
         """
         self._refuse_in_run("equilibrium")
         self._world.check_idle()

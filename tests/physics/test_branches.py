@@ -1,0 +1,236 @@
+"""Equilibria follow their branch, say where they leave it, and are traced through limit points."""
+
+import numpy as np
+import pytest
+
+import rods
+import withe
+
+LEE = {"stretch": 7.2e6 * 6.0, "bend": 7.2e6 * 2.0, "length": 120.0}
+
+
+def propped_beam(edges):
+    """A clamped beam of unit length and bending stiffness whose end may slide along it."""
+    scene = withe.Scene(gravity=(0.0, 0.0, 0.0))
+    beam = scene.add_rod(
+        start=(0, 0, 0),
+        end=(1, 0, 0),
+        nodes=edges + 1,
+        radius=1e-3,
+        normal=(0, 0, 1),
+        stiffness=rods.stiffness(stretch=1e6),
+        line_density=1.0,
+    )
+    scene.clamp(beam.start)
+    tip = scene.pin(beam.end, free=(1, 0, 0))
+    return scene.build(integrator="static", planar=True), beam, tip
+
+
+@pytest.mark.parametrize("edges", [2, 20, 100, 400])
+def test_a_support_that_moves_takes_the_beam_along_one_branch_up_and_down(edges):
+    simulation, _, tip = propped_beam(edges)
+    there, back = [], []
+    for d in (0.1, 0.2, 0.3, 0.4, 0.5):
+        simulation.move(tip, position=(1, 0, -d))
+        result = simulation.equilibrium()
+        assert result.stable
+        assert not result.branch_changed
+        assert result.iterations <= 8
+        there.append(simulation.energy().bend)
+    for d in (0.4, 0.3, 0.2, 0.1):
+        simulation.move(tip, position=(1, 0, -d))
+        assert not simulation.equilibrium().branch_changed
+        back.append(simulation.energy().bend)
+    assert back == pytest.approx(there[-2::-1], rel=1e-6)
+    simulation.move(tip, position=(1, 0, 0.5))
+    assert not simulation.equilibrium().branch_changed
+    assert simulation.energy().bend == pytest.approx(there[-1], rel=1e-6)
+    if edges > 2:
+        # Small deflections: 3/2 d^2.
+        assert there[0] == pytest.approx(1.5 * 0.1**2, rel=2e-2)
+
+
+@pytest.mark.parametrize("planar", [True, False])
+def test_one_long_move_ends_where_many_short_ones_do(planar):
+    def turned(count):
+        scene = withe.Scene(gravity=(0.0, 0.0, -2.0))
+        arm = rods.straight(scene, 31, stiffness=rods.stiffness(stretch=1e5))
+        hand = scene.clamp(arm.start)
+        scene.pin(arm.end)
+        simulation = scene.build(integrator="static", planar=planar)
+        for k in range(1, count + 1):
+            part = k / count
+            angle = 1.2 * part
+            simulation.move(hand, position=(0.3 * part, 0, 0.1 * part), tangent=(np.cos(angle), 0, np.sin(angle)))
+            result = simulation.equilibrium()
+            assert result.stable
+        return simulation.positions(arm)
+
+    assert turned(1) == pytest.approx(turned(16), abs=1e-6)
+
+
+def test_steps_of_the_static_integrator_follow_the_same_branch():
+    stepped, beam, tip = propped_beam(100)
+    stepped.move(tip, position=(1, 0, -0.5), over=5 * stepped.time_step)
+    stepped.step(5)
+    found, other_beam, other_tip = propped_beam(100)
+    found.move(other_tip, position=(1, 0, -0.5))
+    found.equilibrium()
+    assert stepped.statistics.branch_changes == 0
+    assert stepped.positions(beam) == pytest.approx(found.positions(other_beam), abs=1e-6)
+
+
+def lee(edges):
+    """Lee's frame: a column and a beam, rigidly joined, pinned at their far ends, loaded at a fifth of the beam."""
+    scene = withe.Scene(gravity=(0.0, 0.0, 0.0))
+    common = {
+        "stiffness": rods.stiffness(stretch=LEE["stretch"], bend=LEE["bend"], twist=LEE["bend"]),
+        "line_density": 1.0,
+        "radius": 1.0,
+        "nodes": edges + 1,
+    }
+    length = LEE["length"]
+    column = scene.add_rod(start=(0, 0, 0), end=(0, 0, length), **common)
+    beam = scene.add_rod(start=(0, 0, length), end=(length, 0, length), **common)
+    scene.join(column.end, beam.start)
+    scene.pin(column.start)
+    scene.pin(beam.end)
+    return scene, beam.node(edges // 5)
+
+
+UNIT = LEE["bend"] / LEE["length"] ** 2
+
+
+def test_limit_loads_of_lees_frame_by_force_and_by_displacement():
+    """18.55 EI / L^2 [Lee, Manuel and Rossow 1968], at second order in the mesh; snap-through to a negative load."""
+    by_force, by_displacement = [], []
+    for edges in (20, 40, 80):
+        scene, node = lee(edges)
+        load = scene.add_force(node, (0, 0, -UNIT))
+        simulation = scene.build(integrator="static", planar=True)
+        path = simulation.equilibrium(path="arc_length", load=load, to=20.0)
+        assert path.finished
+        assert path.load_factors[0] == 0.0
+        assert path.load_factors[-1] == pytest.approx(20.0, rel=1e-9)
+        assert simulation.get(load, "force")[2] == pytest.approx(-20.0 * UNIT, rel=1e-9)
+        first, second = path.limit_points
+        assert path.stable[:first].all()
+        assert not path.stable[first + 1 : second].any()
+        assert path.stable[second + 1 :].all()
+        assert path.load_factors[second] < -9.0
+        by_force.append(path.load_factors[first])
+
+        scene, node = lee(edges)
+        grip = scene.pin(node, free=(1, 0, 0))
+        simulation = scene.build(integrator="static", planar=True)
+        heights = np.arange(46.0, 52.0, 0.25)
+        forces = []
+        for drop in heights:
+            simulation.move(grip, position=(0, 0, LEE["length"] - drop))
+            assert not simulation.equilibrium().branch_changed
+            forces.append(-simulation.reaction(grip).force[2] / UNIT)
+        top = int(np.argmax(forces))
+        by_displacement.append(
+            np.polyval(
+                parabola := np.polyfit(heights[top - 2 : top + 3], forces[top - 2 : top + 3], 2),
+                -0.5 * parabola[1] / parabola[0],
+            )
+        )
+    print("limit loads", by_force, by_displacement)
+    for loads in (by_force, by_displacement):
+        assert loads[-1] == pytest.approx(18.55, rel=1e-3)
+        assert (loads[0] - loads[1]) / (loads[1] - loads[2]) == pytest.approx(4.0, abs=1.0)
+    assert by_displacement == pytest.approx(by_force, rel=1e-4)
+
+
+def test_a_load_beyond_the_limit_snaps_through_to_the_far_branch_and_says_so():
+    scene, node = lee(20)
+    load = scene.add_force(node, (0, 0, -UNIT))
+    traced = scene.build(integrator="static", planar=True)
+    traced.equilibrium(path="arc_length", load=load, to=20.0)
+
+    simulation = scene.build(integrator="static", planar=True)
+    changes = []
+    for factor in (9.0, 18.0, 18.5, 18.6, 20.0):
+        simulation.set(load, force=(0, 0, -factor * UNIT))
+        result = simulation.equilibrium()
+        assert result.stable
+        changes.append(result.branch_changed)
+    assert changes == [False, False, False, True, False]
+    assert simulation.positions() == pytest.approx(traced.positions(), abs=1e-4)
+    for factor in (10.0, 0.0, -9.0, -9.5):
+        simulation.set(load, force=(0, 0, -factor * UNIT))
+        changes.append(simulation.equilibrium().branch_changed)
+    assert changes[-4:] == [False, False, False, True]
+
+
+def test_a_support_that_moves_beyond_a_limit_point_says_so_and_its_path_is_traced():
+    """Pushed down by a support that slides, the frame snaps where the path of displacements turns back."""
+    scene, node = lee(20)
+    grip = scene.pin(node, free=(1, 0, 0))
+    traced = scene.build(integrator="static", planar=True)
+    traced.move(grip, position=(0, 0, 20.0))
+    path = traced.equilibrium(path="arc_length")
+    assert path.finished
+    assert path.load_factors[-1] == pytest.approx(1.0, rel=1e-9)
+    assert -path.forces(grip)[:, 2].min() / UNIT > 18.0
+    turn = 100.0 * path.load_factors[path.limit_points[0]]
+    drops = LEE["length"] - path.positions()[:, traced.rods[1].rows][:, 4, 2]
+    assert drops == pytest.approx(100.0 * path.load_factors, abs=1e-6)
+
+    simulation = scene.build(integrator="static", planar=True)
+    simulation.move(grip, position=(0, 0, LEE["length"] - turn + 0.2))
+    assert not simulation.equilibrium().branch_changed
+    simulation.move(grip, position=(0, 0, LEE["length"] - turn - 0.2))
+    result = simulation.equilibrium()
+    assert result.branch_changed
+    assert result.stable
+    simulation.move(grip, position=(0, 0, 20.0))
+    assert not simulation.equilibrium().branch_changed
+    assert simulation.positions() == pytest.approx(traced.positions(), abs=1e-4)
+
+
+def arch(edges):
+    """Clamped at one end, hinged at the other: 215 degrees of a circle of unit radius."""
+    scene = withe.Scene(gravity=(0.0, 0.0, 0.0))
+    angle = np.radians(np.linspace(-107.5, 107.5, edges + 1))
+    curve = np.stack([np.sin(angle), 0.0 * angle, np.cos(angle)], axis=1)
+    arc = scene.add_rod(points=curve, stiffness=rods.stiffness(stretch=1e6), line_density=1.0, radius=1e-3)
+    scene.clamp(arc.start)
+    scene.pin(arc.end)
+    return scene, arc.node(edges // 2)
+
+
+def test_limit_load_of_a_deep_arch_by_force_and_by_displacement():
+    """8.97 EI / R^2 [DaDeppo and Schmidt 1975], 897 in their numbers."""
+    scene, crown = arch(64)
+    load = scene.add_force(crown, (0, 0, -1.0))
+    simulation = scene.build(integrator="static", planar=True)
+    path = simulation.equilibrium(path="arc_length", load=load, to=12.0)
+    assert path.finished
+    limit = path.load_factors[path.limit_points[0]]
+    assert limit == pytest.approx(8.97, rel=1e-3)
+    assert path.stable[: path.limit_points[0]].all()
+    assert not path.stable[path.limit_points[0] + 1]
+
+    scene, crown = arch(64)
+    grip = scene.pin(crown, free=(1, 0, 0))
+    simulation = scene.build(integrator="static", planar=True)
+    simulation.move(grip, position=(0, 0, -0.25))
+    path = simulation.equilibrium(path="arc_length", turn=0.02)
+    assert path.finished
+    assert -path.forces(grip)[:, 2].min() == pytest.approx(limit, rel=1e-3)
+
+
+def test_what_a_path_cannot_be_asked_for_is_refused():
+    simulation, _, _ = propped_beam(4)
+    with pytest.raises(ValueError, match="path"):
+        simulation.equilibrium(path="riks")
+    with pytest.raises(ValueError, match="start must be 0"):
+        simulation.equilibrium(path="arc_length", start=0.5)
+    with pytest.raises(ValueError, match="another load factor"):
+        simulation.equilibrium(path="arc_length", to=0.0)
+    scene, node = lee(10)
+    load = scene.add_force(node, lambda t: (0, 0, -t))
+    with pytest.raises(ValueError, match="function of time"):
+        scene.build(integrator="static").equilibrium(path="arc_length", load=load)
