@@ -429,6 +429,8 @@ class Statistics:
     @property
     def assembly_time(self) -> float: ...
     @property
+    def branch_changes(self) -> int: ...
+    @property
     def energy_momentum_steps(self) -> int: ...
     @property
     def factorizations(self) -> int: ...
@@ -470,6 +472,8 @@ class EquilibriumResult:
     How an equilibrium was found.
     """
     @property
+    def branch_changed(self) -> bool: ...
+    @property
     def decided(self) -> bool: ...
     @property
     def iterations(self) -> int: ...
@@ -477,6 +481,34 @@ class EquilibriumResult:
     def residual(self) -> float: ...
     @property
     def stable(self) -> bool: ...
+
+class PathPoint:
+    """
+    A point of a path of equilibria.
+    """
+    @property
+    def factor(self) -> float: ...
+    @property
+    def forces(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
+    @property
+    def limit(self) -> bool: ...
+    @property
+    def moments(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
+    @property
+    def positions(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
+    @property
+    def stable(self) -> bool: ...
+
+class EquilibriumPath:
+    """
+    A path of equilibria.
+    """
+    @property
+    def finished(self) -> bool: ...
+    @property
+    def iterations(self) -> int: ...
+    @property
+    def points(self) -> list[PathPoint]: ...
 
 class Plan:
     """
@@ -527,6 +559,10 @@ class World:
     def equilibrium(self, callback: typing.Any) -> EquilibriumResult:
         """
         Find the static equilibrium.
+        """
+    def equilibrium_path(self, loads: collections.abc.Sequence[typing.SupportsInt], start: typing.SupportsFloat, end: typing.SupportsFloat, most_points: typing.SupportsInt, turn: typing.SupportsFloat, callback: typing.Any) -> EquilibriumPath:
+        """
+        Follow a path of equilibria through limit points.
         """
     def linearise(self) -> Linearisation: ...
     def load(
