@@ -221,20 +221,32 @@ double estimated_error(Equations& equations, const Newton& newton, const Options
   return moved_by(error, equations, newton, h, work);
 }
 
+/// Velocity at the end of a step of what supports hold. They have no dynamics of their own, and midpoint's 2 v - v0 would
+/// ring for ever: their mean velocities of this step and the last are carried on, to second order, but where they jump.
+void find_held_velocity(const Model& model, const StepPlan& plan, const State& state, StepWorkspace& work) {
+  VectorX& v = work.held_velocity;
+  v = (work.held.q - state.q) / plan.dt;
+  if (plan.rule == StepRule::backward_euler || state.motion.known == 0) return;
+  constexpr double kJump = 0.75;  // of it; from rest at an even acceleration, the second step is 2/3 faster
+  const double share = 0.5 * plan.dt / (state.time + 0.5 * plan.dt - state.motion.time[0]);
+  for (const Constraint& c : model.constraints) {
+    const Vector3 now = c.held(v), gain = now - c.held(state.motion.velocity[0]);
+    if (gain.norm() <= kJump * now.norm()) v.segment(c.first, c.size) += share * gain.head(c.size);
+  }
+}
+
 /// Finds the fluid's force for a step of dt: that on velocities as they are taken to be within the step, to the order
 /// of the scheme, at the positions that go with them. Under the midpoint rules those of the last two steps are carried
 /// on: velocities at their ends would ring on stiff modes, and the guess with them.
 bool begin_flow(Equations& equations, double dt, bool euler, const State& state, StepWorkspace& work) {
   if (!equations.flows()) return true;
   VectorX &v = work.mean, &q = work.z;
-  const Motion& past = state.motion;
-  if (euler || past.known < 2)
+  if (euler)
     v = state.v;
-  else if (equations.flow_excess() > 1.0)
-    v = past.velocity[0];
+  else if (state.motion.known == 2 && equations.flow_excess() > 1.0)
+    v = state.motion.velocity[0];
   else
-    v = past.velocity[0] + ((state.time + 0.5 * dt - past.time[0]) / (past.time[0] - past.time[1])) *
-                               (past.velocity[0] - past.velocity[1]);
+    extrapolate_velocity(state, state.time + 0.5 * dt, v);
   equations.assembler().project(v);
   equations.assembler().add_held_change(state.q, work.held.q, 1.0 / dt, v);
   q = state.q;
@@ -252,6 +264,15 @@ void remember_motion(const VectorX& q1, double dt, State& state) {
 }
 
 }  // namespace
+
+void extrapolate_velocity(const State& state, double time, VectorX& v) {
+  const Motion& past = state.motion;
+  if (past.known < 2)
+    v = state.v;
+  else
+    v = past.velocity[0] +
+        ((time - past.time[0]) / (past.time[0] - past.time[1])) * (past.velocity[0] - past.velocity[1]);
+}
 
 Turning turning(const Model& model, const State& state, const VectorX& q, const double* stretch_stiffness,
                 bool at_end) {
@@ -284,12 +305,14 @@ void book_work(Equations& equations, const Parameters& parameters, const VectorX
 void book_supports(const Equations& equations, const VectorX& v0, const VectorX& v1, double dt, StepWorkspace& work,
                    StepResult& result) {
   VectorX& full_residual = work.newton.evaluation.full_residual;
+  VectorX& momentum = work.difference;  // by how much it grows
+  work.z = v1 - v0;
+  multiply(equations.model(), equations.mass(), work.z, momentum);
   for (const Constraint& c : equations.model().constraints) {
-    const Vector3 mass = c.part(equations.mass().rows), change = c.part(work.change);  // mass couples nothing held
-    const Vector3 force = c.held(full_residual), assumed = c.held(work.assumed);
-    const Vector3 before = c.held(v0), after = c.held(v1);
-    result.support_work += (force - assumed).dot(change) + 0.5 * mass.dot(after.cwiseAbs2() - before.cwiseAbs2());
-    full_residual.segment(c.first, c.size) += (mass.cwiseProduct(after - before) / dt - assumed).head(c.size);
+    const Vector3 gain = c.held(momentum), assumed = c.held(work.assumed);
+    const Vector3 force = c.held(full_residual) - assumed, mean = 0.5 * (c.held(v0) + c.held(v1));
+    result.support_work += force.dot(c.part(work.change)) + gain.dot(mean);
+    full_residual.segment(c.first, c.size) += (gain / dt - assumed).head(c.size);
   }
 }
 
@@ -310,6 +333,10 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
   equations.begin(state, parameters, h, plan.rule == StepRule::energy_momentum, euler ? Inner::end : Inner::middle);
   if (equations.contact() && equations.contact()->blocked()) return result;
   if (!begin_flow(equations, dt, euler, state, work)) return result;
+  if (!model.constraints.empty()) {
+    find_held_velocity(model, plan, state, work);
+    equations.held_acceleration = (work.held_velocity - state.v) / dt;
+  }
   result.newton = find_inner(equations, newton, options, plan, h, state, predictor, work);
   if (!result.newton.converged) return result;
   VectorX& q1 = work.move;
@@ -343,9 +370,8 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
   else
     v1 = 2.0 * work.mean - state.v;
   if (plan.rule == StepRule::energy_momentum) equations.set_turning_velocities(work.change, dt, v1);
-  // Held unknowns have no dynamics of their own: midpoint's 2 v - v0 would ring for ever.
   assembler.project(v1);
-  assembler.add_held_part(work.mean, 1.0, v1);
+  if (!model.constraints.empty()) assembler.add_held_part(work.held_velocity, 1.0, v1);
   book_work(equations, parameters, working, result);
   if (const Contact* contact = equations.contact()) {
     const double by_obstacles = contact->obstacle_work();
@@ -364,7 +390,7 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
   predictor.record(state.time + 0.5 * dt, plan.slot, acceleration, equations.mass().rows, work.assumed);
   if (equations.contact()) result.stiffness_work = equations.contact()->accept(state);
   if (!model.planar()) compute_configuration(model, state, q1, work.after);
-  if (equations.flows()) remember_motion(q1, dt, state);
+  if (state.motion.velocity[0].size() != 0) remember_motion(q1, dt, state);
   accept_configuration(model, q1, work.after, state);
   state.v = v1;
   state.acceleration = acceleration;

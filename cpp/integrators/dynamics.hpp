@@ -55,7 +55,7 @@ struct StepWorkspace {
   HeldTarget held;
   bool repeated = false;  ///< the same step as before, with stiffer contact
   VectorX deep;           ///< where that led
-  VectorX z, move, change, mean, velocity, assumed, difference, whole_acceleration;
+  VectorX z, move, change, mean, velocity, held_velocity, assumed, difference, whole_acceleration;
   Configuration after;
   State from, next;  ///< explicit steps
 };
@@ -64,6 +64,14 @@ struct StepWorkspace {
 StepResult implicit_step(Equations& equations, const Newton& newton, const Options& options,
                          const Parameters& parameters, const StepPlan& plan, State& state, Predictor& predictor,
                          StepWorkspace& work);
+
+/// Velocities in the middle of a step, to second order: those over the last two steps are carried on to `time` [s], for
+/// velocities at their ends ring on modes that are stiff to the midpoint rule. `state.v` where they are not known.
+void extrapolate_velocity(const State& state, double time, VectorX& v);
+
+/// Finds the acceleration at the state where it is not known, and where an explicit step leads: positions in `work.z`,
+/// velocities (predicted ones, to second order) in `work.velocity`.
+void begin_verlet(Equations& equations, const Parameters& parameters, double dt, State& state, StepWorkspace& work);
 
 /// Velocity Verlet; velocity-dependent forces are taken at the half step.
 StepResult verlet_step(Equations& equations, const Parameters& parameters, double dt, State& state,

@@ -206,6 +206,10 @@ void Equations::add_step(const VectorX& z, bool with_matrix, Evaluation& out) {
   const double inverse = h_ != 0.0 ? 1.0 / h_ : 0.0;
   const auto x = z.array(), q0 = state_->q.array(), v0 = state_->v.array();
   acceleration_ = (inverse * (inverse * (x - q0) - v0)).matrix();
+  if (h_ != 0.0 && held_acceleration.size() != 0) {
+    assembler_.project(acceleration_);
+    assembler_.add_held_part(held_acceleration, 1.0, acceleration_);
+  }
   multiply(model_, mass_, acceleration_, inertia_);
   if (h_ != 0.0 && inner_ == Inner::middle) set_turning_inertia(z);
   const auto inertia = inertia_.array();

@@ -66,6 +66,8 @@ class Equations {
              Inner inner = Inner::end);
   /// Explicit nodal forces (per unknown) that act in this step.
   VectorX custom_force;
+  /// Of what supports hold, which acts on the edges next to it; meaningful where held. Empty: as the rest accelerates.
+  VectorX held_acceleration;
   /// Whether Stokeslets act: then `begin_flow` follows `begin`. The fluid's force is that on velocities `v` at
   /// positions `q`, and a local drag for what the velocities of the step differ from them; see flow.cpp. False where no
   /// solution was found.

@@ -84,21 +84,26 @@ double undamped_step(const Equations& equations, double shift) {
 
 }  // namespace
 
+void begin_verlet(Equations& equations, const Parameters& parameters, double dt, State& state, StepWorkspace& work) {
+  if (!state.acceleration_current)
+    explicit_acceleration(equations, parameters, dt, state, state, state.v, work, state.acceleration);
+  state.acceleration_current = true;
+  VectorX &half = work.mean, &q1 = work.z, &v1 = work.velocity;
+  half = state.v + 0.5 * dt * state.acceleration;
+  equations.assembler().project(half);
+  equations.assembler().add_held_change(state.q, work.held.q, 1.0 / dt, half);
+  q1 = state.q + dt * half;
+  // Drag, viscosity and the spin couple want the velocity at the end; a predicted one is second order.
+  v1 = half + 0.5 * dt * state.acceleration;
+}
+
 StepResult verlet_step(Equations& equations, const Parameters& parameters, double dt, State& state,
                        StepWorkspace& work) {
   StepResult result;
   const Model& model = equations.model();
-  const Assembler& assembler = equations.assembler();
   if (!work.held.reachable) return result;
-  if (!state.acceleration_current)
-    explicit_acceleration(equations, parameters, dt, state, state, state.v, work, state.acceleration);
-  VectorX &half = work.mean, &q1 = work.z, &v1 = work.velocity;
-  half = state.v + 0.5 * dt * state.acceleration;
-  assembler.project(half);
-  assembler.add_held_change(state.q, work.held.q, 1.0 / dt, half);
-  q1 = state.q + dt * half;
-  // Drag, viscosity and the spin couple want the velocity at the end; a predicted one is second order.
-  v1 = half + 0.5 * dt * state.acceleration;
+  begin_verlet(equations, parameters, dt, state, work);
+  const VectorX &half = work.mean, &q1 = work.z;
   State& next = work.next;
   const bool in_fluid = model.description.fluid.model != FluidModel::none;
   const bool resisted = equations.contact() || parameters.viscous || parameters.dragged || in_fluid;

@@ -16,8 +16,11 @@ Turning turning(const Model& model, const State& state, const VectorX& q, const 
 /// Work of loads, drag and viscosity over the step, with the forces that acted in it.
 void book_work(Equations& equations, const Parameters& parameters, const VectorX& change, StepResult& result);
 
-/// Held unknowns move as they are told, so their inertia is what changes their velocity, not what the scheme's formula
-/// (`work.assumed`) says: mends the reactions, and gives the supports' work, exact in the kinetic energy.
+/// Held unknowns move as they are told, and so act on the edges next to them by their acceleration, (v1 - v0) / dt.
+/// The supports' work is that of the forces on what they hold, over its way, and
+/// (v0 + v1) / 2 times M (v1 - v0) there: the latter, with what the others' equations say of theirs, is exactly what
+/// the kinetic energy grows by. Puts M (v1 - v0) / dt into the reactions in place of `work.assumed`, the inertia in the
+/// residual.
 void book_supports(const Equations& equations, const VectorX& v0, const VectorX& v1, double dt, StepWorkspace& work,
                    StepResult& result);
 

@@ -294,11 +294,10 @@ class Builder {
       s.node = global_node(description.pass);
       const auto [in, out] = edges_at(description.pass);
       const auto e = static_cast<std::size_t>(out >= 0 ? out : in);
-      s.tangent = (scene_.positions.row(model_.edge_head[e]) - scene_.positions.row(model_.edge_tail[e]))
-                      .transpose()
-                      .normalized();
+      s.tangent = to_eigen(model_.initial_tangent[e]);
       if (holds_frame(description.kind)) {
         s.frame = cluster_at(description.pass).frame;
+        s.tangent = drawn_frame_at(description.pass).col(2);
       } else if (holds_edge(description.kind)) {
         s.edge = static_cast<int>(e);
         s.other_node = model_.edge_tail[e] == s.node ? model_.edge_head[e] : model_.edge_tail[e];

@@ -97,14 +97,18 @@ void add_constraints(Model& model) {
       require(!frame_held[at(support.frame)], "joint is already clamped: release the clamp that is there first");
       frame_held[at(support.frame)] = true;
       const bool turns = spinning && !model.planar();
-      const Matrix3 free = turns ? Matrix3(support.tangent * support.tangent.transpose()) : Matrix3(Matrix3::Zero());
+      const Vector3& gripped = support.description.axis;
+      const Vector3 axis = gripped.isZero() ? support.tangent : gripped;
+      const Matrix3 free = turns ? Matrix3(axis * axis.transpose()) : Matrix3(Matrix3::Zero());
       model.constraints.push_back({model.frame_dof[at(support.frame)], model.frame_size(), free});
     }
   }
   model.edge_lumped.clear();
-  for (int e = 0; e < model.edge_count; ++e)
-    model.edge_lumped.push_back(model.rod_curved[at(model.edge_rod[at(e)])] || node_held[at(model.edge_tail[at(e)])] ||
-                                node_held[at(model.edge_head[at(e)])]);
+  model.edge_held.clear();
+  for (int e = 0; e < model.edge_count; ++e) {
+    model.edge_lumped.push_back(model.rod_curved[at(model.edge_rod[at(e)])]);
+    model.edge_held.push_back(node_held[at(model.edge_tail[at(e)])] || node_held[at(model.edge_head[at(e)])]);
+  }
 }
 
 }  // namespace withe

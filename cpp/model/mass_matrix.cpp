@@ -24,7 +24,7 @@ void set_mass(const Model& model, const Parameters& p, MassMatrix& mass) {
   else
     mass.coupling = p.edge_density.cwiseProduct(model.edge_arc) / 6.0;
   for (int e = 0; e < model.edge_count; ++e)
-    if (model.edge_lumped[at(e)]) mass.coupling(e) = 0.0;
+    if (model.edge_lumped[at(e)] || (p.held_lumped && model.edge_held[at(e)])) mass.coupling(e) = 0.0;
 }
 
 void multiply(const Model& model, const MassMatrix& mass, const VectorX& x, VectorX& out) {

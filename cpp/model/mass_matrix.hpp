@@ -8,9 +8,12 @@
 /// identity of space, momentum and angular momentum are kept as with lumped masses. Bending waves gain most: their
 /// frequencies are off by O(l^4), where lumped masses leave O(l^2), at free ends the most of it.
 ///
-/// Edges with a node that a support holds keep their mass at their nodes: what a support does from step to step then
-/// stays no part of the others' inertia, and of frequencies one edge changes no more than O(l^3). So do those of rods
-/// whose edges are chords of arcs, of more than a radian in all: a chord that spins about the centre of its arc is
+/// A node that a support holds acts on its neighbours through what couples them: a bar of one edge that hangs on a pin
+/// has the moment of inertia m l^2 / 3, and when its pin is moved it lags behind. Its velocity at the end of
+/// a step is known to second order only (`find_held_velocity`), so fourth-order steps leave the mass of edges at held
+/// nodes at their nodes (`Parameters::held_lumped`).
+///
+/// Rods whose edges are chords of arcs, of more than a radian in all, have their mass at their nodes: a chord that spins about the centre of its arc is
 /// nearer to it than the arc, by which the consistent matrix loses kappa^2 l^2 / 6 of the energy and the lumped one
 /// nothing. An explicit scheme divides by masses, and so takes the row sums alone (`Parameters::lumped`).
 

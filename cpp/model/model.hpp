@@ -80,7 +80,7 @@ struct Support {
   int frame = -1;                      ///< of a clamp
   int other_node = -1;                 ///< hold_edge
   int edge = -1;                       ///< hold_edge
-  Vector3 tangent = Vector3::UnitX();  ///< drawn, at the end that is held
+  Vector3 tangent = Vector3::UnitX();  ///< drawn, of what is held: the rod at a frame, or an edge
   int first_constraint = 0;
 };
 
@@ -97,6 +97,7 @@ struct Parameters {
   std::vector<VectorX> natural_twist;       ///< per rod and stencil [rad/m]
   BendMeasure measure;
   bool lumped = false;  ///< whether masses sit at nodes alone; see mass_matrix.hpp
+  bool held_lumped = false;  ///< whether those of edges at held nodes do
 
   // Derived from the above by `update_derived`.
   VectorX node_mass, node_drag;                  ///< of the half edges around a node, and added ones [kg], [N s/m]
@@ -122,6 +123,7 @@ struct Model {
   VectorX edge_arc;               ///< of the rod that an edge is the chord of [m]
   std::vector<bool> rod_curved;   ///< whether its edges are chords of arcs of more than a radian in all
   std::vector<bool> edge_lumped;  ///< whether its mass is at its nodes; see mass_matrix.hpp
+  std::vector<bool> edge_held;    ///< whether a support holds one of its nodes
   std::vector<BendStencil> bend;
   std::vector<int> reversed_bend;  ///< stencils with an edge against its rod
   std::vector<FrameStencil> half;

@@ -45,12 +45,14 @@ bool fits(const ObstacleDescription& o, const Vector3& corner, const Vector3& no
 }  // namespace
 
 std::optional<Plane> find_plane(const SceneDescription& scene, std::optional<bool> asked, std::string& reason) {
-  if (scene.has_custom_force) {
+  // Who asks for a plane sees to it that such forces stay in it.
+  const bool sure = asked.value_or(false);
+  if (scene.has_custom_force && !sure) {
     reason = "a custom force may point anywhere";
     return std::nullopt;
   }
   for (const LoadDescription& load : scene.loads)
-    if (load.varies) {
+    if (load.varies && !sure) {
       reason = "a load that varies may leave any plane";
       return std::nullopt;
     }

@@ -41,10 +41,11 @@ auto find_record(Records& records, const ContactKey& key) -> decltype(records.da
 
 /// Configuration, velocities and the frames they are measured from. The frames advance by time-parallel
 /// transport once per accepted step or load increment.
-/// Mean velocities over the last two steps, the later one first, by which a fluid's force is predicted.
+/// Mean velocities over the last two steps, the later one first, by which a fluid's force, custom
+/// ones and the velocities of supports are predicted.
 struct Motion {
   int known = 0;
-  VectorX velocity[2];  ///< [m/s]; empty where no fluid asks for them
+  VectorX velocity[2];  ///< [m/s]; empty where nothing asks for them
   double time[2] = {};  ///< middles of these steps [s]
 };
 

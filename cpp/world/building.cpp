@@ -195,7 +195,7 @@ void World::Implementation::rebuild(Rebuild why) {
     } else {
       kept = StepStart{};
     }
-    // A support changes where the mass of the edges at it sits, and with that what kinetic energy there is.
+    // Frames that come and go carry inertia, and a support may change where the mass of edges sits.
     EnergyScratch& scratch = energy_scratch;
     set_mass(old, parameters, scratch.mass);
     const double before = kinetic_energy(old, scratch.mass, from.v);

@@ -86,6 +86,7 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
   rest();
   StaticResult r;
   try {
+    if (force_function) ask_custom_force(system, time, state.q, state.v);
     aim_obstacles(system, time);
     r = find_equilibrium(system, *newton, options, parameters, boundary, state, work.newton);
     // Contact that turns out too soft is made stiffer, from where it has settled.

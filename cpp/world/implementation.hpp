@@ -129,7 +129,9 @@ struct World::Implementation {
   std::vector<ObstacleMotion> obstacle_motions;  ///< none until one moves
   std::vector<NaturalRamp> ramps;
   std::vector<Vector3> load_values;
-  MatrixX3 custom_force;
+  MatrixX3 custom_force;                         ///< of the last step [N]
+  VectorX custom_force_before;                   ///< per unknown, at the start of an explicit step
+  World::ForceFunction force_function;
   std::function<void(double, double)> callback;  ///< StepCallback, bound to its world
   std::function<void()> poll;
   std::atomic<bool> interrupted{false};
@@ -178,6 +180,10 @@ struct World::Implementation {
   void spread_jumps(double duration);
   void hold_now(HeldTarget& target) const;
   void set_motion_at(SupportMotion& motion, double time) const;
+  /// Asks for custom forces at a time and a state, on each unknown.
+  void ask_custom_force(Equations& target, double time, const VectorX& q, const VectorX& v);
+  /// Those of a step of dt, which leads to where `work.held` says.
+  void find_custom_force(Equations& target, double dt);
   void update_custom_force(Equations& target) const;
 
   // stepping.cpp

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "common/check.hpp"
 #include "geometry/rotation.hpp"
 #include "world/implementation.hpp"
 
@@ -112,6 +113,55 @@ void World::Implementation::hold_now(HeldTarget& target) const {
       }
     }
   }
+}
+
+void World::Implementation::ask_custom_force(Equations& target, double time, const VectorX& q, const VectorX& v) {
+  MatrixX3 positions(model.node_count, 3), velocities(model.node_count, 3);
+  for (int i = 0; i < model.node_count; ++i) {
+    positions.row(i) = node_position(model, q, i);
+    velocities.row(i) = node_velocity(model, v, i);
+  }
+  const MatrixX3 force = force_function(time, positions, velocities);
+  require(force.rows() == model.node_count, "custom force must have one row a node, " +
+                                                std::to_string(model.node_count) + ", got " +
+                                                std::to_string(force.rows()));
+  require(force.allFinite(), "custom force must be finite");
+  if (model.planar())
+    require((force * model.plane->normal).norm() <= 1e-8 * force.norm(),
+            "a custom force leaves the plane of the scene: build it with planar=False");
+  custom_force = force;
+  update_custom_force(target);
+}
+
+/// Forces at the start of a step would feed a spring's oscillation, by 1 + (w dt)^2 / 2 a step. At q0 + (dt / 2) v0,
+/// which under the midpoint rule is q1 - (dt / 2) v1 as well, they leave the step symmetric in time, of second order,
+/// and stable for a spring of frequency w < 2 / dt, however stiff the rod that it pulls at: its matrix has the
+/// determinant 1 and the trace 2 - (w dt)^2. Backward Euler's at the predicted end damp, for w < sqrt(4/3) / dt.
+/// Verlet's end is known.
+void World::Implementation::find_custom_force(Equations& target, double dt) {
+  VectorX &q = work.z, &v = work.velocity;
+  if (options.integrator == Integrator::verlet) {
+    if (!state.acceleration_current) ask_custom_force(target, state.time, state.q, state.v);
+    update_custom_force(target);
+    begin_verlet(target, parameters, dt, state, work);
+    custom_force_before = target.custom_force;
+    ask_custom_force(target, state.time + dt, q, v);
+    return;
+  }
+  const Assembler& assembler = target.assembler();
+  const double time = force_time(state.time, dt);
+  const auto hold = [&] {
+    assembler.project(v);
+    assembler.add_held_change(state.q, work.held.q, 1.0 / dt, v);
+  };
+  v = state.v;
+  hold();
+  q = state.q + (time - state.time) * v;
+  if (conserving()) {
+    extrapolate_velocity(state, time, v);
+    hold();
+  }
+  ask_custom_force(target, time, q, v);
 }
 
 void World::Implementation::update_custom_force(Equations& target) const {

@@ -6,7 +6,7 @@
 namespace withe {
 namespace {
 
-constexpr std::uint64_t kMagic = 0x3753454854495755ull;
+constexpr std::uint64_t kMagic = 0x3853454854495755ull;
 
 /// FNV-1a.
 std::uint64_t hash_of(std::string_view bytes) {
@@ -63,6 +63,7 @@ void exchange(Archive& io, Self& self) {
   io(p.edge_bend);
   io(p.gravity);
   io(p.fluid_viscosity);
+  io(p.held_lumped);
   for (auto& m : p.natural_curvature) io(m);
   for (auto& v : p.natural_twist) io(v);
   for (auto& r : self.ramps) {
@@ -159,6 +160,7 @@ std::string World::snapshot() const {
     w(d.pass.node);
     w(d.free);
     w(d.gripped);
+    w(d.axis);
   }
   exchange(w, self);
   w(hash_of(w.bytes));
@@ -179,6 +181,7 @@ void World::restore(const std::string& bytes) {
   // Everything is read into a copy, so that a damaged file changes nothing.
   auto fresh = std::make_unique<Implementation>(*implementation_);
   fresh->callback = implementation_->callback;
+  fresh->force_function = implementation_->force_function;
   bool spatial = false, obstacles_move = false;
   std::int64_t count = 0;
   r(spatial);
@@ -203,6 +206,7 @@ void World::restore(const std::string& bytes) {
             "snapshot is damaged: support of a node that is not there");
     r(d.free);
     r(d.gripped);
+    r(d.axis);
     supports.push_back(d);
     active.push_back(on);
   }
@@ -210,7 +214,7 @@ void World::restore(const std::string& bytes) {
     for (std::size_t s = 0; s < supports.size(); ++s) {
       const SupportDescription &a = supports[s], &b = fresh->description.supports[s];
       if (active[s] != fresh->model.supports[s].active || a.kind != b.kind || a.pass.rod != b.pass.rod ||
-          a.pass.node != b.pass.node || a.free != b.free || a.gripped != b.gripped)
+          a.pass.node != b.pass.node || a.free != b.free || a.gripped != b.gripped || a.axis != b.axis)
         return false;
     }
     return true;

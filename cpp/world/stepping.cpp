@@ -287,6 +287,7 @@ bool World::Implementation::inner_step(double dt, int slot, double& error) {
   };
   StepResult r;
   try {
+    if (force_function) find_custom_force(system, dt);
     r = step_by_rule(dt, slot);
     for (int tries = 0; r.too_deep && tries < kMostStiffenings; ++tries) {
       support_work += system.contact()->stiffen(state);
@@ -310,6 +311,8 @@ bool World::Implementation::inner_step(double dt, int slot, double& error) {
   guard.turn = std::max(guard.turn, r.largest_turn);
   guard.stretch_gain += r.stretch_gain;
   load_work += r.load_work;
+  if (force_function && options.integrator == Integrator::verlet)
+    load_work += 0.5 * (custom_force_before - system.custom_force).dot(work.change);
   dissipated += r.dissipated;
   support_work += r.support_work + r.stiffness_work;
   contact_guard.put_in = r.pressing_gain;

@@ -43,11 +43,20 @@ int World::add_support(const SupportDescription& support) {
     self.rebuild(Rebuild::running);
   } catch (...) {
     auto callback = self.callback;
+    auto force_function = self.force_function;
     auto poll = self.poll;
     implementation_ = std::make_unique<Implementation>(backup);
     implementation_->callback = callback;
+    implementation_->force_function = force_function;
     implementation_->poll = poll;
     throw;
+  }
+  if (support.kind == SupportKind::spinning_clamp) {
+    // Its frame has found its place, and with that the tangent that it holds.
+    const Support& bearing = self.model.supports[at(index)];
+    self.description.supports[at(index)].axis =
+        frame_rotation(self.model, self.state, bearing.frame) * bearing.tangent;
+    self.rebuild(Rebuild::running);
   }
   const Support& s = self.model.supports[at(index)];
   SupportMotion& m = self.motions[at(index)];
@@ -108,6 +117,16 @@ void World::prescribe_support(int support, const Vector3& position, const Matrix
     if (std::abs((position - plane.origin).dot(plane.normal)) > 1e-9 * self.model.length_scale ||
         (rotation * plane.normal - plane.normal).norm() > 1e-9)
       self.leave_plane("a moving support");
+  }
+  if (self.options.integrator == Integrator::fourth_order && !self.parameters.held_lumped) {
+    // Velocities of supports are known to second order: see mass_matrix.hpp.
+    MassMatrix& mass = self.energy_scratch.mass;
+    set_mass(self.model, self.parameters, mass);
+    self.support_work -= kinetic_energy(self.model, mass, self.state.v);
+    self.parameters.held_lumped = true;
+    update_derived(self.model, self.parameters);
+    set_mass(self.model, self.parameters, mass);
+    self.support_work += kinetic_energy(self.model, mass, self.state.v);
   }
   SupportMotion& m = self.motions[at(support)];
   m.to_position = m.from_position = position;

@@ -106,15 +106,7 @@ void World::set_step_callback(const StepCallback& callback) {
 
 void World::set_poll(const std::function<void()>& poll) { implementation_->poll = poll; }
 
-void World::set_custom_force(const MatrixX3& force) {
-  Implementation& self = *implementation_;
-  require(force.rows() == self.model.node_count, "custom force must have one row a node, " +
-                                                     std::to_string(self.model.node_count) + ", got " +
-                                                     std::to_string(force.rows()));
-  require(force.allFinite(), "custom force must be finite");
-  self.custom_force = force;
-  self.state.acceleration_current = false;
-}
+void World::set_force_function(const ForceFunction& force) { implementation_->force_function = force; }
 
 void World::set_load(int load, const Vector3& value) {
   Implementation& self = *implementation_;

@@ -143,14 +143,18 @@ class World {
   void interrupt();
 
   // Called before every inner step. `force_time`: when loads act in this step; `end_time`: where supports
-  // shall be at its end. May call set_load, prescribe and set_custom_force. Empty: none.
+  // shall be at its end. May call set_load and prescribe. Empty: none.
   using StepCallback = std::function<void(World&, double force_time, double end_time)>;
   void set_step_callback(const StepCallback& callback);
   /// Asked before every inner step and Newton iteration; what it throws ends the call, with the state the last
   /// accepted one. Must leave the world alone. Empty: none.
   void set_poll(const std::function<void()>& poll);
-  /// Explicit nodal forces (nodes x 3) [N] used from now on.
-  void set_custom_force(const MatrixX3& force);
+  /// Forces on all nodes (nodes x 3) [N] at a time [s], from their positions [m] and velocities [m/s].
+  using ForceFunction =
+      std::function<MatrixX3(double time, const MatrixX3& positions, const MatrixX3& velocities)>;
+  /// Asked once an inner step, at the time at which the scheme's forces act, for the state extrapolated to then. Empty:
+  /// the last forces stay.
+  void set_force_function(const ForceFunction& force);
 
   void set_load(int load, const Vector3& value);
   Vector3 load(int load) const;

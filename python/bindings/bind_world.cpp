@@ -96,31 +96,31 @@ using WorldClass = py::class_<GuardedWorld>;
 void define_steps(WorldClass& world) {
   world.def(
       "step",
-      [](GuardedWorld& self, int count, const py::object& callback) {
-        self.run([count](World& w) { w.step(count); }, callback);
+      [](GuardedWorld& self, int count, const py::object& callback, const py::object& forces) {
+        self.run([count](World& w) { w.step(count); }, callback, forces);
       },
-      py::arg("count"), py::arg("callback"), "Advance exactly `count` time steps.");
+      py::arg("count"), py::arg("callback"), py::arg("forces"), "Advance exactly `count` time steps.");
   world.def(
       "advance_to",
-      [](GuardedWorld& self, double time, const py::object& callback) {
-        self.run([time](World& w) { w.advance_to(time); }, callback);
+      [](GuardedWorld& self, double time, const py::object& callback, const py::object& forces) {
+        self.run([time](World& w) { w.advance_to(time); }, callback, forces);
       },
-      py::arg("time"), py::arg("callback"), "Advance to a time [s].");
+      py::arg("time"), py::arg("callback"), py::arg("forces"), "Advance to a time [s].");
   world.def(
       "equilibrium",
-      [](GuardedWorld& self, const py::object& callback) {
-        return self.run([](World& w) { return w.equilibrium(); }, callback);
+      [](GuardedWorld& self, const py::object& callback, const py::object& forces) {
+        return self.run([](World& w) { return w.equilibrium(); }, callback, forces);
       },
-      py::arg("callback"), "Find the static equilibrium.");
+      py::arg("callback"), py::arg("forces"), "Find the static equilibrium.");
   world.def(
       "equilibrium_path",
       [](GuardedWorld& self, const std::vector<int>& loads, double start, double end, int most_points, double turn,
-         const py::object& callback) {
+         const py::object& callback, const py::object& forces) {
         const PathOptions wanted{loads, start, end, most_points, turn};
-        return self.run([&wanted](World& w) { return w.equilibrium_path(wanted); }, callback);
+        return self.run([&wanted](World& w) { return w.equilibrium_path(wanted); }, callback, forces);
       },
       py::arg("loads"), py::arg("start"), py::arg("end"), py::arg("most_points"), py::arg("turn"), py::arg("callback"),
-      "Follow a path of equilibria through limit points.");
+      py::arg("forces"),      "Follow a path of equilibria through limit points.");
   world.def("check_idle", [](GuardedWorld& self) { (void)self.changing(); }, "Raises in the middle of a step.");
   world.def(
       "snapshot", [](const GuardedWorld& self) { return py::bytes(self.reading().snapshot()); }, "The whole state.");
@@ -137,9 +137,6 @@ void define_parameters(WorldClass& world) {
       "set_load", [](GuardedWorld& self, int load, const Vector3& value) { self.steering().set_load(load, value); },
       py::arg("load"), py::arg("value"));
   world.def("load", [](const GuardedWorld& self, int load) { return self.reading().load(load); }, py::arg("load"));
-  world.def(
-      "set_custom_force", [](GuardedWorld& self, const MatrixX3& force) { self.steering().set_custom_force(force); },
-      py::arg("force"));
   world.def(
       "set_natural_curvature",
       [](GuardedWorld& self, int rod, const MatrixX2& curvature, double over) {

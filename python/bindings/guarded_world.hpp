@@ -23,7 +23,7 @@ class GuardedWorld {
     refuse(stepping_ && !in_own_callback());
     return world_;
   }
-  /// For what a callback is there to set: loads, prescribed motion and custom forces.
+  /// For what a callback is there to set: loads and prescribed motion.
   World& steering() {
     refuse(stepping_ && !in_own_callback());
     return world_;
@@ -34,10 +34,10 @@ class GuardedWorld {
     return world_;
   }
   /// Runs `advance(world)` without the GIL. `callback(force_time, end_time)`, or None, is called before
-  /// every inner step. Signals are looked at every 50 ms between inner steps, where their handlers may read the
+  /// every inner step, and `forces(time, positions, velocities)`, or None, for its custom forces. Signals are looked at every 50 ms between inner steps, where their handlers may read the
   /// world, and every 100 ms within a step that takes so long, where they may not.
   template <class Advance>
-  auto run(Advance advance, const py::object& callback) {
+  auto run(Advance advance, const py::object& callback, const py::object& forces) {
     refuse(stepping_);
     Stepping stepping(*this);
     auto polled = Clock::now();
@@ -53,6 +53,12 @@ class GuardedWorld {
       if (poll) check_signals();
       if (!callback.is_none()) callback(force_time, end_time);
     });
+    if (!forces.is_none())
+      world_.set_force_function([&](double time, const MatrixX3& positions, const MatrixX3& velocities) {
+        const py::gil_scoped_acquire gil;
+        const InCallback mark(*this);
+        return forces(time, positions, velocities).template cast<MatrixX3>();
+      });
     world_.set_poll([&] {
       if (Clock::now() - polled < std::chrono::milliseconds(100)) return;
       const py::gil_scoped_acquire gil;
@@ -69,6 +75,7 @@ class GuardedWorld {
     explicit Stepping(GuardedWorld& owner) : self(owner) { self.stepping_ = true; }
     ~Stepping() {
       self.world_.set_step_callback({});
+      self.world_.set_force_function({});
       self.world_.set_poll({});
       self.stepping_ = false;
     }

@@ -536,7 +536,9 @@ class World:
     """
     def __init__(self, description: SceneDescription, options: Options) -> None: ...
     def add_support(self, support: SupportDescription) -> int: ...
-    def advance_to(self, time: typing.SupportsFloat | typing.SupportsIndex, callback: typing.Any) -> None:
+    def advance_to(
+        self, time: typing.SupportsFloat | typing.SupportsIndex, callback: typing.Any, forces: typing.Any
+    ) -> None:
         """
         Advance to a time [s].
         """
@@ -556,7 +558,7 @@ class World:
         self, rod: typing.SupportsInt | typing.SupportsIndex
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 9]"]: ...
     def energy(self) -> Energy: ...
-    def equilibrium(self, callback: typing.Any) -> EquilibriumResult:
+    def equilibrium(self, callback: typing.Any, forces: typing.Any) -> EquilibriumResult:
         """
         Find the static equilibrium.
         """
@@ -611,7 +613,6 @@ class World:
         """
     def rod_energy(self, rod: typing.SupportsInt | typing.SupportsIndex) -> Energy: ...
     def set_added_mass(self, mass: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> None: ...
-    def set_custom_force(self, force: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"]) -> None: ...
     def set_fluid_viscosity(self, viscosity: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
     def set_gravity(self, gravity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None: ...
     def set_load(
@@ -642,7 +643,7 @@ class World:
     def spins(
         self, rod: typing.SupportsInt | typing.SupportsIndex
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
-    def step(self, count: typing.SupportsInt | typing.SupportsIndex, callback: typing.Any) -> None:
+    def step(self, count: typing.SupportsInt | typing.SupportsIndex, callback: typing.Any, forces: typing.Any) -> None:
         """
         Advance exactly `count` time steps.
         """

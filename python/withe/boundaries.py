@@ -43,10 +43,8 @@ class Boundaries:
         Raises
         ------
         ValueError
-            A node that is held already, or spin=True with hold="frame", which only a scene may be built with.
+            A node that is held already.
         """
-        if spin and hold == "frame":
-            raise ValueError("spin of a clamp put on while running needs hold='edge'")
         return self._hold(make_clamp(self._directory, node, hold, free, spin, name))
 
     def pin(self, node: NodeHandle | str, *, free: npt.ArrayLike | None = None, name: str | None = None) -> Support:

@@ -282,18 +282,20 @@ class Control(Boundaries):
         """What to call before every inner step, if anything."""
         now = self._world.time
         moving = any(not _finished(path, now) for path in self._settings.paths.values())
-        if moving or self._settings.functions or self._custom_forces:
+        if moving or self._settings.functions:
             return self._apply_functions
         return None
 
     def _apply_functions(self, force_time: float, end_time: float) -> None:
-        """Evaluate loads, paths and custom forces for the coming inner step."""
+        """Evaluate loads and paths for the coming inner step."""
         if self._settings.functions:
             for index, part in enumerate(self._loads):
                 function = self._settings.functions.get(part.name)
                 if function is not None:
                     what = f"{part.kind} {part.name!r} at t = {force_time:g}"
-                    self._world.set_load(index, validation.vector(function(force_time), what))
+                    value = validation.vector(function(force_time), what)
+                    self._check_in_plane(value, what, along_normal=part.kind == "moment")
+                    self._world.set_load(index, value)
         for name, path in self._settings.paths.items():
             if name not in self._settings.supports and (obstacle := self._obstacle(name)) is not None:
                 what = f"path of {name!r} at t = {end_time:g}"
@@ -306,13 +308,33 @@ class Control(Boundaries):
             owner = f"support {name!r}"
             position, rotation = evaluate_path(path, end_time, present, support.kind != "pin", owner)
             self._world.prescribe_support(index, position, rotation)
-        if self._custom_forces:
-            positions, velocities = self._world.positions(), self._world.velocities()
-            total = np.zeros_like(positions)
-            for force in self._custom_forces:
-                value = force.function(self._world.time, positions.copy(), velocities.copy())
-                total += validation.number_array(value, f"custom force {force.name!r}", total.shape)
-            self._world.set_custom_force(total)
+
+    def _force_function(self) -> Callable[[float, FloatArray, FloatArray], FloatArray] | None:
+        """What finds the custom forces of an inner step, if any."""
+        return self._custom_force if self._custom_forces else None
+
+    def _custom_force(self, time: float, positions: FloatArray, velocities: FloatArray) -> FloatArray:
+        total = np.zeros(positions.shape)
+        for force in self._custom_forces:
+            value = force.function(time, positions.copy(), velocities.copy())
+            what = f"custom force {force.name!r}"
+            forces = validation.number_array(value, what, total.shape)
+            self._check_in_plane(forces, f"{what} at t = {time:g}")
+            total += forces
+        return total
+
+    def _check_in_plane(self, value: FloatArray, what: str, along_normal: bool = False) -> None:
+        """Refuse what a function gave that leaves the plane of a simulation built with planar=True."""
+        if not self._options["planar"]:
+            return
+        normal = np.array(self._world.plan.plane_normal)
+        out = value - np.outer(value @ normal, normal).reshape(value.shape) if along_normal else value @ normal
+        if np.linalg.norm(out) > 1e-8 * np.linalg.norm(value):
+            must = "along the normal of" if along_normal else "in"
+            raise ValueError(
+                f"{what} must stay {must} the plane of a scene built with planar=True, whose normal is "
+                f"({normal[0]:g}, {normal[1]:g}, {normal[2]:g}), got {np.array2string(value, threshold=9)}"
+            )
 
 
 def _finished(path: Path, time: float) -> bool:

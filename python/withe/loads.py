@@ -118,13 +118,21 @@ class Loads:
     def add_custom_force(
         self, function: Callable[[float, FloatArray, FloatArray], npt.ArrayLike], *, name: str | None = None
     ) -> CustomForce:
-        """Add forces that a function computes, once before every step (explicitly).
+        """Add forces that a function computes: springs, magnets, buoyancy.
+
+        They are found once a step, where the scheme's own forces act, for positions and velocities
+        extrapolated to then: to the middle of an implicit midpoint or energy-momentum step (second order;
+        an oscillation of angular frequency w, in radians a second, keeps its amplitude for w time_step < 2;
+        where neighbours go to and fro, edges carry a third of their mass, and w^2 is up to three times the
+        spring constant over the mass at a node), to the end of a backward Euler step, and at the end that
+        a Verlet step reaches. In an equilibrium they are those at the present state.
 
         Parameters
         ----------
         function : callable
             ``function(time, positions, velocities)`` returns the force on every node of the scene,
-            shape (nodes, 3) [N]; time [s], positions [m] and velocities [m/s] are those before the step.
+            shape (nodes, 3) [N]; time [s], positions [m] and velocities [m/s] are those at which the force
+            shall act.
         name : str
 
         Returns

@@ -328,6 +328,7 @@ class Scene(Loads, Contacts, Fluids):
         planar : bool
             Force two or three dimensions; by default a scene that lies in a plane is solved in it. A
             straight scene without gravity lies in many, and ``True`` takes that of its first director.
+            Loads that are functions and custom forces may leave any plane; with ``True`` they must not.
         duration : float [s]
             Over which `tolerance` holds; 1 s by default.
         bending : {"angle", "tangent"}

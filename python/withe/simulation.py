@@ -122,12 +122,12 @@ class Simulation(Control):
 
     def _step(self, count: int) -> None:
         with self._convergence():
-            self._world.step(count, self._step_callback())
+            self._world.step(count, self._step_callback(), self._force_function())
 
     def _advance_to(self, time: float) -> None:
         """Advance to a time, with steps of equal length that are no longer than the time step."""
         with self._convergence():
-            self._world.advance_to(time, self._step_callback())
+            self._world.advance_to(time, self._step_callback(), self._force_function())
 
     @overload
     def equilibrium(self) -> Equilibrium: ...
@@ -219,7 +219,7 @@ class Simulation(Control):
             return self._arc_length(load, start, to, steps, turn)
         self._apply_functions(self._world.time, self._world.time)
         with self._convergence():
-            found = self._world.equilibrium(None)
+            found = self._world.equilibrium(None, self._force_function())
         stability: Stability = "stable" if found.stable else "diverges"
         if not found.decided:
             stability = self.linearise().stability
@@ -241,7 +241,7 @@ class Simulation(Control):
         self._apply_functions(self._world.time, self._world.time)
         with self._convergence():
             found = self._world.equilibrium_path(
-                [self._load_index(part) for part in parts], begin, end, count + 1, widest, None
+                [self._load_index(part) for part in parts], begin, end, count + 1, widest, None, self._force_function()
             )
         points = found.points
         return EquilibriumPath(

@@ -68,6 +68,9 @@ TEST(Plane, IsNotFoundWhereAnythingLeavesIt) {
     b.scene.loads[0].varies = true;
   }));
   EXPECT_TRUE(spoiled([](SceneBuilder& b) { b.scene.has_custom_force = true; }));
+  SceneBuilder asked = flat_arc();
+  asked.scene.has_custom_force = true;
+  EXPECT_TRUE(build_model(asked.scene, true).planar());  // who asks for a plane keeps forces in it
   EXPECT_TRUE(spoiled([](SceneBuilder& b) { b.scene.rods[0].natural_twist(2) = 0.1; }));
   EXPECT_TRUE(spoiled([](SceneBuilder& b) { b.scene.rods[0].natural_curvature(2, 0) = 0.1; }));  // towards d1 = y
   EXPECT_TRUE(spoiled([](SceneBuilder& b) {

@@ -486,7 +486,6 @@ TEST(BadInput, IsRefusedByName) {
   EXPECT_THROW(world.move_support(0, Vector3(nan, 0, 0), I, 0.0), std::invalid_argument);
   EXPECT_THROW(world.move_support(5, Vector3::Zero(), I, 0.0), std::invalid_argument);
   EXPECT_THROW(world.set_velocities(MatrixX3::Zero(3, 3)), std::invalid_argument);
-  EXPECT_THROW(world.set_custom_force(MatrixX3::Zero(3, 3)), std::invalid_argument);
   EXPECT_THROW(world.set_added_mass(VectorX::Constant(12, -1.0)), std::invalid_argument);
   EXPECT_TRUE(same_state(world, before));
 }

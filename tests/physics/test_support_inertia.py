@@ -1,0 +1,101 @@
+"""Inertia of edges at nodes that supports hold, and what a clamp that may spin holds."""
+
+import numpy as np
+import pytest
+
+import withe
+
+STEEL = {"radius": 5e-3, "material": withe.Material(youngs_modulus=2e11, poisson_ratio=0.3, density=7850.0)}
+
+
+@pytest.mark.parametrize("integrator", ["implicit_midpoint", "energy_momentum", "fourth_order"])
+@pytest.mark.parametrize("support", ["pin", "stub", "revolute"])
+@pytest.mark.parametrize("edges", [1, 3])
+def test_a_bar_on_a_pin_swings_with_its_moment_of_inertia(integrator, support, edges):
+    """m l^2 / 3 about the pin: a period of 2 pi sqrt(2 l / 3 g)."""
+    scene = withe.Scene()
+    angle = 0.01
+    tip = (np.sin(angle), 0, -np.cos(angle))
+    bar = scene.add_rod(start=(0, 0, 0), end=tip, nodes=edges + 1, **STEEL)
+    if support == "pin":
+        scene.pin(bar.start)
+    elif support == "stub":
+        stub = scene.add_rod(start=(0, 0, 1e-3), end=(0, 0, 0), nodes=2, **STEEL)
+        scene.clamp(stub.start)
+        scene.join(stub.end, bar.start, "pinned")
+    else:
+        wall = scene.add_rod(start=(0, -0.1, 0), end=(0, 0, 0), nodes=3, **STEEL)
+        scene.clamp(wall.start)
+        scene.join(wall.end, bar.start, "revolute", axis=(0, 1, 0))
+    simulation = scene.build(time_step=2e-3, integrator=integrator)
+    period = 2 * np.pi * np.sqrt(2 / 3 / 9.81)
+    simulation.run(0.25 * period, progress=False)  # through the lowest point
+    x, v = simulation.positions(bar)[-1, 0], simulation.velocities(bar)[-1, 0]
+    assert 0.25 * period - x / v == pytest.approx(0.25 * period, rel=2e-4)
+
+
+@pytest.mark.parametrize("planar", [True, False])
+def test_a_support_that_moves_books_its_work_to_the_last_digit(planar):
+    """Of a stiff bar of few edges its pin is shaken: what it gives is the energy that is there."""
+    scene = withe.Scene()
+    bar = scene.add_rod(
+        start=(0, 0, 0),
+        end=(0.3, 0, -1),
+        nodes=3,
+        radius=2e-2,
+        material=withe.Material(youngs_modulus=1e7, density=1e3),
+    )
+    hand = scene.pin(bar.start)
+    simulation = scene.build(time_step=2e-3, integrator="energy_momentum", planar=planar, step_tolerance=1e-12)
+    simulation.move(hand, path=lambda t: (0.1 * np.sin(9.0 * t) ** 2, 0.0, 0.05 * np.sin(7.0 * t) ** 2))
+    first = simulation.energy()
+    given = 0.0
+    for _ in range(300):
+        before = simulation.positions(bar)[0]
+        simulation.step()
+        given += simulation.reaction(hand).force @ (simulation.positions(bar)[0] - before)
+        now = simulation.energy()
+        assert now.total - now.work == pytest.approx(first.total - first.work, abs=1e-8)
+    # The force over the way, too, to what a velocity at the end of a step differs from that over it.
+    assert given == pytest.approx(now.work, abs=1e-3 * now.kinetic)
+
+
+def test_the_free_end_of_a_bar_falls_behind_where_its_other_end_is_jerked():
+    """A bar whose end is given a velocity turns about a point a third of its length from the other: -1/2 there."""
+    scene = withe.Scene(gravity=(0, 0, 0))
+    bar = scene.add_rod(start=(0, 0, 0), end=(0, 0, 1), nodes=2, **STEEL)
+    hand = scene.pin(bar.start)
+    simulation = scene.build(time_step=1e-4)
+    simulation.move(hand, position=(1e-3, 0, 0), over=1e-2)
+    simulation.step(3)
+    assert simulation.velocities(bar)[1, 0] == pytest.approx(-0.05, rel=1e-3)
+
+
+@pytest.mark.parametrize("nodes", [11, 21])
+@pytest.mark.parametrize("while_running", [False, True])
+def test_a_shaft_turns_in_a_bearing_without_a_motion_of_its_line(nodes, while_running):
+    """A naturally straight round shaft, bent into a quarter circle: it turns about its tangent at the bearing."""
+    angle = np.linspace(0, np.pi / 2, 401)
+    scene = withe.Scene(gravity=(0, 0, 0))
+    shaft = scene.add_rod(
+        points=0.3 * np.stack([np.sin(angle), 0 * angle, 1 - np.cos(angle)], 1),
+        nodes=nodes,
+        radius=3e-3,
+        natural="straight",
+        material=withe.Material(youngs_modulus=1e8, poisson_ratio=0.5, density=1200.0, viscosity=1e5),
+    )
+    motor = scene.clamp(shaft.start)
+    bearing = scene.clamp(shaft.end, spin=not while_running)
+    simulation = scene.build(integrator="static", time_step=0.1)
+    if while_running:
+        # Elsewhere than it was drawn.
+        simulation.move(bearing, tangent=(0.3, 0.0, 1.0), over=0.5)
+        simulation.step(6)
+        simulation.release(bearing)
+        simulation.clamp(shaft.end, spin=True)
+    simulation.equilibrium()
+    before, stored = simulation.positions(shaft), simulation.energy().bend
+    simulation.move(motor, roll=np.pi, over=2.0)
+    simulation.step(21)
+    assert np.abs(simulation.positions(shaft) - before).max() < 2e-6
+    assert simulation.energy().bend == pytest.approx(stored, rel=1e-5)
