@@ -221,8 +221,9 @@ double estimated_error(Equations& equations, const Newton& newton, const Options
   return moved_by(error, equations, newton, h, work);
 }
 
-/// Velocity at the end of a step of what supports hold. They have no dynamics of their own, and midpoint's 2 v - v0 would
-/// ring for ever: their mean velocities of this step and the last are carried on, to second order, but where they jump.
+/// Velocity at the end of a step of what supports hold. They have no dynamics of their own, and midpoint's 2 v - v0
+/// would ring for ever: their mean velocities of this step and the last are carried on, to second order, but where they
+/// jump.
 void find_held_velocity(const Model& model, const StepPlan& plan, const State& state, StepWorkspace& work) {
   VectorX& v = work.held_velocity;
   v = (work.held.q - state.q) / plan.dt;

@@ -80,7 +80,8 @@ struct SupportDescription {
   RodPass pass;
   Matrix3 free = Matrix3::Zero();  ///< projector onto the directions along which the node may slide
   bool gripped = false;            ///< put on while the scene runs, so that it must not change what is stored
-  Vector3 axis = Vector3::Zero();  ///< about which a spinning clamp turns that was put on then; else that of the drawing
+  Vector3 axis =
+      Vector3::Zero();  ///< about which a spinning clamp turns that was put on then; else that of the drawing
 };
 
 enum class LoadKind {

@@ -13,9 +13,10 @@
 /// a step is known to second order only (`find_held_velocity`), so fourth-order steps leave the mass of edges at held
 /// nodes at their nodes (`Parameters::held_lumped`).
 ///
-/// Rods whose edges are chords of arcs, of more than a radian in all, have their mass at their nodes: a chord that spins about the centre of its arc is
-/// nearer to it than the arc, by which the consistent matrix loses kappa^2 l^2 / 6 of the energy and the lumped one
-/// nothing. An explicit scheme divides by masses, and so takes the row sums alone (`Parameters::lumped`).
+/// Rods whose edges are chords of arcs, of more than a radian in all, have their mass at their nodes: a chord that
+/// spins about the centre of its arc is nearer to it than the arc, by which the consistent matrix loses kappa^2 l^2 / 6
+/// of the energy and the lumped one nothing. An explicit scheme divides by masses, and so takes the row sums alone
+/// (`Parameters::lumped`).
 
 #include "model/model.hpp"
 

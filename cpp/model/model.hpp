@@ -96,7 +96,7 @@ struct Parameters {
   std::vector<MatrixX2> natural_curvature;  ///< per rod and stencil, smooth [1/m]
   std::vector<VectorX> natural_twist;       ///< per rod and stencil [rad/m]
   BendMeasure measure;
-  bool lumped = false;  ///< whether masses sit at nodes alone; see mass_matrix.hpp
+  bool lumped = false;       ///< whether masses sit at nodes alone; see mass_matrix.hpp
   bool held_lumped = false;  ///< whether those of edges at held nodes do
 
   // Derived from the above by `update_derived`.

@@ -129,8 +129,8 @@ struct World::Implementation {
   std::vector<ObstacleMotion> obstacle_motions;  ///< none until one moves
   std::vector<NaturalRamp> ramps;
   std::vector<Vector3> load_values;
-  MatrixX3 custom_force;                         ///< of the last step [N]
-  VectorX custom_force_before;                   ///< per unknown, at the start of an explicit step
+  MatrixX3 custom_force;        ///< of the last step [N]
+  VectorX custom_force_before;  ///< per unknown, at the start of an explicit step
   World::ForceFunction force_function;
   std::function<void(double, double)> callback;  ///< StepCallback, bound to its world
   std::function<void()> poll;

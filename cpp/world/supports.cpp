@@ -54,8 +54,7 @@ int World::add_support(const SupportDescription& support) {
   if (support.kind == SupportKind::spinning_clamp) {
     // Its frame has found its place, and with that the tangent that it holds.
     const Support& bearing = self.model.supports[at(index)];
-    self.description.supports[at(index)].axis =
-        frame_rotation(self.model, self.state, bearing.frame) * bearing.tangent;
+    self.description.supports[at(index)].axis = frame_rotation(self.model, self.state, bearing.frame) * bearing.tangent;
     self.rebuild(Rebuild::running);
   }
   const Support& s = self.model.supports[at(index)];

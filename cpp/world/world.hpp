@@ -150,8 +150,7 @@ class World {
   /// accepted one. Must leave the world alone. Empty: none.
   void set_poll(const std::function<void()>& poll);
   /// Forces on all nodes (nodes x 3) [N] at a time [s], from their positions [m] and velocities [m/s].
-  using ForceFunction =
-      std::function<MatrixX3(double time, const MatrixX3& positions, const MatrixX3& velocities)>;
+  using ForceFunction = std::function<MatrixX3(double time, const MatrixX3& positions, const MatrixX3& velocities)>;
   /// Asked once an inner step, at the time at which the scheme's forces act, for the state extrapolated to then. Empty:
   /// the last forces stay.
   void set_force_function(const ForceFunction& force);

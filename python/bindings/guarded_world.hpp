@@ -34,8 +34,9 @@ class GuardedWorld {
     return world_;
   }
   /// Runs `advance(world)` without the GIL. `callback(force_time, end_time)`, or None, is called before
-  /// every inner step, and `forces(time, positions, velocities)`, or None, for its custom forces. Signals are looked at every 50 ms between inner steps, where their handlers may read the
-  /// world, and every 100 ms within a step that takes so long, where they may not.
+  /// every inner step, and `forces(time, positions, velocities)`, or None, for its custom forces. Signals are looked at
+  /// every 50 ms between inner steps, where their handlers may read the world, and every 100 ms within a step that
+  /// takes so long, where they may not.
   template <class Advance>
   auto run(Advance advance, const py::object& callback, const py::object& forces) {
     refuse(stepping_);
