@@ -15,6 +15,7 @@ __all__: list[str] = [
     "ContactTable",
     "ConvergenceFailure",
     "Energy",
+    "EquilibriumPath",
     "EquilibriumResult",
     "FluidDescription",
     "JointDescription",
@@ -23,6 +24,7 @@ __all__: list[str] = [
     "Momentum",
     "ObstacleDescription",
     "Options",
+    "PathPoint",
     "Plan",
     "Reaction",
     "RevoluteLink",
@@ -562,7 +564,16 @@ class World:
         """
         Find the static equilibrium.
         """
-    def equilibrium_path(self, loads: collections.abc.Sequence[typing.SupportsInt], start: typing.SupportsFloat, end: typing.SupportsFloat, most_points: typing.SupportsInt, turn: typing.SupportsFloat, callback: typing.Any) -> EquilibriumPath:
+    def equilibrium_path(
+        self,
+        loads: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex],
+        start: typing.SupportsFloat | typing.SupportsIndex,
+        end: typing.SupportsFloat | typing.SupportsIndex,
+        most_points: typing.SupportsInt | typing.SupportsIndex,
+        turn: typing.SupportsFloat | typing.SupportsIndex,
+        callback: typing.Any,
+        forces: typing.Any,
+    ) -> EquilibriumPath:
         """
         Follow a path of equilibria through limit points.
         """

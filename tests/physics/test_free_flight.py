@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import rods
-from convergence import assert_order
 
 EDGES = 16
 RADIUS = 0.08
