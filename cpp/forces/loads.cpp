@@ -36,11 +36,12 @@ void clear(Local& out, int n) {
   }
 }
 
-void moment_on_edge(const Model& model, const State& state, const Configuration& c, int edge, const Vector3& M,
-                    Local& out) {
+void moment_on_edge(const Model& model, const State& state, const Configuration& c, const LoadPiece& piece,
+                    const Vector3& value, Local& out) {
+  const int edge = piece.edge;
   const EdgeFrame<double>& f = c.edge[at(edge)];
   if (model.planar()) {
-    const double m = M.dot(model.plane->normal), l = f.inverse_length;
+    const double m = value.dot(model.plane->normal), l = f.inverse_length;
     const double t[2] = {f.tangent.x, f.tangent.y}, n[2] = {-f.tangent.y * l, f.tangent.x * l};
     for (int i = 0; i < 2; ++i) {
       out.gradient[i] = m * n[i];
@@ -53,17 +54,28 @@ void moment_on_edge(const Model& model, const State& state, const Configuration&
     }
     return;
   }
-  const Vector3 t = to_eigen(f.tangent), spin = to_eigen(f.spin);
+  const Vector3 t = to_eigen(f.tangent), spin = to_eigen(f.spin),
+                M = piece.follower ? carried(model, f, edge, value) : value;
   const double l = f.inverse_length, along = M.dot(t);
   const Vector3 turn = l * M.cross(t), lateral = l * (M - along * t);
   const Vector3 force = turn + along * spin;
-  const Matrix3 D = l * l * cross_matrix(M) * (Matrix3::Identity() - t * t.transpose()) - l * turn * t.transpose() +
-                    spin * lateral.transpose() + along * spin_derivative(f, state.tangent[at(edge)]);
+  Matrix3 D = l * l * cross_matrix(M) * (Matrix3::Identity() - t * t.transpose()) - l * turn * t.transpose() +
+              spin * lateral.transpose() + along * spin_derivative(f, state.tangent[at(edge)]);
+  Vector3 by_angle = Vector3::Zero(), torque = lateral;  // derivatives of the force by theta, of the torque by the edge
+  if (piece.follower) {
+    const Matrix3 A = l * cross_matrix(t) + t * spin.transpose();  // turn of the edge's frame by its vector
+    const Matrix3 B = spin * t.transpose() - l * cross_matrix(t);  // force by moment
+    D -= B * cross_matrix(M) * A;
+    by_angle = B * t.cross(M);
+    torque += A.transpose() * M.cross(t);
+  }
   for (int i = 0; i < 3; ++i) {
     out.gradient[i] = force(i);
     out.gradient[4 + i] = -force(i);
-    out.hessian[3][i] = lateral(i);
-    out.hessian[3][4 + i] = -lateral(i);
+    out.hessian[3][i] = torque(i);
+    out.hessian[3][4 + i] = -torque(i);
+    out.hessian[i][3] = by_angle(i);
+    out.hessian[4 + i][3] = -by_angle(i);
     for (int j = 0; j < 3; ++j) {
       out.hessian[i][j] = out.hessian[4 + i][4 + j] = -D(i, j);
       out.hessian[i][4 + j] = out.hessian[4 + i][j] = D(i, j);
@@ -72,15 +84,21 @@ void moment_on_edge(const Model& model, const State& state, const Configuration&
   out.gradient[3] = -along;
 }
 
-void moment_on_frame(const Model& model, const VectorX& q, int frame, const Vector3& M, Local& out) {
+void moment_on_frame(const Model& model, const VectorX& q, const Configuration& configuration, const LoadPiece& piece,
+                     const Vector3& value, Local& out) {
   if (model.planar()) {
-    out.gradient[0] = -M.dot(model.plane->normal);
+    out.gradient[0] = -value.dot(model.plane->normal);
     return;
   }
-  const Vector3 w = q.segment<3>(model.frame_dof[at(frame)]);
+  const Vector3 M = piece.follower ? Vector3(configuration.frame[at(piece.frame)] * value) : value;
+  const Vector3 w = q.segment<3>(model.frame_dof[at(piece.frame)]);
   const double c = 1.0 / (1.0 + 0.25 * w.squaredNorm());
   const Vector3 u = M - 0.5 * w.cross(M);
-  const Matrix3 D = -0.5 * c * c * u * w.transpose() + 0.5 * c * cross_matrix(M);
+  Matrix3 D = -0.5 * c * c * u * w.transpose() + 0.5 * c * cross_matrix(M);
+  if (piece.follower) {
+    const Matrix3 J = cayley_spin(w);
+    D -= J.transpose() * cross_matrix(M) * J;
+  }
   for (int i = 0; i < 3; ++i) {
     out.gradient[i] = -c * u(i);
     for (int j = 0; j < 3; ++j) out.hessian[i][j] = -D(i, j);
@@ -117,6 +135,25 @@ void follower(const Model& model, const Configuration& c, int edge, const Vector
   }
 }
 
+/// Half of value x e on either node, with the potential (value / 2) . (x0 x x1).
+void pressure_on_edge(const Model& model, const VectorX& q, int edge, const Vector3& value, Local& out) {
+  const int n = model.dimension, tail = model.tail_dof[at(edge)], head = model.head_dof[at(edge)];
+  Matrix3 X = 0.5 * cross_matrix(value);
+  if (model.planar()) {
+    const double p = 0.5 * value.dot(model.plane->normal);
+    X << 0.0, -p, 0.0, p, 0.0, 0.0, 0.0, 0.0, 0.0;
+  }
+  for (int i = 0; i < n; ++i)
+    for (int j = 0; j < n; ++j) {
+      const double e = q(head + j) - q(tail + j);
+      out.gradient[i] -= X(i, j) * e;
+      out.gradient[n + i] -= X(i, j) * e;
+      out.hessian[i][j] = out.hessian[n + i][j] = X(i, j);
+      out.hessian[i][n + j] = out.hessian[n + i][n + j] = -X(i, j);
+      out.energy += q(head + i) * X(i, j) * q(tail + j);
+    }
+}
+
 }  // namespace
 
 Loads resolve_loads(const Model& model) {
@@ -128,7 +165,10 @@ Loads resolve_loads(const Model& model) {
     loads.values.push_back(load.value);
     const RodDescription& rod = scene.rods[at(load.pass.rod)];
     const int first = model.rod_first_edge[at(load.pass.rod)], last = model.rod_first_edge[at(load.pass.rod) + 1] - 1;
-    if (load.kind == LoadKind::distributed) {
+    if (load.kind == LoadKind::pressure) {
+      for (int e = first; e <= last; ++e) loads.pieces.push_back({LoadShape::edge_pressure, index, 1.0, -1, e});
+      if (!rod.closed) loads.unsymmetric = true;
+    } else if (load.kind == LoadKind::distributed) {
       for (int e = first; e <= last; ++e)
         for (int node : {model.edge_tail[at(e)], model.edge_head[at(e)]})
           loads.pieces.push_back(
@@ -142,25 +182,30 @@ Loads resolve_loads(const Model& model) {
         loads.pieces.push_back(
             {load.follower ? LoadShape::follower : LoadShape::dead_node, index, 1.0, node, in >= 0 ? in : out});
       } else {
-        require(!load.follower, "a moment cannot follow: give it in world axes, or as a function of time");
         int frame = -1;
         for (const FrameStencil& half : model.half)
           if (half.hinge < 0 && (half.edge == in || half.edge == out) && model.frame_node[at(half.frame)] == node)
             frame = half.frame;
         if (frame >= 0) {
-          loads.pieces.push_back({LoadShape::frame_moment, index, 1.0, node, -1, frame});
+          loads.pieces.push_back({LoadShape::frame_moment, index, 1.0, node, -1, frame, load.follower});
         } else {
           const double share = in >= 0 && out >= 0 ? 0.5 : 1.0;
           for (int e : {in, out})
-            if (e >= 0) loads.pieces.push_back({LoadShape::edge_moment, index, share, node, e});
+            if (e >= 0) loads.pieces.push_back({LoadShape::edge_moment, index, share, node, e, -1, load.follower});
         }
       }
     }
   }
   for (const LoadPiece& piece : loads.pieces)
-    if (piece.shape == LoadShape::follower || (!model.planar() && piece.shape != LoadShape::dead_node))
+    if (piece.shape == LoadShape::follower ||
+        (!model.planar() && (piece.shape == LoadShape::edge_moment || piece.shape == LoadShape::frame_moment)))
       loads.unsymmetric = true;
   return loads;
+}
+
+bool has_potential(const Model& model, const LoadPiece& piece) {
+  if (piece.shape == LoadShape::edge_pressure) return model.description.rods[at(model.edge_rod[at(piece.edge)])].closed;
+  return piece.shape == LoadShape::dead_node;
 }
 
 int load_dofs(const Model& model, const LoadPiece& piece, int (&dofs)[kMaxLocal]) {
@@ -171,9 +216,9 @@ int load_dofs(const Model& model, const LoadPiece& piece, int (&dofs)[kMaxLocal]
   };
   if (piece.shape == LoadShape::dead_node || piece.shape == LoadShape::follower) add(model.node_dof[at(piece.node)], d);
   if (piece.shape == LoadShape::frame_moment) add(model.frame_dof[at(piece.frame)], model.frame_size());
-  if (piece.shape == LoadShape::follower || piece.shape == LoadShape::edge_moment) {
+  if (piece.edge >= 0 && piece.shape != LoadShape::dead_node) {
     add(model.node_dof[at(model.edge_tail[at(piece.edge)])], d);
-    if (!model.planar()) add(model.edge_dof[at(piece.edge)], 1);
+    if (!model.planar() && piece.shape != LoadShape::edge_pressure) add(model.edge_dof[at(piece.edge)], 1);
     add(model.node_dof[at(model.edge_head[at(piece.edge)])], d);
   }
   return n;
@@ -198,10 +243,13 @@ void load_local(const Model& model, const State& state, const VectorX& q, const 
       follower(model, c, piece.edge, value, out);
       break;
     case LoadShape::edge_moment:
-      moment_on_edge(model, state, c, piece.edge, value, out);
+      moment_on_edge(model, state, c, piece, value, out);
       break;
     case LoadShape::frame_moment:
-      moment_on_frame(model, q, piece.frame, value, out);
+      moment_on_frame(model, q, c, piece, value, out);
+      break;
+    case LoadShape::edge_pressure:
+      pressure_on_edge(model, q, piece.edge, value, out);
       break;
   }
 }

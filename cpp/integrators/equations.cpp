@@ -56,7 +56,7 @@ Equations::Equations(const Model& model, const Options& options)
   inverse_rest_ = model.edge_length.cwiseInverse();
   node_dof_drag_ = VectorX::Zero(model.dof_count);
   for (const LoadPiece& piece : loads_.pieces)
-    if (piece.shape != LoadShape::dead_node) has_potential_ = false;
+    if (!withe::has_potential(model, piece)) has_potential_ = false;
   if (options.integrator == Integrator::statics) return;
   const FluidModel fluid = model.description.fluid.model;
   if (fluid == FluidModel::stokeslets) fluid_ = std::make_unique<StokesletFluid>(model);
@@ -194,6 +194,8 @@ void Equations::add_loads(const VectorX& z, bool with_matrix, Evaluation& out) {
     const int* dofs = assembler_.loads[k].dofs(0);
     if (dead)
       for (int i = 0; i < model_.dimension; ++i) out.potential += local.gradient[i] * z(dofs[i]);
+    else
+      out.potential += local.energy;
   }
 }
 

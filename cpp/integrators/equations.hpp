@@ -31,7 +31,7 @@ struct Evaluation {
   VectorX full_residual;  ///< before projection: minus the reactions
   VectorX magnitude;      ///< per row, sum of the absolute contributions
   VectorX floor;          ///< per row, what rounding alone leaves
-  double potential = 0;   ///< elastic + gravity - dead loads [J], where the scene has one
+  double potential = 0;   ///< elastic + gravity - loads that have one [J], where the scene has one
 };
 
 /// What z is of the step from q0 to q1.

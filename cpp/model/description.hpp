@@ -88,14 +88,19 @@ enum class LoadKind {
   force,        ///< at a node [N]
   moment,       ///< at a node [N m]
   distributed,  ///< along a rod [N/m]; pass.node is ignored
+  pressure,     ///< along a rod, value x tangent per present length [N/m]; pass.node is ignored
 };
+
+/// Whether the value of a load is an axis to turn about, and not a direction to push in.
+inline bool is_axial(LoadKind kind) { return kind == LoadKind::moment || kind == LoadKind::pressure; }
 
 struct LoadDescription {
   LoadKind kind = LoadKind::force;
   RodPass pass;
-  Vector3 value = Vector3::Zero();  ///< world axes; a follower load keeps its direction in the edge's frame
+  Vector3 value = Vector3::Zero();  ///< world axes; a follower load keeps its direction in the frame that carries it
   bool follower = false;
   bool varies = false;  ///< set by a callback while running, so `value` is only its first one
+  bool added = false;   ///< put on while the scene runs: it has no say in which plane the drawing lies in
 };
 
 enum class ContactLaw { imcv2, imcv1, barrier, spillmann_teschner };

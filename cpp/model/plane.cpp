@@ -28,7 +28,7 @@ void collect_directions(const SceneDescription& scene, std::vector<Vector3>& dir
   }
   add(scene.gravity, 0.0);
   for (const LoadDescription& load : scene.loads)
-    if (load.kind != LoadKind::moment) add(load.value, 0.0);
+    if (!load.added && !is_axial(load.kind)) add(load.value, 0.0);
 }
 
 /// Whether an obstacle meets rods in a plane as its cut by the plane does: a plane that stands on it, a capsule whose
@@ -52,7 +52,7 @@ std::optional<Plane> find_plane(const SceneDescription& scene, std::optional<boo
     return std::nullopt;
   }
   for (const LoadDescription& load : scene.loads)
-    if (load.varies && !sure) {
+    if (load.varies && !load.added && !sure) {
       reason = "a load that varies may leave any plane";
       return std::nullopt;
     }
@@ -90,8 +90,8 @@ std::optional<Plane> find_plane(const SceneDescription& scene, std::optional<boo
     }
   const auto across = [&](const Vector3& v) { return v.cross(normal).norm() > kTolerance * 100 * v.norm(); };
   for (const LoadDescription& load : scene.loads)
-    if (load.kind == LoadKind::moment && across(load.value)) {
-      reason = "a moment turns out of the plane";
+    if (!load.added && is_axial(load.kind) && across(load.value)) {
+      reason = "a moment turns, or a pressure pushes, out of the plane";
       return std::nullopt;
     }
   for (const RodDescription& rod : scene.rods) {

@@ -13,8 +13,10 @@ constexpr Words<SupportKind, 5> kSupportKinds{{{"pin", SupportKind::pin},
                                                {"hold_edge", SupportKind::hold_edge},
                                                {"spinning_clamp", SupportKind::spinning_clamp},
                                                {"spinning_edge", SupportKind::spinning_edge}}};
-constexpr Words<LoadKind, 3> kLoadKinds{
-    {{"force", LoadKind::force}, {"moment", LoadKind::moment}, {"distributed", LoadKind::distributed}}};
+constexpr Words<LoadKind, 4> kLoadKinds{{{"force", LoadKind::force},
+                                         {"moment", LoadKind::moment},
+                                         {"distributed", LoadKind::distributed},
+                                         {"pressure", LoadKind::pressure}}};
 
 constexpr Words<Bending, 2> kBendings{{{"angle", Bending::angle}, {"tangent", Bending::tangent}}};
 constexpr Words<ContactLaw, 4> kContactLaws{{{"imcv2", ContactLaw::imcv2},

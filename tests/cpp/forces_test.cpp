@@ -49,7 +49,11 @@ constexpr LoadCase kLoads[] = {{"follower at the start", LoadKind::force, {0, 0}
                                {"distributed follower", LoadKind::distributed, {0, 0}, true},
                                {"moment on two edges", LoadKind::moment, {0, 3}, false},
                                {"moment on the last edge", LoadKind::moment, {0, 5}, false},
-                               {"moment on a frame", LoadKind::moment, {0, 0}, false}};
+                               {"moment on a frame", LoadKind::moment, {0, 0}, false},
+                               {"moment that follows two edges", LoadKind::moment, {0, 3}, true},
+                               {"moment that follows the last edge", LoadKind::moment, {0, 5}, true},
+                               {"moment that follows a frame", LoadKind::moment, {0, 0}, true},
+                               {"pressure", LoadKind::pressure, {0, 0}, false}};
 
 std::vector<Case> cases_with(const LoadCase& load, bool planar) {
   testing::SceneBuilder builder;
@@ -60,9 +64,9 @@ std::vector<Case> cases_with(const LoadCase& load, bool planar) {
   else
     builder.add_rod(testing::helix(6), material);
   if (load.kind == LoadKind::moment) builder.support(SupportKind::clamp, {0, 0});
-  const Vector3 value = !planar                         ? Vector3(0.7, -1.1, 0.5)
-                        : load.kind == LoadKind::moment ? Vector3(0.0, 0.9, 0.0)
-                                                        : Vector3(0.7, 0.0, -0.4);
+  const Vector3 value = !planar               ? Vector3(0.7, -1.1, 0.5)
+                        : is_axial(load.kind) ? Vector3(0.0, 0.9, 0.0)
+                                              : Vector3(0.7, 0.0, -0.4);
   builder.load(load.kind, load.pass, value, load.follower);
   std::vector<Case> cases = testing::states_of(load.name, builder.scene);
   // As far from its source frame as a Newton iterate may try: transport is singular at 180 degrees.
@@ -94,7 +98,7 @@ TEST(Loads, JacobiansAreExactInEveryState) {
 TEST(Loads, AMomentDoesItsAngleOfWorkInARigidTurn) {
   for (bool planar : {false, true})
     for (const LoadCase& load : kLoads) {
-      if (load.kind != LoadKind::moment) continue;
+      if (load.kind != LoadKind::moment || load.follower) continue;
       for (const Case& c : cases_with(load, planar)) {
         const Loads loads = resolve_loads(c.model);
         const VectorX force = sum_of(c, loads, c.q).force;
@@ -150,11 +154,48 @@ TEST(Loads, AreUnsymmetricOnlyWhereTheyHaveTo) {
   EXPECT_FALSE(unsymmetric(LoadKind::moment, false, true));
 }
 
-TEST(Loads, RefuseAMomentThatFollows) {
+TEST(Loads, AMomentThatFollowsTurnsWithItsEdge) {
   testing::SceneBuilder builder;
-  builder.add_rod(testing::helix(6));
-  builder.load(LoadKind::moment, {0, 2}, Vector3(1, 2, 3), true);
-  EXPECT_THROW(resolve_loads(build_model(builder.scene, false)), std::invalid_argument);
+  builder.add_rod(testing::line(Vector3::Zero(), Vector3(0, 0, 2), 3), {}, false, Vector3::UnitX());
+  builder.load(LoadKind::moment, {0, 2}, Vector3(0, 0, 1.5), true);  // about the tangent, wherever that points
+  Case c = testing::states_of("moment", builder.scene, false)[0];
+  const Loads loads = resolve_loads(c.model);
+  c.q.segment<3>(c.model.node_dof[2]) = Vector3(1, 0, 1);
+  const VectorX force = sum_of(c, loads, c.q).force;
+  EXPECT_NEAR(force(c.model.edge_dof[1]), 1.5, 1e-14);
+  for (const auto& [u, omega] : testing::rigid_motions(c.model)) {
+    Case turned = c;
+    turned.state.q = c.q;
+    EXPECT_NEAR(force.dot(testing::rigid_motion(turned, u, omega)), Vector3(1.5, 0, 0).dot(omega), 1e-12);
+  }
+}
+
+TEST(Loads, APressureOnAClosedRodIsTheGradientOfAnArea) {
+  for (bool planar : {false, true}) {
+    testing::SceneBuilder builder;
+    testing::RodMaterial material;
+    material.bend2 = material.bend1;
+    builder.add_rod(testing::arc(6), material, true, Vector3::UnitY());
+    builder.load(LoadKind::pressure, {0, 0}, Vector3(0.0, 0.9, 0.0));
+    for (const Case& c : testing::states_of("ring", builder.scene, planar)) {
+      const Loads loads = resolve_loads(c.model);
+      EXPECT_FALSE(loads.unsymmetric);
+      const Sum sum = sum_of(c, loads, c.q);
+      EXPECT_LT((sum.jacobian - sum.jacobian.transpose()).norm(), 1e-14) << c.name;
+      const auto energy = [&](const VectorX& q) {
+        Configuration configuration;
+        compute_configuration(c.model, c.state, q, configuration);
+        Local local;
+        double total = 0.0;
+        for (const LoadPiece& piece : loads.pieces) {
+          load_local(c.model, c.state, q, configuration, loads, piece, local);
+          total += local.energy;
+        }
+        return VectorX::Constant(1, total);
+      };
+      EXPECT_TRUE(derivative_matches(energy, c.q, MatrixX(-sum.force.transpose()))) << c.name;
+    }
+  }
 }
 
 }  // namespace
