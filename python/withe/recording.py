@@ -30,10 +30,11 @@ _UNITS = {
     "curvatures": "1/m",
     "twists": "rad/m",
     "tensions": "N",
+    "spins": "rad/s",
     "energy": "J",
     "radii": "m",
 }
-_ROD_READOUTS = ("directors", "curvatures", "twists", "tensions")
+_ROD_READOUTS = ("directors", "curvatures", "twists", "tensions", "spins")
 
 
 @dataclass(frozen=True)
@@ -162,6 +163,8 @@ class Record:
             self._array(f"rod_{index}_curvatures", (frames, rod.stencils, 2))
             self._array(f"rod_{index}_twists", (frames, rod.stencils))
             self._array(f"rod_{index}_tensions", (frames, rod.edges))
+            if f"rod_{index}_spins" in self._arrays:  # which files had none of at first
+                self._array(f"rod_{index}_spins", (frames, rod.edges))
         for index, obstacle in enumerate(self._obstacles):
             self._array(f"obstacle_{index}_place", (frames, 3))
             if obstacle.kind not in ("plane", "capsule") or obstacle.axis.shape != (3,) or not obstacle.radius >= 0.0:
@@ -255,6 +258,18 @@ class Record:
     def tensions(self, rod: Any) -> FloatArray:
         """Axial forces of the edges, shape (frames, edges) [N]."""
         return self._of_rod("tensions", rod)
+
+    def spins(self, rod: Any) -> FloatArray:
+        """Angular velocities of the edges about their tangents, shape (frames, edges) [rad/s].
+
+        Raises
+        ------
+        ValueError
+            A record from a file that was written before spins were recorded.
+        """
+        if f"rod_{self._index(rod)}_spins" not in self._arrays:
+            raise ValueError("record holds no spins: its file was written before they were recorded")
+        return self._of_rod("spins", rod)
 
     def energy(self) -> EnergyHistory:
         """Energies, every one an array of shape (frames,) [J]."""

@@ -70,6 +70,9 @@ class CurlingSimulation:
     def tensions(self, rod: str) -> np.ndarray:
         return np.linspace(1.0, 0.0, len(self._edges(rod))) * self.time
 
+    def spins(self, rod: str) -> np.ndarray:
+        return np.linspace(-1.0, 1.0, len(self._edges(rod))) * self.time
+
     def energy(self) -> SimpleNamespace:
         bend = 1e-3 * (CURVATURE_RATE * self.time) ** 2
         return SimpleNamespace(

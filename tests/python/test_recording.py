@@ -39,6 +39,7 @@ def test_read_outs_are_those_of_the_simulation_at_every_frame(simulation):
                 "curvatures",
                 "twists",
                 "tensions",
+                "spins",
             ):
                 ours = getattr(record, readout)(rod)
                 np.testing.assert_array_equal(ours[frame], getattr(then, readout)(rod))
