@@ -1,4 +1,6 @@
+#include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "common/check.hpp"
 #include "common/text.hpp"
@@ -217,6 +219,19 @@ void World::Implementation::rebuild(Rebuild why) {
   make_plan();
 }
 
+void World::Implementation::remake_equations() {
+  model.description.loads = description.loads;
+  static_equations.reset();
+  rescue_equations.reset();
+  newton = std::make_unique<Newton>(model, options);
+  equations = std::make_unique<Equations>(model, options);
+  equations->loads().values = load_values;
+  forget_matrix();
+  reaction_current = false;
+  state.acceleration_current = false;
+  make_plan();
+}
+
 State World::Implementation::transferred(const Model& old, const State& from) const {
   State to = initial_state(model);
   to.time = from.time;
@@ -284,50 +299,76 @@ State World::Implementation::transferred(const Model& old, const State& from) co
 
 /// A new frame takes the orientation that stresses its halves least, with the edges where they are.
 void World::Implementation::relax_frames(const std::vector<bool>& is_new) {
+  for (int f = 0; f < model.frame_count; ++f)
+    if (is_new[at(f)]) relax_frame(f, Matrix3::Identity());
+}
+
+/// The frame and the hinges on it, with the edges where they are; the frame turns about what `free` projects onto.
+void World::Implementation::relax_frame(int f, const Matrix3& free) {
   ElasticCoefficients elastic;
   set_elastic(parameters, elastic);
   Configuration c;
   Local local;
-  for (int f = 0; f < model.frame_count; ++f) {
-    if (!is_new[at(f)]) continue;
-    const int dof = model.frame_dof[at(f)], n = model.frame_size(), row = model.planar() ? 4 : 7;
-    // Start from the rotation of the first attached edge since it was drawn.
+  const int dof = model.frame_dof[at(f)], n = model.frame_size(), row = model.planar() ? 4 : 7;
+  compute_configuration(model, state, state.q, c);
+  // How an attached edge has turned since it was drawn.
+  const auto turn_of = [&](const FrameStencil& half) -> Matrix3 {
+    const Vector3 t = to_eigen(model.initial_tangent[at(half.edge)]),
+                  d1 = to_eigen(model.initial_director[at(half.edge)]);
+    Matrix3 drawn;
+    drawn << d1, t.cross(d1), t;
+    return edge_directors(model, c, half.edge) * drawn.transpose();
+  };
+  // Start from that of the first edge that no hinge lets turn, if nothing holds the frame.
+  const auto fixed = std::find_if(model.half.begin(), model.half.end(),
+                                  [f](const FrameStencil& half) { return half.frame == f && half.hinge < 0; });
+  if (free.isIdentity() && fixed != model.half.end()) {
+    const Matrix3 rotation = turn_of(*fixed);
+    if (model.planar())
+      state.q(dof) = rotation_log(rotation).dot(model.plane->normal);
+    else
+      state.frame[at(f)] = rotation;
+  }
+  std::vector<int> hinges;  // each one's unknown follows those of the frame
+  for (std::size_t h = 0; h < model.hinges.size(); ++h)
+    if (model.hinges[h].frame == f) hinges.push_back(static_cast<int>(h));
+  for (const FrameStencil& half : model.half)
+    if (half.frame == f && half.hinge >= 0) {
+      const Hinge& hinge = model.hinges[at(half.hinge)];
+      const Matrix3 relative = frame_rotation(model, state, f).transpose() * turn_of(half);
+      const double angle = rotation_log(relative).dot(hinge.axis), full = 2.0 * std::numbers::pi;
+      state.q(hinge.dof) = angle + full * std::round((state.q(hinge.dof) - angle) / full);
+    }
+  const int size = n + static_cast<int>(hinges.size());
+  Eigen::MatrixXd project = Eigen::MatrixXd::Identity(size, size);
+  project.topLeftCorner(n, n) = free.topLeftCorner(n, n);
+  for (int k = 0; k < 20; ++k) {
     compute_configuration(model, state, state.q, c);
+    Eigen::MatrixXd H = Eigen::MatrixXd::Zero(size, size);
+    VectorX g = VectorX::Zero(size);
     for (std::size_t h = 0; h < model.half.size(); ++h) {
       if (model.half[h].frame != f) continue;
-      const int e = model.half[h].edge;
-      const Matrix3 now = edge_directors(model, c, e);
-      const Vector3 t = to_eigen(model.initial_tangent[at(e)]), d1 = to_eigen(model.initial_director[at(e)]);
-      Matrix3 drawn;
-      drawn << d1, t.cross(d1), t;
-      const Matrix3 rotation = now * drawn.transpose();
-      if (model.planar())
-        state.q(dof) = rotation_log(rotation).dot(model.plane->normal);
-      else
-        state.frame[at(f)] = rotation;
-      break;
-    }
-    for (int k = 0; k < 20; ++k) {
-      compute_configuration(model, state, state.q, c);
-      Matrix3 H = Matrix3::Identity() * 1e-300;
-      Vector3 g = Vector3::Zero();
-      for (std::size_t h = 0; h < model.half.size(); ++h) {
-        if (model.half[h].frame != f) continue;
-        half_local(model, state.q, elastic, c, static_cast<int>(h), true, local);
-        for (int i = 0; i < n; ++i) {
-          g(i) += local.gradient[row + i];
-          for (int j = 0; j < n; ++j) H(i, j) += local.hessian[row + i][row + j];
-        }
+      half_local(model, state.q, elastic, c, static_cast<int>(h), true, local);
+      const auto own = std::find(hinges.begin(), hinges.end(), model.half[h].hinge);
+      const int last = n + static_cast<int>(own - hinges.begin()), count = own == hinges.end() ? n : n + 1;
+      const auto place = [&](int i) { return i < n ? i : last; };
+      for (int i = 0; i < count; ++i) {
+        g(place(i)) += local.gradient[row + i];
+        for (int j = 0; j < count; ++j) H(place(i), place(j)) += local.hessian[row + i][row + j];
       }
-      const VectorX step = H.topLeftCorner(n, n).ldlt().solve(-g.head(n));
-      if (!step.allFinite()) break;
-      state.q.segment(dof, n) += step * std::min(1.0, 0.5 / std::max(step.norm(), 1e-300));
-      if (!model.planar()) {
-        state.frame[at(f)] = orthonormalized(cayley(state.q.segment<3>(dof)) * state.frame[at(f)]);
-        state.q.segment<3>(dof).setZero();
-      }
-      if (step.norm() < 1e-13) break;
     }
+    const double scale = std::max(H.diagonal().cwiseAbs().maxCoeff(), 1e-300);
+    H = project * H * project + scale * (Eigen::MatrixXd::Identity(size, size) - project);
+    const VectorX step = project * H.ldlt().solve(-project * g);
+    if (!step.allFinite()) break;
+    const VectorX taken = step * std::min(1.0, 0.5 / std::max(step.norm(), 1e-300));
+    state.q.segment(dof, n) += taken.head(n);
+    for (int h = n; h < size; ++h) state.q(model.hinges[at(hinges[at(h - n)])].dof) += taken(h);
+    if (!model.planar()) {
+      state.frame[at(f)] = orthonormalized(cayley(state.q.segment<3>(dof)) * state.frame[at(f)]);
+      state.q.segment<3>(dof).setZero();
+    }
+    if (step.norm() < 1e-13) break;
   }
 }
 

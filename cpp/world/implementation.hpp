@@ -161,6 +161,8 @@ struct World::Implementation {
   void listen();
   void rebuild(Rebuild why);
   void make_plan();
+  /// Equations for other loads than before.
+  void remake_equations();
   void add_contact_notes();
   void add_coarse_notes();
   std::string fluid_note() const;
@@ -168,6 +170,17 @@ struct World::Implementation {
   void leave_plane(const std::string& why);
   State transferred(const Model& old, const State& from) const;
   void relax_frames(const std::vector<bool>& is_new);
+  void relax_frame(int frame, const Matrix3& free);
+
+  // set_state.cpp
+  bool leaves_plane(const RodState& rod) const;
+  VectorX placed(const std::vector<RodState>& rods) const;
+  void place_rods(const std::vector<RodState>& rods);
+  void set_rates(const std::vector<RodState>& rods);
+  void relax_joints(const std::vector<bool>& is_told);
+  void turn_frames(const std::vector<bool>& is_told);
+  /// What came before no longer tells what comes next.
+  void forget_motion();
 
   // prescribed.cpp
   /// Gives a part of a natural shape another value, at once or over a time [s].

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <string_view>
 
 #include "world/archive.hpp"
@@ -15,6 +16,54 @@ std::uint64_t hash_of(std::string_view bytes) {
   return hash;
 }
 
+/// Loads that the drawing has; those put on since follow them.
+std::size_t drawn_loads(const SceneDescription& scene) {
+  return static_cast<std::size_t>(
+      std::count_if(scene.loads.begin(), scene.loads.end(), [](const LoadDescription& load) { return !load.added; }));
+}
+
+void write_added_loads(Writer& w, const SceneDescription& scene) {
+  const std::size_t drawn = drawn_loads(scene);
+  w(static_cast<std::int64_t>(scene.loads.size() - drawn));
+  for (std::size_t k = drawn; k < scene.loads.size(); ++k) {
+    const LoadDescription& load = scene.loads[k];
+    w(static_cast<int>(load.kind));
+    w(load.pass.rod);
+    w(load.pass.node);
+    w(load.follower);
+  }
+}
+
+std::vector<LoadDescription> read_added_loads(Reader& r, const SceneDescription& scene) {
+  std::int64_t count = 0;
+  r(count);
+  require(count >= 0 && count < 1 << 20, "snapshot is damaged: impossible number of loads");
+  std::vector<LoadDescription> loads(static_cast<std::size_t>(count));
+  for (LoadDescription& load : loads) {
+    int kind = 0;
+    r(kind);
+    require(kind >= 0 && kind <= static_cast<int>(LoadKind::pressure), "snapshot is damaged: unknown load");
+    load.kind = static_cast<LoadKind>(kind);
+    r(load.pass.rod);
+    r(load.pass.node);
+    require(load.pass.rod >= 0 && load.pass.rod < static_cast<int>(scene.rods.size()) && load.pass.node >= 0 &&
+                load.pass.node < static_cast<int>(scene.rods[static_cast<std::size_t>(load.pass.rod)].nodes.size()),
+            "snapshot is damaged: load at a node that is not there");
+    r(load.follower);
+    load.added = true;
+  }
+  return loads;
+}
+
+bool same_loads(const std::vector<LoadDescription>& added, const SceneDescription& scene) {
+  const std::size_t drawn = drawn_loads(scene);
+  return std::equal(added.begin(), added.end(), scene.loads.begin() + static_cast<std::ptrdiff_t>(drawn),
+                    scene.loads.end(), [](const LoadDescription& a, const LoadDescription& b) {
+                      return a.kind == b.kind && a.pass.rod == b.pass.rod && a.pass.node == b.pass.node &&
+                             a.follower == b.follower;
+                    });
+}
+
 /// Hash of the drawn scene: what must be equal for a snapshot to fit.
 std::uint64_t fingerprint(const SceneDescription& scene) {
   Writer w;
@@ -28,7 +77,7 @@ std::uint64_t fingerprint(const SceneDescription& scene) {
     w(rod.directors);
   }
   w(static_cast<std::int64_t>(scene.joints.size()));
-  w(static_cast<std::int64_t>(scene.loads.size()));
+  w(static_cast<std::int64_t>(drawn_loads(scene)));
   w(static_cast<int>(scene.fluid.model));
   w(scene.fluid.regularization);
   w(scene.fluid.wavelength);
@@ -162,6 +211,7 @@ std::string World::snapshot() const {
     w(d.gripped);
     w(d.axis);
   }
+  write_added_loads(w, self.description);
   exchange(w, self);
   w(hash_of(w.bytes));
   return w.bytes;
@@ -219,6 +269,14 @@ void World::restore(const std::string& bytes) {
     }
     return true;
   }();
+  const std::vector<LoadDescription> added = read_added_loads(r, fresh->description);
+  if (!same_loads(added, fresh->description)) {
+    auto& loads = fresh->description.loads;
+    loads.resize(drawn_loads(fresh->description));
+    loads.insert(loads.end(), added.begin(), added.end());
+    fresh->load_values.resize(loads.size(), Vector3::Zero());
+    fresh->remake_equations();
+  }
   if (!same) {
     fresh->spatial = spatial;
     fresh->description.supports = supports;

@@ -12,6 +12,12 @@ namespace {
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
+/// Whether a load points, or turns, out of the plane of a normal.
+bool off_plane(LoadKind kind, const Vector3& value, const Vector3& normal) {
+  const double off = is_axial(kind) ? value.cross(normal).norm() : std::abs(value.dot(normal));
+  return off > 1e-8 * value.norm();
+}
+
 }  // namespace
 
 World::World(SceneDescription description, Options options)
@@ -114,14 +120,26 @@ void World::set_load(int load, const Vector3& value) {
   require(value.allFinite(), "load must be finite");
   if (self.model.planar()) {
     const Vector3& n = self.model.plane->normal;
-    const bool moment = self.description.loads[at(load)].kind == LoadKind::moment;
-    const double off = moment ? value.cross(n).norm() : std::abs(value.dot(n));
-    if (off > 1e-8 * value.norm()) self.leave_plane("a load");
+    if (off_plane(self.description.loads[at(load)].kind, value, n)) self.leave_plane("a load");
   }
   self.load_values[at(load)] = value;
   self.equations->loads().values = self.load_values;
   self.reaction_current = false;
   self.state.acceleration_current = false;
+}
+int World::add_load(const LoadDescription& load) {
+  Implementation& self = *implementation_;
+  const auto& rods = self.description.rods;
+  require(load.pass.rod >= 0 && load.pass.rod < static_cast<int>(rods.size()) && load.pass.node >= 0 &&
+              load.pass.node < static_cast<int>(rods[at(load.pass.rod)].nodes.size()),
+          "load at a node that is not there");
+  require(load.value.allFinite(), "load must be finite");
+  if (self.model.planar() && off_plane(load.kind, load.value, self.model.plane->normal)) self.leave_plane("a load");
+  self.description.loads.push_back(load);
+  self.description.loads.back().added = true;
+  self.load_values.push_back(load.value);
+  self.remake_equations();
+  return static_cast<int>(self.load_values.size()) - 1;
 }
 Vector3 World::load(int load) const {
   require(load >= 0 && load < static_cast<int>(implementation_->load_values.size()),
@@ -250,12 +268,7 @@ void World::set_velocities(const MatrixX3& velocities) {
       self.state.v.segment<3>(dof) = v;
   }
   self.equations->assembler().project(self.state.v);
-  self.state.acceleration.setZero();
-  self.state.acceleration_current = false;
-  self.predictor.clear();
-  self.state.motion.known = 0;
-  self.alarm.reset();
-  self.guard.turn = EnergyGuard{}.turn;
+  self.forget_motion();
 }
 
 }  // namespace withe

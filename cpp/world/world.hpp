@@ -3,6 +3,7 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -108,6 +109,16 @@ struct Linearisation {
   SparseMatrix displacement;  ///< (3 nodes) x free unknowns: node displacements [m] of each unknown
 };
 
+/// What a rod is to be like; what is empty stays as it is.
+struct RodState {
+  int rod = 0;
+  MatrixX3 positions;   ///< per node [m]
+  MatrixX3 directors;   ///< first ones, per edge; given where positions are
+  VectorX twists;       ///< per stencil [rad/m]: which of the angles that fit the directors; given where they are
+  MatrixX3 velocities;  ///< per node [m/s]
+  VectorX spins;        ///< per edge, angular velocity about the tangent [rad/s]
+};
+
 /// Non-convergence below the smallest step. Becomes withe.ConvergenceError.
 class ConvergenceFailure : public std::runtime_error {
  public:
@@ -157,6 +168,7 @@ class World {
 
   void set_load(int load, const Vector3& value);
   Vector3 load(int load) const;
+  int add_load(const LoadDescription& load);  ///< acts from now on; its index
   /// Ramped linearly over `over` seconds from now (0: at once).
   void set_natural_curvature(int rod, const MatrixX2& curvature, double over);
   void set_natural_twist(int rod, const VectorX& twist, double over);
@@ -189,6 +201,10 @@ class World {
   MatrixX3 positions() const;   ///< every node once [m]
   MatrixX3 velocities() const;  ///< [m/s]
   void set_velocities(const MatrixX3& velocities);
+  /// Puts rods where they are told to be, all at once. Frames of joints take the orientation that stresses them least,
+  /// and turn as the edges at them do on the mean. Throws std::invalid_argument, and changes nothing, where a support
+  /// holds what would move, an edge has no length, or surfaces would overlap.
+  void set_state(const std::vector<RodState>& rods, std::optional<double> time);
   MatrixX9 directors(int rod) const;   ///< per edge
   MatrixX2 curvatures(int rod) const;  ///< per stencil, of the smooth rod [1/m]
   VectorX twists(int rod) const;       ///< per stencil [rad/m]

@@ -9,6 +9,14 @@ namespace withe::bindings {
 namespace {
 
 void register_results(py::module_& module) {
+  py::class_<RodState>(module, "RodState", "What a rod is to be like; what is empty stays as it is.")
+      .def(py::init<>())
+      .def_readwrite("rod", &RodState::rod)
+      .def_readwrite("positions", &RodState::positions)
+      .def_readwrite("directors", &RodState::directors)
+      .def_readwrite("twists", &RodState::twists)
+      .def_readwrite("velocities", &RodState::velocities)
+      .def_readwrite("spins", &RodState::spins);
   py::class_<Linearisation>(module, "Linearisation", "Equations linearised about the present configuration.")
       .def_property_readonly("geometric", [](const Linearisation& self) { return self.geometric; })
       .def_property_readonly("gradients", [](const Linearisation& self) { return self.gradients; })
@@ -136,6 +144,9 @@ void define_parameters(WorldClass& world) {
   world.def(
       "set_load", [](GuardedWorld& self, int load, const Vector3& value) { self.steering().set_load(load, value); },
       py::arg("load"), py::arg("value"));
+  world.def(
+      "add_load", [](GuardedWorld& self, const LoadDescription& load) { return self.changing().add_load(load); },
+      py::arg("load"), "A load that acts from now on; its index.");
   world.def("load", [](const GuardedWorld& self, int load) { return self.reading().load(load); }, py::arg("load"));
   world.def(
       "set_natural_curvature",
@@ -232,6 +243,12 @@ void define_readouts(WorldClass& world) {
       "set_velocities",
       [](GuardedWorld& self, const MatrixX3& velocities) { self.changing().set_velocities(velocities); },
       py::arg("velocities"));
+  world.def(
+      "set_state",
+      [](GuardedWorld& self, const std::vector<RodState>& rods, std::optional<double> time) {
+        self.changing().set_state(rods, time);
+      },
+      py::arg("rods"), py::arg("time"), "Put rods where they are told to be.");
   world.def(
       "directors", [](const GuardedWorld& self, int rod) { return self.reading().directors(rod); }, py::arg("rod"));
   world.def(

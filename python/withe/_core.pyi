@@ -30,6 +30,7 @@ __all__: list[str] = [
     "RevoluteLink",
     "RodDescription",
     "RodPass",
+    "RodState",
     "SceneDescription",
     "Statistics",
     "SupportDescription",
@@ -295,6 +296,34 @@ class FluidDescription:
     @wavelength.setter
     def wavelength(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
 
+class RodState:
+    """
+    What a rod is to be like; what is empty stays as it is.
+    """
+
+    rod: int
+    def __init__(self) -> None: ...
+    @property
+    def directors(self) -> typing.Annotated[numpy.typing.NDArray, numpy.float64, "[m, 3]"]: ...
+    @directors.setter
+    def directors(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"]) -> None: ...
+    @property
+    def positions(self) -> typing.Annotated[numpy.typing.NDArray, numpy.float64, "[m, 3]"]: ...
+    @positions.setter
+    def positions(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"]) -> None: ...
+    @property
+    def spins(self) -> typing.Annotated[numpy.typing.NDArray, numpy.float64, "[m, 1]"]: ...
+    @spins.setter
+    def spins(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> None: ...
+    @property
+    def twists(self) -> typing.Annotated[numpy.typing.NDArray, numpy.float64, "[m, 1]"]: ...
+    @twists.setter
+    def twists(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> None: ...
+    @property
+    def velocities(self) -> typing.Annotated[numpy.typing.NDArray, numpy.float64, "[m, 3]"]: ...
+    @velocities.setter
+    def velocities(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"]) -> None: ...
+
 class SceneDescription:
     """
     What the scene layer hands to the engine.
@@ -537,6 +566,11 @@ class World:
     A scene while it runs.
     """
     def __init__(self, description: SceneDescription, options: Options) -> None: ...
+    def add_load(self, load: LoadDescription) -> int:
+        """
+        A load that acts from now on; its index.
+        """
+
     def add_support(self, support: SupportDescription) -> int: ...
     def advance_to(
         self, time: typing.SupportsFloat | typing.SupportsIndex, callback: typing.Any, forces: typing.Any
@@ -646,6 +680,13 @@ class World:
     def set_rod_parameters(
         self, rod: typing.SupportsInt | typing.SupportsIndex, parameters: RodDescription
     ) -> None: ...
+    def set_state(
+        self, rods: collections.abc.Sequence[RodState], time: typing.SupportsFloat | typing.SupportsIndex | None
+    ) -> None:
+        """
+        Put rods where they are told to be.
+        """
+
     def set_velocities(self, velocities: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"]) -> None: ...
     def snapshot(self) -> bytes:
         """

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import numpy.typing as npt
 
 from withe import validation
-from withe.boundaries import Boundaries
-from withe.description import added_mass, drag, rod_parameters
+from withe.applied_loads import AppliedLoads, load_vector
+from withe.description import added_mass, describe_load, drag, rod_parameters
 from withe.handles import Drag, Fluid, Load, Mass, Rod
 from withe.motion import Path, Turn, evaluate_path
 from withe.parameters import ROD_WORDS, RodParameters
@@ -27,6 +27,7 @@ from withe.parts import (
     SupportPart,
 )
 from withe.rods import curvature_array, twist_array
+from withe.states import States
 
 __all__ = ["Control"]
 
@@ -34,7 +35,7 @@ FloatArray = npt.NDArray[np.float64]
 _NATURAL_WORDS = ("natural_curvature", "natural_twist")
 
 
-class Control(Boundaries):
+class Control(States, AppliedLoads):
     """Actuation, loads and parameters of a running simulation."""
 
     _scene_gravity: FloatArray
@@ -107,8 +108,8 @@ class Control(Boundaries):
         **values
             Of a rod: youngs_modulus, poisson_ratio, density, viscosity, stretch_stiffness,
             bend_stiffness, twist_stiffness, line_density, viscous_time, drag (numbers, or one an edge),
-            natural_curvature, natural_twist. Of a load: force, moment or load, constant or a function of
-            time. Of a mass: mass. Of a drag: drag. Of a fluid: viscosity. Of the scene: gravity.
+            natural_curvature, natural_twist. Of a load: force, moment, load or pressure, constant or a function
+            of time. Of a mass: mass. Of a drag: drag. Of a fluid: viscosity. Of the scene: gravity.
 
         Raises
         ------
@@ -190,7 +191,8 @@ class Control(Boundaries):
             if word == "radius":
                 return part.section.radii.copy()
         elif isinstance(part, LoadPart) and word == part.kind:
-            return np.array(self._world.load(self._load_index(part)))
+            value = np.array(self._world.load(self._load_index(part)))
+            return value if part.axis is None else float(value @ part.axis)
         elif isinstance(part, MassPart) and word == "mass":
             return self._settings.masses[part.name]
         elif isinstance(part, DragPart) and word == "drag":
@@ -241,10 +243,22 @@ class Control(Boundaries):
     def _load_index(self, part: LoadPart) -> int:
         return self._loads.index(part)
 
+    def _load_time(self) -> float:
+        return self._world.time
+
+    def _take_load(self, part: LoadPart) -> Load:
+        """A load put on while running acts from now on, until the simulation is reset."""
+        self._world.add_load(describe_load(part))
+        self._loads = [*self._loads, part]
+        self._settings.loads[part.name] = part
+        if part.function is not None:
+            self._settings.functions[part.name] = part.function
+        return cast(Load, self._directory.add(part))
+
     def _set_load(self, part: LoadPart, value: Any) -> None:
         what = f"{part.kind} {part.name!r}"
         function = value if callable(value) else None
-        now = validation.vector(value(self._world.time) if callable(value) else value, what)
+        now = load_vector(value(self._world.time) if callable(value) else value, part.axis, what)
         self._world.set_load(self._load_index(part), now)
         if function is None:
             self._settings.functions.pop(part.name, None)
@@ -293,7 +307,7 @@ class Control(Boundaries):
                 function = self._settings.functions.get(part.name)
                 if function is not None:
                     what = f"{part.kind} {part.name!r} at t = {force_time:g}"
-                    value = validation.vector(function(force_time), what)
+                    value = load_vector(function(force_time), part.axis, what)
                     self._check_in_plane(value, what, along_normal=part.kind == "moment")
                     self._world.set_load(index, value)
         for name, path in self._settings.paths.items():

@@ -27,7 +27,7 @@ from withe.parts import (
 )
 from withe.supports import held_rows
 
-__all__ = ["added_mass", "describe", "describe_support", "drag", "parameters_of", "rod_parameters"]
+__all__ = ["added_mass", "describe", "describe_load", "describe_support", "drag", "parameters_of", "rod_parameters"]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -55,7 +55,7 @@ def describe(directory: Directory, gravity: FloatArray, bending: Bending = "angl
     scene.rods = [_describe_rod(directory, rod, drag(directory, coefficients, rod)) for rod in rods]
     scene.joints = [_describe_joint(group) for group in _groups(directory.all(JoinPart))]
     scene.supports = _describe_supports(directory)
-    scene.loads = [_describe_load(load) for load in directory.all(LoadPart)]
+    scene.loads = [describe_load(load) for load in directory.all(LoadPart)]
     scene.has_custom_force = bool(directory.all(CustomForcePart))
     scene.contact = describe_contact(directory)
     scene.fluid = describe_fluid(directory)
@@ -176,7 +176,8 @@ def _held_twice(directory: Directory, first: SupportPart, second: SupportPart) -
     )
 
 
-def _describe_load(part: LoadPart) -> _core.LoadDescription:
+def describe_load(part: LoadPart) -> _core.LoadDescription:
+    """One load."""
     load = _core.LoadDescription()
     load.kind = "distributed" if part.kind == "load" else part.kind
     load.pass_ = _core.RodPass(*part.node)

@@ -9,81 +9,17 @@ import numpy as np
 import numpy.typing as npt
 
 from withe import validation
-from withe.directory import Directory
-from withe.handles import CustomForce, Drag, Load, Mass, NodeHandle, Rod
-from withe.parts import CustomForcePart, DragPart, LoadKind, LoadPart, MassPart, Pass
+from withe.applied_loads import AppliedLoads
+from withe.handles import CustomForce, Drag, Mass, NodeHandle, Rod
+from withe.parts import CustomForcePart, DragPart, MassPart
 
 __all__ = ["Loads"]
 
 FloatArray = npt.NDArray[np.float64]
-Value = npt.ArrayLike | Callable[[float], npt.ArrayLike]
 
 
-class Loads:
+class Loads(AppliedLoads):
     """Forces, moments, masses and drag of a scene."""
-
-    _directory: Directory
-
-    def add_force(
-        self, node: NodeHandle | str, force: Value, *, follower: bool = False, name: str | None = None
-    ) -> Load:
-        """Add a force at a node.
-
-        Parameters
-        ----------
-        node : NodeHandle or str
-        force : array_like of shape (3,) [N], or a function of time [s] that returns it
-        follower : bool
-            Whether it turns with the edge that ends at the node (or starts there, at the first node).
-        name : str
-
-        Returns
-        -------
-        Load
-        """
-        place, _ = self._directory.node(node, "node of the force")
-        return self._load("force", place, force, validation.truth(follower, "follower"), name)
-
-    def add_moment(self, node: NodeHandle | str, moment: Value, *, name: str | None = None) -> Load:
-        """Add a moment at a node, in world axes.
-
-        Parameters
-        ----------
-        node : NodeHandle or str
-        moment : array_like of shape (3,) [N m], or a function of time [s] that returns it
-        name : str
-
-        Returns
-        -------
-        Load
-        """
-        place, _ = self._directory.node(node, "node of the moment")
-        return self._load("moment", place, moment, False, name)
-
-    def add_load(self, rod: Rod | str, load: Value, *, follower: bool = False, name: str | None = None) -> Load:
-        """Add a force spread evenly along a rod.
-
-        Parameters
-        ----------
-        rod : Rod or str
-        load : array_like of shape (3,) [N/m], or a function of time [s] that returns it
-        follower : bool
-            Whether it turns with the edges.
-        name : str
-
-        Returns
-        -------
-        Load
-        """
-        part = self._directory.rod(rod, "rod of the load")
-        return self._load("load", (part.index, 0), load, validation.truth(follower, "follower"), name)
-
-    def _load(self, kind: LoadKind, node: Pass, value: Value, follower: bool, name: str | None) -> Load:
-        name = self._directory.new_name(name, kind)
-        what = f"{kind} {name!r}"
-        function = value if callable(value) else None
-        first = validation.vector(value(0.0) if callable(value) else value, what + (" at t = 0" if function else ""))
-        return cast(Load, self._directory.add(LoadPart(name, kind, node, first, function, follower)))
 
     def add_mass(self, node: NodeHandle | str, mass: float, *, name: str | None = None) -> Mass:
         """Add a point mass [kg] to a node."""

@@ -15,6 +15,7 @@ from withe.parameters import RodParameters
 from withe.sections import SectionProperties
 
 __all__ = [
+    "LOAD_KINDS",
     "SUPPORT_KINDS",
     "ContactModel",
     "ContactSettings",
@@ -44,8 +45,9 @@ ContactModel = Literal["imcv2", "barrier", "imcv1", "spillmann_teschner"]
 FrictionModel = Literal["implicit", "lagged", "anchored", "semi_explicit"]
 Overlap = Literal["error", "separate"]
 FluidModel = Literal["stokeslets", "resistive"]
-LoadKind = Literal["force", "moment", "load"]
+LoadKind = Literal["force", "moment", "load", "pressure"]
 SupportKind = Literal["pin", "clamp", "hold_edge", "spinning_clamp", "spinning_edge"]
+LOAD_KINDS: tuple[str, ...] = get_args(LoadKind)
 SUPPORT_KINDS: tuple[str, ...] = get_args(SupportKind)
 
 
@@ -110,7 +112,7 @@ class SupportPart:
 
 @dataclass(frozen=True, eq=False)
 class LoadPart:
-    """A force at a node, a moment at a node, or a load along a rod."""
+    """A force at a node, a moment at a node, a load along a rod, or a pressure on it."""
 
     name: str
     kind: LoadKind
@@ -118,6 +120,7 @@ class LoadPart:
     value: FloatArray  # (3,), the value at t = 0 of one that varies
     function: Callable[[float], npt.ArrayLike] | None
     follower: bool
+    axis: FloatArray | None = None  # of a pressure: unit normal that its value is along
 
 
 @dataclass(frozen=True, eq=False)

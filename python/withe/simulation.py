@@ -572,26 +572,47 @@ class Simulation(Control):
         """The whole state, to go back to with `restore`, bit by bit."""
         return Snapshot(self._world.snapshot(), self._world.time, self._settings.copy())
 
-    def restore(self, snapshot: Snapshot) -> None:
-        """Go back to a snapshot, of this simulation or another of the same scene.
+    def restore(self, snapshot: Snapshot | Record, frame: int = -1) -> None:
+        """Go back to a snapshot, of this simulation or another of the same scene, or to a frame of a record.
+
+        A record holds positions, velocities, frames and spins of rods and their time, to the last digit or nearly;
+        everything else stays as it is here: supports must be where they were then, and what was set (loads, natural
+        shapes, materials) and the history that contact and friction remember are not in it. Joints are
+        turned so that they stress the edges at them least, and turn as these do on the mean.
+
+        Parameters
+        ----------
+        snapshot : Snapshot or Record
+        frame : int
+            Of a record; the last one by default.
 
         Raises
         ------
         ValueError
-            A snapshot of another scene, a damaged one, or one from a file that needs functions of time
-            that this simulation does not have.
+            A snapshot or record of another scene, a damaged one, a snapshot from a file that needs functions of time
+            that this simulation does not have, or a record whose nodes are elsewhere than supports hold them.
         RuntimeError
             Called by a callback of `run`.
         """
+        from withe.recording import Record
+
         self._refuse_in_run("restore")
+        if isinstance(snapshot, Record):
+            self._restore_record(snapshot, frame)
+            self._exact_time = None
+            return
         if not isinstance(snapshot, Snapshot):
-            raise ValueError(f"snapshot must be a withe.Snapshot, got {type(snapshot).__name__}")
+            raise ValueError(
+                f"snapshot must be a withe.Snapshot, got {type(snapshot).__name__}; a withe.Record will do too"
+            )
         settings = self._matched(snapshot)
         self._world.restore(snapshot._state)
         for name in set(self._directory.parts) - set(self._scene.parts) - set(settings.supports):
             del self._directory.parts[name]
         for name, (_, part) in settings.supports.items():
             self._directory.parts[name] = part
+        self._directory.parts.update(settings.loads)
+        self._loads = [*self._scene.all(LoadPart), *settings.loads.values()]
         self._settings = settings
         self._exact_time = None
 

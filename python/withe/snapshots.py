@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -14,7 +14,7 @@ import numpy.typing as npt
 from withe import io, validation
 from withe.motion import Path, Turn
 from withe.parameters import RodParameters
-from withe.parts import SUPPORT_KINDS, SupportPart
+from withe.parts import LOAD_KINDS, SUPPORT_KINDS, LoadPart, SupportPart
 
 __all__ = ["Settings", "Snapshot"]
 
@@ -39,6 +39,8 @@ class Settings:
         Loads that vary, by name.
     paths : dict of str to callable
         Supports that move along a path, by name.
+    loads : dict of str to LoadPart
+        Those put on while running, in order.
     """
 
     rods: list[RodParameters]
@@ -49,6 +51,7 @@ class Settings:
     supports: dict[str, tuple[int, SupportPart]]
     functions: dict[str, Callable[[float], npt.ArrayLike]] = field(default_factory=dict)
     paths: dict[str, Path] = field(default_factory=dict)
+    loads: dict[str, LoadPart] = field(default_factory=dict)
 
     def copy(self) -> Settings:
         """Settings that no longer change with these. What they hold is never changed in place."""
@@ -61,6 +64,7 @@ class Settings:
             dict(self.supports),
             dict(self.functions),
             dict(self.paths),
+            dict(self.loads),
         )
 
 
@@ -94,6 +98,7 @@ class Snapshot:
     def __getstate__(self) -> dict[str, Any]:
         settings = self._settings.copy()
         settings.functions = {}
+        settings.loads = {name: replace(load, function=None) for name, load in settings.loads.items()}
         settings.paths = {name: path for name, path in settings.paths.items() if isinstance(path, Turn)}
         return {
             "_state": self._state,
@@ -132,6 +137,12 @@ class Snapshot:
             turn = settings.paths.get(name)
             if isinstance(turn, Turn):
                 arrays |= {f"support_{number}_{word}": values for word, values in turn.arrays().items()}
+        loads = []
+        for number, load in enumerate(settings.loads.values()):
+            loads.append({"name": load.name, "kind": load.kind, "node": load.node, "follower": load.follower})
+            arrays[f"load_{number}_value"] = load.value
+            if load.axis is not None:
+                arrays[f"load_{number}_axis"] = load.axis
         header = {
             "time": self._time,
             "rods": len(settings.rods),
@@ -139,6 +150,7 @@ class Snapshot:
             "drags": settings.drags,
             "fluids": settings.fluids,
             "supports": supports,
+            "loads": loads,
             "functions": self._function_names(),
         }
         return io.save_arrays(path, "snapshot", _FILE_VERSION, header, arrays)
@@ -191,6 +203,20 @@ class Snapshot:
                         )
                     )
                 )
+        loads: dict[str, LoadPart] = {}
+        for number, entry in enumerate(header.get("loads", [])):  # which files had none of at first
+            name, kind = str(entry["name"]), validation.choice(entry["kind"], "kind", LOAD_KINDS)
+            rod, node = (validation.integer(index, "node", 0, 10_000_000) for index in entry["node"])
+            axis = arrays.get(f"load_{number}_axis")
+            loads[name] = LoadPart(
+                name,
+                kind,  # type: ignore[arg-type]
+                (rod, node),
+                validation.vector(arrays[f"load_{number}_value"], "value"),
+                None,
+                validation.truth(entry["follower"], "follower"),
+                None if axis is None else validation.unit_vector(axis, "axis"),
+            )
         settings = Settings(
             rods=rods,
             masses={str(name): validation.non_negative(mass, name) for name, mass in header["masses"].items()},
@@ -199,6 +225,7 @@ class Snapshot:
             gravity=validation.vector(arrays["gravity"], "gravity"),
             supports=supports,
             paths=paths,
+            loads=loads,
         )
         missing = tuple(str(name) for name in header["functions"])
         state = arrays["state"]

@@ -1,9 +1,12 @@
 """Loads on a simulation: constant, functions of time, follower, custom."""
 
+import pickle
+
 import numpy as np
 import pytest
 
-from simple_scenes import cantilever, weightless
+import withe
+from simple_scenes import RUBBER, cantilever, weightless
 
 
 def test_a_load_may_be_a_function_of_time():
@@ -148,3 +151,115 @@ def test_a_callback_may_read_but_not_step():
     simulation = globals_["simulation"] = scene.build()
     simulation.step(2)
     assert outcome == [(11, 3)] * 2
+
+
+@pytest.mark.parametrize("planar", [True, False])
+def test_a_load_put_on_while_running_acts_as_one_of_the_scene(planar):
+    """A force, a moment that follows, and a load along the rod: the same equilibrium, and the same steps."""
+    ends = []
+    for late in (False, True):
+        scene, arm, _ = cantilever()
+        simulation = None if not late else scene.build(planar=planar)
+        target = scene if not late else simulation
+        target.add_force(arm.end, (0.002, 0, 0.02), follower=True)
+        target.add_moment(arm.node(5), (0, 1e-4, 0), follower=True)
+        target.add_load(arm, (0, 0, 0.05))
+        simulation = simulation or scene.build(planar=planar)
+        assert simulation.plan.planar is planar
+        simulation.step(10)
+        simulation.equilibrium()
+        ends.append(simulation.positions())
+    assert np.allclose(*ends, rtol=0, atol=1e-9)
+
+
+def test_a_load_put_on_out_of_the_plane_makes_the_scene_three_dimensional():
+    scene, arm, _ = cantilever()
+    simulation = scene.build()
+    assert simulation.plan.planar
+    simulation.add_force(arm.end, (0, 0.01, 0))
+    assert not simulation.plan.planar
+    simulation.step(5)
+    assert simulation.positions(arm)[-1, 1] > 0
+    held = scene.build(planar=True)
+    with pytest.raises(ValueError, match="leaves the plane"):
+        held.add_force(arm.end, (0, 0.01, 0), name="aside")
+    held.add_force(arm.end, (0, 0, 0.01), name="aside")  # what was refused has left no trace
+
+
+def growing_moment(t):
+    return (0, 1e-4 * t, 0)
+
+
+def test_loads_put_on_while_running_are_set_kept_in_snapshots_and_undone_by_reset(tmp_path):
+    scene, arm, _ = cantilever()
+    simulation = scene.build()
+    fresh = simulation.snapshot()
+    push = simulation.add_force(arm.end, (0, 0, 0.01), name="push")
+    turn = simulation.add_moment(arm.end, growing_moment)
+    simulation.step(3)
+    simulation.set(push, force=(0.001, 0, 0.02))
+    assert np.array_equal(simulation.get("push", "force"), (0.001, 0, 0.02))
+    state = simulation.snapshot()
+    copies = [simulation.copy(), pickle.loads(pickle.dumps(simulation)), scene.build()]
+    copies[2].restore(state)
+    simulation.step(3)
+    for other in copies:
+        other.step(3)
+        assert other.snapshot() == simulation.snapshot()
+        assert np.allclose(other.get(turn, "moment"), simulation.get(turn, "moment"))
+    simulation.clamp(arm.end)  # equations are made anew, loads and all
+    simulation.step()
+    simulation.reset()
+    assert simulation.snapshot() == fresh
+    with pytest.raises(ValueError, match="not in the scene"):
+        simulation.set(push, force=(0, 0, 0))
+    from_file = withe.Snapshot.load(state.save(tmp_path / "state.npz"))
+    with pytest.raises(ValueError, match="function of time"):
+        scene.build().restore(from_file)
+    copies[2].restore(from_file)
+    assert np.array_equal(copies[2].get("push", "force"), (0.001, 0, 0.02))
+
+
+def test_a_torque_may_depend_on_the_state():
+    """A torque against the spin, -c omega: omega decays as exp(-c t / I)."""
+    scene = withe.Scene(gravity=(0, 0, 0))
+    rod = scene.add_rod(start=(0, 0, 0), end=(0.01, 0, 0), nodes=3, radius=5e-3, material=RUBBER)
+    simulation = scene.build(time_step=1e-3, planar=False, integrator="backward_euler")
+    inertia = RUBBER.density * np.pi * 5e-3**4 / 2 * 0.01
+    rate = 5.0
+    simulation.add_moment(rod.node(1), lambda t: (-rate * inertia * simulation.spins(rod).mean(), 0, 0))
+    simulation.set_state(rod, spins=10.0)
+    simulation.step(200)
+    assert simulation.spins(rod).mean() == pytest.approx(10.0 * np.exp(-1.0), rel=5e-3)
+
+
+def test_a_moment_that_follows_stays_about_the_tangent_of_its_edge():
+    """A twisting moment at the tip of a quarter circle does not care which way the whole is turned."""
+    scene, arm, _ = weightless()
+    found = []
+    for natural in (0.0, np.pi / 2 / 0.2):
+        simulation = scene.build(planar=False, integrator="static")
+        simulation.set_natural_curvature(arm, (0.0, natural))
+        simulation.equilibrium()
+        simulation.add_moment(arm.end, (2e-4, 0, 0), follower=True)
+        simulation.equilibrium()
+        stiffness = simulation.get(arm, "twist_stiffness")[0]
+        found.append(simulation.twists(arm)[-1] * stiffness)
+    assert found[0] == pytest.approx(2e-4, rel=1e-9)
+    assert found[1] == pytest.approx(2e-4, rel=2e-3)
+
+
+def test_a_pressure_is_a_number_and_needs_a_normal_on_an_open_rod():
+    scene, arm, _ = weightless()
+    with pytest.raises(ValueError, match="must be given: it is open"):
+        scene.add_pressure(arm, 1.0)
+    wind = scene.add_pressure(arm, 0.05, normal=(0, -1, 0))
+    simulation = scene.build()
+    assert simulation.get(wind, "pressure") == pytest.approx(0.05)
+    simulation.equilibrium()
+    assert simulation.positions(arm)[-1, 2] > 0.001  # normal x tangent is up
+    simulation.set(wind, pressure=-0.05)
+    simulation.equilibrium()
+    assert simulation.positions(arm)[-1, 2] < -0.001
+    with pytest.raises(ValueError, match="must be a number"):
+        simulation.set(wind, pressure=(0, 0, 1))

@@ -1,0 +1,281 @@
+/// Rods put elsewhere while the scene runs: positions, frames and rates from outside.
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "common/check.hpp"
+#include "common/text.hpp"
+#include "geometry/rotation.hpp"
+#include "world/implementation.hpp"
+
+namespace withe {
+namespace {
+
+std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+constexpr double kHeld = 1e-9;     // of the scene's length, or rad: what rounding may have moved
+constexpr double kAligned = 1e-6;  // rad: directors from outside are no better
+
+void check_shapes(const Model& model, const RodState& rod) {
+  const int rods = static_cast<int>(model.description.rods.size());
+  require(rod.rod >= 0 && rod.rod < rods, "no such rod: " + std::to_string(rod.rod));
+  const Eigen::Index nodes = static_cast<Eigen::Index>(model.description.rods[at(rod.rod)].nodes.size()),
+                     edges = model.rod_first_edge[at(rod.rod) + 1] - model.rod_first_edge[at(rod.rod)],
+                     stencils = static_cast<Eigen::Index>(model.place[at(rod.rod)].size());
+  const auto fits = [](const auto& values, Eigen::Index rows) {
+    return (values.rows() == 0 || values.rows() == rows) && values.allFinite();
+  };
+  require(fits(rod.positions, nodes) && fits(rod.velocities, nodes), "positions and velocities need a row a node");
+  require(fits(rod.directors, edges) && fits(rod.spins, edges), "directors and spins need a row an edge");
+  require(fits(rod.twists, stencils) && (rod.twists.size() > 0 || rod.directors.rows() == 0 || stencils == 0),
+          "twists need a number a stencil");
+  require(rod.directors.rows() > 0 || rod.positions.rows() == 0, "positions need directors");
+}
+
+}  // namespace
+
+void World::set_state(const std::vector<RodState>& rods, std::optional<double> time) {
+  for (const RodState& rod : rods) check_shapes(implementation_->model, rod);
+  require(!time || std::isfinite(*time), "time must be finite");
+  // On a copy, so that what is refused changes nothing.
+  auto fresh = std::make_unique<Implementation>(*implementation_);
+  fresh->callback = implementation_->callback;
+  fresh->poll = implementation_->poll;
+  for (const RodState& rod : rods)
+    if (fresh->model.planar() && fresh->leaves_plane(rod)) {
+      fresh->leave_plane("a state of rod '" + fresh->description.rods[at(rod.rod)].name + "'");
+      break;
+    }
+  if (time) fresh->state.time = *time;
+  fresh->place_rods(rods);
+  fresh->set_rates(rods);
+  implementation_ = std::move(fresh);
+}
+
+bool World::Implementation::leaves_plane(const RodState& rod) const {
+  const Plane& plane = *model.plane;
+  const auto off = [&](const MatrixX3& rows, const Vector3& origin, double scale) {
+    return rows.rows() > 0 && ((rows.rowwise() - origin.transpose()) * plane.normal).cwiseAbs().maxCoeff() > scale;
+  };
+  if (off(rod.positions, plane.origin, kHeld * model.length_scale)) return true;
+  if (rod.velocities.rows() > 0 && off(rod.velocities, Vector3::Zero(), kHeld * rod.velocities.cwiseAbs().maxCoeff()))
+    return true;
+  if ((rod.spins.array() != 0.0).any() || (rod.twists.array().abs() > kAligned / model.length_scale).any()) return true;
+  // In its plane an edge turns its drawn directors about the normal.
+  for (Eigen::Index e = 0; e < rod.directors.rows(); ++e) {
+    const int edge = model.rod_first_edge[at(rod.rod)] + static_cast<int>(e);
+    const auto& nodes = description.rods[at(rod.rod)].nodes;
+    const auto in_space = [&](Eigen::Index i) -> Vector3 {
+      if (rod.positions.rows() > 0) return rod.positions.row(i);
+      return node_position(model, state.q, nodes[static_cast<std::size_t>(i)]);
+    };
+    const Vector3 drawn = to_eigen(model.initial_tangent[at(edge)]), d1 = to_eigen(model.initial_director[at(edge)]),
+                  now = in_space((e + 1) % static_cast<Eigen::Index>(nodes.size())) - in_space(e);
+    const double angle = std::atan2(drawn.cross(now).dot(plane.normal), drawn.dot(now));
+    if ((rotation_exp(angle * plane.normal) * d1 - rod.directors.row(e).transpose()).norm() > kAligned) return true;
+  }
+  return false;
+}
+
+/// Unknowns with nodes where they are told to be; refuses to move what is held.
+VectorX World::Implementation::placed(const std::vector<RodState>& rods) const {
+  VectorX q = state.q;
+  std::vector<bool> told(at(model.node_count), false);
+  for (const RodState& rod : rods)
+    for (Eigen::Index i = 0; i < rod.positions.rows(); ++i) {
+      const int node = description.rods[at(rod.rod)].nodes[static_cast<std::size_t>(i)], dof = model.node_dof[at(node)];
+      const Vector3 x = rod.positions.row(i);
+      VectorX own = x;
+      if (model.planar()) {
+        const Vector3 from = x - model.plane->origin;
+        own = Vector2(from.dot(model.plane->first), from.dot(model.plane->second));
+      }
+      require(!told[at(node)] || (q.segment(dof, model.dimension) - own).norm() <= kHeld * model.length_scale,
+              "positions of rods that share a node must agree" + place_of_node(node).words);
+      told[at(node)] = true;
+      q.segment(dof, model.dimension) = own;
+    }
+  for (const Support& support : model.supports) {
+    if (!support.active) continue;
+    for (int node : {support.node, support.other_node}) {
+      if (node < 0) continue;
+      for (const Constraint& c : model.constraints) {
+        if (c.first != model.node_dof[at(node)]) continue;
+        const Vector3 moved = c.held_change(state.q, q);
+        require(moved.norm() <= kHeld * model.length_scale, "positions move what a support holds, by " +
+                                                                text(moved.norm()) + " m" + place_of_node(node).words +
+                                                                ": move the support there first, or release it");
+        q.segment(c.first, c.size) -= moved.head(c.size);
+      }
+    }
+  }
+  for (int e = 0; e < model.edge_count; ++e) {
+    const double length =
+        (q.segment(model.head_dof[at(e)], model.dimension) - q.segment(model.tail_dof[at(e)], model.dimension)).norm();
+    require(length > 1e-6 * model.edge_length(e),
+            "positions leave an edge without length" + place_of_node(model.edge_tail[at(e)]).words);
+  }
+  return q;
+}
+
+/// Nodes, frames and the branches of twists.
+void World::Implementation::place_rods(const std::vector<RodState>& rods) {
+  std::vector<bool> is_told(at(model.edge_count), false);
+  for (const RodState& rod : rods)
+    for (Eigen::Index e = 0; e < rod.directors.rows(); ++e)
+      is_told[at(model.rod_first_edge[at(rod.rod)] + static_cast<int>(e))] = true;
+  if (std::find(is_told.begin(), is_told.end(), true) == is_told.end()) return;
+  const VectorX q = placed(rods);
+  Configuration c;
+  compute_configuration(model, state, state.q, c);
+  const Configuration before = c;
+  compute_configuration(model, state, q, c);
+  if (!model.planar()) {
+    for (int e = 0; e < model.edge_count; ++e)
+      require(is_told[at(e)] || dot(before.edge[at(e)].tangent, c.edge[at(e)].tangent) > -1.0 + 1e-6,
+              "positions turn an edge of another rod right round" + place_of_node(model.edge_tail[at(e)]).words);
+    const VectorX bend_tau = state.bend_tau, half_tau = state.half_tau;
+    accept_configuration(model, q, c, state);
+    // Frames of edges that are told are theirs; which turn a twist is in follows from what is told too.
+    for (std::size_t b = 0; b < model.bend.size(); ++b) {
+      const auto i = static_cast<Eigen::Index>(b);
+      if (is_told[at(model.bend[b].edge[0])] || is_told[at(model.bend[b].edge[1])]) state.bend_tau(i) = 0.0;
+    }
+    for (std::size_t h = 0; h < model.half.size(); ++h)
+      if (is_told[at(model.half[h].edge)]) state.half_tau(static_cast<Eigen::Index>(h)) = 0.0;
+    for (const RodState& rod : rods) {
+      for (Eigen::Index e = 0; e < rod.directors.rows(); ++e) {
+        const int edge = model.rod_first_edge[at(rod.rod)] + static_cast<int>(e);
+        const Vector3 t =
+            (q.segment<3>(model.head_dof[at(edge)]) - q.segment<3>(model.tail_dof[at(edge)])).normalized();
+        const Vector3 told = rod.directors.row(e);
+        require(
+            std::abs(told.norm() - 1.0) < kAligned && std::abs(told.dot(t)) < kAligned,
+            "directors must be unit vectors normal to their edges" + place_of_node(model.edge_tail[at(edge)]).words);
+        const Vector3 d1 = (told - t * t.dot(told)).normalized();
+        const Vector3 now = to_eigen(before.edge[at(edge)].d1);
+        for (const Support& support : model.supports)
+          require(!support.active || support.edge != edge || may_spin(support.description.kind) ||
+                      (d1 - now).norm() < kAligned,
+                  "directors turn an edge that a support holds" + place_of_node(support.node).words +
+                      ": turn the support there first, or release it");
+        state.tangent[at(edge)] = to_vec3(t);
+        state.director[at(edge)] = to_vec3(d1);
+        state.q(model.edge_dof[at(edge)]) = 0.0;
+      }
+      const auto& places = model.place[at(rod.rod)];
+      for (Eigen::Index s = 0; s < rod.twists.size(); ++s) {
+        const StencilPlace& place = places[static_cast<std::size_t>(s)];
+        if (place.bend >= 0) state.bend_tau(place.bend) = rod.twists(s) * model.bend_voronoi(place.bend);
+        for (int h : place.half)
+          if (h >= 0) state.half_tau(h) = rod.twists(s) * model.half_voronoi(h);
+      }
+    }
+  } else {
+    state.q = q;
+  }
+  relax_joints(is_told);
+  compute_configuration(model, state, state.q, c);
+  require(c.bend_strain.allFinite() && c.half_strain.allFinite(), "positions fold an edge right back onto the next");
+  accept_configuration(model, VectorX(state.q), c, state);
+  if (Contact* contact = equations->contact()) {
+    state.contacts.clear();
+    forget_contacts();
+    contact->set_parameters(parameters);
+    contact->initialise(state);
+    check_overlap();
+  }
+  forget_motion();
+}
+
+/// Frames that edges are attached to turn with them, as far as nothing holds them.
+void World::Implementation::relax_joints(const std::vector<bool>& is_told) {
+  std::vector<bool> which(at(model.frame_count), false);
+  for (const FrameStencil& half : model.half)
+    if (is_told[at(half.edge)]) which[at(half.frame)] = true;
+  for (int f = 0; f < model.frame_count; ++f) {
+    if (!which[at(f)]) continue;
+    Matrix3 free = Matrix3::Identity();
+    for (const Constraint& c : model.constraints)
+      if (c.first == model.frame_dof[at(f)]) free = c.free;
+    relax_frame(f, free);
+  }
+}
+
+void World::Implementation::set_rates(const std::vector<RodState>& rods) {
+  std::vector<bool> is_told(at(model.edge_count), false);
+  for (const RodState& rod : rods) {
+    const int first = model.rod_first_edge[at(rod.rod)], end = model.rod_first_edge[at(rod.rod) + 1];
+    if (rod.velocities.rows() > 0 || rod.spins.size() > 0)
+      for (int e = first; e < end; ++e) is_told[at(e)] = true;
+    for (Eigen::Index i = 0; i < rod.velocities.rows(); ++i) {
+      const int dof = model.node_dof[at(description.rods[at(rod.rod)].nodes[static_cast<std::size_t>(i)])];
+      const Vector3 v = rod.velocities.row(i);
+      if (model.planar())
+        state.v.segment<2>(dof) << v.dot(model.plane->first), v.dot(model.plane->second);
+      else
+        state.v.segment<3>(dof) = v;
+    }
+    if (!model.planar())
+      for (Eigen::Index e = 0; e < rod.spins.size(); ++e)
+        state.v(model.edge_dof[at(first + static_cast<int>(e))]) = rod.spins(e);
+  }
+  turn_frames(is_told);
+  equations->assembler().project(state.v);
+  forget_motion();
+}
+
+/// Frames turn as the edges at them do, on the mean; hinges as what is left of that about their axes.
+void World::Implementation::turn_frames(const std::vector<bool>& is_told) {
+  Configuration c;
+  compute_configuration(model, state, state.q, c);
+  const auto rate = [&](int e) -> Vector3 {
+    const Vector3 t = edge_directors(model, c, e).col(2);
+    const Vector3 along =
+        node_velocity(model, state.v, model.edge_head[at(e)]) - node_velocity(model, state.v, model.edge_tail[at(e)]);
+    const double spin = model.planar() ? 0.0 : state.v(model.edge_dof[at(e)]);
+    return t.cross(along) / c.length(e) + spin * t;
+  };
+  for (int f = 0; f < model.frame_count; ++f) {
+    bool told = false;
+    int count = 0;
+    Vector3 turn = Vector3::Zero();
+    for (const FrameStencil& half : model.half) {
+      if (half.frame != f) continue;
+      if (is_told[at(half.edge)]) told = true;
+      if (half.hinge >= 0) continue;
+      turn += rate(half.edge);
+      ++count;
+    }
+    if (!told) continue;
+    const int dof = model.frame_dof[at(f)];
+    if (count > 0) {
+      turn /= count;
+      if (model.planar())
+        state.v(dof) = turn.dot(model.plane->normal);
+      else
+        state.v.segment<3>(dof) = turn;
+    }
+    for (const FrameStencil& half : model.half)
+      if (half.frame == f && half.hinge >= 0) {
+        const Hinge& hinge = model.hinges[at(half.hinge)];
+        const Vector3 axis = frame_rotation(model, state, f) * hinge.axis;
+        state.v(hinge.dof) = axis.dot(rate(half.edge) - Vector3(state.v.segment<3>(dof)));
+      }
+  }
+}
+
+void World::Implementation::forget_motion() {
+  state.acceleration.setZero();
+  state.acceleration_current = false;
+  predictor.clear();
+  state.motion.known = 0;
+  alarm.reset();
+  guard.turn = EnergyGuard{}.turn;
+  guard.energy.reset();
+  reaction_current = false;
+}
+
+}  // namespace withe
