@@ -36,6 +36,7 @@ void Contact::set_parameters(const Parameters& parameters) {
   const std::size_t rods = model_.description.rods.size();
   least_stiffness_.setConstant(static_cast<Eigen::Index>(rods), given);
   edge_mass_ = parameters.edge_density.cwiseProduct(model_.edge_arc);
+  gravity_ = parameters.gravity.norm();
   for (int e = 0; e < model_.edge_count && !(given > 0.0); ++e) {
     const double r = surfaces_.radius(e);
     if (!(r > 0.0)) continue;
@@ -50,7 +51,8 @@ void Contact::initialise(State& state) const {
   if (state.contact_stiffness.size() == 0) state.contact_stiffness = least_stiffness_;
 }
 
-/// What stops an edge's mass within the step, at the speed at which the ends meet.
+/// What stops an edge's mass at the speed at which the ends meet, within the step or within the depth of contact; and
+/// what stores its energy in that depth, where a step's force does as much work as contact stores.
 double Contact::impact_stiffness(const ContactPair& pair) const {
   if (fixed(pair)) return 0.0;
   const bool obstacle = pair.key.b < 0;
@@ -67,8 +69,11 @@ double Contact::impact_stiffness(const ContactPair& pair) const {
       square = std::max(square, dot(relative, relative));
     }
   }
-  const double mass = obstacle ? edge_mass_(pair.key.a) : std::min(edge_mass_(pair.key.a), edge_mass_(pair.key.b));
-  return mass * std::sqrt(square) / (duration_ * 2.0 * kDepth * pair.small_radius());
+  const double depth = kDepth * pair.small_radius(), half = 0.5 * mass_of(pair) / depth;
+  const double stops = half * std::min(std::sqrt(square) / duration_, square / depth);
+  if (pressing_ < Pressing::mean) return stops;
+  const double speed = approach_speed(pair);
+  return std::max(stops, half * speed * speed / depth);
 }
 
 /// Of a contact that begins, for a whole node.
@@ -87,8 +92,7 @@ double Contact::start_stiffness(const ContactPair& pair, const VectorX& stiffnes
 /// would put energy in.
 double Contact::first_stiffness(const ContactPair& pair) const {
   const double start = start_stiffness(pair, state_->contact_stiffness);
-  const bool before = starting_ || std::binary_search(unrecorded_.begin(), unrecorded_.end(), pair.key);
-  return before ? start : std::max(start, impact_stiffness(pair));
+  return met(pair) ? std::max(start, impact_stiffness(pair)) : start;
 }
 
 double Contact::tangential_stiffness(const ContactPair& pair, double stiffness) const {
@@ -121,7 +125,7 @@ double Contact::farthest(const VectorX& change) const {
   return std::sqrt(most);
 }
 
-Contact::Touching Contact::touch(int index, const VectorX& q) const {
+Contact::Touching Contact::touch(int index, const VectorX& q, bool whole) const {
   const ContactPair& pair = pairs_[at(index)];
   Touching t;
   t.pair = index;
@@ -136,7 +140,7 @@ Contact::Touching Contact::touch(int index, const VectorX& q) const {
   // Far apart by their middles: no need for more.
   const Vec3d middle = 0.5 * (x[0] + x[1] - x[2] - x[3]), u = x[1] - x[0], v = x[3] - x[2];
   const double size = 0.5 * (std::sqrt(dot(u, u)) + std::sqrt(dot(v, v))) + (1.0 + kFar) * pair.reach();
-  if (dot(middle, middle) > size * size) {
+  if (!whole && dot(middle, middle) > size * size) {
     t.distance = std::sqrt(dot(middle, middle)) - size + (1.0 + kFar) * pair.reach();  // or more
     return t;
   }
@@ -161,6 +165,7 @@ void Contact::begin(const State& state, double duration) {
   forget_foreseen();
   if (outgrown(state.q, nullptr)) find_pairs(state.q, state.q);
   touching_.clear();
+  leaving_.clear();
   unrecorded_.clear();
   starting_ = true;
   update(state.q);
@@ -168,6 +173,8 @@ void Contact::begin(const State& state, double duration) {
   for (const Touching& t : touching_)
     if (record_of(pairs_[at(t.pair)].key) == nullptr) unrecorded_.push_back(pairs_[at(t.pair)].key);
   std::sort(unrecorded_.begin(), unrecorded_.end());
+  for (const Touching& t : touching_)
+    if (t.law.elastic > 0.0) leaving_.push_back(t);
   start_energy_ = energy();
   start_pressing_ = pressing_energy();
   if (!target_.empty()) move_obstacles();
@@ -218,7 +225,6 @@ void Contact::update(const VectorX& q1) {
   q1_ = q1;
   bounds_.resize(pairs_.size());
   touching_ = lagged_;
-  const ContactDescription& contact = model_.description.contact;
   for (int p = 0; p < static_cast<int>(pairs_.size()); ++p) {
     if (bounds_[at(p)].clear > moved_) continue;
     const ContactPair& pair = pairs_[at(p)];
@@ -227,16 +233,10 @@ void Contact::update(const VectorX& q1) {
     const auto above = [&](double least) { return moved_ + kSafe * 0.5 * (t.distance - least); };
     bounds_[at(p)] = {above(pair.reach()), above(pair.nearest())};
     if (t.distance >= pair.reach()) continue;
-    const ContactRecord* record = record_of(pair.key);
-    t.stiffness = pair.share * (record ? record->stiffness : first_stiffness(pair));
-    t.yielded = record ? record->yielded : 0.0;
-    t.energy = contact_energy(contact.law, t.distance + t.yielded, pair.radii(), pair.tolerance);
-    t.energy.value *= t.stiffness;
-    t.energy.first *= t.stiffness;
-    t.energy.second *= t.stiffness;
-    if (record) t.stick = record->stick;
+    set_force(t, record_of(pair.key));
     touching_.push_back(t);
   }
+  add_leaving(lagged_.size());
   current_ = !starting_;  // what has no record begins otherwise in a step than before it
 }
 

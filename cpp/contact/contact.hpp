@@ -11,6 +11,7 @@
 
 #include "contact/broad_phase.hpp"
 #include "contact/friction.hpp"
+#include "contact/pressing_law.hpp"
 #include "contact/surfaces.hpp"
 
 namespace withe {
@@ -19,6 +20,13 @@ namespace withe {
 inline constexpr double kDepth = 0.01;
 /// No deeper than this where a step, an equilibrium or a drawing is accepted.
 inline constexpr double kDeepest = 0.04;
+
+/// How surfaces press in a step (see pressing_law.hpp): in statics; by the force at its end; by that of the whole step,
+/// where they have just met; and along the mean direction too, so that sliding gains nothing.
+enum class Pressing { still, end, mean, mean_direction };
+
+/// What stays the same where a contact becomes stiffer under load.
+enum class Keep { force, energy };
 
 /// Gradient and Hessian of one contact in its own unknowns.
 struct ContactLocal {
@@ -60,8 +68,8 @@ class Contact {
   /// Work of moving obstacles on rods and on what contact stores, with the forces at q1 [J].
   double obstacle_work() const;
 
-  /// Whether the steps to come are energy-momentum ones, in which pressing may gain no energy.
-  void conserve(bool conserving) { conserving_ = conserving; }
+  /// How surfaces press in the steps to come.
+  void press_by(Pressing pressing) { pressing_ = pressing; }
   /// A step begins at `state`, which must outlive it. `duration`: the time in which slip happens [s].
   void begin(const State& state, double duration);
   /// Finds what touches at q1.
@@ -87,6 +95,8 @@ class Contact {
   /// Whether that is more than a step may end with.
   bool too_deep() const { return depth() > deepest_; }
   void allow_depth(double deepest) { deepest_ = deepest; }
+  /// Whether a step of dt would be too long for what an impact loses by its restitution.
+  bool unresolved(double dt) const;
 
   /// Whether everything that touches has an element; if not, `couple` gives elements to it and to what is near.
   bool coupled() const;
@@ -114,12 +124,12 @@ class Contact {
   void hold_sticking(const State& state, VectorX& change) const;
 
   /// Keeps in `state`, still where the step began, what contacts at q1 must remember; their stiffness follows the
-  /// forces. Returns the energy that the change of stiffness put in [J].
-  double accept(State& state);
+  /// forces. Returns the energy that this put in, below zero where it took some: never more than `spare` [J].
+  double accept(State& state, Keep keep, double spare);
   /// The same for a step so short that stiffness stays as it is.
   void remember(State& state) const;
   /// Makes contacts of bodies that are too deep in each other stiffer; returns the energy put in [J].
-  double stiffen(State& state);
+  double stiffen(State& state, Keep keep);
   /// Stiffness that no rod falls below; that of a state that has none yet.
   void set_parameters(const Parameters& parameters);
   void initialise(State& state) const;
@@ -142,6 +152,10 @@ class Contact {
     double distance = 0;
     ContactEnergy energy;  ///< times the stiffness
     double stiffness = 0, yielded = 0;
+    double approach = 0, age = 0;  ///< see ContactRecord
+    double before = 0;             ///< distance at the start of the step, where `law` needs it [m]
+    PressingLaw law;
+    PressingForce pressing;
     Vec3d stick{};
     int frozen = -1;  ///< friction of the start and no pressing: index in frozen_
   };
@@ -164,11 +178,25 @@ class Contact {
   static double depth_of(const ContactPair& pair, double distance) {
     return (pair.radii() - distance) / pair.small_radius();
   }
+  /// What is too deep is what presses.
+  static double depth_of(const ContactPair& pair, const Touching& t) { return depth_of(pair, t.distance + t.yielded); }
   /// Whether a stiffness is given.
   bool fixed(const ContactPair& pair) const {
     return pair.stiffness > 0.0 || model_.description.contact.stiffness > 0.0;
   }
-  Touching touch(int pair, const VectorX& q) const;
+  /// `whole`: its closest points too, however far apart it is.
+  Touching touch(int pair, const VectorX& q, bool whole = false) const;
+  void set_force(Touching& t, const ContactRecord* record) const;
+  void add_leaving(std::size_t first);
+  double start_distance(const ContactPair& pair) const;
+  double distance_before(const ContactPair& pair, const Touching& t) const;
+  double first_approach(const ContactPair& pair) const;
+  double approach_speed(const ContactPair& pair) const;
+  double mass_of(const ContactPair& pair) const;
+  double rest_speed(const ContactPair& pair) const;
+  double swing_time(const ContactPair& pair, const Touching& t) const;
+  double impact_share(const ContactPair& pair, const Touching& t) const;
+  bool met(const ContactPair& pair) const;
   double start_stiffness(const ContactPair& pair, const VectorX& stiffness) const;
   double impact_stiffness(const ContactPair& pair) const;
   double first_stiffness(const ContactPair& pair) const;
@@ -216,13 +244,15 @@ class Contact {
   }
   const ContactRecord* record_of(const ContactKey& key) const;
   double change_stiffness(const Touching& t, double ratio, double yielded, ContactRecord& record) const;
-  double yielded_at(const Touching& t, double ratio) const;
+  double yielded_at(const Touching& t, double ratio, Keep keep) const;
   /// Of a whole node, for a force to press surfaces no deeper than `kDepth` [N/m].
   static double wanted_stiffness(const ContactPair& pair, double force) {
     return force / (2.0 * kDepth * pair.small_radius() * pair.share);
   }
+  double worn(const Touching& t) const;
   double faded(const Touching& t) const;
-  double follow_force(const Touching& t, ContactRecord& record) const;
+  /// By how much a contact's stiffness is to change, by the force that it carries.
+  double wanted_ratio(const Touching& t, const ContactRecord& record) const;
   double source_stiffness() const;
   void record_friction(const Touching& t, ContactRecord& record) const;
   ContactRecord record(const Touching& t) const;
@@ -250,12 +280,15 @@ class Contact {
   bool starting_ = false;
   bool current_ = false;  ///< touching_ is what touches at q1_
   const State* state_ = nullptr;
-  bool geometric_ = true, conserving_ = false;
+  bool geometric_ = true;
+  Pressing pressing_ = Pressing::end;
+  double gravity_ = 0;  ///< [m/s^2]
   double duration_ = 0, eased_ = 1, start_energy_ = 0, start_pressing_ = 0, deepest_ = kDeepest;
   VectorX q1_;
   /// Friction of each pair over its limit, empty where it is not known; and the next.
   std::vector<Vec3d> foreseen_, next_foreseen_;
   std::vector<Touching> touching_, lagged_;
+  std::vector<Touching> leaving_;  ///< what gives back in this step what it took, wherever it ends
   std::vector<Frozen> frozen_;
   std::vector<std::pair<ContactKey, int>> elements_;  ///< sorted
   std::vector<int> element_unknowns_;

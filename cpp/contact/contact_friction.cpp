@@ -42,7 +42,7 @@ double Contact::friction_slope(const Touching& t) const {
   if (t.frozen >= 0) return pair.friction * frozen_[at(t.frozen)].pressing * slip_rate();
   if (freezes()) return 0.0;
   if (model_.description.contact.friction_law == FrictionLaw::anchored) return tangential_stiffness(pair, t.stiffness);
-  return -pair.friction * t.energy.first * slip_rate();
+  return -pair.friction * t.pressing.first * slip_rate();
 }
 
 FrictionSetting Contact::setting(const Touching& t) const {
@@ -52,10 +52,10 @@ FrictionSetting Contact::setting(const Touching& t) const {
   f.pair = &pair;
   if (pair.key.b < 0) f.obstacle = &surfaces_.obstacles()[at(-1 - pair.key.b)];
   f.points = t.points;
-  f.contact_law = contact.law;
+  f.pressing = t.law;
+  f.before = t.before;
+  f.slides = pressing_ == Pressing::mean_direction && !pair.plane() && t.law.elastic > 0.0;
   f.law = contact.friction_law;
-  f.stiffness = t.stiffness;
-  f.yielded = t.yielded;
   f.tangential_stiffness = tangential_stiffness(pair, t.stiffness);
   f.rate = slip_rate();
   f.stick = t.stick;

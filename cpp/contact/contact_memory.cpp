@@ -13,7 +13,7 @@ bool by_key(const ContactRecord& a, const ContactRecord& b) { return a.key < b.k
 
 // A stiffness follows forces that outgrow it at once, and is then so many times what they want; and it follows those
 // for which it is so many times too great.
-constexpr double kAhead = 1.5, kSlack = 32.0;
+constexpr double kAhead = 1.25, kSlack = 32.0;
 // Greatest depth that has yielded, over the smaller radius; what is beyond the depth that lasts presses again little by
 // little: this much of it is left after a step.
 constexpr double kMostYield = 0.02, kLastingYield = 0.01;
@@ -102,66 +102,70 @@ double Contact::depth() const {
   double deepest = 0.0;
   for (const Touching& t : touching_) {
     const ContactPair& pair = pairs_[at(t.pair)];
-    if (t.frozen < 0) deepest = std::max(deepest, depth_of(pair, t.distance));
+    if (t.frozen < 0) deepest = std::max(deepest, depth_of(pair, t));
   }
   return deepest;
 }
 
 double Contact::rounding(int i, double reach) const {
   const Touching& t = touching_[at(i)];
-  const double stiffness = std::max(t.energy.second, friction_slope(t));
+  const double stiffness = std::max(t.pressing.by_end, friction_slope(t));
   return 8.0 * std::numeric_limits<double>::epsilon() * reach * stiffness;
 }
 
-/// The depth that must press no more for a contact that becomes stiffer to press as hard as before; not so much that
-/// surfaces could sink into each other for good.
-double Contact::yielded_at(const Touching& t, double ratio) const {
+/// The depth that must press no more for a contact that becomes stiffer to press as hard as before, not so much that
+/// surfaces could sink into each other for good; or to store as much energy as before: then surfaces that a load presses
+/// yield by no more than half of their depth times the logarithm of that load.
+double Contact::yielded_at(const Touching& t, double ratio, Keep keep) const {
   const ContactPair& pair = pairs_[at(t.pair)];
-  const ContactLaw law = model_.description.contact.law;
-  const double wanted = t.energy.first / (t.stiffness * ratio);  // of E'(D), negative
+  const double wanted = (keep == Keep::force ? -t.energy.first : t.energy.value) / (t.stiffness * ratio);
   double low = t.distance + t.yielded, high = pair.reach();
   for (int k = 0; k < 60; ++k) {
     const double middle = 0.5 * (low + high);
-    (contact_energy(law, middle, pair.radii(), pair.tolerance).first < wanted ? low : high) = middle;
+    const ContactEnergy e = contact_energy(t.law.law, middle, pair.radii(), pair.tolerance);
+    ((keep == Keep::force ? -e.first : e.value) > wanted ? low : high) = middle;
   }
+  if (keep == Keep::energy) return high - t.distance;
   return std::min(low - t.distance, kMostYield * pair.small_radius());
 }
 
-/// Gives a contact another stiffness, and another depth that presses no more. Anchors keep their force, and so their
-/// elastic slip changes. Returns the energy put in.
+/// Gives a contact another stiffness, and another depth that presses no more. Anchors that become stiffer keep their
+/// force, others their energy, and so their elastic slip changes. Returns the energy put in.
 double Contact::change_stiffness(const Touching& t, double ratio, double yielded, ContactRecord& record) const {
   const ContactPair& pair = pairs_[at(t.pair)];
   const double anchor = tangential_stiffness(pair, t.stiffness);
   const double energy =
-      ratio * t.stiffness *
-      contact_energy(model_.description.contact.law, t.distance + yielded, pair.radii(), pair.tolerance).value;
-  const double put_in = energy - t.energy.value + 0.5 * anchor * dot(record.stick, record.stick) * (1.0 / ratio - 1.0);
-  record.stick = (1.0 / ratio) * record.stick;
+      ratio * t.stiffness * contact_energy(t.law.law, t.distance + yielded, pair.radii(), pair.tolerance).value;
+  const double shorter = ratio > 1.0 ? 1.0 / ratio : 1.0 / std::sqrt(ratio);
+  const double put_in = energy - t.energy.value +
+                        0.5 * anchor * dot(record.stick, record.stick) * (ratio * shorter * shorter - 1.0);
+  record.stick = shorter * record.stick;
   record.stiffness *= ratio;
   record.yielded = yielded;
   return put_in;
 }
 
-/// What has yielded wears off where surfaces that separate press no more, without work, and fades where it is deep.
-double Contact::faded(const Touching& t) const {
-  const ContactPair& pair = pairs_[at(t.pair)];
-  const double lasting = kLastingYield * pair.small_radius();
-  const double left = t.yielded > lasting ? lasting + kFading * (t.yielded - lasting) : t.yielded;
-  return std::clamp(pair.reach() - t.distance, 0.0, left);
+/// What has yielded wears off where surfaces that separate press no more, without work.
+double Contact::worn(const Touching& t) const {
+  return std::clamp(pairs_[at(t.pair)].reach() - t.distance, 0.0, t.yielded);
 }
 
-/// Stiffness from one step to the next, by the force that it carries; returns the energy put in.
-double Contact::follow_force(const Touching& t, ContactRecord& record) const {
+/// And fades where it is deep and surfaces rest, which takes work.
+double Contact::faded(const Touching& t) const {
+  const double lasting = kLastingYield * pairs_[at(t.pair)].small_radius();
+  const double left = t.yielded > lasting ? lasting + kFading * (t.yielded - lasting) : t.yielded;
+  return std::min(worn(t), left);
+}
+
+double Contact::wanted_ratio(const Touching& t, const ContactRecord& record) const {
   const ContactPair& pair = pairs_[at(t.pair)];
+  if (fixed(pair)) return 1.0;
   const double wanted = wanted_stiffness(pair, record.force);
-  if (wanted > record.stiffness) {
-    const double ratio = kAhead * wanted / record.stiffness;
-    return change_stiffness(t, ratio, yielded_at(t, ratio), record);
-  }
+  if (wanted > record.stiffness) return kAhead * wanted / record.stiffness;
+  if (record.approach > 0.0) return 1.0;  // as stiff as the impact that has only begun will want it
   // A contact that is about to open wants next to nothing, and more when it presses again.
   const double common = std::max(wanted, start_stiffness(pair, state_->contact_stiffness));
-  if (kSlack * common < record.stiffness) return change_stiffness(t, 2.0 * common / record.stiffness, faded(t), record);
-  return t.yielded > 0.0 ? change_stiffness(t, 1.0, faded(t), record) : 0.0;
+  return kSlack * common < record.stiffness ? 2.0 * common / record.stiffness : 1.0;
 }
 
 /// The greatest force that contact has to hold at a node, times 1e5 / m [Choi, dissertation, (5.16), (5.17)]: what all
@@ -196,6 +200,10 @@ ContactRecord Contact::record(const Touching& t) const {
   record.force = -t.energy.first;
   record.stiffness = t.stiffness / pair.share;
   record.yielded = t.yielded;
+  if (pressing_ != Pressing::still && impact_share(pair, t) > 0.0) {
+    record.approach = t.approach;
+    record.age = t.age + duration_;
+  }
   if (frictional_ && !freezes() && pair.friction > 0.0) record_friction(t, record);
   return record;
 }
@@ -210,43 +218,56 @@ void Contact::keep(std::vector<ContactRecord>& records, State& state) const {
 void Contact::remember(State& state) const {
   std::vector<ContactRecord> records;
   for (const Touching& t : touching_) {
-    if (t.frozen >= 0) continue;
     const ContactPair& pair = pairs_[at(t.pair)];
+    if (t.frozen >= 0 || t.distance >= pair.reach()) continue;
     records.push_back(record(t));
     if (record_of(pair.key) == nullptr) records.back().stiffness = start_stiffness(pair, state.contact_stiffness);
   }
   keep(records, state);
 }
 
-double Contact::accept(State& state) {
+double Contact::accept(State& state, Keep keep, double spare) {
+  struct Fading {
+    const Touching* touching;
+    std::size_t record;
+  };
   std::vector<ContactRecord> records;
+  std::vector<Fading> fading;
   const ContactDescription& contact = model_.description.contact;
   const bool source = contact.stiffness_rule == StiffnessRule::source && !(contact.stiffness > 0.0);
   const double common = source ? std::max(source_stiffness(), least_stiffness_.minCoeff()) : 0.0;
   VectorX greatest = least_stiffness_;
-  double put_in = 0.0;
+  double put_in = 0.0, wanted = 0.0;
   for (const Touching& t : touching_) {
-    if (t.frozen >= 0) continue;
     const ContactPair& pair = pairs_[at(t.pair)];
+    if (t.frozen >= 0 || t.distance >= pair.reach()) continue;
     ContactRecord record = this->record(t);
-    if (source && !fixed(pair)) {
-      const double ratio = common / record.stiffness;
-      put_in += change_stiffness(t, ratio, ratio > 1.0 ? yielded_at(t, ratio) : faded(t), record);
-    } else if (!fixed(pair)) {
-      put_in += follow_force(t, record);
+    const double ratio = source && !fixed(pair) ? common / record.stiffness : wanted_ratio(t, record);
+    if (ratio > 1.0) {
+      put_in += change_stiffness(t, ratio, yielded_at(t, ratio, keep), record);
+    } else if (ratio < 1.0 || record.approach > 0.0) {
+      put_in += change_stiffness(t, ratio, worn(t), record);
     } else if (t.yielded > 0.0) {
-      put_in += change_stiffness(t, 1.0, faded(t), record);
+      ContactRecord unused;
+      wanted += change_stiffness(t, 1.0, faded(t), unused);
+      fading.push_back({&t, records.size()});
     }
     for (int rod : {pair.rod_a, pair.rod_b})
       if (rod >= 0) greatest(rod) = std::max(greatest(rod), source ? common : wanted_stiffness(pair, -t.energy.first));
     records.push_back(record);
   }
-  keep(records, state);
+  // Energy grows with depth the faster the deeper, so that a part of the way takes less than that part of the work.
+  const double part = wanted > spare ? spare / wanted : 1.0;
+  for (const auto& [t, number] : fading) {
+    const double left = worn(*t) + part * (faded(*t) - worn(*t));
+    put_in += change_stiffness(*t, 1.0, left, records[number]);
+  }
+  this->keep(records, state);
   if (!(contact.stiffness > 0.0)) follow_forces(greatest, state.contact_stiffness);
   return put_in;
 }
 
-double Contact::stiffen(State& state) {
+double Contact::stiffen(State& state, Keep keep) {
   // Pairs are renumbered when candidates are found anew for the start of the step.
   struct Deep {
     ContactPair pair;
@@ -255,7 +276,7 @@ double Contact::stiffen(State& state) {
   std::vector<Deep> deep;
   for (const Touching& t : touching_) {
     const ContactPair& pair = pairs_[at(t.pair)];
-    const double depth = depth_of(pair, t.distance);
+    const double depth = depth_of(pair, t);
     if (t.frozen < 0 && depth > 2.0 * kDepth) deep.push_back({pair, std::min(100.0, depth / kDepth), t.stiffness});
   }
   begin(state, duration_);
@@ -266,7 +287,7 @@ double Contact::stiffen(State& state) {
       return pairs_[at(s.pair)].key == key;
     });
     if (record && pressed != touching_.end()) {
-      put_in += change_stiffness(*pressed, factor, yielded_at(*pressed, factor), *record);
+      put_in += change_stiffness(*pressed, factor, yielded_at(*pressed, factor, keep), *record);
       continue;
     }
     if (pair.stiffness > 0.0) {

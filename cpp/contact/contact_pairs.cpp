@@ -57,9 +57,10 @@ void Contact::find_pairs(const VectorX& from, const VectorX& to) {
   }
   const std::size_t fixed = surfaces_.obstacle_pairs().size();
   // What touches is known by the key of its pair while pairs are renumbered; those with obstacles keep their number.
-  std::vector<std::pair<std::size_t, ContactKey>> renumbered;
-  for (std::size_t i = 0; i < lagged_.size(); ++i)
-    if (at(lagged_[i].pair) >= fixed) renumbered.emplace_back(i, pairs_[at(lagged_[i].pair)].key);
+  std::vector<std::pair<Touching*, ContactKey>> renumbered;
+  for (std::vector<Touching>* kept : {&lagged_, &leaving_})
+    for (Touching& t : *kept)
+      if (at(t.pair) >= fixed) renumbered.emplace_back(&t, pairs_[at(t.pair)].key);
   pairs_.resize(fixed);
   for (const BroadPhase::Pair& found : broad_phase_.find(boxes_)) {
     const int a = surfaces_.edges()[at(found.a)], b = surfaces_.edges()[at(found.b)];
@@ -68,18 +69,18 @@ void Contact::find_pairs(const VectorX& from, const VectorX& to) {
     pairs_.back().element = element_of(pairs_.back().key);
   }
   const std::size_t found = pairs_.size();
-  for (const auto& [i, key] : renumbered) {
+  for (const auto& [touching, key] : renumbered) {
     const auto place = std::lower_bound(pairs_.begin() + static_cast<std::ptrdiff_t>(fixed),
                                         pairs_.begin() + static_cast<std::ptrdiff_t>(found), key,
                                         [](const ContactPair& pair, const ContactKey& k) { return pair.key < k; });
     auto number = static_cast<std::size_t>(place - pairs_.begin());
     if (number == found || pairs_[number].key != key) {
-      // Gone out of reach within a step: its friction of the start still acts.
+      // Gone out of reach within a step: its friction of the start still acts, and what it gives back.
       number = pairs_.size();
       pairs_.push_back(surfaces_.pair(key.a, key.b));
       pairs_.back().element = element_of(key);
     }
-    lagged_[i].pair = static_cast<int>(number);
+    touching->pair = static_cast<int>(number);
   }
   // Iterates go to and fro on a way whose candidates are all known.
   low_ = from.cwiseMin(to);

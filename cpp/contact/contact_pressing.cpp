@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "contact/contact.hpp"
 
@@ -10,9 +11,153 @@ std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
 }  // namespace
 
+namespace {
+
+// An impact is over after so many swings of its contact and steps, and forgotten after twice as many.
+constexpr double kSwings = 12.0, kSteps = 4.0;
+
+/// From 0 to 1 where x does, without a corner.
+double smooth_step(double x) {
+  x = std::clamp(x, 0.0, 1.0);
+  return x * x * (3.0 - 2.0 * x);
+}
+
+// Surfaces that part faster than this, over the speed at which they met, give back no more than restitution says.
+constexpr double kParting = 0.05;
+// Steps in a swing, by which what an impact gives back is known to a hundredth, while it lasts no longer than this.
+constexpr double kStepsInSwing = 12.0, kResolvedSwings = 4.0;
+
+}  // namespace
+
+double Contact::mass_of(const ContactPair& pair) const {
+  return pair.key.b < 0 ? edge_mass_(pair.key.a) : std::min(edge_mass_(pair.key.a), edge_mass_(pair.key.b));
+}
+
+/// Surfaces that meet more slowly rest on each other: as fast as a fall from the depth of contact ends, or as slip that
+/// counts as none.
+double Contact::rest_speed(const ContactPair& pair) const {
+  return std::max(std::sqrt(gravity_ * kDepth * pair.small_radius()), model_.description.contact.slip_tolerance);
+}
+
+/// Half a period of an edge on its contact: as long as an impact lasts at least.
+double Contact::swing_time(const ContactPair& pair, const Touching& t) const {
+  return std::numbers::pi * std::sqrt(0.5 * mass_of(pair) * pair.share / t.stiffness);
+}
+
+/// 1 for surfaces that have just met, 0 for those that rest on each other.
+double Contact::impact_share(const ContactPair& pair, const Touching& t) const {
+  if (!(t.approach > 0.0)) return 0.0;
+  const double over = kSwings * swing_time(pair, t) + kSteps * duration_;
+  return smooth_step(t.approach / rest_speed(pair) - 1.0) * smooth_step(2.0 - t.age / over);
+}
+
+/// Whether surfaces meet in this step.
+bool Contact::met(const ContactPair& pair) const {
+  return !starting_ && !std::binary_search(unrecorded_.begin(), unrecorded_.end(), pair.key);
+}
+
+double Contact::first_approach(const ContactPair& pair) const {
+  return pressing_ == Pressing::still || !met(pair) ? 0.0 : approach_speed(pair);
+}
+
+/// At which surfaces near each other as the step begins.
+double Contact::approach_speed(const ContactPair& pair) const {
+  Vec3d x[4], v[4];
+  end_points(pair, state_->q, x);
+  end_points(pair, state_->v, v);
+  const Vec3d shift = shift_of(pair), moved = (1.0 / duration_) * shift;
+  if (pair.plane()) return std::max(0.0, -dot(x[3], v[pair.key.end] - moved));
+  if (pair.key.b < 0) {
+    x[2] -= shift;
+    x[3] -= shift;
+    v[2] = v[3] = moved;
+  }
+  const ClosestPoints c = closest_points(x[0], x[1], x[2], x[3], pair.weight_a, pair.weight_b);
+  double w[4];
+  end_weights(c.s, c.t, w);
+  Vec3d rate{};
+  for (int i = 0; i < 4; ++i) rate += w[i] * v[i];
+  return std::max(0.0, -dot(c.between, rate) / std::sqrt(std::max(dot(c.between, c.between), 1e-300)));
+}
+
+/// Distance as the step begins, an obstacle that moves being where it was.
+double Contact::start_distance(const ContactPair& pair) const {
+  Vec3d x[4];
+  end_points(pair, state_->q, x);
+  const Vec3d shift = shift_of(pair);
+  x[2] -= shift;
+  if (pair.plane()) return dot(x[3], x[pair.key.end] - x[2]);
+  x[3] -= shift;
+  return std::sqrt(closest_points(x[0], x[1], x[2], x[3], pair.weight_a, pair.weight_b).square);
+}
+
+/// The same of the points that are the closest at its end, D0 of `add_mean_pressing`.
+double Contact::distance_before(const ContactPair& pair, const Touching& t) const {
+  double w[4];
+  end_weights(t.points.s, t.points.t, w);
+  Vec3d start[4], d0{};
+  end_points(pair, state_->q, start);
+  const Vec3d shift = shift_of(pair), &d1 = t.points.between;
+  start[2] -= shift;
+  start[3] -= shift;
+  for (int i = 0; i < 4; ++i) d0 += w[i] * start[i];
+  return std::sqrt(std::max(dot(d0, d0) + t.distance * t.distance - dot(d1, d1), 0.0));
+}
+
+/// Sets what a contact remembers, its energy at q1 and its force.
+void Contact::set_force(Touching& t, const ContactRecord* record) const {
+  const ContactPair& pair = pairs_[at(t.pair)];
+  t.stiffness = pair.share * (record ? record->stiffness : first_stiffness(pair));
+  t.yielded = record ? record->yielded : 0.0;
+  t.approach = record ? record->approach : first_approach(pair);
+  t.age = record ? record->age : 0.0;
+  if (record) t.stick = record->stick;
+  t.law = {model_.description.contact.law, pair.radii(), pair.tolerance, t.stiffness, t.yielded};
+  t.energy = t.law.energy(t.distance);
+  t.energy.value *= t.stiffness;
+  t.energy.first *= t.stiffness;
+  t.energy.second *= t.stiffness;
+  t.pressing = {t.energy.first, t.energy.second, 0.0};
+  const double share = pressing_ == Pressing::still ? 0.0 : impact_share(pair, t);
+  if (share == 0.0) return;
+  // Friction that goes with the force k E'(D0) asks for the same force at the end of the step before.
+  const bool lags = freezes() && pair.friction > 0.0;
+  if (pressing_ >= Pressing::mean && !lags) t.law.elastic = share;
+  t.law.restitution = std::sqrt(1.0 - share * (1.0 - pair.restitution * pair.restitution));
+  t.law.parting = kParting * t.approach * duration_;
+  if (t.law.elastic == 0.0 && !(t.law.restitution < 1.0)) return;
+  t.before = pressing_ == Pressing::mean_direction && !pair.plane() ? distance_before(pair, t) : start_distance(pair);
+  t.pressing = t.law.at(t.before, t.distance);
+}
+
+/// Adds what touches at the start of the step only, and gives back there what it took; `first`: of `touching_` behind
+/// what is there for friction alone.
+void Contact::add_leaving(std::size_t first) {
+  const auto from = touching_.begin() + static_cast<std::ptrdiff_t>(first);
+  const std::size_t count = touching_.size();
+  for (const Touching& start : leaving_) {
+    const auto end = from + static_cast<std::ptrdiff_t>(count - first);
+    const auto found =
+        std::lower_bound(from, end, start.pair, [](const Touching& t, int pair) { return t.pair < pair; });
+    if (found != end && found->pair == start.pair) continue;
+    Touching t = touch(start.pair, q1_, true);
+    set_force(t, record_of(pairs_[at(t.pair)].key));
+    touching_.push_back(t);
+  }
+}
+
+bool Contact::unresolved(double dt) const {
+  return std::any_of(touching_.begin(), touching_.end(), [&](const Touching& t) {
+    const ContactPair& pair = pairs_[at(t.pair)];
+    if (t.frozen >= 0 || !(t.law.restitution < 1.0)) return false;
+    const double swing = swing_time(pair, t);
+    return t.age < kResolvedSwings * swing && kStepsInSwing * dt > swing;
+  });
+}
+
 /// What surfaces that press do. On a plane the end's direction is also the mean one.
 void Contact::press(const Touching& t, bool with_hessian, ContactLocal& out) const {
-  if (!conserving_ || pairs_[at(t.pair)].plane()) {
+  if (pressing_ != Pressing::mean_direction || pairs_[at(t.pair)].plane()) {
     add_pressing(t, with_hessian, out);
     return;
   }
@@ -24,7 +169,7 @@ void Contact::press(const Touching& t, bool with_hessian, ContactLocal& out) con
     for (int j = 0; j < 12; ++j) out.hessian[i][j] += straight.hessian[i][j];
 }
 
-/// The gradient of k E(D) at the end of the step.
+/// Along the gradient of D at the end of the step.
 void Contact::add_pressing(const Touching& t, bool with_hessian, ContactLocal& out) const {
   const ContactPair& pair = pairs_[at(t.pair)];
   double w[4], g[12];
@@ -35,29 +180,29 @@ void Contact::add_pressing(const Touching& t, bool with_hessian, ContactLocal& o
   const double n[3] = {direction.x, direction.y, direction.z};
   for (int i = 0; i < 12; ++i) {
     g[i] = w[i / 3] * n[i % 3];
-    out.gradient[i] += t.energy.first * g[i];
+    out.gradient[i] += t.pressing.first * g[i];
   }
   if (!with_hessian) return;
   if (pair.plane()) {
     for (int i = 0; i < 6; ++i)
-      for (int j = 0; j < 6; ++j) out.hessian[i][j] += t.energy.second * g[i] * g[j];
+      for (int j = 0; j < 6; ++j) out.hessian[i][j] += t.pressing.by_end * g[i] * g[j];
     return;
   }
   Vec3d x[4];
   end_points(pair, q1_, x);
   double H[12][12];
   half_square_hessian(t.points, x[1] - x[0], x[3] - x[2], pair.weight_a, pair.weight_b, H);
-  const double turn = geometric_ ? t.energy.first / t.distance : 0.0;
+  const double turn = geometric_ ? t.pressing.first / t.distance : 0.0;
   for (int i = 0; i < 12; ++i)
-    for (int j = 0; j < 12; ++j) out.hessian[i][j] += turn * H[i][j] + (t.energy.second - turn) * g[i] * g[j];
+    for (int j = 0; j < 12; ++j) out.hessian[i][j] += turn * H[i][j] + (t.pressing.by_end - turn) * g[i] * g[j];
 }
 
-/// In an energy-momentum step the force k E'(D1) pushes along the mean of the way d1 between the closest points at the
-/// end and the way d0 between those same points of both rods at the start,
-///   k E'(D1) w_i (d0 + d1) / (D0 + D1),   D0 = sqrt(|d0|^2 + D1^2 - |d1|^2),
-/// whose work over the step is k E'(D1) (D1 - D0). As no points were closer at the start than the closest, and E is
-/// convex, that is never more than what the contact gave: pressing gains no energy, however far surfaces slide. And the
-/// force points along the way between the points in the middle of the step: it turns nothing there.
+/// In an energy-momentum step the force f (see pressing_law.hpp) pushes along the mean of the way d1 between the closest
+/// points at the end and the way d0 between those same points of both rods at the start,
+///   f w_i (d0 + d1) / (D0 + D1),   D0 = sqrt(|d0|^2 + D1^2 - |d1|^2),
+/// whose work over the step is f (D1 - D0). As no points were closer at the start than the closest, and E is convex,
+/// that is never more than what the contact gave: pressing gains no energy, however far surfaces slide. And the force
+/// points along the way between the points in the middle of the step: it turns nothing there.
 void Contact::add_mean_pressing(const Touching& t, bool with_hessian, ContactLocal& out) const {
   const ContactPair& pair = pairs_[at(t.pair)];
   double w[4];
@@ -71,7 +216,7 @@ void Contact::add_mean_pressing(const Touching& t, bool with_hessian, ContactLoc
   Vec3d d0{};
   for (int i = 0; i < 4; ++i) d0 += w[i] * start[i];
   const double before = std::sqrt(std::max(dot(d0, d0) + t.distance * t.distance - dot(d1, d1), 0.0));
-  const double sum = before + t.distance, force = t.energy.first / sum;
+  const double sum = before + t.distance, force = t.pressing.first / sum;
   const Vec3d mean = d0 + d1;
   for (int i = 0; i < 12; ++i) out.gradient[i] += force * w[i / 3] * mean[i % 3];
   if (!with_hessian) return;
@@ -86,7 +231,9 @@ void Contact::add_mean_pressing(const Touching& t, bool with_hessian, ContactLoc
     const Vec3d moved0 = ds * u0 - dt * v0, moved1 = ds * u - dt * v;
     const double spread = pair.weight_a * (t.points.s - 0.5) * ds + pair.weight_b * (t.points.t - 0.5) * dt;
     const double distance = w[n] * d1[k] / t.distance;
-    const double change = (t.energy.second * distance - force * (distance + (dot(d0, moved0) + spread) / before)) / sum;
+    const double earlier = (dot(d0, moved0) + spread) / before;
+    const double change =
+        (t.pressing.by_end * distance + t.pressing.by_start * earlier - force * (distance + earlier)) / sum;
     for (int i = 0; i < 12; ++i) {
       const double share = ws[i / 3] * ds + wt[i / 3] * dt;
       const double turned = moved0[i % 3] + moved1[i % 3] + (i % 3 == k ? w[n] : 0.0);

@@ -13,7 +13,7 @@
 #include <cmath>
 
 #include "common/dual.hpp"
-#include "contact/contact_law.hpp"
+#include "contact/pressing_law.hpp"
 #include "contact/surfaces.hpp"
 #include "geometry/segment_distance.hpp"
 
@@ -29,10 +29,10 @@ struct FrictionSetting {
   ClosestPoints points;                 ///< whose class is kept
   double start[kContactUnknowns] = {};  ///< unknowns at the start of the step
   Vec3d source[2];                      ///< tangents that the frames of a and b are transported from
-  ContactLaw contact_law = ContactLaw::imcv2;
+  PressingLaw pressing;
+  double before = 0;    ///< distance at the start, as far as it is always the same [m]
+  bool slides = false;  ///< or that of the points that are closest at the end
   FrictionLaw law = FrictionLaw::implicit;
-  double stiffness = 0;             ///< [N/m]
-  double yielded = 0;               ///< [m]
   double tangential_stiffness = 0;  ///< of an anchor [N/m]
   double rate = 0;                  ///< K / (2 dt) [1/m]
   Vec3d drift{};                    ///< way of an obstacle in the step [m]
@@ -153,7 +153,8 @@ struct SlippingSurfaces {
   Vec3<Scalar> normal, between{};  ///< of the centrelines; nothing beside a plane
   Scalar inverse = 0.0;            ///< of the length of `between` [1/m]; 0: nothing
   Scalar pressing;                 ///< N
-  double pressing_slope;           ///< of N by the distance [N/m]
+  PressingForce law;               ///< of minus N
+  double before = 0;               ///< distance at the start of the step [m]
   Scalar w[4];
   Vec3<Scalar> way;  ///< slip, with its part along the normal [m]
   FrictionForce<Scalar> friction;
@@ -179,10 +180,23 @@ void find_contact(const FrictionSetting& f, const Vec3<Scalar> (&x)[4], Slipping
     c.inverse = 1.0 / sqrt(square);
     c.normal = c.inverse * c.between;
   }
-  const ContactEnergy e = contact_energy(f.contact_law, value_of(c.distance) + f.yielded, pair.radii(), pair.tolerance);
-  c.pressing_slope = -f.stiffness * e.second;
-  c.pressing = chain(c.distance, -f.stiffness * e.first, c.pressing_slope);
   end_weights(c.s, c.t, c.w);
+  if (!f.slides) {
+    c.before = f.before;
+    c.law = f.pressing.at(f.before, value_of(c.distance));
+    c.pressing = chain(c.distance, -c.law.first, -c.law.by_end);
+  } else {
+    // See Contact::add_mean_pressing.
+    Vec3<Scalar> d0{};
+    for (int i = 0; i < 4; ++i) {
+      const Vec3d start{f.start[3 * i], f.start[3 * i + 1], f.start[3 * i + 2]};
+      d0 += c.w[i] * lift(pair.rod_b < 0 && i > 1 ? start - f.drift : start);
+    }
+    const Scalar before = sqrt(dot(d0, d0) + c.distance * c.distance - dot(c.between, c.between));
+    c.before = value_of(before);
+    c.law = f.pressing.at(c.before, value_of(c.distance));
+    c.pressing = chain(c.distance, -c.law.first, -c.law.by_end) + chain(before, 0.0, -c.law.by_start);
+  }
   if (pair.rod_b < 0) c.w[2] = c.w[3] = Scalar(0.0);
 }
 

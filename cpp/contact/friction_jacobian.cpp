@@ -20,11 +20,25 @@ struct Slopes {
   Vec3d moment[kWays];  ///< m
 };
 
+/// How hard they press by the distance that the closest points had at the start of the step, which moves with them.
+void add_start_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& c, Slopes& d) {
+  const auto start = [&](int i) {
+    const Vec3d x{f.start[3 * i], f.start[3 * i + 1], f.start[3 * i + 2]};
+    return f.pair->rod_b < 0 && i > 1 ? x - f.drift : x;
+  };
+  const Vec3d u = start(1) - start(0), v = start(3) - start(2);
+  const Vec3d between = start(0) - start(2) + c.s * u - c.t * v;
+  for (int j = 0; j < kWays; ++j) {
+    const double spread = f.pair->weight_a * (c.s - 0.5) * d.s[j] + f.pair->weight_b * (c.t - 0.5) * d.t[j];
+    d.pressing[j] -= c.law.by_start / c.before * (dot(between, d.s[j] * u - d.t[j] * v) + spread);
+  }
+}
+
 /// Where they touch, and how hard they press: by all but the angles.
 void add_contact_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& c, Slopes& d) {
   const ContactPair& pair = *f.pair;
   if (pair.plane()) {
-    for (int k = 0; k < 3; ++k) d.pressing[k] = c.pressing_slope * c.normal[k];
+    for (int k = 0; k < 3; ++k) d.pressing[k] = -c.law.by_end * c.normal[k];
     return;
   }
   const Vec3d &u = c.sides[0].edge, &v = c.sides[1].edge;
@@ -33,7 +47,7 @@ void add_contact_slopes(const FrictionSetting& f, const SlippingSurfaces<double>
   const Vec3d a = K[0][1] * v - K[0][0] * u, b = K[1][1] * v - K[1][0] * u;
   for (int k = 0; k < 3; ++k) {
     const double across = c.between[k];
-    d.pressing[k] = c.pressing_slope / c.distance * across;
+    d.pressing[k] = -c.law.by_end / c.distance * across;
     d.s[k] = a[k];
     d.t[k] = b[k];
     d.between[k] = kAxis[k] + d.s[k] * u - d.t[k] * v;
@@ -45,6 +59,7 @@ void add_contact_slopes(const FrictionSetting& f, const SlippingSurfaces<double>
     d.t[kEdge[1] + k] = K[1][1] * across;
     d.between[kEdge[1] + k] = -across * b;
   }
+  if (f.slides) add_start_slopes(f, c, d);
 }
 
 /// By how much edges turn and spin, and on what lever.

@@ -47,6 +47,7 @@ bool Surfaces::set_own(int first, int second, ContactPair& pair) const {
       touches = !p.ignored;
       if (p.friction >= 0.0) pair.friction = p.friction;
       pair.stiffness = p.stiffness;
+      if (p.restitution >= 0.0) pair.restitution = p.restitution;
     }
   return touches;
 }
@@ -120,6 +121,7 @@ ContactPair Surfaces::pair(int a, int b) const {
   p.weight_a = parallel_weight(model_.edge_length(a), p.radii());
   p.weight_b = parallel_weight(model_.edge_length(b), p.radii());
   p.friction = model_.description.contact.friction;
+  p.restitution = model_.description.contact.restitution;
   set_own(p.rod_a, p.rod_b, p);
   return p;
 }
@@ -146,6 +148,8 @@ void Surfaces::add_obstacles() {
       p.radius_b = d.radius;
       p.tolerance = tolerance(e);
       p.friction = contact.obstacle_friction(static_cast<Eigen::Index>(o));
+      if (contact.obstacle_restitution.size() > 0)
+        p.restitution = contact.obstacle_restitution(static_cast<Eigen::Index>(o));
       if (!set_own(p.rod_a, body, p)) continue;
       if (!plane) {
         p.weight_a = parallel_weight(model_.edge_length(e), p.radii());

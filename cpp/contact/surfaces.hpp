@@ -21,6 +21,7 @@ struct ContactPair {
   double share = 1;                   ///< of a node's contact with a plane, which its two edges share
   double friction = 0;                ///< [-]
   double stiffness = 0;               ///< of its own [N/m]; 0: none
+  double restitution = 1;             ///< [-]
   int element = -1;                   ///< row of its unknowns in the matrix's table; -1: none yet
 
   double radii() const { return radius_a + radius_b; }

@@ -374,9 +374,11 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
   assembler.project(v1);
   if (!model.constraints.empty()) assembler.add_held_part(work.held_velocity, 1.0, v1);
   book_work(equations, parameters, working, result);
+  double contact_loss = 0.0;
   if (const Contact* contact = equations.contact()) {
     const double by_obstacles = contact->obstacle_work();
-    result.dissipated += equations.contact_loss(working, by_obstacles);
+    contact_loss = equations.contact_loss(working, by_obstacles);
+    result.dissipated += contact_loss;
     result.support_work += by_obstacles;
   }
   if (!model.constraints.empty()) {
@@ -389,7 +391,8 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
   acceleration = (v1 - state.v) / dt;
   if (options.tolerance) result.error = estimated_error(equations, newton, options, plan, predictor, work);
   predictor.record(state.time + 0.5 * dt, plan.slot, acceleration, equations.mass().rows, work.assumed);
-  if (equations.contact()) result.stiffness_work = equations.contact()->accept(state);
+  if (Contact* contact = equations.contact())
+    result.dissipated -= contact->accept(state, Keep::energy, std::max(contact_loss, 0.0));
   if (!model.planar()) compute_configuration(model, state, q1, work.after);
   if (state.motion.velocity[0].size() != 0) remember_motion(q1, dt, state);
   accept_configuration(model, q1, work.after, state);

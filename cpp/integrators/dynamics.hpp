@@ -43,9 +43,8 @@ struct StepResult {
   double stretch_gain = 0;    ///< energy that midpoint brings into stretching from nowhere [J]
   double error = 0;           ///< estimated local error [m]
   double load_work = 0;       ///< of loads and custom forces [J]
-  double dissipated = 0;      ///< by drag and viscosity [J]
+  double dissipated = 0;      ///< by drag, viscosity and contact [J]
   double support_work = 0;    ///< [J]
-  double stiffness_work = 0;  ///< put in where contact became stiffer or softer under load [J]
   double pressing_gain = 0;   ///< put in by surfaces that press, `Contact::pressing_gain` [J]
 };
 

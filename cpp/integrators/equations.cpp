@@ -94,7 +94,10 @@ void Equations::begin(const State& state, const Parameters& parameters, double h
   floor_current_ = false;
   flowing_ = false;
   if (!contact_) return;
-  contact_->conserve(energy_momentum);
+  contact_->press_by(energy_momentum          ? Pressing::mean_direction
+                     : inner == Inner::middle ? Pressing::mean
+                     : h != 0.0               ? Pressing::end
+                                              : Pressing::still);
   contact_->begin(state, h == 0.0 ? static_duration_ : inner == Inner::middle ? 2.0 * h : h);
 }
 

@@ -74,7 +74,7 @@ class Statics {
   void accept(const VectorX& q) {
     if (Contact* contact = equations_.contact()) {
       contact->update(q);
-      contact->accept(state_);
+      contact->accept(state_, Keep::force, INFINITY);
     }
     Configuration& c = scratch_;
     compute_configuration(equations_.model(), state_, q, c);

@@ -144,12 +144,15 @@ struct ContactPairDescription {
   bool ignored = false;
   double friction = -1;  ///< coefficient [-]; negative: that of the scene
   double stiffness = 0;  ///< [N/m]; 0: that of the scene
+  double restitution = -1;  ///< coefficient [-]; negative: that of the scene
 };
 
 struct ContactDescription {
   bool rods = false;          ///< whether rods touch each other and themselves
   double friction = 0;        ///< coefficient between rods [-]
   VectorX obstacle_friction;  ///< per obstacle [-]
+  double restitution = 1;     ///< coefficient between rods [-]
+  VectorX obstacle_restitution;  ///< per obstacle [-]; empty: 1
   ContactLaw law = ContactLaw::imcv2;
   FrictionLaw friction_law = FrictionLaw::implicit;
   double distance_tolerance = 0;  ///< delta [m]; 0: a tenth of the smaller radius of a pair

@@ -21,6 +21,8 @@ struct ContactRecord {
   double force = 0;      ///< pressing the surfaces apart [N]
   double stiffness = 0;  ///< [N/m]
   double yielded = 0;    ///< depth that presses no more, since the contact became stiffer under load; fades [m]
+  double approach = 0;   ///< speed at which the surfaces met [m/s]; 0: they rest on each other
+  double age = 0;        ///< time since then [s]
   Vec3d stick{};         ///< elastic slip of an anchored contact, of a's surface over b's [m]
   Vec3d friction{};      ///< on a [N]
   bool sticking = false;

@@ -97,6 +97,8 @@ void exchange_contacts(Archive& io, std::vector<ContactRecord>& contacts) {
     io(c.force);
     io(c.stiffness);
     io(c.yielded);
+    io(c.approach);
+    io(c.age);
     for (Vec3d* v : {&c.stick, &c.friction}) io(v->x), io(v->y), io(v->z);
     io(c.sticking);
   }

@@ -165,7 +165,12 @@ World::Implementation::Attempt World::Implementation::try_step(double dt) {
     take_back();
     return Attempt::inaccurate;
   }
-  const bool gained = guarded && gains_energy(), pumped = !gained && watched && contact_pumps(dt);
+  const bool unresolved = watched && equations_of_step().contact()->unresolved(dt);
+  const bool gained = !unresolved && guarded && gains_energy(), pumped = !unresolved && !gained && watched && contact_pumps(dt);
+  if (unresolved && may_cut()) {
+    take_back();
+    return Attempt::inaccurate;
+  }
   if (gained || pumped) {
     take_back();
     if (pumped) guard = books;
@@ -176,6 +181,7 @@ World::Implementation::Attempt World::Implementation::try_step(double dt) {
   }
   watch_step(dt, equations_of_step());
   commit_step();
+  if (watched && equations_of_step().contact()->unresolved(2.0 * dt)) return Attempt::hard;
   if (!options.tolerance) return Attempt::easy;
   // An oscillation has no error twice a period: what counts is the greatest of the last steps, were they longer.
   // Far below what is allowed an estimate is mostly rounding.
@@ -290,7 +296,7 @@ bool World::Implementation::inner_step(double dt, int slot, double& error) {
     if (force_function) find_custom_force(system, dt);
     r = step_by_rule(dt, slot);
     for (int tries = 0; r.too_deep && tries < kMostStiffenings; ++tries) {
-      support_work += system.contact()->stiffen(state);
+      dissipated -= system.contact()->stiffen(state, Keep::energy);
       work.newton.factor.owner = nullptr;
       work.repeated = true;
       r = step_by_rule(dt, slot);
@@ -314,7 +320,7 @@ bool World::Implementation::inner_step(double dt, int slot, double& error) {
   if (force_function && options.integrator == Integrator::verlet)
     load_work += 0.5 * (custom_force_before - system.custom_force).dot(work.change);
   dissipated += r.dissipated;
-  support_work += r.support_work + r.stiffness_work;
+  support_work += r.support_work;
   contact_guard.put_in = r.pressing_gain;
   if (options.integrator != Integrator::fourth_order || slot == 2) keep_reactions();
   if (ramped) {
@@ -355,6 +361,12 @@ void World::Implementation::keep_reactions() {
 
 /// A scheme that steps back in time asks for forces that can be run backwards.
 void World::Implementation::check_reversible(const Parameters& p) const {
+  const ContactDescription& contact = description.contact;
+  const auto elastic = [](const ContactPairDescription& pair) { return !(pair.restitution >= 0.0) || pair.restitution == 1.0; };
+  require(options.integrator != Integrator::verlet ||
+              ((!contact.rods || contact.restitution == 1.0) && (contact.obstacle_restitution.array() == 1.0).all() &&
+               std::all_of(contact.pairs.begin(), contact.pairs.end(), elastic)),
+          "integrator 'verlet' knows elastic impacts only: take restitution=1, or an implicit integrator");
   if (options.integrator != Integrator::fourth_order) return;
   require(!description.contact.any(),
           "integrator 'fourth_order' goes back in time within each step, which contact does not allow: take integrator "

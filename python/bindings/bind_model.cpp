@@ -69,12 +69,15 @@ void register_contact(py::module_& module) {
       .def_readwrite("second", &ContactPairDescription::second)
       .def_readwrite("ignored", &ContactPairDescription::ignored)
       .def_readwrite("friction", &ContactPairDescription::friction)
-      .def_readwrite("stiffness", &ContactPairDescription::stiffness);
+      .def_readwrite("stiffness", &ContactPairDescription::stiffness)
+      .def_readwrite("restitution", &ContactPairDescription::restitution);
   py::class_<ContactDescription> contact(module, "ContactDescription", "What touches, and how.");
   contact.def(py::init<>())
       .def_readwrite("rods", &ContactDescription::rods)
       .def_readwrite("friction", &ContactDescription::friction)
       .def_readwrite("obstacle_friction", &ContactDescription::obstacle_friction)
+      .def_readwrite("restitution", &ContactDescription::restitution)
+      .def_readwrite("obstacle_restitution", &ContactDescription::obstacle_restitution)
       .def_readwrite("distance_tolerance", &ContactDescription::distance_tolerance)
       .def_readwrite("slip_tolerance", &ContactDescription::slip_tolerance)
       .def_readwrite("stiffness", &ContactDescription::stiffness)

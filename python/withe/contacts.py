@@ -50,7 +50,9 @@ class Contacts:
 
     _directory: Directory
 
-    def add_floor(self, height: float = 0.0, *, friction: float = 0.0, name: str | None = None) -> Obstacle:
+    def add_floor(
+        self, height: float = 0.0, *, friction: float = 0.0, restitution: float = 1.0, name: str | None = None
+    ) -> Obstacle:
         """Add a floor at a height [m], with its normal along +z.
 
         Parameters
@@ -58,6 +60,8 @@ class Contacts:
         height : float [m]
         friction : float
             Coefficient between the floor and every rod; see `set_friction` for single rods.
+        restitution : float
+            Speed after an impact over that before it, from 0 to 1; see `enable_contact`.
         name : str
 
         Returns
@@ -67,14 +71,21 @@ class Contacts:
         Raises
         ------
         ValueError
-            A height that is no number, or negative friction.
+            A height that is no number, negative friction, or a restitution outside 0 to 1.
         """
         height = validation.number(height, "height of the floor")
         name = self._directory.new_name(name, "floor")
-        return self._obstacle(name, "plane", np.array([0.0, 0.0, height]), np.array([0.0, 0.0, 1.0]), 0.0, friction)
+        up = np.array([0.0, 0.0, 1.0])
+        return self._obstacle(name, "plane", np.array([0.0, 0.0, height]), up, 0.0, friction, restitution)
 
     def add_plane(
-        self, point: npt.ArrayLike, normal: npt.ArrayLike, *, friction: float = 0.0, name: str | None = None
+        self,
+        point: npt.ArrayLike,
+        normal: npt.ArrayLike,
+        *,
+        friction: float = 0.0,
+        restitution: float = 1.0,
+        name: str | None = None,
     ) -> Obstacle:
         """Add a plane through a point; what is behind it, against its normal, is solid.
 
@@ -84,6 +95,7 @@ class Contacts:
         normal : array_like of shape (3,)
             Of any length.
         friction : float
+        restitution : float
         name : str
 
         Returns
@@ -92,12 +104,17 @@ class Contacts:
         """
         name = self._directory.new_name(name, "plane")
         where = validation.vector(point, f"point of {name!r}")
-        return self._obstacle(
-            name, "plane", where, validation.unit_vector(normal, f"normal of {name!r}"), 0.0, friction
-        )
+        across = validation.unit_vector(normal, f"normal of {name!r}")
+        return self._obstacle(name, "plane", where, across, 0.0, friction, restitution)
 
     def add_sphere(
-        self, center: npt.ArrayLike, radius: float, *, friction: float = 0.0, name: str | None = None
+        self,
+        center: npt.ArrayLike,
+        radius: float,
+        *,
+        friction: float = 0.0,
+        restitution: float = 1.0,
+        name: str | None = None,
     ) -> Obstacle:
         """Add a solid sphere.
 
@@ -106,6 +123,7 @@ class Contacts:
         center : array_like of shape (3,) [m]
         radius : float [m]
         friction : float
+        restitution : float
         name : str
 
         Returns
@@ -114,9 +132,8 @@ class Contacts:
         """
         name = self._directory.new_name(name, "sphere")
         where = validation.vector(center, f"center of {name!r}")
-        return self._obstacle(
-            name, "capsule", where, where, validation.positive(radius, f"radius of {name!r}"), friction
-        )
+        radius = validation.positive(radius, f"radius of {name!r}")
+        return self._obstacle(name, "capsule", where, where, radius, friction, restitution)
 
     def add_capsule(
         self,
@@ -125,6 +142,7 @@ class Contacts:
         radius: float,
         *,
         friction: float = 0.0,
+        restitution: float = 1.0,
         name: str | None = None,
     ) -> Obstacle:
         """Add a solid cylinder with round ends.
@@ -135,6 +153,7 @@ class Contacts:
             Of its axis.
         radius : float [m]
         friction : float
+        restitution : float
         name : str
 
         Returns
@@ -143,16 +162,16 @@ class Contacts:
         """
         name = self._directory.new_name(name, "capsule")
         first, last = validation.vector(start, f"start of {name!r}"), validation.vector(end, f"end of {name!r}")
-        return self._obstacle(
-            name, "capsule", first, last, validation.positive(radius, f"radius of {name!r}"), friction
-        )
+        radius = validation.positive(radius, f"radius of {name!r}")
+        return self._obstacle(name, "capsule", first, last, radius, friction, restitution)
 
     def enable_contact(
         self,
         *,
         friction: float = 0.0,
+        restitution: float = 1.0,
         model: ContactModel = "imcv2",
-        friction_model: FrictionModel = "implicit",
+        friction_model: FrictionModel = "anchored",
         distance_tolerance: float | None = None,
         slip_tolerance: float = 1e-3,
         stiffness: float | Literal["source"] | None = None,
@@ -167,14 +186,17 @@ class Contacts:
         ----------
         friction : float
             Coefficient between rods.
+        restitution : float
+            Speed at which surfaces part after an impact over that at which they met, from 0 to 1; see Notes.
         model : {"imcv2", "barrier", "imcv1", "spillmann_teschner"}
             Energy of contact: the smooth penalty of Choi's dissertation, (5.2), or a barrier, (5.1). Archival, for
             comparison: its first penalty, (4.16), and the baseline of its 4.7, a penalty without a tolerance
             that leads out of a depth within one step.
-        friction_model : {"implicit", "lagged", "anchored", "semi_explicit"}
-            At the end of the step, exactly; with the forces of its start, which keeps the equations
-            symmetric; an elastic stick that holds a load without creep; or, archival, with the forces and the
-            direction of slip of its start (4.5 of Choi's dissertation), which holds nothing that is at rest.
+        friction_model : {"anchored", "implicit", "lagged", "semi_explicit"}
+            An elastic stick that holds a load without creep; a force that grows with the slip velocity, at the end of
+            the step, exactly, under which what is held creeps; the same with the forces of the step's start, which
+            keeps the equations symmetric; or, archival, with the forces and the direction of slip of its start (4.5
+            of Choi's dissertation), which holds nothing that is at rest.
         distance_tolerance : float [m]
             Surfaces nearer than this press on each other; by default a tenth of the smaller radius.
         slip_tolerance : float [m/s]
@@ -193,8 +215,21 @@ class Contacts:
         Raises
         ------
         ValueError
-            Negative friction, a tolerance or stiffness that is not positive, a tolerance above a radius; from
-            `build`, surfaces inside each other, with both edges and the depth.
+            Negative friction, a restitution outside 0 to 1, a tolerance or stiffness that is not positive, a tolerance
+            above a radius; from `build`, surfaces inside each other, with both edges and the depth, and a restitution
+            below 1 with integrator "verlet".
+
+        Notes
+        -----
+        Impacts are elastic by default. In implicit midpoint and energy-momentum steps they are so at any time step:
+        the force of a step does as much work as contact stores [Gonzalez 1996; Laursen and Chawla 1997]. Backward Euler,
+        and "lagged" and "semi_explicit" friction, lose most of an impact that is shorter than a few steps, and nothing
+        in the limit of short ones. With a
+        restitution e below 1 contact gives back e^2 of the energy that it took; steps are cut until an impact is
+        resolved, unless ``adaptive=False``. Rods shake within after an impact, so that as a whole they part more slowly
+        than e says. Surfaces that meet more slowly than sqrt(g r / 100), r the smaller radius, or than the slip
+        tolerance, rest on each other, and so do those that stay in contact for longer than an impact lasts. What
+        contact takes for good is part of `Simulation.energy().dissipated`, and what it stores is `.contact`.
 
         Examples
         --------
@@ -214,6 +249,7 @@ class Contacts:
             settings,
             rods=True,
             friction=validation.non_negative(friction, "friction"),
+            restitution=validation.share(restitution, "restitution"),
             model=cast(ContactModel, validation.choice(model, "model of contact", get_args(ContactModel))),
             friction_model=cast(
                 FrictionModel, validation.choice(friction_model, "friction_model", get_args(FrictionModel))
@@ -228,6 +264,10 @@ class Contacts:
     def set_friction(self, a: Rod | Obstacle | str, b: Rod | Obstacle | str, friction: float) -> None:
         """Give two rods, or a rod and an obstacle, a friction coefficient of their own."""
         self._set_pair(a, b, ignored=False, friction=validation.non_negative(friction, "friction"))
+
+    def set_restitution(self, a: Rod | Obstacle | str, b: Rod | Obstacle | str, restitution: float) -> None:
+        """Give two rods, or a rod and an obstacle, a coefficient of restitution of their own, from 0 to 1."""
+        self._set_pair(a, b, ignored=False, restitution=validation.share(restitution, "restitution"))
 
     def set_contact_stiffness(self, a: Rod | Obstacle | str, b: Rod | Obstacle | str, stiffness: float) -> None:
         """Give two rods, or a rod and an obstacle, a contact stiffness of their own [N/m].
@@ -277,9 +317,12 @@ class Contacts:
         other: FloatArray,
         radius: float,
         friction: float,
+        restitution: float,
     ) -> Obstacle:
         friction = validation.non_negative(friction, f"friction of {name!r}")
-        return cast(Obstacle, self._directory.add(ObstaclePart(name, kind, point, other, radius, friction)))
+        restitution = validation.share(restitution, f"restitution of {name!r}")
+        part = ObstaclePart(name, kind, point, other, radius, friction, restitution)
+        return cast(Obstacle, self._directory.add(part))
 
 
 def _optional(value: float | None, what: str) -> float | None:
@@ -298,6 +341,7 @@ def describe_contact(directory: Directory) -> _core.ContactDescription:
     contact = _core.ContactDescription()
     contact.rods = settings.rods
     contact.friction = settings.friction
+    contact.restitution = settings.restitution
     contact.law = settings.model
     contact.friction_law = settings.friction_model
     contact.distance_tolerance = settings.distance_tolerance or 0.0
@@ -319,6 +363,7 @@ def describe_contact(directory: Directory) -> _core.ContactDescription:
             )
     contact.obstacles = [_describe_obstacle(part) for part in obstacles]
     contact.obstacle_friction = np.array([part.friction for part in obstacles], dtype=float)
+    contact.obstacle_restitution = np.array([part.restitution for part in obstacles], dtype=float)
     bodies = {rod.name: rod.index for rod in rods} | {part.name: -1 - i for i, part in enumerate(obstacles)}
     pairs = [_pair(bodies[a], bodies[b], own) for (a, b), own in settings.pairs.items()]
     members = list(settings.groups.items())
@@ -344,6 +389,7 @@ def _pair(first: int, second: int, own: PairSettings) -> _core.ContactPairDescri
     pair.ignored = own.ignored
     pair.friction = -1.0 if own.friction is None else own.friction
     pair.stiffness = own.stiffness or 0.0
+    pair.restitution = -1.0 if own.restitution is None else own.restitution
     return pair
 
 

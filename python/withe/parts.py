@@ -170,6 +170,7 @@ class ObstaclePart:
     other: FloatArray  # normal; end of the axis (3,)
     radius: float
     friction: float
+    restitution: float
 
 
 @dataclass(frozen=True)
@@ -178,6 +179,7 @@ class PairSettings:
 
     ignored: bool = False
     friction: float | None = None
+    restitution: float | None = None
     stiffness: float | None = None  # [N/m]
 
 
@@ -187,8 +189,9 @@ class ContactSettings:
 
     rods: bool = False
     friction: float = 0.0
+    restitution: float = 1.0
     model: ContactModel = "imcv2"
-    friction_model: FrictionModel = "implicit"
+    friction_model: FrictionModel = "anchored"
     distance_tolerance: float | None = None
     slip_tolerance: float = 1e-3
     stiffness: float | Literal["source"] | None = None

@@ -73,6 +73,14 @@ def non_negative(value: Any, what: str) -> float:
     return result
 
 
+def share(value: Any, what: str) -> float:
+    """A number from 0 to 1, both included."""
+    result = number(value, what)
+    if not 0.0 <= result <= 1.0:
+        raise ValueError(f"{what} must be from 0 to 1, got {result:g}")
+    return result
+
+
 def integer(value: Any, what: str, low: int, high: int) -> int:
     """A whole number in low..high, both included."""
     if isinstance(value, np.ndarray) and value.ndim == 0:

@@ -94,8 +94,7 @@ void random_touch(RandomNumbers& random, Other other, FrictionLaw law, bool plan
   f.law = law;
   f.spatial = !planar;
   f.centreline = random.normal() > 0.0;
-  f.stiffness = 40.0;
-  f.yielded = 0.01 * c.pair.tolerance;
+  f.pressing = {ContactLaw::imcv2, c.pair.radii(), c.pair.tolerance, 40.0, 0.01 * c.pair.tolerance};
   f.tangential_stiffness = random.normal() > 0.0 ? 1.0 : 100.0;
   f.rate = 3.0;
   slip(random, x, c);

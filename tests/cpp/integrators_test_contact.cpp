@@ -184,7 +184,7 @@ struct ContactStep {
   explicit ContactStep(const Case& c, bool conserving = false) : state(c.state), contact(c.model) {
     contact.set_parameters(initial_parameters(c.model));
     contact.initialise(state);
-    contact.conserve(conserving);
+    contact.press_by(conserving ? Pressing::mean_direction : Pressing::end);
     contact.begin(state, 0.3);
     contact.update(c.q);
   }

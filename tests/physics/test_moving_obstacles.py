@@ -13,15 +13,15 @@ RUBBER = withe.Material(youngs_modulus=1e6, poisson_ratio=0.5, density=1200.0)
 RADIUS = 5e-3
 
 
-def lying(friction: float = 0.0) -> tuple[withe.Scene, withe.Rod, withe.Obstacle]:
+def lying(friction: float = 0.0, restitution: float = 1.0) -> tuple[withe.Scene, withe.Rod, withe.Obstacle]:
     scene = withe.Scene()
     rod = scene.add_rod(start=(0, 0, RADIUS), end=(0.3, 0, RADIUS), nodes=21, radius=RADIUS, material=RUBBER)
-    return scene, rod, scene.add_floor(friction=friction, name="table")
+    return scene, rod, scene.add_floor(friction=friction, restitution=restitution, name="table")
 
 
 @pytest.mark.parametrize("integrator", ["implicit_midpoint", "energy_momentum"])
 def test_a_floor_that_lifts_a_rod_works_as_much_as_the_rod_gains(integrator: Any) -> None:
-    scene, rod, table = lying()
+    scene, rod, table = lying(restitution=0.0)  # or the start and the stop of the lift would throw it
     simulation = scene.build(integrator=integrator, time_step=2e-3)
     simulation.step(100)
     start = simulation.energy()
