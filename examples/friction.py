@@ -30,7 +30,7 @@ def resting() -> tuple[withe.Simulation, withe.Load]:
     foam = withe.Material(youngs_modulus=1e5, poisson_ratio=0.5, density=DENSITY)
     rod = scene.add_rod(start=(0, 0, RADIUS), end=(LENGTH, 0, RADIUS), nodes=26, radius=RADIUS, material=foam)
     scene.add_floor(friction=FRICTION)
-    scene.enable_contact(distance_tolerance=5e-4, slip_tolerance=1e-3)
+    scene.enable_contact(friction_model="implicit", distance_tolerance=5e-4, slip_tolerance=1e-3)
     push = scene.add_load(rod, (0.0, 0.0, 0.0), name="push")
     simulation = scene.build(time_step=5e-3)
     simulation.equilibrium()

@@ -25,7 +25,7 @@ inline constexpr double kDeepest = 0.04;
 /// where they have just met; and along the mean direction too, so that sliding gains nothing.
 enum class Pressing { still, end, mean, mean_direction };
 
-/// What stays the same where a contact becomes stiffer under load.
+/// What is never more where a contact becomes stiffer under load.
 enum class Keep { force, energy };
 
 /// Gradient and Hessian of one contact in its own unknowns.
@@ -124,7 +124,8 @@ class Contact {
   void hold_sticking(const State& state, VectorX& change) const;
 
   /// Keeps in `state`, still where the step began, what contacts at q1 must remember; their stiffness follows the
-  /// forces. Returns the energy that this put in, below zero where it took some: never more than `spare` [J].
+  /// forces. Returns the energy that this put in, below zero where it took some; if that is what to keep, no more than
+  /// `spare` [J].
   double accept(State& state, Keep keep, double spare);
   /// The same for a step so short that stiffness stays as it is.
   void remember(State& state) const;

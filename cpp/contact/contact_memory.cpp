@@ -113,17 +113,18 @@ double Contact::rounding(int i, double reach) const {
   return 8.0 * std::numeric_limits<double>::epsilon() * reach * stiffness;
 }
 
-/// The depth that must press no more for a contact that becomes stiffer to press as hard as before, not so much that
-/// surfaces could sink into each other for good; or to store as much energy as before: then surfaces that a load presses
-/// yield by no more than half of their depth times the logarithm of that load.
+/// The depth that must press no more for a contact that becomes stiffer to press as hard as before, which takes energy;
+/// to store as much as before, in an impact; or, where energy does not count, the former, but not so much that surfaces
+/// could sink into each other for good.
 double Contact::yielded_at(const Touching& t, double ratio, Keep keep) const {
   const ContactPair& pair = pairs_[at(t.pair)];
-  const double wanted = (keep == Keep::force ? -t.energy.first : t.energy.value) / (t.stiffness * ratio);
+  const bool force = keep == Keep::force || t.approach == 0.0;
+  const double wanted = (force ? -t.energy.first : t.energy.value) / (t.stiffness * ratio);
   double low = t.distance + t.yielded, high = pair.reach();
   for (int k = 0; k < 60; ++k) {
     const double middle = 0.5 * (low + high);
     const ContactEnergy e = contact_energy(t.law.law, middle, pair.radii(), pair.tolerance);
-    ((keep == Keep::force ? -e.first : e.value) > wanted ? low : high) = middle;
+    ((force ? -e.first : e.value) > wanted ? low : high) = middle;
   }
   if (keep == Keep::energy) return high - t.distance;
   return std::min(low - t.distance, kMostYield * pair.small_radius());
@@ -257,6 +258,7 @@ double Contact::accept(State& state, Keep keep, double spare) {
     records.push_back(record);
   }
   // Energy grows with depth the faster the deeper, so that a part of the way takes less than that part of the work.
+  spare -= put_in;
   const double part = wanted > spare ? spare / wanted : 1.0;
   for (const auto& [t, number] : fading) {
     const double left = worn(*t) + part * (faded(*t) - worn(*t));

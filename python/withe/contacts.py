@@ -237,7 +237,7 @@ class Contacts:
         >>> scene = withe.Scene()
         >>> rubber = withe.Material(youngs_modulus=1e6, density=1000.0)
         >>> rod = scene.add_rod(start=(0, 0, 0.01), end=(0.3, 0, 0.01), nodes=31, radius=5e-3, material=rubber)
-        >>> floor = scene.add_floor(friction=0.4)
+        >>> floor = scene.add_floor(friction=0.4, restitution=0.0)
         >>> scene.enable_contact(friction=0.3)
         >>> simulation = scene.build(time_step=5e-3)
         >>> simulation.step(40)
