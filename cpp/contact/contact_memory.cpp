@@ -138,8 +138,8 @@ double Contact::change_stiffness(const Touching& t, double ratio, double yielded
   const double energy =
       ratio * t.stiffness * contact_energy(t.law.law, t.distance + yielded, pair.radii(), pair.tolerance).value;
   const double shorter = ratio > 1.0 ? 1.0 / ratio : 1.0 / std::sqrt(ratio);
-  const double put_in = energy - t.energy.value +
-                        0.5 * anchor * dot(record.stick, record.stick) * (ratio * shorter * shorter - 1.0);
+  const double put_in =
+      energy - t.energy.value + 0.5 * anchor * dot(record.stick, record.stick) * (ratio * shorter * shorter - 1.0);
   record.stick = shorter * record.stick;
   record.stiffness *= ratio;
   record.yielded = yielded;

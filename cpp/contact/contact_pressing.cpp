@@ -197,8 +197,8 @@ void Contact::add_pressing(const Touching& t, bool with_hessian, ContactLocal& o
     for (int j = 0; j < 12; ++j) out.hessian[i][j] += turn * H[i][j] + (t.pressing.by_end - turn) * g[i] * g[j];
 }
 
-/// In an energy-momentum step the force f (see pressing_law.hpp) pushes along the mean of the way d1 between the closest
-/// points at the end and the way d0 between those same points of both rods at the start,
+/// In an energy-momentum step the force f (see pressing_law.hpp) pushes along the mean of the way d1 between the
+/// closest points at the end and the way d0 between those same points of both rods at the start,
 ///   f w_i (d0 + d1) / (D0 + D1),   D0 = sqrt(|d0|^2 + D1^2 - |d1|^2),
 /// whose work over the step is f (D1 - D0). As no points were closer at the start than the closest, and E is convex,
 /// that is never more than what the contact gave: pressing gains no energy, however far surfaces slide. And the force

@@ -50,7 +50,8 @@ struct PressingLaw {
   }
 
  private:
-  /// Q and its derivatives; by Gauss's rule of three points, exact to the sixth power, where the difference would round.
+  /// Q and its derivatives; by Gauss's rule of three points, exact to the sixth power, where the difference would
+  /// round.
   PressingForce quotient(double start, double end, const ContactEnergy& last) const {
     const double way = end - start;
     if (std::abs(way) > 0.01 * tolerance) {

@@ -142,16 +142,16 @@ struct ObstacleDescription {
 struct ContactPairDescription {
   int first = 0, second = 0;
   bool ignored = false;
-  double friction = -1;  ///< coefficient [-]; negative: that of the scene
-  double stiffness = 0;  ///< [N/m]; 0: that of the scene
+  double friction = -1;     ///< coefficient [-]; negative: that of the scene
+  double stiffness = 0;     ///< [N/m]; 0: that of the scene
   double restitution = -1;  ///< coefficient [-]; negative: that of the scene
 };
 
 struct ContactDescription {
-  bool rods = false;          ///< whether rods touch each other and themselves
-  double friction = 0;        ///< coefficient between rods [-]
-  VectorX obstacle_friction;  ///< per obstacle [-]
-  double restitution = 1;     ///< coefficient between rods [-]
+  bool rods = false;             ///< whether rods touch each other and themselves
+  double friction = 0;           ///< coefficient between rods [-]
+  VectorX obstacle_friction;     ///< per obstacle [-]
+  double restitution = 1;        ///< coefficient between rods [-]
   VectorX obstacle_restitution;  ///< per obstacle [-]; empty: 1
   ContactLaw law = ContactLaw::imcv2;
   FrictionLaw friction_law = FrictionLaw::implicit;

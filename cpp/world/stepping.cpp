@@ -166,7 +166,8 @@ World::Implementation::Attempt World::Implementation::try_step(double dt) {
     return Attempt::inaccurate;
   }
   const bool unresolved = watched && equations_of_step().contact()->unresolved(dt);
-  const bool gained = !unresolved && guarded && gains_energy(), pumped = !unresolved && !gained && watched && contact_pumps(dt);
+  const bool gained = !unresolved && guarded && gains_energy(),
+             pumped = !unresolved && !gained && watched && contact_pumps(dt);
   if (unresolved && may_cut()) {
     take_back();
     return Attempt::inaccurate;
@@ -362,7 +363,9 @@ void World::Implementation::keep_reactions() {
 /// A scheme that steps back in time asks for forces that can be run backwards.
 void World::Implementation::check_reversible(const Parameters& p) const {
   const ContactDescription& contact = description.contact;
-  const auto elastic = [](const ContactPairDescription& pair) { return !(pair.restitution >= 0.0) || pair.restitution == 1.0; };
+  const auto elastic = [](const ContactPairDescription& pair) {
+    return !(pair.restitution >= 0.0) || pair.restitution == 1.0;
+  };
   require(options.integrator != Integrator::verlet ||
               ((!contact.rods || contact.restitution == 1.0) && (contact.obstacle_restitution.array() == 1.0).all() &&
                std::all_of(contact.pairs.begin(), contact.pairs.end(), elastic)),

@@ -92,8 +92,9 @@ Case slipped(const Named& named, double size, std::optional<bool> planar = std::
   return c;
 }
 
-/// `foreseen`: after a step of Newton's method that changes nothing, whose friction is that at hand.
-void expect_exact(const Case& c, Integrator integrator, Inner inner, bool foreseen = false) {
+/// `foreseen`: after a step of Newton's method that changes nothing, whose friction is that at hand. `approach`: at
+/// which the surfaces have just met.
+void expect_exact(const Case& c, Integrator integrator, Inner inner, bool foreseen = false, double approach = 0.0) {
   Options options;
   options.integrator = integrator;
   Equations equations(c.model, options);
@@ -107,6 +108,7 @@ void expect_exact(const Case& c, Integrator integrator, Inner inner, bool forese
     record.key = r.key;
     record.stick = {0.01, 0.002, -0.01};
     record.stiffness = 40.0;
+    record.approach = approach;
     state.contacts.push_back(record);
   }
   std::sort(state.contacts.begin(), state.contacts.end(),
@@ -229,6 +231,40 @@ TEST(Contact, MatrixIsExactForEveryClassLawAndScheme) {
       expect_exact(c, Integrator::backward_euler, Inner::end);
       expect_exact(c, Integrator::implicit_midpoint, Inner::middle);
       expect_exact(c, Integrator::energy_momentum, Inner::middle);
+    }
+}
+
+TEST(Contact, MatrixIsExactInAnImpactWithAndWithoutRestitution) {
+  for (Named named : touching_scenes())
+    for (FrictionLaw law : kFrictionLaws)
+      for (double restitution : {1.0, 0.5}) {
+        named.scene.contact.friction_law = law;
+        named.scene.contact.restitution = restitution;
+        named.scene.contact.obstacle_restitution = VectorX::Constant(1, restitution);
+        Case c = slipped(named, 0.02);
+        c.increment = 1e-5;  // between the ends of restitution's switch
+        expect_exact(c, Integrator::backward_euler, Inner::end, false, 5.0);
+        expect_exact(c, Integrator::implicit_midpoint, Inner::middle, false, 5.0);
+        expect_exact(c, Integrator::energy_momentum, Inner::middle, false, 5.0);
+      }
+}
+
+TEST(PressingLaw, WorksAsMuchOverAStepAsContactStoresWhileSurfacesMeet) {
+  testing::RandomNumbers random(3);
+  for (ContactLaw law : {ContactLaw::imcv2, ContactLaw::imcv1, ContactLaw::spillmann_teschner})
+    for (int k = 0; k < 200; ++k) {
+      const double radii = 1.0, tolerance = 0.1;
+      const PressingLaw pressing{law, radii, tolerance, 7.0, 0.0, 1.0};
+      const double start = radii + 0.1 * random.normal();
+      const double end = start + std::pow(10.0, -0.05 * k) * 0.1 * random.normal();
+      const double stored = 7.0 * (pressing.energy(end).value - pressing.energy(start).value);
+      EXPECT_NEAR(pressing.at(start, end).first * (end - start), stored, 1e-9 * std::abs(stored) + 1e-15);
+      // Half the energy comes back where surfaces part fast.
+      const PressingLaw half{law, radii, tolerance, 7.0, 0.0, 1.0, std::sqrt(0.5), 1e-6};
+      if (end > start + 1e-6) EXPECT_NEAR(half.at(start, end).first * (end - start), 0.5 * stored, 1e-9);
+      // It never pushes more than the surfaces do that are nearest.
+      const double most = std::min(7.0 * pressing.energy(std::min(start, end)).first, 0.0);
+      EXPECT_GE(pressing.at(start, end).first, most * (1.0 + 1e-12));
     }
 }
 
