@@ -223,7 +223,7 @@ class Contacts:
         -----
         Impacts are elastic by default. In implicit midpoint and energy-momentum steps they are so at any time step:
         the force of a step does as much work as contact stores [Gonzalez 1996; Laursen and Chawla 1997]. Backward
-        Euler, and "lagged" and "semi_explicit" friction, lose most of an impact that is shorter than a few steps, and nothing
+        Euler, and "lagged" and "semi_explicit" friction, lose most of an impact shorter than a few steps, and nothing
         in the limit of short ones. With a
         restitution e below 1 contact gives back e^2 of the energy that it took; steps are cut until an impact is
         resolved, unless ``adaptive=False``. Rods shake within after an impact, so that as a whole they part more slowly
