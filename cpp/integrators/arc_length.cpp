@@ -167,7 +167,7 @@ class ArcLength {
   void accept(const VectorX& q) {
     if (Contact* contact = equations_.contact()) {
       contact->update(q);
-      contact->accept(state_);
+      contact->accept(state_, Keep::force, INFINITY);
     }
     compute_configuration(equations_.model(), state_, q, scratch_);
     accept_configuration(equations_.model(), q, scratch_, state_);
