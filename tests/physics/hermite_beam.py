@@ -7,13 +7,11 @@ shear, no rotary inertia. Integrals by Gauss's rule, time by an eighth-order Run
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.linalg import cho_factor, cho_solve
-
-Load = tuple[float, tuple[float, float], float]  # until when, force and moment at the end s = length
 
 
 def fly(
@@ -25,10 +23,13 @@ def fly(
     direction: tuple[float, float],
     gravity: tuple[float, float] = (0.0, 0.0),
     pinned: bool = False,
-    loads: Sequence[Load] = (),
+    load: Callable[[float], tuple[float, float, float]] = lambda t: (0.0, 0.0, 0.0),
     times: Sequence[float],
 ) -> np.ndarray:
-    """Both ends of a beam of unit mass per length that starts straight and at rest from the origin, (times, 2, 2)."""
+    """Both ends of a beam of unit mass per length that starts straight and at rest from the origin, (times, 2, 2).
+
+    The load is a force and a moment at its far end, by time; the moment turns x towards z.
+    """
     step = length / elements
     points, weights = np.polynomial.legendre.leggauss(5)
     x, w = 0.5 * (points + 1.0), 0.5 * step * weights
@@ -46,7 +47,7 @@ def fly(
     free = np.arange(1 if pinned else 0, count)
     factor = cho_factor(mass[np.ix_(free, free)])
 
-    def accelerations(q: np.ndarray, force: tuple[float, float], moment: float) -> np.ndarray:
+    def accelerations(q: np.ndarray, t: float) -> np.ndarray:
         d = np.einsum("ak,eac->ekc", slope, q[rows])
         dd = np.einsum("ak,eac->ekc", turn, q[rows])
         size = np.hypot(d[..., 0], d[..., 1])[..., None]
@@ -59,6 +60,7 @@ def fly(
         held += np.einsum("ak,k,ekc->eac", turn, w, bend * bent * by_turn)
         total = np.outer(weight, gravity)
         np.add.at(total, rows, -held)
+        *force, moment = load(t)
         total[-2] += force
         end = q[-1]
         total[-1] += moment * np.array([-end[1], end[0]]) / (end @ end)
@@ -69,28 +71,10 @@ def fly(
     q = np.zeros((count, 2))
     q[::2] = np.outer(np.linspace(0.0, length, elements + 1), direction)
     q[1::2] = direction
-    state, time, found = np.concatenate([q.ravel(), np.zeros(2 * count)]), 0.0, []
-    for until, force, moment in [*loads, (np.inf, (0.0, 0.0), 0.0)]:
-        wanted = [t for t in times if time < t <= until]
-        last = wanted[-1] if until == np.inf and wanted else until
-        if not np.isfinite(last) or last <= time:
-            continue
 
-        def rates(t: float, y: np.ndarray, force: tuple[float, float] = force, moment: float = moment) -> np.ndarray:
-            return np.concatenate(
-                [y[2 * count :], accelerations(y[: 2 * count].reshape(count, 2), force, moment).ravel()]
-            )
+    def rates(t: float, y: np.ndarray) -> np.ndarray:
+        return np.concatenate([y[2 * count :], accelerations(y[: 2 * count].reshape(count, 2), t).ravel()])
 
-        solution = solve_ivp(
-            rates,
-            (time, last),
-            state,
-            t_eval=[*(t for t in wanted if t < last), last],
-            rtol=1e-8,
-            atol=1e-9,
-            method="DOP853",
-        )
-        reached = solution.y.T[: len(wanted)]
-        found += [y[: 2 * count].reshape(count, 2)[[0, -2]] for y in reached]
-        state, time = solution.y[:, -1], last
-    return np.array(found)
+    start = np.concatenate([q.ravel(), np.zeros(2 * count)])
+    found = solve_ivp(rates, (0.0, times[-1]), start, t_eval=times, rtol=1e-8, atol=1e-9, method="DOP853").y
+    return found[: 2 * count].T.reshape(-1, count, 2)[:, [0, -2]]

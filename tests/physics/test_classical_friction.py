@@ -1,0 +1,164 @@
+"""Coulomb's law in its classical cases: slopes, cylinders that slide and roll, a stick that spins down, capstans."""
+
+import numpy as np
+import pytest
+
+import withe
+
+G = 9.81
+STIFF = withe.Material(youngs_modulus=1e9, poisson_ratio=0.3, density=1000.0)
+
+
+def on_a_slope(degrees, friction, along, friction_model, step=2e-3, integrator="implicit_midpoint", **contact):
+    """A cylinder that just touches a slope, and the direction down it."""
+    angle = np.radians(degrees)
+    normal = np.array((np.sin(angle), 0.0, np.cos(angle)))
+    down = np.array((np.cos(angle), 0.0, -np.sin(angle)))
+    axis = down if along else np.array((0.0, 1.0, 0.0))
+    scene = withe.Scene()
+    start = 0.02 * normal
+    cylinder = scene.add_rod(start=start, end=start + 0.4 * axis, nodes=9, radius=0.02, material=STIFF)
+    scene.add_plane((0, 0, 0), normal, friction=friction)
+    scene.enable_contact(friction_model=friction_model, **contact)
+    return scene.build(integrator=integrator, time_step=step), cylinder, down
+
+
+FRICTION = 0.5
+THRESHOLD = np.degrees(np.arctan(FRICTION))
+
+
+@pytest.mark.parametrize("friction_model", ["anchored", "implicit"])
+@pytest.mark.parametrize("beyond", [-0.001, 0.001])
+def test_a_block_on_a_slope_slides_when_it_is_steeper_than_friction(beyond, friction_model):
+    """Above the threshold with g (sin a - mu cos a); a thousandth of the angle to either side of it, it is told."""
+    degrees = THRESHOLD * (1.0 + beyond)
+    # What it slides while it comes to press on the slope it loses within eight seconds; backward Euler is exact
+    # where it speeds up evenly.
+    simulation, block, down = on_a_slope(
+        degrees, FRICTION, True, friction_model, 5e-3, "backward_euler", slip_tolerance=1e-4
+    )
+    simulation.step(1600)
+    before = simulation.velocities(block)[4] @ down
+    simulation.step(100)
+    after = simulation.velocities(block)[4] @ down
+    angle = np.radians(degrees)
+    exact = G * (np.sin(angle) - FRICTION * np.cos(angle))
+    print(f"slope, {friction_model}, {beyond}:", after, (after - before) / 0.5 / exact - 1.0)
+    if exact < 0.0:
+        # Regularised friction creeps by less than its slip tolerance, anchors do not.
+        assert abs(after) < (1e-7 if friction_model == "anchored" else 1e-4)
+    else:
+        assert after - before == pytest.approx(0.5 * exact, rel=1e-3)
+
+
+@pytest.mark.parametrize("friction_model", ["anchored", "implicit"])
+def test_a_cylinder_rolls_down_a_slope_at_two_thirds_of_what_slides(friction_model):
+    simulation, cylinder, down = on_a_slope(20.0, 0.6, False, friction_model)
+    simulation.step(100)
+    before, spin = simulation.velocities(cylinder)[4] @ down, simulation.spins(cylinder)[4]
+    simulation.step(200)
+    gained = (simulation.velocities(cylinder)[4] @ down - before) / 0.4
+    exact = 2.0 / 3.0 * G * np.sin(np.radians(20.0))
+    print(f"rolling, {friction_model}:", gained / exact - 1.0)
+    assert gained == pytest.approx(exact, rel=5e-4)
+    assert (simulation.spins(cylinder)[4] - spin) / 0.4 * 0.02 == pytest.approx(exact, rel=2e-3)
+
+
+@pytest.mark.parametrize("friction_model", ["anchored", "implicit"])
+def test_a_cylinder_that_slides_comes_to_roll_at_two_thirds_of_its_speed(friction_model):
+    """After v0 / (3 mu g), whatever the friction."""
+    simulation, cylinder, down = on_a_slope(0.0, 0.3, False, friction_model, step=1e-3)
+    simulation.step(50)
+    simulation.set_velocities(cylinder, np.tile(down, (9, 1)))
+    simulation.step(80)
+    sliding = simulation.velocities(cylinder)[4] @ down
+    simulation.step(420)
+    rolling = simulation.velocities(cylinder)[4] @ down
+    print(f"to rolling, {friction_model}:", sliding / (1.0 - 0.3 * G * 0.08) - 1.0, 1.5 * rolling - 1.0)
+    assert sliding == pytest.approx(1.0 - 0.3 * G * 0.08, rel=1e-3)
+    assert rolling == pytest.approx(2.0 / 3.0, rel=2e-4)
+
+
+def spin_lost(edges):
+    """Angular deceleration of a rubber stick over three tenths of a second, of its angular momentum [rad/s^2]."""
+    scene = withe.Scene()
+    rubber = withe.Material(youngs_modulus=1e7, poisson_ratio=0.5, density=1000.0)
+    stick = scene.add_rod(start=(-0.5, 0, 0.02), end=(0.5, 0, 0.02), nodes=edges + 1, radius=0.02, material=rubber)
+    scene.add_floor(friction=0.3)
+    scene.enable_contact(friction_model="implicit", slip_tolerance=1e-3)
+    simulation = scene.build(time_step=1e-3)
+    simulation.step(400)
+    velocities = np.zeros((edges + 1, 3))
+    velocities[:, 1] = 8.0 * simulation.positions(stick)[:, 0]
+    simulation.set_velocities(stick, velocities)
+
+    def spin():
+        """12 / L^3 times the integral of x v, both straight along every edge."""
+        x, v = simulation.positions(stick), simulation.velocities(stick)
+        middle = np.cross(0.5 * (x[1:] + x[:-1]), 0.5 * (v[1:] + v[:-1]))
+        return float(12.0 * (middle + np.cross(np.diff(x, axis=0), np.diff(v, axis=0)) / 12.0)[:, 2].mean())
+
+    simulation.step(50)
+    before = spin()
+    simulation.step(300)
+    return (before - spin()) / 0.3
+
+
+def test_a_stick_that_spins_flat_on_a_floor_slows_at_three_mu_g_over_its_length():
+    """Torque mu m g L / 4 over m L^2 / 12. It is soft enough to press evenly along its length."""
+    errors = [spin_lost(n) / (3.0 * 0.3 * G) - 1.0 for n in (4, 10, 40)]
+    print("spinning stick:", errors)
+    assert abs(errors[0]) < 1e-3
+    assert np.abs(errors[1:]).max() < 3e-4
+
+
+POST, ROPE, TAIL = 0.05, 0.005, 0.08  # [m]
+
+
+def wound(nodes, wrap):
+    """A rope that winds about a post and leaves straight; its tangents at both ends, and what it turns by."""
+    reach = POST + ROPE
+    rise = 3.0 * ROPE / (2.0 * np.pi) if wrap > np.pi else 0.0
+    per = np.hypot(reach, rise)
+    s = np.linspace(-TAIL, wrap * per + TAIL, nodes)
+    angle = np.clip(s / per, 0.0, wrap)
+
+    def tangent(a):
+        return np.array((-reach * np.sin(a), rise, reach * np.cos(a))) / per
+
+    points = np.stack([reach * np.cos(angle), rise * angle, reach * np.sin(angle)], axis=1)
+    points += np.outer(np.minimum(s, 0.0), tangent(0.0)) + np.outer(np.maximum(s - wrap * per, 0.0), tangent(wrap))
+    return points, tangent(0.0), tangent(wrap), wrap * reach / per
+
+
+@pytest.mark.parametrize(("turns", "bound"), [(0.25, 1e-3), (1.0, 1e-3), (2.0, 2e-3)])
+def test_a_rope_wound_about_a_post_multiplies_its_tension(turns, bound):
+    """exp(mu phi) [Euler 1769, Eytelwein 1808]; beyond half a turn it climbs, and turns by a thousandth less."""
+    friction, speed, step = 0.2, 0.01, 5e-3
+    points, first, last, turned = wound(201, 2.0 * np.pi * turns)
+    exact = np.exp(friction * turned)
+    bending = 5e-4 * (POST + ROPE) ** 2  # hardly any
+    scene = withe.Scene(gravity=(0, 0, 0))
+    rope = scene.add_rod(
+        points=points,
+        radius=ROPE,
+        stiffness=withe.Stiffness(stretch=2e3 * exact, bend=bending, twist=bending),
+        line_density=0.02,
+        natural="straight",
+    )
+    scene.add_capsule((0, -1, 0), (0, 1, 0), POST, friction=friction)
+    scene.enable_contact(slip_tolerance=1e-4, centreline_friction=True, friction_model="implicit")
+    scene.ignore_contact(rope, rope)
+    scene.add_force(rope.start, -first)
+    scene.add_drag(0.02)
+    grip = scene.pin(rope.end)
+    simulation = scene.build(integrator="backward_euler", time_step=step)
+    simulation.move(grip, position=points[-1] + 1.2 * speed * last, over=1.2)
+    simulation.step(150)
+    pulls = []
+    for _ in range(50):
+        simulation.step()
+        pulls.append(simulation.reaction(grip).force @ last)
+    error = float(np.mean(pulls)) / exact - 1.0
+    print(f"capstan, {turns} turns:", exact, error)
+    assert abs(error) < bound
