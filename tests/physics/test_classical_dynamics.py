@@ -68,11 +68,11 @@ def test_a_double_pendulum_swings_as_by_lagrange(kind):
         scene.join(upper.end, lower.start, kind, **({"axis": (0, 1, 0)} if kind == "revolute" else {}))
         return farthest(followed(scene.build(time_step=step), lower, SWINGS), exact)
 
-    meshes = [missed(n, 5e-4) for n in (2, 5, 10)]
+    meshes = [missed(n, 5e-4) for n in (1, 2, 10)]
     steps = [missed(20, dt) for dt in (2e-2, 1e-2, 5e-3)]
     print(f"double pendulum, {kind}:", meshes, steps)
-    assert meshes[-1] < 5e-4
-    assert meshes[0] > 10.0 * meshes[1] > 50.0 * meshes[2]
+    # Stiff bars carry their mass along them: one edge is enough, and only the step is left.
+    assert max(meshes) < 1e-4
     assert_order_at_least(steps, 2.0, slack=0.3)
 
 
@@ -132,11 +132,10 @@ def test_a_four_bar_linkage_moves_as_by_lagrange():
         scene.join(coupler.end, rocker.end, "pinned")
         return farthest(followed(scene.build(time_step=step), rocker, times), exact)
 
-    meshes = [missed(n, 5e-4) for n in (2, 5, 10)]
+    meshes = [missed(n, 5e-4) for n in (1, 2, 10)]
     steps = [missed(20, dt) for dt in (2e-2, 1e-2, 5e-3)]
     print("four-bar:", meshes, steps)
-    assert meshes[-1] < 5e-4
-    assert meshes[0] > 5.0 * meshes[1] > 10.0 * meshes[2]
+    assert max(meshes) < 1e-4
     assert_order_at_least(steps, 2.0, slack=0.3)
 
 
@@ -150,7 +149,7 @@ FLIGHT = np.array((1.0, 2.0, 3.0, 4.0))
 
 @pytest.fixture(scope="module")
 def spaghetti():
-    """Both ends of the beam at these times, good to 3e-4 of its length of 10."""
+    """Both ends of the beam at these times, good to 3e-5 of its length of 10."""
 
     def load(time):
         return 8.0 * pulse(time), 0.0, -80.0 * pulse(time)
