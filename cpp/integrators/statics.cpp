@@ -19,7 +19,7 @@ bool turned_too_far(const State& state, const Configuration& c, bool planar) {
 }
 
 // Corrections of points on the way may be this long, over the length of the scene: Newton's method leaves their square.
-constexpr double kOnTheWay = 1e-4;
+constexpr double kOnTheWay = 1e-6;
 // Edges turn by no more than this between two points of a path, by the linear solution [rad].
 constexpr double kFarthestTurn = 1.0;
 // What has to be cut below this share of that leads to no point of the path: it has ended.
