@@ -26,6 +26,9 @@ constexpr double kFarthestTurn = 1.0;
 constexpr double kShortest = 1.0 / 64.0;
 // Where no edge turns, the path ends after so many cuts.
 constexpr int kMostCuts = 6, kMostCutsOfFriction = 12;
+// A path has no more points than this: what a scene is torn along by a support that goes a thousand lengths away is
+// found by settling there.
+constexpr int kMostPoints = 1000;
 // Times that a path may end and be taken up again.
 constexpr int kMostJumps = 20;
 // Where a path has ended, the scene goes on from so many steps behind the last one that was tried.
@@ -88,8 +91,9 @@ class Statics {
     const int most_cuts = equations_.has_potential() ? kMostCuts : kMostCutsOfFriction;
     double reached = 0.0, longest = 1.0;
     bool was_stable = false;
-    for (int cuts = 0, jumps = 0; reached < 1.0;) {
+    for (int cuts = 0, jumps = 0, points = 0; reached < 1.0;) {
       if (cuts == 0) {
+        if (++points > kMostPoints) return false;
         path_.go_to(reached);
         path_.find_tangent(tangent_);
         ++last.iterations;
