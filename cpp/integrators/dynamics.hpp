@@ -39,13 +39,13 @@ struct StepResult {
   bool accepted = false;
   bool too_deep = false;  ///< surfaces are too deep in each other: contact must be stiffer
   NewtonResult newton;
-  double largest_turn = 0;    ///< of an edge [rad]
-  double stretch_gain = 0;    ///< energy that midpoint brings into stretching from nowhere [J]
-  double error = 0;           ///< estimated local error [m]
-  double load_work = 0;       ///< of loads and custom forces [J]
-  double dissipated = 0;      ///< by drag, viscosity and contact [J]
-  double support_work = 0;    ///< [J]
-  double pressing_gain = 0;   ///< put in by surfaces that press, `Contact::pressing_gain` [J]
+  double largest_turn = 0;   ///< of an edge [rad]
+  double stretch_gain = 0;   ///< energy that midpoint brings into stretching from nowhere [J]
+  double error = 0;          ///< estimated local error [m]
+  double load_work = 0;      ///< of loads and custom forces [J]
+  double dissipated = 0;     ///< by drag, viscosity and contact [J]
+  double support_work = 0;   ///< [J]
+  double pressing_gain = 0;  ///< put in by surfaces that press, `Contact::pressing_gain` [J]
 };
 
 /// Scratch of a step; owned by the world, so that a step does not allocate.

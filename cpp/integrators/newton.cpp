@@ -226,8 +226,8 @@ NewtonResult Newton::solve(Equations& equations, VectorX& z, const VectorX* targ
     result.step = p.step;
     if (!e.residual.allFinite()) return give_up();
     const Balance balance = this->balance(e, result);
-    // Rounding alone is no proof before the first step: a light load on a stiff rod hides in it. Points on the way end by
-    // their steps alone, whatever rounding leaves: the same scene elsewhere in space takes the same steps.
+    // Rounding alone is no proof before the first step: a light load on a stiff rod hides in it. Points on the way end
+    // by their steps alone, whatever rounding leaves: the same scene elsewhere in space takes the same steps.
     const bool on_the_way = predicted && predicted->enough > 0.0;
     if (on_the_way ? p.step <= predicted->enough
                    : (balance.floor && (result.iterations > 0 || balance.relative)) ||

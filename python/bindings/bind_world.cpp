@@ -128,7 +128,7 @@ void define_steps(WorldClass& world) {
         return self.run([&wanted](World& w) { return w.equilibrium_path(wanted); }, callback, forces);
       },
       py::arg("loads"), py::arg("start"), py::arg("end"), py::arg("most_points"), py::arg("turn"), py::arg("callback"),
-      py::arg("forces"),      "Follow a path of equilibria through limit points.");
+      py::arg("forces"), "Follow a path of equilibria through limit points.");
   world.def("check_idle", [](GuardedWorld& self) { (void)self.changing(); }, "Raises in the middle of a step.");
   world.def(
       "snapshot", [](const GuardedWorld& self) { return py::bytes(self.reading().snapshot()); }, "The whole state.");

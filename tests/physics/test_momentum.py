@@ -100,9 +100,10 @@ def test_a_scene_in_its_plane_and_in_space_has_the_same_momenta():
     np.testing.assert_allclose(momenta[0].angular, momenta[1].angular, atol=1e-10)
 
 
-@pytest.mark.parametrize("integrator", ["implicit_midpoint", "fourth_order"])
-def test_angular_momentum_of_joined_rods_is_kept_in_a_plane(integrator):
-    simulation = star(True, True, integrator, 2e-3)
+@pytest.mark.parametrize("planar", [True, False], ids=["planar", "spatial"])
+@pytest.mark.parametrize("integrator", ["implicit_midpoint", "energy_momentum", "fourth_order"])
+def test_angular_momentum_of_joined_rods_is_kept(integrator, planar):
+    simulation = star(planar, planar, integrator, 2e-3)
     simulation.set_velocities(None, turning(simulation, (0, 0, 2.0), (0.3, -0.1, 0)))
     simulation.step(1)
     before = simulation.momentum()
