@@ -218,12 +218,8 @@ class _Sum:
         case = self._case
         acceleration = (moved / h - before.velocities) / h
         self._on_nodes(-self._mass[:, None] * acceleration, slice(None))
-        # An edge carries its mass along it: m / 3, m / 6, m / 3; but at a wall half of it sits at either node.
-        shared = np.full((len(self._couple), 1), case.line_density * self._edge / 6)
-        shared[0] = 0.0
-        if case.both_ends and case.nodes > 2:
-            shared[-1] = 0.0
-        self._pair(shared * np.diff(acceleration, axis=0))
+        # An edge carries its mass along it: m / 3, m / 6, m / 3.
+        self._pair(case.line_density * self._edge / 6 * np.diff(acceleration, axis=0))
         rotary = 1000.0 * math.pi * case.radius**4 / 2 * self._edge
         torque = rotary * (turned / h - before.spins) / h
         self._along(-torque, slice(None))

@@ -107,10 +107,10 @@ void add_edge_rows(Local& out, const EdgePlace& r, const EdgePlace& c, const Edg
   out.hessian[r.angle][c.angle] += kTwice * b.angle_angle;
 }
 
-void clear(Local& out, int width) {
+void clear(Local& out, int width, bool with_matrix = true) {
   for (int i = 0; i < width; ++i) {
     out.gradient[i] = 0.0;
-    for (int j = 0; j < width; ++j) out.hessian[i][j] = 0.0;
+    for (int j = 0; with_matrix && j < width; ++j) out.hessian[i][j] = 0.0;
   }
 }
 
@@ -155,11 +155,11 @@ MovingEdge<double> Equations::moving_edge(int edge) const {
 }
 
 /// Bending and twisting of a stencil.
-void Equations::discrete_bend_local(int stencil, Local& local) const {
+void Equations::discrete_bend_local(int stencil, bool with_matrix, Local& local) const {
   const BendStencil& s = model_.bend[at(stencil)];
   const bool planar = model_.planar();
   const int step = planar ? 2 : 4;
-  clear(local, planar ? 6 : 11);
+  clear(local, planar ? 6 : 11, with_matrix);
   // An edge against its rod has its head where the stencil has its tail.
   EdgePlace place[2];
   for (int k = 0; k < 2; ++k) {
@@ -199,7 +199,7 @@ void Equations::discrete_bend_local(int stencil, Local& local) const {
   for (int i = 0; i < 2; ++i) {
     const EdgeFrame<double>& middle = middle_.edge[at(s.edge[i])];
     add_edge_forces(local, place[i], edge[i], middle, moment[i]);
-    for (int j = 0; j < 2; ++j) {
+    for (int j = 0; with_matrix && j < 2; ++j) {
       EdgeBlock<double> block = edge_block(edge[i], i == 0 ? 1.0 : -1.0, columns[j]);
       finish_block(place[i], edge[i], middle, moment[i], i == j, block);
       add_edge_rows(local, place[i], place[j], block);
@@ -354,7 +354,7 @@ void Equations::add_discrete_gradient(const VectorX& z, bool with_matrix, const 
     add(assembler_.stretch, e);
   };
   const auto add_bend = [&](int b) {
-    discrete_bend_local(b, local);
+    discrete_bend_local(b, with_matrix, local);
     add(assembler_.bend, b);
   };
   if (model_.planar()) {

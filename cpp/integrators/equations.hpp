@@ -138,7 +138,7 @@ class Equations {
   void mean_stretch_local(const VectorX& z, int edge, const double* axial_force, Local& local) const;
   MovingEdge<double> moving_edge(int edge) const;
   double working_turn(int edge, double change) const;
-  void discrete_bend_local(int stencil, Local& local) const;
+  void discrete_bend_local(int stencil, bool with_matrix, Local& local) const;
   void discrete_planar_half_local(int stencil, Local& local) const;
   void discrete_half_local(int stencil, Local& local) const;
   void add_spin_couple(const VectorX& z);

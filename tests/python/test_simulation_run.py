@@ -291,9 +291,9 @@ def test_a_mesh_too_coarse_for_the_motion_warns_once(moved, recwarn):
         simulation.set_natural_curvature(arm, (2.5 / 0.05, 0.0), over=0.5, discrete=True)
     simulation.run(2.0, progress=False)
     simulation.equilibrium()
-    said = [str(warning.message) for warning in recwarn.list]
+    said = [str(w.message) for w in recwarn.list if issubclass(w.category, withe.CoarseMeshWarning)]
     if moved == "resting":
-        assert not said
+        assert not recwarn.list
     else:
         assert len(said) == 1
         assert ("an edge twists by" if moved == "twisted" else "an edge turns by") in said[0]
