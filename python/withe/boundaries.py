@@ -28,6 +28,7 @@ class Boundaries:
     _directory: Directory
     _settings: Settings
     _world: _core.World
+    _options: dict[str, Any]
 
     def clamp(
         self,
@@ -108,7 +109,7 @@ class Boundaries:
         tangent : array_like of shape (3,)
             Where the rod is to point, instead: the smallest turn from the drawn tangent, and then ...
         roll : float [rad]
-            ... a turn about it. Full turns count.
+            ... a turn about it. Full turns count, and take time: at most half a turn in a time step.
         over : float [s]
             Reached after so long, evenly; within the next step by default.
         path : callable
@@ -183,6 +184,14 @@ class Boundaries:
         owner = f"support {part.name!r}"
         end_tangent = start_tangent if tangent is None else validation.unit_vector(tangent, f"tangent of {owner}")
         end_roll = start_roll if roll is None else validation.number(roll, f"roll of {owner}")
+        # Rotations at the ends of a step do not tell full turns between them.
+        step = float(self._options["time_step"])
+        way = abs(end_roll - start_roll)
+        if way * min(step / over if over > 0.0 else 1.0, 1.0) > np.pi:
+            raise ValueError(
+                f"roll of {owner} must turn by at most half a turn in a time step, got {end_roll - start_roll:g} rad "
+                f"{'at once' if over == 0.0 else f'over {over:g} s'}: take over={1.5 * way / np.pi * step:.2g} or more"
+            )
         return Turn(
             positions=np.stack([np.array(self._world.support_position(index)), target]),
             tangents=np.stack([start_tangent, end_tangent]),

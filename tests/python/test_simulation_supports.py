@@ -123,6 +123,15 @@ def test_rolls_count_full_turns(hold):
     assert np.allclose(simulation.twists(arm), -3.0 / length, rtol=1e-6)
 
 
+@pytest.mark.parametrize("over", [0.0, 0.01, 0.012])
+def test_a_roll_by_more_than_half_a_turn_in_a_step_is_refused_with_the_time_that_would_do(over):
+    _, _, simulation = cantilever(planar=False, time_step=0.01)
+    with pytest.raises(ValueError, match=r"at most half a turn in a time step, got 4\.39823 rad .*take over=0\.021"):
+        simulation.move("wall", roll=1.4 * np.pi, over=over)
+    simulation.move("wall", roll=1.4 * np.pi, over=0.021)
+    simulation.move("wall", roll=0.9 * np.pi)
+
+
 def test_a_path_gives_the_position_at_the_end_of_every_step():
     _, arm, simulation = cantilever(planar=False, time_step=0.01)
 
