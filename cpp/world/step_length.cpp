@@ -120,7 +120,7 @@ void World::Implementation::add_step_notes() {
   if (!std::isfinite(slowest)) return;
   const double dt = options.time_step, first = 1.8751040687 * 1.8751040687 * slowest, angle = first * dt;
   const int resolved =
-      angle > 1.0 ? 0 : std::max(1, static_cast<int>(0.5 + std::sqrt(1.0 / (slowest * dt)) / std::numbers::pi));
+      angle > 1.0 ? 0 : std::max(1, static_cast<int>(std::lround(std::sqrt(1.0 / (slowest * dt)) / std::numbers::pi)));
   const double per_period = 1.0 - std::pow(1.0 + angle * angle, -std::numbers::pi / std::atan(angle));
   plan.notes.push_back("steps of " + text(dt) + " s resolve less than " + text(0.5 / (std::numbers::pi * dt)) +
                        " Hz: of rod '" + description.rods[which].name + "' alone, clamped and unstressed, " +

@@ -261,7 +261,9 @@ TEST(PressingLaw, WorksAsMuchOverAStepAsContactStoresWhileSurfacesMeet) {
       EXPECT_NEAR(pressing.at(start, end).first * (end - start), stored, 1e-9 * std::abs(stored) + 1e-15);
       // Half the energy comes back where surfaces part fast.
       const PressingLaw half{law, radii, tolerance, 7.0, 0.0, 1.0, std::sqrt(0.5), 1e-6};
-      if (end > start + 1e-6) EXPECT_NEAR(half.at(start, end).first * (end - start), 0.5 * stored, 1e-9);
+      if (end > start + 1e-6) {
+        EXPECT_NEAR(half.at(start, end).first * (end - start), 0.5 * stored, 1e-9);
+      }
       // It never pushes more than the surfaces do that are nearest.
       const double most = std::min(7.0 * pressing.energy(std::min(start, end)).first, 0.0);
       EXPECT_GE(pressing.at(start, end).first, most * (1.0 + 1e-12));
