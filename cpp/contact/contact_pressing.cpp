@@ -133,10 +133,10 @@ void Contact::set_force(Touching& t, const ContactRecord* record) const {
 /// Adds what touches at the start of the step only, and gives back there what it took; `first`: of `touching_` behind
 /// what is there for friction alone.
 void Contact::add_leaving(std::size_t first) {
-  const auto from = touching_.begin() + static_cast<std::ptrdiff_t>(first);
   const std::size_t count = touching_.size();
   for (const Touching& start : leaving_) {
-    const auto end = from + static_cast<std::ptrdiff_t>(count - first);
+    const auto from = touching_.begin() + static_cast<std::ptrdiff_t>(first);  // adding to them moves them
+    const auto end = touching_.begin() + static_cast<std::ptrdiff_t>(count);
     const auto found =
         std::lower_bound(from, end, start.pair, [](const Touching& t, int pair) { return t.pair < pair; });
     if (found != end && found->pair == start.pair) continue;

@@ -25,6 +25,7 @@ ContactTable World::contacts() const {
   Contact* contact = self.equations->contact();
   if (contact == nullptr) return table;
   const Model& model = self.model;
+  contact->set_parameters(self.parameters);  // a copy has taken no step yet
   const std::vector<ContactReport> reports = contact->report(self.state);
   const auto rows = static_cast<Eigen::Index>(reports.size());
   table.bodies.resize(rows, 5);
