@@ -168,7 +168,7 @@ void Assembler::couple(const std::vector<int>& contact_unknowns, int width) {
   contact.find_offsets(*solver_);
 }
 
-void Assembler::forget_contacts(const std::vector<int>& contact_unknowns, int width) {
+void Assembler::order_for(const std::vector<int>& contact_unknowns, int width) {
   contact = ElementTable(width, contact_unknowns);
   analyse();
 }

@@ -80,8 +80,8 @@ class Assembler {
   /// Takes in the unknowns of contacts, one after the other (-1: none), and finds a new order of elimination where they
   /// couple what was not coupled yet. The solver is then another one.
   void couple(const std::vector<int>& contact_unknowns, int width);
-  /// As it was before rods came near each other.
-  void forget_contacts(const std::vector<int>& contact_unknowns, int width);
+  /// Takes in contacts likewise, with an order of elimination for these and no others.
+  void order_for(const std::vector<int>& contact_unknowns, int width);
   /// Another number whenever the solver is.
   int generation() const { return generation_; }
 

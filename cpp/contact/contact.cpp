@@ -125,10 +125,8 @@ double Contact::farthest(const VectorX& change) const {
   return std::sqrt(most);
 }
 
-Contact::Touching Contact::touch(int index, const VectorX& q, bool whole) const {
-  const ContactPair& pair = pairs_[at(index)];
+Contact::Touching Contact::touch(const ContactPair& pair, const VectorX& q, bool whole) const {
   Touching t;
-  t.pair = index;
   Vec3d x[4];
   end_points(pair, q, x);
   if (pair.plane()) {
@@ -228,10 +226,13 @@ void Contact::update(const VectorX& q1) {
   for (int p = 0; p < static_cast<int>(pairs_.size()); ++p) {
     if (bounds_[at(p)].clear > moved_) continue;
     const ContactPair& pair = pairs_[at(p)];
-    Touching t = touch(p, q1);
+    Touching t = touch(pair, q1);
+    t.pair = p;
     // A distance changes by no more than both edges move.
     const auto above = [&](double least) { return moved_ + kSafe * 0.5 * (t.distance - least); };
-    bounds_[at(p)] = {above(pair.reach()), above(pair.nearest())};
+    // The weights of closest_points make it greater than that of the points themselves.
+    const double weights = 0.25 * (pair.weight_a + pair.weight_b);
+    bounds_[at(p)] = {above(pair.reach()), above(std::sqrt(pair.nearest() * pair.nearest() + weights))};
     if (t.distance >= pair.reach()) continue;
     set_force(t, record_of(pair.key));
     touching_.push_back(t);
@@ -240,13 +241,13 @@ void Contact::update(const VectorX& q1) {
   current_ = !starting_;  // what has no record begins otherwise in a step than before it
 }
 
-void Contact::unknowns(int i, int (&dofs)[kContactUnknowns]) const { unknowns_of(pair_of(i), dofs); }
+void Contact::unknowns(int i, int (&dofs)[kContactUnknowns]) const { unknowns_of(pair_of(i).key, dofs); }
 
-void Contact::unknowns_of(const ContactPair& pair, int (&dofs)[kContactUnknowns]) const {
+void Contact::unknowns_of(const ContactKey& key, int (&dofs)[kContactUnknowns]) const {
   std::fill(std::begin(dofs), std::end(dofs), -1);
-  const bool obstacle = pair.key.b < 0;
+  const bool obstacle = key.b < 0;
   for (int side = 0; side < (obstacle ? 1 : 2); ++side) {
-    const auto edge = at(side == 0 ? pair.key.a : pair.key.b);
+    const auto edge = at(side == 0 ? key.a : key.b);
     for (int k = 0; k < model_.dimension; ++k) {
       dofs[6 * side + k] = model_.tail_dof[edge] + k;
       dofs[6 * side + 3 + k] = model_.head_dof[edge] + k;

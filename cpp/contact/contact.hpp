@@ -101,6 +101,9 @@ class Contact {
   /// Whether everything that touches has an element; if not, `couple` gives elements to it and to what is near.
   bool coupled() const;
   void couple();
+  /// Those that have elements, sorted; and gives elements to these.
+  const std::vector<ContactKey>& elements() const { return elements_; }
+  void couple(std::vector<ContactKey> keys);
   /// Unknowns of all elements, one after the other.
   const std::vector<int>& element_unknowns() const { return element_unknowns_; }
 
@@ -173,7 +176,7 @@ class Contact {
     bool sticking = false;
   };
   const ContactPair& pair_of(int i) const;
-  void unknowns_of(const ContactPair& pair, int (&dofs)[kContactUnknowns]) const;
+  void unknowns_of(const ContactKey& key, int (&dofs)[kContactUnknowns]) const;
   /// Row of a pair in the table of elements, or -1.
   int element_of(const ContactKey& key) const;
   static double depth_of(const ContactPair& pair, double distance) {
@@ -186,7 +189,7 @@ class Contact {
     return pair.stiffness > 0.0 || model_.description.contact.stiffness > 0.0;
   }
   /// `whole`: its closest points too, however far apart it is.
-  Touching touch(int pair, const VectorX& q, bool whole = false) const;
+  Touching touch(const ContactPair& pair, const VectorX& q, bool whole = false) const;
   void set_force(Touching& t, const ContactRecord* record) const;
   void add_leaving(std::size_t first);
   double start_distance(const ContactPair& pair) const;
@@ -232,6 +235,11 @@ class Contact {
   void freeze();
   /// Unknowns of a pair at q (obstacles' points where there are none).
   void values_at(const ContactPair& pair, const VectorX& q, double (&x)[kContactUnknowns]) const;
+  template <class More>
+  void set_boxes(const VectorX& from, const VectorX& to, const More& more);
+  void find_near(std::vector<ContactPair>& pairs);
+  std::size_t number_of(const std::vector<ContactPair>& pairs, const ContactKey& key) const;
+  void keep_touching();
   void find_pairs(const VectorX& from, const VectorX& to);
   bool outgrown(const VectorX& q, const VectorX* change) const;
   double farthest(const VectorX& change) const;
@@ -264,7 +272,9 @@ class Contact {
   bool frictional_ = false;
   BroadPhase broad_phase_;
   std::vector<Box> boxes_;
-  std::vector<ContactPair> pairs_;  ///< obstacles' first, then candidates of the broad phase
+  /// Obstacles' first, then candidates of the broad phase, sorted by key: a contact's place among others does not depend
+  /// on when candidates were found. And those before they were found last.
+  std::vector<ContactPair> pairs_, old_pairs_;
   VectorX reference_;               ///< where the candidates belong
   VectorX low_, high_;              ///< bounds of the way there
   double margin_ = 0;
@@ -291,7 +301,7 @@ class Contact {
   std::vector<Touching> touching_, lagged_;
   std::vector<Touching> leaving_;  ///< what gives back in this step what it took, wherever it ends
   std::vector<Frozen> frozen_;
-  std::vector<std::pair<ContactKey, int>> elements_;  ///< sorted
+  std::vector<ContactKey> elements_;  ///< sorted
   std::vector<int> element_unknowns_;
   VectorX least_stiffness_;
   VectorX edge_mass_;  ///< [kg]

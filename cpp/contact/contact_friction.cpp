@@ -146,7 +146,7 @@ Contact::Slipping Contact::frozen_slipping(const Touching& t, const VectorX& cha
   out.limit = pair.friction * frozen.pressing;
   out.slip = frozen_slip(t);
   int dofs[kContactUnknowns];
-  unknowns_of(pair, dofs);
+  unknowns_of(pair.key, dofs);
   for (int i = 0; i < kContactUnknowns; ++i)
     if (dofs[i] >= 0) out.change += change(dofs[i]) * Vec3d{frozen.slip[0][i], frozen.slip[1][i], frozen.slip[2][i]};
   out.law = tanh_law(pair.friction, frozen.pressing, dot(out.slip, out.slip), slip_rate());
@@ -157,7 +157,7 @@ Contact::Slipping Contact::slipping(const Touching& t, const VectorX& change) co
   const ContactPair& pair = pairs_[at(t.pair)];
   const FrictionSetting f = setting(t);
   int dofs[kContactUnknowns];
-  unknowns_of(pair, dofs);
+  unknowns_of(pair.key, dofs);
   double now[kContactUnknowns];
   values_at(pair, q1_, now);
   Dual<1> unknown[kContactUnknowns];

@@ -369,6 +369,8 @@ void Contact::forget() {
   bounds_.clear();
   touching_.clear();
   lagged_.clear();
+  leaving_.clear();
+  q1_.resize(0);
   couple();
 }
 

@@ -35,53 +35,34 @@ bool Contact::outgrown(const VectorX& q, const VectorX* change) const {
   return false;
 }
 
+/// Boxes of all edges that may touch others, on a way, grown by half of the tolerance and by `more` than that.
+template <class More>
+void Contact::set_boxes(const VectorX& from, const VectorX& to, const More& more) {
+  boxes_.clear();
+  for (int e : surfaces_.edges()) {
+    const int tail = model_.edge_tail[at(e)], head = model_.edge_head[at(e)];
+    const double grow = surfaces_.radius(e) + 0.5 * surfaces_.tolerance(e) + more(e);
+    Box box = Box::around(local_position(model_, from, tail), local_position(model_, from, head), grow);
+    if (&from != &to)
+      box.include(Box::around(local_position(model_, to, tail), local_position(model_, to, head), grow));
+    boxes_.push_back(box);
+  }
+}
+
 /// Candidates for the way from one configuration to another, and beyond by a margin that grows with the last travel.
 void Contact::find_pairs(const VectorX& from, const VectorX& to) {
   if (surfaces_.edges().empty()) return;
   current_ = false;
-  forget_foreseen();
   double travel = 0.0;
   if (reference_.size() == to.size())
     for (int dof : model_.node_dof)
       travel = std::max(travel, (to.segment(dof, model_.dimension) - reference_.segment(dof, model_.dimension)).norm());
   const double reach = surfaces_.greatest_reach();
   margin_ = std::clamp(4.0 * travel, 0.25 * reach, 2.0 * reach);
-  boxes_.clear();
-  for (int e : surfaces_.edges()) {
-    const int tail = model_.edge_tail[at(e)], head = model_.edge_head[at(e)];
-    const double grow = surfaces_.radius(e) + 0.5 * surfaces_.tolerance(e) + 0.5 * margin_;
-    Box box = Box::around(local_position(model_, from, tail), local_position(model_, from, head), grow);
-    if (&from != &to)
-      box.include(Box::around(local_position(model_, to, tail), local_position(model_, to, head), grow));
-    boxes_.push_back(box);
-  }
-  const std::size_t fixed = surfaces_.obstacle_pairs().size();
-  // What touches is known by the key of its pair while pairs are renumbered; those with obstacles keep their number.
-  std::vector<std::pair<Touching*, ContactKey>> renumbered;
-  for (std::vector<Touching>* kept : {&lagged_, &leaving_})
-    for (Touching& t : *kept)
-      if (at(t.pair) >= fixed) renumbered.emplace_back(&t, pairs_[at(t.pair)].key);
-  pairs_.resize(fixed);
-  for (const BroadPhase::Pair& found : broad_phase_.find(boxes_)) {
-    const int a = surfaces_.edges()[at(found.a)], b = surfaces_.edges()[at(found.b)];
-    if (!surfaces_.may_touch(a, b)) continue;
-    pairs_.push_back(surfaces_.pair(a, b));
-    pairs_.back().element = element_of(pairs_.back().key);
-  }
-  const std::size_t found = pairs_.size();
-  for (const auto& [touching, key] : renumbered) {
-    const auto place = std::lower_bound(pairs_.begin() + static_cast<std::ptrdiff_t>(fixed),
-                                        pairs_.begin() + static_cast<std::ptrdiff_t>(found), key,
-                                        [](const ContactPair& pair, const ContactKey& k) { return pair.key < k; });
-    auto number = static_cast<std::size_t>(place - pairs_.begin());
-    if (number == found || pairs_[number].key != key) {
-      // Gone out of reach within a step: its friction of the start still acts, and what it gives back.
-      number = pairs_.size();
-      pairs_.push_back(surfaces_.pair(key.a, key.b));
-      pairs_.back().element = element_of(key);
-    }
-    touching->pair = static_cast<int>(number);
-  }
+  set_boxes(from, to, [&](int) { return 0.5 * margin_; });
+  std::swap(pairs_, old_pairs_);
+  find_near(pairs_);
+  keep_touching();
   // Iterates go to and fro on a way whose candidates are all known.
   low_ = from.cwiseMin(to);
   high_ = from.cwiseMax(to);
@@ -89,9 +70,53 @@ void Contact::find_pairs(const VectorX& from, const VectorX& to) {
   bounds_.assign(pairs_.size(), {});
 }
 
+/// Pairs with obstacles, and those of edges whose `boxes_` overlap, sorted by key.
+void Contact::find_near(std::vector<ContactPair>& pairs) {
+  const std::vector<ContactPair>& fixed = surfaces_.obstacle_pairs();
+  pairs.assign(fixed.begin(), fixed.end());
+  for (const BroadPhase::Pair& found : broad_phase_.find(boxes_)) {
+    const int a = surfaces_.edges()[at(found.a)], b = surfaces_.edges()[at(found.b)];
+    if (surfaces_.may_touch(a, b)) pairs.push_back(surfaces_.pair(a, b));
+  }
+}
+
+/// Candidates sorted by key follow those with obstacles, which keep their numbers.
+std::size_t Contact::number_of(const std::vector<ContactPair>& pairs, const ContactKey& key) const {
+  const auto first = pairs.begin() + static_cast<std::ptrdiff_t>(surfaces_.obstacle_pairs().size());
+  return static_cast<std::size_t>(
+      std::lower_bound(first, pairs.end(), key, [](const ContactPair& pair, const ContactKey& k) { return pair.key < k; }) -
+      pairs.begin());
+}
+
+/// What touches is known by the key of its pair while pairs are renumbered, from `old_pairs_` to `pairs_`. What has gone
+/// out of reach within a step stays a candidate: its friction of the start still acts, and what it gives back.
+void Contact::keep_touching() {
+  const std::size_t fixed = surfaces_.obstacle_pairs().size();
+  for (const std::vector<Touching>* kept : {&lagged_, &leaving_})
+    for (const Touching& t : *kept) {
+      if (at(t.pair) < fixed) continue;
+      const ContactKey& key = old_pairs_[at(t.pair)].key;
+      const std::size_t number = number_of(pairs_, key);
+      if (number == pairs_.size() || pairs_[number].key != key)
+        pairs_.insert(pairs_.begin() + static_cast<std::ptrdiff_t>(number), surfaces_.pair(key.a, key.b));
+    }
+  for (std::vector<Touching>* kept : {&lagged_, &leaving_})
+    for (Touching& t : *kept)
+      if (at(t.pair) >= fixed) t.pair = static_cast<int>(number_of(pairs_, old_pairs_[at(t.pair)].key));
+  if (!foreseen_.empty()) {
+    next_foreseen_.assign(pairs_.size(), {});
+    for (std::size_t p = 0; p < pairs_.size(); ++p) {
+      const std::size_t number = p < fixed ? p : number_of(old_pairs_, pairs_[p].key);
+      if (number < foreseen_.size() && old_pairs_[number].key == pairs_[p].key) next_foreseen_[p] = foreseen_[number];
+    }
+    foreseen_.swap(next_foreseen_);
+  }
+  for (std::size_t p = 0; p < pairs_.size(); ++p) pairs_[p].element = element_of(pairs_[p].key);
+}
+
 int Contact::element_of(const ContactKey& key) const {
-  const auto known = std::lower_bound(elements_.begin(), elements_.end(), std::pair(key, -1));
-  return known != elements_.end() && known->first == key ? known->second : -1;
+  const auto known = std::lower_bound(elements_.begin(), elements_.end(), key);
+  return known != elements_.end() && *known == key ? static_cast<int>(known - elements_.begin()) : -1;
 }
 
 bool Contact::coupled() const {
@@ -99,25 +124,34 @@ bool Contact::coupled() const {
                      [&](const Touching& t) { return pairs_[at(t.pair)].element >= 0; });
 }
 
+/// What is near is looked for anew, for the candidates depend on when they were found: the same configuration gives the
+/// same elements, whatever was read out before.
 void Contact::couple() {
-  elements_.clear();
+  std::vector<ContactKey> keys;
+  for (const Touching& t : touching_) keys.push_back(pairs_[at(t.pair)].key);
+  std::sort(keys.begin(), keys.end());
+  boxes_.clear();
+  if (q1_.size() > 0) set_boxes(q1_, q1_, [&](int e) { return kNear * surfaces_.radius(e); });
+  std::vector<ContactPair> near;
+  find_near(near);
+  for (const ContactPair& pair : near) {
+    if (pair.key.b >= 0 && touch(pair, q1_).distance >= pair.reach() + kNear * pair.radii()) continue;
+    if (!std::binary_search(keys.begin(), keys.end(), pair.key))
+      keys.insert(std::lower_bound(keys.begin(), keys.end(), pair.key), pair.key);
+  }
+  couple(std::move(keys));
+}
+
+void Contact::couple(std::vector<ContactKey> keys) {
+  std::sort(keys.begin(), keys.end());
+  elements_ = std::move(keys);
   element_unknowns_.clear();
-  std::vector<bool> now(pairs_.size(), false);
-  for (const Touching& t : touching_) now[at(t.pair)] = true;
-  for (std::size_t p = 0; p < pairs_.size(); ++p) {
-    ContactPair& pair = pairs_[p];
-    pair.element = -1;
-    const bool near =
-        pair.key.b < 0 || now[p] ||
-        (q1_.size() > 0 && touch(static_cast<int>(p), q1_).distance < pair.reach() + kNear * pair.radii());
-    if (!near) continue;
-    pair.element = static_cast<int>(elements_.size());
-    elements_.emplace_back(pair.key, pair.element);
+  for (const ContactKey& key : elements_) {
     int dofs[kContactUnknowns];
-    unknowns_of(pair, dofs);
+    unknowns_of(key, dofs);
     element_unknowns_.insert(element_unknowns_.end(), std::begin(dofs), std::end(dofs));
   }
-  std::sort(elements_.begin(), elements_.end());
+  for (ContactPair& pair : pairs_) pair.element = element_of(pair.key);
 }
 
 double Contact::allowed(const VectorX& q1, const VectorX& change) {

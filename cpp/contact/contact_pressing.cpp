@@ -140,7 +140,8 @@ void Contact::add_leaving(std::size_t first) {
     const auto found =
         std::lower_bound(from, end, start.pair, [](const Touching& t, int pair) { return t.pair < pair; });
     if (found != end && found->pair == start.pair) continue;
-    Touching t = touch(start.pair, q1_, true);
+    Touching t = touch(pairs_[at(start.pair)], q1_, true);
+    t.pair = start.pair;
     set_force(t, record_of(pairs_[at(t.pair)].key));
     touching_.push_back(t);
   }

@@ -98,7 +98,8 @@ StokesletFluid::StokesletFluid(const Model& model)
   lower_.setZero(size);
   diagonal_.setZero(kBlockEntries * line_);
   for (VectorX* v :
-       {&position_, &right_, &solution_, &residual_, &scaled_, &search_, &image_, &past_[0], &past_[1], &wave_, &kept_})
+       {&position_, &right_, &memory_.solution, &residual_, &scaled_, &search_, &image_, &memory_.past[0],
+        &memory_.past[1], &memory_.wave, &kept_})
     v->setZero(3 * line_);
   for (Chunk& chunk : chunks_) {
     const auto n = static_cast<Eigen::Index>(3 * chunk.nodes.size());
@@ -108,11 +109,25 @@ StokesletFluid::StokesletFluid(const Model& model)
 }
 
 void StokesletFluid::forget() {
-  known_ = 0;
-  factorized_ = false;
-  waited_ = 0;
-  excess_ = 1.0;
-  wave_.setZero();
+  memory_.known = 0;
+  memory_.factorized_at.resize(0);
+  memory_.waited = 0;
+  memory_.excess = 1.0;
+  memory_.wave.setZero();
+}
+
+void StokesletFluid::recall(const Memory& memory) {
+  for (const VectorX* v : {&memory.solution, &memory.past[0], &memory.past[1], &memory.wave})
+    require(v->size() == 3 * line_ && v->allFinite(), "memory of a fluid must be that of the same scene");
+  require(memory.factorized_at.size() == 0 || memory.factorized_at.size() == model_.dof_count,
+          "memory of a fluid must be that of the same scene");
+  require(memory.known >= 0 && memory.known <= 3, "memory of a fluid must have up to three solutions");
+  if (memory.factorized_at.size() > 0) {
+    place(memory.factorized_at);
+    assemble();
+    factorize(memory.factorized_at);
+  }
+  memory_ = memory;
 }
 
 double* StokesletFluid::row(int node, int entry) {
@@ -173,7 +188,8 @@ void StokesletFluid::assemble() {
   for (int i = 0; i < model_.node_count; ++i) add_row(i);
 }
 
-bool StokesletFluid::factorize() {
+/// Parts of A at q, where it has been assembled.
+bool StokesletFluid::factorize(const VectorX& q) {
   for (Chunk& chunk : chunks_) {
     const auto n = static_cast<int>(chunk.nodes.size());
     for (int b = 0; b < n; ++b)
@@ -187,7 +203,7 @@ bool StokesletFluid::factorize() {
     chunk.factor.compute(chunk.matrix);
     if (chunk.factor.info() != Eigen::Success) return false;
   }
-  factorized_ = true;
+  memory_.factorized_at = q;
   return true;
 }
 
@@ -204,16 +220,16 @@ void StokesletFluid::precondition(const VectorX& from, VectorX& to) {
 
 /// Sets out from the parabola through the last three solutions, or what there is of it.
 void StokesletFluid::guess() {
-  image_ = solution_;
-  if (known_ == 0)
-    solution_.setZero();
-  else if (known_ == 2)
-    solution_ = 2.0 * image_ - past_[0];
-  else if (known_ == 3)
-    solution_ = 3.0 * (image_ - past_[0]) + past_[1];
-  if (known_ >= 2) past_[1].swap(past_[0]);
-  if (known_ >= 1) past_[0].swap(image_);
-  known_ = std::min(known_ + 1, 3);
+  image_ = memory_.solution;
+  if (memory_.known == 0)
+    memory_.solution.setZero();
+  else if (memory_.known == 2)
+    memory_.solution = 2.0 * image_ - memory_.past[0];
+  else if (memory_.known == 3)
+    memory_.solution = 3.0 * (image_ - memory_.past[0]) + memory_.past[1];
+  if (memory_.known >= 2) memory_.past[1].swap(memory_.past[0]);
+  if (memory_.known >= 1) memory_.past[0].swap(image_);
+  memory_.known = std::min(memory_.known + 1, 3);
 }
 
 /// Conjugate gradients.
@@ -221,22 +237,22 @@ bool StokesletFluid::iterate(double tolerance) {
   const BlockMatrix matrix{model_.node_count, line_, lower_.data(), diagonal_.data()};
   const auto multiply = [&](const VectorX& x, VectorX& y) { stokeslet_kernels().multiply(matrix, x.data(), y.data()); };
   const double wanted = tolerance * right_.norm();
-  multiply(solution_, residual_);
+  multiply(memory_.solution, residual_);
   residual_ = right_ - residual_;
   double before = 0.0;
-  for (iterations_ = 0; iterations_ < kMostIterations; ++iterations_) {
+  for (memory_.iterations = 0; memory_.iterations < kMostIterations; ++memory_.iterations) {
     if (residual_.norm() <= wanted) return true;
     precondition(residual_, scaled_);
     const double now = residual_.dot(scaled_);
     if (!std::isfinite(now)) return false;
-    if (iterations_ == 0)
+    if (memory_.iterations == 0)
       search_ = scaled_;
     else
       search_ = scaled_ + (now / before) * search_;
     before = now;
     multiply(search_, image_);
     const double step = now / search_.dot(image_);
-    solution_ += step * search_;
+    memory_.solution += step * search_;
     residual_ -= step * image_;
   }
   return false;
@@ -248,14 +264,14 @@ bool StokesletFluid::solve(const VectorX& q, const VectorX& velocity, VectorX& f
   for (int i = 0; i < model_.node_count; ++i)
     for (int k = 0; k < model_.dimension; ++k) right_[k * line_ + i] = velocity[model_.node_dof[at(i)] + k];
   // An old factorisation serves until it has become half as slow again as it was.
-  const bool fresh = !factorized_ || iterations_ > fresh_iterations_ + std::max(3, fresh_iterations_ / 2);
-  if (fresh && !factorize()) {
+  const bool fresh = memory_.factorized_at.size() == 0 || memory_.iterations > memory_.fresh_iterations + std::max(3, memory_.fresh_iterations / 2);
+  if (fresh && !factorize(q)) {
     forget();
     return false;
   }
   guess();
   const bool found = iterate(kTolerance);
-  if (fresh) fresh_iterations_ = iterations_;
+  if (fresh) memory_.fresh_iterations = memory_.iterations;
   if (!found) {
     forget();
     return false;
@@ -263,7 +279,7 @@ bool StokesletFluid::solve(const VectorX& q, const VectorX& velocity, VectorX& f
   force.setZero(velocity.size());
   for (int i = 0; i < model_.node_count; ++i)
     for (int k = 0; k < model_.dimension; ++k)
-      force[model_.node_dof[at(i)] + k] = -8.0 * std::numbers::pi * solution_[k * line_ + i];
+      force[model_.node_dof[at(i)] + k] = -8.0 * std::numbers::pi * memory_.solution[k * line_ + i];
   return true;
 }
 
@@ -304,39 +320,39 @@ void StokesletFluid::solve_held(VectorX& x) {
 
 /// One power iteration; resistance of the motion that it finds over what local drag and inertia do.
 double StokesletFluid::sharpen_wave() {
-  right_ = wave_;
-  solution_.setZero();
+  right_ = memory_.wave;
+  memory_.solution.setZero();
   if (!iterate(kRough)) return 1.0;
-  multiply_held(wave_, image_);
-  const double ratio = 8.0 * std::numbers::pi * wave_.dot(solution_) / wave_.dot(image_);
-  wave_ = solution_;
-  solve_held(wave_);
-  wave_ /= wave_.norm();
+  multiply_held(memory_.wave, image_);
+  const double ratio = 8.0 * std::numbers::pi * memory_.wave.dot(memory_.solution) / memory_.wave.dot(image_);
+  memory_.wave = memory_.solution;
+  solve_held(memory_.wave);
+  memory_.wave /= memory_.wave.norm();
   return ratio;
 }
 
 double StokesletFluid::excess(const VectorX& inertia, double limit) {
-  if (waited_ > 0) {
-    --waited_;
-    return excess_;
+  if (memory_.waited > 0) {
+    --memory_.waited;
+    return memory_.excess;
   }
-  const bool first = wave_.isZero(0.0);
+  const bool first = memory_.wave.isZero(0.0);
   if (first)
     for (int k = 0; k < model_.dimension; ++k)
-      for (int i = 0; i < model_.node_count; ++i) wave_[k * line_ + i] = std::sin(1.0 + 7.0 * i + 2.0 * k) + (i % 2);
+      for (int i = 0; i < model_.node_count; ++i) memory_.wave[k * line_ + i] = std::sin(1.0 + 7.0 * i + 2.0 * k) + (i % 2);
   held_ = node_drag_ + inertia;
-  kept_.swap(solution_);
-  const int iterations = iterations_;
+  kept_.swap(memory_.solution);
+  const int iterations = memory_.iterations;
   double ratio = 0.0;
   for (int i = 0; i < (first ? 12 : 2); ++i) ratio = sharpen_wave();
-  kept_.swap(solution_);
-  iterations_ = iterations;
+  kept_.swap(memory_.solution);
+  memory_.iterations = iterations;
   // R <= ratio (D + M) is to be <= limit (excess D + M). An iteration comes from below.
   const double wanted = 1.05 * ratio, share = inertia.cwiseQuotient(node_drag_).maxCoeff();
   const double needed = (wanted + std::max(wanted - limit, 0.0) * share) / limit;
-  excess_ = needed <= 1.0 ? 1.0 : std::exp2(0.5 * std::ceil(2.0 * std::log2(needed)));
-  waited_ = kWait;
-  return excess_;
+  memory_.excess = needed <= 1.0 ? 1.0 : std::exp2(0.5 * std::ceil(2.0 * std::log2(needed)));
+  memory_.waited = kWait;
+  return memory_.excess;
 }
 
 Eigen::MatrixXd StokesletFluid::mobility(const VectorX& q) {

@@ -41,10 +41,23 @@ class StokesletFluid {
   void set_local_drag(double viscosity, MassMatrix& drag) const;
   /// A at q, three rows a node [1 / m]: 8 pi mu times velocity per force.
   Eigen::MatrixXd mobility(const VectorX& q);
+  /// What solutions leave for those to come: the last ones, to set out from, and where the parts of A were factorised.
+  struct Memory {
+    VectorX solution, past[2];  ///< the last one, and those before
+    int known = 0;              ///< how many there are
+    VectorX factorized_at;      ///< empty: not yet
+    int iterations = 0, fresh_iterations = 0;
+    VectorX wave;  ///< the motion that is resisted most compared with local drag and inertia
+    double excess = 1.0;
+    int waited = 0;
+  };
+  const Memory& memory() const { return memory_; }
+  /// Goes on from there, with the same bits.
+  void recall(const Memory& memory);
   /// As it was before its first solution.
   void forget();
   /// Of the last solution.
-  int iterations() const { return iterations_; }
+  int iterations() const { return memory_.iterations; }
 
  private:
   /// Nodes next to each other, whose own mobility is factorised.
@@ -58,7 +71,7 @@ class StokesletFluid {
   void assemble();
   void add_row(int node);
   double* row(int node, int entry);
-  bool factorize();
+  bool factorize(const VectorX& q);
   void precondition(const VectorX& from, VectorX& to);
   void guess();
   bool iterate(double tolerance);
@@ -78,16 +91,11 @@ class StokesletFluid {
   VectorX lower_, diagonal_;
   std::vector<std::ptrdiff_t> row_start_;
   std::vector<Chunk> chunks_;
-  VectorX position_, right_, solution_, residual_, scaled_, search_, image_;
-  VectorX past_[2];  ///< solutions before the last
-  int known_ = 0;    ///< how many there are
-  bool factorized_ = false;
-  int iterations_ = 0, fresh_iterations_ = 0;
+  VectorX position_, right_, residual_, scaled_, search_, image_;
   VectorX node_drag_, edge_drag_;  ///< the local drag for unit viscosity: of nodes, and between them [m]
   VectorX held_;                   ///< per node, local drag and inertia [m]
-  VectorX wave_, kept_;            ///< the motion that is resisted most compared with these
-  double excess_ = 1.0;
-  int waited_ = 0;
+  VectorX kept_;
+  Memory memory_;
 };
 
 }  // namespace withe

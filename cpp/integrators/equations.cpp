@@ -1,7 +1,9 @@
 #include "integrators/equations.hpp"
 
+#include <algorithm>
 #include <cmath>
 
+#include "common/check.hpp"
 #include "geometry/rotation.hpp"
 
 namespace withe {
@@ -50,6 +52,7 @@ Equations::Equations(const Model& model, const Options& options)
       static_duration_(options.time_step) {
   if (contact_) {
     assembler_.couple(contact_->element_unknowns(), kContactUnknowns);
+    ordered_ = contact_->elements();
     if (contact_->frictional()) has_potential_ = false;
   }
   custom_force = VectorX::Zero(model.dof_count);
@@ -103,7 +106,60 @@ void Equations::begin(const State& state, const Parameters& parameters, double h
 
 void Equations::forget_contacts() {
   contact_->forget();
-  assembler_.forget_contacts(contact_->element_unknowns(), kContactUnknowns);
+  order_for_contacts();
+}
+
+/// Finds an order of elimination for the contacts that are coupled now, and no others.
+void Equations::order_for_contacts() {
+  assembler_.order_for(contact_->element_unknowns(), kContactUnknowns);
+  ordered_ = contact_->elements();
+}
+
+EquationsMemory Equations::memory(bool with_matrix) const {
+  EquationsMemory out;
+  remember(out, with_matrix);
+  return out;
+}
+
+void Equations::pass_mark() {
+  if (mark_ != Mark::set) return;
+  remember(at_mark_, true);
+  mark_ = Mark::passed;
+}
+
+/// Without allocation where `out` has had the sizes before.
+void Equations::remember(EquationsMemory& out, bool with_matrix) const {
+  if (contact_) {
+    out.ordered = ordered_;
+    out.coupled = contact_->elements();
+  }
+  if (with_matrix) {
+    const std::span<const double> values = assembler_.solver().values();
+    out.matrix.assign(values.begin(), values.end());
+  }
+  if (fluid_) {
+    out.flow_excess = flow_excess_;
+    out.fluid = fluid_->memory();
+  }
+}
+
+void Equations::recall(const EquationsMemory& memory) {
+  if (contact_) {
+    contact_->couple(memory.ordered);
+    if (memory.ordered != ordered_) order_for_contacts();
+    contact_->couple(memory.coupled);
+    assembler_.couple(contact_->element_unknowns(), kContactUnknowns);
+  }
+  if (!memory.matrix.empty()) {
+    const std::span<double> values = assembler_.solver().values();
+    require(memory.matrix.size() == values.size(), "a matrix of another scene");
+    std::copy(memory.matrix.begin(), memory.matrix.end(), values.begin());
+  }
+  if (fluid_) {
+    flow_excess_ = memory.flow_excess;
+    flow_version_ = -1;
+    fluid_->recall(memory.fluid);
+  }
 }
 
 void Equations::set_contact_end(const VectorX& z) {
@@ -115,7 +171,9 @@ void Equations::find_contacts(const VectorX& z, bool with_matrix) {
   contact_->update(contact_end_);
   if (!with_matrix || contact_->coupled()) return;
   contact_->couple();
+  const int before = assembler_.generation();
   assembler_.couple(contact_->element_unknowns(), kContactUnknowns);
+  if (assembler_.generation() != before) ordered_ = contact_->elements();
 }
 
 /// Contact acts at the end of the step: its forces are those there, and its matrix counts twice where z is the middle.
@@ -164,6 +222,7 @@ void Equations::evaluate(const VectorX& z, bool with_matrix, const double* axial
   gradient_.setZero(model_.dof_count + kPadding);
   magnitude_.setZero(model_.dof_count + kPadding);
   last_z_ = z;
+  if (with_matrix) pass_mark();
   if (contact_) find_contacts(z, with_matrix);
   const std::span<double> values = assembler_.solver().values();
   if (with_matrix) std::fill(values.begin(), values.end(), 0.0);

@@ -37,6 +37,15 @@ struct Evaluation {
 /// What z is of the step from q0 to q1.
 enum class Inner { end, middle };
 
+/// What solves leave for those to come.
+struct EquationsMemory {
+  /// Contacts whose unknowns the order of elimination was found for, and those in the matrix; sorted.
+  std::vector<ContactKey> ordered, coupled;
+  std::vector<double> matrix;  ///< whose factorisation is in use; empty: none
+  double flow_excess = 0;
+  StokesletFluid::Memory fluid;
+};
+
 class Equations {
  public:
   Equations(const Model& model, const Options& options);
@@ -54,6 +63,7 @@ class Equations {
 
   /// Nothing where nothing can touch.
   Contact* contact() { return contact_.get(); }
+  const Contact* contact() const { return contact_.get(); }
   void forget_contacts();
   /// How much of a step of z contact allows, from 0 to 1.
   double allowed(const VectorX& z, const VectorX& step);
@@ -75,8 +85,17 @@ class Equations {
   bool begin_flow(const VectorX& q, const VectorX& v);
   /// By which the local drag of the last step was greater than that of single rods; 0: not known.
   double flow_excess() const { return flow_excess_; }
-  /// What earlier solutions left behind.
+  /// Without what earlier solutions of the flow left behind.
   void forget_flow();
+  /// What solves left for those to come; the matrix where its factorisation may serve again.
+  EquationsMemory memory(bool with_matrix) const;
+  /// Goes on from there, but for the factorisation.
+  void recall(const EquationsMemory& memory);
+  /// From here on what would be lost of that is kept, until the next mark: copied once, when it is about to change.
+  void mark() { mark_ = Mark::set; }
+  bool marked() const { return mark_ != Mark::none; }
+  /// What it was at the mark; nothing where it has not changed since.
+  const EquationsMemory* since_mark() const { return mark_ == Mark::passed ? &at_mark_ : nullptr; }
 
   /// Residual at z, and the matrix when asked for. `axial_force`: see stretch_hessian.
   void evaluate(const VectorX& z, bool with_matrix, const double* axial_force, Evaluation& out);
@@ -127,6 +146,9 @@ class Equations {
   void add_resistance(const VectorX& z, bool with_matrix);
   void resistive_local_at(int edge, const VectorX& z, bool with_hessian, Local& local) const;
   double flow_loss(const VectorX& change) const;
+  void order_for_contacts();
+  void remember(EquationsMemory& out, bool with_matrix) const;
+  void pass_mark();
   void find_contacts(const VectorX& z, bool with_matrix);
   void add_contacts(bool with_matrix, Evaluation& out);
   void add_elastic(const ElasticCoefficients& k, const VectorX& z, bool with_matrix, const double* axial_force,
@@ -154,6 +176,10 @@ class Equations {
   bool has_potential_ = true;
   std::vector<std::string> asymmetries_;
   Assembler assembler_;
+  enum class Mark { none, set, passed };
+  Mark mark_ = Mark::none;
+  EquationsMemory at_mark_;
+  std::vector<ContactKey> ordered_;  ///< contacts for which the assembler has found its order of elimination
   double static_duration_ = 0;  ///< in which slip happens in statics [s]
   Inner inner_ = Inner::end;
   const State* state_ = nullptr;

@@ -21,6 +21,7 @@ std::size_t at(int i) { return static_cast<std::size_t>(i); }
 }  // namespace
 
 bool Equations::begin_flow(const VectorX& q, const VectorX& v) {
+  pass_mark();
   if (!fluid_->solve(q, v, flow_start_)) return false;
   const double viscosity = parameters_->fluid_viscosity, duration = inner_ == Inner::middle ? 2.0 * h_ : h_;
   flow_inertia_ = parameters_->node_mass / (viscosity * duration);

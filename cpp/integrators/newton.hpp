@@ -47,17 +47,21 @@ struct StartRecord {
   }
 };
 
-/// What the factorisation in a solver belongs to, and how well old ones have served.
-struct FactorRecord {
-  const Equations* owner = nullptr;                     ///< nothing: not to be used again
-  double interval = 0;                                  ///< [s]
-  int generation = 0;                                   ///< of the solver
+/// How well factorisations and initial guesses have served.
+struct NewtonHistory {
+  double interval = 0;                                  ///< that a factorisation belongs to [s]
   std::array<double, 3> contraction{1e-2, 1e-2, 1e-2};  ///< per MatrixAge: error after an iteration over error before
   int waited = 0;                                       ///< time steps since one was last tried across
   bool tired = false;                                   ///< served the last time step slowly
   int plain_solves = 0;                                 ///< still to come before the mixed method is tried again
   std::array<StartRecord, 5> starts{};                  ///< per start of find_inner
   StartRecord cut;                                      ///< of those whose first step is cut
+};
+
+/// What the factorisation in a solver belongs to, and that history.
+struct FactorRecord : NewtonHistory {
+  const Equations* owner = nullptr;  ///< nothing: not to be used again
+  int generation = 0;                ///< of the solver
 };
 
 /// Scratch of the solver; owned by the world, so that a step does not allocate.

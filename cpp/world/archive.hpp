@@ -5,6 +5,7 @@
 #include <cstring>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "common/check.hpp"
 #include "common/types.hpp"
@@ -26,6 +27,10 @@ class Writer {
     (*this)(static_cast<std::int64_t>(m.rows()));
     (*this)(static_cast<std::int64_t>(m.cols()));
     raw(m.data(), static_cast<std::size_t>(m.size()) * sizeof(double));
+  }
+  void operator()(const std::vector<double>& numbers) {
+    (*this)(static_cast<std::int64_t>(numbers.size()));
+    raw(numbers.data(), numbers.size() * sizeof(double));
   }
 };
 
@@ -57,6 +62,14 @@ class Reader {
     (*this)(columns);
     require(rows == m.rows() && columns == m.cols(), "snapshot belongs to another scene: sizes differ");
     raw(m.data(), static_cast<std::size_t>(m.size()) * sizeof(double));
+  }
+  void operator()(std::vector<double>& numbers) {
+    std::int64_t count = 0;
+    (*this)(count);
+    require(count >= 0 && static_cast<std::size_t>(count) <= (bytes_.size() - position_) / sizeof(double),
+            "snapshot is damaged: it ends too early");
+    numbers.resize(static_cast<std::size_t>(count));
+    raw(numbers.data(), numbers.size() * sizeof(double));
   }
   void expect_end() const { require(position_ == bytes_.size(), "snapshot is damaged: it is too long"); }
 

@@ -75,58 +75,21 @@ World::Implementation::Implementation(SceneDescription scene, Options choice)
 }
 
 World::Implementation::Implementation(const Implementation& other)
-    : description(other.description),
+    : Running(other),
+      description(other.description),
       options(other.options),
       model(other.model),
-      parameters(other.parameters),
-      work(other.work),
-      predictor(other.predictor),
-      state(other.state),
       plan(other.plan),
       statistics(other.statistics),
-      motions(other.motions),
-      obstacle_motions(other.obstacle_motions),
-      ramps(other.ramps),
-      load_values(other.load_values),
-      custom_force(other.custom_force),
       separated(other.separated),
       spatial(other.spatial),
-      level(other.level),
-      easy_steps(other.easy_steps),
-      patience(other.patience),
-      grown(other.grown),
-      guard(other.guard),
-      contact_guard(other.contact_guard),
-      error_rate(other.error_rate),
-      grid_origin(other.grid_origin),
-      grid_steps(other.grid_steps),
-      support_work(other.support_work),
-      actuation_work(other.actuation_work),
-      dissipated(other.dissipated),
-      load_work(other.load_work),
-      alarm(other.alarm),
       warning(other.warning),
-      step_watch(other.step_watch),
-      step_warning(other.step_warning),
-      reaction_residual(other.reaction_residual),
-      reaction_current(other.reaction_current) {
+      step_warning(other.step_warning) {
+  work.newton.counters = other.work.newton.counters;
   listen();
   newton = std::make_unique<Newton>(model, options);
   equations = std::make_unique<Equations>(model, options);
   equations->loads().values = load_values;
-  forget_matrix();
-}
-
-/// Candidates and the order of elimination follow from the past: who goes on from here with none has the same bits.
-void World::Implementation::forget_contacts() {
-  for (Equations* system : {equations.get(), rescue_equations.get(), static_equations.get()})
-    if (system && system->contact()) system->forget_contacts();
-}
-
-void World::Implementation::forget_matrix() {
-  work.newton.factor = FactorRecord{};
-  for (Equations* system : {equations.get(), rescue_equations.get(), static_equations.get()})
-    if (system) system->forget_flow();
 }
 
 void World::Implementation::listen() {
@@ -195,7 +158,7 @@ void World::Implementation::rebuild(Rebuild why) {
       kept.state = transferred(old, kept.state);
       kept.predictor.clear();
     } else {
-      kept = StepStart{};
+      kept = Moving{};
     }
     // Frames that come and go carry inertia, and a support may change where the mass of edges sits.
     EnergyScratch& scratch = energy_scratch;

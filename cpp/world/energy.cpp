@@ -124,8 +124,7 @@ Energy World::Implementation::rod_energy(int rod) const {
 }
 
 /// Plain midpoint pumps energy into stretching when edges turn far within a step, and backward Euler gains where it
-/// should lose, from edges under pressure that give way: whether the step just taken, from where `keep_for_return` was
-/// called, did.
+/// should lose, from edges under pressure that give way: whether the step just taken, that started from `kept`, did.
 bool World::Implementation::gains_energy() {
   // Where edges hardly turn, bending gains nothing, and stretching what the step has found. Backward Euler forgets what
   // it gains, so only much counts.
@@ -158,7 +157,7 @@ bool World::Implementation::gains_energy() {
 }
 
 /// Where surfaces slide over each other's edges by much within a step, the forces at its end may push more than those
-/// on the way would have. Whether the step just taken, from where `keep_for_return` was called, gained by that more
+/// on the way would have. Whether the step just taken, that started from `kept`, gained by that more
 /// than half of what is left of a share of the greatest energy; losses make room, and so does time, and a little of
 /// what friction and drag take.
 bool World::Implementation::contact_pumps(double dt) {

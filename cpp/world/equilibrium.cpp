@@ -55,9 +55,9 @@ void World::Implementation::rest() {
 
 /// Equilibrium after `dt` (0: at the present time, with supports and actuation as they are).
 EquilibriumResult World::Implementation::equilibrium(double dt) {
-  const State before = state;
-  const std::vector<SupportMotion> motions_before = motions;
-  const double time = state.time + dt, work_before = actuation_work;
+  const Moving before = *this;
+  const Lagged lagged_before = lagged();
+  const double time = state.time + dt;
   if (actuated()) {
     actuation_work -= actuation_energy();
     apply_ramps(time);
@@ -68,13 +68,12 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
   update_custom_force(system);
   const auto undo = [&] {
     release_obstacles(system);
-    state = before;
-    motions = motions_before;
-    actuation_work = work_before;
+    static_cast<Moving&>(*this) = before;
     apply_ramps(state.time);
     system.loads().values = load_values;
+    recall(lagged_before);  // and no more of `system`, which this may drop
   };
-  std::vector<SupportMotion> from = motions_before;
+  std::vector<SupportMotion> from = before.motions;
   const std::vector<SupportMotion> target = motions;
   const Boundary boundary = [&](double fraction, VectorX& q) {
     for (std::size_t s = 0; s < motions.size(); ++s) put_between(from[s], target[s], fraction, motions[s]);
@@ -115,6 +114,7 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
   state.time = time;
   retire_ramps();
   statistics.steps += 1;
+  steps_taken += 1;
   system.begin(state, parameters, 0.0, false);
   system.evaluate(state.q, false, nullptr, work.newton.evaluation);
   reaction_residual = work.newton.evaluation.full_residual;
@@ -143,8 +143,8 @@ EquilibriumPath World::equilibrium_path(const PathOptions& wanted) {
       values[i] = factor * full[i];
     }
   };
-  const State before = self.state;
-  const std::vector<SupportMotion> motions_before = self.motions;
+  const Moving before = self;
+  const Lagged lagged_before = self.lagged();
   EquilibriumPath out;
   ArcResult r;
   const auto set_loads = [&](const std::vector<Vector3>& values) {
@@ -198,9 +198,9 @@ EquilibriumPath World::equilibrium_path(const PathOptions& wanted) {
       m.start = m.end = self.state.time;
     }
   } catch (...) {
-    self.state = before;
-    self.motions = motions_before;
+    static_cast<Moving&>(self) = before;
     set_loads(full);
+    self.recall(lagged_before);
     throw;
   }
   std::vector<Vector3> values = full;

@@ -2,95 +2,11 @@
 /// What World is made of; private to this room.
 
 #include <atomic>
-#include <cstdint>
-#include <limits>
 
-#include "integrators/dynamics.hpp"
 #include "integrators/statics.hpp"
-#include "world/world.hpp"
+#include "world/running.hpp"
 
 namespace withe {
-
-/// Where a support is, and where it is going.
-struct SupportMotion {
-  Vector3 position = Vector3::Zero();      ///< now [m]
-  Matrix3 rotation = Matrix3::Identity();  ///< now, from the drawn orientation
-  Vector3 from_position = Vector3::Zero(), to_position = Vector3::Zero();
-  Matrix3 from_rotation = Matrix3::Identity(), to_rotation = Matrix3::Identity();
-  double start = 0, end = 0;  ///< of the ramp [s]
-  double stretch = 1;         ///< of a held edge: its length when it was gripped, over the drawn one
-};
-
-/// How far something has come that goes evenly from a start to an end, at a time; from 0 to 1.
-double ramp_fraction(double time, double start, double end);
-
-/// Where an obstacle goes, as a way from where it is drawn.
-struct ObstacleMotion {
-  Vector3 from = Vector3::Zero(), to = Vector3::Zero();  ///< [m]
-  double start = 0, end = 0;                             ///< [s]
-};
-
-/// What goes evenly from one value to another.
-template <class Value>
-struct Ramp {
-  Value from, to;
-  double start = 0, end = 0;  ///< [s]
-  bool active = false;
-
-  /// Sets what is on its way to where it is at a time; false where it is not.
-  bool apply(double time, Value& now) const {
-    if (!active) return false;
-    const double s = ramp_fraction(time, start, end);
-    now.noalias() = (1.0 - s) * from + s * to;
-    return true;
-  }
-
-  /// At rest from the end on.
-  void retire(double time) {
-    if (time >= end) active = false;
-  }
-};
-
-/// Natural shape of a rod: curvature [1/m] and twist [rad/m] of its stencils.
-struct NaturalRamp {
-  Ramp<MatrixX2> curvature;
-  Ramp<VectorX> twist;
-};
-
-/// Books of the watch over plain midpoint's energy.
-struct EnergyGuard {
-  double turn = std::numeric_limits<double>::infinity();  ///< of the last step [rad]; before the first, not known
-  double scale = 0;                                       ///< [J]
-  double excess = 0;                                      ///< out of nowhere so far [J]
-  double stretch_gain = 0;                                ///< of the last step, into stretching [J]
-  int rescue = 0;                                         ///< energy-momentum steps still to take in its place
-  std::optional<Energy> energy;                           ///< at the present state, where a step has just found it
-};
-
-/// Books of the watch over what contact puts in where surfaces slide by much within a step.
-struct ContactGuard {
-  double scale = 0;   ///< greatest energy so far, as it was looked at [J]
-  double excess = 0;  ///< put in and not lost since, as far as it is not long ago [J]
-  double put_in = 0;  ///< in the last step, by surfaces that press [J]
-};
-
-/// Sums over a few steps in a row, of squares of velocities weighed by mass; see step_length.cpp.
-struct StepWatch {
-  double change = 0;    ///< by how much they change within a step [J]
-  double motion = 0;    ///< what that is compared with [J]
-  double greatest = 0;  ///< of such sums so far [J]
-  // Under backward Euler:
-  double pull = 0, moved = 0;  ///< by how much forces change with the motion, over the step; the motion [J]
-  VectorX acceleration;        ///< in the step before
-};
-
-/// What a step that is taken back returns to.
-struct StepStart {
-  State state;
-  Predictor predictor;
-  std::vector<SupportMotion> motions;
-  double support_work = 0, actuation_work = 0, dissipated = 0, load_work = 0;
-};
 
 /// Scratch for energies.
 struct EnergyScratch {
@@ -99,62 +15,54 @@ struct EnergyScratch {
   MassMatrix mass;
 };
 
-/// Easy steps before longer ones are tried, at least.
-inline constexpr int kLeastPatience = 4;
-
 /// Why a model is built: at first, because supports changed or the plane was left, or to take a snapshot's state.
 enum class Rebuild { first, running, restored };
 
-struct World::Implementation {
+struct World::Implementation : Running {
   Implementation(SceneDescription description, Options options);
+  /// The same scene at the same point, without what `lagged` knows: see `recall`.
   Implementation(const Implementation& other);
 
   SceneDescription description;
   Options options;
   Model model;
-  Parameters parameters;
   std::unique_ptr<Newton> newton;
   std::unique_ptr<Equations> equations;
   std::unique_ptr<Equations> rescue_equations;  ///< energy-momentum ones, made when plain midpoint gains energy
   std::unique_ptr<Equations> static_equations;  ///< symmetric ones, made when first needed
   StepWorkspace work;
   mutable EnergyScratch energy_scratch;
-  Predictor predictor;
-  StepStart kept;
+  FactorRecord marked_factor;
+  StepControl marked_control;
+  Moving kept;                                             ///< at the start of a step that may be taken back
   std::vector<SupportMotion> motions_before, kept_motions;  ///< at the start of a time step, of a part of it
-  State state;
   Plan plan;
   Statistics statistics;
-  std::vector<SupportMotion> motions;
-  std::vector<ObstacleMotion> obstacle_motions;  ///< none until one moves
-  std::vector<NaturalRamp> ramps;
-  std::vector<Vector3> load_values;
-  MatrixX3 custom_force;        ///< of the last step [N]
   VectorX custom_force_before;  ///< per unknown, at the start of an explicit step
   World::ForceFunction force_function;
   std::function<void(double, double)> callback;  ///< StepCallback, bound to its world
   std::function<void()> poll;
   std::atomic<bool> interrupted{false};
-  double separated = 0;           ///< how far overlapping rods were moved before the start [m]
-  bool spatial = false;           ///< left its plane while running
-  int level = 0;                  ///< present halvings of the time step, in `notches()` to each
-  int easy_steps = 0;             ///< since it changed
-  int patience = kLeastPatience;  ///< of them before longer steps are tried
-  bool grown = false;             ///< fewer easy steps than the least patience ago
-  EnergyGuard guard;
-  ContactGuard contact_guard;
-  double error_rate = 0;   ///< greatest estimated error of the last steps over the power of the step that it goes with
-  double grid_origin = 0;  ///< time = grid_origin + grid_steps time_step after whole steps, free of summed rounding
-  std::int64_t grid_steps = 0;
-  double support_work = 0, actuation_work = 0, dissipated = 0, load_work = 0;
-  std::optional<Energy> alarm;  ///< energies at the start, for the explicit scheme's alarm
+  double separated = 0;  ///< how far overlapping rods were moved before the start [m]
+  bool spatial = false;  ///< left its plane while running
   /// Of a mesh too coarse for the motion, and empty once it was heard; none yet where there was no reason.
   std::optional<std::string> warning;
-  StepWatch step_watch;
   std::optional<std::string> step_warning;  ///< likewise, of steps too long for the motion
   NewtonResult last_newton;
-  VectorX reaction_residual;  ///< full residual of the last solve
-  bool reaction_current = false;
+
+  // lagged.cpp
+  Lagged lagged();
+  void recall(const Lagged& lagged);
+  Equations* system(System which);
+  void factorize_again(System owner);
+  /// From here on a step may end without a trace; `return_to_mark` then makes it so.
+  void mark();
+  void return_to_mark();
+  /// Callbacks, which belong to who runs the scene.
+  void take_callbacks(const Implementation& other);
+  /// Matrices of earlier steps.
+  void forget_matrix();
+  void forget_contacts();
 
   // building.cpp
   /// Lets interruptions reach the solver.
@@ -217,7 +125,6 @@ struct World::Implementation {
   double local_order() const;
   bool may_grow(double dt, double times) const;
   Attempt try_step(double dt);
-  void keep_for_return();
   void take_back();
   void commit_step();
   void return_to_start();
@@ -230,9 +137,6 @@ struct World::Implementation {
   StepResult step_by_rule(double dt, int slot);
   void keep_reactions();
   void check_reversible(const Parameters& p) const;
-  /// Matrices of earlier steps.
-  void forget_matrix();
-  void forget_contacts();
 
   // failure.cpp
   struct Place {

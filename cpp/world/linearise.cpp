@@ -164,25 +164,22 @@ class StrainParts {
 }  // namespace
 
 Linearisation World::linearise() const {
-  Implementation& self = *implementation_;
+  const Implementation& self = *implementation_;
   const Model& model = self.model;
-  Equations& system = self.statics();
+  // Equations of its own: what is read out changes no matrix that is yet to serve.
+  Options symmetric = self.options;
+  symmetric.integrator = Integrator::statics;
+  Equations system(model, symmetric);
+  system.loads().values = self.load_values;
   self.update_custom_force(system);
   system.begin(self.state, self.parameters, 0.0, false);
-  Evaluation& evaluation = self.work.newton.evaluation;
+  Evaluation evaluation;
   system.evaluate(self.state.q, false, nullptr, evaluation);
-  self.reaction_current = false;
 
   const SparseMatrix basis = free_basis(model), back = basis.transpose();
   const StrainParts parts(system, self.state);
-  const ElasticCoefficients whole = std::exchange(system.elastic, parts.without());
-  try {
-    system.evaluate(self.state.q, true, nullptr, evaluation);
-  } catch (...) {
-    system.elastic = whole;
-    throw;
-  }
-  system.elastic = whole;
+  system.elastic = parts.without();
+  system.evaluate(self.state.q, true, nullptr, evaluation);
 
   Linearisation out;
   out.geometric = back * matrix_of(system.assembler()) * basis;

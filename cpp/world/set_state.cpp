@@ -41,8 +41,8 @@ void World::set_state(const std::vector<RodState>& rods, std::optional<double> t
   require(!time || std::isfinite(*time), "time must be finite");
   // On a copy, so that what is refused changes nothing.
   auto fresh = std::make_unique<Implementation>(*implementation_);
-  fresh->callback = implementation_->callback;
-  fresh->poll = implementation_->poll;
+  fresh->recall(implementation_->lagged());
+  fresh->take_callbacks(*implementation_);
   for (const RodState& rod : rods)
     if (fresh->model.planar() && fresh->leaves_plane(rod)) {
       fresh->leave_plane("a state of rod '" + fresh->description.rods[at(rod.rod)].name + "'");
@@ -188,6 +188,7 @@ void World::Implementation::place_rods(const std::vector<RodState>& rods) {
     check_overlap();
   }
   forget_motion();
+  forget_matrix();
 }
 
 /// Frames that edges are attached to turn with them, as far as nothing holds them.

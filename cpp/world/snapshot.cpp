@@ -7,7 +7,7 @@
 namespace withe {
 namespace {
 
-constexpr std::uint64_t kMagic = 0x3853454854495755ull;
+constexpr std::uint64_t kMagic = 0x3953454854495755ull;
 
 /// FNV-1a.
 std::uint64_t hash_of(std::string_view bytes) {
@@ -90,24 +90,46 @@ void exchange_contacts(Archive& io, std::vector<ContactRecord>& contacts) {
   io(count);
   require(count >= 0 && count < 1 << 28, "snapshot is damaged: impossible number of contacts");
   contacts.resize(static_cast<std::size_t>(count));
-  for (ContactRecord& c : contacts) {
-    io(c.key.a);
-    io(c.key.b);
-    io(c.key.end);
-    io(c.force);
-    io(c.stiffness);
-    io(c.yielded);
-    io(c.approach);
-    io(c.age);
-    for (Vec3d* v : {&c.stick, &c.friction}) io(v->x), io(v->y), io(v->z);
-    io(c.sticking);
+  for (auto& [key, force, stiffness, yielded, approach, age, stick, friction, sticking] : contacts) {
+    io(key.a), io(key.b), io(key.end), io(force), io(stiffness), io(yielded), io(approach), io(age);
+    for (Vec3d* v : {&stick, &friction}) io(v->x), io(v->y), io(v->z);
+    io(sticking);
   }
 }
 
-/// The numbers of a state that any world of the scene has, in a fixed order.
-template <class Archive, class Self>
-void exchange(Archive& io, Self& self) {
-  auto& p = self.parameters;
+// Members are named one by one, by structured bindings: one that is added and not named here does not compile.
+
+template <class Archive>
+void exchange(Archive& io, Vec3d& v) {
+  io(v.x), io(v.y), io(v.z);
+}
+
+/// Of any size, in an archive that ends soon enough to be read.
+template <class Archive>
+void exchange(Archive& io, VectorX& v) {
+  auto size = static_cast<std::int64_t>(v.size());
+  io(size);
+  require(size >= 0 && size < 1 << 28, "snapshot is damaged: impossible size");
+  v.resize(size);
+  io(v);
+}
+
+template <class Archive>
+void exchange(Archive& io, std::optional<Energy>& energy) {
+  bool known = energy.has_value();
+  io(known);
+  if (!known) {
+    energy.reset();
+    return;
+  }
+  if (!energy) energy.emplace();
+  auto& [kinetic, stretch, bend, twist, gravity, loads, contact, total, work, dissipated] = *energy;
+  for (double* x : {&kinetic, &stretch, &bend, &twist, &gravity, &loads, &contact, &total, &work, &dissipated}) io(*x);
+}
+
+/// What users may set; the rest follows from it.
+template <class Archive>
+void exchange(Archive& io, Parameters& p) {
   for (auto* v : {&p.edge_stretch, &p.edge_twist, &p.edge_density, &p.edge_rotary, &p.edge_viscous_time, &p.edge_drag,
                   &p.added_mass})
     io(*v);
@@ -117,63 +139,145 @@ void exchange(Archive& io, Self& self) {
   io(p.held_lumped);
   for (auto& m : p.natural_curvature) io(m);
   for (auto& v : p.natural_twist) io(v);
-  for (auto& r : self.ramps) {
-    io(r.curvature.from);
-    io(r.curvature.to);
-    io(r.twist.from);
-    io(r.twist.to);
-    io(r.curvature.start);
-    io(r.curvature.end);
-    io(r.twist.start);
-    io(r.twist.end);
-    io(r.curvature.active);
-    io(r.twist.active);
+}
+
+template <class Archive>
+void exchange(Archive& io, Settings& settings) {
+  auto& [parameters, ramps, load_values, obstacle_motions] = settings;
+  exchange(io, parameters);
+  const auto exchange_ramp = [&](auto& ramp) {
+    auto& [from, to, start, end, active] = ramp;
+    io(from), io(to), io(start), io(end), io(active);
+  };
+  for (auto& [curvature, twist] : ramps) exchange_ramp(curvature), exchange_ramp(twist);
+  for (auto& v : load_values) io(v);
+  for (auto& [from, to, start, end] : obstacle_motions) io(from), io(to), io(start), io(end);
+}
+
+template <class Archive>
+void exchange(Archive& io, State& state) {
+  auto& [time, q, v, acceleration, acceleration_current, tangent, director, frame, bend_tau, half_tau, contacts,
+         obstacles, contact_stiffness, motion] = state;
+  io(time), io(q), io(v), io(acceleration), io(acceleration_current);
+  for (auto& t : tangent) exchange(io, t);
+  for (auto& d : director) exchange(io, d);
+  for (auto& f : frame) io(f);
+  io(bend_tau), io(half_tau);
+  exchange_contacts(io, contacts);
+  for (auto& [point, other] : obstacles) exchange(io, point), exchange(io, other);
+  io(contact_stiffness);
+  auto& [known, velocity, times] = motion;
+  io(known);
+  for (int i : {0, 1}) io(velocity[i]), io(times[i]);
+}
+
+template <class Archive>
+void exchange(Archive& io, Moving& moving) {
+  auto& [state, predictor, motions, support_work, actuation_work, dissipated, load_work] = moving;
+  exchange(io, state);
+  predictor.exchange(io);
+  for (auto& motion : motions) {
+    auto& [position, rotation, from_position, to_position, from_rotation, to_rotation, start, end, stretch] = motion;
+    io(position), io(rotation), io(from_position), io(to_position), io(from_rotation), io(to_rotation);
+    io(start), io(end), io(stretch);
   }
-  for (auto& v : self.load_values) io(v);
-  io(self.custom_force);
-  for (auto* x : {&self.support_work, &self.actuation_work, &self.dissipated, &self.load_work}) io(*x);
-  io(self.level);
-  io(self.easy_steps);
-  io(self.patience);
-  io(self.grown);
-  io(self.guard.rescue);
-  io(self.error_rate);
-  io(self.grid_origin);
-  io(self.grid_steps);
-  for (auto* x : {&self.guard.turn, &self.guard.scale, &self.guard.excess}) io(*x);
-  for (auto* x : {&self.contact_guard.scale, &self.contact_guard.excess}) io(*x);
-  for (auto& m : self.motions) {
-    io(m.position);
-    io(m.stretch);
-    io(m.rotation);
-    io(m.from_position);
-    io(m.to_position);
-    io(m.from_rotation);
-    io(m.to_rotation);
-    io(m.start);
-    io(m.end);
+  for (double* x : {&support_work, &actuation_work, &dissipated, &load_work}) io(*x);
+}
+
+template <class Archive>
+void exchange(Archive& io, StepControl& control) {
+  auto& [level, easy_steps, patience, grown, error_rate, grid_origin, grid_steps, steps_taken, guard, contact_guard,
+         step_watch, alarm] = control;
+  io(level), io(easy_steps), io(patience), io(grown), io(error_rate), io(grid_origin), io(grid_steps), io(steps_taken);
+  auto& [turn, scale, excess, stretch_gain, rescue, energy] = guard;
+  io(turn), io(scale), io(excess), io(stretch_gain), io(rescue);
+  exchange(io, energy);
+  auto& [greatest, gained, put_in] = contact_guard;
+  io(greatest), io(gained), io(put_in);
+  auto& [change, motion, most, pull, moved, acceleration] = step_watch;
+  io(change), io(motion), io(most), io(pull), io(moved);
+  exchange(io, acceleration);
+  exchange(io, alarm);
+}
+
+template <class Archive>
+void exchange(Archive& io, Found& found) {
+  auto& [custom_force, reaction_residual, reaction_current] = found;
+  io(custom_force), io(reaction_residual), io(reaction_current);
+}
+
+template <class Archive>
+void exchange(Archive& io, Running& running) {
+  exchange(io, static_cast<Settings&>(running));
+  exchange(io, static_cast<Moving&>(running));
+  exchange(io, static_cast<StepControl&>(running));
+  exchange(io, static_cast<Found&>(running));
+}
+
+template <class Archive>
+void exchange(Archive& io, std::vector<ContactKey>& keys) {
+  auto count = static_cast<std::int64_t>(keys.size());
+  io(count);
+  require(count >= 0 && count < 1 << 28, "snapshot is damaged: impossible number of contacts");
+  keys.resize(static_cast<std::size_t>(count));
+  for (auto& [a, b, end] : keys) io(a), io(b), io(end);
+}
+
+template <class Archive>
+void exchange(Archive& io, StokesletFluid::Memory& memory) {
+  auto& [solution, past, known, factorized_at, iterations, fresh_iterations, wave, excess, waited] = memory;
+  for (VectorX* v : {&solution, &past[0], &past[1], &factorized_at, &wave}) exchange(io, *v);
+  io(known), io(iterations), io(fresh_iterations), io(excess), io(waited);
+}
+
+template <class Archive>
+void exchange(Archive& io, EquationsMemory& memory) {
+  auto& [ordered, coupled, matrix, flow_excess, fluid] = memory;
+  exchange(io, ordered);
+  exchange(io, coupled);
+  io(matrix);
+  io(flow_excess);
+  exchange(io, fluid);
+}
+
+template <class Archive>
+void exchange(Archive& io, NewtonHistory& history) {
+  auto& [interval, contraction, waited, tired, plain_solves, starts, cut] = history;
+  io(interval);
+  for (double& rate : contraction) io(rate);
+  io(waited), io(tired), io(plain_solves);
+  for (auto& [misses, waits] : starts) io(misses), io(waits);
+  io(cut.misses), io(cut.waits);
+}
+
+template <class Archive>
+void exchange(Archive& io, Lagged& lagged) {
+  auto& [newton, owner, systems] = lagged;
+  exchange(io, newton);
+  int number = owner ? static_cast<int>(*owner) : -1;
+  io(number);
+  require(number >= -1 && number < static_cast<int>(kSystems.size()), "snapshot is damaged: unknown equations");
+  if (number >= 0) owner = static_cast<System>(number);
+  for (auto& memory : systems) {
+    bool known = memory.has_value();
+    io(known);
+    if (known && !memory) memory.emplace();
+    if (known) exchange(io, *memory);
   }
-  auto& s = self.state;
-  io(s.time);
-  io(s.q);
-  io(s.v);
-  io(s.acceleration);
-  io(s.acceleration_current);
-  for (auto& t : s.tangent) io(t.x), io(t.y), io(t.z);
-  for (auto& d : s.director) io(d.x), io(d.y), io(d.z);
-  for (auto& f : s.frame) io(f);
-  io(s.bend_tau);
-  io(s.half_tau);
-  for (auto& o : s.obstacles)
-    for (Vec3d* x : {&o.point, &o.other}) io(x->x), io(x->y), io(x->z);
-  for (auto& m : self.obstacle_motions) io(m.from), io(m.to), io(m.start), io(m.end);
-  io(s.contact_stiffness);
-  exchange_contacts(io, s.contacts);
-  io(s.motion.known);
-  for (int i : {0, 1}) io(s.motion.velocity[i]), io(s.motion.time[i]);
-  self.predictor.exchange(io);
-  io(self.reaction_current);
-  io(self.reaction_residual);
+}
+
+/// Refuses what another scene, or none, would have left.
+void check_lagged(const Lagged& lagged, const Model& model) {
+  const int obstacles = static_cast<int>(model.description.contact.obstacles.size());
+  const auto is_edge = [&](int edge) { return edge >= 0 && edge < model.edge_count; };
+  for (const auto& memory : lagged.systems) {
+    if (!memory) continue;
+    for (const std::vector<ContactKey>* keys : {&memory->ordered, &memory->coupled})
+      for (const auto& [a, b, end] : *keys)
+        require(is_edge(a) && (b < 0 ? b >= -obstacles : is_edge(b)), "snapshot is damaged: impossible contact");
+    const Eigen::Map<const VectorX> matrix(memory->matrix.data(), static_cast<Eigen::Index>(memory->matrix.size()));
+    require(matrix.allFinite(), "snapshot is damaged: not finite");
+  }
 }
 
 /// Ramps have no size until they are used.
@@ -195,8 +299,6 @@ void give_sizes(World::Implementation& self) {
 std::string World::snapshot() const {
   Implementation& self = *implementation_;
   give_sizes(self);
-  self.forget_contacts();
-  self.forget_matrix();  // who restores has none, and goes on with the same bits
   Writer w;
   w(kMagic);
   w(fingerprint(self.description));
@@ -214,7 +316,9 @@ std::string World::snapshot() const {
     w(d.axis);
   }
   write_added_loads(w, self.description);
-  exchange(w, self);
+  exchange(w, static_cast<Running&>(self));
+  Lagged lagged = self.lagged();
+  exchange(w, lagged);
   w(hash_of(w.bytes));
   return w.bytes;
 }
@@ -232,8 +336,7 @@ void World::restore(const std::string& bytes) {
   require(print == fingerprint(implementation_->description), "snapshot belongs to another scene");
   // Everything is read into a copy, so that a damaged file changes nothing.
   auto fresh = std::make_unique<Implementation>(*implementation_);
-  fresh->callback = implementation_->callback;
-  fresh->force_function = implementation_->force_function;
+  fresh->take_callbacks(*implementation_);
   bool spatial = false, obstacles_move = false;
   std::int64_t count = 0;
   r(spatial);
@@ -289,7 +392,9 @@ void World::restore(const std::string& bytes) {
   }
   fresh->obstacle_motions.assign(obstacles_move ? fresh->state.obstacles.size() : 0, ObstacleMotion{});
   give_sizes(*fresh);
-  exchange(r, *fresh);
+  exchange(r, static_cast<Running&>(*fresh));
+  Lagged lagged;
+  exchange(r, lagged);
   r.expect_end();
   require(fresh->level >= 0 && fresh->level <= fresh->notches() * fresh->options.max_halvings &&
               fresh->easy_steps >= 0 && fresh->patience >= 1 && fresh->easy_steps <= fresh->patience &&
@@ -302,9 +407,9 @@ void World::restore(const std::string& bytes) {
   require(fresh->predictor.plausible(), "snapshot is damaged: impossible history");
   update_derived(fresh->model, fresh->parameters);
   fresh->check_reversible(fresh->parameters);
-  fresh->forget_matrix();
   fresh->equations->loads().values = fresh->load_values;
-  fresh->alarm.reset();
+  check_lagged(lagged, fresh->model);
+  fresh->recall(lagged);
   implementation_ = std::move(fresh);
 }
 

@@ -43,12 +43,11 @@ void World::Implementation::watch_step(double dt, const Equations& system) {
   const Integrator integrator = options.integrator;
   if (step_warning || options.tolerance || integrator == Integrator::statics || integrator == Integrator::verlet)
     return;
-  const long place = statistics.steps % kPeriod;
+  const std::int64_t place = steps_taken % kPeriod;
   if (place >= kLooked) return;
   auto& [change, motion, greatest, pull, moved, before] = step_watch;
   if (place == 0) change = motion = pull = moved = 0.0;
-  const Contact* contact = description.contact.any() ? equations->contact() : nullptr;
-  if (contact && contact->count() > 0) {
+  if (const Contact* contact = system.contact(); contact && contact->count() > 0) {
     change = motion = pull = moved = 0.0;
     before.resize(0);
     return;

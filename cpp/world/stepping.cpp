@@ -26,21 +26,26 @@ constexpr int kResolutionPeriod = 64, kAlarmPeriod = 16;
 void World::Implementation::advance(double duration) {
   const double base = state.time;
   if (options.integrator == Integrator::verlet && !alarm) begin_explicit();
+  motions_before = motions;
+  mark();
   if (!options.adaptive && !options.tolerance) level = 0;
   // Without a step before there is no estimate, so error control begins with a step too small to need one.
   if (options.tolerance && predictor.empty()) level = std::max(level, notches() * std::min(options.max_halvings, 8));
-  motions_before = motions;
   spread_jumps(duration);
   try {
     advance_in_parts(duration);
   } catch (...) {
-    if (state.time == base) motions = motions_before;
-    forget_matrix();  // nor does what was tried leave a trace
+    if (state.time == base) {  // what was tried leaves no trace
+      motions = motions_before;
+      return_to_mark();
+    } else {
+      forget_matrix();
+    }
     throw;
   }
   // An energy costs as much as a step.
-  if (options.integrator == Integrator::verlet && statistics.steps % kAlarmPeriod == 0) check_explicit();
-  if (statistics.steps % kResolutionPeriod == 0) check_resolution();
+  if (options.integrator == Integrator::verlet && steps_taken % kAlarmPeriod == 0) check_explicit();
+  if (steps_taken % kResolutionPeriod == 0) check_resolution();
 }
 
 void World::Implementation::advance_in_parts(double duration) {
@@ -150,14 +155,22 @@ World::Implementation::Attempt World::Implementation::try_step(double dt) {
   const bool guarded =
       options.adaptive && guard.rescue == 0 && (options.integrator == Integrator::implicit_midpoint || fourth || euler);
   const bool watched = options.adaptive && equations->contact() && options.integrator != Integrator::verlet;
-  if (guarded || watched || options.tolerance || fourth) keep_for_return();
+  const bool keeps = guarded || watched || options.tolerance || fourth;
+  if (keeps) kept = *this;
   // Actuation changes what is stored without a motion, so the start is looked at while it is as it was.
   if (guarded && !guard.energy && actuated()) guard.energy = energy();
   const EnergyGuard books = guard;
   const double allowed = options.tolerance ? *options.tolerance * dt / options.duration.value_or(1.0) : INFINITY;
   work.newton.finest = 0.01 * allowed;  // so that what Newton leaves is no part of the error
   double error = 0.0;
-  if (!scheme_step(dt, error)) {
+  bool done = false;
+  try {
+    done = scheme_step(dt, error);
+  } catch (...) {
+    if (keeps) return_to_start();
+    throw;
+  }
+  if (!done) {
     statistics.rejected_steps += 1;
     return Attempt::failed;
   }
@@ -191,16 +204,6 @@ World::Implementation::Attempt World::Implementation::try_step(double dt) {
   return may_grow(dt, std::exp2(1.0 / notches())) ? Attempt::easy : Attempt::hard;
 }
 
-void World::Implementation::keep_for_return() {
-  kept.state = state;
-  kept.predictor = predictor;
-  kept.motions = motions;
-  kept.support_work = support_work;
-  kept.actuation_work = actuation_work;
-  kept.dissipated = dissipated;
-  kept.load_work = load_work;
-}
-
 /// Undoes an accepted step.
 void World::Implementation::take_back() {
   return_to_start();
@@ -209,19 +212,14 @@ void World::Implementation::take_back() {
 }
 
 void World::Implementation::return_to_start() {
-  state = kept.state;
-  motions = kept.motions;
-  support_work = kept.support_work;
-  actuation_work = kept.actuation_work;
-  dissipated = kept.dissipated;
-  load_work = kept.load_work;
+  static_cast<Moving&>(*this) = kept;
   apply_ramps(state.time);
-  predictor = kept.predictor;
 }
 
 /// What only steps that stay may do.
 void World::Implementation::commit_step() {
   statistics.steps += 1;
+  steps_taken += 1;
   statistics.largest_turn = std::max(statistics.largest_turn, guard.turn);
   if (guard.rescue > 0) {
     --guard.rescue;
@@ -305,7 +303,6 @@ bool World::Implementation::inner_step(double dt, int slot, double& error) {
     }
   } catch (...) {
     undo();
-    forget_matrix();  // the step that comes next is the same whether this one was tried or not
     throw;
   }
   last_newton = r.newton;

@@ -17,6 +17,7 @@ std::size_t at(int i) { return static_cast<std::size_t>(i); }
 int World::add_support(const SupportDescription& support) {
   Implementation& self = *implementation_;
   const Implementation backup(self);
+  const Lagged lagged = self.lagged();
   // The first row that a released support has left, so that who clamps and lets go without end needs no more of them.
   const auto& rows = self.model.supports;
   const auto index = static_cast<int>(
@@ -42,13 +43,10 @@ int World::add_support(const SupportDescription& support) {
     }
     self.rebuild(Rebuild::running);
   } catch (...) {
-    auto callback = self.callback;
-    auto force_function = self.force_function;
-    auto poll = self.poll;
-    implementation_ = std::make_unique<Implementation>(backup);
-    implementation_->callback = callback;
-    implementation_->force_function = force_function;
-    implementation_->poll = poll;
+    auto before = std::make_unique<Implementation>(backup);
+    before->take_callbacks(self);
+    before->recall(lagged);
+    implementation_ = std::move(before);
     throw;
   }
   if (support.kind == SupportKind::spinning_clamp) {

@@ -23,7 +23,7 @@ bool off_plane(LoadKind kind, const Vector3& value, const Vector3& normal) {
 World::World(SceneDescription description, Options options)
     : implementation_(std::make_unique<Implementation>(std::move(description), options)) {}
 World::World(const World& other) : implementation_(std::make_unique<Implementation>(*other.implementation_)) {
-  other.implementation_->forget_matrix();  // the copy has none either, and both go on with the same bits
+  implementation_->recall(other.implementation_->lagged());
 }
 World::~World() = default;
 

@@ -1,0 +1,110 @@
+/// What solves leave for those to come: factorisations that may serve again, orders of elimination, guesses.
+
+#include "common/check.hpp"
+#include "world/implementation.hpp"
+
+namespace withe {
+namespace {
+
+std::size_t at(System which) { return static_cast<std::size_t>(which); }
+
+}  // namespace
+
+/// Nothing where there are none of their own.
+Equations* World::Implementation::system(System which) {
+  switch (which) {
+    case System::scheme:
+      return equations.get();
+    case System::rescue:
+      return rescue_equations.get();
+    case System::statics:
+      return static_equations.get();
+  }
+  return nullptr;
+}
+
+Lagged World::Implementation::lagged() {
+  Lagged out;
+  const FactorRecord& factor = work.newton.factor;
+  out.newton = factor;
+  for (const System which : kSystems) {
+    const Equations* known = system(which);
+    if (!known) continue;
+    const bool owns = factor.owner == known && factor.generation == known->assembler().generation();
+    if (owns) out.owner = which;
+    out.systems[at(which)] = known->memory(owns);
+  }
+  return out;
+}
+
+/// The same matrix makes the same factorisation.
+void World::Implementation::recall(const Lagged& past) {
+  for (const System which : kSystems) {
+    const auto& memory = past.systems[at(which)];
+    if (!memory && which == System::rescue) rescue_equations.reset();
+    if (!memory && which == System::statics) static_equations.reset();
+    if (!memory) continue;
+    if (which == System::rescue) rescue();
+    if (which == System::statics) statics();
+    require(system(which) != nullptr, "equations of another scene");
+    system(which)->recall(*memory);
+  }
+  FactorRecord& factor = work.newton.factor;
+  static_cast<NewtonHistory&>(factor) = past.newton;
+  factor.owner = nullptr;
+  if (past.owner) factorize_again(*past.owner);
+}
+
+/// With the matrix as it is; users count what steps factorise.
+void World::Implementation::factorize_again(System which) {
+  Equations& owner = *system(which);
+  const Counters counters = work.newton.counters;
+  require(newton->factorize(owner, work.newton), "a matrix of another scene");
+  work.newton.counters = counters;
+  work.newton.factor.owner = &owner;
+  work.newton.factor.generation = owner.assembler().generation();
+}
+
+void World::Implementation::mark() {
+  marked_control = *this;
+  marked_factor = work.newton.factor;
+  for (const System which : kSystems)
+    if (Equations* known = system(which)) known->mark();
+}
+
+void World::Implementation::return_to_mark() {
+  static_cast<StepControl&>(*this) = marked_control;
+  if (!equations->marked()) {  // made anew since, for other supports or outside of a plane
+    forget_matrix();
+    return;
+  }
+  for (auto* made : {&rescue_equations, &static_equations})
+    if (*made && !(*made)->marked()) made->reset();
+  work.newton.factor = marked_factor;
+  for (const System which : kSystems) {
+    Equations* known = system(which);
+    const EquationsMemory* before = known ? known->since_mark() : nullptr;
+    if (!before) continue;
+    known->recall(*before);
+    if (marked_factor.owner == known) factorize_again(which);
+  }
+}
+
+void World::Implementation::take_callbacks(const Implementation& other) {
+  callback = other.callback;
+  force_function = other.force_function;
+  poll = other.poll;
+}
+
+void World::Implementation::forget_contacts() {
+  for (const System which : kSystems)
+    if (Equations* known = system(which); known && known->contact()) known->forget_contacts();
+}
+
+void World::Implementation::forget_matrix() {
+  work.newton.factor = FactorRecord{};
+  for (const System which : kSystems)
+    if (Equations* known = system(which)) known->forget_flow();
+}
+
+}  // namespace withe

@@ -1,0 +1,143 @@
+#pragma once
+/// What a scene is while it runs, as values: everything that acts on what follows, copied by default.
+
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <vector>
+
+#include "integrators/dynamics.hpp"
+#include "world/world.hpp"
+
+namespace withe {
+
+/// Where a support is, and where it is going.
+struct SupportMotion {
+  Vector3 position = Vector3::Zero();      ///< now [m]
+  Matrix3 rotation = Matrix3::Identity();  ///< now, from the drawn orientation
+  Vector3 from_position = Vector3::Zero(), to_position = Vector3::Zero();
+  Matrix3 from_rotation = Matrix3::Identity(), to_rotation = Matrix3::Identity();
+  double start = 0, end = 0;  ///< of the ramp [s]
+  double stretch = 1;         ///< of a held edge: its length when it was gripped, over the drawn one
+};
+
+/// How far something has come that goes evenly from a start to an end, at a time; from 0 to 1.
+double ramp_fraction(double time, double start, double end);
+
+/// Where an obstacle goes, as a way from where it is drawn.
+struct ObstacleMotion {
+  Vector3 from = Vector3::Zero(), to = Vector3::Zero();  ///< [m]
+  double start = 0, end = 0;                             ///< [s]
+};
+
+/// What goes evenly from one value to another.
+template <class Value>
+struct Ramp {
+  Value from, to;
+  double start = 0, end = 0;  ///< [s]
+  bool active = false;
+
+  /// Sets what is on its way to where it is at a time; false where it is not.
+  bool apply(double time, Value& now) const {
+    if (!active) return false;
+    const double s = ramp_fraction(time, start, end);
+    now.noalias() = (1.0 - s) * from + s * to;
+    return true;
+  }
+
+  /// At rest from the end on.
+  void retire(double time) {
+    if (time >= end) active = false;
+  }
+};
+
+/// Natural shape of a rod: curvature [1/m] and twist [rad/m] of its stencils.
+struct NaturalRamp {
+  Ramp<MatrixX2> curvature;
+  Ramp<VectorX> twist;
+};
+
+/// Energy balance of the watch over plain midpoint's energy.
+struct EnergyGuard {
+  double turn = std::numeric_limits<double>::infinity();  ///< of the last step [rad]; before the first, not known
+  double scale = 0;                                       ///< [J]
+  double excess = 0;                                      ///< out of nowhere so far [J]
+  double stretch_gain = 0;                                ///< of the last step, into stretching [J]
+  int rescue = 0;                                         ///< energy-momentum steps still to take in its place
+  std::optional<Energy> energy;                           ///< at the present state, where a step has just found it
+};
+
+/// Energy balance of the watch over what contact puts in where surfaces slide by much within a step.
+struct ContactGuard {
+  double scale = 0;   ///< greatest energy so far, as it was looked at [J]
+  double excess = 0;  ///< put in and not lost since, as far as it is not long ago [J]
+  double put_in = 0;  ///< in the last step, by surfaces that press [J]
+};
+
+/// Sums over a few steps in a row, of squares of velocities weighed by mass; see step_length.cpp.
+struct StepWatch {
+  double change = 0;    ///< by how much they change within a step [J]
+  double motion = 0;    ///< what that is compared with [J]
+  double greatest = 0;  ///< of such sums so far [J]
+  // Under backward Euler:
+  double pull = 0, moved = 0;  ///< by how much forces change with the motion, over the step; the motion [J]
+  VectorX acceleration;        ///< in the step before
+};
+
+/// Easy steps before longer ones are tried, at least.
+inline constexpr int kLeastPatience = 4;
+
+/// What only the user changes, and what is on its way to where the user wants it.
+struct Settings {
+  Parameters parameters;
+  std::vector<NaturalRamp> ramps;
+  std::vector<Vector3> load_values;
+  std::vector<ObstacleMotion> obstacle_motions;  ///< none until one moves
+};
+
+/// What a step changes, and returns to where it is taken back.
+struct Moving {
+  State state;
+  Predictor predictor;
+  std::vector<SupportMotion> motions;
+  double support_work = 0, actuation_work = 0, dissipated = 0, load_work = 0;  ///< [J]
+};
+
+/// By what the next step is chosen and judged.
+struct StepControl {
+  int level = 0;                  ///< present halvings of the time step, in `notches()` to each
+  int easy_steps = 0;             ///< since it changed
+  int patience = kLeastPatience;  ///< of them before longer steps are tried
+  bool grown = false;             ///< fewer easy steps than the least patience ago
+  double error_rate = 0;   ///< greatest estimated error of the last steps over the power of the step that it goes with
+  double grid_origin = 0;  ///< time = grid_origin + grid_steps time_step after whole steps, free of summed rounding
+  std::int64_t grid_steps = 0;
+  std::int64_t steps_taken = 0;  ///< inner steps accepted since the scene was built
+  EnergyGuard guard;
+  ContactGuard contact_guard;
+  StepWatch step_watch;
+  std::optional<Energy> alarm;  ///< energies at the start, for the explicit scheme's alarm
+};
+
+/// What was found last, for read-outs and for who does not ask again.
+struct Found {
+  MatrixX3 custom_force;      ///< of the last step [N]
+  VectorX reaction_residual;  ///< full residual of the last solve
+  bool reaction_current = false;
+};
+
+struct Running : Settings, Moving, StepControl, Found {};
+
+/// Systems of equations that a scene may have.
+enum class System { scheme, rescue, statics };
+inline constexpr std::array<System, 3> kSystems{System::scheme, System::rescue, System::statics};
+
+/// What solves leave for those to come: with it, a copy goes on with the same bits.
+struct Lagged {
+  NewtonHistory newton;
+  std::optional<System> owner;  ///< of the factorisation that may serve again
+  std::array<std::optional<EquationsMemory>, kSystems.size()> systems;
+};
+
+}  // namespace withe
