@@ -272,11 +272,11 @@ class Contact {
   bool frictional_ = false;
   BroadPhase broad_phase_;
   std::vector<Box> boxes_;
-  /// Obstacles' first, then candidates of the broad phase, sorted by key: a contact's place among others does not depend
-  /// on when candidates were found. And those before they were found last.
+  /// Obstacles' first, then candidates of the broad phase, sorted by key: a contact's place among others does not
+  /// depend on when candidates were found. And those before they were found last.
   std::vector<ContactPair> pairs_, old_pairs_;
-  VectorX reference_;               ///< where the candidates belong
-  VectorX low_, high_;              ///< bounds of the way there
+  VectorX reference_;   ///< where the candidates belong
+  VectorX low_, high_;  ///< bounds of the way there
   double margin_ = 0;
   struct Bounds {
     double clear = -1.0;  ///< it touches nothing while `moved_` stays below [m]

@@ -84,12 +84,13 @@ void Contact::find_near(std::vector<ContactPair>& pairs) {
 std::size_t Contact::number_of(const std::vector<ContactPair>& pairs, const ContactKey& key) const {
   const auto first = pairs.begin() + static_cast<std::ptrdiff_t>(surfaces_.obstacle_pairs().size());
   return static_cast<std::size_t>(
-      std::lower_bound(first, pairs.end(), key, [](const ContactPair& pair, const ContactKey& k) { return pair.key < k; }) -
+      std::lower_bound(first, pairs.end(), key,
+                       [](const ContactPair& pair, const ContactKey& k) { return pair.key < k; }) -
       pairs.begin());
 }
 
-/// What touches is known by the key of its pair while pairs are renumbered, from `old_pairs_` to `pairs_`. What has gone
-/// out of reach within a step stays a candidate: its friction of the start still acts, and what it gives back.
+/// What touches is known by the key of its pair while pairs are renumbered, from `old_pairs_` to `pairs_`. What has
+/// gone out of reach within a step stays a candidate: its friction of the start still acts, and what it gives back.
 void Contact::keep_touching() {
   const std::size_t fixed = surfaces_.obstacle_pairs().size();
   for (const std::vector<Touching>* kept : {&lagged_, &leaving_})

@@ -97,9 +97,8 @@ StokesletFluid::StokesletFluid(const Model& model)
   }
   lower_.setZero(size);
   diagonal_.setZero(kBlockEntries * line_);
-  for (VectorX* v :
-       {&position_, &right_, &memory_.solution, &residual_, &scaled_, &search_, &image_, &memory_.past[0],
-        &memory_.past[1], &memory_.wave, &kept_})
+  for (VectorX* v : {&position_, &right_, &memory_.solution, &residual_, &scaled_, &search_, &image_, &memory_.past[0],
+                     &memory_.past[1], &memory_.wave, &kept_})
     v->setZero(3 * line_);
   for (Chunk& chunk : chunks_) {
     const auto n = static_cast<Eigen::Index>(3 * chunk.nodes.size());
@@ -264,7 +263,8 @@ bool StokesletFluid::solve(const VectorX& q, const VectorX& velocity, VectorX& f
   for (int i = 0; i < model_.node_count; ++i)
     for (int k = 0; k < model_.dimension; ++k) right_[k * line_ + i] = velocity[model_.node_dof[at(i)] + k];
   // An old factorisation serves until it has become half as slow again as it was.
-  const bool fresh = memory_.factorized_at.size() == 0 || memory_.iterations > memory_.fresh_iterations + std::max(3, memory_.fresh_iterations / 2);
+  const bool fresh = memory_.factorized_at.size() == 0 ||
+                     memory_.iterations > memory_.fresh_iterations + std::max(3, memory_.fresh_iterations / 2);
   if (fresh && !factorize(q)) {
     forget();
     return false;
@@ -339,7 +339,8 @@ double StokesletFluid::excess(const VectorX& inertia, double limit) {
   const bool first = memory_.wave.isZero(0.0);
   if (first)
     for (int k = 0; k < model_.dimension; ++k)
-      for (int i = 0; i < model_.node_count; ++i) memory_.wave[k * line_ + i] = std::sin(1.0 + 7.0 * i + 2.0 * k) + (i % 2);
+      for (int i = 0; i < model_.node_count; ++i)
+        memory_.wave[k * line_ + i] = std::sin(1.0 + 7.0 * i + 2.0 * k) + (i % 2);
   held_ = node_drag_ + inertia;
   kept_.swap(memory_.solution);
   const int iterations = memory_.iterations;

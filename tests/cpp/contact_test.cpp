@@ -1,6 +1,7 @@
 // What touches what, against brute force. The oracles:
 //   - closest points: the least of |p - q|^2 plus the small weights over a fine grid of both parameters;
-//   - overlaps of boxes: every pair, one by one.
+//   - overlaps of boxes: every pair, one by one;
+//   - what touches, and how far an iterate may go: every pair of edges, along the way too, without memory of others.
 // Invariants: the distance is symmetric in its segments and its gradient continuous across classes and at parallel
 // segments; each law's derivatives are those of its energy.
 
@@ -161,6 +162,103 @@ TEST(Surfaces, NeighboursAreCountedRoundAClosedRod) {
   EXPECT_FALSE(surfaces.may_touch(0, 39));
   EXPECT_FALSE(surfaces.may_touch(0, 38));
   EXPECT_TRUE(surfaces.may_touch(0, 20));
+}
+
+/// Three rods and a ball, near each other.
+SceneDescription tangle(RandomNumbers& random) {
+  testing::SceneBuilder builder;
+  for (int rod = 0; rod < 3; ++rod) {
+    MatrixX3 points = testing::line(Vector3::Zero(), Vector3(1.2, 0, 0), 9);
+    const Vector3 shift = 0.3 * random.vector();
+    for (Eigen::Index i = 0; i < points.rows(); ++i) points.row(i) += (shift + 0.05 * random.vector()).transpose();
+    builder.add_rod(points);
+    builder.scene.rods.back().contact_radius.setConstant(8, rod == 0 ? 0.03 : 0.05);
+  }
+  builder.scene.contact.rods = true;
+  ObstacleDescription ball;
+  ball.kind = ObstacleKind::capsule;
+  ball.point = ball.other = Vector3(0.5, -0.4, 0.1);
+  ball.radius = 0.2;
+  builder.scene.contact.obstacles.push_back(ball);
+  builder.scene.contact.obstacle_friction = VectorX::Zero(1);
+  builder.scene.contact.obstacle_restitution = VectorX::Ones(1);
+  return builder.scene;
+}
+
+/// Every pair of surfaces of a scene.
+std::vector<ContactPair> all_pairs(const Model& model, const Surfaces& surfaces) {
+  std::vector<ContactPair> pairs = surfaces.obstacle_pairs();
+  for (int a = 0; a < model.edge_count; ++a)
+    for (int b = a + 1; b < model.edge_count; ++b)
+      if (surfaces.may_touch(a, b)) pairs.push_back(surfaces.pair(a, b));
+  return pairs;
+}
+
+ClosestPoints closest(const Model& model, const Surfaces& surfaces, const ContactPair& pair, const VectorX& q) {
+  const auto node = [&](int n) { return local_position(model, q, n); };
+  const auto a = static_cast<std::size_t>(pair.key.a);
+  if (pair.key.b < 0) {
+    const Obstacle& o = surfaces.obstacles()[static_cast<std::size_t>(-1 - pair.key.b)];
+    return closest_points(node(model.edge_tail[a]), node(model.edge_head[a]), o.point, o.other, pair.weight_a,
+                          pair.weight_b);
+  }
+  const auto b = static_cast<std::size_t>(pair.key.b);
+  return closest_points(node(model.edge_tail[a]), node(model.edge_head[a]), node(model.edge_tail[b]),
+                        node(model.edge_head[b]), pair.weight_a, pair.weight_b);
+}
+
+/// Walks of many iterates a step, tiny and wide, on which candidates are found anew and bounds let pairs be skipped.
+TEST(Contact, FindsWhatTouchesAndHowFarItMayGoAsBruteForceDoesWhateverCameBefore) {
+  RandomNumbers random(17);
+  int cut = 0, touching = 0;
+  for (int scene = 0; scene < 12; ++scene) {
+    const Model model = build_model(tangle(random), std::nullopt);
+    const Parameters parameters = initial_parameters(model);
+    State state = initial_state(model);
+    Contact contact(model);
+    contact.set_parameters(parameters);
+    contact.initialise(state);
+    const std::vector<ContactPair> pairs = all_pairs(model, contact.surfaces());
+    const auto distance = [&](const ContactPair& pair, const VectorX& q) {
+      const Vec3d between = closest(model, contact.surfaces(), pair, q).between;
+      return std::sqrt(dot(between, between));
+    };
+    for (int step = 0; step < 12; ++step) {
+      contact.begin(state, 1e-2);
+      VectorX q = state.q;
+      for (int iterate = 0; iterate < 6; ++iterate) {
+        const double wide = std::pow(10.0, -1.0 - 0.5 * ((step + iterate) % 6));
+        const VectorX change = wide * random.vector(model.dof_count);
+        Contact fresh(model);
+        fresh.set_parameters(parameters);
+        fresh.begin(state, 1e-2);
+        fresh.update(q);
+        const double kept = contact.allowed(q, change);
+        ASSERT_EQ(kept, fresh.allowed(q, change));
+        cut += kept < 1.0 ? 1 : 0;
+        // What passes hardly farther away than that is followed for a hundred steps only, the shorter the nearer it is.
+        bool reached = kept == 1.0;
+        for (const ContactPair& pair : pairs) {
+          const double start = distance(pair, q), least = std::min(kNearest * start, pair.nearest());
+          for (int k = 1; k <= 20; ++k) ASSERT_GE(distance(pair, q + (kept * k / 20.0) * change), 0.98 * least);
+          reached = reached || distance(pair, q + kept * change) <= 1.05 * least;
+        }
+        EXPECT_TRUE(reached) << "cut to " << kept << " for nothing";
+        q += kept * change;
+        contact.update(q);
+        fresh.update(q);
+        int expected = 0;
+        for (const ContactPair& pair : pairs)
+          if (std::sqrt(closest(model, contact.surfaces(), pair, q).square) < pair.reach()) ++expected;
+        ASSERT_EQ(contact.count(), expected);
+        ASSERT_EQ(contact.energy(), fresh.energy());
+        touching += expected;
+      }
+      state.q = q;
+    }
+  }
+  EXPECT_GT(cut, 100);
+  EXPECT_GT(touching, 100);
 }
 
 }  // namespace
