@@ -388,6 +388,7 @@ StaticResult find_equilibrium(Equations& equations, const Newton& newton, const 
                               const Parameters& parameters, const Boundary& boundary, State& state,
                               NewtonWorkspace& work) {
   const std::vector<Vector3> loads = equations.loads().values;
+  equations.held_acceleration.resize(0);  // that of the last time step, if there was one
   const StaticResult result = Statics(equations, newton, options, parameters, boundary, state, work).run();
   equations.loads().values = loads;
   return result;
