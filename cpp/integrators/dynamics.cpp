@@ -297,8 +297,7 @@ Turning turning(const Model& model, const State& state, const VectorX& q, const 
 }
 
 void book_work(Equations& equations, const Parameters& parameters, const VectorX& change, StepResult& result) {
-  if (!equations.loads().pieces.empty() || equations.model().description.has_custom_force)
-    result.load_work = equations.load_work(change);
+  if (equations.loaded()) result.load_work = equations.load_work(change);
   const bool in_fluid = equations.model().description.fluid.model != FluidModel::none;
   if (parameters.dragged || parameters.viscous || in_fluid) result.dissipated = equations.dissipated(change);
 }

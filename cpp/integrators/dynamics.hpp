@@ -68,6 +68,10 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
 /// velocities at their ends ring on modes that are stiff to the midpoint rule. `state.v` where they are not known.
 void extrapolate_velocity(const State& state, double time, VectorX& v);
 
+/// Finds the acceleration at the state, with loads and custom forces as they are now, where it is not known.
+void find_acceleration(Equations& equations, const Parameters& parameters, double dt, State& state,
+                       StepWorkspace& work);
+
 /// Finds the acceleration at the state where it is not known, and where an explicit step leads: positions in `work.z`,
 /// velocities (predicted ones, to second order) in `work.velocity`.
 void begin_verlet(Equations& equations, const Parameters& parameters, double dt, State& state, StepWorkspace& work);

@@ -602,17 +602,21 @@ double Equations::dissipated(const VectorX& change) const {
   return work;
 }
 
-double Equations::load_work(const VectorX& change) const {
-  double work = custom_force.dot(change);
+void Equations::load_force(VectorX& out) const {
+  out = custom_force;
   Local local;
   for (std::size_t k = 0; k < loads_.pieces.size(); ++k) {
     load_local(model_, *state_, last_z_, middle_, loads_, loads_.pieces[k], local);
     const ElementTable& table = assembler_.loads[k];
     const int* dofs = table.dofs(0);
     for (int i = 0; i < table.width(); ++i)
-      if (dofs[i] >= 0) work -= local.gradient[i] * change[dofs[i]];
+      if (dofs[i] >= 0) out[dofs[i]] -= local.gradient[i];
   }
-  return work;
+}
+
+double Equations::load_work(const VectorX& change) const {
+  load_force(load_force_);
+  return load_force_.dot(change);
 }
 
 }  // namespace withe

@@ -113,6 +113,9 @@ class Equations {
   /// evaluation [J].
   double dissipated(const VectorX& change) const;
   double load_work(const VectorX& change) const;
+  /// Of loads and custom forces in the last evaluation, per unknown.
+  void load_force(VectorX& out) const;
+  bool loaded() const { return !loads_.pieces.empty() || model_.description.has_custom_force; }
   /// What contact takes from the motion over `change`, and from obstacles that move, and does not store [J]; where
   /// there is contact.
   double contact_loss(const VectorX& change, double obstacle_work) const;
@@ -180,7 +183,7 @@ class Equations {
   Mark mark_ = Mark::none;
   EquationsMemory at_mark_;
   std::vector<ContactKey> ordered_;  ///< contacts for which the assembler has found its order of elimination
-  double static_duration_ = 0;  ///< in which slip happens in statics [s]
+  double static_duration_ = 0;       ///< in which slip happens in statics [s]
   Inner inner_ = Inner::end;
   const State* state_ = nullptr;
   const Parameters* parameters_ = nullptr;
@@ -216,7 +219,8 @@ class Equations {
   VectorX axial_floor_;   ///< per edge [N]
   VectorX elastic_rows_;  ///< per unknown, the discrete gradient alone
   VectorX working_change_;
-  double rounding_ = 0;  ///< relative, of a direction in space
+  mutable VectorX load_force_;  ///< scratch of `load_work`
+  double rounding_ = 0;         ///< relative, of a direction in space
   bool floor_current_ = false;
 };
 

@@ -84,10 +84,16 @@ double undamped_step(const Equations& equations, double shift) {
 
 }  // namespace
 
-void begin_verlet(Equations& equations, const Parameters& parameters, double dt, State& state, StepWorkspace& work) {
-  if (!state.acceleration_current)
-    explicit_acceleration(equations, parameters, dt, state, state, state.v, work, state.acceleration);
+void find_acceleration(Equations& equations, const Parameters& parameters, double dt, State& state,
+                       StepWorkspace& work) {
+  if (state.acceleration_current) return;
+  explicit_acceleration(equations, parameters, dt, state, state, state.v, work, state.acceleration);
+  if (equations.loaded()) equations.load_force(state.load_force);
   state.acceleration_current = true;
+}
+
+void begin_verlet(Equations& equations, const Parameters& parameters, double dt, State& state, StepWorkspace& work) {
+  find_acceleration(equations, parameters, dt, state, work);
   VectorX &half = work.mean, &q1 = work.z, &v1 = work.velocity;
   half = state.v + 0.5 * dt * state.acceleration;
   equations.assembler().project(half);
@@ -114,6 +120,11 @@ StepResult verlet_step(Equations& equations, const Parameters& parameters, doubl
   if (!std::isfinite(next.v.squaredNorm())) return result;
   work.change = q1 - state.q;
   book_work(equations, parameters, work.change, result);
+  if (equations.loaded()) {
+    // The mean of the forces at both ends, as velocities are.
+    equations.load_force(next.load_force);
+    result.load_work = 0.5 * (state.load_force + next.load_force).dot(work.change);
+  }
   if (Contact* contact = equations.contact()) {
     // What surfaces store by pressing Verlet keeps on the whole, which the force at the end alone does not show.
     result.dissipated += contact->friction_loss(work.change);

@@ -56,6 +56,7 @@ struct State {
   VectorX q, v;                         ///< positions [m], angles [rad]; frames of joints: increments from `frame`
   VectorX acceleration;                 ///< of the last step, to predict the next one (explicit: to begin it)
   bool acceleration_current = false;    ///< explicit scheme: `acceleration` belongs to q and the present forces
+  VectorX load_force;                   ///< explicit scheme: of loads and custom forces there, for their work; or empty
   std::vector<Vec3d> tangent;           ///< per edge: source of the reference director
   std::vector<Vec3d> director;          ///< per edge: reference director, normal to `tangent`
   std::vector<Matrix3> frame;           ///< per joint frame (in a plane: not used, q holds the angle)

@@ -80,6 +80,8 @@ World::Implementation::Implementation(const Implementation& other)
       options(other.options),
       model(other.model),
       plan(other.plan),
+      plan_current(other.plan_current),
+      plane_left_by(other.plane_left_by),
       statistics(other.statistics),
       separated(other.separated),
       spatial(other.spatial),
@@ -338,8 +340,8 @@ void World::Implementation::relax_frame(int f, const Matrix3& free) {
 void World::Implementation::leave_plane(const std::string& why) {
   require(!options.planar.value_or(false), why + " leaves the plane of the scene: build it with planar=False");
   spatial = true;
+  plane_left_by = why;
   rebuild(Rebuild::running);
-  plan.notes.push_back("left the plane while running: " + why);
 }
 
 void World::Implementation::add_contact_notes() {
@@ -391,6 +393,7 @@ std::string World::Implementation::fluid_note() const {
 }
 
 void World::Implementation::make_plan() {
+  plan_current = true;
   const double stable = plan.stable_step;
   plan = Plan{};
   plan.stable_step = stable;
@@ -408,6 +411,7 @@ void World::Implementation::make_plan() {
                               : spatial                                      ? std::string("the scene left its plane")
                                                                              : model.plane_reason));
   }
+  if (!plane_left_by.empty()) notes.push_back("left the plane while running: " + plane_left_by);
   for (const std::string& reason : equations->asymmetries()) notes.push_back("unsymmetric Jacobian: " + reason);
   if (!parameters.dragged) notes.push_back("no drag: its terms are left out");
   notes.push_back(fluid_note());

@@ -38,10 +38,14 @@ BendTwistEnergy bend_twist_energy(const Model& model, const ElasticCoefficients&
 
 /// What actuation changes at a state that stays: bending and twisting [J].
 double World::Implementation::actuation_energy() const {
-  auto& [c, k, mass] = energy_scratch;
-  compute_configuration(model, state, state.q, c);
-  set_elastic(parameters, k);
-  const BendTwistEnergy e = bend_twist_energy(model, k, c);
+  compute_configuration(model, state, state.q, energy_scratch.configuration);
+  return actuation_energy_again();
+}
+
+/// The same of other parameters, at the state for which it has just been found.
+double World::Implementation::actuation_energy_again() const {
+  set_elastic(parameters, energy_scratch.elastic);
+  const BendTwistEnergy e = bend_twist_energy(model, energy_scratch.elastic, energy_scratch.configuration);
   return e.bend + e.twist;
 }
 

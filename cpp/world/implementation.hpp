@@ -34,11 +34,12 @@ struct World::Implementation : Running {
   mutable EnergyScratch energy_scratch;
   FactorRecord marked_factor;
   StepControl marked_control;
-  Moving kept;                                             ///< at the start of a step that may be taken back
+  Moving kept;                                              ///< at the start of a step that may be taken back
   std::vector<SupportMotion> motions_before, kept_motions;  ///< at the start of a time step, of a part of it
   Plan plan;
+  bool plan_current = false;  ///< made when it is asked for
+  std::string plane_left_by;  ///< what left the plane, where something did
   Statistics statistics;
-  VectorX custom_force_before;  ///< per unknown, at the start of an explicit step
   World::ForceFunction force_function;
   std::function<void(double, double)> callback;  ///< StepCallback, bound to its world
   std::function<void()> poll;
@@ -128,6 +129,7 @@ struct World::Implementation : Running {
   void take_back();
   void commit_step();
   void return_to_start();
+  void ask_callback(double force_time, double end_time);
   bool scheme_step(double dt, double& error);
   bool composed_step(double dt, double& error);
   bool conserving() const;
@@ -183,6 +185,7 @@ struct World::Implementation : Running {
   Energy rod_energy(int rod) const;
   Energy energy_of(const State& at, double loads, double work_done, double lost) const;
   double actuation_energy() const;
+  double actuation_energy_again() const;
   bool gains_energy();
   bool contact_pumps(double dt);
   void begin_explicit();

@@ -144,7 +144,6 @@ void World::Implementation::find_custom_force(Equations& target, double dt) {
     if (!state.acceleration_current) ask_custom_force(target, state.time, state.q, state.v);
     update_custom_force(target);
     begin_verlet(target, parameters, dt, state, work);
-    custom_force_before = target.custom_force;
     ask_custom_force(target, state.time + dt, q, v);
     return;
   }

@@ -156,9 +156,10 @@ void exchange(Archive& io, Settings& settings) {
 
 template <class Archive>
 void exchange(Archive& io, State& state) {
-  auto& [time, q, v, acceleration, acceleration_current, tangent, director, frame, bend_tau, half_tau, contacts,
-         obstacles, contact_stiffness, motion] = state;
+  auto& [time, q, v, acceleration, acceleration_current, load_force, tangent, director, frame, bend_tau, half_tau,
+         contacts, obstacles, contact_stiffness, motion] = state;
   io(time), io(q), io(v), io(acceleration), io(acceleration_current);
+  exchange(io, load_force);
   for (auto& t : tangent) exchange(io, t);
   for (auto& d : director) exchange(io, d);
   for (auto& f : frame) io(f);
@@ -384,6 +385,7 @@ void World::restore(const std::string& bytes) {
   }
   if (!same) {
     fresh->spatial = spatial;
+    if (!spatial) fresh->plane_left_by.clear();
     fresh->description.supports = supports;
     fresh->motions.assign(supports.size(), SupportMotion{});
     fresh->model.supports.assign(supports.size(), Support{});

@@ -268,10 +268,28 @@ bool World::Implementation::composed_step(double dt, double& error) {
   return true;
 }
 
+/// Asks for loads and for where supports shall be. An explicit step begins with the forces that the last one has ended
+/// with: loads at its end are none of those at its start, from which it would be of first order.
+void World::Implementation::ask_callback(double force_time, double end_time) {
+  if (!callback) return;
+  if (options.integrator != Integrator::verlet) {
+    callback(force_time, end_time);
+    return;
+  }
+  if (!state.acceleration_current) {
+    if (force_function) ask_custom_force(*equations, state.time, state.q, state.v);
+    update_custom_force(*equations);
+    find_acceleration(*equations, parameters, end_time - state.time, state, work);
+  }
+  const bool planar = model.planar();
+  callback(force_time, end_time);
+  state.acceleration_current = planar == model.planar();  // or another model's
+}
+
 /// Asks for what is prescribed, and steps by dt; changes nothing where the step does not converge.
 bool World::Implementation::inner_step(double dt, int slot, double& error) {
   const double start = state.time, end = start + dt, middle = force_time(start, dt);
-  if (callback) callback(middle, end);
+  ask_callback(middle, end);
   const bool ramped = actuated();
   double actuation = 0.0;
   if (ramped) {
@@ -315,8 +333,6 @@ bool World::Implementation::inner_step(double dt, int slot, double& error) {
   guard.turn = std::max(guard.turn, r.largest_turn);
   guard.stretch_gain += r.stretch_gain;
   load_work += r.load_work;
-  if (force_function && options.integrator == Integrator::verlet)
-    load_work += 0.5 * (custom_force_before - system.custom_force).dot(work.change);
   dissipated += r.dissipated;
   support_work += r.support_work;
   contact_guard.put_in = r.pressing_gain;

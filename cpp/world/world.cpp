@@ -29,7 +29,10 @@ World::~World() = default;
 
 const SceneDescription& World::description() const { return implementation_->description; }
 const Options& World::options() const { return implementation_->options; }
-const Plan& World::plan() const { return implementation_->plan; }
+const Plan& World::plan() const {
+  if (!implementation_->plan_current) implementation_->make_plan();
+  return implementation_->plan;
+}
 double World::time() const { return implementation_->state.time; }
 void World::interrupt() { implementation_->interrupted = true; }
 
@@ -154,7 +157,7 @@ void World::Implementation::actuate(Ramp<Value>& ramp, Value& now, const Value& 
     ramp.active = false;
     now = value;
     update_natural(model, parameters);
-    actuation_work += actuation_energy() - before;
+    actuation_work += actuation_energy_again() - before;
   } else {
     ramp = {now, value, state.time, state.time + over, true};
   }
@@ -212,10 +215,10 @@ void World::set_rod_parameters(int rod, const RodDescription& d) {
   self.check_reversible(p);
   const double before = self.actuation_energy();
   self.parameters = std::move(p);
-  self.actuation_work += self.actuation_energy() - before;
+  self.actuation_work += self.actuation_energy_again() - before;
   self.reaction_current = false;
   self.state.acceleration_current = false;
-  self.make_plan();
+  self.plan_current = false;
 }
 
 void World::set_added_mass(const VectorX& mass) {

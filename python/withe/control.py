@@ -215,15 +215,21 @@ class Control(States, AppliedLoads):
             curvature = curvature_array(values["natural_curvature"], part.voronoi, False, part.owner)
         if "natural_twist" in values:
             twist = twist_array(values["natural_twist"], part.voronoi, part.owner)
-        before = self._world.snapshot()
+        changes: list[Callable[[], None]] = []
+        if curvature is not None:
+            changes.append(lambda: self._world.set_natural_curvature(part.index, curvature, 0.0))
+        if twist is not None:
+            changes.append(lambda: self._world.set_natural_twist(part.index, twist, 0.0))
+        if parameters is not self._settings.rods[part.index]:
+            changes.append(lambda: self._apply_parameters(part.index, parameters))
+        # One that is refused, such as what leaves the plane of planar=True, changes nothing; after others, these go too.
+        before = self._world.snapshot() if len(changes) > 1 else b""
         try:
-            if curvature is not None:
-                self._world.set_natural_curvature(part.index, curvature, 0.0)
-            if twist is not None:
-                self._world.set_natural_twist(part.index, twist, 0.0)
-            self._apply_parameters(part.index, parameters)
-        except ValueError:  # out of the plane of a simulation that is to stay in it
-            self._world.restore(before)
+            for change in changes:
+                change()
+        except ValueError:
+            if len(changes) > 1:
+                self._world.restore(before)
             raise
 
     def _apply_parameters(self, rod: int, parameters: RodParameters) -> None:

@@ -20,7 +20,7 @@ __all__ = ["Settings", "Snapshot"]
 
 FloatArray = npt.NDArray[np.float64]
 
-_FILE_VERSION = 2
+_FILE_VERSION = 3
 
 
 @dataclass

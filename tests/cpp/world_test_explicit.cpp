@@ -38,5 +38,32 @@ TEST(Verlet, WithoutDragTakesTheSameStepsAsTheGeneralPath) {
   }
 }
 
+/// Where an arm is after a fiftieth of a second, and what its energy balance is off by.
+std::pair<MatrixX3, double> swing(double dt, bool follower) {
+  SceneBuilder builder = testing::hanging_arm();
+  builder.load(LoadKind::force, {0, 11}, Vector3::Zero(), follower);
+  World world(builder.scene, options(Integrator::verlet, dt));
+  const Energy start = world.energy();
+  world.set_step_callback(
+      [](World& w, double time, double) { w.set_load(0, std::sin(300.0 * time) * Vector3(0.02, 0.01, 0.03)); });
+  world.step(static_cast<int>(std::lround(0.02 / dt)));
+  const Energy end = world.energy();
+  return {world.positions(), end.total - end.work + end.dissipated - start.total};
+}
+
+TEST(Verlet, IsOfSecondOrderUnderLoadsThatChange) {
+  for (const bool follower : {false, true}) {
+    const MatrixX3 exact = swing(1.25e-6, follower).first;
+    double before = 0.0;
+    for (const double dt : {4e-5, 2e-5, 1e-5}) {
+      const double error = (swing(dt, follower).first - exact).norm();
+      if (before > 0.0) EXPECT_GT(before / error, 3.6) << dt;
+      before = error;
+    }
+    // Energy swings with the modes that a step does not resolve, but what is lost falls with its square as well.
+    EXPECT_LT(std::abs(swing(1e-5, follower).second), 0.4 * std::abs(swing(2e-5, follower).second) + 1e-9);
+  }
+}
+
 }  // namespace
 }  // namespace withe
