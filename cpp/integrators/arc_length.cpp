@@ -96,7 +96,7 @@ class ArcLength {
     const bool along = before ? product(*before, here_.rate) + factor_weight_ * rate_before >= 0.0 : rising;
     rate_ = (along ? 1.0 : -1.0) / norm;
     tangent_ = rate_ * here_.rate;
-    turn_ = newton_.turn(tangent_);
+    turn_ = newton_.norms().turn(tangent_);
     point_.stable = here_.factorization.status == FactorStatus::ok && here_.factorization.negative_pivots == 0;
   }
 
@@ -106,7 +106,7 @@ class ArcLength {
     equations_.evaluate(state_.q, false, nullptr, work_.evaluation);
     step_ = arc * tangent_;
     equations_.predict_axial_force(step_, work_.axial_force);
-    const double start = factor_, length = newton_.displacement(step_);
+    const double start = factor_, length = newton_.norms().displacement(step_);
     VectorX z = state_.q + step_;
     double factor = factor_ + arc * rate_, last = INFINITY;
     NewtonResult& newton = result_.newton;
@@ -130,7 +130,7 @@ class ArcLength {
       }
       ++newton.iterations;
       ++work_.counters.iterations;
-      if (!newton_.factorize(equations_, work_)) break;
+      if (!factorize(equations_, work_)) break;
       step_ = -work_.evaluation.residual;
       solve(step_);
       solve(pull_);
@@ -140,8 +140,8 @@ class ArcLength {
       const double change =
           (left - product(start_.tangent, step_)) / (product(start_.tangent, pull_) + factor_weight_ * start_.rate);
       step_ += change * pull_;
-      if (!step_.allFinite() || newton_.cap(step_) < 1.0) break;
-      const double size = newton_.displacement(step_);
+      if (!step_.allFinite() || newton_.norms().cap(step_) < 1.0) break;
+      const double size = newton_.norms().displacement(step_);
       // What is not drawn in fast may lead to another path.
       if (size > std::max(0.05 * length, 1e4 * tolerance) && size > (k == 0 ? length : 0.5 * last)) break;
       last = size;
@@ -206,7 +206,8 @@ class ArcLength {
     path_.go_to(arc_.end);
     VectorX z = state_.q;
     if (!path_.hold(arc_.end, z)) return;
-    const NewtonResult r = newton_.solve(equations_, z, &path_.target(), kMostIterations, work_);
+    const NewtonResult r =
+        newton_.solve(equations_, z, {.target = &path_.target(), .max_iterations = kMostIterations}, work_);
     result_.newton.iterations += r.iterations;
     if (!r.converged) return;
     accept(z);

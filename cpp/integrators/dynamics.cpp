@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "common/timer.hpp"
+#include "integrators/inner_solve.hpp"
 #include "integrators/step_parts.hpp"
 
 namespace withe {
@@ -22,164 +23,17 @@ double stretch_gain(double before, double after, double across, double rest, boo
   return middle > 0.0 ? 0.5 * (l1 - l0) * (l1 + l0 - 2.0 * middle) / middle : 0.0;
 }
 
-/// Axial forces at the start of a step [N]: where the mixed method sets out from, for those of an extrapolated motion,
-/// whose edges turn along straight lines and so stretch, mean nothing.
-void start_axial_force(const Equations& equations, const VectorX& q, VectorX& out) {
-  const Model& model = equations.model();
-  out.resize(model.edge_count);
-  for (int e = 0; e < model.edge_count; ++e) {
-    const int a = model.node_dof[at(model.edge_tail[at(e)])], b = model.node_dof[at(model.edge_head[at(e)])];
-    double square = 0.0;
-    for (int i = 0; i < model.dimension; ++i) square += (q(b + i) - q(a + i)) * (q(b + i) - q(a + i));
-    out(e) = equations.elastic.stretch_stiffness(e) * (std::sqrt(square) / model.edge_length(e) - 1.0);
-  }
-}
-
-/// Adds to `work.move` what supports do within a part of the step. Where that is more than the edges next to them bear,
-/// the others follow as they would by the linear step.
-void follow_supports(Equations& equations, const Newton& newton, double part, const State& state, StepWorkspace& work) {
-  const Assembler& assembler = equations.assembler();
-  if (newton.leaves_alone(part * assembler.greatest_held_change(state.q, work.held.q))) {
-    assembler.add_held_change(state.q, work.held.q, part, work.move);
-    return;
-  }
-  VectorX& held = work.difference;
-  held.setZero(state.q.size());
-  assembler.add_held_change(state.q, work.held.q, part, held);
-  const double bearable = newton.cap(held);
-  if (bearable < 1.0) {
-    Evaluation& e = work.newton.evaluation;
-    work.newton.factor.owner = nullptr;
-    work.z = state.q + work.move;
-    equations.evaluate(work.z, true, nullptr, e);
-    VectorX& force = work.change;
-    force = -e.residual;
-    if (equations.assembler().solver().factorize().status == FactorStatus::ok) {
-      const double little = 1e-6 * bearable;
-      work.z += little * held;
-      equations.evaluate(work.z, false, nullptr, e);
-      force = force - (e.residual + force) / little;
-      equations.assembler().solver().solve({force.data(), static_cast<std::size_t>(force.size())});
-      if (force.allFinite()) work.move += force;
-    }
-  }
-  work.move += held;
-}
-
-/// Where surfaces stop or turn round, friction jumps within a slip far smaller than an iteration, and Newton's method
-/// goes to and fro across it. So the slip over which it grows is made great first, and small little by little: what
-/// sticks slips in proportion to it, which leads from one solution to the next.
-NewtonResult solve_eased(Equations& equations, const Newton& newton, bool mixed, double h, StepWorkspace& work) {
-  constexpr std::array<double, 7> kEasing{8192.0, 4096.0, 512.0, 64.0, 16.0, 4.0, 1.0};
-  constexpr int kMost = 20;  // iterations
-  NewtonResult found;
-  VectorX& last = work.velocity;
-  int spent = 0;
-  for (std::size_t k = 0; k < kEasing.size(); ++k) {
-    if (k > 1) {
-      work.move = ((kEasing[k] - kEasing[k - 1]) / (kEasing[k - 1] - kEasing[k - 2])) * (work.z - last);
-      last = work.z;
-      work.z += equations.allowed(work.z, work.move) * work.move;
-    } else {
-      last = work.z;
-    }
-    equations.contact()->ease(kEasing[k]);
-    found = newton.solve(equations, work.z, nullptr, kMost, work.newton, mixed, h);
-    spent += found.iterations;
-    if (!found.converged) break;
-  }
-  equations.contact()->ease(1.0);
-  found.iterations = spent;
-  return found;
-}
-
-/// Finds the inner configuration, `work.z`: from the extrapolated motion first; where that is too far off, from a
-/// steady one, or from rest, whose first iteration is the linear step. A step that is repeated since contact was too
-/// soft sets out from where it led.
-NewtonResult find_inner(Equations& equations, const Newton& newton, const Options& options, const StepPlan& plan,
-                        double h, const State& state, const Predictor& predictor, StepWorkspace& work) {
-  struct Start {
-    std::size_t number;  // among FactorRecord::starts
-    bool moving, accelerated, mixed, eased = false;
-  };
-  NewtonResult found;
-  int spent = 0;
-  const int points = predictor.points(plan.slot);
-  // Where edges turn by a radian in an energy-momentum step, the mixed method may circle for ever: then the plain one
-  // comes first for a while.
-  const bool circling = plan.rule == StepRule::energy_momentum;
-  FactorRecord& known = work.newton.factor;
-  const bool mixed = !circling || known.plain_solves == 0;
-  if (circling && !mixed) --known.plain_solves;
-  constexpr int kWait = 16;
-  std::array<Start, 5> starts{{{0, true, true, mixed},
-                               {1, true, false, mixed},
-                               {2, false, false, mixed},
-                               {3, true, false, !mixed},
-                               {4, false, false, mixed, true}}};
-  // Where surfaces stick, a motion that lets them slip leads far off, and from rest Newton's method finds its way soon,
-  // or else mostly within a shorter step.
-  const bool frictional = equations.contact() && equations.contact()->frictional();
-  const bool eases = frictional && equations.contact()->eases();
-  if (frictional) std::swap(starts[1], starts[2]);
-  if (eases) std::rotate(starts.begin() + 2, starts.end() - 1, starts.end());
-  const int few = std::min(12, options.max_iterations);
-  if (work.repeated) {
-    work.z = work.deep;
-    start_axial_force(equations, work.z, work.newton.axial_force);
-    found = newton.solve(equations, work.z, nullptr, std::min(24, options.max_iterations), work.newton, mixed, h);
-    if (found.converged) return found;
-    spent = found.iterations;
-  }
-  for (const Start& start : starts) {
-    if (start.eased && !eases) continue;
-    if (start.accelerated && (points == 0 || work.repeated)) continue;
-    // From rest always; where friction lets surfaces jump, others only while they help.
-    const bool sure = start.number == 2 || (!start.accelerated && !(frictional && options.adaptive));
-    StartRecord& record = known.starts[start.number];
-    if (!sure && record.skipped()) continue;
-    if (start.accelerated) {
-      predictor.extrapolate(state.time + 0.5 * plan.dt, points, work.mean);
-      work.move = h * state.v + (h * h) * work.mean;
-    } else {
-      work.move = (start.moving ? h : 0.0) * state.v;
-    }
-    equations.assembler().project(work.move);
-    work.move *= newton.cap(work.move);
-    if (equations.contact()) equations.contact()->hold_sticking(state, work.move);
-    follow_supports(equations, newton, h / plan.dt, state, work);
-    work.z = state.q + work.move * equations.allowed(state.q, work.move);
-    const bool trial = start.accelerated || (circling && start.mixed && start.moving);
-    const int limit = trial ? few : options.max_iterations;
-    start_axial_force(equations, state.q, work.newton.axial_force);
-    // Starts that surfaces cut short soon converge in one scene, and lead nowhere in another.
-    const bool impatient = trial && known.cut.waits > 0;
-    found = start.eased ? solve_eased(equations, newton, start.mixed, h, work)
-                        : newton.solve(equations, work.z, nullptr, limit, work.newton, start.mixed, h, impatient);
-    spent += found.iterations;
-    if (trial && found.cut && !known.cut.skipped()) known.cut.note(found.converged);
-    if (!sure) record.note(found.converged);
-    if (found.converged) {
-      if (circling && mixed && !start.mixed) known.plain_solves = kWait;
-      break;
-    }
-  }
-  found.iterations = spent;
-  return found;
-}
-
 /// How far a force that acts over a step moves things [m]: filtered by (M / h^2 + K)^-1, so that modes which the step
 /// does not resolve, and which it therefore leaves bounded, count for as little as they move [Hosea and Shampine 1996].
 double moved_by(VectorX& force, Equations& equations, const Newton& newton, double h, StepWorkspace& work) {
   equations.assembler().project(force);
-  const FactorRecord& factor = work.newton.factor;
-  if (factor.owner != &equations || factor.interval != std::abs(h)) {
+  if (!work.newton.matrix.belongs_to(equations, h)) {
     // Nothing moved, and no matrix was made.
     force = (h * h) * force.cwiseProduct(equations.mass().inverse);
-    return newton.displacement(force);
+    return newton.norms().displacement(force);
   }
   equations.assembler().solver().solve({force.data(), static_cast<std::size_t>(force.size())});
-  return newton.displacement(force);
+  return newton.norms().displacement(force);
 }
 
 /// Estimated error of the step just taken [m]: dt^2 / 2 times the mean acceleration (backward Euler), or
@@ -337,7 +191,7 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
     find_held_velocity(model, plan, state, work);
     equations.held_acceleration = (work.held_velocity - state.v) / dt;
   }
-  result.newton = find_inner(equations, newton, options, plan, h, state, predictor, work);
+  result.newton = solve_inner(equations, newton, options, plan, h, state, predictor, work);
   if (!result.newton.converged) return result;
   VectorX& q1 = work.move;
   if (euler)

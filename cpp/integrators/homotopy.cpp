@@ -68,7 +68,7 @@ void Homotopy::find_pull(const VectorX& z, VectorX& pull, VectorX& held) {
     moved_ = z;
     const bool reached = boundary_(factor_ + little, moved_);
     held = moved_ - z;
-    const double turn = reached ? newton_.turn(held) : INFINITY;
+    const double turn = reached ? newton_.norms().turn(held) : INFINITY;
     if (turn <= kLittleTurn) break;
     little *= std::isfinite(turn) ? 0.9 * kLittleTurn / turn : 1e-3;
   }
@@ -89,12 +89,12 @@ void Homotopy::find_tangent(Tangent& out) {
   ++work_.counters.iterations;
   ++work_.counters.factorizations;
   out.factorization = solver.factorize();
-  out.found = out.factorization.status == FactorStatus::ok || newton_.factorize(equations_, work_);
+  out.found = out.factorization.status == FactorStatus::ok || factorize(equations_, work_);
   if (!out.found) return;
   solver.solve({out.rate.data(), static_cast<std::size_t>(out.rate.size())});
   out.rate += held_;
   out.found = out.rate.allFinite();
-  out.turn = newton_.turn(out.rate);
+  out.turn = newton_.norms().turn(out.rate);
 }
 
 }  // namespace withe

@@ -145,7 +145,7 @@ class Statics {
     bool predicted = tangent_.found;
     if (predicted) {
       step_ = increment * tangent_.rate;
-      prediction.length = newton_.displacement(step_);
+      prediction.length = newton_.norms().displacement(step_);
       if (next < 1.0 && !touching) prediction.enough = kOnTheWay * equations_.model().length_scale;
       // Axial forces by the linear solution: those of the prediction are of edges that stretch as they turn.
       equations_.evaluate(state_.q, false, nullptr, work_.evaluation);
@@ -158,8 +158,11 @@ class Statics {
       z_ = state_.q;
       if (!path_.hold(next, z_) || !clear_way(z_)) return false;
     }
-    const NewtonResult r = newton_.solve(equations_, z_, &path_.target(), std::min(25, options_.max_iterations), work_,
-                                         true, 0.0, false, predicted ? &prediction : nullptr);
+    const NewtonResult r = newton_.solve(equations_, z_,
+                                         {.target = &path_.target(),
+                                          .max_iterations = std::min(25, options_.max_iterations),
+                                          .predicted = predicted ? &prediction : nullptr},
+                                         work_);
     note(r, last);
     last.step = r.step;
     if (!r.converged || turned_too_far(state_, equations_.configuration(), equations_.model().planar())) return false;
@@ -193,7 +196,7 @@ class Statics {
     if (!settle(next, result.newton)) return false;
     VectorX change = state_.q - before;
     for (int dof : equations_.model().frame_dof) change.segment(dof, equations_.model().frame_size()).setZero();
-    if (newton_.turn(change) > kJump) result.branch_changed = true;
+    if (newton_.norms().turn(change) > kJump) result.branch_changed = true;
     return true;
   }
 
@@ -216,7 +219,8 @@ class Statics {
       const bool at_rest = h >= longest;
       equations_.begin(state_, parameters_, at_rest ? 0.0 : h, false);
       z = state_.q;
-      const NewtonResult r = newton_.solve(equations_, z, &path_.target(), at_rest ? 40 : 25, work_);
+      const NewtonResult r =
+          newton_.solve(equations_, z, {.target = &path_.target(), .max_iterations = at_rest ? 40 : 25}, work_);
       note(r, last);
       const double found = work_.evaluation.potential - path_.target().dot(z);
       const double rounding = 1e-10 * (std::abs(potential) + std::abs(found)) + least_energy();
@@ -257,7 +261,7 @@ class Statics {
         // Near a minimum full Newton steps finish the work, if they stay near.
         z = state_.q;
         const double energy = here.potential;
-        const NewtonResult r = newton_.solve(equations_, z, nullptr, 30, work_);
+        const NewtonResult r = newton_.solve(equations_, z, {.max_iterations = 30}, work_);
         last.iterations += r.iterations;
         last.residual = r.residual;
         if (r.converged && work_.evaluation.potential <= energy + 1e-9 * std::abs(energy) + least_energy() &&
@@ -279,7 +283,7 @@ class Statics {
         }
         step = -here.residual;
         solver.solve({step.data(), static_cast<std::size_t>(step.size())});
-        if (newton_.cap(step) < 1.0 || equations_.allowed(state_.q, step) < 1.0) {
+        if (newton_.norms().cap(step) < 1.0 || equations_.allowed(state_.q, step) < 1.0) {
           damping *= 4.0;
           continue;
         }
@@ -360,8 +364,8 @@ class Statics {
   void leave_saddle(double factor, int seed) {
     evaluate(factor);
     VectorX direction = lowest_mode(seed);
-    direction *= 1e-3 * equations_.model().length_scale / std::max(newton_.displacement(direction), 1e-300);
-    direction *= newton_.cap(direction);
+    direction *= 1e-3 * equations_.model().length_scale / std::max(newton_.norms().displacement(direction), 1e-300);
+    direction *= newton_.norms().cap(direction);
     accept(state_.q + direction);
   }
 

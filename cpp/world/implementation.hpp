@@ -32,7 +32,8 @@ struct World::Implementation : Running {
   std::unique_ptr<Equations> static_equations;  ///< symmetric ones, made when first needed
   StepWorkspace work;
   mutable EnergyScratch energy_scratch;
-  FactorRecord marked_factor;
+  MatrixRecord marked_matrix;
+  GuessHistory marked_guesses;
   StepControl marked_control;
   Moving kept;                                              ///< at the start of a step that may be taken back
   std::vector<SupportMotion> motions_before, kept_motions;  ///< at the start of a time step, of a part of it

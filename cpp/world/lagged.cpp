@@ -25,12 +25,13 @@ Equations* World::Implementation::system(System which) {
 
 Lagged World::Implementation::lagged() {
   Lagged out;
-  const FactorRecord& factor = work.newton.factor;
-  out.newton = factor;
+  const MatrixRecord& matrix = work.newton.matrix;
+  out.matrix = matrix;
+  out.guesses = work.newton.guesses;
   for (const System which : kSystems) {
     const Equations* known = system(which);
     if (!known) continue;
-    const bool owns = factor.owner == known && factor.generation == known->assembler().generation();
+    const bool owns = matrix.owner == known && matrix.generation == known->assembler().generation();
     if (owns) out.owner = which;
     out.systems[at(which)] = known->memory(owns);
   }
@@ -49,9 +50,10 @@ void World::Implementation::recall(const Lagged& past) {
     require(system(which) != nullptr, "equations of another scene");
     system(which)->recall(*memory);
   }
-  FactorRecord& factor = work.newton.factor;
-  static_cast<NewtonHistory&>(factor) = past.newton;
-  factor.owner = nullptr;
+  MatrixRecord& matrix = work.newton.matrix;
+  static_cast<MatrixHistory&>(matrix) = past.matrix;
+  matrix.owner = nullptr;
+  work.newton.guesses = past.guesses;
   if (past.owner) factorize_again(*past.owner);
 }
 
@@ -61,13 +63,14 @@ void World::Implementation::factorize_again(System which) {
   const Counters counters = work.newton.counters;
   require(newton->factorize(owner, work.newton), "a matrix of another scene");
   work.newton.counters = counters;
-  work.newton.factor.owner = &owner;
-  work.newton.factor.generation = owner.assembler().generation();
+  work.newton.matrix.owner = &owner;
+  work.newton.matrix.generation = owner.assembler().generation();
 }
 
 void World::Implementation::mark() {
   marked_control = *this;
-  marked_factor = work.newton.factor;
+  marked_matrix = work.newton.matrix;
+  marked_guesses = work.newton.guesses;
   for (const System which : kSystems)
     if (Equations* known = system(which)) known->mark();
 }
@@ -80,13 +83,14 @@ void World::Implementation::return_to_mark() {
   }
   for (auto* made : {&rescue_equations, &static_equations})
     if (*made && !(*made)->marked()) made->reset();
-  work.newton.factor = marked_factor;
+  work.newton.matrix = marked_matrix;
+  work.newton.guesses = marked_guesses;
   for (const System which : kSystems) {
     Equations* known = system(which);
     const EquationsMemory* before = known ? known->since_mark() : nullptr;
     if (!before) continue;
     known->recall(*before);
-    if (marked_factor.owner == known) factorize_again(which);
+    if (marked_matrix.owner == known) factorize_again(which);
   }
 }
 
@@ -102,7 +106,8 @@ void World::Implementation::forget_contacts() {
 }
 
 void World::Implementation::forget_matrix() {
-  work.newton.factor = FactorRecord{};
+  work.newton.matrix = MatrixRecord{};
+  work.newton.guesses = GuessHistory{};
   for (const System which : kSystems)
     if (Equations* known = system(which)) known->forget_flow();
 }

@@ -135,7 +135,8 @@ inline constexpr std::array<System, 3> kSystems{System::scheme, System::rescue, 
 
 /// What solves leave for those to come: with it, a copy goes on with the same bits.
 struct Lagged {
-  NewtonHistory newton;
+  MatrixHistory matrix;
+  GuessHistory guesses;
   std::optional<System> owner;  ///< of the factorisation that may serve again
   std::array<std::optional<EquationsMemory>, kSystems.size()> systems;
 };

@@ -45,7 +45,8 @@ class Separation {
       state_.v.setZero();
       predictor_.clear();
       work_.held = {state_.q, true};
-      work_.newton.factor = FactorRecord{};
+      work_.newton.matrix = MatrixRecord{};
+      work_.newton.guesses = GuessHistory{};
       const bool done = implicit_step(equations_, newton_, options_, parameters_, {StepRule::backward_euler, dt, 0},
                                       state_, predictor_, work_)
                             .accepted;
@@ -161,7 +162,7 @@ void World::Implementation::separate() {
   const VectorX drawn = state.q;
   Separation separation(model, parameters, options, state);
   if (!separation.run(state)) return;
-  separated = newton->displacement(state.q - drawn);
+  separated = newton->norms().displacement(state.q - drawn);
   make_plan();
 }
 

@@ -242,19 +242,25 @@ void exchange(Archive& io, EquationsMemory& memory) {
 }
 
 template <class Archive>
-void exchange(Archive& io, NewtonHistory& history) {
-  auto& [interval, contraction, waited, tired, plain_solves, starts, cut] = history;
+void exchange(Archive& io, MatrixHistory& history) {
+  auto& [interval, contraction, waited, slow] = history;
   io(interval);
   for (double& rate : contraction) io(rate);
-  io(waited), io(tired), io(plain_solves);
-  for (auto& [misses, waits] : starts) io(misses), io(waits);
-  io(cut.misses), io(cut.waits);
+  io(waited), io(slow);
+}
+
+template <class Archive>
+void exchange(Archive& io, GuessHistory& history) {
+  auto& [records, cut, plain_solves] = history;
+  for (auto& [misses, waits] : records) io(misses), io(waits);
+  io(cut.misses), io(cut.waits), io(plain_solves);
 }
 
 template <class Archive>
 void exchange(Archive& io, Lagged& lagged) {
-  auto& [newton, owner, systems] = lagged;
-  exchange(io, newton);
+  auto& [matrix, guesses, owner, systems] = lagged;
+  exchange(io, matrix);
+  exchange(io, guesses);
   int number = owner ? static_cast<int>(*owner) : -1;
   io(number);
   require(number >= -1 && number < static_cast<int>(kSystems.size()), "snapshot is damaged: unknown equations");

@@ -314,7 +314,7 @@ bool World::Implementation::inner_step(double dt, int slot, double& error) {
     r = step_by_rule(dt, slot);
     for (int tries = 0; r.too_deep && tries < kMostStiffenings; ++tries) {
       dissipated -= system.contact()->stiffen(state, Keep::energy);
-      work.newton.factor.owner = nullptr;
+      work.newton.matrix.owner = nullptr;
       work.repeated = true;
       r = step_by_rule(dt, slot);
       work.repeated = false;

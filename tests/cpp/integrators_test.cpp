@@ -86,8 +86,8 @@ std::vector<Case> moving_cases(const RodMaterial& material) {
   return cases;
 }
 
-TEST(StartRecord, TriesWhatMissesEverMoreRarelyAndWhatHelpsAtOnce) {
-  StartRecord record;
+TEST(GuessRecord, TriesWhatMissesEverMoreRarelyAndWhatHelpsAtOnce) {
+  GuessRecord record;
   std::vector<int> tried;
   for (int solve = 0; solve < 40; ++solve) {
     if (record.skipped()) continue;
@@ -338,7 +338,7 @@ TEST(Newton, ConvergesQuadraticallyWithTheExactMatrix) {
   std::vector<double> residuals;
   for (int count = 1; count <= 8; ++count) {
     VectorX z = state.q;
-    newton.solve(equations, z, nullptr, count, work);
+    newton.solve(equations, z, {.max_iterations = count}, work);
     residuals.push_back(work.evaluation.residual.norm());
   }
   bool quadratic = false;

@@ -1,0 +1,74 @@
+#pragma once
+/// Chord iterations: the factorised matrix of an earlier iterate, or of an earlier time step, serves for as long as
+/// that is cheaper than a new one.
+
+#include <array>
+#include <cmath>
+
+#include "integrators/equations.hpp"
+
+namespace withe {
+
+/// Where the matrix of an iteration was made: there, at an earlier iterate, or in an earlier time step.
+enum class MatrixAge { fresh, within, across };
+
+/// How well old factorisations have served.
+struct MatrixHistory {
+  double interval = 0;  ///< that the last one belongs to [s]
+  /// Contraction rate per MatrixAge: error after an iteration over error before.
+  std::array<double, 3> contraction{1e-2, 1e-2, 1e-2};
+  int waited = 0;     ///< time steps since one was last tried across
+  bool slow = false;  ///< the last time step took many iterations with one
+};
+
+/// What the factorisation in a solver belongs to, and that history.
+struct MatrixRecord : MatrixHistory {
+  const Equations* owner = nullptr;  ///< nothing: not to be used again
+  int generation = 0;                ///< of the solver
+
+  bool belongs_to(const Equations& equations, double h) const { return owner == &equations && interval == std::abs(h); }
+};
+
+/// One solve's decisions about its matrices, and its estimate of the distance from the solution.
+class MatrixReuse {
+ public:
+  /// `interval`: of a time step, after whose end the matrix may serve again. `allowed`: whether old ones may serve at
+  /// all. `tolerance`: of the solution [m].
+  MatrixReuse(MatrixRecord& record, Equations& equations, double interval, bool allowed, double tolerance);
+
+  /// Whether the coming iteration makes a matrix.
+  bool fresh() const { return fresh_; }
+  /// Whether the solution is so near that the residual alone may show the end, and a matrix be made in vain.
+  bool near_end() const;
+  /// Whether it is within the tolerance, by what is known of the matrix.
+  bool at_end() const { return distance_ <= tolerance_; }
+  /// Length of the last step and of the one before [m]; infinite where it was shortened, or there was none.
+  double step() const { return step_; }
+  double last_step() const { return last_step_; }
+  double tolerance() const { return tolerance_; }
+
+  /// Before an iteration that was not to be needed any more.
+  void note_overdue();
+  /// A matrix was factorised; `whole`: all of the Jacobian, so that it may serve again.
+  void note_matrix(bool whole = true);
+  /// After a step: learns how well matrices serve, and decides about the next one.
+  void note_step(double length);
+  void note_end(int iterations);
+  /// The factorisation is not to be used again.
+  void drop() { record_.owner = nullptr; }
+
+ private:
+  MatrixRecord& record_;
+  Equations& equations_;
+  double interval_;
+  bool allowed_;
+  double tolerance_;
+  bool slipping_;  ///< whether surfaces may turn round within a slip far smaller than a step
+  bool fresh_ = true, made_here_ = false;
+  MatrixAge age_ = MatrixAge::fresh, last_age_ = MatrixAge::fresh;
+  double step_ = INFINITY, last_step_ = INFINITY;
+  double distance_ = INFINITY;  ///< from the solution, estimated [m]
+  int overdue_ = 0;             ///< iterations since that fell below the tolerance
+};
+
+}  // namespace withe

@@ -1,0 +1,32 @@
+#include "integrators/newton_system.hpp"
+
+#include "common/timer.hpp"
+
+namespace withe {
+
+bool factorize(Equations& equations, NewtonWorkspace& work) {
+  const Timer timer(work.counters.solve_time);
+  LinearSolver& solver = equations.assembler().solver();
+  const int n = equations.model().dof_count;
+  ++work.counters.factorizations;
+  if (solver.factorize().status == FactorStatus::ok) return true;
+  double greatest = 0.0;
+  for (int i = 0; i < n; ++i) greatest = std::max(greatest, std::abs(equations.assembler().diagonal(i)));
+  work.trial.setConstant(n, 1e-12 * greatest);
+  return greatest > 0.0 &&
+         solver.factorize({work.trial.data(), static_cast<std::size_t>(work.trial.size())}).status == FactorStatus::ok;
+}
+
+void NewtonSystem::evaluate(const VectorX& z, bool matrix, const double* axial_force) const {
+  const Timer timer(work.counters.assembly_time);
+  equations.evaluate(z, matrix, axial_force, work.evaluation);
+  if (target) work.evaluation.residual -= *target;
+}
+
+void NewtonSystem::solve_for(VectorX& step) const {
+  const Timer timer(work.counters.solve_time);
+  step = -work.evaluation.residual;
+  equations.assembler().solver().solve({step.data(), static_cast<std::size_t>(step.size())});
+}
+
+}  // namespace withe

@@ -1,0 +1,66 @@
+#include "integrators/surface_search.hpp"
+
+namespace withe {
+namespace {
+
+// Halvings of a step before it is taken as it is.
+constexpr int kMostHalvings = 10;
+// That much of a step uphill is too little.
+constexpr double kLittle = 0.125;
+
+}  // namespace
+
+double SurfaceSearch::shortened(const VectorX& z, VectorX& step) const {
+  double kept = norms_.cap(step);
+  step *= kept;
+  const double allowed = system_.equations.allowed(z, step);
+  step *= allowed;
+  return kept * allowed;
+}
+
+bool SurfaceSearch::run(const VectorX& z, bool nearer, double& shorten) {
+  NewtonWorkspace& work = system_.work;
+  const bool uphill = work.step.dot(work.evaluation.residual) > 0.0;
+  double kept = search(z, nearer, uphill ? kLittle : 0.0, shorten);
+  if (uphill && !evaluated_) {
+    Contact& contact = *system_.equations.contact();
+    contact.leave_out_geometric(true);
+    system_.evaluate(z, true);
+    contact.leave_out_geometric(false);
+    if (!system_.factorize()) return false;
+    system_.solve_for(work.step);
+    if (!work.step.allFinite()) return false;
+    shorten = shortened(z, work.step);
+    kept = search(z, nearer, 0.0, shorten);
+    remade_ = true;
+  }
+  work.step *= kept;
+  shorten *= kept;
+  return true;
+}
+
+/// Share of the step that leads on, and more than `least`; else as it is at the last, not evaluated.
+double SurfaceSearch::search(const VectorX& z, bool nearer, double least, double shorten) {
+  NewtonWorkspace& work = system_.work;
+  const Evaluation& e = work.evaluation;
+  const double full = norms_.displacement(work.step) / shorten, before = work.step.dot(e.residual);
+  forget();
+  double kept = 1.0;
+  for (int tries = 0; tries < kMostHalvings && kept > least; ++tries) {
+    work.trial = z + kept * work.step;
+    system_.evaluate(work.trial, false);
+    evaluated_ = e.residual.allFinite();
+    if (evaluated_) {
+      const double after = work.step.dot(e.residual);
+      if (!nearer && before <= after && after <= 0.0) return kept;
+      system_.solve_for(work.next_step);
+      solved_ = norms_.displacement(work.next_step) <= (1.0 - 0.25 * kept * shorten) * full;
+      if (solved_) return kept;
+    }
+    kept *= 0.5;
+  }
+  evaluated_ = false;
+  return kept;
+}
+
+}  // namespace withe

@@ -1,0 +1,45 @@
+#pragma once
+/// Globalisation of Newton's method between surfaces.
+///
+/// Contact and friction turn on and off, so that full steps may go to and fro for ever. A step is kept at a length to
+/// which it leads downhill, which needs no more than an evaluation, or from which the same matrix asks for a smaller
+/// step next: the natural monotonicity test [Deuflhard 2011, section 3.3], which sees displacements only and so no
+/// difference between forces and moments.
+///
+/// Pressing has negative stiffness where surfaces slide off each other, and with much of it a step may lead uphill, to
+/// where forces balance but do not hold. Where little of such a step can be kept, it is made anew without that
+/// stiffness.
+
+#include "integrators/newton_system.hpp"
+#include "integrators/step_norms.hpp"
+
+namespace withe {
+
+class SurfaceSearch {
+ public:
+  SurfaceSearch(const StepNorms& norms, const NewtonSystem& system) : norms_(norms), system_(system) {}
+
+  /// Shortens a step from z to what neither turns nor moves anything too far, and brings no surfaces too near; returns
+  /// by how much.
+  double shortened(const VectorX& z, VectorX& step) const;
+  /// Shortens `work.step`, which has been by `shorten` already, to what leads on. `nearer`: leading downhill is not
+  /// enough. False where no step could be made.
+  bool run(const VectorX& z, bool nearer, double& shorten);
+  void forget() { evaluated_ = solved_ = remade_ = false; }
+
+  /// Whether the end of the step is in `work.trial`, and evaluated without matrix.
+  bool evaluated() const { return evaluated_; }
+  /// Whether `work.next_step` is the step from there with the same matrix.
+  bool solved() const { return solved_; }
+  /// Whether the step was made anew, with a matrix that lacks geometric stiffness.
+  bool remade() const { return remade_; }
+
+ private:
+  double search(const VectorX& z, bool nearer, double least, double shorten);
+
+  const StepNorms& norms_;
+  const NewtonSystem& system_;
+  bool evaluated_ = false, solved_ = false, remade_ = false;
+};
+
+}  // namespace withe
