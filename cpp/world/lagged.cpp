@@ -61,7 +61,7 @@ void World::Implementation::recall(const Lagged& past) {
 void World::Implementation::factorize_again(System which) {
   Equations& owner = *system(which);
   const Counters counters = work.newton.counters;
-  require(newton->factorize(owner, work.newton), "a matrix of another scene");
+  require(factorize(owner, work.newton), "a matrix of another scene");
   work.newton.counters = counters;
   work.newton.matrix.owner = &owner;
   work.newton.matrix.generation = owner.assembler().generation();
