@@ -9,7 +9,7 @@ instead, K = Kg + G^T D G, and inverted with the forces D G x as unknowns of the
 where no large number hides a small one [Hellinger and Reissner's principle; Golub and Van Loan: Matrix computations,
 2013, 4.4 on what such systems lose]. Eigenvalues nearest to -s are those of the inverse that are greatest, found in a
 block Krylov space that M-orthogonal vectors span [Saad: Numerical methods for large eigenvalue problems, 2011, ch. 6];
-blocks, since a round rod has every mode of bending twice, and a free one six at zero.
+blocks, since a round rod has every mode of bending twice, a free one six at zero, and equal rods have equal ones.
 """
 
 from __future__ import annotations
@@ -172,26 +172,33 @@ class Linearisation:
         """
         nodes = max(2, self._displacement.shape[0] // 3)
         shift = float(np.median(np.abs(self._assembled.diagonal()) / self._mass.diagonal())) / nodes**4
+        count = _BLOCK
         for _ in range(40):
-            squares, _, _ = self._krylov(shift, 1, rounds=2)
+            squares, _, _ = self._krylov(shift, count, rounds=2)
             moving = np.abs(squares[np.abs(squares) > _NEUTRAL * shift])
+            if not len(moving) and count < self._mass.shape[0]:
+                count *= 2  # every free rod has six that are neutral
+                continue
             slowest = moving.min() if len(moving) else _NEUTRAL * shift
             if 1e-7 * slowest < shift < 10.0 * slowest:
                 break
             shift = 0.1 * slowest
-        while self._symmetric and self._falling(shift):
+        while self._symmetric and not self._positive(shift):
             shift *= 4.0
         return float(shift)
 
-    def _falling(self, shift: float) -> int:
-        """How many motions have a square below -shift: pivots that are negative [Sylvester's law of inertia]."""
+    def _positive(self, shift: float) -> bool:
+        """Whether no motion has a square below -shift: all pivots are positive [Sylvester's law of inertia]."""
         from scipy.sparse import diags
         from scipy.sparse.linalg import splu
 
         scale = diags(1.0 / np.sqrt(np.abs(self._assembled.diagonal()) + shift * self._mass.diagonal()))
         matrix = (scale @ (self._assembled + shift * self._mass) @ scale).tocsc()
-        factors = splu(matrix, "MMD_AT_PLUS_A", 0.0, options={"SymmetricMode": True, "Equil": False})
-        return int((factors.U.diagonal() < 0.0).sum())
+        try:
+            factors = splu(matrix, "MMD_AT_PLUS_A", 0.0, options={"SymmetricMode": True, "Equil": False})
+        except RuntimeError:  # a pivot that rounding left at zero
+            return False
+        return bool((factors.U.diagonal() > 0.0).all())
 
     def _inverse(self, shift: float) -> Callable[[FloatArray], FloatArray]:
         """Answers b with (K + shift M)^-1 b; see the head of this file."""
@@ -226,7 +233,8 @@ class Linearisation:
         """
         size = self._mass.shape[0]
         solve = self._inverse(shift)
-        start = np.random.default_rng(0).standard_normal((size, min(_BLOCK, size)))
+        # As many at once as are asked for: of equal ones, a narrower block sees no more than it is wide.
+        start = np.random.default_rng(0).standard_normal((size, min(max(_BLOCK, count + 1), size)))
         block, _ = self._orthonormal(solve(self._mass @ start))
         basis, images = block, self._mass @ block
         projected = np.zeros((0, 0))

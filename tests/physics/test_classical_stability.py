@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
-from scipy.optimize import brentq, root
+from scipy.optimize import brentq
 from scipy.special import jv
 
 import rods
 import snap_through
+import theory
 from convergence import assert_order, assert_order_at_least, zero_crossing
 
 
@@ -105,22 +106,9 @@ def test_a_narrow_cantilever_tips_over_sideways_at_prandtls_load_at_second_order
     assert_order_at_least(np.diff(errors[1:]), 2.0, slack=0.2)
 
 
-def beck(load, frequency):
-    """What vanishes at the frequencies of a cantilever under a force P L^2 / B that follows its end [Beck 1952]."""
-    half = 0.5 * load
-    size = np.sqrt(half**2 + frequency**2 + 0j)
-    a, b = np.sqrt(size - half), np.sqrt(size + half)
-    return load**2 + 2.0 * frequency**2 * (1.0 + np.cosh(a) * np.cos(b)) + load * frequency * np.sinh(a) * np.sin(b)
-
-
 def test_flutter_of_becks_column_grows_in_time_as_fast_as_in_theory():
     """Beyond 20.05 its lowest frequencies are a complex pair, found in motion from a small disturbance."""
-
-    def parts(y):
-        value = beck(25.0, y[0] + 1j * y[1])
-        return [value.real, value.imag]
-
-    frequency, growth = root(parts, [11.0, 5.0], tol=1e-13).x
+    frequency, growth = theory.flutter(25.0)
     errors = []
     for edges in (10, 20, 40):
         scene = rods.weightless()

@@ -11,6 +11,8 @@ import withe
 from convergence import assert_order
 
 STEEL = withe.Material(youngs_modulus=2e11, poisson_ratio=0.3, density=7850.0)
+# Wave numbers of a free beam, cosh b cos b = 1.
+FREE_ROOTS = (4.730040744862704, 7.853204624095838, 10.995607838001671)
 
 
 def steel_rod(slenderness, nodes, direction=(1.0, 0.0, 0.0), held=True, planar=None):
@@ -42,7 +44,23 @@ def test_a_free_rod_has_six_motions_without_frequency_and_then_those_of_a_free_b
     found = steel_rod(slenderness, 201, (1.0, 0.7, 0.0), held=False, planar=False)(8)
     # Coordinates round too: edges that are drawn askew pull by E A 1e-14, no little where E I / L^2 is E A 1e-11.
     assert np.abs(found[:6]).max() < 1e-3 * found[6]
-    np.testing.assert_allclose(found[6:], 4.730040744862704**2, rtol=1e-7)
+    np.testing.assert_allclose(found[6:], FREE_ROOTS[0] ** 2, rtol=1e-7)
+
+
+@pytest.mark.parametrize("rods_in_all", [2, 5])
+@pytest.mark.parametrize("extra", [2, 12])
+def test_free_rods_have_six_motions_without_frequency_each_however_many_there_are(rods_in_all, extra):
+    """More than a block of a Krylov space is wide."""
+    scene = rods.weightless()
+    for i in range(rods_in_all):
+        # Round and all the same, so that the lowest frequency comes twice for each.
+        scene.add_rod(start=(0, 0.1 * i, 0), end=(1, 0.1 * i, 0), nodes=41, radius=5e-3, material=STEEL)
+    unit = 0.5 * 5e-3 * np.sqrt(STEEL.youngs_modulus / STEEL.density) / (2.0 * np.pi)
+    neutral = 6 * rods_in_all
+    found = scene.build(planar=False).linearise().frequencies(neutral + extra)
+    moving = np.repeat(np.square(FREE_ROOTS), 2 * rods_in_all)[:extra] * unit
+    assert np.abs(found[:neutral]).max() < 1e-5 * moving[0]
+    np.testing.assert_allclose(found[neutral:][: len(moving)], moving[: len(found) - neutral], rtol=2e-3)
 
 
 def test_frequencies_and_modes_are_those_of_the_matrices():
@@ -110,7 +128,9 @@ def onset(says, low, high):
 
 def test_becks_column_flutters_from_twenty_on():
     """[Beck 1952]: P L^2 / B = 20.0510."""
-    errors = [onset(lambda p, n=n: becks_column(p, n)[0].stability, 15.0, 25.0) / 20.0510 - 1.0 for n in (11, 21, 41)]
+    load = theory.flutter_load()
+    assert load == pytest.approx(20.0510, abs=5e-5)
+    errors = [onset(lambda p, n=n: becks_column(p, n)[0].stability, 15.0, 25.0) / load - 1.0 for n in (11, 21, 41)]
     assert_order(np.array(errors), order=2.0, slack=0.2)
     assert abs(errors[-1]) < 1.5e-3
 
@@ -123,7 +143,8 @@ def test_becks_column_swings_below_and_grows_above_as_its_matrices_say(planar):
     found, linear = becks_column(25.0, 41, planar)
     assert not found.stable
     assert found.stability == "flutters"
-    assert np.abs(2.0 * np.pi * linear.frequencies(4).imag).max() == pytest.approx(4.918, rel=4e-3)
+    _, growth = theory.flutter(25.0)  # 4.9170 without a mesh
+    assert np.abs(2.0 * np.pi * linear.frequencies(4).imag).max() == pytest.approx(growth, rel=4e-3)
     assert np.iscomplexobj(linear.modes(2))
     np.testing.assert_allclose(np.linalg.norm(linear.modes(2), axis=2).max(axis=1), 1.0)
 
@@ -137,9 +158,15 @@ def test_modes_that_flutter_solve_the_equations_of_motion():
     np.testing.assert_allclose(flexible, moves, atol=1e-5)
 
 
-def test_a_mass_at_the_tip_makes_becks_column_flutter_earlier():
-    """[Pflueger 1955]: with a mass as great as the column's the load falls to about 16.2."""
-    assert onset(lambda p: becks_column(p, 41, mass=1.0)[0].stability, 10.0, 25.0) == pytest.approx(16.21, rel=3e-3)
+@pytest.mark.parametrize(("mass", "load"), [(0.1, 17.595), (1.0, 16.212), (2.0, 16.717)])
+def test_a_mass_at_the_tip_makes_becks_column_flutter_earlier(mass, load):
+    """[Pflueger 1955]: P L^2 / B with so many of the column's masses, by the characteristic equation."""
+    exact = theory.flutter_load(mass)
+    assert exact == pytest.approx(load, abs=5e-4)
+    found = [onset(lambda p, n=n: becks_column(p, n, mass=mass)[0].stability, 10.0, 25.0) for n in (11, 21, 41)]
+    errors = np.array(found) / exact - 1.0
+    assert_order(errors, order=2.0, slack=0.2)
+    assert abs(errors[-1]) < 2e-3
 
 
 def twisted_shaft(moment, nodes, ends="hinged"):

@@ -142,3 +142,46 @@ def cantilever_mode(s: np.ndarray, n: int = 0) -> np.ndarray:
         return np.cosh(b * x) - np.cos(b * x) - ratio * (np.sinh(b * x) - np.sin(b * x))
 
     return shape(s) / shape(np.array(1.0))
+
+
+def follower_column(load: float, frequency: complex, mass: float = 0.0) -> complex:
+    """What vanishes at frequencies w of a cantilever under a force that follows its end, with a mass there.
+
+    P L^2 / B, w L^2 sqrt(m / B), M / (m L). y'''' + P y'' = w^2 y, y = y' = 0 at the wall, and y'' = 0,
+    y''' = -M w^2 y at the tip, where the force has no part across the column [Beck 1952; Pflueger 1955]: with
+    y = A (cosh a s - cos b s) + C (sinh a s / a - sin b s / b), a^2, b^2 = (P^2 / 4 + w^2)^(1/2) -+ P / 2, the
+    determinant of the last two.
+    """
+    half = 0.5 * load
+    size = np.sqrt(half**2 + frequency**2 + 0j)
+    a, b = np.sqrt(size - half), np.sqrt(size + half)
+    sinh, cosh, sin, cos = np.sinh(a), np.cosh(a), np.sin(b), np.cos(b)
+    inertia = mass * frequency**2
+    bent = a**2 * cosh + b**2 * cos
+    sheared = a**3 * sinh - b**3 * sin + inertia * (cosh - cos)
+    return complex(bent * (bent + inertia * (sinh / a - sin / b)) - (a * sinh + b * sin) * sheared)
+
+
+def flutter_load(mass: float = 0.0) -> float:
+    """P L^2 / B at which the lowest two frequencies of `follower_column` meet."""
+
+    def both_left(load: float) -> bool:
+        values = [follower_column(load, w, mass).real for w in np.linspace(0.05, 20.0, 4001)]
+        return bool(np.count_nonzero(np.diff(np.sign(values))) >= 2)
+
+    low, high = 10.0, 25.0
+    while high - low > 1e-5:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if both_left(middle) else (low, middle)
+    return 0.5 * (low + high)
+
+
+def flutter(load: float) -> tuple[float, float]:
+    """Frequency and growth, w and its imaginary part, of the lowest pair beyond Beck's load."""
+
+    def parts(y: np.ndarray) -> list[float]:
+        value = follower_column(load, y[0] + 1j * y[1])
+        return [value.real, value.imag]
+
+    frequency, growth = root(parts, [11.0, 5.0], tol=1e-13).x
+    return float(frequency), float(growth)
