@@ -172,6 +172,18 @@ void set_viscous(const Model& model, const Parameters& p, const Configuration& s
   measure_rows(p.measure, out.half_natural);
 }
 
+void refer_viscous_to_ends(const Model& model, const Configuration& start, const Configuration& middle,
+                           const Configuration& end, ElasticCoefficients& out) {
+  for (int e = 0; e < model.edge_count; ++e)
+    out.stretch_natural(e) = (middle.length(e) - 0.5 * (end.length(e) - start.length(e))) / model.edge_length(e) - 1.0;
+  const auto refer = [&](const Columns3& s0, const Columns3& s, const Columns3& s1, Columns3& natural) {
+    const auto at = [&](const Columns3& strain, Eigen::Index i) { return measured(out.measure, strain.row(i)).eval(); };
+    for (Eigen::Index i = 0; i < natural.rows(); ++i) natural.row(i) = at(s, i) - 0.5 * (at(s1, i) - at(s0, i));
+  };
+  refer(start.bend_strain, middle.bend_strain, end.bend_strain, out.bend_natural);
+  refer(start.half_strain, middle.half_strain, end.half_strain, out.half_natural);
+}
+
 void add_coefficients(const ElasticCoefficients& other, ElasticCoefficients& sum) {
   const auto combine = [](auto& k, auto& n, const auto& k2, const auto& n2) {
     for (Eigen::Index i = 0; i < k.size(); ++i) {

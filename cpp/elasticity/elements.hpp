@@ -33,6 +33,11 @@ void set_elastic(const Parameters& parameters, ElasticCoefficients& out);
 /// strain s has the form of an elastic one with natural strain s0.
 void set_viscous(const Model& model, const Parameters& parameters, const Configuration& start, double h,
                  ElasticCoefficients& out);
+/// The same where h is half a step whose middle is evaluated: s0 such that s - s0 is half of what the strain changes by
+/// from the start to the end, (s_end - s_start) / 2. In the middle of a chord strains are others than on the way, even
+/// where a rod only turns, and a rate taken from there would push without a cause and feed energy in.
+void refer_viscous_to_ends(const Model& model, const Configuration& start, const Configuration& middle,
+                           const Configuration& end, ElasticCoefficients& out);
 /// Sum of two quadratic energies in the strains, but for a constant.
 void add_coefficients(const ElasticCoefficients& other, ElasticCoefficients& sum);
 

@@ -57,7 +57,6 @@ Equations::Equations(const Model& model, const Options& options)
   }
   custom_force = VectorX::Zero(model.dof_count);
   inverse_rest_ = model.edge_length.cwiseInverse();
-  node_dof_drag_ = VectorX::Zero(model.dof_count);
   for (const LoadPiece& piece : loads_.pieces)
     if (!withe::has_potential(model, piece)) has_potential_ = false;
   if (options.integrator == Integrator::statics) return;
@@ -74,8 +73,8 @@ void Equations::set_parameters(const Parameters& parameters) {
   set_gravity_force(model_, parameters, gravity_);
   set_elastic(parameters, elastic);
   if (contact_) contact_->set_parameters(parameters);
-  for (int i = 0; i < model_.node_count; ++i)
-    node_dof_drag_.segment(model_.node_dof[at(i)], model_.dimension).setConstant(parameters.node_drag(i));
+  set_drag(model_, parameters, drag_);
+  drag_force_.setZero(model_.dof_count);
 }
 
 void Equations::begin(const State& state, const Parameters& parameters, double h, bool energy_momentum, Inner inner) {
@@ -88,10 +87,7 @@ void Equations::begin(const State& state, const Parameters& parameters, double h
   if (viscous || energy_momentum) compute_configuration(model_, state, state.q, start_);
   if (viscous) {
     set_viscous(model_, parameters, start_, h, viscous_);
-    if (!energy_momentum) {
-      total_ = elastic;
-      add_coefficients(viscous_, total_);
-    }
+    if (!energy_momentum) add_viscosity();
   }
   acting_ = viscous && !energy_momentum ? &total_ : &elastic;
   floor_current_ = false;
@@ -102,6 +98,17 @@ void Equations::begin(const State& state, const Parameters& parameters, double h
                      : h != 0.0               ? Pressing::end
                                               : Pressing::still);
   contact_->begin(state, h == 0.0 ? static_duration_ : inner == Inner::middle ? 2.0 * h : h);
+}
+
+void Equations::add_viscosity() {
+  total_ = elastic;
+  add_coefficients(viscous_, total_);
+}
+
+/// Rates of strain of a step under the midpoint rules, from its ends. The Jacobian takes those of its middle instead.
+void Equations::set_strain_rates() {
+  refer_viscous_to_ends(model_, start_, middle_, end_, viscous_);
+  if (!energy_momentum_) add_viscosity();
 }
 
 void Equations::forget_contacts() {
@@ -229,10 +236,14 @@ void Equations::evaluate(const VectorX& z, bool with_matrix, const double* axial
   compute_configuration(model_, *state_, z, middle_);
   if (!floor_current_) set_floor(z, floor_);
   floor_current_ = true;
-  if (energy_momentum_) {
-    difference_ = 2.0 * (z - state_->q);
+  const bool viscous = h_ != 0.0 && inner_ == Inner::middle && parameters_->viscous;
+  if (energy_momentum_ || viscous) {
     end_q_ = 2.0 * z - state_->q;
     compute_configuration(model_, *state_, end_q_, end_);
+  }
+  if (viscous) set_strain_rates();
+  if (energy_momentum_) {
+    difference_ = 2.0 * (z - state_->q);
     add_discrete_gradient(z, with_matrix, axial_force, out);
   } else {
     add_elastic(*acting_, z, with_matrix, axial_force, out);
@@ -277,7 +288,11 @@ void Equations::add_step(const VectorX& z, bool with_matrix, Evaluation& out) {
   multiply(model_, mass_, acceleration_, inertia_);
   if (h_ != 0.0 && inner_ == Inner::middle) set_turning_inertia(z);
   const auto inertia = inertia_.array();
-  const auto drag = (inverse * node_dof_drag_.array()) * (x - q0);
+  if (parameters_->dragged) {
+    mean_velocity_ = inverse * (z - state_->q);
+    multiply(model_, drag_, mean_velocity_, drag_force_);
+  }
+  const auto drag = drag_force_.array();
   out.full_residual = (gradient_.head(n).array() + inertia + drag - gravity_.array() - custom_force.array()).matrix();
   out.magnitude =
       (magnitude_.head(n).array() + inertia.abs() + drag.abs() + gravity_.array().abs() + custom_force.array().abs())
@@ -291,8 +306,9 @@ void Equations::add_step(const VectorX& z, bool with_matrix, Evaluation& out) {
     const std::span<double> values = assembler_.solver().values();
     const std::vector<std::ptrdiff_t>& diagonal = assembler_.diagonal_offsets();
     for (int i = 0; i < n; ++i)
-      values[static_cast<std::size_t>(diagonal[at(i)])] += (mass_.rows[i] * inverse + node_dof_drag_[i]) * inverse;
+      values[static_cast<std::size_t>(diagonal[at(i)])] += (mass_.rows[i] * inverse + drag_.rows[i]) * inverse;
     add_coupling(mass_.coupling, inverse * inverse, values);
+    if (parameters_->dragged) add_coupling(drag_.coupling, inverse, values);
   }
   // An axial strain rounds along its edge only.
   const bool planar = model_.planar();
@@ -463,10 +479,15 @@ void Equations::set_turning_inertia(const VectorX& z) {
   for (int e = 0; e < model_.edge_count; ++e) {
     const int a = model_.tail_dof[at(e)], b = model_.head_dof[at(e)], angle = model_.edge_dof[at(e)];
     const EdgeFrame<double>& middle = middle_.edge[at(e)];
-    const Vec3d m{z[b] - z[a], z[b + 1] - z[a + 1], z[b + 2] - z[a + 2]};
-    const Vec3d e0{q0[b] - q0[a], q0[b + 1] - q0[a + 1], q0[b + 2] - q0[a + 2]}, e1 = 2.0 * m - e0;
-    const double l0 = std::sqrt(dot(e0, e0)), l1 = std::sqrt(dot(e1, e1));
-    const Vec3d t0 = (1.0 / l0) * e0, t1 = (1.0 / l1) * e1;
+    const Vec3d& t0 = state_->tangent[at(e)];
+    Vec3d t1;
+    if (energy_momentum_) {
+      t1 = end_.edge[at(e)].tangent;
+    } else {
+      const Vec3d e1{2.0 * (z[b] - z[a]) - q0[b] + q0[a], 2.0 * (z[b + 1] - z[a + 1]) - q0[b + 1] + q0[a + 1],
+                     2.0 * (z[b + 2] - z[a + 2]) - q0[b + 2] + q0[a + 2]};
+      t1 = (1.0 / std::sqrt(dot(e1, e1))) * e1;
+    }
     const double change = 2.0 * (z[angle] - q0[angle]);
     const double turn = energy_momentum_ ? finite_turn(change) : change;
     const double inertia = mass_.rows[angle];
@@ -478,7 +499,8 @@ void Equations::set_turning_inertia(const VectorX& z) {
     force += torque * middle.spin;
     if (energy_momentum_) {
       const Vec3d apart = t1 - t0;
-      const double mean = 0.5 * (l0 + l1), cosine = 0.5 * dot(t0 + t1, middle.tangent), rate = inverse * turn;
+      const double mean = 0.5 * (start_.length[e] + end_.length[e]), cosine = 0.5 * dot(t0 + t1, middle.tangent);
+      const double rate = inverse * turn;
       force -= (inertia * rate * rate * dot(apart, apart) / (4.0 * mean * cosine)) * middle.tangent;
     }
     add_couple(e, force);
@@ -577,9 +599,7 @@ void Equations::evaluate_forces(const State& state, const Parameters& parameters
 }
 
 double Equations::dissipated(const VectorX& change) const {
-  const double inverse = h_ != 0.0 ? 1.0 / h_ : 0.0;
-  double work = inverse * (node_dof_drag_.array() * (last_z_ - state_->q).array() * change.array()).sum();
-  work += flow_loss(change);
+  double work = drag_force_.dot(change) + flow_loss(change);
   if (!parameters_->viscous || h_ == 0.0) return work;
   Local local;
   const auto add = [&](const ElementTable& table, int i) {

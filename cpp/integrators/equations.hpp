@@ -139,6 +139,8 @@ class Equations {
 
  private:
   void set_parameters(const Parameters& parameters);
+  void add_viscosity();
+  void set_strain_rates();
   void set_axial_forces(const ElasticCoefficients& k, Evaluation& out);
   StencilBatch regular_batch(const ElasticCoefficients& k, const double* axial_force, double* values);
   void add_step(const VectorX& z, bool with_matrix, Evaluation& out);
@@ -196,7 +198,8 @@ class Equations {
   VectorX end_q_, last_z_;
   MassMatrix mass_;
   VectorX acceleration_, inertia_;
-  VectorX node_dof_drag_, gravity_;
+  MassMatrix drag_;  ///< [N s/m]
+  VectorX mean_velocity_, drag_force_, gravity_;
   std::unique_ptr<StokesletFluid> fluid_;
   MassMatrix flow_drag_;                     ///< [N s/m]
   VectorX flow_start_, flow_, flow_change_;  ///< the fluid's force but for the local drag, and with it [N]

@@ -5,6 +5,16 @@ namespace {
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
+/// What an edge of a density, or drag, per length couples its nodes by.
+void set_coupling(const Model& model, const Parameters& p, const VectorX& density, VectorX& coupling) {
+  if (p.lumped)
+    coupling.setZero(model.edge_count);
+  else
+    coupling = density.cwiseProduct(model.edge_arc) / 6.0;
+  for (int e = 0; e < model.edge_count; ++e)
+    if (model.edge_lumped[at(e)] || (p.held_lumped && model.edge_held[at(e)])) coupling(e) = 0.0;
+}
+
 }  // namespace
 
 void set_mass(const Model& model, const Parameters& p, MassMatrix& mass) {
@@ -19,12 +29,14 @@ void set_mass(const Model& model, const Parameters& p, MassMatrix& mass) {
   if (!model.planar())
     for (int e = 0; e < model.edge_count; ++e) rows(model.edge_dof[at(e)]) = p.edge_inertia(e);
   mass.inverse = rows.cwiseMax(1e-300).cwiseInverse();
-  if (p.lumped)
-    mass.coupling.setZero(model.edge_count);
-  else
-    mass.coupling = p.edge_density.cwiseProduct(model.edge_arc) / 6.0;
-  for (int e = 0; e < model.edge_count; ++e)
-    if (model.edge_lumped[at(e)] || (p.held_lumped && model.edge_held[at(e)])) mass.coupling(e) = 0.0;
+  set_coupling(model, p, p.edge_density, mass.coupling);
+}
+
+void set_drag(const Model& model, const Parameters& p, MassMatrix& drag) {
+  drag.rows.setZero(model.dof_count);
+  for (int i = 0; i < model.node_count; ++i)
+    drag.rows.segment(model.node_dof[at(i)], model.dimension).setConstant(p.node_drag(i));
+  set_coupling(model, p, p.edge_drag, drag.coupling);
 }
 
 void multiply(const Model& model, const MassMatrix& mass, const VectorX& x, VectorX& out) {
