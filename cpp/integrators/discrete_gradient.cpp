@@ -55,10 +55,6 @@ PlanarMoment planar_moment(const BendMeasure& measure, const Vec3d& a0, const Ve
   return m;
 }
 
-void put(double* out, const Vec3d& v, int dimension) {
-  out[0] = v.x, out[1] = v.y;
-  if (dimension == 3) out[2] = v.z;
-}
 void add_block(Local& out, int row, int column, double factor, const Mat3<double>& m, int dimension) {
   for (int i = 0; i < dimension; ++i)
     for (int j = 0; j < dimension; ++j) out.hessian[row + i][column + j] += factor * m.row[i][j];
