@@ -137,6 +137,7 @@ struct World::Implementation : Running {
   double force_time(double start, double dt) const;
   bool inner_step(double dt, int slot, double& error);
   Equations& equations_of_step();
+  StepRule rule_of_step() const;
   StepResult step_by_rule(double dt, int slot);
   void keep_reactions();
   void check_reversible(const Parameters& p) const;

@@ -348,22 +348,31 @@ bool World::Implementation::inner_step(double dt, int slot, double& error) {
 
 Equations& World::Implementation::equations_of_step() { return guard.rescue > 0 ? rescue() : *equations; }
 
+StepRule World::Implementation::rule_of_step() const {
+  if (guard.rescue > 0) return StepRule::energy_momentum;
+  switch (options.integrator) {
+    case Integrator::energy_momentum:
+      return StepRule::energy_momentum;
+    case Integrator::backward_euler:
+      return StepRule::backward_euler;
+    default:
+      return StepRule::midpoint;
+  }
+}
+
 StepResult World::Implementation::step_by_rule(double dt, int slot) {
-  const bool rescued = guard.rescue > 0;
   Equations& system = equations_of_step();
   update_custom_force(system);
   if (options.integrator == Integrator::verlet) return verlet_step(system, parameters, dt, state, work);
-  const StepRule rule = rescued || options.integrator == Integrator::energy_momentum ? StepRule::energy_momentum
-                        : options.integrator == Integrator::backward_euler           ? StepRule::backward_euler
-                                                                                     : StepRule::midpoint;
-  return implicit_step(system, *newton, options, parameters, {rule, dt, slot}, state, predictor, work);
+  return implicit_step(system, *newton, options, parameters, {rule_of_step(), dt, slot}, state, predictor, work);
 }
 
-/// The residual of a frame's unknowns is J(w)^T moment, w its turn where the forces act.
+/// The residual of a frame's unknowns is J(w)^T moment, w its turn where the forces act; of an energy-momentum step,
+/// the moment.
 void World::Implementation::keep_reactions() {
   reaction_residual = work.newton.evaluation.full_residual;
   reaction_current = true;
-  if (model.planar()) return;
+  if (model.planar() || rule_of_step() == StepRule::energy_momentum) return;
   for (const Support& support : model.supports) {
     if (!support.active || support.frame < 0) continue;
     const int dof = model.frame_dof[at(support.frame)];
