@@ -79,7 +79,11 @@ def residual(case: StressCase, simulation: withe.Simulation, before: Look) -> fl
     first = np.cos(turn)[:, None] * first + np.sin(turn)[:, None] * np.cross(tangents, first)
     frames = np.stack([first, np.cross(tangents, first), tangents], axis=1)
     total = _Sum(case, 1).add_forces(z, frames, source=start)
-    total.add_inertia(z - before.positions, before, h, turn)
+    total.add_inertia(z - before.positions, before, h)
+    if case.method == "backward_euler":
+        total.add_spin(z - before.positions, before, h, turn)
+    else:
+        total.add_mean_spin(before, after.directors[:, 2], h, turn)
     return total.over_allowed()
 
 
@@ -213,18 +217,35 @@ class _Sum:
             moment[:, axis] = -(bending + twist_stiffness / length * factor * tau * twisted_by)
         return moment
 
-    def add_inertia(self, moved: FloatArray, before: Look, h: float, turned: FloatArray) -> None:
-        """Of a step over h, from `before`: nodes, spin of edges, and the couple of edges that spin and turn."""
+    def add_inertia(self, moved: FloatArray, before: Look, h: float) -> None:
+        """Of nodes, in a step over h from `before`."""
         case = self._case
         acceleration = (moved / h - before.velocities) / h
         self._on_nodes(-self._mass[:, None] * acceleration, slice(None))
         # An edge carries its mass along it: m / 3, m / 6, m / 3.
         self._pair(case.line_density * self._edge / 6 * np.diff(acceleration, axis=0))
-        rotary = 1000.0 * math.pi * case.radius**4 / 2 * self._edge
-        torque = rotary * (turned / h - before.spins) / h
+
+    @property
+    def _rotary(self) -> float:
+        """Moment of inertia of an edge about itself [kg m^2]."""
+        return 1000.0 * math.pi * self._case.radius**4 / 2 * self._edge
+
+    def add_spin(self, moved: FloatArray, before: Look, h: float, turned: FloatArray) -> None:
+        """Of edges that spin and turn, to where they are at the end: torque and couple."""
+        torque = self._rotary * (turned / h - before.spins) / h
         self._along(-torque, slice(None))
         turning = np.cross(np.diff(moved, axis=0) / h, self._t)
-        self._pair(-(rotary * turned / h)[:, None] * turning / self._lengths**2 - torque[:, None] * self._spin)
+        couple = (self._rotary * turned / h)[:, None] * turning / self._lengths**2
+        self._pair(-couple - torque[:, None] * self._spin)
+
+    def add_mean_spin(self, before: Look, tangents: FloatArray, h: float, turned: FloatArray) -> None:
+        """The same of midpoint steps: the moment I (w1 t1 - w0 t0) / dt, on edges where they are in the middle."""
+        after = 2.0 * turned / h - before.spins
+        gain = after[:, None] * tangents - before.spins[:, None] * before.directors[:, 2]
+        moment = self._rotary / (2.0 * h) * gain
+        torque = _dot(moment, self._t)
+        self._along(-torque, slice(None))
+        self._pair(-np.cross(moment, self._t) / self._lengths - torque[:, None] * self._spin)
 
     def over_allowed(self) -> float:
         """The greatest of forces and couples out of balance, over what is allowed."""
