@@ -245,3 +245,22 @@ def test_backward_euler_by_default_cuts_steps_in_which_a_rod_under_pressure_gain
     uncut = loaded(straight(nodes), 1000.0, event, **options, adaptive=False)
     assert greatest_excess(uncut, 12) > 0.015
     assert greatest_excess(loaded(straight(nodes), 1000.0, event, **options), 12) < 1e-3
+
+
+@pytest.mark.filterwarnings("ignore::withe.CoarseStepWarning")
+@pytest.mark.parametrize("integrator", ["implicit_midpoint", "fourth_order"])
+@pytest.mark.parametrize("steps_a_period", [5, 20])
+def test_midpoint_and_fourth_order_by_default_gain_at_most_a_thousandth(integrator, steps_a_period):
+    """A rod drawn in a curl, straight by nature, let go: of its elastic energy, in 300 steps however long."""
+    scene = rods.weightless()
+    s = np.linspace(0.0, 1.0, 16)
+    stiffness = rods.stiffness(stretch=1e4, bend=1.0)
+    points = np.stack([s, 0.2 * s**3, 0.5 * s**2], axis=1)
+    rod = scene.add_rod(points=points, radius=0.02, line_density=1.0, stiffness=stiffness, natural="straight")
+    period = 2.0 * np.pi / 4.730**2
+    simulation = scene.build(integrator=integrator, time_step=period / steps_a_period)
+    simulation.set_velocities(rod, np.cross((0.3, 4.0, 0.5), points))
+    first = simulation.energy().total
+    most = max(simulation.energy().total for _ in range(300) if not simulation.step())
+    assert most <= first * (1.0 + 1.01e-3)
+    assert simulation.statistics.energy_momentum_steps > 0

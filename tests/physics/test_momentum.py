@@ -5,6 +5,7 @@ import pytest
 
 import rods
 import withe
+from convergence import assert_order_at_least
 
 RADIUS = 0.05
 
@@ -119,3 +120,51 @@ def test_momentum_is_a_copy_with_names():
     assert isinstance(momentum, withe.Momentum)
     momentum.linear[:] = 7.0
     assert simulation.momentum().linear[0] == 0.0
+
+
+@pytest.mark.parametrize("planar", [True, False], ids=["planar", "spatial"])
+@pytest.mark.parametrize("integrator", ["implicit_midpoint", "energy_momentum"])
+def test_reactions_of_a_clamp_are_what_momenta_change_by_and_what_does_the_work(integrator, planar):
+    """A clamp that moves and turns evenly; `exact` is what of a step's books is, the other is of second order.
+
+    In space a step turns by its Cayley vector, and moments of energy-momentum steps in a plane do the work over the
+    angle.
+    """
+    scene = rods.weightless()
+    rod = rods.straight(scene, 11, stiffness=rods.stiffness(stretch=1e3), normal=(0, 0, 1))
+    wall = scene.clamp(rod.start)
+    axis = np.array((0.0, 1.0, 0.0) if planar else (0.36, 0.8, 0.48))
+    cross = np.cross(np.eye(3), axis)
+
+    def pose(t):
+        turn = np.eye(3) + np.sin(0.8 * t) * cross + (1.0 - np.cos(0.8 * t)) * cross @ cross
+        return (0.2 * t, 0.0, 0.1 * t), turn
+
+    def books(step):
+        simulation = scene.build(
+            integrator=integrator, time_step=step, planar=planar, adaptive=False, step_tolerance=1e-13,
+            force_tolerance=1e-13,
+        )  # fmt: skip
+        simulation.move(wall, path=pose)
+        simulation.step(2)
+        errors, scales = np.zeros(2), np.zeros(2)
+        for _ in range(round(1.0 / step)):
+            t, work, angular = simulation.time, simulation.energy().work, simulation.momentum().angular
+            simulation.step()
+            reaction = simulation.reaction(wall)
+            done = step * (reaction.force @ (0.2, 0.0, 0.1) + 0.8 * reaction.moment @ axis)
+            middle = pose(t + 0.5 * step)[0]
+            twirl = step * (np.cross(middle, reaction.force) + reaction.moment)
+            off = np.linalg.norm(simulation.momentum().angular - angular - twirl)
+            errors = np.maximum(errors, (abs(simulation.energy().work - work - done), off))
+            scales = np.maximum(scales, (abs(done), np.linalg.norm(twirl)))
+        return errors / scales
+
+    found = np.array([books(step) for step in (0.04, 0.02, 0.01)])
+    exact = {"work": planar, "moment": not planar or integrator == "implicit_midpoint"}
+    for column, name in enumerate(exact):
+        if exact[name]:
+            assert found[:, column].max() < 1e-9
+        else:
+            assert_order_at_least(found[:, column], 2.0, slack=0.2)
+            assert found[-1, column] < 1e-4
