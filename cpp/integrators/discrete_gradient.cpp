@@ -19,14 +19,6 @@ Vec3d row_of(const Table& table, int i) {
 
 Vec3d in_plane(const EdgeFrame<double>& f, double sign) { return {sign * f.tangent.x, sign * f.tangent.y, 0.0}; }
 
-/// An edge of a plane as one in space: what `edge_columns` asks for.
-EdgeFrame<double> flat(const Vec3d& tangent, double inverse_length) {
-  EdgeFrame<double> f{};
-  f.tangent = tangent;
-  f.inverse_length = inverse_length;
-  return f;
-}
-
 /// The moment about a plane's normal with m (w_a - w_b) = E1 - E0, and its derivatives by the turns of both directions
 /// at the end: `discrete_moment` for kappa = 2 (t_a x t_b) / (1 + t_a . t_b).
 struct PlanarMoment {
@@ -55,34 +47,91 @@ PlanarMoment planar_moment(const BendMeasure& measure, const Vec3d& a0, const Ve
   return m;
 }
 
-void add_block(Local& out, int row, int column, double factor, const Mat3<double>& m, int dimension) {
-  for (int i = 0; i < dimension; ++i)
-    for (int j = 0; j < dimension; ++j) out.hessian[row + i][column + j] += factor * m.row[i][j];
+Vector2 flat(const Vec3d& v) { return {v.x, v.y}; }
+/// By a right angle.
+Vector2 turned(const Vector2& v) { return {-v.y(), v.x()}; }
+
+/// `MovingEdge` in a plane, where a moment has one component and directors do not turn.
+struct PlanarEdge {
+  Vector2 t0, t1, t;
+  double inverse_length1, inverse_length, inverse_mean, chi, stretch;
+  Vector2 force;  ///< of a unit moment, on the edge's vector
+
+  PlanarEdge(const EdgeFrame<double>& start, const EdgeFrame<double>& middle, const EdgeFrame<double>& end)
+      : t0(flat(start.tangent)),
+        t1(flat(end.tangent)),
+        t(flat(middle.tangent)),
+        inverse_length1(end.inverse_length),
+        inverse_length(middle.inverse_length) {
+    const double l0 = 1.0 / start.inverse_length, l1 = 1.0 / end.inverse_length;
+    inverse_mean = 2.0 / (l0 + l1);
+    chi = 0.5 / (1.0 + t0.dot(t1));
+    stretch = chi * inverse_length * inverse_mean * (l1 - l0);
+    force = inverse_length * turned(t) + stretch * cross(t0, t1) * t;
+  }
+
+  /// How a moment changes with the edge's vector at the end, of its change by a turn.
+  Vector2 column(double by_turn) const { return by_turn * inverse_length1 * turned(t1); }
+
+  /// How the force of a moment that stays changes with the edge's vector at the end.
+  Eigen::Matrix2d geometry(double moment) const {
+    const double i = inverse_length, p = moment * cross(t0, t1), nu = stretch * p;
+    const auto normal = [&](const Vector2& v) { return Vector2(inverse_length1 * (v - v.dot(t1) * t1)); };
+    const Vector2 by_chi = 2.0 * chi * normal(t0);
+    const Vector2 by_nu =
+        normal(stretch * moment * turned(t0)) +
+        p * (chi * i * inverse_mean * t1 - stretch * (by_chi + 0.5 * i * t + 0.5 * inverse_mean * t1));
+    Eigen::Matrix2d out =
+        t * by_nu.transpose() - i * i * moment * turned(t) * t.transpose() - 0.5 * nu * i * t * t.transpose();
+    const double turn = 0.5 * i * i * moment;
+    out(0, 0) += 0.5 * nu * i;
+    out(1, 1) += 0.5 * nu * i;
+    out(0, 1) -= turn;
+    out(1, 0) += turn;
+    return out;
+  }
+};
+
+void add_planar_force(Local& out, int tail, int head, const Vector2& force) {
+  for (int k = 0; k < 2; ++k) {
+    out.gradient[head + k] += force(k);
+    out.gradient[tail + k] -= force(k);
+  }
 }
 
-/// Where an edge's vector and angle are among the unknowns of a stencil: its head less its tail; the angle is -1 where
-/// there is none.
+/// Rows of one edge by the vector of another, twice: changes of the end are twice those of the middle.
+void add_planar_rows(Local& out, const int (&row)[2], const int (&column)[2], const Eigen::Matrix2d& block) {
+  for (int a = 0; a < 2; ++a)
+    for (int b = 0; b < 2; ++b)
+      for (int k = 0; k < 2; ++k)
+        for (int l = 0; l < 2; ++l) out.hessian[row[a] + k][column[b] + l] += (a == b ? 2.0 : -2.0) * block(k, l);
+}
+
+void add_block(Local& out, int row, int column, double factor, const Mat3<double>& m) {
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) out.hessian[row + i][column + j] += factor * m.row[i][j];
+}
+
+/// Where an edge's vector and angle are among the unknowns of a stencil in space: its head less its tail.
 struct EdgePlace {
-  int tail, head, angle, dimension;
+  int tail, head, angle;
 };
 
 void add_edge_forces(Local& out, const EdgePlace& e, const MovingEdge<double>& edge, const EdgeFrame<double>& middle,
                      const Vec3d& moment) {
-  Vec3d f = edge.force(moment);
-  if (e.angle >= 0) f += edge.torque(moment) * middle.spin;
+  const Vec3d f = edge.force(moment) + edge.torque(moment) * middle.spin;
   const double component[3] = {f.x, f.y, f.z};
-  for (int i = 0; i < e.dimension; ++i) {
+  for (int i = 0; i < 3; ++i) {
     out.gradient[e.head + i] += component[i];
     out.gradient[e.tail + i] -= component[i];
   }
-  if (e.angle >= 0) out.gradient[e.angle] += edge.torque(moment);
+  out.gradient[e.angle] += edge.torque(moment);
 }
 
 /// What an edge makes of a moment that stays, and of its own change of it.
-void finish_block(const EdgePlace& e, const MovingEdge<double>& edge, const EdgeFrame<double>& middle,
-                  const Vec3d& moment, bool own, EdgeBlock<double>& block) {
+void finish_block(const MovingEdge<double>& edge, const EdgeFrame<double>& middle, const Vec3d& moment, bool own,
+                  EdgeBlock<double>& block) {
   if (own) add_edge_geometry(edge, moment, block);
-  if (e.angle < 0) return;
   add_transport(middle, block);
   if (own) add_spin_change(edge, middle, edge.torque(moment), block);
 }
@@ -91,9 +140,7 @@ void finish_block(const EdgePlace& e, const MovingEdge<double>& edge, const Edge
 void add_edge_rows(Local& out, const EdgePlace& r, const EdgePlace& c, const EdgeBlock<double>& b) {
   constexpr double kTwice = 2.0;
   for (int s : {1, -1})
-    for (int t : {1, -1})
-      add_block(out, s > 0 ? r.head : r.tail, t > 0 ? c.head : c.tail, s * t * kTwice, b.ee, r.dimension);
-  if (r.angle < 0) return;
+    for (int t : {1, -1}) add_block(out, s > 0 ? r.head : r.tail, t > 0 ? c.head : c.tail, s * t * kTwice, b.ee);
   for (int i = 0; i < 3; ++i) {
     out.hessian[r.head + i][c.angle] += kTwice * b.e_angle[i];
     out.hessian[r.tail + i][c.angle] -= kTwice * b.e_angle[i];
@@ -135,69 +182,75 @@ HingeArm hinge_arm(const Vector3& w, const Vector3& axis, double angle) {
   return h;
 }
 
+/// Bending of a stencil in a plane.
+void planar_bend_local(const Model& model, const ElasticCoefficients& elastic, const Configuration& start,
+                       const Configuration& middle, const Configuration& end, int stencil, bool with_matrix,
+                       Local& local) {
+  const BendStencil& s = model.bend[at(stencil)];
+  clear(local, 6, with_matrix);
+  Vec3d t0[2], t1[2];
+  int ends[2][2];
+  for (int k = 0; k < 2; ++k) {
+    const int first = 2 * k, second = 2 * (k + 1);
+    ends[k][0] = s.sign[k] > 0 ? first : second;
+    ends[k][1] = s.sign[k] > 0 ? second : first;
+    t0[k] = in_plane(start.edge[at(s.edge[k])], s.sign[k]);
+    t1[k] = in_plane(end.edge[at(s.edge[k])], s.sign[k]);
+  }
+  const PlanarMoment m =
+      planar_moment(elastic.measure, t0[0], t1[0], t0[1], t1[1], start.bend_strain(stencil, 0),
+                    end.bend_strain(stencil, 0), elastic.bend_natural(stencil, 0), elastic.bend_stiffness(stencil, 0));
+  const auto edge_of = [&](int e) { return PlanarEdge(start.edge[at(e)], middle.edge[at(e)], end.edge[at(e)]); };
+  const PlanarEdge edge[2] = {edge_of(s.edge[0]), edge_of(s.edge[1])};
+  const double by[2] = {m.by_a, m.by_b};
+  for (int i = 0; i < 2; ++i) {
+    const double sign = i == 0 ? 1.0 : -1.0;
+    add_planar_force(local, ends[i][0], ends[i][1], sign * m.moment * edge[i].force);
+    for (int j = 0; with_matrix && j < 2; ++j) {
+      Eigen::Matrix2d block = sign * edge[i].force * edge[j].column(by[j]).transpose();
+      if (i == j) block += edge[i].geometry(sign * m.moment);
+      add_planar_rows(local, ends[i], ends[j], block);
+    }
+  }
+}
+
 }  // namespace
 
 MovingEdge<double> Equations::moving_edge(int edge) const {
   const EdgeFrame<double>&start = start_.edge[at(edge)], &middle = middle_.edge[at(edge)], &end = end_.edge[at(edge)];
-  const bool planar = model_.planar();
-  const auto tangent = [&](const EdgeFrame<double>& f) { return planar ? in_plane(f, 1.0) : f.tangent; };
-  return {tangent(start),
-          start.inverse_length,
-          tangent(end),
-          end.inverse_length,
-          tangent(middle),
-          middle.inverse_length,
-          planar ? 0.0 : turn_of_directors(start, end)};
+  return {start.tangent,         start.inverse_length,         end.tangent, end.inverse_length, middle.tangent,
+          middle.inverse_length, turn_of_directors(start, end)};
 }
 
-/// Bending and twisting of a stencil.
+/// Bending and twisting of a stencil in space.
 void Equations::discrete_bend_local(int stencil, bool with_matrix, Local& local) const {
   const BendStencil& s = model_.bend[at(stencil)];
-  const bool planar = model_.planar();
-  const int step = planar ? 2 : 4;
-  clear(local, planar ? 6 : 11, with_matrix);
+  clear(local, 11, with_matrix);
   // An edge against its rod has its head where the stencil has its tail.
   EdgePlace place[2];
   for (int k = 0; k < 2; ++k) {
-    const int first = step * k, second = step * (k + 1);
-    place[k] = {s.sign[k] > 0 ? first : second, s.sign[k] > 0 ? second : first, planar ? -1 : first + 3,
-                model_.dimension};
+    const int first = 4 * k, second = 4 * (k + 1);
+    place[k] = {s.sign[k] > 0 ? first : second, s.sign[k] > 0 ? second : first, first + 3};
   }
   const MovingEdge<double> edge[2] = {moving_edge(s.edge[0]), moving_edge(s.edge[1])};
-  DiscreteMoment<double> m{};
-  EdgeColumns<double> columns[2];
-  if (planar) {
-    Vec3d t0[2], t1[2];
-    for (int k = 0; k < 2; ++k) {
-      t0[k] = in_plane(start_.edge[at(s.edge[k])], s.sign[k]);
-      t1[k] = in_plane(end_.edge[at(s.edge[k])], s.sign[k]);
-    }
-    const PlanarMoment p = planar_moment(elastic.measure, t0[0], t1[0], t0[1], t1[1], start_.bend_strain(stencil, 0),
-                                         end_.bend_strain(stencil, 0), elastic.bend_natural(stencil, 0),
-                                         elastic.bend_stiffness(stencil, 0));
-    m.moment = {0.0, 0.0, p.moment};
-    m.by_a.row[2] = {0.0, 0.0, p.by_a};
-    m.by_b.row[2] = {0.0, 0.0, p.by_b};
-    for (int k = 0; k < 2; ++k)
-      columns[k] = edge_columns(k == 0 ? m.by_a : m.by_b, flat(edge[k].t1, edge[k].inverse_length1));
-  } else {
-    EdgeFrame<double> f0[2], f1[2];
-    for (int k = 0; k < 2; ++k) {
-      f0[k] = oriented(start_.edge[at(s.edge[k])], s.sign[k]);
-      f1[k] = oriented(end_.edge[at(s.edge[k])], s.sign[k]);
-    }
-    discrete_moment<true>(elastic.measure, f0[0], f1[0], f0[1], f1[1], row_of(start_.bend_strain, stencil),
-                          row_of(end_.bend_strain, stencil), row_of(elastic.bend_natural, stencil),
-                          row_of(elastic.bend_stiffness, stencil), m);
-    for (int k = 0; k < 2; ++k) columns[k] = edge_columns(k == 0 ? m.by_a : m.by_b, end_.edge[at(s.edge[k])]);
+  EdgeFrame<double> f0[2], f1[2];
+  for (int k = 0; k < 2; ++k) {
+    f0[k] = oriented(start_.edge[at(s.edge[k])], s.sign[k]);
+    f1[k] = oriented(end_.edge[at(s.edge[k])], s.sign[k]);
   }
+  DiscreteMoment<double> m{};
+  discrete_moment<true>(elastic.measure, f0[0], f1[0], f0[1], f1[1], row_of(start_.bend_strain, stencil),
+                        row_of(end_.bend_strain, stencil), row_of(elastic.bend_natural, stencil),
+                        row_of(elastic.bend_stiffness, stencil), m);
+  EdgeColumns<double> columns[2];
+  for (int k = 0; k < 2; ++k) columns[k] = edge_columns(k == 0 ? m.by_a : m.by_b, end_.edge[at(s.edge[k])]);
   const Vec3d moment[2] = {m.moment, -m.moment};
   for (int i = 0; i < 2; ++i) {
     const EdgeFrame<double>& middle = middle_.edge[at(s.edge[i])];
     add_edge_forces(local, place[i], edge[i], middle, moment[i]);
     for (int j = 0; with_matrix && j < 2; ++j) {
       EdgeBlock<double> block = edge_block(edge[i], i == 0 ? 1.0 : -1.0, columns[j]);
-      finish_block(place[i], edge[i], middle, moment[i], i == j, block);
+      finish_block(edge[i], middle, moment[i], i == j, block);
       add_edge_rows(local, place[i], place[j], block);
     }
   }
@@ -207,32 +260,26 @@ void Equations::discrete_bend_local(int stencil, bool with_matrix, Local& local)
 void Equations::discrete_planar_half_local(int stencil, Local& local) const {
   const FrameStencil& s = model_.half[at(stencil)];
   clear(local, 5);
-  const MovingEdge<double> edge = moving_edge(s.edge);
   const Vec3d f0 = in_plane(start_.attached[at(stencil)], 1.0), f1 = in_plane(end_.attached[at(stencil)], 1.0);
+  const Vec3d t0 = in_plane(start_.edge[at(s.edge)], 1.0), t1 = in_plane(end_.edge[at(s.edge)], 1.0);
   const double kappa0 = start_.half_strain(stencil, 0), kappa1 = end_.half_strain(stencil, 0);
   const double natural = elastic.half_natural(stencil, 0), stiffness = elastic.half_stiffness(stencil, 0);
-  const PlanarMoment p =
-      s.frame_first ? planar_moment(elastic.measure, f0, f1, edge.t0, edge.t1, kappa0, kappa1, natural, stiffness)
-                    : planar_moment(elastic.measure, edge.t0, edge.t1, f0, f1, kappa0, kappa1, natural, stiffness);
+  const PlanarMoment p = s.frame_first
+                             ? planar_moment(elastic.measure, f0, f1, t0, t1, kappa0, kappa1, natural, stiffness)
+                             : planar_moment(elastic.measure, t0, t1, f0, f1, kappa0, kappa1, natural, stiffness);
   const double sign = s.frame_first ? -1.0 : 1.0;  // of the moment on the edge
   const double by_edge = s.frame_first ? p.by_b : p.by_a, by_frame = s.frame_first ? p.by_a : p.by_b;
-  const EdgePlace place{0, 2, -1, 2};
-  const Vec3d moment{0.0, 0.0, sign * p.moment};
-  Mat3<double> by_spin{};
-  by_spin.row[2].z = by_edge;
-  const EdgeColumns<double> columns = edge_columns(by_spin, flat(edge.t1, edge.inverse_length1));
-  EdgeBlock<double> block = edge_block(edge, sign, columns);
-  finish_block(place, edge, middle_.edge[at(s.edge)], moment, true, block);
-  add_edge_forces(local, place, edge, middle_.edge[at(s.edge)], moment);
-  add_edge_rows(local, place, place, block);
+  const PlanarEdge edge(start_.edge[at(s.edge)], middle_.edge[at(s.edge)], end_.edge[at(s.edge)]);
+  const int ends[2] = {0, 2};
+  const Vector2 column = edge.column(by_edge), by_turn = 2.0 * sign * by_frame * edge.force;
+  add_planar_force(local, ends[0], ends[1], sign * p.moment * edge.force);
+  add_planar_rows(local, ends, ends, sign * edge.force * column.transpose() + edge.geometry(sign * p.moment));
   local.gradient[4] = -sign * p.moment;
-  const Vec3d by_turn = edge.force({0.0, 0.0, 2.0 * sign * by_frame});
-  const double f[2] = {by_turn.x, by_turn.y}, c[2] = {columns.edge.row[2].x, columns.edge.row[2].y};
   for (int i = 0; i < 2; ++i) {
-    local.hessian[2 + i][4] += f[i];
-    local.hessian[i][4] -= f[i];
-    local.hessian[4][2 + i] -= 2.0 * sign * c[i];
-    local.hessian[4][i] += 2.0 * sign * c[i];
+    local.hessian[2 + i][4] += by_turn(i);
+    local.hessian[i][4] -= by_turn(i);
+    local.hessian[4][2 + i] -= 2.0 * sign * column(i);
+    local.hessian[4][i] += 2.0 * sign * column(i);
   }
   local.hessian[4][4] = -2.0 * sign * by_frame;
 }
@@ -252,11 +299,11 @@ void Equations::discrete_half_local(int stencil, Local& local) const {
                         row_of(elastic.half_natural, stencil), row_of(elastic.half_stiffness, stencil), m);
   const double sign = first ? -1.0 : 1.0;  // of the moment on the edge
   const Mat3<double>&by_edge = first ? m.by_b : m.by_a, &by_frame = first ? m.by_a : m.by_b;
-  const EdgePlace place{0, 4, 3, 3};
+  const EdgePlace place{0, 4, 3};
   const Vec3d moment = sign * m.moment;
   const EdgeColumns<double> columns = edge_columns(by_edge, e1);
   EdgeBlock<double> block = edge_block(edge, sign, columns);
-  finish_block(place, edge, middle_.edge[at(s.edge)], moment, true, block);
+  finish_block(edge, middle_.edge[at(s.edge)], moment, true, block);
   add_edge_forces(local, place, edge, middle_.edge[at(s.edge)], moment);
   add_edge_rows(local, place, place, block);
 
@@ -350,7 +397,10 @@ void Equations::add_discrete_gradient(const VectorX& z, bool with_matrix, const 
     add(assembler_.stretch, e);
   };
   const auto add_bend = [&](int b) {
-    discrete_bend_local(b, with_matrix, local);
+    if (model_.planar())
+      planar_bend_local(model_, elastic, start_, middle_, end_, b, with_matrix, local);
+    else
+      discrete_bend_local(b, with_matrix, local);
     add(assembler_.bend, b);
   };
   if (model_.planar()) {
