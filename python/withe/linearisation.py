@@ -143,11 +143,11 @@ class Linearisation:
         size = self._mass.shape[0]
         if not 1 <= count <= size:
             raise ValueError(f"count must be between 1 and {size}, got {count}")
-        shift = self._shift()
+        shift, block = self._shift()
         if count > size // _FULL:
             squares, shapes = self._full(shift)
         else:
-            squares, shapes, _ = self._krylov(shift, count)
+            squares, shapes, _ = self._krylov(shift, count, block)
         chosen = _lowest(squares, count, self._symmetric)
         squares, shapes = squares[chosen], shapes[:, chosen]
         if self._symmetric:
@@ -164,16 +164,21 @@ class Linearisation:
         twice = (shapes * (self._geometric @ shapes)).sum(axis=0) + self._stiffnesses @ strains**2
         return np.asarray(twice / (shapes * (self._mass @ shapes)).sum(axis=0))
 
-    def _shift(self) -> float:
+    def _shift(self) -> tuple[float, int]:
         """A square of a frequency s near that of the slowest motion that is not neutral, and above any that diverges.
 
         Within some powers of ten is near enough: what is neutral then is great in the inverse, and what is not has its
-        digits.
+        digits. And the width of a Krylov block that holds all neutral motions, seven for each free rod, and some that
+        are not: a block finds no more motions of one frequency than it has columns.
         """
+        block = _BLOCK
         nodes = max(2, self._displacement.shape[0] // 3)
         shift = float(np.median(np.abs(self._assembled.diagonal()) / self._mass.diagonal())) / nodes**4
         for _ in range(40):
-            squares, _, _ = self._krylov(shift, 1, rounds=2)
+            squares, _, _ = self._krylov(shift, 1, block, rounds=2)
+            if block < self._mass.shape[0] and (np.abs(squares) < 1e-3 * shift).all():
+                block *= 2
+                continue
             moving = np.abs(squares[np.abs(squares) > _NEUTRAL * shift])
             slowest = moving.min() if len(moving) else _NEUTRAL * shift
             if 1e-7 * slowest < shift < 10.0 * slowest:
@@ -181,7 +186,7 @@ class Linearisation:
             shift = 0.1 * slowest
         while self._symmetric and self._falling(shift):
             shift *= 4.0
-        return float(shift)
+        return float(shift), block
 
     def _falling(self, shift: float) -> int:
         """How many motions have a square below -shift: pivots that are negative [Sylvester's law of inertia]."""
@@ -218,7 +223,7 @@ class Linearisation:
         return solve
 
     def _krylov(
-        self, shift: float, count: int, rounds: int | None = None
+        self, shift: float, count: int, width: int = _BLOCK, rounds: int | None = None
     ) -> tuple[npt.NDArray[Any], npt.NDArray[Any], FloatArray]:
         """Squares nearest to -shift, shapes and residuals, from a Krylov space of (K + shift M)^-1 M.
 
@@ -226,14 +231,14 @@ class Linearisation:
         """
         size = self._mass.shape[0]
         solve = self._inverse(shift)
-        start = np.random.default_rng(0).standard_normal((size, min(_BLOCK, size)))
+        start = np.random.default_rng(0).standard_normal((size, min(width, size)))
         block, _ = self._orthonormal(solve(self._mass @ start))
         basis, images = block, self._mass @ block
         projected = np.zeros((0, 0))
         step = 0
         while True:
             step += 1
-            width = block.shape[1]
+            columns = block.shape[1]
             answer = solve(self._mass @ block)
             column = images.T @ answer
             answer -= basis @ column
@@ -242,22 +247,22 @@ class Linearisation:
             column += again
             grown = np.zeros((basis.shape[1], basis.shape[1]))
             grown[: projected.shape[0], : projected.shape[1]] = projected
-            grown[:, -width:] = column
+            grown[:, -columns:] = column
             block, link = self._orthonormal(answer, scale=float(np.abs(column).max()))
             if self._symmetric:
                 inverses, vectors = np.linalg.eigh(0.5 * (grown + grown.T))
             else:
                 inverses, vectors = np.linalg.eig(grown)
-            residuals = np.linalg.norm(link @ vectors[-width:], axis=0)
+            residuals = np.linalg.norm(link @ vectors[-columns:], axis=0)
             order = np.argsort(-np.abs(inverses))
             done = bool((residuals[order[: count + 1]] <= _RESIDUAL * np.abs(inverses[order[: count + 1]])).all())
             whole = block.shape[1] == 0 or basis.shape[1] + block.shape[1] > size
             if (done and len(order) > count) or whole or step == rounds:
-                kept = order[: max(count + 1, _BLOCK)]
+                kept = order[: max(count + 1, width)]
                 return 1.0 / inverses[kept] - shift, basis @ vectors[:, kept], residuals[kept]
             projected = np.zeros((basis.shape[1] + block.shape[1], basis.shape[1]))
             projected[: basis.shape[1]] = grown
-            projected[basis.shape[1] :, -width:] = link
+            projected[basis.shape[1] :, -columns:] = link
             basis = np.hstack((basis, block))
             images = np.hstack((images, self._mass @ block))
 
