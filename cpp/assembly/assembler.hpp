@@ -82,6 +82,10 @@ class Assembler {
   void couple(const std::vector<int>& contact_unknowns, int width);
   /// As it was before rods came near each other.
   void forget_contacts(const std::vector<int>& contact_unknowns, int width);
+  /// Takes in groups of unknowns that custom forces couple, as far as they are not coupled yet.
+  void couple_groups(const std::vector<std::vector<int>>& groups);
+  /// As it was before they did.
+  void forget_groups();
   /// Another number whenever the solver is.
   int generation() const { return generation_; }
 
@@ -122,7 +126,8 @@ class Assembler {
   Symmetry symmetry_;
   SolverKind kind_;
   int generation_ = 0;
-  std::vector<std::vector<int>> cliques_;  ///< without contact
+  std::vector<std::vector<int>> cliques_;  ///< without contact and custom forces
+  std::vector<std::vector<int>> groups_;   ///< of custom forces
   SparsityPattern pattern_;
   std::unique_ptr<LinearSolver> solver_;
   std::vector<std::ptrdiff_t> diagonal_;

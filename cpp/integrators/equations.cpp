@@ -9,9 +9,12 @@ namespace {
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
-std::vector<std::string> asymmetries_of(const Loads& loads, const Contact* contact, FluidModel fluid,
+std::vector<std::string> asymmetries_of(const Loads& loads, const Contact* contact, const SceneDescription& scene,
                                         const Options& options) {
+  const FluidModel fluid = scene.fluid.model;
   std::vector<std::string> found;
+  if (scene.custom_implicit || (scene.has_custom_force && options.integrator == Integrator::statics))
+    found.emplace_back("custom forces that are solved for");
   if (loads.unsymmetric) found.emplace_back("follower loads or moments in 3D");
   if (options.integrator == Integrator::energy_momentum) found.emplace_back("energy-momentum steps");
   if (contact != nullptr && contact->unsymmetric()) found.emplace_back("implicit friction");
@@ -45,7 +48,7 @@ Equations::Equations(const Model& model, const Options& options)
     : model_(model),
       loads_(resolve_loads(model)),
       contact_(make_contact(model)),
-      asymmetries_(asymmetries_of(loads_, contact_.get(), model.description.fluid.model, options)),
+      asymmetries_(asymmetries_of(loads_, contact_.get(), model.description, options)),
       assembler_(model, loads_, asymmetries_.empty() ? Symmetry::symmetric : Symmetry::unsymmetric, options.solver),
       static_duration_(options.time_step) {
   if (contact_) {
@@ -55,6 +58,7 @@ Equations::Equations(const Model& model, const Options& options)
   custom_force = VectorX::Zero(model.dof_count);
   inverse_rest_ = model.edge_length.cwiseInverse();
   node_dof_drag_ = VectorX::Zero(model.dof_count);
+  if (model.description.has_custom_force) has_potential_ = false;
   for (const LoadPiece& piece : loads_.pieces)
     if (!withe::has_potential(model, piece)) has_potential_ = false;
   if (options.integrator == Integrator::statics) return;
@@ -164,6 +168,7 @@ void Equations::evaluate(const VectorX& z, bool with_matrix, const double* axial
   gradient_.setZero(model_.dof_count + kPadding);
   magnitude_.setZero(model_.dof_count + kPadding);
   last_z_ = z;
+  if (respond) ask_custom(z, with_matrix);
   if (contact_) find_contacts(z, with_matrix);
   const std::span<double> values = assembler_.solver().values();
   if (with_matrix) std::fill(values.begin(), values.end(), 0.0);
@@ -179,6 +184,7 @@ void Equations::evaluate(const VectorX& z, bool with_matrix, const double* axial
     add_elastic(*acting_, z, with_matrix, axial_force, out);
   }
   add_loads(z, with_matrix, out);
+  if (respond && with_matrix) add_custom_matrix(z);
   if (!resistance_.empty() && h_ != 0.0) add_resistance(z, with_matrix);
   if (contact_) add_contacts(with_matrix, out);
   if (h_ != 0.0 && inner_ == Inner::end && !model_.planar()) add_spin_couple(z);

@@ -89,6 +89,7 @@ World::Implementation::Implementation(const Implementation& other)
       ramps(other.ramps),
       load_values(other.load_values),
       custom_force(other.custom_force),
+      custom_moments(other.custom_moments),
       separated(other.separated),
       spatial(other.spatial),
       level(other.level),
@@ -119,8 +120,10 @@ World::Implementation::Implementation(const Implementation& other)
 
 /// Candidates and the order of elimination follow from the past: who goes on from here with none has the same bits.
 void World::Implementation::forget_contacts() {
-  for (Equations* system : {equations.get(), rescue_equations.get(), static_equations.get()})
+  for (Equations* system : {equations.get(), rescue_equations.get(), static_equations.get()}) {
     if (system && system->contact()) system->forget_contacts();
+    if (system) system->forget_custom();
+  }
 }
 
 void World::Implementation::forget_matrix() {
@@ -177,6 +180,7 @@ void World::Implementation::rebuild(Rebuild why) {
     ramps.assign(description.rods.size(), NaturalRamp{});
     motions.assign(description.supports.size(), SupportMotion{});
     custom_force = MatrixX3::Zero(model.node_count, 3);
+    custom_moments = MatrixX3::Zero(description.custom_moments ? model.node_count : 0, 3);
     for (std::size_t s = 0; s < motions.size(); ++s) {
       motions[s].position = motions[s].from_position = motions[s].to_position =
           node_position(model, state.q, model.supports[s].node);
@@ -226,6 +230,7 @@ void World::Implementation::remake_equations() {
   newton = std::make_unique<Newton>(model, options);
   equations = std::make_unique<Equations>(model, options);
   equations->loads().values = load_values;
+  if (Contact* contact = equations->contact()) contact->set_parameters(parameters);
   forget_matrix();
   reaction_current = false;
   state.acceleration_current = false;

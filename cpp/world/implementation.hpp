@@ -24,10 +24,10 @@ struct SupportMotion {
 /// How far something has come that goes evenly from a start to an end, at a time; from 0 to 1.
 double ramp_fraction(double time, double start, double end);
 
-/// Where an obstacle goes, as a way from where it is drawn.
+/// Where an obstacle goes.
 struct ObstacleMotion {
-  Vector3 from = Vector3::Zero(), to = Vector3::Zero();  ///< [m]
-  double start = 0, end = 0;                             ///< [s]
+  ObstacleWay from, to;
+  double start = 0, end = 0;  ///< [s]
 };
 
 /// What goes evenly from one value to another.
@@ -130,8 +130,9 @@ struct World::Implementation {
   std::vector<NaturalRamp> ramps;
   std::vector<Vector3> load_values;
   MatrixX3 custom_force;        ///< of the last step [N]
+  MatrixX3 custom_moments;      ///< likewise, where there are any [N m]
   VectorX custom_force_before;  ///< per unknown, at the start of an explicit step
-  World::ForceFunction force_function;
+  CustomFunction force_function;
   std::function<void(double, double)> callback;  ///< StepCallback, bound to its world
   std::function<void()> poll;
   std::atomic<bool> interrupted{false};
@@ -193,6 +194,9 @@ struct World::Implementation {
   void spread_jumps(double duration);
   void hold_now(HeldTarget& target) const;
   void set_motion_at(SupportMotion& motion, double time) const;
+  CustomForces custom_forces(double time, const VectorX& q, const VectorX& v, bool derivatives);
+  void solve_for_custom(Equations& target, double dt);
+  void solve_for_custom_at_rest(Equations& target, double time);
   /// Asks for custom forces at a time and a state, on each unknown.
   void ask_custom_force(Equations& target, double time, const VectorX& q, const VectorX& v);
   /// Those of a step of dt, which leads to where `work.held` says.
@@ -268,8 +272,9 @@ struct World::Implementation {
   /// Tells the contact of a step where obstacles are at its end; `release_obstacles`: that there is no step.
   void aim_obstacles(Equations& system, double time) const;
   static void release_obstacles(Equations& system);
-  Vector3 obstacle_way(int obstacle) const;
-  std::vector<ObstaclePlace> obstacle_places(const std::function<Vector3(int)>& way) const;
+  ObstacleWay obstacle_way(int obstacle) const;
+  std::vector<ObstaclePlace> obstacle_places(const std::function<ObstacleWay(int)>& way) const;
+  void check_turn(int obstacle, const Vector3& turn) const;
 
   // separation.cpp
   void separate();

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <optional>
 #include <utility>
 
 #include <Eigen/Eigenvalues>
@@ -168,26 +169,33 @@ Linearisation World::linearise() const {
   const Model& model = self.model;
   Equations& system = self.statics();
   self.update_custom_force(system);
+  self.solve_for_custom_at_rest(system, self.state.time);
   system.begin(self.state, self.parameters, 0.0, false);
   Evaluation& evaluation = self.work.newton.evaluation;
-  system.evaluate(self.state.q, false, nullptr, evaluation);
-  self.reaction_current = false;
-
   const SparseMatrix basis = free_basis(model), back = basis.transpose();
-  const StrainParts parts(system, self.state);
-  const ElasticCoefficients whole = std::exchange(system.elastic, parts.without());
+  std::optional<StrainParts> parts;
   try {
-    system.evaluate(self.state.q, true, nullptr, evaluation);
-  } catch (...) {
+    system.evaluate(self.state.q, false, nullptr, evaluation);
+    parts.emplace(system, self.state);
+    const ElasticCoefficients whole = std::exchange(system.elastic, parts->without());
+    try {
+      system.evaluate(self.state.q, true, nullptr, evaluation);
+    } catch (...) {
+      system.elastic = whole;
+      throw;
+    }
     system.elastic = whole;
+  } catch (...) {
+    system.respond = nullptr;
     throw;
   }
-  system.elastic = whole;
+  system.respond = nullptr;
+  self.reaction_current = false;
 
   Linearisation out;
   out.geometric = back * matrix_of(system.assembler()) * basis;
-  out.gradients = parts.gradients() * basis;
-  out.stiffnesses = parts.stiffnesses();
+  out.gradients = parts->gradients() * basis;
+  out.stiffnesses = parts->stiffnesses();
   out.mass = back * matrix_of(model, system.mass()) * basis;
   Entries moves;
   Matrix3 axes = Matrix3::Identity();

@@ -7,7 +7,7 @@
 namespace withe {
 namespace {
 
-constexpr std::uint64_t kMagic = 0x3853454854495755ull;
+constexpr std::uint64_t kMagic = 0x3953454854495755ull;
 
 /// FNV-1a.
 std::uint64_t hash_of(std::string_view bytes) {
@@ -53,6 +53,44 @@ std::vector<LoadDescription> read_added_loads(Reader& r, const SceneDescription&
     load.added = true;
   }
   return loads;
+}
+
+void write_friction(Writer& w, const ContactDescription& contact) {
+  w(contact.friction);
+  w(contact.obstacle_friction);
+  w(static_cast<std::int64_t>(contact.obstacle_across.size()));
+  w(contact.obstacle_across);
+  w(static_cast<std::int64_t>(contact.pairs.size()));
+  for (const ContactPairDescription& p : contact.pairs) {
+    w(p.first), w(p.second), w(p.ignored);
+    for (double x : {p.friction, p.across, p.stiffness, p.restitution}) w(x);
+  }
+}
+
+/// What a snapshot knows of friction, for the contact of a scene.
+ContactDescription read_friction(Reader& r, ContactDescription contact) {
+  r(contact.friction);
+  r(contact.obstacle_friction);
+  std::int64_t count = 0;
+  r(count);
+  require(count == 0 || count == contact.obstacle_friction.size(), "snapshot is damaged: impossible friction");
+  contact.obstacle_across.resize(count);
+  r(contact.obstacle_across);
+  r(count);
+  require(count >= 0 && count < 1 << 20, "snapshot is damaged: impossible number of pairs");
+  contact.pairs.assign(static_cast<std::size_t>(count), {});
+  for (ContactPairDescription& p : contact.pairs) {
+    r(p.first), r(p.second), r(p.ignored);
+    for (double* x : {&p.friction, &p.across, &p.stiffness, &p.restitution}) r(*x);
+  }
+  return contact;
+}
+
+bool same_friction(const ContactDescription& a, const ContactDescription& b) {
+  Writer of_a, of_b;
+  write_friction(of_a, a);
+  write_friction(of_b, b);
+  return of_a.bytes == of_b.bytes;
 }
 
 bool same_loads(const std::vector<LoadDescription>& added, const SceneDescription& scene) {
@@ -131,6 +169,7 @@ void exchange(Archive& io, Self& self) {
   }
   for (auto& v : self.load_values) io(v);
   io(self.custom_force);
+  if (self.description.custom_moments) io(self.custom_moments);
   for (auto* x : {&self.support_work, &self.actuation_work, &self.dissipated, &self.load_work}) io(*x);
   io(self.level);
   io(self.easy_steps);
@@ -165,8 +204,11 @@ void exchange(Archive& io, Self& self) {
   io(s.bend_tau);
   io(s.half_tau);
   for (auto& o : s.obstacles)
-    for (Vec3d* x : {&o.point, &o.other}) io(x->x), io(x->y), io(x->z);
-  for (auto& m : self.obstacle_motions) io(m.from), io(m.to), io(m.start), io(m.end);
+    for (Vec3d* x : {&o.point, &o.other, &o.turn}) io(x->x), io(x->y), io(x->z);
+  for (auto& m : self.obstacle_motions) {
+    for (ObstacleWay* way : {&m.from, &m.to}) io(way->shift), io(way->turn);
+    io(m.start), io(m.end);
+  }
   io(s.contact_stiffness);
   exchange_contacts(io, s.contacts);
   io(s.motion.known);
@@ -214,6 +256,7 @@ std::string World::snapshot() const {
     w(d.axis);
   }
   write_added_loads(w, self.description);
+  if (self.description.contact.any()) write_friction(w, self.description.contact);
   exchange(w, self);
   w(hash_of(w.bytes));
   return w.bytes;
@@ -278,6 +321,13 @@ void World::restore(const std::string& bytes) {
     loads.insert(loads.end(), added.begin(), added.end());
     fresh->load_values.resize(loads.size(), Vector3::Zero());
     fresh->remake_equations();
+  }
+  if (fresh->description.contact.any()) {
+    const ContactDescription contact = read_friction(r, fresh->description.contact);
+    if (!same_friction(contact, fresh->description.contact)) {
+      fresh->description.contact = fresh->model.description.contact = contact;
+      fresh->remake_equations();
+    }
   }
   if (!same) {
     fresh->spatial = spatial;
