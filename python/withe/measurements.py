@@ -15,7 +15,7 @@ from withe.parts import ObstaclePart
 from withe.readouts import Energy, Momentum, Plan, Reaction, RodEnergy, Statistics
 
 if TYPE_CHECKING:
-    from withe.recording import ObstacleOutline
+    from withe.outlines import ObstacleOutline
 
 __all__ = ["Measurements"]
 
@@ -199,7 +199,7 @@ class Measurements(Boundaries):
         )
 
     def _obstacle_outlines(self) -> list[ObstacleOutline]:
-        from withe.recording import ObstacleOutline
+        from withe.outlines import ObstacleOutline
 
         return [
             ObstacleOutline(

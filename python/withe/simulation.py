@@ -27,7 +27,8 @@ from withe.readouts import Equilibrium
 from withe.snapshots import Settings, Snapshot, matched_settings
 
 if TYPE_CHECKING:
-    from withe.recording import Record, Recorder
+    from withe.recorder import Recorder
+    from withe.recording import Record
 
 __all__ = ["Simulation"]
 
@@ -484,7 +485,7 @@ class Simulation(Control, Measurements):
         return self._frame().picture(path, **options)
 
     def _frame(self) -> Record:
-        from withe.recording import present
+        from withe.recorder import present
 
         return present(self, self._obstacle_outlines())
 
