@@ -68,8 +68,9 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
   aim_supports(time);
   Equations& system = statics();
   update_custom_force(system);
+  const MatrixX3 forces_before = custom_force, moments_before = custom_moments;
   const auto undo = [&] {
-    system.respond = nullptr;
+    forget_custom(system, forces_before, moments_before);
     release_obstacles(system);
     state = before;
     motions = motions_before;
@@ -149,6 +150,7 @@ EquilibriumPath World::equilibrium_path(const PathOptions& wanted) {
   };
   const State before = self.state;
   const std::vector<SupportMotion> motions_before = self.motions;
+  const MatrixX3 forces_before = self.custom_force, moments_before = self.custom_moments;
   EquilibriumPath out;
   ArcResult r;
   const auto set_loads = [&](const std::vector<Vector3>& values) {
@@ -203,7 +205,7 @@ EquilibriumPath World::equilibrium_path(const PathOptions& wanted) {
       m.start = m.end = self.state.time;
     }
   } catch (...) {
-    self.statics().respond = nullptr;
+    self.forget_custom(self.statics(), forces_before, moments_before);
     self.state = before;
     self.motions = motions_before;
     set_loads(full);

@@ -197,6 +197,8 @@ struct World::Implementation {
   CustomForces custom_forces(double time, const VectorX& q, const VectorX& v, bool derivatives);
   void solve_for_custom(Equations& target, double dt);
   void solve_for_custom_at_rest(Equations& target, double time);
+  /// Ends that, with custom forces as they were before.
+  void forget_custom(Equations& target, const MatrixX3& forces, const MatrixX3& moments);
   /// Asks for custom forces at a time and a state, on each unknown.
   void ask_custom_force(Equations& target, double time, const VectorX& q, const VectorX& v);
   /// Those of a step of dt, which leads to where `work.held` says.

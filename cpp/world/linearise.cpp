@@ -169,6 +169,7 @@ Linearisation World::linearise() const {
   const Model& model = self.model;
   Equations& system = self.statics();
   self.update_custom_force(system);
+  const MatrixX3 forces = self.custom_force, moments = self.custom_moments;
   self.solve_for_custom_at_rest(system, self.state.time);
   system.begin(self.state, self.parameters, 0.0, false);
   Evaluation& evaluation = self.work.newton.evaluation;
@@ -186,10 +187,10 @@ Linearisation World::linearise() const {
     }
     system.elastic = whole;
   } catch (...) {
-    system.respond = nullptr;
+    self.forget_custom(system, forces, moments);
     throw;
   }
-  system.respond = nullptr;
+  self.forget_custom(system, forces, moments);
   self.reaction_current = false;
 
   Linearisation out;

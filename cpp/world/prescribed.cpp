@@ -203,6 +203,13 @@ void World::Implementation::find_custom_force(Equations& target, double dt) {
   ask_custom_force(target, time, q, v);
 }
 
+void World::Implementation::forget_custom(Equations& target, const MatrixX3& forces, const MatrixX3& moments) {
+  target.respond = nullptr;
+  custom_force = forces;
+  custom_moments = moments;
+  update_custom_force(target);
+}
+
 void World::Implementation::update_custom_force(Equations& target) const {
   if (description.has_custom_force) target.set_custom(custom_force, custom_moments);
 }
