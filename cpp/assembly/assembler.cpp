@@ -173,9 +173,26 @@ void Assembler::order_for(const std::vector<int>& contact_unknowns, int width) {
   analyse();
 }
 
+void Assembler::couple_groups(const std::vector<std::vector<int>>& groups) {
+  const std::size_t known = groups_.size();
+  for (const std::vector<int>& group : groups)
+    if (!std::all_of(group.begin(), group.end(), [&](int row) {
+          return std::all_of(group.begin(), group.end(), [&](int column) { return pattern_.contains(row, column); });
+        }))
+      groups_.push_back(group);
+  if (groups_.size() > known) analyse();
+}
+
+void Assembler::set_groups(const std::vector<std::vector<int>>& groups) {
+  if (groups == groups_) return;
+  groups_ = groups;
+  analyse();
+}
+
 /// The pattern of all tables, its solver, and where everything goes.
 void Assembler::analyse() {
   std::vector<std::vector<int>> cliques = cliques_;
+  cliques.insert(cliques.end(), groups_.begin(), groups_.end());
   for (int e = 0; e < contact.count(); ++e) cliques.emplace_back(contact.dofs(e), contact.dofs(e) + contact.width());
   pattern_ = SparsityPattern::from_cliques(model_.dof_count, cliques);
   solver_ = make_linear_solver(pattern_, symmetry_, kind_);

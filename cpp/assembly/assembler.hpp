@@ -82,6 +82,11 @@ class Assembler {
   void couple(const std::vector<int>& contact_unknowns, int width);
   /// Takes in contacts likewise, with an order of elimination for these and no others.
   void order_for(const std::vector<int>& contact_unknowns, int width);
+  /// Takes in groups of unknowns that custom forces couple, as far as they are not coupled yet.
+  void couple_groups(const std::vector<std::vector<int>>& groups);
+  /// These and no others.
+  void set_groups(const std::vector<std::vector<int>>& groups);
+  const std::vector<std::vector<int>>& groups() const { return groups_; }
   /// Another number whenever the solver is.
   int generation() const { return generation_; }
 
@@ -122,7 +127,8 @@ class Assembler {
   Symmetry symmetry_;
   SolverKind kind_;
   int generation_ = 0;
-  std::vector<std::vector<int>> cliques_;  ///< without contact
+  std::vector<std::vector<int>> cliques_;  ///< without contact and custom forces
+  std::vector<std::vector<int>> groups_;   ///< of custom forces
   SparsityPattern pattern_;
   std::unique_ptr<LinearSolver> solver_;
   std::vector<std::ptrdiff_t> diagonal_;

@@ -157,6 +157,7 @@ void Contact::begin(const State& state, double duration) {
   duration_ = duration;
   eased_ = 1.0;
   shift_.clear();
+  turn_.clear();
   blocked_ = false;
   place_obstacles(state.obstacles);
   lagged_.clear();
@@ -177,7 +178,7 @@ void Contact::begin(const State& state, double duration) {
   start_pressing_ = pressing_energy();
   if (!target_.empty()) move_obstacles();
   if (frictional_ && freezes()) freeze();
-  if (!shift_.empty()) place_obstacles(target_);
+  if (!shift_.empty() || !turn_.empty()) place_obstacles(target_);
 }
 
 void Contact::place_obstacles(const std::vector<ObstaclePlace>& places) { moved_ += 2.0 * surfaces_.place(places); }
@@ -185,11 +186,14 @@ void Contact::place_obstacles(const std::vector<ObstaclePlace>& places) { moved_
 /// Finds the ways of obstacles. Rods follow once these are at their ends: a step in which one would pass through a
 /// centreline that stays is too long.
 void Contact::move_obstacles() {
-  double most = 0.0;
+  double most = 0.0, most_turn = 0.0;
   for (std::size_t o = 0; o < target_.size(); ++o) {
     shift_.push_back(target_[o].point - state_->obstacles[o].point);
+    turn_.push_back(target_[o].turn - state_->obstacles[o].turn);
     most = std::max(most, dot(shift_.back(), shift_.back()));
+    most_turn = std::max(most_turn, dot(turn_.back(), turn_.back()));
   }
+  if (most_turn == 0.0) turn_.clear();
   if (most == 0.0) {
     shift_.clear();
     return;
@@ -199,10 +203,11 @@ void Contact::move_obstacles() {
 }
 
 double Contact::obstacle_work() const {
-  if (shift_.empty()) return 0.0;
   double work = 0.0;
+  if (!turn_.empty())
+    for (const Touching& t : touching_) work += turning_work(t);
   ContactLocal local;
-  for (int i = 0; i < count(); ++i) {
+  for (int i = 0; i < count() && !shift_.empty(); ++i) {
     const Vec3d shift = shift_of(pair_of(i));
     if (dot(shift, shift) == 0.0) continue;
     this->local(i, false, local);

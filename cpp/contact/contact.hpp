@@ -168,7 +168,8 @@ class Contact {
     double slip[3][kContactUnknowns];
     double pressing = 0;  ///< times how far from sticking the contact starts, if semi-explicit [N]
     Vec3d direction{};
-    Vec3d drift{};  ///< what an obstacle moves along the surface [m]
+    Vec3d drift{};   ///< what an obstacle moves along the surface [m]
+    Vec3d turned{};  ///< of that, what it does by turning [m]
   };
   struct FrozenForce {
     Vec3d force{};       ///< on the slip, against it: minus friction on a [N]
@@ -251,6 +252,12 @@ class Contact {
   Vec3d shift_of(const ContactPair& pair) const {
     return pair.key.b < 0 && !shift_.empty() ? shift_[static_cast<std::size_t>(-1 - pair.key.b)] : Vec3d{};
   }
+  /// By which it turns then [rad].
+  Vec3d turn_of(const ContactPair& pair) const {
+    return pair.key.b < 0 && !turn_.empty() ? turn_[static_cast<std::size_t>(-1 - pair.key.b)] : Vec3d{};
+  }
+  /// Work of the obstacle's turning against friction [J].
+  double turning_work(const Touching& t) const;
   const ContactRecord* record_of(const ContactKey& key) const;
   double change_stiffness(const Touching& t, double ratio, double yielded, ContactRecord& record) const;
   double yielded_at(const Touching& t, double ratio, Keep keep) const;
@@ -286,6 +293,7 @@ class Contact {
   double moved_ = 0;            ///< farthest that a node may have gone, summed over all q1 so far [m]
   std::vector<ObstaclePlace> target_;
   std::vector<Vec3d> shift_;  ///< of each obstacle in this step [m]; empty: none moves
+  std::vector<Vec3d> turn_;   ///< likewise [rad]; empty: none turns
   bool blocked_ = false;
   std::vector<ContactKey> unrecorded_;  ///< what touches at the start of the step and has no record
   bool starting_ = false;

@@ -62,6 +62,7 @@ FrictionSetting Contact::setting(const Touching& t) const {
   f.spatial = !model_.planar();
   f.centreline = contact.centreline_friction;
   f.drift = shift_of(pair);
+  f.turn = turn_of(pair);
   f.foreseen = foreseen(t);
   values_at(pair, state_->q, f.start);
   if (!f.spatial) return f;
@@ -78,6 +79,22 @@ void Contact::add_friction(const Touching& t, bool with_hessian, ContactLocal& o
   const SlippingSurfaces<double> surfaces = slipping_surfaces(f, now);
   add_friction_gradient(f, surfaces, out.gradient);
   if (with_hessian) add_friction_jacobian(f, surfaces, out.hessian);
+}
+
+/// Friction's force on the obstacle, the opposite of that on a, times the way of the surface.
+double Contact::turning_work(const Touching& t) const {
+  const ContactPair& pair = pairs_[at(t.pair)];
+  const Vec3d turn = turn_of(pair);
+  if (!(pair.friction > 0.0) || dot(turn, turn) == 0.0) return 0.0;
+  if (t.frozen >= 0) return -dot(frozen_force(t).force, frozen_[at(t.frozen)].turned);
+  if (freezes()) return 0.0;
+  const FrictionSetting f = setting(t);
+  double now[kContactUnknowns];
+  values_at(pair, q1_, now);
+  Vec3d x[4];
+  end_points(pair, q1_, x);
+  const SlippingSurfaces<double> c = slipping_surfaces(f, now);
+  return -dot(c.friction.force, cross(turn, obstacle_arm(f, c, x)));
 }
 
 /// Columns of J at the start, where frames have not turned yet, for all that touches there.
@@ -116,7 +133,13 @@ void Contact::freeze() {
       frozen.slip[1][i] = c.y;
       frozen.slip[2][i] = c.z;
     }
-    const Vec3d shift = shift_of(pair);
+    const Vec3d turn = turn_of(pair);
+    if (dot(turn, turn) > 0.0) {
+      const Vec3d touched = pair.plane() ? x[pair.key.end] - t.distance * t.normal
+                                         : x[2] + t.points.t * (x[3] - x[2]) + pair.radius_b * t.normal;
+      frozen.turned = cross(turn, touched - x[2]);
+    }
+    const Vec3d shift = shift_of(pair) + frozen.turned;
     frozen.drift = shift - dot(shift, t.normal) * t.normal;
     if (model_.description.contact.friction_law == FrictionLaw::semi_explicit) set_direction(pair, frozen);
     lagged_.push_back(t);

@@ -44,8 +44,8 @@ double Contact::energy() const {
     double now[kContactUnknowns], unused[kContactUnknowns] = {};
     values_at(pair, q1_, now);
     const FrictionSetting f = setting(t);
-    const Vec3d stick = friction_gradient(f, now, unused).stick;
-    sum += 0.5 * f.tangential_stiffness * dot(stick, stick);
+    const FrictionForce<double> anchor = friction_gradient(f, now, unused);
+    sum += 0.5 * dot(anchor.force, anchor.stick);
   }
   return sum;
 }
@@ -90,7 +90,7 @@ double Contact::friction_loss(const VectorX& change) const {
       add_friction(t, false, local);
     else
       continue;
-    loss += work_against(i, local, change);
+    loss += work_against(i, local, change) + turning_work(t);
     if (!anchored()) continue;
     const ContactRecord end = record(t);
     loss += dot(end.friction, end.stick - t.stick);
@@ -134,12 +134,11 @@ double Contact::yielded_at(const Touching& t, double ratio, Keep keep) const {
 /// force, others their energy, and so their elastic slip changes. Returns the energy put in.
 double Contact::change_stiffness(const Touching& t, double ratio, double yielded, ContactRecord& record) const {
   const ContactPair& pair = pairs_[at(t.pair)];
-  const double anchor = tangential_stiffness(pair, t.stiffness);
   const double energy =
       ratio * t.stiffness * contact_energy(t.law.law, t.distance + yielded, pair.radii(), pair.tolerance).value;
   const double shorter = ratio > 1.0 ? 1.0 / ratio : 1.0 / std::sqrt(ratio);
   const double put_in =
-      energy - t.energy.value + 0.5 * anchor * dot(record.stick, record.stick) * (ratio * shorter * shorter - 1.0);
+      energy - t.energy.value - 0.5 * dot(record.friction, record.stick) * (ratio * shorter * shorter - 1.0);
   record.stick = shorter * record.stick;
   record.stiffness *= ratio;
   record.yielded = yielded;

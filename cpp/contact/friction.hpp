@@ -9,6 +9,10 @@
 ///   implicit, lagged: F = mu N tanh(K |S| / (2 dt)) S / |S|, K = 15 / nu [Choi, dissertation, (5.7)-(5.14),
 ///                     there between centrelines]
 ///   anchored:         F = k_t (stick + S), of length mu N at most: an elastic stick that slips [Simo and Hughes 1998]
+/// Where an obstacle has one coefficient along a rod and another across it, F is that of the greater coefficient, mu,
+/// times the matrix (mu_t / mu) tt^T + (mu_n / mu) (1 - tt^T), t the rod's tangent along the surface: for a slip in the
+/// direction s, F = N (mu_t (s . t) t + mu_n (s . n) n) [Hu, Nirody, Scott and Shelley 2009, eq. 1]. That matrix is
+/// symmetric and not negative, so F . S is not either.
 
 #include <cmath>
 
@@ -36,6 +40,7 @@ struct FrictionSetting {
   double tangential_stiffness = 0;  ///< of an anchor [N/m]
   double rate = 0;                  ///< K / (2 dt) [1/m]
   Vec3d drift{};                    ///< way of an obstacle in the step [m]
+  Vec3d turn{};                     ///< by which it turns then about its own axis [rad]
   Vec3d stick{};                    ///< at the start of the step [m]
   bool spatial = true, centreline = false;
   const Vec3d* foreseen = nullptr;  ///< friction over its limit, as a step of Newton's method reckons with it
@@ -156,7 +161,9 @@ struct SlippingSurfaces {
   PressingForce law;               ///< of minus N
   double before = 0;               ///< distance at the start of the step [m]
   Scalar w[4];
-  Vec3<Scalar> way;  ///< slip, with its part along the normal [m]
+  Vec3<Scalar> way;      ///< slip, with its part along the normal [m]
+  Vec3<Scalar> along{};  ///< the rod's tangent, without its part along the normal, where its direction counts
+  Vec3<Scalar> plain{};  ///< the force of the greater coefficient
   FrictionForce<Scalar> friction;
 };
 
@@ -200,6 +207,28 @@ void find_contact(const FrictionSetting& f, const Vec3<Scalar> (&x)[4], Slipping
   if (pair.rod_b < 0) c.w[2] = c.w[3] = Scalar(0.0);
 }
 
+/// From where an obstacle is placed to where it is touched [m].
+template <class Scalar>
+Vec3<Scalar> obstacle_arm(const FrictionSetting& f, const SlippingSurfaces<Scalar>& c, const Vec3<Scalar> (&x)[4]) {
+  const ContactPair& pair = *f.pair;
+  if (!pair.plane()) return c.t * c.sides[1].edge + Scalar(pair.radius_b) * c.normal;
+  const Vec3d& point = f.obstacle->point;
+  return x[pair.key.end] - c.distance * c.normal - Vec3<Scalar>{Scalar(point.x), Scalar(point.y), Scalar(point.z)};
+}
+
+/// Friction of the greater coefficient, as it is along and across the rod.
+template <class Scalar>
+void direct_friction(const FrictionSetting& f, SlippingSurfaces<Scalar>& c) {
+  using std::sqrt;
+  const ContactPair& pair = *f.pair;
+  const Vec3<Scalar>& e = c.sides[0].edge;
+  const Vec3<Scalar> t = (1.0 / sqrt(dot(e, e))) * e;
+  c.along = t - dot(t, c.normal) * c.normal;
+  c.plain = c.friction.force;
+  c.friction.force =
+      Scalar(pair.across) * c.plain + (Scalar(pair.along - pair.across) * dot(c.along, c.plain)) * c.along;
+}
+
 /// How far the surfaces have slipped, and the friction on that.
 template <class Scalar>
 SlippingSurfaces<Scalar> slipping_surfaces(const FrictionSetting& f, const Scalar (&unknown)[kContactUnknowns]) {
@@ -230,7 +259,9 @@ SlippingSurfaces<Scalar> slipping_surfaces(const FrictionSetting& f, const Scala
     }
     c.way += Scalar(b == 0 ? 1.0 : -1.0) * cross(side.turn, side.arm);
   }
+  if (dot(f.turn, f.turn) > 0.0) c.way = c.way - cross(lift(f.turn), obstacle_arm(f, c, x));
   c.friction = friction_force(f, c.normal, c.way - dot(c.way, c.normal) * c.normal, c.pressing);
+  if (!f.pair->isotropic()) direct_friction(f, c);
   return c;
 }
 

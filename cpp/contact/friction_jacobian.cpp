@@ -88,6 +88,29 @@ Vec3d turn_of(const FrictionSetting& f, const SlippingSurfaces<double>& c) {
   return turn;
 }
 
+/// Of `obstacle_arm`.
+Vec3d obstacle_arm_slope(const FrictionSetting& f, const SlippingSurfaces<double>& c, const Slopes& d, int j) {
+  if (!f.pair->plane()) return d.t[j] * c.sides[1].edge + f.pair->radius_b * d.lever[j];
+  return j < 3 ? kAxis[j] - c.normal[j] * c.normal : Vec3d{};
+}
+
+/// From the force of the greater coefficient to that of `direct_friction`; the normal of an obstacle turns by `lever`.
+void direct_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& c, Slopes& d) {
+  const double across = f.pair->across, more = f.pair->along - across;
+  const Vec3d &e = c.sides[0].edge, &n = c.normal;
+  const double inverse = 1.0 / std::sqrt(dot(e, e));
+  const Vec3d t = inverse * e;
+  const double share = dot(c.along, c.plain);
+  for (int j = 0; j < kWays; ++j) {
+    const int k = j - kEdge[0];
+    const Vec3d turned = k >= 0 && k < 3 ? inverse * (kAxis[k] - t[k] * t) : Vec3d{};
+    const Vec3d& leant = d.lever[j];
+    const Vec3d along = turned - (dot(turned, n) + dot(t, leant)) * n - dot(t, n) * leant;
+    d.force[j] = across * d.force[j] + (more * (dot(along, c.plain) + dot(c.along, d.force[j]))) * c.along +
+                 (more * share) * along;
+  }
+}
+
 /// The slip, with the part along the normal that it loses as that turns, and the force on it.
 void add_force_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& c, const Vec3d& lever, Slopes& d) {
   const Vec3d &n = c.normal, turn = turn_of(f, c);
@@ -101,6 +124,7 @@ void add_force_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& 
     const Vec3d across = c.inverse * d.between[j];
     Vec3d moved = d.s[j] * change_a - d.t[j] * change_b + cross(lever, d.turn[j]) - cross(turn, d.lever[j]);
     if (j < 3) moved += kAxis[j];
+    if (dot(f.turn, f.turn) > 0.0) moved -= cross(f.turn, obstacle_arm_slope(f, c, d, j));
     moved -= off * across;
     d.force[j] = g.factor * moved - (g.factor * (dot(n, moved) + dot(slip, across))) * n +
                  (2.0 * g.by_square * dot(slip, moved)) * reckoned + (g.by_pressing * d.pressing[j]) * slip;
@@ -178,6 +202,7 @@ void add_friction_jacobian(const FrictionSetting& f, const SlippingSurfaces<doub
   add_contact_slopes(f, c, d);
   add_turn_slopes(f, c, d);
   add_force_slopes(f, c, lever, d);
+  if (!f.pair->isotropic()) direct_slopes(f, c, d);
   for (int j = 0; j < kWays; ++j) d.moment[j] = cross(d.force[j], lever) + cross(force, d.lever[j]);
   for (int b = 0; b < (obstacle ? 1 : 2); ++b) add_rows(f, c, b, cross(force, lever), d, jacobian);
 }

@@ -45,7 +45,7 @@ bool Surfaces::set_own(int first, int second, ContactPair& pair) const {
   for (const ContactPairDescription& p : model_.description.contact.pairs)
     if ((p.first == first && p.second == second) || (p.first == second && p.second == first)) {
       touches = !p.ignored;
-      if (p.friction >= 0.0) pair.friction = p.friction;
+      if (p.friction >= 0.0) pair.set_friction(p.friction, p.across >= 0.0 ? p.across : p.friction);
       pair.stiffness = p.stiffness;
       if (p.restitution >= 0.0) pair.restitution = p.restitution;
     }
@@ -147,7 +147,10 @@ void Surfaces::add_obstacles() {
       p.radius_a = radius(e);
       p.radius_b = d.radius;
       p.tolerance = tolerance(e);
-      p.friction = contact.obstacle_friction(static_cast<Eigen::Index>(o));
+      const auto row = static_cast<Eigen::Index>(o);
+      p.set_friction(contact.obstacle_friction(row), contact.obstacle_across.size() > 0
+                                                         ? contact.obstacle_across(row)
+                                                         : contact.obstacle_friction(row));
       if (contact.obstacle_restitution.size() > 0)
         p.restitution = contact.obstacle_restitution(static_cast<Eigen::Index>(o));
       if (!set_own(p.rod_a, body, p)) continue;

@@ -19,7 +19,8 @@ struct ContactPair {
   double tolerance = 0;               ///< delta [m]
   double weight_a = 0, weight_b = 0;  ///< of closest_points [m^2]
   double share = 1;                   ///< of a node's contact with a plane, which its two edges share
-  double friction = 0;                ///< [-]
+  double friction = 0;                ///< [-]; the greater one, where it is not the same along and across a rod
+  double along = 1, across = 1;       ///< that in these directions of a, over it
   double stiffness = 0;               ///< of its own [N/m]; 0: none
   double restitution = 1;             ///< [-]
   int element = -1;                   ///< row of its unknowns in the matrix's table; -1: none yet
@@ -29,6 +30,12 @@ struct ContactPair {
   double nearest() const { return kNearest * radii(); }
   double small_radius() const { return rod_b < 0 || radius_a < radius_b ? radius_a : radius_b; }
   bool plane() const { return key.end >= 0; }
+  bool isotropic() const { return along == across; }
+  void set_friction(double mu_along, double mu_across) {
+    friction = mu_along > mu_across ? mu_along : mu_across;
+    along = friction > 0.0 ? mu_along / friction : 1.0;
+    across = friction > 0.0 ? mu_across / friction : 1.0;
+  }
 };
 
 /// An obstacle in the axes of the unknowns (in a plane: its two, and zero).

@@ -154,6 +154,26 @@ void pressure_on_edge(const Model& model, const VectorX& q, int edge, const Vect
     }
 }
 
+/// Custom moments: each on the joint at its node, or else shared evenly by the edges there.
+void add_node_moments(const Model& model, Loads& loads) {
+  loads.node_moments.assign(at(model.node_count), Vector3::Zero());
+  std::vector<std::vector<int>> edges(at(model.node_count));
+  for (int e = 0; e < model.edge_count; ++e)
+    for (int node : {model.edge_tail[at(e)], model.edge_head[at(e)]}) edges[at(node)].push_back(e);
+  std::vector<int> frame(at(model.node_count), -1);
+  for (const FrameStencil& half : model.half)
+    if (half.hinge < 0 && frame[at(model.frame_node[at(half.frame)])] < 0)
+      frame[at(model.frame_node[at(half.frame)])] = half.frame;
+  for (int node = 0; node < model.node_count; ++node) {
+    if (frame[at(node)] >= 0) {
+      loads.pieces.push_back({LoadShape::frame_moment, -1, 1.0, node, -1, frame[at(node)]});
+      continue;
+    }
+    const double share = 1.0 / static_cast<double>(std::max<std::size_t>(edges[at(node)].size(), 1));
+    for (int e : edges[at(node)]) loads.pieces.push_back({LoadShape::edge_moment, -1, share, node, e});
+  }
+}
+
 }  // namespace
 
 Loads resolve_loads(const Model& model) {
@@ -196,6 +216,7 @@ Loads resolve_loads(const Model& model) {
       }
     }
   }
+  if (scene.custom_moments) add_node_moments(model, loads);
   for (const LoadPiece& piece : loads.pieces)
     if (piece.shape == LoadShape::follower ||
         (!model.planar() && (piece.shape == LoadShape::edge_moment || piece.shape == LoadShape::frame_moment)))
@@ -229,7 +250,7 @@ void load_local(const Model& model, const State& state, const VectorX& q, const 
   int dofs[kMaxLocal];
   clear(out, load_dofs(model, piece, dofs));
   out.energy = 0.0;
-  const Vector3 value = piece.weight * loads.values[at(piece.load)];
+  const Vector3 value = piece.weight * value_of(loads, piece);
   switch (piece.shape) {
     case LoadShape::dead_node:
       if (model.planar()) {

@@ -18,7 +18,7 @@ enum class LoadShape { dead_node, follower, edge_moment, frame_moment, edge_pres
 /// One piece of a load: what it acts on, and how much of the load's value it is.
 struct LoadPiece {
   LoadShape shape;
-  int load;       ///< index of the load
+  int load;       ///< index of the load; -1: a custom moment on the node
   double weight;  ///< [-], or a length [m] for distributed loads
   int node = -1;
   int edge = -1;  ///< that carries a follower or takes a moment
@@ -28,12 +28,19 @@ struct LoadPiece {
 
 struct Loads {
   std::vector<LoadPiece> pieces;
-  std::vector<Vector3> values;  ///< per load, world axes of the drawn scene [N], [N m], [N/m]
+  std::vector<Vector3> values;        ///< per load, world axes of the drawn scene [N], [N m], [N/m]
+  std::vector<Vector3> node_moments;  ///< custom ones, per node, in world axes [N m]; empty: none
   bool unsymmetric = false;
 };
 
 /// Resolves the loads of a description: which node, edge or frame each acts on.
 Loads resolve_loads(const Model& model);
+
+/// The value that a piece is part of.
+inline const Vector3& value_of(const Loads& loads, const LoadPiece& piece) {
+  return piece.load >= 0 ? loads.values[static_cast<std::size_t>(piece.load)]
+                         : loads.node_moments[static_cast<std::size_t>(piece.node)];
+}
 
 /// Whether the forces of a piece and its like along the rod are minus the gradient of a potential.
 bool has_potential(const Model& model, const LoadPiece& piece);

@@ -11,9 +11,12 @@ namespace {
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
-std::vector<std::string> asymmetries_of(const Loads& loads, const Contact* contact, FluidModel fluid,
+std::vector<std::string> asymmetries_of(const Loads& loads, const Contact* contact, const SceneDescription& scene,
                                         const Options& options) {
+  const FluidModel fluid = scene.fluid.model;
   std::vector<std::string> found;
+  if (scene.custom_implicit || (scene.has_custom_force && options.integrator == Integrator::statics))
+    found.emplace_back("custom forces that are solved for");
   if (loads.unsymmetric) found.emplace_back("follower loads or moments in 3D");
   if (options.integrator == Integrator::energy_momentum) found.emplace_back("energy-momentum steps");
   if (contact != nullptr && contact->unsymmetric()) found.emplace_back("implicit friction");
@@ -47,7 +50,7 @@ Equations::Equations(const Model& model, const Options& options)
     : model_(model),
       loads_(resolve_loads(model)),
       contact_(make_contact(model)),
-      asymmetries_(asymmetries_of(loads_, contact_.get(), model.description.fluid.model, options)),
+      asymmetries_(asymmetries_of(loads_, contact_.get(), model.description, options)),
       assembler_(model, loads_, asymmetries_.empty() ? Symmetry::symmetric : Symmetry::unsymmetric, options.solver),
       static_duration_(options.time_step) {
   if (contact_) {
@@ -57,6 +60,7 @@ Equations::Equations(const Model& model, const Options& options)
   }
   custom_force = VectorX::Zero(model.dof_count);
   inverse_rest_ = model.edge_length.cwiseInverse();
+  if (model.description.has_custom_force) has_potential_ = false;
   for (const LoadPiece& piece : loads_.pieces)
     if (!withe::has_potential(model, piece)) has_potential_ = false;
   if (options.integrator == Integrator::statics) return;
@@ -140,6 +144,7 @@ void Equations::remember(EquationsMemory& out, bool with_matrix) const {
     out.ordered = ordered_;
     out.coupled = contact_->elements();
   }
+  out.groups = assembler_.groups();
   if (with_matrix) {
     const std::span<const double> values = assembler_.solver().values();
     out.matrix.assign(values.begin(), values.end());
@@ -151,9 +156,11 @@ void Equations::remember(EquationsMemory& out, bool with_matrix) const {
 }
 
 void Equations::recall(const EquationsMemory& memory) {
+  const bool regrouped = memory.groups != assembler_.groups();
+  assembler_.set_groups(memory.groups);
   if (contact_) {
     contact_->couple(memory.ordered);
-    if (memory.ordered != ordered_) order_for_contacts();
+    if (regrouped || memory.ordered != ordered_) order_for_contacts();
     contact_->couple(memory.coupled);
     assembler_.couple(contact_->element_unknowns(), kContactUnknowns);
   }
@@ -230,6 +237,7 @@ void Equations::evaluate(const VectorX& z, bool with_matrix, const double* axial
   magnitude_.setZero(model_.dof_count + kPadding);
   last_z_ = z;
   if (with_matrix) pass_mark();
+  if (respond) ask_custom(z, with_matrix);
   if (contact_) find_contacts(z, with_matrix);
   const std::span<double> values = assembler_.solver().values();
   if (with_matrix) std::fill(values.begin(), values.end(), 0.0);
@@ -249,6 +257,7 @@ void Equations::evaluate(const VectorX& z, bool with_matrix, const double* axial
     add_elastic(*acting_, z, with_matrix, axial_force, out);
   }
   add_loads(z, with_matrix, out);
+  if (respond && with_matrix) add_custom_matrix(z);
   if (!resistance_.empty() && h_ != 0.0) add_resistance(z, with_matrix);
   if (contact_) add_contacts(with_matrix, out);
   if (h_ != 0.0 && inner_ == Inner::end && !model_.planar()) add_spin_couple(z);

@@ -17,6 +17,7 @@
 #include "assembly/assembler.hpp"
 #include "contact/contact.hpp"
 #include "elasticity/discrete_gradient.hpp"
+#include "forces/custom_forces.hpp"
 #include "forces/resistive.hpp"
 #include "forces/stokeslets.hpp"
 #include "integrators/options.hpp"
@@ -41,6 +42,7 @@ enum class Inner { end, middle };
 struct EquationsMemory {
   /// Contacts whose unknowns the order of elimination was found for, and those in the matrix; sorted.
   std::vector<ContactKey> ordered, coupled;
+  std::vector<std::vector<int>> groups;  ///< of unknowns that custom forces couple
   std::vector<double> matrix;  ///< whose factorisation is in use; empty: none
   double flow_excess = 0;
   StokesletFluid::Memory fluid;
@@ -74,8 +76,12 @@ class Equations {
   /// must outlive the step.
   void begin(const State& state, const Parameters& parameters, double h, bool energy_momentum,
              Inner inner = Inner::end);
-  /// Explicit nodal forces (per unknown) that act in this step.
+  /// Custom forces (per unknown) that act in this step, at z where they are solved for.
   VectorX custom_force;
+  void set_custom(const MatrixX3& forces, const MatrixX3& moments);
+  /// Custom forces at configuration q and velocities v, which are solved for then. Empty: they stay as they were set.
+  using CustomResponse = std::function<CustomForces(const VectorX& q, const VectorX& v, bool derivatives)>;
+  CustomResponse respond;
   /// Of what supports hold, which acts on the edges next to it; meaningful where held. Empty: as the rest accelerates.
   VectorX held_acceleration;
   /// Whether Stokeslets act: then `begin_flow` follows `begin`. The fluid's force is that on velocities `v` at
@@ -147,6 +153,11 @@ class Equations {
   void add_coupling(const VectorX& coupling, double factor, std::span<double> values);
   void add_flow(const VectorX& z, bool with_matrix, Evaluation& out);
   void add_loads(const VectorX& z, bool with_matrix, Evaluation& out);
+  void ask_custom(const VectorX& z, bool derivatives);
+  void couple_custom();
+  template <class Add>
+  void for_each_custom_derivative(const Add& add) const;
+  void add_custom_matrix(const VectorX& z);
   void find_resistance();
   void add_resistance(const VectorX& z, bool with_matrix);
   void resistive_local_at(int edge, const VectorX& z, bool with_hessian, Local& local) const;
@@ -200,6 +211,8 @@ class Equations {
   VectorX acceleration_, inertia_;
   MassMatrix drag_;  ///< [N s/m]
   VectorX mean_velocity_, drag_force_, gravity_;
+  CustomForces custom_;                                  ///< with derivatives, of the last evaluation with a matrix
+  std::vector<std::vector<std::size_t>> moment_pieces_;  ///< of custom moments, per node
   std::unique_ptr<StokesletFluid> fluid_;
   MassMatrix flow_drag_;                     ///< [N s/m]
   VectorX flow_start_, flow_, flow_change_;  ///< the fluid's force but for the local drag, and with it [N]

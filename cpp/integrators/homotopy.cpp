@@ -11,7 +11,7 @@ namespace {
 // are then both below a millionth.
 constexpr double kLittleTurn = 1e-6;
 
-bool turns(const LoadPiece& piece) { return piece.shape != LoadShape::dead_node; }
+bool turns(const LoadPiece& piece) { return piece.shape != LoadShape::dead_node && piece.load >= 0; }
 
 }  // namespace
 

@@ -142,15 +142,17 @@ struct ObstacleDescription {
 struct ContactPairDescription {
   int first = 0, second = 0;
   bool ignored = false;
-  double friction = -1;     ///< coefficient [-]; negative: that of the scene
-  double stiffness = 0;     ///< [N/m]; 0: that of the scene
+  double friction = -1;  ///< coefficient [-], of a rod and an obstacle that along the rod; negative: that of the scene
+  double across = -1;    ///< of a rod and an obstacle, across the rod [-]; negative: as `friction` says
+  double stiffness = 0;  ///< [N/m]; 0: that of the scene
   double restitution = -1;  ///< coefficient [-]; negative: that of the scene
 };
 
 struct ContactDescription {
   bool rods = false;             ///< whether rods touch each other and themselves
   double friction = 0;           ///< coefficient between rods [-]
-  VectorX obstacle_friction;     ///< per obstacle [-]
+  VectorX obstacle_friction;     ///< per obstacle, along rods [-]
+  VectorX obstacle_across;       ///< per obstacle, across rods [-]; empty: as along them
   double restitution = 1;        ///< coefficient between rods [-]
   VectorX obstacle_restitution;  ///< per obstacle [-]; empty: 1
   ContactLaw law = ContactLaw::imcv2;
@@ -193,7 +195,9 @@ struct SceneDescription {
   std::vector<JointDescription> joints;
   std::vector<SupportDescription> supports;
   std::vector<LoadDescription> loads;
-  bool has_custom_force = false;  ///< an explicit nodal force comes from a callback
+  bool has_custom_force = false;  ///< nodal forces come from a callback
+  bool custom_implicit = false;   ///< it knows their derivatives, so they are solved for
+  bool custom_moments = false;    ///< and moments on nodes
   ContactDescription contact;
   FluidDescription fluid;
 };

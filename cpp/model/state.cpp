@@ -99,20 +99,22 @@ void compute_strains(const Model& model, const State& state, const VectorX& q, C
 
 }  // namespace
 
-ObstaclePlace obstacle_place(const Model& model, const ObstacleDescription& drawn, const Vector3& way) {
+ObstaclePlace obstacle_place(const Model& model, const ObstacleDescription& drawn, const ObstacleWay& way) {
   const auto in_axes = [&](const Vector3& x, bool is_point) -> Vec3d {
     if (!model.planar()) return to_vec3(x);
     const Vector3 from = is_point ? Vector3(x - model.plane->origin) : x;
     return {from.dot(model.plane->first), from.dot(model.plane->second), 0.0};
   };
   const bool plane = drawn.kind == ObstacleKind::plane;
-  return {in_axes(drawn.point + way, true), plane ? in_axes(drawn.other, false) : in_axes(drawn.other + way, true)};
+  const Vec3d turn = model.planar() ? Vec3d{0.0, 0.0, way.turn.dot(model.plane->normal)} : to_vec3(way.turn);
+  return {in_axes(drawn.point + way.shift, true),
+          plane ? in_axes(drawn.other, false) : in_axes(drawn.other + way.shift, true), turn};
 }
 
-Vector3 way_from_drawn(const Model& model, const ObstacleDescription& drawn, const ObstaclePlace& place) {
+ObstacleWay way_from_drawn(const Model& model, const ObstacleDescription& drawn, const ObstaclePlace& place) {
   const Vec3d way = place.point - obstacle_place(model, drawn).point;
-  if (!model.planar()) return to_eigen(way);
-  return way.x * model.plane->first + way.y * model.plane->second;
+  if (!model.planar()) return {to_eigen(way), to_eigen(place.turn)};
+  return {way.x * model.plane->first + way.y * model.plane->second, place.turn.z * model.plane->normal};
 }
 
 State initial_state(const Model& model) {

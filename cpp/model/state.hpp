@@ -31,6 +31,7 @@ struct ContactRecord {
 /// Where an obstacle is, in the axes of the unknowns (in a plane: its two, and zero).
 struct ObstaclePlace {
   Vec3d point{}, other{};  ///< of a plane: a point, and its normal; of a capsule: its ends [m]
+  Vec3d turn{};            ///< about its own axis, since it was drawn; full turns count [rad]
 };
 
 /// The record of a contact among sorted ones, or nothing.
@@ -68,11 +69,13 @@ struct State {
 };
 
 State initial_state(const Model& model);
-/// An obstacle `way` from where it is drawn [m].
-ObstaclePlace obstacle_place(const Model& model, const ObstacleDescription& drawn,
-                             const Vector3& way = Vector3::Zero());
-/// How far it is from there [m]; in a plane, within it.
-Vector3 way_from_drawn(const Model& model, const ObstacleDescription& drawn, const ObstaclePlace& place);
+/// Where an obstacle has gone from where it is drawn [m], and how it has turned [rad].
+struct ObstacleWay {
+  Vector3 shift = Vector3::Zero(), turn = Vector3::Zero();
+};
+ObstaclePlace obstacle_place(const Model& model, const ObstacleDescription& drawn, const ObstacleWay& way = {});
+/// That way back; in a plane, within it.
+ObstacleWay way_from_drawn(const Model& model, const ObstacleDescription& drawn, const ObstaclePlace& place);
 
 /// Everything that follows from q and the source frames of a state.
 struct Configuration {

@@ -142,6 +142,7 @@ void World::Implementation::rebuild(Rebuild why) {
     ramps.assign(description.rods.size(), NaturalRamp{});
     motions.assign(description.supports.size(), SupportMotion{});
     custom_force = MatrixX3::Zero(model.node_count, 3);
+    custom_moments = MatrixX3::Zero(description.custom_moments ? model.node_count : 0, 3);
     for (std::size_t s = 0; s < motions.size(); ++s) {
       motions[s].position = motions[s].from_position = motions[s].to_position =
           node_position(model, state.q, model.supports[s].node);
@@ -191,6 +192,7 @@ void World::Implementation::remake_equations() {
   newton = std::make_unique<Newton>(model, options);
   equations = std::make_unique<Equations>(model, options);
   equations->loads().values = load_values;
+  if (Contact* contact = equations->contact()) contact->set_parameters(parameters);
   forget_matrix();
   reaction_current = false;
   state.acceleration_current = false;

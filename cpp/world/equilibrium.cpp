@@ -9,8 +9,10 @@
 namespace withe {
 
 Equations& World::Implementation::statics() {
-  const bool same = options.integrator != Integrator::energy_momentum &&
-                    (description.fluid.model != FluidModel::resistive || options.integrator == Integrator::statics);
+  const bool same =
+      options.integrator != Integrator::energy_momentum &&
+      (options.integrator == Integrator::statics || (description.fluid.model != FluidModel::resistive &&
+                                                     (!description.has_custom_force || description.custom_implicit)));
   if (same) return *equations;
   if (!static_equations) {
     Options symmetric = options;
@@ -66,7 +68,9 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
   aim_supports(time);
   Equations& system = statics();
   update_custom_force(system);
+  const MatrixX3 forces_before = custom_force, moments_before = custom_moments;
   const auto undo = [&] {
+    forget_custom(system, forces_before, moments_before);
     release_obstacles(system);
     static_cast<Moving&>(*this) = before;
     apply_ramps(state.time);
@@ -85,7 +89,7 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
   rest();
   StaticResult r;
   try {
-    if (force_function) ask_custom_force(system, time, state.q, state.v);
+    solve_for_custom_at_rest(system, time);
     aim_obstacles(system, time);
     r = find_equilibrium(system, *newton, options, parameters, boundary, state, work.newton);
     // Contact that turns out too soft is made stiffer, from where it has settled.
@@ -101,6 +105,7 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
     throw;
   }
   release_obstacles(system);
+  system.respond = nullptr;
   if (!r.converged) {
     undo();
     const bool held =
@@ -123,8 +128,8 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
   check_resolution();
   if (r.branch_changed) statistics.branch_changes += 1;
   const bool frictional = system.contact() && system.contact()->frictional();
-  return {r.stable, !system.loads().unsymmetric || frictional, r.branch_changed, r.newton.iterations,
-          r.newton.residual};
+  const bool symmetric = !system.loads().unsymmetric && !description.has_custom_force;
+  return {r.stable, symmetric || frictional, r.branch_changed, r.newton.iterations, r.newton.residual};
 }
 
 EquilibriumPath World::equilibrium_path(const PathOptions& wanted) {
@@ -145,6 +150,7 @@ EquilibriumPath World::equilibrium_path(const PathOptions& wanted) {
   };
   const Moving before = self;
   const Lagged lagged_before = self.lagged();
+  const MatrixX3 forces_before = self.custom_force, moments_before = self.custom_moments;
   EquilibriumPath out;
   ArcResult r;
   const auto set_loads = [&](const std::vector<Vector3>& values) {
@@ -162,7 +168,7 @@ EquilibriumPath World::equilibrium_path(const PathOptions& wanted) {
     self.aim_supports(self.state.time);
     const std::vector<SupportMotion> target = self.motions;
     Equations& system = self.statics();
-    self.update_custom_force(system);
+    self.solve_for_custom_at_rest(system, self.state.time);
     const auto move_to = [&](double factor) {
       for (std::size_t s = 0; s < target.size(); ++s) put_between(from[s], target[s], factor, self.motions[s]);
     };
@@ -190,6 +196,7 @@ EquilibriumPath World::equilibrium_path(const PathOptions& wanted) {
     };
     r = follow_arc(system, *self.newton, self.options, path,
                    {wanted.start, wanted.end, wanted.most_points, wanted.turn}, self.state, self.work.newton, visit);
+    system.respond = nullptr;
     move_to(r.factor);
     for (std::size_t s = 0; s < target.size(); ++s) {
       SupportMotion& m = self.motions[s];
@@ -198,6 +205,7 @@ EquilibriumPath World::equilibrium_path(const PathOptions& wanted) {
       m.start = m.end = self.state.time;
     }
   } catch (...) {
+    self.forget_custom(self.statics(), forces_before, moments_before);
     static_cast<Moving&>(self) = before;
     set_loads(full);
     self.recall(lagged_before);

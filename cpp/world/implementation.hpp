@@ -41,7 +41,7 @@ struct World::Implementation : Running {
   bool plan_current = false;  ///< made when it is asked for
   std::string plane_left_by;  ///< what left the plane, where something did
   Statistics statistics;
-  World::ForceFunction force_function;
+  CustomFunction force_function;
   std::function<void(double, double)> callback;  ///< StepCallback, bound to its world
   std::function<void()> poll;
   std::atomic<bool> interrupted{false};
@@ -103,6 +103,11 @@ struct World::Implementation : Running {
   void spread_jumps(double duration);
   void hold_now(HeldTarget& target) const;
   void set_motion_at(SupportMotion& motion, double time) const;
+  CustomForces custom_forces(double time, const VectorX& q, const VectorX& v, bool derivatives);
+  void solve_for_custom(Equations& target, double dt);
+  void solve_for_custom_at_rest(Equations& target, double time);
+  /// Ends that, with custom forces as they were before.
+  void forget_custom(Equations& target, const MatrixX3& forces, const MatrixX3& moments);
   /// Asks for custom forces at a time and a state, on each unknown.
   void ask_custom_force(Equations& target, double time, const VectorX& q, const VectorX& v);
   /// Those of a step of dt, which leads to where `work.held` says.
@@ -176,8 +181,9 @@ struct World::Implementation : Running {
   /// Tells the contact of a step where obstacles are at its end; `release_obstacles`: that there is no step.
   void aim_obstacles(Equations& system, double time) const;
   static void release_obstacles(Equations& system);
-  Vector3 obstacle_way(int obstacle) const;
-  std::vector<ObstaclePlace> obstacle_places(const std::function<Vector3(int)>& way) const;
+  ObstacleWay obstacle_way(int obstacle) const;
+  std::vector<ObstaclePlace> obstacle_places(const std::function<ObstacleWay(int)>& way) const;
+  void check_turn(int obstacle, const Vector3& turn) const;
 
   // separation.cpp
   void separate();

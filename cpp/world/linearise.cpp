@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <optional>
 #include <utility>
 
 #include <Eigen/Eigenvalues>
@@ -164,7 +165,7 @@ class StrainParts {
 }  // namespace
 
 Linearisation World::linearise() const {
-  const Implementation& self = *implementation_;
+  Implementation& self = *implementation_;
   const Model& model = self.model;
   // Equations of its own: what is read out changes no matrix that is yet to serve.
   Options symmetric = self.options;
@@ -172,19 +173,27 @@ Linearisation World::linearise() const {
   Equations system(model, symmetric);
   system.loads().values = self.load_values;
   self.update_custom_force(system);
+  const MatrixX3 forces = self.custom_force, moments = self.custom_moments;
+  self.solve_for_custom_at_rest(system, self.state.time);
   system.begin(self.state, self.parameters, 0.0, false);
   Evaluation evaluation;
-  system.evaluate(self.state.q, false, nullptr, evaluation);
-
   const SparseMatrix basis = free_basis(model), back = basis.transpose();
-  const StrainParts parts(system, self.state);
-  system.elastic = parts.without();
-  system.evaluate(self.state.q, true, nullptr, evaluation);
+  std::optional<StrainParts> parts;
+  try {
+    system.evaluate(self.state.q, false, nullptr, evaluation);
+    parts.emplace(system, self.state);
+    system.elastic = parts->without();
+    system.evaluate(self.state.q, true, nullptr, evaluation);
+  } catch (...) {
+    self.forget_custom(system, forces, moments);
+    throw;
+  }
+  self.forget_custom(system, forces, moments);
 
   Linearisation out;
   out.geometric = back * matrix_of(system.assembler()) * basis;
-  out.gradients = parts.gradients() * basis;
-  out.stiffnesses = parts.stiffnesses();
+  out.gradients = parts->gradients() * basis;
+  out.stiffnesses = parts->stiffnesses();
   out.mass = back * matrix_of(model, system.mass()) * basis;
   Entries moves;
   Matrix3 axes = Matrix3::Identity();

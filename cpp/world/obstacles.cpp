@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include <Eigen/Geometry>
+
 #include "common/check.hpp"
 #include "world/implementation.hpp"
 
@@ -10,20 +12,20 @@ namespace {
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
-Vector3 way_at(const ObstacleMotion& m, double time) {
+ObstacleWay way_at(const ObstacleMotion& m, double time) {
   const double share = ramp_fraction(time, m.start, m.end);
-  return (1.0 - share) * m.from + share * m.to;
+  return {(1.0 - share) * m.from.shift + share * m.to.shift, (1.0 - share) * m.from.turn + share * m.to.turn};
 }
 
 }  // namespace
 
-/// How far an obstacle is from where it is drawn [m]; in a plane, within it.
-Vector3 World::Implementation::obstacle_way(int obstacle) const {
+/// How far an obstacle is from where it is drawn; in a plane, within it.
+ObstacleWay World::Implementation::obstacle_way(int obstacle) const {
   return way_from_drawn(model, description.contact.obstacles[at(obstacle)], state.obstacles[at(obstacle)]);
 }
 
 /// Places of all obstacles, each as far from where it is drawn as `way` says.
-std::vector<ObstaclePlace> World::Implementation::obstacle_places(const std::function<Vector3(int)>& way) const {
+std::vector<ObstaclePlace> World::Implementation::obstacle_places(const std::function<ObstacleWay(int)>& way) const {
   std::vector<ObstaclePlace> places;
   for (const ObstacleDescription& drawn : description.contact.obstacles)
     places.push_back(obstacle_place(model, drawn, way(static_cast<int>(places.size()))));
@@ -39,31 +41,46 @@ void World::Implementation::release_obstacles(Equations& system) {
   if (system.contact()) system.contact()->aim({});
 }
 
-void World::move_obstacle(int obstacle, const Vector3& position, double over) {
+/// Only what leaves the shape where it is can be told by the motion of the surface alone.
+void World::Implementation::check_turn(int obstacle, const Vector3& turn) const {
+  const ObstacleDescription& drawn = description.contact.obstacles[at(obstacle)];
+  const bool plane = drawn.kind == ObstacleKind::plane;
+  const Vector3 axis = plane ? drawn.other : Vector3(drawn.other - drawn.point);
+  require(turn.allFinite(), "turn of an obstacle must be finite");
+  require(axis.cross(turn).norm() <= 1e-9 * axis.norm() * turn.norm(),
+          "obstacle '" + drawn.name + "' can turn about " + (plane ? "its normal" : "its axis") + " only");
+}
+
+void World::move_obstacle(int obstacle, const Vector3& position, const Vector3& turn, double over) {
   Implementation& self = *implementation_;
   require(std::isfinite(over) && over >= 0.0, "over must be finite and not negative");
   const Vector3 from = obstacle_position(obstacle);
-  prescribe_obstacle(obstacle, position);
+  const ObstacleWay before = self.obstacle_way(obstacle);
+  prescribe_obstacle(obstacle, position, turn);
   ObstacleMotion& m = self.obstacle_motions[at(obstacle)];
-  m.from = from - self.description.contact.obstacles[at(obstacle)].point;
+  m.from = {from - self.description.contact.obstacles[at(obstacle)].point, before.turn};
   m.end = self.state.time + over;
 }
 
-void World::prescribe_obstacle(int obstacle, const Vector3& position) {
+void World::prescribe_obstacle(int obstacle, const Vector3& position, const Vector3& turn) {
   Implementation& self = *implementation_;
   const Vector3 way = position - obstacle_position(obstacle);
   require(position.allFinite(), "position must be finite");
+  self.check_turn(obstacle, turn);
   const ObstacleDescription& drawn = self.description.contact.obstacles[at(obstacle)];
   // What a plane moves along itself out of the rods' plane, no rod sees without friction; with it, it pulls them out.
-  if (self.model.planar() && std::abs(way.dot(self.model.plane->normal)) > 1e-9 * self.model.length_scale)
-    self.leave_plane("a moving obstacle");
+  if (self.model.planar()) {
+    const Vector3& n = self.model.plane->normal;
+    if (std::abs(way.dot(n)) > 1e-9 * self.model.length_scale || n.cross(turn).norm() > 1e-9 * turn.norm())
+      self.leave_plane("a moving obstacle");
+  }
   if (self.obstacle_motions.empty()) {
     self.obstacle_motions.resize(self.description.contact.obstacles.size());
     for (std::size_t o = 0; o < self.obstacle_motions.size(); ++o)
       self.obstacle_motions[o].from = self.obstacle_motions[o].to = self.obstacle_way(static_cast<int>(o));
   }
   ObstacleMotion& m = self.obstacle_motions[at(obstacle)];
-  m.from = m.to = position - drawn.point;
+  m.from = m.to = {position - drawn.point, turn};
   m.start = m.end = self.state.time;
   self.state.acceleration_current = false;
 }
@@ -72,7 +89,12 @@ Vector3 World::obstacle_position(int obstacle) const {
   const Implementation& self = *implementation_;
   require(obstacle >= 0 && obstacle < static_cast<int>(self.description.contact.obstacles.size()),
           "no such obstacle: " + std::to_string(obstacle));
-  return self.description.contact.obstacles[at(obstacle)].point + self.obstacle_way(obstacle);
+  return self.description.contact.obstacles[at(obstacle)].point + self.obstacle_way(obstacle).shift;
+}
+
+Vector3 World::obstacle_turn(int obstacle) const {
+  (void)obstacle_position(obstacle);  // refuses one that is not there
+  return implementation_->obstacle_way(obstacle).turn;
 }
 
 }  // namespace withe

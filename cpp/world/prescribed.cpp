@@ -115,22 +115,61 @@ void World::Implementation::hold_now(HeldTarget& target) const {
   }
 }
 
-void World::Implementation::ask_custom_force(Equations& target, double time, const VectorX& q, const VectorX& v) {
+CustomForces World::Implementation::custom_forces(double time, const VectorX& q, const VectorX& v, bool derivatives) {
   MatrixX3 positions(model.node_count, 3), velocities(model.node_count, 3);
   for (int i = 0; i < model.node_count; ++i) {
     positions.row(i) = node_position(model, q, i);
     velocities.row(i) = node_velocity(model, v, i);
   }
-  const MatrixX3 force = force_function(time, positions, velocities);
-  require(force.rows() == model.node_count, "custom force must have one row a node, " +
-                                                std::to_string(model.node_count) + ", got " +
-                                                std::to_string(force.rows()));
-  require(force.allFinite(), "custom force must be finite");
-  if (model.planar())
-    require((force * model.plane->normal).norm() <= 1e-8 * force.norm(),
+  CustomForces now = force_function(time, positions, velocities, derivatives);
+  const auto check = [&](const MatrixX3& table, const std::string& what) {
+    require(table.rows() == model.node_count, what + " must have one row a node, " + std::to_string(model.node_count) +
+                                                  ", got " + std::to_string(table.rows()));
+    require(table.allFinite(), what + " must be finite");
+  };
+  check(now.forces, "custom force");
+  if (description.custom_moments) check(now.moments, "custom moment");
+  if (model.planar()) {
+    const Vector3& n = model.plane->normal;
+    const double off = description.custom_moments ? (now.moments - now.moments * n * n.transpose()).norm() : 0.0;
+    require((now.forces * n).norm() <= 1e-8 * now.forces.norm() && off <= 1e-8 * now.moments.norm(),
             "a custom force leaves the plane of the scene: build it with planar=False");
-  custom_force = force;
+  }
+  const Eigen::Index columns = 3 * model.node_count, rows = (description.custom_moments ? 2 : 1) * columns;
+  for (const SparseMatrix* m : {&now.by_position, &now.by_velocity})
+    require(m->size() == 0 || (m->rows() == rows && m->cols() == columns), "derivatives of a custom force must have " +
+                                                                               std::to_string(rows) + " rows and " +
+                                                                               std::to_string(columns) + " columns");
+  custom_force = now.forces;
+  if (description.custom_moments) custom_moments = now.moments;
+  return now;
+}
+
+void World::Implementation::ask_custom_force(Equations& target, double time, const VectorX& q, const VectorX& v) {
+  custom_forces(time, q, v, false);
   update_custom_force(target);
+}
+
+/// Custom forces of a step of dt are those where the scheme's own forces act.
+void World::Implementation::solve_for_custom(Equations& target, double dt) {
+  if (!force_function) return;
+  if (!description.custom_implicit || options.integrator == Integrator::verlet) {
+    find_custom_force(target, dt);
+    return;
+  }
+  target.respond = [this, time = force_time(state.time, dt)](const VectorX& q, const VectorX& v, bool derivatives) {
+    return custom_forces(time, q, v, derivatives);
+  };
+}
+
+/// In balance, whatever moves towards it, velocities are zero.
+void World::Implementation::solve_for_custom_at_rest(Equations& target, double time) {
+  if (!force_function) return;
+  target.respond = [this, time](const VectorX& q, const VectorX& v, bool derivatives) {
+    CustomForces now = custom_forces(time, q, VectorX::Zero(v.size()), derivatives);
+    now.by_velocity.resize(0, 0);
+    return now;
+  };
 }
 
 /// Forces at the start of a step would feed a spring's oscillation, by 1 + (w dt)^2 / 2 a step. At q0 + (dt / 2) v0,
@@ -163,16 +202,15 @@ void World::Implementation::find_custom_force(Equations& target, double dt) {
   ask_custom_force(target, time, q, v);
 }
 
+void World::Implementation::forget_custom(Equations& target, const MatrixX3& forces, const MatrixX3& moments) {
+  target.respond = nullptr;
+  custom_force = forces;
+  custom_moments = moments;
+  update_custom_force(target);
+}
+
 void World::Implementation::update_custom_force(Equations& target) const {
-  if (!description.has_custom_force) return;
-  for (int i = 0; i < model.node_count; ++i) {
-    const int dof = model.node_dof[at(i)];
-    const Vector3 f = custom_force.row(i);
-    if (model.planar())
-      target.custom_force.segment<2>(dof) << f.dot(model.plane->first), f.dot(model.plane->second);
-    else
-      target.custom_force.segment<3>(dof) = f;
-  }
+  if (description.has_custom_force) target.set_custom(custom_force, custom_moments);
 }
 
 }  // namespace withe

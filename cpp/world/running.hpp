@@ -25,10 +25,10 @@ struct SupportMotion {
 /// How far something has come that goes evenly from a start to an end, at a time; from 0 to 1.
 double ramp_fraction(double time, double start, double end);
 
-/// Where an obstacle goes, as a way from where it is drawn.
+/// Where an obstacle goes.
 struct ObstacleMotion {
-  Vector3 from = Vector3::Zero(), to = Vector3::Zero();  ///< [m]
-  double start = 0, end = 0;                             ///< [s]
+  ObstacleWay from, to;
+  double start = 0, end = 0;  ///< [s]
 };
 
 /// What goes evenly from one value to another.
@@ -123,6 +123,7 @@ struct StepControl {
 /// What was found last, for read-outs and for who does not ask again.
 struct Found {
   MatrixX3 custom_force;      ///< of the last step [N]
+  MatrixX3 custom_moments;    ///< likewise, where there are any [N m]
   VectorX reaction_residual;  ///< full residual of the last solve
   bool reaction_current = false;
 };

@@ -70,7 +70,8 @@ class Separation {
     ContactDescription& contact = scene.contact;
     contact.friction = 0.0;
     contact.obstacle_friction.setZero();
-    for (ContactPairDescription& pair : contact.pairs) pair.friction = pair.stiffness = 0.0;
+    contact.obstacle_across.setZero();
+    for (ContactPairDescription& pair : contact.pairs) pair.friction = pair.across = pair.stiffness = 0.0;
     contact.law = ContactLaw::imcv2;  // finite where surfaces overlap
     contact.stiffness = 1.0;          // given: each step sets it
     return model;

@@ -7,7 +7,7 @@
 namespace withe {
 namespace {
 
-constexpr std::uint64_t kMagic = 0x3953454854495755ull;
+constexpr std::uint64_t kMagic = 0x4153454854495755ull;
 
 /// FNV-1a.
 std::uint64_t hash_of(std::string_view bytes) {
@@ -53,6 +53,44 @@ std::vector<LoadDescription> read_added_loads(Reader& r, const SceneDescription&
     load.added = true;
   }
   return loads;
+}
+
+void write_friction(Writer& w, const ContactDescription& contact) {
+  w(contact.friction);
+  w(contact.obstacle_friction);
+  w(static_cast<std::int64_t>(contact.obstacle_across.size()));
+  w(contact.obstacle_across);
+  w(static_cast<std::int64_t>(contact.pairs.size()));
+  for (const ContactPairDescription& p : contact.pairs) {
+    w(p.first), w(p.second), w(p.ignored);
+    for (double x : {p.friction, p.across, p.stiffness, p.restitution}) w(x);
+  }
+}
+
+/// What a snapshot knows of friction, for the contact of a scene.
+ContactDescription read_friction(Reader& r, ContactDescription contact) {
+  r(contact.friction);
+  r(contact.obstacle_friction);
+  std::int64_t count = 0;
+  r(count);
+  require(count == 0 || count == contact.obstacle_friction.size(), "snapshot is damaged: impossible friction");
+  contact.obstacle_across.resize(count);
+  r(contact.obstacle_across);
+  r(count);
+  require(count >= 0 && count < 1 << 20, "snapshot is damaged: impossible number of pairs");
+  contact.pairs.assign(static_cast<std::size_t>(count), {});
+  for (ContactPairDescription& p : contact.pairs) {
+    r(p.first), r(p.second), r(p.ignored);
+    for (double* x : {&p.friction, &p.across, &p.stiffness, &p.restitution}) r(*x);
+  }
+  return contact;
+}
+
+bool same_friction(const ContactDescription& a, const ContactDescription& b) {
+  Writer of_a, of_b;
+  write_friction(of_a, a);
+  write_friction(of_b, b);
+  return of_a.bytes == of_b.bytes;
 }
 
 bool same_loads(const std::vector<LoadDescription>& added, const SceneDescription& scene) {
@@ -151,7 +189,10 @@ void exchange(Archive& io, Settings& settings) {
   };
   for (auto& [curvature, twist] : ramps) exchange_ramp(curvature), exchange_ramp(twist);
   for (auto& v : load_values) io(v);
-  for (auto& [from, to, start, end] : obstacle_motions) io(from), io(to), io(start), io(end);
+  for (auto& [from, to, start, end] : obstacle_motions) {
+    for (ObstacleWay* way : {&from, &to}) io(way->shift), io(way->turn);
+    io(start), io(end);
+  }
 }
 
 template <class Archive>
@@ -165,7 +206,7 @@ void exchange(Archive& io, State& state) {
   for (auto& f : frame) io(f);
   io(bend_tau), io(half_tau);
   exchange_contacts(io, contacts);
-  for (auto& [point, other] : obstacles) exchange(io, point), exchange(io, other);
+  for (auto& [point, other, turn] : obstacles) exchange(io, point), exchange(io, other), exchange(io, turn);
   io(contact_stiffness);
   auto& [known, velocity, times] = motion;
   io(known);
@@ -203,8 +244,8 @@ void exchange(Archive& io, StepControl& control) {
 
 template <class Archive>
 void exchange(Archive& io, Found& found) {
-  auto& [custom_force, reaction_residual, reaction_current] = found;
-  io(custom_force), io(reaction_residual), io(reaction_current);
+  auto& [custom_force, custom_moments, reaction_residual, reaction_current] = found;
+  io(custom_force), io(custom_moments), io(reaction_residual), io(reaction_current);
 }
 
 template <class Archive>
@@ -233,9 +274,20 @@ void exchange(Archive& io, StokesletFluid::Memory& memory) {
 
 template <class Archive>
 void exchange(Archive& io, EquationsMemory& memory) {
-  auto& [ordered, coupled, matrix, flow_excess, fluid] = memory;
+  auto& [ordered, coupled, groups, matrix, flow_excess, fluid] = memory;
   exchange(io, ordered);
   exchange(io, coupled);
+  auto count = static_cast<std::int64_t>(groups.size());
+  io(count);
+  require(count >= 0 && count < 1 << 28, "snapshot is damaged: impossible number of groups");
+  groups.resize(static_cast<std::size_t>(count));
+  for (std::vector<int>& group : groups) {
+    auto size = static_cast<std::int64_t>(group.size());
+    io(size);
+    require(size >= 0 && size < 1 << 10, "snapshot is damaged: impossible group");
+    group.resize(static_cast<std::size_t>(size));
+    for (int& unknown : group) io(unknown);
+  }
   io(matrix);
   io(flow_excess);
   exchange(io, fluid);
@@ -282,6 +334,9 @@ void check_lagged(const Lagged& lagged, const Model& model) {
     for (const std::vector<ContactKey>* keys : {&memory->ordered, &memory->coupled})
       for (const auto& [a, b, end] : *keys)
         require(is_edge(a) && (b < 0 ? b >= -obstacles : is_edge(b)), "snapshot is damaged: impossible contact");
+    for (const std::vector<int>& group : memory->groups)
+      for (int unknown : group)
+        require(unknown >= 0 && unknown < model.dof_count, "snapshot is damaged: impossible group");
     const Eigen::Map<const VectorX> matrix(memory->matrix.data(), static_cast<Eigen::Index>(memory->matrix.size()));
     require(matrix.allFinite(), "snapshot is damaged: not finite");
   }
@@ -323,6 +378,7 @@ std::string World::snapshot() const {
     w(d.axis);
   }
   write_added_loads(w, self.description);
+  if (self.description.contact.any()) write_friction(w, self.description.contact);
   exchange(w, static_cast<Running&>(self));
   Lagged lagged = self.lagged();
   exchange(w, lagged);
@@ -388,6 +444,13 @@ void World::restore(const std::string& bytes) {
     loads.insert(loads.end(), added.begin(), added.end());
     fresh->load_values.resize(loads.size(), Vector3::Zero());
     fresh->remake_equations();
+  }
+  if (fresh->description.contact.any()) {
+    const ContactDescription contact = read_friction(r, fresh->description.contact);
+    if (!same_friction(contact, fresh->description.contact)) {
+      fresh->description.contact = fresh->model.description.contact = contact;
+      fresh->remake_equations();
+    }
   }
   if (!same) {
     fresh->spatial = spatial;

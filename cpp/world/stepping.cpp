@@ -304,13 +304,14 @@ bool World::Implementation::inner_step(double dt, int slot, double& error) {
   aim_obstacles(system, end);
   const auto undo = [&] {
     work.repeated = false;
+    system.respond = nullptr;
     release_obstacles(system);
     motions = kept_motions;
     if (ramped) apply_ramps(start);
   };
   StepResult r;
   try {
-    if (force_function) find_custom_force(system, dt);
+    solve_for_custom(system, dt);
     r = step_by_rule(dt, slot);
     for (int tries = 0; r.too_deep && tries < kMostStiffenings; ++tries) {
       dissipated -= system.contact()->stiffen(state, Keep::energy);
@@ -328,6 +329,7 @@ bool World::Implementation::inner_step(double dt, int slot, double& error) {
     undo();
     return false;
   }
+  system.respond = nullptr;
   release_obstacles(system);
   error = r.error;
   guard.turn = std::max(guard.turn, r.largest_turn);

@@ -115,7 +115,7 @@ void World::set_step_callback(const StepCallback& callback) {
 
 void World::set_poll(const std::function<void()>& poll) { implementation_->poll = poll; }
 
-void World::set_force_function(const ForceFunction& force) { implementation_->force_function = force; }
+void World::set_force_function(const CustomFunction& force) { implementation_->force_function = force; }
 
 void World::set_load(int load, const Vector3& value) {
   Implementation& self = *implementation_;
@@ -144,10 +144,36 @@ int World::add_load(const LoadDescription& load) {
   self.remake_equations();
   return static_cast<int>(self.load_values.size()) - 1;
 }
+void World::remove_load(int load) {
+  Implementation& self = *implementation_;
+  require(load >= 0 && load < static_cast<int>(self.load_values.size()), "no such load: " + std::to_string(load));
+  require(self.description.loads[at(load)].added, "a load of the drawing stays: set it to zero");
+  self.description.loads.erase(self.description.loads.begin() + load);
+  self.load_values.erase(self.load_values.begin() + load);
+  self.remake_equations();
+}
 Vector3 World::load(int load) const {
   require(load >= 0 && load < static_cast<int>(implementation_->load_values.size()),
           "no such load: " + std::to_string(load));
   return implementation_->load_values[at(load)];
+}
+
+void World::set_friction(const ContactDescription& contact) {
+  Implementation& self = *implementation_;
+  ContactDescription& own = self.description.contact;
+  const auto valid = [](const VectorX& v) { return v.size() == 0 || (v.allFinite() && v.minCoeff() >= 0.0); };
+  require(contact.obstacle_friction.size() == own.obstacle_friction.size() &&
+              (contact.obstacle_across.size() == 0 || contact.obstacle_across.size() == own.obstacle_friction.size()),
+          "friction needs one coefficient an obstacle");
+  require(std::isfinite(contact.friction) && contact.friction >= 0.0 && valid(contact.obstacle_friction) &&
+              valid(contact.obstacle_across),
+          "friction must not be negative");
+  own.friction = contact.friction;
+  own.obstacle_friction = contact.obstacle_friction;
+  own.obstacle_across = contact.obstacle_across;
+  own.pairs = contact.pairs;
+  self.model.description.contact = own;
+  self.remake_equations();
 }
 
 template <class Value>

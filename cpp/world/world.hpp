@@ -10,6 +10,7 @@
 #include <Eigen/SparseCore>
 
 #include "common/types.hpp"
+#include "forces/custom_forces.hpp"
 #include "integrators/options.hpp"
 #include "model/description.hpp"
 
@@ -95,8 +96,6 @@ struct Plan {
   std::vector<std::string> notes;  ///< one line per thing that was skipped or decided, and why
 };
 
-using SparseMatrix = Eigen::SparseMatrix<double>;
-
 /// Equations linearised about the present configuration, without what supports hold: mass x'' + stiffness x = 0. The
 /// stiffness is geometric + gradients^T diag(stiffnesses) gradients, kept apart since the sum rounds away slow motions:
 /// they bend N edges by 1 / N^2 of what a single node's motion would, so that its energy is some 1 / N^4 of the sum's
@@ -160,15 +159,15 @@ class World {
   /// Asked before every inner step and Newton iteration; what it throws ends the call, with the state the last
   /// accepted one. Must leave the world alone. Empty: none.
   void set_poll(const std::function<void()>& poll);
-  /// Forces on all nodes (nodes x 3) [N] at a time [s], from their positions [m] and velocities [m/s].
-  using ForceFunction = std::function<MatrixX3(double time, const MatrixX3& positions, const MatrixX3& velocities)>;
-  /// Asked once an inner step, at the time at which the scheme's forces act, for the state extrapolated to then. Empty:
-  /// the last forces stay.
-  void set_force_function(const ForceFunction& force);
+  /// Custom forces, at the time at which the scheme's forces act: once an inner step, for the state extrapolated to
+  /// then; where the scene is to solve for them (`custom_implicit`), and in every equilibrium, for each state that
+  /// Newton's method tries. Empty: the last forces stay.
+  void set_force_function(const CustomFunction& force);
 
   void set_load(int load, const Vector3& value);
   Vector3 load(int load) const;
   int add_load(const LoadDescription& load);  ///< acts from now on; its index
+  void remove_load(int load);                 ///< one put on while running; those after it move up by one
   /// Ramped linearly over `over` seconds from now (0: at once).
   void set_natural_curvature(int rod, const MatrixX2& curvature, double over);
   void set_natural_twist(int rod, const VectorX& twist, double over);
@@ -193,9 +192,15 @@ class World {
   Reaction reaction(int support) const;
 
   // Obstacles. Their place is that of the point they are drawn with: a plane's, a sphere's centre, a capsule's start.
-  void move_obstacle(int obstacle, const Vector3& position, double over);  ///< reached `over` seconds from now
-  void prescribe_obstacle(int obstacle, const Vector3& position);          ///< at the end of the coming inner step
-  Vector3 obstacle_position(int obstacle) const;                           ///< [m]
+  // They turn about the normal of a plane, the axis of a capsule, the centre of a sphere, by `turn` since drawn [rad].
+  /// Reached `over` seconds from now.
+  void move_obstacle(int obstacle, const Vector3& position, const Vector3& turn, double over);
+  /// At the end of the coming inner step.
+  void prescribe_obstacle(int obstacle, const Vector3& position, const Vector3& turn);
+  Vector3 obstacle_position(int obstacle) const;  ///< [m]
+  Vector3 obstacle_turn(int obstacle) const;      ///< [rad]
+  /// Takes over the friction coefficients of a description of the same bodies, and pairs that it has besides.
+  void set_friction(const ContactDescription& contact);
 
   // Read-outs: copies.
   MatrixX3 positions() const;   ///< every node once [m]

@@ -69,6 +69,7 @@ void register_contact(py::module_& module) {
       .def_readwrite("second", &ContactPairDescription::second)
       .def_readwrite("ignored", &ContactPairDescription::ignored)
       .def_readwrite("friction", &ContactPairDescription::friction)
+      .def_readwrite("across", &ContactPairDescription::across)
       .def_readwrite("stiffness", &ContactPairDescription::stiffness)
       .def_readwrite("restitution", &ContactPairDescription::restitution);
   py::class_<ContactDescription> contact(module, "ContactDescription", "What touches, and how.");
@@ -76,6 +77,7 @@ void register_contact(py::module_& module) {
       .def_readwrite("rods", &ContactDescription::rods)
       .def_readwrite("friction", &ContactDescription::friction)
       .def_readwrite("obstacle_friction", &ContactDescription::obstacle_friction)
+      .def_readwrite("obstacle_across", &ContactDescription::obstacle_across)
       .def_readwrite("restitution", &ContactDescription::restitution)
       .def_readwrite("obstacle_restitution", &ContactDescription::obstacle_restitution)
       .def_readwrite("distance_tolerance", &ContactDescription::distance_tolerance)
@@ -154,6 +156,8 @@ void register_model(py::module_& module) {
       .def_readwrite("supports", &SceneDescription::supports)
       .def_readwrite("loads", &SceneDescription::loads)
       .def_readwrite("has_custom_force", &SceneDescription::has_custom_force)
+      .def_readwrite("custom_implicit", &SceneDescription::custom_implicit)
+      .def_readwrite("custom_moments", &SceneDescription::custom_moments)
       .def_readwrite("contact", &SceneDescription::contact)
       .def_readwrite("fluid", &SceneDescription::fluid);
 }

@@ -147,6 +147,7 @@ void define_parameters(WorldClass& world) {
   world.def(
       "add_load", [](GuardedWorld& self, const LoadDescription& load) { return self.changing().add_load(load); },
       py::arg("load"), "A load that acts from now on; its index.");
+  world.def("remove_load", [](GuardedWorld& self, int load) { self.changing().remove_load(load); }, py::arg("load"));
   world.def("load", [](const GuardedWorld& self, int load) { return self.reading().load(load); }, py::arg("load"));
   world.def(
       "set_natural_curvature",
@@ -206,20 +207,28 @@ void define_supports(WorldClass& world) {
       py::arg("support"), py::arg("position"), py::arg("rotation"));
   world.def(
       "move_obstacle",
-      [](GuardedWorld& self, int obstacle, const Vector3& position, double over) {
-        self.changing().move_obstacle(obstacle, position, over);
+      [](GuardedWorld& self, int obstacle, const Vector3& position, const Vector3& turn, double over) {
+        self.changing().move_obstacle(obstacle, position, turn, over);
       },
-      py::arg("obstacle"), py::arg("position"), py::arg("over"));
+      py::arg("obstacle"), py::arg("position"), py::arg("turn"), py::arg("over"));
   world.def(
       "prescribe_obstacle",
-      [](GuardedWorld& self, int obstacle, const Vector3& position) {
-        self.steering().prescribe_obstacle(obstacle, position);
+      [](GuardedWorld& self, int obstacle, const Vector3& position, const Vector3& turn) {
+        self.steering().prescribe_obstacle(obstacle, position, turn);
       },
-      py::arg("obstacle"), py::arg("position"));
+      py::arg("obstacle"), py::arg("position"), py::arg("turn"));
   world.def(
       "obstacle_position",
       [](const GuardedWorld& self, int obstacle) { return self.reading().obstacle_position(obstacle); },
       py::arg("obstacle"));
+  world.def(
+      "obstacle_turn", [](const GuardedWorld& self, int obstacle) { return self.reading().obstacle_turn(obstacle); },
+      py::arg("obstacle"));
+  world.def(
+      "set_friction",
+      [](GuardedWorld& self, const ContactDescription& contact) { self.changing().set_friction(contact); },
+      py::arg("contact"));
+  world.def_property_readonly("contact", [](const GuardedWorld& self) { return self.reading().description().contact; });
   world.def(
       "support_position",
       [](const GuardedWorld& self, int support) { return self.reading().support_position(support); },
@@ -263,7 +272,13 @@ void define_readouts(WorldClass& world) {
       "rod_energy", [](const GuardedWorld& self, int rod) { return self.reading().rod_energy(rod); }, py::arg("rod"));
   world.def("momentum", [](const GuardedWorld& self) { return self.reading().momentum(); });
   world.def("contacts", [](const GuardedWorld& self) { return self.reading().contacts(); });
-  world.def("linearise", [](const GuardedWorld& self) { return self.reading().linearise(); });
+  world.def(
+      "linearise",
+      [](GuardedWorld& self, const py::object& forces) {
+        if (forces.is_none()) return std::as_const(self).reading().linearise();
+        return self.run([](World& w) { return w.linearise(); }, py::none(), forces);
+      },
+      py::arg("forces"));
 }
 
 }  // namespace

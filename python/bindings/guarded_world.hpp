@@ -34,7 +34,8 @@ class GuardedWorld {
     return world_;
   }
   /// Runs `advance(world)` without the GIL. `callback(force_time, end_time)`, or None, is called before
-  /// every inner step, and `forces(time, positions, velocities)`, or None, for its custom forces. Signals are looked at
+  /// every inner step, and `forces(time, positions, velocities, derivatives)`, or None, for its custom forces: they,
+  /// moments, derivatives by positions and by velocities, or None for each. Signals are looked at
   /// every 50 ms between inner steps, where their handlers may read the world, and every 100 ms within a step that
   /// takes so long, where they may not.
   template <class Advance>
@@ -55,11 +56,12 @@ class GuardedWorld {
       if (!callback.is_none()) callback(force_time, end_time);
     });
     if (!forces.is_none())
-      world_.set_force_function([&](double time, const MatrixX3& positions, const MatrixX3& velocities) {
-        const py::gil_scoped_acquire gil;
-        const InCallback mark(*this);
-        return forces(time, positions, velocities).template cast<MatrixX3>();
-      });
+      world_.set_force_function(
+          [&](double time, const MatrixX3& positions, const MatrixX3& velocities, bool derivatives) {
+            const py::gil_scoped_acquire gil;
+            const InCallback mark(*this);
+            return custom_forces(forces(time, positions, velocities, derivatives));
+          });
     world_.set_poll([&] {
       if (Clock::now() - polled < std::chrono::milliseconds(100)) return;
       const py::gil_scoped_acquire gil;
@@ -71,6 +73,15 @@ class GuardedWorld {
 
  private:
   using Clock = std::chrono::steady_clock;
+
+  static CustomForces custom_forces(const py::tuple& found) {
+    CustomForces out;
+    out.forces = found[0].cast<MatrixX3>();
+    if (!found[1].is_none()) out.moments = found[1].cast<MatrixX3>();
+    if (!found[2].is_none()) out.by_position = found[2].cast<SparseMatrix>();
+    if (!found[3].is_none()) out.by_velocity = found[3].cast<SparseMatrix>();
+    return out;
+  }
 
   struct Stepping {
     explicit Stepping(GuardedWorld& owner) : self(owner) { self.stepping_ = true; }

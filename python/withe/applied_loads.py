@@ -41,8 +41,7 @@ class AppliedLoads:
         -------
         Load
         """
-        place, _ = self._directory.node(node, "node of the force")
-        return self._load("force", place, force, validation.truth(follower, "follower"), name)
+        return self._at_node("force", node, force, follower, name)
 
     def add_moment(
         self, node: NodeHandle | str, moment: Value, *, follower: bool = False, name: str | None = None
@@ -64,8 +63,7 @@ class AppliedLoads:
         -------
         Load
         """
-        place, _ = self._directory.node(node, "node of the moment")
-        return self._load("moment", place, moment, validation.truth(follower, "follower"), name)
+        return self._at_node("moment", node, moment, follower, name)
 
     def add_load(self, rod: Rod | str, load: Value, *, follower: bool = False, name: str | None = None) -> Load:
         """Add a force spread evenly along a rod.
@@ -123,6 +121,10 @@ class AppliedLoads:
         else:
             axis = validation.unit_vector(normal, f"normal of the pressure on {part.owner}")
         return self._load("pressure", (part.index, 0), pressure, False, name, axis)
+
+    def _at_node(self, kind: LoadKind, node: NodeHandle | str, value: Value, follower: bool, name: str | None) -> Load:
+        place, _ = self._directory.node(node, f"node of the {kind}")
+        return self._load(kind, place, value, validation.truth(follower, "follower"), name)
 
     def _load(
         self,

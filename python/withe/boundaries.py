@@ -8,11 +8,13 @@ import numpy as np
 import numpy.typing as npt
 
 from withe import _core, drawing, validation
+from withe.contacts import body_of, touching
 from withe.description import describe_support
 from withe.directory import Directory
-from withe.handles import NodeHandle, Obstacle, Support
+from withe.friction import Friction, check_law, friction_pair, with_obstacle, with_pair
+from withe.handles import NodeHandle, Obstacle, Rod, Support
 from withe.motion import Path, Turn, evaluate_path, oriented
-from withe.parts import ObstaclePart, SupportPart
+from withe.parts import ObstaclePart, RodPart, SupportPart
 from withe.snapshots import Settings
 from withe.supports import check_not_held, make_clamp, make_pin
 
@@ -22,7 +24,7 @@ FloatArray = npt.NDArray[np.float64]
 
 
 class Boundaries:
-    """Supports, and obstacles that move."""
+    """Supports, obstacles that move, and their friction."""
 
     _scene: Directory
     _directory: Directory
@@ -100,21 +102,24 @@ class Boundaries:
         Parameters
         ----------
         support : Support, NodeHandle, Obstacle or str
-            A support, the node that it holds, or a floor, plane, sphere or capsule, which moves without turning:
-            its position is that of the point of a plane, the centre of a sphere, the start of a capsule. What it
-            does to rods is part of ``energy().work``.
+            A support, the node that it holds, or a floor, plane, sphere or capsule: its position is that of the point
+            of a plane, the centre of a sphere, the start of a capsule. What it does to rods is part of
+            ``energy().work``.
         position : array_like of shape (3,) [m]
         rotation : array_like of shape (3, 3), or a SciPy Rotation
             Relative to the orientation as drawn.
         tangent : array_like of shape (3,)
             Where the rod is to point, instead: the smallest turn from the drawn tangent, and then ...
         roll : float [rad]
-            ... a turn about it. Full turns count, and take time: at most half a turn in a time step.
+            ... a turn about it. Full turns count, and take time: at most half a turn in a time step. An obstacle turns
+            so about the normal of a plane, the axis of a capsule from start to end, or the tangent that is given for a
+            sphere: rollers, drums and turntables, which drag rods by friction. A belt is a plane that moves along
+            itself.
         over : float [s]
             Reached after so long, evenly; within the next step by default.
         path : callable
             Instead of all these: a function of time [s] that returns a position, or a position and a
-            rotation.
+            rotation; of an obstacle, a position and a roll (of a sphere, times the axis, shape (3,)).
 
         Raises
         ------
@@ -128,11 +133,11 @@ class Boundaries:
         """
         obstacle = self._obstacle(support)
         if obstacle is not None:
-            if any(value is not None for value in (rotation, tangent, roll)):
+            if rotation is not None:
                 raise ValueError(
-                    f"rotation, tangent and roll of {obstacle[1]!r} must be None: an obstacle does not turn"
+                    f"rotation of {obstacle[1]!r} must be None: an obstacle turns by a roll about its axis"
                 )
-            self._move_obstacle(*obstacle, position, over, path)
+            self._move_obstacle(*obstacle, position, tangent, roll, over, path)
             return
         index, part = self._support(support)
         turns = part.kind != "pin"
@@ -227,18 +232,90 @@ class Boundaries:
         return (names.index(name), name) if isinstance(name, str) and name in names else None
 
     def _move_obstacle(
-        self, index: int, name: str, position: npt.ArrayLike | None, over: float, path: Path | None
+        self,
+        index: int,
+        name: str,
+        position: npt.ArrayLike | None,
+        tangent: npt.ArrayLike | None,
+        roll: float | None,
+        over: float,
+        path: Path | None,
     ) -> None:
         over = validation.non_negative(over, "over")
         if path is not None:
-            if position is not None or over != 0.0:
+            if any(value is not None for value in (position, tangent, roll)) or over != 0.0:
                 raise ValueError(f"path of {name!r} must be given alone")
             validation.function(path, f"path of {name!r}")
-            now = self._world.time
-            validation.vector(path(now), f"path of {name!r} at t = {now:g}")
+            self._obstacle_pose(index, path, self._world.time)
             self._settings.paths[name] = path
             return
-        if position is None:
-            raise ValueError(f"position or path of {name!r} must be given")
-        self._world.move_obstacle(index, validation.vector(position, f"position of {name!r}"), over)
+        if position is None and roll is None:
+            raise ValueError(f"position, roll or path of {name!r} must be given")
+        place, turn = np.array(self._world.obstacle_position(index)), np.array(self._world.obstacle_turn(index))
+        if position is not None:
+            place = validation.vector(position, f"position of {name!r}")
+        axis = self._directory.all(ObstaclePart)[index].axis
+        if (tangent is None) != (axis is not None or roll is None):
+            what = "a sphere turns about the tangent that is given with a roll"
+            raise ValueError(
+                f"tangent of {name!r} must be given: {what}"
+                if tangent is None
+                else f"tangent of {name!r} must be None: only {what}, others about their axis"
+            )
+        if roll is not None:
+            about = validation.unit_vector(tangent, f"tangent of {name!r}") if axis is None else axis
+            turn = validation.number(roll, f"roll of {name!r}") * about
+        self._world.move_obstacle(index, place, turn, over)
         self._settings.paths.pop(name, None)
+
+    def _obstacle_pose(self, index: int, path: Path, time: float) -> tuple[FloatArray, FloatArray]:
+        """Where the path of an obstacle leads, and how it has turned since it was drawn [rad]."""
+        part = self._directory.all(ObstaclePart)[index]
+        value = path(time)
+        what = f"path of {part.name!r} at t = {time:g}"
+        if not (isinstance(value, tuple | list) and len(value) == 2):
+            return validation.vector(value, what), np.array(self._world.obstacle_turn(index))
+        place, roll = validation.vector(value[0], f"position on the {what}"), f"roll on the {what}"
+        if part.axis is None:
+            return place, validation.vector(value[1], roll)
+        return place, validation.number(value[1], roll) * part.axis
+
+    # Friction
+
+    def set_friction(self, a: Rod | Obstacle | str, b: Rod | Obstacle | str, friction: Friction) -> None:
+        """Give two rods, or a rod and an obstacle, another friction coefficient of their own. See `Scene.set_friction`.
+
+        Raises
+        ------
+        ValueError
+            Two obstacles, negative friction, or two coefficients for two rods.
+        """
+        first, second = (touching(self._directory, body) for body in (a, b))
+        if isinstance(first, ObstaclePart) and isinstance(second, ObstaclePart):
+            raise ValueError(f"{first.name!r} and {second.name!r} are both obstacles, which never touch")
+        what = f"friction of {first.name!r} and {second.name!r}"
+        rods = isinstance(first, RodPart) and isinstance(second, RodPart)
+        pair = friction_pair(friction, what, directed=not rods)
+        contact = self._world.contact
+        if rods and not contact.rods:
+            raise ValueError(f"{what} cannot be set: rods do not touch in this scene, see Scene.enable_contact")
+        check_law(pair, contact.friction_law, what)
+        bodies = body_of(self._directory, first), body_of(self._directory, second)
+        self._world.set_friction(with_pair(contact, bodies, pair))
+
+    def _set_obstacle_friction(self, part: ObstaclePart, value: Any) -> None:
+        what = f"friction of {part.name!r}"
+        pair = friction_pair(value, what)
+        contact = self._world.contact
+        check_law(pair, contact.friction_law, what)
+        index = self._directory.all(ObstaclePart).index(part)
+        self._world.set_friction(with_obstacle(contact, index, pair))
+
+    def _set_rod_friction(self, value: Any) -> None:
+        """Of all rods with each other."""
+        coefficient = validation.non_negative(value, "friction")
+        contact = self._world.contact
+        if not contact.rods:
+            raise ValueError("friction of the scene is that between rods, which do not touch: see Scene.enable_contact")
+        contact.friction = coefficient
+        self._world.set_friction(contact)

@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from withe import _core, validation
 from withe.directory import Directory
+from withe.friction import Friction, check_law, friction_pair
 from withe.handles import Obstacle, Rod
 from withe.parts import (
     ContactModel,
@@ -26,7 +27,7 @@ from withe.parts import (
     RodPart,
 )
 
-__all__ = ["CONTACT", "Contacts", "contact_table", "describe_contact"]
+__all__ = ["CONTACT", "Contacts", "body_of", "contact_table", "describe_contact", "touching"]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -51,15 +52,18 @@ class Contacts:
     _directory: Directory
 
     def add_floor(
-        self, height: float = 0.0, *, friction: float = 0.0, restitution: float = 1.0, name: str | None = None
+        self, height: float = 0.0, *, friction: Friction = 0.0, restitution: float = 1.0, name: str | None = None
     ) -> Obstacle:
         """Add a floor at a height [m], with its normal along +z.
 
         Parameters
         ----------
         height : float [m]
-        friction : float
-            Coefficient between the floor and every rod; see `set_friction` for single rods.
+        friction : float or pair of float
+            Coefficient between the floor and every rod; see `set_friction` for single rods. Two coefficients are those
+            along and across a rod, as of snakes and of bristles: for a slip in the direction s on rods with the tangent
+            t, friction is the normal force times mu_along (s . t) t + mu_across (s - (s . t) t)
+            [Hu et al. 2009, PNAS 106].
         restitution : float
             Speed after an impact over that before it, from 0 to 1; see `enable_contact`.
         name : str
@@ -83,7 +87,7 @@ class Contacts:
         point: npt.ArrayLike,
         normal: npt.ArrayLike,
         *,
-        friction: float = 0.0,
+        friction: Friction = 0.0,
         restitution: float = 1.0,
         name: str | None = None,
     ) -> Obstacle:
@@ -94,7 +98,7 @@ class Contacts:
         point : array_like of shape (3,) [m]
         normal : array_like of shape (3,)
             Of any length.
-        friction : float
+        friction : float or pair of float
         restitution : float
         name : str
 
@@ -112,7 +116,7 @@ class Contacts:
         center: npt.ArrayLike,
         radius: float,
         *,
-        friction: float = 0.0,
+        friction: Friction = 0.0,
         restitution: float = 1.0,
         name: str | None = None,
     ) -> Obstacle:
@@ -122,7 +126,7 @@ class Contacts:
         ----------
         center : array_like of shape (3,) [m]
         radius : float [m]
-        friction : float
+        friction : float or pair of float
         restitution : float
         name : str
 
@@ -141,7 +145,7 @@ class Contacts:
         end: npt.ArrayLike,
         radius: float,
         *,
-        friction: float = 0.0,
+        friction: Friction = 0.0,
         restitution: float = 1.0,
         name: str | None = None,
     ) -> Obstacle:
@@ -152,7 +156,7 @@ class Contacts:
         start, end : array_like of shape (3,) [m]
             Of its axis.
         radius : float [m]
-        friction : float
+        friction : float or pair of float
         restitution : float
         name : str
 
@@ -261,9 +265,13 @@ class Contacts:
             overlap=cast(Overlap, validation.choice(overlap, "overlap", get_args(Overlap))),
         )
 
-    def set_friction(self, a: Rod | Obstacle | str, b: Rod | Obstacle | str, friction: float) -> None:
-        """Give two rods, or a rod and an obstacle, a friction coefficient of their own."""
-        self._set_pair(a, b, ignored=False, friction=validation.non_negative(friction, "friction"))
+    def set_friction(self, a: Rod | Obstacle | str, b: Rod | Obstacle | str, friction: Friction) -> None:
+        """Give two rods, or a rod and an obstacle, a friction coefficient of their own.
+
+        A rod and an obstacle may have two, along and across the rod; see `add_floor`.
+        """
+        rods = all(isinstance(touching(self._directory, body), RodPart) for body in (a, b))
+        self._set_pair(a, b, ignored=False, friction=friction_pair(friction, "friction", directed=not rods))
 
     def set_restitution(self, a: Rod | Obstacle | str, b: Rod | Obstacle | str, restitution: float) -> None:
         """Give two rods, or a rod and an obstacle, a coefficient of restitution of their own, from 0 to 1."""
@@ -295,19 +303,13 @@ class Contacts:
         self._directory.contact = replace(settings, groups={**settings.groups, part.name: group})
 
     def _set_pair(self, a: Any, b: Any, **own: Any) -> None:
-        first, second = self._touching(a), self._touching(b)
+        first, second = touching(self._directory, a), touching(self._directory, b)
         if isinstance(first, ObstaclePart) and isinstance(second, ObstaclePart):
             raise ValueError(f"{first.name!r} and {second.name!r} are both obstacles, which never touch")
         settings = self._directory.contact
         key = (first.name, second.name) if first.name <= second.name else (second.name, first.name)
         pair = replace(settings.pairs.get(key, PairSettings()), **own)
         self._directory.contact = replace(settings, pairs={**settings.pairs, key: pair})
-
-    def _touching(self, handle: Any) -> RodPart | ObstaclePart:
-        part = self._directory.find_any(handle, "what touches")
-        if not isinstance(part, RodPart | ObstaclePart):
-            raise ValueError(f"what touches must be a rod or an obstacle, got {part.name!r}")
-        return part
 
     def _obstacle(
         self,
@@ -316,13 +318,32 @@ class Contacts:
         point: FloatArray,
         other: FloatArray,
         radius: float,
-        friction: float,
+        friction: Friction,
         restitution: float,
     ) -> Obstacle:
-        friction = validation.non_negative(friction, f"friction of {name!r}")
+        both = friction_pair(friction, f"friction of {name!r}")
         restitution = validation.share(restitution, f"restitution of {name!r}")
-        part = ObstaclePart(name, kind, point, other, radius, friction, restitution)
+        part = ObstaclePart(name, kind, point, other, radius, both, restitution)
         return cast(Obstacle, self._directory.add(part))
+
+
+def touching(directory: Directory, handle: Any) -> RodPart | ObstaclePart:
+    """What a handle or name of something that touches means.
+
+    Raises
+    ------
+    ValueError
+        Neither a rod nor an obstacle.
+    """
+    part = directory.find_any(handle, "what touches")
+    if not isinstance(part, RodPart | ObstaclePart):
+        raise ValueError(f"what touches must be a rod or an obstacle, got {part.name!r}")
+    return part
+
+
+def body_of(directory: Directory, part: RodPart | ObstaclePart) -> int:
+    """How the engine calls a rod (its index) or an obstacle (-1 - index)."""
+    return part.index if isinstance(part, RodPart) else -1 - directory.all(ObstaclePart).index(part)
 
 
 def _optional(value: float | None, what: str) -> float | None:
@@ -362,9 +383,15 @@ def describe_contact(directory: Directory) -> _core.ContactDescription:
                 f"got {settings.distance_tolerance:g} m"
             )
     contact.obstacles = [_describe_obstacle(part) for part in obstacles]
-    contact.obstacle_friction = np.array([part.friction for part in obstacles], dtype=float)
+    for part in obstacles:
+        check_law(part.friction, settings.friction_model, f"friction of {part.name!r}")
+    contact.obstacle_friction = np.array([part.friction[0] for part in obstacles], dtype=float)
+    contact.obstacle_across = np.array([part.friction[1] for part in obstacles], dtype=float)
     contact.obstacle_restitution = np.array([part.restitution for part in obstacles], dtype=float)
     bodies = {rod.name: rod.index for rod in rods} | {part.name: -1 - i for i, part in enumerate(obstacles)}
+    for (a, b), own in settings.pairs.items():
+        if own.friction is not None:
+            check_law(own.friction, settings.friction_model, f"friction of {a!r} and {b!r}")
     pairs = [_pair(bodies[a], bodies[b], own) for (a, b), own in settings.pairs.items()]
     members = list(settings.groups.items())
     for i, (a, group) in enumerate(members):
@@ -387,7 +414,7 @@ def _pair(first: int, second: int, own: PairSettings) -> _core.ContactPairDescri
     pair = _core.ContactPairDescription()
     pair.first, pair.second = first, second
     pair.ignored = own.ignored
-    pair.friction = -1.0 if own.friction is None else own.friction
+    pair.friction, pair.across = (-1.0, -1.0) if own.friction is None else own.friction
     pair.stiffness = own.stiffness or 0.0
     pair.restitution = -1.0 if own.restitution is None else own.restitution
     return pair

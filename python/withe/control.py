@@ -10,8 +10,10 @@ import numpy.typing as npt
 
 from withe import validation
 from withe.applied_loads import AppliedLoads, load_vector
+from withe.custom_forces import CustomForces
 from withe.description import added_mass, describe_load, drag, rod_parameters
-from withe.handles import Drag, Fluid, Load, Mass, Rod
+from withe.friction import as_given, obstacle_friction
+from withe.handles import CustomForce, Drag, Fluid, Load, Mass, Obstacle, Rod
 from withe.motion import Path, Turn, evaluate_path
 from withe.parameters import ROD_WORDS, RodParameters
 from withe.parts import (
@@ -98,7 +100,7 @@ class Control(States, AppliedLoads):
 
     # Parameters
 
-    def set(self, target: Rod | Load | Mass | Drag | Fluid | str | None = None, /, **values: Any) -> None:
+    def set(self, target: Rod | Load | Mass | Drag | Fluid | Obstacle | str | None = None, /, **values: Any) -> None:
         """Change parameters while the simulation runs.
 
         Parameters
@@ -109,7 +111,9 @@ class Control(States, AppliedLoads):
             Of a rod: youngs_modulus, poisson_ratio, density, viscosity, stretch_stiffness,
             bend_stiffness, twist_stiffness, line_density, viscous_time, drag (numbers, or one an edge),
             natural_curvature, natural_twist. Of a load: force, moment, load or pressure, constant or a function
-            of time. Of a mass: mass. Of a drag: drag. Of a fluid: viscosity. Of the scene: gravity.
+            of time. Of a mass: mass. Of a drag: drag. Of a fluid: viscosity. Of an obstacle: friction, one coefficient
+            or a pair, along and across rods. Of the scene: gravity, and friction between rods. See `set_friction` for
+            two of them.
 
         Raises
         ------
@@ -124,10 +128,13 @@ class Control(States, AppliedLoads):
         if not values:
             raise ValueError("set must be given what to set, such as youngs_modulus=1e6")
         if target is None:
-            _only(values, ("gravity",), "the scene")
-            gravity = validation.vector(values["gravity"], "gravity")
-            self._world.set_gravity(gravity)
-            self._settings.gravity = gravity
+            _only(values, ("gravity", "friction"), "the scene")
+            gravity = validation.vector(values["gravity"], "gravity") if "gravity" in values else None
+            if "friction" in values:
+                self._set_rod_friction(values["friction"])
+            if gravity is not None:
+                self._world.set_gravity(gravity)
+                self._settings.gravity = gravity
             return
         part = self._directory.find_any(target, "target")
         if isinstance(part, RodPart):
@@ -148,16 +155,19 @@ class Control(States, AppliedLoads):
             viscosity = validation.positive(values["viscosity"], f"viscosity of {part.name!r}")
             self._world.set_fluid_viscosity(viscosity)
             self._settings.fluids = self._settings.fluids | {part.name: viscosity}
+        elif isinstance(part, ObstaclePart):
+            _only(values, ("friction",), f"obstacle {part.name!r}")
+            self._set_obstacle_friction(part, values["friction"])
         else:
             raise ValueError(_nothing_to_set(part))
 
-    def get(self, target: Rod | Load | Mass | Drag | Fluid | str, word: str | None = None) -> Any:
+    def get(self, target: Rod | Load | Mass | Drag | Fluid | Obstacle | str, word: str | None = None) -> Any:
         """The present value of what `set` sets.
 
         Parameters
         ----------
         target : handle or str
-            Or "gravity".
+            Or "gravity", or "friction" of rods with each other.
         word : str
             As in `set`.
 
@@ -178,6 +188,8 @@ class Control(States, AppliedLoads):
         (29, 2)
         """
         if word is None:
+            if isinstance(target, str) and target == "friction":
+                return float(self._world.contact.friction)
             if not isinstance(target, str) or target != "gravity":
                 raise ValueError("word must be given, such as get(arm, 'youngs_modulus')")
             return self._settings.gravity.copy()
@@ -199,6 +211,9 @@ class Control(States, AppliedLoads):
             return self._settings.drags[part.name]
         elif isinstance(part, FluidPart) and word == "viscosity":
             return self._settings.fluids[part.name]
+        elif isinstance(part, ObstaclePart) and word == "friction":
+            index = self._directory.all(ObstaclePart).index(part)
+            return as_given(obstacle_friction(self._world.contact, index))
         words = _words_of(part)
         if not words:
             raise ValueError(_nothing_to_set(part))
@@ -261,6 +276,35 @@ class Control(States, AppliedLoads):
             self._settings.functions[part.name] = part.function
         return cast(Load, self._directory.add(part))
 
+    def remove(self, load: Load | str) -> None:
+        """Take off a load that was put on while running; it acts no more from now on.
+
+        Parameters
+        ----------
+        load : Load or str
+            As `add_force`, `add_moment`, `add_load` or `add_pressure` of the simulation returned it.
+
+        Raises
+        ------
+        ValueError
+            A load that is not there any more, or one of the scene as it was drawn.
+
+        Examples
+        --------
+        >>> wind = simulation.add_load(arm, (0.1, 0, 0))
+        >>> simulation.remove(wind)
+        """
+        part = self._directory.find(load, LoadPart, "load")
+        if part.name not in self._settings.loads:
+            raise ValueError(
+                f"load {part.name!r} was drawn with the scene, and stays: set({part.name!r}, {part.kind}=...) to zero"
+            )
+        self._world.remove_load(self._load_index(part))
+        self._loads = [other for other in self._loads if other is not part]
+        del self._settings.loads[part.name]
+        self._settings.functions.pop(part.name, None)
+        self._directory.remove(part.name)
+
     def _set_load(self, part: LoadPart, value: Any) -> None:
         what = f"{part.kind} {part.name!r}"
         function = value if callable(value) else None
@@ -318,8 +362,7 @@ class Control(States, AppliedLoads):
                     self._world.set_load(index, value)
         for name, path in self._settings.paths.items():
             if name not in self._settings.supports and (obstacle := self._obstacle(name)) is not None:
-                what = f"path of {name!r} at t = {end_time:g}"
-                self._world.prescribe_obstacle(obstacle[0], validation.vector(path(end_time), what))
+                self._world.prescribe_obstacle(obstacle[0], *self._obstacle_pose(obstacle[0], path, end_time))
                 continue
             index, support = self._settings.supports[name]
             if _finished(path, min(self._world.time, end_time)):
@@ -329,19 +372,40 @@ class Control(States, AppliedLoads):
             position, rotation = evaluate_path(path, end_time, present, support.kind != "pin", owner)
             self._world.prescribe_support(index, position, rotation)
 
-    def _force_function(self) -> Callable[[float, FloatArray, FloatArray], FloatArray] | None:
-        """What finds the custom forces of an inner step, if any."""
-        return self._custom_force if self._custom_forces else None
+    def _force_function(self) -> CustomForces | None:
+        """What finds the custom forces, if any."""
+        if not self._custom_forces:
+            return None
+        shortest = min(float(rod.lengths.min()) for rod in self._directory.all(RodPart))
+        return CustomForces(
+            self._custom_forces,
+            shortest,
+            self._check_in_plane,
+            lambda moments, what: self._check_in_plane(moments, what, along_normal=True),
+        )
 
-    def _custom_force(self, time: float, positions: FloatArray, velocities: FloatArray) -> FloatArray:
-        total = np.zeros(positions.shape)
-        for force in self._custom_forces:
-            value = force.function(time, positions.copy(), velocities.copy())
-            what = f"custom force {force.name!r}"
-            forces = validation.number_array(value, what, total.shape)
-            self._check_in_plane(forces, f"{what} at t = {time:g}")
-            total += forces
-        return total
+    def check_jacobian(self, force: CustomForce | str | None = None) -> None:
+        """Compare the jacobian of a custom force with differences of its function, at the present state.
+
+        Parameters
+        ----------
+        force : CustomForce or str
+            By default all that have a jacobian, one after the other.
+
+        Raises
+        ------
+        ValueError
+            A jacobian that is wrong, with the entry that is farthest off; or none.
+        """
+        given = [part for part in self._custom_forces if part.jacobian is not None]
+        if force is not None:
+            given = [self._directory.find(force, CustomForcePart, "custom force")]
+        custom = self._force_function()
+        if custom is None or not given:
+            raise ValueError("there is no jacobian to check: give add_custom_force one")
+        positions, velocities = np.array(self._world.positions()), np.array(self._world.velocities())
+        for part in given:
+            custom.check(part, self._world.time, positions, velocities)
 
     def _check_in_plane(self, value: FloatArray, what: str, along_normal: bool = False) -> None:
         """Refuse what a function gave that leaves the plane of a simulation built with planar=True."""
@@ -371,13 +435,18 @@ def _words_of(part: Part) -> tuple[str, ...]:
         return (*ROD_WORDS, *_NATURAL_WORDS, "radius")
     if isinstance(part, LoadPart):
         return (part.kind,)
-    words: dict[type[Any], tuple[str, ...]] = {MassPart: ("mass",), DragPart: ("drag",), FluidPart: ("viscosity",)}
+    words: dict[type[Any], tuple[str, ...]] = {
+        MassPart: ("mass",),
+        DragPart: ("drag",),
+        FluidPart: ("viscosity",),
+        ObstaclePart: ("friction",),
+    }
     return words.get(type(part), ())
 
 
 _SETTABLE = (
     "set takes rods (youngs_modulus, natural_curvature, ...), loads (force, moment, load), masses (mass), "
-    "drags (drag), fluids (viscosity), and None for the scene (gravity)"
+    "drags (drag), fluids (viscosity), obstacles (friction), and None for the scene (gravity, friction)"
 )
 
 
@@ -393,8 +462,6 @@ def _nothing_to_set(part: Part) -> str:
         )
     if isinstance(part, SupportPart):
         return f"support {part.name!r} has nothing to set: move, release or reaction take it. {_SETTABLE}"
-    if isinstance(part, ObstaclePart):
-        return f"obstacle {part.name!r} has nothing to set: move takes it. {_SETTABLE}"
     return f"{part.name!r} has nothing to set. {_SETTABLE}"
 
 

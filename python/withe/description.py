@@ -56,7 +56,10 @@ def describe(directory: Directory, gravity: FloatArray, bending: Bending = "angl
     scene.joints = [_describe_joint(group) for group in _groups(directory.all(JoinPart))]
     scene.supports = _describe_supports(directory)
     scene.loads = [describe_load(load) for load in directory.all(LoadPart)]
-    scene.has_custom_force = bool(directory.all(CustomForcePart))
+    custom = directory.all(CustomForcePart)
+    scene.has_custom_force = bool(custom)
+    scene.custom_implicit = any(part.jacobian is not None for part in custom)
+    scene.custom_moments = any(part.moments for part in custom)
     scene.contact = describe_contact(directory)
     scene.fluid = describe_fluid(directory)
     return scene

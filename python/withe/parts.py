@@ -157,20 +157,29 @@ class CustomForcePart:
     """Forces that a function computes."""
 
     name: str
-    function: Callable[[float, FloatArray, FloatArray], npt.ArrayLike]
+    function: Callable[[float, FloatArray, FloatArray], Any]
+    jacobian: Callable[[float, FloatArray, FloatArray], Any] | None = None
+    moments: bool = False
 
 
 @dataclass(frozen=True, eq=False)
 class ObstaclePart:
-    """Something solid that does not move."""
+    """Something solid, as it was drawn."""
 
     name: str
     kind: Literal["plane", "capsule"]
     point: FloatArray  # on the plane; start of the axis (3,) [m]
     other: FloatArray  # normal; end of the axis (3,)
     radius: float
-    friction: float
+    friction: tuple[float, float]  # along and across rods
     restitution: float
+
+    @property
+    def axis(self) -> FloatArray | None:
+        """What it may turn about: normal or axis; None of a sphere, which may turn about any."""
+        axis = self.other if self.kind == "plane" else self.other - self.point
+        length = float(np.linalg.norm(axis))
+        return axis / length if length > 0.0 else None
 
 
 @dataclass(frozen=True)
@@ -178,7 +187,7 @@ class PairSettings:
     """What two bodies have of their own; None: what the scene has."""
 
     ignored: bool = False
-    friction: float | None = None
+    friction: tuple[float, float] | None = None  # along and across a rod
     restitution: float | None = None
     stiffness: float | None = None  # [N/m]
 

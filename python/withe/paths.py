@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Container
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from withe.handles import NodeHandle, Rod, Support
+from withe import _core, validation
+from withe.directory import Directory
+from withe.handles import Load, NodeHandle, Rod, Support
+from withe.parts import LoadPart
 
-__all__ = ["EquilibriumPath"]
+__all__ = ["EquilibriumPath", "PathOptions", "path_of", "path_options"]
 
 FloatArray = npt.NDArray[np.float64]
+
+_MAX_STEPS = 2**31 - 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,3 +63,56 @@ class EquilibriumPath:
     def moments(self, support: Support | NodeHandle | str) -> FloatArray:
         """Moment of a support on the rod, about its node, shape (points, 3) [N m]."""
         return self._reactions[1][:, self._support(support)].copy()
+
+
+@dataclass(frozen=True)
+class PathOptions:
+    """What path is wanted: checked arguments of `Simulation.equilibrium`."""
+
+    loads: list[LoadPart]
+    start: float
+    end: float
+    steps: int
+    turn: float
+
+
+def path_options(
+    directory: Directory, functions: Container[str], load: Any, start: Any, to: Any, steps: Any, turn: Any
+) -> PathOptions:
+    """Check what path is wanted; `functions` has the names of loads that are functions of time.
+
+    Raises
+    ------
+    ValueError
+        A load that is none or a function of time, or numbers out of range.
+    """
+    handles = [] if load is None else [load] if isinstance(load, Load | str) else list(load)
+    parts = [directory.find(handle, LoadPart, "load") for handle in handles]
+    for part in parts:
+        if part.name in functions:
+            raise ValueError(f"load {part.name!r} is a function of time, which a load factor has no place in")
+    begin, end = validation.number(start, "start"), validation.number(to, "to")
+    if begin == end:
+        raise ValueError(f"to must be another load factor than start, got {end} for both")
+    if begin != 0.0 and not parts:
+        raise ValueError(f"start must be 0 where no load is given, got {begin}")
+    count = validation.integer(steps, "steps", 1, _MAX_STEPS)
+    return PathOptions(parts, begin, end, count, validation.positive(turn, "turn"))
+
+
+def path_of(
+    found: _core.EquilibriumPath, rows: Callable[[Rod | str], Any], support: Callable[[Support | NodeHandle | str], int]
+) -> EquilibriumPath:
+    """The engine's path; `rows` of a rod's nodes in all positions, and the index of a support."""
+    points = found.points
+    return EquilibriumPath(
+        load_factors=np.array([point.factor for point in points]),
+        stable=np.array([point.stable for point in points]),
+        limit_points=np.flatnonzero([point.limit for point in points]),
+        finished=found.finished,
+        iterations=found.iterations,
+        _positions=np.array([point.positions for point in points]),
+        _reactions=(np.array([point.forces for point in points]), np.array([point.moments for point in points])),
+        _rows=rows,
+        _support=support,
+    )

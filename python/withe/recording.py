@@ -7,7 +7,7 @@ holds NumPy arrays only, so it pickles, saves to one file, and needs no engine t
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -15,9 +15,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from withe import io, validation
+from withe import io
+from withe.outlines import ObstacleOutline, RodOutline, index_of
 
-__all__ = ["EnergyHistory", "ObstacleOutline", "Record", "Recorder", "RodOutline"]
+__all__ = ["ENERGIES", "ROD_READOUTS", "EnergyHistory", "Record"]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -34,60 +35,7 @@ _UNITS = {
     "energy": "J",
     "radii": "m",
 }
-_ROD_READOUTS = ("directors", "curvatures", "twists", "tensions", "spins")
-
-
-@dataclass(frozen=True)
-class RodOutline:
-    """What pictures and files need to know of a rod besides its motion.
-
-    Attributes
-    ----------
-    name : str
-    rows : ndarray of int, shape (nodes,)
-        The rod's rows among the nodes of the scene.
-    closed : bool
-        Whether the last node is joined to the first by an edge.
-    radii : ndarray of shape (edges,) [m]
-    widths : ndarray of shape (edges, 2) [m], or None
-        Sides of a rectangular section along d1 and d2; None for a round one.
-    """
-
-    name: str
-    rows: npt.NDArray[np.int64]
-    closed: bool
-    radii: FloatArray
-    widths: FloatArray | None = None
-
-    @property
-    def edges(self) -> int:
-        """Number of edges."""
-        return len(self.rows) - (0 if self.closed else 1)
-
-    @property
-    def stencils(self) -> int:
-        """Number of nodes at which the rod bends."""
-        return len(self.rows) - (0 if self.closed else 2)
-
-
-@dataclass(frozen=True)
-class ObstacleOutline:
-    """What pictures need to know of an obstacle besides its motion.
-
-    Attributes
-    ----------
-    name : str
-    kind : {"plane", "capsule"}
-        A sphere is a capsule without length.
-    axis : ndarray of shape (3,)
-        Normal of a plane; from the start of a capsule's axis to its end [m].
-    radius : float [m]
-    """
-
-    name: str
-    kind: str
-    axis: FloatArray
-    radius: float
+ROD_READOUTS = ("directors", "curvatures", "twists", "tensions", "spins")
 
 
 @dataclass(frozen=True)
@@ -110,7 +58,7 @@ class EnergyHistory:
     dissipated: FloatArray
 
 
-_ENERGIES = tuple(field.name for field in fields(EnergyHistory))
+ENERGIES = tuple(field.name for field in fields(EnergyHistory))
 
 
 class Record:
@@ -169,7 +117,7 @@ class Record:
             self._array(f"obstacle_{index}_place", (frames, 3))
             if obstacle.kind not in ("plane", "capsule") or obstacle.axis.shape != (3,) or not obstacle.radius >= 0.0:
                 raise ValueError(f"obstacle {obstacle.name!r} must be a plane or a capsule with an axis and a radius")
-        for name in _ENERGIES:
+        for name in ENERGIES:
             self._array(f"energy_{name}", (frames,))
         for index, name in enumerate(self._extras):
             values = self._arrays.get(f"extra_{index}")
@@ -236,7 +184,7 @@ class Record:
         ValueError
             No obstacle of that name.
         """
-        index = _index_of(self._obstacles, obstacle, "obstacle")
+        index = index_of(self._obstacles, obstacle, "obstacle")
         return self._arrays[f"obstacle_{index}_place"].copy()
 
     def velocities(self, rod: Any = None) -> FloatArray:
@@ -273,7 +221,7 @@ class Record:
 
     def energy(self) -> EnergyHistory:
         """Energies, every one an array of shape (frames,) [J]."""
-        return EnergyHistory(*(self._arrays[f"energy_{name}"].copy() for name in _ENERGIES))
+        return EnergyHistory(*(self._arrays[f"energy_{name}"].copy() for name in ENERGIES))
 
     def keys(self) -> tuple[str, ...]:
         """Names of what was recorded besides the read-outs."""
@@ -306,7 +254,7 @@ class Record:
         return self._arrays[f"rod_{self._index(rod)}_{name}"].copy()
 
     def _index(self, rod: Any) -> int:
-        return _index_of(self._rods, rod, "rod")
+        return index_of(self._rods, rod, "rod")
 
     def __repr__(self) -> str:
         rods = ", ".join(rod.name for rod in self._rods)
@@ -417,155 +365,3 @@ class Record:
         from withe import view
 
         return view.picture(self, path, **options)
-
-
-def _index_of(outlines: tuple[RodOutline, ...] | tuple[ObstacleOutline, ...], handle: Any, what: str) -> int:
-    """Place of a rod or an obstacle among those of a record, by its name or its handle."""
-    name = handle if isinstance(handle, str) else getattr(handle, "name", None)
-    names = [outline.name for outline in outlines]
-    if name not in names:
-        known = ", ".join(map(repr, names)) or "none"
-        wanted = repr(handle) if name is None else repr(name)
-        raise ValueError(f"{what} must be one of {known} or its handle, got {wanted}")
-    return names.index(name)
-
-
-class _Column:
-    """An array that grows by whole frames."""
-
-    def __init__(self, first: npt.NDArray[Any]) -> None:
-        self._values = np.empty((16, *first.shape), first.dtype)
-
-    def check(self, name: str, value: npt.NDArray[Any]) -> None:
-        if value.shape != self._values.shape[1:]:
-            raise ValueError(f"record[{name!r}] must keep its shape {self._values.shape[1:]}, got {value.shape}")
-
-    def write(self, frame: int, value: npt.NDArray[Any]) -> None:
-        if frame == len(self._values):
-            self._values = np.concatenate([self._values, np.empty_like(self._values)])
-        if not np.can_cast(value.dtype, self._values.dtype):
-            self._values = self._values.astype(np.result_type(value, self._values))
-        self._values[frame] = value
-
-    def values(self, frames: int) -> npt.NDArray[Any]:
-        return self._values[:frames].copy()
-
-
-class Recorder:
-    """Takes frames from a simulation while it runs.
-
-    Parameters
-    ----------
-    simulation
-        Answers to the read-outs of `Simulation`.
-    extra : mapping of str to callable
-        Called with the simulation at every frame; each returns a number or an array, of one shape.
-    obstacles : iterable of ObstacleOutline
-        Whose positions to record.
-
-    Raises
-    ------
-    ValueError
-        A name that is not text, or something that cannot be called.
-    """
-
-    def __init__(
-        self,
-        simulation: Any,
-        extra: Mapping[str, Callable[[Any], npt.ArrayLike]] | None = None,
-        obstacles: Iterable[ObstacleOutline] = (),
-    ) -> None:
-        self._simulation = simulation
-        self._obstacles = tuple(obstacles)
-        self._extra = dict(extra or {})
-        for name, function in self._extra.items():
-            if not isinstance(name, str):
-                raise ValueError(f"names in record must be text, got {name!r}")
-            if not callable(function):
-                raise ValueError(f"record[{name!r}] must be a function, got {function!r}")
-        self._rods = outlines(simulation)
-        self._columns: dict[str, _Column] = {}
-        self._frames = 0
-
-    def capture(self) -> None:
-        """Take one frame. A callback's exception propagates, and then no part of the frame is kept.
-
-        Raises
-        ------
-        ValueError
-            An extra that is not numbers, or changes its shape.
-        """
-        frame = self._frame()
-        for index, name in enumerate(self._extra):
-            if self._columns:
-                self._columns[f"extra_{index}"].check(name, frame[f"extra_{index}"])
-        if not self._columns:
-            self._columns = {name: _Column(values) for name, values in frame.items()}
-        for name, values in frame.items():
-            self._columns[name].write(self._frames, values)
-        self._frames += 1  # last, so that an interrupt leaves no half of a frame
-
-    def _frame(self) -> dict[str, npt.NDArray[Any]]:
-        simulation = self._simulation
-        frame: dict[str, npt.NDArray[Any]] = {
-            "times": np.array(simulation.time, float),
-            "positions": simulation.positions(),
-            "velocities": simulation.velocities(),
-        }
-        for index, rod in enumerate(self._rods):
-            for readout in _ROD_READOUTS:
-                frame[f"rod_{index}_{readout}"] = getattr(simulation, readout)(rod.name)
-        for index, obstacle in enumerate(self._obstacles):
-            frame[f"obstacle_{index}_place"] = simulation.obstacle_position(obstacle.name)
-        energy = simulation.energy()
-        for name in _ENERGIES:
-            frame[f"energy_{name}"] = np.array(getattr(energy, name), float)
-        for index, (name, function) in enumerate(self._extra.items()):
-            frame[f"extra_{index}"] = _numbers(name, function(simulation))
-        return frame
-
-    @property
-    def record(self) -> Record:
-        """The frames taken so far."""
-        if self._columns:
-            arrays = {name: column.values(self._frames) for name, column in self._columns.items()}
-        else:
-            arrays = {name: values[None][:0].copy() for name, values in self._frame().items()}
-        return Record(self._rods, arrays, self._extra, self._obstacles)
-
-
-def _numbers(name: str, value: npt.ArrayLike) -> npt.NDArray[Any]:
-    if validation.has_masked(value):
-        raise ValueError(f"record[{name!r}] must have a value everywhere, got a masked array with masked entries")
-    try:
-        array = np.array(value)
-    except ValueError:
-        array = np.array(None)
-    if array.dtype.kind not in "biufc":
-        raise ValueError(f"record[{name!r}] must return numbers of one shape, got {value!r}")
-    return array
-
-
-def outlines(simulation: Any) -> tuple[RodOutline, ...]:
-    """The outlines of the rods of a simulation, from its scene's handles."""
-    return tuple(_outline(rod) for rod in simulation.rods)
-
-
-def _outline(rod: Any) -> RodOutline:
-    rows = np.array(rod.rows, np.int64)
-    edges = len(rows) - (0 if rod.closed else 1)
-    widths = getattr(rod, "widths", None)
-    return RodOutline(
-        name=rod.name,
-        rows=rows,
-        closed=bool(rod.closed),
-        radii=np.array(np.broadcast_to(np.asarray(rod.radii, float), (edges,))),
-        widths=None if widths is None else np.array(np.broadcast_to(widths, (edges, 2)), float),
-    )
-
-
-def present(simulation: Any, obstacles: Iterable[ObstacleOutline] = ()) -> Record:
-    """A record of one frame: the present state of a simulation."""
-    recorder = Recorder(simulation, None, obstacles)
-    recorder.capture()
-    return recorder.record

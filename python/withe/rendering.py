@@ -5,12 +5,7 @@ This is the stage that pictures, films and the viewer share.
 
 from __future__ import annotations
 
-import contextlib
-import os
-import subprocess
-import sys
-from collections.abc import Iterator, Sequence
-from functools import cache
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -18,13 +13,14 @@ import numpy.typing as npt
 
 from withe import scenery
 from withe.extras import require
+from withe.graphics import render_window
 from withe.io import edges_to_nodes, stencils_to_nodes
 from withe.surfaces import Surface
 
 if TYPE_CHECKING:
     from withe.recording import Record
 
-__all__ = ["Stage", "color_limits", "nice_limits", "probe_rendering"]
+__all__ = ["Stage", "color_limits", "nice_limits"]
 
 FloatArray = npt.NDArray[np.float64]
 ColorBy = Literal["rod", "tension", "curvature", "twist", "speed"]
@@ -125,7 +121,7 @@ class Stage:
         pyvista = require("pyvista", "view")
         self._fineness = supersampling
         window = [side * self._fineness for side in self.size]
-        with _window(off_screen):
+        with render_window(off_screen):
             self.plotter = pyvista.Plotter(off_screen=off_screen, window_size=window, lighting="none")
         self.plotter.set_background("#f5f7f9")
         if ground is None:
@@ -491,83 +487,3 @@ def _facing(positions: FloatArray) -> FloatArray:
         normal = -normal
     level = normal[:2] / np.linalg.norm(normal[:2])
     return np.array([level[0], level[1], 0.2])
-
-
-# Rendering off-screen takes a graphics library that wheels do not bring. VTK may end the process where it
-# is missing, so the first render is tried in another one.
-
-_PROBE = """
-import pyvista
-plotter = pyvista.Plotter(off_screen=True, window_size=(64, 64))
-plotter.add_mesh(pyvista.Sphere())
-image = plotter.screenshot(return_img=True)
-raise SystemExit(0 if image.min() < image.max() else 3)
-"""
-_WINDOW = "VTK_DEFAULT_OPENGL_WINDOW"
-
-
-@cache
-def probe_rendering() -> str:
-    """Find a way to render off-screen, in a subprocess, once.
-
-    Returns
-    -------
-    str
-        The render window of VTK that works; empty for its own choice.
-
-    Raises
-    ------
-    RuntimeError
-        None works; the message names the package to install.
-    """
-    windows = ["vtkEGLRenderWindow", "vtkOSOpenGLRenderWindow"] if sys.platform == "linux" else []
-    if sys.platform != "linux" or os.environ.get("DISPLAY") or os.environ.get(_WINDOW):
-        windows.insert(0, "")
-    output = ""
-    for window in windows:
-        environment = {**os.environ, _WINDOW: window} if window else dict(os.environ)
-        try:
-            result = subprocess.run(
-                [sys.executable, "-c", _PROBE], env=environment, capture_output=True, text=True, timeout=180
-            )
-        except (OSError, subprocess.TimeoutExpired) as error:
-            output += str(error)
-            continue
-        if result.returncode == 0:
-            return window
-        output += result.stderr
-    raise RuntimeError(_advice(output))
-
-
-def _advice(output: str) -> str:
-    """What to install, from what the failed render wrote."""
-    message = "cannot render off-screen: "
-    if sys.platform != "linux":
-        last = output.strip().splitlines()[-1:] or ["no reason given"]
-        return message + last[0]
-    for library, package in (
-        ("libGL.so", "libgl1"),
-        ("libXrender.so", "libxrender1"),
-        ("libX11.so", "libx11-6"),
-        ("libSM.so", "libsm6"),
-    ):
-        if f"{library}" in output and "ImportError" in output:
-            return message + f"{library} is missing; install it with: apt install {package}"
-    return message + "no working EGL library was found; install it with: apt install libegl1 libgl1-mesa-dri"
-
-
-@contextlib.contextmanager
-def _window(off_screen: bool) -> Iterator[None]:
-    """Have VTK make the window that the probe found, and leave the environment as it was."""
-    if not off_screen:
-        yield
-        return
-    window = probe_rendering()
-    before = os.environ.get(_WINDOW)
-    if window:
-        os.environ[_WINDOW] = window
-    try:
-        yield
-    finally:
-        if window and before is None:
-            os.environ.pop(_WINDOW, None)

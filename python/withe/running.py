@@ -14,7 +14,8 @@ import numpy.typing as npt
 
 from withe import validation
 from withe.progress import progress as progress_bar
-from withe.recording import Record, Recorder
+from withe.recorder import Recorder
+from withe.recording import Record
 from withe.simulation import Simulation
 
 __all__ = ["run", "run_many"]

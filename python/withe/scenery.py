@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from withe.recording import ObstacleOutline
+from withe.outlines import ObstacleOutline
 
 __all__ = ["cloud", "ends", "framing", "patch", "profile", "surface"]
 

@@ -13,22 +13,22 @@ import numpy as np
 import numpy.typing as npt
 
 from withe import _core, validation
-from withe.contacts import contact_table
 from withe.control import Control
 from withe.description import describe, parameters_of
 from withe.directory import Directory
 from withe.errors import CoarseMeshWarning, CoarseStepWarning, ConvergenceError
-from withe.handles import Load, NodeHandle, Obstacle, Rod, Support
-from withe.knots import link
+from withe.handles import Load
 from withe.linearisation import Linearisation, Stability
+from withe.measurements import Measurements
 from withe.options import check_tolerances, engine_options
-from withe.parts import CustomForcePart, DragPart, FluidPart, LoadPart, MassPart, ObstaclePart, RodPart, SupportPart
-from withe.paths import EquilibriumPath
-from withe.readouts import Energy, Equilibrium, Momentum, Plan, Reaction, RodEnergy, Statistics
-from withe.snapshots import Settings, Snapshot
+from withe.parts import CustomForcePart, DragPart, FluidPart, LoadPart, MassPart, RodPart, SupportPart
+from withe.paths import EquilibriumPath, PathOptions, path_of, path_options
+from withe.readouts import Equilibrium
+from withe.snapshots import Settings, Snapshot, matched_settings
 
 if TYPE_CHECKING:
-    from withe.recording import ObstacleOutline, Record, Recorder
+    from withe.recorder import Recorder
+    from withe.recording import Record
 
 __all__ = ["Simulation"]
 
@@ -37,7 +37,7 @@ FloatArray = npt.NDArray[np.float64]
 _MAX_STEPS = 2**31 - 1
 
 
-class Simulation(Control):
+class Simulation(Control, Measurements):
     """A scene while it runs. Made by `Scene.build`.
 
     Read-outs are copies. Rods, nodes, supports and loads are given by their handles or their names.
@@ -216,7 +216,9 @@ class Simulation(Control):
         self._world.check_idle()
         if path is not None:
             validation.choice(path, "path", ("arc_length",))
-            return self._arc_length(load, start, to, steps, turn)
+            return self._arc_length(
+                path_options(self._directory, self._settings.functions, load, start, to, steps, turn)
+            )
         self._apply_functions(self._world.time, self._world.time)
         with self._convergence():
             found = self._world.equilibrium(None, self._force_function())
@@ -225,35 +227,15 @@ class Simulation(Control):
             stability = self.linearise().stability
         return Equilibrium(stability == "stable", stability, found.branch_changed, found.iterations, found.residual)
 
-    def _arc_length(self, load: Any, start: Any, to: Any, steps: Any, turn: Any) -> EquilibriumPath:
-        handles = [] if load is None else [load] if isinstance(load, Load | str) else list(load)
-        parts = [self._directory.find(handle, LoadPart, "load") for handle in handles]
-        for part in parts:
-            if part.name in self._settings.functions:
-                raise ValueError(f"load {part.name!r} is a function of time, which a load factor has no place in")
-        begin, end = validation.number(start, "start"), validation.number(to, "to")
-        if begin == end:
-            raise ValueError(f"to must be another load factor than start, got {end} for both")
-        if begin != 0.0 and not parts:
-            raise ValueError(f"start must be 0 where no load is given, got {begin}")
-        count = validation.integer(steps, "steps", 1, _MAX_STEPS - 1)
-        widest = validation.positive(turn, "turn")
+    def _arc_length(self, wanted: PathOptions) -> EquilibriumPath:
         self._apply_functions(self._world.time, self._world.time)
+        loads = [self._load_index(part) for part in wanted.loads]
         with self._convergence():
             found = self._world.equilibrium_path(
-                [self._load_index(part) for part in parts], begin, end, count + 1, widest, None, self._force_function()
+                loads, wanted.start, wanted.end, wanted.steps + 1, wanted.turn, None, self._force_function()
             )
-        points = found.points
-        return EquilibriumPath(
-            load_factors=np.array([point.factor for point in points]),
-            stable=np.array([point.stable for point in points]),
-            limit_points=np.flatnonzero([point.limit for point in points]),
-            finished=found.finished,
-            iterations=found.iterations,
-            _positions=np.array([point.positions for point in points]),
-            _reactions=(np.array([point.forces for point in points]), np.array([point.moments for point in points])),
-            _rows=lambda rod: self._directory.layout.rows(self._rod(rod)),
-            _support=lambda support: self._support(support)[0],
+        return path_of(
+            found, lambda rod: self._directory.layout.rows(self._rod(rod)), lambda support: self._support(support)[0]
         )
 
     def run(
@@ -362,161 +344,7 @@ class Simulation(Control):
             if warning := self._world.take_step_warning():
                 warnings.warn(warning, CoarseStepWarning, stacklevel=4)
 
-    # Read-outs
-
-    @property
-    def rods(self) -> tuple[Rod, ...]:
-        """Handles of all rods, in the order of the scene."""
-        return self._directory.rods
-
-    def _rod(self, rod: Rod | str) -> int:
-        return self._directory.rod(rod).index
-
-    def positions(self, rod: Rod | str | None = None) -> FloatArray:
-        """Positions of the nodes of a rod, or of every node of the scene once.
-
-        Returns
-        -------
-        ndarray of shape (nodes, 3) [m]
-            Of the whole scene without a rod; `rod.rows` are a rod's rows there.
-
-        Raises
-        ------
-        ValueError
-            Not a rod of this scene.
-        """
-        positions = self._world.positions()
-        return positions if rod is None else positions[self._directory.layout.rows(self._rod(rod))]
-
-    def obstacle_position(self, obstacle: Obstacle | str) -> FloatArray:
-        """Where an obstacle is: the point of a plane, a sphere's centre, a capsule's start, shape (3,) [m].
-
-        Raises
-        ------
-        ValueError
-            Not an obstacle of this scene.
-        """
-        part = self._directory.find(obstacle, ObstaclePart, "obstacle")
-        return np.array(self._world.obstacle_position(self._directory.all(ObstaclePart).index(part)))
-
-    def velocities(self, rod: Rod | str | None = None) -> FloatArray:
-        """Velocities of the nodes of a rod, or of every node once, shape (nodes, 3) [m/s]."""
-        velocities = self._world.velocities()
-        return velocities if rod is None else velocities[self._directory.layout.rows(self._rod(rod))]
-
-    def directors(self, rod: Rod | str) -> FloatArray:
-        """Material frames of the edges, shape (edges, 3, 3), rows d1, d2, tangent."""
-        return self._world.directors(self._rod(rod)).reshape(-1, 3, 3)
-
-    def curvatures(self, rod: Rod | str) -> FloatArray:
-        """Curvatures towards d1 and d2, shape (stencils, 2) [1/m]."""
-        return self._world.curvatures(self._rod(rod))
-
-    def twists(self, rod: Rod | str) -> FloatArray:
-        """Twists, shape (stencils,) [rad/m]."""
-        return self._world.twists(self._rod(rod))
-
-    def tensions(self, rod: Rod | str) -> FloatArray:
-        """Axial forces of the edges, pulling is positive, shape (edges,) [N]."""
-        return self._world.tensions(self._rod(rod))
-
-    def spins(self, rod: Rod | str) -> FloatArray:
-        """Angular velocities of the edges about their tangents, shape (edges,) [rad/s]."""
-        return self._world.spins(self._rod(rod))
-
-    @overload
-    def energy(self) -> Energy: ...
-
-    @overload
-    def energy(self, rod: Rod | str) -> RodEnergy: ...
-
-    def energy(self, rod: Rod | str | None = None) -> Energy | RodEnergy:
-        """Energies of the whole scene, or of one rod [J].
-
-        Parameters
-        ----------
-        rod : Rod or str, optional
-
-        Returns
-        -------
-        Energy
-            Without a rod.
-        RodEnergy
-            Of a rod; loads, contact, work and dissipation belong to the scene.
-        """
-        if rod is not None:
-            part = self._world.rod_energy(self._rod(rod))
-            return RodEnergy(**{name: getattr(part, name) for name in RodEnergy.__dataclass_fields__})
-        energy = self._world.energy()
-        return Energy(**{name: getattr(energy, name) for name in Energy.__dataclass_fields__})
-
-    def momentum(self) -> Momentum:
-        """Linear momentum, and angular momentum about the origin, of the whole scene.
-
-        By the masses that the equations of motion have, nodes that supports hold included. Sum of x cross (M v) over
-        nodes, M the mass matrix, of I omega t over edges that spin at omega about their tangents t, and of what the
-        frames of joints carry.
-
-        Returns
-        -------
-        Momentum
-
-        Examples
-        --------
-        >>> import withe
-        >>> scene = withe.Scene(gravity=(0, 0, 0))
-        >>> rubber = withe.Material(youngs_modulus=1e6, density=1000.0)
-        >>> baton = scene.add_rod(start=(-0.1, 0, 0), end=(0.1, 0, 0), nodes=5, radius=5e-3, material=rubber)
-        >>> simulation = scene.build()
-        >>> simulation.set_velocities(baton, [(0, 20 * x, 0) for x, _, _ in simulation.positions(baton)])
-        >>> print(f"{simulation.momentum().angular[2]:.6f} kg m^2/s")  # m L^2 / 12 times 20 rad/s
-        0.001047 kg m^2/s
-        """
-        momentum = self._world.momentum()
-        return Momentum(np.array(momentum.linear), np.array(momentum.angular))
-
-    def reaction(self, support: Support | NodeHandle | str) -> Reaction:
-        """Force and moment of a support on the rod.
-
-        Parameters
-        ----------
-        support : Support, NodeHandle or str
-            A support, or the node that it holds.
-
-        Raises
-        ------
-        ValueError
-            Nothing holds that node.
-        """
-        index, _ = self._support(support)
-        reaction = self._world.reaction(index)
-        return Reaction(np.array(reaction.force), np.array(reaction.moment))
-
-    def contacts(self) -> npt.NDArray[np.void]:
-        """What touches now.
-
-        Returns
-        -------
-        structured ndarray, a row per contact
-            "pair" (two names) and "edge" (their edges, -1 for an obstacle), "distance" of the centrelines
-            and "gap" of the surfaces [m], "point" between them [m], "normal" from the second to the first,
-            "normal_force" [N], "friction" on the first [N], "sticking".
-        """
-        return contact_table(self._directory, self._world.contacts())
-
-    def link(self, rod: Rod | str) -> float:
-        """Link of a rod [turns]: its twist and its writhe.
-
-        Kept by a closed rod, and by an open one whose ends are held and do not spin, as long as nothing
-        passes through it [Calugareanu 1961]. An open rod is carried on straight from both ends.
-
-        Returns
-        -------
-        float
-        """
-        index = self._rod(rod)
-        closed = self._directory.layout.rods[index].closed
-        return link(self.positions(rod), self.directors(rod), closed)
+    # At a moment
 
     def linearise(self) -> Linearisation:
         """Equations of motion linearised about the present configuration, with supports held.
@@ -536,27 +364,8 @@ class Simulation(Control):
         >>> print(f"{scene.build().linearise().frequencies(1)[0]:.2f} Hz")
         7.06 Hz
         """
-        found = self._world.linearise()
+        found = self._world.linearise(self._force_function())
         return Linearisation(found.geometric, found.gradients, found.stiffnesses, found.mass, found.displacement)
-
-    @property
-    def statistics(self) -> Statistics:
-        """What the work so far took."""
-        statistics = self._world.statistics
-        return Statistics(**{name: getattr(statistics, name) for name in Statistics.__dataclass_fields__})
-
-    @property
-    def plan(self) -> Plan:
-        """What was decided for this scene: ``print(simulation.plan)``."""
-        plan = self._world.plan
-        return Plan(
-            planar=plan.planar,
-            plane_normal=np.array(plan.plane_normal) if plan.planar else None,
-            unknowns=plan.unknowns,
-            solver=plan.solver,
-            stable_step=plan.stable_step or None,
-            notes=tuple(plan.notes),
-        )
 
     def __getitem__(self, name: str) -> Any:
         """The handle of the part, node or edge of that name."""
@@ -605,7 +414,7 @@ class Simulation(Control):
             raise ValueError(
                 f"snapshot must be a withe.Snapshot, got {type(snapshot).__name__}; a withe.Record will do too"
             )
-        settings = self._matched(snapshot)
+        settings = matched_settings(snapshot, self._settings, self._directory, self._scene)
         self._world.restore(snapshot._state)
         for name in set(self._directory.parts) - set(self._scene.parts) - set(settings.supports):
             del self._directory.parts[name]
@@ -615,39 +424,6 @@ class Simulation(Control):
         self._loads = [*self._scene.all(LoadPart), *settings.loads.values()]
         self._settings = settings
         self._exact_time = None
-
-    def _matched(self, snapshot: Snapshot) -> Settings:
-        """Settings of a snapshot, made whole with what only this simulation knows."""
-        settings = snapshot._settings.copy()
-        mine = self._settings
-        counts = [len(rod.stretch_stiffness) for rod in mine.rods]
-        if (
-            [len(rod.stretch_stiffness) for rod in settings.rods] != counts
-            or settings.masses.keys() != mine.masses.keys()
-            or settings.drags.keys() != mine.drags.keys()
-            or settings.fluids.keys() != mine.fluids.keys()
-        ):
-            raise ValueError("snapshot belongs to another scene")
-        for name, (index, part) in settings.supports.items():
-            node, _ = self._directory.node(part.node_name, f"node held by {name!r}")
-            settings.supports[name] = index, SupportPart(name, part.kind, node, part.node_name, part.free)
-            known = self._scene.parts.get(name)
-            if known is not None and not isinstance(known, SupportPart):
-                raise ValueError(f"snapshot belongs to another scene: {name!r} is no support in this one")
-        for name in snapshot._missing:
-            part_of_scene = self._scene.parts.get(name)
-            if (name in settings.supports or isinstance(part_of_scene, ObstaclePart)) and name in mine.paths:
-                settings.paths[name] = mine.paths[name]
-            elif name in mine.functions:
-                settings.functions[name] = mine.functions[name]
-            elif isinstance(part_of_scene, LoadPart) and part_of_scene.function is not None:
-                settings.functions[name] = part_of_scene.function
-            else:
-                raise ValueError(
-                    f"snapshot needs the function of time of {name!r}, which no file holds: "
-                    "set it on this simulation first"
-                )
-        return settings
 
     def reset(self) -> None:
         """Go back to the scene as it was drawn, and undo everything that was set since.
@@ -709,22 +485,9 @@ class Simulation(Control):
         return self._frame().picture(path, **options)
 
     def _frame(self) -> Record:
-        from withe.recording import present
+        from withe.recorder import present
 
         return present(self, self._obstacle_outlines())
-
-    def _obstacle_outlines(self) -> list[ObstacleOutline]:
-        from withe.recording import ObstacleOutline
-
-        return [
-            ObstacleOutline(
-                part.name,
-                part.kind,
-                np.array(part.other if part.kind == "plane" else part.other - part.point, float),
-                float(part.radius),
-            )
-            for part in self._directory.all(ObstaclePart)
-        ]
 
     _recorder: Recorder | None
     _exact_time: tuple[float, float] | None

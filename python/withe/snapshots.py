@@ -12,11 +12,12 @@ import numpy as np
 import numpy.typing as npt
 
 from withe import io, validation
+from withe.directory import Directory
 from withe.motion import Path, Turn
 from withe.parameters import RodParameters
-from withe.parts import LOAD_KINDS, SUPPORT_KINDS, LoadPart, SupportPart
+from withe.parts import LOAD_KINDS, SUPPORT_KINDS, LoadPart, ObstaclePart, SupportPart
 
-__all__ = ["Settings", "Snapshot"]
+__all__ = ["Settings", "Snapshot", "matched_settings"]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -232,3 +233,49 @@ class Snapshot:
         if state.dtype != np.uint8 or state.ndim != 1:
             raise ValueError("its state must be bytes")
         return cls(state.tobytes(), validation.number(header["time"], "time"), settings, missing)
+
+
+def matched_settings(snapshot: Snapshot, mine: Settings, directory: Directory, scene: Directory) -> Settings:
+    """Settings of a snapshot, made whole with what only the simulation that restores it knows.
+
+    Parameters
+    ----------
+    snapshot : Snapshot
+    mine : Settings
+        Of that simulation now.
+    directory, scene : Directory
+        Its parts now, and those of the scene as it was drawn.
+
+    Raises
+    ------
+    ValueError
+        A snapshot of another scene, or one that needs functions of time that the simulation does not have.
+    """
+    settings = snapshot._settings.copy()
+    counts = [len(rod.stretch_stiffness) for rod in mine.rods]
+    if (
+        [len(rod.stretch_stiffness) for rod in settings.rods] != counts
+        or settings.masses.keys() != mine.masses.keys()
+        or settings.drags.keys() != mine.drags.keys()
+        or settings.fluids.keys() != mine.fluids.keys()
+    ):
+        raise ValueError("snapshot belongs to another scene")
+    for name, (index, part) in settings.supports.items():
+        node, _ = directory.node(part.node_name, f"node held by {name!r}")
+        settings.supports[name] = index, SupportPart(name, part.kind, node, part.node_name, part.free)
+        known = scene.parts.get(name)
+        if known is not None and not isinstance(known, SupportPart):
+            raise ValueError(f"snapshot belongs to another scene: {name!r} is no support in this one")
+    for name in snapshot._missing:
+        drawn = scene.parts.get(name)
+        if (name in settings.supports or isinstance(drawn, ObstaclePart)) and name in mine.paths:
+            settings.paths[name] = mine.paths[name]
+        elif name in mine.functions:
+            settings.functions[name] = mine.functions[name]
+        elif isinstance(drawn, LoadPart) and drawn.function is not None:
+            settings.functions[name] = drawn.function
+        else:
+            raise ValueError(
+                f"snapshot needs the function of time of {name!r}, which no file holds: set it on this simulation first"
+            )
+    return settings

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from withe.recording import RodOutline
+from withe.outlines import RodOutline
 
 __all__ = ["Surface"]
 

@@ -6,7 +6,6 @@ Both are extras, imported when first used; ``make view`` or ``pip install ".[vie
 from __future__ import annotations
 
 import os
-import subprocess
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -16,12 +15,14 @@ import numpy.typing as npt
 
 from withe import scenery
 from withe.extras import require
+from withe.films import Film, film_places
 from withe.io import written_beside
 from withe.progress import progress as progress_bar
 from withe.rendering import ColorBy, Stage
 
 if TYPE_CHECKING:
-    from withe.recording import ObstacleOutline, Record
+    from withe.outlines import ObstacleOutline
+    from withe.recording import Record
 
 __all__ = ["animate", "picture", "plot", "view"]
 
@@ -152,7 +153,7 @@ def animate(
         places = film_places(stage.times, speed / fps)
         with (
             written_beside(path) as temporary,
-            _Film(encoder, temporary, stage.size, fps) as film,
+            Film(encoder, temporary, stage.size, fps) as film,
             progress_bar(len(places), "rendering", progress, unit="pictures") as bar,
         ):
             for place in places:
@@ -482,27 +483,6 @@ def _even(size: Sequence[int]) -> Sequence[int]:
         return size
 
 
-def film_places(times: FloatArray, interval: float) -> FloatArray:
-    """Where in the record the pictures of a film lie, as fractional frame numbers.
-
-    Parameters
-    ----------
-    times : ndarray of shape (frames,) [s]
-    interval : float
-        Time of the simulation between two pictures [s].
-
-    Returns
-    -------
-    ndarray of shape (pictures,)
-        The frames themselves where time does not pass.
-    """
-    duration = float(times[-1] - times[0])
-    if duration <= 0.0 or np.any(np.diff(times) <= 0.0):
-        return np.arange(len(times), dtype=float)
-    moments = times[0] + interval * np.arange(int(np.floor(duration / interval + 1e-9)) + 1)
-    return np.asarray(np.interp(moments, times, np.arange(len(times))), float)
-
-
 def _in_notebook() -> bool:
     """Whether this runs in a Jupyter kernel."""
     try:
@@ -510,43 +490,3 @@ def _in_notebook() -> bool:
     except ImportError:
         return False
     return shell is not None and hasattr(shell, "kernel")
-
-
-class _Film:
-    """Pictures that go to ffmpeg as they are made."""
-
-    def __init__(self, encoder: str, path: Path, size: tuple[int, int], fps: float) -> None:
-        source = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}", "-r", f"{fps:g}", "-i", "-"]
-        if path.suffix.lower() == ".gif":
-            filters = "split[a][b];[a]palettegen=stats_mode=diff[p];[b][p]paletteuse=dither=none:diff_mode=rectangle"
-            target = ["-filter_complex", filters, "-loop", "0"]
-        else:
-            target = ["-c:v", "libx264", "-crf", "18", "-pix_fmt", "yuv420p", "-movflags", "+faststart"]
-        self._command = [encoder, "-y", "-loglevel", "error", *source, *target, os.fspath(path.absolute())]
-
-    def __enter__(self) -> _Film:
-        self._process = subprocess.Popen(
-            self._command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
-        )
-        return self
-
-    def write(self, image: npt.NDArray[np.uint8]) -> None:
-        """Append one picture, shape (height, width, 3)."""
-        assert self._process.stdin is not None
-        try:
-            self._process.stdin.write(np.ascontiguousarray(image).tobytes())
-        except BrokenPipeError:
-            self._finish()
-
-    def _finish(self) -> None:
-        _, errors = self._process.communicate()
-        if self._process.returncode != 0:
-            words = errors.decode(errors="replace").strip()
-            raise RuntimeError(f"ffmpeg failed, and no film was written: {words or 'it gave no reason'}")
-
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        if kind is None:
-            self._finish()
-        else:
-            self._process.kill()
-            self._process.communicate()

@@ -198,3 +198,15 @@ def test_a_moment_on_the_free_end_of_a_shaft_makes_it_flutter_however_small():
         assert found.stability == "flutters"
         growth.append(np.abs(linear.frequencies(4).imag).max() / moment)
     np.testing.assert_allclose(growth, growth[0], rtol=0.05)
+
+
+def test_neutral_motions_of_many_free_rods_are_all_found():
+    """Seven each: three ways, three turns, and its spin; more than a Krylov block of a fixed width would hold."""
+    scene = withe.Scene(gravity=(0, 0, 0))
+    rubber = withe.Material(youngs_modulus=1e7, density=1000.0)
+    for z in range(3):
+        scene.add_rod(start=(0, 0, z), end=(0.1, 0, z), nodes=11, radius=5e-3, material=rubber)
+    found = scene.build(planar=False).linearise().frequencies(24)
+    assert (np.abs(found[:18]) < 1e-6).all()
+    free = np.abs(found) > 1e-6
+    assert found[free].min() == pytest.approx(89.0, rel=0.02)  # 4.730^2 / (2 pi L^2) sqrt(EI / m)

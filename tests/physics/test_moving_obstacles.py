@@ -105,9 +105,9 @@ def test_a_cantilever_follows_the_floor_that_bends_it() -> None:
 def test_what_an_obstacle_cannot_do_is_refused() -> None:
     scene, _, table = lying()
     simulation = scene.build()
-    with pytest.raises(ValueError, match="an obstacle does not turn"):
-        simulation.move(table, position=(0, 0, 0), roll=1.0)
-    with pytest.raises(ValueError, match="position or path of 'table' must be given"):
+    with pytest.raises(ValueError, match="an obstacle turns by a roll about its axis"):
+        simulation.move(table, position=(0, 0, 0), rotation=[[1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    with pytest.raises(ValueError, match="position, roll or path of 'table' must be given"):
         simulation.move(table)
     with pytest.raises(ValueError, match="position of 'table'"):
         simulation.move("table", position=(0, 0))

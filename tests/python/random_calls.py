@@ -91,6 +91,11 @@ def custom(data):
     return wind
 
 
+def stiffness(data):
+    value = data.draw(st.one_of(sensible, st.sampled_from(SPECIAL)))
+    return lambda t, x, v: np.multiply(value, np.eye(x.size))
+
+
 def add_obstacle(world, data):
     friction = data.draw(st.one_of(st.just(0.3), number))
     kind = data.draw(st.integers(0, 3))
@@ -152,6 +157,7 @@ ON_SCENE = {
     "add_mass": lambda w, d: w.scene.add_mass(d.draw(node), d.draw(positive)),
     "add_drag": lambda w, d: w.scene.add_drag(d.draw(positive)),
     "add_custom_force": lambda w, d: w.scene.add_custom_force(custom(d)),
+    "add_solved_force": lambda w, d: w.scene.add_custom_force(custom(d), jacobian=stiffness(d)),
     "gravity": lambda w, d: setattr(w.scene, "gravity", d.draw(triple)),
     "pickle": lambda w, d: setattr(w, "scene", copy.deepcopy(w.scene)),
 }
@@ -223,6 +229,17 @@ ON_SIMULATION = {
     "set_moment": lambda w, d: w.simulation.set("moment 1", moment=d.draw(small_triple)),
     "set_function": lambda w, d: w.simulation.set("force 1", force=function_of_time(d)),
     "set_gravity": lambda w, d: w.simulation.set(gravity=d.draw(triple)),
+    "put_on": lambda w, d: w.simulation.add_force(d.draw(node), d.draw(small_triple)),
+    "take_off": lambda w, d: w.simulation.remove(d.draw(st.sampled_from(["force 1", "force 2", "moment 1"]))),
+    "friction": lambda w, d: w.simulation.set(
+        d.draw(st.sampled_from(["floor 1", "plane 1", "sphere 1", None])),
+        friction=d.draw(st.one_of(st.floats(0, 1), number, st.tuples(number, number))),
+    ),
+    "friction_of_two": lambda w, d: w.simulation.set_friction(d.draw(rod), d.draw(touched), d.draw(number)),
+    "roll": lambda w, d: w.simulation.move(
+        d.draw(st.sampled_from(["floor 1", "sphere 1", "capsule 1"])), roll=d.draw(number),
+        tangent=d.draw(st.one_of(st.none(), triple)), over=d.draw(st.sampled_from([0.0, 0.01])),
+    ),
     "natural_curvature": lambda w, d: w.simulation.set_natural_curvature(
         d.draw(rod), d.draw(st.tuples(number, number)), over=d.draw(st.sampled_from([0.0, 0.01, -1, math.nan]))
     ),

@@ -52,6 +52,21 @@ class Wind:
         return -1e-3 * v + 1e-4 * np.cos(20.0 * t)
 
 
+class Springs:
+    """A custom force that is solved for, between nodes that are not neighbours, and moments with it."""
+
+    def __call__(self, t, x, v):
+        return 0.1 * (x[::-1] - x) - 1e-3 * v, 1e-5 * np.cos(20.0 * t) * np.array([(0.0, 1.0, 0.0)] * len(x))
+
+
+class SpringsJacobian:
+    """That of the forces; moments have none."""
+
+    def __call__(self, t, x, v):
+        between = 0.1 * (np.eye(len(x))[::-1] - np.eye(len(x)))
+        return np.kron(between, np.eye(3)), -1e-3 * np.eye(x.size)
+
+
 class Interrupting:
     """What a user's Ctrl-C looks like from inside a callback, at its call of a number."""
 
@@ -112,6 +127,8 @@ def add_supports_and_loads(scene, r, flat, a, b, varying, clamped):
         scene.add_drag(0.05, name="drag")
     if varying and r.random() < 0.15:
         scene.add_custom_force(Wind())
+    if varying and r.random() < 0.15:
+        scene.add_custom_force(Springs(), jacobian=SpringsJacobian(), moments=True)
 
 
 def add_surroundings(scene, r, flat, floor):

@@ -131,6 +131,31 @@ def move_obstacle(simulation, r):
     simulation.move(r.choice(["floor", "ball"]), position=vector(r, 0.01), over=r.choice([0.0, 0.02]))
 
 
+def turn_obstacle(simulation, r):
+    over = r.choice([0.0, 0.02])
+    if r.random() < 0.5:
+        simulation.move("floor", roll=number(r, 3.0), over=over)
+    else:
+        simulation.move("ball", roll=number(r, 3.0), tangent=(0, 1, 0), over=over)
+
+
+def friction(simulation, r):
+    mu = r.choice([0.0, 0.2, 0.4, (0.1, 0.3)])
+    if r.random() < 0.7:
+        simulation.set(r.choice(["floor", "ball"]), friction=mu)
+    else:
+        simulation.set_friction("a", r.choice(["b", "floor"]), mu)
+
+
+def load(simulation, r):
+    """Put on, or taken off."""
+    name = r.choice(["gust", "squall"])
+    if r.random() < 0.5:
+        simulation.add_force("b.end", Wave(vector(r, 0.01), 40.0) if r.random() < 0.3 else vector(r, 0.01), name=name)
+    else:
+        simulation.remove(name)
+
+
 def hold(simulation, r):
     where, kind, edge = r.choice(["b.end", "a.node(1)", "a.start"]), r.random() < 0.5, r.random() < 0.5
     if kind:
@@ -149,7 +174,7 @@ def equilibrium(simulation, r):
 
 CALLS = {
     step: 4, run: 2, set_rod: 2, set_part: 2, gravity: 1, curvature: 1, twist: 1, velocities: 1, move: 7, path: 1,
-    interrupted_path: 1, move_obstacle: 1, hold: 2, release: 2, equilibrium: 1,
+    interrupted_path: 1, move_obstacle: 1, hold: 2, release: 2, equilibrium: 1, turn_obstacle: 1, friction: 1, load: 1,
 }  # fmt: skip
 
 

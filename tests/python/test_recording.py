@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from curling_motion import CURVATURE_RATE, CurlingSimulation
-from withe import recording
-from withe.recording import EnergyHistory, Recorder, present
+from withe import recorder as recorder_room
+from withe.recorder import Recorder, present
+from withe.recording import EnergyHistory
 
 
 @pytest.fixture
@@ -187,7 +188,7 @@ def test_an_interrupt_within_a_frame_leaves_whole_frames_only(simulation, monkey
     recorder = Recorder(simulation)
     recorder.capture()
     simulation.step(0.1)
-    write, calls = recording._Column.write, []
+    write, calls = recorder_room._Column.write, []
 
     def interrupted(self, frame, value):
         calls.append(frame)
@@ -195,7 +196,7 @@ def test_an_interrupt_within_a_frame_leaves_whole_frames_only(simulation, monkey
             raise KeyboardInterrupt
         write(self, frame, value)
 
-    monkeypatch.setattr(recording._Column, "write", interrupted)
+    monkeypatch.setattr(recorder_room._Column, "write", interrupted)
     with pytest.raises(KeyboardInterrupt):
         recorder.capture()
     assert len(recorder.record) == 1

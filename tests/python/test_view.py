@@ -12,9 +12,11 @@ import pytest
 
 import withe
 from curling_motion import CURVATURE_RATE, CurlingSimulation
-from withe import rendering, scenery, view
+from withe import graphics, rendering, scenery, view
 from withe.extras import require
-from withe.recording import ObstacleOutline, Record, Recorder, RodOutline, present
+from withe.outlines import ObstacleOutline, RodOutline
+from withe.recorder import Recorder, present
+from withe.recording import Record
 from withe.surfaces import Surface
 
 
@@ -327,13 +329,13 @@ def test_a_first_render_that_fails_or_crashes_names_the_package_to_install(recor
     def crash(command, **options):
         return subprocess.CompletedProcess(command, -11, "", output)
 
-    rendering.probe_rendering.cache_clear()
+    graphics.probe_rendering.cache_clear()
     monkeypatch.setattr(subprocess, "run", crash)
     try:
         with pytest.raises(RuntimeError, match=f"apt install {package}"):
-            rendering.probe_rendering()
+            graphics.probe_rendering()
     finally:
-        rendering.probe_rendering.cache_clear()
+        graphics.probe_rendering.cache_clear()
 
 
 def test_importing_the_views_imports_no_heavy_package():
