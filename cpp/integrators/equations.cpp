@@ -144,7 +144,7 @@ void Equations::remember(EquationsMemory& out, bool with_matrix) const {
 }
 
 void Equations::recall(const EquationsMemory& memory) {
-  if (contact_) {
+  if (contact_ && (memory.ordered != ordered_ || memory.coupled != contact_->elements())) {
     contact_->couple(memory.ordered);
     if (memory.ordered != ordered_) order_for_contacts();
     contact_->couple(memory.coupled);
