@@ -158,7 +158,7 @@ void Equations::remember(EquationsMemory& out, bool with_matrix) const {
 void Equations::recall(const EquationsMemory& memory) {
   const bool regrouped = memory.groups != assembler_.groups();
   assembler_.set_groups(memory.groups);
-  if (contact_) {
+  if (contact_ && (regrouped || memory.ordered != ordered_ || memory.coupled != contact_->elements())) {
     contact_->couple(memory.ordered);
     if (regrouped || memory.ordered != ordered_) order_for_contacts();
     contact_->couple(memory.coupled);

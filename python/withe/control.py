@@ -237,7 +237,7 @@ class Control(States, AppliedLoads):
             changes.append(lambda: self._world.set_natural_twist(part.index, twist, 0.0))
         if parameters is not self._settings.rods[part.index]:
             changes.append(lambda: self._apply_parameters(part.index, parameters))
-        # One that is refused, such as what leaves the plane of planar=True, changes nothing; after others, these go too.
+        # A change that is refused, as it leaves the plane of planar=True, does nothing; those before it are taken back.
         before = self._world.snapshot() if len(changes) > 1 else b""
         try:
             for change in changes:

@@ -57,7 +57,9 @@ TEST(Verlet, IsOfSecondOrderUnderLoadsThatChange) {
     double before = 0.0;
     for (const double dt : {4e-5, 2e-5, 1e-5}) {
       const double error = (swing(dt, follower).first - exact).norm();
-      if (before > 0.0) EXPECT_GT(before / error, 3.6) << dt;
+      if (before > 0.0) {
+        EXPECT_GT(before / error, 3.6) << dt;
+      }
       before = error;
     }
     // Energy swings with the modes that a step does not resolve, but what is lost falls with its square as well.
