@@ -56,6 +56,47 @@ bool Contact::met(const ContactPair& pair) const {
   return !starting_ && !std::binary_search(unrecorded_.begin(), unrecorded_.end(), pair.key);
 }
 
+/// Whether no more than the tail of the contact law presses the surfaces.
+bool Contact::apart(const Touching& t) const {
+  return t.distance + t.yielded >= pairs_[at(t.pair)].radii();
+}
+
+/// Notes which surfaces near each other anew as the step begins, of those that touch by then.
+void Contact::renew_impacts() {
+  for (Touching& t : touching_) {
+    const ContactPair& pair = pairs_[at(t.pair)];
+    ContactRecord record;
+    if (const ContactRecord* known = find_record(state_->contacts, pair.key))
+      record = *known;
+    else
+      record.key = pair.key, record.stiffness = t.stiffness / pair.share;
+    if (!renew_impact(t, record)) continue;
+    set_force(t, &record);
+    renewed_.push_back(record);
+  }
+  std::sort(renewed_.begin(), renewed_.end(),
+            [](const ContactRecord& a, const ContactRecord& b) { return a.key < b.key; });
+}
+
+/// Surfaces may part and meet again, or first meet, within the tolerance of contact, and what presses may be hit: their
+/// speed is then that of another impact, for which contact is as stiff as if it only began, without a change of energy.
+/// An impact is on its way in while its age is 0.
+bool Contact::renew_impact(Touching& t, ContactRecord& record) const {
+  const ContactPair& pair = pairs_[at(t.pair)];
+  const double speed = approach_speed(pair);
+  const bool near = apart(t), again = near && t.age > 0.0 && speed > 0.0;
+  if (!again && (speed <= t.approach || speed <= rest_speed(pair))) return false;
+  t.approach = record.approach = speed;
+  record.age = 0.0;
+  if (!near) return true;
+  const double ratio = impact_stiffness(pair) / record.stiffness;
+  if (!(ratio > 1.0)) return true;
+  record.yielded = yielded_at(t, ratio, Keep::energy);
+  record.stiffness *= ratio;
+  record.stick = (1.0 / std::sqrt(ratio)) * record.stick;
+  return true;
+}
+
 double Contact::first_approach(const ContactPair& pair) const {
   return pressing_ == Pressing::still || !met(pair) ? 0.0 : approach_speed(pair);
 }
@@ -126,7 +167,7 @@ void Contact::set_force(Touching& t, const ContactRecord* record) const {
   t.law.restitution = std::sqrt(1.0 - share * (1.0 - pair.restitution * pair.restitution));
   t.law.parting = kParting * t.approach * duration_;
   if (t.law.elastic == 0.0 && !(t.law.restitution < 1.0)) return;
-  t.before = pressing_ == Pressing::mean_direction && !pair.plane() ? distance_before(pair, t) : start_distance(pair);
+  t.before = turns(pair) ? distance_before(pair, t) : start_distance(pair);
   t.pressing = t.law.at(t.before, t.distance);
 }
 
@@ -155,9 +196,14 @@ bool Contact::unresolved(double dt) const {
   });
 }
 
-/// What surfaces that press do. On a plane the end's direction is also the mean one.
+/// Whether surfaces press along the mean direction of the step. On a plane the end's is also the mean one.
+bool Contact::turns(const ContactPair& pair) const {
+  return pressing_ == Pressing::mean_direction ? !pair.plane() : pressing_ == Pressing::mean && pair.key.b >= 0;
+}
+
+/// What surfaces that press do.
 void Contact::press(const Touching& t, bool with_hessian, ContactLocal& out) const {
-  if (pressing_ != Pressing::mean_direction || pairs_[at(t.pair)].plane()) {
+  if (!turns(pairs_[at(t.pair)])) {
     add_pressing(t, with_hessian, out);
     return;
   }

@@ -14,6 +14,8 @@ std::vector<std::string> asymmetries_of(const Loads& loads, const Contact* conta
   std::vector<std::string> found;
   if (loads.unsymmetric) found.emplace_back("follower loads or moments in 3D");
   if (options.integrator == Integrator::energy_momentum) found.emplace_back("energy-momentum steps");
+  if (options.integrator == Integrator::implicit_midpoint && contact != nullptr && !contact->surfaces().edges().empty())
+    found.emplace_back("contact of rods in midpoint steps");
   if (contact != nullptr && contact->unsymmetric()) found.emplace_back("implicit friction");
   if (fluid == FluidModel::resistive && options.integrator != Integrator::statics)
     found.emplace_back("resistive-force theory");
@@ -47,7 +49,8 @@ Equations::Equations(const Model& model, const Options& options)
       contact_(make_contact(model)),
       asymmetries_(asymmetries_of(loads_, contact_.get(), model.description.fluid.model, options)),
       assembler_(model, loads_, asymmetries_.empty() ? Symmetry::symmetric : Symmetry::unsymmetric, options.solver),
-      static_duration_(options.time_step) {
+      static_duration_(options.time_step),
+      explicit_(options.integrator == Integrator::verlet) {
   if (contact_) {
     assembler_.couple(contact_->element_unknowns(), kContactUnknowns);
     if (contact_->frictional()) has_potential_ = false;
@@ -70,7 +73,6 @@ void Equations::set_parameters(const Parameters& parameters) {
   set_mass(model_, parameters, mass_);
   set_gravity_force(model_, parameters, gravity_);
   set_elastic(parameters, elastic);
-  if (contact_) contact_->set_parameters(parameters);
   for (int i = 0; i < model_.node_count; ++i)
     node_dof_drag_.segment(model_.node_dof[at(i)], model_.dimension).setConstant(parameters.node_drag(i));
 }
@@ -94,11 +96,11 @@ void Equations::begin(const State& state, const Parameters& parameters, double h
   floor_current_ = false;
   flowing_ = false;
   if (!contact_) return;
-  contact_->press_by(energy_momentum          ? Pressing::mean_direction
-                     : inner == Inner::middle ? Pressing::mean
-                     : h != 0.0               ? Pressing::end
-                                              : Pressing::still);
-  contact_->begin(state, h == 0.0 ? static_duration_ : inner == Inner::middle ? 2.0 * h : h);
+  const Pressing pressing = energy_momentum            ? Pressing::mean_direction
+                            : inner == Inner::middle   ? Pressing::mean
+                            : h != 0.0 && !explicit_   ? Pressing::end
+                                                       : Pressing::still;
+  contact_->begin(state, parameters, h == 0.0 ? static_duration_ : inner == Inner::middle ? 2.0 * h : h, pressing);
 }
 
 void Equations::forget_contacts() {

@@ -155,6 +155,7 @@ class Equations {
   std::vector<std::string> asymmetries_;
   Assembler assembler_;
   double static_duration_ = 0;  ///< in which slip happens in statics [s]
+  bool explicit_ = false;
   Inner inner_ = Inner::end;
   const State* state_ = nullptr;
   const Parameters* parameters_ = nullptr;
