@@ -201,9 +201,10 @@ ContactRecord Contact::record(const Touching& t) const {
   record.force = -t.energy.first;
   record.stiffness = t.stiffness / pair.share;
   record.yielded = t.yielded;
-  if (pressing_ != Pressing::still && impact_share(pair, t) > 0.0) {
+  const bool coming = t.age == 0.0 && apart(t);
+  if (pressing_ != Pressing::still && (coming || impact_share(pair, t) > 0.0)) {
     record.approach = t.approach;
-    record.age = t.age == 0.0 && apart(t) ? 0.0 : t.age + duration_;
+    record.age = coming ? 0.0 : t.age + duration_;
   }
   if (frictional_ && !freezes() && pair.friction > 0.0) record_friction(t, record);
   return record;
@@ -289,8 +290,11 @@ double Contact::stiffen(State& state, Keep keep) {
       return pairs_[at(s.pair)].key == key;
     });
     if (const ContactRecord* renewed = find_record(renewed_, pair.key)) {
-      if (!record) record = &*state.contacts.insert(std::lower_bound(state.contacts.begin(), state.contacts.end(), *renewed, by_key), *renewed);
-      *record = *renewed;
+      const auto place = std::lower_bound(state.contacts.begin(), state.contacts.end(), *renewed, by_key);
+      if (record)
+        *record = *renewed;
+      else
+        record = &*state.contacts.insert(place, *renewed);
     }
     if (record && pressed != touching_.end()) {
       put_in += change_stiffness(*pressed, factor, yielded_at(*pressed, factor, keep), *record);

@@ -14,7 +14,8 @@ std::vector<std::string> asymmetries_of(const Loads& loads, const Contact* conta
   std::vector<std::string> found;
   if (loads.unsymmetric) found.emplace_back("follower loads or moments in 3D");
   if (options.integrator == Integrator::energy_momentum) found.emplace_back("energy-momentum steps");
-  if (options.integrator == Integrator::implicit_midpoint && contact != nullptr && !contact->surfaces().edges().empty())
+  const bool rods_touch = contact != nullptr && !contact->surfaces().edges().empty();
+  if (options.integrator == Integrator::implicit_midpoint && rods_touch && !contact->frictional())
     found.emplace_back("contact of rods in midpoint steps");
   if (contact != nullptr && contact->unsymmetric()) found.emplace_back("implicit friction");
   if (fluid == FluidModel::resistive && options.integrator != Integrator::statics)
