@@ -21,9 +21,9 @@ inline constexpr double kDepth = 0.01;
 /// No deeper than this where a step, an equilibrium or a drawing is accepted.
 inline constexpr double kDeepest = 0.04;
 
-/// How surfaces press in a step (see pressing_law.hpp): in statics and explicit steps, where nothing is known of impacts;
-/// by the force at its end; by that of the whole step, where they have just met; and along the mean direction too, so
-/// that sliding gains nothing.
+/// How surfaces press in a step (see pressing_law.hpp): in statics and explicit steps, where nothing is known of
+/// impacts; by the force at its end; by that of the whole step, where they have just met; and along the mean direction
+/// too, so that sliding gains nothing.
 enum class Pressing { still, end, mean, mean_direction };
 
 /// What is never more where a contact becomes stiffer under load.

@@ -24,9 +24,9 @@ double smooth_step(double x) {
 
 // Of surfaces that near each other so slowly that they rest, if they do not fall on; over the speed of rest.
 constexpr double kLeastApproach = 1e-9;
-// Surfaces that part faster than this, over the speed at which they will have parted, give back no more than restitution
-// says: slower ones have a four-hundredth of the energy that is to be left. That speed is so much of that of approach, at
-// least.
+// Surfaces that part faster than this, over the speed at which they will have parted, give back no more than
+// restitution says: slower ones have a four-hundredth of the energy that is to be left. That speed is so much of that
+// of approach, at least.
 constexpr double kParting = 0.05, kLeastParting = 0.1;
 // What an impact gives back is known within this many swings.
 constexpr double kResolvedSwings = 4.0;
@@ -65,9 +65,7 @@ bool Contact::met(const ContactPair& pair) const {
 }
 
 /// Whether no more than the tail of the contact law presses the surfaces.
-bool Contact::apart(const Touching& t) const {
-  return t.distance + t.yielded >= pairs_[at(t.pair)].radii();
-}
+bool Contact::apart(const Touching& t) const { return t.distance + t.yielded >= pairs_[at(t.pair)].radii(); }
 
 /// Notes which surfaces near each other anew as the step begins, of those that touch by then.
 void Contact::renew_impacts() {
@@ -264,7 +262,7 @@ void Contact::add_pressing(const Touching& t, bool with_hessian, ContactLocal& o
     for (int j = 0; j < 12; ++j) out.hessian[i][j] += turn * H[i][j] + (t.pressing.by_end - turn) * g[i] * g[j];
 }
 
-/// In an energy-momentum step the force f (see pressing_law.hpp) pushes along the mean of the way d1 between the
+/// Where `turns` says so, the force f (see pressing_law.hpp) pushes along the mean of the way d1 between the
 /// closest points at the end and the way d0 between those same points of both rods at the start,
 ///   f w_i (d0 + d1) / (D0 + D1),   D0 = sqrt(|d0|^2 + D1^2 - |d1|^2),
 /// whose work over the step is f (D1 - D0). As no points were closer at the start than the closest, and E is convex,

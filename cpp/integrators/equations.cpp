@@ -97,10 +97,10 @@ void Equations::begin(const State& state, const Parameters& parameters, double h
   floor_current_ = false;
   flowing_ = false;
   if (!contact_) return;
-  const Pressing pressing = energy_momentum            ? Pressing::mean_direction
-                            : inner == Inner::middle   ? Pressing::mean
-                            : h != 0.0 && !explicit_   ? Pressing::end
-                                                       : Pressing::still;
+  const Pressing pressing = energy_momentum          ? Pressing::mean_direction
+                            : inner == Inner::middle ? Pressing::mean
+                            : h != 0.0 && !explicit_ ? Pressing::end
+                                                     : Pressing::still;
   contact_->begin(state, parameters, h == 0.0 ? static_duration_ : inner == Inner::middle ? 2.0 * h : h, pressing);
 }
 

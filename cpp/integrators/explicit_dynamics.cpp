@@ -21,7 +21,8 @@ void explicit_acceleration(Equations& equations, const Parameters& parameters, d
   work.from.q -= dt * v;
   work.from.v = v;
   equations.begin(work.from, parameters, dt, false);
-  if (Contact* contact = equations.contact(); contact && contact->anchored()) contact->begin(before, parameters, dt, Pressing::still);
+  if (Contact* contact = equations.contact(); contact && contact->anchored())
+    contact->begin(before, parameters, dt, Pressing::still);
   if (equations.flows() && !solve_flow(equations, state.q, v, work.newton.counters)) {
     acceleration.setConstant(state.q.size(), std::nan(""));
     return;
