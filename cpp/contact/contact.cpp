@@ -32,6 +32,8 @@ Contact::Contact(const Model& model) : model_(model), surfaces_(model) {
 const ContactPair& Contact::pair_of(int i) const { return pairs_[at(touching_[at(i)].pair)]; }
 
 void Contact::set_parameters(const Parameters& parameters) {
+  if (version_ == parameters.version) return;
+  version_ = parameters.version;
   const double given = model_.description.contact.stiffness;
   const std::size_t rods = model_.description.rods.size();
   least_stiffness_.setConstant(static_cast<Eigen::Index>(rods), given);
@@ -47,7 +49,8 @@ void Contact::set_parameters(const Parameters& parameters) {
   }
 }
 
-void Contact::initialise(State& state) const {
+void Contact::initialise(State& state, const Parameters& parameters) {
+  set_parameters(parameters);
   if (state.contact_stiffness.size() == 0) state.contact_stiffness = least_stiffness_;
 }
 
@@ -149,9 +152,18 @@ Contact::Touching Contact::touch(const ContactPair& pair, const VectorX& q, bool
   return t;
 }
 
-const ContactRecord* Contact::record_of(const ContactKey& key) const { return find_record(state_->contacts, key); }
+const ContactRecord* Contact::record_of(const ContactKey& key) const {
+  const ContactRecord* renewed = renewed_.empty() ? nullptr : find_record(renewed_, key);
+  return renewed ? renewed : find_record(state_->contacts, key);
+}
 
-void Contact::begin(const State& state, double duration) {
+void Contact::begin(const State& state, const Parameters& parameters, double duration, Pressing pressing) {
+  set_parameters(parameters);
+  pressing_ = pressing;
+  restart(state, duration);
+}
+
+void Contact::restart(const State& state, double duration) {
   current_ = false;
   state_ = &state;
   duration_ = duration;
@@ -166,9 +178,11 @@ void Contact::begin(const State& state, double duration) {
   touching_.clear();
   leaving_.clear();
   unrecorded_.clear();
+  renewed_.clear();
   starting_ = true;
   update(state.q);
   starting_ = false;
+  if (pressing_ != Pressing::still) renew_impacts();
   for (const Touching& t : touching_)
     if (record_of(pairs_[at(t.pair)].key) == nullptr) unrecorded_.push_back(pairs_[at(t.pair)].key);
   std::sort(unrecorded_.begin(), unrecorded_.end());

@@ -21,8 +21,9 @@ inline constexpr double kDepth = 0.01;
 /// No deeper than this where a step, an equilibrium or a drawing is accepted.
 inline constexpr double kDeepest = 0.04;
 
-/// How surfaces press in a step (see pressing_law.hpp): in statics; by the force at its end; by that of the whole step,
-/// where they have just met; and along the mean direction too, so that sliding gains nothing.
+/// How surfaces press in a step (see pressing_law.hpp): in statics and explicit steps, where nothing is known of
+/// impacts; by the force at its end; by that of the whole step, where they have just met; and along the mean direction
+/// too, so that sliding gains nothing.
 enum class Pressing { still, end, mean, mean_direction };
 
 /// What is never more where a contact becomes stiffer under load.
@@ -68,10 +69,8 @@ class Contact {
   /// Work of moving obstacles on rods and on what contact stores, with the forces at q1 [J].
   double obstacle_work() const;
 
-  /// How surfaces press in the steps to come.
-  void press_by(Pressing pressing) { pressing_ = pressing; }
   /// A step begins at `state`, which must outlive it. `duration`: the time in which slip happens [s].
-  void begin(const State& state, double duration);
+  void begin(const State& state, const Parameters& parameters, double duration, Pressing pressing);
   /// Finds what touches at q1.
   void update(const VectorX& q1);
   int count() const { return static_cast<int>(touching_.size()); }
@@ -134,12 +133,11 @@ class Contact {
   void remember(State& state) const;
   /// Makes contacts of bodies that are too deep in each other stiffer; returns the energy put in [J].
   double stiffen(State& state, Keep keep);
-  /// Stiffness that no rod falls below; that of a state that has none yet.
-  void set_parameters(const Parameters& parameters);
-  void initialise(State& state) const;
+  /// Gives a state that has none yet the stiffness that no rod falls below.
+  void initialise(State& state, const Parameters& parameters);
   /// Contacts of a state at rest, for read-outs; and their energy.
-  std::vector<ContactReport> report(const State& state);
-  double energy_of(const State& state);
+  std::vector<ContactReport> report(const State& state, const Parameters& parameters);
+  double energy_of(const State& state, const Parameters& parameters);
   /// The next step finds everything anew.
   void forget();
 
@@ -202,6 +200,10 @@ class Contact {
   double swing_time(const ContactPair& pair, const Touching& t) const;
   double impact_share(const ContactPair& pair, const Touching& t) const;
   bool met(const ContactPair& pair) const;
+  bool apart(const Touching& t) const;
+  bool turns(const ContactPair& pair) const;
+  void renew_impacts();
+  bool renew_impact(Touching& t, ContactRecord& record) const;
   double start_stiffness(const ContactPair& pair, const VectorX& stiffness) const;
   double impact_stiffness(const ContactPair& pair) const;
   double first_stiffness(const ContactPair& pair) const;
@@ -245,7 +247,9 @@ class Contact {
   bool outgrown(const VectorX& q, const VectorX* change) const;
   double farthest(const VectorX& change) const;
   double allowed_of(const ContactPair& pair, const VectorX& q, const VectorX* change, const Vec3d& shift) const;
-  void look_at(const State& state);
+  void set_parameters(const Parameters& parameters);
+  void restart(const State& state, double duration);
+  void look_at(const State& state, const Parameters& parameters);
   void move_obstacles();
   void place_obstacles(const std::vector<ObstaclePlace>& places);
   /// Way of a pair's obstacle in this step [m].
@@ -295,6 +299,7 @@ class Contact {
   std::vector<Vec3d> shift_;  ///< of each obstacle in this step [m]; empty: none moves
   std::vector<Vec3d> turn_;   ///< likewise [rad]; empty: none turns
   bool blocked_ = false;
+  std::vector<ContactRecord> renewed_;  ///< of contacts whose surfaces near each other anew in this step; sorted
   std::vector<ContactKey> unrecorded_;  ///< what touches at the start of the step and has no record
   bool starting_ = false;
   bool current_ = false;  ///< touching_ is what touches at q1_
@@ -311,6 +316,7 @@ class Contact {
   std::vector<Frozen> frozen_;
   std::vector<ContactKey> elements_;  ///< sorted
   std::vector<int> element_unknowns_;
+  long version_ = -1;  ///< of the parameters that the next two belong to
   VectorX least_stiffness_;
   VectorX edge_mass_;  ///< [kg]
 };

@@ -54,7 +54,7 @@ FrictionSetting Contact::setting(const Touching& t) const {
   f.points = t.points;
   f.pressing = t.law;
   f.before = t.before;
-  f.slides = pressing_ == Pressing::mean_direction && !pair.plane() && t.law.elastic > 0.0;
+  f.slides = turns(pair) && t.law.elastic > 0.0;
   f.law = contact.friction_law;
   f.tangential_stiffness = tangential_stiffness(pair, t.stiffness);
   f.rate = slip_rate();

@@ -200,9 +200,10 @@ ContactRecord Contact::record(const Touching& t) const {
   record.force = -t.energy.first;
   record.stiffness = t.stiffness / pair.share;
   record.yielded = t.yielded;
-  if (pressing_ != Pressing::still && impact_share(pair, t) > 0.0) {
+  const bool coming = t.age == 0.0 && apart(t);
+  if (pressing_ != Pressing::still && (coming || impact_share(pair, t) > 0.0)) {
     record.approach = t.approach;
-    record.age = t.age + duration_;
+    record.age = coming ? 0.0 : t.age + duration_;
   }
   if (frictional_ && !freezes() && pair.friction > 0.0) record_friction(t, record);
   return record;
@@ -280,13 +281,20 @@ double Contact::stiffen(State& state, Keep keep) {
     const double depth = depth_of(pair, t);
     if (t.frozen < 0 && depth > 2.0 * kDepth) deep.push_back({pair, std::min(100.0, depth / kDepth), t.stiffness});
   }
-  begin(state, duration_);
+  restart(state, duration_);
   double put_in = 0.0;
   for (const auto& [pair, factor, stiffness] : deep) {
     ContactRecord* record = find_record(state.contacts, pair.key);
     const auto pressed = std::find_if(touching_.begin(), touching_.end(), [&, &key = pair.key](const Touching& s) {
       return pairs_[at(s.pair)].key == key;
     });
+    if (const ContactRecord* renewed = find_record(renewed_, pair.key)) {
+      const auto place = std::lower_bound(state.contacts.begin(), state.contacts.end(), *renewed, by_key);
+      if (record)
+        *record = *renewed;
+      else
+        record = &*state.contacts.insert(place, *renewed);
+    }
     if (record && pressed != touching_.end()) {
       put_in += change_stiffness(*pressed, factor, yielded_at(*pressed, factor, keep), *record);
       continue;
@@ -319,23 +327,25 @@ void Contact::hold_sticking(const State& state, VectorX& change) const {
 }
 
 /// A step that goes nowhere: obstacles stay where they are in the state.
-void Contact::look_at(const State& state) {
+void Contact::look_at(const State& state, const Parameters& parameters) {
   std::vector<ObstaclePlace> target = std::exchange(target_, {});
-  begin(state, 1.0);
+  const Pressing pressing = pressing_;
+  begin(state, parameters, 1.0, Pressing::still);
+  pressing_ = pressing;
   target_ = std::move(target);
 }
 
-double Contact::energy_of(const State& state) {
+double Contact::energy_of(const State& state, const Parameters& parameters) {
   const State* kept = state_;
   const double duration = duration_;
-  look_at(state);
+  look_at(state, parameters);
   state_ = kept;
   duration_ = duration;
   return start_energy_;
 }
 
-std::vector<ContactReport> Contact::report(const State& state) {
-  look_at(state);
+std::vector<ContactReport> Contact::report(const State& state, const Parameters& parameters) {
+  look_at(state, parameters);
   std::vector<ContactReport> reports;
   for (const Touching& t : touching_) {
     const ContactPair& pair = pairs_[at(t.pair)];

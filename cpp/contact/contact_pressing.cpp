@@ -22,10 +22,18 @@ double smooth_step(double x) {
   return x * x * (3.0 - 2.0 * x);
 }
 
-// Surfaces that part faster than this, over the speed at which they met, give back no more than restitution says.
-constexpr double kParting = 0.05;
-// Steps in a swing, by which what an impact gives back is known to a hundredth, while it lasts no longer than this.
-constexpr double kStepsInSwing = 12.0, kResolvedSwings = 4.0;
+// Of surfaces that near each other so slowly that they rest, if they do not fall on; over the speed of rest.
+constexpr double kLeastApproach = 1e-9;
+// Surfaces that part faster than this, over the speed at which they will have parted, give back no more than
+// restitution says: slower ones have a four-hundredth of the energy that is to be left. That speed is so much of that
+// of approach, at least.
+constexpr double kParting = 0.05, kLeastParting = 0.1;
+// What an impact gives back is known within this many swings.
+constexpr double kResolvedSwings = 4.0;
+
+/// Steps in a swing by which what an impact gives back, e of the speed, is known to a hundredth: in the one in which it
+/// turns round nothing of the speed is lost, which is the more the less is to be left.
+double steps_in_swing(double restitution) { return std::clamp(10.0 / std::max(restitution, 1e-3), 12.0, 40.0); }
 
 }  // namespace
 
@@ -56,8 +64,58 @@ bool Contact::met(const ContactPair& pair) const {
   return !starting_ && !std::binary_search(unrecorded_.begin(), unrecorded_.end(), pair.key);
 }
 
+/// Whether no more than the tail of the contact law presses the surfaces.
+bool Contact::apart(const Touching& t) const { return t.distance + t.yielded >= pairs_[at(t.pair)].radii(); }
+
+/// Notes which surfaces near each other anew as the step begins, of those that touch by then.
+void Contact::renew_impacts() {
+  for (Touching& t : touching_) {
+    const ContactPair& pair = pairs_[at(t.pair)];
+    ContactRecord record;
+    if (const ContactRecord* known = find_record(state_->contacts, pair.key)) {
+      if (known->approach == 0.0) continue;  // they rest until they have left each other
+      record = *known;
+    } else {
+      record.key = pair.key;
+      record.stiffness = t.stiffness / pair.share;
+    }
+    if (!renew_impact(t, record)) continue;
+    set_force(t, &record);
+    renewed_.push_back(record);
+  }
+  std::sort(renewed_.begin(), renewed_.end(),
+            [](const ContactRecord& a, const ContactRecord& b) { return a.key < b.key; });
+}
+
+/// Surfaces that a scene begins with within the tolerance of contact fall onto each other if they store less than what
+/// moves and weight will give, and rest if not. Later they may part and meet again within it, and those that press may
+/// be hit by more than the impact that is not yet over. The speed at which they near each other is then that of another
+/// impact, which is on its way in while its age is 0: for it contact is as stiff as if it only began, without a change
+/// of energy.
+bool Contact::renew_impact(Touching& t, ContactRecord& record) const {
+  const ContactPair& pair = pairs_[at(t.pair)];
+  double speed = approach_speed(pair);
+  if (record.approach == 0.0) {
+    const double given = 0.5 * speed * speed + gravity_ * std::max(t.distance - pair.radii(), 0.0);
+    if (!(t.energy.value < pair.share * mass_of(pair) * given)) return false;
+    speed = std::max(speed, kLeastApproach * rest_speed(pair));
+  } else {
+    const bool again = apart(t) && t.age > 0.0 && speed > 0.0;
+    if (!again && speed <= t.approach) return false;
+  }
+  t.approach = record.approach = speed;
+  record.age = 0.0;
+  const double ratio = impact_stiffness(pair) / record.stiffness;
+  if (!apart(t) || !(ratio > 1.0)) return true;
+  record.yielded = yielded_at(t, ratio, Keep::energy);
+  record.stiffness *= ratio;
+  record.stick = (1.0 / std::sqrt(ratio)) * record.stick;
+  return true;
+}
+
 double Contact::first_approach(const ContactPair& pair) const {
-  return pressing_ == Pressing::still || !met(pair) ? 0.0 : approach_speed(pair);
+  if (pressing_ == Pressing::still || !met(pair)) return 0.0;
+  return std::max(approach_speed(pair), kLeastApproach * rest_speed(pair));
 }
 
 /// At which surfaces near each other as the step begins.
@@ -124,9 +182,9 @@ void Contact::set_force(Touching& t, const ContactRecord* record) const {
   const bool lags = freezes() && pair.friction > 0.0;
   if (pressing_ >= Pressing::mean && !lags) t.law.elastic = share;
   t.law.restitution = std::sqrt(1.0 - share * (1.0 - pair.restitution * pair.restitution));
-  t.law.parting = kParting * t.approach * duration_;
+  t.law.parting = kParting * std::max(t.law.restitution, kLeastParting) * t.approach * duration_;
   if (t.law.elastic == 0.0 && !(t.law.restitution < 1.0)) return;
-  t.before = pressing_ == Pressing::mean_direction && !pair.plane() ? distance_before(pair, t) : start_distance(pair);
+  t.before = turns(pair) ? distance_before(pair, t) : start_distance(pair);
   t.pressing = t.law.at(t.before, t.distance);
 }
 
@@ -152,13 +210,20 @@ bool Contact::unresolved(double dt) const {
     const ContactPair& pair = pairs_[at(t.pair)];
     if (t.frozen >= 0 || !(t.law.restitution < 1.0)) return false;
     const double swing = swing_time(pair, t);
-    return t.age < kResolvedSwings * swing && kStepsInSwing * dt > swing;
+    return t.age < kResolvedSwings * swing && steps_in_swing(pair.restitution) * dt > swing;
   });
 }
 
-/// What surfaces that press do. On a plane the end's direction is also the mean one.
+/// Whether surfaces press along the mean direction of the step. On a plane the end's is also the mean one; and in a
+/// midpoint step only rods do, which thereby keep their angular momentum, unless friction is to stay symmetric.
+bool Contact::turns(const ContactPair& pair) const {
+  if (pressing_ == Pressing::mean_direction) return !pair.plane();
+  return pressing_ == Pressing::mean && pair.key.b >= 0 && (!frictional_ || unsymmetric());
+}
+
+/// What surfaces that press do.
 void Contact::press(const Touching& t, bool with_hessian, ContactLocal& out) const {
-  if (pressing_ != Pressing::mean_direction || pairs_[at(t.pair)].plane()) {
+  if (!turns(pairs_[at(t.pair)])) {
     add_pressing(t, with_hessian, out);
     return;
   }
@@ -198,7 +263,7 @@ void Contact::add_pressing(const Touching& t, bool with_hessian, ContactLocal& o
     for (int j = 0; j < 12; ++j) out.hessian[i][j] += turn * H[i][j] + (t.pressing.by_end - turn) * g[i] * g[j];
 }
 
-/// In an energy-momentum step the force f (see pressing_law.hpp) pushes along the mean of the way d1 between the
+/// Where `turns` says so, the force f (see pressing_law.hpp) pushes along the mean of the way d1 between the
 /// closest points at the end and the way d0 between those same points of both rods at the start,
 ///   f w_i (d0 + d1) / (D0 + D1),   D0 = sqrt(|d0|^2 + D1^2 - |d1|^2),
 /// whose work over the step is f (D1 - D0). As no points were closer at the start than the closest, and E is convex,

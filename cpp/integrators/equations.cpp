@@ -19,6 +19,9 @@ std::vector<std::string> asymmetries_of(const Loads& loads, const Contact* conta
     found.emplace_back("custom forces that are solved for");
   if (loads.unsymmetric) found.emplace_back("follower loads or moments in 3D");
   if (options.integrator == Integrator::energy_momentum) found.emplace_back("energy-momentum steps");
+  const bool rods_touch = contact != nullptr && !contact->surfaces().edges().empty();
+  if (options.integrator == Integrator::implicit_midpoint && rods_touch && !contact->frictional())
+    found.emplace_back("contact of rods in midpoint steps");
   if (contact != nullptr && contact->unsymmetric()) found.emplace_back("implicit friction");
   if (fluid == FluidModel::resistive && options.integrator != Integrator::statics)
     found.emplace_back("resistive-force theory");
@@ -52,7 +55,8 @@ Equations::Equations(const Model& model, const Options& options)
       contact_(make_contact(model)),
       asymmetries_(asymmetries_of(loads_, contact_.get(), model.description, options)),
       assembler_(model, loads_, asymmetries_.empty() ? Symmetry::symmetric : Symmetry::unsymmetric, options.solver),
-      static_duration_(options.time_step) {
+      static_duration_(options.time_step),
+      explicit_(options.integrator == Integrator::verlet) {
   if (contact_) {
     assembler_.couple(contact_->element_unknowns(), kContactUnknowns);
     ordered_ = contact_->elements();
@@ -76,7 +80,6 @@ void Equations::set_parameters(const Parameters& parameters) {
   set_mass(model_, parameters, mass_);
   set_gravity_force(model_, parameters, gravity_);
   set_elastic(parameters, elastic);
-  if (contact_) contact_->set_parameters(parameters);
   set_drag(model_, parameters, drag_);
   drag_force_.setZero(model_.dof_count);
 }
@@ -97,11 +100,11 @@ void Equations::begin(const State& state, const Parameters& parameters, double h
   floor_current_ = false;
   flowing_ = false;
   if (!contact_) return;
-  contact_->press_by(energy_momentum          ? Pressing::mean_direction
-                     : inner == Inner::middle ? Pressing::mean
-                     : h != 0.0               ? Pressing::end
-                                              : Pressing::still);
-  contact_->begin(state, h == 0.0 ? static_duration_ : inner == Inner::middle ? 2.0 * h : h);
+  const Pressing pressing = energy_momentum          ? Pressing::mean_direction
+                            : inner == Inner::middle ? Pressing::mean
+                            : h != 0.0 && !explicit_ ? Pressing::end
+                                                     : Pressing::still;
+  contact_->begin(state, parameters, h == 0.0 ? static_duration_ : inner == Inner::middle ? 2.0 * h : h, pressing);
 }
 
 void Equations::add_viscosity() {

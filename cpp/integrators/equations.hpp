@@ -197,6 +197,7 @@ class Equations {
   EquationsMemory at_mark_;
   std::vector<ContactKey> ordered_;  ///< contacts for which the assembler has found its order of elimination
   double static_duration_ = 0;       ///< in which slip happens in statics [s]
+  bool explicit_ = false;
   Inner inner_ = Inner::end;
   const State* state_ = nullptr;
   const Parameters* parameters_ = nullptr;

@@ -21,7 +21,8 @@ void explicit_acceleration(Equations& equations, const Parameters& parameters, d
   work.from.q -= dt * v;
   work.from.v = v;
   equations.begin(work.from, parameters, dt, false);
-  if (Contact* contact = equations.contact(); contact && contact->anchored()) contact->begin(before, dt);
+  if (Contact* contact = equations.contact(); contact && contact->anchored())
+    contact->begin(before, parameters, dt, Pressing::still);
   if (equations.flows() && !solve_flow(equations, state.q, v, work.newton.counters)) {
     acceleration.setConstant(state.q.size(), std::nan(""));
     return;
@@ -154,7 +155,7 @@ double stable_step(Equations& equations, const Parameters& parameters, const Sta
     work.from.q -= h * state.v;
     equations.begin(work.from, parameters, h, false);
     if (Contact* contact = equations.contact()) {
-      contact->begin(work.from, dt);
+      contact->begin(work.from, parameters, dt, Pressing::still);
       contact->ease(0.25);
     }
     equations.evaluate(state.q, true, nullptr, work.newton.evaluation);

@@ -177,10 +177,7 @@ void World::Implementation::rebuild(Rebuild why) {
   newton = std::make_unique<Newton>(model, options);
   equations = std::make_unique<Equations>(model, options);
   equations->loads().values = load_values;
-  if (Contact* contact = equations->contact()) {
-    contact->set_parameters(parameters);
-    contact->initialise(state);
-  }
+  if (Contact* contact = equations->contact()) contact->initialise(state, parameters);
   reaction_current = false;
   make_plan();
 }

@@ -25,8 +25,7 @@ ContactTable World::contacts() const {
   Contact* contact = self.equations->contact();
   if (contact == nullptr) return table;
   const Model& model = self.model;
-  contact->set_parameters(self.parameters);  // a copy has taken no step yet
-  const std::vector<ContactReport> reports = contact->report(self.state);
+  const std::vector<ContactReport> reports = contact->report(self.state, self.parameters);
   const auto rows = static_cast<Eigen::Index>(reports.size());
   table.bodies.resize(rows, 5);
   table.numbers.resize(rows, 14);
@@ -48,7 +47,7 @@ void World::Implementation::check_overlap() const {
   Contact* contact = equations->contact();
   if (contact == nullptr) return;
   const ContactReport* deepest = nullptr;
-  const std::vector<ContactReport> reports = contact->report(state);
+  const std::vector<ContactReport> reports = contact->report(state, parameters);
   const bool bars = description.contact.law == ContactLaw::barrier;  // which is infinite where surfaces touch
   double depth = bars ? 0.0 : kDeepest;
   for (const ContactReport& r : reports) {

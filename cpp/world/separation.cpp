@@ -28,7 +28,6 @@ class Separation {
         state_(start),
         barred_(model.description.contact.law == ContactLaw::barrier) {
     contact().allow_depth(INFINITY);
-    contact().set_parameters(parameters_);
     soft_ = 100.0 * (parameters_.edge_bend.rowwise().maxCoeff().array() / model_.edge_arc.array().cube()).minCoeff() *
             std::pow(1.0 / model_.edge_count, 3.0);
     stiff_ = 100.0 * (parameters_.edge_stretch.array() / model_.edge_arc.array()).maxCoeff();
@@ -107,7 +106,7 @@ class Separation {
   /// Greatest depth of two surfaces in each other [m]; a barrier wants them to be a little apart.
   double overlap() {
     double deepest = 0.0;
-    for (const ContactReport& r : contact().report(state_))
+    for (const ContactReport& r : contact().report(state_, parameters_))
       deepest = std::max(deepest, (barred_ ? 1e-2 * contact().surfaces().tolerance(r.key.a) : 0.0) - r.gap);
     return deepest;
   }
@@ -115,7 +114,7 @@ class Separation {
   /// Centrelines that cross do not know which way to go: they leave each other along their common normal.
   void nudge() {
     VectorX move = VectorX::Zero(state_.q.size());
-    for (const ContactReport& r : contact().report(state_)) {
+    for (const ContactReport& r : contact().report(state_, parameters_)) {
       if (r.key.b < 0) continue;
       const Vec3d a0 = tail(r.key.a), b0 = tail(r.key.b), u = head(r.key.a) - a0, v = head(r.key.b) - b0;
       const Vec3d between = a0 + r.s * u - b0 - r.t * v;

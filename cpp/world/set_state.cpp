@@ -183,8 +183,7 @@ void World::Implementation::place_rods(const std::vector<RodState>& rods) {
   if (Contact* contact = equations->contact()) {
     state.contacts.clear();
     forget_contacts();
-    contact->set_parameters(parameters);
-    contact->initialise(state);
+    contact->initialise(state, parameters);
     check_overlap();
   }
   forget_motion();

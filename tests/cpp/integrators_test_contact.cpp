@@ -100,10 +100,9 @@ void expect_exact(const Case& c, Integrator integrator, Inner inner, bool forese
   Equations equations(c.model, options);
   const Parameters parameters = initial_parameters(c.model);
   State state = c.state;
-  equations.contact()->set_parameters(parameters);
-  equations.contact()->initialise(state);
+  equations.contact()->initialise(state, parameters);
   state.contacts.clear();
-  for (const ContactReport& r : equations.contact()->report(state)) {
+  for (const ContactReport& r : equations.contact()->report(state, parameters)) {
     ContactRecord record;
     record.key = r.key;
     record.stick = {0.01, 0.002, -0.01};
@@ -184,10 +183,9 @@ TEST(Contact, MatrixIsExactForEveryEnergy) {
 /// Contact in the step from a case's state to its q.
 struct ContactStep {
   explicit ContactStep(const Case& c, bool conserving = false) : state(c.state), contact(c.model) {
-    contact.set_parameters(initial_parameters(c.model));
-    contact.initialise(state);
-    contact.press_by(conserving ? Pressing::mean_direction : Pressing::end);
-    contact.begin(state, 0.3);
+    const Parameters parameters = initial_parameters(c.model);
+    contact.initialise(state, parameters);
+    contact.begin(state, parameters, 0.3, conserving ? Pressing::mean_direction : Pressing::end);
     contact.update(c.q);
   }
   ContactStep(const ContactStep&) = delete;

@@ -162,3 +162,67 @@ def test_a_rope_wound_about_a_post_multiplies_its_tension(turns, bound):
     error = float(np.mean(pulls)) / exact - 1.0
     print(f"capstan, {turns} turns:", exact, error)
     assert abs(error) < bound
+
+
+def grasped(friction_model, integrator):
+    """How far a cylinder sinks within ten seconds that four elastic fingers press on, and have lifted [m]."""
+    scene = withe.Scene()
+    radius, thick = 8e-3, 3e-3
+    foam = withe.Material(youngs_modulus=1e7, poisson_ratio=0.5, density=500.0, viscosity=2e3)
+    rubber = withe.Material(youngs_modulus=1e7, poisson_ratio=0.5, density=1000.0, viscosity=2e3)
+    cylinder = scene.add_rod(start=(0, -0.03, 0), end=(0, 0.03, 0), nodes=7, radius=radius, material=foam)
+    hands = []
+    for side, y in ((-1, -0.015), (-1, 0.015), (1, -0.015), (1, 0.015)):
+        top = np.array((side * (radius + thick + 1e-4), y, 0.06))
+        finger = scene.add_rod(start=top, end=(top[0], y, -0.004), nodes=15, radius=thick, material=rubber)
+        hands.append((scene.clamp(finger.start), top - (side * 6e-3, 0, 0)))
+    scene.add_floor(-radius)
+    scene.enable_contact(friction=0.8, friction_model=friction_model)
+    simulation = scene.build(integrator=integrator, time_step=5e-3)
+    for up in (0.0, 0.02):
+        for hand, place in hands:
+            simulation.move(hand, position=place + np.array((0, 0, up)), over=0.3)
+        simulation.run(1.0, progress=False)
+    before = simulation.positions(cylinder)
+    assert before[:, 2].min() > 0.015
+    simulation.run(10.0, progress=False)
+    return float((before - simulation.positions(cylinder))[:, 2].max())
+
+
+@pytest.mark.parametrize("integrator", ["backward_euler", "implicit_midpoint"])
+def test_a_grasped_cylinder_does_not_creep_on_anchors(integrator):
+    """Regularised friction lets it sink at about a tenth of the slip tolerance."""
+    assert abs(grasped("anchored", integrator)) < 1e-7
+    assert grasped("implicit", integrator) > 1e-4
+
+
+def gathered(force, tolerance):
+    """Speed beyond (F - mu m g) t / m of a block of 1 kg that a force begins to push at once [m/s]."""
+    scene = withe.Scene()
+    radius = 0.025
+    foam = withe.Material(youngs_modulus=1e5, poisson_ratio=0.5, density=1.0 / (np.pi * radius**2))
+    block = scene.add_rod(start=(0, 0, radius), end=(1, 0, radius), nodes=26, radius=radius, material=foam)
+    scene.add_floor(friction=0.4)
+    scene.enable_contact(distance_tolerance=tolerance)
+    push = scene.add_load(block, (0.0, 0.0, 0.0))
+    simulation = scene.build(time_step=1e-3)
+    simulation.equilibrium()
+    simulation.set(push, load=(force, 0.0, 0.0))
+    simulation.run(0.5, progress=False)
+    return simulation.velocities(block)[:, 0].mean() - (force - 0.4 * G) * 0.5
+
+
+def test_a_block_that_is_pushed_at_once_gathers_the_speed_that_its_anchors_give_before_it_slides():
+    """On a spring that yields at mu m g, x = delta / 20 from where it rests, then as Coulomb says: that adds
+    sqrt((2 F - mu m g) x / m), less (F / mu m g - 1) g mu times how long it takes."""
+    for force in (4.121, 6.0):
+        speeds = []
+        for tolerance in (2e-3, 5e-4):
+            give = 0.05 * tolerance
+            rate, shift = np.sqrt(0.4 * G / give), force * give / (0.4 * G)
+            until = np.arccos(1.0 - give / shift) / rate
+            exact = shift * rate * np.sin(rate * until) - (force - 0.4 * G) * until
+            speeds.append(gathered(force, tolerance))
+            print(f"pushed at once, {force} N, tolerance {tolerance}:", speeds[-1], exact)
+            assert 0.75 * exact < speeds[-1] < exact  # as contact is up to a quarter stiffer than it has to be
+        assert speeds[0] / speeds[1] == pytest.approx(2.0, rel=0.1)  # goes with the root of the tolerance
