@@ -189,7 +189,6 @@ void World::Implementation::remake_equations() {
   newton = std::make_unique<Newton>(model, options);
   equations = std::make_unique<Equations>(model, options);
   equations->loads().values = load_values;
-  if (Contact* contact = equations->contact()) contact->set_parameters(parameters);
   forget_matrix();
   reaction_current = false;
   state.acceleration_current = false;

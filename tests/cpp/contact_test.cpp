@@ -216,22 +216,20 @@ TEST(Contact, FindsWhatTouchesAndHowFarItMayGoAsBruteForceDoesWhateverCameBefore
     const Parameters parameters = initial_parameters(model);
     State state = initial_state(model);
     Contact contact(model);
-    contact.set_parameters(parameters);
-    contact.initialise(state);
+    contact.initialise(state, parameters);
     const std::vector<ContactPair> pairs = all_pairs(model, contact.surfaces());
     const auto distance = [&](const ContactPair& pair, const VectorX& q) {
       const Vec3d between = closest(model, contact.surfaces(), pair, q).between;
       return std::sqrt(dot(between, between));
     };
     for (int step = 0; step < 12; ++step) {
-      contact.begin(state, 1e-2);
+      contact.begin(state, parameters, 1e-2, Pressing::end);
       VectorX q = state.q;
       for (int iterate = 0; iterate < 6; ++iterate) {
         const double wide = std::pow(10.0, -1.0 - 0.5 * ((step + iterate) % 6));
         const VectorX change = wide * random.vector(model.dof_count);
         Contact fresh(model);
-        fresh.set_parameters(parameters);
-        fresh.begin(state, 1e-2);
+        fresh.begin(state, parameters, 1e-2, Pressing::end);
         fresh.update(q);
         const double kept = contact.allowed(q, change);
         ASSERT_EQ(kept, fresh.allowed(q, change));
