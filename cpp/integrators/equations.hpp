@@ -43,7 +43,7 @@ struct EquationsMemory {
   /// Contacts whose unknowns the order of elimination was found for, and those in the matrix; sorted.
   std::vector<ContactKey> ordered, coupled;
   std::vector<std::vector<int>> groups;  ///< of unknowns that custom forces couple
-  std::vector<double> matrix;  ///< whose factorisation is in use; empty: none
+  std::vector<double> matrix;            ///< whose factorisation is in use; empty: none
   double flow_excess = 0;
   StokesletFluid::Memory fluid;
 };
