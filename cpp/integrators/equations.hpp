@@ -95,8 +95,8 @@ class Equations {
   void forget_flow();
   /// What solves left for those to come; the matrix where its factorisation may serve again.
   EquationsMemory memory(bool with_matrix) const;
-  /// Goes on from there, but for the factorisation.
-  void recall(const EquationsMemory& memory);
+  /// Goes on from there, but for the factorisation. False where there is no matrix to factorise.
+  bool recall(const EquationsMemory& memory);
   /// From here on what would be lost of that is kept, until the next mark: copied once, when it is about to change.
   void mark() { mark_ = Mark::set; }
   bool marked() const { return mark_ != Mark::none; }

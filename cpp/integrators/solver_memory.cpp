@@ -2,7 +2,6 @@
 
 #include <algorithm>
 
-#include "common/check.hpp"
 #include "integrators/equations.hpp"
 
 namespace withe {
@@ -47,7 +46,7 @@ void Equations::remember(EquationsMemory& out, bool with_matrix) const {
   }
 }
 
-void Equations::recall(const EquationsMemory& memory) {
+bool Equations::recall(const EquationsMemory& memory) {
   const bool regrouped = memory.groups != assembler_.groups();
   assembler_.set_groups(memory.groups);
   if (contact_ && (regrouped || memory.ordered != ordered_ || memory.coupled != contact_->elements())) {
@@ -56,16 +55,16 @@ void Equations::recall(const EquationsMemory& memory) {
     contact_->couple(memory.coupled);
     assembler_.couple(contact_->element_unknowns(), kContactUnknowns);
   }
-  if (!memory.matrix.empty()) {
-    const std::span<double> values = assembler_.solver().values();
-    require(memory.matrix.size() == values.size(), "a matrix of another scene");
-    std::copy(memory.matrix.begin(), memory.matrix.end(), values.begin());
-  }
+  // A scene with other options or friction may have a matrix of another form.
+  const std::span<double> values = assembler_.solver().values();
+  const bool fits = memory.matrix.size() == values.size();
+  if (fits) std::copy(memory.matrix.begin(), memory.matrix.end(), values.begin());
   if (fluid_) {
     flow_excess_ = memory.flow_excess;
     flow_version_ = -1;
     fluid_->recall(memory.fluid);
   }
+  return fits;
 }
 
 }  // namespace withe

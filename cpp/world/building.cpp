@@ -59,7 +59,7 @@ Matrix3 frame_rotation(const Model& model, const State& state, int frame) {
 }
 
 World::Implementation::Implementation(SceneDescription scene, Options choice)
-    : description(std::move(scene)), options(choice) {
+    : description(std::move(scene)), drawn_contact(description.contact), options(choice) {
   require(options.time_step > 0.0 && std::isfinite(options.time_step), "time_step must be positive and finite");
   for (const LoadDescription& load : description.loads) load_values.push_back(load.value);
   rebuild(Rebuild::first);
@@ -77,6 +77,7 @@ World::Implementation::Implementation(SceneDescription scene, Options choice)
 World::Implementation::Implementation(const Implementation& other)
     : Running(other),
       description(other.description),
+      drawn_contact(other.drawn_contact),
       options(other.options),
       model(other.model),
       plan(other.plan),

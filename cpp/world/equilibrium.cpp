@@ -55,6 +55,31 @@ void World::Implementation::rest() {
   work.newton.finest = INFINITY;
 }
 
+/// Whether nothing resists a translation along which forces do not sum to zero: no way off leads to equilibrium then.
+bool World::Implementation::drifts(Equations& system) {
+  if (system.contact()) return false;
+  for (const Support& s : model.supports)
+    if (s.active) return false;
+  system.begin(state, parameters, 0.0, false);
+  Evaluation& e = work.newton.evaluation;
+  system.evaluate(state.q, true, nullptr, e);
+  if (!e.residual.allFinite()) return false;
+  constexpr double kBalanced = 1e-6, kNeutral = 1e-12;  // over all forces there are; over the greatest stiffness
+  VectorX along(model.dof_count), pull(model.dof_count);
+  for (int axis = 0; axis < model.dimension; ++axis) {
+    along.setZero();
+    for (int dof : model.node_dof) along[dof + axis] = 1.0;
+    const double force = along.dot(e.residual), scale = along.dot(e.magnitude);
+    if (std::abs(force) <= kBalanced * scale) continue;
+    const auto size = static_cast<std::size_t>(model.dof_count);
+    system.assembler().solver().multiply({along.data(), size}, {pull.data(), size});
+    double greatest = 0.0;
+    for (int i = 0; i < model.dof_count; ++i) greatest = std::max(greatest, std::abs(system.assembler().diagonal(i)));
+    if (pull.cwiseAbs().maxCoeff() <= kNeutral * greatest) return true;
+  }
+  return false;
+}
+
 /// Equilibrium after `dt` (0: at the present time, with supports and actuation as they are).
 EquilibriumResult World::Implementation::equilibrium(double dt) {
   const Moving before = *this;
@@ -91,7 +116,10 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
   try {
     solve_for_custom_at_rest(system, time);
     aim_obstacles(system, time);
-    r = find_equilibrium(system, *newton, options, parameters, boundary, state, work.newton);
+    if (drifts(system))
+      newton->balance(work.newton.evaluation, r.newton);
+    else
+      r = find_equilibrium(system, *newton, options, parameters, boundary, state, work.newton);
     // Contact that turns out too soft is made stiffer, from where it has settled.
     from = target;
     for (int tries = 0; r.converged && system.contact() && system.contact()->depth() > kDeepest && tries < 8; ++tries) {

@@ -24,6 +24,7 @@ struct World::Implementation : Running {
   Implementation(const Implementation& other);
 
   SceneDescription description;
+  ContactDescription drawn_contact;  ///< whose friction holds until it is set
   Options options;
   Model model;
   std::unique_ptr<Newton> newton;
@@ -169,6 +170,7 @@ struct World::Implementation : Running {
 
   // equilibrium.cpp
   EquilibriumResult equilibrium(double dt);
+  bool drifts(Equations& system);
   void rest();
   Equations& statics();
   Equations& rescue();

@@ -40,6 +40,7 @@ Lagged World::Implementation::lagged() {
 
 /// The same matrix makes the same factorisation.
 void World::Implementation::recall(const Lagged& past) {
+  bool fits = true;
   for (const System which : kSystems) {
     const auto& memory = past.systems[at(which)];
     if (!memory && which == System::rescue) rescue_equations.reset();
@@ -48,13 +49,13 @@ void World::Implementation::recall(const Lagged& past) {
     if (which == System::rescue) rescue();
     if (which == System::statics) statics();
     require(system(which) != nullptr, "equations of another scene");
-    system(which)->recall(*memory);
+    if (!system(which)->recall(*memory) && past.owner == which) fits = false;
   }
   MatrixRecord& matrix = work.newton.matrix;
   static_cast<MatrixHistory&>(matrix) = past.matrix;
   matrix.owner = nullptr;
   work.newton.guesses = past.guesses;
-  if (past.owner) factorize_again(*past.owner);
+  if (past.owner && fits) factorize_again(*past.owner);
 }
 
 /// With the matrix as it is; users count what steps factorise.
@@ -89,8 +90,7 @@ void World::Implementation::return_to_mark() {
     Equations* known = system(which);
     const EquationsMemory* before = known ? known->since_mark() : nullptr;
     if (!before) continue;
-    known->recall(*before);
-    if (marked_matrix.owner == known) factorize_again(which);
+    if (known->recall(*before) && marked_matrix.owner == known) factorize_again(which);
   }
 }
 

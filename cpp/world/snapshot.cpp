@@ -55,6 +55,7 @@ std::vector<LoadDescription> read_added_loads(Reader& r, const SceneDescription&
   return loads;
 }
 
+/// As it was set while running; where it was not, that of the drawing holds.
 void write_friction(Writer& w, const ContactDescription& contact) {
   w(contact.friction);
   w(contact.obstacle_friction);
@@ -378,7 +379,9 @@ std::string World::snapshot() const {
     w(d.axis);
   }
   write_added_loads(w, self.description);
-  if (self.description.contact.any()) write_friction(w, self.description.contact);
+  const bool set = !same_friction(self.description.contact, self.drawn_contact);
+  w(set);
+  if (set) write_friction(w, self.description.contact);
   exchange(w, static_cast<Running&>(self));
   Lagged lagged = self.lagged();
   exchange(w, lagged);
@@ -445,12 +448,12 @@ void World::restore(const std::string& bytes) {
     fresh->load_values.resize(loads.size(), Vector3::Zero());
     fresh->remake_equations();
   }
-  if (fresh->description.contact.any()) {
-    const ContactDescription contact = read_friction(r, fresh->description.contact);
-    if (!same_friction(contact, fresh->description.contact)) {
-      fresh->description.contact = fresh->model.description.contact = contact;
-      fresh->remake_equations();
-    }
+  bool friction_set = false;
+  r(friction_set);
+  const ContactDescription contact = friction_set ? read_friction(r, fresh->description.contact) : fresh->drawn_contact;
+  if (!same_friction(contact, fresh->description.contact)) {
+    fresh->description.contact = fresh->model.description.contact = contact;
+    fresh->remake_equations();
   }
   if (!same) {
     fresh->spatial = spatial;

@@ -132,16 +132,21 @@ class CustomForces:
         state = [positions.copy(), velocities.copy()]
         speed = max(float(np.abs(velocities).max(initial=0.0)), self._length)
         little = _LITTLE * (self._length if which == 0 else speed)
-        columns = []
-        for index in np.ndindex(*positions.shape):
+        rows, columns, slopes = [], [], []
+        for column, index in enumerate(np.ndindex(*positions.shape)):
             kept = state[which][index]
             ends = []
             for sign in (1.0, -1.0):
                 state[which][index] = kept + sign * little
                 ends.append(self._value(part, time, *state).ravel())
             state[which][index] = kept
-            columns.append(sparse.csc_matrix((ends[0] - ends[1])[:, None] / (2.0 * little)))
-        return sparse.hstack(columns, format="csc")
+            change = ends[0] - ends[1]
+            found = np.flatnonzero(change)
+            rows.append(found)
+            columns.append(np.full(len(found), column))
+            slopes.append(change[found] / (2.0 * little))
+        shape = (len(change), positions.size)
+        return sparse.csc_matrix((np.concatenate(slopes), (np.concatenate(rows), np.concatenate(columns))), shape)
 
     def _padded(self, matrix: Any, size: int) -> Any:
         """With rows for moments, where another force has some."""

@@ -119,7 +119,7 @@ class Directory:
             raise ValueError(f"{what} must not be a node or an edge, got {name!r}")
         part = self.parts.get(name)
         if part is None:
-            known = ", ".join(map(repr, list(self.parts)[:12])) or "nothing"
+            known = ", ".join(map(repr, sorted(self.parts)[:12])) or "nothing"
             raise ValueError(f"{what} {name!r:.80} is not in the scene, which has {known}")
         return part
 

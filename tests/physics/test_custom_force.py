@@ -155,3 +155,26 @@ def test_functions_that_stay_in_a_plane_are_taken_there_and_others_named(kind):
             with pytest.raises(ValueError, match=r"'wind' at t = .* must stay in the plane"):
                 simulation.step()
     np.testing.assert_allclose(ends[0], ends[1], atol=1e-9)
+
+
+@pytest.mark.parametrize("stiffness", [0.0, 1e-4, 10.0])
+def test_a_free_rod_rests_where_a_custom_force_holds_it_and_is_refused_at_once_where_none_does(stiffness):
+    asked = []
+    scene = withe.Scene(gravity=(0, 0, 0))
+    rod = scene.add_rod(
+        start=(0, 0, 0), end=(0.2, 0, 0), nodes=6, radius=5e-3, material=withe.Material(youngs_modulus=1e6, density=1e3)
+    )
+
+    def pull(time, positions, velocities):
+        asked.append(time)
+        return np.array([0.0, 0.0, 1e-3]) - stiffness * (positions - [[x, 0.0, 0.0] for x in np.linspace(0, 0.2, 6)])
+
+    scene.add_custom_force(pull)
+    simulation = scene.build()
+    if stiffness:
+        simulation.equilibrium()
+        assert simulation.positions(rod)[:, 2] == pytest.approx(1e-3 / stiffness, rel=1e-6)
+    else:
+        with pytest.raises(withe.ConvergenceError, match="no support holds the scene"):
+            simulation.equilibrium()
+        assert len(asked) < 100

@@ -233,3 +233,32 @@ def test_a_snapshot_pickles_also_with_functions_that_do_not():
     assert state == simulation.snapshot()
     simulation.restore(state)
     simulation.step(3)
+
+
+def test_a_snapshot_without_friction_starts_a_scene_that_has_some():
+    """A scene is brought to rest without friction, and goes on with that of its own drawing."""
+
+    rubber = withe.Material(youngs_modulus=1e6, density=1e3)
+
+    def sled(friction, **options):
+        scene = withe.Scene()
+        rod = scene.add_rod(start=(0, 0, 5e-3), end=(0.2, 0, 5e-3), nodes=6, radius=5e-3, material=rubber)
+        scene.add_floor(friction=friction)
+        return rod, scene.build(integrator="backward_euler", time_step=2e-3, **options)
+
+    _, smooth = sled(0.0)
+    smooth.step(50)
+    rod, rough = sled(0.5)
+    rough.restore(smooth.snapshot())
+    assert rough.get("floor 1", "friction") == 0.5
+    rough.set_velocities(rod, np.tile((0.1, 0.0, 0.0), (6, 1)))
+    rough.run(0.1)
+    assert np.abs(rough.velocities(rod)).max() < 1e-3
+    # What is set while running goes with the snapshot, and off with one from before.
+    before = rough.snapshot()
+    rough.set("floor 1", friction=0.2)
+    after = rough.snapshot()
+    rough.restore(before)
+    assert rough.get("floor 1", "friction") == 0.5
+    rough.restore(after)
+    assert rough.get("floor 1", "friction") == 0.2
