@@ -61,14 +61,15 @@ double Contact::impact_stiffness(const ContactPair& pair) const {
   const bool obstacle = pair.key.b < 0;
   const Vec3d shift = shift_of(pair);
   double square = 0.0;
-  for (int node_a : {model_.edge_tail[at(pair.key.a)], model_.edge_head[at(pair.key.a)]}) {
+  for (int k = 0; k < (pair.curve() ? pair.piece.weights->nodes : 2); ++k) {
+    const int node_a = pair.curve() ? pair.piece.node[k] : end_node(pair.key.a, k);
     const Vec3d v = local_position(model_, state_->v, node_a) - (1.0 / duration_) * shift;
     if (obstacle) {
       square = std::max(square, dot(v, v));
       continue;
     }
-    for (int node_b : {model_.edge_tail[at(pair.key.b)], model_.edge_head[at(pair.key.b)]}) {
-      const Vec3d relative = v - local_position(model_, state_->v, node_b);
+    for (int l = 0; l < 2; ++l) {
+      const Vec3d relative = v - local_position(model_, state_->v, end_node(pair.key.b, l));
       square = std::max(square, dot(relative, relative));
     }
   }
@@ -103,14 +104,20 @@ double Contact::tangential_stiffness(const ContactPair& pair, double stiffness) 
   return pair.friction * pressing / (kGive * pair.tolerance);
 }
 
+/// Ends of edges, or of an obstacle; of a piece of a curve its nodes, and nothing.
 void Contact::end_points(const ContactPair& pair, const VectorX& q, Vec3d (&x)[4]) const {
+  if (pair.curve()) {
+    for (int i = 0; i < 4; ++i)
+      x[i] = i < pair.piece.weights->nodes ? local_position(model_, q, pair.piece.node[i]) : Vec3d{};
+    return;
+  }
   x[0] = local_vector(model_, q, model_.tail_dof[at(pair.key.a)]);
   x[1] = local_vector(model_, q, model_.head_dof[at(pair.key.a)]);
   if (pair.key.b >= 0) {
     x[2] = local_vector(model_, q, model_.tail_dof[at(pair.key.b)]);
     x[3] = local_vector(model_, q, model_.head_dof[at(pair.key.b)]);
   } else {
-    const Obstacle& o = surfaces_.obstacles()[at(-1 - pair.key.b)];
+    const Obstacle& o = obstacle_of(pair);
     x[2] = o.point;
     x[3] = o.other;
   }
@@ -132,10 +139,12 @@ Contact::Touching Contact::touch(const ContactPair& pair, const VectorX& q, bool
   Touching t;
   Vec3d x[4];
   end_points(pair, q, x);
-  if (pair.plane()) {
-    t.points.s = pair.key.end;
-    t.normal = x[3];
-    t.distance = dot(x[3], x[pair.key.end] - x[2]);
+  if (pair.curve()) {
+    const Obstacle& o = obstacle_of(pair);
+    const CurveDistance<double> d = curve_distance(pair.piece, o, x);
+    t.distance = d.distance;
+    t.points.s = d.s;
+    t.normal = distance_to(o, curve_point(*pair.piece.weights, x, d.s)).normal;
     return t;
   }
   // Far apart by their middles: no need for more.
@@ -213,7 +222,15 @@ void Contact::move_obstacles() {
     return;
   }
   for (const ContactPair& pair : surfaces_.obstacle_pairs())
-    if (!pair.plane() && allowed_of(pair, state_->q, nullptr, shift_of(pair)) < 1.0) blocked_ = true;
+    if (!flat(pair) && allowed_of(pair, state_->q, nullptr, shift_of(pair)) < 1.0) blocked_ = true;
+}
+
+/// Minus the force on the nodes beside an obstacle, and so that on it [N].
+Vec3d Contact::force_on_nodes(const ContactPair& pair, const ContactLocal& local) {
+  Vec3d sum{};
+  for (int i = 0; i < (pair.curve() ? 9 : 6); i += 3)
+    sum += Vec3d{local.gradient[i], local.gradient[i + 1], local.gradient[i + 2]};
+  return sum;
 }
 
 double Contact::obstacle_work() const {
@@ -225,8 +242,7 @@ double Contact::obstacle_work() const {
     const Vec3d shift = shift_of(pair_of(i));
     if (dot(shift, shift) == 0.0) continue;
     this->local(i, false, local);
-    const double* g = local.gradient;  // of the edge's two nodes; the obstacle's is the opposite of their sum
-    work -= dot(shift, Vec3d{g[0] + g[3], g[1] + g[4], g[2] + g[5]});
+    work -= dot(shift, force_on_nodes(pair_of(i), local));
   }
   return work;
 }
@@ -260,9 +276,29 @@ void Contact::update(const VectorX& q1) {
   current_ = !starting_;  // what has no record begins otherwise in a step than before it
 }
 
-void Contact::unknowns(int i, int (&dofs)[kContactUnknowns]) const { unknowns_of(pair_of(i).key, dofs); }
+void Contact::unknowns(int i, int (&dofs)[kContactUnknowns]) const { unknowns_of(pair_of(i), dofs); }
+
+void Contact::unknowns_of(const ContactPair& pair, int (&dofs)[kContactUnknowns]) const {
+  if (!pair.curve()) {
+    unknowns_of_edges(pair.key, dofs);
+    return;
+  }
+  std::fill(std::begin(dofs), std::end(dofs), -1);
+  const CurveWeights& w = *pair.piece.weights;
+  for (int i = 0; i < w.nodes; ++i)
+    for (int k = 0; k < model_.dimension; ++k) dofs[3 * i + k] = model_.node_dof[at(pair.piece.node[i])] + k;
+  for (int b = 0; b < w.edges && frictional_ && !model_.planar(); ++b)
+    dofs[12 + b] = model_.edge_dof[at(pair.piece.edge[b])];
+}
 
 void Contact::unknowns_of(const ContactKey& key, int (&dofs)[kContactUnknowns]) const {
+  if (key.b < 0)
+    unknowns_of(surfaces_.obstacle_pair(key), dofs);
+  else
+    unknowns_of_edges(key, dofs);
+}
+
+void Contact::unknowns_of_edges(const ContactKey& key, int (&dofs)[kContactUnknowns]) const {
   std::fill(std::begin(dofs), std::end(dofs), -1);
   const bool obstacle = key.b < 0;
   for (int side = 0; side < (obstacle ? 1 : 2); ++side) {

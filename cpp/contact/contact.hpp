@@ -175,7 +175,18 @@ class Contact {
     bool sticking = false;
   };
   const ContactPair& pair_of(int i) const;
+  const Obstacle& obstacle_of(const ContactPair& pair) const {
+    return surfaces_.obstacles()[static_cast<std::size_t>(-1 - pair.key.b)];
+  }
+  /// Whether a pair is one with a plane, which has no other side.
+  bool flat(const ContactPair& pair) const { return pair.key.b < 0 && obstacle_of(pair).kind == ObstacleKind::plane; }
+  int end_node(int edge, int end) const {
+    return (end == 0 ? model_.edge_tail : model_.edge_head)[static_cast<std::size_t>(edge)];
+  }
+  static Vec3d force_on_nodes(const ContactPair& pair, const ContactLocal& local);
+  void unknowns_of(const ContactPair& pair, int (&dofs)[kContactUnknowns]) const;
   void unknowns_of(const ContactKey& key, int (&dofs)[kContactUnknowns]) const;
+  void unknowns_of_edges(const ContactKey& key, int (&dofs)[kContactUnknowns]) const;
   /// Row of a pair in the table of elements, or -1.
   int element_of(const ContactKey& key) const;
   static double depth_of(const ContactPair& pair, double distance) {
@@ -215,6 +226,10 @@ class Contact {
   void press(const Touching& t, bool with_hessian, ContactLocal& out) const;
   void add_pressing(const Touching& t, bool with_hessian, ContactLocal& out) const;
   void add_mean_pressing(const Touching& t, bool with_hessian, ContactLocal& out) const;
+  void add_curve_pressing(const Touching& t, bool with_hessian, ContactLocal& out) const;
+  void add_start_direction(const ContactPair& pair, const Vec3d (&x1)[4], double distance, double (&along)[9],
+                           double (&hessian)[9][9]) const;
+  CurveDistance<double> distance_at_start(const ContactPair& pair, Vec3d (&x)[4]) const;
   void add_friction(const Touching& t, bool with_hessian, ContactLocal& out) const;
   void add_frozen_friction(const Touching& t, bool with_hessian, ContactLocal& out) const;
   FrozenForce frozen_force(const Touching& t) const;
@@ -236,6 +251,7 @@ class Contact {
   void set_direction(const ContactPair& pair, Frozen& frozen) const;
   void record_frozen(std::vector<ContactRecord>& records) const;
   void freeze();
+  void freeze_slip(const Touching& t, Frozen& frozen) const;
   /// Unknowns of a pair at q (obstacles' points where there are none).
   void values_at(const ContactPair& pair, const VectorX& q, double (&x)[kContactUnknowns]) const;
   template <class More>
@@ -250,6 +266,9 @@ class Contact {
   void set_parameters(const Parameters& parameters);
   void restart(const State& state, double duration);
   void look_at(const State& state, const Parameters& parameters);
+  double allowed_of_piece(const ContactPair& pair, const VectorX& q, const VectorX* change, const Vec3d& shift) const;
+  template <class Distance>
+  static double advance(const ContactPair& pair, double speed, const Distance& distance_at);
   void move_obstacles();
   void place_obstacles(const std::vector<ObstaclePlace>& places);
   /// Way of a pair's obstacle in this step [m].

@@ -24,6 +24,10 @@ void Contact::values_at(const ContactPair& pair, const VectorX& q, double (&valu
     values[3 * i + 2] = x[i].z;
   }
   if (model_.planar()) return;
+  if (pair.curve()) {
+    for (int b = 0; b < pair.piece.weights->edges; ++b) values[12 + b] = q(model_.edge_dof[at(pair.piece.edge[b])]);
+    return;
+  }
   values[12] = q(model_.edge_dof[at(pair.key.a)]);
   if (pair.key.b >= 0) values[13] = q(model_.edge_dof[at(pair.key.b)]);
 }
@@ -50,7 +54,7 @@ FrictionSetting Contact::setting(const Touching& t) const {
   const ContactPair& pair = pairs_[at(t.pair)];
   FrictionSetting f;
   f.pair = &pair;
-  if (pair.key.b < 0) f.obstacle = &surfaces_.obstacles()[at(-1 - pair.key.b)];
+  if (pair.key.b < 0) f.obstacle = &obstacle_of(pair);
   f.points = t.points;
   f.pressing = t.law;
   f.before = t.before;
@@ -66,6 +70,10 @@ FrictionSetting Contact::setting(const Touching& t) const {
   f.foreseen = foreseen(t);
   values_at(pair, state_->q, f.start);
   if (!f.spatial) return f;
+  if (pair.curve()) {
+    for (int b = 0; b < pair.piece.weights->edges; ++b) f.source[b] = state_->tangent[at(pair.piece.edge[b])];
+    return f;
+  }
   f.source[0] = state_->tangent[at(pair.key.a)];
   if (pair.key.b >= 0) f.source[1] = state_->tangent[at(pair.key.b)];
   return f;
@@ -97,47 +105,67 @@ double Contact::turning_work(const Touching& t) const {
   return -dot(c.friction.force, cross(turn, obstacle_arm(f, c, x)));
 }
 
-/// Columns of J at the start, where frames have not turned yet, for all that touches there.
+namespace {
+
+/// Adds how edge `tail`, `tail + 1` turns and spins the surface on `arm`, to columns of J.
+void add_turning(const Vec3d (&x)[4], int tail, int angle, const Vec3d& arm, bool spatial,
+                 Vec3d (&column)[kContactUnknowns]) {
+  const Vec3d e = x[tail + 1] - x[tail];
+  const double inverse = 1.0 / std::sqrt(dot(e, e));
+  const Vec3d tangent = inverse * e;
+  const Vec3d axes[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  for (int k = 0; k < 3; ++k) {
+    const Vec3d turned = inverse * cross(cross(tangent, axes[k]), arm);
+    column[3 * tail + 3 + k] += turned;
+    column[3 * tail + k] -= turned;
+  }
+  if (spatial) column[angle] = cross(tangent, arm);
+}
+
+}  // namespace
+
+/// J at the start.
+void Contact::freeze_slip(const Touching& t, Frozen& frozen) const {
+  const ContactPair& pair = pairs_[at(t.pair)];
+  const bool centreline = model_.description.contact.centreline_friction, obstacle = pair.key.b < 0;
+  double w[4];
+  end_weights(t.points.s, t.points.t, w);
+  for (int i = 0; i < 3 && pair.curve(); ++i) w[i] = pair.piece.weights->at(i, t.points.s);
+  Vec3d x[4], column[kContactUnknowns] = {};
+  end_points(pair, state_->q, x);
+  const Vec3d axes[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  for (int i = 0; i < (pair.curve() ? 9 : obstacle ? 6 : 12); ++i) column[i] = w[i / 3] * axes[i % 3];
+  const int edges = centreline ? 0 : pair.curve() ? pair.piece.weights->edges : obstacle ? 1 : 2;
+  for (int side = 0; side < edges; ++side) {
+    const Vec3d arm = pair.curve() ? piece_arm(pair, side, t.points.s, t.normal)
+                                   : (side == 0 ? 1.0 : -1.0) * contact_arm(pair, side, t.normal, t.points.between);
+    add_turning(x, pair.curve() ? side : 2 * side, 12 + side, arm, !model_.planar(), column);
+  }
+  for (int i = 0; i < kContactUnknowns; ++i) {
+    const Vec3d c = column[i] - dot(column[i], t.normal) * t.normal;
+    frozen.slip[0][i] = c.x;
+    frozen.slip[1][i] = c.y;
+    frozen.slip[2][i] = c.z;
+  }
+}
+
+/// Friction with J of the start, where frames have not turned yet, for all that touches there.
 void Contact::freeze() {
   frozen_.clear();
-  const bool centreline = model_.description.contact.centreline_friction;
   for (const Touching& t : touching_) {
     const ContactPair& pair = pairs_[at(t.pair)];
     const double pressing = -t.energy.first;
     if (!(pair.friction > 0.0) || !(pressing > 0.0)) continue;
     Frozen frozen{};
     frozen.pressing = pressing;
-    double w[4];
-    end_weights(t.points.s, t.points.t, w);
-    Vec3d x[4], column[kContactUnknowns] = {};
-    end_points(pair, state_->q, x);
-    const bool obstacle = pair.key.b < 0;
-    const Vec3d axes[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
-    for (int i = 0; i < (obstacle ? 6 : 12); ++i) column[i] = w[i / 3] * axes[i % 3];
-    for (int side = 0; side < (centreline ? 0 : obstacle ? 1 : 2); ++side) {
-      const double sign = side == 0 ? 1.0 : -1.0;
-      const Vec3d e = x[2 * side + 1] - x[2 * side];
-      const double inverse = 1.0 / std::sqrt(dot(e, e));
-      const Vec3d tangent = inverse * e;
-      const Vec3d arm = contact_arm(pair, side, t.normal, t.points.between);
-      for (int k = 0; k < 3; ++k) {
-        const Vec3d turned = (sign * inverse) * cross(cross(tangent, axes[k]), arm);
-        column[6 * side + 3 + k] += turned;
-        column[6 * side + k] -= turned;
-      }
-      if (!model_.planar()) column[12 + side] = sign * cross(tangent, arm);
-    }
-    for (int i = 0; i < kContactUnknowns; ++i) {
-      const Vec3d c = column[i] - dot(column[i], t.normal) * t.normal;
-      frozen.slip[0][i] = c.x;
-      frozen.slip[1][i] = c.y;
-      frozen.slip[2][i] = c.z;
-    }
+    freeze_slip(t, frozen);
     const Vec3d turn = turn_of(pair);
     if (dot(turn, turn) > 0.0) {
-      const Vec3d touched = pair.plane() ? x[pair.key.end] - t.distance * t.normal
-                                         : x[2] + t.points.t * (x[3] - x[2]) + pair.radius_b * t.normal;
-      frozen.turned = cross(turn, touched - x[2]);
+      Vec3d x[4];
+      end_points(pair, state_->q, x);
+      frozen.turned = cross(turn, pair.curve()
+                                      ? piece_obstacle_arm(pair, obstacle_of(pair), x, t.points.s)
+                                      : x[2] + t.points.t * (x[3] - x[2]) + pair.radius_b * t.normal - x[2]);
     }
     const Vec3d shift = shift_of(pair) + frozen.turned;
     frozen.drift = shift - dot(shift, t.normal) * t.normal;
@@ -169,7 +197,7 @@ Contact::Slipping Contact::frozen_slipping(const Touching& t, const VectorX& cha
   out.limit = pair.friction * frozen.pressing;
   out.slip = frozen_slip(t);
   int dofs[kContactUnknowns];
-  unknowns_of(pair.key, dofs);
+  unknowns_of(pair, dofs);
   for (int i = 0; i < kContactUnknowns; ++i)
     if (dofs[i] >= 0) out.change += change(dofs[i]) * Vec3d{frozen.slip[0][i], frozen.slip[1][i], frozen.slip[2][i]};
   out.law = tanh_law(pair.friction, frozen.pressing, dot(out.slip, out.slip), slip_rate());
@@ -180,7 +208,7 @@ Contact::Slipping Contact::slipping(const Touching& t, const VectorX& change) co
   const ContactPair& pair = pairs_[at(t.pair)];
   const FrictionSetting f = setting(t);
   int dofs[kContactUnknowns];
-  unknowns_of(pair.key, dofs);
+  unknowns_of(pair, dofs);
   double now[kContactUnknowns];
   values_at(pair, q1_, now);
   Dual<1> unknown[kContactUnknowns];

@@ -60,11 +60,11 @@ double Contact::pressing_energy() const {
 double Contact::work_against(int i, const ContactLocal& local, const VectorX& change) const {
   int dofs[kContactUnknowns];
   unknowns(i, dofs);
-  const double* g = local.gradient;  // of an edge's two nodes; an obstacle's is the opposite of their sum
+  const double* g = local.gradient;
   double work = 0.0;
   for (int k = 0; k < kContactUnknowns; ++k)
     if (dofs[k] >= 0) work += g[k] * change(dofs[k]);
-  return work - dot(shift_of(pair_of(i)), Vec3d{g[0] + g[3], g[1] + g[4], g[2] + g[5]});
+  return pair_of(i).key.b < 0 ? work - dot(shift_of(pair_of(i)), force_on_nodes(pair_of(i), local)) : work;
 }
 
 double Contact::pressing_gain(const VectorX& change) const {
@@ -359,7 +359,12 @@ std::vector<ContactReport> Contact::report(const State& state, const Parameters&
     r.force = -t.energy.first;
     Vec3d x[4];
     end_points(pair, state.q, x);
-    const Vec3d on_a = x[0] + r.s * (x[1] - x[0]);
+    Vec3d on_a = x[0] + r.s * (x[1] - x[0]);
+    if (pair.curve()) {
+      on_a = curve_point(*pair.piece.weights, x, t.points.s);
+      r.key.a = pair.piece.edge[pair.piece.weights->edges > 1 && r.s > 0.0];
+      r.s = pair.piece.weights->along(t.points.s);
+    }
     r.point = on_a - (pair.radius_a + 0.5 * r.gap) * t.normal;
     if (const ContactRecord* record = record_of(pair.key)) {
       r.friction = record->friction;

@@ -38,6 +38,8 @@ double steps_in_swing(double restitution) { return std::clamp(10.0 / std::max(re
 }  // namespace
 
 double Contact::mass_of(const ContactPair& pair) const {
+  if (pair.curve() && pair.piece.weights->edges == 2)
+    return 0.5 * (edge_mass_(pair.piece.edge[0]) + edge_mass_(pair.piece.edge[1]));
   return pair.key.b < 0 ? edge_mass_(pair.key.a) : std::min(edge_mass_(pair.key.a), edge_mass_(pair.key.b));
 }
 
@@ -121,10 +123,15 @@ double Contact::first_approach(const ContactPair& pair) const {
 /// At which surfaces near each other as the step begins.
 double Contact::approach_speed(const ContactPair& pair) const {
   Vec3d x[4], v[4];
-  end_points(pair, state_->q, x);
   end_points(pair, state_->v, v);
   const Vec3d shift = shift_of(pair), moved = (1.0 / duration_) * shift;
-  if (pair.plane()) return std::max(0.0, -dot(x[3], v[pair.key.end] - moved));
+  if (pair.curve()) {
+    const CurveSlopes slopes = curve_slopes(pair.piece, distance_at_start(pair, x));
+    double rate = 0.0;
+    for (int i = 0; i < 3 * pair.piece.weights->nodes; ++i) rate += slopes.distance[i] * (v[i / 3] - moved)[i % 3];
+    return std::max(0.0, -rate);
+  }
+  end_points(pair, state_->q, x);
   if (pair.key.b < 0) {
     x[2] -= shift;
     x[3] -= shift;
@@ -141,10 +148,10 @@ double Contact::approach_speed(const ContactPair& pair) const {
 /// Distance as the step begins, an obstacle that moves being where it was.
 double Contact::start_distance(const ContactPair& pair) const {
   Vec3d x[4];
+  if (pair.curve()) return distance_at_start(pair, x).distance;
   end_points(pair, state_->q, x);
   const Vec3d shift = shift_of(pair);
   x[2] -= shift;
-  if (pair.plane()) return dot(x[3], x[pair.key.end] - x[2]);
   x[3] -= shift;
   return std::sqrt(closest_points(x[0], x[1], x[2], x[3], pair.weight_a, pair.weight_b).square);
 }
@@ -214,15 +221,25 @@ bool Contact::unresolved(double dt) const {
   });
 }
 
-/// Whether surfaces press along the mean direction of the step. On a plane the end's is also the mean one; and in a
-/// midpoint step only rods do, which thereby keep their angular momentum, unless friction is to stay symmetric.
+/// Whether surfaces press along the mean direction of the step. Curves have a mean of their own; and in a midpoint
+/// step only rods do, which thereby keep their angular momentum, unless friction is to stay symmetric.
 bool Contact::turns(const ContactPair& pair) const {
-  if (pressing_ == Pressing::mean_direction) return !pair.plane();
+  if (pair.curve()) return false;
+  if (pressing_ == Pressing::mean_direction) return true;
   return pressing_ == Pressing::mean && pair.key.b >= 0 && (!frictional_ || unsymmetric());
+}
+
+CurveDistance<double> Contact::distance_at_start(const ContactPair& pair, Vec3d (&x)[4]) const {
+  end_points(pair, state_->q, x);
+  return curve_distance(pair.piece, obstacle_of(pair), x, shift_of(pair));
 }
 
 /// What surfaces that press do.
 void Contact::press(const Touching& t, bool with_hessian, ContactLocal& out) const {
+  if (pairs_[at(t.pair)].curve()) {
+    add_curve_pressing(t, with_hessian, out);
+    return;
+  }
   if (!turns(pairs_[at(t.pair)])) {
     add_pressing(t, with_hessian, out);
     return;
@@ -240,20 +257,14 @@ void Contact::add_pressing(const Touching& t, bool with_hessian, ContactLocal& o
   const ContactPair& pair = pairs_[at(t.pair)];
   double w[4], g[12];
   end_weights(t.points.s, t.points.t, w);
-  if (pair.plane()) w[2] = w[3] = 0.0;
   // dD = sum w_i (between / D) . dx_i: |between| differs from D by the weights of closest_points.
-  const Vec3d direction = pair.plane() ? t.normal : (1.0 / t.distance) * t.points.between;
+  const Vec3d direction = (1.0 / t.distance) * t.points.between;
   const double n[3] = {direction.x, direction.y, direction.z};
   for (int i = 0; i < 12; ++i) {
     g[i] = w[i / 3] * n[i % 3];
     out.gradient[i] += t.pressing.first * g[i];
   }
   if (!with_hessian) return;
-  if (pair.plane()) {
-    for (int i = 0; i < 6; ++i)
-      for (int j = 0; j < 6; ++j) out.hessian[i][j] += t.pressing.by_end * g[i] * g[j];
-    return;
-  }
   Vec3d x[4];
   end_points(pair, q1_, x);
   double H[12][12];
@@ -261,6 +272,58 @@ void Contact::add_pressing(const Touching& t, bool with_hessian, ContactLocal& o
   const double turn = geometric_ ? t.pressing.first / t.distance : 0.0;
   for (int i = 0; i < 12; ++i)
     for (int j = 0; j < 12; ++j) out.hessian[i][j] += turn * H[i][j] + (t.pressing.by_end - turn) * g[i] * g[j];
+}
+
+/// Of a smooth curve, along the gradient of D at the end of the step; or, where its force is that of the whole step and
+/// the matrix need not be symmetric, along the gradients at the start and the end in those shares b and 1 - b with
+/// which it does the work f (D1 - D0): where a ring rolls, the points that touch at the end came down onto the surface
+/// within the step, and their force alone would slow it.
+void Contact::add_curve_pressing(const Touching& t, bool with_hessian, ContactLocal& out) const {
+  const ContactPair& pair = pairs_[at(t.pair)];
+  const Obstacle& o = obstacle_of(pair);
+  Vec3d x[4];
+  end_points(pair, q1_, x);
+  const CurveDistance<double> end = curve_distance(pair.piece, o, x);
+  const CurveSlopes slopes = curve_slopes(pair.piece, end);
+  double along[9], hessian[9][9] = {};
+  std::copy(slopes.distance, slopes.distance + 9, along);
+  if (with_hessian && geometric_) add_curve_hessian(pair.piece, o, end, slopes, 1.0, 9, &hessian[0][0]);
+  if (pressing_ == Pressing::mean_direction || (pressing_ == Pressing::mean && unsymmetric()))
+    add_start_direction(pair, x, end.distance, along, hessian);
+  for (int i = 0; i < 9; ++i) {
+    out.gradient[i] += t.pressing.first * along[i];
+    for (int j = 0; j < 9 && with_hessian; ++j)
+      out.hessian[i][j] += t.pressing.first * hessian[i][j] + t.pressing.by_end * along[i] * slopes.distance[j];
+  }
+}
+
+/// From the gradient of D at the end of the step, and its derivative, to the mean of `add_curve_pressing`,
+///   m = (1 - b) g1 + b g0,   b = (D1 - D0 - p1) / (p0 - p1),   p = g . (x1 - x0).
+void Contact::add_start_direction(const ContactPair& pair, const Vec3d (&x1)[4], double distance, double (&along)[9],
+                                  double (&hessian)[9][9]) const {
+  Vec3d x0[4];
+  const CurveDistance<double> start = distance_at_start(pair, x0);
+  const CurveSlopes first = curve_slopes(pair.piece, start);
+  const Vec3d shift = shift_of(pair);
+  double way[9] = {}, turned[9], p0 = 0.0, p1 = 0.0, size = 0.0;
+  for (int i = 0; i < 3 * pair.piece.weights->nodes; ++i) way[i] = (x1[i / 3] - x0[i / 3] - shift)[i % 3];
+  for (int i = 0; i < 9; ++i) {
+    turned[i] = first.distance[i] - along[i];
+    p0 += first.distance[i] * way[i];
+    p1 += along[i] * way[i];
+    size += std::abs(way[i]);
+  }
+  // Where gradients differ by no more than rounding, any shares will do.
+  const bool same = std::abs(p0 - p1) <= 1e-12 * size;
+  const double share = same ? 0.5 : (distance - start.distance - p1) / (p0 - p1), b = std::clamp(share, 0.0, 1.0);
+  const bool fixed = same || share != b || !geometric_;
+  for (int j = 0; j < 9; ++j) {
+    double bent = 0.0;
+    for (int i = 0; i < 9; ++i) bent += way[i] * hessian[i][j];
+    const double change = fixed ? 0.0 : -(bent + b * (turned[j] - bent)) / (p0 - p1);
+    for (int i = 0; i < 9; ++i) hessian[i][j] = (1.0 - b) * hessian[i][j] + turned[i] * change;
+  }
+  for (int i = 0; i < 9; ++i) along[i] += b * turned[i];
 }
 
 /// Where `turns` says so, the force f (see pressing_law.hpp) pushes along the mean of the way d1 between the

@@ -4,8 +4,9 @@
 /// The slip of a step is that of the two material points at the contact, S = J (q1 - q0), without its part along the
 /// normal: what the closest points of the centrelines (and an obstacle) move, and what their edges turn and spin,
 ///   S = sum_i w_i (x_i - x_i^0) + phi_a x r_a - phi_b x r_b,   phi = t x (e - e^0) / |e| + t (theta - theta^0),
-/// with r from the centreline to the surface. The force F on S goes back through the same J, so its work, F . S, is
-/// never negative, whatever the integrator.
+/// with r from the centreline to the surface. Where an obstacle touches a smooth curve (curve.hpp), w_i are its
+/// weights, and phi is that of both edges in the shares 1/2 - s and 1/2 + s. The force F on S goes back through the
+/// same J, so its work, F . S, is never negative, whatever the integrator.
 ///   implicit, lagged: F = mu N tanh(K |S| / (2 dt)) S / |S|, K = 15 / nu [Choi, dissertation, (5.7)-(5.14),
 ///                     there between centrelines]
 ///   anchored:         F = k_t (stick + S), of length mu N at most: an elastic stick that slips [Simo and Hughes 1998]
@@ -23,7 +24,8 @@
 
 namespace withe {
 
-/// Unknowns of a contact: a0, a1, b0, b1 (3 each), angle of a, angle of b.
+/// Unknowns of a contact: a0, a1, b0, b1 (3 each), angle of a, angle of b; of a piece of a curve: its nodes (3 each),
+/// three that are none, the angles of its edges.
 inline constexpr int kContactUnknowns = 14;
 
 /// What stays the same while the unknowns of one contact change.
@@ -66,6 +68,23 @@ template <class Scalar>
 Vec3<Scalar> contact_arm(const ContactPair& pair, int side, const Vec3<Scalar>& normal, const Vec3<Scalar>& between) {
   const double length = arm_length(pair, side);
   return Scalar(side == 0 ? -length : length) * (pair.rod_b < 0 ? normal : between);
+}
+
+/// The same of an edge beside a piece of a curve, whose surface turns by its share in the rotations of both.
+template <class Scalar>
+Vec3<Scalar> piece_arm(const ContactPair& pair, int side, const Scalar& s, const Vec3<Scalar>& normal) {
+  const CurveWeights& w = *pair.piece.weights;
+  return (-pair.radius_a * (w.share[side] + w.share_slope[side] * s)) * normal;
+}
+
+/// From where an obstacle is placed to where it touches a piece of a curve at s [m].
+template <class Scalar>
+Vec3<Scalar> piece_obstacle_arm(const ContactPair& pair, const Obstacle& o, const Vec3<Scalar> (&x)[4],
+                                const Scalar& s) {
+  const Vec3<Scalar> c = curve_point(*pair.piece.weights, x, s);
+  const PointDistance<Scalar> d = distance_to(o, c);
+  return c - Vec3<Scalar>{Scalar(o.point.x), Scalar(o.point.y), Scalar(o.point.z)} -
+         (d.distance - Scalar(pair.radius_b)) * d.normal;
 }
 
 /// tanh(c |S|) / |S| as a function of |S|^2.
@@ -142,6 +161,7 @@ inline ForceLaw force_law(const FrictionSetting& f, double pressing, double squa
 /// One of the edges whose turning makes surfaces slip.
 template <class Scalar>
 struct SlippingEdge {
+  int tail = 0;               ///< its node among those of the contact; its head is the next
   Vec3<Scalar> edge, change;  ///< now, and since the start of the step [m]
   Vec3<Scalar> tangent, arm;
   Vec3<Scalar> turn;    ///< phi
@@ -153,8 +173,9 @@ struct SlippingEdge {
 template <class Scalar>
 struct SlippingSurfaces {
   SlippingEdge<Scalar> sides[2];
-  int bodies = 0;  ///< with an arm
-  Scalar s, t, distance;
+  Vec3<Scalar> node[3];            ///< of a curve
+  int bodies = 0;                  ///< with an arm
+  Scalar s, t, distance;           ///< a curve's t is nothing
   Vec3<Scalar> normal, between{};  ///< of the centrelines; nothing beside a plane
   Scalar inverse = 0.0;            ///< of the length of `between` [1/m]; 0: nothing
   Scalar pressing;                 ///< N
@@ -167,6 +188,18 @@ struct SlippingSurfaces {
   FrictionForce<Scalar> friction;
 };
 
+/// Shares of the ends in how far the surfaces slip by.
+template <class Scalar>
+void set_weights(const ContactPair& pair, SlippingSurfaces<Scalar>& c) {
+  if (!pair.curve()) {
+    end_weights(c.s, c.t, c.w);
+    return;
+  }
+  const CurveWeights& w = *pair.piece.weights;
+  for (int i = 0; i < 3; ++i) c.w[i] = w.middle[i] + c.s * (w.slope[i] + 0.5 * w.bend[i] * c.s);
+  c.w[3] = Scalar(0.0);
+}
+
 /// Where the surfaces touch, and how hard they press.
 template <class Scalar>
 void find_contact(const FrictionSetting& f, const Vec3<Scalar> (&x)[4], SlippingSurfaces<Scalar>& c) {
@@ -175,9 +208,11 @@ void find_contact(const FrictionSetting& f, const Vec3<Scalar> (&x)[4], Slipping
   const ContactPair& pair = *f.pair;
   c.s = f.points.s;
   c.t = f.points.t;
-  if (pair.plane()) {
-    c.normal = lift(f.obstacle->other);
-    c.distance = dot(c.normal, x[pair.key.end] - lift(f.obstacle->point));
+  if (pair.curve()) {
+    const CurveDistance<Scalar> d = curve_distance(pair.piece, *f.obstacle, x);
+    c.s = d.s;
+    c.distance = d.distance;
+    c.normal = distance_to(*f.obstacle, curve_point(*pair.piece.weights, x, c.s)).normal;
   } else {
     const Vec3<Scalar> r = x[0] - x[2], &u = c.sides[0].edge, &v = c.sides[1].edge;
     solve_parameters(r, u, v, pair.weight_a, pair.weight_b, f.points.s_free, f.points.t_free, c.s, c.t);
@@ -187,7 +222,7 @@ void find_contact(const FrictionSetting& f, const Vec3<Scalar> (&x)[4], Slipping
     c.inverse = 1.0 / sqrt(square);
     c.normal = c.inverse * c.between;
   }
-  end_weights(c.s, c.t, c.w);
+  set_weights(pair, c);
   if (!f.slides) {
     c.before = f.before;
     c.law = f.pressing.at(f.before, value_of(c.distance));
@@ -204,16 +239,24 @@ void find_contact(const FrictionSetting& f, const Vec3<Scalar> (&x)[4], Slipping
     c.law = f.pressing.at(c.before, value_of(c.distance));
     c.pressing = chain(c.distance, -c.law.first, -c.law.by_end) + chain(before, 0.0, -c.law.by_start);
   }
-  if (pair.rod_b < 0) c.w[2] = c.w[3] = Scalar(0.0);
+  if (pair.rod_b < 0 && !pair.curve()) c.w[2] = c.w[3] = Scalar(0.0);
 }
+
+/// Whether an edge's turning moves a's surface, or b's against it.
+inline double turn_sign(const FrictionSetting& f, int side) { return side == 0 || f.pair->curve() ? 1.0 : -1.0; }
 
 /// From where an obstacle is placed to where it is touched [m].
 template <class Scalar>
 Vec3<Scalar> obstacle_arm(const FrictionSetting& f, const SlippingSurfaces<Scalar>& c, const Vec3<Scalar> (&x)[4]) {
   const ContactPair& pair = *f.pair;
-  if (!pair.plane()) return c.t * c.sides[1].edge + Scalar(pair.radius_b) * c.normal;
-  const Vec3d& point = f.obstacle->point;
-  return x[pair.key.end] - c.distance * c.normal - Vec3<Scalar>{Scalar(point.x), Scalar(point.y), Scalar(point.z)};
+  if (pair.curve()) return piece_obstacle_arm(pair, *f.obstacle, x, c.s);
+  return c.t * c.sides[1].edge + Scalar(pair.radius_b) * c.normal;
+}
+
+/// Along the rod where it touches.
+template <class Scalar>
+Vec3<Scalar> rod_direction(const FrictionSetting& f, const SlippingSurfaces<Scalar>& c) {
+  return f.pair->curve() ? curve_direction(*f.pair->piece.weights, c.node, c.s) : c.sides[0].edge;
 }
 
 /// Friction of the greater coefficient, as it is along and across the rod.
@@ -221,7 +264,7 @@ template <class Scalar>
 void direct_friction(const FrictionSetting& f, SlippingSurfaces<Scalar>& c) {
   using std::sqrt;
   const ContactPair& pair = *f.pair;
-  const Vec3<Scalar>& e = c.sides[0].edge;
+  const Vec3<Scalar> e = rod_direction(f, c);
   const Vec3<Scalar> t = (1.0 / sqrt(dot(e, e))) * e;
   c.along = t - dot(t, c.normal) * c.normal;
   c.plain = c.friction.force;
@@ -238,26 +281,30 @@ SlippingSurfaces<Scalar> slipping_surfaces(const FrictionSetting& f, const Scala
   const auto lift = [](const Vec3d& v) { return Vec3<Scalar>{Scalar(v.x), Scalar(v.y), Scalar(v.z)}; };
   const Vec3<Scalar> x[4] = {point(0), point(1), point(2), point(3)};
   SlippingSurfaces<Scalar> c;
+  const bool curve = f.pair->curve();
   for (int b = 0; b < 2; ++b) {
-    c.sides[b].edge = x[2 * b + 1] - x[2 * b];
-    c.sides[b].change = c.sides[b].edge - lift(before(2 * b + 1) - before(2 * b));
+    const int tail = curve ? b : 2 * b;
+    c.sides[b].tail = tail;
+    c.sides[b].edge = x[tail + 1] - x[tail];
+    c.sides[b].change = c.sides[b].edge - lift(before(tail + 1) - before(tail));
   }
   find_contact(f, x, c);
+  for (int i = 0; i < 3 && curve; ++i) c.node[i] = x[i];
   c.way = -lift(f.drift);
   for (int i = 0; i < 4; ++i) c.way += c.w[i] * (x[i] - lift(before(i)));
-  c.bodies = f.centreline ? 0 : f.pair->rod_b < 0 ? 1 : 2;
+  c.bodies = f.centreline ? 0 : curve ? f.pair->piece.weights->edges : f.pair->rod_b < 0 ? 1 : 2;
   for (int b = 0; b < c.bodies; ++b) {
     SlippingEdge<Scalar>& side = c.sides[b];
     side.inverse = 1.0 / sqrt(dot(side.edge, side.edge));
     side.tangent = side.inverse * side.edge;
-    side.arm = contact_arm(*f.pair, b, c.normal, c.between);
+    side.arm = curve ? piece_arm(*f.pair, b, c.s, c.normal) : contact_arm(*f.pair, b, c.normal, c.between);
     side.turn = side.inverse * cross(side.tangent, side.change);
     if (f.spatial) {
       side.turn += (unknown[12 + b] - f.start[12 + b]) * side.tangent;
       const Vec3<Scalar> source = lift(f.source[b]);
       side.spin = -((side.inverse / (1.0 + dot(source, side.tangent))) * cross(source, side.tangent));
     }
-    c.way += Scalar(b == 0 ? 1.0 : -1.0) * cross(side.turn, side.arm);
+    c.way += Scalar(turn_sign(f, b)) * cross(side.turn, side.arm);
   }
   if (dot(f.turn, f.turn) > 0.0) c.way = c.way - cross(lift(f.turn), obstacle_arm(f, c, x));
   c.friction = friction_force(f, c.normal, c.way - dot(c.way, c.normal) * c.normal, c.pressing);
@@ -277,15 +324,15 @@ void add_friction_gradient(const FrictionSetting& f, const SlippingSurfaces<Scal
   for (int i = 0; i < 4; ++i) add(i, c.w[i] * c.friction.force);
   for (int b = 0; b < c.bodies; ++b) {
     const SlippingEdge<Scalar>& side = c.sides[b];
-    const Vec3<Scalar> torque = Scalar(b == 0 ? 1.0 : -1.0) * cross(side.arm, c.friction.force);
+    const Vec3<Scalar> torque = Scalar(turn_sign(f, b)) * cross(side.arm, c.friction.force);
     Vec3<Scalar> couple = side.inverse * cross(torque, side.tangent);
     if (f.spatial) {
       const Scalar axial = dot(side.tangent, torque);
       couple += axial * side.spin;
       gradient[12 + b] += axial;
     }
-    add(2 * b + 1, couple);
-    add(2 * b, -couple);
+    add(side.tail + 1, couple);
+    add(side.tail, -couple);
   }
 }
 

@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "contact/friction_curve.hpp"
+
 namespace withe {
 namespace {
 
@@ -37,10 +39,6 @@ void add_start_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& 
 /// Where they touch, and how hard they press: by all but the angles.
 void add_contact_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& c, Slopes& d) {
   const ContactPair& pair = *f.pair;
-  if (pair.plane()) {
-    for (int k = 0; k < 3; ++k) d.pressing[k] = -c.law.by_end * c.normal[k];
-    return;
-  }
   const Vec3d &u = c.sides[0].edge, &v = c.sides[1].edge;
   double K[2][2];
   parameter_inverse(f.points.s_free, f.points.t_free, u, v, pair.weight_a, pair.weight_b, K);
@@ -90,8 +88,7 @@ Vec3d turn_of(const FrictionSetting& f, const SlippingSurfaces<double>& c) {
 
 /// Of `obstacle_arm`.
 Vec3d obstacle_arm_slope(const FrictionSetting& f, const SlippingSurfaces<double>& c, const Slopes& d, int j) {
-  if (!f.pair->plane()) return d.t[j] * c.sides[1].edge + f.pair->radius_b * d.lever[j];
-  return j < 3 ? kAxis[j] - c.normal[j] * c.normal : Vec3d{};
+  return d.t[j] * c.sides[1].edge + f.pair->radius_b * d.lever[j];
 }
 
 /// From the force of the greater coefficient to that of `direct_friction`; the normal of an obstacle turns by `lever`.
@@ -196,6 +193,10 @@ void add_rows(const FrictionSetting& f, const SlippingSurfaces<double>& c, int b
 
 void add_friction_jacobian(const FrictionSetting& f, const SlippingSurfaces<double>& c,
                            double (&jacobian)[kContactUnknowns][kContactUnknowns]) {
+  if (f.pair->curve()) {
+    add_curve_friction_jacobian(f, c, jacobian);
+    return;
+  }
   const bool obstacle = f.pair->rod_b < 0;
   const Vec3d &force = c.friction.force, &lever = obstacle ? c.normal : c.between;
   Slopes d;

@@ -5,6 +5,7 @@
 #include <functional>
 #include <numbers>
 #include <queue>
+#include <tuple>
 #include <utility>
 
 #include "geometry/segment_distance.hpp"
@@ -13,6 +14,17 @@ namespace withe {
 namespace {
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+// The length a of a piece of a curve, over the smaller of an edge's length and the rod's radius. With twelve times the
+// depth to which surfaces press, a tilted piece touches where a pressure that grows with its depth has its middle.
+// which surfaces press.
+constexpr double kLeastBend = 0.12;
+
+double norm(const Vec3d& v) { return std::sqrt(dot(v, v)); }
+
+bool obstacle_order(const ContactKey& a, const ContactKey& b) {
+  return std::tie(b.b, a.a, a.end) < std::tie(a.b, b.a, b.end);
+}
 
 double parallel_weight(double length, double radii) {
   const double size = std::min(length, radii);
@@ -128,46 +140,83 @@ ContactPair Surfaces::pair(int a, int b) const {
 
 void Surfaces::add_obstacles() {
   const ContactDescription& contact = model_.description.contact;
-  std::vector<int> degree(at(model_.node_count), 0);
-  for (int e = 0; e < model_.edge_count; ++e) {
-    ++degree[at(model_.edge_tail[at(e)])];
-    ++degree[at(model_.edge_head[at(e)])];
-  }
   for (std::size_t o = 0; o < contact.obstacles.size(); ++o) {
     const ObstacleDescription& d = contact.obstacles[o];
-    const bool plane = d.kind == ObstacleKind::plane;
     const ObstaclePlace place = obstacle_place(model_, d);
     obstacles_.push_back({d.kind, place.point, place.other, d.radius});
-    const int body = -1 - static_cast<int>(o);
-    for (int e = 0; e < model_.edge_count; ++e) {
-      if (!(radius(e) > 0.0)) continue;
-      ContactPair p;
-      p.key = {e, body, -1};
-      p.rod_a = model_.edge_rod[at(e)];
-      p.radius_a = radius(e);
-      p.radius_b = d.radius;
-      p.tolerance = tolerance(e);
-      const auto row = static_cast<Eigen::Index>(o);
+    ContactPair p;
+    p.key.b = -1 - static_cast<int>(o);
+    p.radius_b = d.radius;
+    const auto row = static_cast<Eigen::Index>(o);
+    for (int rod = 0; rod < static_cast<int>(model_.description.rods.size()); ++rod) {
+      p.rod_a = rod;
       p.set_friction(contact.obstacle_friction(row), contact.obstacle_across.size() > 0
                                                          ? contact.obstacle_across(row)
                                                          : contact.obstacle_friction(row));
-      if (contact.obstacle_restitution.size() > 0)
-        p.restitution = contact.obstacle_restitution(static_cast<Eigen::Index>(o));
-      if (!set_own(p.rod_a, body, p)) continue;
-      if (!plane) {
-        p.weight_a = parallel_weight(model_.edge_length(e), p.radii());
-        p.weight_b = parallel_weight((d.other - d.point).norm(), p.radii());
-        if (p.weight_b == 0.0) p.weight_b = p.weight_a;  // a sphere: any point of its segment is the same
-        obstacle_pairs_.push_back(p);
-        continue;
-      }
-      for (int end = 0; end < 2; ++end) {
-        const int node = (end == 0 ? model_.edge_tail : model_.edge_head)[at(e)];
-        p.key.end = end;
-        p.share = 1.0 / degree[at(node)];
-        obstacle_pairs_.push_back(p);
-      }
+      p.restitution = contact.obstacle_restitution.size() > 0 ? contact.obstacle_restitution(row) : 1.0;
+      p.stiffness = 0.0;
+      if (!set_own(rod, p.key.b, p)) continue;
+      add_edges(p, obstacles_.back());
+      add_pieces(p, obstacles_.back(), rod);
     }
+  }
+  std::sort(obstacle_pairs_.begin(), obstacle_pairs_.end(),
+            [](const ContactPair& a, const ContactPair& b) { return obstacle_order(a.key, b.key); });
+}
+
+const ContactPair& Surfaces::obstacle_pair(const ContactKey& key) const {
+  return *std::lower_bound(obstacle_pairs_.begin(), obstacle_pairs_.end(), key,
+                           [](const ContactPair& pair, const ContactKey& k) { return obstacle_order(pair.key, k); });
+}
+
+/// The distance from a point to a smaller one is no parabola along an edge.
+bool Surfaces::smooth(const Obstacle& obstacle, int edge) const {
+  return radius(edge) > 0.0 &&
+         (obstacle.kind == ObstacleKind::plane || obstacle.radius + radius(edge) >= model_.edge_length(edge));
+}
+
+void Surfaces::add_edges(const ContactPair& prototype, const Obstacle& obstacle) {
+  for (int e = model_.rod_first_edge[at(prototype.rod_a)]; e < model_.rod_first_edge[at(prototype.rod_a + 1)]; ++e) {
+    if (!(radius(e) > 0.0) || smooth(obstacle, e)) continue;
+    ContactPair p = prototype;
+    p.key.a = e;
+    p.radius_a = radius(e);
+    p.tolerance = tolerance(e);
+    p.weight_a = parallel_weight(model_.edge_length(e), p.radii());
+    p.weight_b = parallel_weight(norm(obstacle.other - obstacle.point), p.radii());
+    if (p.weight_b == 0.0) p.weight_b = p.weight_a;  // a sphere: any point of its segment is the same
+    obstacle_pairs_.push_back(p);
+  }
+}
+
+void Surfaces::add_pieces(const ContactPair& prototype, const Obstacle& obstacle, int rod) {
+  const int first = model_.rod_first_edge[at(rod)], end = model_.rod_first_edge[at(rod + 1)];
+  const bool closed = model_.description.rods[at(rod)].closed;
+  const auto add = [&](const CurveWeights& weights, int before, int behind, int which) {
+    ContactPair p = prototype;
+    p.key.a = before;
+    p.key.end = which;
+    p.radius_a = 0.5 * (radius(before) + radius(behind));
+    p.tolerance = std::min(tolerance(before), tolerance(behind));
+    p.piece = {&weights,
+               {model_.edge_tail[at(before)], model_.edge_head[at(before)], -1},
+               {before, -1},
+               kLeastBend * std::min(p.radius_a, model_.edge_length(before))};
+    p.share = before == behind ? 0.5 : 1.0;  // half as long
+    if (before != behind) {
+      p.piece.node[2] = model_.edge_head[at(behind)];
+      p.piece.edge[1] = behind;
+    }
+    obstacle_pairs_.push_back(p);
+  };
+  for (int e = first; e < end; ++e) {
+    if (!smooth(obstacle, e)) continue;
+    const int before = e > first ? e - 1 : closed ? end - 1 : -1, behind = e + 1 < end ? e + 1 : closed ? first : -1;
+    if (before < 0 || !smooth(obstacle, before)) add(kCurveStart, e, e, 0);
+    if (behind < 0 || !smooth(obstacle, behind))
+      add(kCurveEnd, e, e, 1);
+    else
+      add(kCurveInside, e, behind, 1);
   }
 }
 

@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "contact/curve.hpp"
 #include "geometry/vec3.hpp"
 #include "model/state.hpp"
 
@@ -13,12 +14,13 @@ constexpr double kNearest = 0.5;
 
 /// Two surfaces that may touch, and all that does not change while they do.
 struct ContactPair {
-  ContactKey key;
+  ContactKey key;    ///< of a piece of a curve: the edge before its node, or behind the first, and which end of it
+  CurvePiece piece;  ///< of a's curve beside an obstacle that is larger than an edge
   int rod_a = 0, rod_b = -1;          ///< -1: an obstacle
   double radius_a = 0, radius_b = 0;  ///< [m]
   double tolerance = 0;               ///< delta [m]
   double weight_a = 0, weight_b = 0;  ///< of closest_points [m^2]
-  double share = 1;                   ///< of a node's contact with a plane, which its two edges share
+  double share = 1;                   ///< of a contact's stiffness
   double friction = 0;                ///< [-]; the greater one, where it is not the same along and across a rod
   double along = 1, across = 1;       ///< that in these directions of a, over it
   double stiffness = 0;               ///< of its own [N/m]; 0: none
@@ -29,20 +31,13 @@ struct ContactPair {
   double reach() const { return radii() + tolerance; }
   double nearest() const { return kNearest * radii(); }
   double small_radius() const { return rod_b < 0 || radius_a < radius_b ? radius_a : radius_b; }
-  bool plane() const { return key.end >= 0; }
+  bool curve() const { return piece.weights != nullptr; }
   bool isotropic() const { return along == across; }
   void set_friction(double mu_along, double mu_across) {
     friction = mu_along > mu_across ? mu_along : mu_across;
     along = friction > 0.0 ? mu_along / friction : 1.0;
     across = friction > 0.0 ? mu_across / friction : 1.0;
   }
-};
-
-/// An obstacle in the axes of the unknowns (in a plane: its two, and zero).
-struct Obstacle {
-  ObstacleKind kind = ObstacleKind::plane;
-  Vec3d point{}, other{};  ///< of a plane: its normal
-  double radius = 0;
 };
 
 class Surfaces {
@@ -52,8 +47,11 @@ class Surfaces {
   const std::vector<Obstacle>& obstacles() const { return obstacles_; }
   /// Puts obstacles where they are now; how far the farthest of them came [m].
   double place(const std::vector<ObstaclePlace>& places);
-  /// Pairs with obstacles: every edge that has a surface with every obstacle that is not ignored.
+  /// Pairs with obstacles, one after the other: every edge, or piece of a curve, that has a surface, with every
+  /// obstacle that is not ignored.
   const std::vector<ContactPair>& obstacle_pairs() const { return obstacle_pairs_; }
+  /// That of a key.
+  const ContactPair& obstacle_pair(const ContactKey& key) const;
   /// Edges that may touch other edges.
   const std::vector<int>& edges() const { return edges_; }
   double radius(int edge) const { return radius_[static_cast<std::size_t>(edge)]; }
@@ -66,6 +64,11 @@ class Surfaces {
  private:
   void find_neighbours();
   void add_obstacles();
+  /// Pairs of an obstacle with straight edges, and with the pieces of curves between others.
+  void add_edges(const ContactPair& prototype, const Obstacle& obstacle);
+  void add_pieces(const ContactPair& prototype, const Obstacle& obstacle, int rod);
+  /// Whether an obstacle is large enough to be touched by a curve.
+  bool smooth(const Obstacle& obstacle, int edge) const;
   /// Sets what two bodies have of their own; whether they may touch.
   bool set_own(int first, int second, ContactPair& pair) const;
 

@@ -93,6 +93,8 @@ class Contacts:
     ) -> Obstacle:
         """Add a plane through a point; what is behind it, against its normal, is solid.
 
+        It touches the smooth curve of a rod that its nodes stand for, and not their corners.
+
         Parameters
         ----------
         point : array_like of shape (3,) [m]
@@ -122,6 +124,9 @@ class Contacts:
     ) -> Obstacle:
         """Add a solid sphere.
 
+        With a radius of an edge's length and more (its rod's included) it touches the smooth curve of a rod, or its
+        edges where it is smaller.
+
         Parameters
         ----------
         center : array_like of shape (3,) [m]
@@ -150,6 +155,9 @@ class Contacts:
         name: str | None = None,
     ) -> Obstacle:
         """Add a solid cylinder with round ends.
+
+        With a radius of an edge's length and more (its rod's included) it touches the smooth curve of a rod, or its
+        edges where it is smaller.
 
         Parameters
         ----------

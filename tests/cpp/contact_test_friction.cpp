@@ -18,7 +18,10 @@ using testing::RandomNumbers;
 
 constexpr int kN = kContactUnknowns;
 
-enum class Other { rod, plane, sphere, capsule };
+/// The last three are touched by a curve.
+enum class Other { rod, sphere, capsule, beside_plane, beside_sphere, beside_capsule };
+
+bool curved(Other other) { return other >= Other::beside_plane; }
 
 /// A contact somewhere within a step, its frames turned and its surfaces slipped.
 struct Touch {
@@ -35,7 +38,6 @@ Vec3d random_point(RandomNumbers& random, bool planar) {
 /// Edges that are nearly parallel in one case of six, with centrelines that are apart.
 void place(RandomNumbers& random, Other other, bool planar, Touch& c, Vec3d (&x)[4]) {
   c.pair.rod_b = other == Other::rod ? 0 : -1;
-  c.pair.key.end = other == Other::plane ? (random.normal() > 0.0 ? 1 : 0) : -1;
   c.pair.weight_a = 0.01;
   c.pair.weight_b = 0.02;
   do {
@@ -47,16 +49,9 @@ void place(RandomNumbers& random, Other other, bool planar, Touch& c, Vec3d (&x)
 }
 
 /// Makes surfaces thick enough to touch.
-void press(const Vec3d (&x)[4], Touch& c) {
+void press(Touch& c) {
   ContactPair& pair = c.pair;
   double distance = std::sqrt(c.setting.points.square);
-  if (pair.plane()) {
-    c.setting.points = {};
-    c.setting.points.s = pair.key.end;
-    distance = 0.3;
-    c.obstacle.other = (1.0 / std::sqrt(dot(x[3], x[3]))) * x[3];
-    c.obstacle.point = x[pair.key.end] - distance * c.obstacle.other;
-  }
   pair.radius_a = 0.42 * distance;
   pair.radius_b = 0.6 * distance;
   pair.tolerance = 0.1 * distance;
@@ -68,7 +63,8 @@ void slip(RandomNumbers& random, const Vec3d (&x)[4], Touch& c) {
   FrictionSetting& f = c.setting;
   const bool rods = c.pair.rod_b >= 0, planar = !f.spatial;
   for (int i = 0; i < 4; ++i) {
-    const Vec3d start = x[i] + (rods || i < 2 ? 0.1 : 0.0) * random_point(random, planar);
+    const bool moves = c.pair.curve() ? i < c.pair.piece.weights->nodes : rods || i < 2;
+    const Vec3d start = x[i] + (moves ? 0.1 : 0.0) * random_point(random, planar);
     const double now[3] = {x[i].x, x[i].y, x[i].z}, before[3] = {start.x, start.y, start.z};
     std::copy(now, now + 3, c.now + 3 * i);
     std::copy(before, before + 3, f.start + 3 * i);
@@ -86,11 +82,39 @@ void slip(RandomNumbers& random, const Vec3d (&x)[4], Touch& c) {
   }
 }
 
+/// A piece of a curve that bends beside an obstacle, its radius about as great as the distance.
+void place_piece(RandomNumbers& random, Other other, bool planar, Touch& c, Vec3d (&x)[4]) {
+  const CurveWeights* weights[] = {&kCurveInside, &kCurveInside, &kCurveStart, &kCurveEnd};
+  c.pair.piece.weights = weights[static_cast<int>(4.0 * std::abs(random.normal())) % 4];
+  c.pair.piece.least_bend = 0.05;
+  const double bent = random.normal();
+  for (int i = 0; i < 4; ++i) {
+    x[i] = Vec3d{i - 1.0, 1.0 + 0.2 * bent * (i - 1) * (i - 1), 0.0} + 0.1 * random_point(random, planar);
+    if (i >= c.pair.piece.weights->nodes) x[i] = Vec3d{};
+  }
+  c.obstacle.radius = 3.0;
+  if (other == Other::beside_plane) {
+    c.obstacle.other = (1.0 / std::sqrt(1.01)) * Vec3d{0.1, 1.0, 0.0};
+    c.setting.points.square = 1.0;
+    return;
+  }
+  c.obstacle.kind = ObstacleKind::capsule;
+  c.obstacle.point = Vec3d{0.0, -2.0, 0.0} + 0.3 * random_point(random, planar);
+  c.obstacle.other = c.obstacle.point;
+  if (other == Other::beside_capsule) c.obstacle.other += random_point(random, planar);
+  c.setting.points.square = 1.0;
+}
+
 void random_touch(RandomNumbers& random, Other other, FrictionLaw law, bool planar, Touch& c) {
   FrictionSetting& f = c.setting;
   Vec3d x[4];
-  place(random, other, planar, c, x);
-  press(x, c);
+  if (curved(other))
+    place_piece(random, other, planar, c, x);
+  else
+    place(random, other, planar, c, x);
+  press(c);
+  // How near it is says whether it presses.
+  if (curved(other)) c.pair.radius_a = 0.3 + curve_distance(c.pair.piece, c.obstacle, x).distance - c.pair.radius_b;
   f.pair = &c.pair;
   f.obstacle = other == Other::rod ? nullptr : &c.obstacle;
   f.law = law;
@@ -106,6 +130,12 @@ std::string class_of(const Touch& c, const FrictionForce<double>& friction) {
   const FrictionSetting& f = c.setting;
   std::string name = f.law == FrictionLaw::implicit ? "implicit" : friction.sticking ? "sticking" : "slipping";
   name += f.centreline ? ", centreline" : "";
+  if (f.pair->curve()) {
+    const Vec3d x[3] = {{c.now[0], c.now[1], c.now[2]}, {c.now[3], c.now[4], c.now[5]}, {c.now[6], c.now[7], c.now[8]}};
+    const CurveDistance<double> d = curve_distance(f.pair->piece, c.obstacle, x);
+    name += d.free ? ", s free" : "";
+    return name + (f.pair->piece.weights == &kCurveInside ? ", inside" : ", at an end");
+  }
   name += f.points.s_free ? ", s free" : "";
   return name + (f.points.t_free ? ", t free" : "");
 }
@@ -140,7 +170,11 @@ std::size_t compare(Other other, FrictionLaw law, bool planar) {
     Touch c;
     random_touch(random, other, law, planar, c);
     Matrix expected = by_dual_numbers(c);
-    if (other != Other::rod) {  // an obstacle has no unknowns
+    if (c.pair.curve()) {  // nodes that are not there
+      for (int i = 0; i < kN; ++i)
+        if (i < 12 ? i >= 3 * c.pair.piece.weights->nodes : i - 12 >= c.pair.piece.weights->edges)
+          expected.col(i).setZero();
+    } else if (other != Other::rod) {  // an obstacle has no unknowns
       expected.middleCols<6>(6).setZero();
       expected.col(13).setZero();
     }
@@ -208,9 +242,14 @@ INSTANTIATE_TEST_SUITE_P(InSpaceAndInAPlane, FrictionJacobian, ::testing::Bool()
 TEST_P(FrictionJacobian, OfTwoRodsIsThatOfDualNumbers) { expect_dual_numbers(Other::rod, GetParam(), 4); }
 
 TEST_P(FrictionJacobian, OfAnObstacleIsThatOfDualNumbers) {
-  expect_dual_numbers(Other::plane, GetParam(), 1);
   expect_dual_numbers(Other::sphere, GetParam(), 2);
   expect_dual_numbers(Other::capsule, GetParam(), 4);
+}
+
+TEST_P(FrictionJacobian, OfACurveBesideAnObstacleIsThatOfDualNumbers) {
+  expect_dual_numbers(Other::beside_plane, GetParam(), 4);
+  expect_dual_numbers(Other::beside_sphere, GetParam(), 4);
+  expect_dual_numbers(Other::beside_capsule, GetParam(), 4);
 }
 
 }  // namespace

@@ -1,0 +1,142 @@
+#pragma once
+/// Contact of an obstacle with the smooth curve of a rod, in pieces, one about each node.
+///
+/// About an inner node 1 between nodes 0 and 2, and between the middles of both its edges, the curve is
+///   c(s) = m + s u + (s^2 / 2) k,   s in [-1/2, 1/2],
+///   m = x1 + k / 24,   u = (x2 - x0) / 2,   k = x0 - 2 x1 + x2.
+/// It is the quadratic B-spline of the nodes (m = x1 + k / 8), which has the edges as tangents at their middles, so
+/// that directions are continuous from piece to piece; moved by k / 12, since an arc whose length is that of its edges
+/// lies between the nodes and the middles of the edges, 1/24 and 1/12 of k from them. On an evenly bent rod it is that
+/// arc up to the fourth power of an edge's length. Beside the last node of a rod it is half an edge, straight, s = 0
+/// there.
+///
+/// The distance delta of an obstacle from c is taken at both ends of a piece and in its middle, and by the parabola
+/// through these elsewhere, g0 + g1 s + g2 s^2 / 2; the piece is as near as
+///   D = min over s of g0 + g1 s + (s^2 / 2) phi(g2),   phi(g) = (g + sqrt(g^2 + 4 a^2)) / 2,
+/// where phi, with a small length a, keeps the place s from jumping between both ends of a piece that lies along the
+/// obstacle. D and its gradient are continuous. All distances are in m.
+
+#include "contact/obstacle.hpp"
+
+namespace withe {
+
+/// The linear maps of a piece: c(s) = sum_i (middle_i + slope_i s + bend_i s^2 / 2) x_i, s in [low, low + 1].
+struct CurveWeights {
+  int nodes, edges;
+  double middle[3], slope[3], bend[3];
+  double share[2], share_slope[2];  ///< of each edge's rotation in that at s
+  double low;
+  double value_by[3], slope_by[3];  ///< g0 and g1 of the three distances; g2 is 4 (1, -2, 1) of them
+
+  double high() const { return low + 1.0; }
+  double sample(int j) const { return low + 0.5 * j; }
+  /// How far along its edge s is.
+  double along(double s) const { return edges > 1 ? (s > 0.0 ? s : 1.0 + s) : middle[1] + s * slope[1]; }
+  double at(int node, double s) const { return middle[node] + s * (slope[node] + 0.5 * s * bend[node]); }
+};
+inline constexpr double kBendBy[3] = {4.0, -8.0, 4.0};
+inline constexpr CurveWeights kCurveInside{.nodes = 3,
+                                           .edges = 2,
+                                           .middle = {1.0 / 24.0, 22.0 / 24.0, 1.0 / 24.0},
+                                           .slope = {-0.5, 0.0, 0.5},
+                                           .bend = {1.0, -2.0, 1.0},
+                                           .share = {0.5, 0.5},
+                                           .share_slope = {-1.0, 1.0},
+                                           .low = -0.5,
+                                           .value_by = {0.0, 1.0, 0.0},
+                                           .slope_by = {-1.0, 0.0, 1.0}};
+inline constexpr CurveWeights kCurveStart{.nodes = 2,
+                                          .edges = 1,
+                                          .middle = {1.0, 0.0, 0.0},
+                                          .slope = {-0.5, 0.5, 0.0},
+                                          .bend = {},
+                                          .share = {1.0, 0.0},
+                                          .share_slope = {},
+                                          .low = 0.0,
+                                          .value_by = {1.0, 0.0, 0.0},
+                                          .slope_by = {-3.0, 4.0, -1.0}};
+inline constexpr CurveWeights kCurveEnd{.nodes = 2,
+                                        .edges = 1,
+                                        .middle = {0.0, 1.0, 0.0},
+                                        .slope = {-0.5, 0.5, 0.0},
+                                        .bend = {},
+                                        .share = {1.0, 0.0},
+                                        .share_slope = {},
+                                        .low = -1.0,
+                                        .value_by = {0.0, 0.0, 1.0},
+                                        .slope_by = {1.0, -4.0, 3.0}};
+
+/// One piece; its second node and edge are those that follow along the rod.
+struct CurvePiece {
+  const CurveWeights* weights = nullptr;  ///< nothing: a straight edge in place of a curve
+  int node[3] = {-1, -1, -1}, edge[2] = {-1, -1};
+  double least_bend = 0;  ///< a
+};
+
+template <class Scalar>
+struct CurveDistance {
+  PointDistance<Scalar> sample[3];
+  Scalar slope, bend, stiff, s, distance;  ///< g1, g2, phi, where, and how near
+  bool free = false;                       ///< s is not at an end
+
+  /// phi' and phi''
+  double bend_share() const { return value_of(stiff) / root(); }
+  double bend_change(double a) const { return 2.0 * a * a / (root() * root() * root()); }
+
+ private:
+  double root() const { return 2.0 * value_of(stiff) - value_of(bend); }
+};
+
+template <class Scalar>
+Vec3<Scalar> curve_point(const CurveWeights& w, const Vec3<Scalar>* x, const Scalar& s) {
+  Vec3<Scalar> c{Scalar(0.0), Scalar(0.0), Scalar(0.0)};
+  for (int i = 0; i < w.nodes; ++i) {
+    const Scalar weight = w.middle[i] + s * (w.slope[i] + 0.5 * w.bend[i] * s);
+    c += weight * x[i];
+  }
+  return c;
+}
+
+/// c'(s)
+template <class Scalar>
+Vec3<Scalar> curve_direction(const CurveWeights& w, const Vec3<Scalar>* x, const Scalar& s) {
+  Vec3<Scalar> u{Scalar(0.0), Scalar(0.0), Scalar(0.0)};
+  for (int i = 0; i < w.nodes; ++i) u += (w.slope[i] + w.bend[i] * s) * x[i];
+  return u;
+}
+
+/// How near a piece with nodes x comes to an obstacle, or to where it was before its `drift`.
+template <class Scalar>
+CurveDistance<Scalar> curve_distance(const CurvePiece& piece, const Obstacle& o, const Vec3<Scalar>* x,
+                                     const Vec3d& drift = {}) {
+  using std::sqrt;
+  const CurveWeights& w = *piece.weights;
+  CurveDistance<Scalar> d;
+  Scalar value = 0.0;
+  d.slope = d.bend = Scalar(0.0);
+  for (int j = 0; j < 3; ++j) {
+    d.sample[j] = distance_to(o, curve_point(w, x, Scalar(w.sample(j))), drift);
+    value += w.value_by[j] * d.sample[j].distance;
+    d.slope += w.slope_by[j] * d.sample[j].distance;
+    d.bend += kBendBy[j] * d.sample[j].distance;
+  }
+  d.stiff = 0.5 * (d.bend + sqrt(d.bend * d.bend + 4.0 * piece.least_bend * piece.least_bend));
+  d.s = -d.slope / d.stiff;
+  const double s = value_of(d.s);
+  d.free = s > w.low && s < w.high();
+  if (!d.free) d.s = Scalar(s > w.low ? w.high() : w.low);
+  d.distance = value + d.s * (d.slope + 0.5 * d.stiff * d.s);
+  return d;
+}
+
+/// Derivatives by the nodes: of D, of g1 and g2, and of s.
+struct CurveSlopes {
+  double distance[9], slope[9], bend[9], s[9];
+};
+CurveSlopes curve_slopes(const CurvePiece& piece, const CurveDistance<double>& d);
+
+/// Adds `factor` times the second derivative of D to `hessian`, a square of rows `stride` long.
+void add_curve_hessian(const CurvePiece& piece, const Obstacle& o, const CurveDistance<double>& d,
+                       const CurveSlopes& slopes, double factor, int stride, double* hessian);
+
+}  // namespace withe

@@ -1,0 +1,180 @@
+#include "contact/friction_curve.hpp"
+
+#include <cmath>
+
+namespace withe {
+namespace {
+
+// Unknowns that move a contact: three nodes, and both angles.
+constexpr int kAngle = 9, kWays = 11;
+
+constexpr Vec3d kAxis[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+
+int unknown_of(int way) { return way < kAngle ? way : way + 3; }
+
+/// Derivatives by them.
+struct Slopes {
+  double s[kWays] = {}, pressing[kWays] = {};
+  Vec3d normal[kWays] = {}, turn[kWays] = {};  ///< n, omega
+  Vec3d force[kWays], moment[kWays];           ///< F, F x n
+};
+
+struct Curve {
+  const CurveWeights& w;
+  double s, weight[3], weight_slope[3];  ///< w_i, w_i'
+  double lever[2] = {};                  ///< r m_b
+};
+
+Curve curve_of(const FrictionSetting& f, const SlippingSurfaces<double>& c) {
+  Curve out{.w = *f.pair->piece.weights, .s = c.s, .weight = {}, .weight_slope = {}};
+  for (int i = 0; i < 3; ++i) {
+    out.weight[i] = out.w.at(i, c.s);
+    out.weight_slope[i] = out.w.slope[i] + out.w.bend[i] * c.s;
+  }
+  for (int b = 0; b < c.bodies; ++b) out.lever[b] = f.pair->radius_a * (out.w.share[b] + out.w.share_slope[b] * c.s);
+  return out;
+}
+
+/// Where it touches, how hard, and along which normal.
+void add_contact_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& c, const Curve& curve,
+                        const Vec3d (&x)[3], Slopes& d) {
+  const CurveDistance<double> distance = curve_distance(f.pair->piece, *f.obstacle, x);
+  const CurveSlopes slopes = curve_slopes(f.pair->piece, distance);
+  const PointDistance<double> point = distance_to(*f.obstacle, curve_point(curve.w, x, c.s));
+  const Vec3d tangent = curve_direction(curve.w, x, c.s);
+  for (int j = 0; j < kAngle; ++j) {
+    d.s[j] = slopes.s[j];
+    d.pressing[j] = -c.law.by_end * slopes.distance[j];
+    d.normal[j] = normal_change(*f.obstacle, point, curve.weight[j / 3] * kAxis[j % 3] + d.s[j] * tangent);
+  }
+}
+
+void add_turn_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& c, const Curve& curve, Slopes& d) {
+  for (int b = 0; b < c.bodies; ++b) {
+    const SlippingEdge<double>& side = c.sides[b];
+    const double rho = curve.lever[b], inverse = side.inverse, angle = dot(side.turn, side.tangent);
+    const Vec3d start = side.edge - side.change, bend = side.turn - angle * side.tangent;
+    for (int k = 0; k < 3; ++k) {
+      const double along = side.tangent[k];
+      const Vec3d turned = (rho * inverse) * (inverse * cross(start, kAxis[k]) - (2.0 * along) * bend +
+                                              angle * (kAxis[k] - along * side.tangent));
+      d.turn[3 * side.tail + 3 + k] += turned;
+      d.turn[3 * side.tail + k] -= turned;
+    }
+    if (f.spatial) d.turn[kAngle + b] = rho * side.tangent;
+    for (int j = 0; j < kAngle; ++j) d.turn[j] += (f.pair->radius_a * curve.w.share_slope[b] * d.s[j]) * side.turn;
+  }
+}
+
+/// Of `piece_obstacle_arm`, a - (delta - r) n with a = c(s): da - (n . da) n - (delta - r) dn.
+Vec3d obstacle_arm_slope(const FrictionSetting& f, const Curve& curve, const Vec3d (&x)[3], const Slopes& d, int j) {
+  const PointDistance<double> point = distance_to(*f.obstacle, curve_point(curve.w, x, curve.s));
+  Vec3d moved = d.s[j] * curve_direction(curve.w, x, curve.s);
+  if (j < kAngle) moved += curve.weight[j / 3] * kAxis[j % 3];
+  return moved - dot(point.normal, moved) * point.normal - (point.distance - f.pair->radius_b) * d.normal[j];
+}
+
+void add_force_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& c, const Curve& curve,
+                      const Vec3d (&x)[3], Slopes& d) {
+  const Vec3d &n = c.normal, way = whole_way(f, c);
+  const double off = dot(way, n);
+  const Vec3d slip = way - off * n;
+  const ForceLaw g = force_law(f, c.pressing, dot(slip, slip), c.friction.sticking);
+  const Vec3d reckoned = g.reckoned(slip, f.foreseen, f.pair->friction * c.pressing);
+  const bool turns = dot(f.turn, f.turn) > 0.0;
+  Vec3d turn{}, moved_on{};
+  for (int b = 0; b < c.bodies; ++b) turn += curve.lever[b] * c.sides[b].turn;
+  for (int i = 0; i < curve.w.nodes; ++i)
+    moved_on += curve.weight_slope[i] * (x[i] - Vec3d{f.start[3 * i], f.start[3 * i + 1], f.start[3 * i + 2]});
+  for (int j = 0; j < kWays; ++j) {
+    const Vec3d& across = d.normal[j];
+    Vec3d moved = d.s[j] * moved_on + cross(n, d.turn[j]) - cross(turn, across);
+    if (j < kAngle) moved += curve.weight[j / 3] * kAxis[j % 3];
+    if (turns) moved -= cross(f.turn, obstacle_arm_slope(f, curve, x, d, j));
+    d.force[j] = g.factor * (moved - off * across) - (g.factor * (dot(n, moved) + dot(slip, across))) * n +
+                 (2.0 * g.by_square * dot(slip, moved - off * across)) * reckoned +
+                 (g.by_pressing * d.pressing[j]) * slip;
+  }
+}
+
+/// From the force of the greater coefficient to that of `direct_friction`.
+void direct_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& c, const Curve& curve, const Vec3d (&x)[3],
+                   Slopes& d) {
+  const double across = f.pair->across, more = f.pair->along - across, share = dot(c.along, c.plain);
+  const Vec3d e = rod_direction(f, c), &n = c.normal;
+  const double inverse = 1.0 / std::sqrt(dot(e, e));
+  const Vec3d t = inverse * e;
+  Vec3d bend{};
+  for (int i = 0; i < curve.w.nodes; ++i) bend += curve.w.bend[i] * x[i];
+  for (int j = 0; j < kWays; ++j) {
+    Vec3d change = d.s[j] * bend;
+    if (j < kAngle) change += curve.weight_slope[j / 3] * kAxis[j % 3];
+    const Vec3d turned = inverse * (change - dot(t, change) * t), &leant = d.normal[j];
+    const Vec3d along = turned - (dot(turned, n) + dot(t, leant)) * n - dot(t, n) * leant;
+    d.force[j] = across * d.force[j] + (more * (dot(along, c.plain) + dot(c.along, d.force[j]))) * c.along +
+                 (more * share) * along;
+  }
+}
+
+/// What the moment m = F x n does to an edge, r m_b (m x t / |e| + (t . m) spin), and to its angle.
+void add_couples(const FrictionSetting& f, const SlippingSurfaces<double>& c, const Curve& curve, int b,
+                 const Slopes& d, double (&jacobian)[kContactUnknowns][kContactUnknowns]) {
+  const SlippingEdge<double>& side = c.sides[b];
+  const Vec3d &t = side.tangent, m = cross(c.friction.force, c.normal);
+  const double rho = curve.lever[b], inverse = side.inverse, along = dot(t, m);
+  const double grown = f.pair->radius_a * curve.w.share_slope[b];
+  Vec3d couple[kWays];
+  double axial[kWays];
+  for (int j = 0; j < kWays; ++j) {
+    const Vec3d moment = rho * d.moment[j] + (grown * d.s[j]) * m;
+    axial[j] = f.spatial ? dot(t, moment) : 0.0;
+    couple[j] = inverse * cross(moment, t) + axial[j] * side.spin;
+  }
+  // By the edge itself; see add_couple_slopes of friction_jacobian.cpp.
+  const Vec3d& source = f.source[b];
+  const double facing = f.spatial ? dot(source, t) : 0.0, share = inverse / (1.0 + facing);
+  const Vec3d bend = inverse * cross(m, t), mean = (2.0 + facing) * t + source;
+  for (int k = 0; k < 3; ++k) {
+    Vec3d own = (rho * inverse) * (inverse * cross(m, kAxis[k]) - (2.0 * t[k]) * bend);
+    const double lean = inverse * (m[k] - along * t[k]);
+    if (f.spatial)
+      own += (rho * (lean - along * share * mean[k])) * side.spin -
+             (rho * along * share * inverse) * cross(source, kAxis[k]);
+    const int head = 3 * side.tail + 3 + k, tail = 3 * side.tail + k;
+    couple[head] += own;
+    couple[tail] -= own;
+    if (!f.spatial) continue;
+    axial[head] += rho * lean;
+    axial[tail] -= rho * lean;
+  }
+  for (int j = 0; j < kWays; ++j) {
+    for (int k = 0; k < 3; ++k) {
+      jacobian[3 * side.tail + 3 + k][unknown_of(j)] += couple[j][k];
+      jacobian[3 * side.tail + k][unknown_of(j)] -= couple[j][k];
+    }
+    if (f.spatial) jacobian[12 + b][unknown_of(j)] += axial[j];
+  }
+}
+
+}  // namespace
+
+void add_curve_friction_jacobian(const FrictionSetting& f, const SlippingSurfaces<double>& c,
+                                 double (&jacobian)[kContactUnknowns][kContactUnknowns]) {
+  const Vec3d x[3] = {c.node[0], c.node[1], c.node[2]};
+  const Curve curve = curve_of(f, c);
+  Slopes d;
+  add_contact_slopes(f, c, curve, x, d);
+  add_turn_slopes(f, c, curve, d);
+  add_force_slopes(f, c, curve, x, d);
+  if (!f.pair->isotropic()) direct_slopes(f, c, curve, x, d);
+  for (int j = 0; j < kWays; ++j)
+    d.moment[j] = cross(d.force[j], c.normal) + cross(c.friction.force, d.normal[j]);
+  for (int i = 0; i < curve.w.nodes; ++i)
+    for (int j = 0; j < kWays; ++j) {
+      const Vec3d force = curve.weight[i] * d.force[j] + (curve.weight_slope[i] * d.s[j]) * c.friction.force;
+      for (int k = 0; k < 3; ++k) jacobian[3 * i + k][unknown_of(j)] += force[k];
+    }
+  for (int b = 0; b < c.bodies; ++b) add_couples(f, c, curve, b, d, jacobian);
+}
+
+}  // namespace withe

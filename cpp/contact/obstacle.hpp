@@ -1,0 +1,63 @@
+#pragma once
+/// Obstacles, and how far points are from them.
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/dual.hpp"
+#include "geometry/vec3.hpp"
+#include "model/model.hpp"
+
+namespace withe {
+
+/// An obstacle in the axes of the unknowns (in a plane: its two, and zero).
+struct Obstacle {
+  ObstacleKind kind = ObstacleKind::plane;
+  Vec3d point{}, other{};  ///< of a plane: its normal
+  double radius = 0;
+};
+
+/// A point beside an obstacle.
+template <class Scalar>
+struct PointDistance {
+  Scalar distance;      ///< from a plane, or from the middle of a sphere or the axis of a capsule [m]
+  Vec3<Scalar> normal;  ///< its gradient
+  bool beside = false;  ///< a capsule's axis, between its ends
+};
+
+/// `drift`: the obstacle is taken back by so much.
+template <class Scalar>
+PointDistance<Scalar> distance_to(const Obstacle& o, const Vec3<Scalar>& x, const Vec3d& drift = {}) {
+  using std::sqrt;
+  const auto lift = [](const Vec3d& v) { return Vec3<Scalar>{Scalar(v.x), Scalar(v.y), Scalar(v.z)}; };
+  PointDistance<Scalar> out;
+  Vec3<Scalar> way = x - lift(o.point - drift);
+  if (o.kind == ObstacleKind::plane) {
+    out.normal = lift(o.other);
+    out.distance = dot(out.normal, way);
+    return out;
+  }
+  const Vec3d axis = o.other - o.point;
+  const double square = dot(axis, axis);
+  if (square > 1e-18 * o.radius * o.radius) {
+    const Scalar t = (1.0 / square) * dot(way, lift(axis));
+    out.beside = value_of(t) > 0.0 && value_of(t) < 1.0;
+    way = way - (out.beside ? t : Scalar(std::clamp(value_of(t), 0.0, 1.0))) * lift(axis);
+  }
+  out.distance = sqrt(dot(way, way));
+  out.normal = (1.0 / (out.distance + 1e-300)) * way;
+  return out;
+}
+
+/// How the normal turns as the point moves by `change`: the second derivative of the distance, times it.
+inline Vec3d normal_change(const Obstacle& o, const PointDistance<double>& p, const Vec3d& change) {
+  if (o.kind == ObstacleKind::plane) return {};
+  Vec3d across = change - dot(p.normal, change) * p.normal;
+  if (p.beside) {
+    const Vec3d axis = o.other - o.point;
+    across -= (dot(axis, across) / dot(axis, axis)) * axis;
+  }
+  return (1.0 / std::max(p.distance, 1e-300)) * across;
+}
+
+}  // namespace withe

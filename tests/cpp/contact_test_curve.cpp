@@ -1,0 +1,126 @@
+// Distance of an obstacle from the smooth curve of a rod: derivatives, continuity along the curve, and how near it is
+// to the arc that its nodes stand for.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "contact/curve.hpp"
+#include "scenes.hpp"
+
+namespace withe {
+namespace {
+
+using testing::RandomNumbers;
+
+Vec3d random_point(RandomNumbers& random) { return {random.normal(), random.normal(), random.normal()}; }
+
+Obstacle random_obstacle(RandomNumbers& random, int kind) {
+  Obstacle o;
+  o.radius = 2.0;
+  if (kind == 0) {
+    const Vec3d n = Vec3d{0.0, 0.0, 1.0} + 0.3 * random_point(random);
+    o.other = (1.0 / std::sqrt(dot(n, n))) * n;
+    return o;
+  }
+  o.kind = ObstacleKind::capsule;
+  o.point = Vec3d{0.0, 0.0, -2.0} + 0.3 * random_point(random);
+  o.other = kind == 1 ? o.point : o.point + random_point(random);
+  return o;
+}
+
+/// Straight, bent to and from the obstacle.
+void random_nodes(RandomNumbers& random, Vec3d (&x)[3]) {
+  const double bent = 0.3 * random.normal();
+  for (int i = 0; i < 3; ++i) x[i] = Vec3d{i - 1.0, 0.0, 0.2 + bent * (i - 1) * (i - 1)} + 0.05 * random_point(random);
+}
+
+TEST(CurveDistance, DerivativesAreThoseOfTheDistance) {
+  RandomNumbers random(3);
+  const CurveWeights* weights[] = {&kCurveInside, &kCurveStart, &kCurveEnd};
+  int free = 0;
+  for (int k = 0; k < 300; ++k) {
+    const CurvePiece piece{.weights = weights[k % 3], .least_bend = 0.02};
+    const Obstacle o = random_obstacle(random, k / 3 % 3);
+    Vec3d x[3];
+    random_nodes(random, x);
+    const auto distance = [&](const double (&q)[9]) {
+      Vec3d p[3];
+      for (int i = 0; i < 3; ++i) p[i] = {q[3 * i], q[3 * i + 1], q[3 * i + 2]};
+      return curve_distance(piece, o, p);
+    };
+    double q[9];
+    for (int i = 0; i < 9; ++i) q[i] = x[i / 3][i % 3];
+    const CurveDistance<double> d = distance(q);
+    const CurveSlopes slopes = curve_slopes(piece, d);
+    free += d.free;
+    double hessian[9][9] = {};
+    add_curve_hessian(piece, o, d, slopes, 1.0, 9, &hessian[0][0]);
+    const double h = 1e-6;
+    for (int j = 0; j < 9; ++j) {
+      double up[9], down[9];
+      std::copy(q, q + 9, up);
+      std::copy(q, q + 9, down);
+      up[j] += h;
+      down[j] -= h;
+      const CurveDistance<double> above = distance(up), below = distance(down);
+      EXPECT_NEAR(slopes.distance[j], (above.distance - below.distance) / (2.0 * h), 1e-7) << k;
+      if (above.free != below.free) continue;
+      EXPECT_NEAR(slopes.s[j], (above.s - below.s) / (2.0 * h), 1e-6 * (1.0 + std::abs(slopes.s[j]))) << k;
+      const CurveSlopes high = curve_slopes(piece, above), low = curve_slopes(piece, below);
+      for (int i = 0; i < 9; ++i)
+        EXPECT_NEAR(hessian[i][j], (high.distance[i] - low.distance[i]) / (2.0 * h),
+                    1e-6 * (1.0 + std::abs(hessian[i][j])))
+            << k;
+    }
+  }
+  EXPECT_GT(free, 50);
+  EXPECT_LT(free, 250);
+}
+
+TEST(CurveDistance, GoesOnSmoothlyFromPieceToPieceOfAnEvenlyBentRod) {
+  const double turn = 0.3;
+  Vec3d x[4];
+  for (int i = 0; i < 4; ++i) x[i] = {std::sin(turn * i), 0.0, std::cos(turn * i)};
+  const Vec3d a = curve_point(kCurveInside, x, 0.5), b = curve_point(kCurveInside, x + 1, -0.5);
+  EXPECT_NEAR(dot(a, a), dot(b, b), 1e-15);
+  EXPECT_LT(std::sqrt(dot(a - b, a - b)), 0.1 * turn * turn * turn);
+  Vec3d first{}, second{};
+  for (int i = 0; i < 3; ++i) {
+    first += (kCurveInside.slope[i] + 0.5 * kCurveInside.bend[i]) * x[i];
+    second += (kCurveInside.slope[i] - 0.5 * kCurveInside.bend[i]) * x[i + 1];
+  }
+  for (int k = 0; k < 3; ++k) EXPECT_NEAR(first[k], second[k], 1e-15);  // both that of the edge between
+}
+
+TEST(CurveDistance, OfAnArcDrawnByItsLengthConvergesWithTheFourthPowerOfAnEdge) {
+  double last = 0.0;
+  for (int n : {8, 16, 32, 64}) {
+    const double turn = 2.0 * std::numbers::pi / n, radius = 0.5 * turn / std::sin(0.5 * turn);  // of edges as long as
+    Vec3d x[3];                                                                                  // the arc of a circle
+    for (int i = 0; i < 3; ++i) x[i] = {radius * std::sin(turn * (i - 1)), 0.0, radius * std::cos(turn * (i - 1))};
+    double worst = 0.0;
+    for (double s : {-0.5, -0.3, 0.0, 0.2, 0.5}) {
+      const Vec3d c = curve_point(kCurveInside, x, s);
+      worst = std::max(worst, std::abs(std::sqrt(dot(c, c)) - 1.0));
+    }
+    if (last > 0.0) EXPECT_GT(std::log2(last / worst), 3.9);
+    last = worst;
+  }
+  EXPECT_LT(last, 2e-6);
+}
+
+TEST(CurveDistance, IsThatOfAStraightRodFromAPlane) {
+  const Vec3d x[3] = {{-1.0, 0.0, 0.3}, {0.0, 0.0, 0.3}, {1.0, 0.0, 0.3}};
+  const Obstacle floor{.other = {0.0, 0.0, 1.0}};
+  for (const CurveWeights* weights : {&kCurveInside, &kCurveStart, &kCurveEnd}) {
+    const CurvePiece piece{.weights = weights, .least_bend = 1e-3};
+    const CurveDistance<double> d = curve_distance(piece, floor, x);
+    EXPECT_NEAR(d.distance, 0.3, 1e-15);
+    EXPECT_NEAR(d.s, 0.0, 1e-12);  // and presses about its middle
+  }
+}
+
+}  // namespace
+}  // namespace withe
