@@ -15,9 +15,8 @@ namespace {
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
-// The length a of a piece of a curve, over the smaller of an edge's length and the rod's radius. With twelve times the
-// depth to which surfaces press, a tilted piece touches where a pressure that grows with its depth has its middle.
-// which surfaces press.
+// The length a of a piece of a curve, over the smaller of an edge's length and the rod's radius: twelve times the depth
+// to which surfaces press, so that a tilted piece touches where a pressure that grows with its depth has its middle.
 constexpr double kLeastBend = 0.12;
 
 double norm(const Vec3d& v) { return std::sqrt(dot(v, v)); }
