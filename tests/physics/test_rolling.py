@@ -108,7 +108,7 @@ def test_a_cable_over_a_rail_holds_below_its_limit(edges: int) -> None:
     assert np.abs(simulation.positions(cable) - before)[[0, -1], 2].max() < 1e-4
 
 
-def test_a_cable_pulled_past_its_limit_over_a_rail_slides_as_theory_has_it() -> None:
+def test_a_cable_pulled_past_its_limit_over_a_rail_slides_nearly_as_theory_has_it() -> None:
     """At a tenth past it an error of the tension ratio counts ten times."""
     errors = []
     for edges in (24, 48, 96):
