@@ -89,6 +89,11 @@ class Contact {
   double pressing_gain(const VectorX& change) const;
   /// What friction takes over such a step, what anchors store apart [J].
   double friction_loss(const VectorX& change) const;
+  /// The same of an explicit step, whose velocities change by the mean of the forces at both its ends; `start`, `end`:
+  /// `friction_force` there.
+  double mean_friction_loss(const VectorX& change, const VectorX& start, const VectorX& end) const;
+  /// Minus the generalised forces of friction at q1; empty where nothing has any.
+  void friction_force(VectorX& out) const;
   /// Greatest depth of surfaces in each other, over the smaller radius.
   double depth() const;
   /// Whether that is more than a step may end with.
@@ -222,6 +227,7 @@ class Contact {
   void end_points(const ContactPair& pair, const VectorX& q, Vec3d (&x)[4]) const;
   FrictionSetting setting(const Touching& t) const;
   double pressing_energy() const;
+  bool add_friction_alone(const Touching& t, ContactLocal& out) const;
   double work_against(int i, const ContactLocal& local, const VectorX& change) const;
   void press(const Touching& t, bool with_hessian, ContactLocal& out) const;
   void add_pressing(const Touching& t, bool with_hessian, ContactLocal& out) const;

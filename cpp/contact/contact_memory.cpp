@@ -79,17 +79,50 @@ double Contact::pressing_gain(const VectorX& change) const {
   return gain;
 }
 
+/// Whether a contact has any friction, which it adds.
+bool Contact::add_friction_alone(const Touching& t, ContactLocal& out) const {
+  if (t.frozen >= 0)
+    add_frozen_friction(t, false, out);
+  else if (!freezes() && pairs_[at(t.pair)].friction > 0.0)
+    add_friction(t, false, out);
+  else
+    return false;
+  return true;
+}
+
+void Contact::friction_force(VectorX& out) const {
+  if (!frictional_) return;
+  out.setZero(model_.dof_count);
+  for (int i = 0; i < count(); ++i) {
+    ContactLocal local{};
+    if (!add_friction_alone(touching_[at(i)], local)) continue;
+    int dofs[kContactUnknowns];
+    unknowns(i, dofs);
+    for (int k = 0; k < kContactUnknowns; ++k)
+      if (dofs[k] >= 0) out(dofs[k]) += local.gradient[k];
+  }
+}
+
+double Contact::mean_friction_loss(const VectorX& change, const VectorX& start, const VectorX& end) const {
+  double loss = friction_loss(change);
+  if (!frictional_ || start.size() != end.size()) return loss;
+  loss += 0.5 * (start - end).dot(change);
+  if (!anchored()) return loss;
+  for (const Touching& t : touching_) {
+    if (!(pairs_[at(t.pair)].friction > 0.0)) continue;
+    const ContactRecord end_record = record(t);
+    const Vec3d before = -tangential_stiffness(pairs_[at(t.pair)], t.stiffness) * t.stick;
+    loss += 0.5 * dot(before - end_record.friction, end_record.stick - t.stick);
+  }
+  return loss;
+}
+
 double Contact::friction_loss(const VectorX& change) const {
   double loss = 0.0;
   for (int i = 0; i < count(); ++i) {
     const Touching& t = touching_[at(i)];
     ContactLocal local{};
-    if (t.frozen >= 0)
-      add_frozen_friction(t, false, local);
-    else if (!freezes() && pair_of(i).friction > 0.0)
-      add_friction(t, false, local);
-    else
-      continue;
+    if (!add_friction_alone(t, local)) continue;
     loss += work_against(i, local, change) + turning_work(t);
     if (!anchored()) continue;
     const ContactRecord end = record(t);

@@ -90,6 +90,7 @@ void find_acceleration(Equations& equations, const Parameters& parameters, doubl
   if (state.acceleration_current) return;
   explicit_acceleration(equations, parameters, dt, state, state, state.v, work, state.acceleration);
   if (equations.loaded()) equations.load_force(state.load_force);
+  if (const Contact* contact = equations.contact()) contact->friction_force(state.friction_force);
   state.acceleration_current = true;
 }
 
@@ -128,7 +129,8 @@ StepResult verlet_step(Equations& equations, const Parameters& parameters, doubl
   }
   if (Contact* contact = equations.contact()) {
     // What surfaces store by pressing Verlet keeps on the whole, which the force at the end alone does not show.
-    result.dissipated += contact->friction_loss(work.change);
+    contact->friction_force(next.friction_force);
+    result.dissipated += contact->mean_friction_loss(work.change, state.friction_force, next.friction_force);
     result.support_work += contact->obstacle_work();
     contact->remember(next);
   }

@@ -58,6 +58,7 @@ struct State {
   VectorX acceleration;                 ///< of the last step, to predict the next one (explicit: to begin it)
   bool acceleration_current = false;    ///< explicit scheme: `acceleration` belongs to q and the present forces
   VectorX load_force;                   ///< explicit scheme: of loads and custom forces there, for their work; or empty
+  VectorX friction_force;               ///< likewise, against that of friction
   std::vector<Vec3d> tangent;           ///< per edge: source of the reference director
   std::vector<Vec3d> director;          ///< per edge: reference director, normal to `tangent`
   std::vector<Matrix3> frame;           ///< per joint frame (in a plane: not used, q holds the angle)

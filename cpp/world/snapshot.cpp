@@ -198,10 +198,11 @@ void exchange(Archive& io, Settings& settings) {
 
 template <class Archive>
 void exchange(Archive& io, State& state) {
-  auto& [time, q, v, acceleration, acceleration_current, load_force, tangent, director, frame, bend_tau, half_tau,
-         contacts, obstacles, contact_stiffness, motion] = state;
+  auto& [time, q, v, acceleration, acceleration_current, load_force, friction_force, tangent, director, frame, bend_tau,
+         half_tau, contacts, obstacles, contact_stiffness, motion] = state;
   io(time), io(q), io(v), io(acceleration), io(acceleration_current);
   exchange(io, load_force);
+  exchange(io, friction_force);
   for (auto& t : tangent) exchange(io, t);
   for (auto& d : director) exchange(io, d);
   for (auto& f : frame) io(f);

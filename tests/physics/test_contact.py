@@ -399,6 +399,21 @@ def test_an_explicit_step_that_friction_forbids_is_refused_with_the_one_that_it_
 
 
 @pytest.mark.parametrize("friction_model", ["implicit", "lagged", "anchored"])
+def test_what_friction_takes_in_explicit_steps_is_booked_to_second_order(friction_model: Any) -> None:
+    errors = []
+    for time_step in (1e-4, 5e-5):
+        simulation, push = explicit_rod(friction_model, time_step, 2e-2)
+        start = simulation.energy().total
+        simulation.set(push, load=(6.0, 0, 0))
+        simulation.step(round(0.4 / time_step))
+        errors.append(excess(simulation, start) / simulation.energy().kinetic)
+    print("explicit friction:", friction_model, errors)
+    assert abs(errors[0]) < 1e-4
+    # Lagged friction has its normal force from the start of the step.
+    assert abs(errors[1]) < abs(errors[0]) / (1.8 if friction_model == "lagged" else 3.0)
+
+
+@pytest.mark.parametrize("friction_model", ["implicit", "lagged", "anchored"])
 def test_explicit_steps_let_a_rod_slide_as_a_block_does(friction_model: Any) -> None:
     simulation, push = explicit_rod(friction_model, 1e-4, 2e-2)
     start = simulation.energy().total
