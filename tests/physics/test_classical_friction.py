@@ -131,7 +131,7 @@ def wound(nodes, wrap):
     return points, tangent(0.0), tangent(wrap), wrap * reach / per
 
 
-@pytest.mark.parametrize(("turns", "bound"), [(0.25, 1e-3), (1.0, 1e-3), (2.0, 2e-3)])
+@pytest.mark.parametrize(("turns", "bound"), [(0.25, 2e-4), (1.0, 3e-4), (2.0, 1.5e-3)])
 def test_a_rope_wound_about_a_post_multiplies_its_tension(turns, bound):
     """exp(mu phi) [Euler 1769, Eytelwein 1808]; beyond half a turn it climbs, and turns by a thousandth less."""
     friction, speed, step = 0.2, 0.01, 5e-3
@@ -147,7 +147,15 @@ def test_a_rope_wound_about_a_post_multiplies_its_tension(turns, bound):
         natural="straight",
     )
     scene.add_capsule((0, -1, 0), (0, 1, 0), POST, friction=friction)
-    scene.enable_contact(slip_tolerance=1e-4, centreline_friction=True, friction_model="implicit")
+    # Hard surfaces: those that begin a tenth of the radius before they touch, and press a hundredth of it deep, lead
+    # to an error of .0012 at one turn, however many nodes there are; with corners its error is of the other sign.
+    scene.enable_contact(
+        slip_tolerance=1e-4,
+        centreline_friction=True,
+        friction_model="implicit",
+        stiffness=1e6,
+        distance_tolerance=0.01 * ROPE,
+    )
     scene.ignore_contact(rope, rope)
     scene.add_force(rope.start, -first)
     scene.add_drag(0.02)
