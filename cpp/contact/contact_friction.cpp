@@ -163,9 +163,8 @@ void Contact::freeze() {
     if (dot(turn, turn) > 0.0) {
       Vec3d x[4];
       end_points(pair, state_->q, x);
-      frozen.turned = cross(turn, pair.curve()
-                                      ? piece_obstacle_arm(pair, obstacle_of(pair), x, t.points.s)
-                                      : x[2] + t.points.t * (x[3] - x[2]) + pair.radius_b * t.normal - x[2]);
+      frozen.turned = cross(turn, pair.curve() ? piece_obstacle_arm(pair, obstacle_of(pair), x, t.points.s)
+                                               : x[2] + t.points.t * (x[3] - x[2]) + pair.radius_b * t.normal - x[2]);
     }
     const Vec3d shift = shift_of(pair) + frozen.turned;
     frozen.drift = shift - dot(shift, t.normal) * t.normal;

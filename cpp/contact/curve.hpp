@@ -3,18 +3,25 @@
 ///
 /// About an inner node 1 between nodes 0 and 2, and between the middles of both its edges, the curve is
 ///   c(s) = m + s u + (s^2 / 2) k,   s in [-1/2, 1/2],
-///   m = x1 + k / 24,   u = (x2 - x0) / 2,   k = x0 - 2 x1 + x2.
+///   m = x1,   u = (x2 - x0) / 2,   k = x0 - 2 x1 + x2.
 /// It is the quadratic B-spline of the nodes (m = x1 + k / 8), which has the edges as tangents at their middles, so
-/// that directions are continuous from piece to piece; moved by k / 12, since an arc whose length is that of its edges
-/// lies between the nodes and the middles of the edges, 1/24 and 1/12 of k from them. On an evenly bent rod it is that
-/// arc up to the fourth power of an edge's length. Beside the last node of a rod it is half an edge, straight, s = 0
-/// there.
+/// that directions are continuous from piece to piece; moved by k / 8 to go through the nodes. On an evenly bent rod it
+/// is the arc through its nodes up to the fourth power of an edge's length; elsewhere pieces meet up to an eighth of
+/// the third difference of the nodes. A rod that lies flat touches at its nodes, each with the load that is lumped
+/// there: moments of |x| about a node, as of a stick that spins, are those of the trapezoidal rule. A curve that went
+/// nearer to the edges, m = x1 + k / 24, would have the arc of their length, but spread what presses on a node to both
+/// others. Beside the last node of a rod it is half an edge, straight, s = 0 there; of that a plane touches its ends
+/// only, and so the node, as the piece before has the other one.
 ///
 /// The distance delta of an obstacle from c is taken at both ends of a piece and in its middle, and by the parabola
 /// through these elsewhere, g0 + g1 s + g2 s^2 / 2; the piece is as near as
 ///   D = min over s of g0 + g1 s + (s^2 / 2) phi(g2),   phi(g) = (g + sqrt(g^2 + 4 a^2)) / 2,
 /// where phi, with a small length a, keeps the place s from jumping between both ends of a piece that lies along the
 /// obstacle. D and its gradient are continuous. All distances are in m.
+///
+/// a: a piece that presses by its depth, p - g1 s at a tilt g1, presses on the whole at s = -g1 / (12 p), which is
+/// where D is taken for a = 12 p. Ends of a piece that is tilted by more are a / 8 farther than they are drawn, 3 p
+/// / 2. On half an edge, whose s is twice as long, a is a fourth of that.
 
 #include "contact/obstacle.hpp"
 
@@ -37,7 +44,7 @@ struct CurveWeights {
 inline constexpr double kBendBy[3] = {4.0, -8.0, 4.0};
 inline constexpr CurveWeights kCurveInside{.nodes = 3,
                                            .edges = 2,
-                                           .middle = {1.0 / 24.0, 22.0 / 24.0, 1.0 / 24.0},
+                                           .middle = {0.0, 1.0, 0.0},
                                            .slope = {-0.5, 0.0, 0.5},
                                            .bend = {1.0, -2.0, 1.0},
                                            .share = {0.5, 0.5},
@@ -65,6 +72,27 @@ inline constexpr CurveWeights kCurveEnd{.nodes = 2,
                                         .low = -1.0,
                                         .value_by = {0.0, 0.0, 1.0},
                                         .slope_by = {1.0, -4.0, 3.0}};
+/// The first and the last node, for themselves.
+inline constexpr CurveWeights kCurveFirst{.nodes = 2,
+                                          .edges = 1,
+                                          .middle = {1.0, 0.0, 0.0},
+                                          .slope = {},
+                                          .bend = {},
+                                          .share = {1.0, 0.0},
+                                          .share_slope = {},
+                                          .low = -0.5,
+                                          .value_by = {0.0, 1.0, 0.0},
+                                          .slope_by = {}};
+inline constexpr CurveWeights kCurveLast{.nodes = 2,
+                                         .edges = 1,
+                                         .middle = {0.0, 1.0, 0.0},
+                                         .slope = {},
+                                         .bend = {},
+                                         .share = {1.0, 0.0},
+                                         .share_slope = {},
+                                         .low = -0.5,
+                                         .value_by = {0.0, 1.0, 0.0},
+                                         .slope_by = {}};
 
 /// One piece; its second node and edge are those that follow along the rod.
 struct CurvePiece {

@@ -256,7 +256,8 @@ Vec3<Scalar> obstacle_arm(const FrictionSetting& f, const SlippingSurfaces<Scala
 /// Along the rod where it touches.
 template <class Scalar>
 Vec3<Scalar> rod_direction(const FrictionSetting& f, const SlippingSurfaces<Scalar>& c) {
-  return f.pair->curve() ? curve_direction(*f.pair->piece.weights, c.node, c.s) : c.sides[0].edge;
+  const CurveWeights* w = f.pair->piece.weights;
+  return w != nullptr && w->edges > 1 ? curve_direction(*w, c.node, c.s) : c.sides[0].edge;
 }
 
 /// Friction of the greater coefficient, as it is along and across the rod.

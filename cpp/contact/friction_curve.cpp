@@ -104,11 +104,13 @@ void direct_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& c, 
   const Vec3d e = rod_direction(f, c), &n = c.normal;
   const double inverse = 1.0 / std::sqrt(dot(e, e));
   const Vec3d t = inverse * e;
+  const bool edge = curve.w.edges == 1;  // the direction is that of its edge
+  const double of_edge[3] = {-1.0, 1.0, 0.0};
   Vec3d bend{};
   for (int i = 0; i < curve.w.nodes; ++i) bend += curve.w.bend[i] * x[i];
   for (int j = 0; j < kWays; ++j) {
     Vec3d change = d.s[j] * bend;
-    if (j < kAngle) change += curve.weight_slope[j / 3] * kAxis[j % 3];
+    if (j < kAngle) change += (edge ? of_edge : curve.weight_slope)[j / 3] * kAxis[j % 3];
     const Vec3d turned = inverse * (change - dot(t, change) * t), &leant = d.normal[j];
     const Vec3d along = turned - (dot(turned, n) + dot(t, leant)) * n - dot(t, n) * leant;
     d.force[j] = across * d.force[j] + (more * (dot(along, c.plain) + dot(c.along, d.force[j]))) * c.along +
@@ -167,8 +169,7 @@ void add_curve_friction_jacobian(const FrictionSetting& f, const SlippingSurface
   add_turn_slopes(f, c, curve, d);
   add_force_slopes(f, c, curve, x, d);
   if (!f.pair->isotropic()) direct_slopes(f, c, curve, x, d);
-  for (int j = 0; j < kWays; ++j)
-    d.moment[j] = cross(d.force[j], c.normal) + cross(c.friction.force, d.normal[j]);
+  for (int j = 0; j < kWays; ++j) d.moment[j] = cross(d.force[j], c.normal) + cross(c.friction.force, d.normal[j]);
   for (int i = 0; i < curve.w.nodes; ++i)
     for (int j = 0; j < kWays; ++j) {
       const Vec3d force = curve.weight[i] * d.force[j] + (curve.weight_slope[i] * d.s[j]) * c.friction.force;

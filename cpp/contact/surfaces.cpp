@@ -15,9 +15,9 @@ namespace {
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
-// The length a of a piece of a curve, over the smaller of an edge's length and the rod's radius: twelve times the depth
-// to which surfaces press, so that a tilted piece touches where a pressure that grows with its depth has its middle.
-constexpr double kLeastBend = 0.12;
+// The length a of curve.hpp for the depth to which surfaces press, a hundredth of the rod's radius, which is taken no
+// greater than an edge.
+constexpr double kLeastBend = 12.0 * 0.01;
 
 double norm(const Vec3d& v) { return std::sqrt(dot(v, v)); }
 
@@ -201,19 +201,22 @@ void Surfaces::add_pieces(const ContactPair& prototype, const Obstacle& obstacle
                {model_.edge_tail[at(before)], model_.edge_head[at(before)], -1},
                {before, -1},
                kLeastBend * std::min(p.radius_a, model_.edge_length(before))};
-    p.share = before == behind ? 0.5 : 1.0;  // half as long
-    if (before != behind) {
+    if (before == behind) {  // half as long
+      p.share = 0.5;
+      p.piece.least_bend *= 0.25;
+    } else {
       p.piece.node[2] = model_.edge_head[at(behind)];
       p.piece.edge[1] = behind;
     }
     obstacle_pairs_.push_back(p);
   };
+  const bool flat = obstacle.kind == ObstacleKind::plane;
   for (int e = first; e < end; ++e) {
     if (!smooth(obstacle, e)) continue;
     const int before = e > first ? e - 1 : closed ? end - 1 : -1, behind = e + 1 < end ? e + 1 : closed ? first : -1;
-    if (before < 0 || !smooth(obstacle, before)) add(kCurveStart, e, e, 0);
+    if (before < 0 || !smooth(obstacle, before)) add(flat ? kCurveFirst : kCurveStart, e, e, 0);
     if (behind < 0 || !smooth(obstacle, behind))
-      add(kCurveEnd, e, e, 1);
+      add(flat ? kCurveLast : kCurveEnd, e, e, 1);
     else
       add(kCurveInside, e, behind, 1);
   }

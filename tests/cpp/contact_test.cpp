@@ -194,6 +194,11 @@ std::vector<ContactPair> all_pairs(const Model& model, const Surfaces& surfaces)
   return pairs;
 }
 
+/// D; and how far centrelines are apart, as a curve's is.
+struct Apart {
+  double distance, centrelines;
+};
+
 ClosestPoints closest(const Model& model, const Surfaces& surfaces, const ContactPair& pair, const VectorX& q) {
   const auto node = [&](int n) { return local_position(model, q, n); };
   const auto a = static_cast<std::size_t>(pair.key.a);
@@ -205,6 +210,18 @@ ClosestPoints closest(const Model& model, const Surfaces& surfaces, const Contac
   const auto b = static_cast<std::size_t>(pair.key.b);
   return closest_points(node(model.edge_tail[a]), node(model.edge_head[a]), node(model.edge_tail[b]),
                         node(model.edge_head[b]), pair.weight_a, pair.weight_b);
+}
+
+Apart apart(const Model& model, const Surfaces& surfaces, const ContactPair& pair, const VectorX& q) {
+  if (pair.curve()) {
+    Vec3d x[3];
+    for (int i = 0; i < pair.piece.weights->nodes; ++i) x[i] = local_position(model, q, pair.piece.node[i]);
+    const Obstacle& o = surfaces.obstacles()[static_cast<std::size_t>(-1 - pair.key.b)];
+    const double d = curve_distance(pair.piece, o, x).distance;
+    return {d, d};
+  }
+  const ClosestPoints c = closest(model, surfaces, pair, q);
+  return {std::sqrt(c.square), std::sqrt(dot(c.between, c.between))};
 }
 
 /// Walks of many iterates a step, tiny and wide, on which candidates are found anew and bounds let pairs be skipped.
@@ -219,8 +236,7 @@ TEST(Contact, FindsWhatTouchesAndHowFarItMayGoAsBruteForceDoesWhateverCameBefore
     contact.initialise(state, parameters);
     const std::vector<ContactPair> pairs = all_pairs(model, contact.surfaces());
     const auto distance = [&](const ContactPair& pair, const VectorX& q) {
-      const Vec3d between = closest(model, contact.surfaces(), pair, q).between;
-      return std::sqrt(dot(between, between));
+      return apart(model, contact.surfaces(), pair, q).centrelines;
     };
     for (int step = 0; step < 12; ++step) {
       contact.begin(state, parameters, 1e-2, Pressing::end);
@@ -247,7 +263,7 @@ TEST(Contact, FindsWhatTouchesAndHowFarItMayGoAsBruteForceDoesWhateverCameBefore
         fresh.update(q);
         int expected = 0;
         for (const ContactPair& pair : pairs)
-          if (std::sqrt(closest(model, contact.surfaces(), pair, q).square) < pair.reach()) ++expected;
+          if (apart(model, contact.surfaces(), pair, q).distance < pair.reach()) ++expected;
         ASSERT_EQ(contact.count(), expected);
         ASSERT_EQ(contact.energy(), fresh.energy());
         touching += expected;

@@ -84,8 +84,8 @@ void slip(RandomNumbers& random, const Vec3d (&x)[4], Touch& c) {
 
 /// A piece of a curve that bends beside an obstacle, its radius about as great as the distance.
 void place_piece(RandomNumbers& random, Other other, bool planar, Touch& c, Vec3d (&x)[4]) {
-  const CurveWeights* weights[] = {&kCurveInside, &kCurveInside, &kCurveStart, &kCurveEnd};
-  c.pair.piece.weights = weights[static_cast<int>(4.0 * std::abs(random.normal())) % 4];
+  const CurveWeights* weights[] = {&kCurveInside, &kCurveInside, &kCurveStart, &kCurveEnd, &kCurveFirst, &kCurveLast};
+  c.pair.piece.weights = weights[static_cast<int>(6.0 * std::abs(random.normal())) % 6];
   c.pair.piece.least_bend = 0.05;
   const double bent = random.normal();
   for (int i = 0; i < 4; ++i) {

@@ -30,13 +30,32 @@ def rolling_ring(degrees: float, edges: int, step: float = 1e-3, **options: Any)
 
 
 def acceleration(degrees: float, edges: int, **options: Any) -> float:
-    """Over what it is for a hoop that rolls on its surface, g sin a / (1 + (R / (R + r))^2)."""
+    """Over what it is for a hoop that rolls on its surface, g sin a / (1 + k), with k = I / m (R + r)^2.
+
+    The mass is that of straight edges, I = m R^2 (2 + cos f) / 3 with f the turn between two: it is greater by
+    k f^2 / (6 (1 + k)) than a round hoop's, second order in an edge's length.
+    """
     simulation, ring, down = rolling_ring(degrees, edges, **options)
     simulation.step(500)
     before = simulation.velocities(ring).mean(axis=0) @ down
     simulation.step(1000)
     gained = simulation.velocities(ring).mean(axis=0) @ down - before
-    return float(gained / (G * np.sin(np.radians(degrees)) / (1.0 + (RING / (RING + THICK)) ** 2)))
+    inertia = (2.0 + np.cos(2.0 * np.pi / edges)) / 3.0 * (RING / (RING + THICK)) ** 2
+    return float(gained / (G * np.sin(np.radians(degrees)) / (1.0 + inertia)))
+
+
+def out_of_round(edges: int) -> float:
+    """Height that the curve between nodes on a circle rises and falls by: the fourth power of an edge's length [m]."""
+    turn = 2.0 * np.pi / edges
+    s = np.linspace(-0.5, 0.5, 101)
+    radius = np.hypot(1.0 - s**2 * (1.0 - np.cos(turn)), s * np.sin(turn))
+    return float(RING * np.ptp(radius))
+
+
+def unevenness(degrees: float) -> float:
+    """What a metre of height changes of the speed gained between .5 s and 1.5 s, over that: G = (1 + k) v dv."""
+    gain = 0.5 * G * np.sin(np.radians(degrees))
+    return float(0.5 * G * (1.0 / (0.5 * gain) + 1.0 / (1.5 * gain)) / gain)
 
 
 @pytest.mark.parametrize("degrees", [1.0, 3.0, 10.0])
@@ -44,9 +63,8 @@ def test_a_ring_of_few_edges_rolls_down_a_slope_as_a_hoop(degrees: float) -> Non
     """On its edges one of 24 stands still on 3 degrees, and is 13 to 20 % too slow on 10."""
     errors = [acceleration(degrees, n) - 1.0 for n in (12, 24, 48)]
     print("rolling ring:", degrees, errors)
-    # A ring of 12 edges is out of round by the fourth power of an edge's length, and speeds up and slows down over it.
-    assert abs(errors[0]) < 0.03
-    assert np.abs(errors[1:]).max() < 0.005
+    for n, error in zip((12, 24, 48), errors, strict=True):
+        assert abs(error) < 0.004 + out_of_round(n) * unevenness(degrees)
 
 
 @pytest.mark.parametrize("integrator", ["energy_momentum", "backward_euler"])
@@ -101,11 +119,12 @@ def sliding_speed(past: float, straight: float, time: float) -> float:
 @pytest.mark.parametrize("edges", [24, 48, 96])
 def test_a_cable_over_a_rail_holds_below_its_limit(edges: int) -> None:
     simulation, cable, _ = pulled_cable(edges, -0.1)
-    simulation.step(100)
+    simulation.step(400)  # it is drawn off the rail, and its straight parts swing
     before = simulation.positions(cable)
     simulation.step(100)
-    # Its straight parts swing. Past its limit it slides by centimetres.
-    assert np.abs(simulation.positions(cable) - before)[[0, -1], 2].max() < 1e-4
+    moved = np.abs(simulation.positions(cable) - before)[[0, -1], 2].max()
+    print("cable below its limit:", moved)
+    assert moved < 1e-4  # past its limit it slides by centimetres
 
 
 def test_a_cable_pulled_past_its_limit_over_a_rail_slides_nearly_as_theory_has_it() -> None:
