@@ -104,15 +104,19 @@ void Contact::friction_force(VectorX& out) const {
 }
 
 double Contact::mean_friction_loss(const VectorX& change, const VectorX& start, const VectorX& end) const {
-  double loss = friction_loss(change);
-  if (!frictional_ || start.size() != end.size()) return loss;
-  loss += 0.5 * (start - end).dot(change);
-  if (!anchored()) return loss;
+  if (!frictional_ || start.size() != end.size()) return friction_loss(change);
+  double loss = 0.5 * (start.dot(change) + end.dot(change));
   for (const Touching& t : touching_) {
-    if (!(pairs_[at(t.pair)].friction > 0.0)) continue;
-    const ContactRecord end_record = record(t);
-    const Vec3d before = -tangential_stiffness(pairs_[at(t.pair)], t.stiffness) * t.stick;
-    loss += 0.5 * dot(before - end_record.friction, end_record.stick - t.stick);
+    const ContactPair& pair = pairs_[at(t.pair)];
+    if (!(pair.friction > 0.0)) continue;
+    if (!shift_.empty() || !turn_.empty()) {
+      ContactLocal local{};
+      if (add_friction_alone(t, local)) loss += turning_work(t) - dot(shift_of(pair), force_on_nodes(pair, local));
+    }
+    if (!anchored()) continue;
+    const ContactRecord now = record(t);
+    const Vec3d before = -tangential_stiffness(pair, t.stiffness) * t.stick;
+    loss += 0.5 * dot(before + now.friction, now.stick - t.stick);
   }
   return loss;
 }
