@@ -43,14 +43,14 @@ SceneDescription open_rod(int nodes, bool planar) {
 }
 
 /// The equations of one midpoint step of such a rod, at a configuration a little off their root.
-struct Problem : StepProblem {
+struct Problem : BenchmarkProblem {
   VectorX z;
 
-  Problem(int nodes, bool planar) : StepProblem(open_rod(nodes, planar), planar) {
+  Problem(int nodes, bool planar) : BenchmarkProblem(open_rod(nodes, planar), planar) {
     const auto size = static_cast<double>(state.v.size());
     for (Eigen::Index i = 0; i < state.v.size(); ++i) state.v(i) = 0.1 * std::sin(4.0 * static_cast<double>(i) / size);
     z = state.q + 0.5 * kStep * state.v;
-    equations.begin(state, parameters, 0.5 * kStep, false);
+    equations.begin(state, parameters, StepRule::backward_euler, 0.5 * kStep);
   }
 };
 
@@ -61,14 +61,14 @@ void newton_iteration(benchmark::State& run, bool planar) {
   LinearSolver& solver = p.solver();
   VectorX next = p.z;
   work.step.setZero(p.z.size());
-  p.equations.evaluate(p.z, true, nullptr, work.evaluation);
-  p.equations.predict_axial_force(work.step, work.axial_force);
+  p.equations.evaluate(p.z, true, nullptr, work.data);
+  predict_axial_force(p.equations.problem(), work.data, work.step, work.axial_force);
   for ([[maybe_unused]] auto _ : run) {
-    p.equations.evaluate(p.z, true, work.axial_force.data(), work.evaluation);
+    p.equations.evaluate(p.z, true, work.axial_force.data(), work.data);
     if (solver.factorize().status != FactorStatus::ok) run.SkipWithError("singular");
-    work.step = -work.evaluation.residual;
+    work.step = -work.data.residual;
     solver.solve({work.step.data(), static_cast<std::size_t>(work.step.size())});
-    p.equations.predict_axial_force(work.step, work.axial_force);
+    predict_axial_force(p.equations.problem(), work.data, work.step, work.axial_force);
     next = p.z + work.step;
     benchmark::DoNotOptimize(next.data());
   }
@@ -90,7 +90,7 @@ using Dpbsv = void (*)(const char*, const int*, const int*, const int*, double*,
 void dpbsv(benchmark::State& run, Dpbsv solve) {
   Problem p(static_cast<int>(run.range(0)), false);
   NewtonWorkspace work;
-  p.equations.evaluate(p.z, true, nullptr, work.evaluation);
+  p.equations.evaluate(p.z, true, nullptr, work.data);
   const LinearSolver& solver = p.solver();
   const int n = solver.size(), width = 10, rows = width + 1, one = 1;
   // The lower band, column by column: its entries come out of A x, x one at every 21st unknown.
@@ -106,7 +106,7 @@ void dpbsv(benchmark::State& run, Dpbsv solve) {
   }
   for ([[maybe_unused]] auto _ : run) {
     matrix = band;
-    right.assign(work.evaluation.residual.data(), work.evaluation.residual.data() + n);
+    right.assign(work.data.residual.data(), work.data.residual.data() + n);
     int info = 0;
     const double start = processor_time();
     solve("L", &n, &width, &one, matrix.data(), &rows, right.data(), &n, &info, 1);

@@ -88,23 +88,20 @@ SceneDescription pile(int rods, int layers) {
 }
 
 /// The matrix of a step that sets out from where a scene is drawn.
-struct Problem : StepProblem {
+struct Problem : BenchmarkProblem {
   VectorX force;
 
-  explicit Problem(const SceneDescription& scene) : StepProblem(scene, false) {
-    if (Contact* contact = equations.contact()) {
-      contact->set_parameters(parameters);
-      contact->initialise(state);
-    }
-    equations.begin(state, parameters, 1e-3, false);
-    Evaluation e;
+  explicit Problem(const SceneDescription& scene) : BenchmarkProblem(scene, false) {
+    if (Contact* contact = equations.contact()) contact->initialise(state, parameters);
+    equations.begin(state, parameters, StepRule::backward_euler, 1e-3);
+    StepData e;
     equations.evaluate(state.q, true, nullptr, e);
     force = VectorX::Ones(state.q.size());
   }
 };
 
 /// Of the last evaluation.
-Eigen::SparseMatrix<double> lower_triangle(StepProblem& p) {
+Eigen::SparseMatrix<double> lower_triangle(BenchmarkProblem& p) {
   const SparsityPattern& pattern = p.equations.assembler().pattern();
   LinearSolver& solver = p.solver();
   std::vector<Eigen::Triplet<double>> entries;
@@ -170,18 +167,17 @@ SceneDescription rods_on_a_floor(int rods) {
 }
 
 /// The system of a Newton iteration in a pile whose rods press on each other, after 8 ms.
-struct Settled : StepProblem {
+struct Settled : BenchmarkProblem {
   static constexpr double kStep = 1e-3;  // [s]
   Eigen::SparseMatrix<double> matrix;    // all of it
   VectorX residual;
 
-  explicit Settled(const SceneDescription& scene) : StepProblem(scene, false) {
+  explicit Settled(const SceneDescription& scene) : BenchmarkProblem(scene, false) {
     const Newton newton(model, options);
     Predictor predictor;
     StepWorkspace work;
     predictor.resize(state.q.size());
-    equations.contact()->set_parameters(parameters);
-    equations.contact()->initialise(state);
+    equations.contact()->initialise(state, parameters);
     for (int k = 0; k < 8; ++k) {
       work.held.q = state.q;
       const StepPlan plan{StepRule::backward_euler, kStep, 0};
@@ -189,12 +185,12 @@ struct Settled : StepProblem {
         const StepResult r = implicit_step(equations, newton, options, parameters, plan, state, predictor, work);
         if (r.accepted) break;
         require(r.too_deep && tries < 8, "the pile did not settle");
-        equations.contact()->stiffen(state);
+        equations.contact()->stiffen(state, Keep::force);
       }
     }
-    equations.begin(state, parameters, kStep, false);
-    equations.evaluate(state.q, true, nullptr, work.newton.evaluation);
-    residual = work.newton.evaluation.residual;
+    equations.begin(state, parameters, StepRule::backward_euler, kStep);
+    equations.evaluate(state.q, true, nullptr, work.newton.data);
+    residual = work.newton.data.residual;
     const Eigen::SparseMatrix<double> lower = lower_triangle(*this);
     matrix = lower.selfadjointView<Eigen::Lower>();
   }

@@ -5,16 +5,16 @@
 
 namespace withe {
 
-struct StepProblem {
+struct BenchmarkProblem {
   Model model;
   Options options;
   Equations equations;
   Parameters parameters;
   State state;
 
-  StepProblem(const SceneDescription& scene, bool planar)
+  BenchmarkProblem(const SceneDescription& scene, bool planar)
       : model(build_model(scene, planar)),
-        equations(model, options),
+        equations(model, equation_options(options)),
         parameters(initial_parameters(model)),
         state(initial_state(model)) {}
 

@@ -156,7 +156,7 @@ void pressure_on_edge(const Model& model, const VectorX& q, int edge, const Vect
 
 /// Custom moments: each on the joint at its node, or else shared evenly by the edges there.
 void add_node_moments(const Model& model, Loads& loads) {
-  loads.node_moments.assign(at(model.node_count), Vector3::Zero());
+  loads.node_moments = model.node_count;
   std::vector<std::vector<int>> edges(at(model.node_count));
   for (int e = 0; e < model.edge_count; ++e)
     for (int node : {model.edge_tail[at(e)], model.edge_head[at(e)]}) edges[at(node)].push_back(e);
@@ -245,12 +245,12 @@ int load_dofs(const Model& model, const LoadPiece& piece, int (&dofs)[kMaxLocal]
   return n;
 }
 
-void load_local(const Model& model, const State& state, const VectorX& q, const Configuration& c, const Loads& loads,
-                const LoadPiece& piece, Local& out) {
+void load_local(const Model& model, const State& state, const VectorX& q, const Configuration& c,
+                const LoadPiece& piece, const Vector3& load, Local& out) {
   int dofs[kMaxLocal];
   clear(out, load_dofs(model, piece, dofs));
   out.energy = 0.0;
-  const Vector3 value = piece.weight * value_of(loads, piece);
+  const Vector3 value = piece.weight * load;
   switch (piece.shape) {
     case LoadShape::dead_node:
       if (model.planar()) {

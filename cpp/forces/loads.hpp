@@ -29,18 +29,12 @@ struct LoadPiece {
 struct Loads {
   std::vector<LoadPiece> pieces;
   std::vector<Vector3> values;        ///< per load, world axes of the drawn scene [N], [N m], [N/m]
-  std::vector<Vector3> node_moments;  ///< custom ones, per node, in world axes [N m]; empty: none
+  int node_moments = 0;         ///< nodes that custom moments may act on
   bool unsymmetric = false;
 };
 
 /// Resolves the loads of a description: which node, edge or frame each acts on.
 Loads resolve_loads(const Model& model);
-
-/// The value that a piece is part of.
-inline const Vector3& value_of(const Loads& loads, const LoadPiece& piece) {
-  return piece.load >= 0 ? loads.values[static_cast<std::size_t>(piece.load)]
-                         : loads.node_moments[static_cast<std::size_t>(piece.node)];
-}
 
 /// Whether the forces of a piece and its like along the rod are minus the gradient of a potential.
 bool has_potential(const Model& model, const LoadPiece& piece);
@@ -48,9 +42,9 @@ bool has_potential(const Model& model, const LoadPiece& piece);
 /// Unknowns of a piece in the order of its Local; -1 where there is none.
 int load_dofs(const Model& model, const LoadPiece& piece, int (&dofs)[kMaxLocal]);
 
-/// Minus the generalised force, and minus its Jacobian (not symmetric in space). The energy is that of a pressure,
-/// which sums to a potential along closed rods; of others it is zero.
-void load_local(const Model& model, const State& state, const VectorX& q, const Configuration& c, const Loads& loads,
-                const LoadPiece& piece, Local& out);
+/// Minus the generalised force of a piece of a load of that value, and minus its Jacobian (not symmetric in space). The
+/// energy is that of a pressure, which sums to a potential along closed rods; of others it is zero.
+void load_local(const Model& model, const State& state, const VectorX& q, const Configuration& c,
+                const LoadPiece& piece, const Vector3& load, Local& out);
 
 }  // namespace withe

@@ -103,9 +103,9 @@ class ArcLength {
   /// From `start_`, whose state is the present one, to the point an arc away. Iterations that took, or 0: not found.
   int go(double arc) {
     path_.go_to(factor_);
-    equations_.evaluate(state_.q, false, nullptr, work_.evaluation);
+    equations_.evaluate(state_.q, false, nullptr, work_.data);
     step_ = arc * tangent_;
-    equations_.predict_axial_force(step_, work_.axial_force);
+    predict_axial_force(equations_.problem(), work_.data, step_, work_.axial_force);
     const double start = factor_, length = newton_.norms().displacement(step_);
     VectorX z = state_.q + step_;
     double factor = factor_ + arc * rate_, last = INFINITY;
@@ -118,8 +118,8 @@ class ArcLength {
       if (k > 0 && equations_.allowed(state_.q, z - state_.q) < 1.0) break;
       path_.find_pull(z, pull_, held_);
       path_.evaluate(z, true, options_.mixed ? work_.axial_force.data() : nullptr);
-      if (!work_.evaluation.residual.allFinite()) break;
-      const Balance balance = newton_.balance(work_.evaluation, newton);
+      if (!work_.data.residual.allFinite()) break;
+      const Balance balance = newton_.balance(work_.data, newton);
       if ((balance.floor && k > 0) || (balance.either && last <= tolerance)) {
         accept(z);
         factor_ = factor;
@@ -131,7 +131,7 @@ class ArcLength {
       ++newton.iterations;
       ++work_.counters.iterations;
       if (!factorize(equations_, work_)) break;
-      step_ = -work_.evaluation.residual;
+      step_ = -work_.data.residual;
       solve(step_);
       solve(pull_);
       pull_ += held_;
@@ -145,7 +145,7 @@ class ArcLength {
       // What is not drawn in fast may lead to another path.
       if (size > std::max(0.05 * length, 1e4 * tolerance) && size > (k == 0 ? length : 0.5 * last)) break;
       last = size;
-      equations_.predict_axial_force(step_, work_.axial_force);
+      predict_axial_force(equations_.problem(), work_.data, step_, work_.axial_force);
       z += step_;
       factor += change;
     }

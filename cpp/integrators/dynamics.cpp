@@ -7,6 +7,7 @@
 #include "common/timer.hpp"
 #include "integrators/inner_solve.hpp"
 #include "integrators/step_parts.hpp"
+#include "steps/inertia.hpp"
 
 namespace withe {
 namespace {
@@ -150,15 +151,20 @@ Turning turning(const Model& model, const State& state, const VectorX& q, const 
   return {std::acos(std::copysign(std::sqrt(std::min(std::abs(smallest), 1.0)), smallest)), gain};
 }
 
-void book_work(Equations& equations, const Parameters& parameters, const VectorX& change, StepResult& result) {
-  if (equations.loaded()) result.load_work = equations.load_work(change);
+void add_work(const Equations& equations, const Parameters& parameters, const VectorX& change, StepWorkspace& work,
+              StepResult& result) {
+  const StepData& data = work.newton.data;
+  if (equations.loaded()) {
+    equations.load_force(data, work.assumed);
+    result.load_work = work.assumed.dot(change);
+  }
   const bool in_fluid = equations.model().description.fluid.model != FluidModel::none;
-  if (parameters.dragged || parameters.viscous || in_fluid) result.dissipated = equations.dissipated(change);
+  if (parameters.dragged || parameters.viscous || in_fluid) result.dissipated = equations.dissipated(data, change);
 }
 
-void book_supports(const Equations& equations, const VectorX& v0, const VectorX& v1, double dt, StepWorkspace& work,
+void add_support_work(const Equations& equations, const VectorX& v0, const VectorX& v1, double dt, StepWorkspace& work,
                    StepResult& result) {
-  VectorX& full_residual = work.newton.evaluation.full_residual;
+  VectorX& full_residual = work.newton.data.full_residual;
   VectorX& momentum = work.difference;  // by how much it grows
   work.z = v1 - v0;
   multiply(equations.model(), equations.mass(), work.z, momentum);
@@ -184,12 +190,12 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
   const bool euler = plan.rule == StepRule::backward_euler;
   const double dt = plan.dt, h = euler ? dt : 0.5 * dt;
   if (!work.held.reachable) return result;
-  equations.begin(state, parameters, h, plan.rule == StepRule::energy_momentum, euler ? Inner::end : Inner::middle);
+  equations.begin(state, parameters, plan.rule, h);
   if (equations.contact() && equations.contact()->blocked()) return result;
   if (!begin_flow(equations, dt, euler, state, work)) return result;
   if (!model.constraints.empty()) {
     find_held_velocity(model, plan, state, work);
-    equations.held_acceleration = (work.held_velocity - state.v) / dt;
+    equations.held_acceleration() = (work.held_velocity - state.v) / dt;
   }
   result.newton = solve_inner(equations, newton, options, plan, h, state, predictor, work);
   if (!result.newton.converged) return result;
@@ -198,7 +204,7 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
     q1 = work.z;
   else
     q1 = 2.0 * work.z - state.q;
-  const double* watched = plan.rule == StepRule::energy_momentum ? nullptr : equations.elastic.stretch_stiffness.data();
+  const double* watched = plan.rule == StepRule::energy_momentum ? nullptr : equations.elastic().stretch_stiffness.data();
   const Turning turned = turning(model, state, q1, watched, euler);
   result.largest_turn = turned.largest;
   if (!q1.allFinite() || !(result.largest_turn <= 1.5)) return result;
@@ -215,7 +221,9 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
     }
   }
   work.change = q1 - state.q;
-  const VectorX& working = plan.rule == StepRule::energy_momentum ? equations.working_change(work.change) : work.change;
+  const bool conserves = plan.rule == StepRule::energy_momentum;
+  if (conserves) set_working_change(equations.problem(), work.newton.data, work.change, work.working);
+  const VectorX& working = conserves ? work.working : work.change;
   if (equations.contact()) result.pressing_gain = equations.contact()->pressing_gain(working);
   work.mean = work.change / dt;
   VectorX& v1 = work.velocity;
@@ -223,22 +231,22 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
     v1 = work.mean;
   else
     v1 = 2.0 * work.mean - state.v;
-  if (plan.rule == StepRule::energy_momentum) equations.set_turning_velocities(work.change, dt, v1);
+  if (conserves) set_turning_velocities(equations.problem(), work.change, dt, v1);
   assembler.project(v1);
   if (!model.constraints.empty()) assembler.add_held_part(work.held_velocity, 1.0, v1);
-  book_work(equations, parameters, working, result);
+  add_work(equations, parameters, working, work, result);
   double contact_loss = 0.0;
   if (const Contact* contact = equations.contact()) {
     const double by_obstacles = contact->obstacle_work();
-    contact_loss = equations.contact_loss(working, by_obstacles);
+    contact_loss = equations.contact_loss(work.newton.data, working, by_obstacles);
     result.dissipated += contact_loss;
     result.support_work += by_obstacles;
   }
   if (!model.constraints.empty()) {
-    work.assumed = equations.inertia();
-    if (plan.rule == StepRule::energy_momentum)
-      equations.set_working_rows(work.change, work.newton.evaluation.full_residual);
-    book_supports(equations, state.v, v1, dt, work, result);
+    work.assumed = work.newton.data.inertia;
+    if (conserves)
+      set_working_rows(equations.problem(), work.newton.data, work.change, work.newton.data.full_residual);
+    add_support_work(equations, state.v, v1, dt, work, result);
   }
   VectorX& acceleration = work.mean;
   acceleration = (v1 - state.v) / dt;

@@ -14,9 +14,6 @@ struct HeldTarget {
   bool reachable = true;  ///< false: a frame would have to turn by half a turn at once
 };
 
-/// How one implicit step goes from q0 to q1.
-enum class StepRule { backward_euler, midpoint, energy_momentum };
-
 /// Parts of a fourth-order step, each a symmetric step of second order; the third goes back in time.
 /// [Suzuki 1990; Hairer, Lubich and Wanner: Geometric numerical integration, 2006, II.4].
 inline constexpr double kSuzuki = 0.41449077179437573714;  // 1 / (4 - 4^(1/3))
@@ -54,7 +51,7 @@ struct StepWorkspace {
   HeldTarget held;
   bool repeated = false;  ///< the same step as before, with stiffer contact
   VectorX deep;           ///< where that led
-  VectorX z, move, change, mean, velocity, held_velocity, assumed, difference, whole_acceleration;
+  VectorX z, move, change, working, mean, velocity, held_velocity, assumed, difference, whole_acceleration;
   Configuration after;
   State from, next;  ///< explicit steps
 };

@@ -9,7 +9,7 @@ namespace {
 
 /// Forces of the last evaluation over mass, where nothing holds.
 void set_acceleration(const Equations& equations, const StepWorkspace& work, VectorX& acceleration) {
-  acceleration = -work.newton.evaluation.full_residual.cwiseProduct(equations.mass().inverse);
+  acceleration = -work.newton.data.full_residual.cwiseProduct(equations.mass().inverse);
   equations.assembler().project(acceleration);  // what a support holds has one mass
 }
 
@@ -20,14 +20,14 @@ void explicit_acceleration(Equations& equations, const Parameters& parameters, d
   work.from = state;  // one that reaches q over dt with velocity v
   work.from.q -= dt * v;
   work.from.v = v;
-  equations.begin(work.from, parameters, dt, false);
+  equations.begin(work.from, parameters, StepRule::verlet, dt);
   if (Contact* contact = equations.contact(); contact && contact->anchored())
     contact->begin(before, parameters, dt, Pressing::still);
   if (equations.flows() && !solve_flow(equations, state.q, v, work.newton.counters)) {
     acceleration.setConstant(state.q.size(), std::nan(""));
     return;
   }
-  equations.evaluate(state.q, false, nullptr, work.newton.evaluation);
+  equations.evaluate(state.q, false, nullptr, work.newton.data);
   set_acceleration(equations, work, acceleration);
 }
 
@@ -36,10 +36,11 @@ void explicit_acceleration(Equations& equations, const Parameters& parameters, d
 double free_acceleration(Equations& equations, const Parameters& parameters, const State& state, StepWorkspace& work) {
   State& next = work.next;
   if (next.q.size() != state.q.size()) next = state;  // once: what an explicit step leaves as it is, and room
-  const double turn = equations.advance(state, work.z, next);
-  equations.evaluate_forces(next, parameters, work.velocity, work.newton.evaluation);
+  const double turn = advance(equations.model(), state, work.z, work.newton.data.configuration, next);
+  equations.begin(next, parameters, StepRule::verlet, 0.0);
+  equations.evaluate_forces(work.velocity, work.newton.data);
   set_acceleration(equations, work, next.acceleration);
-  return equations.model().planar() ? turning(equations.model(), state, work.z).largest : turn;
+  return turn;
 }
 
 /// The same under contact, drag, viscosity or in a fluid.
@@ -85,11 +86,18 @@ double undamped_step(const Equations& equations, double shift) {
 
 }  // namespace
 
+double advance(const Model& model, const State& state, const VectorX& q, Configuration& configuration, State& next) {
+  if (!model.planar()) return std::acos(std::min(advance_configuration(model, state, q, configuration, next), 1.0));
+  compute_configuration(model, state, q, configuration);
+  next.q = q;
+  return turning(model, state, q).largest;
+}
+
 void find_acceleration(Equations& equations, const Parameters& parameters, double dt, State& state,
                        StepWorkspace& work) {
   if (state.acceleration_current) return;
   explicit_acceleration(equations, parameters, dt, state, state, state.v, work, state.acceleration);
-  if (equations.loaded()) equations.load_force(state.load_force);
+  if (equations.loaded()) equations.load_force(work.newton.data, state.load_force);
   if (const Contact* contact = equations.contact()) contact->friction_force(state.friction_force);
   state.acceleration_current = true;
 }
@@ -121,10 +129,10 @@ StepResult verlet_step(Equations& equations, const Parameters& parameters, doubl
   next.v = half + 0.5 * dt * next.acceleration;
   if (!std::isfinite(next.v.squaredNorm())) return result;
   work.change = q1 - state.q;
-  book_work(equations, parameters, work.change, result);
+  add_work(equations, parameters, work.change, work, result);
   if (equations.loaded()) {
     // The mean of the forces at both ends, as velocities are.
-    equations.load_force(next.load_force);
+    equations.load_force(work.newton.data, next.load_force);
     result.load_work = 0.5 * (state.load_force + next.load_force).dot(work.change);
   }
   if (Contact* contact = equations.contact()) {
@@ -136,7 +144,7 @@ StepResult verlet_step(Equations& equations, const Parameters& parameters, doubl
   }
   if (!model.constraints.empty()) {
     work.assumed.setZero(model.dof_count);
-    book_supports(equations, state.v, next.v, dt, work, result);
+    add_support_work(equations, state.v, next.v, dt, work, result);
   }
   next.acceleration_current = true;
   next.time = state.time + dt;
@@ -147,20 +155,20 @@ StepResult verlet_step(Equations& equations, const Parameters& parameters, doubl
 }
 
 double stable_step(Equations& equations, const Parameters& parameters, const State& state, StepWorkspace& work) {
-  equations.begin(state, parameters, 0.0, false);
-  equations.evaluate(state.q, true, nullptr, work.newton.evaluation);
+  equations.begin(state, parameters, StepRule::statics, 0.0);
+  equations.evaluate(state.q, true, nullptr, work.newton.data);
   double dt = undamped_step(equations, 0.0);
   // The eigenvalue falls while a step grows, at most as one over it: each round halves the logarithm of the error.
   for (int k = 0; k < 20 && std::isfinite(dt); ++k) {
     const double h = 0.25 * dt;
     work.from = state;  // as it moves: friction resists less, the faster it slips
     work.from.q -= h * state.v;
-    equations.begin(work.from, parameters, h, false);
+    equations.begin(work.from, parameters, StepRule::verlet, h);
     if (Contact* contact = equations.contact()) {
       contact->begin(work.from, parameters, dt, Pressing::still);
       contact->ease(0.25);
     }
-    equations.evaluate(state.q, true, nullptr, work.newton.evaluation);
+    equations.evaluate(state.q, true, nullptr, work.newton.data);
     const double before = std::exchange(dt, undamped_step(equations, 1.0 / (h * h)));
     if (std::abs(dt - before) < 1e-3 * dt) break;
   }

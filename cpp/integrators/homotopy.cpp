@@ -28,9 +28,9 @@ LoadPath growing_loads(Equations& equations, const Parameters& parameters, const
   // The residual is linear in them: the share by which the state is least out of balance.
   const auto out_of_balance = [&](double share) {
     scale(share, equations.loads().values);
-    equations.begin(state, parameters, 0.0, false);
-    equations.evaluate(state.q, false, nullptr, work.evaluation);
-    return work.evaluation.residual;
+    equations.begin(state, parameters, StepRule::statics, 0.0);
+    equations.evaluate(state.q, false, nullptr, work.data);
+    return work.data.residual;
   };
   const VectorX without = out_of_balance(0.0), change = out_of_balance(1.0) - without;
   const double square = change.squaredNorm();
@@ -43,23 +43,23 @@ LoadPath growing_loads(Equations& equations, const Parameters& parameters, const
 void Homotopy::start_out_of_balance() {
   imbalance_.setZero(state_.q.size());
   go_to(0.0);
-  equations_.evaluate(state_.q, false, nullptr, work_.evaluation);
-  imbalance_ = work_.evaluation.residual;
+  equations_.evaluate(state_.q, false, nullptr, work_.data);
+  imbalance_ = work_.data.residual;
   go_to(0.0);
 }
 
 void Homotopy::go_to(double factor) {
   factor_ = factor;
   loads_(factor, equations_.loads().values);
-  equations_.begin(state_, parameters_, 0.0, false);
+  equations_.begin(state_, parameters_, StepRule::statics, 0.0);
   if (imbalance_.size() == 0) imbalance_.setZero(state_.q.size());
   target_ = (1.0 - factor) * imbalance_;
 }
 
 void Homotopy::evaluate(const VectorX& z, bool with_matrix, const double* axial_force) {
-  equations_.evaluate(z, with_matrix, axial_force, work_.evaluation);
-  work_.evaluation.residual -= target_;
-  work_.evaluation.potential -= target_.dot(z);
+  equations_.evaluate(z, with_matrix, axial_force, work_.data);
+  work_.data.residual -= target_;
+  work_.data.potential -= target_.dot(z);
 }
 
 void Homotopy::find_pull(const VectorX& z, VectorX& pull, VectorX& held) {
@@ -74,12 +74,12 @@ void Homotopy::find_pull(const VectorX& z, VectorX& pull, VectorX& held) {
   }
   held /= little;
   moves_ = !held.isZero(0.0);
-  equations_.evaluate(z, false, nullptr, work_.evaluation);
-  pull = work_.evaluation.residual;
+  equations_.evaluate(z, false, nullptr, work_.data);
+  pull = work_.data.residual;
   loads_(factor_ + little, equations_.loads().values);
-  equations_.evaluate(moved_, false, nullptr, work_.evaluation);
+  equations_.evaluate(moved_, false, nullptr, work_.data);
   loads_(factor_, equations_.loads().values);
-  pull = (pull - work_.evaluation.residual) / little - imbalance_;
+  pull = (pull - work_.data.residual) / little - imbalance_;
 }
 
 void Homotopy::find_tangent(Tangent& out) {

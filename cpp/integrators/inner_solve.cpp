@@ -31,7 +31,7 @@ void start_axial_force(const Equations& equations, const VectorX& q, VectorX& ou
     const int a = model.node_dof[at(model.edge_tail[at(e)])], b = model.node_dof[at(model.edge_head[at(e)])];
     double square = 0.0;
     for (int i = 0; i < model.dimension; ++i) square += (q(b + i) - q(a + i)) * (q(b + i) - q(a + i));
-    out(e) = equations.elastic.stretch_stiffness(e) * (std::sqrt(square) / model.edge_length(e) - 1.0);
+    out(e) = equations.elastic().stretch_stiffness(e) * (std::sqrt(square) / model.edge_length(e) - 1.0);
   }
 }
 
@@ -48,7 +48,7 @@ void follow_supports(Equations& equations, const Newton& newton, double part, co
   assembler.add_held_change(state.q, work.held.q, part, held);
   const double bearable = newton.norms().cap(held);
   if (bearable < 1.0) {
-    Evaluation& e = work.newton.evaluation;
+    StepData& e = work.newton.data;
     work.newton.matrix.owner = nullptr;
     work.z = state.q + work.move;
     equations.evaluate(work.z, true, nullptr, e);

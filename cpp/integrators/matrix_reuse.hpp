@@ -5,7 +5,7 @@
 #include <array>
 #include <cmath>
 
-#include "integrators/equations.hpp"
+#include "steps/equations.hpp"
 
 namespace withe {
 

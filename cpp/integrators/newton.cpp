@@ -36,13 +36,13 @@ bool loses_path(const Prediction& predicted, const MatrixReuse& reuse, bool firs
 /// |F|^2 / 2.
 double line_search(const NewtonSystem& system, const VectorX& z, const VectorX& step) {
   NewtonWorkspace& work = system.work;
-  const double before = 0.5 * work.evaluation.residual.squaredNorm();
+  const double before = 0.5 * work.data.residual.squaredNorm();
   const double slope = -2.0 * before;  // F^T (dF/dq) dq, with dq = -J^-1 F
   double low = 0.0, high = 2.0, alpha = 1.0;
   for (int n = 0; n < 20; ++n) {
     work.trial = z + alpha * step;
     system.evaluate(work.trial, false);
-    const double change = 0.5 * work.evaluation.residual.squaredNorm() - before;
+    const double change = 0.5 * work.data.residual.squaredNorm() - before;
     if (!(change <= 0.1 * alpha * slope))
       high = alpha;
     else if (alpha < 1.0 && change < 0.9 * alpha * slope)
@@ -59,7 +59,7 @@ double line_search(const NewtonSystem& system, const VectorX& z, const VectorX& 
 
 Newton::Newton(const Model& model, const Options& options) : model_(model), options_(options), norms_(model) {}
 
-Balance Newton::balance(const Evaluation& e, NewtonResult& result) const {
+Balance Newton::balance(const StepData& e, NewtonResult& result) const {
   double force_scale = 0.0, moment_scale = 0.0;
   for (Eigen::Index i = 0; i < e.residual.size(); ++i) {
     double& scale = norms_.is_angle(i) ? moment_scale : force_scale;
@@ -129,8 +129,8 @@ class Newton::Solve {
     const bool near_end = reuse_.near_end();
     if (!search_.evaluated() || (reuse_.fresh() && !near_end)) evaluate(reuse_.fresh() && !near_end);
     result_.step = reuse_.step();
-    if (!work_.evaluation.residual.allFinite()) return Verdict::failed;
-    balance_ = newton_.balance(work_.evaluation, result_);
+    if (!work_.data.residual.allFinite()) return Verdict::failed;
+    balance_ = newton_.balance(work_.data, result_);
     if (converged()) return Verdict::converged;
     if (result_.iterations == how_.max_iterations) return Verdict::failed;
     if (result_.iterations == 0) first_residual_ = result_.residual;
@@ -165,7 +165,7 @@ class Newton::Solve {
     if (!work_.step.allFinite()) return false;
     double shorten = search_.shortened(z_, work_.step);
     system_.equations.foresee(work_.step, shorten);
-    if (mixed_) system_.equations.predict_axial_force(work_.step, work_.axial_force);
+    if (mixed_) predict_axial_force(system_.equations.problem(), work_.data, work_.step, work_.axial_force);
     axial_known_ = mixed_;
     if (contact_ && !step_between_surfaces(shorten)) return false;
     if (result_.iterations == 0) result_.cut = contact_ && shorten < kCut;

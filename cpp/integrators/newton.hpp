@@ -51,7 +51,7 @@ class Newton {
   /// Finds z with F(z) = target, starting at z.
   NewtonResult solve(Equations& equations, VectorX& z, const SolveOptions& how, NewtonWorkspace& work) const;
   /// Whether residuals are small enough; also notes the worst one in `result`.
-  Balance balance(const Evaluation& evaluation, NewtonResult& result) const;
+  Balance balance(const StepData& evaluation, NewtonResult& result) const;
 
  private:
   class Solve;

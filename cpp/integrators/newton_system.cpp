@@ -19,13 +19,13 @@ bool factorize(Equations& equations, NewtonWorkspace& work) {
 
 void NewtonSystem::evaluate(const VectorX& z, bool matrix, const double* axial_force) const {
   const Timer timer(work.counters.assembly_time);
-  equations.evaluate(z, matrix, axial_force, work.evaluation);
-  if (target) work.evaluation.residual -= *target;
+  equations.evaluate(z, matrix, axial_force, work.data);
+  if (target) work.data.residual -= *target;
 }
 
 void NewtonSystem::solve_for(VectorX& step) const {
   const Timer timer(work.counters.solve_time);
-  step = -work.evaluation.residual;
+  step = -work.data.residual;
   equations.assembler().solver().solve({step.data(), static_cast<std::size_t>(step.size())});
 }
 

@@ -3,7 +3,7 @@
 
 #include <functional>
 
-#include "integrators/equations.hpp"
+#include "steps/equations.hpp"
 #include "integrators/guess_history.hpp"
 #include "integrators/matrix_reuse.hpp"
 
@@ -16,7 +16,7 @@ struct Counters {
 
 /// Scratch of the solver; owned by the world, so that a step does not allocate.
 struct NewtonWorkspace {
-  Evaluation evaluation;
+  StepData data;
   VectorX step, axial_force, trial, next_step;
   MatrixRecord matrix;
   GuessHistory guesses;

@@ -3,7 +3,7 @@
 
 #include <optional>
 
-#include "solvers/linear_solver.hpp"
+#include "steps/equations.hpp"
 
 namespace withe {
 
@@ -30,5 +30,8 @@ struct Options {
   int max_iterations = 40;        ///< per Newton solve
   int max_halvings = 12;          ///< smallest step is time_step / 2^max_halvings
 };
+
+/// The form of the equations that an integrator solves.
+EquationOptions equation_options(const Options& options);
 
 }  // namespace withe

@@ -148,8 +148,8 @@ class Statics {
       prediction.length = newton_.norms().displacement(step_);
       if (next < 1.0 && !touching) prediction.enough = kOnTheWay * equations_.model().length_scale;
       // Axial forces by the linear solution: those of the prediction are of edges that stretch as they turn.
-      equations_.evaluate(state_.q, false, nullptr, work_.evaluation);
-      equations_.predict_axial_force(step_, work_.axial_force);
+      equations_.evaluate(state_.q, false, nullptr, work_.data);
+      predict_axial_force(equations_.problem(), work_.data, step_, work_.axial_force);
       z_ = state_.q + step_;
       if (!path_.hold(next, z_)) return false;
       predicted = clear_way(z_);
@@ -165,7 +165,7 @@ class Statics {
                                          work_);
     note(r, last);
     last.step = r.step;
-    if (!r.converged || turned_too_far(state_, equations_.configuration(), equations_.model().planar())) return false;
+    if (!r.converged || turned_too_far(state_, work_.data.configuration, equations_.model().planar())) return false;
     accept(z_);
     return true;
   }
@@ -209,7 +209,7 @@ class Statics {
     double stiffness = 0.0;
     for (int i = 0; i < model.dof_count; ++i)
       stiffness = std::max(stiffness, equations_.assembler().diagonal(i) / std::max(equations_.mass().rows(i), 1e-300));
-    double potential = work_.evaluation.potential;
+    double potential = work_.data.potential;
     energy_scale_ = std::max(energy_scale_, std::abs(potential));
     double h = 1e2 / std::sqrt(stiffness);
     const double longest = 1e12 * h, shortest = 1e-6 * h;
@@ -217,15 +217,15 @@ class Statics {
     for (int k = 0; k < 400 && h > shortest; ++k) {
       state_.v.setZero();
       const bool at_rest = h >= longest;
-      equations_.begin(state_, parameters_, at_rest ? 0.0 : h, false);
+      equations_.begin(state_, parameters_, at_rest ? StepRule::statics : StepRule::backward_euler, at_rest ? 0.0 : h);
       z = state_.q;
       const NewtonResult r =
           newton_.solve(equations_, z, {.target = &path_.target(), .max_iterations = at_rest ? 40 : 25}, work_);
       note(r, last);
-      const double found = work_.evaluation.potential - path_.target().dot(z);
+      const double found = work_.data.potential - path_.target().dot(z);
       const double rounding = 1e-10 * (std::abs(potential) + std::abs(found)) + least_energy();
       const bool falls = !equations_.has_potential() || found <= potential + rounding;
-      if (r.converged && falls && !turned_too_far(state_, equations_.configuration(), model.planar())) {
+      if (r.converged && falls && !turned_too_far(state_, work_.data.configuration, model.planar())) {
         accept(z);
         if (at_rest) return true;
         potential = found;
@@ -247,7 +247,7 @@ class Statics {
     for (int k = 0; k < max_steps; ++k) {
       work_.poll();
       evaluate(1.0);
-      const Evaluation here = work_.evaluation;
+      const StepData here = work_.data;
       const Balance balance = newton_.balance(here, last);
       if (damping == 0.0) {
         double stiffness = 0.0;
@@ -264,8 +264,8 @@ class Statics {
         const NewtonResult r = newton_.solve(equations_, z, {.max_iterations = 30}, work_);
         last.iterations += r.iterations;
         last.residual = r.residual;
-        if (r.converged && work_.evaluation.potential <= energy + 1e-9 * std::abs(energy) + least_energy() &&
-            !turned_too_far(state_, equations_.configuration(), model.planar())) {
+        if (r.converged && work_.data.potential <= energy + 1e-9 * std::abs(energy) + least_energy() &&
+            !turned_too_far(state_, work_.data.configuration, model.planar())) {
           accept(z);
           return true;
         }
@@ -288,11 +288,11 @@ class Statics {
           continue;
         }
         z = state_.q + step;
-        equations_.evaluate(z, false, nullptr, work_.evaluation);
+        equations_.evaluate(z, false, nullptr, work_.data);
         const double gain = here.residual.dot(step);  // negative
         const double rounding = 1e-13 * (std::abs(here.potential) + here.magnitude.cwiseAbs().dot(step.cwiseAbs()));
-        if (std::isfinite(work_.evaluation.potential) &&
-            work_.evaluation.potential - here.potential <= 0.1 * gain + rounding) {
+        if (std::isfinite(work_.data.potential) &&
+            work_.data.potential - here.potential <= 0.1 * gain + rounding) {
           accepted = true;
         } else {
           damping *= 4.0;
@@ -392,7 +392,7 @@ StaticResult find_equilibrium(Equations& equations, const Newton& newton, const 
                               const Parameters& parameters, const Boundary& boundary, State& state,
                               NewtonWorkspace& work) {
   const std::vector<Vector3> loads = equations.loads().values;
-  equations.held_acceleration.resize(0);  // that of the last time step, if there was one
+  equations.held_acceleration().resize(0);  // that of the last time step, if there was one
   const StaticResult result = Statics(equations, newton, options, parameters, boundary, state, work).run();
   equations.loads().values = loads;
   return result;

@@ -1,5 +1,5 @@
 #pragma once
-/// What implicit and explicit steps share: how far edges turn, and the books of energy.
+/// What implicit and explicit steps share: how far edges turn, and the energy that goes in and out.
 
 #include "integrators/dynamics.hpp"
 
@@ -14,15 +14,20 @@ Turning turning(const Model& model, const State& state, const VectorX& q, const 
                 bool at_end = false);
 
 /// Work of loads, drag and viscosity over the step, with the forces that acted in it.
-void book_work(Equations& equations, const Parameters& parameters, const VectorX& change, StepResult& result);
+void add_work(const Equations& equations, const Parameters& parameters, const VectorX& change, StepWorkspace& work,
+              StepResult& result);
 
 /// Held unknowns move as they are told, and so act on the edges next to them by their acceleration, (v1 - v0) / dt.
 /// The supports' work is that of the forces on what they hold, over its way, and
 /// (v0 + v1) / 2 times M (v1 - v0) there: the latter, with what the others' equations say of theirs, is exactly what
 /// the kinetic energy grows by. Puts M (v1 - v0) / dt into the reactions in place of `work.assumed`, the inertia in the
 /// residual.
-void book_supports(const Equations& equations, const VectorX& v0, const VectorX& v1, double dt, StepWorkspace& work,
-                   StepResult& result);
+void add_support_work(const Equations& equations, const VectorX& v0, const VectorX& v1, double dt, StepWorkspace& work,
+                      StepResult& result);
+
+/// Of an explicit step from a state to q: the configuration there, and that of `next`. Returns by how much edges turn at
+/// most [rad].
+double advance(const Model& model, const State& state, const VectorX& q, Configuration& configuration, State& next);
 
 /// Finds the fluid's force at q on velocities v, and the time that takes.
 bool solve_flow(Equations& equations, const VectorX& q, const VectorX& v, Counters& counters);

@@ -20,7 +20,7 @@ double SurfaceSearch::shortened(const VectorX& z, VectorX& step) const {
 
 bool SurfaceSearch::run(const VectorX& z, bool nearer, double& shorten) {
   NewtonWorkspace& work = system_.work;
-  const bool uphill = work.step.dot(work.evaluation.residual) > 0.0;
+  const bool uphill = work.step.dot(work.data.residual) > 0.0;
   double kept = search(z, nearer, uphill ? kLittle : 0.0, shorten);
   if (uphill && !evaluated_) {
     Contact& contact = *system_.equations.contact();
@@ -42,7 +42,7 @@ bool SurfaceSearch::run(const VectorX& z, bool nearer, double& shorten) {
 /// Share of the step that leads on, and more than `least`; else as it is at the last, not evaluated.
 double SurfaceSearch::search(const VectorX& z, bool nearer, double least, double shorten) {
   NewtonWorkspace& work = system_.work;
-  const Evaluation& e = work.evaluation;
+  const StepData& e = work.data;
   const double full = norms_.displacement(work.step) / shorten, before = work.step.dot(e.residual);
   forget();
   double kept = 1.0;

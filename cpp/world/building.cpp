@@ -91,7 +91,7 @@ World::Implementation::Implementation(const Implementation& other)
   work.newton.counters = other.work.newton.counters;
   listen();
   newton = std::make_unique<Newton>(model, options);
-  equations = std::make_unique<Equations>(model, options);
+  equations = std::make_unique<Equations>(model, equation_options(options));
   equations->loads().values = load_values;
 }
 
@@ -170,13 +170,13 @@ void World::Implementation::rebuild(Rebuild why) {
     const double before = kinetic_energy(old, scratch.mass, from.v);
     update_derived(model, parameters);
     newton = std::make_unique<Newton>(model, options);
-    equations = std::make_unique<Equations>(model, options);
+    equations = std::make_unique<Equations>(model, equation_options(options));
     relax_frames(is_new);
     set_mass(model, parameters, scratch.mass);
     support_work += kinetic_energy(model, scratch.mass, state.v) - before;
   }
   newton = std::make_unique<Newton>(model, options);
-  equations = std::make_unique<Equations>(model, options);
+  equations = std::make_unique<Equations>(model, equation_options(options));
   equations->loads().values = load_values;
   if (Contact* contact = equations->contact()) contact->initialise(state, parameters);
   reaction_current = false;
@@ -188,7 +188,7 @@ void World::Implementation::remake_equations() {
   static_equations.reset();
   rescue_equations.reset();
   newton = std::make_unique<Newton>(model, options);
-  equations = std::make_unique<Equations>(model, options);
+  equations = std::make_unique<Equations>(model, equation_options(options));
   equations->loads().values = load_values;
   forget_matrix();
   reaction_current = false;

@@ -17,7 +17,7 @@ Equations& World::Implementation::statics() {
   if (!static_equations) {
     Options symmetric = options;
     symmetric.integrator = Integrator::statics;
-    static_equations = std::make_unique<Equations>(model, symmetric);
+    static_equations = std::make_unique<Equations>(model, equation_options(symmetric));
   }
   static_equations->loads().values = load_values;
   return *static_equations;
@@ -28,7 +28,7 @@ Equations& World::Implementation::rescue() {
   if (!rescue_equations) {
     Options conserving = options;
     conserving.integrator = Integrator::energy_momentum;
-    rescue_equations = std::make_unique<Equations>(model, conserving);
+    rescue_equations = std::make_unique<Equations>(model, equation_options(conserving));
   }
   rescue_equations->loads().values = load_values;
   return *rescue_equations;
@@ -60,8 +60,8 @@ bool World::Implementation::drifts(Equations& system) {
   if (system.contact()) return false;
   for (const Support& s : model.supports)
     if (s.active) return false;
-  system.begin(state, parameters, 0.0, false);
-  Evaluation& e = work.newton.evaluation;
+  system.begin(state, parameters, StepRule::statics, 0.0);
+  StepData& e = work.newton.data;
   system.evaluate(state.q, true, nullptr, e);
   if (!e.residual.allFinite()) return false;
   constexpr double kBalanced = 1e-6, kNeutral = 1e-12;  // over all forces there are; over the greatest stiffness
@@ -117,7 +117,7 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
     solve_for_custom_at_rest(system, time);
     aim_obstacles(system, time);
     if (drifts(system))
-      newton->balance(work.newton.evaluation, r.newton);
+      newton->balance(work.newton.data, r.newton);
     else
       r = find_equilibrium(system, *newton, options, parameters, boundary, state, work.newton);
     // Contact that turns out too soft is made stiffer, from where it has settled.
@@ -133,7 +133,7 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
     throw;
   }
   release_obstacles(system);
-  system.respond = nullptr;
+  system.respond({});
   if (!r.converged) {
     undo();
     const bool held =
@@ -148,11 +148,11 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
   retire_ramps();
   statistics.steps += 1;
   steps_taken += 1;
-  system.begin(state, parameters, 0.0, false);
-  system.evaluate(state.q, false, nullptr, work.newton.evaluation);
-  reaction_residual = work.newton.evaluation.full_residual;
+  system.begin(state, parameters, StepRule::statics, 0.0);
+  system.evaluate(state.q, false, nullptr, work.newton.data);
+  reaction_residual = work.newton.data.full_residual;
   reaction_current = true;
-  newton->balance(work.newton.evaluation, r.newton);
+  newton->balance(work.newton.data, r.newton);
   check_resolution();
   if (r.branch_changed) statistics.branch_changes += 1;
   const bool frictional = system.contact() && system.contact()->frictional();
@@ -211,7 +211,7 @@ EquilibriumPath World::equilibrium_path(const PathOptions& wanted) {
     Homotopy path(system, *self.newton, self.parameters, boundary, loads, self.state, self.work.newton);
     if (!by_loads) path.start_out_of_balance();
     const ArcVisitor visit = [&](const ArcPoint& point) {
-      self.reaction_residual = self.work.newton.evaluation.full_residual;
+      self.reaction_residual = self.work.newton.data.full_residual;
       self.reaction_current = true;
       MatrixX3 forces = MatrixX3::Zero(static_cast<Eigen::Index>(target.size()), 3), moments = forces;
       for (std::size_t s = 0; s < target.size(); ++s) {
@@ -224,7 +224,7 @@ EquilibriumPath World::equilibrium_path(const PathOptions& wanted) {
     };
     r = follow_arc(system, *self.newton, self.options, path,
                    {wanted.start, wanted.end, wanted.most_points, wanted.turn}, self.state, self.work.newton, visit);
-    system.respond = nullptr;
+    system.respond({});
     move_to(r.factor);
     for (std::size_t s = 0; s < target.size(); ++s) {
       SupportMotion& m = self.motions[s];
@@ -252,9 +252,9 @@ void World::Implementation::refresh_reactions() {
   if (reaction_current) return;
   Equations& system = statics();
   update_custom_force(system);
-  system.begin(state, parameters, 0.0, false);
-  system.evaluate(state.q, false, nullptr, work.newton.evaluation);
-  reaction_residual = work.newton.evaluation.full_residual;
+  system.begin(state, parameters, StepRule::statics, 0.0);
+  system.evaluate(state.q, false, nullptr, work.newton.data);
+  reaction_residual = work.newton.data.full_residual;
   reaction_current = true;
 }
 

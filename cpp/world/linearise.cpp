@@ -73,10 +73,10 @@ SparseMatrix matrix_of(const Model& model, const MassMatrix& mass) {
 /// their stiffnesses are taken away but their forces are kept.
 class StrainParts {
  public:
-  StrainParts(const Equations& system, const State& state)
-      : system_(system), state_(state), model_(system.model()), without_(system.elastic) {
+  StrainParts(const Equations& system, const State& state, const Configuration& configuration)
+      : system_(system), state_(state), configuration_(configuration), model_(system.model()), without_(system.elastic()) {
     for (int e = 0; e < model_.edge_count; ++e) add_stretch(e);
-    const ElasticCoefficients& k = system.elastic;
+    const ElasticCoefficients& k = system.elastic();
     for (int b = 0; b < static_cast<int>(model_.bend.size()); ++b)
       add_turning(system.assembler().bend, b, k.bend_stiffness, k.bend_natural, without_.bend_stiffness,
                   without_.bend_natural, &StrainParts::bend);
@@ -106,10 +106,10 @@ class StrainParts {
 
   /// The strain of a stretched edge is taken as its elongation [m].
   void add_stretch(int edge) {
-    const ElasticCoefficients& k = system_.elastic;
+    const ElasticCoefficients& k = system_.elastic();
     const double stiffness = k.stretch_stiffness(edge);
     if (stiffness == 0.0) return;
-    const Configuration& c = system_.configuration();
+    const Configuration& c = configuration_;
     const Vec3d& t = c.edge[at(edge)].tangent;
     const double along[3] = {t.x, t.y, t.z};
     double gradient[kMaxLocal] = {};
@@ -124,10 +124,10 @@ class StrainParts {
   }
 
   void bend(const ElasticCoefficients& k, int stencil, Local& out) const {
-    bend_local(model_, k, system_.configuration(), stencil, false, out);
+    bend_local(model_, k, configuration_, stencil, false, out);
   }
   void half(const ElasticCoefficients& k, int stencil, Local& out) const {
-    half_local(model_, state_.q, k, system_.configuration(), stencil, false, out);
+    half_local(model_, state_.q, k, configuration_, stencil, false, out);
   }
 
   /// Energies k (s - s0)^2 / 2 of unit stiffness differ by s + 1/2, and their gradients by that of s, between natural
@@ -156,6 +156,7 @@ class StrainParts {
 
   const Equations& system_;
   const State& state_;
+  const Configuration& configuration_;
   const Model& model_;
   ElasticCoefficients without_;
   Entries entries_;
@@ -170,19 +171,19 @@ Linearisation World::linearise() const {
   // Equations of its own: what is read out changes no matrix that is yet to serve.
   Options symmetric = self.options;
   symmetric.integrator = Integrator::statics;
-  Equations system(model, symmetric);
+  Equations system(model, equation_options(symmetric));
   system.loads().values = self.load_values;
   self.update_custom_force(system);
   const MatrixX3 forces = self.custom_force, moments = self.custom_moments;
   self.solve_for_custom_at_rest(system, self.state.time);
-  system.begin(self.state, self.parameters, 0.0, false);
-  Evaluation evaluation;
+  system.begin(self.state, self.parameters, StepRule::statics, 0.0);
+  StepData evaluation;
   const SparseMatrix basis = free_basis(model), back = basis.transpose();
   std::optional<StrainParts> parts;
   try {
     system.evaluate(self.state.q, false, nullptr, evaluation);
-    parts.emplace(system, self.state);
-    system.elastic = parts->without();
+    parts.emplace(system, self.state, evaluation.configuration);
+    system.elastic() = parts->without();
     system.evaluate(self.state.q, true, nullptr, evaluation);
   } catch (...) {
     self.forget_custom(system, forces, moments);

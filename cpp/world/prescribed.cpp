@@ -157,19 +157,19 @@ void World::Implementation::solve_for_custom(Equations& target, double dt) {
     find_custom_force(target, dt);
     return;
   }
-  target.respond = [this, time = force_time(state.time, dt)](const VectorX& q, const VectorX& v, bool derivatives) {
+  target.respond([this, time = force_time(state.time, dt)](const VectorX& q, const VectorX& v, bool derivatives) {
     return custom_forces(time, q, v, derivatives);
-  };
+  });
 }
 
 /// In balance, whatever moves towards it, velocities are zero.
 void World::Implementation::solve_for_custom_at_rest(Equations& target, double time) {
   if (!force_function) return;
-  target.respond = [this, time](const VectorX& q, const VectorX& v, bool derivatives) {
+  target.respond([this, time](const VectorX& q, const VectorX& v, bool derivatives) {
     CustomForces now = custom_forces(time, q, VectorX::Zero(v.size()), derivatives);
     now.by_velocity.resize(0, 0);
     return now;
-  };
+  });
 }
 
 /// Forces at the start of a step would feed a spring's oscillation, by 1 + (w dt)^2 / 2 a step. At q0 + (dt / 2) v0,
@@ -203,7 +203,7 @@ void World::Implementation::find_custom_force(Equations& target, double dt) {
 }
 
 void World::Implementation::forget_custom(Equations& target, const MatrixX3& forces, const MatrixX3& moments) {
-  target.respond = nullptr;
+  target.respond({});
   custom_force = forces;
   custom_moments = moments;
   update_custom_force(target);

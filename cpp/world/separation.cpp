@@ -24,7 +24,7 @@ class Separation {
         parameters_(massive(model_, parameters)),
         options_(descent(options)),
         newton_(model_, options_),
-        equations_(model_, options_),
+        equations_(model_, equation_options(options_)),
         state_(start),
         barred_(model.description.contact.law == ContactLaw::barrier) {
     contact().allow_depth(INFINITY);

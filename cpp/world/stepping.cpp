@@ -304,7 +304,7 @@ bool World::Implementation::inner_step(double dt, int slot, double& error) {
   aim_obstacles(system, end);
   const auto undo = [&] {
     work.repeated = false;
-    system.respond = nullptr;
+    system.respond({});
     release_obstacles(system);
     motions = kept_motions;
     if (ramped) apply_ramps(start);
@@ -329,7 +329,7 @@ bool World::Implementation::inner_step(double dt, int slot, double& error) {
     undo();
     return false;
   }
-  system.respond = nullptr;
+  system.respond({});
   release_obstacles(system);
   error = r.error;
   guard.turn = std::max(guard.turn, r.largest_turn);
@@ -372,7 +372,7 @@ StepResult World::Implementation::step_by_rule(double dt, int slot) {
 /// The residual of a frame's unknowns is J(w)^T moment, w its turn where the forces act; of an energy-momentum step,
 /// the moment.
 void World::Implementation::keep_reactions() {
-  reaction_residual = work.newton.evaluation.full_residual;
+  reaction_residual = work.newton.data.full_residual;
   reaction_current = true;
   if (model.planar() || rule_of_step() == StepRule::energy_momentum) return;
   for (const Support& support : model.supports) {

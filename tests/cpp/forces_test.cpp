@@ -27,7 +27,7 @@ Sum sum_of(const Case& c, const Loads& loads, const VectorX& q) {
   for (const LoadPiece& piece : loads.pieces) {
     int dofs[kMaxLocal];
     const int n = load_dofs(c.model, piece, dofs);
-    load_local(c.model, c.state, q, configuration, loads, piece, local);
+    load_local(c.model, c.state, q, configuration, piece, loads.values[at(piece.load)], local);
     for (int i = 0; i < n; ++i) {
       sum.force(dofs[i]) -= local.gradient[i];
       for (int j = 0; j < n; ++j) sum.jacobian(dofs[i], dofs[j]) += local.hessian[i][j];
@@ -188,7 +188,7 @@ TEST(Loads, APressureOnAClosedRodIsTheGradientOfAnArea) {
         Local local;
         double total = 0.0;
         for (const LoadPiece& piece : loads.pieces) {
-          load_local(c.model, c.state, q, configuration, loads, piece, local);
+          load_local(c.model, c.state, q, configuration, piece, loads.values[at(piece.load)], local);
           total += local.energy;
         }
         return VectorX::Constant(1, total);

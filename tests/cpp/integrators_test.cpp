@@ -7,6 +7,7 @@
 #include "derivative_check.hpp"
 #include "integrators/dynamics.hpp"
 #include "integrators/statics.hpp"
+#include "steps/inertia.hpp"
 #include "states.hpp"
 
 namespace withe {
@@ -33,6 +34,8 @@ Options options_of(Scheme scheme) {
   return options;
 }
 
+StepRule rule_of(Scheme scheme) { return equation_options(options_of(scheme)).rule; }
+
 double interval_of(Scheme scheme, double dt) {
   return scheme == Scheme::statics ? 0.0 : scheme == Scheme::backward_euler ? dt : 0.5 * dt;
 }
@@ -42,10 +45,10 @@ void expect_matrix_is_exact(Case c, Scheme scheme, double dt) {
   // The discrete gradient divides by the step, so differences about a step of nothing are rounding.
   if (scheme == Scheme::energy_momentum && c.q == c.state.q)
     c.q += 10.0 * c.increment * testing::RandomNumbers(8).vector(c.q.size());
-  Equations equations(c.model, options_of(scheme));
+  Equations equations(c.model, equation_options(options_of(scheme)));
   const Parameters parameters = initial_parameters(c.model);
-  equations.begin(c.state, parameters, interval_of(scheme, dt), scheme == Scheme::energy_momentum);
-  Evaluation evaluation;
+  equations.begin(c.state, parameters, rule_of(scheme), interval_of(scheme, dt));
+  StepData evaluation;
   const Eigen::Index n = c.model.dof_count;
   MatrixX free(n, n), J(n, n);
   equations.evaluate(c.q, true, nullptr, evaluation);
@@ -175,13 +178,13 @@ TEST(Equations, EnergyMomentumIsMidpointWhereNothingMovesYet) {
       if (!c.model.planar()) c.q.segment<3>(dof).setZero();
     c.state.q = c.q;
     const Parameters parameters = initial_parameters(c.model);
-    Equations a(c.model, options_of(Scheme::energy_momentum)), b(c.model, options_of(Scheme::implicit_midpoint));
-    a.begin(c.state, parameters, 0.0, true);
-    b.begin(c.state, parameters, 0.0, false);
+    Equations a(c.model, equation_options(options_of(Scheme::energy_momentum))), b(c.model, equation_options(options_of(Scheme::implicit_midpoint)));
+    a.begin(c.state, parameters, StepRule::energy_momentum, 0.0);
+    b.begin(c.state, parameters, StepRule::statics, 0.0);
     Configuration here;
     compute_configuration(c.model, c.state, c.q, here);
     if (!c.model.planar()) accept_configuration(c.model, c.q, here, c.state);
-    Evaluation ea, eb;
+    StepData ea, eb;
     a.evaluate(c.q, true, nullptr, ea);
     b.evaluate(c.q, true, nullptr, eb);
     EXPECT_LT((ea.residual - eb.residual).norm(), 1e-12 * (1.0 + eb.magnitude.norm())) << c.name;
@@ -199,10 +202,10 @@ TEST(Equations, EnergyMomentumIsMidpointWhereNothingMovesYet) {
 
 TEST(Equations, MixedNewtonSharesTheResidual) {
   for (const Case& c : moving_cases(lossy())) {
-    Equations equations(c.model, options_of(Scheme::backward_euler));
+    Equations equations(c.model, equation_options(options_of(Scheme::backward_euler)));
     const Parameters parameters = initial_parameters(c.model);
-    equations.begin(c.state, parameters, 0.1, false);
-    Evaluation plain, mixed;
+    equations.begin(c.state, parameters, StepRule::backward_euler, 0.1);
+    StepData plain, mixed;
     const VectorX axial = VectorX::Constant(c.model.edge_count, 2.5);
     equations.evaluate(c.q, true, nullptr, plain);
     equations.evaluate(c.q, true, axial.data(), mixed);
@@ -215,11 +218,11 @@ TEST(Equations, EnergyMomentumForcesDoTheWorkOfTheEnergyTheyChange) {
   // drag and gravity the residual of statics is all there is.
   for (const Case& c : testing::all_cases()) {
     if (c.increment < 1e-2) continue;
-    Equations equations(c.model, options_of(Scheme::energy_momentum));
+    Equations equations(c.model, equation_options(options_of(Scheme::energy_momentum)));
     Parameters parameters = initial_parameters(c.model);
     parameters.gravity.setZero();
-    equations.begin(c.state, parameters, 0.0, true);
-    Evaluation evaluation;
+    equations.begin(c.state, parameters, StepRule::energy_momentum, 0.0);
+    StepData evaluation;
     const VectorX z = 0.5 * (c.state.q + c.q);
     equations.evaluate(z, false, nullptr, evaluation);
     const auto energy_at = [&](const VectorX& q) {
@@ -227,20 +230,21 @@ TEST(Equations, EnergyMomentumForcesDoTheWorkOfTheEnergyTheyChange) {
       compute_configuration(c.model, c.state, q, configuration);
       double sum = 0.0;
       for (int e = 0; e < c.model.edge_count; ++e)
-        sum += stretch_energy_of(c.model, equations.elastic, configuration, e);
+        sum += stretch_energy_of(c.model, equations.elastic(), configuration, e);
       for (int b = 0; b < static_cast<int>(c.model.bend.size()); ++b) {
-        const BendTwistEnergy part = bend_energy_of(equations.elastic, configuration, b);
+        const BendTwistEnergy part = bend_energy_of(equations.elastic(), configuration, b);
         sum += part.bend + part.twist;
       }
       for (int h = 0; h < static_cast<int>(c.model.half.size()); ++h) {
-        const BendTwistEnergy part = half_energy_of(equations.elastic, configuration, h);
+        const BendTwistEnergy part = half_energy_of(equations.elastic(), configuration, h);
         sum += part.bend + part.twist;
       }
       return sum;
     };
     const double change = energy_at(c.q) - energy_at(c.state.q);
     // Rows of frames in space are moments over their Cayley vectors.
-    VectorX over = equations.working_change(c.q - c.state.q);
+    VectorX over;
+    set_working_change(equations.problem(), evaluation, c.q - c.state.q, over);
     for (int dof : c.model.frame_dof)
       if (!c.model.planar()) over.segment<3>(dof) = c.q.segment<3>(dof) - c.state.q.segment<3>(dof);
     EXPECT_NEAR(evaluation.full_residual.dot(over), change, 1e-11 * (1.0 + energy_at(c.q))) << c.name;
@@ -255,10 +259,10 @@ TEST(Equations, SpinCoupleDoesNoWorkAndAddsNoForce) {
   b.add_rod(testing::helix(6), spinning);
   const Case with = testing::states_of("spin", b.scene)[3], without = testing::states_of("still", a.scene)[3];
   const auto residual = [](const Case& c) {
-    Equations equations(c.model, options_of(Scheme::backward_euler));
+    Equations equations(c.model, equation_options(options_of(Scheme::backward_euler)));
     const Parameters parameters = initial_parameters(c.model);
-    equations.begin(c.state, parameters, 0.2, false);
-    Evaluation evaluation;
+    equations.begin(c.state, parameters, StepRule::backward_euler, 0.2);
+    StepData evaluation;
     equations.evaluate(c.q, false, nullptr, evaluation);
     return evaluation.full_residual;
   };
@@ -279,10 +283,10 @@ TEST(Equations, SpinCoupleDoesNoWorkAndAddsNoForce) {
 
 /// Moves every unknown by its rounding, to and fro: no row may change by more than Newton's method takes for balanced.
 void expect_rounding_within_floor(const Case& c, double dt) {
-  Equations equations(c.model, options_of(Scheme::backward_euler));
+  Equations equations(c.model, equation_options(options_of(Scheme::backward_euler)));
   const Parameters parameters = initial_parameters(c.model);
-  equations.begin(c.state, parameters, dt, false);
-  Evaluation there, beside;
+  equations.begin(c.state, parameters, StepRule::backward_euler, dt);
+  StepData there, beside;
   equations.evaluate(c.q, false, nullptr, there);
   testing::RandomNumbers random(5);
   for (int sample = 0; sample < 10; ++sample) {
@@ -329,17 +333,17 @@ TEST(Newton, ConvergesQuadraticallyWithTheExactMatrix) {
   Options options = options_of(Scheme::backward_euler);
   options.mixed = false;
   options.force_tolerance = 1e-13;
-  Equations equations(model, options);
+  Equations equations(model, equation_options(options));
   const Newton newton(model, options);
   const Parameters parameters = initial_parameters(model);
   const State state = initial_state(model);
-  equations.begin(state, parameters, 0.05, false);
+  equations.begin(state, parameters, StepRule::backward_euler, 0.05);
   NewtonWorkspace work;
   std::vector<double> residuals;
   for (int count = 1; count <= 8; ++count) {
     VectorX z = state.q;
     newton.solve(equations, z, {.max_iterations = count}, work);
-    residuals.push_back(work.evaluation.residual.norm());
+    residuals.push_back(work.data.residual.norm());
   }
   bool quadratic = false;
   for (std::size_t i = 1; i < residuals.size(); ++i)
@@ -356,14 +360,14 @@ TEST(StableStep, IsTwoOverTheHighestFrequency) {
   builder.add_rod(testing::helix(6), material);
   builder.support(SupportKind::pin, {0, 0});
   const Model model = build_model(builder.scene, false);
-  Equations equations(model, options_of(Scheme::statics));
+  Equations equations(model, equation_options(options_of(Scheme::statics)));
   Parameters parameters = initial_parameters(model);
   parameters.lumped = true;
   const State state = initial_state(model);
   StepWorkspace work;
   const double step = stable_step(equations, parameters, state, work);
-  equations.begin(state, parameters, 0.0, false);
-  equations.evaluate(state.q, true, nullptr, work.newton.evaluation);
+  equations.begin(state, parameters, StepRule::statics, 0.0);
+  equations.evaluate(state.q, true, nullptr, work.newton.data);
   // The same by a dense eigenproblem, by repeated multiplication of the dense matrix.
   const Eigen::Index n = model.dof_count;
   MatrixX K(n, n);
@@ -395,7 +399,7 @@ double growth(const RodMaterial& material, double of_stable) {
   const Model model = build_model(builder.scene, false);
   Options options;
   options.integrator = Integrator::verlet;
-  Equations equations(model, options);
+  Equations equations(model, equation_options(options));
   Parameters parameters = initial_parameters(model);
   parameters.lumped = true;
   State state = initial_state(model);

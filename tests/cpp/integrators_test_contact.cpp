@@ -94,10 +94,10 @@ Case slipped(const Named& named, double size, std::optional<bool> planar = std::
 
 /// `foreseen`: after a step of Newton's method that changes nothing, whose friction is that at hand. `approach`: at
 /// which the surfaces have just met.
-void expect_exact(const Case& c, Integrator integrator, Inner inner, bool foreseen = false, double approach = 0.0) {
+void expect_exact(const Case& c, Integrator integrator, StepRule rule, bool foreseen = false, double approach = 0.0) {
   Options options;
   options.integrator = integrator;
-  Equations equations(c.model, options);
+  Equations equations(c.model, equation_options(options));
   const Parameters parameters = initial_parameters(c.model);
   State state = c.state;
   equations.contact()->initialise(state, parameters);
@@ -112,8 +112,8 @@ void expect_exact(const Case& c, Integrator integrator, Inner inner, bool forese
   }
   std::sort(state.contacts.begin(), state.contacts.end(),
             [](const ContactRecord& a, const ContactRecord& b) { return a.key < b.key; });
-  equations.begin(state, parameters, 0.3, integrator == Integrator::energy_momentum, inner);
-  Evaluation evaluation;
+  equations.begin(state, parameters, rule, 0.3);
+  StepData evaluation;
   const Eigen::Index n = c.model.dof_count;
   equations.evaluate(c.q, true, nullptr, evaluation);
   if (foreseen) {
@@ -164,7 +164,7 @@ TEST(Contact, MatrixIsExactNextToTheBordersOfClassesAndToParallelEdges) {
       named.scene.contact.friction_law = law;
       Case c = slipped(named, 2e-4);
       c.increment = 3e-5;
-      expect_exact(c, Integrator::backward_euler, Inner::end);
+      expect_exact(c, Integrator::backward_euler, StepRule::backward_euler);
     }
 }
 
@@ -176,7 +176,7 @@ TEST(Contact, MatrixIsExactForEveryEnergy) {
         for (RodDescription& rod : named.scene.rods) rod.contact_radius *= 0.6;
       Case c = slipped(named, 0.02);
       if (law == ContactLaw::barrier) c.increment = 2e-4;
-      expect_exact(c, Integrator::backward_euler, Inner::end);
+      expect_exact(c, Integrator::backward_euler, StepRule::backward_euler);
     }
 }
 
@@ -226,9 +226,9 @@ TEST(Contact, MatrixIsExactForEveryClassLawAndScheme) {
     for (FrictionLaw law : kFrictionLaws) {
       named.scene.contact.friction_law = law;
       const Case c = slipped(named, 0.02);
-      expect_exact(c, Integrator::backward_euler, Inner::end);
-      expect_exact(c, Integrator::implicit_midpoint, Inner::middle);
-      expect_exact(c, Integrator::energy_momentum, Inner::middle);
+      expect_exact(c, Integrator::backward_euler, StepRule::backward_euler);
+      expect_exact(c, Integrator::implicit_midpoint, StepRule::midpoint);
+      expect_exact(c, Integrator::energy_momentum, StepRule::energy_momentum);
     }
 }
 
@@ -241,9 +241,9 @@ TEST(Contact, MatrixIsExactInAnImpactWithAndWithoutRestitution) {
         named.scene.contact.obstacle_restitution = VectorX::Constant(1, restitution);
         Case c = slipped(named, 0.02);
         c.increment = 1e-5;  // between the ends of restitution's switch
-        expect_exact(c, Integrator::backward_euler, Inner::end, false, 5.0);
-        expect_exact(c, Integrator::implicit_midpoint, Inner::middle, false, 5.0);
-        expect_exact(c, Integrator::energy_momentum, Inner::middle, false, 5.0);
+        expect_exact(c, Integrator::backward_euler, StepRule::backward_euler, false, 5.0);
+        expect_exact(c, Integrator::implicit_midpoint, StepRule::midpoint, false, 5.0);
+        expect_exact(c, Integrator::energy_momentum, StepRule::energy_momentum, false, 5.0);
       }
 }
 
@@ -272,7 +272,7 @@ TEST(Contact, MatrixIsExactWhereFrictionIsForeseenAsItIs) {
   for (Named named : touching_scenes())
     for (FrictionLaw law : kFrictionLaws) {
       named.scene.contact.friction_law = law;
-      expect_exact(slipped(named, 0.02), Integrator::backward_euler, Inner::end, true);
+      expect_exact(slipped(named, 0.02), Integrator::backward_euler, StepRule::backward_euler, true);
     }
 }
 

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "integrators/equations.hpp"
+#include "steps/equations.hpp"
 #include "states.hpp"
 
 namespace withe {
@@ -63,15 +63,15 @@ std::vector<Case> long_cases() {
 void expect_same_sums(const Case& c, Integrator integrator) {
   Options options;
   options.integrator = integrator;  // energy-momentum: whole lines instead of triangles
-  Equations equations(c.model, options);
-  Assembler reference(c.model, equations.loads(), equations.symmetric() ? Symmetry::symmetric : Symmetry::unsymmetric,
+  Equations equations(c.model, equation_options(options));
+  Assembler reference(c.model, equations.loads(), equations.asymmetries().empty() ? Symmetry::symmetric : Symmetry::unsymmetric,
                       SolverKind::automatic);
   const Parameters parameters = initial_parameters(c.model);
-  Evaluation evaluation, alone;
-  equations.begin(c.state, parameters, 0.0, false);
+  StepData evaluation, alone;
+  equations.begin(c.state, parameters, StepRule::statics, 0.0);
   equations.evaluate(c.q, true, nullptr, evaluation);
   VectorX force, magnitude;
-  add_stencil_by_stencil(c, reference, equations.elastic, force, magnitude);
+  add_stencil_by_stencil(c, reference, equations.elastic(), force, magnitude);
   const double scale = magnitude.maxCoeff() + 1.0;
   EXPECT_LT((evaluation.residual - force).cwiseAbs().maxCoeff(), 1e-12 * scale) << c.name;
   EXPECT_LT((evaluation.magnitude - magnitude).cwiseAbs().maxCoeff(), 1e-12 * scale) << c.name;
@@ -124,20 +124,21 @@ VectorX spin_couples(const Model& model, const Parameters& parameters, const Con
 void expect_explicit_forces(const Case& c) {
   Options options;
   options.integrator = Integrator::verlet;
-  Equations equations(c.model, options), implicit(c.model, options);
+  Equations equations(c.model, equation_options(options)), implicit(c.model, equation_options(options));
   const Parameters parameters = initial_parameters(c.model);
   VectorX v(c.model.dof_count);
   for (Eigen::Index i = 0; i < v.size(); ++i) v[i] = std::sin(1.0 + 3.0 * static_cast<double>(i));
   State next = c.state;
-  const double turn = equations.advance(c.state, c.q, next);
-  Evaluation lean, general;
-  equations.evaluate_forces(next, parameters, v, lean);
+  StepData lean, general;
+  const double turn = advance(c.model, c.state, c.q, lean.configuration, next);
+  equations.begin(next, parameters, StepRule::verlet, 0.0);
+  equations.evaluate_forces(v, lean);
 
   State moved = c.state;
   Configuration configuration;
   compute_configuration(c.model, c.state, c.q, configuration);
   accept_configuration(c.model, c.q, configuration, moved);
-  implicit.begin(moved, parameters, 0.0, false);
+  implicit.begin(moved, parameters, StepRule::statics, 0.0);
   implicit.evaluate(moved.q, false, nullptr, general);
   VectorX expected = general.full_residual;
   if (!c.model.planar()) {
@@ -185,12 +186,12 @@ void add_discrete_gradient(const Case& c, const ElasticCoefficients& k, const Co
 void expect_discrete_gradient(const Case& c) {
   Options options;
   options.integrator = Integrator::energy_momentum;
-  Equations equations(c.model, options);
+  Equations equations(c.model, equation_options(options));
   Parameters parameters = initial_parameters(c.model);
   parameters.gravity.setZero();
-  equations.begin(c.state, parameters, 0.0, true);
+  equations.begin(c.state, parameters, StepRule::energy_momentum, 0.0);
   const VectorX z = 0.5 * (c.state.q + c.q);
-  Evaluation evaluation, alone, ahead, behind;
+  StepData evaluation, alone, ahead, behind;
   equations.evaluate(z, true, nullptr, evaluation);
 
   Configuration at_step[3];
@@ -203,12 +204,12 @@ void expect_discrete_gradient(const Case& c) {
     const double strain = 0.5 * sum / c.model.edge_length[e] - 1.0;
     const int tail = c.model.tail_dof[i], head = c.model.head_dof[i];
     const Vector3 pull =
-        equations.elastic.stretch_stiffness[e] * strain * 2.0 / sum * (z.segment<3>(head) - z.segment<3>(tail));
+        equations.elastic().stretch_stiffness[e] * strain * 2.0 / sum * (z.segment<3>(head) - z.segment<3>(tail));
     force.segment<3>(head) += pull;
     force.segment<3>(tail) -= pull;
   }
   for (int b = 0; b < static_cast<int>(c.model.bend.size()); ++b)
-    add_discrete_gradient(c, equations.elastic, at_step, b, force);
+    add_discrete_gradient(c, equations.elastic(), at_step, b, force);
   const double scale = evaluation.magnitude.maxCoeff() + 1.0;
   EXPECT_LT((evaluation.full_residual - force).cwiseAbs().maxCoeff(), 1e-11 * scale) << c.name;
 

@@ -1,10 +1,10 @@
-// Forces of the energy-momentum scheme: see equations.hpp and elasticity/discrete_gradient.hpp.
+// Forces of the energy-momentum scheme: see step_problem.hpp and elasticity/discrete_gradient.hpp.
 
 #include <cmath>
 
 #include "elasticity/discrete_gradient.hpp"
 #include "geometry/rotation.hpp"
-#include "integrators/equations.hpp"
+#include "steps/elastic_forces.hpp"
 
 namespace withe {
 namespace {
@@ -214,17 +214,15 @@ void planar_bend_local(const Model& model, const ElasticCoefficients& elastic, c
   }
 }
 
-}  // namespace
-
-MovingEdge<double> Equations::moving_edge(int edge) const {
-  const EdgeFrame<double>&start = start_.edge[at(edge)], &middle = middle_.edge[at(edge)], &end = end_.edge[at(edge)];
+MovingEdge<double> moving_edge(const StepProblem& problem, const StepData& data, int edge) {
+  const EdgeFrame<double>&start = problem.start_configuration.edge[at(edge)], &middle = data.configuration.edge[at(edge)], &end = data.end_configuration.edge[at(edge)];
   return {start.tangent,         start.inverse_length,         end.tangent, end.inverse_length, middle.tangent,
           middle.inverse_length, turn_of_directors(start, end)};
 }
 
 /// Bending and twisting of a stencil in space.
-void Equations::discrete_bend_local(int stencil, bool with_matrix, Local& local) const {
-  const BendStencil& s = model_.bend[at(stencil)];
+void discrete_bend_local(const StepProblem& problem, const StepData& data, int stencil, bool with_matrix, Local& local) {
+  const BendStencil& s = problem.model.bend[at(stencil)];
   clear(local, 11, with_matrix);
   // An edge against its rod has its head where the stencil has its tail.
   EdgePlace place[2];
@@ -232,21 +230,21 @@ void Equations::discrete_bend_local(int stencil, bool with_matrix, Local& local)
     const int first = 4 * k, second = 4 * (k + 1);
     place[k] = {s.sign[k] > 0 ? first : second, s.sign[k] > 0 ? second : first, first + 3};
   }
-  const MovingEdge<double> edge[2] = {moving_edge(s.edge[0]), moving_edge(s.edge[1])};
+  const MovingEdge<double> edge[2] = {moving_edge(problem, data, s.edge[0]), moving_edge(problem, data, s.edge[1])};
   EdgeFrame<double> f0[2], f1[2];
   for (int k = 0; k < 2; ++k) {
-    f0[k] = oriented(start_.edge[at(s.edge[k])], s.sign[k]);
-    f1[k] = oriented(end_.edge[at(s.edge[k])], s.sign[k]);
+    f0[k] = oriented(problem.start_configuration.edge[at(s.edge[k])], s.sign[k]);
+    f1[k] = oriented(data.end_configuration.edge[at(s.edge[k])], s.sign[k]);
   }
   DiscreteMoment<double> m{};
-  discrete_moment<true>(elastic.measure, f0[0], f1[0], f0[1], f1[1], row_of(start_.bend_strain, stencil),
-                        row_of(end_.bend_strain, stencil), row_of(elastic.bend_natural, stencil),
-                        row_of(elastic.bend_stiffness, stencil), m);
+  discrete_moment<true>(problem.elastic.measure, f0[0], f1[0], f0[1], f1[1], row_of(problem.start_configuration.bend_strain, stencil),
+                        row_of(data.end_configuration.bend_strain, stencil), row_of(problem.elastic.bend_natural, stencil),
+                        row_of(problem.elastic.bend_stiffness, stencil), m);
   EdgeColumns<double> columns[2];
-  for (int k = 0; k < 2; ++k) columns[k] = edge_columns(k == 0 ? m.by_a : m.by_b, end_.edge[at(s.edge[k])]);
+  for (int k = 0; k < 2; ++k) columns[k] = edge_columns(k == 0 ? m.by_a : m.by_b, data.end_configuration.edge[at(s.edge[k])]);
   const Vec3d moment[2] = {m.moment, -m.moment};
   for (int i = 0; i < 2; ++i) {
-    const EdgeFrame<double>& middle = middle_.edge[at(s.edge[i])];
+    const EdgeFrame<double>& middle = data.configuration.edge[at(s.edge[i])];
     add_edge_forces(local, place[i], edge[i], middle, moment[i]);
     for (int j = 0; with_matrix && j < 2; ++j) {
       EdgeBlock<double> block = edge_block(edge[i], i == 0 ? 1.0 : -1.0, columns[j]);
@@ -257,19 +255,19 @@ void Equations::discrete_bend_local(int stencil, bool with_matrix, Local& local)
 }
 
 /// Bending in a plane between a frame and an edge; the frame's row is a moment.
-void Equations::discrete_planar_half_local(int stencil, Local& local) const {
-  const FrameStencil& s = model_.half[at(stencil)];
+void discrete_planar_half_local(const StepProblem& problem, const StepData& data, int stencil, Local& local) {
+  const FrameStencil& s = problem.model.half[at(stencil)];
   clear(local, 5);
-  const Vec3d f0 = in_plane(start_.attached[at(stencil)], 1.0), f1 = in_plane(end_.attached[at(stencil)], 1.0);
-  const Vec3d t0 = in_plane(start_.edge[at(s.edge)], 1.0), t1 = in_plane(end_.edge[at(s.edge)], 1.0);
-  const double kappa0 = start_.half_strain(stencil, 0), kappa1 = end_.half_strain(stencil, 0);
-  const double natural = elastic.half_natural(stencil, 0), stiffness = elastic.half_stiffness(stencil, 0);
+  const Vec3d f0 = in_plane(problem.start_configuration.attached[at(stencil)], 1.0), f1 = in_plane(data.end_configuration.attached[at(stencil)], 1.0);
+  const Vec3d t0 = in_plane(problem.start_configuration.edge[at(s.edge)], 1.0), t1 = in_plane(data.end_configuration.edge[at(s.edge)], 1.0);
+  const double kappa0 = problem.start_configuration.half_strain(stencil, 0), kappa1 = data.end_configuration.half_strain(stencil, 0);
+  const double natural = problem.elastic.half_natural(stencil, 0), stiffness = problem.elastic.half_stiffness(stencil, 0);
   const PlanarMoment p = s.frame_first
-                             ? planar_moment(elastic.measure, f0, f1, t0, t1, kappa0, kappa1, natural, stiffness)
-                             : planar_moment(elastic.measure, t0, t1, f0, f1, kappa0, kappa1, natural, stiffness);
+                             ? planar_moment(problem.elastic.measure, f0, f1, t0, t1, kappa0, kappa1, natural, stiffness)
+                             : planar_moment(problem.elastic.measure, t0, t1, f0, f1, kappa0, kappa1, natural, stiffness);
   const double sign = s.frame_first ? -1.0 : 1.0;  // of the moment on the edge
   const double by_edge = s.frame_first ? p.by_b : p.by_a, by_frame = s.frame_first ? p.by_a : p.by_b;
-  const PlanarEdge edge(start_.edge[at(s.edge)], middle_.edge[at(s.edge)], end_.edge[at(s.edge)]);
+  const PlanarEdge edge(problem.start_configuration.edge[at(s.edge)], data.configuration.edge[at(s.edge)], data.end_configuration.edge[at(s.edge)]);
   const int ends[2] = {0, 2};
   const Vector2 column = edge.column(by_edge), by_turn = 2.0 * sign * by_frame * edge.force;
   add_planar_force(local, ends[0], ends[1], sign * p.moment * edge.force);
@@ -286,30 +284,30 @@ void Equations::discrete_planar_half_local(int stencil, Local& local) const {
 
 /// Bending and twisting in space between a frame and an edge. The frame's rows are the moment on it, whose work is that
 /// over its Cayley vector.
-void Equations::discrete_half_local(int stencil, Local& local) const {
-  const FrameStencil& s = model_.half[at(stencil)];
+void discrete_half_local(const StepProblem& problem, const StepData& data, int stencil, Local& local) {
+  const FrameStencil& s = problem.model.half[at(stencil)];
   clear(local, 11);
-  const MovingEdge<double> edge = moving_edge(s.edge);
-  const EdgeFrame<double>&e0 = start_.edge[at(s.edge)], &e1 = end_.edge[at(s.edge)];
-  const EdgeFrame<double>&f0 = start_.attached[at(stencil)], &f1 = end_.attached[at(stencil)];
+  const MovingEdge<double> edge = moving_edge(problem, data, s.edge);
+  const EdgeFrame<double>&e0 = problem.start_configuration.edge[at(s.edge)], &e1 = data.end_configuration.edge[at(s.edge)];
+  const EdgeFrame<double>&f0 = problem.start_configuration.attached[at(stencil)], &f1 = data.end_configuration.attached[at(stencil)];
   const bool first = s.frame_first;
   DiscreteMoment<double> m;
-  discrete_moment<true>(elastic.measure, first ? f0 : e0, first ? f1 : e1, first ? e0 : f0, first ? e1 : f1,
-                        row_of(start_.half_strain, stencil), row_of(end_.half_strain, stencil),
-                        row_of(elastic.half_natural, stencil), row_of(elastic.half_stiffness, stencil), m);
+  discrete_moment<true>(problem.elastic.measure, first ? f0 : e0, first ? f1 : e1, first ? e0 : f0, first ? e1 : f1,
+                        row_of(problem.start_configuration.half_strain, stencil), row_of(data.end_configuration.half_strain, stencil),
+                        row_of(problem.elastic.half_natural, stencil), row_of(problem.elastic.half_stiffness, stencil), m);
   const double sign = first ? -1.0 : 1.0;  // of the moment on the edge
   const Mat3<double>&by_edge = first ? m.by_b : m.by_a, &by_frame = first ? m.by_a : m.by_b;
   const EdgePlace place{0, 4, 3};
   const Vec3d moment = sign * m.moment;
   const EdgeColumns<double> columns = edge_columns(by_edge, e1);
   EdgeBlock<double> block = edge_block(edge, sign, columns);
-  finish_block(edge, middle_.edge[at(s.edge)], moment, true, block);
-  add_edge_forces(local, place, edge, middle_.edge[at(s.edge)], moment);
+  finish_block(edge, data.configuration.edge[at(s.edge)], moment, true, block);
+  add_edge_forces(local, place, edge, data.configuration.edge[at(s.edge)], moment);
   add_edge_rows(local, place, place, block);
 
   // The frame turns at the end by J(w) dw, and by its hinge's angle about the hinge's axis there.
-  const int dof = model_.frame_dof[at(s.frame)];
-  const Vector3 w = end_q_.segment<3>(dof), on_frame = -sign * to_eigen(m.moment);
+  const int dof = problem.model.frame_dof[at(s.frame)];
+  const Vector3 w = data.end.segment<3>(dof), on_frame = -sign * to_eigen(m.moment);
   const Matrix3 J = cayley_spin(w);
   Matrix3 by_spin, by_vector;  // of the moment m
   for (int i = 0; i < 3; ++i) {
@@ -324,14 +322,14 @@ void Equations::discrete_half_local(int stencil, Local& local) const {
   by.middleCols<3>(7) = by_spin * J;
   HingeArm h{Vector3::Zero(), Matrix3::Zero(), Vector3::Zero()};
   if (s.hinge >= 0) {
-    const Hinge& hinge = model_.hinges[at(s.hinge)];
-    by.col(10) = by_spin * (end_.frame[at(s.frame)] * hinge.axis);
-    h = hinge_arm(w, start_.frame[at(s.frame)] * hinge.axis, difference_(hinge.dof));
+    const Hinge& hinge = problem.model.hinges[at(s.hinge)];
+    by.col(10) = by_spin * (data.end_configuration.frame[at(s.frame)] * hinge.axis);
+    h = hinge_arm(w, problem.start_configuration.frame[at(s.frame)] * hinge.axis, 2.0 * (data.z(hinge.dof) - problem.start->q(hinge.dof)));
   }
   // Rows of the edge by the frame and its hinge.
   for (int k = 7; k < 11; ++k) {
     const Vec3d change = to_vec3(Vector3(2.0 * sign * by.col(k)));
-    const Vec3d f = edge.force(change) + edge.torque(change) * middle_.edge[at(s.edge)].spin;
+    const Vec3d f = edge.force(change) + edge.torque(change) * data.configuration.edge[at(s.edge)].spin;
     for (int i = 0; i < 3; ++i) {
       local.hessian[4 + i][k] += f[i];
       local.hessian[i][k] -= f[i];
@@ -351,80 +349,70 @@ void Equations::discrete_half_local(int stencil, Local& local) const {
 }
 
 /// Force of the mean strain, along the mean of the edge.
-void Equations::mean_stretch_local(const VectorX& z, int edge, const double* axial_force, Local& local) const {
-  const int dim = model_.dimension;
-  const double force = force_[edge], geometric = axial_force ? axial_force[edge] : force;
-  const int* dofs = assembler_.stretch.dofs(edge);
+void mean_stretch_local(const StepProblem& problem, const StepData& data, const Assembler& assembler, int edge, const double* axial_force, Local& local) {
+  const int dim = problem.model.dimension;
+  const double force = data.force[edge], geometric = axial_force ? axial_force[edge] : force;
+  const int* dofs = assembler.stretch.dofs(edge);
   double mean[3];
-  for (int i = 0; i < dim; ++i) mean[i] = inverse_mean_[edge] * (z(dofs[dim + i]) - z(dofs[i]));
-  const Vec3d& t1 = end_.edge[at(edge)].tangent;
-  const double t[3] = {t1.x, t1.y, t1.z}, transverse = geometric * inverse_mean_[edge];
+  for (int i = 0; i < dim; ++i) mean[i] = data.inverse_mean[edge] * (data.z(dofs[dim + i]) - data.z(dofs[i]));
+  const Vec3d& t1 = data.end_configuration.edge[at(edge)].tangent;
+  const double t[3] = {t1.x, t1.y, t1.z}, transverse = geometric * data.inverse_mean[edge];
   for (int i = 0; i < dim; ++i) {
     local.gradient[i] = -force * mean[i];
     local.gradient[dim + i] = force * mean[i];
     for (int j = 0; j < dim; ++j) {
-      const double h = mean[i] * t[j] * (modulus_[edge] - transverse) + (i == j ? transverse : 0.0);
+      const double h = mean[i] * t[j] * (data.modulus[edge] - transverse) + (i == j ? transverse : 0.0);
       local.hessian[i][j] = local.hessian[dim + i][dim + j] = h;
       local.hessian[i][dim + j] = local.hessian[dim + i][j] = -h;
     }
   }
 }
 
-/// Axial forces of the mean strain, and 2 / (l0 + l1).
-void Equations::set_mean_axial_forces() {
-  const int n = model_.edge_count;
-  force_.resize(n);
-  modulus_.resize(n);
-  inverse_mean_.resize(n);
-  for (int e = 0; e < n; ++e) {
-    const double EA = elastic.stretch_stiffness[e], sum = start_.length[e] + end_.length[e];
-    force_[e] = EA * (0.5 * sum / model_.edge_length[e] - 1.0);
-    modulus_[e] = EA / model_.edge_length[e];
-    inverse_mean_[e] = 2.0 / sum;
-  }
-}
+}  // namespace
 
-void Equations::add_discrete_gradient(const VectorX& z, bool with_matrix, const double* axial_force, Evaluation& out) {
-  const std::span<double> values = assembler_.solver().values();
+void ElasticForces::add_discrete_gradient(const StepProblem& problem, StepData& data, const Assembler& assembler,
+                                          std::span<double> values) const {
+  const Model& model = problem.model;
+  const bool with_matrix = !values.empty();
   Local local;
   const auto add = [&](const ElementTable& table, int i) {
-    table.add_gradient(i, local.gradient, 1.0, gradient_, magnitude_);
+    table.add_gradient(i, local.gradient, 1.0, data.gradient, data.row_magnitude);
     if (with_matrix) table.add_hessian(i, local.hessian, 1.0, values);
   };
-  set_mean_axial_forces();
+  set_mean_axial_forces(problem, data);
   const auto add_edge = [&](int e) {
-    mean_stretch_local(z, e, axial_force, local);
-    add(assembler_.stretch, e);
+    mean_stretch_local(problem, data, assembler, e, data.axial_force, local);
+    add(assembler.stretch, e);
   };
   const auto add_bend = [&](int b) {
-    if (model_.planar())
-      planar_bend_local(model_, elastic, start_, middle_, end_, b, with_matrix, local);
+    if (model.planar())
+      planar_bend_local(model, problem.elastic, problem.start_configuration, data.configuration, data.end_configuration,
+                        b, with_matrix, local);
     else
-      discrete_bend_local(b, with_matrix, local);
-    add(assembler_.bend, b);
+      discrete_bend_local(problem, data, b, with_matrix, local);
+    add(assembler.bend, b);
   };
-  if (model_.planar()) {
-    for (int e = 0; e < model_.edge_count; ++e) add_edge(e);
-    for (int b = 0; b < static_cast<int>(model_.bend.size()); ++b) add_bend(b);
+  if (model.planar()) {
+    for (int e = 0; e < model.edge_count; ++e) add_edge(e);
+    for (int b = 0; b < static_cast<int>(model.bend.size()); ++b) add_bend(b);
   } else {
-    stencil_kernels().momentum_bend(regular_batch(elastic, axial_force, with_matrix ? values.data() : nullptr),
-                                    {.start_frames = &start_.edge.data()->tangent.x,
-                                     .end_frames = &end_.edge.data()->tangent.x,
-                                     .start_strain = start_.bend_strain.data(),
-                                     .end_strain = end_.bend_strain.data()});
-    for (int e : assembler_.regular.other_edges) add_edge(e);
-    for (int b : assembler_.regular.other_bend) add_bend(b);
+    stencil_kernels().momentum_bend(regular_batch(problem.elastic, data, assembler, values, data.axial_force),
+                                    {.start_frames = &problem.start_configuration.edge.data()->tangent.x,
+                                     .end_frames = &data.end_configuration.edge.data()->tangent.x,
+                                     .start_strain = problem.start_configuration.bend_strain.data(),
+                                     .end_strain = data.end_configuration.bend_strain.data()});
+    for (int e : assembler.regular.other_edges) add_edge(e);
+    for (int b : assembler.regular.other_bend) add_bend(b);
   }
-  for (int h = 0; h < static_cast<int>(model_.half.size()); ++h) {
-    if (model_.planar())
-      discrete_planar_half_local(h, local);
+  for (int h = 0; h < static_cast<int>(model.half.size()); ++h) {
+    if (model.planar())
+      discrete_planar_half_local(problem, data, h, local);
     else
-      discrete_half_local(h, local);
-    add(assembler_.half, h);
+      discrete_half_local(problem, data, h, local);
+    add(assembler.half, h);
   }
-  elastic_rows_ = gradient_.head(model_.dof_count);
-  if (!parameters_->viscous || h_ == 0.0) return;
-  add_elastic(viscous_, z, with_matrix, nullptr, out);
+  data.elastic_rows = data.gradient.head(model.dof_count);
+  if (problem.viscous_acts()) add_elastic(problem, data.viscous, data, assembler, values, nullptr);
 }
 
 }  // namespace withe

@@ -2,19 +2,19 @@
 
 #include <algorithm>
 
-#include "integrators/equations.hpp"
+#include "steps/equations.hpp"
 
 namespace withe {
 
 void Equations::forget_contacts() {
-  contact_->forget();
+  contact()->forget();
   order_for_contacts();
 }
 
 /// Finds an order of elimination for the contacts that are coupled now, and no others.
 void Equations::order_for_contacts() {
-  assembler_.order_for(contact_->element_unknowns(), kContactUnknowns);
-  ordered_ = contact_->elements();
+  assembler_.order_for(contact()->element_unknowns(), kContactUnknowns);
+  ordered_ = contact()->elements();
 }
 
 EquationsMemory Equations::memory(bool with_matrix) const {
@@ -31,39 +31,35 @@ void Equations::pass_mark() {
 
 /// Without allocation where `out` has had the sizes before.
 void Equations::remember(EquationsMemory& out, bool with_matrix) const {
-  if (contact_) {
+  if (terms_.contact) {
     out.ordered = ordered_;
-    out.coupled = contact_->elements();
+    out.coupled = contact()->elements();
   }
   out.groups = assembler_.groups();
   if (with_matrix) {
     const std::span<const double> values = assembler_.solver().values();
     out.matrix.assign(values.begin(), values.end());
   }
-  if (fluid_) {
-    out.flow_excess = flow_excess_;
-    out.fluid = fluid_->memory();
+  if (terms_.stokeslets) {
+    out.flow_excess = terms_.stokeslets->excess();
+    out.fluid = terms_.stokeslets->memory();
   }
 }
 
 bool Equations::recall(const EquationsMemory& memory) {
   const bool regrouped = memory.groups != assembler_.groups();
   assembler_.set_groups(memory.groups);
-  if (contact_ && (regrouped || memory.ordered != ordered_ || memory.coupled != contact_->elements())) {
-    contact_->couple(memory.ordered);
+  if (terms_.contact && (regrouped || memory.ordered != ordered_ || memory.coupled != contact()->elements())) {
+    contact()->couple(memory.ordered);
     if (regrouped || memory.ordered != ordered_) order_for_contacts();
-    contact_->couple(memory.coupled);
-    assembler_.couple(contact_->element_unknowns(), kContactUnknowns);
+    contact()->couple(memory.coupled);
+    assembler_.couple(contact()->element_unknowns(), kContactUnknowns);
   }
   // A scene with other options or friction may have a matrix of another form.
   const std::span<double> values = assembler_.solver().values();
   const bool fits = memory.matrix.size() == values.size();
   if (fits) std::copy(memory.matrix.begin(), memory.matrix.end(), values.begin());
-  if (fluid_) {
-    flow_excess_ = memory.flow_excess;
-    flow_version_ = -1;
-    fluid_->recall(memory.fluid);
-  }
+  if (terms_.stokeslets) terms_.stokeslets->recall(memory.fluid, memory.flow_excess);
   return fits;
 }
 

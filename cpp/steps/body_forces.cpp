@@ -1,0 +1,48 @@
+#include "steps/body_forces.hpp"
+
+#include "steps/inertia.hpp"
+
+namespace withe {
+namespace {
+
+std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+}  // namespace
+
+void set_gravity_force(const Model& model, const Parameters& p, VectorX& force) {
+  force.setZero(model.dof_count);
+  for (int i = 0; i < model.node_count; ++i) {
+    const int dof = model.node_dof[at(i)];
+    if (model.planar())
+      force.segment<2>(dof) =
+          p.node_mass(i) * Vector2(p.gravity.dot(model.plane->first), p.gravity.dot(model.plane->second));
+    else
+      force.segment<3>(dof) = p.node_mass(i) * p.gravity;
+  }
+}
+
+void Gravity::add(const StepProblem& problem, StepData& data, const Assembler&, std::span<double>) const {
+  const int n = problem.model.dof_count;
+  data.gradient.head(n) -= problem.gravity;
+  data.row_magnitude.head(n) += problem.gravity.cwiseAbs();
+  data.potential -= problem.gravity.dot(data.z);
+}
+
+void Drag::add(const StepProblem& problem, StepData& data, const Assembler& assembler,
+               std::span<double> values) const {
+  if (!problem.parameters->dragged || !problem.moves()) return;
+  const int n = problem.model.dof_count;
+  const double inverse = 1.0 / problem.interval;
+  data.velocity = inverse * (data.z - problem.start->q);
+  multiply(problem.model, problem.drag, data.velocity, data.drag_force);
+  data.gradient.head(n) += data.drag_force;
+  data.row_magnitude.head(n) += data.drag_force.cwiseAbs();
+  if (!values.empty()) add_mass_matrix(problem, problem.drag, inverse, 1, assembler, values);
+}
+
+double Drag::dissipated(const StepProblem& problem, const StepData& data, const Assembler&,
+                        const VectorX& change) const {
+  return problem.parameters->dragged && problem.moves() ? data.drag_force.dot(change) : 0.0;
+}
+
+}  // namespace withe

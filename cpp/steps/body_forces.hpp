@@ -1,0 +1,26 @@
+#pragma once
+/// Gravity and drag.
+
+#include "steps/term.hpp"
+
+namespace withe {
+
+class Gravity final : public Term {
+ public:
+  void add(const StepProblem& problem, StepData& data, const Assembler& assembler,
+           std::span<double> values) const override;
+};
+
+/// D (z - q0) / h.
+class Drag final : public Term {
+ public:
+  void add(const StepProblem& problem, StepData& data, const Assembler& assembler,
+           std::span<double> values) const override;
+  double dissipated(const StepProblem& problem, const StepData& data, const Assembler& assembler,
+                    const VectorX& change) const override;
+};
+
+/// Gravity's force per unknown.
+void set_gravity_force(const Model& model, const Parameters& parameters, VectorX& force);
+
+}  // namespace withe

@@ -1,0 +1,68 @@
+#include "steps/contact_forces.hpp"
+
+#include <cmath>
+
+namespace withe {
+
+void ContactForces::begin(StepProblem& problem) {
+  const Pressing pressing = problem.rule == StepRule::energy_momentum  ? Pressing::mean_direction
+                            : problem.rule == StepRule::midpoint       ? Pressing::mean
+                            : problem.rule == StepRule::backward_euler ? Pressing::end
+                                                                       : Pressing::still;
+  contact_.begin(*problem.start, *problem.parameters, problem.slip_time, pressing);
+}
+
+void ContactForces::find(const StepProblem& problem, StepData& data, Assembler& assembler, bool with_matrix) {
+  if (problem.in_middle())
+    data.end = 2.0 * data.z - problem.start->q;
+  else
+    data.end = data.z;
+  contact_.update(data.end);
+  if (!with_matrix || contact_.coupled()) return;
+  contact_.couple();
+  assembler.couple(contact_.element_unknowns(), kContactUnknowns);
+}
+
+void ContactForces::add(const StepProblem& problem, StepData& data, const Assembler& assembler,
+                        std::span<double> values) const {
+  const int n = problem.model.dof_count;
+  data.contact_gradient.setZero(n);
+  data.contact_floor.setZero(n);
+  const double twice = problem.end_rate();
+  ContactLocal local;
+  int dofs[kContactUnknowns];
+  for (int i = 0; i < contact_.count(); ++i) {
+    contact_.local(i, !values.empty(), local);
+    contact_.unknowns(i, dofs);
+    const double rounding = contact_.rounding(i, data.rounding.reach);
+    for (int k = 0; k < kContactUnknowns; ++k) {
+      if (dofs[k] < 0) continue;
+      data.contact_gradient[dofs[k]] += local.gradient[k];
+      data.row_magnitude[dofs[k]] += std::abs(local.gradient[k]);
+      data.contact_floor[dofs[k]] += rounding;
+    }
+    if (!values.empty()) assembler.contact.add_hessian(contact_.element(i), local.hessian, twice, values);
+  }
+  data.gradient.head(n) += data.contact_gradient;
+  if (!contact_.frictional() && !problem.in_middle()) data.potential += contact_.energy();
+}
+
+double ContactForces::allowed(const StepProblem& problem, const VectorX& z, const VectorX& step) {
+  if (problem.in_middle())
+    end_ = 2.0 * z - problem.start->q;
+  else
+    end_ = z;
+  change_ = problem.end_rate() * step;
+  return contact_.allowed(end_, change_);
+}
+
+void ContactForces::foresee(const StepProblem& problem, const VectorX& step, double kept) {
+  change_ = (problem.end_rate() / kept) * step;
+  contact_.foresee_friction(change_);
+}
+
+double ContactForces::loss(const StepData& data, const VectorX& change, double obstacle_work) const {
+  return data.contact_gradient.dot(change) + obstacle_work - (contact_.energy() - contact_.start_energy());
+}
+
+}  // namespace withe

@@ -1,0 +1,38 @@
+#pragma once
+/// Custom forces among the equations: see forces/custom_forces.hpp.
+
+#include <functional>
+
+#include "steps/term.hpp"
+
+namespace withe {
+
+/// Custom forces at configuration q and velocities v.
+using CustomResponse = std::function<CustomForces(const VectorX& q, const VectorX& v, bool derivatives)>;
+
+class CustomTerm final : public Term {
+ public:
+  /// What is solved for in the steps to come. Empty: forces stay as they were set.
+  CustomResponse respond;
+
+  void find(const StepProblem& problem, StepData& data, Assembler& assembler, bool with_matrix) override;
+  void add(const StepProblem& problem, StepData& data, const Assembler& assembler,
+           std::span<double> values) const override;
+  void add_applied(const StepProblem& problem, const StepData& data, const Assembler& assembler,
+                   VectorX& force) const override;
+
+ private:
+  template <class Add>
+  void for_each_derivative(const StepProblem& problem, const Add& add) const;
+  void couple(const StepProblem& problem, Assembler& assembler);
+  void add_matrix(const StepProblem& problem, const StepData& data, const Assembler& assembler,
+                  std::span<double> values) const;
+
+  CustomForces found_;                                   ///< with derivatives, of the last evaluation with a matrix
+  std::vector<std::vector<std::size_t>> moment_pieces_;  ///< of custom moments, per node
+};
+
+/// Forces and moments (where there are any), per node in world axes, as the equations take them.
+AppliedForces applied_forces(const Model& model, const MatrixX3& forces, const MatrixX3& moments);
+
+}  // namespace withe

@@ -1,0 +1,205 @@
+#include "steps/elastic_forces.hpp"
+
+#include "elasticity/stencil_kernels.hpp"
+#include "steps/inertia.hpp"
+
+namespace withe {
+namespace {
+
+std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+}  // namespace
+
+StencilBatch regular_batch(const ElasticCoefficients& k, StepData& data, const Assembler& assembler,
+                           std::span<double> values, const double* axial_force) {
+  const RegularStencils& regular = assembler.regular;
+  return {.count = static_cast<int>(regular.stencil.size()),
+          .stencil = regular.stencil.data(),
+          .first_unknown = regular.first_unknown.data(),
+          .edges = regular.edges.data(),
+          .owned = regular.owned.data(),
+          .lines = regular.lines.data(),
+          .lower = assembler.solver().symmetry() == Symmetry::symmetric,
+          .by_rows = regular.by_rows,
+          .measure = k.measure,
+          .frames = &data.configuration.edge.data()->tangent.x,
+          .strain = data.configuration.bend_strain.data(),
+          .natural = k.bend_natural.data(),
+          .stiffness = k.bend_stiffness.data(),
+          .column = data.configuration.bend_strain.rows(),
+          .force = data.force.data(),
+          .geometric = axial_force ? axial_force : data.force.data(),
+          .modulus = data.modulus.data(),
+          .residual = data.gradient.data(),
+          .magnitude = data.row_magnitude.data(),
+          .values = values.empty() ? nullptr : values.data(),
+          .velocity = nullptr,
+          .edge_inertia = nullptr};
+}
+
+const ElasticCoefficients& acting_coefficients(const StepProblem& problem, const StepData& data) {
+  if (!problem.viscous_acts() || problem.conserves_energy()) return problem.elastic;
+  return problem.in_middle() ? data.damped : problem.damped;
+}
+
+void ElasticForces::begin(StepProblem& problem) {
+  const State& start = *problem.start;
+  const bool viscous = problem.viscous_acts();
+  if (viscous || problem.conserves_energy())
+    compute_configuration(problem.model, start, start.q, problem.start_configuration);
+  if (!viscous) return;
+  set_viscous(problem.model, *problem.parameters, problem.start_configuration, problem.interval, problem.viscous);
+  problem.damped = problem.elastic;
+  add_coefficients(problem.viscous, problem.damped);
+}
+
+/// Configurations; and rates of strain of a step under the midpoint rules, from its ends. The Jacobian takes those of
+/// its middle instead.
+void ElasticForces::find(const StepProblem& problem, StepData& data, Assembler&, bool) {
+  const Model& model = problem.model;
+  compute_configuration(model, *problem.start, data.z, data.configuration);
+  const bool viscous = problem.viscous_acts() && problem.in_middle();
+  if (!problem.conserves_energy() && !viscous) return;
+  data.end = 2.0 * data.z - problem.start->q;
+  compute_configuration(model, *problem.start, data.end, data.end_configuration);
+  if (!viscous) return;
+  data.viscous = problem.viscous;
+  refer_viscous_to_ends(model, problem.start_configuration, data.configuration, data.end_configuration, data.viscous);
+  if (problem.conserves_energy()) return;
+  data.damped = problem.elastic;
+  add_coefficients(data.viscous, data.damped);
+}
+
+void ElasticForces::add(const StepProblem& problem, StepData& data, const Assembler& assembler,
+                        std::span<double> values) const {
+  if (problem.conserves_energy())
+    add_discrete_gradient(problem, data, assembler, values);
+  else
+    add_elastic(problem, acting_coefficients(problem, data), data, assembler, values, data.axial_force);
+}
+
+/// Axial forces of all edges and their energy.
+void ElasticForces::set_axial_forces(const StepProblem& problem, const ElasticCoefficients& k, StepData& data) const {
+  const int n = problem.model.edge_count;
+  data.force.resize(n);
+  data.modulus.resize(n);
+  double energy = 0.0;
+  for (int e = 0; e < n; ++e) {
+    const double strain = data.configuration.length[e] * inverse_rest_[e] - 1.0 - k.stretch_natural[e];
+    data.force[e] = k.stretch_stiffness[e] * strain;
+    data.modulus[e] = k.stretch_stiffness[e] * inverse_rest_[e];
+    energy += data.force[e] * strain * problem.model.edge_length[e];
+  }
+  data.potential += 0.5 * energy;
+}
+
+void ElasticForces::add_elastic(const StepProblem& problem, const ElasticCoefficients& k, StepData& data,
+                                const Assembler& assembler, std::span<double> values,
+                                const double* axial_force) const {
+  set_axial_forces(problem, k, data);
+  const StencilBatch batch = regular_batch(k, data, assembler, values, axial_force);
+  data.potential += problem.model.planar() ? stencil_kernels().planar_bend(batch) : stencil_kernels().bend(batch);
+  add_others(problem, k, data, assembler, values, axial_force);
+}
+
+/// What the kernels do not take: edges and stencils of joints and of rods' ends at walls.
+void ElasticForces::add_others(const StepProblem& problem, const ElasticCoefficients& k, StepData& data,
+                               const Assembler& assembler, std::span<double> values, const double* axial_force) const {
+  const Model& model = problem.model;
+  const bool with_matrix = !values.empty();
+  Local local;
+  const auto add = [&](const ElementTable& table, int i) {
+    table.add_gradient(i, local.gradient, 1.0, data.gradient, data.row_magnitude);
+    if (with_matrix) table.add_hessian(i, local.hessian, 1.0, values);
+  };
+  for (int e : assembler.regular.other_edges) {
+    stretch_local(model, k, data.configuration, e, with_matrix, axial_force, local);
+    add(assembler.stretch, e);
+  }
+  for (int b : assembler.regular.other_bend) {
+    bend_local(model, k, data.configuration, b, with_matrix, local);
+    data.potential += local.energy;
+    add(assembler.bend, b);
+  }
+  for (int h = 0; h < static_cast<int>(model.half.size()); ++h) {
+    half_local(model, data.z, k, data.configuration, h, with_matrix, local);
+    data.potential += local.energy;
+    add(assembler.half, h);
+  }
+}
+
+void ElasticForces::add_explicit(const StepProblem& problem, StepData& data, const Assembler& assembler,
+                                 const VectorX& v) const {
+  set_axial_forces(problem, problem.elastic, data);
+  StencilBatch batch = regular_batch(problem.elastic, data, assembler, {}, nullptr);
+  if (problem.model.planar()) {
+    stencil_kernels().planar_bend_forces(batch);
+  } else {
+    batch.velocity = v.data();
+    batch.edge_inertia = problem.parameters->edge_inertia.data();
+    stencil_kernels().bend_forces(batch);
+    for (int e : assembler.regular.other_edges) add_explicit_spin_couple(problem, data, e, v);
+  }
+  add_others(problem, problem.elastic, data, assembler, {}, nullptr);
+}
+
+double ElasticForces::dissipated(const StepProblem& problem, const StepData& data, const Assembler& assembler,
+                                 const VectorX& change) const {
+  if (!problem.viscous_acts()) return 0.0;
+  const Model& model = problem.model;
+  const ElasticCoefficients& viscous = problem.in_middle() ? data.viscous : problem.viscous;
+  double work = 0.0;
+  Local local;
+  const auto add = [&](const ElementTable& table, int i) {
+    const int* dofs = table.dofs(i);
+    for (int k = 0; k < table.width(); ++k)
+      if (dofs[k] >= 0) work += local.gradient[k] * change[dofs[k]];
+  };
+  for (int e = 0; e < model.edge_count; ++e) {
+    stretch_local(model, viscous, data.configuration, e, false, nullptr, local);
+    add(assembler.stretch, e);
+  }
+  for (int b = 0; b < static_cast<int>(model.bend.size()); ++b) {
+    bend_local(model, viscous, data.configuration, b, false, local);
+    add(assembler.bend, b);
+  }
+  for (int h = 0; h < static_cast<int>(model.half.size()); ++h) {
+    half_local(model, data.z, viscous, data.configuration, h, false, local);
+    add(assembler.half, h);
+  }
+  return work;
+}
+
+/// Axial forces of the mean strain, and 2 / (l0 + l1).
+void ElasticForces::set_mean_axial_forces(const StepProblem& problem, StepData& data) const {
+  const Model& model = problem.model;
+  const int n = model.edge_count;
+  data.force.resize(n);
+  data.modulus.resize(n);
+  data.inverse_mean.resize(n);
+  for (int e = 0; e < n; ++e) {
+    const double EA = problem.elastic.stretch_stiffness[e],
+                 sum = problem.start_configuration.length[e] + data.end_configuration.length[e];
+    data.force[e] = EA * (0.5 * sum / model.edge_length[e] - 1.0);
+    data.modulus[e] = EA / model.edge_length[e];
+    data.inverse_mean[e] = 2.0 / sum;
+  }
+}
+
+void predict_axial_force(const StepProblem& problem, const StepData& data, const VectorX& step, VectorX& out) {
+  const Model& model = problem.model;
+  const ElasticCoefficients& k = acting_coefficients(problem, data);
+  const bool mean = problem.conserves_energy();
+  out.resize(model.edge_count);
+  for (int e = 0; e < model.edge_count; ++e) {
+    const int a = model.node_dof[at(model.edge_tail[at(e)])], b = model.node_dof[at(model.edge_head[at(e)])];
+    const Vec3d& tangent = (mean ? data.end_configuration : data.configuration).edge[at(e)].tangent;
+    const double t[3] = {tangent.x, tangent.y, tangent.z};
+    double length = mean ? 0.5 * (problem.start_configuration.length(e) + data.end_configuration.length(e))
+                         : data.configuration.length(e);
+    for (int i = 0; i < model.dimension; ++i) length += t[i] * (step(b + i) - step(a + i));
+    out(e) = k.stretch_stiffness(e) * (length / model.edge_length(e) - 1.0 - k.stretch_natural(e));
+  }
+}
+
+}  // namespace withe

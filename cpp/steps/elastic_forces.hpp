@@ -1,0 +1,47 @@
+#pragma once
+/// Stretching, bending and twisting, and what of them is viscous; in energy-momentum steps the discrete gradient.
+
+#include "elasticity/stencil_kernels.hpp"
+#include "steps/term.hpp"
+
+namespace withe {
+
+class ElasticForces final : public Term {
+ public:
+  explicit ElasticForces(const Model& model) : inverse_rest_(model.edge_length.cwiseInverse()) {}
+
+  void begin(StepProblem& problem) override;
+  void find(const StepProblem& problem, StepData& data, Assembler& assembler, bool with_matrix) override;
+  void add(const StepProblem& problem, StepData& data, const Assembler& assembler,
+           std::span<double> values) const override;
+  double dissipated(const StepProblem& problem, const StepData& data, const Assembler& assembler,
+                    const VectorX& change) const override;
+
+  /// Elastic forces alone, with velocities v the couple of edges that spin and turn as well.
+  void add_explicit(const StepProblem& problem, StepData& data, const Assembler& assembler, const VectorX& v) const;
+
+ private:
+  void set_axial_forces(const StepProblem& problem, const ElasticCoefficients& k, StepData& data) const;
+  void set_mean_axial_forces(const StepProblem& problem, StepData& data) const;
+  void add_elastic(const StepProblem& problem, const ElasticCoefficients& k, StepData& data, const Assembler& assembler,
+                   std::span<double> values, const double* axial_force) const;
+  void add_others(const StepProblem& problem, const ElasticCoefficients& k, StepData& data, const Assembler& assembler,
+                  std::span<double> values, const double* axial_force) const;
+  void add_discrete_gradient(const StepProblem& problem, StepData& data, const Assembler& assembler,
+                             std::span<double> values) const;
+
+  VectorX inverse_rest_;  ///< per edge: 1 / L [1 / m]
+};
+
+/// The stencils that kernels take, as they lie in the data.
+StencilBatch regular_batch(const ElasticCoefficients& k, StepData& data, const Assembler& assembler,
+                           std::span<double> values, const double* axial_force);
+
+/// What acts in an evaluation: elasticity, with viscosity where the rule takes both as one.
+const ElasticCoefficients& acting_coefficients(const StepProblem& problem, const StepData& data);
+
+/// Axial forces [N] as the mixed method wants them: linearly extrapolated from the last evaluation by a
+/// Newton step, n <- EA (eps + d eps . dz).
+void predict_axial_force(const StepProblem& problem, const StepData& data, const VectorX& step, VectorX& out);
+
+}  // namespace withe

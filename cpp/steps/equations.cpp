@@ -1,0 +1,177 @@
+#include "steps/equations.hpp"
+
+#include <atomic>
+#include <cmath>
+#include <utility>
+
+#include "elasticity/stencil_kernels.hpp"
+#include "steps/body_forces.hpp"
+#include "steps/inertia.hpp"
+#include "steps/load_forces.hpp"
+#include "steps/rounding.hpp"
+
+namespace withe {
+namespace {
+
+std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+long next_number() {
+  static std::atomic<long> count{0};
+  return ++count;
+}
+
+StepProblem problem_of(const Model& model) {
+  StepProblem problem(model);
+  problem.loads = resolve_loads(model);
+  problem.custom.force = VectorX::Zero(model.dof_count);
+  problem.custom.moments.assign(at(problem.loads.node_moments), Vector3::Zero());
+  return problem;
+}
+
+/// An axial strain rounds along its edge only.
+void add_axial_bounds(const Model& model, StepData& data) {
+  const int size = model.dimension;
+  for (int e = 0; e < model.edge_count; ++e) {
+    const Vec3d& t = data.configuration.edge[at(e)].tangent;
+    const double bound = data.rounding.axial[e];
+    const double part[3] = {bound * std::abs(t.x), bound * std::abs(t.y), size == 2 ? 0.0 : bound * std::abs(t.z)};
+    double *tail = &data.floor[model.tail_dof[at(e)]], *head = &data.floor[model.head_dof[at(e)]];
+    for (int i = 0; i < size; ++i) {
+      tail[i] += part[i];
+      head[i] += part[i];
+    }
+  }
+}
+
+}  // namespace
+
+Equations::Equations(const Model& model, const EquationOptions& options)
+    : problem_(problem_of(model)),
+      terms_(make_terms(model, problem_.loads, options.rule)),
+      asymmetries_(asymmetries_of(model, problem_.loads, terms_, options.rule)),
+      assembler_(model, problem_.loads,
+                 asymmetries_.empty() ? Symmetry::symmetric : Symmetry::unsymmetric, options.solver),
+      static_duration_(options.static_duration) {
+  if (contact()) {
+    assembler_.couple(contact()->element_unknowns(), kContactUnknowns);
+    ordered_ = contact()->elements();
+    if (contact()->frictional()) has_potential_ = false;
+  }
+  if (terms_.custom) has_potential_ = false;
+  for (const LoadPiece& piece : loads().pieces)
+    if (!withe::has_potential(model, piece)) has_potential_ = false;
+}
+
+void Equations::set_parameters(const Parameters& parameters) {
+  problem_.parameters = &parameters;
+  if (problem_.version == parameters.version) return;
+  problem_.version = parameters.version;
+  set_mass(model(), parameters, problem_.mass);
+  set_gravity_force(model(), parameters, problem_.gravity);
+  set_elastic(parameters, problem_.elastic);
+  set_drag(model(), parameters, problem_.drag);
+}
+
+void Equations::begin(const State& state, const Parameters& parameters, StepRule rule, double h) {
+  set_parameters(parameters);
+  problem_.start = &state;
+  problem_.rule = rule;
+  problem_.interval = h;
+  problem_.number = next_number();
+  problem_.slip_time = problem_.moves() ? problem_.duration() : static_duration_;
+  for (const std::unique_ptr<Term>& term : terms_.all) term->begin(problem_);
+}
+
+void Equations::set_custom(const MatrixX3& forces, const MatrixX3& moments) {
+  problem_.custom = applied_forces(model(), forces, moments);
+}
+
+void Equations::respond(CustomResponse response) {
+  if (terms_.custom) terms_.custom->respond = std::move(response);
+}
+
+bool Equations::begin_flow(const VectorX& q, const VectorX& v) {
+  pass_mark();
+  return terms_.stokeslets->solve(problem_, q, v);
+}
+
+void Equations::forget_flow() {
+  if (terms_.stokeslets) terms_.stokeslets->forget();
+}
+
+void Equations::clear(const VectorX& z, StepData& data) const {
+  data.potential = 0.0;
+  data.gradient.setZero(model().dof_count + kPadding);
+  data.row_magnitude.setZero(model().dof_count + kPadding);
+  data.z = z;
+}
+
+/// What acts, with room for it in the matrix.
+void Equations::find(StepData& data, bool with_matrix) {
+  for (const std::unique_ptr<Term>& term : terms_.all) {
+    const int before = assembler_.generation();
+    term->find(problem_, data, assembler_, with_matrix);
+    if (terms_.contact && assembler_.generation() != before) ordered_ = contact()->elements();
+  }
+}
+
+void Equations::evaluate(const VectorX& z, bool with_matrix, const double* axial_force, StepData& data) {
+  clear(z, data);
+  data.axial_force = axial_force;
+  if (with_matrix) pass_mark();
+  find(data, with_matrix);
+  if (data.rounding.number != problem_.number) set_rounding_bounds(problem_, data);
+  std::span<double> values;
+  if (with_matrix) {
+    values = assembler_.solver().values();
+    std::fill(values.begin(), values.end(), 0.0);
+  }
+  for (const std::unique_ptr<Term>& term : terms_.all) term->add(problem_, data, assembler_, values);
+  finish(data);
+  if (with_matrix) assembler_.project_matrix();
+}
+
+void Equations::finish(StepData& data) const {
+  const int n = model().dof_count;
+  data.full_residual = data.gradient.head(n);
+  data.magnitude = data.row_magnitude.head(n);
+  data.floor = data.rounding.rows + data.rounding.relative * data.magnitude;
+  if (terms_.contact) data.floor += data.contact_floor;
+  add_axial_bounds(model(), data);
+  data.residual = data.full_residual;
+  assembler_.project(data.residual);
+}
+
+void Equations::evaluate_forces(const VectorX& v, StepData& data) const {
+  clear(problem_.start->q, data);
+  data.custom = problem_.custom;
+  data.axial_force = nullptr;
+  terms_.elastic->add_explicit(problem_, data, assembler_, v);
+  if (!loads().pieces.empty()) LoadForces().add(problem_, data, assembler_, {});
+  data.full_residual = data.gradient.head(model().dof_count) - problem_.gravity - problem_.custom.force;
+}
+
+double Equations::dissipated(const StepData& data, const VectorX& change) const {
+  double work = 0.0;
+  for (const std::unique_ptr<Term>& term : terms_.all) work += term->dissipated(problem_, data, assembler_, change);
+  return work;
+}
+
+void Equations::load_force(const StepData& data, VectorX& out) const {
+  out.setZero(model().dof_count);
+  for (const std::unique_ptr<Term>& term : terms_.all) term->add_applied(problem_, data, assembler_, out);
+}
+
+double Equations::allowed(const VectorX& z, const VectorX& step) {
+  return terms_.contact ? terms_.contact->allowed(problem_, z, step) : 1.0;
+}
+
+void Equations::foresee(const VectorX& step, double kept) {
+  if (terms_.contact) terms_.contact->foresee(problem_, step, kept);
+}
+
+double Equations::contact_loss(const StepData& data, const VectorX& change, double obstacle_work) const {
+  return terms_.contact->loss(data, change, obstacle_work);
+}
+
+}  // namespace withe

@@ -1,0 +1,118 @@
+#pragma once
+/// The equations of a scene's steps under one scheme: its terms, and the matrix that they share.
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "assembly/assembler.hpp"
+#include "steps/terms.hpp"
+
+namespace withe {
+
+/// What solves leave for those to come.
+struct EquationsMemory {
+  /// Contacts whose unknowns the order of elimination was found for, and those in the matrix; sorted.
+  std::vector<ContactKey> ordered, coupled;
+  std::vector<std::vector<int>> groups;  ///< of unknowns that custom forces couple
+  std::vector<double> matrix;            ///< whose factorisation is in use; empty: none
+  double flow_excess = 0;
+  StokesletFluid::Memory fluid;
+};
+
+/// What decides about the form of the equations.
+struct EquationOptions {
+  StepRule rule = StepRule::midpoint;
+  double static_duration = 0;  ///< in which slip happens in statics [s]
+  SolverKind solver = SolverKind::automatic;
+};
+
+class Equations {
+ public:
+  Equations(const Model& model, const EquationOptions& options);
+  Equations(const Equations&) = delete;
+  Equations& operator=(const Equations&) = delete;
+
+  const Model& model() const { return problem_.model; }
+  /// The problem that has begun last.
+  const StepProblem& problem() const { return problem_; }
+  Assembler& assembler() { return assembler_; }
+  const Assembler& assembler() const { return assembler_; }
+  Loads& loads() { return problem_.loads; }
+  const Loads& loads() const { return problem_.loads; }
+  const MassMatrix& mass() const { return problem_.mass; }
+  ElasticCoefficients& elastic() { return problem_.elastic; }
+  const ElasticCoefficients& elastic() const { return problem_.elastic; }
+  VectorX& held_acceleration() { return problem_.held_acceleration; }
+  /// In words, what makes the Jacobian unsymmetric.
+  const std::vector<std::string>& asymmetries() const { return asymmetries_; }
+  /// True where statics minimise a potential.
+  bool has_potential() const { return has_potential_; }
+
+  /// Nothing where nothing can touch.
+  Contact* contact() { return terms_.contact ? &terms_.contact->contact() : nullptr; }
+  const Contact* contact() const { return terms_.contact ? &terms_.contact->contact() : nullptr; }
+  void forget_contacts();
+  /// How much of a step of z contact allows, from 0 to 1.
+  double allowed(const VectorX& z, const VectorX& step);
+  /// Tells contact of a step of Newton's method from where it was last evaluated, of which `kept` is left.
+  void foresee(const VectorX& step, double kept);
+  double contact_loss(const StepData& data, const VectorX& change, double obstacle_work) const;
+
+  /// Prepares a step from `state`, which must outlive it, over h (0: statics).
+  void begin(const State& state, const Parameters& parameters, StepRule rule, double h);
+  /// Custom forces that act in the steps to come, and what is solved for (empty: nothing), where the scene has any.
+  void set_custom(const MatrixX3& forces, const MatrixX3& moments);
+  void respond(CustomResponse response);
+  /// Whether Stokeslets act: then `begin_flow` follows `begin`, with velocities `v` at positions `q`. False where no
+  /// solution was found.
+  bool flows() const { return terms_.stokeslets != nullptr; }
+  bool begin_flow(const VectorX& q, const VectorX& v);
+  double flow_excess() const { return terms_.stokeslets->excess(); }
+  void forget_flow();
+
+  /// Residual at z, and the matrix when asked for. `axial_force`: see stretch_hessian.
+  void evaluate(const VectorX& z, bool with_matrix, const double* axial_force, StepData& data);
+  /// Forces without inertia at the start of the problem, whose configuration the data has, with velocities v: the full
+  /// residual alone. No contact, viscosity, drag or fluid.
+  void evaluate_forces(const VectorX& v, StepData& data) const;
+
+  /// What drag, viscosity and fluids take, and what loads and custom forces give, over `change`, with the forces of the
+  /// last evaluation [J].
+  double dissipated(const StepData& data, const VectorX& change) const;
+  bool loaded() const { return !loads().pieces.empty() || terms_.custom != nullptr; }
+  /// Of loads and custom forces in the last evaluation, per unknown.
+  void load_force(const StepData& data, VectorX& out) const;
+
+  /// What solves left for those to come; the matrix where its factorisation may serve again.
+  EquationsMemory memory(bool with_matrix) const;
+  /// Goes on from there, but for the factorisation. False where there is no matrix to factorise.
+  bool recall(const EquationsMemory& memory);
+  /// From here on what would be lost of that is kept, until the next mark: copied once, when it is about to change.
+  void mark() { mark_ = Mark::set; }
+  bool marked() const { return mark_ != Mark::none; }
+  /// What it was at the mark; nothing where it has not changed since.
+  const EquationsMemory* since_mark() const { return mark_ == Mark::passed ? &at_mark_ : nullptr; }
+
+ private:
+  void set_parameters(const Parameters& parameters);
+  void clear(const VectorX& z, StepData& data) const;
+  void find(StepData& data, bool with_matrix);
+  void finish(StepData& data) const;
+  void order_for_contacts();
+  void remember(EquationsMemory& out, bool with_matrix) const;
+  void pass_mark();
+
+  StepProblem problem_;
+  Terms terms_;
+  bool has_potential_ = true;
+  std::vector<std::string> asymmetries_;
+  Assembler assembler_;
+  double static_duration_;
+  enum class Mark { none, set, passed };
+  Mark mark_ = Mark::none;
+  EquationsMemory at_mark_;
+  std::vector<ContactKey> ordered_;  ///< contacts for which the assembler has found its order of elimination
+};
+
+}  // namespace withe

@@ -1,0 +1,125 @@
+// The force of a viscous fluid.
+//
+// Stokeslets: the force of the fluid is F(v) = -R v, with R dense. With velocities v* guessed before the step and u
+// those of the step, D (v* - u) - R v* acts, D a local drag: at u = v* that is F, and what it leaves is (D - R) (u -
+// v*), of the order of the scheme where v* is. On modes that neither mass nor stiffness hold back, u = (1 - R / D) v*
+// under backward Euler, where v* is the last u: stable for R up to 2 D, and beyond where mass over the step or
+// stiffness times it is as great. Under the midpoint rules, where v* is extrapolated from the last two, the roots of
+// x^2 = (1 - R / D) (2 x - 1) stay in the unit circle for R up to 4/3 D (stiffness does not help a velocity that
+// changes sign each step). D is as great as R along single rods; rods that nearly touch resist each other more, and
+// D grows where mass over the step is too small for that. The midpoint rules then take the last u for v*, which is
+// stable for R up to 2 D whatever the stiffness, but of first order: extrapolated, slow motions that meet a tenth of D
+// would grow.
+
+#include "steps/fluid_forces.hpp"
+
+#include "steps/inertia.hpp"
+
+namespace withe {
+namespace {
+
+std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+}  // namespace
+
+void StokesletForces::begin(StepProblem&) { acts_ = false; }
+
+bool StokesletForces::solve(const StepProblem& problem, const VectorX& q, const VectorX& v) {
+  if (!fluid_.solve(q, v, start_)) return false;
+  const Parameters& parameters = *problem.parameters;
+  const double viscosity = parameters.fluid_viscosity;
+  inertia_ = parameters.node_mass / (viscosity * problem.duration());
+  const double excess = fluid_.excess(inertia_, problem.in_middle() ? 1.3 : 1.9);
+  if (excess != excess_ || version_ != parameters.version) fluid_.set_local_drag(excess * viscosity, drag_);
+  excess_ = excess;
+  version_ = parameters.version;
+  multiply(problem.model, drag_, v, local_);
+  start_ = viscosity * start_ + local_;
+  acts_ = true;
+  return true;
+}
+
+/// The fluid's force on velocities (z - q0) / h.
+void StokesletForces::add(const StepProblem& problem, StepData& data, const Assembler& assembler,
+                          std::span<double> values) const {
+  if (!acts_) return;
+  const int n = problem.model.dof_count;
+  const double inverse = 1.0 / problem.interval;
+  data.velocity = inverse * (data.z - problem.start->q);
+  multiply(problem.model, drag_, data.velocity, data.flow_drag);
+  data.row_magnitude.head(n) += start_.cwiseAbs() + data.flow_drag.cwiseAbs();
+  data.flow_force = start_ - data.flow_drag;
+  data.gradient.head(n) -= data.flow_force;
+  if (!values.empty()) add_mass_matrix(problem, drag_, inverse, 1, assembler, values);
+}
+
+double StokesletForces::dissipated(const StepProblem&, const StepData& data, const Assembler&,
+                                   const VectorX& change) const {
+  return acts_ ? -data.flow_force.dot(change) : 0.0;
+}
+
+void StokesletForces::forget() {
+  fluid_.forget();
+  excess_ = 0.0;
+}
+
+void StokesletForces::recall(const StokesletFluid::Memory& memory, double excess) {
+  excess_ = excess;
+  version_ = -1;
+  fluid_.recall(memory);
+}
+
+ResistiveForces::ResistiveForces(const Model& model) {
+  const SceneDescription& scene = model.description;
+  for (int e = 0; e < model.edge_count; ++e) {
+    const auto rod = at(model.edge_rod[at(e)]);
+    const RodDescription& d = scene.rods[rod];
+    const double radius = d.contact_radius[e - model.rod_first_edge[rod]];
+    resistance_.push_back(resistive_coefficients(radius, d.rest_lengths.sum(), scene.fluid.wavelength));
+  }
+}
+
+void ResistiveForces::set_local(const StepProblem& problem, const StepData& data, int edge, bool with_hessian,
+                                Local& local) const {
+  const Model& model = problem.model;
+  const EdgeFrame<double>& f = data.configuration.edge[at(edge)];
+  const double half = 0.5 * model.edge_length[edge] * problem.parameters->fluid_viscosity;
+  ResistiveEdge resistive{.dimension = model.dimension,
+                          .along = half * resistance_[at(edge)].along,
+                          .across = half * resistance_[at(edge)].across,
+                          .tangent = {f.tangent.x, f.tangent.y, f.tangent.z},
+                          .inverse_length = f.inverse_length,
+                          .change = {},
+                          .inverse_duration = 1.0 / problem.interval};
+  const int dof[2] = {model.tail_dof[at(edge)], model.head_dof[at(edge)]};
+  for (int end = 0; end < 2; ++end)
+    for (int k = 0; k < model.dimension; ++k)
+      resistive.change[end][k] = data.z[dof[end] + k] - problem.start->q[dof[end] + k];
+  resistive_local(resistive, with_hessian, local);
+}
+
+void ResistiveForces::add(const StepProblem& problem, StepData& data, const Assembler& assembler,
+                          std::span<double> values) const {
+  if (!problem.moves()) return;
+  Local local;
+  for (int e = 0; e < problem.model.edge_count; ++e) {
+    set_local(problem, data, e, !values.empty(), local);
+    assembler.stretch.add_gradient(e, local.gradient, 1.0, data.gradient, data.row_magnitude);
+    if (!values.empty()) assembler.stretch.add_hessian(e, local.hessian, 1.0, values);
+  }
+}
+
+double ResistiveForces::dissipated(const StepProblem& problem, const StepData& data, const Assembler& assembler,
+                                   const VectorX& change) const {
+  double work = 0.0;
+  if (!problem.moves()) return work;
+  Local local;
+  for (int e = 0; e < problem.model.edge_count; ++e) {
+    set_local(problem, data, e, false, local);
+    const int* dofs = assembler.stretch.dofs(e);
+    for (int k = 0; k < assembler.stretch.width(); ++k) work += local.gradient[k] * change[dofs[k]];
+  }
+  return work;
+}
+
+}  // namespace withe

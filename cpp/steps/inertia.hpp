@@ -1,0 +1,32 @@
+#pragma once
+/// Inertia: of nodes, of edges that spin and turn, and of frames.
+
+#include "steps/term.hpp"
+
+namespace withe {
+
+/// M ((z - q0) / h^2 - v0 / h), and what turning adds. Under backward Euler an edge that spins at omega and turns also
+/// needs the couple I omega t x dt/dt; under the midpoint rules angular momentum is kept exactly.
+class Inertia final : public Term {
+ public:
+  void add(const StepProblem& problem, StepData& data, const Assembler& assembler,
+           std::span<double> values) const override;
+};
+
+/// Entries of a matrix such as that of masses: its diagonal, and what couples nodes off it.
+void add_mass_matrix(const StepProblem& problem, const MassMatrix& mass, double rate, int power, const Assembler& assembler,
+                     std::span<double> values);
+
+/// Adds to the gradient the couple of an edge that spins and turns with velocities v.
+void add_explicit_spin_couple(const StepProblem& problem, StepData& data, int edge, const VectorX& v);
+
+/// Of an energy-momentum step that changes the unknowns by `change`: the velocities of angles at its end.
+void set_turning_velocities(const StepProblem& problem, const VectorX& change, double dt, VectorX& v1);
+/// What forces of an energy-momentum step do their work over: its change of the unknowns, but for angles and frames,
+/// whose torques and moments are those about where they are in the middle.
+void set_working_change(const StepProblem& problem, const StepData& data, const VectorX& change, VectorX& working);
+/// Makes of the rows of angles, after an energy-momentum step, what does the work over `change` that their torques
+/// do.
+void set_working_rows(const StepProblem& problem, const StepData& data, const VectorX& change, VectorX& rows);
+
+}  // namespace withe

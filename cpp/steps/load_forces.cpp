@@ -1,0 +1,37 @@
+#include "steps/load_forces.hpp"
+
+namespace withe {
+
+void LoadForces::add(const StepProblem& problem, StepData& data, const Assembler& assembler,
+                     std::span<double> values) const {
+  const Loads& loads = problem.loads;
+  Local local;
+  for (std::size_t k = 0; k < loads.pieces.size(); ++k) {
+    const bool dead = loads.pieces[k].shape == LoadShape::dead_node;
+    load_local(problem.model, *problem.start, data.z, data.configuration, loads.pieces[k],
+               value_of(loads, data.custom, loads.pieces[k]), local);
+    assembler.loads[k].add_gradient(0, local.gradient, 1.0, data.gradient, data.row_magnitude);
+    if (!values.empty() && !dead) assembler.loads[k].add_hessian(0, local.hessian, 1.0, values);
+    const int* dofs = assembler.loads[k].dofs(0);
+    if (dead)
+      for (int i = 0; i < problem.model.dimension; ++i) data.potential += local.gradient[i] * data.z(dofs[i]);
+    else
+      data.potential += local.energy;
+  }
+}
+
+void LoadForces::add_applied(const StepProblem& problem, const StepData& data, const Assembler& assembler,
+                             VectorX& force) const {
+  const Loads& loads = problem.loads;
+  Local local;
+  for (std::size_t k = 0; k < loads.pieces.size(); ++k) {
+    load_local(problem.model, *problem.start, data.z, data.configuration, loads.pieces[k],
+               value_of(loads, data.custom, loads.pieces[k]), local);
+    const ElementTable& table = assembler.loads[k];
+    const int* dofs = table.dofs(0);
+    for (int i = 0; i < table.width(); ++i)
+      if (dofs[i] >= 0) force[dofs[i]] -= local.gradient[i];
+  }
+}
+
+}  // namespace withe

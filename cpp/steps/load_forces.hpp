@@ -1,0 +1,22 @@
+#pragma once
+/// Loads that a user puts on, see forces/loads.hpp.
+
+#include "steps/term.hpp"
+
+namespace withe {
+
+class LoadForces final : public Term {
+ public:
+  void add(const StepProblem& problem, StepData& data, const Assembler& assembler,
+           std::span<double> values) const override;
+  void add_applied(const StepProblem& problem, const StepData& data, const Assembler& assembler,
+                   VectorX& force) const override;
+};
+
+/// What a piece is a piece of.
+inline const Vector3& value_of(const Loads& loads, const AppliedForces& custom, const LoadPiece& piece) {
+  return piece.load >= 0 ? loads.values[static_cast<std::size_t>(piece.load)]
+                         : custom.moments[static_cast<std::size_t>(piece.node)];
+}
+
+}  // namespace withe

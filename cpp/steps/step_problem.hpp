@@ -1,0 +1,106 @@
+#pragma once
+/// The problem that one step must solve, as a value, and what an evaluation of it finds.
+///
+/// Every implicit scheme solves for an inner configuration z over an interval h:
+///   M ((z - q0) / h^2 - v0 / h) + grad V(z) + D (z - q0) / h - f = 0,
+/// with z = q1, h = dt (backward Euler) or z = (q0 + q1) / 2, h = dt / 2 (implicit midpoint: backward Euler
+/// over half the step, then extrapolated). Statics is the same without mass. The energy-momentum scheme
+/// replaces grad V by a discrete gradient between q0 and q1 = 2 z - q0:
+///   stretching: EA (eps0 + eps1) / 2 (e0 + e1) / (|e0| + |e1|)   [Simo, Tarnow and Doblare 1995];
+///   bending, twisting: moments whose work is what the energy changes by, see elasticity/discrete_gradient.hpp;
+///   surfaces that press: along the mean of the ways between them, see Contact::add_mean_pressing.
+
+#include "elasticity/elements.hpp"
+#include "forces/custom_forces.hpp"
+#include "forces/loads.hpp"
+#include "model/mass_matrix.hpp"
+#include "model/state.hpp"
+
+namespace withe {
+
+/// How one step goes from q0 to q1, and so what z is of it. An explicit step evaluates at its end alone.
+enum class StepRule { statics, backward_euler, midpoint, energy_momentum, verlet };
+
+/// Custom forces as the equations take them.
+struct AppliedForces {
+  VectorX force;                 ///< per unknown [N]
+  std::vector<Vector3> moments;  ///< per node, in world axes [N m]; empty: none
+};
+
+struct StepProblem {
+  explicit StepProblem(const Model& of) : model(of) {}
+
+  const Model& model;
+  const State* start = nullptr;            ///< must outlive the step
+  const Parameters* parameters = nullptr;  ///< likewise
+  StepRule rule = StepRule::statics;
+  double interval = 0;  ///< h, from q0 to z [s]; 0: statics
+  double slip_time = 0;  ///< in which slip happens [s]
+  long number = 0;      ///< of problems so far: tells one from another
+
+  /// Of the parameters, of that version.
+  long version = -1;
+  MassMatrix mass, drag;  ///< [kg], [N s/m]
+  VectorX gravity;        ///< force per unknown [N]
+  ElasticCoefficients elastic;
+
+  /// Of the start, where viscosity or the rule need it.
+  Configuration start_configuration;
+  ElasticCoefficients viscous;  ///< viscosity alone, over h, from the start's strains
+  ElasticCoefficients damped;   ///< elasticity and viscosity as one
+
+  Loads loads;                 ///< with the values that act at the time of the step's forces
+  AppliedForces custom;        ///< unless they are solved for
+  /// Of what supports hold, which acts on the edges next to it; meaningful where held. Empty: as the rest accelerates.
+  VectorX held_acceleration;
+
+  /// Whether z is the middle of the step, and q1 = 2 z - q0.
+  bool in_middle() const { return rule == StepRule::midpoint || rule == StepRule::energy_momentum; }
+  bool conserves_energy() const { return rule == StepRule::energy_momentum; }
+  bool moves() const { return interval != 0.0; }
+  bool viscous_acts() const { return parameters->viscous && moves(); }
+  /// Of the whole step [s].
+  double duration() const { return in_middle() ? 2.0 * interval : interval; }
+  /// By how much q1 changes with z.
+  double end_rate() const { return in_middle() ? 2.0 : 1.0; }
+};
+
+/// What rounding leaves of a residual, which no iteration removes; see rounding.cpp.
+struct RoundingBounds {
+  long number = -1;      ///< of the problem that they belong to
+  VectorX rows;          ///< of bending, twisting and inertia
+  VectorX axial;         ///< per edge [N]
+  double relative = 0;   ///< of a direction in space
+  double reach = 0;      ///< greatest coordinate [m]
+};
+
+/// What an evaluation of a problem finds; owned by who asks for it.
+struct StepData {
+  VectorX residual;       ///< projected onto free directions
+  VectorX full_residual;  ///< before projection: minus the reactions
+  VectorX magnitude;      ///< per row, sum of the absolute contributions
+  VectorX floor;          ///< per row, what rounding alone leaves
+  double potential = 0;   ///< elastic + gravity - loads that have one [J], where the scene has one
+
+  VectorX z;
+  const double* axial_force = nullptr;  ///< of the mixed method, see stretch_local; nothing: that of the configuration
+  VectorX end;  ///< q1
+  Configuration configuration;      ///< at z
+  Configuration end_configuration;  ///< at q1, where viscosity or the rule need it
+  RoundingBounds rounding;
+
+  /// What terms leave for each other and for read-outs.
+  VectorX gradient, row_magnitude;   ///< forces and their absolute values so far; padded by kPadding
+  ElasticCoefficients viscous, damped;  ///< of a step whose middle is z
+  VectorX force, modulus;            ///< per edge: EA eps [N], EA / L [N / m]
+  VectorX inverse_mean;              ///< per edge: 2 / (l0 + l1) of an energy-momentum step [1 / m]
+  VectorX elastic_rows;              ///< per unknown, the discrete gradient alone
+  AppliedForces custom;              ///< custom forces at z
+  VectorX velocity;                  ///< (z - q0) / h
+  VectorX acceleration, inertia;     ///< M times the acceleration [N], [N m]
+  VectorX drag_force;                ///< [N]
+  VectorX flow_force, flow_drag;     ///< of a fluid, and its local drag [N]
+  VectorX contact_gradient, contact_floor;
+};
+
+}  // namespace withe

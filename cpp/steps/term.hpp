@@ -1,0 +1,36 @@
+#pragma once
+/// One kind of force among the equations of a step. Terms are named in one table, `make_terms` in terms.cpp; a scene has
+/// those that it needs.
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "assembly/assembler.hpp"
+#include "steps/step_problem.hpp"
+
+namespace withe {
+
+class Term {
+ public:
+  Term() = default;
+  Term(const Term&) = delete;
+  Term& operator=(const Term&) = delete;
+  virtual ~Term() = default;
+
+  /// Finds what holds through a step that has just begun.
+  virtual void begin(StepProblem&) {}
+  /// Finds what acts at data.z before anything is added; where a matrix is wanted, makes room for it.
+  virtual void find(const StepProblem&, StepData&, Assembler&, bool /*with_matrix*/) {}
+  /// Adds forces (minus the generalised ones) to the rows, energies to the potential, and derivatives to the matrix:
+  /// `values`, through the assembler's offsets; empty where none is wanted.
+  virtual void add(const StepProblem&, StepData&, const Assembler&, std::span<double> values) const = 0;
+  /// What is taken from the motion over `change` with the forces of the last evaluation [J].
+  virtual double dissipated(const StepProblem&, const StepData&, const Assembler&, const VectorX& /*change*/) const {
+    return 0.0;
+  }
+  /// Adds what a user applies, in the last evaluation, to generalised forces.
+  virtual void add_applied(const StepProblem&, const StepData&, const Assembler&, VectorX& /*force*/) const {}
+};
+
+}  // namespace withe

@@ -1,0 +1,51 @@
+#include "steps/terms.hpp"
+
+#include <utility>
+
+#include "steps/body_forces.hpp"
+#include "steps/inertia.hpp"
+#include "steps/load_forces.hpp"
+
+namespace withe {
+
+/// Inertia turns what those before it make of a frame's rows.
+Terms make_terms(const Model& model, const Loads& loads, StepRule rule) {
+  const SceneDescription& scene = model.description;
+  const bool moves = rule != StepRule::statics;
+  Terms terms;
+  const auto add = [&]<class Kind>(std::unique_ptr<Kind> term) {
+    Kind* const out = term.get();
+    terms.all.push_back(std::move(term));
+    return out;
+  };
+  terms.elastic = add(std::make_unique<ElasticForces>(model));
+  if (!loads.pieces.empty()) add(std::make_unique<LoadForces>());
+  if (moves && scene.fluid.model == FluidModel::resistive) add(std::make_unique<ResistiveForces>(model));
+  if (scene.contact.any()) terms.contact = add(std::make_unique<ContactForces>(model));
+  add(std::make_unique<Inertia>());
+  add(std::make_unique<Drag>());
+  add(std::make_unique<Gravity>());
+  if (scene.has_custom_force) terms.custom = add(std::make_unique<CustomTerm>());
+  if (moves && scene.fluid.model == FluidModel::stokeslets)
+    terms.stokeslets = add(std::make_unique<StokesletForces>(model));
+  return terms;
+}
+
+std::vector<std::string> asymmetries_of(const Model& model, const Loads& loads, const Terms& terms, StepRule rule) {
+  const SceneDescription& scene = model.description;
+  const Contact* contact = terms.contact ? &terms.contact->contact() : nullptr;
+  std::vector<std::string> found;
+  if (scene.custom_implicit || (scene.has_custom_force && rule == StepRule::statics))
+    found.emplace_back("custom forces that are solved for");
+  if (loads.unsymmetric) found.emplace_back("follower loads or moments in 3D");
+  if (rule == StepRule::energy_momentum) found.emplace_back("energy-momentum steps");
+  const bool rods_touch = contact && !contact->surfaces().edges().empty();
+  if (rule == StepRule::midpoint && rods_touch && !contact->frictional())
+    found.emplace_back("contact of rods in midpoint steps");
+  if (contact && contact->unsymmetric()) found.emplace_back("implicit friction");
+  if (scene.fluid.model == FluidModel::resistive && rule != StepRule::statics)
+    found.emplace_back("resistive-force theory");
+  return found;
+}
+
+}  // namespace withe
