@@ -6,8 +6,7 @@
 /// with z = q1, h = dt (backward Euler) or z = (q0 + q1) / 2, h = dt / 2 (implicit midpoint: backward Euler
 /// over half the step, then extrapolated). Statics is the same without mass. The energy-momentum scheme
 /// replaces grad V by a discrete gradient between q0 and q1 = 2 z - q0:
-///   stretching: EA (eps0 + eps1) / 2 (e0 + e1) / (|e0| + |e1|)   [Simo, Tarnow and Doblare 1995];
-///   bending, twisting: moments whose work is what the energy changes by, see elasticity/discrete_gradient.hpp;
+///   stretching, bending, twisting: see elasticity/discrete_elements.hpp;
 ///   surfaces that press: along the mean of the ways between them, see Contact::add_mean_pressing.
 
 #include <memory>
@@ -16,7 +15,7 @@
 
 #include "assembly/assembler.hpp"
 #include "contact/contact.hpp"
-#include "elasticity/discrete_gradient.hpp"
+#include "elasticity/elements.hpp"
 #include "forces/custom_forces.hpp"
 #include "forces/resistive.hpp"
 #include "forces/stokeslets.hpp"
@@ -173,12 +172,7 @@ class Equations {
                          Evaluation& out);
   void add_discrete_gradient(const VectorX& z, bool with_matrix, const double* axial_force, Evaluation& out);
   void set_mean_axial_forces();
-  void mean_stretch_local(const VectorX& z, int edge, const double* axial_force, Local& local) const;
-  MovingEdge<double> moving_edge(int edge) const;
   double working_turn(int edge, double change) const;
-  void discrete_bend_local(int stencil, bool with_matrix, Local& local) const;
-  void discrete_planar_half_local(int stencil, Local& local) const;
-  void discrete_half_local(int stencil, Local& local) const;
   void add_spin_couple(const VectorX& z);
   void set_turning_inertia(const VectorX& z);
   Vec3d spin_couple(int edge, double omega, const Vec3d& rate) const;
@@ -225,7 +219,6 @@ class Equations {
   long version_ = -1;                       ///< of the parameters that mass, elastic, gravity_ and drag belong to
   VectorX gradient_, magnitude_;            ///< forces but for inertia, drag and gravity; padded by kPadding
   VectorX force_, modulus_, inverse_rest_;  ///< per edge: EA eps [N], EA / L [N / m], 1 / L [1 / m]
-  VectorX inverse_mean_;                    ///< per edge: 2 / (l0 + l1) of an energy-momentum step [1 / m]
   /// q1 that goes with z, and by how much it changes with z.
   void set_contact_end(const VectorX& z);
   double end_rate() const { return inner_ == Inner::middle ? 2.0 : 1.0; }
