@@ -1,5 +1,6 @@
 #include "steps/elastic_forces.hpp"
 
+#include "elasticity/discrete_elements.hpp"
 #include "elasticity/stencil_kernels.hpp"
 #include "steps/inertia.hpp"
 
@@ -8,8 +9,7 @@ namespace {
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
-}  // namespace
-
+/// The stencils that kernels take, as they lie in the data.
 StencilBatch regular_batch(const ElasticCoefficients& k, StepData& data, const Assembler& assembler,
                            std::span<double> values, const double* axial_force) {
   const RegularStencils& regular = assembler.regular;
@@ -36,6 +36,8 @@ StencilBatch regular_batch(const ElasticCoefficients& k, StepData& data, const A
           .velocity = nullptr,
           .edge_inertia = nullptr};
 }
+
+}  // namespace
 
 const ElasticCoefficients& acting_coefficients(const StepProblem& problem, const StepData& data) {
   if (!problem.viscous_acts() || problem.conserves_energy()) return problem.elastic;
@@ -170,20 +172,63 @@ double ElasticForces::dissipated(const StepProblem& problem, const StepData& dat
   return work;
 }
 
-/// Axial forces of the mean strain, and 2 / (l0 + l1).
+/// Axial forces of the mean strain.
 void ElasticForces::set_mean_axial_forces(const StepProblem& problem, StepData& data) const {
-  const Model& model = problem.model;
-  const int n = model.edge_count;
+  const int n = problem.model.edge_count;
   data.force.resize(n);
   data.modulus.resize(n);
-  data.inverse_mean.resize(n);
   for (int e = 0; e < n; ++e) {
-    const double EA = problem.elastic.stretch_stiffness[e],
-                 sum = problem.start_configuration.length[e] + data.end_configuration.length[e];
-    data.force[e] = EA * (0.5 * sum / model.edge_length[e] - 1.0);
-    data.modulus[e] = EA / model.edge_length[e];
-    data.inverse_mean[e] = 2.0 / sum;
+    const MeanStretch mean =
+        mean_stretch(problem.model, problem.elastic, problem.start_configuration, data.end_configuration, e);
+    data.force[e] = mean.force;
+    data.modulus[e] = mean.modulus;
   }
+}
+
+/// Forces of the energy-momentum scheme: see elasticity/discrete_elements.hpp.
+void ElasticForces::add_discrete_gradient(const StepProblem& problem, StepData& data, const Assembler& assembler,
+                                          std::span<double> values) const {
+  const Model& model = problem.model;
+  const bool with_matrix = !values.empty();
+  data.change = 2.0 * (data.z - problem.start->q);
+  const DiscreteStep step{.start = problem.start_configuration,
+                          .middle = data.configuration,
+                          .end = data.end_configuration,
+                          .middle_q = data.z,
+                          .end_q = data.end,
+                          .change = data.change};
+  Local local;
+  const auto add = [&](const ElementTable& table, int i) {
+    table.add_gradient(i, local.gradient, 1.0, data.gradient, data.row_magnitude);
+    if (with_matrix) table.add_hessian(i, local.hessian, 1.0, values);
+  };
+  const auto add_edge = [&](int e) {
+    discrete_stretch_local(model, problem.elastic, step, e, with_matrix, data.axial_force, local);
+    add(assembler.stretch, e);
+  };
+  const auto add_bend = [&](int b) {
+    discrete_bend_local(model, problem.elastic, step, b, with_matrix, local);
+    add(assembler.bend, b);
+  };
+  if (model.planar()) {
+    for (int e = 0; e < model.edge_count; ++e) add_edge(e);
+    for (int b = 0; b < static_cast<int>(model.bend.size()); ++b) add_bend(b);
+  } else {
+    set_mean_axial_forces(problem, data);
+    stencil_kernels().momentum_bend(regular_batch(problem.elastic, data, assembler, values, data.axial_force),
+                                    {.start_frames = &problem.start_configuration.edge.data()->tangent.x,
+                                     .end_frames = &data.end_configuration.edge.data()->tangent.x,
+                                     .start_strain = problem.start_configuration.bend_strain.data(),
+                                     .end_strain = data.end_configuration.bend_strain.data()});
+    for (int e : assembler.regular.other_edges) add_edge(e);
+    for (int b : assembler.regular.other_bend) add_bend(b);
+  }
+  for (int h = 0; h < static_cast<int>(model.half.size()); ++h) {
+    discrete_half_local(model, problem.elastic, step, h, with_matrix, local);
+    add(assembler.half, h);
+  }
+  data.elastic_rows = data.gradient.head(model.dof_count);
+  if (problem.viscous_acts()) add_elastic(problem, data.viscous, data, assembler, values, nullptr);
 }
 
 void predict_axial_force(const StepProblem& problem, const StepData& data, const VectorX& step, VectorX& out) {

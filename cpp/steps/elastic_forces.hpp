@@ -1,7 +1,6 @@
 #pragma once
 /// Stretching, bending and twisting, and what of them is viscous; in energy-momentum steps the discrete gradient.
 
-#include "elasticity/stencil_kernels.hpp"
 #include "steps/term.hpp"
 
 namespace withe {
@@ -32,10 +31,6 @@ class ElasticForces final : public Term {
 
   VectorX inverse_rest_;  ///< per edge: 1 / L [1 / m]
 };
-
-/// The stencils that kernels take, as they lie in the data.
-StencilBatch regular_batch(const ElasticCoefficients& k, StepData& data, const Assembler& assembler,
-                           std::span<double> values, const double* axial_force);
 
 /// What acts in an evaluation: elasticity, with viscosity where the rule takes both as one.
 const ElasticCoefficients& acting_coefficients(const StepProblem& problem, const StepData& data);

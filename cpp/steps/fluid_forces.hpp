@@ -43,7 +43,7 @@ class StokesletForces final : public Term {
   double excess() const { return excess_; }
   /// Without what earlier solutions left behind.
   void forget();
-  StokesletFluid::Memory memory() const { return fluid_.memory(); }
+  const StokesletFluid::Memory& memory() const { return fluid_.memory(); }
   void recall(const StokesletFluid::Memory& memory, double excess);
 
  private:

@@ -93,7 +93,7 @@ struct StepData {
   VectorX gradient, row_magnitude;   ///< forces and their absolute values so far; padded by kPadding
   ElasticCoefficients viscous, damped;  ///< of a step whose middle is z
   VectorX force, modulus;            ///< per edge: EA eps [N], EA / L [N / m]
-  VectorX inverse_mean;              ///< per edge: 2 / (l0 + l1) of an energy-momentum step [1 / m]
+  VectorX change;                    ///< q1 - q0 of an energy-momentum step
   VectorX elastic_rows;              ///< per unknown, the discrete gradient alone
   AppliedForces custom;              ///< custom forces at z
   VectorX velocity;                  ///< (z - q0) / h

@@ -134,8 +134,8 @@ void expect_exact(const Case& c, Integrator integrator, StepRule rule, bool fore
     return evaluation.residual;
   };
   EXPECT_TRUE(derivative_matches(residual, VectorX::Zero(n), J, c.increment))
-      << c.name << ", law " << static_cast<int>(c.model.description.contact.friction_law) << ", inner "
-      << static_cast<int>(inner);
+      << c.name << ", law " << static_cast<int>(c.model.description.contact.friction_law) << ", rule "
+      << static_cast<int>(rule);
 }
 
 constexpr FrictionLaw kFrictionLaws[] = {FrictionLaw::implicit, FrictionLaw::lagged, FrictionLaw::anchored,

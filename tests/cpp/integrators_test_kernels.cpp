@@ -2,7 +2,8 @@
 
 #include <gtest/gtest.h>
 
-#include "steps/equations.hpp"
+#include "elasticity/discrete_gradient.hpp"
+#include "integrators/step_parts.hpp"
 #include "states.hpp"
 
 namespace withe {

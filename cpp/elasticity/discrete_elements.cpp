@@ -1,0 +1,393 @@
+#include "elasticity/discrete_elements.hpp"
+
+#include <cmath>
+
+#include "elasticity/discrete_gradient.hpp"
+#include "geometry/rotation.hpp"
+
+namespace withe {
+namespace {
+
+std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+Vec3d row_of(const Columns3& table, int i) { return {table(i, 0), table(i, 1), table(i, 2)}; }
+
+Vec3d in_plane(const EdgeFrame<double>& f, double sign) { return {sign * f.tangent.x, sign * f.tangent.y, 0.0}; }
+
+/// The moment about a plane's normal with m (w_a - w_b) = E1 - E0, and its derivatives by the turns of both directions
+/// at the end: `discrete_moment` for kappa = 2 (t_a x t_b) / (1 + t_a . t_b).
+struct PlanarMoment {
+  double moment, by_a, by_b;
+};
+
+PlanarMoment planar_moment(const BendMeasure& measure, const Vec3d& a0, const Vec3d& a1, const Vec3d& b0,
+                           const Vec3d& b1, double kappa0, double kappa1, double natural, double stiffness) {
+  const DividedMoments<double> h = divided_moments<true, double>(measure, {kappa0, 0.0, 0.0}, {kappa1, 0.0, 0.0},
+                                                                 {natural, 0.0, 0.0}, {stiffness, 0.0, 0.0});
+  const Vec3d a = 0.5 * (a0 + a1), b = 0.5 * (b0 + b1);
+  const double inverse = 2.0 / (2.0 + dot(a0, b0) + dot(a1, b1)), kappa = 0.5 * (kappa0 + kappa1);
+  const double along = dot(a, b), across = cross(a, b).z;
+  const double slope = -inverse * (2.0 * along + kappa * across);
+  PlanarMoment m;
+  m.moment = h.by[0] * slope;
+  // By a turn of a less that of b: kappa, and 1 + t_a . t_b.
+  const double by_kappa = -(1.0 + 0.25 * kappa1 * kappa1), by_chi = cross(a1, b1).z;
+  const double strained =
+      h.second[0][0] * slope * by_kappa - h.by[0] * inverse * (0.5 * by_kappa * across + 0.5 * by_chi * slope);
+  // d along = (da x b + db' ...) / 2: a turn of a moves it by w x a1.
+  const double along_a = 0.5 * cross(a1, b).z, along_b = -0.5 * cross(a, b1).z;
+  const double across_a = -0.5 * dot(a1, b), across_b = 0.5 * dot(a, b1);
+  m.by_a = strained - h.by[0] * inverse * (2.0 * along_a + kappa * across_a);
+  m.by_b = -strained - h.by[0] * inverse * (2.0 * along_b + kappa * across_b);
+  return m;
+}
+
+Vector2 flat(const Vec3d& v) { return {v.x, v.y}; }
+/// By a right angle.
+Vector2 turned(const Vector2& v) { return {-v.y(), v.x()}; }
+
+/// `MovingEdge` in a plane, where a moment has one component and directors do not turn.
+struct PlanarEdge {
+  Vector2 t0, t1, t;
+  double inverse_length1, inverse_length, inverse_mean, chi, stretch;
+  Vector2 force;  ///< of a unit moment, on the edge's vector
+
+  PlanarEdge(const EdgeFrame<double>& start, const EdgeFrame<double>& middle, const EdgeFrame<double>& end)
+      : t0(flat(start.tangent)),
+        t1(flat(end.tangent)),
+        t(flat(middle.tangent)),
+        inverse_length1(end.inverse_length),
+        inverse_length(middle.inverse_length) {
+    const double l0 = 1.0 / start.inverse_length, l1 = 1.0 / end.inverse_length;
+    inverse_mean = 2.0 / (l0 + l1);
+    chi = 0.5 / (1.0 + t0.dot(t1));
+    stretch = chi * inverse_length * inverse_mean * (l1 - l0);
+    force = inverse_length * turned(t) + stretch * cross(t0, t1) * t;
+  }
+
+  /// How a moment changes with the edge's vector at the end, of its change by a turn.
+  Vector2 column(double by_turn) const { return by_turn * inverse_length1 * turned(t1); }
+
+  /// How the force of a moment that stays changes with the edge's vector at the end.
+  Eigen::Matrix2d geometry(double moment) const {
+    const double i = inverse_length, p = moment * cross(t0, t1), nu = stretch * p;
+    const auto normal = [&](const Vector2& v) { return Vector2(inverse_length1 * (v - v.dot(t1) * t1)); };
+    const Vector2 by_chi = 2.0 * chi * normal(t0);
+    const Vector2 by_nu =
+        normal(stretch * moment * turned(t0)) +
+        p * (chi * i * inverse_mean * t1 - stretch * (by_chi + 0.5 * i * t + 0.5 * inverse_mean * t1));
+    Eigen::Matrix2d out =
+        t * by_nu.transpose() - i * i * moment * turned(t) * t.transpose() - 0.5 * nu * i * t * t.transpose();
+    const double turn = 0.5 * i * i * moment;
+    out(0, 0) += 0.5 * nu * i;
+    out(1, 1) += 0.5 * nu * i;
+    out(0, 1) -= turn;
+    out(1, 0) += turn;
+    return out;
+  }
+};
+
+void add_planar_force(Local& out, int tail, int head, const Vector2& force) {
+  for (int k = 0; k < 2; ++k) {
+    out.gradient[head + k] += force(k);
+    out.gradient[tail + k] -= force(k);
+  }
+}
+
+/// Rows of one edge by the vector of another, twice: changes of the end are twice those of the middle.
+void add_planar_rows(Local& out, const int (&row)[2], const int (&column)[2], const Eigen::Matrix2d& block) {
+  for (int a = 0; a < 2; ++a)
+    for (int b = 0; b < 2; ++b)
+      for (int k = 0; k < 2; ++k)
+        for (int l = 0; l < 2; ++l) out.hessian[row[a] + k][column[b] + l] += (a == b ? 2.0 : -2.0) * block(k, l);
+}
+
+void add_block(Local& out, int row, int column, double factor, const Mat3<double>& m) {
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) out.hessian[row + i][column + j] += factor * m.row[i][j];
+}
+
+/// Where an edge's vector and angle are among the unknowns of a stencil in space: its head less its tail.
+struct EdgePlace {
+  int tail, head, angle;
+};
+
+void add_edge_forces(Local& out, const EdgePlace& e, const MovingEdge<double>& edge, const EdgeFrame<double>& middle,
+                     const Vec3d& moment) {
+  const Vec3d f = edge.force(moment) + edge.torque(moment) * middle.spin;
+  const double component[3] = {f.x, f.y, f.z};
+  for (int i = 0; i < 3; ++i) {
+    out.gradient[e.head + i] += component[i];
+    out.gradient[e.tail + i] -= component[i];
+  }
+  out.gradient[e.angle] += edge.torque(moment);
+}
+
+/// What an edge makes of a moment that stays, and of its own change of it.
+void finish_block(const MovingEdge<double>& edge, const EdgeFrame<double>& middle, const Vec3d& moment, bool own,
+                  EdgeBlock<double>& block) {
+  if (own) add_edge_geometry(edge, moment, block);
+  add_transport(middle, block);
+  if (own) add_spin_change(edge, middle, edge.torque(moment), block);
+}
+
+/// Rows of edge `r` by the vector and angle of edge `c`, twice: changes of the end are twice those of the middle.
+void add_edge_rows(Local& out, const EdgePlace& r, const EdgePlace& c, const EdgeBlock<double>& b) {
+  constexpr double kTwice = 2.0;
+  for (int s : {1, -1})
+    for (int t : {1, -1}) add_block(out, s > 0 ? r.head : r.tail, t > 0 ? c.head : c.tail, s * t * kTwice, b.ee);
+  for (int i = 0; i < 3; ++i) {
+    out.hessian[r.head + i][c.angle] += kTwice * b.e_angle[i];
+    out.hessian[r.tail + i][c.angle] -= kTwice * b.e_angle[i];
+    out.hessian[r.angle][c.head + i] += kTwice * b.angle_e[i];
+    out.hessian[r.angle][c.tail + i] -= kTwice * b.angle_e[i];
+  }
+  out.hessian[r.angle][c.angle] += kTwice * b.angle_angle;
+}
+
+void clear(Local& out, int width, bool with_matrix) {
+  for (int i = 0; i < width; ++i) {
+    out.gradient[i] = 0.0;
+    for (int j = 0; with_matrix && j < width; ++j) out.hessian[i][j] = 0.0;
+  }
+}
+
+/// How the torque on a hinge follows from the moment m on what it carries: m . arm. Behind a frame that turns by the
+/// Cayley vector w the hinge turns by `angle` about `axis`, and what both make of the carried frame is a rotation with
+/// the Cayley vector w + angle arm.
+struct HingeArm {
+  Vector3 arm;
+  Matrix3 by_frame;  ///< by w
+  Vector3 by_angle;
+};
+
+HingeArm hinge_arm(const Vector3& w, const Vector3& axis, double angle) {
+  const Vector3 x = 0.5 * w;
+  const double t = std::tan(0.5 * angle), along = x.dot(axis), n = 1.0 / (1.0 - along * t);
+  const bool little = std::abs(angle) < 1e-4;
+  const double k = little ? 1.0 + angle * angle / 12.0 : 2.0 * t / angle;
+  const double by_k = little ? angle / 6.0 : ((1.0 + t * t) * angle - 2.0 * t) / (angle * angle);
+  const Vector3 a = n * (axis + x.cross(axis) + along * x);
+  HingeArm h;
+  h.arm = k * a;
+  h.by_frame =
+      0.5 * k *
+      (n * (-cross_matrix(axis) + along * Matrix3::Identity() + x * axis.transpose()) + n * t * a * axis.transpose());
+  h.by_angle = by_k * a + k * n * along * 0.5 * (1.0 + t * t) * a;
+  return h;
+}
+
+MovingEdge<double> moving_edge(const DiscreteStep& step, int edge) {
+  const EdgeFrame<double>&start = step.start.edge[at(edge)], &middle = step.middle.edge[at(edge)],
+        &end = step.end.edge[at(edge)];
+  return {start.tangent,         start.inverse_length,         end.tangent, end.inverse_length, middle.tangent,
+          middle.inverse_length, turn_of_directors(start, end)};
+}
+
+PlanarEdge planar_edge(const DiscreteStep& step, int edge) {
+  return {step.start.edge[at(edge)], step.middle.edge[at(edge)], step.end.edge[at(edge)]};
+}
+
+/// Its derivatives where asked for.
+DiscreteMoment<double> moment_between(const BendMeasure& measure, const EdgeFrame<double>& a0,
+                                      const EdgeFrame<double>& a1, const EdgeFrame<double>& b0,
+                                      const EdgeFrame<double>& b1, const Vec3d& start, const Vec3d& end,
+                                      const Vec3d& natural, const Vec3d& stiffness, bool with_matrix) {
+  DiscreteMoment<double> m{};
+  if (with_matrix)
+    discrete_moment<true>(measure, a0, a1, b0, b1, start, end, natural, stiffness, m);
+  else
+    discrete_moment<false>(measure, a0, a1, b0, b1, start, end, natural, stiffness, m);
+  return m;
+}
+
+void planar_bend_local(const Model& model, const ElasticCoefficients& elastic, const DiscreteStep& step, int stencil,
+                       bool with_matrix, Local& out) {
+  const BendStencil& s = model.bend[at(stencil)];
+  clear(out, 6, with_matrix);
+  Vec3d t0[2], t1[2];
+  int ends[2][2];
+  for (int k = 0; k < 2; ++k) {
+    const int first = 2 * k, second = 2 * (k + 1);
+    ends[k][0] = s.sign[k] > 0 ? first : second;
+    ends[k][1] = s.sign[k] > 0 ? second : first;
+    t0[k] = in_plane(step.start.edge[at(s.edge[k])], s.sign[k]);
+    t1[k] = in_plane(step.end.edge[at(s.edge[k])], s.sign[k]);
+  }
+  const PlanarMoment m = planar_moment(elastic.measure, t0[0], t1[0], t0[1], t1[1], step.start.bend_strain(stencil, 0),
+                                       step.end.bend_strain(stencil, 0), elastic.bend_natural(stencil, 0),
+                                       elastic.bend_stiffness(stencil, 0));
+  const PlanarEdge edge[2] = {planar_edge(step, s.edge[0]), planar_edge(step, s.edge[1])};
+  const double by[2] = {m.by_a, m.by_b};
+  for (int i = 0; i < 2; ++i) {
+    const double sign = i == 0 ? 1.0 : -1.0;
+    add_planar_force(out, ends[i][0], ends[i][1], sign * m.moment * edge[i].force);
+    for (int j = 0; with_matrix && j < 2; ++j) {
+      Eigen::Matrix2d block = sign * edge[i].force * edge[j].column(by[j]).transpose();
+      if (i == j) block += edge[i].geometry(sign * m.moment);
+      add_planar_rows(out, ends[i], ends[j], block);
+    }
+  }
+}
+
+void planar_half_local(const Model& model, const ElasticCoefficients& elastic, const DiscreteStep& step, int stencil,
+                       bool with_matrix, Local& out) {
+  const FrameStencil& s = model.half[at(stencil)];
+  clear(out, 5, with_matrix);
+  const Vec3d f0 = in_plane(step.start.attached[at(stencil)], 1.0), f1 = in_plane(step.end.attached[at(stencil)], 1.0);
+  const Vec3d t0 = in_plane(step.start.edge[at(s.edge)], 1.0), t1 = in_plane(step.end.edge[at(s.edge)], 1.0);
+  const double kappa0 = step.start.half_strain(stencil, 0), kappa1 = step.end.half_strain(stencil, 0);
+  const double natural = elastic.half_natural(stencil, 0), stiffness = elastic.half_stiffness(stencil, 0);
+  const PlanarMoment p = s.frame_first
+                             ? planar_moment(elastic.measure, f0, f1, t0, t1, kappa0, kappa1, natural, stiffness)
+                             : planar_moment(elastic.measure, t0, t1, f0, f1, kappa0, kappa1, natural, stiffness);
+  const double sign = s.frame_first ? -1.0 : 1.0;  // of the moment on the edge
+  const PlanarEdge edge = planar_edge(step, s.edge);
+  const int ends[2] = {0, 2};
+  add_planar_force(out, ends[0], ends[1], sign * p.moment * edge.force);
+  out.gradient[4] = -sign * p.moment;
+  if (!with_matrix) return;
+  const double by_edge = s.frame_first ? p.by_b : p.by_a, by_frame = s.frame_first ? p.by_a : p.by_b;
+  const Vector2 column = edge.column(by_edge), by_turn = 2.0 * sign * by_frame * edge.force;
+  add_planar_rows(out, ends, ends, sign * edge.force * column.transpose() + edge.geometry(sign * p.moment));
+  for (int i = 0; i < 2; ++i) {
+    out.hessian[2 + i][4] += by_turn(i);
+    out.hessian[i][4] -= by_turn(i);
+    out.hessian[4][2 + i] -= 2.0 * sign * column(i);
+    out.hessian[4][i] += 2.0 * sign * column(i);
+  }
+  out.hessian[4][4] = -2.0 * sign * by_frame;
+}
+
+/// How the moment `m` between an edge and a frame changes with the unknowns of a half stencil at the end: the frame
+/// turns there by J(w) dw, and by its hinge's angle about the hinge's `axis`.
+Eigen::Matrix<double, 3, 11> moment_columns(const EdgeColumns<double>& by_edge, const Mat3<double>& by_frame,
+                                            const Vector3& w, const Vector3& axis) {
+  Matrix3 by_spin, by_vector;
+  for (int i = 0; i < 3; ++i) {
+    by_spin.row(i) << by_frame.row[i].x, by_frame.row[i].y, by_frame.row[i].z;
+    by_vector.row(i) << by_edge.edge.row[i].x, by_edge.edge.row[i].y, by_edge.edge.row[i].z;
+  }
+  Eigen::Matrix<double, 3, 11> by;
+  by.middleCols<3>(4) = by_vector;
+  by.leftCols<3>() = -by_vector;
+  by.col(3) << by_edge.angle.x, by_edge.angle.y, by_edge.angle.z;
+  by.middleCols<3>(7) = by_spin * cayley_spin(w);
+  by.col(10) = by_spin * axis;
+  return by;
+}
+
+}  // namespace
+
+void discrete_bend_local(const Model& model, const ElasticCoefficients& elastic, const DiscreteStep& step, int stencil,
+                         bool with_matrix, Local& out) {
+  if (model.planar()) return planar_bend_local(model, elastic, step, stencil, with_matrix, out);
+  const BendStencil& s = model.bend[at(stencil)];
+  clear(out, 11, with_matrix);
+  // An edge against its rod has its head where the stencil has its tail.
+  EdgePlace place[2];
+  for (int k = 0; k < 2; ++k) {
+    const int first = 4 * k, second = 4 * (k + 1);
+    place[k] = {s.sign[k] > 0 ? first : second, s.sign[k] > 0 ? second : first, first + 3};
+  }
+  const MovingEdge<double> edge[2] = {moving_edge(step, s.edge[0]), moving_edge(step, s.edge[1])};
+  EdgeFrame<double> f0[2], f1[2];
+  for (int k = 0; k < 2; ++k) {
+    f0[k] = oriented(step.start.edge[at(s.edge[k])], s.sign[k]);
+    f1[k] = oriented(step.end.edge[at(s.edge[k])], s.sign[k]);
+  }
+  const DiscreteMoment<double> m =
+      moment_between(elastic.measure, f0[0], f1[0], f0[1], f1[1], row_of(step.start.bend_strain, stencil),
+                     row_of(step.end.bend_strain, stencil), row_of(elastic.bend_natural, stencil),
+                     row_of(elastic.bend_stiffness, stencil), with_matrix);
+  const Vec3d moment[2] = {m.moment, -m.moment};
+  for (int i = 0; i < 2; ++i) add_edge_forces(out, place[i], edge[i], step.middle.edge[at(s.edge[i])], moment[i]);
+  if (!with_matrix) return;
+  EdgeColumns<double> columns[2];
+  for (int k = 0; k < 2; ++k) columns[k] = edge_columns(k == 0 ? m.by_a : m.by_b, step.end.edge[at(s.edge[k])]);
+  for (int i = 0; i < 2; ++i)
+    for (int j = 0; j < 2; ++j) {
+      EdgeBlock<double> block = edge_block(edge[i], i == 0 ? 1.0 : -1.0, columns[j]);
+      finish_block(edge[i], step.middle.edge[at(s.edge[i])], moment[i], i == j, block);
+      add_edge_rows(out, place[i], place[j], block);
+    }
+}
+
+/// The work of the frame's moment is that over its Cayley vector.
+void discrete_half_local(const Model& model, const ElasticCoefficients& elastic, const DiscreteStep& step, int stencil,
+                         bool with_matrix, Local& out) {
+  if (model.planar()) return planar_half_local(model, elastic, step, stencil, with_matrix, out);
+  const FrameStencil& s = model.half[at(stencil)];
+  clear(out, 11, with_matrix);
+  const MovingEdge<double> edge = moving_edge(step, s.edge);
+  const EdgeFrame<double>&e0 = step.start.edge[at(s.edge)], &e1 = step.end.edge[at(s.edge)];
+  const EdgeFrame<double>&f0 = step.start.attached[at(stencil)], &f1 = step.end.attached[at(stencil)];
+  const EdgeFrame<double>& middle = step.middle.edge[at(s.edge)];
+  const bool first = s.frame_first;
+  const DiscreteMoment<double> m =
+      moment_between(elastic.measure, first ? f0 : e0, first ? f1 : e1, first ? e0 : f0, first ? e1 : f1,
+                     row_of(step.start.half_strain, stencil), row_of(step.end.half_strain, stencil),
+                     row_of(elastic.half_natural, stencil), row_of(elastic.half_stiffness, stencil), with_matrix);
+  const double sign = first ? -1.0 : 1.0;  // of the moment on the edge
+  const EdgePlace place{0, 4, 3};
+  const Vec3d moment = sign * m.moment;
+  add_edge_forces(out, place, edge, middle, moment);
+  const Vector3 w = step.end_q.segment<3>(model.frame_dof[at(s.frame)]), on_frame = -sign * to_eigen(m.moment);
+  Vector3 axis = Vector3::Zero();
+  HingeArm h{Vector3::Zero(), Matrix3::Zero(), Vector3::Zero()};
+  if (s.hinge >= 0) {
+    const Hinge& hinge = model.hinges[at(s.hinge)];
+    axis = step.end.frame[at(s.frame)] * hinge.axis;
+    h = hinge_arm(w, step.start.frame[at(s.frame)] * hinge.axis, step.change(hinge.dof));
+  }
+  for (int i = 0; i < 3; ++i) out.gradient[7 + i] = on_frame(i);
+  out.gradient[10] = h.arm.dot(on_frame);
+  if (!with_matrix) return;
+
+  const EdgeColumns<double> columns = edge_columns(first ? m.by_b : m.by_a, e1);
+  EdgeBlock<double> block = edge_block(edge, sign, columns);
+  finish_block(edge, middle, moment, true, block);
+  add_edge_rows(out, place, place, block);
+  const Eigen::Matrix<double, 3, 11> by = moment_columns(columns, first ? m.by_a : m.by_b, w, axis);
+  // Rows of the edge by the frame and its hinge.
+  for (int k = 7; k < 11; ++k) {
+    const Vec3d change = to_vec3(Vector3(2.0 * sign * by.col(k)));
+    const Vec3d f = edge.force(change) + edge.torque(change) * middle.spin;
+    for (int i = 0; i < 3; ++i) {
+      out.hessian[4 + i][k] += f[i];
+      out.hessian[i][k] -= f[i];
+    }
+    out.hessian[3][k] += edge.torque(change);
+  }
+  const Eigen::Matrix<double, 3, 11> frame_rows = (-2.0 * sign) * by;
+  Eigen::Matrix<double, 1, 11> hinge_row = h.arm.transpose() * frame_rows;
+  hinge_row.segment<3>(7) += 2.0 * on_frame.transpose() * h.by_frame;
+  hinge_row(10) += 2.0 * on_frame.dot(h.by_angle);
+  for (int k = 0; k < 11; ++k) {
+    for (int i = 0; i < 3; ++i) out.hessian[7 + i][k] = frame_rows(i, k);
+    out.hessian[10][k] = hinge_row(k);
+  }
+}
+
+void discrete_stretch_local(const Model& model, const ElasticCoefficients& elastic, const DiscreteStep& step, int edge,
+                            bool with_matrix, const double* axial_force, Local& out) {
+  const int dim = model.dimension, tail = model.tail_dof[at(edge)], head = model.head_dof[at(edge)];
+  const auto [force, modulus, inverse_mean] = mean_stretch(model, elastic, step.start, step.end, edge);
+  double mean[3];
+  for (int i = 0; i < dim; ++i) mean[i] = inverse_mean * (step.middle_q(head + i) - step.middle_q(tail + i));
+  for (int i = 0; i < dim; ++i) {
+    out.gradient[i] = -force * mean[i];
+    out.gradient[dim + i] = force * mean[i];
+  }
+  if (!with_matrix) return;
+  const Vec3d& t1 = step.end.edge[at(edge)].tangent;
+  const double t[3] = {t1.x, t1.y, t1.z}, transverse = (axial_force ? axial_force[edge] : force) * inverse_mean;
+  for (int i = 0; i < dim; ++i)
+    for (int j = 0; j < dim; ++j) {
+      const double h = mean[i] * t[j] * (modulus - transverse) + (i == j ? transverse : 0.0);
+      out.hessian[i][j] = out.hessian[dim + i][dim + j] = h;
+      out.hessian[i][dim + j] = out.hessian[dim + i][j] = -h;
+    }
+}
+
+}  // namespace withe

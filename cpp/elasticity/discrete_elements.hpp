@@ -1,0 +1,39 @@
+#pragma once
+/// Discrete gradients of one stencil over a step, in its own unknowns (see elements.hpp): forces whose work is what the
+/// energy changes by. Derivatives are by the middle of the step, of whose change the end's is twice.
+///   stretching: EA (eps0 + eps1) / 2 (e0 + e1) / (|e0| + |e1|)   [Simo, Tarnow and Doblare 1995];
+///   bending, twisting: moments between frames, see discrete_gradient.hpp. A frame's row is the moment on it.
+
+#include "elasticity/elements.hpp"
+
+namespace withe {
+
+/// A step whose middle is evaluated; all are measured from the frames of the start.
+struct DiscreteStep {
+  const Configuration &start, &middle, &end;
+  const VectorX &middle_q, &end_q;
+  const VectorX& change;  ///< of the unknowns, from the start to the end
+};
+
+/// How an edge's mean strain pulls.
+struct MeanStretch {
+  double force;         ///< EA (eps0 + eps1) / 2 [N]
+  double modulus;       ///< EA / L [N / m]
+  double inverse_mean;  ///< 2 / (l0 + l1) [1 / m]
+};
+inline MeanStretch mean_stretch(const Model& model, const ElasticCoefficients& elastic, const Configuration& start,
+                                const Configuration& end, int edge) {
+  const double EA = elastic.stretch_stiffness[edge], rest = model.edge_length[edge];
+  const double sum = start.length[edge] + end.length[edge];
+  return {EA * (0.5 * sum / rest - 1.0), EA / rest, 2.0 / sum};
+}
+
+/// `axial_force`: per edge, in place of that of the mean strain in the matrix, see stretch_hessian; or null.
+void discrete_stretch_local(const Model& model, const ElasticCoefficients& elastic, const DiscreteStep& step, int edge,
+                            bool with_matrix, const double* axial_force, Local& out);
+void discrete_bend_local(const Model& model, const ElasticCoefficients& elastic, const DiscreteStep& step, int stencil,
+                         bool with_matrix, Local& out);
+void discrete_half_local(const Model& model, const ElasticCoefficients& elastic, const DiscreteStep& step, int stencil,
+                         bool with_matrix, Local& out);
+
+}  // namespace withe
