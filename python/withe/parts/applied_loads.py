@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import cast
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -13,16 +14,34 @@ from withe.parts.directory import Directory
 from withe.parts.handles import Load, NodeHandle, Rod
 from withe.parts.kinds import LoadKind, LoadPart, Pass, RodPart
 
-__all__ = ["AppliedLoads", "load_vector"]
+__all__ = ["AppliedLoads", "Bearer", "load_vector"]
 
 FloatArray = npt.NDArray[np.float64]
 Value = npt.ArrayLike | Callable[[float], npt.ArrayLike]
 
 
-class AppliedLoads:
-    """What pushes and turns rods: part of `Scene` and of `Simulation`."""
+class Bearer(Protocol):
+    """What loads are put on: a scene, or a simulation that runs."""
 
-    _directory: Directory
+    @property
+    def directory(self) -> Directory:
+        """Its parts."""
+
+    @property
+    def time(self) -> float:
+        """When a load begins to act [s]."""
+
+    def take(self, part: LoadPart) -> Load:
+        """Let a load act from now on."""
+
+
+class AppliedLoads(ABC):
+    """Methods of `Scene` and of `Simulation` that put loads on what `_bearer` is."""
+
+    @property
+    @abstractmethod
+    def _bearer(self) -> Bearer:
+        """What loads are put on."""
 
     def add_force(
         self, node: NodeHandle | str, force: Value, *, follower: bool = False, name: str | None = None
@@ -41,7 +60,7 @@ class AppliedLoads:
         -------
         Load
         """
-        return self._at_node("force", node, force, follower, name)
+        return _put_at_node(self._bearer, "force", node, force, follower, name)
 
     def add_moment(
         self, node: NodeHandle | str, moment: Value, *, follower: bool = False, name: str | None = None
@@ -63,7 +82,7 @@ class AppliedLoads:
         -------
         Load
         """
-        return self._at_node("moment", node, moment, follower, name)
+        return _put_at_node(self._bearer, "moment", node, moment, follower, name)
 
     def add_load(self, rod: Rod | str, load: Value, *, follower: bool = False, name: str | None = None) -> Load:
         """Add a force spread evenly along a rod.
@@ -80,8 +99,8 @@ class AppliedLoads:
         -------
         Load
         """
-        part = self._directory.rod(rod, "rod of the load")
-        return self._load("load", (part.index, 0), load, validation.truth(follower, "follower"), name)
+        place = self._bearer.directory.rod(rod, "rod of the load").index, 0
+        return _put(self._bearer, "load", place, load, validation.truth(follower, "follower"), name)
 
     def add_pressure(
         self,
@@ -115,39 +134,36 @@ class AppliedLoads:
         ValueError
             An open rod, or one that goes round no area, without a normal.
         """
-        part = self._directory.rod(rod, "rod of the pressure")
+        part = self._bearer.directory.rod(rod, "rod of the pressure")
         if normal is None:
             axis = _area_normal(part)
         else:
             axis = validation.unit_vector(normal, f"normal of the pressure on {part.owner}")
-        return self._load("pressure", (part.index, 0), pressure, False, name, axis)
+        return _put(self._bearer, "pressure", (part.index, 0), pressure, False, name, axis)
 
-    def _at_node(self, kind: LoadKind, node: NodeHandle | str, value: Value, follower: bool, name: str | None) -> Load:
-        place, _ = self._directory.node(node, f"node of the {kind}")
-        return self._load(kind, place, value, validation.truth(follower, "follower"), name)
 
-    def _load(
-        self,
-        kind: LoadKind,
-        node: Pass,
-        value: Value,
-        follower: bool,
-        name: str | None,
-        axis: FloatArray | None = None,
-    ) -> Load:
-        name = self._directory.new_name(name, kind)
-        function = value if callable(value) else None
-        now = self._load_time()
-        what = f"{kind} {name!r}" + (f" at t = {now:g}" if function else "")
-        first = load_vector(value(now) if callable(value) else value, axis, what)
-        return self._take_load(LoadPart(name, kind, node, first, function, follower, axis))
+def _put_at_node(
+    bearer: Bearer, kind: LoadKind, node: NodeHandle | str, value: Value, follower: bool, name: str | None
+) -> Load:
+    place, _ = bearer.directory.node(node, f"node of the {kind}")
+    return _put(bearer, kind, place, value, validation.truth(follower, "follower"), name)
 
-    def _load_time(self) -> float:
-        """When a load begins to act [s]."""
-        return 0.0
 
-    def _take_load(self, part: LoadPart) -> Load:
-        return cast(Load, self._directory.add(part))
+def _put(
+    bearer: Bearer,
+    kind: LoadKind,
+    node: Pass,
+    value: Value,
+    follower: bool,
+    name: str | None,
+    axis: FloatArray | None = None,
+) -> Load:
+    name = bearer.directory.new_name(name, kind)
+    function = value if callable(value) else None
+    now = bearer.time
+    what = f"{kind} {name!r}" + (f" at t = {now:g}" if function else "")
+    first = load_vector(value(now) if callable(value) else value, axis, what)
+    return bearer.take(LoadPart(name, kind, node, first, function, follower, axis))
 
 
 def load_vector(value: npt.ArrayLike, axis: FloatArray | None, what: str) -> FloatArray:

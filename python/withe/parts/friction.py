@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
+import numpy.typing as npt
 
 from withe import _core
 from withe.common import validation
@@ -14,7 +13,7 @@ __all__ = ["Friction", "as_given", "check_law", "friction_pair", "obstacle_frict
 Friction = float | tuple[float, float]
 
 
-def friction_pair(value: Any, what: str, *, directed: bool = True) -> tuple[float, float]:
+def friction_pair(value: Friction | npt.ArrayLike, what: str, *, directed: bool = True) -> tuple[float, float]:
     """Coefficients along and across a rod.
 
     Parameters

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal, get_args
+from typing import Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -11,7 +11,7 @@ from withe.common import drawing, validation
 from withe.parts.kinds import RodPart
 from withe.parts.materials import Material, Stiffness
 from withe.parts.parameters import RodParameters
-from withe.parts.sections import Circle, SectionProperties, check_section
+from withe.parts.sections import Circle, Section, SectionProperties, check_section
 
 __all__ = ["Natural", "curvature_array", "make_rod", "twist_array"]
 
@@ -25,21 +25,21 @@ def make_rod(
     name: str,
     index: int,
     *,
-    start: Any,
-    end: Any,
-    points: Any,
-    nodes: Any,
-    closed: Any,
-    normal: Any,
-    radius: Any,
-    section: Any,
-    material: Any,
-    stiffness: Any,
-    line_density: Any,
-    natural: Any,
-    natural_curvature: Any,
-    natural_twist: Any,
-    discrete: Any,
+    start: npt.ArrayLike | None,
+    end: npt.ArrayLike | None,
+    points: npt.ArrayLike | None,
+    nodes: int | None,
+    closed: bool,
+    normal: npt.ArrayLike | None,
+    radius: npt.ArrayLike | None,
+    section: Section | None,
+    material: Material | None,
+    stiffness: Stiffness | None,
+    line_density: npt.ArrayLike | None,
+    natural: Natural,
+    natural_curvature: npt.ArrayLike | None,
+    natural_twist: npt.ArrayLike | None,
+    discrete: bool,
 ) -> RodPart:
     """The arrays of a rod; see `Scene.add_rod` for the arguments.
 
@@ -90,7 +90,7 @@ def make_rod(
     )
 
 
-def curvature_array(value: Any, voronoi: FloatArray, discrete: bool, owner: str) -> FloatArray:
+def curvature_array(value: npt.ArrayLike, voronoi: FloatArray, discrete: bool, owner: str) -> FloatArray:
     """Natural curvature as an array of shape (stencils, 2) [1/m], of the smooth rod.
 
     Raises
@@ -113,13 +113,18 @@ def curvature_array(value: Any, voronoi: FloatArray, discrete: bool, owner: str)
     return np.array(given)
 
 
-def twist_array(value: Any, voronoi: FloatArray, owner: str) -> FloatArray:
+def twist_array(value: npt.ArrayLike, voronoi: FloatArray, owner: str) -> FloatArray:
     """Natural twist as an array of shape (stencils,) [rad/m]."""
     return validation.per_item(value, f"natural_twist of {owner}", len(voronoi), "stencils", sign=True)
 
 
 def _centreline(
-    start: Any, end: Any, points: Any, nodes: Any, closed: bool, owner: str
+    start: npt.ArrayLike | None,
+    end: npt.ArrayLike | None,
+    points: npt.ArrayLike | None,
+    nodes: int | None,
+    closed: bool,
+    owner: str,
 ) -> tuple[FloatArray, float | None]:
     """Nodes, and how far they are apart along the curve that they were taken from, if they were."""
     if (points is None) == (start is None and end is None):
@@ -149,7 +154,7 @@ def _centreline(
     return drawing.resample(line, count, closed)
 
 
-def _directors(normal: Any, tangents: FloatArray, owner: str) -> FloatArray:
+def _directors(normal: npt.ArrayLike | None, tangents: FloatArray, owner: str) -> FloatArray:
     if normal is None:
         return drawing.transport_directors(tangents, drawing.default_normal(tangents[0]))
     what = f"normal of {owner}"
@@ -166,25 +171,32 @@ def _directors(normal: Any, tangents: FloatArray, owner: str) -> FloatArray:
     return drawing.transport_directors(tangents, rows[0]) if single else rows
 
 
-def _section(radius: Any, section: Any, edges: int, owner: str) -> SectionProperties:
-    if (radius is None) == (section is None):
+def _section(radius: npt.ArrayLike | None, section: Section | None, edges: int, owner: str) -> SectionProperties:
+    if radius is not None and section is None:
+        shape: Section = Circle(radius)
+    elif section is not None and radius is None:
+        shape = check_section(section, owner)
+    else:
         raise ValueError(f"{owner} must have either a radius or a section")
-    shape = Circle(radius) if section is None else check_section(section, owner)
     with np.errstate(over="ignore", under="ignore"):
         return shape.properties(edges, owner)
 
 
 def _parameters(
-    material: Any, stiffness: Any, line_density: Any, properties: SectionProperties, owner: str
+    material: Material | None,
+    stiffness: Stiffness | None,
+    line_density: npt.ArrayLike | None,
+    properties: SectionProperties,
+    owner: str,
 ) -> RodParameters:
     if (material is None) == (stiffness is None):
         raise ValueError(f"{owner} must have either a material or a stiffness")
     if (stiffness is None) != (line_density is None):
         raise ValueError(f"line_density of {owner} must be given with a stiffness, and only then")
-    if material is not None:
-        if not isinstance(material, Material):
-            raise ValueError(f"material of {owner} must be a withe.Material, got {type(material).__name__}")
-        return RodParameters.from_material(material, properties, owner)
-    if not isinstance(stiffness, Stiffness):
-        raise ValueError(f"stiffness of {owner} must be a withe.Stiffness, got {type(stiffness).__name__}")
-    return RodParameters.from_stiffness(stiffness, line_density, properties, owner)
+    if line_density is not None:
+        if not isinstance(stiffness, Stiffness):
+            raise ValueError(f"stiffness of {owner} must be a withe.Stiffness, got {type(stiffness).__name__}")
+        return RodParameters.from_stiffness(stiffness, line_density, properties, owner)
+    if not isinstance(material, Material):
+        raise ValueError(f"material of {owner} must be a withe.Material, got {type(material).__name__}")
+    return RodParameters.from_material(material, properties, owner)

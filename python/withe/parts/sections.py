@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -121,7 +120,7 @@ def _rectangle_torsion(long: FloatArray, short: FloatArray) -> FloatArray:
     return torsion
 
 
-def check_section(section: Any, owner: str) -> Section:
+def check_section(section: object, owner: str) -> Section:
     """One of the sections above."""
     if not isinstance(section, Section):
         raise ValueError(

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
 from withe.parts.directory import Directory
+from withe.parts.handles import NodeHandle
 from withe.parts.kinds import SupportKind, SupportPart
 
 __all__ = ["check_not_held", "held_rows", "make_clamp", "make_pin"]
@@ -17,7 +18,14 @@ __all__ = ["check_not_held", "held_rows", "make_clamp", "make_pin"]
 FloatArray = npt.NDArray[np.float64]
 
 
-def make_clamp(directory: Directory, node: Any, hold: Any, free: Any, spin: Any, name: Any) -> SupportPart:
+def make_clamp(
+    directory: Directory,
+    node: NodeHandle | str,
+    hold: Literal["frame", "edge"],
+    free: npt.ArrayLike | None,
+    spin: bool,
+    name: str | None,
+) -> SupportPart:
     """A clamp, checked; not yet in the directory."""
     name = directory.new_name(name, "clamp")
     place, node_name = directory.node(node, "node to clamp")
@@ -32,7 +40,7 @@ def make_clamp(directory: Directory, node: Any, hold: Any, free: Any, spin: Any,
     return SupportPart(name, kind, place, node_name, _projector(free, "free of the clamp"))
 
 
-def make_pin(directory: Directory, node: Any, free: Any, name: Any) -> SupportPart:
+def make_pin(directory: Directory, node: NodeHandle | str, free: npt.ArrayLike | None, name: str | None) -> SupportPart:
     """A pin, checked; not yet in the directory."""
     name = directory.new_name(name, "pin")
     place, node_name = directory.node(node, "node to pin")
@@ -69,7 +77,7 @@ def held_rows(directory: Directory, part: SupportPart) -> set[int]:
     return held
 
 
-def _projector(free: Any, what: str) -> FloatArray:
+def _projector(free: npt.ArrayLike | None, what: str) -> FloatArray:
     """Projector onto the span of one or two directions."""
     if free is None:
         return np.zeros((3, 3))

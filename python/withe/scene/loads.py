@@ -1,4 +1,4 @@
-"""What pulls, pushes and slows the rods of a scene: the half of `Scene` that loads them."""
+"""What pulls, pushes and slows the rods of a scene, besides loads that a simulation may also take."""
 
 from __future__ import annotations
 
@@ -9,17 +9,20 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
-from withe.parts.applied_loads import AppliedLoads
-from withe.parts.handles import CustomForce, Drag, Mass, NodeHandle, Rod
-from withe.parts.kinds import CustomForcePart, DragPart, MassPart
+from withe.parts.directory import Directory
+from withe.parts.fluid import make_fluid
+from withe.parts.handles import CustomForce, Drag, Fluid, Mass, NodeHandle, Rod
+from withe.parts.kinds import CustomForcePart, DragPart, FluidModel, MassPart
 
 __all__ = ["Loads"]
 
 FloatArray = npt.NDArray[np.float64]
 
 
-class Loads(AppliedLoads):
-    """Forces, moments, masses and drag of a scene."""
+class Loads:
+    """Masses, drag, custom forces and the fluid of a scene: methods of `Scene` that need its parts alone."""
+
+    _directory: Directory
 
     def add_mass(self, node: NodeHandle | str, mass: float, *, name: str | None = None) -> Mass:
         """Add a point mass [kg] to a node."""
@@ -121,3 +124,54 @@ class Loads(AppliedLoads):
             validation.function(jacobian, f"jacobian of {name!r}")
         part = CustomForcePart(name, function, jacobian, validation.truth(moments, "moments"))
         return cast(CustomForce, self._directory.add(part))
+
+    def add_fluid(
+        self,
+        viscosity: float,
+        *,
+        model: FluidModel = "stokeslets",
+        regularization: float | None = None,
+        wavelength: float | None = None,
+        name: str | None = None,
+    ) -> Fluid:
+        """Surround all rods by a viscous fluid without inertia, at rest far away (Stokes flow).
+
+        It neither carries (for buoyancy, change `gravity`) nor resists spin about a rod's tangent. What rods lose to it
+        is in `energy().dissipated`.
+
+        Parameters
+        ----------
+        viscosity : float [Pa s]
+        model : {"stokeslets", "resistive"}
+            With "stokeslets" every piece of a rod moves the fluid at all others: regularized Stokeslet segments
+            [Cortez 2018, J. Comput. Phys. 375], whose dense equations are solved once a step, for velocities as
+            they are then; what these change within the step meets a local drag, so steps stay stable. The work of a
+            step grows with the square of the number of nodes. With "resistive" each piece is resisted as if alone,
+            -mu (c_t v_t + c_n v_n) per length, exactly and implicitly; rods do not feel each other.
+        regularization : float [m]
+            Of "stokeslets" (not used by the other): the length over which a point force is spread. By default sqrt(e)
+            = 1.65 times the radius, for which a thin rod has the resistance that slender-body theory gives to a
+            cylinder; then the radius must be the same all over the scene. Edges of a third of it or more are needed.
+        wavelength : float [m]
+            Of "resistive" (not used by the other): of waves along the rods, such as the length of one turn of a helix,
+            for c_t = 2 pi / ln(.18 wavelength / radius), c_n = 4 pi / (ln(.18 wavelength / radius) + 1/2)
+            [Lighthill 1976]. By default rods are taken as straight: c_t = 2 pi / (ln(length / radius) - 1/2), c_n =
+            4 pi / (ln(length / radius) + 1/2), as of spheroids [Happel and Brenner 1965].
+        name : str
+
+        Returns
+        -------
+        Fluid
+            `Simulation.set` changes its viscosity.
+
+        Raises
+        ------
+        ValueError
+            A second fluid, a number out of range, or an unknown model.
+
+        Examples
+        --------
+        >>> glycerol = scene.add_fluid(viscosity=1.4, regularization=1e-3)
+        """
+        part = make_fluid(self._directory, viscosity, model, regularization, wavelength, name)
+        return cast(Fluid, self._directory.add(part))

@@ -3,33 +3,31 @@
 from __future__ import annotations
 
 import uuid
-from typing import TYPE_CHECKING, Any, Literal, cast
+from typing import Any, Literal, cast
 
 import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
-from withe.parts.contacts import Contacts
+from withe.parts.applied_loads import AppliedLoads, Bearer
 from withe.parts.directory import Directory
-from withe.parts.fluid import Fluids
-from withe.parts.handles import Joint, NodeHandle, Rod, RodPlace, Support
-from withe.parts.joints import connected, gather
-from withe.parts.kinds import JoinKind, JoinPart, JointForm, Pass, RodPart, SupportPart
+from withe.parts.handles import Joint, Load, NodeHandle, Rod, RodPlace, Support
+from withe.parts.kinds import JoinKind, JointForm, LoadPart, RodPart, SupportPart
 from withe.parts.materials import Material, Section, Stiffness
+from withe.parts.options import Bending, BuildOptions, Integrator, LineSearch, Solver
 from withe.parts.rods import Natural, make_rod
 from withe.parts.supports import check_not_held, make_clamp, make_pin
+from withe.scene.contacts import Contacts
+from withe.scene.joints import JoinedNodes
 from withe.scene.loads import Loads
-
-if TYPE_CHECKING:
-    from withe.parts.options import Bending, Integrator, LineSearch, Solver
-    from withe.simulation.simulation import Simulation
+from withe.simulation.simulation import Simulation
 
 __all__ = ["Scene"]
 
 FloatArray = npt.NDArray[np.float64]
 
 
-class Scene(Loads, Contacts, Fluids):
+class Scene(AppliedLoads, Loads, Contacts):
     """A description of rods, joints, supports and loads, from which simulations are built.
 
     Parameters
@@ -51,9 +49,7 @@ class Scene(Loads, Contacts, Fluids):
 
     def __init__(self, gravity: npt.ArrayLike = (0.0, 0.0, -9.81)) -> None:
         self._directory = Directory(uuid.uuid4().hex)
-        self._joins_at: dict[Pass, list[JoinPart]] = {}
-        self._low = np.full(3, np.inf)
-        self._high = np.full(3, -np.inf)
+        self._joints = JoinedNodes(self._directory)
         self.gravity = gravity
 
     @property
@@ -180,8 +176,6 @@ class Scene(Loads, Contacts, Fluids):
         )
         place = RodPlace(name, len(rod.points), rod.closed, rod.section.radii, rod.section.widths)
         self._directory.layout.add(place)
-        self._low = np.minimum(self._low, rod.points.min(axis=0))
-        self._high = np.maximum(self._high, rod.points.max(axis=0))
         return cast(Rod, self._directory.add(rod))
 
     def join(
@@ -221,30 +215,7 @@ class Scene(Loads, Contacts, Fluids):
             Nodes that are apart by more than 1e-9 of the scene, one and the same node, joins that
             contradict each other, or an axis without a revolute joint.
         """
-        name = self._directory.new_name(name, "joint")
-        node_a, name_a = self._directory.node(a, "first node to join")
-        node_b, name_b = self._directory.node(b, "second node to join")
-        validation.choice(kind, "kind of the joint", ("rigid", "pinned", "revolute"))
-        validation.choice(form, "form of the joint", ("frame", "pairs"))
-        if (kind == "revolute") != (axis is not None):
-            raise ValueError(f"axis of the joint must be given when kind='revolute', and only then; kind is {kind!r}")
-        if form == "pairs" and kind != "rigid":
-            raise ValueError(f"form of the joint must be 'frame' when kind={kind!r}")
-        if node_a == node_b:
-            raise ValueError(f"nodes to join must be two, got {name_a!r} twice")
-        distance = float(np.linalg.norm(self._point(node_a) - self._point(node_b)))
-        if distance > 1e-9 * float(np.linalg.norm(self._high - self._low)):
-            raise ValueError(
-                f"nodes {name_a!r} and {name_b!r} must coincide to be joined, they are {distance:g} m apart"
-            )
-        direction = None if axis is None else validation.unit_vector(axis, "axis of the joint")
-        part = JoinPart(name, (node_a, node_b), (name_a, name_b), kind, direction, form)
-        joins = {join.name: join for node in part.nodes for join in connected(self._joins_at, node)}
-        gather([*joins.values(), part])
-        for node in part.nodes:
-            self._joins_at.setdefault(node, []).append(part)
-        self._directory.layout.merge(node_a, node_b)
-        return cast(Joint, self._directory.add(part))
+        return cast(Joint, self._directory.add(self._joints.join(a, b, kind, axis, form, name)))
 
     # Supports
 
@@ -280,18 +251,14 @@ class Scene(Loads, Contacts, Fluids):
         ValueError
             A node that is held already.
         """
-        return self._hold(make_clamp(self._directory, node, hold, free, spin, name))
+        return _hold(self._directory, make_clamp(self._directory, node, hold, free, spin, name))
 
     def pin(self, node: NodeHandle | str, *, free: npt.ArrayLike | None = None, name: str | None = None) -> Support:
         """Hold a node in place, and leave its rod free to turn.
 
         Arguments, result and refusals are those of `clamp`.
         """
-        return self._hold(make_pin(self._directory, node, free, name))
-
-    def _hold(self, part: SupportPart) -> Support:
-        check_not_held(self._directory, part, self._directory.all(SupportPart))
-        return cast(Support, self._directory.add(part))
+        return _hold(self._directory, make_pin(self._directory, node, free, name))
 
     # Simulations
 
@@ -361,10 +328,7 @@ class Scene(Loads, Contacts, Fluids):
             A scene without rods, planar=True for one that lies in no plane, an explicit step above
             the stable limit, "fourth_order" with viscosity or strong drag, or an option out of range.
         """
-        from withe.parts.options import make_options
-        from withe.simulation.simulation import Simulation
-
-        options = make_options(
+        options = BuildOptions(
             integrator=integrator,
             time_step=time_step,
             adaptive=adaptive,
@@ -379,14 +343,28 @@ class Scene(Loads, Contacts, Fluids):
             force_tolerance=force_tolerance,
             max_iterations=max_iterations,
             max_halvings=max_halvings,
-        )
+        ).checked()
         directory = self._directory.copy()
         if bending == "tangent":
             directory.parts.update({rod.name: rod.without_arcs() for rod in directory.all(RodPart)})
         return Simulation._build(directory, self._gravity.copy(), options)
 
-    # Helpers
+    @property
+    def _bearer(self) -> Bearer:
+        return _Drawn(self._directory)
 
-    def _point(self, node: Pass) -> FloatArray:
-        rod = self._directory.layout.rods[node[0]].name
-        return np.asarray(self._directory.rod(rod).points[node[1]])
+
+class _Drawn:
+    """A scene as loads see it: they act from the start."""
+
+    def __init__(self, directory: Directory) -> None:
+        self.directory = directory
+        self.time = 0.0
+
+    def take(self, part: LoadPart) -> Load:
+        return cast(Load, self.directory.add(part))
+
+
+def _hold(directory: Directory, part: SupportPart) -> Support:
+    check_not_held(directory, part, directory.all(SupportPart))
+    return cast(Support, directory.add(part))

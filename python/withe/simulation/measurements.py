@@ -1,8 +1,8 @@
-"""What may be read of a simulation at any moment: part of `Simulation`. Read-outs are copies."""
+"""What may be read of a simulation at any moment. Read-outs are copies."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, overload
+from typing import overload
 
 import numpy as np
 import numpy.typing as npt
@@ -11,27 +11,24 @@ from withe.knots import link
 from withe.parts.contacts import contact_table
 from withe.parts.handles import NodeHandle, Obstacle, Rod, Support
 from withe.parts.kinds import ObstaclePart
-from withe.simulation.boundaries import Boundaries
 from withe.simulation.readouts import Energy, Momentum, Plan, Reaction, RodEnergy, Statistics
-
-if TYPE_CHECKING:
-    from withe.common.outlines import ObstacleOutline
+from withe.simulation.session import Session
+from withe.simulation.supports import find_support
 
 __all__ = ["Measurements"]
 
 FloatArray = npt.NDArray[np.float64]
 
 
-class Measurements(Boundaries):
-    """Shapes, motions, forces and energies."""
+class Measurements:
+    """Methods of `Simulation` that read shapes, motions, forces and energies."""
+
+    _session: Session
 
     @property
     def rods(self) -> tuple[Rod, ...]:
         """Handles of all rods, in the order of the scene."""
-        return self._directory.rods
-
-    def _rod(self, rod: Rod | str) -> int:
-        return self._directory.rod(rod).index
+        return self._session.directory.rods
 
     def positions(self, rod: Rod | str | None = None) -> FloatArray:
         """Positions of the nodes of a rod, or of every node of the scene once.
@@ -46,8 +43,12 @@ class Measurements(Boundaries):
         ValueError
             Not a rod of this scene.
         """
-        positions = self._world.positions()
-        return positions if rod is None else positions[self._directory.layout.rows(self._rod(rod))]
+        positions = self._session.world.positions()
+        return (
+            positions
+            if rod is None
+            else positions[self._session.directory.layout.rows(self._session.directory.rod(rod).index)]
+        )
 
     def obstacle_position(self, obstacle: Obstacle | str) -> FloatArray:
         """Where an obstacle is: the point of a plane, a sphere's centre, a capsule's start, shape (3,) [m].
@@ -57,33 +58,37 @@ class Measurements(Boundaries):
         ValueError
             Not an obstacle of this scene.
         """
-        part = self._directory.find(obstacle, ObstaclePart, "obstacle")
-        return np.array(self._world.obstacle_position(self._directory.all(ObstaclePart).index(part)))
+        part = self._session.directory.find(obstacle, ObstaclePart, "obstacle")
+        return np.array(self._session.world.obstacle_position(self._session.directory.all(ObstaclePart).index(part)))
 
     def velocities(self, rod: Rod | str | None = None) -> FloatArray:
         """Velocities of the nodes of a rod, or of every node once, shape (nodes, 3) [m/s]."""
-        velocities = self._world.velocities()
-        return velocities if rod is None else velocities[self._directory.layout.rows(self._rod(rod))]
+        velocities = self._session.world.velocities()
+        return (
+            velocities
+            if rod is None
+            else velocities[self._session.directory.layout.rows(self._session.directory.rod(rod).index)]
+        )
 
     def directors(self, rod: Rod | str) -> FloatArray:
         """Material frames of the edges, shape (edges, 3, 3), rows d1, d2, tangent."""
-        return self._world.directors(self._rod(rod)).reshape(-1, 3, 3)
+        return self._session.world.directors(self._session.directory.rod(rod).index).reshape(-1, 3, 3)
 
     def curvatures(self, rod: Rod | str) -> FloatArray:
         """Curvatures towards d1 and d2, shape (stencils, 2) [1/m]."""
-        return self._world.curvatures(self._rod(rod))
+        return self._session.world.curvatures(self._session.directory.rod(rod).index)
 
     def twists(self, rod: Rod | str) -> FloatArray:
         """Twists, shape (stencils,) [rad/m]."""
-        return self._world.twists(self._rod(rod))
+        return self._session.world.twists(self._session.directory.rod(rod).index)
 
     def tensions(self, rod: Rod | str) -> FloatArray:
         """Axial forces of the edges, pulling is positive, shape (edges,) [N]."""
-        return self._world.tensions(self._rod(rod))
+        return self._session.world.tensions(self._session.directory.rod(rod).index)
 
     def spins(self, rod: Rod | str) -> FloatArray:
         """Angular velocities of the edges about their tangents, shape (edges,) [rad/s]."""
-        return self._world.spins(self._rod(rod))
+        return self._session.world.spins(self._session.directory.rod(rod).index)
 
     @overload
     def energy(self) -> Energy: ...
@@ -106,9 +111,9 @@ class Measurements(Boundaries):
             Of a rod; loads, contact, work and dissipation belong to the scene.
         """
         if rod is not None:
-            part = self._world.rod_energy(self._rod(rod))
+            part = self._session.world.rod_energy(self._session.directory.rod(rod).index)
             return RodEnergy(**{name: getattr(part, name) for name in RodEnergy.__dataclass_fields__})
-        energy = self._world.energy()
+        energy = self._session.world.energy()
         return Energy(**{name: getattr(energy, name) for name in Energy.__dataclass_fields__})
 
     def momentum(self) -> Momentum:
@@ -133,7 +138,7 @@ class Measurements(Boundaries):
         >>> print(f"{simulation.momentum().angular[2]:.6f} kg m^2/s")  # m L^2 / 12 times 20 rad/s
         0.001047 kg m^2/s
         """
-        momentum = self._world.momentum()
+        momentum = self._session.world.momentum()
         return Momentum(np.array(momentum.linear), np.array(momentum.angular))
 
     def reaction(self, support: Support | NodeHandle | str) -> Reaction:
@@ -149,8 +154,8 @@ class Measurements(Boundaries):
         ValueError
             Nothing holds that node.
         """
-        index, _ = self._support(support)
-        reaction = self._world.reaction(index)
+        index, _ = find_support(self._session, support)
+        reaction = self._session.world.reaction(index)
         return Reaction(np.array(reaction.force), np.array(reaction.moment))
 
     def contacts(self) -> npt.NDArray[np.void]:
@@ -163,7 +168,7 @@ class Measurements(Boundaries):
             and "gap" of the surfaces [m], "point" between them [m], "normal" from the second to the first,
             "normal_force" [N], "friction" on the first [N], "sticking".
         """
-        return contact_table(self._directory, self._world.contacts())
+        return contact_table(self._session.directory, self._session.world.contacts())
 
     def link(self, rod: Rod | str) -> float:
         """Link of a rod [turns]: its twist and its writhe.
@@ -175,20 +180,20 @@ class Measurements(Boundaries):
         -------
         float
         """
-        index = self._rod(rod)
-        closed = self._directory.layout.rods[index].closed
+        index = self._session.directory.rod(rod).index
+        closed = self._session.directory.layout.rods[index].closed
         return link(self.positions(rod), self.directors(rod), closed)
 
     @property
     def statistics(self) -> Statistics:
         """What the work so far took."""
-        statistics = self._world.statistics
+        statistics = self._session.world.statistics
         return Statistics(**{name: getattr(statistics, name) for name in Statistics.__dataclass_fields__})
 
     @property
     def plan(self) -> Plan:
         """What was decided for this scene: ``print(simulation.plan)``."""
-        plan = self._world.plan
+        plan = self._session.world.plan
         return Plan(
             planar=plan.planar,
             plane_normal=np.array(plan.plane_normal) if plan.planar else None,
@@ -197,16 +202,3 @@ class Measurements(Boundaries):
             stable_step=plan.stable_step or None,
             notes=tuple(plan.notes),
         )
-
-    def _obstacle_outlines(self) -> list[ObstacleOutline]:
-        from withe.common.outlines import ObstacleOutline
-
-        return [
-            ObstacleOutline(
-                part.name,
-                part.kind,
-                np.array(part.other if part.kind == "plane" else part.other - part.point, float),
-                float(part.radius),
-            )
-            for part in self._directory.all(ObstaclePart)
-        ]

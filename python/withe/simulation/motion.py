@@ -4,18 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from withe.common import drawing, validation
 
-__all__ = ["Path", "Pose", "Turn", "evaluate_path", "oriented"]
+__all__ = ["Path", "Pose", "RotationLike", "Turn", "evaluate_path", "oriented"]
 
 FloatArray = npt.NDArray[np.float64]
 Pose = tuple[FloatArray, FloatArray]  # position (3,) [m], rotation (3, 3) from the drawn orientation
 Path = Callable[[float], Any]
+
+
+class HasMatrix(Protocol):
+    """A rotation as SciPy has them."""
+
+    def as_matrix(self) -> npt.NDArray[Any]:
+        """Shape (3, 3)."""
+
+
+RotationLike = npt.ArrayLike | HasMatrix
 
 
 def oriented(drawn_tangent: FloatArray, drawn_director: FloatArray, tangent: FloatArray, roll: float) -> FloatArray:

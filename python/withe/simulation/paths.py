@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container
+from collections.abc import Callable, Container, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -78,7 +78,13 @@ class PathOptions:
 
 
 def path_options(
-    directory: Directory, functions: Container[str], load: Any, start: Any, to: Any, steps: Any, turn: Any
+    directory: Directory,
+    functions: Container[str],
+    load: Load | str | Sequence[Load | str] | None,
+    start: float,
+    to: float,
+    steps: int,
+    turn: float,
 ) -> PathOptions:
     """Check what path is wanted; `functions` has the names of loads that are functions of time.
 

@@ -3,33 +3,32 @@
 from __future__ import annotations
 
 import os
-import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path as FilePath
-from typing import TYPE_CHECKING, Any, Literal, overload
+from typing import Any, Literal, overload
 
 import numpy as np
 import numpy.typing as npt
 
-from withe import _core
 from withe.common import validation
-from withe.errors import CoarseMeshWarning, CoarseStepWarning, ConvergenceError
-from withe.parts.description import describe, parameters_of
+from withe.common.progress import progress as progress_bar
 from withe.parts.directory import Directory
 from withe.parts.handles import Load
-from withe.parts.kinds import CustomForcePart, DragPart, FluidPart, LoadPart, MassPart, RodPart, SupportPart
-from withe.parts.options import check_tolerances, engine_options
+from withe.parts.options import BuildOptions
+from withe.recording.record import Record
+from withe.recording.recorder import present
 from withe.simulation.control import Control
-from withe.simulation.linearisation import Linearisation, Stability
+from withe.simulation.linearisation import Linearisation
+from withe.simulation.loop import Run
 from withe.simulation.measurements import Measurements
-from withe.simulation.paths import EquilibriumPath, PathOptions, path_of, path_options
+from withe.simulation.obstacles import obstacle_outlines
+from withe.simulation.paths import EquilibriumPath, path_options
+from withe.simulation.placement import Placement
 from withe.simulation.readouts import Equilibrium
-from withe.simulation.snapshots import Settings, Snapshot, matched_settings
-
-if TYPE_CHECKING:
-    from withe.recording.record import Record
-    from withe.recording.recorder import Recorder
+from withe.simulation.session import Session
+from withe.simulation.snapshots import Snapshot, restore
+from withe.simulation.states import restore_frame
+from withe.simulation.stepping import Stepping
 
 __all__ = ["Simulation"]
 
@@ -38,7 +37,7 @@ FloatArray = npt.NDArray[np.float64]
 _MAX_STEPS = 2**31 - 1
 
 
-class Simulation(Control, Measurements):
+class Simulation(Control, Placement, Measurements):
     """A scene while it runs. Made by `Scene.build`.
 
     Read-outs are copies. Rods, nodes, supports and loads are given by their handles or their names.
@@ -56,39 +55,23 @@ class Simulation(Control, Measurements):
     0.05
     """
 
+    _stepping: Stepping
+    _initial: Snapshot
+
     def __init__(self) -> None:
         raise TypeError("a Simulation is made by Scene.build")
 
     @classmethod
-    def _build(cls, directory: Directory, gravity: FloatArray, options: dict[str, Any]) -> Simulation:
+    def _build(cls, directory: Directory, gravity: FloatArray, options: BuildOptions) -> Simulation:
         """A simulation of a directory that nobody else changes."""
+        return cls._of(Stepping(Session.begin(directory, gravity, options)))
+
+    @classmethod
+    def _of(cls, stepping: Stepping, initial: Snapshot | None = None) -> Simulation:
         self = cls.__new__(cls)
-        self._scene = directory
-        self._scene_gravity = gravity
-        self._options = options
-        self._directory = directory.copy()
-        self._loads = directory.all(LoadPart)
-        self._custom_forces = directory.all(CustomForcePart)
-        description = describe(directory, gravity, options["bending"])
-        if rods := directory.all(RodPart):
-            check_tolerances(
-                options, max(float(rod.lengths.sum()) for rod in rods), min(float(rod.lengths.min()) for rod in rods)
-            )
-        supports = {part.name: (index, part) for index, part in enumerate(directory.all(SupportPart))}
-        self._settings = Settings(
-            rods=parameters_of(directory),
-            masses={part.name: part.mass for part in directory.all(MassPart)},
-            drags={part.name: part.coefficient for part in directory.all(DragPart)},
-            fluids={part.name: part.viscosity for part in directory.all(FluidPart)},
-            gravity=gravity.copy(),
-            supports=supports,
-            functions={part.name: part.function for part in directory.all(LoadPart) if part.function is not None},
-        )
-        self._world = _core.World(description, engine_options(options))
-        self._recorder = None
-        self._exact_time = None
-        self._running = False
-        self._initial = self.snapshot()
+        self._stepping = stepping
+        self._session = stepping.session
+        self._initial = self.snapshot() if initial is None else initial
         return self
 
     # Stepping
@@ -96,15 +79,12 @@ class Simulation(Control, Measurements):
     @property
     def time(self) -> float:
         """Time since the start [s]."""
-        now = self._world.time
-        if self._exact_time is not None and self._exact_time[0] == now:
-            return self._exact_time[1]
-        return now
+        return self._stepping.time
 
     @property
     def time_step(self) -> float:
         """As it was given to `Scene.build` [s]."""
-        return float(self._options["time_step"])
+        return self._session.options.time_step
 
     def step(self, count: int = 1) -> None:
         """Advance by exactly `count` time steps, whatever is cut inside.
@@ -118,17 +98,8 @@ class Simulation(Control, Measurements):
         RuntimeError
             Called by a callback of `run`, or while another thread runs the simulation.
         """
-        self._refuse_in_run("step")
-        self._step(validation.integer(count, "number of steps", 0, _MAX_STEPS))
-
-    def _step(self, count: int) -> None:
-        with self._convergence():
-            self._world.step(count, self._step_callback(), self._force_function())
-
-    def _advance_to(self, time: float) -> None:
-        """Advance to a time, with steps of equal length that are no longer than the time step."""
-        with self._convergence():
-            self._world.advance_to(time, self._step_callback(), self._force_function())
+        self._stepping.refuse_in_run("step")
+        self._stepping.step(validation.integer(count, "number of steps", 0, _MAX_STEPS))
 
     @overload
     def equilibrium(self) -> Equilibrium: ...
@@ -213,31 +184,13 @@ class Simulation(Control, Measurements):
         >>> print(f"{path.load_factors[path.limit_points[0]]:.0f} N")
         992 N
         """
-        self._refuse_in_run("equilibrium")
-        self._world.check_idle()
-        if path is not None:
-            validation.choice(path, "path", ("arc_length",))
-            return self._arc_length(
-                path_options(self._directory, self._settings.functions, load, start, to, steps, turn)
-            )
-        self._apply_functions(self._world.time, self._world.time)
-        with self._convergence():
-            found = self._world.equilibrium(None, self._force_function())
-        stability: Stability = "stable" if found.stable else "diverges"
-        if not found.decided:
-            stability = self.linearise().stability
-        return Equilibrium(stability == "stable", stability, found.branch_changed, found.iterations, found.residual)
-
-    def _arc_length(self, wanted: PathOptions) -> EquilibriumPath:
-        self._apply_functions(self._world.time, self._world.time)
-        loads = [self._load_index(part) for part in wanted.loads]
-        with self._convergence():
-            found = self._world.equilibrium_path(
-                loads, wanted.start, wanted.end, wanted.steps + 1, wanted.turn, None, self._force_function()
-            )
-        return path_of(
-            found, lambda rod: self._directory.layout.rows(self._rod(rod)), lambda support: self._support(support)[0]
-        )
+        self._stepping.refuse_in_run("equilibrium")
+        self._session.world.check_idle()
+        if path is None:
+            return self._stepping.equilibrium()
+        validation.choice(path, "path", ("arc_length",))
+        functions = self._session.settings.functions
+        return self._stepping.path(path_options(self._session.directory, functions, load, start, to, steps, turn))
 
     def run(
         self,
@@ -286,36 +239,11 @@ class Simulation(Control, Measurements):
             Called by a callback of a run: those may read, set, hold and copy the simulation, but not advance it
             or take it back.
         """
-        self._refuse_in_run("run")
-        from withe.simulation.running import run
-
-        return run(
-            self,
-            duration,
-            record_every=record_every,
-            progress=progress,
-            before_step=before_step,
-            until=until,
-            record=record,
-        )
-
-    @contextmanager
-    def _in_run(self) -> Iterator[None]:
-        """While this lasts, only the loop of `run` may advance the simulation."""
-        self._refuse_in_run("run")
-        self._running = True
-        try:
-            yield
-        finally:
-            self._running = False
-
-    def _refuse_in_run(self, what: str) -> None:
-        """Refuse what would change the time or the state behind the back of a run, whose record were wrong then."""
-        if self._running:
-            raise RuntimeError(
-                f"{what} cannot be called while the simulation runs: before_step may read, set and hold it, until and "
-                "record may read it, and all may go on with a copy()"
-            )
+        self._stepping.refuse_in_run("run")
+        loop = Run(self, self._stepping, duration, record_every, before_step, until, record)
+        with progress_bar(loop.duration, "simulating", progress) as bar:
+            loop.go(bar.update, lambda: False)
+        return loop.record
 
     @property
     def record(self) -> Record:
@@ -326,24 +254,9 @@ class Simulation(Control, Measurements):
         RuntimeError
             There was none.
         """
-        if self._recorder is None:
+        if self._stepping.recorder is None:
             raise RuntimeError("there is no record: call run first")
-        return self._recorder.record
-
-    @contextmanager
-    def _convergence(self) -> Iterator[None]:
-        """Give the engine's failures the names of this scene."""
-        try:
-            yield
-        except _core.ConvergenceFailure as failure:
-            message, time, step, rod, node, residual = failure.args
-            name = self._directory.layout.rods[rod].name if rod >= 0 else None
-            raise ConvergenceError(message, time, step, name, node if node >= 0 else None, residual) from None
-        finally:
-            if warning := self._world.take_warning():
-                warnings.warn(warning, CoarseMeshWarning, stacklevel=4)
-            if warning := self._world.take_step_warning():
-                warnings.warn(warning, CoarseStepWarning, stacklevel=4)
+        return self._stepping.recorder.record
 
     # At a moment
 
@@ -365,12 +278,11 @@ class Simulation(Control, Measurements):
         >>> print(f"{scene.build().linearise().frequencies(1)[0]:.2f} Hz")
         7.06 Hz
         """
-        found = self._world.linearise(self._force_function())
-        return Linearisation(found.geometric, found.gradients, found.stiffnesses, found.mass, found.displacement)
+        return self._stepping.linearise()
 
     def __getitem__(self, name: str) -> Any:
         """The handle of the part, node or edge of that name."""
-        return self._directory.handle(name)
+        return self._session.directory.handle(name)
 
     def __repr__(self) -> str:
         rods = ", ".join(rod.name for rod in self.rods)
@@ -380,7 +292,7 @@ class Simulation(Control, Measurements):
 
     def snapshot(self) -> Snapshot:
         """The whole state, to go back to with `restore`, bit by bit."""
-        return Snapshot(self._world.snapshot(), self._world.time, self._settings.copy())
+        return Snapshot(self._session.world.snapshot(), self._session.world.time, self._session.settings.copy())
 
     def restore(self, snapshot: Snapshot | Record, frame: int = -1) -> None:
         """Go back to a snapshot, of this simulation or another of the same scene, or to a frame of a record.
@@ -404,27 +316,16 @@ class Simulation(Control, Measurements):
         RuntimeError
             Called by a callback of `run`.
         """
-        from withe.recording.record import Record
-
-        self._refuse_in_run("restore")
+        self._stepping.refuse_in_run("restore")
         if isinstance(snapshot, Record):
-            self._restore_record(snapshot, frame)
-            self._exact_time = None
-            return
-        if not isinstance(snapshot, Snapshot):
+            restore_frame(self._session, snapshot, frame)
+        elif isinstance(snapshot, Snapshot):
+            restore(self._session, snapshot)
+        else:
             raise ValueError(
                 f"snapshot must be a withe.Snapshot, got {type(snapshot).__name__}; a withe.Record will do too"
             )
-        settings = matched_settings(snapshot, self._settings, self._directory, self._scene)
-        self._world.restore(snapshot._state)
-        for name in set(self._directory.parts) - set(self._scene.parts) - set(settings.supports):
-            del self._directory.parts[name]
-        for name, (_, part) in settings.supports.items():
-            self._directory.parts[name] = part
-        self._directory.parts.update(settings.loads)
-        self._loads = [*self._scene.all(LoadPart), *settings.loads.values()]
-        self._settings = settings
-        self._exact_time = None
+        self._stepping.frame_time = None
 
     def reset(self) -> None:
         """Go back to the scene as it was drawn, and undo everything that was set since.
@@ -434,19 +335,12 @@ class Simulation(Control, Measurements):
         RuntimeError
             Called by a callback of `run`.
         """
-        self._refuse_in_run("reset")
+        self._stepping.refuse_in_run("reset")
         self.restore(self._initial)
 
     def copy(self) -> Simulation:
         """Another simulation in the same state, which goes its own way from here."""
-        other = Simulation.__new__(Simulation)
-        other.__dict__.update(self.__dict__)
-        other._directory = self._directory.copy()
-        other._settings = self._settings.copy()
-        other._world = self._world.copy()
-        other._recorder = None
-        other._running = False
-        return other
+        return Simulation._of(self._stepping.copy(), self._initial)
 
     def __copy__(self) -> Simulation:
         return self.copy()
@@ -455,20 +349,21 @@ class Simulation(Control, Measurements):
         return self.copy()
 
     def __getstate__(self) -> dict[str, Any]:
+        session = self._session
         return {
-            "scene": self._scene,
-            "gravity": self._scene_gravity,
-            "options": self._options,
+            "scene": session.scene,
+            "gravity": session.gravity,
+            "options": session.options,
             "snapshot": self.snapshot(),
-            "functions": self._settings.functions,
-            "paths": self._settings.paths,
+            "functions": session.settings.functions,
+            "paths": session.settings.paths,
         }
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         built = Simulation._build(state["scene"], state["gravity"], state["options"])
         self.__dict__.update(built.__dict__)
-        self._settings.functions = state["functions"]
-        self._settings.paths = state["paths"]
+        self._session.settings.functions = state["functions"]
+        self._session.settings.paths = state["paths"]
         self.restore(state["snapshot"])
 
     # Pictures
@@ -486,11 +381,4 @@ class Simulation(Control, Measurements):
         return self._frame().picture(path, **options)
 
     def _frame(self) -> Record:
-        from withe.recording.recorder import present
-
-        return present(self, self._obstacle_outlines())
-
-    _recorder: Recorder | None
-    _exact_time: tuple[float, float] | None
-    _running: bool
-    _initial: Snapshot
+        return present(self, obstacle_outlines(self._session.directory))

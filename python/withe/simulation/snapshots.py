@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -17,57 +16,14 @@ from withe.parts.directory import Directory
 from withe.parts.kinds import LOAD_KINDS, SUPPORT_KINDS, LoadPart, ObstaclePart, SupportPart
 from withe.parts.parameters import RodParameters
 from withe.simulation.motion import Path, Turn
+from withe.simulation.session import Session
+from withe.simulation.settings import Settings
 
-__all__ = ["Settings", "Snapshot", "matched_settings"]
+__all__ = ["Snapshot", "restore"]
 
 FloatArray = npt.NDArray[np.float64]
 
 _FILE_VERSION = 3
-
-
-@dataclass
-class Settings:
-    """What was set on a simulation that the engine does not keep in its state, or keeps in another form.
-
-    Attributes
-    ----------
-    rods : list of RodParameters
-    masses, drags, fluids : dict
-        Present value of each part, by name.
-    gravity : ndarray of shape (3,) [m/s^2]
-    supports : dict of str to (int, SupportPart)
-        Those that hold, with their index in the engine.
-    functions : dict of str to callable
-        Loads that vary, by name.
-    paths : dict of str to callable
-        Supports that move along a path, by name.
-    loads : dict of str to LoadPart
-        Those put on while running, in order.
-    """
-
-    rods: list[RodParameters]
-    masses: dict[str, float]
-    drags: dict[str, float]
-    fluids: dict[str, float]
-    gravity: FloatArray
-    supports: dict[str, tuple[int, SupportPart]]
-    functions: dict[str, Callable[[float], npt.ArrayLike]] = field(default_factory=dict)
-    paths: dict[str, Path] = field(default_factory=dict)
-    loads: dict[str, LoadPart] = field(default_factory=dict)
-
-    def copy(self) -> Settings:
-        """Settings that no longer change with these. What they hold is never changed in place."""
-        return Settings(
-            list(self.rods),
-            dict(self.masses),
-            dict(self.drags),
-            dict(self.fluids),
-            self.gravity.copy(),
-            dict(self.supports),
-            dict(self.functions),
-            dict(self.paths),
-            dict(self.loads),
-        )
 
 
 class Snapshot:
@@ -236,7 +192,25 @@ class Snapshot:
         return cls(state.tobytes(), validation.number(header["time"], "time"), settings, missing)
 
 
-def matched_settings(snapshot: Snapshot, mine: Settings, directory: Directory, scene: Directory) -> Settings:
+def restore(session: Session, snapshot: Snapshot) -> None:
+    """Go back to a snapshot; see `Simulation.restore`.
+
+    Raises
+    ------
+    ValueError
+        A snapshot of another scene, a damaged one, or one that needs functions of time that the session does not have.
+    """
+    settings = _matched(snapshot, session.settings, session.directory, session.scene)
+    session.world.restore(snapshot._state)
+    parts = session.directory.parts
+    for name in set(parts) - set(session.scene.parts) - set(settings.supports):
+        del parts[name]
+    parts.update({name: part for name, (_, part) in settings.supports.items()})
+    parts.update(settings.loads)
+    session.settings = settings
+
+
+def _matched(snapshot: Snapshot, mine: Settings, directory: Directory, scene: Directory) -> Settings:
     """Settings of a snapshot, made whole with what only the simulation that restores it knows.
 
     Parameters

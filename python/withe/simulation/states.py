@@ -1,8 +1,6 @@
-"""Rods put elsewhere while a simulation runs: part of `Simulation`."""
+"""Rods put elsewhere while a simulation runs."""
 
 from __future__ import annotations
-
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -11,134 +9,111 @@ from withe import _core
 from withe.common import validation
 from withe.parts.handles import Rod
 from withe.parts.kinds import RodPart
-from withe.simulation.boundaries import Boundaries
+from withe.recording.record import Record
+from withe.simulation.session import Session
 
-if TYPE_CHECKING:
-    from withe.recording.record import Record
-
-__all__ = ["States"]
+__all__ = ["restore_frame", "set_state", "set_velocities"]
 
 FloatArray = npt.NDArray[np.float64]
 
 
-class States(Boundaries):
-    """Positions, frames and rates from outside."""
+def set_state(
+    session: Session,
+    rod: Rod | str,
+    positions: npt.ArrayLike | None,
+    velocities: npt.ArrayLike | None,
+    twist: npt.ArrayLike | None,
+    directors: npt.ArrayLike | None,
+    spins: npt.ArrayLike | None,
+) -> None:
+    """Put a rod elsewhere; see `Simulation.set_state`."""
+    part = session.directory.rod(rod)
+    state = _core.RodState()
+    state.rod = part.index
+    if twist is not None and directors is not None:
+        raise ValueError(f"twist of {part.owner} must not be given together with directors")
+    if velocities is not None:
+        state.velocities = validation.number_array(
+            np.broadcast_to(
+                validation.number_array(velocities, f"velocities of {part.owner}", part.points.shape, (3,)),
+                part.points.shape,
+            ),
+            "velocities",
+            part.points.shape,
+        )
+    if spins is not None:
+        state.spins = validation.per_item(spins, f"spins of {part.owner}", len(part.tangents), "edges", sign=True)
+    if positions is not None or twist is not None or directors is not None:
+        _place(session, part, state, positions, twist, directors)
+    session.world.set_state([state], None)
 
-    def set_state(
-        self,
-        rod: Rod | str,
-        positions: npt.ArrayLike | None = None,
-        velocities: npt.ArrayLike | None = None,
-        *,
-        twist: npt.ArrayLike | None = None,
-        directors: npt.ArrayLike | None = None,
-        spins: npt.ArrayLike | None = None,
-    ) -> None:
-        """Put a rod elsewhere, at once. What is not given stays as it is.
 
-        Joints turn with the edges at them. The energy that this puts in is not booked as work: the balance of
-        ``energy()`` begins anew. A state out of the plane of a planar simulation makes it three-dimensional, unless
-        it was built with planar=True.
+def set_velocities(session: Session, rod: Rod | str | None, velocities: npt.ArrayLike) -> None:
+    """Set velocities of nodes; see `Simulation.set_velocities`."""
+    now = np.array(session.world.velocities())
+    if rod is None:
+        now[:] = validation.number_array(velocities, "velocities", now.shape, (3,))
+    else:
+        part = session.directory.rod(rod)
+        shape = part.points.shape
+        now[session.directory.layout.rows(part.index)] = validation.number_array(
+            velocities, f"velocities of {part.owner}", shape, (3,)
+        )
+    session.world.set_velocities(now)
 
-        Parameters
-        ----------
-        rod : Rod or str
-        positions : array_like of shape (nodes, 3) [m]
-            The first director of the first edge follows by the smallest turn. Nodes that a support holds must stay:
-            move the support first.
-        velocities : array_like of shape (nodes, 3) or (3,) [m/s]
-            Those of nodes that are held stay as they are.
-        twist : float or array_like of shape (stencils,) [rad/m]
-            As `twists` reads it. By default that of now; a closed rod spreads evenly what new positions
-            change of it, so that it is closed again.
-        directors : array_like of shape (edges, 3, 3) or (edges, 3)
-            Instead of twist: as `directors` reads them, or the first ones alone. Each stencil then has the least of
-            the twists that fit, less than half a turn.
-        spins : float or array_like of shape (edges,) [rad/s]
-            Angular velocities of the edges about their tangents.
 
-        Raises
-        ------
-        ValueError
-            Wrong shapes, not finite, directors that are not normal to their edges, twist that does not close a
-            closed rod, an edge without length, a rod that folds right back, a node that is held, surfaces that
-            would overlap, or what leaves the plane of a simulation built with planar=True. Then nothing is changed.
+def _place(
+    session: Session,
+    part: RodPart,
+    state: _core.RodState,
+    positions: npt.ArrayLike | None,
+    twist: npt.ArrayLike | None,
+    directors: npt.ArrayLike | None,
+) -> None:
+    """Fill in where a rod is to be, frames included."""
+    points = session.world.positions()[session.directory.layout.rows(part.index)]
+    if positions is not None:
+        points = validation.number_array(positions, f"positions of {part.owner}", part.points.shape)
+    tangents = _tangents(points, part)
+    turns = np.zeros(len(part.voronoi))
+    if directors is not None:
+        first = _first_directors(directors, tangents, part)
+    else:
+        now = session.world.directors(part.index).reshape(-1, 3, 3)[0]
+        plan = session.world.plan
+        normal = np.array(plan.plane_normal) if plan.planar else now[0]
+        start = _carried(now[0], now[2], tangents[0], normal)
+        if twist is None:
+            turns = np.array(session.world.twists(part.index)) * part.voronoi
+        else:
+            turns = _per_stencil(twist, part) * part.voronoi
+        first, turns = _laid(start, tangents, turns, part, must_close=twist is not None)
+    state.positions, state.directors, state.twists = points, first, turns / part.voronoi
 
-        Examples
-        --------
-        >>> simulation.set_state(arm, spins=np.linspace(0.0, 5.0, 30))
-        """
-        part = self._directory.rod(rod)
+
+def restore_frame(session: Session, record: Record, frame: int) -> None:
+    """Make a frame of a record the present state; see `Simulation.restore`."""
+    parts = session.directory.all(RodPart)
+    if len(record.rods) != len(parts) or any(
+        outline.name != part.name
+        or outline.closed != part.closed
+        or not np.array_equal(outline.rows, session.directory.layout.rows(part.index))
+        for outline, part in zip(record.rods, parts, strict=True)
+    ):
+        raise ValueError("record belongs to another scene: its rods are others")
+    count = len(record)
+    frame = validation.integer(frame, "frame", -count, count - 1)
+    states = []
+    for part in parts:
         state = _core.RodState()
         state.rod = part.index
-        if twist is not None and directors is not None:
-            raise ValueError(f"twist of {part.owner} must not be given together with directors")
-        if velocities is not None:
-            state.velocities = validation.number_array(
-                np.broadcast_to(
-                    validation.number_array(velocities, f"velocities of {part.owner}", part.points.shape, (3,)),
-                    part.points.shape,
-                ),
-                "velocities",
-                part.points.shape,
-            )
-        if spins is not None:
-            state.spins = validation.per_item(spins, f"spins of {part.owner}", len(part.tangents), "edges", sign=True)
-        if positions is not None or twist is not None or directors is not None:
-            self._place(part, state, positions, twist, directors)
-        self._world.set_state([state], None)
-
-    def _place(
-        self,
-        part: RodPart,
-        state: _core.RodState,
-        positions: npt.ArrayLike | None,
-        twist: npt.ArrayLike | None,
-        directors: npt.ArrayLike | None,
-    ) -> None:
-        """Fill in where a rod is to be, frames included."""
-        points = self._world.positions()[self._directory.layout.rows(part.index)]
-        if positions is not None:
-            points = validation.number_array(positions, f"positions of {part.owner}", part.points.shape)
-        tangents = _tangents(points, part)
-        turns = np.zeros(len(part.voronoi))
-        if directors is not None:
-            first = _first_directors(directors, tangents, part)
-        else:
-            now = self._world.directors(part.index).reshape(-1, 3, 3)[0]
-            plan = self._world.plan
-            normal = np.array(plan.plane_normal) if plan.planar else now[0]
-            start = _carried(now[0], now[2], tangents[0], normal)
-            if twist is None:
-                turns = np.array(self._world.twists(part.index)) * part.voronoi
-            else:
-                turns = _per_stencil(twist, part) * part.voronoi
-            first, turns = _laid(start, tangents, turns, part, must_close=twist is not None)
-        state.positions, state.directors, state.twists = points, first, turns / part.voronoi
-
-    def _restore_record(self, record: Record, frame: int) -> None:
-        """Make a frame of a record the present state; see `Simulation.restore`."""
-        parts = self._directory.all(RodPart)
-        if len(record.rods) != len(parts) or any(
-            outline.name != part.name
-            or outline.closed != part.closed
-            or not np.array_equal(outline.rows, self._directory.layout.rows(part.index))
-            for outline, part in zip(record.rods, parts, strict=True)
-        ):
-            raise ValueError("record belongs to another scene: its rods are others")
-        count = len(record)
-        frame = validation.integer(frame, "frame", -count, count - 1)
-        states = []
-        for part in parts:
-            state = _core.RodState()
-            state.rod = part.index
-            state.positions = record.positions(part.name)[frame]
-            state.velocities = record.velocities(part.name)[frame]
-            state.directors = record.directors(part.name)[frame, :, 0]
-            state.twists = record.twists(part.name)[frame]
-            state.spins = record.spins(part.name)[frame]
-            states.append(state)
-        self._world.set_state(states, float(record.times[frame]))
+        state.positions = record.positions(part.name)[frame]
+        state.velocities = record.velocities(part.name)[frame]
+        state.directors = record.directors(part.name)[frame, :, 0]
+        state.twists = record.twists(part.name)[frame]
+        state.spins = record.spins(part.name)[frame]
+        states.append(state)
+    session.world.set_state(states, float(record.times[frame]))
 
 
 def _tangents(points: FloatArray, part: RodPart) -> FloatArray:
