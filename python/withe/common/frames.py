@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
 
-from withe.common.outlines import ObstacleOutline, RodOutline
+from withe.common.outlines import Named, ObstacleOutline, RodOutline
 
 __all__ = ["ENERGIES", "EnergyHistory", "Frames", "edges_to_nodes", "stencils_to_nodes"]
 
@@ -56,25 +56,25 @@ class Frames(Protocol):
     def obstacles(self) -> tuple[ObstacleOutline, ...]:
         """In the order of the scene."""
 
-    def positions(self, rod: Any = None) -> FloatArray:
+    def positions(self, rod: Named | None = None) -> FloatArray:
         """Of the nodes of a rod, or of all, shape (frames, nodes, 3) [m]."""
 
-    def velocities(self, rod: Any = None) -> FloatArray:
+    def velocities(self, rod: Named | None = None) -> FloatArray:
         """Of the nodes of a rod, or of all, shape (frames, nodes, 3) [m/s]."""
 
-    def directors(self, rod: Any) -> FloatArray:
+    def directors(self, rod: Named) -> FloatArray:
         """Material frames of the edges, shape (frames, edges, 3, 3), rows d1, d2, tangent."""
 
-    def curvatures(self, rod: Any) -> FloatArray:
+    def curvatures(self, rod: Named) -> FloatArray:
         """Towards d1 and d2, shape (frames, stencils, 2) [1/m]."""
 
-    def twists(self, rod: Any) -> FloatArray:
+    def twists(self, rod: Named) -> FloatArray:
         """Shape (frames, stencils) [rad/m]."""
 
-    def tensions(self, rod: Any) -> FloatArray:
+    def tensions(self, rod: Named) -> FloatArray:
         """Axial forces of the edges, shape (frames, edges) [N]."""
 
-    def obstacle_position(self, obstacle: Any) -> FloatArray:
+    def obstacle_position(self, obstacle: Named) -> FloatArray:
         """Of the point of a plane, a sphere's centre, a capsule's start, shape (frames, 3) [m]."""
 
     def energy(self) -> EnergyHistory:

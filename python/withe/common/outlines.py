@@ -3,14 +3,25 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["ObstacleOutline", "RodOutline", "index_of", "outlines"]
+__all__ = ["Named", "ObstacleOutline", "RodOutline", "index_of"]
 
 FloatArray = npt.NDArray[np.float64]
+
+
+class HasName(Protocol):
+    """An outline, or a handle."""
+
+    @property
+    def name(self) -> str:
+        """Name of a part of the scene."""
+
+
+Named = str | HasName
 
 
 @dataclass(frozen=True)
@@ -66,7 +77,7 @@ class ObstacleOutline:
     radius: float
 
 
-def index_of(outlines: tuple[RodOutline, ...] | tuple[ObstacleOutline, ...], handle: Any, what: str) -> int:
+def index_of(outlines: tuple[RodOutline, ...] | tuple[ObstacleOutline, ...], handle: Named, what: str) -> int:
     """Place of a rod or an obstacle among those of a record, by its name or its handle."""
     name = handle if isinstance(handle, str) else getattr(handle, "name", None)
     names = [outline.name for outline in outlines]
@@ -75,21 +86,3 @@ def index_of(outlines: tuple[RodOutline, ...] | tuple[ObstacleOutline, ...], han
         wanted = repr(handle) if name is None else repr(name)
         raise ValueError(f"{what} must be one of {known} or its handle, got {wanted}")
     return names.index(name)
-
-
-def outlines(simulation: Any) -> tuple[RodOutline, ...]:
-    """The outlines of the rods of a simulation, from its scene's handles."""
-    return tuple(_outline(rod) for rod in simulation.rods)
-
-
-def _outline(rod: Any) -> RodOutline:
-    rows = np.array(rod.rows, np.int64)
-    edges = len(rows) - (0 if rod.closed else 1)
-    widths = getattr(rod, "widths", None)
-    return RodOutline(
-        name=rod.name,
-        rows=rows,
-        closed=bool(rod.closed),
-        radii=np.array(np.broadcast_to(np.asarray(rod.radii, float), (edges,))),
-        widths=None if widths is None else np.array(np.broadcast_to(widths, (edges, 2)), float),
-    )

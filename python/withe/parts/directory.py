@@ -78,7 +78,7 @@ class Directory:
         if number.isdecimal():
             self._retired[word] = max(self._retired.get(word, 0), int(number))
 
-    def new_name(self, name: Any, word: str) -> str:
+    def new_name(self, name: str | None, word: str) -> str:
         """A name that is free: the one given, or the word and a number.
 
         Raises
@@ -99,7 +99,7 @@ class Directory:
             raise ValueError(f"name of the {word} must not read like that of a node or edge, got {name!r}")
         return name
 
-    def find(self, handle: Any, kind: type[P], what: str) -> P:
+    def find(self, handle: Handle | str, kind: type[P], what: str) -> P:
         """The part that a handle or a name stands for.
 
         Raises
@@ -112,7 +112,7 @@ class Directory:
             raise ValueError(f"{what} must be a {_WORDS[kind]}, got the {_WORDS[type(part)]} {part.name!r}")
         return part
 
-    def find_any(self, handle: Any, what: str) -> Part:
+    def find_any(self, handle: Handle | str, what: str) -> Part:
         """The part of any kind that a handle or a name stands for."""
         name = self._name(handle, what)
         if isinstance(handle, NodeHandle | EdgeHandle):
@@ -123,7 +123,7 @@ class Directory:
             raise ValueError(f"{what} {name!r:.80} is not in the scene, which has {known}")
         return part
 
-    def handle(self, name: Any) -> Any:
+    def handle(self, name: str) -> Any:
         """The handle of the part, node or edge of that name."""
         if not isinstance(name, str):
             raise ValueError(f"name must be text, got {type(name).__name__}")
@@ -136,11 +136,11 @@ class Directory:
         (index, node), _ = self.node(name, "name")
         return self.rods[index].node(node)
 
-    def rod(self, handle: Any, what: str = "rod") -> RodPart:
+    def rod(self, handle: Handle | str, what: str = "rod") -> RodPart:
         """The rod that a handle or a name stands for."""
         return self.find(handle, RodPart, what)
 
-    def node(self, handle: Any, what: str = "node") -> tuple[Pass, str]:
+    def node(self, handle: Handle | str, what: str = "node") -> tuple[Pass, str]:
         """The node that a handle or a name such as "arm.end" stands for: (rod, node of the rod), its name."""
         name = self._name(handle, what)
         if isinstance(handle, NodeHandle):
@@ -163,7 +163,7 @@ class Directory:
         """The row of a node in the positions of the scene."""
         return int(self.layout.rows(node[0])[node[1]])
 
-    def _name(self, handle: Any, what: str) -> str:
+    def _name(self, handle: Handle | str, what: str) -> str:
         if isinstance(handle, Handle):
             if handle.scene_id != self.scene_id:
                 raise ValueError(f"{what} {handle.name!r} is a handle of another scene")

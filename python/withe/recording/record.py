@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from withe import io, view
 from withe.common.frames import ENERGIES, EnergyHistory
-from withe.common.outlines import ObstacleOutline, RodOutline, index_of
+from withe.common.outlines import Named, ObstacleOutline, RodOutline, index_of
 
 __all__ = ["ROD_READOUTS", "EnergyHistory", "Record"]
 
@@ -139,7 +139,7 @@ class Record:
         """Number of frames."""
         return len(self._arrays["times"])
 
-    def positions(self, rod: Any = None) -> FloatArray:
+    def positions(self, rod: Named | None = None) -> FloatArray:
         """Positions of the nodes of a rod, or of every node of the scene once.
 
         Returns
@@ -153,7 +153,7 @@ class Record:
         """
         return self._nodal("positions", rod)
 
-    def obstacle_position(self, obstacle: Any) -> FloatArray:
+    def obstacle_position(self, obstacle: Named) -> FloatArray:
         """Positions of an obstacle: of the point of a plane, a sphere's centre, a capsule's start, (frames, 3) [m].
 
         Raises
@@ -164,27 +164,27 @@ class Record:
         index = index_of(self._obstacles, obstacle, "obstacle")
         return self._arrays[f"obstacle_{index}_place"].copy()
 
-    def velocities(self, rod: Any = None) -> FloatArray:
+    def velocities(self, rod: Named | None = None) -> FloatArray:
         """Velocities of the nodes of a rod, or of every node once, (frames, nodes, 3) [m/s]."""
         return self._nodal("velocities", rod)
 
-    def directors(self, rod: Any) -> FloatArray:
+    def directors(self, rod: Named) -> FloatArray:
         """Material frames of the edges, (frames, edges, 3, 3), rows d1, d2, tangent."""
         return self._of_rod("directors", rod)
 
-    def curvatures(self, rod: Any) -> FloatArray:
+    def curvatures(self, rod: Named) -> FloatArray:
         """Curvatures towards d1 and d2, shape (frames, stencils, 2) [1/m]."""
         return self._of_rod("curvatures", rod)
 
-    def twists(self, rod: Any) -> FloatArray:
+    def twists(self, rod: Named) -> FloatArray:
         """Twists, shape (frames, stencils) [rad/m]."""
         return self._of_rod("twists", rod)
 
-    def tensions(self, rod: Any) -> FloatArray:
+    def tensions(self, rod: Named) -> FloatArray:
         """Axial forces of the edges, shape (frames, edges) [N]."""
         return self._of_rod("tensions", rod)
 
-    def spins(self, rod: Any) -> FloatArray:
+    def spins(self, rod: Named) -> FloatArray:
         """Angular velocities of the edges about their tangents, shape (frames, edges) [rad/s].
 
         Raises
@@ -223,14 +223,14 @@ class Record:
             raise KeyError(f"nothing was recorded as {name!r}; known: {known}")
         return self._arrays[f"extra_{self._extras.index(name)}"].copy()
 
-    def _nodal(self, name: str, rod: Any) -> FloatArray:
+    def _nodal(self, name: str, rod: Named | None) -> FloatArray:
         values = self._arrays[name]
         return values.copy() if rod is None else values[:, self._rods[self._index(rod)].rows]
 
-    def _of_rod(self, name: str, rod: Any) -> FloatArray:
+    def _of_rod(self, name: str, rod: Named) -> FloatArray:
         return self._arrays[f"rod_{self._index(rod)}_{name}"].copy()
 
-    def _index(self, rod: Any) -> int:
+    def _index(self, rod: Named) -> int:
         return index_of(self._rods, rod, "rod")
 
     def __repr__(self) -> str:

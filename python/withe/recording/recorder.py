@@ -2,18 +2,73 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
-from typing import Any
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
 from withe.common.frames import ENERGIES
-from withe.common.outlines import ObstacleOutline, outlines
+from withe.common.outlines import ObstacleOutline, RodOutline
 from withe.recording.record import ROD_READOUTS, Record
 
 __all__ = ["Recorder", "present"]
+
+
+class Energies(Protocol):
+    """Energies of a moment, by the names of `ENERGIES`."""
+
+    @property
+    def total(self) -> float:
+        """Sum of those that a scene stores [J]."""
+
+
+class Drawn(Protocol):
+    """A rod's handle."""
+
+    @property
+    def name(self) -> str:
+        """Of the rod."""
+
+    @property
+    def rows(self) -> npt.NDArray[np.int64]:
+        """Its rows among the nodes of the scene, shape (nodes,)."""
+
+    @property
+    def closed(self) -> bool:
+        """Whether its last node is joined to its first by an edge."""
+
+    @property
+    def radii(self) -> npt.NDArray[np.float64]:
+        """Of its edges, shape (edges,) [m]."""
+
+
+class Moving(Protocol):
+    """What answers to the read-outs of `Simulation`; also to those of `ROD_READOUTS`, given a rod's name."""
+
+    @property
+    def time(self) -> float:
+        """Now [s]."""
+
+    @property
+    def rods(self) -> Sequence[Drawn]:
+        """In the order of the scene."""
+
+    def positions(self) -> npt.NDArray[np.float64]:
+        """Of all nodes, shape (nodes, 3) [m]."""
+
+    def velocities(self) -> npt.NDArray[np.float64]:
+        """Of all nodes, shape (nodes, 3) [m/s]."""
+
+    def obstacle_position(self, obstacle: str, /) -> npt.NDArray[np.float64]:
+        """Shape (3,) [m]."""
+
+    def energy(self) -> Energies:
+        """Of the whole scene."""
+
+
+S = TypeVar("S", bound=Moving)
 
 
 class _Column:
@@ -37,7 +92,7 @@ class _Column:
         return self._values[:frames].copy()
 
 
-class Recorder:
+class Recorder(Generic[S]):
     """Takes frames from a simulation while it runs.
 
     Parameters
@@ -57,8 +112,8 @@ class Recorder:
 
     def __init__(
         self,
-        simulation: Any,
-        extra: Mapping[str, Callable[[Any], npt.ArrayLike]] | None = None,
+        simulation: S,
+        extra: Mapping[str, Callable[[S], npt.ArrayLike]] | None = None,
         obstacles: Iterable[ObstacleOutline] = (),
     ) -> None:
         self._simulation = simulation
@@ -69,7 +124,7 @@ class Recorder:
                 raise ValueError(f"names in record must be text, got {name!r}")
             if not callable(function):
                 raise ValueError(f"record[{name!r}] must be a function, got {function!r}")
-        self._rods = outlines(simulation)
+        self._rods = tuple(_outline(rod) for rod in simulation.rods)
         self._columns: dict[str, _Column] = {}
         self._frames = 0
 
@@ -132,8 +187,21 @@ def _numbers(name: str, value: npt.ArrayLike) -> npt.NDArray[Any]:
     return array
 
 
-def present(simulation: Any, obstacles: Iterable[ObstacleOutline] = ()) -> Record:
+def present(simulation: Moving, obstacles: Iterable[ObstacleOutline] = ()) -> Record:
     """A record of one frame: the present state of a simulation."""
     recorder = Recorder(simulation, None, obstacles)
     recorder.capture()
     return recorder.record
+
+
+def _outline(rod: Drawn) -> RodOutline:
+    rows = np.array(rod.rows, np.int64)
+    edges = len(rows) - (0 if rod.closed else 1)
+    widths = getattr(rod, "widths", None)
+    return RodOutline(
+        name=rod.name,
+        rows=rows,
+        closed=bool(rod.closed),
+        radii=np.array(np.broadcast_to(np.asarray(rod.radii, float), (edges,))),
+        widths=None if widths is None else np.array(np.broadcast_to(widths, (edges, 2)), float),
+    )

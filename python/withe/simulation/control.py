@@ -7,25 +7,20 @@ from typing import Any
 import numpy.typing as npt
 
 from withe.common import validation
-from withe.parts.applied_loads import AppliedLoads
 from withe.parts.handles import CustomForce, Drag, Fluid, Load, Mass, Obstacle, Rod
 from withe.parts.rods import curvature_array, twist_array
 from withe.simulation.functions import check_jacobian
-from withe.simulation.loads import RunningLoads, remove_load
+from withe.simulation.loads import remove_load
 from withe.simulation.parameters import get_value, set_values
 from withe.simulation.session import Session
 
 __all__ = ["Control"]
 
 
-class Control(AppliedLoads):
+class Control:
     """Methods of `Simulation` that actuate and set; what they do is done by functions of the session."""
 
     _session: Session
-
-    @property
-    def _bearer(self) -> RunningLoads:
-        return RunningLoads(self._session)
 
     # Natural shape
 

@@ -11,13 +11,13 @@ import numpy.typing as npt
 
 from withe.common import validation
 from withe.recording.record import Record
-from withe.recording.recorder import Recorder
+from withe.recording.recorder import Moving, Recorder
 from withe.simulation.obstacles import obstacle_outlines
 from withe.simulation.stepping import Stepping
 
 __all__ = ["Run"]
 
-S = TypeVar("S")
+S = TypeVar("S", bound=Moving)
 
 _CHUNK_TIME = 0.05  # between two looks at the clock [s]
 _MAX_FRAMES = 10_000_000

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Container, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -50,8 +49,8 @@ class EquilibriumPath:
     iterations: int
     _positions: FloatArray
     _reactions: tuple[FloatArray, FloatArray]
-    _rows: Callable[[Any], Any]
-    _support: Callable[[Any], int]
+    _rows: Callable[[Rod | str], npt.NDArray[np.int64]]
+    _support: Callable[[Support | NodeHandle | str], int]
 
     def positions(self, rod: Rod | str | None = None) -> FloatArray:
         """Positions of the nodes of a rod, or of every node once, shape (points, nodes, 3) [m]."""
@@ -108,7 +107,9 @@ def path_options(
 
 
 def path_of(
-    found: _core.EquilibriumPath, rows: Callable[[Rod | str], Any], support: Callable[[Support | NodeHandle | str], int]
+    found: _core.EquilibriumPath,
+    rows: Callable[[Rod | str], npt.NDArray[np.int64]],
+    support: Callable[[Support | NodeHandle | str], int],
 ) -> EquilibriumPath:
     """The engine's path; `rows` of a rod's nodes in all positions, and the index of a support."""
     points = found.points

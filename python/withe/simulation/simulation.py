@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from withe.common import validation
 from withe.common.progress import progress as progress_bar
+from withe.parts.applied_loads import AppliedLoads
 from withe.parts.directory import Directory
 from withe.parts.handles import Load
 from withe.parts.options import BuildOptions
@@ -19,6 +20,7 @@ from withe.recording.record import Record
 from withe.recording.recorder import present
 from withe.simulation.control import Control
 from withe.simulation.linearisation import Linearisation
+from withe.simulation.loads import RunningLoads
 from withe.simulation.loop import Run
 from withe.simulation.measurements import Measurements
 from withe.simulation.obstacles import obstacle_outlines
@@ -37,7 +39,7 @@ FloatArray = npt.NDArray[np.float64]
 _MAX_STEPS = 2**31 - 1
 
 
-class Simulation(Control, Placement, Measurements):
+class Simulation(AppliedLoads, Control, Placement, Measurements):
     """A scene while it runs. Made by `Scene.build`.
 
     Read-outs are copies. Rods, nodes, supports and loads are given by their handles or their names.
@@ -73,6 +75,10 @@ class Simulation(Control, Placement, Measurements):
         self._session = stepping.session
         self._initial = self.snapshot() if initial is None else initial
         return self
+
+    @property
+    def _bearer(self) -> RunningLoads:
+        return RunningLoads(self._session)
 
     # Stepping
 

@@ -6,6 +6,7 @@ import sys
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
 
 from withe import _core
 from withe.errors import CoarseMeshWarning, CoarseStepWarning, ConvergenceError
@@ -38,7 +39,7 @@ class Stepping:
 
     def __init__(self, session: Session) -> None:
         self.session = session
-        self.recorder: Recorder | None = None
+        self.recorder: Recorder[Any] | None = None
         self.frame_time: tuple[float, float] | None = None
         self._running = False
 
