@@ -142,7 +142,7 @@ class Placement:
     ) -> None:
         """Put a rod elsewhere, at once. What is not given stays as it is.
 
-        Joints turn with the edges at them. The energy that this puts in is not booked as work: the balance of
+        Joints turn with the edges at them. The energy that this puts in does not count as work: the balance of
         ``energy()`` begins anew. A state out of the plane of a planar simulation makes it three-dimensional, unless
         it was built with planar=True.
 

@@ -92,20 +92,8 @@ class Stage:
         if color_by != "rod" and color_by not in _BARS:
             raise ValueError(f"color_by must be one of 'rod', {str(list(_BARS))[1:-1]}, got {color_by!r}")
         self.size = _checked_size(size)
-        self._record = record
-        self.times = record.times
-        self._positions = record.positions()
-        self._directors = [record.directors(rod)[:, :, 0] for rod in record.rods]
-        samples = max(1, min(6, _MAX_SAMPLES // sum(len(rod.rows) for rod in record.rods)))
-        self._surfaces = [Surface(rod, self._positions[0, rod.rows], samples) for rod in record.rods]
-        self._footprints = [
-            surface.footprint(self._positions[0, rod.rows])
-            for surface, rod in zip(self._surfaces, record.rods, strict=True)
-        ]
-        self._values = None if color_by == "rod" else [_nodal(record, rod, color_by) for rod in record.rods]
+        self._read(record, color_by)
         in_view = self._positions if frames is None else self._positions[list(frames)]
-        self._footprints_of_obstacles: list[FloatArray] = []
-        self._places = [record.obstacle_position(obstacle) for obstacle in record.obstacles]
         nodes = in_view.reshape(-1, 3)
         around = [
             scenery.framing(obstacle, places if frames is None else places[list(frames)], nodes)
@@ -137,6 +125,22 @@ class Stage:
             self.plotter.enable_anti_aliasing("ssaa")
         self._label: Any = None
         self.show(0.0)
+
+    def _read(self, record: Frames, color_by: ColorBy) -> None:
+        """Motions, and the surfaces of rods."""
+        self._record = record
+        self.times = record.times
+        self._positions = record.positions()
+        self._directors = [record.directors(rod)[:, :, 0] for rod in record.rods]
+        samples = max(1, min(6, _MAX_SAMPLES // sum(len(rod.rows) for rod in record.rods)))
+        self._surfaces = [Surface(rod, self._positions[0, rod.rows], samples) for rod in record.rods]
+        self._footprints = [
+            surface.footprint(self._positions[0, rod.rows])
+            for surface, rod in zip(self._surfaces, record.rods, strict=True)
+        ]
+        self._values = None if color_by == "rod" else [_nodal(record, rod, color_by) for rod in record.rods]
+        self._footprints_of_obstacles: list[FloatArray] = []
+        self._places = [record.obstacle_position(obstacle) for obstacle in record.obstacles]
 
     def show(self, frame: float) -> None:
         """Move the rods to a frame; between two frames, in between."""
