@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 
 import withe
-from withe.progress import Progress, progress
+from withe.common.progress import Progress, progress
 
 __all__ = ["DATA", "HAVE_ELASTICA", "OUT", "Report", "Timing", "arguments", "bar", "interleaved", "once"]
 

@@ -1,6 +1,6 @@
 """Try whether pictures can be rendered here, and say in one line what is missing."""
 
-from withe.graphics import probe_rendering
+from withe.view.graphics import probe_rendering
 
 try:
     probe_rendering()

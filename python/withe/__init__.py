@@ -13,15 +13,27 @@ by rounding, so set it to "baseline" everywhere to find the same bits on unlike 
 from withe import perception, shapes, view
 from withe._core import __version__
 from withe.errors import CoarseMeshWarning, CoarseStepWarning, ConvergenceError
-from withe.handles import CustomForce, Drag, EdgeHandle, Fluid, Joint, Load, Mass, NodeHandle, Obstacle, Rod, Support
-from withe.linearisation import Linearisation
-from withe.materials import Circle, Material, Rectangle, Stiffness, Tube
-from withe.readouts import Energy, Equilibrium, Momentum, Plan, Reaction, RodEnergy, Statistics
-from withe.recording import Record
-from withe.running import run_many
-from withe.scene import Scene
-from withe.simulation import Simulation
-from withe.snapshots import Snapshot
+from withe.parts.handles import (
+    CustomForce,
+    Drag,
+    EdgeHandle,
+    Fluid,
+    Joint,
+    Load,
+    Mass,
+    NodeHandle,
+    Obstacle,
+    Rod,
+    Support,
+)
+from withe.parts.materials import Circle, Material, Rectangle, Stiffness, Tube
+from withe.recording.record import Record
+from withe.scene.scene import Scene
+from withe.simulation.linearisation import Linearisation
+from withe.simulation.readouts import Energy, Equilibrium, Momentum, Plan, Reaction, RodEnergy, Statistics
+from withe.simulation.running import run_many
+from withe.simulation.simulation import Simulation
+from withe.simulation.snapshots import Snapshot
 
 __all__ = [
     "Circle",

@@ -6,13 +6,13 @@ import argparse
 import sys
 from collections.abc import Sequence
 
+from withe.perception import command
+
 __all__ = ["main"]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; what the user gave wrongly is said in one line."""
-    from withe.perception import command
-
     parser = argparse.ArgumentParser(prog="withe", description="Tools around withe: soft robots made of slender rods.")
     commands = parser.add_subparsers(required=True, metavar="command")
     command.add_parser(commands)

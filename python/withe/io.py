@@ -10,13 +10,12 @@ import zipfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-if TYPE_CHECKING:
-    from withe.recording import Record
+from withe.common.frames import Frames, edges_to_nodes, stencils_to_nodes
 
 __all__ = ["load_arrays", "save_arrays", "write_vtk", "written_beside"]
 
@@ -159,7 +158,7 @@ def _read_header(path: Path, text: npt.NDArray[Any], kind: str, version: int) ->
     return header
 
 
-def write_vtk(record: Record, folder: str | os.PathLike[str]) -> Path:
+def write_vtk(record: Frames, folder: str | os.PathLike[str]) -> Path:
     """Write a record as a time series for ParaView: one .vtp file a frame, and a .pvd that lists them.
 
     Every rod is one polyline. Its points carry radius [m], tension [N] (mean of the two edges at a
@@ -170,6 +169,7 @@ def write_vtk(record: Record, folder: str | os.PathLike[str]) -> Path:
     Parameters
     ----------
     record : Record
+        Or whatever answers to its read-outs.
     folder : path
         Created if missing; files of the same names are written over.
 
@@ -216,7 +216,7 @@ def write_vtk(record: Record, folder: str | os.PathLike[str]) -> Path:
 class _Polylines:
     """The frames of a record as VTK PolyData documents."""
 
-    def __init__(self, record: Record) -> None:
+    def __init__(self, record: Frames) -> None:
         rods = record.rods
         self._rods = rods
         positions, velocities = record.positions(), record.velocities()
@@ -291,29 +291,3 @@ def _string_array(name: str, words: list[str]) -> str:
 
 def _base64(data: bytes) -> str:
     return base64.b64encode(np.uint64(len(data)).astype("<u8").tobytes() + data).decode("ascii")
-
-
-def edges_to_nodes(values: npt.NDArray[np.float64], closed: bool) -> npt.NDArray[np.float64]:
-    """Mean of the two edges at each node; the end nodes of an open rod take that of their one edge.
-
-    Parameters
-    ----------
-    values : ndarray of shape (frames, edges, ...)
-    closed : bool
-
-    Returns
-    -------
-    ndarray of shape (frames, nodes, ...)
-    """
-    if closed:
-        return 0.5 * (values + np.roll(values, 1, axis=1))
-    inner = 0.5 * (values[:, :-1] + values[:, 1:])
-    return np.concatenate([values[:, :1], inner, values[:, -1:]], axis=1)
-
-
-def stencils_to_nodes(values: npt.NDArray[np.float64], closed: bool) -> npt.NDArray[np.float64]:
-    """Values at the inner nodes of an open rod, carried on to its ends; shape (frames, nodes, ...)."""
-    if closed:
-        return values
-    padding = [(0, 0), (1, 1)] + [(0, 0)] * (values.ndim - 2)
-    return np.pad(values, padding, mode="edge" if values.shape[1] else "constant")

@@ -7,8 +7,8 @@ from typing import Literal, get_args
 import numpy as np
 import numpy.typing as npt
 
-from withe import validation
-from withe.drawing import natural_shape
+from withe.common import validation
+from withe.common.drawing import natural_shape
 
 __all__ = ["granny_knot", "link", "overhand_knot", "reef_knot", "signed_crossings", "writhe"]
 

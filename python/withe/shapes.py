@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from withe.common.validation import integer, non_negative, number, positive, unit_vector, vector
 from withe.knots import granny_knot, overhand_knot, reef_knot
-from withe.validation import integer, non_negative, number, positive, unit_vector, vector
 
 __all__ = ["arc", "circle", "granny_knot", "helix", "overhand_knot", "reef_knot"]
 

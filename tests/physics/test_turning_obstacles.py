@@ -136,10 +136,10 @@ def test_full_turns_count_and_a_path_may_roll():
     simulation.move(ball, path=lambda t: ((0.5, 0, 0), (0, 0, 3 * t)))
     kept = simulation.snapshot()
     simulation.step(10)
-    np.testing.assert_allclose(simulation._world.obstacle_turn(0), (0, 100, 0))
-    np.testing.assert_allclose(simulation._world.obstacle_turn(1), (0, 0, 0.03))
+    np.testing.assert_allclose(simulation._session.world.obstacle_turn(0), (0, 100, 0))
+    np.testing.assert_allclose(simulation._session.world.obstacle_turn(1), (0, 0, 0.03))
     simulation.restore(kept)
-    np.testing.assert_allclose(simulation._world.obstacle_turn(0), 0)
+    np.testing.assert_allclose(simulation._session.world.obstacle_turn(0), 0)
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ def pytest_configure():
 def renderer():
     """Skips, and says so, where nothing can be rendered."""
     pytest.importorskip("pyvista")
-    from withe.graphics import probe_rendering
+    from withe.view.graphics import probe_rendering
 
     try:
         probe_rendering()

@@ -231,7 +231,7 @@ def read_all(simulation):
     assert np.isfinite(simulation.momentum().angular).all()
     assert np.isfinite(simulation.linearise().stiffness).all()
     simulation.contacts(), str(simulation.plan), simulation.statistics
-    for support in simulation._settings.supports:
+    for support in simulation._session.settings.supports:
         assert np.isfinite(simulation.reaction(support).force).all()
 
 

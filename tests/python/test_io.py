@@ -13,8 +13,8 @@ import pytest
 from curling_motion import CurlingSimulation, Handle
 from simple_scenes import cantilever
 from withe.io import load_arrays, save_arrays
-from withe.recorder import Recorder
 from withe.recording import EnergyHistory, Record
+from withe.recording.recorder import Recorder
 
 
 @pytest.fixture

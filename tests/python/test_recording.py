@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from curling_motion import CURVATURE_RATE, CurlingSimulation
-from withe import recorder as recorder_room
-from withe.recorder import Recorder, present
 from withe.recording import EnergyHistory
+from withe.recording import recorder as recorder_room
+from withe.recording.recorder import Recorder, present
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ import threading
 
 import pytest
 
-from withe.progress import progress
+from withe.common.progress import progress
 
 
 class Terminal(io.StringIO):

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import withe
-from withe.description import describe
-from withe.handles import Layout, RodPlace, UnionFind
+from withe.parts.description import describe
+from withe.parts.handles import Layout, RodPlace, UnionFind
 
 RUBBER = withe.Material(youngs_modulus=1e6, density=1000.0)
 

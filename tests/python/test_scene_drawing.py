@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import withe
-from withe import drawing
-from withe.parts import RodPart
+from withe.common import drawing
+from withe.parts.kinds import RodPart
 
 RUBBER = withe.Material(youngs_modulus=1e6, poisson_ratio=0.3, density=1000.0, viscosity=50.0)
 

@@ -263,9 +263,18 @@ def test_a_free_shaft_that_its_clamp_turns_many_times_does_not_warn():
     assert np.abs(simulation.twists(arm)).max() < 10.0
 
 
-def test_a_shaft_that_is_wound_up_between_two_clamps_warns():
+@pytest.mark.parametrize(
+    "advance",
+    [
+        lambda simulation: simulation.step(70),
+        lambda simulation: simulation.run(70 * simulation.time_step, progress=False),
+    ],
+    ids=["step", "run"],
+)
+def test_a_shaft_that_is_wound_up_between_two_clamps_warns(advance):
     arm, simulation = shaft(6)
     simulation.clamp(arm.end)
     simulation.move(arm.end, roll=2 * np.pi * 5, over=0.2)
-    with pytest.warns(withe.CoarseMeshWarning, match=r"twists by \d+ degrees against the next"):
-        simulation.step(70)
+    with pytest.warns(withe.CoarseMeshWarning, match=r"twists by \d+ degrees against the next") as caught:
+        advance(simulation)
+    assert [warning.filename for warning in caught] == [__file__]  # the line of the user

@@ -72,7 +72,7 @@ def test_a_rigid_joint_keeps_the_angles_at_its_node():
         return np.array(result)
 
     now = tangents(simulation.positions)
-    drawn = tangents(lambda name: simulation._scene.rod(name).points)
+    drawn = tangents(lambda name: simulation._session.scene.rod(name).points)
     assert np.abs(now - drawn).max() > 0.05  # it has turned
     assert np.allclose(now @ now.T, drawn @ drawn.T, atol=5e-3)
 

@@ -45,7 +45,7 @@ def test_a_snapshot_travels_through_a_file_into_another_build(simulation, tmp_pa
     other = BUILDERS[0]()
     for build in BUILDERS:
         candidate = build()
-        if candidate._options == simulation._options and len(candidate.rods) == len(simulation.rods):
+        if candidate._session.options == simulation._session.options and len(candidate.rods) == len(simulation.rods):
             other = candidate
     other.restore(state)
     simulation.step(5)

@@ -169,7 +169,8 @@ def test_reactions_balance_the_loads_at_every_support():
     total = sum(simulation.reaction(name).force for name in ("clamp 1", "clamp 2"))
     weight = sum(
         float(
-            simulation.get(rod, "line_density")[0] * np.linalg.norm(np.ptp(simulation._scene.rod(rod).points, axis=0))
+            simulation.get(rod, "line_density")[0]
+            * np.linalg.norm(np.ptp(simulation._session.scene.rod(rod).points, axis=0))
         )
         for rod in simulation.rods
     )
@@ -235,7 +236,7 @@ def test_clamping_and_letting_go_again_and_again_leaves_nothing_behind():
     for k in range(200):
         simulation.release(simulation.clamp(arm.end) if k % 2 else simulation.pin(arm.node(k % 7 + 2)))
     assert len(simulation.snapshot()._state) == size
-    assert list(simulation._directory.parts) == ["arm", "wall"]
+    assert list(simulation._session.directory.parts) == ["arm", "wall"]
 
 
 def test_the_handle_of_a_released_support_says_so_and_never_means_another():

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from withe.extras import require
+from withe.common.extras import require
 from withe.perception.drawing import draw
 from withe.perception.tracing import read_image, trace
 

@@ -7,7 +7,7 @@ import colorsys
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from withe.extras import require
+from withe.common.extras import require
 from withe.perception.results import Tracing
 from withe.perception.tracing import check_image
 

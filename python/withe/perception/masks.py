@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from withe import _core
-from withe.extras import require
+from withe.common.extras import require
 
 __all__ = ["MaskFunction", "border_filter", "color_filter", "network_mask"]
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from withe import _core
-from withe.extras import require
+from withe.common.extras import require
 from withe.perception.masks import MaskFunction, border_filter
 from withe.perception.results import Ambiguity, Crossing, Joint, Tracing
 

@@ -1,0 +1,107 @@
+"""Recorded frames, as files and pictures read them: whatever answers to the read-outs of a `Record`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from withe.common.outlines import Named, ObstacleOutline, RodOutline
+
+__all__ = ["ENERGIES", "EnergyHistory", "Frames", "edges_to_nodes", "stencils_to_nodes"]
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class EnergyHistory:
+    """Energies of every frame, arrays of shape (frames,) [J].
+
+    `total` is the sum of kinetic, stretch, bend, twist, gravity, loads and contact. `work`, done by
+    supports and actuation, and `dissipated` count from the start of the simulation.
+    """
+
+    kinetic: FloatArray
+    stretch: FloatArray
+    bend: FloatArray
+    twist: FloatArray
+    gravity: FloatArray
+    loads: FloatArray
+    contact: FloatArray
+    total: FloatArray
+    work: FloatArray
+    dissipated: FloatArray
+
+
+ENERGIES = tuple(field.name for field in fields(EnergyHistory))
+
+
+class Frames(Protocol):
+    """The motion of a scene, frame by frame; a rod or an obstacle is given by its outline, its handle or its name."""
+
+    def __len__(self) -> int:
+        """Number of frames."""
+
+    @property
+    def times(self) -> FloatArray:
+        """Of the frames, shape (frames,) [s]."""
+
+    @property
+    def rods(self) -> tuple[RodOutline, ...]:
+        """In the order of the scene."""
+
+    @property
+    def obstacles(self) -> tuple[ObstacleOutline, ...]:
+        """In the order of the scene."""
+
+    def positions(self, rod: Named | None = None) -> FloatArray:
+        """Of the nodes of a rod, or of all, shape (frames, nodes, 3) [m]."""
+
+    def velocities(self, rod: Named | None = None) -> FloatArray:
+        """Of the nodes of a rod, or of all, shape (frames, nodes, 3) [m/s]."""
+
+    def directors(self, rod: Named) -> FloatArray:
+        """Material frames of the edges, shape (frames, edges, 3, 3), rows d1, d2, tangent."""
+
+    def curvatures(self, rod: Named) -> FloatArray:
+        """Towards d1 and d2, shape (frames, stencils, 2) [1/m]."""
+
+    def twists(self, rod: Named) -> FloatArray:
+        """Shape (frames, stencils) [rad/m]."""
+
+    def tensions(self, rod: Named) -> FloatArray:
+        """Axial forces of the edges, shape (frames, edges) [N]."""
+
+    def obstacle_position(self, obstacle: Named) -> FloatArray:
+        """Of the point of a plane, a sphere's centre, a capsule's start, shape (frames, 3) [m]."""
+
+    def energy(self) -> EnergyHistory:
+        """Every one an array of shape (frames,) [J]."""
+
+
+def edges_to_nodes(values: npt.NDArray[np.float64], closed: bool) -> npt.NDArray[np.float64]:
+    """Mean of the two edges at each node; the end nodes of an open rod take that of their one edge.
+
+    Parameters
+    ----------
+    values : ndarray of shape (frames, edges, ...)
+    closed : bool
+
+    Returns
+    -------
+    ndarray of shape (frames, nodes, ...)
+    """
+    if closed:
+        return 0.5 * (values + np.roll(values, 1, axis=1))
+    inner = 0.5 * (values[:, :-1] + values[:, 1:])
+    return np.concatenate([values[:, :1], inner, values[:, -1:]], axis=1)
+
+
+def stencils_to_nodes(values: npt.NDArray[np.float64], closed: bool) -> npt.NDArray[np.float64]:
+    """Values at the inner nodes of an open rod, carried on to its ends; shape (frames, nodes, ...)."""
+    if closed:
+        return values
+    padding = [(0, 0), (1, 1)] + [(0, 0)] * (values.ndim - 2)
+    return np.pad(values, padding, mode="edge" if values.shape[1] else "constant")

@@ -1,0 +1,88 @@
+"""What pictures and files need to know of rods and obstacles besides their motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+__all__ = ["Named", "ObstacleOutline", "RodOutline", "index_of"]
+
+FloatArray = npt.NDArray[np.float64]
+
+
+class HasName(Protocol):
+    """An outline, or a handle."""
+
+    @property
+    def name(self) -> str:
+        """Name of a part of the scene."""
+
+
+Named = str | HasName
+
+
+@dataclass(frozen=True)
+class RodOutline:
+    """What pictures and files need to know of a rod besides its motion.
+
+    Attributes
+    ----------
+    name : str
+    rows : ndarray of int, shape (nodes,)
+        The rod's rows among the nodes of the scene.
+    closed : bool
+        Whether the last node is joined to the first by an edge.
+    radii : ndarray of shape (edges,) [m]
+    widths : ndarray of shape (edges, 2) [m], or None
+        Sides of a rectangular section along d1 and d2; None for a round one.
+    """
+
+    name: str
+    rows: npt.NDArray[np.int64]
+    closed: bool
+    radii: FloatArray
+    widths: FloatArray | None = None
+
+    @property
+    def edges(self) -> int:
+        """Number of edges."""
+        return len(self.rows) - (0 if self.closed else 1)
+
+    @property
+    def stencils(self) -> int:
+        """Number of nodes at which the rod bends."""
+        return len(self.rows) - (0 if self.closed else 2)
+
+
+@dataclass(frozen=True)
+class ObstacleOutline:
+    """What pictures need to know of an obstacle besides its motion.
+
+    Attributes
+    ----------
+    name : str
+    kind : {"plane", "capsule"}
+        A sphere is a capsule without length.
+    axis : ndarray of shape (3,)
+        Normal of a plane; from the start of a capsule's axis to its end [m].
+    radius : float [m]
+    """
+
+    name: str
+    kind: str
+    axis: FloatArray
+    radius: float
+
+
+def index_of(outlines: tuple[RodOutline, ...] | tuple[ObstacleOutline, ...], handle: Named, what: str) -> int:
+    """Place of a rod or an obstacle among those of a record, by its name or its handle."""
+    name = handle if isinstance(handle, str) else getattr(handle, "name", None)
+    names = [outline.name for outline in outlines]
+    if name not in names:
+        known = ", ".join(map(repr, names)) or "none"
+        wanted = repr(handle) if name is None else repr(name)
+        raise ValueError(f"{what} must be one of {known} or its handle, got {wanted}")
+    return names.index(name)

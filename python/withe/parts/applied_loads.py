@@ -1,0 +1,184 @@
+"""Forces, moments, loads along rods and pressure, on a scene or on a simulation that runs."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from withe.common import validation
+from withe.parts.directory import Directory
+from withe.parts.handles import Load, NodeHandle, Rod
+from withe.parts.kinds import LoadKind, LoadPart, Pass, RodPart
+
+__all__ = ["AppliedLoads", "Bearer", "load_vector"]
+
+FloatArray = npt.NDArray[np.float64]
+Value = npt.ArrayLike | Callable[[float], npt.ArrayLike]
+
+
+class Bearer(Protocol):
+    """What loads are put on: a scene, or a simulation that runs."""
+
+    @property
+    def directory(self) -> Directory:
+        """Its parts."""
+
+    @property
+    def time(self) -> float:
+        """When a load begins to act [s]."""
+
+    def take(self, part: LoadPart) -> Load:
+        """Let a load act from now on."""
+
+
+class AppliedLoads(ABC):
+    """Methods of `Scene` and of `Simulation` that put loads on what `_bearer` is."""
+
+    @property
+    @abstractmethod
+    def _bearer(self) -> Bearer:
+        """What loads are put on."""
+
+    def add_force(
+        self, node: NodeHandle | str, force: Value, *, follower: bool = False, name: str | None = None
+    ) -> Load:
+        """Add a force at a node.
+
+        Parameters
+        ----------
+        node : NodeHandle or str
+        force : array_like of shape (3,) [N], or a function of time [s] that returns it
+        follower : bool
+            Whether it turns with the edge that ends at the node (or starts there, at the first node).
+        name : str
+
+        Returns
+        -------
+        Load
+        """
+        return _put_at_node(self._bearer, "force", node, force, follower, name)
+
+    def add_moment(
+        self, node: NodeHandle | str, moment: Value, *, follower: bool = False, name: str | None = None
+    ) -> Load:
+        """Add a moment at a node.
+
+        Parameters
+        ----------
+        node : NodeHandle or str
+        moment : array_like of shape (3,) [N m], or a function of time [s] that returns it
+            In world axes, as the scene is drawn. Put on a simulation, the function may read it (its spins, say), once
+            before every step: a torque that depends on the state, explicitly.
+        follower : bool
+            Whether it turns with what it acts on: the joint or the clamp at the node, or else half of it with
+            either edge there.
+        name : str
+
+        Returns
+        -------
+        Load
+        """
+        return _put_at_node(self._bearer, "moment", node, moment, follower, name)
+
+    def add_load(self, rod: Rod | str, load: Value, *, follower: bool = False, name: str | None = None) -> Load:
+        """Add a force spread evenly along a rod.
+
+        Parameters
+        ----------
+        rod : Rod or str
+        load : array_like of shape (3,) [N/m], or a function of time [s] that returns it
+        follower : bool
+            Whether it turns with the edges.
+        name : str
+
+        Returns
+        -------
+        Load
+        """
+        place = self._bearer.directory.rod(rod, "rod of the load").index, 0
+        return _put(self._bearer, "load", place, load, validation.truth(follower, "follower"), name)
+
+    def add_pressure(
+        self,
+        rod: Rod | str,
+        pressure: float | Callable[[float], float],
+        *,
+        normal: npt.ArrayLike | None = None,
+        name: str | None = None,
+    ) -> Load:
+        """Add a pressure on the side of a rod: a force per present length, normal x tangent, that follows the rod.
+
+        What a ring in a plane feels of a fluid around it: it buckles at 3 EI / R^3 [Levy 1884]. Along a closed rod
+        its work is the pressure times the area that is lost, as seen along the normal.
+
+        Parameters
+        ----------
+        rod : Rod or str
+        pressure : float [N/m], or a function of time [s] that returns it
+            Force per length. Positive pushes into a closed rod.
+        normal : array_like of shape (3,)
+            Normal of the plane in which it pushes, which stays; the push is to the left along the rod as seen
+            from its tip. By default that about which a closed rod goes round counter-clockwise, as drawn.
+        name : str
+
+        Returns
+        -------
+        Load
+
+        Raises
+        ------
+        ValueError
+            An open rod, or one that goes round no area, without a normal.
+        """
+        part = self._bearer.directory.rod(rod, "rod of the pressure")
+        if normal is None:
+            axis = _area_normal(part)
+        else:
+            axis = validation.unit_vector(normal, f"normal of the pressure on {part.owner}")
+        return _put(self._bearer, "pressure", (part.index, 0), pressure, False, name, axis)
+
+
+def _put_at_node(
+    bearer: Bearer, kind: LoadKind, node: NodeHandle | str, value: Value, follower: bool, name: str | None
+) -> Load:
+    place, _ = bearer.directory.node(node, f"node of the {kind}")
+    return _put(bearer, kind, place, value, validation.truth(follower, "follower"), name)
+
+
+def _put(
+    bearer: Bearer,
+    kind: LoadKind,
+    node: Pass,
+    value: Value,
+    follower: bool,
+    name: str | None,
+    axis: FloatArray | None = None,
+) -> Load:
+    name = bearer.directory.new_name(name, kind)
+    function = value if callable(value) else None
+    now = bearer.time
+    what = f"{kind} {name!r}" + (f" at t = {now:g}" if function else "")
+    first = load_vector(value(now) if callable(value) else value, axis, what)
+    return bearer.take(LoadPart(name, kind, node, first, function, follower, axis))
+
+
+def load_vector(value: npt.ArrayLike, axis: FloatArray | None, what: str) -> FloatArray:
+    """A load as three numbers: a pressure is along its normal."""
+    if axis is None:
+        return validation.vector(value, what)
+    return validation.number(value, what) * axis
+
+
+def _area_normal(part: RodPart) -> FloatArray:
+    if not part.closed:
+        raise ValueError(f"normal of the pressure on {part.owner} must be given: it is open")
+    points = part.points - part.points.mean(axis=0)
+    area = 0.5 * np.cross(points, np.roll(points, -1, axis=0)).sum(axis=0)
+    size = float(np.linalg.norm(area))
+    if size < 1e-9 * float(part.lengths.sum()) ** 2:
+        raise ValueError(f"normal of the pressure on {part.owner} must be given: it goes round no area")
+    return np.asarray(area / size)

@@ -1,0 +1,173 @@
+"""What the rods of a scene may touch, as the engine takes it and as it answers."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from withe import _core
+from withe.common import validation
+from withe.parts.directory import Directory
+from withe.parts.friction import Friction, check_law, friction_pair
+from withe.parts.handles import Obstacle, Rod
+from withe.parts.kinds import (
+    ContactSettings,
+    ObstaclePart,
+    PairSettings,
+    RodPart,
+)
+
+__all__ = ["CONTACT", "Body", "body_of", "contact_table", "describe_contact", "make_obstacle", "pair_of", "touching"]
+
+FloatArray = npt.NDArray[np.float64]
+Body = Rod | Obstacle | str
+
+CONTACT = np.dtype(
+    [
+        ("pair", "U64", (2,)),
+        ("edge", np.int64, (2,)),
+        ("distance", float),
+        ("gap", float),
+        ("point", float, (3,)),
+        ("normal", float, (3,)),
+        ("normal_force", float),
+        ("friction", float, (3,)),
+        ("sticking", bool),
+    ]
+)
+
+
+def make_obstacle(
+    name: str,
+    kind: Literal["plane", "capsule"],
+    point: FloatArray,
+    other: FloatArray,
+    radius: float,
+    friction: Friction,
+    restitution: float,
+) -> ObstaclePart:
+    """An obstacle, checked; not yet in the directory."""
+    both = friction_pair(friction, f"friction of {name!r}")
+    restitution = validation.share(restitution, f"restitution of {name!r}")
+    return ObstaclePart(name, kind, point, other, radius, both, restitution)
+
+
+def pair_of(directory: Directory, a: Body, b: Body) -> tuple[str, str]:
+    """Names of two bodies that may touch, in the order by which `ContactSettings.pairs` knows them.
+
+    Raises
+    ------
+    ValueError
+        Two obstacles, or something that touches nothing.
+    """
+    first, second = touching(directory, a), touching(directory, b)
+    if isinstance(first, ObstaclePart) and isinstance(second, ObstaclePart):
+        raise ValueError(f"{first.name!r} and {second.name!r} are both obstacles, which never touch")
+    return (first.name, second.name) if first.name <= second.name else (second.name, first.name)
+
+
+def touching(directory: Directory, handle: Body) -> RodPart | ObstaclePart:
+    """What a handle or name of something that touches means.
+
+    Raises
+    ------
+    ValueError
+        Neither a rod nor an obstacle.
+    """
+    part = directory.find_any(handle, "what touches")
+    if not isinstance(part, RodPart | ObstaclePart):
+        raise ValueError(f"what touches must be a rod or an obstacle, got {part.name!r}")
+    return part
+
+
+def body_of(directory: Directory, part: RodPart | ObstaclePart) -> int:
+    """How the engine calls a rod (its index) or an obstacle (-1 - index)."""
+    return part.index if isinstance(part, RodPart) else -1 - directory.all(ObstaclePart).index(part)
+
+
+def describe_contact(directory: Directory) -> _core.ContactDescription:
+    """What touches, for the engine.
+
+    Raises
+    ------
+    ValueError
+        A distance tolerance above the radius of a rod.
+    """
+    settings: ContactSettings = directory.contact
+    contact = _core.ContactDescription()
+    contact.rods = settings.rods
+    contact.friction = settings.friction
+    contact.restitution = settings.restitution
+    contact.law = settings.model
+    contact.friction_law = settings.friction_model
+    contact.distance_tolerance = settings.distance_tolerance or 0.0
+    contact.slip_tolerance = settings.slip_tolerance
+    if settings.stiffness == "source":
+        contact.stiffness_rule = "source"
+    else:
+        contact.stiffness = settings.stiffness or 0.0
+    contact.centreline_friction = settings.centreline_friction
+    contact.overlap = settings.overlap
+    obstacles = directory.all(ObstaclePart)
+    rods = directory.all(RodPart)
+    for rod in rods:
+        smallest = float(rod.section.radii.min())
+        if settings.distance_tolerance is not None and settings.distance_tolerance > smallest:
+            raise ValueError(
+                f"distance_tolerance must not exceed the radius of rod {rod.name!r}, {smallest:g} m, "
+                f"got {settings.distance_tolerance:g} m"
+            )
+    contact.obstacles = [_describe_obstacle(part) for part in obstacles]
+    for part in obstacles:
+        check_law(part.friction, settings.friction_model, f"friction of {part.name!r}")
+    contact.obstacle_friction = np.array([part.friction[0] for part in obstacles], dtype=float)
+    contact.obstacle_across = np.array([part.friction[1] for part in obstacles], dtype=float)
+    contact.obstacle_restitution = np.array([part.restitution for part in obstacles], dtype=float)
+    bodies = {rod.name: rod.index for rod in rods} | {part.name: -1 - i for i, part in enumerate(obstacles)}
+    for (a, b), own in settings.pairs.items():
+        if own.friction is not None:
+            check_law(own.friction, settings.friction_model, f"friction of {a!r} and {b!r}")
+    pairs = [_pair(bodies[a], bodies[b], own) for (a, b), own in settings.pairs.items()]
+    members = list(settings.groups.items())
+    for i, (a, group) in enumerate(members):
+        pairs += [_pair(bodies[a], bodies[b], PairSettings(ignored=True)) for b, other in members[i:] if other == group]
+    contact.pairs = pairs
+    return contact
+
+
+def _describe_obstacle(part: ObstaclePart) -> _core.ObstacleDescription:
+    obstacle = _core.ObstacleDescription()
+    obstacle.kind = part.kind
+    obstacle.point = part.point
+    obstacle.other = part.other
+    obstacle.radius = part.radius
+    obstacle.name = part.name
+    return obstacle
+
+
+def _pair(first: int, second: int, own: PairSettings) -> _core.ContactPairDescription:
+    pair = _core.ContactPairDescription()
+    pair.first, pair.second = first, second
+    pair.ignored = own.ignored
+    pair.friction, pair.across = (-1.0, -1.0) if own.friction is None else own.friction
+    pair.stiffness = own.stiffness or 0.0
+    pair.restitution = -1.0 if own.restitution is None else own.restitution
+    return pair
+
+
+def contact_table(directory: Directory, table: _core.ContactTable) -> npt.NDArray[np.void]:
+    """Contacts of the engine as a structured array with names."""
+    rods = [rod.name for rod in directory.layout.rods]
+    obstacles = [part.name for part in directory.all(ObstaclePart)]
+    contacts = np.zeros(len(table.bodies), CONTACT)
+    bodies, numbers = table.bodies, table.numbers
+    for i, (a, _, b, _, _) in enumerate(bodies):
+        contacts["pair"][i] = rods[a], rods[b] if b >= 0 else obstacles[-1 - b]
+    contacts["edge"] = bodies[:, [1, 3]]
+    contacts["sticking"] = bodies[:, 4] != 0
+    contacts["distance"], contacts["gap"] = numbers[:, 0], numbers[:, 1]
+    contacts["point"], contacts["normal"] = numbers[:, 2:5], numbers[:, 5:8]
+    contacts["normal_force"], contacts["friction"] = numbers[:, 8], numbers[:, 9:12]
+    return contacts

@@ -1,0 +1,190 @@
+"""Hands a scene to the engine: the parts of a directory as the plain arrays of `_core`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import cast
+
+import numpy as np
+import numpy.typing as npt
+
+from withe import _core
+from withe.parts.contacts import describe_contact
+from withe.parts.directory import Directory
+from withe.parts.fluid import describe_fluid
+from withe.parts.joints import JointGroup, connected, gather
+from withe.parts.kinds import (
+    CustomForcePart,
+    DragPart,
+    JoinPart,
+    LoadPart,
+    MassPart,
+    Pass,
+    RodPart,
+    SupportPart,
+)
+from withe.parts.options import Bending
+from withe.parts.parameters import RodParameters
+from withe.parts.supports import held_rows
+
+__all__ = ["added_mass", "describe", "describe_load", "describe_support", "drag", "parameters_of", "rod_parameters"]
+
+FloatArray = npt.NDArray[np.float64]
+
+
+def describe(directory: Directory, gravity: FloatArray, bending: Bending = "angle") -> _core.SceneDescription:
+    """The whole scene.
+
+    Raises
+    ------
+    ValueError
+        A scene without rods, or two supports at nodes that were joined later.
+    """
+    rods = directory.all(RodPart)
+    if not rods:
+        raise ValueError("the scene must have at least one rod: add one with add_rod")
+    scene = _core.SceneDescription()
+    positions = np.empty((directory.layout.node_count, 3))
+    for rod in reversed(rods):  # the first rod at a shared node places it
+        positions[directory.layout.rows(rod.index)] = rod.points
+    scene.positions = positions
+    scene.gravity = gravity
+    scene.bending = bending
+    scene.added_mass = added_mass(directory, {mass.name: mass.mass for mass in directory.all(MassPart)})
+    coefficients = {part.name: part.coefficient for part in directory.all(DragPart)}
+    scene.rods = [_describe_rod(directory, rod, drag(directory, coefficients, rod)) for rod in rods]
+    scene.joints = [_describe_joint(group) for group in _groups(directory.all(JoinPart))]
+    scene.supports = _describe_supports(directory)
+    scene.loads = [describe_load(load) for load in directory.all(LoadPart)]
+    custom = directory.all(CustomForcePart)
+    scene.has_custom_force = bool(custom)
+    scene.custom_implicit = any(part.jacobian is not None for part in custom)
+    scene.custom_moments = any(part.moments for part in custom)
+    scene.contact = describe_contact(directory)
+    scene.fluid = describe_fluid(directory)
+    return scene
+
+
+def added_mass(directory: Directory, masses: dict[str, float]) -> FloatArray:
+    """Point masses of every node of the scene [kg], from the present mass of each part."""
+    total = np.zeros(directory.layout.node_count)
+    for part in directory.all(MassPart):
+        total[directory.row(part.node)] += masses[part.name]
+    return total
+
+
+def drag(directory: Directory, coefficients: dict[str, float], rod: RodPart) -> float:
+    """Drag of a rod [Pa s], the sum of all parts that act on it."""
+    # By name: a look through all parts for every rod would take most of the time of a build.
+    found = [(cast(DragPart, directory.parts[name]), value) for name, value in coefficients.items()]
+    return sum(
+        (value for part, value in found if part.rods is None or rod.index in part.rods),
+        0.0,
+    )
+
+
+def parameters_of(directory: Directory) -> list[RodParameters]:
+    """Parameters of all rods as described, drag included."""
+    coefficients = {part.name: part.coefficient for part in directory.all(DragPart)}
+    return [
+        rod.parameters.changed("drag", drag(directory, coefficients, rod), rod.section, rod.owner)
+        for rod in directory.all(RodPart)
+    ]
+
+
+def rod_parameters(parameters: RodParameters) -> _core.RodDescription:
+    """A description that carries parameters only, for `set_rod_parameters`."""
+    description = _core.RodDescription()
+    _fill(description, parameters)
+    return description
+
+
+def describe_support(part: SupportPart) -> _core.SupportDescription:
+    """One support."""
+    support = _core.SupportDescription()
+    support.kind = part.kind
+    support.pass_ = _core.RodPass(*part.node)
+    support.free = part.free
+    return support
+
+
+def _describe_rod(directory: Directory, rod: RodPart, coefficient: float) -> _core.RodDescription:
+    description = _core.RodDescription()
+    description.name = rod.name
+    description.nodes = directory.layout.rows(rod.index).tolist()
+    description.closed = rod.closed
+    description.directors = rod.directors
+    description.rest_lengths = rod.lengths
+    description.arc_lengths = rod.arcs
+    description.natural_curvature = rod.natural_curvature
+    description.natural_twist = rod.natural_twist
+    description.contact_radius = rod.section.radii
+    _fill(description, rod.parameters.changed("drag", coefficient, rod.section, rod.owner))
+    return description
+
+
+def _fill(description: _core.RodDescription, parameters: RodParameters) -> None:
+    description.stretch_stiffness = parameters.stretch_stiffness
+    description.bend_stiffness = parameters.bend_stiffness
+    description.twist_stiffness = parameters.twist_stiffness
+    description.line_density = parameters.line_density
+    description.rotary_inertia = parameters.rotary_inertia
+    description.viscous_time = parameters.viscous_time
+    description.drag = parameters.drag
+
+
+def _groups(joins: Sequence[JoinPart]) -> list[JointGroup]:
+    """One group for every shared node, in the order of its first join."""
+    joins_at: dict[Pass, list[JoinPart]] = {}
+    for join in joins:
+        for node in join.nodes:
+            joins_at.setdefault(node, []).append(join)
+    groups: list[JointGroup] = []
+    done: set[str] = set()
+    for join in joins:
+        if join.name not in done:
+            members = connected(joins_at, join.nodes[0])
+            done.update(member.name for member in members)
+            groups.append(gather(members))
+    return groups
+
+
+def _describe_joint(group: JointGroup) -> _core.JointDescription:
+    joint = _core.JointDescription()
+    joint.clusters = [[_core.RodPass(*node) for node in cluster] for cluster in group.clusters]
+    joint.links = [_core.RevoluteLink(parent, child, axis) for parent, child, axis in group.links]
+    joint.form = group.form
+    return joint
+
+
+def _describe_supports(directory: Directory) -> list[_core.SupportDescription]:
+    holder: dict[int, SupportPart] = {}
+    for part in directory.all(SupportPart):
+        for row in held_rows(directory, part):
+            other = holder.setdefault(row, part)
+            if other is not part:
+                raise ValueError(_held_twice(directory, other, part))
+    return [describe_support(part) for part in directory.all(SupportPart)]
+
+
+def _held_twice(directory: Directory, first: SupportPart, second: SupportPart) -> str:
+    if directory.row(first.node) == directory.row(second.node):
+        return (
+            f"nodes {first.node_name!r} and {second.node_name!r} are joined, and held by both "
+            f"{first.name!r} and {second.name!r}: hold them once"
+        )
+    return (
+        f"since rods were joined, {first.name!r} at {first.node_name!r} and {second.name!r} at {second.node_name!r} "
+        "hold the same node (hold='edge' takes both nodes of an edge): hold it once"
+    )
+
+
+def describe_load(part: LoadPart) -> _core.LoadDescription:
+    """One load."""
+    load = _core.LoadDescription()
+    load.kind = "distributed" if part.kind == "load" else part.kind
+    load.pass_ = _core.RodPass(*part.node)
+    load.value = part.value
+    load.follower = part.follower
+    load.varies = part.function is not None
+    return load

@@ -1,0 +1,173 @@
+"""Finds the parts of a scene by handle or by name."""
+
+from __future__ import annotations
+
+from typing import Any, TypeVar
+
+from withe.parts.handles import EdgeHandle, Handle, Layout, NodeHandle, Rod, parse_place
+from withe.parts.kinds import (
+    ContactSettings,
+    CustomForcePart,
+    DragPart,
+    FluidPart,
+    JoinPart,
+    LoadPart,
+    MassPart,
+    ObstaclePart,
+    Part,
+    Pass,
+    RodPart,
+    SupportPart,
+    handle_of,
+)
+
+__all__ = ["Directory"]
+
+P = TypeVar("P", bound=Part)
+
+_WORDS: dict[type[Any], str] = {
+    RodPart: "rod",
+    JoinPart: "joint",
+    SupportPart: "support",
+    LoadPart: "load",
+    MassPart: "mass",
+    DragPart: "drag",
+    FluidPart: "fluid",
+    CustomForcePart: "custom force",
+    ObstaclePart: "obstacle",
+}
+
+
+class Directory:
+    """The named parts of one scene. A simulation keeps its own copy, so the scene may go on changing."""
+
+    def __init__(self, scene_id: str) -> None:
+        self.scene_id = scene_id
+        self.layout = Layout()
+        self.parts: dict[str, Part] = {}
+        self.contact = ContactSettings()
+        self._retired: dict[str, int] = {}  # greatest number of a released part that was named by one, by its word
+
+    def copy(self) -> Directory:
+        """A directory that no longer changes with this one."""
+        other = Directory(self.scene_id)
+        other.layout = self.layout.copy()
+        other.parts = dict(self.parts)
+        other.contact = self.contact
+        other._retired = dict(self._retired)
+        return other
+
+    def all(self, kind: type[P]) -> list[P]:
+        """Parts of one kind, in the order they were added."""
+        return [part for part in self.parts.values() if isinstance(part, kind)]
+
+    @property
+    def rods(self) -> tuple[Rod, ...]:
+        """Handles of all rods."""
+        return tuple(Rod(self.scene_id, part.name, self.layout, part.index) for part in self.all(RodPart))
+
+    def add(self, part: Part) -> Handle:
+        """Take in a part whose name is new, and return its handle."""
+        self.parts[part.name] = part
+        return handle_of(part, self.scene_id, self.layout)
+
+    def remove(self, name: str) -> None:
+        """Take a part out. A name that was made for it is not made again, so that its handle stays without a part."""
+        del self.parts[name]
+        word, _, number = name.rpartition(" ")
+        if number.isdecimal():
+            self._retired[word] = max(self._retired.get(word, 0), int(number))
+
+    def new_name(self, name: str | None, word: str) -> str:
+        """A name that is free: the one given, or the word and a number.
+
+        Raises
+        ------
+        ValueError
+            Not text, taken, or a name that nodes and edges have.
+        """
+        if name is None:
+            number = self._retired.get(word, 0) + 1
+            while f"{word} {number}" in self.parts:
+                number += 1
+            return f"{word} {number}"
+        if not isinstance(name, str) or not name or not name.isprintable():
+            raise ValueError(f"name of the {word} must be printable text, got {name!r:.80}")
+        if name in self.parts:
+            raise ValueError(f"name of the {word} must be new: {name!r} is a {_WORDS[type(self.parts[name])]}")
+        if parse_place(name) is not None:
+            raise ValueError(f"name of the {word} must not read like that of a node or edge, got {name!r}")
+        return name
+
+    def find(self, handle: Handle | str, kind: type[P], what: str) -> P:
+        """The part that a handle or a name stands for.
+
+        Raises
+        ------
+        ValueError
+            A handle of another scene, of another kind of part, or an unknown name.
+        """
+        part = self.find_any(handle, what)
+        if not isinstance(part, kind):
+            raise ValueError(f"{what} must be a {_WORDS[kind]}, got the {_WORDS[type(part)]} {part.name!r}")
+        return part
+
+    def find_any(self, handle: Handle | str, what: str) -> Part:
+        """The part of any kind that a handle or a name stands for."""
+        name = self._name(handle, what)
+        if isinstance(handle, NodeHandle | EdgeHandle):
+            raise ValueError(f"{what} must not be a node or an edge, got {name!r}")
+        part = self.parts.get(name)
+        if part is None:
+            known = ", ".join(map(repr, sorted(self.parts)[:12])) or "nothing"
+            raise ValueError(f"{what} {name!r:.80} is not in the scene, which has {known}")
+        return part
+
+    def handle(self, name: str) -> Any:
+        """The handle of the part, node or edge of that name."""
+        if not isinstance(name, str):
+            raise ValueError(f"name must be text, got {type(name).__name__}")
+        part = self.parts.get(name)
+        if part is not None:
+            return handle_of(part, self.scene_id, self.layout)
+        place = parse_place(name)
+        if place is not None and place[1] == "edge":
+            return self.rods[self.rod(place[0]).index].edge(place[2])
+        (index, node), _ = self.node(name, "name")
+        return self.rods[index].node(node)
+
+    def rod(self, handle: Handle | str, what: str = "rod") -> RodPart:
+        """The rod that a handle or a name stands for."""
+        return self.find(handle, RodPart, what)
+
+    def node(self, handle: Handle | str, what: str = "node") -> tuple[Pass, str]:
+        """The node that a handle or a name such as "arm.end" stands for: (rod, node of the rod), its name."""
+        name = self._name(handle, what)
+        if isinstance(handle, NodeHandle):
+            place: tuple[str, str, int] | None = (handle.rod, "node", handle.index)
+        else:
+            place = parse_place(name)
+        if place is None or place[1] != "node" or isinstance(handle, EdgeHandle):
+            raise ValueError(f"{what} must be a node of a rod, such as arm.end or arm.node(3), got {name!r:.80}")
+        rod = self.parts.get(place[0])
+        if not isinstance(rod, RodPart):
+            raise ValueError(f"{what} {name!r:.80} is not in the scene: it has no rod {place[0]!r:.80}")
+        found = Rod(self.scene_id, rod.name, self.layout, rod.index)
+        if isinstance(handle, str) and name.endswith((".start", ".end")):
+            node = found.start if place[2] == 0 else found.end
+        else:
+            node = found.node(place[2])
+        return (rod.index, node.index), node.name
+
+    def row(self, node: Pass) -> int:
+        """The row of a node in the positions of the scene."""
+        return int(self.layout.rows(node[0])[node[1]])
+
+    def _name(self, handle: Handle | str, what: str) -> str:
+        if isinstance(handle, Handle):
+            if handle.scene_id != self.scene_id:
+                raise ValueError(f"{what} {handle.name!r} is a handle of another scene")
+            return handle.name
+        if isinstance(handle, str):
+            return handle
+        raise ValueError(f"{what} must be a handle or a name, got {type(handle).__name__}")

@@ -1,0 +1,299 @@
+"""Handles: names for the parts of a scene, that hold nothing else and so survive copy, pickle and file.
+
+A handle, or its name, is accepted wherever a part is asked for. It belongs to one scene, and serves every
+simulation built from it.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from withe.common import validation
+
+__all__ = [
+    "CustomForce",
+    "Drag",
+    "EdgeHandle",
+    "Fluid",
+    "Handle",
+    "Joint",
+    "Layout",
+    "Load",
+    "Mass",
+    "NodeHandle",
+    "Obstacle",
+    "Rod",
+    "RodPlace",
+    "Support",
+    "parse_place",
+]
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class RodPlace:
+    """What a scene's layout knows of one rod."""
+
+    name: str
+    nodes: int
+    closed: bool
+    radii: FloatArray
+    widths: FloatArray | None
+
+
+class Layout:
+    """Which row of `positions()` each node of each rod has; joined nodes share one."""
+
+    def __init__(self) -> None:
+        self.rods: list[RodPlace] = []
+        self._merges: list[tuple[tuple[int, int], tuple[int, int]]] = []
+        self._rows: list[npt.NDArray[np.int64]] | None = None
+
+    def copy(self) -> Layout:
+        """A layout that no longer changes with this one."""
+        other = Layout()
+        other.rods = list(self.rods)
+        other._merges = list(self._merges)
+        return other
+
+    def add(self, rod: RodPlace) -> int:
+        """Append a rod; returns its index."""
+        self.rods.append(rod)
+        self._rows = None
+        return len(self.rods) - 1
+
+    def merge(self, a: tuple[int, int], b: tuple[int, int]) -> None:
+        """Make two nodes, each (rod, node), one."""
+        self._merges.append((a, b))
+        self._rows = None
+
+    def rows(self, rod: int) -> npt.NDArray[np.int64]:
+        """Rows of the nodes of a rod."""
+        if self._rows is None:
+            self._rows = self._number()
+        return self._rows[rod]
+
+    @property
+    def node_count(self) -> int:
+        """Number of nodes, shared ones counted once."""
+        return max((int(self.rows(i).max()) for i in range(len(self.rods))), default=-1) + 1
+
+    def _number(self) -> list[npt.NDArray[np.int64]]:
+        starts = np.concatenate([[0], np.cumsum([rod.nodes for rod in self.rods])]).astype(int)
+        roots = UnionFind(int(starts[-1]))
+        for (rod_a, a), (rod_b, b) in self._merges:
+            roots.unite(int(starts[rod_a]) + a, int(starts[rod_b]) + b)
+        root = np.array([roots.find(i) for i in range(int(starts[-1]))], dtype=np.int64)
+        # Rows in order of first appearance: a root is the first of its group.
+        is_first = root == np.arange(len(root))
+        row_of_root = np.cumsum(is_first) - 1
+        rows = row_of_root[root]
+        return [rows[starts[i] : starts[i + 1]] for i in range(len(self.rods))]
+
+
+class UnionFind:
+    """Groups of whole numbers; the root of a group is its smallest member."""
+
+    def __init__(self, count: int) -> None:
+        self._parents = list(range(count))
+
+    def find(self, i: int) -> int:
+        """The root of the group of i."""
+        while self._parents[i] != i:
+            self._parents[i] = self._parents[self._parents[i]]
+            i = self._parents[i]
+        return i
+
+    def unite(self, i: int, j: int) -> None:
+        """Make the groups of i and j one."""
+        low, high = sorted((self.find(i), self.find(j)))
+        self._parents[high] = low
+
+
+@dataclass(frozen=True)
+class Handle:
+    """A part of a scene, by name."""
+
+    scene_id: str = field(repr=False)
+    name: str
+
+
+@dataclass(frozen=True)
+class Joint(Handle):
+    """Nodes that `Scene.join` made one."""
+
+
+@dataclass(frozen=True)
+class Support(Handle):
+    """What holds a node: made by `clamp` and `pin`."""
+
+
+@dataclass(frozen=True)
+class Load(Handle):
+    """A force, a moment or a distributed load."""
+
+
+@dataclass(frozen=True)
+class Mass(Handle):
+    """A mass at a node."""
+
+
+@dataclass(frozen=True)
+class Drag(Handle):
+    """Viscous drag on some rods."""
+
+
+@dataclass(frozen=True)
+class Fluid(Handle):
+    """A viscous fluid around all rods."""
+
+
+@dataclass(frozen=True)
+class CustomForce(Handle):
+    """Forces computed by a function of the user's."""
+
+
+@dataclass(frozen=True)
+class Obstacle(Handle):
+    """Something solid that rods touch."""
+
+
+@dataclass(frozen=True)
+class NodeHandle(Handle):
+    """A node of a rod; its name is "arm.start", "arm.end" or "arm.node(3)".
+
+    Attributes
+    ----------
+    rod : str
+        Name of the rod.
+    index : int
+        Zero or more.
+    """
+
+    rod: str = field(repr=False)
+    index: int = field(repr=False)
+
+
+@dataclass(frozen=True)
+class EdgeHandle(Handle):
+    """An edge of a rod, from node `index` to the next; its name is "arm.edge(3)"."""
+
+    rod: str = field(repr=False)
+    index: int = field(repr=False)
+
+
+@dataclass(frozen=True)
+class Rod(Handle):
+    """A rod of a scene, made by `Scene.add_rod`.
+
+    Examples
+    --------
+    >>> import withe
+    >>> scene = withe.Scene()
+    >>> rubber = withe.Material(youngs_modulus=1e6, density=1000.0)
+    >>> arm = scene.add_rod(start=(0, 0, 0), end=(0, 0, -1), nodes=5, radius=0.01, material=rubber, name="arm")
+    >>> arm.node(-1) == arm.end
+    True
+    >>> arm.rows
+    array([0, 1, 2, 3, 4])
+    """
+
+    layout: Layout = field(repr=False, compare=False)
+    index: int = field(repr=False, compare=False)
+
+    @property
+    def _place(self) -> RodPlace:
+        return self.layout.rods[self.index]
+
+    @property
+    def closed(self) -> bool:
+        """Whether the last node is joined to the first by an edge."""
+        return self._place.closed
+
+    @property
+    def nodes(self) -> int:
+        """Number of nodes."""
+        return self._place.nodes
+
+    @property
+    def edges(self) -> int:
+        """Number of edges."""
+        return self.nodes - (0 if self.closed else 1)
+
+    @property
+    def stencils(self) -> int:
+        """Number of nodes at which the rod bends: the inner ones, or all of a closed rod."""
+        return self.nodes - (0 if self.closed else 2)
+
+    @property
+    def rows(self) -> npt.NDArray[np.int64]:
+        """Rows of the rod's nodes in `positions()` of the whole scene, shape (nodes,)."""
+        return self.layout.rows(self.index).copy()
+
+    @property
+    def radii(self) -> FloatArray:
+        """Radius of each edge (half the larger side of a rectangle), shape (edges,) [m]."""
+        return self._place.radii.copy()
+
+    @property
+    def widths(self) -> FloatArray | None:
+        """Sides of a rectangular section along d1 and d2, shape (edges, 2) [m]; None for a round one."""
+        return None if self._place.widths is None else self._place.widths.copy()
+
+    @property
+    def start(self) -> NodeHandle:
+        """The first node of an open rod."""
+        return self._end("start", 0)
+
+    @property
+    def end(self) -> NodeHandle:
+        """The last node of an open rod."""
+        return self._end("end", self.nodes - 1)
+
+    def _end(self, word: str, index: int) -> NodeHandle:
+        if self.closed:
+            raise ValueError(f"rod {self.name!r} is closed and has no {word}: take one of its nodes, node(i)")
+        return self.node(index)
+
+    def node(self, index: int) -> NodeHandle:
+        """A node by its index; negative ones count from the end.
+
+        Raises
+        ------
+        ValueError
+            An index out of range.
+        """
+        i = validation.integer(index, f"node of rod {self.name!r}", -self.nodes, self.nodes - 1) % self.nodes
+        word = f"node({i})"
+        if not self.closed:
+            word = {0: "start", self.nodes - 1: "end"}.get(i, word)
+        return NodeHandle(self.scene_id, f"{self.name}.{word}", self.name, i)
+
+    def edge(self, index: int) -> EdgeHandle:
+        """An edge by its index; negative ones count from the end.
+
+        Raises
+        ------
+        ValueError
+            An index out of range.
+        """
+        i = validation.integer(index, f"edge of rod {self.name!r}", -self.edges, self.edges - 1) % self.edges
+        return EdgeHandle(self.scene_id, f"{self.name}.edge({i})", self.name, i)
+
+
+_PLACE = re.compile(r"(?P<rod>.+)\.(?:(?P<end>start|end)|(?P<kind>node|edge)\((?P<index>-?\d{1,9})\))")
+
+
+def parse_place(name: str) -> tuple[str, str, int] | None:
+    """Split the name of a node or edge into rod, "node" or "edge", and index; None if it is no such name."""
+    match = _PLACE.fullmatch(name)
+    if match is None:
+        return None
+    if match["end"]:
+        return match["rod"], "node", 0 if match["end"] == "start" else -1
+    return match["rod"], match["kind"], int(match["index"])

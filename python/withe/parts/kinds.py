@@ -1,0 +1,231 @@
+"""What a scene remembers of everything that was added to it: values, never changed in place."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal, get_args
+
+import numpy as np
+import numpy.typing as npt
+
+from withe.common.drawing import voronoi_lengths
+from withe.parts.handles import CustomForce, Drag, Fluid, Handle, Joint, Layout, Load, Mass, Obstacle, Rod, Support
+from withe.parts.parameters import RodParameters
+from withe.parts.sections import SectionProperties
+
+__all__ = [
+    "LOAD_KINDS",
+    "SUPPORT_KINDS",
+    "ContactModel",
+    "ContactSettings",
+    "CustomForcePart",
+    "DragPart",
+    "FluidModel",
+    "FluidPart",
+    "FrictionModel",
+    "JoinPart",
+    "LoadPart",
+    "MassPart",
+    "ObstaclePart",
+    "Overlap",
+    "PairSettings",
+    "Part",
+    "Pass",
+    "RodPart",
+    "SupportPart",
+    "handle_of",
+]
+
+FloatArray = npt.NDArray[np.float64]
+Pass = tuple[int, int]  # rod, node of the rod
+JoinKind = Literal["rigid", "pinned", "revolute"]
+JointForm = Literal["frame", "pairs"]
+ContactModel = Literal["imcv2", "barrier", "imcv1", "spillmann_teschner"]
+FrictionModel = Literal["implicit", "lagged", "anchored", "semi_explicit"]
+Overlap = Literal["error", "separate"]
+FluidModel = Literal["stokeslets", "resistive"]
+LoadKind = Literal["force", "moment", "load", "pressure"]
+SupportKind = Literal["pin", "clamp", "hold_edge", "spinning_clamp", "spinning_edge"]
+LOAD_KINDS: tuple[str, ...] = get_args(LoadKind)
+SUPPORT_KINDS: tuple[str, ...] = get_args(SupportKind)
+
+
+@dataclass(frozen=True, eq=False)
+class RodPart:
+    """A rod as it was drawn."""
+
+    name: str
+    index: int
+    closed: bool
+    points: FloatArray  # (nodes, 3) [m]
+    tangents: FloatArray  # (edges, 3)
+    directors: FloatArray  # first directors, (edges, 3)
+    lengths: FloatArray  # (edges,) [m]
+    arcs: FloatArray  # of the curve that they are chords of, (edges,) [m]
+    voronoi: FloatArray  # (stencils,) [m]
+    section: SectionProperties
+    parameters: RodParameters
+    natural_curvature: FloatArray  # (stencils, 2) [1/m]
+    natural_twist: FloatArray  # (stencils,) [rad/m]
+
+    @property
+    def owner(self) -> str:
+        """How errors call it."""
+        return f"rod {self.name!r}"
+
+    def without_arcs(self) -> RodPart:
+        """The same shape, made of its edges instead of the arcs over them."""
+        voronoi = voronoi_lengths(self.lengths, self.closed)
+        longer = self.voronoi / voronoi
+        return replace(
+            self,
+            arcs=self.lengths,
+            voronoi=voronoi,
+            natural_curvature=self.natural_curvature * longer[:, None],
+            natural_twist=self.natural_twist * longer,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class JoinPart:
+    """Two nodes that are one."""
+
+    name: str
+    nodes: tuple[Pass, Pass]
+    node_names: tuple[str, str]
+    kind: JoinKind
+    axis: FloatArray | None
+    form: JointForm
+
+
+@dataclass(frozen=True, eq=False)
+class SupportPart:
+    """What holds a node."""
+
+    name: str
+    kind: SupportKind
+    node: Pass
+    node_name: str
+    free: FloatArray  # projector onto the directions along which the node may slide, (3, 3)
+
+
+@dataclass(frozen=True, eq=False)
+class LoadPart:
+    """A force at a node, a moment at a node, a load along a rod, or a pressure on it."""
+
+    name: str
+    kind: LoadKind
+    node: Pass
+    value: FloatArray  # (3,), the value at t = 0 of one that varies
+    function: Callable[[float], npt.ArrayLike] | None
+    follower: bool
+    axis: FloatArray | None = None  # of a pressure: unit normal that its value is along
+
+
+@dataclass(frozen=True, eq=False)
+class MassPart:
+    """A mass at a node."""
+
+    name: str
+    node: Pass
+    mass: float
+
+
+@dataclass(frozen=True, eq=False)
+class DragPart:
+    """Viscous drag along rods; None: all of them."""
+
+    name: str
+    coefficient: float
+    rods: tuple[int, ...] | None
+
+
+@dataclass(frozen=True, eq=False)
+class FluidPart:
+    """A viscous fluid around all rods."""
+
+    name: str
+    model: FluidModel
+    viscosity: float  # [Pa s]
+    regularization: float | None  # [m]
+    wavelength: float | None  # [m]
+
+
+@dataclass(frozen=True, eq=False)
+class CustomForcePart:
+    """Forces that a function computes."""
+
+    name: str
+    function: Callable[[float, FloatArray, FloatArray], Any]
+    jacobian: Callable[[float, FloatArray, FloatArray], Any] | None = None
+    moments: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class ObstaclePart:
+    """Something solid, as it was drawn."""
+
+    name: str
+    kind: Literal["plane", "capsule"]
+    point: FloatArray  # on the plane; start of the axis (3,) [m]
+    other: FloatArray  # normal; end of the axis (3,)
+    radius: float
+    friction: tuple[float, float]  # along and across rods
+    restitution: float
+
+    @property
+    def axis(self) -> FloatArray | None:
+        """What it may turn about: normal or axis; None of a sphere, which may turn about any."""
+        axis = self.other if self.kind == "plane" else self.other - self.point
+        length = float(np.linalg.norm(axis))
+        return axis / length if length > 0.0 else None
+
+
+@dataclass(frozen=True)
+class PairSettings:
+    """What two bodies have of their own; None: what the scene has."""
+
+    ignored: bool = False
+    friction: tuple[float, float] | None = None  # along and across a rod
+    restitution: float | None = None
+    stiffness: float | None = None  # [N/m]
+
+
+@dataclass(frozen=True, eq=False)
+class ContactSettings:
+    """Whether rods touch, and how."""
+
+    rods: bool = False
+    friction: float = 0.0
+    restitution: float = 1.0
+    model: ContactModel = "imcv2"
+    friction_model: FrictionModel = "anchored"
+    distance_tolerance: float | None = None
+    slip_tolerance: float = 1e-3
+    stiffness: float | Literal["source"] | None = None
+    centreline_friction: bool = False
+    overlap: Overlap = "error"
+    pairs: Mapping[tuple[str, str], PairSettings] = field(default_factory=dict)
+    groups: Mapping[str, str] = field(default_factory=dict)  # of rods
+
+
+Part = RodPart | JoinPart | SupportPart | LoadPart | MassPart | DragPart | FluidPart | CustomForcePart | ObstaclePart
+
+_HANDLES: dict[type[Any], type[Handle]] = {
+    JoinPart: Joint,
+    SupportPart: Support,
+    LoadPart: Load,
+    MassPart: Mass,
+    DragPart: Drag,
+    FluidPart: Fluid,
+    CustomForcePart: CustomForce,
+    ObstaclePart: Obstacle,
+}
+
+
+def handle_of(part: Part, scene_id: str, layout: Layout) -> Handle:
+    """The handle of a part."""
+    if isinstance(part, RodPart):
+        return Rod(scene_id, part.name, layout, part.index)
+    return _HANDLES[type(part)](scene_id, part.name)

@@ -1,0 +1,185 @@
+"""The numbers of a rod that may change while a simulation runs, by the words of `set` and `get`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from withe.common import validation
+from withe.parts.materials import Material, Stiffness, bend_stiffness, check_poisson_ratio
+from withe.parts.sections import SectionProperties
+
+__all__ = ["MATERIAL_WORDS", "ROD_WORDS", "RodParameters"]
+
+FloatArray = npt.NDArray[np.float64]
+
+MATERIAL_WORDS = ("youngs_modulus", "poisson_ratio", "density", "viscosity")
+ROD_WORDS = (
+    *MATERIAL_WORDS,
+    "stretch_stiffness",
+    "bend_stiffness",
+    "twist_stiffness",
+    "line_density",
+    "viscous_time",
+    "drag",
+)
+
+
+@dataclass(frozen=True)
+class RodParameters:
+    """Stiffness, inertia and damping of a rod.
+
+    The first group is what a user gave: a number, or an array of shape (edges,), and None where the rod
+    has its stiffness given directly. The second is what the engine works with, arrays of shape (edges,).
+    """
+
+    youngs_modulus: float | FloatArray | None  # [Pa]
+    poisson_ratio: float | None
+    density: float | FloatArray | None  # [kg/m^3]
+    viscosity: float | FloatArray | None  # [Pa s]
+
+    stretch_stiffness: FloatArray  # [N]
+    bend_stiffness: FloatArray  # (edges, 2) [N m^2]
+    twist_stiffness: FloatArray  # [N m^2]
+    line_density: FloatArray  # [kg/m]
+    rotary_inertia: FloatArray  # [kg m]
+    viscous_time: FloatArray  # [s]
+    drag: FloatArray  # [Pa s]
+
+    @classmethod
+    def from_material(cls, material: Material, section: SectionProperties, owner: str) -> RodParameters:
+        """Parameters of a rod of one material."""
+        edges = len(section.area)
+        zero = np.zeros(edges)
+        empty = cls(None, material.poisson_ratio, None, None, zero, np.zeros((edges, 2)), zero, zero, zero, zero, zero)
+        values = {word: getattr(material, word) for word in ("youngs_modulus", "density", "viscosity")}
+        return empty._derived(values, section)._checked(owner)
+
+    @classmethod
+    def from_stiffness(
+        cls, stiffness: Stiffness, line_density: npt.ArrayLike, section: SectionProperties, owner: str
+    ) -> RodParameters:
+        """Parameters of a rod whose stiffness is given directly."""
+        edges = len(section.area)
+        density = validation.per_item(line_density, f"line_density of {owner}", edges, "edges")
+        return cls(
+            youngs_modulus=None,
+            poisson_ratio=None,
+            density=None,
+            viscosity=None,
+            stretch_stiffness=validation.per_item(stiffness.stretch, f"stretch stiffness of {owner}", edges, "edges"),
+            bend_stiffness=bend_stiffness(stiffness.bend, f"bend stiffness of {owner}", edges),
+            twist_stiffness=validation.per_item(stiffness.twist, f"twist stiffness of {owner}", edges, "edges"),
+            line_density=density,
+            rotary_inertia=_rotary_inertia(density, section),
+            viscous_time=validation.per_item(
+                stiffness.viscous_time, f"viscous_time of {owner}", edges, "edges", zero=True
+            ),
+            drag=np.zeros(edges),
+        )._checked(owner)
+
+    def changed(self, word: str, value: Any, section: SectionProperties, owner: str) -> RodParameters:
+        """A copy with one word changed, and all that follows from it.
+
+        Raises
+        ------
+        ValueError
+            An unknown word, a word of a material for a rod that has none, or a value out of range.
+        """
+        if word not in ROD_WORDS:
+            raise ValueError(f"a rod has no {word!r}; its words are {', '.join(ROD_WORDS)}")
+        edges = len(section.area)
+        what = f"{word} of {owner}"
+        if word in MATERIAL_WORDS and self.youngs_modulus is None:
+            raise ValueError(f"{what} cannot be set: its stiffness was given directly, without a material")
+        if word == "poisson_ratio":
+            return replace(self, poisson_ratio=check_poisson_ratio(value, what))._derived({}, section)._checked(owner)
+        if word == "bend_stiffness":
+            return replace(self, bend_stiffness=bend_stiffness(value, what, edges))._checked(owner)
+        zero = word in ("viscosity", "viscous_time", "drag")
+        array = validation.per_item(value, what, edges, "edges", zero=zero)
+        if word in MATERIAL_WORDS:
+            given = float(array[0]) if validation.is_scalar(value) else array
+            return self._derived({word: given}, section)._checked(owner)
+        if word == "line_density":
+            changed = replace(self, line_density=array, rotary_inertia=_rotary_inertia(array, section))
+            return changed._checked(owner)
+        values: dict[str, Any] = {word: array}
+        return replace(self, **values)._checked(owner)
+
+    def get(self, word: str) -> Any:
+        """The present value of a word: a copy."""
+        value = getattr(self, word)
+        return value.copy() if isinstance(value, np.ndarray) else value
+
+    def arrays(self) -> dict[str, FloatArray]:
+        """Everything as arrays, for a file."""
+        values = {field.name: getattr(self, field.name) for field in fields(self)}
+        return {name: np.asarray(value, np.float64) for name, value in values.items() if value is not None}
+
+    @classmethod
+    def from_arrays(cls, arrays: Mapping[str, FloatArray], edges: int, owner: str) -> RodParameters:
+        """What `arrays` gave.
+
+        Raises
+        ------
+        ValueError
+            Something is missing, not finite or of another shape.
+        """
+        values: dict[str, Any] = {}
+        for word in (*MATERIAL_WORDS, *(field.name for field in fields(cls)[4:])):
+            if word in MATERIAL_WORDS and word not in arrays:
+                values[word] = None
+                continue
+            shapes: list[tuple[int | str, ...]] = [(edges, 2) if word == "bend_stiffness" else (edges,)]
+            if word in MATERIAL_WORDS:
+                shapes.append(())
+            array = validation.number_array(arrays.get(word), f"{word} of {owner}", *shapes)
+            values[word] = float(array) if array.ndim == 0 else array
+        return cls(**values)._checked(owner)
+
+    def equals(self, other: RodParameters) -> bool:
+        """Whether every number is the same."""
+        mine, theirs = self.arrays(), other.arrays()
+        return mine.keys() == theirs.keys() and all(np.array_equal(mine[name], theirs[name]) for name in mine)
+
+    def _derived(self, given: dict[str, Any], section: SectionProperties) -> RodParameters:
+        """With stiffness and inertia from the material, for the words that changed."""
+        known = replace(self, **given)
+        assert known.youngs_modulus is not None
+        assert known.poisson_ratio is not None
+        ones = np.ones(len(section.area))
+        values: dict[str, Any] = dict(given)
+        with np.errstate(over="ignore", invalid="ignore"):
+            if "density" in given and known.density is not None:
+                values["line_density"] = known.density * section.area
+                values["rotary_inertia"] = known.density * (section.moment1 + section.moment2)
+            modulus = known.youngs_modulus * ones
+            if "youngs_modulus" in given:
+                values["stretch_stiffness"] = modulus * section.area
+                values["bend_stiffness"] = np.stack([modulus * section.moment1, modulus * section.moment2], axis=1)
+            if "youngs_modulus" in given or not given:
+                values["twist_stiffness"] = modulus / (2.0 * (1.0 + known.poisson_ratio)) * section.torsion
+            if known.viscosity is not None and ("viscosity" in given or "youngs_modulus" in given):
+                values["viscous_time"] = known.viscosity * ones / known.youngs_modulus
+        return replace(self, **values)
+
+    def _checked(self, owner: str) -> RodParameters:
+        """Itself, if nothing over- or underflowed on the way."""
+        for word in ("stretch_stiffness", "bend_stiffness", "twist_stiffness", "line_density"):
+            values = getattr(self, word)
+            if not (np.isfinite(values).all() and (values > 0.0).all()):
+                raise ValueError(f"{word} of {owner} must be positive and finite, got {values.flat[0]:g}")
+        for word in ("rotary_inertia", "viscous_time", "drag"):
+            values = getattr(self, word)
+            if not (np.isfinite(values).all() and (values >= 0.0).all()):
+                raise ValueError(f"{word} of {owner} must be finite and not negative, got {values.flat[0]:g}")
+        return self
+
+
+def _rotary_inertia(line_density: FloatArray, section: SectionProperties) -> FloatArray:
+    return np.asarray(line_density * (section.moment1 + section.moment2) / section.area, np.float64)

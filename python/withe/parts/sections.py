@@ -1,0 +1,129 @@
+"""Cross-sections of rods: area, moments of area, torsion constant."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from withe.common import validation
+
+__all__ = ["Circle", "Rectangle", "Section", "SectionProperties", "Tube"]
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class SectionProperties:
+    """What the equations of a rod need of its section, every one an array of shape (edges,).
+
+    Attributes
+    ----------
+    area [m^2]
+    moment1, moment2 [m^4]
+        Second moments of area that resist curvature towards d1 and d2.
+    torsion [m^4]
+        Torsion constant J.
+    radii [m]
+        Radius of a round section, half the larger side of another.
+    widths : shape (edges, 2) [m], or None
+        Sides along d1 and d2; None for a round section.
+    """
+
+    area: FloatArray
+    moment1: FloatArray
+    moment2: FloatArray
+    torsion: FloatArray
+    radii: FloatArray
+    widths: FloatArray | None = None
+
+
+@dataclass(frozen=True)
+class Circle:
+    """A full circle.
+
+    Parameters
+    ----------
+    radius : float or array_like of shape (edges,) [m]
+    """
+
+    radius: npt.ArrayLike
+
+    def properties(self, edges: int, owner: str) -> SectionProperties:
+        """The section of every edge of a rod; `owner`, such as "rod 'arm'", is named in errors."""
+        r = validation.per_item(self.radius, f"radius of {owner}", edges, "edges")
+        moment = 0.25 * math.pi * r**4
+        return SectionProperties(math.pi * r**2, moment, moment.copy(), 2.0 * moment, r)
+
+
+@dataclass(frozen=True)
+class Tube:
+    """A circle with a round hole in its middle.
+
+    Parameters
+    ----------
+    outer_radius, inner_radius : float or array_like of shape (edges,) [m]
+    """
+
+    outer_radius: npt.ArrayLike
+    inner_radius: npt.ArrayLike
+
+    def properties(self, edges: int, owner: str) -> SectionProperties:
+        """The section of every edge of a rod; `owner`, such as "rod 'arm'", is named in errors."""
+        outer = validation.per_item(self.outer_radius, f"outer_radius of {owner}", edges, "edges")
+        inner = validation.per_item(self.inner_radius, f"inner_radius of {owner}", edges, "edges", zero=True)
+        if np.any(inner >= outer):
+            place = int(np.flatnonzero(inner >= outer)[0])
+            raise ValueError(
+                f"inner_radius of {owner} must be below its outer_radius {outer[place]:g}, got {inner[place]:g}"
+            )
+        moment = 0.25 * math.pi * (outer**4 - inner**4)
+        return SectionProperties(math.pi * (outer**2 - inner**2), moment, moment.copy(), 2.0 * moment, outer)
+
+
+@dataclass(frozen=True)
+class Rectangle:
+    """A full rectangle, with its width along the first director and its height along the second.
+
+    Parameters
+    ----------
+    width, height : float or array_like of shape (edges,) [m]
+    """
+
+    width: npt.ArrayLike
+    height: npt.ArrayLike
+
+    def properties(self, edges: int, owner: str) -> SectionProperties:
+        """The section of every edge of a rod; `owner`, such as "rod 'arm'", is named in errors."""
+        width = validation.per_item(self.width, f"width of {owner}", edges, "edges")
+        height = validation.per_item(self.height, f"height of {owner}", edges, "edges")
+        return SectionProperties(
+            area=width * height,
+            moment1=height * width**3 / 12.0,
+            moment2=width * height**3 / 12.0,
+            torsion=_rectangle_torsion(np.maximum(width, height), np.minimum(width, height)),
+            radii=0.5 * np.maximum(width, height),
+            widths=np.stack([width, height], axis=1),
+        )
+
+
+Section = Circle | Tube | Rectangle
+
+
+def _rectangle_torsion(long: FloatArray, short: FloatArray) -> FloatArray:
+    """J = a b^3 [1/3 - (64/pi^5) (b/a) sum over odd n of tanh(n pi a / 2b) / n^5], a >= b (Saint-Venant)."""
+    n = np.arange(1, 80, 2, dtype=float)[:, None]
+    series = np.sum(np.tanh(0.5 * n * math.pi * long / short) / n**5, axis=0)
+    torsion: FloatArray = long * short**3 * (1.0 / 3.0 - 64.0 / math.pi**5 * (short / long) * series)
+    return torsion
+
+
+def check_section(section: object, owner: str) -> Section:
+    """One of the sections above."""
+    if not isinstance(section, Section):
+        raise ValueError(
+            f"section of {owner} must be a withe.Circle, withe.Tube or withe.Rectangle, got {type(section).__name__}"
+        )
+    return section

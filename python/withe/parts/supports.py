@@ -1,0 +1,89 @@
+"""Turns what a user says about a support into a `SupportPart`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from withe.common import validation
+from withe.parts.directory import Directory
+from withe.parts.handles import NodeHandle
+from withe.parts.kinds import SupportKind, SupportPart
+
+__all__ = ["check_not_held", "held_rows", "make_clamp", "make_pin"]
+
+FloatArray = npt.NDArray[np.float64]
+
+
+def make_clamp(
+    directory: Directory,
+    node: NodeHandle | str,
+    hold: Literal["frame", "edge"],
+    free: npt.ArrayLike | None,
+    spin: bool,
+    name: str | None,
+) -> SupportPart:
+    """A clamp, checked; not yet in the directory."""
+    name = directory.new_name(name, "clamp")
+    place, node_name = directory.node(node, "node to clamp")
+    validation.choice(hold, "hold of the clamp", ("frame", "edge"))
+    kinds: dict[tuple[str, bool], SupportKind] = {
+        ("frame", False): "clamp",
+        ("frame", True): "spinning_clamp",
+        ("edge", False): "hold_edge",
+        ("edge", True): "spinning_edge",
+    }
+    kind = kinds[hold, validation.truth(spin, "spin of the clamp")]
+    return SupportPart(name, kind, place, node_name, _projector(free, "free of the clamp"))
+
+
+def make_pin(directory: Directory, node: NodeHandle | str, free: npt.ArrayLike | None, name: str | None) -> SupportPart:
+    """A pin, checked; not yet in the directory."""
+    name = directory.new_name(name, "pin")
+    place, node_name = directory.node(node, "node to pin")
+    return SupportPart(name, "pin", place, node_name, _projector(free, "free of the pin"))
+
+
+def check_not_held(directory: Directory, part: SupportPart, others: Iterable[SupportPart]) -> None:
+    """Refuse a second support of one node.
+
+    Raises
+    ------
+    ValueError
+        A node that it would hold, or one that is joined to it, is held by one of the others.
+    """
+    held = held_rows(directory, part)
+    for other in others:
+        if directory.row(other.node) == directory.row(part.node):
+            raise ValueError(f"node {part.node_name!r} is already held by {other.name!r}: release that first")
+        if not held.isdisjoint(held_rows(directory, other)):
+            raise ValueError(
+                f"{part.name!r} at {part.node_name!r} would hold a node that {other.name!r} at {other.node_name!r} "
+                "holds: hold='edge' takes both nodes of an edge"
+            )
+
+
+def held_rows(directory: Directory, part: SupportPart) -> set[int]:
+    """Rows of the nodes that a support holds: with hold="edge" also that at the other end of the edge."""
+    index, node = part.node
+    held = {directory.row(part.node)}
+    if part.kind in ("hold_edge", "spinning_edge"):
+        rod = directory.layout.rods[index]
+        beyond = node + 1 if node + 1 < rod.nodes or rod.closed else node - 1
+        held.add(directory.row((index, beyond % rod.nodes)))
+    return held
+
+
+def _projector(free: npt.ArrayLike | None, what: str) -> FloatArray:
+    """Projector onto the span of one or two directions."""
+    if free is None:
+        return np.zeros((3, 3))
+    directions = validation.number_array(free, what, (3,), (1, 3), (2, 3)).reshape(-1, 3)
+    units = np.array([validation.unit_vector(row, what) for row in directions])
+    u, sizes, _ = np.linalg.svd(units.T, full_matrices=False)
+    if sizes.min() < 1e-6:
+        raise ValueError(f"{what} must be directions that differ")
+    return np.asarray(u @ u.T, np.float64)

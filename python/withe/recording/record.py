@@ -1,0 +1,336 @@
+"""What a run leaves behind: the read-outs of a simulation, frame by frame.
+
+A `Record` answers to the same read-outs as a `Simulation`, with one more axis in front: the frames. It
+holds NumPy arrays only, so it pickles, saves to one file, and needs no engine to be looked at.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from withe import io, view
+from withe.common.frames import ENERGIES, EnergyHistory
+from withe.common.outlines import Named, ObstacleOutline, RodOutline, index_of
+
+__all__ = ["ROD_READOUTS", "EnergyHistory", "Record"]
+
+FloatArray = npt.NDArray[np.float64]
+
+_FILE_VERSION = 1
+_UNITS = {
+    "times": "s",
+    "positions": "m",
+    "velocities": "m/s",
+    "directors": "1",
+    "curvatures": "1/m",
+    "twists": "rad/m",
+    "tensions": "N",
+    "spins": "rad/s",
+    "energy": "J",
+    "radii": "m",
+}
+ROD_READOUTS = ("directors", "curvatures", "twists", "tensions", "spins")
+
+
+class Record:
+    """The frames of a run. Made by `Simulation.run`, or read with `Record.load`.
+
+    Every read-out is a copy, and its first axis is the frame. A rod is named by its handle or its name.
+
+    Examples
+    --------
+    >>> record = simulation.run(duration=2.0, record_every=0.02)
+    >>> tip = record.positions("arm")[:, -1]
+    >>> tip.shape
+    (101, 3)
+    """
+
+    def __init__(
+        self,
+        rods: Iterable[RodOutline],
+        arrays: Mapping[str, npt.NDArray[Any]],
+        extras: Iterable[str] = (),
+        obstacles: Iterable[ObstacleOutline] = (),
+    ) -> None:
+        self._rods = tuple(rods)
+        self._obstacles = tuple(obstacles)
+        self._arrays = dict(arrays)
+        self._extras = tuple(extras)
+        self._check()
+
+    def _check(self) -> None:
+        """Refuse arrays that do not fit together."""
+        frames = len(self._array("times", ()))
+        positions = self._array("positions", (frames, None, 3))
+        nodes = positions.shape[1]
+        self._array("velocities", (frames, nodes, 3))
+        for index, rod in enumerate(self._rods):
+            if rod.rows.ndim != 1 or rod.rows.dtype.kind != "i" or len(rod.rows) < 2:
+                raise ValueError(f"rows of rod {rod.name!r} must be two or more integers")
+            if rod.rows.min() < 0 or rod.rows.max() >= nodes:
+                raise ValueError(f"rows of rod {rod.name!r} must lie in 0..{nodes - 1}")
+            for name, values, shape in (
+                ("radii", rod.radii, (rod.edges,)),
+                ("widths", rod.widths, (rod.edges, 2)),
+            ):
+                if values is not None and (values.shape != shape or values.dtype.kind != "f"):
+                    raise ValueError(
+                        f"{name} of rod {rod.name!r} must be floats of shape {shape}, "
+                        f"got {values.dtype} of shape {values.shape}"
+                    )
+            self._array(f"rod_{index}_directors", (frames, rod.edges, 3, 3))
+            self._array(f"rod_{index}_curvatures", (frames, rod.stencils, 2))
+            self._array(f"rod_{index}_twists", (frames, rod.stencils))
+            self._array(f"rod_{index}_tensions", (frames, rod.edges))
+            if f"rod_{index}_spins" in self._arrays:  # which files had none of at first
+                self._array(f"rod_{index}_spins", (frames, rod.edges))
+        for index, obstacle in enumerate(self._obstacles):
+            self._array(f"obstacle_{index}_place", (frames, 3))
+            if obstacle.kind not in ("plane", "capsule") or obstacle.axis.shape != (3,) or not obstacle.radius >= 0.0:
+                raise ValueError(f"obstacle {obstacle.name!r} must be a plane or a capsule with an axis and a radius")
+        for name in ENERGIES:
+            self._array(f"energy_{name}", (frames,))
+        for index, name in enumerate(self._extras):
+            values = self._arrays.get(f"extra_{index}")
+            if values is None or values.shape[:1] != (frames,):
+                raise ValueError(f"record[{name!r}] must have one row for each of {frames} frames")
+
+    def _array(self, name: str, shape: tuple[int | None, ...]) -> npt.NDArray[Any]:
+        values = self._arrays.get(name)
+        if values is None:
+            raise ValueError(f"array {name!r} is missing")
+        if (shape and len(shape) != values.ndim) or (not shape and values.ndim != 1):
+            raise ValueError(f"array {name!r} has shape {values.shape}")
+        if any(want not in (None, got) for want, got in zip(shape, values.shape, strict=False)):
+            raise ValueError(f"array {name!r} must have shape {shape}, got {values.shape}")
+        if values.dtype != np.float64:
+            raise ValueError(f"array {name!r} must hold floats, got {values.dtype}")
+        return values
+
+    # Read-outs
+
+    @property
+    def times(self) -> FloatArray:
+        """Times of the frames, shape (frames,) [s]."""
+        return self._arrays["times"].copy()
+
+    @property
+    def rods(self) -> tuple[RodOutline, ...]:
+        """The rods, in the order of the scene."""
+        return self._rods
+
+    @property
+    def obstacles(self) -> tuple[ObstacleOutline, ...]:
+        """Planes, spheres and capsules, in the order of the scene."""
+        return self._obstacles
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Units of the read-outs, by name."""
+        return dict(_UNITS)
+
+    def __len__(self) -> int:
+        """Number of frames."""
+        return len(self._arrays["times"])
+
+    def positions(self, rod: Named | None = None) -> FloatArray:
+        """Positions of the nodes of a rod, or of every node of the scene once.
+
+        Returns
+        -------
+        ndarray of shape (frames, nodes, 3) [m]
+
+        Raises
+        ------
+        ValueError
+            No rod of that name.
+        """
+        return self._nodal("positions", rod)
+
+    def obstacle_position(self, obstacle: Named) -> FloatArray:
+        """Positions of an obstacle: of the point of a plane, a sphere's centre, a capsule's start, (frames, 3) [m].
+
+        Raises
+        ------
+        ValueError
+            No obstacle of that name.
+        """
+        index = index_of(self._obstacles, obstacle, "obstacle")
+        return self._arrays[f"obstacle_{index}_place"].copy()
+
+    def velocities(self, rod: Named | None = None) -> FloatArray:
+        """Velocities of the nodes of a rod, or of every node once, (frames, nodes, 3) [m/s]."""
+        return self._nodal("velocities", rod)
+
+    def directors(self, rod: Named) -> FloatArray:
+        """Material frames of the edges, (frames, edges, 3, 3), rows d1, d2, tangent."""
+        return self._of_rod("directors", rod)
+
+    def curvatures(self, rod: Named) -> FloatArray:
+        """Curvatures towards d1 and d2, shape (frames, stencils, 2) [1/m]."""
+        return self._of_rod("curvatures", rod)
+
+    def twists(self, rod: Named) -> FloatArray:
+        """Twists, shape (frames, stencils) [rad/m]."""
+        return self._of_rod("twists", rod)
+
+    def tensions(self, rod: Named) -> FloatArray:
+        """Axial forces of the edges, shape (frames, edges) [N]."""
+        return self._of_rod("tensions", rod)
+
+    def spins(self, rod: Named) -> FloatArray:
+        """Angular velocities of the edges about their tangents, shape (frames, edges) [rad/s].
+
+        Raises
+        ------
+        ValueError
+            A record from a file that was written before spins were recorded.
+        """
+        if f"rod_{self._index(rod)}_spins" not in self._arrays:
+            raise ValueError("record holds no spins: its file was written before they were recorded")
+        return self._of_rod("spins", rod)
+
+    def energy(self) -> EnergyHistory:
+        """Energies, every one an array of shape (frames,) [J]."""
+        return EnergyHistory(*(self._arrays[f"energy_{name}"].copy() for name in ENERGIES))
+
+    def keys(self) -> tuple[str, ...]:
+        """Names of what was recorded besides the read-outs."""
+        return self._extras
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._extras)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._extras
+
+    def __getitem__(self, name: str) -> npt.NDArray[Any]:
+        """What `run(record={name: ...})` returned, one row a frame.
+
+        Raises
+        ------
+        KeyError
+            Nothing was recorded under that name.
+        """
+        if name not in self._extras:
+            known = ", ".join(map(repr, self._extras)) or "nothing"
+            raise KeyError(f"nothing was recorded as {name!r}; known: {known}")
+        return self._arrays[f"extra_{self._extras.index(name)}"].copy()
+
+    def _nodal(self, name: str, rod: Named | None) -> FloatArray:
+        values = self._arrays[name]
+        return values.copy() if rod is None else values[:, self._rods[self._index(rod)].rows]
+
+    def _of_rod(self, name: str, rod: Named) -> FloatArray:
+        return self._arrays[f"rod_{self._index(rod)}_{name}"].copy()
+
+    def _index(self, rod: Named) -> int:
+        return index_of(self._rods, rod, "rod")
+
+    def __repr__(self) -> str:
+        rods = ", ".join(rod.name for rod in self._rods)
+        if len(self) == 0:
+            return f"Record(no frames; rods {rods})"
+        first, last = self._arrays["times"][[0, -1]]
+        return f"Record({len(self)} frames, {first:g}..{last:g} s; rods {rods})"
+
+    # Files
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write the record to one .npz file that NumPy alone can read.
+
+        Raises
+        ------
+        OSError
+            The file cannot be written.
+        """
+        header = {
+            "units": _UNITS,
+            "rods": [{"name": rod.name, "closed": rod.closed} for rod in self._rods],
+            "extras": list(self._extras),
+            "obstacles": [
+                {"name": each.name, "kind": each.kind, "axis": each.axis.tolist(), "radius": each.radius}
+                for each in self._obstacles
+            ],
+        }
+        arrays = dict(self._arrays)
+        for index, rod in enumerate(self._rods):
+            arrays[f"rod_{index}_rows"] = rod.rows
+            arrays[f"rod_{index}_radii"] = rod.radii
+            if rod.widths is not None:
+                arrays[f"rod_{index}_widths"] = rod.widths
+        return io.save_arrays(path, "record", _FILE_VERSION, header, arrays)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Record:
+        """Read a record that `save` wrote.
+
+        Raises
+        ------
+        ValueError
+            A file that is damaged, not a record, or of another version.
+        OSError
+            The file cannot be opened.
+        """
+        header, arrays = io.load_arrays(path, "record", _FILE_VERSION)
+        try:
+            rods = [
+                RodOutline(
+                    name=str(rod["name"]),
+                    rows=arrays.pop(f"rod_{index}_rows"),
+                    closed=bool(rod["closed"]),
+                    radii=arrays.pop(f"rod_{index}_radii"),
+                    widths=arrays.pop(f"rod_{index}_widths", None),
+                )
+                for index, rod in enumerate(header["rods"])
+            ]
+            obstacles = [
+                ObstacleOutline(str(o["name"]), str(o["kind"]), np.array(o["axis"], float), float(o["radius"]))
+                for o in header.get("obstacles", [])  # which files had none of at first
+            ]
+            return cls(rods, arrays, [str(name) for name in header["extras"]], obstacles)
+        except (KeyError, TypeError, ValueError) as error:
+            raise ValueError(f"{path} is a damaged record: {error}") from error
+
+    def to_vtk(self, folder: str | os.PathLike[str]) -> Path:
+        """Write the frames for ParaView; open the .pvd file whose path is returned.
+
+        See `withe.io.write_vtk` for what the files hold.
+        """
+        return io.write_vtk(self, folder)
+
+    # Pictures
+
+    def plot(self, **options: Any) -> Any:
+        """Shapes at several times and energies over time, as a matplotlib figure.
+
+        See `withe.view.plot` for the options.
+        """
+        return view.plot(self, **options)
+
+    def view(self, **options: Any) -> Any:
+        """Turn the rods about and slide through time, in a notebook or a window.
+
+        See `withe.view.view` for the options.
+        """
+        return view.view(self, **options)
+
+    def animate(self, path: str | os.PathLike[str], **options: Any) -> Path:
+        """Render the rods as tubes into a film, .mp4 or .gif.
+
+        See `withe.view.animate` for the options.
+        """
+        return view.animate(self, path, **options)
+
+    def picture(self, path: str | os.PathLike[str], **options: Any) -> Path:
+        """Render one frame, the last one unless `frame=` says otherwise, into a .png file.
+
+        See `withe.view.picture` for the options.
+        """
+        return view.picture(self, path, **options)

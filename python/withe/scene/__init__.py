@@ -1,0 +1,5 @@
+"""What a user describes: rods, joints, supports, loads, contact, fluid."""
+
+from withe.scene.scene import Scene
+
+__all__ = ["Scene"]

@@ -1,0 +1,326 @@
+"""What the rods of a scene may touch: the methods of `Scene` that are about contact and friction.
+
+Its numbered equations are those of Andrew Choi's doctoral dissertation, University of California, Los Angeles, whose
+chapters on contact follow Tong, Choi, Joo, Jawed: A fully implicit method for robust frictional contact handling in
+elastic rods, Extreme Mechanics Letters 58, 2023.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Literal, cast, get_args
+
+import numpy as np
+import numpy.typing as npt
+
+from withe.common import validation
+from withe.parts.contacts import Body, make_obstacle, pair_of, touching
+from withe.parts.directory import Directory
+from withe.parts.friction import Friction, friction_pair
+from withe.parts.handles import Obstacle, Rod
+from withe.parts.kinds import ContactModel, FrictionModel, Overlap, PairSettings, RodPart
+
+__all__ = ["Contacts"]
+
+
+class Contacts:
+    """Obstacles, contact of rods, and friction of a scene: methods of `Scene` that need its parts alone."""
+
+    _directory: Directory
+
+    def add_floor(
+        self, height: float = 0.0, *, friction: Friction = 0.0, restitution: float = 1.0, name: str | None = None
+    ) -> Obstacle:
+        """Add a floor at a height [m], with its normal along +z.
+
+        Parameters
+        ----------
+        height : float [m]
+        friction : float or pair of float
+            Coefficient between the floor and every rod; see `set_friction` for single rods. Two coefficients are those
+            along and across a rod, as of snakes and of bristles: for a slip in the direction s on rods with the tangent
+            t, friction is the normal force times mu_along (s . t) t + mu_across (s - (s . t) t)
+            [Hu et al. 2009, PNAS 106].
+        restitution : float
+            Speed after an impact over that before it, from 0 to 1; see `enable_contact`.
+        name : str
+
+        Returns
+        -------
+        Obstacle
+
+        Raises
+        ------
+        ValueError
+            A height that is no number, negative friction, or a restitution outside 0 to 1.
+        """
+        height = validation.number(height, "height of the floor")
+        name = self._directory.new_name(name, "floor")
+        up = np.array([0.0, 0.0, 1.0])
+        return cast(
+            Obstacle,
+            self._directory.add(
+                make_obstacle(name, "plane", np.array([0.0, 0.0, height]), up, 0.0, friction, restitution)
+            ),
+        )
+
+    def add_plane(
+        self,
+        point: npt.ArrayLike,
+        normal: npt.ArrayLike,
+        *,
+        friction: Friction = 0.0,
+        restitution: float = 1.0,
+        name: str | None = None,
+    ) -> Obstacle:
+        """Add a plane through a point; what is behind it, against its normal, is solid.
+
+        It touches the smooth curve of a rod that its nodes stand for, and not their corners.
+
+        Parameters
+        ----------
+        point : array_like of shape (3,) [m]
+        normal : array_like of shape (3,)
+            Of any length.
+        friction : float or pair of float
+        restitution : float
+        name : str
+
+        Returns
+        -------
+        Obstacle
+        """
+        name = self._directory.new_name(name, "plane")
+        where = validation.vector(point, f"point of {name!r}")
+        across = validation.unit_vector(normal, f"normal of {name!r}")
+        return cast(
+            Obstacle, self._directory.add(make_obstacle(name, "plane", where, across, 0.0, friction, restitution))
+        )
+
+    def add_sphere(
+        self,
+        center: npt.ArrayLike,
+        radius: float,
+        *,
+        friction: Friction = 0.0,
+        restitution: float = 1.0,
+        name: str | None = None,
+    ) -> Obstacle:
+        """Add a solid sphere.
+
+        With a radius of an edge's length and more (its rod's included) it touches the smooth curve of a rod, or its
+        edges where it is smaller.
+
+        Parameters
+        ----------
+        center : array_like of shape (3,) [m]
+        radius : float [m]
+        friction : float or pair of float
+        restitution : float
+        name : str
+
+        Returns
+        -------
+        Obstacle
+        """
+        name = self._directory.new_name(name, "sphere")
+        where = validation.vector(center, f"center of {name!r}")
+        radius = validation.positive(radius, f"radius of {name!r}")
+        return cast(
+            Obstacle, self._directory.add(make_obstacle(name, "capsule", where, where, radius, friction, restitution))
+        )
+
+    def add_capsule(
+        self,
+        start: npt.ArrayLike,
+        end: npt.ArrayLike,
+        radius: float,
+        *,
+        friction: Friction = 0.0,
+        restitution: float = 1.0,
+        name: str | None = None,
+    ) -> Obstacle:
+        """Add a solid cylinder with round ends.
+
+        With a radius of an edge's length and more (its rod's included) it touches the smooth curve of a rod, or its
+        edges where it is smaller.
+
+        Parameters
+        ----------
+        start, end : array_like of shape (3,) [m]
+            Of its axis.
+        radius : float [m]
+        friction : float or pair of float
+        restitution : float
+        name : str
+
+        Returns
+        -------
+        Obstacle
+        """
+        name = self._directory.new_name(name, "capsule")
+        first, last = validation.vector(start, f"start of {name!r}"), validation.vector(end, f"end of {name!r}")
+        radius = validation.positive(radius, f"radius of {name!r}")
+        return cast(
+            Obstacle, self._directory.add(make_obstacle(name, "capsule", first, last, radius, friction, restitution))
+        )
+
+    def enable_contact(
+        self,
+        *,
+        friction: float = 0.0,
+        restitution: float = 1.0,
+        model: ContactModel = "imcv2",
+        friction_model: FrictionModel = "anchored",
+        distance_tolerance: float | None = None,
+        slip_tolerance: float = 1e-3,
+        stiffness: float | Literal["source"] | None = None,
+        centreline_friction: bool = False,
+        overlap: Overlap = "error",
+    ) -> None:
+        """Let rods touch each other and themselves. Obstacles need no such word; its tolerances are theirs too.
+
+        A rod does not touch itself within (pi / 2) (2 radius + tolerance) along it, joints included.
+
+        Parameters
+        ----------
+        friction : float
+            Coefficient between rods.
+        restitution : float
+            Speed at which surfaces part after an impact over that at which they met, from 0 to 1; see Notes.
+        model : {"imcv2", "barrier", "imcv1", "spillmann_teschner"}
+            Energy of contact: the smooth penalty of Choi's dissertation, (5.2), or a barrier, (5.1). Archival, for
+            comparison: its first penalty, (4.16), and the baseline of its 4.7, a penalty without a tolerance
+            that leads out of a depth within one step.
+        friction_model : {"anchored", "implicit", "lagged", "semi_explicit"}
+            An elastic stick that holds a load without creep; a force that grows with the slip velocity, at the end of
+            the step, exactly, under which what is held creeps; the same with the forces of the step's start, which
+            keeps the equations symmetric; or, archival, with the forces and the direction of slip of its start (4.5
+            of Choi's dissertation), which holds nothing that is at rest.
+        distance_tolerance : float [m]
+            Surfaces nearer than this press on each other; by default a tenth of the smaller radius.
+        slip_tolerance : float [m/s]
+            Slip slower than this counts as sticking, with less friction than the coefficient allows.
+        stiffness : float [N/m] or "source"
+            Of contact; by default it follows the forces, so that surfaces are about a hundredth of the
+            smaller radius deep in each other. "source" is the rule (5.17) of Choi's dissertation: 1e5 / m times the
+            greatest force on a node in contact, for all contacts; it has a scale, that of its flagella.
+        centreline_friction : bool
+            Let friction act on the centrelines, as in Choi's dissertation, and not where surfaces touch.
+        overlap : {"error", "separate"}
+            What `build` does with surfaces that are drawn inside each other: refuse them, or move rods apart,
+            quasi-statically, with supports where they are. What is moved is stressed: its natural shape stays
+            that of the drawing.
+
+        Raises
+        ------
+        ValueError
+            Negative friction, a restitution outside 0 to 1, a tolerance or stiffness that is not positive, a tolerance
+            above a radius; from `build`, surfaces inside each other, with both edges and the depth, and a restitution
+            below 1 with integrator "verlet".
+
+        Notes
+        -----
+        Impacts are elastic by default. In implicit midpoint and energy-momentum steps they are so at any time step:
+        the force of a step does as much work as contact stores [Gonzalez 1996; Laursen and Chawla 1997]. Backward
+        Euler, and "lagged" and "semi_explicit" friction, lose most of an impact shorter than a few steps, and nothing
+        in the limit of short ones. With a
+        restitution e below 1 contact gives back e^2 of the energy that it took; steps are cut until an impact is
+        resolved, unless ``adaptive=False``. Rods shake within after an impact, so that as a whole they part more slowly
+        than e says. Surfaces that meet more slowly than sqrt(g r / 100), r the smaller radius, or than the slip
+        tolerance, rest on each other, and so do those that stay in contact for longer than an impact lasts. What
+        contact takes for good is part of `Simulation.energy().dissipated`, and what it stores is `.contact`.
+
+        Examples
+        --------
+        >>> import withe
+        >>> scene = withe.Scene()
+        >>> rubber = withe.Material(youngs_modulus=1e6, density=1000.0)
+        >>> rod = scene.add_rod(start=(0, 0, 0.01), end=(0.3, 0, 0.01), nodes=31, radius=5e-3, material=rubber)
+        >>> floor = scene.add_floor(friction=0.4, restitution=0.0)
+        >>> scene.enable_contact(friction=0.3)
+        >>> simulation = scene.build(time_step=5e-3)
+        >>> simulation.step(40)
+        >>> len(simulation.contacts()) > 0
+        True
+        """
+        settings = self._directory.contact
+        self._directory.contact = replace(
+            settings,
+            rods=True,
+            friction=validation.non_negative(friction, "friction"),
+            restitution=validation.share(restitution, "restitution"),
+            model=cast(ContactModel, validation.choice(model, "model of contact", get_args(ContactModel))),
+            friction_model=cast(
+                FrictionModel, validation.choice(friction_model, "friction_model", get_args(FrictionModel))
+            ),
+            distance_tolerance=_optional(distance_tolerance, "distance_tolerance"),
+            slip_tolerance=validation.positive(slip_tolerance, "slip_tolerance"),
+            stiffness=stiffness if stiffness == "source" else _optional(stiffness, "stiffness of contact"),
+            centreline_friction=validation.truth(centreline_friction, "centreline_friction"),
+            overlap=cast(Overlap, validation.choice(overlap, "overlap", get_args(Overlap))),
+        )
+
+    def set_friction(self, a: Rod | Obstacle | str, b: Rod | Obstacle | str, friction: Friction) -> None:
+        """Give two rods, or a rod and an obstacle, a friction coefficient of their own.
+
+        A rod and an obstacle may have two, along and across the rod; see `add_floor`.
+        """
+        rods = all(isinstance(touching(self._directory, body), RodPart) for body in (a, b))
+        _set_pair(self._directory, a, b, friction=friction_pair(friction, "friction", directed=not rods))
+
+    def set_restitution(self, a: Rod | Obstacle | str, b: Rod | Obstacle | str, restitution: float) -> None:
+        """Give two rods, or a rod and an obstacle, a coefficient of restitution of their own, from 0 to 1."""
+        _set_pair(self._directory, a, b, restitution=validation.share(restitution, "restitution"))
+
+    def set_contact_stiffness(self, a: Rod | Obstacle | str, b: Rod | Obstacle | str, stiffness: float) -> None:
+        """Give two rods, or a rod and an obstacle, a contact stiffness of their own [N/m].
+
+        It stays as it is, and grows only where a step would end with surfaces too deep in each other.
+        """
+        _set_pair(self._directory, a, b, stiffness=validation.positive(stiffness, "stiffness of contact"))
+
+    def ignore_contact(self, a: Rod | Obstacle | str, b: Rod | Obstacle | str) -> None:
+        """Let two rods, or a rod and an obstacle, pass through each other; a rod and itself too."""
+        _set_pair(self._directory, a, b, ignored=True)
+
+    def set_contact_group(self, rod: Rod | str, group: str) -> None:
+        """Put a rod into a group, whose members do not touch each other or themselves.
+
+        Raises
+        ------
+        ValueError
+            Not a rod, or a group whose name is no text.
+        """
+        part = self._directory.rod(rod)
+        if not isinstance(group, str) or not group:
+            raise ValueError(f"group of rod {part.name!r} must be text, got {group!r:.80}")
+        settings = self._directory.contact
+        self._directory.contact = replace(settings, groups={**settings.groups, part.name: group})
+
+
+def _optional(value: float | None, what: str) -> float | None:
+    return None if value is None else validation.positive(value, what)
+
+
+def _set_pair(
+    directory: Directory,
+    a: Body,
+    b: Body,
+    *,
+    ignored: bool = False,
+    friction: tuple[float, float] | None = None,
+    restitution: float | None = None,
+    stiffness: float | None = None,
+) -> None:
+    """Give two bodies something of their own, besides what they have."""
+    key = pair_of(directory, a, b)
+    settings = directory.contact
+    pair = settings.pairs.get(key, PairSettings())
+    pair = PairSettings(
+        ignored,
+        pair.friction if friction is None else friction,
+        pair.restitution if restitution is None else restitution,
+        pair.stiffness if stiffness is None else stiffness,
+    )
+    directory.contact = replace(settings, pairs={**settings.pairs, key: pair})

@@ -1,0 +1,370 @@
+"""Scenes: soft robots described rod by rod."""
+
+from __future__ import annotations
+
+import uuid
+from typing import Any, Literal, cast
+
+import numpy as np
+import numpy.typing as npt
+
+from withe.common import validation
+from withe.parts.applied_loads import AppliedLoads, Bearer
+from withe.parts.directory import Directory
+from withe.parts.handles import Joint, Load, NodeHandle, Rod, RodPlace, Support
+from withe.parts.kinds import JoinKind, JointForm, LoadPart, RodPart, SupportPart
+from withe.parts.materials import Material, Section, Stiffness
+from withe.parts.options import Bending, BuildOptions, Integrator, LineSearch, Solver
+from withe.parts.rods import Natural, make_rod
+from withe.parts.supports import check_not_held, make_clamp, make_pin
+from withe.scene.contacts import Contacts
+from withe.scene.joints import JoinedNodes
+from withe.scene.loads import Loads
+from withe.simulation.simulation import Simulation
+
+__all__ = ["Scene"]
+
+FloatArray = npt.NDArray[np.float64]
+
+
+class Scene(AppliedLoads, Loads, Contacts):
+    """A description of rods, joints, supports and loads, from which simulations are built.
+
+    Parameters
+    ----------
+    gravity : array_like of shape (3,) [m/s^2]
+
+    Examples
+    --------
+    >>> import withe
+    >>> scene = withe.Scene()
+    >>> rubber = withe.Material(youngs_modulus=1e6, density=1000.0)
+    >>> arm = scene.add_rod(start=(0, 0, 0), end=(0.3, 0, 0), nodes=31, radius=5e-3, material=rubber, name="arm")
+    >>> scene.clamp(arm.start)
+    Support(name='clamp 1')
+    >>> simulation = scene.build(integrator="static")
+    >>> simulation.equilibrium().stable
+    True
+    """
+
+    def __init__(self, gravity: npt.ArrayLike = (0.0, 0.0, -9.81)) -> None:
+        self._directory = Directory(uuid.uuid4().hex)
+        self._joints = JoinedNodes(self._directory)
+        self.gravity = gravity
+
+    @property
+    def gravity(self) -> FloatArray:
+        """Acceleration of free fall, shape (3,) [m/s^2]."""
+        return self._gravity.copy()
+
+    @gravity.setter
+    def gravity(self, value: npt.ArrayLike) -> None:
+        self._gravity = validation.vector(value, "gravity")
+
+    @property
+    def rods(self) -> tuple[Rod, ...]:
+        """Handles of all rods, in the order they were added."""
+        return self._directory.rods
+
+    def __getitem__(self, name: str) -> Any:
+        """The handle of the part, node or edge of that name: ``scene["arm"]``, ``scene["arm.end"]``.
+
+        Raises
+        ------
+        ValueError
+            There is none.
+        """
+        return self._directory.handle(name)
+
+    def __repr__(self) -> str:
+        return f"Scene({', '.join(part.name for part in self._directory.parts.values())})"
+
+    # Rods and joints
+
+    def add_rod(
+        self,
+        *,
+        start: npt.ArrayLike | None = None,
+        end: npt.ArrayLike | None = None,
+        points: npt.ArrayLike | None = None,
+        nodes: int | None = None,
+        closed: bool = False,
+        normal: npt.ArrayLike | None = None,
+        radius: npt.ArrayLike | None = None,
+        section: Section | None = None,
+        material: Material | None = None,
+        stiffness: Stiffness | None = None,
+        line_density: npt.ArrayLike | None = None,
+        natural: Natural = "as_built",
+        natural_curvature: npt.ArrayLike | None = None,
+        natural_twist: npt.ArrayLike | None = None,
+        discrete: bool = False,
+        name: str | None = None,
+    ) -> Rod:
+        """Add a rod, from end to end or along any centreline.
+
+        Parameters
+        ----------
+        start, end : array_like of shape (3,) [m]
+            Ends of a straight rod of `nodes` nodes.
+        points : array_like of shape (n, 3) [m]
+            Centreline instead. Its points are the nodes, and the edges between them the rod; or `nodes`
+            asks for so many evenly spaced by arc length along it. Edges are then chords, and have the mass
+            and, where the rod is curved by nature, the compliance of their arcs: give smooth curves so.
+        nodes : int
+            Number of nodes, ends included.
+        closed : bool
+            Whether the last point is joined to the first (which may be repeated at the end).
+        normal : array_like of shape (3,) or (edges, 3)
+            First director of the first edge, which the others get by parallel transport, or of every
+            edge; made normal to the edge. By default the first coordinate axis not close to the edge.
+        radius : float or array_like of shape (edges,) [m]
+            Of a circular section.
+        section : Circle, Tube or Rectangle
+            Section instead of a radius; a rectangle's width lies along the first director.
+        material : Material
+        stiffness : Stiffness
+            Stiffnesses instead of a material, with `line_density`.
+        line_density : float or array_like of shape (edges,) [kg/m]
+            Mass per length.
+        natural : {"as_built", "straight"}
+            Shape that is free of stress: the one drawn, or straight.
+        natural_curvature : array_like of shape (2,) or (stencils, 2) [1/m]
+            Stress-free curvature towards d1 and d2 instead, that of the smooth rod.
+        natural_twist : float or array_like of shape (stencils,) [rad/m]
+            Stress-free twist instead.
+        discrete : bool
+            Whether natural_curvature is 2 tan(phi / 2) [-], phi the angle between two edges.
+        name : str
+            By default "rod 1", "rod 2", ...
+
+        Returns
+        -------
+        Rod
+
+        Raises
+        ------
+        ValueError
+            What cannot be a rod: the message names the argument, what was expected and what came.
+
+        Examples
+        --------
+        >>> scene = Scene()
+        >>> stiff = Stiffness(stretch=100.0, bend=(2e-3, 1e-3), twist=1e-3)
+        >>> scene.add_rod(start=(0, 0, 0), end=(0, 0, 1), nodes=11, radius=0.01, stiffness=stiff, line_density=0.1)
+        Rod(name='rod 1')
+        """
+        name = self._directory.new_name(name, "rod")
+        rod = make_rod(
+            name,
+            len(self._directory.layout.rods),
+            start=start,
+            end=end,
+            points=points,
+            nodes=nodes,
+            closed=closed,
+            normal=normal,
+            radius=radius,
+            section=section,
+            material=material,
+            stiffness=stiffness,
+            line_density=line_density,
+            natural=natural,
+            natural_curvature=natural_curvature,
+            natural_twist=natural_twist,
+            discrete=discrete,
+        )
+        place = RodPlace(name, len(rod.points), rod.closed, rod.section.radii, rod.section.widths)
+        self._directory.layout.add(place)
+        return cast(Rod, self._directory.add(rod))
+
+    def join(
+        self,
+        a: NodeHandle | str,
+        b: NodeHandle | str,
+        kind: JoinKind = "rigid",
+        *,
+        axis: npt.ArrayLike | None = None,
+        form: JointForm = "frame",
+        name: str | None = None,
+    ) -> Joint:
+        """Make two nodes that coincide one.
+
+        Joins at the same node add up: any number of rods may meet there.
+
+        Parameters
+        ----------
+        a, b : NodeHandle or str
+            Ends or inner nodes, of two rods or of one.
+        kind : {"rigid", "pinned", "revolute"}
+            Whether the rods keep their angles, may turn freely, or about one axis.
+        axis : array_like of shape (3,)
+            Of a revolute joint, as it is drawn; it turns with a.
+        form : {"frame", "pairs"}
+            A rigid joint as a body of its own, bent against every edge, or as one bending element for
+            every pair of edges (archival; stiffer).
+        name : str
+
+        Returns
+        -------
+        Joint
+
+        Raises
+        ------
+        ValueError
+            Nodes that are apart by more than 1e-9 of the scene, one and the same node, joins that
+            contradict each other, or an axis without a revolute joint.
+        """
+        return cast(Joint, self._directory.add(self._joints.join(a, b, kind, axis, form, name)))
+
+    # Supports
+
+    def clamp(
+        self,
+        node: NodeHandle | str,
+        *,
+        hold: Literal["frame", "edge"] = "frame",
+        free: npt.ArrayLike | None = None,
+        spin: bool = False,
+        name: str | None = None,
+    ) -> Support:
+        """Hold a node in place, and the direction and roll of its rod.
+
+        Parameters
+        ----------
+        node : NodeHandle or str
+        hold : {"frame", "edge"}
+            Clamp the rod at the node itself, as a wall does, or hold its end edge: both its nodes and
+            its angle.
+        free : array_like of shape (3,) or (2, 3)
+            Directions along which the clamp may slide.
+        spin : bool
+            Whether it may turn about the rod's tangent, which it goes on holding.
+        name : str
+
+        Returns
+        -------
+        Support
+
+        Raises
+        ------
+        ValueError
+            A node that is held already.
+        """
+        return _hold(self._directory, make_clamp(self._directory, node, hold, free, spin, name))
+
+    def pin(self, node: NodeHandle | str, *, free: npt.ArrayLike | None = None, name: str | None = None) -> Support:
+        """Hold a node in place, and leave its rod free to turn.
+
+        Arguments, result and refusals are those of `clamp`.
+        """
+        return _hold(self._directory, make_pin(self._directory, node, free, name))
+
+    # Simulations
+
+    def build(
+        self,
+        *,
+        integrator: Integrator = "implicit_midpoint",
+        time_step: float = 5e-3,
+        adaptive: bool = True,
+        tolerance: float | None = None,
+        planar: bool | None = None,
+        duration: float | None = None,
+        bending: Bending = "angle",
+        solver: Solver = "automatic",
+        line_search: LineSearch = "automatic",
+        mixed: bool = True,
+        step_tolerance: float = 1e-9,
+        force_tolerance: float = 1e-8,
+        max_iterations: int = 40,
+        max_halvings: int | None = None,
+    ) -> Simulation:
+        """Turn the scene into the equations that it needs, ready to run. The scene may go on changing.
+
+        Parameters
+        ----------
+        integrator : {"implicit_midpoint", "backward_euler", "energy_momentum", "fourth_order", "verlet", "static"}
+            "fourth_order" is five midpoint steps in one, the third back in time; it takes no viscosity, and
+            drag only up to mass over time_step.
+        time_step : float [s]
+        adaptive : bool
+            Whether an implicit step that fails is halved; steps grow back. And whether midpoint and fourth-order
+            steps that would gain more than a thousandth of the energy are taken as energy-momentum ones, which are
+            as accurate there or more so; `statistics.energy_momentum_steps` counts them.
+        tolerance : float [m]
+            Cut steps so that the error of positions stays below it, over `duration`.
+        planar : bool
+            Force two or three dimensions; by default a scene that lies in a plane is solved in it. A
+            straight scene without gravity lies in many, and ``True`` takes that of its first director.
+            Loads that are functions and custom forces may leave any plane; with ``True`` they must not.
+        duration : float [s]
+            Over which `tolerance` holds; 1 s by default.
+        bending : {"angle", "tangent"}
+            What bending strain is: the angle phi between two edges, to sixth order, or 2 tan(phi / 2) as in
+            [Bergou et al. 2008], which bends too stiffly on coarse meshes, and with which edges are always the
+            rod and never chords of its arcs.
+        solver : {"automatic", "band", "sparse"}
+        line_search : {"automatic", "goldstein_price", "none"}
+        mixed : bool
+            Newton's method with the axial forces as unknowns of their own.
+        step_tolerance : float
+            A Newton step below it, relative to the length of the scene, has converged.
+        force_tolerance : float
+            And forces out of balance below it, relative to those in the scene.
+        max_iterations : int
+            Of one Newton solve.
+        max_halvings : int
+            The smallest step is time_step / 2^max_halvings; 12 by default, 20 with a tolerance. A run that needs
+            smaller ones ends in a :class:`withe.ConvergenceError`.
+
+        Returns
+        -------
+        Simulation
+
+        Raises
+        ------
+        ValueError
+            A scene without rods, planar=True for one that lies in no plane, an explicit step above
+            the stable limit, "fourth_order" with viscosity or strong drag, or an option out of range.
+        """
+        options = BuildOptions(
+            integrator=integrator,
+            time_step=time_step,
+            adaptive=adaptive,
+            tolerance=tolerance,
+            planar=planar,
+            duration=duration,
+            bending=bending,
+            solver=solver,
+            line_search=line_search,
+            mixed=mixed,
+            step_tolerance=step_tolerance,
+            force_tolerance=force_tolerance,
+            max_iterations=max_iterations,
+            max_halvings=max_halvings,
+        ).checked()
+        directory = self._directory.copy()
+        if bending == "tangent":
+            directory.parts.update({rod.name: rod.without_arcs() for rod in directory.all(RodPart)})
+        return Simulation._build(directory, self._gravity.copy(), options)
+
+    @property
+    def _bearer(self) -> Bearer:
+        return _Drawn(self._directory)
+
+
+class _Drawn:
+    """A scene as loads see it: they act from the start."""
+
+    def __init__(self, directory: Directory) -> None:
+        self.directory = directory
+        self.time = 0.0
+
+    def take(self, part: LoadPart) -> Load:
+        return cast(Load, self.directory.add(part))
+
+
+def _hold(directory: Directory, part: SupportPart) -> Support:
+    check_not_held(directory, part, directory.all(SupportPart))
+    return cast(Support, directory.add(part))

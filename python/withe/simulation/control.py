@@ -1,0 +1,170 @@
+"""What drives a simulation while it runs: natural shapes, parameters, loads."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy.typing as npt
+
+from withe.common import validation
+from withe.parts.handles import CustomForce, Drag, Fluid, Load, Mass, Obstacle, Rod
+from withe.parts.rods import curvature_array, twist_array
+from withe.simulation.functions import check_jacobian
+from withe.simulation.loads import remove_load
+from withe.simulation.parameters import get_value, set_values
+from withe.simulation.session import Session
+
+__all__ = ["Control"]
+
+
+class Control:
+    """Methods of `Simulation` that actuate and set; what they do is done by functions of the session."""
+
+    _session: Session
+
+    # Natural shape
+
+    def set_natural_curvature(
+        self, rod: Rod | str, curvature: npt.ArrayLike, over: float = 0.0, *, discrete: bool = False
+    ) -> None:
+        """Actuate a rod by changing the curvature at which it is free of stress.
+
+        A curvature out of the plane of a planar simulation makes it three-dimensional, unless it was
+        built with planar=True.
+
+        Parameters
+        ----------
+        rod : Rod or str
+        curvature : array_like of shape (2,) or (stencils, 2) [1/m]
+            Towards the two directors; one pair for the whole rod, or one a stencil.
+        over : float [s]
+            Reached after so long, evenly; at once by default.
+        discrete : bool
+            Whether the curvature is 2 tan(phi / 2) [-], phi the angle between two edges.
+
+        Raises
+        ------
+        ValueError
+            Wrong shape, not finite, a turn of pi or more at a node, or out of the plane of a simulation
+            that was built with planar=True.
+
+        Examples
+        --------
+        >>> simulation.set_natural_curvature(arm, (0.0, 12.5), over=0.2)
+        """
+        part = self._session.directory.rod(rod)
+        values = curvature_array(curvature, part.voronoi, validation.truth(discrete, "discrete"), part.owner)
+        self._session.world.set_natural_curvature(part.index, values, validation.non_negative(over, "over"))
+
+    def set_natural_twist(self, rod: Rod | str, twist: npt.ArrayLike, over: float = 0.0) -> None:
+        """Actuate a rod by changing the twist at which it is free of stress.
+
+        Parameters
+        ----------
+        rod : Rod or str
+        twist : float or array_like of shape (stencils,) [rad/m]
+        over : float [s]
+            Reached after so long, evenly; at once by default.
+
+        Raises
+        ------
+        ValueError
+            Wrong shape, not finite, or not zero in a simulation that was built with planar=True.
+        """
+        part = self._session.directory.rod(rod)
+        values = twist_array(twist, part.voronoi, part.owner)
+        self._session.world.set_natural_twist(part.index, values, validation.non_negative(over, "over"))
+
+    # Parameters
+
+    def set(self, target: Rod | Load | Mass | Drag | Fluid | Obstacle | str | None = None, /, **values: Any) -> None:
+        """Change parameters while the simulation runs.
+
+        Parameters
+        ----------
+        target : handle or str
+            None for what belongs to the whole scene.
+        **values
+            Of a rod: youngs_modulus, poisson_ratio, density, viscosity, stretch_stiffness,
+            bend_stiffness, twist_stiffness, line_density, viscous_time, drag (numbers, or one an edge),
+            natural_curvature, natural_twist. Of a load: force, moment, load or pressure, constant or a function
+            of time. Of a mass: mass. Of a drag: drag. Of a fluid: viscosity. Of an obstacle: friction, one coefficient
+            or a pair, along and across rods. Of the scene: gravity, and friction between rods. See `set_friction` for
+            two of them.
+
+        Raises
+        ------
+        ValueError
+            A word that the target does not have, or a value out of range; then nothing is changed.
+
+        Examples
+        --------
+        >>> simulation.set(arm, youngs_modulus=2e6)
+        >>> simulation.set(tip_load, force=lambda t: (0, 0, -t))
+        """
+        set_values(self._session, target, values)
+
+    def get(self, target: Rod | Load | Mass | Drag | Fluid | Obstacle | str, word: str | None = None) -> Any:
+        """The present value of what `set` sets.
+
+        Parameters
+        ----------
+        target : handle or str
+            Or "gravity", or "friction" of rods with each other.
+        word : str
+            As in `set`.
+
+        Returns
+        -------
+        float or ndarray
+            Stiffnesses and what else belongs to edges one an edge, (edges,); natural curvature
+            (stencils, 2) and twist (stencils,); loads (3,). What belongs to a material as it was set.
+
+        Raises
+        ------
+        ValueError
+            A word that the target does not have.
+
+        Examples
+        --------
+        >>> simulation.get(arm, "natural_curvature").shape
+        (29, 2)
+        """
+        return get_value(self._session, target, word)
+
+    # Loads and custom forces
+
+    def remove(self, load: Load | str) -> None:
+        """Take off a load that was put on while running; it acts no more from now on.
+
+        Parameters
+        ----------
+        load : Load or str
+            As `add_force`, `add_moment`, `add_load` or `add_pressure` of the simulation returned it.
+
+        Raises
+        ------
+        ValueError
+            A load that is not there any more, or one of the scene as it was drawn.
+
+        Examples
+        --------
+        >>> wind = simulation.add_load(arm, (0.1, 0, 0))
+        >>> simulation.remove(wind)
+        """
+        remove_load(self._session, load)
+
+    def check_jacobian(self, force: CustomForce | str | None = None) -> None:
+        """Compare the jacobian of a custom force with differences of its function, at the present state.
+
+        Parameters
+        ----------
+        force : CustomForce or str
+            By default all that have a jacobian, one after the other.
+
+        Raises
+        ------
+        ValueError
+            A jacobian that is wrong, with the entry that is farthest off; or none.
+        """
+        check_jacobian(self._session, force)

@@ -1,0 +1,100 @@
+"""Functions that a user gave: loads and paths that vary with time, and custom forces."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import numpy.typing as npt
+
+from withe.parts.applied_loads import load_vector
+from withe.parts.handles import CustomForce
+from withe.parts.kinds import CustomForcePart, RodPart
+from withe.simulation.custom_forces import CustomForces
+from withe.simulation.motion import Path, Turn, evaluate_path
+from withe.simulation.obstacles import find_obstacle, obstacle_pose
+from withe.simulation.session import Session
+
+__all__ = ["apply_functions", "check_jacobian", "force_function", "step_callback"]
+
+FloatArray = npt.NDArray[np.float64]
+
+
+def step_callback(session: Session) -> Callable[[float, float], None] | None:
+    """What to call before every inner step, if anything."""
+    now = session.world.time
+    moving = any(not _finished(path, now) for path in session.settings.paths.values())
+    if moving or session.settings.functions:
+        return lambda force_time, end_time: apply_functions(session, force_time, end_time)
+    return None
+
+
+def apply_functions(session: Session, force_time: float, end_time: float) -> None:
+    """Evaluate loads and paths for the coming inner step."""
+    if session.settings.functions:
+        for index, part in enumerate(session.loads):
+            function = session.settings.functions.get(part.name)
+            if function is not None:
+                what = f"{part.kind} {part.name!r} at t = {force_time:g}"
+                value = load_vector(function(force_time), part.axis, what)
+                _check_in_plane(session, value, what, along_normal=part.kind == "moment")
+                session.world.set_load(index, value)
+    for name, path in session.settings.paths.items():
+        if name not in session.settings.supports and (obstacle := find_obstacle(session.directory, name)) is not None:
+            session.world.prescribe_obstacle(obstacle[0], *obstacle_pose(session, obstacle[0], path, end_time))
+            continue
+        index, support = session.settings.supports[name]
+        if _finished(path, min(session.world.time, end_time)):
+            continue
+        present = np.array(session.world.support_rotation(index))
+        owner = f"support {name!r}"
+        position, rotation = evaluate_path(path, end_time, present, support.kind != "pin", owner)
+        session.world.prescribe_support(index, position, rotation)
+
+
+def force_function(session: Session) -> CustomForces | None:
+    """What finds the custom forces, if any."""
+    if not session.custom_forces:
+        return None
+    shortest = min(float(rod.lengths.min()) for rod in session.directory.all(RodPart))
+    return CustomForces(
+        session.custom_forces,
+        shortest,
+        lambda forces, what: _check_in_plane(session, forces, what),
+        lambda moments, what: _check_in_plane(session, moments, what, along_normal=True),
+    )
+
+
+def check_jacobian(session: Session, force: CustomForce | str | None) -> None:
+    """Compare a jacobian with differences; see `Simulation.check_jacobian`."""
+    given = [part for part in session.custom_forces if part.jacobian is not None]
+    if force is not None:
+        given = [session.directory.find(force, CustomForcePart, "custom force")]
+    custom = force_function(session)
+    if custom is None or not given:
+        raise ValueError("there is no jacobian to check: give add_custom_force one")
+    positions, velocities = np.array(session.world.positions()), np.array(session.world.velocities())
+    for part in given:
+        custom.check(part, session.world.time, positions, velocities)
+
+
+def _check_in_plane(session: Session, value: FloatArray, what: str, along_normal: bool = False) -> None:
+    """Refuse what a function gave that leaves the plane of a simulation built with planar=True."""
+    if not session.options.planar:
+        return
+    normal = np.array(session.world.plan.plane_normal)
+    out = value - np.outer(value @ normal, normal).reshape(value.shape) if along_normal else value @ normal
+    if np.linalg.norm(out) > 1e-8 * np.linalg.norm(value):
+        must = "along the normal of" if along_normal else "in"
+        raise ValueError(
+            f"{what} must stay {must} the plane of a scene built with planar=True, whose normal is "
+            f"({normal[0]:g}, {normal[1]:g}, {normal[2]:g}), got {np.array2string(value, threshold=9)}"
+        )
+
+
+def _finished(path: Path, time: float) -> bool:
+    """Whether a path has come to its end, and was followed there."""
+    if not isinstance(path, Turn):
+        return False
+    begin, end = path.times
+    return bool(time > end or (time == end and begin < end))

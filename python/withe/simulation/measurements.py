@@ -1,0 +1,204 @@
+"""What may be read of a simulation at any moment. Read-outs are copies."""
+
+from __future__ import annotations
+
+from typing import overload
+
+import numpy as np
+import numpy.typing as npt
+
+from withe.knots import link
+from withe.parts.contacts import contact_table
+from withe.parts.handles import NodeHandle, Obstacle, Rod, Support
+from withe.parts.kinds import ObstaclePart
+from withe.simulation.readouts import Energy, Momentum, Plan, Reaction, RodEnergy, Statistics
+from withe.simulation.session import Session
+from withe.simulation.supports import find_support
+
+__all__ = ["Measurements"]
+
+FloatArray = npt.NDArray[np.float64]
+
+
+class Measurements:
+    """Methods of `Simulation` that read shapes, motions, forces and energies."""
+
+    _session: Session
+
+    @property
+    def rods(self) -> tuple[Rod, ...]:
+        """Handles of all rods, in the order of the scene."""
+        return self._session.directory.rods
+
+    def positions(self, rod: Rod | str | None = None) -> FloatArray:
+        """Positions of the nodes of a rod, or of every node of the scene once.
+
+        Returns
+        -------
+        ndarray of shape (nodes, 3) [m]
+            Of the whole scene without a rod; `rod.rows` are a rod's rows there.
+
+        Raises
+        ------
+        ValueError
+            Not a rod of this scene.
+        """
+        positions = self._session.world.positions()
+        return (
+            positions
+            if rod is None
+            else positions[self._session.directory.layout.rows(self._session.directory.rod(rod).index)]
+        )
+
+    def obstacle_position(self, obstacle: Obstacle | str) -> FloatArray:
+        """Where an obstacle is: the point of a plane, a sphere's centre, a capsule's start, shape (3,) [m].
+
+        Raises
+        ------
+        ValueError
+            Not an obstacle of this scene.
+        """
+        part = self._session.directory.find(obstacle, ObstaclePart, "obstacle")
+        return np.array(self._session.world.obstacle_position(self._session.directory.all(ObstaclePart).index(part)))
+
+    def velocities(self, rod: Rod | str | None = None) -> FloatArray:
+        """Velocities of the nodes of a rod, or of every node once, shape (nodes, 3) [m/s]."""
+        velocities = self._session.world.velocities()
+        return (
+            velocities
+            if rod is None
+            else velocities[self._session.directory.layout.rows(self._session.directory.rod(rod).index)]
+        )
+
+    def directors(self, rod: Rod | str) -> FloatArray:
+        """Material frames of the edges, shape (edges, 3, 3), rows d1, d2, tangent."""
+        return self._session.world.directors(self._session.directory.rod(rod).index).reshape(-1, 3, 3)
+
+    def curvatures(self, rod: Rod | str) -> FloatArray:
+        """Curvatures towards d1 and d2, shape (stencils, 2) [1/m]."""
+        return self._session.world.curvatures(self._session.directory.rod(rod).index)
+
+    def twists(self, rod: Rod | str) -> FloatArray:
+        """Twists, shape (stencils,) [rad/m]."""
+        return self._session.world.twists(self._session.directory.rod(rod).index)
+
+    def tensions(self, rod: Rod | str) -> FloatArray:
+        """Axial forces of the edges, pulling is positive, shape (edges,) [N]."""
+        return self._session.world.tensions(self._session.directory.rod(rod).index)
+
+    def spins(self, rod: Rod | str) -> FloatArray:
+        """Angular velocities of the edges about their tangents, shape (edges,) [rad/s]."""
+        return self._session.world.spins(self._session.directory.rod(rod).index)
+
+    @overload
+    def energy(self) -> Energy: ...
+
+    @overload
+    def energy(self, rod: Rod | str) -> RodEnergy: ...
+
+    def energy(self, rod: Rod | str | None = None) -> Energy | RodEnergy:
+        """Energies of the whole scene, or of one rod [J].
+
+        Parameters
+        ----------
+        rod : Rod or str, optional
+
+        Returns
+        -------
+        Energy
+            Without a rod.
+        RodEnergy
+            Of a rod; loads, contact, work and dissipation belong to the scene.
+        """
+        if rod is not None:
+            part = self._session.world.rod_energy(self._session.directory.rod(rod).index)
+            return RodEnergy(**{name: getattr(part, name) for name in RodEnergy.__dataclass_fields__})
+        energy = self._session.world.energy()
+        return Energy(**{name: getattr(energy, name) for name in Energy.__dataclass_fields__})
+
+    def momentum(self) -> Momentum:
+        """Linear momentum, and angular momentum about the origin, of the whole scene.
+
+        By the masses that the equations of motion have, nodes that supports hold included. Sum of x cross (M v) over
+        nodes, M the mass matrix, of I omega t over edges that spin at omega about their tangents t, and of what the
+        frames of joints carry.
+
+        Returns
+        -------
+        Momentum
+
+        Examples
+        --------
+        >>> import withe
+        >>> scene = withe.Scene(gravity=(0, 0, 0))
+        >>> rubber = withe.Material(youngs_modulus=1e6, density=1000.0)
+        >>> baton = scene.add_rod(start=(-0.1, 0, 0), end=(0.1, 0, 0), nodes=5, radius=5e-3, material=rubber)
+        >>> simulation = scene.build()
+        >>> simulation.set_velocities(baton, [(0, 20 * x, 0) for x, _, _ in simulation.positions(baton)])
+        >>> print(f"{simulation.momentum().angular[2]:.6f} kg m^2/s")  # m L^2 / 12 times 20 rad/s
+        0.001047 kg m^2/s
+        """
+        momentum = self._session.world.momentum()
+        return Momentum(np.array(momentum.linear), np.array(momentum.angular))
+
+    def reaction(self, support: Support | NodeHandle | str) -> Reaction:
+        """Force and moment of a support on the rod.
+
+        Parameters
+        ----------
+        support : Support, NodeHandle or str
+            A support, or the node that it holds.
+
+        Raises
+        ------
+        ValueError
+            Nothing holds that node.
+        """
+        index, _ = find_support(self._session, support)
+        reaction = self._session.world.reaction(index)
+        return Reaction(np.array(reaction.force), np.array(reaction.moment))
+
+    def contacts(self) -> npt.NDArray[np.void]:
+        """What touches now.
+
+        Returns
+        -------
+        structured ndarray, a row per contact
+            "pair" (two names) and "edge" (their edges, -1 for an obstacle), "distance" of the centrelines
+            and "gap" of the surfaces [m], "point" between them [m], "normal" from the second to the first,
+            "normal_force" [N], "friction" on the first [N], "sticking".
+        """
+        return contact_table(self._session.directory, self._session.world.contacts())
+
+    def link(self, rod: Rod | str) -> float:
+        """Link of a rod [turns]: its twist and its writhe.
+
+        Kept by a closed rod, and by an open one whose ends are held and do not spin, as long as nothing
+        passes through it [Calugareanu 1961]. An open rod is carried on straight from both ends.
+
+        Returns
+        -------
+        float
+        """
+        index = self._session.directory.rod(rod).index
+        closed = self._session.directory.layout.rods[index].closed
+        return link(self.positions(rod), self.directors(rod), closed)
+
+    @property
+    def statistics(self) -> Statistics:
+        """What the work so far took."""
+        statistics = self._session.world.statistics
+        return Statistics(**{name: getattr(statistics, name) for name in Statistics.__dataclass_fields__})
+
+    @property
+    def plan(self) -> Plan:
+        """What was decided for this scene: ``print(simulation.plan)``."""
+        plan = self._session.world.plan
+        return Plan(
+            planar=plan.planar,
+            plane_normal=np.array(plan.plane_normal) if plan.planar else None,
+            unknowns=plan.unknowns,
+            solver=plan.solver,
+            stable_step=plan.stable_step or None,
+            notes=tuple(plan.notes),
+        )

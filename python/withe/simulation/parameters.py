@@ -1,0 +1,195 @@
+"""Numbers of the parts of a simulation, set and read by their words while it runs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from withe.common import validation
+from withe.parts.description import added_mass, drag, rod_parameters
+from withe.parts.friction import as_given, obstacle_friction
+from withe.parts.handles import Drag, Fluid, Load, Mass, Obstacle, Rod
+from withe.parts.kinds import (
+    DragPart,
+    FluidPart,
+    JoinPart,
+    LoadPart,
+    MassPart,
+    ObstaclePart,
+    Part,
+    RodPart,
+    SupportPart,
+)
+from withe.parts.parameters import ROD_WORDS, RodParameters
+from withe.parts.rods import curvature_array, twist_array
+from withe.simulation.loads import load_index, set_load
+from withe.simulation.obstacles import set_obstacle_friction, set_rod_friction
+from withe.simulation.session import Session
+
+__all__ = ["Settable", "get_value", "set_values"]
+
+Settable = Rod | Load | Mass | Drag | Fluid | Obstacle
+_NATURAL_WORDS = ("natural_curvature", "natural_twist")
+
+
+def set_values(session: Session, target: Settable | str | None, values: dict[str, Any]) -> None:
+    """Change parameters; see `Simulation.set`."""
+    if not values:
+        raise ValueError("set must be given what to set, such as youngs_modulus=1e6")
+    if target is None:
+        _only(values, ("gravity", "friction"), "the scene")
+        gravity = validation.vector(values["gravity"], "gravity") if "gravity" in values else None
+        if "friction" in values:
+            set_rod_friction(session, values["friction"])
+        if gravity is not None:
+            session.world.set_gravity(gravity)
+            session.settings.gravity = gravity
+        return
+    part = session.directory.find_any(target, "target")
+    if isinstance(part, RodPart):
+        _set_rod(session, part, values)
+    elif isinstance(part, LoadPart):
+        _only(values, (part.kind,), f"{part.kind} {part.name!r}")
+        set_load(session, part, values[part.kind])
+    elif isinstance(part, MassPart):
+        _only(values, ("mass",), f"mass {part.name!r}")
+        masses = session.settings.masses | {part.name: validation.non_negative(values["mass"], f"mass {part.name!r}")}
+        session.world.set_added_mass(added_mass(session.directory, masses))
+        session.settings.masses = masses
+    elif isinstance(part, DragPart):
+        _only(values, ("drag",), f"drag {part.name!r}")
+        _set_drag(session, part, validation.non_negative(values["drag"], f"drag {part.name!r}"))
+    elif isinstance(part, FluidPart):
+        _only(values, ("viscosity",), f"fluid {part.name!r}")
+        viscosity = validation.positive(values["viscosity"], f"viscosity of {part.name!r}")
+        session.world.set_fluid_viscosity(viscosity)
+        session.settings.fluids = session.settings.fluids | {part.name: viscosity}
+    elif isinstance(part, ObstaclePart):
+        _only(values, ("friction",), f"obstacle {part.name!r}")
+        set_obstacle_friction(session, part, values["friction"])
+    else:
+        raise ValueError(_nothing_to_set(part))
+
+
+def get_value(session: Session, target: Settable | str, word: str | None) -> Any:
+    """The present value of a parameter; see `Simulation.get`."""
+    if word is None:
+        if isinstance(target, str) and target == "friction":
+            return float(session.world.contact.friction)
+        if not isinstance(target, str) or target != "gravity":
+            raise ValueError("word must be given, such as get(arm, 'youngs_modulus')")
+        return session.settings.gravity.copy()
+    part = session.directory.find_any(target, "target")
+    if isinstance(part, RodPart):
+        if word in _NATURAL_WORDS:
+            readout = session.world.natural_curvature if word == _NATURAL_WORDS[0] else session.world.natural_twist
+            return np.array(readout(part.index))
+        if word in ROD_WORDS:
+            return session.settings.rods[part.index].get(word)
+        if word == "radius":
+            return part.section.radii.copy()
+    elif isinstance(part, LoadPart) and word == part.kind:
+        value = np.array(session.world.load(load_index(session, part)))
+        return value if part.axis is None else float(value @ part.axis)
+    elif isinstance(part, MassPart) and word == "mass":
+        return session.settings.masses[part.name]
+    elif isinstance(part, DragPart) and word == "drag":
+        return session.settings.drags[part.name]
+    elif isinstance(part, FluidPart) and word == "viscosity":
+        return session.settings.fluids[part.name]
+    elif isinstance(part, ObstaclePart) and word == "friction":
+        index = session.directory.all(ObstaclePart).index(part)
+        return as_given(obstacle_friction(session.world.contact, index))
+    words = _words_of(part)
+    if not words:
+        raise ValueError(_nothing_to_set(part))
+    raise ValueError(f"{part.name!r} has no {word!r}; it has {', '.join(words)}")
+
+
+def _set_rod(session: Session, part: RodPart, values: dict[str, Any]) -> None:
+    _only(values, (*ROD_WORDS, *_NATURAL_WORDS), part.owner)
+    parameters = session.settings.rods[part.index]
+    for word, value in values.items():
+        if word in ROD_WORDS:
+            parameters = parameters.changed(word, value, part.section, part.owner)
+    curvature = twist = None
+    if "natural_curvature" in values:
+        curvature = curvature_array(values["natural_curvature"], part.voronoi, False, part.owner)
+    if "natural_twist" in values:
+        twist = twist_array(values["natural_twist"], part.voronoi, part.owner)
+    changes: list[Callable[[], None]] = []
+    if curvature is not None:
+        changes.append(lambda: session.world.set_natural_curvature(part.index, curvature, 0.0))
+    if twist is not None:
+        changes.append(lambda: session.world.set_natural_twist(part.index, twist, 0.0))
+    if parameters is not session.settings.rods[part.index]:
+        changes.append(lambda: _apply_parameters(session, part.index, parameters))
+    # A change that is refused, as it leaves the plane of planar=True, does nothing; those before it are taken back.
+    before = session.world.snapshot() if len(changes) > 1 else b""
+    try:
+        for change in changes:
+            change()
+    except ValueError:
+        if len(changes) > 1:
+            session.world.restore(before)
+        raise
+
+
+def _apply_parameters(session: Session, rod: int, parameters: RodParameters) -> None:
+    if parameters is not session.settings.rods[rod]:
+        session.world.set_rod_parameters(rod, rod_parameters(parameters))
+        session.settings.rods[rod] = parameters
+
+
+def _set_drag(session: Session, part: DragPart, coefficient: float) -> None:
+    drags = session.settings.drags | {part.name: coefficient}
+    for rod in session.directory.all(RodPart):
+        if part.rods is None or rod.index in part.rods:
+            total = drag(session.directory, drags, rod)
+            changed = session.settings.rods[rod.index].changed("drag", total, rod.section, rod.owner)
+            _apply_parameters(session, rod.index, changed)
+    session.settings.drags = drags
+
+
+def _words_of(part: Part) -> tuple[str, ...]:
+    """The words of `get` that a part takes."""
+    if isinstance(part, RodPart):
+        return (*ROD_WORDS, *_NATURAL_WORDS, "radius")
+    if isinstance(part, LoadPart):
+        return (part.kind,)
+    words: dict[type[Any], tuple[str, ...]] = {
+        MassPart: ("mass",),
+        DragPart: ("drag",),
+        FluidPart: ("viscosity",),
+        ObstaclePart: ("friction",),
+    }
+    return words.get(type(part), ())
+
+
+_SETTABLE = (
+    "set takes rods (youngs_modulus, natural_curvature, ...), loads (force, moment, load), masses (mass), "
+    "drags (drag), fluids (viscosity), obstacles (friction), and None for the scene (gravity, friction)"
+)
+
+
+def _nothing_to_set(part: Part) -> str:
+    """What drives a part instead."""
+    if isinstance(part, JoinPart):
+        first, second = part.node_names
+        return (
+            f"joint {part.name!r} has no motor and nothing to set. To drive it: equal and opposite moments on the rods "
+            f"at both sides, scene.add_moment({first}, ...) and scene.add_moment({second}, ...), which "
+            "set(load, moment=...) changes or makes a function of time; set_natural_curvature or set_natural_twist of "
+            "a rod beside it; or, to prescribe where it is, clamp or pin its node and move that"
+        )
+    if isinstance(part, SupportPart):
+        return f"support {part.name!r} has nothing to set: move, release or reaction take it. {_SETTABLE}"
+    return f"{part.name!r} has nothing to set. {_SETTABLE}"
+
+
+def _only(values: dict[str, Any], words: tuple[str, ...], owner: str) -> None:
+    for word in values:
+        if word not in words:
+            raise ValueError(f"{owner} has no {word!r} to set; it has {', '.join(words)}")

@@ -1,0 +1,193 @@
+"""What is put where while a simulation runs: supports, obstacles, rods."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy.typing as npt
+
+from withe.parts.friction import Friction
+from withe.parts.handles import NodeHandle, Obstacle, Rod, Support
+from withe.parts.supports import make_clamp, make_pin
+from withe.simulation.motion import Path, RotationLike
+from withe.simulation.obstacles import find_obstacle, move_obstacle, set_pair_friction
+from withe.simulation.session import Session
+from withe.simulation.states import set_state, set_velocities
+from withe.simulation.supports import hold as put_on
+from withe.simulation.supports import move_support, release
+
+__all__ = ["Placement"]
+
+
+class Placement:
+    """Methods of `Simulation` that hold, move and place; what they do is done by functions of the session."""
+
+    _session: Session
+
+    def clamp(
+        self,
+        node: NodeHandle | str,
+        *,
+        hold: Literal["frame", "edge"] = "frame",
+        free: npt.ArrayLike | None = None,
+        spin: bool = False,
+        name: str | None = None,
+    ) -> Support:
+        """Hold a node where it is now, and the direction and roll of its rod. See `Scene.clamp`.
+
+        Raises
+        ------
+        ValueError
+            A node that is held already.
+        """
+        return put_on(self._session, make_clamp(self._session.directory, node, hold, free, spin, name))
+
+    def pin(self, node: NodeHandle | str, *, free: npt.ArrayLike | None = None, name: str | None = None) -> Support:
+        """Hold a node where it is now. See `Scene.pin`.
+
+        Raises
+        ------
+        ValueError
+            A node that is held already.
+        """
+        return put_on(self._session, make_pin(self._session.directory, node, free, name))
+
+    def release(self, support: Support | NodeHandle | str) -> None:
+        """Let go of a node.
+
+        Parameters
+        ----------
+        support : Support, NodeHandle or str
+            A support, or the node that it holds.
+
+        Raises
+        ------
+        ValueError
+            Nothing holds that node.
+        """
+        release(self._session, support)
+
+    def move(
+        self,
+        support: Support | NodeHandle | Obstacle | str,
+        position: npt.ArrayLike | None = None,
+        rotation: RotationLike | None = None,
+        *,
+        tangent: npt.ArrayLike | None = None,
+        roll: float | None = None,
+        over: float = 0.0,
+        path: Path | None = None,
+    ) -> None:
+        """Move a support or an obstacle, or let it move along a path from now on. What is not given stays as it is.
+
+        Parameters
+        ----------
+        support : Support, NodeHandle, Obstacle or str
+            A support, the node that it holds, or a floor, plane, sphere or capsule: its position is that of the point
+            of a plane, the centre of a sphere, the start of a capsule. What it does to rods is part of
+            ``energy().work``.
+        position : array_like of shape (3,) [m]
+        rotation : array_like of shape (3, 3), or a SciPy Rotation
+            Relative to the orientation as drawn.
+        tangent : array_like of shape (3,)
+            Where the rod is to point, instead: the smallest turn from the drawn tangent, and then ...
+        roll : float [rad]
+            ... a turn about it. Full turns count, and take time: at most half a turn in a time step. An obstacle turns
+            so about the normal of a plane, the axis of a capsule from start to end, or the tangent that is given for a
+            sphere: rollers, drums and turntables, which drag rods by friction. A belt is a plane that moves along
+            itself.
+        over : float [s]
+            Reached after so long, evenly; within the next step by default.
+        path : callable
+            Instead of all these: a function of time [s] that returns a position, or a position and a
+            rotation; of an obstacle, a position and a roll (of a sphere, times the axis, shape (3,)).
+
+        Raises
+        ------
+        ValueError
+            Nothing holds that node, a direction for a pin or an obstacle, or arguments that contradict each other.
+
+        Examples
+        --------
+        >>> hand = simulation.clamp(arm.end)
+        >>> simulation.move(hand, position=(0.1, 0, 0.2), roll=np.pi, over=0.5)
+        """
+        obstacle = find_obstacle(self._session.directory, support)
+        if obstacle is None:
+            move_support(self._session, support, position, rotation, tangent, roll, over, path)
+            return
+        if rotation is not None:
+            raise ValueError(f"rotation of {obstacle[1]!r} must be None: an obstacle turns by a roll about its axis")
+        move_obstacle(self._session, *obstacle, position, tangent, roll, over, path)
+
+    def set_friction(self, a: Rod | Obstacle | str, b: Rod | Obstacle | str, friction: Friction) -> None:
+        """Give two rods, or a rod and an obstacle, another friction coefficient of their own. See `Scene.set_friction`.
+
+        Raises
+        ------
+        ValueError
+            Two obstacles, negative friction, or two coefficients for two rods.
+        """
+        set_pair_friction(self._session, a, b, friction)
+
+    def set_state(
+        self,
+        rod: Rod | str,
+        positions: npt.ArrayLike | None = None,
+        velocities: npt.ArrayLike | None = None,
+        *,
+        twist: npt.ArrayLike | None = None,
+        directors: npt.ArrayLike | None = None,
+        spins: npt.ArrayLike | None = None,
+    ) -> None:
+        """Put a rod elsewhere, at once. What is not given stays as it is.
+
+        Joints turn with the edges at them. The energy that this puts in does not count as work: the balance of
+        ``energy()`` begins anew. A state out of the plane of a planar simulation makes it three-dimensional, unless
+        it was built with planar=True.
+
+        Parameters
+        ----------
+        rod : Rod or str
+        positions : array_like of shape (nodes, 3) [m]
+            The first director of the first edge follows by the smallest turn. Nodes that a support holds must stay:
+            move the support first.
+        velocities : array_like of shape (nodes, 3) or (3,) [m/s]
+            Those of nodes that are held stay as they are.
+        twist : float or array_like of shape (stencils,) [rad/m]
+            As `twists` reads it. By default that of now; a closed rod spreads evenly what new positions
+            change of it, so that it is closed again.
+        directors : array_like of shape (edges, 3, 3) or (edges, 3)
+            Instead of twist: as `directors` reads them, or the first ones alone. Each stencil then has the least of
+            the twists that fit, less than half a turn.
+        spins : float or array_like of shape (edges,) [rad/s]
+            Angular velocities of the edges about their tangents.
+
+        Raises
+        ------
+        ValueError
+            Wrong shapes, not finite, directors that are not normal to their edges, twist that does not close a
+            closed rod, an edge without length, a rod that folds right back, a node that is held, surfaces that
+            would overlap, or what leaves the plane of a simulation built with planar=True. Then nothing is changed.
+
+        Examples
+        --------
+        >>> simulation.set_state(arm, spins=np.linspace(0.0, 5.0, 30))
+        """
+        set_state(self._session, rod, positions, velocities, twist, directors, spins)
+
+    def set_velocities(self, rod: Rod | str | None, velocities: npt.ArrayLike) -> None:
+        """Set the velocities of the nodes of a rod; those that are held stay at rest.
+
+        Parameters
+        ----------
+        rod : Rod or str
+            None for every node of the scene.
+        velocities : array_like of shape (nodes, 3) or (3,) [m/s]
+
+        Raises
+        ------
+        ValueError
+            Wrong shape, or not finite.
+        """
+        set_velocities(self._session, rod, velocities)

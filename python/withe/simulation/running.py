@@ -1,0 +1,126 @@
+"""Many simulations side by side."""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Callable, Iterable, Mapping
+from concurrent.futures import FIRST_EXCEPTION, Future, ThreadPoolExecutor, wait
+from typing import Any, Literal
+
+import numpy.typing as npt
+
+from withe.common import validation
+from withe.common.progress import progress as progress_bar
+from withe.recording.record import Record
+from withe.simulation.loop import Run
+from withe.simulation.simulation import Simulation
+
+__all__ = ["run_many"]
+
+
+def run_many(
+    simulations: Iterable[Simulation],
+    duration: float,
+    *,
+    workers: int | None = None,
+    errors: Literal["raise", "return"] = "raise",
+    record_every: float | None = None,
+    progress: bool | Literal["always"] = True,
+    before_step: Callable[[Simulation], object] | None = None,
+    until: Callable[[Simulation], object] | None = None,
+    record: Mapping[str, Callable[[Simulation], npt.ArrayLike]] | None = None,
+) -> list[Record | Exception]:
+    """Run many simulations side by side, in threads, with one progress bar.
+
+    Parameters
+    ----------
+    simulations : iterable of Simulation
+        All different; `Simulation.copy` makes more of one.
+    duration : float [s]
+    workers : int
+        Number of threads; by default one a processor.
+    errors : {"raise", "return"}
+        Whether the first exception ends everything, or takes the place of its record.
+    record_every, progress, before_step, until, record
+        As in `Simulation.run`.
+
+    Returns
+    -------
+    list of Record
+        In the order of the simulations; with errors="return", exceptions among them.
+
+    Raises
+    ------
+    ValueError
+        Something that is not a simulation, or one that is there twice.
+    ConvergenceError, KeyboardInterrupt, or what a callback raised
+        With errors="raise"; every simulation keeps what it recorded until then.
+    """
+    try:
+        listed = list(simulations)
+    except TypeError:
+        raise ValueError(f"simulations must be a list, got {type(simulations).__name__}") from None
+    for index, simulation in enumerate(listed):
+        if not isinstance(simulation, Simulation):
+            raise ValueError(f"simulations must be withe.Simulation, got {type(simulation).__name__} at [{index}]")
+    if len({id(simulation) for simulation in listed}) < len(listed):
+        raise ValueError("simulations must differ: one is there twice, take a copy()")
+    validation.choice(errors, "errors", ("raise", "return"))
+    threads = _processors() if workers is None else validation.integer(workers, "workers", 1, 4096)
+    runs = [
+        Run(simulation, simulation._stepping, duration, record_every, before_step, until, record)
+        for simulation in listed
+    ]
+    if not runs:
+        return []
+
+    stop = threading.Event()
+    with progress_bar(sum(each.duration for each in runs), "simulating", progress) as bar:
+
+        def work(each: Run[Simulation]) -> Record:
+            task = bar.task(each.duration)
+            try:
+                each.go(task.update, stop.is_set)
+            finally:
+                task.finish()
+            return each.record
+
+        pool = ThreadPoolExecutor(min(threads, len(runs)), thread_name_prefix="withe")
+        try:
+            futures = [pool.submit(work, each) for each in runs]
+            _wait(futures, errors == "raise")
+        finally:
+            stop.set()
+            pool.shutdown(wait=True, cancel_futures=True)
+    return [_result(future, errors) for future in futures] if errors == "return" else _all(futures)
+
+
+def _wait(futures: list[Future[Record]], first_error: bool) -> None:
+    """Wait in slices, so that Ctrl-C reaches this thread."""
+    pending = set(futures)
+    while pending:
+        done, pending = wait(pending, timeout=0.1, return_when=FIRST_EXCEPTION)
+        if first_error and any(future.exception() is not None for future in done):
+            return
+
+
+def _all(futures: list[Future[Record]]) -> list[Record | Exception]:
+    failed = [future.exception() for future in futures if future.done() and not future.cancelled()]
+    # A run that was stopped because of another's error is not the cause.
+    causes = [error for error in failed if error is not None and not isinstance(error, KeyboardInterrupt)]
+    for error in causes or [error for error in failed if error is not None]:
+        raise error
+    return [future.result() for future in futures]
+
+
+def _result(future: Future[Record], errors: str) -> Record | Exception:
+    error = future.exception()
+    if error is not None and not isinstance(error, Exception):
+        raise error
+    return error if error is not None else future.result()
+
+
+def _processors() -> int:
+    affinity: Any = getattr(os, "sched_getaffinity", None)
+    return max(1, len(affinity(0)) if affinity is not None else os.cpu_count() or 1)

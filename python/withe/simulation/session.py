@@ -1,0 +1,91 @@
+"""A scene while it runs, as every function that changes or reads it is given it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from withe import _core
+from withe.parts.description import describe, parameters_of
+from withe.parts.directory import Directory
+from withe.parts.kinds import CustomForcePart, DragPart, FluidPart, LoadPart, MassPart, RodPart, SupportPart
+from withe.parts.options import BuildOptions, check_tolerances
+from withe.simulation.settings import Settings
+
+__all__ = ["Session"]
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(eq=False)
+class Session:
+    """A scene while it runs.
+
+    Attributes
+    ----------
+    scene, gravity, options
+        As they were drawn and built; never changed.
+    directory : Directory
+        Parts now: those of the scene, and what came while running.
+    settings : Settings
+        What was set while running.
+    world : _core.World
+        The engine.
+    drawn_loads, custom_forces : tuple
+        Parts of the scene, in its order.
+    """
+
+    scene: Directory
+    gravity: FloatArray
+    options: BuildOptions
+    directory: Directory
+    settings: Settings
+    world: _core.World
+    drawn_loads: tuple[LoadPart, ...]
+    custom_forces: tuple[CustomForcePart, ...]
+
+    @classmethod
+    def begin(cls, scene: Directory, gravity: FloatArray, options: BuildOptions) -> Session:
+        """Build a scene that nobody else changes.
+
+        Raises
+        ------
+        ValueError
+            A scene that cannot be built.
+        """
+        description = describe(scene, gravity, options.bending)
+        if rods := scene.all(RodPart):
+            check_tolerances(
+                options, max(float(rod.lengths.sum()) for rod in rods), min(float(rod.lengths.min()) for rod in rods)
+            )
+        drawn_loads = tuple(scene.all(LoadPart))
+        settings = Settings(
+            rods=parameters_of(scene),
+            masses={part.name: part.mass for part in scene.all(MassPart)},
+            drags={part.name: part.coefficient for part in scene.all(DragPart)},
+            fluids={part.name: part.viscosity for part in scene.all(FluidPart)},
+            gravity=gravity.copy(),
+            supports={part.name: (index, part) for index, part in enumerate(scene.all(SupportPart))},
+            functions={part.name: part.function for part in drawn_loads if part.function is not None},
+        )
+        return cls(
+            scene=scene,
+            gravity=gravity,
+            options=options,
+            directory=scene.copy(),
+            settings=settings,
+            world=_core.World(description, options.engine()),
+            drawn_loads=drawn_loads,
+            custom_forces=tuple(scene.all(CustomForcePart)),
+        )
+
+    def copy(self) -> Session:
+        """Another in the same state, which goes its own way from here."""
+        return replace(self, directory=self.directory.copy(), settings=self.settings.copy(), world=self.world.copy())
+
+    @property
+    def loads(self) -> list[LoadPart]:
+        """All loads, in the order of the engine."""
+        return [*self.drawn_loads, *self.settings.loads.values()]

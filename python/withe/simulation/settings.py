@@ -1,0 +1,62 @@
+"""What was set on a simulation while it ran."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from withe.parts.kinds import LoadPart, SupportPart
+from withe.parts.parameters import RodParameters
+from withe.simulation.motion import Path
+
+__all__ = ["Settings"]
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass
+class Settings:
+    """What was set on a simulation that the engine does not keep in its state, or keeps in another form.
+
+    Attributes
+    ----------
+    rods : list of RodParameters
+    masses, drags, fluids : dict
+        Present value of each part, by name.
+    gravity : ndarray of shape (3,) [m/s^2]
+    supports : dict of str to (int, SupportPart)
+        Those that hold, with their index in the engine.
+    functions : dict of str to callable
+        Loads that vary, by name.
+    paths : dict of str to callable
+        Supports that move along a path, by name.
+    loads : dict of str to LoadPart
+        Those put on while running, in order.
+    """
+
+    rods: list[RodParameters]
+    masses: dict[str, float]
+    drags: dict[str, float]
+    fluids: dict[str, float]
+    gravity: FloatArray
+    supports: dict[str, tuple[int, SupportPart]]
+    functions: dict[str, Callable[[float], npt.ArrayLike]] = field(default_factory=dict)
+    paths: dict[str, Path] = field(default_factory=dict)
+    loads: dict[str, LoadPart] = field(default_factory=dict)
+
+    def copy(self) -> Settings:
+        """Settings that no longer change with these. What they hold is never changed in place."""
+        return Settings(
+            list(self.rods),
+            dict(self.masses),
+            dict(self.drags),
+            dict(self.fluids),
+            self.gravity.copy(),
+            dict(self.supports),
+            dict(self.functions),
+            dict(self.paths),
+            dict(self.loads),
+        )

@@ -1,0 +1,390 @@
+"""Simulations: a scene while it runs."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path as FilePath
+from typing import Any, Literal, overload
+
+import numpy as np
+import numpy.typing as npt
+
+from withe.common import validation
+from withe.common.progress import progress as progress_bar
+from withe.parts.applied_loads import AppliedLoads
+from withe.parts.directory import Directory
+from withe.parts.handles import Load
+from withe.parts.options import BuildOptions
+from withe.recording.record import Record
+from withe.recording.recorder import present
+from withe.simulation.control import Control
+from withe.simulation.linearisation import Linearisation
+from withe.simulation.loads import RunningLoads
+from withe.simulation.loop import Run
+from withe.simulation.measurements import Measurements
+from withe.simulation.obstacles import obstacle_outlines
+from withe.simulation.paths import EquilibriumPath, path_options
+from withe.simulation.placement import Placement
+from withe.simulation.readouts import Equilibrium
+from withe.simulation.session import Session
+from withe.simulation.snapshots import Snapshot, restore
+from withe.simulation.states import restore_frame
+from withe.simulation.stepping import Stepping
+
+__all__ = ["Simulation"]
+
+FloatArray = npt.NDArray[np.float64]
+
+_MAX_STEPS = 2**31 - 1
+
+
+class Simulation(AppliedLoads, Control, Placement, Measurements):
+    """A scene while it runs. Made by `Scene.build`.
+
+    Read-outs are copies. Rods, nodes, supports and loads are given by their handles or their names.
+
+    Examples
+    --------
+    >>> import withe
+    >>> scene = withe.Scene()
+    >>> rubber = withe.Material(youngs_modulus=1e6, density=1000.0)
+    >>> arm = scene.add_rod(start=(0, 0, 0), end=(0, 0, -0.3), nodes=31, radius=5e-3, material=rubber, name="arm")
+    >>> support = scene.clamp(arm.start)
+    >>> simulation = scene.build(time_step=5e-3)
+    >>> simulation.step(10)
+    >>> round(simulation.time, 6)
+    0.05
+    """
+
+    _stepping: Stepping
+    _initial: Snapshot
+
+    def __init__(self) -> None:
+        raise TypeError("a Simulation is made by Scene.build")
+
+    @classmethod
+    def _build(cls, directory: Directory, gravity: FloatArray, options: BuildOptions) -> Simulation:
+        """A simulation of a directory that nobody else changes."""
+        return cls._of(Stepping(Session.begin(directory, gravity, options)))
+
+    @classmethod
+    def _of(cls, stepping: Stepping, initial: Snapshot | None = None) -> Simulation:
+        self = cls.__new__(cls)
+        self._stepping = stepping
+        self._session = stepping.session
+        self._initial = self.snapshot() if initial is None else initial
+        return self
+
+    @property
+    def _bearer(self) -> RunningLoads:
+        return RunningLoads(self._session)
+
+    # Stepping
+
+    @property
+    def time(self) -> float:
+        """Time since the start [s]."""
+        return self._stepping.time
+
+    @property
+    def time_step(self) -> float:
+        """As it was given to `Scene.build` [s]."""
+        return self._session.options.time_step
+
+    def step(self, count: int = 1) -> None:
+        """Advance by exactly `count` time steps, whatever is cut inside.
+
+        Raises
+        ------
+        ConvergenceError
+            A step that cannot be solved even when cut; the state is then the last accepted one.
+        ValueError
+            A count that is not a whole number, or negative.
+        RuntimeError
+            Called by a callback of `run`, or while another thread runs the simulation.
+        """
+        self._stepping.refuse_in_run("step")
+        self._stepping.step(validation.integer(count, "number of steps", 0, _MAX_STEPS))
+
+    @overload
+    def equilibrium(self) -> Equilibrium: ...
+
+    @overload
+    def equilibrium(
+        self,
+        *,
+        path: Literal["arc_length"],
+        load: Load | str | Sequence[Load | str] | None = None,
+        start: float = 0.0,
+        to: float = 1.0,
+        steps: int = 1000,
+        turn: float = 0.1,
+    ) -> EquilibriumPath: ...
+
+    def equilibrium(
+        self,
+        *,
+        path: Literal["arc_length"] | None = None,
+        load: Load | str | Sequence[Load | str] | None = None,
+        start: float = 0.0,
+        to: float = 1.0,
+        steps: int = 1000,
+        turn: float = 0.1,
+    ) -> Equilibrium | EquilibriumPath:
+        """Find the static equilibrium that the present state leads to, and go there. Time stands still.
+
+        Supports that were moved go to their places, and loads that were changed come in, along the branch of equilibria
+        that begins at the present state, in steps in which no edge turns far. Where that branch ends (at a limit point)
+        or is not stable any more, the scene goes on dynamically: then `branch_changed` is true. Saddles are left, so
+        that a straight column that carries too much buckles.
+
+        With ``path="arc_length"`` the branch is followed through limit points, stable or not, by pseudo-arc-length
+        continuation [Riks 1979, Int. J. Solids Struct. 15; Crisfield 1981, Comput. Struct. 13], and all its points are
+        returned; the simulation ends at the last one.
+
+        Parameters
+        ----------
+        path : "arc_length", optional
+        load : Load, str, or several, optional
+            Loads whose present values the load factor multiplies. Without any, the factor is that of all that has been
+            changed since the last equilibrium (in the drawn state: of all loads), 0 before and 1 as it is asked for:
+            supports that were moved, loads, gravity, natural shapes; the last three as forces out of balance.
+        start : float
+            Load factor at which the path begins, with the equilibrium to which the present state leads there. Needs
+            loads.
+        to : float
+            Load factor at which the path ends, the first time that it is met. The loads keep that factor.
+        steps : int
+            The path also ends after so many steps.
+        turn : float [rad]
+            Greatest turn of an edge from one point of the path to the next.
+
+        Returns
+        -------
+        Equilibrium
+            Or, along a path, `EquilibriumPath`.
+
+        Raises
+        ------
+        ConvergenceError
+            None was found, or there is none (a free rod under gravity).
+        ValueError
+            A load that is a function of time, or a load factor or number of steps that cannot be.
+
+        Examples
+        --------
+        Half a circle, pinned at both ends, snaps through at its first limit load:
+
+        >>> import numpy as np
+        >>> import withe
+        >>> scene = withe.Scene(gravity=(0, 0, 0))
+        >>> angle = np.linspace(-np.pi / 2, np.pi / 2, 41)
+        >>> steel = withe.Material(youngs_modulus=2e11, poisson_ratio=0.3, density=7850.0)
+        >>> arc = np.stack([np.sin(angle), 0 * angle, np.cos(angle)], axis=1)
+        >>> arch = scene.add_rod(points=arc, radius=5e-3, material=steel)
+        >>> ends = scene.pin(arch.start), scene.pin(arch.end)
+        >>> load = scene.add_force(arch.node(20), (0, 0, -1.0))
+        >>> simulation = scene.build(integrator="static", planar=True)
+        >>> path = simulation.equilibrium(path="arc_length", load=load, to=1000.0)
+        >>> print(f"{path.load_factors[path.limit_points[0]]:.0f} N")
+        992 N
+        """
+        self._stepping.refuse_in_run("equilibrium")
+        self._session.world.check_idle()
+        if path is None:
+            return self._stepping.equilibrium()
+        validation.choice(path, "path", ("arc_length",))
+        functions = self._session.settings.functions
+        return self._stepping.path(path_options(self._session.directory, functions, load, start, to, steps, turn))
+
+    def run(
+        self,
+        duration: float,
+        record_every: float | None = None,
+        *,
+        progress: bool | Literal["always"] = True,
+        before_step: Callable[[Simulation], object] | None = None,
+        until: Callable[[Simulation], object] | None = None,
+        record: Mapping[str, Callable[[Simulation], npt.ArrayLike]] | None = None,
+    ) -> Record:
+        """Advance by a duration and record what happens.
+
+        Frames are taken at the start, at every multiple of `record_every` after it, and at the end. Where
+        that is no multiple of the time step, steps are shortened evenly to land on the frames.
+
+        Parameters
+        ----------
+        duration : float [s]
+        record_every : float [s]
+            By default a hundredth of the duration, rounded up to whole time steps.
+        progress : bool or "always"
+            Whether to show a progress bar; True shows one on a terminal and in a notebook.
+        before_step : callable
+            Called with the simulation once before every time step, never before an inner or repeated one:
+            the place for a controller.
+        until : callable
+            Called with the simulation after every time step; the run ends when it returns true.
+        record : mapping of str to callable
+            What else to record: each is called with the simulation at every frame, and its results are
+            ``record[name]``.
+
+        Returns
+        -------
+        Record
+            Also kept as `simulation.record`.
+
+        Raises
+        ------
+        ConvergenceError, KeyboardInterrupt, or what a callback raised
+            What was recorded until then is `simulation.record`.
+        ValueError
+            A duration or record_every that is not positive or too short to change the time, or a callback
+            that cannot be called.
+        RuntimeError
+            Called by a callback of a run: those may read, set, hold and copy the simulation, but not advance it
+            or take it back.
+        """
+        self._stepping.refuse_in_run("run")
+        loop = Run(self, self._stepping, duration, record_every, before_step, until, record)
+        with progress_bar(loop.duration, "simulating", progress) as bar:
+            loop.go(bar.update, lambda: False)
+        return loop.record
+
+    @property
+    def record(self) -> Record:
+        """What the last `run` recorded, also when it ended early.
+
+        Raises
+        ------
+        RuntimeError
+            There was none.
+        """
+        if self._stepping.recorder is None:
+            raise RuntimeError("there is no record: call run first")
+        return self._stepping.recorder.record
+
+    # At a moment
+
+    def linearise(self) -> Linearisation:
+        """Equations of motion linearised about the present configuration, with supports held.
+
+        Returns
+        -------
+        Linearisation
+            Tangent stiffness, masses, natural frequencies and modes. Meaningful at an equilibrium.
+
+        Examples
+        --------
+        >>> import withe
+        >>> scene = withe.Scene(gravity=(0, 0, 0))
+        >>> steel = withe.Material(youngs_modulus=2e11, poisson_ratio=0.3, density=7850.0)
+        >>> beam = scene.add_rod(start=(0, 0, 0), end=(1, 0, 0), nodes=51, radius=5e-3, material=steel)
+        >>> wall = scene.clamp(beam.start)
+        >>> print(f"{scene.build().linearise().frequencies(1)[0]:.2f} Hz")
+        7.06 Hz
+        """
+        return self._stepping.linearise()
+
+    def __getitem__(self, name: str) -> Any:
+        """The handle of the part, node or edge of that name."""
+        return self._session.directory.handle(name)
+
+    def __repr__(self) -> str:
+        rods = ", ".join(rod.name for rod in self.rods)
+        return f"Simulation(t = {self.time:g} s; rods {rods})"
+
+    # State
+
+    def snapshot(self) -> Snapshot:
+        """The whole state, to go back to with `restore`, bit by bit."""
+        return Snapshot(self._session.world.snapshot(), self._session.world.time, self._session.settings.copy())
+
+    def restore(self, snapshot: Snapshot | Record, frame: int = -1) -> None:
+        """Go back to a snapshot, of this simulation or another of the same scene, or to a frame of a record.
+
+        A record holds positions, velocities, frames and spins of rods and their time, to the last digit or nearly;
+        everything else stays as it is here: supports must be where they were then, and what was set (loads, natural
+        shapes, materials) and the history that contact and friction remember are not in it. Joints are
+        turned so that they stress the edges at them least, and turn as these do on the mean.
+
+        Parameters
+        ----------
+        snapshot : Snapshot or Record
+        frame : int
+            Of a record; the last one by default.
+
+        Raises
+        ------
+        ValueError
+            A snapshot or record of another scene, a damaged one, a snapshot from a file that needs functions of time
+            that this simulation does not have, or a record whose nodes are elsewhere than supports hold them.
+        RuntimeError
+            Called by a callback of `run`.
+        """
+        self._stepping.refuse_in_run("restore")
+        if isinstance(snapshot, Record):
+            restore_frame(self._session, snapshot, frame)
+        elif isinstance(snapshot, Snapshot):
+            restore(self._session, snapshot)
+        else:
+            raise ValueError(
+                f"snapshot must be a withe.Snapshot, got {type(snapshot).__name__}; a withe.Record will do too"
+            )
+        self._stepping.frame_time = None
+
+    def reset(self) -> None:
+        """Go back to the scene as it was drawn, and undo everything that was set since.
+
+        Raises
+        ------
+        RuntimeError
+            Called by a callback of `run`.
+        """
+        self._stepping.refuse_in_run("reset")
+        self.restore(self._initial)
+
+    def copy(self) -> Simulation:
+        """Another simulation in the same state, which goes its own way from here."""
+        return Simulation._of(self._stepping.copy(), self._initial)
+
+    def __copy__(self) -> Simulation:
+        return self.copy()
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Simulation:
+        return self.copy()
+
+    def __getstate__(self) -> dict[str, Any]:
+        session = self._session
+        return {
+            "scene": session.scene,
+            "gravity": session.gravity,
+            "options": session.options,
+            "snapshot": self.snapshot(),
+            "functions": session.settings.functions,
+            "paths": session.settings.paths,
+        }
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        built = Simulation._build(state["scene"], state["gravity"], state["options"])
+        self.__dict__.update(built.__dict__)
+        self._session.settings.functions = state["functions"]
+        self._session.settings.paths = state["paths"]
+        self.restore(state["snapshot"])
+
+    # Pictures
+
+    def plot(self, **options: Any) -> Any:
+        """The present shape as a matplotlib figure; see `withe.view.plot` for the options."""
+        return self._frame().plot(**options)
+
+    def view(self, **options: Any) -> Any:
+        """The present shape to turn about, in a notebook or a window; see `withe.view.view`."""
+        return self._frame().view(**options)
+
+    def picture(self, path: str | os.PathLike[str], **options: Any) -> FilePath:
+        """Render the present shape into a .png file; see `withe.view.picture`."""
+        return self._frame().picture(path, **options)
+
+    def _frame(self) -> Record:
+        return present(self, obstacle_outlines(self._session.directory))

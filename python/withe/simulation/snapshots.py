@@ -1,0 +1,256 @@
+"""Snapshots: the whole state of a simulation at one moment, to go back to bit by bit."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+from pathlib import Path as FilePath
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from withe import io
+from withe.common import validation
+from withe.parts.directory import Directory
+from withe.parts.kinds import LOAD_KINDS, SUPPORT_KINDS, LoadPart, ObstaclePart, SupportPart
+from withe.parts.parameters import RodParameters
+from withe.simulation.motion import Path, Turn
+from withe.simulation.session import Session
+from withe.simulation.settings import Settings
+
+__all__ = ["Snapshot", "restore"]
+
+FloatArray = npt.NDArray[np.float64]
+
+_FILE_VERSION = 3
+
+
+class Snapshot:
+    """The whole state of a simulation at one moment. Made by `Simulation.snapshot`, or read with `load`.
+
+    It can be restored in any simulation of the same scene with the same options, and continues there bit
+    by bit. Functions of time (of loads and paths) are not stored in files and pickles: a simulation that
+    restores such a snapshot must have them already.
+    """
+
+    def __init__(self, state: bytes, time: float, settings: Settings, missing: tuple[str, ...] = ()) -> None:
+        self._state = state
+        self._time = time
+        self._settings = settings
+        self._missing = missing  # names of loads and supports whose functions are not in the file
+
+    @property
+    def time(self) -> float:
+        """When it was taken [s]."""
+        return self._time
+
+    def __repr__(self) -> str:
+        return f"Snapshot(t = {self._time:g} s)"
+
+    def _function_names(self) -> tuple[str, ...]:
+        """Loads and supports whose functions no file can hold."""
+        paths = (name for name, path in self._settings.paths.items() if not isinstance(path, Turn))
+        return tuple(sorted({*self._settings.functions, *paths, *self._missing}))
+
+    def __getstate__(self) -> dict[str, Any]:
+        settings = self._settings.copy()
+        settings.functions = {}
+        settings.loads = {name: replace(load, function=None) for name, load in settings.loads.items()}
+        settings.paths = {name: path for name, path in settings.paths.items() if isinstance(path, Turn)}
+        return {
+            "_state": self._state,
+            "_time": self._time,
+            "_settings": settings,
+            "_missing": self._function_names(),
+        }
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Snapshot):
+            return NotImplemented
+        return self._state == other._state
+
+    def __hash__(self) -> int:
+        return hash(self._state)
+
+    def save(self, path: str | os.PathLike[str]) -> FilePath:
+        """Write the snapshot to one .npz file.
+
+        Raises
+        ------
+        OSError
+            The file cannot be written.
+        """
+        settings = self._settings
+        arrays: dict[str, npt.NDArray[Any]] = {
+            "state": np.frombuffer(self._state, np.uint8),
+            "gravity": settings.gravity,
+        }
+        for index, rod in enumerate(settings.rods):
+            arrays |= {f"rod_{index}_{word}": values for word, values in rod.arrays().items()}
+        supports = []
+        for number, (name, (index, part)) in enumerate(settings.supports.items()):
+            supports.append({"name": name, "index": index, "kind": part.kind, "node": part.node_name})
+            arrays[f"support_{number}_free"] = part.free
+            turn = settings.paths.get(name)
+            if isinstance(turn, Turn):
+                arrays |= {f"support_{number}_{word}": values for word, values in turn.arrays().items()}
+        loads = []
+        for number, load in enumerate(settings.loads.values()):
+            loads.append({"name": load.name, "kind": load.kind, "node": load.node, "follower": load.follower})
+            arrays[f"load_{number}_value"] = load.value
+            if load.axis is not None:
+                arrays[f"load_{number}_axis"] = load.axis
+        header = {
+            "time": self._time,
+            "rods": len(settings.rods),
+            "masses": settings.masses,
+            "drags": settings.drags,
+            "fluids": settings.fluids,
+            "supports": supports,
+            "loads": loads,
+            "functions": self._function_names(),
+        }
+        return io.save_arrays(path, "snapshot", _FILE_VERSION, header, arrays)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Snapshot:
+        """Read a snapshot that `save` wrote. Nothing in the file is ever run.
+
+        Raises
+        ------
+        ValueError
+            A file that is damaged, not a snapshot, or of another version.
+        OSError
+            The file cannot be opened.
+        """
+        header, arrays = io.load_arrays(path, "snapshot", _FILE_VERSION)
+        try:
+            return cls._from_file(header, arrays)
+        except (KeyError, TypeError, AttributeError, ValueError, OverflowError) as error:
+            raise ValueError(f"{path} is a damaged snapshot: {error}") from error
+
+    @classmethod
+    def _from_file(cls, header: dict[str, Any], arrays: dict[str, npt.NDArray[Any]]) -> Snapshot:
+        rods = []
+        for index in range(validation.integer(header["rods"], "rods", 1, 10_000_000)):
+            mine = {
+                name.removeprefix(f"rod_{index}_"): values
+                for name, values in arrays.items()
+                if name.startswith(f"rod_{index}_")
+            }
+            rods.append(RodParameters.from_arrays(mine, len(mine["stretch_stiffness"]), f"rod {index}"))
+        supports: dict[str, tuple[int, SupportPart]] = {}
+        paths: dict[str, Path] = {}
+        for number, entry in enumerate(header["supports"]):
+            name, kind = str(entry["name"]), validation.choice(entry["kind"], "kind", SUPPORT_KINDS)
+            free = validation.number_array(arrays[f"support_{number}_free"], "free", (3, 3))
+            index = validation.integer(entry["index"], "index", 0, 10_000_000)
+            # Which node that is, the simulation that restores it knows by the name.
+            supports[name] = index, SupportPart(name, kind, (-1, -1), str(entry["node"]), free)  # type: ignore[arg-type]
+            if f"support_{number}_drawn" in arrays:
+                paths[name] = Turn(
+                    *(
+                        validation.number_array(arrays[f"support_{number}_{word}"], word, shape)
+                        for word, shape in (
+                            ("positions", (2, 3)),
+                            ("tangents", (2, 3)),
+                            ("rolls", (2,)),
+                            ("times", (2,)),
+                            ("drawn", (2, 3)),
+                        )
+                    )
+                )
+        loads: dict[str, LoadPart] = {}
+        for number, entry in enumerate(header.get("loads", [])):  # which files had none of at first
+            name, kind = str(entry["name"]), validation.choice(entry["kind"], "kind", LOAD_KINDS)
+            rod, node = (validation.integer(index, "node", 0, 10_000_000) for index in entry["node"])
+            axis = arrays.get(f"load_{number}_axis")
+            loads[name] = LoadPart(
+                name,
+                kind,  # type: ignore[arg-type]
+                (rod, node),
+                validation.vector(arrays[f"load_{number}_value"], "value"),
+                None,
+                validation.truth(entry["follower"], "follower"),
+                None if axis is None else validation.unit_vector(axis, "axis"),
+            )
+        settings = Settings(
+            rods=rods,
+            masses={str(name): validation.non_negative(mass, name) for name, mass in header["masses"].items()},
+            drags={str(name): validation.non_negative(drag, name) for name, drag in header["drags"].items()},
+            fluids={str(name): validation.positive(fluid, name) for name, fluid in header["fluids"].items()},
+            gravity=validation.vector(arrays["gravity"], "gravity"),
+            supports=supports,
+            paths=paths,
+            loads=loads,
+        )
+        missing = tuple(str(name) for name in header["functions"])
+        state = arrays["state"]
+        if state.dtype != np.uint8 or state.ndim != 1:
+            raise ValueError("its state must be bytes")
+        return cls(state.tobytes(), validation.number(header["time"], "time"), settings, missing)
+
+
+def restore(session: Session, snapshot: Snapshot) -> None:
+    """Go back to a snapshot; see `Simulation.restore`.
+
+    Raises
+    ------
+    ValueError
+        A snapshot of another scene, a damaged one, or one that needs functions of time that the session does not have.
+    """
+    settings = _matched(snapshot, session.settings, session.directory, session.scene)
+    session.world.restore(snapshot._state)
+    parts = session.directory.parts
+    for name in set(parts) - set(session.scene.parts) - set(settings.supports):
+        del parts[name]
+    parts.update({name: part for name, (_, part) in settings.supports.items()})
+    parts.update(settings.loads)
+    session.settings = settings
+
+
+def _matched(snapshot: Snapshot, mine: Settings, directory: Directory, scene: Directory) -> Settings:
+    """Settings of a snapshot, made whole with what only the simulation that restores it knows.
+
+    Parameters
+    ----------
+    snapshot : Snapshot
+    mine : Settings
+        Of that simulation now.
+    directory, scene : Directory
+        Its parts now, and those of the scene as it was drawn.
+
+    Raises
+    ------
+    ValueError
+        A snapshot of another scene, or one that needs functions of time that the simulation does not have.
+    """
+    settings = snapshot._settings.copy()
+    counts = [len(rod.stretch_stiffness) for rod in mine.rods]
+    if (
+        [len(rod.stretch_stiffness) for rod in settings.rods] != counts
+        or settings.masses.keys() != mine.masses.keys()
+        or settings.drags.keys() != mine.drags.keys()
+        or settings.fluids.keys() != mine.fluids.keys()
+    ):
+        raise ValueError("snapshot belongs to another scene")
+    for name, (index, part) in settings.supports.items():
+        node, _ = directory.node(part.node_name, f"node held by {name!r}")
+        settings.supports[name] = index, SupportPart(name, part.kind, node, part.node_name, part.free)
+        known = scene.parts.get(name)
+        if known is not None and not isinstance(known, SupportPart):
+            raise ValueError(f"snapshot belongs to another scene: {name!r} is no support in this one")
+    for name in snapshot._missing:
+        drawn = scene.parts.get(name)
+        if (name in settings.supports or isinstance(drawn, ObstaclePart)) and name in mine.paths:
+            settings.paths[name] = mine.paths[name]
+        elif name in mine.functions:
+            settings.functions[name] = mine.functions[name]
+        elif isinstance(drawn, LoadPart) and drawn.function is not None:
+            settings.functions[name] = drawn.function
+        else:
+            raise ValueError(
+                f"snapshot needs the function of time of {name!r}, which no file holds: set it on this simulation first"
+            )
+    return settings

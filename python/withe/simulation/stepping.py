@@ -1,0 +1,142 @@
+"""A simulation's way through time: its steps, its equilibria, its run."""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from withe import _core
+from withe.errors import CoarseMeshWarning, CoarseStepWarning, ConvergenceError
+from withe.recording.recorder import Recorder
+from withe.simulation.functions import apply_functions, force_function, step_callback
+from withe.simulation.linearisation import Linearisation, Stability
+from withe.simulation.loads import load_index
+from withe.simulation.paths import EquilibriumPath, PathOptions, path_of
+from withe.simulation.readouts import Equilibrium
+from withe.simulation.session import Session
+from withe.simulation.supports import find_support
+
+__all__ = ["Stepping"]
+
+
+class Stepping:
+    """What advances a session.
+
+    Parameters
+    ----------
+    session : Session
+
+    Attributes
+    ----------
+    recorder : Recorder or None
+        Of the last run.
+    frame_time : (float, float) or None
+        Time of the engine at the last frame of a run, and the time of that frame: steps add up to it but for rounding.
+    """
+
+    def __init__(self, session: Session) -> None:
+        self.session = session
+        self.recorder: Recorder[Any] | None = None
+        self.frame_time: tuple[float, float] | None = None
+        self._running = False
+
+    def copy(self) -> Stepping:
+        """That of a copied session, in no run."""
+        other = Stepping(self.session.copy())
+        other.frame_time = self.frame_time
+        return other
+
+    @property
+    def time(self) -> float:
+        """Time since the start [s]."""
+        now = self.session.world.time
+        if self.frame_time is not None and self.frame_time[0] == now:
+            return self.frame_time[1]
+        return now
+
+    def step(self, count: int) -> None:
+        """Advance by time steps."""
+        with self._convergence():
+            self.session.world.step(count, step_callback(self.session), force_function(self.session))
+
+    def advance_to(self, time: float) -> None:
+        """Advance to a time, with steps of equal length that are no longer than the time step."""
+        with self._convergence():
+            self.session.world.advance_to(time, step_callback(self.session), force_function(self.session))
+
+    def equilibrium(self) -> Equilibrium:
+        """Go to the equilibrium that the present state leads to."""
+        world = self.session.world
+        apply_functions(self.session, world.time, world.time)
+        with self._convergence():
+            found = world.equilibrium(None, force_function(self.session))
+        stability: Stability = "stable" if found.stable else "diverges"
+        if not found.decided:
+            stability = self.linearise().stability
+        return Equilibrium(stability == "stable", stability, found.branch_changed, found.iterations, found.residual)
+
+    def path(self, wanted: PathOptions) -> EquilibriumPath:
+        """Go along a path of equilibria."""
+        session = self.session
+        apply_functions(session, session.world.time, session.world.time)
+        loads = [load_index(session, part) for part in wanted.loads]
+        with self._convergence():
+            found = session.world.equilibrium_path(
+                loads, wanted.start, wanted.end, wanted.steps + 1, wanted.turn, None, force_function(session)
+            )
+        return path_of(
+            found,
+            lambda rod: session.directory.layout.rows(session.directory.rod(rod).index),
+            lambda support: find_support(session, support)[0],
+        )
+
+    def linearise(self) -> Linearisation:
+        """Equations of motion linearised about the present configuration."""
+        found = self.session.world.linearise(force_function(self.session))
+        return Linearisation(found.geometric, found.gradients, found.stiffnesses, found.mass, found.displacement)
+
+    @contextmanager
+    def in_run(self) -> Iterator[None]:
+        """While this lasts, only the loop of `run` may advance the simulation."""
+        self.refuse_in_run("run")
+        self._running = True
+        try:
+            yield
+        finally:
+            self._running = False
+
+    def refuse_in_run(self, what: str) -> None:
+        """Refuse what would change the time or the state behind the back of a run, whose record were wrong then."""
+        if self._running:
+            raise RuntimeError(
+                f"{what} cannot be called while the simulation runs: before_step may read, set and hold it, until and "
+                "record may read it, and all may go on with a copy()"
+            )
+
+    @contextmanager
+    def _convergence(self) -> Iterator[None]:
+        """Give the engine's failures the names of this scene, and pass on its warnings."""
+        world = self.session.world
+        try:
+            yield
+        except _core.ConvergenceFailure as failure:
+            message, time, step, rod, node, residual = failure.args
+            name = self.session.directory.layout.rods[rod].name if rod >= 0 else None
+            raise ConvergenceError(message, time, step, name, node if node >= 0 else None, residual) from None
+        finally:
+            if warning := world.take_warning():
+                warnings.warn(warning, CoarseMeshWarning, stacklevel=_levels_to_user())
+            if warning := world.take_step_warning():
+                warnings.warn(warning, CoarseStepWarning, stacklevel=_levels_to_user())
+
+
+def _levels_to_user() -> int:
+    """How many calls lie between what calls this and the line outside of withe that led here."""
+    level, frame = 1, sys._getframe(1)
+    while frame.f_back is not None and frame.f_globals.get("__name__", "").split(".")[0] in ("withe", "contextlib"):
+        frame = frame.f_back
+        level += 1
+    return level

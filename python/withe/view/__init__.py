@@ -1,0 +1,9 @@
+"""Pictures of a record: figures by matplotlib; pictures, films and a viewer by PyVista.
+
+Both are extras, imported when first used; ``make view`` or ``pip install ".[view]"`` in a clone of withe installs them.
+"""
+
+from withe.view.figures import plot
+from withe.view.pictures import animate, picture, view
+
+__all__ = ["animate", "picture", "plot", "view"]

@@ -1,0 +1,260 @@
+"""Figures of recorded frames: shapes and energies, by matplotlib, which is imported when first used."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from withe.common.extras import require
+from withe.common.frames import Frames
+from withe.common.outlines import ObstacleOutline
+from withe.view import scenery
+
+__all__ = ["plot"]
+
+FloatArray = npt.NDArray[np.float64]
+
+
+def plot(record: Frames, *, shapes: int = 6) -> Any:
+    """Draw the shapes of the rods at several times, and the energies over time.
+
+    Obstacles near the rods are drawn too: in two dimensions planes as lines, spheres and capsules as outlines, in three
+    see-through. Those that move are drawn at the same times as the rods, in the same colours.
+
+    Parameters
+    ----------
+    record : Record
+    shapes : int
+        At how many times, evenly chosen, the first and last among them.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        In two dimensions where the motion stays in a coordinate plane, else in three.
+
+    Raises
+    ------
+    ValueError
+        A record without frames, or fewer than one shape.
+    ImportError
+        matplotlib is not installed.
+
+    Examples
+    --------
+    >>> record.plot(shapes=4).savefig("arm.png")
+    """
+    if len(record) == 0:
+        raise ValueError("record has no frames to plot")
+    if int(shapes) != shapes or shapes < 1:
+        raise ValueError(f"shapes must be a positive integer, got {shapes!r}")
+    pyplot = require("matplotlib.pyplot", "view")
+    with pyplot.rc_context(_STYLE):
+        single = len(record) == 1
+        figure = pyplot.figure(figsize=(5.5, 4.6) if single else (11.0, 4.6), layout="constrained")
+        grid = figure.add_gridspec(1, 1 if single else 2, width_ratios=[1] if single else [1.1, 1.0])
+        axes = _plot_shapes(figure, grid[0], record, int(shapes))
+        if not single:
+            _plot_energies(figure.add_subplot(grid[1]), record)
+        if axes.name == "3d":
+            _fit(axes)
+    if "inline" in pyplot.get_backend():
+        pyplot.close(figure)  # a notebook shows what the cell returns, and would show this twice
+    return figure
+
+
+_STYLE = {
+    "axes.edgecolor": "#8a9299",
+    "axes.labelcolor": "#33383d",
+    "axes.spines.right": False,
+    "axes.spines.top": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": "#e3e7ea",
+    "grid.linewidth": 0.8,
+    "xtick.color": "#5c646b",
+    "ytick.color": "#5c646b",
+    "legend.frameon": False,
+    "lines.solid_capstyle": "round",
+    "font.size": 10,
+}
+_OBSTACLE, _OBSTACLE_FILL = "#8a9299", "#d9dfe4"
+_ENERGY_COLOURS = {
+    "kinetic": "#e76f51",
+    "stretch": "#e9b44c",
+    "bend": "#2a9d8f",
+    "twist": "#8d6a9f",
+    "gravity": "#457b9d",
+    "loads": "#6a994e",
+    "contact": "#c8553d",
+    "total": "#33383d",
+}
+
+
+def _plot_shapes(figure: Any, place: Any, record: Frames, count: int) -> Any:
+    colormaps = require("matplotlib", "view").colormaps
+    colors = require("matplotlib.colors", "view")
+    cm = require("matplotlib.cm", "view")
+    positions, times = record.positions(), record.times
+    frames = np.unique(np.linspace(0, len(record) - 1, count).round().astype(int))
+    size = float(np.ptp(positions.reshape(-1, 3), axis=0).max())
+    factor, prefix = _prefix(size, (1.0, 1e-3, 1e-6))
+    axes_shown = _plane(positions)
+    three = axes_shown is None
+    shown = list(range(3)) if axes_shown is None else axes_shown
+    axes = figure.add_subplot(place, projection="3d" if three else None)
+    late = colors.LinearSegmentedColormap.from_list("ink", colormaps["YlGnBu"](np.linspace(0.3, 1.0, 64)))
+    end = times[-1] if times[-1] > times[0] else times[0] + 1.0
+    scale = cm.ScalarMappable(colors.Normalize(times[0], end), late)
+    for frame in frames:
+        for rod in record.rods:
+            points = positions[frame, rod.rows][:, shown] * factor
+            if rod.closed:
+                points = np.concatenate([points, points[:1]])
+            axes.plot(*points.T, color=scale.to_rgba(times[frame]), linewidth=2.2)
+    nodes = positions.reshape(-1, 3)
+    around = []
+    for obstacle in record.obstacles:
+        places = record.obstacle_position(obstacle)[frames]
+        around.append(scenery.framing(obstacle, places, nodes))
+        still = bool(np.all(places == places[0]))
+        for place, time in zip(places[: 1 if still else None], times[frames], strict=False):
+            ink = _OBSTACLE if still else scale.to_rgba(time)
+            if three:
+                _draw_solid(axes, obstacle, place, np.concatenate([nodes, *around]), factor, ink)
+            else:
+                _draw_section(axes, obstacle, place, nodes, shown, factor, ink)
+    names = "xyz"
+    axes.set_xlabel(f"{names[shown[0]]} [{prefix}m]")
+    axes.set_ylabel(f"{names[shown[1]]} [{prefix}m]")
+    if three:
+        axes.set_zlabel(f"z [{prefix}m]")
+        _box(axes, np.concatenate([nodes, *around]) * factor)
+    else:
+        axes.set_aspect("equal", adjustable="datalim")
+    if len(frames) > 1:
+        bar = figure.colorbar(scale, ax=axes, shrink=0.75, pad=0.12 if three else 0.03)
+        bar.set_label("time [s]")
+        bar.outline.set_visible(False)
+    return axes
+
+
+def _draw_section(
+    axes: Any,
+    obstacle: ObstacleOutline,
+    place: FloatArray,
+    nodes: FloatArray,
+    shown: list[int],
+    factor: float,
+    ink: Any,
+) -> None:
+    """An obstacle where it is seen along one coordinate: the line of a plane, the outline of a sphere or capsule."""
+    if obstacle.kind == "capsule":
+        first, second = (end[shown] * factor for end in scenery.ends(obstacle, place))
+        outline = scenery.profile(first, second, obstacle.radius * factor)
+        shape = require("matplotlib.patches", "view").Polygon(
+            outline, facecolor=_OBSTACLE_FILL, edgecolor=ink, linewidth=1.2, zorder=1.5
+        )
+        axes.add_artist(shape)
+        if len(scenery.framing(obstacle, place[None], nodes)):
+            axes.update_datalim(outline)
+        return
+    normal = obstacle.axis[shown]
+    if np.linalg.norm(normal) <= 1e-9 * np.linalg.norm(obstacle.axis):
+        return  # it faces the reader
+    if len(scenery.framing(obstacle, place[None], nodes)):
+        foot = nodes[:, shown].mean(axis=0)
+        foot = foot - normal * (normal @ (foot - place[shown])) / (normal @ normal)
+        # The line has no ends; both points count for the limits, so they are near each other.
+        beside = 1e-3 * np.ptp(nodes[:, shown], axis=0).max() * np.array([-normal[1], normal[0]])
+        axes.axline(foot * factor, (foot + beside) * factor, color=ink, linewidth=1.6, zorder=1.5)
+
+
+def _draw_solid(
+    axes: Any, obstacle: ObstacleOutline, place: FloatArray, nodes: FloatArray, factor: float, ink: Any
+) -> None:
+    """An obstacle in three dimensions, see-through: a patch of a plane, a sphere or a capsule."""
+    if not len(scenery.framing(obstacle, place[None], nodes)):
+        return
+    if obstacle.kind == "plane":
+        corners = scenery.patch(obstacle, place, nodes, 0.3)[[0, 1, 3, 2]].reshape(2, 2, 3) * factor
+        axes.plot_surface(*np.moveaxis(corners, -1, 0), color=_OBSTACLE_FILL, alpha=0.5, shade=False)
+        return
+    grid = scenery.surface(obstacle, place) * factor
+    axes.plot_surface(*np.moveaxis(grid, -1, 0), color=ink, alpha=0.35, linewidth=0.0)
+
+
+def _box(axes: Any, positions: FloatArray) -> None:
+    """Three axes of one scale around all positions, with few ticks where there is little room."""
+    points = positions.reshape(-1, 3)
+    size = np.ptp(points, axis=0)
+    spans = np.maximum(1.05 * size, 0.1 * size.max())
+    middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    for axis, centre, span in zip((axes.xaxis, axes.yaxis, axes.zaxis), middle, spans, strict=True):
+        # matplotlib measures these distances, and its own 8 and 21 points, by the spans of the other two axes.
+        others = spans.max() / np.sqrt(0.5 * (spans @ spans - span**2))
+        axis.set_tick_params(pad=10.0 * others - 8.0)
+        axis.labelpad = 26.0 * others - 21.0
+        axis.set_view_interval(centre - 0.5 * span, centre + 0.5 * span, ignore=True)
+        axis.set_pane_color((1.0, 1.0, 1.0, 0.0))
+        axis.set_ticks(_ticks(centre - 0.5 * span, centre + 0.5 * span, max(1, round(4.0 * span / spans.max()))))
+
+
+def _ticks(low: float, high: float, count: int) -> list[float]:
+    """Round numbers away from both ends, where their labels would meet those of the next axis."""
+    ticker = require("matplotlib.ticker", "view")
+    room = 0.1 * (high - low)
+    for wanted in range(count, count + 6):
+        ticks = [float(t) for t in ticker.MaxNLocator(wanted).tick_values(low, high) if low + room <= t <= high - room]
+        if len(ticks) >= min(2, count):
+            break
+    return ticks
+
+
+def _fit(axes: Any) -> None:
+    """Make a box smaller until the page has room for its labels, of which the layout does not know."""
+    spans, page = np.ptp([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()], axis=1), axes.figure.bbox
+    for zoom in np.arange(1.0, 0.4, -0.05):
+        axes.set_box_aspect(spans, zoom=zoom)
+        axes.figure.draw_without_rendering()
+        drawn = axes.get_tightbbox()
+        if np.all(drawn.min >= page.min) and np.all(drawn.max <= page.max):
+            break
+
+
+def _plot_energies(axes: Any, record: Frames) -> None:
+    energy, times = record.energy(), record.times
+    curves = {name: getattr(energy, name) for name in _ENERGY_COLOURS}
+    # Heights have no zero of their own: gravity counts from the first frame.
+    curves["total"] = curves["total"] - energy.gravity[0]
+    curves["gravity"] = curves["gravity"] - energy.gravity[0]
+    largest = max(float(np.abs(values).max()) for values in curves.values())
+    factor, prefix = _prefix(largest, (1.0, 1e-3, 1e-6, 1e-9))
+    for name, values in curves.items():
+        if name == "total" or np.abs(values).max() > 2e-3 * largest:
+            width = 1.4 if name == "total" else 1.8
+            style = "--" if name == "total" else "-"
+            label = "gravity, from the start" if name == "gravity" else name
+            axes.plot(times, values * factor, style, color=_ENERGY_COLOURS[name], linewidth=width, label=label)
+    axes.set_xlabel("time [s]")
+    axes.set_ylabel(f"energy [{prefix}J]")
+    axes.margins(x=0.0)
+    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, columnspacing=1.2, handlelength=1.6)
+
+
+def _prefix(largest: float, units: tuple[float, ...]) -> tuple[float, str]:
+    """A factor and its prefix that bring the largest value to one or more."""
+    prefixes = {1.0: "", 1e-3: "m", 1e-6: "\N{MICRO SIGN}", 1e-9: "n"}
+    unit = next((unit for unit in units if largest >= unit), units[-1] if largest > 0.0 else 1.0)
+    return 1.0 / unit, prefixes[unit]
+
+
+def _plane(positions: FloatArray) -> list[int] | None:
+    """The two coordinates of a motion in a coordinate plane; None for any other."""
+    extents = np.ptp(positions.reshape(-1, 3), axis=0)
+    flat = extents <= 1e-6 * extents.max()
+    if not flat.any():
+        return None
+    missing = 1 if flat[1] else int(np.flatnonzero(flat)[0])
+    return [axis for axis in range(3) if axis != missing]

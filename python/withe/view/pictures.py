@@ -1,0 +1,242 @@
+"""Pictures, films and a viewer of recorded frames, by PyVista, which is imported when first used."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from withe.common.extras import require
+from withe.common.frames import Frames
+from withe.common.progress import progress as progress_bar
+from withe.io import written_beside
+from withe.view.films import Film, film_places
+from withe.view.rendering import ColorBy, Stage
+
+__all__ = ["animate", "picture", "view"]
+
+FloatArray = npt.NDArray[np.float64]
+
+
+def picture(
+    record: Frames,
+    path: str | os.PathLike[str],
+    *,
+    frame: int = -1,
+    ghosts: Sequence[int] = (),
+    size: Sequence[int] = (1280, 960),
+    color_by: ColorBy = "rod",
+    camera: str | npt.ArrayLike | None = None,
+    ground: float | None = None,
+    label: str | None = None,
+) -> Path:
+    """Render one frame into a .png file: rods as tubes, and planes, spheres and capsules.
+
+    Of a plane a square around the rods is drawn, and what is far away, or much larger than the rods, does not move
+    the camera.
+
+    Parameters
+    ----------
+    record : Record
+    path : path
+        The file, ending in .png.
+    frame : int
+        Which frame; negative numbers count from the last one.
+    ghosts : sequence of int
+        Other frames, drawn faintly.
+    size : pair of int [px]
+    color_by : {"rod", "tension", "curvature", "twist", "speed"}
+        One colour a rod, or the quantity with its scale, the same for all frames.
+    camera : str or array_like of shape (3,), optional
+        From where to look: "front", "side", "top", "oblique" or a direction. By default along the
+        normal of a planar motion, and obliquely at any other.
+    ground : float, optional [m]
+        Height at which the shadow falls; by default a level plane near the rods, or a little below them.
+    label : str, optional
+        Text in the lower left corner.
+
+    Returns
+    -------
+    pathlib.Path
+        The file.
+
+    Raises
+    ------
+    ValueError
+        A record without frames, a frame that it has not, another suffix, or an option out of range.
+    ImportError
+        PyVista is not installed.
+    RuntimeError
+        Nothing can be rendered here; the message names the package to install.
+    """
+    path = _path(path, ".png")
+    number = _frame(record, frame)
+    others = [_frame(record, ghost) for ghost in ghosts]
+    stage = Stage(
+        record, size=size, color_by=color_by, camera=camera, ground=ground, frames=[*others, number], ghosts=others
+    )
+    try:
+        stage.show(number)
+        if label:
+            stage.label(label)
+        pyplot_image = require("matplotlib.image", "view")
+        with written_beside(path) as temporary:
+            pyplot_image.imsave(temporary, stage.image(), pil_kwargs={"optimize": True})
+    finally:
+        stage.close()
+    return path
+
+
+def animate(
+    record: Frames,
+    path: str | os.PathLike[str],
+    *,
+    fps: float | None = None,
+    speed: float = 1.0,
+    size: Sequence[int] = (1280, 720),
+    color_by: ColorBy = "rod",
+    camera: str | npt.ArrayLike | None = None,
+    ground: float | None = None,
+    progress: bool | Literal["always"] = True,
+) -> Path:
+    """Render the rods as tubes into a film, with planes, spheres and capsules, which move as they did.
+
+    Parameters
+    ----------
+    record : Record
+    path : path
+        The file, ending in .mp4 or .gif.
+    fps : float, optional
+        Pictures a second of film; 30 for .mp4, 20 for .gif. Between two frames of the record the rods
+        are drawn in between.
+    speed : float
+        Seconds of the simulation shown in one second of film.
+    size, color_by, camera, ground
+        As in `picture`; the camera stands still and has all frames in view.
+    progress : bool or "always"
+        Whether to show a progress bar, as in `Simulation.run`.
+
+    Returns
+    -------
+    pathlib.Path
+        The file.
+
+    Raises
+    ------
+    ValueError
+        A record without frames, another suffix, or an option out of range.
+    ImportError
+        PyVista or imageio-ffmpeg is not installed.
+    RuntimeError
+        Nothing can be rendered here, or ffmpeg fails, as on a full disk; the message says why, and what was in
+        the file before is left.
+    """
+    path = _path(path, ".mp4", ".gif")
+    fps = float(fps if fps is not None else (30.0 if path.suffix.lower() == ".mp4" else 20.0))
+    for name, value in (("fps", fps), ("speed", speed)):
+        if not (np.isfinite(value) and value > 0.0):
+            raise ValueError(f"{name} must be positive, got {value!r}")
+    encoder = require("imageio_ffmpeg", "view").get_ffmpeg_exe()
+    stage = Stage(record, size=_even(size), color_by=color_by, camera=camera, ground=ground)
+    try:
+        places = film_places(stage.times, speed / fps)
+        with (
+            written_beside(path) as temporary,
+            Film(encoder, temporary, stage.size, fps) as film,
+            progress_bar(len(places), "rendering", progress, unit="pictures") as bar,
+        ):
+            for place in places:
+                stage.show(place)
+                stage.label(f"t = {np.interp(place, np.arange(len(stage.times)), stage.times):.2f} s")
+                film.write(stage.image())
+                bar.advance(1)
+    finally:
+        stage.close()
+    return path
+
+
+def view(
+    record: Frames,
+    *,
+    size: Sequence[int] = (1024, 640),
+    color_by: ColorBy = "rod",
+    camera: str | npt.ArrayLike | None = None,
+    ground: float | None = None,
+    backend: str | None = None,
+) -> Any:
+    """Turn the rods about and slide through time, in a notebook or a window.
+
+    Parameters
+    ----------
+    record : Record
+    size, color_by, camera, ground
+        As in `picture`; the camera has all frames in view at first.
+    backend : str, optional
+        PyVista's way to show it in a notebook, such as "trame" or "static"; its own choice by default.
+
+    Returns
+    -------
+    widget
+        In a notebook, what displays the viewer; None elsewhere.
+
+    Raises
+    ------
+    ValueError, ImportError, RuntimeError
+        As in `picture`.
+    """
+    notebook = _in_notebook()
+    stage = Stage(
+        record, size=size, color_by=color_by, camera=camera, ground=ground, off_screen=notebook, supersampling=1
+    )
+    if len(record) > 1 and backend != "static":
+        stage.plotter.add_slider_widget(
+            lambda time: stage.show(float(np.interp(time, stage.times, np.arange(len(stage.times))))),
+            rng=(float(stage.times[0]), float(stage.times[-1])),
+            value=float(stage.times[0]),
+            title="time [s]",
+            color="#33383d",
+            pointa=(0.3, 0.1),
+            pointb=(0.7, 0.1),
+            slider_width=0.02,
+            tube_width=0.004,
+            title_height=0.02,
+            fmt="%.2f",
+        )
+    stage.plotter.add_axes(color="#33383d", viewport=(0.0, 0.0, 0.16, 0.2))
+    options = {"jupyter_backend": backend} if notebook and backend else {}
+    return stage.plotter.show(**options)
+
+
+def _frame(record: Frames, frame: int) -> int:
+    count = len(record)
+    if int(frame) != frame or not -count <= frame < count:
+        raise ValueError(f"frame must lie in {-count}..{count - 1}, got {frame!r}")
+    return int(frame) % count
+
+
+def _path(path: str | os.PathLike[str], *suffixes: str) -> Path:
+    path = Path(path)
+    if path.suffix.lower() not in suffixes:
+        raise ValueError(f"path must end in {' or '.join(suffixes)}, got {str(path)!r}")
+    return path
+
+
+def _even(size: Sequence[int]) -> Sequence[int]:
+    """Films need even sides."""
+    try:
+        return [int(side) // 2 * 2 for side in size]
+    except (TypeError, ValueError):
+        return size
+
+
+def _in_notebook() -> bool:
+    """Whether this runs in a Jupyter kernel."""
+    try:
+        shell = require("IPython", "view").get_ipython()
+    except ImportError:
+        return False
+    return shell is not None and hasattr(shell, "kernel")

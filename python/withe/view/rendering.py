@@ -1,0 +1,490 @@
+"""Rods as tubes, and what they touch, on a light ground, rendered by PyVista.
+
+This is the stage that pictures, films and the viewer share.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from withe.common.extras import require
+from withe.common.frames import Frames, edges_to_nodes, stencils_to_nodes
+from withe.view import scenery
+from withe.view.graphics import render_window
+from withe.view.surfaces import Surface
+
+__all__ = ["Stage", "color_limits", "nice_limits"]
+
+FloatArray = npt.NDArray[np.float64]
+ColorBy = Literal["rod", "tension", "curvature", "twist", "speed"]
+
+_PALETTE = ("#2a9d8f", "#e76f51", "#457b9d", "#e9b44c", "#8d6a9f", "#6a994e", "#c8553d", "#4f6d7a")
+_BARS = {
+    "tension": ("tension [N]", "viridis"),
+    "curvature": ("curvature [1/m]", "viridis"),
+    "twist": ("twist [rad/m]", "viridis"),
+    "speed": ("speed [m/s]", "viridis"),
+}
+_DIRECTIONS = {
+    "front": (0.0, -1.0, 0.12),
+    "side": (1.0, 0.0, 0.12),
+    "top": (0.0, 0.0, 1.0),
+    "oblique": (0.6, -1.0, 0.55),
+}
+_VIEW_ANGLE = 24.0  # [degrees]
+_BAR_SHARE = 0.16
+_INK = "#33383d"
+_PLANE, _PLANE_EDGE, _SOLID = "#e3e8ec", "#c3cbd2", "#b4bdc5"
+_MAX_SAMPLES = 6000  # rings of all rods together
+_SHADOW_CELLS = 320
+_BLURS = (2.5, 5.0, 9.0, 14.0)  # [cells], by height above the ground
+
+
+class Stage:
+    """The rods of a record in front of a camera that sees all their frames.
+
+    Parameters
+    ----------
+    record : Record
+    size : pair of int [px]
+    color_by : {"rod", "tension", "curvature", "twist", "speed"}
+    camera : str or array_like of shape (3,), optional
+        From where to look: "front", "side", "top", "oblique" or a direction. By default along the
+        normal of a planar motion, and obliquely at any other.
+    frames : sequence of int, optional
+        What the camera has in view; all frames by default.
+    ghosts : sequence of int
+        Frames that stand behind the others, faintly, the first one most.
+    ground : float, optional [m]
+        Height at which the shadow falls; by default a level plane near the rods, or a little below them.
+    off_screen : bool
+        Render into memory rather than into a window.
+    supersampling : int
+        Pixels rendered for one pixel shown, along each side.
+
+    Raises
+    ------
+    ValueError
+        A record without frames, or an argument out of range.
+    RuntimeError
+        Nothing can be rendered off-screen here.
+    """
+
+    def __init__(
+        self,
+        record: Frames,
+        *,
+        size: Sequence[int] = (1280, 720),
+        color_by: ColorBy = "rod",
+        camera: str | npt.ArrayLike | None = None,
+        frames: Sequence[int] | None = None,
+        ghosts: Sequence[int] = (),
+        ground: float | None = None,
+        off_screen: bool = True,
+        supersampling: int = 2,
+    ) -> None:
+        if len(record) == 0:
+            raise ValueError("record has no frames to show")
+        if color_by != "rod" and color_by not in _BARS:
+            raise ValueError(f"color_by must be one of 'rod', {str(list(_BARS))[1:-1]}, got {color_by!r}")
+        self.size = _checked_size(size)
+        self._read(record, color_by)
+        in_view = self._positions if frames is None else self._positions[list(frames)]
+        nodes = in_view.reshape(-1, 3)
+        around = [
+            scenery.framing(obstacle, places if frames is None else places[list(frames)], nodes)
+            for obstacle, places in zip(record.obstacles, self._places, strict=True)
+        ]
+        direction = _direction(camera, in_view)
+        if ground is not None and not np.isfinite(ground):
+            raise ValueError(f"ground must be a height in metres, got {ground!r}")
+
+        pyvista = require("pyvista", "view")
+        self._fineness = supersampling
+        window = [side * self._fineness for side in self.size]
+        with render_window(off_screen):
+            self.plotter = pyvista.Plotter(off_screen=off_screen, window_size=window, lighting="none")
+        self.plotter.set_background("#f5f7f9")
+        if ground is None:
+            ground = self._floor(nodes)
+        # Under a slope there is no ground to cast a shadow on.
+        kinds = [obstacle.kind for obstacle, seen in zip(record.obstacles, around, strict=True) if len(seen)]
+        self._casts = ground is not None or "plane" not in kinds
+        nearby = np.concatenate([nodes[:0], *around])
+        self._frame_camera(direction, nodes, nearby, ground, 0.0 if color_by == "rod" else _BAR_SHARE)
+        self._add_lights(pyvista, direction)
+        self._add_obstacles(pyvista, np.concatenate([nodes, nearby]))
+        self._add_shadow(pyvista)
+        self._add_rods(pyvista, color_by)
+        self._ghosts = [points for frame in ghosts for points in self._add_ghost(pyvista, frame, list(ghosts))]
+        if supersampling == 1:
+            self.plotter.enable_anti_aliasing("ssaa")
+        self._label: Any = None
+        self.show(0.0)
+
+    def _read(self, record: Frames, color_by: ColorBy) -> None:
+        """Motions, and the surfaces of rods."""
+        self._record = record
+        self.times = record.times
+        self._positions = record.positions()
+        self._directors = [record.directors(rod)[:, :, 0] for rod in record.rods]
+        samples = max(1, min(6, _MAX_SAMPLES // sum(len(rod.rows) for rod in record.rods)))
+        self._surfaces = [Surface(rod, self._positions[0, rod.rows], samples) for rod in record.rods]
+        self._footprints = [
+            surface.footprint(self._positions[0, rod.rows])
+            for surface, rod in zip(self._surfaces, record.rods, strict=True)
+        ]
+        self._values = None if color_by == "rod" else [_nodal(record, rod, color_by) for rod in record.rods]
+        self._footprints_of_obstacles: list[FloatArray] = []
+        self._places = [record.obstacle_position(obstacle) for obstacle in record.obstacles]
+
+    def show(self, frame: float) -> None:
+        """Move the rods to a frame; between two frames, in between."""
+        before = min(int(frame), len(self.times) - 1)
+        after = min(before + 1, len(self.times) - 1)
+        share = frame - before
+        meshed = list(self._ghosts)
+        self._obstacle_points = []
+        for actor, places, surface in self._obstacles:
+            way = self._mixed(places, before, after, share) - places[0]
+            actor.position = way
+            self._obstacle_points += [surface + way] if surface is not None else []
+        for index, rod in enumerate(self._record.rods):
+            nodes = self._mixed(self._positions, before, after, share)[rod.rows]
+            points, normals = self._surfaces[index].mesh(
+                nodes, self._mixed(self._directors[index], before, after, share)
+            )
+            mesh = self._meshes[index]
+            mesh.points = points
+            mesh.point_data["Normals"] = normals
+            if self._values is not None:
+                nodal = self._mixed(self._values[index], before, after, share)
+                mesh.point_data["value"] = self._surfaces[index].on_surface(nodal)
+            meshed.append(points)
+        if self._casts:
+            self._cast_shadow(meshed)
+
+    def label(self, text: str) -> None:
+        """Write a line of text in the lower left corner, in place of the one before."""
+        if self._label is None:
+            size = max(7, self.size[1] * self._fineness // 55)
+            self._label = self.plotter.add_text(text, position=(0.03, 0.04), viewport=True, color=_INK, font_size=size)
+        else:
+            self._label.input = text
+
+    def image(self) -> npt.NDArray[np.uint8]:
+        """What the camera sees, shape (height, width, 3)."""
+        self.plotter.render()
+        fine = self.plotter.screenshot(return_img=True)[..., :3]
+        step, area = self._fineness, self._fineness**2
+        sums = np.full((self.size[1], self.size[0], 3), area // 2, np.uint16)
+        for row, column in np.ndindex(step, step):  # many times faster than the mean over blocks
+            sums += fine[row::step, column::step]
+        return np.asarray(sums // area, np.uint8)
+
+    def close(self) -> None:
+        """Free the window."""
+        self.plotter.close()
+
+    @staticmethod
+    def _mixed(values: FloatArray, before: int, after: int, share: float) -> FloatArray:
+        mixed: FloatArray = (1.0 - share) * values[before] + share * values[after]
+        return mixed
+
+    def _floor(self, points: FloatArray) -> float | None:
+        """Height of the level plane on which the shadow of rods that are near it falls; None where there is none."""
+        heights = [
+            float(places[0, 2])
+            for obstacle, places in zip(self._record.obstacles, self._places, strict=True)
+            if obstacle.kind == "plane"
+            and obstacle.axis[2] > (1.0 - 1e-9) * np.linalg.norm(obstacle.axis)
+            and np.ptp(places[:, 2]) == 0.0
+            and len(scenery.framing(obstacle, places[:1], points))
+        ]
+        if not heights:
+            return None
+        return max(heights) + 1e-3 * float(np.linalg.norm(np.ptp(points, axis=0)))  # not in the plane itself
+
+    def _frame_camera(
+        self, direction: FloatArray, points: FloatArray, around: FloatArray, ground: float | None, aside: float
+    ) -> None:
+        """Look from a direction at the middle of all points, from as near as all are in view.
+
+        So is what is around the rods. A share of the picture, `aside`, is left to the scale on the right.
+        """
+        reach = max(float(rod.radii.max()) for rod in self._record.rods)
+        everything = np.concatenate([points, around])
+        low, high = everything.min(axis=0), everything.max(axis=0)
+        extent = float(np.linalg.norm(high - low)) + 2.0 * reach
+        self._extent = extent
+        self._ground = float(low[2]) - reach - 0.03 * extent if ground is None else float(ground)
+        middle, half = 0.5 * (low + high)[:2], 0.5 * float((high - low)[:2].max()) + 0.15 * extent
+        self._shadow_bounds = middle - half, middle + half
+        corners = [points + reach * sign * axis for axis in np.eye(3) for sign in (-1.0, 1.0)]
+        shadows = np.column_stack([points[:, :2], np.full(len(points), self._ground)])
+        seen = np.concatenate([*corners, shadows, around])
+        up = np.array([0.0, 1.0, 0.0]) if abs(direction[2]) > 0.99 else np.array([0.0, 0.0, 1.0])
+        right = np.cross(up, direction)
+        right /= np.linalg.norm(right)
+        up = np.cross(direction, right)
+        across, height = seen @ right, seen @ up
+        focus = 0.5 * (across.max() + across.min()) * right + 0.5 * (height.max() + height.min()) * up
+        focus += (seen @ direction).mean() * direction
+        slope = np.tan(np.radians(0.5 * _VIEW_ANGLE))
+        local = seen - focus
+        needed = np.maximum(
+            np.abs(local @ up) / (0.82 * slope),
+            np.abs(local @ right) / ((0.86 - aside) * slope * self.size[0] / self.size[1]),
+        )
+        distance = float((needed + local @ direction).max())
+        view = self.plotter.camera
+        view.view_angle = _VIEW_ANGLE
+        view.SetWindowCenter(aside, 0.0)
+        view.focal_point, view.position, view.up = focus, focus + distance * direction, up
+        view.clipping_range = (0.05 * distance, 10.0 * (distance + extent))
+
+    def _add_lights(self, pyvista: Any, direction: FloatArray) -> None:
+        focus = np.array(self.plotter.camera.focal_point)
+        right, up = np.cross(self.plotter.camera.up, direction), np.array(self.plotter.camera.up)
+        for offset, strength in (
+            (1.2 * direction - 0.7 * right + 0.9 * up, 0.9),
+            (0.9 * direction + 1.1 * right + 0.1 * up, 0.45),
+            (-0.8 * direction + 0.2 * right + 0.9 * up, 0.35),
+        ):
+            position = focus + 20.0 * self._extent * offset
+            self.plotter.add_light(pyvista.Light(position=position, focal_point=focus, intensity=strength))
+
+    def _add_rods(self, pyvista: Any, color_by: ColorBy) -> None:
+        self._meshes = [_empty_mesh(pyvista, surface) for surface in self._surfaces]
+        options: dict[str, Any] = {"ambient": 0.35, "diffuse": 0.8, "specular": 0.3, "specular_power": 30.0}
+        if self._values is not None:
+            title, colours = _BARS[color_by]
+            low, high, labels, digits = nice_limits(*color_limits(self._values))
+            if low == -high:
+                colours = "coolwarm"
+            options |= {
+                "scalars": "value",
+                "cmap": colours,
+                "clim": (low, high),
+                "scalar_bar_args": {
+                    "title": f"{title}\n",
+                    "color": _INK,
+                    "vertical": True,
+                    "position_x": 0.98 - 0.5 * (0.05 + 0.0132 * len(title) * self.size[1] / self.size[0]),
+                    "position_y": 0.25,
+                    "width": 0.05,
+                    "height": 0.5,
+                    "title_font_size": self.size[1] * self._fineness // 42,
+                    "label_font_size": self.size[1] * self._fineness // 48,
+                    "fmt": digits,
+                    "n_labels": labels,
+                },
+            }
+        for index, mesh in enumerate(self._meshes):
+            if self._values is None:
+                options["color"] = _color(index)
+            else:
+                mesh.point_data["value"] = np.zeros(mesh.n_points)
+            actor = self.plotter.add_mesh(mesh, reset_camera=False, **options)
+            actor.prop.interpolation = "Phong"
+
+    def _add_obstacles(self, pyvista: Any, nodes: FloatArray) -> None:
+        """Patches of planes, spheres and capsules, with where they are and, where they cast a shadow, their points."""
+        self._obstacles: list[tuple[Any, FloatArray, FloatArray | None]] = []
+        for obstacle, places in zip(self._record.obstacles, self._places, strict=True):
+            if obstacle.kind == "plane":
+                corners = scenery.patch(obstacle, places[0], nodes)
+                mesh = pyvista.PolyData(corners, [4, 0, 1, 2, 3])
+                options: dict[str, Any] = {"color": _PLANE, "ambient": 0.75, "diffuse": 0.3, "specular": 0.0}
+                normal = obstacle.axis / np.linalg.norm(obstacle.axis)
+                places = places[:1] + np.outer((places - places[0]) @ normal, normal)  # along itself it looks the same
+                self._obstacles.append((self.plotter.add_mesh(mesh, reset_camera=False, **options), places, None))
+                edge = pyvista.PolyData(corners, lines=[5, 0, 1, 2, 3, 0])
+                rim = self.plotter.add_mesh(edge, color=_PLANE_EDGE, reset_camera=False, lighting=False, line_width=2)
+                self._obstacles.append((rim, places, None))
+                continue
+            start, end = scenery.ends(obstacle, places[0])
+            length = float(np.linalg.norm(end - start))
+            if length <= 1e-9 * obstacle.radius:
+                mesh = pyvista.Sphere(radius=obstacle.radius, center=start, theta_resolution=64, phi_resolution=48)
+            else:
+                mesh = pyvista.Capsule(
+                    center=0.5 * (start + end),
+                    direction=(end - start) / length,
+                    radius=obstacle.radius,
+                    cylinder_length=length,
+                    resolution=64,
+                )
+            actor = self.plotter.add_mesh(
+                mesh, color=_SOLID, ambient=0.35, diffuse=0.75, specular=0.1, smooth_shading=True, reset_camera=False
+            )
+            area = np.pi * obstacle.radius**2 + 2.0 * obstacle.radius * length
+            points = scenery.cloud(obstacle, places[0])
+            self._obstacles.append((actor, places, points))
+            self._footprints_of_obstacles.append(np.full(len(points), area / len(points)))
+
+    def _add_ghost(self, pyvista: Any, frame: int, ghosts: list[int]) -> list[FloatArray]:
+        """Rods of one frame in pale colours, which do not move; returns the points of their surfaces."""
+        strength = 0.2 + 0.3 * ghosts.index(frame) / max(1, len(ghosts) - 1)
+        ghost = []
+        for index, rod in enumerate(self._record.rods):
+            surface = self._surfaces[index]
+            points, normals = surface.mesh(self._positions[frame, rod.rows], self._directors[index][frame])
+            mesh = _empty_mesh(pyvista, surface)
+            mesh.points = points
+            mesh.point_data["Normals"] = normals
+            paint = _color(index) if self._values is None else np.array([0.5, 0.53, 0.56])
+            pale = strength * paint + (1.0 - strength) * np.array([0.93, 0.94, 0.95])
+            actor = self.plotter.add_mesh(mesh, color=pale, ambient=0.5, diffuse=0.6, reset_camera=False)
+            actor.prop.interpolation = "Phong"
+            ghost.append(points)
+        return ghost
+
+    def _add_shadow(self, pyvista: Any) -> None:
+        """A plane under the rods, clear where no shadow falls."""
+        low, high = self._shadow_bounds
+        corners = np.column_stack([[low[0], high[0], high[0], low[0]], [low[1], low[1], high[1], high[1]]])
+        plane = pyvista.PolyData(np.column_stack([corners, np.full(4, self._ground)]), [4, 0, 1, 2, 3])
+        plane.active_texture_coordinates = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+        blank = pyvista.Texture(np.zeros((_SHADOW_CELLS, _SHADOW_CELLS, 4), np.uint8))
+        self._shadow = self.plotter.add_mesh(plane, texture=blank, lighting=False, reset_camera=False)
+        self._shadow.ForceTranslucentOn()
+
+    def _cast_shadow(self, points: list[FloatArray]) -> None:
+        """Lay the rods flat on a grid and blur them, the more the higher they are."""
+        from scipy.ndimage import gaussian_filter
+
+        low, high = self._shadow_bounds
+        shade = np.zeros((_SHADOW_CELLS, _SHADOW_CELLS))
+        footprints = self._footprints * (len(points) // len(self._footprints)) + self._footprints_of_obstacles
+        points = points + self._obstacle_points
+        heights = np.concatenate(points)[:, 2] - self._ground
+        places = (np.concatenate(points)[:, :2] - low) / (high - low) * _SHADOW_CELLS
+        weights = np.concatenate(footprints) / np.prod((high - low) / _SHADOW_CELLS)
+        level = np.clip(heights / self._extent * len(_BLURS), 0, len(_BLURS) - 1).astype(int)
+        box = [[0, _SHADOW_CELLS]] * 2
+        for index, blur in enumerate(_BLURS):
+            here = level == index
+            if here.any():
+                cover, *_ = np.histogram2d(places[here, 1], places[here, 0], _SHADOW_CELLS, box, weights=weights[here])
+                shade += gaussian_filter(cover, blur, mode="constant")
+        pixels = np.empty((_SHADOW_CELLS, _SHADOW_CELLS, 4), np.uint8)
+        pixels[..., :3] = (62, 74, 86)
+        pixels[..., 3] = 255.0 * 0.42 * -np.expm1(-1.4 * shade[::-1])
+        texture = require("pyvista", "view").Texture(pixels)
+        texture.interpolate = True
+        self._shadow.texture = texture
+
+
+def color_limits(values: Sequence[FloatArray]) -> tuple[float, float]:
+    """The ends of a scale for all values: zero in the middle where they go both ways, and never what rounding leaves.
+
+    Parameters
+    ----------
+    values : sequence of ndarray
+        One a rod.
+    """
+    low, high = min(float(v.min()) for v in values), max(float(v.max()) for v in values)
+    least = 1e-9 * max(-low, high)
+    low, high = (0.0 if abs(end) <= least else end for end in (low, high))
+    if low < -0.05 * high and high > 0.0:
+        return -max(-low, high), max(-low, high)
+    return low, high if high > low else low + 1e-12
+
+
+def nice_limits(low: float, high: float) -> tuple[float, float, int, str]:
+    """Ends of a scale that begins and ends at round numbers.
+
+    Parameters
+    ----------
+    low, high : float
+        What it must hold.
+
+    Returns
+    -------
+    low, high : float
+    labels : int
+        How many, ends among them, stand at round numbers.
+    format : str
+        With the digits that they need.
+    """
+    size = max(abs(low), abs(high), high - low)
+    if not (1e-9 * size < high - low and 1e-290 < size < 1e290):
+        return low, high, 2, "%.3g"
+    unit = 10.0 ** np.floor(np.log10(high - low))
+    even = low == -high  # keeps zero in the middle, with a label
+    for step in unit * np.array([0.2, 0.25, 0.5, 1.0, 2.0, 2.5]):
+        first, last = np.floor(low / step + 1e-9), np.ceil(high / step - 1e-9)
+        if last - first <= (4 if even else 5):
+            break
+    decimals = next((d for d in range(5) if abs(round(step, d) - step) < 1e-6 * step), None)
+    plain = decimals is not None and max(abs(first), abs(last)) * step < 1e5
+    return float(first * step), float(last * step), int(last - first) + 1, f"%.{decimals}f" if plain else "%.3g"
+
+
+def _empty_mesh(pyvista: Any, surface: Surface) -> Any:
+    faces = np.column_stack([np.full(len(surface.faces), 4), surface.faces])
+    mesh = pyvista.PolyData(np.zeros((int(surface.faces.max()) + 1, 3)), faces.ravel())
+    mesh.point_data.active_normals = np.zeros((mesh.n_points, 3))
+    return mesh
+
+
+def _color(rod: int) -> FloatArray:
+    code = _PALETTE[rod % len(_PALETTE)]
+    return np.array([int(code[place : place + 2], 16) / 255.0 for place in (1, 3, 5)])
+
+
+def _nodal(record: Frames, rod: Any, color_by: ColorBy) -> FloatArray:
+    """The quantity that colours a rod, at its nodes, shape (frames, nodes)."""
+    if color_by == "tension":
+        return edges_to_nodes(record.tensions(rod), rod.closed)
+    if color_by == "twist":
+        return stencils_to_nodes(record.twists(rod), rod.closed)
+    if color_by == "curvature":
+        return stencils_to_nodes(np.linalg.norm(record.curvatures(rod), axis=-1), rod.closed)
+    speeds: FloatArray = np.linalg.norm(record.velocities(rod), axis=-1)
+    return speeds
+
+
+def _checked_size(size: Sequence[int]) -> tuple[int, int]:
+    try:
+        width, height = (int(side) for side in size)
+    except (TypeError, ValueError):
+        raise ValueError(f"size must be two integers, width and height in pixels, got {size!r}") from None
+    if not (16 <= width <= 8192 and 16 <= height <= 8192):
+        raise ValueError(f"size must lie between 16 and 8192 pixels, got {size!r}")
+    return width, height
+
+
+def _direction(camera: str | npt.ArrayLike | None, positions: FloatArray) -> FloatArray:
+    """Unit vector from the rods to the camera."""
+    if camera is None:
+        direction = _facing(positions)
+    elif isinstance(camera, str):
+        if camera not in _DIRECTIONS:
+            raise ValueError(f"camera must be one of {str(list(_DIRECTIONS))[1:-1]} or a direction, got {camera!r}")
+        direction = np.array(_DIRECTIONS[camera])
+    else:
+        direction = np.asarray(camera, float)
+        if direction.shape != (3,) or not np.all(np.isfinite(direction)) or not np.any(direction):
+            raise ValueError(f"camera must be a direction of shape (3,), not zero, got {camera!r}")
+    return direction / np.linalg.norm(direction)
+
+
+def _facing(positions: FloatArray) -> FloatArray:
+    """Along the normal of a planar motion, a little from above; obliquely at any other."""
+    points = positions.reshape(-1, 3) - positions.reshape(-1, 3).mean(axis=0)
+    spread, axes = np.linalg.eigh(points.T @ points)
+    if spread[0] > 1e-4 * spread[2] or spread[1] <= 1e-4 * spread[2]:
+        return np.array(_DIRECTIONS["oblique"])
+    normal = axes[:, 0]
+    if abs(normal[2]) > 0.9:
+        return np.array([0.0, -0.6, 1.0])
+    if normal @ np.array([0.3, -1.0, 0.0]) < 0.0:
+        normal = -normal
+    level = normal[:2] / np.linalg.norm(normal[:2])
+    return np.array([level[0], level[1], 0.2])

@@ -1,0 +1,169 @@
+"""Surfaces of rods: a section swept along a smooth centreline. Pure functions of positions and directors.
+
+The centreline is a cubic spline through the nodes, so few nodes look as smooth as many. What depends on
+the mesh only, the interpolation and the faces, is made once; a frame then costs two small products.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from withe.common.outlines import RodOutline
+
+__all__ = ["Surface"]
+
+FloatArray = npt.NDArray[np.float64]
+
+_CAP_RINGS = 6
+
+
+class Surface:
+    """The surface of one rod. Round sections end in half spheres, rectangular ones in flat faces.
+
+    Parameters
+    ----------
+    rod : RodOutline
+    nodes : ndarray of shape (nodes, 3) [m]
+        A shape of the rod, for the spacing of its nodes.
+    samples_per_edge : int
+        Rings of the surface between two nodes.
+    sides : int
+        Corners of a round section.
+
+    Attributes
+    ----------
+    faces : ndarray of int, shape (faces, 4)
+        Corners of each quadrilateral, counter-clockwise from outside.
+    """
+
+    def __init__(self, rod: RodOutline, nodes: FloatArray, samples_per_edge: int = 4, sides: int = 24) -> None:
+        self.closed = rod.closed
+        chords = np.linalg.norm(np.diff(nodes, axis=0, append=nodes[:1]), axis=1)[: rod.edges]
+        knots = np.concatenate([[0.0], np.cumsum(np.maximum(chords, 1e-12 * chords.max()))])
+        samples = _subdivide(knots, samples_per_edge)
+        if rod.closed:
+            samples = samples[:-1]
+        middles = 0.5 * (knots[1:] + knots[:-1])
+        self._position_weights, self._tangent_weights = _spline(knots, samples, rod.closed)
+        self._edge_weights = _hats(middles, samples, knots[-1] if rod.closed else None)
+        half = 0.5 * rod.widths if rod.widths is not None else np.stack([rod.radii, rod.radii], axis=1)
+        self._half_widths = self._edge_weights @ half
+        self._section, self._section_normals = _round(sides) if rod.widths is None else _rectangle()
+        self._caps = _caps(rod.widths is None) if not rod.closed else np.zeros((0, 3))
+        self._ring_samples = self._rings(len(samples))
+        self.faces = _faces(len(self._ring_samples), len(self._section), rod.closed)
+
+    def _rings(self, samples: int) -> npt.NDArray[np.int64]:
+        """Sample of every ring: the first one repeated for its cap, then all, then the last one."""
+        caps = len(self._caps)
+        return np.concatenate([np.zeros(caps, int), np.arange(samples), np.full(caps, samples - 1)])
+
+    def mesh(self, nodes: FloatArray, directors: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Points and normals of the surface.
+
+        Parameters
+        ----------
+        nodes : ndarray of shape (nodes, 3) [m]
+        directors : ndarray of shape (edges, 3)
+            First director of every edge.
+
+        Returns
+        -------
+        points, normals : ndarrays of shape (points, 3)
+        """
+        centres = self._position_weights @ nodes
+        tangents = _unit(self._tangent_weights @ nodes)
+        first = self._edge_weights @ directors
+        first = _unit(first - np.sum(first * tangents, axis=1, keepdims=True) * tangents)
+        second = np.cross(tangents, first)
+
+        count = len(self._caps)
+        scale = np.ones((len(self._ring_samples), 1))
+        along = np.zeros((len(self._ring_samples), 1))
+        lean = np.zeros((len(self._ring_samples), 1))
+        if count:
+            scale[:count, 0], scale[-count:, 0] = self._caps[:, 0], self._caps[::-1, 0]
+            along[:count, 0], along[-count:, 0] = -self._caps[:, 1], self._caps[::-1, 1]
+            lean[:count, 0], lean[-count:, 0] = -self._caps[:, 2], self._caps[::-1, 2]
+
+        rings = self._ring_samples
+        half = self._half_widths[rings]
+        axes = np.stack([half[:, :1] * scale * first[rings], half[:, 1:] * scale * second[rings]], axis=1)
+        shift = centres[rings] + along * half[:, :1] * tangents[rings]
+        points = shift[:, None] + self._section @ axes
+        unit_axes = np.stack([first[rings], second[rings]], axis=1)
+        flat = np.sqrt(1.0 - lean**2)[:, None]
+        normals = flat * (self._section_normals @ unit_axes) + (lean * tangents[rings])[:, None]
+        return points.reshape(-1, 3), normals.reshape(-1, 3)
+
+    def footprint(self, nodes: FloatArray) -> FloatArray:
+        """Area of the rod seen from the side that falls to each point of the surface [m^2]."""
+        centres = self._position_weights @ nodes
+        steps = np.linalg.norm(np.diff(centres, axis=0, append=centres[:1] if self.closed else centres[-1:]), axis=1)
+        areas = 2.0 * self._half_widths.max(axis=1) * steps
+        caps = len(self._caps)
+        padded = np.concatenate([np.zeros(caps), areas, np.zeros(caps)])
+        return np.repeat(padded / len(self._section), len(self._section))
+
+    def on_surface(self, nodal: FloatArray) -> FloatArray:
+        """Values at the nodes, shape (nodes,), carried to the points of the surface."""
+        values = np.clip(self._position_weights @ nodal, nodal.min(), nodal.max())
+        return np.repeat(values[self._ring_samples], len(self._section))
+
+
+def _unit(vectors: FloatArray) -> FloatArray:
+    lengths = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return np.asarray(vectors / np.maximum(lengths, 1e-300), float)
+
+
+def _subdivide(knots: FloatArray, count: int) -> FloatArray:
+    fractions = np.arange(count) / count
+    inner = knots[:-1, None] + np.diff(knots)[:, None] * fractions
+    return np.append(inner.ravel(), knots[-1])
+
+
+def _spline(knots: FloatArray, samples: FloatArray, closed: bool) -> tuple[FloatArray, FloatArray]:
+    """Matrices that take the nodes to the points and the tangents of a cubic spline at the samples."""
+    from scipy.interpolate import CubicSpline
+
+    nodes = len(knots) - 1 if closed else len(knots)
+    values = np.eye(nodes)
+    if closed:
+        values = np.concatenate([values, values[:1]])
+    spline = CubicSpline(knots, values, bc_type="periodic" if closed else "not-a-knot")
+    return spline(samples), spline(samples, 1)
+
+
+def _hats(knots: FloatArray, samples: FloatArray, period: float | None) -> FloatArray:
+    """Matrix of piecewise linear interpolation from the knots to the samples, constant beyond them."""
+    return np.stack([np.interp(samples, knots, row, period=period) for row in np.eye(len(knots))], axis=1)
+
+
+def _round(sides: int) -> tuple[FloatArray, FloatArray]:
+    angles = 2.0 * np.pi * np.arange(sides) / sides
+    corners = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    return corners, corners
+
+
+def _rectangle() -> tuple[FloatArray, FloatArray]:
+    """Every corner twice, once for each of its faces, so that edges stay sharp."""
+    corners = np.array([[1, -1], [1, 1], [1, 1], [-1, 1], [-1, 1], [-1, -1], [-1, -1], [1, -1]], float)
+    normals = np.repeat(np.array([[1, 0], [0, 1], [-1, 0], [0, -1]], float), 2, axis=0)
+    return corners, normals
+
+
+def _caps(round_section: bool) -> FloatArray:
+    """Rows of scale, offset along the rod in half widths, and lean of the normal; from the pole inwards."""
+    if not round_section:
+        return np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 1.0]])
+    angles = 0.5 * np.pi * np.arange(_CAP_RINGS, 0, -1) / _CAP_RINGS
+    return np.stack([np.cos(angles), np.sin(angles), np.sin(angles)], axis=1)
+
+
+def _faces(rings: int, sides: int, closed: bool) -> npt.NDArray[np.int64]:
+    ring = np.arange(rings if closed else rings - 1)[:, None]
+    side = np.arange(sides)[None]
+    following, beside = (ring + 1) % rings, (side + 1) % sides
+    corners = [ring * sides + side, ring * sides + beside, following * sides + beside, following * sides + side]
+    return np.stack(corners, axis=-1).reshape(-1, 4)
