@@ -24,29 +24,32 @@ std::size_t at(MatrixAge age) { return static_cast<std::size_t>(age); }
 
 }  // namespace
 
-MatrixReuse::MatrixReuse(MatrixRecord& record, Equations& equations, double interval, bool allowed, double tolerance)
+MatrixReuse::MatrixReuse(MatrixRecord& record, Equations& equations, double interval, bool allowed, double tolerance,
+                         const Without& heuristics)
     : record_(record),
       equations_(equations),
       interval_(std::abs(interval)),
       allowed_(allowed),
       tolerance_(tolerance),
-      slipping_(equations.contact() && equations.contact()->eases()) {
+      heuristics_(heuristics),
+      slipping_(equations.contact() && equations.contact()->eases() && heuristics.uses(Heuristic::refresh_while_slipping)) {
   if (!allowed)
     drop();
   else if (record.belongs_to(equations, interval) && record.generation == equations.assembler().generation()) {
-    const bool badly = record.contraction[at(MatrixAge::across)] > kSlow;
-    fresh_ = record.slow || (badly && ++record.waited < kWait);
+    const bool badly = record.contraction[at(MatrixAge::across)] > kSlow && heuristics.uses(Heuristic::rest_from_reuse);
+    fresh_ = !heuristics.uses(Heuristic::reuse_across_steps) ||
+             (record.slow && heuristics.uses(Heuristic::refresh_after_slow)) || (badly && ++record.waited < kWait);
     if (!fresh_) record.waited = 0;
   }
   record.slow = false;
-  record.contraction[at(MatrixAge::within)] *= kForgetting;
+  if (heuristics.uses(Heuristic::forget_contraction)) record.contraction[at(MatrixAge::within)] *= kForgetting;
 }
 
-bool MatrixReuse::near_end() const { return distance_ <= kNearEnd * tolerance_; }
+bool MatrixReuse::near_end() const { return distance_ <= kNearEnd * tolerance_ && heuristics_.uses(Heuristic::late_matrix); }
 
 void MatrixReuse::note_overdue() {
   overdue_ = at_end() ? overdue_ + 1 : 0;
-  if (allowed_ && overdue_ >= kCostOfMatrix) fresh_ = true;
+  if (allowed_ && overdue_ >= kCostOfMatrix && heuristics_.uses(Heuristic::overdue_matrix)) fresh_ = true;
 }
 
 void MatrixReuse::note_matrix(bool whole) {
@@ -69,14 +72,15 @@ void MatrixReuse::note_step(double length) {
     // Steps near the tolerance are rounding as much as progress.
     const double rate = step_ / last_step_;
     double& known = record_.contraction[at(last_age_)];
-    if (last_step_ > 1e2 * tolerance_ || rate < known) known = rate;
+    if (last_step_ > 1e2 * tolerance_ || rate < known || !heuristics_.uses(Heuristic::careful_rate)) known = rate;
     measured = last_age_ == age_;
   }
   const double here = std::min(0.5, (measured ? 1.0 : 4.0) * record_.contraction[at(age_)]);
   distance_ = step_ * here / (1.0 - here);
   const double next = record_.contraction[at(age_ == MatrixAge::across ? MatrixAge::across : MatrixAge::within)];
   fresh_ = !std::isfinite(step_) || next > 0.5 || (slipping_ && step_ > kUnsettled * tolerance_) ||
-           (distance_ > tolerance_ && std::log(distance_ / tolerance_) > kWorth * std::log(1.0 / next));
+           (!heuristics_.uses(Heuristic::reuse_within_step) && made_here_) ||
+           (heuristics_.uses(Heuristic::matrix_worth) && distance_ > tolerance_ && std::log(distance_ / tolerance_) > kWorth * std::log(1.0 / next));
 }
 
 }  // namespace withe

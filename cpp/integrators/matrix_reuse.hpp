@@ -34,7 +34,8 @@ class MatrixReuse {
  public:
   /// `interval`: of a time step, after whose end the matrix may serve again. `allowed`: whether old ones may serve at
   /// all. `tolerance`: of the solution [m].
-  MatrixReuse(MatrixRecord& record, Equations& equations, double interval, bool allowed, double tolerance);
+  MatrixReuse(MatrixRecord& record, Equations& equations, double interval, bool allowed, double tolerance,
+              const Without& heuristics);
 
   /// Whether the coming iteration makes a matrix.
   bool fresh() const { return fresh_; }
@@ -63,6 +64,7 @@ class MatrixReuse {
   double interval_;
   bool allowed_;
   double tolerance_;
+  const Without& heuristics_;
   bool slipping_;  ///< whether surfaces may turn round within a slip far smaller than a step
   bool fresh_ = true, made_here_ = false;
   MatrixAge age_ = MatrixAge::fresh, last_age_ = MatrixAge::fresh;

@@ -95,11 +95,11 @@ class Newton::Solve {
         z_(z),
         contact_(equations.contact()),
         system_{equations, how.target, work},
-        search_(newton.norms_, system_),
+        search_(newton.norms_, system_, newton.options_.heuristics),
         line_search_(newton.options_.line_search == LineSearch::goldstein_price),
         mixed_(how.mixed && newton.options_.mixed),
         reuse_(work.matrix, equations, how.interval, how.interval != 0.0 && !line_search_,
-               std::min(newton.options_.step_tolerance * newton.model_.length_scale, work.finest)),
+               std::min(newton.options_.step_tolerance * newton.model_.length_scale, work.finest), newton.options_.heuristics),
         axial_known_(mixed_ && (how.interval != 0.0 || how.predicted)) {}
 
   NewtonResult run() {
@@ -118,6 +118,8 @@ class Newton::Solve {
   }
 
  private:
+  bool uses(Heuristic h) const { return newton_.options_.heuristics.uses(h); }
+
   enum class Verdict { go_on, converged, failed };
 
   void evaluate(bool matrix) {
@@ -134,7 +136,7 @@ class Newton::Solve {
     if (converged()) return Verdict::converged;
     if (result_.iterations == how_.max_iterations) return Verdict::failed;
     if (result_.iterations == 0) first_residual_ = result_.residual;
-    if (how_.interval != 0.0 && result_.iterations >= kFirstIterations && std::isinf(reuse_.step()) &&
+    if (uses(Heuristic::reject_growing) && how_.interval != 0.0 && result_.iterations >= kFirstIterations && std::isinf(reuse_.step()) &&
         std::isinf(reuse_.last_step()) && result_.residual > kMostGrowth * first_residual_)
       return Verdict::failed;
     reuse_.note_overdue();
@@ -147,7 +149,7 @@ class Newton::Solve {
   bool converged() const {
     if (how_.predicted && how_.predicted->enough > 0.0) return reuse_.step() <= how_.predicted->enough;
     return (balance_.floor && (result_.iterations > 0 || balance_.relative)) ||
-           (balance_.either && (reuse_.at_end() || stagnant_ >= kStagnant));
+           (balance_.either && (reuse_.at_end() || (stagnant_ >= kStagnant && uses(Heuristic::stagnation))));
   }
 
   /// Takes a step; false where there is none, or none that may lead to the solution.
@@ -164,12 +166,12 @@ class Newton::Solve {
     search_.forget();
     if (!work_.step.allFinite()) return false;
     double shorten = search_.shortened(z_, work_.step);
-    system_.equations.foresee(work_.step, shorten);
+    if (uses(Heuristic::predict_friction)) system_.equations.foresee(work_.step, shorten);
     if (mixed_) system_.equations.predict_axial_force(work_.step, work_.axial_force);
     axial_known_ = mixed_;
-    if (contact_ && !step_between_surfaces(shorten)) return false;
+    if (contact_ && uses(Heuristic::surface_search) && !step_between_surfaces(shorten)) return false;
     if (result_.iterations == 0) result_.cut = contact_ && shorten < kCut;
-    if (how_.give_up_if_cut && result_.cut) return false;
+    if (how_.give_up_if_cut && result_.cut && uses(Heuristic::reject_cut)) return false;
     if (line_search_) {
       const double alpha = line_search(system_, z_, work_.step);
       work_.step *= alpha;
@@ -190,8 +192,8 @@ class Newton::Solve {
   bool step_between_surfaces(double& shorten) {
     const double full = newton_.norms_.displacement(work_.step) / shorten;
     const bool follows = result_.iterations == 0 || (std::isfinite(reuse_.step()) && full <= 0.5 * reuse_.step());
-    if (full <= kShort * reuse_.tolerance() && follows) return true;
-    if (!search_.run(z_, result_.iterations >= kLongestDescent, shorten)) return false;
+    if (uses(Heuristic::skip_near_end) && full <= kShort * reuse_.tolerance() && follows) return true;
+    if (!search_.run(z_, uses(Heuristic::end_descent) && result_.iterations >= kLongestDescent, shorten)) return false;
     if (search_.remade()) reuse_.note_matrix(false);
     axial_known_ = false;  // no prediction outlives a step that may lead elsewhere
     return true;

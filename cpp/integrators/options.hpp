@@ -3,6 +3,7 @@
 
 #include <optional>
 
+#include "integrators/heuristics.hpp"
 #include "solvers/linear_solver.hpp"
 
 namespace withe {
@@ -29,6 +30,7 @@ struct Options {
   double force_tolerance = 1e-8;  ///< residual, relative to the forces in the scene
   int max_iterations = 40;        ///< per Newton solve
   int max_halvings = 12;          ///< smallest step is time_step / 2^max_halvings
+  Without heuristics;             ///< all are used but for measurements
 };
 
 }  // namespace withe

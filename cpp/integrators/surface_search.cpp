@@ -20,7 +20,7 @@ double SurfaceSearch::shortened(const VectorX& z, VectorX& step) const {
 
 bool SurfaceSearch::run(const VectorX& z, bool nearer, double& shorten) {
   NewtonWorkspace& work = system_.work;
-  const bool uphill = work.step.dot(work.evaluation.residual) > 0.0;
+  const bool uphill = heuristics_.uses(Heuristic::drop_geometric) && work.step.dot(work.evaluation.residual) > 0.0;
   double kept = search(z, nearer, uphill ? kLittle : 0.0, shorten);
   if (uphill && !evaluated_) {
     Contact& contact = *system_.equations.contact();
@@ -52,7 +52,7 @@ double SurfaceSearch::search(const VectorX& z, bool nearer, double least, double
     evaluated_ = e.residual.allFinite();
     if (evaluated_) {
       const double after = work.step.dot(e.residual);
-      if (!nearer && before <= after && after <= 0.0) return kept;
+      if (!nearer && heuristics_.uses(Heuristic::search_descent) && before <= after && after <= 0.0) return kept;
       system_.solve_for(work.next_step);
       solved_ = norms_.displacement(work.next_step) <= (1.0 - 0.25 * kept * shorten) * full;
       if (solved_) return kept;

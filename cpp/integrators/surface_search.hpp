@@ -17,7 +17,8 @@ namespace withe {
 
 class SurfaceSearch {
  public:
-  SurfaceSearch(const StepNorms& norms, const NewtonSystem& system) : norms_(norms), system_(system) {}
+  SurfaceSearch(const StepNorms& norms, const NewtonSystem& system, const Without& heuristics)
+      : norms_(norms), system_(system), heuristics_(heuristics) {}
 
   /// Shortens a step from z to what neither turns nor moves anything too far, and brings no surfaces too near; returns
   /// by how much.
@@ -39,6 +40,7 @@ class SurfaceSearch {
 
   const StepNorms& norms_;
   const NewtonSystem& system_;
+  const Without& heuristics_;
   bool evaluated_ = false, solved_ = false, remade_ = false;
 };
 
