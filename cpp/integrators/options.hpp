@@ -11,9 +11,8 @@ namespace withe {
 enum class Integrator { statics, backward_euler, implicit_midpoint, energy_momentum, fourth_order, verlet };
 
 enum class LineSearch {
-  automatic,        ///< full steps with a cap; falls back to the energy line search
+  automatic,        ///< full steps with a cap, and between surfaces as far as `SurfaceSearch` finds
   goldstein_price,  ///< [Choi, dissertation, Algorithm 4] on |F|^2 / 2
-  none,
 };
 
 struct Options {

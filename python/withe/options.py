@@ -9,7 +9,7 @@ from withe import _core, validation
 __all__ = ["Bending", "Integrator", "LineSearch", "Solver", "check_tolerances", "engine_options", "make_options"]
 
 Integrator = Literal["implicit_midpoint", "backward_euler", "energy_momentum", "fourth_order", "verlet", "static"]
-LineSearch = Literal["automatic", "goldstein_price", "none"]
+LineSearch = Literal["automatic", "goldstein_price"]
 Solver = Literal["automatic", "band", "sparse"]
 Bending = Literal["angle", "tangent"]
 
