@@ -21,6 +21,7 @@ NAMES = (
     "work_precision",
     "friction_precision",
     "robustness",
+    "ablation",
     "conservation",
     "contact",
     "contact_robustness",

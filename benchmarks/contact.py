@@ -50,7 +50,7 @@ def grippers(report: Report, quick: bool) -> None:
     report.table(f"Gripper, {steps:,} steps", ("friction", "s", "contacts"), rows)
 
 
-def _knot(friction: float, law: withe.parts.FrictionModel) -> withe.Simulation:
+def knot(friction: float, law: withe.parts.FrictionModel) -> withe.Simulation:
     """An overhand knot of 301 nodes whose ends are pulled apart at 2 cm/s."""
     scene = withe.Scene(gravity=(0.0, 0.0, 0.0))
     rubber = withe.Material(youngs_modulus=KNOT_MODULUS, poisson_ratio=0.5, density=KNOT_DENSITY)
@@ -75,7 +75,7 @@ def knots(report: Report, quick: bool) -> None:
         ("lagged", 0.1, "lagged", 0.65),
         ("implicit", 0.1, "implicit", 1.0),
     ):
-        seconds, contacts = _timed(_knot(friction, law), steps)
+        seconds, contacts = _timed(knot(friction, law), steps)
         rows.append((name, f"{1e3 * seconds:.2f}", contacts))
         report.goal(f"knot, friction {name} [ms a step]", None if quick else 1e3 * seconds, most, at_least=False)
     report.table("Overhand knot, 301 nodes", ("friction", "ms a step", "contacts"), rows)
@@ -100,7 +100,7 @@ def beside_elastica(report: Report, quick: bool) -> None:
     step = largest_stable_step(run, 0.6 * sound, 0.5)
     other = KnotRun(**run, time_step=step)
     other.seconds_per_step(200)
-    theirs, (ours, _) = other.seconds_per_step(500), _timed(_knot(0.0, "lagged"), 200, 200)
+    theirs, (ours, _) = other.seconds_per_step(500), _timed(knot(0.0, "lagged"), 200, 200)
     rows = [
         (name, f"{1e3 * size:.3g}", f"{1e3 * seconds:.2f}", f"{seconds / size:.2f}")
         for name, size, seconds in (("ours", KNOT_STEP, ours), ("PyElastica", step, theirs))

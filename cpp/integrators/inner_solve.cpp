@@ -37,9 +37,9 @@ void start_axial_force(const Equations& equations, const VectorX& q, VectorX& ou
 
 /// Adds to `work.move` what supports do within a part of the step. Where that is more than the edges next to them bear,
 /// the others follow as they would by the linear step.
-void follow_supports(Equations& equations, const Newton& newton, double part, const State& state, StepWorkspace& work) {
+void follow_supports(Equations& equations, const Newton& newton, const Options& options, double part, const State& state, StepWorkspace& work) {
   const Assembler& assembler = equations.assembler();
-  if (newton.norms().leaves_alone(part * assembler.greatest_held_change(state.q, work.held.q))) {
+  if (!options.heuristics.uses(Heuristic::supports_linear) || newton.norms().leaves_alone(part * assembler.greatest_held_change(state.q, work.held.q))) {
     assembler.add_held_change(state.q, work.held.q, part, work.move);
     return;
   }
@@ -90,7 +90,7 @@ class InnerSolve {
   NewtonResult run() {
     NewtonResult found;
     int spent = 0;
-    if (work_.repeated) {
+    if (work_.repeated && uses(Heuristic::repeat_from_end)) {
       found = repeat();
       if (found.converged) return found;
       spent = found.iterations;
@@ -99,12 +99,12 @@ class InnerSolve {
       if (!applies(guess)) continue;
       GuessRecord& record = history_.records[static_cast<std::size_t>(guess)];
       const bool sure = certain(guess);
-      if (!sure && record.skipped()) continue;
+      if (!sure && uses(Heuristic::start_record) && record.skipped()) continue;
       found = solve_from(guess);
       spent += found.iterations;
       if (!sure) record.note(found.converged);
       if (!found.converged) continue;
-      if (circling_ && mixed_ && guess == Guess::other_method) history_.plain_solves = kPlainSolves;
+      if (circling_ && mixed_ && guess == Guess::other_method && uses(Heuristic::remember_plain)) history_.plain_solves = kPlainSolves;
       break;
     }
     found.iterations = spent;
@@ -115,12 +115,18 @@ class InnerSolve {
   /// Where surfaces stick, a motion that lets them slip leads far off, and from rest Newton's method finds its way
   /// soon, or else mostly within a shorter step.
   Guesses order() const {
+    if (!uses(Heuristic::friction_order))
+      return {Guess::accelerated, Guess::steady, Guess::rest, Guess::other_method, Guess::continuation};
     if (regularised_) return {Guess::accelerated, Guess::rest, Guess::continuation, Guess::steady, Guess::other_method};
     if (frictional_) return {Guess::accelerated, Guess::rest, Guess::steady, Guess::other_method, Guess::continuation};
     return {Guess::accelerated, Guess::steady, Guess::rest, Guess::other_method, Guess::continuation};
   }
 
   bool applies(Guess guess) const {
+    if (guess == Guess::accelerated && !uses(Heuristic::start_accelerated)) return false;
+    if (guess == Guess::steady && !uses(Heuristic::start_steady)) return false;
+    if (guess == Guess::other_method && !uses(Heuristic::start_other_method)) return false;
+    if (guess == Guess::continuation && !uses(Heuristic::start_continuation)) return false;
     if (guess == Guess::continuation) return regularised_;
     return guess != Guess::accelerated || (points_ != 0 && !work_.repeated);
   }
@@ -141,6 +147,8 @@ class InnerSolve {
 
   bool mixed(Guess guess) const { return (guess == Guess::other_method) != mixed_; }
 
+  bool uses(Heuristic h) const { return options_.heuristics.uses(h); }
+
   NewtonResult repeat() {
     work_.z = work_.deep;
     start_axial_force(equations_, work_.z, work_.newton.axial_force);
@@ -160,8 +168,8 @@ class InnerSolve {
     }
     equations_.assembler().project(work_.move);
     work_.move *= newton_.norms().cap(work_.move);
-    if (equations_.contact()) equations_.contact()->hold_sticking(state_, work_.move);
-    follow_supports(equations_, newton_, h_ / plan_.dt, state_, work_);
+    if (equations_.contact() && uses(Heuristic::hold_sticking)) equations_.contact()->hold_sticking(state_, work_.move);
+    follow_supports(equations_, newton_, options_, h_ / plan_.dt, state_, work_);
     work_.z = state_.q + work_.move * equations_.allowed(state_.q, work_.move);
     start_axial_force(equations_, state_.q, work_.newton.axial_force);
   }
@@ -170,7 +178,7 @@ class InnerSolve {
     guess_at(guess);
     if (guess == Guess::continuation) return solve_by_continuation();
     // Guesses that surfaces cut short soon converge in one scene, and lead nowhere in another.
-    const bool trial = on_trial(guess);
+    const bool trial = on_trial(guess) && uses(Heuristic::few_iterations);
     const NewtonResult found =
         newton_.solve(equations_, work_.z,
                       {.max_iterations = trial ? std::min(kFew, options_.max_iterations) : options_.max_iterations,
@@ -190,7 +198,7 @@ class InnerSolve {
     VectorX& last = work_.velocity;
     int spent = 0;
     for (std::size_t k = 0; k < kRegularisation.size(); ++k) {
-      if (k > 1) {
+      if (k > 1 && uses(Heuristic::continuation_secant)) {
         const double share =
             (kRegularisation[k] - kRegularisation[k - 1]) / (kRegularisation[k - 1] - kRegularisation[k - 2]);
         work_.move = share * (work_.z - last);

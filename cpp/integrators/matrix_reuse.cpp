@@ -9,14 +9,8 @@ namespace {
 // so many steps.
 constexpr double kSlow = 0.15;
 constexpr int kWait = 16;
-// A step, of the contraction rate within a step: what served badly once is tried again in time.
-constexpr double kForgetting = 0.96;
-// So many iterations cost as much as a new matrix.
-constexpr int kCostOfMatrix = 3;
 // An iteration with an old matrix costs about a quarter of one with a new one.
 constexpr double kWorth = 2.5;
-// While steps are longer than this, over the tolerance, surfaces may yet stick or slip, and an old matrix not know it.
-constexpr double kUnsettled = 1e4;
 // So near the end, over the tolerance, an iteration leaves less than that.
 constexpr double kNearEnd = 1e3;
 
@@ -24,30 +18,24 @@ std::size_t at(MatrixAge age) { return static_cast<std::size_t>(age); }
 
 }  // namespace
 
-MatrixReuse::MatrixReuse(MatrixRecord& record, Equations& equations, double interval, bool allowed, double tolerance)
+MatrixReuse::MatrixReuse(MatrixRecord& record, Equations& equations, double interval, bool allowed, double tolerance,
+                         const Without& heuristics)
     : record_(record),
       equations_(equations),
       interval_(std::abs(interval)),
       allowed_(allowed),
       tolerance_(tolerance),
-      slipping_(equations.contact() && equations.contact()->eases()) {
+      heuristics_(heuristics) {
   if (!allowed)
     drop();
   else if (record.belongs_to(equations, interval) && record.generation == equations.assembler().generation()) {
-    const bool badly = record.contraction[at(MatrixAge::across)] > kSlow;
-    fresh_ = record.slow || (badly && ++record.waited < kWait);
+    const bool badly = record.contraction[at(MatrixAge::across)] > kSlow && heuristics.uses(Heuristic::rest_from_reuse);
+    fresh_ = !heuristics.uses(Heuristic::reuse_across_steps) || (badly && ++record.waited < kWait);
     if (!fresh_) record.waited = 0;
   }
-  record.slow = false;
-  record.contraction[at(MatrixAge::within)] *= kForgetting;
 }
 
-bool MatrixReuse::near_end() const { return distance_ <= kNearEnd * tolerance_; }
-
-void MatrixReuse::note_overdue() {
-  overdue_ = at_end() ? overdue_ + 1 : 0;
-  if (allowed_ && overdue_ >= kCostOfMatrix) fresh_ = true;
-}
+bool MatrixReuse::near_end() const { return distance_ <= kNearEnd * tolerance_ && heuristics_.uses(Heuristic::late_matrix); }
 
 void MatrixReuse::note_matrix(bool whole) {
   fresh_ = made_here_ = true;
@@ -55,8 +43,6 @@ void MatrixReuse::note_matrix(bool whole) {
   record_.interval = interval_;
   record_.generation = equations_.assembler().generation();
 }
-
-void MatrixReuse::note_end(int iterations) { record_.slow = age_ == MatrixAge::across && iterations >= kCostOfMatrix; }
 
 void MatrixReuse::note_step(double length) {
   last_step_ = step_;
@@ -66,17 +52,15 @@ void MatrixReuse::note_step(double length) {
   if (!allowed_) return;
   bool measured = false;
   if (std::isfinite(last_step_) && std::isfinite(step_)) {
-    // Steps near the tolerance are rounding as much as progress.
-    const double rate = step_ / last_step_;
-    double& known = record_.contraction[at(last_age_)];
-    if (last_step_ > 1e2 * tolerance_ || rate < known) known = rate;
+    record_.contraction[at(last_age_)] = step_ / last_step_;
     measured = last_age_ == age_;
   }
   const double here = std::min(0.5, (measured ? 1.0 : 4.0) * record_.contraction[at(age_)]);
   distance_ = step_ * here / (1.0 - here);
   const double next = record_.contraction[at(age_ == MatrixAge::across ? MatrixAge::across : MatrixAge::within)];
-  fresh_ = !std::isfinite(step_) || next > 0.5 || (slipping_ && step_ > kUnsettled * tolerance_) ||
-           (distance_ > tolerance_ && std::log(distance_ / tolerance_) > kWorth * std::log(1.0 / next));
+  fresh_ = !std::isfinite(step_) || next > 0.5 ||
+           (!heuristics_.uses(Heuristic::reuse_within_step) && made_here_) ||
+           (heuristics_.uses(Heuristic::matrix_worth) && distance_ > tolerance_ && std::log(distance_ / tolerance_) > kWorth * std::log(1.0 / next));
 }
 
 }  // namespace withe

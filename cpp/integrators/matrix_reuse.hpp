@@ -17,8 +17,7 @@ struct MatrixHistory {
   double interval = 0;  ///< that the last one belongs to [s]
   /// Contraction rate per MatrixAge: error after an iteration over error before.
   std::array<double, 3> contraction{1e-2, 1e-2, 1e-2};
-  int waited = 0;     ///< time steps since one was last tried across
-  bool slow = false;  ///< the last time step took many iterations with one
+  int waited = 0;  ///< time steps since one was last tried across
 };
 
 /// What the factorisation in a solver belongs to, and that history.
@@ -34,7 +33,8 @@ class MatrixReuse {
  public:
   /// `interval`: of a time step, after whose end the matrix may serve again. `allowed`: whether old ones may serve at
   /// all. `tolerance`: of the solution [m].
-  MatrixReuse(MatrixRecord& record, Equations& equations, double interval, bool allowed, double tolerance);
+  MatrixReuse(MatrixRecord& record, Equations& equations, double interval, bool allowed, double tolerance,
+              const Without& heuristics);
 
   /// Whether the coming iteration makes a matrix.
   bool fresh() const { return fresh_; }
@@ -47,13 +47,10 @@ class MatrixReuse {
   double last_step() const { return last_step_; }
   double tolerance() const { return tolerance_; }
 
-  /// Before an iteration that was not to be needed any more.
-  void note_overdue();
   /// A matrix was factorised; `whole`: all of the Jacobian, so that it may serve again.
   void note_matrix(bool whole = true);
   /// After a step: learns how well matrices serve, and decides about the next one.
   void note_step(double length);
-  void note_end(int iterations);
   /// The factorisation is not to be used again.
   void drop() { record_.owner = nullptr; }
 
@@ -63,12 +60,11 @@ class MatrixReuse {
   double interval_;
   bool allowed_;
   double tolerance_;
-  bool slipping_;  ///< whether surfaces may turn round within a slip far smaller than a step
+  const Without& heuristics_;
   bool fresh_ = true, made_here_ = false;
   MatrixAge age_ = MatrixAge::fresh, last_age_ = MatrixAge::fresh;
   double step_ = INFINITY, last_step_ = INFINITY;
   double distance_ = INFINITY;  ///< from the solution, estimated [m]
-  int overdue_ = 0;             ///< iterations since that fell below the tolerance
 };
 
 }  // namespace withe

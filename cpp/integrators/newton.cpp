@@ -8,19 +8,8 @@
 namespace withe {
 namespace {
 
-// After so many iterations, steps that are still too long to be taken whole and a residual that has grown by so much
-// lead nowhere in time.
-constexpr int kFirstIterations = 4;
-constexpr double kMostGrowth = 1e3;
 // A first step of which less is kept counts as cut.
 constexpr double kCut = 0.5;
-// Friction has no potential, and may lead downhill in a circle; what has not converged after so many iterations does.
-constexpr int kLongestDescent = 20;
-// Steps shorter than this, over the tolerance, are taken as they are while each halves the one before.
-constexpr double kShort = 1e2;
-// Iterations without progress in balance end a solve.
-constexpr int kStagnant = 3;
-constexpr double kProgress = 0.25;
 
 // Corrections of a prediction must shrink by this factor, while they are longer than this share of the prediction, and
 // than this, over the tolerance.
@@ -95,11 +84,11 @@ class Newton::Solve {
         z_(z),
         contact_(equations.contact()),
         system_{equations, how.target, work},
-        search_(newton.norms_, system_),
+        search_(newton.norms_, system_, newton.options_.heuristics),
         line_search_(newton.options_.line_search == LineSearch::goldstein_price),
         mixed_(how.mixed && newton.options_.mixed),
         reuse_(work.matrix, equations, how.interval, how.interval != 0.0 && !line_search_,
-               std::min(newton.options_.step_tolerance * newton.model_.length_scale, work.finest)),
+               std::min(newton.options_.step_tolerance * newton.model_.length_scale, work.finest), newton.options_.heuristics),
         axial_known_(mixed_ && (how.interval != 0.0 || how.predicted)) {}
 
   NewtonResult run() {
@@ -108,16 +97,15 @@ class Newton::Solve {
       const Verdict verdict = look();
       if (verdict == Verdict::go_on && iterate()) continue;
       result_.converged = verdict == Verdict::converged;
-      if (result_.converged)
-        reuse_.note_end(result_.iterations);
-      else
-        reuse_.drop();
+      if (!result_.converged) reuse_.drop();
       if (contact_) contact_->forget_foreseen();
       return result_;
     }
   }
 
  private:
+  bool uses(Heuristic h) const { return newton_.options_.heuristics.uses(h); }
+
   enum class Verdict { go_on, converged, failed };
 
   void evaluate(bool matrix) {
@@ -133,11 +121,6 @@ class Newton::Solve {
     balance_ = newton_.balance(work_.data, result_);
     if (converged()) return Verdict::converged;
     if (result_.iterations == how_.max_iterations) return Verdict::failed;
-    if (result_.iterations == 0) first_residual_ = result_.residual;
-    if (how_.interval != 0.0 && result_.iterations >= kFirstIterations && std::isinf(reuse_.step()) &&
-        std::isinf(reuse_.last_step()) && result_.residual > kMostGrowth * first_residual_)
-      return Verdict::failed;
-    reuse_.note_overdue();
     if (reuse_.fresh() && near_end) evaluate(true);
     return Verdict::go_on;
   }
@@ -147,7 +130,7 @@ class Newton::Solve {
   bool converged() const {
     if (how_.predicted && how_.predicted->enough > 0.0) return reuse_.step() <= how_.predicted->enough;
     return (balance_.floor && (result_.iterations > 0 || balance_.relative)) ||
-           (balance_.either && (reuse_.at_end() || stagnant_ >= kStagnant));
+           (balance_.either && reuse_.at_end());
   }
 
   /// Takes a step; false where there is none, or none that may lead to the solution.
@@ -164,12 +147,12 @@ class Newton::Solve {
     search_.forget();
     if (!work_.step.allFinite()) return false;
     double shorten = search_.shortened(z_, work_.step);
-    system_.equations.foresee(work_.step, shorten);
+    if (uses(Heuristic::predict_friction)) system_.equations.foresee(work_.step, shorten);
     if (mixed_) predict_axial_force(system_.equations.problem(), work_.data, work_.step, work_.axial_force);
     axial_known_ = mixed_;
-    if (contact_ && !step_between_surfaces(shorten)) return false;
+    if (contact_ && uses(Heuristic::surface_search) && !step_between_surfaces(shorten)) return false;
     if (result_.iterations == 0) result_.cut = contact_ && shorten < kCut;
-    if (how_.give_up_if_cut && result_.cut) return false;
+    if (how_.give_up_if_cut && result_.cut && uses(Heuristic::reject_cut)) return false;
     if (line_search_) {
       const double alpha = line_search(system_, z_, work_.step);
       work_.step *= alpha;
@@ -182,16 +165,11 @@ class Newton::Solve {
     else
       z_ += work_.step;
     reuse_.note_step(shorten < 1.0 ? INFINITY : newton_.norms_.displacement(work_.step));
-    stagnant_ = balance_.either && reuse_.step() > kProgress * reuse_.last_step() ? stagnant_ + 1 : 0;
     return !how_.predicted || !how_.predicted->strict || !loses_path(*how_.predicted, reuse_, result_.iterations == 0);
   }
 
-  /// Near the end every step is shorter than the last whole one, or friction's jump lies between.
   bool step_between_surfaces(double& shorten) {
-    const double full = newton_.norms_.displacement(work_.step) / shorten;
-    const bool follows = result_.iterations == 0 || (std::isfinite(reuse_.step()) && full <= 0.5 * reuse_.step());
-    if (full <= kShort * reuse_.tolerance() && follows) return true;
-    if (!search_.run(z_, result_.iterations >= kLongestDescent, shorten)) return false;
+    if (!search_.run(z_, shorten)) return false;
     if (search_.remade()) reuse_.note_matrix(false);
     axial_known_ = false;  // no prediction outlives a step that may lead elsewhere
     return true;
@@ -209,8 +187,6 @@ class Newton::Solve {
   bool axial_known_;
   NewtonResult result_;
   Balance balance_;
-  double first_residual_ = 0.0;
-  int stagnant_ = 0;
 };
 
 NewtonResult Newton::solve(Equations& equations, VectorX& z, const SolveOptions& how, NewtonWorkspace& work) const {

@@ -10,7 +10,7 @@
 namespace withe {
 
 struct Counters {
-  long iterations = 0, factorizations = 0;
+  long iterations = 0, evaluations = 0, factorizations = 0;
   double assembly_time = 0, solve_time = 0, fluid_time = 0;  ///< [s]
 };
 

@@ -3,6 +3,7 @@
 
 #include <optional>
 
+#include "integrators/heuristics.hpp"
 #include "steps/equations.hpp"
 
 namespace withe {
@@ -10,9 +11,8 @@ namespace withe {
 enum class Integrator { statics, backward_euler, implicit_midpoint, energy_momentum, fourth_order, verlet };
 
 enum class LineSearch {
-  automatic,        ///< full steps with a cap; falls back to the energy line search
+  automatic,        ///< full steps with a cap, and between surfaces as far as `SurfaceSearch` finds
   goldstein_price,  ///< [Choi, dissertation, Algorithm 4] on |F|^2 / 2
-  none,
 };
 
 struct Options {
@@ -29,6 +29,7 @@ struct Options {
   double force_tolerance = 1e-8;  ///< residual, relative to the forces in the scene
   int max_iterations = 40;        ///< per Newton solve
   int max_halvings = 12;          ///< smallest step is time_step / 2^max_halvings
+  Without heuristics;             ///< all are used but for measurements
 };
 
 /// The form of the equations that an integrator solves.

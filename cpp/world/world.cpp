@@ -40,6 +40,7 @@ const Statistics& World::statistics() const {
   Statistics& s = implementation_->statistics;
   const Counters& c = implementation_->work.newton.counters;
   s.iterations = c.iterations;
+  s.evaluations = c.evaluations;
   s.factorizations = c.factorizations;
   s.assembly_time = c.assembly_time;
   s.solve_time = c.solve_time;

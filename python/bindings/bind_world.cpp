@@ -41,6 +41,7 @@ void register_results(py::module_& module) {
       .def_readonly("steps", &Statistics::steps)
       .def_readonly("rejected_steps", &Statistics::rejected_steps)
       .def_readonly("iterations", &Statistics::iterations)
+      .def_readonly("evaluations", &Statistics::evaluations)
       .def_readonly("factorizations", &Statistics::factorizations)
       .def_readonly("largest_turn", &Statistics::largest_turn)
       .def_readonly("branch_changes", &Statistics::branch_changes)

@@ -27,6 +27,7 @@ def run(name, folder, *arguments):
         "work_precision",
         "friction_precision",
         "robustness",
+        "ablation",
         "conservation",
         "skips",
         "parallel",

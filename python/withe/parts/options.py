@@ -11,7 +11,7 @@ from withe.common import validation
 __all__ = ["Bending", "BuildOptions", "Integrator", "LineSearch", "Solver", "check_tolerances"]
 
 Integrator = Literal["implicit_midpoint", "backward_euler", "energy_momentum", "fourth_order", "verlet", "static"]
-LineSearch = Literal["automatic", "goldstein_price", "none"]
+LineSearch = Literal["automatic", "goldstein_price"]
 Solver = Literal["automatic", "band", "sparse"]
 Bending = Literal["angle", "tangent"]
 

@@ -305,7 +305,7 @@ class Scene(AppliedLoads, Loads, Contacts):
             [Bergou et al. 2008], which bends too stiffly on coarse meshes, and with which edges are always the
             rod and never chords of its arcs.
         solver : {"automatic", "band", "sparse"}
-        line_search : {"automatic", "goldstein_price", "none"}
+        line_search : {"automatic", "goldstein_price"}
         mixed : bool
             Newton's method with the axial forces as unknowns of their own.
         step_tolerance : float

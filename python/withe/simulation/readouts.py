@@ -131,8 +131,8 @@ class Statistics:
     ----------
     steps, rejected_steps : int
         Inner steps: a time step that had to be cut counts several.
-    iterations, factorizations : int
-        Of Newton's method.
+    iterations, evaluations, factorizations : int
+        Of Newton's method, its residual (with or without the matrix), its matrix.
     largest_turn : float [rad]
         Greatest turn of an edge within one inner step.
     branch_changes : int
@@ -146,6 +146,7 @@ class Statistics:
     steps: int
     rejected_steps: int
     iterations: int
+    evaluations: int
     factorizations: int
     largest_turn: float
     branch_changes: int

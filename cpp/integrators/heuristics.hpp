@@ -1,0 +1,42 @@
+#pragma once
+/// What Newton's method does beyond full steps, by name, so that each can be switched off and measured
+/// (benchmarks/ablation.py).
+
+namespace withe {
+
+enum class Heuristic : unsigned {
+  reuse_across_steps,
+  reuse_within_step,
+  rest_from_reuse,
+  late_matrix,
+  matrix_worth,
+  reject_cut,
+  surface_search,
+  search_descent,
+  drop_geometric,
+  start_accelerated,
+  start_steady,
+  start_other_method,
+  start_continuation,
+  start_record,
+  remember_plain,
+  friction_order,
+  few_iterations,
+  repeat_from_end,
+  hold_sticking,
+  predict_friction,
+  supports_linear,
+  continuation_secant,
+};
+
+/// A set of heuristics that are switched off.
+class Without {
+ public:
+  bool uses(Heuristic h) const { return (bits_ >> static_cast<unsigned>(h) & 1U) == 0U; }
+  void switch_off(Heuristic h) { bits_ |= 1U << static_cast<unsigned>(h); }
+
+ private:
+  unsigned bits_ = 0;
+};
+
+}  // namespace withe
