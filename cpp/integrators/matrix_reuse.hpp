@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 
+#include "integrators/heuristics.hpp"
 #include "steps/equations.hpp"
 
 namespace withe {
