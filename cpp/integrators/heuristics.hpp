@@ -18,7 +18,6 @@ enum class Heuristic : unsigned {
   start_continuation,
   start_record,
   few_iterations,
-  repeat_from_end,
   hold_sticking,
   predict_friction,
   supports_linear,

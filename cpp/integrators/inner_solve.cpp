@@ -10,8 +10,8 @@ namespace {
 /// Initial guesses: the extrapolated motion; rest; rest, and continuation in friction's regularisation.
 enum class Guess : std::size_t { extrapolated, rest, continuation };
 
-// Iterations of guesses that may be wrong, and of repeated steps.
-constexpr int kFew = 12, kRepeated = 24;
+// Iterations of a guess that may be wrong.
+constexpr int kFew = 12;
 // The slip over which friction grows, over that of the scene, and iterations at each.
 constexpr std::array<double, 7> kRegularisation{8192.0, 4096.0, 512.0, 64.0, 16.0, 4.0, 1.0};
 constexpr int kMostOfEach = 20;
@@ -82,11 +82,6 @@ class InnerSolve {
   NewtonResult run() {
     NewtonResult found;
     int spent = 0;
-    if (work_.repeated && uses(Heuristic::repeat_from_end)) {
-      found = repeat();
-      if (found.converged) return found;
-      spent = found.iterations;
-    }
     for (Guess guess : {Guess::extrapolated, Guess::rest, Guess::continuation}) {
       if (!applies(guess)) continue;
       GuessRecord& record = history_.records[static_cast<std::size_t>(guess)];
@@ -104,7 +99,7 @@ class InnerSolve {
  private:
   bool applies(Guess guess) const {
     if (guess == Guess::extrapolated)
-      return points_ != 0 && !work_.repeated && uses(Heuristic::extrapolated_start);
+      return points_ != 0 && uses(Heuristic::extrapolated_start);
     return guess == Guess::rest || (regularised_ && uses(Heuristic::start_continuation));
   }
 
@@ -114,15 +109,6 @@ class InnerSolve {
   }
 
   bool uses(Heuristic h) const { return options_.heuristics.uses(h); }
-
-  NewtonResult repeat() {
-    work_.z = work_.deep;
-    start_axial_force(equations_, work_.z, work_.newton.axial_force);
-    return newton_.solve(
-        equations_, work_.z,
-        {.max_iterations = std::min(kRepeated, options_.max_iterations), .interval = h_},
-        work_.newton);
-  }
 
   /// Puts the guess into `work.z`.
   void guess_at(Guess guess) {
