@@ -18,7 +18,6 @@ enum class Heuristic : unsigned {
   start_continuation,
   start_record,
   few_iterations,
-  hold_sticking,
   predict_friction,
   supports_linear,
   continuation_secant,

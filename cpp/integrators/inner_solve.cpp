@@ -120,7 +120,6 @@ class InnerSolve {
     }
     equations_.assembler().project(work_.move);
     work_.move *= newton_.norms().cap(work_.move);
-    if (equations_.contact() && uses(Heuristic::hold_sticking)) equations_.contact()->hold_sticking(state_, work_.move);
     follow_supports(equations_, newton_, options_, h_ / plan_.dt, state_, work_);
     work_.z = state_.q + work_.move * equations_.allowed(state_.q, work_.move);
     start_axial_force(equations_, state_.q, work_.newton.axial_force);
