@@ -20,7 +20,6 @@ enum class Heuristic : unsigned {
   few_iterations,
   predict_friction,
   supports_linear,
-  continuation_secant,
 };
 
 /// A set of heuristics that are switched off.

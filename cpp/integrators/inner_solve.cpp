@@ -33,9 +33,11 @@ void start_axial_force(const Equations& equations, const VectorX& q, VectorX& ou
 
 /// Adds to `work.move` what supports do within a part of the step. Where that is more than the edges next to them bear,
 /// the others follow as they would by the linear step.
-void follow_supports(Equations& equations, const Newton& newton, const Options& options, double part, const State& state, StepWorkspace& work) {
+void follow_supports(Equations& equations, const Newton& newton, const Options& options, double part,
+                     const State& state, StepWorkspace& work) {
   const Assembler& assembler = equations.assembler();
-  if (!options.heuristics.uses(Heuristic::supports_linear) || newton.norms().leaves_alone(part * assembler.greatest_held_change(state.q, work.held.q))) {
+  if (!options.heuristics.uses(Heuristic::supports_linear) ||
+      newton.norms().leaves_alone(part * assembler.greatest_held_change(state.q, work.held.q))) {
     assembler.add_held_change(state.q, work.held.q, part, work.move);
     return;
   }
@@ -75,8 +77,7 @@ class InnerSolve {
         predictor_(predictor),
         work_(work),
         history_(work.newton.guesses),
-        frictional_(equations.contact() && equations.contact()->frictional()),
-        regularised_(frictional_ && equations.contact()->eases()),
+        regularised_(equations.contact() && equations.contact()->frictional() && equations.contact()->eases()),
         points_(predictor.points(plan.slot)) {}
 
   NewtonResult run() {
@@ -98,8 +99,7 @@ class InnerSolve {
 
  private:
   bool applies(Guess guess) const {
-    if (guess == Guess::extrapolated)
-      return points_ != 0 && uses(Heuristic::extrapolated_start);
+    if (guess == Guess::extrapolated) return points_ != 0 && uses(Heuristic::extrapolated_start);
     return guess == Guess::rest || (regularised_ && uses(Heuristic::start_continuation));
   }
 
@@ -128,8 +128,8 @@ class InnerSolve {
   NewtonResult solve_from(Guess guess) {
     guess_at(guess);
     if (guess == Guess::continuation) return solve_by_continuation();
-    // Guesses that surfaces cut short soon converge in one scene, and lead nowhere in another.
-    // What need not lead to the solution is given up after few iterations.
+    // What need not lead to the solution is rejected after few iterations; what surfaces cut short soon converges in
+    // one scene, and leads nowhere in another.
     const bool trial = guess == Guess::extrapolated && uses(Heuristic::few_iterations);
     const NewtonResult found =
         newton_.solve(equations_, work_.z,
@@ -159,8 +159,7 @@ class InnerSolve {
         last = work_.z;
       }
       equations_.contact()->ease(kRegularisation[k]);
-      found = newton_.solve(equations_, work_.z, {.max_iterations = kMostOfEach, .interval = h_},
-                            work_.newton);
+      found = newton_.solve(equations_, work_.z, {.max_iterations = kMostOfEach, .interval = h_}, work_.newton);
       spent += found.iterations;
       if (!found.converged) break;
     }
@@ -178,9 +177,8 @@ class InnerSolve {
   const Predictor& predictor_;
   StepWorkspace& work_;
   GuessHistory& history_;
-  bool frictional_;
   bool regularised_;  ///< whether friction's regularisation is what Newton's method may fail on
-  int points_;  ///< of the extrapolation
+  int points_;        ///< of the extrapolation
 };
 
 }  // namespace
