@@ -126,10 +126,6 @@ class Contact {
   void foresee_friction(const VectorX& change);
   void forget_foreseen() { foreseen_.clear(); }
 
-  /// Takes from a predicted change of q what would move surfaces that stick: friction is steep there, and from outside
-  /// Newton's method would fall past it.
-  void hold_sticking(const State& state, VectorX& change) const;
-
   /// Keeps in `state`, still where the step began, what contacts at q1 must remember; their stiffness follows the
   /// forces. Returns the energy that this put in, below zero where it took some; if that is what to keep, no more than
   /// `spare` [J].

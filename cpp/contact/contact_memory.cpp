@@ -350,19 +350,6 @@ double Contact::stiffen(State& state, Keep keep) {
   return put_in;
 }
 
-void Contact::hold_sticking(const State& state, VectorX& change) const {
-  for (const ContactRecord& record : state.contacts) {
-    // Rods that stick to each other may well move together, which lagged friction is content with.
-    if (!record.sticking || (record.key.b >= 0 && !unsymmetric())) continue;
-    for (int edge : {record.key.a, record.key.b}) {
-      if (edge < 0) continue;
-      change.segment(model_.tail_dof[at(edge)], model_.dimension).setZero();
-      change.segment(model_.head_dof[at(edge)], model_.dimension).setZero();
-      if (!model_.planar()) change(model_.edge_dof[at(edge)]) = 0.0;
-    }
-  }
-}
-
 /// A step that goes nowhere: obstacles stay where they are in the state.
 void Contact::look_at(const State& state, const Parameters& parameters) {
   std::vector<ObstaclePlace> target = std::exchange(target_, {});
