@@ -1,8 +1,7 @@
 #include "elasticity/elements.hpp"
 
-#include "elasticity/bend_planar.hpp"
 #include "elasticity/bend_twist.hpp"
-#include "elasticity/stretch.hpp"
+#include "elasticity/put_local.hpp"
 #include "geometry/rotation.hpp"
 
 namespace withe {
@@ -79,72 +78,32 @@ Matrix3 dense(const Mat3<double>& a) {
   return m;
 }
 
-struct Direction2 {
-  double tx, ty, nx, ny;  // tangent and normal over length
-};
-Direction2 direction2(const EdgeFrame<double>& f) {
-  return {f.tangent.x, f.tangent.y, -f.tangent.y * f.inverse_length, f.tangent.x * f.inverse_length};
-}
-/// Second derivative of an edge's angle: - (t n^T + n t^T) / l, n over length.
-void add_angle_hessian(double (&m)[2][2], double weight, const Direction2& d, double inverse_length) {
-  const double t[2] = {d.tx, d.ty}, n[2] = {d.nx, d.ny};
-  for (int i = 0; i < 2; ++i)
-    for (int j = 0; j < 2; ++j) m[i][j] -= weight * inverse_length * (t[i] * n[j] + n[i] * t[j]);
-}
-
 void bend_planar_local(const ElasticCoefficients& k, const Configuration& c, const BendStencil& s, Eigen::Index i,
-                       Local& out) {
+                       bool with_hessian, Local& out) {
   const PlanarBend<double> p =
       planar_bend(k.measure, c.bend_strain(i, 0), k.bend_natural(i, 0), k.bend_stiffness(i, 0));
-  const EdgeFrame<double>&f0 = c.edge[static_cast<std::size_t>(s.edge[0])],
-        &f1 = c.edge[static_cast<std::size_t>(s.edge[1])];
-  Direction2 a = direction2(f0), b = direction2(f1);
-  if (s.sign[0] < 0) a = {-a.tx, -a.ty, -a.nx, -a.ny};
-  if (s.sign[1] < 0) b = {-b.tx, -b.ty, -b.nx, -b.ny};
+  const PlanarEdge<double> edge[2] = {planar_edge(c.edge[static_cast<std::size_t>(s.edge[0])], s.sign[0]),
+                                      planar_edge(c.edge[static_cast<std::size_t>(s.edge[1])], s.sign[1])};
+  PlanarForces<double> f;
+  planar_bend_forces<true>(p, edge, f);
   out.energy = p.energy;
-  // phi = angle(e1) - angle(e0); e0 = x1 - x0, e1 = x2 - x1.
-  const double d[6] = {a.nx, a.ny, -a.nx - b.nx, -a.ny - b.ny, b.nx, b.ny};
-  for (int r = 0; r < 6; ++r) {
-    out.gradient[r] = p.slope * d[r];
-    for (int col = 0; col < 6; ++col) out.hessian[r][col] = p.curvature * d[r] * d[col];
-  }
-  double A[2][2] = {}, B[2][2] = {};
-  add_angle_hessian(A, -p.slope, a, f0.inverse_length);
-  add_angle_hessian(B, p.slope, b, f1.inverse_length);
-  for (int r = 0; r < 2; ++r)
-    for (int col = 0; col < 2; ++col) {
-      out.hessian[r][col] += A[r][col];
-      out.hessian[r][2 + col] -= A[r][col];
-      out.hessian[2 + r][col] -= A[r][col];
-      out.hessian[2 + r][2 + col] += A[r][col] + B[r][col];
-      out.hessian[2 + r][4 + col] -= B[r][col];
-      out.hessian[4 + r][2 + col] -= B[r][col];
-      out.hessian[4 + r][4 + col] += B[r][col];
-    }
+  put_planar_bend(f, with_hessian, out);
 }
 
+/// The attached end is an edge of unit length, whose angle is the frame's.
 void half_planar_local(const ElasticCoefficients& k, const Configuration& c, const FrameStencil& s, Eigen::Index i,
-                       Local& out) {
+                       bool with_hessian, Local& out) {
   const PlanarBend<double> p =
       planar_bend(k.measure, c.half_strain(i, 0), k.half_natural(i, 0), k.half_stiffness(i, 0));
-  const EdgeFrame<double>& f = c.edge[static_cast<std::size_t>(s.edge)];
-  const Direction2 a = direction2(f);
-  const double sign = s.frame_first ? 1.0 : -1.0;
-  const double d[5] = {-sign * a.nx, -sign * a.ny, sign * a.nx, sign * a.ny, -sign};
+  const int a = s.frame_first ? 0 : 1, b = 1 - a;  // slots of the frame and of the edge
+  PlanarEdge<double> edge[2];
+  edge[a] = planar_edge(c.attached[static_cast<std::size_t>(i)]);
+  edge[b] = planar_edge(c.edge[static_cast<std::size_t>(s.edge)]);
+  PlanarForces<double> f;
+  planar_bend_forces<true>(p, edge, f);
+  const Vec2<double> turn = turned(edge[a].tangent), coupling = f.by[b][a] * turn;
   out.energy = p.energy;
-  for (int r = 0; r < 5; ++r) {
-    out.gradient[r] = p.slope * d[r];
-    for (int col = 0; col < 5; ++col) out.hessian[r][col] = p.curvature * d[r] * d[col];
-  }
-  double A[2][2] = {};
-  add_angle_hessian(A, sign * p.slope, a, f.inverse_length);
-  for (int r = 0; r < 2; ++r)
-    for (int col = 0; col < 2; ++col) {
-      out.hessian[r][col] += A[r][col];
-      out.hessian[r][2 + col] -= A[r][col];
-      out.hessian[2 + r][col] -= A[r][col];
-      out.hessian[2 + r][2 + col] += A[r][col];
-    }
+  put_planar_half({f.force[b], dot(turn, f.force[a]), f.by[b][b], coupling, coupling, p.curvature}, with_hessian, out);
 }
 
 }  // namespace
@@ -213,34 +172,20 @@ BendTwistEnergy half_energy_of(const ElasticCoefficients& k, const Configuration
 }
 
 void stretch_local(const Model& model, const ElasticCoefficients& k, const Configuration& c, int edge,
-                   bool with_hessian, const double* axial_force, Local& out) {
+                   bool with_hessian, const double* given_force, Local& out) {
   const EdgeFrame<double>& f = c.edge[static_cast<std::size_t>(edge)];
-  const double rest = model.edge_length(edge);
-  const double force = k.stretch_stiffness(edge) * (c.length(edge) / rest - 1.0 - k.stretch_natural(edge));
+  const double EA = k.stretch_stiffness(edge), rest = model.edge_length(edge);
+  const double force = axial_force(c.length(edge), rest, EA, k.stretch_natural(edge));
   out.energy = stretch_energy_of(model, k, c, edge);
-  const int n = model.dimension;
-  const double t[3] = {f.tangent.x, f.tangent.y, f.tangent.z};
-  for (int i = 0; i < n; ++i) {
-    out.gradient[i] = -force * t[i];
-    out.gradient[n + i] = force * t[i];
-  }
-  if (!with_hessian) return;
-  const Mat3<double> H = stretch_hessian(f.tangent, f.inverse_length, rest, k.stretch_stiffness(edge),
-                                         axial_force ? axial_force[edge] : force);
-  for (int i = 0; i < n; ++i) {
-    const double row[3] = {H.row[i].x, H.row[i].y, H.row[i].z};
-    for (int j = 0; j < n; ++j) {
-      out.hessian[i][j] = out.hessian[n + i][n + j] = row[j];
-      out.hessian[i][n + j] = out.hessian[n + i][j] = -row[j];
-    }
-  }
+  put_stretch(model.dimension, f.tangent, f.tangent, force, EA / rest,
+              (given_force ? given_force[edge] : force) * f.inverse_length, with_hessian, out);
 }
 
 void bend_local(const Model& model, const ElasticCoefficients& k, const Configuration& c, int stencil,
                 bool with_hessian, Local& out) {
   const BendStencil& s = model.bend[static_cast<std::size_t>(stencil)];
   const auto i = static_cast<Eigen::Index>(stencil);
-  if (model.planar()) return bend_planar_local(k, c, s, i, out);
+  if (model.planar()) return bend_planar_local(k, c, s, i, with_hessian, out);
   const EdgeFrame<double> f0 = oriented(c.edge[static_cast<std::size_t>(s.edge[0])], s.sign[0]);
   const EdgeFrame<double> f1 = oriented(c.edge[static_cast<std::size_t>(s.edge[1])], s.sign[1]);
   const BendTwistDerivatives<double> d =
@@ -280,7 +225,7 @@ void half_local(const Model& model, const VectorX& q, const ElasticCoefficients&
                 bool with_hessian, Local& out) {
   const FrameStencil& s = model.half[static_cast<std::size_t>(stencil)];
   const auto i = static_cast<Eigen::Index>(stencil);
-  if (model.planar()) return half_planar_local(k, c, s, i, out);
+  if (model.planar()) return half_planar_local(k, c, s, i, with_hessian, out);
   const EdgeFrame<double>& edge = c.edge[static_cast<std::size_t>(s.edge)];
   const EdgeFrame<double>& end = c.attached[static_cast<std::size_t>(stencil)];
   const EdgeFrame<double>&f0 = s.frame_first ? end : edge, &f1 = s.frame_first ? edge : end;

@@ -92,6 +92,17 @@ void add_matrix(const StencilBatch& batch, int first, int live, const Pack (&mat
     add_lines<Piece, false>(batch, first, live, matrix);
 }
 
+/// For a matrix that is kept by columns.
+template <int kSize, int kWidth>
+void exchange_triangles(Pack (&matrix)[kSize][kWidth]) {
+  for (int i = 0; i < kSize; ++i)
+    for (int j = 0; j < i; ++j) {
+      const Pack swapped = matrix[i][j];
+      matrix[i][j] = matrix[j][i];
+      matrix[j][i] = swapped;
+    }
+}
+
 /// Adds to one number per unknown.
 template <class Piece, int count>
 void add_vector(const StencilBatch& batch, int first, int live, const Pack* numbers, double* out) {

@@ -19,32 +19,27 @@ void Equations::set_mean_axial_forces() {
 
 void Equations::add_discrete_gradient(const VectorX& z, bool with_matrix, const double* axial_force, Evaluation& out) {
   const std::span<double> values = assembler_.solver().values();
-  const DiscreteStep step{start_, middle_, end_, z, end_q_, difference_};
+  const DiscreteStep step{start_, middle_, end_, end_q_, difference_};
   Local local;
   const auto add = [&](const ElementTable& table, int i) {
     table.add_gradient(i, local.gradient, 1.0, gradient_, magnitude_);
     if (with_matrix) table.add_hessian(i, local.hessian, 1.0, values);
   };
-  const auto add_edge = [&](int e) {
+  set_mean_axial_forces();
+  const StencilKernels& kernels = stencil_kernels();
+  (model_.planar() ? kernels.planar_momentum_bend : kernels.momentum_bend)(
+      regular_batch(elastic, axial_force, with_matrix ? values.data() : nullptr),
+      {.start_frames = &start_.edge.data()->tangent.x,
+       .end_frames = &end_.edge.data()->tangent.x,
+       .start_strain = start_.bend_strain.data(),
+       .end_strain = end_.bend_strain.data()});
+  for (int e : assembler_.regular.other_edges) {
     discrete_stretch_local(model_, elastic, step, e, with_matrix, axial_force, local);
     add(assembler_.stretch, e);
-  };
-  const auto add_bend = [&](int b) {
+  }
+  for (int b : assembler_.regular.other_bend) {
     discrete_bend_local(model_, elastic, step, b, with_matrix, local);
     add(assembler_.bend, b);
-  };
-  if (model_.planar()) {
-    for (int e = 0; e < model_.edge_count; ++e) add_edge(e);
-    for (int b = 0; b < static_cast<int>(model_.bend.size()); ++b) add_bend(b);
-  } else {
-    set_mean_axial_forces();
-    stencil_kernels().momentum_bend(regular_batch(elastic, axial_force, with_matrix ? values.data() : nullptr),
-                                    {.start_frames = &start_.edge.data()->tangent.x,
-                                     .end_frames = &end_.edge.data()->tangent.x,
-                                     .start_strain = start_.bend_strain.data(),
-                                     .end_strain = end_.bend_strain.data()});
-    for (int e : assembler_.regular.other_edges) add_edge(e);
-    for (int b : assembler_.regular.other_bend) add_bend(b);
   }
   for (int h = 0; h < static_cast<int>(model_.half.size()); ++h) {
     discrete_half_local(model_, elastic, step, h, with_matrix, local);
