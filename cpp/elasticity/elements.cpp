@@ -43,35 +43,6 @@ void put(Local& out, int at, const Vec3d& v) {
   out.gradient[at + 1] = v.y;
   out.gradient[at + 2] = v.z;
 }
-void put_block(Local& out, int row, int column, double sign, const Mat3<double>& m) {
-  for (int i = 0; i < 3; ++i) {
-    out.hessian[row + i][column] = sign * m.row[i].x;
-    out.hessian[row + i][column + 1] = sign * m.row[i].y;
-    out.hessian[row + i][column + 2] = sign * m.row[i].z;
-  }
-}
-void put_transposed(Local& out, int row, int column, double sign, const Mat3<double>& m) {
-  for (int i = 0; i < 3; ++i) {
-    out.hessian[row][column + i] = sign * m.row[i].x;
-    out.hessian[row + 1][column + i] = sign * m.row[i].y;
-    out.hessian[row + 2][column + i] = sign * m.row[i].z;
-  }
-}
-/// Column and row of an angle against a node.
-void put_angle(Local& out, int node, int angle, const Vec3d& v) {
-  const double c[3] = {v.x, v.y, v.z};
-  for (int i = 0; i < 3; ++i) out.hessian[node + i][angle] = out.hessian[angle][node + i] = c[i];
-}
-Mat3<double> minus(const Mat3<double>& a, const Mat3<double>& b) {
-  return {{a.row[0] - b.row[0], a.row[1] - b.row[1], a.row[2] - b.row[2]}};
-}
-Mat3<double> plus(const Mat3<double>& a, const Mat3<double>& b) {
-  return {{a.row[0] + b.row[0], a.row[1] + b.row[1], a.row[2] + b.row[2]}};
-}
-Mat3<double> transposed(const Mat3<double>& a) {
-  const Vec3d* r = a.row;
-  return {{{r[0].x, r[1].x, r[2].x}, {r[0].y, r[1].y, r[2].y}, {r[0].z, r[1].z, r[2].z}}};
-}
 Matrix3 dense(const Mat3<double>& a) {
   Matrix3 m;
   for (int i = 0; i < 3; ++i) m.row(i) << a.row[i].x, a.row[i].y, a.row[i].z;
@@ -104,6 +75,29 @@ void half_planar_local(const ElasticCoefficients& k, const Configuration& c, con
   const Vec2<double> turn = turned(edge[a].tangent), coupling = f.by[b][a] * turn;
   out.energy = p.energy;
   put_planar_half({f.force[b], dot(turn, f.force[a]), f.by[b][b], coupling, coupling, p.curvature}, with_hessian, out);
+}
+
+/// Second derivatives by the spin of the frame that is in slot `a` of a half stencil: with itself, with the vector of
+/// the edge in the other slot, and with that one's angle. A spin eta moves the frame's unit tangent T by eta x T and
+/// its directors by T . eta.
+struct SpinHessian {
+  Matrix3 spin, edge;
+  Vector3 angle;
+};
+SpinHessian spin_hessian(const BendTwistDerivatives<double>& d, int a, const Vector3& T) {
+  const int b = 1 - a;
+  const Vector3 ge = to_eigen(d.gradient_e[a]);
+  const Matrix3 X = cross_matrix(T);  // X^T-side of eta -> eta x T
+  const Matrix3 Haa = dense(d.ee[a][a]);
+  const Matrix3 Hab = a == 0 ? dense(d.ee[0][1]) : Matrix3(dense(d.ee[0][1]).transpose());  // frame edge, real edge
+  const Vector3 haa = to_eigen(d.e_angle[a][a]);                                            // frame edge, frame angle
+  const Vector3 hab = to_eigen(d.e_angle[a][b]);                                            // frame edge, edge's angle
+  const Vector3 hba = to_eigen(d.e_angle[b][a]);                                            // real edge, frame angle
+  Matrix3 S = X * Haa * X.transpose() + d.angle_angle[a][a] * T * T.transpose();
+  const Vector3 Xh = X * haa;
+  S += Xh * T.transpose() + T * Xh.transpose() + 0.5 * (ge * T.transpose() + T * ge.transpose());
+  S.diagonal().array() -= ge.dot(T);
+  return {S, X * Hab + T * hba.transpose(), X * hab + d.angle_angle[0][1] * T};
 }
 
 }  // namespace
@@ -188,37 +182,23 @@ void bend_local(const Model& model, const ElasticCoefficients& k, const Configur
   if (model.planar()) return bend_planar_local(k, c, s, i, with_hessian, out);
   const EdgeFrame<double> f0 = oriented(c.edge[static_cast<std::size_t>(s.edge[0])], s.sign[0]);
   const EdgeFrame<double> f1 = oriented(c.edge[static_cast<std::size_t>(s.edge[1])], s.sign[1]);
-  const BendTwistDerivatives<double> d =
+  BendTwistDerivatives<double> d =
       bend_twist(k.measure, f0, f1, strain_row(c.bend_strain, i), strain_row(k.bend_natural, i),
                  stiffness_row(k.bend_stiffness, i), with_hessian);
   out.energy = d.energy;
-  const double s0 = s.sign[0], s1 = s.sign[1];
-  put(out, 0, -d.gradient_e[0]);
-  out.gradient[3] = s0 * d.gradient_angle[0];
-  put(out, 4, d.gradient_e[0] - d.gradient_e[1]);
-  out.gradient[7] = s1 * d.gradient_angle[1];
-  put(out, 8, d.gradient_e[1]);
-  if (!with_hessian) return;
-  const Mat3<double>&A = d.ee[0][0], &B = d.ee[0][1], &F = d.ee[1][1];
-  put_block(out, 0, 0, 1.0, A);
-  put_block(out, 0, 4, 1.0, minus(B, A));
-  put_block(out, 0, 8, -1.0, B);
-  put_block(out, 4, 4, 1.0, minus(plus(A, F), plus(B, transposed(B))));
-  put_block(out, 4, 8, 1.0, minus(B, F));
-  put_block(out, 8, 8, 1.0, F);
-  put_transposed(out, 4, 0, 1.0, minus(B, A));
-  put_transposed(out, 8, 0, -1.0, B);
-  put_transposed(out, 8, 4, 1.0, minus(B, F));
-  const double sign[2] = {s0, s1};
+  // Edges against their rod: their angles count the other way.
   for (int j = 0; j < 2; ++j) {
-    const int angle = 3 + 4 * j;
-    const Vec3d g0 = sign[j] * d.e_angle[0][j], g1 = sign[j] * d.e_angle[1][j];
-    put_angle(out, 0, angle, -g0);
-    put_angle(out, 4, angle, g0 - g1);
-    put_angle(out, 8, angle, g1);
-    out.hessian[angle][angle] = d.angle_angle[j][j];
+    if (s.sign[j] > 0) continue;
+    d.gradient_angle[j] = -d.gradient_angle[j];
+    for (Vec3d* column : {&d.e_angle[0][j], &d.e_angle[1][j]}) *column = -*column;
+    d.angle_angle[0][1] = -d.angle_angle[0][1];
   }
-  out.hessian[3][7] = out.hessian[7][3] = s0 * s1 * d.angle_angle[0][1];
+  put(out, 0, -d.gradient_e[0]);
+  put(out, 4, d.gradient_e[0] - d.gradient_e[1]);
+  put(out, 8, d.gradient_e[1]);
+  out.gradient[3] = d.gradient_angle[0];
+  out.gradient[7] = d.gradient_angle[1];
+  if (with_hessian) put_bend_twist_matrix(d, out.hessian);
 }
 
 void half_local(const Model& model, const VectorX& q, const ElasticCoefficients& k, const Configuration& c, int stencil,
@@ -238,7 +218,6 @@ void half_local(const Model& model, const VectorX& q, const ElasticCoefficients&
   out.gradient[3] = d.gradient_angle[b];
   put(out, 4, d.gradient_e[b]);
 
-  // A spin eta of the frame moves its unit tangent by eta x T and its directors by T . eta.
   const Vector3 T = to_eigen(end.tangent), ge = to_eigen(d.gradient_e[a]);
   const Vector3 moment = T.cross(ge) + d.gradient_angle[a] * T;
   const auto frame_dof = model.frame_dof[static_cast<std::size_t>(s.frame)];
@@ -251,27 +230,14 @@ void half_local(const Model& model, const VectorX& q, const ElasticCoefficients&
   out.gradient[10] = axis.dot(moment);
   if (!with_hessian) return;
 
-  const Matrix3 X = cross_matrix(T);  // X^T-side of eta -> eta x T
-  const Matrix3 Haa = dense(d.ee[a][a]);
-  const Matrix3 Hab = a == 0 ? dense(d.ee[0][1]) : Matrix3(dense(d.ee[0][1]).transpose());  // frame edge, real edge
-  const Vector3 haa = to_eigen(d.e_angle[a][a]);                                            // frame edge, frame angle
-  const Vector3 hab = to_eigen(d.e_angle[a][b]);                                            // frame edge, edge's angle
-  const Vector3 hba = to_eigen(d.e_angle[b][a]);                                            // real edge, frame angle
-  const Vector3 hbb = to_eigen(d.e_angle[b][b]);
-  const double cross_angle = d.angle_angle[0][1];
-  Matrix3 S = X * Haa * X.transpose() + d.angle_angle[a][a] * T * T.transpose();
-  const Vector3 Xh = X * haa;
-  S += Xh * T.transpose() + T * Xh.transpose() + 0.5 * (ge * T.transpose() + T * ge.transpose());
-  S.diagonal().array() -= ge.dot(T);
-  const Matrix3 Se = X * Hab + T * hba.transpose();  // spin against the real edge
-  const Vector3 Sangle = X * hab + cross_angle * T;  // spin against its angle
-
+  const auto [S, Se, Sangle] = spin_hessian(d, a, T);
   const Vector3 u = moment - 0.5 * w.cross(moment);
   const double cay = 1.0 / (1.0 + 0.25 * w.squaredNorm());
   const Matrix3 Hww = J.transpose() * S * J - (0.25 * cay * cay) * (u * w.transpose() + w * u.transpose());
   const Matrix3 Hwe = J.transpose() * Se;
   const Vector3 Hwangle = J.transpose() * Sangle;
   const Matrix3 E = dense(d.ee[b][b]);
+  const Vector3 hbb = to_eigen(d.e_angle[b][b]);
   for (int r = 0; r < 3; ++r) {
     for (int col = 0; col < 3; ++col) {
       out.hessian[r][col] = out.hessian[4 + r][4 + col] = E(r, col);

@@ -58,7 +58,7 @@ template <Wanted wanted, bool inner>
     Pack H[11][11 + kLanes];
     for (auto& row : H)
       for (int i = 11; i < 11 + kLanes; ++i) row[i] = 0.0;
-    fill(d, H);
+    put_bend_twist_matrix(d, H);
     add_matrix<Block>(batch, first, live, H);
   }
   return sum_of_live(d.energy, live);

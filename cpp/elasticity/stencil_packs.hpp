@@ -124,33 +124,6 @@ void add_absolute(Pack* out, const Vec3<Pack>& v) {
   out[0] += absolute(v.x), out[1] += absolute(v.y), out[2] += absolute(v.z);
 }
 
-/// Fills the lower and the upper triangle from the blocks of the two edges and angles.
-template <int kWidth>
-void fill(const BendTwistDerivatives<Pack>& d, Pack (&H)[11][kWidth]) {
-  const Mat3<Pack>&A = d.ee[0][0], &B = d.ee[0][1], &F = d.ee[1][1];
-  const auto both = [&](int i, int j, Pack value) { H[i][j] = H[j][i] = value; };
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) {
-      const Pack a = A.row[i][j], b = B.row[i][j], f = F.row[i][j];
-      H[i][j] = a;
-      H[8 + i][8 + j] = f;
-      H[4 + i][4 + j] = (a + f) - (b + B.row[j][i]);
-      both(i, 4 + j, b - a);
-      both(i, 8 + j, -b);
-      both(4 + i, 8 + j, b - f);
-    }
-  for (int j = 0; j < 2; ++j)
-    for (int i = 0; i < 3; ++i) {
-      const Pack g0 = d.e_angle[0][j][i], g1 = d.e_angle[1][j][i];
-      both(i, 3 + 4 * j, -g0);
-      both(4 + i, 3 + 4 * j, g0 - g1);
-      both(8 + i, 3 + 4 * j, g1);
-    }
-  H[3][3] = d.angle_angle[0][0];
-  H[7][7] = d.angle_angle[1][1];
-  both(3, 7, d.angle_angle[0][1]);
-}
-
 /// Whether the kLanes stencils from `first` follow one another.
 bool are_inner(const StencilBatch& batch, int first) {
   const int last = first + kLanes - 1;
