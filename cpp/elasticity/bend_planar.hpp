@@ -4,6 +4,7 @@
 /// second. [Choi, dissertation 3.3, 3.5 without the third coordinate; f: geometry/bend_measure.hpp].
 
 #include "geometry/bend_measure.hpp"
+#include "geometry/vec2.hpp"
 
 namespace withe {
 
@@ -39,6 +40,56 @@ PlanarBend<Scalar> planar_bend(const BendMeasure& measure, const Scalar& kappa, 
   const Scalar strain = beta.value - natural;
   const Scalar moment = stiffness * strain;
   return {0.5 * moment * strain, moment * beta.first, stiffness * beta.first * beta.first + moment * beta.second};
+}
+
+/// The direction of an edge, or of what it is attached to, and one over its length.
+template <class Scalar>
+struct PlanarEdge {
+  Vec2<Scalar> tangent;
+  Scalar inverse_length;
+};
+
+/// Forces of two edges that follow one another, and how they change, with respect to their vectors.
+template <class Scalar>
+struct PlanarForces {
+  Vec2<Scalar> force[2];  ///< [N]
+  Mat2<Scalar> by[2][2];  ///< of the first by the second [N / m]; where asked for
+};
+
+/// Of the bending `p` between two edges: phi is the angle of the second less that of the first, and an edge's angle has
+/// the gradient n = (-ty, tx) / l and the Hessian -(t n^T + n t^T) / l.
+template <bool with_matrix, class Scalar>
+void planar_bend_forces(const PlanarBend<Scalar>& p, const PlanarEdge<Scalar> (&edge)[2], PlanarForces<Scalar>& out) {
+  const Vec2<Scalar> by_edge[2] = {-edge[0].inverse_length * turned(edge[0].tangent),
+                                   edge[1].inverse_length * turned(edge[1].tangent)};
+  for (int i = 0; i < 2; ++i) out.force[i] = p.slope * by_edge[i];
+  if constexpr (with_matrix)
+    for (int i = 0; i < 2; ++i) {
+      for (int j = 0; j < 2; ++j) {
+        out.by[i][j] = Mat2<Scalar>{};
+        add_outer(out.by[i][j], p.curvature, by_edge[i], by_edge[j]);
+      }
+      add_symmetric_outer(out.by[i][i], -edge[i].inverse_length, edge[i].tangent, out.force[i]);
+    }
+}
+
+/// The matrix of three nodes from that of the two edges between them.
+template <class Scalar, class Matrix>
+void put_planar_matrix(const PlanarForces<Scalar>& f, Matrix& out) {
+  for (int k = 0; k < 2; ++k)
+    for (int l = 0; l < 2; ++l) {
+      const Scalar b00 = f.by[0][0].row[k][l], b01 = f.by[0][1].row[k][l];
+      const Scalar b10 = f.by[1][0].row[k][l], b11 = f.by[1][1].row[k][l];
+      out[k][l] = b00;
+      out[k][2 + l] = b01 - b00;
+      out[k][4 + l] = -b01;
+      out[2 + k][l] = b10 - b00;
+      out[2 + k][2 + l] = (b00 - b01) + (b11 - b10);
+      out[2 + k][4 + l] = b01 - b11;
+      out[4 + k][l] = -b10;
+      out[4 + k][2 + l] = b10 - b11;
+      out[4 + k][4 + l] = b11;
+    }
 }
 
 }  // namespace withe

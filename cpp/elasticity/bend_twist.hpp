@@ -210,4 +210,31 @@ void apply_transport(const EdgeFrame<Scalar>& f0, const EdgeFrame<Scalar>& f1, B
   apply_transport_gradient(f0, f1, d);
 }
 
+/// Both triangles of the matrix of node, angle, node, angle, node.
+template <class Scalar, class Matrix>
+void put_bend_twist_matrix(const BendTwistDerivatives<Scalar>& d, Matrix& H) {
+  const Mat3<Scalar>&A = d.ee[0][0], &B = d.ee[0][1], &F = d.ee[1][1];
+  const auto both = [&](int i, int j, const Scalar& value) { H[i][j] = H[j][i] = value; };
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) {
+      const Scalar a = A.row[i][j], b = B.row[i][j], f = F.row[i][j];
+      H[i][j] = a;
+      H[8 + i][8 + j] = f;
+      H[4 + i][4 + j] = (a + f) - (b + B.row[j][i]);
+      both(i, 4 + j, b - a);
+      both(i, 8 + j, -b);
+      both(4 + i, 8 + j, b - f);
+    }
+  for (int j = 0; j < 2; ++j)
+    for (int i = 0; i < 3; ++i) {
+      const Scalar g0 = d.e_angle[0][j][i], g1 = d.e_angle[1][j][i];
+      both(i, 3 + 4 * j, -g0);
+      both(4 + i, 3 + 4 * j, g0 - g1);
+      both(8 + i, 3 + 4 * j, g1);
+    }
+  H[3][3] = d.angle_angle[0][0];
+  H[7][7] = d.angle_angle[1][1];
+  both(3, 7, d.angle_angle[0][1]);
+}
+
 }  // namespace withe

@@ -3,6 +3,8 @@
 #include <cmath>
 
 #include "elasticity/discrete_gradient.hpp"
+#include "elasticity/discrete_planar.hpp"
+#include "elasticity/put_local.hpp"
 #include "geometry/rotation.hpp"
 
 namespace withe {
@@ -11,96 +13,6 @@ namespace {
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
 Vec3d row_of(const Columns3& table, int i) { return {table(i, 0), table(i, 1), table(i, 2)}; }
-
-Vec3d in_plane(const EdgeFrame<double>& f, double sign) { return {sign * f.tangent.x, sign * f.tangent.y, 0.0}; }
-
-/// The moment about a plane's normal with m (w_a - w_b) = E1 - E0, and its derivatives by the turns of both directions
-/// at the end: `discrete_moment` for kappa = 2 (t_a x t_b) / (1 + t_a . t_b).
-struct PlanarMoment {
-  double moment, by_a, by_b;
-};
-
-PlanarMoment planar_moment(const BendMeasure& measure, const Vec3d& a0, const Vec3d& a1, const Vec3d& b0,
-                           const Vec3d& b1, double kappa0, double kappa1, double natural, double stiffness) {
-  const DividedMoments<double> h = divided_moments<true, double>(measure, {kappa0, 0.0, 0.0}, {kappa1, 0.0, 0.0},
-                                                                 {natural, 0.0, 0.0}, {stiffness, 0.0, 0.0});
-  const Vec3d a = 0.5 * (a0 + a1), b = 0.5 * (b0 + b1);
-  const double inverse = 2.0 / (2.0 + dot(a0, b0) + dot(a1, b1)), kappa = 0.5 * (kappa0 + kappa1);
-  const double along = dot(a, b), across = cross(a, b).z;
-  const double slope = -inverse * (2.0 * along + kappa * across);
-  PlanarMoment m;
-  m.moment = h.by[0] * slope;
-  // By a turn of a less that of b: kappa, and 1 + t_a . t_b.
-  const double by_kappa = -(1.0 + 0.25 * kappa1 * kappa1), by_chi = cross(a1, b1).z;
-  const double strained =
-      h.second[0][0] * slope * by_kappa - h.by[0] * inverse * (0.5 * by_kappa * across + 0.5 * by_chi * slope);
-  // d along = (da x b + db' ...) / 2: a turn of a moves it by w x a1.
-  const double along_a = 0.5 * cross(a1, b).z, along_b = -0.5 * cross(a, b1).z;
-  const double across_a = -0.5 * dot(a1, b), across_b = 0.5 * dot(a, b1);
-  m.by_a = strained - h.by[0] * inverse * (2.0 * along_a + kappa * across_a);
-  m.by_b = -strained - h.by[0] * inverse * (2.0 * along_b + kappa * across_b);
-  return m;
-}
-
-Vector2 flat(const Vec3d& v) { return {v.x, v.y}; }
-/// By a right angle.
-Vector2 turned(const Vector2& v) { return {-v.y(), v.x()}; }
-
-/// `MovingEdge` in a plane, where a moment has one component and directors do not turn.
-struct PlanarEdge {
-  Vector2 t0, t1, t;
-  double inverse_length1, inverse_length, inverse_mean, chi, stretch;
-  Vector2 force;  ///< of a unit moment, on the edge's vector
-
-  PlanarEdge(const EdgeFrame<double>& start, const EdgeFrame<double>& middle, const EdgeFrame<double>& end)
-      : t0(flat(start.tangent)),
-        t1(flat(end.tangent)),
-        t(flat(middle.tangent)),
-        inverse_length1(end.inverse_length),
-        inverse_length(middle.inverse_length) {
-    const double l0 = 1.0 / start.inverse_length, l1 = 1.0 / end.inverse_length;
-    inverse_mean = 2.0 / (l0 + l1);
-    chi = 0.5 / (1.0 + t0.dot(t1));
-    stretch = chi * inverse_length * inverse_mean * (l1 - l0);
-    force = inverse_length * turned(t) + stretch * cross(t0, t1) * t;
-  }
-
-  /// How a moment changes with the edge's vector at the end, of its change by a turn.
-  Vector2 column(double by_turn) const { return by_turn * inverse_length1 * turned(t1); }
-
-  /// How the force of a moment that stays changes with the edge's vector at the end.
-  Eigen::Matrix2d geometry(double moment) const {
-    const double i = inverse_length, p = moment * cross(t0, t1), nu = stretch * p;
-    const auto normal = [&](const Vector2& v) { return Vector2(inverse_length1 * (v - v.dot(t1) * t1)); };
-    const Vector2 by_chi = 2.0 * chi * normal(t0);
-    const Vector2 by_nu =
-        normal(stretch * moment * turned(t0)) +
-        p * (chi * i * inverse_mean * t1 - stretch * (by_chi + 0.5 * i * t + 0.5 * inverse_mean * t1));
-    Eigen::Matrix2d out =
-        t * by_nu.transpose() - i * i * moment * turned(t) * t.transpose() - 0.5 * nu * i * t * t.transpose();
-    const double turn = 0.5 * i * i * moment;
-    out(0, 0) += 0.5 * nu * i;
-    out(1, 1) += 0.5 * nu * i;
-    out(0, 1) -= turn;
-    out(1, 0) += turn;
-    return out;
-  }
-};
-
-void add_planar_force(Local& out, int tail, int head, const Vector2& force) {
-  for (int k = 0; k < 2; ++k) {
-    out.gradient[head + k] += force(k);
-    out.gradient[tail + k] -= force(k);
-  }
-}
-
-/// Rows of one edge by the vector of another, twice: changes of the end are twice those of the middle.
-void add_planar_rows(Local& out, const int (&row)[2], const int (&column)[2], const Eigen::Matrix2d& block) {
-  for (int a = 0; a < 2; ++a)
-    for (int b = 0; b < 2; ++b)
-      for (int k = 0; k < 2; ++k)
-        for (int l = 0; l < 2; ++l) out.hessian[row[a] + k][column[b] + l] += (a == b ? 2.0 : -2.0) * block(k, l);
-}
 
 void add_block(Local& out, int row, int column, double factor, const Mat3<double>& m) {
   for (int i = 0; i < 3; ++i)
@@ -184,8 +96,9 @@ MovingEdge<double> moving_edge(const DiscreteStep& step, int edge) {
           middle.inverse_length, turn_of_directors(start, end)};
 }
 
-PlanarEdge planar_edge(const DiscreteStep& step, int edge) {
-  return {step.start.edge[at(edge)], step.middle.edge[at(edge)], step.end.edge[at(edge)]};
+PlanarMovingEdge<double> planar_moving_edge(const DiscreteStep& step, int edge, double sign) {
+  return {planar_edge(step.start.edge[at(edge)], sign), planar_edge(step.middle.edge[at(edge)], sign),
+          planar_edge(step.end.edge[at(edge)], sign)};
 }
 
 /// Its derivatives where asked for.
@@ -204,59 +117,38 @@ DiscreteMoment<double> moment_between(const BendMeasure& measure, const EdgeFram
 void planar_bend_local(const Model& model, const ElasticCoefficients& elastic, const DiscreteStep& step, int stencil,
                        bool with_matrix, Local& out) {
   const BendStencil& s = model.bend[at(stencil)];
-  clear(out, 6, with_matrix);
-  Vec3d t0[2], t1[2];
-  int ends[2][2];
-  for (int k = 0; k < 2; ++k) {
-    const int first = 2 * k, second = 2 * (k + 1);
-    ends[k][0] = s.sign[k] > 0 ? first : second;
-    ends[k][1] = s.sign[k] > 0 ? second : first;
-    t0[k] = in_plane(step.start.edge[at(s.edge[k])], s.sign[k]);
-    t1[k] = in_plane(step.end.edge[at(s.edge[k])], s.sign[k]);
-  }
-  const PlanarMoment m = planar_moment(elastic.measure, t0[0], t1[0], t0[1], t1[1], step.start.bend_strain(stencil, 0),
-                                       step.end.bend_strain(stencil, 0), elastic.bend_natural(stencil, 0),
-                                       elastic.bend_stiffness(stencil, 0));
-  const PlanarEdge edge[2] = {planar_edge(step, s.edge[0]), planar_edge(step, s.edge[1])};
-  const double by[2] = {m.by_a, m.by_b};
-  for (int i = 0; i < 2; ++i) {
-    const double sign = i == 0 ? 1.0 : -1.0;
-    add_planar_force(out, ends[i][0], ends[i][1], sign * m.moment * edge[i].force);
-    for (int j = 0; with_matrix && j < 2; ++j) {
-      Eigen::Matrix2d block = sign * edge[i].force * edge[j].column(by[j]).transpose();
-      if (i == j) block += edge[i].geometry(sign * m.moment);
-      add_planar_rows(out, ends[i], ends[j], block);
-    }
-  }
+  const PlanarMovingEdge<double> edge[2] = {planar_moving_edge(step, s.edge[0], s.sign[0]),
+                                            planar_moving_edge(step, s.edge[1], s.sign[1])};
+  const PlanarMoment<double> m = planar_moment(elastic.measure, edge[0].t0, edge[0].t1, edge[1].t0, edge[1].t1,
+                                               step.start.bend_strain(stencil, 0), step.end.bend_strain(stencil, 0),
+                                               elastic.bend_natural(stencil, 0), elastic.bend_stiffness(stencil, 0));
+  PlanarForces<double> f;
+  if (with_matrix)
+    planar_discrete_forces<true>(m, edge, f);
+  else
+    planar_discrete_forces<false>(m, edge, f);
+  put_planar_bend(f, with_matrix, out);
 }
 
 void planar_half_local(const Model& model, const ElasticCoefficients& elastic, const DiscreteStep& step, int stencil,
                        bool with_matrix, Local& out) {
   const FrameStencil& s = model.half[at(stencil)];
-  clear(out, 5, with_matrix);
-  const Vec3d f0 = in_plane(step.start.attached[at(stencil)], 1.0), f1 = in_plane(step.end.attached[at(stencil)], 1.0);
-  const Vec3d t0 = in_plane(step.start.edge[at(s.edge)], 1.0), t1 = in_plane(step.end.edge[at(s.edge)], 1.0);
-  const double kappa0 = step.start.half_strain(stencil, 0), kappa1 = step.end.half_strain(stencil, 0);
-  const double natural = elastic.half_natural(stencil, 0), stiffness = elastic.half_stiffness(stencil, 0);
-  const PlanarMoment p = s.frame_first
-                             ? planar_moment(elastic.measure, f0, f1, t0, t1, kappa0, kappa1, natural, stiffness)
-                             : planar_moment(elastic.measure, t0, t1, f0, f1, kappa0, kappa1, natural, stiffness);
+  const int a = s.frame_first ? 0 : 1, b = 1 - a;  // slots of the frame and of the edge
+  const auto direction = [&](const EdgeFrame<double>& f) { return planar_edge(f).tangent; };
+  const PlanarMovingEdge<double> edge = planar_moving_edge(step, s.edge, 1.0);
+  Vec2<double> t0[2], t1[2];
+  t0[a] = direction(step.start.attached[at(stencil)]), t1[a] = direction(step.end.attached[at(stencil)]);
+  t0[b] = edge.t0, t1[b] = edge.t1;
+  const PlanarMoment<double> m = planar_moment(elastic.measure, t0[0], t1[0], t0[1], t1[1],
+                                               step.start.half_strain(stencil, 0), step.end.half_strain(stencil, 0),
+                                               elastic.half_natural(stencil, 0), elastic.half_stiffness(stencil, 0));
   const double sign = s.frame_first ? -1.0 : 1.0;  // of the moment on the edge
-  const PlanarEdge edge = planar_edge(step, s.edge);
-  const int ends[2] = {0, 2};
-  add_planar_force(out, ends[0], ends[1], sign * p.moment * edge.force);
-  out.gradient[4] = -sign * p.moment;
-  if (!with_matrix) return;
-  const double by_edge = s.frame_first ? p.by_b : p.by_a, by_frame = s.frame_first ? p.by_a : p.by_b;
-  const Vector2 column = edge.column(by_edge), by_turn = 2.0 * sign * by_frame * edge.force;
-  add_planar_rows(out, ends, ends, sign * edge.force * column.transpose() + edge.geometry(sign * p.moment));
-  for (int i = 0; i < 2; ++i) {
-    out.hessian[2 + i][4] += by_turn(i);
-    out.hessian[i][4] -= by_turn(i);
-    out.hessian[4][2 + i] -= 2.0 * sign * column(i);
-    out.hessian[4][i] += 2.0 * sign * column(i);
-  }
-  out.hessian[4][4] = -2.0 * sign * by_frame;
+  const double by_turn[2] = {2.0 * sign * m.by_a, 2.0 * sign * m.by_b};
+  const Vec2<double> column = edge.column(by_turn[b]);
+  PlanarHalfForces f{sign * m.moment * edge.force, -sign * m.moment, {}, by_turn[a] * edge.force, -column, -by_turn[a]};
+  add_outer(f.edge_edge, 1.0, edge.force, column);
+  edge.add_geometry(2.0, sign * m.moment, f.edge_edge);
+  put_planar_half(f, with_matrix, out);
 }
 
 /// How the moment `m` between an edge and a frame changes with the unknowns of a half stencil at the end: the frame
@@ -370,24 +262,12 @@ void discrete_half_local(const Model& model, const ElasticCoefficients& elastic,
 }
 
 void discrete_stretch_local(const Model& model, const ElasticCoefficients& elastic, const DiscreteStep& step, int edge,
-                            bool with_matrix, const double* axial_force, Local& out) {
-  const int dim = model.dimension, tail = model.tail_dof[at(edge)], head = model.head_dof[at(edge)];
+                            bool with_matrix, const double* given_force, Local& out) {
   const auto [force, modulus, inverse_mean] = mean_stretch(model, elastic, step.start, step.end, edge);
-  double mean[3];
-  for (int i = 0; i < dim; ++i) mean[i] = inverse_mean * (step.middle_q(head + i) - step.middle_q(tail + i));
-  for (int i = 0; i < dim; ++i) {
-    out.gradient[i] = -force * mean[i];
-    out.gradient[dim + i] = force * mean[i];
-  }
-  if (!with_matrix) return;
-  const Vec3d& t1 = step.end.edge[at(edge)].tangent;
-  const double t[3] = {t1.x, t1.y, t1.z}, transverse = (axial_force ? axial_force[edge] : force) * inverse_mean;
-  for (int i = 0; i < dim; ++i)
-    for (int j = 0; j < dim; ++j) {
-      const double h = mean[i] * t[j] * (modulus - transverse) + (i == j ? transverse : 0.0);
-      out.hessian[i][j] = out.hessian[dim + i][dim + j] = h;
-      out.hessian[i][dim + j] = out.hessian[dim + i][j] = -h;
-    }
+  const EdgeFrame<double>& middle = step.middle.edge[at(edge)];
+  const Vec3d direction = (inverse_mean * step.middle.length[edge]) * middle.tangent;
+  put_stretch(model.dimension, direction, step.end.edge[at(edge)].tangent, force, modulus,
+              (given_force ? given_force[edge] : force) * inverse_mean, with_matrix, out);
 }
 
 }  // namespace withe

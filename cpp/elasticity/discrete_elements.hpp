@@ -5,13 +5,14 @@
 ///   bending, twisting: moments between frames, see discrete_gradient.hpp. A frame's row is the moment on it.
 
 #include "elasticity/elements.hpp"
+#include "elasticity/stretch.hpp"
 
 namespace withe {
 
 /// A step whose middle is evaluated; all are measured from the frames of the start.
 struct DiscreteStep {
   const Configuration &start, &middle, &end;
-  const VectorX &middle_q, &end_q;
+  const VectorX& end_q;
   const VectorX& change;  ///< of the unknowns, from the start to the end
 };
 
@@ -25,12 +26,12 @@ inline MeanStretch mean_stretch(const Model& model, const ElasticCoefficients& e
                                 const Configuration& end, int edge) {
   const double EA = elastic.stretch_stiffness[edge], rest = model.edge_length[edge];
   const double sum = start.length[edge] + end.length[edge];
-  return {EA * (0.5 * sum / rest - 1.0), EA / rest, 2.0 / sum};
+  return {axial_force(0.5 * sum, rest, EA, 0.0), EA / rest, 2.0 / sum};
 }
 
-/// `axial_force`: per edge, in place of that of the mean strain in the matrix, see stretch_hessian; or null.
+/// `given_force`: axial, per edge, in place of that of the mean strain in the matrix, see add_stretch_hessian; or null.
 void discrete_stretch_local(const Model& model, const ElasticCoefficients& elastic, const DiscreteStep& step, int edge,
-                            bool with_matrix, const double* axial_force, Local& out);
+                            bool with_matrix, const double* given_force, Local& out);
 void discrete_bend_local(const Model& model, const ElasticCoefficients& elastic, const DiscreteStep& step, int stencil,
                          bool with_matrix, Local& out);
 void discrete_half_local(const Model& model, const ElasticCoefficients& elastic, const DiscreteStep& step, int stencil,

@@ -1,8 +1,7 @@
 #include "elasticity/elements.hpp"
 
-#include "elasticity/bend_planar.hpp"
 #include "elasticity/bend_twist.hpp"
-#include "elasticity/stretch.hpp"
+#include "elasticity/put_local.hpp"
 #include "geometry/rotation.hpp"
 
 namespace withe {
@@ -44,107 +43,61 @@ void put(Local& out, int at, const Vec3d& v) {
   out.gradient[at + 1] = v.y;
   out.gradient[at + 2] = v.z;
 }
-void put_block(Local& out, int row, int column, double sign, const Mat3<double>& m) {
-  for (int i = 0; i < 3; ++i) {
-    out.hessian[row + i][column] = sign * m.row[i].x;
-    out.hessian[row + i][column + 1] = sign * m.row[i].y;
-    out.hessian[row + i][column + 2] = sign * m.row[i].z;
-  }
-}
-void put_transposed(Local& out, int row, int column, double sign, const Mat3<double>& m) {
-  for (int i = 0; i < 3; ++i) {
-    out.hessian[row][column + i] = sign * m.row[i].x;
-    out.hessian[row + 1][column + i] = sign * m.row[i].y;
-    out.hessian[row + 2][column + i] = sign * m.row[i].z;
-  }
-}
-/// Column and row of an angle against a node.
-void put_angle(Local& out, int node, int angle, const Vec3d& v) {
-  const double c[3] = {v.x, v.y, v.z};
-  for (int i = 0; i < 3; ++i) out.hessian[node + i][angle] = out.hessian[angle][node + i] = c[i];
-}
-Mat3<double> minus(const Mat3<double>& a, const Mat3<double>& b) {
-  return {{a.row[0] - b.row[0], a.row[1] - b.row[1], a.row[2] - b.row[2]}};
-}
-Mat3<double> plus(const Mat3<double>& a, const Mat3<double>& b) {
-  return {{a.row[0] + b.row[0], a.row[1] + b.row[1], a.row[2] + b.row[2]}};
-}
-Mat3<double> transposed(const Mat3<double>& a) {
-  const Vec3d* r = a.row;
-  return {{{r[0].x, r[1].x, r[2].x}, {r[0].y, r[1].y, r[2].y}, {r[0].z, r[1].z, r[2].z}}};
-}
 Matrix3 dense(const Mat3<double>& a) {
   Matrix3 m;
   for (int i = 0; i < 3; ++i) m.row(i) << a.row[i].x, a.row[i].y, a.row[i].z;
   return m;
 }
 
-struct Direction2 {
-  double tx, ty, nx, ny;  // tangent and normal over length
-};
-Direction2 direction2(const EdgeFrame<double>& f) {
-  return {f.tangent.x, f.tangent.y, -f.tangent.y * f.inverse_length, f.tangent.x * f.inverse_length};
-}
-/// Second derivative of an edge's angle: - (t n^T + n t^T) / l, n over length.
-void add_angle_hessian(double (&m)[2][2], double weight, const Direction2& d, double inverse_length) {
-  const double t[2] = {d.tx, d.ty}, n[2] = {d.nx, d.ny};
-  for (int i = 0; i < 2; ++i)
-    for (int j = 0; j < 2; ++j) m[i][j] -= weight * inverse_length * (t[i] * n[j] + n[i] * t[j]);
-}
-
 void bend_planar_local(const ElasticCoefficients& k, const Configuration& c, const BendStencil& s, Eigen::Index i,
-                       Local& out) {
+                       bool with_hessian, Local& out) {
   const PlanarBend<double> p =
       planar_bend(k.measure, c.bend_strain(i, 0), k.bend_natural(i, 0), k.bend_stiffness(i, 0));
-  const EdgeFrame<double>&f0 = c.edge[static_cast<std::size_t>(s.edge[0])],
-        &f1 = c.edge[static_cast<std::size_t>(s.edge[1])];
-  Direction2 a = direction2(f0), b = direction2(f1);
-  if (s.sign[0] < 0) a = {-a.tx, -a.ty, -a.nx, -a.ny};
-  if (s.sign[1] < 0) b = {-b.tx, -b.ty, -b.nx, -b.ny};
+  const PlanarEdge<double> edge[2] = {planar_edge(c.edge[static_cast<std::size_t>(s.edge[0])], s.sign[0]),
+                                      planar_edge(c.edge[static_cast<std::size_t>(s.edge[1])], s.sign[1])};
+  PlanarForces<double> f;
+  planar_bend_forces<true>(p, edge, f);
   out.energy = p.energy;
-  // phi = angle(e1) - angle(e0); e0 = x1 - x0, e1 = x2 - x1.
-  const double d[6] = {a.nx, a.ny, -a.nx - b.nx, -a.ny - b.ny, b.nx, b.ny};
-  for (int r = 0; r < 6; ++r) {
-    out.gradient[r] = p.slope * d[r];
-    for (int col = 0; col < 6; ++col) out.hessian[r][col] = p.curvature * d[r] * d[col];
-  }
-  double A[2][2] = {}, B[2][2] = {};
-  add_angle_hessian(A, -p.slope, a, f0.inverse_length);
-  add_angle_hessian(B, p.slope, b, f1.inverse_length);
-  for (int r = 0; r < 2; ++r)
-    for (int col = 0; col < 2; ++col) {
-      out.hessian[r][col] += A[r][col];
-      out.hessian[r][2 + col] -= A[r][col];
-      out.hessian[2 + r][col] -= A[r][col];
-      out.hessian[2 + r][2 + col] += A[r][col] + B[r][col];
-      out.hessian[2 + r][4 + col] -= B[r][col];
-      out.hessian[4 + r][2 + col] -= B[r][col];
-      out.hessian[4 + r][4 + col] += B[r][col];
-    }
+  put_planar_bend(f, with_hessian, out);
 }
 
+/// The attached end is an edge of unit length, whose angle is the frame's.
 void half_planar_local(const ElasticCoefficients& k, const Configuration& c, const FrameStencil& s, Eigen::Index i,
-                       Local& out) {
+                       bool with_hessian, Local& out) {
   const PlanarBend<double> p =
       planar_bend(k.measure, c.half_strain(i, 0), k.half_natural(i, 0), k.half_stiffness(i, 0));
-  const EdgeFrame<double>& f = c.edge[static_cast<std::size_t>(s.edge)];
-  const Direction2 a = direction2(f);
-  const double sign = s.frame_first ? 1.0 : -1.0;
-  const double d[5] = {-sign * a.nx, -sign * a.ny, sign * a.nx, sign * a.ny, -sign};
+  const int a = s.frame_first ? 0 : 1, b = 1 - a;  // slots of the frame and of the edge
+  PlanarEdge<double> edge[2];
+  edge[a] = planar_edge(c.attached[static_cast<std::size_t>(i)]);
+  edge[b] = planar_edge(c.edge[static_cast<std::size_t>(s.edge)]);
+  PlanarForces<double> f;
+  planar_bend_forces<true>(p, edge, f);
+  const Vec2<double> turn = turned(edge[a].tangent), coupling = f.by[b][a] * turn;
   out.energy = p.energy;
-  for (int r = 0; r < 5; ++r) {
-    out.gradient[r] = p.slope * d[r];
-    for (int col = 0; col < 5; ++col) out.hessian[r][col] = p.curvature * d[r] * d[col];
-  }
-  double A[2][2] = {};
-  add_angle_hessian(A, sign * p.slope, a, f.inverse_length);
-  for (int r = 0; r < 2; ++r)
-    for (int col = 0; col < 2; ++col) {
-      out.hessian[r][col] += A[r][col];
-      out.hessian[r][2 + col] -= A[r][col];
-      out.hessian[2 + r][col] -= A[r][col];
-      out.hessian[2 + r][2 + col] += A[r][col];
-    }
+  put_planar_half({f.force[b], dot(turn, f.force[a]), f.by[b][b], coupling, coupling, p.curvature}, with_hessian, out);
+}
+
+/// Second derivatives by the spin of the frame that is in slot `a` of a half stencil: with itself, with the vector of
+/// the edge in the other slot, and with that one's angle. A spin eta moves the frame's unit tangent T by eta x T and
+/// its directors by T . eta.
+struct SpinHessian {
+  Matrix3 spin, edge;
+  Vector3 angle;
+};
+SpinHessian spin_hessian(const BendTwistDerivatives<double>& d, int a, const Vector3& T) {
+  const int b = 1 - a;
+  const Vector3 ge = to_eigen(d.gradient_e[a]);
+  const Matrix3 X = cross_matrix(T);  // X^T-side of eta -> eta x T
+  const Matrix3 Haa = dense(d.ee[a][a]);
+  const Matrix3 Hab = a == 0 ? dense(d.ee[0][1]) : Matrix3(dense(d.ee[0][1]).transpose());  // frame edge, real edge
+  const Vector3 haa = to_eigen(d.e_angle[a][a]);                                            // frame edge, frame angle
+  const Vector3 hab = to_eigen(d.e_angle[a][b]);                                            // frame edge, edge's angle
+  const Vector3 hba = to_eigen(d.e_angle[b][a]);                                            // real edge, frame angle
+  Matrix3 S = X * Haa * X.transpose() + d.angle_angle[a][a] * T * T.transpose();
+  const Vector3 Xh = X * haa;
+  S += Xh * T.transpose() + T * Xh.transpose() + 0.5 * (ge * T.transpose() + T * ge.transpose());
+  S.diagonal().array() -= ge.dot(T);
+  return {S, X * Hab + T * hba.transpose(), X * hab + d.angle_angle[0][1] * T};
 }
 
 }  // namespace
@@ -213,74 +166,46 @@ BendTwistEnergy half_energy_of(const ElasticCoefficients& k, const Configuration
 }
 
 void stretch_local(const Model& model, const ElasticCoefficients& k, const Configuration& c, int edge,
-                   bool with_hessian, const double* axial_force, Local& out) {
+                   bool with_hessian, const double* given_force, Local& out) {
   const EdgeFrame<double>& f = c.edge[static_cast<std::size_t>(edge)];
-  const double rest = model.edge_length(edge);
-  const double force = k.stretch_stiffness(edge) * (c.length(edge) / rest - 1.0 - k.stretch_natural(edge));
+  const double EA = k.stretch_stiffness(edge), rest = model.edge_length(edge);
+  const double force = axial_force(c.length(edge), rest, EA, k.stretch_natural(edge));
   out.energy = stretch_energy_of(model, k, c, edge);
-  const int n = model.dimension;
-  const double t[3] = {f.tangent.x, f.tangent.y, f.tangent.z};
-  for (int i = 0; i < n; ++i) {
-    out.gradient[i] = -force * t[i];
-    out.gradient[n + i] = force * t[i];
-  }
-  if (!with_hessian) return;
-  const Mat3<double> H = stretch_hessian(f.tangent, f.inverse_length, rest, k.stretch_stiffness(edge),
-                                         axial_force ? axial_force[edge] : force);
-  for (int i = 0; i < n; ++i) {
-    const double row[3] = {H.row[i].x, H.row[i].y, H.row[i].z};
-    for (int j = 0; j < n; ++j) {
-      out.hessian[i][j] = out.hessian[n + i][n + j] = row[j];
-      out.hessian[i][n + j] = out.hessian[n + i][j] = -row[j];
-    }
-  }
+  put_stretch(model.dimension, f.tangent, f.tangent, force, EA / rest,
+              (given_force ? given_force[edge] : force) * f.inverse_length, with_hessian, out);
 }
 
 void bend_local(const Model& model, const ElasticCoefficients& k, const Configuration& c, int stencil,
                 bool with_hessian, Local& out) {
   const BendStencil& s = model.bend[static_cast<std::size_t>(stencil)];
   const auto i = static_cast<Eigen::Index>(stencil);
-  if (model.planar()) return bend_planar_local(k, c, s, i, out);
+  if (model.planar()) return bend_planar_local(k, c, s, i, with_hessian, out);
   const EdgeFrame<double> f0 = oriented(c.edge[static_cast<std::size_t>(s.edge[0])], s.sign[0]);
   const EdgeFrame<double> f1 = oriented(c.edge[static_cast<std::size_t>(s.edge[1])], s.sign[1]);
-  const BendTwistDerivatives<double> d =
+  BendTwistDerivatives<double> d =
       bend_twist(k.measure, f0, f1, strain_row(c.bend_strain, i), strain_row(k.bend_natural, i),
                  stiffness_row(k.bend_stiffness, i), with_hessian);
   out.energy = d.energy;
-  const double s0 = s.sign[0], s1 = s.sign[1];
-  put(out, 0, -d.gradient_e[0]);
-  out.gradient[3] = s0 * d.gradient_angle[0];
-  put(out, 4, d.gradient_e[0] - d.gradient_e[1]);
-  out.gradient[7] = s1 * d.gradient_angle[1];
-  put(out, 8, d.gradient_e[1]);
-  if (!with_hessian) return;
-  const Mat3<double>&A = d.ee[0][0], &B = d.ee[0][1], &F = d.ee[1][1];
-  put_block(out, 0, 0, 1.0, A);
-  put_block(out, 0, 4, 1.0, minus(B, A));
-  put_block(out, 0, 8, -1.0, B);
-  put_block(out, 4, 4, 1.0, minus(plus(A, F), plus(B, transposed(B))));
-  put_block(out, 4, 8, 1.0, minus(B, F));
-  put_block(out, 8, 8, 1.0, F);
-  put_transposed(out, 4, 0, 1.0, minus(B, A));
-  put_transposed(out, 8, 0, -1.0, B);
-  put_transposed(out, 8, 4, 1.0, minus(B, F));
-  const double sign[2] = {s0, s1};
+  // Edges against their rod: their angles count the other way.
   for (int j = 0; j < 2; ++j) {
-    const int angle = 3 + 4 * j;
-    const Vec3d g0 = sign[j] * d.e_angle[0][j], g1 = sign[j] * d.e_angle[1][j];
-    put_angle(out, 0, angle, -g0);
-    put_angle(out, 4, angle, g0 - g1);
-    put_angle(out, 8, angle, g1);
-    out.hessian[angle][angle] = d.angle_angle[j][j];
+    if (s.sign[j] > 0) continue;
+    d.gradient_angle[j] = -d.gradient_angle[j];
+    for (Vec3d* column : {&d.e_angle[0][j], &d.e_angle[1][j]}) *column = -*column;
+    d.angle_angle[0][1] = -d.angle_angle[0][1];
   }
-  out.hessian[3][7] = out.hessian[7][3] = s0 * s1 * d.angle_angle[0][1];
+  put(out, 0, -d.gradient_e[0]);
+  put(out, 4, d.gradient_e[0] - d.gradient_e[1]);
+  put(out, 8, d.gradient_e[1]);
+  out.gradient[3] = d.gradient_angle[0];
+  out.gradient[7] = d.gradient_angle[1];
+  if (with_hessian) put_bend_twist_matrix(d, out.hessian);
 }
 
 void half_local(const Model& model, const VectorX& q, const ElasticCoefficients& k, const Configuration& c, int stencil,
                 bool with_hessian, Local& out) {
   const FrameStencil& s = model.half[static_cast<std::size_t>(stencil)];
   const auto i = static_cast<Eigen::Index>(stencil);
-  if (model.planar()) return half_planar_local(k, c, s, i, out);
+  if (model.planar()) return half_planar_local(k, c, s, i, with_hessian, out);
   const EdgeFrame<double>& edge = c.edge[static_cast<std::size_t>(s.edge)];
   const EdgeFrame<double>& end = c.attached[static_cast<std::size_t>(stencil)];
   const EdgeFrame<double>&f0 = s.frame_first ? end : edge, &f1 = s.frame_first ? edge : end;
@@ -293,7 +218,6 @@ void half_local(const Model& model, const VectorX& q, const ElasticCoefficients&
   out.gradient[3] = d.gradient_angle[b];
   put(out, 4, d.gradient_e[b]);
 
-  // A spin eta of the frame moves its unit tangent by eta x T and its directors by T . eta.
   const Vector3 T = to_eigen(end.tangent), ge = to_eigen(d.gradient_e[a]);
   const Vector3 moment = T.cross(ge) + d.gradient_angle[a] * T;
   const auto frame_dof = model.frame_dof[static_cast<std::size_t>(s.frame)];
@@ -306,27 +230,14 @@ void half_local(const Model& model, const VectorX& q, const ElasticCoefficients&
   out.gradient[10] = axis.dot(moment);
   if (!with_hessian) return;
 
-  const Matrix3 X = cross_matrix(T);  // X^T-side of eta -> eta x T
-  const Matrix3 Haa = dense(d.ee[a][a]);
-  const Matrix3 Hab = a == 0 ? dense(d.ee[0][1]) : Matrix3(dense(d.ee[0][1]).transpose());  // frame edge, real edge
-  const Vector3 haa = to_eigen(d.e_angle[a][a]);                                            // frame edge, frame angle
-  const Vector3 hab = to_eigen(d.e_angle[a][b]);                                            // frame edge, edge's angle
-  const Vector3 hba = to_eigen(d.e_angle[b][a]);                                            // real edge, frame angle
-  const Vector3 hbb = to_eigen(d.e_angle[b][b]);
-  const double cross_angle = d.angle_angle[0][1];
-  Matrix3 S = X * Haa * X.transpose() + d.angle_angle[a][a] * T * T.transpose();
-  const Vector3 Xh = X * haa;
-  S += Xh * T.transpose() + T * Xh.transpose() + 0.5 * (ge * T.transpose() + T * ge.transpose());
-  S.diagonal().array() -= ge.dot(T);
-  const Matrix3 Se = X * Hab + T * hba.transpose();  // spin against the real edge
-  const Vector3 Sangle = X * hab + cross_angle * T;  // spin against its angle
-
+  const auto [S, Se, Sangle] = spin_hessian(d, a, T);
   const Vector3 u = moment - 0.5 * w.cross(moment);
   const double cay = 1.0 / (1.0 + 0.25 * w.squaredNorm());
   const Matrix3 Hww = J.transpose() * S * J - (0.25 * cay * cay) * (u * w.transpose() + w * u.transpose());
   const Matrix3 Hwe = J.transpose() * Se;
   const Vector3 Hwangle = J.transpose() * Sangle;
   const Matrix3 E = dense(d.ee[b][b]);
+  const Vector3 hbb = to_eigen(d.e_angle[b][b]);
   for (int r = 0; r < 3; ++r) {
     for (int col = 0; col < 3; ++col) {
       out.hessian[r][col] = out.hessian[4 + r][4 + col] = E(r, col);

@@ -3,6 +3,7 @@
 
 #include "elasticity/discrete_gradient.hpp"
 #include "elasticity/stencil_packs.hpp"
+#include "elasticity/stretch.hpp"
 
 namespace withe::WITHE_INSTRUCTION_SET {
 
@@ -51,8 +52,8 @@ template <bool with_matrix, bool inner>
   for (int j = 0; j < 2; ++j) {
     d.gradient_e[j] = edge[j].force(moment[j]);
     d.gradient_angle[j] = edge[j].torque(moment[j]);
-    mean[j] = (lanes.owned[j] * edge[j].inverse_mean / f[j].inverse_length) * f[j].tangent;
-    tension[j] = lanes.of_edge(batch.force, j) * mean[j];
+    mean[j] = (edge[j].inverse_mean / f[j].inverse_length) * f[j].tangent;
+    tension[j] = (lanes.owned[j] * lanes.of_edge(batch.force, j)) * mean[j];
   }
   apply_transport_gradient(f[0], f[1], d);
   add_forces<true>(batch, first, live, d, tension);
@@ -74,12 +75,10 @@ template <bool with_matrix, bool inner>
       for (EdgeBlock<Pack>& b : block) add_transport(f[i], b);
       add_spin_change(edge[i], f[i], d.gradient_angle[i], block[i]);
       // Changes of the end are twice those of the middle; the mixed method has axial forces of its own.
-      const Pack geometric = lanes.owned[i] * lanes.of_edge(batch.geometric, i) * edge[i].inverse_mean;
-      const Vec3<Pack> pull =
-          (lanes.of_edge(batch.modulus, i) - lanes.of_edge(batch.geometric, i) * edge[i].inverse_mean) * f1[i].tangent;
+      const Pack transverse = lanes.owned[i] * (lanes.of_edge(batch.geometric, i) * edge[i].inverse_mean);
       Mat3<Pack> stretching{};
-      add_identity(stretching, geometric);
-      add_outer(stretching, 1.0, mean[i], pull);
+      add_stretch_hessian(mean[i], f1[i].tangent, lanes.owned[i] * lanes.of_edge(batch.modulus, i), transverse,
+                          stretching);
       Pack row[11];
       for (int r = 0; r < 3; ++r) {
         Vec3<Pack> by_edge[2] = {2.0 * block[0].ee.row[r], 2.0 * block[1].ee.row[r]};
@@ -93,13 +92,7 @@ template <bool with_matrix, bool inner>
       put_row(row, by_edge, by_angle);
       for (int j = 0; j < 11; ++j) H[3 + 4 * i][j] = row[j];
     }
-    if (!batch.by_rows)
-      for (int i = 0; i < 11; ++i)
-        for (int j = 0; j < i; ++j) {
-          const Pack swapped = H[i][j];
-          H[i][j] = H[j][i];
-          H[j][i] = swapped;
-        }
+    if (!batch.by_rows) exchange_triangles(H);
     add_lines<Block, false>(batch, first, live, H);
   }
 }

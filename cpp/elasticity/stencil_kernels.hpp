@@ -39,7 +39,7 @@ struct StencilBatch {
   const double* edge_inertia;  ///< per edge, of theta [kg m^2]: likewise
 };
 
-/// What an energy-momentum step needs beside the middle, see Equations::add_discrete_gradient. The batch's `force` is
+/// What an energy-momentum step needs beside the middle, see discrete_elements.hpp. The batch's `force` is
 /// then that of the mean strain, `frames` and `strain` are in the middle.
 struct MomentumBatch {
   const double *start_frames, *end_frames;  ///< tables like `frames`
@@ -53,7 +53,9 @@ struct StencilKernels {
   /// they are; with the couples of edges that spin and turn, see Equations::spin_couple.
   void (*bend_forces)(const StencilBatch&);
   void (*planar_bend_forces)(const StencilBatch&);
-  void (*momentum_bend)(const StencilBatch&, const MomentumBatch&);  ///< in space
+  /// Discrete gradients, see discrete_elements.hpp; of the lines above, whole ones are filled.
+  void (*momentum_bend)(const StencilBatch&, const MomentumBatch&);
+  void (*planar_momentum_bend)(const StencilBatch&, const MomentumBatch&);
 };
 
 const StencilKernels& stencil_kernels();

@@ -92,6 +92,17 @@ void add_matrix(const StencilBatch& batch, int first, int live, const Pack (&mat
     add_lines<Piece, false>(batch, first, live, matrix);
 }
 
+/// For a matrix that is kept by columns.
+template <int kSize, int kWidth>
+void exchange_triangles(Pack (&matrix)[kSize][kWidth]) {
+  for (int i = 0; i < kSize; ++i)
+    for (int j = 0; j < i; ++j) {
+      const Pack swapped = matrix[i][j];
+      matrix[i][j] = matrix[j][i];
+      matrix[j][i] = swapped;
+    }
+}
+
 /// Adds to one number per unknown.
 template <class Piece, int count>
 void add_vector(const StencilBatch& batch, int first, int live, const Pack* numbers, double* out) {
@@ -111,33 +122,6 @@ void put_absolute(Pack* out, const Vec3<Pack>& v) {
 }
 void add_absolute(Pack* out, const Vec3<Pack>& v) {
   out[0] += absolute(v.x), out[1] += absolute(v.y), out[2] += absolute(v.z);
-}
-
-/// Fills the lower and the upper triangle from the blocks of the two edges and angles.
-template <int kWidth>
-void fill(const BendTwistDerivatives<Pack>& d, Pack (&H)[11][kWidth]) {
-  const Mat3<Pack>&A = d.ee[0][0], &B = d.ee[0][1], &F = d.ee[1][1];
-  const auto both = [&](int i, int j, Pack value) { H[i][j] = H[j][i] = value; };
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) {
-      const Pack a = A.row[i][j], b = B.row[i][j], f = F.row[i][j];
-      H[i][j] = a;
-      H[8 + i][8 + j] = f;
-      H[4 + i][4 + j] = (a + f) - (b + B.row[j][i]);
-      both(i, 4 + j, b - a);
-      both(i, 8 + j, -b);
-      both(4 + i, 8 + j, b - f);
-    }
-  for (int j = 0; j < 2; ++j)
-    for (int i = 0; i < 3; ++i) {
-      const Pack g0 = d.e_angle[0][j][i], g1 = d.e_angle[1][j][i];
-      both(i, 3 + 4 * j, -g0);
-      both(4 + i, 3 + 4 * j, g0 - g1);
-      both(8 + i, 3 + 4 * j, g1);
-    }
-  H[3][3] = d.angle_angle[0][0];
-  H[7][7] = d.angle_angle[1][1];
-  both(3, 7, d.angle_angle[0][1]);
 }
 
 /// Whether the kLanes stencils from `first` follow one another.

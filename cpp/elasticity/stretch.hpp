@@ -1,29 +1,31 @@
 #pragma once
-/// Stretching of one edge.
+/// Stretching of one edge, with the energy E = (EA / 2) (eps - eps_n)^2 L, axial strain eps = |e| / L - 1.
+/// [Bergou et al. 2008, section 4.2.3].
 
+#include <type_traits>
+
+#include "geometry/vec2.hpp"
 #include "geometry/vec3.hpp"
 
 namespace withe {
 
-/// Stretching energy of one edge, E = (EA / 2) eps^2 L with axial strain eps = |e| / L - 1.
-/// [Bergou et al. 2008, section 4.2.3]. Lengths in m, axial stiffness in N, result in J.
+/// n = EA (eps - eps_n) [N]: the derivative of the energy by the length. Lengths in m, axial stiffness in N.
 template <class Scalar>
-Scalar stretch_energy(const Scalar& length, const Scalar& rest_length, const Scalar& axial_stiffness) {
-  const Scalar strain = length / rest_length - 1.0;
-  return 0.5 * axial_stiffness * strain * strain * rest_length;
+Scalar axial_force(const Scalar& length, const Scalar& rest_length, const std::type_identity_t<Scalar>& axial_stiffness,
+                   const std::type_identity_t<Scalar>& natural_strain) {
+  return axial_stiffness * (length / rest_length - 1.0 - natural_strain);
 }
 
-/// Hessian with respect to the edge vector: (EA / L) t t^T + (n / l) (I - t t^T). The axial force n is given
-/// apart: with n = EA eps it is the exact Hessian, with n its own unknown that of the mixed Newton method
-/// [Magisano, Leonetti and Garcea 2017].
-template <class Scalar>
-Mat3<Scalar> stretch_hessian(const Vec3<Scalar>& tangent, const Scalar& inverse_length, const Scalar& rest_length,
-                             const Scalar& axial_stiffness, const Scalar& axial_force) {
-  const Scalar g = axial_force * inverse_length;
-  Mat3<Scalar> H{};
-  add_identity(H, g);
-  add_outer(H, axial_stiffness / rest_length - g, tangent, tangent);
-  return H;
+/// Hessian with respect to the edge vector: (EA / L) t t^T + (n / l) (I - t t^T), from the `modulus` EA / L and the
+/// `transverse` stiffness n / l. The axial force n of the latter is given apart: with n = EA eps it is the exact
+/// Hessian, with n its own unknown that of the mixed Newton method [Magisano, Leonetti and Garcea 2017].
+/// In a step whose force is n m, m = (e0 + e1) / (l0 + l1), that by the vector in its middle: with m in place of the
+/// first t, that at the end in place of the second, and n 2 / (l0 + l1).
+template <class Matrix, class Vector, class Scalar>
+void add_stretch_hessian(const Vector& direction, const Vector& tangent, const Scalar& modulus,
+                         const Scalar& transverse, Matrix& out) {
+  add_identity(out, transverse);
+  add_outer(out, modulus - transverse, direction, tangent);
 }
 
 }  // namespace withe

@@ -194,7 +194,6 @@ void ElasticForces::add_discrete_gradient(const StepProblem& problem, StepData& 
   const DiscreteStep step{.start = problem.start_configuration,
                           .middle = data.configuration,
                           .end = data.end_configuration,
-                          .middle_q = data.z,
                           .end_q = data.end,
                           .change = data.change};
   Local local;
@@ -202,26 +201,21 @@ void ElasticForces::add_discrete_gradient(const StepProblem& problem, StepData& 
     table.add_gradient(i, local.gradient, 1.0, data.gradient, data.row_magnitude);
     if (with_matrix) table.add_hessian(i, local.hessian, 1.0, values);
   };
-  const auto add_edge = [&](int e) {
+  set_mean_axial_forces(problem, data);
+  const StencilKernels& kernels = stencil_kernels();
+  (model.planar() ? kernels.planar_momentum_bend : kernels.momentum_bend)(
+      regular_batch(problem.elastic, data, assembler, values, data.axial_force),
+      {.start_frames = &problem.start_configuration.edge.data()->tangent.x,
+       .end_frames = &data.end_configuration.edge.data()->tangent.x,
+       .start_strain = problem.start_configuration.bend_strain.data(),
+       .end_strain = data.end_configuration.bend_strain.data()});
+  for (int e : assembler.regular.other_edges) {
     discrete_stretch_local(model, problem.elastic, step, e, with_matrix, data.axial_force, local);
     add(assembler.stretch, e);
-  };
-  const auto add_bend = [&](int b) {
+  }
+  for (int b : assembler.regular.other_bend) {
     discrete_bend_local(model, problem.elastic, step, b, with_matrix, local);
     add(assembler.bend, b);
-  };
-  if (model.planar()) {
-    for (int e = 0; e < model.edge_count; ++e) add_edge(e);
-    for (int b = 0; b < static_cast<int>(model.bend.size()); ++b) add_bend(b);
-  } else {
-    set_mean_axial_forces(problem, data);
-    stencil_kernels().momentum_bend(regular_batch(problem.elastic, data, assembler, values, data.axial_force),
-                                    {.start_frames = &problem.start_configuration.edge.data()->tangent.x,
-                                     .end_frames = &data.end_configuration.edge.data()->tangent.x,
-                                     .start_strain = problem.start_configuration.bend_strain.data(),
-                                     .end_strain = data.end_configuration.bend_strain.data()});
-    for (int e : assembler.regular.other_edges) add_edge(e);
-    for (int b : assembler.regular.other_bend) add_bend(b);
   }
   for (int h = 0; h < static_cast<int>(model.half.size()); ++h) {
     discrete_half_local(model, problem.elastic, step, h, with_matrix, local);

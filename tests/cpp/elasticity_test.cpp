@@ -7,7 +7,7 @@
 #include "elasticity/bend_planar.hpp"
 #include "elasticity/elements.hpp"
 #include "elasticity/stretch.hpp"
-#include "states.hpp"
+#include "stencil_kinds.hpp"
 
 namespace withe {
 namespace {
@@ -15,51 +15,14 @@ namespace {
 using testing::all_cases;
 using testing::at;
 using testing::Case;
+using testing::count_of;
 using testing::derivative_matches;
+using testing::dofs_of;
 using testing::gradient_matches;
+using testing::Kind;
+using testing::kKinds;
 using testing::MatrixX;
-
-enum class Kind { stretch, bend, half };
-constexpr Kind kKinds[] = {Kind::stretch, Kind::bend, Kind::half};
-const char* name_of(Kind kind) {
-  return kind == Kind::stretch ? "stretch" : kind == Kind::bend ? "bend-twist" : "half stencils";
-}
-
-void append(std::vector<int>& dofs, int first, int count) {
-  for (int i = 0; i < count; ++i) dofs.push_back(first + i);
-}
-
-/// Unknowns of a stencil in the order that elements.hpp gives; -1 for a hinge that is not there.
-std::vector<int> dofs_of(const Model& m, Kind kind, int i) {
-  std::vector<int> dofs;
-  const auto node = [&](int n) { append(dofs, m.node_dof[at(n)], m.dimension); };
-  const auto angle = [&](int edge) {
-    if (!m.planar()) dofs.push_back(m.edge_dof[at(edge)]);
-  };
-  if (kind == Kind::stretch) {
-    node(m.edge_tail[at(i)]);
-    node(m.edge_head[at(i)]);
-  } else if (kind == Kind::bend) {
-    const BendStencil& s = m.bend[at(i)];
-    node(s.node[0]);
-    angle(s.edge[0]);
-    node(s.node[1]);
-    angle(s.edge[1]);
-    node(s.node[2]);
-  } else {
-    const FrameStencil& s = m.half[at(i)];
-    node(m.edge_tail[at(s.edge)]);
-    angle(s.edge);
-    node(m.edge_head[at(s.edge)]);
-    append(dofs, m.frame_dof[at(s.frame)], m.frame_size());
-    if (!m.planar()) dofs.push_back(s.hinge < 0 ? -1 : m.hinges[at(s.hinge)].dof);
-  }
-  return dofs;
-}
-
-int count_of(const Model& m, Kind kind) {
-  return kind == Kind::stretch ? m.edge_count : static_cast<int>(kind == Kind::bend ? m.bend.size() : m.half.size());
-}
+using testing::name_of;
 
 struct Sum {
   double energy = 0;
@@ -233,9 +196,9 @@ TEST(Elements, NothingIsStressedWhereARodIsDrawnInItsNaturalShape) {
   for (Kind kind : kKinds) EXPECT_LT(sum_of(c, elastic_of(c), kind, c.q).gradient.norm(), 1e-12);
 }
 
-TEST(StretchEnergy, IsHalfOfStiffnessTimesStrainSquaredTimesLength) {
-  EXPECT_NEAR(stretch_energy(1.2, 1.0, 50.0), 0.5 * 50.0 * 0.04, 1e-14);
-  EXPECT_NEAR(stretch_energy(1.8, 2.0, 50.0), 0.5 * 50.0 * 0.01 * 2.0, 1e-14);
+TEST(AxialForce, IsStiffnessTimesStrainBeyondTheNaturalOne) {
+  EXPECT_NEAR(axial_force(1.2, 1.0, 50.0, 0.0), 10.0, 1e-13);
+  EXPECT_NEAR(axial_force(1.8, 2.0, 50.0, 0.1), -10.0, 1e-13);
 }
 
 TEST(PlanarBend, DerivativesInTheTurnAreExact) {

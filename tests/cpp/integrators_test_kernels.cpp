@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "elasticity/discrete_elements.hpp"
 #include "elasticity/discrete_gradient.hpp"
 #include "integrators/step_parts.hpp"
 #include "states.hpp"
@@ -40,6 +41,39 @@ void add_stencil_by_stencil(const Case& c, Assembler& assembler, const ElasticCo
   assembler.project_matrix();
 }
 
+/// Discrete gradients of the step to c.q and their matrix, each stencil by itself.
+void add_discrete_stencil_by_stencil(const Case& c, Assembler& assembler, const ElasticCoefficients& k,
+                                     const double* given_force, VectorX& force, VectorX& magnitude) {
+  Configuration start, middle, end;
+  const VectorX change = c.q - c.state.q;
+  compute_configuration(c.model, c.state, c.state.q, start);
+  compute_configuration(c.model, c.state, 0.5 * (c.state.q + c.q), middle);
+  compute_configuration(c.model, c.state, c.q, end);
+  const DiscreteStep step{start, middle, end, c.q, change};
+  std::fill(assembler.solver().values().begin(), assembler.solver().values().end(), 0.0);
+  force.setZero(c.model.dof_count);
+  magnitude.setZero(c.model.dof_count);
+  Local local;
+  const auto add = [&](const ElementTable& table, int i) {
+    table.add_gradient(i, local.gradient, 1.0, force, magnitude);
+    table.add_hessian(i, local.hessian, 1.0, assembler.solver().values());
+  };
+  for (int e = 0; e < c.model.edge_count; ++e) {
+    discrete_stretch_local(c.model, k, step, e, true, given_force, local);
+    add(assembler.stretch, e);
+  }
+  for (int b = 0; b < static_cast<int>(c.model.bend.size()); ++b) {
+    discrete_bend_local(c.model, k, step, b, true, local);
+    add(assembler.bend, b);
+  }
+  for (int h = 0; h < static_cast<int>(c.model.half.size()); ++h) {
+    discrete_half_local(c.model, k, step, h, true, local);
+    add(assembler.half, h);
+  }
+  assembler.project(force);
+  assembler.project_matrix();
+}
+
 /// More stencils than a pack has lanes, and a remainder.
 std::vector<Case> long_cases() {
   std::vector<Case> cases;
@@ -50,15 +84,28 @@ std::vector<Case> long_cases() {
   round.bend2 = round.bend1;
   round.natural_twist = 0.0;
   for (int nodes : {3, 4, 6, 7, 23}) {
-    testing::SceneBuilder open, flat, closed;
+    testing::SceneBuilder open, flat, closed, circle;
     open.add_rod(testing::helix(nodes), curved);
     open.add_rod(testing::line(Vector3(3, 0, 0), Vector3(4, 0, 1), nodes + 2), curved);
     flat.add_rod(testing::arc(nodes), round, false, Vector3::UnitY());
     closed.add_rod(testing::ring(nodes, 1.0, 0.3), curved, true);
-    for (const auto& [name, builder] : {std::pair{"open", &open}, std::pair{"flat", &flat}, std::pair{"ring", &closed}})
+    circle.add_rod(testing::ring(nodes, 1.0, 0.0), round, true, Vector3::UnitZ());
+    for (const auto& [name, builder] : {std::pair{"open", &open}, std::pair{"flat", &flat}, std::pair{"ring", &closed},
+                                        std::pair{"ring in a plane", &circle}})
       for (Case& c : testing::states_of(name + std::to_string(nodes), builder->scene)) cases.push_back(std::move(c));
   }
   return cases;
+}
+
+void expect_same_matrix(Assembler& assembler, Assembler& reference, const std::string& name) {
+  const std::span<const double> a = assembler.solver().values(), b = reference.solver().values();
+  ASSERT_EQ(a.size(), b.size());
+  double greatest = 0.0, difference = 0.0;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    greatest = std::max(greatest, std::abs(b[i]));
+    difference = std::max(difference, std::abs(a[i] - b[i]));
+  }
+  EXPECT_LT(difference, 1e-12 * greatest) << name;
 }
 
 void expect_same_sums(const Case& c, Integrator integrator) {
@@ -76,13 +123,7 @@ void expect_same_sums(const Case& c, Integrator integrator) {
   const double scale = magnitude.maxCoeff() + 1.0;
   EXPECT_LT((evaluation.residual - force).cwiseAbs().maxCoeff(), 1e-12 * scale) << c.name;
   EXPECT_LT((evaluation.magnitude - magnitude).cwiseAbs().maxCoeff(), 1e-12 * scale) << c.name;
-  const std::span<const double> a = equations.assembler().solver().values(), b = reference.solver().values();
-  double greatest = 0.0, difference = 0.0;
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    greatest = std::max(greatest, std::abs(b[i]));
-    difference = std::max(difference, std::abs(a[i] - b[i]));
-  }
-  EXPECT_LT(difference, 1e-12 * greatest) << c.name;
+  expect_same_matrix(equations.assembler(), reference, c.name);
   equations.evaluate(c.q, false, nullptr, alone);
   EXPECT_LT((evaluation.residual - alone.residual).cwiseAbs().maxCoeff(), 1e-13 * scale) << c.name;
 }
@@ -225,6 +266,36 @@ void expect_discrete_gradient(const Case& c) {
   equations.evaluate(z - step * x, false, nullptr, behind);
   expected = (ahead.residual - behind.residual) / (2.0 * step);
   EXPECT_LT((y - expected).norm(), 1e-5 * expected.norm()) << c.name;
+}
+
+/// `given`: with axial forces of their own in the matrix, as in Newton's mixed method.
+void expect_same_discrete_sums(const Case& c, bool given) {
+  Options options;
+  options.integrator = Integrator::energy_momentum;
+  Equations equations(c.model, equation_options(options));
+  Assembler reference(c.model, equations.loads(), Symmetry::unsymmetric, SolverKind::automatic);
+  Parameters parameters = initial_parameters(c.model);
+  parameters.gravity.setZero();
+  const VectorX z = 0.5 * (c.state.q + c.q), drawn = 10.0 * testing::RandomNumbers(3).vector(c.model.edge_count);
+  const double* axial = given ? drawn.data() : nullptr;
+  StepData evaluation, alone;
+  equations.begin(c.state, parameters, StepRule::energy_momentum, 0.0);
+  equations.evaluate(z, true, axial, evaluation);
+  VectorX force, magnitude;
+  add_discrete_stencil_by_stencil(c, reference, equations.elastic(), axial, force, magnitude);
+  const double scale = magnitude.maxCoeff() + 1.0;
+  EXPECT_LT((evaluation.residual - force).cwiseAbs().maxCoeff(), 1e-12 * scale) << c.name;
+  EXPECT_LT((evaluation.magnitude - magnitude).cwiseAbs().maxCoeff(), 1e-12 * scale) << c.name;
+  expect_same_matrix(equations.assembler(), reference, c.name);
+  equations.evaluate(z, false, axial, alone);
+  EXPECT_LT((evaluation.residual - alone.residual).cwiseAbs().maxCoeff(), 1e-13 * scale) << c.name;
+}
+
+TEST(StencilKernels, AddUpToTheDiscreteGradientsThatStencilsGiveOneByOne) {
+  for (bool given : {false, true}) {
+    for (const Case& c : testing::all_cases()) expect_same_discrete_sums(c, given);
+    for (const Case& c : long_cases()) expect_same_discrete_sums(c, given);
+  }
 }
 
 TEST(StencilKernels, GiveDiscreteGradientsInSpace) {
