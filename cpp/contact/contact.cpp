@@ -11,25 +11,10 @@ std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
 // The elastic give of an anchor at its limit, over the distance tolerance.
 constexpr double kGive = 0.05;
-// Pairs farther apart than this beyond their reach, over it, are of no interest.
-constexpr double kFar = 0.6;
-// What rounding leaves of a distance to go.
-constexpr double kSafe = 1.0 - 1e-9;
 
 }  // namespace
 
-Contact::Contact(const Model& model) : model_(model), surfaces_(model) {
-  const ContactDescription& contact = model.description.contact;
-  pairs_ = surfaces_.obstacle_pairs();
-  for (const ContactPair& p : pairs_) frictional_ = frictional_ || p.friction > 0.0;
-  if (contact.rods) {
-    frictional_ = frictional_ || contact.friction > 0.0;
-    for (const ContactPairDescription& p : contact.pairs) frictional_ = frictional_ || p.friction > 0.0;
-  }
-  couple();
-}
-
-const ContactPair& Contact::pair_of(int i) const { return pairs_[at(touching_[at(i)].pair)]; }
+Contact::Contact(const Model& model) : model_(model), surfaces_(model), candidates_(model, surfaces_) {}
 
 void Contact::set_parameters(const Parameters& parameters) {
   if (version_ == parameters.version) return;
@@ -104,63 +89,6 @@ double Contact::tangential_stiffness(const ContactPair& pair, double stiffness) 
   return pair.friction * pressing / (kGive * pair.tolerance);
 }
 
-/// Ends of edges, or of an obstacle; of a piece of a curve its nodes, and nothing.
-void Contact::end_points(const ContactPair& pair, const VectorX& q, Vec3d (&x)[4]) const {
-  if (pair.curve()) {
-    for (int i = 0; i < 4; ++i)
-      x[i] = i < pair.piece.weights->nodes ? local_position(model_, q, pair.piece.node[i]) : Vec3d{};
-    return;
-  }
-  x[0] = local_vector(model_, q, model_.tail_dof[at(pair.key.a)]);
-  x[1] = local_vector(model_, q, model_.head_dof[at(pair.key.a)]);
-  if (pair.key.b >= 0) {
-    x[2] = local_vector(model_, q, model_.tail_dof[at(pair.key.b)]);
-    x[3] = local_vector(model_, q, model_.head_dof[at(pair.key.b)]);
-  } else {
-    const Obstacle& o = obstacle_of(pair);
-    x[2] = o.point;
-    x[3] = o.other;
-  }
-}
-
-/// The longest way of a node; NaN where one is.
-double Contact::farthest(const VectorX& change) const {
-  double most = 0.0;
-  for (int dof : model_.node_dof) {
-    double square = 0.0;
-    for (int k = 0; k < model_.dimension; ++k) square += change(dof + k) * change(dof + k);
-    if (std::isnan(square)) return square;
-    most = std::max(most, square);
-  }
-  return std::sqrt(most);
-}
-
-Contact::Touching Contact::touch(const ContactPair& pair, const VectorX& q, bool whole) const {
-  Touching t;
-  Vec3d x[4];
-  end_points(pair, q, x);
-  if (pair.curve()) {
-    const Obstacle& o = obstacle_of(pair);
-    const CurveDistance<double> d = curve_distance(pair.piece, o, x);
-    t.distance = d.distance;
-    t.points.s = d.s;
-    t.normal = distance_to(o, curve_point(*pair.piece.weights, x, d.s)).normal;
-    return t;
-  }
-  // Far apart by their middles: no need for more.
-  const Vec3d middle = 0.5 * (x[0] + x[1] - x[2] - x[3]), u = x[1] - x[0], v = x[3] - x[2];
-  const double size = 0.5 * (std::sqrt(dot(u, u)) + std::sqrt(dot(v, v))) + (1.0 + kFar) * pair.reach();
-  if (!whole && dot(middle, middle) > size * size) {
-    t.distance = std::sqrt(dot(middle, middle)) - size + (1.0 + kFar) * pair.reach();  // or more
-    return t;
-  }
-  t.points = closest_points(x[0], x[1], x[2], x[3], pair.weight_a, pair.weight_b);
-  t.distance = std::sqrt(t.points.square);
-  const double length = std::sqrt(dot(t.points.between, t.points.between));
-  t.normal = (1.0 / std::max(length, 1e-300)) * t.points.between;
-  return t;
-}
-
 const ContactRecord* Contact::record_of(const ContactKey& key) const {
   const ContactRecord* renewed = renewed_.empty() ? nullptr : find_record(renewed_, key);
   return renewed ? renewed : find_record(state_->contacts, key);
@@ -180,10 +108,9 @@ void Contact::restart(const State& state, double duration) {
   shift_.clear();
   turn_.clear();
   blocked_ = false;
-  place_obstacles(state.obstacles);
+  candidates_.place(state.obstacles);
   lagged_.clear();
   forget_foreseen();
-  if (outgrown(state.q, nullptr)) find_pairs(state.q, state.q);
   touching_.clear();
   leaving_.clear();
   unrecorded_.clear();
@@ -193,18 +120,16 @@ void Contact::restart(const State& state, double duration) {
   starting_ = false;
   if (pressing_ != Pressing::still) renew_impacts();
   for (const Touching& t : touching_)
-    if (record_of(pairs_[at(t.pair)].key) == nullptr) unrecorded_.push_back(pairs_[at(t.pair)].key);
+    if (record_of(t.pair.key) == nullptr) unrecorded_.push_back(t.pair.key);
   std::sort(unrecorded_.begin(), unrecorded_.end());
   for (const Touching& t : touching_)
     if (t.law.elastic > 0.0) leaving_.push_back(t);
   start_energy_ = energy();
   start_pressing_ = pressing_energy();
   if (!target_.empty()) move_obstacles();
-  if (frictional_ && freezes()) freeze();
-  if (!shift_.empty() || !turn_.empty()) place_obstacles(target_);
+  if (frictional() && freezes()) freeze();
+  if (!shift_.empty() || !turn_.empty()) candidates_.place(target_);
 }
-
-void Contact::place_obstacles(const std::vector<ObstaclePlace>& places) { moved_ += 2.0 * surfaces_.place(places); }
 
 /// Finds the ways of obstacles. Rods follow once these are at their ends: a step in which one would pass through a
 /// centreline that stays is too long.
@@ -221,8 +146,7 @@ void Contact::move_obstacles() {
     shift_.clear();
     return;
   }
-  for (const ContactPair& pair : surfaces_.obstacle_pairs())
-    if (!flat(pair) && allowed_of(pair, state_->q, nullptr, shift_of(pair)) < 1.0) blocked_ = true;
+  blocked_ = candidates_.blocked(state_->q, shift_);
 }
 
 /// Minus the force on the nodes beside an obstacle, and so that on it [N].
@@ -249,67 +173,25 @@ double Contact::obstacle_work() const {
 
 void Contact::update(const VectorX& q1) {
   if (current_ && q1 == q1_) return;
-  moved_ += q1_.size() == q1.size() ? farthest(q1 - q1_) : INFINITY;
-  if (outgrown(q1, nullptr)) find_pairs(q1, q1);
-  if (!std::isfinite(moved_)) {
-    moved_ = 0.0;
-    bounds_.clear();
-  }
   q1_ = q1;
-  bounds_.resize(pairs_.size());
   touching_ = lagged_;
-  for (int p = 0; p < static_cast<int>(pairs_.size()); ++p) {
-    if (bounds_[at(p)].clear > moved_) continue;
-    const ContactPair& pair = pairs_[at(p)];
-    Touching t = touch(pair, q1);
-    t.pair = p;
-    // A distance changes by no more than both edges move.
-    const auto above = [&](double least) { return moved_ + kSafe * 0.5 * (t.distance - least); };
-    // The weights of closest_points make it greater than that of the points themselves.
-    const double weights = 0.25 * (pair.weight_a + pair.weight_b);
-    bounds_[at(p)] = {above(pair.reach()), above(std::sqrt(pair.nearest() * pair.nearest() + weights))};
-    if (t.distance >= pair.reach()) continue;
+  candidates_.find(q1, [&](const ContactPair& pair, const Proximity& proximity) {
+    Touching& t = touching_.emplace_back(Touching{pair, proximity});
     set_force(t, record_of(pair.key));
-    touching_.push_back(t);
-  }
+  });
   add_leaving(lagged_.size());
   current_ = !starting_;  // what has no record begins otherwise in a step than before it
 }
 
-void Contact::unknowns(int i, int (&dofs)[kContactUnknowns]) const { unknowns_of(pair_of(i), dofs); }
-
-void Contact::unknowns_of(const ContactPair& pair, int (&dofs)[kContactUnknowns]) const {
-  if (!pair.curve()) {
-    unknowns_of_edges(pair.key, dofs);
-    return;
-  }
-  std::fill(std::begin(dofs), std::end(dofs), -1);
-  const CurveWeights& w = *pair.piece.weights;
-  for (int i = 0; i < w.nodes; ++i)
-    for (int k = 0; k < model_.dimension; ++k) dofs[3 * i + k] = model_.node_dof[at(pair.piece.node[i])] + k;
-  for (int b = 0; b < w.edges && frictional_ && !model_.planar(); ++b)
-    dofs[12 + b] = model_.edge_dof[at(pair.piece.edge[b])];
+std::vector<ContactKey> Contact::near() {
+  std::vector<ContactKey> keys = candidates_.near(q1_);
+  for (const Touching& t : touching_) keys.push_back(t.pair.key);
+  std::sort(keys.begin(), keys.end());
+  keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
+  return keys;
 }
 
-void Contact::unknowns_of(const ContactKey& key, int (&dofs)[kContactUnknowns]) const {
-  if (key.b < 0)
-    unknowns_of(surfaces_.obstacle_pair(key), dofs);
-  else
-    unknowns_of_edges(key, dofs);
-}
-
-void Contact::unknowns_of_edges(const ContactKey& key, int (&dofs)[kContactUnknowns]) const {
-  std::fill(std::begin(dofs), std::end(dofs), -1);
-  const bool obstacle = key.b < 0;
-  for (int side = 0; side < (obstacle ? 1 : 2); ++side) {
-    const auto edge = at(side == 0 ? key.a : key.b);
-    for (int k = 0; k < model_.dimension; ++k) {
-      dofs[6 * side + k] = model_.tail_dof[edge] + k;
-      dofs[6 * side + 3 + k] = model_.head_dof[edge] + k;
-    }
-    if (frictional_ && !model_.planar()) dofs[12 + side] = model_.edge_dof[edge];
-  }
-}
+void Contact::unknowns(int i, int (&dofs)[kContactUnknowns]) const { surfaces_.unknowns(pair_of(i), dofs); }
 
 void Contact::local(int i, bool with_hessian, ContactLocal& out) const {
   const Touching& t = touching_[at(i)];
@@ -321,7 +203,7 @@ void Contact::local(int i, bool with_hessian, ContactLocal& out) const {
     return;
   }
   press(t, with_hessian, out);
-  if (pairs_[at(t.pair)].friction > 0.0 && !freezes()) add_friction(t, with_hessian, out);
+  if (t.pair.friction > 0.0 && !freezes()) add_friction(t, with_hessian, out);
 }
 
 }  // namespace withe

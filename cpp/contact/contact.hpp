@@ -5,12 +5,13 @@
 /// so every iterate is shortened until no pair of centrelines passes through another on its way (`allowed`): the path
 /// from one accepted state to the next keeps every knot.
 
-#include <span>
+#include <algorithm>
 #include <utility>
 #include <vector>
 
-#include "contact/broad_phase.hpp"
+#include "contact/candidates.hpp"
 #include "contact/friction.hpp"
+#include "contact/friction_prediction.hpp"
 #include "contact/pressing_law.hpp"
 #include "contact/surfaces.hpp"
 
@@ -53,8 +54,8 @@ class Contact {
 
   const Surfaces& surfaces() const { return surfaces_; }
   /// Whether friction is there at all, and its Jacobian unsymmetric.
-  bool frictional() const { return frictional_; }
-  bool unsymmetric() const { return frictional_ && !freezes(); }
+  bool frictional() const { return surfaces_.frictional(); }
+  bool unsymmetric() const { return frictional() && !freezes(); }
   /// Whether friction goes with the way, and not with the velocity.
   bool anchored() const { return model_.description.contact.friction_law == FrictionLaw::anchored; }
 
@@ -76,8 +77,7 @@ class Contact {
   int count() const { return static_cast<int>(touching_.size()); }
   /// Unknowns of contact i, -1 where there is none.
   void unknowns(int i, int (&dofs)[kContactUnknowns]) const;
-  /// Row of contact i in the table of elements; -1 until `couple` has given it one.
-  int element(int i) const { return pair_of(i).element; }
+  const ContactKey& key(int i) const { return pair_of(i).key; }
   void local(int i, bool with_hessian, ContactLocal& out) const;
   /// Rounding of contact i's force for coordinates up to `reach` [N].
   double rounding(int i, double reach) const;
@@ -102,17 +102,11 @@ class Contact {
   /// Whether a step of dt would be too long for what an impact loses by its restitution.
   bool unresolved(double dt) const;
 
-  /// Whether everything that touches has an element; if not, `couple` gives elements to it and to what is near.
-  bool coupled() const;
-  void couple();
-  /// Those that have elements, sorted; and gives elements to these.
-  const std::vector<ContactKey>& elements() const { return elements_; }
-  void couple(std::vector<ContactKey> keys);
-  /// Unknowns of all elements, one after the other.
-  const std::vector<int>& element_unknowns() const { return element_unknowns_; }
+  /// What touches or is near at q1, sorted: what the matrix should have room for.
+  std::vector<ContactKey> near();
 
   /// How much of a change of q1 may be made before centrelines come too close, from 0 to 1.
-  double allowed(const VectorX& q1, const VectorX& change);
+  double allowed(const VectorX& q1, const VectorX& change) { return candidates_.allowed(q1, change); }
 
   /// Whether friction grows with slip, so that it can be eased: by how much the slip tolerance is greater for a while.
   bool eases() const;
@@ -153,10 +147,8 @@ class Contact {
     return law == FrictionLaw::lagged || law == FrictionLaw::semi_explicit;
   }
   struct Touching {
-    int pair = 0;  ///< index in pairs_
-    ClosestPoints points;
-    Vec3d normal{};
-    double distance = 0;
+    ContactPair pair;
+    Proximity proximity;
     ContactEnergy energy;  ///< times the stiffness
     double stiffness = 0, yielded = 0;
     double approach = 0, age = 0;  ///< see ContactRecord
@@ -179,32 +171,23 @@ class Contact {
     double slope[3][3];  ///< by the slip [N/m]
     bool sticking = false;
   };
-  const ContactPair& pair_of(int i) const;
-  const Obstacle& obstacle_of(const ContactPair& pair) const {
-    return surfaces_.obstacles()[static_cast<std::size_t>(-1 - pair.key.b)];
-  }
-  /// Whether a pair is one with a plane, which has no other side.
-  bool flat(const ContactPair& pair) const { return pair.key.b < 0 && obstacle_of(pair).kind == ObstacleKind::plane; }
+  const ContactPair& pair_of(int i) const { return touching_[static_cast<std::size_t>(i)].pair; }
+  const Bodies& bodies() const { return candidates_.bodies(); }
   int end_node(int edge, int end) const {
     return (end == 0 ? model_.edge_tail : model_.edge_head)[static_cast<std::size_t>(edge)];
   }
   static Vec3d force_on_nodes(const ContactPair& pair, const ContactLocal& local);
-  void unknowns_of(const ContactPair& pair, int (&dofs)[kContactUnknowns]) const;
-  void unknowns_of(const ContactKey& key, int (&dofs)[kContactUnknowns]) const;
-  void unknowns_of_edges(const ContactKey& key, int (&dofs)[kContactUnknowns]) const;
-  /// Row of a pair in the table of elements, or -1.
-  int element_of(const ContactKey& key) const;
   static double depth_of(const ContactPair& pair, double distance) {
     return (pair.radii() - distance) / pair.small_radius();
   }
   /// What is too deep is what presses.
-  static double depth_of(const ContactPair& pair, const Touching& t) { return depth_of(pair, t.distance + t.yielded); }
+  static double depth_of(const ContactPair& pair, const Touching& t) {
+    return depth_of(pair, t.proximity.distance + t.yielded);
+  }
   /// Whether a stiffness is given.
   bool fixed(const ContactPair& pair) const {
     return pair.stiffness > 0.0 || model_.description.contact.stiffness > 0.0;
   }
-  /// `whole`: its closest points too, however far apart it is.
-  Touching touch(const ContactPair& pair, const VectorX& q, bool whole = false) const;
   void set_force(Touching& t, const ContactRecord* record) const;
   void add_leaving(std::size_t first);
   double start_distance(const ContactPair& pair) const;
@@ -224,7 +207,6 @@ class Contact {
   double impact_stiffness(const ContactPair& pair) const;
   double first_stiffness(const ContactPair& pair) const;
   double tangential_stiffness(const ContactPair& pair, double stiffness) const;
-  void end_points(const ContactPair& pair, const VectorX& q, Vec3d (&x)[4]) const;
   FrictionSetting setting(const Touching& t) const;
   double pressing_energy() const;
   bool add_friction_alone(const Touching& t, ContactLocal& out) const;
@@ -248,9 +230,7 @@ class Contact {
   };
   Slipping frozen_slipping(const Touching& t, const VectorX& change) const;
   Slipping slipping(const Touching& t, const VectorX& change) const;
-  const Vec3d* foreseen(const Touching& t) const {
-    return foreseen_.empty() ? nullptr : &foreseen_[static_cast<std::size_t>(t.pair)];
-  }
+  const Vec3d* foreseen(const Touching& t) const { return foreseen_.of(t.pair.key); }
   double slip_rate() const;
   /// Of friction by the slip, at most [N/m].
   double friction_slope(const Touching& t) const;
@@ -258,25 +238,10 @@ class Contact {
   void record_frozen(std::vector<ContactRecord>& records) const;
   void freeze();
   void freeze_slip(const Touching& t, Frozen& frozen) const;
-  /// Unknowns of a pair at q (obstacles' points where there are none).
-  void values_at(const ContactPair& pair, const VectorX& q, double (&x)[kContactUnknowns]) const;
-  template <class More>
-  void set_boxes(const VectorX& from, const VectorX& to, const More& more);
-  void find_near(std::vector<ContactPair>& pairs);
-  std::size_t number_of(const std::vector<ContactPair>& pairs, const ContactKey& key) const;
-  void keep_touching();
-  void find_pairs(const VectorX& from, const VectorX& to);
-  bool outgrown(const VectorX& q, const VectorX* change) const;
-  double farthest(const VectorX& change) const;
-  double allowed_of(const ContactPair& pair, const VectorX& q, const VectorX* change, const Vec3d& shift) const;
   void set_parameters(const Parameters& parameters);
   void restart(const State& state, double duration);
   void look_at(const State& state, const Parameters& parameters);
-  double allowed_of_piece(const ContactPair& pair, const VectorX& q, const VectorX* change, const Vec3d& shift) const;
-  template <class Distance>
-  static double advance(const ContactPair& pair, double speed, const Distance& distance_at);
   void move_obstacles();
-  void place_obstacles(const std::vector<ObstaclePlace>& places);
   /// Way of a pair's obstacle in this step [m].
   Vec3d shift_of(const ContactPair& pair) const {
     return pair.key.b < 0 && !shift_.empty() ? shift_[static_cast<std::size_t>(-1 - pair.key.b)] : Vec3d{};
@@ -305,21 +270,7 @@ class Contact {
 
   const Model& model_;
   Surfaces surfaces_;
-  bool frictional_ = false;
-  BroadPhase broad_phase_;
-  std::vector<Box> boxes_;
-  /// Obstacles' first, then candidates of the broad phase, sorted by key: a contact's place among others does not
-  /// depend on when candidates were found. And those before they were found last.
-  std::vector<ContactPair> pairs_, old_pairs_;
-  VectorX reference_;   ///< where the candidates belong
-  VectorX low_, high_;  ///< bounds of the way there
-  double margin_ = 0;
-  struct Bounds {
-    double clear = -1.0;  ///< it touches nothing while `moved_` stays below [m]
-    double open = -1.0;   ///< nor do its centrelines come nearer than an iteration may bring them
-  };
-  std::vector<Bounds> bounds_;  ///< per pair
-  double moved_ = 0;            ///< farthest that a node may have gone, summed over all q1 so far [m]
+  Candidates candidates_;
   std::vector<ObstaclePlace> target_;
   std::vector<Vec3d> shift_;  ///< of each obstacle in this step [m]; empty: none moves
   std::vector<Vec3d> turn_;   ///< likewise [rad]; empty: none turns
@@ -334,13 +285,10 @@ class Contact {
   double gravity_ = 0;  ///< [m/s^2]
   double duration_ = 0, eased_ = 1, start_energy_ = 0, start_pressing_ = 0, deepest_ = kDeepest;
   VectorX q1_;
-  /// Friction of each pair over its limit, empty where it is not known; and the next.
-  std::vector<Vec3d> foreseen_, next_foreseen_;
+  FrictionPrediction foreseen_;
   std::vector<Touching> touching_, lagged_;
   std::vector<Touching> leaving_;  ///< what gives back in this step what it took, wherever it ends
   std::vector<Frozen> frozen_;
-  std::vector<ContactKey> elements_;  ///< sorted
-  std::vector<int> element_unknowns_;
   long version_ = -1;  ///< of the parameters that the next two belong to
   VectorX least_stiffness_;
   VectorX edge_mass_;  ///< [kg]

@@ -14,34 +14,16 @@ std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
 }  // namespace
 
-void Contact::values_at(const ContactPair& pair, const VectorX& q, double (&values)[kContactUnknowns]) const {
-  std::fill(std::begin(values), std::end(values), 0.0);
-  Vec3d x[4];
-  end_points(pair, q, x);
-  for (int i = 0; i < 4; ++i) {
-    values[3 * i] = x[i].x;
-    values[3 * i + 1] = x[i].y;
-    values[3 * i + 2] = x[i].z;
-  }
-  if (model_.planar()) return;
-  if (pair.curve()) {
-    for (int b = 0; b < pair.piece.weights->edges; ++b) values[12 + b] = q(model_.edge_dof[at(pair.piece.edge[b])]);
-    return;
-  }
-  values[12] = q(model_.edge_dof[at(pair.key.a)]);
-  if (pair.key.b >= 0) values[13] = q(model_.edge_dof[at(pair.key.b)]);
-}
-
 bool Contact::eases() const {
   const FrictionLaw law = model_.description.contact.friction_law;
-  return frictional_ && (law == FrictionLaw::implicit || law == FrictionLaw::lagged);
+  return frictional() && (law == FrictionLaw::implicit || law == FrictionLaw::lagged);
 }
 
 /// K / (2 dt), over the slip tolerance [1/m].
 double Contact::slip_rate() const { return 7.5 / (eased_ * model_.description.contact.slip_tolerance * duration_); }
 
 double Contact::friction_slope(const Touching& t) const {
-  const ContactPair& pair = pairs_[at(t.pair)];
+  const ContactPair& pair = t.pair;
   if (!(pair.friction > 0.0)) return 0.0;
   if (t.frozen >= 0) return pair.friction * frozen_[at(t.frozen)].pressing * slip_rate();
   if (freezes()) return 0.0;
@@ -51,11 +33,11 @@ double Contact::friction_slope(const Touching& t) const {
 
 FrictionSetting Contact::setting(const Touching& t) const {
   const ContactDescription& contact = model_.description.contact;
-  const ContactPair& pair = pairs_[at(t.pair)];
+  const ContactPair& pair = t.pair;
   FrictionSetting f;
   f.pair = &pair;
-  if (pair.key.b < 0) f.obstacle = &obstacle_of(pair);
-  f.points = t.points;
+  if (pair.key.b < 0) f.obstacle = &bodies().obstacle(pair);
+  f.points = t.proximity.points;
   f.pressing = t.law;
   f.before = t.before;
   f.slides = turns(pair) && t.law.elastic > 0.0;
@@ -68,7 +50,7 @@ FrictionSetting Contact::setting(const Touching& t) const {
   f.drift = shift_of(pair);
   f.turn = turn_of(pair);
   f.foreseen = foreseen(t);
-  values_at(pair, state_->q, f.start);
+  bodies().values(pair, state_->q, f.start);
   if (!f.spatial) return f;
   if (pair.curve()) {
     for (int b = 0; b < pair.piece.weights->edges; ++b) f.source[b] = state_->tangent[at(pair.piece.edge[b])];
@@ -80,10 +62,10 @@ FrictionSetting Contact::setting(const Touching& t) const {
 }
 
 void Contact::add_friction(const Touching& t, bool with_hessian, ContactLocal& out) const {
-  const ContactPair& pair = pairs_[at(t.pair)];
+  const ContactPair& pair = t.pair;
   const FrictionSetting f = setting(t);
   double now[kContactUnknowns];
-  values_at(pair, q1_, now);
+  bodies().values(pair, q1_, now);
   const SlippingSurfaces<double> surfaces = slipping_surfaces(f, now);
   add_friction_gradient(f, surfaces, out.gradient);
   if (with_hessian) add_friction_jacobian(f, surfaces, out.hessian);
@@ -91,16 +73,16 @@ void Contact::add_friction(const Touching& t, bool with_hessian, ContactLocal& o
 
 /// Friction's force on the obstacle, the opposite of that on a, times the way of the surface.
 double Contact::turning_work(const Touching& t) const {
-  const ContactPair& pair = pairs_[at(t.pair)];
+  const ContactPair& pair = t.pair;
   const Vec3d turn = turn_of(pair);
   if (!(pair.friction > 0.0) || dot(turn, turn) == 0.0) return 0.0;
   if (t.frozen >= 0) return -dot(frozen_force(t).force, frozen_[at(t.frozen)].turned);
   if (freezes()) return 0.0;
   const FrictionSetting f = setting(t);
   double now[kContactUnknowns];
-  values_at(pair, q1_, now);
+  bodies().values(pair, q1_, now);
   Vec3d x[4];
-  end_points(pair, q1_, x);
+  bodies().end_points(pair, q1_, x);
   const SlippingSurfaces<double> c = slipping_surfaces(f, now);
   return -dot(c.friction.force, cross(turn, obstacle_arm(f, c, x)));
 }
@@ -126,23 +108,24 @@ void add_turning(const Vec3d (&x)[4], int tail, int angle, const Vec3d& arm, boo
 
 /// J at the start.
 void Contact::freeze_slip(const Touching& t, Frozen& frozen) const {
-  const ContactPair& pair = pairs_[at(t.pair)];
+  const ContactPair& pair = t.pair;
   const bool centreline = model_.description.contact.centreline_friction, obstacle = pair.key.b < 0;
   double w[4];
-  end_weights(t.points.s, t.points.t, w);
-  for (int i = 0; i < 3 && pair.curve(); ++i) w[i] = pair.piece.weights->at(i, t.points.s);
+  end_weights(t.proximity.points.s, t.proximity.points.t, w);
+  for (int i = 0; i < 3 && pair.curve(); ++i) w[i] = pair.piece.weights->at(i, t.proximity.points.s);
   Vec3d x[4], column[kContactUnknowns] = {};
-  end_points(pair, state_->q, x);
+  bodies().end_points(pair, state_->q, x);
   const Vec3d axes[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
   for (int i = 0; i < (pair.curve() ? 9 : obstacle ? 6 : 12); ++i) column[i] = w[i / 3] * axes[i % 3];
   const int edges = centreline ? 0 : pair.curve() ? pair.piece.weights->edges : obstacle ? 1 : 2;
   for (int side = 0; side < edges; ++side) {
-    const Vec3d arm = pair.curve() ? piece_arm(pair, side, t.points.s, t.normal)
-                                   : (side == 0 ? 1.0 : -1.0) * contact_arm(pair, side, t.normal, t.points.between);
+    const Vec3d arm = pair.curve() ? piece_arm(pair, side, t.proximity.points.s, t.proximity.normal)
+                                   : (side == 0 ? 1.0 : -1.0) *
+                                         contact_arm(pair, side, t.proximity.normal, t.proximity.points.between);
     add_turning(x, pair.curve() ? side : 2 * side, 12 + side, arm, !model_.planar(), column);
   }
   for (int i = 0; i < kContactUnknowns; ++i) {
-    const Vec3d c = column[i] - dot(column[i], t.normal) * t.normal;
+    const Vec3d c = column[i] - dot(column[i], t.proximity.normal) * t.proximity.normal;
     frozen.slip[0][i] = c.x;
     frozen.slip[1][i] = c.y;
     frozen.slip[2][i] = c.z;
@@ -153,7 +136,7 @@ void Contact::freeze_slip(const Touching& t, Frozen& frozen) const {
 void Contact::freeze() {
   frozen_.clear();
   for (const Touching& t : touching_) {
-    const ContactPair& pair = pairs_[at(t.pair)];
+    const ContactPair& pair = t.pair;
     const double pressing = -t.energy.first;
     if (!(pair.friction > 0.0) || !(pressing > 0.0)) continue;
     Frozen frozen{};
@@ -162,12 +145,13 @@ void Contact::freeze() {
     const Vec3d turn = turn_of(pair);
     if (dot(turn, turn) > 0.0) {
       Vec3d x[4];
-      end_points(pair, state_->q, x);
-      frozen.turned = cross(turn, pair.curve() ? piece_obstacle_arm(pair, obstacle_of(pair), x, t.points.s)
-                                               : x[2] + t.points.t * (x[3] - x[2]) + pair.radius_b * t.normal - x[2]);
+      bodies().end_points(pair, state_->q, x);
+      frozen.turned = cross(
+          turn, pair.curve() ? piece_obstacle_arm(pair, bodies().obstacle(pair), x, t.proximity.points.s)
+                             : x[2] + t.proximity.points.t * (x[3] - x[2]) + pair.radius_b * t.proximity.normal - x[2]);
     }
     const Vec3d shift = shift_of(pair) + frozen.turned;
-    frozen.drift = shift - dot(shift, t.normal) * t.normal;
+    frozen.drift = shift - dot(shift, t.proximity.normal) * t.proximity.normal;
     if (model_.description.contact.friction_law == FrictionLaw::semi_explicit) set_direction(pair, frozen);
     lagged_.push_back(t);
     lagged_.back().frozen = static_cast<int>(frozen_.size());
@@ -178,11 +162,11 @@ void Contact::freeze() {
 
 /// How far the surfaces have slipped, with J of the start.
 Vec3d Contact::frozen_slip(const Touching& t) const {
-  const ContactPair& pair = pairs_[at(t.pair)];
+  const ContactPair& pair = t.pair;
   const Frozen& frozen = frozen_[at(t.frozen)];
   double now[kContactUnknowns], before[kContactUnknowns];
-  values_at(pair, q1_, now);
-  values_at(pair, state_->q, before);
+  bodies().values(pair, q1_, now);
+  bodies().values(pair, state_->q, before);
   Vec3d slip = -frozen.drift;
   for (int i = 0; i < kContactUnknowns; ++i)
     slip += (now[i] - before[i]) * Vec3d{frozen.slip[0][i], frozen.slip[1][i], frozen.slip[2][i]};
@@ -190,13 +174,13 @@ Vec3d Contact::frozen_slip(const Touching& t) const {
 }
 
 Contact::Slipping Contact::frozen_slipping(const Touching& t, const VectorX& change) const {
-  const ContactPair& pair = pairs_[at(t.pair)];
+  const ContactPair& pair = t.pair;
   const Frozen& frozen = frozen_[at(t.frozen)];
   Slipping out;
   out.limit = pair.friction * frozen.pressing;
   out.slip = frozen_slip(t);
   int dofs[kContactUnknowns];
-  unknowns_of(pair, dofs);
+  surfaces_.unknowns(pair, dofs);
   for (int i = 0; i < kContactUnknowns; ++i)
     if (dofs[i] >= 0) out.change += change(dofs[i]) * Vec3d{frozen.slip[0][i], frozen.slip[1][i], frozen.slip[2][i]};
   out.law = tanh_law(pair.friction, frozen.pressing, dot(out.slip, out.slip), slip_rate());
@@ -204,12 +188,12 @@ Contact::Slipping Contact::frozen_slipping(const Touching& t, const VectorX& cha
 }
 
 Contact::Slipping Contact::slipping(const Touching& t, const VectorX& change) const {
-  const ContactPair& pair = pairs_[at(t.pair)];
+  const ContactPair& pair = t.pair;
   const FrictionSetting f = setting(t);
   int dofs[kContactUnknowns];
-  unknowns_of(pair, dofs);
+  surfaces_.unknowns(pair, dofs);
   double now[kContactUnknowns];
-  values_at(pair, q1_, now);
+  bodies().values(pair, q1_, now);
   Dual<1> unknown[kContactUnknowns];
   for (int i = 0; i < kContactUnknowns; ++i) {
     unknown[i] = now[i];
@@ -226,27 +210,26 @@ Contact::Slipping Contact::slipping(const Touching& t, const VectorX& change) co
 }
 
 void Contact::foresee_friction(const VectorX& change) {
-  if (!frictional_ || model_.description.contact.friction_law == FrictionLaw::semi_explicit) return;
-  if (eases() && farthest(change) * slip_rate() < kShortWay) {
+  if (!frictional() || model_.description.contact.friction_law == FrictionLaw::semi_explicit) return;
+  if (eases() && farthest(model_, change) * slip_rate() < kShortWay) {
     forget_foreseen();
     return;
   }
-  update(q1_);  // pairs may have been found anew since
-  next_foreseen_.assign(pairs_.size(), {});
-  for (const Touching& t : touching_) {
-    const bool frozen = t.frozen >= 0;
-    if (frozen != freezes() || !(pairs_[at(t.pair)].friction > 0.0)) continue;
-    const Slipping s = frozen ? frozen_slipping(t, change) : slipping(t, change);
-    if (s.limit > 0.0) next_foreseen_[at(t.pair)] = s.law.foresee(s.slip, s.change, foreseen(t), s.limit);
-  }
-  foreseen_.swap(next_foreseen_);
+  foreseen_.renew([&](const auto& add) {
+    for (const Touching& t : touching_) {
+      const bool frozen = t.frozen >= 0;
+      if (frozen != freezes() || !(t.pair.friction > 0.0)) continue;
+      const Slipping s = frozen ? frozen_slipping(t, change) : slipping(t, change);
+      if (s.limit > 0.0) add(t.pair.key, s.law.foresee(s.slip, s.change, foreseen(t), s.limit));
+    }
+  });
 }
 
 /// The direction of slip at the start, and how much of friction there is at its speed, tanh(K u / 2) [Choi,
 /// dissertation, (4.12), (4.13), with the weight (5.10) in place of (4.14)].
 void Contact::set_direction(const ContactPair& pair, Frozen& frozen) const {
   double velocity[kContactUnknowns];
-  values_at(pair, state_->v, velocity);
+  bodies().values(pair, state_->v, velocity);
   Vec3d u = (-1.0 / duration_) * frozen.drift;
   for (int i = 0; i < kContactUnknowns; ++i)
     u += velocity[i] * Vec3d{frozen.slip[0][i], frozen.slip[1][i], frozen.slip[2][i]};
@@ -259,7 +242,7 @@ void Contact::set_direction(const ContactPair& pair, Frozen& frozen) const {
 /// the direction at the start, s = S . direction where that is positive: constant while surfaces slip on, and nothing
 /// where they would slip back, so that it never pushes them.
 Contact::FrozenForce Contact::frozen_force(const Touching& t) const {
-  const ContactPair& pair = pairs_[at(t.pair)];
+  const ContactPair& pair = t.pair;
   const Frozen& frozen = frozen_[at(t.frozen)];
   const ContactDescription& contact = model_.description.contact;
   const double rate = slip_rate(), limit = pair.friction * frozen.pressing;
@@ -291,7 +274,7 @@ Contact::FrozenForce Contact::frozen_force(const Touching& t) const {
 void Contact::record_frozen(std::vector<ContactRecord>& records) const {
   for (const Touching& t : touching_) {
     if (t.frozen < 0) continue;
-    ContactRecord* record = find_record(records, pairs_[at(t.pair)].key);
+    ContactRecord* record = find_record(records, t.pair.key);
     if (record == nullptr) continue;
     const FrozenForce f = frozen_force(t);
     record->friction = -f.force;

@@ -39,10 +39,10 @@ double Contact::energy() const {
   for (const Touching& t : touching_) {
     if (t.frozen >= 0) continue;
     sum += t.energy.value;
-    const ContactPair& pair = pairs_[at(t.pair)];
+    const ContactPair& pair = t.pair;
     if (contact.friction_law != FrictionLaw::anchored || !(pair.friction > 0.0)) continue;
     double now[kContactUnknowns], unused[kContactUnknowns] = {};
-    values_at(pair, q1_, now);
+    bodies().values(pair, q1_, now);
     const FrictionSetting f = setting(t);
     const FrictionForce<double> anchor = friction_gradient(f, now, unused);
     sum += 0.5 * dot(anchor.force, anchor.stick);
@@ -83,7 +83,7 @@ double Contact::pressing_gain(const VectorX& change) const {
 bool Contact::add_friction_alone(const Touching& t, ContactLocal& out) const {
   if (t.frozen >= 0)
     add_frozen_friction(t, false, out);
-  else if (!freezes() && pairs_[at(t.pair)].friction > 0.0)
+  else if (!freezes() && t.pair.friction > 0.0)
     add_friction(t, false, out);
   else
     return false;
@@ -91,7 +91,7 @@ bool Contact::add_friction_alone(const Touching& t, ContactLocal& out) const {
 }
 
 void Contact::friction_force(VectorX& out) const {
-  if (!frictional_) return;
+  if (!frictional()) return;
   out.setZero(model_.dof_count);
   for (int i = 0; i < count(); ++i) {
     ContactLocal local{};
@@ -104,10 +104,10 @@ void Contact::friction_force(VectorX& out) const {
 }
 
 double Contact::mean_friction_loss(const VectorX& change, const VectorX& start, const VectorX& end) const {
-  if (!frictional_ || start.size() != end.size()) return friction_loss(change);
+  if (!frictional() || start.size() != end.size()) return friction_loss(change);
   double loss = 0.5 * (start.dot(change) + end.dot(change));
   for (const Touching& t : touching_) {
-    const ContactPair& pair = pairs_[at(t.pair)];
+    const ContactPair& pair = t.pair;
     if (!(pair.friction > 0.0)) continue;
     if (!shift_.empty() || !turn_.empty()) {
       ContactLocal local{};
@@ -138,7 +138,7 @@ double Contact::friction_loss(const VectorX& change) const {
 double Contact::depth() const {
   double deepest = 0.0;
   for (const Touching& t : touching_) {
-    const ContactPair& pair = pairs_[at(t.pair)];
+    const ContactPair& pair = t.pair;
     if (t.frozen < 0) deepest = std::max(deepest, depth_of(pair, t));
   }
   return deepest;
@@ -154,25 +154,25 @@ double Contact::rounding(int i, double reach) const {
 /// to store as much as before, in an impact; or, where energy does not count, the former, but not so much that surfaces
 /// could sink into each other for good.
 double Contact::yielded_at(const Touching& t, double ratio, Keep keep) const {
-  const ContactPair& pair = pairs_[at(t.pair)];
+  const ContactPair& pair = t.pair;
   const bool force = keep == Keep::force || t.approach == 0.0;
   const double wanted = (force ? -t.energy.first : t.energy.value) / (t.stiffness * ratio);
-  double low = t.distance + t.yielded, high = pair.reach();
+  double low = t.proximity.distance + t.yielded, high = pair.reach();
   for (int k = 0; k < 60; ++k) {
     const double middle = 0.5 * (low + high);
     const ContactEnergy e = contact_energy(t.law.law, middle, pair.radii(), pair.tolerance);
     ((force ? -e.first : e.value) > wanted ? low : high) = middle;
   }
-  if (keep == Keep::energy) return high - t.distance;
-  return std::min(low - t.distance, kMostYield * pair.small_radius());
+  if (keep == Keep::energy) return high - t.proximity.distance;
+  return std::min(low - t.proximity.distance, kMostYield * pair.small_radius());
 }
 
 /// Gives a contact another stiffness, and another depth that presses no more. Anchors that become stiffer keep their
 /// force, others their energy, and so their elastic slip changes. Returns the energy put in.
 double Contact::change_stiffness(const Touching& t, double ratio, double yielded, ContactRecord& record) const {
-  const ContactPair& pair = pairs_[at(t.pair)];
-  const double energy =
-      ratio * t.stiffness * contact_energy(t.law.law, t.distance + yielded, pair.radii(), pair.tolerance).value;
+  const ContactPair& pair = t.pair;
+  const double energy = ratio * t.stiffness *
+                        contact_energy(t.law.law, t.proximity.distance + yielded, pair.radii(), pair.tolerance).value;
   const double shorter = ratio > 1.0 ? 1.0 / ratio : 1.0 / std::sqrt(ratio);
   const double put_in =
       energy - t.energy.value - 0.5 * dot(record.friction, record.stick) * (ratio * shorter * shorter - 1.0);
@@ -184,18 +184,18 @@ double Contact::change_stiffness(const Touching& t, double ratio, double yielded
 
 /// What has yielded wears off where surfaces that separate press no more, without work.
 double Contact::worn(const Touching& t) const {
-  return std::clamp(pairs_[at(t.pair)].reach() - t.distance, 0.0, t.yielded);
+  return std::clamp(t.pair.reach() - t.proximity.distance, 0.0, t.yielded);
 }
 
 /// And fades where it is deep and surfaces rest, which takes work.
 double Contact::faded(const Touching& t) const {
-  const double lasting = kLastingYield * pairs_[at(t.pair)].small_radius();
+  const double lasting = kLastingYield * t.pair.small_radius();
   const double left = t.yielded > lasting ? lasting + kFading * (t.yielded - lasting) : t.yielded;
   return std::min(worn(t), left);
 }
 
 double Contact::wanted_ratio(const Touching& t, const ContactRecord& record) const {
-  const ContactPair& pair = pairs_[at(t.pair)];
+  const ContactPair& pair = t.pair;
   if (fixed(pair)) return 1.0;
   const double wanted = wanted_stiffness(pair, record.force);
   if (wanted > record.stiffness) return kAhead * wanted / record.stiffness;
@@ -218,12 +218,12 @@ double Contact::source_stiffness() const {
     for (int k = 0; k < 12; ++k)
       if (dofs[k] >= 0) force(dofs[k]) += local.gradient[k];
   }
-  return kSource * farthest(force);
+  return kSource * farthest(model_, force);
 }
 
 void Contact::record_friction(const Touching& t, ContactRecord& record) const {
   double now[kContactUnknowns], unused[kContactUnknowns] = {};
-  values_at(pairs_[at(t.pair)], q1_, now);
+  bodies().values(t.pair, q1_, now);
   const FrictionForce<double> f = friction_gradient(setting(t), now, unused);
   record.stick = f.stick;
   record.friction = -f.force;
@@ -231,7 +231,7 @@ void Contact::record_friction(const Touching& t, ContactRecord& record) const {
 }
 
 ContactRecord Contact::record(const Touching& t) const {
-  const ContactPair& pair = pairs_[at(t.pair)];
+  const ContactPair& pair = t.pair;
   ContactRecord record;
   record.key = pair.key;
   record.force = -t.energy.first;
@@ -242,7 +242,7 @@ ContactRecord Contact::record(const Touching& t) const {
     record.approach = t.approach;
     record.age = coming ? 0.0 : t.age + duration_;
   }
-  if (frictional_ && !freezes() && pair.friction > 0.0) record_friction(t, record);
+  if (frictional() && !freezes() && pair.friction > 0.0) record_friction(t, record);
   return record;
 }
 
@@ -256,8 +256,8 @@ void Contact::keep(std::vector<ContactRecord>& records, State& state) const {
 void Contact::remember(State& state) const {
   std::vector<ContactRecord> records;
   for (const Touching& t : touching_) {
-    const ContactPair& pair = pairs_[at(t.pair)];
-    if (t.frozen >= 0 || t.distance >= pair.reach()) continue;
+    const ContactPair& pair = t.pair;
+    if (t.frozen >= 0 || t.proximity.distance >= pair.reach()) continue;
     records.push_back(record(t));
     if (record_of(pair.key) == nullptr) records.back().stiffness = start_stiffness(pair, state.contact_stiffness);
   }
@@ -277,8 +277,8 @@ double Contact::accept(State& state, Keep keep, double spare) {
   VectorX greatest = least_stiffness_;
   double put_in = 0.0, wanted = 0.0;
   for (const Touching& t : touching_) {
-    const ContactPair& pair = pairs_[at(t.pair)];
-    if (t.frozen >= 0 || t.distance >= pair.reach()) continue;
+    const ContactPair& pair = t.pair;
+    if (t.frozen >= 0 || t.proximity.distance >= pair.reach()) continue;
     ContactRecord record = this->record(t);
     const double ratio = source && !fixed(pair) ? common / record.stiffness : wanted_ratio(t, record);
     if (ratio > 1.0) {
@@ -314,7 +314,7 @@ double Contact::stiffen(State& state, Keep keep) {
   };
   std::vector<Deep> deep;
   for (const Touching& t : touching_) {
-    const ContactPair& pair = pairs_[at(t.pair)];
+    const ContactPair& pair = t.pair;
     const double depth = depth_of(pair, t);
     if (t.frozen < 0 && depth > 2.0 * kDepth) deep.push_back({pair, std::min(100.0, depth / kDepth), t.stiffness});
   }
@@ -322,9 +322,8 @@ double Contact::stiffen(State& state, Keep keep) {
   double put_in = 0.0;
   for (const auto& [pair, factor, stiffness] : deep) {
     ContactRecord* record = find_record(state.contacts, pair.key);
-    const auto pressed = std::find_if(touching_.begin(), touching_.end(), [&, &key = pair.key](const Touching& s) {
-      return pairs_[at(s.pair)].key == key;
-    });
+    const auto pressed = std::find_if(touching_.begin(), touching_.end(),
+                                      [&, &key = pair.key](const Touching& s) { return s.pair.key == key; });
     if (const ContactRecord* renewed = find_record(renewed_, pair.key)) {
       const auto place = std::lower_bound(state.contacts.begin(), state.contacts.end(), *renewed, by_key);
       if (record)
@@ -385,24 +384,24 @@ std::vector<ContactReport> Contact::report(const State& state, const Parameters&
   look_at(state, parameters);
   std::vector<ContactReport> reports;
   for (const Touching& t : touching_) {
-    const ContactPair& pair = pairs_[at(t.pair)];
+    const ContactPair& pair = t.pair;
     ContactReport r;
     r.key = pair.key;
-    r.distance = t.distance;
-    r.gap = t.distance - pair.radii();
-    r.s = t.points.s;
-    r.t = t.points.t;
-    r.normal = t.normal;
+    r.distance = t.proximity.distance;
+    r.gap = t.proximity.distance - pair.radii();
+    r.s = t.proximity.points.s;
+    r.t = t.proximity.points.t;
+    r.normal = t.proximity.normal;
     r.force = -t.energy.first;
     Vec3d x[4];
-    end_points(pair, state.q, x);
+    bodies().end_points(pair, state.q, x);
     Vec3d on_a = x[0] + r.s * (x[1] - x[0]);
     if (pair.curve()) {
-      on_a = curve_point(*pair.piece.weights, x, t.points.s);
+      on_a = curve_point(*pair.piece.weights, x, t.proximity.points.s);
       r.key.a = pair.piece.edge[pair.piece.weights->edges > 1 && r.s > 0.0];
-      r.s = pair.piece.weights->along(t.points.s);
+      r.s = pair.piece.weights->along(t.proximity.points.s);
     }
-    r.point = on_a - (pair.radius_a + 0.5 * r.gap) * t.normal;
+    r.point = on_a - (pair.radius_a + 0.5 * r.gap) * t.proximity.normal;
     if (const ContactRecord* record = record_of(pair.key)) {
       r.friction = record->friction;
       r.sticking = record->sticking;
@@ -414,15 +413,11 @@ std::vector<ContactReport> Contact::report(const State& state, const Parameters&
 
 void Contact::forget() {
   current_ = false;
-  pairs_ = surfaces_.obstacle_pairs();
-  elements_.clear();
-  reference_.resize(0);
-  bounds_.clear();
+  candidates_.forget();
   touching_.clear();
   lagged_.clear();
   leaving_.clear();
   q1_.resize(0);
-  couple();
 }
 
 }  // namespace withe

@@ -67,12 +67,12 @@ bool Contact::met(const ContactPair& pair) const {
 }
 
 /// Whether no more than the tail of the contact law presses the surfaces.
-bool Contact::apart(const Touching& t) const { return t.distance + t.yielded >= pairs_[at(t.pair)].radii(); }
+bool Contact::apart(const Touching& t) const { return t.proximity.distance + t.yielded >= t.pair.radii(); }
 
 /// Notes which surfaces near each other anew as the step begins, of those that touch by then.
 void Contact::renew_impacts() {
   for (Touching& t : touching_) {
-    const ContactPair& pair = pairs_[at(t.pair)];
+    const ContactPair& pair = t.pair;
     ContactRecord record;
     if (const ContactRecord* known = find_record(state_->contacts, pair.key)) {
       if (known->approach == 0.0) continue;  // they rest until they have left each other
@@ -95,10 +95,10 @@ void Contact::renew_impacts() {
 /// impact, which is on its way in while its age is 0: for it contact is as stiff as if it only began, without a change
 /// of energy.
 bool Contact::renew_impact(Touching& t, ContactRecord& record) const {
-  const ContactPair& pair = pairs_[at(t.pair)];
+  const ContactPair& pair = t.pair;
   double speed = approach_speed(pair);
   if (record.approach == 0.0) {
-    const double given = 0.5 * speed * speed + gravity_ * std::max(t.distance - pair.radii(), 0.0);
+    const double given = 0.5 * speed * speed + gravity_ * std::max(t.proximity.distance - pair.radii(), 0.0);
     if (!(t.energy.value < pair.share * mass_of(pair) * given)) return false;
     speed = std::max(speed, kLeastApproach * rest_speed(pair));
   } else {
@@ -123,7 +123,7 @@ double Contact::first_approach(const ContactPair& pair) const {
 /// At which surfaces near each other as the step begins.
 double Contact::approach_speed(const ContactPair& pair) const {
   Vec3d x[4], v[4];
-  end_points(pair, state_->v, v);
+  bodies().end_points(pair, state_->v, v);
   const Vec3d shift = shift_of(pair), moved = (1.0 / duration_) * shift;
   if (pair.curve()) {
     const CurveSlopes slopes = curve_slopes(pair.piece, distance_at_start(pair, x));
@@ -131,7 +131,7 @@ double Contact::approach_speed(const ContactPair& pair) const {
     for (int i = 0; i < 3 * pair.piece.weights->nodes; ++i) rate += slopes.distance[i] * (v[i / 3] - moved)[i % 3];
     return std::max(0.0, -rate);
   }
-  end_points(pair, state_->q, x);
+  bodies().end_points(pair, state_->q, x);
   if (pair.key.b < 0) {
     x[2] -= shift;
     x[3] -= shift;
@@ -149,7 +149,7 @@ double Contact::approach_speed(const ContactPair& pair) const {
 double Contact::start_distance(const ContactPair& pair) const {
   Vec3d x[4];
   if (pair.curve()) return distance_at_start(pair, x).distance;
-  end_points(pair, state_->q, x);
+  bodies().end_points(pair, state_->q, x);
   const Vec3d shift = shift_of(pair);
   x[2] -= shift;
   x[3] -= shift;
@@ -159,26 +159,26 @@ double Contact::start_distance(const ContactPair& pair) const {
 /// The same of the points that are the closest at its end, D0 of `add_mean_pressing`.
 double Contact::distance_before(const ContactPair& pair, const Touching& t) const {
   double w[4];
-  end_weights(t.points.s, t.points.t, w);
+  end_weights(t.proximity.points.s, t.proximity.points.t, w);
   Vec3d start[4], d0{};
-  end_points(pair, state_->q, start);
-  const Vec3d shift = shift_of(pair), &d1 = t.points.between;
+  bodies().end_points(pair, state_->q, start);
+  const Vec3d shift = shift_of(pair), &d1 = t.proximity.points.between;
   start[2] -= shift;
   start[3] -= shift;
   for (int i = 0; i < 4; ++i) d0 += w[i] * start[i];
-  return std::sqrt(std::max(dot(d0, d0) + t.distance * t.distance - dot(d1, d1), 0.0));
+  return std::sqrt(std::max(dot(d0, d0) + t.proximity.distance * t.proximity.distance - dot(d1, d1), 0.0));
 }
 
 /// Sets what a contact remembers, its energy at q1 and its force.
 void Contact::set_force(Touching& t, const ContactRecord* record) const {
-  const ContactPair& pair = pairs_[at(t.pair)];
+  const ContactPair& pair = t.pair;
   t.stiffness = pair.share * (record ? record->stiffness : first_stiffness(pair));
   t.yielded = record ? record->yielded : 0.0;
   t.approach = record ? record->approach : first_approach(pair);
   t.age = record ? record->age : 0.0;
   if (record) t.stick = record->stick;
   t.law = {model_.description.contact.law, pair.radii(), pair.tolerance, t.stiffness, t.yielded};
-  t.energy = t.law.energy(t.distance);
+  t.energy = t.law.energy(t.proximity.distance);
   t.energy.value *= t.stiffness;
   t.energy.first *= t.stiffness;
   t.energy.second *= t.stiffness;
@@ -192,7 +192,7 @@ void Contact::set_force(Touching& t, const ContactRecord* record) const {
   t.law.parting = kParting * std::max(t.law.restitution, kLeastParting) * t.approach * duration_;
   if (t.law.elastic == 0.0 && !(t.law.restitution < 1.0)) return;
   t.before = turns(pair) ? distance_before(pair, t) : start_distance(pair);
-  t.pressing = t.law.at(t.before, t.distance);
+  t.pressing = t.law.at(t.before, t.proximity.distance);
 }
 
 /// Adds what touches at the start of the step only, and gives back there what it took; `first`: of `touching_` behind
@@ -202,19 +202,19 @@ void Contact::add_leaving(std::size_t first) {
   for (const Touching& start : leaving_) {
     const auto from = touching_.begin() + static_cast<std::ptrdiff_t>(first);  // adding to them moves them
     const auto end = touching_.begin() + static_cast<std::ptrdiff_t>(count);
-    const auto found =
-        std::lower_bound(from, end, start.pair, [](const Touching& t, int pair) { return t.pair < pair; });
-    if (found != end && found->pair == start.pair) continue;
-    Touching t = touch(pairs_[at(start.pair)], q1_, true);
-    t.pair = start.pair;
-    set_force(t, record_of(pairs_[at(t.pair)].key));
+    const auto found = std::lower_bound(from, end, start.pair.key, [](const Touching& t, const ContactKey& key) {
+      return comes_before(t.pair.key, key);
+    });
+    if (found != end && found->pair.key == start.pair.key) continue;
+    Touching t{start.pair, bodies().proximity(start.pair, q1_, true)};
+    set_force(t, record_of(t.pair.key));
     touching_.push_back(t);
   }
 }
 
 bool Contact::unresolved(double dt) const {
   return std::any_of(touching_.begin(), touching_.end(), [&](const Touching& t) {
-    const ContactPair& pair = pairs_[at(t.pair)];
+    const ContactPair& pair = t.pair;
     if (t.frozen >= 0 || !(t.law.restitution < 1.0)) return false;
     const double swing = swing_time(pair, t);
     return t.age < kResolvedSwings * swing && steps_in_swing(pair.restitution) * dt > swing;
@@ -226,21 +226,21 @@ bool Contact::unresolved(double dt) const {
 bool Contact::turns(const ContactPair& pair) const {
   if (pair.curve()) return false;
   if (pressing_ == Pressing::mean_direction) return true;
-  return pressing_ == Pressing::mean && pair.key.b >= 0 && (!frictional_ || unsymmetric());
+  return pressing_ == Pressing::mean && pair.key.b >= 0 && (!frictional() || unsymmetric());
 }
 
 CurveDistance<double> Contact::distance_at_start(const ContactPair& pair, Vec3d (&x)[4]) const {
-  end_points(pair, state_->q, x);
-  return curve_distance(pair.piece, obstacle_of(pair), x, shift_of(pair));
+  bodies().end_points(pair, state_->q, x);
+  return curve_distance(pair.piece, bodies().obstacle(pair), x, shift_of(pair));
 }
 
 /// What surfaces that press do.
 void Contact::press(const Touching& t, bool with_hessian, ContactLocal& out) const {
-  if (pairs_[at(t.pair)].curve()) {
+  if (t.pair.curve()) {
     add_curve_pressing(t, with_hessian, out);
     return;
   }
-  if (!turns(pairs_[at(t.pair)])) {
+  if (!turns(t.pair)) {
     add_pressing(t, with_hessian, out);
     return;
   }
@@ -254,11 +254,11 @@ void Contact::press(const Touching& t, bool with_hessian, ContactLocal& out) con
 
 /// Along the gradient of D at the end of the step.
 void Contact::add_pressing(const Touching& t, bool with_hessian, ContactLocal& out) const {
-  const ContactPair& pair = pairs_[at(t.pair)];
+  const ContactPair& pair = t.pair;
   double w[4], g[12];
-  end_weights(t.points.s, t.points.t, w);
+  end_weights(t.proximity.points.s, t.proximity.points.t, w);
   // dD = sum w_i (between / D) . dx_i: |between| differs from D by the weights of closest_points.
-  const Vec3d direction = (1.0 / t.distance) * t.points.between;
+  const Vec3d direction = (1.0 / t.proximity.distance) * t.proximity.points.between;
   const double n[3] = {direction.x, direction.y, direction.z};
   for (int i = 0; i < 12; ++i) {
     g[i] = w[i / 3] * n[i % 3];
@@ -266,10 +266,10 @@ void Contact::add_pressing(const Touching& t, bool with_hessian, ContactLocal& o
   }
   if (!with_hessian) return;
   Vec3d x[4];
-  end_points(pair, q1_, x);
+  bodies().end_points(pair, q1_, x);
   double H[12][12];
-  half_square_hessian(t.points, x[1] - x[0], x[3] - x[2], pair.weight_a, pair.weight_b, H);
-  const double turn = geometric_ ? t.pressing.first / t.distance : 0.0;
+  half_square_hessian(t.proximity.points, x[1] - x[0], x[3] - x[2], pair.weight_a, pair.weight_b, H);
+  const double turn = geometric_ ? t.pressing.first / t.proximity.distance : 0.0;
   for (int i = 0; i < 12; ++i)
     for (int j = 0; j < 12; ++j) out.hessian[i][j] += turn * H[i][j] + (t.pressing.by_end - turn) * g[i] * g[j];
 }
@@ -279,10 +279,10 @@ void Contact::add_pressing(const Touching& t, bool with_hessian, ContactLocal& o
 /// which it does the work f (D1 - D0): where a ring rolls, the points that touch at the end came down onto the surface
 /// within the step, and their force alone would slow it.
 void Contact::add_curve_pressing(const Touching& t, bool with_hessian, ContactLocal& out) const {
-  const ContactPair& pair = pairs_[at(t.pair)];
-  const Obstacle& o = obstacle_of(pair);
+  const ContactPair& pair = t.pair;
+  const Obstacle& o = bodies().obstacle(pair);
   Vec3d x[4];
-  end_points(pair, q1_, x);
+  bodies().end_points(pair, q1_, x);
   const CurveDistance<double> end = curve_distance(pair.piece, o, x);
   const CurveSlopes slopes = curve_slopes(pair.piece, end);
   double along[9], hessian[9][9] = {};
@@ -333,33 +333,35 @@ void Contact::add_start_direction(const ContactPair& pair, const Vec3d (&x1)[4],
 /// that is never more than what the contact gave: pressing gains no energy, however far surfaces slide. And the force
 /// points along the way between the points in the middle of the step: it turns nothing there.
 void Contact::add_mean_pressing(const Touching& t, bool with_hessian, ContactLocal& out) const {
-  const ContactPair& pair = pairs_[at(t.pair)];
+  const ContactPair& pair = t.pair;
   double w[4];
-  end_weights(t.points.s, t.points.t, w);
+  end_weights(t.proximity.points.s, t.proximity.points.t, w);
   Vec3d x[4], start[4];
-  end_points(pair, q1_, x);
-  end_points(pair, state_->q, start);
-  const Vec3d shift = shift_of(pair), &d1 = t.points.between;
+  bodies().end_points(pair, q1_, x);
+  bodies().end_points(pair, state_->q, start);
+  const Vec3d shift = shift_of(pair), &d1 = t.proximity.points.between;
   start[2] -= shift;
   start[3] -= shift;
   Vec3d d0{};
   for (int i = 0; i < 4; ++i) d0 += w[i] * start[i];
-  const double before = std::sqrt(std::max(dot(d0, d0) + t.distance * t.distance - dot(d1, d1), 0.0));
-  const double sum = before + t.distance, force = t.pressing.first / sum;
+  const double before =
+      std::sqrt(std::max(dot(d0, d0) + t.proximity.distance * t.proximity.distance - dot(d1, d1), 0.0));
+  const double sum = before + t.proximity.distance, force = t.pressing.first / sum;
   const Vec3d mean = d0 + d1;
   for (int i = 0; i < 12; ++i) out.gradient[i] += force * w[i / 3] * mean[i % 3];
   if (!with_hessian) return;
   const Vec3d u = x[1] - x[0], v = x[3] - x[2], u0 = start[1] - start[0], v0 = start[3] - start[2];
   const double ws[4] = {-1, 1, 0, 0}, wt[4] = {0, 0, 1, -1};
   double K[2][2];
-  parameter_inverse(t.points.s_free, t.points.t_free, u, v, pair.weight_a, pair.weight_b, K);
+  parameter_inverse(t.proximity.points.s_free, t.proximity.points.t_free, u, v, pair.weight_a, pair.weight_b, K);
   for (int j = 0; j < 12; ++j) {
     const int n = j / 3, k = j % 3;
     const double by_s = ws[n] * d1[k] + w[n] * u[k], by_t = wt[n] * d1[k] - w[n] * v[k];
     const double ds = -K[0][0] * by_s - K[0][1] * by_t, dt = -K[1][0] * by_s - K[1][1] * by_t;
     const Vec3d moved0 = ds * u0 - dt * v0, moved1 = ds * u - dt * v;
-    const double spread = pair.weight_a * (t.points.s - 0.5) * ds + pair.weight_b * (t.points.t - 0.5) * dt;
-    const double distance = w[n] * d1[k] / t.distance;
+    const double spread =
+        pair.weight_a * (t.proximity.points.s - 0.5) * ds + pair.weight_b * (t.proximity.points.t - 0.5) * dt;
+    const double distance = w[n] * d1[k] / t.proximity.distance;
     const double earlier = (dot(d0, moved0) + spread) / before;
     const double change =
         (t.pressing.by_end * distance + t.pressing.by_start * earlier - force * (distance + earlier)) / sum;

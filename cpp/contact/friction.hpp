@@ -24,10 +24,6 @@
 
 namespace withe {
 
-/// Unknowns of a contact: a0, a1, b0, b1 (3 each), angle of a, angle of b; of a piece of a curve: its nodes (3 each),
-/// three that are none, the angles of its edges.
-inline constexpr int kContactUnknowns = 14;
-
 /// What stays the same while the unknowns of one contact change.
 struct FrictionSetting {
   const ContactPair* pair = nullptr;

@@ -13,11 +13,11 @@ void Equations::set_contact_end(const VectorX& z) {
 void Equations::find_contacts(const VectorX& z, bool with_matrix) {
   set_contact_end(z);
   contact_->update(contact_end_);
-  if (!with_matrix || contact_->coupled()) return;
-  contact_->couple();
+  if (!with_matrix || contact_rows_.hold(*contact_)) return;
+  contact_rows_.set(contact_->surfaces(), contact_->near());
   const int before = assembler_.generation();
-  assembler_.couple(contact_->element_unknowns(), kContactUnknowns);
-  if (assembler_.generation() != before) ordered_ = contact_->elements();
+  assembler_.couple(contact_rows_.unknowns(), kContactUnknowns);
+  if (assembler_.generation() != before) ordered_ = contact_rows_.keys();
 }
 
 /// Contact acts at the end of the step: its forces are those there, and its matrix counts twice where z is the middle.
@@ -38,7 +38,8 @@ void Equations::add_contacts(bool with_matrix, Evaluation& out) {
       contact_floor_[dofs[k]] += rounding;
     }
     if (with_matrix)
-      assembler_.contact.add_hessian(contact_->element(i), local.hessian, twice, assembler_.solver().values());
+      assembler_.contact.add_hessian(contact_rows_.row(contact_->key(i)), local.hessian, twice,
+                                     assembler_.solver().values());
   }
   gradient_.head(model_.dof_count) += contact_gradient_;
   if (has_potential_ && inner_ == Inner::end) out.potential += contact_->energy();

@@ -76,7 +76,7 @@ void Equations::couple_custom() {
   }
   const int before = assembler_.generation();
   assembler_.couple_groups(groups);
-  if (contact_ && assembler_.generation() != before) ordered_ = contact_->elements();
+  if (contact_ && assembler_.generation() != before) ordered_ = contact_rows_.keys();
 }
 
 void Equations::add_custom_matrix(const VectorX& z) {

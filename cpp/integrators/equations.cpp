@@ -52,8 +52,9 @@ Equations::Equations(const Model& model, const Options& options)
       static_duration_(options.time_step),
       explicit_(options.integrator == Integrator::verlet) {
   if (contact_) {
-    assembler_.couple(contact_->element_unknowns(), kContactUnknowns);
-    ordered_ = contact_->elements();
+    contact_rows_.set(contact_->surfaces(), contact_->near());
+    assembler_.couple(contact_rows_.unknowns(), kContactUnknowns);
+    ordered_ = contact_rows_.keys();
     if (contact_->frictional()) has_potential_ = false;
   }
   custom_force = VectorX::Zero(model.dof_count);

@@ -20,6 +20,7 @@
 #include "forces/custom_forces.hpp"
 #include "forces/resistive.hpp"
 #include "forces/stokeslets.hpp"
+#include "integrators/contact_rows.hpp"
 #include "integrators/options.hpp"
 #include "model/mass_matrix.hpp"
 #include "model/state.hpp"
@@ -195,6 +196,7 @@ class Equations {
   enum class Mark { none, set, passed };
   Mark mark_ = Mark::none;
   EquationsMemory at_mark_;
+  ContactRows contact_rows_;
   std::vector<ContactKey> ordered_;  ///< contacts for which the assembler has found its order of elimination
   double static_duration_ = 0;       ///< in which slip happens in statics [s]
   bool explicit_ = false;

@@ -8,13 +8,14 @@ namespace withe {
 
 void Equations::forget_contacts() {
   contact_->forget();
+  contact_rows_.set(contact_->surfaces(), contact_->near());
   order_for_contacts();
 }
 
 /// Finds an order of elimination for the contacts that are coupled now, and no others.
 void Equations::order_for_contacts() {
-  assembler_.order_for(contact_->element_unknowns(), kContactUnknowns);
-  ordered_ = contact_->elements();
+  assembler_.order_for(contact_rows_.unknowns(), kContactUnknowns);
+  ordered_ = contact_rows_.keys();
 }
 
 EquationsMemory Equations::memory(bool with_matrix) const {
@@ -33,7 +34,7 @@ void Equations::pass_mark() {
 void Equations::remember(EquationsMemory& out, bool with_matrix) const {
   if (contact_) {
     out.ordered = ordered_;
-    out.coupled = contact_->elements();
+    out.coupled = contact_rows_.keys();
   }
   out.groups = assembler_.groups();
   if (with_matrix) {
@@ -49,11 +50,11 @@ void Equations::remember(EquationsMemory& out, bool with_matrix) const {
 bool Equations::recall(const EquationsMemory& memory) {
   const bool regrouped = memory.groups != assembler_.groups();
   assembler_.set_groups(memory.groups);
-  if (contact_ && (regrouped || memory.ordered != ordered_ || memory.coupled != contact_->elements())) {
-    contact_->couple(memory.ordered);
+  if (contact_ && (regrouped || memory.ordered != ordered_ || memory.coupled != contact_rows_.keys())) {
+    contact_rows_.set(contact_->surfaces(), memory.ordered);
     if (regrouped || memory.ordered != ordered_) order_for_contacts();
-    contact_->couple(memory.coupled);
-    assembler_.couple(contact_->element_unknowns(), kContactUnknowns);
+    contact_rows_.set(contact_->surfaces(), memory.coupled);
+    assembler_.couple(contact_rows_.unknowns(), kContactUnknowns);
   }
   // A scene with other options or friction may have a matrix of another form.
   const std::span<double> values = assembler_.solver().values();

@@ -1,0 +1,74 @@
+#pragma once
+/// Which surfaces may touch, and how far an iterate may go.
+///
+/// A grid finds the pairs of edges that may come near on the way of an iterate, and beyond it by a margin; they are
+/// found again when a node leaves that. What touches, and how far an iterate may go, depends on where the bodies are
+/// and on nothing that came before: bounds of how far nodes must move to change either only let pairs be skipped.
+
+#include <vector>
+
+#include "contact/bodies.hpp"
+#include "contact/broad_phase.hpp"
+
+namespace withe {
+
+class Candidates {
+ public:
+  Candidates(const Model& model, const Surfaces& surfaces);
+
+  /// Rods, and obstacles where they were placed last.
+  const Bodies& bodies() const { return bodies_; }
+  void place(const std::vector<ObstaclePlace>& places) { moved_ += 2.0 * bodies_.place(places); }
+
+  /// Calls add(pair, proximity) for all that is within reach at q: obstacles' pairs first, then others, sorted by key.
+  template <class Add>
+  void find(const VectorX& q, const Add& add) {
+    reach(q);
+    for (std::size_t p = 0; p < pairs_.size(); ++p) {
+      if (bounds_[p].clear > moved_) continue;
+      const Proximity proximity = bodies_.proximity(pairs_[p], q);
+      set_bounds(proximity.distance, p);
+      if (proximity.distance < pairs_[p].reach()) add(pairs_[p], proximity);
+    }
+  }
+  /// How much of a change of q may be made before centrelines come too close, from 0 to 1.
+  double allowed(const VectorX& q, const VectorX& change);
+  /// Whether an obstacle that moves by its `shift` would pass through a rod that stays at q.
+  bool blocked(const VectorX& q, const std::vector<Vec3d>& shift) const;
+  /// What is within reach and half of its radii at q, sorted by key, whatever the candidates are; and all obstacles'
+  /// pairs. Empty q: these alone.
+  std::vector<ContactKey> near(const VectorX& q);
+  /// Without what was found before.
+  void forget();
+
+ private:
+  struct Bounds {
+    double clear = -1.0;  ///< it touches nothing while `moved_` stays below [m]
+    double open = -1.0;   ///< nor do its centrelines come nearer than an iteration may bring them
+  };
+  void reach(const VectorX& q);
+  void set_bounds(double distance, std::size_t pair);
+  double way_from_last(const VectorX& q) const;
+  template <class More>
+  void set_boxes(const VectorX& from, const VectorX& to, const More& more);
+  void find_near(std::vector<ContactPair>& pairs);
+  void find_pairs(const VectorX& from, const VectorX& to);
+  bool outgrown(const VectorX& q, const VectorX* change) const;
+  double allowed_of(const ContactPair& pair, const VectorX& q, const VectorX* change, const Vec3d& shift) const;
+  double allowed_of_piece(const ContactPair& pair, const VectorX& q, const VectorX* change, const Vec3d& shift) const;
+
+  const Model& model_;
+  const Surfaces& surfaces_;
+  Bodies bodies_;
+  BroadPhase broad_phase_;
+  std::vector<Box> boxes_;
+  std::vector<ContactPair> pairs_;  ///< obstacles' first, then those of the broad phase, sorted by key
+  VectorX reference_;               ///< where the candidates belong
+  VectorX low_, high_;              ///< bounds of the way there
+  double margin_ = 0;
+  std::vector<Bounds> bounds_;  ///< per pair
+  VectorX last_;                ///< the last q
+  double moved_ = 0;            ///< farthest that a node may have gone, summed over all q so far [m]
+};
+
+}  // namespace withe
