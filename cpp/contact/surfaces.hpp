@@ -50,6 +50,7 @@ class Surfaces {
  public:
   explicit Surfaces(const Model& model);
 
+  const Model& model() const { return model_; }
   /// As they are drawn.
   const std::vector<Obstacle>& obstacles() const { return obstacles_; }
   /// Pairs with obstacles, one after the other: every edge, or piece of a curve, that has a surface, with every

@@ -21,16 +21,16 @@ void Equations::find_contacts(const VectorX& z, bool with_matrix) {
 }
 
 /// Contact acts at the end of the step: its forces are those there, and its matrix counts twice where z is the middle.
-void Equations::add_contacts(bool with_matrix, Evaluation& out) {
+void Equations::add_contacts(bool with_matrix, const ContactLinearisation& linearisation, Evaluation& out) {
   contact_gradient_.setZero(model_.dof_count);
   contact_floor_.setZero(model_.dof_count);
   const double twice = end_rate();
   ContactLocal local;
   int dofs[kContactUnknowns];
   for (int i = 0; i < contact_->count(); ++i) {
-    contact_->local(i, with_matrix, local);
+    contact_->local(i, with_matrix, local, linearisation);
     contact_->unknowns(i, dofs);
-    const double rounding = contact_->rounding(i, reach_);
+    const double rounding = contact_->rounding(i, reach_, linearisation);
     for (int k = 0; k < kContactUnknowns; ++k) {
       if (dofs[k] < 0) continue;
       contact_gradient_[dofs[k]] += local.gradient[k];
@@ -52,10 +52,10 @@ double Equations::allowed(const VectorX& z, const VectorX& step) {
   return contact_->allowed(contact_end_, contact_change_);
 }
 
-void Equations::foresee(const VectorX& step, double kept) {
+void Equations::predict_friction(const VectorX& step, double kept, ContactLinearisation& linearisation) {
   if (!contact_) return;
   contact_change_ = (end_rate() / kept) * step;
-  contact_->foresee_friction(contact_change_);
+  contact_->predict_friction(contact_change_, linearisation);
 }
 
 double Equations::contact_loss(const VectorX& change, double obstacle_work) const {

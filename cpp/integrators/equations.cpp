@@ -113,7 +113,8 @@ void Equations::set_strain_rates() {
   if (!energy_momentum_) add_viscosity();
 }
 
-void Equations::evaluate(const VectorX& z, bool with_matrix, const double* axial_force, Evaluation& out) {
+void Equations::evaluate(const VectorX& z, bool with_matrix, const double* axial_force, Evaluation& out,
+                         const ContactLinearisation& contact) {
   out.potential = 0.0;
   gradient_.setZero(model_.dof_count + kPadding);
   magnitude_.setZero(model_.dof_count + kPadding);
@@ -141,7 +142,7 @@ void Equations::evaluate(const VectorX& z, bool with_matrix, const double* axial
   add_loads(z, with_matrix, out);
   if (respond && with_matrix) add_custom_matrix(z);
   if (!resistance_.empty() && h_ != 0.0) add_resistance(z, with_matrix);
-  if (contact_) add_contacts(with_matrix, out);
+  if (contact_) add_contacts(with_matrix, contact, out);
   if (h_ != 0.0 && inner_ == Inner::end && !model_.planar()) add_spin_couple(z);
   add_step(z, with_matrix, out);
   assembler_.project(out.residual);

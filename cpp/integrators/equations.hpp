@@ -8,7 +8,7 @@
 /// replaces grad V by a discrete gradient between q0 and q1 = 2 z - q0:
 ///   stretching: EA (eps0 + eps1) / 2 (e0 + e1) / (|e0| + |e1|)   [Simo, Tarnow and Doblare 1995];
 ///   bending, twisting: moments whose work is what the energy changes by, see elasticity/discrete_gradient.hpp;
-///   surfaces that press: along the mean of the ways between them, see Contact::add_mean_pressing.
+///   surfaces that press: along the mean of the ways between them, see contact/pressing.cpp.
 
 #include <memory>
 #include <string>
@@ -70,8 +70,8 @@ class Equations {
   void forget_contacts();
   /// How much of a step of z contact allows, from 0 to 1.
   double allowed(const VectorX& z, const VectorX& step);
-  /// Tells contact of a step of Newton's method from where it was last evaluated, of which `kept` is left.
-  void foresee(const VectorX& step, double kept);
+  /// Predicts the friction of a step of Newton's method from the last evaluation, of which `kept` is left.
+  void predict_friction(const VectorX& step, double kept, ContactLinearisation& linearisation);
 
   /// Prepares a step from `state` over h (0: statics). Copies what it needs but the state itself, which
   /// must outlive the step.
@@ -104,8 +104,10 @@ class Equations {
   /// What it was at the mark; nothing where it has not changed since.
   const EquationsMemory* since_mark() const { return mark_ == Mark::passed ? &at_mark_ : nullptr; }
 
-  /// Residual at z, and the matrix when asked for. `axial_force`: see stretch_hessian.
-  void evaluate(const VectorX& z, bool with_matrix, const double* axial_force, Evaluation& out);
+  /// Residual at z, and the matrix when asked for. `axial_force`: see stretch_hessian. `contact`: how Newton's method
+  /// takes it.
+  void evaluate(const VectorX& z, bool with_matrix, const double* axial_force, Evaluation& out,
+                const ContactLinearisation& contact = {});
   /// Of an explicit step from `state` to q: the configuration there, and that of `next`. Returns by how much edges turn
   /// at most [rad]; in a plane 0.
   double advance(const State& state, const VectorX& q, State& next);
@@ -167,7 +169,7 @@ class Equations {
   void remember(EquationsMemory& out, bool with_matrix) const;
   void pass_mark();
   void find_contacts(const VectorX& z, bool with_matrix);
-  void add_contacts(bool with_matrix, Evaluation& out);
+  void add_contacts(bool with_matrix, const ContactLinearisation& linearisation, Evaluation& out);
   void add_elastic(const ElasticCoefficients& k, const VectorX& z, bool with_matrix, const double* axial_force,
                    Evaluation& out);
   void add_other_elastic(const ElasticCoefficients& k, const VectorX& z, bool with_matrix, const double* axial_force,

@@ -80,7 +80,7 @@ class InnerSolve {
         work_(work),
         history_(work.newton.guesses),
         frictional_(equations.contact() && equations.contact()->frictional()),
-        regularised_(frictional_ && equations.contact()->eases()),
+        regularised_(frictional_ && equations.contact()->regularises()),
         circling_(plan.rule == StepRule::energy_momentum),
         mixed_(!circling_ || history_.plain_solves == 0),
         points_(predictor.points(plan.slot)) {
@@ -199,13 +199,13 @@ class InnerSolve {
       } else {
         last = work_.z;
       }
-      equations_.contact()->ease(kRegularisation[k]);
-      found = newton_.solve(equations_, work_.z, {.max_iterations = kMostOfEach, .mixed = mixed_, .interval = h_},
-                            work_.newton);
+      found = newton_.solve(
+          equations_, work_.z,
+          {.max_iterations = kMostOfEach, .mixed = mixed_, .interval = h_, .regularisation = kRegularisation[k]},
+          work_.newton);
       spent += found.iterations;
       if (!found.converged) break;
     }
-    equations_.contact()->ease(1.0);
     found.iterations = spent;
     return found;
   }

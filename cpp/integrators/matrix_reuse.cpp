@@ -30,7 +30,7 @@ MatrixReuse::MatrixReuse(MatrixRecord& record, Equations& equations, double inte
       interval_(std::abs(interval)),
       allowed_(allowed),
       tolerance_(tolerance),
-      slipping_(equations.contact() && equations.contact()->eases()) {
+      slipping_(equations.contact() && equations.contact()->regularises()) {
   if (!allowed)
     drop();
   else if (record.belongs_to(equations, interval) && record.generation == equations.assembler().generation()) {

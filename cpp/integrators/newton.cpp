@@ -100,7 +100,11 @@ class Newton::Solve {
         mixed_(how.mixed && newton.options_.mixed),
         reuse_(work.matrix, equations, how.interval, how.interval != 0.0 && !line_search_,
                std::min(newton.options_.step_tolerance * newton.model_.length_scale, work.finest)),
-        axial_known_(mixed_ && (how.interval != 0.0 || how.predicted)) {}
+        axial_known_(mixed_ && (how.interval != 0.0 || how.predicted)) {
+    work.contact.regularisation = how.regularisation;
+    work.contact.geometric = true;
+    work.contact.friction.clear();
+  }
 
   NewtonResult run() {
     for (;; ++result_.iterations) {
@@ -112,7 +116,7 @@ class Newton::Solve {
         reuse_.note_end(result_.iterations);
       else
         reuse_.drop();
-      if (contact_) contact_->forget_foreseen();
+      work_.contact.friction.clear();
       return result_;
     }
   }
@@ -164,7 +168,7 @@ class Newton::Solve {
     search_.forget();
     if (!work_.step.allFinite()) return false;
     double shorten = search_.shortened(z_, work_.step);
-    system_.equations.foresee(work_.step, shorten);
+    system_.equations.predict_friction(work_.step, shorten, work_.contact);
     if (mixed_) system_.equations.predict_axial_force(work_.step, work_.axial_force);
     axial_known_ = mixed_;
     if (contact_ && !step_between_surfaces(shorten)) return false;

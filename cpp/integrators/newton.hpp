@@ -40,6 +40,7 @@ struct SolveOptions {
   double interval = 0;  ///< of a time step [s], whose matrix may serve several iterations and the steps to come; the
                         ///< mixed method then sets out from work.axial_force. 0: a new matrix every iteration
   bool give_up_if_cut = false;            ///< where the first step is `cut`
+  double regularisation = 1;              ///< by which friction's slip tolerance is greater, in a continuation
   const Prediction* predicted = nullptr;  ///< how z was found, if it was from another solution
 };
 

@@ -19,7 +19,7 @@ bool factorize(Equations& equations, NewtonWorkspace& work) {
 
 void NewtonSystem::evaluate(const VectorX& z, bool matrix, const double* axial_force) const {
   const Timer timer(work.counters.assembly_time);
-  equations.evaluate(z, matrix, axial_force, work.evaluation);
+  equations.evaluate(z, matrix, axial_force, work.evaluation, work.contact);
   if (target) work.evaluation.residual -= *target;
 }
 

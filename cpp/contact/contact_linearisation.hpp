@@ -1,6 +1,6 @@
 #pragma once
-/// The friction that a step of Newton's method predicts for the contacts that it knows, over its limit: the multipliers
-/// of a primal-dual linearisation, see `ForceLaw`.
+/// How Newton's method takes contact: a continuation in the slip tolerance, what its derivatives leave out, and the
+/// friction that its last step has predicted.
 
 #include <algorithm>
 #include <utility>
@@ -11,6 +11,8 @@
 
 namespace withe {
 
+/// Friction of contacts over its limit, as a step of Newton's method predicts it: the multipliers of a primal-dual
+/// linearisation, see `ForceLaw`.
 class FrictionPrediction {
  public:
   /// Nothing where there has been no step; what touches since then has none.
@@ -22,7 +24,7 @@ class FrictionPrediction {
     return found != shares_.end() && found->first == key ? &found->second : &kNone;
   }
   void clear() { known_ = false; }
-  /// Takes the next prediction, made by add(key, share) calls of `make`, in which this one can still be asked for.
+  /// Takes what make(add) gives by calls of add(key, share); until it is done the last prediction can be asked for.
   template <class Make>
   void renew(const Make& make) {
     next_.clear();
@@ -36,6 +38,12 @@ class FrictionPrediction {
   using Share = std::pair<ContactKey, Vec3d>;
   bool known_ = false;
   std::vector<Share> shares_, next_;  ///< sorted by key
+};
+
+struct ContactLinearisation {
+  double regularisation = 1;    ///< by which the slip tolerance is greater
+  bool geometric = true;        ///< derivatives have how pressing turns, the part by which it has negative stiffness
+  FrictionPrediction friction{};  ///< where known, derivatives are what Newton's steps need, not those of the forces
 };
 
 }  // namespace withe
