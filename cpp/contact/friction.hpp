@@ -24,10 +24,6 @@
 
 namespace withe {
 
-/// Unknowns of a contact: a0, a1, b0, b1 (3 each), angle of a, angle of b; of a piece of a curve: its nodes (3 each),
-/// three that are none, the angles of its edges.
-inline constexpr int kContactUnknowns = 14;
-
 /// What stays the same while the unknowns of one contact change.
 struct FrictionSetting {
   const ContactPair* pair = nullptr;
@@ -45,7 +41,7 @@ struct FrictionSetting {
   Vec3d turn{};                     ///< by which it turns then about its own axis [rad]
   Vec3d stick{};                    ///< at the start of the step [m]
   bool spatial = true, centreline = false;
-  const Vec3d* foreseen = nullptr;  ///< friction over its limit, as a step of Newton's method reckons with it
+  const Vec3d* predicted = nullptr;  ///< friction over its limit, as a step of Newton's method predicts it
 };
 
 template <class Scalar>
@@ -126,19 +122,19 @@ FrictionForce<Scalar> friction_force(const FrictionSetting& f, const Vec3<Scalar
 ///
 /// Friction has a corner where surfaces stop, and Newton's method goes to and fro round it: the tangent on one side
 /// knows nothing of the other. So F and S are linearised as unknowns of their own, F / g = S in place of F = g S [Chan,
-/// Golub and Mulet 1999]: where balance asks for less than the limit, a step foresees that while surfaces still slip,
+/// Golub and Mulet 1999]: where balance asks for less than the limit, a step predicts that while surfaces still slip,
 /// and the next derivative, g dS + 2 g' (S . dS) F / g with that F, holds them.
 struct ForceLaw {
   double factor = 0, by_square = 0, by_pressing = 0;  ///< g, g', g_N
 
-  /// F / g of a derivative; `foreseen`, where known, times `limit` is F.
-  Vec3d reckoned(const Vec3d& slip, const Vec3d* foreseen, double limit) const {
-    return foreseen != nullptr && factor > 0.0 ? (limit / factor) * *foreseen : slip;
+  /// F / g of a derivative; `predicted`, where known, times `limit` is F.
+  Vec3d dual_slip(const Vec3d& slip, const Vec3d* predicted, double limit) const {
+    return predicted != nullptr && factor > 0.0 ? (limit / factor) * *predicted : slip;
   }
   /// F over its limit after a step that changes S: as the linear equations have it, but 1 at most.
-  Vec3d foresee(const Vec3d& slip, const Vec3d& change, const Vec3d* foreseen, double limit) const {
+  Vec3d predict(const Vec3d& slip, const Vec3d& change, const Vec3d* predicted, double limit) const {
     const Vec3d force =
-        factor * (slip + change) + (2.0 * by_square * dot(slip, change)) * reckoned(slip, foreseen, limit);
+        factor * (slip + change) + (2.0 * by_square * dot(slip, change)) * dual_slip(slip, predicted, limit);
     return (1.0 / std::max(limit, std::sqrt(dot(force, force)))) * force;
   }
 };
@@ -228,7 +224,7 @@ void find_contact(const FrictionSetting& f, const Vec3<Scalar> (&x)[4], Slipping
     c.law = f.pressing.at(f.before, value_of(c.distance));
     c.pressing = chain(c.distance, -c.law.first, -c.law.by_end);
   } else {
-    // See Contact::add_mean_pressing.
+    // See add_mean_pressing in pressing.cpp.
     Vec3<Scalar> d0{};
     for (int i = 0; i < 4; ++i) {
       const Vec3d start{f.start[3 * i], f.start[3 * i + 1], f.start[3 * i + 2]};

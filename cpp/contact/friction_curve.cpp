@@ -80,7 +80,7 @@ void add_force_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& 
   const double off = dot(way, n);
   const Vec3d slip = way - off * n;
   const ForceLaw g = force_law(f, c.pressing, dot(slip, slip), c.friction.sticking);
-  const Vec3d reckoned = g.reckoned(slip, f.foreseen, f.pair->friction * c.pressing);
+  const Vec3d dual = g.dual_slip(slip, f.predicted, f.pair->friction * c.pressing);
   const bool turns = dot(f.turn, f.turn) > 0.0;
   Vec3d turn{}, moved_on{};
   for (int b = 0; b < c.bodies; ++b) turn += curve.lever[b] * c.sides[b].turn;
@@ -92,8 +92,7 @@ void add_force_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& 
     if (j < kAngle) moved += curve.weight[j / 3] * kAxis[j % 3];
     if (turns) moved -= cross(f.turn, obstacle_arm_slope(f, curve, x, d, j));
     d.force[j] = g.factor * (moved - off * across) - (g.factor * (dot(n, moved) + dot(slip, across))) * n +
-                 (2.0 * g.by_square * dot(slip, moved - off * across)) * reckoned +
-                 (g.by_pressing * d.pressing[j]) * slip;
+                 (2.0 * g.by_square * dot(slip, moved - off * across)) * dual + (g.by_pressing * d.pressing[j]) * slip;
   }
 }
 

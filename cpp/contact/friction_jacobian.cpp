@@ -115,7 +115,7 @@ void add_force_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& 
   const double off = dot(way, n);
   const Vec3d slip = way - off * n;
   const ForceLaw g = force_law(f, c.pressing, dot(slip, slip), c.friction.sticking);
-  const Vec3d reckoned = g.reckoned(slip, f.foreseen, f.pair->friction * c.pressing);
+  const Vec3d dual = g.dual_slip(slip, f.predicted, f.pair->friction * c.pressing);
   const Vec3d change_a = c.sides[0].change, change_b = f.pair->rod_b < 0 ? Vec3d{} : c.sides[1].change;
   for (int j = 0; j < kWays; ++j) {
     const Vec3d across = c.inverse * d.between[j];
@@ -124,7 +124,7 @@ void add_force_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& 
     if (dot(f.turn, f.turn) > 0.0) moved -= cross(f.turn, obstacle_arm_slope(f, c, d, j));
     moved -= off * across;
     d.force[j] = g.factor * moved - (g.factor * (dot(n, moved) + dot(slip, across))) * n +
-                 (2.0 * g.by_square * dot(slip, moved)) * reckoned + (g.by_pressing * d.pressing[j]) * slip;
+                 (2.0 * g.by_square * dot(slip, moved)) * dual + (g.by_pressing * d.pressing[j]) * slip;
   }
 }
 

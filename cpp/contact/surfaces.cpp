@@ -32,6 +32,11 @@ double parallel_weight(double length, double radii) {
 
 }  // namespace
 
+bool comes_before(const ContactKey& a, const ContactKey& b) {
+  if (a.b < 0 || b.b < 0) return a.b < 0 && (b.b >= 0 || obstacle_order(a, b));
+  return a < b;
+}
+
 Surfaces::Surfaces(const Model& model) : model_(model) {
   const ContactDescription& contact = model.description.contact;
   for (const RodDescription& rod : model.description.rods)
@@ -44,6 +49,10 @@ Surfaces::Surfaces(const Model& model) : model_(model) {
     find_neighbours();
   }
   add_obstacles();
+  for (const ContactPair& p : obstacle_pairs_) frictional_ = frictional_ || p.friction > 0.0;
+  if (!contact.rods) return;
+  frictional_ = frictional_ || contact.friction > 0.0;
+  for (const ContactPairDescription& p : contact.pairs) frictional_ = frictional_ || p.friction > 0.0;
 }
 
 double Surfaces::tolerance(int edge) const {
@@ -110,17 +119,6 @@ bool Surfaces::may_touch(int a, int b) const {
   return set_own(model_.edge_rod[at(a)], model_.edge_rod[at(b)], unused);
 }
 
-double Surfaces::place(const std::vector<ObstaclePlace>& places) {
-  double square = 0.0;
-  for (std::size_t o = 0; o < places.size(); ++o) {
-    const Vec3d shift = places[o].point - obstacles_[o].point;
-    square = std::max(square, dot(shift, shift));
-    obstacles_[o].point = places[o].point;
-    obstacles_[o].other = places[o].other;
-  }
-  return std::sqrt(square);
-}
-
 ContactPair Surfaces::pair(int a, int b) const {
   ContactPair p;
   p.key = {a, b, -1};
@@ -166,6 +164,39 @@ void Surfaces::add_obstacles() {
 const ContactPair& Surfaces::obstacle_pair(const ContactKey& key) const {
   return *std::lower_bound(obstacle_pairs_.begin(), obstacle_pairs_.end(), key,
                            [](const ContactPair& pair, const ContactKey& k) { return obstacle_order(pair.key, k); });
+}
+
+void Surfaces::unknowns(const ContactPair& pair, int (&dofs)[kContactUnknowns]) const {
+  if (!pair.curve()) {
+    unknowns_of_edges(pair.key, dofs);
+    return;
+  }
+  std::fill(std::begin(dofs), std::end(dofs), -1);
+  const CurveWeights& w = *pair.piece.weights;
+  for (int i = 0; i < w.nodes; ++i)
+    for (int k = 0; k < model_.dimension; ++k) dofs[3 * i + k] = model_.node_dof[at(pair.piece.node[i])] + k;
+  for (int b = 0; b < w.edges && frictional_ && !model_.planar(); ++b)
+    dofs[12 + b] = model_.edge_dof[at(pair.piece.edge[b])];
+}
+
+void Surfaces::unknowns(const ContactKey& key, int (&dofs)[kContactUnknowns]) const {
+  if (key.b < 0)
+    unknowns(obstacle_pair(key), dofs);
+  else
+    unknowns_of_edges(key, dofs);
+}
+
+void Surfaces::unknowns_of_edges(const ContactKey& key, int (&dofs)[kContactUnknowns]) const {
+  std::fill(std::begin(dofs), std::end(dofs), -1);
+  const bool obstacle = key.b < 0;
+  for (int side = 0; side < (obstacle ? 1 : 2); ++side) {
+    const auto edge = at(side == 0 ? key.a : key.b);
+    for (int k = 0; k < model_.dimension; ++k) {
+      dofs[6 * side + k] = model_.tail_dof[edge] + k;
+      dofs[6 * side + 3 + k] = model_.head_dof[edge] + k;
+    }
+    if (frictional_ && !model_.planar()) dofs[12 + side] = model_.edge_dof[edge];
+  }
 }
 
 /// The distance from a point to a smaller one is no parabola along an edge.

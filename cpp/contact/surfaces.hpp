@@ -12,6 +12,10 @@ namespace withe {
 /// Centrelines may come as near as this, over their distance or the sum of their radii, within an iteration.
 constexpr double kNearest = 0.5;
 
+/// Unknowns of a contact: a0, a1, b0, b1 (3 each), angle of a, angle of b; of a piece of a curve: its nodes (3 each),
+/// three that are none, the angles of its edges.
+inline constexpr int kContactUnknowns = 14;
+
 /// Two surfaces that may touch, and all that does not change while they do.
 struct ContactPair {
   ContactKey key;    ///< of a piece of a curve: the edge before its node, or behind the first, and which end of it
@@ -25,7 +29,6 @@ struct ContactPair {
   double along = 1, across = 1;       ///< that in these directions of a, over it
   double stiffness = 0;               ///< of its own [N/m]; 0: none
   double restitution = 1;             ///< [-]
-  int element = -1;                   ///< row of its unknowns in the matrix's table; -1: none yet
 
   double radii() const { return radius_a + radius_b; }
   double reach() const { return radii() + tolerance; }
@@ -40,13 +43,16 @@ struct ContactPair {
   }
 };
 
+/// The order in which contacts are found: those with obstacles, one obstacle after the other, then those of edges.
+bool comes_before(const ContactKey& a, const ContactKey& b);
+
 class Surfaces {
  public:
   explicit Surfaces(const Model& model);
 
+  const Model& model() const { return model_; }
+  /// As they are drawn.
   const std::vector<Obstacle>& obstacles() const { return obstacles_; }
-  /// Puts obstacles where they are now; how far the farthest of them came [m].
-  double place(const std::vector<ObstaclePlace>& places);
   /// Pairs with obstacles, one after the other: every edge, or piece of a curve, that has a surface, with every
   /// obstacle that is not ignored.
   const std::vector<ContactPair>& obstacle_pairs() const { return obstacle_pairs_; }
@@ -60,6 +66,11 @@ class Surfaces {
   bool may_touch(int a, int b) const;
   ContactPair pair(int a, int b) const;
   double greatest_reach() const { return greatest_reach_; }
+  /// Whether friction is there at all.
+  bool frictional() const { return frictional_; }
+  /// Unknowns of two surfaces, -1 where there is none; angles where there is friction.
+  void unknowns(const ContactPair& pair, int (&dofs)[kContactUnknowns]) const;
+  void unknowns(const ContactKey& key, int (&dofs)[kContactUnknowns]) const;
 
  private:
   void find_neighbours();
@@ -71,6 +82,7 @@ class Surfaces {
   bool smooth(const Obstacle& obstacle, int edge) const;
   /// Sets what two bodies have of their own; whether they may touch.
   bool set_own(int first, int second, ContactPair& pair) const;
+  void unknowns_of_edges(const ContactKey& key, int (&dofs)[kContactUnknowns]) const;
 
   const Model& model_;
   std::vector<double> radius_;
@@ -79,6 +91,7 @@ class Surfaces {
   std::vector<Obstacle> obstacles_;
   std::vector<ContactPair> obstacle_pairs_;
   double greatest_reach_ = 0;
+  bool frictional_ = false;
 };
 
 /// What stands at a node's first unknown, as a vector of three numbers in the axes of the unknowns.

@@ -164,11 +164,8 @@ double stable_step(Equations& equations, const Parameters& parameters, const Sta
     work.from = state;  // as it moves: friction resists less, the faster it slips
     work.from.q -= h * state.v;
     equations.begin(work.from, parameters, StepRule::verlet, h);
-    if (Contact* contact = equations.contact()) {
-      contact->begin(work.from, parameters, dt, Pressing::still);
-      contact->ease(0.25);
-    }
-    equations.evaluate(state.q, true, nullptr, work.newton.data);
+    if (Contact* contact = equations.contact()) contact->begin(work.from, parameters, dt, Pressing::still);
+    equations.evaluate(state.q, true, nullptr, work.newton.data, {.regularisation = 0.25});
     const double before = std::exchange(dt, undamped_step(equations, 1.0 / (h * h)));
     if (std::abs(dt - before) < 1e-3 * dt) break;
   }

@@ -77,7 +77,7 @@ class InnerSolve {
         predictor_(predictor),
         work_(work),
         history_(work.newton.guesses),
-        regularised_(equations.contact() && equations.contact()->frictional() && equations.contact()->eases()),
+        regularised_(equations.contact() && equations.contact()->frictional() && equations.contact()->regularises()),
         points_(predictor.points(plan.slot)) {}
 
   NewtonResult run() {
@@ -158,12 +158,12 @@ class InnerSolve {
       } else {
         last = work_.z;
       }
-      equations_.contact()->ease(kRegularisation[k]);
-      found = newton_.solve(equations_, work_.z, {.max_iterations = kMostOfEach, .interval = h_}, work_.newton);
+      found = newton_.solve(equations_, work_.z,
+                            {.max_iterations = kMostOfEach, .interval = h_, .regularisation = kRegularisation[k]},
+                            work_.newton);
       spent += found.iterations;
       if (!found.converged) break;
     }
-    equations_.contact()->ease(1.0);
     found.iterations = spent;
     return found;
   }

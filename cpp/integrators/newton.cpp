@@ -90,7 +90,11 @@ class Newton::Solve {
         reuse_(work.matrix, equations, how.interval, how.interval != 0.0 && !line_search_,
                std::min(newton.options_.step_tolerance * newton.model_.length_scale, work.finest),
                newton.options_.heuristics),
-        axial_known_(mixed_ && (how.interval != 0.0 || how.predicted)) {}
+        axial_known_(mixed_ && (how.interval != 0.0 || how.predicted)) {
+    work.contact.regularisation = how.regularisation;
+    work.contact.geometric = true;
+    work.contact.friction.clear();
+  }
 
   NewtonResult run() {
     for (;; ++result_.iterations) {
@@ -99,7 +103,7 @@ class Newton::Solve {
       if (verdict == Verdict::go_on && iterate()) continue;
       result_.converged = verdict == Verdict::converged;
       if (!result_.converged) reuse_.drop();
-      if (contact_) contact_->forget_foreseen();
+      work_.contact.friction.clear();
       return result_;
     }
   }
@@ -147,7 +151,7 @@ class Newton::Solve {
     search_.forget();
     if (!work_.step.allFinite()) return false;
     double shorten = search_.shortened(z_, work_.step);
-    if (uses(Heuristic::predict_friction)) system_.equations.foresee(work_.step, shorten);
+    if (uses(Heuristic::predict_friction)) system_.equations.predict_friction(work_.step, shorten, work_.contact);
     if (mixed_) predict_axial_force(system_.equations.problem(), work_.data, work_.step, work_.axial_force);
     axial_known_ = mixed_;
     if (contact_ && uses(Heuristic::surface_search) && !step_between_surfaces(shorten)) return false;

@@ -23,7 +23,7 @@ struct Balance {
   bool either = true;    ///< each one or the other
 };
 
-/// A solution foreseen from another one on the same path, with its axial forces in work.axial_force. A guess that is
+/// A solution predicted from another one on the same path, with its axial forces in work.axial_force. A guess that is
 /// near enough is drawn in fast: where the first correction is longer than the prediction, or the corrections do not
 /// halve, the path is lost, or another one not far [Deuflhard 2011, section 5.1].
 struct Prediction {
@@ -40,6 +40,7 @@ struct SolveOptions {
   double interval = 0;  ///< of a time step [s], whose matrix may serve several iterations and the steps to come; the
                         ///< mixed method then sets out from work.axial_force. 0: a new matrix every iteration
   bool give_up_if_cut = false;            ///< where the first step is `cut`
+  double regularisation = 1;              ///< by which friction's slip tolerance is greater, in a continuation
   const Prediction* predicted = nullptr;  ///< how z was found, if it was from another solution
 };
 

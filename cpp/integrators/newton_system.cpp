@@ -20,7 +20,7 @@ bool factorize(Equations& equations, NewtonWorkspace& work) {
 void NewtonSystem::evaluate(const VectorX& z, bool matrix, const double* axial_force) const {
   const Timer timer(work.counters.assembly_time);
   ++work.counters.evaluations;
-  equations.evaluate(z, matrix, axial_force, work.data);
+  equations.evaluate(z, matrix, axial_force, work.data, work.contact);
   if (target) work.data.residual -= *target;
 }
 

@@ -18,6 +18,7 @@ struct Counters {
 struct NewtonWorkspace {
   StepData data;
   VectorX step, axial_force, trial, next_step;
+  ContactLinearisation contact;
   MatrixRecord matrix;
   GuessHistory guesses;
   double finest = INFINITY;  ///< [m], a step tolerance that error control wants; that of the options is an upper bound

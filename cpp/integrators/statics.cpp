@@ -137,7 +137,7 @@ class Statics {
     return tangent_.factorization.status == FactorStatus::ok && tangent_.factorization.negative_pivots == 0;
   }
 
-  /// The point of the path at the factor `next`, foreseen along the tangent.
+  /// The point of the path at the factor `next`, predicted along the tangent.
   bool reach(double next, double increment, NewtonResult& last) {
     path_.go_to(next);
     const bool touching = equations_.contact() && equations_.contact()->count() > 0;

@@ -23,10 +23,9 @@ bool SurfaceSearch::run(const VectorX& z, double& shorten) {
   const bool uphill = heuristics_.uses(Heuristic::drop_geometric) && work.step.dot(work.data.residual) > 0.0;
   double kept = search(z, uphill ? kLittle : 0.0, shorten);
   if (uphill && !evaluated_) {
-    Contact& contact = *system_.equations.contact();
-    contact.leave_out_geometric(true);
+    work.contact.geometric = false;
     system_.evaluate(z, true);
-    contact.leave_out_geometric(false);
+    work.contact.geometric = true;
     if (!system_.factorize()) return false;
     system_.solve_for(work.step);
     if (!work.step.allFinite()) return false;

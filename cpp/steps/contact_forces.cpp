@@ -4,6 +4,8 @@
 
 namespace withe {
 
+ContactForces::ContactForces(const Model& model) : contact_(model) { rows_.set(contact_.surfaces(), contact_.near()); }
+
 void ContactForces::begin(StepProblem& problem) {
   const Pressing pressing = problem.rule == StepRule::energy_momentum  ? Pressing::mean_direction
                             : problem.rule == StepRule::midpoint       ? Pressing::mean
@@ -18,9 +20,9 @@ void ContactForces::find(const StepProblem& problem, StepData& data, Assembler& 
   else
     data.end = data.z;
   contact_.update(data.end);
-  if (!with_matrix || contact_.coupled()) return;
-  contact_.couple();
-  assembler.couple(contact_.element_unknowns(), kContactUnknowns);
+  if (!with_matrix || rows_.hold(contact_)) return;
+  rows_.set(contact_.surfaces(), contact_.near());
+  assembler.couple(rows_.unknowns(), kContactUnknowns);
 }
 
 void ContactForces::add(const StepProblem& problem, StepData& data, const Assembler& assembler,
@@ -28,20 +30,21 @@ void ContactForces::add(const StepProblem& problem, StepData& data, const Assemb
   const int n = problem.model.dof_count;
   data.contact_gradient.setZero(n);
   data.contact_floor.setZero(n);
+  const ContactLinearisation& linearisation = *data.contact;
   const double twice = problem.end_rate();
   ContactLocal local;
   int dofs[kContactUnknowns];
   for (int i = 0; i < contact_.count(); ++i) {
-    contact_.local(i, !values.empty(), local);
+    contact_.local(i, !values.empty(), local, linearisation);
     contact_.unknowns(i, dofs);
-    const double rounding = contact_.rounding(i, data.rounding.reach);
+    const double rounding = contact_.rounding(i, data.rounding.reach, linearisation);
     for (int k = 0; k < kContactUnknowns; ++k) {
       if (dofs[k] < 0) continue;
       data.contact_gradient[dofs[k]] += local.gradient[k];
       data.row_magnitude[dofs[k]] += std::abs(local.gradient[k]);
       data.contact_floor[dofs[k]] += rounding;
     }
-    if (!values.empty()) assembler.contact.add_hessian(contact_.element(i), local.hessian, twice, values);
+    if (!values.empty()) assembler.contact.add_hessian(rows_.row(contact_.key(i)), local.hessian, twice, values);
   }
   data.gradient.head(n) += data.contact_gradient;
   if (!contact_.frictional() && !problem.in_middle()) data.potential += contact_.energy();
@@ -56,9 +59,10 @@ double ContactForces::allowed(const StepProblem& problem, const VectorX& z, cons
   return contact_.allowed(end_, change_);
 }
 
-void ContactForces::foresee(const StepProblem& problem, const VectorX& step, double kept) {
+void ContactForces::predict_friction(const StepProblem& problem, const VectorX& step, double kept,
+                                     ContactLinearisation& linearisation) {
   change_ = (problem.end_rate() / kept) * step;
-  contact_.foresee_friction(change_);
+  contact_.predict_friction(change_, linearisation);
 }
 
 double ContactForces::loss(const StepData& data, const VectorX& change, double obstacle_work) const {

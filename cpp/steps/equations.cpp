@@ -53,8 +53,8 @@ Equations::Equations(const Model& model, const EquationOptions& options)
                  asymmetries_.empty() ? Symmetry::symmetric : Symmetry::unsymmetric, options.solver),
       static_duration_(options.static_duration) {
   if (contact()) {
-    assembler_.couple(contact()->element_unknowns(), kContactUnknowns);
-    ordered_ = contact()->elements();
+    assembler_.couple(terms_.contact->rows().unknowns(), kContactUnknowns);
+    ordered_ = terms_.contact->rows().keys();
     if (contact()->frictional()) has_potential_ = false;
   }
   if (terms_.custom) has_potential_ = false;
@@ -111,13 +111,15 @@ void Equations::find(StepData& data, bool with_matrix) {
   for (const std::unique_ptr<Term>& term : terms_.all) {
     const int before = assembler_.generation();
     term->find(problem_, data, assembler_, with_matrix);
-    if (terms_.contact && assembler_.generation() != before) ordered_ = contact()->elements();
+    if (terms_.contact && assembler_.generation() != before) ordered_ = terms_.contact->rows().keys();
   }
 }
 
-void Equations::evaluate(const VectorX& z, bool with_matrix, const double* axial_force, StepData& data) {
+void Equations::evaluate(const VectorX& z, bool with_matrix, const double* axial_force, StepData& data,
+                         const ContactLinearisation& contact) {
   clear(z, data);
   data.axial_force = axial_force;
+  data.contact = &contact;
   if (with_matrix) pass_mark();
   find(data, with_matrix);
   if (data.rounding.number != problem_.number) set_rounding_bounds(problem_, data);
@@ -166,8 +168,8 @@ double Equations::allowed(const VectorX& z, const VectorX& step) {
   return terms_.contact ? terms_.contact->allowed(problem_, z, step) : 1.0;
 }
 
-void Equations::foresee(const VectorX& step, double kept) {
-  if (terms_.contact) terms_.contact->foresee(problem_, step, kept);
+void Equations::predict_friction(const VectorX& step, double kept, ContactLinearisation& linearisation) {
+  if (terms_.contact) terms_.contact->predict_friction(problem_, step, kept, linearisation);
 }
 
 double Equations::contact_loss(const StepData& data, const VectorX& change, double obstacle_work) const {

@@ -55,8 +55,8 @@ class Equations {
   void forget_contacts();
   /// How much of a step of z contact allows, from 0 to 1.
   double allowed(const VectorX& z, const VectorX& step);
-  /// Tells contact of a step of Newton's method from where it was last evaluated, of which `kept` is left.
-  void foresee(const VectorX& step, double kept);
+  /// Predicts the friction of a step of Newton's method from the last evaluation, of which `kept` is left.
+  void predict_friction(const VectorX& step, double kept, ContactLinearisation& linearisation);
   double contact_loss(const StepData& data, const VectorX& change, double obstacle_work) const;
 
   /// Prepares a step from `state`, which must outlive it, over h (0: statics).
@@ -71,8 +71,10 @@ class Equations {
   double flow_excess() const { return terms_.stokeslets->excess(); }
   void forget_flow();
 
-  /// Residual at z, and the matrix when asked for. `axial_force`: see stretch_hessian.
-  void evaluate(const VectorX& z, bool with_matrix, const double* axial_force, StepData& data);
+  /// Residual at z, and the matrix when asked for. `axial_force`: see stretch_hessian. `contact`: how Newton's method
+  /// takes it.
+  void evaluate(const VectorX& z, bool with_matrix, const double* axial_force, StepData& data,
+                const ContactLinearisation& contact = {});
   /// Forces without inertia at the start of the problem, whose configuration the data has, with velocities v: the full
   /// residual alone. No contact, viscosity, drag or fluid.
   void evaluate_forces(const VectorX& v, StepData& data) const;

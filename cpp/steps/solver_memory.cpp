@@ -8,13 +8,14 @@ namespace withe {
 
 void Equations::forget_contacts() {
   contact()->forget();
+  terms_.contact->rows().set(contact()->surfaces(), contact()->near());
   order_for_contacts();
 }
 
 /// Finds an order of elimination for the contacts that are coupled now, and no others.
 void Equations::order_for_contacts() {
-  assembler_.order_for(contact()->element_unknowns(), kContactUnknowns);
-  ordered_ = contact()->elements();
+  assembler_.order_for(terms_.contact->rows().unknowns(), kContactUnknowns);
+  ordered_ = terms_.contact->rows().keys();
 }
 
 EquationsMemory Equations::memory(bool with_matrix) const {
@@ -33,7 +34,7 @@ void Equations::pass_mark() {
 void Equations::remember(EquationsMemory& out, bool with_matrix) const {
   if (terms_.contact) {
     out.ordered = ordered_;
-    out.coupled = contact()->elements();
+    out.coupled = terms_.contact->rows().keys();
   }
   out.groups = assembler_.groups();
   if (with_matrix) {
@@ -49,11 +50,13 @@ void Equations::remember(EquationsMemory& out, bool with_matrix) const {
 bool Equations::recall(const EquationsMemory& memory) {
   const bool regrouped = memory.groups != assembler_.groups();
   assembler_.set_groups(memory.groups);
-  if (terms_.contact && (regrouped || memory.ordered != ordered_ || memory.coupled != contact()->elements())) {
-    contact()->couple(memory.ordered);
+  if (terms_.contact &&
+      (regrouped || memory.ordered != ordered_ || memory.coupled != terms_.contact->rows().keys())) {
+    ContactRows& rows = terms_.contact->rows();
+    rows.set(contact()->surfaces(), memory.ordered);
     if (regrouped || memory.ordered != ordered_) order_for_contacts();
-    contact()->couple(memory.coupled);
-    assembler_.couple(contact()->element_unknowns(), kContactUnknowns);
+    rows.set(contact()->surfaces(), memory.coupled);
+    assembler_.couple(rows.unknowns(), kContactUnknowns);
   }
   // A scene with other options or friction may have a matrix of another form.
   const std::span<double> values = assembler_.solver().values();

@@ -8,8 +8,9 @@
 /// replaces grad V by a discrete gradient between q0 and q1 = 2 z - q0:
 ///   stretching: EA (eps0 + eps1) / 2 (e0 + e1) / (|e0| + |e1|)   [Simo, Tarnow and Doblare 1995];
 ///   bending, twisting: moments whose work is what the energy changes by, see elasticity/discrete_gradient.hpp;
-///   surfaces that press: along the mean of the ways between them, see Contact::add_mean_pressing.
+///   surfaces that press: along the mean of the ways between them, see contact/pressing.cpp.
 
+#include "contact/contact_linearisation.hpp"
 #include "elasticity/elements.hpp"
 #include "forces/custom_forces.hpp"
 #include "forces/loads.hpp"
@@ -83,6 +84,7 @@ struct StepData {
   double potential = 0;   ///< elastic + gravity - loads that have one [J], where the scene has one
 
   VectorX z;
+  const ContactLinearisation* contact = nullptr;  ///< how Newton's method takes contact
   const double* axial_force = nullptr;  ///< of the mixed method, see stretch_local; nothing: that of the configuration
   VectorX end;  ///< q1
   Configuration configuration;      ///< at z

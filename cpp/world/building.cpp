@@ -359,7 +359,7 @@ void World::Implementation::add_contact_notes() {
     plan.notes.push_back("rods that overlapped as drawn were moved apart, by up to " + std::to_string(separated) +
                          " m: they are stressed there");
   if (!equations->contact()->frictional()) plan.notes.emplace_back("no friction: contact stays symmetric");
-  if (options.integrator == Integrator::verlet && equations->contact()->eases())
+  if (options.integrator == Integrator::verlet && equations->contact()->regularises())
     plan.notes.emplace_back(
         "friction that sticks allows explicit steps of at most about slip_tolerance / (7.5 mu) times a node's "
         "mass over the force that presses it, which the drawing does not know");

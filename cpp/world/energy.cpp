@@ -197,7 +197,7 @@ void World::Implementation::begin_explicit() {
 std::string World::Implementation::longest_explicit_step() {
   const double stable = stable_step(*equations, parameters, state, work);
   if (!(options.time_step > stable)) return "";
-  const bool slips = equations->contact() && equations->contact()->eases();
+  const bool slips = equations->contact() && equations->contact()->regularises();
   return ": take a time_step below " + text(stable) + " s" +
          (slips ? ", or a greater slip_tolerance, which allows longer ones under friction" : "");
 }

@@ -122,7 +122,8 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
       r = find_equilibrium(system, *newton, options, parameters, boundary, state, work.newton);
     // Contact that turns out too soft is made stiffer, from where it has settled.
     from = target;
-    for (int tries = 0; r.converged && system.contact() && system.contact()->depth() > kDeepest && tries < 8; ++tries) {
+    for (int tries = 0; r.converged && system.contact() && system.contact()->contacts().depth() > kDeepest && tries < 8;
+         ++tries) {
       system.contact()->stiffen(state, Keep::force);
       const bool changed = r.branch_changed;
       r = find_equilibrium(system, *newton, options, parameters, boundary, state, work.newton);

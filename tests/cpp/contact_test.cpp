@@ -10,6 +10,7 @@
 #include <gtest/gtest.h>
 
 #include <set>
+#include <utility>
 
 #include "contact/contact_law.hpp"
 #include "derivative_check.hpp"
@@ -199,79 +200,172 @@ struct Apart {
   double distance, centrelines;
 };
 
-ClosestPoints closest(const Model& model, const Surfaces& surfaces, const ContactPair& pair, const VectorX& q) {
-  const auto node = [&](int n) { return local_position(model, q, n); };
-  const auto a = static_cast<std::size_t>(pair.key.a);
-  if (pair.key.b < 0) {
-    const Obstacle& o = surfaces.obstacles()[static_cast<std::size_t>(-1 - pair.key.b)];
-    return closest_points(node(model.edge_tail[a]), node(model.edge_head[a]), o.point, o.other, pair.weight_a,
-                          pair.weight_b);
-  }
-  const auto b = static_cast<std::size_t>(pair.key.b);
-  return closest_points(node(model.edge_tail[a]), node(model.edge_head[a]), node(model.edge_tail[b]),
-                        node(model.edge_head[b]), pair.weight_a, pair.weight_b);
+ClosestPoints closest(const Bodies& bodies, const ContactPair& pair, const VectorX& q) {
+  Vec3d x[4];
+  bodies.end_points(pair, q, x);
+  return closest_points(x[0], x[1], x[2], x[3], pair.weight_a, pair.weight_b);
 }
 
-Apart apart(const Model& model, const Surfaces& surfaces, const ContactPair& pair, const VectorX& q) {
+Apart apart(const Bodies& bodies, const ContactPair& pair, const VectorX& q) {
   if (pair.curve()) {
     Vec3d x[3];
-    for (int i = 0; i < pair.piece.weights->nodes; ++i) x[i] = local_position(model, q, pair.piece.node[i]);
-    const Obstacle& o = surfaces.obstacles()[static_cast<std::size_t>(-1 - pair.key.b)];
-    const double d = curve_distance(pair.piece, o, x).distance;
+    for (int i = 0; i < pair.piece.weights->nodes; ++i) x[i] = local_position(*bodies.model, q, pair.piece.node[i]);
+    const double d = curve_distance(pair.piece, bodies.obstacle(pair), x).distance;
     return {d, d};
   }
-  const ClosestPoints c = closest(model, surfaces, pair, q);
+  const ClosestPoints c = closest(bodies, pair, q);
   return {std::sqrt(c.square), std::sqrt(dot(c.between, c.between))};
 }
 
-/// Walks of many iterates a step, tiny and wide, on which candidates are found anew and bounds let pairs be skipped.
-TEST(Contact, FindsWhatTouchesAndHowFarItMayGoAsBruteForceDoesWhateverCameBefore) {
+/// Candidates that have seen much, and the same without memory.
+struct Walk {
+  const Model& model;
+  Surfaces surfaces{model};
+  Candidates candidates{model, surfaces};
+  Bodies bodies{&model, surfaces.obstacles()};
+  std::vector<ContactPair> pairs = all_pairs(model, surfaces);
+  VectorX q = initial_state(model).q;
+  int cut = 0, touching = 0;
+
+  double allowed(const VectorX& change) {
+    const double kept = candidates.allowed(q, bodies, change);
+    EXPECT_EQ(kept, Candidates(model, surfaces).allowed(q, bodies, change));
+    cut += kept < 1.0 ? 1 : 0;
+    return kept;
+  }
+
+  /// A way is cut where surfaces come near, or after a hundred steps past what stays apart: the farthest that bodies
+  /// have come towards each other by then is a hundred times how near they were, beyond the least distance.
+  void expect_nothing_passes(const VectorX& change, double kept) const {
+    const auto distance = [&](const ContactPair& pair, double share) {
+      return apart(bodies, pair, q + share * change).centrelines;
+    };
+    const double past = 0.02 * kept * 2.0 * farthest(model, change);  // seen at a hundred points
+    bool reached = kept == 1.0;
+    for (const ContactPair& pair : pairs) {
+      const double least = std::min(kNearest * distance(pair, 0.0), pair.nearest());
+      double nearest = INFINITY;
+      for (int k = 1; k <= (kept < 1.0 ? 100 : 20); ++k)
+        nearest = std::min(nearest, distance(pair, kept * k / (kept < 1.0 ? 100.0 : 20.0)));
+      ASSERT_GE(nearest, 0.98 * least);
+      reached = reached || nearest <= 1.01 * least + past;
+    }
+    EXPECT_TRUE(reached) << "cut to " << kept << " for nothing";
+  }
+
+  /// Also in one and the same order, and without a trace.
+  void expect_found() {
+    using Found = std::vector<std::pair<ContactKey, double>>;
+    Found found, unseen, expected;
+    const auto into = [](Found& out) {
+      return [&out](const ContactPair& pair, const Proximity& p) { out.emplace_back(pair.key, p.distance); };
+    };
+    std::as_const(candidates).find(q, bodies, into(unseen));
+    candidates.find(q, bodies, into(found));
+    for (const ContactPair& pair : pairs)
+      if (const double d = apart(bodies, pair, q).distance; d < pair.reach()) expected.emplace_back(pair.key, d);
+    EXPECT_EQ(found, expected);
+    EXPECT_EQ(unseen, expected);
+    touching += static_cast<int>(found.size());
+  }
+};
+
+/// Walks of many iterates, tiny and wide, on which candidates are found anew and bounds let pairs be skipped, with
+/// obstacles that move between them.
+TEST(Candidates, FindWhatTouchesAndHowFarItMayGoAsBruteForceDoesWhateverCameBefore) {
   RandomNumbers random(17);
   int cut = 0, touching = 0;
   for (int scene = 0; scene < 12; ++scene) {
     const Model model = build_model(tangle(random), std::nullopt);
-    const Parameters parameters = initial_parameters(model);
-    State state = initial_state(model);
-    Contact contact(model);
-    contact.initialise(state, parameters);
-    const std::vector<ContactPair> pairs = all_pairs(model, contact.surfaces());
-    const auto distance = [&](const ContactPair& pair, const VectorX& q) {
-      return apart(model, contact.surfaces(), pair, q).centrelines;
-    };
-    for (int step = 0; step < 12; ++step) {
-      contact.begin(state, parameters, 1e-2, Pressing::end);
-      VectorX q = state.q;
-      for (int iterate = 0; iterate < 6; ++iterate) {
-        const double wide = std::pow(10.0, -1.0 - 0.5 * ((step + iterate) % 6));
-        const VectorX change = wide * random.vector(model.dof_count);
-        Contact fresh(model);
-        fresh.begin(state, parameters, 1e-2, Pressing::end);
-        fresh.update(q);
-        const double kept = contact.allowed(q, change);
-        ASSERT_EQ(kept, fresh.allowed(q, change));
-        cut += kept < 1.0 ? 1 : 0;
-        // What passes hardly farther away than that is followed for a hundred steps only, the shorter the nearer it is.
-        bool reached = kept == 1.0;
-        for (const ContactPair& pair : pairs) {
-          const double start = distance(pair, q), least = std::min(kNearest * start, pair.nearest());
-          for (int k = 1; k <= 20; ++k) ASSERT_GE(distance(pair, q + (kept * k / 20.0) * change), 0.98 * least);
-          reached = reached || distance(pair, q + kept * change) <= 1.05 * least;
+    Walk walk{model};
+    for (int iterate = 0; iterate < 72; ++iterate) {
+      const double wide = std::pow(10.0, -1.0 - 0.5 * ((iterate / 6 + iterate) % 6));
+      if (iterate % 6 == 0 && scene % 2 == 1)
+        for (Obstacle& o : walk.bodies.obstacles) {
+          const Vec3d shift = 0.1 * random_point(random);
+          o.point += shift;
+          o.other += shift;
         }
-        EXPECT_TRUE(reached) << "cut to " << kept << " for nothing";
-        q += kept * change;
-        contact.update(q);
-        fresh.update(q);
-        int expected = 0;
-        for (const ContactPair& pair : pairs)
-          if (apart(model, contact.surfaces(), pair, q).distance < pair.reach()) ++expected;
-        ASSERT_EQ(contact.count(), expected);
-        ASSERT_EQ(contact.energy(), fresh.energy());
-        touching += expected;
-      }
-      state.q = q;
+      const VectorX change = wide * random.vector(model.dof_count);
+      const double kept = walk.allowed(change);
+      ASSERT_NO_FATAL_FAILURE(walk.expect_nothing_passes(change, kept));
+      walk.q += kept * change;
+      walk.expect_found();
+      ASSERT_FALSE(::testing::Test::HasFailure());
     }
+    cut += walk.cut;
+    touching += walk.touching;
   }
   EXPECT_GT(cut, 100);
+  EXPECT_GT(touching, 100);
+}
+
+/// What a step asks of contact, as bits.
+std::vector<double> answers(Contact& contact, const VectorX& q, const VectorX& change) {
+  std::vector<double> out{contact.allowed(q, change)};
+  contact.update(q + out[0] * change);
+  VectorX friction;
+  contact.friction_force(friction);
+  out.insert(out.end(), friction.begin(), friction.end());
+  ContactLocal local{};
+  ContactLinearisation linearisation;
+  contact.predict_friction(1e-3 * change, linearisation);
+  for (int i = 0; i < contact.count(); ++i) {
+    contact.local(i, true, local, linearisation);
+    out.insert(out.end(), std::begin(local.gradient), std::end(local.gradient));
+    for (const auto& row : local.hessian) out.insert(out.end(), std::begin(row), std::end(row));
+  }
+  out.insert(out.end(), {contact.energy(), contact.start_energy(), contact.pressing_gain(change),
+                         contact.obstacle_work(), contact.unresolved(1e-2) ? 1.0 : 0.0});
+  return out;
+}
+
+/// Two of one scene take the same steps, and one of them is asked in between for contacts and energies of states.
+TEST(Contact, ReadOutsChangeNoBitOfWhatFollows) {
+  RandomNumbers random(23);
+  int touching = 0;
+  for (FrictionLaw law : {FrictionLaw::implicit, FrictionLaw::lagged, FrictionLaw::anchored})
+    for (Pressing pressing : {Pressing::still, Pressing::end, Pressing::mean, Pressing::mean_direction}) {
+      SceneDescription scene = tangle(random);
+      scene.contact.friction = 0.4;
+      scene.contact.restitution = 0.5;
+      scene.contact.friction_law = law;
+      scene.contact.obstacle_friction = VectorX::Constant(1, 0.3);
+      const Model model = build_model(scene, std::nullopt);
+      const Parameters parameters = initial_parameters(model);
+      State state = initial_state(model), other = state;
+      Contact plain(model), asked(model);
+      plain.initialise(state, parameters);
+      other.contact_stiffness = state.contact_stiffness;
+      const auto ask = [&] {
+        other.q = state.q + 0.05 * random.vector(model.dof_count);
+        const std::vector<ContactReport> reports = asked.report(other, parameters);
+        touching += static_cast<int>(reports.size());
+        EXPECT_EQ(asked.energy_of(other, parameters), Contact(model).energy_of(other, parameters));
+      };
+      for (int step = 0; step < 8; ++step) {
+        state.v = random.vector(model.dof_count);
+        State twin = state;
+        ask();
+        plain.begin(state, parameters, 1e-2, pressing);
+        asked.begin(twin, parameters, 1e-2, pressing);
+        for (int iterate = 0; iterate < 3; ++iterate) {
+          const VectorX change = 0.03 * random.vector(model.dof_count);
+          ask();
+          ASSERT_EQ(answers(plain, state.q, change), answers(asked, twin.q, change));
+        }
+        ask();
+        ASSERT_EQ(plain.near(), asked.near());
+        ASSERT_EQ(plain.accept(state, Keep::energy, 1.0), asked.accept(twin, Keep::energy, 1.0));
+        ASSERT_EQ(state.contact_stiffness, twin.contact_stiffness);
+        ASSERT_EQ(state.contacts.size(), twin.contacts.size());
+        for (std::size_t i = 0; i < state.contacts.size(); ++i) {
+          ASSERT_EQ(state.contacts[i].stiffness, twin.contacts[i].stiffness);
+          ASSERT_EQ(state.contacts[i].age, twin.contacts[i].age);
+        }
+        state.q = plain.contacts().q();
+      }
+    }
   EXPECT_GT(touching, 100);
 }
 

@@ -215,7 +215,7 @@ TEST(ForceLaw, ForeseesTheForceOfTheLinearEquationsOfForceAndSlip) {
     const FrictionSetting f = law_setting(pair, law);
     const auto inverse = [&](const Vec3d& s) { return 1.0 / force_law(f, pressing, dot(s, s), false).factor; };
     const ForceLaw g = force_law(f, pressing, dot(slip, slip), false);
-    const Vec3d force = limit * g.foresee(slip, change, &share, limit);
+    const Vec3d force = limit * g.predict(slip, change, &share, limit);
     const double turned = (inverse(slip + small * change) - inverse(slip - small * change)) / (2.0 * small);
     const Vec3d unbalanced = inverse(slip) * force + (turned * limit) * share - slip - change;
     EXPECT_LT(std::sqrt(dot(unbalanced, unbalanced)), 1e-8) << static_cast<int>(law);
@@ -228,10 +228,10 @@ TEST(ForceLaw, ForeseesNoMoreThanTheLimitAndHoldsWhatIsForeseenToStop) {
   const double pressing = 2.0, limit = pair.friction * pressing;
   const Vec3d slip{3.0, 0.0, 0.0}, none{};
   const ForceLaw g = force_law(law_setting(pair, FrictionLaw::implicit), pressing, dot(slip, slip), false);
-  const Vec3d most = g.foresee(slip, 100.0 * slip, &none, limit);
+  const Vec3d most = g.predict(slip, 100.0 * slip, &none, limit);
   EXPECT_NEAR(std::sqrt(dot(most, most)), 1.0, 1e-12);
-  const auto stiffness = [&](const Vec3d* foreseen) {
-    return g.factor + 2.0 * g.by_square * dot(slip, g.reckoned(slip, foreseen, limit));
+  const auto stiffness = [&](const Vec3d* predicted) {
+    return g.factor + 2.0 * g.by_square * dot(slip, g.dual_slip(slip, predicted, limit));
   };
   EXPECT_LT(stiffness(nullptr), 1e-6 * g.factor);  // that of the law: it slips
   EXPECT_EQ(stiffness(&none), g.factor);           // a chord to the origin

@@ -92,9 +92,9 @@ Case slipped(const Named& named, double size, std::optional<bool> planar = std::
   return c;
 }
 
-/// `foreseen`: after a step of Newton's method that changes nothing, whose friction is that at hand. `approach`: at
+/// `predicted`: after a step of Newton's method that changes nothing, whose friction is that at hand. `approach`: at
 /// which the surfaces have just met.
-void expect_exact(const Case& c, Integrator integrator, StepRule rule, bool foreseen = false, double approach = 0.0) {
+void expect_exact(const Case& c, Integrator integrator, StepRule rule, bool predicted = false, double approach = 0.0) {
   Options options;
   options.integrator = integrator;
   Equations equations(c.model, equation_options(options));
@@ -116,9 +116,10 @@ void expect_exact(const Case& c, Integrator integrator, StepRule rule, bool fore
   StepData evaluation;
   const Eigen::Index n = c.model.dof_count;
   equations.evaluate(c.q, true, nullptr, evaluation);
-  if (foreseen) {
-    equations.foresee(VectorX::Zero(n), 1.0);
-    equations.evaluate(c.q, true, nullptr, evaluation);
+  if (predicted) {
+    ContactLinearisation linearisation;
+    equations.predict_friction(VectorX::Zero(n), 1.0, linearisation);
+    equations.evaluate(c.q, true, nullptr, evaluation, linearisation);
   }
   ASSERT_GT(equations.contact()->count(), 0) << c.name;
   MatrixX J(n, n);
@@ -199,9 +200,8 @@ struct ContactStep {
 VectorX pressing_eigenvalues(const Case& c, bool geometric) {
   ContactStep step(c);
   Contact& contact = step.contact;
-  contact.leave_out_geometric(!geometric);
   ContactLocal local;
-  contact.local(0, true, local);
+  contact.local(0, true, local, {.geometric = geometric});
   MatrixX H(kContactUnknowns, kContactUnknowns);
   for (int i = 0; i < kContactUnknowns; ++i)
     for (int j = 0; j < kContactUnknowns; ++j) H(i, j) = local.hessian[i][j];
@@ -268,7 +268,7 @@ TEST(PressingLaw, WorksAsMuchOverAStepAsContactStoresWhileSurfacesMeet) {
     }
 }
 
-TEST(Contact, MatrixIsExactWhereFrictionIsForeseenAsItIs) {
+TEST(Contact, MatrixIsExactWhereFrictionIsPredictedAsItIs) {
   for (Named named : touching_scenes())
     for (FrictionLaw law : kFrictionLaws) {
       named.scene.contact.friction_law = law;

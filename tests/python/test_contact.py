@@ -60,6 +60,27 @@ def test_a_restored_a_copied_and_a_pickled_simulation_go_on_with_the_same_bits(f
         np.testing.assert_array_equal(one.positions(), expected)
 
 
+@pytest.mark.parametrize("friction_model", ["implicit", "lagged", "anchored"])
+@pytest.mark.parametrize("integrator", ["backward_euler", "implicit_midpoint", "energy_momentum"])
+def test_energies_and_contacts_read_out_between_any_two_calls_change_no_bit(
+    integrator: Any, friction_model: Any
+) -> None:
+    scene, _, _ = crossing(friction=0.3, friction_model=friction_model, restitution=0.5)
+    simulation, asked = (scene.build(integrator=integrator, time_step=2e-3) for _ in range(2))
+    for k in range(30):
+        asked.energy()
+        if k == 15:
+            for one in (simulation, asked):
+                one.set(gravity=(1.0, 0.0, -9.81))
+        asked.contacts()
+        simulation.step()
+        asked.step()
+        np.testing.assert_array_equal(asked.positions(), simulation.positions())
+        np.testing.assert_array_equal(asked.velocities(), simulation.velocities())
+    assert len(simulation.contacts()) > 0
+    assert asked.statistics.iterations == simulation.statistics.iterations
+
+
 def parallel_pair() -> withe.Scene:
     scene = withe.Scene(gravity=(0, 0, 0))
     for name, height in (("a", 0.0), ("b", 0.007)):

@@ -1,0 +1,100 @@
+#include "contact/bodies.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace withe {
+namespace {
+
+std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+// Pairs farther apart than this beyond their reach, over it, are of no interest.
+constexpr double kFar = 0.6;
+
+}  // namespace
+
+double Bodies::place(const std::vector<ObstaclePlace>& places) {
+  double square = 0.0;
+  for (std::size_t o = 0; o < places.size(); ++o) {
+    const Vec3d shift = places[o].point - obstacles[o].point;
+    square = std::max(square, dot(shift, shift));
+    obstacles[o].point = places[o].point;
+    obstacles[o].other = places[o].other;
+  }
+  return std::sqrt(square);
+}
+
+void Bodies::end_points(const ContactPair& pair, const VectorX& q, Vec3d (&x)[4]) const {
+  if (pair.curve()) {
+    for (int i = 0; i < 4; ++i)
+      x[i] = i < pair.piece.weights->nodes ? local_position(*model, q, pair.piece.node[i]) : Vec3d{};
+    return;
+  }
+  x[0] = local_vector(*model, q, model->tail_dof[at(pair.key.a)]);
+  x[1] = local_vector(*model, q, model->head_dof[at(pair.key.a)]);
+  if (pair.key.b >= 0) {
+    x[2] = local_vector(*model, q, model->tail_dof[at(pair.key.b)]);
+    x[3] = local_vector(*model, q, model->head_dof[at(pair.key.b)]);
+  } else {
+    const Obstacle& o = obstacle(pair);
+    x[2] = o.point;
+    x[3] = o.other;
+  }
+}
+
+void Bodies::values(const ContactPair& pair, const VectorX& q, double (&values)[kContactUnknowns]) const {
+  std::fill(std::begin(values), std::end(values), 0.0);
+  Vec3d x[4];
+  end_points(pair, q, x);
+  for (int i = 0; i < 4; ++i) {
+    values[3 * i] = x[i].x;
+    values[3 * i + 1] = x[i].y;
+    values[3 * i + 2] = x[i].z;
+  }
+  if (model->planar()) return;
+  if (pair.curve()) {
+    for (int b = 0; b < pair.piece.weights->edges; ++b) values[12 + b] = q(model->edge_dof[at(pair.piece.edge[b])]);
+    return;
+  }
+  values[12] = q(model->edge_dof[at(pair.key.a)]);
+  if (pair.key.b >= 0) values[13] = q(model->edge_dof[at(pair.key.b)]);
+}
+
+Proximity Bodies::proximity(const ContactPair& pair, const VectorX& q, bool whole) const {
+  Proximity p;
+  Vec3d x[4];
+  end_points(pair, q, x);
+  if (pair.curve()) {
+    const Obstacle& o = obstacle(pair);
+    p.curve = curve_distance(pair.piece, o, x);
+    p.distance = p.curve.distance;
+    p.points.s = p.curve.s;
+    p.normal = distance_to(o, curve_point(*pair.piece.weights, x, p.curve.s)).normal;
+    return p;
+  }
+  // Far apart by their middles: no need for more.
+  const Vec3d middle = 0.5 * (x[0] + x[1] - x[2] - x[3]), u = x[1] - x[0], v = x[3] - x[2];
+  const double size = 0.5 * (std::sqrt(dot(u, u)) + std::sqrt(dot(v, v))) + (1.0 + kFar) * pair.reach();
+  if (!whole && dot(middle, middle) > size * size) {
+    p.distance = std::sqrt(dot(middle, middle)) - size + (1.0 + kFar) * pair.reach();  // or more
+    return p;
+  }
+  p.points = closest_points(x[0], x[1], x[2], x[3], pair.weight_a, pair.weight_b);
+  p.distance = std::sqrt(p.points.square);
+  const double length = std::sqrt(dot(p.points.between, p.points.between));
+  p.normal = (1.0 / std::max(length, 1e-300)) * p.points.between;
+  return p;
+}
+
+double farthest(const Model& model, const VectorX& change) {
+  double most = 0.0;
+  for (int dof : model.node_dof) {
+    double square = 0.0;
+    for (int k = 0; k < model.dimension; ++k) square += change(dof + k) * change(dof + k);
+    if (std::isnan(square)) return square;
+    most = std::max(most, square);
+  }
+  return std::sqrt(most);
+}
+
+}  // namespace withe

@@ -1,0 +1,42 @@
+#pragma once
+/// Rods and obstacles of a scene where they are: ends, unknowns and closest points of two surfaces.
+
+#include <vector>
+
+#include "contact/surfaces.hpp"
+#include "geometry/segment_distance.hpp"
+
+namespace withe {
+
+/// Where two surfaces are closest to each other.
+struct Proximity {
+  ClosestPoints points;         ///< of a curve: its s alone
+  CurveDistance<double> curve;  ///< of a curve
+  Vec3d normal{};               ///< from b to a
+  double distance = 0;          ///< of the centrelines, or of a centreline and the obstacle [m]
+};
+
+struct Bodies {
+  const Model* model = nullptr;
+  std::vector<Obstacle> obstacles;
+
+  const Obstacle& obstacle(const ContactPair& pair) const {
+    return obstacles[static_cast<std::size_t>(-1 - pair.key.b)];
+  }
+  /// Whether a pair is one with a plane, which has no other side.
+  bool flat(const ContactPair& pair) const { return pair.key.b < 0 && obstacle(pair).kind == ObstacleKind::plane; }
+  /// Puts obstacles where they are now; how far the farthest of them came [m].
+  double place(const std::vector<ObstaclePlace>& places);
+  /// Ends of edges, or of an obstacle; of a piece of a curve its nodes, and nothing.
+  void end_points(const ContactPair& pair, const VectorX& q, Vec3d (&x)[4]) const;
+  /// Unknowns of a pair at q (obstacles' points where there are none).
+  void values(const ContactPair& pair, const VectorX& q, double (&x)[kContactUnknowns]) const;
+  /// Of surfaces that are farther apart than of interest no more than a lower bound of their distance; `whole`: the
+  /// closest points of these too.
+  Proximity proximity(const ContactPair& pair, const VectorX& q, bool whole = false) const;
+};
+
+/// The longest way of a node; NaN where one is.
+double farthest(const Model& model, const VectorX& change);
+
+}  // namespace withe

@@ -1,0 +1,232 @@
+#include "contact/candidates.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace withe {
+namespace {
+
+std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+// Pairs nearer than this beyond their reach, over the sum of their radii, are part of the matrix's pattern.
+constexpr double kNear = 0.5;
+// What rounding leaves of a distance to go.
+constexpr double kSafe = 1.0 - 1e-9;
+
+/// How far a coordinate is outside of two bounds; NaN where it is one.
+double outside(double x, double low, double high) { return x < low ? low - x : x - std::min(x, high); }
+
+double way_between(const std::vector<Obstacle>& from, const std::vector<Obstacle>& to) {
+  double square = 0.0;
+  for (std::size_t o = 0; o < to.size(); ++o)
+    for (const Vec3d& way : {to[o].point - from[o].point, to[o].other - from[o].other})
+      square = std::max(square, dot(way, way));
+  return std::sqrt(square);
+}
+
+/// How much of a way may be made, by conservative advancement: the distance, a function of that much, falls no faster
+/// than by `speed`.
+template <class Distance>
+double advance(const ContactPair& pair, double speed, const Distance& distance_at) {
+  const double start = distance_at(0.0);
+  const double least = std::min(kNearest * start, pair.nearest());
+  double tau = 0.0, distance = start;
+  for (int k = 0; k < 100; ++k) {
+    tau += (distance - 0.99 * least) / speed;
+    if (tau >= 1.0) return 1.0;
+    distance = distance_at(tau);
+    if (distance <= least) break;
+  }
+  return tau;
+}
+
+/// How much of a way a piece of a curve may make.
+double allowed_of_piece(const Bodies& bodies, const ContactPair& pair, const VectorX& q, const VectorX* change,
+                        const Vec3d& shift) {
+  Vec3d x[4], d[4] = {};
+  bodies.end_points(pair, q, x);
+  if (change) bodies.end_points(pair, *change, d);
+  double speed = 0.0;
+  for (int i = 0; i < pair.piece.weights->nodes; ++i) {
+    d[i] -= shift;
+    speed = std::max(speed, dot(d[i], d[i]));
+  }
+  // Shares of nodes in points, and of points in the distance, add up to no more than 7/6 and 5/4, each taken as
+  // positive.
+  speed = 1.5 * std::sqrt(speed);
+  if (speed == 0.0) return 1.0;
+  return advance(pair, speed, [&](double tau) {
+    Vec3d moved[3];
+    for (int i = 0; i < 3; ++i) moved[i] = x[i] + tau * d[i];
+    return curve_distance(pair.piece, bodies.obstacle(pair), moved).distance;
+  });
+}
+
+/// The same of straight lines, whose distance falls no faster than the ends move against each other. `change`: of q;
+/// nothing: rods stay. `shift`: of the obstacle.
+double allowed_of(const Bodies& bodies, const ContactPair& pair, const VectorX& q, const VectorX* change,
+                  const Vec3d& shift) {
+  if (pair.curve()) return allowed_of_piece(bodies, pair, q, change, shift);
+  Vec3d x[4], d[4] = {Vec3d{}, Vec3d{}, shift, shift};
+  bodies.end_points(pair, q, x);
+  const int edges[2] = {pair.key.a, pair.key.b};
+  for (int side = 0; change && side < (pair.key.b < 0 ? 1 : 2); ++side) {
+    d[2 * side] = local_vector(*bodies.model, *change, bodies.model->tail_dof[at(edges[side])]);
+    d[2 * side + 1] = local_vector(*bodies.model, *change, bodies.model->head_dof[at(edges[side])]);
+  }
+  double speed = 0.0;
+  for (int a = 0; a < 2; ++a)
+    for (int b = 2; b < 4; ++b) speed = std::max(speed, dot(d[a] - d[b], d[a] - d[b]));
+  speed = std::sqrt(speed);
+  const Vec3d middle = 0.5 * (x[0] + x[1] - x[2] - x[3]), u = x[1] - x[0], v = x[3] - x[2];
+  const double bound =
+      std::sqrt(dot(middle, middle)) - 0.5 * (std::sqrt(dot(u, u)) + std::sqrt(dot(v, v))) - pair.nearest();
+  if (speed <= bound) return 1.0;
+  return advance(pair, speed, [&](double tau) {
+    const ClosestPoints c = closest_points(x[0] + tau * d[0], x[1] + tau * d[1], x[2] + tau * d[2], x[3] + tau * d[3],
+                                           pair.weight_a, pair.weight_b);
+    return std::sqrt(dot(c.between, c.between));
+  });
+}
+
+}  // namespace
+
+Candidates::Candidates(const Model& model, const Surfaces& surfaces)
+    : model_(model), surfaces_(surfaces), pairs_(surfaces.obstacle_pairs()) {}
+
+void Candidates::forget() {
+  pairs_ = surfaces_.obstacle_pairs();
+  reference_.resize(0);
+  bounds_.clear();
+  last_.resize(0);
+}
+
+/// By how much less than before two bodies may be apart, over two, since bounds were last looked at.
+double Candidates::way_from_last(const VectorX& q, const Bodies& bodies) const {
+  if (last_.size() != q.size() || last_obstacles_.size() != bodies.obstacles.size()) return INFINITY;
+  return farthest(model_, q - last_) + 2.0 * way_between(last_obstacles_, bodies.obstacles);
+}
+
+/// Has candidates for q, and what is known of how near they come there.
+void Candidates::reach(const VectorX& q, const Bodies& bodies) {
+  moved_ += way_from_last(q, bodies);
+  if (outgrown(q, nullptr)) find_pairs(q, q);
+  if (!std::isfinite(moved_)) {
+    moved_ = 0.0;
+    bounds_.clear();
+  }
+  last_ = q;
+  last_obstacles_ = bodies.obstacles;
+  bounds_.resize(pairs_.size());
+}
+
+/// A distance changes by no more than both edges move.
+void Candidates::set_bounds(double distance, std::size_t p) {
+  const ContactPair& pair = pairs_[p];
+  const auto above = [&](double least) { return moved_ + kSafe * 0.5 * (distance - least); };
+  // The weights of closest_points make it greater than that of the points themselves.
+  const double weights = 0.25 * (pair.weight_a + pair.weight_b);
+  bounds_[p] = {above(pair.reach()), above(std::sqrt(pair.nearest() * pair.nearest() + weights))};
+}
+
+/// Whether some node has left, or would leave, what the candidates were found for.
+bool Candidates::outgrown(const VectorX& q, const VectorX* change) const {
+  if (surfaces_.edges().empty()) return false;
+  if (reference_.size() != q.size()) return true;
+  const double most = 0.25 * margin_ * margin_;
+  for (int dof : model_.node_dof) {
+    double square = 0.0, later = 0.0;
+    for (int k = dof; k < dof + model_.dimension; ++k) {
+      const double d = outside(q(k), low_(k), high_(k));
+      square += d * d;
+      if (!change) continue;
+      const double then = outside(q(k) + (*change)(k), low_(k), high_(k));
+      later += then * then;
+    }
+    if (!(std::max(square, later) <= most)) return true;
+  }
+  return false;
+}
+
+/// Boxes of all edges that may touch others, on a way, grown by half of the tolerance and by `more` than that.
+template <class More>
+void Candidates::set_boxes(const VectorX& from, const VectorX& to, const More& more, std::vector<Box>& out) const {
+  out.clear();
+  for (int e : surfaces_.edges()) {
+    const int tail = model_.edge_tail[at(e)], head = model_.edge_head[at(e)];
+    const double grow = surfaces_.radius(e) + 0.5 * surfaces_.tolerance(e) + more(e);
+    Box box = Box::around(local_position(model_, from, tail), local_position(model_, from, head), grow);
+    if (&from != &to)
+      box.include(Box::around(local_position(model_, to, tail), local_position(model_, to, head), grow));
+    out.push_back(box);
+  }
+}
+
+/// At q, grown by so many radii.
+std::vector<Box> Candidates::boxes_at(const VectorX& q, double radii) const {
+  std::vector<Box> boxes;
+  if (q.size() > 0) set_boxes(q, q, [&](int e) { return radii * surfaces_.radius(e); }, boxes);
+  return boxes;
+}
+
+/// Candidates for the way from one configuration to another, and beyond by a margin that grows with the last travel.
+void Candidates::find_pairs(const VectorX& from, const VectorX& to) {
+  if (surfaces_.edges().empty()) return;
+  double travel = 0.0;
+  if (reference_.size() == to.size())
+    for (int dof : model_.node_dof)
+      travel = std::max(travel, (to.segment(dof, model_.dimension) - reference_.segment(dof, model_.dimension)).norm());
+  const double reach = surfaces_.greatest_reach();
+  margin_ = std::clamp(4.0 * travel, 0.25 * reach, 2.0 * reach);
+  set_boxes(from, to, [&](int) { return 0.5 * margin_; }, boxes_);
+  add_near(broad_phase_.find(boxes_), pairs_);
+  // Iterates go to and fro on a way whose candidates are all known.
+  low_ = from.cwiseMin(to);
+  high_ = from.cwiseMax(to);
+  reference_ = to;
+  bounds_.assign(pairs_.size(), {});
+}
+
+/// Pairs with obstacles, and those of edges whose boxes overlap, sorted by key.
+void Candidates::add_near(const std::vector<BroadPhase::Pair>& found, std::vector<ContactPair>& pairs) const {
+  const std::vector<ContactPair>& fixed = surfaces_.obstacle_pairs();
+  pairs.assign(fixed.begin(), fixed.end());
+  for (const BroadPhase::Pair& boxes : found) {
+    const int a = surfaces_.edges()[at(boxes.a)], b = surfaces_.edges()[at(boxes.b)];
+    if (surfaces_.may_touch(a, b)) pairs.push_back(surfaces_.pair(a, b));
+  }
+}
+
+std::vector<ContactKey> Candidates::near(const VectorX& q, const Bodies& bodies) const {
+  std::vector<ContactPair> pairs;
+  add_near(BroadPhase().find(boxes_at(q, kNear)), pairs);
+  std::vector<ContactKey> keys;
+  for (const ContactPair& pair : pairs)
+    if (pair.key.b < 0 || bodies.proximity(pair, q).distance < pair.reach() + kNear * pair.radii())
+      keys.push_back(pair.key);
+  std::sort(keys.begin(), keys.end());
+  return keys;
+}
+
+double Candidates::allowed(const VectorX& q, const Bodies& bodies, const VectorX& change) {
+  if (outgrown(q, &change)) {
+    const VectorX end = q + change;
+    find_pairs(q, end);
+  }
+  double least = 1.0;
+  bounds_.resize(pairs_.size());
+  const double here = moved_ + way_from_last(q, bodies), coming = farthest(model_, change);
+  for (std::size_t p = 0; p < pairs_.size(); ++p) {
+    if (bounds_[p].open - here >= coming || bodies.flat(pairs_[p])) continue;
+    least = std::min(least, allowed_of(bodies, pairs_[p], q, &change, Vec3d{}));
+  }
+  return least;
+}
+
+bool Candidates::blocked(const VectorX& q, const Bodies& bodies, const std::vector<Vec3d>& shift) const {
+  for (const ContactPair& pair : surfaces_.obstacle_pairs())
+    if (!bodies.flat(pair) && allowed_of(bodies, pair, q, nullptr, shift[at(-1 - pair.key.b)]) < 1.0) return true;
+  return false;
+}
+
+}  // namespace withe

@@ -1,0 +1,82 @@
+#pragma once
+/// Which surfaces may touch, and how far an iterate may go.
+///
+/// A grid finds the pairs of edges that may come near on the way of an iterate, and beyond it by a margin; they are
+/// found again when a node leaves that. What touches, and how far an iterate may go, depends on where the bodies are
+/// and on nothing that came before: bounds of how far nodes must move to change either only let pairs be skipped.
+
+#include <vector>
+
+#include "contact/bodies.hpp"
+#include "contact/broad_phase.hpp"
+
+namespace withe {
+
+class Candidates {
+ public:
+  Candidates(const Model& model, const Surfaces& surfaces);
+
+  /// Calls add(pair, proximity) for all that is within reach at q: obstacles' pairs first, then others, sorted by key.
+  template <class Add>
+  void find(const VectorX& q, const Bodies& bodies, const Add& add) {
+    reach(q, bodies);
+    for (std::size_t p = 0; p < pairs_.size(); ++p) {
+      if (bounds_[p].clear > moved_) continue;
+      const Proximity proximity = bodies.proximity(pairs_[p], q);
+      set_bounds(proximity.distance, p);
+      if (proximity.distance < pairs_[p].reach()) add(pairs_[p], proximity);
+    }
+  }
+  /// The same without a trace.
+  template <class Add>
+  void find(const VectorX& q, const Bodies& bodies, const Add& add) const {
+    std::vector<ContactPair> found;
+    const bool known = !outgrown(q, nullptr);
+    if (!known) add_near(BroadPhase().find(boxes_at(q, 0.0)), found);
+    const double here = moved_ + way_from_last(q, bodies);
+    const std::vector<ContactPair>& pairs = known ? pairs_ : found;
+    for (std::size_t p = 0; p < pairs.size(); ++p) {
+      if (known && p < bounds_.size() && bounds_[p].clear > here) continue;
+      const Proximity proximity = bodies.proximity(pairs[p], q);
+      if (proximity.distance < pairs[p].reach()) add(pairs[p], proximity);
+    }
+  }
+  /// How much of a change of q may be made before centrelines come too close, from 0 to 1.
+  double allowed(const VectorX& q, const Bodies& bodies, const VectorX& change);
+  /// Whether an obstacle that moves by its `shift` would pass through a rod that stays at q.
+  bool blocked(const VectorX& q, const Bodies& bodies, const std::vector<Vec3d>& shift) const;
+  /// What is within reach and half of its radii at q, sorted by key, whatever the candidates are; and all obstacles'
+  /// pairs. Empty q: these alone.
+  std::vector<ContactKey> near(const VectorX& q, const Bodies& bodies) const;
+  /// Without what was found before.
+  void forget();
+
+ private:
+  struct Bounds {
+    double clear = -1.0;  ///< it touches nothing while `moved_` stays below [m]
+    double open = -1.0;   ///< nor do its centrelines come nearer than an iteration may bring them
+  };
+  void reach(const VectorX& q, const Bodies& bodies);
+  void set_bounds(double distance, std::size_t pair);
+  double way_from_last(const VectorX& q, const Bodies& bodies) const;
+  template <class More>
+  void set_boxes(const VectorX& from, const VectorX& to, const More& more, std::vector<Box>& out) const;
+  std::vector<Box> boxes_at(const VectorX& q, double more) const;
+  void add_near(const std::vector<BroadPhase::Pair>& found, std::vector<ContactPair>& pairs) const;
+  void find_pairs(const VectorX& from, const VectorX& to);
+  bool outgrown(const VectorX& q, const VectorX* change) const;
+  const Model& model_;
+  const Surfaces& surfaces_;
+  BroadPhase broad_phase_;
+  std::vector<Box> boxes_;
+  std::vector<ContactPair> pairs_;  ///< obstacles' first, then those of the broad phase, sorted by key
+  VectorX reference_;               ///< where the candidates belong
+  VectorX low_, high_;              ///< bounds of the way there
+  double margin_ = 0;
+  std::vector<Bounds> bounds_;  ///< per pair
+  VectorX last_;                ///< the last q, and obstacles there
+  std::vector<Obstacle> last_obstacles_;
+  double moved_ = 0;  ///< farthest that a node may have gone, summed over all q so far [m]
+};
+
+}  // namespace withe

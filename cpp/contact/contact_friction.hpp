@@ -1,0 +1,42 @@
+#pragma once
+/// Friction of the contacts of a step: see friction.hpp.
+
+#include "contact/contact_linearisation.hpp"
+#include "contact/contact_problem.hpp"
+#include "contact/friction.hpp"
+
+namespace withe {
+
+/// Whether friction grows with slip, so that its slip tolerance can be made greater for a while.
+bool regularises_friction(const Model& model);
+/// Of an anchor, for a contact of that stiffness [N/m].
+double tangential_stiffness(const ContactPair& pair, double stiffness);
+/// Friction by the slip, at most [N/m].
+double friction_slope(const ContactProblem& problem, const Touching& t, const ContactLinearisation& linearisation);
+/// Adds minus the friction on a contact, and its derivative when asked for. False where there is none.
+bool add_friction(const ContactProblem& problem, const Touching& t, const ContactLinearisation& linearisation,
+                  bool with_hessian, ContactLocal& out);
+/// What an anchor stores [J].
+double anchor_energy(const ContactProblem& problem, const Touching& t);
+/// Work of an obstacle's turning against friction [J].
+double turning_work(const ContactProblem& problem, const Touching& t);
+/// Notes friction at the end of the step, where it is not lagged.
+void record_friction(const ContactProblem& problem, const Touching& t, ContactRecord& record);
+/// The same of a lagged one.
+void record_lagged_friction(const ContactProblem& problem, const Touching& t, ContactRecord& record);
+
+/// A contact's slip, what a change of the unknowns adds to it, and the friction on it.
+struct Slipping {
+  Vec3d slip{}, change{};
+  ForceLaw law;
+  double limit = 0;  ///< [N]
+};
+Slipping slipping(const ContactProblem& problem, const Touching& t, const ContactLinearisation& linearisation,
+                  const VectorX& change);
+/// Whether all surfaces slip so little by `change` that a tangent says enough.
+bool slips_shortly(const ContactProblem& problem, const ContactLinearisation& linearisation, const VectorX& change);
+
+/// Friction with J of the start, where frames have not turned yet, of what touches there.
+LaggedFriction lag_friction(const ContactProblem& problem, const Touching& t);
+
+}  // namespace withe

@@ -1,0 +1,49 @@
+#pragma once
+/// How Newton's method takes contact: a continuation in the slip tolerance, what its derivatives leave out, and the
+/// friction that its last step has predicted.
+
+#include <algorithm>
+#include <utility>
+#include <vector>
+
+#include "geometry/vec3.hpp"
+#include "model/state.hpp"
+
+namespace withe {
+
+/// Friction of contacts over its limit, as a step of Newton's method predicts it: the multipliers of a primal-dual
+/// linearisation, see `ForceLaw`.
+class FrictionPrediction {
+ public:
+  /// Nothing where there has been no step; what touches since then has none.
+  const Vec3d* of(const ContactKey& key) const {
+    static constexpr Vec3d kNone{};
+    if (!known_) return nullptr;
+    const auto found = std::lower_bound(shares_.begin(), shares_.end(), key,
+                                        [](const Share& share, const ContactKey& k) { return share.first < k; });
+    return found != shares_.end() && found->first == key ? &found->second : &kNone;
+  }
+  void clear() { known_ = false; }
+  /// Takes what make(add) gives by calls of add(key, share); until it is done the last prediction can be asked for.
+  template <class Make>
+  void renew(const Make& make) {
+    next_.clear();
+    make([this](const ContactKey& key, const Vec3d& share) { next_.emplace_back(key, share); });
+    std::sort(next_.begin(), next_.end(), [](const Share& a, const Share& b) { return a.first < b.first; });
+    shares_.swap(next_);
+    known_ = true;
+  }
+
+ private:
+  using Share = std::pair<ContactKey, Vec3d>;
+  bool known_ = false;
+  std::vector<Share> shares_, next_;  ///< sorted by key
+};
+
+struct ContactLinearisation {
+  double regularisation = 1;    ///< by which the slip tolerance is greater
+  bool geometric = true;        ///< derivatives have how pressing turns, the part by which it has negative stiffness
+  FrictionPrediction friction{};  ///< where known, derivatives are what Newton's steps need, not those of the forces
+};
+
+}  // namespace withe

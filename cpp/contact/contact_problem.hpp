@@ -1,0 +1,126 @@
+#pragma once
+/// What contact is given by in one step: const while the step is solved.
+
+#include <vector>
+
+#include "contact/bodies.hpp"
+#include "contact/pressing_law.hpp"
+
+namespace withe {
+
+/// Surfaces that carry the greatest force of their rod are this deep in each other, over the smaller radius.
+inline constexpr double kDepth = 0.01;
+
+/// How surfaces press in a step (see pressing_law.hpp): in statics and explicit steps, where nothing is known of
+/// impacts; by the force at its end; by that of the whole step, where they have just met; and along the mean direction
+/// too, so that sliding gains nothing.
+enum class Pressing { still, end, mean, mean_direction };
+
+/// Gradient and Hessian of one contact in its own unknowns.
+struct ContactLocal {
+  double gradient[kContactUnknowns];
+  double hessian[kContactUnknowns][kContactUnknowns];
+};
+
+/// One contact at a configuration.
+struct Touching {
+  ContactPair pair;
+  Proximity proximity;
+  double now[kContactUnknowns] = {};  ///< its unknowns
+  ContactEnergy energy;               ///< times the stiffness
+  double stiffness = 0, yielded = 0;
+  double approach = 0, age = 0;  ///< see ContactRecord
+  double before = 0;             ///< distance at the start of the step, where `law` needs it [m]
+  PressingLaw law;
+  PressingForce pressing;
+  Vec3d stick{};
+  int lagged = -1;  ///< friction of the start and no pressing: index in ContactProblem::lagged_friction
+
+  /// Ends of edges as `Bodies::end_points` has them.
+  void end_points(Vec3d (&x)[4]) const {
+    for (int i = 0; i < 4; ++i) x[i] = {now[3 * i], now[3 * i + 1], now[3 * i + 2]};
+  }
+  /// Of the surfaces in each other, over the smaller radius; what has yielded does not press.
+  double depth() const { return (pair.radii() - (proximity.distance + yielded)) / pair.small_radius(); }
+  /// Whether no more than the tail of the contact law presses the surfaces.
+  bool apart() const { return proximity.distance + yielded >= pair.radii(); }
+};
+
+/// Friction with J and N of the start of the step; semi-explicit: along the slip velocity there, where it has one.
+struct LaggedFriction {
+  double slip[3][kContactUnknowns];
+  double pressing = 0;  ///< times how far from sticking the contact starts, if semi-explicit [N]
+  Vec3d direction{};
+  Vec3d drift{};   ///< what an obstacle moves along the surface [m]
+  Vec3d turned{};  ///< of that, what it does by turning [m]
+
+  Vec3d column(int i) const { return {slip[0][i], slip[1][i], slip[2][i]}; }
+};
+
+/// What contact needs of the parameters.
+struct ContactParameters {
+  ContactParameters() = default;
+  ContactParameters(const Surfaces& surfaces, const Parameters& parameters);
+
+  long version = -1;
+  double gravity = 0;       ///< [m/s^2]
+  VectorX edge_mass;        ///< [kg]
+  VectorX least_stiffness;  ///< per rod, that of no contact of which is less [N/m]
+};
+
+struct ContactProblem {
+  const Surfaces* surfaces = nullptr;
+  const ContactParameters* parameters = nullptr;
+  const State* start = nullptr;
+  Pressing pressing = Pressing::still;
+  double duration = 0;                 ///< the time in which slip happens [s]
+  Bodies bodies;                       ///< with obstacles where they are at the end
+  std::vector<Vec3d> shift;            ///< of each obstacle in the step [m]; empty: none moves
+  std::vector<Vec3d> turn;             ///< likewise [rad]; empty: none turns
+  bool starting = false;               ///< what touches as the step begins is about to be found
+  std::vector<ContactRecord> renewed;  ///< of contacts whose surfaces near each other anew in the step; sorted
+  std::vector<ContactKey> unrecorded;  ///< what touches at the start and has no record
+  std::vector<Touching> leaving;       ///< what gives back in the step what it took, wherever it ends
+  std::vector<Touching> lagged;        ///< contacts of the start, for their friction alone
+  std::vector<LaggedFriction> lagged_friction;
+  double start_energy = 0, start_pressing = 0;  ///< of contact and anchors, and of pressing alone [J]
+
+  const Model& model() const { return *bodies.model; }
+  const ContactDescription& description() const { return model().description.contact; }
+  bool frictional() const { return surfaces->frictional(); }
+  /// Whether friction is that of contacts at the start of the step.
+  bool lags() const { return lags(model()); }
+  static bool lags(const Model& model) {
+    const FrictionLaw law = model.description.contact.friction_law;
+    return law == FrictionLaw::lagged || law == FrictionLaw::semi_explicit;
+  }
+  /// Whether the Jacobian of friction is unsymmetric.
+  bool unsymmetric() const { return frictional() && !lags(); }
+  bool anchored() const { return description().friction_law == FrictionLaw::anchored; }
+  /// Way of a pair's obstacle in the step [m], and by which it turns then [rad].
+  Vec3d shift_of(const ContactPair& pair) const { return of_obstacle(pair, shift); }
+  Vec3d turn_of(const ContactPair& pair) const { return of_obstacle(pair, turn); }
+  /// What is remembered of a contact as the step begins, or nothing.
+  const ContactRecord* record_of(const ContactKey& key) const {
+    const ContactRecord* found = renewed.empty() ? nullptr : find_record(renewed, key);
+    return found ? found : find_record(start->contacts, key);
+  }
+  /// Whether a stiffness is given.
+  bool fixed(const ContactPair& pair) const { return pair.stiffness > 0.0 || description().stiffness > 0.0; }
+  /// Of the edges, or half of both beside a node, that a contact holds up [kg].
+  double mass_of(const ContactPair& pair) const;
+  /// Whether surfaces press along the mean direction of the step. Curves have a mean of their own; and in a midpoint
+  /// step only rods do, which thereby keep their angular momentum, unless friction is to stay symmetric.
+  bool turns(const ContactPair& pair) const;
+  /// A curve's distance as the step begins, an obstacle being where it was; and its nodes.
+  CurveDistance<double> curve_at_start(const ContactPair& pair, Vec3d (&x)[4]) const;
+  /// End points as the step begins, those of an obstacle where they were.
+  void start_points(const ContactPair& pair, Vec3d (&x)[4]) const;
+
+ private:
+  static Vec3d of_obstacle(const ContactPair& pair, const std::vector<Vec3d>& ways) {
+    return pair.key.b < 0 && !ways.empty() ? ways[static_cast<std::size_t>(-1 - pair.key.b)] : Vec3d{};
+  }
+};
+
+}  // namespace withe

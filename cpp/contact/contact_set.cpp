@@ -1,0 +1,101 @@
+#include "contact/contact_set.hpp"
+
+#include <algorithm>
+#include <iterator>
+
+#include "contact/contact_friction.hpp"
+#include "contact/contact_stiffness.hpp"
+#include "contact/impacts.hpp"
+#include "contact/pressing.hpp"
+
+namespace withe {
+namespace {
+
+/// Sets what is remembered of a contact, its energy and how it presses.
+void set_from(const ContactProblem& problem, const ContactRecord* record, Touching& t) {
+  t.stiffness = t.pair.share * (record ? record->stiffness : first_stiffness(problem, t.pair));
+  t.yielded = record ? record->yielded : 0.0;
+  t.approach = record ? record->approach : first_approach(problem, t.pair);
+  t.age = record ? record->age : 0.0;
+  if (record) t.stick = record->stick;
+  set_pressing(problem, t);
+}
+
+}  // namespace
+
+void ContactSet::clear() {
+  q_.resize(0);
+  touching_.clear();
+}
+
+Touching& ContactSet::add(const ContactProblem& problem, const ContactPair& pair, const Proximity& proximity) {
+  Touching& t = touching_.emplace_back();
+  t.pair = pair;
+  t.proximity = proximity;
+  problem.bodies.values(pair, q_, t.now);
+  return t;
+}
+
+void ContactSet::set_forces(const ContactProblem& problem, Touching& t) {
+  set_from(problem, problem.record_of(t.pair.key), t);
+}
+
+void ContactSet::renew(const ContactProblem& problem, int i, const ContactRecord& record) {
+  set_from(problem, &record, touching_[static_cast<std::size_t>(i)]);
+}
+
+/// Adds what touches at the start of the step only, and gives back there what it took; `first`: behind what is there
+/// for friction alone.
+void ContactSet::add_leaving(const ContactProblem& problem, std::size_t first) {
+  const std::size_t count = touching_.size();
+  for (const Touching& start : problem.leaving) {
+    const auto from = touching_.begin() + static_cast<std::ptrdiff_t>(first);  // adding to them moves them
+    const auto end = touching_.begin() + static_cast<std::ptrdiff_t>(count);
+    const auto found = std::lower_bound(from, end, start.pair.key, [](const Touching& t, const ContactKey& key) {
+      return comes_before(t.pair.key, key);
+    });
+    if (found != end && found->pair.key == start.pair.key) continue;
+    set_forces(problem, add(problem, start.pair, problem.bodies.proximity(start.pair, q_, true)));
+  }
+}
+
+const Touching* ContactSet::pressing(const ContactKey& key) const {
+  const auto found = std::find_if(touching_.begin(), touching_.end(),
+                                  [&](const Touching& t) { return t.lagged < 0 && t.pair.key == key; });
+  return found == touching_.end() ? nullptr : &*found;
+}
+
+double ContactSet::pressing_energy() const {
+  double sum = 0.0;
+  for (const Touching& t : touching_)
+    if (t.lagged < 0) sum += t.energy.value;
+  return sum;
+}
+
+double ContactSet::energy(const ContactProblem& problem) const {
+  double sum = 0.0;
+  for (const Touching& t : touching_) {
+    if (t.lagged >= 0) continue;
+    sum += t.energy.value;
+    sum += anchor_energy(problem, t);
+  }
+  return sum;
+}
+
+double ContactSet::depth() const {
+  double deepest = 0.0;
+  for (const Touching& t : touching_)
+    if (t.lagged < 0) deepest = std::max(deepest, t.depth());
+  return deepest;
+}
+
+void contact_local(const ContactProblem& problem, const Touching& t, const ContactLinearisation& linearisation,
+                   bool with_hessian, ContactLocal& out) {
+  std::fill(std::begin(out.gradient), std::end(out.gradient), 0.0);
+  if (with_hessian)
+    for (auto& row : out.hessian) std::fill(std::begin(row), std::end(row), 0.0);
+  if (t.lagged < 0) add_pressing(problem, t, with_hessian, linearisation.geometric, out);
+  add_friction(problem, t, linearisation, with_hessian, out);
+}
+
+}  // namespace withe

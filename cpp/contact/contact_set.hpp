@@ -1,0 +1,56 @@
+#pragma once
+/// What touches at a configuration: a value, which knows of no other.
+
+#include "contact/candidates.hpp"
+#include "contact/contact_linearisation.hpp"
+#include "contact/contact_problem.hpp"
+
+namespace withe {
+
+class ContactSet {
+ public:
+  /// Finds what touches at q: what has lagged friction first, then what presses, in the order of candidates, then what
+  /// only gives back what it took. Candidates that are const keep no bounds of what was seen.
+  template <class AnyCandidates>
+  void find(const ContactProblem& problem, AnyCandidates& candidates, const VectorX& q) {
+    q_ = q;
+    touching_ = problem.lagged;
+    for (Touching& t : touching_) problem.bodies.values(t.pair, q, t.now);
+    const std::size_t first = touching_.size();
+    candidates.find(q, problem.bodies, [&](const ContactPair& pair, const Proximity& proximity) {
+      set_forces(problem, add(problem, pair, proximity));
+    });
+    add_leaving(problem, first);
+  }
+  void clear();
+
+  const VectorX& q() const { return q_; }
+  int count() const { return static_cast<int>(touching_.size()); }
+  const Touching& operator[](int i) const { return touching_[static_cast<std::size_t>(i)]; }
+  std::vector<Touching>::const_iterator begin() const { return touching_.begin(); }
+  std::vector<Touching>::const_iterator end() const { return touching_.end(); }
+  /// That of a pair that presses, or nothing.
+  const Touching* pressing(const ContactKey& key) const;
+  /// Gives a contact what a record that has changed says.
+  void renew(const ContactProblem& problem, int i, const ContactRecord& record);
+
+  /// What pressing stores, and that with what anchors do [J].
+  double pressing_energy() const;
+  double energy(const ContactProblem& problem) const;
+  /// Greatest depth of surfaces in each other, over the smaller radius.
+  double depth() const;
+
+ private:
+  Touching& add(const ContactProblem& problem, const ContactPair& pair, const Proximity& proximity);
+  static void set_forces(const ContactProblem& problem, Touching& t);
+  void add_leaving(const ContactProblem& problem, std::size_t first);
+
+  VectorX q_;
+  std::vector<Touching> touching_;
+};
+
+/// Minus the forces of a contact, and their derivative when asked for.
+void contact_local(const ContactProblem& problem, const Touching& t, const ContactLinearisation& linearisation,
+                   bool with_hessian, ContactLocal& out);
+
+}  // namespace withe

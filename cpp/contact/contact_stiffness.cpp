@@ -1,0 +1,314 @@
+#include "contact/contact_stiffness.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "contact/contact_friction.hpp"
+#include "contact/contact_work.hpp"
+#include "contact/impacts.hpp"
+
+namespace withe {
+namespace {
+
+std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+bool by_key(const ContactRecord& a, const ContactRecord& b) { return a.key < b.key; }
+
+// A stiffness follows forces that outgrow it at once, and is then so many times what they want; and it follows those
+// for which it is so many times too great.
+constexpr double kAhead = 1.25, kSlack = 32.0;
+// Greatest depth that has yielded, over the smaller radius; what is beyond the depth that lasts presses again little by
+// little: this much of it is left after a step.
+constexpr double kMostYield = 0.02, kLastingYield = 0.01;
+constexpr double kFading = 0.9;
+
+/// A contact that is yet to come starts as stiff as its rods' greatest force has wanted, so that those which take over
+/// from each other while surfaces slide have no need to change; that fades where it is much more than is wanted now.
+void follow_forces(const VectorX& greatest, VectorX& stiffness) {
+  for (Eigen::Index rod = 0; rod < greatest.size(); ++rod) {
+    double& own = stiffness(rod);
+    if (greatest(rod) > own)
+      own = kAhead * greatest(rod);
+    else if (own > kSlack * greatest(rod))
+      own *= 0.8;
+  }
+}
+
+/// Of a whole node, for a force to press surfaces no deeper than `kDepth` [N/m].
+double wanted_stiffness(const ContactPair& pair, double force) {
+  return force / (2.0 * kDepth * pair.small_radius() * pair.share);
+}
+
+/// What has yielded wears off where surfaces that separate press no more, without work.
+double worn(const Touching& t) { return std::clamp(t.pair.reach() - t.proximity.distance, 0.0, t.yielded); }
+
+/// And fades where it is deep and surfaces rest, which takes work.
+double faded(const Touching& t) {
+  const double lasting = kLastingYield * t.pair.small_radius();
+  const double left = t.yielded > lasting ? lasting + kFading * (t.yielded - lasting) : t.yielded;
+  return std::min(worn(t), left);
+}
+
+/// What stops an edge's mass at the speed at which the ends meet, within the step or within the depth of contact; and
+/// what stores its energy in that depth, where a step's force does as much work as contact stores.
+double impact_stiffness(const ContactProblem& problem, const ContactPair& pair) {
+  if (problem.fixed(pair)) return 0.0;
+  const Model& model = problem.model();
+  const auto end_node = [&](int edge, int end) { return (end == 0 ? model.edge_tail : model.edge_head)[at(edge)]; };
+  const VectorX& velocities = problem.start->v;
+  const bool obstacle = pair.key.b < 0;
+  const Vec3d shift = problem.shift_of(pair);
+  double square = 0.0;
+  for (int k = 0; k < (pair.curve() ? pair.piece.weights->nodes : 2); ++k) {
+    const int node_a = pair.curve() ? pair.piece.node[k] : end_node(pair.key.a, k);
+    const Vec3d v = local_position(model, velocities, node_a) - (1.0 / problem.duration) * shift;
+    if (obstacle) {
+      square = std::max(square, dot(v, v));
+      continue;
+    }
+    for (int l = 0; l < 2; ++l) {
+      const Vec3d relative = v - local_position(model, velocities, end_node(pair.key.b, l));
+      square = std::max(square, dot(relative, relative));
+    }
+  }
+  const double depth = kDepth * pair.small_radius(), half = 0.5 * problem.mass_of(pair) / depth;
+  const double stops = half * std::min(std::sqrt(square) / problem.duration, square / depth);
+  if (problem.pressing < Pressing::mean) return stops;
+  const double speed = approach_speed(problem, pair);
+  return std::max(stops, half * speed * speed / depth);
+}
+
+}  // namespace
+
+double start_stiffness(const ContactProblem& problem, const ContactPair& pair, const VectorX& stiffness) {
+  if (pair.stiffness > 0.0) return pair.stiffness;
+  double start = stiffness(pair.rod_a);
+  if (pair.rod_b >= 0) start = std::max(start, stiffness(pair.rod_b));
+  if (problem.description().law != ContactLaw::spillmann_teschner) return start;
+  // A force 2 k d leads out of the depth d within the step.
+  const VectorX& masses = problem.parameters->edge_mass;
+  const double a = masses(pair.key.a);
+  const double mass = pair.key.b < 0 ? a : a * masses(pair.key.b) / (a + masses(pair.key.b));
+  return std::max(start, 0.5 * mass / (problem.duration * problem.duration));
+}
+
+double first_stiffness(const ContactProblem& problem, const ContactPair& pair) {
+  const double start = start_stiffness(problem, pair, problem.start->contact_stiffness);
+  return meets(problem, pair) ? std::max(start, impact_stiffness(problem, pair)) : start;
+}
+
+/// The depth that must press no more for a contact that becomes stiffer to press as hard as before, which takes energy;
+/// to store as much as before, in an impact; or, where energy does not count, the former, but not so much that surfaces
+/// could sink into each other for good.
+double ContactStiffness::yielded_at(const Touching& t, double ratio, Keep keep) const {
+  const ContactPair& pair = t.pair;
+  const bool force = keep == Keep::force || t.approach == 0.0;
+  const double wanted = (force ? -t.energy.first : t.energy.value) / (t.stiffness * ratio);
+  double low = t.proximity.distance + t.yielded, high = pair.reach();
+  for (int k = 0; k < 60; ++k) {
+    const double middle = 0.5 * (low + high);
+    const ContactEnergy e = contact_energy(t.law.law, middle, pair.radii(), pair.tolerance);
+    ((force ? -e.first : e.value) > wanted ? low : high) = middle;
+  }
+  if (keep == Keep::energy) return high - t.proximity.distance;
+  return std::min(low - t.proximity.distance, kMostYield * pair.small_radius());
+}
+
+/// Gives a contact another stiffness, and another depth that presses no more. Anchors that become stiffer keep their
+/// force, others their energy, and so their elastic slip changes. Returns the energy put in.
+double ContactStiffness::change_stiffness(const Touching& t, double ratio, double yielded,
+                                          ContactRecord& record) const {
+  const ContactPair& pair = t.pair;
+  const double energy = ratio * t.stiffness *
+                        contact_energy(t.law.law, t.proximity.distance + yielded, pair.radii(), pair.tolerance).value;
+  const double shorter = ratio > 1.0 ? 1.0 / ratio : 1.0 / std::sqrt(ratio);
+  const double put_in =
+      energy - t.energy.value - 0.5 * dot(record.friction, record.stick) * (ratio * shorter * shorter - 1.0);
+  record.stick = shorter * record.stick;
+  record.stiffness *= ratio;
+  record.yielded = yielded;
+  return put_in;
+}
+
+double ContactStiffness::wanted_ratio(const Touching& t, const ContactRecord& record) const {
+  if (problem_.fixed(t.pair)) return 1.0;
+  const double wanted = wanted_stiffness(t.pair, record.force);
+  if (wanted > record.stiffness) return kAhead * wanted / record.stiffness;
+  if (record.approach > 0.0) return 1.0;  // as stiff as the impact that has only begun will want it
+  // A contact that is about to open wants next to nothing, and more when it presses again.
+  const double common = std::max(wanted, start_stiffness(problem_, t.pair, problem_.start->contact_stiffness));
+  return kSlack * common < record.stiffness ? 2.0 * common / record.stiffness : 1.0;
+}
+
+/// The greatest force that contact has to hold at a node, times 1e5 / m [Choi, dissertation, (5.16), (5.17)]: what all
+/// other forces there add up to, inertia among them, is what contact and friction are.
+double ContactStiffness::source_stiffness(const ContactSet& set) const {
+  constexpr double kSource = 1e5;  // [1/m]
+  VectorX force;
+  contact_force(problem_, set, force);
+  return kSource * farthest(problem_.model(), force);
+}
+
+ContactRecord ContactStiffness::record(const Touching& t) const {
+  ContactRecord record;
+  record.key = t.pair.key;
+  record.force = -t.energy.first;
+  record.stiffness = t.stiffness / t.pair.share;
+  record.yielded = t.yielded;
+  const bool coming = t.age == 0.0 && t.apart();
+  if (problem_.pressing != Pressing::still && (coming || impact_share(problem_, t) > 0.0)) {
+    record.approach = t.approach;
+    record.age = coming ? 0.0 : t.age + problem_.duration;
+  }
+  record_friction(problem_, t, record);
+  return record;
+}
+
+/// Sorts records, and adds what lagged friction did.
+void ContactStiffness::finish(const ContactSet& set, std::vector<ContactRecord>& records) const {
+  std::sort(records.begin(), records.end(), by_key);
+  for (const Touching& t : set) {
+    if (t.lagged < 0) continue;
+    if (ContactRecord* record = find_record(records, t.pair.key)) record_lagged_friction(problem_, t, *record);
+  }
+}
+
+void ContactStiffness::remember(const ContactSet& set, const VectorX& stiffness,
+                                std::vector<ContactRecord>& records) const {
+  records.clear();
+  for (const Touching& t : set) {
+    if (t.lagged >= 0 || t.proximity.distance >= t.pair.reach()) continue;
+    records.push_back(record(t));
+    if (problem_.record_of(t.pair.key) == nullptr)
+      records.back().stiffness = start_stiffness(problem_, t.pair, stiffness);
+  }
+  finish(set, records);
+}
+
+double ContactStiffness::accept(const ContactSet& set, Keep keep, double spare, std::vector<ContactRecord>& records,
+                                VectorX& stiffness) const {
+  struct Fading {
+    const Touching* touching;
+    std::size_t record;
+  };
+  std::vector<Fading> fading;
+  records.clear();
+  const ContactDescription& contact = problem_.description();
+  const VectorX& least = problem_.parameters->least_stiffness;
+  const bool source = contact.stiffness_rule == StiffnessRule::source && !(contact.stiffness > 0.0);
+  const double common = source ? std::max(source_stiffness(set), least.minCoeff()) : 0.0;
+  VectorX greatest = least;
+  double put_in = 0.0, wanted = 0.0;
+  for (const Touching& t : set) {
+    const ContactPair& pair = t.pair;
+    if (t.lagged >= 0 || t.proximity.distance >= pair.reach()) continue;
+    ContactRecord record = this->record(t);
+    const double ratio = source && !problem_.fixed(pair) ? common / record.stiffness : wanted_ratio(t, record);
+    if (ratio > 1.0) {
+      put_in += change_stiffness(t, ratio, yielded_at(t, ratio, keep), record);
+    } else if (ratio < 1.0 || record.approach > 0.0) {
+      put_in += change_stiffness(t, ratio, worn(t), record);
+    } else if (t.yielded > 0.0) {
+      ContactRecord unused;
+      wanted += change_stiffness(t, 1.0, faded(t), unused);
+      fading.push_back({&t, records.size()});
+    }
+    for (int rod : {pair.rod_a, pair.rod_b})
+      if (rod >= 0) greatest(rod) = std::max(greatest(rod), source ? common : wanted_stiffness(pair, -t.energy.first));
+    records.push_back(record);
+  }
+  // Energy grows with depth the faster the deeper, so that a part of the way takes less than that part of the work.
+  spare -= put_in;
+  const double part = wanted > spare ? spare / wanted : 1.0;
+  for (const auto& [t, number] : fading) {
+    const double left = worn(*t) + part * (faded(*t) - worn(*t));
+    put_in += change_stiffness(*t, 1.0, left, records[number]);
+  }
+  finish(set, records);
+  if (!(contact.stiffness > 0.0)) follow_forces(greatest, stiffness);
+  return put_in;
+}
+
+double ContactStiffness::stiffen(const ContactSet& set, const ContactSet& start, Keep keep,
+                                 std::vector<ContactRecord>& records, VectorX& stiffness) const {
+  double put_in = 0.0;
+  for (const Touching& deep : set) {
+    const ContactPair& pair = deep.pair;
+    const double depth = deep.depth();
+    if (deep.lagged >= 0 || !(depth > 2.0 * kDepth)) continue;
+    const double factor = std::min(100.0, depth / kDepth);
+    ContactRecord* record = find_record(records, pair.key);
+    if (const ContactRecord* renewed = find_record(problem_.renewed, pair.key)) {
+      if (record)
+        *record = *renewed;
+      else
+        record = &*records.insert(std::lower_bound(records.begin(), records.end(), *renewed, by_key), *renewed);
+    }
+    const Touching* pressed = start.pressing(pair.key);
+    if (record && pressed) {
+      put_in += change_stiffness(*pressed, factor, yielded_at(*pressed, factor, keep), *record);
+      continue;
+    }
+    if (pair.stiffness > 0.0) {
+      ContactRecord own;
+      own.key = pair.key;
+      own.stiffness = factor * deep.stiffness / pair.share;
+      records.insert(std::lower_bound(records.begin(), records.end(), own, by_key), own);
+      continue;
+    }
+    for (int rod : {pair.rod_a, pair.rod_b})
+      if (rod >= 0) stiffness(rod) = std::max(stiffness(rod), factor * deep.stiffness / pair.share);
+  }
+  return put_in;
+}
+
+std::vector<ContactRecord> ContactStiffness::renewed(ContactSet& start) const {
+  std::vector<ContactRecord> records;
+  for (int i = 0; i < start.count(); ++i) {
+    const Touching& t = start[i];
+    ContactRecord record;
+    if (const ContactRecord* known = find_record(problem_.start->contacts, t.pair.key)) {
+      if (known->approach == 0.0) continue;  // they rest until they have left each other
+      record = *known;
+    } else {
+      record.key = t.pair.key;
+      record.stiffness = t.stiffness / t.pair.share;
+    }
+    if (!renew(t, record)) continue;
+    start.renew(problem_, i, record);
+    records.push_back(record);
+  }
+  std::sort(records.begin(), records.end(), by_key);
+  return records;
+}
+
+/// Surfaces that a scene begins with within the tolerance of contact fall onto each other if they store less than what
+/// moves and weight will give, and rest if not. Later they may part and meet again within it, and those that press may
+/// be hit by more than the impact that is not yet over. The speed at which they near each other is then that of another
+/// impact, which is on its way in while its age is 0: for it contact is as stiff as if it only began, without a change
+/// of energy.
+bool ContactStiffness::renew(const Touching& t, ContactRecord& record) const {
+  const ContactPair& pair = t.pair;
+  double speed = approach_speed(problem_, pair);
+  if (record.approach == 0.0) {
+    const double given =
+        0.5 * speed * speed + problem_.parameters->gravity * std::max(t.proximity.distance - pair.radii(), 0.0);
+    if (!(t.energy.value < pair.share * problem_.mass_of(pair) * given)) return false;
+    speed = std::max(speed, least_approach(problem_, pair));
+  } else {
+    const bool again = t.apart() && t.age > 0.0 && speed > 0.0;
+    if (!again && speed <= t.approach) return false;
+  }
+  record.approach = speed;
+  record.age = 0.0;
+  const double ratio = impact_stiffness(problem_, pair) / record.stiffness;
+  if (!t.apart() || !(ratio > 1.0)) return true;
+  Touching renewed = t;
+  renewed.approach = speed;
+  record.yielded = yielded_at(renewed, ratio, Keep::energy);
+  record.stiffness *= ratio;
+  record.stick = (1.0 / std::sqrt(ratio)) * record.stick;
+  return true;
+}
+
+}  // namespace withe

@@ -1,0 +1,53 @@
+#pragma once
+/// How stiff contacts are: from the records of contacts as a step begins, and what touches at its end, to the records
+/// that it leaves.
+///
+/// Stiffness k follows each contact's force so that surfaces are about `kDepth` of the smaller radius deep in each
+/// other. What becomes stiffer under load yields, so that it goes on pressing as hard as before, and stores less, or in
+/// an impact stores as much; the depth that presses no more wears off as surfaces part, and fades where they rest.
+
+#include "contact/contact_set.hpp"
+
+namespace withe {
+
+/// What is never more where a contact becomes stiffer under load.
+enum class Keep { force, energy };
+
+/// Of a contact that begins, for a whole node [N/m]. `stiffness`: of contacts that begin, per rod.
+double start_stiffness(const ContactProblem& problem, const ContactPair& pair, const VectorX& stiffness);
+/// Of a contact without a record. What touches already when the step begins does not become stiffer by its speed, which
+/// would put energy in.
+double first_stiffness(const ContactProblem& problem, const ContactPair& pair);
+
+class ContactStiffness {
+ public:
+  explicit ContactStiffness(const ContactProblem& problem) : problem_(problem) {}
+
+  /// Records of what touches at the end of a step, whose stiffness follows the forces, and so does that of contacts
+  /// that begin, per rod. Returns the energy that this put in, below zero where it took some; if that is what to keep,
+  /// no more than `spare` [J].
+  double accept(const ContactSet& set, Keep keep, double spare, std::vector<ContactRecord>& records,
+                VectorX& stiffness) const;
+  /// The same for a step so short that stiffness stays as it is.
+  void remember(const ContactSet& set, const VectorX& stiffness, std::vector<ContactRecord>& records) const;
+  /// Makes contacts stiffer that are too deep in `set`, records of the step's start and stiffness of contacts that
+  /// begin; `start`: what touches there. Returns the energy put in [J].
+  double stiffen(const ContactSet& set, const ContactSet& start, Keep keep, std::vector<ContactRecord>& records,
+                 VectorX& stiffness) const;
+  /// Which surfaces near each other anew as the step begins, of those that touch by then; gives them to `start`.
+  std::vector<ContactRecord> renewed(ContactSet& start) const;
+
+ private:
+  bool renew(const Touching& t, ContactRecord& record) const;
+  ContactRecord record(const Touching& t) const;
+  void finish(const ContactSet& set, std::vector<ContactRecord>& records) const;
+  double yielded_at(const Touching& t, double ratio, Keep keep) const;
+  double change_stiffness(const Touching& t, double ratio, double yielded, ContactRecord& record) const;
+  /// By how much a contact's stiffness is to change, by the force that it carries.
+  double wanted_ratio(const Touching& t, const ContactRecord& record) const;
+  double source_stiffness(const ContactSet& set) const;
+
+  const ContactProblem& problem_;
+};
+
+}  // namespace withe

@@ -1,0 +1,126 @@
+#include "contact/impacts.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace withe {
+namespace {
+
+// An impact is over after so many swings of its contact and steps, and forgotten after twice as many.
+constexpr double kSwings = 12.0, kSteps = 4.0;
+// The speed of approach of what rests, if it does not fall on; over the speed of rest.
+constexpr double kLeastApproach = 1e-9;
+// Surfaces that part faster than this, over the speed at which they will have parted, give back no more than
+// restitution says: slower ones have a four-hundredth of the energy that is to be left. That speed is so much of that
+// of approach, at least.
+constexpr double kParting = 0.05, kLeastParting = 0.1;
+// What an impact gives back is known within this many swings.
+constexpr double kResolvedSwings = 4.0;
+
+/// From 0 to 1 where x does, without a corner.
+double smooth_step(double x) {
+  x = std::clamp(x, 0.0, 1.0);
+  return x * x * (3.0 - 2.0 * x);
+}
+
+/// Steps in a swing by which what an impact gives back, e of the speed, is known to a hundredth: in the one in which it
+/// turns round nothing of the speed is lost, which is the more the less is to be left.
+double steps_in_swing(double restitution) { return std::clamp(10.0 / std::max(restitution, 1e-3), 12.0, 40.0); }
+
+/// Distance as the step begins.
+double start_distance(const ContactProblem& problem, const ContactPair& pair) {
+  Vec3d x[4];
+  if (pair.curve()) return problem.curve_at_start(pair, x).distance;
+  problem.start_points(pair, x);
+  return std::sqrt(closest_points(x[0], x[1], x[2], x[3], pair.weight_a, pair.weight_b).square);
+}
+
+/// The same of the points that are the closest at its end, D0 of `add_mean_pressing`.
+double distance_before(const ContactProblem& problem, const Touching& t) {
+  double w[4];
+  end_weights(t.proximity.points.s, t.proximity.points.t, w);
+  Vec3d start[4], d0{};
+  problem.start_points(t.pair, start);
+  const Vec3d& d1 = t.proximity.points.between;
+  for (int i = 0; i < 4; ++i) d0 += w[i] * start[i];
+  return std::sqrt(std::max(dot(d0, d0) + t.proximity.distance * t.proximity.distance - dot(d1, d1), 0.0));
+}
+
+}  // namespace
+
+double rest_speed(const ContactProblem& problem, const ContactPair& pair) {
+  return std::max(std::sqrt(problem.parameters->gravity * kDepth * pair.small_radius()),
+                  problem.description().slip_tolerance);
+}
+
+double least_approach(const ContactProblem& problem, const ContactPair& pair) {
+  return kLeastApproach * rest_speed(problem, pair);
+}
+
+double swing_time(const ContactProblem& problem, const Touching& t) {
+  return std::numbers::pi * std::sqrt(0.5 * problem.mass_of(t.pair) * t.pair.share / t.stiffness);
+}
+
+double impact_share(const ContactProblem& problem, const Touching& t) {
+  if (!(t.approach > 0.0)) return 0.0;
+  const double over = kSwings * swing_time(problem, t) + kSteps * problem.duration;
+  return smooth_step(t.approach / rest_speed(problem, t.pair) - 1.0) * smooth_step(2.0 - t.age / over);
+}
+
+bool meets(const ContactProblem& problem, const ContactPair& pair) {
+  return !problem.starting && !std::binary_search(problem.unrecorded.begin(), problem.unrecorded.end(), pair.key);
+}
+
+double first_approach(const ContactProblem& problem, const ContactPair& pair) {
+  if (problem.pressing == Pressing::still || !meets(problem, pair)) return 0.0;
+  return std::max(approach_speed(problem, pair), least_approach(problem, pair));
+}
+
+double approach_speed(const ContactProblem& problem, const ContactPair& pair) {
+  Vec3d x[4], v[4];
+  problem.bodies.end_points(pair, problem.start->v, v);
+  const Vec3d shift = problem.shift_of(pair), moved = (1.0 / problem.duration) * shift;
+  if (pair.curve()) {
+    const CurveSlopes slopes = curve_slopes(pair.piece, problem.curve_at_start(pair, x));
+    double rate = 0.0;
+    for (int i = 0; i < 3 * pair.piece.weights->nodes; ++i) rate += slopes.distance[i] * (v[i / 3] - moved)[i % 3];
+    return std::max(0.0, -rate);
+  }
+  problem.start_points(pair, x);
+  if (pair.key.b < 0) v[2] = v[3] = moved;
+  const ClosestPoints c = closest_points(x[0], x[1], x[2], x[3], pair.weight_a, pair.weight_b);
+  double w[4];
+  end_weights(c.s, c.t, w);
+  Vec3d rate{};
+  for (int i = 0; i < 4; ++i) rate += w[i] * v[i];
+  return std::max(0.0, -dot(c.between, rate) / std::sqrt(std::max(dot(c.between, c.between), 1e-300)));
+}
+
+void set_pressing(const ContactProblem& problem, Touching& t) {
+  const ContactPair& pair = t.pair;
+  t.law = {problem.description().law, pair.radii(), pair.tolerance, t.stiffness, t.yielded};
+  t.energy = t.law.energy(t.proximity.distance);
+  t.energy.value *= t.stiffness;
+  t.energy.first *= t.stiffness;
+  t.energy.second *= t.stiffness;
+  t.pressing = {t.energy.first, t.energy.second, 0.0};
+  const double share = problem.pressing == Pressing::still ? 0.0 : impact_share(problem, t);
+  if (share == 0.0) return;
+  // Friction that goes with the force k E'(D0) asks for the same force at the end of the step before.
+  const bool lags = problem.lags() && pair.friction > 0.0;
+  if (problem.pressing >= Pressing::mean && !lags) t.law.elastic = share;
+  t.law.restitution = std::sqrt(1.0 - share * (1.0 - pair.restitution * pair.restitution));
+  t.law.parting = kParting * std::max(t.law.restitution, kLeastParting) * t.approach * problem.duration;
+  if (t.law.elastic == 0.0 && !(t.law.restitution < 1.0)) return;
+  t.before = problem.turns(pair) ? distance_before(problem, t) : start_distance(problem, pair);
+  t.pressing = t.law.at(t.before, t.proximity.distance);
+}
+
+bool unresolved(const ContactProblem& problem, const Touching& t, double dt) {
+  if (t.lagged >= 0 || !(t.law.restitution < 1.0)) return false;
+  const double swing = swing_time(problem, t);
+  return t.age < kResolvedSwings * swing && steps_in_swing(t.pair.restitution) * dt > swing;
+}
+
+}  // namespace withe

@@ -1,0 +1,29 @@
+#pragma once
+/// Impacts: at which speed surfaces meet, how long they count as having just met, and what of them presses elastically.
+
+#include "contact/contact_problem.hpp"
+
+namespace withe {
+
+/// Surfaces that meet more slowly rest on each other: as fast as a fall from the depth of contact ends, or as slip that
+/// counts as none [m/s].
+double rest_speed(const ContactProblem& problem, const ContactPair& pair);
+/// Of surfaces that near each other so slowly that they rest, if they do not fall on [m/s].
+double least_approach(const ContactProblem& problem, const ContactPair& pair);
+/// At which surfaces near each other as the step begins [m/s].
+double approach_speed(const ContactProblem& problem, const ContactPair& pair);
+/// Whether surfaces meet in this step.
+bool meets(const ContactProblem& problem, const ContactPair& pair);
+/// That of an impact which the step begins; 0: none.
+double first_approach(const ContactProblem& problem, const ContactPair& pair);
+/// Half a period of an edge on its contact: as long as an impact lasts at least [s].
+double swing_time(const ContactProblem& problem, const Touching& t);
+/// 1 for surfaces that have just met, 0 for those that rest on each other.
+double impact_share(const ContactProblem& problem, const Touching& t);
+/// Whether a step of dt would be too long for what an impact loses by its restitution.
+bool unresolved(const ContactProblem& problem, const Touching& t, double dt);
+/// Sets the law by which surfaces press in a step, and the force at its end, of a contact with its stiffness and speed
+/// of approach.
+void set_pressing(const ContactProblem& problem, Touching& t);
+
+}  // namespace withe

@@ -1,0 +1,44 @@
+#pragma once
+/// Which contacts have a place in the matrix: their rows in the assembler's table of elements.
+
+#include <algorithm>
+#include <vector>
+
+#include "contact/contact.hpp"
+
+namespace withe {
+
+class ContactRows {
+ public:
+  /// Sorted.
+  const std::vector<ContactKey>& keys() const { return keys_; }
+  /// Of all rows, one after the other.
+  const std::vector<int>& unknowns() const { return unknowns_; }
+  /// -1: none.
+  int row(const ContactKey& key) const {
+    const auto known = std::lower_bound(keys_.begin(), keys_.end(), key);
+    return known != keys_.end() && *known == key ? static_cast<int>(known - keys_.begin()) : -1;
+  }
+  /// Whether all that touches has a row.
+  bool hold(const Contact& contact) const {
+    for (int i = 0; i < contact.count(); ++i)
+      if (row(contact.key(i)) < 0) return false;
+    return true;
+  }
+  void set(const Surfaces& surfaces, std::vector<ContactKey> keys) {
+    std::sort(keys.begin(), keys.end());
+    keys_ = std::move(keys);
+    unknowns_.clear();
+    for (const ContactKey& key : keys_) {
+      int dofs[kContactUnknowns];
+      surfaces.unknowns(key, dofs);
+      unknowns_.insert(unknowns_.end(), std::begin(dofs), std::end(dofs));
+    }
+  }
+
+ private:
+  std::vector<ContactKey> keys_;
+  std::vector<int> unknowns_;
+};
+
+}  // namespace withe
