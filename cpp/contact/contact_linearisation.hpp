@@ -41,8 +41,8 @@ class FrictionPrediction {
 };
 
 struct ContactLinearisation {
-  double regularisation = 1;    ///< by which the slip tolerance is greater
-  bool geometric = true;        ///< derivatives have how pressing turns, the part by which it has negative stiffness
+  double regularisation = 1;      ///< by which the slip tolerance is greater
+  bool geometric = true;          ///< derivatives have how pressing turns, the part by which it has negative stiffness
   FrictionPrediction friction{};  ///< where known, derivatives are what Newton's steps need, not those of the forces
 };
 

@@ -22,7 +22,7 @@ ContactTable World::contacts() const {
   ContactTable table;
   table.bodies.resize(0, 5);
   table.numbers.resize(0, 14);
-  Contact* contact = self.equations->contact();
+  const Contact* contact = self.equations->contact();
   if (contact == nullptr) return table;
   const Model& model = self.model;
   const std::vector<ContactReport> reports = contact->report(self.state, self.parameters);
@@ -44,7 +44,7 @@ ContactTable World::contacts() const {
 
 /// Refuses a drawing in which surfaces are inside each other.
 void World::Implementation::check_overlap() const {
-  Contact* contact = equations->contact();
+  const Contact* contact = equations->contact();
   if (contact == nullptr) return;
   const ContactReport* deepest = nullptr;
   const std::vector<ContactReport> reports = contact->report(state, parameters);

@@ -72,7 +72,7 @@ Energy World::Implementation::energy_of(const State& at, double loads, double wo
   e.twist = turned.twist;
   e.gravity = gravity_energy(model, parameters, at.q, [](int) { return 1.0; });
   e.loads = -loads;
-  if (Contact* contact = equations->contact()) e.contact = contact->energy_of(at, parameters);
+  if (const Contact* contact = equations->contact()) e.contact = contact->energy_of(at, parameters);
   e.total = e.kinetic + e.stretch + e.bend + e.twist + e.gravity + e.loads + e.contact;
   e.work = work_done;
   e.dissipated = lost;
