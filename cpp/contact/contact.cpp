@@ -240,4 +240,18 @@ void Contact::forget() {
   problem_.leaving.clear();
 }
 
+void Contact::hold_sticking(const State& state, VectorX& change) const {
+  const Model& model = problem_.model();
+  for (const ContactRecord& record : state.contacts) {
+    // Rods that stick to each other may well move together, which lagged friction is content with.
+    if (!record.sticking || (record.key.b >= 0 && !unsymmetric())) continue;
+    for (int edge : {record.key.a, record.key.b}) {
+      if (edge < 0) continue;
+      change.segment(model.tail_dof[at(edge)], model.dimension).setZero();
+      change.segment(model.head_dof[at(edge)], model.dimension).setZero();
+      if (!model.planar()) change(model.edge_dof[at(edge)]) = 0.0;
+    }
+  }
+}
+
 }  // namespace withe

@@ -91,6 +91,10 @@ class Contact {
   /// Predicts the friction of a step of Newton's method by which `change` is to be added to q1.
   void predict_friction(const VectorX& change, ContactLinearisation& linearisation) const;
 
+  /// Takes from a predicted change of q what would move surfaces that stick: friction is steep there, and from outside
+  /// Newton's method would fall past it.
+  void hold_sticking(const State& state, VectorX& change) const;
+
   /// Keeps in `state`, still where the step began, what contacts at q1 must remember: see `ContactStiffness::accept`.
   double accept(State& state, Keep keep, double spare) const;
   /// The same for a step so short that stiffness stays as it is.

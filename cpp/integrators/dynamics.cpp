@@ -215,7 +215,10 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
     if (equations.allowed(state.q, work.change) < 1.0) return result;
     contact->update(q1);
     result.too_deep = contact->too_deep();
-    if (result.too_deep) return result;
+    if (result.too_deep) {
+      work.deep = work.z;
+      return result;
+    }
   }
   work.change = q1 - state.q;
   const bool conserves = plan.rule == StepRule::energy_momentum;

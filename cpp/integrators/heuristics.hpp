@@ -14,12 +14,19 @@ enum class Heuristic : unsigned {
   surface_search,
   search_descent,
   drop_geometric,
-  extrapolated_start,
+  start_accelerated,
+  start_steady,
+  start_other_method,
   start_continuation,
   start_record,
+  remember_plain,
+  friction_order,
   few_iterations,
+  repeat_from_end,
+  hold_sticking,
   predict_friction,
   supports_linear,
+  continuation_secant,
 };
 
 /// A set of heuristics that are switched off.

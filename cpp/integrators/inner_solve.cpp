@@ -7,11 +7,15 @@
 namespace withe {
 namespace {
 
-/// Initial guesses: the extrapolated motion; rest; rest, and continuation in friction's regularisation.
-enum class Guess : std::size_t { extrapolated, rest, continuation };
+/// Initial guesses: the extrapolated motion; a steady one; rest; a steady one with the other of the mixed and the plain
+/// method; rest, and continuation in friction's regularisation.
+enum class Guess : std::size_t { accelerated, steady, rest, other_method, continuation };
+using Guesses = std::array<Guess, 5>;
 
-// Iterations of a guess that may be wrong.
-constexpr int kFew = 12;
+// Iterations of guesses that may be wrong, and of repeated steps.
+constexpr int kFew = 12, kRepeated = 24;
+// Steps without the mixed method after it has gone round in circles.
+constexpr int kPlainSolves = 16;
 // The slip over which friction grows, over that of the scene, and iterations at each.
 constexpr std::array<double, 7> kRegularisation{8192.0, 4096.0, 512.0, 64.0, 16.0, 4.0, 1.0};
 constexpr int kMostOfEach = 20;
@@ -77,13 +81,23 @@ class InnerSolve {
         predictor_(predictor),
         work_(work),
         history_(work.newton.guesses),
-        regularised_(equations.contact() && equations.contact()->frictional() && equations.contact()->regularises()),
-        points_(predictor.points(plan.slot)) {}
+        frictional_(equations.contact() && equations.contact()->frictional()),
+        regularised_(frictional_ && equations.contact()->regularises()),
+        circling_(plan.rule == StepRule::energy_momentum),
+        mixed_(!circling_ || history_.plain_solves == 0),
+        points_(predictor.points(plan.slot)) {
+    if (circling_ && !mixed_) --history_.plain_solves;
+  }
 
   NewtonResult run() {
     NewtonResult found;
     int spent = 0;
-    for (Guess guess : {Guess::extrapolated, Guess::rest, Guess::continuation}) {
+    if (work_.repeated && uses(Heuristic::repeat_from_end)) {
+      found = repeat();
+      if (found.converged) return found;
+      spent = found.iterations;
+    }
+    for (Guess guess : order()) {
       if (!applies(guess)) continue;
       GuessRecord& record = history_.records[static_cast<std::size_t>(guess)];
       const bool sure = certain(guess);
@@ -91,35 +105,73 @@ class InnerSolve {
       found = solve_from(guess);
       spent += found.iterations;
       if (!sure) record.note(found.converged);
-      if (found.converged) break;
+      if (!found.converged) continue;
+      if (circling_ && mixed_ && guess == Guess::other_method && uses(Heuristic::remember_plain))
+        history_.plain_solves = kPlainSolves;
+      break;
     }
     found.iterations = spent;
     return found;
   }
 
  private:
-  bool applies(Guess guess) const {
-    if (guess == Guess::extrapolated) return points_ != 0 && uses(Heuristic::extrapolated_start);
-    return guess == Guess::rest || (regularised_ && uses(Heuristic::start_continuation));
+  /// Where surfaces stick, a motion that lets them slip leads far off, and from rest Newton's method finds its way
+  /// soon, or else mostly within a shorter step.
+  Guesses order() const {
+    if (!uses(Heuristic::friction_order))
+      return {Guess::accelerated, Guess::steady, Guess::rest, Guess::other_method, Guess::continuation};
+    if (regularised_) return {Guess::accelerated, Guess::rest, Guess::continuation, Guess::steady, Guess::other_method};
+    if (frictional_) return {Guess::accelerated, Guess::rest, Guess::steady, Guess::other_method, Guess::continuation};
+    return {Guess::accelerated, Guess::steady, Guess::rest, Guess::other_method, Guess::continuation};
   }
 
-  /// What is always tried: rest, and where steps are not cut, continuation. Others only while they help.
-  bool certain(Guess guess) const {
-    return guess == Guess::rest || (guess == Guess::continuation && !options_.adaptive);
+  bool applies(Guess guess) const {
+    if (guess == Guess::accelerated && !uses(Heuristic::start_accelerated)) return false;
+    if (guess == Guess::steady && !uses(Heuristic::start_steady)) return false;
+    if (guess == Guess::other_method && !uses(Heuristic::start_other_method)) return false;
+    if (guess == Guess::continuation && !uses(Heuristic::start_continuation)) return false;
+    if (guess == Guess::continuation) return regularised_;
+    return guess != Guess::accelerated || (points_ != 0 && !work_.repeated);
   }
+
+  /// What is always tried: rest, and where friction does not let surfaces jump all but the extrapolated motion. Others
+  /// only while they help.
+  bool certain(Guess guess) const {
+    if (guess == Guess::rest) return true;
+    return guess != Guess::accelerated && !(frictional_ && options_.adaptive);
+  }
+
+  /// What need not lead to the solution is given up after few iterations. Where edges turn by a radian in an
+  /// energy-momentum step, the mixed method may circle for ever: then the plain one comes first for a while.
+  bool on_trial(Guess guess) const {
+    const bool moving = guess == Guess::steady || guess == Guess::other_method;
+    return guess == Guess::accelerated || (circling_ && moving && mixed(guess));
+  }
+
+  bool mixed(Guess guess) const { return (guess == Guess::other_method) != mixed_; }
 
   bool uses(Heuristic h) const { return options_.heuristics.uses(h); }
 
+  NewtonResult repeat() {
+    work_.z = work_.deep;
+    start_axial_force(equations_, work_.z, work_.newton.axial_force);
+    return newton_.solve(
+        equations_, work_.z,
+        {.max_iterations = std::min(kRepeated, options_.max_iterations), .mixed = mixed_, .interval = h_},
+        work_.newton);
+  }
+
   /// Puts the guess into `work.z`.
   void guess_at(Guess guess) {
-    if (guess == Guess::extrapolated) {
+    if (guess == Guess::accelerated) {
       predictor_.extrapolate(state_.time + 0.5 * plan_.dt, points_, work_.mean);
       work_.move = h_ * state_.v + (h_ * h_) * work_.mean;
     } else {
-      work_.move.setZero(state_.q.size());
+      work_.move = (guess == Guess::rest || guess == Guess::continuation ? 0.0 : h_) * state_.v;
     }
     equations_.assembler().project(work_.move);
     work_.move *= newton_.norms().cap(work_.move);
+    if (equations_.contact() && uses(Heuristic::hold_sticking)) equations_.contact()->hold_sticking(state_, work_.move);
     follow_supports(equations_, newton_, options_, h_ / plan_.dt, state_, work_);
     work_.z = state_.q + work_.move * equations_.allowed(state_.q, work_.move);
     start_axial_force(equations_, state_.q, work_.newton.axial_force);
@@ -128,12 +180,12 @@ class InnerSolve {
   NewtonResult solve_from(Guess guess) {
     guess_at(guess);
     if (guess == Guess::continuation) return solve_by_continuation();
-    // What need not lead to the solution is rejected after few iterations; what surfaces cut short soon converges in
-    // one scene, and leads nowhere in another.
-    const bool trial = guess == Guess::extrapolated && uses(Heuristic::few_iterations);
+    // Guesses that surfaces cut short soon converge in one scene, and lead nowhere in another.
+    const bool trial = on_trial(guess) && uses(Heuristic::few_iterations);
     const NewtonResult found =
         newton_.solve(equations_, work_.z,
                       {.max_iterations = trial ? std::min(kFew, options_.max_iterations) : options_.max_iterations,
+                       .mixed = mixed(guess),
                        .interval = h_,
                        .give_up_if_cut = trial && history_.cut.waits > 0},
                       work_.newton);
@@ -149,7 +201,7 @@ class InnerSolve {
     VectorX& last = work_.velocity;
     int spent = 0;
     for (std::size_t k = 0; k < kRegularisation.size(); ++k) {
-      if (k > 1) {
+      if (k > 1 && uses(Heuristic::continuation_secant)) {
         const double share =
             (kRegularisation[k] - kRegularisation[k - 1]) / (kRegularisation[k - 1] - kRegularisation[k - 2]);
         work_.move = share * (work_.z - last);
@@ -158,8 +210,9 @@ class InnerSolve {
       } else {
         last = work_.z;
       }
-      found = newton_.solve(equations_, work_.z,
-                            {.max_iterations = kMostOfEach, .interval = h_, .regularisation = kRegularisation[k]},
+      found = newton_.solve(
+          equations_, work_.z,
+          {.max_iterations = kMostOfEach, .mixed = mixed_, .interval = h_, .regularisation = kRegularisation[k]},
                             work_.newton);
       spent += found.iterations;
       if (!found.converged) break;
@@ -177,8 +230,10 @@ class InnerSolve {
   const Predictor& predictor_;
   StepWorkspace& work_;
   GuessHistory& history_;
+  bool frictional_;
   bool regularised_;  ///< whether friction's regularisation is what Newton's method may fail on
-  int points_;        ///< of the extrapolation
+  bool circling_, mixed_;
+  int points_;  ///< of the extrapolation
 };
 
 }  // namespace

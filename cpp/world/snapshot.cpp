@@ -305,9 +305,9 @@ void exchange(Archive& io, MatrixHistory& history) {
 
 template <class Archive>
 void exchange(Archive& io, GuessHistory& history) {
-  auto& [records, cut] = history;
+  auto& [records, cut, plain_solves] = history;
   for (auto& [misses, waits] : records) io(misses), io(waits);
-  io(cut.misses), io(cut.waits);
+  io(cut.misses), io(cut.waits), io(plain_solves);
 }
 
 template <class Archive>

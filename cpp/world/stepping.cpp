@@ -303,6 +303,7 @@ bool World::Implementation::inner_step(double dt, int slot, double& error) {
   Equations& system = equations_of_step();
   aim_obstacles(system, end);
   const auto undo = [&] {
+    work.repeated = false;
     system.respond({});
     release_obstacles(system);
     motions = kept_motions;
@@ -315,7 +316,9 @@ bool World::Implementation::inner_step(double dt, int slot, double& error) {
     for (int tries = 0; r.too_deep && tries < kMostStiffenings; ++tries) {
       dissipated -= system.contact()->stiffen(state, Keep::energy);
       work.newton.matrix.owner = nullptr;
+      work.repeated = true;
       r = step_by_rule(dt, slot);
+      work.repeated = false;
     }
   } catch (...) {
     undo();

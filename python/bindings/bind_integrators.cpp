@@ -14,23 +14,28 @@ constexpr Words<Integrator, 6> kIntegrators{{{"static", Integrator::statics},
                                              {"verlet", Integrator::verlet}}};
 constexpr Words<LineSearch, 2> kLineSearches{
     {{"automatic", LineSearch::automatic}, {"goldstein_price", LineSearch::goldstein_price}}};
-constexpr Words<Heuristic, 15> kHeuristics{{
-    {"reuse_across_steps", Heuristic::reuse_across_steps},
-    {"reuse_within_step", Heuristic::reuse_within_step},
-    {"rest_from_reuse", Heuristic::rest_from_reuse},
-    {"late_matrix", Heuristic::late_matrix},
-    {"matrix_worth", Heuristic::matrix_worth},
-    {"reject_cut", Heuristic::reject_cut},
-    {"surface_search", Heuristic::surface_search},
-    {"search_descent", Heuristic::search_descent},
-    {"drop_geometric", Heuristic::drop_geometric},
-    {"extrapolated_start", Heuristic::extrapolated_start},
-    {"start_continuation", Heuristic::start_continuation},
-    {"start_record", Heuristic::start_record},
-    {"few_iterations", Heuristic::few_iterations},
-    {"predict_friction", Heuristic::predict_friction},
-    {"supports_linear", Heuristic::supports_linear},
-}};
+constexpr Words<Heuristic, 22> kHeuristics{{{"reuse_across_steps", Heuristic::reuse_across_steps},
+                                            {"reuse_within_step", Heuristic::reuse_within_step},
+                                            {"rest_from_reuse", Heuristic::rest_from_reuse},
+                                            {"late_matrix", Heuristic::late_matrix},
+                                            {"matrix_worth", Heuristic::matrix_worth},
+                                            {"reject_cut", Heuristic::reject_cut},
+                                            {"surface_search", Heuristic::surface_search},
+                                            {"search_descent", Heuristic::search_descent},
+                                            {"drop_geometric", Heuristic::drop_geometric},
+                                            {"start_accelerated", Heuristic::start_accelerated},
+                                            {"start_steady", Heuristic::start_steady},
+                                            {"start_other_method", Heuristic::start_other_method},
+                                            {"start_continuation", Heuristic::start_continuation},
+                                            {"start_record", Heuristic::start_record},
+                                            {"remember_plain", Heuristic::remember_plain},
+                                            {"friction_order", Heuristic::friction_order},
+                                            {"few_iterations", Heuristic::few_iterations},
+                                            {"repeat_from_end", Heuristic::repeat_from_end},
+                                            {"hold_sticking", Heuristic::hold_sticking},
+                                            {"predict_friction", Heuristic::predict_friction},
+                                            {"supports_linear", Heuristic::supports_linear},
+                                            {"continuation_secant", Heuristic::continuation_secant}}};
 constexpr Words<SolverKind, 3> kSolvers{
     {{"automatic", SolverKind::automatic}, {"band", SolverKind::band}, {"sparse", SolverKind::sparse}}};
 
