@@ -297,10 +297,10 @@ void exchange(Archive& io, EquationsMemory& memory) {
 
 template <class Archive>
 void exchange(Archive& io, MatrixHistory& history) {
-  auto& [interval, contraction, waited, slow] = history;
+  auto& [interval, contraction, waited] = history;
   io(interval);
   for (double& rate : contraction) io(rate);
-  io(waited), io(slow);
+  io(waited);
 }
 
 template <class Archive>
