@@ -9,8 +9,6 @@ namespace {
 // so many steps.
 constexpr double kSlow = 0.15;
 constexpr int kWait = 16;
-// A step, of the contraction rate within a step: what served badly once is tried again in time.
-constexpr double kForgetting = 0.96;
 // So many iterations cost as much as a new matrix.
 constexpr int kCostOfMatrix = 3;
 // An iteration with an old matrix costs about a quarter of one with a new one.
@@ -40,7 +38,6 @@ MatrixReuse::MatrixReuse(MatrixRecord& record, Equations& equations, double inte
     fresh_ = !heuristics.uses(Heuristic::reuse_across_steps) || (badly && ++record.waited < kWait);
     if (!fresh_) record.waited = 0;
   }
-  if (heuristics.uses(Heuristic::forget_contraction)) record.contraction[at(MatrixAge::within)] *= kForgetting;
 }
 
 bool MatrixReuse::near_end() const { return distance_ <= kNearEnd * tolerance_ && heuristics_.uses(Heuristic::late_matrix); }
