@@ -8,7 +8,6 @@ enum class Heuristic : unsigned {
   reuse_across_steps,
   reuse_within_step,
   rest_from_reuse,
-  refresh_while_slipping,
   late_matrix,
   overdue_matrix,
   matrix_worth,

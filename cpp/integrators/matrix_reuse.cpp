@@ -13,8 +13,6 @@ constexpr int kWait = 16;
 constexpr int kCostOfMatrix = 3;
 // An iteration with an old matrix costs about a quarter of one with a new one.
 constexpr double kWorth = 2.5;
-// While steps are longer than this, over the tolerance, surfaces may yet stick or slip, and an old matrix not know it.
-constexpr double kUnsettled = 1e4;
 // So near the end, over the tolerance, an iteration leaves less than that.
 constexpr double kNearEnd = 1e3;
 
@@ -29,8 +27,7 @@ MatrixReuse::MatrixReuse(MatrixRecord& record, Equations& equations, double inte
       interval_(std::abs(interval)),
       allowed_(allowed),
       tolerance_(tolerance),
-      heuristics_(heuristics),
-      slipping_(equations.contact() && equations.contact()->eases() && heuristics.uses(Heuristic::refresh_while_slipping)) {
+      heuristics_(heuristics) {
   if (!allowed)
     drop();
   else if (record.belongs_to(equations, interval) && record.generation == equations.assembler().generation()) {
@@ -71,7 +68,7 @@ void MatrixReuse::note_step(double length) {
   const double here = std::min(0.5, (measured ? 1.0 : 4.0) * record_.contraction[at(age_)]);
   distance_ = step_ * here / (1.0 - here);
   const double next = record_.contraction[at(age_ == MatrixAge::across ? MatrixAge::across : MatrixAge::within)];
-  fresh_ = !std::isfinite(step_) || next > 0.5 || (slipping_ && step_ > kUnsettled * tolerance_) ||
+  fresh_ = !std::isfinite(step_) || next > 0.5 ||
            (!heuristics_.uses(Heuristic::reuse_within_step) && made_here_) ||
            (heuristics_.uses(Heuristic::matrix_worth) && distance_ > tolerance_ && std::log(distance_ / tolerance_) > kWorth * std::log(1.0 / next));
 }

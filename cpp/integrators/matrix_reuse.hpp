@@ -63,7 +63,6 @@ class MatrixReuse {
   bool allowed_;
   double tolerance_;
   const Without& heuristics_;
-  bool slipping_;  ///< whether surfaces may turn round within a slip far smaller than a step
   bool fresh_ = true, made_here_ = false;
   MatrixAge age_ = MatrixAge::fresh, last_age_ = MatrixAge::fresh;
   double step_ = INFINITY, last_step_ = INFINITY;
