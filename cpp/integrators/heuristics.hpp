@@ -9,7 +9,6 @@ enum class Heuristic : unsigned {
   reuse_within_step,
   rest_from_reuse,
   late_matrix,
-  overdue_matrix,
   matrix_worth,
   careful_rate,
   reject_growing,

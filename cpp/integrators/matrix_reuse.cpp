@@ -9,8 +9,6 @@ namespace {
 // so many steps.
 constexpr double kSlow = 0.15;
 constexpr int kWait = 16;
-// So many iterations cost as much as a new matrix.
-constexpr int kCostOfMatrix = 3;
 // An iteration with an old matrix costs about a quarter of one with a new one.
 constexpr double kWorth = 2.5;
 // So near the end, over the tolerance, an iteration leaves less than that.
@@ -38,11 +36,6 @@ MatrixReuse::MatrixReuse(MatrixRecord& record, Equations& equations, double inte
 }
 
 bool MatrixReuse::near_end() const { return distance_ <= kNearEnd * tolerance_ && heuristics_.uses(Heuristic::late_matrix); }
-
-void MatrixReuse::note_overdue() {
-  overdue_ = at_end() ? overdue_ + 1 : 0;
-  if (allowed_ && overdue_ >= kCostOfMatrix && heuristics_.uses(Heuristic::overdue_matrix)) fresh_ = true;
-}
 
 void MatrixReuse::note_matrix(bool whole) {
   fresh_ = made_here_ = true;

@@ -47,8 +47,6 @@ class MatrixReuse {
   double last_step() const { return last_step_; }
   double tolerance() const { return tolerance_; }
 
-  /// Before an iteration that was not to be needed any more.
-  void note_overdue();
   /// A matrix was factorised; `whole`: all of the Jacobian, so that it may serve again.
   void note_matrix(bool whole = true);
   /// After a step: learns how well matrices serve, and decides about the next one.
@@ -67,7 +65,6 @@ class MatrixReuse {
   MatrixAge age_ = MatrixAge::fresh, last_age_ = MatrixAge::fresh;
   double step_ = INFINITY, last_step_ = INFINITY;
   double distance_ = INFINITY;  ///< from the solution, estimated [m]
-  int overdue_ = 0;             ///< iterations since that fell below the tolerance
 };
 
 }  // namespace withe

@@ -136,7 +136,6 @@ class Newton::Solve {
     if (uses(Heuristic::reject_growing) && how_.interval != 0.0 && result_.iterations >= kFirstIterations && std::isinf(reuse_.step()) &&
         std::isinf(reuse_.last_step()) && result_.residual > kMostGrowth * first_residual_)
       return Verdict::failed;
-    reuse_.note_overdue();
     if (reuse_.fresh() && near_end) evaluate(true);
     return Verdict::go_on;
   }
