@@ -52,10 +52,7 @@ void MatrixReuse::note_step(double length) {
   if (!allowed_) return;
   bool measured = false;
   if (std::isfinite(last_step_) && std::isfinite(step_)) {
-    // Steps near the tolerance are rounding as much as progress.
-    const double rate = step_ / last_step_;
-    double& known = record_.contraction[at(last_age_)];
-    if (last_step_ > 1e2 * tolerance_ || rate < known || !heuristics_.uses(Heuristic::careful_rate)) known = rate;
+    record_.contraction[at(last_age_)] = step_ / last_step_;
     measured = last_age_ == age_;
   }
   const double here = std::min(0.5, (measured ? 1.0 : 4.0) * record_.contraction[at(age_)]);
