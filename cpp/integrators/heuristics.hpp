@@ -10,7 +10,6 @@ enum class Heuristic : unsigned {
   rest_from_reuse,
   late_matrix,
   matrix_worth,
-  reject_growing,
   reject_cut,
   stagnation,
   surface_search,

@@ -8,10 +8,6 @@
 namespace withe {
 namespace {
 
-// After so many iterations, steps that are still too long to be taken whole and a residual that has grown by so much
-// lead nowhere in time.
-constexpr int kFirstIterations = 4;
-constexpr double kMostGrowth = 1e3;
 // A first step of which less is kept counts as cut.
 constexpr double kCut = 0.5;
 // Friction has no potential, and may lead downhill in a circle; what has not converged after so many iterations does.
@@ -132,10 +128,6 @@ class Newton::Solve {
     balance_ = newton_.balance(work_.evaluation, result_);
     if (converged()) return Verdict::converged;
     if (result_.iterations == how_.max_iterations) return Verdict::failed;
-    if (result_.iterations == 0) first_residual_ = result_.residual;
-    if (uses(Heuristic::reject_growing) && how_.interval != 0.0 && result_.iterations >= kFirstIterations && std::isinf(reuse_.step()) &&
-        std::isinf(reuse_.last_step()) && result_.residual > kMostGrowth * first_residual_)
-      return Verdict::failed;
     if (reuse_.fresh() && near_end) evaluate(true);
     return Verdict::go_on;
   }
@@ -207,7 +199,6 @@ class Newton::Solve {
   bool axial_known_;
   NewtonResult result_;
   Balance balance_;
-  double first_residual_ = 0.0;
   int stagnant_ = 0;
 };
 
