@@ -11,7 +11,6 @@ enum class Heuristic : unsigned {
   late_matrix,
   matrix_worth,
   reject_cut,
-  stagnation,
   surface_search,
   search_descent,
   end_descent,

@@ -14,9 +14,6 @@ constexpr double kCut = 0.5;
 constexpr int kLongestDescent = 20;
 // Steps shorter than this, over the tolerance, are taken as they are while each halves the one before.
 constexpr double kShort = 1e2;
-// Iterations without progress in balance end a solve.
-constexpr int kStagnant = 3;
-constexpr double kProgress = 0.25;
 
 // Corrections of a prediction must shrink by this factor, while they are longer than this share of the prediction, and
 // than this, over the tolerance.
@@ -137,7 +134,7 @@ class Newton::Solve {
   bool converged() const {
     if (how_.predicted && how_.predicted->enough > 0.0) return reuse_.step() <= how_.predicted->enough;
     return (balance_.floor && (result_.iterations > 0 || balance_.relative)) ||
-           (balance_.either && (reuse_.at_end() || (stagnant_ >= kStagnant && uses(Heuristic::stagnation))));
+           (balance_.either && reuse_.at_end());
   }
 
   /// Takes a step; false where there is none, or none that may lead to the solution.
@@ -172,7 +169,6 @@ class Newton::Solve {
     else
       z_ += work_.step;
     reuse_.note_step(shorten < 1.0 ? INFINITY : newton_.norms_.displacement(work_.step));
-    stagnant_ = balance_.either && reuse_.step() > kProgress * reuse_.last_step() ? stagnant_ + 1 : 0;
     return !how_.predicted || !how_.predicted->strict || !loses_path(*how_.predicted, reuse_, result_.iterations == 0);
   }
 
@@ -199,7 +195,6 @@ class Newton::Solve {
   bool axial_known_;
   NewtonResult result_;
   Balance balance_;
-  int stagnant_ = 0;
 };
 
 NewtonResult Newton::solve(Equations& equations, VectorX& z, const SolveOptions& how, NewtonWorkspace& work) const {
