@@ -10,8 +10,6 @@ namespace {
 
 // A first step of which less is kept counts as cut.
 constexpr double kCut = 0.5;
-// Friction has no potential, and may lead downhill in a circle; what has not converged after so many iterations does.
-constexpr int kLongestDescent = 20;
 // Steps shorter than this, over the tolerance, are taken as they are while each halves the one before.
 constexpr double kShort = 1e2;
 
@@ -177,7 +175,7 @@ class Newton::Solve {
     const double full = newton_.norms_.displacement(work_.step) / shorten;
     const bool follows = result_.iterations == 0 || (std::isfinite(reuse_.step()) && full <= 0.5 * reuse_.step());
     if (uses(Heuristic::skip_near_end) && full <= kShort * reuse_.tolerance() && follows) return true;
-    if (!search_.run(z_, uses(Heuristic::end_descent) && result_.iterations >= kLongestDescent, shorten)) return false;
+    if (!search_.run(z_, shorten)) return false;
     if (search_.remade()) reuse_.note_matrix(false);
     axial_known_ = false;  // no prediction outlives a step that may lead elsewhere
     return true;

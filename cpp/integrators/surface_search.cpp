@@ -18,10 +18,10 @@ double SurfaceSearch::shortened(const VectorX& z, VectorX& step) const {
   return kept * allowed;
 }
 
-bool SurfaceSearch::run(const VectorX& z, bool nearer, double& shorten) {
+bool SurfaceSearch::run(const VectorX& z, double& shorten) {
   NewtonWorkspace& work = system_.work;
   const bool uphill = heuristics_.uses(Heuristic::drop_geometric) && work.step.dot(work.evaluation.residual) > 0.0;
-  double kept = search(z, nearer, uphill ? kLittle : 0.0, shorten);
+  double kept = search(z, uphill ? kLittle : 0.0, shorten);
   if (uphill && !evaluated_) {
     Contact& contact = *system_.equations.contact();
     contact.leave_out_geometric(true);
@@ -31,7 +31,7 @@ bool SurfaceSearch::run(const VectorX& z, bool nearer, double& shorten) {
     system_.solve_for(work.step);
     if (!work.step.allFinite()) return false;
     shorten = shortened(z, work.step);
-    kept = search(z, nearer, 0.0, shorten);
+    kept = search(z, 0.0, shorten);
     remade_ = true;
   }
   work.step *= kept;
@@ -40,7 +40,7 @@ bool SurfaceSearch::run(const VectorX& z, bool nearer, double& shorten) {
 }
 
 /// Share of the step that leads on, and more than `least`; else as it is at the last, not evaluated.
-double SurfaceSearch::search(const VectorX& z, bool nearer, double least, double shorten) {
+double SurfaceSearch::search(const VectorX& z, double least, double shorten) {
   NewtonWorkspace& work = system_.work;
   const Evaluation& e = work.evaluation;
   const double full = norms_.displacement(work.step) / shorten, before = work.step.dot(e.residual);
@@ -52,7 +52,7 @@ double SurfaceSearch::search(const VectorX& z, bool nearer, double least, double
     evaluated_ = e.residual.allFinite();
     if (evaluated_) {
       const double after = work.step.dot(e.residual);
-      if (!nearer && heuristics_.uses(Heuristic::search_descent) && before <= after && after <= 0.0) return kept;
+      if (heuristics_.uses(Heuristic::search_descent) && before <= after && after <= 0.0) return kept;
       system_.solve_for(work.next_step);
       solved_ = norms_.displacement(work.next_step) <= (1.0 - 0.25 * kept * shorten) * full;
       if (solved_) return kept;

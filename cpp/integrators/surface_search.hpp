@@ -23,9 +23,8 @@ class SurfaceSearch {
   /// Shortens a step from z to what neither turns nor moves anything too far, and brings no surfaces too near; returns
   /// by how much.
   double shortened(const VectorX& z, VectorX& step) const;
-  /// Shortens `work.step`, which has been by `shorten` already, to what leads on. `nearer`: leading downhill is not
-  /// enough. False where no step could be made.
-  bool run(const VectorX& z, bool nearer, double& shorten);
+  /// Shortens `work.step`, which has been by `shorten` already, to what leads on. False where no step could be made.
+  bool run(const VectorX& z, double& shorten);
   void forget() { evaluated_ = solved_ = remade_ = false; }
 
   /// Whether the end of the step is in `work.trial`, and evaluated without matrix.
@@ -36,7 +35,7 @@ class SurfaceSearch {
   bool remade() const { return remade_; }
 
  private:
-  double search(const VectorX& z, bool nearer, double least, double shorten);
+  double search(const VectorX& z, double least, double shorten);
 
   const StepNorms& norms_;
   const NewtonSystem& system_;
