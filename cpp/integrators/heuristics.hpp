@@ -13,7 +13,6 @@ enum class Heuristic : unsigned {
   reject_cut,
   surface_search,
   search_descent,
-  skip_near_end,
   drop_geometric,
   start_accelerated,
   start_steady,

@@ -10,8 +10,6 @@ namespace {
 
 // A first step of which less is kept counts as cut.
 constexpr double kCut = 0.5;
-// Steps shorter than this, over the tolerance, are taken as they are while each halves the one before.
-constexpr double kShort = 1e2;
 
 // Corrections of a prediction must shrink by this factor, while they are longer than this share of the prediction, and
 // than this, over the tolerance.
@@ -170,11 +168,7 @@ class Newton::Solve {
     return !how_.predicted || !how_.predicted->strict || !loses_path(*how_.predicted, reuse_, result_.iterations == 0);
   }
 
-  /// Near the end every step is shorter than the last whole one, or friction's jump lies between.
   bool step_between_surfaces(double& shorten) {
-    const double full = newton_.norms_.displacement(work_.step) / shorten;
-    const bool follows = result_.iterations == 0 || (std::isfinite(reuse_.step()) && full <= 0.5 * reuse_.step());
-    if (uses(Heuristic::skip_near_end) && full <= kShort * reuse_.tolerance() && follows) return true;
     if (!search_.run(z_, shorten)) return false;
     if (search_.remade()) reuse_.note_matrix(false);
     axial_known_ = false;  // no prediction outlives a step that may lead elsewhere
