@@ -3,8 +3,8 @@
     python benchmarks/ablation.py [--quick] [--groups impacts knots] [--heuristics reuse_across_steps]
 
 Counted are evaluations of the residual and factorisations, which do not depend on what else runs on the machine; the
-cost of a run is their sum, a factorisation (with the matrix that it takes) being worth `FACTORISATION` evaluations (with
-the solve that follows). Ratios are geometric means over the scenes of a group that end with and without the heuristic.
+cost of a run is their sum, a factorisation (with the matrix that it takes) being worth `FACTORISATION` evaluations
+(with the solve that follows). Ratios are geometric means over the scenes of a group that end with and without the heuristic.
 A heuristic is worth its lines where the cost grows by 5 % without it, or scenes are lost. A scene is lost where a step
 fails, or its cost exceeds `MOST` times that of all heuristics together.
 """
@@ -119,6 +119,30 @@ def _block(method: str, edges: int, step: float, force: float) -> Scene:
     return run
 
 
+def _pushed_back() -> withe.Simulation:
+    """A rod on a floor, its end pushed to one side: friction over a slip of 1e-8 m turns round within a step."""
+    scene = withe.Scene()
+    rubber = withe.Material(youngs_modulus=1e6, poisson_ratio=0.5, density=1000.0)
+    rod = scene.add_rod(start=(0, 0, 5e-3), end=(1, 0, 5e-3), nodes=31, radius=5e-3, material=rubber)
+    scene.add_floor(friction=0.4)
+    scene.enable_contact(friction_model="lagged", slip_tolerance=1e-5)
+    scene.add_force(rod.end, lambda t: (0.0, 0.3 if t < 0.02 else -0.3, 0.0))
+    return scene.build(integrator="backward_euler", time_step=1e-3)
+
+
+def _belt(law: withe.parts.FrictionModel) -> withe.Simulation:
+    """A rod on a floor that has begun to move, and takes it along."""
+    scene = withe.Scene()
+    rubber = withe.Material(youngs_modulus=1e6, poisson_ratio=0.5, density=1200.0)
+    scene.add_rod(start=(0, 0, 5e-3), end=(0.3, 0, 5e-3), nodes=21, radius=5e-3, material=rubber)
+    floor = scene.add_floor(friction=0.4)
+    scene.enable_contact(friction_model=law)
+    simulation = scene.build(integrator="backward_euler", time_step=1e-3)
+    simulation.step(200)
+    simulation.move(floor, path=lambda t: (0.5 * (t - 0.2), 0.0, 0.0))
+    return simulation
+
+
 def _stepped(build: Callable[[], withe.Simulation], steps: int) -> Scene:
     def run() -> Iterator[withe.Simulation]:
         simulation = build()
@@ -155,7 +179,8 @@ def groups(quick: bool) -> dict[str, list[Scene]]:
             for edges in (3, 10)
             for step in (0.05, 0.015)
             for force in (3.0, 5.0)
-        ],
+        ]
+        + [_stepped(_pushed_back, 100), *(_stepped(lambda law=law: _belt(law), 200) for law in contact_cases.LAWS)],
     }
     return {name: scenes[:2] for name, scenes in found.items()} if quick else found
 
@@ -261,7 +286,9 @@ def main() -> None:
                 lacking = [measure(scene, name, most=MOST * run.cost) for scene, run in kept]
                 found[name][group] = compare(whole, lacking)
                 shown.advance(1)
-    report.table("Everything on", ("group", "scenes", "ended", *_FIELDS[:3], "s"), [(*r[:-1], f"{r[-1]:.2f}") for r in rows])
+    report.table(
+        "Everything on", ("group", "scenes", "ended", *_FIELDS[:3], "s"), [(*r[:-1], f"{r[-1]:.2f}") for r in rows]
+    )
     report.table(
         "Cost without, over with (iterations, factorisations; scenes lost)",
         ("without", *chosen),

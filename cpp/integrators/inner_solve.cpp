@@ -37,9 +37,11 @@ void start_axial_force(const Equations& equations, const VectorX& q, VectorX& ou
 
 /// Adds to `work.move` what supports do within a part of the step. Where that is more than the edges next to them bear,
 /// the others follow as they would by the linear step.
-void follow_supports(Equations& equations, const Newton& newton, const Options& options, double part, const State& state, StepWorkspace& work) {
+void follow_supports(Equations& equations, const Newton& newton, const Options& options, double part,
+                     const State& state, StepWorkspace& work) {
   const Assembler& assembler = equations.assembler();
-  if (!options.heuristics.uses(Heuristic::supports_linear) || newton.norms().leaves_alone(part * assembler.greatest_held_change(state.q, work.held.q))) {
+  if (!options.heuristics.uses(Heuristic::supports_linear) ||
+      newton.norms().leaves_alone(part * assembler.greatest_held_change(state.q, work.held.q))) {
     assembler.add_held_change(state.q, work.held.q, part, work.move);
     return;
   }
@@ -104,7 +106,8 @@ class InnerSolve {
       spent += found.iterations;
       if (!sure) record.note(found.converged);
       if (!found.converged) continue;
-      if (circling_ && mixed_ && guess == Guess::other_method && uses(Heuristic::remember_plain)) history_.plain_solves = kPlainSolves;
+      if (circling_ && mixed_ && guess == Guess::other_method && uses(Heuristic::remember_plain))
+        history_.plain_solves = kPlainSolves;
       break;
     }
     found.iterations = spent;

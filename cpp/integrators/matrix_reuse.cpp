@@ -5,8 +5,7 @@
 namespace withe {
 namespace {
 
-// A matrix of an earlier time step that leaves more than this of an error has served badly, and is tried again after
-// so many steps.
+// A lagged Jacobian of an earlier time step whose contraction rate is above this is tried again after so many steps.
 constexpr double kSlow = 0.15;
 constexpr int kWait = 16;
 // An iteration with an old matrix costs about a quarter of one with a new one.
@@ -35,7 +34,9 @@ MatrixReuse::MatrixReuse(MatrixRecord& record, Equations& equations, double inte
   }
 }
 
-bool MatrixReuse::near_end() const { return distance_ <= kNearEnd * tolerance_ && heuristics_.uses(Heuristic::late_matrix); }
+bool MatrixReuse::near_end() const {
+  return distance_ <= kNearEnd * tolerance_ && heuristics_.uses(Heuristic::late_matrix);
+}
 
 void MatrixReuse::note_matrix(bool whole) {
   fresh_ = made_here_ = true;
@@ -58,9 +59,9 @@ void MatrixReuse::note_step(double length) {
   const double here = std::min(0.5, (measured ? 1.0 : 4.0) * record_.contraction[at(age_)]);
   distance_ = step_ * here / (1.0 - here);
   const double next = record_.contraction[at(age_ == MatrixAge::across ? MatrixAge::across : MatrixAge::within)];
-  fresh_ = !std::isfinite(step_) || next > 0.5 ||
-           (!heuristics_.uses(Heuristic::reuse_within_step) && made_here_) ||
-           (heuristics_.uses(Heuristic::matrix_worth) && distance_ > tolerance_ && std::log(distance_ / tolerance_) > kWorth * std::log(1.0 / next));
+  fresh_ = !std::isfinite(step_) || next > 0.5 || (!heuristics_.uses(Heuristic::reuse_within_step) && made_here_) ||
+           (heuristics_.uses(Heuristic::matrix_worth) && distance_ > tolerance_ &&
+            std::log(distance_ / tolerance_) > kWorth * std::log(1.0 / next));
 }
 
 }  // namespace withe

@@ -88,7 +88,8 @@ class Newton::Solve {
         line_search_(newton.options_.line_search == LineSearch::goldstein_price),
         mixed_(how.mixed && newton.options_.mixed),
         reuse_(work.matrix, equations, how.interval, how.interval != 0.0 && !line_search_,
-               std::min(newton.options_.step_tolerance * newton.model_.length_scale, work.finest), newton.options_.heuristics),
+               std::min(newton.options_.step_tolerance * newton.model_.length_scale, work.finest),
+               newton.options_.heuristics),
         axial_known_(mixed_ && (how.interval != 0.0 || how.predicted)) {}
 
   NewtonResult run() {
@@ -129,8 +130,7 @@ class Newton::Solve {
   /// by their steps alone, whatever rounding leaves: the same scene elsewhere in space takes the same steps.
   bool converged() const {
     if (how_.predicted && how_.predicted->enough > 0.0) return reuse_.step() <= how_.predicted->enough;
-    return (balance_.floor && (result_.iterations > 0 || balance_.relative)) ||
-           (balance_.either && reuse_.at_end());
+    return (balance_.floor && (result_.iterations > 0 || balance_.relative)) || (balance_.either && reuse_.at_end());
   }
 
   /// Takes a step; false where there is none, or none that may lead to the solution.
