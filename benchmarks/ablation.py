@@ -4,7 +4,8 @@
 
 Counted are evaluations of the residual and factorisations, which do not depend on what else runs on the machine; the
 cost of a run is their sum, a factorisation (with the matrix that it takes) being worth `FACTORISATION` evaluations
-(with the solve that follows). Ratios are geometric means over the scenes of a group that end with and without the heuristic.
+(with the solve that follows). Ratios are geometric means over the scenes of a group that end with the heuristic and
+without.
 A heuristic is worth its lines where the cost grows by 5 % without it, or scenes are lost. A scene is lost where a step
 fails, or its cost exceeds `MOST` times that of all heuristics together.
 """

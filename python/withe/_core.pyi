@@ -362,6 +362,30 @@ class Options:
     Choices of a simulation.
     """
 
+    heuristics: typing.ClassVar[tuple] = (
+        "reuse_across_steps",
+        "reuse_within_step",
+        "rest_from_reuse",
+        "late_matrix",
+        "matrix_worth",
+        "reject_cut",
+        "surface_search",
+        "search_descent",
+        "drop_geometric",
+        "start_accelerated",
+        "start_steady",
+        "start_other_method",
+        "start_continuation",
+        "start_record",
+        "remember_plain",
+        "friction_order",
+        "few_iterations",
+        "repeat_from_end",
+        "hold_sticking",
+        "predict_friction",
+        "supports_linear",
+        "continuation_secant",
+    )
     adaptive: bool
     integrator: str
     line_search: str
@@ -369,6 +393,7 @@ class Options:
     planar: bool | None
     solver: str
     def __init__(self) -> None: ...
+    def switch_off(self, arg0: str) -> None: ...
     @property
     def duration(self) -> float | None: ...
     @duration.setter
@@ -487,6 +512,8 @@ class Statistics:
     def branch_changes(self) -> int: ...
     @property
     def energy_momentum_steps(self) -> int: ...
+    @property
+    def evaluations(self) -> int: ...
     @property
     def factorizations(self) -> int: ...
     @property
