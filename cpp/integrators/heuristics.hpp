@@ -10,6 +10,7 @@ enum class Heuristic : unsigned {
   rest_from_reuse,
   late_matrix,
   matrix_worth,
+  reject_growing,
   reject_cut,
   surface_search,
   search_descent,

@@ -8,6 +8,10 @@
 namespace withe {
 namespace {
 
+// After so many iterations, steps that are still too long to be taken whole and a residual that has grown by so much
+// lead nowhere in time.
+constexpr int kFirstIterations = 4;
+constexpr double kMostGrowth = 1e3;
 // A first step of which less is kept counts as cut.
 constexpr double kCut = 0.5;
 
@@ -126,6 +130,10 @@ class Newton::Solve {
     balance_ = newton_.balance(work_.data, result_);
     if (converged()) return Verdict::converged;
     if (result_.iterations == how_.max_iterations) return Verdict::failed;
+    if (result_.iterations == 0) first_residual_ = result_.residual;
+    if (uses(Heuristic::reject_growing) && how_.interval != 0.0 && result_.iterations >= kFirstIterations && std::isinf(reuse_.step()) &&
+        std::isinf(reuse_.last_step()) && result_.residual > kMostGrowth * first_residual_)
+      return Verdict::failed;
     if (reuse_.fresh() && near_end) evaluate(true);
     return Verdict::go_on;
   }
@@ -191,6 +199,7 @@ class Newton::Solve {
   bool axial_known_;
   NewtonResult result_;
   Balance balance_;
+  double first_residual_ = 0.0;
 };
 
 NewtonResult Newton::solve(Equations& equations, VectorX& z, const SolveOptions& how, NewtonWorkspace& work) const {
