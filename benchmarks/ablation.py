@@ -39,7 +39,7 @@ MOST = 5.0
 # time.
 LARGEST = {"knots": 2e7, "tightening, piles": 2e7, "violent motion": 3e5, "equilibria": 3e5}
 WORTH = 1.05
-GUARD = 12.0  # [s]
+GUARD = 4.0  # [s]
 
 
 @dataclass

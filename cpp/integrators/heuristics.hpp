@@ -8,6 +8,7 @@ enum class Heuristic : unsigned {
   reuse_across_steps,
   reuse_within_step,
   rest_from_reuse,
+  refresh_after_slow,
   late_matrix,
   matrix_worth,
   reject_growing,

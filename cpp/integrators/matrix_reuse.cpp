@@ -29,9 +29,11 @@ MatrixReuse::MatrixReuse(MatrixRecord& record, Equations& equations, double inte
     drop();
   else if (record.belongs_to(equations, interval) && record.generation == equations.assembler().generation()) {
     const bool badly = record.contraction[at(MatrixAge::across)] > kSlow && heuristics.uses(Heuristic::rest_from_reuse);
-    fresh_ = !heuristics.uses(Heuristic::reuse_across_steps) || (badly && ++record.waited < kWait);
+    fresh_ = !heuristics.uses(Heuristic::reuse_across_steps) ||
+             (record.slow && heuristics.uses(Heuristic::refresh_after_slow)) || (badly && ++record.waited < kWait);
     if (!fresh_) record.waited = 0;
   }
+  record.slow = false;
 }
 
 bool MatrixReuse::near_end() const {
@@ -44,6 +46,8 @@ void MatrixReuse::note_matrix(bool whole) {
   record_.interval = interval_;
   record_.generation = equations_.assembler().generation();
 }
+
+void MatrixReuse::note_end(int iterations) { record_.slow = age_ == MatrixAge::across && iterations >= kCostOfMatrix; }
 
 void MatrixReuse::note_step(double length) {
   last_step_ = step_;

@@ -18,7 +18,8 @@ struct MatrixHistory {
   double interval = 0;  ///< that the last one belongs to [s]
   /// Contraction rate per MatrixAge: error after an iteration over error before.
   std::array<double, 3> contraction{1e-2, 1e-2, 1e-2};
-  int waited = 0;  ///< time steps since one was last tried across
+  int waited = 0;     ///< time steps since one was last tried across
+  bool slow = false;  ///< the last time step took many iterations with one
 };
 
 /// What the factorisation in a solver belongs to, and that history.
@@ -52,6 +53,7 @@ class MatrixReuse {
   void note_matrix(bool whole = true);
   /// After a step: learns how well matrices serve, and decides about the next one.
   void note_step(double length);
+  void note_end(int iterations);
   /// The factorisation is not to be used again.
   void drop() { record_.owner = nullptr; }
 

@@ -106,7 +106,10 @@ class Newton::Solve {
       const Verdict verdict = look();
       if (verdict == Verdict::go_on && iterate()) continue;
       result_.converged = verdict == Verdict::converged;
-      if (!result_.converged) reuse_.drop();
+      if (result_.converged)
+        reuse_.note_end(result_.iterations);
+      else
+        reuse_.drop();
       work_.contact.friction.clear();
       return result_;
     }

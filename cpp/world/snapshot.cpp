@@ -297,10 +297,10 @@ void exchange(Archive& io, EquationsMemory& memory) {
 
 template <class Archive>
 void exchange(Archive& io, MatrixHistory& history) {
-  auto& [interval, contraction, waited] = history;
+  auto& [interval, contraction, waited, slow] = history;
   io(interval);
   for (double& rate : contraction) io(rate);
-  io(waited);
+  io(waited), io(slow);
 }
 
 template <class Archive>
