@@ -6,8 +6,6 @@
 namespace withe {
 namespace {
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
-
 void append(std::vector<int>& dofs, int first, int count) {
   for (int i = 0; i < count; ++i) dofs.push_back(first < 0 ? -1 : first + i);
 }
@@ -278,6 +276,18 @@ void Assembler::project_matrix() {
     for (int i = 0; i < n; ++i)
       for (int j = 0; j < n; ++j) values[static_cast<std::size_t>(block.own[i][j])] = own(i, j);
   }
+}
+
+double Assembler::greatest_diagonal() const {
+  double greatest = 0.0;
+  for (int i = 0; i < model_.dof_count; ++i) greatest = std::max(greatest, std::abs(diagonal(i)));
+  return greatest;
+}
+
+double Assembler::greatest_diagonal(const VectorX& weight) const {
+  double greatest = 0.0;
+  for (int i = 0; i < model_.dof_count; ++i) greatest = std::max(greatest, diagonal(i) / std::max(weight(i), 1e-300));
+  return greatest;
 }
 
 void Assembler::project(VectorX& vector) const {

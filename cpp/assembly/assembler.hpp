@@ -77,6 +77,10 @@ class Assembler {
     return solver_->values()[static_cast<std::size_t>(diagonal_[static_cast<std::size_t>(dof)])];
   }
 
+  double greatest_diagonal() const;
+  /// Its greatest entry over that of `weight`.
+  double greatest_diagonal(const VectorX& weight) const;
+
   /// Takes in the unknowns of contacts, one after the other (-1: none), and finds a new order of elimination where they
   /// couple what was not coupled yet. The solver is then another one.
   void couple(const std::vector<int>& contact_unknowns, int width);

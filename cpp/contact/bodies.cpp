@@ -6,8 +6,6 @@
 namespace withe {
 namespace {
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
-
 // Pairs farther apart than this beyond their reach, over it, are of no interest.
 constexpr double kFar = 0.6;
 

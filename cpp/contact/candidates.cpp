@@ -6,8 +6,6 @@
 namespace withe {
 namespace {
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
-
 // Pairs nearer than this beyond their reach, over the sum of their radii, are part of the matrix's pattern.
 constexpr double kNear = 0.5;
 // What rounding leaves of a distance to go.

@@ -11,8 +11,6 @@
 namespace withe {
 namespace {
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
-
 /// Puts a problem to the start of a step, with nothing known of what touches there.
 void set_start(const State& state, double duration, ContactProblem& problem) {
   problem.start = &state;

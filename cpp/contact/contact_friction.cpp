@@ -14,8 +14,6 @@ constexpr double kGive = 0.05;
 // On a way this short, over the slip that friction grows with, a tangent says enough.
 constexpr double kShortWay = 0.1;
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
-
 /// K / (2 dt), over the slip tolerance [1/m].
 double slip_rate(const ContactProblem& problem, double regularisation) {
   return 7.5 / (regularisation * problem.description().slip_tolerance * problem.duration);

@@ -4,12 +4,6 @@
 #include <cmath>
 
 namespace withe {
-namespace {
-
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
-
-}  // namespace
-
 ContactParameters::ContactParameters(const Surfaces& surfaces, const Parameters& parameters)
     : version(parameters.version), gravity(parameters.gravity.norm()) {
   const Model& model = surfaces.model();

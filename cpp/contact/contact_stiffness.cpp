@@ -10,8 +10,6 @@
 namespace withe {
 namespace {
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
-
 bool by_key(const ContactRecord& a, const ContactRecord& b) { return a.key < b.key; }
 
 // A stiffness follows forces that outgrow it at once, and is then so many times what they want; and it follows those

@@ -6,8 +6,6 @@
 namespace withe {
 namespace {
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
-
 constexpr Vec3d kAxes[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
 
 /// Adds how edge `tail`, `tail + 1` turns and spins the surface on `arm`, to columns of J.

@@ -13,8 +13,6 @@
 namespace withe {
 namespace {
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
-
 // The length a of curve.hpp for the depth to which surfaces press, a hundredth of the rod's radius, which is taken no
 // greater than an edge.
 constexpr double kLeastBend = 12.0 * 0.01;

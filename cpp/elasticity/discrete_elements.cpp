@@ -10,8 +10,6 @@
 namespace withe {
 namespace {
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
-
 Vec3d row_of(const Columns3& table, int i) { return {table(i, 0), table(i, 1), table(i, 2)}; }
 
 void add_block(Local& out, int row, int column, double factor, const Mat3<double>& m) {

@@ -8,8 +8,6 @@
 namespace withe {
 namespace {
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
-
 /// Value of a follower load now: it turns with its edge from the drawn configuration.
 Vector3 carried(const Model& model, const EdgeFrame<double>& f, int edge, const Vector3& value) {
   const Vector3 t = to_eigen(model.initial_tangent[at(edge)]);

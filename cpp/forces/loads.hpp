@@ -28,7 +28,7 @@ struct LoadPiece {
 
 struct Loads {
   std::vector<LoadPiece> pieces;
-  std::vector<Vector3> values;        ///< per load, world axes of the drawn scene [N], [N m], [N/m]
+  std::vector<Vector3> values;  ///< per load, world axes of the drawn scene [N], [N m], [N/m]
   int node_moments = 0;         ///< nodes that custom moments may act on
   bool unsymmetric = false;
 };

@@ -12,8 +12,6 @@
 namespace withe {
 namespace {
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
-
 /// By how much the energy in stretching an edge of stiffness 1 N grows beyond the work of the axial force of a step
 /// [J], that in its middle or at its end. An edge under pressure that turns gains by the latter: it gives way by l0 (1
 /// - cos).
@@ -163,7 +161,7 @@ void add_work(const Equations& equations, const Parameters& parameters, const Ve
 }
 
 void add_support_work(const Equations& equations, const VectorX& v0, const VectorX& v1, double dt, StepWorkspace& work,
-                   StepResult& result) {
+                      StepResult& result) {
   VectorX& full_residual = work.newton.data.full_residual;
   VectorX& momentum = work.difference;  // by how much it grows
   work.z = v1 - v0;
@@ -204,7 +202,8 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
     q1 = work.z;
   else
     q1 = 2.0 * work.z - state.q;
-  const double* watched = plan.rule == StepRule::energy_momentum ? nullptr : equations.elastic().stretch_stiffness.data();
+  const double* watched =
+      plan.rule == StepRule::energy_momentum ? nullptr : equations.elastic().stretch_stiffness.data();
   const Turning turned = turning(model, state, q1, watched, euler);
   result.largest_turn = turned.largest;
   if (!q1.allFinite() || !(result.largest_turn <= 1.5)) return result;
@@ -244,8 +243,7 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
   }
   if (!model.constraints.empty()) {
     work.assumed = work.newton.data.inertia;
-    if (conserves)
-      set_working_rows(equations.problem(), work.newton.data, work.change, work.newton.data.full_residual);
+    if (conserves) set_working_rows(equations.problem(), work.newton.data, work.change, work.newton.data.full_residual);
     add_support_work(equations, state.v, v1, dt, work, result);
   }
   VectorX& acceleration = work.mean;

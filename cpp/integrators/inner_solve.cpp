@@ -20,8 +20,6 @@ constexpr int kPlainSolves = 16;
 constexpr std::array<double, 7> kRegularisation{8192.0, 4096.0, 512.0, 64.0, 16.0, 4.0, 1.0};
 constexpr int kMostOfEach = 20;
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
-
 /// Axial forces at the start of a step [N]: where the mixed method sets out from, for those of an extrapolated motion,
 /// whose edges turn along straight lines and so stretch, mean nothing.
 void start_axial_force(const Equations& equations, const VectorX& q, VectorX& out) {
@@ -213,7 +211,7 @@ class InnerSolve {
       found = newton_.solve(
           equations_, work_.z,
           {.max_iterations = kMostOfEach, .mixed = mixed_, .interval = h_, .regularisation = kRegularisation[k]},
-                            work_.newton);
+          work_.newton);
       spent += found.iterations;
       if (!found.converged) break;
     }

@@ -8,6 +8,8 @@ namespace {
 // A lagged Jacobian of an earlier time step whose contraction rate is above this is tried again after so many steps.
 constexpr double kSlow = 0.15;
 constexpr int kWait = 16;
+// So many iterations cost as much as a new matrix.
+constexpr int kCostOfMatrix = 3;
 // An iteration with an old matrix costs about a quarter of one with a new one.
 constexpr double kWorth = 2.5;
 // So near the end, over the tolerance, an iteration leaves less than that.

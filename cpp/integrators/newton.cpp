@@ -134,8 +134,8 @@ class Newton::Solve {
     if (converged()) return Verdict::converged;
     if (result_.iterations == how_.max_iterations) return Verdict::failed;
     if (result_.iterations == 0) first_residual_ = result_.residual;
-    if (uses(Heuristic::reject_growing) && how_.interval != 0.0 && result_.iterations >= kFirstIterations && std::isinf(reuse_.step()) &&
-        std::isinf(reuse_.last_step()) && result_.residual > kMostGrowth * first_residual_)
+    if (uses(Heuristic::reject_growing) && how_.interval != 0.0 && result_.iterations >= kFirstIterations &&
+        std::isinf(reuse_.step()) && std::isinf(reuse_.last_step()) && result_.residual > kMostGrowth * first_residual_)
       return Verdict::failed;
     if (reuse_.fresh() && near_end) evaluate(true);
     return Verdict::go_on;

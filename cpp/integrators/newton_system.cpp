@@ -7,12 +7,10 @@ namespace withe {
 bool factorize(Equations& equations, NewtonWorkspace& work) {
   const Timer timer(work.counters.solve_time);
   LinearSolver& solver = equations.assembler().solver();
-  const int n = equations.model().dof_count;
   ++work.counters.factorizations;
   if (solver.factorize().status == FactorStatus::ok) return true;
-  double greatest = 0.0;
-  for (int i = 0; i < n; ++i) greatest = std::max(greatest, std::abs(equations.assembler().diagonal(i)));
-  work.trial.setConstant(n, 1e-12 * greatest);
+  const double greatest = equations.assembler().greatest_diagonal();
+  work.trial.setConstant(equations.model().dof_count, 1e-12 * greatest);
   return greatest > 0.0 &&
          solver.factorize({work.trial.data(), static_cast<std::size_t>(work.trial.size())}).status == FactorStatus::ok;
 }

@@ -3,9 +3,9 @@
 
 #include <functional>
 
-#include "steps/equations.hpp"
 #include "integrators/guess_history.hpp"
 #include "integrators/matrix_reuse.hpp"
+#include "steps/equations.hpp"
 
 namespace withe {
 

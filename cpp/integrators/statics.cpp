@@ -206,9 +206,7 @@ class Statics {
   bool settle(double factor, NewtonResult& last) {
     const Model& model = equations_.model();
     evaluate(factor);
-    double stiffness = 0.0;
-    for (int i = 0; i < model.dof_count; ++i)
-      stiffness = std::max(stiffness, equations_.assembler().diagonal(i) / std::max(equations_.mass().rows(i), 1e-300));
+    const double stiffness = equations_.assembler().greatest_diagonal(equations_.mass().rows);
     double potential = work_.data.potential;
     energy_scale_ = std::max(energy_scale_, std::abs(potential));
     double h = 1e2 / std::sqrt(stiffness);
@@ -250,9 +248,7 @@ class Statics {
       const StepData here = work_.data;
       const Balance balance = newton_.balance(here, last);
       if (damping == 0.0) {
-        double stiffness = 0.0;
-        for (int i = 0; i < model.dof_count; ++i)
-          stiffness = std::max(stiffness, equations_.assembler().diagonal(i) / std::max(weight(i), 1e-300));
+        const double stiffness = equations_.assembler().greatest_diagonal(weight);
         damping = 1e-6 * stiffness;
         lowest_ = 1e-12 * stiffness;
       }
@@ -291,8 +287,7 @@ class Statics {
         equations_.evaluate(z, false, nullptr, work_.data);
         const double gain = here.residual.dot(step);  // negative
         const double rounding = 1e-13 * (std::abs(here.potential) + here.magnitude.cwiseAbs().dot(step.cwiseAbs()));
-        if (std::isfinite(work_.data.potential) &&
-            work_.data.potential - here.potential <= 0.1 * gain + rounding) {
+        if (std::isfinite(work_.data.potential) && work_.data.potential - here.potential <= 0.1 * gain + rounding) {
           accepted = true;
         } else {
           damping *= 4.0;
@@ -339,9 +334,7 @@ class Statics {
     const Model& model = equations_.model();
     LinearSolver& solver = equations_.assembler().solver();
     const VectorX weight = equations_.mass().rows.cwiseMax(1e-300);
-    double stiffness = 0.0;
-    for (int i = 0; i < model.dof_count; ++i)
-      stiffness = std::max(stiffness, equations_.assembler().diagonal(i) / weight(i));
+    const double stiffness = equations_.assembler().greatest_diagonal(weight);
     VectorX shift;
     for (double damping = 1e-16 * stiffness; damping < 1e3 * stiffness; damping *= 2.0) {
       shift = damping * weight;

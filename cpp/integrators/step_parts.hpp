@@ -25,8 +25,8 @@ void add_work(const Equations& equations, const Parameters& parameters, const Ve
 void add_support_work(const Equations& equations, const VectorX& v0, const VectorX& v1, double dt, StepWorkspace& work,
                       StepResult& result);
 
-/// Of an explicit step from a state to q: the configuration there, and that of `next`. Returns by how much edges turn at
-/// most [rad].
+/// Of an explicit step from a state to q: the configuration there, and that of `next`. Returns by how much edges turn
+/// at most [rad].
 double advance(const Model& model, const State& state, const VectorX& q, Configuration& configuration, State& next);
 
 /// Finds the fluid's force at q on velocities v, and the time that takes.

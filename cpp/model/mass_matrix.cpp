@@ -3,8 +3,6 @@
 namespace withe {
 namespace {
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
-
 /// What an edge of a density, or drag, per length couples its nodes by.
 void set_coupling(const Model& model, const Parameters& p, const VectorX& density, VectorX& coupling) {
   if (p.lumped)

@@ -3,12 +3,6 @@
 #include "steps/inertia.hpp"
 
 namespace withe {
-namespace {
-
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
-
-}  // namespace
-
 void set_gravity_force(const Model& model, const Parameters& p, VectorX& force) {
   force.setZero(model.dof_count);
   for (int i = 0; i < model.node_count; ++i) {
@@ -28,8 +22,7 @@ void Gravity::add(const StepProblem& problem, StepData& data, const Assembler&, 
   data.potential -= problem.gravity.dot(data.z);
 }
 
-void Drag::add(const StepProblem& problem, StepData& data, const Assembler& assembler,
-               std::span<double> values) const {
+void Drag::add(const StepProblem& problem, StepData& data, const Assembler& assembler, std::span<double> values) const {
   if (!problem.parameters->dragged || !problem.moves()) return;
   const int n = problem.model.dof_count;
   const double inverse = 1.0 / problem.interval;
@@ -37,7 +30,7 @@ void Drag::add(const StepProblem& problem, StepData& data, const Assembler& asse
   multiply(problem.model, problem.drag, data.velocity, data.drag_force);
   data.gradient.head(n) += data.drag_force;
   data.row_magnitude.head(n) += data.drag_force.cwiseAbs();
-  if (!values.empty()) add_mass_matrix(problem, problem.drag, inverse, 1, assembler, values);
+  if (!values.empty()) add_mass_matrix(problem, problem.drag, inverse, assembler, values);
 }
 
 double Drag::dissipated(const StepProblem& problem, const StepData& data, const Assembler&,

@@ -3,12 +3,6 @@
 #include <algorithm>
 
 namespace withe {
-namespace {
-
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
-
-}  // namespace
-
 AppliedForces applied_forces(const Model& model, const MatrixX3& forces, const MatrixX3& moments) {
   AppliedForces out{VectorX::Zero(model.dof_count), {}};
   for (int i = 0; i < model.node_count; ++i) {
@@ -116,8 +110,8 @@ void CustomTerm::add_matrix(const StepProblem& problem, const StepData& data, co
     }
     const int node = row / 3 - nodes;
     for (std::size_t k : moment_pieces_[at(node)]) {
-      load_local(model, *problem.start, data.z, data.configuration, problem.loads.pieces[k],
-                 Vector3::Unit(row % 3), local);  // what a moment does is linear in it
+      load_local(model, *problem.start, data.z, data.configuration, problem.loads.pieces[k], Vector3::Unit(row % 3),
+                 local);  // what a moment does is linear in it
       const ElementTable& table = assembler.loads[k];
       for (int i = 0; i < table.width(); ++i)
         if (table.dofs(0)[i] >= 0) add_row(table.dofs(0)[i], column, value * local.gradient[i]);

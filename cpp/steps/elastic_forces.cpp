@@ -7,8 +7,6 @@
 namespace withe {
 namespace {
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
-
 /// The stencils that kernels take, as they lie in the data.
 StencilBatch regular_batch(const ElasticCoefficients& k, StepData& data, const Assembler& assembler,
                            std::span<double> values, const double* axial_force) {
@@ -96,8 +94,7 @@ void ElasticForces::set_axial_forces(const StepProblem& problem, const ElasticCo
 }
 
 void ElasticForces::add_elastic(const StepProblem& problem, const ElasticCoefficients& k, StepData& data,
-                                const Assembler& assembler, std::span<double> values,
-                                const double* axial_force) const {
+                                const Assembler& assembler, std::span<double> values, const double* axial_force) const {
   set_axial_forces(problem, k, data);
   const StencilBatch batch = regular_batch(k, data, assembler, values, axial_force);
   data.potential += problem.model.planar() ? stencil_kernels().planar_bend(batch) : stencil_kernels().bend(batch);

@@ -13,8 +13,6 @@
 namespace withe {
 namespace {
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
-
 long next_number() {
   static std::atomic<long> count{0};
   return ++count;
@@ -49,8 +47,8 @@ Equations::Equations(const Model& model, const EquationOptions& options)
     : problem_(problem_of(model)),
       terms_(make_terms(model, problem_.loads, options.rule)),
       asymmetries_(asymmetries_of(model, problem_.loads, terms_, options.rule)),
-      assembler_(model, problem_.loads,
-                 asymmetries_.empty() ? Symmetry::symmetric : Symmetry::unsymmetric, options.solver),
+      assembler_(model, problem_.loads, asymmetries_.empty() ? Symmetry::symmetric : Symmetry::unsymmetric,
+                 options.solver),
       static_duration_(options.static_duration) {
   if (contact()) {
     assembler_.couple(terms_.contact->rows().unknowns(), kContactUnknowns);

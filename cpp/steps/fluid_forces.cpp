@@ -16,12 +16,6 @@
 #include "steps/inertia.hpp"
 
 namespace withe {
-namespace {
-
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
-
-}  // namespace
-
 void StokesletForces::begin(StepProblem&) { acts_ = false; }
 
 bool StokesletForces::solve(const StepProblem& problem, const VectorX& q, const VectorX& v) {
@@ -50,7 +44,7 @@ void StokesletForces::add(const StepProblem& problem, StepData& data, const Asse
   data.row_magnitude.head(n) += start_.cwiseAbs() + data.flow_drag.cwiseAbs();
   data.flow_force = start_ - data.flow_drag;
   data.gradient.head(n) -= data.flow_force;
-  if (!values.empty()) add_mass_matrix(problem, drag_, inverse, 1, assembler, values);
+  if (!values.empty()) add_mass_matrix(problem, drag_, inverse, assembler, values);
 }
 
 double StokesletForces::dissipated(const StepProblem&, const StepData& data, const Assembler&,

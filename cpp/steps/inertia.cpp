@@ -9,8 +9,6 @@
 namespace withe {
 namespace {
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
-
 /// What an angle of a step counts for where the middle of the step is that of a rotation: of its Cayley vector.
 double finite_turn(double angle) { return 2.0 * std::tan(0.5 * angle); }
 
@@ -38,7 +36,8 @@ void add_spin_couple(const StepProblem& problem, StepData& data) {
   const double inverse = 1.0 / problem.interval;
   const double *q0 = problem.start->q.data(), *v0 = problem.start->v.data();
   for (int e = 0; e < problem.model.edge_count; ++e) {
-    const int a = problem.model.tail_dof[at(e)], b = problem.model.head_dof[at(e)], angle = problem.model.edge_dof[at(e)];
+    const int a = problem.model.tail_dof[at(e)], b = problem.model.head_dof[at(e)],
+              angle = problem.model.edge_dof[at(e)];
     const double omega = (z[angle] - q0[angle]) * inverse;
     const Vec3d change{z[b] - z[a] - q0[b] + q0[a], z[b + 1] - z[a + 1] - q0[b + 1] + q0[a + 1],
                        z[b + 2] - z[a + 2] - q0[b + 2] + q0[a + 2]};
@@ -71,7 +70,8 @@ void set_turning_inertia(const StepProblem& problem, StepData& data) {
   }
   const double *q0 = problem.start->q.data(), *v0 = problem.start->v.data();
   for (int e = 0; e < problem.model.edge_count; ++e) {
-    const int a = problem.model.tail_dof[at(e)], b = problem.model.head_dof[at(e)], angle = problem.model.edge_dof[at(e)];
+    const int a = problem.model.tail_dof[at(e)], b = problem.model.head_dof[at(e)],
+              angle = problem.model.edge_dof[at(e)];
     const EdgeFrame<double>& middle = data.configuration.edge[at(e)];
     const Vec3d& t0 = problem.start->tangent[at(e)];
     Vec3d t1;
@@ -93,7 +93,8 @@ void set_turning_inertia(const StepProblem& problem, StepData& data) {
     force += torque * middle.spin;
     if (problem.conserves_energy()) {
       const Vec3d apart = t1 - t0;
-      const double mean = 0.5 * (problem.start_configuration.length[e] + data.end_configuration.length[e]), cosine = 0.5 * dot(t0 + t1, middle.tangent);
+      const double mean = 0.5 * (problem.start_configuration.length[e] + data.end_configuration.length[e]),
+                   cosine = 0.5 * dot(t0 + t1, middle.tangent);
       const double rate = inverse * turn;
       force -= (inertia * rate * rate * dot(apart, apart) / (4.0 * mean * cosine)) * middle.tangent;
     }
@@ -130,16 +131,15 @@ void Inertia::add(const StepProblem& problem, StepData& data, const Assembler& a
     add_spin_couple(problem, data);
   data.gradient.head(n) += data.inertia;
   data.row_magnitude.head(n) += data.inertia.cwiseAbs();
-  if (!values.empty()) add_mass_matrix(problem, problem.mass, inverse, 2, assembler, values);
+  if (!values.empty()) add_mass_matrix(problem, problem.mass, inverse * inverse, assembler, values);
 }
 
 /// What couples nodes off the diagonal is less on it.
-void add_mass_matrix(const StepProblem& problem, const MassMatrix& mass, double rate, int power, const Assembler& assembler,
-                     std::span<double> values) {
-  const double factor = power == 2 ? rate * rate : rate;
+void add_mass_matrix(const StepProblem& problem, const MassMatrix& mass, double factor, const Assembler& assembler, std::span<double> values) {
   const Model& model = problem.model;
   const std::vector<std::ptrdiff_t>& diagonal = assembler.diagonal_offsets();
-  for (int i = 0; i < model.dof_count; ++i) values[static_cast<std::size_t>(diagonal[at(i)])] += (power == 2 ? mass.rows[i] * rate * rate : mass.rows[i] * rate);
+  for (int i = 0; i < model.dof_count; ++i)
+    values[static_cast<std::size_t>(diagonal[at(i)])] += factor * mass.rows[i];
   const auto size = static_cast<std::size_t>(model.dimension);
   for (int e = 0; e < model.edge_count; ++e) {
     const double coupling = factor * mass.coupling[e];
@@ -170,7 +170,8 @@ void set_turning_velocities(const StepProblem& problem, const VectorX& change, d
 
 /// 2 tan(D theta / 2) over how much of the mean of an edge's tangents lies along it in the middle.
 double working_turn(const StepProblem& problem, const StepData& data, int edge, double change) {
-  const Vec3d mean = 0.5 * (problem.start_configuration.edge[at(edge)].tangent + data.end_configuration.edge[at(edge)].tangent);
+  const Vec3d mean =
+      0.5 * (problem.start_configuration.edge[at(edge)].tangent + data.end_configuration.edge[at(edge)].tangent);
   return finite_turn(change) / dot(mean, data.configuration.edge[at(edge)].tangent);
 }
 
@@ -198,7 +199,8 @@ void set_working_rows(const StepProblem& problem, const StepData& data, const Ve
       rows[dof] += data.elastic_rows[dof] * (ratio(finite_turn(change[dof]), change[dof]) - 1.0);
     } else if (!problem.model.planar() && s.other_node >= 0) {
       const int dof = problem.model.edge_dof[at(s.edge)];
-      rows[dof] += data.elastic_rows[dof] * (ratio(working_turn(problem, data, s.edge, change[dof]), change[dof]) - 1.0);
+      rows[dof] +=
+          data.elastic_rows[dof] * (ratio(working_turn(problem, data, s.edge, change[dof]), change[dof]) - 1.0);
     }
   }
 }

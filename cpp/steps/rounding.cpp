@@ -14,8 +14,6 @@ namespace {
 
 constexpr double kRounding = 4.0 * std::numeric_limits<double>::epsilon();  // of a number that some operations lead to
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
-
 /// What rounding leaves of inertia. What spins for long has turned by many radians. Sets the greatest coordinate, and
 /// returns the greatest angle, one radian at least.
 double set_inertial_bounds(const StepProblem& problem, const StepData& data, RoundingBounds& out) {
@@ -65,7 +63,8 @@ void set_rounding_bounds(const StepProblem& problem, StepData& data) {
   };
   const auto bend_add = [&](double moment, double length, std::initializer_list<int> nodes,
                             std::initializer_list<int> angles) {
-    for (int node : nodes) floor.segment(problem.model.node_dof[at(node)], problem.model.dimension).array() += moment / length;
+    for (int node : nodes)
+      floor.segment(problem.model.node_dof[at(node)], problem.model.dimension).array() += moment / length;
     if (!problem.model.planar())
       for (int edge : angles) floor(problem.model.edge_dof[at(edge)]) += moment;
   };
@@ -81,8 +80,9 @@ void set_rounding_bounds(const StepProblem& problem, StepData& data) {
   for (std::size_t h = 0; h < problem.model.half.size(); ++h) {
     const FrameStencil& s = problem.model.half[h];
     const double length = problem.model.edge_length(s.edge);
-    const double moment = moment_of(k.half_stiffness.row(static_cast<Eigen::Index>(h)).maxCoeff(), length,
-                                    data.configuration.attached[h].tangent, data.configuration.edge[at(s.edge)].tangent);
+    const double moment =
+        moment_of(k.half_stiffness.row(static_cast<Eigen::Index>(h)).maxCoeff(), length,
+                  data.configuration.attached[h].tangent, data.configuration.edge[at(s.edge)].tangent);
     bend_add(moment, length, {problem.model.edge_tail[at(s.edge)], problem.model.edge_head[at(s.edge)]}, {s.edge});
     for (int i = 0; i < problem.model.frame_size(); ++i) floor(problem.model.frame_dof[at(s.frame)] + i) += moment;
     if (s.hinge >= 0) floor(problem.model.hinges[at(s.hinge)].dof) += moment;

@@ -50,8 +50,7 @@ void Equations::remember(EquationsMemory& out, bool with_matrix) const {
 bool Equations::recall(const EquationsMemory& memory) {
   const bool regrouped = memory.groups != assembler_.groups();
   assembler_.set_groups(memory.groups);
-  if (terms_.contact &&
-      (regrouped || memory.ordered != ordered_ || memory.coupled != terms_.contact->rows().keys())) {
+  if (terms_.contact && (regrouped || memory.ordered != ordered_ || memory.coupled != terms_.contact->rows().keys())) {
     ContactRows& rows = terms_.contact->rows();
     rows.set(contact()->surfaces(), memory.ordered);
     if (regrouped || memory.ordered != ordered_) order_for_contacts();

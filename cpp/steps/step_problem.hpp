@@ -35,9 +35,9 @@ struct StepProblem {
   const State* start = nullptr;            ///< must outlive the step
   const Parameters* parameters = nullptr;  ///< likewise
   StepRule rule = StepRule::statics;
-  double interval = 0;  ///< h, from q0 to z [s]; 0: statics
+  double interval = 0;   ///< h, from q0 to z [s]; 0: statics
   double slip_time = 0;  ///< in which slip happens [s]
-  long number = 0;      ///< of problems so far: tells one from another
+  long number = 0;       ///< of problems so far: tells one from another
 
   /// Of the parameters, of that version.
   long version = -1;
@@ -50,8 +50,8 @@ struct StepProblem {
   ElasticCoefficients viscous;  ///< viscosity alone, over h, from the start's strains
   ElasticCoefficients damped;   ///< elasticity and viscosity as one
 
-  Loads loads;                 ///< with the values that act at the time of the step's forces
-  AppliedForces custom;        ///< unless they are solved for
+  Loads loads;           ///< with the values that act at the time of the step's forces
+  AppliedForces custom;  ///< unless they are solved for
   /// Of what supports hold, which acts on the edges next to it; meaningful where held. Empty: as the rest accelerates.
   VectorX held_acceleration;
 
@@ -68,11 +68,11 @@ struct StepProblem {
 
 /// What rounding leaves of a residual, which no iteration removes; see rounding.cpp.
 struct RoundingBounds {
-  long number = -1;      ///< of the problem that they belong to
-  VectorX rows;          ///< of bending, twisting and inertia
-  VectorX axial;         ///< per edge [N]
-  double relative = 0;   ///< of a direction in space
-  double reach = 0;      ///< greatest coordinate [m]
+  long number = -1;     ///< of the problem that they belong to
+  VectorX rows;         ///< of bending, twisting and inertia
+  VectorX axial;        ///< per edge [N]
+  double relative = 0;  ///< of a direction in space
+  double reach = 0;     ///< greatest coordinate [m]
 };
 
 /// What an evaluation of a problem finds; owned by who asks for it.
@@ -86,22 +86,22 @@ struct StepData {
   VectorX z;
   const ContactLinearisation* contact = nullptr;  ///< how Newton's method takes contact
   const double* axial_force = nullptr;  ///< of the mixed method, see stretch_local; nothing: that of the configuration
-  VectorX end;  ///< q1
-  Configuration configuration;      ///< at z
-  Configuration end_configuration;  ///< at q1, where viscosity or the rule need it
+  VectorX end;                          ///< q1
+  Configuration configuration;          ///< at z
+  Configuration end_configuration;      ///< at q1, where viscosity or the rule need it
   RoundingBounds rounding;
 
   /// What terms leave for each other and for read-outs.
-  VectorX gradient, row_magnitude;   ///< forces and their absolute values so far; padded by kPadding
+  VectorX gradient, row_magnitude;      ///< forces and their absolute values so far; padded by kPadding
   ElasticCoefficients viscous, damped;  ///< of a step whose middle is z
-  VectorX force, modulus;            ///< per edge: EA eps [N], EA / L [N / m]
-  VectorX change;                    ///< q1 - q0 of an energy-momentum step
-  VectorX elastic_rows;              ///< per unknown, the discrete gradient alone
-  AppliedForces custom;              ///< custom forces at z
-  VectorX velocity;                  ///< (z - q0) / h
-  VectorX acceleration, inertia;     ///< M times the acceleration [N], [N m]
-  VectorX drag_force;                ///< [N]
-  VectorX flow_force, flow_drag;     ///< of a fluid, and its local drag [N]
+  VectorX force, modulus;               ///< per edge: EA eps [N], EA / L [N / m]
+  VectorX change;                       ///< q1 - q0 of an energy-momentum step
+  VectorX elastic_rows;                 ///< per unknown, the discrete gradient alone
+  AppliedForces custom;                 ///< custom forces at z
+  VectorX velocity;                     ///< (z - q0) / h
+  VectorX acceleration, inertia;        ///< M times the acceleration [N], [N m]
+  VectorX drag_force;                   ///< [N]
+  VectorX flow_force, flow_drag;        ///< of a fluid, and its local drag [N]
   VectorX contact_gradient, contact_floor;
 };
 

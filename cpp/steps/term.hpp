@@ -1,6 +1,6 @@
 #pragma once
-/// One kind of force among the equations of a step. Terms are named in one table, `make_terms` in terms.cpp; a scene has
-/// those that it needs.
+/// One kind of force among the equations of a step. Terms are named in one table, `make_terms` in terms.cpp; a scene
+/// has those that it needs.
 
 #include <memory>
 #include <span>

@@ -10,8 +10,6 @@ namespace withe {
 
 namespace {
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
-
 /// Mean colour of a branch where it leaves the zone.
 Eigen::Vector3f mean_color(const ColorImage& image, const SkeletonEdge& edge, int end, const Branch& branch) {
   const int n = static_cast<int>(edge.points.size());

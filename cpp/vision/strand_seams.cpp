@@ -12,8 +12,6 @@ namespace withe {
 
 namespace {
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
-
 bool is_junction(const SkeletonGraph& graph, int node) { return node >= 0 && graph.nodes[at(node)].edges.size() >= 3; }
 
 /// How a line goes on where a wide run becomes narrower.

@@ -10,8 +10,6 @@
 namespace withe {
 namespace {
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
-
 /// Frames are the same when the same end of an edge is attached to both: a node may have several.
 bool same_frame(const Model& a, int frame_a, const Model& b, int frame_b) {
   for (const FrameStencil& s : a.half) {

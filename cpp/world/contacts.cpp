@@ -7,8 +7,6 @@
 namespace withe {
 namespace {
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
-
 Vector3 in_space(const Model& model, const Vec3d& v, bool is_point) {
   if (!model.planar()) return to_eigen(v);
   const Plane& p = *model.plane;

@@ -9,8 +9,6 @@
 namespace withe {
 namespace {
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
-
 /// Share of the greatest energy that steps may gain from nowhere in all: where midpoint steps gain more,
 /// energy-momentum ones are as accurate or more so, and without any limit the former fail (see integrators/README.md).
 constexpr double kMostGain = 1e-3;

@@ -73,9 +73,7 @@ bool World::Implementation::drifts(Equations& system) {
     if (std::abs(force) <= kBalanced * scale) continue;
     const auto size = static_cast<std::size_t>(model.dof_count);
     system.assembler().solver().multiply({along.data(), size}, {pull.data(), size});
-    double greatest = 0.0;
-    for (int i = 0; i < model.dof_count; ++i) greatest = std::max(greatest, std::abs(system.assembler().diagonal(i)));
-    if (pull.cwiseAbs().maxCoeff() <= kNeutral * greatest) return true;
+    if (pull.cwiseAbs().maxCoeff() <= kNeutral * system.assembler().greatest_diagonal()) return true;
   }
   return false;
 }

@@ -22,8 +22,6 @@ constexpr double kBent = 0.05;  // [rad]
 /// Stiffnesses of rods that differ by more leave few digits to the soft ones.
 constexpr double kMismatch = 1e6;
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
-
 }  // namespace
 
 /// Rod and node of a row of the residual, and how to say it; -1 and nothing where it is not known.

@@ -11,8 +11,6 @@ namespace {
 
 using Entries = std::vector<Eigen::Triplet<double>>;
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
-
 SparseMatrix assembled(Eigen::Index rows, Eigen::Index columns, const Entries& entries) {
   SparseMatrix out(rows, columns);
   out.setFromTriplets(entries.begin(), entries.end());
@@ -74,7 +72,11 @@ SparseMatrix matrix_of(const Model& model, const MassMatrix& mass) {
 class StrainParts {
  public:
   StrainParts(const Equations& system, const State& state, const Configuration& configuration)
-      : system_(system), state_(state), configuration_(configuration), model_(system.model()), without_(system.elastic()) {
+      : system_(system),
+        state_(state),
+        configuration_(configuration),
+        model_(system.model()),
+        without_(system.elastic()) {
     for (int e = 0; e < model_.edge_count; ++e) add_stretch(e);
     const ElasticCoefficients& k = system.elastic();
     for (int b = 0; b < static_cast<int>(model_.bend.size()); ++b)

@@ -10,8 +10,6 @@
 namespace withe {
 namespace {
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
-
 ObstacleWay way_at(const ObstacleMotion& m, double time) {
   const double share = ramp_fraction(time, m.start, m.end);
   return {(1.0 - share) * m.from.shift + share * m.to.shift, (1.0 - share) * m.from.turn + share * m.to.turn};

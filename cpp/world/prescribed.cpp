@@ -7,12 +7,6 @@
 #include "world/implementation.hpp"
 
 namespace withe {
-namespace {
-
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
-
-}  // namespace
-
 double ramp_fraction(double time, double start, double end) {
   if (time >= end) return 1.0;
   return std::clamp((time - start) / (end - start), 0.0, 1.0);

@@ -5,12 +5,6 @@
 #include "world/implementation.hpp"
 
 namespace withe {
-namespace {
-
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
-
-}  // namespace
-
 MatrixX3 World::positions() const {
   const Implementation& self = *implementation_;
   MatrixX3 out(self.model.node_count, 3);

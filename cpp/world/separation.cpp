@@ -8,8 +8,6 @@
 namespace withe {
 namespace {
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
-
 // Steps of the descent, and how much stiffer contact is in each.
 constexpr int kMostSteps = 60;
 constexpr double kStiffer = 4.0;

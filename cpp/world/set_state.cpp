@@ -13,8 +13,6 @@
 namespace withe {
 namespace {
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
-
 constexpr double kHeld = 1e-9;     // of the scene's length, or rad: what rounding may have moved
 constexpr double kAligned = 1e-6;  // rad: directors from outside are no better
 

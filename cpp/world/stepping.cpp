@@ -11,8 +11,6 @@
 namespace withe {
 namespace {
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
-
 // Times that contact may be made stiffer before a step counts as failed.
 constexpr int kMostStiffenings = 4;
 // Easy steps before longer ones are tried, at most.

@@ -8,12 +8,6 @@
 #include "world/implementation.hpp"
 
 namespace withe {
-namespace {
-
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
-
-}  // namespace
-
 int World::add_support(const SupportDescription& support) {
   Implementation& self = *implementation_;
   const Implementation backup(self);

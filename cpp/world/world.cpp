@@ -10,8 +10,6 @@
 namespace withe {
 namespace {
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
-
 /// Whether a load points, or turns, out of the plane of a normal.
 bool off_plane(LoadKind kind, const Vector3& value, const Vector3& normal) {
   const double off = is_axial(kind) ? value.cross(normal).norm() : std::abs(value.dot(normal));

@@ -28,7 +28,7 @@ struct Energy {  // [J]
 struct Statistics {
   long steps = 0;  ///< inner steps accepted
   long rejected_steps = 0;
-  long iterations = 0;  ///< Newton iterations
+  long iterations = 0;   ///< Newton iterations
   long evaluations = 0;  ///< of the residual, with or without its matrix
   long factorizations = 0;
   double largest_turn = 0;  ///< of an edge in one step [rad]; plain midpoint loses energy balance above about 0.1

@@ -9,7 +9,6 @@
 namespace withe {
 namespace {
 
-using testing::at;
 using testing::MatrixX;
 using testing::SceneBuilder;
 

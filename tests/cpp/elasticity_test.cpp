@@ -13,7 +13,6 @@ namespace withe {
 namespace {
 
 using testing::all_cases;
-using testing::at;
 using testing::Case;
 using testing::count_of;
 using testing::derivative_matches;

@@ -10,7 +10,6 @@
 namespace withe {
 namespace {
 
-using testing::at;
 using testing::Case;
 using testing::count_of;
 using testing::dofs_of;

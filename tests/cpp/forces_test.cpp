@@ -9,7 +9,6 @@
 namespace withe {
 namespace {
 
-using testing::at;
 using testing::Case;
 using testing::derivative_matches;
 using testing::MatrixX;

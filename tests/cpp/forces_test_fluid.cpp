@@ -14,7 +14,6 @@
 namespace withe {
 namespace {
 
-using testing::at;
 using testing::kPi;
 using testing::MatrixX;
 using testing::SceneBuilder;

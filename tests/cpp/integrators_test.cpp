@@ -7,13 +7,12 @@
 #include "derivative_check.hpp"
 #include "integrators/dynamics.hpp"
 #include "integrators/statics.hpp"
-#include "steps/inertia.hpp"
 #include "states.hpp"
+#include "steps/inertia.hpp"
 
 namespace withe {
 namespace {
 
-using testing::at;
 using testing::Case;
 using testing::derivative_matches;
 using testing::kPi;
@@ -185,7 +184,8 @@ TEST(Equations, EnergyMomentumIsMidpointWhereNothingMovesYet) {
       if (!c.model.planar()) c.q.segment<3>(dof).setZero();
     c.state.q = c.q;
     const Parameters parameters = initial_parameters(c.model);
-    Equations a(c.model, equation_options(options_of(Scheme::energy_momentum))), b(c.model, equation_options(options_of(Scheme::implicit_midpoint)));
+    Equations a(c.model, equation_options(options_of(Scheme::energy_momentum))),
+        b(c.model, equation_options(options_of(Scheme::implicit_midpoint)));
     a.begin(c.state, parameters, StepRule::energy_momentum, 0.0);
     b.begin(c.state, parameters, StepRule::statics, 0.0);
     Configuration here;

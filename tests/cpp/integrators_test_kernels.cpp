@@ -112,7 +112,8 @@ void expect_same_sums(const Case& c, Integrator integrator) {
   Options options;
   options.integrator = integrator;  // energy-momentum: whole lines instead of triangles
   Equations equations(c.model, equation_options(options));
-  Assembler reference(c.model, equations.loads(), equations.asymmetries().empty() ? Symmetry::symmetric : Symmetry::unsymmetric,
+  Assembler reference(c.model, equations.loads(),
+                      equations.asymmetries().empty() ? Symmetry::symmetric : Symmetry::unsymmetric,
                       SolverKind::automatic);
   const Parameters parameters = initial_parameters(c.model);
   StepData evaluation, alone;

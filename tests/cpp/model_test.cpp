@@ -10,7 +10,6 @@
 namespace withe {
 namespace {
 
-using testing::at;
 using testing::kPi;
 using testing::RodMaterial;
 using testing::SceneBuilder;

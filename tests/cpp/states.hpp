@@ -16,8 +16,6 @@ struct Case {
   double increment = 1e-2;  ///< largest one of the derivative check
 };
 
-inline std::size_t at(int i) { return static_cast<std::size_t>(i); }
-
 /// Takes the branch of every twist from where the case is.
 inline void follow_twists(Case& c) {
   Configuration configuration;
