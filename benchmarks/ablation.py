@@ -30,7 +30,8 @@ from reporting import Report, arguments, bar
 from work_precision import Point
 
 import withe
-from withe import _core, simulation
+from withe import _core
+from withe.parts.options import BuildOptions
 
 HEURISTICS: tuple[str, ...] = _core.Options.heuristics
 FACTORISATION = 3.0
@@ -192,19 +193,19 @@ def groups(quick: bool) -> dict[str, list[Scene]]:
 @contextmanager
 def without(heuristic: str) -> Iterator[None]:
     """Simulations that are built here lack a heuristic; nothing where it has no name."""
-    made = simulation.engine_options
+    made = BuildOptions.engine
 
-    def engine_options(options: dict) -> _core.Options:
+    def engine(options: BuildOptions) -> _core.Options:
         result = made(options)
         if heuristic:
             result.switch_off(heuristic)
         return result
 
-    simulation.engine_options = engine_options
+    BuildOptions.engine = engine
     try:
         yield
     finally:
-        simulation.engine_options = made
+        BuildOptions.engine = made
 
 
 @contextmanager

@@ -135,11 +135,11 @@ void Inertia::add(const StepProblem& problem, StepData& data, const Assembler& a
 }
 
 /// What couples nodes off the diagonal is less on it.
-void add_mass_matrix(const StepProblem& problem, const MassMatrix& mass, double factor, const Assembler& assembler, std::span<double> values) {
+void add_mass_matrix(const StepProblem& problem, const MassMatrix& mass, double factor, const Assembler& assembler,
+                     std::span<double> values) {
   const Model& model = problem.model;
   const std::vector<std::ptrdiff_t>& diagonal = assembler.diagonal_offsets();
-  for (int i = 0; i < model.dof_count; ++i)
-    values[static_cast<std::size_t>(diagonal[at(i)])] += factor * mass.rows[i];
+  for (int i = 0; i < model.dof_count; ++i) values[static_cast<std::size_t>(diagonal[at(i)])] += factor * mass.rows[i];
   const auto size = static_cast<std::size_t>(model.dimension);
   for (int e = 0; e < model.edge_count; ++e) {
     const double coupling = factor * mass.coupling[e];

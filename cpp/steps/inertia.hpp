@@ -14,7 +14,8 @@ class Inertia final : public Term {
 };
 
 /// Entries of a matrix such as that of masses: its diagonal, and what couples nodes off it.
-void add_mass_matrix(const StepProblem& problem, const MassMatrix& mass, double factor, const Assembler& assembler, std::span<double> values);
+void add_mass_matrix(const StepProblem& problem, const MassMatrix& mass, double factor, const Assembler& assembler,
+                     std::span<double> values);
 
 /// Adds to the gradient the couple of an edge that spins and turns with velocities v.
 void add_explicit_spin_couple(const StepProblem& problem, StepData& data, int edge, const VectorX& v);
