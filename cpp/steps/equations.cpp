@@ -129,6 +129,8 @@ void Equations::evaluate(const VectorX& z, bool with_matrix, const double* axial
   for (const std::unique_ptr<Term>& term : terms_.all) term->add(problem_, data, assembler_, values);
   finish(data);
   if (with_matrix) assembler_.project_matrix();
+  data.axial_force = nullptr;
+  data.contact = nullptr;
 }
 
 void Equations::finish(StepData& data) const {

@@ -109,6 +109,23 @@ TEST(Equations, MatrixIsTheDerivativeOfTheResidualForEverySchemeAndScene) {
     for (const Case& c : moving_cases(lossy(scheme))) expect_matrix_is_exact(c, scheme, 0.3);
 }
 
+TEST(Equations, TheSameProblemGivesTheSameBitsWhateverWasEvaluatedBetween) {
+  for (Scheme scheme : kSchemes)
+    for (const Case& c : moving_cases(lossy(Scheme::backward_euler))) {
+      Equations equations(c.model, equation_options(options_of(scheme)));
+      const Parameters parameters = initial_parameters(c.model);
+      equations.begin(c.state, parameters, rule_of(scheme), interval_of(scheme, 0.3));
+      StepData first, again, between;
+      equations.evaluate(c.q, true, nullptr, first);
+      const std::span<const double> values = equations.assembler().solver().values();
+      const std::vector<double> matrix(values.begin(), values.end());
+      equations.evaluate(0.5 * (c.q + c.state.q), true, nullptr, between);
+      equations.evaluate(c.q, true, nullptr, again);
+      EXPECT_TRUE(first.residual == again.residual && first.potential == again.potential) << c.name;
+      EXPECT_TRUE(std::equal(matrix.begin(), matrix.end(), equations.assembler().solver().values().begin())) << c.name;
+    }
+}
+
 TEST(Equations, MatrixIsExactWithoutDragAndViscosity) {
   for (const Case& c : moving_cases({}))
     for (Scheme scheme : kSchemes) expect_matrix_is_exact(c, scheme, 0.3);

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+import threading
 from collections.abc import Callable
 from typing import Any
 
@@ -281,3 +282,17 @@ def test_fourth_order_steps_refuse_contact() -> None:
     scene, _, _ = crossing()
     with pytest.raises(ValueError, match="fourth_order"):
         scene.build(integrator="fourth_order")
+
+
+@pytest.mark.parametrize("integrator", ["implicit_midpoint", "energy_momentum", "backward_euler"])
+def test_a_copy_in_another_thread_takes_the_same_steps_to_the_bit(integrator: Any) -> None:
+    simulation = crossing(friction=0.3)[0].build(integrator=integrator)
+    simulation.step(30)
+    copy = simulation.copy()
+    thread = threading.Thread(target=copy.step, args=(40,))
+    thread.start()
+    simulation.step(40)
+    thread.join()
+    assert copy.positions().tobytes() == simulation.positions().tobytes()
+    assert copy.velocities().tobytes() == simulation.velocities().tobytes()
+    assert copy.energy() == simulation.energy()
