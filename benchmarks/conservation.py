@@ -58,7 +58,7 @@ class Flight:
         return vars(self) | {"case": self.case.number, "kind": self.case.kind}
 
 
-def books(simulation: withe.Simulation) -> tuple[float, np.ndarray, np.ndarray]:
+def balances(simulation: withe.Simulation) -> tuple[float, np.ndarray, np.ndarray]:
     """Energy balance [J], linear and angular momentum."""
     energy, momentum = simulation.energy(), simulation.momentum()
     return energy.total - energy.work + energy.dissipated, momentum.linear, momentum.angular
@@ -67,7 +67,7 @@ def books(simulation: withe.Simulation) -> tuple[float, np.ndarray, np.ndarray]:
 def fly(case: Case, integrator: str, steps_a_period: int, steps: int, *, tight: bool = False) -> Flight:
     """One flight."""
     simulation, mass = case.build(integrator, case.period / steps_a_period, tight=tight)
-    energy, linear, angular = books(simulation)
+    energy, linear, angular = balances(simulation)
     start = simulation.energy()
     stored = start.kinetic + start.stretch + start.bend + start.twist
     impulse, far = math.sqrt(2.0 * start.kinetic * mass), 0.0
@@ -79,7 +79,7 @@ def fly(case: Case, integrator: str, steps_a_period: int, steps: int, *, tight: 
             simulation.step(steps // LOOKS)
         except withe.ConvergenceError as error:
             failure = f"ConvergenceError: {error}"
-        now = books(simulation)
+        now = balances(simulation)
         far = max(far, float(np.linalg.norm(simulation.positions(), axis=1).max()))
         worst["linear"] = max(worst["linear"], float(np.linalg.norm(now[1] - linear)) / impulse)
         worst["angular"] = max(worst["angular"], float(np.linalg.norm(now[2] - angular)) / (impulse * far))
@@ -153,7 +153,7 @@ def rotation(axis: np.ndarray, angle: float) -> np.ndarray:
 
 
 def driven(integrator: str, planar: bool, step: float, *, even: bool, seconds: float = 0.4) -> dict[str, float]:
-    """A rod whose wall moves and turns, evenly or not: greatest errors of a step's books, over what they hold.
+    """A rod whose wall moves and turns, evenly or not: greatest errors of a step's energy balance, over what it holds.
 
     From the third step on: only then velocities of what is held are known to second order.
     """
@@ -210,7 +210,7 @@ def add_driven(report: Report) -> None:
                     if not exact:
                         report.goal(f"{integrator} driven {how} in {where}: order of {name}", order, 1.8)
     header = ["integrator", "in", "driven", "book", "4 ms", "2 ms", "1 ms", "order"]
-    report.table("Driven rods: books of a support against its reactions, greatest errors of a step", header, rows)
+    report.table("Driven rods: work and impulses of a support against its reactions, greatest errors of a step", header, rows)
 
 
 # --- what is printed and drawn ----------------------------------------------------------------------------------

@@ -6,7 +6,8 @@
 
 namespace withe {
 
-/// How a guess has served that need not lead to the solution: what misses time and again is tried ever more rarely.
+/// How often a guess that need not lead to the solution has done so: what misses time and again is tried ever more
+/// rarely.
 struct GuessRecord {
   int misses = 0;  ///< in a row
   int waits = 0;   ///< solves to come without it

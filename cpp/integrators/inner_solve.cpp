@@ -81,10 +81,10 @@ class InnerSolve {
         history_(work.newton.guesses),
         frictional_(equations.contact() && equations.contact()->frictional()),
         regularised_(frictional_ && equations.contact()->regularises()),
-        circling_(plan.rule == StepRule::energy_momentum),
-        mixed_(!circling_ || history_.plain_solves == 0),
+        energy_momentum_(plan.rule == StepRule::energy_momentum),
+        mixed_(!energy_momentum_ || history_.plain_solves == 0),
         points_(predictor.points(plan.slot)) {
-    if (circling_ && !mixed_) --history_.plain_solves;
+    if (energy_momentum_ && !mixed_) --history_.plain_solves;
   }
 
   NewtonResult run() {
@@ -104,7 +104,7 @@ class InnerSolve {
       spent += found.iterations;
       if (!sure) record.note(found.converged);
       if (!found.converged) continue;
-      if (circling_ && mixed_ && guess == Guess::other_method && uses(Heuristic::remember_plain))
+      if (energy_momentum_ && mixed_ && guess == Guess::other_method && uses(Heuristic::remember_plain))
         history_.plain_solves = kPlainSolves;
       break;
     }
@@ -143,7 +143,7 @@ class InnerSolve {
   /// energy-momentum step, the mixed method may circle for ever: then the plain one comes first for a while.
   bool on_trial(Guess guess) const {
     const bool moving = guess == Guess::steady || guess == Guess::other_method;
-    return guess == Guess::accelerated || (circling_ && moving && mixed(guess));
+    return guess == Guess::accelerated || (energy_momentum_ && moving && mixed(guess));
   }
 
   bool mixed(Guess guess) const { return (guess == Guess::other_method) != mixed_; }
@@ -230,7 +230,7 @@ class InnerSolve {
   GuessHistory& history_;
   bool frictional_;
   bool regularised_;  ///< whether friction's regularisation is what Newton's method may fail on
-  bool circling_, mixed_;
+  bool energy_momentum_, mixed_;
   int points_;  ///< of the extrapolation
 };
 

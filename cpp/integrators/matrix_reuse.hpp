@@ -13,7 +13,7 @@ namespace withe {
 /// Where the matrix of an iteration was made: there, at an earlier iterate, or in an earlier time step.
 enum class MatrixAge { fresh, within, across };
 
-/// How well old factorisations have served.
+/// Contraction rates of chord iterations with earlier factorisations.
 struct MatrixHistory {
   double interval = 0;  ///< that the last one belongs to [s]
   /// Contraction rate per MatrixAge: error after an iteration over error before.

@@ -9,8 +9,9 @@
 namespace withe {
 
 /// Polynomials in time through the mean accelerations of the last steps, each taken at the middle of its step. Used is
-/// the degree that would have served best last time: modes that the step does not resolve flip sign from step to step,
-/// and every degree amplifies them more. Steps of a composition differ in how far they look ahead, so each has a slot.
+/// the degree that would have predicted the last one best: modes that the step does not resolve flip sign from step to
+/// step, and every degree amplifies them more. Steps of a composition differ in how far they look ahead, so each has a
+/// slot.
 class Predictor {
  public:
   static constexpr int kDepth = 4, kSlots = 5;

@@ -56,7 +56,7 @@ Energy World::Implementation::energy() const {
   return energy_of(state, load_work, support_work + actuation_work, dissipated);
 }
 
-/// Energy of a state, with books as they were kept there.
+/// Energy of a state, with the work and the losses up to it.
 Energy World::Implementation::energy_of(const State& at, double loads, double work_done, double lost) const {
   Energy e;
   auto& [c, k, mass] = energy_scratch;

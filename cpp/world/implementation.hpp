@@ -126,7 +126,7 @@ struct World::Implementation : Running {
   void advance(double duration);
   void advance_in_parts(double duration);
   bool may_cut() const;
-  int notches() const;
+  int levels_per_halving() const;
   void divide_rest(Division& division) const;
   void cut(Attempt why, Division& division, double dt);
   bool grow(Attempt attempt, double dt);

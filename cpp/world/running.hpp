@@ -106,7 +106,7 @@ struct Moving {
 
 /// By what the next step is chosen and judged.
 struct StepControl {
-  int level = 0;                  ///< present halvings of the time step, in `notches()` to each
+  int level = 0;                  ///< present halvings of the time step, in `levels_per_halving()` to each
   int easy_steps = 0;             ///< since it changed
   int patience = kLeastPatience;  ///< of them before longer steps are tried
   bool grown = false;             ///< fewer easy steps than the least patience ago

@@ -471,7 +471,7 @@ void World::restore(const std::string& bytes) {
   Lagged lagged;
   exchange(r, lagged);
   r.expect_end();
-  require(fresh->level >= 0 && fresh->level <= fresh->notches() * fresh->options.max_halvings &&
+  require(fresh->level >= 0 && fresh->level <= fresh->levels_per_halving() * fresh->options.max_halvings &&
               fresh->easy_steps >= 0 && fresh->patience >= 1 && fresh->easy_steps <= fresh->patience &&
               fresh->guard.rescue >= 0 && fresh->guard.rescue <= 256,
           "snapshot is damaged: impossible step size");

@@ -28,7 +28,8 @@ void World::Implementation::advance(double duration) {
   mark();
   if (!options.adaptive && !options.tolerance) level = 0;
   // Without a step before there is no estimate, so error control begins with a step too small to need one.
-  if (options.tolerance && predictor.empty()) level = std::max(level, notches() * std::min(options.max_halvings, 8));
+  if (options.tolerance && predictor.empty())
+    level = std::max(level, levels_per_halving() * std::min(options.max_halvings, 8));
   spread_jumps(duration);
   try {
     advance_in_parts(duration);
@@ -70,18 +71,18 @@ void World::Implementation::advance_in_parts(double duration) {
 
 /// Steps change by powers of two and rarely, or symmetry and energy suffer; under error control, whose error would
 /// change by four, by the fourth root of two.
-int World::Implementation::notches() const { return options.tolerance ? 4 : 1; }
+int World::Implementation::levels_per_halving() const { return options.tolerance ? 4 : 1; }
 
 /// What is left of a time step, in equal parts no longer than `level` says.
 void World::Implementation::divide_rest(Division& division) const {
   division.from = division.reached();
-  const double wanted = std::exp2(static_cast<double>(level) / notches());
+  const double wanted = std::exp2(static_cast<double>(level) / levels_per_halving());
   division.parts = std::max(1L, static_cast<long>(std::ceil((1.0 - division.from) * wanted - 1e-9)));
   division.done = 0;
 }
 
 bool World::Implementation::may_cut() const {
-  return (options.adaptive || options.tolerance) && level < notches() * options.max_halvings &&
+  return (options.adaptive || options.tolerance) && level < levels_per_halving() * options.max_halvings &&
          options.integrator != Integrator::verlet;
 }
 
@@ -97,8 +98,8 @@ void World::Implementation::cut(Attempt why, Division& division, double dt) {
          : why == Attempt::gained_energy ? "Try a smaller time_step, or integrator='energy_momentum'"
                                          : "");
   const long left = division.parts - division.done;
-  level = std::min(level + (why == Attempt::inaccurate ? (notches() + 1) / 2 : notches()),
-                   notches() * options.max_halvings);
+  level = std::min(level + (why == Attempt::inaccurate ? (levels_per_halving() + 1) / 2 : levels_per_halving()),
+                   levels_per_halving() * options.max_halvings);
   for (divide_rest(division); division.parts <= left && may_cut(); divide_rest(division)) ++level;
   if (why == Attempt::gained_energy && grown) patience = std::min(2 * patience, kMostPatience);
   grown = false;
@@ -121,8 +122,8 @@ bool World::Implementation::grow(Attempt attempt, double dt) {
   if (level == 0 || easy_steps < patience) return false;
   easy_steps = 0;
   grown = true;
-  int up = notches();
-  while (up > 1 && !may_grow(dt, std::exp2(static_cast<double>(up) / notches()))) --up;
+  int up = levels_per_halving();
+  while (up > 1 && !may_grow(dt, std::exp2(static_cast<double>(up) / levels_per_halving()))) --up;
   level = std::max(0, level - up);
   return true;
 }
@@ -157,7 +158,7 @@ World::Implementation::Attempt World::Implementation::try_step(double dt) {
   if (keeps) kept = *this;
   // Actuation changes what is stored without a motion, so the start is looked at while it is as it was.
   if (guarded && !guard.energy && actuated()) guard.energy = energy();
-  const EnergyGuard books = guard;
+  const EnergyGuard guard_before = guard;
   const double allowed = options.tolerance ? *options.tolerance * dt / options.duration.value_or(1.0) : INFINITY;
   work.newton.finest = 0.01 * allowed;  // so that what Newton leaves is no part of the error
   double error = 0.0;
@@ -185,7 +186,7 @@ World::Implementation::Attempt World::Implementation::try_step(double dt) {
   }
   if (gained || pumped) {
     take_back();
-    if (pumped) guard = books;
+    if (pumped) guard = guard_before;
     if (euler || !guarded) return Attempt::gained_energy;
     // The same step again, and a while of them, without the flaw.
     guard.rescue = 256;
@@ -199,7 +200,7 @@ World::Implementation::Attempt World::Implementation::try_step(double dt) {
   // Far below what is allowed an estimate is mostly rounding.
   const double seen = error > 0.01 * allowed ? error / std::pow(dt, local_order()) : 0.0;
   error_rate = std::max(seen, error_rate * (1.0 - 1.0 / 256.0));
-  return may_grow(dt, std::exp2(1.0 / notches())) ? Attempt::easy : Attempt::hard;
+  return may_grow(dt, std::exp2(1.0 / levels_per_halving())) ? Attempt::easy : Attempt::hard;
 }
 
 /// Undoes an accepted step.

@@ -97,7 +97,7 @@ std::vector<Case> long_cases() {
   return cases;
 }
 
-void expect_same_matrix(Assembler& assembler, Assembler& reference, const std::string& name) {
+void expect_same_matrix(Assembler& assembler, Assembler& reference, double tolerance, const std::string& name) {
   const std::span<const double> a = assembler.solver().values(), b = reference.solver().values();
   ASSERT_EQ(a.size(), b.size());
   double greatest = 0.0, difference = 0.0;
@@ -105,7 +105,7 @@ void expect_same_matrix(Assembler& assembler, Assembler& reference, const std::s
     greatest = std::max(greatest, std::abs(b[i]));
     difference = std::max(difference, std::abs(a[i] - b[i]));
   }
-  EXPECT_LT(difference, 1e-12 * greatest) << name;
+  EXPECT_LT(difference, tolerance * greatest) << name;
 }
 
 void expect_same_sums(const Case& c, Integrator integrator) {
@@ -124,7 +124,7 @@ void expect_same_sums(const Case& c, Integrator integrator) {
   const double scale = magnitude.maxCoeff() + 1.0;
   EXPECT_LT((evaluation.residual - force).cwiseAbs().maxCoeff(), 1e-12 * scale) << c.name;
   EXPECT_LT((evaluation.magnitude - magnitude).cwiseAbs().maxCoeff(), 1e-12 * scale) << c.name;
-  expect_same_matrix(equations.assembler(), reference, c.name);
+  expect_same_matrix(equations.assembler(), reference, 1e-12, c.name);
   equations.evaluate(c.q, false, nullptr, alone);
   EXPECT_LT((evaluation.residual - alone.residual).cwiseAbs().maxCoeff(), 1e-13 * scale) << c.name;
 }
@@ -287,7 +287,8 @@ void expect_same_discrete_sums(const Case& c, bool given) {
   const double scale = magnitude.maxCoeff() + 1.0;
   EXPECT_LT((evaluation.residual - force).cwiseAbs().maxCoeff(), 1e-12 * scale) << c.name;
   EXPECT_LT((evaluation.magnitude - magnitude).cwiseAbs().maxCoeff(), 1e-12 * scale) << c.name;
-  expect_same_matrix(equations.assembler(), reference, c.name);
+  // Quotients by 1 + cos of what an edge turns against the next lose digits where stencils fold over.
+  expect_same_matrix(equations.assembler(), reference, 1e-11, c.name);
   equations.evaluate(z, false, axial, alone);
   EXPECT_LT((evaluation.residual - alone.residual).cwiseAbs().maxCoeff(), 1e-13 * scale) << c.name;
 }

@@ -125,7 +125,7 @@ def test_momentum_is_a_copy_with_names():
 @pytest.mark.parametrize("planar", [True, False], ids=["planar", "spatial"])
 @pytest.mark.parametrize("integrator", ["implicit_midpoint", "energy_momentum"])
 def test_reactions_of_a_clamp_are_what_momenta_change_by_and_what_does_the_work(integrator, planar):
-    """A clamp that moves and turns evenly; `exact` is what of a step's books is, the other is of second order.
+    """A clamp that moves and turns evenly; `exact` is what of a step's balances is, the other is of second order.
 
     In space a step turns by its Cayley vector, and moments of energy-momentum steps in a plane do the work over the
     angle.
@@ -140,7 +140,7 @@ def test_reactions_of_a_clamp_are_what_momenta_change_by_and_what_does_the_work(
         turn = np.eye(3) + np.sin(0.8 * t) * cross + (1.0 - np.cos(0.8 * t)) * cross @ cross
         return (0.2 * t, 0.0, 0.1 * t), turn
 
-    def books(step):
+    def balances(step):
         simulation = scene.build(
             integrator=integrator, time_step=step, planar=planar, adaptive=False, step_tolerance=1e-13,
             force_tolerance=1e-13,
@@ -160,7 +160,7 @@ def test_reactions_of_a_clamp_are_what_momenta_change_by_and_what_does_the_work(
             scales = np.maximum(scales, (abs(done), np.linalg.norm(twirl)))
         return errors / scales
 
-    found = np.array([books(step) for step in (0.04, 0.02, 0.01)])
+    found = np.array([balances(step) for step in (0.04, 0.02, 0.01)])
     exact = {"work": planar, "moment": not planar or integrator == "implicit_midpoint"}
     for column, name in enumerate(exact):
         if exact[name]:

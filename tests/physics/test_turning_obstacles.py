@@ -9,7 +9,7 @@ GRAVITY, RADIUS, LENGTH = 9.81, 5e-3, 0.2
 STEEL = {"youngs_modulus": 2e8, "poisson_ratio": 0.3, "density": 1000.0}
 
 
-def books(simulation):
+def balances(simulation):
     energy = simulation.energy()
     return energy.total + energy.dissipated - energy.work
 
@@ -30,7 +30,7 @@ def test_turntable_turns_a_rod_by_the_torque_of_its_friction(friction_model):
     scene.enable_contact(friction_model=friction_model)
     simulation = scene.build(time_step=1e-3, integrator="backward_euler")
     simulation.run(0.05, progress=False)
-    before = books(simulation)
+    before = balances(simulation)
     simulation.move(table, roll=rate * 1.0, over=1.0)
     simulation.run(0.1, progress=False)
     # along y, whose speed is that of the turn; a rod also rolls about itself, which takes from the slip at first
