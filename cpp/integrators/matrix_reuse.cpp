@@ -8,6 +8,8 @@ namespace {
 // A lagged Jacobian of an earlier time step whose contraction rate is above this is tried again after so many steps.
 constexpr double kSlow = 0.15;
 constexpr int kWait = 16;
+// A step, of the contraction rate within a step: where it has asked for new matrices alone, it is measured no more.
+constexpr double kForgetting = 0.96;
 // So many iterations cost as much as a new matrix.
 constexpr int kCostOfMatrix = 3;
 // An iteration with an old matrix costs about a quarter of one with a new one.
@@ -36,6 +38,7 @@ MatrixReuse::MatrixReuse(MatrixRecord& record, Equations& equations, double inte
     if (!fresh_) record.waited = 0;
   }
   record.slow = false;
+  if (heuristics.uses(Heuristic::forget_contraction)) record.contraction[at(MatrixAge::within)] *= kForgetting;
 }
 
 bool MatrixReuse::near_end() const {

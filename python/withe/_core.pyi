@@ -367,6 +367,7 @@ class Options:
         "reuse_within_step",
         "rest_from_reuse",
         "refresh_after_slow",
+        "forget_contraction",
         "late_matrix",
         "matrix_worth",
         "reject_growing",
