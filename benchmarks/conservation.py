@@ -209,8 +209,8 @@ def add_driven(report: Report) -> None:
                     rows.append([integrator, where, how, name, *map(figure, values), "-" if exact else f"{order:.1f}"])
                     if not exact:
                         report.goal(f"{integrator} driven {how} in {where}: order of {name}", order, 1.8)
-    header = ["integrator", "in", "driven", "book", "4 ms", "2 ms", "1 ms", "order"]
-    report.table("Driven rods: work and impulses of a support against its reactions, greatest errors of a step", header, rows)
+    header = ["integrator", "in", "driven", "of", "4 ms", "2 ms", "1 ms", "order"]
+    report.table("Driven rods: work and impulse of a support, greatest errors of a step", header, rows)
 
 
 # --- what is printed and drawn ----------------------------------------------------------------------------------
