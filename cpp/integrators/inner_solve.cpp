@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "elasticity/stretch.hpp"
+
 namespace withe {
 namespace {
 
@@ -29,7 +31,7 @@ void start_axial_force(const Equations& equations, const VectorX& q, VectorX& ou
     const int a = model.node_dof[at(model.edge_tail[at(e)])], b = model.node_dof[at(model.edge_head[at(e)])];
     double square = 0.0;
     for (int i = 0; i < model.dimension; ++i) square += (q(b + i) - q(a + i)) * (q(b + i) - q(a + i));
-    out(e) = equations.elastic().stretch_stiffness(e) * (std::sqrt(square) / model.edge_length(e) - 1.0);
+    out(e) = axial_force(std::sqrt(square), model.edge_length(e), equations.elastic().stretch_stiffness(e), 0.0);
   }
 }
 

@@ -15,10 +15,7 @@ void ContactForces::begin(StepProblem& problem) {
 }
 
 void ContactForces::find(const StepProblem& problem, StepData& data, Assembler& assembler, bool with_matrix) {
-  if (problem.in_middle())
-    data.end = 2.0 * data.z - problem.start->q;
-  else
-    data.end = data.z;
+  problem.set_end(data.z, data.end);
   contact_.update(data.end);
   if (!with_matrix || rows_.hold(contact_)) return;
   rows_.set(contact_.surfaces(), contact_.near());
@@ -51,10 +48,7 @@ void ContactForces::add(const StepProblem& problem, StepData& data, const Assemb
 }
 
 double ContactForces::allowed(const StepProblem& problem, const VectorX& z, const VectorX& step) {
-  if (problem.in_middle())
-    end_ = 2.0 * z - problem.start->q;
-  else
-    end_ = z;
+  problem.set_end(z, end_);
   change_ = problem.end_rate() * step;
   return contact_.allowed(end_, change_);
 }

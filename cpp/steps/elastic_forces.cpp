@@ -2,6 +2,7 @@
 
 #include "elasticity/discrete_elements.hpp"
 #include "elasticity/stencil_kernels.hpp"
+#include "elasticity/stretch.hpp"
 #include "steps/inertia.hpp"
 
 namespace withe {
@@ -60,7 +61,7 @@ void ElasticForces::find(const StepProblem& problem, StepData& data, Assembler&,
   compute_configuration(model, *problem.start, data.z, data.configuration);
   const bool viscous = problem.viscous_acts() && problem.in_middle();
   if (!problem.conserves_energy() && !viscous) return;
-  data.end = 2.0 * data.z - problem.start->q;
+  problem.set_end(data.z, data.end);
   compute_configuration(model, *problem.start, data.end, data.end_configuration);
   if (!viscous) return;
   data.viscous = problem.viscous;
@@ -107,23 +108,19 @@ void ElasticForces::add_others(const StepProblem& problem, const ElasticCoeffici
   const Model& model = problem.model;
   const bool with_matrix = !values.empty();
   Local local;
-  const auto add = [&](const ElementTable& table, int i) {
-    table.add_gradient(i, local.gradient, 1.0, data.gradient, data.row_magnitude);
-    if (with_matrix) table.add_hessian(i, local.hessian, 1.0, values);
-  };
   for (int e : assembler.regular.other_edges) {
     stretch_local(model, k, data.configuration, e, with_matrix, axial_force, local);
-    add(assembler.stretch, e);
+    add_element(assembler.stretch, e, local, data, values);
   }
   for (int b : assembler.regular.other_bend) {
     bend_local(model, k, data.configuration, b, with_matrix, local);
     data.potential += local.energy;
-    add(assembler.bend, b);
+    add_element(assembler.bend, b, local, data, values);
   }
   for (int h = 0; h < static_cast<int>(model.half.size()); ++h) {
     half_local(model, data.z, k, data.configuration, h, with_matrix, local);
     data.potential += local.energy;
-    add(assembler.half, h);
+    add_element(assembler.half, h, local, data, values);
   }
 }
 
@@ -149,22 +146,17 @@ double ElasticForces::dissipated(const StepProblem& problem, const StepData& dat
   const ElasticCoefficients& viscous = problem.in_middle() ? data.viscous : problem.viscous;
   double work = 0.0;
   Local local;
-  const auto add = [&](const ElementTable& table, int i) {
-    const int* dofs = table.dofs(i);
-    for (int k = 0; k < table.width(); ++k)
-      if (dofs[k] >= 0) work += local.gradient[k] * change[dofs[k]];
-  };
   for (int e = 0; e < model.edge_count; ++e) {
     stretch_local(model, viscous, data.configuration, e, false, nullptr, local);
-    add(assembler.stretch, e);
+    work += work_of(assembler.stretch, e, local, change);
   }
   for (int b = 0; b < static_cast<int>(model.bend.size()); ++b) {
     bend_local(model, viscous, data.configuration, b, false, local);
-    add(assembler.bend, b);
+    work += work_of(assembler.bend, b, local, change);
   }
   for (int h = 0; h < static_cast<int>(model.half.size()); ++h) {
     half_local(model, data.z, viscous, data.configuration, h, false, local);
-    add(assembler.half, h);
+    work += work_of(assembler.half, h, local, change);
   }
   return work;
 }
@@ -194,10 +186,6 @@ void ElasticForces::add_discrete_gradient(const StepProblem& problem, StepData& 
                           .end_q = data.end,
                           .change = data.change};
   Local local;
-  const auto add = [&](const ElementTable& table, int i) {
-    table.add_gradient(i, local.gradient, 1.0, data.gradient, data.row_magnitude);
-    if (with_matrix) table.add_hessian(i, local.hessian, 1.0, values);
-  };
   set_mean_axial_forces(problem, data);
   const StencilKernels& kernels = stencil_kernels();
   (model.planar() ? kernels.planar_momentum_bend : kernels.momentum_bend)(
@@ -208,15 +196,15 @@ void ElasticForces::add_discrete_gradient(const StepProblem& problem, StepData& 
        .end_strain = data.end_configuration.bend_strain.data()});
   for (int e : assembler.regular.other_edges) {
     discrete_stretch_local(model, problem.elastic, step, e, with_matrix, data.axial_force, local);
-    add(assembler.stretch, e);
+    add_element(assembler.stretch, e, local, data, values);
   }
   for (int b : assembler.regular.other_bend) {
     discrete_bend_local(model, problem.elastic, step, b, with_matrix, local);
-    add(assembler.bend, b);
+    add_element(assembler.bend, b, local, data, values);
   }
   for (int h = 0; h < static_cast<int>(model.half.size()); ++h) {
     discrete_half_local(model, problem.elastic, step, h, with_matrix, local);
-    add(assembler.half, h);
+    add_element(assembler.half, h, local, data, values);
   }
   data.elastic_rows = data.gradient.head(model.dof_count);
   if (problem.viscous_acts()) add_elastic(problem, data.viscous, data, assembler, values, nullptr);
@@ -234,7 +222,7 @@ void predict_axial_force(const StepProblem& problem, const StepData& data, const
     double length = mean ? 0.5 * (problem.start_configuration.length(e) + data.end_configuration.length(e))
                          : data.configuration.length(e);
     for (int i = 0; i < model.dimension; ++i) length += t[i] * (step(b + i) - step(a + i));
-    out(e) = k.stretch_stiffness(e) * (length / model.edge_length(e) - 1.0 - k.stretch_natural(e));
+    out(e) = axial_force(length, model.edge_length(e), k.stretch_stiffness(e), k.stretch_natural(e));
   }
 }
 

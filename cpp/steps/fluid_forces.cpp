@@ -98,8 +98,7 @@ void ResistiveForces::add(const StepProblem& problem, StepData& data, const Asse
   Local local;
   for (int e = 0; e < problem.model.edge_count; ++e) {
     set_local(problem, data, e, !values.empty(), local);
-    assembler.stretch.add_gradient(e, local.gradient, 1.0, data.gradient, data.row_magnitude);
-    if (!values.empty()) assembler.stretch.add_hessian(e, local.hessian, 1.0, values);
+    add_element(assembler.stretch, e, local, data, values);
   }
 }
 
@@ -110,8 +109,7 @@ double ResistiveForces::dissipated(const StepProblem& problem, const StepData& d
   Local local;
   for (int e = 0; e < problem.model.edge_count; ++e) {
     set_local(problem, data, e, false, local);
-    const int* dofs = assembler.stretch.dofs(e);
-    for (int k = 0; k < assembler.stretch.width(); ++k) work += local.gradient[k] * change[dofs[k]];
+    work += work_of(assembler.stretch, e, local, change);
   }
   return work;
 }

@@ -35,9 +35,8 @@ void add_spin_couple(const StepProblem& problem, StepData& data) {
   const VectorX& z = data.z;
   const double inverse = 1.0 / problem.interval;
   const double *q0 = problem.start->q.data(), *v0 = problem.start->v.data();
-  for (int e = 0; e < problem.model.edge_count; ++e) {
-    const int a = problem.model.tail_dof[at(e)], b = problem.model.head_dof[at(e)],
-              angle = problem.model.edge_dof[at(e)];
+  for (int e = 0; e < model.edge_count; ++e) {
+    const int a = model.tail_dof[at(e)], b = model.head_dof[at(e)], angle = model.edge_dof[at(e)];
     const double omega = (z[angle] - q0[angle]) * inverse;
     const Vec3d change{z[b] - z[a] - q0[b] + q0[a], z[b + 1] - z[a + 1] - q0[b + 1] + q0[a + 1],
                        z[b + 2] - z[a + 2] - q0[b + 2] + q0[a + 2]};
@@ -60,18 +59,17 @@ void set_turning_inertia(const StepProblem& problem, StepData& data) {
   const Model& model = problem.model;
   const VectorX& z = data.z;
   const double dt = 2.0 * problem.interval, inverse = 1.0 / dt;
-  if (problem.model.planar()) {
-    for (int f = 0; problem.conserves_energy() && f < problem.model.frame_count; ++f) {
-      const int dof = problem.model.frame_dof[at(f)];
+  if (model.planar()) {
+    for (int f = 0; problem.conserves_energy() && f < model.frame_count; ++f) {
+      const int dof = model.frame_dof[at(f)];
       const double change = 2.0 * (z[dof] - problem.start->q[dof]);
       data.inertia[dof] += 2.0 * problem.mass.rows[dof] * inverse * inverse * (finite_turn(change) - change);
     }
     return;
   }
   const double *q0 = problem.start->q.data(), *v0 = problem.start->v.data();
-  for (int e = 0; e < problem.model.edge_count; ++e) {
-    const int a = problem.model.tail_dof[at(e)], b = problem.model.head_dof[at(e)],
-              angle = problem.model.edge_dof[at(e)];
+  for (int e = 0; e < model.edge_count; ++e) {
+    const int a = model.tail_dof[at(e)], b = model.head_dof[at(e)], angle = model.edge_dof[at(e)];
     const EdgeFrame<double>& middle = data.configuration.edge[at(e)];
     const Vec3d& t0 = problem.start->tangent[at(e)];
     Vec3d t1;
@@ -100,8 +98,8 @@ void set_turning_inertia(const StepProblem& problem, StepData& data) {
     }
     add_couple(model, e, force, data.gradient);
   }
-  for (int f = 0; f < problem.model.frame_count; ++f) {
-    const int dof = problem.model.frame_dof[at(f)];
+  for (int f = 0; f < model.frame_count; ++f) {
+    const int dof = model.frame_dof[at(f)];
     const Matrix3 J = cayley_spin(z.segment<3>(dof)).transpose();
     if (problem.conserves_energy()) {  // whose rows are moments
       const Vector3 other = data.gradient.segment<3>(dof) - data.elastic_rows.segment<3>(dof);

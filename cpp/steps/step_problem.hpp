@@ -62,7 +62,13 @@ struct StepProblem {
   bool viscous_acts() const { return parameters->viscous && moves(); }
   /// Of the whole step [s].
   double duration() const { return in_middle() ? 2.0 * interval : interval; }
-  /// By how much q1 changes with z.
+  /// q1 that goes with z, and by how much it changes with z.
+  void set_end(const VectorX& z, VectorX& end) const {
+    if (in_middle())
+      end = 2.0 * z - start->q;
+    else
+      end = z;
+  }
   double end_rate() const { return in_middle() ? 2.0 : 1.0; }
 };
 

@@ -33,4 +33,20 @@ class Term {
   virtual void add_applied(const StepProblem&, const StepData&, const Assembler&, VectorX& /*force*/) const {}
 };
 
+/// Adds what acts on one element to the rows, and to the matrix where one is wanted.
+inline void add_element(const ElementTable& table, int element, const Local& local, StepData& data,
+                        std::span<double> values) {
+  table.add_gradient(element, local.gradient, 1.0, data.gradient, data.row_magnitude);
+  if (!values.empty()) table.add_hessian(element, local.hessian, 1.0, values);
+}
+
+/// Work of what acts on one element over `change` [J].
+inline double work_of(const ElementTable& table, int element, const Local& local, const VectorX& change) {
+  const int* dofs = table.dofs(element);
+  double work = 0.0;
+  for (int i = 0; i < table.width(); ++i)
+    if (dofs[i] >= 0) work += local.gradient[i] * change[dofs[i]];
+  return work;
+}
+
 }  // namespace withe

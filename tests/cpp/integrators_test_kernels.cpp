@@ -12,33 +12,38 @@ namespace {
 
 using testing::Case;
 
+/// Forces and matrix of all stencils, each by itself: what `stretch`, `bend`, `half` (index, local) say of one.
+template <class Stretch, class Bend, class Half>
+void add_one_by_one(const Model& model, Assembler& assembler, VectorX& force, VectorX& magnitude,
+                    const Stretch& stretch, const Bend& bend, const Half& half) {
+  std::fill(assembler.solver().values().begin(), assembler.solver().values().end(), 0.0);
+  force.setZero(model.dof_count);
+  magnitude.setZero(model.dof_count);
+  Local local;
+  const auto add_all = [&](const ElementTable& table, int count, const auto& set) {
+    for (int i = 0; i < count; ++i) {
+      set(i, local);
+      table.add_gradient(i, local.gradient, 1.0, force, magnitude);
+      table.add_hessian(i, local.hessian, 1.0, assembler.solver().values());
+    }
+  };
+  add_all(assembler.stretch, model.edge_count, stretch);
+  add_all(assembler.bend, static_cast<int>(model.bend.size()), bend);
+  add_all(assembler.half, static_cast<int>(model.half.size()), half);
+  assembler.project(force);
+  assembler.project_matrix();
+}
+
 /// Elastic forces and matrix, each stencil by itself.
 void add_stencil_by_stencil(const Case& c, Assembler& assembler, const ElasticCoefficients& k, VectorX& force,
                             VectorX& magnitude) {
   Configuration configuration;
   compute_configuration(c.model, c.state, c.q, configuration);
-  std::fill(assembler.solver().values().begin(), assembler.solver().values().end(), 0.0);
-  force.setZero(c.model.dof_count);
-  magnitude.setZero(c.model.dof_count);
-  Local local;
-  const auto add = [&](const ElementTable& table, int i) {
-    table.add_gradient(i, local.gradient, 1.0, force, magnitude);
-    table.add_hessian(i, local.hessian, 1.0, assembler.solver().values());
-  };
-  for (int e = 0; e < c.model.edge_count; ++e) {
-    stretch_local(c.model, k, configuration, e, true, nullptr, local);
-    add(assembler.stretch, e);
-  }
-  for (int b = 0; b < static_cast<int>(c.model.bend.size()); ++b) {
-    bend_local(c.model, k, configuration, b, true, local);
-    add(assembler.bend, b);
-  }
-  for (int h = 0; h < static_cast<int>(c.model.half.size()); ++h) {
-    half_local(c.model, c.q, k, configuration, h, true, local);
-    add(assembler.half, h);
-  }
-  assembler.project(force);
-  assembler.project_matrix();
+  add_one_by_one(
+      c.model, assembler, force, magnitude,
+      [&](int e, Local& out) { stretch_local(c.model, k, configuration, e, true, nullptr, out); },
+      [&](int b, Local& out) { bend_local(c.model, k, configuration, b, true, out); },
+      [&](int h, Local& out) { half_local(c.model, c.q, k, configuration, h, true, out); });
 }
 
 /// Discrete gradients of the step to c.q and their matrix, each stencil by itself.
@@ -50,28 +55,11 @@ void add_discrete_stencil_by_stencil(const Case& c, Assembler& assembler, const 
   compute_configuration(c.model, c.state, 0.5 * (c.state.q + c.q), middle);
   compute_configuration(c.model, c.state, c.q, end);
   const DiscreteStep step{start, middle, end, c.q, change};
-  std::fill(assembler.solver().values().begin(), assembler.solver().values().end(), 0.0);
-  force.setZero(c.model.dof_count);
-  magnitude.setZero(c.model.dof_count);
-  Local local;
-  const auto add = [&](const ElementTable& table, int i) {
-    table.add_gradient(i, local.gradient, 1.0, force, magnitude);
-    table.add_hessian(i, local.hessian, 1.0, assembler.solver().values());
-  };
-  for (int e = 0; e < c.model.edge_count; ++e) {
-    discrete_stretch_local(c.model, k, step, e, true, given_force, local);
-    add(assembler.stretch, e);
-  }
-  for (int b = 0; b < static_cast<int>(c.model.bend.size()); ++b) {
-    discrete_bend_local(c.model, k, step, b, true, local);
-    add(assembler.bend, b);
-  }
-  for (int h = 0; h < static_cast<int>(c.model.half.size()); ++h) {
-    discrete_half_local(c.model, k, step, h, true, local);
-    add(assembler.half, h);
-  }
-  assembler.project(force);
-  assembler.project_matrix();
+  add_one_by_one(
+      c.model, assembler, force, magnitude,
+      [&](int e, Local& out) { discrete_stretch_local(c.model, k, step, e, true, given_force, out); },
+      [&](int b, Local& out) { discrete_bend_local(c.model, k, step, b, true, out); },
+      [&](int h, Local& out) { discrete_half_local(c.model, k, step, h, true, out); });
 }
 
 /// More stencils than a pack has lanes, and a remainder.
