@@ -113,12 +113,12 @@ void ElasticForces::add_others(const StepProblem& problem, const ElasticCoeffici
     add_element(assembler.stretch, e, local, data, values);
   }
   for (int b : assembler.regular.other_bend) {
-    bend_local(model, k, data.configuration, b, with_matrix, local);
+    bend_local(model, bend_coefficients(k, b), data.configuration, b, with_matrix, local);
     data.potential += local.energy;
     add_element(assembler.bend, b, local, data, values);
   }
   for (int h = 0; h < static_cast<int>(model.half.size()); ++h) {
-    half_local(model, data.z, k, data.configuration, h, with_matrix, local);
+    half_local(model, data.z, half_coefficients(k, h), data.configuration, h, with_matrix, local);
     data.potential += local.energy;
     add_element(assembler.half, h, local, data, values);
   }
@@ -151,11 +151,11 @@ double ElasticForces::dissipated(const StepProblem& problem, const StepData& dat
     work += work_of(assembler.stretch, e, local, change);
   }
   for (int b = 0; b < static_cast<int>(model.bend.size()); ++b) {
-    bend_local(model, viscous, data.configuration, b, false, local);
+    bend_local(model, bend_coefficients(viscous, b), data.configuration, b, false, local);
     work += work_of(assembler.bend, b, local, change);
   }
   for (int h = 0; h < static_cast<int>(model.half.size()); ++h) {
-    half_local(model, data.z, viscous, data.configuration, h, false, local);
+    half_local(model, data.z, half_coefficients(viscous, h), data.configuration, h, false, local);
     work += work_of(assembler.half, h, local, change);
   }
   return work;
@@ -199,11 +199,11 @@ void ElasticForces::add_discrete_gradient(const StepProblem& problem, StepData& 
     add_element(assembler.stretch, e, local, data, values);
   }
   for (int b : assembler.regular.other_bend) {
-    discrete_bend_local(model, problem.elastic, step, b, with_matrix, local);
+    discrete_bend_local(model, bend_coefficients(problem.elastic, b), step, b, with_matrix, local);
     add_element(assembler.bend, b, local, data, values);
   }
   for (int h = 0; h < static_cast<int>(model.half.size()); ++h) {
-    discrete_half_local(model, problem.elastic, step, h, with_matrix, local);
+    discrete_half_local(model, half_coefficients(problem.elastic, h), step, h, with_matrix, local);
     add_element(assembler.half, h, local, data, values);
   }
   data.elastic_rows = data.gradient.head(model.dof_count);

@@ -310,7 +310,7 @@ void World::Implementation::relax_frame(int f, const Matrix3& free) {
     VectorX g = VectorX::Zero(size);
     for (std::size_t h = 0; h < model.half.size(); ++h) {
       if (model.half[h].frame != f) continue;
-      half_local(model, state.q, elastic, c, static_cast<int>(h), true, local);
+      half_local(model, state.q, half_coefficients(elastic, static_cast<int>(h)), c, static_cast<int>(h), true, local);
       const auto own = std::find(hinges.begin(), hinges.end(), model.half[h].hinge);
       const int last = n + static_cast<int>(own - hinges.begin()), count = own == hinges.end() ? n : n + 1;
       const auto place = [&](int i) { return i < n ? i : last; };
