@@ -66,7 +66,8 @@ struct RegularStencils {
 /// The matrix of a model with its tables.
 class Assembler {
  public:
-  Assembler(const Model& model, const Loads& loads, Symmetry symmetry, SolverKind kind);
+  /// `exact`: the matrix has every derivative, those of edges that turn too.
+  Assembler(const Model& model, const Loads& loads, Symmetry symmetry, SolverKind kind, bool exact = false);
 
   const SparsityPattern& pattern() const { return pattern_; }
   LinearSolver& solver() { return *solver_; }
@@ -76,6 +77,12 @@ class Assembler {
   double diagonal(int dof) const {
     return solver_->values()[static_cast<std::size_t>(diagonal_[static_cast<std::size_t>(dof)])];
   }
+
+  /// The entry of row i and column j in the solver's values, or nothing.
+  double* entry(int row, int column, std::span<double> values) const;
+  /// Three rows, from `first` on, times a matrix; and a block on the diagonal added there. Unsymmetric matrices only.
+  void turn_rows(int first, const Matrix3& by, std::span<double> values) const;
+  void add_block(int first, const Matrix3& block, std::span<double> values) const;
 
   double greatest_diagonal() const;
   /// Its greatest entry over that of `weight`.
@@ -108,6 +115,7 @@ class Assembler {
   double greatest_held_change(const VectorX& from, const VectorX& to) const;
 
   ElementTable stretch, bend, half, contact;
+  ElementTable edges;  ///< tail, angle, head; in space, where the matrix is exact
   RegularStencils regular;
   std::vector<ElementTable> loads;
   /// Per edge and direction, where its nodes' own entries stand, and the one or (unsymmetric) two between them, or -1.

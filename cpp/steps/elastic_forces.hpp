@@ -29,6 +29,9 @@ class ElasticForces final : public Term {
   void add_discrete_gradient(const StepProblem& problem, StepData& data, const Assembler& assembler,
                              std::span<double> values) const;
 
+  void add_rate_slopes(const StepProblem& problem, const StepData& data, const Assembler& assembler,
+                       std::span<double> values) const;
+
   VectorX inverse_rest_;  ///< per edge: 1 / L [1 / m]
 };
 

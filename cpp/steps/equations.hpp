@@ -25,6 +25,8 @@ struct EquationOptions {
   StepRule rule = StepRule::midpoint;
   double static_duration = 0;  ///< in which slip happens in statics [s]
   SolverKind solver = SolverKind::automatic;
+  /// Whether matrices have every derivative, and those of held unknowns and by them: then not projected, often unsymmetric.
+  bool exact = false;
 };
 
 class Equations {

@@ -6,7 +6,8 @@
 namespace withe {
 
 /// M ((z - q0) / h^2 - v0 / h), and what turning adds. Under backward Euler an edge that spins at omega and turns also
-/// needs the couple I omega t x dt/dt; under the midpoint rules angular momentum is kept exactly.
+/// needs the couple I omega t x dt/dt; under the midpoint rules angular momentum is kept exactly (turning_inertia.hpp).
+/// Derivatives of what turning adds are a small part of the mass term, and unsymmetric: they are in exact matrices alone.
 class Inertia final : public Term {
  public:
   void add(const StepProblem& problem, StepData& data, const Assembler& assembler,
