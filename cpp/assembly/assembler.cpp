@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace withe {
 namespace {
@@ -140,7 +141,8 @@ Assembler::Assembler(const Model& model, const Loads& load, Symmetry symmetry, S
       half(model.planar() ? 5 : 11, half_dofs(model)),
       model_(model),
       symmetry_(symmetry),
-      kind_(kind) {
+      kind_(kind),
+      exact_(exact) {
   if (exact && !model.planar()) edges = ElementTable(7, edge_dofs(model));
   for (const LoadPiece& piece : load.pieces) {
     int dofs[kMaxLocal];
@@ -214,6 +216,24 @@ void Assembler::analyse() {
   for (int i = 0; i < model_.dof_count; ++i) diagonal_.push_back(solver_->offset(i, i));
   regular = regular_stencils(model_, bend);
   find_blocks();
+  entries_.clear();
+  for (int column = 0; exact_ && column < pattern_.size; ++column)
+    for (int k = pattern_.column_starts[at(column)]; k < pattern_.column_starts[at(column) + 1]; ++k) {
+      const int row = pattern_.row_indices[at(k)];
+      const bool mirrored = symmetry_ == Symmetry::symmetric && column > row;
+      entries_.push_back(mirrored ? solver_->offset(column, row) : solver_->offset(row, column));
+    }
+}
+
+void Assembler::multiply_transposed(const VectorX& x, VectorX& out) const {
+  out.resize(pattern_.size);
+  const std::span<const double> values = std::as_const(*solver_).values();
+  for (int column = 0; column < pattern_.size; ++column) {
+    double sum = 0.0;
+    for (int k = pattern_.column_starts[at(column)]; k < pattern_.column_starts[at(column) + 1]; ++k)
+      sum += values[static_cast<std::size_t>(entries_[at(k)])] * x[pattern_.row_indices[at(k)]];
+    out[column] = sum;
+  }
 }
 
 void Assembler::find_edge_couplings() {

@@ -84,6 +84,9 @@ class Assembler {
   void turn_rows(int first, const Matrix3& by, std::span<double> values) const;
   void add_block(int first, const Matrix3& block, std::span<double> values) const;
 
+  /// out = A^T x with the solver's values; exact matrices only.
+  void multiply_transposed(const VectorX& x, VectorX& out) const;
+
   double greatest_diagonal() const;
   /// Its greatest entry over that of `weight`.
   double greatest_diagonal(const VectorX& weight) const;
@@ -138,12 +141,14 @@ class Assembler {
   const Model& model_;
   Symmetry symmetry_;
   SolverKind kind_;
+  bool exact_;
   int generation_ = 0;
   std::vector<std::vector<int>> cliques_;  ///< without contact and custom forces
   std::vector<std::vector<int>> groups_;   ///< of custom forces
   SparsityPattern pattern_;
   std::unique_ptr<LinearSolver> solver_;
   std::vector<std::ptrdiff_t> diagonal_;
+  std::vector<std::ptrdiff_t> entries_;  ///< of the pattern, one after the other; exact matrices only
   std::vector<Block> blocks_;
 };
 

@@ -3,6 +3,7 @@
 #include "steps/inertia.hpp"
 
 #include <cmath>
+#include <stdexcept>
 
 #include "geometry/rotation.hpp"
 #include "steps/turning_inertia.hpp"
@@ -49,12 +50,10 @@ TurningEdge<double> turning_edge(const StepProblem& problem, const StepData& dat
 }
 
 template <class Scalar>
-TurningForce<Scalar> turning_force(const StepProblem& problem, int edge, const TurningEdge<Scalar>& turning,
+TurningForce<Scalar> turning_force(const StepProblem& problem, double inertia, const TurningEdge<Scalar>& turning,
                                    const Vec3<Scalar>& moved) {
-  const double inertia = problem.parameters->edge_inertia[edge];
-  return problem.in_middle()
-             ? midpoint_turning(inertia, 2.0 * problem.interval, problem.conserves_energy(), turning)
-             : euler_turning(inertia, problem.interval, turning, moved);
+  return problem.in_middle() ? midpoint_turning(inertia, 2.0 * problem.interval, problem.conserves_energy(), turning)
+                             : euler_turning(inertia, problem.interval, turning, moved);
 }
 
 /// Derivatives by the edge's vector and angle at z, and by its vector, angle and rate at the start.
@@ -83,7 +82,7 @@ TurningForce<ByEdge> turning_slopes(const StepProblem& problem, const StepData& 
       .end_length = length1,
       .change = ByEdge::unknown(data.z[angle], 3) - ByEdge::unknown(problem.start->q[angle], 7),
       .start_rate = ByEdge::unknown(problem.start->v[angle], 8)};
-  return turning_force(problem, edge, turning, e - e0);
+  return turning_force(problem, problem.parameters->edge_inertia[edge], turning, e - e0);
 }
 
 /// Inertia of edges that spin and turn: under backward Euler what the mass matrix knows nothing of, under the midpoint
@@ -92,7 +91,8 @@ void set_turning_edges(const StepProblem& problem, StepData& data) {
   const Model& model = problem.model;
   for (int e = 0; e < model.edge_count; ++e) {
     const Vec3d moved = edge_vector(model, data.z, e) - edge_vector(model, problem.start->q, e);
-    const TurningForce<double> force = turning_force(problem, e, turning_edge(problem, data, e), moved);
+    const TurningForce<double> force =
+        turning_force(problem, problem.parameters->edge_inertia[e], turning_edge(problem, data, e), moved);
     if (problem.in_middle()) data.inertia[model.edge_dof[at(e)]] = force.torque;
     add_to_edge(model, e, force.head, data.gradient);
   }
@@ -143,6 +143,29 @@ void add_edge_slopes(const StepProblem& problem, const StepData& data, const Ass
   }
 }
 
+void add_turning_adjoint(const StepProblem& problem, const StepData& data, int edge, StepAdjoint& adjoint) {
+  const Model& model = problem.model;
+  const int tail = model.tail_dof[at(edge)], head = model.head_dof[at(edge)], angle = model.edge_dof[at(edge)];
+  const Vec3d apart = edge_vector(model, adjoint.rows, edge);
+  // The mass matrix has the torque of backward Euler.
+  const double about = problem.in_middle() ? adjoint.rows[angle] : 0.0;
+  const TurningForce<ByEdge> force = turning_slopes(problem, data, edge);
+  double by[9];
+  for (int k = 0; k < 9; ++k) {
+    by[k] = about * force.torque.slope[k];
+    for (int i = 0; i < 3; ++i) by[k] += apart[i] * force.head[i].slope[k];
+  }
+  for (int i = 0; i < 3; ++i) {
+    adjoint.start[head + i] += by[4 + i];
+    adjoint.start[tail + i] -= by[4 + i];
+  }
+  adjoint.start[angle] += by[7];
+  adjoint.velocity[angle] += by[8];
+  const Vec3d moved = edge_vector(model, data.z, edge) - edge_vector(model, problem.start->q, edge);
+  const TurningForce<double> unit = turning_force(problem, 1.0, turning_edge(problem, data, edge), moved);
+  adjoint.coefficients.mass[angle] += dot(apart, unit.head) + about * unit.torque;
+}
+
 void add_frame_slopes(const StepProblem& problem, const StepData& data, const Assembler& assembler,
                       std::span<double> values) {
   const Model& model = problem.model;
@@ -152,8 +175,7 @@ void add_frame_slopes(const StepProblem& problem, const StepData& data, const As
     if (model.planar()) {
       if (!problem.conserves_energy()) continue;
       const double t = std::tan(data.z[dof] - problem.start->q[dof]);
-      values[static_cast<std::size_t>(assembler.diagonal_offsets()[at(dof)])] +=
-          rate * problem.mass.rows[dof] * t * t;
+      values[static_cast<std::size_t>(assembler.diagonal_offsets()[at(dof)])] += rate * problem.mass.rows[dof] * t * t;
       continue;
     }
     const Vector3 w = data.z.segment<3>(dof);
@@ -162,15 +184,14 @@ void add_frame_slopes(const StepProblem& problem, const StepData& data, const As
       const Vector3 moment = data.gradient.segment<3>(dof) - data.elastic_rows.segment<3>(dof),
                     other = cayley_spin(w).transpose() * moment;
       assembler.turn_rows(dof, cayley_spin(w).transpose().inverse(), values);
-      assembler.add_block(dof,
-                          -0.5 * cross_matrix(other) + 0.25 * (w * other.transpose() + w.dot(other) * Matrix3::Identity()),
-                          values);
+      assembler.add_block(
+          dof, -0.5 * cross_matrix(other) + 0.25 * (w * other.transpose() + w.dot(other) * Matrix3::Identity()),
+          values);
     } else {
       const Vector3 moment = problem.mass.rows[dof] * data.acceleration.segment<3>(dof);
       const Matrix3 J = cayley_spin(w).transpose();
-      assembler.add_block(dof,
-                          rate * problem.mass.rows[dof] * (J - Matrix3::Identity()) + cayley_moment_slope(w, moment),
-                          values);
+      assembler.add_block(
+          dof, rate * problem.mass.rows[dof] * (J - Matrix3::Identity()) + cayley_moment_slope(w, moment), values);
     }
   }
 }
@@ -197,6 +218,34 @@ void Inertia::add(const StepProblem& problem, StepData& data, const Assembler& a
   if (values.empty()) return;
   add_mass_matrix(problem, problem.mass, inverse * inverse, assembler, values);
   if (turning_too && !problem.model.planar()) add_edge_slopes(problem, data, assembler, values);
+}
+
+void Inertia::add_adjoint(const StepProblem& problem, const StepData& data, const Assembler& assembler,
+                          StepAdjoint& adjoint) const {
+  if (!problem.moves()) return;
+  const Model& model = problem.model;
+  const double inverse = 1.0 / problem.interval;
+  VectorX rows = adjoint.rows;
+  if (problem.in_middle() && !model.planar()) {
+    for (int e = 0; e < model.edge_count; ++e) rows[model.edge_dof[at(e)]] = 0.0;
+    for (int f = 0; f < model.frame_count; ++f) {
+      const int dof = model.frame_dof[at(f)];
+      if (!problem.conserves_energy())
+        rows.segment<3>(dof) = (cayley_spin(data.z.segment<3>(dof)) * rows.segment<3>(dof)).eval();
+    }
+  }
+  add_mass_adjoint(model, data.acceleration, rows, adjoint.coefficients.mass, adjoint.coefficients.mass_coupling);
+  VectorX force;
+  multiply(model, problem.mass, rows, force);
+  if (problem.held_acceleration.size() != 0) assembler.project(force);
+  adjoint.start -= inverse * inverse * force;
+  adjoint.velocity -= inverse * force;
+  if (model.planar()) {
+    if (problem.conserves_energy() && model.frame_count > 0)
+      throw std::invalid_argument("no gradient is known yet through joints in energy-momentum steps");
+    return;
+  }
+  for (int e = 0; e < model.edge_count; ++e) add_turning_adjoint(problem, data, e, adjoint);
 }
 
 /// What couples nodes off the diagonal is less on it.

@@ -123,6 +123,7 @@ void World::Implementation::rebuild(Rebuild why) {
   for (std::size_t k = 0; k < index.size(); ++k) all[index[k]] = fresh.supports[k];
   fresh.supports = all;
   static_equations.reset();
+  static_gradient.reset();
   rescue_equations.reset();
   // Scratch has the sizes of the old model.
   const Counters counters = work.newton.counters;
@@ -184,6 +185,7 @@ void World::Implementation::rebuild(Rebuild why) {
 void World::Implementation::remake_equations() {
   model.description.loads = description.loads;
   static_equations.reset();
+  static_gradient.reset();
   rescue_equations.reset();
   newton = std::make_unique<Newton>(model, options);
   equations = std::make_unique<Equations>(model, equation_options(options));
