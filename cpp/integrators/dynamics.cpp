@@ -230,7 +230,7 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
     v1 = work.mean;
   else
     v1 = 2.0 * work.mean - state.v;
-  if (conserves) set_turning_velocities(equations.problem(), work.change, dt, v1);
+  if (conserves) set_turning_velocities(model, state.v, work.change, dt, v1);
   assembler.project(v1);
   if (!model.constraints.empty()) assembler.add_held_part(work.held_velocity, 1.0, v1);
   add_work(equations, parameters, working, work, result);

@@ -33,6 +33,8 @@ class ElasticForces final : public Term {
 
   void add_rate_slopes(const StepProblem& problem, const StepData& data, const Assembler& assembler,
                        std::span<double> values) const;
+  void add_discrete_adjoint(const StepProblem& problem, const StepData& data, const Assembler& assembler,
+                            StepAdjoint& adjoint) const;
 
   VectorX inverse_rest_;  ///< per edge: 1 / L [1 / m]
 };

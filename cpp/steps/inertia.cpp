@@ -3,7 +3,6 @@
 #include "steps/inertia.hpp"
 
 #include <cmath>
-#include <stdexcept>
 
 #include "geometry/rotation.hpp"
 #include "steps/turning_inertia.hpp"
@@ -241,8 +240,12 @@ void Inertia::add_adjoint(const StepProblem& problem, const StepData& data, cons
   adjoint.start -= inverse * inverse * force;
   adjoint.velocity -= inverse * force;
   if (model.planar()) {
-    if (problem.conserves_energy() && model.frame_count > 0)
-      throw std::invalid_argument("no gradient is known yet through joints in energy-momentum steps");
+    for (int f = 0; problem.conserves_energy() && f < model.frame_count; ++f) {
+      const int dof = model.frame_dof[at(f)];
+      const double apart = data.z[dof] - problem.start->q[dof], t = std::tan(apart);
+      adjoint.start[dof] -= inverse * inverse * problem.mass.rows[dof] * t * t * rows[dof];
+      adjoint.coefficients.mass[dof] += inverse * inverse * (t - apart) * rows[dof];
+    }
     return;
   }
   for (int e = 0; e < model.edge_count; ++e) add_turning_adjoint(problem, data, e, adjoint);
@@ -276,12 +279,29 @@ void add_explicit_spin_couple(const StepProblem& problem, StepData& data, int ed
               data.gradient);
 }
 
-void set_turning_velocities(const StepProblem& problem, const VectorX& change, double dt, VectorX& v1) {
-  const auto set = [&](int dof) { v1[dof] = 2.0 * finite_turn(change[dof]) / dt - problem.start->v[dof]; };
-  if (problem.model.planar())
-    for (int f = 0; f < problem.model.frame_count; ++f) set(problem.model.frame_dof[at(f)]);
+namespace {
+
+/// Of every angle whose rate is that of a finite rotation: joints' in a plane, edges' in space.
+template <class Set>
+void for_each_turn(const Model& model, const Set& set) {
+  if (model.planar())
+    for (int f = 0; f < model.frame_count; ++f) set(model.frame_dof[at(f)]);
   else
-    for (int e = 0; e < problem.model.edge_count; ++e) set(problem.model.edge_dof[at(e)]);
+    for (int e = 0; e < model.edge_count; ++e) set(model.edge_dof[at(e)]);
+}
+
+}  // namespace
+
+void set_turning_velocities(const Model& model, const VectorX& v0, const VectorX& change, double dt, VectorX& v1) {
+  for_each_turn(model, [&](int dof) { v1[dof] = 2.0 * finite_turn(change[dof]) / dt - v0[dof]; });
+}
+
+void set_velocity_rates(const Model& model, const VectorX& change, double dt, VectorX& rates) {
+  rates.setConstant(model.dof_count, 2.0 / dt);
+  for_each_turn(model, [&](int dof) {
+    const double t = std::tan(0.5 * change[dof]);
+    rates[dof] *= 1.0 + t * t;
+  });
 }
 
 /// 2 tan(D theta / 2) over how much of the mean of an edge's tangents lies along it in the middle.

@@ -25,7 +25,9 @@ void add_mass_matrix(const StepProblem& problem, const MassMatrix& mass, double 
 void add_explicit_spin_couple(const StepProblem& problem, StepData& data, int edge, const VectorX& v);
 
 /// Of an energy-momentum step that changes the unknowns by `change`: the velocities of angles at its end.
-void set_turning_velocities(const StepProblem& problem, const VectorX& change, double dt, VectorX& v1);
+void set_turning_velocities(const Model& model, const VectorX& v0, const VectorX& change, double dt, VectorX& v1);
+/// How those change with `change`, per unknown: 2 / dt where it turns nothing.
+void set_velocity_rates(const Model& model, const VectorX& change, double dt, VectorX& rates);
 /// What forces of an energy-momentum step do their work over: its change of the unknowns, but for angles and frames,
 /// whose torques and moments are those about where they are in the middle.
 void set_working_change(const StepProblem& problem, const StepData& data, const VectorX& change, VectorX& working);

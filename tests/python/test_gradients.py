@@ -96,7 +96,7 @@ def test_gradient_of_an_equilibrium_is_that_of_differences(planar, joint):
 
     cases = [
         *settings(drawn, random),
-        ((wall, "position"), np.array([1.0, 0, 0]), lambda h: sim.move(wall, position=place + [h, 0, 0]), 1e-6),
+        ((wall, "position"), np.array([1.0, 0, 0]), lambda h: sim.move(wall, position=place + np.array([h, 0, 0])), 1e-6),
         ((wall, "rotation"), axis, lambda h: sim.move(wall, rotation=Rotation.from_rotvec(h * axis)), 1e-5),
     ]
     gradients = found.gradient(weight, [unknown for unknown, *_ in cases])
@@ -135,9 +135,13 @@ def test_gradients_have_the_shape_of_get_and_the_jacobian_their_rows():
         ("implicit_midpoint", 0.0),
         ("implicit_midpoint", 300.0),
         ("fourth_order", 0.0),
+        ("energy_momentum", 0.0),
+        ("energy_momentum", 300.0),
     ],
 )
 def test_gradient_of_a_run_is_that_of_differences(integrator, viscosity, planar, joint, support):
+    if integrator == "energy_momentum" and joint and not planar:
+        pytest.skip("none is known through joints in space; refused, see below")
     random = np.random.default_rng(5)
     drawn = Drawn(
         planar=planar,

@@ -96,8 +96,8 @@ class Record:
         Raises
         ------
         ValueError
-            The run was without ``differentiable=True``, or has no gradient and says why; a wrong shape; a derivative out
-            of the plane of a planar scene.
+            The run was without ``differentiable=True``, or has no gradient and says why; a wrong shape; a derivative
+            out of the plane of a planar scene.
 
         Notes
         -----

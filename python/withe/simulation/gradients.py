@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from withe import _core
 from withe.common import validation
-from withe.parts.handles import Drag, Handle, Load, Mass, NodeHandle, Rod, Support
+from withe.parts.handles import Drag, Load, Mass, NodeHandle, Rod, Support
 from withe.parts.kinds import DragPart, LoadPart, MassPart, RodPart, SupportPart
 from withe.parts.parameters import ROD_WORDS, RodParameters
 from withe.simulation.loads import load_index
