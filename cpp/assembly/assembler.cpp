@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace withe {
 namespace {
@@ -15,16 +16,6 @@ std::vector<int> stretch_dofs(const Model& model) {
   for (int e = 0; e < model.edge_count; ++e) {
     append(dofs, model.node_dof[at(model.edge_tail[at(e)])], model.dimension);
     append(dofs, model.node_dof[at(model.edge_head[at(e)])], model.dimension);
-  }
-  return dofs;
-}
-
-std::vector<int> edge_dofs(const Model& model) {
-  std::vector<int> dofs;
-  for (int e = 0; e < model.edge_count; ++e) {
-    append(dofs, model.tail_dof[at(e)], 3);
-    append(dofs, model.edge_dof[at(e)], 1);
-    append(dofs, model.head_dof[at(e)], 3);
   }
   return dofs;
 }
@@ -134,27 +125,21 @@ void ElementTable::add_hessian(int element, const double* hessian, int stride, d
   }
 }
 
-Assembler::Assembler(const Model& model, const Loads& load, Symmetry symmetry, SolverKind kind, bool exact)
+Assembler::Assembler(const Model& model, std::vector<ElementTable*> declared, Symmetry symmetry, SolverKind kind)
     : stretch(2 * model.dimension, stretch_dofs(model)),
       bend(model.planar() ? 6 : 11, bend_dofs(model)),
       half(model.planar() ? 5 : 11, half_dofs(model)),
       model_(model),
       symmetry_(symmetry),
-      kind_(kind) {
-  if (exact && !model.planar()) edges = ElementTable(7, edge_dofs(model));
-  for (const LoadPiece& piece : load.pieces) {
-    int dofs[kMaxLocal];
-    const int n = load_dofs(model, piece, dofs);
-    loads.emplace_back(n, std::vector<int>(dofs, dofs + n));
-  }
+      kind_(kind),
+      declared_(std::move(declared)) {
   const auto add_cliques = [&](const ElementTable& table) {
     for (int e = 0; e < table.count(); ++e) cliques_.emplace_back(table.dofs(e), table.dofs(e) + table.width());
   };
   add_cliques(stretch);
   add_cliques(bend);
   add_cliques(half);
-  add_cliques(edges);
-  for (const ElementTable& table : loads) add_cliques(table);
+  for (const ElementTable* table : declared_) add_cliques(*table);
   for (int i = 0; i < model.dof_count; ++i) cliques_.push_back({i});
   for (const Constraint& c : model.constraints) {
     std::vector<int> own;
@@ -207,8 +192,8 @@ void Assembler::analyse() {
   pattern_ = SparsityPattern::from_cliques(model_.dof_count, cliques);
   solver_ = make_linear_solver(pattern_, symmetry_, kind_);
   ++generation_;
-  for (ElementTable* table : {&stretch, &bend, &half, &edges, &contact}) table->find_offsets(*solver_);
-  for (ElementTable& table : loads) table.find_offsets(*solver_);
+  for (ElementTable* table : {&stretch, &bend, &half, &contact}) table->find_offsets(*solver_);
+  for (ElementTable* table : declared_) table->find_offsets(*solver_);
   find_edge_couplings();
   diagonal_.clear();
   for (int i = 0; i < model_.dof_count; ++i) diagonal_.push_back(solver_->offset(i, i));

@@ -22,6 +22,10 @@ void Gravity::add(const StepProblem& problem, StepData& data, const Assembler&, 
   data.potential -= problem.gravity.dot(data.z);
 }
 
+void Gravity::add_explicit(const StepProblem& problem, StepData& data, const Assembler&, const VectorX&) const {
+  data.gradient.head(problem.model.dof_count) -= problem.gravity;
+}
+
 void Drag::add(const StepProblem& problem, StepData& data, const Assembler& assembler, std::span<double> values) const {
   if (!problem.parameters->dragged || !problem.moves()) return;
   const int n = problem.model.dof_count;

@@ -47,6 +47,8 @@ void ContactForces::add(const StepProblem& problem, StepData& data, const Assemb
   if (!contact_.frictional() && !problem.in_middle()) data.potential += contact_.energy();
 }
 
+void ContactForces::add_rounding(const StepProblem&, StepData& data) const { data.floor += data.contact_floor; }
+
 double ContactForces::allowed(const StepProblem& problem, const VectorX& z, const VectorX& step) {
   problem.set_end(z, end_);
   change_ = problem.end_rate() * step;

@@ -3,6 +3,7 @@
 #include "steps/inertia.hpp"
 
 #include <cmath>
+#include <utility>
 
 #include "geometry/rotation.hpp"
 #include "steps/turning_inertia.hpp"
@@ -52,9 +53,8 @@ template <class Scalar>
 TurningForce<Scalar> turning_force(const StepProblem& problem, int edge, const TurningEdge<Scalar>& turning,
                                    const Vec3<Scalar>& moved) {
   const double inertia = problem.parameters->edge_inertia[edge];
-  return problem.in_middle()
-             ? midpoint_turning(inertia, 2.0 * problem.interval, problem.conserves_energy(), turning)
-             : euler_turning(inertia, problem.interval, turning, moved);
+  return problem.in_middle() ? midpoint_turning(inertia, 2.0 * problem.interval, problem.conserves_energy(), turning)
+                             : euler_turning(inertia, problem.interval, turning, moved);
 }
 
 /// Derivatives by the edge's vector and angle at z, and by its vector, angle and rate at the start.
@@ -122,7 +122,7 @@ void set_turning_frames(const StepProblem& problem, StepData& data) {
 }
 
 /// Derivatives of the inertia of edges, beyond those of the mass matrix.
-void add_edge_slopes(const StepProblem& problem, const StepData& data, const Assembler& assembler,
+void add_edge_slopes(const StepProblem& problem, const StepData& data, const ElementTable& edges,
                      std::span<double> values) {
   const Model& model = problem.model;
   const double inverse = 1.0 / problem.interval;
@@ -139,7 +139,7 @@ void add_edge_slopes(const StepProblem& problem, const StepData& data, const Ass
       hessian[3][column] = sign * force.torque.slope[unknown];
     }
     hessian[3][3] -= inverse * inverse * problem.mass.rows[model.edge_dof[at(e)]];
-    assembler.edges.add_hessian(e, hessian, 1.0, values);
+    edges.add_hessian(e, hessian, 1.0, values);
   }
 }
 
@@ -152,8 +152,7 @@ void add_frame_slopes(const StepProblem& problem, const StepData& data, const As
     if (model.planar()) {
       if (!problem.conserves_energy()) continue;
       const double t = std::tan(data.z[dof] - problem.start->q[dof]);
-      values[static_cast<std::size_t>(assembler.diagonal_offsets()[at(dof)])] +=
-          rate * problem.mass.rows[dof] * t * t;
+      values[static_cast<std::size_t>(assembler.diagonal_offsets()[at(dof)])] += rate * problem.mass.rows[dof] * t * t;
       continue;
     }
     const Vector3 w = data.z.segment<3>(dof);
@@ -162,20 +161,30 @@ void add_frame_slopes(const StepProblem& problem, const StepData& data, const As
       const Vector3 moment = data.gradient.segment<3>(dof) - data.elastic_rows.segment<3>(dof),
                     other = cayley_spin(w).transpose() * moment;
       assembler.turn_rows(dof, cayley_spin(w).transpose().inverse(), values);
-      assembler.add_block(dof,
-                          -0.5 * cross_matrix(other) + 0.25 * (w * other.transpose() + w.dot(other) * Matrix3::Identity()),
-                          values);
+      assembler.add_block(
+          dof, -0.5 * cross_matrix(other) + 0.25 * (w * other.transpose() + w.dot(other) * Matrix3::Identity()),
+          values);
     } else {
       const Vector3 moment = problem.mass.rows[dof] * data.acceleration.segment<3>(dof);
       const Matrix3 J = cayley_spin(w).transpose();
-      assembler.add_block(dof,
-                          rate * problem.mass.rows[dof] * (J - Matrix3::Identity()) + cayley_moment_slope(w, moment),
-                          values);
+      assembler.add_block(
+          dof, rate * problem.mass.rows[dof] * (J - Matrix3::Identity()) + cayley_moment_slope(w, moment), values);
     }
   }
 }
 
 }  // namespace
+
+Inertia::Inertia(const Model& model, bool exact) {
+  if (!exact || model.planar()) return;
+  std::vector<int> dofs;
+  for (int e = 0; e < model.edge_count; ++e) {
+    for (int i = 0; i < 3; ++i) dofs.push_back(model.tail_dof[at(e)] + i);
+    dofs.push_back(model.edge_dof[at(e)]);
+    for (int i = 0; i < 3; ++i) dofs.push_back(model.head_dof[at(e)] + i);
+  }
+  edges_ = ElementTable(7, std::move(dofs));
+}
 
 void Inertia::add(const StepProblem& problem, StepData& data, const Assembler& assembler,
                   std::span<double> values) const {
@@ -196,7 +205,7 @@ void Inertia::add(const StepProblem& problem, StepData& data, const Assembler& a
   data.row_magnitude.head(n) += data.inertia.cwiseAbs();
   if (values.empty()) return;
   add_mass_matrix(problem, problem.mass, inverse * inverse, assembler, values);
-  if (turning_too && !problem.model.planar()) add_edge_slopes(problem, data, assembler, values);
+  if (turning_too && !problem.model.planar()) add_edge_slopes(problem, data, edges_, values);
 }
 
 /// What couples nodes off the diagonal is less on it.

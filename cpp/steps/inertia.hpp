@@ -7,11 +7,18 @@ namespace withe {
 
 /// M ((z - q0) / h^2 - v0 / h), and what turning adds. Under backward Euler an edge that spins at omega and turns also
 /// needs the couple I omega t x dt/dt; under the midpoint rules angular momentum is kept exactly (turning_inertia.hpp).
-/// Derivatives of what turning adds are a small part of the mass term, and unsymmetric: they are in exact matrices alone.
+/// Derivatives of what turning adds are a small part of the mass term, and unsymmetric: they are in exact matrices
+/// alone.
 class Inertia final : public Term {
  public:
+  Inertia(const Model& model, bool exact);
+
+  void declare(std::vector<ElementTable*>& tables) override { tables.push_back(&edges_); }
   void add(const StepProblem& problem, StepData& data, const Assembler& assembler,
            std::span<double> values) const override;
+
+ private:
+  ElementTable edges_;  ///< tail, angle, head; in space, where the matrix is exact
 };
 
 /// Entries of a matrix such as that of masses: its diagonal, and what couples nodes off it.
