@@ -6,6 +6,7 @@
 #include "steps/elastic_forces.hpp"
 #include "steps/inertia.hpp"
 #include "steps/load_forces.hpp"
+#include "steps/spring_forces.hpp"
 
 namespace withe {
 
@@ -22,6 +23,7 @@ Terms make_terms(const Model& model, const Loads& loads, StepRule rule, bool exa
   add(std::make_unique<ElasticForces>(model));
   const LoadForces* applied = nullptr;
   if (!loads.pieces.empty()) applied = add(std::make_unique<LoadForces>(model, loads));
+  if (!scene.springs.empty()) add(std::make_unique<SpringForces>(model));
   if (moves && scene.fluid.model == FluidModel::resistive) add(std::make_unique<ResistiveForces>(model));
   if (scene.contact.any()) terms.contact = add(std::make_unique<ContactForces>(model));
   add(std::make_unique<Inertia>(model, exact));
