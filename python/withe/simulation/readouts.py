@@ -19,7 +19,7 @@ class Energy:
 
     Attributes
     ----------
-    kinetic, stretch, bend, twist, gravity, contact
+    kinetic, stretch, bend, twist, gravity, contact, spring
     loads
         Minus the work done by loads and custom forces since the start.
     total
@@ -27,7 +27,7 @@ class Energy:
     work
         Done by supports and actuation since the start.
     dissipated
-        By viscosity and drag since the start.
+        By viscosity, drag, dampers, fluids and contact since the start.
     """
 
     kinetic: float
@@ -37,6 +37,7 @@ class Energy:
     gravity: float
     loads: float
     contact: float
+    spring: float
     total: float
     work: float
     dissipated: float
