@@ -3,6 +3,7 @@
 #include "steps/inertia.hpp"
 
 #include <cmath>
+#include <utility>
 
 #include "geometry/rotation.hpp"
 #include "steps/turning_inertia.hpp"
@@ -121,7 +122,7 @@ void set_turning_frames(const StepProblem& problem, StepData& data) {
 }
 
 /// Derivatives of the inertia of edges, beyond those of the mass matrix.
-void add_edge_slopes(const StepProblem& problem, const StepData& data, const Assembler& assembler,
+void add_edge_slopes(const StepProblem& problem, const StepData& data, const ElementTable& edges,
                      std::span<double> values) {
   const Model& model = problem.model;
   const double inverse = 1.0 / problem.interval;
@@ -138,7 +139,7 @@ void add_edge_slopes(const StepProblem& problem, const StepData& data, const Ass
       hessian[3][column] = sign * force.torque.slope[unknown];
     }
     hessian[3][3] -= inverse * inverse * problem.mass.rows[model.edge_dof[at(e)]];
-    assembler.edges.add_hessian(e, hessian, 1.0, values);
+    edges.add_hessian(e, hessian, 1.0, values);
   }
 }
 
@@ -197,6 +198,17 @@ void add_frame_slopes(const StepProblem& problem, const StepData& data, const As
 
 }  // namespace
 
+Inertia::Inertia(const Model& model, bool exact) {
+  if (!exact || model.planar()) return;
+  std::vector<int> dofs;
+  for (int e = 0; e < model.edge_count; ++e) {
+    for (int i = 0; i < 3; ++i) dofs.push_back(model.tail_dof[at(e)] + i);
+    dofs.push_back(model.edge_dof[at(e)]);
+    for (int i = 0; i < 3; ++i) dofs.push_back(model.head_dof[at(e)] + i);
+  }
+  edges_ = ElementTable(7, std::move(dofs));
+}
+
 void Inertia::add(const StepProblem& problem, StepData& data, const Assembler& assembler,
                   std::span<double> values) const {
   if (!problem.moves()) return;
@@ -216,7 +228,7 @@ void Inertia::add(const StepProblem& problem, StepData& data, const Assembler& a
   data.row_magnitude.head(n) += data.inertia.cwiseAbs();
   if (values.empty()) return;
   add_mass_matrix(problem, problem.mass, inverse * inverse, assembler, values);
-  if (turning_too && !problem.model.planar()) add_edge_slopes(problem, data, assembler, values);
+  if (turning_too && !problem.model.planar()) add_edge_slopes(problem, data, edges_, values);
 }
 
 void Inertia::add_adjoint(const StepProblem& problem, const StepData& data, const Assembler& assembler,

@@ -11,10 +11,16 @@ namespace withe {
 /// alone.
 class Inertia final : public Term {
  public:
+  Inertia(const Model& model, bool exact);
+
+  void declare(std::vector<ElementTable*>& tables) override { tables.push_back(&edges_); }
   void add(const StepProblem& problem, StepData& data, const Assembler& assembler,
            std::span<double> values) const override;
   void add_adjoint(const StepProblem& problem, const StepData& data, const Assembler& assembler,
                    StepAdjoint& adjoint) const override;
+
+ private:
+  ElementTable edges_;  ///< tail, angle, head; in space, where the matrix is exact
 };
 
 /// Entries of a matrix such as that of masses: its diagonal, and what couples nodes off it.
