@@ -7,7 +7,7 @@
 namespace withe {
 namespace {
 
-constexpr std::uint64_t kMagic = 0x4153454854495755ull;
+constexpr std::uint64_t kMagic = 0x4153454854495756ull;
 
 /// FNV-1a.
 std::uint64_t hash_of(std::string_view bytes) {
@@ -168,22 +168,19 @@ void exchange(Archive& io, std::optional<Energy>& energy) {
 
 /// What users may set; the rest follows from it.
 template <class Archive>
-void exchange(Archive& io, Parameters& p) {
-  for (auto* v : {&p.edge_stretch, &p.edge_twist, &p.edge_density, &p.edge_rotary, &p.edge_viscous_time, &p.edge_drag,
-                  &p.added_mass})
-    io(*v);
-  io(p.edge_bend);
-  io(p.gravity);
-  io(p.fluid_viscosity);
+void exchange(Archive& io, const Model& model, Parameters& p) {
+  for (const ParameterInfo& info : parameter_index())
+    for (int rod = 0; rod < (info.of_rod() ? static_cast<int>(model.place.size()) : 1); ++rod) {
+      ParameterView values = parameter_view(model, p, info.kind, rod);
+      io(values);
+    }
   io(p.held_lumped);
-  for (auto& m : p.natural_curvature) io(m);
-  for (auto& v : p.natural_twist) io(v);
 }
 
 template <class Archive>
-void exchange(Archive& io, Settings& settings) {
+void exchange(Archive& io, const Model& model, Settings& settings) {
   auto& [parameters, ramps, load_values, obstacle_motions] = settings;
-  exchange(io, parameters);
+  exchange(io, model, parameters);
   const auto exchange_ramp = [&](auto& ramp) {
     auto& [from, to, start, end, active] = ramp;
     io(from), io(to), io(start), io(end), io(active);
@@ -251,8 +248,8 @@ void exchange(Archive& io, Found& found) {
 }
 
 template <class Archive>
-void exchange(Archive& io, Running& running) {
-  exchange(io, static_cast<Settings&>(running));
+void exchange(Archive& io, const Model& model, Running& running) {
+  exchange(io, model, static_cast<Settings&>(running));
   exchange(io, static_cast<Moving&>(running));
   exchange(io, static_cast<StepControl&>(running));
   exchange(io, static_cast<Found&>(running));
@@ -361,7 +358,7 @@ void give_sizes(World::Implementation& self) {
 }  // namespace
 
 std::string World::snapshot() const {
-  Implementation& self = *implementation_;
+  Implementation& self = accounted();
   give_sizes(self);
   Writer w;
   w(kMagic);
@@ -383,7 +380,7 @@ std::string World::snapshot() const {
   const bool set = !same_friction(self.description.contact, self.drawn_contact);
   w(set);
   if (set) write_friction(w, self.description.contact);
-  exchange(w, static_cast<Running&>(self));
+  exchange(w, self.model, static_cast<Running&>(self));
   Lagged lagged = self.lagged();
   exchange(w, lagged);
   w(hash_of(w.bytes));
@@ -402,7 +399,7 @@ void World::restore(const std::string& bytes) {
   r(print);
   require(print == fingerprint(implementation_->description), "snapshot belongs to another scene");
   // Everything is read into a copy, so that a damaged file changes nothing.
-  auto fresh = std::make_unique<Implementation>(*implementation_);
+  auto fresh = std::make_unique<Implementation>(accounted());
   fresh->take_callbacks(*implementation_);
   bool spatial = false, obstacles_move = false;
   std::int64_t count = 0;
@@ -467,7 +464,7 @@ void World::restore(const std::string& bytes) {
   }
   fresh->obstacle_motions.assign(obstacles_move ? fresh->state.obstacles.size() : 0, ObstacleMotion{});
   give_sizes(*fresh);
-  exchange(r, static_cast<Running&>(*fresh));
+  exchange(r, fresh->model, static_cast<Running&>(*fresh));
   Lagged lagged;
   exchange(r, lagged);
   r.expect_end();

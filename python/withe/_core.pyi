@@ -35,9 +35,11 @@ __all__: list[str] = [
     "Statistics",
     "SupportDescription",
     "World",
+    "check_turns",
     "close_and_open",
     "foreground_mask",
     "hsv_mask",
+    "smooth_curvatures",
     "thin",
     "trace_lines",
 ]
@@ -695,6 +697,12 @@ class World:
     def obstacle_turn(
         self, obstacle: typing.SupportsInt | typing.SupportsIndex
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]: ...
+    def parameter(
+        self, name: str, rod: typing.SupportsInt | typing.SupportsIndex = 0
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        Present values, a row an edge, stencil or node.
+        """
     def positions(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
     def prescribe_obstacle(
         self,
@@ -716,6 +724,10 @@ class World:
         Go back to a snapshot.
         """
     def rod_energy(self, rod: typing.SupportsInt | typing.SupportsIndex) -> Energy: ...
+    def set(self, rod: typing.SupportsInt | typing.SupportsIndex, values: dict) -> None:
+        """
+        Set parameters by their names, those of edges and stencils of a rod: all, or where one is refused none.
+        """
     def set_added_mass(self, mass: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> None: ...
     def set_fluid_viscosity(self, viscosity: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
     def set_friction(self, contact: ContactDescription) -> None: ...
@@ -736,9 +748,6 @@ class World:
         rod: typing.SupportsInt | typing.SupportsIndex,
         twist: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
         over: typing.SupportsFloat | typing.SupportsIndex,
-    ) -> None: ...
-    def set_rod_parameters(
-        self, rod: typing.SupportsInt | typing.SupportsIndex, parameters: RodDescription
     ) -> None: ...
     def set_state(
         self, rods: collections.abc.Sequence[RodState], time: typing.SupportsFloat | typing.SupportsIndex | None
@@ -782,6 +791,15 @@ class World:
     @property
     def time(self) -> float: ...
 
+def check_turns(
+    smooth: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 2]"],
+    voronoi: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    owner: str,
+) -> None:
+    """
+    Refuse curvatures [1/m] that turn a rod by pi or more at a node.
+    """
+
 def close_and_open(mask: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8]) -> numpy.typing.NDArray[numpy.uint8]:
     """
     Closing, then opening, by a square of 3 x 3 pixels.
@@ -805,6 +823,14 @@ def hsv_mask(
 ) -> numpy.typing.NDArray[numpy.uint8]:
     """
     Pixels whose colour is in a range.
+    """
+
+def smooth_curvatures(
+    discrete: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 2]"],
+    voronoi: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 2]"]:
+    """
+    Curvatures [1/m] of the smooth rod that turns by the same angles as discrete ones 2 tan(phi / 2), a row a stencil.
     """
 
 def thin(mask: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8]) -> numpy.typing.NDArray[numpy.uint8]:

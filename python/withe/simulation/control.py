@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from withe.common import validation
 from withe.parts.handles import CustomForce, Drag, Fluid, Load, Mass, Obstacle, Rod
-from withe.parts.rods import curvature_array, twist_array
+from withe.parts.rods import curvature_array, curvature_given, twist_array
 from withe.simulation.functions import check_jacobian
 from withe.simulation.loads import remove_load
 from withe.simulation.parameters import get_value, set_values
@@ -53,7 +53,10 @@ class Control:
         >>> simulation.set_natural_curvature(arm, (0.0, 12.5), over=0.2)
         """
         part = self._session.directory.rod(rod)
-        values = curvature_array(curvature, part.voronoi, validation.truth(discrete, "discrete"), part.owner)
+        if validation.truth(discrete, "discrete"):
+            values = curvature_array(curvature, part.voronoi, True, part.owner)
+        else:
+            values = curvature_given(curvature, len(part.voronoi), part.owner).reshape(-1, 2)
         self._session.world.set_natural_curvature(part.index, values, validation.non_negative(over, "over"))
 
     def set_natural_twist(self, rod: Rod | str, twist: npt.ArrayLike, over: float = 0.0) -> None:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from withe.common import validation
-from withe.parts.description import added_mass, drag, rod_parameters
+from withe.parts.description import added_mass, drag
 from withe.parts.friction import as_given, obstacle_friction
 from withe.parts.handles import Drag, Fluid, Load, Mass, Obstacle, Rod
 from withe.parts.kinds import (
@@ -22,8 +21,8 @@ from withe.parts.kinds import (
     RodPart,
     SupportPart,
 )
-from withe.parts.parameters import ROD_WORDS, RodParameters
-from withe.parts.rods import curvature_array, twist_array
+from withe.parts.parameters import ROD_WORDS
+from withe.parts.rods import curvature_given, twist_array
 from withe.simulation.loads import load_index, set_load
 from withe.simulation.obstacles import set_obstacle_friction, set_rod_friction
 from withe.simulation.session import Session
@@ -32,6 +31,7 @@ __all__ = ["Settable", "get_value", "set_values"]
 
 Settable = Rod | Load | Mass | Drag | Fluid | Obstacle
 _NATURAL_WORDS = ("natural_curvature", "natural_twist")
+_SET_ROD = (*ROD_WORDS, *_NATURAL_WORDS)
 
 
 def set_values(session: Session, target: Settable | str | None, values: dict[str, Any]) -> None:
@@ -109,47 +109,25 @@ def get_value(session: Session, target: Settable | str, word: str | None) -> Any
 
 
 def _set_rod(session: Session, part: RodPart, values: dict[str, Any]) -> None:
-    _only(values, (*ROD_WORDS, *_NATURAL_WORDS), part.owner)
-    parameters = session.settings.rods[part.index]
+    _only(values, _SET_ROD, part.owner)
+    before = parameters = session.settings.rods[part.index]
+    natural = {}
     for word, value in values.items():
-        if word in ROD_WORDS:
-            parameters = parameters.changed(word, value, part.section, part.owner)
-    curvature = twist = None
-    if "natural_curvature" in values:
-        curvature = curvature_array(values["natural_curvature"], part.voronoi, False, part.owner)
-    if "natural_twist" in values:
-        twist = twist_array(values["natural_twist"], part.voronoi, part.owner)
-    changes: list[Callable[[], None]] = []
-    if curvature is not None:
-        changes.append(lambda: session.world.set_natural_curvature(part.index, curvature, 0.0))
-    if twist is not None:
-        changes.append(lambda: session.world.set_natural_twist(part.index, twist, 0.0))
-    if parameters is not session.settings.rods[part.index]:
-        changes.append(lambda: _apply_parameters(session, part.index, parameters))
-    # A change that is refused, as it leaves the plane of planar=True, does nothing; those before it are taken back.
-    before = session.world.snapshot() if len(changes) > 1 else b""
-    try:
-        for change in changes:
-            change()
-    except ValueError:
-        if len(changes) > 1:
-            session.world.restore(before)
-        raise
-
-
-def _apply_parameters(session: Session, rod: int, parameters: RodParameters) -> None:
-    if parameters is not session.settings.rods[rod]:
-        session.world.set_rod_parameters(rod, rod_parameters(parameters))
-        session.settings.rods[rod] = parameters
+        if word == "natural_curvature":
+            natural[word] = curvature_given(value, len(part.voronoi), part.owner)
+        elif word == "natural_twist":
+            natural[word] = twist_array(value, part.voronoi, part.owner)
+        else:
+            parameters = parameters.with_value(word, value, part.section, part.owner)
+    session.world.set(part.index, parameters.acting(before) | natural)
+    session.settings.rods[part.index] = parameters
 
 
 def _set_drag(session: Session, part: DragPart, coefficient: float) -> None:
     drags = session.settings.drags | {part.name: coefficient}
     for rod in session.directory.all(RodPart):
         if part.rods is None or rod.index in part.rods:
-            total = drag(session.directory, drags, rod)
-            changed = session.settings.rods[rod.index].changed("drag", total, rod.section, rod.owner)
-            _apply_parameters(session, rod.index, changed)
+            _set_rod(session, rod, {"drag": drag(session.directory, drags, rod)})
     session.settings.drags = drags
 
 
