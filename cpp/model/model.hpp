@@ -97,6 +97,10 @@ struct Parameters {
   double fluid_viscosity = 0;               ///< [Pa s]
   std::vector<MatrixX2> natural_curvature;  ///< per rod and stencil, smooth [1/m]
   std::vector<VectorX> natural_twist;       ///< per rod and stencil [rad/m]
+  double friction = 0;                      ///< between rods [-]
+  double slip_tolerance = 1e-3;             ///< nu [m/s]
+  MatrixX2 obstacle_friction;               ///< per obstacle, along and across rods [-]
+  MatrixX2 pair_friction;                   ///< per pair of bodies, likewise; negative: that of the scene [-]
   BendMeasure measure;
   bool lumped = false;       ///< whether masses sit at nodes alone; see mass_matrix.hpp
   bool held_lumped = false;  ///< whether those of edges at held nodes do
@@ -165,6 +169,8 @@ struct Model {
 Model build_model(const SceneDescription& description, std::optional<bool> planar);
 /// Parameters as described, derived ones included.
 Parameters initial_parameters(const Model& model);
+/// Friction as described; update_derived must follow.
+void set_friction(const ContactDescription& contact, Parameters& parameters);
 /// Stiffnesses, densities, viscous time and drag of one rod, from one value an edge; update_derived must follow.
 void set_rod(const Model& model, int rod, const RodDescription& description, Parameters& parameters);
 /// Masses, stencil stiffnesses and discrete natural strains from the rest.

@@ -15,7 +15,7 @@ namespace {
 
 using enum ParameterKind;
 
-constexpr std::array<ParameterInfo, 12> kIndex{{
+constexpr std::array<ParameterInfo, 16> kIndex{{
     {stretch_stiffness, "stretch_stiffness", Extent::edge, 1, "N", Range::positive, Derived::nothing},
     {bend_stiffness, "bend_stiffness", Extent::edge, 2, "N m^2", Range::positive, Derived::stiffness},
     {twist_stiffness, "twist_stiffness", Extent::edge, 1, "N m^2", Range::positive, Derived::stiffness},
@@ -28,6 +28,10 @@ constexpr std::array<ParameterInfo, 12> kIndex{{
     {added_mass, "added_mass", Extent::node, 1, "kg", Range::non_negative, Derived::masses},
     {gravity, "gravity", Extent::scene, 3, "m/s^2", Range::any, Derived::nothing},
     {fluid_viscosity, "fluid_viscosity", Extent::scene, 1, "Pa s", Range::positive, Derived::nothing},
+    {friction, "friction", Extent::scene, 1, "-", Range::non_negative, Derived::nothing},
+    {slip_tolerance, "slip_tolerance", Extent::scene, 1, "m/s", Range::positive, Derived::nothing},
+    {obstacle_friction, "obstacle_friction", Extent::obstacle, 2, "-", Range::non_negative, Derived::nothing},
+    {pair_friction, "pair_friction", Extent::pair, 2, "-", Range::any, Derived::nothing},
 }};
 
 constexpr bool in_order() {
@@ -55,6 +59,10 @@ Eigen::Index rows_of(const Model& model, const ParameterInfo& info, int rod) {
       return model.rod_first_edge[at(rod) + 1] - model.rod_first_edge[at(rod)];
     case Extent::stencil:
       return model.rod_voronoi[at(rod)].size();
+    case Extent::obstacle:
+      return static_cast<Eigen::Index>(model.description.contact.obstacles.size());
+    case Extent::pair:
+      return static_cast<Eigen::Index>(model.description.contact.pairs.size());
     case Extent::scene:
       break;
   }
@@ -109,6 +117,14 @@ ParameterView parameter_view(const Model& model, Parameters& p, ParameterKind ki
         return p.added_mass.data();
       case gravity:
         return p.gravity.data();
+      case friction:
+        return &p.friction;
+      case slip_tolerance:
+        return &p.slip_tolerance;
+      case obstacle_friction:
+        return p.obstacle_friction.data();
+      case pair_friction:
+        return p.pair_friction.data();
       case fluid_viscosity:
         break;
     }

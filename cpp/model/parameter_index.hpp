@@ -21,10 +21,15 @@ enum class ParameterKind {
   added_mass,
   gravity,
   fluid_viscosity,
+  friction,
+  slip_tolerance,
+  obstacle_friction,
+  pair_friction,
 };
 
-/// What a parameter has a row of numbers for: the scene; every node; every edge, or stencil, of a rod.
-enum class Extent { scene, node, edge, stencil };
+/// What a parameter has a row of numbers for: the scene; every node; every edge, or stencil, of a rod; every obstacle;
+/// every pair of bodies that has something of its own.
+enum class Extent { scene, node, edge, stencil, obstacle, pair };
 
 enum class Range { any, non_negative, positive };
 
@@ -40,6 +45,8 @@ struct ParameterInfo {
   Range range;
   Derived derived;
 
+  /// Set through `World::set_friction`: it decides about the form of the equations.
+  bool of_contact() const { return kind >= ParameterKind::friction; }
   bool of_rod() const { return extent == Extent::edge || extent == Extent::stencil; }
 };
 

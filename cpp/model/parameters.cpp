@@ -56,6 +56,19 @@ void set_rod(const Model& model, int rod, const RodDescription& description, Par
   p.edge_drag.segment(first, count) = description.drag;
 }
 
+void set_friction(const ContactDescription& contact, Parameters& p) {
+  p.friction = contact.friction;
+  p.slip_tolerance = contact.slip_tolerance;
+  p.obstacle_friction.resize(contact.obstacle_friction.size(), 2);
+  p.obstacle_friction.col(0) = contact.obstacle_friction;
+  p.obstacle_friction.col(1) = contact.obstacle_across.size() > 0 ? contact.obstacle_across : contact.obstacle_friction;
+  p.pair_friction.resize(static_cast<Eigen::Index>(contact.pairs.size()), 2);
+  for (Eigen::Index i = 0; i < p.pair_friction.rows(); ++i) {
+    const ContactPairDescription& pair = contact.pairs[static_cast<std::size_t>(i)];
+    p.pair_friction.row(i) << pair.friction, pair.across >= 0.0 ? pair.across : pair.friction;
+  }
+}
+
 Parameters initial_parameters(const Model& model) {
   const SceneDescription& scene = model.description;
   Parameters p;
@@ -73,6 +86,7 @@ Parameters initial_parameters(const Model& model) {
   p.added_mass = scene.added_mass;
   p.gravity = scene.gravity;
   p.fluid_viscosity = scene.fluid.viscosity;
+  set_friction(scene.contact, p);
   if (scene.bending == Bending::tangent) p.measure = {0.0, 0.0};
   update_derived(model, p);
   return p;

@@ -110,6 +110,7 @@ struct World::Implementation : Running {
   /// Leads a part of a natural shape to another value over a time [s].
   template <class Value>
   void begin_ramp(Ramp<Value>& ramp, const Value& now, const Value& value, double over);
+  void take_friction();
   /// Leaves the plane of a planar scene where a parameter of the kind does.
   void leave_plane_for(const ParameterSetting& setting);
   void set(std::span<const ParameterSetting> settings);

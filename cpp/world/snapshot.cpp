@@ -58,6 +58,7 @@ std::vector<LoadDescription> read_added_loads(Reader& r, const SceneDescription&
 /// As it was set while running; where it was not, that of the drawing holds.
 void write_friction(Writer& w, const ContactDescription& contact) {
   w(contact.friction);
+  w(contact.slip_tolerance);
   w(contact.obstacle_friction);
   w(static_cast<std::int64_t>(contact.obstacle_across.size()));
   w(contact.obstacle_across);
@@ -71,6 +72,7 @@ void write_friction(Writer& w, const ContactDescription& contact) {
 /// What a snapshot knows of friction, for the contact of a scene.
 ContactDescription read_friction(Reader& r, ContactDescription contact) {
   r(contact.friction);
+  r(contact.slip_tolerance);
   r(contact.obstacle_friction);
   std::int64_t count = 0;
   r(count);
@@ -450,8 +452,8 @@ void World::restore(const std::string& bytes) {
   r(friction_set);
   const ContactDescription contact = friction_set ? read_friction(r, fresh->description.contact) : fresh->drawn_contact;
   if (!same_friction(contact, fresh->description.contact)) {
-    fresh->description.contact = fresh->model.description.contact = contact;
-    fresh->remake_equations();
+    fresh->description.contact = contact;
+    fresh->take_friction();
   }
   if (!same) {
     fresh->spatial = spatial;

@@ -172,12 +172,39 @@ void World::set_friction(const ContactDescription& contact) {
   require(std::isfinite(contact.friction) && contact.friction >= 0.0 && valid(contact.obstacle_friction) &&
               valid(contact.obstacle_across),
           "friction must not be negative");
+  require(std::isfinite(contact.slip_tolerance) && contact.slip_tolerance > 0.0, "slip_tolerance must be positive");
+  const auto energy = [&] {
+    const Contact* touching = self.equations->contact();
+    return touching ? touching->energy_of(self.state, self.parameters) : 0.0;
+  };
+  const double before = energy();
   own.friction = contact.friction;
+  own.slip_tolerance = contact.slip_tolerance;
   own.obstacle_friction = contact.obstacle_friction;
   own.obstacle_across = contact.obstacle_across;
   own.pairs = contact.pairs;
-  self.model.description.contact = own;
-  self.remake_equations();
+  self.take_friction();
+  // What anchors hold changes with the coefficients that they are made of.
+  self.actuation_work += energy() - before;
+}
+
+/// That of the description; the equations take another form only where friction comes or goes.
+void World::Implementation::take_friction() {
+  model.description.contact = description.contact;
+  withe::set_friction(description.contact, parameters);
+  update_derived(model, Derived::nothing, 0, parameters);
+  reaction_current = false;
+  state.acceleration_current = false;
+  plan_current = false;
+  bool remade = false;
+  for (const System which : kSystems) {
+    Equations* known = system(which);
+    if (!known || !known->contact()) continue;
+    const bool frictional = known->contact()->frictional();
+    known->contact()->set_friction(parameters);
+    remade = remade || known->contact()->frictional() != frictional;
+  }
+  if (remade) remake_equations();
 }
 
 template <class Value>
@@ -208,6 +235,7 @@ void World::Implementation::leave_plane_for(const ParameterSetting& setting) {
 void World::Implementation::set(std::span<const ParameterSetting> settings) {
   for (const ParameterSetting& setting : settings) {
     check_setting(model, setting);
+    require(!info_of(setting.kind).of_contact(), "friction is set by set_friction");
     require(setting.kind != ParameterKind::fluid_viscosity || description.fluid.model != FluidModel::none,
             "the scene has no fluid");
   }

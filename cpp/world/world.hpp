@@ -202,7 +202,8 @@ class World {
   void prescribe_obstacle(int obstacle, const Vector3& position, const Vector3& turn);
   Vector3 obstacle_position(int obstacle) const;  ///< [m]
   Vector3 obstacle_turn(int obstacle) const;      ///< [rad]
-  /// Takes over the friction coefficients of a description of the same bodies, and pairs that it has besides.
+  /// Takes over the friction coefficients and the slip tolerance of a description of the same bodies, and pairs that it
+  /// has besides.
   void set_friction(const ContactDescription& contact);
 
   // Read-outs: copies.

@@ -133,3 +133,102 @@ def test_a_ramp_ends_where_a_natural_curvature_is_set_at_once_to_what_it_is():
     simulation.set("arm", natural_curvature=now)
     simulation.step(5)
     assert np.array_equal(simulation.get("arm", "natural_curvature"), now)
+
+
+def sliding(friction=0.3, own=None, rods=0.2, pull=(2.0, 1.0, 0.0), **contact):
+    """A block on a table that pulls at it, and a rod that lies across the block."""
+    scene = withe.Scene()
+    block = scene.add_rod(start=(0, 0, 0.01), end=(0.1, 0, 0.01), nodes=6, radius=0.01, material=RUBBER, name="block")
+    across = scene.add_rod(
+        start=(0.05, -0.05, 0.025), end=(0.05, 0.05, 0.025), nodes=6, radius=0.005, material=RUBBER, name="across"
+    )
+    table = scene.add_floor(friction=friction, name="table")
+    scene.enable_contact(friction=rods, **contact)
+    if own is not None:
+        scene.set_friction(block, table, own)
+    scene.add_load(block, pull)
+    return scene.build(time_step=2e-3, integrator="backward_euler"), across
+
+
+FRICTION = [
+    ({"friction": 0.1}, lambda s: s.set("table", friction=0.1)),
+    ({"friction": (0.1, 0.4)}, lambda s: s.set("table", friction=(0.1, 0.4))),
+    ({"own": 0.05}, lambda s: s.set_friction("block", "table", 0.05)),
+    (
+        {"slip_tolerance": 1e-2, "friction_model": "implicit", "pull": (0.3, 0.1, 0.0)},
+        lambda s: s.set(slip_tolerance=1e-2),
+    ),
+]
+
+
+@pytest.mark.parametrize(("drawn", "act"), FRICTION)
+def test_friction_set_while_running_goes_on_as_if_it_had_been_drawn(drawn, act):
+    model = {key: drawn[key] for key in ("friction_model", "pull") if key in drawn}
+    simulation, _ = sliding(**model)
+    act(simulation)
+    built, _ = sliding(**drawn)
+    plain, _ = sliding(**model)
+    for each in (simulation, built, plain):
+        each.step(40)
+    scale = np.ptp(built.positions())
+    assert np.abs(simulation.positions() - built.positions()).max() <= 1e-9 * scale
+    assert np.abs(simulation.positions() - plain.positions()).max() > 1e-5 * scale
+
+
+def test_friction_that_changes_keeps_the_equations_and_its_work_is_accounted_for():
+    simulation, _ = sliding()
+    simulation.step(30)
+    for i in range(20):
+        before, counted = simulation.energy(), simulation.statistics.factorizations
+        simulation.set("table", friction=0.3 + 0.01 * i)
+        simulation.set(None, friction=0.2 + 0.01 * i, slip_tolerance=1e-3 + 1e-4 * i)
+        after = simulation.energy()
+        assert np.isclose(after.work - before.work, stored(after) - stored(before), rtol=1e-9, atol=1e-15)
+        assert simulation.statistics.factorizations == counted
+        simulation.step()
+    assert simulation.get("slip_tolerance") == pytest.approx(1e-3 + 1e-4 * 19)
+    assert simulation.get("table", "friction") == pytest.approx(0.49)
+    # Read-outs between two steps go by what was set, and so does a snapshot in a simulation that was never told.
+    fresh, _ = sliding()
+    fresh.restore(simulation.snapshot())
+    copy = simulation.copy()
+    for each in (simulation, fresh, copy):
+        each.step(5)
+    assert np.array_equal(fresh.positions(), simulation.positions())
+    assert np.array_equal(copy.positions(), simulation.positions())
+    assert fresh.get("slip_tolerance") == simulation.get("slip_tolerance")
+
+
+@pytest.mark.parametrize("to", [0.0, 0.3])
+def test_friction_comes_and_goes(to):
+    simulation, _ = sliding(friction=0.3 - to, rods=0.0, friction_model="implicit")
+    simulation.set("table", friction=to)
+    built, _ = sliding(friction=to, rods=0.0, friction_model="implicit")
+    simulation.step(20)
+    built.step(20)
+    assert np.abs(simulation.positions() - built.positions()).max() <= 1e-9 * np.ptp(built.positions())
+
+
+def test_a_slip_tolerance_out_of_range_is_named():
+    simulation, _ = sliding()
+    with pytest.raises(ValueError, match="slip_tolerance must be positive, got 0"):
+        simulation.set(slip_tolerance=0.0)
+    assert simulation.get("slip_tolerance") == 1e-3
+
+
+def test_poses_of_supports_and_obstacles_are_read():
+    scene = withe.Scene()
+    arm = scene.add_rod(start=(0, 0, 0.5), end=(0.2, 0, 0.5), nodes=6, radius=5e-3, material=RUBBER, name="arm")
+    wall = scene.clamp(arm.start, name="wall")
+    ball = scene.add_sphere((0, 0, 0), 0.1, name="ball")
+    simulation = scene.build(planar=False, time_step=1e-3)
+    turn = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
+    simulation.move(wall, position=(0, 0.1, 0.5), rotation=turn, over=0.01)
+    simulation.move(ball, position=(0, 0, -0.1), tangent=(0, 0, 1), roll=0.5, over=0.01)
+    simulation.step(10)
+    assert np.allclose(simulation.get(wall, "position"), (0, 0.1, 0.5), atol=1e-12)
+    assert np.allclose(simulation.get("wall", "rotation"), turn, atol=1e-12)
+    assert np.allclose(simulation.get(ball, "position"), (0, 0, -0.1), atol=1e-12)
+    assert np.allclose(simulation.get(ball, "turn"), (0, 0, 0.5), atol=1e-12)
+    with pytest.raises(ValueError, match="'wall' has no 'mass'; it has position, rotation"):
+        simulation.get(wall, "mass")

@@ -7,7 +7,7 @@ from typing import Any
 import numpy.typing as npt
 
 from withe.common import validation
-from withe.parts.handles import CustomForce, Drag, Fluid, Load, Mass, Obstacle, Rod
+from withe.parts.handles import CustomForce, Drag, Fluid, Load, Mass, Obstacle, Rod, Support
 from withe.parts.rods import curvature_array, curvature_given, twist_array
 from withe.simulation.functions import check_jacobian
 from withe.simulation.loads import remove_load
@@ -92,8 +92,8 @@ class Control:
             bend_stiffness, twist_stiffness, line_density, viscous_time, drag (numbers, or one an edge),
             natural_curvature, natural_twist. Of a load: force, moment, load or pressure, constant or a function
             of time. Of a mass: mass. Of a drag: drag. Of a fluid: viscosity. Of an obstacle: friction, one coefficient
-            or a pair, along and across rods. Of the scene: gravity, and friction between rods. See `set_friction` for
-            two of them.
+            or a pair, along and across rods. Of the scene: gravity, friction between rods, and the slip_tolerance of
+            friction. See `set_friction` for two bodies.
 
         Raises
         ------
@@ -107,21 +107,23 @@ class Control:
         """
         set_values(self._session, target, values)
 
-    def get(self, target: Rod | Load | Mass | Drag | Fluid | Obstacle | str, word: str | None = None) -> Any:
+    def get(self, target: Rod | Load | Mass | Drag | Fluid | Obstacle | Support | str, word: str | None = None) -> Any:
         """The present value of what `set` sets.
 
         Parameters
         ----------
         target : handle or str
-            Or "gravity", or "friction" of rods with each other.
+            Or "gravity", "friction" of rods with each other, or "slip_tolerance".
         word : str
-            As in `set`.
+            As in `set`; of a support "position" and "rotation", of an obstacle "position" and "turn", which `move`
+            changes; of a rod its "radius".
 
         Returns
         -------
         float or ndarray
             Stiffnesses and what else belongs to edges one an edge, (edges,); natural curvature
-            (stencils, 2) and twist (stencils,); loads (3,). What belongs to a material as it was set.
+            (stencils, 2) and twist (stencils,); loads (3,); positions (3,) [m], rotations (3, 3) and turns (3,) [rad]
+            from what was drawn. What belongs to a material as it was set.
 
         Raises
         ------

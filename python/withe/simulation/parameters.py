@@ -9,7 +9,7 @@ import numpy as np
 from withe.common import validation
 from withe.parts.description import added_mass, drag
 from withe.parts.friction import as_given, obstacle_friction
-from withe.parts.handles import Drag, Fluid, Load, Mass, Obstacle, Rod
+from withe.parts.handles import Drag, Fluid, Load, Mass, Obstacle, Rod, Support
 from withe.parts.kinds import (
     DragPart,
     FluidPart,
@@ -24,12 +24,14 @@ from withe.parts.kinds import (
 from withe.parts.parameters import ROD_WORDS
 from withe.parts.rods import curvature_given, twist_array
 from withe.simulation.loads import load_index, set_load
-from withe.simulation.obstacles import set_obstacle_friction, set_rod_friction
+from withe.simulation.obstacles import set_obstacle_friction, set_scene_friction
 from withe.simulation.session import Session
+from withe.simulation.supports import find_support
 
 __all__ = ["Settable", "get_value", "set_values"]
 
 Settable = Rod | Load | Mass | Drag | Fluid | Obstacle
+_POSE = ("position", "rotation")  # of supports, which `Simulation.move` changes
 _NATURAL_WORDS = ("natural_curvature", "natural_twist")
 _SET_ROD = (*ROD_WORDS, *_NATURAL_WORDS)
 
@@ -39,10 +41,10 @@ def set_values(session: Session, target: Settable | str | None, values: dict[str
     if not values:
         raise ValueError("set must be given what to set, such as youngs_modulus=1e6")
     if target is None:
-        _only(values, ("gravity", "friction"), "the scene")
+        _only(values, ("gravity", "friction", "slip_tolerance"), "the scene")
         gravity = validation.vector(values["gravity"], "gravity") if "gravity" in values else None
-        if "friction" in values:
-            set_rod_friction(session, values["friction"])
+        if values.keys() & {"friction", "slip_tolerance"}:
+            set_scene_friction(session, values)
         if gravity is not None:
             session.world.set_gravity(gravity)
             session.settings.gravity = gravity
@@ -73,11 +75,11 @@ def set_values(session: Session, target: Settable | str | None, values: dict[str
         raise ValueError(_nothing_to_set(part))
 
 
-def get_value(session: Session, target: Settable | str, word: str | None) -> Any:
+def get_value(session: Session, target: Settable | Support | str, word: str | None) -> Any:
     """The present value of a parameter; see `Simulation.get`."""
     if word is None:
-        if isinstance(target, str) and target == "friction":
-            return float(session.world.contact.friction)
+        if isinstance(target, str) and target in ("friction", "slip_tolerance"):
+            return float(getattr(session.world.contact, target))
         if not isinstance(target, str) or target != "gravity":
             raise ValueError("word must be given, such as get(arm, 'youngs_modulus')")
         return session.settings.gravity.copy()
@@ -99,6 +101,14 @@ def get_value(session: Session, target: Settable | str, word: str | None) -> Any
         return session.settings.drags[part.name]
     elif isinstance(part, FluidPart) and word == "viscosity":
         return session.settings.fluids[part.name]
+    elif isinstance(part, SupportPart) and word in _POSE:
+        index, _ = find_support(session, part.name)
+        world = session.world
+        return np.array(world.support_position(index) if word == "position" else world.support_rotation(index))
+    elif isinstance(part, ObstaclePart) and word in ("position", "turn"):
+        index = session.directory.all(ObstaclePart).index(part)
+        world = session.world
+        return np.array(world.obstacle_position(index) if word == "position" else world.obstacle_turn(index))
     elif isinstance(part, ObstaclePart) and word == "friction":
         index = session.directory.all(ObstaclePart).index(part)
         return as_given(obstacle_friction(session.world.contact, index))
@@ -141,14 +151,15 @@ def _words_of(part: Part) -> tuple[str, ...]:
         MassPart: ("mass",),
         DragPart: ("drag",),
         FluidPart: ("viscosity",),
-        ObstaclePart: ("friction",),
+        ObstaclePart: ("friction", "position", "turn"),
+        SupportPart: _POSE,
     }
     return words.get(type(part), ())
 
 
 _SETTABLE = (
     "set takes rods (youngs_modulus, natural_curvature, ...), loads (force, moment, load), masses (mass), "
-    "drags (drag), fluids (viscosity), obstacles (friction), and None for the scene (gravity, friction)"
+    "drags (drag), fluids (viscosity), obstacles (friction), and None for the scene (gravity, friction, slip_tolerance)"
 )
 
 
