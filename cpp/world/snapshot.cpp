@@ -168,14 +168,17 @@ void exchange(Archive& io, std::optional<Energy>& energy) {
   for (double* x : {&kinetic, &stretch, &bend, &twist, &gravity, &loads, &contact, &total, &work, &dissipated}) io(*x);
 }
 
-/// What users may set; the rest follows from it.
+/// What users may set; the rest follows from it. Friction is that of the drawing where it was not set: see
+/// `write_friction`.
 template <class Archive>
 void exchange(Archive& io, const Model& model, Parameters& p) {
-  for (const ParameterInfo& info : parameter_index())
+  for (const ParameterInfo& info : parameter_index()) {
+    if (info.of_contact()) continue;
     for (int rod = 0; rod < (info.of_rod() ? static_cast<int>(model.place.size()) : 1); ++rod) {
       ParameterView values = parameter_view(model, p, info.kind, rod);
       io(values);
     }
+  }
   io(p.held_lumped);
 }
 

@@ -230,5 +230,5 @@ def test_poses_of_supports_and_obstacles_are_read():
     assert np.allclose(simulation.get("wall", "rotation"), turn, atol=1e-12)
     assert np.allclose(simulation.get(ball, "position"), (0, 0, -0.1), atol=1e-12)
     assert np.allclose(simulation.get(ball, "turn"), (0, 0, 0.5), atol=1e-12)
-    with pytest.raises(ValueError, match="'wall' has no 'mass'; it has position, rotation"):
+    with pytest.raises(ValueError, match="get reads its position and rotation"):
         simulation.get(wall, "mass")

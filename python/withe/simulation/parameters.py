@@ -152,7 +152,6 @@ def _words_of(part: Part) -> tuple[str, ...]:
         DragPart: ("drag",),
         FluidPart: ("viscosity",),
         ObstaclePart: ("friction", "position", "turn"),
-        SupportPart: _POSE,
     }
     return words.get(type(part), ())
 
@@ -174,7 +173,7 @@ def _nothing_to_set(part: Part) -> str:
             "a rod beside it; or, to prescribe where it is, clamp or pin its node and move that"
         )
     if isinstance(part, SupportPart):
-        return f"support {part.name!r} has nothing to set: move, release or reaction take it. {_SETTABLE}"
+        return f"support {part.name!r} has nothing to set: move, release or reaction take it. {_SETTABLE}; get reads its position and rotation"
     return f"{part.name!r} has nothing to set. {_SETTABLE}"
 
 
