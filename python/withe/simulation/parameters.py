@@ -173,7 +173,10 @@ def _nothing_to_set(part: Part) -> str:
             "a rod beside it; or, to prescribe where it is, clamp or pin its node and move that"
         )
     if isinstance(part, SupportPart):
-        return f"support {part.name!r} has nothing to set: move, release or reaction take it. {_SETTABLE}; get reads its position and rotation"
+        return (
+            f"support {part.name!r} has nothing to set: move, release or reaction take it. {_SETTABLE}; get reads its "
+            "position and rotation"
+        )
     return f"{part.name!r} has nothing to set. {_SETTABLE}"
 
 
