@@ -148,10 +148,10 @@ double SpringForces::dissipated(const StepProblem& problem, const StepData& data
   return work;
 }
 
-double spring_energy(const Model& model, const Parameters& parameters, const VectorX& q) {
+double spring_energy(const Model& model, const VectorX& stiffness, const VectorX& rest_length, const VectorX& q) {
   double energy = 0.0;
-  for (int s = 0; s < static_cast<int>(model.description.springs.size()); ++s)
-    energy += spring_energy(spring_of(parameters, s), length_of(between(model, q, s)));
+  for (int s = 0; s < static_cast<int>(stiffness.size()); ++s)
+    energy += spring_energy(Spring{stiffness[s], rest_length[s], 0.0}, length_of(between(model, q, s)));
   return energy;
 }
 

@@ -27,7 +27,7 @@ class SpringForces final : public Term {
 };
 
 /// Of all springs at a configuration [J].
-double spring_energy(const Model& model, const Parameters& parameters, const VectorX& q);
+double spring_energy(const Model& model, const VectorX& stiffness, const VectorX& rest_length, const VectorX& q);
 /// n of one spring, with velocities v [N].
 double spring_tension(const Model& model, const Parameters& parameters, const VectorX& q, const VectorX& v, int spring);
 

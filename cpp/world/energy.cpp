@@ -39,7 +39,7 @@ BendTwistEnergy bend_twist_energy(const Model& model, const ElasticCoefficients&
   return sum;
 }
 
-/// Kinetic, elastic and gravity's.
+/// Kinetic, elastic, of springs and gravity's.
 Energy mechanical_energy(const Model& model, const EnergyCoefficients& k, const Configuration& c, const State& state) {
   Energy e;
   e.kinetic = kinetic_energy(model, k.mass, state.v);
@@ -48,6 +48,7 @@ Energy mechanical_energy(const Model& model, const EnergyCoefficients& k, const 
   e.bend = turned.bend;
   e.twist = turned.twist;
   e.gravity = gravity_energy(model, k, state.q, [](int) { return 1.0; });
+  e.spring = spring_energy(model, k.spring_stiffness, k.spring_rest_length, state.q);
   return e;
 }
 
@@ -60,6 +61,8 @@ void EnergyCoefficients::set(const Model& model, const Parameters& p) {
   set_mass(model, p, mass);
   node_mass = p.node_mass;
   gravity = p.gravity;
+  spring_stiffness = p.spring_stiffness;
+  spring_rest_length = p.spring_rest_length;
 }
 
 /// What ramps of natural shapes change at a state that stays: bending and twisting [J].
@@ -90,7 +93,7 @@ double World::Implementation::work_of_settings() const {
   now.set(model, parameters);
   const Energy a = mechanical_energy(model, before_settings, c, state), b = mechanical_energy(model, now, c, state);
   return (b.kinetic - a.kinetic) + (b.stretch - a.stretch) + (b.bend - a.bend) + (b.twist - a.twist) +
-         (b.gravity - a.gravity);
+         (b.gravity - a.gravity) + (b.spring - a.spring);
 }
 
 Energy World::Implementation::energy() const {
@@ -105,7 +108,6 @@ Energy World::Implementation::energy_of(const State& at, double loads, double wo
   Energy e = mechanical_energy(model, coefficients, c, at);
   e.loads = -loads;
   if (const Contact* contact = equations->contact()) e.contact = contact->energy_of(at, parameters);
-  e.spring = spring_energy(model, parameters, at.q);
   e.total = e.kinetic + e.stretch + e.bend + e.twist + e.gravity + e.loads + e.contact + e.spring;
   e.work = work_done;
   e.dissipated = lost;

@@ -12,9 +12,10 @@ namespace withe {
 struct EnergyCoefficients {
   ElasticCoefficients elastic;
   MassMatrix mass;
-  VectorX node_mass;  ///< [kg]
-  Vector3 gravity;    ///< [m/s^2]
-  long version = -1;  ///< of the parameters
+  VectorX node_mass;                             ///< [kg]
+  Vector3 gravity;                               ///< [m/s^2]
+  VectorX spring_stiffness, spring_rest_length;  ///< [N/m], [m]
+  long version = -1;                             ///< of the parameters
 
   void set(const Model& model, const Parameters& parameters);
 };
