@@ -1,0 +1,192 @@
+"""What is looked for: natural curvature over a few functions, and parameters of rods, in the words of `set`."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from withe.common import validation
+from withe.parts.handles import Rod
+from withe.parts.kinds import RodPart
+from withe.parts.parameters import ROD_WORDS
+from withe.real2sim.places import rod_part, turning_axis
+from withe.simulation.simulation import Simulation
+
+__all__ = ["NaturalCurvature", "Unknown", "parse_unknowns"]
+
+FloatArray = npt.NDArray[np.float64]
+
+
+class Unknown(ABC):
+    """Some numbers of a simulation.
+
+    Attributes
+    ----------
+    word, rods : str, tuple of str
+        What it is, and of which rods.
+    names : tuple of str
+        Of each number.
+    scales : ndarray of shape (n,)
+        A change of each coordinate that counts as large: all it may do must be visible.
+    """
+
+    word: str
+    rods: tuple[str, ...]
+    names: tuple[str, ...]
+    scales: FloatArray
+    per_frame: bool
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    @abstractmethod
+    def read(self, simulation: Simulation) -> FloatArray:
+        """Coordinates of the present value, shape (n,)."""
+
+    @abstractmethod
+    def write(self, simulation: Simulation, coordinates: FloatArray) -> None:
+        """Set them."""
+
+    def value(self, coordinates: FloatArray) -> FloatArray:
+        """What the coordinates, of shape (..., n), mean, in SI units."""
+        return coordinates
+
+    def slope(self, coordinates: FloatArray) -> FloatArray:
+        """Derivatives of `value`."""
+        return np.ones_like(coordinates)
+
+
+class NaturalCurvature(Unknown):
+    """Natural curvature of a rod as a sum of functions along it [1/m]."""
+
+    word = "natural_curvature"
+    per_frame = True
+
+    def __init__(self, simulation: Simulation, rod: Rod | str, basis: Any = "constant") -> None:
+        part = rod_part(simulation, rod)
+        self._rod, self.rods = part.name, (part.name,)
+        self.length = float(part.lengths.sum())
+        functions, words = _basis(part, basis)
+        plane = turning_axis(simulation, part)
+        self._directions = np.eye(2) if plane is None else plane[0][None]
+        axes = [" towards d1", " towards d2"] if plane is None else [""]
+        self.names = tuple(f"natural_curvature of {part.name!r}{axis}{word}" for axis in axes for word in words)
+        self._fields = np.concatenate([functions[:, :, None] * direction for direction in self._directions], axis=1)
+        self._inverse = np.linalg.pinv(self._fields.transpose(0, 2, 1).reshape(-1, len(self.names)))
+        largest = np.abs(functions).max(axis=0)
+        if not (largest > 0.0).all():
+            raise ValueError(f"basis of {part.owner} must have no column of zeros")
+        self.scales = np.tile(1.0 / (self.length * largest), len(axes))
+
+    @property
+    def fields(self) -> FloatArray:
+        """Curvature that each coordinate stands for, shape (stencils, n, 2)."""
+        return self._fields
+
+    def read(self, simulation: Simulation) -> FloatArray:
+        """Coordinates of the nearest curvature that the functions make."""
+        return np.asarray(self._inverse @ simulation.get(self._rod, self.word).ravel())
+
+    def write(self, simulation: Simulation, coordinates: FloatArray) -> None:
+        """Set them."""
+        simulation.set(self._rod, natural_curvature=np.einsum("snc,n->sc", self._fields, coordinates))
+
+
+class Parameter(Unknown):
+    """A positive parameter of one or several rods, as the logarithm of what it is multiplied by."""
+
+    per_frame = False
+
+    def __init__(self, simulation: Simulation, rods: Sequence[Rod | str], word: str) -> None:
+        parts = [rod_part(simulation, rod) for rod in rods]
+        self.word, self.rods = word, tuple(part.name for part in parts)
+        self._first = {}
+        for part in parts:
+            value = simulation.get(part.name, word)
+            if value is None:
+                raise ValueError(
+                    f"{word} of {part.owner} cannot be unknown: its stiffness was given without a material"
+                )
+            if not (np.asarray(value) > 0.0).all():
+                raise ValueError(
+                    f"{word} of {part.owner} must be positive to begin with, as its logarithm is looked for: set a "
+                    f"first guess, simulation.set({part.name!r}, {word}=...)"
+                )
+            self._first[part.name] = value
+        self._mean = float(np.mean([np.mean(value) for value in self._first.values()]))
+        self.names = (f"{word} of {', '.join(map(repr, self.rods))}",)
+        self.scales = np.ones(1)
+
+    def read(self, simulation: Simulation) -> FloatArray:
+        """Logarithm of the present value over the first."""
+        name = self.rods[0]
+        return np.array([np.log(np.mean(simulation.get(name, self.word)) / np.mean(self._first[name]))])
+
+    def write(self, simulation: Simulation, coordinates: FloatArray) -> None:
+        """Multiply what it was at first."""
+        for name, first in self._first.items():
+            simulation.set(name, **{self.word: first * float(np.exp(coordinates[0]))})
+
+    def value(self, coordinates: FloatArray) -> FloatArray:
+        """Its mean over the rods, in SI units."""
+        return np.asarray(self._mean * np.exp(coordinates))
+
+    def slope(self, coordinates: FloatArray) -> FloatArray:
+        """The value itself, as the coordinate is a logarithm."""
+        return self.value(coordinates)
+
+
+def parse_unknowns(simulation: Simulation, unknowns: Sequence[Any], what: str = "unknowns") -> list[Unknown]:
+    """Unknowns of what a user gave: tuples (rod, word) or (rod, "natural_curvature", basis).
+
+    Raises
+    ------
+    ValueError
+        Something else, a word that cannot be unknown, or the same one twice.
+    """
+    if isinstance(unknowns, str) or not isinstance(unknowns, Sequence):
+        raise ValueError(f"{what} must be a list such as [(arm, 'natural_curvature', 'constant')], got {unknowns!r}")
+    found: list[Unknown] = []
+    seen: set[tuple[str, str]] = set()
+    for item in unknowns:
+        if not isinstance(item, tuple) or len(item) not in (2, 3) or not isinstance(item[1], str):
+            raise ValueError(f"{what} must be tuples (rod, word) or (rod, 'natural_curvature', basis), got {item!r}")
+        rod, word, *basis = item
+        if word == "natural_curvature":
+            unknown: Unknown = NaturalCurvature(simulation, rod, *basis)
+        elif word in ROD_WORDS and word != "poisson_ratio" and not basis:
+            rods = list(rod) if isinstance(rod, tuple | list) else [rod]
+            unknown = Parameter(simulation, rods, word)
+        else:
+            words = ", ".join(("natural_curvature", *(w for w in ROD_WORDS if w != "poisson_ratio")))
+            raise ValueError(f"{what} must be of {words}, only the first with a basis, got {item[1:]!r}")
+        for name in unknown.rods:
+            if (name, word) in seen:
+                raise ValueError(f"{what} must be different, got {word} of rod {name!r} twice")
+            seen.add((name, word))
+        found.append(unknown)
+    return found
+
+
+def _basis(part: RodPart, basis: Any) -> tuple[FloatArray, list[str]]:
+    """Functions along a rod at its stencils, shape (stencils, n), and what tells their coordinates apart."""
+    stencils = len(part.voronoi)
+    if stencils == 0:
+        raise ValueError(f"{part.owner} has no stencil that could bend: it needs three nodes")
+    ends = np.cumsum(part.lengths)
+    share = (ends if part.closed else ends[:-1]) / ends[-1]
+    if isinstance(basis, str):
+        validation.choice(basis, f"basis of {part.owner}", ("constant", "linear", "segment"))
+        if basis == "constant":
+            return np.ones((stencils, 1)), [""]
+        if basis == "linear":
+            return np.stack([1.0 - share, share], axis=1), [" at its start", " at its end"]
+        return np.eye(stencils), [f" at stencil {i}" for i in range(stencils)]
+    functions = validation.number_array(basis, f"basis of {part.owner}", (stencils, "n"))
+    if functions.shape[1] == 0:
+        raise ValueError(f"basis of {part.owner} must have at least one column")
+    return functions, [f" [{i}]" for i in range(functions.shape[1])]
