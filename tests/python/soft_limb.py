@@ -28,7 +28,7 @@ def robot(nodes=25, form="pairs", **build):
     lower = scene.add_rod(start=(LIMB, 0, 0), end=(2 * LIMB, 0, 0), name="lower", **options)
     scene.join(upper.end, lower.start, form=form)
     scene.clamp(upper.start, hold="edge")
-    places = [(upper, LIMB * i / 4) for i in range(5)] + [(lower, LIMB * i / 4) for i in range(1, 5)]
+    places = [("upper", LIMB * i / 4) for i in range(5)] + [("lower", LIMB * i / 4) for i in range(1, 5)]
     return scene.build(integrator="static", **build), places
 
 

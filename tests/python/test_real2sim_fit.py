@@ -235,6 +235,7 @@ def test_errors_have_the_size_that_the_covariance_says():
         ([Tags([[(1, 0, 0)]], ["arm.end"], sigma=1)] * 2 + [3], ARM, {}, "targets must be Curvatures"),
         ([Tags([[(1, 0, 0)]] * n, ["arm.end"], sigma=1) for n in (1, 2)], ARM, {}, "same number of frames, got 1, 2"),
         ([Tags([[(1, 0, 0)]], ["arm.end"])] * 2, ARM, {}, "sigma of every target must be given"),
+        (Tags([[(1, 0)]], ["arm.end"]), ARM, {}, "camera must be given for tags in pixels"),
         (Tags([[(1, 0, 0)]], ["leg.end"]), ARM, {}, "no rod 'leg'"),
         (Tags([[(1, 0, 0)]], [("arm", 0.5)]), ARM, {}, "must lie on rod 'arm', from 0 to 0.3 m, got 0.5"),
     ],
@@ -247,7 +248,8 @@ def test_bad_input_is_refused(targets, unknowns, options, message):
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: Tags([[(1, 0)]], ["a"]), r"points without a camera must have shape \(frames, 1, 3\), got \(1, 1, 2\)"),
+        (lambda: Tags([[(1, 0)]], ["a", "b"]), r"points in pixels must have shape \(frames, 2, 2\), got \(1, 1, 2\)"),
+        (lambda: Tags([[1, 0, 0]], ["a"]), r"points in metres must have shape \(frames, 1, 3\), got \(1, 3\)"),
         (lambda: Tags([[(1, 0, np.inf)]], ["a"]), "must be finite, or NaN where nothing was seen"),
         (lambda: Tags([[(1, 0, 0)]], ["a"], sigma=0), "sigma must be positive"),
         (lambda: Tags([[(1, 0, 0)]] * 2, ["a"], times=[1, 1]), "times must grow"),

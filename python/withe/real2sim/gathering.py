@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.real2sim.least_squares import FrameSolution, reduced, seen, weaknesses
+from withe.real2sim.outliers import find_outliers
 from withe.real2sim.results import Fit, Outlier, Unobservable
 from withe.real2sim.stills import Stills
 from withe.real2sim.targets import Tags, Target
@@ -13,9 +14,6 @@ from withe.real2sim.targets import Tags, Target
 __all__ = ["gather"]
 
 FloatArray = npt.NDArray[np.float64]
-
-_WINDOW = 7  # frames of the running median that a jump is measured from
-_JUMP = 10.0  # times the usual scatter
 
 
 def gather(
@@ -52,7 +50,7 @@ def gather(
         converged=np.array([f in solutions and solutions[f].converged for f in range(frames)]),
         reasons=reasons,
         unobservable=_unobservable(stills, with_data),
-        outliers=_outliers(targets, residuals),
+        outliers=_outliers(stills, targets, residuals, with_data),
         _unknowns=tuple(stills.unknowns),
         _coordinates=coordinates,
     )
@@ -135,23 +133,12 @@ def _weights(names: list[str], direction: FloatArray) -> dict[str, float]:
     return {name: float(weight) for name, weight in zip(names, direction, strict=True) if abs(weight) > 0.1}
 
 
-def _outliers(targets: list[Target], residuals: FloatArray) -> tuple[Outlier, ...]:
-    """Tags whose residual jumps in one frame; of several in a frame, those at least half as far as the farthest."""
-    if len(targets) != 1 or not isinstance(targets[0], Tags) or len(residuals) < _WINDOW:
+def _outliers(
+    stills: Stills, targets: list[Target], residuals: FloatArray, solutions: dict[int, FrameSolution]
+) -> tuple[Outlier, ...]:
+    """Tags that jump, where tags are all there is."""
+    if len(targets) != 1 or not isinstance(targets[0], Tags):
         return ()
     scale = targets[0].sigma or 1.0
     places = scale * residuals.reshape(len(residuals), len(targets[0].places), -1)
-    jumps = np.full(places.shape[:2], np.nan)
-    with np.errstate(all="ignore"):
-        for frame in range(len(places)):
-            first = int(np.clip(frame - _WINDOW // 2, 0, len(places) - _WINDOW))
-            around = places[first : first + _WINDOW]
-            known = np.asarray(np.isfinite(around).all(axis=2))
-            for tag in range(places.shape[1]):
-                if known[:, tag].any():
-                    middle = np.median(around[known[:, tag], tag], axis=0)
-                    jumps[frame, tag] = np.linalg.norm(places[frame, tag] - middle)
-    usual = 1.4826 * float(np.nanmedian(jumps)) if np.isfinite(jumps).any() else 0.0
-    farthest = np.nanmax(np.nan_to_num(jumps), axis=1)
-    found = np.argwhere((jumps > _JUMP * usual) & (jumps >= 0.5 * farthest[:, None]) & (usual > 0.0))
-    return tuple(Outlier(int(f), int(t), float(jumps[f, t]), usual) for f, t in found)
+    return find_outliers(places, solutions, stills.per_frame)

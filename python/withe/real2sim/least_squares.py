@@ -3,20 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["FrameSolution", "Problem", "Weakness", "all_frames", "lone_frame", "weaknesses"]
+__all__ = [
+    "FrameSolution",
+    "Problem",
+    "Weakness",
+    "all_frames",
+    "lone_frame",
+    "range_of",
+    "reduced",
+    "seen",
+    "weaknesses",
+]
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 
 _RANK = 1e-9  # singular values below it, relative to the greatest, belong to directions that nothing tells
-_SMALL = 1e-6  # a step that would lessen the residual by less than this share of it is the last
-_HALVINGS = 12
+_SMALL = 1e-5  # a step that would lessen the residual by less than this share of it is the last
+_TRIALS = 8
 
 
 class Problem(Protocol):
@@ -66,14 +76,22 @@ def _size(residual: FloatArray) -> float:
     return float(np.linalg.norm(seen(residual)))
 
 
-def _least(matrix: FloatArray, right: FloatArray) -> FloatArray:
-    """The shortest x with the least |matrix x - right|."""
-    return np.asarray(np.linalg.lstsq(matrix, right, rcond=_RANK)[0])
+def _bounded(matrix: FloatArray, right: FloatArray, radius: float) -> FloatArray:
+    """The x of least |matrix x - right| among those with no coordinate beyond a radius, by Levenberg's damping."""
+    u, values, vectors = np.linalg.svd(matrix, full_matrices=False)
+    good = values > _RANK * values.max(initial=0.0)
+    values, along = values[good], u[:, good].T @ right
 
+    def step(damping: float) -> FloatArray:
+        return np.asarray(vectors[good].T @ (values * along / (values**2 + damping)))
 
-def _capped(step: FloatArray) -> float:
-    """Share of a step that changes no coordinate by more than its scale: further away another shape may be nearest."""
-    return 1.0 / max(1.0, float(np.abs(step).max(initial=0.0)))
+    if np.abs(step(0.0)).max(initial=0.0) <= radius:
+        return step(0.0)
+    low, high = values.min() ** 2 * 1e-6, values.max() ** 2 * max(1.0, np.linalg.norm(along / values) / radius)
+    while high > 1.1 * low:
+        middle = np.sqrt(low * high)
+        low, high = (middle, high) if np.abs(step(middle)).max() > radius else (low, middle)
+    return step(high)
 
 
 def lone_frame(
@@ -81,7 +99,7 @@ def lone_frame(
 ) -> FrameSolution:
     """Fit one frame, with the coordinates that are not free as they are.
 
-    No coordinate changes by more than its scale in one step, and a step is halved until it brings less.
+    No coordinate changes by more than its scale in one step, and by a quarter of that when a step brings nothing.
     """
     scales = problem.scales[free]
     found = problem.residual(start, frame)
@@ -91,17 +109,17 @@ def lone_frame(
     coordinates, (residual, state) = start.copy(), found
     for iteration in range(1, max_iterations + 1):
         jacobian = _seen_rows(problem.jacobian(coordinates, state, frame)[:, free] * scales, residual)
-        step = _least(jacobian, -seen(residual))
+        step = _bounded(jacobian, -seen(residual), 1.0)
         gain = float(np.linalg.norm(jacobian @ step))
         if gain <= _SMALL * _size(residual) or gain <= tolerance:
             return FrameSolution(coordinates, residual, jacobian, iteration, True)
-        step *= _capped(step)
-        for halving in range(_HALVINGS):
+        for _ in range(_TRIALS):
             trial = coordinates.copy()
-            trial[free] += 0.5**halving * scales * step
+            trial[free] += scales * step
             found = problem.residual(trial, frame)
             if found is not None and _size(found[0]) < _size(residual):
                 break
+            step = _bounded(jacobian, -seen(residual), 0.25 * float(np.abs(step).max()))
         else:
             return FrameSolution(coordinates, residual, jacobian, iteration, False, "no step lessens the residual")
         coordinates, (residual, state) = trial, found
@@ -123,21 +141,22 @@ def all_frames(
     The latter are eliminated frame by frame: with U the range of J_local, shared coordinates solve the least squares of
     (I - U U^T) (J_shared x + r), stacked over frames.
     """
-    local, common = problem.per_frame, ~problem.per_frame
+    local = problem.per_frame
     points = {frame: start[frame].copy() for frame in frames}
     solutions = _linearised(problem, points, progress)
     for iteration in range(1, max_iterations + 1):
         size = _total(solutions)
-        steps = _joint_step(solutions, local, common)
+        steps = _joint_step(solutions, local, 1.0)
         gain = np.sqrt(sum(float(np.sum((solutions[f].jacobian @ steps[f]) ** 2)) for f in frames))
         if gain <= _SMALL * size or gain <= tolerance:
             return _closed(solutions, iteration, True)
-        share = min(_capped(step) for step in steps.values())
-        for halving in range(_HALVINGS):
-            trial = {f: points[f] + share * 0.5**halving * problem.scales * steps[f] for f in frames}
+        for _ in range(_TRIALS):
+            trial = {f: points[f] + problem.scales * steps[f] for f in frames}
             tried = _linearised(problem, trial, progress)
             if len(tried) == len(frames) and _total(tried) < size:
                 break
+            farthest = max(float(np.abs(step).max()) for step in steps.values())
+            steps = _joint_step(solutions, local, 0.25 * farthest)
         else:
             return _closed(solutions, iteration, False, "no step lessens the residual")
         points, solutions = trial, tried
@@ -164,7 +183,7 @@ def _total(solutions: dict[int, FrameSolution]) -> float:
     return float(np.sqrt(sum(_size(solution.residual) ** 2 for solution in solutions.values())))
 
 
-def _range(matrix: FloatArray) -> FloatArray:
+def range_of(matrix: FloatArray) -> FloatArray:
     """An orthonormal basis of what a matrix reaches."""
     u, values, _ = np.linalg.svd(matrix, full_matrices=False)
     return np.asarray(u[:, values > _RANK * values.max(initial=0.0)])
@@ -174,22 +193,43 @@ def reduced(solutions: dict[int, FrameSolution], local: BoolArray) -> tuple[Floa
     """Derivatives by shared coordinates, and residuals, without what each frame's own coordinates make good."""
     rows, right = [], []
     for solution in solutions.values():
-        basis = _range(solution.jacobian[:, local])
+        basis = range_of(solution.jacobian[:, local])
         shared, residual = solution.jacobian[:, ~local], seen(solution.residual)
         rows.append(shared - basis @ (basis.T @ shared))
         right.append(residual - basis @ (basis.T @ residual))
     return np.concatenate(rows), np.concatenate(right)
 
 
-def _joint_step(solutions: dict[int, FrameSolution], local: BoolArray, common: BoolArray) -> dict[int, FloatArray]:
-    matrix, right = reduced(solutions, local)
-    shared = _least(matrix, -right)
-    steps = {}
+def _joint_step(solutions: dict[int, FrameSolution], local: BoolArray, radius: float) -> dict[int, FloatArray]:
+    """Steps of all frames together, with so much of Levenberg's damping that no coordinate goes beyond a radius."""
+    greatest = max(float(np.sum(solution.jacobian**2)) for solution in solutions.values())
+    damping = 0.0
+    while True:
+        steps = _damped_step(solutions, local, damping)
+        if max(float(np.abs(step).max()) for step in steps.values()) <= radius:
+            return steps
+        damping = 3.0 * damping or 1e-9 * greatest
+
+
+def _damped_step(solutions: dict[int, FrameSolution], local: BoolArray, damping: float) -> dict[int, FloatArray]:
+    """Least of sum |J s + r|^2 + damping |s|^2, s the steps: what frames share, and then what each needs besides."""
+    root, count = np.sqrt(damping), int(local.sum())
+    extra = {}
     for frame, solution in solutions.items():
-        step = np.zeros(len(local))
-        step[common] = shared
-        step[local] = _least(
-            solution.jacobian[:, local], -seen(solution.residual) - solution.jacobian[:, common] @ shared
+        rows = np.zeros((count, len(local)))
+        rows[:, local] = root * np.eye(count)
+        residual = np.concatenate([seen(solution.residual), np.zeros(count)])
+        extra[frame] = replace(solution, residual=residual, jacobian=np.concatenate([solution.jacobian, rows]))
+    matrix, right = reduced(extra, local)
+    free = matrix.shape[1]
+    matrix, right = np.concatenate([matrix, root * np.eye(free)]), np.concatenate([right, np.zeros(free)])
+    shared = _bounded(matrix, -right, np.inf)
+    steps = {}
+    for frame, solution in extra.items():
+        step = np.empty(len(local))
+        step[~local] = shared
+        step[local] = _bounded(
+            solution.jacobian[:, local], -solution.residual - solution.jacobian[:, ~local] @ shared, np.inf
         )
         steps[frame] = step
     return steps

@@ -25,7 +25,8 @@ class Outlier:
     frame, tag : int
         From 0.
     jump : float
-        Distance from the running median of its residual, in the unit of the target [px or m].
+        Distance from the running median of its residual, were it left out of the fit, in the unit of the target
+        [px or m].
     scatter : float
         Usual distance, 1.48 times the median.
     """

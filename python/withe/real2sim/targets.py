@@ -169,7 +169,7 @@ class Tags(Target):
     Parameters
     ----------
     points : array_like of shape (frames, tags, 2) [px] or (frames, tags, 3) [m]
-        Pixels need a camera. NaN where a tag was not seen.
+        Pixels need a camera, which `calibrate` finds. NaN where a tag was not seen.
     places : sequence
         Where on the rods the tags are: nodes, or pairs of a rod and a length along it [m].
     camera : perception.Camera, optional
@@ -180,7 +180,7 @@ class Tags(Target):
     Raises
     ------
     ValueError
-        Wrong shapes, or pixels without a camera.
+        Wrong shapes.
     """
 
     points: npt.ArrayLike
@@ -190,9 +190,9 @@ class Tags(Target):
     times: Any = None
 
     def __post_init__(self) -> None:
-        dimension = 3 if self.camera is None else 2
-        what = "points without a camera" if self.camera is None else "points in pixels"
-        self.points = _with_gaps(self.points, what, (None, len(self.places), dimension))
+        in_pixels = self.camera is not None or np.shape(self.points)[-1:] == (2,)
+        what = "points in pixels" if in_pixels else "points in metres"
+        self.points = _with_gaps(self.points, what, (None, len(self.places), 2 if in_pixels else 3))
         self.sigma = None if self.sigma is None else validation.positive(self.sigma, "sigma")
         self.times = _checked_times(self.times, len(self.points))
 
@@ -216,6 +216,8 @@ class Tags(Target):
 
     def bind(self, simulation: Simulation) -> Residual:
         """The residual for the nodes of a simulation."""
+        if self.camera is None and np.shape(self.points)[2] == 2:
+            raise ValueError("camera must be given for tags in pixels; real2sim.calibrate finds one")
         return _TagResidual(self, Places(simulation, self.places))
 
 

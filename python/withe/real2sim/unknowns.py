@@ -16,7 +16,7 @@ from withe.parts.parameters import ROD_WORDS
 from withe.real2sim.places import rod_part, turning_axis
 from withe.simulation.simulation import Simulation
 
-__all__ = ["NaturalCurvature", "Unknown", "parse_unknowns"]
+__all__ = ["NaturalCurvature", "Tilt", "Unknown", "parse_unknowns"]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -138,6 +138,34 @@ class Parameter(Unknown):
     def slope(self, coordinates: FloatArray) -> FloatArray:
         """The value itself, as the coordinate is a logarithm."""
         return self.value(coordinates)
+
+
+class Tilt(Unknown):
+    """Angle by which the base of a robot in a plane is tilted: gravity is turned the other way."""
+
+    word, per_frame = "gravity", False
+    name = "tilt of the base"
+
+    def __init__(self, simulation: Simulation) -> None:
+        part = rod_part(simulation, simulation.rods[0])
+        plane = turning_axis(simulation, part)
+        assert plane is not None
+        self._axis, self._first = plane[1], simulation.get("gravity")
+        self.rods, self.names, self.scales = (), (self.name,), np.ones(1)
+
+    def read(self, simulation: Simulation) -> FloatArray:
+        """None yet."""
+        return np.zeros(1)
+
+    def write(self, simulation: Simulation, coordinates: FloatArray) -> None:
+        """Turn gravity."""
+        simulation.set(gravity=self.gravity(float(coordinates[0])))
+
+    def gravity(self, tilt: float) -> FloatArray:
+        """Gravity as a base that is tilted feels it [m/s^2]."""
+        along = self._axis * (self._axis @ self._first)
+        across = np.cross(self._axis, self._first)
+        return np.asarray(along + np.cos(tilt) * (self._first - along) - np.sin(tilt) * across)
 
 
 def parse_unknowns(simulation: Simulation, unknowns: Sequence[Any], what: str = "unknowns") -> list[Unknown]:
