@@ -4,10 +4,24 @@
 >>> log = withe.real2sim.read_log("log.csv", tags=range(101, 110))  # doctest: +SKIP
 """
 
+from withe.perception.tags import TagDetection, detect_tags
 from withe.real2sim.calibration import Calibration, calibrate
 from withe.real2sim.fitting import fit
 from withe.real2sim.logs import Log, read_log
 from withe.real2sim.results import Fit, Outlier, Unobservable
 from withe.real2sim.targets import Curvatures, Tags
 
-__all__ = ["Calibration", "Curvatures", "Fit", "Log", "Outlier", "Tags", "Unobservable", "calibrate", "fit", "read_log"]
+__all__ = [
+    "Calibration",
+    "Curvatures",
+    "Fit",
+    "Log",
+    "Outlier",
+    "TagDetection",
+    "Tags",
+    "Unobservable",
+    "calibrate",
+    "detect_tags",
+    "fit",
+    "read_log",
+]
