@@ -6,6 +6,7 @@
 
 from withe.perception.tags import TagDetection, detect_tags
 from withe.real2sim.calibration import Calibration, calibrate
+from withe.real2sim.centrelines import Centrelines, rest_shape
 from withe.real2sim.fitting import fit
 from withe.real2sim.logs import Log, read_log
 from withe.real2sim.results import Fit, Outlier, Unobservable
@@ -13,6 +14,7 @@ from withe.real2sim.targets import Curvatures, Tags
 
 __all__ = [
     "Calibration",
+    "Centrelines",
     "Curvatures",
     "Fit",
     "Log",
@@ -24,4 +26,5 @@ __all__ = [
     "detect_tags",
     "fit",
     "read_log",
+    "rest_shape",
 ]

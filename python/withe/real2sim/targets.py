@@ -15,7 +15,17 @@ from withe.perception.camera import Camera
 from withe.real2sim.places import Place, Places, turning_axis
 from withe.simulation.simulation import Simulation
 
-__all__ = ["Curvatures", "Residual", "Tags", "Target", "bind", "frames_of", "pixel_derivative", "turns"]
+__all__ = [
+    "Curvatures",
+    "Residual",
+    "Tags",
+    "Target",
+    "bind",
+    "checked_times",
+    "frames_of",
+    "pixel_derivative",
+    "turns",
+]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -96,7 +106,7 @@ class Curvatures(Target):
         self.values = _with_gaps(self.values, "values", (None, len(self.groups)))
         self.sigma = None if self.sigma is None else validation.positive(self.sigma, "sigma")
         self.normal = None if self.normal is None else validation.unit_vector(self.normal, "normal")
-        self.times = _checked_times(self.times, len(self.values))
+        self.times = checked_times(self.times, len(self.values))
 
     @classmethod
     def from_pixels(
@@ -194,7 +204,7 @@ class Tags(Target):
         what = "points in pixels" if in_pixels else "points in metres"
         self.points = _with_gaps(self.points, what, (None, len(self.places), 2 if in_pixels else 3))
         self.sigma = None if self.sigma is None else validation.positive(self.sigma, "sigma")
-        self.times = _checked_times(self.times, len(self.points))
+        self.times = checked_times(self.times, len(self.points))
 
     @property
     def frames(self) -> int:
@@ -315,7 +325,8 @@ def _with_gaps(values: npt.ArrayLike, what: str, shape: tuple[int | None, ...]) 
     return array
 
 
-def _checked_times(times: Any, frames: int) -> FloatArray | None:
+def checked_times(times: Any, frames: int) -> FloatArray | None:
+    """Times of frames, if they are given: numbers that grow."""
     if times is None:
         return None
     array = validation.number_array(times, "times", (frames,))
