@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace withe {
 namespace {
@@ -15,6 +16,16 @@ std::vector<int> stretch_dofs(const Model& model) {
   for (int e = 0; e < model.edge_count; ++e) {
     append(dofs, model.node_dof[at(model.edge_tail[at(e)])], model.dimension);
     append(dofs, model.node_dof[at(model.edge_head[at(e)])], model.dimension);
+  }
+  return dofs;
+}
+
+std::vector<int> edge_dofs(const Model& model) {
+  std::vector<int> dofs;
+  for (int e = 0; e < model.edge_count; ++e) {
+    append(dofs, model.tail_dof[at(e)], 3);
+    append(dofs, model.edge_dof[at(e)], 1);
+    append(dofs, model.head_dof[at(e)], 3);
   }
   return dofs;
 }
@@ -124,13 +135,15 @@ void ElementTable::add_hessian(int element, const double* hessian, int stride, d
   }
 }
 
-Assembler::Assembler(const Model& model, const Loads& load, Symmetry symmetry, SolverKind kind)
+Assembler::Assembler(const Model& model, const Loads& load, Symmetry symmetry, SolverKind kind, bool exact)
     : stretch(2 * model.dimension, stretch_dofs(model)),
       bend(model.planar() ? 6 : 11, bend_dofs(model)),
       half(model.planar() ? 5 : 11, half_dofs(model)),
       model_(model),
       symmetry_(symmetry),
-      kind_(kind) {
+      kind_(kind),
+      exact_(exact) {
+  if (exact && !model.planar()) edges = ElementTable(7, edge_dofs(model));
   for (const LoadPiece& piece : load.pieces) {
     int dofs[kMaxLocal];
     const int n = load_dofs(model, piece, dofs);
@@ -142,6 +155,7 @@ Assembler::Assembler(const Model& model, const Loads& load, Symmetry symmetry, S
   add_cliques(stretch);
   add_cliques(bend);
   add_cliques(half);
+  add_cliques(edges);
   for (const ElementTable& table : loads) add_cliques(table);
   for (int i = 0; i < model.dof_count; ++i) cliques_.push_back({i});
   for (const Constraint& c : model.constraints) {
@@ -195,13 +209,31 @@ void Assembler::analyse() {
   pattern_ = SparsityPattern::from_cliques(model_.dof_count, cliques);
   solver_ = make_linear_solver(pattern_, symmetry_, kind_);
   ++generation_;
-  for (ElementTable* table : {&stretch, &bend, &half, &contact}) table->find_offsets(*solver_);
+  for (ElementTable* table : {&stretch, &bend, &half, &edges, &contact}) table->find_offsets(*solver_);
   for (ElementTable& table : loads) table.find_offsets(*solver_);
   find_edge_couplings();
   diagonal_.clear();
   for (int i = 0; i < model_.dof_count; ++i) diagonal_.push_back(solver_->offset(i, i));
   regular = regular_stencils(model_, bend);
   find_blocks();
+  entries_.clear();
+  for (int column = 0; exact_ && column < pattern_.size; ++column)
+    for (int k = pattern_.column_starts[at(column)]; k < pattern_.column_starts[at(column) + 1]; ++k) {
+      const int row = pattern_.row_indices[at(k)];
+      const bool mirrored = symmetry_ == Symmetry::symmetric && column > row;
+      entries_.push_back(mirrored ? solver_->offset(column, row) : solver_->offset(row, column));
+    }
+}
+
+void Assembler::multiply_transposed(const VectorX& x, VectorX& out) const {
+  out.resize(pattern_.size);
+  const std::span<const double> values = std::as_const(*solver_).values();
+  for (int column = 0; column < pattern_.size; ++column) {
+    double sum = 0.0;
+    for (int k = pattern_.column_starts[at(column)]; k < pattern_.column_starts[at(column) + 1]; ++k)
+      sum += values[static_cast<std::size_t>(entries_[at(k)])] * x[pattern_.row_indices[at(k)]];
+    out[column] = sum;
+  }
 }
 
 void Assembler::find_edge_couplings() {
@@ -276,6 +308,27 @@ void Assembler::project_matrix() {
     for (int i = 0; i < n; ++i)
       for (int j = 0; j < n; ++j) values[static_cast<std::size_t>(block.own[i][j])] = own(i, j);
   }
+}
+
+double* Assembler::entry(int row, int column, std::span<double> values) const {
+  if (!pattern_.contains(row, column)) return nullptr;
+  const bool mirrored = symmetry_ == Symmetry::symmetric && column > row;
+  return &values[static_cast<std::size_t>(mirrored ? solver_->offset(column, row) : solver_->offset(row, column))];
+}
+
+void Assembler::turn_rows(int first, const Matrix3& by, std::span<double> values) const {
+  for (int k = pattern_.column_starts[at(first)]; k < pattern_.column_starts[at(first) + 1]; ++k) {
+    const int column = pattern_.row_indices[at(k)];
+    Vector3 rows;
+    for (int i = 0; i < 3; ++i) rows(i) = *entry(first + i, column, values);
+    rows = (by * rows).eval();
+    for (int i = 0; i < 3; ++i) *entry(first + i, column, values) = rows(i);
+  }
+}
+
+void Assembler::add_block(int first, const Matrix3& block, std::span<double> values) const {
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) *entry(first + i, first + j, values) += block(i, j);
 }
 
 double Assembler::greatest_diagonal() const {

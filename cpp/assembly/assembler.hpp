@@ -66,7 +66,8 @@ struct RegularStencils {
 /// The matrix of a model with its tables.
 class Assembler {
  public:
-  Assembler(const Model& model, const Loads& loads, Symmetry symmetry, SolverKind kind);
+  /// `exact`: the matrix has every derivative, those of edges that turn too.
+  Assembler(const Model& model, const Loads& loads, Symmetry symmetry, SolverKind kind, bool exact = false);
 
   const SparsityPattern& pattern() const { return pattern_; }
   LinearSolver& solver() { return *solver_; }
@@ -76,6 +77,15 @@ class Assembler {
   double diagonal(int dof) const {
     return solver_->values()[static_cast<std::size_t>(diagonal_[static_cast<std::size_t>(dof)])];
   }
+
+  /// The entry of row i and column j in the solver's values, or nothing.
+  double* entry(int row, int column, std::span<double> values) const;
+  /// Three rows, from `first` on, times a matrix; and a block on the diagonal added there. Unsymmetric matrices only.
+  void turn_rows(int first, const Matrix3& by, std::span<double> values) const;
+  void add_block(int first, const Matrix3& block, std::span<double> values) const;
+
+  /// out = A^T x with the solver's values; exact matrices only.
+  void multiply_transposed(const VectorX& x, VectorX& out) const;
 
   double greatest_diagonal() const;
   /// Its greatest entry over that of `weight`.
@@ -108,6 +118,7 @@ class Assembler {
   double greatest_held_change(const VectorX& from, const VectorX& to) const;
 
   ElementTable stretch, bend, half, contact;
+  ElementTable edges;  ///< tail, angle, head; in space, where the matrix is exact
   RegularStencils regular;
   std::vector<ElementTable> loads;
   /// Per edge and direction, where its nodes' own entries stand, and the one or (unsymmetric) two between them, or -1.
@@ -130,12 +141,14 @@ class Assembler {
   const Model& model_;
   Symmetry symmetry_;
   SolverKind kind_;
+  bool exact_;
   int generation_ = 0;
   std::vector<std::vector<int>> cliques_;  ///< without contact and custom forces
   std::vector<std::vector<int>> groups_;   ///< of custom forces
   SparsityPattern pattern_;
   std::unique_ptr<LinearSolver> solver_;
   std::vector<std::ptrdiff_t> diagonal_;
+  std::vector<std::ptrdiff_t> entries_;  ///< of the pattern, one after the other; exact matrices only
   std::vector<Block> blocks_;
 };
 

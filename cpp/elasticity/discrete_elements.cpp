@@ -112,14 +112,14 @@ DiscreteMoment<double> moment_between(const BendMeasure& measure, const EdgeFram
   return m;
 }
 
-void planar_bend_local(const Model& model, const ElasticCoefficients& elastic, const DiscreteStep& step, int stencil,
+void planar_bend_local(const Model& model, const TurnCoefficients& elastic, const DiscreteStep& step, int stencil,
                        bool with_matrix, Local& out) {
   const BendStencil& s = model.bend[at(stencil)];
   const PlanarMovingEdge<double> edge[2] = {planar_moving_edge(step, s.edge[0], s.sign[0]),
                                             planar_moving_edge(step, s.edge[1], s.sign[1])};
   const PlanarMoment<double> m = planar_moment(elastic.measure, edge[0].t0, edge[0].t1, edge[1].t0, edge[1].t1,
                                                step.start.bend_strain(stencil, 0), step.end.bend_strain(stencil, 0),
-                                               elastic.bend_natural(stencil, 0), elastic.bend_stiffness(stencil, 0));
+                                               elastic.natural.x, elastic.stiffness.x);
   PlanarForces<double> f;
   if (with_matrix)
     planar_discrete_forces<true>(m, edge, f);
@@ -128,7 +128,7 @@ void planar_bend_local(const Model& model, const ElasticCoefficients& elastic, c
   put_planar_bend(f, with_matrix, out);
 }
 
-void planar_half_local(const Model& model, const ElasticCoefficients& elastic, const DiscreteStep& step, int stencil,
+void planar_half_local(const Model& model, const TurnCoefficients& elastic, const DiscreteStep& step, int stencil,
                        bool with_matrix, Local& out) {
   const FrameStencil& s = model.half[at(stencil)];
   const int a = s.frame_first ? 0 : 1, b = 1 - a;  // slots of the frame and of the edge
@@ -139,7 +139,7 @@ void planar_half_local(const Model& model, const ElasticCoefficients& elastic, c
   t0[b] = edge.t0, t1[b] = edge.t1;
   const PlanarMoment<double> m = planar_moment(elastic.measure, t0[0], t1[0], t0[1], t1[1],
                                                step.start.half_strain(stencil, 0), step.end.half_strain(stencil, 0),
-                                               elastic.half_natural(stencil, 0), elastic.half_stiffness(stencil, 0));
+                                               elastic.natural.x, elastic.stiffness.x);
   const double sign = s.frame_first ? -1.0 : 1.0;  // of the moment on the edge
   const double by_turn[2] = {2.0 * sign * m.by_a, 2.0 * sign * m.by_b};
   const Vec2<double> column = edge.column(by_turn[b]);
@@ -169,7 +169,7 @@ Eigen::Matrix<double, 3, 11> moment_columns(const EdgeColumns<double>& by_edge, 
 
 }  // namespace
 
-void discrete_bend_local(const Model& model, const ElasticCoefficients& elastic, const DiscreteStep& step, int stencil,
+void discrete_bend_local(const Model& model, const TurnCoefficients& elastic, const DiscreteStep& step, int stencil,
                          bool with_matrix, Local& out) {
   if (model.planar()) return planar_bend_local(model, elastic, step, stencil, with_matrix, out);
   const BendStencil& s = model.bend[at(stencil)];
@@ -188,8 +188,7 @@ void discrete_bend_local(const Model& model, const ElasticCoefficients& elastic,
   }
   const DiscreteMoment<double> m =
       moment_between(elastic.measure, f0[0], f1[0], f0[1], f1[1], row_of(step.start.bend_strain, stencil),
-                     row_of(step.end.bend_strain, stencil), row_of(elastic.bend_natural, stencil),
-                     row_of(elastic.bend_stiffness, stencil), with_matrix);
+                     row_of(step.end.bend_strain, stencil), elastic.natural, elastic.stiffness, with_matrix);
   const Vec3d moment[2] = {m.moment, -m.moment};
   for (int i = 0; i < 2; ++i) add_edge_forces(out, place[i], edge[i], step.middle.edge[at(s.edge[i])], moment[i]);
   if (!with_matrix) return;
@@ -204,7 +203,7 @@ void discrete_bend_local(const Model& model, const ElasticCoefficients& elastic,
 }
 
 /// The work of the frame's moment is that over its Cayley vector.
-void discrete_half_local(const Model& model, const ElasticCoefficients& elastic, const DiscreteStep& step, int stencil,
+void discrete_half_local(const Model& model, const TurnCoefficients& elastic, const DiscreteStep& step, int stencil,
                          bool with_matrix, Local& out) {
   if (model.planar()) return planar_half_local(model, elastic, step, stencil, with_matrix, out);
   const FrameStencil& s = model.half[at(stencil)];
@@ -216,8 +215,7 @@ void discrete_half_local(const Model& model, const ElasticCoefficients& elastic,
   const bool first = s.frame_first;
   const DiscreteMoment<double> m =
       moment_between(elastic.measure, first ? f0 : e0, first ? f1 : e1, first ? e0 : f0, first ? e1 : f1,
-                     row_of(step.start.half_strain, stencil), row_of(step.end.half_strain, stencil),
-                     row_of(elastic.half_natural, stencil), row_of(elastic.half_stiffness, stencil), with_matrix);
+                     row_of(step.start.half_strain, stencil), row_of(step.end.half_strain, stencil), elastic.natural, elastic.stiffness, with_matrix);
   const double sign = first ? -1.0 : 1.0;  // of the moment on the edge
   const EdgePlace place{0, 4, 3};
   const Vec3d moment = sign * m.moment;

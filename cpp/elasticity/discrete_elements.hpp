@@ -32,9 +32,9 @@ inline MeanStretch mean_stretch(const Model& model, const ElasticCoefficients& e
 /// `given_force`: axial, per edge, in place of that of the mean strain in the matrix, see add_stretch_hessian; or null.
 void discrete_stretch_local(const Model& model, const ElasticCoefficients& elastic, const DiscreteStep& step, int edge,
                             bool with_matrix, const double* given_force, Local& out);
-void discrete_bend_local(const Model& model, const ElasticCoefficients& elastic, const DiscreteStep& step, int stencil,
+void discrete_bend_local(const Model& model, const TurnCoefficients& elastic, const DiscreteStep& step, int stencil,
                          bool with_matrix, Local& out);
-void discrete_half_local(const Model& model, const ElasticCoefficients& elastic, const DiscreteStep& step, int stencil,
+void discrete_half_local(const Model& model, const TurnCoefficients& elastic, const DiscreteStep& step, int stencil,
                          bool with_matrix, Local& out);
 
 }  // namespace withe

@@ -1,5 +1,7 @@
 #include "elasticity/elements.hpp"
 
+#include <algorithm>
+
 #include "elasticity/bend_twist.hpp"
 #include "elasticity/put_local.hpp"
 #include "geometry/rotation.hpp"
@@ -8,7 +10,10 @@ namespace withe {
 namespace {
 
 BendTwistStrain<double> strain_row(const Columns3& m, Eigen::Index i) { return {m(i, 0), m(i, 1), m(i, 2)}; }
-BendTwistStiffness<double> stiffness_row(const Columns3& m, Eigen::Index i) { return {m(i, 0), m(i, 1), m(i, 2)}; }
+BendTwistStrain<double> natural_of(const TurnCoefficients& k) { return {k.natural.x, k.natural.y, k.natural.z}; }
+BendTwistStiffness<double> stiffness_of(const TurnCoefficients& k) {
+  return {k.stiffness.x, k.stiffness.y, k.stiffness.z};
+}
 
 /// Rows (kappa1, kappa2, tau) become strains; in a plane the other columns are zero.
 void measure_rows(const BendMeasure& measure, Columns3& rows) {
@@ -49,10 +54,9 @@ Matrix3 dense(const Mat3<double>& a) {
   return m;
 }
 
-void bend_planar_local(const ElasticCoefficients& k, const Configuration& c, const BendStencil& s, Eigen::Index i,
+void bend_planar_local(const TurnCoefficients& k, const Configuration& c, const BendStencil& s, Eigen::Index i,
                        bool with_hessian, Local& out) {
-  const PlanarBend<double> p =
-      planar_bend(k.measure, c.bend_strain(i, 0), k.bend_natural(i, 0), k.bend_stiffness(i, 0));
+  const PlanarBend<double> p = planar_bend(k.measure, c.bend_strain(i, 0), k.natural.x, k.stiffness.x);
   const PlanarEdge<double> edge[2] = {planar_edge(c.edge[static_cast<std::size_t>(s.edge[0])], s.sign[0]),
                                       planar_edge(c.edge[static_cast<std::size_t>(s.edge[1])], s.sign[1])};
   PlanarForces<double> f;
@@ -62,10 +66,9 @@ void bend_planar_local(const ElasticCoefficients& k, const Configuration& c, con
 }
 
 /// The attached end is an edge of unit length, whose angle is the frame's.
-void half_planar_local(const ElasticCoefficients& k, const Configuration& c, const FrameStencil& s, Eigen::Index i,
+void half_planar_local(const TurnCoefficients& k, const Configuration& c, const FrameStencil& s, Eigen::Index i,
                        bool with_hessian, Local& out) {
-  const PlanarBend<double> p =
-      planar_bend(k.measure, c.half_strain(i, 0), k.half_natural(i, 0), k.half_stiffness(i, 0));
+  const PlanarBend<double> p = planar_bend(k.measure, c.half_strain(i, 0), k.natural.x, k.stiffness.x);
   const int a = s.frame_first ? 0 : 1, b = 1 - a;  // slots of the frame and of the edge
   PlanarEdge<double> edge[2];
   edge[a] = planar_edge(c.attached[static_cast<std::size_t>(i)]);
@@ -98,6 +101,21 @@ SpinHessian spin_hessian(const BendTwistDerivatives<double>& d, int a, const Vec
   S += Xh * T.transpose() + T * Xh.transpose() + 0.5 * (ge * T.transpose() + T * ge.transpose());
   S.diagonal().array() -= ge.dot(T);
   return {S, X * Hab + T * hba.transpose(), X * hab + d.angle_angle[0][1] * T};
+}
+
+/// The energy k (s - s0)^2 / 2 of unit stiffness and of a natural strain of s - 1 has the gradient of the strain s.
+template <class Evaluate>
+void set_gradients(const BendMeasure& measure, const Vector3& strain, int width, const Evaluate& evaluate,
+                   StrainGradients& out) {
+  Local local;
+  for (int s = 0; s < out.count; ++s) {
+    out.strain[s] = strain(s);
+    TurnCoefficients unit{measure, {}, {}};
+    (s == 0 ? unit.stiffness.x : s == 1 ? unit.stiffness.y : unit.stiffness.z) = 1.0;
+    (s == 0 ? unit.natural.x : s == 1 ? unit.natural.y : unit.natural.z) = strain(s) - 1.0;
+    evaluate(unit, local);
+    std::copy_n(local.gradient, width, out.gradient[s]);
+  }
 }
 
 }  // namespace
@@ -175,7 +193,7 @@ void stretch_local(const Model& model, const ElasticCoefficients& k, const Confi
               (given_force ? given_force[edge] : force) * f.inverse_length, with_hessian, out);
 }
 
-void bend_local(const Model& model, const ElasticCoefficients& k, const Configuration& c, int stencil,
+void bend_local(const Model& model, const TurnCoefficients& k, const Configuration& c, int stencil,
                 bool with_hessian, Local& out) {
   const BendStencil& s = model.bend[static_cast<std::size_t>(stencil)];
   const auto i = static_cast<Eigen::Index>(stencil);
@@ -183,8 +201,7 @@ void bend_local(const Model& model, const ElasticCoefficients& k, const Configur
   const EdgeFrame<double> f0 = oriented(c.edge[static_cast<std::size_t>(s.edge[0])], s.sign[0]);
   const EdgeFrame<double> f1 = oriented(c.edge[static_cast<std::size_t>(s.edge[1])], s.sign[1]);
   BendTwistDerivatives<double> d =
-      bend_twist(k.measure, f0, f1, strain_row(c.bend_strain, i), strain_row(k.bend_natural, i),
-                 stiffness_row(k.bend_stiffness, i), with_hessian);
+      bend_twist(k.measure, f0, f1, strain_row(c.bend_strain, i), natural_of(k), stiffness_of(k), with_hessian);
   out.energy = d.energy;
   // Edges against their rod: their angles count the other way.
   for (int j = 0; j < 2; ++j) {
@@ -201,7 +218,7 @@ void bend_local(const Model& model, const ElasticCoefficients& k, const Configur
   if (with_hessian) put_bend_twist_matrix(d, out.hessian);
 }
 
-void half_local(const Model& model, const VectorX& q, const ElasticCoefficients& k, const Configuration& c, int stencil,
+void half_local(const Model& model, const VectorX& q, const TurnCoefficients& k, const Configuration& c, int stencil,
                 bool with_hessian, Local& out) {
   const FrameStencil& s = model.half[static_cast<std::size_t>(stencil)];
   const auto i = static_cast<Eigen::Index>(stencil);
@@ -211,8 +228,7 @@ void half_local(const Model& model, const VectorX& q, const ElasticCoefficients&
   const EdgeFrame<double>&f0 = s.frame_first ? end : edge, &f1 = s.frame_first ? edge : end;
   const int a = s.frame_first ? 0 : 1, b = 1 - a;  // slots of the frame and of the edge
   const BendTwistDerivatives<double> d =
-      bend_twist(k.measure, f0, f1, strain_row(c.half_strain, i), strain_row(k.half_natural, i),
-                 stiffness_row(k.half_stiffness, i), with_hessian);
+      bend_twist(k.measure, f0, f1, strain_row(c.half_strain, i), natural_of(k), stiffness_of(k), with_hessian);
   out.energy = d.energy;
   put(out, 0, -d.gradient_e[b]);
   out.gradient[3] = d.gradient_angle[b];
@@ -261,6 +277,33 @@ void half_local(const Model& model, const VectorX& q, const ElasticCoefficients&
   }
   out.hessian[3][10] = out.hessian[10][3] = Sangle.dot(axis);
   out.hessian[10][10] = axis.dot(S * axis);
+}
+
+void stretch_gradients(const Model& model, const Configuration& c, int edge, StrainGradients& out) {
+  const Vec3d& t = c.edge[static_cast<std::size_t>(edge)].tangent;
+  const double inverse = 1.0 / model.edge_length(edge);
+  out.count = 1;
+  out.strain[0] = c.length(edge) * inverse - 1.0;
+  for (int i = 0; i < model.dimension; ++i) {
+    out.gradient[0][i] = -inverse * t[i];
+    out.gradient[0][model.dimension + i] = inverse * t[i];
+  }
+}
+
+void bend_gradients(const Model& model, const BendMeasure& measure, const Configuration& c, int stencil,
+                    StrainGradients& out) {
+  out.count = model.planar() ? 1 : 3;
+  set_gradients(
+      measure, measured(measure, c.bend_strain.row(stencil)), model.planar() ? 6 : 11,
+      [&](const TurnCoefficients& k, Local& local) { bend_local(model, k, c, stencil, false, local); }, out);
+}
+
+void half_gradients(const Model& model, const VectorX& q, const BendMeasure& measure, const Configuration& c,
+                    int stencil, StrainGradients& out) {
+  out.count = model.planar() ? 1 : 3;
+  set_gradients(
+      measure, measured(measure, c.half_strain.row(stencil)), model.planar() ? 5 : 11,
+      [&](const TurnCoefficients& k, Local& local) { half_local(model, q, k, c, stencil, false, local); }, out);
 }
 
 }  // namespace withe

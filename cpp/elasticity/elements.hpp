@@ -27,6 +27,22 @@ struct ElasticCoefficients {
   Columns3 half_stiffness, half_natural;
 };
 
+/// Those of bending and twisting of one stencil.
+struct TurnCoefficients {
+  BendMeasure measure;
+  Vec3d stiffness, natural;
+};
+inline TurnCoefficients bend_coefficients(const ElasticCoefficients& k, int i) {
+  return {k.measure,
+          {k.bend_stiffness(i, 0), k.bend_stiffness(i, 1), k.bend_stiffness(i, 2)},
+          {k.bend_natural(i, 0), k.bend_natural(i, 1), k.bend_natural(i, 2)}};
+}
+inline TurnCoefficients half_coefficients(const ElasticCoefficients& k, int i) {
+  return {k.measure,
+          {k.half_stiffness(i, 0), k.half_stiffness(i, 1), k.half_stiffness(i, 2)},
+          {k.half_natural(i, 0), k.half_natural(i, 1), k.half_natural(i, 2)}};
+}
+
 /// Elasticity alone.
 void set_elastic(const Parameters& parameters, ElasticCoefficients& out);
 /// Kelvin-Voigt viscosity alone over an interval h: the potential (eta / E) k (s - s0)^2 / (2 h) of the
@@ -43,10 +59,23 @@ void add_coefficients(const ElasticCoefficients& other, ElasticCoefficients& sum
 
 void stretch_local(const Model& model, const ElasticCoefficients& coefficients, const Configuration& c, int edge,
                    bool with_hessian, const double* axial_force, Local& out);
-void bend_local(const Model& model, const ElasticCoefficients& coefficients, const Configuration& c, int stencil,
+void bend_local(const Model& model, const TurnCoefficients& coefficients, const Configuration& c, int stencil,
                 bool with_hessian, Local& out);
-void half_local(const Model& model, const VectorX& q, const ElasticCoefficients& coefficients, const Configuration& c,
+void half_local(const Model& model, const VectorX& q, const TurnCoefficients& coefficients, const Configuration& c,
                 int stencil, bool with_hessian, Local& out);
+
+/// The strains of one stencil, f (kappa1, kappa2, tau) (in a plane the first alone), or the axial strain of an edge; and
+/// their gradients, a row each.
+struct StrainGradients {
+  int count;
+  double strain[3];
+  double gradient[3][kMaxLocal];
+};
+void stretch_gradients(const Model& model, const Configuration& c, int edge, StrainGradients& out);
+void bend_gradients(const Model& model, const BendMeasure& measure, const Configuration& c, int stencil,
+                    StrainGradients& out);
+void half_gradients(const Model& model, const VectorX& q, const BendMeasure& measure, const Configuration& c,
+                    int stencil, StrainGradients& out);
 
 /// Energies alone: stretch of an edge; bend and twist of a stencil [J].
 double stretch_energy_of(const Model& model, const ElasticCoefficients& coefficients, const Configuration& c, int edge);

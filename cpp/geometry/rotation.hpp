@@ -49,6 +49,12 @@ inline Matrix3 cayley_spin(const Vector3& w) {
   return (Matrix3::Identity() + 0.5 * cross_matrix(w)) / (1.0 + 0.25 * w.squaredNorm());
 }
 
+/// Derivative of cayley_spin(w)^T m by w.
+inline Matrix3 cayley_moment_slope(const Vector3& w, const Vector3& m) {
+  const double c = 1.0 / (1.0 + 0.25 * w.squaredNorm());
+  return 0.5 * c * cross_matrix(m) - (0.5 * c * c) * (m - 0.5 * w.cross(m)) * w.transpose();
+}
+
 /// Removes the rounding that products of rotations collect.
 inline Matrix3 orthonormalized(const Matrix3& rotation) {
   return Eigen::Quaterniond(rotation).normalized().toRotationMatrix();

@@ -49,6 +49,15 @@ void multiply(const Model& model, const MassMatrix& mass, const VectorX& x, Vect
   }
 }
 
+void add_mass_adjoint(const Model& model, const VectorX& x, const VectorX& rows, VectorX& by_rows,
+                      VectorX& by_coupling) {
+  by_rows += rows.cwiseProduct(x);
+  for (int e = 0; e < model.edge_count; ++e) {
+    const int a = model.tail_dof[at(e)], b = model.head_dof[at(e)];
+    for (int i = 0; i < model.dimension; ++i) by_coupling[e] -= (rows[b + i] - rows[a + i]) * (x[b + i] - x[a + i]);
+  }
+}
+
 double kinetic_energy(const Model& model, const MassMatrix& mass, const VectorX& v) {
   double twice = mass.rows.dot(v.cwiseAbs2());
   for (int e = 0; e < model.edge_count; ++e) {

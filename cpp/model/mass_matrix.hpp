@@ -34,6 +34,9 @@ void set_mass(const Model& model, const Parameters& parameters, MassMatrix& mass
 void set_drag(const Model& model, const Parameters& parameters, MassMatrix& drag);
 /// out = M x.
 void multiply(const Model& model, const MassMatrix& mass, const VectorX& x, VectorX& out);
+/// Adds the derivatives of rows . M x by the numbers of M.
+void add_mass_adjoint(const Model& model, const VectorX& x, const VectorX& rows, VectorX& by_rows,
+                      VectorX& by_coupling);
 /// v . M v / 2 [J].
 double kinetic_energy(const Model& model, const MassMatrix& mass, const VectorX& v);
 

@@ -175,6 +175,15 @@ std::optional<Plane> find_plane(const SceneDescription& description, std::option
 /// Square of the angle by which an arc of `arc` over a chord of `chord` turns [rad^2], to its fourth power.
 inline double square_of_turn(double chord, double arc) { return 24.0 * (arc / chord - 1.0); }
 
+/// The arc that the edges of a stencil are chords of, as its drawn natural curvature has it.
+struct ArcOfStencil {
+  bool turns = false;
+  double square_of_turn = 0;        ///< [rad^2]
+  Vector2 share = Vector2::Zero();  ///< of the curvature's square towards either director
+};
+ArcOfStencil arc_of_bend(const Model& model, Eigen::Index stencil);
+ArcOfStencil arc_of_half(const Model& model, Eigen::Index stencil);
+
 /// Discrete curvature 2 tan(|kappa| V / 2) along kappa. Needs |kappa| V < pi.
 Vector2 discrete_curvature(const Vector2& smooth, double voronoi);
 /// Its inverse.

@@ -4,18 +4,48 @@
 
 #include "common/check.hpp"
 #include "model/model.hpp"
+#include "model/stencil_numbers.hpp"
 
 namespace withe {
 
-Vector2 discrete_curvature(const Vector2& smooth, double voronoi) {
-  const double k = smooth.norm();
-  if (k == 0.0) return Vector2::Zero();
-  const double phi = k * voronoi;
+namespace {
+
+void require_turn(const Vector2& smooth, double voronoi) {
+  const double phi = smooth.norm() * voronoi;
   // The message is made when it is needed: actuation comes here in every step.
   if (!(phi < std::numbers::pi))
     require(false, "natural curvature turns an edge by " + std::to_string(phi) +
                        " rad; it must stay below pi: use more nodes");
-  return (2.0 * std::tan(0.5 * phi) / k) * smooth;
+}
+
+ArcOfStencil arc_of(const Model& model, std::pair<int, int> owner, double square) {
+  if (!(square > 0.0) || owner.first < 0 || owner.second < 0) return {};
+  const Vector2 k = model.description.rods[static_cast<std::size_t>(owner.first)].natural_curvature.row(owner.second);
+  if (k.squaredNorm() == 0.0) return {};
+  return {true, square, k.cwiseAbs2() / k.squaredNorm()};
+}
+
+double square_of_turn_of(const Model& model, int edge) {
+  return square_of_turn(model.edge_length(edge), model.edge_arc(edge));
+}
+
+}  // namespace
+
+ArcOfStencil arc_of_bend(const Model& model, Eigen::Index stencil) {
+  const auto i = static_cast<std::size_t>(stencil);
+  const int* edge = model.bend[i].edge;
+  return arc_of(model, model.bend_owner[i],
+                0.5 * (square_of_turn_of(model, edge[0]) + square_of_turn_of(model, edge[1])));
+}
+
+ArcOfStencil arc_of_half(const Model& model, Eigen::Index stencil) {
+  const auto i = static_cast<std::size_t>(stencil);
+  return arc_of(model, model.half_owner[i], 0.25 * square_of_turn_of(model, model.half[i].edge));
+}
+
+Vector2 discrete_curvature(const Vector2& smooth, double voronoi) {
+  require_turn(smooth, voronoi);
+  return discrete_over_smooth(smooth(0), smooth(1), voronoi) * smooth;
 }
 
 Vector2 smooth_curvature(const Vector2& discrete, double voronoi) {
@@ -66,11 +96,10 @@ void update_natural(const Model& model, Parameters& p) {
     if (rod < 0 || stencil < 0) return Vector3::Zero();
     const auto r = static_cast<std::size_t>(rod);
     const Vector2 k = p.natural_curvature[r].row(stencil);
-    Vector3 drawn;
-    drawn << discrete_curvature(k, voronoi), p.natural_twist[r](stencil) * voronoi;
-    Vector3 out = measured(p.measure, drawn);
-    if (planar) return {model.planar_components[r].dot(out.head<2>()), 0.0, 0.0};
-    return out;
+    require_turn(k, voronoi);
+    const Vec3d out = natural_strain(p.measure, k(0), k(1), p.natural_twist[r](stencil), voronoi);
+    if (planar) return {model.planar_components[r].dot(Vector2(out.x, out.y)), 0.0, 0.0};
+    return {out.x, out.y, out.z};
   };
   p.bend_natural = model.bend_offset;
   for (std::size_t r = 0; r < model.place.size(); ++r)
@@ -121,20 +150,10 @@ void update_derived(const Model& model, Parameters& p) {
     const Vector2 b = p.edge_bend.row(e);
     return Vector2(c(0) * c(0) * b(0) + c(1) * c(1) * b(1), 0.0);
   };
-  // Two parts of edges in series: V / K = V0 / K0 + V1 / K1.
-  const auto series = [](double k0, double v0, double k1, double v1) {
-    return k0 == 0.0 && k1 == 0.0 ? 0.0 : 1.0 / (v0 / k0 + v1 / k1);
+  const auto twist_stiffness = [&](double twist, const Vector2& bend, const ArcOfStencil& arc) {
+    if (!arc.turns || twist == 0.0 || bend.minCoeff() <= 0.0) return twist;
+    return twist_of_arc(twist, bend(0), bend(1), arc.square_of_turn, arc.share);
   };
-  // A moment along the middle of an arc that turns by phi bends its ends, to either side: 1 / Kt + phi^2 / (12 K), K
-  // against bending about the arc's normal.
-  const auto twist_of_arc = [&](double twist, const Vector2& bend, std::pair<int, int> owner, double square) {
-    if (!(square > 0.0) || owner.first < 0 || owner.second < 0 || twist == 0.0 || bend.minCoeff() <= 0.0) return twist;
-    const Vector2 k = model.description.rods[static_cast<std::size_t>(owner.first)].natural_curvature.row(owner.second);
-    if (k.squaredNorm() == 0.0) return twist;
-    const Vector2 share = k.cwiseAbs2() / k.squaredNorm();
-    return 1.0 / (1.0 / twist + square / 12.0 * (share(0) / bend(1) + share(1) / bend(0)));
-  };
-  const auto turn = [&](int e) { return square_of_turn(model.edge_length(e), model.edge_arc(e)); };
   const auto n = static_cast<Eigen::Index>(model.bend.size());
   p.bend_stiffness.resize(n, 3);
   p.bend_viscous_time.resize(n);
@@ -144,10 +163,9 @@ void update_derived(const Model& model, Parameters& p) {
     const double la = model.edge_arc(a), lb = model.edge_arc(b);
     const Vector2 ba = bend_of(a), bb = bend_of(b);
     const double va = model.bend_share(i, 0) * la, vb = model.bend_share(i, 1) * lb;
-    const Vector2 bending(series(ba(0), va, bb(0), vb), series(ba(1), va, bb(1), vb));
-    const double twist = series(p.edge_twist(a), 0.5 * la, p.edge_twist(b), 0.5 * lb);
-    const auto& owner = model.bend_owner[static_cast<std::size_t>(i)];
-    p.bend_stiffness.row(i) << bending.transpose(), twist_of_arc(twist, bending, owner, 0.5 * (turn(a) + turn(b)));
+    const Vector2 bending(in_series(ba(0), va, bb(0), vb), in_series(ba(1), va, bb(1), vb));
+    const double twist = in_series(p.edge_twist(a), 0.5 * la, p.edge_twist(b), 0.5 * lb);
+    p.bend_stiffness.row(i) << bending.transpose(), twist_stiffness(twist, bending, arc_of_bend(model, i));
     p.bend_viscous_time(i) = (la * p.edge_viscous_time(a) + lb * p.edge_viscous_time(b)) / (la + lb);
   }
   const auto m = static_cast<Eigen::Index>(model.half.size());
@@ -159,8 +177,7 @@ void update_derived(const Model& model, Parameters& p) {
     const FrameStencil& s = model.half[static_cast<std::size_t>(i)];
     const Vector2 bending = bend_of(s.edge) / (model.half_share(i) * model.edge_arc(s.edge));
     const double twist = p.edge_twist(s.edge) / model.half_voronoi(i);
-    const auto& owner = model.half_owner[static_cast<std::size_t>(i)];
-    p.half_stiffness.row(i) << bending.transpose(), twist_of_arc(twist, bending, owner, 0.25 * turn(s.edge));
+    p.half_stiffness.row(i) << bending.transpose(), twist_stiffness(twist, bending, arc_of_half(model, i));
     p.half_viscous_time(i) = p.edge_viscous_time(s.edge);
     // A frame carries the rotary inertia of the half edges attached to it.
     (s.hinge < 0 ? p.frame_inertia(s.frame) : p.hinge_inertia(s.hinge)) += 0.5 * p.edge_inertia(s.edge);

@@ -22,6 +22,10 @@ void Gravity::add(const StepProblem& problem, StepData& data, const Assembler&, 
   data.potential -= problem.gravity.dot(data.z);
 }
 
+void Gravity::add_adjoint(const StepProblem&, const StepData&, const Assembler&, StepAdjoint& adjoint) const {
+  adjoint.coefficients.gravity -= adjoint.rows;
+}
+
 void Drag::add(const StepProblem& problem, StepData& data, const Assembler& assembler, std::span<double> values) const {
   if (!problem.parameters->dragged || !problem.moves()) return;
   const int n = problem.model.dof_count;
@@ -31,6 +35,17 @@ void Drag::add(const StepProblem& problem, StepData& data, const Assembler& asse
   data.gradient.head(n) += data.drag_force;
   data.row_magnitude.head(n) += data.drag_force.cwiseAbs();
   if (!values.empty()) add_mass_matrix(problem, problem.drag, inverse, assembler, values);
+}
+
+void Drag::add_adjoint(const StepProblem& problem, const StepData& data, const Assembler&, StepAdjoint& adjoint) const {
+  if (!problem.moves()) return;
+  const double inverse = 1.0 / problem.interval;
+  const VectorX velocity = inverse * (data.z - problem.start->q);
+  add_mass_adjoint(problem.model, velocity, adjoint.rows, adjoint.coefficients.drag,
+                   adjoint.coefficients.drag_coupling);
+  VectorX force;
+  multiply(problem.model, problem.drag, adjoint.rows, force);
+  adjoint.start -= inverse * force;
 }
 
 double Drag::dissipated(const StepProblem& problem, const StepData& data, const Assembler&,

@@ -1,6 +1,7 @@
 #include "steps/contact_forces.hpp"
 
 #include <cmath>
+#include <stdexcept>
 
 namespace withe {
 
@@ -45,6 +46,15 @@ void ContactForces::add(const StepProblem& problem, StepData& data, const Assemb
   }
   data.gradient.head(n) += data.contact_gradient;
   if (!contact_.frictional() && !problem.in_middle()) data.potential += contact_.energy();
+}
+
+/// Without friction contact is a function of q1 alone, but under the midpoint rules.
+void ContactForces::add_adjoint(const StepProblem& problem, const StepData&, const Assembler&, StepAdjoint&) const {
+  if (contact_.count() == 0) return;
+  if (contact_.frictional()) throw std::invalid_argument("no gradient is known through friction yet: take friction=0");
+  if (problem.in_middle())
+    throw std::invalid_argument(
+        "no gradient is known through contact under the midpoint rules yet: take integrator='backward_euler'");
 }
 
 double ContactForces::allowed(const StepProblem& problem, const VectorX& z, const VectorX& step) {

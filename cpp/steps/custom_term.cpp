@@ -1,6 +1,7 @@
 #include "steps/custom_term.hpp"
 
 #include <algorithm>
+#include <stdexcept>
 
 namespace withe {
 AppliedForces applied_forces(const Model& model, const MatrixX3& forces, const MatrixX3& moments) {
@@ -117,6 +118,10 @@ void CustomTerm::add_matrix(const StepProblem& problem, const StepData& data, co
         if (table.dofs(0)[i] >= 0) add_row(table.dofs(0)[i], column, value * local.gradient[i]);
     }
   });
+}
+
+void CustomTerm::add_adjoint(const StepProblem&, const StepData&, const Assembler&, StepAdjoint&) const {
+  throw std::invalid_argument("no gradient is known through custom forces");
 }
 
 }  // namespace withe

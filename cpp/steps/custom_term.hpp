@@ -18,6 +18,8 @@ class CustomTerm final : public Term {
   void find(const StepProblem& problem, StepData& data, Assembler& assembler, bool with_matrix) override;
   void add(const StepProblem& problem, StepData& data, const Assembler& assembler,
            std::span<double> values) const override;
+  void add_adjoint(const StepProblem& problem, const StepData& data, const Assembler& assembler,
+                   StepAdjoint& adjoint) const override;
   void add_applied(const StepProblem& problem, const StepData& data, const Assembler& assembler,
                    VectorX& force) const override;
 

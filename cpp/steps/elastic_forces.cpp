@@ -3,6 +3,7 @@
 #include "elasticity/discrete_elements.hpp"
 #include "elasticity/stencil_kernels.hpp"
 #include "elasticity/stretch.hpp"
+#include "geometry/rotation.hpp"
 #include "steps/inertia.hpp"
 
 namespace withe {
@@ -77,6 +78,8 @@ void ElasticForces::add(const StepProblem& problem, StepData& data, const Assemb
     add_discrete_gradient(problem, data, assembler, values);
   else
     add_elastic(problem, acting_coefficients(problem, data), data, assembler, values, data.axial_force);
+  if (problem.exact && !values.empty() && problem.viscous_acts() && problem.in_middle())
+    add_rate_slopes(problem, data, assembler, values);
 }
 
 /// Axial forces of all edges and their energy.
@@ -113,12 +116,12 @@ void ElasticForces::add_others(const StepProblem& problem, const ElasticCoeffici
     add_element(assembler.stretch, e, local, data, values);
   }
   for (int b : assembler.regular.other_bend) {
-    bend_local(model, k, data.configuration, b, with_matrix, local);
+    bend_local(model, bend_coefficients(k, b), data.configuration, b, with_matrix, local);
     data.potential += local.energy;
     add_element(assembler.bend, b, local, data, values);
   }
   for (int h = 0; h < static_cast<int>(model.half.size()); ++h) {
-    half_local(model, data.z, k, data.configuration, h, with_matrix, local);
+    half_local(model, data.z, half_coefficients(k, h), data.configuration, h, with_matrix, local);
     data.potential += local.energy;
     add_element(assembler.half, h, local, data, values);
   }
@@ -151,11 +154,11 @@ double ElasticForces::dissipated(const StepProblem& problem, const StepData& dat
     work += work_of(assembler.stretch, e, local, change);
   }
   for (int b = 0; b < static_cast<int>(model.bend.size()); ++b) {
-    bend_local(model, viscous, data.configuration, b, false, local);
+    bend_local(model, bend_coefficients(viscous, b), data.configuration, b, false, local);
     work += work_of(assembler.bend, b, local, change);
   }
   for (int h = 0; h < static_cast<int>(model.half.size()); ++h) {
-    half_local(model, data.z, viscous, data.configuration, h, false, local);
+    half_local(model, data.z, half_coefficients(viscous, h), data.configuration, h, false, local);
     work += work_of(assembler.half, h, local, change);
   }
   return work;
@@ -199,15 +202,58 @@ void ElasticForces::add_discrete_gradient(const StepProblem& problem, StepData& 
     add_element(assembler.stretch, e, local, data, values);
   }
   for (int b : assembler.regular.other_bend) {
-    discrete_bend_local(model, problem.elastic, step, b, with_matrix, local);
+    discrete_bend_local(model, bend_coefficients(problem.elastic, b), step, b, with_matrix, local);
     add_element(assembler.bend, b, local, data, values);
   }
   for (int h = 0; h < static_cast<int>(model.half.size()); ++h) {
-    discrete_half_local(model, problem.elastic, step, h, with_matrix, local);
+    discrete_half_local(model, half_coefficients(problem.elastic, h), step, h, with_matrix, local);
+    if (problem.exact && with_matrix && !model.planar()) {
+      // Inertia turns the rows of frames, from derivatives by a Cayley vector to moments; these are moments already.
+      Eigen::Map<Eigen::Matrix<double, 3, kMaxLocal, Eigen::RowMajor>> rows(&local.hessian[7][0]);
+      const int frame = model.frame_dof[at(model.half[at(h)].frame)];
+      rows = (cayley_spin(data.z.segment<3>(frame)).transpose() * rows).eval();
+    }
     add_element(assembler.half, h, local, data, values);
   }
   data.elastic_rows = data.gradient.head(model.dof_count);
   if (problem.viscous_acts()) add_elastic(problem, data.viscous, data, assembler, values, nullptr);
+}
+
+/// Under the midpoint rules the rate of a strain s is that between the ends, (s1 - s0) / dt, where the matrix has that
+/// of the middle: k g g^T for k g g1^T, g and g1 the gradients of s in the middle and at the end.
+void ElasticForces::add_rate_slopes(const StepProblem& problem, const StepData& data, const Assembler& assembler,
+                                    std::span<double> values) const {
+  const Model& model = problem.model;
+  const ElasticCoefficients& k = problem.viscous;
+  StrainGradients middle, end;
+  double hessian[kMaxLocal][kMaxLocal];
+  const auto add = [&](const ElementTable& table, int element, const double* stiffness, Eigen::Index stride) {
+    const int width = table.width();
+    for (int i = 0; i < width; ++i)
+      for (int j = 0; j < width; ++j) {
+        hessian[i][j] = 0.0;
+        for (int s = 0; s < middle.count; ++s)
+          hessian[i][j] +=
+              stiffness[s * stride] * middle.gradient[s][i] * (end.gradient[s][j] - middle.gradient[s][j]);
+      }
+    table.add_hessian(element, hessian, 1.0, values);
+  };
+  for (int e = 0; e < model.edge_count; ++e) {
+    stretch_gradients(model, data.configuration, e, middle);
+    stretch_gradients(model, data.end_configuration, e, end);
+    const double stiffness = k.stretch_stiffness[e] * model.edge_length[e];
+    add(assembler.stretch, e, &stiffness, 1);
+  }
+  for (int b = 0; b < static_cast<int>(model.bend.size()); ++b) {
+    bend_gradients(model, k.measure, data.configuration, b, middle);
+    bend_gradients(model, k.measure, data.end_configuration, b, end);
+    add(assembler.bend, b, &k.bend_stiffness(b, 0), k.bend_stiffness.rows());
+  }
+  for (int h = 0; h < static_cast<int>(model.half.size()); ++h) {
+    half_gradients(model, data.z, k.measure, data.configuration, h, middle);
+    half_gradients(model, data.end, k.measure, data.end_configuration, h, end);
+    add(assembler.half, h, &k.half_stiffness(h, 0), k.half_stiffness.rows());
+  }
 }
 
 void predict_axial_force(const StepProblem& problem, const StepData& data, const VectorX& step, VectorX& out) {

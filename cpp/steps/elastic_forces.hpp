@@ -13,6 +13,8 @@ class ElasticForces final : public Term {
   void find(const StepProblem& problem, StepData& data, Assembler& assembler, bool with_matrix) override;
   void add(const StepProblem& problem, StepData& data, const Assembler& assembler,
            std::span<double> values) const override;
+  void add_adjoint(const StepProblem& problem, const StepData& data, const Assembler& assembler,
+                   StepAdjoint& adjoint) const override;
   double dissipated(const StepProblem& problem, const StepData& data, const Assembler& assembler,
                     const VectorX& change) const override;
 
@@ -28,6 +30,9 @@ class ElasticForces final : public Term {
                   std::span<double> values, const double* axial_force) const;
   void add_discrete_gradient(const StepProblem& problem, StepData& data, const Assembler& assembler,
                              std::span<double> values) const;
+
+  void add_rate_slopes(const StepProblem& problem, const StepData& data, const Assembler& assembler,
+                       std::span<double> values) const;
 
   VectorX inverse_rest_;  ///< per edge: 1 / L [1 / m]
 };

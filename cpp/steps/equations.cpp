@@ -46,10 +46,11 @@ void add_axial_bounds(const Model& model, StepData& data) {
 Equations::Equations(const Model& model, const EquationOptions& options)
     : problem_(problem_of(model)),
       terms_(make_terms(model, problem_.loads, options.rule)),
-      asymmetries_(asymmetries_of(model, problem_.loads, terms_, options.rule)),
+      asymmetries_(asymmetries_of(model, problem_.loads, terms_, options.rule, options.exact)),
       assembler_(model, problem_.loads, asymmetries_.empty() ? Symmetry::symmetric : Symmetry::unsymmetric,
-                 options.solver),
+                 options.solver, options.exact),
       static_duration_(options.static_duration) {
+  problem_.exact = options.exact;
   if (contact()) {
     assembler_.couple(terms_.contact->rows().unknowns(), kContactUnknowns);
     ordered_ = terms_.contact->rows().keys();
@@ -128,7 +129,7 @@ void Equations::evaluate(const VectorX& z, bool with_matrix, const double* axial
   }
   for (const std::unique_ptr<Term>& term : terms_.all) term->add(problem_, data, assembler_, values);
   finish(data);
-  if (with_matrix) assembler_.project_matrix();
+  if (with_matrix && !problem_.exact) assembler_.project_matrix();
   data.axial_force = nullptr;
   data.contact = nullptr;
 }

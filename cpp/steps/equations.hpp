@@ -25,6 +25,9 @@ struct EquationOptions {
   StepRule rule = StepRule::midpoint;
   double static_duration = 0;  ///< in which slip happens in statics [s]
   SolverKind solver = SolverKind::automatic;
+  /// Whether matrices have every derivative, and those of held unknowns and by them: then not projected, often
+  /// unsymmetric.
+  bool exact = false;
 };
 
 class Equations {
@@ -48,6 +51,8 @@ class Equations {
   const std::vector<std::string>& asymmetries() const { return asymmetries_; }
   /// True where statics minimise a potential.
   bool has_potential() const { return has_potential_; }
+
+  const std::vector<std::unique_ptr<Term>>& terms() const { return terms_.all; }
 
   /// Nothing where nothing can touch.
   Contact* contact() { return terms_.contact ? &terms_.contact->contact() : nullptr; }

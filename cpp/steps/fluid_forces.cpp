@@ -13,6 +13,8 @@
 
 #include "steps/fluid_forces.hpp"
 
+#include <stdexcept>
+
 #include "steps/inertia.hpp"
 
 namespace withe {
@@ -45,6 +47,11 @@ void StokesletForces::add(const StepProblem& problem, StepData& data, const Asse
   data.flow_force = start_ - data.flow_drag;
   data.gradient.head(n) -= data.flow_force;
   if (!values.empty()) add_mass_matrix(problem, drag_, inverse, assembler, values);
+}
+
+void StokesletForces::add_adjoint(const StepProblem&, const StepData&, const Assembler&, StepAdjoint&) const {
+  if (acts_)
+    throw std::invalid_argument("no gradient is known through a fluid of Stokeslets: take model='resistive' or drag");
 }
 
 double StokesletForces::dissipated(const StepProblem&, const StepData& data, const Assembler&,
@@ -100,6 +107,11 @@ void ResistiveForces::add(const StepProblem& problem, StepData& data, const Asse
     set_local(problem, data, e, !values.empty(), local);
     add_element(assembler.stretch, e, local, data, values);
   }
+}
+
+void ResistiveForces::add_adjoint(const StepProblem& problem, const StepData&, const Assembler&, StepAdjoint&) const {
+  if (problem.moves())
+    throw std::invalid_argument("no gradient is known through a fluid yet: take drag, which has one");
 }
 
 double ResistiveForces::dissipated(const StepProblem& problem, const StepData& data, const Assembler& assembler,

@@ -3,24 +3,15 @@
 #include "steps/inertia.hpp"
 
 #include <cmath>
+#include <stdexcept>
 
 #include "geometry/rotation.hpp"
+#include "steps/turning_inertia.hpp"
 
 namespace withe {
 namespace {
 
-/// What an angle of a step counts for where the middle of the step is that of a rotation: of its Cayley vector.
-double finite_turn(double angle) { return 2.0 * std::tan(0.5 * angle); }
-
-/// An edge that spins at omega and turns also needs the couple I omega t x dt/dt: nodal forces
-/// +- I omega (dt/dt x t) / l, which do no work; this one acts at its head.
-Vec3d spin_couple(const StepProblem& problem, const StepData& data, int edge, double omega, const Vec3d& rate) {
-  const EdgeFrame<double>& f = data.configuration.edge[at(edge)];
-  return (problem.parameters->edge_inertia[edge] * omega * f.inverse_length * f.inverse_length) *
-         cross(rate, f.tangent);
-}
-
-void add_couple(const Model& model, int edge, const Vec3d& force, VectorX& gradient) {
+void add_to_edge(const Model& model, int edge, const Vec3d& force, VectorX& gradient) {
   double *tail = &gradient[model.tail_dof[at(edge)]], *head = &gradient[model.head_dof[at(edge)]];
   const double component[3] = {force.x, force.y, force.z};
   for (int i = 0; i < 3; ++i) {
@@ -29,83 +20,178 @@ void add_couple(const Model& model, int edge, const Vec3d& force, VectorX& gradi
   }
 }
 
-/// Its Jacobian is left out: it is a small part of the mass term.
-void add_spin_couple(const StepProblem& problem, StepData& data) {
+Vec3d edge_vector(const Model& model, const VectorX& q, int edge) {
+  const double *tail = &q[model.tail_dof[at(edge)]], *head = &q[model.head_dof[at(edge)]];
+  return {head[0] - tail[0], head[1] - tail[1], head[2] - tail[2]};
+}
+
+TurningEdge<double> turning_edge(const StepProblem& problem, const StepData& data, int edge) {
+  const EdgeFrame<double>& f = data.configuration.edge[at(edge)];
+  const int angle = problem.model.edge_dof[at(edge)];
+  TurningEdge<double> out{.tangent = f.tangent,
+                          .spin = f.spin,
+                          .inverse_length = f.inverse_length,
+                          .start_tangent = problem.start->tangent[at(edge)],
+                          .end_tangent = {},
+                          .start_length = 0.0,
+                          .end_length = 0.0,
+                          .change = data.z[angle] - problem.start->q[angle],
+                          .start_rate = problem.start->v[angle]};
+  if (problem.conserves_energy()) {
+    out.end_tangent = data.end_configuration.edge[at(edge)].tangent;
+    out.start_length = problem.start_configuration.length[edge];
+    out.end_length = data.end_configuration.length[edge];
+  } else if (problem.in_middle()) {
+    const Vec3d e1 =
+        2.0 * edge_vector(problem.model, data.z, edge) - edge_vector(problem.model, problem.start->q, edge);
+    out.end_tangent = (1.0 / std::sqrt(dot(e1, e1))) * e1;
+  }
+  return out;
+}
+
+template <class Scalar>
+TurningForce<Scalar> turning_force(const StepProblem& problem, double inertia, const TurningEdge<Scalar>& turning,
+                                   const Vec3<Scalar>& moved) {
+  return problem.in_middle() ? midpoint_turning(inertia, 2.0 * problem.interval, problem.conserves_energy(), turning)
+                             : euler_turning(inertia, problem.interval, turning, moved);
+}
+
+/// Derivatives by the edge's vector and angle at z, and by its vector, angle and rate at the start.
+using ByEdge = Dual<9>;
+
+TurningForce<ByEdge> turning_slopes(const StepProblem& problem, const StepData& data, int edge) {
   const Model& model = problem.model;
-  const VectorX& z = data.z;
-  const double inverse = 1.0 / problem.interval;
-  const double *q0 = problem.start->q.data(), *v0 = problem.start->v.data();
+  const auto vector = [](const Vec3d& v, int first) -> Vec3<ByEdge> {
+    return {ByEdge::unknown(v.x, first), ByEdge::unknown(v.y, first + 1), ByEdge::unknown(v.z, first + 2)};
+  };
+  const int angle = model.edge_dof[at(edge)];
+  const Vec3<ByEdge> e = vector(edge_vector(model, data.z, edge), 0),
+                     e0 = vector(edge_vector(model, problem.start->q, edge), 4), e1 = ByEdge(2.0) * e - e0;
+  const ByEdge length = sqrt(dot(e, e)), length0 = sqrt(dot(e0, e0)), length1 = sqrt(dot(e1, e1));
+  const Vec3<ByEdge> source = (1.0 / length0) * e0;
+  const Vec3d& director = problem.start->director[at(edge)];
+  const EdgeFrame<ByEdge> f =
+      edge_frame<ByEdge>(e, length, source, {director.x, director.y, director.z}, ByEdge(1.0), ByEdge(0.0));
+  const TurningEdge<ByEdge> turning{
+      .tangent = f.tangent,
+      .spin = f.spin,
+      .inverse_length = f.inverse_length,
+      .start_tangent = source,
+      .end_tangent = (1.0 / length1) * e1,
+      .start_length = length0,
+      .end_length = length1,
+      .change = ByEdge::unknown(data.z[angle], 3) - ByEdge::unknown(problem.start->q[angle], 7),
+      .start_rate = ByEdge::unknown(problem.start->v[angle], 8)};
+  return turning_force(problem, problem.parameters->edge_inertia[edge], turning, e - e0);
+}
+
+/// Inertia of edges that spin and turn: under backward Euler what the mass matrix knows nothing of, under the midpoint
+/// rules all of it.
+void set_turning_edges(const StepProblem& problem, StepData& data) {
+  const Model& model = problem.model;
   for (int e = 0; e < model.edge_count; ++e) {
-    const int a = model.tail_dof[at(e)], b = model.head_dof[at(e)], angle = model.edge_dof[at(e)];
-    const double omega = (z[angle] - q0[angle]) * inverse;
-    const Vec3d change{z[b] - z[a] - q0[b] + q0[a], z[b + 1] - z[a + 1] - q0[b + 1] + q0[a + 1],
-                       z[b + 2] - z[a + 2] - q0[b + 2] + q0[a + 2]};
-    // psi = theta + spin . e is what turns: the edge's inertia acts on the nodes as its elastic torque does. It does no
-    // work either, since spin is normal to the edge before and now.
-    const double torque = problem.parameters->edge_inertia[e] * (omega - v0[angle]) * inverse;
-    add_couple(model, e,
-               spin_couple(problem, data, e, omega, inverse * change) + torque * data.configuration.edge[at(e)].spin,
-               data.gradient);
+    const Vec3d moved = edge_vector(model, data.z, e) - edge_vector(model, problem.start->q, e);
+    const TurningForce<double> force =
+        turning_force(problem, problem.parameters->edge_inertia[e], turning_edge(problem, data, e), moved);
+    if (problem.in_middle()) data.inertia[model.edge_dof[at(e)]] = force.torque;
+    add_to_edge(model, e, force.head, data.gradient);
   }
 }
 
-/// Inertia of spinning edges and of frames in a step under the midpoint rules, such that angular momentum is kept
-/// exactly. The spin's part of it, I omega t, changes in a step by dt m, m = I (omega1 t1 - omega0 t0) / dt: nodes and
-/// angle of the edge take that moment like any other, about where the edge is in the middle. In energy-momentum steps
-/// omega is 2 tan(D theta / 2) / dt, as in a rigid rotation of the whole, and an axial force that vanishes with the
-/// square of the step makes the work of m what kinetic energy changes by. Jacobians are left out: they are a small part
-/// of the mass term.
-void set_turning_inertia(const StepProblem& problem, StepData& data) {
+/// Inertia of frames under the midpoint rules: moments J^T m where a Cayley vector's spin is J dw; in energy-momentum
+/// steps all but elastic forces become moments.
+void set_turning_frames(const StepProblem& problem, StepData& data) {
   const Model& model = problem.model;
-  const VectorX& z = data.z;
-  const double dt = 2.0 * problem.interval, inverse = 1.0 / dt;
-  if (model.planar()) {
-    for (int f = 0; problem.conserves_energy() && f < model.frame_count; ++f) {
-      const int dof = model.frame_dof[at(f)];
-      const double change = 2.0 * (z[dof] - problem.start->q[dof]);
-      data.inertia[dof] += 2.0 * problem.mass.rows[dof] * inverse * inverse * (finite_turn(change) - change);
-    }
-    return;
-  }
-  const double *q0 = problem.start->q.data(), *v0 = problem.start->v.data();
-  for (int e = 0; e < model.edge_count; ++e) {
-    const int a = model.tail_dof[at(e)], b = model.head_dof[at(e)], angle = model.edge_dof[at(e)];
-    const EdgeFrame<double>& middle = data.configuration.edge[at(e)];
-    const Vec3d& t0 = problem.start->tangent[at(e)];
-    Vec3d t1;
-    if (problem.conserves_energy()) {
-      t1 = data.end_configuration.edge[at(e)].tangent;
-    } else {
-      const Vec3d e1{2.0 * (z[b] - z[a]) - q0[b] + q0[a], 2.0 * (z[b + 1] - z[a + 1]) - q0[b + 1] + q0[a + 1],
-                     2.0 * (z[b + 2] - z[a + 2]) - q0[b + 2] + q0[a + 2]};
-      t1 = (1.0 / std::sqrt(dot(e1, e1))) * e1;
-    }
-    const double change = 2.0 * (z[angle] - q0[angle]);
-    const double turn = problem.conserves_energy() ? finite_turn(change) : change;
-    const double inertia = problem.mass.rows[angle];
-    const Vec3d moment = (inertia * inverse) * ((2.0 * inverse * turn - v0[angle]) * t1 - v0[angle] * t0);
-    const double torque = dot(moment, middle.tangent);
-    data.inertia[angle] = torque;
-    Vec3d force = middle.inverse_length * cross(moment, middle.tangent);
-    // An edge's torque turns its nodes by spin . e as well; that of inertia takes back what all others do.
-    force += torque * middle.spin;
-    if (problem.conserves_energy()) {
-      const Vec3d apart = t1 - t0;
-      const double mean = 0.5 * (problem.start_configuration.length[e] + data.end_configuration.length[e]),
-                   cosine = 0.5 * dot(t0 + t1, middle.tangent);
-      const double rate = inverse * turn;
-      force -= (inertia * rate * rate * dot(apart, apart) / (4.0 * mean * cosine)) * middle.tangent;
-    }
-    add_couple(model, e, force, data.gradient);
-  }
+  const double inverse = 0.5 / problem.interval;
   for (int f = 0; f < model.frame_count; ++f) {
     const int dof = model.frame_dof[at(f)];
-    const Matrix3 J = cayley_spin(z.segment<3>(dof)).transpose();
+    if (model.planar()) {
+      if (!problem.conserves_energy()) continue;
+      const double change = 2.0 * (data.z[dof] - problem.start->q[dof]);
+      data.inertia[dof] += 2.0 * problem.mass.rows[dof] * inverse * inverse * (finite_turn(change) - change);
+      continue;
+    }
+    const Matrix3 J = cayley_spin(data.z.segment<3>(dof)).transpose();
     if (problem.conserves_energy()) {  // whose rows are moments
       const Vector3 other = data.gradient.segment<3>(dof) - data.elastic_rows.segment<3>(dof);
       data.gradient.segment<3>(dof) += J.inverse() * other - other;
     } else {
       data.inertia.segment<3>(dof) = (J * data.inertia.segment<3>(dof)).eval();
+    }
+  }
+}
+
+/// Derivatives of the inertia of edges, beyond those of the mass matrix.
+void add_edge_slopes(const StepProblem& problem, const StepData& data, const Assembler& assembler,
+                     std::span<double> values) {
+  const Model& model = problem.model;
+  const double inverse = 1.0 / problem.interval;
+  for (int e = 0; e < model.edge_count; ++e) {
+    const TurningForce<ByEdge> force = turning_slopes(problem, data, e);
+    double hessian[7][7];
+    for (int column = 0; column < 7; ++column) {
+      const int unknown = column < 3 ? column : column == 3 ? 3 : column - 4;
+      const double sign = column < 3 ? -1.0 : 1.0;
+      for (int i = 0; i < 3; ++i) {
+        hessian[4 + i][column] = sign * force.head[i].slope[unknown];
+        hessian[i][column] = -hessian[4 + i][column];
+      }
+      hessian[3][column] = sign * force.torque.slope[unknown];
+    }
+    hessian[3][3] -= inverse * inverse * problem.mass.rows[model.edge_dof[at(e)]];
+    assembler.edges.add_hessian(e, hessian, 1.0, values);
+  }
+}
+
+void add_turning_adjoint(const StepProblem& problem, const StepData& data, int edge, StepAdjoint& adjoint) {
+  const Model& model = problem.model;
+  const int tail = model.tail_dof[at(edge)], head = model.head_dof[at(edge)], angle = model.edge_dof[at(edge)];
+  const Vec3d apart = edge_vector(model, adjoint.rows, edge);
+  // The mass matrix has the torque of backward Euler.
+  const double about = problem.in_middle() ? adjoint.rows[angle] : 0.0;
+  const TurningForce<ByEdge> force = turning_slopes(problem, data, edge);
+  double by[9];
+  for (int k = 0; k < 9; ++k) {
+    by[k] = about * force.torque.slope[k];
+    for (int i = 0; i < 3; ++i) by[k] += apart[i] * force.head[i].slope[k];
+  }
+  for (int i = 0; i < 3; ++i) {
+    adjoint.start[head + i] += by[4 + i];
+    adjoint.start[tail + i] -= by[4 + i];
+  }
+  adjoint.start[angle] += by[7];
+  adjoint.velocity[angle] += by[8];
+  const Vec3d moved = edge_vector(model, data.z, edge) - edge_vector(model, problem.start->q, edge);
+  const TurningForce<double> unit = turning_force(problem, 1.0, turning_edge(problem, data, edge), moved);
+  adjoint.coefficients.mass[angle] += dot(apart, unit.head) + about * unit.torque;
+}
+
+void add_frame_slopes(const StepProblem& problem, const StepData& data, const Assembler& assembler,
+                      std::span<double> values) {
+  const Model& model = problem.model;
+  const double rate = 1.0 / (problem.interval * problem.interval);
+  for (int f = 0; f < model.frame_count; ++f) {
+    const int dof = model.frame_dof[at(f)];
+    if (model.planar()) {
+      if (!problem.conserves_energy()) continue;
+      const double t = std::tan(data.z[dof] - problem.start->q[dof]);
+      values[static_cast<std::size_t>(assembler.diagonal_offsets()[at(dof)])] += rate * problem.mass.rows[dof] * t * t;
+      continue;
+    }
+    const Vector3 w = data.z.segment<3>(dof);
+    if (problem.conserves_energy()) {
+      // Others' rows times T = J^-T = I + w^ / 2 + w w^T / 4; those of elastic forces have been divided by it.
+      const Vector3 moment = data.gradient.segment<3>(dof) - data.elastic_rows.segment<3>(dof),
+                    other = cayley_spin(w).transpose() * moment;
+      assembler.turn_rows(dof, cayley_spin(w).transpose().inverse(), values);
+      assembler.add_block(
+          dof, -0.5 * cross_matrix(other) + 0.25 * (w * other.transpose() + w.dot(other) * Matrix3::Identity()),
+          values);
+    } else {
+      const Vector3 moment = problem.mass.rows[dof] * data.acceleration.segment<3>(dof);
+      const Matrix3 J = cayley_spin(w).transpose();
+      assembler.add_block(
+          dof, rate * problem.mass.rows[dof] * (J - Matrix3::Identity()) + cayley_moment_slope(w, moment), values);
     }
   }
 }
@@ -123,13 +209,43 @@ void Inertia::add(const StepProblem& problem, StepData& data, const Assembler& a
     assembler.add_held_part(problem.held_acceleration, 1.0, data.acceleration);
   }
   multiply(problem.model, problem.mass, data.acceleration, data.inertia);
-  if (problem.in_middle())
-    set_turning_inertia(problem, data);
-  else if (!problem.model.planar())
-    add_spin_couple(problem, data);
+  if (!problem.model.planar()) set_turning_edges(problem, data);
+  if (problem.in_middle()) set_turning_frames(problem, data);
+  const bool turning_too = problem.exact && !values.empty();
+  if (turning_too && problem.in_middle()) add_frame_slopes(problem, data, assembler, values);
   data.gradient.head(n) += data.inertia;
   data.row_magnitude.head(n) += data.inertia.cwiseAbs();
-  if (!values.empty()) add_mass_matrix(problem, problem.mass, inverse * inverse, assembler, values);
+  if (values.empty()) return;
+  add_mass_matrix(problem, problem.mass, inverse * inverse, assembler, values);
+  if (turning_too && !problem.model.planar()) add_edge_slopes(problem, data, assembler, values);
+}
+
+void Inertia::add_adjoint(const StepProblem& problem, const StepData& data, const Assembler& assembler,
+                          StepAdjoint& adjoint) const {
+  if (!problem.moves()) return;
+  const Model& model = problem.model;
+  const double inverse = 1.0 / problem.interval;
+  VectorX rows = adjoint.rows;
+  if (problem.in_middle() && !model.planar()) {
+    for (int e = 0; e < model.edge_count; ++e) rows[model.edge_dof[at(e)]] = 0.0;
+    for (int f = 0; f < model.frame_count; ++f) {
+      const int dof = model.frame_dof[at(f)];
+      if (!problem.conserves_energy())
+        rows.segment<3>(dof) = (cayley_spin(data.z.segment<3>(dof)) * rows.segment<3>(dof)).eval();
+    }
+  }
+  add_mass_adjoint(model, data.acceleration, rows, adjoint.coefficients.mass, adjoint.coefficients.mass_coupling);
+  VectorX force;
+  multiply(model, problem.mass, rows, force);
+  if (problem.held_acceleration.size() != 0) assembler.project(force);
+  adjoint.start -= inverse * inverse * force;
+  adjoint.velocity -= inverse * force;
+  if (model.planar()) {
+    if (problem.conserves_energy() && model.frame_count > 0)
+      throw std::invalid_argument("no gradient is known yet through joints in energy-momentum steps");
+    return;
+  }
+  for (int e = 0; e < model.edge_count; ++e) add_turning_adjoint(problem, data, e, adjoint);
 }
 
 /// What couples nodes off the diagonal is less on it.
@@ -153,9 +269,11 @@ void add_mass_matrix(const StepProblem& problem, const MassMatrix& mass, double 
 
 void add_explicit_spin_couple(const StepProblem& problem, StepData& data, int edge, const VectorX& v) {
   const Model& model = problem.model;
-  const int a = model.tail_dof[at(edge)], b = model.head_dof[at(edge)];
-  const Vec3d rate{v[b] - v[a], v[b + 1] - v[a + 1], v[b + 2] - v[a + 2]};
-  add_couple(model, edge, spin_couple(problem, data, edge, v[model.edge_dof[at(edge)]], rate), data.gradient);
+  const EdgeFrame<double>& f = data.configuration.edge[at(edge)];
+  add_to_edge(model, edge,
+              spin_couple<double>(problem.parameters->edge_inertia[edge], v[model.edge_dof[at(edge)]],
+                                  edge_vector(model, v, edge), f.tangent, f.inverse_length),
+              data.gradient);
 }
 
 void set_turning_velocities(const StepProblem& problem, const VectorX& change, double dt, VectorX& v1) {

@@ -6,11 +6,15 @@
 namespace withe {
 
 /// M ((z - q0) / h^2 - v0 / h), and what turning adds. Under backward Euler an edge that spins at omega and turns also
-/// needs the couple I omega t x dt/dt; under the midpoint rules angular momentum is kept exactly.
+/// needs the couple I omega t x dt/dt; under the midpoint rules angular momentum is kept exactly (turning_inertia.hpp).
+/// Derivatives of what turning adds are a small part of the mass term, and unsymmetric: they are in exact matrices
+/// alone.
 class Inertia final : public Term {
  public:
   void add(const StepProblem& problem, StepData& data, const Assembler& assembler,
            std::span<double> values) const override;
+  void add_adjoint(const StepProblem& problem, const StepData& data, const Assembler& assembler,
+                   StepAdjoint& adjoint) const override;
 };
 
 /// Entries of a matrix such as that of masses: its diagonal, and what couples nodes off it.

@@ -1,5 +1,7 @@
 #include "steps/load_forces.hpp"
 
+#include <stdexcept>
+
 namespace withe {
 
 void LoadForces::add(const StepProblem& problem, StepData& data, const Assembler& assembler,
@@ -17,6 +19,26 @@ void LoadForces::add(const StepProblem& problem, StepData& data, const Assembler
       for (int i = 0; i < problem.model.dimension; ++i) data.potential += local.gradient[i] * data.z(dofs[i]);
     else
       data.potential += local.energy;
+  }
+}
+
+void LoadForces::add_adjoint(const StepProblem& problem, const StepData& data, const Assembler& assembler,
+                             StepAdjoint& adjoint) const {
+  const Loads& loads = problem.loads;
+  Local local;
+  double rows[kMaxLocal];
+  for (std::size_t k = 0; k < loads.pieces.size(); ++k) {
+    const LoadPiece& piece = loads.pieces[k];
+    if (piece.load < 0) continue;
+    const ElementTable& table = assembler.loads[k];
+    gather(table, 0, adjoint.rows, rows);
+    for (int axis = 0; axis < 3; ++axis) {
+      load_local(problem.model, *problem.start, data.z, data.configuration, piece, Vector3::Unit(axis), local);
+      for (int i = 0; i < table.width(); ++i)
+        adjoint.coefficients.loads(piece.load, axis) += rows[i] * local.gradient[i];
+    }
+    if (piece.shape == LoadShape::frame_moment && piece.follower && !problem.model.planar() && problem.moves())
+      throw std::invalid_argument("no gradient of a motion is known through a moment that follows a joint");
   }
 }
 

@@ -9,6 +9,8 @@ class LoadForces final : public Term {
  public:
   void add(const StepProblem& problem, StepData& data, const Assembler& assembler,
            std::span<double> values) const override;
+  void add_adjoint(const StepProblem& problem, const StepData& data, const Assembler& assembler,
+                   StepAdjoint& adjoint) const override;
   void add_applied(const StepProblem& problem, const StepData& data, const Assembler& assembler,
                    VectorX& force) const override;
 };

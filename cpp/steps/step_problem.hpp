@@ -37,6 +37,7 @@ struct StepProblem {
   StepRule rule = StepRule::statics;
   double interval = 0;   ///< h, from q0 to z [s]; 0: statics
   double slip_time = 0;  ///< in which slip happens [s]
+  bool exact = false;    ///< whether the matrix has every derivative; else what is small and unsymmetric is left out
   long number = 0;       ///< of problems so far: tells one from another
 
   /// Of the parameters, of that version.

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "assembly/assembler.hpp"
+#include "steps/step_adjoint.hpp"
 #include "steps/step_problem.hpp"
 
 namespace withe {
@@ -29,6 +30,9 @@ class Term {
   virtual double dissipated(const StepProblem&, const StepData&, const Assembler&, const VectorX& /*change*/) const {
     return 0.0;
   }
+  /// Adds rows^T times the derivatives of what `add` adds by what the step is given, at z. Throws std::invalid_argument
+  /// where they are not known.
+  virtual void add_adjoint(const StepProblem&, const StepData&, const Assembler&, StepAdjoint&) const = 0;
   /// Adds what a user applies, in the last evaluation, to generalised forces.
   virtual void add_applied(const StepProblem&, const StepData&, const Assembler&, VectorX& /*force*/) const {}
 };
@@ -47,6 +51,12 @@ inline double work_of(const ElementTable& table, int element, const Local& local
   for (int i = 0; i < table.width(); ++i)
     if (dofs[i] >= 0) work += local.gradient[i] * change[dofs[i]];
   return work;
+}
+
+/// What multiplies the rows of one element.
+inline void gather(const ElementTable& table, int element, const VectorX& rows, double (&out)[kMaxLocal]) {
+  const int* dofs = table.dofs(element);
+  for (int i = 0; i < table.width(); ++i) out[i] = dofs[i] >= 0 ? rows[dofs[i]] : 0.0;
 }
 
 }  // namespace withe

@@ -31,7 +31,8 @@ Terms make_terms(const Model& model, const Loads& loads, StepRule rule) {
   return terms;
 }
 
-std::vector<std::string> asymmetries_of(const Model& model, const Loads& loads, const Terms& terms, StepRule rule) {
+std::vector<std::string> asymmetries_of(const Model& model, const Loads& loads, const Terms& terms, StepRule rule,
+                                        bool exact) {
   const SceneDescription& scene = model.description;
   const Contact* contact = terms.contact ? &terms.contact->contact() : nullptr;
   std::vector<std::string> found;
@@ -45,6 +46,8 @@ std::vector<std::string> asymmetries_of(const Model& model, const Loads& loads, 
   if (contact && contact->unsymmetric()) found.emplace_back("implicit friction");
   if (scene.fluid.model == FluidModel::resistive && rule != StepRule::statics)
     found.emplace_back("resistive-force theory");
+  if (exact && rule != StepRule::statics && (!model.planar() || rule != StepRule::backward_euler))
+    found.emplace_back("every derivative of inertia and viscosity");
   return found;
 }
 

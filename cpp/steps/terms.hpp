@@ -25,7 +25,8 @@ struct Terms {
 /// `rule`: statics know no fluid.
 Terms make_terms(const Model& model, const Loads& loads, StepRule rule);
 
-/// In words, what makes the Jacobian unsymmetric.
-std::vector<std::string> asymmetries_of(const Model& model, const Loads& loads, const Terms& terms, StepRule rule);
+/// In words, what makes the Jacobian unsymmetric. `exact`: it has every derivative.
+std::vector<std::string> asymmetries_of(const Model& model, const Loads& loads, const Terms& terms, StepRule rule,
+                                        bool exact);
 
 }  // namespace withe

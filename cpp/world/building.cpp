@@ -123,6 +123,7 @@ void World::Implementation::rebuild(Rebuild why) {
   for (std::size_t k = 0; k < index.size(); ++k) all[index[k]] = fresh.supports[k];
   fresh.supports = all;
   static_equations.reset();
+  static_gradient.reset();
   rescue_equations.reset();
   // Scratch has the sizes of the old model.
   const Counters counters = work.newton.counters;
@@ -184,6 +185,7 @@ void World::Implementation::rebuild(Rebuild why) {
 void World::Implementation::remake_equations() {
   model.description.loads = description.loads;
   static_equations.reset();
+  static_gradient.reset();
   rescue_equations.reset();
   newton = std::make_unique<Newton>(model, options);
   equations = std::make_unique<Equations>(model, equation_options(options));
@@ -310,7 +312,7 @@ void World::Implementation::relax_frame(int f, const Matrix3& free) {
     VectorX g = VectorX::Zero(size);
     for (std::size_t h = 0; h < model.half.size(); ++h) {
       if (model.half[h].frame != f) continue;
-      half_local(model, state.q, elastic, c, static_cast<int>(h), true, local);
+      half_local(model, state.q, half_coefficients(elastic, static_cast<int>(h)), c, static_cast<int>(h), true, local);
       const auto own = std::find(hinges.begin(), hinges.end(), model.half[h].hinge);
       const int last = n + static_cast<int>(own - hinges.begin()), count = own == hinges.end() ? n : n + 1;
       const auto place = [&](int i) { return i < n ? i : last; };

@@ -31,6 +31,9 @@ struct World::Implementation : Running {
   std::unique_ptr<Equations> equations;
   std::unique_ptr<Equations> rescue_equations;  ///< energy-momentum ones, made when plain midpoint gains energy
   std::unique_ptr<Equations> static_equations;  ///< symmetric ones, made when first needed
+  mutable std::unique_ptr<StepGradient> static_gradient;  ///< made when first needed
+  std::shared_ptr<Tape> tape;                             ///< of a run that is kept for gradients
+  long taped = 0;                                         ///< its length at the start of a step that may be taken back
   StepWorkspace work;
   mutable EnergyScratch energy_scratch;
   MatrixRecord marked_matrix;
@@ -167,6 +170,11 @@ struct World::Implementation : Running {
   void watch_step(double dt, const Equations& system);
   std::string unresolved_in_time(double dt) const;
   void add_step_notes();
+
+  // gradients.cpp
+  void check_tape();
+  void record_step(StepRule rule, double dt);
+  void add_held_gradient(const VectorX& held, EquilibriumGradient& out) const;
 
   // equilibrium.cpp
   EquilibriumResult equilibrium(double dt);

@@ -72,19 +72,24 @@ SparseMatrix matrix_of(const Model& model, const MassMatrix& mass) {
 class StrainParts {
  public:
   StrainParts(const Equations& system, const State& state, const Configuration& configuration)
-      : system_(system),
-        state_(state),
-        configuration_(configuration),
-        model_(system.model()),
-        without_(system.elastic()) {
-    for (int e = 0; e < model_.edge_count; ++e) add_stretch(e);
+      : model_(system.model()), without_(system.elastic()) {
     const ElasticCoefficients& k = system.elastic();
-    for (int b = 0; b < static_cast<int>(model_.bend.size()); ++b)
-      add_turning(system.assembler().bend, b, k.bend_stiffness, k.bend_natural, without_.bend_stiffness,
-                  without_.bend_natural, &StrainParts::bend);
-    for (int h = 0; h < static_cast<int>(model_.half.size()); ++h)
-      add_turning(system.assembler().half, h, k.half_stiffness, k.half_natural, without_.half_stiffness,
-                  without_.half_natural, &StrainParts::half);
+    const Assembler& assembler = system.assembler();
+    StrainGradients strains;
+    for (int e = 0; e < model_.edge_count; ++e) {
+      if (k.stretch_stiffness(e) == 0.0) continue;
+      stretch_gradients(model_, configuration, e, strains);
+      add_row(assembler.stretch, e, strains.gradient[0], k.stretch_stiffness(e) * model_.edge_length(e));
+      take_away(strains.strain[0], without_.stretch_stiffness(e), without_.stretch_natural(e));
+    }
+    for (int b = 0; b < static_cast<int>(model_.bend.size()); ++b) {
+      bend_gradients(model_, k.measure, configuration, b, strains);
+      add_rows(assembler.bend, b, strains, k.bend_stiffness, without_.bend_stiffness, without_.bend_natural);
+    }
+    for (int h = 0; h < static_cast<int>(model_.half.size()); ++h) {
+      half_gradients(model_, state.q, k.measure, configuration, h, strains);
+      add_rows(assembler.half, h, strains, k.half_stiffness, without_.half_stiffness, without_.half_natural);
+    }
   }
 
   SparseMatrix gradients() const { return assembled(count(), model_.dof_count, entries_); }
@@ -93,10 +98,13 @@ class StrainParts {
   const ElasticCoefficients& without() const { return without_; }
 
  private:
-  static constexpr double kLittle = 0x1p-40;
-  using Evaluate = void (StrainParts::*)(const ElasticCoefficients& k, int stencil, Local& out) const;
-
   Eigen::Index count() const { return static_cast<Eigen::Index>(stiffnesses_.size()); }
+
+  static void take_away(double strain, double& stiffness, double& natural) {
+    constexpr double kLittle = 0x1p-40;
+    natural = strain - (strain - natural) / kLittle;
+    stiffness *= kLittle;
+  }
 
   void add_row(const ElementTable& table, int element, const double* gradient, double stiffness) {
     const int row = static_cast<int>(stiffnesses_.size());
@@ -106,59 +114,14 @@ class StrainParts {
     stiffnesses_.push_back(stiffness);
   }
 
-  /// The strain of a stretched edge is taken as its elongation [m].
-  void add_stretch(int edge) {
-    const ElasticCoefficients& k = system_.elastic();
-    const double stiffness = k.stretch_stiffness(edge);
-    if (stiffness == 0.0) return;
-    const Configuration& c = configuration_;
-    const Vec3d& t = c.edge[at(edge)].tangent;
-    const double along[3] = {t.x, t.y, t.z};
-    double gradient[kMaxLocal] = {};
-    for (int i = 0; i < model_.dimension; ++i) {
-      gradient[i] = -along[i];
-      gradient[model_.dimension + i] = along[i];
+  void add_rows(const ElementTable& table, int stencil, const StrainGradients& strains, const Columns3& stiffness,
+                Columns3& less, Columns3& shifted) {
+    for (int s = 0; s < strains.count; ++s) {
+      if (stiffness(stencil, s) != 0.0) add_row(table, stencil, strains.gradient[s], stiffness(stencil, s));
+      take_away(strains.strain[s], less(stencil, s), shifted(stencil, s));
     }
-    add_row(system_.assembler().stretch, edge, gradient, stiffness / model_.edge_length(edge));
-    const double strain = c.length(edge) / model_.edge_length(edge) - 1.0;
-    without_.stretch_stiffness(edge) = kLittle * stiffness;
-    without_.stretch_natural(edge) = strain - (strain - k.stretch_natural(edge)) / kLittle;
   }
 
-  void bend(const ElasticCoefficients& k, int stencil, Local& out) const {
-    bend_local(model_, k, configuration_, stencil, false, out);
-  }
-  void half(const ElasticCoefficients& k, int stencil, Local& out) const {
-    half_local(model_, state_.q, k, configuration_, stencil, false, out);
-  }
-
-  /// Energies k (s - s0)^2 / 2 of unit stiffness differ by s + 1/2, and their gradients by that of s, between natural
-  /// strains -1 and 0.
-  void add_turning(const ElementTable& table, int stencil, const Columns3& stiffness, const Columns3& natural,
-                   Columns3& less, Columns3& shifted, Evaluate evaluate) {
-    const int strains = model_.planar() ? 1 : 3;
-    const VectorX own = stiffness.row(stencil), rest = natural.row(stencil);
-    VectorX strain(strains);
-    Local at_zero, at_one;
-    for (int s = 0; s < strains; ++s) {
-      less.row(stencil).setZero();
-      shifted.row(stencil).setZero();
-      less(stencil, s) = 1.0;
-      (this->*evaluate)(without_, stencil, at_zero);
-      shifted(stencil, s) = -1.0;
-      (this->*evaluate)(without_, stencil, at_one);
-      strain(s) = at_one.energy - at_zero.energy - 0.5;
-      for (int i = 0; i < table.width(); ++i) at_one.gradient[i] -= at_zero.gradient[i];
-      if (own(s) != 0.0) add_row(table, stencil, at_one.gradient, own(s));
-    }
-    less.row(stencil) = kLittle * own.transpose();
-    shifted.row(stencil) = rest.transpose();
-    for (int s = 0; s < strains; ++s) shifted(stencil, s) = strain(s) - (strain(s) - rest(s)) / kLittle;
-  }
-
-  const Equations& system_;
-  const State& state_;
-  const Configuration& configuration_;
   const Model& model_;
   ElasticCoefficients without_;
   Entries entries_;

@@ -156,6 +156,7 @@ World::Implementation::Attempt World::Implementation::try_step(double dt) {
   const bool watched = options.adaptive && equations->contact() && options.integrator != Integrator::verlet;
   const bool keeps = guarded || watched || options.tolerance || fourth;
   if (keeps) kept = *this;
+  if (tape) taped = tape->count();
   // Actuation changes what is stored without a motion, so the start is looked at while it is as it was.
   if (guarded && !guard.energy && actuated()) guard.energy = energy();
   const EnergyGuard guard_before = guard;
@@ -212,6 +213,7 @@ void World::Implementation::take_back() {
 
 void World::Implementation::return_to_start() {
   static_cast<Moving&>(*this) = kept;
+  if (tape) tape->cut(taped, state);
   apply_ramps(state.time);
 }
 
@@ -308,6 +310,7 @@ bool World::Implementation::inner_step(double dt, int slot, double& error) {
     motions = kept_motions;
     if (ramped) apply_ramps(start);
   };
+  if (tape) check_tape();
   StepResult r;
   try {
     solve_for_custom(system, dt);
@@ -330,6 +333,7 @@ bool World::Implementation::inner_step(double dt, int slot, double& error) {
   }
   system.respond({});
   release_obstacles(system);
+  if (tape) record_step(rule_of_step(), dt);
   error = r.error;
   guard.turn = std::max(guard.turn, r.largest_turn);
   guard.stretch_gain += r.stretch_gain;

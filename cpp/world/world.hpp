@@ -11,6 +11,7 @@
 
 #include "common/types.hpp"
 #include "forces/custom_forces.hpp"
+#include "gradients/tape.hpp"
 #include "integrators/options.hpp"
 #include "model/description.hpp"
 
@@ -107,6 +108,13 @@ struct Linearisation {
   VectorX stiffnesses;        ///< per strain: [N/m], [N m]
   SparseMatrix mass;          ///< free unknowns x free unknowns
   SparseMatrix displacement;  ///< (3 nodes) x free unknowns: node displacements [m] of each unknown
+};
+
+/// Derivatives of scalars of an equilibrium by what acts, and by where supports hold.
+struct EquilibriumGradient {
+  ParameterGradient parameters;
+  MatrixX3 support_positions;  ///< per support, by its position [1/m]
+  MatrixX3 support_rotations;  ///< per support, by a rotation vector [1/rad]
 };
 
 /// What a rod is to be like; what is empty stays as it is.
@@ -225,6 +233,13 @@ class World {
   std::string take_step_warning();  ///< likewise, of steps too long for it
   ContactTable contacts() const;
   Linearisation linearise() const;
+
+  /// Of scalars whose derivatives by positions (a row each node, [1/m]) are given, in the equilibrium that the scene is
+  /// in. Throws std::invalid_argument where it is in none, where none is known, or where a derivative leaves the plane.
+  std::vector<EquilibriumGradient> equilibrium_gradients(const std::vector<MatrixX3>& by_positions) const;
+  /// Keeps the steps from here on, for gradients; nothing: no more.
+  std::shared_ptr<Tape> start_tape();
+  void stop_tape();
 
   /// The whole state as bytes, for a description and options equal to this world's (supports may differ).
   std::string snapshot() const;

@@ -8,6 +8,38 @@
 namespace withe::bindings {
 namespace {
 
+void register_gradients(py::module_& module) {
+  py::class_<ParameterGradient>(module, "ParameterGradient", "Derivatives of a scalar by the numbers that act.")
+      .def_readonly("stretch_stiffness", &ParameterGradient::edge_stretch)
+      .def_readonly("bend_stiffness", &ParameterGradient::edge_bend)
+      .def_readonly("twist_stiffness", &ParameterGradient::edge_twist)
+      .def_readonly("line_density", &ParameterGradient::edge_density)
+      .def_readonly("rotary_inertia", &ParameterGradient::edge_rotary)
+      .def_readonly("viscous_time", &ParameterGradient::edge_viscous_time)
+      .def_readonly("drag", &ParameterGradient::edge_drag)
+      .def_readonly("added_mass", &ParameterGradient::added_mass)
+      .def_readonly("gravity", &ParameterGradient::gravity)
+      .def_readonly("natural_curvature", &ParameterGradient::natural_curvature)
+      .def_readonly("natural_twist", &ParameterGradient::natural_twist)
+      .def_readonly("loads", &ParameterGradient::loads);
+  py::class_<EquilibriumGradient>(module, "EquilibriumGradient", "Derivatives of a scalar of an equilibrium.")
+      .def_readonly("parameters", &EquilibriumGradient::parameters)
+      .def_readonly("support_positions", &EquilibriumGradient::support_positions)
+      .def_readonly("support_rotations", &EquilibriumGradient::support_rotations);
+  py::class_<RunGradient>(module, "RunGradient", "Derivatives of a scalar of a run.")
+      .def_readonly("parameters", &RunGradient::parameters)
+      .def_property_readonly("initial_positions", [](const RunGradient& self) { return self.initial.positions; })
+      .def_property_readonly("initial_velocities", [](const RunGradient& self) { return self.initial.velocities; });
+  py::class_<MomentAdjoint>(module, "MomentAdjoint", "What a scalar depends on after so many steps of a run.")
+      .def(py::init([](long steps, const MatrixX3& positions, const MatrixX3& velocities) {
+             return MomentAdjoint{steps, positions, velocities};
+           }),
+           py::arg("steps"), py::arg("positions"), py::arg("velocities"));
+  py::class_<Tape, std::shared_ptr<Tape>>(module, "Tape", "A run as the adjoint method needs it.")
+      .def_property_readonly("count", &Tape::count, "Steps taken.")
+      .def("gradient", &Tape::gradient, py::arg("moments"), py::call_guard<py::gil_scoped_release>());
+}
+
 void register_results(py::module_& module) {
   py::class_<RodState>(module, "RodState", "What a rod is to be like; what is empty stays as it is.")
       .def(py::init<>())
@@ -274,6 +306,14 @@ void define_readouts(WorldClass& world) {
   world.def("momentum", [](const GuardedWorld& self) { return self.reading().momentum(); });
   world.def("contacts", [](const GuardedWorld& self) { return self.reading().contacts(); });
   world.def(
+      "equilibrium_gradients",
+      [](const GuardedWorld& self, const std::vector<MatrixX3>& by_positions) {
+        return self.reading().equilibrium_gradients(by_positions);
+      },
+      py::arg("by_positions"));
+  world.def("start_tape", [](GuardedWorld& self) { return self.changing().start_tape(); });
+  world.def("stop_tape", [](GuardedWorld& self) { self.changing().stop_tape(); });
+  world.def(
       "linearise",
       [](GuardedWorld& self, const py::object& forces) {
         if (forces.is_none()) return std::as_const(self).reading().linearise();
@@ -285,6 +325,7 @@ void define_readouts(WorldClass& world) {
 }  // namespace
 
 void register_world(py::module_& module) {
+  register_gradients(module);
   register_results(module);
   register_exceptions(module);
   WorldClass world(module, "World", "A scene while it runs.");

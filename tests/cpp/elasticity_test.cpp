@@ -37,8 +37,8 @@ Sum sum_of(const Case& c, const ElasticCoefficients& k, Kind kind, const VectorX
   Local local;
   for (int i = 0; i < count_of(c.model, kind); ++i) {
     if (kind == Kind::stretch) stretch_local(c.model, k, configuration, i, true, nullptr, local);
-    if (kind == Kind::bend) bend_local(c.model, k, configuration, i, true, local);
-    if (kind == Kind::half) half_local(c.model, q, k, configuration, i, true, local);
+    if (kind == Kind::bend) bend_local(c.model, bend_coefficients(k, i), configuration, i, true, local);
+    if (kind == Kind::half) half_local(c.model, q, half_coefficients(k, i), configuration, i, true, local);
     const std::vector<int> dofs = dofs_of(c.model, kind, i);
     sum.energy += local.energy;
     for (std::size_t a = 0; a < dofs.size(); ++a) {

@@ -42,8 +42,8 @@ struct Step {
     for (auto& row : out.hessian)
       for (double& number : row) number = NAN;
     if (kind == Kind::stretch) discrete_stretch_local(c.model, k, step, i, with_matrix, given_force, out);
-    if (kind == Kind::bend) discrete_bend_local(c.model, k, step, i, with_matrix, out);
-    if (kind == Kind::half) discrete_half_local(c.model, k, step, i, with_matrix, out);
+    if (kind == Kind::bend) discrete_bend_local(c.model, bend_coefficients(k, i), step, i, with_matrix, out);
+    if (kind == Kind::half) discrete_half_local(c.model, half_coefficients(k, i), step, i, with_matrix, out);
     return out;
   }
   double energy(Kind kind, int i, const Configuration& at_q) const {

@@ -39,23 +39,27 @@ double interval_of(Scheme scheme, double dt) {
   return scheme == Scheme::statics ? 0.0 : scheme == Scheme::backward_euler ? dt : 0.5 * dt;
 }
 
-/// Compares d(residual) / dz with the solver's matrix, on the directions that supports leave free.
-void expect_matrix_is_exact(Case c, Scheme scheme, double dt) {
+/// Compares d(residual) / dz with the solver's matrix, on the directions that supports leave free; or with the exact
+/// one, on all.
+void expect_matrix_is_exact(Case c, Scheme scheme, double dt, bool exact = false) {
   // The discrete gradient divides by the step, so differences about a step of nothing are rounding.
   if (scheme == Scheme::energy_momentum && c.q == c.state.q)
     c.q += 10.0 * c.increment * testing::RandomNumbers(8).vector(c.q.size());
-  Equations equations(c.model, equation_options(options_of(scheme)));
+  EquationOptions options = equation_options(options_of(scheme));
+  options.exact = exact;
+  Equations equations(c.model, options);
   const Parameters parameters = initial_parameters(c.model);
   equations.begin(c.state, parameters, rule_of(scheme), interval_of(scheme, dt));
   StepData evaluation;
+  const VectorX& rows = exact ? evaluation.full_residual : evaluation.residual;
   const Eigen::Index n = c.model.dof_count;
   MatrixX free(n, n), J(n, n);
   equations.evaluate(c.q, true, nullptr, evaluation);
-  const VectorX with_matrix = evaluation.residual;
+  const VectorX with_matrix = rows;
   const double scale = evaluation.magnitude.maxCoeff();
   for (Eigen::Index i = 0; i < n; ++i) {
     VectorX e = VectorX::Unit(n, i), y(n);
-    equations.assembler().project(e);
+    if (!exact) equations.assembler().project(e);
     free.col(i) = e;
     equations.assembler().solver().multiply({e.data(), static_cast<std::size_t>(n)},
                                             {y.data(), static_cast<std::size_t>(n)});
@@ -63,7 +67,7 @@ void expect_matrix_is_exact(Case c, Scheme scheme, double dt) {
   }
   const auto residual = [&](const VectorX& d) {
     equations.evaluate(c.q + free * d, false, nullptr, evaluation);
-    return evaluation.residual;
+    return rows;
   };
   EXPECT_LE((residual(VectorX::Zero(n)) - with_matrix).cwiseAbs().maxCoeff(), 1e-13 * scale) << c.name;
   EXPECT_TRUE(derivative_matches(residual, VectorX::Zero(n), J, c.increment))
@@ -157,19 +161,36 @@ TEST(Equations, MatrixIsExactUnderEveryKindOfLoad) {
   for (bool planar : {false, true}) expect_exact_under_loads(planar);
 }
 
-void expect_exact_between_supports(bool slides, Scheme scheme) {
+void expect_exact_between_supports(bool slides, Scheme scheme, const RodMaterial& material, bool exact = false) {
   const Vector3 axis(0.6, 0.0, 0.8);
   const Matrix3 free = slides ? Matrix3(axis * axis.transpose()) : Matrix3::Zero();
-  SceneBuilder builder = testing::tee(JointForm::frame, false, lossy(scheme));
+  SceneBuilder builder = testing::tee(JointForm::frame, false, material);
   builder.support(SupportKind::clamp, {0, 0}, free);
   builder.support(SupportKind::pin, {1, 0}, free);
   builder.support(SupportKind::hold_edge, {2, 2}, free);
-  for (const Case& c : testing::states_of("supports", builder.scene)) expect_matrix_is_exact(c, scheme, 0.3);
+  for (const Case& c : testing::states_of("supports", builder.scene)) expect_matrix_is_exact(c, scheme, 0.3, exact);
 }
 
 TEST(Equations, MatrixIsExactBetweenSupportsOfEveryKind) {
   for (bool slides : {false, true})
-    for (Scheme scheme : kSchemes) expect_exact_between_supports(slides, scheme);
+    for (Scheme scheme : kSchemes) expect_exact_between_supports(slides, scheme, lossy(scheme));
+}
+
+/// With all that turns and dissipates.
+RodMaterial whole(double rotary) {
+  RodMaterial material = lossy(Scheme::backward_euler);
+  material.rotary = rotary;
+  return material;
+}
+
+TEST(Equations, ExactMatrixHasEveryDerivativeInMotion) {
+  for (const Case& c : moving_cases(whole(0.3)))
+    for (Scheme scheme : kSchemes) expect_matrix_is_exact(c, scheme, 0.3, true);
+}
+
+TEST(Equations, ExactMatrixHasThoseByWhatSupportsHold) {
+  for (bool slides : {false, true})
+    for (Scheme scheme : kSchemes) expect_exact_between_supports(slides, scheme, whole(0.3), true);
 }
 
 TEST(Equations, MatrixWithRotaryInertiaIsExactWhereNothingMovesYet) {

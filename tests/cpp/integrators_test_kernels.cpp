@@ -42,8 +42,8 @@ void add_stencil_by_stencil(const Case& c, Assembler& assembler, const ElasticCo
   add_one_by_one(
       c.model, assembler, force, magnitude,
       [&](int e, Local& out) { stretch_local(c.model, k, configuration, e, true, nullptr, out); },
-      [&](int b, Local& out) { bend_local(c.model, k, configuration, b, true, out); },
-      [&](int h, Local& out) { half_local(c.model, c.q, k, configuration, h, true, out); });
+      [&](int b, Local& out) { bend_local(c.model, bend_coefficients(k, b), configuration, b, true, out); },
+      [&](int h, Local& out) { half_local(c.model, c.q, half_coefficients(k, h), configuration, h, true, out); });
 }
 
 /// Discrete gradients of the step to c.q and their matrix, each stencil by itself.
@@ -58,8 +58,8 @@ void add_discrete_stencil_by_stencil(const Case& c, Assembler& assembler, const 
   add_one_by_one(
       c.model, assembler, force, magnitude,
       [&](int e, Local& out) { discrete_stretch_local(c.model, k, step, e, true, given_force, out); },
-      [&](int b, Local& out) { discrete_bend_local(c.model, k, step, b, true, out); },
-      [&](int h, Local& out) { discrete_half_local(c.model, k, step, h, true, out); });
+      [&](int b, Local& out) { discrete_bend_local(c.model, bend_coefficients(k, b), step, b, true, out); },
+      [&](int h, Local& out) { discrete_half_local(c.model, half_coefficients(k, h), step, h, true, out); });
 }
 
 /// More stencils than a pack has lanes, and a remainder.

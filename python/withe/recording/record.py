@@ -7,9 +7,9 @@ holds NumPy arrays only, so it pickles, saves to one file, and needs no engine t
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -18,7 +18,7 @@ from withe import io, view
 from withe.common.frames import ENERGIES, EnergyHistory
 from withe.common.outlines import Named, ObstacleOutline, RodOutline, index_of
 
-__all__ = ["ROD_READOUTS", "EnergyHistory", "Record"]
+__all__ = ["ROD_READOUTS", "EnergyHistory", "Record", "RunGradient"]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -36,6 +36,13 @@ _UNITS = {
     "radii": "m",
 }
 ROD_READOUTS = ("directors", "curvatures", "twists", "tensions", "spins")
+
+
+class RunGradient(Protocol):
+    """What a differentiable run knows."""
+
+    def gradient(self, by: Mapping[str, npt.ArrayLike], wrt: Sequence[Any], /) -> list[Any]:
+        """See `Record.gradient`."""
 
 
 class Record:
@@ -57,12 +64,49 @@ class Record:
         arrays: Mapping[str, npt.NDArray[Any]],
         extras: Iterable[str] = (),
         obstacles: Iterable[ObstacleOutline] = (),
+        derivatives: RunGradient | None = None,
     ) -> None:
+        self._derivatives = derivatives
         self._rods = tuple(rods)
         self._obstacles = tuple(obstacles)
         self._arrays = dict(arrays)
         self._extras = tuple(extras)
         self._check()
+
+    def __getstate__(self) -> dict[str, Any]:
+        return self.__dict__ | {"_derivatives": None}
+
+    def gradient(self, by: Mapping[str, npt.ArrayLike], wrt: Sequence[Any]) -> list[Any]:
+        """Derivatives of a scalar L of this run, by the adjoint method: one way back through its steps.
+
+        Parameters
+        ----------
+        by : mapping
+            "positions", of shape (frames, nodes, 3) [1/m], "velocities", likewise [s/m], or both: derivatives of L by
+            what `positions()` and `velocities()` say.
+        wrt : sequence
+            What to differentiate by: see `Equilibrium.gradient`; also "initial_positions" and "initial_velocities", of
+            shape (nodes, 3), where directors turn along with their edges.
+
+        Returns
+        -------
+        list
+            For each of `wrt`, dL over it, shaped like `Simulation.get`.
+
+        Raises
+        ------
+        ValueError
+            The run was without ``differentiable=True``, or has no gradient and says why; a wrong shape; a derivative out
+            of the plane of a planar scene.
+
+        Notes
+        -----
+        Steps are taken as they ran, whatever was cut: the derivative is that of the numbers computed. Records from
+        files, and unpickled ones, have none.
+        """
+        if self._derivatives is None:
+            raise ValueError("this record has no gradient: run with differentiable=True, and ask before it is saved")
+        return self._derivatives.gradient(by, wrt)
 
     def _check(self) -> None:
         """Refuse arrays that do not fit together."""

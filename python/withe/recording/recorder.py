@@ -11,7 +11,7 @@ import numpy.typing as npt
 from withe.common import validation
 from withe.common.frames import ENERGIES
 from withe.common.outlines import ObstacleOutline, RodOutline
-from withe.recording.record import ROD_READOUTS, Record
+from withe.recording.record import ROD_READOUTS, Record, RunGradient
 
 __all__ = ["Recorder", "present"]
 
@@ -66,6 +66,13 @@ class Moving(Protocol):
 
     def energy(self) -> Energies:
         """Of the whole scene."""
+
+
+class Derivatives(RunGradient, Protocol):
+    """What a differentiable run keeps."""
+
+    def note_frame(self) -> None:
+        """A frame has been taken."""
 
 
 S = TypeVar("S", bound=Moving)
@@ -127,6 +134,7 @@ class Recorder(Generic[S]):
         self._rods = tuple(_outline(rod) for rod in simulation.rods)
         self._columns: dict[str, _Column] = {}
         self._frames = 0
+        self.derivatives: Derivatives | None = None  # of a differentiable run
 
     def capture(self) -> None:
         """Take one frame. A callback's exception propagates, and then no part of the frame is kept.
@@ -172,7 +180,7 @@ class Recorder(Generic[S]):
             arrays = {name: column.values(self._frames) for name, column in self._columns.items()}
         else:
             arrays = {name: values[None][:0].copy() for name, values in self._frame().items()}
-        return Record(self._rods, arrays, self._extra, self._obstacles)
+        return Record(self._rods, arrays, self._extra, self._obstacles, self.derivatives)
 
 
 def _numbers(name: str, value: npt.ArrayLike) -> npt.NDArray[Any]:

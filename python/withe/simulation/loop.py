@@ -12,6 +12,7 @@ import numpy.typing as npt
 from withe.common import validation
 from withe.recording.record import Record
 from withe.recording.recorder import Moving, Recorder
+from withe.simulation.gradients import RunDerivatives
 from withe.simulation.obstacles import obstacle_outlines
 from withe.simulation.stepping import Stepping
 
@@ -35,6 +36,7 @@ class Run(Generic[S]):
         before_step: Callable[[S], object] | None,
         until: Callable[[S], object] | None,
         record: Mapping[str, Callable[[S], npt.ArrayLike]] | None,
+        differentiable: bool = False,
     ) -> None:
         self.duration = validation.positive(duration, "duration")
         step = stepping.session.options.time_step
@@ -64,6 +66,7 @@ class Run(Generic[S]):
         self._recorder = Recorder(simulation, record, obstacle_outlines(stepping.session.directory))
         self._start = stepping.time
         self._ended = False
+        self._differentiable = validation.truth(differentiable, "differentiable")
 
     def go(self, report: Callable[[float], object], stopped: Callable[[], bool]) -> None:
         """Run to the end; `report` hears how much is done [s], and `stopped` may end it."""
@@ -74,7 +77,9 @@ class Run(Generic[S]):
         stepping = self._stepping
         stepping.recorder = self._recorder
         self._report, self._stopped = report, stopped
-        self._recorder.capture()
+        derivatives = RunDerivatives(stepping.session) if self._differentiable else None
+        self._recorder.derivatives = derivatives
+        self._capture()
         done, frame = 0.0, 0
         try:
             while done < self.duration and not self._ended:
@@ -86,11 +91,18 @@ class Run(Generic[S]):
                 if not self._ended:
                     # Time steps add up to the frame's time but for rounding; a frame says the time itself.
                     stepping.frame_time = stepping.session.world.time, self._start + after
-                self._recorder.capture()
+                self._capture()
                 done = after
                 report(done)
         finally:
             stepping.frame_time = None
+            if derivatives is not None:
+                derivatives.end()
+
+    def _capture(self) -> None:
+        self._recorder.capture()
+        if self._recorder.derivatives is not None:
+            self._recorder.derivatives.note_frame()
 
     def _advance(self, begin: float, end: float) -> None:
         """From one frame to the next; both count from the start of the run [s]."""

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -95,9 +96,9 @@ class RodEnergy:
     total: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Equilibrium:
-    """How a static equilibrium was found.
+    """How a static equilibrium was found, and how it depends on what acts.
 
     Attributes
     ----------
@@ -121,6 +122,73 @@ class Equilibrium:
     branch_changed: bool
     iterations: int
     residual: float
+    _gradient: Callable[[npt.ArrayLike, Sequence[Any]], list[Any]] = field(repr=False)
+    _jacobian: Callable[[Any, Sequence[Any]], list[FloatArray]] = field(repr=False)
+
+    def gradient(self, dL_dx: npt.ArrayLike, wrt: Sequence[Any]) -> list[Any]:
+        """Derivatives of a scalar L of this equilibrium, by the adjoint method.
+
+        One solve with the transposed stiffness, whatever the number of unknowns: with g the derivative of L by all
+        unknowns q of the equilibrium R(q, p) = 0, r = -K^-T g gives dL/dp = r^T dR/dp [Giles and Pierce 2000, 2.1].
+
+        Parameters
+        ----------
+        dL_dx : array_like of shape (nodes, 3) [1/m]
+            Derivative of L by the positions of all nodes of the scene, as `Simulation.positions()` has them.
+        wrt : sequence
+            Pairs of a part and a word of `Simulation.get`: of a rod natural_curvature, natural_twist, youngs_modulus,
+            poisson_ratio, density, bend_stiffness and so on; of a load its value; of a mass "mass"; of a support
+            "position" [m] and "rotation" (a rotation vector [rad], about where it is). Or "gravity".
+
+        Returns
+        -------
+        list
+            For each of `wrt`, dL over it, shaped like `Simulation.get`.
+
+        Raises
+        ------
+        ValueError
+            The simulation has left this equilibrium, or it follows not from what acts (a rod free to spin, a limit
+            point); a wrong shape, a derivative out of the plane of a planar scene; something without a gradient.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import withe
+        >>> scene = withe.Scene()
+        >>> rubber = withe.Material(youngs_modulus=1e6, poisson_ratio=0.5, density=1200.0)
+        >>> arm = scene.add_rod(start=(0, 0, 0), end=(0.1, 0, 0), nodes=21, radius=4e-3, material=rubber)
+        >>> wall = scene.clamp(arm.start)
+        >>> simulation = scene.build()
+        >>> height = np.zeros((21, 3))
+        >>> height[-1, 2] = 1.0  # of the tip
+        >>> (by_modulus,) = simulation.equilibrium().gradient(height, wrt=[(arm, "youngs_modulus")])
+        >>> bool(by_modulus > 0.0)
+        True
+        """
+        return self._gradient(dL_dx, wrt)
+
+    def jacobian(self, of: Any, wrt: Sequence[Any]) -> list[FloatArray]:
+        """Derivatives of positions in this equilibrium.
+
+        Parameters
+        ----------
+        of : handle of a node or rod, or name
+        wrt : sequence
+            See `gradient`.
+
+        Returns
+        -------
+        list of ndarray of shape (3, ...) or (nodes, 3, ...)
+            For each of `wrt`, the position of the node (or of the rod's nodes) over it: first the position's axes, then
+            those of `Simulation.get`.
+
+        Raises
+        ------
+        ValueError
+            See `gradient`.
+        """
+        return self._jacobian(of, wrt)
 
 
 @dataclass(frozen=True)

@@ -207,6 +207,7 @@ class Simulation(AppliedLoads, Control, Placement, Measurements):
         before_step: Callable[[Simulation], object] | None = None,
         until: Callable[[Simulation], object] | None = None,
         record: Mapping[str, Callable[[Simulation], npt.ArrayLike]] | None = None,
+        differentiable: bool = False,
     ) -> Record:
         """Advance by a duration and record what happens.
 
@@ -228,6 +229,8 @@ class Simulation(AppliedLoads, Control, Placement, Measurements):
         record : mapping of str to callable
             What else to record: each is called with the simulation at every frame, and its results are
             ``record[name]``.
+        differentiable : bool
+            Whether to keep what `Record.gradient` needs: the unknowns of every step, 8 bytes each.
 
         Returns
         -------
@@ -246,7 +249,7 @@ class Simulation(AppliedLoads, Control, Placement, Measurements):
             or take it back.
         """
         self._stepping.refuse_in_run("run")
-        loop = Run(self, self._stepping, duration, record_every, before_step, until, record)
+        loop = Run(self, self._stepping, duration, record_every, before_step, until, record, differentiable)
         with progress_bar(loop.duration, "simulating", progress) as bar:
             loop.go(bar.update, lambda: False)
         return loop.record

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import sys
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
+import numpy as np
+
 from withe import _core
 from withe.errors import CoarseMeshWarning, CoarseStepWarning, ConvergenceError
+from withe.parts.handles import NodeHandle
 from withe.recording.recorder import Recorder
 from withe.simulation.functions import apply_functions, force_function, step_callback
+from withe.simulation.gradients import Unknown, equilibrium_gradient, equilibrium_jacobian, positions_adjoint
 from withe.simulation.linearisation import Linearisation, Stability
 from withe.simulation.loads import load_index
 from withe.simulation.paths import EquilibriumPath, PathOptions, path_of
@@ -76,7 +80,41 @@ class Stepping:
         stability: Stability = "stable" if found.stable else "diverges"
         if not found.decided:
             stability = self.linearise().stability
-        return Equilibrium(stability == "stable", stability, found.branch_changed, found.iterations, found.residual)
+        gradient, jacobian = self._derivatives()
+        return Equilibrium(
+            stable=stability == "stable",
+            stability=stability,
+            branch_changed=found.branch_changed,
+            iterations=found.iterations,
+            residual=found.residual,
+            _gradient=gradient,
+            _jacobian=jacobian,
+        )
+
+    def _derivatives(
+        self,
+    ) -> tuple[Callable[[Any, Sequence[Unknown]], list[Any]], Callable[[Any, Sequence[Unknown]], list[Any]]]:
+        """Gradient and Jacobian of the equilibrium that the session is in now."""
+        session = self.session
+        found = session.world.positions()
+
+        def check() -> None:
+            if not np.array_equal(session.world.positions(), found):
+                raise ValueError("the simulation has left this equilibrium: ask for gradients before it goes on")
+
+        def gradient(dL_dx: Any, wrt: Sequence[Unknown]) -> list[Any]:
+            check()
+            return equilibrium_gradient(session, positions_adjoint(session, dL_dx, "dL_dx"), wrt)
+
+        def jacobian(of: Any, wrt: Sequence[Unknown]) -> list[Any]:
+            check()
+            if isinstance(of, NodeHandle) or (isinstance(of, str) and "." in of):
+                node, _ = session.directory.node(of, "of")
+                return [rows[0] for rows in equilibrium_jacobian(session, np.array([session.directory.row(node)]), wrt)]
+            rod = session.directory.rod(of)
+            return equilibrium_jacobian(session, session.directory.layout.rows(rod.index), wrt)
+
+        return gradient, jacobian
 
     def path(self, wanted: PathOptions) -> EquilibriumPath:
         """Go along a path of equilibria."""

@@ -1,0 +1,181 @@
+#include "gradients/parameter_gradient.hpp"
+
+#include "model/stencil_numbers.hpp"
+
+namespace withe {
+namespace {
+
+/// By EI1, EI2, GJ of two edges.
+using ByEdges = Dual<6>;
+
+struct EdgeNumbers {
+  ByEdges bend[2], twist;
+};
+
+/// In a plane the one bending stiffness stands in the first place.
+EdgeNumbers edge_numbers(const Model& model, const Parameters& p, int edge, int first) {
+  EdgeNumbers out{{ByEdges::unknown(p.edge_bend(edge, 0), first), ByEdges::unknown(p.edge_bend(edge, 1), first + 1)},
+                  ByEdges::unknown(p.edge_twist(edge), first + 2)};
+  if (model.planar()) {
+    const Vector2 c = model.planar_components[at(model.edge_rod[at(edge)])];
+    out.bend[0] = c(0) * c(0) * out.bend[0] + c(1) * c(1) * out.bend[1];
+    out.bend[1] = ByEdges(0.0);
+  }
+  return out;
+}
+
+class Chain {
+ public:
+  Chain(const Model& model, const Parameters& parameters, const CoefficientAdjoint& by)
+      : model_(model), p_(parameters), by_(by) {
+    const Eigen::Index edges = model.edge_count;
+    for (VectorX* v : {&out.edge_stretch, &out.edge_twist, &out.edge_density, &out.edge_rotary, &out.edge_viscous_time,
+                       &out.edge_drag})
+      v->setZero(edges);
+    out.edge_bend = MatrixX2::Zero(edges, 2);
+    out.added_mass.setZero(model.node_count);
+    for (std::size_t r = 0; r < p_.natural_curvature.size(); ++r) {
+      out.natural_curvature.push_back(MatrixX2::Zero(p_.natural_curvature[r].rows(), 2));
+      out.natural_twist.push_back(VectorX::Zero(p_.natural_twist[r].size()));
+    }
+    out.loads = by.loads;
+    add_masses();
+    add_stiffnesses();
+    add_natural();
+  }
+
+  ParameterGradient out;
+
+ private:
+  void add_masses() {
+    VectorX by_mass(model_.node_count), by_drag(model_.node_count);
+    for (int i = 0; i < model_.node_count; ++i) {
+      const int dof = model_.node_dof[at(i)], n = model_.dimension;
+      Vector3 force = Vector3::Zero();
+      if (model_.planar())
+        force = by_.gravity(dof) * model_.plane->first + by_.gravity(dof + 1) * model_.plane->second;
+      else
+        force = by_.gravity.segment<3>(dof);
+      out.gravity += p_.node_mass(i) * force;
+      by_mass(i) = by_.mass.segment(dof, n).sum() + p_.gravity.dot(force);
+      by_drag(i) = by_.drag.segment(dof, n).sum();
+    }
+    out.added_mass = by_mass;
+    VectorX by_inertia = VectorX::Zero(model_.edge_count);
+    for (int e = 0; e < model_.edge_count; ++e) {
+      const double arc = model_.edge_arc(e);
+      const int tail = model_.edge_tail[at(e)], head = model_.edge_head[at(e)];
+      out.edge_density(e) = 0.5 * arc * (by_mass(tail) + by_mass(head));
+      out.edge_drag(e) = 0.5 * arc * (by_drag(tail) + by_drag(head));
+      if (!p_.lumped && !model_.edge_lumped[at(e)] && !(p_.held_lumped && model_.edge_held[at(e)])) {
+        out.edge_density(e) += arc / 6.0 * by_.mass_coupling(e);
+        out.edge_drag(e) += arc / 6.0 * by_.drag_coupling(e);
+      }
+      if (!model_.planar()) by_inertia(e) = by_.mass(model_.edge_dof[at(e)]);
+    }
+    for (const FrameStencil& s : model_.half) {
+      by_inertia(s.edge) += 0.5 * by_.mass.segment(model_.frame_dof[at(s.frame)], model_.frame_size()).sum();
+      if (s.hinge >= 0) by_inertia(s.edge) += 0.5 * by_.mass(model_.hinges[at(s.hinge)].dof);
+    }
+    out.edge_rotary = by_inertia.cwiseProduct(model_.edge_arc);
+  }
+
+  void add_edge(int edge, const double* slope) {
+    out.edge_bend(edge, 0) += slope[0];
+    out.edge_bend(edge, 1) += slope[1];
+    out.edge_twist(edge) += slope[2];
+  }
+
+  static ByEdges twist_stiffness(const ByEdges& twist, const ByEdges& bend1, const ByEdges& bend2,
+                                 const ArcOfStencil& arc) {
+    if (!arc.turns || value_of(twist) == 0.0 || value_of(bend1) <= 0.0 || value_of(bend2) <= 0.0) return twist;
+    return twist_of_arc(twist, bend1, bend2, arc.square_of_turn, arc.share);
+  }
+
+  void add_stiffnesses() {
+    out.edge_stretch = by_.stretch_stiffness;
+    out.edge_viscous_time = by_.stretch_time;
+    for (Eigen::Index i = 0; i < by_.bend_stiffness.rows(); ++i) {
+      const int a = model_.bend[static_cast<std::size_t>(i)].edge[0],
+                b = model_.bend[static_cast<std::size_t>(i)].edge[1];
+      const double la = model_.edge_arc(a), lb = model_.edge_arc(b);
+      const double va = model_.bend_share(i, 0) * la, vb = model_.bend_share(i, 1) * lb;
+      const EdgeNumbers of_a = edge_numbers(model_, p_, a, 0), of_b = edge_numbers(model_, p_, b, 3);
+      const ByEdges bend1 = in_series(of_a.bend[0], va, of_b.bend[0], vb),
+                    bend2 = in_series(of_a.bend[1], va, of_b.bend[1], vb),
+                    twist = twist_stiffness(in_series(of_a.twist, 0.5 * la, of_b.twist, 0.5 * lb), bend1, bend2,
+                                            arc_of_bend(model_, i));
+      const ByEdges sum =
+          by_.bend_stiffness(i, 0) * bend1 + by_.bend_stiffness(i, 1) * bend2 + by_.bend_stiffness(i, 2) * twist;
+      add_edge(a, sum.slope);
+      add_edge(b, sum.slope + 3);
+      out.edge_viscous_time(a) += by_.bend_time(i) * la / (la + lb);
+      out.edge_viscous_time(b) += by_.bend_time(i) * lb / (la + lb);
+    }
+    for (Eigen::Index i = 0; i < by_.half_stiffness.rows(); ++i) {
+      const int e = model_.half[static_cast<std::size_t>(i)].edge;
+      const EdgeNumbers of = edge_numbers(model_, p_, e, 0);
+      const double inverse = 1.0 / (model_.half_share(i) * model_.edge_arc(e));
+      const ByEdges bend1 = inverse * of.bend[0], bend2 = inverse * of.bend[1],
+                    twist = twist_stiffness(of.twist / model_.half_voronoi(i), bend1, bend2, arc_of_half(model_, i));
+      const ByEdges sum =
+          by_.half_stiffness(i, 0) * bend1 + by_.half_stiffness(i, 1) * bend2 + by_.half_stiffness(i, 2) * twist;
+      add_edge(e, sum.slope);
+      out.edge_viscous_time(e) += by_.half_time(i);
+    }
+  }
+
+  /// What a stencil's natural strains say of the natural shape that a rod has at one of its own.
+  void add_shape(int rod, int stencil, double voronoi, const Vector3& by) {
+    if (rod < 0 || stencil < 0) return;
+    const auto r = static_cast<std::size_t>(rod);
+    using ByShape = Dual<3>;
+    const Vec3<ByShape> strain = natural_strain(p_.measure, ByShape::unknown(p_.natural_curvature[r](stencil, 0), 0),
+                                                ByShape::unknown(p_.natural_curvature[r](stencil, 1), 1),
+                                                ByShape::unknown(p_.natural_twist[r](stencil), 2), voronoi);
+    ByShape sum(0.0);
+    if (model_.planar())
+      sum = by(0) * (model_.planar_components[r](0) * strain.x + model_.planar_components[r](1) * strain.y);
+    else
+      sum = by(0) * strain.x + by(1) * strain.y + by(2) * strain.z;
+    out.natural_curvature[r](stencil, 0) += sum.slope[0];
+    out.natural_curvature[r](stencil, 1) += sum.slope[1];
+    out.natural_twist[r](stencil) += sum.slope[2];
+  }
+
+  void add_natural() {
+    for (std::size_t r = 0; r < model_.place.size(); ++r)
+      for (std::size_t s = 0; s < model_.place[r].size(); ++s) {
+        const int bend = model_.place[r][s].bend;
+        if (bend >= 0)
+          add_shape(static_cast<int>(r), static_cast<int>(s), model_.bend_voronoi(bend),
+                    by_.bend_natural.row(bend).transpose());
+      }
+    for (std::size_t b = 0; b < model_.bend.size(); ++b) {
+      if (model_.bend_owner[b].first >= 0 || model_.bend_owner[b].second < -1) continue;
+      for (int edge : model_.bend[b].edge) {
+        const int rod = model_.edge_rod[at(edge)];
+        const int stencils = static_cast<int>(p_.natural_twist[at(rod)].size());
+        if (stencils == 0) continue;
+        add_shape(rod, edge == model_.rod_first_edge[at(rod)] ? 0 : stencils - 1, 0.5 * model_.edge_arc(edge),
+                  by_.bend_natural.row(static_cast<Eigen::Index>(b)).transpose());
+      }
+    }
+    for (std::size_t h = 0; h < model_.half.size(); ++h)
+      add_shape(model_.half_owner[h].first, model_.half_owner[h].second,
+                model_.half_voronoi(static_cast<Eigen::Index>(h)),
+                by_.half_natural.row(static_cast<Eigen::Index>(h)).transpose());
+  }
+
+  const Model& model_;
+  const Parameters& p_;
+  const CoefficientAdjoint& by_;
+};
+
+}  // namespace
+
+ParameterGradient parameter_gradient(const Model& model, const Parameters& parameters, const CoefficientAdjoint& by) {
+  return Chain(model, parameters, by).out;
+}
+
+}  // namespace withe

@@ -1,0 +1,22 @@
+#pragma once
+/// From derivatives by the coefficients of steps to those by the parameters that a user sets.
+
+#include "steps/step_adjoint.hpp"
+
+namespace withe {
+
+/// Derivatives of a scalar by `Parameters` and by the values of loads, shaped like them.
+struct ParameterGradient {
+  VectorX edge_stretch;
+  MatrixX2 edge_bend;
+  VectorX edge_twist, edge_density, edge_rotary, edge_viscous_time, edge_drag;
+  VectorX added_mass;
+  Vector3 gravity = Vector3::Zero();
+  std::vector<MatrixX2> natural_curvature;
+  std::vector<VectorX> natural_twist;
+  MatrixX3 loads;
+};
+
+ParameterGradient parameter_gradient(const Model& model, const Parameters& parameters, const CoefficientAdjoint& by);
+
+}  // namespace withe

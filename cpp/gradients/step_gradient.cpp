@@ -1,0 +1,174 @@
+#include "gradients/step_gradient.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "geometry/rotation.hpp"
+
+namespace withe {
+namespace {
+
+Vec3d edge_vector(const Model& model, const VectorX& q, int edge) {
+  const int a = model.tail_dof[at(edge)], b = model.head_dof[at(edge)];
+  return {q[b] - q[a], q[b + 1] - q[a + 1], q[b + 2] - q[a + 2]};
+}
+
+void add_to_edge(const Model& model, int edge, const Vec3d& v, VectorX& out) {
+  const int a = model.tail_dof[at(edge)], b = model.head_dof[at(edge)];
+  for (int i = 0; i < 3; ++i) {
+    out[b + i] += v[i];
+    out[a + i] -= v[i];
+  }
+}
+
+EquationOptions exact(EquationOptions options) {
+  options.exact = true;
+  return options;
+}
+
+}  // namespace
+
+StepGradient::StepGradient(const Model& model, EquationOptions options) : equations_(model, exact(options)) {}
+
+void StepGradient::begin(const StepTaken& step) {
+  step_.emplace(step);
+  const Model& model = equations_.model();
+  const bool middle = step.rule == StepRule::midpoint || step.rule == StepRule::energy_momentum;
+  equations_.begin(step.start, step.parameters, step.rule, middle ? 0.5 * step.duration : step.duration);
+  if (!model.constraints.empty() && moves()) equations_.held_acceleration().setZero(model.dof_count);
+  if (middle)
+    z_ = 0.5 * (step.start.q + step.end);
+  else
+    z_ = step.end;
+  equations_.evaluate(z_, true, nullptr, data_);
+  if (!model.planar()) compute_configuration(model, step.start, step.end, end_);
+  Assembler& assembler = equations_.assembler();
+  LinearSolver& solver = assembler.solver();
+  exact_.assign(solver.values().begin(), solver.values().end());
+  assembler.project_matrix();
+  const bool solved = solver.factorize().status == FactorStatus::ok;
+  std::copy(exact_.begin(), exact_.end(), solver.values().begin());
+  if (!solved)
+    throw std::invalid_argument(
+        "the state does not follow from what acts, as the matrix is singular there: something is free to move or to "
+        "spin, or it is a limit point");
+}
+
+double StepGradient::imbalance() const {
+  return data_.residual.cwiseAbs().maxCoeff() / std::max(data_.magnitude.maxCoeff(), 1e-300);
+}
+
+/// From the state at the end, in its own coordinates, to q1.
+void StepGradient::set_end(const StateAdjoint& state) {
+  const Model& model = equations_.model();
+  by_end_ = state.q;
+  if (model.planar()) return;
+  for (int e = 0; e < model.edge_count; ++e)
+    add_to_edge(model, e, state.q[model.edge_dof[at(e)]] * end_.edge[at(e)].spin, by_end_);
+  for (int dof : model.frame_dof)
+    by_end_.segment<3>(dof) = cayley_spin(step_->end.segment<3>(dof)).transpose() * state.q.segment<3>(dof);
+}
+
+/// rows = -(R_z^T)^-1 zbar on what is free, and what it makes of the columns of R_z.
+void StepGradient::solve() {
+  const Assembler& assembler = equations_.assembler();
+  rows_ = -by_z_;
+  assembler.project(rows_);
+  assembler.solver().solve_transposed({rows_.data(), static_cast<std::size_t>(rows_.size())});
+  assembler.project(rows_);
+  assembler.multiply_transposed(rows_, columns_);
+}
+
+void StepGradient::pull_back(StateAdjoint& state, CoefficientAdjoint& by, VectorX& held) {
+  const Model& model = equations_.model();
+  const Assembler& assembler = equations_.assembler();
+  set_end(state);
+  // v1 = rate (q1 - q0) - (end_rate - 1) v0.
+  VectorX start = VectorX::Zero(model.dof_count), velocity = start;
+  if (moves()) {
+    VectorX free = state.v;
+    assembler.project(free);
+    const double rate = end_rate() / step_->duration;
+    by_end_ += rate * free;
+    start -= rate * free;
+    velocity -= (end_rate() - 1.0) * free;
+  }
+  start -= (end_rate() - 1.0) * by_end_;
+  by_z_ = end_rate() * by_end_;
+  solve();
+
+  StepAdjoint adjoint(model, rows_, by);
+  for (const std::unique_ptr<Term>& term : equations_.terms())
+    term->add_adjoint(equations_.problem(), data_, assembler, adjoint);
+  if (moves()) {
+    start += adjoint.start;
+    velocity += adjoint.velocity;
+    if (!model.planar()) {
+      add_transport(state, adjoint, start);
+      add_frames(state, adjoint, start);
+    }
+  }
+  add_held(start, held);
+  if (!moves()) return;
+  state.q = start;
+  state.v = velocity;
+  assembler.project(state.v);
+}
+
+void StepGradient::add_frames(const StateAdjoint& state, const StepAdjoint& adjoint, VectorX& start) const {
+  const Model& model = equations_.model();
+  for (int f = 0; f < model.frame_count; ++f) {
+    const int dof = model.frame_dof[at(f)];
+    const Vector3 at_end = state.q.segment<3>(dof) + adjoint.end_spin.row(f).transpose();
+    start.segment<3>(dof) = cayley(step_->end.segment<3>(dof)).transpose() * at_end +
+                            cayley(z_.segment<3>(dof)).transpose() * adjoint.middle_spin.row(f).transpose() +
+                            adjoint.start_spin.row(f).transpose();
+  }
+}
+
+/// What turns directors and leaves nodes their part of torques, as far as it depends on the edges of the start.
+void StepGradient::add_transport(const StateAdjoint& state, const StepAdjoint& adjoint, VectorX& start) const {
+  const Model& model = equations_.model();
+  for (int e = 0; e < model.edge_count; ++e) {
+    const int angle = model.edge_dof[at(e)];
+    const EdgeFrame<double>& f = data_.configuration.edge[at(e)];
+    const EdgeFrame<double>& last = end_.edge[at(e)];
+    const Vec3d e0 = edge_vector(model, step_->start.q, e);
+    const double inverse0 = 1.0 / std::sqrt(dot(e0, e0));
+    // Where all of an edge's angles, of the start too, grow alike and its reference director turns back, nothing
+    // changes.
+    const double turns = columns_[angle] + adjoint.start[angle],
+                 at_z = turns - adjoint.end_turn[e] - adjoint.start_turn[e];
+    Vec3d by = (at_z * inverse0 / f.inverse_length) * f.spin +
+               ((adjoint.end_turn[e] + state.q[angle]) * inverse0 / last.inverse_length) * last.spin;
+    const double torque = data_.full_residual[angle] - data_.inertia[angle];
+    const Vec3d u = torque * edge_vector(model, rows_, e);
+    const Vec3d s = inverse0 * e0;
+    const double k = inverse0 / (1.0 + dot(s, f.tangent));
+    const Vec3d by_s = (-k * f.inverse_length) * cross(f.tangent, u) - (k * dot(u, f.spin)) * f.tangent;
+    by += by_s - dot(by_s, s) * s;
+    add_to_edge(model, e, by, start);
+  }
+}
+
+/// What supports hold is prescribed: q1 there, and so z. Accelerations there are prescribed too.
+void StepGradient::add_held(VectorX& start, VectorX& held) const {
+  const Model& model = equations_.model();
+  if (model.constraints.empty()) return;
+  VectorX by = by_z_ + columns_;
+  if (moves()) {
+    VectorX force;
+    multiply(model, equations_.mass(), rows_, force);
+    const double h = equations_.problem().interval;
+    by -= force / (h * h);
+  }
+  const double share = 1.0 / end_rate();  // of z = share q1 + (1 - share) q0
+  for (const Constraint& c : model.constraints) {
+    const Vector3 part = c.held(by);
+    held.segment(c.first, c.size) += share * part.head(c.size);
+    start.segment(c.first, c.size) += (1.0 - share) * part.head(c.size);
+  }
+}
+
+}  // namespace withe

@@ -1,0 +1,71 @@
+#pragma once
+/// The adjoint of one step: derivatives of a scalar by the state at a step's end become those by the state at its start
+/// and by the numbers that act in it.
+///
+/// A step solves R(z; start, p) = 0. With zbar the derivative of the scalar by z, R_z^T r = -zbar gives r, and the
+/// scalar's derivative by anything else x is r^T R_x, beside what depends on x directly [Giles and Pierce 2000,
+/// sec. 2.1]. R_z is the exact matrix; r^T R_x is what the terms say (`Term::add_adjoint`).
+///
+/// What a step carries on besides q and v is where directors are. A reference director that is transported along has
+/// one angle to it, so a state is differentiated by positions, by how an edge's directors turn about it (psi) and by
+/// how a joint's frame turns (a rotation vector), in the places that q has for angles and frames. From a start with
+/// vector e0 to the vector e directors turn by
+///   d psi = d theta + spin . d e + back . d e0,    spin = -(t0 x t) / (l (1 + t0 . t)),   back = l / l0 spin,
+/// theta counted from a start that turns along.
+
+#include <optional>
+
+#include "steps/equations.hpp"
+
+namespace withe {
+
+/// Derivatives of a scalar by a state, in the places of its unknowns.
+struct StateAdjoint {
+  VectorX q;  ///< positions [1/m], turns of directors and of frames [1/rad], angles of hinges
+  VectorX v;  ///< [s/m], [s/rad]
+};
+
+/// What is differentiated: a step from `start` to q1.
+struct StepTaken {
+  const State& start;
+  const Parameters& parameters;
+  StepRule rule;
+  double duration;  ///< [s]; statics: 0
+  const VectorX& end;
+};
+
+class StepGradient {
+ public:
+  StepGradient(const Model& model, EquationOptions options);
+
+  Equations& equations() { return equations_; }
+
+  /// Prepares for a step; what it refers to must outlive `pull_back`. Throws std::invalid_argument where no state
+  /// follows from what acts.
+  void begin(const StepTaken& step);
+  /// Of the last evaluation: greatest force out of balance over the greatest that there is [-].
+  double imbalance() const;
+  /// Makes of the adjoint of the state at the end that of the state at the start, and adds what coefficients and held
+  /// unknowns (at the end, in coordinates of the state) contribute. Throws std::invalid_argument where no gradient is
+  /// known.
+  void pull_back(StateAdjoint& state, CoefficientAdjoint& by, VectorX& held);
+
+ private:
+  void set_end(const StateAdjoint& state);
+  void solve();
+  void add_transport(const StateAdjoint& state, const StepAdjoint& adjoint, VectorX& start) const;
+  void add_frames(const StateAdjoint& state, const StepAdjoint& adjoint, VectorX& start) const;
+  void add_held(VectorX& start, VectorX& held) const;
+  bool moves() const { return step_->rule != StepRule::statics; }
+  bool in_middle() const { return equations_.problem().in_middle(); }
+  double end_rate() const { return equations_.problem().end_rate(); }
+
+  Equations equations_;
+  std::optional<StepTaken> step_;
+  StepData data_;
+  Configuration end_;
+  VectorX z_, by_end_, by_z_, rows_, columns_;
+  std::vector<double> exact_;
+};
+
+}  // namespace withe

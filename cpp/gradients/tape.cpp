@@ -1,0 +1,145 @@
+#include "gradients/tape.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <stdexcept>
+#include <utility>
+
+namespace withe {
+namespace {
+
+MatrixX3 at_nodes(const Model& model, const VectorX& by) {
+  MatrixX3 out(model.node_count, 3);
+  for (int i = 0; i < model.node_count; ++i) {
+    const int dof = model.node_dof[at(i)];
+    if (model.planar())
+      out.row(i) = by(dof) * model.plane->first + by(dof + 1) * model.plane->second;
+    else
+      out.row(i) = by.segment<3>(dof);
+  }
+  return out;
+}
+
+}  // namespace
+
+void add_to_nodes(const Model& model, const MatrixX3& by, VectorX& out) {
+  for (Eigen::Index i = 0; i < by.rows(); ++i) {
+    const int dof = model.node_dof[static_cast<std::size_t>(i)];
+    const Vector3 row = by.row(i);
+    if (model.planar())
+      out.segment<2>(dof) += Vector2(row.dot(model.plane->first), row.dot(model.plane->second));
+    else
+      out.segment<3>(dof) += row;
+  }
+}
+
+/// Goes through the states of a run again, and back.
+class Tape::Player {
+ public:
+  explicit Player(const Tape& tape) : tape_(tape), model_(tape.model_) {}
+
+  /// The gradient of a step's rule, made when it is first met.
+  StepGradient& gradient(StepRule rule) {
+    std::unique_ptr<StepGradient>& made = gradients_[static_cast<std::size_t>(rule)];
+    if (!made) {
+      EquationOptions options = tape_.options_;
+      options.rule = rule;
+      made = std::make_unique<StepGradient>(model_, options);
+      made->equations().loads().values = tape_.loads_;
+    }
+    return *made;
+  }
+
+  void advance(const Step& step, State& state) {
+    const double rate = step.rule == StepRule::backward_euler ? 1.0 : 2.0;
+    VectorX v = (rate / step.duration) * (step.end - state.q) - (rate - 1.0) * state.v;
+    gradient(step.rule).equations().assembler().project(v);
+    if (!model_.planar()) compute_configuration(model_, state, step.end, configuration_);
+    accept_configuration(model_, step.end, configuration_, state);
+    state.v = v;
+  }
+
+ private:
+  const Tape& tape_;
+  const Model& model_;
+  std::array<std::unique_ptr<StepGradient>, 5> gradients_;
+  Configuration configuration_;
+};
+
+Tape::Tape(const Model& model, EquationOptions options, State first, Parameters parameters, std::vector<Vector3> loads)
+    : model_(model),
+      options_(options),
+      first_(std::move(first)),
+      parameters_(std::move(parameters)),
+      loads_(std::move(loads)),
+      last_(first_.q),
+      last_velocity_(first_.v) {}
+
+void Tape::record(StepRule rule, double duration, const VectorX& end, const State& after) {
+  steps_.push_back({rule, duration, end});
+  last_ = after.q;
+  last_velocity_ = after.v;
+}
+
+void Tape::cut(long count, const State& after) {
+  if (count >= this->count()) return;
+  steps_.resize(static_cast<std::size_t>(count));
+  last_ = after.q;
+  last_velocity_ = after.v;
+}
+
+void Tape::refuse(const std::string& why) {
+  if (refused_.empty()) refused_ = why;
+}
+
+bool Tape::continues(const State& state, const Parameters& parameters, const std::vector<Vector3>& loads) const {
+  return parameters.version == parameters_.version && loads == loads_ && state.q == last_ && state.v == last_velocity_;
+}
+
+RunGradient Tape::gradient(std::vector<MomentAdjoint> moments) const {
+  if (!refused_.empty()) throw std::invalid_argument("no gradient is known of this run: " + refused_);
+  std::sort(moments.begin(), moments.end(),
+            [](const MomentAdjoint& a, const MomentAdjoint& b) { return a.steps < b.steps; });
+  if (!moments.empty() && (moments.front().steps < 0 || moments.back().steps > count()))
+    throw std::invalid_argument("a moment lies outside of the run");
+
+  Player player(*this);
+  const auto stride = static_cast<std::size_t>(std::ceil(std::sqrt(static_cast<double>(steps_.size()) + 1.0)));
+  std::vector<State> starts;  // of every stretch of so many steps
+  State state = first_;
+  for (std::size_t k = 0; k < steps_.size(); ++k) {
+    if (k % stride == 0) starts.push_back(state);
+    player.advance(steps_[k], state);
+  }
+  StateAdjoint adjoint{VectorX::Zero(model_.dof_count), VectorX::Zero(model_.dof_count)};
+  CoefficientAdjoint coefficients(model_, loads_.size());
+  VectorX held = VectorX::Zero(model_.dof_count);
+  std::vector<State> states;
+  const auto add_moments = [&](std::size_t steps) {
+    for (; !moments.empty() && moments.back().steps == static_cast<long>(steps); moments.pop_back()) {
+      add_to_nodes(model_, moments.back().positions, adjoint.q);
+      add_to_nodes(model_, moments.back().velocities, adjoint.v);
+    }
+  };
+  for (std::size_t k = steps_.size(); k-- > 0;) {
+    const std::size_t first = k / stride * stride;
+    if (k == steps_.size() - 1 || k % stride == stride - 1) {
+      states.assign(1, starts[k / stride]);
+      for (std::size_t j = first; j < k; ++j) {
+        states.push_back(states.back());
+        player.advance(steps_[j], states.back());
+      }
+    }
+    add_moments(k + 1);
+    const Step& step = steps_[k];
+    StepGradient& gradient = player.gradient(step.rule);
+    gradient.begin({states[k - first], parameters_, step.rule, step.duration, step.end});
+    gradient.pull_back(adjoint, coefficients, held);
+  }
+  add_moments(0);
+  return {parameter_gradient(model_, parameters_, coefficients),
+          {at_nodes(model_, adjoint.q), at_nodes(model_, adjoint.v)}};
+}
+
+}  // namespace withe

@@ -1,0 +1,69 @@
+#pragma once
+/// A run as the adjoint method needs it: what each step led to, so that states come again without a solve.
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "gradients/parameter_gradient.hpp"
+#include "gradients/step_gradient.hpp"
+
+namespace withe {
+
+/// Derivatives of a scalar by the state that a run began with.
+struct InitialGradient {
+  MatrixX3 positions;   ///< per node [1/m]; directors turn along with their edges, without spin
+  MatrixX3 velocities;  ///< per node [s/m]
+};
+
+struct RunGradient {
+  ParameterGradient parameters;
+  InitialGradient initial;
+};
+
+/// What a scalar depends on at a moment of a run: after so many steps.
+struct MomentAdjoint {
+  long steps = 0;
+  MatrixX3 positions, velocities;  ///< per node; or empty
+};
+
+/// Adds to the places of nodes what is given per node, in the axes of space.
+void add_to_nodes(const Model& model, const MatrixX3& by, VectorX& out);
+
+class Tape {
+ public:
+  /// Of a run that begins so; these are kept.
+  Tape(const Model& model, EquationOptions options, State first, Parameters parameters, std::vector<Vector3> loads);
+
+  long count() const { return static_cast<long>(steps_.size()); }
+  /// Notes a step to q1 that has been accepted.
+  void record(StepRule rule, double duration, const VectorX& end, const State& after);
+  /// Forgets all but so many.
+  void cut(long count, const State& after);
+  /// Says why no gradient goes through this run; the first reason stays.
+  void refuse(const std::string& why);
+  /// Whether that is what the last step led to, and what acts is what acted.
+  bool continues(const State& state, const Parameters& parameters, const std::vector<Vector3>& loads) const;
+
+  /// Throws std::invalid_argument where none is known.
+  RunGradient gradient(std::vector<MomentAdjoint> moments) const;
+
+ private:
+  struct Step {
+    StepRule rule;
+    double duration;
+    VectorX end;
+  };
+  class Player;
+
+  Model model_;
+  EquationOptions options_;
+  State first_;
+  Parameters parameters_;
+  std::vector<Vector3> loads_;
+  std::vector<Step> steps_;
+  VectorX last_, last_velocity_;  ///< what the last step led to
+  std::string refused_;
+};
+
+}  // namespace withe

@@ -1,0 +1,50 @@
+#pragma once
+/// How the numbers of a stencil follow from those of its edges, on any scalar: doubles, or dual numbers for
+/// derivatives.
+
+#include <cmath>
+#include <numbers>
+
+#include "common/dual.hpp"
+#include "common/types.hpp"
+#include "geometry/bend_measure.hpp"
+#include "geometry/vec3.hpp"
+
+namespace withe {
+
+/// Two parts of edges in series: V / K = V0 / K0 + V1 / K1.
+template <class Scalar>
+Scalar in_series(const Scalar& k0, double v0, const Scalar& k1, double v1) {
+  if (value_of(k0) == 0.0 || value_of(k1) == 0.0) return Scalar(0.0);
+  return 1.0 / (v0 / k0 + v1 / k1);
+}
+
+/// A moment along the middle of an arc that turns by phi bends its ends, to either side: 1 / Kt + phi^2 / (12 K), K
+/// against bending about the arc's normal, of which the curvature's `share` towards either director tells the part.
+template <class Scalar>
+Scalar twist_of_arc(const Scalar& twist, const Scalar& bend1, const Scalar& bend2, double square_of_turn,
+                    const Vector2& share) {
+  return 1.0 / (1.0 / twist + square_of_turn / 12.0 * (share(0) / bend2 + share(1) / bend1));
+}
+
+/// 2 tan(|kappa| V / 2) / |kappa| [m], which makes a discrete curvature of one of the smooth rod.
+template <class Scalar>
+Scalar discrete_over_smooth(const Scalar& kappa1, const Scalar& kappa2, double voronoi) {
+  using std::sqrt;
+  const Scalar square = kappa1 * kappa1 + kappa2 * kappa2;
+  if (value_of(square) * voronoi * voronoi < 1e-16) return voronoi + (voronoi * voronoi * voronoi / 12.0) * square;
+  const Scalar k = sqrt(square), phi = voronoi * k;
+  const double t = std::tan(0.5 * value_of(phi));
+  return chain(phi, 2.0 * t, 1.0 + t * t) / k;
+}
+
+/// Strains of bending and twisting of a naturally curved and twisted stencil.
+template <class Scalar>
+Vec3<Scalar> natural_strain(const BendMeasure& measure, const Scalar& kappa1, const Scalar& kappa2, const Scalar& twist,
+                            double voronoi) {
+  const Scalar factor = discrete_over_smooth(kappa1, kappa2, voronoi), x = factor * kappa1, y = factor * kappa2;
+  const Scalar f = bend_factor(measure, x * x + y * y).value;
+  return {f * x, f * y, f * (voronoi * twist)};
+}
+
+}  // namespace withe

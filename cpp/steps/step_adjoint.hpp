@@ -1,0 +1,56 @@
+#pragma once
+/// Derivatives of a step by what it is given, times a vector: what the adjoint method asks of each term.
+
+#include "model/model.hpp"
+
+namespace withe {
+
+/// Derivatives of a scalar by the coefficients that the equations of a step are made of.
+struct CoefficientAdjoint {
+  VectorX stretch_stiffness, stretch_time;  ///< per edge: by EA [1/N] and by viscous time [1/s]
+  Columns3 bend_stiffness, bend_natural;    ///< per stencil: by stiffnesses [1/(N m)], by natural strains
+  Columns3 half_stiffness, half_natural;
+  VectorX bend_time, half_time;                      ///< by viscous times [1/s]
+  VectorX mass, mass_coupling, drag, drag_coupling;  ///< by `MassMatrix`
+  VectorX gravity;                                   ///< per unknown, by its force [1/N]
+  MatrixX3 loads;                                    ///< per load, by its value
+
+  explicit CoefficientAdjoint(const Model& model, std::size_t load_count)
+      : stretch_stiffness(VectorX::Zero(model.edge_count)),
+        stretch_time(stretch_stiffness),
+        bend_stiffness(Columns3::Zero(static_cast<Eigen::Index>(model.bend.size()), 3)),
+        bend_natural(bend_stiffness),
+        half_stiffness(Columns3::Zero(static_cast<Eigen::Index>(model.half.size()), 3)),
+        half_natural(half_stiffness),
+        bend_time(VectorX::Zero(bend_stiffness.rows())),
+        half_time(VectorX::Zero(half_stiffness.rows())),
+        mass(VectorX::Zero(model.dof_count)),
+        mass_coupling(VectorX::Zero(model.edge_count)),
+        drag(mass),
+        drag_coupling(mass_coupling),
+        gravity(mass),
+        loads(MatrixX3::Zero(static_cast<Eigen::Index>(load_count), 3)) {}
+};
+
+/// rows^T times the derivatives of a step's residual, at fixed z. An edge's frame and a joint's are functions of the
+/// start: they are taken by how they turn, in the configuration that they are part of.
+struct StepAdjoint {
+  const VectorX& rows;                         ///< what the residual is multiplied by
+  VectorX start, velocity;                     ///< by q0 (its angles: of directors) and v0
+  VectorX start_turn, end_turn;                ///< per edge: by the angle of its directors at the start, at q1 [rad]
+  MatrixX3 start_spin, middle_spin, end_spin;  ///< per frame: by its rotation vector at the start, at z, at q1 [rad]
+  CoefficientAdjoint& coefficients;
+
+  StepAdjoint(const Model& model, const VectorX& rows_of, CoefficientAdjoint& by)
+      : rows(rows_of),
+        start(VectorX::Zero(model.dof_count)),
+        velocity(start),
+        start_turn(VectorX::Zero(model.edge_count)),
+        end_turn(start_turn),
+        start_spin(MatrixX3::Zero(model.frame_count, 3)),
+        middle_spin(start_spin),
+        end_spin(start_spin),
+        coefficients(by) {}
+};
+
+}  // namespace withe

@@ -1,0 +1,84 @@
+#pragma once
+/// Inertia of an edge about itself, on any scalar: doubles, or dual numbers for its derivatives.
+
+#include <cmath>
+
+#include "common/dual.hpp"
+#include "geometry/frames.hpp"
+
+namespace withe {
+
+/// What a step's rotation by `angle` counts for where the middle of the step is that of a rotation: its Cayley vector.
+template <class Scalar>
+Scalar finite_turn(const Scalar& angle) {
+  const double t = std::tan(0.5 * value_of(angle));
+  return chain(angle, 2.0 * t, 1.0 + t * t);
+}
+
+/// An edge in a step: as z has it, its vectors at the start (at the end: midpoint rules only), and how its angle moves.
+template <class Scalar>
+struct TurningEdge {
+  Vec3<Scalar> tangent, spin;  ///< at z
+  Scalar inverse_length;
+  Vec3<Scalar> start_tangent, end_tangent;
+  Scalar start_length, end_length;  ///< energy-momentum steps only
+  Scalar change;                    ///< of the angle from the start to z
+  Scalar start_rate;                ///< [rad/s]
+};
+
+/// What is added to the rows: of the head (and taken from those of the tail) and of the angle.
+template <class Scalar>
+struct TurningForce {
+  Vec3<Scalar> head;
+  Scalar torque;
+};
+
+/// An edge that spins at omega and turns also needs the couple I omega t x dt/dt: nodal forces
+/// +- I omega (dt/dt x t) / l, which do no work; this one acts at its head. `rate`: of the edge's vector.
+template <class Scalar>
+Vec3<Scalar> spin_couple(double inertia, const Scalar& omega, const Vec3<Scalar>& rate, const Vec3<Scalar>& tangent,
+                         const Scalar& inverse_length) {
+  return (inertia * omega * inverse_length * inverse_length) * cross(rate, tangent);
+}
+
+/// Of a step of backward Euler over h. psi = theta + spin . e is what turns: the edge's inertia acts on the nodes as its
+/// elastic torque does. It does no work either, since spin is normal to the edge before and now.
+template <class Scalar>
+TurningForce<Scalar> euler_turning(double inertia, double interval, const TurningEdge<Scalar>& edge,
+                                   const Vec3<Scalar>& moved) {
+  const double inverse = 1.0 / interval;
+  const Scalar omega = inverse * edge.change;
+  const Scalar torque = inertia * (omega - edge.start_rate) * inverse;
+  return {spin_couple<Scalar>(inertia, omega, Scalar(inverse) * moved, edge.tangent, edge.inverse_length) +
+              torque * edge.spin,
+          torque};
+}
+
+/// Of a step under the midpoint rules over dt, such that angular momentum is kept exactly. The spin's part of it,
+/// I omega t, changes in a step by dt m, m = I (omega1 t1 - omega0 t0) / dt: nodes and angle of the edge take that
+/// moment like any other, about where the edge is in the middle. In energy-momentum steps omega is 2 tan(D theta / 2) /
+/// dt, as in a rigid rotation of the whole, and an axial force that vanishes with the square of the step makes the work
+/// of m what kinetic energy changes by.
+template <class Scalar>
+TurningForce<Scalar> midpoint_turning(double inertia, double dt, bool conserves_energy,
+                                      const TurningEdge<Scalar>& edge) {
+  const double inverse = 1.0 / dt;
+  const Scalar change = 2.0 * edge.change;
+  const Scalar turn = conserves_energy ? finite_turn(change) : change;
+  const Vec3<Scalar>&t0 = edge.start_tangent, &t1 = edge.end_tangent;
+  const Vec3<Scalar> moment =
+      Scalar(inertia * inverse) * ((2.0 * inverse * turn - edge.start_rate) * t1 - edge.start_rate * t0);
+  const Scalar torque = dot(moment, edge.tangent);
+  Vec3<Scalar> force = edge.inverse_length * cross(moment, edge.tangent);
+  // An edge's torque turns its nodes by spin . e as well; that of inertia takes back what all others do.
+  force += torque * edge.spin;
+  if (conserves_energy) {
+    const Vec3<Scalar> apart = t1 - t0;
+    const Scalar mean = 0.5 * (edge.start_length + edge.end_length), cosine = 0.5 * dot(t0 + t1, edge.tangent);
+    const Scalar rate = inverse * turn;
+    force -= (inertia * rate * rate * dot(apart, apart) / (4.0 * mean * cosine)) * edge.tangent;
+  }
+  return {force, torque};
+}
+
+}  // namespace withe

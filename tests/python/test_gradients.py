@@ -1,0 +1,270 @@
+"""Gradients of equilibria and of runs, against differences of whole equilibria and whole runs."""
+
+import pickle
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import withe
+
+TIGHT = {"step_tolerance": 1e-13, "force_tolerance": 1e-12}
+NODES = 11
+
+
+class Drawn:
+    """A curved arm, alone or with a branch, in a plane or in space, with everything that can be set."""
+
+    def __init__(self, *, planar, joint, integrator, support="frame", viscosity=0.0, radius=1.5e-2, **options):
+        self.planar, self.support = planar, support
+        scene = withe.Scene()
+        material = withe.Material(youngs_modulus=1e6, poisson_ratio=0.4, density=1200.0, viscosity=viscosity)
+        s = np.linspace(0.0, 1.0, NODES)
+        points = np.stack([0.3 * s, 0.0 * s if planar else 0.04 * np.sin(3.0 * s), 0.05 * np.sin(2.0 * s)], 1)
+        self.arm = scene.add_rod(points=points, radius=radius, material=material, name="arm")
+        self.wall = None
+        if support == "frame":
+            self.wall = scene.clamp(self.arm.start)
+        elif support == "edge":
+            self.wall = scene.clamp(self.arm.start, hold="edge")
+        if joint:
+            tip = points[6] + [0.02, 0.0 if planar else 0.1, 0.1]
+            branch = scene.add_rod(start=points[6], end=tip, nodes=5, radius=0.7 * radius, material=material)
+            scene.join(self.arm.node(6), branch.start)
+        self.force = scene.add_force(self.arm.end, (0, 0, 0.3 * (radius / 1.5e-2) ** 4), name="force")
+        self.mass = scene.add_mass(self.arm.node(7), 0.01)
+        self.drag = scene.add_drag(0.2)
+        self.simulation = scene.build(integrator=integrator, planar=planar or None, **TIGHT, **options)
+
+    def vectors(self, random, count):
+        """Of so many nodes, in the plane of a planar scene."""
+        out = random.normal(size=(count, 3))
+        if self.planar:
+            out[:, 1] = 0.0
+        return out
+
+    def bent(self, random):
+        """A direction in which natural curvature may change."""
+        now = self.simulation.get(self.arm, "natural_curvature")
+        if not self.planar:
+            return random.normal(size=now.shape)
+        return np.outer(random.normal(size=len(now)), now[0] / np.linalg.norm(now[0]))
+
+
+def difference(simulation, of, change, size):
+    """Central difference of `of()` over `change(+-size)`, from and back to the present state."""
+    start, ends = simulation.snapshot(), []
+    for step in (size, -size):
+        simulation.restore(start)
+        change(step)
+        ends.append(of())
+    simulation.restore(start)
+    return (ends[0] - ends[1]) / (2.0 * size)
+
+
+def settings(drawn, random):
+    """Pairs of what `wrt` says with what its gradient is multiplied by, how to change it, and by how much."""
+    sim, arm = drawn.simulation, drawn.arm
+    curvature, twist = sim.get(arm, "natural_curvature"), sim.get(arm, "natural_twist")
+    bend = sim.get(arm, "bend_stiffness")
+    bent, turned = drawn.bent(random), 0.0 if drawn.planar else random.normal(size=twist.shape)
+    uneven = random.uniform(0.5, 1.5, size=bend.shape)
+    yield (arm, "youngs_modulus"), 1.0, lambda h: sim.set(arm, youngs_modulus=1e6 + h), 100.0
+    yield (arm, "density"), 1.0, lambda h: sim.set(arm, density=1200.0 + h), 0.1
+    yield (arm, "bend_stiffness"), uneven * bend, lambda h: sim.set(arm, bend_stiffness=bend * (1.0 + h * uneven)), 1e-4
+    yield (arm, "natural_curvature"), bent, lambda h: sim.set(arm, natural_curvature=curvature + h * bent), 1e-3
+    yield (arm, "natural_twist"), turned, lambda h: sim.set(arm, natural_twist=twist + h * turned), 1e-3
+    yield (drawn.force, "force"), np.array([0, 0, 1.0]), lambda h: sim.set(drawn.force, force=(0, 0, 0.3 + h)), 1e-4
+    yield (drawn.mass, "mass"), 1.0, lambda h: sim.set(drawn.mass, mass=0.01 + h), 3e-6
+    yield "gravity", np.array([0, 0, 1.0]), lambda h: sim.set(None, gravity=(0, 0, -9.81 + h)), 1e-3
+
+
+@pytest.mark.parametrize("joint", [False, True])
+@pytest.mark.parametrize("planar", [True, False])
+def test_gradient_of_an_equilibrium_is_that_of_differences(planar, joint):
+    random = np.random.default_rng(3)
+    drawn = Drawn(planar=planar, joint=joint, integrator="static")
+    sim, arm, wall = drawn.simulation, drawn.arm, drawn.wall
+    sim.set(arm, natural_curvature=sim.get(arm, "natural_curvature") + 2.0 * drawn.bent(random))
+    found = sim.equilibrium()
+    weight = drawn.vectors(random, len(sim.positions()))
+    place, axis = sim.positions(arm)[0], np.array([0.0, 1.0, 0.0]) if planar else np.array([0.3, 0.5, -0.4])
+
+    def of():
+        sim.equilibrium()
+        return float((weight * sim.positions()).sum())
+
+    cases = [
+        *settings(drawn, random),
+        ((wall, "position"), np.array([1.0, 0, 0]), lambda h: sim.move(wall, position=place + [h, 0, 0]), 1e-6),
+        ((wall, "rotation"), axis, lambda h: sim.move(wall, rotation=Rotation.from_rotvec(h * axis)), 1e-5),
+    ]
+    gradients = found.gradient(weight, [unknown for unknown, *_ in cases])
+    for gradient, (unknown, along, change, size) in zip(gradients, cases, strict=True):
+        assert np.sum(gradient * along) == pytest.approx(difference(sim, of, change, size), rel=1e-6, abs=1e-12), (
+            unknown
+        )
+
+
+def test_gradients_have_the_shape_of_get_and_the_jacobian_their_rows():
+    random = np.random.default_rng(4)
+    drawn = Drawn(planar=False, joint=False, integrator="static")
+    sim, arm = drawn.simulation, drawn.arm
+    words = ("youngs_modulus", "natural_curvature", "natural_twist", "bend_stiffness", "line_density", "poisson_ratio")
+    wrt = [(arm, word) for word in words]
+    found = sim.equilibrium()
+    weight = random.normal(size=(NODES, 3))
+    gradients, jacobians = found.gradient(weight, wrt), found.jacobian(arm, wrt)
+    for word, gradient, jacobian in zip(words, gradients, jacobians, strict=True):
+        shape = np.shape(sim.get(arm, word))
+        assert np.shape(gradient) == shape
+        assert jacobian.shape == (NODES, 3, *shape)
+        np.testing.assert_allclose(np.tensordot(weight, jacobian, axes=2), gradient, rtol=1e-10, atol=1e-14)
+    (tip,) = found.jacobian(arm.end, [(arm, "natural_twist")])
+    np.testing.assert_array_equal(tip, jacobians[2][-1])
+
+
+@pytest.mark.parametrize("support", [None, "frame", "edge"])
+@pytest.mark.parametrize("joint", [False, True])
+@pytest.mark.parametrize("planar", [True, False])
+@pytest.mark.parametrize(
+    ("integrator", "viscosity"),
+    [
+        ("backward_euler", 0.0),
+        ("backward_euler", 300.0),
+        ("implicit_midpoint", 0.0),
+        ("implicit_midpoint", 300.0),
+        ("fourth_order", 0.0),
+    ],
+)
+def test_gradient_of_a_run_is_that_of_differences(integrator, viscosity, planar, joint, support):
+    random = np.random.default_rng(5)
+    drawn = Drawn(
+        planar=planar,
+        joint=joint,
+        integrator=integrator,
+        support=support,
+        viscosity=viscosity,
+        adaptive=False,
+        time_step=2e-3,
+    )
+    sim, arm = drawn.simulation, drawn.arm
+    held = {None: 0, "frame": 1, "edge": 2}[support]
+    velocities, directions = (drawn.vectors(random, NODES) for _ in range(2))
+    velocities[:held], directions[:held] = 0.0, 0.0
+    sim.set_velocities(arm, 0.3 * velocities)
+    if not planar:
+        sim.set_state(arm, spins=20.0 * random.normal(size=NODES - 1))
+    frames, nodes = 5, len(sim.positions())
+    weights = {
+        "positions": np.array([drawn.vectors(random, nodes) for _ in range(frames)]),
+        "velocities": np.array([0.01 * drawn.vectors(random, nodes) for _ in range(frames)]),
+    }
+
+    def run(**options):
+        return sim.run(24e-3, record_every=6e-3, progress=False, **options)
+
+    def of():
+        record = run()
+        return float(sum((weight * getattr(record, name)()).sum() for name, weight in weights.items()))
+
+    cases = [
+        *settings(drawn, random),
+        ((drawn.drag, "drag"), 1.0, lambda h: sim.set(drawn.drag, drag=0.2 + h), 1e-3),
+        (
+            "initial_velocities",
+            np.concatenate([directions, np.zeros((nodes - NODES, 3))]),
+            lambda h: sim.set_velocities(arm, 0.3 * velocities + h * directions),
+            1e-4,
+        ),
+    ]
+    if viscosity:
+        cases.append(((arm, "viscosity"), 1.0, lambda h: sim.set(arm, viscosity=viscosity + h), 0.05))
+    if not joint and support != "edge":
+        cases.append(("initial_positions", directions, lambda h: move_with_directors(sim, arm, h * directions), 1e-6))
+    start = sim.snapshot()
+    gradients = run(differentiable=True).gradient(weights, [unknown for unknown, *_ in cases])
+    sim.restore(start)
+    for gradient, (unknown, along, change, size) in zip(gradients, cases, strict=True):
+        # Differences of two sizes, extrapolated, leave rounding alone.
+        wide, near = (difference(sim, of, change, times * size) for times in (1.0, 0.5))
+        assert np.sum(gradient * along) == pytest.approx((4.0 * near - wide) / 3.0, rel=2e-6, abs=1e-11), unknown
+
+
+def move_with_directors(simulation, rod, way):
+    """Nodes moved, directors turned along with their edges by the smallest turn."""
+    positions, directors = simulation.positions(rod), simulation.directors(rod)[:, 0]
+    spins, velocities = simulation.spins(rod), simulation.velocities(rod)
+
+    def tangents(x):
+        e = np.diff(x, axis=0)
+        return e / np.linalg.norm(e, axis=1)[:, None]
+
+    before, after = tangents(positions), tangents(positions + way)
+    along = np.sum(directors * after, axis=1) / (1.0 + np.sum(before * after, axis=1))
+    turned = directors - along[:, None] * (before + after)
+    simulation.set_state(rod, positions=positions + way, directors=turned, velocities=velocities, spins=spins)
+
+
+def test_steps_that_were_cut_are_differentiated_as_they_ran():
+    random = np.random.default_rng(6)
+    drawn = Drawn(planar=True, joint=False, integrator="backward_euler", tolerance=1e-4, time_step=0.02)
+    sim = drawn.simulation
+    record = sim.run(0.1, record_every=0.1, progress=False, differentiable=True)
+    assert sim.statistics.steps > 5
+    weight = np.zeros((2, NODES, 3))
+    weight[-1] = drawn.vectors(random, NODES)
+    (by_gravity,) = record.gradient({"positions": weight}, ["gravity"])
+    assert np.linalg.norm(by_gravity) > 0.0
+
+
+def test_what_has_no_gradient_says_so():
+    drawn = Drawn(planar=True, joint=False, integrator="implicit_midpoint", adaptive=False)
+    sim, arm = drawn.simulation, drawn.arm
+    found = sim.equilibrium()
+    out_of_plane = np.zeros((NODES, 3))
+    out_of_plane[:, 1] = 1.0
+    for value, wrt, message in (
+        (out_of_plane, [(arm, "youngs_modulus")], "plane"),
+        (np.zeros((3, 3)), [(arm, "youngs_modulus")], "shape"),
+        (np.zeros((NODES, 3)), [(arm, "colour")], "no 'colour'"),
+        (np.zeros((NODES, 3)), [], "wrt must be a list"),
+        (np.zeros((NODES, 3)), ["initial_positions"], "an equilibrium has no"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            found.gradient(value, wrt)
+    sim.set(drawn.force, force=(0, 0, 1.0))
+    with pytest.raises(ValueError, match="in no equilibrium"):
+        found.gradient(np.zeros((NODES, 3)), ["gravity"])
+    sim.equilibrium()
+    with pytest.raises(ValueError, match="has left this equilibrium"):
+        found.gradient(np.zeros((NODES, 3)), ["gravity"])
+
+    zeros = np.zeros((2, NODES, 3))
+    with pytest.raises(ValueError, match="differentiable=True"):
+        sim.run(0.01, record_every=0.01, progress=False).gradient({"positions": zeros}, ["gravity"])
+    record = sim.run(0.01, record_every=0.01, progress=False, differentiable=True)
+    assert np.all(record.gradient({"positions": zeros}, ["gravity"])[0] == 0.0)
+    with pytest.raises(ValueError, match="pose"):
+        record.gradient({"positions": zeros}, [(drawn.wall, "position")])
+    with pytest.raises(ValueError, match="derivatives by"):
+        record.gradient({"curvatures": zeros}, ["gravity"])
+    with pytest.raises(ValueError, match="before it is saved"):
+        pickle.loads(pickle.dumps(record)).gradient({"positions": zeros}, ["gravity"])
+    changed = sim.run(
+        0.01, record_every=0.01, progress=False, differentiable=True, before_step=lambda s: s.set(arm, density=1100.0)
+    )
+    with pytest.raises(ValueError, match="changed while it ran"):
+        changed.gradient({"positions": zeros}, ["gravity"])
+    sim.move(drawn.wall, position=(0, 0, 0.01), over=0.01)
+    moved = sim.run(0.01, record_every=0.01, progress=False, differentiable=True)
+    with pytest.raises(ValueError, match="a support moved"):
+        moved.gradient({"positions": zeros}, ["gravity"])
+
+
+def test_a_differentiable_run_is_the_same_run():
+    runs = []
+    for differentiable in (False, True):
+        drawn = Drawn(planar=False, joint=True, integrator="implicit_midpoint", time_step=5e-3)
+        runs.append(drawn.simulation.run(0.1, progress=False, differentiable=differentiable))
+    np.testing.assert_array_equal(runs[0].positions(), runs[1].positions())
