@@ -6,6 +6,8 @@ import pytest
 import withe
 from soft_limb import CONSTANT, LIMB, published, robot, seen_curvatures
 from withe.real2sim import Curvatures, Tags, fit
+from withe.real2sim.stills import Stills
+from withe.real2sim.unknowns import Tilt, parse_unknowns
 
 ARM = [("arm", "natural_curvature", "constant")]
 
@@ -268,3 +270,18 @@ def test_turns_in_space_need_an_axis():
     targets = Curvatures([[0.1]], names([0, 15, 30]), [(1,)])
     with pytest.raises(ValueError, match="normal must be given"):
         fit(arm(space=True), targets, ARM, progress=False)
+
+
+@pytest.mark.parametrize("space", [False, True])
+def test_derivatives_are_those_of_equilibria(space):
+    simulation = arm(space=space)
+    unknowns = parse_unknowns(simulation, [("arm", "natural_curvature", "linear"), ("arm", "youngs_modulus")])
+    unknowns += parse_unknowns(simulation, [("arm", "density")]) + ([] if space else [Tilt(simulation)])
+    stills = Stills(simulation, unknowns, Tags(np.zeros((1, 6, 3)), names(range(5, 31, 5))).bind(simulation))
+    coordinates = np.array([3.0, -2.0, 0.1, -0.2, 0.3] if not space else [3.0, -2.0, 1.0, 4.0, 0.1, -0.2])
+    found = stills.residual(coordinates, 0)
+    jacobian = stills.jacobian(coordinates, found[1], 0)
+    for i, step in enumerate(1e-4 * stills.scales):
+        ahead, behind = (stills.residual(coordinates + s * np.eye(len(coordinates))[i], 0)[0] for s in (step, -step))
+        scale = np.abs(jacobian[:, i]).max()
+        assert jacobian[:, i] == pytest.approx((ahead - behind) / (2 * step), abs=1e-5 * scale)

@@ -9,6 +9,7 @@ from withe.real2sim.calibration import Calibration, calibrate
 from withe.real2sim.centrelines import Centrelines, rest_shape
 from withe.real2sim.fitting import fit
 from withe.real2sim.logs import Log, read_log
+from withe.real2sim.motions import fit_motion
 from withe.real2sim.results import Fit, Outlier, Unobservable
 from withe.real2sim.targets import Curvatures, Tags
 
@@ -25,6 +26,7 @@ __all__ = [
     "calibrate",
     "detect_tags",
     "fit",
+    "fit_motion",
     "read_log",
     "rest_shape",
 ]

@@ -103,9 +103,10 @@ class CameraProblem:
         view, count, tags = self.view(coordinates), self.count, np.arange(len(self.places))
         weights, slopes = self.places.weights(view.places)
         scaled = view.scaled(weights @ state)
-        changes = np.tensordot(weights, self.equilibria.changes(coordinates[:count], frame), axes=1)
+        by_node = view.scale * view.axes[None, :, None] * weights[:, None, :, None]
+        by_robot = self.equilibria.derivatives(by_node.reshape(2 * len(tags), *state.shape), coordinates[:count], frame)
         jacobian = np.zeros((len(tags), 2, len(coordinates)))
-        jacobian[:, :, :count] = view.scale * np.einsum("dc,tcn->tdn", view.axes, changes)
+        jacobian[:, :, :count] = by_robot.reshape(len(tags), 2, count)
         jacobian[:, 0, count], jacobian[:, 1, count] = -scaled[:, 1], scaled[:, 0]
         jacobian[:, :, count + 1] = scaled
         jacobian[:, 0, count + 2] = jacobian[:, 1, count + 3] = 1.0

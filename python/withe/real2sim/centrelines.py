@@ -103,23 +103,29 @@ class _LineResidual(Residual):
         nearest = line[edges] + shares[:, None] * (line[edges + 1] - line[edges])
         return np.asarray((nearest - seen).ravel() / self._sigma)
 
-    def derivative(self, positions: FloatArray, changes: FloatArray, frame: int) -> FloatArray:
+    def derivative(self, positions: FloatArray, frame: int) -> FloatArray:
         line, seen = self._line(positions), self._seen[frame]
-        moved = changes[self._rows]
-        if self._camera is not None:
-            moved = np.einsum("tdc,tcn->tdn", pixel_derivative(self._camera, positions[self._rows]), moved)
+        dimension = line.shape[1]
+        derivative = np.zeros((self._samples, dimension, self._nodes, 3))
         if len(seen) == 0:
-            return np.zeros((self._samples * line.shape[1], changes.shape[2]))
+            return derivative.reshape(-1, self._nodes, 3)
         edges, shares, slides = self._nearest(line, seen)
-        point = moved[edges] + shares[:, None, None] * (moved[edges + 1] - moved[edges])
-        # The nearest point may slide along its edge: only what goes across counts, but at ends and corners.
         chord = line[edges + 1] - line[edges]
-        tangent = np.where(slides[:, None], chord / np.linalg.norm(chord, axis=1)[:, None], 0.0)
+        length = np.linalg.norm(chord, axis=1)[:, None]
+        # The nearest point slides along its edge, but at ends and corners: only what goes across counts, less the
+        # turn of the edge, as the way to it stays at right angles.
+        tangent = np.where(slides[:, None], chord / length, 0.0)
         away = line[edges] + shares[:, None] * chord - seen
-        turned = (moved[edges + 1] - moved[edges]) / np.linalg.norm(chord, axis=1)[:, None, None]
-        point -= tangent[:, :, None] * np.einsum("td,tdn->tn", tangent, point)[:, None]
-        point -= tangent[:, :, None] * np.einsum("td,tdn->tn", away, turned)[:, None]
-        return np.asarray(point.reshape(-1, changes.shape[2]) / self._sigma)
+        across = np.eye(dimension) - tangent[:, :, None] * tangent[:, None]
+        turned = tangent[:, :, None] * away[:, None] / length[:, :, None]
+        by_node = np.broadcast_to(np.eye(3), (len(self._rows), 3, 3))
+        if self._camera is not None:
+            by_node = pixel_derivative(self._camera, positions[self._rows])
+        at = np.arange(len(seen))
+        for end, share, sign in ((edges, 1.0 - shares, 1.0), (edges + 1, shares, -1.0)):
+            by_end = share[:, None, None] * across + sign * turned
+            derivative[at, :, self._rows[end]] += by_end @ by_node[end] / self._sigma
+        return derivative.reshape(-1, self._nodes, 3)
 
     def _line(self, positions: FloatArray) -> FloatArray:
         points = positions[self._rows]

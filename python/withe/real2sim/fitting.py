@@ -115,12 +115,12 @@ def fit(
         if not stills.per_frame.all():
             bar.update(0)
             before = stills.solves
-            solutions = all_frames(
+            solutions |= all_frames(
                 stills, good, {f: solutions[f].coordinates for f in good}, goal, limit, lambda: bar.advance(1)
             )
             for frame in good:
                 solves[frame] += (stills.solves - before) // len(good)
-    return gather(stills, listed, solutions, solves, len(blank))
+    return gather(stills, listed, solutions, solves, len(blank), listed[0].frames)
 
 
 def _frame_by_frame(

@@ -8,8 +8,8 @@ import numpy.typing as npt
 from withe.real2sim.least_squares import FrameSolution, reduced, seen, weaknesses
 from withe.real2sim.outliers import find_outliers
 from withe.real2sim.results import Fit, Outlier, Unobservable
-from withe.real2sim.stills import Stills
 from withe.real2sim.targets import Tags, Target
+from withe.real2sim.unknowns import Coordinates
 
 __all__ = ["gather"]
 
@@ -17,10 +17,15 @@ FloatArray = npt.NDArray[np.float64]
 
 
 def gather(
-    stills: Stills, targets: list[Target], solutions: dict[int, FrameSolution], solves: dict[int, int], rows: int
+    stills: Coordinates,
+    targets: list[Target],
+    solutions: dict[int, FrameSolution],
+    solves: dict[int, int],
+    rows: int,
+    frames: int,
 ) -> Fit:
     """The result of a fit."""
-    frames, count = targets[0].frames, len(stills.names)
+    count = len(stills.names)
     coordinates = np.full((frames, count), np.nan)
     residuals = np.full((frames, rows), np.nan)
     for frame, solution in solutions.items():
@@ -64,7 +69,7 @@ def _square(solutions: dict[int, FrameSolution]) -> float:
     return sum(float(np.sum(seen(solution.residual) ** 2)) for solution in solutions.values())
 
 
-def _variance(stills: Stills, targets: list[Target], solutions: dict[int, FrameSolution]) -> float:
+def _variance(stills: Coordinates, targets: list[Target], solutions: dict[int, FrameSolution]) -> float:
     """Of a residual: 1 where sigma was given, else what all frames leave over the degrees of freedom."""
     if all(target.sigma is not None for target in targets):
         return 1.0
@@ -84,7 +89,7 @@ def _inverse(matrix: FloatArray) -> FloatArray:
     return np.asarray(inverse)
 
 
-def _spreads(stills: Stills, solutions: dict[int, FrameSolution]) -> dict[int, FloatArray]:
+def _spreads(stills: Coordinates, solutions: dict[int, FrameSolution]) -> dict[int, FloatArray]:
     """Covariance of every frame's coordinates over their scales, for residuals of variance 1."""
     local = stills.per_frame
     if local.all():
@@ -103,7 +108,7 @@ def _spreads(stills: Stills, solutions: dict[int, FrameSolution]) -> dict[int, F
     return spreads
 
 
-def _unobservable(stills: Stills, solutions: dict[int, FrameSolution]) -> tuple[Unobservable, ...]:
+def _unobservable(stills: Coordinates, solutions: dict[int, FrameSolution]) -> tuple[Unobservable, ...]:
     """Combinations of shared unknowns, and of the frames' own, that move targets by less than the misfit."""
     rows = _rows(solutions)
     if rows == 0:
@@ -134,10 +139,12 @@ def _weights(names: list[str], direction: FloatArray) -> dict[str, float]:
 
 
 def _outliers(
-    stills: Stills, targets: list[Target], residuals: FloatArray, solutions: dict[int, FrameSolution]
+    stills: Coordinates, targets: list[Target], residuals: FloatArray, solutions: dict[int, FrameSolution]
 ) -> tuple[Outlier, ...]:
     """Tags that jump, where tags are all there is."""
     if len(targets) != 1 or not isinstance(targets[0], Tags):
+        return ()
+    if len(residuals) != targets[0].frames:  # a motion, all of it one fit
         return ()
     scale = targets[0].sigma or 1.0
     places = scale * residuals.reshape(len(residuals), len(targets[0].places), -1)

@@ -9,6 +9,8 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
+from withe.errors import ConvergenceError
+
 __all__ = [
     "FrameSolution",
     "Problem",
@@ -65,7 +67,7 @@ class Weakness:
 
 def seen(residual: FloatArray) -> FloatArray:
     """A residual without gaps: zero where nothing was seen."""
-    return np.nan_to_num(residual, nan=0.0)
+    return np.where(np.isnan(residual), 0.0, residual)
 
 
 def _seen_rows(jacobian: FloatArray, residual: FloatArray) -> FloatArray:
@@ -108,7 +110,11 @@ def lone_frame(
         return FrameSolution(start, empty, np.zeros((0, len(scales))), 0, False, "no equilibrium to begin with")
     coordinates, (residual, state) = start.copy(), found
     for iteration in range(1, max_iterations + 1):
-        jacobian = _seen_rows(problem.jacobian(coordinates, state, frame)[:, free] * scales, residual)
+        try:
+            jacobian = _seen_rows(problem.jacobian(coordinates, state, frame)[:, free] * scales, residual)
+        except ConvergenceError as error:
+            empty = np.zeros((len(residual), len(scales)))
+            return FrameSolution(coordinates, residual, empty, iteration, False, f"no derivatives there: {error}")
         step = _bounded(jacobian, -seen(residual), 1.0)
         gain = float(np.linalg.norm(jacobian @ step))
         if gain <= _SMALL * _size(residual) or gain <= tolerance:
@@ -144,6 +150,9 @@ def all_frames(
     local = problem.per_frame
     points = {frame: start[frame].copy() for frame in frames}
     solutions = _linearised(problem, points, progress)
+    frames = list(solutions)  # those that have an equilibrium to begin with
+    if not frames:
+        return {}
     for iteration in range(1, max_iterations + 1):
         size = _total(solutions)
         steps = _joint_step(solutions, local, 1.0)
@@ -151,7 +160,7 @@ def all_frames(
         if gain <= _SMALL * size or gain <= tolerance:
             return _closed(solutions, iteration, True)
         for _ in range(_TRIALS):
-            trial = {f: points[f] + problem.scales * steps[f] for f in frames}
+            trial = {f: solutions[f].coordinates + problem.scales * steps[f] for f in frames}
             tried = _linearised(problem, trial, progress)
             if len(tried) == len(frames) and _total(tried) < size:
                 break
@@ -159,21 +168,24 @@ def all_frames(
             steps = _joint_step(solutions, local, 0.25 * farthest)
         else:
             return _closed(solutions, iteration, False, "no step lessens the residual")
-        points, solutions = trial, tried
+        solutions = tried
     return _closed(solutions, max_iterations, False, "max_iterations were not enough")
 
 
 def _linearised(
     problem: Problem, points: dict[int, FloatArray], progress: Callable[[], None]
 ) -> dict[int, FrameSolution]:
-    """Residuals and derivatives of all frames, up to the first that has none."""
+    """Residuals and derivatives of all frames that have them."""
     found = {}
     for frame, point in points.items():
         evaluated = problem.residual(point, frame)
         if evaluated is None:
-            break
+            continue
         residual, state = evaluated
-        jacobian = _seen_rows(problem.jacobian(point, state, frame) * problem.scales, residual)
+        try:
+            jacobian = _seen_rows(problem.jacobian(point, state, frame) * problem.scales, residual)
+        except ConvergenceError:
+            continue
         found[frame] = FrameSolution(point, residual, jacobian, 0, False)
         progress()
     return found

@@ -130,7 +130,7 @@ class Fit:
         )
 
     def value(self, rod: Rod | str, word: str = "natural_curvature") -> FloatArray:
-        """Values of one unknown, shape (frames, n).
+        """Values of one unknown, shape (frames, n): of a rod, or `value("delay")`.
 
         Raises
         ------
@@ -168,9 +168,10 @@ class Fit:
 
     def _place(self, rod: Rod | str, word: str) -> slice:
         name = rod if isinstance(rod, str) else rod.name
+        word = name if name == "delay" else word
         start = 0
         for unknown in self._unknowns:
-            if unknown.word == word and name in unknown.rods:
+            if unknown.word == word and (name in unknown.rods or name == word):
                 return slice(start, start + len(unknown))
             start += len(unknown)
         raise ValueError(f"{word} of rod {name!r} was not fitted; these were: {', '.join(self.names)}")

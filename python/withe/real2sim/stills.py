@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
 
 from withe.errors import ConvergenceError
 from withe.real2sim.targets import Residual
-from withe.real2sim.unknowns import Unknown
+from withe.real2sim.unknowns import Coordinates, Unknown
+from withe.simulation.gradients import equilibrium_gradients
 from withe.simulation.simulation import Simulation
 
 __all__ = ["Conditions", "Equilibria", "Stills"]
@@ -21,7 +21,7 @@ Conditions = Callable[[Simulation, int], object]
 _DIFFERENCE = 1e-4  # of the scale of an unknown: truncation 1e-8 of it squared, rounding about as much
 
 
-class Equilibria:
+class Equilibria(Coordinates):
     """The equilibrium of every frame.
 
     Parameters
@@ -34,10 +34,6 @@ class Equilibria:
 
     Attributes
     ----------
-    names, scales
-        Of all coordinates, in the order of the unknowns.
-    per_frame : ndarray of bool
-        Which of them every frame has of its own.
     solves : int
         Equilibria so far.
     """
@@ -48,19 +44,9 @@ class Equilibria:
         unknowns: Sequence[Unknown],
         conditions: Conditions | None = None,
     ) -> None:
-        self.simulation, self.unknowns = simulation, list(unknowns)
+        super().__init__(simulation, unknowns)
         self._conditions = conditions
-        self.names = tuple(name for unknown in self.unknowns for name in unknown.names)
-        self.scales = np.concatenate([unknown.scales for unknown in self.unknowns])
-        self.per_frame = np.repeat([unknown.per_frame for unknown in self.unknowns], [len(u) for u in self.unknowns])
-        ends = np.cumsum([0, *(len(unknown) for unknown in self.unknowns)])
-        self.slices = [slice(a, b) for a, b in pairwise(ends)]
         self.solves = 0
-        self._written = np.full(len(self.names), np.nan)
-
-    def begin(self) -> FloatArray:
-        """Coordinates of what the simulation has now."""
-        return np.concatenate([unknown.read(self.simulation) for unknown in self.unknowns])
 
     def positions(self, coordinates: FloatArray, frame: int) -> FloatArray:
         """Where the nodes come to rest, shape (nodes, 3) [m].
@@ -75,22 +61,54 @@ class Equilibria:
         try:
             return self._go(coordinates, frame)
         except (ConvergenceError, ValueError):
-            self._written[:] = np.nan
+            self.forget()
             raise
 
     def _go(self, coordinates: FloatArray, frame: int) -> FloatArray:
-        for unknown, place in zip(self.unknowns, self.slices, strict=True):
-            if not np.array_equal(coordinates[place], self._written[place]):
-                unknown.write(self.simulation, coordinates[place])
-                self._written[place] = coordinates[place]
+        unchanged = self._conditions is None and np.array_equal(coordinates, self._written)
+        self.write(coordinates)
+        if unchanged:
+            return self.simulation.positions()
         if self._conditions is not None:
             self._conditions(self.simulation, frame)
         self.solves += 1
         self.simulation.equilibrium()
         return self.simulation.positions()
 
-    def changes(self, coordinates: FloatArray, frame: int) -> FloatArray:
-        """Derivatives of positions by coordinates, shape (nodes, 3, n), by central differences of equilibria."""
+    def derivatives(self, by_positions: FloatArray, coordinates: FloatArray, frame: int) -> FloatArray:
+        """Derivatives of m scalars of the present equilibrium by the coordinates, shape (m, n).
+
+        By the adjoint method; by central differences of equilibria where the engine knows no gradient.
+
+        Parameters
+        ----------
+        by_positions : ndarray of shape (m, nodes, 3)
+            Derivatives of the scalars by positions.
+        coordinates : ndarray of shape (n,)
+            Of that equilibrium.
+        frame : int
+
+        Raises
+        ------
+        ConvergenceError
+            The branch of equilibria ends here.
+        """
+        normal = self.simulation.plan.plane_normal
+        inside = by_positions if normal is None else by_positions - (by_positions @ normal)[..., None] * normal
+        words = [word for unknown in self.unknowns for word in unknown.words]
+        try:
+            found = equilibrium_gradients(self.simulation._session, list(inside), words)
+        except ValueError:
+            changes = self._differences(coordinates, frame)
+            return np.asarray(np.tensordot(by_positions, changes, axes=2))
+        columns, first = [], 0
+        for unknown, place in zip(self.unknowns, self.slices, strict=True):
+            columns.append(unknown.chain(coordinates[place], found[first : first + len(unknown.words)]))
+            first += len(unknown.words)
+        return np.concatenate(columns, axis=1)
+
+    def _differences(self, coordinates: FloatArray, frame: int) -> FloatArray:
+        """Derivatives of positions by coordinates, shape (nodes, 3, n), by central differences."""
         columns = []
         for i, scale in enumerate(self.scales):
             step = np.zeros_like(coordinates)
@@ -124,4 +142,4 @@ class Stills(Equilibria):
 
     def jacobian(self, coordinates: FloatArray, positions: FloatArray, frame: int) -> FloatArray:
         """Derivatives of the residual by the coordinates, shape (residuals, n), at the present equilibrium."""
-        return self._residual.derivative(positions, self.changes(coordinates, frame), frame)
+        return self.derivatives(self._residual.derivative(positions, frame), coordinates, frame)

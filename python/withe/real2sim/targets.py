@@ -38,8 +38,8 @@ class Residual(ABC):
         """Shape (residuals,), of positions of shape (nodes, 3) [m]."""
 
     @abstractmethod
-    def derivative(self, positions: FloatArray, changes: FloatArray, frame: int) -> FloatArray:
-        """How it changes, shape (residuals, n), with changes of positions of shape (nodes, 3, n)."""
+    def derivative(self, positions: FloatArray, frame: int) -> FloatArray:
+        """By the positions, shape (residuals, nodes, 3)."""
 
 
 class Target(ABC):
@@ -152,6 +152,8 @@ class _CurvatureResidual(Residual):
         first = np.cross(first, axis)
         self._plane = np.stack([first / np.linalg.norm(first), np.cross(axis, first) / np.linalg.norm(first)])
         self._weights = places.weights()[0]
+        self._chords = np.diff(self._weights, axis=0)
+        self._bends = np.diff(np.eye(len(target.places) - 1), axis=0)  # of chords against each other
         self._means = np.zeros((len(target.groups), len(target.places) - 2))
         for row, group in enumerate(target.groups):
             self._means[row, np.array(group) - 1] = 1.0 / len(group)
@@ -161,15 +163,14 @@ class _CurvatureResidual(Residual):
         found = self._means @ (2.0 * np.tan(turns(points) / 2.0))
         return np.asarray((found - self._values[frame]) / self._sigma)
 
-    def derivative(self, positions: FloatArray, changes: FloatArray, frame: int) -> FloatArray:
+    def derivative(self, positions: FloatArray, frame: int) -> FloatArray:
         points = self._weights @ positions @ self._plane.T
         chords = np.diff(points, axis=0)
-        moved = np.einsum("tk,kcn,dc->tdn", self._weights, changes, self._plane, optimize=True)
-        swing = np.diff(moved, axis=0)
-        # A chord e turns by (e x de) / |e|^2.
-        angle = (chords[:, :1] * swing[:, 1] - chords[:, 1:] * swing[:, 0]) / (chords**2).sum(axis=1)[:, None]
-        slope = 1.0 + np.tan(turns(points) / 2.0) ** 2
-        return np.asarray(self._means @ (slope[:, None] * np.diff(angle, axis=0)) / self._sigma)
+        # A chord e turns by (e x de) / |e|^2 about the axis: by (axis x e) . de.
+        across = np.stack([-chords[:, 1], chords[:, 0]], axis=1) / (chords**2).sum(axis=1)[:, None]
+        slope = self._means * (1.0 + np.tan(turns(points) / 2.0) ** 2) / self._sigma
+        by_chord = (slope @ self._bends)[:, :, None] * (across @ self._plane)
+        return np.asarray(self._chords.T @ by_chord)
 
 
 @dataclass(eq=False)
@@ -241,11 +242,13 @@ class _TagResidual(Residual):
         seen = points if self._camera is None else self._camera.project(points)
         return np.asarray((seen - self._points[frame]).ravel() / self._sigma)
 
-    def derivative(self, positions: FloatArray, changes: FloatArray, frame: int) -> FloatArray:
-        moved = np.tensordot(self._weights, changes, axes=1)
+    def derivative(self, positions: FloatArray, frame: int) -> FloatArray:
+        tags = len(self._weights)
+        by_point = np.broadcast_to(np.eye(3), (tags, 3, 3))
         if self._camera is not None:
-            moved = np.einsum("tdc,tcn->tdn", pixel_derivative(self._camera, self._weights @ positions), moved)
-        return np.asarray(moved.reshape(-1, changes.shape[2]) / self._sigma)
+            by_point = pixel_derivative(self._camera, self._weights @ positions)
+        by_node = by_point[:, :, None] * self._weights[:, None, :, None] / self._sigma
+        return np.asarray(by_node.reshape(-1, *positions.shape))
 
 
 def pixel_derivative(camera: Camera, points: FloatArray) -> FloatArray:
@@ -265,8 +268,8 @@ class _Together(Residual):
     def value(self, positions: FloatArray, frame: int) -> FloatArray:
         return np.concatenate([residual.value(positions, frame) for residual in self._residuals])
 
-    def derivative(self, positions: FloatArray, changes: FloatArray, frame: int) -> FloatArray:
-        return np.concatenate([residual.derivative(positions, changes, frame) for residual in self._residuals])
+    def derivative(self, positions: FloatArray, frame: int) -> FloatArray:
+        return np.concatenate([residual.derivative(positions, frame) for residual in self._residuals])
 
 
 def frames_of(targets: Target | Sequence[Target]) -> list[Target]:

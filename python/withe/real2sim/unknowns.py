@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from withe.parts.parameters import ROD_WORDS
 from withe.real2sim.places import rod_part, turning_axis
 from withe.simulation.simulation import Simulation
 
-__all__ = ["NaturalCurvature", "Tilt", "Unknown", "parse_unknowns"]
+__all__ = ["Coordinates", "Delay", "NaturalCurvature", "Tilt", "Unknown", "parse_unknowns"]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -51,6 +52,15 @@ class Unknown(ABC):
     def write(self, simulation: Simulation, coordinates: FloatArray) -> None:
         """Set them."""
 
+    @property
+    @abstractmethod
+    def words(self) -> list[Any]:
+        """What to ask the engine for derivatives by, to have those by the coordinates."""
+
+    @abstractmethod
+    def chain(self, coordinates: FloatArray, found: list[list[Any]]) -> FloatArray:
+        """Derivatives of m scalars by the coordinates, shape (m, n), from those by the words, m each."""
+
     def value(self, coordinates: FloatArray) -> FloatArray:
         """What the coordinates, of shape (..., n), mean, in SI units."""
         return coordinates
@@ -58,6 +68,44 @@ class Unknown(ABC):
     def slope(self, coordinates: FloatArray) -> FloatArray:
         """Derivatives of `value`."""
         return np.ones_like(coordinates)
+
+
+class Coordinates:
+    """All unknowns of a simulation as one vector.
+
+    Attributes
+    ----------
+    names, scales
+        Of all coordinates, in the order of the unknowns.
+    slices : list of slice
+        Those of each unknown.
+    per_frame : ndarray of bool
+        Which of them every frame has of its own.
+    """
+
+    def __init__(self, simulation: Simulation, unknowns: Sequence[Unknown]) -> None:
+        self.simulation, self.unknowns = simulation, list(unknowns)
+        self.names = tuple(name for unknown in self.unknowns for name in unknown.names)
+        self.scales = np.concatenate([unknown.scales for unknown in self.unknowns])
+        self.per_frame = np.repeat([unknown.per_frame for unknown in self.unknowns], [len(u) for u in self.unknowns])
+        ends = np.cumsum([0, *(len(unknown) for unknown in self.unknowns)])
+        self.slices = [slice(a, b) for a, b in pairwise(ends)]
+        self._written = np.full(len(self.names), np.nan)
+
+    def begin(self) -> FloatArray:
+        """Those of what the simulation has now."""
+        return np.concatenate([unknown.read(self.simulation) for unknown in self.unknowns])
+
+    def write(self, coordinates: FloatArray) -> None:
+        """Set what is not set yet."""
+        for unknown, place in zip(self.unknowns, self.slices, strict=True):
+            if not np.array_equal(coordinates[place], self._written[place]):
+                unknown.write(self.simulation, coordinates[place])
+                self._written[place] = coordinates[place]
+
+    def forget(self) -> None:
+        """What was set may not be there any more."""
+        self._written[:] = np.nan
 
 
 class NaturalCurvature(Unknown):
@@ -82,11 +130,6 @@ class NaturalCurvature(Unknown):
             raise ValueError(f"basis of {part.owner} must have no column of zeros")
         self.scales = np.tile(1.0 / (self.length * largest), len(axes))
 
-    @property
-    def fields(self) -> FloatArray:
-        """Curvature that each coordinate stands for, shape (stencils, n, 2)."""
-        return self._fields
-
     def read(self, simulation: Simulation) -> FloatArray:
         """Coordinates of the nearest curvature that the functions make."""
         return np.asarray(self._inverse @ simulation.get(self._rod, self.word).ravel())
@@ -94,6 +137,15 @@ class NaturalCurvature(Unknown):
     def write(self, simulation: Simulation, coordinates: FloatArray) -> None:
         """Set them."""
         simulation.set(self._rod, natural_curvature=np.einsum("snc,n->sc", self._fields, coordinates))
+
+    @property
+    def words(self) -> list[Any]:
+        """Natural curvature of the rod."""
+        return [(self._rod, self.word)]
+
+    def chain(self, coordinates: FloatArray, found: list[list[Any]]) -> FloatArray:
+        """What each function stands for."""
+        return np.asarray(np.tensordot(np.array(found[0]), self._fields, axes=([1, 2], [0, 2])))
 
 
 class Parameter(Unknown):
@@ -131,6 +183,17 @@ class Parameter(Unknown):
         for name, first in self._first.items():
             simulation.set(name, **{self.word: first * float(np.exp(coordinates[0]))})
 
+    @property
+    def words(self) -> list[Any]:
+        """The parameter of each rod."""
+        return [(name, self.word) for name in self.rods]
+
+    def chain(self, coordinates: FloatArray, found: list[list[Any]]) -> FloatArray:
+        """All values grow with the factor."""
+        factor, firsts = float(np.exp(coordinates[0])), self._first.values()
+        shares = [[np.sum(one * first * factor) for one in by] for by, first in zip(found, firsts, strict=True)]
+        return np.asarray(np.sum(shares, axis=0))[:, None]
+
     def value(self, coordinates: FloatArray) -> FloatArray:
         """Its mean over the rods, in SI units."""
         return np.asarray(self._mean * np.exp(coordinates))
@@ -161,11 +224,47 @@ class Tilt(Unknown):
         """Turn gravity."""
         simulation.set(gravity=self.gravity(float(coordinates[0])))
 
+    @property
+    def words(self) -> list[Any]:
+        """Gravity."""
+        return ["gravity"]
+
+    def chain(self, coordinates: FloatArray, found: list[list[Any]]) -> FloatArray:
+        """As gravity turns."""
+        change = -np.cross(self._axis, self.gravity(float(coordinates[0])))
+        return np.asarray(np.array(found[0]) @ change)[:, None]
+
     def gravity(self, tilt: float) -> FloatArray:
         """Gravity as a base that is tilted feels it [m/s^2]."""
         along = self._axis * (self._axis @ self._first)
         across = np.cross(self._axis, self._first)
         return np.asarray(along + np.cos(tilt) * (self._first - along) - np.sin(tilt) * across)
+
+
+class Delay(Unknown):
+    """How much later than a run the clock of what was seen began [s]."""
+
+    word, per_frame = "delay", False
+
+    def __init__(self, first: float, duration: float) -> None:
+        self._first = first
+        self.rods, self.names, self.scales = (), ("delay",), np.array([duration])
+
+    def read(self, simulation: Simulation) -> FloatArray:
+        """The first guess."""
+        return np.array([self._first])
+
+    def write(self, simulation: Simulation, coordinates: FloatArray) -> None:
+        """It is none of the simulation's."""
+
+    @property
+    def words(self) -> list[Any]:
+        """The engine knows none."""
+        return []
+
+    def chain(self, coordinates: FloatArray, found: list[list[Any]]) -> FloatArray:
+        """No equilibrium depends on it."""
+        return np.zeros((0, 1))
 
 
 def parse_unknowns(simulation: Simulation, unknowns: Sequence[Any], what: str = "unknowns") -> list[Unknown]:
