@@ -20,16 +20,6 @@ std::vector<int> stretch_dofs(const Model& model) {
   return dofs;
 }
 
-std::vector<int> edge_dofs(const Model& model) {
-  std::vector<int> dofs;
-  for (int e = 0; e < model.edge_count; ++e) {
-    append(dofs, model.tail_dof[at(e)], 3);
-    append(dofs, model.edge_dof[at(e)], 1);
-    append(dofs, model.head_dof[at(e)], 3);
-  }
-  return dofs;
-}
-
 std::vector<int> bend_dofs(const Model& model) {
   std::vector<int> dofs;
   for (const BendStencil& s : model.bend)
@@ -135,28 +125,23 @@ void ElementTable::add_hessian(int element, const double* hessian, int stride, d
   }
 }
 
-Assembler::Assembler(const Model& model, const Loads& load, Symmetry symmetry, SolverKind kind, bool exact)
+Assembler::Assembler(const Model& model, std::vector<ElementTable*> declared, Symmetry symmetry, SolverKind kind,
+                     bool exact)
     : stretch(2 * model.dimension, stretch_dofs(model)),
       bend(model.planar() ? 6 : 11, bend_dofs(model)),
       half(model.planar() ? 5 : 11, half_dofs(model)),
       model_(model),
       symmetry_(symmetry),
       kind_(kind),
-      exact_(exact) {
-  if (exact && !model.planar()) edges = ElementTable(7, edge_dofs(model));
-  for (const LoadPiece& piece : load.pieces) {
-    int dofs[kMaxLocal];
-    const int n = load_dofs(model, piece, dofs);
-    loads.emplace_back(n, std::vector<int>(dofs, dofs + n));
-  }
+      exact_(exact),
+      declared_(std::move(declared)) {
   const auto add_cliques = [&](const ElementTable& table) {
     for (int e = 0; e < table.count(); ++e) cliques_.emplace_back(table.dofs(e), table.dofs(e) + table.width());
   };
   add_cliques(stretch);
   add_cliques(bend);
   add_cliques(half);
-  add_cliques(edges);
-  for (const ElementTable& table : loads) add_cliques(table);
+  for (const ElementTable* table : declared_) add_cliques(*table);
   for (int i = 0; i < model.dof_count; ++i) cliques_.push_back({i});
   for (const Constraint& c : model.constraints) {
     std::vector<int> own;
@@ -209,8 +194,8 @@ void Assembler::analyse() {
   pattern_ = SparsityPattern::from_cliques(model_.dof_count, cliques);
   solver_ = make_linear_solver(pattern_, symmetry_, kind_);
   ++generation_;
-  for (ElementTable* table : {&stretch, &bend, &half, &edges, &contact}) table->find_offsets(*solver_);
-  for (ElementTable& table : loads) table.find_offsets(*solver_);
+  for (ElementTable* table : {&stretch, &bend, &half, &contact}) table->find_offsets(*solver_);
+  for (ElementTable* table : declared_) table->find_offsets(*solver_);
   find_edge_couplings();
   diagonal_.clear();
   for (int i = 0; i < model_.dof_count; ++i) diagonal_.push_back(solver_->offset(i, i));

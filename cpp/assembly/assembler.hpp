@@ -6,7 +6,6 @@
 
 #include "elasticity/elements.hpp"
 #include "elasticity/stencil_kernels.hpp"
-#include "forces/loads.hpp"
 #include "solvers/linear_solver.hpp"
 
 namespace withe {
@@ -66,8 +65,9 @@ struct RegularStencils {
 /// The matrix of a model with its tables.
 class Assembler {
  public:
-  /// `exact`: the matrix has every derivative, those of edges that turn too.
-  Assembler(const Model& model, const Loads& loads, Symmetry symmetry, SolverKind kind, bool exact = false);
+  /// `declared`: tables of forces besides elasticity, which must outlive it; their offsets follow the solver's.
+  Assembler(const Model& model, std::vector<ElementTable*> declared, Symmetry symmetry, SolverKind kind,
+            bool exact = false);
 
   const SparsityPattern& pattern() const { return pattern_; }
   LinearSolver& solver() { return *solver_; }
@@ -118,9 +118,7 @@ class Assembler {
   double greatest_held_change(const VectorX& from, const VectorX& to) const;
 
   ElementTable stretch, bend, half, contact;
-  ElementTable edges;  ///< tail, angle, head; in space, where the matrix is exact
   RegularStencils regular;
-  std::vector<ElementTable> loads;
   /// Per edge and direction, where its nodes' own entries stand, and the one or (unsymmetric) two between them, or -1.
   std::vector<std::ptrdiff_t> edge_couplings;
 
@@ -141,6 +139,7 @@ class Assembler {
   const Model& model_;
   Symmetry symmetry_;
   SolverKind kind_;
+  std::vector<ElementTable*> declared_;
   bool exact_;
   int generation_ = 0;
   std::vector<std::vector<int>> cliques_;  ///< without contact and custom forces

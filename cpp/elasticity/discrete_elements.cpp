@@ -22,9 +22,14 @@ struct EdgePlace {
   int tail, head, angle;
 };
 
-void add_edge_forces(Local& out, const EdgePlace& e, const MovingEdge<double>& edge, const EdgeFrame<double>& middle,
+/// What an edge makes of a moment; `spin`: of its directors' transport.
+Vec3d edge_force(const MovingEdge<double>& edge, const Vec3d& spin, const Vec3d& moment) {
+  return edge.force(moment) + edge.torque(moment) * spin;
+}
+
+void add_edge_forces(Local& out, const EdgePlace& e, const MovingEdge<double>& edge, const Vec3d& spin,
                      const Vec3d& moment) {
-  const Vec3d f = edge.force(moment) + edge.torque(moment) * middle.spin;
+  const Vec3d f = edge_force(edge, spin, moment);
   const double component[3] = {f.x, f.y, f.z};
   for (int i = 0; i < 3; ++i) {
     out.gradient[e.head + i] += component[i];
@@ -34,9 +39,11 @@ void add_edge_forces(Local& out, const EdgePlace& e, const MovingEdge<double>& e
 }
 
 /// What an edge makes of a moment that stays, and of its own change of it.
-void finish_block(const MovingEdge<double>& edge, const EdgeFrame<double>& middle, const Vec3d& moment, bool own,
+void finish_block(const MovingEdge<double>& edge, const DiscreteStep& step, int index, const Vec3d& moment, bool own,
                   EdgeBlock<double>& block) {
   if (own) add_edge_geometry(edge, moment, block);
+  if (!step.transported) return;
+  const EdgeFrame<double>& middle = step.middle.edge[at(index)];
   add_transport(middle, block);
   if (own) add_spin_change(edge, middle, edge.torque(moment), block);
 }
@@ -85,6 +92,10 @@ HingeArm hinge_arm(const Vector3& w, const Vector3& axis, double angle) {
       (n * (-cross_matrix(axis) + along * Matrix3::Identity() + x * axis.transpose()) + n * t * a * axis.transpose());
   h.by_angle = by_k * a + k * n * along * 0.5 * (1.0 + t * t) * a;
   return h;
+}
+
+Vec3d spin_of(const DiscreteStep& step, int edge) {
+  return step.transported ? step.middle.edge[at(edge)].spin : Vec3d{};
 }
 
 MovingEdge<double> moving_edge(const DiscreteStep& step, int edge) {
@@ -190,14 +201,14 @@ void discrete_bend_local(const Model& model, const TurnCoefficients& elastic, co
       moment_between(elastic.measure, f0[0], f1[0], f0[1], f1[1], row_of(step.start.bend_strain, stencil),
                      row_of(step.end.bend_strain, stencil), elastic.natural, elastic.stiffness, with_matrix);
   const Vec3d moment[2] = {m.moment, -m.moment};
-  for (int i = 0; i < 2; ++i) add_edge_forces(out, place[i], edge[i], step.middle.edge[at(s.edge[i])], moment[i]);
+  for (int i = 0; i < 2; ++i) add_edge_forces(out, place[i], edge[i], spin_of(step, s.edge[i]), moment[i]);
   if (!with_matrix) return;
   EdgeColumns<double> columns[2];
   for (int k = 0; k < 2; ++k) columns[k] = edge_columns(k == 0 ? m.by_a : m.by_b, step.end.edge[at(s.edge[k])]);
   for (int i = 0; i < 2; ++i)
     for (int j = 0; j < 2; ++j) {
       EdgeBlock<double> block = edge_block(edge[i], i == 0 ? 1.0 : -1.0, columns[j]);
-      finish_block(edge[i], step.middle.edge[at(s.edge[i])], moment[i], i == j, block);
+      finish_block(edge[i], step, s.edge[i], moment[i], i == j, block);
       add_edge_rows(out, place[i], place[j], block);
     }
 }
@@ -211,7 +222,6 @@ void discrete_half_local(const Model& model, const TurnCoefficients& elastic, co
   const MovingEdge<double> edge = moving_edge(step, s.edge);
   const EdgeFrame<double>&e0 = step.start.edge[at(s.edge)], &e1 = step.end.edge[at(s.edge)];
   const EdgeFrame<double>&f0 = step.start.attached[at(stencil)], &f1 = step.end.attached[at(stencil)];
-  const EdgeFrame<double>& middle = step.middle.edge[at(s.edge)];
   const bool first = s.frame_first;
   const DiscreteMoment<double> m =
       moment_between(elastic.measure, first ? f0 : e0, first ? f1 : e1, first ? e0 : f0, first ? e1 : f1,
@@ -219,7 +229,8 @@ void discrete_half_local(const Model& model, const TurnCoefficients& elastic, co
   const double sign = first ? -1.0 : 1.0;  // of the moment on the edge
   const EdgePlace place{0, 4, 3};
   const Vec3d moment = sign * m.moment;
-  add_edge_forces(out, place, edge, middle, moment);
+  const Vec3d spin = spin_of(step, s.edge);
+  add_edge_forces(out, place, edge, spin, moment);
   const Vector3 w = step.end_q.segment<3>(model.frame_dof[at(s.frame)]), on_frame = -sign * to_eigen(m.moment);
   Vector3 axis = Vector3::Zero();
   HingeArm h{Vector3::Zero(), Matrix3::Zero(), Vector3::Zero()};
@@ -234,13 +245,13 @@ void discrete_half_local(const Model& model, const TurnCoefficients& elastic, co
 
   const EdgeColumns<double> columns = edge_columns(first ? m.by_b : m.by_a, e1);
   EdgeBlock<double> block = edge_block(edge, sign, columns);
-  finish_block(edge, middle, moment, true, block);
+  finish_block(edge, step, s.edge, moment, true, block);
   add_edge_rows(out, place, place, block);
   const Eigen::Matrix<double, 3, 11> by = moment_columns(columns, first ? m.by_a : m.by_b, w, axis);
   // Rows of the edge by the frame and its hinge.
   for (int k = 7; k < 11; ++k) {
     const Vec3d change = to_vec3(Vector3(2.0 * sign * by.col(k)));
-    const Vec3d f = edge.force(change) + edge.torque(change) * middle.spin;
+    const Vec3d f = edge_force(edge, spin, change);
     for (int i = 0; i < 3; ++i) {
       out.hessian[4 + i][k] += f[i];
       out.hessian[i][k] -= f[i];

@@ -14,6 +14,9 @@ struct DiscreteStep {
   const Configuration &start, &middle, &end;
   const VectorX& end_q;
   const VectorX& change;  ///< of the unknowns, from the start to the end
+  /// Whether torques leave nodes their part of the directors' transport; without, forces are those that change not when
+  /// the start and the end are exchanged.
+  bool transported = true;
 };
 
 /// How an edge's mean strain pulls.

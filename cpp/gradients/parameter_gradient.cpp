@@ -39,6 +39,9 @@ class Chain {
       out.natural_twist.push_back(VectorX::Zero(p_.natural_twist[r].size()));
     }
     out.loads = by.loads;
+    out.spring_stiffness = by.spring_stiffness;
+    out.spring_rest_length = by.spring_rest_length;
+    out.spring_damping = by.spring_damping;
     add_masses();
     add_stiffnesses();
     add_natural();

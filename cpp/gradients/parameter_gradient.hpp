@@ -15,6 +15,7 @@ struct ParameterGradient {
   std::vector<MatrixX2> natural_curvature;
   std::vector<VectorX> natural_twist;
   MatrixX3 loads;
+  VectorX spring_stiffness, spring_rest_length, spring_damping;
 };
 
 ParameterGradient parameter_gradient(const Model& model, const Parameters& parameters, const CoefficientAdjoint& by);

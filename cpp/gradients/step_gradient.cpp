@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "geometry/rotation.hpp"
+#include "steps/inertia.hpp"
 
 namespace withe {
 namespace {
@@ -37,6 +38,12 @@ void StepGradient::begin(const StepTaken& step) {
   const bool middle = step.rule == StepRule::midpoint || step.rule == StepRule::energy_momentum;
   equations_.begin(step.start, step.parameters, step.rule, middle ? 0.5 * step.duration : step.duration);
   if (!model.constraints.empty() && moves()) equations_.held_acceleration().setZero(model.dof_count);
+  if (step.rule == StepRule::energy_momentum) {
+    z_ = step.end - step.start.q;
+    set_velocity_rates(model, z_, step.duration, rates_);
+  } else if (moves()) {
+    rates_.setConstant(model.dof_count, (middle ? 2.0 : 1.0) / step.duration);
+  }
   if (middle)
     z_ = 0.5 * (step.start.q + step.end);
   else
@@ -84,14 +91,14 @@ void StepGradient::pull_back(StateAdjoint& state, CoefficientAdjoint& by, Vector
   const Model& model = equations_.model();
   const Assembler& assembler = equations_.assembler();
   set_end(state);
-  // v1 = rate (q1 - q0) - (end_rate - 1) v0.
+  // v1 = rate (q1 - q0) - (end_rate - 1) v0, but that angles' rates may be those of finite rotations.
   VectorX start = VectorX::Zero(model.dof_count), velocity = start;
   if (moves()) {
     VectorX free = state.v;
     assembler.project(free);
-    const double rate = end_rate() / step_->duration;
-    by_end_ += rate * free;
-    start -= rate * free;
+    const VectorX moved = rates_.cwiseProduct(free);
+    by_end_ += moved;
+    start -= moved;
     velocity -= (end_rate() - 1.0) * free;
   }
   start -= (end_rate() - 1.0) * by_end_;

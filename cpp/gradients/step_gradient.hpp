@@ -64,6 +64,7 @@ class StepGradient {
   std::optional<StepTaken> step_;
   StepData data_;
   Configuration end_;
+  VectorX rates_;  ///< of velocities at the end by q1 [1/s]
   VectorX z_, by_end_, by_z_, rows_, columns_;
   std::vector<double> exact_;
 };

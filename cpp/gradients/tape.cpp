@@ -6,6 +6,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "steps/inertia.hpp"
+
 namespace withe {
 namespace {
 
@@ -54,6 +56,8 @@ class Tape::Player {
   void advance(const Step& step, State& state) {
     const double rate = step.rule == StepRule::backward_euler ? 1.0 : 2.0;
     VectorX v = (rate / step.duration) * (step.end - state.q) - (rate - 1.0) * state.v;
+    if (step.rule == StepRule::energy_momentum)
+      set_turning_velocities(model_, state.v, step.end - state.q, step.duration, v);
     gradient(step.rule).equations().assembler().project(v);
     if (!model_.planar()) compute_configuration(model_, state, step.end, configuration_);
     accept_configuration(model_, step.end, configuration_, state);

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <span>
 
+#include "steps/elastic_forces.hpp"
+
 namespace withe {
 namespace {
 

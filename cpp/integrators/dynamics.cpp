@@ -156,8 +156,7 @@ void add_work(const Equations& equations, const Parameters& parameters, const Ve
     equations.load_force(data, work.assumed);
     result.load_work = work.assumed.dot(change);
   }
-  const bool in_fluid = equations.model().description.fluid.model != FluidModel::none;
-  if (parameters.dragged || parameters.viscous || in_fluid) result.dissipated = equations.dissipated(data, change);
+  if (equations.dissipates(parameters)) result.dissipated = equations.dissipated(data, change);
 }
 
 void add_support_work(const Equations& equations, const VectorX& v0, const VectorX& v1, double dt, StepWorkspace& work,
@@ -207,7 +206,7 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
   const Turning turned = turning(model, state, q1, watched, euler);
   result.largest_turn = turned.largest;
   if (!q1.allFinite() || !(result.largest_turn <= 1.5)) return result;
-  result.stretch_gain = turned.stretch_gain;
+  result.stretch_gain = turned.stretch_gain + (watched ? equations.gained(q1) : 0.0);
   if (Contact* contact = equations.contact()) {
     // Iterates pass through nothing, but they may find a way around what a rod would have met.
     work.change = work.z - state.q;
@@ -230,7 +229,7 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
     v1 = work.mean;
   else
     v1 = 2.0 * work.mean - state.v;
-  if (conserves) set_turning_velocities(equations.problem(), work.change, dt, v1);
+  if (conserves) set_turning_velocities(model, state.v, work.change, dt, v1);
   assembler.project(v1);
   if (!model.constraints.empty()) assembler.add_held_part(work.held_velocity, 1.0, v1);
   add_work(equations, parameters, working, work, result);

@@ -43,7 +43,7 @@ double free_acceleration(Equations& equations, const Parameters& parameters, con
   return turn;
 }
 
-/// The same under contact, drag, viscosity or in a fluid.
+/// The same under contact, or where anything takes energy from the motion.
 double resisted_acceleration(Equations& equations, const Parameters& parameters, double dt, const State& state,
                              StepWorkspace& work) {
   const Model& model = equations.model();
@@ -121,8 +121,7 @@ StepResult verlet_step(Equations& equations, const Parameters& parameters, doubl
   begin_verlet(equations, parameters, dt, state, work);
   const VectorX &half = work.mean, &q1 = work.z;
   State& next = work.next;
-  const bool in_fluid = model.description.fluid.model != FluidModel::none;
-  const bool resisted = equations.contact() || parameters.viscous || parameters.dragged || in_fluid;
+  const bool resisted = equations.contact() || equations.dissipates(parameters);
   result.largest_turn = resisted ? resisted_acceleration(equations, parameters, dt, state, work)
                                  : free_acceleration(equations, parameters, state, work);
   if (!(result.largest_turn <= 1.5)) return result;

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "integrators/surface_search.hpp"
+#include "steps/elastic_forces.hpp"
 
 namespace withe {
 namespace {

@@ -7,6 +7,8 @@
 #include <span>
 #include <vector>
 
+#include "steps/elastic_forces.hpp"
+
 namespace withe {
 namespace {
 

@@ -13,7 +13,7 @@ struct Turning {
 Turning turning(const Model& model, const State& state, const VectorX& q, const double* stretch_stiffness = nullptr,
                 bool at_end = false);
 
-/// Work of loads, drag and viscosity over the step, with the forces that acted in it.
+/// Work of loads, and what all but contact takes from the motion, over the step, with the forces that acted in it.
 void add_work(const Equations& equations, const Parameters& parameters, const VectorX& change, StepWorkspace& work,
               StepResult& result);
 

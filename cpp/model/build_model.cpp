@@ -384,6 +384,11 @@ class Builder {
 
 Model build_model(const SceneDescription& description, std::optional<bool> planar) {
   require(!description.rods.empty(), "the scene has no rods: add one with add_rod");
+  for (const SpringDescription& spring : description.springs) {
+    for (int node : spring.nodes)
+      require(node >= 0 && node < description.positions.rows(), "spring at a node that is not there");
+    require(spring.nodes[0] != spring.nodes[1], "a spring must act between two different nodes");
+  }
   Model model;
   model.description = description;
   if (planar.value_or(true)) model.plane = find_plane(description, planar, model.plane_reason);

@@ -2,6 +2,7 @@
 /// What the scene layer hands to the engine: plain arrays in SI units, one struct per thing that a user
 /// adds. Nodes that are joined already share one index here. Nothing in it changes after `build`.
 
+#include <array>
 #include <string>
 #include <vector>
 
@@ -103,6 +104,14 @@ struct LoadDescription {
   bool added = false;   ///< put on while the scene runs: it has no say in which plane the drawing lies in
 };
 
+/// A spring with a damper beside it (Kelvin and Voigt) between two nodes; see forces/spring.hpp.
+struct SpringDescription {
+  std::array<int, 2> nodes{};  ///< rows of SceneDescription::positions
+  double stiffness = 0;        ///< k [N/m]
+  double rest_length = 0;      ///< L [m]
+  double damping = 0;          ///< c [N s/m]
+};
+
 enum class ContactLaw { imcv2, imcv1, barrier, spillmann_teschner };
 
 /// How the stiffness of contact is found where no number is given.
@@ -195,6 +204,7 @@ struct SceneDescription {
   std::vector<JointDescription> joints;
   std::vector<SupportDescription> supports;
   std::vector<LoadDescription> loads;
+  std::vector<SpringDescription> springs;
   bool has_custom_force = false;  ///< nodal forces come from a callback
   bool custom_implicit = false;   ///< it knows their derivatives, so they are solved for
   bool custom_moments = false;    ///< and moments on nodes

@@ -92,9 +92,10 @@ struct Parameters {
   VectorX edge_density, edge_rotary, edge_viscous_time, edge_drag;
   VectorX added_mass;
   Vector3 gravity;
-  double fluid_viscosity = 0;               ///< [Pa s]
-  std::vector<MatrixX2> natural_curvature;  ///< per rod and stencil, smooth [1/m]
-  std::vector<VectorX> natural_twist;       ///< per rod and stencil [rad/m]
+  double fluid_viscosity = 0;                                    ///< [Pa s]
+  std::vector<MatrixX2> natural_curvature;                       ///< per rod and stencil, smooth [1/m]
+  std::vector<VectorX> natural_twist;                            ///< per rod and stencil [rad/m]
+  VectorX spring_stiffness, spring_rest_length, spring_damping;  ///< per spring [N/m], [m], [N s/m]
   BendMeasure measure;
   bool lumped = false;       ///< whether masses sit at nodes alone; see mass_matrix.hpp
   bool held_lumped = false;  ///< whether those of edges at held nodes do
@@ -163,6 +164,8 @@ Model build_model(const SceneDescription& description, std::optional<bool> plana
 Parameters initial_parameters(const Model& model);
 /// Stiffnesses, densities, viscous time and drag of one rod, from one value an edge; update_derived must follow.
 void set_rod(const Model& model, int rod, const RodDescription& description, Parameters& parameters);
+/// Stiffness, rest length and damping of one spring, which must be finite and not negative.
+void set_spring(int spring, const SpringDescription& description, Parameters& parameters);
 /// Masses, stencil stiffnesses and discrete natural strains from the rest.
 void update_derived(const Model& model, Parameters& parameters);
 /// Only the discrete natural strains.

@@ -66,6 +66,15 @@ void set_rod(const Model& model, int rod, const RodDescription& description, Par
   p.edge_drag.segment(first, count) = description.drag;
 }
 
+void set_spring(int spring, const SpringDescription& d, Parameters& p) {
+  for (double x : {d.stiffness, d.rest_length, d.damping})
+    require(std::isfinite(x) && x >= 0.0,
+            "stiffness, rest length and damping of a spring must be finite and not negative, got " + std::to_string(x));
+  p.spring_stiffness[spring] = d.stiffness;
+  p.spring_rest_length[spring] = d.rest_length;
+  p.spring_damping[spring] = d.damping;
+}
+
 Parameters initial_parameters(const Model& model) {
   const SceneDescription& scene = model.description;
   Parameters p;
@@ -80,6 +89,9 @@ Parameters initial_parameters(const Model& model) {
     p.natural_curvature.push_back(rod.natural_curvature);
     p.natural_twist.push_back(rod.natural_twist);
   }
+  for (VectorX* v : {&p.spring_stiffness, &p.spring_rest_length, &p.spring_damping})
+    v->resize(static_cast<Eigen::Index>(scene.springs.size()));
+  for (std::size_t s = 0; s < scene.springs.size(); ++s) set_spring(static_cast<int>(s), scene.springs[s], p);
   p.added_mass = scene.added_mass;
   p.gravity = scene.gravity;
   p.fluid_viscosity = scene.fluid.viscosity;

@@ -26,6 +26,10 @@ void Gravity::add_adjoint(const StepProblem&, const StepData&, const Assembler&,
   adjoint.coefficients.gravity -= adjoint.rows;
 }
 
+void Gravity::add_explicit(const StepProblem& problem, StepData& data, const Assembler&, const VectorX&) const {
+  data.gradient.head(problem.model.dof_count) -= problem.gravity;
+}
+
 void Drag::add(const StepProblem& problem, StepData& data, const Assembler& assembler, std::span<double> values) const {
   if (!problem.parameters->dragged || !problem.moves()) return;
   const int n = problem.model.dof_count;

@@ -11,11 +11,14 @@ class Gravity final : public Term {
            std::span<double> values) const override;
   void add_adjoint(const StepProblem& problem, const StepData& data, const Assembler& assembler,
                    StepAdjoint& adjoint) const override;
+  void add_explicit(const StepProblem& problem, StepData& data, const Assembler& assembler,
+                    const VectorX& v) const override;
 };
 
 /// D (z - q0) / h.
 class Drag final : public Term {
  public:
+  bool dissipates(const Parameters& parameters) const override { return parameters.dragged; }
   void add(const StepProblem& problem, StepData& data, const Assembler& assembler,
            std::span<double> values) const override;
   void add_adjoint(const StepProblem& problem, const StepData& data, const Assembler& assembler,

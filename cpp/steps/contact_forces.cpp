@@ -57,6 +57,8 @@ void ContactForces::add_adjoint(const StepProblem& problem, const StepData&, con
         "no gradient is known through contact under the midpoint rules yet: take integrator='backward_euler'");
 }
 
+void ContactForces::add_rounding(const StepProblem&, StepData& data) const { data.floor += data.contact_floor; }
+
 double ContactForces::allowed(const StepProblem& problem, const VectorX& z, const VectorX& step) {
   problem.set_end(z, end_);
   change_ = problem.end_rate() * step;

@@ -16,12 +16,14 @@ class ContactForces final : public Term {
   ContactRows& rows() { return rows_; }
   const ContactRows& rows() const { return rows_; }
 
+  bool has_potential() const override { return !contact_.frictional(); }
   void begin(StepProblem& problem) override;
   void find(const StepProblem& problem, StepData& data, Assembler& assembler, bool with_matrix) override;
   void add(const StepProblem& problem, StepData& data, const Assembler& assembler,
            std::span<double> values) const override;
   void add_adjoint(const StepProblem& problem, const StepData& data, const Assembler& assembler,
                    StepAdjoint& adjoint) const override;
+  void add_rounding(const StepProblem& problem, StepData& data) const override;
 
   /// How much of a step of z contact allows, from 0 to 1.
   double allowed(const StepProblem& problem, const VectorX& z, const VectorX& step);

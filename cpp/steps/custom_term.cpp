@@ -83,7 +83,7 @@ void CustomTerm::couple(const StepProblem& problem, Assembler& assembler) {
         if (pieces[k].load < 0) moment_pieces_[at(pieces[k].node)].push_back(k);
     }
     for (std::size_t k : moment_pieces_[at(row - nodes)])
-      add_group(assembler.loads[k].dofs(0), assembler.loads[k].width(), column);
+      add_group(loads_->tables()[k].dofs(0), loads_->tables()[k].width(), column);
   }
   assembler.couple_groups(groups);
 }
@@ -113,7 +113,7 @@ void CustomTerm::add_matrix(const StepProblem& problem, const StepData& data, co
     for (std::size_t k : moment_pieces_[at(node)]) {
       load_local(model, *problem.start, data.z, data.configuration, problem.loads.pieces[k], Vector3::Unit(row % 3),
                  local);  // what a moment does is linear in it
-      const ElementTable& table = assembler.loads[k];
+      const ElementTable& table = loads_->tables()[k];
       for (int i = 0; i < table.width(); ++i)
         if (table.dofs(0)[i] >= 0) add_row(table.dofs(0)[i], column, value * local.gradient[i]);
     }

@@ -3,7 +3,7 @@
 
 #include <functional>
 
-#include "steps/term.hpp"
+#include "steps/load_forces.hpp"
 
 namespace withe {
 
@@ -12,9 +12,12 @@ using CustomResponse = std::function<CustomForces(const VectorX& q, const Vector
 
 class CustomTerm final : public Term {
  public:
+  /// `loads` has the pieces of moments, where there are any, and must outlive it.
+  explicit CustomTerm(const LoadForces* loads) : loads_(loads) {}
   /// What is solved for in the steps to come. Empty: forces stay as they were set.
   CustomResponse respond;
 
+  bool has_potential() const override { return false; }
   void find(const StepProblem& problem, StepData& data, Assembler& assembler, bool with_matrix) override;
   void add(const StepProblem& problem, StepData& data, const Assembler& assembler,
            std::span<double> values) const override;
@@ -30,6 +33,7 @@ class CustomTerm final : public Term {
   void add_matrix(const StepProblem& problem, const StepData& data, const Assembler& assembler,
                   std::span<double> values) const;
 
+  const LoadForces* loads_;
   CustomForces found_;                                   ///< with derivatives, of the last evaluation with a matrix
   std::vector<std::vector<std::size_t>> moment_pieces_;  ///< of custom moments, per node
 };

@@ -6,6 +6,7 @@
 
 #include <stdexcept>
 
+#include "elasticity/discrete_elements.hpp"
 #include "geometry/rotation.hpp"
 #include "steps/elastic_forces.hpp"
 
@@ -60,12 +61,154 @@ class StencilAdjoint {
   double rows_[kMaxLocal];
 };
 
+/// Of discrete gradients. They are functions of the two ends of a step alone, but for what torques leave nodes of the
+/// directors' transport, spin times the torque; and those which exchange the ends leave alone. So derivatives by the
+/// start are those by the end of the step backwards.
+class DiscreteAdjoint {
+ public:
+  DiscreteAdjoint(const StepProblem& problem, const StepData& data, StepAdjoint& adjoint)
+      : problem_(problem),
+        adjoint_(adjoint),
+        back_(-data.change),
+        start_(problem.start_configuration),
+        forth_{problem.start_configuration, data.configuration, data.end_configuration, data.end, data.change, false},
+        backwards_{data.end_configuration, data.configuration, start_, problem.start->q, back_, false},
+        rows_(adjoint.rows) {
+    const Model& model = problem.model;
+    for (int e = 0; !model.planar() && e < model.edge_count; ++e) {
+      // The start's angles as those of a step backwards: counted from where the end's tangents are.
+      EdgeFrame<double>& start = start_.edge[at(e)];
+      const Vec3d& source = data.end_configuration.edge[at(e)].tangent;
+      start.spin = (-start.inverse_length / (1.0 + dot(source, start.tangent))) * cross(source, start.tangent);
+      const Vec3d& spin = data.configuration.edge[at(e)].spin;
+      const int tail = model.tail_dof[at(e)], head = model.head_dof[at(e)];
+      for (int i = 0; i < 3; ++i) rows_[model.edge_dof[at(e)]] += spin[i] * (rows_[head + i] - rows_[tail + i]);
+    }
+  }
+
+  /// `evaluate(step, k, with_matrix, local)`, with stiffnesses and natural strains `k`.
+  template <class Evaluate>
+  void add_turning(const ElementTable& table, int i, const TurnCoefficients& k,
+                   const std::vector<std::pair<int, int>>& angles, const Evaluate& evaluate, Columns3& by_stiffness,
+                   Columns3& by_natural) {
+    double rows[kMaxLocal];
+    gather(table, i, rows_, rows);
+    const auto work = [&](const TurnCoefficients& of) {
+      Local local;
+      evaluate(forth_, of, false, local);
+      double sum = 0.0;
+      for (int r = 0; r < table.width(); ++r) sum += rows[r] * local.gradient[r];
+      return sum;
+    };
+    for (int s = 0; s < (problem_.model.planar() ? 1 : 3); ++s) {
+      TurnCoefficients unit{k.measure, {}, k.natural};
+      (s == 0 ? unit.stiffness.x : s == 1 ? unit.stiffness.y : unit.stiffness.z) = 1.0;
+      const double now = work(unit);
+      by_stiffness(i, s) += now;
+      (s == 0 ? unit.natural.x : s == 1 ? unit.natural.y : unit.natural.z) += 1.0;
+      by_natural(i, s) += k.stiffness[s] * (work(unit) - now);
+    }
+    add_ends(table, i, rows, angles, [&](const DiscreteStep& step, Local& local) { evaluate(step, k, true, local); });
+  }
+
+  /// q1 = 2 z - q0, and matrices of steps are twice derivatives by their ends.
+  template <class Evaluate>
+  void add_ends(const ElementTable& table, int element, const double* rows,
+                const std::vector<std::pair<int, int>>& angles, const Evaluate& evaluate) {
+    Local by_end, by_start;
+    evaluate(forth_, by_end);
+    evaluate(backwards_, by_start);
+    const int* dofs = table.dofs(element);
+    double end[kMaxLocal], start[kMaxLocal];
+    for (int c = 0; c < table.width(); ++c) {
+      end[c] = start[c] = 0.0;
+      for (int r = 0; r < table.width(); ++r) {
+        end[c] += 0.5 * rows[r] * by_end.hessian[r][c];
+        start[c] += 0.5 * rows[r] * by_start.hessian[r][c];
+      }
+      if (dofs[c] >= 0) adjoint_.start[dofs[c]] += start[c] - end[c];
+    }
+    for (const auto& [place, edge] : angles) {
+      adjoint_.start_turn[edge] += start[place];
+      adjoint_.end_turn[edge] += end[place];
+      // From angles so counted to turns of directors that are carried along with the edge.
+      const int tail = problem_.model.tail_dof[at(edge)], head = problem_.model.head_dof[at(edge)];
+      for (int i = 0; i < 3; ++i) {
+        adjoint_.start[head + i] -= start[place] * start_.edge[at(edge)].spin[i];
+        adjoint_.start[tail + i] += start[place] * start_.edge[at(edge)].spin[i];
+      }
+    }
+  }
+
+  const DiscreteStep& forth() const { return forth_; }
+  const VectorX& rows() const { return rows_; }
+
+ private:
+  const StepProblem& problem_;
+  StepAdjoint& adjoint_;
+  VectorX back_;
+  Configuration start_;
+  DiscreteStep forth_, backwards_;
+  VectorX rows_;  ///< with what those of nodes make of torques among those of angles
+};
+
 }  // namespace
+
+void ElasticForces::add_discrete_adjoint(const StepProblem& problem, const StepData& data, const Assembler& assembler,
+                                         StepAdjoint& adjoint) const {
+  const Model& model = problem.model;
+  for (const FrameStencil& half : model.half)
+    if (!model.planar() && adjoint.rows.segment<3>(model.frame_dof[at(half.frame)]).squaredNorm() > 0.0)
+      throw std::invalid_argument(
+          "no gradient is known yet through joints in energy-momentum steps in space: take integrator "
+          "'implicit_midpoint' with adaptive=False, or 'backward_euler'");
+  const ElasticCoefficients& k = problem.elastic;
+  CoefficientAdjoint& by = adjoint.coefficients;
+  DiscreteAdjoint discrete(problem, data, adjoint);
+  Local local;
+  double rows[kMaxLocal];
+  ElasticCoefficients unit;
+  unit.stretch_stiffness = VectorX::Ones(model.edge_count);
+  unit.stretch_natural = k.stretch_natural;
+  for (int e = 0; e < model.edge_count; ++e) {
+    gather(assembler.stretch, e, discrete.rows(), rows);
+    discrete_stretch_local(model, unit, discrete.forth(), e, false, nullptr, local);
+    for (int r = 0; r < assembler.stretch.width(); ++r) by.stretch_stiffness(e) += rows[r] * local.gradient[r];
+    discrete.add_ends(assembler.stretch, e, rows, {}, [&](const DiscreteStep& step, Local& out) {
+      discrete_stretch_local(model, k, step, e, true, nullptr, out);
+    });
+  }
+  const bool planar = model.planar();
+  for (int b = 0; b < static_cast<int>(model.bend.size()); ++b) {
+    std::vector<std::pair<int, int>> angles;
+    if (!planar) angles = {{3, model.bend[at(b)].edge[0]}, {7, model.bend[at(b)].edge[1]}};
+    discrete.add_turning(
+        assembler.bend, b, bend_coefficients(k, b), angles,
+        [&](const DiscreteStep& step, const TurnCoefficients& of, bool with_matrix, Local& out) {
+          discrete_bend_local(model, of, step, b, with_matrix, out);
+        },
+        by.bend_stiffness, by.bend_natural);
+  }
+  for (int h = 0; h < static_cast<int>(model.half.size()); ++h) {
+    std::vector<std::pair<int, int>> angles;
+    if (!planar) angles = {{3, model.half[at(h)].edge}};
+    discrete.add_turning(
+        assembler.half, h, half_coefficients(k, h), angles,
+        [&](const DiscreteStep& step, const TurnCoefficients& of, bool with_matrix, Local& out) {
+          discrete_half_local(model, of, step, h, with_matrix, out);
+        },
+        by.half_stiffness, by.half_natural);
+  }
+}
 
 void ElasticForces::add_adjoint(const StepProblem& problem, const StepData& data, const Assembler& assembler,
                                 StepAdjoint& adjoint) const {
-  if (problem.conserves_energy()) throw std::invalid_argument("no gradient is known through energy-momentum steps yet");
   const Model& model = problem.model;
+  if (problem.conserves_energy()) {
+    add_discrete_adjoint(problem, data, assembler, adjoint);
+    if (!problem.viscous_acts()) return;
+  }
+  const bool elastic = !problem.conserves_energy();
   const ElasticCoefficients &k = problem.elastic, &kv = problem.viscous;
   const bool viscous = problem.viscous_acts(), middle = problem.in_middle();
   const double rate = problem.moves() ? 1.0 / problem.interval : 0.0;
@@ -75,7 +218,7 @@ void ElasticForces::add_adjoint(const StepProblem& problem, const StepData& data
     StencilAdjoint part(problem, assembler.stretch, e, adjoint);
     stretch_gradients(model, data.configuration, e, part.middle);
     const double along = model.edge_length(e) * part.along(0);
-    by.stretch_stiffness(e) += (part.middle.strain[0] - k.stretch_natural(e)) * along;
+    if (elastic) by.stretch_stiffness(e) += (part.middle.strain[0] - k.stretch_natural(e)) * along;
     if (!viscous) continue;
     stretch_gradients(model, problem.start_configuration, e, part.start);
     if (middle) stretch_gradients(model, data.end_configuration, e, part.end);
@@ -89,8 +232,10 @@ void ElasticForces::add_adjoint(const StepProblem& problem, const StepData& data
                                Columns3& by_natural, double& by_time) {
     for (int s = 0; s < part.middle.count; ++s) {
       const double along = part.along(s);
-      by_stiffness(i, s) += (part.middle.strain[s] - natural(i, s)) * along;
-      by_natural(i, s) -= stiffness(i, s) * along;
+      if (elastic) {
+        by_stiffness(i, s) += (part.middle.strain[s] - natural(i, s)) * along;
+        by_natural(i, s) -= stiffness(i, s) * along;
+      }
       if (!viscous) continue;
       by_stiffness(i, s) += rate * viscous_time * part.change(s) * along;
       by_time += rate * stiffness(i, s) * part.change(s) * along;
@@ -118,7 +263,7 @@ void ElasticForces::add_adjoint(const StepProblem& problem, const StepData& data
     if (!model.planar()) part.angles = {{3, model.half[at(h)].edge}};
     add_turning(part, h, k.half_stiffness, k.half_natural, problem.parameters->half_viscous_time(h), kv.half_stiffness,
                 by.half_stiffness, by.half_natural, by.half_time(h));
-    if (model.planar() || !problem.moves()) continue;
+    if (model.planar() || !problem.moves() || !elastic) continue;
     // How the frame's turns enter, beyond its unknowns.
     const int frame = model.half[at(h)].frame;
     const Vector3 w = data.z.segment<3>(model.frame_dof[at(frame)]);

@@ -1,5 +1,7 @@
 #include "steps/elastic_forces.hpp"
 
+#include <cmath>
+
 #include "elasticity/discrete_elements.hpp"
 #include "elasticity/stencil_kernels.hpp"
 #include "elasticity/stretch.hpp"
@@ -142,6 +144,21 @@ void ElasticForces::add_explicit(const StepProblem& problem, StepData& data, con
   add_others(problem, problem.elastic, data, assembler, {}, nullptr);
 }
 
+void ElasticForces::add_rounding(const StepProblem& problem, StepData& data) const {
+  const Model& model = problem.model;
+  const int size = model.dimension;
+  for (int e = 0; e < model.edge_count; ++e) {
+    const Vec3d& t = data.configuration.edge[at(e)].tangent;
+    const double bound = data.rounding.axial[e];
+    const double part[3] = {bound * std::abs(t.x), bound * std::abs(t.y), size == 2 ? 0.0 : bound * std::abs(t.z)};
+    double *tail = &data.floor[model.tail_dof[at(e)]], *head = &data.floor[model.head_dof[at(e)]];
+    for (int i = 0; i < size; ++i) {
+      tail[i] += part[i];
+      head[i] += part[i];
+    }
+  }
+}
+
 double ElasticForces::dissipated(const StepProblem& problem, const StepData& data, const Assembler& assembler,
                                  const VectorX& change) const {
   if (!problem.viscous_acts()) return 0.0;
@@ -233,8 +250,7 @@ void ElasticForces::add_rate_slopes(const StepProblem& problem, const StepData& 
       for (int j = 0; j < width; ++j) {
         hessian[i][j] = 0.0;
         for (int s = 0; s < middle.count; ++s)
-          hessian[i][j] +=
-              stiffness[s * stride] * middle.gradient[s][i] * (end.gradient[s][j] - middle.gradient[s][j]);
+          hessian[i][j] += stiffness[s * stride] * middle.gradient[s][i] * (end.gradient[s][j] - middle.gradient[s][j]);
       }
     table.add_hessian(element, hessian, 1.0, values);
   };

@@ -9,6 +9,7 @@ class ElasticForces final : public Term {
  public:
   explicit ElasticForces(const Model& model) : inverse_rest_(model.edge_length.cwiseInverse()) {}
 
+  bool dissipates(const Parameters& parameters) const override { return parameters.viscous; }
   void begin(StepProblem& problem) override;
   void find(const StepProblem& problem, StepData& data, Assembler& assembler, bool with_matrix) override;
   void add(const StepProblem& problem, StepData& data, const Assembler& assembler,
@@ -17,9 +18,11 @@ class ElasticForces final : public Term {
                    StepAdjoint& adjoint) const override;
   double dissipated(const StepProblem& problem, const StepData& data, const Assembler& assembler,
                     const VectorX& change) const override;
-
   /// Elastic forces alone, with velocities v the couple of edges that spin and turn as well.
-  void add_explicit(const StepProblem& problem, StepData& data, const Assembler& assembler, const VectorX& v) const;
+  void add_explicit(const StepProblem& problem, StepData& data, const Assembler& assembler,
+                    const VectorX& v) const override;
+  /// An axial strain rounds along its edge only.
+  void add_rounding(const StepProblem& problem, StepData& data) const override;
 
  private:
   void set_axial_forces(const StepProblem& problem, const ElasticCoefficients& k, StepData& data) const;
@@ -33,6 +36,8 @@ class ElasticForces final : public Term {
 
   void add_rate_slopes(const StepProblem& problem, const StepData& data, const Assembler& assembler,
                        std::span<double> values) const;
+  void add_discrete_adjoint(const StepProblem& problem, const StepData& data, const Assembler& assembler,
+                            StepAdjoint& adjoint) const;
 
   VectorX inverse_rest_;  ///< per edge: 1 / L [1 / m]
 };

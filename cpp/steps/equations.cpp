@@ -1,13 +1,11 @@
 #include "steps/equations.hpp"
 
+#include <algorithm>
 #include <atomic>
-#include <cmath>
 #include <utility>
 
 #include "elasticity/stencil_kernels.hpp"
 #include "steps/body_forces.hpp"
-#include "steps/inertia.hpp"
-#include "steps/load_forces.hpp"
 #include "steps/rounding.hpp"
 
 namespace withe {
@@ -26,39 +24,27 @@ StepProblem problem_of(const Model& model) {
   return problem;
 }
 
-/// An axial strain rounds along its edge only.
-void add_axial_bounds(const Model& model, StepData& data) {
-  const int size = model.dimension;
-  for (int e = 0; e < model.edge_count; ++e) {
-    const Vec3d& t = data.configuration.edge[at(e)].tangent;
-    const double bound = data.rounding.axial[e];
-    const double part[3] = {bound * std::abs(t.x), bound * std::abs(t.y), size == 2 ? 0.0 : bound * std::abs(t.z)};
-    double *tail = &data.floor[model.tail_dof[at(e)]], *head = &data.floor[model.head_dof[at(e)]];
-    for (int i = 0; i < size; ++i) {
-      tail[i] += part[i];
-      head[i] += part[i];
-    }
-  }
+std::vector<ElementTable*> tables_of(const Terms& terms) {
+  std::vector<ElementTable*> tables;
+  for (const std::unique_ptr<Term>& term : terms.all) term->declare(tables);
+  return tables;
 }
 
 }  // namespace
 
 Equations::Equations(const Model& model, const EquationOptions& options)
     : problem_(problem_of(model)),
-      terms_(make_terms(model, problem_.loads, options.rule)),
+      terms_(make_terms(model, problem_.loads, options.rule, options.exact)),
       asymmetries_(asymmetries_of(model, problem_.loads, terms_, options.rule, options.exact)),
-      assembler_(model, problem_.loads, asymmetries_.empty() ? Symmetry::symmetric : Symmetry::unsymmetric,
+      assembler_(model, tables_of(terms_), asymmetries_.empty() ? Symmetry::symmetric : Symmetry::unsymmetric,
                  options.solver, options.exact),
       static_duration_(options.static_duration) {
   problem_.exact = options.exact;
   if (contact()) {
     assembler_.couple(terms_.contact->rows().unknowns(), kContactUnknowns);
     ordered_ = terms_.contact->rows().keys();
-    if (contact()->frictional()) has_potential_ = false;
   }
-  if (terms_.custom) has_potential_ = false;
-  for (const LoadPiece& piece : loads().pieces)
-    if (!withe::has_potential(model, piece)) has_potential_ = false;
+  for (const std::unique_ptr<Term>& term : terms_.all) has_potential_ = has_potential_ && term->has_potential();
 }
 
 void Equations::set_parameters(const Parameters& parameters) {
@@ -139,19 +125,35 @@ void Equations::finish(StepData& data) const {
   data.full_residual = data.gradient.head(n);
   data.magnitude = data.row_magnitude.head(n);
   data.floor = data.rounding.rows + data.rounding.relative * data.magnitude;
-  if (terms_.contact) data.floor += data.contact_floor;
-  add_axial_bounds(model(), data);
+  for (const std::unique_ptr<Term>& term : terms_.all) term->add_rounding(problem_, data);
   data.residual = data.full_residual;
   assembler_.project(data.residual);
 }
 
 void Equations::evaluate_forces(const VectorX& v, StepData& data) const {
   clear(problem_.start->q, data);
-  data.custom = problem_.custom;
+  if (terms_.custom) data.custom = problem_.custom;
   data.axial_force = nullptr;
-  terms_.elastic->add_explicit(problem_, data, assembler_, v);
-  if (!loads().pieces.empty()) LoadForces().add(problem_, data, assembler_, {});
-  data.full_residual = data.gradient.head(model().dof_count) - problem_.gravity - problem_.custom.force;
+  for (const std::unique_ptr<Term>& term : terms_.all) term->add_explicit(problem_, data, assembler_, v);
+  data.full_residual = data.gradient.head(model().dof_count);
+}
+
+bool Equations::dissipates(const Parameters& parameters) const {
+  return std::any_of(terms_.all.begin(), terms_.all.end(),
+                     [&](const std::unique_ptr<Term>& term) { return term->dissipates(parameters); });
+}
+
+double Equations::gained(const VectorX& end) const {
+  double energy = 0.0;
+  for (const std::unique_ptr<Term>& term : terms_.all) energy += term->gained(problem_, end);
+  return energy;
+}
+
+std::vector<std::string> Equations::notes() const {
+  std::vector<std::string> notes;
+  for (const std::unique_ptr<Term>& term : terms_.all)
+    if (std::string note = term->note(); !note.empty()) notes.push_back(std::move(note));
+  return notes;
 }
 
 double Equations::dissipated(const StepData& data, const VectorX& change) const {

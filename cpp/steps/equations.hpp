@@ -49,6 +49,8 @@ class Equations {
   VectorX& held_acceleration() { return problem_.held_acceleration; }
   /// In words, what makes the Jacobian unsymmetric.
   const std::vector<std::string>& asymmetries() const { return asymmetries_; }
+  /// What terms have to say for the plan.
+  std::vector<std::string> notes() const;
   /// True where statics minimise a potential.
   bool has_potential() const { return has_potential_; }
 
@@ -84,8 +86,11 @@ class Equations {
   /// residual alone. No contact, viscosity, drag or fluid.
   void evaluate_forces(const VectorX& v, StepData& data) const;
 
-  /// What drag, viscosity and fluids take, and what loads and custom forces give, over `change`, with the forces of the
-  /// last evaluation [J].
+  /// Whether anything but contact takes energy from the motion.
+  bool dissipates(const Parameters& parameters) const;
+  /// What energies grow by over a step that ends at `end`, beyond the work of their forces, but for elasticity [J].
+  double gained(const VectorX& end) const;
+  /// What drag, viscosity, springs and fluids take over `change`, with the forces of the last evaluation [J].
   double dissipated(const StepData& data, const VectorX& change) const;
   bool loaded() const { return !loads().pieces.empty() || terms_.custom != nullptr; }
   /// Of loads and custom forces in the last evaluation, per unknown.

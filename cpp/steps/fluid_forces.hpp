@@ -14,6 +14,7 @@ class ResistiveForces final : public Term {
  public:
   explicit ResistiveForces(const Model& model);
 
+  bool dissipates(const Parameters&) const override { return true; }
   void add(const StepProblem& problem, StepData& data, const Assembler& assembler,
            std::span<double> values) const override;
   void add_adjoint(const StepProblem& problem, const StepData& data, const Assembler& assembler,
@@ -33,6 +34,7 @@ class StokesletForces final : public Term {
  public:
   explicit StokesletForces(const Model& model) : fluid_(model) {}
 
+  bool dissipates(const Parameters&) const override { return true; }
   void begin(StepProblem& problem) override;
   /// After a step has begun. False where no solution was found.
   bool solve(const StepProblem& problem, const VectorX& q, const VectorX& v);

@@ -3,7 +3,7 @@
 #include "steps/inertia.hpp"
 
 #include <cmath>
-#include <stdexcept>
+#include <utility>
 
 #include "geometry/rotation.hpp"
 #include "steps/turning_inertia.hpp"
@@ -122,7 +122,7 @@ void set_turning_frames(const StepProblem& problem, StepData& data) {
 }
 
 /// Derivatives of the inertia of edges, beyond those of the mass matrix.
-void add_edge_slopes(const StepProblem& problem, const StepData& data, const Assembler& assembler,
+void add_edge_slopes(const StepProblem& problem, const StepData& data, const ElementTable& edges,
                      std::span<double> values) {
   const Model& model = problem.model;
   const double inverse = 1.0 / problem.interval;
@@ -139,7 +139,7 @@ void add_edge_slopes(const StepProblem& problem, const StepData& data, const Ass
       hessian[3][column] = sign * force.torque.slope[unknown];
     }
     hessian[3][3] -= inverse * inverse * problem.mass.rows[model.edge_dof[at(e)]];
-    assembler.edges.add_hessian(e, hessian, 1.0, values);
+    edges.add_hessian(e, hessian, 1.0, values);
   }
 }
 
@@ -198,6 +198,17 @@ void add_frame_slopes(const StepProblem& problem, const StepData& data, const As
 
 }  // namespace
 
+Inertia::Inertia(const Model& model, bool exact) {
+  if (!exact || model.planar()) return;
+  std::vector<int> dofs;
+  for (int e = 0; e < model.edge_count; ++e) {
+    for (int i = 0; i < 3; ++i) dofs.push_back(model.tail_dof[at(e)] + i);
+    dofs.push_back(model.edge_dof[at(e)]);
+    for (int i = 0; i < 3; ++i) dofs.push_back(model.head_dof[at(e)] + i);
+  }
+  edges_ = ElementTable(7, std::move(dofs));
+}
+
 void Inertia::add(const StepProblem& problem, StepData& data, const Assembler& assembler,
                   std::span<double> values) const {
   if (!problem.moves()) return;
@@ -217,7 +228,7 @@ void Inertia::add(const StepProblem& problem, StepData& data, const Assembler& a
   data.row_magnitude.head(n) += data.inertia.cwiseAbs();
   if (values.empty()) return;
   add_mass_matrix(problem, problem.mass, inverse * inverse, assembler, values);
-  if (turning_too && !problem.model.planar()) add_edge_slopes(problem, data, assembler, values);
+  if (turning_too && !problem.model.planar()) add_edge_slopes(problem, data, edges_, values);
 }
 
 void Inertia::add_adjoint(const StepProblem& problem, const StepData& data, const Assembler& assembler,
@@ -241,8 +252,12 @@ void Inertia::add_adjoint(const StepProblem& problem, const StepData& data, cons
   adjoint.start -= inverse * inverse * force;
   adjoint.velocity -= inverse * force;
   if (model.planar()) {
-    if (problem.conserves_energy() && model.frame_count > 0)
-      throw std::invalid_argument("no gradient is known yet through joints in energy-momentum steps");
+    for (int f = 0; problem.conserves_energy() && f < model.frame_count; ++f) {
+      const int dof = model.frame_dof[at(f)];
+      const double apart = data.z[dof] - problem.start->q[dof], t = std::tan(apart);
+      adjoint.start[dof] -= inverse * inverse * problem.mass.rows[dof] * t * t * rows[dof];
+      adjoint.coefficients.mass[dof] += inverse * inverse * (t - apart) * rows[dof];
+    }
     return;
   }
   for (int e = 0; e < model.edge_count; ++e) add_turning_adjoint(problem, data, e, adjoint);
@@ -276,12 +291,29 @@ void add_explicit_spin_couple(const StepProblem& problem, StepData& data, int ed
               data.gradient);
 }
 
-void set_turning_velocities(const StepProblem& problem, const VectorX& change, double dt, VectorX& v1) {
-  const auto set = [&](int dof) { v1[dof] = 2.0 * finite_turn(change[dof]) / dt - problem.start->v[dof]; };
-  if (problem.model.planar())
-    for (int f = 0; f < problem.model.frame_count; ++f) set(problem.model.frame_dof[at(f)]);
+namespace {
+
+/// Of every angle whose rate is that of a finite rotation: joints' in a plane, edges' in space.
+template <class Set>
+void for_each_turn(const Model& model, const Set& set) {
+  if (model.planar())
+    for (int f = 0; f < model.frame_count; ++f) set(model.frame_dof[at(f)]);
   else
-    for (int e = 0; e < problem.model.edge_count; ++e) set(problem.model.edge_dof[at(e)]);
+    for (int e = 0; e < model.edge_count; ++e) set(model.edge_dof[at(e)]);
+}
+
+}  // namespace
+
+void set_turning_velocities(const Model& model, const VectorX& v0, const VectorX& change, double dt, VectorX& v1) {
+  for_each_turn(model, [&](int dof) { v1[dof] = 2.0 * finite_turn(change[dof]) / dt - v0[dof]; });
+}
+
+void set_velocity_rates(const Model& model, const VectorX& change, double dt, VectorX& rates) {
+  rates.setConstant(model.dof_count, 2.0 / dt);
+  for_each_turn(model, [&](int dof) {
+    const double t = std::tan(0.5 * change[dof]);
+    rates[dof] *= 1.0 + t * t;
+  });
 }
 
 /// 2 tan(D theta / 2) over how much of the mean of an edge's tangents lies along it in the middle.

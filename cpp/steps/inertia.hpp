@@ -11,10 +11,16 @@ namespace withe {
 /// alone.
 class Inertia final : public Term {
  public:
+  Inertia(const Model& model, bool exact);
+
+  void declare(std::vector<ElementTable*>& tables) override { tables.push_back(&edges_); }
   void add(const StepProblem& problem, StepData& data, const Assembler& assembler,
            std::span<double> values) const override;
   void add_adjoint(const StepProblem& problem, const StepData& data, const Assembler& assembler,
                    StepAdjoint& adjoint) const override;
+
+ private:
+  ElementTable edges_;  ///< tail, angle, head; in space, where the matrix is exact
 };
 
 /// Entries of a matrix such as that of masses: its diagonal, and what couples nodes off it.
@@ -25,7 +31,9 @@ void add_mass_matrix(const StepProblem& problem, const MassMatrix& mass, double 
 void add_explicit_spin_couple(const StepProblem& problem, StepData& data, int edge, const VectorX& v);
 
 /// Of an energy-momentum step that changes the unknowns by `change`: the velocities of angles at its end.
-void set_turning_velocities(const StepProblem& problem, const VectorX& change, double dt, VectorX& v1);
+void set_turning_velocities(const Model& model, const VectorX& v0, const VectorX& change, double dt, VectorX& v1);
+/// How those change with `change`, per unknown: 2 / dt where it turns nothing.
+void set_velocity_rates(const Model& model, const VectorX& change, double dt, VectorX& rates);
 /// What forces of an energy-momentum step do their work over: its change of the unknowns, but for angles and frames,
 /// whose torques and moments are those about where they are in the middle.
 void set_working_change(const StepProblem& problem, const StepData& data, const VectorX& change, VectorX& working);

@@ -1,20 +1,34 @@
 #include "steps/load_forces.hpp"
 
+#include <algorithm>
 #include <stdexcept>
 
 namespace withe {
 
-void LoadForces::add(const StepProblem& problem, StepData& data, const Assembler& assembler,
-                     std::span<double> values) const {
+LoadForces::LoadForces(const Model& model, const Loads& loads)
+    : has_potential_(std::all_of(loads.pieces.begin(), loads.pieces.end(),
+                                 [&](const LoadPiece& piece) { return withe::has_potential(model, piece); })) {
+  for (const LoadPiece& piece : loads.pieces) {
+    int dofs[kMaxLocal];
+    const int n = load_dofs(model, piece, dofs);
+    tables_.emplace_back(n, std::vector<int>(dofs, dofs + n));
+  }
+}
+
+void LoadForces::declare(std::vector<ElementTable*>& tables) {
+  for (ElementTable& table : tables_) tables.push_back(&table);
+}
+
+void LoadForces::add(const StepProblem& problem, StepData& data, const Assembler&, std::span<double> values) const {
   const Loads& loads = problem.loads;
   Local local;
   for (std::size_t k = 0; k < loads.pieces.size(); ++k) {
     const bool dead = loads.pieces[k].shape == LoadShape::dead_node;
     load_local(problem.model, *problem.start, data.z, data.configuration, loads.pieces[k],
                value_of(loads, data.custom, loads.pieces[k]), local);
-    assembler.loads[k].add_gradient(0, local.gradient, 1.0, data.gradient, data.row_magnitude);
-    if (!values.empty() && !dead) assembler.loads[k].add_hessian(0, local.hessian, 1.0, values);
-    const int* dofs = assembler.loads[k].dofs(0);
+    tables_[k].add_gradient(0, local.gradient, 1.0, data.gradient, data.row_magnitude);
+    if (!values.empty() && !dead) tables_[k].add_hessian(0, local.hessian, 1.0, values);
+    const int* dofs = tables_[k].dofs(0);
     if (dead)
       for (int i = 0; i < problem.model.dimension; ++i) data.potential += local.gradient[i] * data.z(dofs[i]);
     else
@@ -22,7 +36,7 @@ void LoadForces::add(const StepProblem& problem, StepData& data, const Assembler
   }
 }
 
-void LoadForces::add_adjoint(const StepProblem& problem, const StepData& data, const Assembler& assembler,
+void LoadForces::add_adjoint(const StepProblem& problem, const StepData& data, const Assembler&,
                              StepAdjoint& adjoint) const {
   const Loads& loads = problem.loads;
   Local local;
@@ -30,7 +44,7 @@ void LoadForces::add_adjoint(const StepProblem& problem, const StepData& data, c
   for (std::size_t k = 0; k < loads.pieces.size(); ++k) {
     const LoadPiece& piece = loads.pieces[k];
     if (piece.load < 0) continue;
-    const ElementTable& table = assembler.loads[k];
+    const ElementTable& table = tables_[k];
     gather(table, 0, adjoint.rows, rows);
     for (int axis = 0; axis < 3; ++axis) {
       load_local(problem.model, *problem.start, data.z, data.configuration, piece, Vector3::Unit(axis), local);
@@ -42,14 +56,13 @@ void LoadForces::add_adjoint(const StepProblem& problem, const StepData& data, c
   }
 }
 
-void LoadForces::add_applied(const StepProblem& problem, const StepData& data, const Assembler& assembler,
-                             VectorX& force) const {
+void LoadForces::add_applied(const StepProblem& problem, const StepData& data, const Assembler&, VectorX& force) const {
   const Loads& loads = problem.loads;
   Local local;
   for (std::size_t k = 0; k < loads.pieces.size(); ++k) {
     load_local(problem.model, *problem.start, data.z, data.configuration, loads.pieces[k],
                value_of(loads, data.custom, loads.pieces[k]), local);
-    const ElementTable& table = assembler.loads[k];
+    const ElementTable& table = tables_[k];
     const int* dofs = table.dofs(0);
     for (int i = 0; i < table.width(); ++i)
       if (dofs[i] >= 0) force[dofs[i]] -= local.gradient[i];

@@ -7,12 +7,23 @@ namespace withe {
 
 class LoadForces final : public Term {
  public:
+  LoadForces(const Model& model, const Loads& loads);
+
+  void declare(std::vector<ElementTable*>& tables) override;
+  bool has_potential() const override { return has_potential_; }
   void add(const StepProblem& problem, StepData& data, const Assembler& assembler,
            std::span<double> values) const override;
   void add_adjoint(const StepProblem& problem, const StepData& data, const Assembler& assembler,
                    StepAdjoint& adjoint) const override;
   void add_applied(const StepProblem& problem, const StepData& data, const Assembler& assembler,
                    VectorX& force) const override;
+
+  /// Of one element each, per piece.
+  const std::vector<ElementTable>& tables() const { return tables_; }
+
+ private:
+  std::vector<ElementTable> tables_;
+  bool has_potential_;
 };
 
 /// What a piece is a piece of.

@@ -5,14 +5,11 @@
 
 #include <cmath>
 #include <initializer_list>
-#include <limits>
 
 #include "steps/elastic_forces.hpp"
 
 namespace withe {
 namespace {
-
-constexpr double kRounding = 4.0 * std::numeric_limits<double>::epsilon();  // of a number that some operations lead to
 
 /// What rounding leaves of inertia. What spins for long has turned by many radians. Sets the greatest coordinate, and
 /// returns the greatest angle, one radian at least.

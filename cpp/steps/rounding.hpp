@@ -1,9 +1,14 @@
 #pragma once
 /// What rounding leaves of a residual.
 
+#include <limits>
+
 #include "steps/step_problem.hpp"
 
 namespace withe {
+
+/// Of a number that some operations lead to, relative to it.
+inline constexpr double kRounding = 4.0 * std::numeric_limits<double>::epsilon();
 
 /// Finds the bounds of a problem, at the configuration of `data`.
 void set_rounding_bounds(const StepProblem& problem, StepData& data);

@@ -14,6 +14,7 @@ struct CoefficientAdjoint {
   VectorX mass, mass_coupling, drag, drag_coupling;  ///< by `MassMatrix`
   VectorX gravity;                                   ///< per unknown, by its force [1/N]
   MatrixX3 loads;                                    ///< per load, by its value
+  VectorX spring_stiffness, spring_rest_length, spring_damping;  ///< per spring
 
   explicit CoefficientAdjoint(const Model& model, std::size_t load_count)
       : stretch_stiffness(VectorX::Zero(model.edge_count)),
@@ -29,7 +30,10 @@ struct CoefficientAdjoint {
         drag(mass),
         drag_coupling(mass_coupling),
         gravity(mass),
-        loads(MatrixX3::Zero(static_cast<Eigen::Index>(load_count), 3)) {}
+        loads(MatrixX3::Zero(static_cast<Eigen::Index>(load_count), 3)),
+        spring_stiffness(VectorX::Zero(static_cast<Eigen::Index>(model.description.springs.size()))),
+        spring_rest_length(spring_stiffness),
+        spring_damping(spring_stiffness) {}
 };
 
 /// rows^T times the derivatives of a step's residual, at fixed z. An edge's frame and a joint's are functions of the

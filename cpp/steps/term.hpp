@@ -4,6 +4,7 @@
 
 #include <memory>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "assembly/assembler.hpp"
@@ -19,6 +20,15 @@ class Term {
   Term& operator=(const Term&) = delete;
   virtual ~Term() = default;
 
+  /// Adds the tables of its own elements: the assembler makes room for them in the matrix, before any step.
+  virtual void declare(std::vector<ElementTable*>& /*tables*/) {}
+  /// Whether its forces are minus the gradient of a potential.
+  virtual bool has_potential() const { return true; }
+  /// Whether it takes anything from the motion.
+  virtual bool dissipates(const Parameters&) const { return false; }
+  /// A line for the plan; nothing where there is nothing to say.
+  virtual std::string note() const { return {}; }
+
   /// Finds what holds through a step that has just begun.
   virtual void begin(StepProblem&) {}
   /// Finds what acts at data.z before anything is added; where a matrix is wanted, makes room for it.
@@ -26,6 +36,15 @@ class Term {
   /// Adds forces (minus the generalised ones) to the rows, energies to the potential, and derivatives to the matrix:
   /// `values`, through the assembler's offsets; empty where none is wanted.
   virtual void add(const StepProblem&, StepData&, const Assembler&, std::span<double> values) const = 0;
+  /// The same of an explicit step with velocities v that nothing resists, at its start: forces alone.
+  virtual void add_explicit(const StepProblem& problem, StepData& data, const Assembler& assembler,
+                            const VectorX& /*v*/) const {
+    add(problem, data, assembler, {});
+  }
+  /// Adds what rounding alone leaves of its rows in the last evaluation, beyond that of their magnitude, to data.floor.
+  virtual void add_rounding(const StepProblem&, StepData&) const {}
+  /// What its energy grows by over a step that ends at `end`, beyond the work of its forces [J].
+  virtual double gained(const StepProblem&, const VectorX& /*end*/) const { return 0.0; }
   /// What is taken from the motion over `change` with the forces of the last evaluation [J].
   virtual double dissipated(const StepProblem&, const StepData&, const Assembler&, const VectorX& /*change*/) const {
     return 0.0;

@@ -3,13 +3,15 @@
 #include <utility>
 
 #include "steps/body_forces.hpp"
+#include "steps/elastic_forces.hpp"
 #include "steps/inertia.hpp"
 #include "steps/load_forces.hpp"
+#include "steps/spring_forces.hpp"
 
 namespace withe {
 
 /// Inertia turns what those before it make of a frame's rows.
-Terms make_terms(const Model& model, const Loads& loads, StepRule rule) {
+Terms make_terms(const Model& model, const Loads& loads, StepRule rule, bool exact) {
   const SceneDescription& scene = model.description;
   const bool moves = rule != StepRule::statics;
   Terms terms;
@@ -18,14 +20,16 @@ Terms make_terms(const Model& model, const Loads& loads, StepRule rule) {
     terms.all.push_back(std::move(term));
     return out;
   };
-  terms.elastic = add(std::make_unique<ElasticForces>(model));
-  if (!loads.pieces.empty()) add(std::make_unique<LoadForces>());
+  add(std::make_unique<ElasticForces>(model));
+  const LoadForces* applied = nullptr;
+  if (!loads.pieces.empty()) applied = add(std::make_unique<LoadForces>(model, loads));
+  if (!scene.springs.empty()) add(std::make_unique<SpringForces>(model));
   if (moves && scene.fluid.model == FluidModel::resistive) add(std::make_unique<ResistiveForces>(model));
   if (scene.contact.any()) terms.contact = add(std::make_unique<ContactForces>(model));
-  add(std::make_unique<Inertia>());
+  add(std::make_unique<Inertia>(model, exact));
   add(std::make_unique<Drag>());
   add(std::make_unique<Gravity>());
-  if (scene.has_custom_force) terms.custom = add(std::make_unique<CustomTerm>());
+  if (scene.has_custom_force) terms.custom = add(std::make_unique<CustomTerm>(applied));
   if (moves && scene.fluid.model == FluidModel::stokeslets)
     terms.stokeslets = add(std::make_unique<StokesletForces>(model));
   return terms;

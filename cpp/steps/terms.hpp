@@ -7,7 +7,6 @@
 
 #include "steps/contact_forces.hpp"
 #include "steps/custom_term.hpp"
-#include "steps/elastic_forces.hpp"
 #include "steps/fluid_forces.hpp"
 
 namespace withe {
@@ -16,16 +15,15 @@ namespace withe {
 /// the scene does without).
 struct Terms {
   std::vector<std::unique_ptr<Term>> all;
-  ElasticForces* elastic = nullptr;
   ContactForces* contact = nullptr;
   CustomTerm* custom = nullptr;
   StokesletForces* stokeslets = nullptr;
 };
 
-/// `rule`: statics know no fluid.
-Terms make_terms(const Model& model, const Loads& loads, StepRule rule);
+/// `rule`: statics know no fluid. `exact`: the Jacobian has every derivative.
+Terms make_terms(const Model& model, const Loads& loads, StepRule rule, bool exact);
 
-/// In words, what makes the Jacobian unsymmetric. `exact`: it has every derivative.
+/// In words, what makes the Jacobian unsymmetric.
 std::vector<std::string> asymmetries_of(const Model& model, const Loads& loads, const Terms& terms, StepRule rule,
                                         bool exact);
 

@@ -415,6 +415,7 @@ void World::Implementation::make_plan() {
   if (!parameters.dragged) notes.push_back("no drag: its terms are left out");
   notes.push_back(fluid_note());
   if (!parameters.viscous) notes.push_back("no viscosity: its terms are left out");
+  for (const std::string& note : equations->notes()) notes.push_back(note);
   if (description.loads.empty()) notes.push_back("no loads but gravity");
   add_contact_notes();
   add_step_notes();

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "common/text.hpp"
+#include "steps/spring_forces.hpp"
 #include "world/implementation.hpp"
 
 namespace withe {
@@ -71,7 +72,8 @@ Energy World::Implementation::energy_of(const State& at, double loads, double wo
   e.gravity = gravity_energy(model, parameters, at.q, [](int) { return 1.0; });
   e.loads = -loads;
   if (const Contact* contact = equations->contact()) e.contact = contact->energy_of(at, parameters);
-  e.total = e.kinetic + e.stretch + e.bend + e.twist + e.gravity + e.loads + e.contact;
+  e.spring = spring_energy(model, parameters, at.q);
+  e.total = e.kinetic + e.stretch + e.bend + e.twist + e.gravity + e.loads + e.contact + e.spring;
   e.work = work_done;
   e.dissipated = lost;
   return e;
@@ -145,10 +147,9 @@ bool World::Implementation::gains_energy() {
   const Energy now = energy();
   const double gain = (now.total - now.work + now.dissipated) - (then.total - then.work + then.dissipated);
   // What came from nowhere is no measure of what there is.
-  const auto elastic = [](const Energy& e) { return e.stretch + e.bend + e.twist; };
-  const double put_in = now.kinetic + elastic(now) - std::max(gain, 0.0);
+  const double put_in = now.kinetic + now.elastic() - std::max(gain, 0.0);
   const double scale = std::max(
-      {guard.scale, then.kinetic, 0.1 * elastic(then), std::min(std::max(now.kinetic, 0.1 * elastic(now)), put_in)});
+      {guard.scale, then.kinetic, 0.1 * then.elastic(), std::min(std::max(now.kinetic, 0.1 * now.elastic()), put_in)});
   guard.energy = then;
   const double most = kMostGain * scale;
   if (gain > 1e-6 * scale && guard.excess + gain > most) return true;
@@ -177,7 +178,7 @@ bool World::Implementation::contact_pumps(double dt) {
     const Energy now = energy();
     const Energy then = energy_of(kept.state, kept.load_work, kept.support_work + kept.actuation_work, kept.dissipated);
     gain = put_in + (now.total - now.work + now.dissipated) - (then.total - then.work + then.dissipated);
-    for (const Energy& e : {now, then}) scale = std::max(scale, e.kinetic + e.stretch + e.bend + e.twist + e.contact);
+    for (const Energy& e : {now, then}) scale = std::max(scale, e.kinetic + e.elastic() + e.contact);
     if (too_much()) return true;
   }
   excess = std::max(excess + gain - room(), 0.0);
@@ -205,10 +206,10 @@ void World::Implementation::check_explicit() {
   const Energy e = energy();
   const double gain = (e.total - e.work + e.dissipated) - (alarm->total - alarm->work + alarm->dissipated);
   const double scale = std::max({alarm->kinetic, std::abs(e.gravity - alarm->gravity), std::abs(e.loads - alarm->loads),
-                                 std::abs(e.work - alarm->work), alarm->stretch + alarm->bend + alarm->twist, 1e-300});
+                                 std::abs(e.work - alarm->work), alarm->elastic(), 1e-300});
   // All that is summed: what rests has no energy but that of its weight, and rounding gains some of that.
-  const double sum = e.kinetic + e.stretch + e.bend + e.twist + e.contact + std::abs(e.gravity) + std::abs(e.loads) +
-                     std::abs(e.work) + std::abs(e.dissipated);
+  const double sum = e.kinetic + e.elastic() + e.contact + std::abs(e.gravity) + std::abs(e.loads) + std::abs(e.work) +
+                     std::abs(e.dissipated);
   const double rounding = std::numeric_limits<double>::epsilon() * model.dof_count * sum;
   if (std::isfinite(e.total) && gain <= 0.5 * scale + rounding) return;
   const std::string longest = std::isfinite(e.total) ? longest_explicit_step() : "";

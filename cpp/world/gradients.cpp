@@ -85,7 +85,7 @@ std::shared_ptr<Tape> World::start_tape() {
   if (self.options.integrator == Integrator::verlet || self.options.integrator == Integrator::statics)
     self.tape->refuse("integrator '" +
                       std::string(self.options.integrator == Integrator::verlet ? "verlet" : "static") +
-                      "' has none; take 'backward_euler', 'implicit_midpoint' or 'fourth_order'");
+                      "' has none; take any other");
   if (self.description.contact.any())
     self.tape->refuse("contact takes part in it; equilibria with contact have a gradient");
   return self.tape;

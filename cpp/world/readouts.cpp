@@ -2,6 +2,8 @@
 
 #include <Eigen/Geometry>
 
+#include "common/check.hpp"
+#include "steps/spring_forces.hpp"
 #include "world/implementation.hpp"
 
 namespace withe {
@@ -101,6 +103,12 @@ VectorX World::tensions(int rod) const {
   for (int e = 0; e < count; ++e)
     out(e) = self.parameters.edge_stretch(first + e) * (c.length(first + e) / self.model.edge_length(first + e) - 1.0);
   return out;
+}
+
+double World::spring_tension(int spring) const {
+  const Implementation& self = *implementation_;
+  require(spring >= 0 && spring < self.parameters.spring_stiffness.size(), "no such spring: " + std::to_string(spring));
+  return withe::spring_tension(self.model, self.parameters, self.state.q, self.state.v, spring);
 }
 
 VectorX World::spins(int rod) const {

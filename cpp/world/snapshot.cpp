@@ -117,6 +117,9 @@ std::uint64_t fingerprint(const SceneDescription& scene) {
   }
   w(static_cast<std::int64_t>(scene.joints.size()));
   w(static_cast<std::int64_t>(drawn_loads(scene)));
+  w(static_cast<std::int64_t>(scene.springs.size()));
+  for (const SpringDescription& spring : scene.springs)
+    for (int node : spring.nodes) w(node);
   w(static_cast<int>(scene.fluid.model));
   w(scene.fluid.regularization);
   w(scene.fluid.wavelength);
@@ -162,15 +165,16 @@ void exchange(Archive& io, std::optional<Energy>& energy) {
     return;
   }
   if (!energy) energy.emplace();
-  auto& [kinetic, stretch, bend, twist, gravity, loads, contact, total, work, dissipated] = *energy;
-  for (double* x : {&kinetic, &stretch, &bend, &twist, &gravity, &loads, &contact, &total, &work, &dissipated}) io(*x);
+  auto& [kinetic, stretch, bend, twist, gravity, loads, contact, spring, total, work, dissipated] = *energy;
+  for (double* x : {&kinetic, &stretch, &bend, &twist, &gravity, &loads, &contact, &spring, &total, &work, &dissipated})
+    io(*x);
 }
 
 /// What users may set; the rest follows from it.
 template <class Archive>
 void exchange(Archive& io, Parameters& p) {
   for (auto* v : {&p.edge_stretch, &p.edge_twist, &p.edge_density, &p.edge_rotary, &p.edge_viscous_time, &p.edge_drag,
-                  &p.added_mass})
+                  &p.added_mass, &p.spring_stiffness, &p.spring_rest_length, &p.spring_damping})
     io(*v);
   io(p.edge_bend);
   io(p.gravity);
@@ -478,6 +482,9 @@ void World::restore(const std::string& bytes) {
   require(fresh->state.q.allFinite() && fresh->state.v.allFinite(), "snapshot is damaged: not finite");
   require(std::isfinite(fresh->parameters.fluid_viscosity) && fresh->parameters.fluid_viscosity >= 0.0,
           "snapshot is damaged: impossible viscosity");
+  for (const VectorX* v :
+       {&fresh->parameters.spring_stiffness, &fresh->parameters.spring_rest_length, &fresh->parameters.spring_damping})
+    require(v->allFinite() && (v->array() >= 0.0).all(), "snapshot is damaged: impossible spring");
   require(fresh->state.motion.known >= 0 && fresh->state.motion.known <= 2, "snapshot is damaged: impossible history");
   require(fresh->predictor.plausible(), "snapshot is damaged: impossible history");
   update_derived(fresh->model, fresh->parameters);

@@ -5,6 +5,7 @@
 
 #include "common/check.hpp"
 #include "common/timer.hpp"
+#include "steps/spring_forces.hpp"
 #include "world/implementation.hpp"
 
 namespace withe {
@@ -14,6 +15,11 @@ namespace {
 bool off_plane(LoadKind kind, const Vector3& value, const Vector3& normal) {
   const double off = is_axial(kind) ? value.cross(normal).norm() : std::abs(value.dot(normal));
   return off > 1e-8 * value.norm();
+}
+
+int checked_spring(const Parameters& parameters, int spring) {
+  require(spring >= 0 && spring < parameters.spring_stiffness.size(), "no such spring: " + std::to_string(spring));
+  return spring;
 }
 
 }  // namespace
@@ -277,6 +283,26 @@ void World::set_fluid_viscosity(double viscosity) {
   self.parameters.fluid_viscosity = viscosity;
   update_derived(self.model, self.parameters);
   self.state.acceleration_current = false;
+}
+
+void World::set_spring(int spring, const SpringDescription& description) {
+  Implementation& self = *implementation_;
+  const double before = spring_energy(self.model, self.parameters, self.state.q);
+  Parameters p = self.parameters;
+  withe::set_spring(checked_spring(p, spring), description, p);
+  self.check_reversible(p);
+  update_natural(self.model, p);
+  self.parameters = std::move(p);
+  self.actuation_work += spring_energy(self.model, self.parameters, self.state.q) - before;
+  self.reaction_current = false;
+  self.state.acceleration_current = false;
+}
+
+SpringDescription World::spring(int spring) const {
+  const Implementation& self = *implementation_;
+  const Parameters& p = self.parameters;
+  const int s = checked_spring(p, spring);
+  return {self.description.springs[at(s)].nodes, p.spring_stiffness[s], p.spring_rest_length[s], p.spring_damping[s]};
 }
 
 void World::set_velocities(const MatrixX3& velocities) {

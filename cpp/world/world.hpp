@@ -21,9 +21,13 @@ struct Energy {  // [J]
   double kinetic = 0, stretch = 0, bend = 0, twist = 0, gravity = 0;
   double loads = 0;  ///< minus the work done by loads and custom forces since the start
   double contact = 0;
+  double spring = 0;
   double total = 0;       ///< sum of the above
   double work = 0;        ///< done by supports and actuation since the start
-  double dissipated = 0;  ///< by viscosity and drag since the start
+  double dissipated = 0;  ///< by viscosity, drag, dampers, fluids and contact since the start
+
+  /// Stored in what is deformed, but for contact.
+  double elastic() const { return stretch + bend + twist + spring; }
 };
 
 struct Statistics {
@@ -188,6 +192,9 @@ class World {
   void set_added_mass(const VectorX& mass);
   void set_gravity(const Vector3& gravity);
   void set_fluid_viscosity(double viscosity);
+  /// Stiffness, rest length and damping; its nodes stay.
+  void set_spring(int spring, const SpringDescription& parameters);
+  SpringDescription spring(int spring) const;  ///< as it is now
 
   // Supports; indices are rows of description().supports.
   int add_support(const SupportDescription& support);  ///< holds the present position and orientation
@@ -219,11 +226,12 @@ class World {
   /// and turn as the edges at them do on the mean. Throws std::invalid_argument, and changes nothing, where a support
   /// holds what would move, an edge has no length, or surfaces would overlap.
   void set_state(const std::vector<RodState>& rods, std::optional<double> time);
-  MatrixX9 directors(int rod) const;   ///< per edge
-  MatrixX2 curvatures(int rod) const;  ///< per stencil, of the smooth rod [1/m]
-  VectorX twists(int rod) const;       ///< per stencil [rad/m]
-  VectorX tensions(int rod) const;     ///< per edge [N]
-  VectorX spins(int rod) const;        ///< per edge, angular velocity about the tangent [rad/s]
+  MatrixX9 directors(int rod) const;        ///< per edge
+  MatrixX2 curvatures(int rod) const;       ///< per stencil, of the smooth rod [1/m]
+  VectorX twists(int rod) const;            ///< per stencil [rad/m]
+  VectorX tensions(int rod) const;          ///< per edge [N]
+  double spring_tension(int spring) const;  ///< positive where it pulls; its damper's part included [N]
+  VectorX spins(int rod) const;             ///< per edge, angular velocity about the tangent [rad/s]
   Energy energy() const;
   /// Of one rod: kinetic, stretch, bend, twist, gravity and their sum; what surrounds a joint belongs to the rods whose
   /// edges meet there. All rods together have what the scene has, but for loads, contact and the energy balance.

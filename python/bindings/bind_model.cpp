@@ -137,12 +137,22 @@ void register_loads(py::module_& module) {
   def_word(load, "kind", &LoadDescription::kind, kLoadKinds);
 }
 
+void register_springs(py::module_& module) {
+  py::class_<SpringDescription>(module, "SpringDescription", "A spring with a damper beside it between two nodes.")
+      .def(py::init<>())
+      .def_readwrite("nodes", &SpringDescription::nodes)
+      .def_readwrite("stiffness", &SpringDescription::stiffness)
+      .def_readwrite("rest_length", &SpringDescription::rest_length)
+      .def_readwrite("damping", &SpringDescription::damping);
+}
+
 }  // namespace
 
 void register_model(py::module_& module) {
   register_rod(module);
   register_joints_and_supports(module);
   register_loads(module);
+  register_springs(module);
   register_contact(module);
   register_fluid(module);
   py::class_<SceneDescription> scene(module, "SceneDescription", "What the scene layer hands to the engine.");
@@ -155,6 +165,7 @@ void register_model(py::module_& module) {
       .def_readwrite("joints", &SceneDescription::joints)
       .def_readwrite("supports", &SceneDescription::supports)
       .def_readwrite("loads", &SceneDescription::loads)
+      .def_readwrite("springs", &SceneDescription::springs)
       .def_readwrite("has_custom_force", &SceneDescription::has_custom_force)
       .def_readwrite("custom_implicit", &SceneDescription::custom_implicit)
       .def_readwrite("custom_moments", &SceneDescription::custom_moments)

@@ -21,7 +21,10 @@ void register_gradients(py::module_& module) {
       .def_readonly("gravity", &ParameterGradient::gravity)
       .def_readonly("natural_curvature", &ParameterGradient::natural_curvature)
       .def_readonly("natural_twist", &ParameterGradient::natural_twist)
-      .def_readonly("loads", &ParameterGradient::loads);
+      .def_readonly("loads", &ParameterGradient::loads)
+      .def_readonly("spring_stiffness", &ParameterGradient::spring_stiffness)
+      .def_readonly("spring_rest_length", &ParameterGradient::spring_rest_length)
+      .def_readonly("spring_damping", &ParameterGradient::spring_damping);
   py::class_<EquilibriumGradient>(module, "EquilibriumGradient", "Derivatives of a scalar of an equilibrium.")
       .def_readonly("parameters", &EquilibriumGradient::parameters)
       .def_readonly("support_positions", &EquilibriumGradient::support_positions)
@@ -63,6 +66,7 @@ void register_results(py::module_& module) {
       .def_readonly("gravity", &Energy::gravity)
       .def_readonly("loads", &Energy::loads)
       .def_readonly("contact", &Energy::contact)
+      .def_readonly("spring", &Energy::spring)
       .def_readonly("total", &Energy::total)
       .def_readonly("work", &Energy::work)
       .def_readonly("dissipated", &Energy::dissipated);
@@ -214,6 +218,14 @@ void define_parameters(WorldClass& world) {
       [](GuardedWorld& self, double viscosity) { self.changing().set_fluid_viscosity(viscosity); },
       py::arg("viscosity"));
   world.def(
+      "set_spring",
+      [](GuardedWorld& self, int spring, const SpringDescription& parameters) {
+        self.changing().set_spring(spring, parameters);
+      },
+      py::arg("spring"), py::arg("parameters"));
+  world.def(
+      "spring", [](const GuardedWorld& self, int spring) { return self.reading().spring(spring); }, py::arg("spring"));
+  world.def(
       "set_gravity", [](GuardedWorld& self, const Vector3& gravity) { self.changing().set_gravity(gravity); },
       py::arg("gravity"));
 }
@@ -297,6 +309,9 @@ void define_readouts(WorldClass& world) {
       "curvatures", [](const GuardedWorld& self, int rod) { return self.reading().curvatures(rod); }, py::arg("rod"));
   world.def("twists", [](const GuardedWorld& self, int rod) { return self.reading().twists(rod); }, py::arg("rod"));
   world.def("tensions", [](const GuardedWorld& self, int rod) { return self.reading().tensions(rod); }, py::arg("rod"));
+  world.def(
+      "spring_tension", [](const GuardedWorld& self, int spring) { return self.reading().spring_tension(spring); },
+      py::arg("spring"));
   world.def("spins", [](const GuardedWorld& self, int rod) { return self.reading().spins(rod); }, py::arg("rod"));
   world.def("take_step_warning", [](GuardedWorld& self) { return self.changing().take_step_warning(); });
   world.def("take_warning", [](GuardedWorld& self) { return self.changing().take_warning(); });

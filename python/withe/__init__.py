@@ -24,6 +24,7 @@ from withe.parts.handles import (
     NodeHandle,
     Obstacle,
     Rod,
+    Spring,
     Support,
 )
 from withe.parts.materials import Circle, Material, Rectangle, Stiffness, Tube
@@ -63,6 +64,7 @@ __all__ = [
     "Scene",
     "Simulation",
     "Snapshot",
+    "Spring",
     "Statistics",
     "Stiffness",
     "Support",

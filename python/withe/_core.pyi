@@ -15,18 +15,15 @@ __all__: list[str] = [
     "ContactTable",
     "ConvergenceFailure",
     "Energy",
-    "EquilibriumGradient",
     "EquilibriumPath",
     "EquilibriumResult",
     "FluidDescription",
     "JointDescription",
     "Linearisation",
     "LoadDescription",
-    "MomentAdjoint",
     "Momentum",
     "ObstacleDescription",
     "Options",
-    "ParameterGradient",
     "PathPoint",
     "Plan",
     "Reaction",
@@ -34,11 +31,10 @@ __all__: list[str] = [
     "RodDescription",
     "RodPass",
     "RodState",
-    "RunGradient",
     "SceneDescription",
+    "SpringDescription",
     "Statistics",
     "SupportDescription",
-    "Tape",
     "World",
     "close_and_open",
     "foreground_mask",
@@ -194,6 +190,31 @@ class LoadDescription:
     def value(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]: ...
     @value.setter
     def value(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None: ...
+
+class SpringDescription:
+    """
+    A spring with a damper beside it between two nodes.
+    """
+    def __init__(self) -> None: ...
+    @property
+    def damping(self) -> float: ...
+    @damping.setter
+    def damping(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    @property
+    def nodes(self) -> typing.Annotated[list[int], "FixedSize(2)"]: ...
+    @nodes.setter
+    def nodes(
+        self,
+        arg0: typing.Annotated[collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], "FixedSize(2)"],
+    ) -> None: ...
+    @property
+    def rest_length(self) -> float: ...
+    @rest_length.setter
+    def rest_length(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    @property
+    def stiffness(self) -> float: ...
+    @stiffness.setter
+    def stiffness(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
 
 class ObstacleDescription:
     """
@@ -358,6 +379,10 @@ class SceneDescription:
     @rods.setter
     def rods(self, arg0: collections.abc.Sequence[RodDescription]) -> None: ...
     @property
+    def springs(self) -> list[SpringDescription]: ...
+    @springs.setter
+    def springs(self, arg0: collections.abc.Sequence[SpringDescription]) -> None: ...
+    @property
     def supports(self) -> list[SupportDescription]: ...
     @supports.setter
     def supports(self, arg0: collections.abc.Sequence[SupportDescription]) -> None: ...
@@ -431,79 +456,6 @@ class Options:
     @tolerance.setter
     def tolerance(self, arg0: typing.SupportsFloat | typing.SupportsIndex | None) -> None: ...
 
-class ParameterGradient:
-    """
-    Derivatives of a scalar by the numbers that act.
-    """
-    @property
-    def added_mass(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
-    @property
-    def bend_stiffness(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 2]"]: ...
-    @property
-    def drag(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
-    @property
-    def gravity(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]: ...
-    @property
-    def line_density(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
-    @property
-    def loads(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
-    @property
-    def natural_curvature(self) -> list[typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 2]"]]: ...
-    @property
-    def natural_twist(self) -> list[typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]]: ...
-    @property
-    def rotary_inertia(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
-    @property
-    def stretch_stiffness(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
-    @property
-    def twist_stiffness(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
-    @property
-    def viscous_time(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
-
-class EquilibriumGradient:
-    """
-    Derivatives of a scalar of an equilibrium.
-    """
-    @property
-    def parameters(self) -> ParameterGradient: ...
-    @property
-    def support_positions(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
-    @property
-    def support_rotations(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
-
-class RunGradient:
-    """
-    Derivatives of a scalar of a run.
-    """
-    @property
-    def initial_positions(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
-    @property
-    def initial_velocities(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
-    @property
-    def parameters(self) -> ParameterGradient: ...
-
-class MomentAdjoint:
-    """
-    What a scalar depends on after so many steps of a run.
-    """
-    def __init__(
-        self,
-        steps: typing.SupportsInt | typing.SupportsIndex,
-        positions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
-        velocities: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
-    ) -> None: ...
-
-class Tape:
-    """
-    A run as the adjoint method needs it.
-    """
-    def gradient(self, moments: collections.abc.Sequence[MomentAdjoint]) -> RunGradient: ...
-    @property
-    def count(self) -> int:
-        """
-        Steps taken.
-        """
-
 class RodState:
     """
     What a rod is to be like; what is empty stays as it is.
@@ -565,6 +517,8 @@ class Energy:
     def kinetic(self) -> float: ...
     @property
     def loads(self) -> float: ...
+    @property
+    def spring(self) -> float: ...
     @property
     def stretch(self) -> float: ...
     @property
@@ -729,9 +683,6 @@ class World:
         """
         Find the static equilibrium.
         """
-    def equilibrium_gradients(
-        self, by_positions: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"]]
-    ) -> list[EquilibriumGradient]: ...
     def equilibrium_path(
         self,
         loads: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex],
@@ -821,6 +772,7 @@ class World:
     def set_rod_parameters(
         self, rod: typing.SupportsInt | typing.SupportsIndex, parameters: RodDescription
     ) -> None: ...
+    def set_spring(self, spring: typing.SupportsInt | typing.SupportsIndex, parameters: SpringDescription) -> None: ...
     def set_state(
         self, rods: collections.abc.Sequence[RodState], time: typing.SupportsFloat | typing.SupportsIndex | None
     ) -> None:
@@ -835,12 +787,12 @@ class World:
     def spins(
         self, rod: typing.SupportsInt | typing.SupportsIndex
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
-    def start_tape(self) -> Tape: ...
+    def spring(self, spring: typing.SupportsInt | typing.SupportsIndex) -> SpringDescription: ...
+    def spring_tension(self, spring: typing.SupportsInt | typing.SupportsIndex) -> float: ...
     def step(self, count: typing.SupportsInt | typing.SupportsIndex, callback: typing.Any, forces: typing.Any) -> None:
         """
         Advance exactly `count` time steps.
         """
-    def stop_tape(self) -> None: ...
     def support_position(
         self, support: typing.SupportsInt | typing.SupportsIndex
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]: ...

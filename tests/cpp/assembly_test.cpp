@@ -27,12 +27,12 @@ int half_bandwidth(const Assembler& assembler) {
 
 int half_bandwidth(const SceneDescription& scene, std::optional<bool> planar = std::nullopt) {
   const Model model = build_model(scene, planar);
-  return half_bandwidth(Assembler(model, resolve_loads(model), Symmetry::symmetric, SolverKind::automatic));
+  return half_bandwidth(Assembler(model, {}, Symmetry::symmetric, SolverKind::automatic));
 }
 
 std::string solver_of(const SceneDescription& scene, std::optional<bool> planar = std::nullopt) {
   const Model model = build_model(scene, planar);
-  return Assembler(model, resolve_loads(model), Symmetry::symmetric, SolverKind::automatic).solver().name();
+  return Assembler(model, {}, Symmetry::symmetric, SolverKind::automatic).solver().name();
 }
 
 SceneBuilder open_rod(SupportKind kind) {
@@ -154,7 +154,7 @@ TEST(ElementTable, ScatterAgreesWithADenseSum) {
   for (const SceneDescription& scene : scenes())
     for (Symmetry symmetry : {Symmetry::symmetric, Symmetry::unsymmetric}) {
       const Model model = build_model(scene, std::nullopt);
-      Assembler assembler(model, resolve_loads(model), symmetry, SolverKind::automatic);
+      Assembler assembler(model, {}, symmetry, SolverKind::automatic);
       const MatrixX expected = fill(assembler, 5);
       EXPECT_LT((dense(assembler.solver()) - expected).norm(), 1e-12 * expected.norm());
     }
@@ -162,7 +162,7 @@ TEST(ElementTable, ScatterAgreesWithADenseSum) {
 
 TEST(ElementTable, GradientsAddUpWithTheirMagnitudes) {
   const Model model = build_model(open_rod(SupportKind::pin).scene, std::nullopt);
-  const Assembler assembler(model, resolve_loads(model), Symmetry::symmetric, SolverKind::automatic);
+  const Assembler assembler(model, {}, Symmetry::symmetric, SolverKind::automatic);
   VectorX residual = VectorX::Zero(model.dof_count), magnitude = residual;
   const double up[6] = {1, 2, 3, 4, 5, 6}, down[6] = {-1, -2, -3, -4, -5, -6};
   assembler.stretch.add_gradient(0, up, 2.0, residual, magnitude);
@@ -177,7 +177,7 @@ TEST(Assembler, ProjectionTakesHeldDirectionsOutOfTheMatrix) {
   for (const SceneDescription& scene : scenes())
     for (Symmetry symmetry : {Symmetry::symmetric, Symmetry::unsymmetric}) {
       const Model model = build_model(scene, std::nullopt);
-      Assembler assembler(model, resolve_loads(model), symmetry, SolverKind::automatic);
+      Assembler assembler(model, {}, symmetry, SolverKind::automatic);
       const MatrixX before = fill(assembler, 6);
       assembler.project_matrix();
       const MatrixX after = dense(assembler.solver());
@@ -197,7 +197,7 @@ TEST(Assembler, ProjectionTakesHeldDirectionsOutOfTheMatrix) {
 TEST(Assembler, SplitsAVectorIntoWhatIsHeldAndWhatIsFree) {
   for (const SceneDescription& scene : scenes()) {
     const Model model = build_model(scene, std::nullopt);
-    const Assembler assembler(model, resolve_loads(model), Symmetry::symmetric, SolverKind::automatic);
+    const Assembler assembler(model, {}, Symmetry::symmetric, SolverKind::automatic);
     const VectorX v = testing::RandomNumbers(9).vector(model.dof_count), held = assembler.held_part(v);
     VectorX free = v, twice;
     assembler.project(free);

@@ -135,6 +135,18 @@ TEST(Equations, MatrixIsExactWithoutDragAndViscosity) {
     for (Scheme scheme : kSchemes) expect_matrix_is_exact(c, scheme, 0.3);
 }
 
+/// Springs across every scene and along its first edge; dampers where the matrix takes them as the residual does.
+TEST(Equations, MatrixIsExactWithSpringsBetweenNodesThatNoRodCouples) {
+  for (Scheme scheme : kSchemes)
+    for (Case c : moving_cases({})) {
+      const double damping = scheme == Scheme::implicit_midpoint ? 0.0 : 0.6;
+      c.model.description.springs = {{{0, c.model.node_count - 1}, 5.0, 0.8, damping}, {{1, 0}, 7.0, 0.0, damping}};
+      expect_matrix_is_exact(c, scheme, 0.3);
+      for (SpringDescription& spring : c.model.description.springs) spring.damping = 0.6;
+      expect_matrix_is_exact(c, scheme, 0.3, true);
+    }
+}
+
 void expect_exact_under_loads(bool planar) {
   for (Scheme scheme : kSchemes) {
     SceneBuilder builder;

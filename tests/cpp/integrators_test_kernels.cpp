@@ -100,8 +100,7 @@ void expect_same_sums(const Case& c, Integrator integrator) {
   Options options;
   options.integrator = integrator;  // energy-momentum: whole lines instead of triangles
   Equations equations(c.model, equation_options(options));
-  Assembler reference(c.model, equations.loads(),
-                      equations.asymmetries().empty() ? Symmetry::symmetric : Symmetry::unsymmetric,
+  Assembler reference(c.model, {}, equations.asymmetries().empty() ? Symmetry::symmetric : Symmetry::unsymmetric,
                       SolverKind::automatic);
   const Parameters parameters = initial_parameters(c.model);
   StepData evaluation, alone;
@@ -130,7 +129,7 @@ TEST(StencilKernels, FillUnsymmetricMatricesToo) {
 TEST(StencilKernels, TakeTheOrdinaryStencilsOfOpenRods) {
   for (const Case& c : long_cases()) {
     if (c.name.rfind("ring", 0) == 0) continue;
-    const Assembler assembler(c.model, resolve_loads(c.model), Symmetry::symmetric, SolverKind::automatic);
+    const Assembler assembler(c.model, {}, Symmetry::symmetric, SolverKind::automatic);
     EXPECT_EQ(assembler.regular.stencil.size(), c.model.bend.size()) << c.name;
     EXPECT_TRUE(assembler.regular.other_edges.empty()) << c.name;
   }
@@ -262,7 +261,7 @@ void expect_same_discrete_sums(const Case& c, bool given) {
   Options options;
   options.integrator = Integrator::energy_momentum;
   Equations equations(c.model, equation_options(options));
-  Assembler reference(c.model, equations.loads(), Symmetry::unsymmetric, SolverKind::automatic);
+  Assembler reference(c.model, {}, Symmetry::unsymmetric, SolverKind::automatic);
   Parameters parameters = initial_parameters(c.model);
   parameters.gravity.setZero();
   const VectorX z = 0.5 * (c.state.q + c.q), drawn = 10.0 * testing::RandomNumbers(3).vector(c.model.edge_count);

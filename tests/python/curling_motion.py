@@ -77,7 +77,7 @@ class CurlingSimulation:
         bend = 1e-3 * (CURVATURE_RATE * self.time) ** 2
         return SimpleNamespace(
             kinetic=1e-3, stretch=0.0, bend=bend, twist=0.0, gravity=-1e-3 * self.time, loads=0.0,
-            contact=0.0, total=1e-3 + bend - 1e-3 * self.time, work=bend, dissipated=0.0,
+            contact=0.0, spring=0.0, total=1e-3 + bend - 1e-3 * self.time, work=bend, dissipated=0.0,
         )  # fmt: skip
 
     def _rod(self, name: str) -> Handle:

@@ -34,6 +34,9 @@ class Drawn:
         self.force = scene.add_force(self.arm.end, (0, 0, 0.3 * (radius / 1.5e-2) ** 4), name="force")
         self.mass = scene.add_mass(self.arm.node(7), 0.01)
         self.drag = scene.add_drag(0.2)
+        damping = 0.0 if integrator == "fourth_order" else 0.5
+        ends = self.arm.node(3), self.arm.node(9)
+        self.spring = scene.add_spring(*ends, stiffness=20.0, rest_length=0.1, damping=damping)
         self.simulation = scene.build(integrator=integrator, planar=planar or None, **TIGHT, **options)
 
     def vectors(self, random, count):
@@ -76,6 +79,8 @@ def settings(drawn, random):
     yield (arm, "natural_twist"), turned, lambda h: sim.set(arm, natural_twist=twist + h * turned), 1e-3
     yield (drawn.force, "force"), np.array([0, 0, 1.0]), lambda h: sim.set(drawn.force, force=(0, 0, 0.3 + h)), 1e-4
     yield (drawn.mass, "mass"), 1.0, lambda h: sim.set(drawn.mass, mass=0.01 + h), 3e-6
+    for word, value, size in (("stiffness", 20.0, 1e-2), ("rest_length", 0.1, 1e-4)):
+        yield (drawn.spring, word), 1.0, lambda h, w=word, v=value: sim.set(drawn.spring, **{w: v + h}), size
     yield "gravity", np.array([0, 0, 1.0]), lambda h: sim.set(None, gravity=(0, 0, -9.81 + h)), 1e-3
 
 
@@ -96,7 +101,7 @@ def test_gradient_of_an_equilibrium_is_that_of_differences(planar, joint):
 
     cases = [
         *settings(drawn, random),
-        ((wall, "position"), np.array([1.0, 0, 0]), lambda h: sim.move(wall, position=place + [h, 0, 0]), 1e-6),
+        ((wall, "position"), np.array([1.0, 0, 0]), lambda h: sim.move(wall, position=place + np.array([h, 0, 0])), 1e-6),
         ((wall, "rotation"), axis, lambda h: sim.move(wall, rotation=Rotation.from_rotvec(h * axis)), 1e-5),
     ]
     gradients = found.gradient(weight, [unknown for unknown, *_ in cases])
@@ -135,9 +140,13 @@ def test_gradients_have_the_shape_of_get_and_the_jacobian_their_rows():
         ("implicit_midpoint", 0.0),
         ("implicit_midpoint", 300.0),
         ("fourth_order", 0.0),
+        ("energy_momentum", 0.0),
+        ("energy_momentum", 300.0),
     ],
 )
 def test_gradient_of_a_run_is_that_of_differences(integrator, viscosity, planar, joint, support):
+    if integrator == "energy_momentum" and joint and not planar:
+        pytest.skip("none is known through joints in space; refused, see below")
     random = np.random.default_rng(5)
     drawn = Drawn(
         planar=planar,
@@ -178,6 +187,8 @@ def test_gradient_of_a_run_is_that_of_differences(integrator, viscosity, planar,
             1e-4,
         ),
     ]
+    if integrator != "fourth_order":
+        cases.append(((drawn.spring, "damping"), 1.0, lambda h: sim.set(drawn.spring, damping=0.5 + h), 1e-2))
     if viscosity:
         cases.append(((arm, "viscosity"), 1.0, lambda h: sim.set(arm, viscosity=viscosity + h), 0.05))
     if not joint and support != "edge":

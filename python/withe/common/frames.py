@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-from withe.common.outlines import Named, ObstacleOutline, RodOutline
+from withe.common.outlines import Named, ObstacleOutline, RodOutline, SpringOutline
 
 __all__ = ["ENERGIES", "EnergyHistory", "Frames", "edges_to_nodes", "stencils_to_nodes"]
 
@@ -19,7 +19,7 @@ FloatArray = npt.NDArray[np.float64]
 class EnergyHistory:
     """Energies of every frame, arrays of shape (frames,) [J].
 
-    `total` is the sum of kinetic, stretch, bend, twist, gravity, loads and contact. `work`, done by
+    `total` is the sum of kinetic, stretch, bend, twist, gravity, loads, contact and spring. `work`, done by
     supports and actuation, and `dissipated` count from the start of the simulation.
     """
 
@@ -30,6 +30,7 @@ class EnergyHistory:
     gravity: FloatArray
     loads: FloatArray
     contact: FloatArray
+    spring: FloatArray
     total: FloatArray
     work: FloatArray
     dissipated: FloatArray
@@ -54,6 +55,10 @@ class Frames(Protocol):
 
     @property
     def obstacles(self) -> tuple[ObstacleOutline, ...]:
+        """In the order of the scene."""
+
+    @property
+    def springs(self) -> tuple[SpringOutline, ...]:
         """In the order of the scene."""
 
     def positions(self, rod: Named | None = None) -> FloatArray:

@@ -1,4 +1,4 @@
-"""What pictures and files need to know of rods and obstacles besides their motion."""
+"""What pictures and files need to know of rods, obstacles and springs besides their motion."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["Named", "ObstacleOutline", "RodOutline", "index_of"]
+__all__ = ["Named", "ObstacleOutline", "RodOutline", "SpringOutline", "index_of"]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -75,6 +75,21 @@ class ObstacleOutline:
     kind: str
     axis: FloatArray
     radius: float
+
+
+@dataclass(frozen=True)
+class SpringOutline:
+    """What pictures need to know of a spring besides the motion of its nodes.
+
+    Attributes
+    ----------
+    name : str
+    rows : pair of int
+        Rows of its nodes among those of the scene.
+    """
+
+    name: str
+    rows: tuple[int, int]
 
 
 def index_of(outlines: tuple[RodOutline, ...] | tuple[ObstacleOutline, ...], handle: Named, what: str) -> int:

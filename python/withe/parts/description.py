@@ -25,6 +25,7 @@ from withe.parts.kinds import (
 )
 from withe.parts.options import Bending
 from withe.parts.parameters import RodParameters
+from withe.parts.springs import describe_springs
 from withe.parts.supports import held_rows
 
 __all__ = ["added_mass", "describe", "describe_load", "describe_support", "drag", "parameters_of", "rod_parameters"]
@@ -38,7 +39,7 @@ def describe(directory: Directory, gravity: FloatArray, bending: Bending = "angl
     Raises
     ------
     ValueError
-        A scene without rods, or two supports at nodes that were joined later.
+        A scene without rods, or two supports, or a spring, at nodes that were joined later.
     """
     rods = directory.all(RodPart)
     if not rods:
@@ -56,6 +57,7 @@ def describe(directory: Directory, gravity: FloatArray, bending: Bending = "angl
     scene.joints = [_describe_joint(group) for group in _groups(directory.all(JoinPart))]
     scene.supports = _describe_supports(directory)
     scene.loads = [describe_load(load) for load in directory.all(LoadPart)]
+    scene.springs = describe_springs(directory)
     custom = directory.all(CustomForcePart)
     scene.has_custom_force = bool(custom)
     scene.custom_implicit = any(part.jacobian is not None for part in custom)

@@ -17,6 +17,7 @@ from withe.parts.kinds import (
     Part,
     Pass,
     RodPart,
+    SpringPart,
     SupportPart,
     handle_of,
 )
@@ -31,6 +32,7 @@ _WORDS: dict[type[Any], str] = {
     SupportPart: "support",
     LoadPart: "load",
     MassPart: "mass",
+    SpringPart: "spring",
     DragPart: "drag",
     FluidPart: "fluid",
     CustomForcePart: "custom force",

@@ -28,6 +28,7 @@ __all__ = [
     "Obstacle",
     "Rod",
     "RodPlace",
+    "Spring",
     "Support",
     "parse_place",
 ]
@@ -141,6 +142,11 @@ class Load(Handle):
 @dataclass(frozen=True)
 class Mass(Handle):
     """A mass at a node."""
+
+
+@dataclass(frozen=True)
+class Spring(Handle):
+    """A spring, with a damper beside it, between two nodes."""
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,20 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common.drawing import voronoi_lengths
-from withe.parts.handles import CustomForce, Drag, Fluid, Handle, Joint, Layout, Load, Mass, Obstacle, Rod, Support
+from withe.parts.handles import (
+    CustomForce,
+    Drag,
+    Fluid,
+    Handle,
+    Joint,
+    Layout,
+    Load,
+    Mass,
+    Obstacle,
+    Rod,
+    Spring,
+    Support,
+)
 from withe.parts.parameters import RodParameters
 from withe.parts.sections import SectionProperties
 
@@ -33,6 +46,7 @@ __all__ = [
     "Part",
     "Pass",
     "RodPart",
+    "SpringPart",
     "SupportPart",
     "handle_of",
 ]
@@ -133,6 +147,18 @@ class MassPart:
 
 
 @dataclass(frozen=True, eq=False)
+class SpringPart:
+    """A spring, with a damper beside it, between two nodes."""
+
+    name: str
+    nodes: tuple[Pass, Pass]
+    node_names: tuple[str, str]
+    stiffness: float  # [N/m]
+    rest_length: float  # [m]
+    damping: float  # [N s/m]
+
+
+@dataclass(frozen=True, eq=False)
 class DragPart:
     """Viscous drag along rods; None: all of them."""
 
@@ -210,13 +236,25 @@ class ContactSettings:
     groups: Mapping[str, str] = field(default_factory=dict)  # of rods
 
 
-Part = RodPart | JoinPart | SupportPart | LoadPart | MassPart | DragPart | FluidPart | CustomForcePart | ObstaclePart
+Part = (
+    RodPart
+    | JoinPart
+    | SupportPart
+    | LoadPart
+    | MassPart
+    | SpringPart
+    | DragPart
+    | FluidPart
+    | CustomForcePart
+    | ObstaclePart
+)
 
 _HANDLES: dict[type[Any], type[Handle]] = {
     JoinPart: Joint,
     SupportPart: Support,
     LoadPart: Load,
     MassPart: Mass,
+    SpringPart: Spring,
     DragPart: Drag,
     FluidPart: Fluid,
     CustomForcePart: CustomForce,

@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from withe import io, view
 from withe.common.frames import ENERGIES, EnergyHistory
-from withe.common.outlines import Named, ObstacleOutline, RodOutline, index_of
+from withe.common.outlines import Named, ObstacleOutline, RodOutline, SpringOutline, index_of
 
 __all__ = ["ROD_READOUTS", "EnergyHistory", "Record", "RunGradient"]
 
@@ -64,10 +64,12 @@ class Record:
         arrays: Mapping[str, npt.NDArray[Any]],
         extras: Iterable[str] = (),
         obstacles: Iterable[ObstacleOutline] = (),
+        springs: Iterable[SpringOutline] = (),
         derivatives: RunGradient | None = None,
     ) -> None:
         self._derivatives = derivatives
         self._rods = tuple(rods)
+        self._springs = tuple(springs)
         self._obstacles = tuple(obstacles)
         self._arrays = dict(arrays)
         self._extras = tuple(extras)
@@ -96,8 +98,8 @@ class Record:
         Raises
         ------
         ValueError
-            The run was without ``differentiable=True``, or has no gradient and says why; a wrong shape; a derivative out
-            of the plane of a planar scene.
+            The run was without ``differentiable=True``, or has no gradient and says why; a wrong shape; a derivative
+            out of the plane of a planar scene.
 
         Notes
         -----
@@ -138,6 +140,9 @@ class Record:
             self._array(f"obstacle_{index}_place", (frames, 3))
             if obstacle.kind not in ("plane", "capsule") or obstacle.axis.shape != (3,) or not obstacle.radius >= 0.0:
                 raise ValueError(f"obstacle {obstacle.name!r} must be a plane or a capsule with an axis and a radius")
+        for spring in self._springs:
+            if len(spring.rows) != 2 or not all(0 <= row < nodes for row in spring.rows):
+                raise ValueError(f"rows of spring {spring.name!r} must be two in 0..{nodes - 1}")
         for name in ENERGIES:
             self._array(f"energy_{name}", (frames,))
         for index, name in enumerate(self._extras):
@@ -173,6 +178,11 @@ class Record:
     def obstacles(self) -> tuple[ObstacleOutline, ...]:
         """Planes, spheres and capsules, in the order of the scene."""
         return self._obstacles
+
+    @property
+    def springs(self) -> tuple[SpringOutline, ...]:
+        """Springs between nodes, in the order of the scene."""
+        return self._springs
 
     @property
     def units(self) -> dict[str, str]:
@@ -302,6 +312,7 @@ class Record:
                 {"name": each.name, "kind": each.kind, "axis": each.axis.tolist(), "radius": each.radius}
                 for each in self._obstacles
             ],
+            "springs": [{"name": each.name, "rows": list(each.rows)} for each in self._springs],
         }
         arrays = dict(self._arrays)
         for index, rod in enumerate(self._rods):
@@ -338,8 +349,14 @@ class Record:
                 ObstacleOutline(str(o["name"]), str(o["kind"]), np.array(o["axis"], float), float(o["radius"]))
                 for o in header.get("obstacles", [])  # which files had none of at first
             ]
-            return cls(rods, arrays, [str(name) for name in header["extras"]], obstacles)
-        except (KeyError, TypeError, ValueError) as error:
+            springs = [
+                SpringOutline(str(each["name"]), (int(each["rows"][0]), int(each["rows"][1])))
+                for each in header.get("springs", [])  # likewise
+            ]
+            if "energy_spring" not in arrays:  # as in files from before there were springs
+                arrays["energy_spring"] = np.zeros(len(arrays["times"]))
+            return cls(rods, arrays, [str(name) for name in header["extras"]], obstacles, springs)
+        except (KeyError, IndexError, TypeError, ValueError) as error:
             raise ValueError(f"{path} is a damaged record: {error}") from error
 
     def to_vtk(self, folder: str | os.PathLike[str]) -> Path:

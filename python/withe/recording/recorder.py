@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from withe.common import validation
 from withe.common.frames import ENERGIES
-from withe.common.outlines import ObstacleOutline, RodOutline
+from withe.common.outlines import ObstacleOutline, RodOutline, SpringOutline
 from withe.recording.record import ROD_READOUTS, Record, RunGradient
 
 __all__ = ["Recorder", "present"]
@@ -110,6 +110,8 @@ class Recorder(Generic[S]):
         Called with the simulation at every frame; each returns a number or an array, of one shape.
     obstacles : iterable of ObstacleOutline
         Whose positions to record.
+    springs : iterable of SpringOutline
+        To be drawn between their nodes.
 
     Raises
     ------
@@ -122,9 +124,11 @@ class Recorder(Generic[S]):
         simulation: S,
         extra: Mapping[str, Callable[[S], npt.ArrayLike]] | None = None,
         obstacles: Iterable[ObstacleOutline] = (),
+        springs: Iterable[SpringOutline] = (),
     ) -> None:
         self._simulation = simulation
         self._obstacles = tuple(obstacles)
+        self._springs = tuple(springs)
         self._extra = dict(extra or {})
         for name, function in self._extra.items():
             if not isinstance(name, str):
@@ -180,7 +184,7 @@ class Recorder(Generic[S]):
             arrays = {name: column.values(self._frames) for name, column in self._columns.items()}
         else:
             arrays = {name: values[None][:0].copy() for name, values in self._frame().items()}
-        return Record(self._rods, arrays, self._extra, self._obstacles, self.derivatives)
+        return Record(self._rods, arrays, self._extra, self._obstacles, self._springs, self.derivatives)
 
 
 def _numbers(name: str, value: npt.ArrayLike) -> npt.NDArray[Any]:
@@ -195,9 +199,11 @@ def _numbers(name: str, value: npt.ArrayLike) -> npt.NDArray[Any]:
     return array
 
 
-def present(simulation: Moving, obstacles: Iterable[ObstacleOutline] = ()) -> Record:
+def present(
+    simulation: Moving, obstacles: Iterable[ObstacleOutline] = (), springs: Iterable[SpringOutline] = ()
+) -> Record:
     """A record of one frame: the present state of a simulation."""
-    recorder = Recorder(simulation, None, obstacles)
+    recorder = Recorder(simulation, None, obstacles, springs)
     recorder.capture()
     return recorder.record
 

@@ -11,8 +11,9 @@ import numpy.typing as npt
 from withe.common import validation
 from withe.parts.directory import Directory
 from withe.parts.fluid import make_fluid
-from withe.parts.handles import CustomForce, Drag, Fluid, Mass, NodeHandle, Rod
+from withe.parts.handles import CustomForce, Drag, Fluid, Mass, NodeHandle, Rod, Spring
 from withe.parts.kinds import CustomForcePart, DragPart, FluidModel, MassPart
+from withe.parts.springs import make_spring
 
 __all__ = ["Loads"]
 
@@ -20,7 +21,7 @@ FloatArray = npt.NDArray[np.float64]
 
 
 class Loads:
-    """Masses, drag, custom forces and the fluid of a scene: methods of `Scene` that need its parts alone."""
+    """Masses, springs, drag, custom forces and the fluid of a scene: methods of `Scene` that need its parts alone."""
 
     _directory: Directory
 
@@ -30,6 +31,55 @@ class Loads:
         place, node_name = self._directory.node(node, "node of the mass")
         part = MassPart(name, place, validation.non_negative(mass, f"mass at {node_name!r}"))
         return cast(Mass, self._directory.add(part))
+
+    def add_spring(
+        self,
+        a: NodeHandle | str,
+        b: NodeHandle | str,
+        *,
+        stiffness: float,
+        rest_length: float | None = None,
+        damping: float = 0.0,
+        name: str | None = None,
+    ) -> Spring:
+        """Add a spring without mass, with a damper beside it (Kelvin and Voigt), between two nodes.
+
+        At length l it pulls them together by stiffness (l - rest_length) + damping dl/dt, along the line between them,
+        and stores stiffness (l - rest_length)^2 / 2, which is `energy().spring`. Nothing touches it.
+
+        Parameters
+        ----------
+        a, b : NodeHandle or str
+            Of one rod or of two; held or free.
+        stiffness : float [N/m]
+        rest_length : float [m]
+            By default the distance as drawn. With 0 the force is proportional to that between the nodes.
+        damping : float [N s/m]
+        name : str
+
+        Returns
+        -------
+        Spring
+            `Simulation.set` changes stiffness, rest_length and damping; `Simulation.spring_tension` is its force.
+
+        Raises
+        ------
+        ValueError
+            One and the same node, a number that is negative or not finite, or a rest_length above zero between nodes
+            that coincide.
+
+        Examples
+        --------
+        A stay from the middle of the arm to a post:
+
+        >>> stiff = withe.Stiffness(stretch=100.0, bend=1e-3, twist=1e-3)
+        >>> post = scene.add_rod(points=[(0, 0, 0.1), (0, 0, 0.2)], radius=0.01, stiffness=stiff, line_density=1)
+        >>> scene.add_spring(arm.node(15), post.start, stiffness=100.0, name="stay")
+        Spring(name='stay')
+        """
+        return cast(
+            Spring, self._directory.add(make_spring(self._directory, a, b, stiffness, rest_length, damping, name))
+        )
 
     def add_drag(self, coefficient: float, *, rods: Iterable[Rod | str] | None = None, name: str | None = None) -> Drag:
         """Add viscous drag: a force per length against the velocity. Drags on one rod add up.

@@ -7,11 +7,11 @@ from typing import Any
 import numpy.typing as npt
 
 from withe.common import validation
-from withe.parts.handles import CustomForce, Drag, Fluid, Load, Mass, Obstacle, Rod
+from withe.parts.handles import CustomForce, Load, Rod
 from withe.parts.rods import curvature_array, twist_array
 from withe.simulation.functions import check_jacobian
 from withe.simulation.loads import remove_load
-from withe.simulation.parameters import get_value, set_values
+from withe.simulation.parameters import Settable, get_value, set_values
 from withe.simulation.session import Session
 
 __all__ = ["Control"]
@@ -77,7 +77,7 @@ class Control:
 
     # Parameters
 
-    def set(self, target: Rod | Load | Mass | Drag | Fluid | Obstacle | str | None = None, /, **values: Any) -> None:
+    def set(self, target: Settable | str | None = None, /, **values: Any) -> None:
         """Change parameters while the simulation runs.
 
         Parameters
@@ -88,9 +88,9 @@ class Control:
             Of a rod: youngs_modulus, poisson_ratio, density, viscosity, stretch_stiffness,
             bend_stiffness, twist_stiffness, line_density, viscous_time, drag (numbers, or one an edge),
             natural_curvature, natural_twist. Of a load: force, moment, load or pressure, constant or a function
-            of time. Of a mass: mass. Of a drag: drag. Of a fluid: viscosity. Of an obstacle: friction, one coefficient
-            or a pair, along and across rods. Of the scene: gravity, and friction between rods. See `set_friction` for
-            two of them.
+            of time. Of a mass: mass. Of a spring: stiffness, rest_length, damping. Of a drag: drag. Of a fluid:
+            viscosity. Of an obstacle: friction, one coefficient or a pair, along and across rods. Of the scene:
+            gravity, and friction between rods. See `set_friction` for two of them.
 
         Raises
         ------
@@ -104,7 +104,7 @@ class Control:
         """
         set_values(self._session, target, values)
 
-    def get(self, target: Rod | Load | Mass | Drag | Fluid | Obstacle | str, word: str | None = None) -> Any:
+    def get(self, target: Settable | str, word: str | None = None) -> Any:
         """The present value of what `set` sets.
 
         Parameters

@@ -11,9 +11,10 @@ import numpy.typing as npt
 
 from withe import _core
 from withe.common import validation
-from withe.parts.handles import Drag, Handle, Load, Mass, NodeHandle, Rod, Support
-from withe.parts.kinds import DragPart, LoadPart, MassPart, RodPart, SupportPart
+from withe.parts.handles import Drag, Load, Mass, NodeHandle, Rod, Spring, Support
+from withe.parts.kinds import DragPart, LoadPart, MassPart, RodPart, SpringPart, SupportPart
 from withe.parts.parameters import ROD_WORDS, RodParameters
+from withe.parts.springs import SPRING_WORDS
 from withe.simulation.loads import load_index
 from withe.simulation.session import Session
 
@@ -27,7 +28,7 @@ __all__ = [
 ]
 
 FloatArray = npt.NDArray[np.float64]
-Unknown = tuple[Rod | Load | Mass | Drag | Support | str, str] | str
+Unknown = tuple[Rod | Load | Mass | Drag | Spring | Support | str, str] | str
 """What to differentiate by: a part and a word of `set`, or "gravity", "initial_positions", "initial_velocities"."""
 
 _ENGINE_WORDS = (
@@ -166,6 +167,9 @@ def _reader(session: Session, unknown: Unknown) -> Callable[[Any], Any]:
     if isinstance(part, MassPart) and word == "mass":
         row = session.directory.row(part.node)
         return lambda g: float(g.parameters.added_mass[row])
+    if isinstance(part, SpringPart) and word in SPRING_WORDS:
+        spring = session.scene.all(SpringPart).index(part)
+        return lambda g: float(getattr(g.parameters, f"spring_{word}")[spring])
     if isinstance(part, DragPart) and word == "drag":
         edges = np.concatenate(
             [

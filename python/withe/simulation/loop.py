@@ -14,6 +14,7 @@ from withe.recording.record import Record
 from withe.recording.recorder import Moving, Recorder
 from withe.simulation.gradients import RunDerivatives
 from withe.simulation.obstacles import obstacle_outlines
+from withe.simulation.springs import spring_outlines
 from withe.simulation.stepping import Stepping
 
 __all__ = ["Run"]
@@ -63,7 +64,8 @@ class Run(Generic[S]):
         self._before_step = before_step
         self._until = until
         self._stepping = stepping
-        self._recorder = Recorder(simulation, record, obstacle_outlines(stepping.session.directory))
+        directory = stepping.session.directory
+        self._recorder = Recorder(simulation, record, obstacle_outlines(directory), spring_outlines(directory))
         self._start = stepping.time
         self._ended = False
         self._differentiable = validation.truth(differentiable, "differentiable")

@@ -9,10 +9,11 @@ import numpy.typing as npt
 
 from withe.knots import link
 from withe.parts.contacts import contact_table
-from withe.parts.handles import NodeHandle, Obstacle, Rod, Support
-from withe.parts.kinds import ObstaclePart
+from withe.parts.handles import NodeHandle, Obstacle, Rod, Spring, Support
+from withe.parts.kinds import ObstaclePart, SpringPart
 from withe.simulation.readouts import Energy, Momentum, Plan, Reaction, RodEnergy, Statistics
 from withe.simulation.session import Session
+from withe.simulation.springs import spring_tension
 from withe.simulation.supports import find_support
 
 __all__ = ["Measurements"]
@@ -85,6 +86,16 @@ class Measurements:
     def tensions(self, rod: Rod | str) -> FloatArray:
         """Axial forces of the edges, pulling is positive, shape (edges,) [N]."""
         return self._session.world.tensions(self._session.directory.rod(rod).index)
+
+    def spring_tension(self, spring: Spring | str) -> float:
+        """Axial force of a spring and its damper, pulling is positive [N].
+
+        Raises
+        ------
+        ValueError
+            Not a spring of this scene.
+        """
+        return spring_tension(self._session, self._session.directory.find(spring, SpringPart, "spring"))
 
     def spins(self, rod: Rod | str) -> FloatArray:
         """Angular velocities of the edges about their tangents, shape (edges,) [rad/s]."""

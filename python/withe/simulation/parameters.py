@@ -10,7 +10,7 @@ import numpy as np
 from withe.common import validation
 from withe.parts.description import added_mass, drag, rod_parameters
 from withe.parts.friction import as_given, obstacle_friction
-from withe.parts.handles import Drag, Fluid, Load, Mass, Obstacle, Rod
+from withe.parts.handles import Drag, Fluid, Load, Mass, Obstacle, Rod, Spring
 from withe.parts.kinds import (
     DragPart,
     FluidPart,
@@ -20,17 +20,20 @@ from withe.parts.kinds import (
     ObstaclePart,
     Part,
     RodPart,
+    SpringPart,
     SupportPart,
 )
 from withe.parts.parameters import ROD_WORDS, RodParameters
 from withe.parts.rods import curvature_array, twist_array
+from withe.parts.springs import SPRING_WORDS
 from withe.simulation.loads import load_index, set_load
 from withe.simulation.obstacles import set_obstacle_friction, set_rod_friction
 from withe.simulation.session import Session
+from withe.simulation.springs import set_spring, spring_value
 
 __all__ = ["Settable", "get_value", "set_values"]
 
-Settable = Rod | Load | Mass | Drag | Fluid | Obstacle
+Settable = Rod | Load | Mass | Spring | Drag | Fluid | Obstacle
 _NATURAL_WORDS = ("natural_curvature", "natural_twist")
 
 
@@ -58,6 +61,9 @@ def set_values(session: Session, target: Settable | str | None, values: dict[str
         masses = session.settings.masses | {part.name: validation.non_negative(values["mass"], f"mass {part.name!r}")}
         session.world.set_added_mass(added_mass(session.directory, masses))
         session.settings.masses = masses
+    elif isinstance(part, SpringPart):
+        _only(values, SPRING_WORDS, f"spring {part.name!r}")
+        set_spring(session, part, values)
     elif isinstance(part, DragPart):
         _only(values, ("drag",), f"drag {part.name!r}")
         _set_drag(session, part, validation.non_negative(values["drag"], f"drag {part.name!r}"))
@@ -95,6 +101,8 @@ def get_value(session: Session, target: Settable | str, word: str | None) -> Any
         return value if part.axis is None else float(value @ part.axis)
     elif isinstance(part, MassPart) and word == "mass":
         return session.settings.masses[part.name]
+    elif isinstance(part, SpringPart) and word in SPRING_WORDS:
+        return spring_value(session, part, word)
     elif isinstance(part, DragPart) and word == "drag":
         return session.settings.drags[part.name]
     elif isinstance(part, FluidPart) and word == "viscosity":
@@ -161,6 +169,7 @@ def _words_of(part: Part) -> tuple[str, ...]:
         return (part.kind,)
     words: dict[type[Any], tuple[str, ...]] = {
         MassPart: ("mass",),
+        SpringPart: SPRING_WORDS,
         DragPart: ("drag",),
         FluidPart: ("viscosity",),
         ObstaclePart: ("friction",),
@@ -170,7 +179,8 @@ def _words_of(part: Part) -> tuple[str, ...]:
 
 _SETTABLE = (
     "set takes rods (youngs_modulus, natural_curvature, ...), loads (force, moment, load), masses (mass), "
-    "drags (drag), fluids (viscosity), obstacles (friction), and None for the scene (gravity, friction)"
+    "springs (stiffness, rest_length, damping), drags (drag), fluids (viscosity), obstacles (friction), and None for "
+    "the scene (gravity, friction)"
 )
 
 

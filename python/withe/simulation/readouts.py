@@ -20,7 +20,7 @@ class Energy:
 
     Attributes
     ----------
-    kinetic, stretch, bend, twist, gravity, contact
+    kinetic, stretch, bend, twist, gravity, contact, spring
     loads
         Minus the work done by loads and custom forces since the start.
     total
@@ -28,7 +28,7 @@ class Energy:
     work
         Done by supports and actuation since the start.
     dissipated
-        By viscosity and drag since the start.
+        By viscosity, drag, dampers, fluids and contact since the start.
     """
 
     kinetic: float
@@ -38,6 +38,7 @@ class Energy:
     gravity: float
     loads: float
     contact: float
+    spring: float
     total: float
     work: float
     dissipated: float

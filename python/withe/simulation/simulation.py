@@ -29,6 +29,7 @@ from withe.simulation.placement import Placement
 from withe.simulation.readouts import Equilibrium
 from withe.simulation.session import Session
 from withe.simulation.snapshots import Snapshot, restore
+from withe.simulation.springs import spring_outlines
 from withe.simulation.states import restore_frame
 from withe.simulation.stepping import Stepping
 
@@ -390,4 +391,5 @@ class Simulation(AppliedLoads, Control, Placement, Measurements):
         return self._frame().picture(path, **options)
 
     def _frame(self) -> Record:
-        return present(self, obstacle_outlines(self._session.directory))
+        directory = self._session.directory
+        return present(self, obstacle_outlines(directory), spring_outlines(directory))

@@ -21,7 +21,7 @@ def plot(record: Frames, *, shapes: int = 6) -> Any:
     """Draw the shapes of the rods at several times, and the energies over time.
 
     Obstacles near the rods are drawn too: in two dimensions planes as lines, spheres and capsules as outlines, in three
-    see-through. Those that move are drawn at the same times as the rods, in the same colours.
+    see-through. Those that move, and springs, are drawn at the same times as the rods, in the same colours.
 
     Parameters
     ----------
@@ -88,6 +88,7 @@ _ENERGY_COLOURS = {
     "gravity": "#457b9d",
     "loads": "#6a994e",
     "contact": "#c8553d",
+    "spring": "#bc6c9b",
     "total": "#33383d",
 }
 
@@ -113,6 +114,11 @@ def _plot_shapes(figure: Any, place: Any, record: Frames, count: int) -> Any:
             if rod.closed:
                 points = np.concatenate([points, points[:1]])
             axes.plot(*points.T, color=scale.to_rgba(times[frame]), linewidth=2.2)
+        for spring in record.springs:
+            ends = positions[:, list(spring.rows)]
+            normal = np.eye(3)[2 if three else 3 - sum(shown)]
+            points = scenery.zigzag(ends[frame], scenery.spring_width(ends), normal)
+            axes.plot(*(points[:, shown] * factor).T, color=scale.to_rgba(times[frame]), linewidth=0.9)
     nodes = positions.reshape(-1, 3)
     around = []
     for obstacle in record.obstacles:

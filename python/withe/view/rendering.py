@@ -15,6 +15,7 @@ from withe.common.extras import require
 from withe.common.frames import Frames, edges_to_nodes, stencils_to_nodes
 from withe.view import scenery
 from withe.view.graphics import render_window
+from withe.view.springs import SpringLines
 from withe.view.surfaces import Surface
 
 __all__ = ["Stage", "color_limits", "nice_limits"]
@@ -120,6 +121,7 @@ class Stage:
         self._add_obstacles(pyvista, np.concatenate([nodes, nearby]))
         self._add_shadow(pyvista)
         self._add_rods(pyvista, color_by)
+        self._springs = SpringLines(pyvista, self.plotter, record, direction)
         self._ghosts = [points for frame in ghosts for points in self._add_ghost(pyvista, frame, list(ghosts))]
         if supersampling == 1:
             self.plotter.enable_anti_aliasing("ssaa")
@@ -153,8 +155,10 @@ class Stage:
             way = self._mixed(places, before, after, share) - places[0]
             actor.position = way
             self._obstacle_points += [surface + way] if surface is not None else []
+        positions = self._mixed(self._positions, before, after, share)
+        self._springs.show(positions)
         for index, rod in enumerate(self._record.rods):
-            nodes = self._mixed(self._positions, before, after, share)[rod.rows]
+            nodes = positions[rod.rows]
             points, normals = self._surfaces[index].mesh(
                 nodes, self._mixed(self._directors[index], before, after, share)
             )

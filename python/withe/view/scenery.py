@@ -1,4 +1,4 @@
-"""Obstacles as pictures show them: a patch of each plane, spheres and capsules. Pure functions of where they are."""
+"""Obstacles and springs as pictures show them: a patch of each plane, spheres and capsules, zigzags. Pure functions."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from withe.common.outlines import ObstacleOutline
 
-__all__ = ["cloud", "ends", "framing", "patch", "profile", "surface"]
+__all__ = ["cloud", "ends", "framing", "patch", "profile", "spring_width", "surface", "zigzag"]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -131,3 +131,38 @@ def profile(first: FloatArray, second: FloatArray, radius: float) -> FloatArray:
     angles = start + np.linspace(0.0, np.pi, 40)
     half = radius * np.stack([np.cos(angles), np.sin(angles)], axis=1)
     return np.concatenate([first + half, second - half, first + half[:1]])
+
+
+def zigzag(ends: FloatArray, width: float, normal: FloatArray) -> FloatArray:
+    """A spring between two points as a line that goes to and fro.
+
+    Parameters
+    ----------
+    ends : ndarray of shape (2, 3) [m]
+    width : float [m]
+        From one side to the other.
+    normal : ndarray of shape (3,)
+        Of the plane that it lies in, as near as its ends allow.
+
+    Returns
+    -------
+    ndarray of shape (points, 3) [m]
+        The same number of points wherever it is.
+    """
+    turns = 8
+    along = ends[1] - ends[0]
+    side = np.cross(normal, along)
+    if np.linalg.norm(side) <= 1e-6 * np.linalg.norm(normal) * np.linalg.norm(along):
+        side = np.cross(np.eye(3)[int(np.argmin(np.abs(along)))], along)
+    length = float(np.linalg.norm(side))
+    if length > 0.0:
+        side = side / length
+    places = np.concatenate([[0.0], np.linspace(0.15, 0.85, 2 * turns + 1), [1.0]])
+    offsets = np.zeros(len(places))
+    offsets[2:-2:2], offsets[3:-2:2] = 0.5, -0.5
+    return np.asarray(ends[0] + np.outer(places, along) + width * np.outer(offsets, side), np.float64)
+
+
+def spring_width(ends: FloatArray) -> float:
+    """How wide a spring is drawn [m], from where its ends are in all frames, shape (frames, 2, 3) [m]."""
+    return 0.08 * float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=-1).max())

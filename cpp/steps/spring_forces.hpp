@@ -1,0 +1,34 @@
+#pragma once
+/// Springs between nodes, see forces/spring.hpp.
+
+#include "forces/spring.hpp"
+#include "steps/term.hpp"
+
+namespace withe {
+
+class SpringForces final : public Term {
+ public:
+  explicit SpringForces(const Model& model);
+
+  void declare(std::vector<ElementTable*>& tables) override { tables.push_back(&table_); }
+  bool dissipates(const Parameters& parameters) const override;
+  std::string note() const override;
+  void add(const StepProblem& problem, StepData& data, const Assembler& assembler,
+           std::span<double> values) const override;
+  void add_adjoint(const StepProblem& problem, const StepData& data, const Assembler& assembler,
+                   StepAdjoint& adjoint) const override;
+  void add_rounding(const StepProblem& problem, StepData& data) const override;
+  double gained(const StepProblem& problem, const VectorX& end) const override;
+  double dissipated(const StepProblem& problem, const StepData& data, const Assembler& assembler,
+                    const VectorX& change) const override;
+
+ private:
+  ElementTable table_;
+};
+
+/// Of all springs at a configuration [J].
+double spring_energy(const Model& model, const Parameters& parameters, const VectorX& q);
+/// n of one spring, with velocities v [N].
+double spring_tension(const Model& model, const Parameters& parameters, const VectorX& q, const VectorX& v, int spring);
+
+}  // namespace withe
