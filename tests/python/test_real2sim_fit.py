@@ -285,3 +285,53 @@ def test_derivatives_are_those_of_equilibria(space):
         ahead, behind = (stills.residual(coordinates + s * np.eye(len(coordinates))[i], 0)[0] for s in (step, -step))
         scale = np.abs(jacobian[:, i]).max()
         assert jacobian[:, i] == pytest.approx((ahead - behind) / (2 * step), abs=1e-5 * scale)
+
+
+def test_where_the_engine_knows_no_gradient_differences_take_its_place():
+    def hanging(modulus):
+        scene = withe.Scene()
+        rubber = withe.Material(youngs_modulus=modulus, density=1000.0)
+        rod = scene.add_rod(start=(0, 0, 0), end=(0.3, 0, 0), nodes=21, radius=8e-3, material=rubber, name="arm")
+        scene.clamp(rod.start)
+        scene.add_custom_force(
+            lambda time, positions, velocities: np.array([[0.0, 0.0, 0.05]] * 21) * (np.arange(21) == 20)[:, None]
+        )
+        simulation = scene.build(integrator="static", planar=False)
+        simulation.equilibrium()
+        return simulation
+
+    tags = hanging(3e6).positions("arm")[None, [10, 20]]
+    found = fit(hanging(2e6), Tags(tags, names([10, 20])), [("arm", "youngs_modulus")], progress=False)
+    assert found.values[0, 0] == pytest.approx(3e6, rel=1e-5)
+
+
+def test_a_rod_that_is_free_to_spin_is_fitted():
+    def rope(modulus):
+        scene = withe.Scene()
+        rubber = withe.Material(youngs_modulus=modulus, density=1000.0)
+        rod = scene.add_rod(start=(0, 0, 0), end=(0.3, 0, 0), nodes=21, radius=5e-3, material=rubber, name="arm")
+        scene.pin(rod.start)
+        scene.pin(rod.end, free=(1, 0, 0))
+        simulation = scene.build(integrator="static", planar=False)
+        simulation.equilibrium()
+        return simulation
+
+    tags = rope(3e6).positions("arm")[None, [5, 10]]
+    found = fit(rope(2e6), Tags(tags, names([5, 10])), [("arm", "youngs_modulus")], progress=False)
+    assert found.values[0, 0] == pytest.approx(3e6, rel=1e-4)
+
+
+def test_a_frame_without_equilibrium_says_so_and_the_others_are_fitted():
+    simulation = arm()
+    tags = drawn(simulation, [(0.0, 1.0), (0.0, 2.0)], [15, 30])
+
+    def conditions(simulation, frame):
+        simulation.set(gravity=(0, 0, -9.81))
+        if frame == 0:
+            raise withe.ConvergenceError("there is none")
+
+    found = fit(simulation, Tags(tags, names([15, 30])), ARM, conditions=conditions, progress=False)
+    assert list(found.converged) == [False, True]
+    assert found.reasons == {0: "no equilibrium to begin with"}
+    assert found.values[1, 0] == pytest.approx(2.0, abs=1e-6)
+    assert np.isnan(found.rms[0])
