@@ -144,6 +144,22 @@ def test_a_curvature_shared_by_several_loads_is_found_with_the_stiffness():
     assert found.value(rod)[0] == pytest.approx([0.0, 2.0], abs=1e-6)
 
 
+def test_a_mass_at_the_tip_is_weighed():
+    def loaded(mass):
+        scene = withe.Scene()
+        rubber = withe.Material(youngs_modulus=2e7, density=1000.0)
+        rod = scene.add_rod(start=(0, 0, 0), end=(0.3, 0, 0), nodes=31, radius=5e-3, material=rubber, name="arm")
+        scene.clamp(rod.start)
+        scene.add_mass(rod.end, mass, name="weight")
+        return scene.build(integrator="static")
+
+    truth = loaded(0.02)
+    truth.equilibrium()
+    tags = truth.positions("arm")[None, [15, 30]]
+    found = fit(loaded(0.01), Tags(tags, names([15, 30])), [("weight", "mass")], progress=False)
+    assert found.value("weight", "mass")[0] == pytest.approx([0.02], rel=1e-6)
+
+
 def test_stiffness_and_weight_are_told_as_one_number():
     truth = arm()
     truth.set("arm", youngs_modulus=1.5e6)

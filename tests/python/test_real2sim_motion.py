@@ -71,6 +71,23 @@ def test_errors_have_the_size_that_the_covariance_says():
     assert 0.6 < np.sqrt(np.mean(np.square(scaled))) < 1.4  # 16 numbers
 
 
+def test_friction_is_told_by_how_a_rod_slides_to_a_stop():
+    def sliding(friction):
+        scene = withe.Scene()
+        rubber = withe.Material(youngs_modulus=1e6, density=1000.0)
+        rod = scene.add_rod(start=(0, 0, 0), end=(0.1, 0, 0), nodes=5, radius=5e-3, material=rubber, name="arm")
+        scene.add_plane(point=(0, 0, -5e-3), normal=(0, 0, 1), friction=friction, name="floor")
+        scene.enable_contact()
+        simulation = scene.build(time_step=2e-3, integrator="backward_euler")
+        simulation.set_velocities(rod, (0.5, 0, 0))
+        return simulation
+
+    record = sliding(0.35).run(0.2, record_every=0.02, progress=False)
+    seen = Tags(record.positions("arm")[1:, [0, 4]], ["arm.start", "arm.end"], times=record.times[1:])
+    found = fit_motion(sliding(0.5), seen, [("floor", "friction")], progress=False)
+    assert found.value("floor", "friction")[0] == pytest.approx([0.35], rel=1e-2)
+
+
 @pytest.mark.parametrize(
     ("targets", "unknowns", "options", "message"),
     [

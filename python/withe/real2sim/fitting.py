@@ -51,8 +51,8 @@ def fit(
     unknowns : sequence of tuples
         ``(rod, "natural_curvature", basis)``, with basis "constant", "linear" (its values at both ends), "segment" (one
         a stencil), or functions along the rod, array_like of shape (stencils, n); in space these count twice, for
-        both directors. ``(rod, word)`` for a positive parameter of a rod or of a tuple of rods: youngs_modulus,
-        density, bend_stiffness, line_density, ...; it is multiplied by one factor.
+        both directors. ``(part, word)`` for a positive parameter of a part or of a tuple of parts, all multiplied by
+        one factor: youngs_modulus, density, bend_stiffness, line_density, ... of rods, mass, friction of an obstacle.
     method : {"gauss_newton", "lbfgs", "source"}
         "source" is gradient descent by forward differences on the sum of absolute residuals [Algorithm 6 of the
         dissertation that withe began with], for constant natural curvature in a plane; its unknown is a limb's whole

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
-from withe.parts.handles import Rod
+from withe.parts.handles import Handle, Rod
 from withe.parts.kinds import RodPart
 from withe.parts.parameters import ROD_WORDS
 from withe.real2sim.places import rod_part, turning_axis
@@ -20,6 +20,8 @@ from withe.simulation.simulation import Simulation
 __all__ = ["Coordinates", "Delay", "NaturalCurvature", "Tilt", "Unknown", "parse_unknowns"]
 
 FloatArray = npt.NDArray[np.float64]
+
+_POSITIVE = (*(word for word in ROD_WORDS if word != "poisson_ratio"), "mass", "friction")
 
 
 class Unknown(ABC):
@@ -149,26 +151,26 @@ class NaturalCurvature(Unknown):
 
 
 class Parameter(Unknown):
-    """A positive parameter of one or several rods, as the logarithm of what it is multiplied by."""
+    """A positive parameter of one or several parts, as the logarithm of what it is multiplied by."""
 
     per_frame = False
 
-    def __init__(self, simulation: Simulation, rods: Sequence[Rod | str], word: str) -> None:
-        parts = [rod_part(simulation, rod) for rod in rods]
+    def __init__(self, simulation: Simulation, handles: Sequence[Handle | str], word: str) -> None:
+        parts = [simulation._session.directory.find_any(handle, "unknowns") for handle in handles]
         self.word, self.rods = word, tuple(part.name for part in parts)
-        self._first = {}
+        self._first: dict[str, Any] = {}
         for part in parts:
             value = simulation.get(part.name, word)
             if value is None:
                 raise ValueError(
-                    f"{word} of {part.owner} cannot be unknown: its stiffness was given without a material"
+                    f"{word} of {part.name!r} cannot be unknown: its stiffness was given without a material"
                 )
             if not (np.asarray(value) > 0.0).all():
                 raise ValueError(
-                    f"{word} of {part.owner} must be positive to begin with, as its logarithm is looked for: set a "
+                    f"{word} of {part.name!r} must be positive to begin with, as its logarithm is looked for: set a "
                     f"first guess, simulation.set({part.name!r}, {word}=...)"
                 )
-            self._first[part.name] = value
+            self._first[part.name] = np.asarray(value, np.float64) if np.ndim(value) else float(value)
         self._mean = float(np.mean([np.mean(value) for value in self._first.values()]))
         self.names = (f"{word} of {', '.join(map(repr, self.rods))}",)
         self.scales = np.ones(1)
@@ -195,7 +197,7 @@ class Parameter(Unknown):
         return np.asarray(np.sum(shares, axis=0))[:, None]
 
     def value(self, coordinates: FloatArray) -> FloatArray:
-        """Its mean over the rods, in SI units."""
+        """Its mean over the parts, in SI units."""
         return np.asarray(self._mean * np.exp(coordinates))
 
     def slope(self, coordinates: FloatArray) -> FloatArray:
@@ -268,7 +270,7 @@ class Delay(Unknown):
 
 
 def parse_unknowns(simulation: Simulation, unknowns: Sequence[Any], what: str = "unknowns") -> list[Unknown]:
-    """Unknowns of what a user gave: tuples (rod, word) or (rod, "natural_curvature", basis).
+    """Unknowns of what a user gave: tuples (part, word) or (rod, "natural_curvature", basis).
 
     Raises
     ------
@@ -285,11 +287,10 @@ def parse_unknowns(simulation: Simulation, unknowns: Sequence[Any], what: str = 
         rod, word, *basis = item
         if word == "natural_curvature":
             unknown: Unknown = NaturalCurvature(simulation, rod, *basis)
-        elif word in ROD_WORDS and word != "poisson_ratio" and not basis:
-            rods = list(rod) if isinstance(rod, tuple | list) else [rod]
-            unknown = Parameter(simulation, rods, word)
+        elif word in _POSITIVE and not basis:
+            unknown = Parameter(simulation, list(rod) if isinstance(rod, tuple | list) else [rod], word)
         else:
-            words = ", ".join(("natural_curvature", *(w for w in ROD_WORDS if w != "poisson_ratio")))
+            words = ", ".join(("natural_curvature", *_POSITIVE))
             raise ValueError(f"{what} must be of {words}, only the first with a basis, got {item[1:]!r}")
         for name in unknown.rods:
             if (name, word) in seen:
