@@ -218,7 +218,7 @@ def _joint_step(solutions: dict[int, FrameSolution], local: BoolArray, radius: f
     damping = 0.0
     while True:
         steps = _damped_step(solutions, local, damping)
-        if max(float(np.abs(step).max()) for step in steps.values()) <= radius:
+        if not max(float(np.abs(step).max()) for step in steps.values()) > radius:
             return steps
         damping = 3.0 * damping or 1e-9 * greatest
 
