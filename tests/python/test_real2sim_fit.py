@@ -337,7 +337,8 @@ def test_a_rod_that_is_free_to_spin_is_fitted():
     assert found.values[0, 0] == pytest.approx(3e6, rel=1e-4)
 
 
-def test_a_frame_without_equilibrium_says_so_and_the_others_are_fitted():
+@pytest.mark.parametrize("more", [[], [("arm", "youngs_modulus")]])
+def test_a_frame_without_equilibrium_says_so_and_the_others_are_fitted(more):
     simulation = arm()
     tags = drawn(simulation, [(0.0, 1.0), (0.0, 2.0)], [15, 30])
 
@@ -346,7 +347,7 @@ def test_a_frame_without_equilibrium_says_so_and_the_others_are_fitted():
         if frame == 0:
             raise withe.ConvergenceError("there is none")
 
-    found = fit(simulation, Tags(tags, names([15, 30])), ARM, conditions=conditions, progress=False)
+    found = fit(simulation, Tags(tags, names([15, 30])), [*ARM, *more], conditions=conditions, progress=False)
     assert list(found.converged) == [False, True]
     assert found.reasons == {0: "no equilibrium to begin with"}
     assert found.values[1, 0] == pytest.approx(2.0, abs=1e-6)

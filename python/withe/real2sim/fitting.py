@@ -115,12 +115,18 @@ def fit(
         if not stills.per_frame.all():
             bar.update(0)
             before = stills.solves
-            solutions |= all_frames(
-                stills, good, {f: solutions[f].coordinates for f in good}, goal, limit, lambda: bar.advance(1)
-            )
+            begin = {f: solutions[f].coordinates for f in good}
+            together = all_frames(stills, good, begin, goal, limit, lambda: bar.advance(1))
+            solutions = {f: together.get(f, _without(begin[f])) for f in good}
             for frame in good:
                 solves[frame] += (stills.solves - before) // len(good)
     return gather(stills, listed, solutions, solves, len(blank), listed[0].frames)
+
+
+def _without(coordinates: FloatArray) -> FrameSolution:
+    """A frame that has no equilibrium, or no derivatives there."""
+    empty = np.zeros((0, len(coordinates)))
+    return FrameSolution(coordinates, np.zeros(0), empty, 0, False, "no equilibrium to begin with")
 
 
 def _frame_by_frame(
