@@ -17,6 +17,7 @@ NAMES = (
     "newton_iteration",
     "sparse_solvers",
     "skips",
+    "settings",
     "parallel",
     "work_precision",
     "friction_precision",

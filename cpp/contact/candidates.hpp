@@ -48,6 +48,10 @@ class Candidates {
   /// What is within reach and half of its radii at q, sorted by key, whatever the candidates are; and all obstacles'
   /// pairs. Empty q: these alone.
   std::vector<ContactKey> near(const VectorX& q, const Bodies& bodies) const;
+  /// Coefficients of friction of the surfaces have changed.
+  void renew_friction() {
+    for (ContactPair& pair : pairs_) surfaces_.set_friction(pair);
+  }
   /// Without what was found before.
   void forget();
 

@@ -81,8 +81,15 @@ Contact::Contact(const Model& model) : surfaces_(model), candidates_(model, surf
 
 bool Contact::regularises() const { return frictional() && regularises_friction(problem_.model()); }
 
+void Contact::set_friction(const Parameters& parameters) {
+  if (surfaces_.set_friction(parameters)) candidates_.renew_friction();
+}
+
 void Contact::begin(const State& state, const Parameters& parameters, double duration, Pressing pressing) {
-  if (parameters_.version != parameters.version) parameters_ = ContactParameters(surfaces_, parameters);
+  if (parameters_.version != parameters.version) {
+    set_friction(parameters);
+    parameters_ = ContactParameters(surfaces_, parameters);
+  }
   problem_.pressing = pressing;
   restart(state, duration);
 }

@@ -55,6 +55,8 @@ class Contact {
   /// Whether an obstacle would pass through a rod on its way through this step.
   bool blocked() const { return blocked_; }
 
+  /// Takes over coefficients of friction, for read-outs before the next step.
+  void set_friction(const Parameters& parameters);
   /// A step begins at `state`, which must outlive it. `duration`: the time in which slip happens [s].
   void begin(const State& state, const Parameters& parameters, double duration, Pressing pressing);
   /// Finds what touches at q1.

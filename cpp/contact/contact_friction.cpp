@@ -16,7 +16,7 @@ constexpr double kShortWay = 0.1;
 
 /// K / (2 dt), over the slip tolerance [1/m].
 double slip_rate(const ContactProblem& problem, double regularisation) {
-  return 7.5 / (regularisation * problem.description().slip_tolerance * problem.duration);
+  return 7.5 / (regularisation * problem.parameters->slip_tolerance * problem.duration);
 }
 
 FrictionSetting friction_setting(const ContactProblem& problem, const Touching& t, double regularisation,

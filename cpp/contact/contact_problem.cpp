@@ -5,7 +5,7 @@
 
 namespace withe {
 ContactParameters::ContactParameters(const Surfaces& surfaces, const Parameters& parameters)
-    : version(parameters.version), gravity(parameters.gravity.norm()) {
+    : version(parameters.version), gravity(parameters.gravity.norm()), slip_tolerance(parameters.slip_tolerance) {
   const Model& model = surfaces.model();
   const double given = model.description.contact.stiffness;
   least_stiffness.setConstant(static_cast<Eigen::Index>(model.description.rods.size()), given);

@@ -63,9 +63,10 @@ struct ContactParameters {
   ContactParameters(const Surfaces& surfaces, const Parameters& parameters);
 
   long version = -1;
-  double gravity = 0;       ///< [m/s^2]
-  VectorX edge_mass;        ///< [kg]
-  VectorX least_stiffness;  ///< per rod, that of no contact of which is less [N/m]
+  double gravity = 0;         ///< [m/s^2]
+  double slip_tolerance = 0;  ///< nu [m/s]
+  VectorX edge_mass;          ///< [kg]
+  VectorX least_stiffness;    ///< per rod, that of no contact of which is less [N/m]
 };
 
 struct ContactProblem {

@@ -51,7 +51,7 @@ double distance_before(const ContactProblem& problem, const Touching& t) {
 
 double rest_speed(const ContactProblem& problem, const ContactPair& pair) {
   return std::max(std::sqrt(problem.parameters->gravity * kDepth * pair.small_radius()),
-                  problem.description().slip_tolerance);
+                  problem.parameters->slip_tolerance);
 }
 
 double least_approach(const ContactProblem& problem, const ContactPair& pair) {

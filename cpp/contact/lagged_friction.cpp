@@ -57,7 +57,7 @@ void set_direction(const ContactProblem& problem, const ContactPair& pair, Lagge
   for (int i = 0; i < kContactUnknowns; ++i) u += velocity[i] * lagged.column(i);
   const double speed = std::sqrt(dot(u, u));
   if (speed > 0.0) lagged.direction = (1.0 / speed) * u;
-  lagged.pressing *= std::tanh(7.5 * speed / problem.description().slip_tolerance);
+  lagged.pressing *= std::tanh(7.5 * speed / problem.parameters->slip_tolerance);
 }
 
 /// How far the surfaces have slipped, with J of the start.

@@ -37,6 +37,11 @@ bool comes_before(const ContactKey& a, const ContactKey& b) {
 
 Surfaces::Surfaces(const Model& model) : model_(model) {
   const ContactDescription& contact = model.description.contact;
+  Parameters drawn;
+  withe::set_friction(contact, drawn);
+  friction_ = drawn.friction;
+  obstacle_friction_ = drawn.obstacle_friction;
+  pair_friction_ = drawn.pair_friction;
   for (const RodDescription& rod : model.description.rods)
     for (Eigen::Index e = 0; e < rod.rest_lengths.size(); ++e)
       radius_.push_back(rod.contact_radius.size() > 0 ? rod.contact_radius(e) : 0.0);
@@ -47,10 +52,37 @@ Surfaces::Surfaces(const Model& model) : model_(model) {
     find_neighbours();
   }
   add_obstacles();
+  note_frictional();
+}
+
+void Surfaces::note_frictional() {
+  const bool rods = model_.description.contact.rods;
+  frictional_ = rods && (friction_ > 0.0 || (pair_friction_.col(0).array() > 0.0).any());
   for (const ContactPair& p : obstacle_pairs_) frictional_ = frictional_ || p.friction > 0.0;
-  if (!contact.rods) return;
-  frictional_ = frictional_ || contact.friction > 0.0;
-  for (const ContactPairDescription& p : contact.pairs) frictional_ = frictional_ || p.friction > 0.0;
+}
+
+bool Surfaces::set_friction(const Parameters& p) {
+  const auto same = [](const MatrixX2& a, const MatrixX2& b) { return a.rows() == b.rows() && a == b; };
+  if (friction_ == p.friction && same(obstacle_friction_, p.obstacle_friction) && same(pair_friction_, p.pair_friction))
+    return false;
+  friction_ = p.friction;
+  obstacle_friction_ = p.obstacle_friction;
+  pair_friction_ = p.pair_friction;
+  for (ContactPair& pair : obstacle_pairs_) set_friction(pair);
+  note_frictional();
+  return true;
+}
+
+void Surfaces::set_friction(ContactPair& pair) const {
+  const bool obstacle = pair.key.b < 0;
+  const int other = obstacle ? pair.key.b : pair.rod_b;
+  const Eigen::Index row = -1 - pair.key.b;
+  pair.set_friction(obstacle ? obstacle_friction_(row, 0) : friction_,
+                    obstacle ? obstacle_friction_(row, 1) : friction_);
+  const auto& pairs = model_.description.contact.pairs;
+  for (Eigen::Index i = 0; i < pair_friction_.rows(); ++i)
+    if (pairs[static_cast<std::size_t>(i)].is_of(pair.rod_a, other) && pair_friction_(i, 0) >= 0.0)
+      pair.set_friction(pair_friction_(i, 0), pair_friction_(i, 1));
 }
 
 double Surfaces::tolerance(int edge) const {
@@ -61,9 +93,8 @@ double Surfaces::tolerance(int edge) const {
 bool Surfaces::set_own(int first, int second, ContactPair& pair) const {
   bool touches = true;
   for (const ContactPairDescription& p : model_.description.contact.pairs)
-    if ((p.first == first && p.second == second) || (p.first == second && p.second == first)) {
+    if (p.is_of(first, second)) {
       touches = !p.ignored;
-      if (p.friction >= 0.0) pair.set_friction(p.friction, p.across >= 0.0 ? p.across : p.friction);
       pair.stiffness = p.stiffness;
       if (p.restitution >= 0.0) pair.restitution = p.restitution;
     }
@@ -127,9 +158,9 @@ ContactPair Surfaces::pair(int a, int b) const {
   p.tolerance = std::min(tolerance(a), tolerance(b));
   p.weight_a = parallel_weight(model_.edge_length(a), p.radii());
   p.weight_b = parallel_weight(model_.edge_length(b), p.radii());
-  p.friction = model_.description.contact.friction;
   p.restitution = model_.description.contact.restitution;
   set_own(p.rod_a, p.rod_b, p);
+  set_friction(p);
   return p;
 }
 
@@ -145,12 +176,10 @@ void Surfaces::add_obstacles() {
     const auto row = static_cast<Eigen::Index>(o);
     for (int rod = 0; rod < static_cast<int>(model_.description.rods.size()); ++rod) {
       p.rod_a = rod;
-      p.set_friction(contact.obstacle_friction(row), contact.obstacle_across.size() > 0
-                                                         ? contact.obstacle_across(row)
-                                                         : contact.obstacle_friction(row));
       p.restitution = contact.obstacle_restitution.size() > 0 ? contact.obstacle_restitution(row) : 1.0;
       p.stiffness = 0.0;
       if (!set_own(rod, p.key.b, p)) continue;
+      set_friction(p);
       add_edges(p, obstacles_.back());
       add_pieces(p, obstacles_.back(), rod);
     }

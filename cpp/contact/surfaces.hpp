@@ -66,6 +66,10 @@ class Surfaces {
   bool may_touch(int a, int b) const;
   ContactPair pair(int a, int b) const;
   double greatest_reach() const { return greatest_reach_; }
+  /// Takes over coefficients that are not those there are; whether there were any.
+  bool set_friction(const Parameters& parameters);
+  /// Gives a pair the coefficients of its bodies.
+  void set_friction(ContactPair& pair) const;
   /// Whether friction is there at all.
   bool frictional() const { return frictional_; }
   /// Unknowns of two surfaces, -1 where there is none; angles where there is friction.
@@ -74,6 +78,7 @@ class Surfaces {
 
  private:
   void find_neighbours();
+  void note_frictional();
   void add_obstacles();
   /// Pairs of an obstacle with straight edges, and with the pieces of curves between others.
   void add_edges(const ContactPair& prototype, const Obstacle& obstacle);
@@ -91,6 +96,8 @@ class Surfaces {
   std::vector<Obstacle> obstacles_;
   std::vector<ContactPair> obstacle_pairs_;
   double greatest_reach_ = 0;
+  double friction_ = 0;  ///< coefficients, as in `Parameters`
+  MatrixX2 obstacle_friction_, pair_friction_;
   bool frictional_ = false;
 };
 

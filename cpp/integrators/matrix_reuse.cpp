@@ -50,6 +50,12 @@ void MatrixReuse::note_matrix(bool whole) {
   record_.owner = allowed_ && whole ? &equations_ : nullptr;
   record_.interval = interval_;
   record_.generation = equations_.assembler().generation();
+  record_.factorized = true;
+}
+
+void MatrixReuse::note_spare_matrix() {
+  note_matrix();
+  record_.factorized = false;
 }
 
 void MatrixReuse::note_end(int iterations) { record_.slow = age_ == MatrixAge::across && iterations >= kCostOfMatrix; }

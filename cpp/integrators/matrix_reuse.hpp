@@ -26,6 +26,7 @@ struct MatrixHistory {
 struct MatrixRecord : MatrixHistory {
   const Equations* owner = nullptr;  ///< nothing: not to be used again
   int generation = 0;                ///< of the solver
+  bool factorized = true;            ///< false: the matrix in the solver is newer than its factorisation
 
   bool belongs_to(const Equations& equations, double h) const { return owner == &equations && interval == std::abs(h); }
 };
@@ -40,6 +41,8 @@ class MatrixReuse {
 
   /// Whether the coming iteration makes a matrix.
   bool fresh() const { return fresh_; }
+  /// Whether the one before it has to be factorised: it was made for an iteration that was not needed.
+  bool pending() const { return !fresh_ && !record_.factorized; }
   /// Whether the solution is so near that the residual alone may show the end, and a matrix be made in vain.
   bool near_end() const;
   /// Whether it is within the tolerance, by what is known of the matrix.
@@ -51,6 +54,10 @@ class MatrixReuse {
 
   /// A matrix was factorised; `whole`: all of the Jacobian, so that it may serve again.
   void note_matrix(bool whole = true);
+  /// A matrix was made and the solve ended. It serves the next one, not the factorisation of one before it: what lasts
+  /// from step to step is then a function of the matrix alone.
+  void note_spare_matrix();
+  void note_factorized() { record_.factorized = true; }
   /// After a step: learns how well matrices serve, and decides about the next one.
   void note_step(double length);
   void note_end(int iterations);

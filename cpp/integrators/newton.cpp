@@ -107,10 +107,12 @@ class Newton::Solve {
       const Verdict verdict = look();
       if (verdict == Verdict::go_on && iterate()) continue;
       result_.converged = verdict == Verdict::converged;
-      if (result_.converged)
+      if (result_.converged) {
+        if (spare_matrix_) reuse_.note_spare_matrix();
         reuse_.note_end(result_.iterations);
-      else
+      } else {
         reuse_.drop();
+      }
       work_.contact.friction.clear();
       return result_;
     }
@@ -123,6 +125,7 @@ class Newton::Solve {
 
   void evaluate(bool matrix) {
     system_.evaluate(z_, matrix, mixed_ && axial_known_ ? work_.axial_force.data() : nullptr);
+    spare_matrix_ = matrix;
   }
 
   /// Evaluates, where the search has not done so, with what the coming iteration wants; and judges.
@@ -152,9 +155,10 @@ class Newton::Solve {
   /// Takes a step; false where there is none, or none that may lead to the solution.
   bool iterate() {
     ++work_.counters.iterations;
-    if (reuse_.fresh()) {
+    if (reuse_.fresh() || reuse_.pending()) {
       if (!system_.factorize()) return false;
-      reuse_.note_matrix();
+      reuse_.fresh() ? reuse_.note_matrix() : reuse_.note_factorized();
+      spare_matrix_ = false;
     }
     if (search_.solved() && !reuse_.fresh())
       work_.step.swap(work_.next_step);
@@ -201,6 +205,7 @@ class Newton::Solve {
   bool line_search_, mixed_;
   MatrixReuse reuse_;
   bool axial_known_;
+  bool spare_matrix_ = false;  ///< made since the last factorisation
   NewtonResult result_;
   Balance balance_;
   double first_residual_ = 0.0;

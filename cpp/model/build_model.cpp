@@ -97,6 +97,7 @@ class Builder {
     model_.edge_count = static_cast<int>(lengths.size());
     model_.edge_length = to_vector(lengths);
     model_.edge_arc = to_vector(arcs);
+    for (std::size_t r = 0; r < scene_.rods.size(); ++r) model_.rod_voronoi.push_back(voronoi_of(static_cast<int>(r)));
     model_.length_scale = longest;
     if (!model_.planar()) return;
     for (std::size_t r = 0; r < scene_.rods.size(); ++r) {
@@ -104,6 +105,17 @@ class Builder {
       const Vector3& n = model_.plane->normal;
       model_.planar_components.emplace_back(f.col(1).dot(n), -f.col(0).dot(n));
     }
+  }
+
+  /// Half of both edges of every stencil of a rod.
+  VectorX voronoi_of(int index) const {
+    const auto r = static_cast<std::size_t>(index);
+    const int first = model_.rod_first_edge[r], edges = model_.rod_first_edge[r + 1] - first;
+    const VectorX arcs = model_.edge_arc.segment(first, edges);
+    if (!scene_.rods[r].closed) return 0.5 * (arcs.head(edges - 1) + arcs.tail(edges - 1));
+    VectorX out(edges);
+    for (int e = 0; e < edges; ++e) out(e) = 0.5 * (arcs((e + edges - 1) % edges) + arcs(e));
+    return out;
   }
 
   void find_clusters() {
@@ -228,6 +240,7 @@ class Builder {
       return far == (sign > 0) ? model_.edge_tail[i] : model_.edge_head[i];
     };
     model_.bend.push_back({{e0, e1}, {end(e0, true, s0), end(e0, false, s0), end(e1, false, s1)}, {s0, s1}});
+    if (owner.first < 0) model_.bend_across.push_back(static_cast<int>(model_.bend.size()) - 1);
     model_.bend_owner.push_back(owner);
     bend_voronoi_.push_back(0.5 * (model_.edge_arc(e0) + model_.edge_arc(e1)));
     offsets_keep_drawn_.push_back(keep_drawn);

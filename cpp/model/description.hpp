@@ -155,6 +155,8 @@ struct ContactPairDescription {
   double across = -1;    ///< of a rod and an obstacle, across the rod [-]; negative: as `friction` says
   double stiffness = 0;  ///< [N/m]; 0: that of the scene
   double restitution = -1;  ///< coefficient [-]; negative: that of the scene
+
+  bool is_of(int a, int b) const { return (first == a && second == b) || (first == b && second == a); }
 };
 
 struct ContactDescription {

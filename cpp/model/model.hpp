@@ -2,6 +2,7 @@
 /// The scene as flat arrays: everything that is decided once, in `build`, and the parameters that may be
 /// changed while it runs. Built by `build_model`; immutable but for `Parameters`.
 
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -84,7 +85,8 @@ struct Support {
   int first_constraint = 0;
 };
 
-/// Numbers that may change while running; one entry per edge, stencil or node.
+/// Numbers that may change while running; one entry per edge, stencil or node. What users set of them has names in
+/// parameter_index.hpp.
 struct Parameters {
   VectorX edge_stretch;  ///< EA [N]
   MatrixX2 edge_bend;    ///< EI1, EI2 [N m^2]
@@ -92,9 +94,13 @@ struct Parameters {
   VectorX edge_density, edge_rotary, edge_viscous_time, edge_drag;
   VectorX added_mass;
   Vector3 gravity;
-  double fluid_viscosity = 0;                                    ///< [Pa s]
-  std::vector<MatrixX2> natural_curvature;                       ///< per rod and stencil, smooth [1/m]
-  std::vector<VectorX> natural_twist;                            ///< per rod and stencil [rad/m]
+  double fluid_viscosity = 0;               ///< [Pa s]
+  std::vector<MatrixX2> natural_curvature;  ///< per rod and stencil, smooth [1/m]
+  std::vector<VectorX> natural_twist;       ///< per rod and stencil [rad/m]
+  double friction = 0;                      ///< between rods [-]
+  double slip_tolerance = 1e-3;             ///< nu [m/s]
+  MatrixX2 obstacle_friction;               ///< per obstacle, along and across rods [-]
+  MatrixX2 pair_friction;                   ///< per pair of bodies, likewise; negative: that of the scene [-]
   VectorX spring_stiffness, spring_rest_length, spring_damping;  ///< per spring [N/m], [m], [N s/m]
   BendMeasure measure;
   bool lumped = false;       ///< whether masses sit at nodes alone; see mass_matrix.hpp
@@ -129,6 +135,7 @@ struct Model {
   std::vector<int> reversed_bend;  ///< stencils with an edge against its rod
   std::vector<FrameStencil> half;
   VectorX bend_voronoi, half_voronoi;  ///< [m]
+  std::vector<VectorX> rod_voronoi;    ///< [rod](stencil), of the whole stencil, wherever its curvature is [m]
   MatrixX2 bend_share;                 ///< per stencil: the part of each of its edges whose bending it carries; 1/2,
   VectorX half_share;                  ///< but 5/12 at a frame and 7/12 at the edge's other end; see build_model.cpp
   std::vector<Hinge> hinges;
@@ -138,6 +145,7 @@ struct Model {
   // Drawn values that only joints of form `pairs`, and rods joined at an angle, have.
   MatrixX3 bend_offset;  ///< per stencil: discrete strains that the drawing adds to the natural ones
   std::vector<std::pair<int, int>> bend_owner;  ///< (rod, stencil), or (-1, -1) across rods
+  std::vector<int> bend_across;                 ///< stencils across rods
   std::vector<std::pair<int, int>> half_owner;  ///< (rod, nearest stencil); (rod, -1) where the rod has none
 
   // Layout of the unknowns.
@@ -162,14 +170,17 @@ struct Model {
 Model build_model(const SceneDescription& description, std::optional<bool> planar);
 /// Parameters as described, derived ones included.
 Parameters initial_parameters(const Model& model);
+/// Friction as described; update_derived must follow.
+void set_friction(const ContactDescription& contact, Parameters& parameters);
 /// Stiffnesses, densities, viscous time and drag of one rod, from one value an edge; update_derived must follow.
 void set_rod(const Model& model, int rod, const RodDescription& description, Parameters& parameters);
 /// Stiffness, rest length and damping of one spring, which must be finite and not negative.
 void set_spring(int spring, const SpringDescription& description, Parameters& parameters);
 /// Masses, stencil stiffnesses and discrete natural strains from the rest.
 void update_derived(const Model& model, Parameters& parameters);
-/// Only the discrete natural strains.
+/// Only the discrete natural strains; those of one rod.
 void update_natural(const Model& model, Parameters& parameters);
+void update_natural(const Model& model, Parameters& parameters, int rod);
 
 /// The plane that holds the whole scene, or nothing (with the reason). A straight scene has one only when `asked`: that
 /// of its first director.
@@ -191,5 +202,11 @@ ArcOfStencil arc_of_half(const Model& model, Eigen::Index stencil);
 Vector2 discrete_curvature(const Vector2& smooth, double voronoi);
 /// Its inverse.
 Vector2 smooth_curvature(const Vector2& discrete, double voronoi);
+/// Of stencils, one a row [1/m].
+MatrixX2 smooth_curvatures(const MatrixX2& discrete, const VectorX& voronoi);
+/// Refuses smooth curvatures, a row a stencil or one for all, that turn a rod by pi or more at a node;
+/// std::invalid_argument says where, and of what: `owner`.
+void check_turns(const Eigen::Map<const MatrixX>& smooth, const VectorX& voronoi,
+                 const std::function<std::string()>& owner);
 
 }  // namespace withe

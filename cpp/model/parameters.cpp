@@ -1,13 +1,14 @@
 #include <atomic>
 #include <cmath>
 #include <numbers>
+#include <optional>
 
 #include "common/check.hpp"
-#include "model/model.hpp"
+#include "common/text.hpp"
+#include "model/parameter_index.hpp"
 #include "model/stencil_numbers.hpp"
 
 namespace withe {
-
 namespace {
 
 void require_turn(const Vector2& smooth, double voronoi) {
@@ -54,6 +55,24 @@ Vector2 smooth_curvature(const Vector2& discrete, double voronoi) {
   return (2.0 * std::atan(0.5 * k) / (k * voronoi)) * discrete;
 }
 
+MatrixX2 smooth_curvatures(const MatrixX2& discrete, const VectorX& voronoi) {
+  MatrixX2 out(discrete.rows(), 2);
+  for (Eigen::Index i = 0; i < out.rows(); ++i) out.row(i) = smooth_curvature(discrete.row(i), voronoi(i));
+  return out;
+}
+
+void check_turns(const Eigen::Map<const MatrixX>& smooth, const VectorX& voronoi,
+                 const std::function<std::string()>& owner) {
+  const Eigen::Index step = smooth.rows() == voronoi.size() ? 1 : 0;
+  for (Eigen::Index i = 0; i < voronoi.size(); ++i) {
+    const double* k = smooth.data() + 2 * step * i;
+    const double square = (k[0] * k[0] + k[1] * k[1]) * voronoi(i) * voronoi(i);
+    if (square < std::numbers::pi * std::numbers::pi) continue;
+    require(false, owner() + " must turn the rod by less than pi at every node, got " + text(std::sqrt(square)) +
+                       " rad at stencil " + std::to_string(i) + ": use more nodes");
+  }
+}
+
 void set_rod(const Model& model, int rod, const RodDescription& description, Parameters& p) {
   const auto r = static_cast<std::size_t>(rod);
   const int first = model.rod_first_edge[r], count = model.rod_first_edge[r + 1] - first;
@@ -73,6 +92,19 @@ void set_spring(int spring, const SpringDescription& d, Parameters& p) {
   p.spring_stiffness[spring] = d.stiffness;
   p.spring_rest_length[spring] = d.rest_length;
   p.spring_damping[spring] = d.damping;
+}
+
+void set_friction(const ContactDescription& contact, Parameters& p) {
+  p.friction = contact.friction;
+  p.slip_tolerance = contact.slip_tolerance;
+  p.obstacle_friction.resize(contact.obstacle_friction.size(), 2);
+  p.obstacle_friction.col(0) = contact.obstacle_friction;
+  p.obstacle_friction.col(1) = contact.obstacle_across.size() > 0 ? contact.obstacle_across : contact.obstacle_friction;
+  p.pair_friction.resize(static_cast<Eigen::Index>(contact.pairs.size()), 2);
+  for (Eigen::Index i = 0; i < p.pair_friction.rows(); ++i) {
+    const ContactPairDescription& pair = contact.pairs[static_cast<std::size_t>(i)];
+    p.pair_friction.row(i) << pair.friction, pair.across >= 0.0 ? pair.across : pair.friction;
+  }
 }
 
 Parameters initial_parameters(const Model& model) {
@@ -95,107 +127,233 @@ Parameters initial_parameters(const Model& model) {
   p.added_mass = scene.added_mass;
   p.gravity = scene.gravity;
   p.fluid_viscosity = scene.fluid.viscosity;
+  set_friction(scene.contact, p);
   if (scene.bending == Bending::tangent) p.measure = {0.0, 0.0};
   update_derived(model, p);
   return p;
 }
 
-void update_natural(const Model& model, Parameters& p) {
+namespace {
+
+void note_change(Parameters& p) {
   static std::atomic<long> versions{0};
   p.version = ++versions;
-  const bool planar = model.planar();
-  const auto strain = [&](int rod, int stencil, double voronoi) -> Vector3 {
-    if (rod < 0 || stencil < 0) return Vector3::Zero();
-    const auto r = static_cast<std::size_t>(rod);
-    const Vector2 k = p.natural_curvature[r].row(stencil);
-    require_turn(k, voronoi);
-    const Vec3d out = natural_strain(p.measure, k(0), k(1), p.natural_twist[r](stencil), voronoi);
-    if (planar) return {model.planar_components[r].dot(Vector2(out.x, out.y)), 0.0, 0.0};
-    return {out.x, out.y, out.z};
-  };
-  p.bend_natural = model.bend_offset;
-  for (std::size_t r = 0; r < model.place.size(); ++r)
-    for (std::size_t s = 0; s < model.place[r].size(); ++s) {
-      const StencilPlace& place = model.place[r][s];
-      if (place.bend >= 0)
-        p.bend_natural.row(place.bend) +=
-            strain(static_cast<int>(r), static_cast<int>(s), model.bend_voronoi(place.bend));
-    }
-  // Stencils across two rods: each rod's nearest natural strain over its half of the length.
-  for (std::size_t b = 0; b < model.bend.size(); ++b) {
-    if (model.bend_owner[b].first >= 0) continue;
-    for (int i = 0; i < 2; ++i) {
-      const int edge = model.bend[b].edge[i];
-      const int rod = model.edge_rod[static_cast<std::size_t>(edge)];
-      const int stencils = static_cast<int>(p.natural_twist[static_cast<std::size_t>(rod)].size());
-      if (stencils == 0 || model.bend_owner[b].second < -1) continue;
-      const int nearest = edge == model.rod_first_edge[static_cast<std::size_t>(rod)] ? 0 : stencils - 1;
-      p.bend_natural.row(static_cast<Eigen::Index>(b)) += strain(rod, nearest, 0.5 * model.edge_arc(edge));
-    }
-  }
-  p.half_natural.resize(static_cast<Eigen::Index>(model.half.size()), 3);
-  for (std::size_t h = 0; h < model.half.size(); ++h)
-    p.half_natural.row(static_cast<Eigen::Index>(h)) =
-        strain(model.half_owner[h].first, model.half_owner[h].second, model.half_voronoi(static_cast<Eigen::Index>(h)));
 }
 
-void update_derived(const Model& model, Parameters& p) {
-  const auto at = [](int i) { return static_cast<Eigen::Index>(i); };
+/// Discrete natural strains of one rod's stencils.
+class NaturalStrain {
+ public:
+  NaturalStrain(const Model& model, const Parameters& p, int rod)
+      : curvature_(p.natural_curvature[at(rod)]),
+        twist_(p.natural_twist[at(rod)]),
+        measure_(p.measure),
+        plane_(model.planar() ? std::optional(model.planar_components[at(rod)]) : std::nullopt) {}
+
+  int stencils() const { return static_cast<int>(twist_.size()); }
+
+  Vector3 operator()(int stencil, double voronoi) const {
+    require_turn(curvature_.row(stencil), voronoi);
+    const Vec3d strain =
+        natural_strain(measure_, curvature_(stencil, 0), curvature_(stencil, 1), twist_(stencil), voronoi);
+    if (plane_) return {plane_->dot(Vector2(strain.x, strain.y)), 0.0, 0.0};
+    return {strain.x, strain.y, strain.z};
+  }
+
+ private:
+  const MatrixX2& curvature_;
+  const VectorX& twist_;
+  BendMeasure measure_;
+  std::optional<Vector2> plane_;
+};
+
+/// Of a stencil across two rods: each rod's nearest natural strain over its half of the length.
+void update_natural_across(const Model& model, Parameters& p, int stencil) {
+  p.bend_natural.row(stencil) = model.bend_offset.row(stencil);
+  for (const int edge : model.bend[at(stencil)].edge) {
+    const int rod = model.edge_rod[at(edge)];
+    const NaturalStrain strain(model, p, rod);
+    if (strain.stencils() == 0 || model.bend_owner[at(stencil)].second < -1) continue;
+    const int nearest = edge == model.rod_first_edge[at(rod)] ? 0 : strain.stencils() - 1;
+    p.bend_natural.row(stencil) += strain(nearest, 0.5 * model.edge_arc(edge));
+  }
+}
+
+/// What edges give their nodes, and frames that they are attached to.
+void update_masses(const Model& model, Parameters& p) {
   p.node_mass = p.added_mass;
   p.node_drag = VectorX::Zero(model.node_count);
   p.edge_inertia.resize(model.edge_count);
   for (int e = 0; e < model.edge_count; ++e) {
     const double half = 0.5 * model.edge_arc(e);
-    for (int node : {model.edge_tail[static_cast<std::size_t>(e)], model.edge_head[static_cast<std::size_t>(e)]}) {
+    for (int node : {model.edge_tail[at(e)], model.edge_head[at(e)]}) {
       p.node_mass(node) += half * p.edge_density(e);
       p.node_drag(node) += half * p.edge_drag(e);
     }
     p.edge_inertia(e) = model.edge_arc(e) * p.edge_rotary(e);
   }
   p.dragged = (p.node_drag.array() != 0.0).any();
-  p.viscous = (p.edge_viscous_time.array() != 0.0).any();
-
-  // In a plane the one bending stiffness stands in the first column.
-  const auto bend_of = [&](int e) -> Vector2 {
-    if (!model.planar()) return p.edge_bend.row(e);
-    const Vector2 c = model.planar_components[static_cast<std::size_t>(model.edge_rod[static_cast<std::size_t>(e)])];
-    const Vector2 b = p.edge_bend.row(e);
-    return Vector2(c(0) * c(0) * b(0) + c(1) * c(1) * b(1), 0.0);
-  };
-  const auto twist_stiffness = [&](double twist, const Vector2& bend, const ArcOfStencil& arc) {
-    if (!arc.turns || twist == 0.0 || bend.minCoeff() <= 0.0) return twist;
-    return twist_of_arc(twist, bend(0), bend(1), arc.square_of_turn, arc.share);
-  };
-  const auto n = static_cast<Eigen::Index>(model.bend.size());
-  p.bend_stiffness.resize(n, 3);
-  p.bend_viscous_time.resize(n);
-  for (Eigen::Index i = 0; i < n; ++i) {
-    const BendStencil& s = model.bend[static_cast<std::size_t>(i)];
-    const int a = s.edge[0], b = s.edge[1];
-    const double la = model.edge_arc(a), lb = model.edge_arc(b);
-    const Vector2 ba = bend_of(a), bb = bend_of(b);
-    const double va = model.bend_share(i, 0) * la, vb = model.bend_share(i, 1) * lb;
-    const Vector2 bending(in_series(ba(0), va, bb(0), vb), in_series(ba(1), va, bb(1), vb));
-    const double twist = in_series(p.edge_twist(a), 0.5 * la, p.edge_twist(b), 0.5 * lb);
-    p.bend_stiffness.row(i) << bending.transpose(), twist_stiffness(twist, bending, arc_of_bend(model, i));
-    p.bend_viscous_time(i) = (la * p.edge_viscous_time(a) + lb * p.edge_viscous_time(b)) / (la + lb);
-  }
-  const auto m = static_cast<Eigen::Index>(model.half.size());
-  p.half_stiffness.resize(m, 3);
-  p.half_viscous_time.resize(m);
   p.frame_inertia = VectorX::Zero(model.frame_count);
-  p.hinge_inertia = VectorX::Zero(at(static_cast<int>(model.hinges.size())));
-  for (Eigen::Index i = 0; i < m; ++i) {
-    const FrameStencil& s = model.half[static_cast<std::size_t>(i)];
-    const Vector2 bending = bend_of(s.edge) / (model.half_share(i) * model.edge_arc(s.edge));
-    const double twist = p.edge_twist(s.edge) / model.half_voronoi(i);
-    p.half_stiffness.row(i) << bending.transpose(), twist_stiffness(twist, bending, arc_of_half(model, i));
-    p.half_viscous_time(i) = p.edge_viscous_time(s.edge);
-    // A frame carries the rotary inertia of the half edges attached to it.
+  p.hinge_inertia = VectorX::Zero(static_cast<Eigen::Index>(model.hinges.size()));
+  // A frame carries the rotary inertia of the half edges attached to it.
+  for (const FrameStencil& s : model.half) {
     (s.hinge < 0 ? p.frame_inertia(s.frame) : p.hinge_inertia(s.hinge)) += 0.5 * p.edge_inertia(s.edge);
     if (s.hinge >= 0) p.frame_inertia(s.frame) += 0.5 * p.edge_inertia(s.edge);
   }
+}
+
+void update_viscous_times(const Model& model, Parameters& p) {
+  p.viscous = (p.edge_viscous_time.array() != 0.0).any();
+  p.bend_viscous_time.resize(static_cast<Eigen::Index>(model.bend.size()));
+  for (Eigen::Index i = 0; i < p.bend_viscous_time.size(); ++i) {
+    const auto& [a, b] = model.bend[static_cast<std::size_t>(i)].edge;
+    const double la = model.edge_arc(a), lb = model.edge_arc(b);
+    p.bend_viscous_time(i) = (la * p.edge_viscous_time(a) + lb * p.edge_viscous_time(b)) / (la + lb);
+  }
+  p.half_viscous_time.resize(static_cast<Eigen::Index>(model.half.size()));
+  for (Eigen::Index i = 0; i < p.half_viscous_time.size(); ++i)
+    p.half_viscous_time(i) = p.edge_viscous_time(model.half[static_cast<std::size_t>(i)].edge);
+}
+
+/// In a plane the one bending stiffness stands in the first column.
+Vector2 bend_of(const Model& model, const Parameters& p, int edge) {
+  const Vector2 b = p.edge_bend.row(edge);
+  if (!model.planar()) return b;
+  const Vector2 c = model.planar_components[at(model.edge_rod[at(edge)])];
+  return {c(0) * c(0) * b(0) + c(1) * c(1) * b(1), 0.0};
+}
+
+/// `square`: of what the arc turns by [rad^2].
+double twist_stiffness(const Model& model, double twist, const Vector2& bend, std::pair<int, int> owner,
+                       double square) {
+  const ArcOfStencil arc = arc_of(model, owner, square);
+  if (!arc.turns || twist == 0.0 || bend.minCoeff() <= 0.0) return twist;
+  return twist_of_arc(twist, bend(0), bend(1), arc.square_of_turn, arc.share);
+}
+
+/// Stiffness of bend stencils: two parts of edges in series, V / K = V0 / K0 + V1 / K1. The part of an edge that the
+/// stencil before it ended with is kept, since divisions are most of the work.
+class BendStiffness {
+ public:
+  BendStiffness(const Model& model, const Parameters& p) : model_(model), p_(p) {}
+
+  Vector3 operator()(int stencil) {
+    const auto& [a, b] = model_.bend[at(stencil)].edge;
+    const double share_a = model_.bend_share(stencil, 0), share_b = model_.bend_share(stencil, 1);
+    const Part before = a == edge_ && share_a == share_ ? part_ : part(a, share_a);
+    edge_ = b;
+    share_ = share_b;
+    part_ = part(b, share_b);
+    const Vector2 bending(1.0 / (before.bend1 + part_.bend1), 1.0 / (before.bend2 + part_.bend2));
+    const double twist = 1.0 / (before.twist + part_.twist), square = 0.5 * (before.square + part_.square);
+    return {bending(0), bending(1), twist_stiffness(model_, twist, bending, model_.bend_owner[at(stencil)], square)};
+  }
+
+ private:
+  /// V / K of a share of an edge, in twisting always of half of it; square of the edge's turn.
+  struct Part {
+    double bend1, bend2, twist, square;
+  };
+  Part part(int edge, double share) const {
+    const double length = model_.edge_arc(edge), chord = model_.edge_length(edge), bent = share * length;
+    const Vector2 k = bend_of(model_, p_, edge);
+    return {bent / k(0), bent / k(1), 0.5 * length / p_.edge_twist(edge),
+            length == chord ? 0.0 : square_of_turn(chord, length)};
+  }
+
+  const Model& model_;
+  const Parameters& p_;
+  int edge_ = -1;
+  double share_ = 0;
+  Part part_{};
+};
+
+void update_half_stiffness(const Model& model, Parameters& p, int half) {
+  const int edge = model.half[at(half)].edge;
+  const Vector2 bending = bend_of(model, p, edge) / (model.half_share(half) * model.edge_arc(edge));
+  const double twist = p.edge_twist(edge) / model.half_voronoi(half);
+  const double square = 0.25 * square_of_turn(model.edge_length(edge), model.edge_arc(edge));
+  p.half_stiffness.row(half) << bending.transpose(),
+      twist_stiffness(model, twist, bending, model.half_owner[at(half)], square);
+}
+
+/// Calls `own(row of a bend stencil, its stencil of the rod)` for those of a rod, `across(row)` for those across it
+/// and another one.
+template <class Own, class Across>
+void for_stencils_of(const Model& model, int rod, const Own& own, const Across& across) {
+  const auto& places = model.place[at(rod)];
+  for (std::size_t s = 0; s < places.size(); ++s)
+    if (places[s].bend >= 0) own(places[s].bend, static_cast<int>(s));
+  for (const int b : model.bend_across) {
+    const auto& edge = model.bend[at(b)].edge;
+    if (model.edge_rod[at(edge[0])] == rod || model.edge_rod[at(edge[1])] == rod) across(b);
+  }
+}
+
+void update_stiffness_of(const Model& model, Parameters& p, int rod) {
+  BendStiffness stiffness(model, p);
+  const auto update = [&](int b) { p.bend_stiffness.row(b) = stiffness(b); };
+  for_stencils_of(model, rod, [&](int b, int) { update(b); }, update);
+  for (int h = 0; h < static_cast<int>(model.half.size()); ++h)
+    if (model.edge_rod[at(model.half[at(h)].edge)] == rod) update_half_stiffness(model, p, h);
+}
+
+void update_natural_of(const Model& model, Parameters& p, int rod) {
+  const NaturalStrain strain(model, p, rod);
+  for_stencils_of(
+      model, rod,
+      [&](int b, int s) {
+        p.bend_natural.row(b) = model.bend_offset.row(b) + strain(s, model.bend_voronoi(b)).transpose();
+      },
+      [&](int b) { update_natural_across(model, p, b); });
+  for (int h = 0; h < static_cast<int>(model.half.size()); ++h) {
+    const auto& [owner, stencil] = model.half_owner[at(h)];
+    if (owner == rod && stencil >= 0) p.half_natural.row(h) = strain(stencil, model.half_voronoi(h));
+  }
+}
+
+}  // namespace
+
+void update_natural(const Model& model, Parameters& p) {
+  note_change(p);
+  p.bend_natural = model.bend_offset;
+  p.half_natural.setZero(static_cast<Eigen::Index>(model.half.size()), 3);
+  for (int r = 0; r < static_cast<int>(model.place.size()); ++r) update_natural_of(model, p, r);
+}
+
+void update_natural(const Model& model, Parameters& p, int rod) {
+  note_change(p);
+  update_natural_of(model, p, rod);
+}
+
+void update_derived(const Model& model, Parameters& p) {
+  update_masses(model, p);
+  update_viscous_times(model, p);
+  p.bend_stiffness.resize(static_cast<Eigen::Index>(model.bend.size()), 3);
+  p.half_stiffness.resize(static_cast<Eigen::Index>(model.half.size()), 3);
+  BendStiffness stiffness(model, p);
+  for (int b = 0; b < static_cast<int>(model.bend.size()); ++b) p.bend_stiffness.row(b) = stiffness(b);
+  for (int h = 0; h < static_cast<int>(model.half.size()); ++h) update_half_stiffness(model, p, h);
   update_natural(model, p);
+}
+
+void update_derived(const Model& model, Derived derived, int rod, Parameters& p) {
+  switch (derived) {
+    case Derived::stiffness:
+      update_stiffness_of(model, p, rod);
+      break;
+    case Derived::masses:
+      update_masses(model, p);
+      break;
+    case Derived::viscous_times:
+      update_viscous_times(model, p);
+      break;
+    case Derived::natural_strains:
+      update_natural_of(model, p, rod);
+      break;
+    case Derived::nothing:
+      break;
+  }
+  note_change(p);
 }
 
 }  // namespace withe

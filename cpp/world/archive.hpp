@@ -28,6 +28,12 @@ class Writer {
     (*this)(static_cast<std::int64_t>(m.cols()));
     raw(m.data(), static_cast<std::size_t>(m.size()) * sizeof(double));
   }
+  template <class Matrix>
+  void operator()(const Eigen::Map<Matrix>& m) {
+    (*this)(static_cast<std::int64_t>(m.rows()));
+    (*this)(static_cast<std::int64_t>(m.cols()));
+    raw(m.data(), static_cast<std::size_t>(m.size()) * sizeof(double));
+  }
   void operator()(const std::vector<double>& numbers) {
     (*this)(static_cast<std::int64_t>(numbers.size()));
     raw(numbers.data(), numbers.size() * sizeof(double));
@@ -57,6 +63,14 @@ class Reader {
   /// Sizes must be those that the matrix has already.
   template <class Derived>
   void operator()(Eigen::PlainObjectBase<Derived>& m) {
+    std::int64_t rows = 0, columns = 0;
+    (*this)(rows);
+    (*this)(columns);
+    require(rows == m.rows() && columns == m.cols(), "snapshot belongs to another scene: sizes differ");
+    raw(m.data(), static_cast<std::size_t>(m.size()) * sizeof(double));
+  }
+  template <class Matrix>
+  void operator()(Eigen::Map<Matrix>& m) {
     std::int64_t rows = 0, columns = 0;
     (*this)(rows);
     (*this)(columns);

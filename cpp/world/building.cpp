@@ -102,6 +102,7 @@ void World::Implementation::listen() {
 
 /// Builds the model for the present supports and plane; a running state is carried over.
 void World::Implementation::rebuild(Rebuild why) {
+  account_for_settings();
   SceneDescription active = description;
   // Released supports keep their row until another takes it, but hold nothing.
   std::vector<bool> released(description.supports.size(), false);
@@ -164,15 +165,15 @@ void World::Implementation::rebuild(Rebuild why) {
       kept = Moving{};
     }
     // Frames that come and go carry inertia, and a support may change where the mass of edges sits.
-    EnergyScratch& scratch = energy_scratch;
-    set_mass(old, parameters, scratch.mass);
-    const double before = kinetic_energy(old, scratch.mass, from.v);
+    MassMatrix mass;
+    set_mass(old, parameters, mass);
+    const double before = kinetic_energy(old, mass, from.v);
     update_derived(model, parameters);
     newton = std::make_unique<Newton>(model, options);
     equations = std::make_unique<Equations>(model, equation_options(options));
     relax_frames(is_new);
-    set_mass(model, parameters, scratch.mass);
-    support_work += kinetic_energy(model, scratch.mass, state.v) - before;
+    set_mass(model, parameters, mass);
+    support_work += kinetic_energy(model, mass, state.v) - before;
   }
   newton = std::make_unique<Newton>(model, options);
   equations = std::make_unique<Equations>(model, equation_options(options));

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <limits>
 #include <string>
+#include <utility>
 
 #include "common/text.hpp"
 #include "steps/spring_forces.hpp"
@@ -16,13 +17,13 @@ constexpr double kMostGain = 1e-3;
 
 /// Of a part of each node's mass, part(node).
 template <class Part>
-double gravity_energy(const Model& model, const Parameters& p, const VectorX& q, const Part& part) {
-  Vector3 g = p.gravity;
-  if (model.planar()) g << p.gravity.dot(model.plane->first), p.gravity.dot(model.plane->second), 0.0;
+double gravity_energy(const Model& model, const EnergyCoefficients& k, const VectorX& q, const Part& part) {
+  Vector3 g = k.gravity;
+  if (model.planar()) g << k.gravity.dot(model.plane->first), k.gravity.dot(model.plane->second), 0.0;
   double energy = 0.0;
   for (int i = 0; i < model.node_count; ++i) {
     const int dof = model.node_dof[at(i)];
-    for (int k = 0; k < model.dimension; ++k) energy -= part(i) * p.node_mass(i) * g(k) * q(dof + k);
+    for (int d = 0; d < model.dimension; ++d) energy -= part(i) * k.node_mass(i) * g(d) * q(dof + d);
   }
   return energy;
 }
@@ -38,38 +39,70 @@ BendTwistEnergy bend_twist_energy(const Model& model, const ElasticCoefficients&
   return sum;
 }
 
-}  // namespace
-
-/// What actuation changes at a state that stays: bending and twisting [J].
-double World::Implementation::actuation_energy() const {
-  compute_configuration(model, state, state.q, energy_scratch.configuration);
-  return actuation_energy_again();
+/// Kinetic, elastic and gravity's.
+Energy mechanical_energy(const Model& model, const EnergyCoefficients& k, const Configuration& c, const State& state) {
+  Energy e;
+  e.kinetic = kinetic_energy(model, k.mass, state.v);
+  for (int i = 0; i < model.edge_count; ++i) e.stretch += stretch_energy_of(model, k.elastic, c, i);
+  const BendTwistEnergy turned = bend_twist_energy(model, k.elastic, c);
+  e.bend = turned.bend;
+  e.twist = turned.twist;
+  e.gravity = gravity_energy(model, k, state.q, [](int) { return 1.0; });
+  return e;
 }
 
-/// The same of other parameters, at the state for which it has just been found.
-double World::Implementation::actuation_energy_again() const {
-  set_elastic(parameters, energy_scratch.elastic);
-  const BendTwistEnergy e = bend_twist_energy(model, energy_scratch.elastic, energy_scratch.configuration);
+}  // namespace
+
+void EnergyCoefficients::set(const Model& model, const Parameters& p) {
+  if (version == p.version) return;
+  version = p.version;
+  set_elastic(p, elastic);
+  set_mass(model, p, mass);
+  node_mass = p.node_mass;
+  gravity = p.gravity;
+}
+
+/// What ramps of natural shapes change at a state that stays: bending and twisting [J].
+double World::Implementation::actuation_energy() const {
+  auto& [c, k] = energy_scratch;
+  compute_configuration(model, state, state.q, c);
+  k.set(model, parameters);
+  const BendTwistEnergy e = bend_twist_energy(model, k.elastic, c);
   return e.bend + e.twist;
 }
 
+void World::Implementation::begin_setting() {
+  if (!newly_set) before_settings.set(model, parameters);
+  newly_set = true;
+}
+
+void World::Implementation::account_for_settings() {
+  if (!newly_set) return;
+  actuation_work += work_of_settings();
+  std::swap(before_settings, energy_scratch.coefficients);  // those of now, for what is set next
+  newly_set = false;
+}
+
+double World::Implementation::work_of_settings() const {
+  if (!newly_set) return 0.0;
+  auto& [c, now] = energy_scratch;
+  compute_configuration(model, state, state.q, c);
+  now.set(model, parameters);
+  const Energy a = mechanical_energy(model, before_settings, c, state), b = mechanical_energy(model, now, c, state);
+  return (b.kinetic - a.kinetic) + (b.stretch - a.stretch) + (b.bend - a.bend) + (b.twist - a.twist) +
+         (b.gravity - a.gravity);
+}
+
 Energy World::Implementation::energy() const {
-  return energy_of(state, load_work, support_work + actuation_work, dissipated);
+  return energy_of(state, load_work, support_work + (actuation_work + work_of_settings()), dissipated);
 }
 
 /// Energy of a state, with the work and the losses up to it.
 Energy World::Implementation::energy_of(const State& at, double loads, double work_done, double lost) const {
-  Energy e;
-  auto& [c, k, mass] = energy_scratch;
+  auto& [c, coefficients] = energy_scratch;
   compute_configuration(model, at, at.q, c);
-  set_elastic(parameters, k);
-  set_mass(model, parameters, mass);
-  e.kinetic = kinetic_energy(model, mass, at.v);
-  for (int i = 0; i < model.edge_count; ++i) e.stretch += stretch_energy_of(model, k, c, i);
-  const BendTwistEnergy turned = bend_twist_energy(model, k, c);
-  e.bend = turned.bend;
-  e.twist = turned.twist;
-  e.gravity = gravity_energy(model, parameters, at.q, [](int) { return 1.0; });
+  coefficients.set(model, parameters);
+  Energy e = mechanical_energy(model, coefficients, c, at);
   e.loads = -loads;
   if (const Contact* contact = equations->contact()) e.contact = contact->energy_of(at, parameters);
   e.spring = spring_energy(model, parameters, at.q);
@@ -81,10 +114,11 @@ Energy World::Implementation::energy_of(const State& at, double loads, double wo
 
 /// A node's part goes to the rods that meet there, by the masses of their half edges: what is added to it too.
 Energy World::Implementation::rod_energy(int rod) const {
-  auto& [c, k, mass] = energy_scratch;
+  auto& [c, coefficients] = energy_scratch;
   compute_configuration(model, state, state.q, c);
-  set_elastic(parameters, k);
-  set_mass(model, parameters, mass);
+  coefficients.set(model, parameters);
+  const ElasticCoefficients& k = coefficients.elastic;
+  const MassMatrix& mass = coefficients.mass;
   const int first = model.rod_first_edge.at(at(rod)), last = model.rod_first_edge.at(at(rod) + 1);
   const auto share_of = [&](int edge) { return first <= edge && edge < last ? 1.0 : 0.0; };
 
@@ -124,7 +158,7 @@ Energy World::Implementation::rod_energy(int rod) const {
     e.twist += share * turned.twist;
   }
   e.kinetic += 0.5 * part.cwiseProduct(mass.rows).dot(state.v.cwiseAbs2());
-  e.gravity = gravity_energy(model, parameters, state.q, [&](int node) { return mine(node) / all(node); });
+  e.gravity = gravity_energy(model, coefficients, state.q, [&](int node) { return mine(node) / all(node); });
   e.total = e.kinetic + e.stretch + e.bend + e.twist + e.gravity;
   return e;
 }

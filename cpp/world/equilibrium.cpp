@@ -80,6 +80,7 @@ bool World::Implementation::drifts(Equations& system) {
 
 /// Equilibrium after `dt` (0: at the present time, with supports and actuation as they are).
 EquilibriumResult World::Implementation::equilibrium(double dt) {
+  account_for_settings();
   const Moving before = *this;
   const Lagged lagged_before = lagged();
   const double time = state.time + dt;
@@ -160,7 +161,7 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
 }
 
 EquilibriumPath World::equilibrium_path(const PathOptions& wanted) {
-  Implementation& self = *implementation_;
+  Implementation& self = accounted();
   const Timer timer(self.statistics.total_time);
   for (int load : wanted.loads)
     require(load >= 0 && load < static_cast<int>(self.load_values.size()), "no such load: " + std::to_string(load));

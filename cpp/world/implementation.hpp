@@ -8,11 +8,21 @@
 
 namespace withe {
 
+/// What energies are made of besides the state, as parameters say.
+struct EnergyCoefficients {
+  ElasticCoefficients elastic;
+  MassMatrix mass;
+  VectorX node_mass;  ///< [kg]
+  Vector3 gravity;    ///< [m/s^2]
+  long version = -1;  ///< of the parameters
+
+  void set(const Model& model, const Parameters& parameters);
+};
+
 /// Scratch for energies.
 struct EnergyScratch {
   Configuration configuration;
-  ElasticCoefficients elastic;
-  MassMatrix mass;
+  EnergyCoefficients coefficients;
 };
 
 /// Why a model is built: at first, because supports changed or the plane was left, or to take a snapshot's state.
@@ -36,6 +46,9 @@ struct World::Implementation : Running {
   long taped = 0;                                         ///< its length at the start of a step that may be taken back
   StepWorkspace work;
   mutable EnergyScratch energy_scratch;
+  /// Before what was set since the state last moved; the work of that is found when it is asked for.
+  EnergyCoefficients before_settings;
+  bool newly_set = false;
   MatrixRecord marked_matrix;
   GuessHistory marked_guesses;
   StepControl marked_control;
@@ -97,9 +110,13 @@ struct World::Implementation : Running {
   void forget_motion();
 
   // prescribed.cpp
-  /// Gives a part of a natural shape another value, at once or over a time [s].
+  /// Leads a part of a natural shape to another value over a time [s].
   template <class Value>
-  void actuate(Ramp<Value>& ramp, Value& now, const Value& value, double over);
+  void begin_ramp(Ramp<Value>& ramp, const Value& now, const Value& value, double over);
+  void take_friction();
+  /// Leaves the plane of a planar scene where a parameter of the kind does.
+  void leave_plane_for(const ParameterSetting& setting);
+  void set(std::span<const ParameterSetting> settings);
   void apply_ramps(double time);
   void retire_ramps();
   bool actuated() const;
@@ -203,7 +220,11 @@ struct World::Implementation : Running {
   Energy rod_energy(int rod) const;
   Energy energy_of(const State& at, double loads, double work_done, double lost) const;
   double actuation_energy() const;
-  double actuation_energy_again() const;
+  /// To be called before parameters are set, and before the state moves or what is set is copied.
+  void begin_setting();
+  void account_for_settings();
+  /// What has been set since changed the energy of the present state by this [J].
+  double work_of_settings() const;
   bool gains_energy();
   bool contact_pumps(double dt);
   void begin_explicit();

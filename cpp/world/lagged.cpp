@@ -66,6 +66,7 @@ void World::Implementation::factorize_again(System which) {
   work.newton.counters = counters;
   work.newton.matrix.owner = &owner;
   work.newton.matrix.generation = owner.assembler().generation();
+  work.newton.matrix.factorized = true;
 }
 
 void World::Implementation::mark() {

@@ -38,7 +38,7 @@ void World::set_state(const std::vector<RodState>& rods, std::optional<double> t
   for (const RodState& rod : rods) check_shapes(implementation_->model, rod);
   require(!time || std::isfinite(*time), "time must be finite");
   // On a copy, so that what is refused changes nothing.
-  auto fresh = std::make_unique<Implementation>(*implementation_);
+  auto fresh = std::make_unique<Implementation>(accounted());
   fresh->recall(implementation_->lagged());
   fresh->take_callbacks(*implementation_);
   for (const RodState& rod : rods)

@@ -7,7 +7,7 @@
 namespace withe {
 namespace {
 
-constexpr std::uint64_t kMagic = 0x4153454854495755ull;
+constexpr std::uint64_t kMagic = 0x4153454854495756ull;
 
 /// FNV-1a.
 std::uint64_t hash_of(std::string_view bytes) {
@@ -58,6 +58,7 @@ std::vector<LoadDescription> read_added_loads(Reader& r, const SceneDescription&
 /// As it was set while running; where it was not, that of the drawing holds.
 void write_friction(Writer& w, const ContactDescription& contact) {
   w(contact.friction);
+  w(contact.slip_tolerance);
   w(contact.obstacle_friction);
   w(static_cast<std::int64_t>(contact.obstacle_across.size()));
   w(contact.obstacle_across);
@@ -71,6 +72,7 @@ void write_friction(Writer& w, const ContactDescription& contact) {
 /// What a snapshot knows of friction, for the contact of a scene.
 ContactDescription read_friction(Reader& r, ContactDescription contact) {
   r(contact.friction);
+  r(contact.slip_tolerance);
   r(contact.obstacle_friction);
   std::int64_t count = 0;
   r(count);
@@ -170,24 +172,24 @@ void exchange(Archive& io, std::optional<Energy>& energy) {
     io(*x);
 }
 
-/// What users may set; the rest follows from it.
+/// What users may set; the rest follows from it. Friction is that of the drawing where it was not set: see
+/// `write_friction`.
 template <class Archive>
-void exchange(Archive& io, Parameters& p) {
-  for (auto* v : {&p.edge_stretch, &p.edge_twist, &p.edge_density, &p.edge_rotary, &p.edge_viscous_time, &p.edge_drag,
-                  &p.added_mass, &p.spring_stiffness, &p.spring_rest_length, &p.spring_damping})
-    io(*v);
-  io(p.edge_bend);
-  io(p.gravity);
-  io(p.fluid_viscosity);
+void exchange(Archive& io, const Model& model, Parameters& p) {
+  for (const ParameterInfo& info : parameter_index()) {
+    if (info.of_contact()) continue;
+    for (int rod = 0; rod < (info.of_rod() ? static_cast<int>(model.place.size()) : 1); ++rod) {
+      ParameterView values = parameter_view(model, p, info.kind, rod);
+      io(values);
+    }
+  }
   io(p.held_lumped);
-  for (auto& m : p.natural_curvature) io(m);
-  for (auto& v : p.natural_twist) io(v);
 }
 
 template <class Archive>
-void exchange(Archive& io, Settings& settings) {
+void exchange(Archive& io, const Model& model, Settings& settings) {
   auto& [parameters, ramps, load_values, obstacle_motions] = settings;
-  exchange(io, parameters);
+  exchange(io, model, parameters);
   const auto exchange_ramp = [&](auto& ramp) {
     auto& [from, to, start, end, active] = ramp;
     io(from), io(to), io(start), io(end), io(active);
@@ -255,8 +257,8 @@ void exchange(Archive& io, Found& found) {
 }
 
 template <class Archive>
-void exchange(Archive& io, Running& running) {
-  exchange(io, static_cast<Settings&>(running));
+void exchange(Archive& io, const Model& model, Running& running) {
+  exchange(io, model, static_cast<Settings&>(running));
   exchange(io, static_cast<Moving&>(running));
   exchange(io, static_cast<StepControl&>(running));
   exchange(io, static_cast<Found&>(running));
@@ -365,7 +367,7 @@ void give_sizes(World::Implementation& self) {
 }  // namespace
 
 std::string World::snapshot() const {
-  Implementation& self = *implementation_;
+  Implementation& self = accounted();
   give_sizes(self);
   Writer w;
   w(kMagic);
@@ -387,7 +389,7 @@ std::string World::snapshot() const {
   const bool set = !same_friction(self.description.contact, self.drawn_contact);
   w(set);
   if (set) write_friction(w, self.description.contact);
-  exchange(w, static_cast<Running&>(self));
+  exchange(w, self.model, static_cast<Running&>(self));
   Lagged lagged = self.lagged();
   exchange(w, lagged);
   w(hash_of(w.bytes));
@@ -406,7 +408,7 @@ void World::restore(const std::string& bytes) {
   r(print);
   require(print == fingerprint(implementation_->description), "snapshot belongs to another scene");
   // Everything is read into a copy, so that a damaged file changes nothing.
-  auto fresh = std::make_unique<Implementation>(*implementation_);
+  auto fresh = std::make_unique<Implementation>(accounted());
   fresh->take_callbacks(*implementation_);
   bool spatial = false, obstacles_move = false;
   std::int64_t count = 0;
@@ -457,8 +459,8 @@ void World::restore(const std::string& bytes) {
   r(friction_set);
   const ContactDescription contact = friction_set ? read_friction(r, fresh->description.contact) : fresh->drawn_contact;
   if (!same_friction(contact, fresh->description.contact)) {
-    fresh->description.contact = fresh->model.description.contact = contact;
-    fresh->remake_equations();
+    fresh->description.contact = contact;
+    fresh->take_friction();
   }
   if (!same) {
     fresh->spatial = spatial;
@@ -471,7 +473,7 @@ void World::restore(const std::string& bytes) {
   }
   fresh->obstacle_motions.assign(obstacles_move ? fresh->state.obstacles.size() : 0, ObstacleMotion{});
   give_sizes(*fresh);
-  exchange(r, static_cast<Running&>(*fresh));
+  exchange(r, fresh->model, static_cast<Running&>(*fresh));
   Lagged lagged;
   exchange(r, lagged);
   r.expect_end();

@@ -23,6 +23,7 @@ constexpr int kResolutionPeriod = 64, kAlarmPeriod = 16;
 /// One time step of `duration`, in equal parts where it does not converge or is not accurate enough.
 void World::Implementation::advance(double duration) {
   const double base = state.time;
+  account_for_settings();
   if (options.integrator == Integrator::verlet && !alarm) begin_explicit();
   motions_before = motions;
   mark();

@@ -111,7 +111,8 @@ void World::prescribe_support(int support, const Vector3& position, const Matrix
   }
   if (self.options.integrator == Integrator::fourth_order && !self.parameters.held_lumped) {
     // Velocities of supports are known to second order: see mass_matrix.hpp.
-    MassMatrix& mass = self.energy_scratch.mass;
+    self.account_for_settings();
+    MassMatrix mass;
     set_mass(self.model, self.parameters, mass);
     self.support_work -= kinetic_energy(self.model, mass, self.state.v);
     self.parameters.held_lumped = true;

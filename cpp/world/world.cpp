@@ -26,10 +26,15 @@ int checked_spring(const Parameters& parameters, int spring) {
 
 World::World(SceneDescription description, Options options)
     : implementation_(std::make_unique<Implementation>(std::move(description), options)) {}
-World::World(const World& other) : implementation_(std::make_unique<Implementation>(*other.implementation_)) {
+World::World(const World& other) : implementation_(std::make_unique<Implementation>(other.accounted())) {
   implementation_->recall(other.implementation_->lagged());
 }
 World::~World() = default;
+
+World::Implementation& World::accounted() const {
+  implementation_->account_for_settings();
+  return *implementation_;
+}
 
 const SceneDescription& World::description() const { return implementation_->description; }
 const Options& World::options() const { return implementation_->options; }
@@ -173,129 +178,166 @@ void World::set_friction(const ContactDescription& contact) {
   require(std::isfinite(contact.friction) && contact.friction >= 0.0 && valid(contact.obstacle_friction) &&
               valid(contact.obstacle_across),
           "friction must not be negative");
+  require(std::isfinite(contact.slip_tolerance) && contact.slip_tolerance > 0.0, "slip_tolerance must be positive");
+  const auto energy = [&] {
+    const Contact* touching = self.equations->contact();
+    return touching ? touching->energy_of(self.state, self.parameters) : 0.0;
+  };
+  const double before = energy();
   own.friction = contact.friction;
+  own.slip_tolerance = contact.slip_tolerance;
   own.obstacle_friction = contact.obstacle_friction;
   own.obstacle_across = contact.obstacle_across;
   own.pairs = contact.pairs;
-  self.model.description.contact = own;
-  self.remake_equations();
+  self.take_friction();
+  // What anchors hold changes with the coefficients that they are made of.
+  self.actuation_work += energy() - before;
+}
+
+/// That of the description; the equations take another form only where friction comes or goes.
+void World::Implementation::take_friction() {
+  model.description.contact = description.contact;
+  withe::set_friction(description.contact, parameters);
+  update_derived(model, Derived::nothing, 0, parameters);
+  reaction_current = false;
+  state.acceleration_current = false;
+  plan_current = false;
+  bool remade = false;
+  for (const System which : kSystems) {
+    Equations* known = system(which);
+    if (!known || !known->contact()) continue;
+    const bool frictional = known->contact()->frictional();
+    known->contact()->set_friction(parameters);
+    remade = remade || known->contact()->frictional() != frictional;
+  }
+  if (remade) remake_equations();
 }
 
 template <class Value>
-void World::Implementation::actuate(Ramp<Value>& ramp, Value& now, const Value& value, double over) {
-  if (over == 0.0) {
-    const double before = actuation_energy();
-    ramp.active = false;
-    now = value;
-    update_natural(model, parameters);
-    actuation_work += actuation_energy_again() - before;
-  } else {
-    ramp = {now, value, state.time, state.time + over, true};
-  }
+void World::Implementation::begin_ramp(Ramp<Value>& ramp, const Value& now, const Value& value, double over) {
+  ramp = {now, value, state.time, state.time + over, true};
   reaction_current = false;
   state.acceleration_current = false;
 }
 
+void World::Implementation::leave_plane_for(const ParameterSetting& setting) {
+  if (!model.planar()) return;
+  const auto& [kind, rod, values] = setting;
+  const auto name = [&, r = rod] { return " of rod '" + description.rods[at(r)].name + "'"; };
+  if (kind == ParameterKind::natural_curvature) {
+    const Vector2 p = model.planar_components[at(rod)];
+    for (Eigen::Index i = 0; i < values.rows(); ++i)
+      if (std::abs(values(i, 0) * p(1) - values(i, 1) * p(0)) > 1e-8 * values.row(i).norm())
+        return leave_plane("natural curvature" + name());
+  } else if (kind == ParameterKind::natural_twist) {
+    if ((values.array() != 0.0).any()) leave_plane("natural twist" + name());
+  } else if (kind == ParameterKind::gravity) {
+    const Vector3 gravity = values.row(0);
+    if (std::abs(gravity.dot(model.plane->normal)) > 1e-8 * gravity.norm()) leave_plane("gravity");
+  }
+}
+
+/// All of them or, where one is refused, none.
+void World::Implementation::set(std::span<const ParameterSetting> settings) {
+  for (const ParameterSetting& setting : settings) {
+    check_setting(model, setting);
+    require(!info_of(setting.kind).of_contact(), "friction is set by set_friction");
+    require(setting.kind != ParameterKind::fluid_viscosity || description.fluid.model != FluidModel::none,
+            "the scene has no fluid");
+  }
+  if (options.integrator == Integrator::fourth_order) {
+    Parameters wanted = parameters;
+    set_parameters(model, settings, wanted);
+    check_reversible(wanted);
+  }
+  for (const ParameterSetting& setting : settings) leave_plane_for(setting);
+  for (const ParameterSetting& setting : settings) {
+    if (setting.kind == ParameterKind::natural_curvature) ramps[at(setting.rod)].curvature.active = false;
+    if (setting.kind == ParameterKind::natural_twist) ramps[at(setting.rod)].twist.active = false;
+  }
+  const bool set_before = newly_set;
+  begin_setting();
+  if (!set_parameters(model, settings, parameters)) {
+    newly_set = set_before;
+    return;
+  }
+  reaction_current = false;
+  state.acceleration_current = false;
+  plan_current = false;
+}
+
+void World::set(std::span<const ParameterSetting> settings) { implementation_->set(settings); }
+
+namespace {
+
+template <class Matrix>
+ParameterValues rows_of(const Matrix& m) {
+  return {m.data(), m.rows(), m.cols()};
+}
+
+}  // namespace
+
+MatrixX World::parameter(ParameterKind kind, int rod) const {
+  Implementation& self = *implementation_;
+  require(!info_of(kind).of_rod() || (rod >= 0 && rod < static_cast<int>(self.ramps.size())),
+          "no such rod: " + std::to_string(rod));
+  return parameter_view(self.model, self.parameters, kind, rod);
+}
+
 void World::set_natural_curvature(int rod, const MatrixX2& curvature, double over) {
   Implementation& self = *implementation_;
-  require(rod >= 0 && rod < static_cast<int>(self.ramps.size()), "no such rod: " + std::to_string(rod));
-  MatrixX2& now = self.parameters.natural_curvature[at(rod)];
-  require(curvature.rows() == now.rows(), "natural curvature needs one row a stencil, " + std::to_string(now.rows()) +
-                                              ", got " + std::to_string(curvature.rows()));
-  require(curvature.allFinite() && std::isfinite(over) && over >= 0.0, "natural curvature must be finite, over >= 0");
-  if (self.model.planar()) {
-    const Vector2 p = self.model.planar_components[at(rod)];
-    for (Eigen::Index i = 0; i < curvature.rows(); ++i)
-      if (std::abs(curvature(i, 0) * p(1) - curvature(i, 1) * p(0)) > 1e-8 * curvature.row(i).norm()) {
-        self.leave_plane("natural curvature of rod '" + self.description.rods[at(rod)].name + "'");
-        break;
-      }
-  }
-  for (std::size_t s = 0; s < self.model.place[at(rod)].size(); ++s) {
-    const auto row = static_cast<Eigen::Index>(s);
-    const int b = self.model.place[at(rod)][s].bend;
-    if (b >= 0) discrete_curvature(curvature.row(row), self.model.bend_voronoi(b));  // refuses a turn of pi
-  }
-  self.actuate(self.ramps[at(rod)].curvature, now, curvature, over);
+  require(std::isfinite(over) && over >= 0.0, "over must be finite and not negative");
+  const ParameterSetting setting{ParameterKind::natural_curvature, rod, rows_of(curvature)};
+  if (over == 0.0) return self.set({&setting, 1});
+  check_setting(self.model, setting);
+  self.leave_plane_for(setting);
+  const MatrixX2& now = self.parameters.natural_curvature[at(rod)];
+  const MatrixX2 target = curvature.rows() == now.rows() ? curvature : MatrixX2(curvature.replicate(now.rows(), 1));
+  self.begin_ramp(self.ramps[at(rod)].curvature, now, target, over);
 }
 
 void World::set_natural_twist(int rod, const VectorX& twist, double over) {
   Implementation& self = *implementation_;
-  require(rod >= 0 && rod < static_cast<int>(self.ramps.size()), "no such rod: " + std::to_string(rod));
-  require(twist.size() == self.parameters.natural_twist[at(rod)].size(), "natural twist needs one number a stencil");
-  require(twist.allFinite() && std::isfinite(over) && over >= 0.0, "natural twist must be finite, over >= 0");
-  if (self.model.planar() && (twist.array() != 0.0).any())
-    self.leave_plane("natural twist of rod '" + self.description.rods[at(rod)].name + "'");
-  self.actuate(self.ramps[at(rod)].twist, self.parameters.natural_twist[at(rod)], twist, over);
+  require(std::isfinite(over) && over >= 0.0, "over must be finite and not negative");
+  const ParameterSetting setting{ParameterKind::natural_twist, rod, rows_of(twist)};
+  if (over == 0.0) return self.set({&setting, 1});
+  check_setting(self.model, setting);
+  self.leave_plane_for(setting);
+  self.begin_ramp(self.ramps[at(rod)].twist, self.parameters.natural_twist[at(rod)], twist, over);
 }
 
 MatrixX2 World::natural_curvature(int rod) const { return implementation_->parameters.natural_curvature.at(at(rod)); }
 VectorX World::natural_twist(int rod) const { return implementation_->parameters.natural_twist.at(at(rod)); }
 
-void World::set_rod_parameters(int rod, const RodDescription& d) {
-  Implementation& self = *implementation_;
-  require(rod >= 0 && rod < static_cast<int>(self.ramps.size()), "no such rod: " + std::to_string(rod));
-  const int count = self.model.rod_first_edge[at(rod) + 1] - self.model.rod_first_edge[at(rod)];
-  for (const VectorX* v :
-       {&d.stretch_stiffness, &d.twist_stiffness, &d.line_density, &d.rotary_inertia, &d.viscous_time, &d.drag})
-    require(v->size() == count && v->allFinite(), "rod parameters need one finite number an edge");
-  require(d.bend_stiffness.rows() == count && d.bend_stiffness.allFinite(), "bend_stiffness needs one row an edge");
-  Parameters p = self.parameters;
-  set_rod(self.model, rod, d, p);
-  update_derived(self.model, p);
-  self.check_reversible(p);
-  const double before = self.actuation_energy();
-  self.parameters = std::move(p);
-  self.actuation_work += self.actuation_energy_again() - before;
-  self.reaction_current = false;
-  self.state.acceleration_current = false;
-  self.plan_current = false;
-}
-
 void World::set_added_mass(const VectorX& mass) {
-  Implementation& self = *implementation_;
-  require(mass.size() == self.model.node_count && mass.allFinite() && (mass.array() >= 0.0).all(),
-          "added mass needs one finite number >= 0 a node");
-  Parameters p = self.parameters;
-  p.added_mass = mass;
-  update_derived(self.model, p);
-  self.check_reversible(p);
-  self.parameters = std::move(p);
-  self.state.acceleration_current = false;
+  const ParameterSetting setting{ParameterKind::added_mass, 0, rows_of(mass)};
+  set({&setting, 1});
 }
 
 void World::set_gravity(const Vector3& gravity) {
-  Implementation& self = *implementation_;
-  require(gravity.allFinite(), "gravity must be finite");
-  if (self.model.planar() && std::abs(gravity.dot(self.model.plane->normal)) > 1e-8 * gravity.norm())
-    self.leave_plane("gravity");
-  self.parameters.gravity = gravity;
-  update_derived(self.model, self.parameters);
-  self.reaction_current = false;
-  self.state.acceleration_current = false;
+  const ParameterSetting setting{ParameterKind::gravity, 0, {gravity.data(), 1, 3}};
+  set({&setting, 1});
 }
 
 void World::set_fluid_viscosity(double viscosity) {
-  Implementation& self = *implementation_;
-  require(self.description.fluid.model != FluidModel::none, "the scene has no fluid");
-  require(std::isfinite(viscosity) && viscosity > 0.0,
-          "viscosity of the fluid must be positive and finite, got " + std::to_string(viscosity));
-  self.parameters.fluid_viscosity = viscosity;
-  update_derived(self.model, self.parameters);
-  self.state.acceleration_current = false;
+  const ParameterSetting setting{ParameterKind::fluid_viscosity, 0, {&viscosity, 1, 1}};
+  set({&setting, 1});
 }
 
 void World::set_spring(int spring, const SpringDescription& description) {
-  Implementation& self = *implementation_;
-  const double before = spring_energy(self.model, self.parameters, self.state.q);
-  Parameters p = self.parameters;
-  withe::set_spring(checked_spring(p, spring), description, p);
-  self.check_reversible(p);
-  update_natural(self.model, p);
-  self.parameters = std::move(p);
-  self.actuation_work += spring_energy(self.model, self.parameters, self.state.q) - before;
-  self.reaction_current = false;
-  self.state.acceleration_current = false;
+  const Parameters& p = implementation_->parameters;
+  const int s = checked_spring(p, spring);
+  VectorX stiffness = p.spring_stiffness, rest_length = p.spring_rest_length, damping = p.spring_damping;
+  stiffness[s] = description.stiffness;
+  rest_length[s] = description.rest_length;
+  damping[s] = description.damping;
+  const auto all = [](ParameterKind kind, const VectorX& values) -> ParameterSetting {
+    return {kind, 0, ParameterValues(values.data(), values.size(), 1)};
+  };
+  const ParameterSetting settings[] = {all(ParameterKind::spring_stiffness, stiffness),
+                                       all(ParameterKind::spring_rest_length, rest_length),
+                                       all(ParameterKind::spring_damping, damping)};
+  implementation_->set(settings);
 }
 
 SpringDescription World::spring(int spring) const {
@@ -309,6 +351,7 @@ void World::set_velocities(const MatrixX3& velocities) {
   Implementation& self = *implementation_;
   require(velocities.rows() == self.model.node_count, "velocities need one row a node");
   require(velocities.allFinite(), "velocities must be finite");
+  self.account_for_settings();
   if (self.model.planar()) {
     const VectorX off = velocities * self.model.plane->normal;
     if (off.cwiseAbs().maxCoeff() > 1e-9 * velocities.cwiseAbs().maxCoeff()) self.leave_plane("a velocity");

@@ -4,6 +4,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -13,7 +14,7 @@
 #include "forces/custom_forces.hpp"
 #include "gradients/tape.hpp"
 #include "integrators/options.hpp"
-#include "model/description.hpp"
+#include "model/parameter_index.hpp"
 
 namespace withe {
 
@@ -181,14 +182,15 @@ class World {
   Vector3 load(int load) const;
   int add_load(const LoadDescription& load);  ///< acts from now on; its index
   void remove_load(int load);                 ///< one put on while running; those after it move up by one
-  /// Ramped linearly over `over` seconds from now (0: at once).
+  /// Sets parameters by their index, all or, where one is refused, none. What this does to the energy at the present
+  /// state is work of actuation.
+  void set(std::span<const ParameterSetting> settings);
+  MatrixX parameter(ParameterKind kind, int rod = 0) const;  ///< present values
+  /// Ramped linearly over `over` seconds from now (0: at once); a row a stencil, or one for all.
   void set_natural_curvature(int rod, const MatrixX2& curvature, double over);
   void set_natural_twist(int rod, const VectorX& twist, double over);
   MatrixX2 natural_curvature(int rod) const;  ///< present value, of the smooth rod [1/m]
   VectorX natural_twist(int rod) const;       ///< [rad/m]
-  /// Replaces the parameters of a rod that may change while running: stiffnesses, line density, rotary
-  /// inertia, viscous time, drag. Shape, nodes and natural shape are ignored.
-  void set_rod_parameters(int rod, const RodDescription& parameters);
   void set_added_mass(const VectorX& mass);
   void set_gravity(const Vector3& gravity);
   void set_fluid_viscosity(double viscosity);
@@ -215,7 +217,8 @@ class World {
   void prescribe_obstacle(int obstacle, const Vector3& position, const Vector3& turn);
   Vector3 obstacle_position(int obstacle) const;  ///< [m]
   Vector3 obstacle_turn(int obstacle) const;      ///< [rad]
-  /// Takes over the friction coefficients of a description of the same bodies, and pairs that it has besides.
+  /// Takes over the friction coefficients and the slip tolerance of a description of the same bodies, and pairs that it
+  /// has besides.
   void set_friction(const ContactDescription& contact);
 
   // Read-outs: copies.
@@ -257,6 +260,8 @@ class World {
   struct Implementation;
 
  private:
+  /// With the work of what was set accounted for: what goes on from here does so with the same bits.
+  Implementation& accounted() const;
   std::unique_ptr<Implementation> implementation_;
 };
 

@@ -2,7 +2,7 @@
 #include <pybind11/stl.h>
 
 #include "bindings.hpp"
-#include "model/description.hpp"
+#include "model/model.hpp"
 
 namespace withe::bindings {
 namespace {
@@ -171,6 +171,17 @@ void register_model(py::module_& module) {
       .def_readwrite("custom_moments", &SceneDescription::custom_moments)
       .def_readwrite("contact", &SceneDescription::contact)
       .def_readwrite("fluid", &SceneDescription::fluid);
+  module.def(
+      "smooth_curvatures", &smooth_curvatures, py::arg("discrete"), py::arg("voronoi"),
+      "Curvatures [1/m] of the smooth rod that turns by the same angles as discrete ones 2 tan(phi / 2), a row a "
+      "stencil.");
+  module.def(
+      "check_turns",
+      [](const MatrixX2& smooth, const VectorX& voronoi, const std::string& owner) {
+        check_turns({smooth.data(), smooth.rows(), 2}, voronoi, [&] { return owner; });
+      },
+      py::arg("smooth"), py::arg("voronoi"), py::arg("owner"),
+      "Refuse curvatures [1/m] that turn a rod by pi or more at a node.");
 }
 
 }  // namespace withe::bindings

@@ -138,6 +138,23 @@ void register_exceptions(py::module_& module) {
 
 using WorldClass = py::class_<GuardedWorld>;
 
+void set_parameters(World& world, int rod, const py::dict& values) {
+  using Array = py::array_t<double, py::array::c_style | py::array::forcecast>;
+  std::vector<Array> arrays;
+  std::vector<ParameterSetting> settings;
+  for (const auto& [name, value] : values) {
+    const ParameterInfo& info = parameter_named(name.cast<std::string_view>());
+    const Array& array = arrays.emplace_back(py::reinterpret_borrow<py::object>(value));
+    const auto size = [&](int axis) { return static_cast<Eigen::Index>(array.shape(axis)); };
+    // One row where there is one axis, unless each row is a number.
+    const bool table = array.ndim() == 2, list = array.ndim() == 1 && info.columns == 1;
+    const Eigen::Index rows = table || list ? size(0) : 1;
+    const Eigen::Index columns = table ? size(1) : list ? 1 : static_cast<Eigen::Index>(array.size());
+    settings.push_back({info.kind, rod, {array.data(), rows, columns}});
+  }
+  world.set(settings);
+}
+
 void define_steps(WorldClass& world) {
   world.def(
       "step",
@@ -205,11 +222,15 @@ void define_parameters(WorldClass& world) {
       "natural_twist", [](const GuardedWorld& self, int rod) { return self.reading().natural_twist(rod); },
       py::arg("rod"));
   world.def(
-      "set_rod_parameters",
-      [](GuardedWorld& self, int rod, const RodDescription& parameters) {
-        self.changing().set_rod_parameters(rod, parameters);
+      "set", [](GuardedWorld& self, int rod, const py::dict& values) { set_parameters(self.changing(), rod, values); },
+      py::arg("rod"), py::arg("values"),
+      "Set parameters by their names, those of edges and stencils of a rod: all, or where one is refused none.");
+  world.def(
+      "parameter",
+      [](const GuardedWorld& self, const std::string& name, int rod) {
+        return self.reading().parameter(parameter_named(name).kind, rod);
       },
-      py::arg("rod"), py::arg("parameters"));
+      py::arg("name"), py::arg("rod") = 0, "Present values, a row an edge, stencil or node.");
   world.def(
       "set_added_mass", [](GuardedWorld& self, const VectorX& mass) { self.changing().set_added_mass(mass); },
       py::arg("mass"));

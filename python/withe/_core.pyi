@@ -15,15 +15,18 @@ __all__: list[str] = [
     "ContactTable",
     "ConvergenceFailure",
     "Energy",
+    "EquilibriumGradient",
     "EquilibriumPath",
     "EquilibriumResult",
     "FluidDescription",
     "JointDescription",
     "Linearisation",
     "LoadDescription",
+    "MomentAdjoint",
     "Momentum",
     "ObstacleDescription",
     "Options",
+    "ParameterGradient",
     "PathPoint",
     "Plan",
     "Reaction",
@@ -31,14 +34,18 @@ __all__: list[str] = [
     "RodDescription",
     "RodPass",
     "RodState",
+    "RunGradient",
     "SceneDescription",
     "SpringDescription",
     "Statistics",
     "SupportDescription",
+    "Tape",
     "World",
+    "check_turns",
     "close_and_open",
     "foreground_mask",
     "hsv_mask",
+    "smooth_curvatures",
     "thin",
     "trace_lines",
 ]
@@ -456,6 +463,85 @@ class Options:
     @tolerance.setter
     def tolerance(self, arg0: typing.SupportsFloat | typing.SupportsIndex | None) -> None: ...
 
+class ParameterGradient:
+    """
+    Derivatives of a scalar by the numbers that act.
+    """
+    @property
+    def added_mass(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+    @property
+    def bend_stiffness(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 2]"]: ...
+    @property
+    def drag(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+    @property
+    def gravity(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]: ...
+    @property
+    def line_density(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+    @property
+    def loads(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
+    @property
+    def natural_curvature(self) -> list[typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 2]"]]: ...
+    @property
+    def natural_twist(self) -> list[typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]]: ...
+    @property
+    def rotary_inertia(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+    @property
+    def spring_damping(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+    @property
+    def spring_rest_length(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+    @property
+    def spring_stiffness(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+    @property
+    def stretch_stiffness(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+    @property
+    def twist_stiffness(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+    @property
+    def viscous_time(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+
+class EquilibriumGradient:
+    """
+    Derivatives of a scalar of an equilibrium.
+    """
+    @property
+    def parameters(self) -> ParameterGradient: ...
+    @property
+    def support_positions(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
+    @property
+    def support_rotations(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
+
+class RunGradient:
+    """
+    Derivatives of a scalar of a run.
+    """
+    @property
+    def initial_positions(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
+    @property
+    def initial_velocities(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
+    @property
+    def parameters(self) -> ParameterGradient: ...
+
+class MomentAdjoint:
+    """
+    What a scalar depends on after so many steps of a run.
+    """
+    def __init__(
+        self,
+        steps: typing.SupportsInt | typing.SupportsIndex,
+        positions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
+        velocities: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
+    ) -> None: ...
+
+class Tape:
+    """
+    A run as the adjoint method needs it.
+    """
+    def gradient(self, moments: collections.abc.Sequence[MomentAdjoint]) -> RunGradient: ...
+    @property
+    def count(self) -> int:
+        """
+        Steps taken.
+        """
+
 class RodState:
     """
     What a rod is to be like; what is empty stays as it is.
@@ -683,6 +769,9 @@ class World:
         """
         Find the static equilibrium.
         """
+    def equilibrium_gradients(
+        self, by_positions: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"]]
+    ) -> list[EquilibriumGradient]: ...
     def equilibrium_path(
         self,
         loads: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex],
@@ -727,6 +816,12 @@ class World:
     def obstacle_turn(
         self, obstacle: typing.SupportsInt | typing.SupportsIndex
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]: ...
+    def parameter(
+        self, name: str, rod: typing.SupportsInt | typing.SupportsIndex = 0
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        Present values, a row an edge, stencil or node.
+        """
     def positions(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
     def prescribe_obstacle(
         self,
@@ -748,6 +843,10 @@ class World:
         Go back to a snapshot.
         """
     def rod_energy(self, rod: typing.SupportsInt | typing.SupportsIndex) -> Energy: ...
+    def set(self, rod: typing.SupportsInt | typing.SupportsIndex, values: dict) -> None:
+        """
+        Set parameters by their names, those of edges and stencils of a rod: all, or where one is refused none.
+        """
     def set_added_mass(self, mass: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> None: ...
     def set_fluid_viscosity(self, viscosity: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
     def set_friction(self, contact: ContactDescription) -> None: ...
@@ -769,9 +868,6 @@ class World:
         twist: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
         over: typing.SupportsFloat | typing.SupportsIndex,
     ) -> None: ...
-    def set_rod_parameters(
-        self, rod: typing.SupportsInt | typing.SupportsIndex, parameters: RodDescription
-    ) -> None: ...
     def set_spring(self, spring: typing.SupportsInt | typing.SupportsIndex, parameters: SpringDescription) -> None: ...
     def set_state(
         self, rods: collections.abc.Sequence[RodState], time: typing.SupportsFloat | typing.SupportsIndex | None
@@ -789,10 +885,12 @@ class World:
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
     def spring(self, spring: typing.SupportsInt | typing.SupportsIndex) -> SpringDescription: ...
     def spring_tension(self, spring: typing.SupportsInt | typing.SupportsIndex) -> float: ...
+    def start_tape(self) -> Tape: ...
     def step(self, count: typing.SupportsInt | typing.SupportsIndex, callback: typing.Any, forces: typing.Any) -> None:
         """
         Advance exactly `count` time steps.
         """
+    def stop_tape(self) -> None: ...
     def support_position(
         self, support: typing.SupportsInt | typing.SupportsIndex
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]: ...
@@ -817,6 +915,15 @@ class World:
     @property
     def time(self) -> float: ...
 
+def check_turns(
+    smooth: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 2]"],
+    voronoi: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    owner: str,
+) -> None:
+    """
+    Refuse curvatures [1/m] that turn a rod by pi or more at a node.
+    """
+
 def close_and_open(mask: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8]) -> numpy.typing.NDArray[numpy.uint8]:
     """
     Closing, then opening, by a square of 3 x 3 pixels.
@@ -840,6 +947,14 @@ def hsv_mask(
 ) -> numpy.typing.NDArray[numpy.uint8]:
     """
     Pixels whose colour is in a range.
+    """
+
+def smooth_curvatures(
+    discrete: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 2]"],
+    voronoi: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 2]"]:
+    """
+    Curvatures [1/m] of the smooth rod that turns by the same angles as discrete ones 2 tan(phi / 2), a row a stencil.
     """
 
 def thin(mask: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8]) -> numpy.typing.NDArray[numpy.uint8]:

@@ -30,6 +30,7 @@ def run(name, folder, *arguments):
         "ablation",
         "conservation",
         "skips",
+        "settings",
         "parallel",
         "contact",
         "contact_robustness",

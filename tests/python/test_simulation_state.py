@@ -262,3 +262,32 @@ def test_a_snapshot_without_friction_starts_a_scene_that_has_some():
     assert rough.get("floor 1", "friction") == 0.5
     rough.restore(after)
     assert rough.get("floor 1", "friction") == 0.2
+
+
+def pinned_pair():
+    """Without gravity, so that twist decays until steps find next to nothing to solve."""
+    scene = withe.Scene(gravity=(0, 0, 0))
+    soft = withe.Material(youngs_modulus=1e6, poisson_ratio=0.5, density=1000.0, viscosity=100.0)
+    stiff = withe.Material(youngs_modulus=3e6, poisson_ratio=0.3, density=800.0)
+    a = scene.add_rod(start=(0, 0, 0.1), end=(0.2, 0, 0.1), nodes=8, radius=4e-3, material=soft, normal=(0, 0, 1))
+    b = scene.add_rod(start=(0.2, 0, 0.1), end=(0.2, 0.1, 0.2), nodes=6, radius=3e-3, material=stiff)
+    scene.join(a.end, b.start, "pinned")
+    scene.clamp(a.start, hold="edge")
+    scene.pin(b.end)
+    scene.add_drag(0.05, name="drag")
+    scene.add_floor(0.09, friction=0.3)
+    simulation = scene.build(integrator="backward_euler", time_step=2e-3)
+    simulation.set_natural_twist(b, 4.0)
+    return simulation
+
+
+def test_a_copy_takes_the_same_step_after_any_step():
+    simulation = pinned_pair()
+    for drag in (0.05, 0.13, 0.05):
+        simulation.set("drag", drag=drag)
+        for _ in range(8):
+            copy_of_it = simulation.copy()
+            copy_of_it.step()
+            simulation.step()
+            assert copy_of_it.positions().tobytes() == simulation.positions().tobytes()
+            assert copy_of_it.velocities().tobytes() == simulation.velocities().tobytes()

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from withe import _core
+
 __all__ = [
     "check_edges",
     "default_normal",
@@ -104,9 +106,7 @@ def smooth_curvature(discrete: FloatArray, voronoi: FloatArray) -> FloatArray:
     discrete : ndarray of shape (stencils, 2)
     voronoi : ndarray of shape (stencils,) [m]
     """
-    size = np.sqrt(np.sum(discrete**2, axis=-1))
-    safe = np.where(size > 0.0, size, 1.0)
-    return np.asarray(discrete * (2.0 * np.arctan(0.5 * size) / (safe * voronoi))[..., None], np.float64)
+    return np.asarray(_core.smooth_curvatures(discrete, voronoi))
 
 
 def natural_shape(

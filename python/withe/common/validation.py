@@ -148,6 +148,8 @@ def number_array(value: Any, what: str, *shapes: tuple[int | str, ...]) -> Float
         came = _shape(raw.shape) if raw.shape else "a single number"
         raise ValueError(f"{what} must have shape {wanted}, got {came}")
     result = np.array(raw, np.float64, order="C")
+    if np.vdot(result, result) <= _LARGEST**2:  # then each of them is in range; unlike `dot` it never warns
+        return result
     bad = ~np.isfinite(result)
     if bad.any():
         place = tuple(int(i) for i in np.argwhere(bad)[0])

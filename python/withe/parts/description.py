@@ -28,7 +28,7 @@ from withe.parts.parameters import RodParameters
 from withe.parts.springs import describe_springs
 from withe.parts.supports import held_rows
 
-__all__ = ["added_mass", "describe", "describe_load", "describe_support", "drag", "parameters_of", "rod_parameters"]
+__all__ = ["added_mass", "describe", "describe_load", "describe_support", "drag", "parameters_of"]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -92,13 +92,6 @@ def parameters_of(directory: Directory) -> list[RodParameters]:
         rod.parameters.changed("drag", drag(directory, coefficients, rod), rod.section, rod.owner)
         for rod in directory.all(RodPart)
     ]
-
-
-def rod_parameters(parameters: RodParameters) -> _core.RodDescription:
-    """A description that carries parameters only, for `set_rod_parameters`."""
-    description = _core.RodDescription()
-    _fill(description, parameters)
-    return description
 
 
 def describe_support(part: SupportPart) -> _core.SupportDescription:

@@ -28,6 +28,16 @@ ROD_WORDS = (
     "drag",
 )
 
+_ACTING = (
+    "stretch_stiffness",
+    "bend_stiffness",
+    "twist_stiffness",
+    "line_density",
+    "rotary_inertia",
+    "viscous_time",
+    "drag",
+)
+
 
 @dataclass(frozen=True)
 class RodParameters:
@@ -90,6 +100,10 @@ class RodParameters:
         ValueError
             An unknown word, a word of a material for a rod that has none, or a value out of range.
         """
+        return self.with_value(word, value, section, owner)._checked(owner)
+
+    def with_value(self, word: str, value: Any, section: SectionProperties, owner: str) -> RodParameters:
+        """The same for the engine, which refuses what follows from the value and has over- or underflowed."""
         if word not in ROD_WORDS:
             raise ValueError(f"a rod has no {word!r}; its words are {', '.join(ROD_WORDS)}")
         edges = len(section.area)
@@ -97,19 +111,24 @@ class RodParameters:
         if word in MATERIAL_WORDS and self.youngs_modulus is None:
             raise ValueError(f"{what} cannot be set: its stiffness was given directly, without a material")
         if word == "poisson_ratio":
-            return replace(self, poisson_ratio=check_poisson_ratio(value, what))._derived({}, section)._checked(owner)
+            return self._derived({word: check_poisson_ratio(value, what)}, section)
         if word == "bend_stiffness":
-            return replace(self, bend_stiffness=bend_stiffness(value, what, edges))._checked(owner)
+            return replace(self, bend_stiffness=bend_stiffness(value, what, edges))
         zero = word in ("viscosity", "viscous_time", "drag")
-        array = validation.per_item(value, what, edges, "edges", zero=zero)
         if word in MATERIAL_WORDS:
-            given = float(array[0]) if validation.is_scalar(value) else array
-            return self._derived({word: given}, section)._checked(owner)
+            if validation.is_scalar(value):
+                check = validation.non_negative if zero else validation.positive
+                return self._derived({word: check(value, what)}, section)
+            return self._derived({word: validation.per_item(value, what, edges, "edges", zero=zero)}, section)
+        array = validation.per_item(value, what, edges, "edges", zero=zero)
         if word == "line_density":
-            changed = replace(self, line_density=array, rotary_inertia=_rotary_inertia(array, section))
-            return changed._checked(owner)
+            return replace(self, line_density=array, rotary_inertia=_rotary_inertia(array, section))
         values: dict[str, Any] = {word: array}
-        return replace(self, **values)._checked(owner)
+        return replace(self, **values)
+
+    def acting(self, before: RodParameters) -> dict[str, FloatArray]:
+        """What the engine works with that is not what `before` has, by its names there."""
+        return {word: mine for word in _ACTING if (mine := getattr(self, word)) is not getattr(before, word)}
 
     def get(self, word: str) -> Any:
         """The present value of a word: a copy."""
@@ -149,23 +168,25 @@ class RodParameters:
 
     def _derived(self, given: dict[str, Any], section: SectionProperties) -> RodParameters:
         """With stiffness and inertia from the material, for the words that changed."""
-        known = replace(self, **given)
-        assert known.youngs_modulus is not None
-        assert known.poisson_ratio is not None
-        ones = np.ones(len(section.area))
         values: dict[str, Any] = dict(given)
+        modulus = given.get("youngs_modulus", self.youngs_modulus)
+        assert modulus is not None
         with np.errstate(over="ignore", invalid="ignore"):
-            if "density" in given and known.density is not None:
-                values["line_density"] = known.density * section.area
-                values["rotary_inertia"] = known.density * (section.moment1 + section.moment2)
-            modulus = known.youngs_modulus * ones
+            if "density" in given:
+                values["line_density"] = given["density"] * section.area
+                values["rotary_inertia"] = given["density"] * (section.moment1 + section.moment2)
             if "youngs_modulus" in given:
                 values["stretch_stiffness"] = modulus * section.area
-                values["bend_stiffness"] = np.stack([modulus * section.moment1, modulus * section.moment2], axis=1)
-            if "youngs_modulus" in given or not given:
-                values["twist_stiffness"] = modulus / (2.0 * (1.0 + known.poisson_ratio)) * section.torsion
-            if known.viscosity is not None and ("viscosity" in given or "youngs_modulus" in given):
-                values["viscous_time"] = known.viscosity * ones / known.youngs_modulus
+                per_edge = modulus[:, None] if isinstance(modulus, np.ndarray) else modulus
+                values["bend_stiffness"] = per_edge * section.moments
+            if "youngs_modulus" in given or "poisson_ratio" in given:
+                poisson = given.get("poisson_ratio", self.poisson_ratio)
+                assert poisson is not None
+                values["twist_stiffness"] = modulus / (2.0 * (1.0 + poisson)) * section.torsion
+            viscosity = given.get("viscosity", self.viscosity)
+            if viscosity is not None and ("viscosity" in given or "youngs_modulus" in given):
+                time = viscosity / modulus
+                values["viscous_time"] = np.full(len(section.area), time) if validation.is_scalar(time) else time
         return replace(self, **values)
 
     def _checked(self, owner: str) -> RodParameters:

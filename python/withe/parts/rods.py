@@ -7,13 +7,14 @@ from typing import Literal, get_args
 import numpy as np
 import numpy.typing as npt
 
+from withe import _core
 from withe.common import drawing, validation
 from withe.parts.kinds import RodPart
 from withe.parts.materials import Material, Stiffness
 from withe.parts.parameters import RodParameters
 from withe.parts.sections import Circle, Section, SectionProperties, check_section
 
-__all__ = ["Natural", "curvature_array", "make_rod", "twist_array"]
+__all__ = ["Natural", "curvature_array", "curvature_given", "make_rod", "twist_array"]
 
 FloatArray = npt.NDArray[np.float64]
 Natural = Literal["as_built", "straight"]
@@ -90,6 +91,11 @@ def make_rod(
     )
 
 
+def curvature_given(value: npt.ArrayLike, stencils: int, owner: str) -> FloatArray:
+    """Natural curvature as it was given: one pair for all stencils, of shape (2,), or one for each, (stencils, 2)."""
+    return validation.number_array(value, f"natural_curvature of {owner}", (2,), (stencils, 2))
+
+
 def curvature_array(value: npt.ArrayLike, voronoi: FloatArray, discrete: bool, owner: str) -> FloatArray:
     """Natural curvature as an array of shape (stencils, 2) [1/m], of the smooth rod.
 
@@ -98,18 +104,11 @@ def curvature_array(value: npt.ArrayLike, voronoi: FloatArray, discrete: bool, o
     ValueError
         Another shape, not finite, or a turn of pi or more at a node.
     """
-    what = f"natural_curvature of {owner}"
     stencils = len(voronoi)
-    given = np.broadcast_to(validation.number_array(value, what, (2,), (stencils, 2)), (stencils, 2))
+    given = np.broadcast_to(curvature_given(value, stencils, owner), (stencils, 2))
     if discrete:
         return drawing.smooth_curvature(given, voronoi)
-    turn = np.hypot(given[:, 0], given[:, 1]) * voronoi
-    sharp = np.flatnonzero(turn >= np.pi)
-    if len(sharp):
-        raise ValueError(
-            f"{what} must turn the rod by less than pi at every node, "
-            f"got {turn[sharp[0]]:.3g} rad at stencil {sharp[0]}: use more nodes"
-        )
+    _core.check_turns(given, voronoi, f"natural_curvature of {owner}")
     return np.array(given)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -38,6 +39,11 @@ class SectionProperties:
     torsion: FloatArray
     radii: FloatArray
     widths: FloatArray | None = None
+
+    @cached_property
+    def moments(self) -> FloatArray:
+        """Both second moments of area, shape (edges, 2) [m^4]."""
+        return np.stack([self.moment1, self.moment2], axis=1)
 
 
 @dataclass(frozen=True)

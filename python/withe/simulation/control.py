@@ -7,8 +7,8 @@ from typing import Any
 import numpy.typing as npt
 
 from withe.common import validation
-from withe.parts.handles import CustomForce, Load, Rod
-from withe.parts.rods import curvature_array, twist_array
+from withe.parts.handles import CustomForce, Drag, Fluid, Load, Mass, Obstacle, Rod, Support
+from withe.parts.rods import curvature_array, curvature_given, twist_array
 from withe.simulation.functions import check_jacobian
 from withe.simulation.loads import remove_load
 from withe.simulation.parameters import Settable, get_value, set_values
@@ -53,7 +53,10 @@ class Control:
         >>> simulation.set_natural_curvature(arm, (0.0, 12.5), over=0.2)
         """
         part = self._session.directory.rod(rod)
-        values = curvature_array(curvature, part.voronoi, validation.truth(discrete, "discrete"), part.owner)
+        if validation.truth(discrete, "discrete"):
+            values = curvature_array(curvature, part.voronoi, True, part.owner)
+        else:
+            values = curvature_given(curvature, len(part.voronoi), part.owner).reshape(-1, 2)
         self._session.world.set_natural_curvature(part.index, values, validation.non_negative(over, "over"))
 
     def set_natural_twist(self, rod: Rod | str, twist: npt.ArrayLike, over: float = 0.0) -> None:
@@ -90,7 +93,7 @@ class Control:
             natural_curvature, natural_twist. Of a load: force, moment, load or pressure, constant or a function
             of time. Of a mass: mass. Of a spring: stiffness, rest_length, damping. Of a drag: drag. Of a fluid:
             viscosity. Of an obstacle: friction, one coefficient or a pair, along and across rods. Of the scene:
-            gravity, and friction between rods. See `set_friction` for two of them.
+            gravity, friction between rods, and the slip_tolerance of friction. See `set_friction` for two bodies.
 
         Raises
         ------
@@ -104,21 +107,23 @@ class Control:
         """
         set_values(self._session, target, values)
 
-    def get(self, target: Settable | str, word: str | None = None) -> Any:
+    def get(self, target: Settable | Support | str, word: str | None = None) -> Any:
         """The present value of what `set` sets.
 
         Parameters
         ----------
         target : handle or str
-            Or "gravity", or "friction" of rods with each other.
+            Or "gravity", "friction" of rods with each other, or "slip_tolerance".
         word : str
-            As in `set`.
+            As in `set`; of a support "position" and "rotation", of an obstacle "position" and "turn", which `move`
+            changes; of a rod its "radius".
 
         Returns
         -------
         float or ndarray
             Stiffnesses and what else belongs to edges one an edge, (edges,); natural curvature
-            (stencils, 2) and twist (stencils,); loads (3,). What belongs to a material as it was set.
+            (stencils, 2) and twist (stencils,); loads (3,); positions (3,) [m], rotations (3, 3) and turns (3,) [rad]
+            from what was drawn. What belongs to a material as it was set.
 
         Raises
         ------

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 
@@ -22,7 +24,7 @@ __all__ = [
     "obstacle_pose",
     "set_obstacle_friction",
     "set_pair_friction",
-    "set_rod_friction",
+    "set_scene_friction",
 ]
 
 FloatArray = npt.NDArray[np.float64]
@@ -126,11 +128,13 @@ def set_obstacle_friction(session: Session, part: ObstaclePart, value: Friction)
     session.world.set_friction(with_obstacle(contact, index, pair))
 
 
-def set_rod_friction(session: Session, value: float) -> None:
-    """Change the friction coefficient of all rods with each other."""
-    coefficient = validation.non_negative(value, "friction")
+def set_scene_friction(session: Session, values: dict[str, Any]) -> None:
+    """Change the friction coefficient of all rods with each other, and the slip tolerance of all friction."""
     contact = session.world.contact
-    if not contact.rods:
-        raise ValueError("friction of the scene is that between rods, which do not touch: see Scene.enable_contact")
-    contact.friction = coefficient
+    if "friction" in values:
+        contact.friction = validation.non_negative(values["friction"], "friction")
+        if not contact.rods:
+            raise ValueError("friction of the scene is that between rods, which do not touch: see Scene.enable_contact")
+    if "slip_tolerance" in values:
+        contact.slip_tolerance = validation.positive(values["slip_tolerance"], "slip_tolerance")
     session.world.set_friction(contact)

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from withe.common import validation
-from withe.parts.description import added_mass, drag, rod_parameters
+from withe.parts.description import added_mass, drag
 from withe.parts.friction import as_given, obstacle_friction
-from withe.parts.handles import Drag, Fluid, Load, Mass, Obstacle, Rod, Spring
+from withe.parts.handles import Drag, Fluid, Load, Mass, Obstacle, Rod, Spring, Support
 from withe.parts.kinds import (
     DragPart,
     FluidPart,
@@ -23,18 +22,21 @@ from withe.parts.kinds import (
     SpringPart,
     SupportPart,
 )
-from withe.parts.parameters import ROD_WORDS, RodParameters
-from withe.parts.rods import curvature_array, twist_array
+from withe.parts.parameters import ROD_WORDS
+from withe.parts.rods import curvature_given, twist_array
 from withe.parts.springs import SPRING_WORDS
 from withe.simulation.loads import load_index, set_load
-from withe.simulation.obstacles import set_obstacle_friction, set_rod_friction
+from withe.simulation.obstacles import set_obstacle_friction, set_scene_friction
 from withe.simulation.session import Session
 from withe.simulation.springs import set_spring, spring_value
+from withe.simulation.supports import find_support
 
 __all__ = ["Settable", "get_value", "set_values"]
 
 Settable = Rod | Load | Mass | Spring | Drag | Fluid | Obstacle
+_POSE = ("position", "rotation")  # of supports, which `Simulation.move` changes
 _NATURAL_WORDS = ("natural_curvature", "natural_twist")
+_SET_ROD = (*ROD_WORDS, *_NATURAL_WORDS)
 
 
 def set_values(session: Session, target: Settable | str | None, values: dict[str, Any]) -> None:
@@ -42,10 +44,10 @@ def set_values(session: Session, target: Settable | str | None, values: dict[str
     if not values:
         raise ValueError("set must be given what to set, such as youngs_modulus=1e6")
     if target is None:
-        _only(values, ("gravity", "friction"), "the scene")
+        _only(values, ("gravity", "friction", "slip_tolerance"), "the scene")
         gravity = validation.vector(values["gravity"], "gravity") if "gravity" in values else None
-        if "friction" in values:
-            set_rod_friction(session, values["friction"])
+        if values.keys() & {"friction", "slip_tolerance"}:
+            set_scene_friction(session, values)
         if gravity is not None:
             session.world.set_gravity(gravity)
             session.settings.gravity = gravity
@@ -79,11 +81,11 @@ def set_values(session: Session, target: Settable | str | None, values: dict[str
         raise ValueError(_nothing_to_set(part))
 
 
-def get_value(session: Session, target: Settable | str, word: str | None) -> Any:
+def get_value(session: Session, target: Settable | Support | str, word: str | None) -> Any:
     """The present value of a parameter; see `Simulation.get`."""
     if word is None:
-        if isinstance(target, str) and target == "friction":
-            return float(session.world.contact.friction)
+        if isinstance(target, str) and target in ("friction", "slip_tolerance"):
+            return float(getattr(session.world.contact, target))
         if not isinstance(target, str) or target != "gravity":
             raise ValueError("word must be given, such as get(arm, 'youngs_modulus')")
         return session.settings.gravity.copy()
@@ -107,6 +109,14 @@ def get_value(session: Session, target: Settable | str, word: str | None) -> Any
         return session.settings.drags[part.name]
     elif isinstance(part, FluidPart) and word == "viscosity":
         return session.settings.fluids[part.name]
+    elif isinstance(part, SupportPart) and word in _POSE:
+        index, _ = find_support(session, part.name)
+        world = session.world
+        return np.array(world.support_position(index) if word == "position" else world.support_rotation(index))
+    elif isinstance(part, ObstaclePart) and word in ("position", "turn"):
+        index = session.directory.all(ObstaclePart).index(part)
+        world = session.world
+        return np.array(world.obstacle_position(index) if word == "position" else world.obstacle_turn(index))
     elif isinstance(part, ObstaclePart) and word == "friction":
         index = session.directory.all(ObstaclePart).index(part)
         return as_given(obstacle_friction(session.world.contact, index))
@@ -117,47 +127,25 @@ def get_value(session: Session, target: Settable | str, word: str | None) -> Any
 
 
 def _set_rod(session: Session, part: RodPart, values: dict[str, Any]) -> None:
-    _only(values, (*ROD_WORDS, *_NATURAL_WORDS), part.owner)
-    parameters = session.settings.rods[part.index]
+    _only(values, _SET_ROD, part.owner)
+    before = parameters = session.settings.rods[part.index]
+    natural = {}
     for word, value in values.items():
-        if word in ROD_WORDS:
-            parameters = parameters.changed(word, value, part.section, part.owner)
-    curvature = twist = None
-    if "natural_curvature" in values:
-        curvature = curvature_array(values["natural_curvature"], part.voronoi, False, part.owner)
-    if "natural_twist" in values:
-        twist = twist_array(values["natural_twist"], part.voronoi, part.owner)
-    changes: list[Callable[[], None]] = []
-    if curvature is not None:
-        changes.append(lambda: session.world.set_natural_curvature(part.index, curvature, 0.0))
-    if twist is not None:
-        changes.append(lambda: session.world.set_natural_twist(part.index, twist, 0.0))
-    if parameters is not session.settings.rods[part.index]:
-        changes.append(lambda: _apply_parameters(session, part.index, parameters))
-    # A change that is refused, as it leaves the plane of planar=True, does nothing; those before it are taken back.
-    before = session.world.snapshot() if len(changes) > 1 else b""
-    try:
-        for change in changes:
-            change()
-    except ValueError:
-        if len(changes) > 1:
-            session.world.restore(before)
-        raise
-
-
-def _apply_parameters(session: Session, rod: int, parameters: RodParameters) -> None:
-    if parameters is not session.settings.rods[rod]:
-        session.world.set_rod_parameters(rod, rod_parameters(parameters))
-        session.settings.rods[rod] = parameters
+        if word == "natural_curvature":
+            natural[word] = curvature_given(value, len(part.voronoi), part.owner)
+        elif word == "natural_twist":
+            natural[word] = twist_array(value, part.voronoi, part.owner)
+        else:
+            parameters = parameters.with_value(word, value, part.section, part.owner)
+    session.world.set(part.index, parameters.acting(before) | natural)
+    session.settings.rods[part.index] = parameters
 
 
 def _set_drag(session: Session, part: DragPart, coefficient: float) -> None:
     drags = session.settings.drags | {part.name: coefficient}
     for rod in session.directory.all(RodPart):
         if part.rods is None or rod.index in part.rods:
-            total = drag(session.directory, drags, rod)
-            changed = session.settings.rods[rod.index].changed("drag", total, rod.section, rod.owner)
-            _apply_parameters(session, rod.index, changed)
+            _set_rod(session, rod, {"drag": drag(session.directory, drags, rod)})
     session.settings.drags = drags
 
 
@@ -172,7 +160,7 @@ def _words_of(part: Part) -> tuple[str, ...]:
         SpringPart: SPRING_WORDS,
         DragPart: ("drag",),
         FluidPart: ("viscosity",),
-        ObstaclePart: ("friction",),
+        ObstaclePart: ("friction", "position", "turn"),
     }
     return words.get(type(part), ())
 
@@ -180,7 +168,7 @@ def _words_of(part: Part) -> tuple[str, ...]:
 _SETTABLE = (
     "set takes rods (youngs_modulus, natural_curvature, ...), loads (force, moment, load), masses (mass), "
     "springs (stiffness, rest_length, damping), drags (drag), fluids (viscosity), obstacles (friction), and None for "
-    "the scene (gravity, friction)"
+    "the scene (gravity, friction, slip_tolerance)"
 )
 
 
@@ -195,7 +183,10 @@ def _nothing_to_set(part: Part) -> str:
             "a rod beside it; or, to prescribe where it is, clamp or pin its node and move that"
         )
     if isinstance(part, SupportPart):
-        return f"support {part.name!r} has nothing to set: move, release or reaction take it. {_SETTABLE}"
+        return (
+            f"support {part.name!r} has nothing to set: move, release or reaction take it. {_SETTABLE}; get reads its "
+            "position and rotation"
+        )
     return f"{part.name!r} has nothing to set. {_SETTABLE}"
 
 

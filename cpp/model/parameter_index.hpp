@@ -1,0 +1,85 @@
+#pragma once
+/// The index of what users set while a scene runs: every number of `Parameters` that acts, by its name.
+
+#include <span>
+#include <string_view>
+
+#include "model/model.hpp"
+
+namespace withe {
+
+enum class ParameterKind {
+  stretch_stiffness,
+  bend_stiffness,
+  twist_stiffness,
+  line_density,
+  rotary_inertia,
+  viscous_time,
+  drag,
+  natural_curvature,
+  natural_twist,
+  added_mass,
+  gravity,
+  fluid_viscosity,
+  spring_stiffness,
+  spring_rest_length,
+  spring_damping,
+  friction,
+  slip_tolerance,
+  obstacle_friction,
+  pair_friction,
+};
+
+/// What a parameter has a row of numbers for: the scene; every node; every edge, or stencil, of a rod; every obstacle; every
+/// spring; every pair of bodies that has something of its own.
+enum class Extent { scene, node, edge, stencil, spring, obstacle, pair };
+
+enum class Range { any, non_negative, positive };
+
+/// What derives from a parameter.
+enum class Derived { nothing, masses, stiffness, viscous_times, natural_strains };
+
+struct ParameterInfo {
+  ParameterKind kind;
+  std::string_view name;
+  Extent extent;
+  int columns;
+  std::string_view unit;
+  Range range;
+  Derived derived;
+
+  /// Set through `World::set_friction`: it decides about the form of the equations.
+  bool of_contact() const { return kind >= ParameterKind::friction; }
+  bool of_rod() const { return extent == Extent::edge || extent == Extent::stencil; }
+};
+
+/// All of them, in the order of their kinds.
+std::span<const ParameterInfo> parameter_index();
+const ParameterInfo& info_of(ParameterKind kind);
+/// Throws std::invalid_argument where there is none of the name.
+const ParameterInfo& parameter_named(std::string_view name);
+
+using ParameterView = Eigen::Map<MatrixX>;
+using ParameterValues = Eigen::Map<const MatrixX>;
+
+/// The numbers themselves: rows as `Extent` says, of rod `rod` where they belong to one. Change them through
+/// `set_parameter`, or follow with `update_derived`.
+ParameterView parameter_view(const Model& model, Parameters& parameters, ParameterKind kind, int rod);
+
+/// Wanted numbers: all rows, or one that holds for every one of them.
+struct ParameterSetting {
+  ParameterKind kind;
+  int rod = 0;  ///< where the parameter belongs to one
+  ParameterValues values;
+};
+
+/// Refuses what does not fit, is not finite or out of range; std::invalid_argument says what.
+void check_setting(const Model& model, const ParameterSetting& setting);
+/// Sets those of the settings, which fit, that are not what already holds, and what derives from them; whether there
+/// were any.
+bool set_parameters(const Model& model, std::span<const ParameterSetting> settings, Parameters& parameters);
+
+/// What derives from parameters, of a rod where they belong to one.
+void update_derived(const Model& model, Derived derived, int rod, Parameters& parameters);
+
+}  // namespace withe
