@@ -10,7 +10,7 @@ by rounding, so set it to "baseline" everywhere to find the same bits on unlike 
 ``print(simulation.plan)`` says which are in use.
 """
 
-from withe import perception, shapes, view
+from withe import perception, real2sim, shapes, view
 from withe._core import __version__
 from withe.errors import CoarseMeshWarning, CoarseStepWarning, ConvergenceError
 from withe.parts.handles import (
@@ -71,6 +71,7 @@ __all__ = [
     "Tube",
     "__version__",
     "perception",
+    "real2sim",
     "run_many",
     "shapes",
     "view",

@@ -2,11 +2,13 @@
 
 import re
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import withe
+from soft_limb import LOG
 from withe.perception.synthetic import make_case, render
 
 README = Path(__file__).resolve().parent.parent.parent / "README.md"
@@ -28,7 +30,7 @@ def test_the_robot_of_the_readme_curls_its_fingers(tmp_path, monkeypatch):
     pytest.importorskip("matplotlib").use("Agg")
     monkeypatch.chdir(tmp_path)
     names = {}
-    for block in blocks("natural_curvature"):
+    for block in blocks("gripper.npz"):
         exec(compile(block, str(README), "exec"), names)
     assert (tmp_path / "gripper.png").stat().st_size > 10_000
     assert withe.Record.load("gripper.npz").times[-1] == names["simulation"].time == 1.0
@@ -70,3 +72,21 @@ def test_cables_of_a_picture_become_rods(tmp_path, monkeypatch):
     assert len(names["tracing"]) == 2
     (rod,) = names["scene"].build().rods
     assert rod.nodes == 101
+
+
+def test_what_a_camera_saw_of_an_arm_is_explained(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    rows = LOG.read_text().splitlines()
+    Path("log.csv").write_text("\n".join(rows[:30]))
+    scene = withe.Scene()
+    silicone = withe.Material(youngs_modulus=1.793e6, density=1240.0)
+    arm = scene.add_rod(start=(0, 0, 0), end=(0.15, 0, 0), nodes=49, radius=0.01, material=silicone)
+    scene.clamp(arm.start, hold="edge")
+    pixels = withe.real2sim.read_log("log.csv", tags=range(101, 110), skip=7).pixels
+    names = {"withe": withe, "arm": arm, "simulation": scene.build(integrator="static")}
+    names["tracing"] = SimpleNamespace(centrelines=[pixels[10]])
+    for block in blocks("read_log"):
+        exec(compile(block, str(README), "exec"), names)
+    assert names["found"].converged.all()
+    assert names["found"].rms.max() < 5.4  # pixels: 1 % of the length, with one arm for two limbs
+    assert names["simulation"].get(arm, "natural_curvature").any()

@@ -18,7 +18,14 @@ from withe.parts.springs import SPRING_WORDS
 from withe.simulation.loads import load_index
 from withe.simulation.session import Session
 
-__all__ = ["RunDerivatives", "Unknown", "equilibrium_gradient", "equilibrium_jacobian", "positions_adjoint"]
+__all__ = [
+    "RunDerivatives",
+    "Unknown",
+    "equilibrium_gradient",
+    "equilibrium_gradients",
+    "equilibrium_jacobian",
+    "positions_adjoint",
+]
 
 FloatArray = npt.NDArray[np.float64]
 Unknown = tuple[Rod | Load | Mass | Drag | Spring | Support | str, str] | str
@@ -41,14 +48,23 @@ _READOUTS = ("positions", "velocities")
 
 def equilibrium_gradient(session: Session, by_positions: FloatArray, wrt: Sequence[Unknown]) -> list[Any]:
     """Derivatives of a scalar of the present equilibrium; see `Equilibrium.gradient`."""
+    return [found[0] for found in equilibrium_gradients(session, [by_positions], wrt)]
+
+
+def equilibrium_gradients(
+    session: Session, by_positions: Sequence[FloatArray], wrt: Sequence[Unknown]
+) -> list[list[Any]]:
+    """Derivatives of several scalars of the present equilibrium, for each of `wrt` one a scalar.
+
+    The stiffness is factorised once for all of them.
+    """
     readers = _readers(session, wrt)
-    found = session.world.equilibrium_gradients([by_positions])[0]
-    return [read(found) for read in readers]
+    found = session.world.equilibrium_gradients(list(by_positions))
+    return [[read(gradient) for gradient in found] for read in readers]
 
 
 def equilibrium_jacobian(session: Session, rows: npt.NDArray[np.int64], wrt: Sequence[Unknown]) -> list[FloatArray]:
     """Derivatives of positions of nodes in the present equilibrium; see `Equilibrium.jacobian`."""
-    readers = _readers(session, wrt)
     nodes = session.directory.layout.node_count
     axes = _axes(session)
     adjoints = []
@@ -57,10 +73,9 @@ def equilibrium_jacobian(session: Session, rows: npt.NDArray[np.int64], wrt: Seq
             by = np.zeros((nodes, 3))
             by[row] = axis
             adjoints.append(by)
-    found = session.world.equilibrium_gradients(adjoints)
     out = []
-    for read in readers:
-        values = np.array([read(gradient) for gradient in found])
+    for found in equilibrium_gradients(session, adjoints, wrt):
+        values = np.array(found)
         along = values.reshape(len(rows), len(axes), *values.shape[1:])
         out.append(np.moveaxis(np.tensordot(along, axes, axes=(1, 0)), -1, 1))
     return out

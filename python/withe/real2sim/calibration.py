@@ -1,0 +1,244 @@
+"""The camera that sees tags of a robot that moves in a plane, found with the robot's own shapes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from withe.common import validation
+from withe.common.progress import progress as progress_bar
+from withe.errors import ConvergenceError
+from withe.perception.camera import Camera
+from withe.real2sim.camera_problem import CameraProblem
+from withe.real2sim.least_squares import FrameSolution, all_frames, lone_frame, reduced, weaknesses
+from withe.real2sim.places import Line, Places
+from withe.real2sim.results import Unobservable
+from withe.real2sim.targets import Tags
+from withe.real2sim.unknowns import NaturalCurvature, Tilt, Unknown, parse_unknowns
+from withe.simulation.simulation import Simulation
+
+__all__ = ["Calibration", "calibrate"]
+
+FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
+Free = Literal["roll", "scale", "arcs", "tilt"]
+
+_FREE = ("roll", "scale", "arcs", "tilt")
+_PIXELS = 1e-6  # norm of residuals that is as good as none
+_ITERATIONS = 50
+
+
+class Calibration(Camera):
+    """A camera at right angles to the plane in which a robot moves, and where its tags are.
+
+    Attributes
+    ----------
+    roll : float [rad]
+        By which the picture is turned clockwise against the vertical.
+    scale : float [px/m]
+    tilt : float [rad]
+        Of the base, towards positive curvature; 0 unless it was free.
+    places : list of (str, float)
+        Rod and length along it [m] of every tag, for `Tags`.
+    gravity : ndarray of shape (3,) [m/s^2]
+        That the simulation is to have: turned back by the tilt.
+    residuals : ndarray of shape (frames, tags, 2) [px]
+        Simulated less seen in the frames that were used.
+    unobservable : tuple of Unobservable
+        What these frames cannot tell apart: print them.
+    """
+
+    roll: float
+    scale: float
+    tilt: float
+    places: list[tuple[str, float]]
+    gravity: FloatArray
+    residuals: FloatArray
+    unobservable: tuple[Unobservable, ...]
+
+    @property
+    def rms(self) -> float:
+        """Root of the mean square distance of tags from where they were seen [px]."""
+        return float(np.sqrt(np.nanmean((self.residuals**2).sum(axis=2))))
+
+
+def calibrate(
+    simulation: Simulation,
+    tags: Tags,
+    frames: slice | Sequence[int] = slice(None),
+    free: Sequence[Free] = ("roll", "scale", "arcs"),
+    *,
+    unknowns: Sequence[Any] | None = None,
+    progress: bool | Literal["always"] = True,
+) -> Calibration:
+    """Find the camera that saw tags of a robot in a plane, together with the robot's shapes.
+
+    The picture is x right, y down, and the camera looks straight at the plane, held nearly upright: a point (x, y) of
+    the plane, right and up against gravity, is seen at offset + scale R(roll) (x, -y). The offset is always found.
+
+    Parameters
+    ----------
+    simulation : Simulation
+        Planar. It is left as it is.
+    tags : Tags
+        In pixels, without a camera, with two places at least.
+    frames : slice or sequence of int
+        Which to use; leave some to see how well the camera fits them.
+    free : sequence of {"roll", "scale", "arcs", "tilt"}
+        What to find: the camera's roll; its scale, else that of the tags' distances in the picture; where the tags
+        are, but for the first, and the last if it is at the tip; the tilt of the base. What is not free is 0 or as
+        given in `tags`.
+    unknowns : sequence of tuples, optional
+        As in `fit`; by default every rod's natural curvature, constant along it.
+    progress : bool or "always"
+
+    Returns
+    -------
+    Calibration
+
+    Raises
+    ------
+    ValueError
+        A simulation that is not planar, tags that are not in pixels, or nothing seen.
+    ConvergenceError
+        The robot has no equilibrium for some frame.
+    """
+    listed = _checked(simulation, tags, free)
+    copy = simulation.copy()
+    places = Places(copy, tags.places)
+    own: list[Unknown] = (
+        [NaturalCurvature(copy, rod) for rod in copy.rods] if unknowns is None else parse_unknowns(copy, unknowns)
+    )
+    if "roll" in listed or "tilt" in listed:
+        own.append(Tilt(copy))
+    seen = np.asarray(tags.points, np.float64)
+    chosen = _chosen(frames, tags.frames)
+    good = [f for f in chosen if np.isfinite(seen[f]).any()]
+    if not good:
+        raise ValueError(f"tags must be seen in some of the {len(chosen)} frames that were asked for, got none")
+    problem = CameraProblem(copy, own, places, seen)
+    open_ = problem.free(listed)
+    return _calibration(problem, _solve(problem, good, open_, progress), open_)
+
+
+class _Restricted:
+    """The same problem with some coordinates as they are at the start."""
+
+    def __init__(self, problem: CameraProblem, free: BoolArray, start: FloatArray) -> None:
+        self._problem, self._free, self._start = problem, free, start
+        self.scales, self.per_frame = problem.scales[free], problem.per_frame[free]
+
+    def whole(self, coordinates: FloatArray) -> FloatArray:
+        """All coordinates."""
+        whole = self._start.copy()
+        whole[self._free] = coordinates
+        return whole
+
+    def residual(self, coordinates: FloatArray, frame: int) -> tuple[FloatArray, FloatArray] | None:
+        """As that of the problem."""
+        return self._problem.residual(self.whole(coordinates), frame)
+
+    def jacobian(self, coordinates: FloatArray, state: FloatArray, frame: int) -> FloatArray:
+        """As that of the problem."""
+        return self._problem.jacobian(self.whole(coordinates), state, frame)[:, self._free]
+
+
+def _checked(simulation: Simulation, tags: Tags, free: Sequence[str]) -> list[str]:
+    """What is free, if all else can be."""
+    if not isinstance(tags, Tags) or np.shape(tags.points)[2] != 2:
+        raise ValueError("tags must be real2sim.Tags in pixels, shape (frames, tags, 2), without a camera")
+    if len(tags.places) < 2:
+        raise ValueError(f"tags must have two places at least, got {len(tags.places)}")
+    if simulation.plan.plane_normal is None:
+        raise ValueError("simulation must be planar: a camera in space is found by Camera.from_points")
+    words = [free] if isinstance(free, str) else list(free)
+    for word in words:
+        validation.choice(word, "free", _FREE)
+    return words
+
+
+def _chosen(frames: slice | Sequence[int], count: int) -> list[int]:
+    if isinstance(frames, slice):
+        return list(range(count))[frames]
+    return [validation.integer(frame, "frames", 0, count - 1) for frame in frames]
+
+
+def _solve(
+    problem: CameraProblem, frames: list[int], free: BoolArray, progress: bool | Literal["always"]
+) -> dict[int, FloatArray]:
+    """All coordinates of every frame: first its own for the camera as it begins, then all of them."""
+    restricted = _Restricted(problem, free, problem.begin)
+    own = restricted.per_frame
+    start, guess = {}, problem.begin[free]
+    with progress_bar(len(frames), "calibrating", progress, unit="frames") as bar:
+        for frame in frames:
+            guess = lone_frame(restricted, frame, guess, own, _PIXELS, _ITERATIONS).coordinates
+            start[frame] = guess
+        found = all_frames(restricted, frames, start, _PIXELS, _ITERATIONS, lambda: bar.advance(1))
+    failed = [frame for frame in frames if frame not in found]
+    if failed:
+        raise ConvergenceError(
+            f"frame {failed[0]} has no equilibrium for the first guess of the camera: leave it out of frames, or set "
+            "natural curvatures of the simulation that look more like it"
+        )
+    return {frame: restricted.whole(solution.coordinates) for frame, solution in found.items()}
+
+
+def _calibration(problem: CameraProblem, found: dict[int, FloatArray], free: BoolArray) -> Calibration:
+    """The camera; its focal length is that of one a metre away, as the picture of a plane tells no other."""
+    last = next(reversed(found.values()))
+    view = problem.view(last)
+    forwards = np.cross(*view.axes)
+    depth = float(forwards @ problem.places.rods[0].points[0])
+    camera = Calibration(
+        np.diag([view.scale, view.scale, 1.0]),
+        rotation=np.stack([*view.axes, forwards]),
+        translation=(*(view.offset / view.scale), 1.0 - depth),
+    )
+    camera.roll, camera.scale = float(view.roll), view.scale
+    camera.places = [_on_rod(line, arc) for line, arc in zip(problem.places.lines, view.places, strict=True)]
+    names = problem.equilibria.names
+    tilt = next((u for u in problem.equilibria.unknowns if isinstance(u, Tilt)), None)
+    camera.tilt = float(last[names.index(Tilt.name)]) if tilt is not None else 0.0
+    camera.gravity = problem.equilibria.simulation.get("gravity") if tilt is None else tilt.gravity(camera.tilt)
+    solutions = {}
+    for frame, coordinates in found.items():
+        evaluated = problem.residual(coordinates, frame)
+        assert evaluated is not None
+        residual, state = evaluated
+        jacobian = problem.jacobian(coordinates, state, frame) * problem.scales
+        jacobian[np.isnan(residual)] = 0.0
+        solutions[frame] = FrameSolution(coordinates, residual, jacobian, 0, True)
+    camera.residuals = np.stack([s.residual.reshape(-1, 2) for s in solutions.values()])
+    camera.unobservable = _not_told(problem, solutions, free)
+    return camera
+
+
+def _not_told(problem: CameraProblem, solutions: dict[int, FrameSolution], free: BoolArray) -> tuple[Unobservable, ...]:
+    """What moves the tags by less than the misfit. The base may be tilted, even if that was not asked for."""
+    asked = free | np.array([name == Tilt.name for name in problem.names])
+    shared = asked & ~problem.per_frame
+    kept = {f: FrameSolution(s.coordinates, s.residual, s.jacobian[:, asked], 0, True) for f, s in solutions.items()}
+    matrix, _ = reduced(kept, problem.per_frame[asked])
+    residuals = np.concatenate([s.residual for s in solutions.values()])
+    rows = int(np.isfinite(residuals).sum())
+    misfit = float(np.sqrt(np.nanmean(residuals**2)))
+    names = [name for name, one in zip(problem.names, shared, strict=True) if one]
+    return tuple(
+        Unobservable(
+            {n: float(w) for n, w in zip(names, weakness.direction, strict=True) if abs(w) > 0.1},
+            weakness.effect,
+            misfit,
+        )
+        for weakness in weaknesses(matrix, rows, misfit)
+    )
+
+
+def _on_rod(line: Line, arc: float) -> tuple[str, float]:
+    """A place along a line as one along a rod; beyond an end, at the end."""
+    rod = int(np.searchsorted(line.offsets, arc, side="right")) - 1
+    part, offset = line.rods[max(rod, 0)], line.offsets[max(rod, 0)]
+    return part.name, float(np.clip(arc - offset, 0.0, part.lengths.sum()))

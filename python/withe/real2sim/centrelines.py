@@ -1,0 +1,204 @@
+"""Centrelines of rods as targets, and the rest shape of a rod that sags."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from withe.common import validation
+from withe.parts.handles import Rod
+from withe.perception.camera import Camera
+from withe.real2sim.fitting import fit
+from withe.real2sim.places import lines_of, node_count, rod_part
+from withe.real2sim.results import Fit
+from withe.real2sim.targets import Residual, Target, checked_times, pixel_derivative
+from withe.simulation.simulation import Simulation
+
+__all__ = ["Centrelines", "rest_shape"]
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(eq=False)
+class Centrelines(Target):
+    """Points seen along rods, without knowing which point of the rod each is.
+
+    A residual is the way from a seen point to the nearest one of the simulated line. With `ends`, the first and the
+    last point are the ends of the line, in either order.
+
+    Parameters
+    ----------
+    points : sequence of array_like of shape (n, 2) [px] or (n, 3) [m]
+        One a frame, such as the centrelines of `perception.trace`; without any point where nothing was seen. Pixels
+        need a camera.
+    rods : Rod, str, or several
+        Rods that go on end to end.
+    camera : perception.Camera, optional
+    ends : bool
+        Whether the whole line was seen.
+    samples : int
+        Points to use of each centreline, evenly along it.
+    sigma : float, optional [px or m]
+        Standard deviation of a coordinate; estimated from what a fit leaves where it is not given.
+    times : array_like of shape (frames,), optional [s]
+
+    Raises
+    ------
+    ValueError
+        Wrong shapes, or numbers that are not finite.
+    """
+
+    points: Sequence[npt.ArrayLike]
+    rods: Rod | str | Sequence[Rod | str]
+    camera: Camera | None = None
+    ends: bool = True
+    samples: int = 50
+    sigma: float | None = None
+    times: Any = None
+
+    def __post_init__(self) -> None:
+        dimension = 3 if self.camera is None else 2
+        self.samples = validation.integer(self.samples, "samples", 2, 10**6)
+        checked = []
+        for frame, points in enumerate(self.points):
+            if np.size(points) == 0:
+                checked.append(np.zeros((0, dimension)))
+                continue
+            line = validation.number_array(points, f"points of frame {frame}", ("n", dimension))
+            checked.append(_evenly(line, self.samples, frame))
+        self.points = checked
+        self.ends = validation.truth(self.ends, "ends")
+        self.sigma = None if self.sigma is None else validation.positive(self.sigma, "sigma")
+        self.times = checked_times(self.times, len(checked))
+
+    @property
+    def frames(self) -> int:
+        """Number of frames."""
+        return len(self.points)
+
+    def bind(self, simulation: Simulation) -> Residual:
+        """The residual for the nodes of a simulation."""
+        given = [self.rods] if isinstance(self.rods, Rod | str) else list(self.rods)
+        lines = lines_of(simulation, [rod_part(simulation, rod) for rod in given])
+        if len(lines) != 1:
+            raise ValueError(f"rods of Centrelines must go on end to end as one line, got {len(lines)} lines")
+        return _LineResidual(self, lines[0].rows, node_count(simulation))
+
+
+class _LineResidual(Residual):
+    def __init__(self, target: Centrelines, rows: npt.NDArray[np.int64], nodes: int) -> None:
+        self._seen = [np.asarray(points) for points in target.points]
+        self._camera, self._ends, self._sigma = target.camera, target.ends, target.sigma or 1.0
+        self._rows, self._nodes, self._samples = rows, nodes, target.samples
+
+    def value(self, positions: FloatArray, frame: int) -> FloatArray:
+        line, seen = self._line(positions), self._seen[frame]
+        if len(seen) == 0:
+            return np.full(self._samples * line.shape[1], np.nan)
+        edges, shares, _ = self._nearest(line, seen)
+        nearest = line[edges] + shares[:, None] * (line[edges + 1] - line[edges])
+        return np.asarray((nearest - seen).ravel() / self._sigma)
+
+    def derivative(self, positions: FloatArray, frame: int) -> FloatArray:
+        line, seen = self._line(positions), self._seen[frame]
+        dimension = line.shape[1]
+        derivative = np.zeros((self._samples, dimension, self._nodes, 3))
+        if len(seen) == 0:
+            return derivative.reshape(-1, self._nodes, 3)
+        edges, shares, slides = self._nearest(line, seen)
+        chord = line[edges + 1] - line[edges]
+        length = np.linalg.norm(chord, axis=1)[:, None]
+        # The nearest point slides along its edge, but at ends and corners: only what goes across counts, less the
+        # turn of the edge, as the way to it stays at right angles.
+        tangent = np.where(slides[:, None], chord / length, 0.0)
+        away = line[edges] + shares[:, None] * chord - seen
+        across = np.eye(dimension) - tangent[:, :, None] * tangent[:, None]
+        turned = tangent[:, :, None] * away[:, None] / length[:, :, None]
+        by_node = np.broadcast_to(np.eye(3), (len(self._rows), 3, 3))
+        if self._camera is not None:
+            by_node = pixel_derivative(self._camera, positions[self._rows])
+        at = np.arange(len(seen))
+        for end, share, sign in ((edges, 1.0 - shares, 1.0), (edges + 1, shares, -1.0)):
+            by_end = share[:, None, None] * across + sign * turned
+            derivative[at, :, self._rows[end]] += by_end @ by_node[end] / self._sigma
+        return derivative.reshape(-1, self._nodes, 3)
+
+    def _line(self, positions: FloatArray) -> FloatArray:
+        points = positions[self._rows]
+        return points if self._camera is None else self._camera.project(points)
+
+    def _nearest(self, line: FloatArray, seen: FloatArray) -> tuple[npt.NDArray[np.int64], FloatArray, FloatArray]:
+        """Edge and share of it where the line is nearest to each point, and whether that may slide."""
+        chord = np.diff(line, axis=0)
+        way = seen[:, None] - line[None, :-1]
+        shares = np.clip((way * chord).sum(axis=2) / (chord**2).sum(axis=1), 0.0, 1.0)
+        distance = np.linalg.norm(way - shares[:, :, None] * chord, axis=2)
+        edges = distance.argmin(axis=1)
+        at = np.arange(len(seen))
+        share = shares[at, edges]
+        if self._ends:
+            same = np.linalg.norm(line[[0, -1]] - seen[[0, -1]]) <= np.linalg.norm(line[[-1, 0]] - seen[[0, -1]])
+            last = len(line) - 2
+            edges[[0, -1]] = (0, last) if same else (last, 0)
+            share[[0, -1]] = (0.0, 1.0) if same else (1.0, 0.0)
+        return edges, share, (share > 0.0) & (share < 1.0)
+
+
+def rest_shape(
+    simulation: Simulation,
+    rod: Rod | str,
+    centreline: npt.ArrayLike,
+    camera: Camera | None = None,
+    basis: Any = "linear",
+    *,
+    ends: bool = True,
+    progress: bool | Literal["always"] = False,
+) -> Fit:
+    """Find the shape that a rod would have without its weight, from a photograph of it as it sags.
+
+    Parameters
+    ----------
+    simulation : Simulation
+        The rod as it is held, with its stiffness and weight; it is left as it is.
+    rod : Rod or str
+    centreline : array_like of shape (n, 2) [px] or (n, 3) [m]
+        Seen along it, such as `perception.trace(picture).centrelines[0]`; pixels need the camera.
+    camera : perception.Camera, optional
+    basis : optional
+        Of natural curvature, as in `fit`.
+    ends : bool
+        Whether the centreline goes from end to end.
+    progress : bool or "always"
+
+    Returns
+    -------
+    Fit
+        Of one frame; `found.apply(simulation)` gives the rod this rest shape.
+
+    Raises
+    ------
+    ValueError
+        A centreline of another shape, or pixels without a camera.
+
+    Examples
+    --------
+    >>> hanging = scene.build(integrator="static")
+    >>> found = withe.real2sim.rest_shape(hanging, arm, [(0, 0, 0), (0.15, 0, -0.03), (0.25, 0, -0.12)], ends=False)
+    >>> found.names[0]
+    "natural_curvature of 'arm' at its start"
+    """
+    target = Centrelines([centreline], rod, camera, ends)
+    return fit(simulation, target, [(rod, "natural_curvature", basis)], progress=progress)
+
+
+def _evenly(line: FloatArray, samples: int, frame: int) -> FloatArray:
+    """Points evenly along a line."""
+    lengths = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+    if not lengths[-1] > 0.0:
+        raise ValueError(f"points of frame {frame} must differ from each other")
+    at = np.linspace(0.0, lengths[-1], samples)
+    return np.stack([np.interp(at, lengths, column) for column in line.T], axis=1)

@@ -1,0 +1,152 @@
+"""Numbers for which a simulation looks like what a camera saw."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from withe.common import validation
+from withe.common.progress import Progress
+from withe.common.progress import progress as progress_bar
+from withe.real2sim.gathering import gather
+from withe.real2sim.least_squares import FrameSolution, all_frames, lone_frame
+from withe.real2sim.results import Fit
+from withe.real2sim.scalar_methods import descend, minimise
+from withe.real2sim.stills import Conditions, Stills
+from withe.real2sim.targets import Target, bind, frames_of
+from withe.real2sim.unknowns import parse_unknowns
+from withe.simulation.simulation import Simulation
+
+__all__ = ["fit"]
+
+FloatArray = npt.NDArray[np.float64]
+Method = Literal["gauss_newton", "lbfgs", "source"]
+
+
+def fit(
+    simulation: Simulation,
+    targets: Target | Sequence[Target],
+    unknowns: Sequence[Any],
+    method: Method = "gauss_newton",
+    *,
+    shared: Sequence[Any] = (),
+    conditions: Conditions | None = None,
+    tolerance: float | None = None,
+    max_iterations: int | None = None,
+    progress: bool | Literal["always"] = True,
+) -> Fit:
+    """Find unknowns with which equilibria look like targets, frame after frame.
+
+    Least squares over the residuals of all targets divided by their sigma. Every frame begins with what the frame
+    before it found. Natural curvature is of each frame, material of all of them.
+
+    Parameters
+    ----------
+    simulation : Simulation
+        Its numbers are the first guess. It is left as it is; `Fit.apply` sets what was found.
+    targets : Curvatures, Tags, Centrelines, or several
+    unknowns : sequence of tuples
+        ``(rod, "natural_curvature", basis)``, with basis "constant", "linear" (its values at both ends), "segment" (one
+        a stencil), or functions along the rod, array_like of shape (stencils, n); in space these count twice, for
+        both directors. ``(part, word)`` for a positive parameter of a part or of a tuple of parts, all multiplied by
+        one factor: youngs_modulus, density, bend_stiffness, line_density, ... of rods, mass, friction of an obstacle.
+    method : {"gauss_newton", "lbfgs", "source"}
+        "source" is gradient descent by forward differences on the sum of absolute residuals [Algorithm 6 of the
+        dissertation that withe began with], for constant natural curvature in a plane; its unknown is a limb's whole
+        turn in radians, its first step .1.
+    shared : sequence of tuples
+        Further unknowns that all frames share: natural curvature of one rod under several loads.
+    conditions : callable, optional
+        Called with a simulation and the frame before each equilibrium, to set loads or to move supports.
+    tolerance : float, optional
+        Norm of residuals below which a frame is done, 1e-10; the sum of their sizes with "source", 2.5e-3.
+    max_iterations : int, optional
+        Of each frame; 50, or 1000 with the other methods.
+    progress : bool or "always"
+        Whether to show a progress bar; True shows one on a terminal and in a notebook.
+
+    Returns
+    -------
+    Fit
+
+    Raises
+    ------
+    ValueError
+        Targets of unlike lengths, with no frame in which anything was seen, or what cannot be unknown.
+
+    Examples
+    --------
+    >>> arm_tip = withe.real2sim.Tags([[(0.28, 0.0, -0.08)]], [arm.end])
+    >>> still = scene.build(integrator="static")
+    >>> found = withe.real2sim.fit(still, arm_tip, [(arm, "natural_curvature", "constant")])
+    >>> bool(found.converged.all())
+    True
+    """
+    validation.choice(method, "method", ("gauss_newton", "lbfgs", "source"))
+    listed = frames_of(targets)
+    copy = simulation.copy()
+    own = parse_unknowns(copy, unknowns)
+    common = parse_unknowns(copy, shared, "shared")
+    for unknown in common:
+        unknown.per_frame = False
+        if any(unknown.word == other.word and set(unknown.rods) & set(other.rods) for other in own):
+            raise ValueError(f"{unknown.names[0]} must be in unknowns or in shared, got both")
+    if not own + common:
+        raise ValueError("unknowns must be at least one, got none")
+    residual = bind(listed, copy)
+    stills = Stills(copy, own + common, residual, conditions)
+    start = stills.begin()
+    blank = residual.value(copy.positions(), 0)
+    good = [f for f in range(listed[0].frames) if np.isfinite(residual.value(copy.positions(), f)).any()]
+    if not good:
+        raise ValueError(f"targets must show something in some frame, got nothing in all {listed[0].frames}")
+    limit = (50 if method == "gauss_newton" else 1000) if max_iterations is None else max_iterations
+    limit = validation.integer(limit, "max_iterations", 1, 2**31 - 1)
+    goal = validation.positive(
+        (2.5e-3 if method == "source" else 1e-10) if tolerance is None else tolerance, "tolerance"
+    )
+    if method != "gauss_newton" and not stills.per_frame.all():
+        raise ValueError(f"method must be 'gauss_newton' where frames share unknowns, got {method!r}")
+    with progress_bar(len(good), "fitting", progress, unit="frames") as bar:
+        solutions, solves = _frame_by_frame(stills, good, start, method, goal, limit, bar)
+        if not stills.per_frame.all():
+            bar.update(0)
+            before = stills.solves
+            begin = {f: solutions[f].coordinates for f in good}
+            together = all_frames(stills, good, begin, goal, limit, lambda: bar.advance(1))
+            solutions = {f: together.get(f, _without(begin[f])) for f in good}
+            for frame in good:
+                solves[frame] += (stills.solves - before) // len(good)
+    return gather(stills, listed, solutions, solves, len(blank), listed[0].frames)
+
+
+def _without(coordinates: FloatArray) -> FrameSolution:
+    """A frame that has no equilibrium, or no derivatives there."""
+    empty = np.zeros((0, len(coordinates)))
+    return FrameSolution(coordinates, np.zeros(0), empty, 0, False, "no equilibrium to begin with")
+
+
+def _frame_by_frame(
+    stills: Stills, frames: list[int], start: FloatArray, method: str, goal: float, limit: int, bar: Progress
+) -> tuple[dict[int, FrameSolution], dict[int, int]]:
+    """Every frame by itself, beginning with what the one before it found."""
+    solutions, solves = {}, {}
+    guess = start
+    for frame in frames:
+        before = stills.solves
+        if not stills.per_frame.any():
+            solutions[frame] = FrameSolution(start, np.zeros(0), np.zeros((0, 0)), 0, True)
+        elif method == "gauss_newton":
+            solutions[frame] = lone_frame(stills, frame, guess, stills.per_frame, goal, limit)
+        elif method == "lbfgs":
+            solutions[frame] = minimise(stills, frame, guess, goal, limit)
+        else:
+            solutions[frame] = descend(stills, frame, guess, goal, limit)
+        if solutions[frame].converged:
+            guess = solutions[frame].coordinates
+        solves[frame] = stills.solves - before
+        bar.advance(1)
+    return solutions, solves

@@ -1,0 +1,279 @@
+"""Gauss-Newton: frame by frame, or all frames at once where they share unknowns."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from withe.errors import ConvergenceError
+
+__all__ = [
+    "FrameSolution",
+    "Problem",
+    "Weakness",
+    "all_frames",
+    "lone_frame",
+    "range_of",
+    "reduced",
+    "seen",
+    "weaknesses",
+]
+
+FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
+
+_RANK = 1e-9  # singular values below it, relative to the greatest, belong to directions that nothing tells
+_SMALL = 1e-5  # a step that would lessen the residual by less than this share of it is the last
+_TRIALS = 8
+
+
+class Problem(Protocol):
+    """Residuals of frames, in units of their standard deviation, NaN where there is none."""
+
+    scales: FloatArray
+    per_frame: BoolArray
+
+    def residual(self, coordinates: FloatArray, frame: int) -> tuple[FloatArray, FloatArray] | None:
+        """Residual and state of a frame, or None where there is none."""
+
+    def jacobian(self, coordinates: FloatArray, state: FloatArray, frame: int) -> FloatArray:
+        """Derivatives of the residual by the coordinates, at the state that was asked for last."""
+
+
+@dataclass(eq=False)
+class FrameSolution:
+    """What was found for a frame: derivatives are by coordinates over their scales."""
+
+    coordinates: FloatArray
+    residual: FloatArray
+    jacobian: FloatArray
+    iterations: int
+    converged: bool
+    reason: str = ""
+
+
+@dataclass(eq=False)
+class Weakness:
+    """A direction of coordinates over their scales that the targets tell little or nothing about."""
+
+    direction: FloatArray
+    effect: float  # of a change by one scale, root of the mean square over the residuals
+    frames: list[int] = field(default_factory=list)
+
+
+def seen(residual: FloatArray) -> FloatArray:
+    """A residual without gaps: zero where nothing was seen."""
+    return np.where(np.isnan(residual), 0.0, residual)
+
+
+def _seen_rows(jacobian: FloatArray, residual: FloatArray) -> FloatArray:
+    return np.where(np.isnan(residual)[:, None], 0.0, jacobian)
+
+
+def _size(residual: FloatArray) -> float:
+    return float(np.linalg.norm(seen(residual)))
+
+
+def _bounded(matrix: FloatArray, right: FloatArray, radius: float) -> FloatArray:
+    """The x of least |matrix x - right| among those with no coordinate beyond a radius, by Levenberg's damping."""
+    u, values, vectors = np.linalg.svd(matrix, full_matrices=False)
+    good = values > _RANK * values.max(initial=0.0)
+    values, along = values[good], u[:, good].T @ right
+
+    def step(damping: float) -> FloatArray:
+        return np.asarray(vectors[good].T @ (values * along / (values**2 + damping)))
+
+    if np.abs(step(0.0)).max(initial=0.0) <= radius:
+        return step(0.0)
+    low, high = values.min() ** 2 * 1e-6, values.max() ** 2 * max(1.0, np.linalg.norm(along / values) / radius)
+    while high > 1.1 * low:
+        middle = np.sqrt(low * high)
+        low, high = (middle, high) if np.abs(step(middle)).max() > radius else (low, middle)
+    return step(high)
+
+
+def lone_frame(
+    problem: Problem, frame: int, start: FloatArray, free: BoolArray, tolerance: float, max_iterations: int
+) -> FrameSolution:
+    """Fit one frame, with the coordinates that are not free as they are.
+
+    No coordinate changes by more than its scale in one step, and by a quarter of that when a step brings nothing.
+    """
+    scales = problem.scales[free]
+    found = problem.residual(start, frame)
+    if found is None:
+        empty = np.full(0, np.nan)
+        return FrameSolution(start, empty, np.zeros((0, len(scales))), 0, False, "no equilibrium to begin with")
+    coordinates, (residual, state) = start.copy(), found
+    for iteration in range(1, max_iterations + 1):
+        try:
+            jacobian = _seen_rows(problem.jacobian(coordinates, state, frame)[:, free] * scales, residual)
+        except ConvergenceError as error:
+            empty = np.zeros((len(residual), len(scales)))
+            return FrameSolution(coordinates, residual, empty, iteration, False, f"no derivatives there: {error}")
+        step = _bounded(jacobian, -seen(residual), 1.0)
+        gain = float(np.linalg.norm(jacobian @ step))
+        if gain <= _SMALL * _size(residual) or gain <= tolerance:
+            return FrameSolution(coordinates, residual, jacobian, iteration, True)
+        for _ in range(_TRIALS):
+            trial = coordinates.copy()
+            trial[free] += scales * step
+            found = problem.residual(trial, frame)
+            if found is not None and _size(found[0]) < _size(residual):
+                break
+            step = _bounded(jacobian, -seen(residual), 0.25 * float(np.abs(step).max()))
+        else:
+            return FrameSolution(coordinates, residual, jacobian, iteration, False, "no step lessens the residual")
+        coordinates, (residual, state) = trial, found
+        if _size(residual) <= tolerance:
+            return FrameSolution(coordinates, residual, jacobian, iteration, True)
+    return FrameSolution(coordinates, residual, jacobian, max_iterations, False, "max_iterations were not enough")
+
+
+def all_frames(
+    problem: Problem,
+    frames: list[int],
+    start: dict[int, FloatArray],
+    tolerance: float,
+    max_iterations: int,
+    progress: Callable[[], None] = lambda: None,
+) -> dict[int, FrameSolution]:
+    """Fit all frames at once, for coordinates that they share and those that each has of its own.
+
+    The latter are eliminated frame by frame: with U the range of J_local, shared coordinates solve the least squares of
+    (I - U U^T) (J_shared x + r), stacked over frames.
+    """
+    local = problem.per_frame
+    points = {frame: start[frame].copy() for frame in frames}
+    solutions = _linearised(problem, points, progress)
+    frames = list(solutions)  # those that have an equilibrium to begin with
+    if not frames:
+        return {}
+    for iteration in range(1, max_iterations + 1):
+        size = _total(solutions)
+        steps = _joint_step(solutions, local, 1.0)
+        gain = np.sqrt(sum(float(np.sum((solutions[f].jacobian @ steps[f]) ** 2)) for f in frames))
+        if gain <= _SMALL * size or gain <= tolerance:
+            return _closed(solutions, iteration, True)
+        for _ in range(_TRIALS):
+            trial = {f: solutions[f].coordinates + problem.scales * steps[f] for f in frames}
+            tried = _linearised(problem, trial, progress)
+            if len(tried) == len(frames) and _total(tried) < size:
+                break
+            farthest = max(float(np.abs(step).max()) for step in steps.values())
+            steps = _joint_step(solutions, local, 0.25 * farthest)
+        else:
+            return _closed(solutions, iteration, False, "no step lessens the residual")
+        solutions = tried
+    return _closed(solutions, max_iterations, False, "max_iterations were not enough")
+
+
+def _linearised(
+    problem: Problem, points: dict[int, FloatArray], progress: Callable[[], None]
+) -> dict[int, FrameSolution]:
+    """Residuals and derivatives of all frames that have them."""
+    found = {}
+    for frame, point in points.items():
+        evaluated = problem.residual(point, frame)
+        if evaluated is None:
+            continue
+        residual, state = evaluated
+        try:
+            jacobian = _seen_rows(problem.jacobian(point, state, frame) * problem.scales, residual)
+        except ConvergenceError:
+            continue
+        found[frame] = FrameSolution(point, residual, jacobian, 0, False)
+        progress()
+    return found
+
+
+def _total(solutions: dict[int, FrameSolution]) -> float:
+    return float(np.sqrt(sum(_size(solution.residual) ** 2 for solution in solutions.values())))
+
+
+def range_of(matrix: FloatArray) -> FloatArray:
+    """An orthonormal basis of what a matrix reaches."""
+    u, values, _ = np.linalg.svd(matrix, full_matrices=False)
+    return np.asarray(u[:, values > _RANK * values.max(initial=0.0)])
+
+
+def reduced(solutions: dict[int, FrameSolution], local: BoolArray) -> tuple[FloatArray, FloatArray]:
+    """Derivatives by shared coordinates, and residuals, without what each frame's own coordinates make good."""
+    rows, right = [], []
+    for solution in solutions.values():
+        basis = range_of(solution.jacobian[:, local])
+        shared, residual = solution.jacobian[:, ~local], seen(solution.residual)
+        rows.append(shared - basis @ (basis.T @ shared))
+        right.append(residual - basis @ (basis.T @ residual))
+    return np.concatenate(rows), np.concatenate(right)
+
+
+def _joint_step(solutions: dict[int, FrameSolution], local: BoolArray, radius: float) -> dict[int, FloatArray]:
+    """Steps of all frames together, with so much of Levenberg's damping that no coordinate goes beyond a radius."""
+    greatest = max(float(np.sum(solution.jacobian**2)) for solution in solutions.values())
+    damping = 0.0
+    while True:
+        steps = _damped_step(solutions, local, damping)
+        if not max(float(np.abs(step).max()) for step in steps.values()) > radius:
+            return steps
+        damping = 3.0 * damping or 1e-9 * greatest
+
+
+def _damped_step(solutions: dict[int, FrameSolution], local: BoolArray, damping: float) -> dict[int, FloatArray]:
+    """Least of sum |J s + r|^2 + damping |s|^2, s the steps: what frames share, and then what each needs besides."""
+    root, count = np.sqrt(damping), int(local.sum())
+    extra = {}
+    for frame, solution in solutions.items():
+        rows = np.zeros((count, len(local)))
+        rows[:, local] = root * np.eye(count)
+        residual = np.concatenate([seen(solution.residual), np.zeros(count)])
+        extra[frame] = replace(solution, residual=residual, jacobian=np.concatenate([solution.jacobian, rows]))
+    matrix, right = reduced(extra, local)
+    free = matrix.shape[1]
+    matrix, right = np.concatenate([matrix, root * np.eye(free)]), np.concatenate([right, np.zeros(free)])
+    shared = _bounded(matrix, -right, np.inf)
+    steps = {}
+    for frame, solution in extra.items():
+        step = np.empty(len(local))
+        step[~local] = shared
+        step[local] = _bounded(
+            solution.jacobian[:, local], -solution.residual - solution.jacobian[:, ~local] @ shared, np.inf
+        )
+        steps[frame] = step
+    return steps
+
+
+def _closed(
+    solutions: dict[int, FrameSolution], iterations: int, converged: bool, reason: str = ""
+) -> dict[int, FrameSolution]:
+    for solution in solutions.values():
+        solution.iterations, solution.converged, solution.reason = iterations, converged, reason
+    return solutions
+
+
+def weaknesses(jacobian: FloatArray, rows: int, misfit: float) -> list[Weakness]:
+    """Directions in which a change by one scale moves the targets by less than the misfit, or than rounding.
+
+    Were the misfit systematic, the least squares could be off by more than the scale there.
+
+    Parameters
+    ----------
+    jacobian : ndarray of shape (residuals, n)
+        By coordinates over their scales.
+    rows : int
+        Residuals that were seen.
+    misfit : float
+        Root of the mean square of the residuals.
+    """
+    count = jacobian.shape[1]
+    if rows == 0 or count == 0:
+        return []
+    _, values, vectors = np.linalg.svd(jacobian, full_matrices=True)
+    values = np.concatenate([values, np.zeros(count - len(values))])
+    effects = values / np.sqrt(rows)
+    least = max(misfit, _RANK * float(effects.max()))
+    return [Weakness(vectors[i], float(effects[i])) for i in range(count) if effects[i] < least or effects[i] == 0.0]

@@ -1,0 +1,177 @@
+"""What a fit found."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from withe.parts.handles import Rod
+from withe.real2sim.unknowns import Unknown
+from withe.simulation.simulation import Simulation
+
+__all__ = ["Fit", "Outlier", "Unobservable"]
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Outlier:
+    """A tag that jumped in one frame against what the fit left of it in the frames around.
+
+    Attributes
+    ----------
+    frame, tag : int
+        From 0.
+    jump : float
+        Distance from the running median of its residual, were it left out of the fit, in the unit of the target
+        [px or m].
+    scatter : float
+        Usual distance, 1.48 times the median.
+    """
+
+    frame: int
+    tag: int
+    jump: float
+    scatter: float
+
+    def __str__(self) -> str:
+        return (
+            f"frame {self.frame}: tag {self.tag} jumps by {self.jump:.3g}, usual is {self.scatter:.2g}; leave it out "
+            "by targets.without(fit.outliers)"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Unobservable:
+    """A combination of unknowns that the targets do not tell.
+
+    Attributes
+    ----------
+    weights : dict of str to float
+        Share of each unknown in it: of the logarithm of a parameter, of natural curvature times the rod's length.
+    effect : float
+        How far targets move (root of the mean square) with a change by a factor e, or by a turn of one radian,
+        while all other unknowns adapt; in units of sigma, or of the target without one.
+    misfit : float
+        What the fit leaves (root of the mean square), in the same unit: were it systematic, it would hide that change.
+    frames : tuple of int
+        Where, if it is not everywhere.
+    """
+
+    weights: dict[str, float]
+    effect: float
+    misfit: float
+    frames: tuple[int, ...] = ()
+
+    def __str__(self) -> str:
+        main = sorted(self.weights.items(), key=lambda item: -abs(item[1]))[:4]
+        text = main[0][0] if len(main) == 1 else " ".join(f"{weight:+.2f} {name}" for name, weight in main)
+        where = f" in {len(self.frames)} frames" if self.frames else ""
+        return f"{text}: moves the targets by {self.effect:.2g}, the misfit is {self.misfit:.2g}{where}"
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """What a fit found, frame by frame.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Of the unknowns.
+    values : ndarray of shape (frames, unknowns)
+        In SI units; what frames share stands in every row. NaN in frames that were skipped.
+    residuals : ndarray of shape (frames, residuals)
+        Simulated less seen, in units of sigma, or of the target without one; NaN where nothing was seen.
+    covariance : ndarray of shape (frames, unknowns, unknowns)
+        Of the values, for independent errors of the targets. Their variance is that of sigma, or what all frames
+        leave, divided by the degrees of freedom; NaN without either, infinite where the targets tell nothing.
+    solves : ndarray of int of shape (frames,)
+        Equilibria that the search took in each frame.
+    iterations : ndarray of int of shape (frames,)
+        Outer iterations.
+    converged : ndarray of bool of shape (frames,)
+        Whether no change of the unknowns would bring the frame nearer; what is out of reach leaves a residual.
+    reasons : dict of int to str
+        Why frames did not converge, or were skipped.
+    unobservable : tuple of Unobservable
+        Combinations of unknowns that the targets do not tell; print them.
+    outliers : tuple of Outlier
+        Tags that jump in one frame.
+    """
+
+    names: tuple[str, ...]
+    values: FloatArray
+    residuals: FloatArray
+    covariance: FloatArray
+    solves: npt.NDArray[np.int64]
+    iterations: npt.NDArray[np.int64]
+    converged: npt.NDArray[np.bool_]
+    reasons: dict[int, str]
+    unobservable: tuple[Unobservable, ...]
+    outliers: tuple[Outlier, ...]
+    _unknowns: tuple[Unknown, ...] = field(repr=False)
+    _coordinates: FloatArray = field(repr=False)
+
+    @property
+    def skipped(self) -> tuple[int, ...]:
+        """Frames in which nothing was seen."""
+        return tuple(int(i) for i in np.flatnonzero(np.isnan(self.residuals).all(axis=1)))
+
+    @property
+    def rms(self) -> FloatArray:
+        """Root of the mean square of every frame's residuals, shape (frames,); NaN where nothing was seen."""
+        known = np.isfinite(self.residuals)
+        sums = np.where(known, self.residuals, 0.0) ** 2
+        counts = known.sum(axis=1)
+        return np.asarray(
+            np.sqrt(np.divide(sums.sum(axis=1), counts, where=counts > 0, out=np.full(len(counts), np.nan)))
+        )
+
+    def value(self, rod: Rod | str, word: str = "natural_curvature") -> FloatArray:
+        """Values of one unknown, shape (frames, n): of a rod, or `value("delay")`.
+
+        Raises
+        ------
+        ValueError
+            It was none.
+        """
+        return self.values[:, self._place(rod, word)]
+
+    def sigma(self, rod: Rod | str, word: str = "natural_curvature") -> FloatArray:
+        """Standard deviations of one unknown, shape (frames, n)."""
+        deviations = np.sqrt(np.diagonal(self.covariance, axis1=1, axis2=2))
+        return np.asarray(deviations[:, self._place(rod, word)])
+
+    def apply(self, simulation: Simulation, frame: int = -1) -> None:
+        """Set in a simulation what was found for a frame.
+
+        Parameters
+        ----------
+        simulation : Simulation
+            The one that was fitted, or another of the same scene.
+        frame : int
+
+        Raises
+        ------
+        ValueError
+            A frame that was skipped, or another scene.
+        """
+        coordinates = self._coordinates[frame]
+        if not np.isfinite(coordinates).all():
+            raise ValueError(f"frame {frame} was skipped, as nothing was seen in it: give one with values")
+        start = 0
+        for unknown in self._unknowns:
+            unknown.write(simulation, coordinates[start : start + len(unknown)])
+            start += len(unknown)
+
+    def _place(self, rod: Rod | str, word: str) -> slice:
+        name = rod if isinstance(rod, str) else rod.name
+        word = name if name == "delay" else word
+        start = 0
+        for unknown in self._unknowns:
+            if unknown.word == word and (name in unknown.rods or name == word):
+                return slice(start, start + len(unknown))
+            start += len(unknown)
+        raise ValueError(f"{word} of rod {name!r} was not fitted; these were: {', '.join(self.names)}")

@@ -1,0 +1,145 @@
+"""Equilibria for unknown numbers, how far they are from what was seen, and how that changes with the numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from withe.errors import ConvergenceError
+from withe.real2sim.targets import Residual
+from withe.real2sim.unknowns import Coordinates, Unknown
+from withe.simulation.gradients import equilibrium_gradients
+from withe.simulation.simulation import Simulation
+
+__all__ = ["Conditions", "Equilibria", "Stills"]
+
+FloatArray = npt.NDArray[np.float64]
+Conditions = Callable[[Simulation, int], object]
+
+_DIFFERENCE = 1e-4  # of the scale of an unknown: truncation 1e-8 of it squared, rounding about as much
+
+
+class Equilibria(Coordinates):
+    """The equilibrium of every frame.
+
+    Parameters
+    ----------
+    simulation : Simulation
+        It is changed.
+    unknowns : list of Unknown
+    conditions : callable, optional
+        Called with the simulation and the frame before an equilibrium is looked for.
+
+    Attributes
+    ----------
+    solves : int
+        Equilibria so far.
+    """
+
+    def __init__(
+        self,
+        simulation: Simulation,
+        unknowns: Sequence[Unknown],
+        conditions: Conditions | None = None,
+    ) -> None:
+        super().__init__(simulation, unknowns)
+        self._conditions = conditions
+        self.solves = 0
+
+    def positions(self, coordinates: FloatArray, frame: int) -> FloatArray:
+        """Where the nodes come to rest, shape (nodes, 3) [m].
+
+        Raises
+        ------
+        ConvergenceError
+            Nowhere; the simulation is then where it was before, with other numbers.
+        ValueError
+            There are no such numbers.
+        """
+        try:
+            return self._go(coordinates, frame)
+        except (ConvergenceError, ValueError):
+            self.forget()
+            raise
+
+    def _go(self, coordinates: FloatArray, frame: int) -> FloatArray:
+        unchanged = self._conditions is None and np.array_equal(coordinates, self._written)
+        self.write(coordinates)
+        if unchanged:
+            return self.simulation.positions()
+        if self._conditions is not None:
+            self._conditions(self.simulation, frame)
+        self.solves += 1
+        self.simulation.equilibrium()
+        return self.simulation.positions()
+
+    def derivatives(self, by_positions: FloatArray, coordinates: FloatArray, frame: int) -> FloatArray:
+        """Derivatives of m scalars of the present equilibrium by the coordinates, shape (m, n).
+
+        By the adjoint method; by central differences of equilibria where the engine knows no gradient.
+
+        Parameters
+        ----------
+        by_positions : ndarray of shape (m, nodes, 3)
+            Derivatives of the scalars by positions.
+        coordinates : ndarray of shape (n,)
+            Of that equilibrium.
+        frame : int
+
+        Raises
+        ------
+        ConvergenceError
+            The branch of equilibria ends here.
+        """
+        normal = self.simulation.plan.plane_normal
+        inside = by_positions if normal is None else by_positions - (by_positions @ normal)[..., None] * normal
+        words = [word for unknown in self.unknowns for word in unknown.words]
+        try:
+            found = equilibrium_gradients(self.simulation._session, list(inside), words)
+        except ValueError:
+            changes = self._differences(coordinates, frame)
+            return np.asarray(np.tensordot(by_positions, changes, axes=2))
+        columns, first = [], 0
+        for unknown, place in zip(self.unknowns, self.slices, strict=True):
+            columns.append(unknown.chain(coordinates[place], found[first : first + len(unknown.words)]))
+            first += len(unknown.words)
+        return np.concatenate(columns, axis=1)
+
+    def _differences(self, coordinates: FloatArray, frame: int) -> FloatArray:
+        """Derivatives of positions by coordinates, shape (nodes, 3, n), by central differences."""
+        columns = []
+        for i, scale in enumerate(self.scales):
+            step = np.zeros_like(coordinates)
+            step[i] = _DIFFERENCE * scale
+            ahead = self.positions(coordinates + step, frame)
+            behind = self.positions(coordinates - step, frame)
+            columns.append((ahead - behind) / (2.0 * step[i]))
+        return np.stack(columns, axis=2)
+
+
+class Stills(Equilibria):
+    """The equilibrium of every frame, and how far it is from a target."""
+
+    def __init__(
+        self,
+        simulation: Simulation,
+        unknowns: Sequence[Unknown],
+        residual: Residual,
+        conditions: Conditions | None = None,
+    ) -> None:
+        super().__init__(simulation, unknowns, conditions)
+        self._residual = residual
+
+    def residual(self, coordinates: FloatArray, frame: int) -> tuple[FloatArray, FloatArray] | None:
+        """Residual of a frame and positions; None where there is no equilibrium, or none of such numbers."""
+        try:
+            positions = self.positions(coordinates, frame)
+        except (ConvergenceError, ValueError):
+            return None
+        return self._residual.value(positions, frame), positions
+
+    def jacobian(self, coordinates: FloatArray, positions: FloatArray, frame: int) -> FloatArray:
+        """Derivatives of the residual by the coordinates, shape (residuals, n), at the present equilibrium."""
+        return self.derivatives(self._residual.derivative(positions, frame), coordinates, frame)

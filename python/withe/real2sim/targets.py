@@ -1,0 +1,338 @@
+"""What a simulation is to look like: curvatures, tags, or centrelines, frame by frame."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from withe.common import validation
+from withe.perception.camera import Camera
+from withe.real2sim.places import Place, Places, turning_axis
+from withe.simulation.simulation import Simulation
+
+__all__ = [
+    "Curvatures",
+    "Residual",
+    "Tags",
+    "Target",
+    "bind",
+    "checked_times",
+    "frames_of",
+    "pixel_derivative",
+    "turns",
+]
+
+FloatArray = npt.NDArray[np.float64]
+
+
+class Residual(ABC):
+    """How far positions are from a frame of a target, in units of `sigma`, or of 1; NaN where nothing was seen."""
+
+    @abstractmethod
+    def value(self, positions: FloatArray, frame: int) -> FloatArray:
+        """Shape (residuals,), of positions of shape (nodes, 3) [m]."""
+
+    @abstractmethod
+    def derivative(self, positions: FloatArray, frame: int) -> FloatArray:
+        """By the positions, shape (residuals, nodes, 3)."""
+
+
+class Target(ABC):
+    """What every frame shows. `times` are those of the frames [s], `sigma` a standard deviation; None if not known."""
+
+    times: Any
+    sigma: float | None
+
+    @property
+    @abstractmethod
+    def frames(self) -> int:
+        """Number of frames."""
+
+    @abstractmethod
+    def bind(self, simulation: Simulation) -> Residual:
+        """The residual for the nodes of a simulation."""
+
+
+def turns(points: FloatArray) -> FloatArray:
+    """Angles between the chords of points in a plane, counter-clockwise positive, (..., n, 2) -> (..., n - 2) [rad]."""
+    chords = np.diff(points, axis=-2)
+    before, after = chords[..., :-1, :], chords[..., 1:, :]
+    cross = before[..., 0] * after[..., 1] - before[..., 1] * after[..., 0]
+    return np.asarray(np.arctan2(cross, (before * after).sum(axis=-1)))
+
+
+@dataclass(eq=False)
+class Curvatures(Target):
+    """Discrete curvatures 2 tan(turn / 2) at tags, averaged over groups of them.
+
+    The turn at a tag is the angle between the chords to the tags before and after it, in a plane
+    [Bergou et al. 2008, section 4.2.1].
+
+    Parameters
+    ----------
+    values : array_like of shape (frames, groups)
+        NaN where a frame does not tell. Positive where natural curvature along the first material director in the plane
+        bends the rod so; about `normal` in space.
+    places : sequence
+        Where on the rods the tags are: nodes, or pairs of a rod and a length along it [m].
+    groups : sequence of sequences of int
+        Tags over which each value is a mean, counted from 0; the first and the last have no turn.
+    normal : array_like of shape (3,), optional
+        Axis about which positive turns go; not needed in a planar simulation.
+    sigma : float, optional
+        Standard deviation of the values; estimated from what a fit leaves where it is not given.
+    times : array_like of shape (frames,), optional [s]
+
+    Raises
+    ------
+    ValueError
+        Wrong shapes, or a group without tags or with one that has no turn.
+    """
+
+    values: npt.ArrayLike
+    places: Sequence[Place]
+    groups: Sequence[Sequence[int]]
+    normal: npt.ArrayLike | None = None
+    sigma: float | None = None
+    times: Any = None
+
+    def __post_init__(self) -> None:
+        self.groups = _checked_groups(self.groups, len(self.places))
+        self.values = _with_gaps(self.values, "values", (None, len(self.groups)))
+        self.sigma = None if self.sigma is None else validation.positive(self.sigma, "sigma")
+        self.normal = None if self.normal is None else validation.unit_vector(self.normal, "normal")
+        self.times = checked_times(self.times, len(self.values))
+
+    @classmethod
+    def from_pixels(
+        cls, pixels: npt.ArrayLike, places: Sequence[Place], groups: Sequence[Sequence[int]], **options: Any
+    ) -> Curvatures:
+        """Curvatures that a picture of tags shows, seen at right angles to the plane in which they move.
+
+        Parameters
+        ----------
+        pixels : array_like of shape (frames, tags, 2) [px]
+            x to the right, y down; NaN where a tag was not seen. What turns counter-clockwise in the picture counts as
+            positive.
+        places, groups, **options
+            As in `Curvatures`.
+        """
+        seen = _with_gaps(pixels, "pixels", (None, len(places), 2))
+        curvature = 2.0 * np.tan(turns(seen * (1.0, -1.0)) / 2.0)
+        checked = _checked_groups(groups, len(places))
+        means = np.stack([curvature[:, np.array(group) - 1].mean(axis=1) for group in checked], axis=1)
+        return cls(means, places, checked, **options)
+
+    @property
+    def frames(self) -> int:
+        """Number of frames."""
+        return len(np.asarray(self.values))
+
+    def bind(self, simulation: Simulation) -> Residual:
+        """The residual for the nodes of a simulation."""
+        places = Places(simulation, self.places)
+        axis = self.normal
+        if axis is None:
+            plane = turning_axis(simulation, places.rods[0])
+            if plane is None:
+                raise ValueError("normal must be given: the simulation is not planar, and turns need an axis")
+            axis = plane[1]
+        return _CurvatureResidual(self, places, np.asarray(axis, np.float64))
+
+
+class _CurvatureResidual(Residual):
+    def __init__(self, target: Curvatures, places: Places, axis: FloatArray) -> None:
+        self._values, self._sigma, self._axis = np.asarray(target.values, np.float64), target.sigma or 1.0, axis
+        first = np.eye(3)[np.abs(axis).argmin()]
+        first = np.cross(first, axis)
+        self._plane = np.stack([first / np.linalg.norm(first), np.cross(axis, first) / np.linalg.norm(first)])
+        self._weights = places.weights()[0]
+        self._chords = np.diff(self._weights, axis=0)
+        self._bends = np.diff(np.eye(len(target.places) - 1), axis=0)  # of chords against each other
+        self._means = np.zeros((len(target.groups), len(target.places) - 2))
+        for row, group in enumerate(target.groups):
+            self._means[row, np.array(group) - 1] = 1.0 / len(group)
+
+    def value(self, positions: FloatArray, frame: int) -> FloatArray:
+        points = self._weights @ positions @ self._plane.T
+        found = self._means @ (2.0 * np.tan(turns(points) / 2.0))
+        return np.asarray((found - self._values[frame]) / self._sigma)
+
+    def derivative(self, positions: FloatArray, frame: int) -> FloatArray:
+        points = self._weights @ positions @ self._plane.T
+        chords = np.diff(points, axis=0)
+        # A chord e turns by (e x de) / |e|^2 about the axis: by (axis x e) . de.
+        across = np.stack([-chords[:, 1], chords[:, 0]], axis=1) / (chords**2).sum(axis=1)[:, None]
+        slope = self._means * (1.0 + np.tan(turns(points) / 2.0) ** 2) / self._sigma
+        by_chord = (slope @ self._bends)[:, :, None] * (across @ self._plane)
+        return np.asarray(self._chords.T @ by_chord)
+
+
+@dataclass(eq=False)
+class Tags(Target):
+    """Where tags on rods were seen, in pixels or in metres.
+
+    Parameters
+    ----------
+    points : array_like of shape (frames, tags, 2) [px] or (frames, tags, 3) [m]
+        Pixels need a camera, which `calibrate` finds. NaN where a tag was not seen.
+    places : sequence
+        Where on the rods the tags are: nodes, or pairs of a rod and a length along it [m].
+    camera : perception.Camera, optional
+    sigma : float, optional [px or m]
+        Standard deviation of a coordinate; estimated from what a fit leaves where it is not given.
+    times : array_like of shape (frames,), optional [s]
+
+    Raises
+    ------
+    ValueError
+        Wrong shapes.
+    """
+
+    points: npt.ArrayLike
+    places: Sequence[Place]
+    camera: Camera | None = None
+    sigma: float | None = None
+    times: Any = None
+
+    def __post_init__(self) -> None:
+        in_pixels = self.camera is not None or np.shape(self.points)[-1:] == (2,)
+        what = "points in pixels" if in_pixels else "points in metres"
+        self.points = _with_gaps(self.points, what, (None, len(self.places), 2 if in_pixels else 3))
+        self.sigma = None if self.sigma is None else validation.positive(self.sigma, "sigma")
+        self.times = checked_times(self.times, len(self.points))
+
+    @property
+    def frames(self) -> int:
+        """Number of frames."""
+        return len(np.asarray(self.points))
+
+    def without(self, outliers: Sequence[tuple[int, int]]) -> Tags:
+        """The same without some tags in some frames.
+
+        Parameters
+        ----------
+        outliers : sequence of (frame, tag)
+            Such as `Fit.outliers`.
+        """
+        points = np.array(self.points)
+        for frame, tag, *_ in outliers:
+            points[frame, tag] = np.nan
+        return Tags(points, self.places, self.camera, self.sigma, self.times)
+
+    def bind(self, simulation: Simulation) -> Residual:
+        """The residual for the nodes of a simulation."""
+        if self.camera is None and np.shape(self.points)[2] == 2:
+            raise ValueError("camera must be given for tags in pixels; real2sim.calibrate finds one")
+        return _TagResidual(self, Places(simulation, self.places))
+
+
+class _TagResidual(Residual):
+    def __init__(self, target: Tags, places: Places) -> None:
+        self._points, self._camera, self._sigma = np.asarray(target.points), target.camera, target.sigma or 1.0
+        self._weights = places.weights()[0]
+
+    def value(self, positions: FloatArray, frame: int) -> FloatArray:
+        points = self._weights @ positions
+        seen = points if self._camera is None else self._camera.project(points)
+        return np.asarray((seen - self._points[frame]).ravel() / self._sigma)
+
+    def derivative(self, positions: FloatArray, frame: int) -> FloatArray:
+        tags = len(self._weights)
+        by_point = np.broadcast_to(np.eye(3), (tags, 3, 3))
+        if self._camera is not None:
+            by_point = pixel_derivative(self._camera, self._weights @ positions)
+        by_node = by_point[:, :, None] * self._weights[:, None, :, None] / self._sigma
+        return np.asarray(by_node.reshape(-1, *positions.shape))
+
+
+def pixel_derivative(camera: Camera, points: FloatArray) -> FloatArray:
+    """How pixels move with points, shape (n, 2, 3) [px/m], by central differences of the projection."""
+    step = 1e-5 * max(float(np.ptp(points, axis=0).max()), 1e-3)
+    near = points[None, None] + step * np.array([1.0, -1.0])[:, None, None, None] * np.eye(3)[None, :, None]
+    pixels = camera.project(near.reshape(-1, 3)).reshape(2, 3, len(points), 2)
+    return np.asarray(((pixels[0] - pixels[1]) / (2.0 * step)).transpose(1, 2, 0))
+
+
+class _Together(Residual):
+    """Several targets of the same frames."""
+
+    def __init__(self, residuals: list[Residual]) -> None:
+        self._residuals = residuals
+
+    def value(self, positions: FloatArray, frame: int) -> FloatArray:
+        return np.concatenate([residual.value(positions, frame) for residual in self._residuals])
+
+    def derivative(self, positions: FloatArray, frame: int) -> FloatArray:
+        return np.concatenate([residual.derivative(positions, frame) for residual in self._residuals])
+
+
+def frames_of(targets: Target | Sequence[Target]) -> list[Target]:
+    """Targets as a list; all have as many frames.
+
+    Raises
+    ------
+    ValueError
+        None, something else than targets, or unlike numbers of frames.
+    """
+    listed = [targets] if isinstance(targets, Target) else list(targets)
+    for target in listed:
+        if not isinstance(target, Target):
+            raise ValueError(f"targets must be Curvatures, Tags or Centrelines, got {type(target).__name__}")
+    if not listed or listed[0].frames == 0:
+        raise ValueError("targets must have at least one frame")
+    if len({target.frames for target in listed}) > 1:
+        counts = ", ".join(str(target.frames) for target in listed)
+        raise ValueError(f"targets must have the same number of frames, got {counts}")
+    if len(listed) > 1 and any(target.sigma is None for target in listed):
+        raise ValueError("sigma of every target must be given where there are several: it says how they weigh")
+    return listed
+
+
+def bind(targets: list[Target], simulation: Simulation) -> Residual:
+    """The residual of all targets for the nodes of a simulation."""
+    bound = [target.bind(simulation) for target in targets]
+    return bound[0] if len(bound) == 1 else _Together(bound)
+
+
+def _checked_groups(groups: Sequence[Sequence[int]], tags: int) -> list[tuple[int, ...]]:
+    if tags < 3:
+        raise ValueError(f"places must be three at least, got {tags}: a turn needs a tag on either side")
+    if len(groups) == 0:
+        raise ValueError("groups must be at least one, got none")
+    checked = []
+    for group in groups:
+        if len(group) == 0:
+            raise ValueError("groups must have at least one tag each, got an empty one")
+        checked.append(tuple(validation.integer(tag, "tags of groups", 1, tags - 2) for tag in group))
+    return checked
+
+
+def _with_gaps(values: npt.ArrayLike, what: str, shape: tuple[int | None, ...]) -> FloatArray:
+    """A copy as numbers, of which some may be NaN."""
+    try:
+        array = np.array(np.ma.filled(np.ma.asarray(values, dtype=float), np.nan), np.float64)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"{what} must be numbers: {error}") from None
+    fits = array.ndim == len(shape) and all(n is None or n == m for n, m in zip(shape, array.shape, strict=True))
+    if not fits:
+        wanted = ", ".join("frames" if n is None else str(n) for n in shape)
+        raise ValueError(f"{what} must have shape ({wanted}), got {array.shape}")
+    if np.isinf(array).any():
+        raise ValueError(f"{what} must be finite, or NaN where nothing was seen, got infinity")
+    return array
+
+
+def checked_times(times: Any, frames: int) -> FloatArray | None:
+    """Times of frames, if they are given: numbers that grow."""
+    if times is None:
+        return None
+    array = validation.number_array(times, "times", (frames,))
+    if (np.diff(array) <= 0.0).any():
+        raise ValueError("times must grow from frame to frame")
+    return array

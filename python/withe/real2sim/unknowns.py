@@ -1,0 +1,320 @@
+"""What is looked for: natural curvature over a few functions, and parameters of rods, in the words of `set`."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from withe.common import validation
+from withe.parts.handles import Handle, Rod
+from withe.parts.kinds import RodPart
+from withe.parts.parameters import ROD_WORDS
+from withe.real2sim.places import rod_part, turning_axis
+from withe.simulation.simulation import Simulation
+
+__all__ = ["Coordinates", "Delay", "NaturalCurvature", "Tilt", "Unknown", "parse_unknowns"]
+
+FloatArray = npt.NDArray[np.float64]
+
+_POSITIVE = (*(word for word in ROD_WORDS if word != "poisson_ratio"), "mass", "friction")
+
+
+class Unknown(ABC):
+    """Some numbers of a simulation.
+
+    Attributes
+    ----------
+    word, rods : str, tuple of str
+        What it is, and of which rods.
+    names : tuple of str
+        Of each number.
+    scales : ndarray of shape (n,)
+        A change of each coordinate that counts as large: all it may do must be visible.
+    """
+
+    word: str
+    rods: tuple[str, ...]
+    names: tuple[str, ...]
+    scales: FloatArray
+    per_frame: bool
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    @abstractmethod
+    def read(self, simulation: Simulation) -> FloatArray:
+        """Coordinates of the present value, shape (n,)."""
+
+    @abstractmethod
+    def write(self, simulation: Simulation, coordinates: FloatArray) -> None:
+        """Set them."""
+
+    @property
+    @abstractmethod
+    def words(self) -> list[Any]:
+        """What to ask the engine for derivatives by, to have those by the coordinates."""
+
+    @abstractmethod
+    def chain(self, coordinates: FloatArray, found: list[list[Any]]) -> FloatArray:
+        """Derivatives of m scalars by the coordinates, shape (m, n), from those by the words, m each."""
+
+    def value(self, coordinates: FloatArray) -> FloatArray:
+        """What the coordinates, of shape (..., n), mean, in SI units."""
+        return coordinates
+
+    def slope(self, coordinates: FloatArray) -> FloatArray:
+        """Derivatives of `value`."""
+        return np.ones_like(coordinates)
+
+
+class Coordinates:
+    """All unknowns of a simulation as one vector.
+
+    Attributes
+    ----------
+    names, scales
+        Of all coordinates, in the order of the unknowns.
+    slices : list of slice
+        Those of each unknown.
+    per_frame : ndarray of bool
+        Which of them every frame has of its own.
+    """
+
+    def __init__(self, simulation: Simulation, unknowns: Sequence[Unknown]) -> None:
+        self.simulation, self.unknowns = simulation, list(unknowns)
+        self.names = tuple(name for unknown in self.unknowns for name in unknown.names)
+        self.scales = np.concatenate([unknown.scales for unknown in self.unknowns])
+        self.per_frame = np.repeat([unknown.per_frame for unknown in self.unknowns], [len(u) for u in self.unknowns])
+        ends = np.cumsum([0, *(len(unknown) for unknown in self.unknowns)])
+        self.slices = [slice(a, b) for a, b in pairwise(ends)]
+        self._written = np.full(len(self.names), np.nan)
+
+    def begin(self) -> FloatArray:
+        """Those of what the simulation has now."""
+        return np.concatenate([unknown.read(self.simulation) for unknown in self.unknowns])
+
+    def write(self, coordinates: FloatArray) -> None:
+        """Set what is not set yet."""
+        for unknown, place in zip(self.unknowns, self.slices, strict=True):
+            if not np.array_equal(coordinates[place], self._written[place]):
+                unknown.write(self.simulation, coordinates[place])
+                self._written[place] = coordinates[place]
+
+    def forget(self) -> None:
+        """What was set may not be there any more."""
+        self._written[:] = np.nan
+
+
+class NaturalCurvature(Unknown):
+    """Natural curvature of a rod as a sum of functions along it [1/m]."""
+
+    word = "natural_curvature"
+    per_frame = True
+
+    def __init__(self, simulation: Simulation, rod: Rod | str, basis: Any = "constant") -> None:
+        part = rod_part(simulation, rod)
+        self._rod, self.rods = part.name, (part.name,)
+        self.length = float(part.lengths.sum())
+        functions, words = _basis(part, basis)
+        plane = turning_axis(simulation, part)
+        self._directions = np.eye(2) if plane is None else plane[0][None]
+        axes = [" towards d1", " towards d2"] if plane is None else [""]
+        self.names = tuple(f"natural_curvature of {part.name!r}{axis}{word}" for axis in axes for word in words)
+        self._fields = np.concatenate([functions[:, :, None] * direction for direction in self._directions], axis=1)
+        self._inverse = np.linalg.pinv(self._fields.transpose(0, 2, 1).reshape(-1, len(self.names)))
+        largest = np.abs(functions).max(axis=0)
+        if not (largest > 0.0).all():
+            raise ValueError(f"basis of {part.owner} must have no column of zeros")
+        self.scales = np.tile(1.0 / (self.length * largest), len(axes))
+
+    def read(self, simulation: Simulation) -> FloatArray:
+        """Coordinates of the nearest curvature that the functions make."""
+        return np.asarray(self._inverse @ simulation.get(self._rod, self.word).ravel())
+
+    def write(self, simulation: Simulation, coordinates: FloatArray) -> None:
+        """Set them."""
+        simulation.set(self._rod, natural_curvature=np.einsum("snc,n->sc", self._fields, coordinates))
+
+    @property
+    def words(self) -> list[Any]:
+        """Natural curvature of the rod."""
+        return [(self._rod, self.word)]
+
+    def chain(self, coordinates: FloatArray, found: list[list[Any]]) -> FloatArray:
+        """What each function stands for."""
+        return np.asarray(np.tensordot(np.array(found[0]), self._fields, axes=([1, 2], [0, 2])))
+
+
+class Parameter(Unknown):
+    """A positive parameter of one or several parts, as the logarithm of what it is multiplied by."""
+
+    per_frame = False
+
+    def __init__(self, simulation: Simulation, handles: Sequence[Handle | str], word: str) -> None:
+        parts = [simulation._session.directory.find_any(handle, "unknowns") for handle in handles]
+        self.word, self.rods = word, tuple(part.name for part in parts)
+        self._first: dict[str, Any] = {}
+        for part in parts:
+            value = simulation.get(part.name, word)
+            if value is None:
+                raise ValueError(
+                    f"{word} of {part.name!r} cannot be unknown: its stiffness was given without a material"
+                )
+            if not (np.asarray(value) > 0.0).all():
+                raise ValueError(
+                    f"{word} of {part.name!r} must be positive to begin with, as its logarithm is looked for: set a "
+                    f"first guess, simulation.set({part.name!r}, {word}=...)"
+                )
+            self._first[part.name] = np.asarray(value, np.float64) if np.ndim(value) else float(value)
+        self._mean = float(np.mean([np.mean(value) for value in self._first.values()]))
+        self.names = (f"{word} of {', '.join(map(repr, self.rods))}",)
+        self.scales = np.ones(1)
+
+    def read(self, simulation: Simulation) -> FloatArray:
+        """Logarithm of the present value over the first."""
+        name = self.rods[0]
+        return np.array([np.log(np.mean(simulation.get(name, self.word)) / np.mean(self._first[name]))])
+
+    def write(self, simulation: Simulation, coordinates: FloatArray) -> None:
+        """Multiply what it was at first."""
+        for name, first in self._first.items():
+            simulation.set(name, **{self.word: first * float(np.exp(coordinates[0]))})
+
+    @property
+    def words(self) -> list[Any]:
+        """The parameter of each rod."""
+        return [(name, self.word) for name in self.rods]
+
+    def chain(self, coordinates: FloatArray, found: list[list[Any]]) -> FloatArray:
+        """All values grow with the factor."""
+        factor, firsts = float(np.exp(coordinates[0])), self._first.values()
+        shares = [[np.sum(one * first * factor) for one in by] for by, first in zip(found, firsts, strict=True)]
+        return np.asarray(np.sum(shares, axis=0))[:, None]
+
+    def value(self, coordinates: FloatArray) -> FloatArray:
+        """Its mean over the parts, in SI units."""
+        return np.asarray(self._mean * np.exp(coordinates))
+
+    def slope(self, coordinates: FloatArray) -> FloatArray:
+        """The value itself, as the coordinate is a logarithm."""
+        return self.value(coordinates)
+
+
+class Tilt(Unknown):
+    """Angle by which the base of a robot in a plane is tilted: gravity is turned the other way."""
+
+    word, per_frame = "gravity", False
+    name = "tilt of the base"
+
+    def __init__(self, simulation: Simulation) -> None:
+        part = rod_part(simulation, simulation.rods[0])
+        plane = turning_axis(simulation, part)
+        assert plane is not None
+        self._axis, self._first = plane[1], simulation.get("gravity")
+        self.rods, self.names, self.scales = (), (self.name,), np.ones(1)
+
+    def read(self, simulation: Simulation) -> FloatArray:
+        """None yet."""
+        return np.zeros(1)
+
+    def write(self, simulation: Simulation, coordinates: FloatArray) -> None:
+        """Turn gravity."""
+        simulation.set(gravity=self.gravity(float(coordinates[0])))
+
+    @property
+    def words(self) -> list[Any]:
+        """Gravity."""
+        return ["gravity"]
+
+    def chain(self, coordinates: FloatArray, found: list[list[Any]]) -> FloatArray:
+        """As gravity turns."""
+        change = -np.cross(self._axis, self.gravity(float(coordinates[0])))
+        return np.asarray(np.array(found[0]) @ change)[:, None]
+
+    def gravity(self, tilt: float) -> FloatArray:
+        """Gravity as a base that is tilted feels it [m/s^2]."""
+        along = self._axis * (self._axis @ self._first)
+        across = np.cross(self._axis, self._first)
+        return np.asarray(along + np.cos(tilt) * (self._first - along) - np.sin(tilt) * across)
+
+
+class Delay(Unknown):
+    """How much later than a run the clock of what was seen began [s]."""
+
+    word, per_frame = "delay", False
+
+    def __init__(self, first: float, duration: float) -> None:
+        self._first = first
+        self.rods, self.names, self.scales = (), ("delay",), np.array([duration])
+
+    def read(self, simulation: Simulation) -> FloatArray:
+        """The first guess."""
+        return np.array([self._first])
+
+    def write(self, simulation: Simulation, coordinates: FloatArray) -> None:
+        """It is none of the simulation's."""
+
+    @property
+    def words(self) -> list[Any]:
+        """The engine knows none."""
+        return []
+
+    def chain(self, coordinates: FloatArray, found: list[list[Any]]) -> FloatArray:
+        """No equilibrium depends on it."""
+        return np.zeros((0, 1))
+
+
+def parse_unknowns(simulation: Simulation, unknowns: Sequence[Any], what: str = "unknowns") -> list[Unknown]:
+    """Unknowns of what a user gave: tuples (part, word) or (rod, "natural_curvature", basis).
+
+    Raises
+    ------
+    ValueError
+        Something else, a word that cannot be unknown, or the same one twice.
+    """
+    if isinstance(unknowns, str) or not isinstance(unknowns, Sequence):
+        raise ValueError(f"{what} must be a list such as [(arm, 'natural_curvature', 'constant')], got {unknowns!r}")
+    found: list[Unknown] = []
+    seen: set[tuple[str, str]] = set()
+    for item in unknowns:
+        if not isinstance(item, tuple) or len(item) not in (2, 3) or not isinstance(item[1], str):
+            raise ValueError(f"{what} must be tuples (rod, word) or (rod, 'natural_curvature', basis), got {item!r}")
+        rod, word, *basis = item
+        if word == "natural_curvature":
+            unknown: Unknown = NaturalCurvature(simulation, rod, *basis)
+        elif word in _POSITIVE and not basis:
+            unknown = Parameter(simulation, list(rod) if isinstance(rod, tuple | list) else [rod], word)
+        else:
+            words = ", ".join(("natural_curvature", *_POSITIVE))
+            raise ValueError(f"{what} must be of {words}, only the first with a basis, got {item[1:]!r}")
+        for name in unknown.rods:
+            if (name, word) in seen:
+                raise ValueError(f"{what} must be different, got {word} of rod {name!r} twice")
+            seen.add((name, word))
+        found.append(unknown)
+    return found
+
+
+def _basis(part: RodPart, basis: Any) -> tuple[FloatArray, list[str]]:
+    """Functions along a rod at its stencils, shape (stencils, n), and what tells their coordinates apart."""
+    stencils = len(part.voronoi)
+    if stencils == 0:
+        raise ValueError(f"{part.owner} has no stencil that could bend: it needs three nodes")
+    ends = np.cumsum(part.lengths)
+    share = (ends if part.closed else ends[:-1]) / ends[-1]
+    if isinstance(basis, str):
+        validation.choice(basis, f"basis of {part.owner}", ("constant", "linear", "segment"))
+        if basis == "constant":
+            return np.ones((stencils, 1)), [""]
+        if basis == "linear":
+            return np.stack([1.0 - share, share], axis=1), [" at its start", " at its end"]
+        return np.eye(stencils), [f" at stencil {i}" for i in range(stencils)]
+    functions = validation.number_array(basis, f"basis of {part.owner}", (stencils, "n"))
+    if functions.shape[1] == 0:
+        raise ValueError(f"basis of {part.owner} must have at least one column")
+    return functions, [f" [{i}]" for i in range(functions.shape[1])]

@@ -1,0 +1,354 @@
+"""Fits find what was drawn, say how sure they are, and what the targets do not tell."""
+
+import numpy as np
+import pytest
+
+import withe
+from soft_limb import CONSTANT, LIMB, published, robot, seen_curvatures
+from withe.real2sim import Curvatures, Tags, fit
+from withe.real2sim.stills import Stills
+from withe.real2sim.unknowns import Tilt, parse_unknowns
+
+ARM = [("arm", "natural_curvature", "constant")]
+
+
+def arm(nodes=31, space=False, **options):
+    scene = withe.Scene()
+    rubber = withe.Material(youngs_modulus=1e6, density=1000.0)
+    rod = scene.add_rod(start=(0, 0, 0), end=(0.3, 0, 0), nodes=nodes, radius=5e-3, material=rubber, name="arm")
+    scene.clamp(rod.start)
+    return scene.build(integrator="static", planar=False if space else None, **options)
+
+
+def drawn(simulation, curvatures, places):
+    """Where places are, for natural curvatures one after the other, shape (frames, places, 3)."""
+    simulation = simulation.copy()
+    tags = []
+    for curvature in curvatures:
+        simulation.set("arm", natural_curvature=curvature)
+        simulation.equilibrium()
+        tags.append([simulation.positions("arm")[place] for place in places])
+    return np.array(tags)
+
+
+def names(places):
+    return [f"arm.node({place})" for place in places]
+
+
+def test_the_limbs_of_the_dissertation_are_explained_in_three_iterations_a_frame():
+    simulation, places = robot()
+    found = fit(simulation, seen_curvatures(places), CONSTANT, progress=False)
+    assert found.converged.all()
+    assert np.abs(found.residuals).sum(axis=1).max() < 1e-9
+    assert found.iterations.max() <= 3
+    assert np.degrees(np.abs(found.values * LIMB - published()[1])).max() < 0.6
+    assert found.unobservable == ()
+
+
+def test_published_turns_reach_the_published_tolerance():
+    simulation, places = robot()
+    residual = seen_curvatures(places).bind(simulation)
+    for frame, turns in enumerate(published()[1]):
+        for rod, turn in zip(("upper", "lower"), turns, strict=True):
+            simulation.set(rod, natural_curvature=(0.0, turn / LIMB))
+        simulation.equilibrium()
+        assert np.abs(residual.value(simulation.positions(), frame)).sum() < 2.5e-3
+
+
+def test_the_published_descent_takes_fewer_than_2000_equilibria():
+    simulation, places = robot()
+    found = fit(simulation, seen_curvatures(places), CONSTANT, method="source", progress=False)
+    assert found.converged.all()
+    assert np.abs(found.residuals).sum(axis=1).max() < 2.5e-3
+    assert found.solves.sum() < 2000
+
+
+@pytest.mark.parametrize("method", ["gauss_newton", "lbfgs"])
+@pytest.mark.parametrize(
+    ("basis", "curvature"),
+    [
+        ("constant", np.full(29, 4.0)),
+        ("linear", np.linspace(1 / 30, 29 / 30, 29) * 10 - 2),
+        (np.stack([np.ones(29), np.arange(29) < 15], axis=1), 2 + 5.0 * (np.arange(29) < 15)),
+    ],
+)
+def test_curvature_along_a_rod_is_found(basis, curvature, method):
+    simulation = arm()
+    places = range(5, 31, 5)
+    tags = drawn(simulation, [np.stack([0 * curvature, curvature], axis=1)], places)
+    found = fit(simulation, Tags(tags, names(places)), [("arm", "natural_curvature", basis)], method, progress=False)
+    assert found.converged.all()
+    found.apply(simulation, 0)
+    tolerance = 1e-5 if method == "gauss_newton" else 1e-2
+    assert simulation.get("arm", "natural_curvature")[:, 1] == pytest.approx(curvature, abs=tolerance)
+    assert np.abs(found.residuals).max() < tolerance * 1e-2
+
+
+def test_in_space_both_curvatures_are_found():
+    simulation = arm(space=True)
+    tags = drawn(simulation, [(3.0, -5.0), (3.5, -5.0)], range(5, 31, 5))
+    found = fit(simulation, Tags(tags, names(range(5, 31, 5))), ARM, progress=False)
+    assert found.values == pytest.approx(np.array([(3.0, -5.0), (3.5, -5.0)]), abs=1e-6)
+    assert found.names[0] == "natural_curvature of 'arm' towards d1"
+
+
+def test_the_simulation_is_left_as_it_was():
+    simulation = arm()
+    tags = drawn(simulation, [(0.0, 5.0)], [30])
+    before = simulation.snapshot()
+    fit(simulation, Tags(tags, ["arm.end"]), ARM, progress=False)
+    assert np.array_equal(simulation.get("arm", "natural_curvature"), np.zeros((29, 2)))
+    simulation.equilibrium()
+    simulation.restore(before)
+
+
+def test_a_stiffness_that_all_frames_share_is_found_with_the_curvature_of_each():
+    truth = arm()
+    truth.set("arm", youngs_modulus=2.3e6)
+    places = range(3, 31, 3)
+    tags = drawn(truth, [(0.0, k) for k in (-3.0, 0.0, 4.0)], places)
+    found = fit(arm(), Tags(tags, names(places)), [*ARM, ("arm", "youngs_modulus")], progress=False)
+    assert found.value("arm", "youngs_modulus") == pytest.approx(2.3e6, rel=1e-6)
+    assert found.value("arm")[:, 0] == pytest.approx([-3.0, 0.0, 4.0], abs=1e-5)
+    assert found.unobservable == ()
+
+
+def test_a_curvature_shared_by_several_loads_is_found_with_the_stiffness():
+    scene = withe.Scene(gravity=(0, 0, 0))
+    rubber = withe.Material(youngs_modulus=1e6, density=1000.0)
+    rod = scene.add_rod(start=(0, 0, 0), end=(0.3, 0, 0), nodes=31, radius=5e-3, material=rubber, name="arm")
+    scene.clamp(rod.start)
+    load = scene.add_force(rod.end, (0, 0, 0))
+    forces = np.array([0.0, 1e-3, 3e-3])
+    simulation = scene.build(integrator="static", planar=False)
+
+    def hang(simulation, frame):
+        simulation.set(load, force=(0, 0, -forces[frame]))
+
+    truth = simulation.copy()
+    truth.set(rod, youngs_modulus=7e5, natural_curvature=(0, 2.0))
+    tags = []
+    for frame in range(3):
+        hang(truth, frame)
+        truth.equilibrium()
+        tags.append(truth.positions(rod)[[15, 30]])
+    found = fit(
+        simulation,
+        Tags(tags, names([15, 30])),
+        [(rod, "youngs_modulus")],
+        shared=ARM,
+        conditions=hang,
+        progress=False,
+    )
+    assert found.value(rod, "youngs_modulus")[0] == pytest.approx(7e5, rel=1e-6)
+    assert found.value(rod)[0] == pytest.approx([0.0, 2.0], abs=1e-6)
+
+
+def test_a_mass_at_the_tip_is_weighed():
+    def loaded(mass):
+        scene = withe.Scene()
+        rubber = withe.Material(youngs_modulus=2e7, density=1000.0)
+        rod = scene.add_rod(start=(0, 0, 0), end=(0.3, 0, 0), nodes=31, radius=5e-3, material=rubber, name="arm")
+        scene.clamp(rod.start)
+        scene.add_mass(rod.end, mass, name="weight")
+        return scene.build(integrator="static")
+
+    truth = loaded(0.02)
+    truth.equilibrium()
+    tags = truth.positions("arm")[None, [15, 30]]
+    found = fit(loaded(0.01), Tags(tags, names([15, 30])), [("weight", "mass")], progress=False)
+    assert found.value("weight", "mass")[0] == pytest.approx([0.02], rel=1e-6)
+
+
+def test_stiffness_and_weight_are_told_as_one_number():
+    truth = arm()
+    truth.set("arm", youngs_modulus=1.5e6)
+    places = range(3, 31, 3)
+    tags = drawn(truth, [(0.0, 0.0)], places)
+    unknowns = [("arm", "youngs_modulus"), ("arm", "density")]
+    found = fit(arm(), Tags(tags, names(places)), unknowns, progress=False)
+    assert found.converged.all()
+    (only,) = found.unobservable
+    assert set(only.weights) == {"youngs_modulus of 'arm'", "density of 'arm'"}
+    assert np.prod(list(only.weights.values())) == pytest.approx(0.5, abs=0.01)
+    ratio = found.value("arm", "youngs_modulus") / found.value("arm", "density")
+    assert ratio == pytest.approx(1500.0, rel=1e-6)
+    assert np.isinf(found.sigma("arm", "density")).all()
+
+
+def test_frames_in_which_nothing_was_seen_are_skipped_and_lost_tags_left_out():
+    simulation = arm()
+    places = range(5, 31, 5)
+    tags = drawn(simulation, [(0.0, k) for k in (1.0, 2.0, 3.0)], places)
+    tags[1] = np.nan
+    tags[2, 4] = np.nan
+    found = fit(simulation, Tags(tags, names(places)), ARM, progress=False)
+    assert found.skipped == (1,)
+    assert found.reasons == {1: "nothing was seen"}
+    assert list(found.converged) == [True, False, True]
+    assert found.values[[0, 2], 0] == pytest.approx([1.0, 3.0], abs=1e-6)
+    with pytest.raises(ValueError, match="frame 1 was skipped"):
+        found.apply(simulation, 1)
+
+
+def test_a_shape_out_of_reach_leaves_its_residual():
+    simulation = arm()
+    simulation.set("arm", youngs_modulus=2e7)
+    found = fit(simulation, Tags([[(0.4, 0.0, 0.0)]], ["arm.end"]), ARM, progress=False)
+    assert found.converged.all()
+    reached = drawn(simulation, [(0.0, k) for k in np.linspace(0, 15, 151)], [30])[:, 0]
+    least = np.linalg.norm(reached - (0.4, 0, 0), axis=1).min()
+    assert np.linalg.norm(found.residuals[0]) == pytest.approx(least, rel=1e-3)
+
+
+def test_a_tag_that_jumps_in_one_frame_is_named():
+    simulation = arm()
+    places = range(5, 31, 5)
+    tags = drawn(simulation, [(0.0, 0.1 * k) for k in range(20)], places)
+    tags += np.random.default_rng(3).normal(0, 1e-4, tags.shape) * (1, 0, 1)
+    tags[12, 3] += (0.0, 0.0, 5e-3)
+    targets = Tags(tags, names(places))
+    found = fit(simulation, targets, ARM, progress=False)
+    (outlier,) = found.outliers
+    assert (outlier.frame, outlier.tag) == (12, 3)
+    assert outlier.jump == pytest.approx(5e-3, rel=0.2)
+    cleaned = fit(simulation, targets.without([(o.frame, o.tag) for o in found.outliers]), ARM, progress=False)
+    assert cleaned.outliers == ()
+    assert cleaned.rms[12] < 0.1 * found.rms[12]
+
+
+def test_errors_have_the_size_that_the_covariance_says():
+    coarse, fine = arm(), arm(nodes=121)
+    truth = np.array([(0.0, 3.0)])
+    exact = drawn(fine, truth, range(20, 121, 20))
+    camera = withe.perception.Camera(
+        [[1500.0, 0, 640], [0, 1500, 360], [0, 0, 1]],
+        rotation=[[1, 0, 0], [0, 0, -1], [0, 1, 0]],
+        translation=(0, 0, 1),
+    )
+    pixels = camera.project(exact[0])
+    rng = np.random.default_rng(11)
+    frames = pixels + rng.normal(0, 0.5, (100, *pixels.shape))
+    found = fit(coarse, Tags(frames, names(range(5, 31, 5)), camera, sigma=0.5), ARM, progress=False)
+    scaled = (found.value("arm")[:, 0] - 3.0) / found.sigma("arm")[:, 0]
+    assert 0.9 < np.sqrt(np.mean(scaled**2)) < 1.1
+    unknown = fit(coarse, Tags(frames, names(range(5, 31, 5)), camera), ARM, progress=False)
+    assert unknown.sigma("arm") == pytest.approx(found.sigma("arm"), rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("targets", "unknowns", "options", "message"),
+    [
+        (Tags([[(1, 0, 0)]], ["arm.end"]), [], {}, "unknowns must be at least one"),
+        (Tags([[(1, 0, 0)]], ["arm.end"]), "arm", {}, "unknowns must be a list"),
+        (Tags([[(1, 0, 0)]], ["arm.end"]), [("arm", "colour")], {}, "unknowns must be of natural_curvature"),
+        (Tags([[(1, 0, 0)]], ["arm.end"]), [*ARM, *ARM], {}, "natural_curvature of rod 'arm' twice"),
+        (Tags([[(1, 0, 0)]], ["arm.end"]), ARM, {"shared": ARM}, "in unknowns or in shared, got both"),
+        (Tags([[(1, 0, 0)]], ["arm.end"]), [("arm", "viscosity")], {}, "must be positive to begin with"),
+        (Tags([[(1, 0, 0)]], ["arm.end"]), [("arm", "natural_curvature", "cubic")], {}, "'constant' or 'linear' or"),
+        (Tags([[(1, 0, 0)]], ["arm.end"]), [("arm", "natural_curvature", np.ones((3, 1)))], {}, r"\(29, n\)"),
+        (Tags([[(1, 0, 0)]], ["arm.end"]), ARM, {"method": "newton"}, "method must be"),
+        (Tags([[(1, 0, 0)]], ["arm.end"]), [("arm", "density")], {"method": "source"}, "where frames share unknowns"),
+        (Tags([[[np.nan] * 3]] * 2, ["arm.end"]), ARM, {}, "show something in some frame, got nothing in all 2"),
+        ([Tags([[(1, 0, 0)]], ["arm.end"], sigma=1)] * 2 + [3], ARM, {}, "targets must be Curvatures"),
+        ([Tags([[(1, 0, 0)]] * n, ["arm.end"], sigma=1) for n in (1, 2)], ARM, {}, "same number of frames, got 1, 2"),
+        ([Tags([[(1, 0, 0)]], ["arm.end"])] * 2, ARM, {}, "sigma of every target must be given"),
+        (Tags([[(1, 0)]], ["arm.end"]), ARM, {}, "camera must be given for tags in pixels"),
+        (Tags([[(1, 0, 0)]], ["leg.end"]), ARM, {}, "no rod 'leg'"),
+        (Tags([[(1, 0, 0)]], [("arm", 0.5)]), ARM, {}, "must lie on rod 'arm', from 0 to 0.3 m, got 0.5"),
+    ],
+)
+def test_bad_input_is_refused(targets, unknowns, options, message):
+    with pytest.raises(ValueError, match=message):
+        fit(arm(), targets, unknowns, progress=False, **options)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: Tags([[(1, 0)]], ["a", "b"]), r"points in pixels must have shape \(frames, 2, 2\), got \(1, 1, 2\)"),
+        (lambda: Tags([[1, 0, 0]], ["a"]), r"points in metres must have shape \(frames, 1, 3\), got \(1, 3\)"),
+        (lambda: Tags([[(1, 0, np.inf)]], ["a"]), "must be finite, or NaN where nothing was seen"),
+        (lambda: Tags([[(1, 0, 0)]], ["a"], sigma=0), "sigma must be positive"),
+        (lambda: Tags([[(1, 0, 0)]] * 2, ["a"], times=[1, 1]), "times must grow"),
+        (lambda: Curvatures([[0.1]], ["a", "b"], [(1,)]), "places must be three at least"),
+        (lambda: Curvatures([[0.1]], ["a", "b", "c"], [(2,)]), "tags of groups must lie in 1..1, got 2"),
+        (lambda: Curvatures([[0.1]], ["a", "b", "c"], [()]), "at least one tag each"),
+        (lambda: Curvatures([[0.1, 0.2]], ["a", "b", "c"], [(1,)]), r"must have shape \(frames, 1\), got \(1, 2\)"),
+    ],
+)
+def test_bad_targets_are_refused(make, message):
+    with pytest.raises(ValueError, match=message):
+        make()
+
+
+def test_turns_in_space_need_an_axis():
+    targets = Curvatures([[0.1]], names([0, 15, 30]), [(1,)])
+    with pytest.raises(ValueError, match="normal must be given"):
+        fit(arm(space=True), targets, ARM, progress=False)
+
+
+@pytest.mark.parametrize("space", [False, True])
+def test_derivatives_are_those_of_equilibria(space):
+    simulation = arm(space=space)
+    unknowns = parse_unknowns(simulation, [("arm", "natural_curvature", "linear"), ("arm", "youngs_modulus")])
+    unknowns += parse_unknowns(simulation, [("arm", "density")]) + ([] if space else [Tilt(simulation)])
+    stills = Stills(simulation, unknowns, Tags(np.zeros((1, 6, 3)), names(range(5, 31, 5))).bind(simulation))
+    coordinates = np.array([3.0, -2.0, 0.1, -0.2, 0.3] if not space else [3.0, -2.0, 1.0, 4.0, 0.1, -0.2])
+    found = stills.residual(coordinates, 0)
+    jacobian = stills.jacobian(coordinates, found[1], 0)
+    for i, step in enumerate(1e-4 * stills.scales):
+        ahead, behind = (stills.residual(coordinates + s * np.eye(len(coordinates))[i], 0)[0] for s in (step, -step))
+        scale = np.abs(jacobian[:, i]).max()
+        assert jacobian[:, i] == pytest.approx((ahead - behind) / (2 * step), abs=1e-5 * scale)
+
+
+def test_where_the_engine_knows_no_gradient_differences_take_its_place():
+    def hanging(modulus):
+        scene = withe.Scene()
+        rubber = withe.Material(youngs_modulus=modulus, density=1000.0)
+        rod = scene.add_rod(start=(0, 0, 0), end=(0.3, 0, 0), nodes=21, radius=8e-3, material=rubber, name="arm")
+        scene.clamp(rod.start)
+        scene.add_custom_force(
+            lambda time, positions, velocities: np.array([[0.0, 0.0, 0.05]] * 21) * (np.arange(21) == 20)[:, None]
+        )
+        simulation = scene.build(integrator="static", planar=False)
+        simulation.equilibrium()
+        return simulation
+
+    tags = hanging(3e6).positions("arm")[None, [10, 20]]
+    found = fit(hanging(2e6), Tags(tags, names([10, 20])), [("arm", "youngs_modulus")], progress=False)
+    assert found.values[0, 0] == pytest.approx(3e6, rel=1e-5)
+
+
+def test_a_rod_that_is_free_to_spin_is_fitted():
+    def rope(modulus):
+        scene = withe.Scene()
+        rubber = withe.Material(youngs_modulus=modulus, density=1000.0)
+        rod = scene.add_rod(start=(0, 0, 0), end=(0.3, 0, 0), nodes=21, radius=5e-3, material=rubber, name="arm")
+        scene.pin(rod.start)
+        scene.pin(rod.end, free=(1, 0, 0))
+        simulation = scene.build(integrator="static", planar=False)
+        simulation.equilibrium()
+        return simulation
+
+    tags = rope(3e6).positions("arm")[None, [5, 10]]
+    found = fit(rope(2e6), Tags(tags, names([5, 10])), [("arm", "youngs_modulus")], progress=False)
+    assert found.values[0, 0] == pytest.approx(3e6, rel=1e-4)
+
+
+@pytest.mark.parametrize("more", [[], [("arm", "youngs_modulus")]])
+def test_a_frame_without_equilibrium_says_so_and_the_others_are_fitted(more):
+    simulation = arm()
+    tags = drawn(simulation, [(0.0, 1.0), (0.0, 2.0)], [15, 30])
+
+    def conditions(simulation, frame):
+        simulation.set(gravity=(0, 0, -9.81))
+        if frame == 0:
+            raise withe.ConvergenceError("there is none")
+
+    found = fit(simulation, Tags(tags, names([15, 30])), [*ARM, *more], conditions=conditions, progress=False)
+    assert list(found.converged) == [False, True]
+    assert found.reasons == {0: "no equilibrium to begin with"}
+    assert found.values[1, 0] == pytest.approx(2.0, abs=1e-6)
+    assert np.isnan(found.rms[0])

@@ -1,0 +1,108 @@
+"""Stiffness, damping and the delay between two clocks are found from how a rod rings."""
+
+import numpy as np
+import pytest
+
+import withe
+from withe.real2sim import Tags, fit_motion
+
+UNKNOWNS = [("arm", "youngs_modulus"), ("arm", "viscosity"), "delay"]
+
+
+def ringing(modulus=1e6, viscosity=300.0, nodes=13, time_step=2.5e-3):
+    """A cantilever that was bent to the side and let go."""
+    scene = withe.Scene(gravity=(0, 0, -9.81))
+    rubber = withe.Material(youngs_modulus=modulus, density=1000.0, viscosity=viscosity)
+    arm = scene.add_rod(start=(0, 0, 0), end=(0, 0, -0.2), nodes=nodes, radius=5e-3, material=rubber, name="arm")
+    scene.clamp(arm.start)
+    scene.add_force(arm.end, (0.01, 0, 0))
+    simulation = scene.build(time_step=time_step, planar=True)
+    let_go(simulation)
+    return simulation
+
+
+def let_go(simulation):
+    """Bent by a force at the tip, which then vanishes."""
+    simulation.set("force 1", force=(0.01, 0, 0))
+    simulation.equilibrium()
+    simulation.set("force 1", force=(0, 0, 0))
+
+
+def seen(delay, noise=0.0, seed=0, **options):
+    """Tags of the middle and the tip, 25 a second."""
+    times = np.arange(0.04, 2.0, 0.04)
+    simulation = ringing(time_step=1e-3, **options)
+    nodes = (simulation.rods[0].nodes - 1) // 2
+    shapes = []
+    for time in times + delay:
+        simulation.run(time - simulation.time, progress=False)
+        shapes.append(simulation.positions("arm")[[nodes, -1]])
+    shapes = np.array(shapes) + np.random.default_rng(seed).normal(0, noise, (len(times), 2, 3)) * (1, 0, 1)
+    return Tags(shapes, ["arm.node(6)", "arm.end"], times=times)
+
+
+def test_stiffness_damping_and_delay_are_found_to_a_percent_from_two_seconds_of_ringing():
+    found = fit_motion(
+        ringing(modulus=1.2e6, viscosity=2000.0),
+        seen(0.013, noise=2e-4, nodes=25, viscosity=3000.0),
+        UNKNOWNS,
+        begin=let_go,
+        progress=False,
+    )
+    assert found.converged.all()
+    assert found.value("arm", "youngs_modulus")[0] == pytest.approx([1e6], rel=1e-2)
+    assert found.value("arm", "viscosity")[0] == pytest.approx([3000.0], rel=3e-2)
+    assert found.value("delay")[0] == pytest.approx([0.013], abs=2e-3)
+    assert found.unobservable == ()
+
+
+def test_errors_have_the_size_that_the_covariance_says():
+    exact = seen(0.0, viscosity=3000.0)
+    rng = np.random.default_rng(7)
+    scaled = []
+    for _ in range(8):
+        noise = rng.normal(0, 3e-4, np.shape(exact.points)) * (1, 0, 1)
+        target = Tags(exact.points + noise, exact.places, times=exact.times, sigma=3e-4)
+        found = fit_motion(
+            ringing(viscosity=3000.0, time_step=1e-3), target, UNKNOWNS[:2], begin=let_go, progress=False
+        )
+        truth = np.array([1e6, 3000.0])
+        scaled.append((found.values[0] - truth) / np.sqrt(np.diag(found.covariance[0])))
+    assert 0.6 < np.sqrt(np.mean(np.square(scaled))) < 1.4  # 16 numbers
+
+
+def test_friction_is_told_by_how_a_rod_slides_to_a_stop():
+    def sliding(friction):
+        scene = withe.Scene()
+        rubber = withe.Material(youngs_modulus=1e6, density=1000.0)
+        rod = scene.add_rod(start=(0, 0, 0), end=(0.1, 0, 0), nodes=5, radius=5e-3, material=rubber, name="arm")
+        scene.add_plane(point=(0, 0, -5e-3), normal=(0, 0, 1), friction=friction, name="floor")
+        scene.enable_contact()
+        simulation = scene.build(time_step=2e-3, integrator="backward_euler")
+        simulation.set_velocities(rod, (0.5, 0, 0))
+        return simulation
+
+    record = sliding(0.35).run(0.2, record_every=0.02, progress=False)
+    seen = Tags(record.positions("arm")[1:, [0, 4]], ["arm.start", "arm.end"], times=record.times[1:])
+    found = fit_motion(sliding(0.5), seen, [("floor", "friction")], progress=False)
+    assert found.value("floor", "friction")[0] == pytest.approx([0.35], rel=1e-2)
+
+
+@pytest.mark.parametrize(
+    ("targets", "unknowns", "options", "message"),
+    [
+        (Tags([[(0, 0, 0)]], ["arm.end"]), UNKNOWNS, {}, "times of targets must be given"),
+        (Tags([[(0, 0, 0)]], ["arm.end"], times=[0.1]), ["dealy"], {}, "must be tuples, or 'delay' once"),
+        (Tags([[(0, 0, 0)]], ["arm.end"], times=[0.1]), [], {}, "unknowns must be at least one"),
+        (Tags([[(0, 0, 0)]], ["arm.end"], times=[0.1]), UNKNOWNS, {"delay": -0.2}, "times plus delay must not be"),
+        (
+            [Tags([[(0, 0, 0)]], ["arm.end"], times=[t], sigma=1) for t in (0.1, 0.2)],
+            UNKNOWNS,
+            {},
+            "times of all targets must be the same",
+        ),
+    ],
+)
+def test_bad_input_is_refused(targets, unknowns, options, message):
+    with pytest.raises(ValueError, match=message):
+        fit_motion(ringing(), targets, unknowns, progress=False, **options)
