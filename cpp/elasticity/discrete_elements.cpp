@@ -128,9 +128,9 @@ void planar_bend_local(const Model& model, const TurnCoefficients& elastic, cons
   const BendStencil& s = model.bend[at(stencil)];
   const PlanarMovingEdge<double> edge[2] = {planar_moving_edge(step, s.edge[0], s.sign[0]),
                                             planar_moving_edge(step, s.edge[1], s.sign[1])};
-  const PlanarMoment<double> m = planar_moment(elastic.measure, edge[0].t0, edge[0].t1, edge[1].t0, edge[1].t1,
-                                               step.start.bend_strain(stencil, 0), step.end.bend_strain(stencil, 0),
-                                               elastic.natural.x, elastic.stiffness.x);
+  const PlanarMoment<double> m =
+      planar_moment(elastic.measure, edge[0].t0, edge[0].t1, edge[1].t0, edge[1].t1, step.start.bend_strain(stencil, 0),
+                    step.end.bend_strain(stencil, 0), elastic.natural.x, elastic.stiffness.x);
   PlanarForces<double> f;
   if (with_matrix)
     planar_discrete_forces<true>(m, edge, f);
@@ -148,9 +148,9 @@ void planar_half_local(const Model& model, const TurnCoefficients& elastic, cons
   Vec2<double> t0[2], t1[2];
   t0[a] = direction(step.start.attached[at(stencil)]), t1[a] = direction(step.end.attached[at(stencil)]);
   t0[b] = edge.t0, t1[b] = edge.t1;
-  const PlanarMoment<double> m = planar_moment(elastic.measure, t0[0], t1[0], t0[1], t1[1],
-                                               step.start.half_strain(stencil, 0), step.end.half_strain(stencil, 0),
-                                               elastic.natural.x, elastic.stiffness.x);
+  const PlanarMoment<double> m =
+      planar_moment(elastic.measure, t0[0], t1[0], t0[1], t1[1], step.start.half_strain(stencil, 0),
+                    step.end.half_strain(stencil, 0), elastic.natural.x, elastic.stiffness.x);
   const double sign = s.frame_first ? -1.0 : 1.0;  // of the moment on the edge
   const double by_turn[2] = {2.0 * sign * m.by_a, 2.0 * sign * m.by_b};
   const Vec2<double> column = edge.column(by_turn[b]);
@@ -225,7 +225,8 @@ void discrete_half_local(const Model& model, const TurnCoefficients& elastic, co
   const bool first = s.frame_first;
   const DiscreteMoment<double> m =
       moment_between(elastic.measure, first ? f0 : e0, first ? f1 : e1, first ? e0 : f0, first ? e1 : f1,
-                     row_of(step.start.half_strain, stencil), row_of(step.end.half_strain, stencil), elastic.natural, elastic.stiffness, with_matrix);
+                     row_of(step.start.half_strain, stencil), row_of(step.end.half_strain, stencil), elastic.natural,
+                     elastic.stiffness, with_matrix);
   const double sign = first ? -1.0 : 1.0;  // of the moment on the edge
   const EdgePlace place{0, 4, 3};
   const Vec3d moment = sign * m.moment;

@@ -193,8 +193,8 @@ void stretch_local(const Model& model, const ElasticCoefficients& k, const Confi
               (given_force ? given_force[edge] : force) * f.inverse_length, with_hessian, out);
 }
 
-void bend_local(const Model& model, const TurnCoefficients& k, const Configuration& c, int stencil,
-                bool with_hessian, Local& out) {
+void bend_local(const Model& model, const TurnCoefficients& k, const Configuration& c, int stencil, bool with_hessian,
+                Local& out) {
   const BendStencil& s = model.bend[static_cast<std::size_t>(stencil)];
   const auto i = static_cast<Eigen::Index>(stencil);
   if (model.planar()) return bend_planar_local(k, c, s, i, with_hessian, out);

@@ -64,8 +64,8 @@ void bend_local(const Model& model, const TurnCoefficients& coefficients, const 
 void half_local(const Model& model, const VectorX& q, const TurnCoefficients& coefficients, const Configuration& c,
                 int stencil, bool with_hessian, Local& out);
 
-/// The strains of one stencil, f (kappa1, kappa2, tau) (in a plane the first alone), or the axial strain of an edge; and
-/// their gradients, a row each.
+/// The strains of one stencil, f (kappa1, kappa2, tau) (in a plane the first alone), or the axial strain of an edge;
+/// and their gradients, a row each.
 struct StrainGradients {
   int count;
   double strain[3];

@@ -30,8 +30,8 @@ enum class ParameterKind {
   pair_friction,
 };
 
-/// What a parameter has a row of numbers for: the scene; every node; every edge, or stencil, of a rod; every obstacle; every
-/// spring; every pair of bodies that has something of its own.
+/// What a parameter has a row of numbers for: the scene; every node; every edge, or stencil, of a rod; every obstacle;
+/// every spring; every pair of bodies that has something of its own.
 enum class Extent { scene, node, edge, stencil, spring, obstacle, pair };
 
 enum class Range { any, non_negative, positive };

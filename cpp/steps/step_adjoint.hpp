@@ -10,10 +10,10 @@ struct CoefficientAdjoint {
   VectorX stretch_stiffness, stretch_time;  ///< per edge: by EA [1/N] and by viscous time [1/s]
   Columns3 bend_stiffness, bend_natural;    ///< per stencil: by stiffnesses [1/(N m)], by natural strains
   Columns3 half_stiffness, half_natural;
-  VectorX bend_time, half_time;                      ///< by viscous times [1/s]
-  VectorX mass, mass_coupling, drag, drag_coupling;  ///< by `MassMatrix`
-  VectorX gravity;                                   ///< per unknown, by its force [1/N]
-  MatrixX3 loads;                                    ///< per load, by its value
+  VectorX bend_time, half_time;                                  ///< by viscous times [1/s]
+  VectorX mass, mass_coupling, drag, drag_coupling;              ///< by `MassMatrix`
+  VectorX gravity;                                               ///< per unknown, by its force [1/N]
+  MatrixX3 loads;                                                ///< per load, by its value
   VectorX spring_stiffness, spring_rest_length, spring_damping;  ///< per spring
 
   explicit CoefficientAdjoint(const Model& model, std::size_t load_count)

@@ -41,8 +41,8 @@ Vec3<Scalar> spin_couple(double inertia, const Scalar& omega, const Vec3<Scalar>
   return (inertia * omega * inverse_length * inverse_length) * cross(rate, tangent);
 }
 
-/// Of a step of backward Euler over h. psi = theta + spin . e is what turns: the edge's inertia acts on the nodes as its
-/// elastic torque does. It does no work either, since spin is normal to the edge before and now.
+/// Of a step of backward Euler over h. psi = theta + spin . e is what turns: the edge's inertia acts on the nodes as
+/// its elastic torque does. It does no work either, since spin is normal to the edge before and now.
 template <class Scalar>
 TurningForce<Scalar> euler_turning(double inertia, double interval, const TurningEdge<Scalar>& edge,
                                    const Vec3<Scalar>& moved) {

@@ -101,7 +101,12 @@ def test_gradient_of_an_equilibrium_is_that_of_differences(planar, joint):
 
     cases = [
         *settings(drawn, random),
-        ((wall, "position"), np.array([1.0, 0, 0]), lambda h: sim.move(wall, position=place + np.array([h, 0, 0])), 1e-6),
+        (
+            (wall, "position"),
+            np.array([1.0, 0, 0]),
+            lambda h: sim.move(wall, position=place + np.array([h, 0, 0])),
+            1e-6,
+        ),
         ((wall, "rotation"), axis, lambda h: sim.move(wall, rotation=Rotation.from_rotvec(h * axis)), 1e-5),
     ]
     gradients = found.gradient(weight, [unknown for unknown, *_ in cases])

@@ -40,8 +40,10 @@ def test_one_plane_for_all_tags_gives_their_places_in_metres():
     right = np.array([1.0, 0.0, 0.3]) / np.hypot(1.0, 0.3)
     down = np.cross(right, normal)
     numbers = range(20, 26)
-    places = {n: (0.0, 0.0, 0.5) + (0.06 * (i % 3) - 0.06) * right + (0.06 * (i // 3) - 0.03) * down
-              for i, n in enumerate(numbers)}
+    places = {
+        n: (0.0, 0.0, 0.5) + (0.06 * (i % 3) - 0.06) * right + (0.06 * (i // 3) - 0.03) * down
+        for i, n in enumerate(numbers)
+    }
     rays = np.linalg.inv(matrix)
 
     def to_tag(number, x, y):

@@ -41,10 +41,7 @@ def test_the_robot_of_the_readme_curls_its_fingers(tmp_path, monkeypatch):
 
 
 def test_the_knot_of_the_readme_is_pulled_tight():
-    names = {
-        "withe": withe,
-        "silicone": withe.Material(youngs_modulus=2e6, poisson_ratio=0.5, density=1200.0, viscosity=2e3),
-    }
+    names = {}
     for block in blocks("overhand_knot"):
         exec(compile(block, str(README), "exec"), names)
     contacts, pull = names["simulation"].contacts(), names["simulation"].reaction(names["grips"][1]).force[0]
@@ -54,19 +51,22 @@ def test_the_knot_of_the_readme_is_pulled_tight():
     assert pull > 5.5e-3 * bending / 4e-3**2  # what the knot takes without friction, at e / h = 75
 
 
+def test_gradients_of_the_readme_have_the_shapes_that_it_says():
+    names = {}
+    for block in blocks("differentiable=True"):
+        exec(compile(block, str(README), "exec"), names)
+    assert names["by_curvature"].shape == (3, 19, 2)
+    assert names["by_gravity"][2] > 0.0
+    assert names["by_modulus"] > 0.0
+    assert names["by_start"].shape == (21, 3)
+
+
 def test_cables_of_a_picture_become_rods(tmp_path, monkeypatch):
     cv2 = pytest.importorskip("cv2")
     monkeypatch.chdir(tmp_path)
     case = make_case("crossing 60", 1)
     cv2.imwrite("cables.jpg", render(case, np.random.default_rng(0))[..., ::-1])
-    corners = np.array([(0, 0), (640, 0), (640, 480), (0, 480)])
-    names = {
-        "withe": withe,
-        "scene": withe.Scene(),
-        "silicone": withe.Material(youngs_modulus=1e6, poisson_ratio=0.5, density=1200.0),
-        "pixels": corners,
-        "metres": 1e-3 * corners,
-    }
+    names = {}
     for block in blocks("withe.perception.trace"):
         exec(compile(block, str(README), "exec"), names)
     assert len(names["tracing"]) == 2

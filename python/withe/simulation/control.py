@@ -7,7 +7,7 @@ from typing import Any
 import numpy.typing as npt
 
 from withe.common import validation
-from withe.parts.handles import CustomForce, Drag, Fluid, Load, Mass, Obstacle, Rod, Support
+from withe.parts.handles import CustomForce, Load, Rod, Support
 from withe.parts.rods import curvature_array, curvature_given, twist_array
 from withe.simulation.functions import check_jacobian
 from withe.simulation.loads import remove_load
