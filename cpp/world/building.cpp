@@ -103,6 +103,7 @@ void World::Implementation::listen() {
 /// Builds the model for the present supports and plane; a running state is carried over.
 void World::Implementation::rebuild(Rebuild why) {
   account_for_settings();
+  if (tape) tape->refuse("supports came or went while it ran, or something left its plane");
   SceneDescription active = description;
   // Released supports keep their row until another takes it, but hold nothing.
   std::vector<bool> released(description.supports.size(), false);
