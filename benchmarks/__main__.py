@@ -18,6 +18,7 @@ NAMES = (
     "sparse_solvers",
     "skips",
     "settings",
+    "gradients",
     "parallel",
     "work_precision",
     "friction_precision",

@@ -18,20 +18,28 @@ struct Dual {
     return d;
   }
 
-  friend Dual operator+(Dual a, const Dual& b) {
-    a.value += b.value;
-    for (int i = 0; i < N; ++i) a.slope[i] += b.slope[i];
-    return a;
+  friend Dual operator+(const Dual& a, const Dual& b) {
+    Dual c(a.value + b.value);
+    for (int i = 0; i < N; ++i) c.slope[i] = a.slope[i] + b.slope[i];
+    return c;
   }
-  friend Dual operator-(Dual a, const Dual& b) {
-    a.value -= b.value;
-    for (int i = 0; i < N; ++i) a.slope[i] -= b.slope[i];
-    return a;
+  friend Dual operator-(const Dual& a, const Dual& b) {
+    Dual c(a.value - b.value);
+    for (int i = 0; i < N; ++i) c.slope[i] = a.slope[i] - b.slope[i];
+    return c;
   }
-  friend Dual operator-(Dual a) {
-    a.value = -a.value;
-    for (int i = 0; i < N; ++i) a.slope[i] = -a.slope[i];
-    return a;
+  friend Dual operator-(const Dual& a) { return -1.0 * a; }
+  // With constants, which most products have.
+  friend Dual operator+(const Dual& a, double b) { return chain(a, a.value + b, 1.0); }
+  friend Dual operator+(double a, const Dual& b) { return b + a; }
+  friend Dual operator-(const Dual& a, double b) { return a + -b; }
+  friend Dual operator-(double a, const Dual& b) { return chain(b, a - b.value, -1.0); }
+  friend Dual operator*(double a, const Dual& b) { return chain(b, a * b.value, a); }
+  friend Dual operator*(const Dual& a, double b) { return b * a; }
+  friend Dual operator/(const Dual& a, double b) { return (1.0 / b) * a; }
+  friend Dual operator/(double a, const Dual& b) {
+    const double quotient = a / b.value;
+    return chain(b, quotient, -quotient / b.value);
   }
   friend Dual operator*(const Dual& a, const Dual& b) {
     Dual c(a.value * b.value);

@@ -56,10 +56,9 @@ TurningForce<Scalar> turning_force(const StepProblem& problem, double inertia, c
                              : euler_turning(inertia, problem.interval, turning, moved);
 }
 
-/// Derivatives by the edge's vector and angle at z, and by its vector, angle and rate at the start.
-using ByEdge = Dual<9>;
+using ByEdge = Dual<TurningSlopes::kUnknowns>;
 
-TurningForce<ByEdge> turning_slopes(const StepProblem& problem, const StepData& data, int edge) {
+TurningSlopes turning_slopes(const StepProblem& problem, const StepData& data, int edge) {
   const Model& model = problem.model;
   const auto vector = [](const Vec3d& v, int first) -> Vec3<ByEdge> {
     return {ByEdge::unknown(v.x, first), ByEdge::unknown(v.y, first + 1), ByEdge::unknown(v.z, first + 2)};
@@ -82,7 +81,13 @@ TurningForce<ByEdge> turning_slopes(const StepProblem& problem, const StepData& 
       .end_length = length1,
       .change = ByEdge::unknown(data.z[angle], 3) - ByEdge::unknown(problem.start->q[angle], 7),
       .start_rate = ByEdge::unknown(problem.start->v[angle], 8)};
-  return turning_force(problem, problem.parameters->edge_inertia[edge], turning, e - e0);
+  const TurningForce<ByEdge> force = turning_force(problem, problem.parameters->edge_inertia[edge], turning, e - e0);
+  TurningSlopes out;
+  for (int k = 0; k < TurningSlopes::kUnknowns; ++k) {
+    for (int i = 0; i < 3; ++i) out.by[i][k] = force.head[i].slope[k];
+    out.by[3][k] = force.torque.slope[k];
+  }
+  return out;
 }
 
 /// Inertia of edges that spin and turn: under backward Euler what the mass matrix knows nothing of, under the midpoint
@@ -122,21 +127,21 @@ void set_turning_frames(const StepProblem& problem, StepData& data) {
 }
 
 /// Derivatives of the inertia of edges, beyond those of the mass matrix.
-void add_edge_slopes(const StepProblem& problem, const StepData& data, const ElementTable& edges,
-                     std::span<double> values) {
+void add_edge_slopes(const StepProblem& problem, StepData& data, const ElementTable& edges, std::span<double> values) {
   const Model& model = problem.model;
   const double inverse = 1.0 / problem.interval;
+  data.turning.resize(at(model.edge_count));
   for (int e = 0; e < model.edge_count; ++e) {
-    const TurningForce<ByEdge> force = turning_slopes(problem, data, e);
+    const TurningSlopes& slopes = data.turning[at(e)] = turning_slopes(problem, data, e);
     double hessian[7][7];
     for (int column = 0; column < 7; ++column) {
       const int unknown = column < 3 ? column : column == 3 ? 3 : column - 4;
       const double sign = column < 3 ? -1.0 : 1.0;
       for (int i = 0; i < 3; ++i) {
-        hessian[4 + i][column] = sign * force.head[i].slope[unknown];
+        hessian[4 + i][column] = sign * slopes.by[i][unknown];
         hessian[i][column] = -hessian[4 + i][column];
       }
-      hessian[3][column] = sign * force.torque.slope[unknown];
+      hessian[3][column] = sign * slopes.by[3][unknown];
     }
     hessian[3][3] -= inverse * inverse * problem.mass.rows[model.edge_dof[at(e)]];
     edges.add_hessian(e, hessian, 1.0, values);
@@ -149,11 +154,11 @@ void add_turning_adjoint(const StepProblem& problem, const StepData& data, int e
   const Vec3d apart = edge_vector(model, adjoint.rows, edge);
   // The mass matrix has the torque of backward Euler.
   const double about = problem.in_middle() ? adjoint.rows[angle] : 0.0;
-  const TurningForce<ByEdge> force = turning_slopes(problem, data, edge);
-  double by[9];
-  for (int k = 0; k < 9; ++k) {
-    by[k] = about * force.torque.slope[k];
-    for (int i = 0; i < 3; ++i) by[k] += apart[i] * force.head[i].slope[k];
+  const TurningSlopes& slopes = data.turning[at(edge)];
+  double by[TurningSlopes::kUnknowns];
+  for (int k = 0; k < TurningSlopes::kUnknowns; ++k) {
+    by[k] = about * slopes.by[3][k];
+    for (int i = 0; i < 3; ++i) by[k] += apart[i] * slopes.by[i][k];
   }
   for (int i = 0; i < 3; ++i) {
     adjoint.start[head + i] += by[4 + i];

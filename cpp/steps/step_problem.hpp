@@ -82,6 +82,13 @@ struct RoundingBounds {
   double reach = 0;     ///< greatest coordinate [m]
 };
 
+/// Derivatives of what an edge's inertia about itself adds to the rows of its head (three) and its angle: by the edge's
+/// vector and angle at z, and by its vector, angle and rate at the start.
+struct TurningSlopes {
+  static constexpr int kUnknowns = 9;
+  double by[4][kUnknowns];
+};
+
 /// What an evaluation of a problem finds; owned by who asks for it.
 struct StepData {
   VectorX residual;       ///< projected onto free directions
@@ -110,6 +117,7 @@ struct StepData {
   VectorX drag_force;                   ///< [N]
   VectorX flow_force, flow_drag;        ///< of a fluid, and its local drag [N]
   VectorX contact_gradient, contact_floor;
+  std::vector<TurningSlopes> turning;  ///< per edge, of an exact matrix in space
 };
 
 }  // namespace withe

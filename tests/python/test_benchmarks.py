@@ -31,6 +31,7 @@ def run(name, folder, *arguments):
         "conservation",
         "skips",
         "settings",
+        "gradients",
         "parallel",
         "contact",
         "contact_robustness",
