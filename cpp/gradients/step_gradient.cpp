@@ -10,6 +10,13 @@
 namespace withe {
 namespace {
 
+/// Stiffness by which neutral modes are held, and that below which rounding alone resists, over the greatest; what a
+/// solve may leave of its right-hand side.
+constexpr double kNeutral = 1e-12, kFree = 1e-14, kSolved = 1e-6;
+constexpr const char* kSingular =
+    "the state does not follow from what acts, as the matrix is singular there: something that counts is free to move "
+    "or to spin, or it is a limit point";
+
 Vec3d edge_vector(const Model& model, const VectorX& q, int edge) {
   const int a = model.tail_dof[at(edge)], b = model.head_dof[at(edge)];
   return {q[b] - q[a], q[b + 1] - q[a + 1], q[b + 2] - q[a + 2]};
@@ -54,16 +61,20 @@ void StepGradient::begin(const StepTaken& step) {
   LinearSolver& solver = assembler.solver();
   exact_.assign(solver.values().begin(), solver.values().end());
   assembler.project_matrix();
-  const bool solved = solver.factorize().status == FactorStatus::ok;
+  bool solved = solver.factorize().status == FactorStatus::ok;
+  shifted_ = !solved;
+  if (shifted_) {
+    // What is free to spin or to move is held by little; see `solve`.
+    rows_.setConstant(model.dof_count, kNeutral * assembler.greatest_diagonal());
+    solved = solver.factorize({rows_.data(), static_cast<std::size_t>(rows_.size())}).status == FactorStatus::ok;
+  }
   std::copy(exact_.begin(), exact_.end(), solver.values().begin());
-  if (!solved)
-    throw std::invalid_argument(
-        "the state does not follow from what acts, as the matrix is singular there: something is free to move or to "
-        "spin, or it is a limit point");
+  if (!solved) throw std::invalid_argument(kSingular);
 }
 
 double StepGradient::imbalance() const {
-  return data_.residual.cwiseAbs().maxCoeff() / std::max(data_.magnitude.maxCoeff(), 1e-300);
+  const double beyond_rounding = (data_.residual.cwiseAbs() - data_.floor).maxCoeff();
+  return std::max(beyond_rounding, 0.0) / std::max(data_.magnitude.maxCoeff(), 1e-300);
 }
 
 /// From the state at the end, in its own coordinates, to q1.
@@ -85,6 +96,15 @@ void StepGradient::solve() {
   assembler.solver().solve_transposed({rows_.data(), static_cast<std::size_t>(rows_.size())});
   assembler.project(rows_);
   assembler.multiply_transposed(rows_, columns_);
+  // A scalar that neutral modes leave alone has a gradient, one that goes with them has none.
+  const double size = by_z_.cwiseAbs().maxCoeff();
+  bool follows = moves() || kFree * assembler.greatest_diagonal() * rows_.cwiseAbs().maxCoeff() <= size;
+  if (shifted_) {
+    VectorX left = by_z_ + columns_;
+    assembler.project(left);
+    follows = follows && left.cwiseAbs().maxCoeff() <= kSolved * size;
+  }
+  if (!follows) throw std::invalid_argument(kSingular);
 }
 
 void StepGradient::pull_back(StateAdjoint& state, CoefficientAdjoint& by, VectorX& held) {

@@ -43,7 +43,7 @@ class StepGradient {
   /// Prepares for a step; what it refers to must outlive `pull_back`. Throws std::invalid_argument where no state
   /// follows from what acts.
   void begin(const StepTaken& step);
-  /// Of the last evaluation: greatest force out of balance over the greatest that there is [-].
+  /// Of the last evaluation: greatest force out of balance, beyond rounding, over the greatest that there is [-].
   double imbalance() const;
   /// Makes of the adjoint of the state at the end that of the state at the start, and adds what coefficients and held
   /// unknowns (at the end, in coordinates of the state) contribute. Throws std::invalid_argument where no gradient is
@@ -67,6 +67,7 @@ class StepGradient {
   VectorX rates_;  ///< of velocities at the end by q1 [1/s]
   VectorX z_, by_end_, by_z_, rows_, columns_;
   std::vector<double> exact_;
+  bool shifted_ = false;  ///< the factorised matrix, against neutral modes
 };
 
 }  // namespace withe

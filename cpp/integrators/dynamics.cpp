@@ -6,6 +6,7 @@
 
 #include "common/timer.hpp"
 #include "integrators/inner_solve.hpp"
+#include "integrators/newton_system.hpp"
 #include "integrators/step_parts.hpp"
 #include "steps/inertia.hpp"
 
@@ -26,11 +27,15 @@ double stretch_gain(double before, double after, double across, double rest, boo
 /// does not resolve, and which it therefore leaves bounded, count for as little as they move [Hosea and Shampine 1996].
 double moved_by(VectorX& force, Equations& equations, const Newton& newton, double h, StepWorkspace& work) {
   equations.assembler().project(force);
-  if (!work.newton.matrix.belongs_to(equations, h)) {
+  MatrixRecord& matrix = work.newton.matrix;
+  // A matrix that was made for an iteration that was not needed has not been factorised.
+  const bool usable = matrix.belongs_to(equations, h) && (matrix.factorized || factorize(equations, work.newton));
+  if (!usable) {
     // Nothing moved, and no matrix was made.
     force = (h * h) * force.cwiseProduct(equations.mass().inverse);
     return newton.norms().displacement(force);
   }
+  matrix.factorized = true;
   equations.assembler().solver().solve({force.data(), static_cast<std::size_t>(force.size())});
   return newton.norms().displacement(force);
 }

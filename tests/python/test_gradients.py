@@ -116,6 +116,34 @@ def test_gradient_of_an_equilibrium_is_that_of_differences(planar, joint):
         )
 
 
+def test_what_is_free_to_spin_has_gradients_of_what_spinning_leaves_alone():
+    scene = withe.Scene()
+    rubber = withe.Material(youngs_modulus=1e6, poisson_ratio=0.4, density=1200.0)
+    cable = scene.add_rod(start=(0, 0, 0), end=(0.3, 0, 0), nodes=21, radius=6e-3, material=rubber)
+    pins = scene.pin(cable.start), scene.pin(cable.end)
+    simulation = scene.build(integrator="static", planar=False, **TIGHT)
+    sag = np.zeros((21, 3))
+    sag[10, 2] = 1.0
+    (by_modulus,) = simulation.equilibrium().gradient(sag, [(cable, "youngs_modulus")])
+
+    def of():
+        simulation.equilibrium()
+        return simulation.positions()[10, 2]
+
+    expected = difference(simulation, of, lambda h: simulation.set(cable, youngs_modulus=1e6 + h), 100.0)
+    assert by_modulus == pytest.approx(expected, rel=1e-6)
+
+    for pin in pins:
+        simulation.release(pin)
+    simulation.set(gravity=(0, 0, 0))
+    found = simulation.equilibrium()
+    length = np.zeros((21, 3))
+    length[[0, -1], 0] = -1.0, 1.0
+    assert found.gradient(length, [(cable, "youngs_modulus")])[0] == pytest.approx(0.0, abs=1e-12)
+    with pytest.raises(ValueError, match="free to move"):
+        found.gradient(sag, [(cable, "youngs_modulus")])
+
+
 def test_gradients_have_the_shape_of_get_and_the_jacobian_their_rows():
     random = np.random.default_rng(4)
     drawn = Drawn(planar=False, joint=False, integrator="static")
