@@ -54,9 +54,9 @@ def fit(
         both directors. ``(part, word)`` for a positive parameter of a part or of a tuple of parts, all multiplied by
         one factor: youngs_modulus, density, bend_stiffness, line_density, ... of rods, mass, friction of an obstacle.
     method : {"gauss_newton", "lbfgs", "source"}
-        "source" is gradient descent by forward differences on the sum of absolute residuals [Algorithm 6 of the
-        dissertation that withe began with], for constant natural curvature in a plane; its unknown is a limb's whole
-        turn in radians, its first step .1.
+        "source" is gradient descent by forward differences on the sum of absolute residuals [Choi, doctoral
+        dissertation, University of California, Los Angeles, Algorithm 6], for constant natural curvature in a plane;
+        its unknown is a limb's whole turn in radians, its first step .1.
     shared : sequence of tuples
         Further unknowns that all frames share: natural curvature of one rod under several loads.
     conditions : callable, optional
