@@ -221,8 +221,9 @@ class Contacts:
 
         Notes
         -----
-        Impacts are elastic by default. In implicit midpoint and energy-momentum steps they are so at any time step:
-        the force of a step does as much work as contact stores [Gonzalez 1996; Laursen and Chawla 1997]. Backward
+        Impacts are elastic by default. In implicit midpoint and energy-momentum steps the force of a step does as much
+        work as contact stores [Gonzalez 1996; Laursen and Chawla 1997], so that those with obstacles are elastic at any
+        time step; rods that cross lose some per cent in steps as long as the impact, and less in shorter ones. Backward
         Euler, and "lagged" and "semi_explicit" friction, lose most of an impact shorter than a few steps, and nothing
         in the limit of short ones. With a
         restitution e below 1 contact gives back e^2 of the energy that it took; steps are cut until an impact is
