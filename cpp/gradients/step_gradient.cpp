@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "geometry/rotation.hpp"
+#include "model/edge_vectors.hpp"
 #include "steps/inertia.hpp"
 
 namespace withe {
@@ -16,19 +17,6 @@ constexpr double kNeutral = 1e-12, kFree = 1e-14, kSolved = 1e-6;
 constexpr const char* kSingular =
     "the state does not follow from what acts, as the matrix is singular there: something that counts is free to move "
     "or to spin, or it is a limit point";
-
-Vec3d edge_vector(const Model& model, const VectorX& q, int edge) {
-  const int a = model.tail_dof[at(edge)], b = model.head_dof[at(edge)];
-  return {q[b] - q[a], q[b + 1] - q[a + 1], q[b + 2] - q[a + 2]};
-}
-
-void add_to_edge(const Model& model, int edge, const Vec3d& v, VectorX& out) {
-  const int a = model.tail_dof[at(edge)], b = model.head_dof[at(edge)];
-  for (int i = 0; i < 3; ++i) {
-    out[b + i] += v[i];
-    out[a + i] -= v[i];
-  }
-}
 
 EquationOptions exact(EquationOptions options) {
   options.exact = true;

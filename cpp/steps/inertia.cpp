@@ -6,24 +6,11 @@
 #include <utility>
 
 #include "geometry/rotation.hpp"
+#include "model/edge_vectors.hpp"
 #include "steps/turning_inertia.hpp"
 
 namespace withe {
 namespace {
-
-void add_to_edge(const Model& model, int edge, const Vec3d& force, VectorX& gradient) {
-  double *tail = &gradient[model.tail_dof[at(edge)]], *head = &gradient[model.head_dof[at(edge)]];
-  const double component[3] = {force.x, force.y, force.z};
-  for (int i = 0; i < 3; ++i) {
-    head[i] += component[i];
-    tail[i] -= component[i];
-  }
-}
-
-Vec3d edge_vector(const Model& model, const VectorX& q, int edge) {
-  const double *tail = &q[model.tail_dof[at(edge)]], *head = &q[model.head_dof[at(edge)]];
-  return {head[0] - tail[0], head[1] - tail[1], head[2] - tail[2]};
-}
 
 TurningEdge<double> turning_edge(const StepProblem& problem, const StepData& data, int edge) {
   const EdgeFrame<double>& f = data.configuration.edge[at(edge)];

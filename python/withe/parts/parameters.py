@@ -13,7 +13,7 @@ from withe.common import validation
 from withe.parts.materials import Material, Stiffness, bend_stiffness, check_poisson_ratio
 from withe.parts.sections import SectionProperties
 
-__all__ = ["MATERIAL_WORDS", "ROD_WORDS", "RodParameters"]
+__all__ = ["ACTING_WORDS", "MATERIAL_WORDS", "ROD_WORDS", "RodParameters"]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -28,7 +28,7 @@ ROD_WORDS = (
     "drag",
 )
 
-_ACTING = (
+ACTING_WORDS = (
     "stretch_stiffness",
     "bend_stiffness",
     "twist_stiffness",
@@ -128,7 +128,7 @@ class RodParameters:
 
     def acting(self, before: RodParameters) -> dict[str, FloatArray]:
         """What the engine works with that is not what `before` has, by its names there."""
-        return {word: mine for word in _ACTING if (mine := getattr(self, word)) is not getattr(before, word)}
+        return {word: mine for word in ACTING_WORDS if (mine := getattr(self, word)) is not getattr(before, word)}
 
     def get(self, word: str) -> Any:
         """The present value of a word: a copy."""

@@ -13,7 +13,7 @@ from withe import _core
 from withe.common import validation
 from withe.parts.handles import Drag, Load, Mass, NodeHandle, Rod, Spring, Support
 from withe.parts.kinds import DragPart, LoadPart, MassPart, RodPart, SpringPart, SupportPart
-from withe.parts.parameters import ROD_WORDS, RodParameters
+from withe.parts.parameters import ACTING_WORDS, ROD_WORDS, RodParameters
 from withe.parts.springs import SPRING_WORDS
 from withe.simulation.loads import load_index
 from withe.simulation.session import Session
@@ -31,15 +31,6 @@ FloatArray = npt.NDArray[np.float64]
 Unknown = tuple[Rod | Load | Mass | Drag | Spring | Support | str, str] | str
 """What to differentiate by: a part and a word of `set`, or "gravity", "initial_positions", "initial_velocities"."""
 
-_ENGINE_WORDS = (
-    "stretch_stiffness",
-    "bend_stiffness",
-    "twist_stiffness",
-    "line_density",
-    "rotary_inertia",
-    "viscous_time",
-    "drag",
-)
 _NATURAL_WORDS = ("natural_curvature", "natural_twist")
 _INITIAL_WORDS = ("initial_positions", "initial_velocities")
 
@@ -245,7 +236,7 @@ def _slopes(parameters: RodParameters, word: str) -> dict[str, FloatArray]:
     p = parameters
     if word == "line_density":
         return {word: np.ones_like(p.line_density), "rotary_inertia": p.rotary_inertia / p.line_density}
-    if word in _ENGINE_WORDS:
+    if word in ACTING_WORDS:
         return {word: np.ones_like(getattr(p, word))}
     if p.youngs_modulus is None or p.poisson_ratio is None or p.density is None:
         raise ValueError(f"no gradient by {word}: the rod's stiffness was given directly, without a material")
