@@ -48,7 +48,6 @@ class Tape::Player {
       EquationOptions options = tape_.options_;
       options.rule = rule;
       made = std::make_unique<StepGradient>(model_, options);
-      made->equations().loads().values = tape_.loads_;
     }
     return *made;
   }
@@ -71,12 +70,11 @@ class Tape::Player {
   Configuration configuration_;
 };
 
-Tape::Tape(const Model& model, EquationOptions options, State first, Parameters parameters, std::vector<Vector3> loads)
+Tape::Tape(const Model& model, EquationOptions options, State first, Parameters parameters)
     : model_(model),
       options_(options),
       first_(std::move(first)),
       parameters_(std::move(parameters)),
-      loads_(std::move(loads)),
       last_(first_.q),
       last_velocity_(first_.v) {}
 
@@ -97,9 +95,9 @@ void Tape::refuse(const std::string& why) {
   if (refused_.empty()) refused_ = why;
 }
 
-bool Tape::continues(const State& state, const Parameters& parameters, const std::vector<Vector3>& loads) const {
-  return state.q.size() == last_.size() && parameters.version == parameters_.version && loads == loads_ &&
-         state.q == last_ && state.v == last_velocity_;
+bool Tape::continues(const State& state, const Parameters& parameters) const {
+  return state.q.size() == last_.size() && parameters.version == parameters_.version &&
+         parameters.loads == parameters_.loads && state.q == last_ && state.v == last_velocity_;
 }
 
 RunGradient Tape::gradient(std::vector<MomentAdjoint> moments) const {
@@ -118,7 +116,7 @@ RunGradient Tape::gradient(std::vector<MomentAdjoint> moments) const {
     player.advance(steps_[k], state);
   }
   StateAdjoint adjoint{VectorX::Zero(model_.dof_count), VectorX::Zero(model_.dof_count)};
-  CoefficientAdjoint coefficients(model_, loads_.size());
+  CoefficientAdjoint coefficients(model_, parameters_.loads.rows());
   VectorX held = VectorX::Zero(model_.dof_count);
   std::vector<State> states;
   const auto add_moments = [&](std::size_t steps) {

@@ -33,7 +33,7 @@ void add_to_nodes(const Model& model, const MatrixX3& by, VectorX& out);
 class Tape {
  public:
   /// Of a run that begins so; these are kept.
-  Tape(const Model& model, EquationOptions options, State first, Parameters parameters, std::vector<Vector3> loads);
+  Tape(const Model& model, EquationOptions options, State first, Parameters parameters);
 
   long count() const { return static_cast<long>(steps_.size()); }
   /// Notes a step to q1 that has been accepted.
@@ -43,7 +43,7 @@ class Tape {
   /// Says why no gradient goes through this run; the first reason stays.
   void refuse(const std::string& why);
   /// Whether that is what the last step led to, and what acts is what acted.
-  bool continues(const State& state, const Parameters& parameters, const std::vector<Vector3>& loads) const;
+  bool continues(const State& state, const Parameters& parameters) const;
 
   /// Throws std::invalid_argument where none is known.
   RunGradient gradient(std::vector<MomentAdjoint> moments) const;
@@ -60,7 +60,6 @@ class Tape {
   EquationOptions options_;
   State first_;
   Parameters parameters_;
-  std::vector<Vector3> loads_;
   std::vector<Step> steps_;
   VectorX last_, last_velocity_;  ///< what the last step led to
   std::string refused_;

@@ -50,7 +50,6 @@ std::vector<EquilibriumGradient> World::equilibrium_gradients(const std::vector<
     self.static_gradient = std::make_unique<StepGradient>(model, equation_options(statics));
   }
   StepGradient& gradient = *self.static_gradient;
-  gradient.equations().loads().values = self.load_values;
   State frames = self.state;
   if (!model.planar()) {
     // Directors are measured from where they are, and so turn with their edges without a change of their angles.
@@ -67,7 +66,7 @@ std::vector<EquilibriumGradient> World::equilibrium_gradients(const std::vector<
             "a derivative by positions has one row a node, " + std::to_string(model.node_count));
     StateAdjoint adjoint{VectorX::Zero(model.dof_count), {}};
     add_to_nodes(model, by, adjoint.q);
-    CoefficientAdjoint coefficients(model, self.load_values.size());
+    CoefficientAdjoint coefficients(model, self.parameters.loads.rows());
     VectorX held = VectorX::Zero(model.dof_count);
     gradient.pull_back(adjoint, coefficients, held);
     const auto supports = static_cast<Eigen::Index>(model.supports.size());
@@ -80,8 +79,7 @@ std::vector<EquilibriumGradient> World::equilibrium_gradients(const std::vector<
 
 std::shared_ptr<Tape> World::start_tape() {
   Implementation& self = *implementation_;
-  self.tape =
-      std::make_shared<Tape>(self.model, equation_options(self.options), self.state, self.parameters, self.load_values);
+  self.tape = std::make_shared<Tape>(self.model, equation_options(self.options), self.state, self.parameters);
   if (self.options.integrator == Integrator::verlet || self.options.integrator == Integrator::statics)
     self.tape->refuse("integrator '" +
                       std::string(self.options.integrator == Integrator::verlet ? "verlet" : "static") +
@@ -95,7 +93,7 @@ void World::stop_tape() { implementation_->tape.reset(); }
 
 /// Before a step.
 void World::Implementation::check_tape() {
-  if (!tape->continues(state, parameters, load_values))
+  if (!tape->continues(state, parameters))
     tape->refuse("numbers, loads or the state were changed while it ran, or change with time; begin another run there");
 }
 

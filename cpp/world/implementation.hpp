@@ -216,6 +216,8 @@ struct World::Implementation : Running {
   // separation.cpp
   void separate();
 
+  std::pair<Eigen::Index, Eigen::Index> load_rows(int load) const;  ///< the first, and how many
+
   // energy.cpp
   Energy energy() const;
   Energy rod_energy(int rod) const;

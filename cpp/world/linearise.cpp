@@ -137,7 +137,6 @@ Linearisation World::linearise() const {
   Options symmetric = self.options;
   symmetric.integrator = Integrator::statics;
   Equations system(model, equation_options(symmetric));
-  system.loads().values = self.load_values;
   self.update_custom_force(system);
   const MatrixX3 forces = self.custom_force, moments = self.custom_moments;
   self.solve_for_custom_at_rest(system, self.state.time);

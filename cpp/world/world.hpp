@@ -178,8 +178,9 @@ class World {
   /// Newton's method tries. Empty: the last forces stay.
   void set_force_function(const CustomFunction& force);
 
-  void set_load(int load, const Vector3& value);
-  Vector3 load(int load) const;
+  /// One row, or one an edge, as it was put on: world axes of the drawn scene [N], [N m], [N/m].
+  void set_load(int load, const MatrixX3& values);
+  MatrixX3 load(int load) const;
   int add_load(const LoadDescription& load);  ///< acts from now on; its index
   void remove_load(int load);                 ///< one put on while running; those after it move up by one
   /// Sets parameters by their index, all or, where one is refused, none. What this does to the energy at the present

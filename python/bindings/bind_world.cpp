@@ -196,8 +196,8 @@ void define_steps(WorldClass& world) {
 
 void define_parameters(WorldClass& world) {
   world.def(
-      "set_load", [](GuardedWorld& self, int load, const Vector3& value) { self.steering().set_load(load, value); },
-      py::arg("load"), py::arg("value"));
+      "set_load", [](GuardedWorld& self, int load, const MatrixX3& values) { self.steering().set_load(load, values); },
+      py::arg("load"), py::arg("values"));
   world.def(
       "add_load", [](GuardedWorld& self, const LoadDescription& load) { return self.changing().add_load(load); },
       py::arg("load"), "A load that acts from now on; its index.");

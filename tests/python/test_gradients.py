@@ -352,3 +352,24 @@ def test_a_differentiable_run_is_the_same_run():
         drawn = Drawn(planar=False, joint=True, integrator="implicit_midpoint", time_step=5e-3)
         runs.append(drawn.simulation.run(0.1, progress=False, differentiable=differentiable))
     np.testing.assert_array_equal(runs[0].positions(), runs[1].positions())
+
+
+def test_gradients_by_loads_edge_by_edge():
+    drawn = Drawn(planar=False, joint=False, integrator="static")
+    rows = np.random.default_rng(3).normal(size=(NODES - 1, 3))
+    spread, even = drawn.simulation.add_load(drawn.arm, 0.1 * rows), drawn.simulation.add_load(drawn.arm, (0, 0, 0.05))
+    found = drawn.simulation.equilibrium()
+    random = np.random.default_rng(4)
+    by, way = random.normal(size=(NODES, 3)), random.normal(size=(NODES - 1, 3))
+    of_spread, of_even = found.gradient(by, wrt=[(spread, "load"), (even, "load")])
+    assert of_spread.shape == (NODES - 1, 3)
+    assert of_even == pytest.approx(of_spread.sum(axis=0), rel=1e-12)
+
+    def loss():
+        drawn.simulation.equilibrium()
+        return float((by * drawn.simulation.positions()).sum())
+
+    expected = difference(
+        drawn.simulation, loss, lambda step: drawn.simulation.set(spread, load=0.1 * rows + step * way), 1e-4
+    )
+    assert (of_spread * way).sum() == pytest.approx(expected, rel=1e-6)

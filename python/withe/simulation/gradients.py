@@ -15,7 +15,7 @@ from withe.parts.handles import Drag, Load, Mass, NodeHandle, Rod, Spring, Suppo
 from withe.parts.kinds import DragPart, LoadPart, MassPart, RodPart, SpringPart, SupportPart
 from withe.parts.parameters import ACTING_WORDS, ROD_WORDS, RodParameters
 from withe.parts.springs import SPRING_WORDS
-from withe.simulation.loads import load_index
+from withe.simulation.loads import load_rows
 from withe.simulation.session import Session
 
 __all__ = [
@@ -151,10 +151,12 @@ def _reader(session: Session, unknown: Unknown) -> Callable[[Any], Any]:
     if isinstance(part, RodPart):
         return _rod_reader(session, part, word)
     if isinstance(part, LoadPart) and word == part.kind:
-        index, axis = load_index(session, part), part.axis
+        rows, axis, shape = load_rows(session, part), part.axis, part.value.shape
         if part.name in session.settings.functions:
             raise ValueError(f"{part.name!r} is a function of time: no gradient by its one value")
-        return lambda g: g.parameters.loads[index].copy() if axis is None else float(g.parameters.loads[index] @ axis)
+        if axis is None:
+            return lambda g: g.parameters.loads[rows].reshape(shape)
+        return lambda g: (g.parameters.loads[rows].reshape(shape) @ axis)[()]
     if isinstance(part, MassPart) and word == "mass":
         row = session.directory.row(part.node)
         return lambda g: float(g.parameters.added_mass[row])
