@@ -164,7 +164,7 @@ EquilibriumPath World::equilibrium_path(const PathOptions& wanted) {
   Implementation& self = accounted();
   const Timer timer(self.statistics.total_time);
   for (int load : wanted.loads)
-    require(load >= 0 && load < static_cast<int>(self.load_values.size()), "no such load: " + std::to_string(load));
+    require(load >= 0 && load < static_cast<int>(self.load_values.size()), "no such load: ", load);
   require(std::isfinite(wanted.start) && std::isfinite(wanted.end) && wanted.start != wanted.end,
           "a path needs two factors to lead from and to");
   require(wanted.most_points > 0 && wanted.turn > 0.0, "a path needs points and turns that are positive");
