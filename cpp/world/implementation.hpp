@@ -24,6 +24,7 @@ struct EnergyCoefficients {
 struct EnergyScratch {
   Configuration configuration;
   EnergyCoefficients coefficients;
+  ContactAtRest contact;
 };
 
 /// Why a model is built: at first, because supports changed or the plane was left, or to take a snapshot's state.

@@ -18,7 +18,7 @@ bool off_plane(LoadKind kind, const Vector3& value, const Vector3& normal) {
 }
 
 int checked_spring(const Parameters& parameters, int spring) {
-  require(spring >= 0 && spring < parameters.spring_stiffness.size(), "no such spring: " + std::to_string(spring));
+  require(spring >= 0 && spring < parameters.spring_stiffness.size(), "no such spring: ", spring);
   return spring;
 }
 
@@ -86,7 +86,7 @@ void World::step(int count) {
 void World::advance_to(double time) {
   Implementation& self = *implementation_;
   const double span = time - self.state.time;
-  require(std::isfinite(time) && span >= 0.0, "time must not lie before the present, got " + std::to_string(time));
+  require(std::isfinite(time) && span >= 0.0, "time must not lie before the present, got ", time);
   if (span == 0.0) return;
   self.guard.energy.reset();
   const Timer timer(self.statistics.total_time);
@@ -129,7 +129,7 @@ void World::set_force_function(const CustomFunction& force) { implementation_->f
 
 void World::set_load(int load, const Vector3& value) {
   Implementation& self = *implementation_;
-  require(load >= 0 && load < static_cast<int>(self.load_values.size()), "no such load: " + std::to_string(load));
+  require(load >= 0 && load < static_cast<int>(self.load_values.size()), "no such load: ", load);
   require(value.allFinite(), "load must be finite");
   if (self.model.planar()) {
     const Vector3& n = self.model.plane->normal;
@@ -156,15 +156,14 @@ int World::add_load(const LoadDescription& load) {
 }
 void World::remove_load(int load) {
   Implementation& self = *implementation_;
-  require(load >= 0 && load < static_cast<int>(self.load_values.size()), "no such load: " + std::to_string(load));
+  require(load >= 0 && load < static_cast<int>(self.load_values.size()), "no such load: ", load);
   require(self.description.loads[at(load)].added, "a load of the drawing stays: set it to zero");
   self.description.loads.erase(self.description.loads.begin() + load);
   self.load_values.erase(self.load_values.begin() + load);
   self.remake_equations();
 }
 Vector3 World::load(int load) const {
-  require(load >= 0 && load < static_cast<int>(implementation_->load_values.size()),
-          "no such load: " + std::to_string(load));
+  require(load >= 0 && load < static_cast<int>(implementation_->load_values.size()), "no such load: ", load);
   return implementation_->load_values[at(load)];
 }
 
@@ -181,7 +180,7 @@ void World::set_friction(const ContactDescription& contact) {
   require(std::isfinite(contact.slip_tolerance) && contact.slip_tolerance > 0.0, "slip_tolerance must be positive");
   const auto energy = [&] {
     const Contact* touching = self.equations->contact();
-    return touching ? touching->energy_of(self.state, self.parameters) : 0.0;
+    return touching ? touching->energy_of(self.state, self.parameters, self.energy_scratch.contact) : 0.0;
   };
   const double before = energy();
   own.friction = contact.friction;
@@ -279,8 +278,7 @@ ParameterValues rows_of(const Matrix& m) {
 
 MatrixX World::parameter(ParameterKind kind, int rod) const {
   Implementation& self = *implementation_;
-  require(!info_of(kind).of_rod() || (rod >= 0 && rod < static_cast<int>(self.ramps.size())),
-          "no such rod: " + std::to_string(rod));
+  require(!info_of(kind).of_rod() || (rod >= 0 && rod < static_cast<int>(self.ramps.size())), "no such rod: ", rod);
   return parameter_view(self.model, self.parameters, kind, rod);
 }
 
