@@ -125,8 +125,12 @@ void set_elastic(const Parameters& p, ElasticCoefficients& out) {
   out.stretch_stiffness = p.edge_stretch;
   out.stretch_natural.setZero(p.edge_stretch.size());
   out.bend_stiffness = p.bend_stiffness;
-  out.bend_natural = p.bend_natural;
   out.half_stiffness = p.half_stiffness;
+  set_natural(p, out);
+}
+
+void set_natural(const Parameters& p, ElasticCoefficients& out) {
+  out.bend_natural = p.bend_natural;
   out.half_natural = p.half_natural;
 }
 

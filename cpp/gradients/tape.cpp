@@ -98,8 +98,9 @@ void Tape::refuse(const std::string& why) {
 }
 
 bool Tape::continues(const State& state, const Parameters& parameters, const std::vector<Vector3>& loads) const {
-  return state.q.size() == last_.size() && parameters.version == parameters_.version && loads == loads_ &&
-         state.q == last_ && state.v == last_velocity_;
+  return state.q.size() == last_.size() && parameters.version == parameters_.version &&
+         parameters.natural_version == parameters_.natural_version && loads == loads_ && state.q == last_ &&
+         state.v == last_velocity_;
 }
 
 RunGradient Tape::gradient(std::vector<MomentAdjoint> moments) const {

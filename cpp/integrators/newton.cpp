@@ -54,28 +54,18 @@ double line_search(const NewtonSystem& system, const VectorX& z, const VectorX& 
 Newton::Newton(const Model& model, const Options& options) : model_(model), options_(options), norms_(model) {}
 
 Balance Newton::balance(const StepData& e, NewtonResult& result) const {
-  double force_scale = 0.0, moment_scale = 0.0;
-  for (Eigen::Index i = 0; i < e.residual.size(); ++i) {
-    double& scale = norms_.is_angle(i) ? moment_scale : force_scale;
-    scale = std::max(scale, e.magnitude(i));
-  }
-  moment_scale = std::max(moment_scale, force_scale * norms_.shortest_edge());
+  const auto greatest = [](const auto& rows) { return rows.template maxCoeff<Eigen::PropagateNaN>(); };
+  const auto coordinates = norms_.coordinates().array(), angles = norms_.angles().array();
+  const double force = greatest(e.magnitude.array() * coordinates);
+  const double moment = std::max(greatest(e.magnitude.array() * angles), force * norms_.shortest_edge());
+  const auto size = e.residual.array().abs();
+  const auto over_floor = size - 10.0 * e.floor.array();
+  const auto over_share = size - options_.force_tolerance * (force * coordinates + moment * angles);
+  result.residual = (size / norms_.arms().array()).maxCoeff(&result.worst_row);
   Balance balance;
-  result.residual = 0.0;
-  for (Eigen::Index i = 0; i < e.residual.size(); ++i) {
-    const bool angle = norms_.is_angle(i);
-    const double r = std::abs(e.residual(i));
-    const bool floor = r <= 10.0 * e.floor(i);
-    const bool relative = r <= options_.force_tolerance * (angle ? moment_scale : force_scale);
-    balance.floor = balance.floor && floor;
-    balance.relative = balance.relative && relative;
-    balance.either = balance.either && (floor || relative);
-    const double as_force = angle ? r / norms_.shortest_edge() : r;
-    if (!(as_force <= result.residual)) {
-      result.residual = as_force;
-      result.worst_row = static_cast<int>(i);
-    }
-  }
+  balance.either = greatest(over_floor.min(over_share)) <= 0.0;
+  balance.floor = balance.either && greatest(over_floor) <= 0.0;
+  balance.relative = balance.either && greatest(over_share) <= 0.0;
   return balance;
 }
 

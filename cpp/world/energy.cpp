@@ -55,6 +55,8 @@ Energy mechanical_energy(const Model& model, const EnergyCoefficients& k, const 
 }  // namespace
 
 void EnergyCoefficients::set(const Model& model, const Parameters& p) {
+  if (natural_version != p.natural_version) set_natural(p, elastic);
+  natural_version = p.natural_version;
   if (version == p.version) return;
   version = p.version;
   set_elastic(p, elastic);
@@ -65,13 +67,19 @@ void EnergyCoefficients::set(const Model& model, const Parameters& p) {
   spring_rest_length = p.spring_rest_length;
 }
 
-/// What ramps of natural shapes change at a state that stays: bending and twisting [J].
-double World::Implementation::actuation_energy() const {
+/// Takes ramps from one time to another at a state that stays, and adds what that changes of bending and twisting [J].
+void World::Implementation::apply_ramps(double from, double to, double& work) {
   auto& [c, k, touching] = energy_scratch;
+  const auto energy = [&] {
+    k.set(model, parameters);
+    const BendTwistEnergy e = bend_twist_energy(model, k.elastic, c);
+    return e.bend + e.twist;
+  };
   compute_configuration(model, state, state.q, c);
-  k.set(model, parameters);
-  const BendTwistEnergy e = bend_twist_energy(model, k.elastic, c);
-  return e.bend + e.twist;
+  apply_ramps(from);
+  work -= energy();
+  apply_ramps(to);
+  work += energy();
 }
 
 void World::Implementation::begin_setting() {
