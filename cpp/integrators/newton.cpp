@@ -61,12 +61,18 @@ Balance Newton::balance(const StepData& e, NewtonResult& result) const {
   const auto size = e.residual.array().abs();
   const auto over_floor = size - 10.0 * e.floor.array();
   const auto over_share = size - options_.force_tolerance * (force * coordinates + moment * angles);
-  result.residual = (size / norms_.arms().array()).maxCoeff(&result.worst_row);
+  result.residual = (size / norms_.arms().array()).maxCoeff();
   Balance balance;
   balance.either = greatest(over_floor.min(over_share)) <= 0.0;
   balance.floor = balance.either && greatest(over_floor) <= 0.0;
   balance.relative = balance.either && greatest(over_share) <= 0.0;
   return balance;
+}
+
+int Newton::worst_row(const VectorX& residual) const {
+  int row = -1;
+  (residual.array().abs() / norms_.arms().array()).maxCoeff(&row);
+  return row;
 }
 
 /// One solve.
@@ -97,6 +103,7 @@ class Newton::Solve {
       const Verdict verdict = look();
       if (verdict == Verdict::go_on && iterate()) continue;
       result_.converged = verdict == Verdict::converged;
+      result_.worst_row = newton_.worst_row(work_.data.residual);
       if (result_.converged) {
         if (spare_matrix_) reuse_.note_spare_matrix();
         reuse_.note_end(result_.iterations);

@@ -51,8 +51,10 @@ class Newton {
   const StepNorms& norms() const { return norms_; }
   /// Finds z with F(z) = target, starting at z.
   NewtonResult solve(Equations& equations, VectorX& z, const SolveOptions& how, NewtonWorkspace& work) const;
-  /// Whether residuals are small enough; also notes the worst one in `result`.
+  /// Whether residuals are small enough; also notes the greatest one in `result`.
   Balance balance(const StepData& evaluation, NewtonResult& result) const;
+  /// Where the greatest one is.
+  int worst_row(const VectorX& residual) const;
 
  private:
   class Solve;

@@ -67,8 +67,8 @@ void EnergyCoefficients::set(const Model& model, const Parameters& p) {
   spring_rest_length = p.spring_rest_length;
 }
 
-/// Takes ramps from one time to another at a state that stays, and adds what that changes of bending and twisting [J].
-void World::Implementation::apply_ramps(double from, double to, double& work) {
+/// Takes ramps on to a time at a state that stays, and adds what that changes of bending and twisting [J].
+void World::Implementation::apply_ramps(double time, double& work) {
   auto& [c, k, touching] = energy_scratch;
   const auto energy = [&] {
     k.set(model, parameters);
@@ -76,9 +76,8 @@ void World::Implementation::apply_ramps(double from, double to, double& work) {
     return e.bend + e.twist;
   };
   compute_configuration(model, state, state.q, c);
-  apply_ramps(from);
   work -= energy();
-  apply_ramps(to);
+  apply_ramps(time);
   work += energy();
 }
 

@@ -84,7 +84,7 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
   const Moving before = *this;
   const Lagged lagged_before = lagged();
   const double time = state.time + dt;
-  if (actuated()) apply_ramps(state.time, time, actuation_work);
+  if (actuated()) apply_ramps(time, actuation_work);
   aim_supports(time);
   Equations& system = statics();
   update_custom_force(system);

@@ -120,7 +120,7 @@ struct World::Implementation : Running {
   void leave_plane_for(const ParameterSetting& setting);
   void set(std::span<const ParameterSetting> settings);
   void apply_ramps(double time);
-  void apply_ramps(double from, double to, double& work);
+  void apply_ramps(double time, double& work);
   void retire_ramps();
   bool actuated() const;
   void aim_supports(double time);
