@@ -26,6 +26,9 @@ bool loses_path(const Prediction& predicted, const MatrixReuse& reuse, bool firs
   return first ? !(reuse.step() <= predicted.length) : !(reuse.step() <= kMostContraction * reuse.last_step());
 }
 
+/// In packs: what is not finite is none times zero either.
+bool is_finite(const VectorX& x) { return (0.0 * x).sum() == 0.0; }
+
 /// [Choi, dissertation, Algorithm 4], with the sign of q + alpha dq and the bounds it leaves unset: Goldstein-Price on
 /// |F|^2 / 2.
 double line_search(const NewtonSystem& system, const VectorX& z, const VectorX& step) {
@@ -54,18 +57,19 @@ double line_search(const NewtonSystem& system, const VectorX& z, const VectorX& 
 Newton::Newton(const Model& model, const Options& options) : model_(model), options_(options), norms_(model) {}
 
 Balance Newton::balance(const StepData& e, NewtonResult& result) const {
-  const auto greatest = [](const auto& rows) { return rows.template maxCoeff<Eigen::PropagateNaN>(); };
+  Balance balance;
+  balance.finite = is_finite(e.residual);
+  if (!balance.finite) return balance;
   const auto coordinates = norms_.coordinates().array(), angles = norms_.angles().array();
-  const double force = greatest(e.magnitude.array() * coordinates);
-  const double moment = std::max(greatest(e.magnitude.array() * angles), force * norms_.shortest_edge());
+  const double force = (e.magnitude.array() * coordinates).maxCoeff();
+  const double moment = std::max((e.magnitude.array() * angles).maxCoeff(), force * norms_.shortest_edge());
   const auto size = e.residual.array().abs();
   const auto over_floor = size - 10.0 * e.floor.array();
   const auto over_share = size - options_.force_tolerance * (force * coordinates + moment * angles);
   result.residual = (size / norms_.arms().array()).maxCoeff();
-  Balance balance;
-  balance.either = greatest(over_floor.min(over_share)) <= 0.0;
-  balance.floor = balance.either && greatest(over_floor) <= 0.0;
-  balance.relative = balance.either && greatest(over_share) <= 0.0;
+  balance.either = over_floor.min(over_share).maxCoeff() <= 0.0;
+  balance.floor = balance.either && over_floor.maxCoeff() <= 0.0;
+  balance.relative = balance.either && over_share.maxCoeff() <= 0.0;
   return balance;
 }
 
@@ -130,8 +134,8 @@ class Newton::Solve {
     const bool near_end = reuse_.near_end();
     if (!search_.evaluated() || (reuse_.fresh() && !near_end)) evaluate(reuse_.fresh() && !near_end);
     result_.step = reuse_.step();
-    if (!work_.data.residual.allFinite()) return Verdict::failed;
     balance_ = newton_.balance(work_.data, result_);
+    if (!balance_.finite) return Verdict::failed;
     if (converged()) return Verdict::converged;
     if (result_.iterations == how_.max_iterations) return Verdict::failed;
     if (result_.iterations == 0) first_residual_ = result_.residual;
@@ -162,7 +166,7 @@ class Newton::Solve {
     else
       system_.solve_for(work_.step);
     search_.forget();
-    if (!work_.step.allFinite()) return false;
+    if (!is_finite(work_.step)) return false;
     double shorten = search_.shortened(z_, work_.step);
     if (uses(Heuristic::predict_friction)) system_.equations.predict_friction(work_.step, shorten, work_.contact);
     if (mixed_) predict_axial_force(system_.equations.problem(), work_.data, work_.step, work_.axial_force);
