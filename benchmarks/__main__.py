@@ -28,6 +28,7 @@ NAMES = (
     "contact",
     "contact_robustness",
     "perception",
+    "real2sim",
 )
 
 

@@ -35,6 +35,7 @@ def run(name, folder, *arguments):
         "parallel",
         "contact",
         "contact_robustness",
+        "real2sim",
     ],
 )
 def test_the_short_form_writes_its_figures(name, tmp_path):
