@@ -1,6 +1,7 @@
 #pragma once
 /// A run as the adjoint method needs it: what each step led to, so that states come again without a solve.
 
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -19,6 +20,13 @@ struct InitialGradient {
 struct RunGradient {
   ParameterGradient parameters;
   InitialGradient initial;
+};
+
+/// Derivatives of the state at the end of a run by that at its start and by what acts, a row each for the numbers of a
+/// state vector (state_vector.hpp).
+struct RunJacobian {
+  MatrixX state;
+  std::vector<RunGradient> rows;  ///< without the state at the start
 };
 
 /// What a scalar depends on at a moment of a run: after so many steps.
@@ -47,6 +55,8 @@ class Tape {
 
   /// Throws std::invalid_argument where none is known.
   RunGradient gradient(std::vector<MomentAdjoint> moments) const;
+  /// Likewise; costs a solve of each step for every row.
+  RunJacobian jacobian() const;
 
  private:
   struct Step {
@@ -55,6 +65,10 @@ class Tape {
     VectorX end;
   };
   class Player;
+
+  void check_known() const;
+  /// Goes back through the steps: `visit(k, gradient)` with that of step k, begun.
+  void walk_back(const std::function<void(std::size_t, StepGradient&)>& visit) const;
 
   Model model_;
   EquationOptions options_;

@@ -3,6 +3,7 @@
 
 #include "common/check.hpp"
 #include "geometry/rotation.hpp"
+#include "gradients/state_vector.hpp"
 #include "world/implementation.hpp"
 
 namespace withe {
@@ -90,6 +91,28 @@ std::shared_ptr<Tape> World::start_tape() {
 }
 
 void World::stop_tape() { implementation_->tape.reset(); }
+
+VectorX World::state_difference(const World& reference) const {
+  const Implementation &self = *implementation_, &other = *reference.implementation_;
+  const auto same = [](const Constraint& a, const Constraint& b) { return a.first == b.first && a.free == b.free; };
+  require(self.model.planar() == other.model.planar() && self.model.dof_count == other.model.dof_count &&
+              std::equal(self.model.constraints.begin(), self.model.constraints.end(), other.model.constraints.begin(),
+                         other.model.constraints.end(), same),
+          "the reference must be a copy of this simulation, with the same supports");
+  return withe::state_difference(self.model, other.state, self.state);
+}
+
+void World::displace_state(const VectorX& by) {
+  // On a copy, so that what is refused changes nothing.
+  auto fresh = std::make_unique<Implementation>(accounted());
+  fresh->recall(implementation_->lagged());
+  fresh->take_callbacks(*implementation_);
+  withe::displace_state(fresh->model, by, fresh->state);
+  fresh->meet_anew();
+  fresh->forget_motion();
+  fresh->forget_matrix();
+  implementation_ = std::move(fresh);
+}
 
 /// Before a step.
 void World::Implementation::check_tape() {

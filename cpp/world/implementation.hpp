@@ -107,6 +107,7 @@ struct World::Implementation : Running {
   void set_rates(const std::vector<RodState>& rods);
   void relax_joints(const std::vector<bool>& is_told);
   void turn_frames(const std::vector<bool>& is_told);
+  void meet_anew();
   /// What came before no longer tells what comes next.
   void forget_motion();
 
