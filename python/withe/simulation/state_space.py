@@ -69,7 +69,7 @@ class StateSpace:
         >>> balance = simulation.equilibrium()
         >>> A, B = simulation.step_jacobian([(arm, "natural_curvature")])
         >>> A.shape, B.shape
-        ((40, 40), (40, 20))
+        ((40, 40), (40, 18))
         >>> bool(np.abs(np.linalg.eigvals(A.toarray())).max() < 1.0)
         True
         """
