@@ -6,9 +6,18 @@
 
 namespace withe {
 
-/// Throws std::invalid_argument (ValueError in Python) with the given message unless the condition holds.
-inline void require(bool condition, const std::string& message) {
-  if (!condition) throw std::invalid_argument(message);
+/// Throws std::invalid_argument (ValueError in Python) unless the condition holds. Its message, of strings and numbers
+/// one after the other, is put together only then: a check that passes does not allocate.
+template <class... Parts>
+void require(bool condition, const Parts&... parts) {
+  if (condition) return;
+  const auto text = [](const auto& part) {
+    if constexpr (requires { std::to_string(part); })
+      return std::to_string(part);
+    else
+      return std::string(part);
+  };
+  throw std::invalid_argument((text(parts) + ...));
 }
 
 }  // namespace withe

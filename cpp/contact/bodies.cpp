@@ -84,15 +84,4 @@ Proximity Bodies::proximity(const ContactPair& pair, const VectorX& q, bool whol
   return p;
 }
 
-double farthest(const Model& model, const VectorX& change) {
-  double most = 0.0;
-  for (int dof : model.node_dof) {
-    double square = 0.0;
-    for (int k = 0; k < model.dimension; ++k) square += change(dof + k) * change(dof + k);
-    if (std::isnan(square)) return square;
-    most = std::max(most, square);
-  }
-  return std::sqrt(most);
-}
-
 }  // namespace withe

@@ -1,6 +1,8 @@
 #pragma once
 /// Rods and obstacles of a scene where they are: ends, unknowns and closest points of two surfaces.
 
+#include <algorithm>
+#include <cmath>
 #include <vector>
 
 #include "contact/surfaces.hpp"
@@ -36,7 +38,17 @@ struct Bodies {
   Proximity proximity(const ContactPair& pair, const VectorX& q, bool whole = false) const;
 };
 
-/// The longest way of a node; NaN where one is.
-double farthest(const Model& model, const VectorX& change);
+/// The longest way of a node; NaN where one is. `change`: any expression of a change of q, which is not stored.
+template <class Change>
+double farthest(const Model& model, const Eigen::MatrixBase<Change>& change) {
+  double most = 0.0;
+  for (int dof : model.node_dof) {
+    double square = 0.0;
+    for (int k = dof; k < dof + model.dimension; ++k) square += change(k) * change(k);
+    if (std::isnan(square)) return square;
+    most = std::max(most, square);
+  }
+  return std::sqrt(most);
+}
 
 }  // namespace withe

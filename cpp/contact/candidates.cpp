@@ -160,11 +160,11 @@ void Candidates::set_boxes(const VectorX& from, const VectorX& to, const More& m
   }
 }
 
-/// At q, grown by so many radii.
-std::vector<Box> Candidates::boxes_at(const VectorX& q, double radii) const {
-  std::vector<Box> boxes;
-  if (q.size() > 0) set_boxes(q, q, [&](int e) { return radii * surfaces_.radius(e); }, boxes);
-  return boxes;
+/// What is near at q, where edges are thicker by so many radii.
+void Candidates::find_near(const VectorX& q, double radii, CandidateSearch& search) const {
+  search.boxes.clear();
+  if (q.size() > 0) set_boxes(q, q, [&](int e) { return radii * surfaces_.radius(e); }, search.boxes);
+  add_near(search.broad_phase.find(search.boxes), search.pairs);
 }
 
 /// Candidates for the way from one configuration to another, and beyond by a margin that grows with the last travel.
@@ -196,10 +196,10 @@ void Candidates::add_near(const std::vector<BroadPhase::Pair>& found, std::vecto
 }
 
 std::vector<ContactKey> Candidates::near(const VectorX& q, const Bodies& bodies) const {
-  std::vector<ContactPair> pairs;
-  add_near(BroadPhase().find(boxes_at(q, kNear)), pairs);
+  CandidateSearch search;
+  find_near(q, kNear, search);
   std::vector<ContactKey> keys;
-  for (const ContactPair& pair : pairs)
+  for (const ContactPair& pair : search.pairs)
     if (pair.key.b < 0 || bodies.proximity(pair, q).distance < pair.reach() + kNear * pair.radii())
       keys.push_back(pair.key);
   std::sort(keys.begin(), keys.end());
@@ -208,8 +208,8 @@ std::vector<ContactKey> Candidates::near(const VectorX& q, const Bodies& bodies)
 
 double Candidates::allowed(const VectorX& q, const Bodies& bodies, const VectorX& change) {
   if (outgrown(q, &change)) {
-    const VectorX end = q + change;
-    find_pairs(q, end);
+    end_ = q + change;
+    find_pairs(q, end_);
   }
   double least = 1.0;
   bounds_.resize(pairs_.size());

@@ -12,6 +12,13 @@
 
 namespace withe {
 
+/// Scratch of a search for what is near.
+struct CandidateSearch {
+  BroadPhase broad_phase;
+  std::vector<Box> boxes;
+  std::vector<ContactPair> pairs;  ///< obstacles' first, then those found, sorted by key
+};
+
 class Candidates {
  public:
   Candidates(const Model& model, const Surfaces& surfaces);
@@ -27,14 +34,13 @@ class Candidates {
       if (proximity.distance < pairs_[p].reach()) add(pairs_[p], proximity);
     }
   }
-  /// The same without a trace.
+  /// The same without a trace; what the search needs is the caller's.
   template <class Add>
-  void find(const VectorX& q, const Bodies& bodies, const Add& add) const {
-    std::vector<ContactPair> found;
+  void find(const VectorX& q, const Bodies& bodies, CandidateSearch& search, const Add& add) const {
     const bool known = !outgrown(q, nullptr);
-    if (!known) add_near(BroadPhase().find(boxes_at(q, 0.0)), found);
+    if (!known) find_near(q, 0.0, search);
     const double here = moved_ + way_from_last(q, bodies);
-    const std::vector<ContactPair>& pairs = known ? pairs_ : found;
+    const std::vector<ContactPair>& pairs = known ? pairs_ : search.pairs;
     for (std::size_t p = 0; p < pairs.size(); ++p) {
       if (known && p < bounds_.size() && bounds_[p].clear > here) continue;
       const Proximity proximity = bodies.proximity(pairs[p], q);
@@ -65,7 +71,7 @@ class Candidates {
   double way_from_last(const VectorX& q, const Bodies& bodies) const;
   template <class More>
   void set_boxes(const VectorX& from, const VectorX& to, const More& more, std::vector<Box>& out) const;
-  std::vector<Box> boxes_at(const VectorX& q, double more) const;
+  void find_near(const VectorX& q, double radii, CandidateSearch& search) const;
   void add_near(const std::vector<BroadPhase::Pair>& found, std::vector<ContactPair>& pairs) const;
   void find_pairs(const VectorX& from, const VectorX& to);
   bool outgrown(const VectorX& q, const VectorX* change) const;
@@ -74,6 +80,7 @@ class Candidates {
   BroadPhase broad_phase_;
   std::vector<Box> boxes_;
   std::vector<ContactPair> pairs_;  ///< obstacles' first, then those of the broad phase, sorted by key
+  VectorX end_;                     ///< scratch: where a way leads
   VectorX reference_;               ///< where the candidates belong
   VectorX low_, high_;              ///< bounds of the way there
   double margin_ = 0;

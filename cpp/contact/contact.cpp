@@ -53,25 +53,18 @@ ContactReport report_of(const ContactProblem& problem, const Touching& t) {
 
 }  // namespace
 
-/// Contact of a state that stays as it is: obstacles too.
-struct Contact::AtRest {
-  ContactParameters own;  ///< where they are not those of the steps
-  ContactProblem problem;
-  ContactSet set;
-
-  AtRest(const Contact& contact, const State& state, const Parameters& parameters) {
-    const bool known = contact.parameters_.version == parameters.version;
-    if (!known) own = ContactParameters(contact.surfaces_, parameters);
-    problem.surfaces = &contact.surfaces_;
-    problem.parameters = known ? &contact.parameters_ : &own;
-    problem.bodies = contact.problem_.bodies;
-    set_start(state, 1.0, problem);
-    problem.starting = true;
-    set.find(problem, contact.candidates_, state.q);
-  }
-  AtRest(const AtRest&) = delete;
-  AtRest& operator=(const AtRest&) = delete;
-};
+void Contact::find_at_rest(const State& state, const Parameters& parameters, ContactAtRest& rest) const {
+  const bool known = parameters_.version == parameters.version;
+  if (!known && rest.own.version != parameters.version) rest.own = ContactParameters(surfaces_, parameters);
+  ContactProblem& problem = rest.problem;
+  problem.surfaces = &surfaces_;
+  problem.parameters = known ? &parameters_ : &rest.own;
+  problem.bodies = problem_.bodies;
+  set_start(state, 1.0, problem);
+  problem.starting = true;
+  rest.set.find(problem, state.q,
+                [&](const auto& add) { candidates_.find(state.q, problem.bodies, rest.search, add); });
+}
 
 Contact::Contact(const Model& model) : surfaces_(model), candidates_(model, surfaces_) {
   problem_.surfaces = &surfaces_;
@@ -99,9 +92,12 @@ void Contact::restart(const State& state, double duration) {
   blocked_ = false;
   set_start(state, duration, problem_);
   problem_.starting = true;
-  set_.find(problem_, candidates_, state.q);
+  find(state.q);
   problem_.starting = false;
-  if (problem_.pressing != Pressing::still) problem_.renewed = ContactStiffness(problem_).renewed(set_);
+  if (problem_.pressing != Pressing::still) {
+    ContactStiffness(problem_).renew(set_, scratch_.records);
+    problem_.renewed.swap(scratch_.records);
+  }
   for (const Touching& t : set_) {
     if (problem_.record_of(t.pair.key) == nullptr) problem_.unrecorded.push_back(t.pair.key);
     if (t.law.elastic > 0.0) problem_.leaving.push_back(t);
@@ -147,8 +143,12 @@ void Contact::lag_friction() {
 
 void Contact::update(const VectorX& q1) {
   if (current_ && q1 == set_.q()) return;
-  set_.find(problem_, candidates_, q1);
+  find(q1);
   current_ = true;
+}
+
+void Contact::find(const VectorX& q) {
+  set_.find(problem_, q, [&](const auto& add) { candidates_.find(q, problem_.bodies, add); });
 }
 
 void Contact::local(int i, bool with_hessian, ContactLocal& out, const ContactLinearisation& linearisation) const {
@@ -199,25 +199,23 @@ void Contact::predict_friction(const VectorX& change, ContactLinearisation& line
   });
 }
 
-double Contact::accept(State& state, Keep keep, double spare) const {
-  std::vector<ContactRecord> records;
-  const double put_in = ContactStiffness(problem_).accept(set_, keep, spare, records, state.contact_stiffness);
-  state.contacts.swap(records);
+double Contact::accept(State& state, Keep keep, double spare) {
+  const double put_in = ContactStiffness(problem_).accept(set_, keep, spare, scratch_, state.contact_stiffness);
+  state.contacts.swap(scratch_.records);
   leave_obstacles(state);
   return put_in;
 }
 
-void Contact::remember(State& state) const {
-  std::vector<ContactRecord> records;
-  ContactStiffness(problem_).remember(set_, state.contact_stiffness, records);
-  state.contacts.swap(records);
+void Contact::remember(State& state) {
+  ContactStiffness(problem_).remember(set_, state.contact_stiffness, scratch_.records);
+  state.contacts.swap(scratch_.records);
   leave_obstacles(state);
 }
 
 double Contact::stiffen(State& state, Keep keep) {
-  const ContactSet deep = set_;
+  std::swap(set_, deep_);
   restart(state, problem_.duration);
-  return ContactStiffness(problem_).stiffen(deep, set_, keep, state.contacts, state.contact_stiffness);
+  return ContactStiffness(problem_).stiffen(deep_, set_, keep, state.contacts, state.contact_stiffness);
 }
 
 void Contact::initialise(State& state, const Parameters& parameters) const {
@@ -225,13 +223,14 @@ void Contact::initialise(State& state, const Parameters& parameters) const {
     state.contact_stiffness = ContactParameters(surfaces_, parameters).least_stiffness;
 }
 
-double Contact::energy_of(const State& state, const Parameters& parameters) const {
-  const AtRest rest(*this, state, parameters);
+double Contact::energy_of(const State& state, const Parameters& parameters, ContactAtRest& rest) const {
+  find_at_rest(state, parameters, rest);
   return rest.set.energy(rest.problem);
 }
 
 std::vector<ContactReport> Contact::report(const State& state, const Parameters& parameters) const {
-  const AtRest rest(*this, state, parameters);
+  ContactAtRest rest;
+  find_at_rest(state, parameters, rest);
   std::vector<ContactReport> reports;
   for (const Touching& t : rest.set) reports.push_back(report_of(rest.problem, t));
   return reports;

@@ -35,6 +35,14 @@ struct ContactReport {
   bool sticking = false;
 };
 
+/// Contact of a state that stays as it is, obstacles too: scratch of read-outs.
+struct ContactAtRest {
+  ContactParameters own;  ///< where they are not those of the steps
+  ContactProblem problem;
+  ContactSet set;
+  CandidateSearch search;
+};
+
 class Contact {
  public:
   explicit Contact(const Model& model);
@@ -98,21 +106,22 @@ class Contact {
   void hold_sticking(const State& state, VectorX& change) const;
 
   /// Keeps in `state`, still where the step began, what contacts at q1 must remember: see `ContactStiffness::accept`.
-  double accept(State& state, Keep keep, double spare) const;
+  double accept(State& state, Keep keep, double spare);
   /// The same for a step so short that stiffness stays as it is.
-  void remember(State& state) const;
+  void remember(State& state);
   /// Makes contacts of bodies that are too deep in each other stiffer; returns the energy put in [J].
   double stiffen(State& state, Keep keep);
   /// Gives a state that has none yet the stiffness that no rod falls below.
   void initialise(State& state, const Parameters& parameters) const;
   /// Contacts of a state at rest, for read-outs; and their energy.
   std::vector<ContactReport> report(const State& state, const Parameters& parameters) const;
-  double energy_of(const State& state, const Parameters& parameters) const;
+  double energy_of(const State& state, const Parameters& parameters, ContactAtRest& rest) const;
   /// The next step finds everything anew.
   void forget();
 
  private:
-  struct AtRest;
+  void find(const VectorX& q);
+  void find_at_rest(const State& state, const Parameters& parameters, ContactAtRest& rest) const;
   void restart(const State& state, double duration);
   void move_obstacles();
   void lag_friction();
@@ -125,7 +134,8 @@ class Contact {
   ContactParameters parameters_;
   ContactProblem problem_;
   Candidates candidates_;
-  ContactSet set_;
+  ContactSet set_, deep_;  ///< what touches; what did when it was found to be too deep
+  StiffnessScratch scratch_;
   bool current_ = false;  ///< set_ is what touches in this step
   std::vector<ObstaclePlace> target_;
   bool blocked_ = false;

@@ -10,14 +10,14 @@ namespace withe {
 class ContactSet {
  public:
   /// Finds what touches at q: what has lagged friction first, then what presses, in the order of candidates, then what
-  /// only gives back what it took. Candidates that are const keep no bounds of what was seen.
-  template <class AnyCandidates>
-  void find(const ContactProblem& problem, AnyCandidates& candidates, const VectorX& q) {
+  /// only gives back what it took. `within_reach(add)` calls add(pair, proximity) for all that is near, in that order.
+  template <class WithinReach>
+  void find(const ContactProblem& problem, const VectorX& q, const WithinReach& within_reach) {
     q_ = q;
     touching_ = problem.lagged;
     for (Touching& t : touching_) problem.bodies.values(t.pair, q, t.now);
     const std::size_t first = touching_.size();
-    candidates.find(q, problem.bodies, [&](const ContactPair& pair, const Proximity& proximity) {
+    within_reach([&](const ContactPair& pair, const Proximity& proximity) {
       set_forces(problem, add(problem, pair, proximity));
     });
     add_leaving(problem, first);

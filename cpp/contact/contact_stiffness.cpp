@@ -140,9 +140,8 @@ double ContactStiffness::wanted_ratio(const Touching& t, const ContactRecord& re
 
 /// The greatest force that contact has to hold at a node, times 1e5 / m [Choi, dissertation, (5.16), (5.17)]: what all
 /// other forces there add up to, inertia among them, is what contact and friction are.
-double ContactStiffness::source_stiffness(const ContactSet& set) const {
+double ContactStiffness::source_stiffness(const ContactSet& set, VectorX& force) const {
   constexpr double kSource = 1e5;  // [1/m]
-  VectorX force;
   contact_force(problem_, set, force);
   return kSource * farthest(problem_.model(), force);
 }
@@ -183,19 +182,16 @@ void ContactStiffness::remember(const ContactSet& set, const VectorX& stiffness,
   finish(set, records);
 }
 
-double ContactStiffness::accept(const ContactSet& set, Keep keep, double spare, std::vector<ContactRecord>& records,
+double ContactStiffness::accept(const ContactSet& set, Keep keep, double spare, StiffnessScratch& scratch,
                                 VectorX& stiffness) const {
-  struct Fading {
-    const Touching* touching;
-    std::size_t record;
-  };
-  std::vector<Fading> fading;
+  auto& [records, fading, greatest, force] = scratch;
   records.clear();
+  fading.clear();
   const ContactDescription& contact = problem_.description();
   const VectorX& least = problem_.parameters->least_stiffness;
   const bool source = contact.stiffness_rule == StiffnessRule::source && !(contact.stiffness > 0.0);
-  const double common = source ? std::max(source_stiffness(set), least.minCoeff()) : 0.0;
-  VectorX greatest = least;
+  const double common = source ? std::max(source_stiffness(set, force), least.minCoeff()) : 0.0;
+  greatest = least;
   double put_in = 0.0, wanted = 0.0;
   for (const Touching& t : set) {
     const ContactPair& pair = t.pair;
@@ -260,8 +256,8 @@ double ContactStiffness::stiffen(const ContactSet& set, const ContactSet& start,
   return put_in;
 }
 
-std::vector<ContactRecord> ContactStiffness::renewed(ContactSet& start) const {
-  std::vector<ContactRecord> records;
+void ContactStiffness::renew(ContactSet& start, std::vector<ContactRecord>& records) const {
+  records.clear();
   for (int i = 0; i < start.count(); ++i) {
     const Touching& t = start[i];
     ContactRecord record;
@@ -272,12 +268,11 @@ std::vector<ContactRecord> ContactStiffness::renewed(ContactSet& start) const {
       record.key = t.pair.key;
       record.stiffness = t.stiffness / t.pair.share;
     }
-    if (!renew(t, record)) continue;
+    if (!begins_anew(t, record)) continue;
     start.renew(problem_, i, record);
     records.push_back(record);
   }
   std::sort(records.begin(), records.end(), by_key);
-  return records;
 }
 
 /// Surfaces that a scene begins with within the tolerance of contact fall onto each other if they store less than what
@@ -285,7 +280,7 @@ std::vector<ContactRecord> ContactStiffness::renewed(ContactSet& start) const {
 /// be hit by more than the impact that is not yet over. The speed at which they near each other is then that of another
 /// impact, which is on its way in while its age is 0: for it contact is as stiff as if it only began, without a change
 /// of energy.
-bool ContactStiffness::renew(const Touching& t, ContactRecord& record) const {
+bool ContactStiffness::begins_anew(const Touching& t, ContactRecord& record) const {
   const ContactPair& pair = t.pair;
   double speed = approach_speed(problem_, pair);
   if (record.approach == 0.0) {

@@ -19,15 +19,26 @@ double start_stiffness(const ContactProblem& problem, const ContactPair& pair, c
 /// would put energy in.
 double first_stiffness(const ContactProblem& problem, const ContactPair& pair);
 
+/// Scratch of the end of a step.
+struct StiffnessScratch {
+  struct Fading {
+    const Touching* touching;
+    std::size_t record;
+  };
+  std::vector<ContactRecord> records;
+  std::vector<Fading> fading;
+  VectorX greatest;  ///< stiffness wanted, per rod [N/m]
+  VectorX force;     ///< per unknown [N]
+};
+
 class ContactStiffness {
  public:
   explicit ContactStiffness(const ContactProblem& problem) : problem_(problem) {}
 
-  /// Records of what touches at the end of a step, whose stiffness follows the forces, and so does that of contacts
-  /// that begin, per rod. Returns the energy that this put in, below zero where it took some; if that is what to keep,
-  /// no more than `spare` [J].
-  double accept(const ContactSet& set, Keep keep, double spare, std::vector<ContactRecord>& records,
-                VectorX& stiffness) const;
+  /// Makes `scratch.records` those of what touches at the end of a step, whose stiffness follows the forces, and so
+  /// does that of contacts that begin, per rod. Returns the energy that this put in, below zero where it took some; if
+  /// that is what to keep, no more than `spare` [J].
+  double accept(const ContactSet& set, Keep keep, double spare, StiffnessScratch& scratch, VectorX& stiffness) const;
   /// The same for a step so short that stiffness stays as it is.
   void remember(const ContactSet& set, const VectorX& stiffness, std::vector<ContactRecord>& records) const;
   /// Makes contacts stiffer that are too deep in `set`, records of the step's start and stiffness of contacts that
@@ -35,17 +46,17 @@ class ContactStiffness {
   double stiffen(const ContactSet& set, const ContactSet& start, Keep keep, std::vector<ContactRecord>& records,
                  VectorX& stiffness) const;
   /// Which surfaces near each other anew as the step begins, of those that touch by then; gives them to `start`.
-  std::vector<ContactRecord> renewed(ContactSet& start) const;
+  void renew(ContactSet& start, std::vector<ContactRecord>& records) const;
 
  private:
-  bool renew(const Touching& t, ContactRecord& record) const;
+  bool begins_anew(const Touching& t, ContactRecord& record) const;
   ContactRecord record(const Touching& t) const;
   void finish(const ContactSet& set, std::vector<ContactRecord>& records) const;
   double yielded_at(const Touching& t, double ratio, Keep keep) const;
   double change_stiffness(const Touching& t, double ratio, double yielded, ContactRecord& record) const;
   /// By how much a contact's stiffness is to change, by the force that it carries.
   double wanted_ratio(const Touching& t, const ContactRecord& record) const;
-  double source_stiffness(const ContactSet& set) const;
+  double source_stiffness(const ContactSet& set, VectorX& force) const;
 
   const ContactProblem& problem_;
 };

@@ -22,9 +22,13 @@ void measure_rows(const BendMeasure& measure, Columns3& rows) {
 
 BendTwistEnergy energy_of_row(const BendMeasure& measure, const Columns3& strain, const Columns3& natural,
                               const Columns3& stiffness, Eigen::Index i) {
-  const auto off = (measured(measure, strain.row(i)) - natural.row(i)).eval();
-  const auto energy = (0.5 * stiffness.row(i).cwiseProduct(off.cwiseAbs2())).eval();
-  return {energy(0) + energy(1), energy(2)};
+  const double factor = bend_factor(measure, strain(i, 0) * strain(i, 0) + strain(i, 1) * strain(i, 1)).value;
+  double energy[3];
+  for (int k = 0; k < 3; ++k) {
+    const double off = factor * strain(i, k) - natural(i, k);
+    energy[k] = 0.5 * (stiffness(i, k) * (off * off));
+  }
+  return {energy[0] + energy[1], energy[2]};
 }
 
 /// Derivatives with respect to edges and thetas.
@@ -125,8 +129,12 @@ void set_elastic(const Parameters& p, ElasticCoefficients& out) {
   out.stretch_stiffness = p.edge_stretch;
   out.stretch_natural.setZero(p.edge_stretch.size());
   out.bend_stiffness = p.bend_stiffness;
-  out.bend_natural = p.bend_natural;
   out.half_stiffness = p.half_stiffness;
+  set_natural(p, out);
+}
+
+void set_natural(const Parameters& p, ElasticCoefficients& out) {
+  out.bend_natural = p.bend_natural;
   out.half_natural = p.half_natural;
 }
 

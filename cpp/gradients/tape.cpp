@@ -98,7 +98,8 @@ void Tape::refuse(const std::string& why) {
 
 bool Tape::continues(const State& state, const Parameters& parameters) const {
   return state.q.size() == last_.size() && parameters.version == parameters_.version &&
-         parameters.loads == parameters_.loads && state.q == last_ && state.v == last_velocity_;
+         parameters.natural_version == parameters_.natural_version && parameters.loads == parameters_.loads &&
+         state.q == last_ && state.v == last_velocity_;
 }
 
 void Tape::check_known() const {

@@ -137,7 +137,7 @@ Turning turning(const Model& model, const State& state, const VectorX& q, const 
                 bool at_end) {
   double smallest = 1.0, gain = 0.0;
   for (int e = 0; e < model.edge_count; ++e) {
-    const int a = model.node_dof[at(model.edge_tail[at(e)])], b = model.node_dof[at(model.edge_head[at(e)])];
+    const int a = model.tail_dof[at(e)], b = model.head_dof[at(e)];
     double across = 0.0, before = 0.0, after = 0.0;
     for (int i = 0; i < model.dimension; ++i) {
       const double d0 = state.q(b + i) - state.q(a + i), d1 = q(b + i) - q(a + i);

@@ -28,7 +28,7 @@ void start_axial_force(const Equations& equations, const VectorX& q, VectorX& ou
   const Model& model = equations.model();
   out.resize(model.edge_count);
   for (int e = 0; e < model.edge_count; ++e) {
-    const int a = model.node_dof[at(model.edge_tail[at(e)])], b = model.node_dof[at(model.edge_head[at(e)])];
+    const int a = model.tail_dof[at(e)], b = model.head_dof[at(e)];
     double square = 0.0;
     for (int i = 0; i < model.dimension; ++i) square += (q(b + i) - q(a + i)) * (q(b + i) - q(a + i));
     out(e) = axial_force(std::sqrt(square), model.edge_length(e), equations.elastic().stretch_stiffness(e), 0.0);

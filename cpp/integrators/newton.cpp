@@ -26,6 +26,9 @@ bool loses_path(const Prediction& predicted, const MatrixReuse& reuse, bool firs
   return first ? !(reuse.step() <= predicted.length) : !(reuse.step() <= kMostContraction * reuse.last_step());
 }
 
+/// In packs: what is not finite is none times zero either.
+bool is_finite(const VectorX& x) { return (0.0 * x).sum() == 0.0; }
+
 /// [Choi, dissertation, Algorithm 4], with the sign of q + alpha dq and the bounds it leaves unset: Goldstein-Price on
 /// |F|^2 / 2.
 double line_search(const NewtonSystem& system, const VectorX& z, const VectorX& step) {
@@ -54,29 +57,26 @@ double line_search(const NewtonSystem& system, const VectorX& z, const VectorX& 
 Newton::Newton(const Model& model, const Options& options) : model_(model), options_(options), norms_(model) {}
 
 Balance Newton::balance(const StepData& e, NewtonResult& result) const {
-  double force_scale = 0.0, moment_scale = 0.0;
-  for (Eigen::Index i = 0; i < e.residual.size(); ++i) {
-    double& scale = norms_.is_angle(i) ? moment_scale : force_scale;
-    scale = std::max(scale, e.magnitude(i));
-  }
-  moment_scale = std::max(moment_scale, force_scale * norms_.shortest_edge());
   Balance balance;
-  result.residual = 0.0;
-  for (Eigen::Index i = 0; i < e.residual.size(); ++i) {
-    const bool angle = norms_.is_angle(i);
-    const double r = std::abs(e.residual(i));
-    const bool floor = r <= 10.0 * e.floor(i);
-    const bool relative = r <= options_.force_tolerance * (angle ? moment_scale : force_scale);
-    balance.floor = balance.floor && floor;
-    balance.relative = balance.relative && relative;
-    balance.either = balance.either && (floor || relative);
-    const double as_force = angle ? r / norms_.shortest_edge() : r;
-    if (!(as_force <= result.residual)) {
-      result.residual = as_force;
-      result.worst_row = static_cast<int>(i);
-    }
-  }
+  balance.finite = is_finite(e.residual);
+  if (!balance.finite) return balance;
+  const auto coordinates = norms_.coordinates().array(), angles = norms_.angles().array();
+  const double force = (e.magnitude.array() * coordinates).maxCoeff();
+  const double moment = std::max((e.magnitude.array() * angles).maxCoeff(), force * norms_.shortest_edge());
+  const auto size = e.residual.array().abs();
+  const auto over_floor = size - 10.0 * e.floor.array();
+  const auto over_share = size - options_.force_tolerance * (force * coordinates + moment * angles);
+  result.residual = (size / norms_.arms().array()).maxCoeff();
+  balance.either = over_floor.min(over_share).maxCoeff() <= 0.0;
+  balance.floor = balance.either && over_floor.maxCoeff() <= 0.0;
+  balance.relative = balance.either && over_share.maxCoeff() <= 0.0;
   return balance;
+}
+
+int Newton::worst_row(const VectorX& residual) const {
+  int row = -1;
+  (residual.array().abs() / norms_.arms().array()).maxCoeff(&row);
+  return row;
 }
 
 /// One solve.
@@ -107,6 +107,7 @@ class Newton::Solve {
       const Verdict verdict = look();
       if (verdict == Verdict::go_on && iterate()) continue;
       result_.converged = verdict == Verdict::converged;
+      result_.worst_row = newton_.worst_row(work_.data.residual);
       if (result_.converged) {
         if (spare_matrix_) reuse_.note_spare_matrix();
         reuse_.note_end(result_.iterations);
@@ -133,8 +134,8 @@ class Newton::Solve {
     const bool near_end = reuse_.near_end();
     if (!search_.evaluated() || (reuse_.fresh() && !near_end)) evaluate(reuse_.fresh() && !near_end);
     result_.step = reuse_.step();
-    if (!work_.data.residual.allFinite()) return Verdict::failed;
     balance_ = newton_.balance(work_.data, result_);
+    if (!balance_.finite) return Verdict::failed;
     if (converged()) return Verdict::converged;
     if (result_.iterations == how_.max_iterations) return Verdict::failed;
     if (result_.iterations == 0) first_residual_ = result_.residual;
@@ -165,7 +166,7 @@ class Newton::Solve {
     else
       system_.solve_for(work_.step);
     search_.forget();
-    if (!work_.step.allFinite()) return false;
+    if (!is_finite(work_.step)) return false;
     double shorten = search_.shortened(z_, work_.step);
     if (uses(Heuristic::predict_friction)) system_.equations.predict_friction(work_.step, shorten, work_.contact);
     if (mixed_) predict_axial_force(system_.equations.problem(), work_.data, work_.step, work_.axial_force);

@@ -18,9 +18,10 @@ struct NewtonResult {
 
 /// How small the residuals are.
 struct Balance {
-  bool relative = true;  ///< all below the tolerance times the forces in the scene
-  bool floor = true;     ///< all within what rounding leaves
-  bool either = true;    ///< each one or the other
+  bool finite = false;    ///< all are numbers; else none of the below holds
+  bool relative = false;  ///< all below the tolerance times the forces in the scene
+  bool floor = false;     ///< all within what rounding leaves
+  bool either = false;    ///< each one or the other
 };
 
 /// A solution predicted from another one on the same path, with its axial forces in work.axial_force. A guess that is
@@ -51,8 +52,10 @@ class Newton {
   const StepNorms& norms() const { return norms_; }
   /// Finds z with F(z) = target, starting at z.
   NewtonResult solve(Equations& equations, VectorX& z, const SolveOptions& how, NewtonWorkspace& work) const;
-  /// Whether residuals are small enough; also notes the worst one in `result`.
+  /// Whether residuals are small enough; also notes the greatest one in `result`.
   Balance balance(const StepData& evaluation, NewtonResult& result) const;
+  /// Where the greatest one is.
+  int worst_row(const VectorX& residual) const;
 
  private:
   class Solve;

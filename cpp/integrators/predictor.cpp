@@ -5,15 +5,32 @@
 namespace withe {
 
 void Predictor::extrapolate(double time, int points, VectorX& out) const {
-  out.setZero(acceleration_[0].size());
+  std::array<double, kDepth> weight;  // Lagrange's
   for (int i = 0; i < points; ++i) {
     const auto a = static_cast<std::size_t>(i);
-    double weight = 1.0;  // Lagrange's
+    weight[a] = 1.0;
     for (int j = 0; j < points; ++j) {
       const auto b = static_cast<std::size_t>(j);
-      if (j != i) weight *= (time - time_[b]) / (time_[a] - time_[b]);
+      if (j != i) weight[a] *= (time - time_[b]) / (time_[a] - time_[b]);
     }
-    out += weight * acceleration_[a];
+  }
+  const auto& [a, b, c, d] = acceleration_;
+  const auto& [wa, wb, wc, wd] = weight;
+  switch (points) {
+    case 0:
+      out.setZero(a.size());
+      break;
+    case 1:
+      out = wa * a;
+      break;
+    case 2:
+      out = wa * a + wb * b;
+      break;
+    case 3:
+      out = wa * a + wb * b + wc * c;
+      break;
+    default:
+      out = wa * a + wb * b + wc * c + wd * d;
   }
 }
 
@@ -24,8 +41,7 @@ void Predictor::record(double time, int slot, const VectorX& acceleration, const
   double least = INFINITY;
   for (int points = 0; points <= count_; ++points) {
     extrapolate(time, points, scratch);
-    scratch -= acceleration;
-    const double error = scratch.cwiseAbs2().dot(weight);
+    const double error = (scratch - acceleration).cwiseAbs2().dot(weight);
     if (error < least) {
       least = error;
       best_[static_cast<std::size_t>(slot)] = points;

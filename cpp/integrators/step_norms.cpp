@@ -9,26 +9,33 @@ namespace {
 // A step is cut where a node moves by more than this share of the scene, an angle or an edge turns by more [rad].
 constexpr double kFarthest = 0.5, kGreatestAngle = 1.5, kGreatestEdgeTurn = 1.0;
 
+/// Greatest square of vectors of so many unknowns.
+template <int Size>
+double greatest_square(const std::vector<int>& firsts, const VectorX& step) {
+  double square = 0.0;
+  for (int first : firsts) square = std::max(square, step.segment<Size>(first).squaredNorm());
+  return square;
+}
+
 }  // namespace
 
 StepNorms::StepNorms(const Model& model) : model_(model), shortest_edge_(model.edge_length.minCoeff()) {
-  is_angle_.assign(static_cast<std::size_t>(model.dof_count), true);
-  for (int dof : model.node_dof)
-    for (int i = 0; i < model.dimension; ++i) is_angle_[static_cast<std::size_t>(dof + i)] = false;
-  for (int dof : model.node_dof) nodes_.push_back({dof, model.dimension});
-  for (int dof : model.frame_dof) angles_.push_back({dof, model.frame_size()});
-  for (int dof : model.edge_dof) angles_.push_back({dof, 1});
-  for (const Hinge& hinge : model.hinges) angles_.push_back({hinge.dof, 1});
+  coordinates_.setZero(model.dof_count);
+  for (int dof : model.node_dof) coordinates_.segment(dof, model.dimension).setOnes();
+  angles_ = 1.0 - coordinates_.array();
+  arms_ = coordinates_ + shortest_edge_ * angles_;
+  (model.planar() ? single_angles_ : rotations_) = model.frame_dof;
+  single_angles_.insert(single_angles_.end(), model.edge_dof.begin(), model.edge_dof.end());
+  for (const Hinge& hinge : model.hinges) single_angles_.push_back(hinge.dof);
 }
 
-double StepNorms::greatest(const std::vector<Block>& blocks, const VectorX& step) {
-  double square = 0.0;
-  for (const Block& block : blocks) {
-    double sum = 0.0;
-    for (int i = 0; i < block.size; ++i) sum += step(block.first + i) * step(block.first + i);
-    square = std::max(square, sum);
-  }
-  return std::sqrt(square);
+double StepNorms::farthest_node(const VectorX& step) const {
+  return std::sqrt(model_.planar() ? greatest_square<2>(model_.node_dof, step)
+                                   : greatest_square<3>(model_.node_dof, step));
+}
+
+double StepNorms::greatest_angle(const VectorX& step) const {
+  return std::sqrt(std::max(greatest_square<1>(single_angles_, step), greatest_square<3>(rotations_, step)));
 }
 
 /// Greatest change of an edge vector over its length.
@@ -45,26 +52,29 @@ double StepNorms::greatest_edge_turn(const VectorX& step) const {
 }
 
 double StepNorms::cap(const VectorX& step) const {
-  const double move = greatest(nodes_, step), turn = greatest(angles_, step), edge_turn = greatest_edge_turn(step);
+  const double move = farthest_node(step), turn = greatest_angle(step);
   double factor = 1.0;
   if (move > kFarthest * model_.length_scale) factor = kFarthest * model_.length_scale / move;
   if (turn * factor > kGreatestAngle) factor = kGreatestAngle / turn;
+  if (leaves_edges_alone(move)) return factor;
+  const double edge_turn = greatest_edge_turn(step);
   if (edge_turn * factor > kGreatestEdgeTurn) factor = kGreatestEdgeTurn / edge_turn;
   return factor;
 }
 
 double StepNorms::turn(const VectorX& step) const {
-  return std::max(greatest_edge_turn(step), 0.5 * greatest(angles_, step));
+  return std::max(greatest_edge_turn(step), 0.5 * greatest_angle(step));
 }
 
 double StepNorms::displacement(const VectorX& step) const {
-  return std::max(greatest(nodes_, step), shortest_edge_ * greatest(angles_, step));
+  return std::max(farthest_node(step), shortest_edge_ * greatest_angle(step));
 }
 
 bool StepNorms::leaves_alone(double most) const {
-  // Both ends of an edge may move by it, in opposite directions.
-  return most <= 0.5 * std::min({kGreatestEdgeTurn * shortest_edge_, 2.0 * kFarthest * model_.length_scale,
-                                 2.0 * kGreatestAngle});
+  return leaves_edges_alone(most) && most <= std::min(kFarthest * model_.length_scale, kGreatestAngle);
 }
+
+/// Both ends of an edge may move by it, in opposite directions.
+bool StepNorms::leaves_edges_alone(double most) const { return most <= 0.5 * kGreatestEdgeTurn * shortest_edge_; }
 
 }  // namespace withe

@@ -20,20 +20,22 @@ class StepNorms {
   /// Whether `cap` surely leaves a step alone in which no node moves, and nothing turns, by more than `most`.
   bool leaves_alone(double most) const;
 
-  bool is_angle(Eigen::Index unknown) const { return is_angle_[static_cast<std::size_t>(unknown)]; }
+  /// Per unknown: 1 where it is a coordinate of a node, 1 where it is an angle, else 0; and by what a force or moment
+  /// is divided to be a force: 1, or the shortest edge [m].
+  const VectorX& coordinates() const { return coordinates_; }
+  const VectorX& angles() const { return angles_; }
+  const VectorX& arms() const { return arms_; }
   double shortest_edge() const { return shortest_edge_; }  ///< [m]
 
  private:
-  /// Unknowns that are one vector: a node's position, a frame's rotation, an angle.
-  struct Block {
-    int first, size;
-  };
-  static double greatest(const std::vector<Block>& blocks, const VectorX& step);
+  double farthest_node(const VectorX& step) const;
+  double greatest_angle(const VectorX& step) const;
   double greatest_edge_turn(const VectorX& step) const;
+  bool leaves_edges_alone(double most) const;
 
   const Model& model_;
-  std::vector<bool> is_angle_;
-  std::vector<Block> nodes_, angles_;
+  VectorX coordinates_, angles_, arms_;
+  std::vector<int> single_angles_, rotations_;  ///< first unknowns of angles, and of rotations in space
   double shortest_edge_ = 1.0;
 };
 

@@ -11,10 +11,10 @@ constexpr double kLittle = 0.125;
 }  // namespace
 
 double SurfaceSearch::shortened(const VectorX& z, VectorX& step) const {
-  double kept = norms_.cap(step);
-  step *= kept;
+  const double kept = norms_.cap(step);
+  if (kept != 1.0) step *= kept;
   const double allowed = system_.equations.allowed(z, step);
-  step *= allowed;
+  if (allowed != 1.0) step *= allowed;
   return kept * allowed;
 }
 

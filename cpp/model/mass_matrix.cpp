@@ -13,6 +13,16 @@ void set_coupling(const Model& model, const Parameters& p, const VectorX& densit
     if (model.edge_lumped[at(e)] || (p.held_lumped && model.edge_held[at(e)])) coupling(e) = 0.0;
 }
 
+template <int Dimension>
+void multiply_coupling(const Model& model, const VectorX& coupling, const VectorX& x, VectorX& out) {
+  for (int e = 0; e < model.edge_count; ++e) {
+    const int a = model.tail_dof[at(e)], b = model.head_dof[at(e)];
+    const Eigen::Matrix<double, Dimension, 1> apart = coupling[e] * (x.segment<Dimension>(b) - x.segment<Dimension>(a));
+    out.segment<Dimension>(a) += apart;
+    out.segment<Dimension>(b) -= apart;
+  }
+}
+
 }  // namespace
 
 void set_mass(const Model& model, const Parameters& p, MassMatrix& mass) {
@@ -39,14 +49,10 @@ void set_drag(const Model& model, const Parameters& p, MassMatrix& drag) {
 
 void multiply(const Model& model, const MassMatrix& mass, const VectorX& x, VectorX& out) {
   out = mass.rows.cwiseProduct(x);
-  for (int e = 0; e < model.edge_count; ++e) {
-    const int a = model.tail_dof[at(e)], b = model.head_dof[at(e)];
-    for (int i = 0; i < model.dimension; ++i) {
-      const double apart = mass.coupling[e] * (x[b + i] - x[a + i]);
-      out[a + i] += apart;
-      out[b + i] -= apart;
-    }
-  }
+  if (model.planar())
+    multiply_coupling<2>(model, mass.coupling, x, out);
+  else
+    multiply_coupling<3>(model, mass.coupling, x, out);
 }
 
 void add_mass_adjoint(const Model& model, const VectorX& x, const VectorX& rows, VectorX& by_rows,

@@ -115,7 +115,9 @@ struct Parameters {
   MatrixX3 bend_natural, half_natural;           ///< per stencil: f (kappa1, kappa2, tau)
   VectorX bend_viscous_time, half_viscous_time;  ///< [s]
   bool viscous = false, dragged = false;
-  long version = 0;  ///< another number whenever anything above has changed; never used twice
+  /// Other numbers whenever anything above has changed, natural shapes and strains apart, and whenever these have;
+  /// never used twice.
+  long version = 0, natural_version = 0;
 };
 
 /// Refuses a load at a node that is not there, of the wrong size, or not finite.

@@ -149,9 +149,9 @@ Parameters initial_parameters(const Model& model) {
 
 namespace {
 
-void note_change(Parameters& p) {
+long next_version() {
   static std::atomic<long> versions{0};
-  p.version = ++versions;
+  return ++versions;
 }
 
 /// Discrete natural strains of one rod's stencils.
@@ -328,14 +328,14 @@ void update_natural_of(const Model& model, Parameters& p, int rod) {
 }  // namespace
 
 void update_natural(const Model& model, Parameters& p) {
-  note_change(p);
+  p.natural_version = next_version();
   p.bend_natural = model.bend_offset;
   p.half_natural.setZero(static_cast<Eigen::Index>(model.half.size()), 3);
   for (int r = 0; r < static_cast<int>(model.place.size()); ++r) update_natural_of(model, p, r);
 }
 
 void update_natural(const Model& model, Parameters& p, int rod) {
-  note_change(p);
+  p.natural_version = next_version();
   update_natural_of(model, p, rod);
 }
 
@@ -347,6 +347,7 @@ void update_derived(const Model& model, Parameters& p) {
   BendStiffness stiffness(model, p);
   for (int b = 0; b < static_cast<int>(model.bend.size()); ++b) p.bend_stiffness.row(b) = stiffness(b);
   for (int h = 0; h < static_cast<int>(model.half.size()); ++h) update_half_stiffness(model, p, h);
+  p.version = next_version();
   update_natural(model, p);
 }
 
@@ -362,12 +363,12 @@ void update_derived(const Model& model, Derived derived, int rod, Parameters& p)
       update_viscous_times(model, p);
       break;
     case Derived::natural_strains:
-      update_natural_of(model, p, rod);
-      break;
+      update_natural(model, p, rod);
+      return;
     case Derived::nothing:
       break;
   }
-  note_change(p);
+  p.version = next_version();
 }
 
 }  // namespace withe

@@ -278,7 +278,7 @@ void predict_axial_force(const StepProblem& problem, const StepData& data, const
   const bool mean = problem.conserves_energy();
   out.resize(model.edge_count);
   for (int e = 0; e < model.edge_count; ++e) {
-    const int a = model.node_dof[at(model.edge_tail[at(e)])], b = model.node_dof[at(model.edge_head[at(e)])];
+    const int a = model.tail_dof[at(e)], b = model.head_dof[at(e)];
     const Vec3d& tangent = (mean ? data.end_configuration : data.configuration).edge[at(e)].tangent;
     const double t[3] = {tangent.x, tangent.y, tangent.z};
     double length = mean ? 0.5 * (problem.start_configuration.length(e) + data.end_configuration.length(e))

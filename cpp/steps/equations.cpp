@@ -49,6 +49,8 @@ Equations::Equations(const Model& model, const EquationOptions& options)
 
 void Equations::set_parameters(const Parameters& parameters) {
   problem_.parameters = &parameters;
+  if (problem_.natural_version != parameters.natural_version) set_natural(parameters, problem_.elastic);
+  problem_.natural_version = parameters.natural_version;
   if (problem_.version == parameters.version) return;
   problem_.version = parameters.version;
   set_mass(model(), parameters, problem_.mass);

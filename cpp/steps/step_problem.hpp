@@ -40,8 +40,8 @@ struct StepProblem {
   bool exact = false;    ///< whether the matrix has every derivative; else what is small and unsymmetric is left out
   long number = 0;       ///< of problems so far: tells one from another
 
-  /// Of the parameters, of that version.
-  long version = -1;
+  /// Of the parameters, of these versions.
+  long version = -1, natural_version = -1;
   MassMatrix mass, drag;  ///< [kg], [N s/m]
   VectorX gravity;        ///< force per unknown [N]
   ElasticCoefficients elastic;

@@ -55,6 +55,8 @@ Energy mechanical_energy(const Model& model, const EnergyCoefficients& k, const 
 }  // namespace
 
 void EnergyCoefficients::set(const Model& model, const Parameters& p) {
+  if (natural_version != p.natural_version) set_natural(p, elastic);
+  natural_version = p.natural_version;
   if (version == p.version) return;
   version = p.version;
   set_elastic(p, elastic);
@@ -65,13 +67,18 @@ void EnergyCoefficients::set(const Model& model, const Parameters& p) {
   spring_rest_length = p.spring_rest_length;
 }
 
-/// What ramps of natural shapes change at a state that stays: bending and twisting [J].
-double World::Implementation::actuation_energy() const {
-  auto& [c, k] = energy_scratch;
+/// Takes ramps on to a time at a state that stays, and adds what that changes of bending and twisting [J].
+void World::Implementation::apply_ramps(double time, double& work) {
+  auto& [c, k, touching] = energy_scratch;
+  const auto energy = [&] {
+    k.set(model, parameters);
+    const BendTwistEnergy e = bend_twist_energy(model, k.elastic, c);
+    return e.bend + e.twist;
+  };
   compute_configuration(model, state, state.q, c);
-  k.set(model, parameters);
-  const BendTwistEnergy e = bend_twist_energy(model, k.elastic, c);
-  return e.bend + e.twist;
+  work -= energy();
+  apply_ramps(time);
+  work += energy();
 }
 
 void World::Implementation::begin_setting() {
@@ -88,7 +95,7 @@ void World::Implementation::account_for_settings() {
 
 double World::Implementation::work_of_settings() const {
   if (!newly_set) return 0.0;
-  auto& [c, now] = energy_scratch;
+  auto& [c, now, touching] = energy_scratch;
   compute_configuration(model, state, state.q, c);
   now.set(model, parameters);
   const Energy a = mechanical_energy(model, before_settings, c, state), b = mechanical_energy(model, now, c, state);
@@ -102,12 +109,12 @@ Energy World::Implementation::energy() const {
 
 /// Energy of a state, with the work and the losses up to it.
 Energy World::Implementation::energy_of(const State& at, double loads, double work_done, double lost) const {
-  auto& [c, coefficients] = energy_scratch;
+  auto& [c, coefficients, touching] = energy_scratch;
   compute_configuration(model, at, at.q, c);
   coefficients.set(model, parameters);
   Energy e = mechanical_energy(model, coefficients, c, at);
   e.loads = -loads;
-  if (const Contact* contact = equations->contact()) e.contact = contact->energy_of(at, parameters);
+  if (const Contact* contact = equations->contact()) e.contact = contact->energy_of(at, parameters, touching);
   e.total = e.kinetic + e.stretch + e.bend + e.twist + e.gravity + e.loads + e.contact + e.spring;
   e.work = work_done;
   e.dissipated = lost;
@@ -116,7 +123,7 @@ Energy World::Implementation::energy_of(const State& at, double loads, double wo
 
 /// A node's part goes to the rods that meet there, by the masses of their half edges: what is added to it too.
 Energy World::Implementation::rod_energy(int rod) const {
-  auto& [c, coefficients] = energy_scratch;
+  auto& [c, coefficients, touching] = energy_scratch;
   compute_configuration(model, state, state.q, c);
   coefficients.set(model, parameters);
   const ElasticCoefficients& k = coefficients.elastic;

@@ -83,11 +83,7 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
   const Lagged lagged_before = lagged();
   const MatrixX3 loads = parameters.loads;
   const double time = state.time + dt;
-  if (actuated()) {
-    actuation_work -= actuation_energy();
-    apply_ramps(time);
-    actuation_work += actuation_energy();
-  }
+  if (actuated()) apply_ramps(time, actuation_work);
   aim_supports(time);
   Equations& system = statics();
   update_custom_force(system);
@@ -163,8 +159,7 @@ EquilibriumPath World::equilibrium_path(const PathOptions& wanted) {
   Implementation& self = accounted();
   const Timer timer(self.statistics.total_time);
   for (int load : wanted.loads)
-    require(load >= 0 && load < static_cast<int>(self.description.loads.size()),
-            "no such load: " + std::to_string(load));
+    require(load >= 0 && load < static_cast<int>(self.description.loads.size()), "no such load: ", load);
   require(std::isfinite(wanted.start) && std::isfinite(wanted.end) && wanted.start != wanted.end,
           "a path needs two factors to lead from and to");
   require(wanted.most_points > 0 && wanted.turn > 0.0, "a path needs points and turns that are positive");

@@ -15,7 +15,7 @@ struct EnergyCoefficients {
   VectorX node_mass;                             ///< [kg]
   Vector3 gravity;                               ///< [m/s^2]
   VectorX spring_stiffness, spring_rest_length;  ///< [N/m], [m]
-  long version = -1;                             ///< of the parameters
+  long version = -1, natural_version = -1;       ///< of the parameters
 
   void set(const Model& model, const Parameters& parameters);
 };
@@ -24,6 +24,7 @@ struct EnergyCoefficients {
 struct EnergyScratch {
   Configuration configuration;
   EnergyCoefficients coefficients;
+  ContactAtRest contact;
 };
 
 /// Why a model is built: at first, because supports changed or the plane was left, or to take a snapshot's state.
@@ -120,6 +121,7 @@ struct World::Implementation : Running {
   void leave_plane_for(const ParameterSetting& setting);
   void set(std::span<const ParameterSetting> settings);
   void apply_ramps(double time);
+  void apply_ramps(double time, double& work);
   void retire_ramps();
   bool actuated() const;
   void aim_supports(double time);
@@ -223,7 +225,6 @@ struct World::Implementation : Running {
   Energy energy() const;
   Energy rod_energy(int rod) const;
   Energy energy_of(const State& at, double loads, double work_done, double lost) const;
-  double actuation_energy() const;
   /// To be called before parameters are set, and before the state moves or what is set is copied.
   void begin_setting();
   void account_for_settings();

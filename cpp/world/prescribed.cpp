@@ -13,12 +13,11 @@ double ramp_fraction(double time, double start, double end) {
 }
 
 void World::Implementation::apply_ramps(double time) {
-  bool changed = false;
   for (std::size_t r = 0; r < ramps.size(); ++r) {
-    if (ramps[r].curvature.apply(time, parameters.natural_curvature[r])) changed = true;
-    if (ramps[r].twist.apply(time, parameters.natural_twist[r])) changed = true;
+    const bool bent = ramps[r].curvature.apply(time, parameters.natural_curvature[r]),
+               twisted = ramps[r].twist.apply(time, parameters.natural_twist[r]);
+    if (bent || twisted) update_natural(model, parameters, static_cast<int>(r));
   }
-  if (changed) update_natural(model, parameters);
 }
 
 /// Those that have come to their end are at rest from now on.

@@ -107,7 +107,7 @@ VectorX World::tensions(int rod) const {
 
 double World::spring_tension(int spring) const {
   const Implementation& self = *implementation_;
-  require(spring >= 0 && spring < self.parameters.spring_stiffness.size(), "no such spring: " + std::to_string(spring));
+  require(spring >= 0 && spring < self.parameters.spring_stiffness.size(), "no such spring: ", spring);
   return withe::spring_tension(self.model, self.parameters, self.state.q, self.state.v, spring);
 }
 

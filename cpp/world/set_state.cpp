@@ -18,7 +18,7 @@ constexpr double kAligned = 1e-6;  // rad: directors from outside are no better
 
 void check_shapes(const Model& model, const RodState& rod) {
   const int rods = static_cast<int>(model.description.rods.size());
-  require(rod.rod >= 0 && rod.rod < rods, "no such rod: " + std::to_string(rod.rod));
+  require(rod.rod >= 0 && rod.rod < rods, "no such rod: ", rod.rod);
   const Eigen::Index nodes = static_cast<Eigen::Index>(model.description.rods[at(rod.rod)].nodes.size()),
                      edges = model.rod_first_edge[at(rod.rod) + 1] - model.rod_first_edge[at(rod.rod)],
                      stencils = static_cast<Eigen::Index>(model.place[at(rod.rod)].size());

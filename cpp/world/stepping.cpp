@@ -294,12 +294,7 @@ bool World::Implementation::inner_step(double dt, int slot, double& error) {
   ask_callback(middle, end);
   const bool ramped = actuated();
   double actuation = 0.0;
-  if (ramped) {
-    apply_ramps(start);
-    actuation -= actuation_energy();
-    apply_ramps(middle);
-    actuation += actuation_energy();
-  }
+  if (ramped) apply_ramps(middle, actuation);
   kept_motions = motions;
   aim_supports(end);
   Equations& system = equations_of_step();
@@ -344,9 +339,7 @@ bool World::Implementation::inner_step(double dt, int slot, double& error) {
   contact_guard.put_in = r.pressing_gain;
   if (options.integrator != Integrator::fourth_order || slot == 2) keep_reactions();
   if (ramped) {
-    actuation -= actuation_energy();
-    apply_ramps(end);
-    actuation += actuation_energy();
+    apply_ramps(end, actuation);
     actuation_work += actuation;
   }
   return true;

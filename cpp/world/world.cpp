@@ -22,7 +22,7 @@ bool off_plane(LoadKind kind, const MatrixX3& values, const Vector3& normal) {
 }
 
 int checked_spring(const Parameters& parameters, int spring) {
-  require(spring >= 0 && spring < parameters.spring_stiffness.size(), "no such spring: " + std::to_string(spring));
+  require(spring >= 0 && spring < parameters.spring_stiffness.size(), "no such spring: ", spring);
   return spring;
 }
 
@@ -90,7 +90,7 @@ void World::step(int count) {
 void World::advance_to(double time) {
   Implementation& self = *implementation_;
   const double span = time - self.state.time;
-  require(std::isfinite(time) && span >= 0.0, "time must not lie before the present, got " + std::to_string(time));
+  require(std::isfinite(time) && span >= 0.0, "time must not lie before the present, got ", time);
   if (span == 0.0) return;
   self.guard.energy.reset();
   const Timer timer(self.statistics.total_time);
@@ -134,7 +134,7 @@ void World::set_force_function(const CustomFunction& force) { implementation_->f
 void World::set_load(int load, const MatrixX3& values) {
   Implementation& self = *implementation_;
   const auto [first, rows] = self.load_rows(load);
-  require(values.rows() == rows, "load must have " + std::to_string(rows) + " rows");
+  require(values.rows() == rows, "load must have ", rows, " rows");
   require(values.allFinite(), "load must be finite");
   if (self.model.planar()) {
     const Vector3& n = self.model.plane->normal;
@@ -172,7 +172,7 @@ MatrixX3 World::load(int load) const {
   return implementation_->parameters.loads.middleRows(first, rows);
 }
 std::pair<Eigen::Index, Eigen::Index> World::Implementation::load_rows(int load) const {
-  require(load >= 0 && load < static_cast<int>(description.loads.size()), "no such load: " + std::to_string(load));
+  require(load >= 0 && load < static_cast<int>(description.loads.size()), "no such load: ", load);
   return {first_load_row(description, at(load)), description.loads[at(load)].values.rows()};
 }
 
@@ -189,7 +189,7 @@ void World::set_friction(const ContactDescription& contact) {
   require(std::isfinite(contact.slip_tolerance) && contact.slip_tolerance > 0.0, "slip_tolerance must be positive");
   const auto energy = [&] {
     const Contact* touching = self.equations->contact();
-    return touching ? touching->energy_of(self.state, self.parameters) : 0.0;
+    return touching ? touching->energy_of(self.state, self.parameters, self.energy_scratch.contact) : 0.0;
   };
   const double before = energy();
   own.friction = contact.friction;
@@ -287,8 +287,7 @@ ParameterValues rows_of(const Matrix& m) {
 
 MatrixX World::parameter(ParameterKind kind, int rod) const {
   Implementation& self = *implementation_;
-  require(!info_of(kind).of_rod() || (rod >= 0 && rod < static_cast<int>(self.ramps.size())),
-          "no such rod: " + std::to_string(rod));
+  require(!info_of(kind).of_rod() || (rod >= 0 && rod < static_cast<int>(self.ramps.size())), "no such rod: ", rod);
   return parameter_view(self.model, self.parameters, kind, rod);
 }
 

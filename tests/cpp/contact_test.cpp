@@ -260,7 +260,8 @@ struct Walk {
     const auto into = [](Found& out) {
       return [&out](const ContactPair& pair, const Proximity& p) { out.emplace_back(pair.key, p.distance); };
     };
-    std::as_const(candidates).find(q, bodies, into(unseen));
+    CandidateSearch search;
+    std::as_const(candidates).find(q, bodies, search, into(unseen));
     candidates.find(q, bodies, into(found));
     for (const ContactPair& pair : pairs)
       if (const double d = apart(bodies, pair, q).distance; d < pair.reach()) expected.emplace_back(pair.key, d);
@@ -337,11 +338,13 @@ TEST(Contact, ReadOutsChangeNoBitOfWhatFollows) {
       Contact plain(model), asked(model);
       plain.initialise(state, parameters);
       other.contact_stiffness = state.contact_stiffness;
+      ContactAtRest asked_before;
       const auto ask = [&] {
         other.q = state.q + 0.05 * random.vector(model.dof_count);
         const std::vector<ContactReport> reports = asked.report(other, parameters);
         touching += static_cast<int>(reports.size());
-        EXPECT_EQ(asked.energy_of(other, parameters), Contact(model).energy_of(other, parameters));
+        ContactAtRest rest;
+        EXPECT_EQ(asked.energy_of(other, parameters, asked_before), Contact(model).energy_of(other, parameters, rest));
       };
       for (int step = 0; step < 8; ++step) {
         state.v = random.vector(model.dof_count);

@@ -49,5 +49,112 @@ TEST(Step, InAFluidDoesNotAllocateAfterWarmUp) {
     }
 }
 
+/// A rod above an obstacle, or a coil that lies on itself; and a second rod across it.
+SceneBuilder lying(const ObstacleDescription& obstacle, bool rods, bool coiled = false) {
+  SceneBuilder builder;
+  builder.scene.gravity = Vector3(0, 0, -9.81);
+  const MatrixX3 straight = testing::line(Vector3(0, 0, 5e-3), Vector3(0.3, 0.01, 5e-3), 16);
+  MatrixX3 coil = testing::helix(24, 0.05, 0.0102, 1.6);
+  coil.col(2).array() += 5e-3;
+  builder.add_rod(coiled ? coil : straight, testing::rubber());
+  if (rods && !coiled)
+    builder.add_rod(testing::line(Vector3(0.15, -0.1, 0.016), Vector3(0.15, 0.1, 0.017), 12), testing::rubber());
+  for (RodDescription& rod : builder.scene.rods) rod.contact_radius.setConstant(rod.rest_lengths.size(), 5e-3);
+  builder.scene.contact.rods = rods;
+  builder.scene.contact.obstacles = {obstacle};
+  return builder;
+}
+
+ObstacleDescription floor_at(double height) {
+  ObstacleDescription floor;
+  floor.point = Vector3(0, 0, height);
+  return floor;
+}
+
+ObstacleDescription capsule_below(const Vector3& start, const Vector3& end) {
+  ObstacleDescription capsule;
+  capsule.kind = ObstacleKind::capsule;
+  capsule.point = start;
+  capsule.other = end;
+  capsule.radius = 0.02;
+  return capsule;
+}
+
+struct Rubbing {
+  double friction;
+  FrictionLaw law;
+};
+
+/// Allocations of the last `steps` steps of a scene, after `before`.
+std::size_t allocations(SceneBuilder builder, const Rubbing& rubbing, Integrator integrator, int before, int steps) {
+  ContactDescription& contact = builder.scene.contact;
+  contact.friction = rubbing.friction;
+  contact.friction_law = rubbing.law;
+  contact.obstacle_friction = VectorX::Constant(1, rubbing.friction);
+  contact.obstacle_restitution = VectorX::Ones(1);
+  World world(builder.scene, testing::options(integrator, integrator == Integrator::verlet ? 2e-5 : 2e-3));
+  world.step(before);
+  const std::size_t count = allocation_count;
+  world.step(steps);
+  return allocation_count - count;
+}
+
+constexpr Rubbing kRubbing[] = {{0.0, FrictionLaw::implicit},
+                                {0.4, FrictionLaw::implicit},
+                                {0.4, FrictionLaw::lagged},
+                                {0.4, FrictionLaw::anchored},
+                                {0.4, FrictionLaw::semi_explicit}};
+constexpr Integrator kWithContact[] = {Integrator::backward_euler, Integrator::implicit_midpoint,
+                                       Integrator::energy_momentum, Integrator::verlet};
+
+TEST(Step, OnAFloorDoesNotAllocateAfterWarmUp) {
+  for (Integrator integrator : kWithContact)
+    for (const Rubbing& rubbing : kRubbing)
+      EXPECT_EQ(allocations(lying(floor_at(0.0), false), rubbing, integrator, 150, 50), 0u)
+          << static_cast<int>(integrator) << " friction " << static_cast<int>(rubbing.law) << " " << rubbing.friction;
+}
+
+/// Where contacts come and go, the vectors that hold them grow when there are more than ever before: each of them once,
+/// at most, as long as there are not twice as many.
+constexpr std::size_t kVectors = 16;
+
+TEST(Step, WithContactsThatComeAndGoAllocatesForMoreThanEverOnly) {
+  const SceneBuilder scenes[] = {
+      lying(floor_at(-3e-3), false),  // bounces
+      lying(capsule_below(Vector3(0.1, 0, -0.02), Vector3(0.1, 0, -0.02)), false),
+      lying(capsule_below(Vector3(0.1, -0.1, -0.02), Vector3(0.1, 0.1, -0.02)), false),
+      lying(floor_at(0.0), true),
+      lying(floor_at(0.0), true, true),
+  };
+  for (const SceneBuilder& scene : scenes)
+    for (Integrator integrator : kWithContact)
+      for (const Rubbing& rubbing : kRubbing)
+        EXPECT_LE(allocations(scene, rubbing, integrator, 200, 100), kVectors)
+            << "scene " << &scene - scenes << " integrator " << static_cast<int>(integrator) << " friction "
+            << static_cast<int>(rubbing.law) << " " << rubbing.friction;
+}
+
+/// Nor where surfaces are pushed deep into each other, so that steps are repeated with stiffer contact.
+TEST(Step, ThatIsRepeatedWithStifferContactDoesNotAllocateAfterWarmUp) {
+  for (StiffnessRule rule : {StiffnessRule::forces, StiffnessRule::source}) {
+    SceneBuilder builder = lying(floor_at(0.0), false);
+    builder.scene.contact.stiffness_rule = rule;
+    builder.scene.contact.obstacle_friction = VectorX::Zero(1);
+    builder.scene.contact.obstacle_restitution = VectorX::Ones(1);
+    const int push = builder.load(LoadKind::force, {0, 8}, Vector3::Zero());
+    World world(builder.scene, testing::options(Integrator::backward_euler, 2e-3));
+    const auto pushes = [&](int first, int last) {
+      for (int k = first; k < last; ++k) {
+        world.set_load(push, Vector3(0, 0, k % 10 == 5 ? -20.0 - k : 0.0));
+        world.step(1);
+      }
+    };
+    pushes(0, 60);
+    const std::size_t before = allocation_count;
+    pushes(60, 120);
+    EXPECT_EQ(allocation_count - before, 0u) << static_cast<int>(rule);
+  }
+}
+
 }  // namespace
 }  // namespace withe
