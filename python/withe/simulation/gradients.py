@@ -12,7 +12,7 @@ import numpy.typing as npt
 from withe import _core
 from withe.common import validation
 from withe.parts.handles import Drag, Load, Mass, NodeHandle, Rod, Spring, Support
-from withe.parts.kinds import DragPart, LoadPart, MassPart, RodPart, SpringPart, SupportPart
+from withe.parts.kinds import DragPart, LoadPart, MassPart, ObstaclePart, RodPart, SpringPart, SupportPart
 from withe.parts.parameters import ACTING_WORDS, ROD_WORDS, RodParameters
 from withe.parts.springs import SPRING_WORDS
 from withe.simulation.loads import load_rows
@@ -216,14 +216,15 @@ def _edges(session: Session, rod: int) -> tuple[int, int]:
 def _rod_reader(session: Session, part: RodPart, word: str) -> Callable[[Any], Any]:
     if word in _NATURAL_WORDS:
         return lambda g: np.array(getattr(g.parameters, word)[part.index])
-    if word not in ROD_WORDS:
-        raise ValueError(
-            f"{part.name!r} has no {word!r} to differentiate by; it has {', '.join((*ROD_WORDS, *_NATURAL_WORDS))}"
-        )
+    if word not in (*ROD_WORDS, "radius"):
+        words = ", ".join((*ROD_WORDS, *_NATURAL_WORDS, "radius"))
+        raise ValueError(f"{part.name!r} has no {word!r} to differentiate by; it has {words}")
     first, last = _edges(session, part.index)
     parameters = session.settings.rods[part.index]
-    slopes = _slopes(parameters, word)
-    scalar = np.ndim(parameters.get(word)) == 0
+    if word == "radius":
+        slopes, scalar = _radius_slopes(session, part, parameters), False
+    else:
+        slopes, scalar = _slopes(parameters, word), np.ndim(parameters.get(word)) == 0
 
     def read(gradient: Any) -> Any:
         parts = [np.asarray(getattr(gradient.parameters, name))[first:last] * slope for name, slope in slopes.items()]
@@ -257,3 +258,26 @@ def _slopes(parameters: RodParameters, word: str) -> dict[str, FloatArray]:
     if word == "density":
         return {"line_density": p.line_density / p.density, "rotary_inertia": p.rotary_inertia / p.density}
     return {"viscous_time": 1.0 / modulus}
+
+
+def _radius_slopes(session: Session, part: RodPart, parameters: RodParameters) -> dict[str, FloatArray]:
+    """Derivatives of what the engine works with by the radius of each edge.
+
+    A = pi r^2, I = pi r^4 / 4, J = 2 I. Stiffness and line density that were given directly do not depend on it; rotary
+    inertia does.
+    """
+    section, p = part.section, parameters
+    if section.widths is not None or not np.allclose(section.area, np.pi * section.radii**2, rtol=1e-12):
+        raise ValueError(f"no gradient by radius: the section of {part.owner} is no withe.Circle")
+    if session.world.contact.rods or session.directory.all(ObstaclePart):
+        raise ValueError(
+            f"no gradient by radius of {part.owner} where rods or obstacles touch: their surfaces would move with it"
+        )
+    per_radius = 1.0 / section.radii
+    if p.youngs_modulus is None:
+        return {"rotary_inertia": 2.0 * p.rotary_inertia * per_radius}
+    powers = {"stretch_stiffness": 2, "bend_stiffness": 4, "twist_stiffness": 4, "line_density": 2, "rotary_inertia": 4}
+    return {
+        name: power * (getattr(p, name).T * per_radius).T  # bending has a column a director
+        for name, power in powers.items()
+    }
