@@ -169,6 +169,7 @@ struct World::Implementation : Running {
   Equations& equations_of_step();
   StepRule rule_of_step() const;
   StepResult step_by_rule(double dt, int slot);
+  void note_reactions();
   void keep_reactions();
   void check_reversible(const Parameters& p) const;
 

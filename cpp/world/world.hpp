@@ -179,7 +179,7 @@ class World {
   void set_force_function(const CustomFunction& force);
 
   /// One row, or one an edge, as it was put on: world axes of the drawn scene [N], [N m], [N/m].
-  void set_load(int load, const MatrixX3& values);
+  void set_load(int load, const Eigen::Ref<const MatrixX3>& values);
   MatrixX3 load(int load) const;
   int add_load(const LoadDescription& load);  ///< acts from now on; its index
   void remove_load(int load);                 ///< one put on while running; those after it move up by one
