@@ -179,18 +179,19 @@ Loads resolve_loads(const Model& model) {
   const auto& scene = model.description;
   for (std::size_t k = 0; k < scene.loads.size(); ++k) {
     const LoadDescription& load = scene.loads[k];
-    const int index = static_cast<int>(k);
-    loads.values.push_back(load.value);
+    const auto index = static_cast<int>(first_load_row(scene, k));
+    const int stride = load.values.rows() > 1 ? 1 : 0;  // in rows, from edge to edge
     const RodDescription& rod = scene.rods[at(load.pass.rod)];
     const int first = model.rod_first_edge[at(load.pass.rod)], last = model.rod_first_edge[at(load.pass.rod) + 1] - 1;
     if (load.kind == LoadKind::pressure) {
-      for (int e = first; e <= last; ++e) loads.pieces.push_back({LoadShape::edge_pressure, index, 1.0, -1, e});
+      for (int e = first; e <= last; ++e)
+        loads.pieces.push_back({LoadShape::edge_pressure, index + stride * (e - first), 1.0, -1, e});
       if (!rod.closed) loads.unsymmetric = true;
     } else if (load.kind == LoadKind::distributed) {
       for (int e = first; e <= last; ++e)
         for (int node : {model.edge_tail[at(e)], model.edge_head[at(e)]})
-          loads.pieces.push_back(
-              {load.follower ? LoadShape::follower : LoadShape::dead_node, index, 0.5 * model.edge_arc(e), node, e});
+          loads.pieces.push_back({load.follower ? LoadShape::follower : LoadShape::dead_node,
+                                  index + stride * (e - first), 0.5 * model.edge_arc(e), node, e});
     } else {
       const int node = rod.nodes[at(load.pass.node)];
       const int count = last - first + 1;

@@ -15,11 +15,11 @@ namespace withe {
 
 enum class LoadShape { dead_node, follower, edge_moment, frame_moment, edge_pressure };
 
-/// One piece of a load: what it acts on, and how much of the load's value it is.
+/// One piece of a load: what it acts on, and its value.
 struct LoadPiece {
   LoadShape shape;
-  int load;       ///< index of the load; -1: a custom moment on the node
-  double weight;  ///< [-], or a length [m] for distributed loads
+  int load;       ///< row of `Parameters::loads`; -1: a custom moment on the node
+  double weight;  ///< how much of the value it is [-], or over which length [m]
   int node = -1;
   int edge = -1;  ///< that carries a follower or takes a moment
   int frame = -1;
@@ -28,8 +28,7 @@ struct LoadPiece {
 
 struct Loads {
   std::vector<LoadPiece> pieces;
-  std::vector<Vector3> values;  ///< per load, world axes of the drawn scene [N], [N m], [N/m]
-  int node_moments = 0;         ///< nodes that custom moments may act on
+  int node_moments = 0;  ///< nodes that custom moments may act on
   bool unsymmetric = false;
 };
 

@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "gradients/state_vector.hpp"
 #include "steps/inertia.hpp"
 
 namespace withe {
@@ -48,7 +49,6 @@ class Tape::Player {
       EquationOptions options = tape_.options_;
       options.rule = rule;
       made = std::make_unique<StepGradient>(model_, options);
-      made->equations().loads().values = tape_.loads_;
     }
     return *made;
   }
@@ -71,12 +71,11 @@ class Tape::Player {
   Configuration configuration_;
 };
 
-Tape::Tape(const Model& model, EquationOptions options, State first, Parameters parameters, std::vector<Vector3> loads)
+Tape::Tape(const Model& model, EquationOptions options, State first, Parameters parameters)
     : model_(model),
       options_(options),
       first_(std::move(first)),
       parameters_(std::move(parameters)),
-      loads_(std::move(loads)),
       last_(first_.q),
       last_velocity_(first_.v) {}
 
@@ -97,19 +96,17 @@ void Tape::refuse(const std::string& why) {
   if (refused_.empty()) refused_ = why;
 }
 
-bool Tape::continues(const State& state, const Parameters& parameters, const std::vector<Vector3>& loads) const {
+bool Tape::continues(const State& state, const Parameters& parameters) const {
   return state.q.size() == last_.size() && parameters.version == parameters_.version &&
-         parameters.natural_version == parameters_.natural_version && loads == loads_ && state.q == last_ &&
-         state.v == last_velocity_;
+         parameters.natural_version == parameters_.natural_version && parameters.loads == parameters_.loads &&
+         state.q == last_ && state.v == last_velocity_;
 }
 
-RunGradient Tape::gradient(std::vector<MomentAdjoint> moments) const {
+void Tape::check_known() const {
   if (!refused_.empty()) throw std::invalid_argument("no gradient is known of this run: " + refused_);
-  std::sort(moments.begin(), moments.end(),
-            [](const MomentAdjoint& a, const MomentAdjoint& b) { return a.steps < b.steps; });
-  if (!moments.empty() && (moments.front().steps < 0 || moments.back().steps > count()))
-    throw std::invalid_argument("a moment lies outside of the run");
+}
 
+void Tape::walk_back(const std::function<void(std::size_t, StepGradient&)>& visit) const {
   Player player(*this);
   const auto stride = static_cast<std::size_t>(std::ceil(std::sqrt(static_cast<double>(steps_.size()) + 1.0)));
   std::vector<State> starts;  // of every stretch of so many steps
@@ -118,16 +115,7 @@ RunGradient Tape::gradient(std::vector<MomentAdjoint> moments) const {
     if (k % stride == 0) starts.push_back(state);
     player.advance(steps_[k], state);
   }
-  StateAdjoint adjoint{VectorX::Zero(model_.dof_count), VectorX::Zero(model_.dof_count)};
-  CoefficientAdjoint coefficients(model_, loads_.size());
-  VectorX held = VectorX::Zero(model_.dof_count);
   std::vector<State> states;
-  const auto add_moments = [&](std::size_t steps) {
-    for (; !moments.empty() && moments.back().steps == static_cast<long>(steps); moments.pop_back()) {
-      add_to_nodes(model_, moments.back().positions, adjoint.q);
-      add_to_nodes(model_, moments.back().velocities, adjoint.v);
-    }
-  };
   for (std::size_t k = steps_.size(); k-- > 0;) {
     const std::size_t first = k / stride * stride;
     if (k == steps_.size() - 1 || k % stride == stride - 1) {
@@ -137,15 +125,59 @@ RunGradient Tape::gradient(std::vector<MomentAdjoint> moments) const {
         player.advance(steps_[j], states.back());
       }
     }
-    add_moments(k + 1);
     const Step& step = steps_[k];
     StepGradient& gradient = player.gradient(step.rule);
     gradient.begin({states[k - first], parameters_, step.rule, step.duration, step.end});
-    gradient.pull_back(adjoint, coefficients, held);
+    visit(k, gradient);
   }
+}
+
+RunGradient Tape::gradient(std::vector<MomentAdjoint> moments) const {
+  check_known();
+  std::sort(moments.begin(), moments.end(),
+            [](const MomentAdjoint& a, const MomentAdjoint& b) { return a.steps < b.steps; });
+  if (!moments.empty() && (moments.front().steps < 0 || moments.back().steps > count()))
+    throw std::invalid_argument("a moment lies outside of the run");
+
+  StateAdjoint adjoint{VectorX::Zero(model_.dof_count), VectorX::Zero(model_.dof_count)};
+  CoefficientAdjoint coefficients(model_, parameters_.loads.rows());
+  VectorX held = VectorX::Zero(model_.dof_count);
+  const auto add_moments = [&](std::size_t steps) {
+    for (; !moments.empty() && moments.back().steps == static_cast<long>(steps); moments.pop_back()) {
+      add_to_nodes(model_, moments.back().positions, adjoint.q);
+      add_to_nodes(model_, moments.back().velocities, adjoint.v);
+    }
+  };
+  walk_back([&](std::size_t k, StepGradient& gradient) {
+    add_moments(k + 1);
+    gradient.pull_back(adjoint, coefficients, held);
+  });
   add_moments(0);
   return {parameter_gradient(model_, parameters_, coefficients),
           {at_nodes(model_, adjoint.q), at_nodes(model_, adjoint.v)}};
+}
+
+RunJacobian Tape::jacobian() const {
+  check_known();
+  const SparseMatrix basis = free_basis(model_), back = basis.transpose();
+  const Eigen::Index free = basis.cols();
+  std::vector<StateAdjoint> adjoints;
+  for (Eigen::Index row = 0; row < 2 * free; ++row) {
+    adjoints.push_back({VectorX::Zero(model_.dof_count), VectorX::Zero(model_.dof_count)});
+    (row < free ? adjoints.back().q : adjoints.back().v) = basis.col(row % free);
+  }
+  std::vector<CoefficientAdjoint> coefficients(adjoints.size(), CoefficientAdjoint(model_, parameters_.loads.rows()));
+  VectorX held = VectorX::Zero(model_.dof_count);
+  walk_back([&](std::size_t, StepGradient& gradient) {
+    for (std::size_t row = 0; row < adjoints.size(); ++row) gradient.pull_back(adjoints[row], coefficients[row], held);
+  });
+  RunJacobian out{MatrixX(2 * free, 2 * free), {}};
+  for (std::size_t row = 0; row < adjoints.size(); ++row) {
+    out.state.row(static_cast<Eigen::Index>(row)) << (back * adjoints[row].q).transpose(),
+        (back * adjoints[row].v).transpose();
+    out.rows.push_back({parameter_gradient(model_, parameters_, coefficients[row]), {}});
+  }
+  return out;
 }
 
 }  // namespace withe

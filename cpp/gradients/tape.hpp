@@ -1,6 +1,7 @@
 #pragma once
 /// A run as the adjoint method needs it: what each step led to, so that states come again without a solve.
 
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -21,6 +22,13 @@ struct RunGradient {
   InitialGradient initial;
 };
 
+/// Derivatives of the state at the end of a run by that at its start and by what acts, a row each for the numbers of a
+/// state vector (state_vector.hpp).
+struct RunJacobian {
+  MatrixX state;
+  std::vector<RunGradient> rows;  ///< without the state at the start
+};
+
 /// What a scalar depends on at a moment of a run: after so many steps.
 struct MomentAdjoint {
   long steps = 0;
@@ -33,7 +41,7 @@ void add_to_nodes(const Model& model, const MatrixX3& by, VectorX& out);
 class Tape {
  public:
   /// Of a run that begins so; these are kept.
-  Tape(const Model& model, EquationOptions options, State first, Parameters parameters, std::vector<Vector3> loads);
+  Tape(const Model& model, EquationOptions options, State first, Parameters parameters);
 
   long count() const { return static_cast<long>(steps_.size()); }
   /// Notes a step to q1 that has been accepted.
@@ -43,10 +51,12 @@ class Tape {
   /// Says why no gradient goes through this run; the first reason stays.
   void refuse(const std::string& why);
   /// Whether that is what the last step led to, and what acts is what acted.
-  bool continues(const State& state, const Parameters& parameters, const std::vector<Vector3>& loads) const;
+  bool continues(const State& state, const Parameters& parameters) const;
 
   /// Throws std::invalid_argument where none is known.
   RunGradient gradient(std::vector<MomentAdjoint> moments) const;
+  /// Likewise; costs a solve of each step for every row.
+  RunJacobian jacobian() const;
 
  private:
   struct Step {
@@ -56,11 +66,14 @@ class Tape {
   };
   class Player;
 
+  void check_known() const;
+  /// Goes back through the steps: `visit(k, gradient)` with that of step k, begun.
+  void walk_back(const std::function<void(std::size_t, StepGradient&)>& visit) const;
+
   Model model_;
   EquationOptions options_;
   State first_;
   Parameters parameters_;
-  std::vector<Vector3> loads_;
   std::vector<Step> steps_;
   VectorX last_, last_velocity_;  ///< what the last step led to
   std::string refused_;

@@ -15,19 +15,16 @@ bool turns(const LoadPiece& piece) { return piece.shape != LoadShape::dead_node 
 
 }  // namespace
 
-LoadPath growing_loads(Equations& equations, const Parameters& parameters, const State& state, NewtonWorkspace& work) {
+LoadPath growing_loads(Equations& equations, Parameters& parameters, const State& state, NewtonWorkspace& work) {
   const std::vector<LoadPiece>& pieces = equations.loads().pieces;
-  if (std::none_of(pieces.begin(), pieces.end(), turns)) return [](double, std::vector<Vector3>&) {};
-  const auto scale = [&pieces, full = equations.loads().values](double share, std::vector<Vector3>& values) {
+  if (std::none_of(pieces.begin(), pieces.end(), turns)) return [](double, MatrixX3&) {};
+  const auto scale = [&pieces, full = parameters.loads](double share, MatrixX3& loads) {
     for (const LoadPiece& piece : pieces)
-      if (turns(piece)) {
-        const auto load = static_cast<std::size_t>(piece.load);
-        values[load] = share * full[load];
-      }
+      if (turns(piece)) loads.row(piece.load) = share * full.row(piece.load);
   };
   // The residual is linear in them: the share by which the state is least out of balance.
   const auto out_of_balance = [&](double share) {
-    scale(share, equations.loads().values);
+    scale(share, parameters.loads);
     equations.begin(state, parameters, StepRule::statics, 0.0);
     equations.evaluate(state.q, false, nullptr, work.data);
     return work.data.residual;
@@ -35,9 +32,7 @@ LoadPath growing_loads(Equations& equations, const Parameters& parameters, const
   const VectorX without = out_of_balance(0.0), change = out_of_balance(1.0) - without;
   const double square = change.squaredNorm();
   const double carried = square > 0.0 ? std::clamp(-without.dot(change) / square, 0.0, 1.0) : 0.0;
-  return [scale, carried](double factor, std::vector<Vector3>& values) {
-    scale(carried + factor * (1.0 - carried), values);
-  };
+  return [scale, carried](double factor, MatrixX3& loads) { scale(carried + factor * (1.0 - carried), loads); };
 }
 
 void Homotopy::start_out_of_balance() {
@@ -50,7 +45,7 @@ void Homotopy::start_out_of_balance() {
 
 void Homotopy::go_to(double factor) {
   factor_ = factor;
-  loads_(factor, equations_.loads().values);
+  loads_(factor, parameters_.loads);
   equations_.begin(state_, parameters_, StepRule::statics, 0.0);
   if (imbalance_.size() == 0) imbalance_.setZero(state_.q.size());
   target_ = (1.0 - factor) * imbalance_;
@@ -76,9 +71,9 @@ void Homotopy::find_pull(const VectorX& z, VectorX& pull, VectorX& held) {
   moves_ = !held.isZero(0.0);
   equations_.evaluate(z, false, nullptr, work_.data);
   pull = work_.data.residual;
-  loads_(factor_ + little, equations_.loads().values);
+  loads_(factor_ + little, parameters_.loads);
   equations_.evaluate(moved_, false, nullptr, work_.data);
-  loads_(factor_, equations_.loads().values);
+  loads_(factor_, parameters_.loads);
   pull = (pull - work_.data.residual) / little - imbalance_;
 }
 

@@ -12,16 +12,17 @@ namespace withe {
 /// Sets the held unknowns of q to where supports are at a factor. False where the frames of the present state are too
 /// far from there.
 using Boundary = std::function<bool(double factor, VectorX& q)>;
-/// Sets the values of loads that grow with the factor.
-using LoadPath = std::function<void(double factor, std::vector<Vector3>& values)>;
+/// Sets rows of `Parameters::loads` that grow with the factor.
+using LoadPath = std::function<void(double factor, MatrixX3& loads)>;
 
 /// Loads that turn with the rod (moments, followers) from the share of them that the state carries already to all of
 /// them: their dead imbalance would pull where they do not. Others stay, as they are part of what is out of balance.
-LoadPath growing_loads(Equations& equations, const Parameters& parameters, const State& state, NewtonWorkspace& work);
+LoadPath growing_loads(Equations& equations, Parameters& parameters, const State& state, NewtonWorkspace& work);
 
 class Homotopy {
  public:
-  Homotopy(Equations& equations, const Newton& newton, const Parameters& parameters, Boundary boundary, LoadPath loads,
+  /// Loads among the parameters are those of the factor last gone to.
+  Homotopy(Equations& equations, const Newton& newton, Parameters& parameters, Boundary boundary, LoadPath loads,
            State& state, NewtonWorkspace& work)
       : equations_(equations),
         newton_(newton),
@@ -58,7 +59,7 @@ class Homotopy {
  private:
   Equations& equations_;
   const Newton& newton_;
-  const Parameters& parameters_;
+  Parameters& parameters_;
   Boundary boundary_;
   LoadPath loads_;
   State& state_;

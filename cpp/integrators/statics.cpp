@@ -40,7 +40,7 @@ constexpr double kJump = 0.25 * kFarthestTurn;
 
 class Statics {
  public:
-  Statics(Equations& equations, const Newton& newton, const Options& options, const Parameters& parameters,
+  Statics(Equations& equations, const Newton& newton, const Options& options, Parameters& parameters,
           const Boundary& boundary, State& state, NewtonWorkspace& work)
       : equations_(equations),
         newton_(newton),
@@ -370,7 +370,7 @@ class Statics {
   Equations& equations_;
   const Newton& newton_;
   const Options& options_;
-  const Parameters& parameters_;
+  Parameters& parameters_;
   State& state_;
   NewtonWorkspace& work_;
   double energy_scale_ = 0.0;  ///< greatest potential met [J]
@@ -384,13 +384,9 @@ class Statics {
 }  // namespace
 
 StaticResult find_equilibrium(Equations& equations, const Newton& newton, const Options& options,
-                              const Parameters& parameters, const Boundary& boundary, State& state,
-                              NewtonWorkspace& work) {
-  const std::vector<Vector3> loads = equations.loads().values;
+                              Parameters& parameters, const Boundary& boundary, State& state, NewtonWorkspace& work) {
   equations.held_acceleration().resize(0);  // that of the last time step, if there was one
-  const StaticResult result = Statics(equations, newton, options, parameters, boundary, state, work).run();
-  equations.loads().values = loads;
-  return result;
+  return Statics(equations, newton, options, parameters, boundary, state, work).run();
 }
 
 }  // namespace withe

@@ -17,7 +17,6 @@ struct StaticResult {
 /// of balance at the start, and the motion of supports, are let in as `Homotopy` has it, in steps in which no edge
 /// turns far.
 StaticResult find_equilibrium(Equations& equations, const Newton& newton, const Options& options,
-                              const Parameters& parameters, const Boundary& boundary, State& state,
-                              NewtonWorkspace& work);
+                              Parameters& parameters, const Boundary& boundary, State& state, NewtonWorkspace& work);
 
 }  // namespace withe

@@ -402,6 +402,7 @@ Model build_model(const SceneDescription& description, std::optional<bool> plana
       require(node >= 0 && node < description.positions.rows(), "spring at a node that is not there");
     require(spring.nodes[0] != spring.nodes[1], "a spring must act between two different nodes");
   }
+  for (const LoadDescription& load : description.loads) check_load(description, load);
   Model model;
   model.description = description;
   if (planar.value_or(true)) model.plane = find_plane(description, planar, model.plane_reason);

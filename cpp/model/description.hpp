@@ -98,9 +98,11 @@ inline bool is_axial(LoadKind kind) { return kind == LoadKind::moment || kind ==
 struct LoadDescription {
   LoadKind kind = LoadKind::force;
   RodPass pass;
-  Vector3 value = Vector3::Zero();  ///< world axes; a follower load keeps its direction in the frame that carries it
+  /// World axes; a follower load keeps its direction in the frame that carries it. One row, or, along a rod, one an
+  /// edge.
+  MatrixX3 values = MatrixX3::Zero(1, 3);
   bool follower = false;
-  bool varies = false;  ///< set by a callback while running, so `value` is only its first one
+  bool varies = false;  ///< set by a callback while running, so `values` are only its first ones
   bool added = false;   ///< put on while the scene runs: it has no say in which plane the drawing lies in
 };
 
@@ -213,5 +215,12 @@ struct SceneDescription {
   ContactDescription contact;
   FluidDescription fluid;
 };
+
+/// Where the rows of a load begin among those of all.
+inline Eigen::Index first_load_row(const SceneDescription& scene, std::size_t load) {
+  Eigen::Index row = 0;
+  for (std::size_t k = 0; k < load; ++k) row += scene.loads[k].values.rows();
+  return row;
+}
 
 }  // namespace withe

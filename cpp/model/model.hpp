@@ -102,6 +102,7 @@ struct Parameters {
   MatrixX2 obstacle_friction;               ///< per obstacle, along and across rods [-]
   MatrixX2 pair_friction;                   ///< per pair of bodies, likewise; negative: that of the scene [-]
   VectorX spring_stiffness, spring_rest_length, spring_damping;  ///< per spring [N/m], [m], [N s/m]
+  MatrixX3 loads;  ///< rows of each load after those of the one before; see `LoadDescription::values`
   BendMeasure measure;
   bool lumped = false;       ///< whether masses sit at nodes alone; see mass_matrix.hpp
   bool held_lumped = false;  ///< whether those of edges at held nodes do
@@ -118,6 +119,9 @@ struct Parameters {
   /// never used twice.
   long version = 0, natural_version = 0;
 };
+
+/// Refuses a load at a node that is not there, of the wrong size, or not finite.
+void check_load(const SceneDescription& scene, const LoadDescription& load);
 
 struct Model {
   SceneDescription description;

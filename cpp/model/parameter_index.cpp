@@ -15,7 +15,7 @@ namespace {
 
 using enum ParameterKind;
 
-constexpr std::array<ParameterInfo, 19> kIndex{{
+constexpr std::array<ParameterInfo, 20> kIndex{{
     {stretch_stiffness, "stretch_stiffness", Extent::edge, 1, "N", Range::positive, Derived::nothing},
     {bend_stiffness, "bend_stiffness", Extent::edge, 2, "N m^2", Range::positive, Derived::stiffness},
     {twist_stiffness, "twist_stiffness", Extent::edge, 1, "N m^2", Range::positive, Derived::stiffness},
@@ -28,6 +28,7 @@ constexpr std::array<ParameterInfo, 19> kIndex{{
     {added_mass, "added_mass", Extent::node, 1, "kg", Range::non_negative, Derived::masses},
     {gravity, "gravity", Extent::scene, 3, "m/s^2", Range::any, Derived::nothing},
     {fluid_viscosity, "fluid_viscosity", Extent::scene, 1, "Pa s", Range::positive, Derived::nothing},
+    {ParameterKind::load, "load", Extent::load, 3, "N, N m or N/m", Range::any, Derived::nothing},
     {spring_stiffness, "spring_stiffness", Extent::spring, 1, "N/m", Range::non_negative, Derived::nothing},
     {spring_rest_length, "spring_rest_length", Extent::spring, 1, "m", Range::non_negative, Derived::nothing},
     {spring_damping, "spring_damping", Extent::spring, 1, "N s/m", Range::non_negative, Derived::nothing},
@@ -64,6 +65,8 @@ Eigen::Index rows_of(const Model& model, const ParameterInfo& info, int rod) {
       return model.rod_voronoi[at(rod)].size();
     case Extent::spring:
       return static_cast<Eigen::Index>(model.description.springs.size());
+    case Extent::load:
+      return first_load_row(model.description, model.description.loads.size());
     case Extent::obstacle:
       return static_cast<Eigen::Index>(model.description.contact.obstacles.size());
     case Extent::pair:
@@ -122,6 +125,8 @@ ParameterView parameter_view(const Model& model, Parameters& p, ParameterKind ki
         return p.added_mass.data();
       case gravity:
         return p.gravity.data();
+      case ParameterKind::load:
+        return p.loads.data();
       case spring_stiffness:
         return p.spring_stiffness.data();
       case spring_rest_length:

@@ -21,6 +21,7 @@ enum class ParameterKind {
   added_mass,
   gravity,
   fluid_viscosity,
+  load,
   spring_stiffness,
   spring_rest_length,
   spring_damping,
@@ -31,8 +32,8 @@ enum class ParameterKind {
 };
 
 /// What a parameter has a row of numbers for: the scene; every node; every edge, or stencil, of a rod; every obstacle;
-/// every spring; every pair of bodies that has something of its own.
-enum class Extent { scene, node, edge, stencil, spring, obstacle, pair };
+/// every spring; every load, or each of its edges; every pair of bodies that has something of its own.
+enum class Extent { scene, node, edge, stencil, spring, load, obstacle, pair };
 
 enum class Range { any, non_negative, positive };
 

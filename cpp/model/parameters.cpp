@@ -107,6 +107,17 @@ void set_friction(const ContactDescription& contact, Parameters& p) {
   }
 }
 
+void check_load(const SceneDescription& scene, const LoadDescription& load) {
+  const int rods = static_cast<int>(scene.rods.size());
+  require(load.pass.rod >= 0 && load.pass.rod < rods && load.pass.node >= 0 &&
+              load.pass.node < static_cast<int>(scene.rods[at(load.pass.rod)].nodes.size()),
+          "load at a node that is not there");
+  const bool along = load.kind == LoadKind::distributed || load.kind == LoadKind::pressure;
+  require(load.values.rows() == 1 || (along && load.values.rows() == scene.rods[at(load.pass.rod)].rest_lengths.size()),
+          "load must have one row, or, along a rod, one an edge");
+  require(load.values.allFinite(), "load must be finite");
+}
+
 Parameters initial_parameters(const Model& model) {
   const SceneDescription& scene = model.description;
   Parameters p;
@@ -126,6 +137,9 @@ Parameters initial_parameters(const Model& model) {
   for (std::size_t s = 0; s < scene.springs.size(); ++s) set_spring(static_cast<int>(s), scene.springs[s], p);
   p.added_mass = scene.added_mass;
   p.gravity = scene.gravity;
+  p.loads.resize(first_load_row(scene, scene.loads.size()), 3);
+  for (std::size_t k = 0; k < scene.loads.size(); ++k)
+    p.loads.middleRows(first_load_row(scene, k), scene.loads[k].values.rows()) = scene.loads[k].values;
   p.fluid_viscosity = scene.fluid.viscosity;
   set_friction(scene.contact, p);
   if (scene.bending == Bending::tangent) p.measure = {0.0, 0.0};

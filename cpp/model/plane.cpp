@@ -28,7 +28,8 @@ void collect_directions(const SceneDescription& scene, std::vector<Vector3>& dir
   }
   add(scene.gravity, 0.0);
   for (const LoadDescription& load : scene.loads)
-    if (!load.added && !is_axial(load.kind)) add(load.value, 0.0);
+    if (!load.added && !is_axial(load.kind))
+      for (const auto& value : load.values.rowwise()) add(value.transpose(), 0.0);
 }
 
 /// Whether an obstacle meets rods in a plane as its cut by the plane does: a plane that stands on it, a capsule whose
@@ -90,10 +91,11 @@ std::optional<Plane> find_plane(const SceneDescription& scene, std::optional<boo
     }
   const auto across = [&](const Vector3& v) { return v.cross(normal).norm() > kTolerance * 100 * v.norm(); };
   for (const LoadDescription& load : scene.loads)
-    if (!load.added && is_axial(load.kind) && across(load.value)) {
-      reason = "a moment turns, or a pressure pushes, out of the plane";
-      return std::nullopt;
-    }
+    for (const auto& value : load.values.rowwise())
+      if (!load.added && is_axial(load.kind) && across(value.transpose())) {
+        reason = "a moment turns, or a pressure pushes, out of the plane";
+        return std::nullopt;
+      }
   for (const RodDescription& rod : scene.rods) {
     if ((rod.natural_twist.array() != 0.0).any()) {
       reason = "rod '" + rod.name + "' has natural twist";

@@ -25,7 +25,7 @@ void LoadForces::add(const StepProblem& problem, StepData& data, const Assembler
   for (std::size_t k = 0; k < loads.pieces.size(); ++k) {
     const bool dead = loads.pieces[k].shape == LoadShape::dead_node;
     load_local(problem.model, *problem.start, data.z, data.configuration, loads.pieces[k],
-               value_of(loads, data.custom, loads.pieces[k]), local);
+               value_of(*problem.parameters, data.custom, loads.pieces[k]), local);
     tables_[k].add_gradient(0, local.gradient, 1.0, data.gradient, data.row_magnitude);
     if (!values.empty() && !dead) tables_[k].add_hessian(0, local.hessian, 1.0, values);
     const int* dofs = tables_[k].dofs(0);
@@ -61,7 +61,7 @@ void LoadForces::add_applied(const StepProblem& problem, const StepData& data, c
   Local local;
   for (std::size_t k = 0; k < loads.pieces.size(); ++k) {
     load_local(problem.model, *problem.start, data.z, data.configuration, loads.pieces[k],
-               value_of(loads, data.custom, loads.pieces[k]), local);
+               value_of(*problem.parameters, data.custom, loads.pieces[k]), local);
     const ElementTable& table = tables_[k];
     const int* dofs = table.dofs(0);
     for (int i = 0; i < table.width(); ++i)

@@ -27,9 +27,9 @@ class LoadForces final : public Term {
 };
 
 /// What a piece is a piece of.
-inline const Vector3& value_of(const Loads& loads, const AppliedForces& custom, const LoadPiece& piece) {
-  return piece.load >= 0 ? loads.values[static_cast<std::size_t>(piece.load)]
-                         : custom.moments[static_cast<std::size_t>(piece.node)];
+inline Vector3 value_of(const Parameters& parameters, const AppliedForces& custom, const LoadPiece& piece) {
+  if (piece.load >= 0) return parameters.loads.row(piece.load);
+  return custom.moments[static_cast<std::size_t>(piece.node)];
 }
 
 }  // namespace withe

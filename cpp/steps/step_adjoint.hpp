@@ -13,10 +13,10 @@ struct CoefficientAdjoint {
   VectorX bend_time, half_time;                                  ///< by viscous times [1/s]
   VectorX mass, mass_coupling, drag, drag_coupling;              ///< by `MassMatrix`
   VectorX gravity;                                               ///< per unknown, by its force [1/N]
-  MatrixX3 loads;                                                ///< per load, by its value
+  MatrixX3 loads;                                                ///< by `Parameters::loads`
   VectorX spring_stiffness, spring_rest_length, spring_damping;  ///< per spring
 
-  explicit CoefficientAdjoint(const Model& model, std::size_t load_count)
+  explicit CoefficientAdjoint(const Model& model, Eigen::Index load_rows)
       : stretch_stiffness(VectorX::Zero(model.edge_count)),
         stretch_time(stretch_stiffness),
         bend_stiffness(Columns3::Zero(static_cast<Eigen::Index>(model.bend.size()), 3)),
@@ -30,7 +30,7 @@ struct CoefficientAdjoint {
         drag(mass),
         drag_coupling(mass_coupling),
         gravity(mass),
-        loads(MatrixX3::Zero(static_cast<Eigen::Index>(load_count), 3)),
+        loads(MatrixX3::Zero(load_rows, 3)),
         spring_stiffness(VectorX::Zero(static_cast<Eigen::Index>(model.description.springs.size()))),
         spring_rest_length(spring_stiffness),
         spring_damping(spring_stiffness) {}

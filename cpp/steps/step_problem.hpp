@@ -51,7 +51,7 @@ struct StepProblem {
   ElasticCoefficients viscous;  ///< viscosity alone, over h, from the start's strains
   ElasticCoefficients damped;   ///< elasticity and viscosity as one
 
-  Loads loads;           ///< with the values that act at the time of the step's forces
+  Loads loads;           ///< whose values are among the parameters
   AppliedForces custom;  ///< unless they are solved for
   /// Of what supports hold, which acts on the edges next to it; meaningful where held. Empty: as the rest accelerates.
   VectorX held_acceleration;

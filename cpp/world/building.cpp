@@ -59,7 +59,6 @@ Matrix3 frame_rotation(const Model& model, const State& state, int frame) {
 World::Implementation::Implementation(SceneDescription scene, Options choice)
     : description(std::move(scene)), drawn_contact(description.contact), options(choice) {
   require(options.time_step > 0.0 && std::isfinite(options.time_step), "time_step must be positive and finite");
-  for (const LoadDescription& load : description.loads) load_values.push_back(load.value);
   rebuild(Rebuild::first);
   check_reversible(parameters);
   if (description.contact.overlap == Overlap::separate) separate();
@@ -90,7 +89,6 @@ World::Implementation::Implementation(const Implementation& other)
   listen();
   newton = std::make_unique<Newton>(model, options);
   equations = std::make_unique<Equations>(model, equation_options(options));
-  equations->loads().values = load_values;
 }
 
 void World::Implementation::listen() {
@@ -178,7 +176,6 @@ void World::Implementation::rebuild(Rebuild why) {
   }
   newton = std::make_unique<Newton>(model, options);
   equations = std::make_unique<Equations>(model, equation_options(options));
-  equations->loads().values = load_values;
   if (Contact* contact = equations->contact()) contact->initialise(state, parameters);
   reaction_current = false;
   make_plan();
@@ -191,7 +188,6 @@ void World::Implementation::remake_equations() {
   rescue_equations.reset();
   newton = std::make_unique<Newton>(model, options);
   equations = std::make_unique<Equations>(model, equation_options(options));
-  equations->loads().values = load_values;
   forget_matrix();
   reaction_current = false;
   state.acceleration_current = false;

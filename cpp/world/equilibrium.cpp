@@ -19,7 +19,6 @@ Equations& World::Implementation::statics() {
     symmetric.integrator = Integrator::statics;
     static_equations = std::make_unique<Equations>(model, equation_options(symmetric));
   }
-  static_equations->loads().values = load_values;
   return *static_equations;
 }
 
@@ -30,7 +29,6 @@ Equations& World::Implementation::rescue() {
     conserving.integrator = Integrator::energy_momentum;
     rescue_equations = std::make_unique<Equations>(model, equation_options(conserving));
   }
-  rescue_equations->loads().values = load_values;
   return *rescue_equations;
 }
 
@@ -83,6 +81,7 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
   account_for_settings();
   const Moving before = *this;
   const Lagged lagged_before = lagged();
+  const MatrixX3 loads = parameters.loads;
   const double time = state.time + dt;
   if (actuated()) apply_ramps(time, actuation_work);
   aim_supports(time);
@@ -94,7 +93,7 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
     release_obstacles(system);
     static_cast<Moving&>(*this) = before;
     apply_ramps(state.time);
-    system.loads().values = load_values;
+    parameters.loads = loads;
     recall(lagged_before);  // and no more of `system`, which this may drop
   };
   std::vector<SupportMotion> from = before.motions;
@@ -160,16 +159,17 @@ EquilibriumPath World::equilibrium_path(const PathOptions& wanted) {
   Implementation& self = accounted();
   const Timer timer(self.statistics.total_time);
   for (int load : wanted.loads)
-    require(load >= 0 && load < static_cast<int>(self.load_values.size()), "no such load: ", load);
+    require(load >= 0 && load < static_cast<int>(self.description.loads.size()), "no such load: ", load);
   require(std::isfinite(wanted.start) && std::isfinite(wanted.end) && wanted.start != wanted.end,
           "a path needs two factors to lead from and to");
   require(wanted.most_points > 0 && wanted.turn > 0.0, "a path needs points and turns that are positive");
-  const std::vector<Vector3> full = self.load_values;
+  const MatrixX3 full = self.parameters.loads;
   const bool by_loads = !wanted.loads.empty();
-  const LoadPath scaled = [&](double factor, std::vector<Vector3>& values) {
+  const LoadPath scaled = [&](double factor, MatrixX3& loads) {
     for (int load : wanted.loads) {
-      const auto i = static_cast<std::size_t>(load);
-      values[i] = factor * full[i];
+      const auto k = static_cast<std::size_t>(load);
+      const Eigen::Index first = first_load_row(self.description, k), rows = self.description.loads[k].values.rows();
+      loads.middleRows(first, rows) = factor * full.middleRows(first, rows);
     }
   };
   const Moving before = self;
@@ -177,15 +177,10 @@ EquilibriumPath World::equilibrium_path(const PathOptions& wanted) {
   const MatrixX3 forces_before = self.custom_force, moments_before = self.custom_moments;
   EquilibriumPath out;
   ArcResult r;
-  const auto set_loads = [&](const std::vector<Vector3>& values) {
-    self.load_values = self.equations->loads().values = values;
-    self.reaction_current = false;
-  };
   try {
     if (by_loads) {
-      std::vector<Vector3> first = full;
-      scaled(wanted.start, first);
-      set_loads(first);
+      scaled(wanted.start, self.parameters.loads);
+      self.reaction_current = false;
       out.iterations += equilibrium().iterations;
     }
     std::vector<SupportMotion> from = self.motions;
@@ -231,13 +226,14 @@ EquilibriumPath World::equilibrium_path(const PathOptions& wanted) {
   } catch (...) {
     self.forget_custom(self.statics(), forces_before, moments_before);
     static_cast<Moving&>(self) = before;
-    set_loads(full);
+    self.parameters.loads = full;
+    self.reaction_current = false;
     self.recall(lagged_before);
     throw;
   }
-  std::vector<Vector3> values = full;
-  scaled(r.factor, values);
-  set_loads(values);
+  self.parameters.loads = full;
+  scaled(r.factor, self.parameters.loads);
+  self.reaction_current = false;
   out.finished = r.finished;
   out.iterations += r.newton.iterations;
   if (out.points.size() < 2 && !r.finished) self.fail(r.newton, 0.0, "no path of equilibria leads from here");

@@ -3,6 +3,7 @@
 
 #include "common/check.hpp"
 #include "geometry/rotation.hpp"
+#include "gradients/state_vector.hpp"
 #include "world/implementation.hpp"
 
 namespace withe {
@@ -50,7 +51,6 @@ std::vector<EquilibriumGradient> World::equilibrium_gradients(const std::vector<
     self.static_gradient = std::make_unique<StepGradient>(model, equation_options(statics));
   }
   StepGradient& gradient = *self.static_gradient;
-  gradient.equations().loads().values = self.load_values;
   State frames = self.state;
   if (!model.planar()) {
     // Directors are measured from where they are, and so turn with their edges without a change of their angles.
@@ -67,7 +67,7 @@ std::vector<EquilibriumGradient> World::equilibrium_gradients(const std::vector<
             "a derivative by positions has one row a node, " + std::to_string(model.node_count));
     StateAdjoint adjoint{VectorX::Zero(model.dof_count), {}};
     add_to_nodes(model, by, adjoint.q);
-    CoefficientAdjoint coefficients(model, self.load_values.size());
+    CoefficientAdjoint coefficients(model, self.parameters.loads.rows());
     VectorX held = VectorX::Zero(model.dof_count);
     gradient.pull_back(adjoint, coefficients, held);
     const auto supports = static_cast<Eigen::Index>(model.supports.size());
@@ -80,8 +80,7 @@ std::vector<EquilibriumGradient> World::equilibrium_gradients(const std::vector<
 
 std::shared_ptr<Tape> World::start_tape() {
   Implementation& self = *implementation_;
-  self.tape =
-      std::make_shared<Tape>(self.model, equation_options(self.options), self.state, self.parameters, self.load_values);
+  self.tape = std::make_shared<Tape>(self.model, equation_options(self.options), self.state, self.parameters);
   if (self.options.integrator == Integrator::verlet || self.options.integrator == Integrator::statics)
     self.tape->refuse("integrator '" +
                       std::string(self.options.integrator == Integrator::verlet ? "verlet" : "static") +
@@ -93,9 +92,31 @@ std::shared_ptr<Tape> World::start_tape() {
 
 void World::stop_tape() { implementation_->tape.reset(); }
 
+VectorX World::state_difference(const World& reference) const {
+  const Implementation &self = *implementation_, &other = *reference.implementation_;
+  const auto same = [](const Constraint& a, const Constraint& b) { return a.first == b.first && a.free == b.free; };
+  require(self.model.planar() == other.model.planar() && self.model.dof_count == other.model.dof_count &&
+              std::equal(self.model.constraints.begin(), self.model.constraints.end(), other.model.constraints.begin(),
+                         other.model.constraints.end(), same),
+          "the reference must be a copy of this simulation, with the same supports");
+  return withe::state_difference(self.model, other.state, self.state);
+}
+
+void World::displace_state(const VectorX& by) {
+  // On a copy, so that what is refused changes nothing.
+  auto fresh = std::make_unique<Implementation>(accounted());
+  fresh->recall(implementation_->lagged());
+  fresh->take_callbacks(*implementation_);
+  withe::displace_state(fresh->model, by, fresh->state);
+  fresh->meet_anew();
+  fresh->forget_motion();
+  fresh->forget_matrix();
+  implementation_ = std::move(fresh);
+}
+
 /// Before a step.
 void World::Implementation::check_tape() {
-  if (!tape->continues(state, parameters, load_values))
+  if (!tape->continues(state, parameters))
     tape->refuse("numbers, loads or the state were changed while it ran, or change with time; begin another run there");
 }
 

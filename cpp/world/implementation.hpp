@@ -108,6 +108,7 @@ struct World::Implementation : Running {
   void set_rates(const std::vector<RodState>& rods);
   void relax_joints(const std::vector<bool>& is_told);
   void turn_frames(const std::vector<bool>& is_told);
+  void meet_anew();
   /// What came before no longer tells what comes next.
   void forget_motion();
 
@@ -217,6 +218,8 @@ struct World::Implementation : Running {
 
   // separation.cpp
   void separate();
+
+  std::pair<Eigen::Index, Eigen::Index> load_rows(int load) const;  ///< the first, and how many
 
   // energy.cpp
   Energy energy() const;

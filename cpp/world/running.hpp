@@ -92,7 +92,6 @@ inline constexpr int kLeastPatience = 4;
 struct Settings {
   Parameters parameters;
   std::vector<NaturalRamp> ramps;
-  std::vector<Vector3> load_values;
   std::vector<ObstacleMotion> obstacle_motions;  ///< none until one moves
 };
 

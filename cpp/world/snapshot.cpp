@@ -31,6 +31,7 @@ void write_added_loads(Writer& w, const SceneDescription& scene) {
     w(load.pass.rod);
     w(load.pass.node);
     w(load.follower);
+    w(static_cast<std::int64_t>(load.values.rows()));
   }
 }
 
@@ -46,10 +47,12 @@ std::vector<LoadDescription> read_added_loads(Reader& r, const SceneDescription&
     load.kind = static_cast<LoadKind>(kind);
     r(load.pass.rod);
     r(load.pass.node);
-    require(load.pass.rod >= 0 && load.pass.rod < static_cast<int>(scene.rods.size()) && load.pass.node >= 0 &&
-                load.pass.node < static_cast<int>(scene.rods[static_cast<std::size_t>(load.pass.rod)].nodes.size()),
-            "snapshot is damaged: load at a node that is not there");
     r(load.follower);
+    std::int64_t rows = 0;
+    r(rows);
+    require(rows >= 0 && rows < 1 << 28, "snapshot is damaged: impossible load");
+    load.values.setZero(rows, 3);
+    check_load(scene, load);
     load.added = true;
   }
   return loads;
@@ -101,7 +104,7 @@ bool same_loads(const std::vector<LoadDescription>& added, const SceneDescriptio
   return std::equal(added.begin(), added.end(), scene.loads.begin() + static_cast<std::ptrdiff_t>(drawn),
                     scene.loads.end(), [](const LoadDescription& a, const LoadDescription& b) {
                       return a.kind == b.kind && a.pass.rod == b.pass.rod && a.pass.node == b.pass.node &&
-                             a.follower == b.follower;
+                             a.follower == b.follower && a.values.rows() == b.values.rows();
                     });
 }
 
@@ -188,14 +191,13 @@ void exchange(Archive& io, const Model& model, Parameters& p) {
 
 template <class Archive>
 void exchange(Archive& io, const Model& model, Settings& settings) {
-  auto& [parameters, ramps, load_values, obstacle_motions] = settings;
+  auto& [parameters, ramps, obstacle_motions] = settings;
   exchange(io, model, parameters);
   const auto exchange_ramp = [&](auto& ramp) {
     auto& [from, to, start, end, active] = ramp;
     io(from), io(to), io(start), io(end), io(active);
   };
   for (auto& [curvature, twist] : ramps) exchange_ramp(curvature), exchange_ramp(twist);
-  for (auto& v : load_values) io(v);
   for (auto& [from, to, start, end] : obstacle_motions) {
     for (ObstacleWay* way : {&from, &to}) io(way->shift), io(way->turn);
     io(start), io(end);
@@ -452,7 +454,7 @@ void World::restore(const std::string& bytes) {
     auto& loads = fresh->description.loads;
     loads.resize(drawn_loads(fresh->description));
     loads.insert(loads.end(), added.begin(), added.end());
-    fresh->load_values.resize(loads.size(), Vector3::Zero());
+    fresh->parameters.loads.setZero(first_load_row(fresh->description, loads.size()), 3);
     fresh->remake_equations();
   }
   bool friction_set = false;
@@ -491,7 +493,6 @@ void World::restore(const std::string& bytes) {
   require(fresh->predictor.plausible(), "snapshot is damaged: impossible history");
   update_derived(fresh->model, fresh->parameters);
   fresh->check_reversible(fresh->parameters);
-  fresh->equations->loads().values = fresh->load_values;
   check_lagged(lagged, fresh->model);
   fresh->recall(lagged);
   implementation_ = std::move(fresh);

@@ -1,6 +1,7 @@
 #include "world/world.hpp"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 
 #include "common/check.hpp"
@@ -12,9 +13,12 @@ namespace withe {
 namespace {
 
 /// Whether a load points, or turns, out of the plane of a normal.
-bool off_plane(LoadKind kind, const Vector3& value, const Vector3& normal) {
-  const double off = is_axial(kind) ? value.cross(normal).norm() : std::abs(value.dot(normal));
-  return off > 1e-8 * value.norm();
+bool off_plane(LoadKind kind, const MatrixX3& values, const Vector3& normal) {
+  return std::any_of(values.rowwise().begin(), values.rowwise().end(), [&](const auto& row) {
+    const Vector3 value = row;
+    const double off = is_axial(kind) ? value.cross(normal).norm() : std::abs(value.dot(normal));
+    return off > 1e-8 * value.norm();
+  });
 }
 
 int checked_spring(const Parameters& parameters, int spring) {
@@ -127,44 +131,49 @@ void World::set_poll(const std::function<void()>& poll) { implementation_->poll 
 
 void World::set_force_function(const CustomFunction& force) { implementation_->force_function = force; }
 
-void World::set_load(int load, const Vector3& value) {
+void World::set_load(int load, const MatrixX3& values) {
   Implementation& self = *implementation_;
-  require(load >= 0 && load < static_cast<int>(self.load_values.size()), "no such load: ", load);
-  require(value.allFinite(), "load must be finite");
+  const auto [first, rows] = self.load_rows(load);
+  require(values.rows() == rows, "load must have ", rows, " rows");
+  require(values.allFinite(), "load must be finite");
   if (self.model.planar()) {
     const Vector3& n = self.model.plane->normal;
-    if (off_plane(self.description.loads[at(load)].kind, value, n)) self.leave_plane("a load");
+    if (off_plane(self.description.loads[at(load)].kind, values, n)) self.leave_plane("a load");
   }
-  self.load_values[at(load)] = value;
-  self.equations->loads().values = self.load_values;
+  self.parameters.loads.middleRows(first, rows) = values;
   self.reaction_current = false;
   self.state.acceleration_current = false;
 }
 int World::add_load(const LoadDescription& load) {
   Implementation& self = *implementation_;
-  const auto& rods = self.description.rods;
-  require(load.pass.rod >= 0 && load.pass.rod < static_cast<int>(rods.size()) && load.pass.node >= 0 &&
-              load.pass.node < static_cast<int>(rods[at(load.pass.rod)].nodes.size()),
-          "load at a node that is not there");
-  require(load.value.allFinite(), "load must be finite");
-  if (self.model.planar() && off_plane(load.kind, load.value, self.model.plane->normal)) self.leave_plane("a load");
+  check_load(self.description, load);
+  const Eigen::Index rows = load.values.rows(), before = self.parameters.loads.rows();
+  if (self.model.planar() && off_plane(load.kind, load.values, self.model.plane->normal)) self.leave_plane("a load");
   self.description.loads.push_back(load);
   self.description.loads.back().added = true;
-  self.load_values.push_back(load.value);
+  self.parameters.loads.conservativeResize(before + rows, 3);
+  self.parameters.loads.bottomRows(rows) = load.values;
   self.remake_equations();
-  return static_cast<int>(self.load_values.size()) - 1;
+  return static_cast<int>(self.description.loads.size()) - 1;
 }
 void World::remove_load(int load) {
   Implementation& self = *implementation_;
-  require(load >= 0 && load < static_cast<int>(self.load_values.size()), "no such load: ", load);
+  const auto [first, rows] = self.load_rows(load);
   require(self.description.loads[at(load)].added, "a load of the drawing stays: set it to zero");
+  MatrixX3& loads = self.parameters.loads;
+  const MatrixX3 after = loads.bottomRows(loads.rows() - first - rows);
+  loads.conservativeResize(loads.rows() - rows, 3);
+  loads.bottomRows(after.rows()) = after;
   self.description.loads.erase(self.description.loads.begin() + load);
-  self.load_values.erase(self.load_values.begin() + load);
   self.remake_equations();
 }
-Vector3 World::load(int load) const {
-  require(load >= 0 && load < static_cast<int>(implementation_->load_values.size()), "no such load: ", load);
-  return implementation_->load_values[at(load)];
+MatrixX3 World::load(int load) const {
+  const auto [first, rows] = implementation_->load_rows(load);
+  return implementation_->parameters.loads.middleRows(first, rows);
+}
+std::pair<Eigen::Index, Eigen::Index> World::Implementation::load_rows(int load) const {
+  require(load >= 0 && load < static_cast<int>(description.loads.size()), "no such load: ", load);
+  return {first_load_row(description, at(load)), description.loads[at(load)].values.rows()};
 }
 
 void World::set_friction(const ContactDescription& contact) {

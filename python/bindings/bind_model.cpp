@@ -131,7 +131,7 @@ void register_loads(py::module_& module) {
   py::class_<LoadDescription> load(module, "LoadDescription", "A force, a moment or a distributed load.");
   load.def(py::init<>())
       .def_readwrite("pass_", &LoadDescription::pass)
-      .def_readwrite("value", &LoadDescription::value)
+      .def_readwrite("values", &LoadDescription::values)
       .def_readwrite("follower", &LoadDescription::follower)
       .def_readwrite("varies", &LoadDescription::varies);
   def_word(load, "kind", &LoadDescription::kind, kLoadKinds);

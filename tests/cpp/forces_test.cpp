@@ -26,7 +26,8 @@ Sum sum_of(const Case& c, const Loads& loads, const VectorX& q) {
   for (const LoadPiece& piece : loads.pieces) {
     int dofs[kMaxLocal];
     const int n = load_dofs(c.model, piece, dofs);
-    load_local(c.model, c.state, q, configuration, piece, loads.values[at(piece.load)], local);
+    load_local(c.model, c.state, q, configuration, piece, initial_parameters(c.model).loads.row(piece.load).transpose(),
+               local);
     for (int i = 0; i < n; ++i) {
       sum.force(dofs[i]) -= local.gradient[i];
       for (int j = 0; j < n; ++j) sum.jacobian(dofs[i], dofs[j]) += local.hessian[i][j];
@@ -102,7 +103,9 @@ TEST(Loads, AMomentDoesItsAngleOfWorkInARigidTurn) {
         const Loads loads = resolve_loads(c.model);
         const VectorX force = sum_of(c, loads, c.q).force;
         for (const auto& [u, omega] : testing::rigid_motions(c.model))
-          EXPECT_NEAR(force.dot(testing::rigid_motion(c, u, omega)), loads.values[0].dot(omega), 1e-12) << c.name;
+          EXPECT_NEAR(force.dot(testing::rigid_motion(c, u, omega)),
+                      initial_parameters(c.model).loads.row(0).dot(omega), 1e-12)
+              << c.name;
       }
     }
 }
@@ -187,7 +190,8 @@ TEST(Loads, APressureOnAClosedRodIsTheGradientOfAnArea) {
         Local local;
         double total = 0.0;
         for (const LoadPiece& piece : loads.pieces) {
-          load_local(c.model, c.state, q, configuration, piece, loads.values[at(piece.load)], local);
+          load_local(c.model, c.state, q, configuration, piece,
+                     initial_parameters(c.model).loads.row(piece.load).transpose(), local);
           total += local.energy;
         }
         return VectorX::Constant(1, total);

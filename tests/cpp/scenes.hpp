@@ -82,7 +82,7 @@ class SceneBuilder {
     return static_cast<int>(scene.supports.size()) - 1;
   }
   int load(LoadKind kind, RodPass pass, const Vector3& value, bool follower = false) {
-    scene.loads.push_back({kind, pass, value, follower, false});
+    scene.loads.push_back({kind, pass, value.transpose(), follower, false});
     return static_cast<int>(scene.loads.size()) - 1;
   }
   int last_node(int rod) const { return static_cast<int>(scene.rods[static_cast<std::size_t>(rod)].nodes.size()) - 1; }

@@ -474,8 +474,8 @@ TEST(BadInput, IsRefusedByName) {
   const World before(world);
   const Matrix3 I = Matrix3::Identity();
   EXPECT_THROW(world.step(-1), std::invalid_argument);
-  EXPECT_THROW(world.set_load(1, Vector3::Zero()), std::invalid_argument);
-  EXPECT_THROW(world.set_load(0, Vector3(nan, 0, 0)), std::invalid_argument);
+  EXPECT_THROW(world.set_load(1, MatrixX3::Zero(1, 3)), std::invalid_argument);
+  EXPECT_THROW(world.set_load(0, Vector3(nan, 0, 0).transpose()), std::invalid_argument);
   EXPECT_THROW(world.set_gravity(Vector3(nan, 0, 0)), std::invalid_argument);
   EXPECT_THROW(world.set_natural_curvature(0, MatrixX2::Zero(3, 2), 0.0), std::invalid_argument);
   EXPECT_THROW(world.set_natural_curvature(1, MatrixX2::Zero(10, 2), 0.0), std::invalid_argument);

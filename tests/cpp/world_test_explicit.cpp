@@ -44,8 +44,9 @@ std::pair<MatrixX3, double> swing(double dt, bool follower) {
   builder.load(LoadKind::force, {0, 11}, Vector3::Zero(), follower);
   World world(builder.scene, options(Integrator::verlet, dt));
   const Energy start = world.energy();
-  world.set_step_callback(
-      [](World& w, double time, double) { w.set_load(0, std::sin(300.0 * time) * Vector3(0.02, 0.01, 0.03)); });
+  world.set_step_callback([](World& w, double time, double) {
+    w.set_load(0, std::sin(300.0 * time) * Vector3(0.02, 0.01, 0.03).transpose());
+  });
   world.step(static_cast<int>(std::lround(0.02 / dt)));
   const Energy end = world.energy();
   return {world.positions(), end.total - end.work + end.dissipated - start.total};

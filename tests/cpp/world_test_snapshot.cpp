@@ -250,7 +250,7 @@ TEST(Snapshot, RemembersRampsLoadsAndMotions) {
     w.set_natural_curvature(0, k, 0.05);
     w.set_natural_twist(0, VectorX::Constant(k.rows(), 3.0), 0.04);
     w.move_support(0, Vector3(0.12, 0.02, 0.0), Matrix3(Eigen::AngleAxisd(0.5, Vector3::UnitZ())), 0.06);
-    w.set_load(0, Vector3(0, 0.02, 0));
+    w.set_load(0, Vector3(0, 0.02, 0).transpose());
     w.step(4);
   };
   for (Integrator integrator : {Integrator::implicit_midpoint, Integrator::energy_momentum})

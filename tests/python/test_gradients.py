@@ -250,6 +250,57 @@ def move_with_directors(simulation, rod, way):
     simulation.set_state(rod, positions=positions + way, directors=turned, velocities=velocities, spins=spins)
 
 
+def tapered(radii, run, *, planar, joint, material=True):
+    """A tapered arm in space or in a plane, in equilibrium or let go from its straight shape."""
+    scene = withe.Scene()
+    rubber = withe.Material(youngs_modulus=1e6, poisson_ratio=0.4, density=1200.0, viscosity=200.0 * run)
+    stiffness = withe.Stiffness(stretch=400.0, bend=0.02, twist=0.015)
+    rod = {"material": rubber} if material else {"stiffness": stiffness, "line_density": 0.6}
+    s = np.linspace(0.0, 1.0, NODES)
+    points = np.stack([0.3 * s, 0.0 * s if planar else 0.04 * np.sin(3.0 * s), 0.05 * np.sin(2.0 * s)], 1)
+    arm = scene.add_rod(points=points, radius=radii, name="arm", **rod)
+    scene.clamp(arm.start)
+    if joint:
+        tip = points[6] + [0.02, 0.0 if planar else 0.1, 0.1]
+        branch = scene.add_rod(start=points[6], end=tip, nodes=5, radius=1e-2, material=rubber)
+        scene.join(arm.node(6), branch.start)
+    scene.add_drag(0.2)
+    options = {"integrator": "implicit_midpoint", "time_step": 2e-3, "adaptive": False} if run else {}
+    return scene.build(planar=planar or None, **({"integrator": "static"} | options), **TIGHT)
+
+
+@pytest.mark.parametrize("material", [True, False])
+@pytest.mark.parametrize("joint", [False, True])
+@pytest.mark.parametrize("planar", [True, False])
+@pytest.mark.parametrize("run", [False, True])
+def test_gradient_by_radii_is_that_of_scenes_built_anew(run, planar, joint, material):
+    random = np.random.default_rng(12)
+    radii = np.linspace(1.8e-2, 1e-2, NODES - 1)
+    way = radii * random.uniform(-1.0, 1.0, size=NODES - 1)
+    nodes = NODES + (4 if joint else 0)
+    weight = random.normal(size=(3 if run else 1, nodes, 3)) * ((1, 0, 1) if planar else (1, 1, 1))
+
+    def shown(simulation, **options):
+        if run:
+            if not planar:
+                simulation.set_state("arm", spins=20.0 * np.sin(np.arange(NODES - 1)))
+            return simulation.run(24e-3, record_every=12e-3, progress=False, **options)
+        return simulation.equilibrium()
+
+    simulation = tapered(radii, run, planar=planar, joint=joint, material=material)
+    found = shown(simulation, **{"differentiable": True} if run else {})
+    (gradient,) = found.gradient({"positions": weight} if run else weight[0], [("arm", "radius")])
+    assert gradient.shape == (NODES - 1,)
+
+    def of(change):
+        other = tapered(radii + change * way, run, planar=planar, joint=joint, material=material)
+        record = shown(other)
+        return float((weight * (record.positions() if run else other.positions()[None])).sum())
+
+    wide, near = ((of(h) - of(-h)) / (2.0 * h) for h in (2e-3, 1e-3))
+    assert gradient @ way == pytest.approx((4.0 * near - wide) / 3.0, rel=1e-6, abs=1e-11)
+
+
 def test_steps_that_were_cut_are_differentiated_as_they_ran():
     random = np.random.default_rng(6)
     drawn = Drawn(planar=True, joint=False, integrator="backward_euler", tolerance=1e-4, time_step=0.02)
@@ -352,3 +403,44 @@ def test_a_differentiable_run_is_the_same_run():
         drawn = Drawn(planar=False, joint=True, integrator="implicit_midpoint", time_step=5e-3)
         runs.append(drawn.simulation.run(0.1, progress=False, differentiable=differentiable))
     np.testing.assert_array_equal(runs[0].positions(), runs[1].positions())
+
+
+def test_gradients_by_loads_edge_by_edge():
+    drawn = Drawn(planar=False, joint=False, integrator="static")
+    rows = np.random.default_rng(3).normal(size=(NODES - 1, 3))
+    spread, even = drawn.simulation.add_load(drawn.arm, 0.1 * rows), drawn.simulation.add_load(drawn.arm, (0, 0, 0.05))
+    found = drawn.simulation.equilibrium()
+    random = np.random.default_rng(4)
+    by, way = random.normal(size=(NODES, 3)), random.normal(size=(NODES - 1, 3))
+    of_spread, of_even = found.gradient(by, wrt=[(spread, "load"), (even, "load")])
+    assert of_spread.shape == (NODES - 1, 3)
+    assert of_even == pytest.approx(of_spread.sum(axis=0), rel=1e-12)
+
+    def loss():
+        drawn.simulation.equilibrium()
+        return float((by * drawn.simulation.positions()).sum())
+
+    expected = difference(
+        drawn.simulation, loss, lambda step: drawn.simulation.set(spread, load=0.1 * rows + step * way), 1e-4
+    )
+    assert (of_spread * way).sum() == pytest.approx(expected, rel=1e-6)
+
+
+def test_radii_that_have_no_gradient_say_so():
+    def gradient(section, floor):
+        scene = withe.Scene()
+        rubber = withe.Material(youngs_modulus=1e6, density=1000.0)
+        arm = scene.add_rod(start=(0, 0, 0), end=(0.1, 0, 0), nodes=5, section=section, material=rubber)
+        scene.clamp(arm.start)
+        if floor:
+            scene.add_plane(point=(0, 0, -1.0), normal=(0, 0, 1))
+            scene.enable_contact()
+        simulation = scene.build(integrator="static", planar=False)
+        return simulation.equilibrium().gradient(np.ones((5, 3)), [(arm, "radius")])
+
+    with pytest.raises(ValueError, match=r"no withe\.Circle"):
+        gradient(withe.Rectangle(0.01, 0.02), floor=False)
+    with pytest.raises(ValueError, match=r"no withe\.Circle"):
+        gradient(withe.Tube(0.02, 0.01), floor=False)
+    with pytest.raises(ValueError, match="surfaces would move"):
+        gradient(withe.Circle(0.01), floor=True)

@@ -273,6 +273,15 @@ def test_a_full_disk_leaves_the_file_that_was_there(record, tmp_path, monkeypatc
     assert list(tmp_path.iterdir()) == [path]
 
 
+def test_a_file_does_not_take_the_place_of_a_device_or_a_pipe(record, tmp_path):
+    pipe = tmp_path / "pipe.npz"
+    os.mkfifo(pipe)
+    with pytest.raises(OSError, match=r"device or a pipe; give another path than.*pipe.npz"):
+        record.save(pipe)
+    assert pipe.is_fifo()
+    assert list(tmp_path.iterdir()) == [pipe]
+
+
 def test_a_file_name_may_be_as_long_as_the_system_allows(record, tmp_path):
     path = record.save(tmp_path / ("n" * 251 + ".npz"))
     np.testing.assert_array_equal(Record.load(path).times, record.times)

@@ -263,3 +263,80 @@ def test_a_pressure_is_a_number_and_needs_a_normal_on_an_open_rod():
     assert simulation.positions(arm)[-1, 2] < -0.001
     with pytest.raises(ValueError, match="must be a number"):
         simulation.set(wind, pressure=(0, 0, 1))
+
+
+@pytest.mark.parametrize("planar", [True, False])
+def test_a_load_edge_by_edge_bends_as_beams_do(planar):
+    """A load that grows from nothing at a wall to w at the end bends by 11 w L^4 / (120 EI) there [Roark]."""
+    scene = withe.Scene(gravity=(0, 0, 0))
+    material = withe.Material(youngs_modulus=1e6, poisson_ratio=0.5, density=1000.0)
+    arm = scene.add_rod(start=(0, 0, 0), end=(0.2, 0, 0), nodes=81, radius=4e-3, material=material)
+    scene.clamp(arm.start)
+    middles = (np.arange(80) + 0.5) / 80
+    load = scene.add_load(arm, 1e-4 * np.outer(middles, (0, 0, 1)))
+    simulation = scene.build(integrator="static", planar=planar)
+    simulation.equilibrium()
+    stiffness = simulation.get(arm, "bend_stiffness")[0, 0]
+    assert simulation.positions(arm)[-1, 2] == pytest.approx(11 * 1e-4 * 0.2**4 / (120 * stiffness), rel=1e-4)
+    assert simulation.reaction(arm.start).force[2] == pytest.approx(-0.5e-4 * 0.2, rel=1e-9)
+    assert np.array_equal(simulation.get(load, "load")[:, 2], 1e-4 * middles)
+    simulation.set(load, load=(0, 0, 1e-4))  # of every edge
+    simulation.equilibrium()
+    assert simulation.positions(arm)[-1, 2] == pytest.approx(1e-4 * 0.2**4 / (8 * stiffness), rel=1e-4)
+
+
+def test_pressure_edge_by_edge_balances_what_hangs_in_a_ring():
+    """Water in a pipe: pressure that falls with height lifts by the weight of what the ring surrounds."""
+    angle = np.linspace(0, 2 * np.pi, 65)[:-1]
+    ring = 0.1 * np.stack([np.cos(angle), 0 * angle, np.sin(angle)], 1)
+    middles = 0.5 * (ring + np.roll(ring, -1, 0))
+    scene = withe.Scene(gravity=(0, 0, 0))
+    steel = withe.Material(youngs_modulus=2e11, poisson_ratio=0.3, density=7800.0)
+    rod = scene.add_rod(points=ring, closed=True, radius=4e-3, material=steel)
+    scene.clamp(rod.node(0))
+    water = scene.add_pressure(rod, 0.5 - 2.0 * middles[:, 2])
+    simulation = scene.build(integrator="static")
+    simulation.equilibrium()
+    x, z = ring[:, 0], ring[:, 2]
+    area = 0.5 * abs(np.sum(x * np.roll(z, -1) - z * np.roll(x, -1)))
+    assert simulation.reaction(rod.node(0)).force == pytest.approx(
+        (0, 0, -2.0 * area), abs=2e-5 * area
+    )  # steel gives by as much
+    assert np.array_equal(simulation.get(water, "pressure"), 0.5 - 2.0 * middles[:, 2])
+
+
+def test_loads_edge_by_edge_are_set_kept_and_refused_by_their_size(tmp_path):
+    scene, arm, _ = cantilever()
+    edges = len(arm.radii)
+    even, rows = scene.add_load(arm, (0, 0, 0.1)), np.outer(np.linspace(0, 1, edges), (0.0, 0.0, 0.2))
+    spread = scene.add_load(arm, lambda t: (1 + t) * rows)
+    with pytest.raises(ValueError, match=r"must have shape \(3,\) or \(\d+, 3\)"):
+        scene.add_load(arm, rows[1:])
+    simulation = scene.build()
+    simulation.add_load(arm, 2 * rows, name="gust")
+    simulation.step(3)
+    simulation.set(spread, load=-rows)
+    with pytest.raises(ValueError, match=r"must have shape \(3,\)"):
+        simulation.set(even, load=rows)
+    state = simulation.snapshot()
+    state.save(tmp_path / "s.npz")
+    simulation.step(5)
+    after = simulation.positions()
+    simulation.remove("gust")
+    simulation.restore(withe.Snapshot.load(tmp_path / "s.npz"))
+    assert np.array_equal(simulation.get("gust", "load"), 2 * rows)
+    assert np.array_equal(simulation.get(spread, "load"), -rows)
+    simulation.step(5)
+    assert np.array_equal(simulation.positions(), after)
+    copy = simulation.copy()
+    copy.step(2)
+    simulation.step(2)
+    assert np.array_equal(copy.positions(), simulation.positions())
+
+
+def test_pressure_that_varies_may_stay_in_its_plane():
+    scene, arm, _ = cantilever()
+    scene.add_pressure(arm, lambda t: 0.1 * t, normal=(0, 1, 0))
+    simulation = scene.build(planar=True)
+    simulation.step(3)
+    assert np.isfinite(simulation.positions()).all()

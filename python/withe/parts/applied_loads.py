@@ -14,7 +14,7 @@ from withe.parts.directory import Directory
 from withe.parts.handles import Load, NodeHandle, Rod
 from withe.parts.kinds import LoadKind, LoadPart, Pass, RodPart
 
-__all__ = ["AppliedLoads", "Bearer", "load_vector"]
+__all__ = ["AppliedLoads", "Bearer", "load_values"]
 
 FloatArray = npt.NDArray[np.float64]
 Value = npt.ArrayLike | Callable[[float], npt.ArrayLike]
@@ -85,12 +85,13 @@ class AppliedLoads(ABC):
         return _put_at_node(self._bearer, "moment", node, moment, follower, name)
 
     def add_load(self, rod: Rod | str, load: Value, *, follower: bool = False, name: str | None = None) -> Load:
-        """Add a force spread evenly along a rod.
+        """Add a force spread along a rod, evenly or edge by edge.
 
         Parameters
         ----------
         rod : Rod or str
-        load : array_like of shape (3,) [N/m], or a function of time [s] that returns it
+        load : array_like of shape (3,) or (edges, 3) [N/m], or a function of time [s] that returns it
+            Per length of the drawn rod, in world axes. One row an edge spreads each of them over its edge.
         follower : bool
             Whether it turns with the edges.
         name : str
@@ -99,13 +100,14 @@ class AppliedLoads(ABC):
         -------
         Load
         """
-        place = self._bearer.directory.rod(rod, "rod of the load").index, 0
-        return _put(self._bearer, "load", place, load, validation.truth(follower, "follower"), name)
+        part = self._bearer.directory.rod(rod, "rod of the load")
+        follows = validation.truth(follower, "follower")
+        return _put(self._bearer, "load", (part.index, 0), load, follows, name, edges=len(part.lengths))
 
     def add_pressure(
         self,
         rod: Rod | str,
-        pressure: float | Callable[[float], float],
+        pressure: npt.ArrayLike | Callable[[float], npt.ArrayLike],
         *,
         normal: npt.ArrayLike | None = None,
         name: str | None = None,
@@ -118,8 +120,8 @@ class AppliedLoads(ABC):
         Parameters
         ----------
         rod : Rod or str
-        pressure : float [N/m], or a function of time [s] that returns it
-            Force per length. Positive pushes into a closed rod.
+        pressure : float or array_like of shape (edges,) [N/m], or a function of time [s] that returns it
+            Force per length, of all edges or of each. Positive pushes into a closed rod.
         normal : array_like of shape (3,)
             Normal of the plane in which it pushes, which stays; the push is to the left along the rod as seen
             from its tip. By default that about which a closed rod goes round counter-clockwise, as drawn.
@@ -139,7 +141,7 @@ class AppliedLoads(ABC):
             axis = _area_normal(part)
         else:
             axis = validation.unit_vector(normal, f"normal of the pressure on {part.owner}")
-        return _put(self._bearer, "pressure", (part.index, 0), pressure, False, name, axis)
+        return _put(self._bearer, "pressure", (part.index, 0), pressure, False, name, axis, len(part.lengths))
 
 
 def _put_at_node(
@@ -157,20 +159,23 @@ def _put(
     follower: bool,
     name: str | None,
     axis: FloatArray | None = None,
+    edges: int | None = None,
 ) -> Load:
     name = bearer.directory.new_name(name, kind)
     function = value if callable(value) else None
     now = bearer.time
     what = f"{kind} {name!r}" + (f" at t = {now:g}" if function else "")
-    first = load_vector(value(now) if callable(value) else value, axis, what)
+    first = load_values(value(now) if callable(value) else value, axis, edges, what)
     return bearer.take(LoadPart(name, kind, node, first, function, follower, axis))
 
 
-def load_vector(value: npt.ArrayLike, axis: FloatArray | None, what: str) -> FloatArray:
-    """A load as three numbers: a pressure is along its normal."""
+def load_values(value: npt.ArrayLike, axis: FloatArray | None, edges: int | None, what: str) -> FloatArray:
+    """A load as three numbers, or, along a rod of so many edges, three an edge; a pressure is along its normal."""
     if axis is None:
-        return validation.vector(value, what)
-    return validation.number(value, what) * axis
+        return validation.number_array(value, what, *([(3,)] if edges is None else [(3,), (edges, 3)]))
+    if edges is None or validation.is_scalar(value):
+        return validation.number(value, what) * axis
+    return validation.number_array(value, what, (edges,))[:, None] * axis
 
 
 def _area_normal(part: RodPart) -> FloatArray:

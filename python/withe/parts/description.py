@@ -179,7 +179,7 @@ def describe_load(part: LoadPart) -> _core.LoadDescription:
     load = _core.LoadDescription()
     load.kind = "distributed" if part.kind == "load" else part.kind
     load.pass_ = _core.RodPass(*part.node)
-    load.value = part.value
+    load.values = np.atleast_2d(part.value)
     load.follower = part.follower
     load.varies = part.function is not None
     return load

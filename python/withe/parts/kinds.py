@@ -131,7 +131,7 @@ class LoadPart:
     name: str
     kind: LoadKind
     node: Pass
-    value: FloatArray  # (3,), the value at t = 0 of one that varies
+    value: FloatArray  # (3,), or (edges, 3) along a rod; of one that varies that at t = 0
     function: Callable[[float], npt.ArrayLike] | None
     follower: bool
     axis: FloatArray | None = None  # of a pressure: unit normal that its value is along

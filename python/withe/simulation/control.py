@@ -122,8 +122,9 @@ class Control:
         -------
         float or ndarray
             Stiffnesses and what else belongs to edges one an edge, (edges,); natural curvature
-            (stencils, 2) and twist (stencils,); loads (3,); positions (3,) [m], rotations (3, 3) and turns (3,) [rad]
-            from what was drawn. What belongs to a material as it was set.
+            (stencils, 2) and twist (stencils,); loads (3,), or (edges, 3)
+            where they were so put on; positions (3,) [m], rotations (3, 3) and turns (3,) [rad] from
+            what was drawn. What belongs to a material as it was set.
 
         Raises
         ------

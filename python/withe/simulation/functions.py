@@ -7,10 +7,10 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
-from withe.parts.applied_loads import load_vector
 from withe.parts.handles import CustomForce
 from withe.parts.kinds import CustomForcePart, RodPart
 from withe.simulation.custom_forces import CustomForces
+from withe.simulation.loads import new_values
 from withe.simulation.motion import Path, Turn, evaluate_path
 from withe.simulation.obstacles import find_obstacle, obstacle_pose
 from withe.simulation.session import Session
@@ -36,8 +36,8 @@ def apply_functions(session: Session, force_time: float, end_time: float) -> Non
             function = session.settings.functions.get(part.name)
             if function is not None:
                 what = f"{part.kind} {part.name!r} at t = {force_time:g}"
-                value = load_vector(function(force_time), part.axis, what)
-                _check_in_plane(session, value, what, along_normal=part.kind == "moment")
+                value = new_values(session, part, function(force_time), what)
+                _check_in_plane(session, value, what, along_normal=part.kind in ("moment", "pressure"))
                 session.world.set_load(index, value)
     for name, path in session.settings.paths.items():
         if name not in session.settings.supports and (obstacle := find_obstacle(session.directory, name)) is not None:

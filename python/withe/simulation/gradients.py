@@ -12,10 +12,10 @@ import numpy.typing as npt
 from withe import _core
 from withe.common import validation
 from withe.parts.handles import Drag, Load, Mass, NodeHandle, Rod, Spring, Support
-from withe.parts.kinds import DragPart, LoadPart, MassPart, RodPart, SpringPart, SupportPart
+from withe.parts.kinds import DragPart, LoadPart, MassPart, ObstaclePart, RodPart, SpringPart, SupportPart
 from withe.parts.parameters import ACTING_WORDS, ROD_WORDS, RodParameters
 from withe.parts.springs import SPRING_WORDS
-from withe.simulation.loads import load_index
+from withe.simulation.loads import load_rows
 from withe.simulation.session import Session
 
 __all__ = [
@@ -25,6 +25,7 @@ __all__ = [
     "equilibrium_gradients",
     "equilibrium_jacobian",
     "positions_adjoint",
+    "unknown_readers",
 ]
 
 FloatArray = npt.NDArray[np.float64]
@@ -49,7 +50,7 @@ def equilibrium_gradients(
 
     The stiffness is factorised once for all of them.
     """
-    readers = _readers(session, wrt)
+    readers = unknown_readers(session, wrt)
     found = session.world.equilibrium_gradients(list(by_positions))
     return [[read(gradient) for gradient in found] for read in readers]
 
@@ -107,7 +108,7 @@ class RunDerivatives:
         """See `Record.gradient`."""
         if not isinstance(by, Mapping) or not by or not set(by) <= set(_READOUTS):
             raise ValueError(f"what a gradient is of must be derivatives by {' and '.join(_READOUTS)}, got {by!r}")
-        readers = _readers(self._session, wrt)
+        readers = unknown_readers(self._session, wrt)
         nodes, frames = self._session.directory.layout.node_count, len(self._steps)
         none = np.empty((0, 3))
         arrays = {name: validation.number_array(value, name, (frames, nodes, 3)) for name, value in by.items()}
@@ -133,7 +134,8 @@ def _axes(session: Session) -> FloatArray:
     return np.stack([first, np.cross(normal, first)])
 
 
-def _readers(session: Session, wrt: Sequence[Unknown]) -> list[Callable[[Any], Any]]:
+def unknown_readers(session: Session, wrt: Sequence[Unknown]) -> list[Callable[[Any], Any]]:
+    """For each of `wrt` what reads its derivative, shaped like `get`, from what the engine finds."""
     if isinstance(wrt, str) or not isinstance(wrt, Sequence) or not wrt:
         raise ValueError('wrt must be a list of what to differentiate by, such as [(arm, "youngs_modulus"), "gravity"]')
     return [_reader(session, unknown) for unknown in wrt]
@@ -151,10 +153,12 @@ def _reader(session: Session, unknown: Unknown) -> Callable[[Any], Any]:
     if isinstance(part, RodPart):
         return _rod_reader(session, part, word)
     if isinstance(part, LoadPart) and word == part.kind:
-        index, axis = load_index(session, part), part.axis
+        rows, axis, shape = load_rows(session, part), part.axis, part.value.shape
         if part.name in session.settings.functions:
             raise ValueError(f"{part.name!r} is a function of time: no gradient by its one value")
-        return lambda g: g.parameters.loads[index].copy() if axis is None else float(g.parameters.loads[index] @ axis)
+        if axis is None:
+            return lambda g: g.parameters.loads[rows].reshape(shape)
+        return lambda g: (g.parameters.loads[rows].reshape(shape) @ axis)[()]
     if isinstance(part, MassPart) and word == "mass":
         row = session.directory.row(part.node)
         return lambda g: float(g.parameters.added_mass[row])
@@ -212,14 +216,15 @@ def _edges(session: Session, rod: int) -> tuple[int, int]:
 def _rod_reader(session: Session, part: RodPart, word: str) -> Callable[[Any], Any]:
     if word in _NATURAL_WORDS:
         return lambda g: np.array(getattr(g.parameters, word)[part.index])
-    if word not in ROD_WORDS:
-        raise ValueError(
-            f"{part.name!r} has no {word!r} to differentiate by; it has {', '.join((*ROD_WORDS, *_NATURAL_WORDS))}"
-        )
+    if word not in (*ROD_WORDS, "radius"):
+        words = ", ".join((*ROD_WORDS, *_NATURAL_WORDS, "radius"))
+        raise ValueError(f"{part.name!r} has no {word!r} to differentiate by; it has {words}")
     first, last = _edges(session, part.index)
     parameters = session.settings.rods[part.index]
-    slopes = _slopes(parameters, word)
-    scalar = np.ndim(parameters.get(word)) == 0
+    if word == "radius":
+        slopes, scalar = _radius_slopes(session, part, parameters), False
+    else:
+        slopes, scalar = _slopes(parameters, word), np.ndim(parameters.get(word)) == 0
 
     def read(gradient: Any) -> Any:
         parts = [np.asarray(getattr(gradient.parameters, name))[first:last] * slope for name, slope in slopes.items()]
@@ -253,3 +258,26 @@ def _slopes(parameters: RodParameters, word: str) -> dict[str, FloatArray]:
     if word == "density":
         return {"line_density": p.line_density / p.density, "rotary_inertia": p.rotary_inertia / p.density}
     return {"viscous_time": 1.0 / modulus}
+
+
+def _radius_slopes(session: Session, part: RodPart, parameters: RodParameters) -> dict[str, FloatArray]:
+    """Derivatives of what the engine works with by the radius of each edge.
+
+    A = pi r^2, I = pi r^4 / 4, J = 2 I. Stiffness and line density that were given directly do not depend on it; rotary
+    inertia does.
+    """
+    section, p = part.section, parameters
+    if section.widths is not None or not np.allclose(section.area, np.pi * section.radii**2, rtol=1e-12):
+        raise ValueError(f"no gradient by radius: the section of {part.owner} is no withe.Circle")
+    if session.world.contact.rods or session.directory.all(ObstaclePart):
+        raise ValueError(
+            f"no gradient by radius of {part.owner} where rods or obstacles touch: their surfaces would move with it"
+        )
+    per_radius = 1.0 / section.radii
+    if p.youngs_modulus is None:
+        return {"rotary_inertia": 2.0 * p.rotary_inertia * per_radius}
+    powers = {"stretch_stiffness": 2, "bend_stiffness": 4, "twist_stiffness": 4, "line_density": 2, "rotary_inertia": 4}
+    return {
+        name: power * (getattr(p, name).T * per_radius).T  # bending has a column a director
+        for name, power in powers.items()
+    }

@@ -4,14 +4,19 @@ from __future__ import annotations
 
 from typing import Any, cast
 
-from withe.parts.applied_loads import load_vector
+import numpy as np
+import numpy.typing as npt
+
+from withe.parts.applied_loads import load_values
 from withe.parts.description import describe_load
 from withe.parts.directory import Directory
 from withe.parts.handles import Load
 from withe.parts.kinds import LoadPart
 from withe.simulation.session import Session
 
-__all__ = ["RunningLoads", "load_index", "remove_load", "set_load"]
+__all__ = ["RunningLoads", "load_index", "load_rows", "new_values", "remove_load", "set_load"]
+
+FloatArray = npt.NDArray[np.float64]
 
 
 class RunningLoads:
@@ -44,6 +49,25 @@ def load_index(session: Session, part: LoadPart) -> int:
     return session.loads.index(part)
 
 
+def load_rows(session: Session, part: LoadPart) -> slice:
+    """Its rows among those of all loads."""
+    first = sum(len(np.atleast_2d(other.value)) for other in session.loads[: load_index(session, part)])
+    return slice(first, first + len(np.atleast_2d(part.value)))
+
+
+def new_values(session: Session, part: LoadPart, value: npt.ArrayLike, what: str) -> FloatArray:
+    """A value for a load, with as many rows as it was put on with.
+
+    Raises
+    ------
+    ValueError
+        One of another shape, or one row an edge where it was put on with one for all.
+    """
+    rows = len(np.atleast_2d(part.value)) if part.value.ndim == 2 else None
+    values = load_values(value, part.axis, rows, what)
+    return np.broadcast_to(values, part.value.shape if rows else values.shape).reshape(-1, 3)
+
+
 def remove_load(session: Session, load: Load | str) -> None:
     """Take a load off; see `Simulation.remove`."""
     part = session.directory.find(load, LoadPart, "load")
@@ -61,7 +85,7 @@ def set_load(session: Session, part: LoadPart, value: Any) -> None:
     """Change a load that acts, to a constant or a function of time."""
     what = f"{part.kind} {part.name!r}"
     function = value if callable(value) else None
-    now = load_vector(value(session.world.time) if callable(value) else value, part.axis, what)
+    now = new_values(session, part, value(session.world.time) if callable(value) else value, what)
     session.world.set_load(load_index(session, part), now)
     if function is None:
         session.settings.functions.pop(part.name, None)

@@ -99,8 +99,11 @@ def get_value(session: Session, target: Settable | Support | str, word: str | No
         if word == "radius":
             return part.section.radii.copy()
     elif isinstance(part, LoadPart) and word == part.kind:
-        value = np.array(session.world.load(load_index(session, part)))
-        return value if part.axis is None else float(value @ part.axis)
+        value = np.array(session.world.load(load_index(session, part))).reshape(part.value.shape)
+        if part.axis is None:
+            return value
+        along = value @ part.axis
+        return along if along.ndim else float(along)
     elif isinstance(part, MassPart) and word == "mass":
         return session.settings.masses[part.name]
     elif isinstance(part, SpringPart) and word in SPRING_WORDS:

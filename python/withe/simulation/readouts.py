@@ -138,8 +138,9 @@ class Equilibrium:
             Derivative of L by the positions of all nodes of the scene, as `Simulation.positions()` has them.
         wrt : sequence
             Pairs of a part and a word of `Simulation.get`: of a rod natural_curvature, natural_twist, youngs_modulus,
-            poisson_ratio, density, bend_stiffness and so on; of a load its value; of a mass "mass"; of a support
-            "position" [m] and "rotation" (a rotation vector [rad], about where it is). Or "gravity".
+            poisson_ratio, density, bend_stiffness and so on, and "radius" [m] of a withe.Circle, one an edge, as if the
+            scene were built anew; of a load its value; of a mass "mass"; of a support "position" [m] and "rotation" (a
+            rotation vector [rad], about where it is). Or "gravity".
 
         Returns
         -------

@@ -170,7 +170,7 @@ class Snapshot:
                 name,
                 kind,  # type: ignore[arg-type]
                 (rod, node),
-                validation.vector(arrays[f"load_{number}_value"], "value"),
+                validation.number_array(arrays[f"load_{number}_value"], "value", (3,), ("edges", 3)),
                 None,
                 validation.truth(entry["follower"], "follower"),
                 None if axis is None else validation.unit_vector(axis, "axis"),

@@ -426,8 +426,12 @@ def nice_limits(low: float, high: float) -> tuple[float, float, int, str]:
         if last - first <= (4 if even else 5):
             break
     decimals = next((d for d in range(5) if abs(round(step, d) - step) < 1e-6 * step), None)
-    plain = decimals is not None and max(abs(first), abs(last)) * step < 1e5
-    return float(first * step), float(last * step), int(last - first) + 1, f"%.{decimals}f" if plain else "%.3g"
+    greatest = max(abs(first), abs(last)) * step
+    plain = decimals is not None and greatest < 1e5
+    # From the first digit of the greatest label to the last of a step, which has two where it begins with 2.5.
+    significant = max(3, int(np.floor(np.log10(greatest) + 1e-9) - np.floor(np.log10(step) + 1e-9)) + 2)
+    form = f"%.{decimals}f" if plain else f"%.{significant}g"
+    return float(first * step), float(last * step), int(last - first) + 1, form
 
 
 def _empty_mesh(pyvista: Any, surface: Surface) -> Any:
