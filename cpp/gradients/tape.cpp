@@ -12,6 +12,8 @@
 namespace withe {
 namespace {
 
+constexpr double kRounding = 1e-12;  // by which supports that rest move, of the scene's length; angles likewise
+
 MatrixX3 at_nodes(const Model& model, const VectorX& by) {
   MatrixX3 out(model.node_count, 3);
   for (int i = 0; i < model.node_count; ++i) {
@@ -58,10 +60,24 @@ class Tape::Player {
     VectorX v = (rate / step.duration) * (step.end - state.q) - (rate - 1.0) * state.v;
     if (step.rule == StepRule::energy_momentum)
       set_turning_velocities(model_, state.v, step.end - state.q, step.duration, v);
-    gradient(step.rule).equations().assembler().project(v);
+    const Assembler& assembler = gradient(step.rule).equations().assembler();
+    assembler.project(v);
+    if (const VectorX* held = held_velocity(step)) assembler.add_held_part(*held, 1.0, v);
     if (!model_.planar()) compute_configuration(model_, state, step.end, configuration_);
     accept_configuration(model_, step.end, configuration_, state);
     state.v = v;
+  }
+
+  /// Per unknown, meaningful where held; nothing where supports rest.
+  const VectorX* held_velocity(const Step& step) {
+    if (step.held.size() == 0) return nullptr;
+    held_.setZero(model_.dof_count);
+    Eigen::Index next = 0;
+    for (const Constraint& c : model_.constraints) {
+      held_.segment(c.first, c.size) = step.held.segment(next, c.size);
+      next += c.size;
+    }
+    return &held_;
   }
 
  private:
@@ -69,6 +85,7 @@ class Tape::Player {
   const Model& model_;
   std::array<std::unique_ptr<StepGradient>, 5> gradients_;
   Configuration configuration_;
+  VectorX held_;
 };
 
 Tape::Tape(const Model& model, EquationOptions options, State first, Parameters parameters)
@@ -80,9 +97,24 @@ Tape::Tape(const Model& model, EquationOptions options, State first, Parameters 
       last_velocity_(first_.v) {}
 
 void Tape::record(StepRule rule, double duration, const VectorX& end, const State& after) {
-  steps_.push_back({rule, duration, end});
+  steps_.push_back({rule, duration, end, held_velocities(after.v)});
+  const VectorX before = held_velocities(last_velocity_);
+  const double moved = steps_.back().held.norm() + before.norm();
+  if (moved * std::abs(duration) <= kRounding * std::max(model_.length_scale, 1.0)) steps_.back().held.resize(0);
   last_ = after.q;
   last_velocity_ = after.v;
+}
+
+VectorX Tape::held_velocities(const VectorX& v) const {
+  Eigen::Index count = 0;
+  for (const Constraint& c : model_.constraints) count += c.size;
+  VectorX out(count);
+  count = 0;
+  for (const Constraint& c : model_.constraints) {
+    out.segment(count, c.size) = c.held(v).head(c.size);
+    count += c.size;
+  }
+  return out;
 }
 
 void Tape::cut(long count, const State& after) {
@@ -127,7 +159,7 @@ void Tape::walk_back(const std::function<void(std::size_t, StepGradient&)>& visi
     }
     const Step& step = steps_[k];
     StepGradient& gradient = player.gradient(step.rule);
-    gradient.begin({states[k - first], parameters_, step.rule, step.duration, step.end});
+    gradient.begin({states[k - first], parameters_, step.rule, step.duration, step.end, player.held_velocity(step)});
     visit(k, gradient);
   }
 }

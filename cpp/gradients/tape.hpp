@@ -44,7 +44,7 @@ class Tape {
   Tape(const Model& model, EquationOptions options, State first, Parameters parameters);
 
   long count() const { return static_cast<long>(steps_.size()); }
-  /// Notes a step to q1 that has been accepted.
+  /// Notes a step to q1 that has been accepted, at whose end the state is `after`.
   void record(StepRule rule, double duration, const VectorX& end, const State& after);
   /// Forgets all but so many.
   void cut(long count, const State& after);
@@ -63,8 +63,10 @@ class Tape {
     StepRule rule;
     double duration;
     VectorX end;
+    VectorX held;  ///< velocities at its end of what supports hold, one after the other; none: they rest, as before it
   };
   class Player;
+  VectorX held_velocities(const VectorX& v) const;
 
   void check_known() const;
   /// Goes back through the steps: `visit(k, gradient)` with that of step k, begun.
