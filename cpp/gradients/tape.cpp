@@ -66,6 +66,7 @@ class Tape::Player {
     if (!model_.planar()) compute_configuration(model_, state, step.end, configuration_);
     accept_configuration(model_, step.end, configuration_, state);
     state.v = v;
+    state.contacts = step.contacts;
   }
 
   /// Per unknown, meaningful where held; nothing where supports rest.
@@ -97,12 +98,31 @@ Tape::Tape(const Model& model, EquationOptions options, State first, Parameters 
       last_velocity_(first_.v) {}
 
 void Tape::record(StepRule rule, double duration, const VectorX& end, const State& after) {
-  steps_.push_back({rule, duration, end, held_velocities(after.v)});
+  steps_.push_back({rule, duration, end, held_velocities(after.v), after.contacts});
+  check_contacts(after);
   const VectorX before = held_velocities(last_velocity_);
   const double moved = steps_.back().held.norm() + before.norm();
   if (moved * std::abs(duration) <= kRounding * std::max(model_.length_scale, 1.0)) steps_.back().held.resize(0);
   last_ = after.q;
   last_velocity_ = after.v;
+}
+
+/// Contact is known as a function of where a step ends alone.
+void Tape::check_contacts(const State& after) {
+  const ContactDescription& contact = model_.description.contact;
+  const auto given = [&](const ContactRecord& record) {
+    if (record.stiffness == contact.stiffness) return true;
+    return std::any_of(contact.pairs.begin(), contact.pairs.end(),
+                       [&](const ContactPairDescription& pair) { return pair.stiffness == record.stiffness; });
+  };
+  if (!std::all_of(after.contacts.begin(), after.contacts.end(), given))
+    refuse("its contacts took a stiffness of their own; give enable_contact(stiffness=), great enough");
+  const auto moved = [](const ObstaclePlace& a, const ObstaclePlace& b) {
+    const auto apart = [](const Vec3d& from, const Vec3d& to) { return dot(to - from, to - from) > 0.0; };
+    return apart(a.point, b.point) || apart(a.other, b.other) || apart(a.turn, b.turn);
+  };
+  for (std::size_t o = 0; o < after.obstacles.size() && o < first_.obstacles.size(); ++o)
+    if (moved(first_.obstacles[o], after.obstacles[o])) refuse("an obstacle moved");
 }
 
 VectorX Tape::held_velocities(const VectorX& v) const {

@@ -64,8 +64,10 @@ class Tape {
     double duration;
     VectorX end;
     VectorX held;  ///< velocities at its end of what supports hold, one after the other; none: they rest, as before it
+    std::vector<ContactRecord> contacts;  ///< at its end
   };
   class Player;
+  void check_contacts(const State& after);
   VectorX held_velocities(const VectorX& v) const;
 
   void check_known() const;

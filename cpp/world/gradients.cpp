@@ -85,8 +85,17 @@ std::shared_ptr<Tape> World::start_tape() {
     self.tape->refuse("integrator '" +
                       std::string(self.options.integrator == Integrator::verlet ? "verlet" : "static") +
                       "' has none; take any other");
-  if (self.description.contact.any())
-    self.tape->refuse("contact takes part in it; equilibria with contact have a gradient");
+  if (const Contact* contact = self.equations->contact()) {
+    const ContactDescription& given = self.description.contact;
+    const auto loses = [](double restitution) { return restitution >= 0.0 && restitution < 1.0; };
+    if (self.options.integrator != Integrator::backward_euler)
+      self.tape->refuse("contact takes part in it; take integrator='backward_euler'");
+    else if (contact->frictional())
+      self.tape->refuse("friction takes part in it; take friction=0");
+    else if (loses(given.restitution) || (given.obstacle_restitution.array() < 1.0).any() ||
+             std::any_of(given.pairs.begin(), given.pairs.end(), [&](const auto& p) { return loses(p.restitution); }))
+      self.tape->refuse("impacts lose energy by their restitution; take restitution=1");
+  }
   return self.tape;
 }
 
@@ -120,8 +129,6 @@ void World::Implementation::check_tape() {
     tape->refuse("numbers, loads or the state were changed while it ran, or change with time; begin another run there");
 }
 
-void World::Implementation::record_step(StepRule rule, double dt) {
-  tape->record(rule, dt, work.move, state);
-}
+void World::Implementation::record_step(StepRule rule, double dt) { tape->record(rule, dt, work.move, state); }
 
 }  // namespace withe

@@ -107,7 +107,7 @@ def test_a_shaft_turns_in_a_bearing_without_a_motion_of_its_line(nodes, while_ru
 @pytest.mark.parametrize("integrator", ["implicit_midpoint", "energy_momentum"])
 @pytest.mark.parametrize("planar", [True, False])
 def test_reactions_of_a_held_edge_do_the_work_that_is_booked(integrator, planar):
-    """Its moment is about the node in the middle of a step: over 2 tan of half the turn it does the work of the step."""
+    """Its moment is about the node in the middle of a step: times 2 tan of half the turn it is the work of the step."""
     along = np.linspace(0, 0.3, 21)
     apart = []
     for step in (4e-3, 2e-3):
