@@ -116,7 +116,7 @@ def draw(held: Balanced, fallen: Balanced, path: Path) -> None:
         for k in shown:
             axis.plot(100.0 * x[k, :, 0], 100.0 * x[k, :, 2], color=color, alpha=0.25, linewidth=3)
         axis.plot(100.0 * x[-1, :, 0], 100.0 * x[-1, :, 2], color=color, linewidth=5, solid_capstyle="round")
-        axis.axhline(0.0, color="#8a9299")
+        axis.plot((-2.0, 2.0), (0.0, 0.0), color="#8a9299", linewidth=4)  # its foot is clamped; there is no floor
         axis.set(title=title, xlabel="cm", aspect="equal", xlim=(-16, 24), ylim=(-20, 28))
     times = held.record.times
     axes[2].axvspan(*PUSHED, color="#e3e7ea", label="push")
