@@ -97,32 +97,13 @@ Tape::Tape(const Model& model, EquationOptions options, State first, Parameters 
       last_(first_.q),
       last_velocity_(first_.v) {}
 
-void Tape::record(StepRule rule, double duration, const VectorX& end, const State& after) {
-  steps_.push_back({rule, duration, end, held_velocities(after.v), after.contacts});
-  check_contacts(after);
+void Tape::record(StepRule rule, double duration, const VectorX& end, const State& after, const char* unknown) {
+  steps_.push_back({rule, duration, end, held_velocities(after.v), after.contacts, unknown});
   const VectorX before = held_velocities(last_velocity_);
   const double moved = steps_.back().held.norm() + before.norm();
   if (moved * std::abs(duration) <= kRounding * std::max(model_.length_scale, 1.0)) steps_.back().held.resize(0);
   last_ = after.q;
   last_velocity_ = after.v;
-}
-
-/// Contact is known as a function of where a step ends alone.
-void Tape::check_contacts(const State& after) {
-  const ContactDescription& contact = model_.description.contact;
-  const auto given = [&](const ContactRecord& record) {
-    if (record.stiffness == contact.stiffness) return true;
-    return std::any_of(contact.pairs.begin(), contact.pairs.end(),
-                       [&](const ContactPairDescription& pair) { return pair.stiffness == record.stiffness; });
-  };
-  if (!std::all_of(after.contacts.begin(), after.contacts.end(), given))
-    refuse("its contacts took a stiffness of their own; give enable_contact(stiffness=), great enough");
-  const auto moved = [](const ObstaclePlace& a, const ObstaclePlace& b) {
-    const auto apart = [](const Vec3d& from, const Vec3d& to) { return dot(to - from, to - from) > 0.0; };
-    return apart(a.point, b.point) || apart(a.other, b.other) || apart(a.turn, b.turn);
-  };
-  for (std::size_t o = 0; o < after.obstacles.size() && o < first_.obstacles.size(); ++o)
-    if (moved(first_.obstacles[o], after.obstacles[o])) refuse("an obstacle moved");
 }
 
 VectorX Tape::held_velocities(const VectorX& v) const {
@@ -155,7 +136,10 @@ bool Tape::continues(const State& state, const Parameters& parameters) const {
 }
 
 void Tape::check_known() const {
-  if (!refused_.empty()) throw std::invalid_argument("no gradient is known of this run: " + refused_);
+  std::string why = refused_;
+  for (const Step& step : steps_)
+    if (why.empty() && step.unknown) why = step.unknown;
+  if (!why.empty()) throw std::invalid_argument("no gradient is known of this run: " + why);
 }
 
 void Tape::walk_back(const std::function<void(std::size_t, StepGradient&)>& visit) const {

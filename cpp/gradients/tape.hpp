@@ -44,8 +44,9 @@ class Tape {
   Tape(const Model& model, EquationOptions options, State first, Parameters parameters);
 
   long count() const { return static_cast<long>(steps_.size()); }
-  /// Notes a step to q1 that has been accepted, at whose end the state is `after`.
-  void record(StepRule rule, double duration, const VectorX& end, const State& after);
+  /// Notes a step to q1 that has been accepted, at whose end the state is `after`; `unknown`: why no gradient goes
+  /// through it, unless it is cut off again.
+  void record(StepRule rule, double duration, const VectorX& end, const State& after, const char* unknown = nullptr);
   /// Forgets all but so many.
   void cut(long count, const State& after);
   /// Says why no gradient goes through this run; the first reason stays.
@@ -65,9 +66,9 @@ class Tape {
     VectorX end;
     VectorX held;  ///< velocities at its end of what supports hold, one after the other; none: they rest, as before it
     std::vector<ContactRecord> contacts;  ///< at its end
+    const char* unknown;                  ///< why no gradient goes through it, if so
   };
   class Player;
-  void check_contacts(const State& after);
   VectorX held_velocities(const VectorX& v) const;
 
   void check_known() const;

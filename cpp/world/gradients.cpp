@@ -129,6 +129,16 @@ void World::Implementation::check_tape() {
     tape->refuse("numbers, loads or the state were changed while it ran, or change with time; begin another run there");
 }
 
-void World::Implementation::record_step(StepRule rule, double dt) { tape->record(rule, dt, work.move, state); }
+void World::Implementation::record_step(StepRule rule, double dt) {
+  const char* unknown = nullptr;
+  if (const Contact* contact = equations_of_step().contact()) {
+    const ContactProblem& problem = contact->problem();
+    if (!contact->has_given_stiffness(state))
+      unknown = "its contacts took a stiffness of their own; give enable_contact(stiffness=), great enough";
+    else if (!problem.shift.empty() || !problem.turn.empty())
+      unknown = "an obstacle moved";
+  }
+  tape->record(rule, dt, work.move, state, unknown);
+}
 
 }  // namespace withe

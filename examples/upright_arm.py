@@ -6,7 +6,7 @@ linear-quadratic regulator may change, once in a time step; x' = A x + B u of a 
 state from `state_difference`. A force pushes at the tip. Fails when the arm falls with the regulator, stands without,
 or when the step's growing mode is not that of the linearised equations.
 
-Writes out/balance.png.
+Writes out/upright_arm.png.
 """
 
 from __future__ import annotations
@@ -153,8 +153,8 @@ def main() -> None:
         f"held: tip at most {1e3 * np.abs(held.tip).max():.1f} mm aside, {1e3 * abs(held.tip[-1]):.2f} mm in the end; "
         f"muscle at most {np.abs(held.curvature).max():.2f} 1/m; without: {1e3 * abs(fallen.tip[-1]):.0f} mm"
     )
-    draw(held, fallen, arguments.out / "balance.png")
-    print(f"Wrote {arguments.out / 'balance.png'}.")
+    draw(held, fallen, arguments.out / "upright_arm.png")
+    print(f"Wrote {arguments.out / 'upright_arm.png'}.")
     if len(growing) != 1 or not 0.98 < rate / expected < 1.0 or closed >= 1.0:
         sys.exit("The step does not have the one growing mode of the equations, or the regulator does not hold it.")
     if abs(held.tip[-1]) > STEADY * LENGTH or abs(fallen.tip[-1]) < 0.3 * LENGTH:
