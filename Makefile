@@ -30,12 +30,13 @@ PYTHON_SOURCES := $(shell find python/withe -name '*.py' -o -name '*.pyi' -o -na
 # Folders too: a deleted file is a change.
 SOURCE_FOLDERS := $(wildcard cpp/*/) $(shell find python/withe -type d -not -name __pycache__)
 
-.PHONY: help demo view test ctest-build ctest ctest-baseline pytest asan asan-python bench wheel lint format format-check types stubs stub-check \
+.PHONY: help demo view learn test ctest-build ctest ctest-baseline pytest asan asan-python bench wheel lint format format-check types stubs stub-check \
     tidy tidy-changed clean distclean
 
 help:
 	@echo "make demo          install what is missing, build, simulate a cantilever, compare with theory"
 	@echo "make view          install what pictures, films and notebooks need"
+	@echo "make learn         install torch, for withe.learning"
 	@echo "make test          all tests, C++ and Python"
 	@echo "make pytest        all tests in Python; TESTS=\"tests/physics -k knot\" runs some"
 	@echo "make ctest-baseline  C++ tests on an emulated machine without AVX (qemu-user)"
@@ -72,6 +73,11 @@ $(STAMPS)/test_tools: $(STAMPS)/build_tools
 	@$(PIP_INSTALL) $(call requirements,test)
 	@touch $@
 
+$(STAMPS)/learn_tools: $(STAMPS)/build_tools
+	@echo "Installing torch into .venv"
+	@$(PIP_INSTALL) $(call requirements,learn)
+	@touch $@
+
 $(STAMPS)/dev_tools: $(STAMPS)/test_tools
 	@echo "Installing developers' tools into .venv"
 	@$(PIP_INSTALL) $(call requirements,dev)
@@ -97,6 +103,8 @@ demo: $(STAMPS)/installed
 
 view: $(STAMPS)/installed $(STAMPS)/view_tools
 	@python tools/check_view.py
+
+learn: $(STAMPS)/installed $(STAMPS)/learn_tools
 
 test: ctest pytest
 

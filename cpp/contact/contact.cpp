@@ -171,6 +171,14 @@ void Contact::friction_force(VectorX& out) const { withe::friction_force(problem
 
 double Contact::obstacle_work() const { return withe::obstacle_work(problem_, set_); }
 
+bool Contact::has_given_stiffness(const State& state) const {
+  return std::all_of(set_.begin(), set_.end(), [&](const Touching& t) {
+    const ContactRecord* record = find_record(state.contacts, t.pair.key);
+    const double given = t.pair.stiffness > 0.0 ? t.pair.stiffness : problem_.description().stiffness;
+    return record == nullptr || record->stiffness == given;
+  });
+}
+
 bool Contact::unresolved(double dt) const {
   return std::any_of(set_.begin(), set_.end(), [&](const Touching& t) { return withe::unresolved(problem_, t, dt); });
 }

@@ -87,6 +87,8 @@ class Contact {
   double mean_friction_loss(const VectorX& change, const VectorX& start, const VectorX& end) const;
   void friction_force(VectorX& out) const;
   double obstacle_work() const;
+  /// Whether what touches has kept, in an accepted state, the stiffness that it was given; not, where none was.
+  bool has_given_stiffness(const State& state) const;
   /// Whether surfaces are deeper in each other than a step may end with.
   bool too_deep() const { return set_.depth() > deepest_; }
   void allow_depth(double deepest) { deepest_ = deepest; }

@@ -32,7 +32,13 @@ void StepGradient::begin(const StepTaken& step) {
   const Model& model = equations_.model();
   const bool middle = step.rule == StepRule::midpoint || step.rule == StepRule::energy_momentum;
   equations_.begin(step.start, step.parameters, step.rule, middle ? 0.5 * step.duration : step.duration);
-  if (!model.constraints.empty() && moves()) equations_.held_acceleration().setZero(model.dof_count);
+  if (!model.constraints.empty() && moves()) {
+    VectorX& acceleration = equations_.held_acceleration();
+    if (step.held_velocity)
+      acceleration = (*step.held_velocity - step.start.v) / step.duration;
+    else
+      acceleration.setZero(model.dof_count);
+  }
   if (step.rule == StepRule::energy_momentum) {
     z_ = step.end - step.start.q;
     set_velocity_rates(model, z_, step.duration, rates_);

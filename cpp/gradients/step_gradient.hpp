@@ -32,6 +32,7 @@ struct StepTaken {
   StepRule rule;
   double duration;  ///< [s]; statics: 0
   const VectorX& end;
+  const VectorX* held_velocity = nullptr;  ///< of supports at the end, meaningful where held; nothing: they rest
 };
 
 class StepGradient {

@@ -145,8 +145,7 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
   steps_taken += 1;
   system.begin(state, parameters, StepRule::statics, 0.0);
   system.evaluate(state.q, false, nullptr, work.newton.data);
-  reaction_residual = work.newton.data.full_residual;
-  reaction_current = true;
+  note_reactions();
   newton->balance(work.newton.data, r.newton);
   check_resolution();
   if (r.branch_changed) statistics.branch_changes += 1;
@@ -202,8 +201,7 @@ EquilibriumPath World::equilibrium_path(const PathOptions& wanted) {
     Homotopy path(system, *self.newton, self.parameters, boundary, loads, self.state, self.work.newton);
     if (!by_loads) path.start_out_of_balance();
     const ArcVisitor visit = [&](const ArcPoint& point) {
-      self.reaction_residual = self.work.newton.data.full_residual;
-      self.reaction_current = true;
+      self.note_reactions();
       MatrixX3 forces = MatrixX3::Zero(static_cast<Eigen::Index>(target.size()), 3), moments = forces;
       for (std::size_t s = 0; s < target.size(); ++s) {
         if (!self.model.supports[s].active) continue;
@@ -246,8 +244,7 @@ void World::Implementation::refresh_reactions() {
   update_custom_force(system);
   system.begin(state, parameters, StepRule::statics, 0.0);
   system.evaluate(state.q, false, nullptr, work.newton.data);
-  reaction_residual = work.newton.data.full_residual;
-  reaction_current = true;
+  note_reactions();
 }
 
 }  // namespace withe

@@ -3,6 +3,7 @@
 
 #include "common/check.hpp"
 #include "geometry/rotation.hpp"
+#include "gradients/state_vector.hpp"
 #include "world/implementation.hpp"
 
 namespace withe {
@@ -84,12 +85,43 @@ std::shared_ptr<Tape> World::start_tape() {
     self.tape->refuse("integrator '" +
                       std::string(self.options.integrator == Integrator::verlet ? "verlet" : "static") +
                       "' has none; take any other");
-  if (self.description.contact.any())
-    self.tape->refuse("contact takes part in it; equilibria with contact have a gradient");
+  if (const Contact* contact = self.equations->contact()) {
+    const ContactDescription& given = self.description.contact;
+    const auto loses = [](double restitution) { return restitution >= 0.0 && restitution < 1.0; };
+    if (self.options.integrator != Integrator::backward_euler)
+      self.tape->refuse("contact takes part in it; take integrator='backward_euler'");
+    else if (contact->frictional())
+      self.tape->refuse("friction takes part in it; take friction=0");
+    else if (loses(given.restitution) || (given.obstacle_restitution.array() < 1.0).any() ||
+             std::any_of(given.pairs.begin(), given.pairs.end(), [&](const auto& p) { return loses(p.restitution); }))
+      self.tape->refuse("impacts lose energy by their restitution; take restitution=1");
+  }
   return self.tape;
 }
 
 void World::stop_tape() { implementation_->tape.reset(); }
+
+VectorX World::state_difference(const World& reference) const {
+  const Implementation &self = *implementation_, &other = *reference.implementation_;
+  const auto same = [](const Constraint& a, const Constraint& b) { return a.first == b.first && a.free == b.free; };
+  require(self.model.planar() == other.model.planar() && self.model.dof_count == other.model.dof_count &&
+              std::equal(self.model.constraints.begin(), self.model.constraints.end(), other.model.constraints.begin(),
+                         other.model.constraints.end(), same),
+          "the reference must be a copy of this simulation, with the same supports");
+  return withe::state_difference(self.model, other.state, self.state);
+}
+
+void World::displace_state(const VectorX& by) {
+  // On a copy, so that what is refused changes nothing.
+  auto fresh = std::make_unique<Implementation>(accounted());
+  fresh->recall(implementation_->lagged());
+  fresh->take_callbacks(*implementation_);
+  withe::displace_state(fresh->model, by, fresh->state);
+  fresh->meet_anew();
+  fresh->forget_motion();
+  fresh->forget_matrix();
+  implementation_ = std::move(fresh);
+}
 
 /// Before a step.
 void World::Implementation::check_tape() {
@@ -98,11 +130,15 @@ void World::Implementation::check_tape() {
 }
 
 void World::Implementation::record_step(StepRule rule, double dt) {
-  constexpr double kRounding = 1e-12;  // of the scene's length; angles likewise
-  for (const Constraint& c : model.constraints)
-    if (c.held(work.held_velocity).norm() * std::abs(dt) > kRounding * std::max(model.length_scale, 1.0))
-      tape->refuse("a support moved");
-  tape->record(rule, dt, work.move, state);
+  const char* unknown = nullptr;
+  if (const Contact* contact = equations_of_step().contact()) {
+    const ContactProblem& problem = contact->problem();
+    if (!contact->has_given_stiffness(state))
+      unknown = "its contacts took a stiffness of their own; give enable_contact(stiffness=), great enough";
+    else if (!problem.shift.empty() || !problem.turn.empty())
+      unknown = "an obstacle moved";
+  }
+  tape->record(rule, dt, work.move, state, unknown);
 }
 
 }  // namespace withe

@@ -108,6 +108,7 @@ struct World::Implementation : Running {
   void set_rates(const std::vector<RodState>& rods);
   void relax_joints(const std::vector<bool>& is_told);
   void turn_frames(const std::vector<bool>& is_told);
+  void meet_anew();
   /// What came before no longer tells what comes next.
   void forget_motion();
 
@@ -168,6 +169,7 @@ struct World::Implementation : Running {
   Equations& equations_of_step();
   StepRule rule_of_step() const;
   StepResult step_by_rule(double dt, int slot);
+  void note_reactions();
   void keep_reactions();
   void check_reversible(const Parameters& p) const;
 

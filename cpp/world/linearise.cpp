@@ -2,8 +2,7 @@
 #include <optional>
 #include <utility>
 
-#include <Eigen/Eigenvalues>
-
+#include "gradients/state_vector.hpp"
 #include "world/implementation.hpp"
 
 namespace withe {
@@ -15,25 +14,6 @@ SparseMatrix assembled(Eigen::Index rows, Eigen::Index columns, const Entries& e
   SparseMatrix out(rows, columns);
   out.setFromTriplets(entries.begin(), entries.end());
   return out;
-}
-
-/// Columns: an orthonormal basis of what supports leave free.
-SparseMatrix free_basis(const Model& model) {
-  std::vector<bool> held(at(model.dof_count), false);
-  Entries entries;
-  int count = 0;
-  for (const Constraint& c : model.constraints) {
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(c.free.topLeftCorner(c.size, c.size));
-    for (int i = 0; i < c.size; ++i) {
-      held[at(c.first + i)] = true;
-      if (axes.eigenvalues()(i) <= 0.5) continue;
-      for (int k = 0; k < c.size; ++k) entries.emplace_back(c.first + k, count, axes.eigenvectors()(k, i));
-      ++count;
-    }
-  }
-  for (int i = 0; i < model.dof_count; ++i)
-    if (!held[at(i)]) entries.emplace_back(i, count++, 1.0);
-  return assembled(model.dof_count, count, entries);
 }
 
 SparseMatrix matrix_of(const Assembler& assembler) {

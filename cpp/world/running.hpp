@@ -124,6 +124,7 @@ struct Found {
   MatrixX3 custom_force;      ///< of the last step [N]
   MatrixX3 custom_moments;    ///< likewise, where there are any [N m]
   VectorX reaction_residual;  ///< full residual of the last solve
+  VectorX reaction_place;     ///< the configuration in which its forces act, in the middle of midpoint steps
   bool reaction_current = false;
 };
 

@@ -178,14 +178,19 @@ void World::Implementation::place_rods(const std::vector<RodState>& rods) {
   compute_configuration(model, state, state.q, c);
   require(c.bend_strain.allFinite() && c.half_strain.allFinite(), "positions fold an edge right back onto the next");
   accept_configuration(model, VectorX(state.q), c, state);
-  if (Contact* contact = equations->contact()) {
-    state.contacts.clear();
-    forget_contacts();
-    contact->initialise(state, parameters);
-    check_overlap();
-  }
+  meet_anew();
   forget_motion();
   forget_matrix();
+}
+
+/// Contacts of a state that no step has led to.
+void World::Implementation::meet_anew() {
+  Contact* contact = equations->contact();
+  if (!contact) return;
+  state.contacts.clear();
+  forget_contacts();
+  contact->initialise(state, parameters);
+  check_overlap();
 }
 
 /// Frames that edges are attached to turn with them, as far as nothing holds them.

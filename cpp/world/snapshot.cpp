@@ -254,8 +254,8 @@ void exchange(Archive& io, StepControl& control) {
 
 template <class Archive>
 void exchange(Archive& io, Found& found) {
-  auto& [custom_force, custom_moments, reaction_residual, reaction_current] = found;
-  io(custom_force), io(custom_moments), io(reaction_residual), io(reaction_current);
+  auto& [custom_force, custom_moments, reaction_residual, reaction_place, reaction_current] = found;
+  io(custom_force), io(custom_moments), io(reaction_residual), io(reaction_place), io(reaction_current);
 }
 
 template <class Archive>
@@ -363,7 +363,8 @@ void give_sizes(World::Implementation& self) {
       if (v->size() != rod.natural_twist.size()) *v = rod.natural_twist;
   }
   self.predictor.resize(self.model.dof_count);
-  if (self.reaction_residual.size() != self.model.dof_count) self.reaction_residual.setZero(self.model.dof_count);
+  for (VectorX* v : {&self.reaction_residual, &self.reaction_place})
+    if (v->size() != self.model.dof_count) v->setZero(self.model.dof_count);
 }
 
 }  // namespace

@@ -369,8 +369,7 @@ StepResult World::Implementation::step_by_rule(double dt, int slot) {
 /// The residual of a frame's unknowns is J(w)^T moment, w its turn where the forces act; of an energy-momentum step,
 /// the moment.
 void World::Implementation::keep_reactions() {
-  reaction_residual = work.newton.data.full_residual;
-  reaction_current = true;
+  note_reactions();
   if (model.planar() || rule_of_step() == StepRule::energy_momentum) return;
   for (const Support& support : model.supports) {
     if (!support.active || support.frame < 0) continue;

@@ -129,6 +129,13 @@ void World::prescribe_support(int support, const Vector3& position, const Matrix
 Vector3 World::support_position(int support) const { return implementation_->motions.at(at(support)).position; }
 Matrix3 World::support_rotation(int support) const { return implementation_->motions.at(at(support)).rotation; }
 
+/// Of the last evaluation.
+void World::Implementation::note_reactions() {
+  reaction_residual = work.newton.data.full_residual;
+  reaction_place = work.newton.data.z;
+  reaction_current = true;
+}
+
 Reaction World::reaction(int support) const {
   Implementation& self = *implementation_;
   require(
@@ -146,10 +153,11 @@ Reaction World::reaction(int support) const {
   }
   if (s.other_node >= 0) {
     const Vector3 other = node_velocity(model, held, s.other_node);
-    const Vector3 arm = node_position(model, self.state.q, s.other_node) - node_position(model, self.state.q, s.node);
+    const VectorX& q = self.reaction_place;
+    const Vector3 arm = node_position(model, q, s.other_node) - node_position(model, q, s.node);
     out.force += other;
     out.moment = arm.cross(other);
-    if (!model.planar()) out.moment += held(model.edge_dof[at(s.edge)]) * to_eigen(self.state.tangent[at(s.edge)]);
+    if (!model.planar()) out.moment += held(model.edge_dof[at(s.edge)]) * arm.normalized();
   }
   return out;
 }

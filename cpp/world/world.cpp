@@ -13,7 +13,7 @@ namespace withe {
 namespace {
 
 /// Whether a load points, or turns, out of the plane of a normal.
-bool off_plane(LoadKind kind, const MatrixX3& values, const Vector3& normal) {
+bool off_plane(LoadKind kind, const Eigen::Ref<const MatrixX3>& values, const Vector3& normal) {
   return std::any_of(values.rowwise().begin(), values.rowwise().end(), [&](const auto& row) {
     const Vector3 value = row;
     const double off = is_axial(kind) ? value.cross(normal).norm() : std::abs(value.dot(normal));
@@ -131,7 +131,7 @@ void World::set_poll(const std::function<void()>& poll) { implementation_->poll 
 
 void World::set_force_function(const CustomFunction& force) { implementation_->force_function = force; }
 
-void World::set_load(int load, const MatrixX3& values) {
+void World::set_load(int load, const Eigen::Ref<const MatrixX3>& values) {
   Implementation& self = *implementation_;
   const auto [first, rows] = self.load_rows(load);
   require(values.rows() == rows, "load must have ", rows, " rows");

@@ -179,7 +179,7 @@ class World {
   void set_force_function(const CustomFunction& force);
 
   /// One row, or one an edge, as it was put on: world axes of the drawn scene [N], [N m], [N/m].
-  void set_load(int load, const MatrixX3& values);
+  void set_load(int load, const Eigen::Ref<const MatrixX3>& values);
   MatrixX3 load(int load) const;
   int add_load(const LoadDescription& load);  ///< acts from now on; its index
   void remove_load(int load);                 ///< one put on while running; those after it move up by one
@@ -252,6 +252,11 @@ class World {
   /// Keeps the steps from here on, for gradients; nothing: no more.
   std::shared_ptr<Tape> start_tape();
   void stop_tape();
+  /// From where another world of the same scene is to where this one is, as a vector; see state_vector.hpp.
+  VectorX state_difference(const World& reference) const;
+  /// Adds such a vector to the present state. Throws std::invalid_argument, and changes nothing, where that is no
+  /// state.
+  void displace_state(const VectorX& by);
 
   /// The whole state as bytes, for a description and options equal to this world's (supports may differ).
   std::string snapshot() const;

@@ -33,6 +33,9 @@ void register_gradients(py::module_& module) {
       .def_readonly("parameters", &RunGradient::parameters)
       .def_property_readonly("initial_positions", [](const RunGradient& self) { return self.initial.positions; })
       .def_property_readonly("initial_velocities", [](const RunGradient& self) { return self.initial.velocities; });
+  py::class_<RunJacobian>(module, "RunJacobian", "Derivatives of the state that a run leads to.")
+      .def_readonly("state", &RunJacobian::state)
+      .def_readonly("rows", &RunJacobian::rows);
   py::class_<MomentAdjoint>(module, "MomentAdjoint", "What a scalar depends on after so many steps of a run.")
       .def(py::init([](long steps, const MatrixX3& positions, const MatrixX3& velocities) {
              return MomentAdjoint{steps, positions, velocities};
@@ -40,7 +43,8 @@ void register_gradients(py::module_& module) {
            py::arg("steps"), py::arg("positions"), py::arg("velocities"));
   py::class_<Tape, std::shared_ptr<Tape>>(module, "Tape", "A run as the adjoint method needs it.")
       .def_property_readonly("count", &Tape::count, "Steps taken.")
-      .def("gradient", &Tape::gradient, py::arg("moments"), py::call_guard<py::gil_scoped_release>());
+      .def("gradient", &Tape::gradient, py::arg("moments"), py::call_guard<py::gil_scoped_release>())
+      .def("jacobian", &Tape::jacobian, py::call_guard<py::gil_scoped_release>());
 }
 
 void register_results(py::module_& module) {
@@ -349,6 +353,15 @@ void define_readouts(WorldClass& world) {
       py::arg("by_positions"));
   world.def("start_tape", [](GuardedWorld& self) { return self.changing().start_tape(); });
   world.def("stop_tape", [](GuardedWorld& self) { self.changing().stop_tape(); });
+  world.def(
+      "state_difference",
+      [](const GuardedWorld& self, const GuardedWorld& reference) {
+        return self.reading().state_difference(reference.reading());
+      },
+      py::arg("reference"));
+  world.def(
+      "displace_state", [](GuardedWorld& self, const VectorX& by) { self.changing().displace_state(by); },
+      py::arg("by"));
   world.def(
       "linearise",
       [](GuardedWorld& self, const py::object& forces) {

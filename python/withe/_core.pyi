@@ -35,6 +35,7 @@ __all__: list[str] = [
     "RodPass",
     "RodState",
     "RunGradient",
+    "RunJacobian",
     "SceneDescription",
     "SpringDescription",
     "Statistics",
@@ -520,6 +521,15 @@ class RunGradient:
     @property
     def parameters(self) -> ParameterGradient: ...
 
+class RunJacobian:
+    """
+    Derivatives of the state that a run leads to.
+    """
+    @property
+    def rows(self) -> list[RunGradient]: ...
+    @property
+    def state(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]: ...
+
 class MomentAdjoint:
     """
     What a scalar depends on after so many steps of a run.
@@ -536,6 +546,7 @@ class Tape:
     A run as the adjoint method needs it.
     """
     def gradient(self, moments: collections.abc.Sequence[MomentAdjoint]) -> RunGradient: ...
+    def jacobian(self) -> RunJacobian: ...
     @property
     def count(self) -> int:
         """
@@ -764,6 +775,7 @@ class World:
     def directors(
         self, rod: typing.SupportsInt | typing.SupportsIndex
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 9]"]: ...
+    def displace_state(self, by: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> None: ...
     def energy(self) -> Energy: ...
     def equilibrium(self, callback: typing.Any, forces: typing.Any) -> EquilibriumResult:
         """
@@ -886,6 +898,7 @@ class World:
     def spring(self, spring: typing.SupportsInt | typing.SupportsIndex) -> SpringDescription: ...
     def spring_tension(self, spring: typing.SupportsInt | typing.SupportsIndex) -> float: ...
     def start_tape(self) -> Tape: ...
+    def state_difference(self, reference: World) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
     def step(self, count: typing.SupportsInt | typing.SupportsIndex, callback: typing.Any, forces: typing.Any) -> None:
         """
         Advance exactly `count` time steps.

@@ -145,7 +145,8 @@ TEST(Step, ThatIsRepeatedWithStifferContactDoesNotAllocateAfterWarmUp) {
     World world(builder.scene, testing::options(Integrator::backward_euler, 2e-3));
     const auto pushes = [&](int first, int last) {
       for (int k = first; k < last; ++k) {
-        world.set_load(push, Vector3(0, 0, k % 10 == 5 ? -20.0 - k : 0.0));
+        const Eigen::RowVector3d force(0, 0, k % 10 == 5 ? -20.0 - k : 0.0);
+        world.set_load(push, force);
         world.step(1);
       }
     };

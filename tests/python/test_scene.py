@@ -221,7 +221,7 @@ def test_loads_masses_and_drag_reach_the_engine():
         ("moment", 1, 4, False, True),
         ("distributed", 1, 0, False, False),
     ]
-    assert np.array_equal(engine.loads[1].value, (1, 0, 0))
+    assert np.array_equal(engine.loads[1].values, [(1, 0, 0)])
     assert engine.added_mass[0] == 0.75
     assert engine.added_mass.sum() == 0.75
     assert [float(rod.drag[0]) for rod in engine.rods] == [0.5, 0.75]

@@ -11,6 +11,7 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent.parent
 # Options of each example, the number that it prints, and between what that number must lie.
 EXAMPLES = {
+    "upright_arm.py": (["--duration", "4"], r"tip at most [.\d]+ mm aside, ([.\d]+) mm in the end", 0.0, 1.0),
     "flagella.py": (["--step", "2e-3", "--duration", "6"], r"drawn together by (\d+)%", 20.0, 80.0),
     "flagella_contact.py": (
         ["--counts", "2", "--frictions", "0.3", "--steps", "200"],

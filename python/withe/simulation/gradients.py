@@ -25,6 +25,7 @@ __all__ = [
     "equilibrium_gradients",
     "equilibrium_jacobian",
     "positions_adjoint",
+    "unknown_readers",
 ]
 
 FloatArray = npt.NDArray[np.float64]
@@ -49,7 +50,7 @@ def equilibrium_gradients(
 
     The stiffness is factorised once for all of them.
     """
-    readers = _readers(session, wrt)
+    readers = unknown_readers(session, wrt)
     found = session.world.equilibrium_gradients(list(by_positions))
     return [[read(gradient) for gradient in found] for read in readers]
 
@@ -107,7 +108,7 @@ class RunDerivatives:
         """See `Record.gradient`."""
         if not isinstance(by, Mapping) or not by or not set(by) <= set(_READOUTS):
             raise ValueError(f"what a gradient is of must be derivatives by {' and '.join(_READOUTS)}, got {by!r}")
-        readers = _readers(self._session, wrt)
+        readers = unknown_readers(self._session, wrt)
         nodes, frames = self._session.directory.layout.node_count, len(self._steps)
         none = np.empty((0, 3))
         arrays = {name: validation.number_array(value, name, (frames, nodes, 3)) for name, value in by.items()}
@@ -133,7 +134,8 @@ def _axes(session: Session) -> FloatArray:
     return np.stack([first, np.cross(normal, first)])
 
 
-def _readers(session: Session, wrt: Sequence[Unknown]) -> list[Callable[[Any], Any]]:
+def unknown_readers(session: Session, wrt: Sequence[Unknown]) -> list[Callable[[Any], Any]]:
+    """For each of `wrt` what reads its derivative, shaped like `get`, from what the engine finds."""
     if isinstance(wrt, str) or not isinstance(wrt, Sequence) or not wrt:
         raise ValueError('wrt must be a list of what to differentiate by, such as [(arm, "youngs_modulus"), "gravity"]')
     return [_reader(session, unknown) for unknown in wrt]

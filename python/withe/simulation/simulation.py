@@ -30,6 +30,7 @@ from withe.simulation.readouts import Equilibrium
 from withe.simulation.session import Session
 from withe.simulation.snapshots import Snapshot, restore
 from withe.simulation.springs import spring_outlines
+from withe.simulation.state_space import StateSpace
 from withe.simulation.states import restore_frame
 from withe.simulation.stepping import Stepping
 
@@ -40,7 +41,7 @@ FloatArray = npt.NDArray[np.float64]
 _MAX_STEPS = 2**31 - 1
 
 
-class Simulation(AppliedLoads, Control, Placement, Measurements):
+class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
     """A scene while it runs. Made by `Scene.build`.
 
     Read-outs are copies. Rods, nodes, supports and loads are given by their handles or their names.

@@ -1,0 +1,228 @@
+"""Equilibria and runs as functions of torch tensors, with gradients by the adjoint method.
+
+>>> import withe
+>>> x = withe.learning.rollout(simulation, {(arm, "youngs_modulus"): E}, duration=2.0)  # doctest: +SKIP
+>>> x[-1, -1, 2].backward()  # doctest: +SKIP
+
+Torch is imported when a function is called (``pip install ".[learn]"`` in a clone of withe).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from withe.common.extras import require
+from withe.parts.handles import Support
+from withe.simulation.gradients import Unknown
+from withe.simulation.simulation import Simulation
+
+__all__ = ["equilibrium", "rollout"]
+
+FloatArray = npt.NDArray[np.float64]
+Values = Mapping[Unknown, Any]
+"""What acts, and a tensor of its values."""
+
+_READOUTS = ("positions", "velocities")
+
+
+def rollout(
+    simulation: Simulation,
+    values: Values,
+    duration: float,
+    record_every: float | None = None,
+    *,
+    of: str | Sequence[str] = "positions",
+) -> Any:
+    """Run a copy of a simulation with other values, as a differentiable function of them.
+
+    Parameters
+    ----------
+    simulation : Simulation
+        Where the run begins; stays as it is.
+    values : mapping
+        From what `Record.gradient` takes in `wrt` (a part and a word of `set`; "gravity"; "initial_positions",
+        "initial_velocities" of all nodes) to tensors, float64, of a shape that `set` takes. Other than `set`,
+        "initial_positions" take directors along by the smallest turn, and joints as they are.
+    duration, record_every : float [s]
+        As in `Simulation.run`.
+    of : str or list of str
+        "positions" or "velocities".
+
+    Returns
+    -------
+    Tensor of shape (frames, nodes, 3), or a tuple of them where `of` is a list
+        Positions [m] or velocities [m/s] of every node at every frame.
+
+    Raises
+    ------
+    ImportError
+        Torch is not installed.
+    ValueError
+        Values that are no tensors of float64, that `set` refuses, or by which no gradient is known; the last when the
+        gradient is asked for.
+    ConvergenceError
+        A step that cannot be solved.
+
+    Examples
+    --------
+    >>> E = torch.tensor(1e6, dtype=torch.float64, requires_grad=True)  # doctest: +SKIP
+    >>> x = withe.learning.rollout(simulation, {(arm, "youngs_modulus"): E}, duration=2.0)  # doctest: +SKIP
+    >>> ((x - measured) ** 2).sum().backward()  # doctest: +SKIP
+    """
+    listed = (of,) if isinstance(of, str) else tuple(of)
+    if not listed or not set(listed) <= set(_READOUTS):
+        raise ValueError(f"of must be {' or '.join(_READOUTS)}, or a list of them, got {of!r}")
+
+    def solve(copy: Simulation, differentiable: bool) -> tuple[list[FloatArray], _PullBack]:
+        record = copy.run(duration, record_every, progress=False, differentiable=differentiable)
+
+        def pull_back(by: list[FloatArray], wrt: list[Unknown]) -> list[Any]:
+            return record.gradient(dict(zip(listed, by, strict=True)), wrt)
+
+        return [getattr(record, name)() for name in listed], pull_back
+
+    found = _apply(simulation, values, solve)
+    return found[0] if isinstance(of, str) else found
+
+
+def equilibrium(simulation: Simulation, values: Values) -> Any:
+    """Equilibrium of a copy of a simulation with other values, as a differentiable function of them.
+
+    Parameters
+    ----------
+    simulation : Simulation
+        Where the search begins; stays as it is.
+    values : mapping
+        From what `Equilibrium.gradient` takes in `wrt` (a part and a word of `set`; "gravity"; a support and
+        "position") to tensors, float64, of a shape that `set` or `move` takes.
+
+    Returns
+    -------
+    Tensor of shape (nodes, 3)
+        Positions of every node [m].
+
+    Raises
+    ------
+    ImportError
+        Torch is not installed.
+    ValueError
+        As in `rollout`.
+    ConvergenceError
+        There is no equilibrium, or none was found.
+
+    Examples
+    --------
+    >>> x = withe.learning.equilibrium(simulation, {(arm, "natural_curvature"): kappa})  # doctest: +SKIP
+    """
+
+    def solve(copy: Simulation, differentiable: bool) -> tuple[list[FloatArray], _PullBack]:
+        found = copy.equilibrium()
+        return [copy.positions()], lambda by, wrt: found.gradient(by[0], wrt)
+
+    return _apply(simulation, values, solve)[0]
+
+
+_PullBack = Callable[[list[FloatArray], list[Unknown]], list[Any]]
+_Solve = Callable[[Simulation, bool], tuple[list[FloatArray], _PullBack]]
+
+
+def _apply(simulation: Simulation, values: Values, solve: _Solve) -> tuple[Any, ...]:
+    torch = require("torch", "learn")
+    if not isinstance(simulation, Simulation):
+        raise ValueError(f"simulation must be a withe.Simulation, got {type(simulation).__name__}")
+    if not isinstance(values, Mapping) or not values:
+        raise ValueError('values must map what acts to tensors, such as {(arm, "youngs_modulus"): E}')
+    for unknown, tensor in values.items():
+        name = _name(unknown)
+        if not isinstance(tensor, torch.Tensor):
+            raise ValueError(f"the value of {name} must be a torch.Tensor, got {type(tensor).__name__}")
+        if tensor.dtype != torch.float64:
+            raise ValueError(
+                f"the value of {name} must be float64, got {tensor.dtype}: make it with dtype=torch.float64, or "
+                "hand in value.double(), through which gradients go back to it"
+            )
+    return tuple(_function().apply(simulation, list(values), solve, *values.values()))
+
+
+def _name(unknown: Unknown) -> str:
+    if isinstance(unknown, str):
+        return repr(unknown)
+    return f"{unknown[1]!r} of {getattr(unknown[0], 'name', unknown[0])!r}"
+
+
+@cache
+def _function() -> Any:
+    """The function that torch is told of; made when torch is there."""
+    torch = require("torch", "learn")
+
+    class Solved(torch.autograd.Function):  # type: ignore[misc,name-defined]
+        @staticmethod
+        def forward(ctx: Any, simulation: Simulation, wrt: list[Unknown], solve: _Solve, *tensors: Any) -> Any:
+            copy = simulation.copy()
+            for unknown, tensor in zip(wrt, tensors, strict=True):
+                _set(copy, unknown, tensor.detach().cpu().numpy())
+            found, pull_back = solve(copy, any(ctx.needs_input_grad))
+            ctx.wrt, ctx.pull_back, ctx.shapes = wrt, pull_back, [tensor.shape for tensor in tensors]
+            ctx.normal = np.array(copy.plan.plane_normal) if copy.plan.planar else None
+            return tuple(torch.as_tensor(np.array(array), device=tensors[0].device) for array in found)
+
+        @staticmethod
+        @torch.autograd.function.once_differentiable  # type: ignore[untyped-decorator]
+        def backward(ctx: Any, *by: Any) -> Any:
+            arrays = [grad.detach().cpu().numpy() for grad in by]
+            if ctx.normal is not None:  # nothing moves along it
+                arrays = [array - np.multiply.outer(array @ ctx.normal, ctx.normal) for array in arrays]
+            asked = [i for i, needed in enumerate(ctx.needs_input_grad[3:]) if needed]
+            found = ctx.pull_back(arrays, [ctx.wrt[i] for i in asked])
+            out: list[Any] = [None] * len(ctx.wrt)
+            for i, gradient in zip(asked, found, strict=True):
+                out[i] = torch.as_tensor(_summed(np.asarray(gradient), ctx.shapes[i]), device=by[0].device)
+            return None, None, None, *out
+
+    return Solved
+
+
+def _summed(gradient: FloatArray, shape: Sequence[int]) -> FloatArray:
+    """Over the axes along which a value of that shape was spread."""
+    extra = gradient.ndim - len(shape)
+    axes = [*range(extra), *(extra + i for i, size in enumerate(shape) if size == 1 != gradient.shape[extra + i])]
+    return np.array(gradient.sum(axis=tuple(axes), keepdims=True)).reshape(tuple(shape))
+
+
+def _set(simulation: Simulation, unknown: Unknown, value: FloatArray) -> None:
+    if not isinstance(unknown, str):
+        target, word = unknown
+        if isinstance(target, Support):
+            if word != "position":
+                raise ValueError(f"of {_name(unknown)} no tensor is taken: supports have a position")
+            simulation.move(target, position=value)
+        else:
+            simulation.set(target, **{word: value if value.ndim else float(value)})
+    elif unknown == "gravity":
+        simulation.set(gravity=value)
+    elif unknown == "initial_velocities":
+        simulation.set_velocities(None, value)
+    elif unknown == "initial_positions":
+        _displace(simulation, value)
+    else:
+        raise ValueError(f"values have no {unknown!r}: see wrt of Record.gradient")
+
+
+def _displace(simulation: Simulation, positions: FloatArray) -> None:
+    """Nodes moved, directors taken along."""
+    now = simulation.positions()
+    if positions.shape != now.shape:
+        raise ValueError(f"initial_positions must have shape {now.shape}, got {positions.shape}")
+    way = (positions - now).ravel()
+    if not way.any():
+        return
+    displacement = simulation.linearise()._displacement  # orthonormal where nodes move
+    by = displacement.T @ way
+    if np.abs(displacement @ by - way).max() > 1e-9 * np.abs(way).max():
+        raise ValueError("initial_positions move what a support holds, or leave the plane of a planar scene")
+    simulation.displace_state(np.concatenate([by, np.zeros_like(by)]))
