@@ -174,7 +174,8 @@ def write_vtk(record: Frames, folder: str | os.PathLike[str]) -> Path:
     record : Record
         Or whatever answers to its read-outs.
     folder : path
-        Created if missing; files of the same names are written over.
+        Created if missing; files of the same names are written over. The .pvd file is written last: it is
+        there only when every frame is.
 
     Returns
     -------
@@ -194,6 +195,8 @@ def write_vtk(record: Frames, folder: str | os.PathLike[str]) -> Path:
         raise ValueError("record has no frames to write")
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
+    collection = folder / "record.pvd"
+    collection.unlink(missing_ok=True)  # an older one would list frames of two records if writing were cut off
     times = record.times
     digits = max(4, len(str(len(record) - 1)))
     names = [f"frame_{frame:0{digits}d}.vtp" for frame in range(len(record))]
@@ -205,7 +208,6 @@ def write_vtk(record: Frames, folder: str | os.PathLike[str]) -> Path:
         f'    <DataSet timestep="{time!r}" group="" part="0" file={quoteattr(name)}/>'
         for time, name in zip(times.tolist(), names, strict=True)
     )
-    collection = folder / "record.pvd"
     with written_beside(collection) as temporary:
         temporary.write_text(
             '<?xml version="1.0"?>\n'

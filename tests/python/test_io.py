@@ -3,6 +3,7 @@
 import errno
 import json
 import os
+import pathlib
 import pickle
 import zipfile
 from dataclasses import fields
@@ -200,6 +201,18 @@ def test_vtk_frames_are_read_back_by_vtk(record, tmp_path):
     np.testing.assert_allclose(mesh["tension"][1:20], (tensions[1:] + tensions[:-1]) / 2)
     assert mesh["tension"][0] == tensions[0]
     np.testing.assert_array_equal(mesh["twist"][32:], record.twists("ring")[3])
+
+
+def test_vtk_that_is_cut_off_leaves_no_older_list_of_frames(record, tmp_path, monkeypatch):
+    collection = record.to_vtk(tmp_path)
+
+    def full_disk(self, *arguments, **options):
+        raise OSError("No space left on device")
+
+    monkeypatch.setattr(pathlib.Path, "write_text", full_disk)
+    with pytest.raises(OSError, match="No space"):
+        record.to_vtk(tmp_path)
+    assert not collection.exists()
 
 
 def test_vtk_of_no_frames_is_refused(tmp_path):
