@@ -16,6 +16,7 @@ void register_model(py::module_& module);
 void register_integrators(py::module_& module);
 void register_world(py::module_& module);
 void register_vision(py::module_& module);
+void register_elastica(py::module_& module);
 
 /// Words for the values of an enum.
 template <class Enum, std::size_t count>

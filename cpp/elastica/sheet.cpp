@@ -1,0 +1,166 @@
+#include "elastica/sheet.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/dual.hpp"
+#include "elastica/runge_kutta.hpp"
+
+namespace withe {
+
+namespace {
+
+using SheetDual = Dual<5>;  // by theta and m at the start of a segment, R, T, length
+
+double sine(double x) { return std::sin(x); }
+double cosine(double x) { return std::cos(x); }
+SheetDual sine(const SheetDual& x) { return chain(x, std::sin(x.value), std::cos(x.value)); }
+SheetDual cosine(const SheetDual& x) { return chain(x, std::cos(x.value), -std::sin(x.value)); }
+
+/// The equations of the header.
+template <class Scalar>
+struct SheetSlope {
+  double growth;
+  Scalar up, forward, length;
+
+  std::array<Scalar, 4> operator()(const Scalar& s, const std::array<Scalar, 4>& y) const {
+    const Scalar c = cosine(y[0]), d = sine(y[0]);
+    if (growth == 0) return {0.5 * y[1], (up - s) * c - forward * d, c, d};
+    const Scalar width = 1.0 + growth * (length - s);
+    const Scalar weight = s + growth * s * (length - 0.5 * s);
+    return {0.5 * (y[1] / width), (up - weight) * c - forward * d, c, d};
+  }
+};
+
+template <class Scalar>
+std::array<Scalar, 4> across(const SheetSlope<Scalar>& slope, int segment, int steps, std::array<Scalar, 4> y) {
+  const Scalar h = slope.length / static_cast<double>(SheetProblem::kSegments * steps);
+  for (int i = 0; i < steps; ++i) {
+    runge_kutta_step<2>(slope, static_cast<double>(segment * steps + i) * h, h, y);
+  }
+  return y;
+}
+
+}  // namespace
+
+int sheet_steps(const SheetProblem::Path& path) {
+  const double force = std::max(std::abs(path.values[0]), std::abs(path.values[1]));
+  const double step = std::min(0.4, 0.3 * std::sqrt(2.0 / std::max(force, 1e-3)));
+  const double steps = std::ceil(path.values[2] / (SheetProblem::kSegments * step));
+  return static_cast<int>(std::clamp(steps, 1.0, 50.0));  // also where Newton's method went astray
+}
+
+void SheetProblem::linearise(const Path& path, System& system) const {
+  system.links.resize(kSegments);
+  const SheetSlope<SheetDual> slope{shape.width_growth, SheetDual::unknown(path.values[0], 2),
+                                    SheetDual::unknown(path.values[1], 3), SheetDual::unknown(path.values[2], 4)};
+  const int steps = sheet_steps(path);
+  for (int k = 0; k < kSegments; ++k) {
+    const auto& y = path.nodes[static_cast<std::size_t>(k)];
+    const auto end =
+        across<SheetDual>(slope, k, steps, {SheetDual::unknown(y[0], 0), SheetDual::unknown(y[1], 1), y[2], y[3]});
+    System::Link& link = system.links[static_cast<std::size_t>(k)];
+    for (std::size_t i = 0; i < kStates; ++i) {
+      link.by_state[i][0] = end[i].slope[0];
+      link.by_state[i][1] = end[i].slope[1];
+      link.by_state[i][2] = i == 2 ? 1.0 : 0.0;
+      link.by_state[i][3] = i == 3 ? 1.0 : 0.0;
+      for (int j = 0; j < kParameters; ++j) link.by_parameters[i][j] = end[i].slope[2 + j];
+      link.gap[i] = end[i].value - path.nodes[static_cast<std::size_t>(k) + 1][i];
+    }
+  }
+  put_end(path, system);
+}
+
+void SheetProblem::put_end(const Path& path, System& system) const {
+  for (int i = 0; i < kParameters; ++i) {
+    std::fill_n(system.end_by_state[i], kStates, 0.0);
+    std::fill_n(system.end_by_parameters[i], kParameters, 0.0);
+  }
+  const double x = tip_back(path), z = tip_up(path);
+  system.end_by_state[0][1] = 1.0;
+  system.end_gap[0] = path.nodes.back()[1] - shape.tip_moment;
+  if (target == TipTarget::position) {
+    system.end_by_state[1][2] = -1.0;
+    system.end_by_state[2][3] = 1.0;
+    system.end_by_parameters[1][2] = 1.0;
+    system.end_gap[1] = x - goal[0];
+    system.end_gap[2] = z - goal[1];
+    return;
+  }
+  system.end_by_parameters[1][2] = 1.0;
+  system.end_gap[1] = path.values[2] - goal[0];
+  if (target == TipTarget::length_and_angle) {
+    system.end_by_state[2][0] = 1.0;
+    system.end_gap[2] = tip_angle(path) - goal[1];
+  } else {
+    const double c = std::cos(goal[1]), d = std::sin(goal[1]);
+    system.end_by_state[2][2] = -c;
+    system.end_by_state[2][3] = -d;
+    system.end_by_parameters[2][2] = c;
+    system.end_gap[2] = c * x - d * z;
+  }
+}
+
+namespace {
+
+/// Where a function of the state passes zero within a step: the state there, by bisection and false position.
+template <class Function>
+std::array<double, 4> state_at_zero(const SheetSlope<double>& slope, double s, double h, const std::array<double, 4>& y,
+                                    const Function& f) {
+  double low = 0, high = h, at_low = f(s, y);
+  std::array<double, 4> state = y;
+  for (int i = 0; i < 30 && high - low > 1e-9; ++i) {
+    const double middle = 0.5 * (low + high);
+    state = y;
+    runge_kutta_step<2>(slope, s, middle, state);
+    const double value = f(s + middle, state);
+    if ((value < 0) == (at_low < 0)) {
+      low = middle;
+      at_low = value;
+    } else {
+      high = middle;
+    }
+  }
+  return state;
+}
+
+}  // namespace
+
+SheetExtremes sheet_extremes(const SheetShape& shape, const SheetProblem::Path& path) {
+  const double length = path.values[2];
+  const SheetSlope<double> slope{shape.width_growth, path.values[0], path.values[1], length};
+  const int steps = sheet_steps(path);
+  const double h = length / (SheetProblem::kSegments * steps);
+  const auto curvature = [&](double s, const std::array<double, 4>& y) { return slope(s, y)[0]; };
+  const auto curvature_slope = [&](double s, const std::array<double, 4>& y) {
+    const double width = 1.0 + shape.width_growth * (length - s);
+    return slope(s, y)[1] + shape.width_growth * y[1] / width;  // 2 b theta''
+  };
+  const auto climb = [&](double /*s*/, const std::array<double, 4>& y) { return y[3] == 0 ? 0.0 : std::sin(y[0]); };
+  SheetExtremes found;
+  const auto see = [&](double s, const std::array<double, 4>& y) {
+    found.largest_curvature = std::max(found.largest_curvature, std::abs(curvature(s, y)));
+    found.smallest_angle = std::min(found.smallest_angle, y[0]);
+    found.largest_angle = std::max(found.largest_angle, y[0]);
+    found.lowest = std::min(found.lowest, y[3]);
+  };
+  for (int k = 0; k < SheetProblem::kSegments; ++k) {
+    std::array<double, 4> y = path.nodes[static_cast<std::size_t>(k)];
+    for (int i = 0; i < steps; ++i) {
+      const double s = (k * steps + i) * h;
+      const std::array<double, 4> before = y;
+      runge_kutta_step<2>(slope, s, h, y);
+      see(s + h, y);
+      const auto look = [&](const auto& f) {
+        if (f(s, before) * f(s + h, y) < 0) see(s, state_at_zero(slope, s, h, before, f));
+      };
+      look(curvature_slope);
+      look(curvature);
+      look(climb);
+    }
+  }
+  return found;
+}
+
+}  // namespace withe

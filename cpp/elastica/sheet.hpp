@@ -1,0 +1,66 @@
+#pragma once
+/// The suspended part of a sheet, seen from the side: a heavy elastica that leaves a flat floor and is held at its tip.
+///
+/// In units of the gravito-bending length Lgb = (EI / 2w)^(1/3) and of the weight per length w at the tip, s from the
+/// lift-off point, theta the angle of the tangent above the floor, m the moment, b the width relative to that at the
+/// tip:
+///   theta' = m / (2 b),  m' = (R - W) cos(theta) - T sin(theta),  X' = cos(theta),  Z' = sin(theta),
+///   W(s) = the weight of the part before s,  theta(0) = m(0) = X(0) = Z(0) = 0.
+/// R and T are the floor's forces on the sheet at lift-off, up and forward (the way the sheet leaves). That the moment
+/// vanishes there is what a flat floor that only pushes asks for; the tip carries a given moment.
+/// [Dissertation (7.6) with the condition that it lacks.]
+
+#include <array>
+#include <vector>
+
+#include "elastica/shooting.hpp"
+
+namespace withe {
+
+/// b(t) = 1 + width_growth t, t the distance from the tip. [1/Lgb], [w Lgb^2].
+struct SheetShape {
+  double width_growth = 0;
+  double tip_moment = 0;
+};
+
+/// What is asked of the tip besides its moment.
+enum class TipTarget {
+  position,             ///< x = length - X and z = Z: the tip's way back and up from where it lay in the flat sheet
+  length_and_angle,     ///< suspended length, and theta at the tip
+  length_and_direction  ///< suspended length, and the angle atan2(x, z) of that way
+};
+
+class SheetProblem {
+ public:
+  static constexpr int kStates = 4, kParameters = 3;  // theta, m, X, Z; R, T, length
+  static constexpr int kSegments = 8;
+  using Path = ShootingPath<kStates, kParameters>;
+  using System = ShootingSystem<kStates, kParameters>;
+
+  SheetShape shape;
+  TipTarget target = TipTarget::position;
+  std::array<double, 2> goal{};
+
+  void linearise(const Path& path, System& system) const;
+
+ private:
+  void put_end(const Path& path, System& system) const;
+};
+
+/// Runge-Kutta steps a segment: at most .4 Lgb, and .3 of the length sqrt(EI / force) over which forces bend.
+int sheet_steps(const SheetProblem::Path& path);
+
+inline double tip_back(const SheetProblem::Path& path) { return path.values[2] - path.nodes.back()[2]; }
+inline double tip_up(const SheetProblem::Path& path) { return path.nodes.back()[3]; }
+inline double tip_angle(const SheetProblem::Path& path) { return path.nodes.back()[0]; }
+
+/// What holds along a solved path. Lengths in Lgb, forces in w Lgb.
+struct SheetExtremes {
+  double largest_curvature = 0;  ///< of its absolute value
+  double smallest_angle = 0;
+  double largest_angle = 0;
+  double lowest = 0;
+};
+SheetExtremes sheet_extremes(const SheetShape& shape, const SheetProblem::Path& path);
+
+}  // namespace withe

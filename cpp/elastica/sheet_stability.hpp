@@ -1,0 +1,14 @@
+#pragma once
+/// Whether an equilibrium of the suspended sheet is a minimum of its energy.
+
+#include "elastica/sheet.hpp"
+
+namespace withe {
+
+/// True where the second variation of the energy, integral of 2 b eta'^2 - ((R - W) sin(theta) + T cos(theta)) eta^2,
+/// is positive for all eta that keep the pose of the tip and the lift-off point: eta = 0 at both ends, and the
+/// integrals of eta sin(theta) and eta cos(theta) vanish. Linear elements; their matrix bordered by the two constraints
+/// has exactly two negative eigenvalues then [Maddocks 1985].
+bool sheet_is_stable(const SheetShape& shape, const SheetProblem::Path& path);
+
+}  // namespace withe

@@ -1,0 +1,16 @@
+"""Paper that is lifted from a table and folded over.
+
+Lengths here are in Lgb = (E h^2 / (24 rho g))^(1/3), the gravito-bending length, and forces in w Lgb, w the weight of
+the sheet per length. That makes one solution serve every paper.
+
+>>> import withe
+>>> pose = withe.folding.elastica(3.0, 2.25)
+>>> print(f"{pose.angle:.4f} rad, {pose.suspended:.4f} Lgb lifted, ratio of forces {pose.force_ratio:.4f}")
+2.3762 rad, 3.4000 Lgb lifted, ratio of forces 0.3837
+"""
+
+from withe.folding.hanging_strip import Measured, droop, measure
+from withe.folding.manifold import Elastica, elastica
+from withe.folding.paper import Paper
+
+__all__ = ["Elastica", "Measured", "Paper", "droop", "elastica", "measure"]

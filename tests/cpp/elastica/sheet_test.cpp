@@ -1,0 +1,116 @@
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include "elastica/runge_kutta.hpp"
+#include "elastica/sheet_manifold.hpp"
+#include "elastica/sheet_stability.hpp"
+
+namespace withe {
+namespace {
+
+SheetProblem::Path solved(double x, double z, const SheetShape& shape = {}) {
+  static const SheetManifold manifold;
+  SheetManifold::Data data;
+  EXPECT_TRUE(manifold.at_position(x, z, shape, data).valid) << x << " " << z;
+  return data.path;
+}
+
+TEST(RungeKutta, IsOfEighthOrderOnAPendulum) {
+  const auto slope = [](double, const std::array<double, 2>& y) {
+    return std::array<double, 2>{y[1], -std::sin(y[0])};
+  };
+  const auto at_end = [&](int steps) {
+    std::array<double, 2> y{2.0, 0.0};
+    for (int i = 0; i < steps; ++i) runge_kutta_step<2>(slope, 4.0 * i / steps, 4.0 / steps, y);
+    return y[0];
+  };
+  const double exact = at_end(200);
+  const double order = std::log2(std::abs(at_end(8) - exact) / std::abs(at_end(16) - exact));
+  EXPECT_NEAR(order, 8.0, 1.0);
+}
+
+TEST(SheetProblem, DerivativesMatchDifferences) {
+  for (const TipTarget target : {TipTarget::position, TipTarget::length_and_angle, TipTarget::length_and_direction}) {
+    SheetProblem problem;
+    problem.shape = {0.3, 0.2};
+    problem.target = target;
+    problem.goal = {2.0, 0.7};
+    const SheetProblem::Path path = solved(3.0, 2.0);
+    SheetProblem::System system, up, down;
+    problem.linearise(path, system);
+    constexpr double kStep = 1e-5;
+    const auto differ = [&](auto&& change) {
+      SheetProblem::Path moved = path;
+      change(moved, kStep);
+      problem.linearise(moved, up);
+      moved = path;
+      change(moved, -kStep);
+      problem.linearise(moved, down);
+    };
+    const auto slope = [](double above, double below) { return (above - below) / (2 * kStep); };
+    for (std::size_t p = 0; p < 3; ++p) {
+      differ([p](SheetProblem::Path& at, double by) { at.values[p] += by; });
+      for (std::size_t k = 0; k < system.links.size(); ++k)
+        for (std::size_t i = 0; i < 4; ++i)
+          EXPECT_NEAR(system.links[k].by_parameters[i][p], slope(up.links[k].gap[i], down.links[k].gap[i]), 1e-7);
+      for (std::size_t i = 0; i < 3; ++i)
+        EXPECT_NEAR(system.end_by_parameters[i][p], slope(up.end_gap[i], down.end_gap[i]), 1e-7);
+    }
+    for (std::size_t j = 0; j < 4; ++j) {
+      differ([j](SheetProblem::Path& at, double by) { at.nodes[3][j] += by; });
+      for (std::size_t i = 0; i < 4; ++i)
+        EXPECT_NEAR(system.links[3].by_state[i][j], slope(up.links[3].gap[i], down.links[3].gap[i]), 1e-7);
+      differ([j](SheetProblem::Path& at, double by) { at.nodes.back()[j] += by; });
+      for (std::size_t i = 0; i < 3; ++i)
+        EXPECT_NEAR(system.end_by_state[i][j], slope(up.end_gap[i], down.end_gap[i]), 1e-7);
+    }
+  }
+}
+
+TEST(SheetManifold, ShapesKeepTheMomentAboutTheTip) {
+  // Moments about the lift-off point: weight at its centre, the tip's force and moment, nothing from the floor.
+  for (const SheetShape& shape : {SheetShape{}, SheetShape{0.0, 0.8}, SheetShape{0.7, 0.0}}) {
+    for (const auto& [x, z] : {std::pair{1.0, 1.5}, {3.0, 2.0}, {6.0, 1.25}}) {
+      const auto path = solved(x, z, shape);
+      const double length = path.values[2], growth = shape.width_growth;
+      // The moment of the weight, integral of b X, by parts of X cut finely.
+      const SheetProblem::Path& p = path;
+      double weight_moment = 0;
+      const auto slope = [&](double s, const std::array<double, 5>& y) {
+        const double b = 1 + growth * (length - s), w = s + growth * s * (length - s / 2);
+        return std::array<double, 5>{y[1] / (2 * b), (p.values[0] - w) * std::cos(y[0]) - p.values[1] * std::sin(y[0]),
+                                     std::cos(y[0]), std::sin(y[0]), b * y[2]};
+      };
+      std::array<double, 5> y{};
+      for (int i = 0; i < 400; ++i) runge_kutta_step<3>(slope, length * i / 400, length / 400, y);
+      weight_moment = y[4];
+      const double weight = length + growth * length * length / 2;
+      const double tip_x = length - x;
+      const double tip_up = weight - p.values[0], tip_forward = -p.values[1];
+      EXPECT_NEAR(y[0], p.nodes.back()[0], 1e-7);
+      EXPECT_NEAR(y[3], z, 1e-7);
+      EXPECT_NEAR(tip_x * tip_up - z * tip_forward - weight_moment + shape.tip_moment, 0.0, 1e-7);
+    }
+  }
+}
+
+TEST(SheetStability, AClampedColumnBucklesAtEulersLoad) {
+  // Hardly bent, so that keeping the tip's way along the column is a constraint; it does not touch the buckling mode.
+  SheetProblem::Path column;
+  const double length = 0.05, load = 8 * std::numbers::pi * std::numbers::pi / (length * length);  // EI = 2
+  const double wave = 4 * std::numbers::pi / length;
+  for (int k = 0; k <= SheetProblem::kSegments; ++k) {
+    const double s = length * k / SheetProblem::kSegments;
+    column.nodes.push_back({1e-3 * std::sin(wave * s), 2e-3 * wave * std::cos(wave * s), s, 0.0});
+  }
+  column.values = {0.0, 0.998 * load, length};
+  EXPECT_TRUE(sheet_is_stable({}, column));
+  column.values[1] = 1.002 * load;
+  EXPECT_FALSE(sheet_is_stable({}, column));
+}
+
+}  // namespace
+}  // namespace withe

@@ -1,0 +1,98 @@
+"""Papers, and how stiff they are: strips that hang from a clamp, against beam theory, a table and a rod."""
+
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import withe
+from withe.folding import Paper, droop, measure
+
+STRIPS = np.genfromtxt(
+    Path(__file__).resolve().parent.parent / "data" / "hanging_strips.csv", delimiter=",", names=True
+)
+
+
+def test_every_strip_of_the_table_droops_so():
+    rows = STRIPS[(STRIPS["lbar_l_over_Lgb"] > 0.3) & (STRIPS["lbar_l_over_Lgb"] < 20)]
+    found = [droop(length) / length for length in rows["lbar_l_over_Lgb"]]
+    np.testing.assert_allclose(found, rows["epsilon_lh_over_l"], atol=1e-6)
+
+
+def test_a_short_strip_droops_by_linear_theory():
+    assert droop(0.1) == pytest.approx(0.1**4 / 16, rel=1e-5)  # w l^4 / 8 EI with EI = 2 w Lgb^3
+
+
+def test_a_rod_of_many_nodes_droops_as_a_strip():
+    stiffness, weight = 3e-5, 0.5  # [N m^2], [N/m]
+    lgb = (stiffness / (2 * weight)) ** (1 / 3)
+    drops = []
+    for nodes in (41, 81):
+        scene = withe.Scene(gravity=(0, 0, -9.81))
+        section = withe.Stiffness(stretch=1e3, bend=stiffness, twist=stiffness)
+        strip = scene.add_rod(
+            start=(0, 0, 0),
+            end=(2 * lgb, 0, 0),
+            nodes=nodes,
+            radius=1e-3,
+            stiffness=section,
+            line_density=weight / 9.81,
+        )
+        scene.clamp(strip.start)
+        simulation = scene.build(planar=True)
+        simulation.equilibrium()
+        drops.append(-simulation.positions(strip)[-1, 2])
+    extrapolated = (4 * drops[1] - drops[0]) / 3
+    assert extrapolated == pytest.approx(lgb * droop(2.0), rel=1e-4)
+
+
+@pytest.mark.parametrize("strip", [1.6, 2.0, 2.9])
+def test_what_droops_is_measured(strip):
+    lgb = 0.05
+    found = measure(length=strip * lgb, drop=lgb * droop(strip))
+    assert found.gravito_bending_length == pytest.approx(lgb, rel=1e-8)
+    assert found.strip == pytest.approx(strip, rel=1e-8)
+
+
+def test_the_error_is_that_of_drawn_readings():
+    random = np.random.default_rng(5)
+    error = 2e-4
+    exact = measure(length=0.1, drop=0.043, error=error)
+    drawn = [
+        measure(length=0.1 + error * a, drop=0.043 + error * b).gravito_bending_length
+        for a, b in random.normal(size=(60, 2))
+    ]
+    assert np.std(drawn) == pytest.approx(exact.error, rel=0.3)
+
+
+def test_strips_that_say_little_are_named():
+    with pytest.warns(UserWarning, match="measure one of 75 to 150 mm"):
+        measure(length=0.05, drop=0.05 * droop(1.0))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        measure(length=0.1, drop=0.05 * droop(2.0))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"length": 0.0, "drop": 0.1}, "length must be positive"),
+        ({"length": 0.1, "drop": 0.2}, "tells nothing"),
+        ({"length": 0.1, "drop": -0.1}, "drop must be positive"),
+        ({"length": 0.1, "drop": 0.04, "error": -1.0}, "error must not be negative"),
+    ],
+)
+def test_readings_that_cannot_be_are_refused(arguments, message):
+    with pytest.raises(ValueError, match=message):
+        measure(**arguments)
+
+
+def test_papers_are_as_published():
+    sizes = {"a4": 0.048, "us_letter": 0.060, "cardboard": 0.132}
+    assert {name: getattr(Paper, name)().gravito_bending_length for name in sizes} == sizes
+    assert Paper.a4().length > Paper.a4().width
+    with pytest.raises(ValueError, match="width must be positive"):
+        Paper(0.3, 0.0, 0.05)
+    with pytest.raises(ValueError, match="friction must not be negative"):
+        Paper(0.3, 0.2, 0.05, friction=-0.1)
