@@ -65,12 +65,6 @@ RegularStencils regular_stencils(const Model& model, const ElementTable& bend) {
   return out;
 }
 
-/// Where the entry of a row and a column stands in the solver's values; symmetric ones hold the lower triangle.
-std::ptrdiff_t place_of(const LinearSolver& solver, int row, int column) {
-  const bool mirrored = solver.symmetry() == Symmetry::symmetric && column > row;
-  return mirrored ? solver.offset(column, row) : solver.offset(row, column);
-}
-
 }  // namespace
 
 void ElementTable::find_offsets(const LinearSolver& solver) {
@@ -83,7 +77,7 @@ void ElementTable::find_offsets(const LinearSolver& solver) {
         if (d[i] < 0 || d[j] < 0)
           offsets_.push_back(-1);
         else
-          offsets_.push_back(static_cast<int>(place_of(solver, d[i], d[j])));
+          offsets_.push_back(static_cast<int>(solver.place(d[i], d[j])));
       }
   }
 }
@@ -210,7 +204,7 @@ void Assembler::analyse() {
   for (int column = 0; exact_ && column < pattern_.size; ++column)
     for (int k = pattern_.column_starts[at(column)]; k < pattern_.column_starts[at(column) + 1]; ++k) {
       const int row = pattern_.row_indices[at(k)];
-      entries_.push_back(place_of(*solver_, row, column));
+      entries_.push_back(solver_->place(row, column));
     }
 }
 
@@ -241,7 +235,7 @@ void Assembler::find_edge_couplings() {
 void Assembler::find_blocks() {
   blocks_.clear();
   const bool symmetric = symmetry_ == Symmetry::symmetric;
-  const auto entry = [&](int r, int c) { return place_of(*solver_, r, c); };
+  const auto entry = [&](int r, int c) { return solver_->place(r, c); };
   const auto coupled = [&](int r, int c) { return pattern_.contains(r, c); };
   for (const Constraint& c : model_.constraints) {
     Block block{c, {}, {}, {}};
@@ -299,7 +293,7 @@ void Assembler::project_matrix() {
 
 double* Assembler::entry(int row, int column, std::span<double> values) const {
   if (!pattern_.contains(row, column)) return nullptr;
-  return &values[static_cast<std::size_t>(place_of(*solver_, row, column))];
+  return &values[static_cast<std::size_t>(solver_->place(row, column))];
 }
 
 void Assembler::turn_rows(int first, const Matrix3& by, std::span<double> values) const {

@@ -35,9 +35,10 @@ class Chain {
     out.edge_bend = MatrixX2::Zero(edges, 2);
     out.added_mass.setZero(model.node_count);
     for (std::size_t r = 0; r < p_.natural_curvature.size(); ++r) {
-      out.natural_curvature.push_back(MatrixX2::Zero(p_.natural_curvature[r].rows(), 2));
+      out.natural_curvature.push_back(by.natural_curvature[r]);
       out.natural_twist.push_back(VectorX::Zero(p_.natural_twist[r].size()));
     }
+    out.rest_length = by.rest_length;
     out.loads = by.loads;
     out.spring_stiffness = by.spring_stiffness;
     out.spring_rest_length = by.spring_rest_length;
@@ -74,6 +75,7 @@ class Chain {
         out.edge_density(e) += arc / 6.0 * by_.mass_coupling(e);
         out.edge_drag(e) += arc / 6.0 * by_.drag_coupling(e);
       }
+      out.rest_length(e) += out.edge_density(e) * p_.edge_density(e) / arc;
       if (!model_.planar()) by_inertia(e) = by_.mass(model_.edge_dof[at(e)]);
     }
     for (const FrameStencil& s : model_.half) {
@@ -95,6 +97,11 @@ class Chain {
     return twist_of_arc(twist, bend1, bend2, arc.square_of_turn, arc.share);
   }
 
+  /// Minus how the stiffness of a stencil changes with the length of one of its edges, of which it carries a share.
+  static double by_length(const ByEdges& stiffness, const ByEdges& of_edge, double share) {
+    return of_edge.value == 0.0 ? 0.0 : stiffness.value * stiffness.value * share / of_edge.value;
+  }
+
   void add_stiffnesses() {
     out.edge_stretch = by_.stretch_stiffness;
     out.edge_viscous_time = by_.stretch_time;
@@ -112,6 +119,14 @@ class Chain {
           by_.bend_stiffness(i, 0) * bend1 + by_.bend_stiffness(i, 1) * bend2 + by_.bend_stiffness(i, 2) * twist;
       add_edge(a, sum.slope);
       add_edge(b, sum.slope + 3);
+      // V / K = V0 / K0 + V1 / K1.
+      for (int end = 0; end < 2; ++end) {
+        const EdgeNumbers& of = end == 0 ? of_a : of_b;
+        out.rest_length(end == 0 ? a : b) -=
+            by_.bend_stiffness(i, 0) * by_length(bend1, of.bend[0], model_.bend_share(i, end)) +
+            by_.bend_stiffness(i, 1) * by_length(bend2, of.bend[1], model_.bend_share(i, end)) +
+            by_.bend_stiffness(i, 2) * by_length(twist, of.twist, 0.5);
+      }
       out.edge_viscous_time(a) += by_.bend_time(i) * la / (la + lb);
       out.edge_viscous_time(b) += by_.bend_time(i) * lb / (la + lb);
     }
@@ -124,13 +139,15 @@ class Chain {
       const ByEdges sum =
           by_.half_stiffness(i, 0) * bend1 + by_.half_stiffness(i, 1) * bend2 + by_.half_stiffness(i, 2) * twist;
       add_edge(e, sum.slope);
+      out.rest_length(e) -= sum.value / model_.edge_arc(e);
       out.edge_viscous_time(e) += by_.half_time(i);
     }
   }
 
   /// What a stencil's natural strains say of the natural shape that a rod has at one of its own.
-  void add_shape(int rod, int stencil, double voronoi, const Vector3& by) {
-    if (rod < 0 || stencil < 0) return;
+  /// Returns what they say of its length.
+  double add_shape(int rod, int stencil, double voronoi, const Vector3& by) {
+    if (rod < 0 || stencil < 0) return 0.0;
     const auto r = static_cast<std::size_t>(rod);
     using ByShape = Dual<3>;
     const Vec3<ByShape> strain = natural_strain(p_.measure, ByShape::unknown(p_.natural_curvature[r](stencil, 0), 0),
@@ -144,15 +161,29 @@ class Chain {
     out.natural_curvature[r](stencil, 0) += sum.slope[0];
     out.natural_curvature[r](stencil, 1) += sum.slope[1];
     out.natural_twist[r](stencil) += sum.slope[2];
+    return sum_by_length(r, stencil, voronoi, by);
+  }
+
+  double sum_by_length(std::size_t r, int stencil, double voronoi, const Vector3& by) const {
+    using ByLength = Dual<1>;
+    const ByLength length = ByLength::unknown(voronoi, 0);
+    // Curvatures and lengths enter by their products alone.
+    const Vec3<ByLength> strain =
+        natural_strain(p_.measure, p_.natural_curvature[r](stencil, 0) * length,
+                       p_.natural_curvature[r](stencil, 1) * length, p_.natural_twist[r](stencil) * length, 1.0);
+    if (!model_.planar()) return (by(0) * strain.x + by(1) * strain.y + by(2) * strain.z).slope[0];
+    const Vector2& c = model_.planar_components[r];
+    return by(0) * (c(0) * strain.x + c(1) * strain.y).slope[0];
   }
 
   void add_natural() {
     for (std::size_t r = 0; r < model_.place.size(); ++r)
       for (std::size_t s = 0; s < model_.place[r].size(); ++s) {
         const int bend = model_.place[r][s].bend;
-        if (bend >= 0)
-          add_shape(static_cast<int>(r), static_cast<int>(s), model_.bend_voronoi(bend),
-                    by_.bend_natural.row(bend).transpose());
+        if (bend < 0) continue;
+        const double by_length = add_shape(static_cast<int>(r), static_cast<int>(s), model_.bend_voronoi(bend),
+                                           by_.bend_natural.row(bend).transpose());
+        for (int edge : model_.bend[at(bend)].edge) out.rest_length(edge) += 0.5 * by_length;
       }
     for (std::size_t b = 0; b < model_.bend.size(); ++b) {
       if (model_.bend_owner[b].first >= 0 || model_.bend_owner[b].second < -1) continue;
@@ -164,10 +195,12 @@ class Chain {
                   by_.bend_natural.row(static_cast<Eigen::Index>(b)).transpose());
       }
     }
-    for (std::size_t h = 0; h < model_.half.size(); ++h)
-      add_shape(model_.half_owner[h].first, model_.half_owner[h].second,
-                model_.half_voronoi(static_cast<Eigen::Index>(h)),
-                by_.half_natural.row(static_cast<Eigen::Index>(h)).transpose());
+    for (std::size_t h = 0; h < model_.half.size(); ++h) {
+      const double by_length = add_shape(model_.half_owner[h].first, model_.half_owner[h].second,
+                                         model_.half_voronoi(static_cast<Eigen::Index>(h)),
+                                         by_.half_natural.row(static_cast<Eigen::Index>(h)).transpose());
+      out.rest_length(model_.half[h].edge) += 0.5 * by_length;
+    }
   }
 
   const Model& model_;

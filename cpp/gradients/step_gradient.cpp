@@ -31,14 +31,13 @@ void StepGradient::begin(const StepTaken& step) {
   step_.emplace(step);
   const Model& model = equations_.model();
   const bool middle = step.rule == StepRule::midpoint || step.rule == StepRule::energy_momentum;
-  equations_.begin(step.start, step.parameters, step.rule, middle ? 0.5 * step.duration : step.duration);
-  if (!model.constraints.empty() && moves()) {
-    VectorX& acceleration = equations_.held_acceleration();
-    if (step.held_velocity)
-      acceleration = (*step.held_velocity - step.start.v) / step.duration;
-    else
-      acceleration.setZero(model.dof_count);
-  }
+  const bool holds = !model.constraints.empty() && moves();
+  if (holds && step.held_velocity)
+    held_acceleration_ = (*step.held_velocity - step.start.v) / step.duration;
+  else if (holds)
+    held_acceleration_.setZero(model.dof_count);
+  equations_.begin(step.start, step.parameters, step.rule, middle ? 0.5 * step.duration : step.duration,
+                   holds ? &held_acceleration_ : nullptr);
   if (step.rule == StepRule::energy_momentum) {
     z_ = step.end - step.start.q;
     set_velocity_rates(model, z_, step.duration, rates_);
@@ -82,17 +81,24 @@ void StepGradient::set_end(const StateAdjoint& state) {
     by_end_.segment<3>(dof) = cayley_spin(step_->end.segment<3>(dof)).transpose() * state.q.segment<3>(dof);
 }
 
-/// rows = -(R_z^T)^-1 zbar on what is free, and what it makes of the columns of R_z.
+/// rows = -(R_z^T)^-1 (zbar + R_z^T w) + w, the former on what is free and w the derivatives by rows of supports, and
+/// what it makes of the columns of R_z.
 void StepGradient::solve() {
   const Assembler& assembler = equations_.assembler();
+  const bool reacts = by_rows_.size() != 0;
   rows_ = -by_z_;
+  if (reacts) {
+    assembler.multiply_transposed(by_rows_, columns_);
+    rows_ -= columns_;
+  }
+  const double size = rows_.cwiseAbs().maxCoeff();
   assembler.project(rows_);
   assembler.solver().solve_transposed({rows_.data(), static_cast<std::size_t>(rows_.size())});
   assembler.project(rows_);
-  assembler.multiply_transposed(rows_, columns_);
   // A scalar that neutral modes leave alone has a gradient, one that goes with them has none.
-  const double size = by_z_.cwiseAbs().maxCoeff();
   bool follows = moves() || kFree * assembler.greatest_diagonal() * rows_.cwiseAbs().maxCoeff() <= size;
+  if (reacts) rows_ += by_rows_;
+  assembler.multiply_transposed(rows_, columns_);
   if (shifted_) {
     VectorX left = by_z_ + columns_;
     assembler.project(left);
@@ -101,7 +107,8 @@ void StepGradient::solve() {
   if (!follows) throw std::invalid_argument(kSingular);
 }
 
-void StepGradient::pull_back(StateAdjoint& state, CoefficientAdjoint& by, VectorX& held) {
+void StepGradient::pull_back(StateAdjoint& state, CoefficientAdjoint& by, HeldAdjoint& held,
+                             const SupportAdjoint* reactions) {
   const Model& model = equations_.model();
   const Assembler& assembler = equations_.assembler();
   set_end(state);
@@ -117,9 +124,15 @@ void StepGradient::pull_back(StateAdjoint& state, CoefficientAdjoint& by, Vector
   }
   start -= (end_rate() - 1.0) * by_end_;
   by_z_ = end_rate() * by_end_;
+  by_rows_.resize(0);
+  if (reactions) add_reactions(*reactions, by);
   solve();
 
-  StepAdjoint adjoint(model, rows_, by);
+  VectorX rows = rows_;
+  if (step_->rule == StepRule::energy_momentum && !model.planar())
+    for (int dof : model.frame_dof)
+      rows.segment<3>(dof) = (cayley_spin(z_.segment<3>(dof)).inverse() * rows.segment<3>(dof)).eval();
+  StepAdjoint adjoint(model, rows, by);
   for (const std::unique_ptr<Term>& term : equations_.terms())
     term->add_adjoint(equations_.problem(), data_, assembler, adjoint);
   if (moves()) {
@@ -130,11 +143,10 @@ void StepGradient::pull_back(StateAdjoint& state, CoefficientAdjoint& by, Vector
       add_frames(state, adjoint, start);
     }
   }
-  add_held(start, held);
+  add_held(adjoint, state.v, start, velocity, held);
   if (!moves()) return;
   state.q = start;
   state.v = velocity;
-  assembler.project(state.v);
 }
 
 void StepGradient::add_frames(const StateAdjoint& state, const StepAdjoint& adjoint, VectorX& start) const {
@@ -170,25 +182,6 @@ void StepGradient::add_transport(const StateAdjoint& state, const StepAdjoint& a
     const Vec3d by_s = (-k * f.inverse_length) * cross(f.tangent, u) - (k * dot(u, f.spin)) * f.tangent;
     by += by_s - dot(by_s, s) * s;
     add_to_edge(model, e, by, start);
-  }
-}
-
-/// What supports hold is prescribed: q1 there, and so z. Accelerations there are prescribed too.
-void StepGradient::add_held(VectorX& start, VectorX& held) const {
-  const Model& model = equations_.model();
-  if (model.constraints.empty()) return;
-  VectorX by = by_z_ + columns_;
-  if (moves()) {
-    VectorX force;
-    multiply(model, equations_.mass(), rows_, force);
-    const double h = equations_.problem().interval;
-    by -= force / (h * h);
-  }
-  const double share = 1.0 / end_rate();  // of z = share q1 + (1 - share) q0
-  for (const Constraint& c : model.constraints) {
-    const Vector3 part = c.held(by);
-    held.segment(c.first, c.size) += share * part.head(c.size);
-    start.segment(c.first, c.size) += (1.0 - share) * part.head(c.size);
   }
 }
 

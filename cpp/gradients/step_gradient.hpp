@@ -33,6 +33,21 @@ struct StepTaken {
   double duration;  ///< [s]; statics: 0
   const VectorX& end;
   const VectorX* held_velocity = nullptr;  ///< of supports at the end, meaningful where held; nothing: they rest
+  /// Per constraint, how much of the gain on the mean velocity before goes into that at the end; nothing: none.
+  const VectorX* held_gain = nullptr;
+};
+
+/// Derivatives of a scalar by the reactions of supports in a step, as `World::reaction` has them; or empty.
+struct SupportAdjoint {
+  MatrixX3 forces, moments;  ///< per support [1/N], [1/(N m)]; zero for those after the last row
+};
+
+/// Derivatives of a scalar by what supports prescribe, meaningful where held.
+struct HeldAdjoint {
+  VectorX pose;  ///< by where they hold at the end of a step, in coordinates of the state
+  VectorX mean;  ///< by the mean velocity of the step that is to be gone back through next [s/m], [s/rad]
+
+  explicit HeldAdjoint(const Model& model) : pose(VectorX::Zero(model.dof_count)), mean(pose) {}
 };
 
 class StepGradient {
@@ -47,16 +62,24 @@ class StepGradient {
   /// Of the last evaluation: greatest force out of balance, beyond rounding, over the greatest that there is [-].
   double imbalance() const;
   /// Makes of the adjoint of the state at the end that of the state at the start, and adds what coefficients and held
-  /// unknowns (at the end, in coordinates of the state) contribute. Throws std::invalid_argument where no gradient is
-  /// known.
-  void pull_back(StateAdjoint& state, CoefficientAdjoint& by, VectorX& held);
+  /// unknowns (at the end, in coordinates of the state) contribute. `reactions`: of this step, by which the scalar goes
+  /// besides. Throws std::invalid_argument where no gradient is known.
+  void pull_back(StateAdjoint& state, CoefficientAdjoint& by, HeldAdjoint& held,
+                 const SupportAdjoint* reactions = nullptr);
 
  private:
   void set_end(const StateAdjoint& state);
+  void add_reactions(const SupportAdjoint& by, CoefficientAdjoint& coefficients);
+  void add_reaction(const Support& support, const Vector3& by_force, const Vector3& by_moment);
+  void add_frame_reaction(int dof, CoefficientAdjoint& coefficients);
+  void add_held_inertia(int angle, CoefficientAdjoint& coefficients) const;
+  void check_reactions() const;
   void solve();
   void add_transport(const StateAdjoint& state, const StepAdjoint& adjoint, VectorX& start) const;
   void add_frames(const StateAdjoint& state, const StepAdjoint& adjoint, VectorX& start) const;
-  void add_held(VectorX& start, VectorX& held) const;
+  void add_held(const StepAdjoint& adjoint, const VectorX& end_velocity, VectorX& start, VectorX& velocity,
+                HeldAdjoint& held) const;
+  void turn_held(VectorX& start, VectorX& pose) const;
   bool moves() const { return step_->rule != StepRule::statics; }
   bool in_middle() const { return equations_.problem().in_middle(); }
   double end_rate() const { return equations_.problem().end_rate(); }
@@ -66,7 +89,8 @@ class StepGradient {
   StepData data_;
   Configuration end_;
   VectorX rates_;  ///< of velocities at the end by q1 [1/s]
-  VectorX z_, by_end_, by_z_, rows_, columns_;
+  VectorX held_acceleration_, z_, by_end_, by_z_, rows_, columns_;
+  VectorX by_rows_;  ///< of the residual, by which reactions go directly; empty: none
   std::vector<double> exact_;
   bool shifted_ = false;  ///< the factorised matrix, against neutral modes
 };

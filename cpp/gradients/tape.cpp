@@ -7,6 +7,8 @@
 #include <utility>
 
 #include "gradients/state_vector.hpp"
+#include "integrators/dynamics.hpp"
+#include "model/edge_vectors.hpp"
 #include "steps/inertia.hpp"
 
 namespace withe {
@@ -16,28 +18,11 @@ constexpr double kRounding = 1e-12;  // by which supports that rest move, of the
 
 MatrixX3 at_nodes(const Model& model, const VectorX& by) {
   MatrixX3 out(model.node_count, 3);
-  for (int i = 0; i < model.node_count; ++i) {
-    const int dof = model.node_dof[at(i)];
-    if (model.planar())
-      out.row(i) = by(dof) * model.plane->first + by(dof + 1) * model.plane->second;
-    else
-      out.row(i) = by.segment<3>(dof);
-  }
+  for (int i = 0; i < model.node_count; ++i) out.row(i) = node_vector(model, by, i).transpose();
   return out;
 }
 
 }  // namespace
-
-void add_to_nodes(const Model& model, const MatrixX3& by, VectorX& out) {
-  for (Eigen::Index i = 0; i < by.rows(); ++i) {
-    const int dof = model.node_dof[static_cast<std::size_t>(i)];
-    const Vector3 row = by.row(i);
-    if (model.planar())
-      out.segment<2>(dof) += Vector2(row.dot(model.plane->first), row.dot(model.plane->second));
-    else
-      out.segment<3>(dof) += row;
-  }
-}
 
 /// Goes through the states of a run again, and back.
 class Tape::Player {
@@ -89,21 +74,40 @@ class Tape::Player {
   VectorX held_;
 };
 
-Tape::Tape(const Model& model, EquationOptions options, State first, Parameters parameters)
+Tape::Tape(const Model& model, EquationOptions options, State first, const Parameters& parameters)
     : model_(model),
       options_(options),
       first_(std::move(first)),
-      parameters_(std::move(parameters)),
+      acting_(parameters),
       last_(first_.q),
       last_velocity_(first_.v) {}
 
-void Tape::record(StepRule rule, double duration, const VectorX& end, const State& after, const char* unknown) {
-  steps_.push_back({rule, duration, end, held_velocities(after.v), after.contacts, unknown});
+void Tape::record(const AcceptedStep& step) {
+  const State& after = step.after;
+  acting_.record(steps_.size(), step.parameters);
+  steps_.push_back({step.rule, step.duration, after.time, step.end, held_velocities(after.v), held_gains(step),
+                    step.reached, after.contacts, step.reacts, step.unknown});
   const VectorX before = held_velocities(last_velocity_);
   const double moved = steps_.back().held.norm() + before.norm();
-  if (moved * std::abs(duration) <= kRounding * std::max(model_.length_scale, 1.0)) steps_.back().held.resize(0);
+  if (moved * std::abs(step.duration) <= kRounding * std::max(model_.length_scale, 1.0)) {
+    steps_.back().held.resize(0);
+    steps_.back().gain.resize(0);
+  }
   last_ = after.q;
   last_velocity_ = after.v;
+}
+
+VectorX Tape::held_gains(const AcceptedStep& step) const {
+  const Motion& motion = step.after.motion;
+  if (step.rule == StepRule::backward_euler || motion.known < 2 || model_.constraints.empty()) return {};
+  VectorX out = VectorX::Zero(static_cast<Eigen::Index>(model_.constraints.size()));
+  for (std::size_t i = 0; i < model_.constraints.size(); ++i) {
+    const Constraint& c = model_.constraints[i];
+    const Vector3 now = c.held(motion.velocity[0]), gain = now - c.held(motion.velocity[1]);
+    if (now.norm() > 0.0 && carries_on(now, gain))
+      out(static_cast<Eigen::Index>(i)) = 0.5 * step.duration / (motion.time[0] - motion.time[1]);
+  }
+  return out;
 }
 
 VectorX Tape::held_velocities(const VectorX& v) const {
@@ -121,6 +125,7 @@ VectorX Tape::held_velocities(const VectorX& v) const {
 void Tape::cut(long count, const State& after) {
   if (count >= this->count()) return;
   steps_.resize(static_cast<std::size_t>(count));
+  acting_.cut(steps_.size());
   last_ = after.q;
   last_velocity_ = after.v;
 }
@@ -129,10 +134,8 @@ void Tape::refuse(const std::string& why) {
   if (refused_.empty()) refused_ = why;
 }
 
-bool Tape::continues(const State& state, const Parameters& parameters) const {
-  return state.q.size() == last_.size() && parameters.version == parameters_.version &&
-         parameters.natural_version == parameters_.natural_version && parameters.loads == parameters_.loads &&
-         state.q == last_ && state.v == last_velocity_;
+bool Tape::continues(const State& state) const {
+  return state.q.size() == last_.size() && state.q == last_ && state.v == last_velocity_;
 }
 
 void Tape::check_known() const {
@@ -142,8 +145,7 @@ void Tape::check_known() const {
   if (!why.empty()) throw std::invalid_argument("no gradient is known of this run: " + why);
 }
 
-void Tape::walk_back(const std::function<void(std::size_t, StepGradient&)>& visit) const {
-  Player player(*this);
+void Tape::walk_back(Player& player, const std::function<void(const Passage&)>& visit) const {
   const auto stride = static_cast<std::size_t>(std::ceil(std::sqrt(static_cast<double>(steps_.size()) + 1.0)));
   std::vector<State> starts;  // of every stretch of so many steps
   State state = first_;
@@ -152,6 +154,8 @@ void Tape::walk_back(const std::function<void(std::size_t, StepGradient&)>& visi
     player.advance(steps_[k], state);
   }
   std::vector<State> states;
+  ActingNumbers::Player acting;
+  std::size_t stretch = acting_.count() - 1;
   for (std::size_t k = steps_.size(); k-- > 0;) {
     const std::size_t first = k / stride * stride;
     if (k == steps_.size() - 1 || k % stride == stride - 1) {
@@ -162,39 +166,107 @@ void Tape::walk_back(const std::function<void(std::size_t, StepGradient&)>& visi
       }
     }
     const Step& step = steps_[k];
+    while (acting_.first(stretch) > k) --stretch;
+    const Parameters& parameters = acting_.play(model_, stretch, acting);
     StepGradient& gradient = player.gradient(step.rule);
-    gradient.begin({states[k - first], parameters_, step.rule, step.duration, step.end, player.held_velocity(step)});
-    visit(k, gradient);
+    gradient.begin({states[k - first], parameters, step.rule, step.duration, step.end, player.held_velocity(step),
+                    step.gain.size() != 0 ? &step.gain : nullptr});
+    const std::function<State()> end = [&] {
+      State after = states[k - first];
+      player.advance(step, after);
+      return after;
+    };
+    visit({k, stretch, gradient, parameters, end});
   }
 }
 
-RunGradient Tape::gradient(std::vector<MomentAdjoint> moments) const {
-  check_known();
-  std::sort(moments.begin(), moments.end(),
-            [](const MomentAdjoint& a, const MomentAdjoint& b) { return a.steps < b.steps; });
-  if (!moments.empty() && (moments.front().steps < 0 || moments.back().steps > count()))
-    throw std::invalid_argument("a moment lies outside of the run");
-
-  StateAdjoint adjoint{VectorX::Zero(model_.dof_count), VectorX::Zero(model_.dof_count)};
-  CoefficientAdjoint coefficients(model_, parameters_.loads.rows());
-  VectorX held = VectorX::Zero(model_.dof_count);
-  const auto add_moments = [&](std::size_t steps) {
-    for (; !moments.empty() && moments.back().steps == static_cast<long>(steps); moments.pop_back()) {
-      add_to_nodes(model_, moments.back().positions, adjoint.q);
-      add_to_nodes(model_, moments.back().velocities, adjoint.v);
+/// What a scalar depends on, by the number of steps before, and by the step whose reactions it takes.
+class Tape::Moments {
+ public:
+  Moments(const Tape& tape, const std::vector<MomentAdjoint>& moments, const ParameterVisitor& visit)
+      : tape_(tape), moments_(moments), visit_(visit), left_(moments.size()) {
+    long last = 0;
+    for (const MomentAdjoint& moment : moments_) {
+      if (moment.steps < last || moment.steps > tape.count())
+        throw std::invalid_argument("a moment lies outside of the run");
+      last = moment.steps;
+      moment.by.check(tape.model_);
+      if (moment.by.has_reactions()) reactions_.emplace_back(reacting_step(moment.steps), &moment.by.reactions);
     }
-  };
-  walk_back([&](std::size_t k, StepGradient& gradient) {
-    add_moments(k + 1);
-    gradient.pull_back(adjoint, coefficients, held);
+  }
+
+  /// Adds those after so many steps; `state()` is the one then.
+  void add(std::size_t steps, const Assembler& assembler, const Parameters& parameters,
+           const std::function<State()>& state, StateAdjoint& adjoint) {
+    for (; left_ > 0 && moments_[left_ - 1].steps == static_cast<long>(steps); --left_) {
+      const ReadoutAdjoint& by = moments_[left_ - 1].by;
+      add_unknowns(tape_.model_, by, adjoint);
+      if (!by.needs_state()) continue;
+      CoefficientAdjoint coefficients(tape_.model_, parameters.loads.rows());
+      add_readouts(tape_.model_, assembler, parameters, state(), by, adjoint, coefficients);
+      const double time = steps == 0 ? tape_.first_.time : tape_.steps_[steps - 1].time;
+      visit_(static_cast<long>(steps), static_cast<long>(left_) - 1, time,
+             parameter_gradient(tape_.model_, parameters, coefficients));
+    }
+  }
+
+  /// By the reactions of a step; or nothing. To be asked from the last step on.
+  const SupportAdjoint* reactions(std::size_t step) {
+    if (reactions_.empty() || reactions_.back().first != step) return nullptr;
+    const SupportAdjoint* found = reactions_.back().second;
+    reactions_.pop_back();
+    return found;
+  }
+
+ private:
+  std::size_t reacting_step(long steps) const {
+    for (long k = steps; k-- > 0;)
+      if (tape_.steps_[static_cast<std::size_t>(k)].reacts) return static_cast<std::size_t>(k);
+    throw std::invalid_argument(
+        "reactions at the start of a run come from before it, and have no gradient: give zeros for the first frame");
+  }
+
+  const Tape& tape_;
+  const std::vector<MomentAdjoint>& moments_;
+  const ParameterVisitor& visit_;
+  std::size_t left_;
+  std::vector<std::pair<std::size_t, const SupportAdjoint*>> reactions_;
+};
+
+InitialGradient Tape::gradient(const std::vector<MomentAdjoint>& given, const ParameterVisitor& visit,
+                               const PoseVisitor& visit_poses) const {
+  check_known();
+  Moments moments(*this, given, visit);
+  StateAdjoint adjoint{VectorX::Zero(model_.dof_count), VectorX::Zero(model_.dof_count)};
+  const CoefficientAdjoint none(model_, acting_.load_rows());
+  CoefficientAdjoint coefficients = none;
+  HeldAdjoint held(model_);
+  double time = first_.time;
+  bool begins = true;
+  Player player(*this);
+  walk_back(player, [&](const Passage& passage) {
+    const std::size_t k = passage.step;
+    moments.add(k + 1, passage.gradient.equations().assembler(), passage.parameters, passage.end, adjoint);
+    if (begins) time = acting_time(steps_[k]);
+    held.pose.setZero();
+    passage.gradient.pull_back(adjoint, coefficients, held, moments.reactions(k));
+    if (visit_poses) visit_poses(static_cast<long>(k), steps_[k].reached, by_poses(model_, steps_[k].end, held.pose));
+    begins = k == acting_.first(passage.stretch) || k == 0;
+    if (!begins) return;
+    visit(static_cast<long>(k), -1, time, parameter_gradient(model_, passage.parameters, coefficients));
+    coefficients = none;
   });
-  add_moments(0);
-  return {parameter_gradient(model_, parameters_, coefficients),
-          {at_nodes(model_, adjoint.q), at_nodes(model_, adjoint.v)}};
+  if (steps_.empty()) visit(0, -1, time, parameter_gradient(model_, acting_.start(), coefficients));
+  const StepRule rule = steps_.empty() ? StepRule::backward_euler : steps_.front().rule;
+  const Assembler& assembler = player.gradient(rule).equations().assembler();
+  assembler.project(adjoint.v);
+  moments.add(0, assembler, acting_.start(), [&] { return first_; }, adjoint);
+  return {at_nodes(model_, adjoint.q), at_nodes(model_, adjoint.v)};
 }
 
 RunJacobian Tape::jacobian() const {
   check_known();
+  if (acting_.count() > 1) throw std::invalid_argument("no Jacobian is known of a run in which something was set");
   const SparseMatrix basis = free_basis(model_), back = basis.transpose();
   const Eigen::Index free = basis.cols();
   std::vector<StateAdjoint> adjoints;
@@ -202,16 +274,19 @@ RunJacobian Tape::jacobian() const {
     adjoints.push_back({VectorX::Zero(model_.dof_count), VectorX::Zero(model_.dof_count)});
     (row < free ? adjoints.back().q : adjoints.back().v) = basis.col(row % free);
   }
-  std::vector<CoefficientAdjoint> coefficients(adjoints.size(), CoefficientAdjoint(model_, parameters_.loads.rows()));
-  VectorX held = VectorX::Zero(model_.dof_count);
-  walk_back([&](std::size_t, StepGradient& gradient) {
-    for (std::size_t row = 0; row < adjoints.size(); ++row) gradient.pull_back(adjoints[row], coefficients[row], held);
+  std::vector<CoefficientAdjoint> coefficients(adjoints.size(), CoefficientAdjoint(model_, acting_.load_rows()));
+  HeldAdjoint held(model_);
+  Player player(*this);
+  walk_back(player, [&](const Passage& passage) {
+    for (std::size_t row = 0; row < adjoints.size(); ++row)
+      passage.gradient.pull_back(adjoints[row], coefficients[row], held);
   });
+  const Parameters& parameters = acting_.start();
   RunJacobian out{MatrixX(2 * free, 2 * free), {}};
   for (std::size_t row = 0; row < adjoints.size(); ++row) {
     out.state.row(static_cast<Eigen::Index>(row)) << (back * adjoints[row].q).transpose(),
         (back * adjoints[row].v).transpose();
-    out.rows.push_back({parameter_gradient(model_, parameters_, coefficients[row]), {}});
+    out.rows.push_back(parameter_gradient(model_, parameters, coefficients[row]));
   }
   return out;
 }

@@ -6,8 +6,10 @@
 #include <string>
 #include <vector>
 
+#include "gradients/acting.hpp"
+#include "gradients/held_gradient.hpp"
 #include "gradients/parameter_gradient.hpp"
-#include "gradients/step_gradient.hpp"
+#include "gradients/readout_gradient.hpp"
 
 namespace withe {
 
@@ -17,68 +19,100 @@ struct InitialGradient {
   MatrixX3 velocities;  ///< per node [s/m]
 };
 
-struct RunGradient {
-  ParameterGradient parameters;
-  InitialGradient initial;
-};
+/// Takes derivatives of a scalar by what acted from a step on until the next that it is given; or by what a read-out at
+/// a moment takes, then `moment` is its place among those given, else -1. `time`: when these numbers acted, in the last
+/// of the steps [s]. From the end of a run to its start.
+using ParameterVisitor = std::function<void(long step, long moment, double time, const ParameterGradient&)>;
 
 /// Derivatives of the state at the end of a run by that at its start and by what acts, a row each for the numbers of a
 /// state vector (state_vector.hpp).
 struct RunJacobian {
   MatrixX state;
-  std::vector<RunGradient> rows;  ///< without the state at the start
+  std::vector<ParameterGradient> rows;
 };
 
-/// What a scalar depends on at a moment of a run: after so many steps.
+/// What a scalar depends on at a moment of a run, after so many steps; moments in the order of time.
 struct MomentAdjoint {
   long steps = 0;
-  MatrixX3 positions, velocities;  ///< per node; or empty
+  ReadoutAdjoint by;
 };
 
-/// Adds to the places of nodes what is given per node, in the axes of space.
-void add_to_nodes(const Model& model, const MatrixX3& by, VectorX& out);
+/// Takes derivatives by poses of supports at the end of a step, and per support how far it had come then from where its
+/// motion began, from 0 to 1 (empty: all are there).
+using PoseVisitor = std::function<void(long step, const VectorX& reached, const PoseAdjoint&)>;
+
+/// A step that has been accepted.
+struct AcceptedStep {
+  StepRule rule;
+  double duration;
+  const VectorX& end;             ///< q1
+  const State& after;             ///< at its end
+  const Parameters& parameters;   ///< as they acted
+  VectorX reached;                ///< see `PoseVisitor`
+  bool reacts = true;             ///< whether reactions are those of this step from here on
+  const char* unknown = nullptr;  ///< why no gradient goes through it, unless it is cut off again
+};
 
 class Tape {
  public:
   /// Of a run that begins so; these are kept.
-  Tape(const Model& model, EquationOptions options, State first, Parameters parameters);
+  Tape(const Model& model, EquationOptions options, State first, const Parameters& parameters);
 
   long count() const { return static_cast<long>(steps_.size()); }
-  /// Notes a step to q1 that has been accepted, at whose end the state is `after`; `unknown`: why no gradient goes
-  /// through it, unless it is cut off again.
-  void record(StepRule rule, double duration, const VectorX& end, const State& after, const char* unknown = nullptr);
+  void record(const AcceptedStep& step);
+  /// What acts from here on is to be told apart from what acted before.
+  void divide() { acting_.divide(); }
   /// Forgets all but so many.
   void cut(long count, const State& after);
   /// Says why no gradient goes through this run; the first reason stays.
   void refuse(const std::string& why);
-  /// Whether that is what the last step led to, and what acts is what acted.
-  bool continues(const State& state, const Parameters& parameters) const;
+  /// Whether that is what the last step led to.
+  bool continues(const State& state) const;
+  /// Whether these are as many loads as at the start.
+  bool has_loads(const Parameters& parameters) const { return parameters.loads.rows() == acting_.load_rows(); }
 
   /// Throws std::invalid_argument where none is known.
-  RunGradient gradient(std::vector<MomentAdjoint> moments) const;
-  /// Likewise; costs a solve of each step for every row.
+  /// `visit_poses` may be empty.
+  InitialGradient gradient(const std::vector<MomentAdjoint>& moments, const ParameterVisitor& visit,
+                           const PoseVisitor& visit_poses) const;
+  /// Likewise, of a run in which nothing was set; costs a solve of each step for every row.
   RunJacobian jacobian() const;
 
  private:
   struct Step {
     StepRule rule;
-    double duration;
+    double duration, time;  ///< and that at its end [s]
     VectorX end;
     VectorX held;  ///< velocities at its end of what supports hold, one after the other; none: they rest, as before it
+    VectorX gain;  ///< see `StepTaken::held_gain`; none: nothing
+    VectorX reached;
     std::vector<ContactRecord> contacts;  ///< at its end
-    const char* unknown;                  ///< why no gradient goes through it, if so
+    bool reacts;
+    const char* unknown;  ///< why no gradient goes through it, if so
   };
   class Player;
+  class Moments;
   VectorX held_velocities(const VectorX& v) const;
+  VectorX held_gains(const AcceptedStep& step) const;
 
   void check_known() const;
-  /// Goes back through the steps: `visit(k, gradient)` with that of step k, begun.
-  void walk_back(const std::function<void(std::size_t, StepGradient&)>& visit) const;
+  /// When the numbers act that a step has [s].
+  static double acting_time(const Step& step) {
+    return step.rule == StepRule::backward_euler ? step.time : step.time - 0.5 * step.duration;
+  }
+  /// A step that is gone back through: its gradient has begun, `end` makes the state that it led to.
+  struct Passage {
+    std::size_t step, stretch;
+    StepGradient& gradient;
+    const Parameters& parameters;
+    const std::function<State()>& end;
+  };
+  void walk_back(Player& player, const std::function<void(const Passage&)>& visit) const;
 
   Model model_;
   EquationOptions options_;
   State first_;
-  Parameters parameters_;
+  ActingNumbers acting_;
   std::vector<Step> steps_;
   VectorX last_, last_velocity_;  ///< what the last step led to
   std::string refused_;

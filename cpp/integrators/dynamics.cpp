@@ -86,11 +86,10 @@ void find_held_velocity(const Model& model, const StepPlan& plan, const State& s
   VectorX& v = work.held_velocity;
   v = (work.held.q - state.q) / plan.dt;
   if (plan.rule == StepRule::backward_euler || state.motion.known == 0) return;
-  constexpr double kJump = 0.75;  // of it; from rest at an even acceleration, the second step is 2/3 faster
   const double share = 0.5 * plan.dt / (state.time + 0.5 * plan.dt - state.motion.time[0]);
   for (const Constraint& c : model.constraints) {
     const Vector3 now = c.held(v), gain = now - c.held(state.motion.velocity[0]);
-    if (gain.norm() <= kJump * now.norm()) v.segment(c.first, c.size) += share * gain.head(c.size);
+    if (carries_on(now, gain)) v.segment(c.first, c.size) += share * gain.head(c.size);
   }
 }
 
@@ -192,13 +191,14 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
   const bool euler = plan.rule == StepRule::backward_euler;
   const double dt = plan.dt, h = euler ? dt : 0.5 * dt;
   if (!work.held.reachable) return result;
-  equations.begin(state, parameters, plan.rule, h);
+  const bool holds = !model.constraints.empty();
+  if (holds) {
+    find_held_velocity(model, plan, state, work);
+    work.held_acceleration = (work.held_velocity - state.v) / dt;
+  }
+  equations.begin(state, parameters, plan.rule, h, holds ? &work.held_acceleration : nullptr);
   if (equations.contact() && equations.contact()->blocked()) return result;
   if (!begin_flow(equations, dt, euler, state, work)) return result;
-  if (!model.constraints.empty()) {
-    find_held_velocity(model, plan, state, work);
-    equations.held_acceleration() = (work.held_velocity - state.v) / dt;
-  }
   result.newton = solve_inner(equations, newton, options, plan, h, state, predictor, work);
   if (!result.newton.converged) return result;
   VectorX& q1 = work.move;

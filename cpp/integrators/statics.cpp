@@ -385,7 +385,6 @@ class Statics {
 
 StaticResult find_equilibrium(Equations& equations, const Newton& newton, const Options& options,
                               Parameters& parameters, const Boundary& boundary, State& state, NewtonWorkspace& work) {
-  equations.held_acceleration().resize(0);  // that of the last time step, if there was one
   return Statics(equations, newton, options, parameters, boundary, state, work).run();
 }
 

@@ -1,10 +1,26 @@
 #pragma once
-/// Vectors of edges among the unknowns, in space.
+/// Vectors of nodes and edges among the unknowns, in space.
 
 #include "geometry/vec3.hpp"
 #include "model/model.hpp"
 
 namespace withe {
+
+/// Of a node, in the axes of space: velocities, or what multiplies rows; in a plane positions are from its origin.
+inline Vector3 node_vector(const Model& model, const VectorX& v, int node) {
+  const int dof = model.node_dof[at(node)];
+  if (!model.planar()) return v.segment<3>(dof);
+  return v(dof) * model.plane->first + v(dof + 1) * model.plane->second;
+}
+
+/// Adds to the rows of a node what is given in the axes of space.
+inline void add_to_node(const Model& model, int node, const Vector3& by, VectorX& rows) {
+  const int dof = model.node_dof[at(node)];
+  if (model.planar())
+    rows.segment<2>(dof) += Vector2(by.dot(model.plane->first), by.dot(model.plane->second));
+  else
+    rows.segment<3>(dof) += by;
+}
 
 /// From the tail of an edge to its head; of a configuration, of velocities, or of what multiplies rows.
 inline Vec3d edge_vector(const Model& model, const VectorX& q, int edge) {

@@ -50,9 +50,7 @@ Vector2 discrete_curvature(const Vector2& smooth, double voronoi) {
 }
 
 Vector2 smooth_curvature(const Vector2& discrete, double voronoi) {
-  const double k = discrete.norm();
-  if (k == 0.0) return Vector2::Zero();
-  return (2.0 * std::atan(0.5 * k) / (k * voronoi)) * discrete;
+  return smooth_over_discrete(discrete(0), discrete(1), voronoi) * discrete;
 }
 
 MatrixX2 smooth_curvatures(const MatrixX2& discrete, const VectorX& voronoi) {

@@ -193,4 +193,21 @@ void accept_configuration(const Model& model, const VectorX& q, const Configurat
   accept_frames(model, configuration, state);
 }
 
+Matrix3 edge_directors(const Model& model, const Configuration& c, int edge) {
+  Matrix3 out;
+  const EdgeFrame<double>& f = c.edge[at(edge)];
+  if (!model.planar()) {
+    out << to_eigen(f.d1), to_eigen(f.d2), to_eigen(f.tangent);
+    return out;
+  }
+  // In its plane an edge turns its drawn directors about the normal.
+  const Vector3 drawn = to_eigen(model.initial_tangent[at(edge)]), d1 = to_eigen(model.initial_director[at(edge)]);
+  const Vector3 t = f.tangent.x * model.plane->first + f.tangent.y * model.plane->second;
+  const Vector3& n = model.plane->normal;
+  const double angle = std::atan2(drawn.cross(t).dot(n), drawn.dot(t));
+  const Vector3 now = rotation_exp(angle * n) * d1;
+  out << now, t.cross(now), t;
+  return out;
+}
+
 }  // namespace withe

@@ -89,6 +89,8 @@ struct Configuration {
 
 /// Fills `out` from q, measured from the frames of `state`. Does not allocate after the first call.
 void compute_configuration(const Model& model, const State& state, const VectorX& q, Configuration& out);
+/// Directors of an edge in the axes of space: columns d1, d2, t.
+Matrix3 edge_directors(const Model& model, const Configuration& c, int edge);
 
 /// Both of an explicit step, in space: `out` from q, measured from where the edges are there, and of `next` all that
 /// `accept_configuration` sets. Returns the smallest cosine of the angles by which edges turn on the way from `state`.

@@ -38,6 +38,17 @@ Scalar discrete_over_smooth(const Scalar& kappa1, const Scalar& kappa2, double v
   return chain(phi, 2.0 * t, 1.0 + t * t) / k;
 }
 
+/// Its inverse, 2 atan(|kappa| / 2) / (|kappa| V), which makes a curvature of the smooth rod of a discrete one [1/m].
+template <class Scalar>
+Scalar smooth_over_discrete(const Scalar& kappa1, const Scalar& kappa2, double voronoi) {
+  using std::sqrt;
+  const Scalar square = kappa1 * kappa1 + kappa2 * kappa2;
+  if (value_of(square) < 1e-8) return 1.0 / voronoi - (1.0 / (12.0 * voronoi)) * square;
+  const Scalar k = sqrt(square);
+  const double half = 0.5 * value_of(k);
+  return chain(k, 2.0 * std::atan(half), 1.0 / (1.0 + half * half)) / (k * voronoi);
+}
+
 /// Strains of bending and twisting of a naturally curved and twisted stencil.
 template <class Scalar>
 Vec3<Scalar> natural_strain(const BendMeasure& measure, const Scalar& kappa1, const Scalar& kappa2, const Scalar& twist,

@@ -50,6 +50,10 @@ class LinearSolver {
   /// Where entry (row, column) lives in values(). Symmetric: only row >= column may be asked for.
   /// Throws std::invalid_argument outside the pattern.
   virtual std::ptrdiff_t offset(int row, int column) const = 0;
+  /// Where either of the two entries lives that are one where the matrix is symmetric.
+  std::ptrdiff_t place(int row, int column) const {
+    return symmetry() == Symmetry::symmetric && column > row ? offset(column, row) : offset(row, column);
+  }
   /// The matrix's entries; kept intact by factorize(). Zeros may be added to kPadding numbers past their end.
   virtual std::span<double> values() = 0;
   virtual std::span<const double> values() const = 0;

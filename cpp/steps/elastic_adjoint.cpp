@@ -4,7 +4,8 @@
 // change from the start: s - s0 under backward Euler, (s1 - s0) / 2 under the midpoint rules. Everything but g is a
 // number, so what multiplies rows^T is (s - n) times `along` = rows^T g, and so on.
 
-#include <stdexcept>
+#include <array>
+#include <utility>
 
 #include "elasticity/discrete_elements.hpp"
 #include "geometry/rotation.hpp"
@@ -70,11 +71,18 @@ class DiscreteAdjoint {
       : problem_(problem),
         adjoint_(adjoint),
         back_(-data.change),
+        back_q_(problem.start->q),
         start_(problem.start_configuration),
         forth_{problem.start_configuration, data.configuration, data.end_configuration, data.end, data.change, false},
-        backwards_{data.end_configuration, data.configuration, start_, problem.start->q, back_, false},
+        backwards_{data.end_configuration, data.configuration, start_, back_q_, back_, false},
         rows_(adjoint.rows) {
     const Model& model = problem.model;
+    for (int dof : model.frame_dof) {
+      if (model.planar()) break;
+      // Backwards a frame turns by the opposite Cayley vector. Its rows are moments.
+      back_q_.segment<3>(dof) = back_.segment<3>(dof);
+      rows_.segment<3>(dof) = (cayley_spin(data.z.segment<3>(dof)) * rows_.segment<3>(dof)).eval();
+    }
     for (int e = 0; !model.planar() && e < model.edge_count; ++e) {
       // The start's angles as those of a step backwards: counted from where the end's tangents are.
       EdgeFrame<double>& start = start_.edge[at(e)];
@@ -86,11 +94,12 @@ class DiscreteAdjoint {
     }
   }
 
-  /// `evaluate(step, k, with_matrix, local)`, with stiffnesses and natural strains `k`.
+  /// `evaluate(step, k, with_matrix, local)`, with stiffnesses and natural strains `k`; `frame`: -1, or whose unknowns
+  /// are among the element's.
   template <class Evaluate>
   void add_turning(const ElementTable& table, int i, const TurnCoefficients& k,
-                   const std::vector<std::pair<int, int>>& angles, const Evaluate& evaluate, Columns3& by_stiffness,
-                   Columns3& by_natural) {
+                   const std::vector<std::pair<int, int>>& angles, int frame, const Evaluate& evaluate,
+                   Columns3& by_stiffness, Columns3& by_natural) {
     double rows[kMaxLocal];
     gather(table, i, rows_, rows);
     const auto work = [&](const TurnCoefficients& of) {
@@ -108,27 +117,38 @@ class DiscreteAdjoint {
       (s == 0 ? unit.natural.x : s == 1 ? unit.natural.y : unit.natural.z) += 1.0;
       by_natural(i, s) += k.stiffness[s] * (work(unit) - now);
     }
-    add_ends(table, i, rows, angles, [&](const DiscreteStep& step, Local& local) { evaluate(step, k, true, local); });
+    const auto [start, end] = add_ends(table, i, rows, angles,
+                                       [&](const DiscreteStep& step, Local& local) { evaluate(step, k, true, local); });
+    if (frame < 0 || problem_.model.planar()) return;
+    const int dof = problem_.model.frame_dof[at(frame)];
+    const auto by_spin = [&](const VectorX& q, const LocalVector& by) -> Vector3 {
+      return cayley_spin(q.segment<3>(dof)).transpose().inverse() * Eigen::Map<const Vector3>(by.data() + 7);
+    };
+    adjoint_.start_spin.row(frame) += by_spin(back_q_, start).transpose();
+    adjoint_.end_spin.row(frame) += by_spin(forth_.end_q, end).transpose();
   }
 
-  /// q1 = 2 z - q0, and matrices of steps are twice derivatives by their ends.
+  using LocalVector = std::array<double, kMaxLocal>;
+  /// q1 = 2 z - q0, and matrices of steps are twice derivatives by their ends. Returns those by the start and by the
+  /// end.
   template <class Evaluate>
-  void add_ends(const ElementTable& table, int element, const double* rows,
-                const std::vector<std::pair<int, int>>& angles, const Evaluate& evaluate) {
+  std::pair<LocalVector, LocalVector> add_ends(const ElementTable& table, int element, const double* rows,
+                                               const std::vector<std::pair<int, int>>& angles,
+                                               const Evaluate& evaluate) {
     Local by_end, by_start;
     evaluate(forth_, by_end);
     evaluate(backwards_, by_start);
     const int* dofs = table.dofs(element);
-    double end[kMaxLocal], start[kMaxLocal];
-    for (int c = 0; c < table.width(); ++c) {
-      end[c] = start[c] = 0.0;
+    LocalVector end{}, start{};
+    for (std::size_t c = 0; c < static_cast<std::size_t>(table.width()); ++c) {
       for (int r = 0; r < table.width(); ++r) {
         end[c] += 0.5 * rows[r] * by_end.hessian[r][c];
         start[c] += 0.5 * rows[r] * by_start.hessian[r][c];
       }
       if (dofs[c] >= 0) adjoint_.start[dofs[c]] += start[c] - end[c];
     }
-    for (const auto& [place, edge] : angles) {
+    for (const auto& [angle, edge] : angles) {
+      const auto place = static_cast<std::size_t>(angle);
       adjoint_.start_turn[edge] += start[place];
       adjoint_.end_turn[edge] += end[place];
       // From angles so counted to turns of directors that are carried along with the edge.
@@ -138,6 +158,7 @@ class DiscreteAdjoint {
         adjoint_.start[tail + i] += start[place] * start_.edge[at(edge)].spin[i];
       }
     }
+    return {start, end};
   }
 
   const DiscreteStep& forth() const { return forth_; }
@@ -146,7 +167,7 @@ class DiscreteAdjoint {
  private:
   const StepProblem& problem_;
   StepAdjoint& adjoint_;
-  VectorX back_;
+  VectorX back_, back_q_;
   Configuration start_;
   DiscreteStep forth_, backwards_;
   VectorX rows_;  ///< with what those of nodes make of torques among those of angles
@@ -157,11 +178,6 @@ class DiscreteAdjoint {
 void ElasticForces::add_discrete_adjoint(const StepProblem& problem, const StepData& data, const Assembler& assembler,
                                          StepAdjoint& adjoint) const {
   const Model& model = problem.model;
-  for (const FrameStencil& half : model.half)
-    if (!model.planar() && adjoint.rows.segment<3>(model.frame_dof[at(half.frame)]).squaredNorm() > 0.0)
-      throw std::invalid_argument(
-          "no gradient is known yet through joints in energy-momentum steps in space: take integrator "
-          "'implicit_midpoint' with adaptive=False, or 'backward_euler'");
   const ElasticCoefficients& k = problem.elastic;
   CoefficientAdjoint& by = adjoint.coefficients;
   DiscreteAdjoint discrete(problem, data, adjoint);
@@ -183,7 +199,7 @@ void ElasticForces::add_discrete_adjoint(const StepProblem& problem, const StepD
     std::vector<std::pair<int, int>> angles;
     if (!planar) angles = {{3, model.bend[at(b)].edge[0]}, {7, model.bend[at(b)].edge[1]}};
     discrete.add_turning(
-        assembler.bend, b, bend_coefficients(k, b), angles,
+        assembler.bend, b, bend_coefficients(k, b), angles, -1,
         [&](const DiscreteStep& step, const TurnCoefficients& of, bool with_matrix, Local& out) {
           discrete_bend_local(model, of, step, b, with_matrix, out);
         },
@@ -193,7 +209,7 @@ void ElasticForces::add_discrete_adjoint(const StepProblem& problem, const StepD
     std::vector<std::pair<int, int>> angles;
     if (!planar) angles = {{3, model.half[at(h)].edge}};
     discrete.add_turning(
-        assembler.half, h, half_coefficients(k, h), angles,
+        assembler.half, h, half_coefficients(k, h), angles, model.half[at(h)].frame,
         [&](const DiscreteStep& step, const TurnCoefficients& of, bool with_matrix, Local& out) {
           discrete_half_local(model, of, step, h, with_matrix, out);
         },
@@ -219,6 +235,8 @@ void ElasticForces::add_adjoint(const StepProblem& problem, const StepData& data
     stretch_gradients(model, data.configuration, e, part.middle);
     const double along = model.edge_length(e) * part.along(0);
     if (elastic) by.stretch_stiffness(e) += (part.middle.strain[0] - k.stretch_natural(e)) * along;
+    if (elastic)
+      by.rest_length(e) -= k.stretch_stiffness(e) * (1.0 + part.middle.strain[0]) / model.edge_length(e) * along;
     if (!viscous) continue;
     stretch_gradients(model, problem.start_configuration, e, part.start);
     if (middle) stretch_gradients(model, data.end_configuration, e, part.end);
@@ -263,13 +281,13 @@ void ElasticForces::add_adjoint(const StepProblem& problem, const StepData& data
     if (!model.planar()) part.angles = {{3, model.half[at(h)].edge}};
     add_turning(part, h, k.half_stiffness, k.half_natural, problem.parameters->half_viscous_time(h), kv.half_stiffness,
                 by.half_stiffness, by.half_natural, by.half_time(h));
-    if (model.planar() || !problem.moves() || !elastic) continue;
+    if (model.planar() || !problem.moves() || (!elastic && !viscous)) continue;
     // How the frame's turns enter, beyond its unknowns.
     const int frame = model.half[at(h)].frame;
     const Vector3 w = data.z.segment<3>(model.frame_dof[at(frame)]);
     Local local;
-    half_local(model, data.z, half_coefficients(acting_coefficients(problem, data), h), data.configuration, h, true,
-               local);
+    const ElasticCoefficients& acting = elastic ? acting_coefficients(problem, data) : data.viscous;
+    half_local(model, data.z, half_coefficients(acting, h), data.configuration, h, true, local);
     Vector3 spin = Vector3::Zero(), start = spin, end = spin;
     const auto& rows = part.rows();
     for (int i = 0; i < 3; ++i) {

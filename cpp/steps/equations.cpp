@@ -59,11 +59,16 @@ void Equations::set_parameters(const Parameters& parameters) {
   set_drag(model(), parameters, problem_.drag);
 }
 
-void Equations::begin(const State& state, const Parameters& parameters, StepRule rule, double h) {
+void Equations::begin(const State& state, const Parameters& parameters, StepRule rule, double h,
+                      const VectorX* held_acceleration) {
   set_parameters(parameters);
   problem_.start = &state;
   problem_.rule = rule;
   problem_.interval = h;
+  if (held_acceleration)
+    problem_.held_acceleration = *held_acceleration;
+  else
+    problem_.held_acceleration.resize(0);
   problem_.number = next_number();
   problem_.slip_time = problem_.moves() ? problem_.duration() : static_duration_;
   for (const std::unique_ptr<Term>& term : terms_.all) term->begin(problem_);

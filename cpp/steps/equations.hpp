@@ -46,7 +46,6 @@ class Equations {
   const MassMatrix& mass() const { return problem_.mass; }
   ElasticCoefficients& elastic() { return problem_.elastic; }
   const ElasticCoefficients& elastic() const { return problem_.elastic; }
-  VectorX& held_acceleration() { return problem_.held_acceleration; }
   /// In words, what makes the Jacobian unsymmetric.
   const std::vector<std::string>& asymmetries() const { return asymmetries_; }
   /// What terms have to say for the plan.
@@ -66,8 +65,10 @@ class Equations {
   void predict_friction(const VectorX& step, double kept, ContactLinearisation& linearisation);
   double contact_loss(const StepData& data, const VectorX& change, double obstacle_work) const;
 
-  /// Prepares a step from `state`, which must outlive it, over h (0: statics).
-  void begin(const State& state, const Parameters& parameters, StepRule rule, double h);
+  /// Prepares a step from `state`, which must outlive it, over h (0: statics). `held_acceleration`: of what supports
+  /// hold, see StepProblem.
+  void begin(const State& state, const Parameters& parameters, StepRule rule, double h,
+             const VectorX* held_acceleration = nullptr);
   /// Custom forces that act in the steps to come, and what is solved for (empty: nothing), where the scene has any.
   void set_custom(const MatrixX3& forces, const MatrixX3& moments);
   void respond(CustomResponse response);

@@ -233,13 +233,13 @@ void Inertia::add_adjoint(const StepProblem& problem, const StepData& data, cons
     for (int e = 0; e < model.edge_count; ++e) rows[model.edge_dof[at(e)]] = 0.0;
     for (int f = 0; f < model.frame_count; ++f) {
       const int dof = model.frame_dof[at(f)];
-      if (!problem.conserves_energy())
-        rows.segment<3>(dof) = (cayley_spin(data.z.segment<3>(dof)) * rows.segment<3>(dof)).eval();
+      rows.segment<3>(dof) = (cayley_spin(data.z.segment<3>(dof)) * rows.segment<3>(dof)).eval();
     }
   }
   add_mass_adjoint(model, data.acceleration, rows, adjoint.coefficients.mass, adjoint.coefficients.mass_coupling);
   VectorX force;
   multiply(model, problem.mass, rows, force);
+  adjoint.acceleration = force;
   if (problem.held_acceleration.size() != 0) assembler.project(force);
   adjoint.start -= inverse * inverse * force;
   adjoint.velocity -= inverse * force;

@@ -15,6 +15,8 @@ struct CoefficientAdjoint {
   VectorX gravity;                                               ///< per unknown, by its force [1/N]
   MatrixX3 loads;                                                ///< by `Parameters::loads`
   VectorX spring_stiffness, spring_rest_length, spring_damping;  ///< per spring
+  std::vector<MatrixX2> natural_curvature;  ///< per rod and stencil, by the smooth one, where it is read out [m]
+  VectorX rest_length;                      ///< per edge, by that in the axial strain, and where it is read out [1/m]
 
   explicit CoefficientAdjoint(const Model& model, Eigen::Index load_rows)
       : stretch_stiffness(VectorX::Zero(model.edge_count)),
@@ -33,14 +35,20 @@ struct CoefficientAdjoint {
         loads(MatrixX3::Zero(load_rows, 3)),
         spring_stiffness(VectorX::Zero(static_cast<Eigen::Index>(model.description.springs.size()))),
         spring_rest_length(spring_stiffness),
-        spring_damping(spring_stiffness) {}
+        spring_damping(spring_stiffness),
+        rest_length(VectorX::Zero(model.edge_count)) {
+    for (const auto& places : model.place)
+      natural_curvature.push_back(MatrixX2::Zero(static_cast<Eigen::Index>(places.size()), 2));
+  }
 };
 
 /// rows^T times the derivatives of a step's residual, at fixed z. An edge's frame and a joint's are functions of the
 /// start: they are taken by how they turn, in the configuration that they are part of.
 struct StepAdjoint {
-  const VectorX& rows;                         ///< what the residual is multiplied by
+  /// What the residual is multiplied by; of frames in space, where a step's rows are moments, what their J^T moment is.
+  const VectorX& rows;
   VectorX start, velocity;                     ///< by q0 (its angles: of directors) and v0
+  VectorX acceleration;                        ///< by the acceleration of what supports hold; meaningful where held
   VectorX start_turn, end_turn;                ///< per edge: by the angle of its directors at the start, at q1 [rad]
   MatrixX3 start_spin, middle_spin, end_spin;  ///< per frame: by its rotation vector at the start, at z, at q1 [rad]
   CoefficientAdjoint& coefficients;
@@ -49,6 +57,7 @@ struct StepAdjoint {
       : rows(rows_of),
         start(VectorX::Zero(model.dof_count)),
         velocity(start),
+        acceleration(start),
         start_turn(VectorX::Zero(model.edge_count)),
         end_turn(start_turn),
         start_spin(MatrixX3::Zero(model.frame_count, 3)),

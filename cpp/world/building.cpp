@@ -5,6 +5,7 @@
 #include "common/check.hpp"
 #include "common/text.hpp"
 #include "geometry/rotation.hpp"
+#include "model/edge_vectors.hpp"
 #include "world/implementation.hpp"
 
 namespace withe {
@@ -26,29 +27,6 @@ Vector3 node_position(const Model& model, const VectorX& q, int node) {
   const int dof = model.node_dof[at(node)];
   if (!model.planar()) return q.segment<3>(dof);
   return model.plane->origin + q(dof) * model.plane->first + q(dof + 1) * model.plane->second;
-}
-
-Vector3 node_velocity(const Model& model, const VectorX& v, int node) {
-  const int dof = model.node_dof[at(node)];
-  if (!model.planar()) return v.segment<3>(dof);
-  return v(dof) * model.plane->first + v(dof + 1) * model.plane->second;
-}
-
-Matrix3 edge_directors(const Model& model, const Configuration& c, int edge) {
-  Matrix3 out;
-  const EdgeFrame<double>& f = c.edge[at(edge)];
-  if (!model.planar()) {
-    out << to_eigen(f.d1), to_eigen(f.d2), to_eigen(f.tangent);
-    return out;
-  }
-  // In its plane an edge turns its drawn directors about the normal.
-  const Vector3 drawn = to_eigen(model.initial_tangent[at(edge)]), d1 = to_eigen(model.initial_director[at(edge)]);
-  const Vector3 t = f.tangent.x * model.plane->first + f.tangent.y * model.plane->second;
-  const Vector3& n = model.plane->normal;
-  const double angle = std::atan2(drawn.cross(t).dot(n), drawn.dot(t));
-  const Vector3 now = rotation_exp(angle * n) * d1;
-  out << now, t.cross(now), t;
-  return out;
 }
 
 Matrix3 frame_rotation(const Model& model, const State& state, int frame) {
@@ -215,8 +193,8 @@ State World::Implementation::transferred(const Model& old, const State& from) co
     const int dof = model.node_dof[at(i)];
     if (lifted) {
       to.q.segment<3>(dof) = node_position(old, from.q, i);
-      to.v.segment<3>(dof) = node_velocity(old, from.v, i);
-      to.acceleration.segment<3>(dof) = node_velocity(old, from.acceleration, i);
+      to.v.segment<3>(dof) = node_vector(old, from.v, i);
+      to.acceleration.segment<3>(dof) = node_vector(old, from.acceleration, i);
     } else {
       copy(old.node_dof[at(i)], dof, model.dimension);
     }

@@ -11,38 +11,11 @@ namespace {
 
 /// An equilibrium leaves this much of the forces in it out of balance.
 constexpr double kBalanced = 1e-6;
+constexpr const char* kFriction = "friction takes part in it; take friction=0";
 
 }  // namespace
 
-void World::Implementation::add_held_gradient(const VectorX& held, EquilibriumGradient& out) const {
-  const auto at_node = [&](int node) -> Vector3 {
-    const int dof = model.node_dof[at(node)];
-    if (!model.planar()) return held.segment<3>(dof);
-    return held(dof) * model.plane->first + held(dof + 1) * model.plane->second;
-  };
-  for (std::size_t s = 0; s < model.supports.size(); ++s) {
-    const Support& support = model.supports[s];
-    if (!support.active) continue;
-    const auto row = static_cast<Eigen::Index>(s);
-    Vector3 position = at_node(support.node), rotation = Vector3::Zero();
-    if (support.frame >= 0) {
-      const int dof = model.frame_dof[at(support.frame)];
-      rotation = model.planar() ? Vector3(held(dof) * model.plane->normal) : Vector3(held.segment<3>(dof));
-    }
-    if (support.other_node >= 0) {
-      const Vector3 other = at_node(support.other_node);
-      const Vector3 arm =
-          node_position(model, state.q, support.other_node) - node_position(model, state.q, support.node);
-      position += other;
-      rotation += arm.cross(other);
-      if (!model.planar()) rotation += held(model.edge_dof[at(support.edge)]) * arm.normalized();
-    }
-    out.support_positions.row(row) += position.transpose();
-    out.support_rotations.row(row) += rotation.transpose();
-  }
-}
-
-std::vector<EquilibriumGradient> World::equilibrium_gradients(const std::vector<MatrixX3>& by_positions) const {
+std::vector<EquilibriumGradient> World::equilibrium_gradients(const std::vector<ReadoutAdjoint>& by) const {
   const Implementation& self = *implementation_;
   const Model& model = self.model;
   if (!self.static_gradient) {
@@ -62,18 +35,17 @@ std::vector<EquilibriumGradient> World::equilibrium_gradients(const std::vector<
   require(gradient.imbalance() < kBalanced,
           "the simulation is in no equilibrium, so that there is no gradient of one: call equilibrium() again");
   std::vector<EquilibriumGradient> out;
-  for (const MatrixX3& by : by_positions) {
-    require(by.rows() == model.node_count,
-            "a derivative by positions has one row a node, " + std::to_string(model.node_count));
-    StateAdjoint adjoint{VectorX::Zero(model.dof_count), {}};
-    add_to_nodes(model, by, adjoint.q);
+  for (const ReadoutAdjoint& scalar : by) {
+    scalar.check(model);
+    StateAdjoint adjoint{VectorX::Zero(model.dof_count), VectorX::Zero(model.dof_count)};
     CoefficientAdjoint coefficients(model, self.parameters.loads.rows());
-    VectorX held = VectorX::Zero(model.dof_count);
-    gradient.pull_back(adjoint, coefficients, held);
-    const auto supports = static_cast<Eigen::Index>(model.supports.size());
-    out.push_back({parameter_gradient(model, self.parameters, coefficients), MatrixX3::Zero(supports, 3),
-                   MatrixX3::Zero(supports, 3)});
-    self.add_held_gradient(held, out.back());
+    HeldAdjoint held(model);
+    add_unknowns(model, scalar, adjoint);
+    if (scalar.needs_state())
+      add_readouts(model, gradient.equations().assembler(), self.parameters, frames, scalar, adjoint, coefficients);
+    gradient.pull_back(adjoint, coefficients, held, scalar.has_reactions() ? &scalar.reactions : nullptr);
+    out.push_back({parameter_gradient(model, self.parameters, coefficients), by_poses(model, self.state.q, held.pose),
+                   by_drawing(model, self.state.q, held.pose)});
   }
   return out;
 }
@@ -91,7 +63,7 @@ std::shared_ptr<Tape> World::start_tape() {
     if (self.options.integrator != Integrator::backward_euler)
       self.tape->refuse("contact takes part in it; take integrator='backward_euler'");
     else if (contact->frictional())
-      self.tape->refuse("friction takes part in it; take friction=0");
+      self.tape->refuse(kFriction);
     else if (loses(given.restitution) || (given.obstacle_restitution.array() < 1.0).any() ||
              std::any_of(given.pairs.begin(), given.pairs.end(), [&](const auto& p) { return loses(p.restitution); }))
       self.tape->refuse("impacts lose energy by their restitution; take restitution=1");
@@ -125,20 +97,30 @@ void World::displace_state(const VectorX& by) {
 
 /// Before a step.
 void World::Implementation::check_tape() {
-  if (!tape->continues(state, parameters))
-    tape->refuse("numbers, loads or the state were changed while it ran, or change with time; begin another run there");
+  if (!tape->continues(state)) tape->refuse("the state was changed while it ran; begin another run there");
+  if (!tape->has_loads(parameters)) tape->refuse("loads came or went while it ran; begin another run there");
 }
 
-void World::Implementation::record_step(StepRule rule, double dt) {
+void World::Implementation::record_step(StepRule rule, double dt, bool reacts) {
   const char* unknown = nullptr;
   if (const Contact* contact = equations_of_step().contact()) {
     const ContactProblem& problem = contact->problem();
-    if (!contact->has_given_stiffness(state))
+    if (contact->frictional())
+      unknown = kFriction;
+    else if (!contact->has_given_stiffness(state))
       unknown = "its contacts took a stiffness of their own; give enable_contact(stiffness=), great enough";
     else if (!problem.shift.empty() || !problem.turn.empty())
       unknown = "an obstacle moved";
   }
-  tape->record(rule, dt, work.move, state, unknown);
+  const bool there =
+      std::all_of(motions.begin(), motions.end(), [&](const SupportMotion& m) { return state.time >= m.end; });
+  VectorX reached;
+  if (!there) reached.resize(static_cast<Eigen::Index>(motions.size()));
+  for (Eigen::Index s = 0; s < reached.size(); ++s) {
+    const SupportMotion& m = motions[static_cast<std::size_t>(s)];
+    reached(s) = ramp_fraction(state.time, m.start, m.end);
+  }
+  tape->record({rule, dt, work.move, state, parameters, reached, reacts, unknown});
 }
 
 }  // namespace withe

@@ -195,8 +195,7 @@ struct World::Implementation : Running {
 
   // gradients.cpp
   void check_tape();
-  void record_step(StepRule rule, double dt);
-  void add_held_gradient(const VectorX& held, EquilibriumGradient& out) const;
+  void record_step(StepRule rule, double dt, bool reacts);
 
   // equilibrium.cpp
   EquilibriumResult equilibrium(double dt);
@@ -240,9 +239,6 @@ struct World::Implementation : Running {
 
 /// Position of a node in space, from any configuration vector.
 Vector3 node_position(const Model& model, const VectorX& q, int node);
-Vector3 node_velocity(const Model& model, const VectorX& v, int node);
-/// Directors of an edge: columns d1, d2, t.
-Matrix3 edge_directors(const Model& model, const Configuration& c, int edge);
 /// Rotation of a joint frame from the drawn axes.
 Matrix3 frame_rotation(const Model& model, const State& state, int frame);
 

@@ -1,4 +1,3 @@
-#include <algorithm>
 #include <optional>
 #include <utility>
 
@@ -19,15 +18,12 @@ SparseMatrix assembled(Eigen::Index rows, Eigen::Index columns, const Entries& e
 SparseMatrix matrix_of(const Assembler& assembler) {
   const SparsityPattern& pattern = assembler.pattern();
   const LinearSolver& solver = assembler.solver();
-  const bool symmetric = solver.symmetry() == Symmetry::symmetric;
   Entries entries;
   entries.reserve(pattern.row_indices.size());
   for (int column = 0; column < pattern.size; ++column)
     for (int p = pattern.column_starts[at(column)]; p < pattern.column_starts[at(column + 1)]; ++p) {
       const int row = pattern.row_indices[at(p)];
-      const std::ptrdiff_t place =
-          symmetric ? solver.offset(std::max(row, column), std::min(row, column)) : solver.offset(row, column);
-      entries.emplace_back(row, column, solver.values()[static_cast<std::size_t>(place)]);
+      entries.emplace_back(row, column, solver.values()[static_cast<std::size_t>(solver.place(row, column))]);
     }
   return assembled(pattern.size, pattern.size, entries);
 }

@@ -4,6 +4,7 @@
 
 #include "common/check.hpp"
 #include "geometry/rotation.hpp"
+#include "model/edge_vectors.hpp"
 #include "world/implementation.hpp"
 
 namespace withe {
@@ -112,7 +113,7 @@ CustomForces World::Implementation::custom_forces(double time, const VectorX& q,
   MatrixX3 positions(model.node_count, 3), velocities(model.node_count, 3);
   for (int i = 0; i < model.node_count; ++i) {
     positions.row(i) = node_position(model, q, i);
-    velocities.row(i) = node_velocity(model, v, i);
+    velocities.row(i) = node_vector(model, v, i);
   }
   CustomForces now = force_function(time, positions, velocities, derivatives);
   const auto check = [&](const MatrixX3& table, const std::string& what) {

@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 
 #include "common/check.hpp"
+#include "model/edge_vectors.hpp"
 #include "steps/spring_forces.hpp"
 #include "world/implementation.hpp"
 
@@ -17,7 +18,7 @@ MatrixX3 World::positions() const {
 MatrixX3 World::velocities() const {
   const Implementation& self = *implementation_;
   MatrixX3 out(self.model.node_count, 3);
-  for (int i = 0; i < self.model.node_count; ++i) out.row(i) = node_velocity(self.model, self.state.v, i);
+  for (int i = 0; i < self.model.node_count; ++i) out.row(i) = node_vector(self.model, self.state.v, i);
   return out;
 }
 
@@ -135,7 +136,7 @@ Momentum World::momentum() const {
   multiply(model, mass, self.state.v, carried);
   Momentum out;
   for (int i = 0; i < model.node_count; ++i) {
-    const Vector3 p = node_velocity(model, carried, i);
+    const Vector3 p = node_vector(model, carried, i);
     out.linear += p;
     out.angular += node_position(model, self.state.q, i).cross(p);
   }

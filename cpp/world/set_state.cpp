@@ -8,6 +8,7 @@
 #include "common/check.hpp"
 #include "common/text.hpp"
 #include "geometry/rotation.hpp"
+#include "model/edge_vectors.hpp"
 #include "world/implementation.hpp"
 
 namespace withe {
@@ -237,7 +238,7 @@ void World::Implementation::turn_frames(const std::vector<bool>& is_told) {
   const auto rate = [&](int e) -> Vector3 {
     const Vector3 t = edge_directors(model, c, e).col(2);
     const Vector3 along =
-        node_velocity(model, state.v, model.edge_head[at(e)]) - node_velocity(model, state.v, model.edge_tail[at(e)]);
+        node_vector(model, state.v, model.edge_head[at(e)]) - node_vector(model, state.v, model.edge_tail[at(e)]);
     const double spin = model.planar() ? 0.0 : state.v(model.edge_dof[at(e)]);
     return t.cross(along) / c.length(e) + spin * t;
   };

@@ -329,7 +329,8 @@ bool World::Implementation::inner_step(double dt, int slot, double& error) {
   }
   system.respond({});
   release_obstacles(system);
-  if (tape) record_step(rule_of_step(), dt);
+  const bool reacts = options.integrator != Integrator::fourth_order || slot == 2;
+  if (tape) record_step(rule_of_step(), dt, reacts);
   error = r.error;
   guard.turn = std::max(guard.turn, r.largest_turn);
   guard.stretch_gain += r.stretch_gain;
@@ -337,7 +338,7 @@ bool World::Implementation::inner_step(double dt, int slot, double& error) {
   dissipated += r.dissipated;
   support_work += r.support_work;
   contact_guard.put_in = r.pressing_gain;
-  if (options.integrator != Integrator::fourth_order || slot == 2) keep_reactions();
+  if (reacts) keep_reactions();
   if (ramped) {
     apply_ramps(end, actuation);
     actuation_work += actuation;

@@ -5,6 +5,7 @@
 #include <Eigen/Geometry>
 
 #include "common/check.hpp"
+#include "model/edge_vectors.hpp"
 #include "world/implementation.hpp"
 
 namespace withe {
@@ -146,13 +147,13 @@ Reaction World::reaction(int support) const {
   const Support& s = model.supports[at(support)];
   const VectorX held = self.equations->assembler().held_part(self.reaction_residual);
   Reaction out;
-  out.force = node_velocity(model, held, s.node);
+  out.force = node_vector(model, held, s.node);
   if (s.frame >= 0) {
     const int dof = model.frame_dof[at(s.frame)];
     out.moment = model.planar() ? Vector3(held(dof) * model.plane->normal) : Vector3(held.segment<3>(dof));
   }
   if (s.other_node >= 0) {
-    const Vector3 other = node_velocity(model, held, s.other_node);
+    const Vector3 other = node_vector(model, held, s.other_node);
     const VectorX& q = self.reaction_place;
     const Vector3 arm = node_position(model, q, s.other_node) - node_position(model, q, s.node);
     out.force += other;

@@ -118,8 +118,8 @@ struct Linearisation {
 /// Derivatives of scalars of an equilibrium by what acts, and by where supports hold.
 struct EquilibriumGradient {
   ParameterGradient parameters;
-  MatrixX3 support_positions;  ///< per support, by its position [1/m]
-  MatrixX3 support_rotations;  ///< per support, by a rotation vector [1/rad]
+  PoseAdjoint supports;
+  DrawnAdjoint drawn;
 };
 
 /// What a rod is to be like; what is empty stays as it is.
@@ -246,9 +246,9 @@ class World {
   ContactTable contacts() const;
   Linearisation linearise() const;
 
-  /// Of scalars whose derivatives by positions (a row each node, [1/m]) are given, in the equilibrium that the scene is
-  /// in. Throws std::invalid_argument where it is in none, where none is known, or where a derivative leaves the plane.
-  std::vector<EquilibriumGradient> equilibrium_gradients(const std::vector<MatrixX3>& by_positions) const;
+  /// Of scalars whose derivatives by read-outs are given, in the equilibrium that the scene is in. Throws
+  /// std::invalid_argument where it is in none, or where none is known.
+  std::vector<EquilibriumGradient> equilibrium_gradients(const std::vector<ReadoutAdjoint>& by) const;
   /// Keeps the steps from here on, for gradients; nothing: no more.
   std::shared_ptr<Tape> start_tape();
   void stop_tape();

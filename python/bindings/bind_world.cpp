@@ -1,4 +1,5 @@
 #include <pybind11/eigen.h>
+#include <pybind11/functional.h>
 #include <pybind11/stl.h>
 
 #include <memory>
@@ -24,26 +25,50 @@ void register_gradients(py::module_& module) {
       .def_readonly("loads", &ParameterGradient::loads)
       .def_readonly("spring_stiffness", &ParameterGradient::spring_stiffness)
       .def_readonly("spring_rest_length", &ParameterGradient::spring_rest_length)
-      .def_readonly("spring_damping", &ParameterGradient::spring_damping);
+      .def_readonly("spring_damping", &ParameterGradient::spring_damping)
+      .def_readonly("rest_length", &ParameterGradient::rest_length);
   py::class_<EquilibriumGradient>(module, "EquilibriumGradient", "Derivatives of a scalar of an equilibrium.")
       .def_readonly("parameters", &EquilibriumGradient::parameters)
-      .def_readonly("support_positions", &EquilibriumGradient::support_positions)
-      .def_readonly("support_rotations", &EquilibriumGradient::support_rotations);
-  py::class_<RunGradient>(module, "RunGradient", "Derivatives of a scalar of a run.")
-      .def_readonly("parameters", &RunGradient::parameters)
-      .def_property_readonly("initial_positions", [](const RunGradient& self) { return self.initial.positions; })
-      .def_property_readonly("initial_velocities", [](const RunGradient& self) { return self.initial.velocities; });
+      .def_property_readonly("support_positions", [](const EquilibriumGradient& g) { return g.supports.positions; })
+      .def_property_readonly("support_rotations", [](const EquilibriumGradient& g) { return g.supports.rotations; })
+      .def_property_readonly("held_nodes", [](const EquilibriumGradient& g) { return g.drawn.nodes; })
+      .def_property_readonly("held_spins", [](const EquilibriumGradient& g) { return g.drawn.spins; });
+  py::class_<PoseAdjoint>(module, "PoseAdjoint", "Derivatives of a scalar by poses of supports.")
+      .def_readonly("positions", &PoseAdjoint::positions)
+      .def_readonly("rotations", &PoseAdjoint::rotations);
+  py::class_<InitialGradient>(module, "InitialGradient", "Derivatives of a scalar of a run by the state at its start.")
+      .def_readonly("positions", &InitialGradient::positions)
+      .def_readonly("velocities", &InitialGradient::velocities);
   py::class_<RunJacobian>(module, "RunJacobian", "Derivatives of the state that a run leads to.")
       .def_readonly("state", &RunJacobian::state)
       .def_readonly("rows", &RunJacobian::rows);
+  py::class_<ReadoutAdjoint>(module, "ReadoutAdjoint", "Derivatives of a scalar by what is read out of a state.")
+      .def(py::init<>())
+      .def_readwrite("positions", &ReadoutAdjoint::positions)
+      .def_readwrite("velocities", &ReadoutAdjoint::velocities)
+      .def_readwrite("directors", &ReadoutAdjoint::directors)
+      .def_readwrite("curvatures", &ReadoutAdjoint::curvatures)
+      .def_readwrite("twists", &ReadoutAdjoint::twists)
+      .def_readwrite("tensions", &ReadoutAdjoint::tensions)
+      .def_readwrite("spins", &ReadoutAdjoint::spins)
+      .def_property(
+          "reaction_forces", [](const ReadoutAdjoint& self) { return self.reactions.forces; },
+          [](ReadoutAdjoint& self, const MatrixX3& value) { self.reactions.forces = value; })
+      .def_property(
+          "reaction_moments", [](const ReadoutAdjoint& self) { return self.reactions.moments; },
+          [](ReadoutAdjoint& self, const MatrixX3& value) { self.reactions.moments = value; });
   py::class_<MomentAdjoint>(module, "MomentAdjoint", "What a scalar depends on after so many steps of a run.")
-      .def(py::init([](long steps, const MatrixX3& positions, const MatrixX3& velocities) {
-             return MomentAdjoint{steps, positions, velocities};
-           }),
-           py::arg("steps"), py::arg("positions"), py::arg("velocities"));
+      .def(py::init<long, ReadoutAdjoint>(), py::arg("steps"), py::arg("by"));
   py::class_<Tape, std::shared_ptr<Tape>>(module, "Tape", "A run as the adjoint method needs it.")
       .def_property_readonly("count", &Tape::count, "Steps taken.")
-      .def("gradient", &Tape::gradient, py::arg("moments"), py::call_guard<py::gil_scoped_release>())
+      .def("divide", &Tape::divide, "What acts from here on is told apart.")
+      .def(
+          "gradient",
+          [](const Tape& self, const std::vector<MomentAdjoint>& moments, const ParameterVisitor& visit,
+             const std::optional<PoseVisitor>& visit_poses) {
+            return self.gradient(moments, visit, visit_poses.value_or(PoseVisitor()));
+          },
+          py::arg("moments"), py::arg("visit"), py::arg("visit_poses"), py::call_guard<py::gil_scoped_release>())
       .def("jacobian", &Tape::jacobian, py::call_guard<py::gil_scoped_release>());
 }
 
@@ -347,10 +372,10 @@ void define_readouts(WorldClass& world) {
   world.def("contacts", [](const GuardedWorld& self) { return self.reading().contacts(); });
   world.def(
       "equilibrium_gradients",
-      [](const GuardedWorld& self, const std::vector<MatrixX3>& by_positions) {
-        return self.reading().equilibrium_gradients(by_positions);
+      [](const GuardedWorld& self, const std::vector<ReadoutAdjoint>& by) {
+        return self.reading().equilibrium_gradients(by);
       },
-      py::arg("by_positions"));
+      py::arg("by"));
   world.def("start_tape", [](GuardedWorld& self) { return self.changing().start_tape(); });
   world.def("stop_tape", [](GuardedWorld& self) { self.changing().stop_tape(); });
   world.def(

@@ -19,6 +19,7 @@ __all__: list[str] = [
     "EquilibriumPath",
     "EquilibriumResult",
     "FluidDescription",
+    "InitialGradient",
     "JointDescription",
     "Linearisation",
     "LoadDescription",
@@ -29,14 +30,16 @@ __all__: list[str] = [
     "ParameterGradient",
     "PathPoint",
     "Plan",
+    "PoseAdjoint",
     "Reaction",
+    "ReadoutAdjoint",
     "RevoluteLink",
     "RodDescription",
     "RodPass",
     "RodState",
-    "RunGradient",
     "RunJacobian",
     "SceneDescription",
+    "SheetManifold",
     "SpringDescription",
     "Statistics",
     "SupportDescription",
@@ -485,6 +488,8 @@ class ParameterGradient:
     @property
     def natural_twist(self) -> list[typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]]: ...
     @property
+    def rest_length(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+    @property
     def rotary_inertia(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
     @property
     def spring_damping(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
@@ -504,48 +509,108 @@ class EquilibriumGradient:
     Derivatives of a scalar of an equilibrium.
     """
     @property
+    def held_nodes(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
+    @property
+    def held_spins(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
+    @property
     def parameters(self) -> ParameterGradient: ...
     @property
     def support_positions(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
     @property
     def support_rotations(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
 
-class RunGradient:
+class PoseAdjoint:
     """
-    Derivatives of a scalar of a run.
+    Derivatives of a scalar by poses of supports.
     """
     @property
-    def initial_positions(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
+    def positions(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
     @property
-    def initial_velocities(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
+    def rotations(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
+
+class InitialGradient:
+    """
+    Derivatives of a scalar of a run by the state at its start.
+    """
     @property
-    def parameters(self) -> ParameterGradient: ...
+    def positions(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
+    @property
+    def velocities(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
 
 class RunJacobian:
     """
     Derivatives of the state that a run leads to.
     """
     @property
-    def rows(self) -> list[RunGradient]: ...
+    def rows(self) -> list[ParameterGradient]: ...
     @property
     def state(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]: ...
+
+class ReadoutAdjoint:
+    """
+    Derivatives of a scalar by what is read out of a state.
+    """
+    def __init__(self) -> None: ...
+    @property
+    def curvatures(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 2]"]: ...
+    @curvatures.setter
+    def curvatures(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 2]"]) -> None: ...
+    @property
+    def directors(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 9]"]: ...
+    @directors.setter
+    def directors(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 9]"]) -> None: ...
+    @property
+    def positions(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
+    @positions.setter
+    def positions(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"]) -> None: ...
+    @property
+    def reaction_forces(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
+    @reaction_forces.setter
+    def reaction_forces(self, arg1: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"]) -> None: ...
+    @property
+    def reaction_moments(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
+    @reaction_moments.setter
+    def reaction_moments(self, arg1: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"]) -> None: ...
+    @property
+    def spins(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+    @spins.setter
+    def spins(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> None: ...
+    @property
+    def tensions(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+    @tensions.setter
+    def tensions(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> None: ...
+    @property
+    def twists(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+    @twists.setter
+    def twists(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> None: ...
+    @property
+    def velocities(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
+    @velocities.setter
+    def velocities(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"]) -> None: ...
 
 class MomentAdjoint:
     """
     What a scalar depends on after so many steps of a run.
     """
-    def __init__(
-        self,
-        steps: typing.SupportsInt | typing.SupportsIndex,
-        positions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
-        velocities: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
-    ) -> None: ...
+    def __init__(self, steps: typing.SupportsInt | typing.SupportsIndex, by: ReadoutAdjoint) -> None: ...
 
 class Tape:
     """
     A run as the adjoint method needs it.
     """
-    def gradient(self, moments: collections.abc.Sequence[MomentAdjoint]) -> RunGradient: ...
+    def divide(self) -> None:
+        """
+        What acts from here on is told apart.
+        """
+    def gradient(
+        self,
+        moments: collections.abc.Sequence[MomentAdjoint],
+        visit: collections.abc.Callable[[int, int, float, ParameterGradient], None],
+        visit_poses: collections.abc.Callable[
+            [int, typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"], PoseAdjoint], None
+        ]
+        | None,
+    ) -> InitialGradient: ...
     def jacobian(self) -> RunJacobian: ...
     @property
     def count(self) -> int:
@@ -781,9 +846,7 @@ class World:
         """
         Find the static equilibrium.
         """
-    def equilibrium_gradients(
-        self, by_positions: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"]]
-    ) -> list[EquilibriumGradient]: ...
+    def equilibrium_gradients(self, by: collections.abc.Sequence[ReadoutAdjoint]) -> list[EquilibriumGradient]: ...
     def equilibrium_path(
         self,
         loads: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex],
@@ -927,6 +990,32 @@ class World:
     def statistics(self) -> Statistics: ...
     @property
     def time(self) -> float: ...
+
+class SheetManifold:
+    """
+    All poses in which a sheet can be held, tabulated once.
+    """
+    def __init__(self) -> None: ...
+    def at_length_and_angle(
+        self,
+        length: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+        angle: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+        width_growth: typing.SupportsFloat | typing.SupportsIndex,
+        tip_moment: typing.SupportsFloat | typing.SupportsIndex,
+    ) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        One row a pose.
+        """
+    def at_position(
+        self,
+        x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+        z: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+        width_growth: typing.SupportsFloat | typing.SupportsIndex,
+        tip_moment: typing.SupportsFloat | typing.SupportsIndex,
+    ) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        One row a pose.
+        """
 
 def check_turns(
     smooth: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 2]"],

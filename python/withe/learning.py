@@ -18,8 +18,8 @@ import numpy.typing as npt
 
 from withe.common.extras import require
 from withe.parts.handles import Support
-from withe.simulation.gradients import Unknown
 from withe.simulation.simulation import Simulation
+from withe.simulation.unknowns import Unknown
 
 __all__ = ["equilibrium", "rollout"]
 

@@ -66,6 +66,15 @@ SUPPORT_KINDS: tuple[str, ...] = get_args(SupportKind)
 
 
 @dataclass(frozen=True, eq=False)
+class Drawing:
+    """How the directors and the natural shape of a rod follow from its nodes."""
+
+    normal: FloatArray | None  # as it was given
+    natural_curvature: bool  # whether it follows
+    natural_twist: bool
+
+
+@dataclass(frozen=True, eq=False)
 class RodPart:
     """A rod as it was drawn."""
 
@@ -82,6 +91,7 @@ class RodPart:
     parameters: RodParameters
     natural_curvature: FloatArray  # (stencils, 2) [1/m]
     natural_twist: FloatArray  # (stencils,) [rad/m]
+    drawing: Drawing | None = None  # None: its nodes were found, or its curvature depends on them otherwise
 
     @property
     def owner(self) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Literal, get_args
 
 import numpy as np
@@ -9,12 +10,12 @@ import numpy.typing as npt
 
 from withe import _core
 from withe.common import drawing, validation
-from withe.parts.kinds import RodPart
+from withe.parts.kinds import Drawing, RodPart
 from withe.parts.materials import Material, Stiffness
 from withe.parts.parameters import RodParameters
 from withe.parts.sections import Circle, Section, SectionProperties, check_section
 
-__all__ = ["Natural", "curvature_array", "curvature_given", "make_rod", "twist_array"]
+__all__ = ["Natural", "curvature_array", "curvature_given", "make_rod", "redrawn", "twist_array"]
 
 FloatArray = npt.NDArray[np.float64]
 Natural = Literal["as_built", "straight"]
@@ -74,7 +75,12 @@ def make_rod(
         curvature = curvature_array(natural_curvature, voronoi, discrete, owner)
     if natural_twist is not None:
         twist = twist_array(natural_twist, voronoi, owner)
+    as_drawn = None
+    if spacing is None and not (discrete and natural_curvature is not None):
+        given = None if normal is None else np.array(normal, float)
+        as_drawn = Drawing(given, as_built and natural_curvature is None, as_built and natural_twist is None)
     return RodPart(
+        drawing=as_drawn,
         name=name,
         index=index,
         closed=closed,
@@ -88,6 +94,28 @@ def make_rod(
         parameters=parameters,
         natural_curvature=curvature,
         natural_twist=twist,
+    )
+
+
+def redrawn(part: RodPart, points: FloatArray) -> RodPart:
+    """What follows from other nodes, drawn as these were: lengths, directors, natural shape."""
+    how = part.drawing
+    assert how is not None
+    lengths = drawing.check_edges(points, part.closed, part.owner)
+    tangents = drawing.edge_vectors(points, part.closed) / lengths[:, None]
+    directors = _directors(how.normal, tangents, part.owner)
+    voronoi = drawing.voronoi_lengths(lengths, part.closed)
+    built = drawing.natural_shape(tangents, directors, voronoi, part.closed, 0.0)
+    return replace(
+        part,
+        points=points,
+        tangents=tangents,
+        directors=directors,
+        lengths=lengths,
+        arcs=lengths,
+        voronoi=voronoi,
+        natural_curvature=built[0] if how.natural_curvature else part.natural_curvature,
+        natural_twist=built[1] if how.natural_twist else part.natural_twist,
     )
 
 

@@ -41,7 +41,7 @@ ROD_READOUTS = ("directors", "curvatures", "twists", "tensions", "spins")
 class RunGradient(Protocol):
     """What a differentiable run knows."""
 
-    def gradient(self, by: Mapping[str, npt.ArrayLike], wrt: Sequence[Any], /) -> list[Any]:
+    def gradient(self, by: Mapping[str, Any], wrt: Sequence[Any], /) -> list[Any]:
         """See `Record.gradient`."""
 
 
@@ -78,22 +78,31 @@ class Record:
     def __getstate__(self) -> dict[str, Any]:
         return self.__dict__ | {"_derivatives": None}
 
-    def gradient(self, by: Mapping[str, npt.ArrayLike], wrt: Sequence[Any]) -> list[Any]:
+    def gradient(self, by: Mapping[str, Any], wrt: Sequence[Any]) -> list[Any]:
         """Derivatives of a scalar L of this run, by the adjoint method: one way back through its steps.
 
         Parameters
         ----------
         by : mapping
-            "positions", of shape (frames, nodes, 3) [1/m], "velocities", likewise [s/m], or both: derivatives of L by
-            what `positions()` and `velocities()` say.
+            Words of read-outs and derivatives of L by what they say: "positions", of shape (frames, nodes, 3) [1/m],
+            "velocities", likewise [s/m], or both by rods; of rods "directors", "curvatures", "twists", "tensions",
+            "spins"; of supports "reaction_forces" [1/N] and "reaction_moments" [1/(N m)], of shape (frames, 3), by
+            which `Simulation.reaction` would answer at each frame after the first. Such as
+            ``{"positions": dL_dx, "curvatures": {arm: dL_dk}}``, each shaped like the read-out of the record.
         wrt : sequence
             What to differentiate by: see `Equilibrium.gradient`; also "initial_positions" and "initial_velocities", of
-            shape (nodes, 3), where directors turn along with their edges.
+            shape (nodes, 3), where directors turn along with their edges. May be empty where ``calls`` are what is
+            wanted.
 
         Returns
         -------
         list
-            For each of `wrt`, dL over it, shaped like `Simulation.get`.
+            For each of `wrt`, dL over it, shaped like `Simulation.get`: over the value that it had at the start of the
+            run, as long as that acted. Its attribute ``calls`` has what was set later: one entry a call of `set`,
+            `set_natural_curvature`, `set_natural_twist` and `move` (of supports), in their order, with ``time`` [s],
+            ``call``, ``target``, ``over`` and ``gradients``, a dict of dL over the value that each word was given,
+            shaped like that value (of a ramp: its end; of a rotation: by a rotation vector that turns it). Under the
+            midpoint rules calls of `move` have none where L goes by reaction moments.
 
         Raises
         ------

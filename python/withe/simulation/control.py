@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
@@ -58,6 +59,8 @@ class Control:
         else:
             values = curvature_given(curvature, len(part.voronoi), part.owner).reshape(-1, 2)
         self._session.world.set_natural_curvature(part.index, values, validation.non_negative(over, "over"))
+        given = values if discrete else np.asarray(curvature)
+        self._session.note("set_natural_curvature", part, {"natural_curvature": given}, float(over))
 
     def set_natural_twist(self, rod: Rod | str, twist: npt.ArrayLike, over: float = 0.0) -> None:
         """Actuate a rod by changing the twist at which it is free of stress.
@@ -77,6 +80,7 @@ class Control:
         part = self._session.directory.rod(rod)
         values = twist_array(twist, part.voronoi, part.owner)
         self._session.world.set_natural_twist(part.index, values, validation.non_negative(over, "over"))
+        self._session.note("set_natural_twist", part, {"natural_twist": np.asarray(twist)}, float(over))
 
     # Parameters
 

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from withe.common import drawing, validation
 
-__all__ = ["Path", "Pose", "RotationLike", "Turn", "evaluate_path", "oriented"]
+__all__ = ["Path", "Pose", "RotationLike", "Turn", "axis_angle", "evaluate_path", "oriented"]
 
 FloatArray = npt.NDArray[np.float64]
 Pose = tuple[FloatArray, FloatArray]  # position (3,) [m], rotation (3, 3) from the drawn orientation
@@ -59,7 +59,7 @@ class Turn:
         span = float(self.times[1] - self.times[0])
         share = min(max((time - float(self.times[0])) / span, 0.0), 1.0) if span > 0.0 else 1.0
         swing = drawing.rotation_between(self.tangents[0], self.tangents[1], self._spare())
-        axis, angle = _axis_angle(swing)
+        axis, angle = axis_angle(swing)
         tangent = drawing.rotation_about(share * angle * axis) @ self.tangents[0]
         position = (1.0 - share) * self.positions[0] + share * self.positions[1]
         roll = (1.0 - share) * float(self.rolls[0]) + share * float(self.rolls[1])
@@ -83,7 +83,8 @@ class Turn:
         }
 
 
-def _axis_angle(rotation: FloatArray) -> tuple[FloatArray, float]:
+def axis_angle(rotation: FloatArray) -> tuple[FloatArray, float]:
+    """Unit vector and angle of a rotation, from 0 to pi."""
     cosine = min(max(0.5 * (float(np.trace(rotation)) - 1.0), -1.0), 1.0)
     axis = np.array([rotation[2, 1] - rotation[1, 2], rotation[0, 2] - rotation[2, 0], rotation[1, 0] - rotation[0, 1]])
     size = float(np.linalg.norm(axis))

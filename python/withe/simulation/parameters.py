@@ -43,7 +43,13 @@ def set_values(session: Session, target: Settable | str | None, values: dict[str
     """Change parameters; see `Simulation.set`."""
     if not values:
         raise ValueError("set must be given what to set, such as youngs_modulus=1e6")
-    if target is None:
+    part = None if target is None else session.directory.find_any(target, "target")
+    _set_values(session, part, values)
+    session.note("set", part, values)
+
+
+def _set_values(session: Session, part: Part | None, values: dict[str, Any]) -> None:
+    if part is None:
         _only(values, ("gravity", "friction", "slip_tolerance"), "the scene")
         gravity = validation.vector(values["gravity"], "gravity") if "gravity" in values else None
         if values.keys() & {"friction", "slip_tolerance"}:
@@ -52,7 +58,6 @@ def set_values(session: Session, target: Settable | str | None, values: dict[str
             session.world.set_gravity(gravity)
             session.settings.gravity = gravity
         return
-    part = session.directory.find_any(target, "target")
     if isinstance(part, RodPart):
         _set_rod(session, part, values)
     elif isinstance(part, LoadPart):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -123,10 +123,10 @@ class Equilibrium:
     branch_changed: bool
     iterations: int
     residual: float
-    _gradient: Callable[[npt.ArrayLike, Sequence[Any]], list[Any]] = field(repr=False)
+    _gradient: Callable[[npt.ArrayLike | Mapping[str, Any], Sequence[Any]], list[Any]] = field(repr=False)
     _jacobian: Callable[[Any, Sequence[Any]], list[FloatArray]] = field(repr=False)
 
-    def gradient(self, dL_dx: npt.ArrayLike, wrt: Sequence[Any]) -> list[Any]:
+    def gradient(self, dL_dx: npt.ArrayLike | Mapping[str, Any], wrt: Sequence[Any]) -> list[Any]:
         """Derivatives of a scalar L of this equilibrium, by the adjoint method.
 
         One solve with the transposed stiffness, whatever the number of unknowns: with g the derivative of L by all
@@ -134,13 +134,18 @@ class Equilibrium:
 
         Parameters
         ----------
-        dL_dx : array_like of shape (nodes, 3) [1/m]
-            Derivative of L by the positions of all nodes of the scene, as `Simulation.positions()` has them.
+        dL_dx : array_like of shape (nodes, 3) [1/m], or mapping
+            Derivative of L by the positions of all nodes of the scene, as `Simulation.positions()` has them. Or words
+            of read-outs with derivatives by them: "positions", so or by rods; of rods "directors", "curvatures",
+            "twists", "tensions", of supports "reaction_forces" [1/N] and "reaction_moments" [1/(N m)], such as
+            ``{"curvatures": {arm: dL_dk}, "reaction_forces": {wall: dL_dF}}``, each shaped like the read-out. A number
+            that a read-out depends on directly, as a tension does on the stiffness, counts with that too.
         wrt : sequence
             Pairs of a part and a word of `Simulation.get`: of a rod natural_curvature, natural_twist, youngs_modulus,
-            poisson_ratio, density, bend_stiffness and so on, and "radius" [m] of a withe.Circle, one an edge, as if the
-            scene were built anew; of a load its value; of a mass "mass"; of a support "position" [m] and "rotation" (a
-            rotation vector [rad], about where it is). Or "gravity".
+            poisson_ratio, density, bend_stiffness and so on, and "radius" [m] of a withe.Circle, one an edge, and
+            "points" [m], the nodes as they were drawn, (nodes, 3), both as if the scene were built anew; of a load its
+            value; of a mass "mass"; of a support "position" [m] and "rotation" (a rotation vector [rad], about where
+            it is). Or "gravity".
 
         Returns
         -------
@@ -171,19 +176,20 @@ class Equilibrium:
         return self._gradient(dL_dx, wrt)
 
     def jacobian(self, of: Any, wrt: Sequence[Any]) -> list[FloatArray]:
-        """Derivatives of positions in this equilibrium.
+        """Derivatives of positions, or of another read-out, in this equilibrium.
 
         Parameters
         ----------
-        of : handle of a node or rod, or name
+        of : handle of a node or rod, or name; or a pair
+            Of a rod or support and a word of `gradient`, such as ``(arm, "curvatures")``.
         wrt : sequence
             See `gradient`.
 
         Returns
         -------
         list of ndarray of shape (3, ...) or (nodes, 3, ...)
-            For each of `wrt`, the position of the node (or of the rod's nodes) over it: first the position's axes, then
-            those of `Simulation.get`.
+            For each of `wrt`, the position of the node (or of the rod's nodes), or the read-out, over it: first the
+            axes of these, then those of `Simulation.get`.
 
         Raises
         ------

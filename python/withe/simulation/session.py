@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -10,13 +12,20 @@ import numpy.typing as npt
 from withe import _core
 from withe.parts.description import describe, parameters_of
 from withe.parts.directory import Directory
-from withe.parts.kinds import CustomForcePart, DragPart, FluidPart, LoadPart, MassPart, RodPart, SupportPart
+from withe.parts.kinds import CustomForcePart, DragPart, FluidPart, LoadPart, MassPart, Part, RodPart, SupportPart
 from withe.parts.options import BuildOptions, check_tolerances
 from withe.simulation.settings import Settings
 
 __all__ = ["Session"]
 
 FloatArray = npt.NDArray[np.float64]
+
+
+class Journal(Protocol):
+    """Who hears what is set."""
+
+    def note(self, session: Session, method: str, part: Part | None, values: Mapping[str, Any], over: float) -> None:
+        """A call has set these, of a part or the scene, reached after so long [s]."""
 
 
 @dataclass(eq=False)
@@ -35,6 +44,8 @@ class Session:
         The engine.
     drawn_loads, custom_forces : tuple
         Parts of the scene, in its order.
+    journal : Journal or None
+        Of a differentiable run, while it goes.
     """
 
     scene: Directory
@@ -45,6 +56,7 @@ class Session:
     world: _core.World
     drawn_loads: tuple[LoadPart, ...]
     custom_forces: tuple[CustomForcePart, ...]
+    journal: Journal | None = None
 
     @classmethod
     def begin(cls, scene: Directory, gravity: FloatArray, options: BuildOptions) -> Session:
@@ -83,7 +95,18 @@ class Session:
 
     def copy(self) -> Session:
         """Another in the same state, which goes its own way from here."""
-        return replace(self, directory=self.directory.copy(), settings=self.settings.copy(), world=self.world.copy())
+        return replace(
+            self,
+            directory=self.directory.copy(),
+            settings=self.settings.copy(),
+            world=self.world.copy(),
+            journal=None,
+        )
+
+    def note(self, method: str, part: Part | None, values: Mapping[str, Any], over: float = 0.0) -> None:
+        """Tell the journal, if there is one, what a call has set."""
+        if self.journal is not None:
+            self.journal.note(self, method, part, values, over)
 
     @property
     def loads(self) -> list[LoadPart]:

@@ -10,9 +10,9 @@ import numpy.typing as npt
 
 from withe.common import validation
 from withe.simulation.functions import apply_functions
-from withe.simulation.gradients import Unknown, unknown_readers
 from withe.simulation.session import Session
 from withe.simulation.stepping import Stepping
+from withe.simulation.unknowns import OfRun, Unknown, unknown_readers
 
 __all__ = ["StateSpace"]
 
@@ -87,7 +87,7 @@ class StateSpace:
         tape = ahead.session.world.start_tape()
         ahead.step(1)
         found = tape.jacobian()
-        rows = [[np.ravel(read(row)) for read in readers] for row in found.rows]
+        rows = [[np.ravel(read(OfRun(row))) for read in readers] for row in found.rows]
         inputs = np.array([np.concatenate([np.empty(0), *row]) for row in rows]).reshape(len(rows), -1)
         return csr_array(found.state), csr_array(inputs)
 

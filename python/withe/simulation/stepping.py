@@ -12,16 +12,16 @@ import numpy as np
 
 from withe import _core
 from withe.errors import CoarseMeshWarning, CoarseStepWarning, ConvergenceError
-from withe.parts.handles import NodeHandle
 from withe.recording.recorder import Recorder
 from withe.simulation.functions import apply_functions, force_function, step_callback
-from withe.simulation.gradients import Unknown, equilibrium_gradient, equilibrium_jacobian, positions_adjoint
+from withe.simulation.gradients import equilibrium_gradient, equilibrium_jacobian
 from withe.simulation.linearisation import Linearisation, Stability
 from withe.simulation.loads import load_index
 from withe.simulation.paths import EquilibriumPath, PathOptions, path_of
 from withe.simulation.readouts import Equilibrium
 from withe.simulation.session import Session
 from withe.simulation.supports import find_support
+from withe.simulation.unknowns import Unknown
 
 __all__ = ["Stepping"]
 
@@ -104,15 +104,11 @@ class Stepping:
 
         def gradient(dL_dx: Any, wrt: Sequence[Unknown]) -> list[Any]:
             check()
-            return equilibrium_gradient(session, positions_adjoint(session, dL_dx, "dL_dx"), wrt)
+            return equilibrium_gradient(session, dL_dx, wrt)
 
         def jacobian(of: Any, wrt: Sequence[Unknown]) -> list[Any]:
             check()
-            if isinstance(of, NodeHandle) or (isinstance(of, str) and "." in of):
-                node, _ = session.directory.node(of, "of")
-                return [rows[0] for rows in equilibrium_jacobian(session, np.array([session.directory.row(node)]), wrt)]
-            rod = session.directory.rod(of)
-            return equilibrium_jacobian(session, session.directory.layout.rows(rod.index), wrt)
+            return equilibrium_jacobian(session, of, wrt)
 
         return gradient, jacobian
 

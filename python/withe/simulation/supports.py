@@ -12,7 +12,7 @@ from withe.parts.description import describe_support
 from withe.parts.handles import Handle, NodeHandle, Support
 from withe.parts.kinds import SupportPart
 from withe.parts.supports import check_not_held
-from withe.simulation.motion import Path, RotationLike, Turn, evaluate_path, oriented
+from withe.simulation.motion import Path, RotationLike, Turn, axis_angle, evaluate_path, oriented
 from withe.simulation.session import Session
 
 __all__ = ["find_support", "hold", "move_support", "release"]
@@ -84,6 +84,7 @@ def move_support(
         now = session.world.time
         evaluate_path(path, now, session.world.support_rotation(index), turns, owner)
         session.settings.paths[part.name] = path
+        session.note("move", part, {})
         return
     if rotation is not None and (tangent is not None or roll is not None):
         raise ValueError(f"rotation of {owner} must not be given together with tangent or roll")
@@ -97,10 +98,16 @@ def move_support(
         matrix = np.array(session.world.support_rotation(index))
         if rotation is not None:
             matrix = validation.rotation_matrix(rotation, f"rotation of {owner}")
+        given = {"position": target} if position is not None else {}
+        if rotation is not None and session.journal is not None:
+            axis, angle = axis_angle(matrix @ np.array(session.world.support_rotation(index)).T)
+            given["rotation"] = angle * axis
         session.world.move_support(index, target, matrix, over)
         session.settings.paths.pop(part.name, None)
+        session.note("move", part, given, over)
         return
     session.settings.paths[part.name] = _turn(session, index, part, target, tangent, roll, over)
+    session.note("move", part, {})
 
 
 def _turn(

@@ -1,0 +1,51 @@
+#pragma once
+/// The numbers that acted in the steps of a run, where they changed while it ran.
+
+#include <memory>
+#include <vector>
+
+#include "model/model.hpp"
+
+namespace withe {
+
+/// Stretches of steps in which the same numbers acted. Of those that change every step, natural shapes and loads, each
+/// stretch has its own; all others are shared.
+class ActingNumbers {
+ public:
+  explicit ActingNumbers(const Parameters& first);
+
+  /// Notes what acts in a step, no earlier than those before.
+  void record(std::size_t step, const Parameters& parameters);
+  /// Begins a stretch with the step to be noted next, though nothing may have changed.
+  void divide() { divided_ = true; }
+  /// Forgets steps from there on.
+  void cut(std::size_t step);
+
+  std::size_t count() const { return stretches_.size(); }
+  /// The first step of a stretch. The first stretch is what was before any step, and may have none.
+  std::size_t first(std::size_t stretch) const { return stretches_[stretch].first; }
+  /// What was before any step.
+  const Parameters& start() const { return *stretches_.front().base; }
+  Eigen::Index load_rows() const { return start().loads.rows(); }
+  /// What acts in a stretch, made of what `out` is of another one, or of nothing yet.
+  struct Player {
+    std::size_t stretch = 0;
+    std::shared_ptr<const Parameters> base;
+    Parameters now;
+  };
+  const Parameters& play(const Model& model, std::size_t stretch, Player& out) const;
+
+ private:
+  struct Stretch {
+    std::size_t first = 0;
+    std::shared_ptr<const Parameters> base;
+    long natural_version = 0;
+    std::vector<MatrixX2> natural_curvature;  ///< empty: that of the base; likewise below
+    std::vector<VectorX> natural_twist;
+    MatrixX3 loads;
+  };
+  std::vector<Stretch> stretches_;
+  bool divided_ = false;
+};
+
+}  // namespace withe

@@ -1,0 +1,25 @@
+#pragma once
+/// From derivatives by unknowns that supports hold to those by poses of supports.
+
+#include "model/model.hpp"
+
+namespace withe {
+
+/// Derivatives of a scalar by poses of supports; zero for those that are released.
+struct PoseAdjoint {
+  MatrixX3 positions;  ///< per support [1/m]
+  MatrixX3 rotations;  ///< per support, by a rotation vector [1/rad]
+};
+
+/// Derivatives by what supports hold as it was drawn.
+struct DrawnAdjoint {
+  MatrixX3 nodes;  ///< per node, by where it is held [1/m]
+  MatrixX3 spins;  ///< per support, by how the frame of the end that it holds is turned, at fixed nodes [1/rad]
+};
+
+DrawnAdjoint by_drawing(const Model& model, const VectorX& q, const VectorX& held);
+
+/// `held`: in coordinates of the state, in which the unknowns are q.
+PoseAdjoint by_poses(const Model& model, const VectorX& q, const VectorX& held);
+
+}  // namespace withe

@@ -1,0 +1,104 @@
+// Reactions are rows of the residual of what supports hold, as `World::reaction` makes forces and moments of them.
+
+#include <stdexcept>
+
+#include "geometry/rotation.hpp"
+#include "gradients/step_gradient.hpp"
+#include "model/edge_vectors.hpp"
+
+namespace withe {
+/// The moments of energy-momentum steps that turn a support are those that do its work over a finite turn.
+void StepGradient::check_reactions() const {
+  const Model& model = equations_.model();
+  if (step_->rule != StepRule::energy_momentum) return;
+  for (const Support& s : model.supports) {
+    if (!s.active) continue;
+    const int dof = model.planar() && s.frame >= 0         ? model.frame_dof[at(s.frame)]
+                    : !model.planar() && s.other_node >= 0 ? model.edge_dof[at(s.edge)]
+                                                           : -1;
+    if (dof >= 0 && step_->end[dof] != step_->start.q[dof])
+      throw std::invalid_argument(
+          "no gradient is known of reactions of supports that turn in energy-momentum steps: take integrator "
+          "'implicit_midpoint' with adaptive=False, or 'backward_euler'");
+  }
+}
+
+void StepGradient::add_reactions(const SupportAdjoint& by, CoefficientAdjoint& coefficients) {
+  check_reactions();
+  const Model& model = equations_.model();
+  by_rows_.setZero(model.dof_count);
+  const auto row = [](const MatrixX3& table, std::size_t s) {
+    const auto i = static_cast<Eigen::Index>(s);
+    return i < table.rows() ? Vector3(table.row(i)) : Vector3(Vector3::Zero());
+  };
+  for (std::size_t s = 0; s < model.supports.size(); ++s)
+    if (model.supports[s].active) add_reaction(model.supports[s], row(by.forces, s), row(by.moments, s));
+  by_rows_ = equations_.assembler().held_part(by_rows_);
+  if (model.planar()) return;
+  for (const Support& support : model.supports) {
+    if (!support.active) continue;
+    if (support.frame >= 0) add_frame_reaction(model.frame_dof[at(support.frame)], coefficients);
+    if (support.other_node >= 0) add_held_inertia(model.edge_dof[at(support.edge)], coefficients);
+  }
+  if (moves()) return;
+  // An equilibrium's rows are those of reference directors that turn along with their edges: without what those which
+  // stay behind leave nodes of torques, -torque spin, with d spin = -t x de / (2 l^2).
+  for (int e = 0; e < model.edge_count; ++e) {
+    const EdgeFrame<double>& f = data_.configuration.edge[at(e)];
+    const double torque = data_.full_residual[model.edge_dof[at(e)]];
+    const Vec3d apart = edge_vector(model, by_rows_, e);
+    add_to_edge(model, e, (0.5 * torque * f.inverse_length * f.inverse_length) * cross(apart, f.tangent), by_z_);
+  }
+}
+
+void StepGradient::add_reaction(const Support& s, const Vector3& by_force, const Vector3& by_moment) {
+  const Model& model = equations_.model();
+  add_to_node(model, s.node, by_force, by_rows_);
+  if (s.frame >= 0) {
+    const int dof = model.frame_dof[at(s.frame)];
+    if (model.planar())
+      by_rows_[dof] += by_moment.dot(model.plane->normal);
+    else
+      by_rows_.segment<3>(dof) += by_moment;
+  }
+  if (s.other_node < 0) return;
+  const VectorX held = equations_.assembler().held_part(data_.full_residual);
+  const Vector3 arm = node_vector(model, z_, s.other_node) - node_vector(model, z_, s.node);
+  const Vector3 other = node_vector(model, held, s.other_node);
+  add_to_node(model, s.other_node, by_force + by_moment.cross(arm), by_rows_);
+  Vector3 by_arm = other.cross(by_moment);
+  if (!model.planar()) {
+    const int angle = model.edge_dof[at(s.edge)];
+    const Vector3 t = arm.normalized();
+    by_rows_[angle] += by_moment.dot(t);
+    by_arm += held[angle] / arm.norm() * (by_moment - by_moment.dot(t) * t);
+  }
+  add_to_node(model, s.other_node, by_arm, by_z_);
+  add_to_node(model, s.node, -by_arm, by_z_);
+}
+
+/// A moment is J(w)^-T times the rows of its frame, w being where the frame is turned to; rows of energy-momentum steps
+/// are moments.
+void StepGradient::add_frame_reaction(int dof, CoefficientAdjoint& coefficients) {
+  if (step_->rule == StepRule::energy_momentum) return;
+  const Vector3 w = z_.segment<3>(dof);
+  const Matrix3 J = cayley_spin(w);
+  const Vector3 u = J.inverse() * by_rows_.segment<3>(dof);
+  const Vector3 moment = J.transpose().inverse() * data_.full_residual.segment<3>(dof);
+  by_rows_.segment<3>(dof) = u;
+  by_z_.segment<3>(dof) -= cayley_moment_slope(w, moment).transpose() * u;
+  if (step_->rule == StepRule::midpoint)
+    coefficients.mass.segment<3>(dof) +=
+        (u - J * u).cwiseProduct(equations_.problem().held_acceleration.segment<3>(dof));
+}
+
+/// Reactions take the inertia of what is held as M (v1 - v0) / dt, for that of finite turns in the rows of midpoint
+/// steps. Either is prescribed, but for the mass.
+void StepGradient::add_held_inertia(int angle, CoefficientAdjoint& coefficients) const {
+  const double inertia = equations_.mass().rows[angle];
+  if (step_->rule != StepRule::midpoint || inertia == 0.0) return;
+  coefficients.mass[angle] +=
+      by_rows_[angle] * (equations_.problem().held_acceleration[angle] - data_.inertia[angle] / inertia);
+}
+
+}  // namespace withe

@@ -1,0 +1,217 @@
+#include "world/exchange.hpp"
+
+#include "world/archive.hpp"
+#include "world/implementation.hpp"
+
+namespace withe {
+namespace {
+
+/// How many there are.
+template <class Archive, class Items>
+void exchange_size(Archive& io, Items& items, std::int64_t most, const char* impossible) {
+  auto size = static_cast<std::int64_t>(items.size());
+  io(size);
+  require(size >= 0 && size < most, impossible);
+  items.resize(static_cast<std::size_t>(size));
+}
+
+template <class Archive>
+void exchange_contacts(Archive& io, std::vector<ContactRecord>& contacts) {
+  exchange_size(io, contacts, 1 << 28, "snapshot is damaged: impossible number of contacts");
+  for (auto& [key, force, stiffness, yielded, approach, age, stick, friction, sticking] : contacts) {
+    io(key.a), io(key.b), io(key.end), io(force), io(stiffness), io(yielded), io(approach), io(age);
+    for (Vec3d* v : {&stick, &friction}) io(v->x), io(v->y), io(v->z);
+    io(sticking);
+  }
+}
+
+// Members are named one by one, by structured bindings: one that is added and not named here does not compile.
+
+template <class Archive>
+void exchange(Archive& io, Vec3d& v) {
+  io(v.x), io(v.y), io(v.z);
+}
+
+/// Of any size, in an archive that ends soon enough to be read.
+template <class Archive>
+void exchange(Archive& io, VectorX& v) {
+  auto size = static_cast<std::int64_t>(v.size());
+  io(size);
+  require(size >= 0 && size < 1 << 28, "snapshot is damaged: impossible size");
+  v.resize(size);
+  io(v);
+}
+
+template <class Archive>
+void exchange(Archive& io, std::optional<Energy>& energy) {
+  bool known = energy.has_value();
+  io(known);
+  if (!known) {
+    energy.reset();
+    return;
+  }
+  if (!energy) energy.emplace();
+  auto& [kinetic, stretch, bend, twist, gravity, loads, contact, spring, total, work, dissipated] = *energy;
+  for (double* x : {&kinetic, &stretch, &bend, &twist, &gravity, &loads, &contact, &spring, &total, &work, &dissipated})
+    io(*x);
+}
+
+/// What users may set; the rest follows from it. Friction is that of the drawing where it was not set: see
+/// `write_friction`.
+template <class Archive>
+void exchange(Archive& io, const Model& model, Parameters& p) {
+  for (const ParameterInfo& info : parameter_index()) {
+    if (info.of_contact()) continue;
+    for (int rod = 0; rod < (info.of_rod() ? static_cast<int>(model.place.size()) : 1); ++rod) {
+      ParameterView values = parameter_view(model, p, info.kind, rod);
+      io(values);
+    }
+  }
+  io(p.held_lumped);
+}
+
+template <class Archive>
+void exchange(Archive& io, const Model& model, Settings& settings) {
+  auto& [parameters, ramps, obstacle_motions] = settings;
+  exchange(io, model, parameters);
+  const auto exchange_ramp = [&](auto& ramp) {
+    auto& [from, to, start, end, active] = ramp;
+    io(from), io(to), io(start), io(end), io(active);
+  };
+  for (auto& [curvature, twist] : ramps) exchange_ramp(curvature), exchange_ramp(twist);
+  for (auto& [from, to, start, end] : obstacle_motions) {
+    for (ObstacleWay* way : {&from, &to}) io(way->shift), io(way->turn);
+    io(start), io(end);
+  }
+}
+
+template <class Archive>
+void exchange(Archive& io, State& state) {
+  auto& [time, q, v, acceleration, acceleration_current, load_force, friction_force, tangent, director, frame, bend_tau,
+         half_tau, contacts, obstacles, contact_stiffness, motion] = state;
+  io(time), io(q), io(v), io(acceleration), io(acceleration_current);
+  exchange(io, load_force);
+  exchange(io, friction_force);
+  for (auto& t : tangent) exchange(io, t);
+  for (auto& d : director) exchange(io, d);
+  for (auto& f : frame) io(f);
+  io(bend_tau), io(half_tau);
+  exchange_contacts(io, contacts);
+  for (auto& [point, other, turn] : obstacles) exchange(io, point), exchange(io, other), exchange(io, turn);
+  io(contact_stiffness);
+  auto& [known, velocity, times] = motion;
+  io(known);
+  for (int i : {0, 1}) io(velocity[i]), io(times[i]);
+}
+
+template <class Archive>
+void exchange(Archive& io, Moving& moving) {
+  auto& [state, predictor, motions, support_work, actuation_work, dissipated, load_work] = moving;
+  exchange(io, state);
+  predictor.exchange(io);
+  for (auto& motion : motions) {
+    auto& [position, rotation, from_position, to_position, from_rotation, to_rotation, start, end, stretch] = motion;
+    io(position), io(rotation), io(from_position), io(to_position), io(from_rotation), io(to_rotation);
+    io(start), io(end), io(stretch);
+  }
+  for (double* x : {&support_work, &actuation_work, &dissipated, &load_work}) io(*x);
+}
+
+template <class Archive>
+void exchange(Archive& io, StepControl& control) {
+  auto& [level, easy_steps, patience, grown, error_rate, grid_origin, grid_steps, steps_taken, guard, contact_guard,
+         step_watch, alarm] = control;
+  io(level), io(easy_steps), io(patience), io(grown), io(error_rate), io(grid_origin), io(grid_steps), io(steps_taken);
+  auto& [turn, scale, excess, stretch_gain, rescue, energy] = guard;
+  io(turn), io(scale), io(excess), io(stretch_gain), io(rescue);
+  exchange(io, energy);
+  auto& [greatest, gained, put_in] = contact_guard;
+  io(greatest), io(gained), io(put_in);
+  auto& [change, motion, most, pull, moved, acceleration] = step_watch;
+  io(change), io(motion), io(most), io(pull), io(moved);
+  exchange(io, acceleration);
+  exchange(io, alarm);
+}
+
+template <class Archive>
+void exchange(Archive& io, Found& found) {
+  auto& [custom_force, custom_moments, reaction_residual, reaction_place, reaction_current] = found;
+  io(custom_force), io(custom_moments), io(reaction_residual), io(reaction_place), io(reaction_current);
+}
+
+template <class Archive>
+void exchange(Archive& io, std::vector<ContactKey>& keys) {
+  exchange_size(io, keys, 1 << 28, "snapshot is damaged: impossible number of contacts");
+  for (auto& [a, b, end] : keys) io(a), io(b), io(end);
+}
+
+template <class Archive>
+void exchange(Archive& io, StokesletFluid::Memory& memory) {
+  auto& [solution, past, known, factorized_at, iterations, fresh_iterations, wave, excess, waited] = memory;
+  for (VectorX* v : {&solution, &past[0], &past[1], &factorized_at, &wave}) exchange(io, *v);
+  io(known), io(iterations), io(fresh_iterations), io(excess), io(waited);
+}
+
+template <class Archive>
+void exchange(Archive& io, EquationsMemory& memory) {
+  auto& [ordered, coupled, groups, matrix, flow_excess, fluid] = memory;
+  exchange(io, ordered);
+  exchange(io, coupled);
+  exchange_size(io, groups, 1 << 28, "snapshot is damaged: impossible number of groups");
+  for (std::vector<int>& group : groups) {
+    exchange_size(io, group, 1 << 10, "snapshot is damaged: impossible group");
+    for (int& unknown : group) io(unknown);
+  }
+  io(matrix);
+  io(flow_excess);
+  exchange(io, fluid);
+}
+
+template <class Archive>
+void exchange(Archive& io, MatrixHistory& history) {
+  auto& [interval, contraction, waited, slow] = history;
+  io(interval);
+  for (double& rate : contraction) io(rate);
+  io(waited), io(slow);
+}
+
+template <class Archive>
+void exchange(Archive& io, GuessHistory& history) {
+  auto& [records, cut, plain_solves] = history;
+  for (auto& [misses, waits] : records) io(misses), io(waits);
+  io(cut.misses), io(cut.waits), io(plain_solves);
+}
+
+}  // namespace
+
+template <class Archive>
+void exchange(Archive& io, const Model& model, Running& running) {
+  exchange(io, model, static_cast<Settings&>(running));
+  exchange(io, static_cast<Moving&>(running));
+  exchange(io, static_cast<StepControl&>(running));
+  exchange(io, static_cast<Found&>(running));
+}
+
+template <class Archive>
+void exchange(Archive& io, Lagged& lagged) {
+  auto& [matrix, guesses, owner, systems] = lagged;
+  exchange(io, matrix);
+  exchange(io, guesses);
+  int number = owner ? static_cast<int>(*owner) : -1;
+  io(number);
+  require(number >= -1 && number < static_cast<int>(kSystems.size()), "snapshot is damaged: unknown equations");
+  if (number >= 0) owner = static_cast<System>(number);
+  for (auto& memory : systems) {
+    bool known = memory.has_value();
+    io(known);
+    if (known && !memory) memory.emplace();
+    if (known) exchange(io, *memory);
+  }
+}
+
+template void exchange(Writer&, const Model&, Running&);
+template void exchange(Reader&, const Model&, Running&);
+template void exchange(Writer&, Lagged&);
+template void exchange(Reader&, Lagged&);
+
+}  // namespace withe

@@ -1,0 +1,332 @@
+"""What was set while a differentiable run went, call by call, and gradients by it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from withe import _core
+from withe.parts.kinds import DragPart, LoadPart, MassPart, Part, RodPart, SpringPart, SupportPart
+from withe.parts.parameters import ACTING_WORDS
+from withe.parts.springs import SPRING_WORDS
+from withe.simulation.moves import Way
+from withe.simulation.session import Session
+from withe.simulation.unknowns import (
+    NATURAL_WORDS,
+    OfRun,
+    Reader,
+    dragged_rods,
+    edges_of,
+    reader_of,
+    rod_slopes,
+    sum_of_slopes,
+)
+
+__all__ = ["CallGradient", "Gradients", "Ledger", "RunJournal"]
+
+FloatArray = npt.NDArray[np.float64]
+
+_FOLLOWING = {  # the arrays that a word of `set` makes anew, and of which words it makes them
+    "youngs_modulus": {
+        "stretch_stiffness": {"youngs_modulus"},
+        "bend_stiffness": {"youngs_modulus"},
+        "twist_stiffness": {"youngs_modulus", "poisson_ratio"},
+        "viscous_time": {"youngs_modulus", "viscosity"},
+    },
+    "poisson_ratio": {"twist_stiffness": {"youngs_modulus", "poisson_ratio"}},
+    "density": {"line_density": {"density"}, "rotary_inertia": {"density"}},
+    "viscosity": {"viscous_time": {"youngs_modulus", "viscosity"}},
+    "line_density": {"line_density": {"line_density"}, "rotary_inertia": {"line_density"}},
+}
+_OF_DRAGS = "drag of drags"  # makes a rod's drag where add_drag's handles do
+
+
+@dataclass(frozen=True, eq=False)
+class CallGradient:
+    """Derivatives of a scalar of a run by what one call set while it ran.
+
+    Attributes
+    ----------
+    time : float [s]
+        When it was called.
+    call : {"set", "set_natural_curvature", "set_natural_twist", "move"}
+    target : str or None
+        Name of the part; None: the scene.
+    over : float [s]
+        After which the value was reached; 0: at once.
+    gradients : dict
+        By each word that was set, shaped like the value that it was given: dL over that value, as long as it acted. A
+        curvature given with discrete=True has that by the curvature [1/m] of every stencil; a rotation by a rotation
+        vector, (3,) [1/rad], that turns the target. Words that have no gradient (functions of time, paths, tangents and
+        rolls, friction, the viscosity of a fluid) are left out.
+    """
+
+    time: float
+    call: str
+    target: str | None
+    over: float
+    gradients: dict[str, Any]
+
+
+class Gradients(list[Any]):
+    """Derivatives of a scalar of a run, for each of `wrt` one.
+
+    Attributes
+    ----------
+    calls : list of CallGradient
+        By what calls of `set`, `set_natural_curvature`, `set_natural_twist` and `move` (of supports) gave while the run
+        went, in their order.
+    """
+
+    def __init__(self, values: Sequence[Any], calls: list[CallGradient]) -> None:
+        super().__init__(values)
+        self.calls = calls
+
+
+@dataclass(frozen=True, eq=False)
+class _Call:
+    step: int
+    time: float
+    method: str
+    part: Part | None
+    values: Mapping[str, Any]
+    over: float
+    session: Session  # as it was left
+
+
+class RunJournal:
+    """Notes what is set while a run goes; see `Session.journal`."""
+
+    def __init__(self, tape: _core.Tape) -> None:
+        self._tape = tape
+        self.calls: list[_Call] = []
+
+    def note(self, session: Session, method: str, part: Part | None, values: Mapping[str, Any], over: float) -> None:
+        """A call has set these."""
+        self._tape.divide()
+        after = replace(session, settings=session.settings.copy(), journal=None)
+        self.calls.append(_Call(self._tape.count, session.world.time, method, part, dict(values), over, after))
+
+
+_Key = tuple[str, str]  # name of a part ("": the scene), and word
+_Weights = dict[int, float]  # of calls in a value that acts; -1: that of the start
+
+
+@dataclass
+class _Ramp:
+    """A value on its way: evenly from what it was to that of a call."""
+
+    start: _Weights
+    call: int
+    begin: float
+    over: float
+
+    def at(self, time: float) -> _Weights:
+        share = 1.0 if self.over == 0.0 else min(max((time - self.begin) / self.over, 0.0), 1.0)
+        weights = {call: (1.0 - share) * weight for call, weight in self.start.items() if share < 1.0}
+        weights[self.call] = share
+        return weights
+
+
+@dataclass
+class _Epoch:
+    """Which calls the numbers come from that act between two calls."""
+
+    session: Session
+    live: dict[_Key, int] = field(default_factory=dict)
+    ramps: dict[_Key, _Ramp] = field(default_factory=dict)
+    made_of: dict[_Key, set[str]] = field(default_factory=dict)  # arrays of rods that were made anew
+    ways: dict[_Key, Way] = field(default_factory=dict)
+
+    def follow(self, index: int, call: _Call) -> _Epoch:
+        """The next one, after a call."""
+        out = _Epoch(call.session, dict(self.live), dict(self.ramps), dict(self.made_of), dict(self.ways))
+        name = "" if call.part is None else call.part.name
+        if isinstance(call.part, SupportPart):
+            out._set_on_way(index, call, call.part)
+            return out
+        for word in call.values:
+            key = (name, word)
+            if isinstance(call.part, RodPart) and word in NATURAL_WORDS:
+                out.ramps[key] = _Ramp(self.weights(key, call.time), index, call.time, call.over)
+                continue
+            out.live[key] = index
+            if isinstance(call.part, RodPart):
+                for array, words in _FOLLOWING.get(word, {word: {word}}).items():
+                    out.made_of[name, array] = words
+            elif isinstance(call.part, DragPart):
+                for rod in dragged_rods(call.session, call.part):
+                    out.made_of[rod.name, "drag"] = {_OF_DRAGS}
+        return out
+
+    def _set_on_way(self, index: int, call: _Call, part: SupportPart) -> None:
+        for word in ("position", "rotation"):
+            before = self.ways.get((part.name, word))
+            start = before.weights(before.reached(call.time)) if before is not None else {}
+            moved = index if word in call.values else None
+            if moved is None and part.name in call.session.settings.paths:
+                start = {}
+            turn = call.values[word] if word == "rotation" and moved is not None else np.zeros(3)
+            self.ways[part.name, word] = Way(word, moved, call.time, call.over, turn, start)
+
+    def weights(self, key: _Key, time: float) -> _Weights:
+        """How much each call has in a natural shape at a time."""
+        return self.ramps[key].at(time) if key in self.ramps else {-1: 1.0}
+
+    def arrays(self, rod: RodPart, word: str, *, initial: bool) -> set[str]:
+        """Those of a rod that depend on a word as it was set, or as it was at the start of the run."""
+        return {
+            array
+            for array in ACTING_WORDS
+            if (word in self.made_of[rod.name, array] if (rod.name, array) in self.made_of else initial)
+        }
+
+
+class Ledger:
+    """Adds up derivatives by what acted, step by step: by what a run began with, and by what calls set."""
+
+    def __init__(
+        self,
+        session: Session,
+        calls: Sequence[_Call],
+        frames: Sequence[int],
+        wrt: Sequence[Any],
+        readers: list[Reader],
+        *,
+        by_moves: bool,
+    ) -> None:
+        """`frames`: how many calls came before each; `by_moves`: whether derivatives by poses are known."""
+        self._session, self._calls, self._frames = session, calls, frames
+        self._unknowns = list(zip(wrt, readers, strict=True))
+        self.sums: list[Any] = [None] * len(self._unknowns)
+        self._epochs = [_Epoch(session)]
+        for index, call in enumerate(calls):
+            self._epochs.append(self._epochs[-1].follow(index, call))
+        self._steps = [call.step for call in calls]
+        self._by_calls: list[dict[str, Any]] = [
+            {word: _of_shape(np.zeros(np.shape(value)), np.shape(value)) for word, value in call.values.items()}
+            if by_moves or not isinstance(call.part, SupportPart)
+            else {}
+            for call in calls
+        ]
+        for call, sums in zip(calls, self._by_calls, strict=True):
+            for word in [word for word in sums if not _has_gradient(call, word)]:
+                del sums[word]
+        self.moves = by_moves and any(isinstance(call.part, SupportPart) and call.values for call in calls)
+
+    def visit(self, step: int, moment: int, time: float, found: _core.ParameterGradient) -> None:
+        """Derivatives by what acted from a step on, or in a read-out at a moment."""
+        after = self._frames[moment] if moment >= 0 else int(np.searchsorted(self._steps, step, side="right"))
+        epoch = self._epochs[after]
+        for place, (unknown, reader) in enumerate(self._unknowns):
+            value = self._of_start(epoch, unknown, reader, time, found)
+            self.sums[place] = value if self.sums[place] is None else self.sums[place] + value
+        for key in epoch.live:
+            self._add_live(epoch, key, found)
+        for key, ramp in epoch.ramps.items():
+            for index, weight in ramp.at(time).items():
+                if index >= 0 and weight != 0.0:
+                    part = self._calls[index].part
+                    assert isinstance(part, RodPart)
+                    self._add(index, key[1], weight * np.asarray(getattr(found, key[1])[part.index]))
+
+    def visit_poses(self, step: int, reached: FloatArray, found: _core.PoseAdjoint) -> None:
+        """Derivatives by poses of supports at the end of a step."""
+        epoch = self._epochs[int(np.searchsorted(self._steps, step, side="right"))]
+        for (name, word), way in epoch.ways.items():
+            index = epoch.session.settings.supports[name][0]
+            share = float(reached[index]) if len(reached) else 1.0
+            by = (found.positions if word == "position" else found.rotations)[index]
+            for call, weight in way.weights(share).items():
+                sums = self._by_calls[call]
+                sums[word] = sums[word] + weight.T @ by
+
+    @property
+    def calls(self) -> list[CallGradient]:
+        """What was found of each."""
+        out = []
+        for call, found in zip(self._calls, self._by_calls, strict=True):
+            gradients = {word: found[word] for word in call.values if word in found}
+            name = None if call.part is None else call.part.name
+            out.append(CallGradient(call.time, call.method, name, call.over, gradients))
+        return out
+
+    def _of_start(self, epoch: _Epoch, unknown: Any, reader: Reader, time: float, found: Any) -> Any:
+        """By what the run began with, as far as that acts."""
+        if isinstance(unknown, str):
+            return reader(OfRun(found)) * (0.0 if ("", unknown) in epoch.live else 1.0)
+        part, word = self._session.directory.find_any(unknown[0], "wrt"), unknown[1]
+        key = (part.name, word)
+        if isinstance(part, RodPart) and word in NATURAL_WORDS:
+            return reader(OfRun(found)) * epoch.weights(key, time).get(-1, 0.0)
+        if isinstance(part, RodPart):
+            if not any(name == part.name for name, _ in epoch.made_of):
+                return reader(OfRun(found))
+            if word == "radius":
+                raise ValueError(
+                    f"no gradient by the radius of {part.owner}: its numbers were set in the course of the run"
+                )
+            arrays = set() if key in epoch.live else epoch.arrays(part, word, initial=True)
+            return self._by_rod(epoch, part, word, arrays, np.shape(reader(OfRun(found))), found)
+        if isinstance(part, DragPart):
+            return _by_drag(epoch, part, found, initial=True) if key not in epoch.live else 0.0
+        return reader(OfRun(found)) * (0.0 if key in epoch.live else 1.0)
+
+    def _add_live(self, epoch: _Epoch, key: _Key, found: Any) -> None:
+        index = epoch.live[key]
+        call, word = self._calls[index], key[1]
+        if isinstance(call.part, RodPart):
+            arrays = epoch.arrays(call.part, word, initial=False)
+            shape = np.shape(call.values[word])
+            self._add(index, word, self._by_rod(epoch, call.part, word, arrays, shape, found))
+        elif isinstance(call.part, DragPart):
+            self._add(index, word, _by_drag(epoch, call.part, found, initial=False))
+        elif isinstance(call.part, LoadPart) and call.part.name in epoch.session.settings.functions:
+            return
+        elif isinstance(call.part, LoadPart | MassPart) or (isinstance(call.part, SpringPart) and word in SPRING_WORDS):
+            self._add(index, word, reader_of(call.session, call.part, word)(OfRun(found)))
+        elif call.part is None and word == "gravity":
+            self._add(index, word, np.array(found.gravity))
+
+    def _add(self, index: int, word: str, value: Any) -> None:
+        shaped = _of_shape(value, np.shape(self._calls[index].values[word]))
+        self._by_calls[index][word] = self._by_calls[index][word] + shaped
+
+    def _by_rod(
+        self, epoch: _Epoch, part: RodPart, word: str, arrays: set[str], shape: tuple[int, ...], found: Any
+    ) -> Any:
+        slopes = rod_slopes(epoch.session, part, word) if arrays else {}
+        kept = {array: slope for array, slope in slopes.items() if array in arrays}
+        first, last = edges_of(epoch.session, part.index)
+        return _of_shape(sum_of_slopes(found, kept, word, first, last), shape)
+
+
+def _has_gradient(call: _Call, word: str) -> bool:
+    if isinstance(call.part, LoadPart):
+        return not callable(call.values[word])
+    if call.part is None:
+        return word == "gravity"
+    return isinstance(call.part, RodPart | MassPart | SpringPart | DragPart | SupportPart)
+
+
+def _by_drag(epoch: _Epoch, part: DragPart, found: Any, *, initial: bool) -> float:
+    total = 0.0
+    for rod in dragged_rods(epoch.session, part):
+        words = epoch.made_of.get((rod.name, "drag"))
+        if (_OF_DRAGS in words) if words is not None else initial:
+            first, last = edges_of(epoch.session, rod.index)
+            total += float(np.asarray(found.drag)[first:last].sum())
+    return total
+
+
+def _of_shape(full: Any, shape: tuple[int, ...]) -> Any:
+    """Derivatives by what was spread over more: sums over the axes along which it was."""
+    array = np.asarray(full)
+    padded = (1,) * (array.ndim - len(shape)) + shape
+    axes = tuple(i for i, size in enumerate(padded) if size == 1 and array.shape[i] != 1)
+    summed = array.sum(axis=axes, keepdims=True).reshape(shape)
+    return float(summed) if summed.ndim == 0 else summed

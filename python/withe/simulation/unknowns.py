@@ -1,0 +1,229 @@
+"""What a gradient is by, in the words of `set` and `get`: reads it from what the engine finds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from withe import _core
+from withe.parts.handles import Drag, Load, Mass, NodeHandle, Rod, Spring, Support
+from withe.parts.kinds import DragPart, LoadPart, MassPart, ObstaclePart, Part, RodPart, SpringPart, SupportPart
+from withe.parts.parameters import ACTING_WORDS, ROD_WORDS, RodParameters
+from withe.parts.springs import SPRING_WORDS
+from withe.simulation.drawn import points_reader
+from withe.simulation.loads import load_rows
+from withe.simulation.session import Session
+
+__all__ = [
+    "INITIAL_WORDS",
+    "NATURAL_WORDS",
+    "OfRun",
+    "Reader",
+    "Unknown",
+    "dragged_rods",
+    "edges_of",
+    "reader_of",
+    "rod_slopes",
+    "sum_of_slopes",
+    "unknown_readers",
+]
+
+FloatArray = npt.NDArray[np.float64]
+Unknown = tuple[Rod | Load | Mass | Drag | Spring | Support | str, str] | str
+"""What to differentiate by: a part and a word of `set`, or "gravity", "initial_positions", "initial_velocities"."""
+
+
+@dataclass(frozen=True)
+class OfRun:
+    """Derivatives of a scalar of a run by what acted in it, or in a part of it."""
+
+    parameters: _core.ParameterGradient
+
+
+Reader = Callable[[_core.EquilibriumGradient | OfRun], Any]
+"""Reads a derivative, shaped like `get`."""
+
+NATURAL_WORDS = ("natural_curvature", "natural_twist")
+INITIAL_WORDS = ("initial_positions", "initial_velocities")
+_POSE = ("position", "rotation")
+
+
+def unknown_readers(session: Session, wrt: Sequence[Unknown], *, may_be_empty: bool = False) -> list[Reader]:
+    """For each of `wrt` what reads its derivative, shaped like `get`, from what the engine finds."""
+    if isinstance(wrt, str) or not isinstance(wrt, Sequence) or not (wrt or may_be_empty):
+        raise ValueError('wrt must be a list of what to differentiate by, such as [(arm, "youngs_modulus"), "gravity"]')
+    return [_reader(session, unknown) for unknown in wrt]
+
+
+def _reader(session: Session, unknown: Unknown) -> Reader:
+    if isinstance(unknown, str):
+        return _scene_reader(unknown)
+    if not isinstance(unknown, tuple) or len(unknown) != 2 or not isinstance(unknown[1], str):
+        raise ValueError(f"wrt must hold pairs of a part and a word of set, or words of the scene; got {unknown!r}")
+    target, word = unknown
+    if isinstance(target, NodeHandle):
+        raise ValueError(f"wrt must name a part, got the node {target.name}: the support there, or its rod")
+    return reader_of(session, session.directory.find_any(target, "wrt"), word)
+
+
+def reader_of(session: Session, part: Part, word: str) -> Reader:
+    """What reads the derivative by a word of a part."""
+    if isinstance(part, RodPart):
+        return _rod_reader(session, part, word)
+    if isinstance(part, LoadPart) and word == part.kind:
+        return _load_reader(session, part)
+    if isinstance(part, MassPart) and word == "mass":
+        row = session.directory.row(part.node)
+        return lambda g: float(g.parameters.added_mass[row])
+    if isinstance(part, SpringPart) and word in SPRING_WORDS:
+        spring = session.scene.all(SpringPart).index(part)
+        return lambda g: float(getattr(g.parameters, f"spring_{word}")[spring])
+    if isinstance(part, DragPart) and word == "drag":
+        edges = np.concatenate([np.arange(*edges_of(session, rod.index)) for rod in dragged_rods(session, part)])
+        return lambda g: float(g.parameters.drag[edges].sum())
+    if isinstance(part, SupportPart) and word in _POSE:
+        return _pose_reader(session, part, word)
+    raise ValueError(f"no gradient is known by {word!r} of {part.name!r}")
+
+
+def _load_reader(session: Session, part: LoadPart) -> Reader:
+    rows, axis, shape = load_rows(session, part), part.axis, part.value.shape
+    if part.name in session.settings.functions:
+        raise ValueError(f"{part.name!r} is a function of time: no gradient by its one value")
+    if axis is None:
+        return lambda g: g.parameters.loads[rows].reshape(shape)
+    return lambda g: (g.parameters.loads[rows].reshape(shape) @ axis)[()]
+
+
+def _pose_reader(session: Session, part: SupportPart, word: str) -> Reader:
+    index = session.settings.supports[part.name][0]
+
+    def read(gradient: _core.EquilibriumGradient | OfRun) -> FloatArray:
+        if isinstance(gradient, OfRun):
+            raise ValueError(
+                f"no gradient of a run by the pose of {part.name!r} is known; equilibria have one, and calls of move"
+            )
+        return np.array(gradient.support_positions[index] if word == "position" else gradient.support_rotations[index])
+
+    return read
+
+
+def _scene_reader(word: str) -> Reader:
+    if word == "gravity":
+        return lambda g: np.array(g.parameters.gravity)
+    if word not in INITIAL_WORDS:
+        raise ValueError(f"wrt knows gravity, {', '.join(INITIAL_WORDS)}, and pairs of a part and a word; got {word!r}")
+
+    def refuse(gradient: _core.EquilibriumGradient | OfRun) -> Any:
+        raise ValueError(f"an equilibrium has no {word}; a run has")
+
+    return refuse
+
+
+def edges_of(session: Session, rod: int) -> tuple[int, int]:
+    """First edge of a rod among those of the scene, and the one after its last."""
+    counts = [len(part.section.area) for part in session.directory.all(RodPart)]
+    return sum(counts[:rod]), sum(counts[: rod + 1])
+
+
+def dragged_rods(session: Session, part: DragPart) -> list[RodPart]:
+    """Those on which a drag acts."""
+    return [rod for rod in session.directory.all(RodPart) if part.rods is None or rod.index in part.rods]
+
+
+def _points_reader(session: Session, part: RodPart) -> Reader:
+    read = points_reader(session, part, edges_of(session, part.index)[0])
+
+    def checked(gradient: _core.EquilibriumGradient | OfRun) -> FloatArray:
+        if isinstance(gradient, OfRun):
+            raise ValueError(f"no gradient of a run by points of {part.owner} is known; equilibria have one")
+        return read(gradient)
+
+    return checked
+
+
+def _rod_reader(session: Session, part: RodPart, word: str) -> Reader:
+    if word == "points":
+        return _points_reader(session, part)
+    if word in NATURAL_WORDS:
+        return lambda g: np.array(getattr(g.parameters, word)[part.index])
+    if word not in (*ROD_WORDS, "radius"):
+        words = ", ".join((*ROD_WORDS, *NATURAL_WORDS, "radius", "points"))
+        raise ValueError(f"{part.name!r} has no {word!r} to differentiate by; it has {words}")
+    first, last = edges_of(session, part.index)
+    slopes = rod_slopes(session, part, word)
+    scalar = word != "radius" and np.ndim(session.settings.rods[part.index].get(word)) == 0
+
+    def read(gradient: _core.EquilibriumGradient | OfRun) -> Any:
+        found = sum_of_slopes(gradient.parameters, slopes, word, first, last)
+        return float(found.sum()) if scalar else found
+
+    return read
+
+
+def rod_slopes(session: Session, part: RodPart, word: str) -> dict[str, FloatArray]:
+    """Derivatives of what the engine works with by a word, or the radius, of a rod as it is set now, edge by edge."""
+    parameters = session.settings.rods[part.index]
+    return _radius_slopes(session, part, parameters) if word == "radius" else _slopes(parameters, word)
+
+
+def sum_of_slopes(
+    found: _core.ParameterGradient, slopes: dict[str, FloatArray], word: str, first: int, last: int
+) -> FloatArray:
+    """By a word of a rod, whose edges are those from `first` to before `last`; one an edge, or a pair."""
+    out = np.zeros((last - first, 2) if word == "bend_stiffness" else last - first)
+    for name, slope in slopes.items():
+        part = np.asarray(getattr(found, name))[first:last] * slope
+        out += part if part.ndim == out.ndim else part.sum(axis=1)
+    return out
+
+
+def _slopes(parameters: RodParameters, word: str) -> dict[str, FloatArray]:
+    """Derivatives of what the engine works with by a word, edge by edge; see `RodParameters`."""
+    p = parameters
+    if word == "line_density":
+        return {word: np.ones_like(p.line_density), "rotary_inertia": p.rotary_inertia / p.line_density}
+    if word in ACTING_WORDS:
+        return {word: np.ones_like(getattr(p, word))}
+    if p.youngs_modulus is None or p.poisson_ratio is None or p.density is None:
+        raise ValueError(f"no gradient by {word}: the rod's stiffness was given directly, without a material")
+    modulus = p.youngs_modulus * np.ones(len(p.stretch_stiffness))
+    if word == "youngs_modulus":
+        return {
+            "stretch_stiffness": p.stretch_stiffness / modulus,
+            "bend_stiffness": p.bend_stiffness / modulus[:, None],
+            "twist_stiffness": p.twist_stiffness / modulus,
+            "viscous_time": -p.viscous_time / modulus,
+        }
+    if word == "poisson_ratio":
+        return {"twist_stiffness": -p.twist_stiffness / (1.0 + p.poisson_ratio)}
+    if word == "density":
+        return {"line_density": p.line_density / p.density, "rotary_inertia": p.rotary_inertia / p.density}
+    return {"viscous_time": 1.0 / modulus}
+
+
+def _radius_slopes(session: Session, part: RodPart, parameters: RodParameters) -> dict[str, FloatArray]:
+    """Derivatives of what the engine works with by the radius of each edge.
+
+    A = pi r^2, I = pi r^4 / 4, J = 2 I. Stiffness and line density that were given directly do not depend on it; rotary
+    inertia does.
+    """
+    section, p = part.section, parameters
+    if section.widths is not None or not np.allclose(section.area, np.pi * section.radii**2, rtol=1e-12):
+        raise ValueError(f"no gradient by radius: the section of {part.owner} is no withe.Circle")
+    if session.world.contact.rods or session.directory.all(ObstaclePart):
+        raise ValueError(
+            f"no gradient by radius of {part.owner} where rods or obstacles touch: their surfaces would move with it"
+        )
+    per_radius = 1.0 / section.radii
+    if p.youngs_modulus is None:
+        return {"rotary_inertia": 2.0 * p.rotary_inertia * per_radius}
+    powers = {"stretch_stiffness": 2, "bend_stiffness": 4, "twist_stiffness": 4, "line_density": 2, "rotary_inertia": 4}
+    return {
+        name: power * (getattr(p, name).T * per_radius).T  # bending has a column a director
+        for name, power in powers.items()
+    }

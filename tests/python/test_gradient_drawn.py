@@ -1,0 +1,136 @@
+"""Gradients of equilibria by nodes as they were drawn, against scenes built anew."""
+
+import numpy as np
+import pytest
+
+import withe
+
+NODES = 11
+SUPPORTS = ("frame", "edge", "both", "end", "pins")
+TIGHT = {"step_tolerance": 1e-13, "force_tolerance": 1e-12}
+
+CASES = [
+    *((planar, support, "as_built") for planar in (True, False) for support in (*SUPPORTS, "closed")),
+    *((False, support, "straight") for support in SUPPORTS),
+]
+
+
+class Arm:
+    """A curved arm of oval sections, held and loaded."""
+
+    def __init__(self, points, *, planar, support, natural="as_built"):
+        scene = withe.Scene()
+        rubber = withe.Material(youngs_modulus=1e6, poisson_ratio=0.4, density=1200.0)
+        self.arm = scene.add_rod(
+            points=points,
+            closed=support == "closed",
+            section=withe.Rectangle(2.4e-2, 2e-2),
+            material=rubber,
+            natural=natural,
+            name="arm",
+            normal=(0, 1, 0.1 * (not planar)),
+        )
+        if support in ("pins", "closed"):
+            self.held = [scene.pin(self.arm.node(0)), scene.pin(self.arm.node(7))]
+        elif support == "both":
+            self.held = [scene.clamp(self.arm.start), scene.clamp(self.arm.end)]
+        elif support == "end":
+            self.held = [scene.clamp(self.arm.end)]
+        else:
+            self.held = [scene.clamp(self.arm.start, hold="edge" if support == "edge" else "frame")]
+        scene.add_force(self.arm.node(8), (0.05, 0, 0.3))
+        scene.add_mass(self.arm.node(5), 0.02)
+        self.simulation = scene.build(integrator="static", planar=planar or None, **TIGHT)
+
+
+def drawn(planar, closed=False):
+    if closed:
+        s = np.linspace(0.0, 2.0 * np.pi, NODES, endpoint=False)
+        return np.stack([0.1 * np.cos(s), 0.02 * np.sin(2 * s) * (not planar), 0.08 * np.sin(s)], 1)
+    s = np.linspace(0.0, 1.0, NODES)
+    return np.stack([0.3 * s, 0.0 * s if planar else 0.04 * np.sin(3.0 * s), 0.05 * np.sin(2.0 * s)], 1)
+
+
+@pytest.mark.parametrize("word", ["positions", "curvatures", "twists", "tensions", "reaction_moments"])
+@pytest.mark.parametrize(("planar", "support", "natural"), CASES)
+def test_gradient_by_drawn_nodes_is_that_of_scenes_built_anew(planar, support, natural, word):
+    random = np.random.default_rng(30)
+    points = drawn(planar, support == "closed")
+    way = random.normal(size=(NODES, 3)) * ((1, 0, 1) if planar else (1, 1, 1))
+    first = Arm(points, planar=planar, support=support, natural=natural)
+    found = first.simulation.equilibrium()
+
+    def shown(arm):
+        if word == "reaction_moments":
+            return arm.simulation.reaction(arm.held[0]).moment
+        return getattr(arm.simulation, word)(arm.arm)
+
+    weight = random.normal(size=shown(first).shape) * (0.01 if word in ("curvatures", "twists") else 1.0)
+    if planar and word == "positions":
+        weight[:, 1] = 0.0
+    target = first.held[0] if word == "reaction_moments" else first.arm
+    (gradient,) = found.gradient({word: {target: weight}}, [(first.arm, "points")])
+
+    def of(h):
+        other = Arm(points + h * way, planar=planar, support=support, natural=natural)
+        other.simulation.equilibrium()
+        return float((weight * shown(other)).sum())
+
+    wide, near = ((of(h) - of(-h)) / (2.0 * h) for h in (2e-5, 1e-5))
+    assert np.sum(gradient * way) == pytest.approx((4.0 * near - wide) / 3.0, rel=1e-6, abs=2e-7)
+
+
+def test_a_shape_that_is_set_later_does_not_follow_drawn_nodes():
+    points, way = drawn(False), np.random.default_rng(31).normal(size=(NODES, 3))
+
+    def arm(h):
+        made = Arm(points + h * way, planar=False, support="frame")
+        made.simulation.set_natural_curvature(made.arm, (3.0, -2.0))
+        return made, made.simulation.equilibrium()
+
+    first, found = arm(0.0)
+    weight = np.zeros((NODES, 3))
+    weight[-1] = 1.0
+    (gradient,) = found.gradient(weight, [(first.arm, "points")])
+    wide, near = ((tip(arm(h)[0]) - tip(arm(-h)[0])) / (2.0 * h) for h in (2e-5, 1e-5))
+    assert np.sum(gradient * way) == pytest.approx((4.0 * near - wide) / 3.0, rel=1e-6)
+
+
+def tip(arm):
+    return float(arm.simulation.positions()[-1].sum())
+
+
+def test_drawn_nodes_that_have_no_gradient_say_so():
+    def refusal(change, run=False, **rod):
+        scene = withe.Scene()
+        rubber = withe.Material(youngs_modulus=1e6, poisson_ratio=0.4, density=1200.0)
+        arm = scene.add_rod(**({"points": drawn(False)} | rod), radius=1e-2, material=rubber, name="arm")
+        other = scene.add_rod(start=drawn(False)[-1], end=(0.5, 0, 0), nodes=5, radius=1e-2, material=rubber)
+        wall = scene.clamp(arm.start)
+        scene.clamp(other.end)
+        simulation = change(scene, arm, other, wall) or scene.build(integrator="implicit_midpoint")
+        if run:
+            found = simulation.run(0.01, record_every=0.01, progress=False, differentiable=True)
+            by = {"positions": np.zeros_like(found.positions())}
+        else:
+            found = simulation.equilibrium()
+            by = {"positions": np.zeros_like(simulation.positions())}
+        with pytest.raises(ValueError, match="by points") as refused:
+            found.gradient(by, [(arm, "points")])
+        return str(refused.value)
+
+    def moved(scene, arm, other, wall):
+        simulation = scene.build(integrator="static")
+        simulation.move(wall, position=(0, 0, 1e-3))
+        return simulation
+
+    assert "joined" in refusal(lambda scene, arm, other, wall: scene.join(arm.end, other.start) and None)
+    assert "loads along rods" in refusal(lambda scene, arm, other, wall: scene.add_load(arm, (0, 0, 1.0)) and None)
+    assert "touch" in refusal(lambda scene, arm, other, wall: scene.add_floor(-5.0) and None)
+    assert "give rest_length=" in refusal(
+        lambda scene, arm, other, wall: scene.add_spring(arm.node(2), arm.node(5), stiffness=3.0) and None
+    )
+    assert "has moved" in refusal(moved)
+    assert "draw the nodes themselves" in refusal(lambda *_: None, nodes=21)
+    assert "inner node" in refusal(lambda scene, arm, other, wall: scene.clamp(arm.node(4)) and None)
+    assert "equilibria have one" in refusal(lambda *_: None, run=True)
