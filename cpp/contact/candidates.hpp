@@ -55,8 +55,8 @@ class Candidates {
   /// pairs. Empty q: these alone.
   std::vector<ContactKey> near(const VectorX& q, const Bodies& bodies) const;
   /// Coefficients of friction of the surfaces have changed.
-  void renew_friction() {
-    for (ContactPair& pair : pairs_) surfaces_.set_friction(pair);
+  void renew_parameters() {
+    for (ContactPair& pair : pairs_) surfaces_.set_parameters(pair);
   }
   /// Without what was found before.
   void forget();

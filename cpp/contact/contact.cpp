@@ -74,13 +74,26 @@ Contact::Contact(const Model& model) : surfaces_(model), candidates_(model, surf
 
 bool Contact::regularises() const { return frictional() && regularises_friction(problem_.model()); }
 
-void Contact::set_friction(const Parameters& parameters) {
-  if (surfaces_.set_friction(parameters)) candidates_.renew_friction();
+void Contact::set_parameters(const Parameters& parameters) {
+  if (surfaces_.set_parameters(parameters.surfaces)) candidates_.renew_parameters();
+}
+
+void Contact::take_given_stiffness(State& state, const Parameters& parameters) const {
+  const Model& model = problem_.model();
+  state.contact_stiffness = ContactParameters(surfaces_, parameters).least_stiffness;
+  for (ContactRecord& record : state.contacts) {
+    const int other = record.key.b < 0 ? record.key.b : model.edge_rod[at(record.key.b)];
+    const double given = surfaces_.given_stiffness(model.edge_rod[at(record.key.a)], other);
+    if (!(given > 0.0)) continue;
+    if (anchored()) record.friction = (given / record.stiffness) * record.friction;
+    record.stiffness = given;
+    record.yielded = 0.0;
+  }
 }
 
 void Contact::begin(const State& state, const Parameters& parameters, double duration, Pressing pressing) {
   if (parameters_.version != parameters.version) {
-    set_friction(parameters);
+    set_parameters(parameters);
     parameters_ = ContactParameters(surfaces_, parameters);
   }
   problem_.pressing = pressing;
@@ -174,7 +187,7 @@ double Contact::obstacle_work() const { return withe::obstacle_work(problem_, se
 bool Contact::has_given_stiffness(const State& state) const {
   return std::all_of(set_.begin(), set_.end(), [&](const Touching& t) {
     const ContactRecord* record = find_record(state.contacts, t.pair.key);
-    const double given = t.pair.stiffness > 0.0 ? t.pair.stiffness : problem_.description().stiffness;
+    const double given = surfaces_.given_stiffness(t.pair.rod_a, t.pair.key.b < 0 ? t.pair.key.b : t.pair.rod_b);
     return record == nullptr || record->stiffness == given;
   });
 }

@@ -63,8 +63,11 @@ class Contact {
   /// Whether an obstacle would pass through a rod on its way through this step.
   bool blocked() const { return blocked_; }
 
-  /// Takes over coefficients of friction, for read-outs before the next step.
-  void set_friction(const Parameters& parameters);
+  /// Takes over how surfaces press and rub, for read-outs before the next step.
+  void set_parameters(const Parameters& parameters);
+  /// Gives contacts of a state, and those that begin, the stiffness that is given, where one is; and where none is any
+  /// more, those that begin the least one.
+  void take_given_stiffness(State& state, const Parameters& parameters) const;
   /// A step begins at `state`, which must outlive it. `duration`: the time in which slip happens [s].
   void begin(const State& state, const Parameters& parameters, double duration, Pressing pressing);
   /// Finds what touches at q1.

@@ -5,9 +5,11 @@
 
 namespace withe {
 ContactParameters::ContactParameters(const Surfaces& surfaces, const Parameters& parameters)
-    : version(parameters.version), gravity(parameters.gravity.norm()), slip_tolerance(parameters.slip_tolerance) {
+    : version(parameters.version),
+      gravity(parameters.gravity.norm()),
+      slip_tolerance(parameters.surfaces.slip_tolerance) {
   const Model& model = surfaces.model();
-  const double given = model.description.contact.stiffness;
+  const double given = parameters.surfaces.contact_stiffness;
   least_stiffness.setConstant(static_cast<Eigen::Index>(model.description.rods.size()), given);
   edge_mass = parameters.edge_density.cwiseProduct(model.edge_arc);
   for (int e = 0; e < model.edge_count && !(given > 0.0); ++e) {

@@ -107,7 +107,9 @@ struct ContactProblem {
     return found ? found : find_record(start->contacts, key);
   }
   /// Whether a stiffness is given.
-  bool fixed(const ContactPair& pair) const { return pair.stiffness > 0.0 || description().stiffness > 0.0; }
+  bool fixed(const ContactPair& pair) const {
+    return pair.stiffness > 0.0 || surfaces->parameters().contact_stiffness > 0.0;
+  }
   /// Of the edges, or half of both beside a node, that a contact holds up [kg].
   double mass_of(const ContactPair& pair) const;
   /// Whether surfaces press along the mean direction of the step. Curves have a mean of their own; and in a midpoint

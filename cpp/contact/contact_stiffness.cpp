@@ -187,9 +187,9 @@ double ContactStiffness::accept(const ContactSet& set, Keep keep, double spare, 
   auto& [records, fading, greatest, force] = scratch;
   records.clear();
   fading.clear();
-  const ContactDescription& contact = problem_.description();
+  const bool given = problem_.surfaces->parameters().contact_stiffness > 0.0;
   const VectorX& least = problem_.parameters->least_stiffness;
-  const bool source = contact.stiffness_rule == StiffnessRule::source && !(contact.stiffness > 0.0);
+  const bool source = problem_.description().stiffness_rule == StiffnessRule::source && !given;
   const double common = source ? std::max(source_stiffness(set, force), least.minCoeff()) : 0.0;
   greatest = least;
   double put_in = 0.0, wanted = 0.0;
@@ -219,7 +219,7 @@ double ContactStiffness::accept(const ContactSet& set, Keep keep, double spare, 
     put_in += change_stiffness(*t, 1.0, left, records[number]);
   }
   finish(set, records);
-  if (!(contact.stiffness > 0.0)) follow_forces(greatest, stiffness);
+  if (!given) follow_forces(greatest, stiffness);
   return put_in;
 }
 

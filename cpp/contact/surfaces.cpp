@@ -38,10 +38,8 @@ bool comes_before(const ContactKey& a, const ContactKey& b) {
 Surfaces::Surfaces(const Model& model) : model_(model) {
   const ContactDescription& contact = model.description.contact;
   Parameters drawn;
-  withe::set_friction(contact, drawn);
-  friction_ = drawn.friction;
-  obstacle_friction_ = drawn.obstacle_friction;
-  pair_friction_ = drawn.pair_friction;
+  set_contact(contact, drawn);
+  parameters_ = drawn.surfaces;
   for (const RodDescription& rod : model.description.rods)
     for (Eigen::Index e = 0; e < rod.rest_lengths.size(); ++e)
       radius_.push_back(rod.contact_radius.size() > 0 ? rod.contact_radius(e) : 0.0);
@@ -57,32 +55,42 @@ Surfaces::Surfaces(const Model& model) : model_(model) {
 
 void Surfaces::note_frictional() {
   const bool rods = model_.description.contact.rods;
-  frictional_ = rods && (friction_ > 0.0 || (pair_friction_.col(0).array() > 0.0).any());
+  frictional_ = rods && (parameters_.friction > 0.0 || (parameters_.pair_friction.col(0).array() > 0.0).any());
   for (const ContactPair& p : obstacle_pairs_) frictional_ = frictional_ || p.friction > 0.0;
 }
 
-bool Surfaces::set_friction(const Parameters& p) {
-  const auto same = [](const MatrixX2& a, const MatrixX2& b) { return a.rows() == b.rows() && a == b; };
-  if (friction_ == p.friction && same(obstacle_friction_, p.obstacle_friction) && same(pair_friction_, p.pair_friction))
-    return false;
-  friction_ = p.friction;
-  obstacle_friction_ = p.obstacle_friction;
-  pair_friction_ = p.pair_friction;
-  for (ContactPair& pair : obstacle_pairs_) set_friction(pair);
+bool Surfaces::set_parameters(const SurfaceParameters& parameters) {
+  if (parameters_ == parameters) return false;
+  parameters_ = parameters;
+  for (ContactPair& pair : obstacle_pairs_) set_parameters(pair);
   note_frictional();
   return true;
 }
 
-void Surfaces::set_friction(ContactPair& pair) const {
+void Surfaces::set_parameters(ContactPair& pair) const {
+  const SurfaceParameters& p = parameters_;
   const bool obstacle = pair.key.b < 0;
   const int other = obstacle ? pair.key.b : pair.rod_b;
   const Eigen::Index row = -1 - pair.key.b;
-  pair.set_friction(obstacle ? obstacle_friction_(row, 0) : friction_,
-                    obstacle ? obstacle_friction_(row, 1) : friction_);
+  pair.set_friction(obstacle ? p.obstacle_friction(row, 0) : p.friction,
+                    obstacle ? p.obstacle_friction(row, 1) : p.friction);
+  pair.restitution = obstacle ? p.obstacle_restitution(row) : p.restitution;
+  pair.stiffness = 0.0;
   const auto& pairs = model_.description.contact.pairs;
-  for (Eigen::Index i = 0; i < pair_friction_.rows(); ++i)
-    if (pairs[static_cast<std::size_t>(i)].is_of(pair.rod_a, other) && pair_friction_(i, 0) >= 0.0)
-      pair.set_friction(pair_friction_(i, 0), pair_friction_(i, 1));
+  for (Eigen::Index i = 0; i < p.pair_friction.rows(); ++i) {
+    if (!pairs[static_cast<std::size_t>(i)].is_of(pair.rod_a, other)) continue;
+    if (p.pair_friction(i, 0) >= 0.0) pair.set_friction(p.pair_friction(i, 0), p.pair_friction(i, 1));
+    if (p.pair_restitution(i) >= 0.0) pair.restitution = p.pair_restitution(i);
+    pair.stiffness = p.pair_contact_stiffness(i);
+  }
+}
+
+double Surfaces::given_stiffness(int rod, int other) const {
+  double given = 0.0;
+  const auto& pairs = model_.description.contact.pairs;
+  for (Eigen::Index i = 0; i < parameters_.pair_contact_stiffness.size(); ++i)
+    if (pairs[static_cast<std::size_t>(i)].is_of(rod, other)) given = parameters_.pair_contact_stiffness(i);
+  return given > 0.0 ? given : parameters_.contact_stiffness;
 }
 
 double Surfaces::tolerance(int edge) const {
@@ -90,15 +98,10 @@ double Surfaces::tolerance(int edge) const {
   return given > 0.0 ? given : 0.1 * radius(edge);
 }
 
-bool Surfaces::set_own(int first, int second, ContactPair& pair) const {
-  bool touches = true;
-  for (const ContactPairDescription& p : model_.description.contact.pairs)
-    if (p.is_of(first, second)) {
-      touches = !p.ignored;
-      pair.stiffness = p.stiffness;
-      if (p.restitution >= 0.0) pair.restitution = p.restitution;
-    }
-  return touches;
+bool Surfaces::may_meet(int first, int second) const {
+  const auto& pairs = model_.description.contact.pairs;
+  const auto last = std::find_if(pairs.rbegin(), pairs.rend(), [&](const auto& p) { return p.is_of(first, second); });
+  return last == pairs.rend() || !last->ignored;
 }
 
 /// Edges that a walk along rods, through joints too, reaches before it has gone too far for a rod to touch itself.
@@ -144,8 +147,7 @@ bool Surfaces::may_touch(int a, int b) const {
   if (a == b || std::binary_search(neighbours_[at(a)].begin(), neighbours_[at(a)].end(), b) ||
       std::binary_search(neighbours_[at(b)].begin(), neighbours_[at(b)].end(), a))
     return false;
-  ContactPair unused;
-  return set_own(model_.edge_rod[at(a)], model_.edge_rod[at(b)], unused);
+  return may_meet(model_.edge_rod[at(a)], model_.edge_rod[at(b)]);
 }
 
 ContactPair Surfaces::pair(int a, int b) const {
@@ -158,9 +160,7 @@ ContactPair Surfaces::pair(int a, int b) const {
   p.tolerance = std::min(tolerance(a), tolerance(b));
   p.weight_a = parallel_weight(model_.edge_length(a), p.radii());
   p.weight_b = parallel_weight(model_.edge_length(b), p.radii());
-  p.restitution = model_.description.contact.restitution;
-  set_own(p.rod_a, p.rod_b, p);
-  set_friction(p);
+  set_parameters(p);
   return p;
 }
 
@@ -173,13 +173,10 @@ void Surfaces::add_obstacles() {
     ContactPair p;
     p.key.b = -1 - static_cast<int>(o);
     p.radius_b = d.radius;
-    const auto row = static_cast<Eigen::Index>(o);
     for (int rod = 0; rod < static_cast<int>(model_.description.rods.size()); ++rod) {
       p.rod_a = rod;
-      p.restitution = contact.obstacle_restitution.size() > 0 ? contact.obstacle_restitution(row) : 1.0;
-      p.stiffness = 0.0;
-      if (!set_own(rod, p.key.b, p)) continue;
-      set_friction(p);
+      if (!may_meet(rod, p.key.b)) continue;
+      set_parameters(p);
       add_edges(p, obstacles_.back());
       add_pieces(p, obstacles_.back(), rod);
     }

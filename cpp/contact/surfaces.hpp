@@ -66,10 +66,14 @@ class Surfaces {
   bool may_touch(int a, int b) const;
   ContactPair pair(int a, int b) const;
   double greatest_reach() const { return greatest_reach_; }
-  /// Takes over coefficients that are not those there are; whether there were any.
-  bool set_friction(const Parameters& parameters);
-  /// Gives a pair the coefficients of its bodies.
-  void set_friction(ContactPair& pair) const;
+  /// How they press and rub.
+  const SurfaceParameters& parameters() const { return parameters_; }
+  /// Takes over parameters that are not those there are; whether there were any.
+  bool set_parameters(const SurfaceParameters& parameters);
+  /// Gives a pair what its bodies have.
+  void set_parameters(ContactPair& pair) const;
+  /// Stiffness that is given to what a rod has with another, or an obstacle as -1 - index [N/m]; 0: none is.
+  double given_stiffness(int rod, int other) const;
   /// Whether friction is there at all.
   bool frictional() const { return frictional_; }
   /// Unknowns of two surfaces, -1 where there is none; angles where there is friction.
@@ -85,8 +89,8 @@ class Surfaces {
   void add_pieces(const ContactPair& prototype, const Obstacle& obstacle, int rod);
   /// Whether an obstacle is large enough to be touched by a curve.
   bool smooth(const Obstacle& obstacle, int edge) const;
-  /// Sets what two bodies have of their own; whether they may touch.
-  bool set_own(int first, int second, ContactPair& pair) const;
+  /// Whether two bodies may touch.
+  bool may_meet(int first, int second) const;
   void unknowns_of_edges(const ContactKey& key, int (&dofs)[kContactUnknowns]) const;
 
   const Model& model_;
@@ -96,8 +100,7 @@ class Surfaces {
   std::vector<Obstacle> obstacles_;
   std::vector<ContactPair> obstacle_pairs_;
   double greatest_reach_ = 0;
-  double friction_ = 0;  ///< coefficients, as in `Parameters`
-  MatrixX2 obstacle_friction_, pair_friction_;
+  SurfaceParameters parameters_;
   bool frictional_ = false;
 };
 

@@ -29,7 +29,7 @@ inline MeanStretch mean_stretch(const Model& model, const ElasticCoefficients& e
                                 const Configuration& end, int edge) {
   const double EA = elastic.stretch_stiffness[edge], rest = model.edge_length[edge];
   const double sum = start.length[edge] + end.length[edge];
-  return {axial_force(0.5 * sum, rest, EA, 0.0), EA / rest, 2.0 / sum};
+  return {axial_force(0.5 * sum, rest, EA, elastic.stretch_natural[edge]), EA / rest, 2.0 / sum};
 }
 
 /// `given_force`: axial, per edge, in place of that of the mean strain in the matrix, see add_stretch_hessian; or null.

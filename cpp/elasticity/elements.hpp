@@ -43,7 +43,7 @@ inline TurnCoefficients half_coefficients(const ElasticCoefficients& k, int i) {
           {k.half_natural(i, 0), k.half_natural(i, 1), k.half_natural(i, 2)}};
 }
 
-/// Elasticity alone; of that, the natural strains of bending and twisting.
+/// Elasticity alone; of that, the natural strains.
 void set_elastic(const Parameters& parameters, ElasticCoefficients& out);
 void set_natural(const Parameters& parameters, ElasticCoefficients& out);
 /// Kelvin-Voigt viscosity alone over an interval h: the potential (eta / E) k (s - s0)^2 / (2 h) of the

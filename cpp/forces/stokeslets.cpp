@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "common/check.hpp"
+#include "common/text.hpp"
 
 namespace withe {
 namespace {
@@ -29,6 +30,9 @@ double bessel_k(int order, double x) {
   return kStep * sum;
 }
 
+/// Per length and viscosity, across a line, to waves of wavenumber 1 / regularization.
+double smooth_resistance() { return 8.0 * std::numbers::pi / (2.0 * bessel_k(0, 1.0) + 2.0 * bessel_k(1, 1.0)); }
+
 }  // namespace
 
 double wave_resistance(double x) {
@@ -43,30 +47,42 @@ void StokesletFluid::set_local_drag(double viscosity, MassMatrix& drag) const {
   drag.coupling = -viscosity * edge_drag_;
 }
 
-StokesletFluid::StokesletFluid(const Model& model)
-    : model_(model),
-      regularization_(model.description.fluid.regularization),
-      line_(line_length(model.node_count)),
-      node_length_(VectorX::Zero(model.node_count)) {
-  require(regularization_ > 0.0,
-          "regularization of the fluid must be positive, got " + std::to_string(regularization_));
+void check_regularization(const Model& model, double regularization) {
+  require(regularization > 0.0, "regularization of the fluid must be positive, got " + text(regularization));
   const double shortest = model.edge_length.minCoeff();
-  require(shortest >= kFinest * regularization_,
+  require(shortest >= kFinest * regularization,
           "regularization of the fluid must not exceed 3 edges, or velocities do not tell forces: got " +
-              std::to_string(regularization_) + " m with edges of " + std::to_string(shortest) + " m");
+              text(regularization) + " m with edges of " + text(shortest) + " m");
+}
+
+void StokesletFluid::set_edge_drag() {
+  // The shortest wave that edges can tell moves them less than a smooth one: the transform of the hats, and its images.
+  constexpr double kHats = 8.0 / (std::numbers::pi * std::numbers::pi);
+  const double across = smooth_resistance();
+  edge_drag_.resize(model_.edge_count);
+  for (int e = 0; e < model_.edge_count; ++e) {
+    const double length = model_.edge_length[e];
+    const double shortest = wave_resistance(std::numbers::pi * regularization() / length) / kHats;
+    edge_drag_[e] = 0.25 * length * std::max(shortest - across, 0.0);
+  }
+}
+
+void StokesletFluid::set_regularization(double regularization) {
+  if (regularization == memory_.regularization) return;
+  memory_.regularization = regularization;
+  set_edge_drag();
+  forget();
+}
+
+StokesletFluid::StokesletFluid(const Model& model)
+    : model_(model), line_(line_length(model.node_count)), node_length_(VectorX::Zero(model.node_count)) {
+  memory_.regularization = model.description.fluid.regularization;
+  check_regularization(model, regularization());
   for (int e = 0; e < model.edge_count; ++e)
     for (int node : {model.edge_tail[at(e)], model.edge_head[at(e)]}) node_length_[node] += 0.5 * model.edge_length[e];
   inverse_length_ = node_length_.cwiseInverse();
-  const double across = 8.0 * std::numbers::pi / (2.0 * bessel_k(0, 1.0) + 2.0 * bessel_k(1, 1.0));
-  node_drag_ = across * node_length_;
-  // The shortest wave that edges can tell moves them less than a smooth one: the transform of the hats, and its images.
-  constexpr double kHats = 8.0 / (std::numbers::pi * std::numbers::pi);
-  edge_drag_.resize(model.edge_count);
-  for (int e = 0; e < model.edge_count; ++e) {
-    const double length = model.edge_length[e];
-    const double shortest = wave_resistance(std::numbers::pi * regularization_ / length) / kHats;
-    edge_drag_[e] = 0.25 * length * std::max(shortest - across, 0.0);
-  }
+  node_drag_ = smooth_resistance() * node_length_;
+  set_edge_drag();
   std::vector<bool> taken(at(model.node_count), false);
   for (std::size_t r = 0; r + 1 < model.rod_first_edge.size(); ++r) {
     const int first = model.rod_first_edge[r], end = model.rod_first_edge[r + 1];
@@ -121,6 +137,8 @@ void StokesletFluid::recall(const Memory& memory) {
   require(memory.factorized_at.size() == 0 || memory.factorized_at.size() == model_.dof_count,
           "memory of a fluid must be that of the same scene");
   require(memory.known >= 0 && memory.known <= 3, "memory of a fluid must have up to three solutions");
+  check_regularization(model_, memory.regularization);
+  set_regularization(memory.regularization);
   if (memory.factorized_at.size() > 0) {
     place(memory.factorized_at);
     assemble();
@@ -163,7 +181,7 @@ void StokesletFluid::add_row(int node) {
                            {column(direction_, 0), column(direction_, 1), column(direction_, 2)},
                            length_.data(),
                            inverse_segment_.data()};
-  stokeslet_kernels().velocity(batch, x, regularization_, of_start_.data(), of_end_.data());
+  stokeslet_kernels().velocity(batch, x, regularization(), of_start_.data(), of_end_.data());
   const auto slots = static_cast<std::ptrdiff_t>(slot_node_.size());
   for (int k = 0; k < kBlockEntries; ++k) {
     double* own = row(node, k);

@@ -24,6 +24,9 @@ namespace withe {
 /// functions; from the transform of the kernel in stokeslet_kernels.hpp.
 double wave_resistance(double x);
 
+/// Refuses a regularization that is not positive, or of more than three edges; std::invalid_argument says why.
+void check_regularization(const Model& model, double regularization);
+
 class StokesletFluid {
  public:
   explicit StokesletFluid(const Model& model);
@@ -31,6 +34,9 @@ class StokesletFluid {
   /// Force per viscosity, -8 pi A^-1 v, on the nodes at q that move with `velocity`; both per unknown. False where no
   /// solution was found.
   bool solve(const VectorX& q, const VectorX& velocity, VectorX& force);
+  /// Length over which a point force is spread [m]; another one forgets earlier solutions.
+  double regularization() const { return memory_.regularization; }
+  void set_regularization(double regularization);
   /// Factor by which the local drag must grow, where rods nearly touch and move against each other, so that the
   /// resistance is at most `limit` times that and the inertia, mass over viscosity and step (per node) [m]. Looked for
   /// once in a while, at the positions of the last solution; a power of sqrt(2), or 1.
@@ -50,6 +56,7 @@ class StokesletFluid {
     VectorX wave;  ///< the motion that is resisted most compared with local drag and inertia
     double excess = 1.0;
     int waited = 0;
+    double regularization = 0;  ///< [m]
   };
   const Memory& memory() const { return memory_; }
   /// Goes on from there, with the same bits.
@@ -78,9 +85,9 @@ class StokesletFluid {
   void multiply_held(const VectorX& x, VectorX& y) const;
   void solve_held(VectorX& x);
   double sharpen_wave();
+  void set_edge_drag();
 
   const Model& model_;
-  double regularization_;
   std::ptrdiff_t line_;  ///< numbers a component
   VectorX node_length_, inverse_length_;
   // One slot for each node of each rod, one after the other; segment s runs from slot s to s + 1, or is none.

@@ -3,7 +3,7 @@
 namespace withe {
 
 ActingNumbers::ActingNumbers(const Parameters& first) {
-  stretches_.push_back({0, std::make_shared<const Parameters>(first), first.natural_version, {}, {}, {}});
+  stretches_.push_back({0, std::make_shared<const Parameters>(first), first.natural_version, {}, {}, {}, {}});
 }
 
 void ActingNumbers::record(std::size_t step, const Parameters& parameters) {
@@ -13,13 +13,14 @@ void ActingNumbers::record(std::size_t step, const Parameters& parameters) {
       parameters.loads == loads)
     return;
   divided_ = false;
-  Stretch next{step, last.base, parameters.natural_version, {}, {}, {}};
+  Stretch next{step, last.base, parameters.natural_version, {}, {}, {}, {}};
   if (parameters.version != last.base->version) {
     next.base = std::make_shared<const Parameters>(parameters);
   } else {
     if (parameters.natural_version != next.base->natural_version) {
       next.natural_curvature = parameters.natural_curvature;
       next.natural_twist = parameters.natural_twist;
+      next.natural_stretch = parameters.edge_natural_stretch;
     }
     if (parameters.loads != next.base->loads) next.loads = parameters.loads;
   }
@@ -42,6 +43,7 @@ const Parameters& ActingNumbers::play(const Model& model, std::size_t stretch, P
   if (own_shape) {
     out.now.natural_curvature = wanted.natural_curvature;
     out.now.natural_twist = wanted.natural_twist;
+    out.now.edge_natural_stretch = wanted.natural_stretch;
     update_natural(model, out.now);
   }
   out.now.loads = wanted.loads.size() != 0 ? wanted.loads : wanted.base->loads;

@@ -42,6 +42,7 @@ class ActingNumbers {
     long natural_version = 0;
     std::vector<MatrixX2> natural_curvature;  ///< empty: that of the base; likewise below
     std::vector<VectorX> natural_twist;
+    VectorX natural_stretch;
     MatrixX3 loads;
   };
   std::vector<Stretch> stretches_;

@@ -13,7 +13,7 @@ struct ParameterGradient {
   VectorX added_mass;
   Vector3 gravity = Vector3::Zero();
   std::vector<MatrixX2> natural_curvature;
-  std::vector<VectorX> natural_twist;
+  std::vector<VectorX> natural_twist, natural_stretch;
   MatrixX3 loads;
   VectorX spring_stiffness, spring_rest_length, spring_damping;
   /// Per edge, of equilibria of rods without joints that are no chords of arcs: by its rest length, and so by lengths

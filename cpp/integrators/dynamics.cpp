@@ -132,7 +132,7 @@ void extrapolate_velocity(const State& state, double time, VectorX& v) {
         ((time - past.time[0]) / (past.time[0] - past.time[1])) * (past.velocity[0] - past.velocity[1]);
 }
 
-Turning turning(const Model& model, const State& state, const VectorX& q, const double* stretch_stiffness,
+Turning turning(const Model& model, const State& state, const VectorX& q, const ElasticCoefficients* elastic,
                 bool at_end) {
   double smallest = 1.0, gain = 0.0;
   for (int e = 0; e < model.edge_count; ++e) {
@@ -147,8 +147,12 @@ Turning turning(const Model& model, const State& state, const VectorX& q, const 
     const double square = across * std::abs(across) / (before * after);  // of the cosine, with its sign
     if (!std::isfinite(square)) return {INFINITY, INFINITY};
     smallest = std::min(smallest, square);
-    if (stretch_stiffness)
-      gain += stretch_stiffness[e] * stretch_gain(before, after, across, model.edge_length(e), at_end);
+    if (elastic) {
+      // With a natural strain n: an edge of rest length (1 + n) L and stiffness (1 + n) EA.
+      const double natural = 1.0 + elastic->stretch_natural(e);
+      gain += natural * elastic->stretch_stiffness(e) *
+              stretch_gain(before, after, across, natural * model.edge_length(e), at_end);
+    }
   }
   return {std::acos(std::copysign(std::sqrt(std::min(std::abs(smallest), 1.0)), smallest)), gain};
 }
@@ -206,8 +210,7 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
     q1 = work.z;
   else
     q1 = 2.0 * work.z - state.q;
-  const double* watched =
-      plan.rule == StepRule::energy_momentum ? nullptr : equations.elastic().stretch_stiffness.data();
+  const ElasticCoefficients* watched = plan.rule == StepRule::energy_momentum ? nullptr : &equations.elastic();
   const Turning turned = turning(model, state, q1, watched, euler);
   result.largest_turn = turned.largest;
   if (!q1.allFinite() || !(result.largest_turn <= 1.5)) return result;

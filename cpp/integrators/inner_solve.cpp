@@ -26,12 +26,13 @@ constexpr int kMostOfEach = 20;
 /// whose edges turn along straight lines and so stretch, mean nothing.
 void start_axial_force(const Equations& equations, const VectorX& q, VectorX& out) {
   const Model& model = equations.model();
+  const ElasticCoefficients& k = equations.elastic();
   out.resize(model.edge_count);
   for (int e = 0; e < model.edge_count; ++e) {
     const int a = model.tail_dof[at(e)], b = model.head_dof[at(e)];
     double square = 0.0;
     for (int i = 0; i < model.dimension; ++i) square += (q(b + i) - q(a + i)) * (q(b + i) - q(a + i));
-    out(e) = axial_force(std::sqrt(square), model.edge_length(e), equations.elastic().stretch_stiffness(e), 0.0);
+    out(e) = axial_force(std::sqrt(square), model.edge_length(e), k.stretch_stiffness(e), k.stretch_natural(e));
   }
 }
 
@@ -141,7 +142,7 @@ class InnerSolve {
     return guess != Guess::accelerated && !(frictional_ && options_.adaptive);
   }
 
-  /// What need not lead to the solution is given up after few iterations. Where edges turn by a radian in an
+  /// Initial guesses that need not lead to the solution are rejected early. Where edges turn by a radian in an
   /// energy-momentum step, the mixed method may circle for ever: then the plain one comes first for a while.
   bool on_trial(Guess guess) const {
     const bool moving = guess == Guess::steady || guess == Guess::other_method;

@@ -85,6 +85,22 @@ struct Support {
   int first_constraint = 0;
 };
 
+/// How surfaces that touch press and rub: between rods, on obstacles, and of pairs of bodies that have something of
+/// their own.
+struct SurfaceParameters {
+  double friction = 0;             ///< between rods [-]
+  double slip_tolerance = 1e-3;    ///< nu [m/s]
+  double restitution = 1;          ///< between rods [-]
+  double contact_stiffness = 0;    ///< [N/m]; 0: found by the rule
+  MatrixX2 obstacle_friction;      ///< per obstacle, along and across rods [-]
+  VectorX obstacle_restitution;    ///< per obstacle [-]
+  MatrixX2 pair_friction;          ///< per pair, along and across; negative: that of its bodies [-]
+  VectorX pair_restitution;        ///< per pair; negative: that of its bodies [-]
+  VectorX pair_contact_stiffness;  ///< per pair; 0: that of the scene [N/m]
+
+  bool operator==(const SurfaceParameters& other) const;
+};
+
 /// Numbers that may change while running; one entry per edge, stencil or node. What users set of them has names in
 /// parameter_index.hpp.
 struct Parameters {
@@ -92,15 +108,14 @@ struct Parameters {
   MatrixX2 edge_bend;    ///< EI1, EI2 [N m^2]
   VectorX edge_twist;    ///< GJ [N m^2]
   VectorX edge_density, edge_rotary, edge_viscous_time, edge_drag;
+  VectorX edge_natural_stretch;  ///< length free of stress over that of the drawing [-]
   VectorX added_mass;
   Vector3 gravity;
   double fluid_viscosity = 0;               ///< [Pa s]
+  double fluid_regularization = 0;          ///< of Stokeslets [m]
   std::vector<MatrixX2> natural_curvature;  ///< per rod and stencil, smooth [1/m]
   std::vector<VectorX> natural_twist;       ///< per rod and stencil [rad/m]
-  double friction = 0;                      ///< between rods [-]
-  double slip_tolerance = 1e-3;             ///< nu [m/s]
-  MatrixX2 obstacle_friction;               ///< per obstacle, along and across rods [-]
-  MatrixX2 pair_friction;                   ///< per pair of bodies, likewise; negative: that of the scene [-]
+  SurfaceParameters surfaces;
   VectorX spring_stiffness, spring_rest_length, spring_damping;  ///< per spring [N/m], [m], [N s/m]
   MatrixX3 loads;  ///< rows of each load after those of the one before; see `LoadDescription::values`
   BendMeasure measure;
@@ -176,8 +191,8 @@ struct Model {
 Model build_model(const SceneDescription& description, std::optional<bool> planar);
 /// Parameters as described, derived ones included.
 Parameters initial_parameters(const Model& model);
-/// Friction as described; update_derived must follow.
-void set_friction(const ContactDescription& contact, Parameters& parameters);
+/// How surfaces press and rub, as described; update_derived must follow.
+void set_contact(const ContactDescription& contact, Parameters& parameters);
 /// Stiffnesses, densities, viscous time and drag of one rod, from one value an edge; update_derived must follow.
 void set_rod(const Model& model, int rod, const RodDescription& description, Parameters& parameters);
 /// Stiffness, rest length and damping of one spring, which must be finite and not negative.

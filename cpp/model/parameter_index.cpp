@@ -15,7 +15,7 @@ namespace {
 
 using enum ParameterKind;
 
-constexpr std::array<ParameterInfo, 20> kIndex{{
+constexpr std::array<ParameterInfo, 27> kIndex{{
     {stretch_stiffness, "stretch_stiffness", Extent::edge, 1, "N", Range::positive, Derived::nothing},
     {bend_stiffness, "bend_stiffness", Extent::edge, 2, "N m^2", Range::positive, Derived::stiffness},
     {twist_stiffness, "twist_stiffness", Extent::edge, 1, "N m^2", Range::positive, Derived::stiffness},
@@ -25,17 +25,24 @@ constexpr std::array<ParameterInfo, 20> kIndex{{
     {drag, "drag", Extent::edge, 1, "Pa s", Range::non_negative, Derived::masses},
     {natural_curvature, "natural_curvature", Extent::stencil, 2, "1/m", Range::any, Derived::natural_strains},
     {natural_twist, "natural_twist", Extent::stencil, 1, "rad/m", Range::any, Derived::natural_strains},
+    {natural_stretch, "natural_stretch", Extent::edge, 1, "-", Range::positive, Derived::natural_strains},
     {added_mass, "added_mass", Extent::node, 1, "kg", Range::non_negative, Derived::masses},
     {gravity, "gravity", Extent::scene, 3, "m/s^2", Range::any, Derived::nothing},
     {fluid_viscosity, "fluid_viscosity", Extent::scene, 1, "Pa s", Range::positive, Derived::nothing},
+    {fluid_regularization, "fluid_regularization", Extent::scene, 1, "m", Range::positive, Derived::nothing},
     {ParameterKind::load, "load", Extent::load, 3, "N, N m or N/m", Range::any, Derived::nothing},
     {spring_stiffness, "spring_stiffness", Extent::spring, 1, "N/m", Range::non_negative, Derived::nothing},
     {spring_rest_length, "spring_rest_length", Extent::spring, 1, "m", Range::non_negative, Derived::nothing},
     {spring_damping, "spring_damping", Extent::spring, 1, "N s/m", Range::non_negative, Derived::nothing},
     {friction, "friction", Extent::scene, 1, "-", Range::non_negative, Derived::nothing},
     {slip_tolerance, "slip_tolerance", Extent::scene, 1, "m/s", Range::positive, Derived::nothing},
+    {restitution, "restitution", Extent::scene, 1, "-", Range::non_negative, Derived::nothing},
+    {contact_stiffness, "contact_stiffness", Extent::scene, 1, "N/m", Range::non_negative, Derived::nothing},
     {obstacle_friction, "obstacle_friction", Extent::obstacle, 2, "-", Range::non_negative, Derived::nothing},
+    {obstacle_restitution, "obstacle_restitution", Extent::obstacle, 1, "-", Range::non_negative, Derived::nothing},
     {pair_friction, "pair_friction", Extent::pair, 2, "-", Range::any, Derived::nothing},
+    {pair_restitution, "pair_restitution", Extent::pair, 1, "-", Range::any, Derived::nothing},
+    {pair_contact_stiffness, "pair_contact_stiffness", Extent::pair, 1, "N/m", Range::non_negative, Derived::nothing},
 }};
 
 constexpr bool in_order() {
@@ -121,6 +128,8 @@ ParameterView parameter_view(const Model& model, Parameters& p, ParameterKind ki
         return p.natural_curvature[at(rod)].data();
       case natural_twist:
         return p.natural_twist[at(rod)].data();
+      case natural_stretch:
+        return p.edge_natural_stretch.data();
       case added_mass:
         return p.added_mass.data();
       case gravity:
@@ -134,13 +143,25 @@ ParameterView parameter_view(const Model& model, Parameters& p, ParameterKind ki
       case spring_damping:
         return p.spring_damping.data();
       case friction:
-        return &p.friction;
+        return &p.surfaces.friction;
       case slip_tolerance:
-        return &p.slip_tolerance;
+        return &p.surfaces.slip_tolerance;
+      case restitution:
+        return &p.surfaces.restitution;
+      case contact_stiffness:
+        return &p.surfaces.contact_stiffness;
       case obstacle_friction:
-        return p.obstacle_friction.data();
+        return p.surfaces.obstacle_friction.data();
+      case obstacle_restitution:
+        return p.surfaces.obstacle_restitution.data();
       case pair_friction:
-        return p.pair_friction.data();
+        return p.surfaces.pair_friction.data();
+      case pair_restitution:
+        return p.surfaces.pair_restitution.data();
+      case pair_contact_stiffness:
+        return p.surfaces.pair_contact_stiffness.data();
+      case fluid_regularization:
+        return &p.fluid_regularization;
       case fluid_viscosity:
         break;
     }

@@ -18,17 +18,24 @@ enum class ParameterKind {
   drag,
   natural_curvature,
   natural_twist,
+  natural_stretch,
   added_mass,
   gravity,
   fluid_viscosity,
+  fluid_regularization,
   load,
   spring_stiffness,
   spring_rest_length,
   spring_damping,
   friction,
   slip_tolerance,
+  restitution,
+  contact_stiffness,
   obstacle_friction,
+  obstacle_restitution,
   pair_friction,
+  pair_restitution,
+  pair_contact_stiffness,
 };
 
 /// What a parameter has a row of numbers for: the scene; every node; every edge, or stencil, of a rod; every obstacle;
@@ -49,7 +56,7 @@ struct ParameterInfo {
   Range range;
   Derived derived;
 
-  /// Set through `World::set_friction`: it decides about the form of the equations.
+  /// Set through `World::set_contact`: they decide about the form of the equations.
   bool of_contact() const { return kind >= ParameterKind::friction; }
   bool of_rod() const { return extent == Extent::edge || extent == Extent::stencil; }
 };

@@ -92,17 +92,36 @@ void set_spring(int spring, const SpringDescription& d, Parameters& p) {
   p.spring_damping[spring] = d.damping;
 }
 
-void set_friction(const ContactDescription& contact, Parameters& p) {
+void set_contact(const ContactDescription& contact, Parameters& parameters) {
+  SurfaceParameters& p = parameters.surfaces;
   p.friction = contact.friction;
   p.slip_tolerance = contact.slip_tolerance;
+  p.restitution = contact.restitution;
+  p.contact_stiffness = contact.stiffness;
   p.obstacle_friction.resize(contact.obstacle_friction.size(), 2);
   p.obstacle_friction.col(0) = contact.obstacle_friction;
   p.obstacle_friction.col(1) = contact.obstacle_across.size() > 0 ? contact.obstacle_across : contact.obstacle_friction;
-  p.pair_friction.resize(static_cast<Eigen::Index>(contact.pairs.size()), 2);
-  for (Eigen::Index i = 0; i < p.pair_friction.rows(); ++i) {
+  p.obstacle_restitution = contact.obstacle_restitution;
+  if (p.obstacle_restitution.size() == 0)
+    p.obstacle_restitution.setOnes(static_cast<Eigen::Index>(contact.obstacles.size()));
+  const auto pairs = static_cast<Eigen::Index>(contact.pairs.size());
+  p.pair_friction.resize(pairs, 2);
+  p.pair_restitution.resize(pairs);
+  p.pair_contact_stiffness.resize(pairs);
+  for (Eigen::Index i = 0; i < pairs; ++i) {
     const ContactPairDescription& pair = contact.pairs[static_cast<std::size_t>(i)];
     p.pair_friction.row(i) << pair.friction, pair.across >= 0.0 ? pair.across : pair.friction;
+    p.pair_restitution(i) = pair.restitution;
+    p.pair_contact_stiffness(i) = pair.stiffness;
   }
+}
+
+bool SurfaceParameters::operator==(const SurfaceParameters& other) const {
+  const auto same = [](const auto& a, const auto& b) { return a.rows() == b.rows() && a == b; };
+  return friction == other.friction && slip_tolerance == other.slip_tolerance && restitution == other.restitution &&
+         contact_stiffness == other.contact_stiffness && same(obstacle_friction, other.obstacle_friction) &&
+         same(obstacle_restitution, other.obstacle_restitution) && same(pair_friction, other.pair_friction) &&
+         same(pair_restitution, other.pair_restitution) && same(pair_contact_stiffness, other.pair_contact_stiffness);
 }
 
 void check_load(const SceneDescription& scene, const LoadDescription& load) {
@@ -124,6 +143,7 @@ Parameters initial_parameters(const Model& model) {
   p.edge_bend.resize(edges, 2);
   for (VectorX* v : {&p.edge_twist, &p.edge_density, &p.edge_rotary, &p.edge_viscous_time, &p.edge_drag})
     v->resize(edges);
+  p.edge_natural_stretch.setOnes(edges);
   for (std::size_t r = 0; r < scene.rods.size(); ++r) {
     const RodDescription& rod = scene.rods[r];
     set_rod(model, static_cast<int>(r), rod, p);
@@ -139,7 +159,8 @@ Parameters initial_parameters(const Model& model) {
   for (std::size_t k = 0; k < scene.loads.size(); ++k)
     p.loads.middleRows(first_load_row(scene, k), scene.loads[k].values.rows()) = scene.loads[k].values;
   p.fluid_viscosity = scene.fluid.viscosity;
-  set_friction(scene.contact, p);
+  p.fluid_regularization = scene.fluid.regularization;
+  set_contact(scene.contact, p);
   if (scene.bending == Bending::tangent) p.measure = {0.0, 0.0};
   update_derived(model, p);
   return p;
@@ -255,8 +276,8 @@ class BendStiffness {
     edge_ = b;
     share_ = share_b;
     part_ = part(b, share_b);
-    const Vector2 bending(1.0 / (before.bend1 + part_.bend1), 1.0 / (before.bend2 + part_.bend2));
-    const double twist = 1.0 / (before.twist + part_.twist), square = 0.5 * (before.square + part_.square);
+    const Vector2 bending(in_series(before.bend1, part_.bend1), in_series(before.bend2, part_.bend2));
+    const double twist = in_series(before.twist, part_.twist), square = 0.5 * (before.square + part_.square);
     return {bending(0), bending(1), twist_stiffness(model_, twist, bending, model_.bend_owner[at(stencil)], square)};
   }
 
@@ -268,7 +289,7 @@ class BendStiffness {
   Part part(int edge, double share) const {
     const double length = model_.edge_arc(edge), chord = model_.edge_length(edge), bent = share * length;
     const Vector2 k = bend_of(model_, p_, edge);
-    return {bent / k(0), bent / k(1), 0.5 * length / p_.edge_twist(edge),
+    return {flexibility(bent, k(0)), flexibility(bent, k(1)), flexibility(0.5 * length, p_.edge_twist(edge)),
             length == chord ? 0.0 : square_of_turn(chord, length)};
   }
 

@@ -5,6 +5,7 @@
 // number, so what multiplies rows^T is (s - n) times `along` = rows^T g, and so on.
 
 #include <array>
+#include <numeric>
 #include <utility>
 
 #include "elasticity/discrete_elements.hpp"
@@ -183,13 +184,20 @@ void ElasticForces::add_discrete_adjoint(const StepProblem& problem, const StepD
   DiscreteAdjoint discrete(problem, data, adjoint);
   Local local;
   double rows[kMaxLocal];
-  ElasticCoefficients unit;
-  unit.stretch_stiffness = VectorX::Ones(model.edge_count);
+  // Of EA = 1 N, and of a natural strain of one less, which pulls by as much more.
+  ElasticCoefficients unit, strained;
+  unit.stretch_stiffness = strained.stretch_stiffness = VectorX::Ones(model.edge_count);
   unit.stretch_natural = k.stretch_natural;
+  strained.stretch_natural = k.stretch_natural.array() - 1.0;
   for (int e = 0; e < model.edge_count; ++e) {
     gather(assembler.stretch, e, discrete.rows(), rows);
-    discrete_stretch_local(model, unit, discrete.forth(), e, false, nullptr, local);
-    for (int r = 0; r < assembler.stretch.width(); ++r) by.stretch_stiffness(e) += rows[r] * local.gradient[r];
+    const auto along = [&](const ElasticCoefficients& of) {
+      discrete_stretch_local(model, of, discrete.forth(), e, false, nullptr, local);
+      return std::inner_product(rows, rows + assembler.stretch.width(), local.gradient, 0.0);
+    };
+    const double pull = along(unit);
+    by.stretch_stiffness(e) += pull;
+    by.stretch_natural(e) -= k.stretch_stiffness(e) * (along(strained) - pull);
     discrete.add_ends(assembler.stretch, e, rows, {}, [&](const DiscreteStep& step, Local& out) {
       discrete_stretch_local(model, k, step, e, true, nullptr, out);
     });
@@ -235,6 +243,7 @@ void ElasticForces::add_adjoint(const StepProblem& problem, const StepData& data
     stretch_gradients(model, data.configuration, e, part.middle);
     const double along = model.edge_length(e) * part.along(0);
     if (elastic) by.stretch_stiffness(e) += (part.middle.strain[0] - k.stretch_natural(e)) * along;
+    if (elastic) by.stretch_natural(e) -= k.stretch_stiffness(e) * along;
     if (elastic)
       by.rest_length(e) -= k.stretch_stiffness(e) * (1.0 + part.middle.strain[0]) / model.edge_length(e) * along;
     if (!viscous) continue;

@@ -21,8 +21,12 @@ namespace withe {
 void StokesletForces::begin(StepProblem&) { acts_ = false; }
 
 bool StokesletForces::solve(const StepProblem& problem, const VectorX& q, const VectorX& v) {
-  if (!fluid_.solve(q, v, start_)) return false;
   const Parameters& parameters = *problem.parameters;
+  if (fluid_.regularization() != parameters.fluid_regularization) {
+    fluid_.set_regularization(parameters.fluid_regularization);
+    excess_ = 0.0;
+  }
+  if (!fluid_.solve(q, v, start_)) return false;
   const double viscosity = parameters.fluid_viscosity;
   inertia_ = parameters.node_mass / (viscosity * problem.duration());
   const double excess = fluid_.excess(inertia_, problem.in_middle() ? 1.3 : 1.9);

@@ -8,6 +8,7 @@ namespace withe {
 /// Derivatives of a scalar by the coefficients that the equations of a step are made of.
 struct CoefficientAdjoint {
   VectorX stretch_stiffness, stretch_time;  ///< per edge: by EA [1/N] and by viscous time [1/s]
+  VectorX stretch_natural;                  ///< per edge, by the natural strain
   Columns3 bend_stiffness, bend_natural;    ///< per stencil: by stiffnesses [1/(N m)], by natural strains
   Columns3 half_stiffness, half_natural;
   VectorX bend_time, half_time;                                  ///< by viscous times [1/s]
@@ -21,6 +22,7 @@ struct CoefficientAdjoint {
   explicit CoefficientAdjoint(const Model& model, Eigen::Index load_rows)
       : stretch_stiffness(VectorX::Zero(model.edge_count)),
         stretch_time(stretch_stiffness),
+        stretch_natural(stretch_stiffness),
         bend_stiffness(Columns3::Zero(static_cast<Eigen::Index>(model.bend.size()), 3)),
         bend_natural(bend_stiffness),
         half_stiffness(Columns3::Zero(static_cast<Eigen::Index>(model.half.size()), 3)),

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "common/check.hpp"
 #include "common/text.hpp"
@@ -76,21 +77,16 @@ void World::Implementation::listen() {
   };
 }
 
-/// Builds the model for the present supports and plane; a running state is carried over.
-void World::Implementation::rebuild(Rebuild why) {
-  account_for_settings();
-  if (tape) tape->refuse("supports came or went while it ran, or something left its plane");
+/// The model for the supports that are active. Released ones keep their row until another takes it, but hold nothing.
+Model World::Implementation::model_of_active(Rebuild why) {
   SceneDescription active = description;
-  // Released supports keep their row until another takes it, but hold nothing.
-  std::vector<bool> released(description.supports.size(), false);
-  for (std::size_t s = 0; s < model.supports.size(); ++s) released[s] = !model.supports[s].active;
   active.supports.clear();
   std::vector<std::size_t> index;
-  for (std::size_t s = 0; s < description.supports.size(); ++s)
-    if (!released[s]) {
-      active.supports.push_back(description.supports[s]);
-      index.push_back(s);
-    }
+  for (std::size_t s = 0; s < description.supports.size(); ++s) {
+    if (s < model.supports.size() && !model.supports[s].active) continue;
+    active.supports.push_back(description.supports[s]);
+    index.push_back(s);
+  }
   Model fresh = build_model(active, spatial ? std::optional<bool>(false) : options.planar);
   if (why == Rebuild::running && !model.planar() && fresh.planar()) {
     spatial = true;  // what kept the drawing from being planar is gone, but the state need not be in the plane
@@ -100,10 +96,14 @@ void World::Implementation::rebuild(Rebuild why) {
   for (std::size_t s = 0; s < all.size(); ++s) all[s].description = description.supports[s];
   for (std::size_t k = 0; k < index.size(); ++k) all[index[k]] = fresh.supports[k];
   fresh.supports = all;
+  return fresh;
+}
+
+/// Drops what has the sizes of the old model.
+void World::Implementation::drop_scratch() {
   static_equations.reset();
   static_gradient.reset();
-  rescue_equations.reset();
-  // Scratch has the sizes of the old model.
+  fallback_equations.reset();
   const Counters counters = work.newton.counters;
   const double finest = work.newton.finest;
   work = StepWorkspace{};
@@ -112,46 +112,60 @@ void World::Implementation::rebuild(Rebuild why) {
   work.newton.finest = finest;
   energy_scratch = EnergyScratch{};
   predictor.clear();
-  if (why == Rebuild::first) {
-    model = std::move(fresh);
-    parameters = initial_parameters(model);
-    parameters.lumped = options.integrator == Integrator::verlet;
-    state = initial_state(model);
-    ramps.assign(description.rods.size(), NaturalRamp{});
-    motions.assign(description.supports.size(), SupportMotion{});
-    custom_force = MatrixX3::Zero(model.node_count, 3);
-    custom_moments = MatrixX3::Zero(description.custom_moments ? model.node_count : 0, 3);
-    for (std::size_t s = 0; s < motions.size(); ++s) {
-      motions[s].position = motions[s].from_position = motions[s].to_position =
-          node_position(model, state.q, model.supports[s].node);
-    }
+}
+
+/// The state as it is drawn.
+void World::Implementation::begin_as_drawn() {
+  parameters = initial_parameters(model);
+  parameters.lumped = options.integrator == Integrator::verlet;
+  state = initial_state(model);
+  ramps.assign(description.rods.size(), NaturalRamp{});
+  motions.assign(description.supports.size(), SupportMotion{});
+  custom_force = MatrixX3::Zero(model.node_count, 3);
+  custom_moments = MatrixX3::Zero(description.custom_moments ? model.node_count : 0, 3);
+  for (std::size_t s = 0; s < motions.size(); ++s)
+    motions[s].position = motions[s].from_position = motions[s].to_position =
+        node_position(model, state.q, model.supports[s].node);
+}
+
+/// The running state, of another model.
+void World::Implementation::carry_over(const Model& old, Rebuild why) {
+  const State from = state;
+  std::vector<bool> is_new(at(model.frame_count), true);
+  for (int f = 0; f < model.frame_count; ++f)
+    for (int g = 0; g < old.frame_count; ++g)
+      if (same_frame(model, f, old, g)) is_new[at(f)] = false;
+  state = transferred(old, from);
+  // A motion that is prescribed in the course of a step may leave the plane: the step still returns to its start.
+  if (why == Rebuild::running && kept.state.q.size() == old.dof_count) {
+    kept.state = transferred(old, kept.state);
+    kept.predictor.clear();
   } else {
-    const Model old = std::move(model);
-    const State from = state;
-    model = std::move(fresh);
-    std::vector<bool> is_new(at(model.frame_count), true);
-    for (int f = 0; f < model.frame_count; ++f)
-      for (int g = 0; g < old.frame_count; ++g)
-        if (same_frame(model, f, old, g)) is_new[at(f)] = false;
-    state = transferred(old, from);
-    // A motion that is prescribed in the course of a step may leave the plane: the step still returns to its start.
-    if (why == Rebuild::running && kept.state.q.size() == old.dof_count) {
-      kept.state = transferred(old, kept.state);
-      kept.predictor.clear();
-    } else {
-      kept = Moving{};
-    }
-    // Frames that come and go carry inertia, and a support may change where the mass of edges sits.
-    MassMatrix mass;
-    set_mass(old, parameters, mass);
-    const double before = kinetic_energy(old, mass, from.v);
-    update_derived(model, parameters);
-    newton = std::make_unique<Newton>(model, options);
-    equations = std::make_unique<Equations>(model, equation_options(options));
-    relax_frames(is_new);
-    set_mass(model, parameters, mass);
-    support_work += kinetic_energy(model, mass, state.v) - before;
+    kept = Moving{};
   }
+  // Frames that come and go carry inertia, and a support may change where the mass of edges sits.
+  MassMatrix mass;
+  set_mass(old, parameters, mass);
+  const double before = kinetic_energy(old, mass, from.v);
+  update_derived(model, parameters);
+  newton = std::make_unique<Newton>(model, options);
+  equations = std::make_unique<Equations>(model, equation_options(options));
+  relax_frames(is_new);
+  set_mass(model, parameters, mass);
+  support_work += kinetic_energy(model, mass, state.v) - before;
+}
+
+/// Builds the model for the present supports and plane; a running state is carried over.
+void World::Implementation::rebuild(Rebuild why) {
+  account_for_settings();
+  if (tape) tape->refuse("supports came or went while it ran, or something left its plane");
+  Model fresh = model_of_active(why);
+  drop_scratch();
+  const Model old = std::exchange(model, std::move(fresh));
+  if (why == Rebuild::first)
+    begin_as_drawn();
+  else
+    carry_over(old, why);
   newton = std::make_unique<Newton>(model, options);
   equations = std::make_unique<Equations>(model, equation_options(options));
   if (Contact* contact = equations->contact()) contact->initialise(state, parameters);
@@ -163,7 +177,7 @@ void World::Implementation::remake_equations() {
   model.description.loads = description.loads;
   static_equations.reset();
   static_gradient.reset();
-  rescue_equations.reset();
+  fallback_equations.reset();
   newton = std::make_unique<Newton>(model, options);
   equations = std::make_unique<Equations>(model, equation_options(options));
   forget_matrix();
@@ -171,6 +185,22 @@ void World::Implementation::remake_equations() {
   state.acceleration_current = false;
   make_plan();
 }
+
+namespace {
+
+/// Twists of stencils that both models have.
+void copy_twists(const Model& old, const State& from, const Model& model, State& to) {
+  for (std::size_t b = 0; b < model.bend.size(); ++b)
+    for (std::size_t k = 0; k < old.bend.size(); ++k)
+      if (old.bend[k].edge[0] == model.bend[b].edge[0] && old.bend[k].edge[1] == model.bend[b].edge[1])
+        to.bend_tau(static_cast<Eigen::Index>(b)) = from.bend_tau(static_cast<Eigen::Index>(k));
+  for (std::size_t h = 0; h < model.half.size(); ++h)
+    for (std::size_t k = 0; k < old.half.size(); ++k)
+      if (old.half[k].edge == model.half[h].edge && old.half[k].frame_first == model.half[h].frame_first)
+        to.half_tau(static_cast<Eigen::Index>(h)) = from.half_tau(static_cast<Eigen::Index>(k));
+}
+
+}  // namespace
 
 State World::Implementation::transferred(const Model& old, const State& from) const {
   State to = initial_state(model);
@@ -224,16 +254,7 @@ State World::Implementation::transferred(const Model& old, const State& from) co
     }
   for (std::size_t h = 0; h < model.hinges.size() && h < old.hinges.size(); ++h)
     if (!lifted) copy(old.hinges[h].dof, model.hinges[h].dof, 1);
-  if (!lifted && !model.planar()) {
-    for (std::size_t b = 0; b < model.bend.size(); ++b)
-      for (std::size_t k = 0; k < old.bend.size(); ++k)
-        if (old.bend[k].edge[0] == model.bend[b].edge[0] && old.bend[k].edge[1] == model.bend[b].edge[1])
-          to.bend_tau(static_cast<Eigen::Index>(b)) = from.bend_tau(static_cast<Eigen::Index>(k));
-    for (std::size_t h = 0; h < model.half.size(); ++h)
-      for (std::size_t k = 0; k < old.half.size(); ++k)
-        if (old.half[k].edge == model.half[h].edge && old.half[k].frame_first == model.half[h].frame_first)
-          to.half_tau(static_cast<Eigen::Index>(h)) = from.half_tau(static_cast<Eigen::Index>(k));
-  }
+  if (!lifted && !model.planar()) copy_twists(old, from, model, to);
   return to;
 }
 
@@ -243,13 +264,10 @@ void World::Implementation::relax_frames(const std::vector<bool>& is_new) {
     if (is_new[at(f)]) relax_frame(f, Matrix3::Identity());
 }
 
-/// The frame and the hinges on it, with the edges where they are; the frame turns about what `free` projects onto.
-void World::Implementation::relax_frame(int f, const Matrix3& free) {
-  ElasticCoefficients elastic;
-  set_elastic(parameters, elastic);
+/// Turns a frame that nothing holds, and the hinges on it, with the edges that are attached to them.
+void World::Implementation::orient_frame(int f, const Matrix3& free) {
+  const int dof = model.frame_dof[at(f)];
   Configuration c;
-  Local local;
-  const int dof = model.frame_dof[at(f)], n = model.frame_size(), row = model.planar() ? 4 : 7;
   compute_configuration(model, state, state.q, c);
   // How an attached edge has turned since it was drawn.
   const auto turn_of = [&](const FrameStencil& half) -> Matrix3 {
@@ -259,7 +277,7 @@ void World::Implementation::relax_frame(int f, const Matrix3& free) {
     drawn << d1, t.cross(d1), t;
     return edge_directors(model, c, half.edge) * drawn.transpose();
   };
-  // Start from that of the first edge that no hinge lets turn, if nothing holds the frame.
+  // As the first edge that no hinge lets turn.
   const auto fixed = std::find_if(model.half.begin(), model.half.end(),
                                   [f](const FrameStencil& half) { return half.frame == f && half.hinge < 0; });
   if (free.isIdentity() && fixed != model.half.end()) {
@@ -269,9 +287,6 @@ void World::Implementation::relax_frame(int f, const Matrix3& free) {
     else
       state.frame[at(f)] = rotation;
   }
-  std::vector<int> hinges;  // each one's unknown follows those of the frame
-  for (std::size_t h = 0; h < model.hinges.size(); ++h)
-    if (model.hinges[h].frame == f) hinges.push_back(static_cast<int>(h));
   for (const FrameStencil& half : model.half)
     if (half.frame == f && half.hinge >= 0) {
       const Hinge& hinge = model.hinges[at(half.hinge)];
@@ -279,6 +294,19 @@ void World::Implementation::relax_frame(int f, const Matrix3& free) {
       const double angle = rotation_log(relative).dot(hinge.axis), full = 2.0 * std::numbers::pi;
       state.q(hinge.dof) = angle + full * std::round((state.q(hinge.dof) - angle) / full);
     }
+}
+
+/// The frame and the hinges on it, with the edges where they are; the frame turns about what `free` projects onto.
+void World::Implementation::relax_frame(int f, const Matrix3& free) {
+  orient_frame(f, free);
+  ElasticCoefficients elastic;
+  set_elastic(parameters, elastic);
+  Configuration c;
+  Local local;
+  const int dof = model.frame_dof[at(f)], n = model.frame_size(), row = model.planar() ? 4 : 7;
+  std::vector<int> hinges;  // each one's unknown follows those of the frame
+  for (std::size_t h = 0; h < model.hinges.size(); ++h)
+    if (model.hinges[h].frame == f) hinges.push_back(static_cast<int>(h));
   const int size = n + static_cast<int>(hinges.size());
   Eigen::MatrixXd project = Eigen::MatrixXd::Identity(size, size);
   project.topLeftCorner(n, n) = free.topLeftCorner(n, n);

@@ -39,11 +39,17 @@ BendTwistEnergy bend_twist_energy(const Model& model, const ElasticCoefficients&
   return sum;
 }
 
+double stretch_energy(const Model& model, const ElasticCoefficients& k, const Configuration& c) {
+  double energy = 0.0;
+  for (int i = 0; i < model.edge_count; ++i) energy += stretch_energy_of(model, k, c, i);
+  return energy;
+}
+
 /// Kinetic, elastic, of springs and gravity's.
 Energy mechanical_energy(const Model& model, const EnergyCoefficients& k, const Configuration& c, const State& state) {
   Energy e;
   e.kinetic = kinetic_energy(model, k.mass, state.v);
-  for (int i = 0; i < model.edge_count; ++i) e.stretch += stretch_energy_of(model, k.elastic, c, i);
+  e.stretch = stretch_energy(model, k.elastic, c);
   const BendTwistEnergy turned = bend_twist_energy(model, k.elastic, c);
   e.bend = turned.bend;
   e.twist = turned.twist;
@@ -67,13 +73,14 @@ void EnergyCoefficients::set(const Model& model, const Parameters& p) {
   spring_rest_length = p.spring_rest_length;
 }
 
-/// Takes ramps on to a time at a state that stays, and adds what that changes of bending and twisting [J].
+/// Takes ramps on to a time at a state that stays, and adds what that changes of the elastic energy [J].
 void World::Implementation::apply_ramps(double time, double& work) {
   auto& [c, k, touching] = energy_scratch;
+  const bool stretched = std::any_of(ramps.begin(), ramps.end(), [](const NaturalRamp& r) { return r.stretch.active; });
   const auto energy = [&] {
     k.set(model, parameters);
     const BendTwistEnergy e = bend_twist_energy(model, k.elastic, c);
-    return e.bend + e.twist;
+    return e.bend + e.twist + (stretched ? stretch_energy(model, k.elastic, c) : 0.0);
   };
   compute_configuration(model, state, state.q, c);
   work -= energy();

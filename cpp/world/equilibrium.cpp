@@ -23,13 +23,13 @@ Equations& World::Implementation::statics() {
 }
 
 /// Energy-momentum steps, which take over where plain midpoint gains energy.
-Equations& World::Implementation::rescue() {
-  if (!rescue_equations) {
+Equations& World::Implementation::fallback() {
+  if (!fallback_equations) {
     Options conserving = options;
     conserving.integrator = Integrator::energy_momentum;
-    rescue_equations = std::make_unique<Equations>(model, equation_options(conserving));
+    fallback_equations = std::make_unique<Equations>(model, equation_options(conserving));
   }
-  return *rescue_equations;
+  return *fallback_equations;
 }
 
 namespace {
@@ -131,14 +131,23 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
   system.respond({});
   if (!r.converged) {
     undo();
-    const bool held =
-        std::any_of(model.supports.begin(), model.supports.end(), [](const Support& s) { return s.active; });
-    fail(
-        r.newton, dt,
-        held ? "no static equilibrium was found"
-             : "no static equilibrium was found, and no support holds the scene: clamp or pin a node",
-        dt > 0.0 ? "" : "Try to get there in parts: small changes of loads and supports, or time steps with viscosity");
+    fail_equilibrium(r.newton, dt);
   }
+  return settle(system, r, time);
+}
+
+/// Says that none was found.
+void World::Implementation::fail_equilibrium(const NewtonResult& newton, double dt) const {
+  const bool held =
+      std::any_of(model.supports.begin(), model.supports.end(), [](const Support& s) { return s.active; });
+  fail(newton, dt,
+       held ? "no static equilibrium was found"
+            : "no static equilibrium was found, and no support holds the scene: clamp or pin a node",
+       dt > 0.0 ? "" : "Try to get there in parts: small changes of loads and supports, or time steps with viscosity");
+}
+
+/// The scene is in the equilibrium that was found, at a time.
+EquilibriumResult World::Implementation::settle(Equations& system, StaticResult& r, double time) {
   state.time = time;
   retire_ramps();
   statistics.steps += 1;
@@ -154,22 +163,55 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
   return {r.stable, symmetric || frictional, r.branch_changed, r.newton.iterations, r.newton.residual};
 }
 
-EquilibriumPath World::equilibrium_path(const PathOptions& wanted) {
-  Implementation& self = accounted();
-  const Timer timer(self.statistics.total_time);
+namespace {
+
+void check_path(const PathOptions& wanted, const SceneDescription& scene) {
   for (int load : wanted.loads)
-    require(load >= 0 && load < static_cast<int>(self.description.loads.size()), "no such load: ", load);
+    require(load >= 0 && load < static_cast<int>(scene.loads.size()), "no such load: ", load);
   require(std::isfinite(wanted.start) && std::isfinite(wanted.end) && wanted.start != wanted.end,
           "a path needs two factors to lead from and to");
   require(wanted.most_points > 0 && wanted.turn > 0.0, "a path needs points and turns that are positive");
+}
+
+/// Some of the loads, times a factor.
+void scale_loads(const SceneDescription& scene, const std::vector<int>& which, double factor, const MatrixX3& full,
+                 MatrixX3& loads) {
+  for (int load : which) {
+    const auto k = static_cast<std::size_t>(load);
+    const Eigen::Index first = first_load_row(scene, k), rows = scene.loads[k].values.rows();
+    loads.middleRows(first, rows) = factor * full.middleRows(first, rows);
+  }
+}
+
+PathPoint path_point(const World& world, const Model& model, const ArcPoint& point) {
+  const auto supports = static_cast<Eigen::Index>(model.supports.size());
+  MatrixX3 forces = MatrixX3::Zero(supports, 3), moments = forces;
+  for (Eigen::Index s = 0; s < supports; ++s) {
+    if (!model.supports[static_cast<std::size_t>(s)].active) continue;
+    const Reaction held = world.reaction(static_cast<int>(s));
+    forces.row(s) = held.force;
+    moments.row(s) = held.moment;
+  }
+  return {point.factor, point.stable, point.limit, world.positions(), forces, moments};
+}
+
+/// A support stays where it is.
+void stop(SupportMotion& motion, double time) {
+  motion.from_position = motion.to_position = motion.position;
+  motion.from_rotation = motion.to_rotation = motion.rotation;
+  motion.start = motion.end = time;
+}
+
+}  // namespace
+
+EquilibriumPath World::equilibrium_path(const PathOptions& wanted) {
+  Implementation& self = accounted();
+  const Timer timer(self.statistics.total_time);
+  check_path(wanted, self.description);
   const MatrixX3 full = self.parameters.loads;
   const bool by_loads = !wanted.loads.empty();
   const LoadPath scaled = [&](double factor, MatrixX3& loads) {
-    for (int load : wanted.loads) {
-      const auto k = static_cast<std::size_t>(load);
-      const Eigen::Index first = first_load_row(self.description, k), rows = self.description.loads[k].values.rows();
-      loads.middleRows(first, rows) = factor * full.middleRows(first, rows);
-    }
+    scale_loads(self.description, wanted.loads, factor, full, loads);
   };
   const Moving before = self;
   const Lagged lagged_before = self.lagged();
@@ -202,25 +244,13 @@ EquilibriumPath World::equilibrium_path(const PathOptions& wanted) {
     if (!by_loads) path.start_out_of_balance();
     const ArcVisitor visit = [&](const ArcPoint& point) {
       self.note_reactions();
-      MatrixX3 forces = MatrixX3::Zero(static_cast<Eigen::Index>(target.size()), 3), moments = forces;
-      for (std::size_t s = 0; s < target.size(); ++s) {
-        if (!self.model.supports[s].active) continue;
-        const Reaction held = reaction(static_cast<int>(s));
-        forces.row(static_cast<Eigen::Index>(s)) = held.force;
-        moments.row(static_cast<Eigen::Index>(s)) = held.moment;
-      }
-      out.points.push_back({point.factor, point.stable, point.limit, positions(), forces, moments});
+      out.points.push_back(path_point(*this, self.model, point));
     };
     r = follow_arc(system, *self.newton, self.options, path,
                    {wanted.start, wanted.end, wanted.most_points, wanted.turn}, self.state, self.work.newton, visit);
     system.respond({});
     move_to(r.factor);
-    for (std::size_t s = 0; s < target.size(); ++s) {
-      SupportMotion& m = self.motions[s];
-      m.from_position = m.to_position = m.position;
-      m.from_rotation = m.to_rotation = m.rotation;
-      m.start = m.end = self.state.time;
-    }
+    for (SupportMotion& m : self.motions) stop(m, self.state.time);
   } catch (...) {
     self.forget_custom(self.statics(), forces_before, moments_before);
     static_cast<Moving&>(self) = before;

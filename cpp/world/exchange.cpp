@@ -56,8 +56,8 @@ void exchange(Archive& io, std::optional<Energy>& energy) {
     io(*x);
 }
 
-/// What users may set; the rest follows from it. Friction is that of the drawing where it was not set: see
-/// `write_friction`.
+/// What users may set; the rest follows from it. Contact is that of the drawing where it was not set: see
+/// `write_contact`.
 template <class Archive>
 void exchange(Archive& io, const Model& model, Parameters& p) {
   for (const ParameterInfo& info : parameter_index()) {
@@ -78,7 +78,8 @@ void exchange(Archive& io, const Model& model, Settings& settings) {
     auto& [from, to, start, end, active] = ramp;
     io(from), io(to), io(start), io(end), io(active);
   };
-  for (auto& [curvature, twist] : ramps) exchange_ramp(curvature), exchange_ramp(twist);
+  for (auto& [curvature, twist, stretch] : ramps)
+    exchange_ramp(curvature), exchange_ramp(twist), exchange_ramp(stretch);
   for (auto& [from, to, start, end] : obstacle_motions) {
     for (ObstacleWay* way : {&from, &to}) io(way->shift), io(way->turn);
     io(start), io(end);
@@ -122,8 +123,8 @@ void exchange(Archive& io, StepControl& control) {
   auto& [level, easy_steps, patience, grown, error_rate, grid_origin, grid_steps, steps_taken, guard, contact_guard,
          step_watch, alarm] = control;
   io(level), io(easy_steps), io(patience), io(grown), io(error_rate), io(grid_origin), io(grid_steps), io(steps_taken);
-  auto& [turn, scale, excess, stretch_gain, rescue, energy] = guard;
-  io(turn), io(scale), io(excess), io(stretch_gain), io(rescue);
+  auto& [turn, scale, excess, stretch_gain, fallback_steps, energy] = guard;
+  io(turn), io(scale), io(excess), io(stretch_gain), io(fallback_steps);
   exchange(io, energy);
   auto& [greatest, gained, put_in] = contact_guard;
   io(greatest), io(gained), io(put_in);
@@ -147,9 +148,10 @@ void exchange(Archive& io, std::vector<ContactKey>& keys) {
 
 template <class Archive>
 void exchange(Archive& io, StokesletFluid::Memory& memory) {
-  auto& [solution, past, known, factorized_at, iterations, fresh_iterations, wave, excess, waited] = memory;
+  auto& [solution, past, known, factorized_at, iterations, fresh_iterations, wave, excess, waited, regularization] =
+      memory;
   for (VectorX* v : {&solution, &past[0], &past[1], &factorized_at, &wave}) exchange(io, *v);
-  io(known), io(iterations), io(fresh_iterations), io(excess), io(waited);
+  io(known), io(iterations), io(fresh_iterations), io(excess), io(waited), io(regularization);
 }
 
 template <class Archive>

@@ -12,6 +12,13 @@ namespace {
 /// An equilibrium leaves this much of the forces in it out of balance.
 constexpr double kBalanced = 1e-6;
 constexpr const char* kFriction = "friction takes part in it; take friction=0";
+constexpr const char* kRestitution = "impacts lose energy by their restitution; take restitution=1";
+
+bool loses_in_impacts(const ContactDescription& contact) {
+  const auto loses = [](double restitution) { return restitution >= 0.0 && restitution < 1.0; };
+  return loses(contact.restitution) || (contact.obstacle_restitution.array() < 1.0).any() ||
+         std::any_of(contact.pairs.begin(), contact.pairs.end(), [&](const auto& p) { return loses(p.restitution); });
+}
 
 }  // namespace
 
@@ -58,15 +65,12 @@ std::shared_ptr<Tape> World::start_tape() {
                       std::string(self.options.integrator == Integrator::verlet ? "verlet" : "static") +
                       "' has none; take any other");
   if (const Contact* contact = self.equations->contact()) {
-    const ContactDescription& given = self.description.contact;
-    const auto loses = [](double restitution) { return restitution >= 0.0 && restitution < 1.0; };
     if (self.options.integrator != Integrator::backward_euler)
       self.tape->refuse("contact takes part in it; take integrator='backward_euler'");
     else if (contact->frictional())
       self.tape->refuse(kFriction);
-    else if (loses(given.restitution) || (given.obstacle_restitution.array() < 1.0).any() ||
-             std::any_of(given.pairs.begin(), given.pairs.end(), [&](const auto& p) { return loses(p.restitution); }))
-      self.tape->refuse("impacts lose energy by their restitution; take restitution=1");
+    else if (loses_in_impacts(self.description.contact))
+      self.tape->refuse(kRestitution);
   }
   return self.tape;
 }
@@ -107,6 +111,8 @@ void World::Implementation::record_step(StepRule rule, double dt, bool reacts) {
     const ContactProblem& problem = contact->problem();
     if (contact->frictional())
       unknown = kFriction;
+    else if (loses_in_impacts(description.contact))
+      unknown = kRestitution;
     else if (!contact->has_given_stiffness(state))
       unknown = "its contacts took a stiffness of their own; give enable_contact(stiffness=), great enough";
     else if (!problem.shift.empty() || !problem.turn.empty())

@@ -36,13 +36,13 @@ struct World::Implementation : Running {
   Implementation(const Implementation& other);
 
   SceneDescription description;
-  ContactDescription drawn_contact;  ///< whose friction holds until it is set
+  ContactDescription drawn_contact;  ///< which holds until it is set
   Options options;
   Model model;
   std::unique_ptr<Newton> newton;
   std::unique_ptr<Equations> equations;
-  std::unique_ptr<Equations> rescue_equations;  ///< energy-momentum ones, made when plain midpoint gains energy
-  std::unique_ptr<Equations> static_equations;  ///< symmetric ones, made when first needed
+  std::unique_ptr<Equations> fallback_equations;  ///< energy-momentum ones, made when plain midpoint gains energy
+  std::unique_ptr<Equations> static_equations;    ///< symmetric ones, made when first needed
   mutable std::unique_ptr<StepGradient> static_gradient;  ///< made when first needed
   std::shared_ptr<Tape> tape;                             ///< of a run that is kept for gradients
   long taped = 0;                                         ///< its length at the start of a step that may be taken back
@@ -89,6 +89,10 @@ struct World::Implementation : Running {
   /// Lets interruptions reach the solver.
   void listen();
   void rebuild(Rebuild why);
+  Model model_of_active(Rebuild why);
+  void drop_scratch();
+  void begin_as_drawn();
+  void carry_over(const Model& old, Rebuild why);
   void make_plan();
   /// Equations for other loads than before.
   void remake_equations();
@@ -99,12 +103,14 @@ struct World::Implementation : Running {
   void leave_plane(const std::string& why);
   State transferred(const Model& old, const State& from) const;
   void relax_frames(const std::vector<bool>& is_new);
+  void orient_frame(int frame, const Matrix3& free);
   void relax_frame(int frame, const Matrix3& free);
 
   // set_state.cpp
   bool leaves_plane(const RodState& rod) const;
   VectorX placed(const std::vector<RodState>& rods) const;
   void place_rods(const std::vector<RodState>& rods);
+  void place_directors(const RodState& rod, const VectorX& q, const Configuration& before);
   void set_rates(const std::vector<RodState>& rods);
   void relax_joints(const std::vector<bool>& is_told);
   void turn_frames(const std::vector<bool>& is_told);
@@ -116,11 +122,12 @@ struct World::Implementation : Running {
   /// Leads a part of a natural shape to another value over a time [s].
   template <class Value>
   void begin_ramp(Ramp<Value>& ramp, const Value& now, const Value& value, double over);
-  void take_friction();
+  void take_contact();
   /// Leaves the plane of a planar scene where a parameter of the kind does.
   void leave_plane_for(const ParameterSetting& setting);
   void set(std::span<const ParameterSetting> settings);
   void apply_ramps(double time);
+  Eigen::VectorBlock<VectorX> natural_stretch(int rod);
   void apply_ramps(double time, double& work);
   void retire_ramps();
   bool actuated() const;
@@ -140,7 +147,7 @@ struct World::Implementation : Running {
   void update_custom_force(Equations& target) const;
 
   // stepping.cpp
-  enum class Attempt { failed, gained_energy, rescued, inaccurate, hard, easy };
+  enum class Attempt { failed, gained_energy, fell_back, inaccurate, hard, easy };
   /// Equal parts in which the rest of a time step, from a fraction of it on, is taken.
   struct Division {
     double from = 0.0;
@@ -171,6 +178,7 @@ struct World::Implementation : Running {
   StepResult step_by_rule(double dt, int slot);
   void note_reactions();
   void keep_reactions();
+  void check_impacts(const ContactDescription& contact) const;
   void check_reversible(const Parameters& p) const;
 
   // failure.cpp
@@ -197,12 +205,17 @@ struct World::Implementation : Running {
   void check_tape();
   void record_step(StepRule rule, double dt, bool reacts);
 
+  // supports.cpp
+  SupportMotion standing(const Support& support) const;
+
   // equilibrium.cpp
   EquilibriumResult equilibrium(double dt);
+  [[noreturn]] void fail_equilibrium(const NewtonResult& newton, double dt) const;
+  EquilibriumResult settle(Equations& system, StaticResult& result, double time);
   bool drifts(Equations& system);
   void rest();
   Equations& statics();
-  Equations& rescue();
+  Equations& fallback();
   void refresh_reactions();
 
   // contacts.cpp

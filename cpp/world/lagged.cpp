@@ -15,8 +15,8 @@ Equations* World::Implementation::system(System which) {
   switch (which) {
     case System::scheme:
       return equations.get();
-    case System::rescue:
-      return rescue_equations.get();
+    case System::fallback:
+      return fallback_equations.get();
     case System::statics:
       return static_equations.get();
   }
@@ -43,10 +43,10 @@ void World::Implementation::recall(const Lagged& past) {
   bool fits = true;
   for (const System which : kSystems) {
     const auto& memory = past.systems[at(which)];
-    if (!memory && which == System::rescue) rescue_equations.reset();
+    if (!memory && which == System::fallback) fallback_equations.reset();
     if (!memory && which == System::statics) static_equations.reset();
     if (!memory) continue;
-    if (which == System::rescue) rescue();
+    if (which == System::fallback) fallback();
     if (which == System::statics) statics();
     require(system(which) != nullptr, "equations of another scene");
     if (!system(which)->recall(*memory) && past.owner == which) fits = false;
@@ -83,7 +83,7 @@ void World::Implementation::return_to_mark() {
     forget_matrix();
     return;
   }
-  for (auto* made : {&rescue_equations, &static_equations})
+  for (auto* made : {&fallback_equations, &static_equations})
     if (*made && !(*made)->marked()) made->reset();
   work.newton.matrix = marked_matrix;
   work.newton.guesses = marked_guesses;

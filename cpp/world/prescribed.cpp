@@ -16,9 +16,15 @@ double ramp_fraction(double time, double start, double end) {
 void World::Implementation::apply_ramps(double time) {
   for (std::size_t r = 0; r < ramps.size(); ++r) {
     const bool bent = ramps[r].curvature.apply(time, parameters.natural_curvature[r]),
-               twisted = ramps[r].twist.apply(time, parameters.natural_twist[r]);
-    if (bent || twisted) update_natural(model, parameters, static_cast<int>(r));
+               twisted = ramps[r].twist.apply(time, parameters.natural_twist[r]),
+               stretched = ramps[r].stretch.apply(time, natural_stretch(static_cast<int>(r)));
+    if (bent || twisted || stretched) update_natural(model, parameters, static_cast<int>(r));
   }
+}
+
+Eigen::VectorBlock<VectorX> World::Implementation::natural_stretch(int rod) {
+  const int first = model.rod_first_edge[at(rod)];
+  return parameters.edge_natural_stretch.segment(first, model.rod_first_edge[at(rod) + 1] - first);
 }
 
 /// Those that have come to their end are at rest from now on.
@@ -26,12 +32,13 @@ void World::Implementation::retire_ramps() {
   for (NaturalRamp& ramp : ramps) {
     ramp.curvature.retire(state.time);
     ramp.twist.retire(state.time);
+    ramp.stretch.retire(state.time);
   }
 }
 
 bool World::Implementation::actuated() const {
   for (const NaturalRamp& ramp : ramps)
-    if (ramp.curvature.active || ramp.twist.active) return true;
+    if (ramp.curvature.active || ramp.twist.active || ramp.stretch.active) return true;
   return false;
 }
 

@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 
 #include "common/check.hpp"
+#include "elasticity/stretch.hpp"
 #include "model/edge_vectors.hpp"
 #include "steps/spring_forces.hpp"
 #include "world/implementation.hpp"
@@ -102,7 +103,9 @@ VectorX World::tensions(int rod) const {
   const int first = self.model.rod_first_edge.at(at(rod)), count = self.model.rod_first_edge.at(at(rod) + 1) - first;
   VectorX out(count);
   for (int e = 0; e < count; ++e)
-    out(e) = self.parameters.edge_stretch(first + e) * (c.length(first + e) / self.model.edge_length(first + e) - 1.0);
+    out(e) =
+        axial_force(c.length(first + e), self.model.edge_length(first + e), self.parameters.edge_stretch(first + e),
+                    self.parameters.edge_natural_stretch(first + e) - 1.0);
   return out;
 }
 

@@ -39,7 +39,8 @@ struct Ramp {
   bool active = false;
 
   /// Sets what is on its way to where it is at a time; false where it is not.
-  bool apply(double time, Value& now) const {
+  template <class Now>
+  bool apply(double time, Now&& now) const {
     if (!active) return false;
     const double s = ramp_fraction(time, start, end);
     now.noalias() = (1.0 - s) * from + s * to;
@@ -52,10 +53,10 @@ struct Ramp {
   }
 };
 
-/// Natural shape of a rod: curvature [1/m] and twist [rad/m] of its stencils.
+/// Natural shape of a rod: curvature [1/m] and twist [rad/m] of its stencils, stretch of its edges [-].
 struct NaturalRamp {
   Ramp<MatrixX2> curvature;
-  Ramp<VectorX> twist;
+  Ramp<VectorX> twist, stretch;
 };
 
 /// Energy balance of the watch over plain midpoint's energy.
@@ -64,7 +65,7 @@ struct EnergyGuard {
   double scale = 0;                                       ///< [J]
   double excess = 0;                                      ///< out of nowhere so far [J]
   double stretch_gain = 0;                                ///< of the last step, into stretching [J]
-  int rescue = 0;                                         ///< energy-momentum steps still to take in its place
+  int fallback_steps = 0;                                 ///< energy-momentum steps still to take in its place
   std::optional<Energy> energy;                           ///< at the present state, where a step has just found it
 };
 
@@ -131,8 +132,8 @@ struct Found {
 struct Running : Settings, Moving, StepControl, Found {};
 
 /// Systems of equations that a scene may have.
-enum class System { scheme, rescue, statics };
-inline constexpr std::array<System, 3> kSystems{System::scheme, System::rescue, System::statics};
+enum class System { scheme, fallback, statics };
+inline constexpr std::array<System, 3> kSystems{System::scheme, System::fallback, System::statics};
 
 /// What solves leave for those to come: with it, a copy goes on with the same bits.
 struct Lagged {

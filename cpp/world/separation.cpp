@@ -87,7 +87,7 @@ class Separation {
     p.edge_viscous_time.setZero();
     p.added_mass.setZero();
     p.gravity.setZero();
-    set_friction(model.description.contact, p);
+    set_contact(model.description.contact, p);
     update_derived(model, p);
     return p;
   }

@@ -119,6 +119,35 @@ VectorX World::Implementation::placed(const std::vector<RodState>& rods) const {
   return q;
 }
 
+/// Directors of a rod whose nodes are at q, which supports held as they were before; and the branches of its twists.
+void World::Implementation::place_directors(const RodState& rod, const VectorX& q, const Configuration& before) {
+  for (Eigen::Index e = 0; e < rod.directors.rows(); ++e) {
+    const int edge = model.rod_first_edge[at(rod.rod)] + static_cast<int>(e);
+    const std::string where = place_of_node(model.edge_tail[at(edge)]).words;
+    const Vector3 t = (q.segment<3>(model.head_dof[at(edge)]) - q.segment<3>(model.tail_dof[at(edge)])).normalized();
+    const Vector3 told = rod.directors.row(e);
+    require(std::abs(told.norm() - 1.0) < kAligned && std::abs(told.dot(t)) < kAligned,
+            "directors must be unit vectors normal to their edges" + where);
+    const Vector3 d1 = (told - t * t.dot(told)).normalized();
+    const Vector3 now = to_eigen(before.edge[at(edge)].d1);
+    for (const Support& support : model.supports)
+      require(
+          !support.active || support.edge != edge || may_spin(support.description.kind) || (d1 - now).norm() < kAligned,
+          "directors turn an edge that a support holds" + place_of_node(support.node).words +
+              ": turn the support there first, or release it");
+    state.tangent[at(edge)] = to_vec3(t);
+    state.director[at(edge)] = to_vec3(d1);
+    state.q(model.edge_dof[at(edge)]) = 0.0;
+  }
+  const auto& places = model.place[at(rod.rod)];
+  for (Eigen::Index s = 0; s < rod.twists.size(); ++s) {
+    const StencilPlace& place = places[static_cast<std::size_t>(s)];
+    if (place.bend >= 0) state.bend_tau(place.bend) = rod.twists(s) * model.bend_voronoi(place.bend);
+    for (int h : place.half)
+      if (h >= 0) state.half_tau(h) = rod.twists(s) * model.half_voronoi(h);
+  }
+}
+
 /// Nodes, frames and the branches of twists.
 void World::Implementation::place_rods(const std::vector<RodState>& rods) {
   std::vector<bool> is_told(at(model.edge_count), false);
@@ -144,34 +173,7 @@ void World::Implementation::place_rods(const std::vector<RodState>& rods) {
     }
     for (std::size_t h = 0; h < model.half.size(); ++h)
       if (is_told[at(model.half[h].edge)]) state.half_tau(static_cast<Eigen::Index>(h)) = 0.0;
-    for (const RodState& rod : rods) {
-      for (Eigen::Index e = 0; e < rod.directors.rows(); ++e) {
-        const int edge = model.rod_first_edge[at(rod.rod)] + static_cast<int>(e);
-        const Vector3 t =
-            (q.segment<3>(model.head_dof[at(edge)]) - q.segment<3>(model.tail_dof[at(edge)])).normalized();
-        const Vector3 told = rod.directors.row(e);
-        require(
-            std::abs(told.norm() - 1.0) < kAligned && std::abs(told.dot(t)) < kAligned,
-            "directors must be unit vectors normal to their edges" + place_of_node(model.edge_tail[at(edge)]).words);
-        const Vector3 d1 = (told - t * t.dot(told)).normalized();
-        const Vector3 now = to_eigen(before.edge[at(edge)].d1);
-        for (const Support& support : model.supports)
-          require(!support.active || support.edge != edge || may_spin(support.description.kind) ||
-                      (d1 - now).norm() < kAligned,
-                  "directors turn an edge that a support holds" + place_of_node(support.node).words +
-                      ": turn the support there first, or release it");
-        state.tangent[at(edge)] = to_vec3(t);
-        state.director[at(edge)] = to_vec3(d1);
-        state.q(model.edge_dof[at(edge)]) = 0.0;
-      }
-      const auto& places = model.place[at(rod.rod)];
-      for (Eigen::Index s = 0; s < rod.twists.size(); ++s) {
-        const StencilPlace& place = places[static_cast<std::size_t>(s)];
-        if (place.bend >= 0) state.bend_tau(place.bend) = rod.twists(s) * model.bend_voronoi(place.bend);
-        for (int h : place.half)
-          if (h >= 0) state.half_tau(h) = rod.twists(s) * model.half_voronoi(h);
-      }
-    }
+    for (const RodState& rod : rods) place_directors(rod, q, before);
   } else {
     state.q = q;
   }

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <string_view>
 
+#include "forces/stokeslets.hpp"
 #include "world/archive.hpp"
 #include "world/exchange.hpp"
 #include "world/implementation.hpp"
@@ -60,9 +61,9 @@ std::vector<LoadDescription> read_added_loads(Reader& r, const SceneDescription&
 }
 
 /// As it was set while running; where it was not, that of the drawing holds.
-void write_friction(Writer& w, const ContactDescription& contact) {
-  w(contact.friction);
-  w(contact.slip_tolerance);
+void write_contact(Writer& w, const ContactDescription& contact) {
+  for (double x : {contact.friction, contact.slip_tolerance, contact.restitution, contact.stiffness}) w(x);
+  w(contact.obstacle_restitution);
   w(contact.obstacle_friction);
   w(static_cast<std::int64_t>(contact.obstacle_across.size()));
   w(contact.obstacle_across);
@@ -73,10 +74,10 @@ void write_friction(Writer& w, const ContactDescription& contact) {
   }
 }
 
-/// What a snapshot knows of friction, for the contact of a scene.
-ContactDescription read_friction(Reader& r, ContactDescription contact) {
-  r(contact.friction);
-  r(contact.slip_tolerance);
+/// What a snapshot knows of it, for the contact of a scene.
+ContactDescription read_contact(Reader& r, ContactDescription contact) {
+  for (double* x : {&contact.friction, &contact.slip_tolerance, &contact.restitution, &contact.stiffness}) r(*x);
+  r(contact.obstacle_restitution);
   r(contact.obstacle_friction);
   std::int64_t count = 0;
   r(count);
@@ -93,10 +94,10 @@ ContactDescription read_friction(Reader& r, ContactDescription contact) {
   return contact;
 }
 
-bool same_friction(const ContactDescription& a, const ContactDescription& b) {
+bool same_contact(const ContactDescription& a, const ContactDescription& b) {
   Writer of_a, of_b;
-  write_friction(of_a, a);
-  write_friction(of_b, b);
+  write_contact(of_a, a);
+  write_contact(of_b, b);
   return of_a.bytes == of_b.bytes;
 }
 
@@ -158,10 +159,106 @@ void give_sizes(World::Implementation& self) {
       if (m->rows() != rod.natural_curvature.rows()) *m = rod.natural_curvature;
     for (VectorX* v : {&ramp.twist.from, &ramp.twist.to})
       if (v->size() != rod.natural_twist.size()) *v = rod.natural_twist;
+    for (VectorX* v : {&ramp.stretch.from, &ramp.stretch.to})
+      if (v->size() != rod.rest_lengths.size()) v->setOnes(rod.rest_lengths.size());
   }
   self.predictor.resize(self.model.dof_count);
   for (VectorX* v : {&self.reaction_residual, &self.reaction_place})
     if (v->size() != self.model.dof_count) v->setZero(self.model.dof_count);
+}
+
+struct StoredSupports {
+  std::vector<SupportDescription> descriptions;
+  std::vector<bool> active;
+};
+
+void write_supports(Writer& w, const World::Implementation& self) {
+  w(static_cast<std::int64_t>(self.description.supports.size()));
+  for (std::size_t s = 0; s < self.description.supports.size(); ++s) {
+    const SupportDescription& d = self.description.supports[s];
+    w(self.model.supports[s].active);
+    w(static_cast<int>(d.kind));
+    w(d.pass.rod);
+    w(d.pass.node);
+    w(d.free);
+    w(d.gripped);
+    w(d.axis);
+  }
+}
+
+StoredSupports read_supports(Reader& r, const SceneDescription& scene) {
+  std::int64_t count = 0;
+  r(count);
+  require(count >= 0 && count < 1 << 20, "snapshot is damaged: impossible number of supports");
+  StoredSupports out;
+  for (std::int64_t s = 0; s < count; ++s) {
+    SupportDescription d;
+    bool on = false;
+    int kind = 0;
+    r(on);
+    r(kind);
+    require(kind >= 0 && kind <= 4, "snapshot is damaged: unknown support");
+    d.kind = static_cast<SupportKind>(kind);
+    r(d.pass.rod);
+    r(d.pass.node);
+    const auto& rods = scene.rods;
+    require(d.pass.rod >= 0 && d.pass.rod < static_cast<int>(rods.size()) && d.pass.node >= 0 &&
+                d.pass.node < static_cast<int>(rods[static_cast<std::size_t>(d.pass.rod)].nodes.size()),
+            "snapshot is damaged: support of a node that is not there");
+    r(d.free);
+    r(d.gripped);
+    r(d.axis);
+    out.descriptions.push_back(d);
+    out.active.push_back(on);
+  }
+  return out;
+}
+
+bool same_supports(const StoredSupports& stored, const World::Implementation& self) {
+  if (stored.active.size() != self.description.supports.size()) return false;
+  for (std::size_t s = 0; s < stored.active.size(); ++s) {
+    const SupportDescription &a = stored.descriptions[s], &b = self.description.supports[s];
+    if (stored.active[s] != self.model.supports[s].active || a.kind != b.kind || a.pass.rod != b.pass.rod ||
+        a.pass.node != b.pass.node || a.free != b.free || a.gripped != b.gripped || a.axis != b.axis)
+      return false;
+  }
+  return true;
+}
+
+void restore_supports(const StoredSupports& stored, World::Implementation& self) {
+  const std::size_t count = stored.active.size();
+  self.description.supports = stored.descriptions;
+  self.motions.assign(count, SupportMotion{});
+  self.model.supports.assign(count, Support{});
+  for (std::size_t s = 0; s < count; ++s) self.model.supports[s].active = stored.active[s];
+  self.rebuild(Rebuild::restored);
+}
+
+void restore_loads(const std::vector<LoadDescription>& added, World::Implementation& self) {
+  if (same_loads(added, self.description)) return;
+  auto& loads = self.description.loads;
+  loads.resize(drawn_loads(self.description));
+  loads.insert(loads.end(), added.begin(), added.end());
+  self.parameters.loads.setZero(first_load_row(self.description, loads.size()), 3);
+  self.remake_equations();
+}
+
+/// Refuses values that no simulation would have left.
+void check_running(const World::Implementation& self) {
+  require(self.level >= 0 && self.level <= self.levels_per_halving() * self.options.max_halvings &&
+              self.easy_steps >= 0 && self.patience >= 1 && self.easy_steps <= self.patience &&
+              self.guard.fallback_steps >= 0 && self.guard.fallback_steps <= 256,
+          "snapshot is damaged: impossible step size");
+  require(self.state.q.allFinite() && self.state.v.allFinite(), "snapshot is damaged: not finite");
+  require(std::isfinite(self.parameters.fluid_viscosity) && self.parameters.fluid_viscosity >= 0.0,
+          "snapshot is damaged: impossible viscosity");
+  if (self.description.fluid.model == FluidModel::stokeslets)
+    check_regularization(self.model, self.parameters.fluid_regularization);
+  for (const VectorX* v :
+       {&self.parameters.spring_stiffness, &self.parameters.spring_rest_length, &self.parameters.spring_damping})
+    require(v->allFinite() && (v->array() >= 0.0).all(), "snapshot is damaged: impossible spring");
+  require(self.state.motion.known >= 0 && self.state.motion.known <= 2, "snapshot is damaged: impossible history");
+  require(self.predictor.plausible(), "snapshot is damaged: impossible history");
 }
 
 }  // namespace
@@ -174,21 +271,11 @@ std::string World::snapshot() const {
   w(fingerprint(self.description));
   w(self.spatial);
   w(!self.obstacle_motions.empty());
-  w(static_cast<std::int64_t>(self.description.supports.size()));
-  for (std::size_t s = 0; s < self.description.supports.size(); ++s) {
-    const SupportDescription& d = self.description.supports[s];
-    w(self.model.supports[s].active);
-    w(static_cast<int>(d.kind));
-    w(d.pass.rod);
-    w(d.pass.node);
-    w(d.free);
-    w(d.gripped);
-    w(d.axis);
-  }
+  write_supports(w, self);
   write_added_loads(w, self.description);
-  const bool set = !same_friction(self.description.contact, self.drawn_contact);
+  const bool set = !same_contact(self.description.contact, self.drawn_contact);
   w(set);
-  if (set) write_friction(w, self.description.contact);
+  if (set) write_contact(w, self.description.contact);
   exchange(w, self.model, static_cast<Running&>(self));
   Lagged lagged = self.lagged();
   exchange(w, lagged);
@@ -211,65 +298,22 @@ void World::restore(const std::string& bytes) {
   auto fresh = std::make_unique<Implementation>(accounted());
   fresh->take_callbacks(*implementation_);
   bool spatial = false, obstacles_move = false;
-  std::int64_t count = 0;
   r(spatial);
   r(obstacles_move);
-  r(count);
-  require(count >= 0 && count < 1 << 20, "snapshot is damaged: impossible number of supports");
-  std::vector<SupportDescription> supports;
-  std::vector<bool> active;
-  for (std::int64_t s = 0; s < count; ++s) {
-    SupportDescription d;
-    bool on = false;
-    int kind = 0;
-    r(on);
-    r(kind);
-    require(kind >= 0 && kind <= 4, "snapshot is damaged: unknown support");
-    d.kind = static_cast<SupportKind>(kind);
-    r(d.pass.rod);
-    r(d.pass.node);
-    const auto& rods = fresh->description.rods;
-    require(d.pass.rod >= 0 && d.pass.rod < static_cast<int>(rods.size()) && d.pass.node >= 0 &&
-                d.pass.node < static_cast<int>(rods[static_cast<std::size_t>(d.pass.rod)].nodes.size()),
-            "snapshot is damaged: support of a node that is not there");
-    r(d.free);
-    r(d.gripped);
-    r(d.axis);
-    supports.push_back(d);
-    active.push_back(on);
-  }
-  const bool same = spatial == fresh->spatial && supports.size() == fresh->description.supports.size() && [&] {
-    for (std::size_t s = 0; s < supports.size(); ++s) {
-      const SupportDescription &a = supports[s], &b = fresh->description.supports[s];
-      if (active[s] != fresh->model.supports[s].active || a.kind != b.kind || a.pass.rod != b.pass.rod ||
-          a.pass.node != b.pass.node || a.free != b.free || a.gripped != b.gripped || a.axis != b.axis)
-        return false;
-    }
-    return true;
-  }();
-  const std::vector<LoadDescription> added = read_added_loads(r, fresh->description);
-  if (!same_loads(added, fresh->description)) {
-    auto& loads = fresh->description.loads;
-    loads.resize(drawn_loads(fresh->description));
-    loads.insert(loads.end(), added.begin(), added.end());
-    fresh->parameters.loads.setZero(first_load_row(fresh->description, loads.size()), 3);
-    fresh->remake_equations();
-  }
-  bool friction_set = false;
-  r(friction_set);
-  const ContactDescription contact = friction_set ? read_friction(r, fresh->description.contact) : fresh->drawn_contact;
-  if (!same_friction(contact, fresh->description.contact)) {
+  const StoredSupports supports = read_supports(r, fresh->description);
+  const bool same = spatial == fresh->spatial && same_supports(supports, *fresh);
+  restore_loads(read_added_loads(r, fresh->description), *fresh);
+  bool contact_set = false;
+  r(contact_set);
+  const ContactDescription contact = contact_set ? read_contact(r, fresh->description.contact) : fresh->drawn_contact;
+  if (!same_contact(contact, fresh->description.contact)) {
     fresh->description.contact = contact;
-    fresh->take_friction();
+    fresh->take_contact();
   }
   if (!same) {
     fresh->spatial = spatial;
     if (!spatial) fresh->plane_left_by.clear();
-    fresh->description.supports = supports;
-    fresh->motions.assign(supports.size(), SupportMotion{});
-    fresh->model.supports.assign(supports.size(), Support{});
-    for (std::size_t s = 0; s < supports.size(); ++s) fresh->model.supports[s].active = active[s];
-    fresh->rebuild(Rebuild::restored);
+    restore_supports(supports, *fresh);
   }
   fresh->obstacle_motions.assign(obstacles_move ? fresh->state.obstacles.size() : 0, ObstacleMotion{});
   give_sizes(*fresh);
@@ -277,18 +321,7 @@ void World::restore(const std::string& bytes) {
   Lagged lagged;
   exchange(r, lagged);
   r.expect_end();
-  require(fresh->level >= 0 && fresh->level <= fresh->levels_per_halving() * fresh->options.max_halvings &&
-              fresh->easy_steps >= 0 && fresh->patience >= 1 && fresh->easy_steps <= fresh->patience &&
-              fresh->guard.rescue >= 0 && fresh->guard.rescue <= 256,
-          "snapshot is damaged: impossible step size");
-  require(fresh->state.q.allFinite() && fresh->state.v.allFinite(), "snapshot is damaged: not finite");
-  require(std::isfinite(fresh->parameters.fluid_viscosity) && fresh->parameters.fluid_viscosity >= 0.0,
-          "snapshot is damaged: impossible viscosity");
-  for (const VectorX* v :
-       {&fresh->parameters.spring_stiffness, &fresh->parameters.spring_rest_length, &fresh->parameters.spring_damping})
-    require(v->allFinite() && (v->array() >= 0.0).all(), "snapshot is damaged: impossible spring");
-  require(fresh->state.motion.known >= 0 && fresh->state.motion.known <= 2, "snapshot is damaged: impossible history");
-  require(fresh->predictor.plausible(), "snapshot is damaged: impossible history");
+  check_running(*fresh);
   update_derived(fresh->model, fresh->parameters);
   fresh->check_reversible(fresh->parameters);
   check_lagged(lagged, fresh->model);

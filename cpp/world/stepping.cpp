@@ -56,7 +56,7 @@ void World::Implementation::advance_in_parts(double duration) {
     work.newton.poll();
     const double dt = duration * ((1.0 - division.from) / static_cast<double>(division.parts));
     const Attempt attempt = try_step(dt);
-    if (attempt == Attempt::rescued) continue;
+    if (attempt == Attempt::fell_back) continue;
     if (attempt != Attempt::easy && attempt != Attempt::hard) {
       cut(attempt, division, dt);
       continue;
@@ -152,8 +152,8 @@ bool World::Implementation::may_grow(double dt, double times) const {
 World::Implementation::Attempt World::Implementation::try_step(double dt) {
   const bool fourth = options.integrator == Integrator::fourth_order;
   const bool euler = options.integrator == Integrator::backward_euler;
-  const bool guarded =
-      options.adaptive && guard.rescue == 0 && (options.integrator == Integrator::implicit_midpoint || fourth || euler);
+  const bool guarded = options.adaptive && guard.fallback_steps == 0 &&
+                       (options.integrator == Integrator::implicit_midpoint || fourth || euler);
   const bool watched = options.adaptive && equations->contact() && options.integrator != Integrator::verlet;
   const bool keeps = guarded || watched || options.tolerance || fourth;
   if (keeps) kept = *this;
@@ -191,8 +191,8 @@ World::Implementation::Attempt World::Implementation::try_step(double dt) {
     if (pumped) guard = guard_before;
     if (euler || !guarded) return Attempt::gained_energy;
     // The same step again, and a while of them, without the flaw.
-    guard.rescue = 256;
-    return Attempt::rescued;
+    guard.fallback_steps = 256;
+    return Attempt::fell_back;
   }
   watch_step(dt, equations_of_step());
   commit_step();
@@ -223,8 +223,8 @@ void World::Implementation::commit_step() {
   statistics.steps += 1;
   steps_taken += 1;
   statistics.largest_turn = std::max(statistics.largest_turn, guard.turn);
-  if (guard.rescue > 0) {
-    --guard.rescue;
+  if (guard.fallback_steps > 0) {
+    --guard.fallback_steps;
     statistics.energy_momentum_steps += 1;
   }
   retire_ramps();
@@ -346,10 +346,10 @@ bool World::Implementation::inner_step(double dt, int slot, double& error) {
   return true;
 }
 
-Equations& World::Implementation::equations_of_step() { return guard.rescue > 0 ? rescue() : *equations; }
+Equations& World::Implementation::equations_of_step() { return guard.fallback_steps > 0 ? fallback() : *equations; }
 
 StepRule World::Implementation::rule_of_step() const {
-  if (guard.rescue > 0) return StepRule::energy_momentum;
+  if (guard.fallback_steps > 0) return StepRule::energy_momentum;
   switch (options.integrator) {
     case Integrator::energy_momentum:
       return StepRule::energy_momentum;
@@ -381,9 +381,8 @@ void World::Implementation::keep_reactions() {
   }
 }
 
-/// A scheme that steps back in time asks for forces that can be run backwards.
-void World::Implementation::check_reversible(const Parameters& p) const {
-  const ContactDescription& contact = description.contact;
+/// The explicit scheme loses nothing in impacts.
+void World::Implementation::check_impacts(const ContactDescription& contact) const {
   const auto elastic = [](const ContactPairDescription& pair) {
     return !(pair.restitution >= 0.0) || pair.restitution == 1.0;
   };
@@ -391,6 +390,11 @@ void World::Implementation::check_reversible(const Parameters& p) const {
               ((!contact.rods || contact.restitution == 1.0) && (contact.obstacle_restitution.array() == 1.0).all() &&
                std::all_of(contact.pairs.begin(), contact.pairs.end(), elastic)),
           "integrator 'verlet' knows elastic impacts only: take restitution=1, or an implicit integrator");
+}
+
+/// A scheme that steps back in time asks for forces that can be run backwards.
+void World::Implementation::check_reversible(const Parameters& p) const {
+  check_impacts(description.contact);
   if (options.integrator != Integrator::fourth_order) return;
   require(!description.contact.any(),
           "integrator 'fourth_order' goes back in time within each step, which contact does not allow: take integrator "

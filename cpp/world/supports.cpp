@@ -9,6 +9,29 @@
 #include "world/implementation.hpp"
 
 namespace withe {
+/// That of a support which has just been put on, where what it holds is.
+SupportMotion World::Implementation::standing(const Support& support) const {
+  SupportMotion m;
+  m.position = node_position(model, state.q, support.node);
+  if (support.frame >= 0) {
+    m.rotation = frame_rotation(model, state, support.frame);
+  } else if (support.edge >= 0) {
+    Configuration c;
+    compute_configuration(model, state, state.q, c);
+    const Vector3 t = to_eigen(model.initial_tangent[at(support.edge)]),
+                  d1 = to_eigen(model.initial_director[at(support.edge)]);
+    Matrix3 drawn;
+    drawn << d1, t.cross(d1), t;
+    m.rotation = edge_directors(model, c, support.edge) * drawn.transpose();
+    const auto& x = description.positions;
+    m.stretch = c.length(support.edge) / (x.row(support.other_node) - x.row(support.node)).norm();
+  }
+  m.from_position = m.to_position = m.position;
+  m.from_rotation = m.to_rotation = m.rotation;
+  m.start = m.end = state.time;
+  return m;
+}
+
 int World::add_support(const SupportDescription& support) {
   Implementation& self = *implementation_;
   const Implementation backup(self);
@@ -50,25 +73,7 @@ int World::add_support(const SupportDescription& support) {
     self.description.supports[at(index)].axis = frame_rotation(self.model, self.state, bearing.frame) * bearing.tangent;
     self.rebuild(Rebuild::running);
   }
-  const Support& s = self.model.supports[at(index)];
-  SupportMotion& m = self.motions[at(index)];
-  m.position = node_position(self.model, self.state.q, s.node);
-  if (s.frame >= 0) {
-    m.rotation = frame_rotation(self.model, self.state, s.frame);
-  } else if (s.edge >= 0) {
-    Configuration c;
-    compute_configuration(self.model, self.state, self.state.q, c);
-    const Vector3 t = to_eigen(self.model.initial_tangent[at(s.edge)]),
-                  d1 = to_eigen(self.model.initial_director[at(s.edge)]);
-    Matrix3 drawn;
-    drawn << d1, t.cross(d1), t;
-    m.rotation = edge_directors(self.model, c, s.edge) * drawn.transpose();
-    const auto& x = self.description.positions;
-    m.stretch = c.length(s.edge) / (x.row(s.other_node) - x.row(s.node)).norm();
-  }
-  m.from_position = m.to_position = m.position;
-  m.from_rotation = m.to_rotation = m.rotation;
-  m.start = m.end = self.state.time;
+  self.motions[at(index)] = self.standing(self.model.supports[at(index)]);
   return index;
 }
 

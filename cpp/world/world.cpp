@@ -6,6 +6,7 @@
 
 #include "common/check.hpp"
 #include "common/timer.hpp"
+#include "forces/stokeslets.hpp"
 #include "steps/spring_forces.hpp"
 #include "world/implementation.hpp"
 
@@ -176,10 +177,11 @@ std::pair<Eigen::Index, Eigen::Index> World::Implementation::load_rows(int load)
   return {first_load_row(description, at(load)), description.loads[at(load)].values.rows()};
 }
 
-void World::set_friction(const ContactDescription& contact) {
-  Implementation& self = *implementation_;
-  ContactDescription& own = self.description.contact;
+namespace {
+
+void check_contact(const ContactDescription& contact, const ContactDescription& own) {
   const auto valid = [](const VectorX& v) { return v.size() == 0 || (v.allFinite() && v.minCoeff() >= 0.0); };
+  const auto share = [](double x) { return x >= 0.0 && x <= 1.0; };
   require(contact.obstacle_friction.size() == own.obstacle_friction.size() &&
               (contact.obstacle_across.size() == 0 || contact.obstacle_across.size() == own.obstacle_friction.size()),
           "friction needs one coefficient an obstacle");
@@ -187,25 +189,52 @@ void World::set_friction(const ContactDescription& contact) {
               valid(contact.obstacle_across),
           "friction must not be negative");
   require(std::isfinite(contact.slip_tolerance) && contact.slip_tolerance > 0.0, "slip_tolerance must be positive");
+  require(contact.obstacle_restitution.size() == own.obstacle_restitution.size(),
+          "restitution needs one coefficient an obstacle");
+  require(share(contact.restitution) &&
+              std::all_of(contact.obstacle_restitution.begin(), contact.obstacle_restitution.end(), share),
+          "restitution must be from 0 to 1");
+  require(std::isfinite(contact.stiffness) && contact.stiffness >= 0.0, "stiffness of contact must not be negative");
+}
+
+}  // namespace
+
+void World::set_contact(const ContactDescription& contact) {
+  Implementation& self = *implementation_;
+  ContactDescription& own = self.description.contact;
+  check_contact(contact, own);
+  ContactDescription wanted = own;
+  wanted.friction = contact.friction;
+  wanted.slip_tolerance = contact.slip_tolerance;
+  wanted.obstacle_friction = contact.obstacle_friction;
+  wanted.obstacle_across = contact.obstacle_across;
+  wanted.restitution = contact.restitution;
+  wanted.obstacle_restitution = contact.obstacle_restitution;
+  wanted.stiffness = contact.stiffness;
+  wanted.pairs = contact.pairs;
+  self.check_impacts(wanted);
   const auto energy = [&] {
     const Contact* touching = self.equations->contact();
     return touching ? touching->energy_of(self.state, self.parameters, self.energy_scratch.contact) : 0.0;
   };
   const double before = energy();
-  own.friction = contact.friction;
-  own.slip_tolerance = contact.slip_tolerance;
-  own.obstacle_friction = contact.obstacle_friction;
-  own.obstacle_across = contact.obstacle_across;
-  own.pairs = contact.pairs;
-  self.take_friction();
-  // What anchors hold changes with the coefficients that they are made of.
+  const double stiffness = self.parameters.surfaces.contact_stiffness;
+  const VectorX of_pairs = self.parameters.surfaces.pair_contact_stiffness;
+  own = std::move(wanted);
+  self.take_contact();
+  const SurfaceParameters& now = self.parameters.surfaces;
+  const bool stiffer = now.contact_stiffness != stiffness || now.pair_contact_stiffness.size() != of_pairs.size() ||
+                       now.pair_contact_stiffness != of_pairs;
+  if (const Contact* touching = self.equations->contact(); touching && stiffer)
+    touching->take_given_stiffness(self.state, self.parameters);
+  // What surfaces and anchors hold changes with the numbers that they are made of.
   self.actuation_work += energy() - before;
 }
 
-/// That of the description; the equations take another form only where friction comes or goes.
-void World::Implementation::take_friction() {
+/// As the description has it; the equations take another form only where friction comes or goes.
+void World::Implementation::take_contact() {
   model.description.contact = description.contact;
-  withe::set_friction(description.contact, parameters);
+  withe::set_contact(description.contact, parameters);
   update_derived(model, Derived::nothing, 0, parameters);
   reaction_current = false;
   state.acceleration_current = false;
@@ -215,7 +244,7 @@ void World::Implementation::take_friction() {
     Equations* known = system(which);
     if (!known || !known->contact()) continue;
     const bool frictional = known->contact()->frictional();
-    known->contact()->set_friction(parameters);
+    known->contact()->set_parameters(parameters);
     remade = remade || known->contact()->frictional() != frictional;
   }
   if (remade) remake_equations();
@@ -249,9 +278,12 @@ void World::Implementation::leave_plane_for(const ParameterSetting& setting) {
 void World::Implementation::set(std::span<const ParameterSetting> settings) {
   for (const ParameterSetting& setting : settings) {
     check_setting(model, setting);
-    require(!info_of(setting.kind).of_contact(), "friction is set by set_friction");
+    require(!info_of(setting.kind).of_contact(), "how surfaces press and rub is set by set_contact");
     require(setting.kind != ParameterKind::fluid_viscosity || description.fluid.model != FluidModel::none,
             "the scene has no fluid");
+    if (setting.kind != ParameterKind::fluid_regularization) continue;
+    require(description.fluid.model == FluidModel::stokeslets, "the scene has no fluid of Stokeslets");
+    check_regularization(model, setting.values(0, 0));
   }
   if (options.integrator == Integrator::fourth_order) {
     Parameters wanted = parameters;
@@ -262,6 +294,7 @@ void World::Implementation::set(std::span<const ParameterSetting> settings) {
   for (const ParameterSetting& setting : settings) {
     if (setting.kind == ParameterKind::natural_curvature) ramps[at(setting.rod)].curvature.active = false;
     if (setting.kind == ParameterKind::natural_twist) ramps[at(setting.rod)].twist.active = false;
+    if (setting.kind == ParameterKind::natural_stretch) ramps[at(setting.rod)].stretch.active = false;
   }
   const bool set_before = newly_set;
   begin_setting();
@@ -313,6 +346,17 @@ void World::set_natural_twist(int rod, const VectorX& twist, double over) {
   self.begin_ramp(self.ramps[at(rod)].twist, self.parameters.natural_twist[at(rod)], twist, over);
 }
 
+void World::set_natural_stretch(int rod, const VectorX& stretch, double over) {
+  Implementation& self = *implementation_;
+  require(std::isfinite(over) && over >= 0.0, "over must be finite and not negative");
+  const ParameterSetting setting{ParameterKind::natural_stretch, rod, rows_of(stretch)};
+  if (over == 0.0) return self.set({&setting, 1});
+  check_setting(self.model, setting);
+  const VectorX now = self.natural_stretch(rod);
+  const VectorX target = stretch.size() == now.size() ? stretch : VectorX(VectorX::Constant(now.size(), stretch(0)));
+  self.begin_ramp(self.ramps[at(rod)].stretch, now, target, over);
+}
+
 MatrixX2 World::natural_curvature(int rod) const { return implementation_->parameters.natural_curvature.at(at(rod)); }
 VectorX World::natural_twist(int rod) const { return implementation_->parameters.natural_twist.at(at(rod)); }
 
@@ -323,11 +367,6 @@ void World::set_added_mass(const VectorX& mass) {
 
 void World::set_gravity(const Vector3& gravity) {
   const ParameterSetting setting{ParameterKind::gravity, 0, {gravity.data(), 1, 3}};
-  set({&setting, 1});
-}
-
-void World::set_fluid_viscosity(double viscosity) {
-  const ParameterSetting setting{ParameterKind::fluid_viscosity, 0, {&viscosity, 1, 1}};
   set({&setting, 1});
 }
 

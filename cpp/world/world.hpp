@@ -190,11 +190,12 @@ class World {
   /// Ramped linearly over `over` seconds from now (0: at once); a row a stencil, or one for all.
   void set_natural_curvature(int rod, const MatrixX2& curvature, double over);
   void set_natural_twist(int rod, const VectorX& twist, double over);
+  /// Likewise of every edge, or one for all: its length free of stress, over that of the drawing [-].
+  void set_natural_stretch(int rod, const VectorX& stretch, double over);
   MatrixX2 natural_curvature(int rod) const;  ///< present value, of the smooth rod [1/m]
   VectorX natural_twist(int rod) const;       ///< [rad/m]
   void set_added_mass(const VectorX& mass);
   void set_gravity(const Vector3& gravity);
-  void set_fluid_viscosity(double viscosity);
   /// Stiffness, rest length and damping; its nodes stay.
   void set_spring(int spring, const SpringDescription& parameters);
   SpringDescription spring(int spring) const;  ///< as it is now
@@ -218,9 +219,9 @@ class World {
   void prescribe_obstacle(int obstacle, const Vector3& position, const Vector3& turn);
   Vector3 obstacle_position(int obstacle) const;  ///< [m]
   Vector3 obstacle_turn(int obstacle) const;      ///< [rad]
-  /// Takes over the friction coefficients and the slip tolerance of a description of the same bodies, and pairs that it
-  /// has besides.
-  void set_friction(const ContactDescription& contact);
+  /// Takes over friction, slip tolerance, restitution and stiffness of a description of the same bodies, and pairs that
+  /// it has besides. What this does to the energy at the present state is work of actuation.
+  void set_contact(const ContactDescription& contact);
 
   // Read-outs: copies.
   MatrixX3 positions() const;   ///< every node once [m]

@@ -22,6 +22,7 @@ void register_gradients(py::module_& module) {
       .def_readonly("gravity", &ParameterGradient::gravity)
       .def_readonly("natural_curvature", &ParameterGradient::natural_curvature)
       .def_readonly("natural_twist", &ParameterGradient::natural_twist)
+      .def_readonly("natural_stretch", &ParameterGradient::natural_stretch)
       .def_readonly("loads", &ParameterGradient::loads)
       .def_readonly("spring_stiffness", &ParameterGradient::spring_stiffness)
       .def_readonly("spring_rest_length", &ParameterGradient::spring_rest_length)
@@ -245,6 +246,12 @@ void define_parameters(WorldClass& world) {
       },
       py::arg("rod"), py::arg("twist"), py::arg("over"));
   world.def(
+      "set_natural_stretch",
+      [](GuardedWorld& self, int rod, const VectorX& stretch, double over) {
+        self.changing().set_natural_stretch(rod, stretch, over);
+      },
+      py::arg("rod"), py::arg("stretch"), py::arg("over"));
+  world.def(
       "natural_curvature", [](const GuardedWorld& self, int rod) { return self.reading().natural_curvature(rod); },
       py::arg("rod"));
   world.def(
@@ -263,10 +270,6 @@ void define_parameters(WorldClass& world) {
   world.def(
       "set_added_mass", [](GuardedWorld& self, const VectorX& mass) { self.changing().set_added_mass(mass); },
       py::arg("mass"));
-  world.def(
-      "set_fluid_viscosity",
-      [](GuardedWorld& self, double viscosity) { self.changing().set_fluid_viscosity(viscosity); },
-      py::arg("viscosity"));
   world.def(
       "set_spring",
       [](GuardedWorld& self, int spring, const SpringDescription& parameters) {
@@ -320,8 +323,8 @@ void define_supports(WorldClass& world) {
       "obstacle_turn", [](const GuardedWorld& self, int obstacle) { return self.reading().obstacle_turn(obstacle); },
       py::arg("obstacle"));
   world.def(
-      "set_friction",
-      [](GuardedWorld& self, const ContactDescription& contact) { self.changing().set_friction(contact); },
+      "set_contact",
+      [](GuardedWorld& self, const ContactDescription& contact) { self.changing().set_contact(contact); },
       py::arg("contact"));
   world.def_property_readonly("contact", [](const GuardedWorld& self) { return self.reading().description().contact; });
   world.def(

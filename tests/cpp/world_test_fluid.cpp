@@ -54,18 +54,33 @@ TEST(Fluid, OfAnotherKindRefusesASnapshot) {
   }
 }
 
-TEST(Fluid, ViscosityChangesWhileRunningAndComesBackFromASnapshot) {
-  World world(in_fluid(testing::hanging_arm(), FluidModel::stokeslets), options_for(Integrator::backward_euler));
-  world.set_fluid_viscosity(0.4);
-  const std::string bytes = world.snapshot();
-  world.step(4);
-  World other(in_fluid(testing::hanging_arm(), FluidModel::stokeslets), options_for(Integrator::backward_euler));
-  other.restore(bytes);
-  other.step(4);
-  EXPECT_TRUE(testing::same_state(world, other));
-  EXPECT_THROW(world.set_fluid_viscosity(-1.0), std::invalid_argument);
-  World dry(testing::hanging_arm().scene, options_for(Integrator::backward_euler));
-  EXPECT_THROW(dry.set_fluid_viscosity(1.0), std::invalid_argument);
+void set(World& world, ParameterKind kind, double value) {
+  const ParameterSetting setting{kind, 0, {&value, 1, 1}};
+  world.set({&setting, 1});
+}
+
+TEST(Fluid, ItsNumbersChangeWhileRunningAndComeBackFromASnapshot) {
+  for (auto [kind, value] :
+       {std::pair(ParameterKind::fluid_viscosity, 0.4), std::pair(ParameterKind::fluid_regularization, 0.02)}) {
+    World world(in_fluid(testing::hanging_arm(), FluidModel::stokeslets), options_for(Integrator::backward_euler));
+    World still(world);
+    world.step(2);
+    still.step(2);
+    set(world, kind, value);
+    world.step(2);
+    still.step(2);
+    EXPECT_FALSE(testing::same_state(world, still));
+    World copy(world), other(in_fluid(testing::hanging_arm(), FluidModel::stokeslets), world.options());
+    other.restore(world.snapshot());
+    for (World* each : {&world, &copy, &other}) each->step(4);
+    EXPECT_TRUE(testing::same_state(world, copy));
+    EXPECT_TRUE(testing::same_state(world, other));
+    EXPECT_THROW(set(world, kind, -1.0), std::invalid_argument);
+    World dry(testing::hanging_arm().scene, options_for(Integrator::backward_euler));
+    EXPECT_THROW(set(dry, kind, value), std::invalid_argument);
+  }
+  World local(in_fluid(testing::hanging_arm(), FluidModel::resistive), options_for(Integrator::backward_euler));
+  EXPECT_THROW(set(local, ParameterKind::fluid_regularization, 0.02), std::invalid_argument);
 }
 
 TEST(Fluid, InAPlaneMovesRodsAsInSpace) {

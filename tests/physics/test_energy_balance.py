@@ -51,6 +51,8 @@ def driven(integrator, step, what, planar=False):
         simulation.set_natural_curvature(arm, (2.0, 0.0) if planar else (1.5, 1.0), over=0.3)
         if not planar:
             simulation.set_natural_twist(hand, 1.2, over=0.4)
+    if "muscle" in what:
+        simulation.set_natural_stretch(arm, np.linspace(0.9, 1.2, 6), over=0.3)
     return simulation
 
 
@@ -80,7 +82,8 @@ CASES = [
     "wall",
     "wall edge",
     "actuation",
-    "drag viscosity load wall actuation",
+    "muscle",
+    "drag viscosity load wall actuation muscle",
 ]
 
 

@@ -249,6 +249,7 @@ ON_SIMULATION = {
         d.draw(rod), d.draw(st.tuples(number, number)), over=d.draw(st.sampled_from([0.0, 0.01, -1, math.nan]))
     ),
     "natural_twist": lambda w, d: w.simulation.set_natural_twist(d.draw(rod), d.draw(number)),
+    "natural_stretch": lambda w, d: w.simulation.set_natural_stretch(d.draw(rod), d.draw(number), over=0.01),
     "velocities": lambda w, d: w.simulation.set_velocities(d.draw(rod), d.draw(triple)),
     "clamp": lambda w, d: w.simulation.clamp(d.draw(node), hold=d.draw(st.sampled_from(["frame", "edge"]))),
     "pin": lambda w, d: w.simulation.pin(d.draw(node)),

@@ -122,3 +122,32 @@ def test_the_plan_tells_of_the_fluid():
     resistive = str(scene_with(viscosity=1.0, model="resistive").build().plan)
     assert "resistive-force theory, implicit" in resistive
     assert "unsymmetric Jacobian: resistive-force theory" in resistive
+
+
+def test_a_regularization_set_while_running_is_that_of_a_fluid_drawn_with_it():
+    drawn = scene_with(viscosity=0.5, regularization=8e-3).build(time_step=2e-3)
+    simulation = scene_with(viscosity=0.5).build(time_step=2e-3)
+    assert simulation.get("fluid 1", "regularization") == pytest.approx(np.sqrt(np.e) * 2e-3)
+    simulation.set("fluid 1", regularization=8e-3)
+    for each in (simulation, drawn):
+        each.step(10)
+    assert simulation.positions() == pytest.approx(drawn.positions(), rel=1e-12)
+    # With others it goes on with the bits of a copy, a pickle and a snapshot.
+    simulation.set("fluid 1", regularization=4e-3, viscosity=0.4)
+    simulation.step(2)
+    fresh = scene_with(viscosity=0.5).build(time_step=2e-3)
+    fresh.restore(simulation.snapshot())
+    copies = [simulation.copy(), pickle.loads(pickle.dumps(simulation)), fresh]
+    for each in (simulation, *copies):
+        each.step(5)
+    for each in copies:
+        assert np.array_equal(each.positions(), simulation.positions())
+        assert each.get("fluid 1", "regularization") == 4e-3
+    with pytest.raises(ValueError, match="regularization of the fluid must not exceed 3 edges"):
+        simulation.set("fluid 1", regularization=0.05)
+    with pytest.raises(ValueError, match="regularization of 'fluid 1' must be positive, got -1"):
+        simulation.set("fluid 1", regularization=-1.0)
+    local = scene_with(viscosity=0.5, model="resistive").build(time_step=2e-3)
+    with pytest.raises(ValueError, match="regularization of 'fluid 1' is that of Stokeslets: its model is 'resistive'"):
+        local.set("fluid 1", regularization=4e-3)
+    assert local.get("fluid 1", "regularization") is None

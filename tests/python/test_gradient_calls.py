@@ -162,6 +162,7 @@ def test_gradient_by_the_ends_of_ramps_is_that_of_differences(integrator, viscos
         1: [lambda s, d, g: s.set_natural_curvature(d.arm, g["first"], over=5.3e-3)],
         3: [lambda s, d, g: s.set_natural_curvature(d.arm, g["second"], over=4.1e-3)],  # while that is on its way
         6: [lambda s, d, g: s.set(d.arm, natural_curvature=g["third"])],
+        7: [lambda s, d, g: s.set_natural_stretch(d.arm, g["stretch"], over=3e-3)],
         8: [lambda s, d, g: s.set_natural_curvature(d.arm, g["fourth"], over=1.0)],
     }
     if not planar:
@@ -174,9 +175,10 @@ def test_gradient_by_the_ends_of_ramps_is_that_of_differences(integrator, viscos
         "first": 3.0 * unit,
         "second": np.outer(np.linspace(-4.0, 4.0, len(now)), unit),
         "third": 2.0 * unit,
+        "stretch": np.linspace(0.999, 1.001, NODES - 1),
         "fourth": -5.0 * unit,
     }
-    order = ["first", "second", "third", "fourth"]
+    order = ["first", "second", "third", "stretch", "fourth"]
     if not planar:
         run.given["twist"] = 4.0
         order.insert(1, "twist")

@@ -8,7 +8,7 @@ import numpy.typing as npt
 from withe import _core
 from withe.common import validation
 
-__all__ = ["Friction", "as_given", "check_law", "friction_pair", "obstacle_friction", "with_obstacle", "with_pair"]
+__all__ = ["Friction", "as_given", "check_law", "friction_pair", "obstacle_friction", "with_obstacle"]
 
 Friction = float | tuple[float, float]
 
@@ -65,19 +65,4 @@ def with_obstacle(contact: _core.ContactDescription, index: int, pair: tuple[flo
     both = np.array([obstacle_friction(contact, i) for i in range(len(contact.obstacles))])
     both[index] = pair
     contact.obstacle_friction, contact.obstacle_across = both[:, 0], both[:, 1]
-    return contact
-
-
-def with_pair(
-    contact: _core.ContactDescription, bodies: tuple[int, int], pair: tuple[float, float]
-) -> _core.ContactDescription:
-    """The same with other coefficients of two bodies: rods by their index, obstacles by -1 - index."""
-    pairs = list(contact.pairs)
-    found = next((own for own in pairs if {own.first, own.second} == set(bodies)), None)
-    if found is None:
-        found = _core.ContactPairDescription()
-        found.first, found.second = bodies
-        pairs.append(found)
-    found.friction, found.across = pair
-    contact.pairs = pairs
     return contact

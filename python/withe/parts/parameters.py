@@ -13,7 +13,7 @@ from withe.common import validation
 from withe.parts.materials import Material, Stiffness, bend_stiffness, check_poisson_ratio
 from withe.parts.sections import SectionProperties
 
-__all__ = ["ACTING_WORDS", "MATERIAL_WORDS", "ROD_WORDS", "RodParameters"]
+__all__ = ["ACTING_WORDS", "MATERIAL_WORDS", "NATURAL_WORDS", "ROD_WORDS", "RodParameters"]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -27,6 +27,8 @@ ROD_WORDS = (
     "viscous_time",
     "drag",
 )
+
+NATURAL_WORDS = ("natural_curvature", "natural_twist", "natural_stretch")  # the shape free of stress
 
 ACTING_WORDS = (
     "stretch_stiffness",

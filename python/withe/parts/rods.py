@@ -15,7 +15,7 @@ from withe.parts.materials import Material, Stiffness
 from withe.parts.parameters import RodParameters
 from withe.parts.sections import Circle, Section, SectionProperties, check_section
 
-__all__ = ["Natural", "curvature_array", "curvature_given", "make_rod", "redrawn", "twist_array"]
+__all__ = ["Natural", "curvature_array", "curvature_given", "make_rod", "redrawn", "stretch_array", "twist_array"]
 
 FloatArray = npt.NDArray[np.float64]
 Natural = Literal["as_built", "straight"]
@@ -143,6 +143,11 @@ def curvature_array(value: npt.ArrayLike, voronoi: FloatArray, discrete: bool, o
 def twist_array(value: npt.ArrayLike, voronoi: FloatArray, owner: str) -> FloatArray:
     """Natural twist as an array of shape (stencils,) [rad/m]."""
     return validation.per_item(value, f"natural_twist of {owner}", len(voronoi), "stencils", sign=True)
+
+
+def stretch_array(value: npt.ArrayLike, edges: int, owner: str) -> FloatArray:
+    """Natural stretch as an array of shape (edges,) [-]."""
+    return validation.per_item(value, f"natural_stretch of {owner}", edges, "edges")
 
 
 def _centreline(

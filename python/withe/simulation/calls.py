@@ -11,12 +11,11 @@ import numpy.typing as npt
 
 from withe import _core
 from withe.parts.kinds import DragPart, LoadPart, MassPart, Part, RodPart, SpringPart, SupportPart
-from withe.parts.parameters import ACTING_WORDS
+from withe.parts.parameters import ACTING_WORDS, NATURAL_WORDS
 from withe.parts.springs import SPRING_WORDS
 from withe.simulation.moves import Way
 from withe.simulation.session import Session
 from withe.simulation.unknowns import (
-    NATURAL_WORDS,
     OfRun,
     Reader,
     dragged_rods,
@@ -53,7 +52,7 @@ class CallGradient:
     ----------
     time : float [s]
         When it was called.
-    call : {"set", "set_natural_curvature", "set_natural_twist", "move"}
+    call : {"set", "set_natural_curvature", "set_natural_twist", "set_natural_stretch", "move"}
     target : str or None
         Name of the part; None: the scene.
     over : float [s]
@@ -78,8 +77,8 @@ class Gradients(list[Any]):
     Attributes
     ----------
     calls : list of CallGradient
-        By what calls of `set`, `set_natural_curvature`, `set_natural_twist` and `move` (of supports) gave while the run
-        went, in their order.
+        By what calls of `set`, `set_natural_curvature`, `set_natural_twist`, `set_natural_stretch` and `move` (of
+        supports) gave while the run went, in their order.
     """
 
     def __init__(self, values: Sequence[Any], calls: list[CallGradient]) -> None:

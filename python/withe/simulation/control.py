@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from withe.common import validation
 from withe.parts.handles import CustomForce, Load, Rod, Support
-from withe.parts.rods import curvature_array, curvature_given, twist_array
+from withe.parts.rods import curvature_array, curvature_given, stretch_array, twist_array
 from withe.simulation.functions import check_jacobian
 from withe.simulation.loads import remove_load
 from withe.simulation.parameters import Settable, get_value, set_values
@@ -82,6 +82,35 @@ class Control:
         self._session.world.set_natural_twist(part.index, values, validation.non_negative(over, "over"))
         self._session.note("set_natural_twist", part, {"natural_twist": np.asarray(twist)}, float(over))
 
+    def set_natural_stretch(self, rod: Rod | str, stretch: npt.ArrayLike, over: float = 0.0) -> None:
+        """Actuate a rod by changing the length at which it is free of stress, as a muscle or a bellows does.
+
+        The axial force is then n = EA (l / L - s), with s the natural stretch and L the drawn length of an edge: the
+        reference strain of a Cosserat rod along its tangent [Antman 2005, chapter 8]. Mass and what resists bending and
+        twisting stay those of the drawn lengths.
+
+        Parameters
+        ----------
+        rod : Rod or str
+        stretch : float or array_like of shape (edges,) [-]
+            Natural length over drawn length: 1 as drawn, 0.9 for a muscle that shortens by a tenth.
+        over : float [s]
+            Reached after so long, evenly; at once by default.
+
+        Raises
+        ------
+        ValueError
+            Wrong shape, not finite, or not positive.
+
+        Examples
+        --------
+        >>> simulation.set_natural_stretch(arm, 1.02, over=0.5)
+        """
+        part = self._session.directory.rod(rod)
+        values = stretch_array(stretch, len(part.lengths), part.owner)
+        self._session.world.set_natural_stretch(part.index, values, validation.non_negative(over, "over"))
+        self._session.note("set_natural_stretch", part, {"natural_stretch": np.asarray(stretch)}, float(over))
+
     # Parameters
 
     def set(self, target: Settable | str | None = None, /, **values: Any) -> None:
@@ -92,12 +121,15 @@ class Control:
         target : handle or str
             None for what belongs to the whole scene.
         **values
-            Of a rod: youngs_modulus, poisson_ratio, density, viscosity, stretch_stiffness,
-            bend_stiffness, twist_stiffness, line_density, viscous_time, drag (numbers, or one an edge),
-            natural_curvature, natural_twist. Of a load: force, moment, load or pressure, constant or a function
-            of time. Of a mass: mass. Of a spring: stiffness, rest_length, damping. Of a drag: drag. Of a fluid:
-            viscosity. Of an obstacle: friction, one coefficient or a pair, along and across rods. Of the scene:
-            gravity, friction between rods, and the slip_tolerance of friction. See `set_friction` for two bodies.
+            Of a rod: youngs_modulus, poisson_ratio, density, viscosity, stretch_stiffness, bend_stiffness,
+            twist_stiffness, line_density, viscous_time, drag (numbers, or one an edge), natural_curvature,
+            natural_twist, natural_stretch (natural over drawn length; see `set_natural_stretch`). Of a load: force,
+            moment, load or pressure, constant or a function of time. Of a mass: mass. Of a spring: stiffness,
+            rest_length, damping. Of a drag: drag. Of a fluid: viscosity, and the regularization [m] of Stokeslets. Of
+            an obstacle: friction, one coefficient or a pair, along and across rods, and restitution. Of a support:
+            position, rotation, as `move` takes them. Of the scene: gravity, friction and restitution between rods, the
+            slip_tolerance of friction, and the contact_stiffness [N/m], or None for one that follows the forces. See
+            `set_friction`, `set_restitution` and `set_contact_stiffness` for two bodies.
 
         Raises
         ------
@@ -106,7 +138,7 @@ class Control:
 
         Examples
         --------
-        >>> simulation.set(arm, youngs_modulus=2e6)
+        >>> simulation.set(arm, youngs_modulus=2e6, natural_stretch=1.01)
         >>> simulation.set(tip_load, force=lambda t: (0, 0, -t))
         """
         set_values(self._session, target, values)
@@ -117,16 +149,15 @@ class Control:
         Parameters
         ----------
         target : handle or str
-            Or "gravity", "friction" of rods with each other, or "slip_tolerance".
+            Or "gravity", "friction" or "restitution" of rods with each other, "slip_tolerance", "contact_stiffness".
         word : str
-            As in `set`; of a support "position" and "rotation", of an obstacle "position" and "turn", which `move`
-            changes; of a rod its "radius".
+            As in `set`; of an obstacle "position" and "turn" too, which `move` changes; of a rod its "radius".
 
         Returns
         -------
         float or ndarray
             Stiffnesses and what else belongs to edges one an edge, (edges,); natural curvature
-            (stencils, 2) and twist (stencils,); loads (3,), or (edges, 3)
+            (stencils, 2) and twist (stencils,), natural stretch (edges,); loads (3,), or (edges, 3)
             where they were so put on; positions (3,) [m], rotations (3, 3) and turns (3,) [rad] from
             what was drawn. What belongs to a material as it was set.
 

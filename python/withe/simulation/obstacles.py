@@ -1,19 +1,15 @@
-"""Obstacles, moved while a simulation runs, and friction, changed then."""
+"""Obstacles that are moved while a simulation runs."""
 
 from __future__ import annotations
-
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
 from withe.common.outlines import ObstacleOutline
-from withe.parts.contacts import Body, body_of, touching
 from withe.parts.directory import Directory
-from withe.parts.friction import Friction, check_law, friction_pair, with_obstacle, with_pair
 from withe.parts.handles import Handle, Obstacle
-from withe.parts.kinds import ObstaclePart, RodPart
+from withe.parts.kinds import ObstaclePart
 from withe.simulation.motion import Path
 from withe.simulation.session import Session
 
@@ -22,9 +18,6 @@ __all__ = [
     "move_obstacle",
     "obstacle_outlines",
     "obstacle_pose",
-    "set_obstacle_friction",
-    "set_pair_friction",
-    "set_scene_friction",
 ]
 
 FloatArray = npt.NDArray[np.float64]
@@ -100,41 +93,3 @@ def obstacle_outlines(directory: Directory) -> list[ObstacleOutline]:
         )
         for part in directory.all(ObstaclePart)
     ]
-
-
-def set_pair_friction(session: Session, a: Body, b: Body, friction: Friction) -> None:
-    """Give two bodies another friction coefficient of their own; see `Simulation.set_friction`."""
-    first, second = (touching(session.directory, body) for body in (a, b))
-    if isinstance(first, ObstaclePart) and isinstance(second, ObstaclePart):
-        raise ValueError(f"{first.name!r} and {second.name!r} are both obstacles, which never touch")
-    what = f"friction of {first.name!r} and {second.name!r}"
-    rods = isinstance(first, RodPart) and isinstance(second, RodPart)
-    pair = friction_pair(friction, what, directed=not rods)
-    contact = session.world.contact
-    if rods and not contact.rods:
-        raise ValueError(f"{what} cannot be set: rods do not touch in this scene, see Scene.enable_contact")
-    check_law(pair, contact.friction_law, what)
-    bodies = body_of(session.directory, first), body_of(session.directory, second)
-    session.world.set_friction(with_pair(contact, bodies, pair))
-
-
-def set_obstacle_friction(session: Session, part: ObstaclePart, value: Friction) -> None:
-    """Change the friction coefficients of an obstacle."""
-    what = f"friction of {part.name!r}"
-    pair = friction_pair(value, what)
-    contact = session.world.contact
-    check_law(pair, contact.friction_law, what)
-    index = session.directory.all(ObstaclePart).index(part)
-    session.world.set_friction(with_obstacle(contact, index, pair))
-
-
-def set_scene_friction(session: Session, values: dict[str, Any]) -> None:
-    """Change the friction coefficient of all rods with each other, and the slip tolerance of all friction."""
-    contact = session.world.contact
-    if "friction" in values:
-        contact.friction = validation.non_negative(values["friction"], "friction")
-        if not contact.rods:
-            raise ValueError("friction of the scene is that between rods, which do not touch: see Scene.enable_contact")
-    if "slip_tolerance" in values:
-        contact.slip_tolerance = validation.positive(values["slip_tolerance"], "slip_tolerance")
-    session.world.set_friction(contact)

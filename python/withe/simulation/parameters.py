@@ -8,7 +8,6 @@ import numpy as np
 
 from withe.common import validation
 from withe.parts.description import added_mass, drag
-from withe.parts.friction import as_given, obstacle_friction
 from withe.parts.handles import Drag, Fluid, Load, Mass, Obstacle, Rod, Spring, Support
 from withe.parts.kinds import (
     DragPart,
@@ -22,21 +21,28 @@ from withe.parts.kinds import (
     SpringPart,
     SupportPart,
 )
-from withe.parts.parameters import ROD_WORDS
-from withe.parts.rods import curvature_given, twist_array
+from withe.parts.parameters import NATURAL_WORDS, ROD_WORDS
+from withe.parts.rods import curvature_given, stretch_array, twist_array
 from withe.parts.springs import SPRING_WORDS
 from withe.simulation.loads import load_index, set_load
-from withe.simulation.obstacles import set_obstacle_friction, set_scene_friction
 from withe.simulation.session import Session
 from withe.simulation.springs import set_spring, spring_value
-from withe.simulation.supports import find_support
+from withe.simulation.supports import find_support, move_support
+from withe.simulation.surfaces import (
+    OBSTACLE_WORDS,
+    SCENE_WORDS,
+    obstacle_value,
+    scene_value,
+    set_obstacle,
+    set_scene,
+)
 
 __all__ = ["Settable", "get_value", "set_values"]
 
-Settable = Rod | Load | Mass | Spring | Drag | Fluid | Obstacle
-_POSE = ("position", "rotation")  # of supports, which `Simulation.move` changes
-_NATURAL_WORDS = ("natural_curvature", "natural_twist")
-_SET_ROD = (*ROD_WORDS, *_NATURAL_WORDS)
+Settable = Rod | Load | Mass | Spring | Drag | Fluid | Obstacle | Support
+_POSE = ("position", "rotation")  # of supports
+_FLUID = ("viscosity", "regularization")
+_SET_ROD = (*ROD_WORDS, *NATURAL_WORDS)
 
 
 def set_values(session: Session, target: Settable | str | None, values: dict[str, Any]) -> None:
@@ -44,16 +50,20 @@ def set_values(session: Session, target: Settable | str | None, values: dict[str
     if not values:
         raise ValueError("set must be given what to set, such as youngs_modulus=1e6")
     part = None if target is None else session.directory.find_any(target, "target")
+    if isinstance(part, SupportPart):
+        _only(values, _POSE, f"support {part.name!r}")
+        move_support(session, part.name, values.get("position"), values.get("rotation"), None, None, 0.0, None)
+        return
     _set_values(session, part, values)
     session.note("set", part, values)
 
 
 def _set_values(session: Session, part: Part | None, values: dict[str, Any]) -> None:
     if part is None:
-        _only(values, ("gravity", "friction", "slip_tolerance"), "the scene")
+        _only(values, ("gravity", *SCENE_WORDS), "the scene")
         gravity = validation.vector(values["gravity"], "gravity") if "gravity" in values else None
-        if values.keys() & {"friction", "slip_tolerance"}:
-            set_scene_friction(session, values)
+        if values.keys() & set(SCENE_WORDS):
+            set_scene(session, values)
         if gravity is not None:
             session.world.set_gravity(gravity)
             session.settings.gravity = gravity
@@ -75,13 +85,11 @@ def _set_values(session: Session, part: Part | None, values: dict[str, Any]) -> 
         _only(values, ("drag",), f"drag {part.name!r}")
         _set_drag(session, part, validation.non_negative(values["drag"], f"drag {part.name!r}"))
     elif isinstance(part, FluidPart):
-        _only(values, ("viscosity",), f"fluid {part.name!r}")
-        viscosity = validation.positive(values["viscosity"], f"viscosity of {part.name!r}")
-        session.world.set_fluid_viscosity(viscosity)
-        session.settings.fluids = session.settings.fluids | {part.name: viscosity}
+        _only(values, _FLUID, f"fluid {part.name!r}")
+        _set_fluid(session, part, values)
     elif isinstance(part, ObstaclePart):
-        _only(values, ("friction",), f"obstacle {part.name!r}")
-        set_obstacle_friction(session, part, values["friction"])
+        _only(values, OBSTACLE_WORDS, f"obstacle {part.name!r}")
+        set_obstacle(session, part, values)
     else:
         raise ValueError(_nothing_to_set(part))
 
@@ -89,16 +97,16 @@ def _set_values(session: Session, part: Part | None, values: dict[str, Any]) -> 
 def get_value(session: Session, target: Settable | Support | str, word: str | None) -> Any:
     """The present value of a parameter; see `Simulation.get`."""
     if word is None:
-        if isinstance(target, str) and target in ("friction", "slip_tolerance"):
-            return float(getattr(session.world.contact, target))
+        if isinstance(target, str) and target in SCENE_WORDS:
+            return scene_value(session, target)
         if not isinstance(target, str) or target != "gravity":
             raise ValueError("word must be given, such as get(arm, 'youngs_modulus')")
         return session.settings.gravity.copy()
     part = session.directory.find_any(target, "target")
     if isinstance(part, RodPart):
-        if word in _NATURAL_WORDS:
-            readout = session.world.natural_curvature if word == _NATURAL_WORDS[0] else session.world.natural_twist
-            return np.array(readout(part.index))
+        if word in NATURAL_WORDS:
+            values = np.array(session.world.parameter(word, part.index))
+            return values if word == "natural_curvature" else values[:, 0]
         if word in ROD_WORDS:
             return session.settings.rods[part.index].get(word)
         if word == "radius":
@@ -117,6 +125,8 @@ def get_value(session: Session, target: Settable | Support | str, word: str | No
         return session.settings.drags[part.name]
     elif isinstance(part, FluidPart) and word == "viscosity":
         return session.settings.fluids[part.name]
+    elif isinstance(part, FluidPart) and word == "regularization":
+        return float(session.world.parameter("fluid_regularization")[0, 0]) or None
     elif isinstance(part, SupportPart) and word in _POSE:
         index, _ = find_support(session, part.name)
         world = session.world
@@ -125,9 +135,8 @@ def get_value(session: Session, target: Settable | Support | str, word: str | No
         index = session.directory.all(ObstaclePart).index(part)
         world = session.world
         return np.array(world.obstacle_position(index) if word == "position" else world.obstacle_turn(index))
-    elif isinstance(part, ObstaclePart) and word == "friction":
-        index = session.directory.all(ObstaclePart).index(part)
-        return as_given(obstacle_friction(session.world.contact, index))
+    elif isinstance(part, ObstaclePart) and word in OBSTACLE_WORDS:
+        return obstacle_value(session, part, word)
     words = _words_of(part)
     if not words:
         raise ValueError(_nothing_to_set(part))
@@ -143,10 +152,21 @@ def _set_rod(session: Session, part: RodPart, values: dict[str, Any]) -> None:
             natural[word] = curvature_given(value, len(part.voronoi), part.owner)
         elif word == "natural_twist":
             natural[word] = twist_array(value, part.voronoi, part.owner)
+        elif word == "natural_stretch":
+            natural[word] = stretch_array(value, len(part.lengths), part.owner)
         else:
             parameters = parameters.with_value(word, value, part.section, part.owner)
     session.world.set(part.index, parameters.acting(before) | natural)
     session.settings.rods[part.index] = parameters
+
+
+def _set_fluid(session: Session, part: FluidPart, values: dict[str, Any]) -> None:
+    numbers = {word: validation.positive(value, f"{word} of {part.name!r}") for word, value in values.items()}
+    if "regularization" in numbers and part.model != "stokeslets":
+        raise ValueError(f"regularization of {part.name!r} is that of Stokeslets: its model is {part.model!r}")
+    session.world.set(0, {f"fluid_{word}": number for word, number in numbers.items()})
+    if "viscosity" in numbers:
+        session.settings.fluids = session.settings.fluids | {part.name: numbers["viscosity"]}
 
 
 def _set_drag(session: Session, part: DragPart, coefficient: float) -> None:
@@ -160,23 +180,25 @@ def _set_drag(session: Session, part: DragPart, coefficient: float) -> None:
 def _words_of(part: Part) -> tuple[str, ...]:
     """The words of `get` that a part takes."""
     if isinstance(part, RodPart):
-        return (*ROD_WORDS, *_NATURAL_WORDS, "radius")
+        return (*ROD_WORDS, *NATURAL_WORDS, "radius")
     if isinstance(part, LoadPart):
         return (part.kind,)
     words: dict[type[Any], tuple[str, ...]] = {
         MassPart: ("mass",),
         SpringPart: SPRING_WORDS,
         DragPart: ("drag",),
-        FluidPart: ("viscosity",),
-        ObstaclePart: ("friction", "position", "turn"),
+        FluidPart: _FLUID,
+        ObstaclePart: (*OBSTACLE_WORDS, "position", "turn"),
+        SupportPart: _POSE,
     }
     return words.get(type(part), ())
 
 
 _SETTABLE = (
     "set takes rods (youngs_modulus, natural_curvature, ...), loads (force, moment, load), masses (mass), "
-    "springs (stiffness, rest_length, damping), drags (drag), fluids (viscosity), obstacles (friction), and None for "
-    "the scene (gravity, friction, slip_tolerance)"
+    "springs (stiffness, rest_length, damping), drags (drag), fluids (viscosity, regularization), obstacles (friction, "
+    "restitution), supports (position, rotation), and None for the scene (gravity, friction, slip_tolerance, "
+    "restitution, contact_stiffness)"
 )
 
 
@@ -189,11 +211,6 @@ def _nothing_to_set(part: Part) -> str:
             f"at both sides, scene.add_moment({first}, ...) and scene.add_moment({second}, ...), which "
             "set(load, moment=...) changes or makes a function of time; set_natural_curvature or set_natural_twist of "
             "a rod beside it; or, to prescribe where it is, clamp or pin its node and move that"
-        )
-    if isinstance(part, SupportPart):
-        return (
-            f"support {part.name!r} has nothing to set: move, release or reaction take it. {_SETTABLE}; get reads its "
-            "position and rotation"
         )
     return f"{part.name!r} has nothing to set. {_SETTABLE}"
 

@@ -10,11 +10,12 @@ from withe.parts.friction import Friction
 from withe.parts.handles import NodeHandle, Obstacle, Rod, Support
 from withe.parts.supports import make_clamp, make_pin
 from withe.simulation.motion import Path, RotationLike
-from withe.simulation.obstacles import find_obstacle, move_obstacle, set_pair_friction
+from withe.simulation.obstacles import find_obstacle, move_obstacle
 from withe.simulation.session import Session
 from withe.simulation.states import set_state, set_velocities
 from withe.simulation.supports import hold as put_on
 from withe.simulation.supports import move_support, release
+from withe.simulation.surfaces import set_pair_friction, set_pair_restitution, set_pair_stiffness
 
 __all__ = ["Placement"]
 
@@ -129,6 +130,38 @@ class Placement:
             Two obstacles, negative friction, or two coefficients for two rods.
         """
         set_pair_friction(self._session, a, b, friction)
+
+    def set_restitution(self, a: Rod | Obstacle | str, b: Rod | Obstacle | str, restitution: float) -> None:
+        """Give two rods, or a rod and an obstacle, another coefficient of restitution of their own.
+
+        It acts from the next step on, on impacts that are under way too.
+
+        Raises
+        ------
+        ValueError
+            Two obstacles, or a number outside 0 to 1.
+
+        Examples
+        --------
+        >>> simulation.set_restitution(arm, floor, 0.5)
+        """
+        set_pair_restitution(self._session, a, b, restitution)
+
+    def set_contact_stiffness(self, a: Rod | Obstacle | str, b: Rod | Obstacle | str, stiffness: float) -> None:
+        """Give two rods, or a rod and an obstacle, another contact stiffness of their own [N/m].
+
+        What that does to the energy of surfaces that press is work of actuation; see `Scene.set_contact_stiffness`.
+
+        Raises
+        ------
+        ValueError
+            Two obstacles, or a stiffness that is not positive.
+
+        Examples
+        --------
+        >>> simulation.set_contact_stiffness(arm, floor, 2e3)
+        """
+        set_pair_stiffness(self._session, a, b, stiffness)
 
     def set_state(
         self,

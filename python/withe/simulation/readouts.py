@@ -141,11 +141,11 @@ class Equilibrium:
             ``{"curvatures": {arm: dL_dk}, "reaction_forces": {wall: dL_dF}}``, each shaped like the read-out. A number
             that a read-out depends on directly, as a tension does on the stiffness, counts with that too.
         wrt : sequence
-            Pairs of a part and a word of `Simulation.get`: of a rod natural_curvature, natural_twist, youngs_modulus,
-            poisson_ratio, density, bend_stiffness and so on, and "radius" [m] of a withe.Circle, one an edge, and
-            "points" [m], the nodes as they were drawn, (nodes, 3), both as if the scene were built anew; of a load its
-            value; of a mass "mass"; of a support "position" [m] and "rotation" (a rotation vector [rad], about where
-            it is). Or "gravity".
+            Pairs of a part and a word of `Simulation.get`: of a rod natural_curvature, natural_twist, natural_stretch,
+            youngs_modulus, poisson_ratio, density, bend_stiffness and so on, and "radius" [m] of a withe.Circle, one an
+            edge, and "points" [m], the nodes as they were drawn, (nodes, 3), both as if the scene were built anew; of a
+            load its value; of a mass "mass"; of a support "position" [m] and "rotation" (a rotation vector [rad], about
+            where it is). Or "gravity".
 
         Returns
         -------

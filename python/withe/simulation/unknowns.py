@@ -12,7 +12,7 @@ import numpy.typing as npt
 from withe import _core
 from withe.parts.handles import Drag, Load, Mass, NodeHandle, Rod, Spring, Support
 from withe.parts.kinds import DragPart, LoadPart, MassPart, ObstaclePart, Part, RodPart, SpringPart, SupportPart
-from withe.parts.parameters import ACTING_WORDS, ROD_WORDS, RodParameters
+from withe.parts.parameters import ACTING_WORDS, NATURAL_WORDS, ROD_WORDS, RodParameters
 from withe.parts.springs import SPRING_WORDS
 from withe.simulation.drawn import points_reader
 from withe.simulation.loads import load_rows
@@ -20,7 +20,6 @@ from withe.simulation.session import Session
 
 __all__ = [
     "INITIAL_WORDS",
-    "NATURAL_WORDS",
     "OfRun",
     "Reader",
     "Unknown",
@@ -47,7 +46,6 @@ class OfRun:
 Reader = Callable[[_core.EquilibriumGradient | OfRun], Any]
 """Reads a derivative, shaped like `get`."""
 
-NATURAL_WORDS = ("natural_curvature", "natural_twist")
 INITIAL_WORDS = ("initial_positions", "initial_velocities")
 _POSE = ("position", "rotation")
 
