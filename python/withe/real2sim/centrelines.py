@@ -218,4 +218,4 @@ def _evenly(line: FloatArray, samples: int, frame: int) -> FloatArray:
     at = np.linspace(0.0, lengths[-1], samples)
     after = np.clip(np.searchsorted(lengths, at), 1, len(line) - 1)
     nearest = np.where(at - lengths[after - 1] < lengths[after] - at, after - 1, after)
-    return line[np.unique(nearest)]
+    return np.asarray(line[np.unique(nearest)])
