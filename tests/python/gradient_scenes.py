@@ -79,7 +79,7 @@ def settings(drawn, random):
     yield (arm, "density"), 1.0, lambda h: sim.set(arm, density=1200.0 + h), 0.1
     yield (arm, "bend_stiffness"), uneven * bend, lambda h: sim.set(arm, bend_stiffness=bend * (1.0 + h * uneven)), 1e-4
     yield (arm, "natural_curvature"), bent, lambda h: sim.set(arm, natural_curvature=curvature + h * bent), 1e-3
-    stretch, longer = sim.get(arm, "natural_stretch"), random.normal(size=NODES - 1)
+    stretch, longer = sim.get(arm, "natural_stretch"), np.random.default_rng(23).normal(size=NODES - 1)
     yield (arm, "natural_stretch"), longer, lambda h: sim.set(arm, natural_stretch=stretch + h * longer), 1e-5
     yield (arm, "natural_twist"), turned, lambda h: sim.set(arm, natural_twist=twist + h * turned), 1e-3
     yield (drawn.force, "force"), np.array([0, 0, 1.0]), lambda h: sim.set(drawn.force, force=(0, 0, 0.3 + h)), 1e-4

@@ -234,7 +234,6 @@ SIMULATIONS = [
     (lambda s, a: s.set(a, poisson_ratio=2), "poisson_ratio of rod 'arm' must lie in (-1, 0.5], got 2"),
     (lambda s, a: s.set(a, bend_stiffness=[1, 2, 3]), "bend_stiffness of rod 'arm' must have shape (2,) or (10, 2)"),
     (lambda s, a: s.set("wall", force=(0, 0, 1)), "support 'wall' has no 'force' to set; it has position, rotation"),
-    (lambda s, a: s.set("wall", force=(0, 0, 1)), "move, release or reaction take it. set takes rods (youngs_modulus"),
     (lambda s, a: s.set(wind=1), "the scene has no 'wind' to set; it has gravity"),
     (lambda s, a: s.set(a.end, force=(0, 0, 1)), "target must not be a node or an edge"),
     (lambda s, a: s.get(a, "colour"), "'arm' has no 'colour'; it has youngs_modulus"),

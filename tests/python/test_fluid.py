@@ -83,7 +83,7 @@ def test_steps_that_go_back_in_time_refuse_a_fluid():
         scene_with(viscosity=1.0).build(integrator="fourth_order")
 
 
-def test_viscosity_is_set_while_running_and_nothing_else_is():
+def test_numbers_of_a_fluid_are_set_while_running_and_nothing_else_is():
     simulation = scene_with(viscosity=1.0, name="honey").build(time_step=2e-3)
     fluid = simulation.get("honey", "viscosity")
     assert fluid == 1.0
@@ -91,8 +91,8 @@ def test_viscosity_is_set_while_running_and_nothing_else_is():
     assert simulation.get("honey", "viscosity") == 2.0
     with pytest.raises(ValueError, match="viscosity of 'honey' must be positive"):
         simulation.set("honey", viscosity=-1.0)
-    with pytest.raises(ValueError, match="regularization"):
-        simulation.set("honey", regularization=1e-3)
+    with pytest.raises(ValueError, match="wavelength"):
+        simulation.set("honey", wavelength=1e-3)
     simulation.reset()
     assert simulation.get("honey", "viscosity") == 1.0
 
