@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "elastica/continuation.hpp"
 #include "elastica/sheet_stability.hpp"
 
 namespace withe {
@@ -23,28 +24,6 @@ Path gentle_lift(double length) {
     path.nodes.push_back({s * s * (length / 8 - s / 12), s * (length - s) / 2, s, s * s * s * (length / 24 - s / 48)});
   }
   return path;
-}
-
-/// Continuation: `ask(share, guess)` poses the problem at a share of the way from what `path` solves to what is wanted,
-/// and may change the guess. Steps adapt; false where one below `least` would be needed.
-template <class Ask>
-bool follow(ShootingSolver<SheetProblem>& solver, const SheetProblem& problem, double least, Path& path, Path& trial,
-            const Ask& ask) {
-  double done = 0, step = 1;
-  while (done < 1) {
-    const double next = std::min(1.0, done + step);
-    trial = path;
-    ask(next, trial);
-    if (solver.solve(problem, trial).converged) {
-      std::swap(path, trial);
-      done = next;
-      step *= 2;
-    } else {
-      step /= 2;
-      if (step < least) return false;
-    }
-  }
-  return true;
 }
 
 bool follow_goal(ShootingSolver<SheetProblem>& solver, SheetProblem& problem, const std::array<double, 2>& goal,
