@@ -4,7 +4,6 @@
 #include <cmath>
 #include <cstddef>
 
-#include "elastica/continuation.hpp"
 #include "elastica/rod_stability.hpp"
 
 namespace withe {
