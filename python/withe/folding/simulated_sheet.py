@@ -151,7 +151,7 @@ class SimulatedSheet:
             ]
         )
         self.rod = add_paper(scene, self.truth, self._places, self._drawn.curl)
-        # Surfaces press on each other from a twentieth of the thickness on: a jaw that lies as high as the sheet does not.
+        # Surfaces press on each other from a twentieth of the thickness on; a jaw at the sheet's height does not.
         scene.add_floor(-0.55 * paper.thickness, friction=self.truth.friction, restitution=0.0, name="table")
         scene.enable_contact(friction=validation.non_negative(own_friction, "own_friction"), restitution=0.0)
         for i in range(held):
