@@ -80,7 +80,7 @@ class StraightLine:
     >>> for pose in (line.gentle, line.folded):
     ...     print(f"x {pose.x:.3f}, force {pose.force[1]:.3f}, stable: {pose.stable}")
     x 2.566, force 1.515, stable: True
-    x -3.666, force 4.922, stable: False
+    x -3.657, force 4.913, stable: False
     """
 
     def __init__(self, suspended: float, stretch_stiffness: float = 2087.0) -> None:
