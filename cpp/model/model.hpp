@@ -89,7 +89,7 @@ struct Support {
   int other_node = -1;                 ///< hold_edge
   int edge = -1;                       ///< hold_edge
   Vector3 tangent = Vector3::UnitX();  ///< drawn, of what is held: the rod at a frame, or an edge
-  std::vector<int> nodes, edges;  ///< nodes whose places and edges whose angles it holds
+  std::vector<int> nodes, edges;       ///< nodes whose places and edges whose angles it holds
   // Of a hand:
   std::vector<TouchedEdge> touched;  ///< in the order of the rod
   std::vector<int> span;             ///< nodes of these edges, in that order

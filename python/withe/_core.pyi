@@ -14,13 +14,12 @@ __all__: list[str] = [
     "ContactPairDescription",
     "ContactTable",
     "ConvergenceFailure",
-    "Deflection",
     "Energy",
     "EquilibriumGradient",
     "EquilibriumPath",
     "EquilibriumResult",
     "FluidDescription",
-    "HandDescription",
+    "GraspTable",
     "InitialGradient",
     "JointDescription",
     "Linearisation",
@@ -49,8 +48,11 @@ __all__: list[str] = [
     "World",
     "check_turns",
     "close_and_open",
+    "dragged_sheet",
     "foreground_mask",
     "hsv_mask",
+    "sheets_at_forces",
+    "sheets_at_poses",
     "smooth_curvatures",
     "thin",
     "trace_lines",
@@ -176,48 +178,11 @@ class JointDescription:
     @links.setter
     def links(self, arg0: collections.abc.Sequence[RevoluteLink]) -> None: ...
 
-class HandDescription:
-    """
-    What a hand holds.
-    """
-
-    posed: bool
-    yields: bool
-    def __init__(self) -> None: ...
-    @property
-    def at(self) -> float: ...
-    @at.setter
-    def at(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
-    @property
-    def force_limit(self) -> float: ...
-    @force_limit.setter
-    def force_limit(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
-    @property
-    def length(self) -> float: ...
-    @length.setter
-    def length(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
-    @property
-    def position(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]: ...
-    @position.setter
-    def position(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None: ...
-    @property
-    def rotation(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 3]"]: ...
-    @rotation.setter
-    def rotation(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"]) -> None: ...
-    @property
-    def stiffness(self) -> typing.Annotated[list[float], "FixedSize(6)"]: ...
-    @stiffness.setter
-    def stiffness(
-        self,
-        arg0: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(6)"],
-    ) -> None: ...
-
 class SupportDescription:
     """
     Something that holds a node.
     """
 
-    hand: HandDescription
     kind: str
     pass_: RodPass
     def __init__(self) -> None: ...
@@ -767,17 +732,6 @@ class Statistics:
     @property
     def total_time(self) -> float: ...
 
-class Deflection:
-    """
-    How far what a hand holds has gone.
-    """
-    @property
-    def shift(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]: ...
-    @property
-    def slip(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]: ...
-    @property
-    def turn(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]: ...
-
 class Reaction:
     """
     Of a support on the rod.
@@ -887,7 +841,6 @@ class World:
     def curvatures(
         self, rod: typing.SupportsInt | typing.SupportsIndex
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 2]"]: ...
-    def deflection(self, support: typing.SupportsInt | typing.SupportsIndex) -> Deflection: ...
     def directors(
         self, rod: typing.SupportsInt | typing.SupportsIndex
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 9]"]: ...
@@ -1068,6 +1021,24 @@ class SheetManifold:
         One row a pose.
         """
 
+class GraspTable:
+    """
+    Grasps that lay a rod, tabulated once.
+    """
+
+    greatest_curvature: typing.ClassVar[float] = 6.0
+    longest: typing.ClassVar[float] = 100.0
+    shortest: typing.ClassVar[float] = 0.1
+    def __init__(self) -> None: ...
+    def grasps(
+        self,
+        questions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+        twist_stiffness: typing.SupportsFloat | typing.SupportsIndex,
+    ) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        One row a grasp, for rows of suspended length, curvature, stretching stiffness, axial force and base angle.
+        """
+
 def check_turns(
     smooth: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 2]"],
     voronoi: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
@@ -1080,6 +1051,17 @@ def check_turns(
 def close_and_open(mask: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8]) -> numpy.typing.NDArray[numpy.uint8]:
     """
     Closing, then opening, by a square of 3 x 3 pixels.
+    """
+
+def dragged_sheet(
+    poses: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    forces: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    friction: typing.SupportsFloat | typing.SupportsIndex,
+    sheet_length: typing.SupportsFloat | typing.SupportsIndex,
+    width_growth: typing.SupportsFloat | typing.SupportsIndex,
+) -> tuple:
+    """
+    A sheet moved from pose to pose, sliding by Coulomb's law: one row a pose, and how far it has slid.
     """
 
 def foreground_mask(
@@ -1100,6 +1082,23 @@ def hsv_mask(
 ) -> numpy.typing.NDArray[numpy.uint8]:
     """
     Pixels whose colour is in a range.
+    """
+
+def sheets_at_forces(
+    forces: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    width_growth: typing.SupportsFloat | typing.SupportsIndex,
+) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Sheets of given floor forces and suspended length, one row a sheet.
+    """
+
+def sheets_at_poses(
+    poses: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    forces: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    width_growth: typing.SupportsFloat | typing.SupportsIndex,
+) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Sheets held at poses, each followed from forces of its own, one row a sheet.
     """
 
 def smooth_curvatures(
