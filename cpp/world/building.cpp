@@ -123,14 +123,18 @@ void World::Implementation::begin_as_drawn() {
   motions.assign(description.supports.size(), SupportMotion{});
   custom_force = MatrixX3::Zero(model.node_count, 3);
   custom_moments = MatrixX3::Zero(description.custom_moments ? model.node_count : 0, 3);
-  for (std::size_t s = 0; s < motions.size(); ++s)
+  for (std::size_t s = 0; s < motions.size(); ++s) {
     motions[s].position = motions[s].from_position = motions[s].to_position =
         node_position(model, state.q, model.supports[s].node);
+    if (model.supports[s].is_hand()) grasp(static_cast<int>(s));
+  }
 }
 
 /// The running state, of another model.
 void World::Implementation::carry_over(const Model& old, Rebuild why) {
   const State from = state;
+  std::vector<std::vector<int>> held_before;
+  for (const Support& s : old.supports) held_before.push_back(s.nodes);
   std::vector<bool> is_new(at(model.frame_count), true);
   for (int f = 0; f < model.frame_count; ++f)
     for (int g = 0; g < old.frame_count; ++g)
@@ -151,6 +155,7 @@ void World::Implementation::carry_over(const Model& old, Rebuild why) {
   newton = std::make_unique<Newton>(model, options);
   equations = std::make_unique<Equations>(model, equation_options(options));
   relax_frames(is_new);
+  if (why == Rebuild::running) regrip(held_before);
   set_mass(model, parameters, mass);
   support_work += kinetic_energy(model, mass, state.v) - before;
 }
@@ -210,6 +215,7 @@ State World::Implementation::transferred(const Model& old, const State& from) co
     to.obstacles[o] = obstacle_place(model, drawn, way_from_drawn(old, drawn, from.obstacles[o]));
   }
   to.contacts = from.contacts;
+  std::copy_n(from.hands.begin(), std::min(from.hands.size(), to.hands.size()), to.hands.begin());
   to.contact_stiffness = from.contact_stiffness;
   Configuration c;
   compute_configuration(old, from, from.q, c);

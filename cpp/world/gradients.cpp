@@ -11,6 +11,7 @@ namespace {
 
 /// An equilibrium leaves this much of the forces in it out of balance.
 constexpr double kBalanced = 1e-6;
+constexpr const char* kHands = "a hand takes part in it; hold the rod by clamp(hold='edge')";
 constexpr const char* kFriction = "friction takes part in it; take friction=0";
 constexpr const char* kRestitution = "impacts lose energy by their restitution; take restitution=1";
 
@@ -25,6 +26,7 @@ bool loses_in_impacts(const ContactDescription& contact) {
 std::vector<EquilibriumGradient> World::equilibrium_gradients(const std::vector<ReadoutAdjoint>& by) const {
   const Implementation& self = *implementation_;
   const Model& model = self.model;
+  require(!self.has_hands(), std::string("there is no gradient of this equilibrium: ") + kHands);
   if (!self.static_gradient) {
     Options statics = self.options;
     statics.integrator = Integrator::statics;
@@ -64,6 +66,7 @@ std::shared_ptr<Tape> World::start_tape() {
     self.tape->refuse("integrator '" +
                       std::string(self.options.integrator == Integrator::verlet ? "verlet" : "static") +
                       "' has none; take any other");
+  if (self.has_hands()) self.tape->refuse(kHands);
   if (const Contact* contact = self.equations->contact()) {
     if (self.options.integrator != Integrator::backward_euler)
       self.tape->refuse("contact takes part in it; take integrator='backward_euler'");

@@ -60,6 +60,25 @@ std::vector<LoadDescription> read_added_loads(Reader& r, const SceneDescription&
   return loads;
 }
 
+void write_hand(Writer& w, const HandDescription& hand) {
+  w(hand.at), w(hand.length), w(hand.posed), w(hand.position), w(hand.rotation), w(hand.yields);
+  for (double k : hand.stiffness) w(k);
+  w(hand.force_limit);
+}
+
+void read_hand(Reader& r, HandDescription& hand) {
+  r(hand.at), r(hand.length), r(hand.posed), r(hand.position), r(hand.rotation), r(hand.yields);
+  for (double& k : hand.stiffness) r(k);
+  r(hand.force_limit);
+}
+
+bool same_hand(const HandDescription& a, const HandDescription& b) {
+  Writer of_a, of_b;
+  write_hand(of_a, a);
+  write_hand(of_b, b);
+  return of_a.bytes == of_b.bytes;
+}
+
 /// As it was set while running; where it was not, that of the drawing holds.
 void write_contact(Writer& w, const ContactDescription& contact) {
   for (double x : {contact.friction, contact.slip_tolerance, contact.restitution, contact.stiffness}) w(x);
@@ -183,6 +202,7 @@ void write_supports(Writer& w, const World::Implementation& self) {
     w(d.free);
     w(d.gripped);
     w(d.axis);
+    write_hand(w, d.hand);
   }
 }
 
@@ -197,7 +217,7 @@ StoredSupports read_supports(Reader& r, const SceneDescription& scene) {
     int kind = 0;
     r(on);
     r(kind);
-    require(kind >= 0 && kind <= 4, "snapshot is damaged: unknown support");
+    require(kind >= 0 && kind <= static_cast<int>(SupportKind::hand), "snapshot is damaged: unknown support");
     d.kind = static_cast<SupportKind>(kind);
     r(d.pass.rod);
     r(d.pass.node);
@@ -208,6 +228,7 @@ StoredSupports read_supports(Reader& r, const SceneDescription& scene) {
     r(d.free);
     r(d.gripped);
     r(d.axis);
+    read_hand(r, d.hand);
     out.descriptions.push_back(d);
     out.active.push_back(on);
   }
@@ -219,7 +240,8 @@ bool same_supports(const StoredSupports& stored, const World::Implementation& se
   for (std::size_t s = 0; s < stored.active.size(); ++s) {
     const SupportDescription &a = stored.descriptions[s], &b = self.description.supports[s];
     if (stored.active[s] != self.model.supports[s].active || a.kind != b.kind || a.pass.rod != b.pass.rod ||
-        a.pass.node != b.pass.node || a.free != b.free || a.gripped != b.gripped || a.axis != b.axis)
+        a.pass.node != b.pass.node || a.free != b.free || a.gripped != b.gripped || a.axis != b.axis ||
+        !same_hand(a.hand, b.hand))
       return false;
   }
   return true;
