@@ -59,7 +59,9 @@ std::string owned(const Model& model, const ParameterInfo& info, int rod) {
 }
 
 std::string shape(Eigen::Index rows, Eigen::Index columns) {
-  return "(" + std::to_string(rows) + ", " + std::to_string(columns) + ")";
+  std::string out("(");
+  out.append(std::to_string(rows)).append(", ").append(std::to_string(columns)).append(")");
+  return out;
 }
 
 Eigen::Index rows_of(const Model& model, const ParameterInfo& info, int rod) {
