@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 namespace withe {
 namespace {
@@ -143,6 +144,19 @@ void add_mean_pressing(const ContactProblem& problem, const Touching& t, bool wi
 }
 
 }  // namespace
+
+void distance_slope(const Touching& t, double (&out)[12]) {
+  std::fill(std::begin(out), std::end(out), 0.0);
+  if (t.pair.curve()) {
+    const CurveSlopes slopes = curve_slopes(t.pair.piece, t.proximity.curve);
+    std::copy(slopes.distance, slopes.distance + 9, out);
+    return;
+  }
+  double w[4];
+  end_weights(t.proximity.points.s, t.proximity.points.t, w);
+  const Vec3d direction = (1.0 / t.proximity.distance) * t.proximity.points.between;
+  for (int i = 0; i < 12; ++i) out[i] = w[i / 3] * direction[i % 3];
+}
 
 void add_pressing(const ContactProblem& problem, const Touching& t, bool with_hessian, bool geometric,
                   ContactLocal& out) {

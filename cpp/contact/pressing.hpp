@@ -10,4 +10,7 @@ namespace withe {
 void add_pressing(const ContactProblem& problem, const Touching& t, bool with_hessian, bool geometric,
                   ContactLocal& out);
 
+/// Derivative of a contact's distance by its unknowns but angles, at the end of the step.
+void distance_slope(const Touching& t, double (&out)[12]);
+
 }  // namespace withe

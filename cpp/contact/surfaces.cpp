@@ -42,6 +42,7 @@ Surfaces::Surfaces(const Model& model) : model_(model) {
   friction_ = drawn.friction;
   obstacle_friction_ = drawn.obstacle_friction;
   pair_friction_ = drawn.pair_friction;
+  pair_shares_ = drawn.pair_shares;
   for (const RodDescription& rod : model.description.rods)
     for (Eigen::Index e = 0; e < rod.rest_lengths.size(); ++e)
       radius_.push_back(rod.contact_radius.size() > 0 ? rod.contact_radius(e) : 0.0);
@@ -55,34 +56,61 @@ Surfaces::Surfaces(const Model& model) : model_(model) {
   note_frictional();
 }
 
+/// Where friction varies, also where it is none for the time being: the form of the equations stays.
 void Surfaces::note_frictional() {
   const bool rods = model_.description.contact.rods;
   frictional_ = rods && (friction_ > 0.0 || (pair_friction_.col(0).array() > 0.0).any());
-  for (const ContactPair& p : obstacle_pairs_) frictional_ = frictional_ || p.friction > 0.0;
+  int rod = -1, other = 0;
+  for (const ContactPair& p : obstacle_pairs_) {
+    if (frictional_) return;
+    if (p.rod_a == rod && p.key.b == other) continue;
+    rod = p.rod_a;
+    other = p.key.b;
+    const BodyFriction f = friction_of(rod, other);
+    frictional_ = f.along > 0.0 || f.across > 0.0;
+  }
 }
 
 bool Surfaces::set_friction(const Parameters& p) {
-  const auto same = [](const MatrixX2& a, const MatrixX2& b) { return a.rows() == b.rows() && a == b; };
-  if (friction_ == p.friction && same(obstacle_friction_, p.obstacle_friction) && same(pair_friction_, p.pair_friction))
+  const auto same = [](const auto& a, const auto& b) { return a.rows() == b.rows() && a == b; };
+  if (friction_ == p.friction && same(obstacle_friction_, p.obstacle_friction) &&
+      same(pair_friction_, p.pair_friction) &&
+      std::equal(pair_shares_.begin(), pair_shares_.end(), p.pair_shares.begin(), p.pair_shares.end(), same))
     return false;
   friction_ = p.friction;
   obstacle_friction_ = p.obstacle_friction;
   pair_friction_ = p.pair_friction;
+  pair_shares_ = p.pair_shares;
   for (ContactPair& pair : obstacle_pairs_) set_friction(pair);
   note_frictional();
   return true;
 }
 
-void Surfaces::set_friction(ContactPair& pair) const {
-  const bool obstacle = pair.key.b < 0;
-  const int other = obstacle ? pair.key.b : pair.rod_b;
-  const Eigen::Index row = -1 - pair.key.b;
-  pair.set_friction(obstacle ? obstacle_friction_(row, 0) : friction_,
-                    obstacle ? obstacle_friction_(row, 1) : friction_);
+Surfaces::BodyFriction Surfaces::friction_of(int rod, int other) const {
+  BodyFriction f{friction_, friction_, -1};
+  if (other < 0) f = {obstacle_friction_(-1 - other, 0), obstacle_friction_(-1 - other, 1), -1};
   const auto& pairs = model_.description.contact.pairs;
-  for (Eigen::Index i = 0; i < pair_friction_.rows(); ++i)
-    if (pairs[static_cast<std::size_t>(i)].is_of(pair.rod_a, other) && pair_friction_(i, 0) >= 0.0)
-      pair.set_friction(pair_friction_(i, 0), pair_friction_(i, 1));
+  for (Eigen::Index i = 0; i < pair_friction_.rows(); ++i) {
+    if (!pairs[static_cast<std::size_t>(i)].is_of(rod, other)) continue;
+    if (pair_friction_(i, 0) >= 0.0) f = {pair_friction_(i, 0), pair_friction_(i, 1), f.given};
+    if (pair_shares_[static_cast<std::size_t>(i)].size() > 0) f.given = static_cast<int>(i);
+  }
+  return f;
+}
+
+Eigen::Index Surfaces::place_along(const ContactPair& pair) const {
+  const auto rod = at(pair.rod_a);
+  const int edge = pair.key.a - model_.rod_first_edge[rod];
+  const auto nodes = static_cast<int>(model_.description.rods[rod].nodes.size());
+  if (!pair.curve()) return nodes + edge;
+  const bool first = pair.piece.weights->edges == 1 && pair.key.end == 0;
+  return (edge + (first ? 0 : 1)) % nodes;
+}
+
+void Surfaces::set_friction(ContactPair& pair) const {
+  const BodyFriction f = friction_of(pair.rod_a, pair.key.b < 0 ? pair.key.b : pair.rod_b);
+  const double share = f.given < 0 || pair.key.b >= 0 ? 1.0 : pair_shares_[at(f.given)](place_along(pair));
+  pair.set_friction(share * f.along, share * f.across);
 }
 
 double Surfaces::tolerance(int edge) const {

@@ -68,7 +68,7 @@ class Surfaces {
   double greatest_reach() const { return greatest_reach_; }
   /// Takes over coefficients that are not those there are; whether there were any.
   bool set_friction(const Parameters& parameters);
-  /// Gives a pair the coefficients of its bodies.
+  /// Gives a pair the coefficients of its bodies, and where they vary those of its place.
   void set_friction(ContactPair& pair) const;
   /// Whether friction is there at all.
   bool frictional() const { return frictional_; }
@@ -85,6 +85,15 @@ class Surfaces {
   void add_pieces(const ContactPair& prototype, const Obstacle& obstacle, int rod);
   /// Whether an obstacle is large enough to be touched by a curve.
   bool smooth(const Obstacle& obstacle, int edge) const;
+  /// Coefficients of two bodies along and across a, wherever they touch; and the place of their pair among those given,
+  /// or -1.
+  struct BodyFriction {
+    double along, across;
+    int given;
+  };
+  BodyFriction friction_of(int rod, int other) const;
+  /// Place of what touches in `ContactPairDescription::shares`.
+  Eigen::Index place_along(const ContactPair& pair) const;
   /// Sets what two bodies have of their own; whether they may touch.
   bool set_own(int first, int second, ContactPair& pair) const;
   void unknowns_of_edges(const ContactKey& key, int (&dofs)[kContactUnknowns]) const;
@@ -98,6 +107,7 @@ class Surfaces {
   double greatest_reach_ = 0;
   double friction_ = 0;  ///< coefficients, as in `Parameters`
   MatrixX2 obstacle_friction_, pair_friction_;
+  std::vector<VectorX> pair_shares_;
   bool frictional_ = false;
 };
 

@@ -101,6 +101,7 @@ struct Parameters {
   double slip_tolerance = 1e-3;             ///< nu [m/s]
   MatrixX2 obstacle_friction;               ///< per obstacle, along and across rods [-]
   MatrixX2 pair_friction;                   ///< per pair of bodies, likewise; negative: that of the scene [-]
+  std::vector<VectorX> pair_shares;         ///< per pair of bodies, see `ContactPairDescription::shares`
   VectorX spring_stiffness, spring_rest_length, spring_damping;  ///< per spring [N/m], [m], [N s/m]
   MatrixX3 loads;  ///< rows of each load after those of the one before; see `LoadDescription::values`
   BendMeasure measure;

@@ -99,9 +99,11 @@ void set_friction(const ContactDescription& contact, Parameters& p) {
   p.obstacle_friction.col(0) = contact.obstacle_friction;
   p.obstacle_friction.col(1) = contact.obstacle_across.size() > 0 ? contact.obstacle_across : contact.obstacle_friction;
   p.pair_friction.resize(static_cast<Eigen::Index>(contact.pairs.size()), 2);
+  p.pair_shares.resize(contact.pairs.size());
   for (Eigen::Index i = 0; i < p.pair_friction.rows(); ++i) {
     const ContactPairDescription& pair = contact.pairs[static_cast<std::size_t>(i)];
     p.pair_friction.row(i) << pair.friction, pair.across >= 0.0 ? pair.across : pair.friction;
+    p.pair_shares[static_cast<std::size_t>(i)] = pair.shares;
   }
 }
 

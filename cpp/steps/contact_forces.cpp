@@ -65,6 +65,12 @@ double ContactForces::allowed(const StepProblem& problem, const VectorX& z, cons
   return contact_.allowed(end_, change_);
 }
 
+bool ContactForces::touches(const StepProblem& problem, const VectorX& z) {
+  problem.set_end(z, end_);
+  contact_.update(end_);
+  return contact_.count() > 0;
+}
+
 void ContactForces::predict_friction(const StepProblem& problem, const VectorX& step, double kept,
                                      ContactLinearisation& linearisation) {
   change_ = (problem.end_rate() / kept) * step;

@@ -75,7 +75,7 @@ ResistiveForces::ResistiveForces(const Model& model) {
   for (int e = 0; e < model.edge_count; ++e) {
     const auto rod = at(model.edge_rod[at(e)]);
     const RodDescription& d = scene.rods[rod];
-    const double radius = d.contact_radius[e - model.rod_first_edge[rod]];
+    const double radius = d.fluid_radius[e - model.rod_first_edge[rod]];
     resistance_.push_back(resistive_coefficients(radius, d.rest_lengths.sum(), scene.fluid.wavelength));
   }
 }

@@ -70,6 +70,8 @@ void write_friction(Writer& w, const ContactDescription& contact) {
   for (const ContactPairDescription& p : contact.pairs) {
     w(p.first), w(p.second), w(p.ignored);
     for (double x : {p.friction, p.across, p.stiffness, p.restitution}) w(x);
+    w(static_cast<std::int64_t>(p.shares.size()));
+    w(p.shares);
   }
 }
 
@@ -89,6 +91,10 @@ ContactDescription read_friction(Reader& r, ContactDescription contact) {
   for (ContactPairDescription& p : contact.pairs) {
     r(p.first), r(p.second), r(p.ignored);
     for (double* x : {&p.friction, &p.across, &p.stiffness, &p.restitution}) r(*x);
+    r(count);
+    require(count >= 0 && count < 1 << 28, "snapshot is damaged: impossible friction");
+    p.shares.resize(count);
+    r(p.shares);
   }
   return contact;
 }

@@ -323,6 +323,10 @@ void define_supports(WorldClass& world) {
       "set_friction",
       [](GuardedWorld& self, const ContactDescription& contact) { self.changing().set_friction(contact); },
       py::arg("contact"));
+  world.def(
+      "set_friction_shares",
+      [](GuardedWorld& self, int pair, const VectorX& shares) { self.changing().set_friction_shares(pair, shares); },
+      py::arg("pair"), py::arg("shares"));
   world.def_property_readonly("contact", [](const GuardedWorld& self) { return self.reading().description().contact; });
   world.def(
       "support_position",

@@ -90,14 +90,15 @@ class Control:
         Parameters
         ----------
         target : handle or str
-            None for what belongs to the whole scene.
+            None for what belongs to the whole scene; two bodies, such as `(arm, floor)`, for what is between them.
         **values
             Of a rod: youngs_modulus, poisson_ratio, density, viscosity, stretch_stiffness,
             bend_stiffness, twist_stiffness, line_density, viscous_time, drag (numbers, or one an edge),
             natural_curvature, natural_twist. Of a load: force, moment, load or pressure, constant or a function
             of time. Of a mass: mass. Of a spring: stiffness, rest_length, damping. Of a drag: drag. Of a fluid:
-            viscosity. Of an obstacle: friction, one coefficient or a pair, along and across rods. Of the scene:
-            gravity, friction between rods, and the slip_tolerance of friction. See `set_friction` for two bodies.
+            viscosity. Of an obstacle: friction, one coefficient, a pair, along and across rods, or a function of
+            position. Of two bodies: friction, as `Scene.set_friction` takes it. Of the scene: gravity, friction between
+            rods, and the slip_tolerance of friction.
 
         Raises
         ------

@@ -9,16 +9,18 @@ import numpy.typing as npt
 
 from withe.common import validation
 from withe.common.outlines import ObstacleOutline
-from withe.parts.contacts import Body, body_of, touching
+from withe.parts.contacts import Body, body_of, pair_friction, pair_of, touching
 from withe.parts.directory import Directory
-from withe.parts.friction import Friction, check_law, friction_pair, with_obstacle, with_pair
+from withe.parts.friction import Coefficients, Friction, check_law, coefficients, pair_between, with_obstacle, with_pair
 from withe.parts.handles import Handle, Obstacle
 from withe.parts.kinds import ObstaclePart, RodPart
 from withe.simulation.motion import Path
 from withe.simulation.session import Session
 
 __all__ = [
+    "find_friction_fields",
     "find_obstacle",
+    "follow_friction_fields",
     "move_obstacle",
     "obstacle_outlines",
     "obstacle_pose",
@@ -105,27 +107,82 @@ def obstacle_outlines(directory: Directory) -> list[ObstacleOutline]:
 def set_pair_friction(session: Session, a: Body, b: Body, friction: Friction) -> None:
     """Give two bodies another friction coefficient of their own; see `Simulation.set_friction`."""
     first, second = (touching(session.directory, body) for body in (a, b))
-    if isinstance(first, ObstaclePart) and isinstance(second, ObstaclePart):
-        raise ValueError(f"{first.name!r} and {second.name!r} are both obstacles, which never touch")
+    names = pair_of(session.directory, a, b)
     what = f"friction of {first.name!r} and {second.name!r}"
-    rods = isinstance(first, RodPart) and isinstance(second, RodPart)
-    pair = friction_pair(friction, what, directed=not rods)
+    given = pair_friction(session.directory, a, b, friction)
     contact = session.world.contact
-    if rods and not contact.rods:
+    if isinstance(first, RodPart) and isinstance(second, RodPart) and not contact.rods:
         raise ValueError(f"{what} cannot be set: rods do not touch in this scene, see Scene.enable_contact")
-    check_law(pair, contact.friction_law, what)
+    check_law(given.pair, contact.friction_law, what)
+    rod, obstacle = (first, second) if isinstance(first, RodPart) else (second, first)
+    shares = None
+    if isinstance(rod, RodPart) and isinstance(obstacle, ObstaclePart):
+        shares = _shares_now(session, rod, obstacle, given)
     bodies = body_of(session.directory, first), body_of(session.directory, second)
-    session.world.set_friction(with_pair(contact, bodies, pair))
+    session.world.set_friction(with_pair(contact, bodies, given.pair, shares))
+    session.settings.frictions[names] = given
+    find_friction_fields(session)
 
 
 def set_obstacle_friction(session: Session, part: ObstaclePart, value: Friction) -> None:
     """Change the friction coefficients of an obstacle."""
     what = f"friction of {part.name!r}"
-    pair = friction_pair(value, what)
+    given = coefficients(value, what)
     contact = session.world.contact
-    check_law(pair, contact.friction_law, what)
+    check_law(given.pair, contact.friction_law, what)
     index = session.directory.all(ObstaclePart).index(part)
-    session.world.set_friction(with_obstacle(contact, index, pair))
+    contact = with_obstacle(contact, index, given.pair)
+    for rod in session.directory.all(RodPart):
+        bodies = rod.index, -1 - index
+        own = pair_between(contact.pairs, bodies)
+        shares = _shares_now(session, rod, part, given)
+        if (own is None and shares is None) or (own is not None and own.friction >= 0.0):
+            continue
+        contact = with_pair(contact, bodies, (-1.0, -1.0), shares)
+    session.world.set_friction(contact)
+    session.settings.frictions[(part.name,)] = given
+    find_friction_fields(session)
+
+
+def find_friction_fields(session: Session) -> None:
+    """Find which pairs of the engine have friction that varies over an obstacle."""
+    obstacles, rods = session.directory.all(ObstaclePart), session.directory.all(RodPart)
+    frictions, fields = session.settings.frictions, session.settings.friction_fields
+    fields.clear()
+    if not any(given.field for given in frictions.values()):
+        return
+    for number, pair in enumerate(session.world.contact.pairs):
+        if not len(pair.shares):
+            continue
+        rod, obstacle = rods[max(pair.first, pair.second)], obstacles[-1 - min(pair.first, pair.second)]
+        first, second = sorted((rod.name, obstacle.name))
+        given = frictions.get((first, second)) or frictions.get((obstacle.name,))
+        if given is not None and given.field is not None:
+            fields[number] = rod.index, obstacle.name, given
+
+
+def follow_friction_fields(session: Session) -> None:
+    """Take friction that varies over obstacles from where rods are now."""
+    obstacles = {part.name: part for part in session.directory.all(ObstaclePart)}
+    rods = session.directory.all(RodPart)
+    for number, (rod, name, given) in session.settings.friction_fields.items():
+        shares = _shares_now(session, rods[rod], obstacles[name], given)
+        session.world.set_friction_shares(number, shares)
+
+
+def _shares_now(session: Session, rod: RodPart, obstacle: ObstaclePart, given: Coefficients) -> FloatArray | None:
+    """What nodes and edges of a rod have of a coefficient; fields move and turn with their obstacle."""
+    nodes = np.array(session.world.positions())[session.directory.layout.rows(rod.index)]
+    if given.field is not None:
+        index = session.directory.all(ObstaclePart).index(obstacle)
+        place, turn = np.array(session.world.obstacle_position(index)), np.array(session.world.obstacle_turn(index))
+        nodes = nodes - place
+        if turn.any():
+            from scipy.spatial.transform import Rotation
+
+            nodes = Rotation.from_rotvec(-turn).apply(nodes)
+        nodes = nodes + obstacle.point
+    return given.shares(nodes, rod.closed, f"friction of {obstacle.name!r}")
 
 
 def set_scene_friction(session: Session, values: dict[str, Any]) -> None:

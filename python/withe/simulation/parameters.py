@@ -26,14 +26,14 @@ from withe.parts.parameters import ROD_WORDS
 from withe.parts.rods import curvature_given, twist_array
 from withe.parts.springs import SPRING_WORDS
 from withe.simulation.loads import load_index, set_load
-from withe.simulation.obstacles import set_obstacle_friction, set_scene_friction
+from withe.simulation.obstacles import set_obstacle_friction, set_pair_friction, set_scene_friction
 from withe.simulation.session import Session
 from withe.simulation.springs import set_spring, spring_value
 from withe.simulation.supports import find_support
 
 __all__ = ["Settable", "get_value", "set_values"]
 
-Settable = Rod | Load | Mass | Spring | Drag | Fluid | Obstacle
+Settable = Rod | Load | Mass | Spring | Drag | Fluid | Obstacle | tuple[Rod | Obstacle | str, Rod | Obstacle | str]
 _POSE = ("position", "rotation")  # of supports, which `Simulation.move` changes
 _NATURAL_WORDS = ("natural_curvature", "natural_twist")
 _SET_ROD = (*ROD_WORDS, *_NATURAL_WORDS)
@@ -43,9 +43,19 @@ def set_values(session: Session, target: Settable | str | None, values: dict[str
     """Change parameters; see `Simulation.set`."""
     if not values:
         raise ValueError("set must be given what to set, such as youngs_modulus=1e6")
+    if isinstance(target, tuple):
+        _set_between(session, target, values)
+        return
     part = None if target is None else session.directory.find_any(target, "target")
     _set_values(session, part, values)
     session.note("set", part, values)
+
+
+def _set_between(session: Session, bodies: tuple[Any, ...], values: dict[str, Any]) -> None:
+    if len(bodies) != 2:
+        raise ValueError(f"target must be a part, or two bodies that touch, got {len(bodies)}")
+    _only(values, ("friction",), "a pair of bodies")
+    set_pair_friction(session, *bodies, values["friction"])
 
 
 def _set_values(session: Session, part: Part | None, values: dict[str, Any]) -> None:
@@ -126,6 +136,9 @@ def get_value(session: Session, target: Settable | Support | str, word: str | No
         world = session.world
         return np.array(world.obstacle_position(index) if word == "position" else world.obstacle_turn(index))
     elif isinstance(part, ObstaclePart) and word == "friction":
+        given = session.settings.frictions.get((part.name,))
+        if given is not None and given.field is not None:
+            return given.field
         index = session.directory.all(ObstaclePart).index(part)
         return as_given(obstacle_friction(session.world.contact, index))
     words = _words_of(part)

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe import _core
+from withe.parts.contacts import drawn_frictions
 from withe.parts.description import describe, parameters_of
 from withe.parts.directory import Directory
 from withe.parts.kinds import CustomForcePart, DragPart, FluidPart, LoadPart, MassPart, Part, RodPart, SupportPart
@@ -81,6 +82,7 @@ class Session:
             gravity=gravity.copy(),
             supports={part.name: (index, part) for index, part in enumerate(scene.all(SupportPart))},
             functions={part.name: part.function for part in drawn_loads if part.function is not None},
+            frictions=drawn_frictions(scene),
         )
         return cls(
             scene=scene,

@@ -23,7 +23,7 @@ from withe.simulation.linearisation import Linearisation
 from withe.simulation.loads import RunningLoads
 from withe.simulation.loop import Run
 from withe.simulation.measurements import Measurements
-from withe.simulation.obstacles import obstacle_outlines
+from withe.simulation.obstacles import find_friction_fields, obstacle_outlines
 from withe.simulation.paths import EquilibriumPath, path_options
 from withe.simulation.placement import Placement
 from withe.simulation.readouts import Equilibrium
@@ -68,7 +68,9 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
     @classmethod
     def _build(cls, directory: Directory, gravity: FloatArray, options: BuildOptions) -> Simulation:
         """A simulation of a directory that nobody else changes."""
-        return cls._of(Stepping(Session.begin(directory, gravity, options)))
+        session = Session.begin(directory, gravity, options)
+        find_friction_fields(session)
+        return cls._of(Stepping(session))
 
     @classmethod
     def _of(cls, stepping: Stepping, initial: Snapshot | None = None) -> Simulation:
@@ -368,6 +370,7 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
             "snapshot": self.snapshot(),
             "functions": session.settings.functions,
             "paths": session.settings.paths,
+            "friction": (session.settings.friction_fields, session.settings.frictions),
         }
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -375,6 +378,7 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
         self.__dict__.update(built.__dict__)
         self._session.settings.functions = state["functions"]
         self._session.settings.paths = state["paths"]
+        self._session.settings.friction_fields, self._session.settings.frictions = state["friction"]
         self.restore(state["snapshot"])
 
     # Pictures
