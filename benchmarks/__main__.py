@@ -26,6 +26,7 @@ NAMES = (
     "ablation",
     "conservation",
     "contact",
+    "contact_fold",
     "contact_robustness",
     "perception",
     "real2sim",

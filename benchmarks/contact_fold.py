@@ -26,7 +26,8 @@ def fold(integrator: withe.parts.Integrator, time_step: float, edges: int = 150)
     """The sheet as it lies, and a jaw that is about to lift its edge."""
     scene = withe.Scene()
     bend = 2.0 * WEIGHT * LGB**3
-    stiff = withe.Stiffness(stretch=12.0 * bend / THICKNESS**2, bend=(bend * (WIDTH / THICKNESS) ** 2, bend), twist=bend)
+    across = bend * (WIDTH / THICKNESS) ** 2
+    stiff = withe.Stiffness(stretch=12.0 * bend / THICKNESS**2, bend=(across, bend), twist=bend)
     height = 0.5 * THICKNESS
     sheet = scene.add_rod(
         start=(0, 0, height),
@@ -87,7 +88,15 @@ def main() -> None:
                 )
             )
             report.goal(f"fold of A4, {integrator} [s]", None if quick else seconds, most, at_least=False)
-    header = ("integrator", "step [ms]", "s", "ms a step", "iterations a step", "us an iteration", "contacts at the end")
+    header = (
+        "integrator",
+        "step [ms]",
+        "s",
+        "ms a step",
+        "iterations a step",
+        "us an iteration",
+        "contacts",
+    )
     report.table(f"A fold of A4 within {DURATION:g} s", header, rows)
     report.write()
 

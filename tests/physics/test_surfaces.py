@@ -34,7 +34,8 @@ def test_a_sheet_rests_at_its_contact_radius_above_the_floor(rod, radius, planar
     simulation.run(duration=0.05, progress=False)
     # Within the distance tolerance above, and four hundredths of the radius below: what contact may give.
     heights = simulation.positions()[:, 2] / radius
-    assert heights.min() > 0.96 and heights.max() < 1.1
+    assert heights.min() > 0.96
+    assert heights.max() < 1.1
     assert simulation.energy().kinetic < 1e-9
 
 

@@ -64,7 +64,8 @@ def test_projected_nodes_lie_in_the_middle_of_what_is_drawn(camera, tmp_path):
     nodes = record.positions("rope")[-1]
     cover = silhouette(record, camera, tmp_path / "rope.png")
     pixels = camera.project(nodes)
-    assert pixels.min() > 20 and (pixels < np.array(SIZE) - 20).all()  # all in view
+    assert pixels.min() > 20
+    assert (pixels < np.array(SIZE) - 20).all()  # all in view
     for i in range(3, len(nodes) - 3):
         along = pixels[i + 1] - pixels[i - 1]
         across = np.array([-along[1], along[0]]) / np.linalg.norm(along)
@@ -87,7 +88,8 @@ def test_a_picture_is_read_back_in_metres(tmp_path):
     fine = np.stack([np.interp(np.linspace(0, 40, 4001), np.arange(41), x) for x in nodes.T], axis=1)
     apart = np.linalg.norm(metres[:, None] - fine[None], axis=2).min(axis=1)
     pixel = 0.5 / 850  # [m] at that distance
-    assert np.median(apart) < pixel and apart.max() < 3 * pixel
+    assert np.median(apart) < pixel
+    assert apart.max() < 3 * pixel
 
 
 def test_cameras_without_a_pose_with_a_lens_or_the_rods_behind_them_are_refused(tmp_path):

@@ -87,7 +87,7 @@ def coefficients(
         if rows.min() < 0.0:
             raise ValueError(f"{what} must not be negative, got {rows.min():g} at edge {int(rows.argmin())}")
         return Coefficients((1.0, 1.0), edges=rows)
-    return Coefficients(friction_pair(value, what, directed=directed))  # type: ignore[arg-type]
+    return Coefficients(friction_pair(value, what, directed=directed))
 
 
 def friction_pair(value: Friction | npt.ArrayLike, what: str, *, directed: bool = True) -> tuple[float, float]:

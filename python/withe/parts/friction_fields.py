@@ -72,7 +72,7 @@ class FrictionMap:
 
 
 def edge_shares(values: FloatArray, closed: bool) -> FloatArray:
-    """Numbers of edges as the engine takes them: those of nodes, which are means of the edges beside them, then theirs."""
+    """Numbers of edges as the engine takes them: those of nodes, means of the edges beside them, then theirs."""
     before, behind = (np.roll(values, 1), values) if closed else (np.r_[values[:1], values], np.r_[values, values[-1:]])
     return np.concatenate([0.5 * (before + behind), values])
 

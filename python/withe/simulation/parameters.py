@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from withe.common import validation
+from withe.parts.contacts import pair_of, touching
 from withe.parts.description import added_mass, drag
 from withe.parts.friction import as_given, obstacle_friction
 from withe.parts.handles import Drag, Fluid, Load, Mass, Obstacle, Rod, Spring, Support
@@ -58,6 +59,16 @@ def _set_between(session: Session, bodies: tuple[Any, ...], values: dict[str, An
     set_pair_friction(session, *bodies, values["friction"])
 
 
+def _between(session: Session, bodies: tuple[Any, ...], word: str) -> Any:
+    if len(bodies) != 2 or word != "friction":
+        raise ValueError(f"two bodies that touch have 'friction' only, got {word!r} of {len(bodies)}")
+    given = session.settings.frictions.get(pair_of(session.directory, *bodies))
+    if given is not None:
+        return given.given
+    obstacle = next((body for body in bodies if isinstance(touching(session.directory, body), ObstaclePart)), None)
+    return get_value(session, "friction", None) if obstacle is None else get_value(session, obstacle, word)
+
+
 def _set_values(session: Session, part: Part | None, values: dict[str, Any]) -> None:
     if part is None:
         _only(values, ("gravity", "friction", "slip_tolerance"), "the scene")
@@ -104,6 +115,8 @@ def get_value(session: Session, target: Settable | Support | str, word: str | No
         if not isinstance(target, str) or target != "gravity":
             raise ValueError("word must be given, such as get(arm, 'youngs_modulus')")
         return session.settings.gravity.copy()
+    if isinstance(target, tuple):
+        return _between(session, target, word)
     part = session.directory.find_any(target, "target")
     if isinstance(part, RodPart):
         if word in _NATURAL_WORDS:
