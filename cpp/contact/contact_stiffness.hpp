@@ -39,8 +39,8 @@ class ContactStiffness {
   /// does that of contacts that begin, per rod. Returns the energy that this put in, below zero where it took some; if
   /// that is what to keep, no more than `spare` [J].
   double accept(const ContactSet& set, Keep keep, double spare, StiffnessScratch& scratch, VectorX& stiffness) const;
-  /// What touches where nothing has moved yet presses no harder than the weight of its edges along `gravity` [m/s^2], in
-  /// the axes of the unknowns: the rest has yielded, so that what is drawn at rest stays so.
+  /// What touches where nothing has moved yet presses no harder than the weight of its edges along `gravity` [m/s^2],
+  /// in the axes of the unknowns: the rest has yielded, so that what is drawn at rest stays so.
   void rest(const ContactSet& set, const Vec3d& gravity, std::vector<ContactRecord>& records) const;
   /// The same for a step so short that stiffness stays as it is.
   void remember(const ContactSet& set, const VectorX& stiffness, std::vector<ContactRecord>& records) const;

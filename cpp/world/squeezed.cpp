@@ -23,8 +23,8 @@ void World::Implementation::fail_squeezed(const Equations& system, int contact, 
   const Touching& t = system.contact()->contacts()[contact];
   const double depth = t.pair.radii() - t.proximity.distance, share = 100.0 * depth / t.pair.small_radius();
   const auto rod_of = [&](int edge) { return "rod '" + description.rods[at(model.edge_rod[at(edge)])].name + "'"; };
-  const std::string other = t.pair.key.b < 0 ? "'" + description.contact.obstacles[at(-1 - t.pair.key.b)].name + "'"
-                                             : rod_of(t.pair.key.b);
+  const std::string other =
+      t.pair.key.b < 0 ? "'" + description.contact.obstacles[at(-1 - t.pair.key.b)].name + "'" : rod_of(t.pair.key.b);
   const int node = model.edge_tail[at(t.pair.key.a)];
   const Place place = place_of_node(t.proximity.points.s > 0.5 ? model.edge_head[at(t.pair.key.a)] : node);
   throw ConvergenceFailure(

@@ -221,8 +221,8 @@ class World {
   /// Takes over the friction coefficients and the slip tolerance of a description of the same bodies, and pairs that it
   /// has besides.
   void set_friction(const ContactDescription& contact);
-  /// What the nodes, then the edges, of a rod rub with on an obstacle, over the coefficients of their pair, which is one
-  /// of the description's.
+  /// What the nodes, then the edges, of a rod rub with on an obstacle, over the coefficients of their pair, which is
+  /// one of the description's.
   void set_friction_shares(int pair, const VectorX& shares);
 
   // Read-outs: copies.

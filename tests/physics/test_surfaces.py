@@ -67,3 +67,32 @@ def test_edges_may_have_contact_radii_of_their_own():
 def test_a_contact_radius_that_is_none_is_refused(radius):
     with pytest.raises(ValueError, match="contact_radius of rod 'sheet'"):
         lying_sheet(contact_radius=radius)
+
+
+def falling_sheet(scheme, step, floor, rods):
+    """A sheet that is held at one end, far above all that it could touch."""
+    scene = withe.Scene()
+    sheet = scene.add_rod(
+        start=(0, 0, 0),
+        end=(0.297, 0, 0),
+        nodes=61,
+        section=withe.Rectangle(0.21, THICKNESS),
+        normal=(0, 1, 0),
+        material=PAPER,
+    )
+    scene.clamp(sheet.start)
+    if floor:
+        scene.add_floor(-1.0)
+    if rods:
+        scene.enable_contact()
+    simulation = scene.build(integrator=scheme, time_step=step)
+    simulation.step(40)
+    return simulation
+
+
+@pytest.mark.parametrize(("scheme", "step"), [("backward_euler", 1e-2), ("implicit_midpoint", 5e-3)])
+@pytest.mark.parametrize(("floor", "rods"), [(True, False), (False, True), (True, True)])
+def test_surfaces_that_nothing_touches_cost_no_iterations(scheme, step, floor, rods):
+    alone, beside = (falling_sheet(scheme, step, *which) for which in ((False, False), (floor, rods)))
+    assert beside.statistics.iterations <= 1.02 * alone.statistics.iterations
+    np.testing.assert_allclose(beside.positions(), alone.positions(), atol=1e-9)
