@@ -207,13 +207,13 @@ void Surfaces::add_obstacles() {
       p.restitution = contact.obstacle_restitution.size() > 0 ? contact.obstacle_restitution(row) : 1.0;
       p.stiffness = 0.0;
       if (!set_own(rod, p.key.b, p)) continue;
-      set_friction(p);
       add_edges(p, obstacles_.back());
       add_pieces(p, obstacles_.back(), rod);
     }
   }
   std::sort(obstacle_pairs_.begin(), obstacle_pairs_.end(),
             [](const ContactPair& a, const ContactPair& b) { return obstacle_order(a.key, b.key); });
+  for (ContactPair& pair : obstacle_pairs_) set_friction(pair);
 }
 
 const ContactPair& Surfaces::obstacle_pair(const ContactKey& key) const {

@@ -14,6 +14,9 @@
 namespace withe {
 namespace {
 
+// Over a step, the time since the middle of the one before where that was much longer.
+constexpr double kMuchLonger = 2.0;
+
 /// By how much the energy in stretching an edge of stiffness 1 N grows beyond the work of the axial force of a step
 /// [J], that in its middle or at its end. An edge under pressure that turns gains by the latter: it gives way by l0 (1
 /// - cos).
@@ -95,11 +98,11 @@ void find_held_velocity(const Model& model, const StepPlan& plan, const State& s
 }
 
 /// Time between the velocities of supports before and after a step: those of backward Euler are means over its steps,
-/// and lie in their middles, however long the last one was.
+/// and lie in their middles, which counts where the last one was much longer.
 double held_time(const StepPlan& plan, const State& state) {
   if (plan.rule != StepRule::backward_euler || state.motion.known == 0) return plan.dt;
   const double between = state.time + 0.5 * plan.dt - state.motion.time[0];
-  return std::abs(between - plan.dt) > 1e-6 * plan.dt ? between : plan.dt;
+  return between > kMuchLonger * plan.dt ? between : plan.dt;
 }
 
 /// Finds the fluid's force for a step of dt: that on velocities as they are taken to be within the step, to the order
@@ -211,7 +214,7 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
   const bool holds = !model.constraints.empty();
   if (holds) {
     find_held_velocity(model, plan, state, work);
-    work.held_acceleration = (work.held_velocity - state.v) / dt;
+    work.held_acceleration = (work.held_velocity - state.v) / held_time(plan, state);
   }
   equations.begin(state, parameters, plan.rule, h, holds ? &work.held_acceleration : nullptr);
   if (equations.contact() && equations.contact()->blocked()) return result;

@@ -206,11 +206,9 @@ class Newton::Solve {
   }
 
   bool step_between_surfaces(double& shorten) {
-    const double whole = shorten;
     if (!search_.run(z_, shorten)) return false;
     if (search_.remade()) reuse_.note_matrix(false);
-    // No prediction outlives a step that may lead elsewhere.
-    axial_known_ = axial_known_ && shorten == whole && !search_.remade();
+    axial_known_ = false;  // no prediction outlives a step that may lead elsewhere
     return true;
   }
 

@@ -325,7 +325,7 @@ void define_supports(WorldClass& world) {
       py::arg("contact"));
   world.def(
       "set_friction_shares",
-      [](GuardedWorld& self, int pair, const VectorX& shares) { self.changing().set_friction_shares(pair, shares); },
+      [](GuardedWorld& self, int pair, const VectorX& shares) { self.steering().set_friction_shares(pair, shares); },
       py::arg("pair"), py::arg("shares"));
   world.def_property_readonly("contact", [](const GuardedWorld& self) { return self.reading().description().contact; });
   world.def(

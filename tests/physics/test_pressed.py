@@ -79,28 +79,25 @@ def test_a_rod_that_is_drawn_touching_a_floor_starts_at_rest(material, scheme, l
 def test_a_rod_that_is_drawn_touching_and_moves_still_bounces(speed):
     simulation = lying(held=False, height=1.02 * RADIUS, integrator="energy_momentum", time_step=1e-4)
     simulation.set_velocities("rod", np.tile([0, 0, -speed], (31, 1)))
-    before = simulation.energy().kinetic
-    simulation.run(duration=2e-3, progress=False)
-    assert simulation.velocities()[:, 2].mean() > 0.5 * speed
-    assert simulation.energy().kinetic > 0.5 * before
+    fastest = 0.0
+    for _ in range(80):
+        simulation.step()
+        fastest = max(fastest, simulation.velocities()[:, 2].mean())
+    assert fastest > 0.7 * speed
 
 
-@pytest.mark.parametrize("scheme", ["backward_euler", "implicit_midpoint", "energy_momentum"])
-@pytest.mark.parametrize("last", [1e-7, 1e-5, 1e-3])
-def test_a_reaction_after_a_short_last_step_is_that_after_a_long_one(scheme, last):
-    """A stiff end that is led along a smooth path by a support that bears its own and its neighbours' inertia."""
-    forces = []
-    for more in (last, 5e-3):
-        scene = withe.Scene(gravity=(0, 0, 0))
-        rod = scene.add_rod(start=(0, 0, 0), end=(0.05, 0, 0), nodes=6, radius=RADIUS, material=RUBBER, name="rod")
-        scene.clamp(rod.start, name="hand")
-        simulation = scene.build(integrator=scheme, time_step=5e-3)
-        simulation.move("hand", path=lambda t: (0, 0, 0.01 * t**2))
-        simulation.run(duration=0.5, progress=False)
-        simulation.run(duration=more, progress=False)
-        forces.append(simulation.reaction("hand").force[2])
-    weight = 1200.0 * np.pi * RADIUS**2 * 0.05 * 0.02  # mass times the acceleration of the path
-    np.testing.assert_allclose(forces, weight, rtol=0.5)
+@pytest.mark.parametrize("last", [1e-7, 1e-6, 1e-5, 1e-4, 1e-3])
+def test_a_reaction_after_a_short_last_step_is_the_mass_times_the_acceleration_of_the_path(last):
+    scene = withe.Scene(gravity=(0, 0, 0))
+    rod = scene.add_rod(start=(0, 0, 0), end=(0.05, 0, 0), nodes=6, radius=RADIUS, material=RUBBER, name="rod")
+    scene.clamp(rod.start, name="hand")
+    simulation = scene.build(integrator="backward_euler", time_step=5e-3)
+    simulation.move("hand", path=lambda t: (0, 0, 0.01 * t**2))
+    simulation.run(duration=0.5, progress=False)
+    expected = 1200.0 * np.pi * RADIUS**2 * 0.05 * 0.02
+    assert simulation.reaction("hand").force[2] == pytest.approx(expected, rel=1e-3)
+    simulation.run(duration=last, progress=False)
+    assert simulation.reaction("hand").force[2] == pytest.approx(expected, rel=0.3)  # the rod shakes; it was 200 times too great
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.4])
