@@ -30,6 +30,7 @@ NAMES = (
     "contact_robustness",
     "perception",
     "real2sim",
+    "deployment",
 )
 
 

@@ -91,6 +91,7 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
   const auto undo = [&] {
     forget_custom(system, forces_before, moments_before);
     release_obstacles(system);
+    release_hands(system);
     static_cast<Moving&>(*this) = before;
     apply_ramps(state.time);
     parameters.loads = loads;
@@ -110,6 +111,7 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
   try {
     solve_for_custom_at_rest(system, time);
     aim_obstacles(system, time);
+    aim_hands(system);
     VectorX reached = state.q;
     if (boundary(1.0, reached)) check_squeezed(system, reached, dt);
     if (drifts(system))
@@ -129,8 +131,10 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
     undo();
     throw;
   }
-  release_obstacles(system);
   system.respond({});
+  if (r.converged) settle_hands(system);
+  release_obstacles(system);
+  release_hands(system);
   if (!r.converged) {
     undo();
     const bool held =
