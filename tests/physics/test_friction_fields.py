@@ -182,3 +182,16 @@ def test_an_image_is_read_as_it_is_shown():
     field = withe.FrictionMap([[0.1, 0.2], [0.3, 0.4]], extent=(0, 2, 0, 2))
     points = [(0.5, 1.5, 0), (1.5, 1.5, 0), (0.5, 0.5, 0), (1.0, 1.0, 0), (-5.0, 9.0, 0)]
     np.testing.assert_allclose(field(points), [0.1, 0.2, 0.3, 0.25, 0.1])
+
+
+def test_friction_may_be_chosen_without_contact_of_rods():
+    scene = withe.Scene()
+    for y in (-1.0, 1.0):  # they cross in each other
+        scene.add_rod(
+            start=(0, 0.05 * y, RADIUS), end=(0.1, -0.05 * y, RADIUS), nodes=9, radius=RADIUS, material=RUBBER
+        )
+    scene.add_floor(friction=0.4)
+    scene.enable_contact(rods=False, friction_model="implicit", slip_tolerance=1e-4)
+    simulation = scene.build(time_step=1e-3)
+    simulation.step(5)
+    assert {tuple(pair)[1] for pair in simulation.contacts()["pair"]} == {"floor 1"}

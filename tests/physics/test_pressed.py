@@ -97,7 +97,8 @@ def test_a_reaction_after_a_short_last_step_is_the_mass_times_the_acceleration_o
     expected = 1200.0 * np.pi * RADIUS**2 * 0.05 * 0.02
     assert simulation.reaction("hand").force[2] == pytest.approx(expected, rel=1e-3)
     simulation.run(duration=last, progress=False)
-    assert simulation.reaction("hand").force[2] == pytest.approx(expected, rel=0.3)  # the rod shakes; it was 200 times too great
+    # The rod shakes; it was 200 times too great.
+    assert simulation.reaction("hand").force[2] == pytest.approx(expected, rel=0.3)
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.4])
