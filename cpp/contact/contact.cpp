@@ -229,13 +229,6 @@ double Contact::stiffen(State& state, Keep keep) {
 void Contact::initialise(State& state, const Parameters& parameters) const {
   if (state.contact_stiffness.size() == 0)
     state.contact_stiffness = ContactParameters(surfaces_, parameters).least_stiffness;
-  if (!state.contacts.empty()) return;
-  ContactAtRest at_rest;
-  find_at_rest(state, parameters, at_rest);
-  Vec3d gravity = to_vec3(parameters.gravity);
-  if (const auto& plane = problem_.model().plane)
-    gravity = {parameters.gravity.dot(plane->first), parameters.gravity.dot(plane->second), 0.0};
-  ContactStiffness(at_rest.problem).rest(at_rest.set, gravity, state.contacts);
 }
 
 double Contact::energy_of(const State& state, const Parameters& parameters, ContactAtRest& rest) const {

@@ -113,7 +113,7 @@ class Contact {
   void remember(State& state);
   /// Makes contacts of bodies that are too deep in each other stiffer; returns the energy put in [J].
   double stiffen(State& state, Keep keep);
-  /// Gives a state that has none yet the stiffness that no rod falls below, and records of what touches.
+  /// Gives a state that has none yet the stiffness that no rod falls below.
   void initialise(State& state, const Parameters& parameters) const;
   /// Contacts of a state at rest, for read-outs; and their energy.
   std::vector<ContactReport> report(const State& state, const Parameters& parameters) const;

@@ -170,36 +170,6 @@ void ContactStiffness::finish(const ContactSet& set, std::vector<ContactRecord>&
   }
 }
 
-void ContactStiffness::rest(const ContactSet& set, const Vec3d& gravity, std::vector<ContactRecord>& records) const {
-  records.clear();
-  for (const Touching& t : set) {
-    const ContactPair& pair = t.pair;
-    if (t.lagged >= 0 || t.proximity.distance >= pair.reach() || problem_.fixed(pair)) continue;
-    const double along = -dot(t.proximity.normal, gravity), carried = pair.key.b < 0 ? along : std::abs(along);
-    const double weight = pair.share * problem_.mass_of(pair) * std::max(carried, 0.0);
-    ContactRecord record;
-    record.key = pair.key;
-    record.stiffness = t.stiffness / pair.share;
-    record.yielded = yielded_by(t, weight);
-    record.approach = least_approach(problem_, pair);
-    records.push_back(record);
-  }
-  std::sort(records.begin(), records.end(), by_key);
-}
-
-/// The depth that must press no more for the force to be no greater than wanted.
-double ContactStiffness::yielded_by(const Touching& t, double wanted) const {
-  const ContactPair& pair = t.pair;
-  if (-t.energy.first <= wanted) return 0.0;
-  double low = t.proximity.distance, high = pair.reach();
-  for (int k = 0; k < 60; ++k) {
-    const double middle = 0.5 * (low + high);
-    const double slope = contact_energy(problem_.description().law, middle, pair.radii(), pair.tolerance).first;
-    (-t.stiffness * slope > wanted ? low : high) = middle;
-  }
-  return high - t.proximity.distance;
-}
-
 void ContactStiffness::remember(const ContactSet& set, const VectorX& stiffness,
                                 std::vector<ContactRecord>& records) const {
   records.clear();

@@ -39,9 +39,6 @@ class ContactStiffness {
   /// does that of contacts that begin, per rod. Returns the energy that this put in, below zero where it took some; if
   /// that is what to keep, no more than `spare` [J].
   double accept(const ContactSet& set, Keep keep, double spare, StiffnessScratch& scratch, VectorX& stiffness) const;
-  /// What touches where nothing has moved yet presses no harder than the weight of its edges along `gravity` [m/s^2],
-  /// in the axes of the unknowns: the rest has yielded, so that what is drawn at rest stays so.
-  void rest(const ContactSet& set, const Vec3d& gravity, std::vector<ContactRecord>& records) const;
   /// The same for a step so short that stiffness stays as it is.
   void remember(const ContactSet& set, const VectorX& stiffness, std::vector<ContactRecord>& records) const;
   /// Makes contacts stiffer that are too deep in `set`, records of the step's start and stiffness of contacts that
@@ -55,7 +52,6 @@ class ContactStiffness {
   bool begins_anew(const Touching& t, ContactRecord& record) const;
   ContactRecord record(const Touching& t) const;
   void finish(const ContactSet& set, std::vector<ContactRecord>& records) const;
-  double yielded_by(const Touching& t, double wanted) const;
   double yielded_at(const Touching& t, double ratio, Keep keep) const;
   double change_stiffness(const Touching& t, double ratio, double yielded, ContactRecord& record) const;
   /// By how much a contact's stiffness is to change, by the force that it carries.

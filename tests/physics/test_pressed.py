@@ -1,4 +1,4 @@
-"""What is pressed by what does not yield, and what is drawn at rest."""
+"""What is pressed by what does not yield, and what supports and floors bear."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,6 @@ import pytest
 import withe
 
 RUBBER = withe.Material(youngs_modulus=1e6, poisson_ratio=0.5, density=1200.0)
-STIFF = withe.Material(youngs_modulus=2e9, poisson_ratio=0.3, density=1200.0)
 RADIUS = 5e-3
 WEIGHT = 1200.0 * np.pi * RADIUS**2 * 0.3 * 9.81
 SCHEMES = ["static", "backward_euler", "implicit_midpoint", "energy_momentum"]
@@ -58,32 +57,6 @@ def test_a_floor_that_is_moved_into_a_held_node_is_the_same_error():
     simulation.move("floor", position=(0, 0, 0.3 * RADIUS), over=0.02)
     with pytest.raises(withe.ConvergenceError, match=r"rod 'rod' is pressed .* into 'floor'"):
         simulation.run(duration=0.03, progress=False)
-
-
-@pytest.mark.parametrize("law", ["imcv2", "barrier", "imcv1"])
-@pytest.mark.parametrize("scheme", ["backward_euler", "implicit_midpoint", "verlet"])
-@pytest.mark.parametrize("material", [RUBBER, STIFF], ids=["soft", "stiff"])
-def test_a_rod_that_is_drawn_touching_a_floor_starts_at_rest(material, scheme, law):
-    height = RADIUS * (1.0 if law != "barrier" else 1.02)
-    step = 1e-6 if scheme == "verlet" else 1e-3
-    simulation = lying(material, height, held=False, contact={"model": law}, integrator=scheme, time_step=step)
-    pressed = simulation.contacts()["normal_force"].sum()
-    assert pressed <= 1.001 * WEIGHT  # no more than the weight, however stiff the rod
-    simulation.run(duration=0.02, progress=False)
-    # A rod that falls freely for a hundredth of a radius, the depth that contact gives, is as fast as this.
-    assert np.abs(simulation.velocities()).max() < np.sqrt(2.0 * 9.81 * 0.01 * RADIUS)
-    assert np.abs(simulation.positions()[:, 2] - height).max() < 0.05 * RADIUS
-
-
-@pytest.mark.parametrize("speed", [0.05, 0.5])
-def test_a_rod_that_is_drawn_touching_and_moves_still_bounces(speed):
-    simulation = lying(held=False, height=1.02 * RADIUS, integrator="energy_momentum", time_step=1e-4)
-    simulation.set_velocities("rod", np.tile([0, 0, -speed], (31, 1)))
-    fastest = 0.0
-    for _ in range(80):
-        simulation.step()
-        fastest = max(fastest, simulation.velocities()[:, 2].mean())
-    assert fastest > 0.7 * speed
 
 
 @pytest.mark.parametrize("last", [1e-7, 1e-6, 1e-5, 1e-4, 1e-3])

@@ -37,7 +37,7 @@ class FrictionMap:
     >>> import withe
     >>> scene = withe.Scene()
     >>> table = withe.FrictionMap([[0.1, 0.5]], extent=(0, 1, 0, 1))
-    >>> float(table([(0.5, 0.2, 0.0)])[0])
+    >>> round(float(table([(0.5, 0.2, 0.0)])[0]), 3)
     0.3
     >>> floor = scene.add_floor(friction=table)
     """

@@ -167,7 +167,8 @@ def follow_friction_fields(session: Session) -> None:
     rods = session.directory.all(RodPart)
     for number, (rod, name, given) in session.settings.friction_fields.items():
         shares = _shares_now(session, rods[rod], obstacles[name], given)
-        session.world.set_friction_shares(number, shares)
+        if shares is not None:
+            session.world.set_friction_shares(number, shares)
 
 
 def _shares_now(session: Session, rod: RodPart, obstacle: ObstaclePart, given: Coefficients) -> FloatArray | None:
