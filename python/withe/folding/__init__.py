@@ -13,8 +13,8 @@ from withe.folding.hanging_strip import Measured, droop, measure
 from withe.folding.jaw import Jaw
 from withe.folding.manifold import elastica
 from withe.folding.paper import Paper
-from withe.folding.planning import plan
+from withe.folding.planning import plan, replan
 from withe.folding.plans import Plan
 from withe.folding.sheets import Elastica
 
-__all__ = ["Elastica", "Jaw", "Measured", "Paper", "Plan", "droop", "elastica", "measure", "plan"]
+__all__ = ["Elastica", "Jaw", "Measured", "Paper", "Plan", "droop", "elastica", "measure", "plan", "replan"]
