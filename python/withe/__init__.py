@@ -10,7 +10,7 @@ by rounding, so set it to "baseline" everywhere to find the same bits on unlike 
 ``print(simulation.plan)`` says which are in use.
 """
 
-from withe import folding, learning, perception, real2sim, shapes, view
+from withe import deployment, folding, learning, perception, real2sim, shapes, view
 from withe._core import __version__
 from withe.errors import CoarseMeshWarning, CoarseStepWarning, ConvergenceError
 from withe.parts.handles import (
@@ -18,6 +18,7 @@ from withe.parts.handles import (
     Drag,
     EdgeHandle,
     Fluid,
+    Hand,
     Joint,
     Load,
     Mass,
@@ -47,6 +48,7 @@ __all__ = [
     "Energy",
     "Equilibrium",
     "Fluid",
+    "Hand",
     "Joint",
     "Linearisation",
     "Load",
@@ -70,6 +72,7 @@ __all__ = [
     "Support",
     "Tube",
     "__version__",
+    "deployment",
     "folding",
     "learning",
     "perception",

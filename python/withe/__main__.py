@@ -1,4 +1,4 @@
-"""The command line: ``withe perceive IMAGE``, ``withe fold --paper a4``."""
+"""The command line: ``withe perceive IMAGE``, ``withe deploy PATTERN``, ``withe fold --paper a4``."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import argparse
 import sys
 from collections.abc import Sequence
 
+from withe.deployment import command as deploy
 from withe.folding import command as fold
 from withe.perception import command as perceive
 
@@ -17,6 +18,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="withe", description="Tools around withe: soft robots made of slender rods.")
     commands = parser.add_subparsers(required=True, metavar="command")
     perceive.add_parser(commands)
+    deploy.add_parser(commands)
     fold.add_parser(commands)
     parsed = parser.parse_args(arguments)
     try:

@@ -14,11 +14,14 @@ __all__: list[str] = [
     "ContactPairDescription",
     "ContactTable",
     "ConvergenceFailure",
+    "Deflection",
     "Energy",
     "EquilibriumGradient",
     "EquilibriumPath",
     "EquilibriumResult",
     "FluidDescription",
+    "GraspTable",
+    "HandDescription",
     "InitialGradient",
     "JointDescription",
     "Linearisation",
@@ -42,6 +45,7 @@ __all__: list[str] = [
     "SheetManifold",
     "SpringDescription",
     "Statistics",
+    "StraightRod",
     "SupportDescription",
     "Tape",
     "World",
@@ -177,11 +181,48 @@ class JointDescription:
     @links.setter
     def links(self, arg0: collections.abc.Sequence[RevoluteLink]) -> None: ...
 
+class HandDescription:
+    """
+    What a hand holds.
+    """
+
+    posed: bool
+    yields: bool
+    def __init__(self) -> None: ...
+    @property
+    def at(self) -> float: ...
+    @at.setter
+    def at(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    @property
+    def force_limit(self) -> float: ...
+    @force_limit.setter
+    def force_limit(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    @property
+    def length(self) -> float: ...
+    @length.setter
+    def length(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    @property
+    def position(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]: ...
+    @position.setter
+    def position(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None: ...
+    @property
+    def rotation(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 3]"]: ...
+    @rotation.setter
+    def rotation(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"]) -> None: ...
+    @property
+    def stiffness(self) -> typing.Annotated[list[float], "FixedSize(6)"]: ...
+    @stiffness.setter
+    def stiffness(
+        self,
+        arg0: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(6)"],
+    ) -> None: ...
+
 class SupportDescription:
     """
     Something that holds a node.
     """
 
+    hand: HandDescription
     kind: str
     pass_: RodPass
     def __init__(self) -> None: ...
@@ -731,6 +772,17 @@ class Statistics:
     @property
     def total_time(self) -> float: ...
 
+class Deflection:
+    """
+    How far what a hand holds has gone.
+    """
+    @property
+    def shift(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]: ...
+    @property
+    def slip(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]: ...
+    @property
+    def turn(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]: ...
+
 class Reaction:
     """
     Of a support on the rod.
@@ -840,6 +892,7 @@ class World:
     def curvatures(
         self, rod: typing.SupportsInt | typing.SupportsIndex
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 2]"]: ...
+    def deflection(self, support: typing.SupportsInt | typing.SupportsIndex) -> Deflection: ...
     def directors(
         self, rod: typing.SupportsInt | typing.SupportsIndex
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 9]"]: ...
@@ -1018,6 +1071,71 @@ class SheetManifold:
     ) -> numpy.typing.NDArray[numpy.float64]:
         """
         One row a pose.
+        """
+
+class GraspTable:
+    """
+    Grasps that lay a rod, tabulated once.
+    """
+
+    greatest_curvature: typing.ClassVar[float] = 6.0
+    longest: typing.ClassVar[float] = 100.0
+    shortest: typing.ClassVar[float] = 0.1
+    def __init__(self) -> None: ...
+    def grasps(
+        self,
+        questions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+        twist_stiffness: typing.SupportsFloat | typing.SupportsIndex,
+    ) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        One row a grasp, for rows of suspended length, curvature, stretching stiffness, axial force and base angle.
+        """
+    def points(
+        self,
+        suspended: typing.SupportsFloat | typing.SupportsIndex,
+        curvature: typing.SupportsFloat | typing.SupportsIndex,
+        stretch_stiffness: typing.SupportsFloat | typing.SupportsIndex,
+        axial_force: typing.SupportsFloat | typing.SupportsIndex,
+    ) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The rod's points: s, position, quaternion.
+        """
+
+class StraightRod:
+    """
+    Poses in which a straight line is laid, for one suspended length.
+    """
+
+    longest: typing.ClassVar[float] = 50.0
+    shortest: typing.ClassVar[float] = 0.3
+    def __init__(
+        self,
+        suspended: typing.SupportsFloat | typing.SupportsIndex,
+        stretch_stiffness: typing.SupportsFloat | typing.SupportsIndex,
+    ) -> None: ...
+    def optima(
+        self, twist_stiffness: typing.SupportsFloat | typing.SupportsIndex
+    ) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The gentle pose and the folded one.
+        """
+    def outline(self, angle_step: typing.SupportsFloat | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Nearest and farthest position on each ray.
+        """
+    def points(
+        self, x: typing.SupportsFloat | typing.SupportsIndex, z: typing.SupportsFloat | typing.SupportsIndex
+    ) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The rod's points: s, position, quaternion.
+        """
+    def poses(
+        self,
+        positions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+        twist_stiffness: typing.SupportsFloat | typing.SupportsIndex,
+    ) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        One row a position.
         """
 
 def check_turns(

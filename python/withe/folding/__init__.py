@@ -12,9 +12,29 @@ the sheet per length. That makes one solution serve every paper.
 from withe.folding.hanging_strip import Measured, droop, measure
 from withe.folding.jaw import Jaw
 from withe.folding.manifold import elastica
+from withe.folding.noise import Noise
 from withe.folding.paper import Paper
 from withe.folding.planning import plan, replan
 from withe.folding.plans import Plan
+from withe.folding.seeing import SeenEdge, find_edge, overhead_camera
 from withe.folding.sheets import Elastica
+from withe.folding.simulated_sheet import Fold, SimulatedSheet
 
-__all__ = ["Elastica", "Jaw", "Measured", "Paper", "Plan", "droop", "elastica", "measure", "plan", "replan"]
+__all__ = [
+    "Elastica",
+    "Fold",
+    "Jaw",
+    "Measured",
+    "Noise",
+    "Paper",
+    "Plan",
+    "SeenEdge",
+    "SimulatedSheet",
+    "droop",
+    "elastica",
+    "find_edge",
+    "measure",
+    "overhead_camera",
+    "plan",
+    "replan",
+]
