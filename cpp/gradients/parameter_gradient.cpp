@@ -43,6 +43,11 @@ class Chain {
     out.spring_stiffness = by.spring_stiffness;
     out.spring_rest_length = by.spring_rest_length;
     out.spring_damping = by.spring_damping;
+    out.fluid_viscosity = by.fluid_viscosity;
+    out.friction = by.friction;
+    out.slip_tolerance = by.slip_tolerance;
+    out.obstacle_friction = by.obstacle_friction;
+    out.pair_friction = by.pair_friction;
     add_masses();
     add_stiffnesses();
     add_natural();

@@ -175,7 +175,9 @@ void StepGradient::add_transport(const StateAdjoint& state, const StepAdjoint& a
                  at_z = turns - adjoint.end_turn[e] - adjoint.start_turn[e];
     Vec3d by = (at_z * inverse0 / f.inverse_length) * f.spin +
                ((adjoint.end_turn[e] + state.q[angle]) * inverse0 / last.inverse_length) * last.spin;
-    const double torque = data_.full_residual[angle] - data_.inertia[angle];
+    // Friction says itself how its torques depend on the start.
+    const double friction = data_.contact_gradient.size() != 0 ? data_.contact_gradient[angle] : 0.0,
+                 torque = data_.full_residual[angle] - data_.inertia[angle] - friction;
     const Vec3d u = torque * edge_vector(model, rows_, e);
     const Vec3d s = inverse0 * e0;
     const double k = inverse0 / (1.0 + dot(s, f.tangent));

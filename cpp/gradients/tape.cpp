@@ -74,13 +74,14 @@ class Tape::Player {
   VectorX held_;
 };
 
-Tape::Tape(const Model& model, EquationOptions options, State first, const Parameters& parameters)
+Tape::Tape(const Model& model, EquationOptions options, State first, const Parameters& parameters, bool frictional)
     : model_(model),
       options_(options),
       first_(std::move(first)),
       acting_(parameters),
       last_(first_.q),
-      last_velocity_(first_.v) {}
+      last_velocity_(first_.v),
+      frictional_(frictional) {}
 
 void Tape::record(const AcceptedStep& step) {
   const State& after = step.after;

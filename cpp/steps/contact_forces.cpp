@@ -5,6 +5,20 @@
 
 namespace withe {
 
+namespace {
+
+void add_friction_adjoint(const FrictionOwner& owner, const ContactAdjoint& by, CoefficientAdjoint& out) {
+  out.slip_tolerance += by.slip_tolerance;
+  if (owner.pair >= 0)
+    out.pair_friction.row(owner.pair) += Eigen::RowVector2d(by.along, by.across);
+  else if (owner.obstacle >= 0)
+    out.obstacle_friction.row(owner.obstacle) += Eigen::RowVector2d(by.along, by.across);
+  else
+    out.friction += by.along + by.across;
+}
+
+}  // namespace
+
 ContactForces::ContactForces(const Model& model) : contact_(model) { rows_.set(contact_.surfaces(), contact_.near()); }
 
 void ContactForces::begin(StepProblem& problem) {
@@ -48,13 +62,27 @@ void ContactForces::add(const StepProblem& problem, StepData& data, const Assemb
   if (!contact_.frictional() && !problem.in_middle()) data.potential += contact_.energy();
 }
 
-/// Without friction contact is a function of q1 alone, but under the midpoint rules.
-void ContactForces::add_adjoint(const StepProblem& problem, const StepData&, const Assembler&, StepAdjoint&) const {
+void ContactForces::add_adjoint(const StepProblem& problem, const StepData&, const Assembler&,
+                                StepAdjoint& adjoint) const {
   if (contact_.count() == 0) return;
-  if (contact_.frictional()) throw std::invalid_argument("no gradient is known through friction yet: take friction=0");
+  if (contact_.frictional() && !problem.moves())
+    throw std::invalid_argument(
+        "no gradient is known of an equilibrium that friction holds, for it goes with the way there: take friction=0, "
+        "or run with differentiable=True");
   if (problem.in_middle())
     throw std::invalid_argument(
         "no gradient is known through contact under the midpoint rules yet: take integrator='backward_euler'");
+  if (!contact_.frictional()) return;  // a function of q1 alone
+  int dofs[kContactUnknowns];
+  double rows[kContactUnknowns];
+  for (int i = 0; i < contact_.count(); ++i) {
+    contact_.unknowns(i, dofs);
+    for (int k = 0; k < kContactUnknowns; ++k) rows[k] = dofs[k] >= 0 ? adjoint.rows[dofs[k]] : 0.0;
+    const ContactAdjoint by = contact_.adjoint(i, rows);
+    for (int k = 0; k < kContactUnknowns; ++k)
+      if (dofs[k] >= 0) adjoint.start[dofs[k]] += by.start[k];
+    add_friction_adjoint(contact_.surfaces().friction_owner(contact_.contacts()[i].pair), by, adjoint.coefficients);
+  }
 }
 
 void ContactForces::add_rounding(const StepProblem&, StepData& data) const { data.floor += data.contact_floor; }

@@ -15,6 +15,9 @@ struct CoefficientAdjoint {
   VectorX gravity;                                               ///< per unknown, by its force [1/N]
   MatrixX3 loads;                                                ///< by `Parameters::loads`
   VectorX spring_stiffness, spring_rest_length, spring_damping;  ///< per spring
+  double fluid_viscosity = 0;                                    ///< [1/(Pa s)]
+  double friction = 0, slip_tolerance = 0;                       ///< of the scene [-], [s/m]
+  MatrixX2 obstacle_friction, pair_friction;                     ///< per obstacle, per pair of bodies [-]
   std::vector<MatrixX2> natural_curvature;  ///< per rod and stencil, by the smooth one, where it is read out [m]
   VectorX rest_length;                      ///< per edge, by that in the axial strain, and where it is read out [1/m]
 
@@ -36,10 +39,15 @@ struct CoefficientAdjoint {
         spring_stiffness(VectorX::Zero(static_cast<Eigen::Index>(model.description.springs.size()))),
         spring_rest_length(spring_stiffness),
         spring_damping(spring_stiffness),
+        obstacle_friction(rows_of_two(model.description.contact.obstacles.size())),
+        pair_friction(rows_of_two(model.description.contact.pairs.size())),
         rest_length(VectorX::Zero(model.edge_count)) {
     for (const auto& places : model.place)
-      natural_curvature.push_back(MatrixX2::Zero(static_cast<Eigen::Index>(places.size()), 2));
+      natural_curvature.push_back(rows_of_two(places.size()));
   }
+
+ private:
+  static MatrixX2 rows_of_two(std::size_t count) { return MatrixX2::Zero(static_cast<Eigen::Index>(count), 2); }
 };
 
 /// rows^T times the derivatives of a step's residual, at fixed z. An edge's frame and a joint's are functions of the

@@ -10,17 +10,31 @@ import numpy as np
 import numpy.typing as npt
 
 from withe import _core
-from withe.parts.kinds import DragPart, LoadPart, MassPart, Part, RodPart, SpringPart, SupportPart
+from withe.parts.contacts import BodyPair
+from withe.parts.kinds import (
+    DragPart,
+    FluidPart,
+    LoadPart,
+    MassPart,
+    ObstaclePart,
+    Part,
+    RodPart,
+    SpringPart,
+    SupportPart,
+)
 from withe.parts.parameters import ACTING_WORDS
 from withe.parts.springs import SPRING_WORDS
 from withe.simulation.moves import Way
 from withe.simulation.session import Session
 from withe.simulation.unknowns import (
     NATURAL_WORDS,
+    SCENE_WORDS,
     OfRun,
     Reader,
     dragged_rods,
     edges_of,
+    friction_reader,
+    part_of,
     reader_of,
     rod_slopes,
     sum_of_slopes,
@@ -53,16 +67,16 @@ class CallGradient:
     ----------
     time : float [s]
         When it was called.
-    call : {"set", "set_natural_curvature", "set_natural_twist", "move"}
+    call : {"set", "set_natural_curvature", "set_natural_twist", "set_friction", "move"}
     target : str or None
-        Name of the part; None: the scene.
+        Name of the part, or of both bodies ("arm, floor"); None: the scene.
     over : float [s]
         After which the value was reached; 0: at once.
     gradients : dict
         By each word that was set, shaped like the value that it was given: dL over that value, as long as it acted. A
         curvature given with discrete=True has that by the curvature [1/m] of every stencil; a rotation by a rotation
         vector, (3,) [1/rad], that turns the target. Words that have no gradient (functions of time, paths, tangents and
-        rolls, friction, the viscosity of a fluid) are left out.
+        rolls, a friction of 0) are left out.
     """
 
     time: float
@@ -78,8 +92,8 @@ class Gradients(list[Any]):
     Attributes
     ----------
     calls : list of CallGradient
-        By what calls of `set`, `set_natural_curvature`, `set_natural_twist` and `move` (of supports) gave while the run
-        went, in their order.
+        By what calls of `set`, `set_natural_curvature`, `set_natural_twist`, `set_friction` and `move` (of supports)
+        gave while the run went, in their order.
     """
 
     def __init__(self, values: Sequence[Any], calls: list[CallGradient]) -> None:
@@ -92,7 +106,7 @@ class _Call:
     step: int
     time: float
     method: str
-    part: Part | None
+    part: Part | BodyPair | None
     values: Mapping[str, Any]
     over: float
     session: Session  # as it was left
@@ -105,7 +119,9 @@ class RunJournal:
         self._tape = tape
         self.calls: list[_Call] = []
 
-    def note(self, session: Session, method: str, part: Part | None, values: Mapping[str, Any], over: float) -> None:
+    def note(
+        self, session: Session, method: str, part: Part | BodyPair | None, values: Mapping[str, Any], over: float
+    ) -> None:
         """A call has set these."""
         self._tape.divide()
         after = replace(session, settings=session.settings.copy(), journal=None)
@@ -259,7 +275,7 @@ class Ledger:
         """By what the run began with, as far as that acts."""
         if isinstance(unknown, str):
             return reader(OfRun(found)) * (0.0 if ("", unknown) in epoch.live else 1.0)
-        part, word = self._session.directory.find_any(unknown[0], "wrt"), unknown[1]
+        part, word = part_of(self._session, unknown[0]), unknown[1]
         key = (part.name, word)
         if isinstance(part, RodPart) and word in NATURAL_WORDS:
             return reader(OfRun(found)) * epoch.weights(key, time).get(-1, 0.0)
@@ -289,8 +305,12 @@ class Ledger:
             return
         elif isinstance(call.part, LoadPart | MassPart) or (isinstance(call.part, SpringPart) and word in SPRING_WORDS):
             self._add(index, word, reader_of(call.session, call.part, word)(OfRun(found)))
-        elif call.part is None and word == "gravity":
-            self._add(index, word, np.array(found.gravity))
+        elif isinstance(call.part, ObstaclePart | BodyPair):
+            self._add(index, word, friction_reader(call.session, call.part)(OfRun(found)))
+        elif isinstance(call.part, FluidPart):
+            self._add(index, word, found.fluid_viscosity)
+        elif call.part is None:
+            self._add(index, word, np.array(getattr(found, word)))
 
     def _add(self, index: int, word: str, value: Any) -> None:
         shaped = _of_shape(value, np.shape(self._calls[index].values[word]))
@@ -308,9 +328,11 @@ class Ledger:
 def _has_gradient(call: _Call, word: str) -> bool:
     if isinstance(call.part, LoadPart):
         return not callable(call.values[word])
+    if word == "friction":
+        return bool(np.max(call.values[word]) > 0.0)
     if call.part is None:
-        return word == "gravity"
-    return isinstance(call.part, RodPart | MassPart | SpringPart | DragPart | SupportPart)
+        return word in SCENE_WORDS
+    return isinstance(call.part, RodPart | MassPart | SpringPart | DragPart | FluidPart | SupportPart)
 
 
 def _by_drag(epoch: _Epoch, part: DragPart, found: Any, *, initial: bool) -> float:
