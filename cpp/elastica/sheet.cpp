@@ -50,6 +50,11 @@ int sheet_steps(const SheetProblem::Path& path) {
   return static_cast<int>(std::clamp(steps, 1.0, 50.0));  // also where Newton's method went astray
 }
 
+std::array<double, 4> across_segment(const SheetShape& shape, const SheetProblem::Path& path, int segment) {
+  const SheetSlope<double> slope{shape.width_growth, path.values[0], path.values[1], path.values[2]};
+  return across<double>(slope, segment, sheet_steps(path), path.nodes[static_cast<std::size_t>(segment)]);
+}
+
 void SheetProblem::linearise(const Path& path, System& system) const {
   system.links.resize(kSegments);
   const SheetSlope<SheetDual> slope{shape.width_growth, SheetDual::unknown(path.values[0], 2),
@@ -78,14 +83,22 @@ void SheetProblem::put_end(const Path& path, System& system) const {
     std::fill_n(system.end_by_parameters[i], kParameters, 0.0);
   }
   const double x = tip_back(path), z = tip_up(path);
-  system.end_by_state[0][1] = 1.0;
-  system.end_gap[0] = path.nodes.back()[1] - shape.tip_moment;
-  if (target == TipTarget::position) {
-    system.end_by_state[1][2] = -1.0;
+  const bool free_moment = target == TipTarget::pose || target == TipTarget::sliding;
+  system.end_by_state[0][free_moment ? 0 : 1] = 1.0;
+  system.end_gap[0] = free_moment ? tip_angle(path) - goal[2] : path.nodes.back()[1] - shape.tip_moment;
+  if (target == TipTarget::position || free_moment) {
     system.end_by_state[2][3] = 1.0;
-    system.end_by_parameters[1][2] = 1.0;
-    system.end_gap[1] = x - goal[0];
     system.end_gap[2] = z - goal[1];
+    if (target == TipTarget::sliding) {
+      system.end_by_parameters[1][0] = -friction;
+      system.end_by_parameters[1][1] = 1.0;
+      system.end_by_parameters[1][2] = friction;
+      system.end_gap[1] = path.values[1] - friction * (path.values[0] + sheet_length - path.values[2]);
+    } else {
+      system.end_by_state[1][2] = -1.0;
+      system.end_by_parameters[1][2] = 1.0;
+      system.end_gap[1] = x - goal[0];
+    }
     return;
   }
   system.end_by_parameters[1][2] = 1.0;

@@ -25,9 +25,11 @@ struct SheetShape {
 
 /// What is asked of the tip besides its moment.
 enum class TipTarget {
-  position,             ///< x = length - X and z = Z: the tip's way back and up from where it lay in the flat sheet
-  length_and_angle,     ///< suspended length, and theta at the tip
-  length_and_direction  ///< suspended length, and the angle atan2(x, z) of that way
+  position,              ///< x = length - X and z = Z: the tip's way back and up from where it lay in the flat sheet
+  length_and_angle,      ///< suspended length, and theta at the tip
+  length_and_direction,  ///< suspended length, and the angle atan2(x, z) of that way
+  pose,                  ///< position and theta; the moment at the tip is what comes out
+  sliding                ///< height and theta while the sheet slides, T = friction (R + weight that lies); x comes out
 };
 
 class SheetProblem {
@@ -39,7 +41,9 @@ class SheetProblem {
 
   SheetShape shape;
   TipTarget target = TipTarget::position;
-  std::array<double, 2> goal{};
+  std::array<double, 3> goal{};  ///< the two or three numbers of the target in the order of its name; x, z, theta
+  double friction = 0;           ///< of `sliding`: coefficient, with the sign of T
+  double sheet_length = 0;       ///< of `sliding`: of the whole sheet [Lgb]
 
   void linearise(const Path& path, System& system) const;
 
@@ -49,6 +53,9 @@ class SheetProblem {
 
 /// Runge-Kutta steps a segment: at most .4 Lgb, and .3 of the length sqrt(EI / force) over which forces bend.
 int sheet_steps(const SheetProblem::Path& path);
+
+/// State at the end of a segment, integrated from that at its start.
+std::array<double, 4> across_segment(const SheetShape& shape, const SheetProblem::Path& path, int segment);
 
 inline double tip_back(const SheetProblem::Path& path) { return path.values[2] - path.nodes.back()[2]; }
 inline double tip_up(const SheetProblem::Path& path) { return path.nodes.back()[3]; }

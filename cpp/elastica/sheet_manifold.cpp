@@ -4,8 +4,6 @@
 #include <cmath>
 #include <numbers>
 
-#include "elastica/sheet_stability.hpp"
-
 namespace withe {
 
 namespace {
@@ -25,34 +23,12 @@ Path gentle_lift(double length) {
   return path;
 }
 
-/// Continuation: `ask(share, guess)` poses the problem at a share of the way from what `path` solves to what is wanted,
-/// and may change the guess. Steps adapt; false where one below `least` would be needed.
-template <class Ask>
-bool follow(ShootingSolver<SheetProblem>& solver, const SheetProblem& problem, double least, Path& path, Path& trial,
-            const Ask& ask) {
-  double done = 0, step = 1;
-  while (done < 1) {
-    const double next = std::min(1.0, done + step);
-    trial = path;
-    ask(next, trial);
-    if (solver.solve(problem, trial).converged) {
-      std::swap(path, trial);
-      done = next;
-      step *= 2;
-    } else {
-      step /= 2;
-      if (step < least) return false;
-    }
-  }
-  return true;
-}
-
-bool follow_goal(ShootingSolver<SheetProblem>& solver, SheetProblem& problem, const std::array<double, 2>& goal,
+bool follow_goal(ShootingSolver<SheetProblem>& solver, SheetProblem& problem, const std::array<double, 3>& goal,
                  Path& path) {
-  const std::array<double, 2> start = problem.goal;
+  const std::array<double, 3> start = problem.goal;
   Path trial;
   return follow(solver, problem, 1e-3, path, trial, [&](double share, Path& guess) {
-    for (std::size_t i = 0; i < 2; ++i) problem.goal[i] = start[i] + share * (goal[i] - start[i]);
+    for (std::size_t i = 0; i < 3; ++i) problem.goal[i] = start[i] + share * (goal[i] - start[i]);
     guess.values[2] = problem.goal[0];  // a guess has the segments of the old length
   });
 }
@@ -216,21 +192,6 @@ bool solve_shape(const SheetShape& shape, SheetManifold::Data& data) {
   });
 }
 
-SheetSolution described(const SheetShape& shape, const Path& path) {
-  const SheetExtremes extremes = sheet_extremes(shape, path);
-  SheetSolution found;
-  found.x = tip_back(path);
-  found.z = tip_up(path);
-  found.angle = tip_angle(path);
-  found.suspended = path.values[2];
-  found.normal_force = path.values[0];
-  found.tangential_force = path.values[1];
-  found.max_curvature = extremes.largest_curvature;
-  found.stable = sheet_is_stable(shape, path);
-  found.valid = found.normal_force > 0 && extremes.smallest_angle > -1e-9 && extremes.lowest > -1e-9;
-  return found;
-}
-
 }  // namespace
 
 SheetSolution SheetManifold::at_position(double x, double z, const SheetShape& shape, Data& data) const {
@@ -240,7 +201,7 @@ SheetSolution SheetManifold::at_position(double x, double z, const SheetShape& s
   data.problem.target = TipTarget::position;
   data.problem.goal = {x, z};
   if (!solve_shape(shape, data)) return {};
-  SheetSolution found = described(shape, data.path);
+  SheetSolution found = describe_sheet(shape, data.path);
   found.valid = found.valid && found.suspended > kShortest && found.suspended < kLongest;
   return found;
 }
@@ -252,7 +213,7 @@ SheetSolution SheetManifold::at_length_and_angle(double length, double angle, co
   interpolate(cell, data.path);
   data.problem.target = TipTarget::length_and_angle;
   data.problem.goal = {length, angle};
-  return solve_shape(shape, data) ? described(shape, data.path) : SheetSolution{};
+  return solve_shape(shape, data) ? describe_sheet(shape, data.path) : SheetSolution{};
 }
 
 }  // namespace withe

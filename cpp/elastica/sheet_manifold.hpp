@@ -5,17 +5,9 @@
 
 #include <vector>
 
-#include "elastica/sheet.hpp"
+#include "elastica/sheet_solution.hpp"
 
 namespace withe {
-
-/// What a user sees of one solution. Angles in rad, lengths in Lgb, forces in w Lgb.
-struct SheetSolution {
-  double x = 0, z = 0, angle = 0, suspended = 0;
-  double normal_force = 0, tangential_force = 0;  ///< of the floor on the sheet at lift-off; forward is positive
-  double max_curvature = 0;
-  bool valid = false, stable = false;
-};
 
 /// Rows are suspended lengths, columns directions atan2(x, z) of the tip's way: on a ray from the origin the distance
 /// grows with the suspended length, so that a position names one row and one column.

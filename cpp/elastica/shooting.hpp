@@ -212,4 +212,28 @@ class ShootingSolver {
   Path step_, trial_;
 };
 
+/// Continuation: `ask(share, guess)` poses the problem at a share of the way from what `path` solves to what is wanted,
+/// and may change the guess. Steps adapt; false where one below `least` would be needed: then `path` solves the last
+/// problem that had an answer.
+template <class Problem, class Ask>
+bool follow(ShootingSolver<Problem>& solver, const Problem& problem, double least,
+            typename ShootingSolver<Problem>::Path& path, typename ShootingSolver<Problem>::Path& trial,
+            const Ask& ask) {
+  double done = 0, step = 1;
+  while (done < 1) {
+    const double next = std::min(1.0, done + step);
+    trial = path;
+    ask(next, trial);
+    if (solver.solve(problem, trial).converged) {
+      std::swap(path, trial);
+      done = next;
+      step *= 2;
+    } else {
+      step /= 2;
+      if (step < least) return false;
+    }
+  }
+  return true;
+}
+
 }  // namespace withe

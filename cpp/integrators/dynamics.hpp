@@ -1,8 +1,7 @@
 #pragma once
 /// One time step: backward Euler, implicit midpoint, energy-momentum, and Verlet.
 
-#include <array>
-
+#include "integrators/fourth_order.hpp"
 #include "integrators/newton.hpp"
 #include "integrators/predictor.hpp"
 
@@ -13,17 +12,6 @@ struct HeldTarget {
   VectorX q;              ///< end of step; meaningful where held
   bool reachable = true;  ///< false: a frame would have to turn by half a turn at once
 };
-
-/// Parts of a fourth-order step, each a symmetric step of second order; the third goes back in time.
-/// [Suzuki 1990; Hairer, Lubich and Wanner: Geometric numerical integration, 2006, II.4].
-inline constexpr double kSuzuki = 0.41449077179437573714;  // 1 / (4 - 4^(1/3))
-inline constexpr std::array<double, 5> kFourthOrderParts = {kSuzuki, kSuzuki, 1.0 - 4.0 * kSuzuki, kSuzuki, kSuzuki};
-/// What their errors of the fifth power add up to: |sum g^5| / 80 of dt^5 times the third derivative.
-inline constexpr double kFourthOrderError = [] {
-  double sum = 0.0;
-  for (double g : kFourthOrderParts) sum += g * g * g * g * g / 80.0;
-  return sum < 0.0 ? -sum : sum;
-}();
 
 /// One implicit step: its rule and its length; `slot` tells the parts of a composition apart.
 struct StepPlan {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "integrators/fourth_order.hpp"
 #include "integrators/surface_search.hpp"
 #include "steps/elastic_forces.hpp"
 
@@ -52,9 +53,16 @@ double line_search(const NewtonSystem& system, const VectorX& z, const VectorX& 
   return alpha;
 }
 
+/// A user's force tolerance is that of a whole step.
+Options options_of_parts(Options options) {
+  if (options.integrator == Integrator::fourth_order) options.force_tolerance /= kFourthOrderWay;
+  return options;
+}
+
 }  // namespace
 
-Newton::Newton(const Model& model, const Options& options) : model_(model), options_(options), norms_(model) {}
+Newton::Newton(const Model& model, const Options& options)
+    : model_(model), options_(options_of_parts(options)), norms_(model) {}
 
 Balance Newton::balance(const StepData& e, NewtonResult& result) const {
   Balance balance;

@@ -8,6 +8,7 @@
 #include "bindings.hpp"
 #include "common/check.hpp"
 #include "elastica/sheet_manifold.hpp"
+#include "elastica/sheet_motion.hpp"
 
 namespace withe::bindings {
 
@@ -16,30 +17,97 @@ namespace {
 using Numbers = py::array_t<double, py::array::c_style | py::array::forcecast>;
 using Solve = SheetSolution (SheetManifold::*)(double, double, const SheetShape&, SheetManifold::Data&) const;
 
-/// One row a pose: x, z, angle, suspended, normal force, tangential force, greatest curvature, valid, stable.
+constexpr py::ssize_t kColumns = 10;
+
+void put(const SheetSolution& found, double* row) {
+  const double numbers[] = {found.x,
+                            found.z,
+                            found.angle,
+                            found.suspended,
+                            found.normal_force,
+                            found.tangential_force,
+                            found.max_curvature,
+                            found.valid ? 1.0 : 0.0,
+                            found.stable ? 1.0 : 0.0,
+                            found.tip_moment};
+  std::copy(std::begin(numbers), std::end(numbers), row);
+}
+
+/// One row a pose: x, z, angle, suspended, normal force, tangential force, greatest curvature, valid, stable, moment.
 Numbers solve_all(const SheetManifold& manifold, Solve solve, const Numbers& first, const Numbers& second,
                   double width_growth, double tip_moment) {
   require(first.ndim() == 1 && second.ndim() == 1 && first.size() == second.size(),
           "both arrays must have shape (poses,)");
-  Numbers rows({first.size(), py::ssize_t{9}});
+  Numbers rows({first.size(), kColumns});
   const double *a = first.data(), *b = second.data();
   double* row = rows.mutable_data();
   const py::gil_scoped_release unlocked;
   SheetManifold::Data data;
-  for (py::ssize_t i = 0; i < first.size(); ++i, row += 9) {
+  for (py::ssize_t i = 0; i < first.size(); ++i, row += kColumns) {
     const SheetSolution found = (manifold.*solve)(a[i], b[i], {width_growth, tip_moment}, data);
-    const double numbers[] = {found.x,
-                              found.z,
-                              found.angle,
-                              found.suspended,
-                              found.normal_force,
-                              found.tangential_force,
-                              found.max_curvature,
-                              found.valid ? 1.0 : 0.0,
-                              found.stable ? 1.0 : 0.0};
-    std::copy(std::begin(numbers), std::end(numbers), row);
+    put(found, row);
   }
   return rows;
+}
+
+/// Rows as above of equilibria named by normal force, tangential force and suspended length.
+Numbers sheets_at_forces(const Numbers& forces, double width_growth) {
+  require(forces.ndim() == 2 && forces.shape(1) == 3, "forces must have shape (sheets, 3)");
+  Numbers rows({forces.shape(0), kColumns});
+  const double* in = forces.data();
+  double* row = rows.mutable_data();
+  const py::gil_scoped_release unlocked;
+  SheetMotionData data;
+  const SheetShape shape{width_growth, 0.0};
+  for (py::ssize_t i = 0; i < forces.shape(0); ++i, in += 3, row += kColumns) {
+    set_sheet_forces(shape, {in[0], in[1], in[2]}, data);
+    put(describe_sheet(shape, data.path), row);
+  }
+  return rows;
+}
+
+/// Rows as above of sheets held at poses (x, z, angle), each followed from forces of its own.
+Numbers sheets_at_poses(const Numbers& poses, const Numbers& forces, double width_growth) {
+  require(poses.ndim() == 2 && poses.shape(1) == 3 && forces.ndim() == 2 && forces.shape(1) == 3 &&
+              forces.shape(0) == poses.shape(0),
+          "poses and forces must have shape (sheets, 3)");
+  Numbers rows({poses.shape(0), kColumns});
+  const double *pose = poses.data(), *in = forces.data();
+  double* row = rows.mutable_data();
+  const py::gil_scoped_release unlocked;
+  SheetMotionData data;
+  const SheetShape shape{width_growth, 0.0};
+  for (py::ssize_t i = 0; i < poses.shape(0); ++i, pose += 3, in += 3, row += kColumns) {
+    set_sheet_forces(shape, {in[0], in[1], in[2]}, data);
+    const bool there = move_sheet({pose[0], pose[1], pose[2]}, data);
+    put(there ? describe_sheet(shape, data.path) : SheetSolution{}, row);
+  }
+  return rows;
+}
+
+/// Rows as above, and the slide, of a sheet that is moved from pose to pose and slides by Coulomb's law; after a pose
+/// that it has no way to, rows are of no sheet.
+py::tuple dragged_sheet(const Numbers& poses, const Numbers& forces, double friction, double sheet_length,
+                        double width_growth) {
+  require(poses.ndim() == 2 && poses.shape(1) == 3, "poses must have shape (poses, 3)");
+  require(forces.ndim() == 1 && forces.size() == 3, "forces must have shape (3,)");
+  Numbers rows({poses.shape(0), kColumns}), slides(poses.shape(0));
+  const double *pose = poses.data(), *in = forces.data();
+  double *row = rows.mutable_data(), *out = slides.mutable_data();
+  {
+    const py::gil_scoped_release unlocked;
+    SheetMotionData data;
+    const SheetShape shape{width_growth, 0.0};
+    set_sheet_forces(shape, {in[0], in[1], in[2]}, data);
+    double slide = 0;
+    bool there = true;
+    for (py::ssize_t i = 0; i < poses.shape(0); ++i, pose += 3, row += kColumns) {
+      there = there && drag_sheet({pose[0], pose[1], pose[2]}, {friction, sheet_length}, slide, data);
+      put(there ? describe_sheet(shape, data.path) : SheetSolution{}, row);
+      out[i] = slide;
+    }
+  }
+  return py::make_tuple(rows, slides);
 }
 
 }  // namespace
@@ -60,6 +128,13 @@ void register_elastica(py::module_& module) {
             return solve_all(self, &SheetManifold::at_length_and_angle, length, angle, width_growth, tip_moment);
           },
           py::arg("length"), py::arg("angle"), py::arg("width_growth"), py::arg("tip_moment"), "One row a pose.");
+  module.def("sheets_at_forces", &sheets_at_forces, py::arg("forces"), py::arg("width_growth"),
+             "Sheets of given floor forces and suspended length, one row a sheet.");
+  module.def("sheets_at_poses", &sheets_at_poses, py::arg("poses"), py::arg("forces"), py::arg("width_growth"),
+             "Sheets held at poses, each followed from forces of its own, one row a sheet.");
+  module.def("dragged_sheet", &dragged_sheet, py::arg("poses"), py::arg("forces"), py::arg("friction"),
+             py::arg("sheet_length"), py::arg("width_growth"),
+             "A sheet moved from pose to pose, sliding by Coulomb's law: one row a pose, and how far it has slid.");
 }
 
 }  // namespace withe::bindings

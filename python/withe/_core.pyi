@@ -47,8 +47,11 @@ __all__: list[str] = [
     "World",
     "check_turns",
     "close_and_open",
+    "dragged_sheet",
     "foreground_mask",
     "hsv_mask",
+    "sheets_at_forces",
+    "sheets_at_poses",
     "smooth_curvatures",
     "thin",
     "trace_lines",
@@ -1031,6 +1034,17 @@ def close_and_open(mask: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8]) 
     Closing, then opening, by a square of 3 x 3 pixels.
     """
 
+def dragged_sheet(
+    poses: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    forces: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    friction: typing.SupportsFloat | typing.SupportsIndex,
+    sheet_length: typing.SupportsFloat | typing.SupportsIndex,
+    width_growth: typing.SupportsFloat | typing.SupportsIndex,
+) -> tuple:
+    """
+    A sheet moved from pose to pose, sliding by Coulomb's law: one row a pose, and how far it has slid.
+    """
+
 def foreground_mask(
     image: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8], contrast: typing.SupportsInt | typing.SupportsIndex
 ) -> numpy.typing.NDArray[numpy.uint8]:
@@ -1049,6 +1063,23 @@ def hsv_mask(
 ) -> numpy.typing.NDArray[numpy.uint8]:
     """
     Pixels whose colour is in a range.
+    """
+
+def sheets_at_forces(
+    forces: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    width_growth: typing.SupportsFloat | typing.SupportsIndex,
+) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Sheets of given floor forces and suspended length, one row a sheet.
+    """
+
+def sheets_at_poses(
+    poses: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    forces: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    width_growth: typing.SupportsFloat | typing.SupportsIndex,
+) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Sheets held at poses, each followed from forces of its own, one row a sheet.
     """
 
 def smooth_curvatures(

@@ -10,7 +10,11 @@ the sheet per length. That makes one solution serve every paper.
 """
 
 from withe.folding.hanging_strip import Measured, droop, measure
-from withe.folding.manifold import Elastica, elastica
+from withe.folding.jaw import Jaw
+from withe.folding.manifold import elastica
 from withe.folding.paper import Paper
+from withe.folding.planning import plan
+from withe.folding.plans import Plan
+from withe.folding.sheets import Elastica
 
-__all__ = ["Elastica", "Measured", "Paper", "droop", "elastica", "measure"]
+__all__ = ["Elastica", "Jaw", "Measured", "Paper", "Plan", "droop", "elastica", "measure", "plan"]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
@@ -13,52 +12,12 @@ import numpy.typing as npt
 
 from withe._core import SheetManifold
 from withe.common import validation
+from withe.folding.sheets import Elastica, described
 
-__all__ = ["Elastica", "elastica"]
+__all__ = ["elastica"]
 
 FloatArray = npt.NDArray[np.float64]
 _LEAST_SHARE = 500  # poses that are worth a thread of their own
-
-
-@dataclass(frozen=True)
-class Elastica:
-    """How a sheet hangs, pose by pose. All arrays have the shape of what was asked for.
-
-    Where `valid` is False the other numbers are NaN, and `stable` is False.
-
-    Attributes
-    ----------
-    x, z : ndarray [Lgb]
-        How far the tip is back from where it lay in the flat sheet, and up from the table.
-    angle : ndarray [rad]
-        Of the tangent at the tip above the direction in which the sheet leaves the table.
-    suspended : ndarray [Lgb]
-        Length that is lifted.
-    normal_force, tangential_force : ndarray [w Lgb]
-        Of the table on the sheet at the lift-off point: upwards, and in the direction in which the sheet leaves
-        (positive where the sheet is pushed together, negative where it is pulled taut).
-    force_ratio : ndarray
-        Size of the tangential force over the normal one. The sheet behind the lift-off point presses on the table
-        too: a sheet of length L slips where the tangential force exceeds
-        friction * (normal_force + L - suspended).
-    max_curvature : ndarray [1/Lgb]
-        Greatest size of the curvature.
-    valid : ndarray of bool
-        Whether there is such a pose; `elastica` says what is refused.
-    stable : ndarray of bool
-        Whether it is a minimum of the energy while the jaw holds position and angle.
-    """
-
-    x: FloatArray
-    z: FloatArray
-    angle: FloatArray
-    suspended: FloatArray
-    normal_force: FloatArray
-    tangential_force: FloatArray
-    force_ratio: FloatArray
-    max_curvature: FloatArray
-    valid: npt.NDArray[np.bool_]
-    stable: npt.NDArray[np.bool_]
 
 
 @cache
@@ -133,7 +92,7 @@ def elastica(
     shares = zip(np.array_split(first.ravel(), parts), np.array_split(second.ravel(), parts), strict=True)
     with ThreadPoolExecutor(parts) as pool:  # the engine releases the interpreter
         rows = np.concatenate(list(pool.map(lambda share: solve(share[0], share[1], growth, moment), shares)))
-    return _described(rows, first.shape)
+    return described(rows, first.shape)
 
 
 def _broadcast(names: tuple[str, str], values: tuple[Any, Any]) -> tuple[FloatArray, FloatArray]:
@@ -147,21 +106,3 @@ def _broadcast(names: tuple[str, str], values: tuple[Any, Any]) -> tuple[FloatAr
         shapes = " and ".join(str(array.shape) for array in arrays)
         raise ValueError(f"{names[0]} and {names[1]} must have shapes that broadcast, got {shapes}") from None
     return first, second
-
-
-def _described(rows: FloatArray, shape: tuple[int, ...]) -> Elastica:
-    valid = rows[:, 7] > 0
-    columns = [np.where(valid, rows[:, i], np.nan).reshape(shape) for i in range(7)]
-    x, z, angle, suspended, normal, tangential, curvature = columns
-    return Elastica(
-        x=x,
-        z=z,
-        angle=angle,
-        suspended=suspended,
-        normal_force=normal,
-        tangential_force=tangential,
-        force_ratio=np.asarray(np.abs(tangential) / normal),
-        max_curvature=curvature,
-        valid=valid.reshape(shape),
-        stable=(valid & (rows[:, 8] > 0)).reshape(shape),
-    )

@@ -6,6 +6,7 @@
 
 #include "elastica/runge_kutta.hpp"
 #include "elastica/sheet_manifold.hpp"
+#include "elastica/sheet_motion.hpp"
 #include "elastica/sheet_stability.hpp"
 
 namespace withe {
@@ -33,11 +34,14 @@ TEST(RungeKutta, IsOfEighthOrderOnAPendulum) {
 }
 
 TEST(SheetProblem, DerivativesMatchDifferences) {
-  for (const TipTarget target : {TipTarget::position, TipTarget::length_and_angle, TipTarget::length_and_direction}) {
+  for (const TipTarget target : {TipTarget::position, TipTarget::length_and_angle, TipTarget::length_and_direction,
+                                 TipTarget::pose, TipTarget::sliding}) {
     SheetProblem problem;
     problem.shape = {0.3, 0.2};
     problem.target = target;
-    problem.goal = {2.0, 0.7};
+    problem.goal = {2.0, 0.7, 1.5};
+    problem.friction = -0.4;
+    problem.sheet_length = 6.0;
     const SheetProblem::Path path = solved(3.0, 2.0);
     SheetProblem::System system, up, down;
     problem.linearise(path, system);
@@ -110,6 +114,67 @@ TEST(SheetStability, AClampedColumnBucklesAtEulersLoad) {
   EXPECT_TRUE(sheet_is_stable({}, column));
   column.values[1] = 1.002 * load;
   EXPECT_FALSE(sheet_is_stable({}, column));
+}
+
+SheetMotionData held(const SheetForces& forces) {
+  SheetMotionData data;
+  set_sheet_forces({}, forces, data);
+  return data;
+}
+
+TEST(SheetMotion, APoseIsMetAndLedBackToItsForces) {
+  const SheetForces forces{3.0, 0.1, 4.0};
+  SheetMotionData data = held(forces);
+  const SheetPose start{tip_back(data.path), tip_up(data.path), tip_angle(data.path)};
+  const SheetPose there{start[0] + 0.2, start[1] - 0.1, start[2] + 0.15};
+  ASSERT_TRUE(move_sheet(there, data));
+  EXPECT_NEAR(tip_back(data.path), there[0], 1e-10);
+  EXPECT_NEAR(tip_up(data.path), there[1], 1e-10);
+  EXPECT_NEAR(tip_angle(data.path), there[2], 1e-10);
+  ASSERT_TRUE(move_sheet(start, data));
+  for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(data.path.values[i], forces[i], 1e-8);
+}
+
+TEST(SheetMotion, WorkOfTheTipIsTheChangeOfEnergyOfASheetThatSticks) {
+  // The tip's work over a small cycle of poses is zero: its forces and moment have a potential.
+  SheetMotionData data = held({3.0, 0.1, 4.0});
+  const SheetPose start{tip_back(data.path), tip_up(data.path), tip_angle(data.path)};
+  const auto forces = [&data] {  // of the jaw on the sheet, along x (backwards), z, and its moment
+    return std::array<double, 3>{data.path.values[1], data.path.values[2] - data.path.values[0],
+                                 data.path.nodes.back()[1]};
+  };
+  constexpr double kStep = 1e-4;
+  double slopes[3][3];
+  for (std::size_t j = 0; j < 3; ++j) {
+    SheetPose up = start, down = start;
+    up[j] += kStep;
+    down[j] -= kStep;
+    ASSERT_TRUE(move_sheet(up, data));
+    const auto above = forces();
+    ASSERT_TRUE(move_sheet(down, data));
+    const auto below = forces();
+    ASSERT_TRUE(move_sheet(start, data));
+    for (std::size_t i = 0; i < 3; ++i) slopes[i][j] = (above[i] - below[i]) / (2 * kStep);
+  }
+  for (std::size_t i = 0; i < 3; ++i)
+    for (std::size_t j = 0; j < i; ++j) EXPECT_NEAR(slopes[i][j], slopes[j][i], 1e-5 * (1 + std::abs(slopes[i][j])));
+}
+
+TEST(SheetMotion, ASheetSlidesWhereItsForcesExceedFriction) {
+  SheetMotionData data = held({1.5, 0.0, 3.0});
+  const double x = tip_back(data.path), z = tip_up(data.path), angle = tip_angle(data.path);
+  const SheetFriction rough{100.0, 6.0}, slick{0.05, 6.0};
+  double slide = 0;
+  SheetMotionData stuck = data;
+  ASSERT_TRUE(drag_sheet({x + 0.3, z, angle}, rough, slide, stuck));
+  EXPECT_EQ(slide, 0.0);
+  ASSERT_GT(std::abs(stuck.path.values[1]), 0.05 * (stuck.path.values[0] + 6.0 - stuck.path.values[2]));
+  for (double way = 0.05; way < 0.31; way += 0.05) ASSERT_TRUE(drag_sheet({x + way, z, angle}, slick, slide, data));
+  EXPECT_GT(slide, 0.1);  // pushed back
+  EXPECT_LT(slide, 0.3);
+  const auto& [up, forward, length] = data.path.values;
+  EXPECT_NEAR(forward, 0.05 * (up + 6.0 - length), 1e-9);
+  EXPECT_NEAR(tip_back(data.path), x + 0.3 - slide, 1e-9);
 }
 
 }  // namespace

@@ -1,0 +1,191 @@
+"""A plan: where the jaw is when, and what the sheet is predicted to do."""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from withe.folding.jaw import Jaw, inner_edge
+from withe.folding.paper import Paper
+from withe.folding.sheets import Elastica, at_forces, drag, forces_of, join, take
+from withe.io import written_beside
+
+__all__ = ["Plan"]
+
+FloatArray = npt.NDArray[np.float64]
+_FLAT = (0.05, 0.0, 0.1)  # forces of a sheet of which next to nothing is lifted [w Lgb], [Lgb]
+_SHORT = 0.5  # the same of a sheet that a plan knows: poses say little of so short a part [Lgb]
+_LOW = 1e-5  # an edge less high than this lies on the table [Lgb]
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Poses of a jaw that folds a sheet, and times at which it is there.
+
+    The world's origin is where the middle of the sheet's lifted edge lay in the flat sheet; x points along the sheet to
+    its far edge, z up, y across. The table and the sheet that lies on it are at z = 0. A pose is that of the sheet's
+    *outer edge*, the one that is lifted: position, and the rotation of a frame that is the world's while the sheet is
+    flat and turns about y with the edge: its x points from the outer edge into the sheet along the straight part that
+    the jaw holds, its z away from the side that lay on the table. The jaw's inner edge, where the sheet begins to hang
+    freely, is `jaw.depth` along that x.
+
+    Attributes
+    ----------
+    paper : Paper
+    target : float [m]
+        Where the outer edge comes down: x of the last pose. The crease is in the middle.
+    method, grasp : str
+    jaw : Jaw
+    side : str
+        From where the jaw's fingers come: "edge", from beyond the sheet's edge in line with the sheet; "side", from the
+        side of the sheet, across it, where there would be no room for them beyond the edge.
+    clearance : float [m]
+        Least height of the fingers over the table while the edge looks back (angle > pi / 2), coming from `side`. At
+        the start the lower finger needs the edge to hang over that of the table, or to be bent up.
+    poses : ndarray of shape (n, 7) [m], [-]
+        x, y, z and the quaternion x, y, z, w of the outer edge.
+    angles : ndarray of shape (n,) [rad]
+        Of the edge, counted on beyond pi: quaternions are those of rotations by these about y.
+    times : ndarray of shape (n,) [s]
+    """
+
+    paper: Paper
+    target: float
+    method: str
+    grasp: str
+    jaw: Jaw
+    side: str
+    clearance: float
+    poses: FloatArray
+    angles: FloatArray
+    times: FloatArray
+    _foreseen: Elastica | None = field(default=None, repr=False)
+
+    @cached_property
+    def _inner(self) -> FloatArray:
+        """Poses of the jaw's inner edge in Lgb."""
+        outer = np.stack([self.poses[:, 0], self.poses[:, 2], self.angles], axis=1)
+        lgb = self.paper.gravito_bending_length
+        return inner_edge(outer, self.jaw.depth) / [lgb, lgb, 1.0]
+
+    @property
+    def _length(self) -> float:
+        return (self.paper.length - self.jaw.depth) / self.paper.gravito_bending_length
+
+    @cached_property
+    def _motion(self) -> tuple[Elastica, FloatArray]:
+        """From where the sheet first hangs freely; what is lifted less than that is lifted without force."""
+        if self._foreseen is not None:
+            begin = int(np.argmax(self._foreseen.suspended > _SHORT))
+            forces, ahead = forces_of(self._foreseen)[begin], take(self._foreseen, slice(0, begin))
+        else:
+            begin = int(np.argmax(self._inner[:, 1] > _LOW))
+            forces, ahead = np.array(_FLAT), at_forces([_FLAT] * begin)
+        sheet, slide = drag(self._inner[begin:], forces, self.paper.friction, self._length)
+        return join(ahead, sheet), np.concatenate([np.zeros(begin), slide])
+
+    @property
+    def sheet(self) -> Elastica:
+        """How the sheet hangs at each pose [Lgb], [w Lgb]: as planned, without slide, or else as predicted."""
+        return self._motion[0] if self._foreseen is None else self._foreseen
+
+    @cached_property
+    def slip_ratio(self) -> FloatArray:
+        """Friction coefficient below which the sheet slides at a pose, of shape (n,).
+
+        Size of the tangential force over the normal force under all that lies, |H| / (R + L - lifted). Where the method
+        does not keep the sheet from sliding ("intuitive") it is that of the predicted motion, friction at most; NaN
+        from where that has no equilibrium within reach.
+        """
+        sheet = self.sheet
+        return np.asarray(np.abs(sheet.tangential_force) / (sheet.normal_force + self._length - sheet.suspended))
+
+    @cached_property
+    def slide(self) -> FloatArray:
+        """How far the sheet has slid towards +x at each pose [m], of shape (n,).
+
+        Predicted with exact elastica, what lies as a rigid body, and Coulomb's law with the friction of the paper; NaN
+        from where no equilibrium is within reach: there the sheet snaps.
+        """
+        sheet, slide = self._motion
+        return np.where(sheet.valid, slide * self.paper.gravito_bending_length, np.nan)
+
+    @cached_property
+    def max_curvature(self) -> FloatArray:
+        """Greatest curvature of the sheet at each pose [1/m], of shape (n,)."""
+        return np.asarray(self.sheet.max_curvature / self.paper.gravito_bending_length)
+
+    def __len__(self) -> int:
+        return len(self.times)
+
+    def __repr__(self) -> str:
+        greatest = f"slip ratio {np.max(self.slip_ratio):.3f}, curvature {np.max(self.max_curvature):.0f}/m"
+        way = f"{self.method}, {self.grasp}, {len(self)} poses in {self.times[-1]:.1f} s"
+        return f"Plan({way}, greatest {greatest}, fingers from the {self.side})"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything, with frames and units, as JSON takes it; what is not finite is None."""
+
+        def listed(values: FloatArray) -> list[Any]:
+            return [value if np.isfinite(value) else None for value in values.tolist()]
+
+        return {
+            "frames": {
+                "world": "origin where the middle of the lifted edge lay in the flat sheet; x along the sheet to its "
+                "far edge, y across, z up; table at z = 0",
+                "pose": "of the sheet's outer edge; x of its frame points into the sheet along the part that the jaw "
+                "holds, z away from the side that lay on the table; the world's frame while the sheet is flat",
+            },
+            "units": {"length": "m", "time": "s", "angle": "rad", "quaternion": "x, y, z, w", "curvature": "1/m"},
+            "paper": dict(vars(self.paper)),
+            "target": self.target,
+            "method": self.method,
+            "grasp": self.grasp,
+            "jaw": {**vars(self.jaw), "side": self.side, "clearance": self.clearance},
+            "times": self.times.tolist(),
+            "poses": self.poses.tolist(),
+            "angles": self.angles.tolist(),
+            "prediction": {
+                "slip_ratio": listed(self.slip_ratio),
+                "slide": listed(self.slide),
+                "max_curvature": listed(self.max_curvature),
+            },
+        }
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write poses and times for a robot.
+
+        Parameters
+        ----------
+        path : path-like
+            "NAME.csv": columns t, x, y, z, qx, qy, qz, qw, the fields of geometry_msgs' PoseArray and
+            trajectory_msgs' MultiDOFJointTrajectory; "NAME.json": everything.
+
+        Returns
+        -------
+        Path
+
+        Raises
+        ------
+        ValueError
+            Another ending.
+        """
+        path = Path(path)
+        if path.suffix == ".csv":
+            rows = np.column_stack([self.times, self.poses])
+            lines = [",".join(f"{value:.9g}" for value in row) for row in rows]
+            text = "\n".join(["t,x,y,z,qx,qy,qz,qw", *lines]) + "\n"
+        elif path.suffix == ".json":
+            text = json.dumps(self.to_dict(), indent=1)
+        else:
+            raise ValueError(f"path must end in .csv or .json, got {path.name!r}")
+        with written_beside(path) as beside:
+            beside.write_text(text, encoding="utf-8")
+        return path

@@ -1,0 +1,120 @@
+"""Equilibria of the lifted part of a sheet, many at a time, in units of Lgb and w."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from withe._core import dragged_sheet, sheets_at_forces, sheets_at_poses
+
+__all__ = ["Elastica", "at_forces", "at_poses", "described", "drag", "forces_of", "join", "poses_of", "take"]
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Elastica:
+    """How a sheet hangs, pose by pose. All arrays have the shape of what was asked for.
+
+    Where `valid` is False the other numbers are NaN, and `stable` is False.
+
+    Attributes
+    ----------
+    x, z : ndarray [Lgb]
+        How far the tip is back from where it lay in the flat sheet, and up from the table.
+    angle : ndarray [rad]
+        Of the tangent at the tip above the direction in which the sheet leaves the table.
+    suspended : ndarray [Lgb]
+        Length that is lifted.
+    normal_force, tangential_force : ndarray [w Lgb]
+        Of the table on the sheet at the lift-off point: upwards, and in the direction in which the sheet leaves
+        (positive where the sheet is pushed together, negative where it is pulled taut).
+    force_ratio : ndarray
+        Size of the tangential force over the normal one. The sheet behind the lift-off point presses on the table
+        too: a sheet of length L slips where the tangential force exceeds
+        friction * (normal_force + L - suspended).
+    max_curvature : ndarray [1/Lgb]
+        Greatest size of the curvature.
+    tip_moment : ndarray [w Lgb^2]
+        Of the jaw on the sheet.
+    valid : ndarray of bool
+        Whether there is such a pose; `elastica` says what is refused.
+    stable : ndarray of bool
+        Whether it is a minimum of the energy while the jaw holds position and angle.
+    """
+
+    x: FloatArray
+    z: FloatArray
+    angle: FloatArray
+    suspended: FloatArray
+    normal_force: FloatArray
+    tangential_force: FloatArray
+    force_ratio: FloatArray
+    max_curvature: FloatArray
+    tip_moment: FloatArray
+    valid: npt.NDArray[np.bool_]
+    stable: npt.NDArray[np.bool_]
+
+
+def described(rows: FloatArray, shape: tuple[int, ...]) -> Elastica:
+    """Give rows of the engine's table their names; in a shape that has as many entries as there are rows."""
+    valid = rows[:, 7] > 0
+    columns = [np.where(valid, rows[:, i], np.nan).reshape(shape) for i in (0, 1, 2, 3, 4, 5, 6, 9)]
+    x, z, angle, suspended, normal, tangential, curvature, moment = columns
+    return Elastica(
+        x=x,
+        z=z,
+        angle=angle,
+        suspended=suspended,
+        normal_force=normal,
+        tangential_force=tangential,
+        force_ratio=np.asarray(np.abs(tangential) / normal),
+        max_curvature=curvature,
+        tip_moment=moment,
+        valid=valid.reshape(shape),
+        stable=(valid & (rows[:, 8] > 0)).reshape(shape),
+    )
+
+
+def join(first: Elastica, second: Elastica) -> Elastica:
+    """One after the other."""
+    return Elastica(**{name: np.concatenate([value, getattr(second, name)]) for name, value in vars(first).items()})
+
+
+def take(sheet: Elastica, index: npt.NDArray[np.generic] | slice) -> Elastica:
+    """Some of many."""
+    return Elastica(**{name: value[index] for name, value in vars(sheet).items()})
+
+
+def forces_of(sheet: Elastica) -> FloatArray:
+    """The three numbers that name an equilibrium, of shape (..., 3): normal force, tangential force, lifted length."""
+    return np.stack([sheet.normal_force, sheet.tangential_force, sheet.suspended], axis=-1)
+
+
+def poses_of(sheet: Elastica) -> FloatArray:
+    """Poses of the tip, of shape (..., 3): x, z, angle."""
+    return np.stack([sheet.x, sheet.z, sheet.angle], axis=-1)
+
+
+def at_forces(forces: npt.ArrayLike) -> Elastica:
+    """Equilibria by the numbers of `forces_of`: an initial value problem, with whatever moment at the tip."""
+    forces = np.asarray(forces, dtype=float)
+    return described(sheets_at_forces(forces.reshape(-1, 3), 0.0), forces.shape[:-1])
+
+
+def at_poses(poses: npt.ArrayLike, forces: npt.ArrayLike) -> Elastica:
+    """Equilibria of sheets held at poses (x, z, angle), each followed without a jump from one of known forces."""
+    poses, forces = np.broadcast_arrays(np.asarray(poses, dtype=float), np.asarray(forces, dtype=float))
+    return described(sheets_at_poses(poses.reshape(-1, 3), forces.reshape(-1, 3), 0.0), poses.shape[:-1])
+
+
+def drag(poses: npt.ArrayLike, forces: npt.ArrayLike, friction: float, length: float) -> tuple[Elastica, FloatArray]:
+    """Move the tip of a sheet from pose to pose, slowly; what lies slides as a rigid body by Coulomb's law.
+
+    Returns the equilibria, not valid from where none is reached without a jump, and how far the sheet has slid
+    towards its far edge [Lgb].
+    """
+    rows, slides = dragged_sheet(np.asarray(poses, dtype=float), np.asarray(forces, dtype=float), friction, length, 0.0)
+    return described(rows, (len(rows),)), slides
