@@ -79,8 +79,8 @@ class Contact {
   /// Minus its forces, and their derivative when asked for.
   void local(int i, bool with_hessian, ContactLocal& out, const ContactLinearisation& linearisation = {}) const;
   /// rows^T times its derivatives by what the step is given; see contact_adjoint.hpp.
-  ContactAdjoint adjoint(int i, const double (&rows)[kContactUnknowns]) const {
-    return contact_adjoint(problem_, set_[i], rows);
+  ContactAdjoint adjoint(int i, const double (&rows)[kContactUnknowns], double by_approach) const {
+    return contact_adjoint(problem_, set_[i], rows, by_approach);
   }
   /// Rounding of contact i's force for coordinates up to `reach` [N].
   double rounding(int i, double reach, const ContactLinearisation& linearisation) const;

@@ -1,9 +1,13 @@
 #include "contact/contact_adjoint.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
 #include "contact/contact_friction.hpp"
+#include "contact/contact_set.hpp"
+#include "contact/impacts.hpp"
+#include "contact/pressing.hpp"
 
 namespace withe {
 namespace {
@@ -14,6 +18,24 @@ using Rows = double[kContactUnknowns];
 Vec3<ByStart> lifted(const Vec3d& v) { return {ByStart(v.x), ByStart(v.y), ByStart(v.z)}; }
 
 int tail_of(const ContactPair& pair, int side) { return pair.curve() ? side : 2 * side; }
+
+Vec3d point_of(const Rows& values, int i) { return {values[3 * i], values[3 * i + 1], values[3 * i + 2]}; }
+
+/// Derivatives of the distance at the start, `Touching::before` where it does not go by the end.
+void set_distance_slopes(const ContactProblem& problem, const ContactPair& pair, double (&slopes)[12]) {
+  std::fill(std::begin(slopes), std::end(slopes), 0.0);
+  Vec3d x[4];
+  if (pair.curve()) {
+    const CurveSlopes of_curve = curve_slopes(pair.piece, problem.curve_at_start(pair, x));
+    std::copy(std::begin(of_curve.distance), std::end(of_curve.distance), slopes);
+    return;
+  }
+  problem.start_points(pair, x);
+  const ClosestPoints c = closest_points(x[0], x[1], x[2], x[3], pair.weight_a, pair.weight_b);
+  double w[4];
+  end_weights(c.s, c.t, w);
+  for (int i = 0; i < 12; ++i) slopes[i] = w[i / 3] * c.between[i % 3] / std::sqrt(c.square);
+}
 
 /// The start with its derivatives by itself, tangents among them.
 SlipStart<ByStart> start_of(const FrictionSetting& f) {
@@ -38,7 +60,13 @@ void add_implicit_friction(const ContactProblem& problem, const Touching& t, con
   const FrictionSetting f = friction_setting(problem, t, 1.0, nullptr);
   ByStart now[kContactUnknowns], gradient[kContactUnknowns];
   for (int i = 0; i < kContactUnknowns; ++i) now[i] = t.now[i];
-  const SlippingSurfaces<ByStart> c = slipping_surfaces(f, start_of(f), now);
+  SlipStart<ByStart> start = start_of(f);
+  if (t.law.elastic > 0.0 && !f.slides) {
+    double slopes[12];
+    set_distance_slopes(problem, t.pair, slopes);
+    std::copy(std::begin(slopes), std::end(slopes), start.before.slope);
+  }
+  const SlippingSurfaces<ByStart> c = slipping_surfaces(f, start, now);
   add_friction_gradient(f, c, gradient);
   ByStart scalar;
   for (int i = 0; i < kContactUnknowns; ++i) scalar += rows[i] * gradient[i];
@@ -104,9 +132,104 @@ void add_lagged_friction(const ContactProblem& problem, const Touching& t, const
   out.along += share.value;  // directions count the same
 }
 
+/// Of `add_mean_pressing` in pressing.cpp, whose start enters by d0 and its length alone.
+void add_mean_pressing(const ContactProblem& problem, const Touching& t, const Rows& rows, ContactAdjoint& out) {
+  const Vec3d& d1 = t.proximity.points.between;
+  const double distance = t.proximity.distance;
+  double w[4];
+  end_weights(t.proximity.points.s, t.proximity.points.t, w);
+  Vec3d start[4], d0{}, along{};
+  problem.start_points(t.pair, start);
+  for (int i = 0; i < 4; ++i) {
+    d0 += w[i] * start[i];
+    along += w[i] * point_of(rows, i);
+  }
+  const double before = std::sqrt(std::max(dot(d0, d0) + distance * distance - dot(d1, d1), 0.0)),
+               share = 1.0 / (before + distance), mean = share * dot(along, d0 + d1);
+  const Vec3d by_d0 = (t.pressing.first * share) * along +
+                      ((t.pressing.by_start - t.pressing.first * share) * mean / before) * d0;
+  for (int i = 0; i < 12; ++i) out.start[i] += w[i / 3] * by_d0[i % 3];
+}
+
+/// Of `add_curve_pressing`, f (g1 + b (g0 - g1)), with b = (D1 - D0 - p1) / (p0 - p1), p = g . (x1 - x0).
+void add_curve_pressing(const ContactProblem& problem, const Touching& t, const Rows& rows, ContactAdjoint& out) {
+  const CurvePiece& piece = t.pair.piece;
+  Vec3d x0[4];
+  const CurveDistance<double> start = problem.curve_at_start(t.pair, x0);
+  const CurveSlopes first = curve_slopes(piece, start), last = curve_slopes(piece, t.proximity.curve);
+  const double (&g0)[9] = first.distance, (&g1)[9] = last.distance;
+  double H[9][9] = {}, way[9] = {}, p0 = 0.0, p1 = 0.0, y0 = 0.0, y1 = 0.0, size = 0.0;
+  add_curve_hessian(piece, problem.bodies.obstacle(t.pair), start, first, 1.0, 9, &H[0][0]);
+  for (int i = 0; i < 3 * piece.weights->nodes; ++i) {
+    way[i] = (point_of(t.now, i / 3) - x0[i / 3] - problem.shift_of(t.pair))[i % 3];
+    p0 += g0[i] * way[i];
+    p1 += g1[i] * way[i];
+    y0 += rows[i] * g0[i];
+    y1 += rows[i] * g1[i];
+    size += std::abs(way[i]);
+  }
+  const bool same = std::abs(p0 - p1) <= kSameDirection * size;
+  const double share = same ? 0.5 : (t.proximity.distance - start.distance - p1) / (p0 - p1),
+               b = std::clamp(share, 0.0, 1.0), force = t.pressing.first,
+               by_share = same || share != b ? 0.0 : force * (y0 - y1) / (p0 - p1);
+  for (int i = 0; i < 9; ++i) {
+    double bent = 0.0, turned = 0.0;
+    for (int j = 0; j < 9; ++j) {
+      bent += H[i][j] * rows[j];
+      turned += H[i][j] * way[j];
+    }
+    out.start[i] += t.pressing.by_start * (y1 + b * (y0 - y1)) * g0[i] + force * b * bent +
+                    by_share * (g1[i] - g0[i] - b * (turned - g0[i] + g1[i]));
+  }
+}
+
+/// Along the direction at the end, by the distance at the start alone.
+void add_end_pressing(const ContactProblem& problem, const Touching& t, double along, ContactAdjoint& out) {
+  if (t.pressing.by_start == 0.0) return;
+  double slopes[12];
+  set_distance_slopes(problem, t.pair, slopes);
+  for (int i = 0; i < 12; ++i) out.start[i] += along / t.pressing.first * t.pressing.by_start * slopes[i];
+}
+
+/// rows times minus the forces.
+double times_forces(const ContactProblem& problem, const Touching& t, const Rows& rows, bool friction) {
+  ContactLocal local{};
+  if (friction)
+    contact_local(problem, t, {}, false, local);
+  else
+    add_pressing(problem, t, false, true, local);
+  double sum = 0.0;
+  for (int i = 0; i < kContactUnknowns; ++i) sum += rows[i] * local.gradient[i];
+  return sum;
+}
+
+/// By what decides how much of an impact is elastic: pressing and friction are proportional to the force.
+void add_impact(const ContactProblem& problem, const Touching& t, const Rows& rows, double by_approach,
+                ContactAdjoint& out) {
+  if (!(t.approach > 0.0)) return;
+  if (t.law.elastic > 0.0 && t.pressing.first != 0.0) {
+    PressingLaw law = t.law;
+    law.elastic = 1.0;
+    double by_share = law.at(t.before, t.proximity.distance).first;
+    law.elastic = 0.0;
+    by_share -= law.at(t.before, t.proximity.distance).first;
+    by_share *= times_forces(problem, t, rows, true) / t.pressing.first;
+    const ImpactShareSlopes slopes = impact_share_slopes(problem, t);
+    by_approach += by_share * slopes.approach;
+    out.slip_tolerance += by_share * slopes.slip_tolerance;
+    out.gravity += by_share * slopes.gravity;
+    out.mass += by_share * slopes.mass;
+  }
+  const ContactKey& key = t.pair.key;
+  if (find_record(problem.renewed, key) == nullptr && find_record(problem.start->contacts, key) != nullptr)
+    out.approach += by_approach;
+  else
+    add_approach_slopes(problem, t.pair, by_approach, out.start, out.velocity);
+}
+
 }  // namespace
 
-ContactAdjoint contact_adjoint(const ContactProblem& problem, const Touching& t, const Rows& rows) {
+ContactAdjoint contact_adjoint(const ContactProblem& problem, const Touching& t, const Rows& rows, double by_approach) {
   ContactAdjoint out;
   if (problem.anchored() && t.pair.friction > 0.0)
     throw std::invalid_argument(
@@ -115,6 +238,14 @@ ContactAdjoint contact_adjoint(const ContactProblem& problem, const Touching& t,
     add_lagged_friction(problem, t, rows, out);
   else if (t.pair.friction > 0.0 && !problem.lags())
     add_implicit_friction(problem, t, rows, out);
+  if (t.lagged >= 0) return out;
+  if (problem.turns(t.pair))
+    add_mean_pressing(problem, t, rows, out);
+  else if (t.pair.curve() && problem.means_direction())
+    add_curve_pressing(problem, t, rows, out);
+  else
+    add_end_pressing(problem, t, times_forces(problem, t, rows, false), out);
+  add_impact(problem, t, rows, by_approach, out);
   return out;
 }
 

@@ -88,6 +88,8 @@ class Chain {
       if (s.hinge >= 0) by_inertia(s.edge) += 0.5 * by_.mass(model_.hinges[at(s.hinge)].dof);
     }
     out.edge_rotary = by_inertia.cwiseProduct(model_.edge_arc);
+    out.edge_density += by_.edge_mass.cwiseProduct(model_.edge_arc);
+    if (by_.gravity_size != 0.0) out.gravity += by_.gravity_size * p_.gravity.normalized();
   }
 
   void add_edge(int edge, const double* slope) {

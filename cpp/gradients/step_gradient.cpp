@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <utility>
 
 #include "geometry/rotation.hpp"
 #include "model/edge_vectors.hpp"
@@ -132,7 +133,7 @@ void StepGradient::pull_back(StateAdjoint& state, CoefficientAdjoint& by, HeldAd
   if (step_->rule == StepRule::energy_momentum && !model.planar())
     for (int dof : model.frame_dof)
       rows.segment<3>(dof) = (cayley_spin(z_.segment<3>(dof)).inverse() * rows.segment<3>(dof)).eval();
-  StepAdjoint adjoint(model, rows, by);
+  StepAdjoint adjoint(model, rows, state.approach, by);
   for (const std::unique_ptr<Term>& term : equations_.terms())
     term->add_adjoint(equations_.problem(), data_, assembler, adjoint);
   if (moves()) {
@@ -147,6 +148,7 @@ void StepGradient::pull_back(StateAdjoint& state, CoefficientAdjoint& by, HeldAd
   if (!moves()) return;
   state.q = start;
   state.v = velocity;
+  state.approach = std::move(adjoint.approach);
 }
 
 void StepGradient::add_frames(const StateAdjoint& state, const StepAdjoint& adjoint, VectorX& start) const {

@@ -262,7 +262,7 @@ InitialGradient Tape::gradient(const std::vector<MomentAdjoint>& given, const Pa
   const Assembler& assembler = player.gradient(rule).equations().assembler();
   assembler.project(adjoint.v);
   moments.add(0, assembler, acting_.start(), [&] { return first_; }, adjoint);
-  return {at_nodes(model_, adjoint.q), at_nodes(model_, adjoint.v)};
+  return {at_nodes(model_, adjoint.q), at_nodes(model_, adjoint.v), by_poses(model_, first_.q, adjoint.q)};
 }
 
 RunJacobian Tape::jacobian() const {

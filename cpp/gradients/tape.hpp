@@ -17,6 +17,7 @@ namespace withe {
 struct InitialGradient {
   MatrixX3 positions;   ///< per node [1/m]; directors turn along with their edges, without spin
   MatrixX3 velocities;  ///< per node [s/m]
+  PoseAdjoint supports;  ///< by where what supports hold was
 };
 
 /// Takes derivatives of a scalar by what acted from a step on until the next that it is given; or by what a read-out at

@@ -7,8 +7,12 @@ namespace withe {
 
 namespace {
 
-void add_friction_adjoint(const FrictionOwner& owner, const ContactAdjoint& by, CoefficientAdjoint& out) {
+void add_coefficients(const ContactProblem& problem, const ContactPair& pair, const ContactAdjoint& by,
+                      CoefficientAdjoint& out) {
+  const FrictionOwner owner = problem.surfaces->friction_owner(pair);
   out.slip_tolerance += by.slip_tolerance;
+  out.gravity_size += by.gravity;
+  problem.add_mass_slopes(pair, by.mass, out.edge_mass);
   if (owner.pair >= 0)
     out.pair_friction.row(owner.pair) += Eigen::RowVector2d(by.along, by.across);
   else if (owner.obstacle >= 0)
@@ -65,23 +69,28 @@ void ContactForces::add(const StepProblem& problem, StepData& data, const Assemb
 void ContactForces::add_adjoint(const StepProblem& problem, const StepData&, const Assembler&,
                                 StepAdjoint& adjoint) const {
   if (contact_.count() == 0) return;
-  if (contact_.frictional() && !problem.moves())
-    throw std::invalid_argument(
-        "no gradient is known of an equilibrium that friction holds, for it goes with the way there: take friction=0, "
-        "or run with differentiable=True");
-  if (problem.in_middle())
-    throw std::invalid_argument(
-        "no gradient is known through contact under the midpoint rules yet: take integrator='backward_euler'");
-  if (!contact_.frictional()) return;  // a function of q1 alone
+  if (!contact_.frictional() && !problem.in_middle()) return;  // a function of q1 alone
   int dofs[kContactUnknowns];
   double rows[kContactUnknowns];
+  ContactLocal local;
   for (int i = 0; i < contact_.count(); ++i) {
+    const Touching& t = contact_.contacts()[i];
     contact_.unknowns(i, dofs);
     for (int k = 0; k < kContactUnknowns; ++k) rows[k] = dofs[k] >= 0 ? adjoint.rows[dofs[k]] : 0.0;
-    const ContactAdjoint by = contact_.adjoint(i, rows);
-    for (int k = 0; k < kContactUnknowns; ++k)
-      if (dofs[k] >= 0) adjoint.start[dofs[k]] += by.start[k];
-    add_friction_adjoint(contact_.surfaces().friction_owner(contact_.contacts()[i].pair), by, adjoint.coefficients);
+    const auto after = adjoint.approach_after.find(t.pair.key);
+    const bool remembered = t.lagged < 0 && after != adjoint.approach_after.end();
+    const ContactAdjoint by = contact_.adjoint(i, rows, remembered ? after->second : 0.0);
+    if (problem.in_middle()) contact_.local(i, true, local);
+    for (int k = 0; k < kContactUnknowns; ++k) {
+      if (dofs[k] < 0) continue;
+      adjoint.start[dofs[k]] += by.start[k];
+      adjoint.velocity[dofs[k]] += by.velocity[k];
+      // q1 = 2 z - q0
+      for (int j = 0; j < kContactUnknowns && problem.in_middle(); ++j)
+        adjoint.start[dofs[k]] -= rows[j] * local.hessian[j][k];
+    }
+    if (by.approach != 0.0) adjoint.approach[t.pair.key] += by.approach;
+    add_coefficients(contact_.problem(), t.pair, by, adjoint.coefficients);
   }
 }
 

@@ -50,8 +50,7 @@ void StokesletForces::add(const StepProblem& problem, StepData& data, const Asse
 }
 
 void StokesletForces::add_adjoint(const StepProblem&, const StepData&, const Assembler&, StepAdjoint&) const {
-  if (acts_)
-    throw std::invalid_argument("no gradient is known through a fluid of Stokeslets: take model='resistive' or drag");
+  throw std::invalid_argument("no gradient is known through a fluid of Stokeslets: take model='resistive' or drag");
 }
 
 double StokesletForces::dissipated(const StepProblem&, const StepData& data, const Assembler&,

@@ -43,7 +43,8 @@ void register_gradients(py::module_& module) {
       .def_readonly("rotations", &PoseAdjoint::rotations);
   py::class_<InitialGradient>(module, "InitialGradient", "Derivatives of a scalar of a run by the state at its start.")
       .def_readonly("positions", &InitialGradient::positions)
-      .def_readonly("velocities", &InitialGradient::velocities);
+      .def_readonly("velocities", &InitialGradient::velocities)
+      .def_readonly("supports", &InitialGradient::supports);
   py::class_<RunJacobian>(module, "RunJacobian", "Derivatives of the state that a run leads to.")
       .def_readonly("state", &RunJacobian::state)
       .def_readonly("rows", &RunJacobian::rows);

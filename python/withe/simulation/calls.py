@@ -28,6 +28,7 @@ from withe.simulation.moves import Way
 from withe.simulation.session import Session
 from withe.simulation.unknowns import (
     NATURAL_WORDS,
+    POSE_WORDS,
     SCENE_WORDS,
     OfRun,
     Reader,
@@ -180,9 +181,9 @@ class _Epoch:
         return out
 
     def _set_on_way(self, index: int, call: _Call, part: SupportPart) -> None:
-        for word in ("position", "rotation"):
+        for word in POSE_WORDS:
             before = self.ways.get((part.name, word))
-            start = before.weights(before.reached(call.time)) if before is not None else {}
+            start = before.weights(before.reached(call.time)) if before is not None else {-1: np.eye(3)}
             moved = index if word in call.values else None
             if moved is None and part.name in call.session.settings.paths:
                 start = {}
@@ -232,13 +233,28 @@ class Ledger:
         for call, sums in zip(calls, self._by_calls, strict=True):
             for word in [word for word in sums if not _has_gradient(call, word)]:
                 del sums[word]
-        self.moves = by_moves and any(isinstance(call.part, SupportPart) and call.values for call in calls)
+        self._poses = {
+            place: (part_of(session, unknown[0]).name, unknown[1])
+            for place, unknown in enumerate(wrt)
+            if isinstance(unknown, tuple) and unknown[1] in POSE_WORDS
+        }
+        if self._poses and not by_moves:
+            raise ValueError(
+                "no gradient by the pose of a support is known of reaction moments under the midpoint rules: take "
+                "integrator='energy_momentum' or 'backward_euler'"
+            )
+        for place in self._poses:
+            self.sums[place] = np.zeros(3)
+        moved = any(isinstance(call.part, SupportPart) and call.values for call in calls)
+        self.moves = by_moves and (moved or bool(self._poses))
 
     def visit(self, step: int, moment: int, time: float, found: _core.ParameterGradient) -> None:
         """Derivatives by what acted from a step on, or in a read-out at a moment."""
         after = self._frames[moment] if moment >= 0 else int(np.searchsorted(self._steps, step, side="right"))
         epoch = self._epochs[after]
         for place, (unknown, reader) in enumerate(self._unknowns):
+            if place in self._poses:
+                continue
             value = self._of_start(epoch, unknown, reader, time, found)
             self.sums[place] = value if self.sums[place] is None else self.sums[place] + value
         for key in epoch.live:
@@ -253,13 +269,32 @@ class Ledger:
     def visit_poses(self, step: int, reached: FloatArray, found: _core.PoseAdjoint) -> None:
         """Derivatives by poses of supports at the end of a step."""
         epoch = self._epochs[int(np.searchsorted(self._steps, step, side="right"))]
-        for (name, word), way in epoch.ways.items():
-            index = epoch.session.settings.supports[name][0]
+        for key, way in epoch.ways.items():
+            index, by = self._by_pose(epoch.session, key, found)
             share = float(reached[index]) if len(reached) else 1.0
-            by = (found.positions if word == "position" else found.rotations)[index]
             for call, weight in way.weights(share).items():
-                sums = self._by_calls[call]
-                sums[word] = sums[word] + weight.T @ by
+                if call >= 0:
+                    sums = self._by_calls[call]
+                    sums[key[1]] = sums[key[1]] + weight.T @ by
+                else:
+                    self._add_pose(key, weight.T @ by)
+        for key in set(self._poses.values()) - epoch.ways.keys():
+            self._add_pose(key, self._by_pose(epoch.session, key, found)[1])
+
+    def add_start(self, found: _core.PoseAdjoint) -> None:
+        """Derivatives by where supports hold what the run began with."""
+        for key in set(self._poses.values()):
+            self._add_pose(key, self._by_pose(self._session, key, found)[1])
+
+    @staticmethod
+    def _by_pose(session: Session, key: _Key, found: _core.PoseAdjoint) -> tuple[int, FloatArray]:
+        index = session.settings.supports[key[0]][0]
+        return index, np.array((found.positions if key[1] == "position" else found.rotations)[index])
+
+    def _add_pose(self, key: _Key, by: FloatArray) -> None:
+        for place, own in self._poses.items():
+            if own == key:
+                self.sums[place] = self.sums[place] + by
 
     @property
     def calls(self) -> list[CallGradient]:

@@ -152,6 +152,7 @@ class RunDerivatives:
             ledger.visit,
             ledger.visit_poses if ledger.moves else None,
         )
+        ledger.add_start(initial.supports)
         found = iter(ledger.sums)
         values = [
             np.array(getattr(initial, unknown.removeprefix("initial_")))

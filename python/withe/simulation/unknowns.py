@@ -33,6 +33,7 @@ from withe.simulation.session import Session
 __all__ = [
     "INITIAL_WORDS",
     "NATURAL_WORDS",
+    "POSE_WORDS",
     "SCENE_WORDS",
     "OfRun",
     "Reader",
@@ -66,7 +67,7 @@ Reader = Callable[[_core.EquilibriumGradient | OfRun], Any]
 NATURAL_WORDS = ("natural_curvature", "natural_twist")
 INITIAL_WORDS = ("initial_positions", "initial_velocities")
 SCENE_WORDS = ("gravity", "friction", "slip_tolerance")
-_POSE = ("position", "rotation")
+POSE_WORDS = ("position", "rotation")
 
 
 def unknown_readers(session: Session, wrt: Sequence[Unknown], *, may_be_empty: bool = False) -> list[Reader]:
@@ -117,7 +118,7 @@ def reader_of(session: Session, part: Part | BodyPair, word: str) -> Reader:
     if isinstance(part, DragPart) and word == "drag":
         edges = np.concatenate([np.arange(*edges_of(session, rod.index)) for rod in dragged_rods(session, part)])
         return lambda g: float(g.parameters.drag[edges].sum())
-    if isinstance(part, SupportPart) and word in _POSE:
+    if isinstance(part, SupportPart) and word in POSE_WORDS:
         return _pose_reader(session, part, word)
     raise ValueError(f"no gradient is known by {word!r} of {part.name!r}")
 
@@ -137,7 +138,7 @@ def _pose_reader(session: Session, part: SupportPart, word: str) -> Reader:
     def read(gradient: _core.EquilibriumGradient | OfRun) -> FloatArray:
         if isinstance(gradient, OfRun):
             raise ValueError(
-                f"no gradient of a run by the pose of {part.name!r} is known; equilibria have one, and calls of move"
+                f"a step has no derivative by the pose of {part.name!r}; equilibria and runs have one, and calls of move"
             )
         return np.array(gradient.support_positions[index] if word == "position" else gradient.support_rotations[index])
 
