@@ -17,6 +17,7 @@ void register_integrators(py::module_& module);
 void register_world(py::module_& module);
 void register_vision(py::module_& module);
 void register_elastica(py::module_& module);
+void register_deployment(py::module_& module);
 
 /// Words for the values of an enum.
 template <class Enum, std::size_t count>

@@ -8,4 +8,5 @@ PYBIND11_MODULE(_core, module) {
   withe::bindings::register_world(module);
   withe::bindings::register_vision(module);
   withe::bindings::register_elastica(module);
+  withe::bindings::register_deployment(module);
 }

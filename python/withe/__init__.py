@@ -10,7 +10,7 @@ by rounding, so set it to "baseline" everywhere to find the same bits on unlike 
 ``print(simulation.plan)`` says which are in use.
 """
 
-from withe import folding, learning, perception, real2sim, shapes, view
+from withe import deployment, folding, learning, perception, real2sim, shapes, view
 from withe._core import __version__
 from withe.errors import CoarseMeshWarning, CoarseStepWarning, ConvergenceError
 from withe.parts.handles import (
@@ -70,6 +70,7 @@ __all__ = [
     "Support",
     "Tube",
     "__version__",
+    "deployment",
     "folding",
     "learning",
     "perception",

@@ -1,4 +1,4 @@
-"""The command line: ``withe perceive IMAGE``."""
+"""The command line: ``withe perceive IMAGE``, ``withe deploy PATTERN``."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ import argparse
 import sys
 from collections.abc import Sequence
 
-from withe.perception import command
+from withe.deployment import command as deploy
+from withe.perception import command as perceive
 
 __all__ = ["main"]
 
@@ -15,7 +16,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; what the user gave wrongly is said in one line."""
     parser = argparse.ArgumentParser(prog="withe", description="Tools around withe: soft robots made of slender rods.")
     commands = parser.add_subparsers(required=True, metavar="command")
-    command.add_parser(commands)
+    perceive.add_parser(commands)
+    deploy.add_parser(commands)
     parsed = parser.parse_args(arguments)
     try:
         return int(parsed.run(parsed))

@@ -19,6 +19,7 @@ __all__: list[str] = [
     "EquilibriumPath",
     "EquilibriumResult",
     "FluidDescription",
+    "GraspTable",
     "InitialGradient",
     "JointDescription",
     "Linearisation",
@@ -1018,6 +1019,24 @@ class SheetManifold:
     ) -> numpy.typing.NDArray[numpy.float64]:
         """
         One row a pose.
+        """
+
+class GraspTable:
+    """
+    Grasps that lay a rod, tabulated once.
+    """
+
+    greatest_curvature: typing.ClassVar[float] = 6.0
+    longest: typing.ClassVar[float] = 100.0
+    shortest: typing.ClassVar[float] = 0.1
+    def __init__(self) -> None: ...
+    def grasps(
+        self,
+        questions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+        twist_stiffness: typing.SupportsFloat | typing.SupportsIndex,
+    ) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        One row a grasp, for rows of suspended length, curvature, stretching stiffness, axial force and base angle.
         """
 
 def check_turns(

@@ -10,7 +10,7 @@ def ringing(modulus=1e6, viscosity=300.0, nodes=13, time_step=2.5e-3):
     scene = withe.Scene(gravity=(0, 0, -9.81))
     rubber = withe.Material(youngs_modulus=modulus, density=1000.0, viscosity=viscosity)
     arm = scene.add_rod(start=(0, 0, 0), end=(0, 0, -0.2), nodes=nodes, radius=5e-3, material=rubber, name="arm")
-    scene.clamp(arm.start)
+    scene.clamp(arm.start, name="wall")
     scene.add_force(arm.end, (0.01, 0, 0))
     simulation = scene.build(time_step=time_step, planar=True)
     let_go(simulation)

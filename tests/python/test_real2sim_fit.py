@@ -6,8 +6,9 @@ import pytest
 import withe
 from soft_limb import CONSTANT, LIMB, published, robot, seen_curvatures
 from withe.real2sim import Curvatures, Tags, fit
+from withe.real2sim.parsing import parse_unknowns
 from withe.real2sim.stills import Stills
-from withe.real2sim.unknowns import Tilt, parse_unknowns
+from withe.real2sim.unknowns import Tilt
 
 ARM = [("arm", "natural_curvature", "constant")]
 
@@ -82,6 +83,41 @@ def test_curvature_along_a_rod_is_found(basis, curvature, method):
     tolerance = 1e-5 if method == "gauss_newton" else 1e-2
     assert simulation.get("arm", "natural_curvature")[:, 1] == pytest.approx(curvature, abs=tolerance)
     assert np.abs(found.residuals).max() < tolerance * 1e-2
+
+
+WAVES = 4.0 + 3.0 * np.sin(np.arange(29) / 5.0)
+HATS = np.stack([np.interp(np.arange(29), (7 * i - 7, 7 * i, 7 * i + 7), (0, 1, 0)) for i in range(5)], axis=1)
+
+
+@pytest.mark.parametrize(
+    ("basis", "curvature"),
+    [("segment", WAVES), ("segment", np.full(29, 4.0)), (HATS, HATS @ (1, -2, 5, 4, 3)), (HATS, np.full(29, 4.0))],
+)
+def test_curvature_stencil_by_stencil_and_over_functions_of_ones_own_is_found(basis, curvature):
+    simulation = arm()
+    places = range(2, 31)
+    tags = Tags(drawn(simulation, [np.stack([0 * curvature, curvature], axis=1)], places), names(places))
+    found = fit(simulation, tags, [("arm", "natural_curvature", basis)], progress=False)
+    assert found.converged.all()
+    found.apply(simulation, 0)
+    assert simulation.get("arm", "natural_curvature")[:, 1] == pytest.approx(curvature, abs=1e-5)
+    constant = fit(simulation, tags, ARM, progress=False)
+    alike = np.ptp(curvature) == 0.0
+    assert (constant.rms[0] < 1e-7) == alike  # which explains no more than it can
+    if alike:
+        assert constant.values[0, 0] == pytest.approx(found.values[0].mean(), abs=1e-6)
+
+
+@pytest.mark.parametrize("basis", ["constant", "segment", HATS])
+def test_errors_of_every_basis_have_the_size_that_the_covariance_says(basis):
+    simulation, places = arm(), range(2, 31)
+    exact = drawn(simulation, [(0.0, 4.0)], places)[0]
+    noise = np.random.default_rng(8).normal(0.0, 1e-5, (40, *exact.shape))
+    frames = Tags(exact + noise, names(places), sigma=1e-5)
+    found = fit(simulation, frames, [("arm", "natural_curvature", basis)], progress=False)
+    off = found.values - 4.0
+    scaled = np.array([np.linalg.solve(np.linalg.cholesky(c), x) for c, x in zip(found.covariance, off, strict=True)])
+    assert np.sqrt(np.mean(scaled**2)) == pytest.approx(1.0, abs=3.0 / np.sqrt(2.0 * scaled.size))
 
 
 def test_in_space_both_curvatures_are_found():

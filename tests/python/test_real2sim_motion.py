@@ -5,7 +5,12 @@ import pytest
 
 import withe
 from ringing_rod import UNKNOWNS, let_go, ringing
+from withe.common.progress import Progress
 from withe.real2sim import Tags, fit_motion
+from withe.real2sim.motions import _Motion
+from withe.real2sim.parsing import parse_unknowns
+from withe.real2sim.targets import bind
+from withe.real2sim.unknowns import Delay
 
 
 def seen(delay, noise=0.0, seed=0, **options):
@@ -34,6 +39,25 @@ def test_stiffness_damping_and_delay_are_found_to_a_percent_from_two_seconds_of_
     assert found.value("arm", "viscosity")[0] == pytest.approx([3000.0], rel=3e-2)
     assert found.value("delay")[0] == pytest.approx([0.013], abs=2e-3)
     assert found.unobservable == ()
+    assert found.solves[0] <= 24  # 42 by differences in every iteration
+
+
+def test_what_is_seen_later_has_moved_on_with_its_velocity():
+    simulation, target = ringing(viscosity=3000.0), seen(0.013, viscosity=3000.0)
+    motion = _Motion(
+        simulation.copy(),
+        [*parse_unknowns(simulation, UNKNOWNS[:1]), Delay(0.0, 2.0)],
+        bind([target], simulation),
+        target.times,
+        0.0,
+        let_go,
+        Progress(1),
+    )
+    at, step = np.array([0.0, 0.0132]), np.array([0.0, 1e-6])  # between two frames
+    _, state = motion.residual(at, 0)
+    ahead, behind = (motion.residual(at + way, 0)[0] for way in (step, -step))
+    by_delay = motion.jacobian(at, state, 0)[:, 1]
+    assert by_delay == pytest.approx((ahead - behind) / 2e-6, abs=1e-7 * np.abs(by_delay).max())
 
 
 def test_without_noise_a_coarser_mesh_and_step_leave_damping_within_a_percent():
@@ -74,6 +98,27 @@ def test_friction_is_told_by_how_a_rod_slides_to_a_stop():
     seen = Tags(record.positions("arm")[1:, [0, 4]], ["arm.start", "arm.end"], times=record.times[1:])
     found = fit_motion(sliding(0.5), seen, [("floor", "friction")], progress=False)
     assert found.value("floor", "friction")[0] == pytest.approx([0.35], rel=1e-2)
+
+
+@pytest.mark.parametrize(
+    "unknown", [("arm", "points", "constant"), ("arm", "natural_curvature", "linear"), ("wall", "rotation")]
+)
+def test_the_shape_of_what_rings_is_told_with_its_stiffness(unknown):
+    def turned():
+        simulation = ringing(viscosity=3000.0)
+        (shape,) = parse_unknowns(simulation, [unknown])
+        shape.write(simulation, np.array([0.1, 0.3])[: len(shape)] * shape.scales)
+        let_go(simulation)
+        return simulation
+
+    record = turned().run(1.0, record_every=0.04, progress=False)
+    target = Tags(record.positions("arm")[1:, [6, 12]], ["arm.node(6)", "arm.end"], times=record.times[1:])
+    start = ringing(modulus=1.1e6, viscosity=3000.0)
+    found = fit_motion(start, target, [unknown, UNKNOWNS[0]], begin=let_go, progress=False)
+    assert found.value("arm", "youngs_modulus")[0] == pytest.approx([1e6], rel=1e-6)
+    assert found.value(*unknown[:2])[0] / found._unknowns[0].scales == pytest.approx(
+        np.array([0.1, 0.3])[: len(found.names) - 1], abs=1e-6
+    )
 
 
 @pytest.mark.parametrize(

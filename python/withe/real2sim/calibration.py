@@ -14,10 +14,12 @@ from withe.errors import ConvergenceError
 from withe.perception.camera import Camera
 from withe.real2sim.camera_problem import CameraProblem
 from withe.real2sim.least_squares import FrameSolution, all_frames, lone_frame, reduced, weaknesses
+from withe.real2sim.parsing import parse_unknowns
 from withe.real2sim.places import Line, Places
 from withe.real2sim.results import Unobservable
+from withe.real2sim.shape_unknowns import NaturalCurvature
 from withe.real2sim.targets import Tags
-from withe.real2sim.unknowns import NaturalCurvature, Tilt, Unknown, parse_unknowns
+from withe.real2sim.unknowns import Tilt, Unknown
 from withe.simulation.simulation import Simulation
 
 __all__ = ["Calibration", "calibrate"]

@@ -41,7 +41,7 @@ class Centrelines(Target):
     ends : bool
         Whether the whole line was seen.
     samples : int
-        Points to use of each centreline, evenly along it.
+        Points to use of each centreline at most, about evenly along it.
     sigma : float, optional [px or m]
         Standard deviation of a coordinate; estimated from what a fit leaves where it is not given.
     times : array_like of shape (frames,), optional [s]
@@ -80,6 +80,11 @@ class Centrelines(Target):
         """Number of frames."""
         return len(self.points)
 
+    def told(self, frame: int) -> int:
+        """Numbers that a frame tells: a point tells where the line is across itself, an end all of it."""
+        points = np.asarray(self.points[frame])
+        return points.size - len(points) + (2 if self.ends and len(points) else 0)
+
     def bind(self, simulation: Simulation) -> Residual:
         """The residual for the nodes of a simulation."""
         given = [self.rods] if isinstance(self.rods, Rod | str) else list(self.rods)
@@ -101,7 +106,9 @@ class _LineResidual(Residual):
             return np.full(self._samples * line.shape[1], np.nan)
         edges, shares, _ = self._nearest(line, seen)
         nearest = line[edges] + shares[:, None] * (line[edges + 1] - line[edges])
-        return np.asarray((nearest - seen).ravel() / self._sigma)
+        values = np.full((self._samples, line.shape[1]), np.nan)
+        values[: len(seen)] = (nearest - seen) / self._sigma
+        return values.ravel()
 
     def derivative(self, positions: FloatArray, frame: int) -> FloatArray:
         line, seen = self._line(positions), self._seen[frame]
@@ -155,7 +162,9 @@ def rest_shape(
     camera: Camera | None = None,
     basis: Any = "linear",
     *,
+    unknown: Literal["natural_curvature", "points"] = "natural_curvature",
     ends: bool = True,
+    sigma: float | None = None,
     progress: bool | Literal["always"] = False,
 ) -> Fit:
     """Find the shape that a rod would have without its weight, from a photograph of it as it sags.
@@ -169,15 +178,20 @@ def rest_shape(
         Seen along it, such as `perception.trace(picture).centrelines[0]`; pixels need the camera.
     camera : perception.Camera, optional
     basis : optional
-        Of natural curvature, as in `fit`.
+        Of natural curvature, or of the turns of edges, as in `fit`.
+    unknown : {"natural_curvature", "points"}
+        With "points", the rod as it was drawn and what holds it: also the angle at which it is clamped.
     ends : bool
         Whether the centreline goes from end to end.
+    sigma : float, optional [px or m]
+        Standard deviation of a coordinate of the centreline; estimated from what the fit leaves by default.
     progress : bool or "always"
 
     Returns
     -------
     Fit
-        Of one frame; `found.apply(simulation)` gives the rod this rest shape.
+        Of one frame; `found.apply(simulation)` gives the rod this rest shape, and `found.points(rod)` has its nodes
+        where ``points`` were unknown.
 
     Raises
     ------
@@ -191,14 +205,17 @@ def rest_shape(
     >>> found.names[0]
     "natural_curvature of 'arm' at its start"
     """
-    target = Centrelines([centreline], rod, camera, ends)
-    return fit(simulation, target, [(rod, "natural_curvature", basis)], progress=progress)
+    validation.choice(unknown, "unknown", ("natural_curvature", "points"))
+    target = Centrelines([centreline], rod, camera, ends, sigma=sigma)
+    return fit(simulation, target, [(rod, unknown, basis)], progress=progress)
 
 
 def _evenly(line: FloatArray, samples: int, frame: int) -> FloatArray:
-    """Points evenly along a line."""
+    """Points of a line, about evenly along it; none in between, which were not seen and would share errors."""
     lengths = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
     if not lengths[-1] > 0.0:
         raise ValueError(f"points of frame {frame} must differ from each other")
     at = np.linspace(0.0, lengths[-1], samples)
-    return np.stack([np.interp(at, lengths, column) for column in line.T], axis=1)
+    after = np.clip(np.searchsorted(lengths, at), 1, len(line) - 1)
+    nearest = np.where(at - lengths[after - 1] < lengths[after] - at, after - 1, after)
+    return np.asarray(line[np.unique(nearest)])

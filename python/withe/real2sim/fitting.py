@@ -13,11 +13,11 @@ from withe.common.progress import Progress
 from withe.common.progress import progress as progress_bar
 from withe.real2sim.gathering import gather
 from withe.real2sim.least_squares import FrameSolution, all_frames, lone_frame
+from withe.real2sim.parsing import parse_unknowns
 from withe.real2sim.results import Fit
 from withe.real2sim.scalar_methods import descend, minimise
 from withe.real2sim.stills import Conditions, Stills
 from withe.real2sim.targets import Target, bind, frames_of
-from withe.real2sim.unknowns import parse_unknowns
 from withe.simulation.simulation import Simulation
 
 __all__ = ["fit"]
@@ -41,7 +41,7 @@ def fit(
     """Find unknowns with which equilibria look like targets, frame after frame.
 
     Least squares over the residuals of all targets divided by their sigma. Every frame begins with what the frame
-    before it found. Natural curvature is of each frame, material of all of them.
+    before it found. Natural curvature is of each frame, all else of all of them.
 
     Parameters
     ----------
@@ -53,6 +53,9 @@ def fit(
         a stencil), or functions along the rod, array_like of shape (stencils, n); in space these count twice, for
         both directors. ``(part, word)`` for a positive parameter of a part or of a tuple of parts, all multiplied by
         one factor: youngs_modulus, density, bend_stiffness, line_density, ... of rods, mass, friction of an obstacle.
+        ``(rod, "points", basis)`` for a rod as it was drawn, in a plane: by how much its edges are turned, over
+        functions of the same kinds, (edges, n), as if the scene were built anew: natural curvature follows, and
+        supports go where its nodes are drawn. ``(support, "position")`` and ``(support, "rotation")`` for poses.
     method : {"gauss_newton", "lbfgs", "source"}
         "source" is gradient descent by forward differences on the sum of absolute residuals [Choi, doctoral
         dissertation, University of California, Los Angeles, Algorithm 6], for constant natural curvature in a plane;
@@ -89,7 +92,7 @@ def fit(
     listed = frames_of(targets)
     copy = simulation.copy()
     own = parse_unknowns(copy, unknowns)
-    common = parse_unknowns(copy, shared, "shared")
+    common = parse_unknowns(copy, shared, "shared", own)
     for unknown in common:
         unknown.per_frame = False
         if any(unknown.word == other.word and set(unknown.rods) & set(other.rods) for other in own):

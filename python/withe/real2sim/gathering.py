@@ -32,7 +32,10 @@ def gather(
         coordinates[frame] = solution.coordinates
         residuals[frame, : len(solution.residual)] = solution.residual
     with_data = {f: s for f, s in solutions.items() if len(s.residual)}
-    variance = _variance(stills, targets, with_data)
+    seen_in = (
+        list(with_data) if frames == targets[0].frames else list(range(targets[0].frames))
+    )  # a motion is one frame
+    variance = _variance(stills, targets, with_data, seen_in)
     values, covariance = np.full_like(coordinates, np.nan), np.full((frames, count, count), np.nan)
     spread = _spreads(stills, with_data)
     for frame, solution in solutions.items():
@@ -69,11 +72,14 @@ def _square(solutions: dict[int, FrameSolution]) -> float:
     return sum(float(np.sum(seen(solution.residual) ** 2)) for solution in solutions.values())
 
 
-def _variance(stills: Coordinates, targets: list[Target], solutions: dict[int, FrameSolution]) -> float:
+def _variance(
+    stills: Coordinates, targets: list[Target], solutions: dict[int, FrameSolution], seen_in: list[int]
+) -> float:
     """Of a residual: 1 where sigma was given, else what all frames leave over the degrees of freedom."""
     if all(target.sigma is not None for target in targets):
         return 1.0
-    free = _rows(solutions) - int(stills.per_frame.sum()) * len(solutions) - int((~stills.per_frame).sum())
+    told = sum(target.told(frame) for target in targets for frame in seen_in)
+    free = told - int(stills.per_frame.sum()) * len(solutions) - int((~stills.per_frame).sum())
     return _square(solutions) / free if free > 0 else np.nan
 
 

@@ -14,6 +14,7 @@ from withe.errors import ConvergenceError
 __all__ = [
     "FrameSolution",
     "Problem",
+    "Secants",
     "Weakness",
     "all_frames",
     "lone_frame",
@@ -29,6 +30,7 @@ BoolArray = npt.NDArray[np.bool_]
 _RANK = 1e-9  # singular values below it, relative to the greatest, belong to directions that nothing tells
 _SMALL = 1e-5  # a step that would lessen the residual by less than this share of it is the last
 _TRIALS = 8
+_TRIALS_OF_SECANTS = 2  # then derivatives are asked for anew
 
 
 class Problem(Protocol):
@@ -65,6 +67,42 @@ class Weakness:
     frames: list[int] = field(default_factory=list)
 
 
+class Secants:
+    """Derivatives that are costly: secants update them from step to step [Broyden 1965, eq. 4.5].
+
+    Coordinates count over their scales. No search ends with updated derivatives.
+
+    Attributes
+    ----------
+    updated : bool
+        Whether those at hand were.
+    """
+
+    def __init__(self) -> None:
+        self.updated = False
+        self._last: tuple[FloatArray, FloatArray, FloatArray] | None = None  # coordinates, residual, derivatives
+
+    def jacobian(
+        self, problem: Problem, coordinates: FloatArray, residual: FloatArray, state: FloatArray, frame: int
+    ) -> FloatArray:
+        """At first, and after `renew`, that of the problem."""
+        self.updated = self._last is not None
+        if self._last is None:
+            found = problem.jacobian(coordinates, state, frame)
+        else:
+            before, old, found = self._last
+            way = (coordinates - before) / problem.scales
+            missed = seen(residual) - old - found @ (coordinates - before)
+            found = found + np.outer(missed, way / problem.scales) / (way @ way)
+        self._last = (coordinates.copy(), seen(residual), found)
+        return found
+
+    def renew(self) -> bool:
+        """Ask the problem next, if those at hand were updated."""
+        self._last = None if self.updated else self._last
+        return self.updated
+
+
 def seen(residual: FloatArray) -> FloatArray:
     """A residual without gaps: zero where nothing was seen."""
     return np.where(np.isnan(residual), 0.0, residual)
@@ -97,7 +135,13 @@ def _bounded(matrix: FloatArray, right: FloatArray, radius: float) -> FloatArray
 
 
 def lone_frame(
-    problem: Problem, frame: int, start: FloatArray, free: BoolArray, tolerance: float, max_iterations: int
+    problem: Problem,
+    frame: int,
+    start: FloatArray,
+    free: BoolArray,
+    tolerance: float,
+    max_iterations: int,
+    secants: Secants | None = None,
 ) -> FrameSolution:
     """Fit one frame, with the coordinates that are not free as they are.
 
@@ -111,25 +155,32 @@ def lone_frame(
     coordinates, (residual, state) = start.copy(), found
     for iteration in range(1, max_iterations + 1):
         try:
-            jacobian = _seen_rows(problem.jacobian(coordinates, state, frame)[:, free] * scales, residual)
+            if secants is None:
+                derivatives = problem.jacobian(coordinates, state, frame)
+            else:
+                derivatives = secants.jacobian(problem, coordinates, residual, state, frame)
         except ConvergenceError as error:
             empty = np.zeros((len(residual), len(scales)))
             return FrameSolution(coordinates, residual, empty, iteration, False, f"no derivatives there: {error}")
+        jacobian = _seen_rows(derivatives[:, free] * scales, residual)
         step = _bounded(jacobian, -seen(residual), 1.0)
         gain = float(np.linalg.norm(jacobian @ step))
         if gain <= _SMALL * _size(residual) or gain <= tolerance:
+            if secants is not None and secants.renew():
+                continue
             return FrameSolution(coordinates, residual, jacobian, iteration, True)
-        for _ in range(_TRIALS):
+        for _ in range(_TRIALS if secants is None or not secants.updated else _TRIALS_OF_SECANTS):
             trial = coordinates.copy()
             trial[free] += scales * step
             found = problem.residual(trial, frame)
             if found is not None and _size(found[0]) < _size(residual):
+                coordinates, (residual, state) = trial, found
                 break
             step = _bounded(jacobian, -seen(residual), 0.25 * float(np.abs(step).max()))
         else:
-            return FrameSolution(coordinates, residual, jacobian, iteration, False, "no step lessens the residual")
-        coordinates, (residual, state) = trial, found
-        if _size(residual) <= tolerance:
+            if secants is None or not secants.renew():
+                return FrameSolution(coordinates, residual, jacobian, iteration, False, "no step lessens the residual")
+        if secants is None and _size(residual) <= tolerance:
             return FrameSolution(coordinates, residual, jacobian, iteration, True)
     return FrameSolution(coordinates, residual, jacobian, max_iterations, False, "max_iterations were not enough")
 

@@ -13,10 +13,11 @@ from withe.common.progress import Progress
 from withe.common.progress import progress as progress_bar
 from withe.errors import ConvergenceError
 from withe.real2sim.gathering import gather
-from withe.real2sim.least_squares import lone_frame
+from withe.real2sim.least_squares import Secants, lone_frame
+from withe.real2sim.parsing import parse_unknowns
 from withe.real2sim.results import Fit
 from withe.real2sim.targets import Residual, Target, bind, frames_of
-from withe.real2sim.unknowns import Coordinates, Delay, Unknown, parse_unknowns
+from withe.real2sim.unknowns import Coordinates, Delay, Unknown
 from withe.simulation.simulation import Simulation
 
 __all__ = ["fit_motion"]
@@ -24,7 +25,7 @@ __all__ = ["fit_motion"]
 FloatArray = npt.NDArray[np.float64]
 
 _DIFFERENCE = 1e-4  # of the scale of an unknown
-_RUNS = 6  # iterations that a progress bar counts on
+_RUNS = 8  # iterations that a progress bar counts on
 
 
 def fit_motion(
@@ -39,8 +40,9 @@ def fit_motion(
 ) -> Fit:
     """Find unknowns with which a run looks like targets, all frames together.
 
-    Gauss-Newton on the residuals of all frames, by central differences of runs. Between time steps positions are those
-    of cubic polynomials through positions and velocities.
+    Gauss-Newton on the residuals of all frames. Derivatives are differences of runs at the beginning and at the end,
+    one run an unknown (those by the delay are velocities); secants update them in between. Between time steps
+    positions are those of cubic polynomials through positions and velocities.
 
     Parameters
     ----------
@@ -49,8 +51,9 @@ def fit_motion(
     targets : Tags, Centrelines, Curvatures, or several
         With the times of their frames, from the start of the motion.
     unknowns : sequence
-        As in `fit`; viscosity, viscous_time, drag and friction show here too. Or "delay": how much later than the run's
-        the clock of the targets began, so that their time t is t + delay in the run, never less than 0.
+        As in `fit`; viscosity, viscous_time, drag and friction show here too, and natural curvature is one for the
+        whole motion. Where supports are unknown, `begin` has to go to an equilibrium. Or "delay": how much later than
+        the run's the clock of the targets began, so that their time t is t + delay in the run, never less than 0.
     begin : callable, optional
         Called with a simulation before each run, when its numbers are set: to find the equilibrium from which it is let
         go, which depends on them, and to let it go.
@@ -95,10 +98,10 @@ def fit_motion(
     if times[0] + late < 0.0:
         raise ValueError(f"times plus delay must not be negative, got {times[0] + late:g} s")
     limit = validation.integer(max_iterations, "max_iterations", 1, 2**31 - 1)
-    with progress_bar(_RUNS * (2 * len(parsed) + 1), "fitting", progress, unit="runs") as bar:
+    with progress_bar(_RUNS + 2 * len(parsed), "fitting", progress, unit="runs") as bar:
         motion = _Motion(copy, parsed, bind(listed, copy), times, late, begin, bar)
         free = np.ones(len(motion.names), bool)
-        solution = lone_frame(motion, 0, motion.begin(), free, 1e-12, limit)
+        solution = lone_frame(motion, 0, motion.begin(), free, 1e-12, limit, Secants())
     motion.per_frame = free
     return gather(motion, listed, {0: solution}, {0: motion.runs}, len(solution.residual), 1)
 
@@ -126,40 +129,57 @@ class _Motion(Coordinates):
         self.runs = 0
 
     def residual(self, coordinates: FloatArray, frame: int) -> tuple[FloatArray, FloatArray] | None:
-        """Residuals of all times, one after the other; None where the run fails."""
+        """Residuals of all times, one after the other, and what `_seen` has; None where the run fails."""
         try:
             self.simulation.restore(self._start)
             self.forget()
             self.write(coordinates)
             if self._begin is not None:
                 self._begin(self.simulation)
-            positions = self._positions(coordinates)
+            shapes = self._shapes(coordinates)
         except (ConvergenceError, ValueError):
             return None
-        values = [self._residual.value(shape, time) for time, shape in enumerate(positions)]
-        return np.concatenate(values), positions
+        return self._values(shapes[0]), shapes
 
     def jacobian(self, coordinates: FloatArray, state: FloatArray, frame: int) -> FloatArray:
-        """By central differences."""
-        columns = []
+        """By forward differences of runs, and by velocities."""
+        now, columns = self._values(state[0]), []
+        late = self._place_of_delay()
         for i, scale in enumerate(self.scales):
+            if i == late:
+                columns.append(self._by_delay(state))
+                continue
             step = np.zeros_like(coordinates)
             step[i] = _DIFFERENCE * scale
-            ahead, behind = self.residual(coordinates + step, frame), self.residual(coordinates - step, frame)
-            if ahead is None or behind is None:
+            ahead = self.residual(coordinates + step, frame)
+            if ahead is None:
                 raise ConvergenceError(
                     f"a run fails for {self.names[i]} a little off what it is: shorten its time step"
                 )
-            columns.append((ahead[0] - behind[0]) / (2.0 * step[i]))
+            columns.append((ahead[0] - now) / step[i])
         return np.stack(columns, axis=1)
 
-    def _positions(self, coordinates: FloatArray) -> FloatArray:
-        """Shapes at the times of the targets, (times, nodes, 3) [m]."""
-        delay = self._delay
-        for unknown, place in zip(self.unknowns, self.slices, strict=True):
-            if isinstance(unknown, Delay):
-                delay = float(coordinates[place][0])
-        asked = self._times + delay
+    def _values(self, positions: FloatArray) -> FloatArray:
+        return np.concatenate([self._residual.value(shape, time) for time, shape in enumerate(positions)])
+
+    def _by_delay(self, state: FloatArray) -> FloatArray:
+        """Derivatives of the residual by the delay: everything is seen later, where it has moved on."""
+        moving = zip(*state, strict=True)
+        return np.concatenate(
+            [
+                np.tensordot(self._residual.derivative(shape, time), velocities, axes=2)
+                for time, (shape, velocities) in enumerate(moving)
+            ]
+        )
+
+    def _place_of_delay(self) -> int | None:
+        places = zip(self.unknowns, self.slices, strict=True)
+        return next((place.start for unknown, place in places if isinstance(unknown, Delay)), None)
+
+    def _shapes(self, coordinates: FloatArray) -> FloatArray:
+        """Positions [m] and velocities [m/s] at the times of the targets, (2, times, nodes, 3)."""
+        late = self._place_of_delay()
+        asked = self._times + (self._delay if late is None else float(coordinates[late]))
         if asked[0] < 0.0:
             raise ValueError("before the run")
         step = self.simulation.time_step
@@ -172,9 +192,15 @@ class _Motion(Coordinates):
         left = np.clip(np.searchsorted(knots, asked, side="right") - 1, 0, len(knots) - 2)
         gap = (knots[left + 1] - knots[left])[:, None, None]
         share = (asked - knots[left])[:, None, None] / gap
-        # Cubic Hermite polynomials.
-        return np.asarray(
-            (1 + 2 * share) * (1 - share) ** 2 * points[left]
-            + share**2 * (3 - 2 * share) * points[left + 1]
-            + gap * share * (1 - share) * ((1 - share) * speeds[left] - share * speeds[left + 1])
+        # Cubic Hermite polynomials and their derivatives.
+        jump = points[left + 1] - points[left]
+        before, after = gap * speeds[left], gap * speeds[left + 1]
+        positions = (
+            points[left]
+            + (3 - 2 * share) * share**2 * jump
+            + share * (1 - share) * ((1 - share) * before - share * after)
         )
+        velocities = (
+            6 * share * (1 - share) * jump + (1 - share) * (1 - 3 * share) * before - share * (2 - 3 * share) * after
+        ) / gap
+        return np.stack([positions, velocities])

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.parts.handles import Rod
+from withe.real2sim.shape_unknowns import DrawnShape
 from withe.real2sim.unknowns import Unknown
 from withe.simulation.simulation import Simulation
 
@@ -165,6 +166,19 @@ class Fit:
         for unknown in self._unknowns:
             unknown.write(simulation, coordinates[start : start + len(unknown)])
             start += len(unknown)
+
+    def points(self, rod: Rod | str, frame: int = -1) -> FloatArray:
+        """Nodes of a rod as it was drawn, shape (nodes, 3) [m], for what was found of its ``points``.
+
+        Raises
+        ------
+        ValueError
+            They were not unknown.
+        """
+        place = self._place(rod, "points")
+        name = rod if isinstance(rod, str) else rod.name
+        found = next(u for u in self._unknowns if isinstance(u, DrawnShape) and name in u.rods)
+        return found.points(self._coordinates[frame, place])
 
     def _place(self, rod: Rod | str, word: str) -> slice:
         name = rod if isinstance(rod, str) else rod.name

@@ -57,6 +57,10 @@ class Target(ABC):
     def bind(self, simulation: Simulation) -> Residual:
         """The residual for the nodes of a simulation."""
 
+    @abstractmethod
+    def told(self, frame: int) -> int:
+        """Numbers that a frame tells."""
+
 
 def turns(points: FloatArray) -> FloatArray:
     """Angles between the chords of points in a plane, counter-clockwise positive, (..., n, 2) -> (..., n - 2) [rad]."""
@@ -132,6 +136,10 @@ class Curvatures(Target):
     def frames(self) -> int:
         """Number of frames."""
         return len(np.asarray(self.values))
+
+    def told(self, frame: int) -> int:
+        """Numbers that a frame tells."""
+        return int(np.isfinite(np.asarray(self.values)[frame]).sum())
 
     def bind(self, simulation: Simulation) -> Residual:
         """The residual for the nodes of a simulation."""
@@ -211,6 +219,10 @@ class Tags(Target):
     def frames(self) -> int:
         """Number of frames."""
         return len(np.asarray(self.points))
+
+    def told(self, frame: int) -> int:
+        """Numbers that a frame tells."""
+        return int(np.isfinite(np.asarray(self.points)[frame]).sum())
 
     def without(self, outliers: Sequence[tuple[int, int]]) -> Tags:
         """The same without some tags in some frames.

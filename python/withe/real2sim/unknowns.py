@@ -1,4 +1,4 @@
-"""What is looked for: natural curvature over a few functions, and parameters of rods, in the words of `set`."""
+"""What is looked for, as coordinates: parameters of rods in the words of `set`, a tilt, a delay."""
 
 from __future__ import annotations
 
@@ -10,18 +10,16 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from withe.common import validation
-from withe.parts.handles import Handle, Rod
-from withe.parts.kinds import RodPart
+from withe.parts.handles import Handle
 from withe.parts.parameters import ROD_WORDS
 from withe.real2sim.places import rod_part, turning_axis
 from withe.simulation.simulation import Simulation
 
-__all__ = ["Coordinates", "Delay", "NaturalCurvature", "Tilt", "Unknown", "parse_unknowns"]
+__all__ = ["POSITIVE", "Coordinates", "Delay", "Parameter", "Tilt", "Unknown"]
 
 FloatArray = npt.NDArray[np.float64]
 
-_POSITIVE = (*(word for word in ROD_WORDS if word != "poisson_ratio"), "mass", "friction")
+POSITIVE = (*(word for word in ROD_WORDS if word != "poisson_ratio"), "mass", "friction")
 
 
 class Unknown(ABC):
@@ -108,46 +106,6 @@ class Coordinates:
     def forget(self) -> None:
         """What was set may not be there any more."""
         self._written[:] = np.nan
-
-
-class NaturalCurvature(Unknown):
-    """Natural curvature of a rod as a sum of functions along it [1/m]."""
-
-    word = "natural_curvature"
-    per_frame = True
-
-    def __init__(self, simulation: Simulation, rod: Rod | str, basis: Any = "constant") -> None:
-        part = rod_part(simulation, rod)
-        self._rod, self.rods = part.name, (part.name,)
-        self.length = float(part.lengths.sum())
-        functions, words = _basis(part, basis)
-        plane = turning_axis(simulation, part)
-        self._directions = np.eye(2) if plane is None else plane[0][None]
-        axes = [" towards d1", " towards d2"] if plane is None else [""]
-        self.names = tuple(f"natural_curvature of {part.name!r}{axis}{word}" for axis in axes for word in words)
-        self._fields = np.concatenate([functions[:, :, None] * direction for direction in self._directions], axis=1)
-        self._inverse = np.linalg.pinv(self._fields.transpose(0, 2, 1).reshape(-1, len(self.names)))
-        largest = np.abs(functions).max(axis=0)
-        if not (largest > 0.0).all():
-            raise ValueError(f"basis of {part.owner} must have no column of zeros")
-        self.scales = np.tile(1.0 / (self.length * largest), len(axes))
-
-    def read(self, simulation: Simulation) -> FloatArray:
-        """Coordinates of the nearest curvature that the functions make."""
-        return np.asarray(self._inverse @ simulation.get(self._rod, self.word).ravel())
-
-    def write(self, simulation: Simulation, coordinates: FloatArray) -> None:
-        """Set them."""
-        simulation.set(self._rod, natural_curvature=np.einsum("snc,n->sc", self._fields, coordinates))
-
-    @property
-    def words(self) -> list[Any]:
-        """Natural curvature of the rod."""
-        return [(self._rod, self.word)]
-
-    def chain(self, coordinates: FloatArray, found: list[list[Any]]) -> FloatArray:
-        """What each function stands for."""
-        return np.asarray(np.tensordot(np.array(found[0]), self._fields, axes=([1, 2], [0, 2])))
 
 
 class Parameter(Unknown):
@@ -250,7 +208,7 @@ class Delay(Unknown):
 
     def __init__(self, first: float, duration: float) -> None:
         self._first = first
-        self.rods, self.names, self.scales = (), ("delay",), np.array([duration])
+        self.rods, self.names, self.scales = (), ("delay",), np.array([duration / 100.0])
 
     def read(self, simulation: Simulation) -> FloatArray:
         """The first guess."""
@@ -267,54 +225,3 @@ class Delay(Unknown):
     def chain(self, coordinates: FloatArray, found: list[list[Any]]) -> FloatArray:
         """No equilibrium depends on it."""
         return np.zeros((0, 1))
-
-
-def parse_unknowns(simulation: Simulation, unknowns: Sequence[Any], what: str = "unknowns") -> list[Unknown]:
-    """Unknowns of what a user gave: tuples (part, word) or (rod, "natural_curvature", basis).
-
-    Raises
-    ------
-    ValueError
-        Something else, a word that cannot be unknown, or the same one twice.
-    """
-    if isinstance(unknowns, str) or not isinstance(unknowns, Sequence):
-        raise ValueError(f"{what} must be a list such as [(arm, 'natural_curvature', 'constant')], got {unknowns!r}")
-    found: list[Unknown] = []
-    seen: set[tuple[str, str]] = set()
-    for item in unknowns:
-        if not isinstance(item, tuple) or len(item) not in (2, 3) or not isinstance(item[1], str):
-            raise ValueError(f"{what} must be tuples (rod, word) or (rod, 'natural_curvature', basis), got {item!r}")
-        rod, word, *basis = item
-        if word == "natural_curvature":
-            unknown: Unknown = NaturalCurvature(simulation, rod, *basis)
-        elif word in _POSITIVE and not basis:
-            unknown = Parameter(simulation, list(rod) if isinstance(rod, tuple | list) else [rod], word)
-        else:
-            words = ", ".join(("natural_curvature", *_POSITIVE))
-            raise ValueError(f"{what} must be of {words}, only the first with a basis, got {item[1:]!r}")
-        for name in unknown.rods:
-            if (name, word) in seen:
-                raise ValueError(f"{what} must be different, got {word} of rod {name!r} twice")
-            seen.add((name, word))
-        found.append(unknown)
-    return found
-
-
-def _basis(part: RodPart, basis: Any) -> tuple[FloatArray, list[str]]:
-    """Functions along a rod at its stencils, shape (stencils, n), and what tells their coordinates apart."""
-    stencils = len(part.voronoi)
-    if stencils == 0:
-        raise ValueError(f"{part.owner} has no stencil that could bend: it needs three nodes")
-    ends = np.cumsum(part.lengths)
-    share = (ends if part.closed else ends[:-1]) / ends[-1]
-    if isinstance(basis, str):
-        validation.choice(basis, f"basis of {part.owner}", ("constant", "linear", "segment"))
-        if basis == "constant":
-            return np.ones((stencils, 1)), [""]
-        if basis == "linear":
-            return np.stack([1.0 - share, share], axis=1), [" at its start", " at its end"]
-        return np.eye(stencils), [f" at stencil {i}" for i in range(stencils)]
-    functions = validation.number_array(basis, f"basis of {part.owner}", (stencils, "n"))
-    if functions.shape[1] == 0:
-        raise ValueError(f"basis of {part.owner} must have at least one column")
-    return functions, [f" [{i}]" for i in range(functions.shape[1])]

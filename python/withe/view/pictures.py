@@ -15,6 +15,7 @@ from withe.common.frames import Frames
 from withe.common.progress import progress as progress_bar
 from withe.io import written_beside
 from withe.view.films import Film, film_places
+from withe.view.pinhole import Pinhole
 from withe.view.rendering import ColorBy, Stage
 
 __all__ = ["animate", "picture", "view"]
@@ -30,7 +31,7 @@ def picture(
     ghosts: Sequence[int] = (),
     size: Sequence[int] = (1280, 960),
     color_by: ColorBy = "rod",
-    camera: str | npt.ArrayLike | None = None,
+    camera: Pinhole | str | npt.ArrayLike | None = None,
     ground: float | None = None,
     label: str | None = None,
 ) -> Path:
@@ -51,9 +52,11 @@ def picture(
     size : pair of int [px]
     color_by : {"rod", "tension", "curvature", "twist", "speed"}
         One colour a rod, or the quantity with its scale, the same for all frames.
-    camera : str or array_like of shape (3,), optional
+    camera : str, array_like of shape (3,) or Camera, optional
         From where to look: "front", "side", "top", "oblique" or a direction. By default along the
-        normal of a planar motion, and obliquely at any other.
+        normal of a planar motion, and obliquely at any other. Or a `withe.perception.Camera` without
+        distortion, of whose picture `size` then is the size: pixels are where its `project` says, and
+        its `to_plane` turns them into metres.
     ground : float, optional [m]
         Height at which the shadow falls; by default a level plane near the rods, or a little below them.
     label : str, optional
@@ -99,7 +102,7 @@ def animate(
     speed: float = 1.0,
     size: Sequence[int] = (1280, 720),
     color_by: ColorBy = "rod",
-    camera: str | npt.ArrayLike | None = None,
+    camera: Pinhole | str | npt.ArrayLike | None = None,
     ground: float | None = None,
     progress: bool | Literal["always"] = True,
 ) -> Path:
@@ -164,7 +167,7 @@ def view(
     *,
     size: Sequence[int] = (1024, 640),
     color_by: ColorBy = "rod",
-    camera: str | npt.ArrayLike | None = None,
+    camera: Pinhole | str | npt.ArrayLike | None = None,
     ground: float | None = None,
     backend: str | None = None,
 ) -> Any:

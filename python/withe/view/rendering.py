@@ -15,6 +15,7 @@ from withe.common.extras import require
 from withe.common.frames import Frames, edges_to_nodes, stencils_to_nodes
 from withe.view import scenery
 from withe.view.graphics import render_window
+from withe.view.pinhole import Pinhole, check_pinhole, look_through, towards
 from withe.view.springs import SpringLines
 from withe.view.surfaces import Surface
 
@@ -53,9 +54,9 @@ class Stage:
     record : Record
     size : pair of int [px]
     color_by : {"rod", "tension", "curvature", "twist", "speed"}
-    camera : str or array_like of shape (3,), optional
-        From where to look: "front", "side", "top", "oblique" or a direction. By default along the
-        normal of a planar motion, and obliquely at any other.
+    camera : str, array_like of shape (3,) or Camera, optional
+        From where to look: "front", "side", "top", "oblique" or a direction, or a camera of given pose and matrix. By
+        default along the normal of a planar motion, and obliquely at any other.
     frames : sequence of int, optional
         What the camera has in view; all frames by default.
     ghosts : sequence of int
@@ -81,7 +82,7 @@ class Stage:
         *,
         size: Sequence[int] = (1280, 720),
         color_by: ColorBy = "rod",
-        camera: str | npt.ArrayLike | None = None,
+        camera: Pinhole | str | npt.ArrayLike | None = None,
         frames: Sequence[int] | None = None,
         ghosts: Sequence[int] = (),
         ground: float | None = None,
@@ -117,6 +118,8 @@ class Stage:
         self._casts = ground is not None or "plane" not in kinds
         nearby = np.concatenate([nodes[:0], *around])
         self._frame_camera(direction, nodes, nearby, ground, 0.0 if color_by == "rod" else _BAR_SHARE)
+        if isinstance(camera, Pinhole):
+            look_through(self.plotter.camera, camera, self.size, nodes)
         self._add_lights(pyvista, direction)
         self._add_obstacles(pyvista, np.concatenate([nodes, nearby]))
         self._add_shadow(pyvista)
@@ -468,10 +471,13 @@ def _checked_size(size: Sequence[int]) -> tuple[int, int]:
     return width, height
 
 
-def _direction(camera: str | npt.ArrayLike | None, positions: FloatArray) -> FloatArray:
+def _direction(camera: Pinhole | str | npt.ArrayLike | None, positions: FloatArray) -> FloatArray:
     """Unit vector from the rods to the camera."""
     if camera is None:
         direction = _facing(positions)
+    elif isinstance(camera, Pinhole):
+        check_pinhole(camera)
+        direction = towards(camera)
     elif isinstance(camera, str):
         if camera not in _DIRECTIONS:
             raise ValueError(f"camera must be one of {str(list(_DIRECTIONS))[1:-1]} or a direction, got {camera!r}")

@@ -1,0 +1,73 @@
+#pragma once
+/// The suspended part of a rod in space: a heavy elastic rod that leaves a flat floor and is held by a gripper.
+///
+/// In units of the gravito-bending length Lgb = (EI / 2w)^(1/3) and of the weight per length w, so that EI = 2. The
+/// lift-off point is the origin, the rod leaves it along x, z is up; s is the length of the unstretched rod from there,
+/// t the tangent, m the moment, n the force of what lies beyond s on what lies before, F that of the floor on the rod:
+///   t' = m x t / 2,  m' = -(1 + e) t x n,  n = -F + s z,  e = n.t / EA,  r' = (1 + e) t,
+///   t(0) = x,  m(0) = -2 kappa z,  r(0) = 0:
+/// curvature kappa in the floor's plane (kappa > 0 bends towards -y), none across it, for a floor gives no moment about
+/// y; and no twist anywhere, for m.t is constant along a rod whose section bends alike in all directions.
+/// [Kirchhoff's rod with stretch; dissertation (9.1), with what (9.3) leaves of it.]
+
+#include <array>
+#include <vector>
+
+#include "elastica/shooting.hpp"
+
+namespace withe {
+
+using RodVector = std::array<double, 3>;
+
+/// What is asked of the held end, and which two of the floor's three forces are unknown for it.
+enum class RodEnd {
+  no_moment,    ///< a gripper that bends nothing; F along y and z
+  plane_of_xz,  ///< position along x and z; F along x and z
+};
+
+/// States t, m; with the position r where `end` asks for it.
+template <RodEnd end>
+class RodProblem {
+ public:
+  static constexpr int kCoupled = 6, kParameters = 2;
+  static constexpr int kStates = end == RodEnd::no_moment ? kCoupled : kCoupled + 3;
+  using Path = ShootingPath<kStates, kParameters>;
+  using System = ShootingSystem<kStates, kParameters>;
+
+  double stretch_stiffness = 1e9;  ///< EA [w Lgb]
+  double given_force = 0;          ///< the third component of F
+  std::array<double, 2> goal{};    ///< of the position
+  std::vector<double> cuts;        ///< s of each node; the last one is the suspended length
+
+  RodVector floor_force(const Path& path) const;
+  void linearise(const Path& path, System& system) const;
+
+ private:
+  void put_end(const Path& path, System& system) const;
+};
+
+/// Cuts no further apart than .6 Lgb, over which no error grows by more than twenty times up to a length of 50.
+std::vector<double> rod_cuts(double suspended);
+
+/// A point of a solved rod.
+struct RodPoint {
+  RodVector tangent{}, moment{}, position{};
+  std::array<double, 4> rotation{1, 0, 0, 0};  ///< unit quaternion (w, x, y, z) from the frame at lift-off
+};
+
+/// Everything that a solved path implies, by one more pass along it.
+struct RodShape {
+  double suspended = 0, stretch_stiffness = 1e9;
+  RodVector floor_force{};
+  std::vector<double> places;    ///< s of the points
+  std::vector<RodPoint> points;  ///< at `spread` points a segment of the path, the cuts among them
+  double residual = 0;           ///< largest gap at a cut or at the end
+  double lowest = 0;             ///< least height of the points
+};
+template <RodEnd end>
+RodShape rod_shape(const RodProblem<end>& problem, const typename RodProblem<end>::Path& path, int spread);
+
+extern template class RodProblem<RodEnd::no_moment>;
+extern template class RodProblem<RodEnd::plane_of_xz>;
+
+}  // namespace withe

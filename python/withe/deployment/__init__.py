@@ -1,0 +1,30 @@
+"""Cables that are laid down along a pattern.
+
+Lengths here are in Lgb = (EI / 2w)^(1/3), the gravito-bending length, and forces in w Lgb, w the weight of the rod per
+length, unless they belong to a particular cable: then in m and N.
+
+>>> import withe
+>>> found = withe.deployment.grasp(5.0, 0.25)
+>>> print(found.position.round(3), found.force.round(3))
+[ 2.505 -0.784  3.444] [0.    0.2   1.493]
+"""
+
+from withe.deployment.cable import Cable, MeasuredCable, measure
+from withe.deployment.feasibility import Feasibility, Slip
+from withe.deployment.grasping import Grasp, grasp
+from withe.deployment.pattern import Pattern
+from withe.deployment.planning import Phase, Plan, plan
+
+__all__ = [
+    "Cable",
+    "Feasibility",
+    "Grasp",
+    "MeasuredCable",
+    "Pattern",
+    "Phase",
+    "Plan",
+    "Slip",
+    "grasp",
+    "measure",
+    "plan",
+]

@@ -1,0 +1,116 @@
+"""Cables: how long and thick they are, and how stiff against their own weight."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from withe.common import validation
+
+__all__ = ["Cable", "MeasuredCable", "measure"]
+
+LOOP_HEIGHT = 1.142240  # of a loop that hangs on a floor, touching it tangentially [Lgb]: .90660 (EI / w)^(1/3)
+_TABLE = {  # Lgb, radius, length [m] [Choi, dissertation, table 9.1]
+    1: (0.018, 1.6e-3, 0.875),
+    2: (0.032, 1.6e-3, 0.885),
+    3: (0.034, 2.0e-3, 0.89),
+    4: (0.0286, 3.2e-3, 0.84),
+    5: (0.0801, 1.8e-3, 0.87),
+}
+
+
+@dataclass(frozen=True)
+class Cable:
+    """A round cable, straight where nothing acts on it.
+
+    Parameters
+    ----------
+    length, radius : float [m]
+    gravito_bending_length : float [m]
+        Lgb = (EI / 2w)^(1/3), EI the bending stiffness and w the weight per length: `measure` finds it with a ruler.
+
+    Raises
+    ------
+    ValueError
+        A length that is not positive, or a cable that is no longer than it is thick.
+
+    Examples
+    --------
+    >>> import withe
+    >>> cable = withe.deployment.Cable.dlo(2)
+    >>> print(f"{cable.length / cable.gravito_bending_length:.1f} Lgb long, ks {cable.stretch_stiffness:.0f}")
+    27.7 Lgb long, ks 1600
+    """
+
+    length: float
+    radius: float
+    gravito_bending_length: float
+
+    def __post_init__(self) -> None:
+        for name in ("length", "radius", "gravito_bending_length"):
+            object.__setattr__(self, name, validation.positive(getattr(self, name), name))
+        if self.length <= 2.0 * self.radius:
+            raise ValueError(f"length must exceed the cable's thickness of {2 * self.radius:g} m, got {self.length:g}")
+
+    @property
+    def stretch_stiffness(self) -> float:
+        """EA Lgb^2 / EI of a solid round section, 4 (Lgb / radius)^2 (dissertation, (9.10))."""
+        return 4.0 * (self.gravito_bending_length / self.radius) ** 2
+
+    @classmethod
+    def dlo(cls, number: int) -> Cable:
+        """One of the five of the experiments: pink and green silicone rubber, rope, thick rubber, a USB cable.
+
+        Parameters
+        ----------
+        number : int
+            1 to 5 [Choi, dissertation, table 9.1].
+        """
+        lgb, radius, length = _TABLE[validation.integer(number, "number", 1, 5)]
+        return cls(length, radius, lgb)
+
+
+@dataclass(frozen=True)
+class MeasuredCable:
+    """A gravito-bending length with its standard deviation.
+
+    Attributes
+    ----------
+    gravito_bending_length, error : float [m]
+    """
+
+    gravito_bending_length: float
+    error: float
+
+
+def measure(*, height: float, error: float = 5e-4) -> MeasuredCable:
+    """Find a cable's gravito-bending length Lgb = (EI / 2w)^(1/3) with a ruler.
+
+    Fold the cable back over itself on a table, one layer on the other, and let it go: it forms a loop whose highest
+    point is 1.1422 Lgb above the lower layer, however long the cable is [Pan et al. 2020; (9.10) has it for another
+    length, (EI / w)^(1/3), which is 26 % greater].
+
+    Parameters
+    ----------
+    height : float [m]
+        Of the loop's highest point above the table, from centreline to centreline.
+    error : float [m]
+        Standard deviation of it.
+
+    Returns
+    -------
+    MeasuredCable
+
+    Raises
+    ------
+    ValueError
+        A height that is not positive, a negative error.
+
+    Examples
+    --------
+    >>> import withe
+    >>> found = withe.deployment.measure(height=0.0366)
+    >>> print(f"{1e3 * found.gravito_bending_length:.1f} mm, give or take {1e3 * found.error:.1f}")
+    32.0 mm, give or take 0.4
+    """
+    height, error = validation.positive(height, "height"), validation.non_negative(error, "error")
+    return MeasuredCable(height / LOOP_HEIGHT, error / LOOP_HEIGHT)

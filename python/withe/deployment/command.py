@@ -1,0 +1,95 @@
+"""The command `withe deploy`."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from withe.deployment.cable import Cable
+from withe.deployment.pattern import Pattern
+from withe.deployment.planning import plan
+
+__all__ = ["add_parser", "run"]
+
+
+def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add `deploy` to the commands of a parser."""
+    parser = commands.add_parser(
+        "deploy",
+        help="plan how to lay a cable along a pattern",
+        description=(
+            "Plan how a gripper lays a cable along a pattern; write NAME_plan.csv (t,x,y,z,qx,qy,qz,qw), NAME_plan.json"
+            " and NAME_plan.png, and say where friction will not hold it."
+        ),
+    )
+    parser.add_argument("pattern", type=Path, help="a CSV file of x, y [m], one row a point, or a picture with --scale")
+    parser.add_argument("--scale", type=float, help="size of a pixel of a picture [m]")
+    parser.add_argument("--dlo", type=int, help="one of the five cables of the experiments, 1 to 5")
+    parser.add_argument("--length", type=float, help="of the cable [m]")
+    parser.add_argument("--radius", type=float, help="of the cable [m]")
+    parser.add_argument("--lgb", type=float, help="its gravito-bending length (EI / 2w)^(1/3) [m]")
+    parser.add_argument("--friction", type=float, default=0.4, help="coefficient with the floor (default: %(default)s)")
+    parser.add_argument("--controller", choices=["exact", "least_friction", "intuitive"], default="exact")
+    parser.add_argument("--speed", type=float, default=0.025, help="along the pattern [m/s] (default: %(default)s)")
+    parser.add_argument(
+        "--smoothing", type=float, default=1e-3, help="farthest from what is given [m] (default: %(default)s)"
+    )
+    parser.add_argument("--out", type=Path, default=Path("."), help="folder to write to (default: here)")
+    parser.add_argument("--no-picture", action="store_true", help="write no PNG file")
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Plan, write the files and say what will hold."""
+    cable = _cable(arguments)
+    if arguments.pattern.suffix.lower() == ".csv":
+        pattern = Pattern(_points(arguments.pattern), smoothing=arguments.smoothing)
+    else:
+        pattern = Pattern(image=arguments.pattern, scale=arguments.scale, smoothing=arguments.smoothing)
+    motion = plan(cable, pattern, arguments.controller, speed=arguments.speed)
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    stem = arguments.out / f"{arguments.pattern.stem}_plan"
+    written = [stem.with_suffix(".csv"), stem.with_suffix(".json")]
+    for path in written:
+        motion.save(path)
+    if not arguments.no_picture:
+        written.append(stem.with_suffix(".png"))
+        motion.plot(arguments.friction).savefig(written[-1], dpi=120)
+    lines = [repr(motion), f"may go at up to {1e3 * motion.fastest:.0f} mm/s"]
+    if arguments.controller != "intuitive":
+        lines.append(str(motion.feasibility(arguments.friction)))
+    sys.stdout.write("\n".join([*lines, *map(str, written)]) + "\n")
+    return 0
+
+
+def _cable(arguments: argparse.Namespace) -> Cable:
+    sizes = (arguments.length, arguments.radius, arguments.lgb)
+    if arguments.dlo is not None and all(size is None for size in sizes):
+        return Cable.dlo(arguments.dlo)
+    if arguments.dlo is not None or any(size is None for size in sizes):
+        raise ValueError("the cable needs --dlo, or --length, --radius and --lgb")
+    return Cable(*sizes)
+
+
+def _points(path: Path) -> npt.NDArray[np.float64]:
+    """Columns x, y of a file; a first row that is no numbers is a header."""
+    lines = path.read_text(encoding="utf-8").splitlines()
+    if lines and not _is_row(lines[0]):
+        lines = lines[1:]
+    rows = [line for line in lines if line.strip()]
+    bad = next((row for row in rows if not _is_row(row)), None)
+    if bad is not None:
+        raise ValueError(f"{path.name} must hold rows x,y in m, got {bad!r}")
+    return np.array([[float(number) for number in row.split(",")[:2]] for row in rows]).reshape(-1, 2)
+
+
+def _is_row(line: str) -> bool:
+    numbers = line.split(",")
+    try:
+        return len(numbers) >= 2 and all(np.isreal(float(number)) for number in numbers[:2])
+    except ValueError:
+        return False

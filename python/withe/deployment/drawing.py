@@ -1,0 +1,65 @@
+"""Figures of planned patterns, by matplotlib, which is imported when first used."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from withe.common.extras import require
+from withe.deployment.feasibility import Feasibility
+from withe.deployment.pattern import Pattern
+
+__all__ = ["draw_plan"]
+
+FloatArray = npt.NDArray[np.float64]
+_MOST_SHOWN = 2.0  # coefficients of friction
+
+
+def draw_plan(pattern: Pattern, jaw: FloatArray, found: Feasibility, title: str) -> Any:
+    """What `Plan.plot` does; `jaw` are its positions, shape (n, 3) [m]."""
+    pyplot = require("matplotlib.pyplot", "view")
+    figure, (floor, needs) = pyplot.subplots(1, 2, figsize=(11.0, 5.2), layout="constrained")
+    _draw_floor(figure, floor, pattern, jaw, found)
+    _draw_needs(needs, found, title)
+    return figure
+
+
+def _draw_floor(figure: Any, axes: Any, pattern: Pattern, jaw: FloatArray, found: Feasibility) -> None:
+    collections = require("matplotlib.collections", "view")
+    axes.plot(1e3 * jaw[:, 0], 1e3 * jaw[:, 1], color="0.75", lw=1.0, label="jaw, seen from above")
+    axes.plot(1e3 * pattern.raw[:, 0], 1e3 * pattern.raw[:, 1], color="k", lw=0.8, ls=":", label="given pattern")
+    points = 1e3 * pattern.points
+    lines = collections.LineCollection(
+        np.stack([points[:-1], points[1:]], 1),
+        array=np.minimum(found.needed[:-1], _MOST_SHOWN),
+        cmap="viridis",
+        lw=4.0,
+        clim=(0.0, min(_MOST_SHOWN, max(found.friction, float(found.needed.max())))),
+        capstyle="round",
+    )
+    axes.add_collection(lines)
+    axes.plot(*points[0], "o", color="k", ms=6, label="free end")
+    axes.set(xlabel="x [mm]", ylabel="y [mm]", title="pattern", aspect="equal")
+    axes.margins(0.08)
+    figure.legend(loc="outside lower left", fontsize="small", ncols=3)
+    figure.colorbar(lines, ax=axes, label="needed coefficient of friction", shrink=0.8)
+
+
+def _draw_needs(axes: Any, found: Feasibility, title: str) -> None:
+    s = 1e3 * found.arc_length
+    for name, needed in (("floor", found.floor), ("lift-off", found.lift_off), ("free end", found.free_end)):
+        axes.plot(s, needed, label=name, lw=1.5)
+    axes.axhline(found.friction, color="k", ls="--", lw=1.0, label="there is")
+    for slip in found.slips:
+        axes.axvspan(1e3 * slip.start, 1e3 * slip.end, color="tab:red", alpha=0.12, lw=0)
+    top = max(1.3 * found.friction, min(_MOST_SHOWN, 1.1 * float(np.max(np.maximum(found.floor, found.lift_off)))))
+    axes.set(
+        xlabel="arc length from the free end [mm]",
+        ylabel="needed coefficient of friction",
+        title=title,
+        ylim=(0.0, top),
+        xlim=(0.0, s[-1]),
+    )
+    axes.legend(loc="best", fontsize="small")

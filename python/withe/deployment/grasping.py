@@ -1,0 +1,211 @@
+"""Where to hold a rod so that it is laid down where it should lie."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+import numpy.typing as npt
+
+from withe._core import GraspTable
+from withe.common import validation
+from withe.errors import ConvergenceError
+
+__all__ = ["Grasp", "grasp"]
+
+FloatArray = npt.NDArray[np.float64]
+_BEND_STIFFNESS = 2.0  # EI in units of w Lgb^2
+_SHARES = (0.0, 0.25, 0.5, 0.7, 0.85, 1.0, 1.2)  # of curvature^2 that a push along the rod may be [w Lgb^3]
+_ENOUGH = 8.0  # [Lgb] of suspended length: for longer ones forces are the same
+_TWIST_STIFFNESS = _BEND_STIFFNESS / 1.5  # GJ of a round rod of incompressible material; it decides stability only
+
+
+@dataclass(frozen=True)
+class Grasp:
+    """How a gripper holds the suspended part of a rod. The arrays have the shape of what was asked for, then (3,).
+
+    The frame is that of the lift-off point: x the direction in which the rod leaves the floor, z up.
+
+    Attributes
+    ----------
+    position : ndarray [Lgb]
+        Of the held end.
+    rotation : ndarray [rad]
+        Rotation vector that turns the frame at lift-off into the jaw's: its first axis is the tangent there.
+    force : ndarray [w Lgb]
+        Of the floor on the suspended part at lift-off.
+    stable : ndarray of bool
+        Whether the energy is a minimum while the jaw holds position and rotation, out of the rod's plane too.
+    residual : ndarray
+        Largest error of the boundary value problem: of tangents, and of moments in w Lgb^2.
+    """
+
+    position: FloatArray
+    rotation: FloatArray
+    force: FloatArray
+    stable: npt.NDArray[np.bool_]
+    residual: FloatArray
+
+    @property
+    def friction(self) -> FloatArray:
+        """Coefficient of friction that lift-off needs: the floor's force along itself over that across."""
+        return np.asarray(np.hypot(self.force[..., 0], self.force[..., 1]) / self.force[..., 2])
+
+
+@cache
+def table() -> GraspTable:
+    """Make the table that solutions begin from, once."""
+    return GraspTable()
+
+
+def grasp(
+    suspended: npt.ArrayLike,
+    curvature: npt.ArrayLike,
+    stretch_stiffness: npt.ArrayLike = 2087.0,
+    *,
+    axial_force: npt.ArrayLike = 0.0,
+) -> Grasp:
+    """Find the grasp that lays a rod with a given curvature at its lift-off point.
+
+    A rod in space, straight and round, hangs between a flat floor, which it leaves along x with a curvature in the
+    floor's plane and none across it, and a jaw that bends it nowhere. In units of Lgb = (EI / 2w)^(1/3) and w,
+
+        t' = m x t / 2,  m' = -(1 + e) t x n,  n = -force + s z,  e = n.t / (2 stretch_stiffness),  r' = (1 + e) t,
+        t(0) = x,  m(0) = -2 curvature z,  m(suspended) = 0,
+
+    (Choi, dissertation, (9.1) and what (9.3) leaves of it), solved by multiple shooting with exact derivatives. The two
+    unknowns are the floor's forces across the rod, along y and z; none acts along it, or a given one.
+
+    Parameters
+    ----------
+    suspended : array_like [Lgb]
+        Length that hangs, .1 to 100. Beyond 7 the forces no longer depend on it.
+    curvature : array_like [1/Lgb]
+        At lift-off, -6 to 6. **A positive one bends the rod towards -y**, to the right of its way, as in the tables of
+        the dissertation's public code; (9.1) has it the other way round.
+    stretch_stiffness : array_like
+        EA Lgb^2 / EI, 4 (Lgb / radius)^2 of a round rod (9.10); at least 100, and 4 times the suspended length.
+    axial_force : array_like [w Lgb]
+        Of the floor on the suspended part along x. A push of some .82 curvature^2 needs least friction.
+
+    Returns
+    -------
+    Grasp
+
+    Raises
+    ------
+    ValueError
+        Not numbers, out of range, or shapes that do not broadcast.
+    ConvergenceError
+        There is no such grasp, as with an axial force that is too large.
+
+    Examples
+    --------
+    >>> import withe
+    >>> found = withe.deployment.grasp(7.0, [0.0, 0.5])
+    >>> print(found.position.round(3), found.friction.round(3))
+    [[ 2.566  0.     5.488]
+     [ 2.307 -1.699  5.334]] [0.    0.302]
+    """
+    names = ("suspended", "curvature", "stretch_stiffness", "axial_force")
+    given = (suspended, curvature, stretch_stiffness, axial_force)
+    arrays = [
+        validation.number_array(value, name, tuple(f"n{i}" for i in range(np.ndim(value))))
+        for name, value in zip(names, given, strict=True)
+    ]
+    try:
+        length, bend, stretch, axial = np.broadcast_arrays(*arrays)
+    except ValueError:
+        shapes = ", ".join(str(array.shape) for array in arrays)
+        raise ValueError(f"{', '.join(names)} must have shapes that broadcast, got {shapes}") from None
+    solver = table()
+    _require_within(length, "suspended", solver.shortest, solver.longest, "Lgb")
+    _require_within(np.abs(bend), "the size of curvature", 0.0, solver.greatest_curvature, "/ Lgb")
+    if not np.all(stretch >= np.maximum(100.0, 4.0 * length)):
+        raise ValueError(
+            f"stretch_stiffness must be at least 100 and 4 times suspended, got {stretch.min():g}: such a rod"
+            " would stretch by an eighth under its own weight"
+        )
+    questions = np.stack([length, bend, 2.0 * stretch, axial, np.zeros_like(axial)], -1).reshape(-1, 5)
+    return _described(solver.grasps(questions, _TWIST_STIFFNESS), questions, length.shape)
+
+
+def _require_within(values: FloatArray, name: str, low: float, high: float, unit: str) -> None:
+    out = values[(values < low) | (values > high)]
+    if out.size:
+        raise ValueError(f"{name} must be from {low:g} to {high:g} {unit}, got {out[0]:g}")
+
+
+def _described(rows: FloatArray, questions: FloatArray, shape: tuple[int, ...]) -> Grasp:
+    unsolved = np.flatnonzero(rows[:, 11] == 0)
+    if unsolved.size:
+        suspended, curvature, _, axial, _ = questions[unsolved[0]]
+        raise ConvergenceError(
+            f"no grasp found for suspended={suspended:g}, curvature={curvature:g}, axial_force={axial:g}"
+        )
+    vectors = (*shape, 3)
+    return Grasp(
+        position=rows[:, :3].reshape(vectors).copy(),
+        rotation=rotation_vectors(rows[:, 3:7]).reshape(vectors),
+        force=rows[:, 7:10].reshape(vectors).copy(),
+        stable=(rows[:, 12] > 0).reshape(shape),
+        residual=rows[:, 10].reshape(shape).copy(),
+    )
+
+
+def least_friction(suspended: FloatArray, curvature: FloatArray, stretch_stiffness: float) -> Grasp:
+    """Grasps with the push along the rod that needs least friction at lift-off, shapes (n,); see `grasp`.
+
+    The push is a share of curvature^2: the best of a few, and of the parabola through it and its neighbours.
+    """
+    count = len(suspended)
+    near = np.minimum(suspended, _ENOUGH)
+
+    def rows_at(share: FloatArray, length: FloatArray = near) -> tuple[FloatArray, FloatArray]:
+        questions = np.stack(
+            [length, curvature, np.full(count, 2.0 * stretch_stiffness), share * curvature**2, np.zeros(count)], -1
+        )
+        rows = np.asarray(table().grasps(questions, _TWIST_STIFFNESS))
+        good = (rows[:, 11] > 0) & (rows[:, 12] > 0) & (rows[:, 9] > 0)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return rows, np.where(good, np.hypot(rows[:, 7], rows[:, 8]) / rows[:, 9], np.inf)
+
+    tried = [rows_at(np.full(count, share)) for share in _SHARES]
+    needed = np.stack([need for _, need in tried])
+    best = np.clip(needed.argmin(0), 1, len(_SHARES) - 2)
+    column = np.arange(count)
+    shares = np.array(_SHARES)
+    x = np.stack([shares[best + i] for i in (-1, 0, 1)])
+    y = np.stack([needed[best + i, column] for i in (-1, 0, 1)])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        left, right = (x[1] - x[0]) * (y[1] - y[2]), (x[1] - x[2]) * (y[1] - y[0])
+        lowest = x[1] - 0.5 * ((x[1] - x[0]) * left - (x[1] - x[2]) * right) / (left - right)
+    refined = rows_at(np.where(np.isfinite(lowest), np.clip(lowest, x[0], x[2]), x[1]))
+    candidates = [refined, *tried]
+    choice = np.stack([need for _, need in candidates]).argmin(0)
+    push = np.stack([rows for rows, _ in candidates])[choice, column, 7]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        chosen, _ = rows_at(np.where(curvature == 0.0, 0.0, push / curvature**2), suspended)
+    questions = np.stack([suspended, curvature, push, push, push], -1)
+    return _described(chosen, questions, (count,))
+
+
+def pivoting(suspended: float, angles: FloatArray, stretch_stiffness: float) -> Grasp:
+    """Grasps of a rod whose free end stands on the floor, at angles above it, without force along it; shape (n,).
+
+    Rotations are those from the floor's frame.
+    """
+    count = len(angles)
+    questions = np.zeros((count, 5))
+    questions[:, 0], questions[:, 2], questions[:, 4] = suspended, 2.0 * stretch_stiffness, angles
+    return _described(table().grasps(questions, _TWIST_STIFFNESS), questions, (count,))
+
+
+def rotation_vectors(quaternions: FloatArray) -> FloatArray:
+    """Rotation vectors of unit quaternions (w, x, y, z), shapes (n, 3) and (n, 4) [rad]."""
+    size = np.linalg.norm(quaternions[:, 1:], axis=1)
+    angle = 2.0 * np.arctan2(size, quaternions[:, 0])
+    with np.errstate(invalid="ignore", divide="ignore"):
+        factor = np.where(size > 0.0, angle / size, 2.0)
+    return np.asarray(factor[:, None] * quaternions[:, 1:])

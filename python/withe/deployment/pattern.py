@@ -1,0 +1,259 @@
+"""Patterns on a floor that a cable is to lie along."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from withe.common import validation
+from withe.deployment.cable import Cable
+from withe.deployment.feasibility import Controller, Feasibility, examine
+from withe.deployment.smoothing import fourth_differences, smooth
+from withe.perception import trace
+
+__all__ = ["Pattern"]
+
+FloatArray = npt.NDArray[np.float64]
+_FUNCTION_SAMPLES = 2001
+_BENT_START = 1.0  # [rad]: curvature at a function's start times its length that asks for a lead-in
+
+
+class Pattern:
+    """A curve on the floor, smoothed and resampled by its length.
+
+    Exactly one of `points`, `function` and `image` says what it is. The cable's free end lies at its beginning.
+
+    Parameters
+    ----------
+    points : array_like of shape (n, 2) or (n, 3) [m]
+        In order along the curve; of a third column, the height, nothing is used.
+    function : callable
+        From an array of shape (n,) of shares of the way, 0 to 1, to points of shape (n, 2) [m].
+    image : str, Path or array_like of shape (height, width, 3)
+        A picture of one drawn curve, traced by `withe.perception`; the longest one is taken, y upwards. Needs `scale`.
+    scale : float [m]
+        Of one pixel.
+    smoothing : float [m]
+        How far the pattern may depart from what was given: of all such curves it is that which a floor holds with
+        least friction (the greatest EI x'''' along it is least). A free end has no moment, so that a curve that begins
+        bent begins a little straighter.
+    lead_in : float [m]
+        Length of an extra piece before the beginning, along which curvature grows from zero. None: that over which the
+        cable turns by one radian, for a `function` that begins bent.
+    nodes : int
+        Number of points of the pattern, 50 to 2000.
+
+    Attributes
+    ----------
+    raw : ndarray of shape (m, 2) [m]
+        What was given, lead-in included.
+    arc_length : ndarray of shape (nodes,) [m]
+        Evenly spaced.
+    points : ndarray of shape (nodes, 2) [m]
+    tangent : ndarray of shape (nodes, 2)
+    curvature : ndarray of shape (nodes,) [1/m]
+        Positive to the left of its way.
+    curvature_slope, curvature_bend : ndarray of shape (nodes,) [1/m^2], [1/m^3]
+        First and second derivative of the curvature by arc length.
+    deviation : float [m]
+        Greatest distance of a raw point from the pattern.
+    lead_in : float [m]
+
+    Raises
+    ------
+    ValueError
+        None or several of the three, fewer than 3 points, repeated points, NaN, a picture without a curve.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import withe
+    >>> x = np.linspace(0.0, 0.5, 101)
+    >>> pattern = withe.deployment.Pattern(np.stack([x, 0.03 * np.sin(4 * np.pi * x)], 1))
+    >>> print(f"{pattern.length:.3f} m, radius {1 / abs(pattern.curvature).max():.2f} m, {pattern.deviation < 1e-3}")
+    0.518 m, radius 0.21 m, True
+    """
+
+    def __init__(
+        self,
+        points: npt.ArrayLike | None = None,
+        *,
+        function: Callable[[FloatArray], npt.ArrayLike] | None = None,
+        image: str | os.PathLike[str] | npt.ArrayLike | None = None,
+        scale: float | None = None,
+        smoothing: float = 1e-3,
+        lead_in: float | None = None,
+        nodes: int = 301,
+    ) -> None:
+        if sum(given is not None for given in (points, function, image)) != 1:
+            raise ValueError("a pattern needs exactly one of points, function and image")
+        smoothing = validation.positive(smoothing, "smoothing")
+        nodes = validation.integer(nodes, "nodes", 50, 2000)
+        if points is not None:
+            raw = _checked(points, "points")
+        elif function is not None:
+            share = np.linspace(0.0, 1.0, _FUNCTION_SAMPLES)
+            raw = _checked(validation.function(function, "function")(share), "the values of function")
+        else:
+            raw = _drawn(image, scale)
+        start = _start_curvature(raw)
+        if lead_in is None:
+            turns = abs(start) * _lengths(raw)[-1]
+            lead_in = 2.0 / abs(start) if function is not None and turns > _BENT_START else 0.0
+        self.lead_in = validation.non_negative(lead_in, "lead_in")
+        if self.lead_in > 0.0:
+            raw = np.concatenate([_lead_in(raw, start, self.lead_in), raw])
+        self.raw = raw
+        self._resample(smoothing, nodes)
+
+    def _resample(self, smoothing: float, nodes: int) -> None:
+        from scipy.interpolate import make_interp_spline
+
+        lengths = _lengths(self.raw)
+        even = np.linspace(0.0, lengths[-1], nodes)
+        sampled = np.stack([np.interp(even, lengths, self.raw[:, i]) for i in range(2)], 1)
+        moved = smooth(sampled, even[1], smoothing)
+        curve = make_interp_spline(even, moved, k=5)
+        fine = np.linspace(0.0, even[-1], 20 * nodes)
+        speed = np.linalg.norm(curve(fine, 1), axis=1)
+        travelled = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(fine))])
+        self.arc_length = np.linspace(0.0, travelled[-1], nodes)
+        curve = make_interp_spline(self.arc_length, curve(np.interp(self.arc_length, travelled, fine)), k=5)
+        first, second, third = (curve(self.arc_length, order) for order in (1, 2, 3))
+        self.points: FloatArray = curve(self.arc_length)
+        fourth = fourth_differences(nodes) @ self.points / self.arc_length[1] ** 4  # what smoothing kept small
+        fourth[-2:] = fourth[-3]
+        self.tangent: FloatArray = first / np.linalg.norm(first, axis=1)[:, None]
+        self.curvature: FloatArray = _cross(first, second)
+        self.curvature_slope: FloatArray = _cross(first, third)
+        self.curvature_bend: FloatArray = _cross(first, fourth) + _cross(second, third)
+        self.deviation = float(distances(sampled, self.points).max())
+
+    @property
+    def length(self) -> float:
+        """Length of the pattern, lead-in included [m]."""
+        return float(self.arc_length[-1])
+
+    @cached_property
+    def crossings(self) -> FloatArray:
+        """Pairs of arc lengths at which the pattern crosses itself, shape (crossings, 2) [m]."""
+        a, b = self.points[:-1], self.points[1:]
+        way = b - a
+        apart = a[None] - a[:, None]
+        turn = way[:, None, 0] * way[None, :, 1] - way[:, None, 1] * way[None, :, 0]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            along = (apart[..., 0] * way[None, :, 1] - apart[..., 1] * way[None, :, 0]) / turn
+            other = (apart[..., 0] * way[:, None, 1] - apart[..., 1] * way[:, None, 0]) / turn
+        first, second = np.nonzero((along >= 0) & (along < 1) & (other >= 0) & (other < 1))
+        later = second > first + 1
+        first, second = first[later], second[later]
+        spacing = self.arc_length[1]
+        places = np.stack([first + along[first, second], second + other[first, second]], 1)
+        return np.asarray(spacing * places)
+
+    def feasibility(self, cable: Cable, friction: float, controller: Controller = "exact") -> Feasibility:
+        """Say where friction holds the cable on the pattern while it is laid, and where not.
+
+        Parameters
+        ----------
+        cable : Cable
+        friction : float
+            Coefficient between cable and floor.
+        controller : {"exact", "least_friction"}
+            How the cable is laid.
+
+        Returns
+        -------
+        Feasibility
+
+        Raises
+        ------
+        ValueError
+            Negative friction; a cable shorter than the pattern, or one that cannot bend so tightly.
+
+        Examples
+        --------
+        >>> import withe
+        >>> angle = np.linspace(0.0, 1.6 * np.pi, 200)
+        >>> circle = withe.deployment.Pattern(0.09 * np.stack([np.sin(angle), 1 - np.cos(angle)], 1), lead_in=0.15)
+        >>> found = circle.feasibility(withe.deployment.Cable.dlo(2), friction=0.4)
+        >>> print(found.feasible, f"{found.lift_off.max():.2f}")
+        True 0.27
+        """
+        return examine(self, cable, friction, controller)
+
+    def __repr__(self) -> str:
+        away = f"{1e3 * self.deviation:.1f} mm from what was given"
+        return f"Pattern({self.length:.3f} m, {len(self.points)} points, {away})"
+
+
+def distances(points: FloatArray, curve: FloatArray) -> FloatArray:
+    """Distance of each point from a polyline, shapes (n, 2) and (m, 2)."""
+    start, way = curve[:-1], np.diff(curve, axis=0)
+    size = (way**2).sum(1)
+    along = ((points[:, None] - start) * way).sum(-1) / size
+    nearest = start + np.clip(along, 0.0, 1.0)[..., None] * way
+    return np.asarray(np.linalg.norm(points[:, None] - nearest, axis=-1).min(1))
+
+
+def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
+    return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
+
+
+def _lengths(points: FloatArray) -> FloatArray:
+    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+
+
+def _checked(points: Any, what: str) -> FloatArray:
+    array = validation.number_array(points, what, ("n", 2), ("n", 3))[:, :2]
+    if len(array) < 3:
+        raise ValueError(f"{what} must be at least 3, got {len(array)}")
+    same = np.flatnonzero((np.diff(array, axis=0) == 0.0).all(1))
+    if same.size:
+        raise ValueError(f"{what} must not repeat: rows {same[0]} and {same[0] + 1} are the same")
+    return array
+
+
+def _drawn(image: Any, scale: float | None) -> FloatArray:
+    """The longest curve of a picture [m], y upwards."""
+    if scale is None:
+        raise ValueError("a pattern from an image needs scale, the size of a pixel in m")
+    size = validation.positive(scale, "scale")
+    tracing = trace(image)
+    curves = [line for line in tracing.centrelines if len(line) >= 3]
+    if not curves:
+        raise ValueError("image must show a curve, none was found in it")
+    longest = max(curves, key=lambda line: float(_lengths(line)[-1]))
+    return np.asarray(size * longest * [1.0, -1.0])
+
+
+def _start_curvature(points: FloatArray) -> float:
+    """Of the circle through the beginning, a tenth of the way and the point between them."""
+    lengths = _lengths(points)
+    a, b, c = (
+        np.array([np.interp(share * lengths[-1], lengths, points[:, i]) for i in range(2)])
+        for share in (0.0, 0.02, 0.04)
+    )
+    area = (b - a)[0] * (c - a)[1] - (b - a)[1] * (c - a)[0]
+    sides = np.linalg.norm(b - a) * np.linalg.norm(c - b) * np.linalg.norm(c - a)
+    return float(2.0 * area / sides) if sides > 0.0 else 0.0
+
+
+def _lead_in(points: FloatArray, curvature: float, length: float) -> FloatArray:
+    """Points before the first one: curvature falls smoothly to zero, backwards from there."""
+    count = 200
+    back = np.linspace(0.0, 1.0, count + 1)
+    lengths = _lengths(points)
+    ahead = np.array([np.interp(min(2e-2 * lengths[-1], lengths[-1]), lengths, points[:, i]) for i in range(2)])
+    chord = ahead - points[0]
+    heading = np.arctan2(chord[1], chord[0]) - 0.5 * curvature * 2e-2 * lengths[-1]
+    # Curvature (1 - 3 u^2 + 2 u^3) of its value, u from 0 at the beginning of the pattern to 1 where it is straight.
+    angle = heading - curvature * length * (back - back**3 + 0.5 * back**4)
+    middle = 0.5 * (angle[1:] + angle[:-1])
+    steps = -np.stack([np.cos(middle), np.sin(middle)], 1) * length / count
+    return np.asarray((points[0] + np.cumsum(steps, axis=0))[::-1])

@@ -1,0 +1,173 @@
+"""Least greatest values: the curve near given points, and the tension along a cable, that a floor holds most easily."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+__all__ = ["fourth_differences", "least_tension", "smooth"]
+
+FloatArray = npt.NDArray[np.float64]
+_POWERS = (2, 4, 8)  # of the norm that stands for the greatest value
+_ROUNDS = 12  # of Newton's method at each
+_BARRIER = 1e-2
+
+
+class _Norm:
+    """Sum of |r|^p / p over rows r in the plane, r = matrix x + offset with all first components before all second."""
+
+    def __init__(self, matrix: Any, offset: FloatArray) -> None:
+        self.matrix, self.offset = matrix, offset
+        self.power, self.scale = 2, 1.0
+
+    def sizes(self, x: FloatArray) -> FloatArray:
+        return np.asarray(np.linalg.norm((self.matrix @ x + self.offset).reshape(2, -1), axis=0))
+
+    def value(self, x: FloatArray) -> float:
+        return float(((self.sizes(x) / self.scale) ** self.power).sum() / self.power)
+
+    def derivatives(self, x: FloatArray) -> tuple[FloatArray, Any]:
+        """Gradient |r|^(p-2) r and Hessian |r|^(p-2) (1 + (p-2) rr / |r|^2), both through the matrix."""
+        rows = (self.matrix @ x + self.offset).reshape(2, -1)
+        size = np.linalg.norm(rows, axis=0)
+        weight = (size / self.scale) ** (self.power - 2) / self.scale**2
+        direction = rows / np.maximum(size, 1e-300)
+        inner = _blocks(weight, (self.power - 2) * weight, direction)
+        return self.matrix.T @ (weight * rows).ravel(), self.matrix.T @ inner @ self.matrix
+
+
+def _blocks(plain: FloatArray, along: FloatArray, direction: FloatArray) -> Any:
+    """Matrix of 2 x 2 blocks plain I + along dd, one a point, over all first and then all second components."""
+    from scipy import sparse
+
+    mixed = along * direction[0] * direction[1]
+    rows = [[plain + along * direction[0] ** 2, mixed], [mixed, plain + along * direction[1] ** 2]]
+    return sparse.bmat([[sparse.diags(block) for block in row] for row in rows])
+
+
+def _minimised(norm: _Norm, x: FloatArray, extra: Any) -> FloatArray:
+    """Newton's method in norms of rising power; `extra(x)` gives value, gradient and Hessian of what is added."""
+    from scipy.sparse.linalg import splu
+
+    for power in _POWERS:
+        scale = float(norm.sizes(x).max())
+        if scale == 0.0:
+            break
+        norm.power, norm.scale = power, scale
+        for _ in range(_ROUNDS):
+            added, slope, bend = extra(x)
+            gradient, hessian = norm.derivatives(x)
+            step = -splu((hessian + bend).tocsc()).solve(gradient + slope)
+            value, length = norm.value(x) + added, 1.0
+            while length > 1e-4 and not norm.value(x + length * step) + extra(x + length * step)[0] < value:
+                length /= 2
+            if length <= 1e-4:
+                break
+            x = x + length * step
+    return x
+
+
+def smooth(points: FloatArray, spacing: float, deviation: float) -> FloatArray:
+    """Move points, evenly spaced along a curve, by at most `deviation` so that the floor must hold least.
+
+    Without tension, what a floor must give an elastic rod per length is EI x'''', with x'' = x''' = 0 at the free end.
+    Its greatest size is a convex function of the points: an 8-norm of it is minimised with a logarithmic barrier at
+    `deviation`.
+
+    Parameters
+    ----------
+    points : ndarray of shape (n, 2) [m]
+    spacing, deviation : float [m]
+
+    Returns
+    -------
+    ndarray of shape (n, 2) [m]
+    """
+    from scipy import sparse
+
+    fourth = fourth_differences(len(points)) / spacing**4
+    both = sparse.block_diag([fourth, fourth]).tocsr()
+    raw = points.T.ravel()
+
+    def barrier(x: FloatArray) -> tuple[float, FloatArray, Any]:
+        away = ((x - raw) / deviation).reshape(2, -1)
+        room = 1.0 - (away**2).sum(0)
+        if not np.all(room > 0.0):
+            return np.inf, away.ravel(), sparse.identity(len(x))
+        slope = 2.0 * _BARRIER / deviation * away / room
+        bend = _blocks(2 * _BARRIER / (deviation**2 * room), 4 * _BARRIER / (deviation * room) ** 2, away)
+        return float(-_BARRIER * np.log(room).sum()), slope.ravel(), bend
+
+    start = _quadratic(both, raw, deviation)
+    return _minimised(_Norm(both, np.zeros(2 * len(points))), start, barrier).reshape(2, -1).T
+
+
+def least_tension(middle: FloatArray, across: FloatArray, along: FloatArray, spacing: float) -> FloatArray:
+    """Size of (across - middle n, along + n') on each interval, for the n that makes the greatest least.
+
+    Parameters
+    ----------
+    middle, across, along : ndarray of shape (intervals,)
+        n is 0 at the beginning of the first one.
+    spacing : float
+
+    Returns
+    -------
+    ndarray of shape (intervals,)
+    """
+    from scipy import sparse
+
+    count = len(middle)
+    shape = (count, count)
+    mean = sparse.diags([0.5 * middle[1:], 0.5 * middle], [-1, 0], shape=shape)
+    slope = sparse.diags([-1.0 / spacing, 1.0 / spacing], [-1, 0], shape=shape)
+    norm = _Norm(sparse.vstack([-mean, slope]).tocsr(), np.concatenate([across, along]))
+    light = 1e-9 * sparse.identity(count)  # where nothing is needed any tension would do
+
+    def ridge(x: FloatArray) -> tuple[float, FloatArray, Any]:
+        return 0.5e-9 * float(x @ x), 1e-9 * x, light
+
+    return norm.sizes(_minimised(norm, np.zeros(count), ridge))
+
+
+def fourth_differences(count: int) -> Any:
+    """Fourth differences at every point.
+
+    Before the first one the curve goes on straight, a free end; at the last two nothing is asked, for there the rod
+    goes on.
+    """
+    from scipy import sparse
+
+    matrix = sparse.diags([1.0, -4.0, 6.0, -4.0, 1.0], [-2, -1, 0, 1, 2], shape=(count, count)).tolil()
+    # x(-1) = 2 x0 - x1, x(-2) = 3 x0 - 2 x1.
+    matrix[0, :3] = [6 - 8 + 3, -4 + 4 - 2, 1]
+    matrix[1, :4] = [-4 + 2, 6 - 1, -4, 1]
+    matrix[count - 2 :] = 0.0
+    return matrix.tocsr()
+
+
+def _quadratic(both: Any, raw: FloatArray, deviation: float) -> FloatArray:
+    """Least squares of what the floor gives, weighed against those of the distance so that the greatest is .9."""
+    from scipy import sparse
+    from scipy.sparse.linalg import splu
+
+    square, unit = (both.T @ both).tocsc(), sparse.identity(len(raw), format="csc")
+
+    def solved(log_weight: float) -> FloatArray:
+        return np.asarray(splu(unit + np.exp(log_weight) * square).solve(raw))
+
+    def farthest(x: FloatArray) -> float:
+        return float(np.linalg.norm((x - raw).reshape(2, -1), axis=0).max())
+
+    low, high = np.log(1e-30), np.log(1e-4)
+    if farthest(solved(high)) <= 0.9 * deviation:
+        return solved(high)
+    for _ in range(20):
+        middle = 0.5 * (low + high)
+        if farthest(solved(middle)) > 0.9 * deviation:
+            high = middle
+        else:
+            low = middle
+    return solved(low)

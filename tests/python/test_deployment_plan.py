@@ -1,0 +1,157 @@
+"""Plans of a gripper that lays a cable: the motion, its files, the command line, and what is refused."""
+
+import json
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import withe
+from withe.__main__ import main
+from withe.deployment import Cable, Pattern, plan
+
+CABLE = Cable.dlo(2)
+
+
+def wave(height=0.03, count=300):
+    x = np.linspace(0.0, 0.5, count)
+    return np.stack([x, height * np.sin(4 * np.pi * x)], 1)
+
+
+@pytest.fixture(scope="module")
+def motion():
+    return plan(CABLE, Pattern(wave()))
+
+
+def phase(motion, name):
+    return next(phase for phase in motion.phases if phase.name == name)
+
+
+def during(motion, name):
+    part = phase(motion, name)
+    return (motion.times >= part.start) & (motion.times <= part.end)
+
+
+def test_each_pose_of_laying_is_the_grasp_of_its_place(motion):
+    # Algorithm 12, written anew with matrices: q = qC + R_t q*, R = R_t exp(e).
+    pattern, lgb = motion.pattern, CABLE.gravito_bending_length
+    rows = np.flatnonzero(during(motion, "lay") & (motion.laid > 0.01) & (motion.laid < pattern.length - 0.01))[::40]
+    for row in rows:
+        s = motion.laid[row]
+        point, tangent = (
+            np.array([np.interp(s, pattern.arc_length, x[:, i]) for i in range(2)])
+            for x in (pattern.points, pattern.tangent)
+        )
+        curvature = np.interp(s, pattern.arc_length, pattern.curvature)
+        found = withe.deployment.grasp((motion.cable.length - s) / lgb, -curvature * lgb, CABLE.stretch_stiffness)
+        x = np.append(tangent, 0.0) / np.linalg.norm(tangent)
+        frame = np.stack([x, np.cross([0, 0, 1], x), [0, 0, 1]], 1)
+        position = np.append(point, CABLE.radius) + lgb * frame @ found.position
+        np.testing.assert_allclose(motion.positions[row], position, atol=2e-5)
+        rotation = frame @ Rotation.from_rotvec(found.rotation).as_matrix()
+        np.testing.assert_allclose(Rotation.from_quat(motion.rotations[row]).as_matrix(), rotation, atol=2e-3)
+
+
+def test_the_motion_begins_hanging_and_has_no_jumps(motion):
+    names = [part.name for part in motion.phases]
+    assert names == ["hang", "touch down", "lay"]
+    assert all(before.end == after.start for before, after in pairwise(motion.phases))
+    tangent = Rotation.from_quat(motion.rotations[0]).as_matrix()[:, 0]
+    np.testing.assert_allclose(tangent, [0.0, 0.0, 1.0], atol=5e-3)
+    assert motion.positions[0, 2] > motion.cable.length
+    np.testing.assert_allclose(np.linalg.norm(motion.rotations, axis=1), 1.0, rtol=1e-12)
+    assert np.diff(motion.times).min() > 0.5 * np.diff(motion.times).max()
+    # Velocities are continuous: no change between rows above a few mm/s.
+    velocity = np.diff(motion.positions, axis=0) / np.diff(motion.times)[:, None]
+    assert np.abs(np.diff(velocity, axis=0)).max() < 6e-3
+    assert np.linalg.norm(velocity[[0, -1]], axis=1).max() < 2e-3
+
+
+def test_the_free_end_rolls_to_its_place_while_the_cable_leans_over(motion):
+    row = np.flatnonzero(during(motion, "touch down"))[0]
+    heading = motion.pattern.tangent[0]
+    behind = (motion.positions[row, :2] - motion.pattern.points[0]) @ heading
+    assert behind == pytest.approx(-0.5 * np.pi * CABLE.radius, abs=1e-4)  # upright, above its free end
+
+
+def test_the_lift_off_point_goes_at_the_speed_that_was_asked_for():
+    motion = plan(CABLE, Pattern(wave()), speed=0.05)
+    lay = phase(motion, "lay")
+    middle = (motion.times > lay.start + 3.0) & (motion.laid < 0.4) & (motion.laid > 0.1)
+    np.testing.assert_allclose(np.diff(motion.laid[middle]) / np.diff(motion.times[middle]), 0.05, rtol=1e-3)
+
+
+def test_intuitive_holds_the_cable_straight_above_the_lift_off_point():
+    motion = plan(CABLE, Pattern(wave()), "intuitive")
+    row = np.searchsorted(motion.laid, 0.2)
+    s = motion.laid[row]
+    above = [np.interp(s, motion.pattern.arc_length, motion.pattern.points[:, i]) for i in range(2)]
+    height = motion.cable.length - s + CABLE.radius
+    np.testing.assert_allclose(motion.positions[row], [*above, height], atol=1e-5)
+    assert np.isnan(motion.needed_friction).all()
+
+
+def test_least_friction_needs_no_more_than_exact(motion):
+    pushed = plan(CABLE, motion.pattern, "least_friction")
+    exact, least = (laid.feasibility(0.4).lift_off for laid in (motion, pushed))
+    assert least.max() < exact.max()
+
+
+def test_files_hold_the_motion(motion, tmp_path):
+    motion.save(tmp_path / "motion.csv")
+    motion.save(tmp_path / "motion.json")
+    with open(tmp_path / "motion.csv") as file:
+        assert file.readline() == "t,x,y,z,qx,qy,qz,qw\n"
+    rows = np.loadtxt(tmp_path / "motion.csv", delimiter=",", skiprows=1)
+    np.testing.assert_allclose(rows[:, 1:4], motion.positions, atol=1e-8)
+    held = json.loads((tmp_path / "motion.json").read_text())
+    np.testing.assert_array_equal(held["motion"]["quaternion_xyzw"], motion.rotations)
+    assert [part["name"] for part in held["phases"]] == [part.name for part in motion.phases]
+    with pytest.raises(ValueError, match=r"must end in .csv or .json"):
+        motion.save(tmp_path / "motion.txt")
+
+
+def test_the_command_line_plans_and_says_what_holds(tmp_path, capsys):
+    source = tmp_path / "wave.csv"
+    np.savetxt(source, wave(), delimiter=",", header="x,y", comments="")
+    pytest.importorskip("matplotlib").use("agg")
+    assert main(["deploy", str(source), "--dlo", "2", "--friction", "0.7", "--out", str(tmp_path)]) == 0
+    out = capsys.readouterr().out
+    assert "holds at a coefficient of friction of 0.7" in out
+    for ending in ("csv", "json", "png"):
+        assert (tmp_path / f"wave_plan.{ending}").stat().st_size > 1000
+    assert main(["deploy", str(source), "--length", "0.885", "--out", str(tmp_path)]) == 2
+    assert "needs --dlo, or --length, --radius and --lgb" in capsys.readouterr().err
+    source.write_text("x,y\n0,0\nfar,away\n")
+    assert main(["deploy", str(source), "--dlo", "2"]) == 2
+    assert "rows x,y in m, got 'far,away'" in capsys.readouterr().err
+
+
+def loop(count=300):
+    angle = np.linspace(-0.5, 2 * np.pi + 0.5, count)
+    return np.stack([0.02 * angle + 0.08 * np.sin(angle), 0.08 * (1 - np.cos(angle))], 1)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: plan(Cable(0.4, 1.6e-3, 0.032), Pattern(wave())), "the cable is 0.4 m long, the pattern 0.5"),
+        (lambda: plan(CABLE, Pattern(wave()), tail=0.5), "pattern and tail"),
+        (lambda: plan(CABLE, Pattern(wave()), tail=-0.1), "tail must not be negative"),
+        (lambda: plan(CABLE, Pattern(wave()), "clever"), "controller must be"),
+        (lambda: plan(CABLE, Pattern(wave()), speed=0.0), "speed must be positive"),
+        (lambda: plan(CABLE, Pattern(wave()), time_step=-1.0), "time_step must be positive"),
+        (lambda: plan(CABLE, Pattern(loop())), "must not cross itself"),
+        (lambda: plan(Cable.dlo(5), Pattern(wave(0.06))), "no floor holds this cable on this pattern"),
+    ],
+)
+def test_bad_input_says_what_is_wrong(call, message):
+    with pytest.raises(ValueError, match=message):
+        call()
+
+
+def test_a_pattern_that_crosses_itself_is_laid_over_itself_on_request():
+    pattern = Pattern(loop())
+    assert pattern.crossings.shape == (1, 2)
+    assert plan(CABLE, pattern, "intuitive", crossings="over").laid[-1] == pytest.approx(pattern.length)
