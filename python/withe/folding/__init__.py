@@ -12,9 +12,24 @@ the sheet per length. That makes one solution serve every paper.
 from withe.folding.hanging_strip import Measured, droop, measure
 from withe.folding.jaw import Jaw
 from withe.folding.manifold import elastica
+from withe.folding.noise import Noise
 from withe.folding.paper import Paper
 from withe.folding.planning import plan
 from withe.folding.plans import Plan
 from withe.folding.sheets import Elastica
+from withe.folding.simulated_sheet import Fold, SimulatedSheet
 
-__all__ = ["Elastica", "Jaw", "Measured", "Paper", "Plan", "droop", "elastica", "measure", "plan"]
+__all__ = [
+    "Elastica",
+    "Fold",
+    "Jaw",
+    "Measured",
+    "Noise",
+    "Paper",
+    "Plan",
+    "SimulatedSheet",
+    "droop",
+    "elastica",
+    "measure",
+    "plan",
+]

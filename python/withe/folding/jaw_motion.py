@@ -1,0 +1,90 @@
+"""Where the jaw of a simulated robot is when: planned poses, one motion after another, and how it misses them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import Any, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from withe.common import validation
+from withe.folding.noise import Drawn
+
+__all__ = ["JawMotion", "Motion"]
+
+FloatArray = npt.NDArray[np.float64]
+_COMES_IN = 0.1  # of the first motion, over which the jaw's errors grow
+_JUMP = np.array([1e-3, 1e-3, 0.05])  # between motions, at most [m], [m], [rad]
+
+
+class Motion(Protocol):
+    """Poses and times of the sheet's outer edge, as a `Plan` has them."""
+
+    @property
+    def times(self) -> FloatArray:
+        """Shape (n,) [s]."""
+
+    @property
+    def poses(self) -> FloatArray:
+        """Shape (n, 7): x, y, z [m] and the quaternion x, y, z, w."""
+
+
+class _Way:
+    """One motion: x, z [m] and angle by time."""
+
+    def __init__(self, motion: Motion, begin: float, before: FloatArray) -> None:
+        """From a time on; `before` is where the jaw is then."""
+        times = validation.number_array(motion.times, "times of a motion", ("n",))
+        poses = validation.number_array(motion.poses, "poses of a motion", (len(times), 7))
+        if len(times) < 2 or (np.diff(times) <= 0).any():
+            raise ValueError("times of a motion must be two or more and grow")
+        angles = np.unwrap(2.0 * np.arctan2(poses[:, 4], poses[:, 6]))
+        angles += 2.0 * np.pi * np.round((before[2] - angles[0]) / (2.0 * np.pi))
+        self.times = times - times[0] + begin
+        self.poses = np.stack([poses[:, 0], poses[:, 2], angles], axis=1)
+        if (np.abs(self.poses[0] - before) > _JUMP).any():
+            where, asked = (f"({x:.4g} m, {z:.4g} m, {angle:.3g} rad)" for x, z, angle in (before, self.poses[0]))
+            raise ValueError(f"poses of a motion must begin where the jaw is, at {where}, got {asked}")
+        self.speed = float((np.hypot(*np.diff(self.poses[:, :2], axis=0).T) / np.diff(times)).max())
+
+    def __call__(self, time: float) -> FloatArray:
+        return np.array([np.interp(time, self.times, self.poses[:, i]) for i in range(3)])
+
+
+class JawMotion:
+    """Motions in a row. Each is asked for when the one before has ended, so that it may depend on what came of that.
+
+    Attributes
+    ----------
+    speed : float [m/s]
+        Greatest of the edge so far.
+    """
+
+    def __init__(self, motions: Iterable[Motion], drawn: Drawn, depth: float, thickness: float) -> None:
+        self._motions: Iterator[Any] = iter(motions)
+        self._drawn, self._depth, self._thickness = drawn, depth, thickness
+        self._way = _Way(next(self._motions), 0.0, np.zeros(3))
+        self._comes_in = _COMES_IN * (self._way.times[-1] - self._way.times[0])
+        self.speed = self._way.speed
+
+    @property
+    def end(self) -> float:
+        """When the present motion ends [s]."""
+        return float(self._way.times[-1])
+
+    def go_on(self) -> bool:
+        """Take the next motion; False if there is none."""
+        motion = next(self._motions, None)
+        if motion is None:
+            return False
+        self._way = _Way(motion, self.end, self._way.poses[-1])
+        self.speed = max(self.speed, self._way.speed)
+        return True
+
+    def __call__(self, time: float) -> FloatArray:
+        """Pose of the outer edge at a time: x, z [m], angle. The table stops the jaw, and so does the sheet on it."""
+        x, z, angle = self._way(time) + self._drawn.off(time, min(1.0, time / self._comes_in))
+        lowest = z - max(0.0, self._depth * np.sin(angle))
+        under = self._thickness if angle > 0.5 * np.pi else 0.0
+        return np.array([x, z + max(0.0, under - lowest), angle])

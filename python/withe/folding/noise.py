@@ -1,0 +1,115 @@
+"""What a simulated sheet and its robot have that nobody told the planner."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+import numpy.typing as npt
+
+from withe.common import validation
+
+__all__ = ["Drawn", "Noise"]
+
+FloatArray = npt.NDArray[np.float64]
+_MOST = 2.0  # standard deviations; what is farther out is drawn again
+_WAVES = 6  # of the jitter
+_SLOWEST, _FASTEST = 0.5, 4.0  # of these [Hz]
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Standard deviations of what differs from trial to trial; nothing is farther off than twice of these.
+
+    Parameters
+    ----------
+    gravito_bending_length : float
+        Relative, of Lgb.
+    friction : float
+        Relative, of the coefficient between sheet and table.
+    curl : float [1/m]
+        Of the curvature that the sheet has without forces.
+    tilt : float [rad]
+        Of the table, about y.
+    position : float [m]
+        By which the jaw is off, in x and in z. It comes in over the first tenth of a motion, for where the jaw grips
+        the sheet it is where the sheet is.
+    angle : float [rad]
+        By which the jaw is turned too far.
+    jitter : float [m]
+        Of the jaw's place about its mean, in x and in z, at .5 to 4 Hz.
+
+    Raises
+    ------
+    ValueError
+        A negative one.
+
+    Examples
+    --------
+    >>> import withe
+    >>> withe.folding.Noise(friction=0.1).friction
+    0.1
+    """
+
+    gravito_bending_length: float = 0.05
+    friction: float = 0.2
+    curl: float = 0.5
+    tilt: float = np.radians(0.5)
+    position: float = 3e-4
+    angle: float = np.radians(0.3)
+    jitter: float = 3e-5
+
+    def __post_init__(self) -> None:
+        for each in fields(self):
+            object.__setattr__(self, each.name, validation.non_negative(getattr(self, each.name), each.name))
+
+    @classmethod
+    def none(cls) -> Noise:
+        """Everything is as the planner believes."""
+        return cls(*(0.0 for _ in fields(cls)))
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """One trial's numbers: factors of Lgb and of friction, curl [1/m], tilt [rad], and how the jaw is off.
+
+    `shift` is (x, z [m], angle [rad]); `waves` of shape (waves, 2, 3): amplitude [m], frequency [rad/s] and phase of
+    the jitter in x and z.
+    """
+
+    gravito_bending_length: float
+    friction: float
+    curl: float
+    tilt: float
+    shift: FloatArray
+    waves: FloatArray
+
+    @classmethod
+    def of(cls, noise: Noise, seed: int) -> Drawn:
+        """Draw; the same from the same seed, number by number, whichever of them are zero."""
+        random = np.random.default_rng(seed)
+        normal = np.array([_truncated(random) for _ in range(7)])
+        amplitude = noise.jitter * np.sqrt(2.0 / _WAVES) * np.ones((_WAVES, 2))
+        frequency = 2.0 * np.pi * random.uniform(_SLOWEST, _FASTEST, (_WAVES, 2))
+        phase = random.uniform(0.0, 2.0 * np.pi, (_WAVES, 2))
+        return cls(
+            gravito_bending_length=1.0 + noise.gravito_bending_length * normal[0],
+            friction=max(0.0, 1.0 + noise.friction * normal[1]),
+            curl=noise.curl * normal[2],
+            tilt=noise.tilt * normal[3],
+            shift=normal[4:] * [noise.position, noise.position, noise.angle],
+            waves=np.stack([amplitude, frequency, phase], axis=2),
+        )
+
+    def off(self, time: float, share: float) -> FloatArray:
+        """How far the jaw is from where it should be, (x, z [m], angle [rad]); `share` of it has come in."""
+        amplitude, frequency, phase = np.moveaxis(self.waves, 2, 0)
+        jitter = (amplitude * np.sin(frequency * time + phase)).sum(axis=0)
+        return np.asarray(share * (self.shift + np.array([jitter[0], jitter[1], 0.0])))
+
+
+def _truncated(random: np.random.Generator) -> float:
+    while True:
+        value = float(random.normal())
+        if abs(value) <= _MOST:
+            return value

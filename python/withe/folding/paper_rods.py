@@ -1,0 +1,37 @@
+"""Paper as rods of the engine."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from withe.folding.paper import Paper
+from withe.parts.handles import Rod
+from withe.parts.materials import Stiffness
+from withe.scene.scene import Scene
+
+__all__ = ["add_paper"]
+
+_DENSITY = 800.0  # of paper [kg/m^3]
+_GRAVITY = 9.81  # [m/s^2], by which Lgb is defined
+
+
+def add_paper(scene: Scene, paper: Paper, places: npt.NDArray[np.float64], curl: float) -> Rod:
+    """Add a flat sheet, seen from its side, with nodes at places along x, as rod "sheet".
+
+    Its bending stiffness is 2 w Lgb^3, w the weight per length, its stretching stiffness that of a strip of a uniform
+    material of its thickness h, 12 EI / h^2. `curl` is its natural curvature [1/m], about -y.
+    """
+    line_density = _DENSITY * paper.thickness * paper.width
+    bend = 2.0 * line_density * _GRAVITY * paper.gravito_bending_length**3
+    stiffness = Stiffness(stretch=12.0 * bend / paper.thickness**2, bend=(bend, bend), twist=bend)
+    zero = np.zeros_like(places)
+    return scene.add_rod(
+        points=np.stack([places, zero, zero], axis=1),
+        normal=(0.0, 1.0, 0.0),
+        radius=0.5 * paper.thickness,
+        stiffness=stiffness,
+        line_density=line_density,
+        natural_curvature=(0.0, curl),
+        name="sheet",
+    )

@@ -1,0 +1,287 @@
+"""A sheet in the rod engine that a robot folds. Knows no planner, nor the equilibria that planners know."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from typing import Any, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from withe.common import validation
+from withe.common.progress import progress as progress_bar
+from withe.errors import ConvergenceError
+from withe.folding.jaw import Jaw
+from withe.folding.jaw_motion import JawMotion, Motion
+from withe.folding.noise import Drawn, Noise
+from withe.folding.paper import Paper
+from withe.folding.paper_rods import add_paper
+from withe.parts.handles import Rod
+from withe.recording.record import Record
+from withe.scene.scene import Scene
+from withe.simulation.simulation import Simulation
+
+__all__ = ["Fold", "SimulatedSheet"]
+
+FloatArray = npt.NDArray[np.float64]
+_SETTLING = 0.5  # after the last motion [s]
+_SNAP = 10.0  # times as fast as the jaw is no folding any more,
+_FAST = 0.2  # where it is faster than this [m/s]
+_LONGEST = 600.0  # [s]
+_FRAMES = 0.05  # [s]
+
+
+class FoldingMotion(Motion, Protocol):
+    """A motion that says where it brings the edge."""
+
+    @property
+    def target(self) -> float:
+        """[m]."""
+
+
+@dataclass(frozen=True)
+class Fold:
+    """What became of a fold.
+
+    Attributes
+    ----------
+    error : float [m]
+        Of the length from the lifted edge to the crease, which is made where the layers turn: half the signed gap
+        between that edge and the place on the sheet where it should lie; negative where the fold is too short.
+    length : float [m]
+        From the lifted edge to the crease.
+    slide : float [m]
+        How far the sheet's far edge has slid over the table, in the direction of x.
+    max_curvature : float [1/m]
+        Greatest at any time.
+    max_speed : float [m/s]
+        Greatest of any part of the sheet.
+    failure : str or None
+        Why it is no fold: the sheet snapped, or its equations had no solution. The other numbers are those of that
+        moment.
+    record : Record
+        Of rod "sheet", from the lifted edge on, over obstacle "table".
+    """
+
+    error: float
+    length: float
+    slide: float
+    max_curvature: float
+    max_speed: float
+    failure: str | None
+    record: Record
+
+
+class SimulatedSheet:
+    """A sheet on a table, whole, and a jaw that holds one of its edges: a robot's world, in simulation.
+
+    The sheet is a planar rod with inertia, stretch, bending, weight and thickness; table and sheet rub on each other,
+    and so do the sheet's sides, by Coulomb's law (anchored). Nothing here knows how a plan was made.
+
+    Parameters
+    ----------
+    paper : Paper
+        As the planner knows it.
+    seed : int
+        Of what differs from it. A sheet folds the same way whenever it is folded.
+    noise : Noise, optional
+        How much differs; by default nothing does.
+    jaw : Jaw, optional
+    edges : int
+        Of the rod.
+    time_step : float [s]
+        Of backward Euler.
+    own_friction : float
+        Coefficient of the sheet on itself.
+
+    Attributes
+    ----------
+    paper : Paper
+    truth : Paper
+        The same as it is on this seed: what a planner must not see.
+    jaw : Jaw
+    simulation : Simulation
+    rod : Rod
+
+    Raises
+    ------
+    ValueError
+        Not a paper, numbers out of range.
+
+    Examples
+    --------
+    >>> import withe
+    >>> sheet = withe.folding.SimulatedSheet(withe.folding.Paper.a4(), seed=3, noise=withe.folding.Noise())
+    >>> print(f"{1e3 * sheet.truth.gravito_bending_length:.1f} mm, friction {sheet.truth.friction:.3f}")
+    49.0 mm, friction 0.106
+    """
+
+    def __init__(
+        self,
+        paper: Paper,
+        seed: int = 0,
+        noise: Noise | None = None,
+        *,
+        jaw: Jaw | None = None,
+        edges: int = 150,
+        time_step: float = 0.01,
+        own_friction: float = 0.3,
+    ) -> None:
+        if not isinstance(paper, Paper):
+            raise ValueError(f"paper must be a Paper, got {paper!r}")
+        if noise is not None and not isinstance(noise, Noise):
+            raise ValueError(f"noise must be a Noise, got {noise!r}")
+        seed = validation.integer(seed, "seed", 0, 2**63 - 1)
+        edges = validation.integer(edges, "edges", 20, 100_000)
+        self.paper = paper
+        self.jaw = Jaw() if jaw is None else jaw
+        self._drawn = Drawn.of(Noise.none() if noise is None else noise, seed)
+        self.truth = replace(
+            paper,
+            gravito_bending_length=paper.gravito_bending_length * self._drawn.gravito_bending_length,
+            friction=paper.friction * self._drawn.friction,
+        )
+        scene = Scene(gravity=9.81 * np.array([np.sin(self._drawn.tilt), 0.0, -np.cos(self._drawn.tilt)]))
+        held = max(1, round(edges * self.jaw.depth / paper.length))
+        self._places = np.concatenate(
+            [
+                np.linspace(0.0, self.jaw.depth, held + 1),
+                np.linspace(self.jaw.depth, paper.length, edges - held + 1)[1:],
+            ]
+        )
+        self.rod = add_paper(scene, self.truth, self._places, self._drawn.curl)
+        # Surfaces press on each other from a twentieth of the thickness on; a jaw at the sheet's height does not.
+        scene.add_floor(-0.55 * paper.thickness, friction=self.truth.friction, restitution=0.0, name="table")
+        scene.enable_contact(friction=validation.non_negative(own_friction, "own_friction"), restitution=0.0)
+        for i in range(held):
+            scene.pin(self.rod.node(i))
+        scene.clamp(self.rod.node(held))
+        self._held = held
+        self.simulation: Simulation = scene.build(integrator="backward_euler", time_step=time_step, planar=True)
+
+    def positions(self) -> FloatArray:
+        """Where the sheet is now, from the lifted edge on, of shape (edges + 1, 3) [m]."""
+        return self.simulation.positions(self.rod)
+
+    def fold(self, plan: FoldingMotion, *, progress: bool = True) -> Fold:
+        """Carry out a plan, from the flat sheet.
+
+        Parameters
+        ----------
+        plan : Plan
+            Or anything else with `times`, `poses` and `target` like those of a plan.
+        progress : bool
+            Whether to show a progress bar.
+
+        Returns
+        -------
+        Fold
+
+        Raises
+        ------
+        ValueError
+            Poses that are not finite or do not begin at the flat sheet, times that do not grow.
+
+        Examples
+        --------
+        >>> import withe
+        >>> paper = withe.folding.Paper.a4()
+        >>> folded = withe.folding.SimulatedSheet(paper).fold(withe.folding.plan(paper))  # doctest: +SKIP
+        >>> print(f"slides {1e3 * folded.slide:.1f} mm")  # doctest: +SKIP
+        slides 7.7 mm
+        """
+        return self.carry_out([plan], plan.target, duration=float(plan.times[-1] - plan.times[0]), progress=progress)
+
+    def carry_out(
+        self, motions: Iterable[Motion], target: float, *, duration: float = _LONGEST, progress: bool = True
+    ) -> Fold:
+        """Carry out motions in a row, from the flat sheet.
+
+        Parameters
+        ----------
+        motions : iterable of Plan
+            Each is asked for when the one before has ended, so that a generator may look at the sheet in between. The
+            first pose of a motion is where the one before has ended.
+        target : float [m]
+            Place on the sheet where the lifted edge should lie in the end.
+        duration : float [s]
+            That a progress bar expects.
+        progress : bool
+
+        Returns
+        -------
+        Fold
+
+        Raises
+        ------
+        ValueError
+            As `fold`, or what a generator raised.
+        """
+        self.simulation.reset()
+        jaw = JawMotion(motions, self._drawn, self.jaw.depth, self.paper.thickness)
+        watch = _Watch(jaw, self.rod)
+        self._follow(jaw)
+        failure = None
+        with progress_bar(duration + _SETTLING, "folding", progress) as bar:
+
+            def ended(simulation: Simulation) -> bool:
+                bar.update(simulation.time)
+                return watch(simulation)
+
+            try:
+                self.simulation.run(_LONGEST, _FRAMES, progress=False, until=ended)
+            except ConvergenceError as error:
+                failure = f"no solution: {error}"
+        if watch.snapped:
+            failure = f"snapped at {self.simulation.time:.2f} s"
+        return self._result(target, watch, failure)
+
+    def _follow(self, jaw: JawMotion) -> None:
+        """Move all nodes that the jaw holds with it, and the direction at its inner edge."""
+
+        def path(place: float, turns: bool) -> Callable[[float], Any]:
+            def at(time: float) -> Any:
+                x, z, angle = jaw(time)
+                cosine, sine = np.cos(angle), np.sin(angle)
+                position = np.array([x + place * cosine, 0.0, z - place * sine])
+                rotation = np.array([[cosine, 0.0, sine], [0.0, 1.0, 0.0], [-sine, 0.0, cosine]])
+                return (position, rotation) if turns else position
+
+            return at
+
+        for i in range(self._held + 1):
+            self.simulation.move(self.rod.node(i), path=path(self._places[i], i == self._held))
+
+    def _result(self, target: float, watch: _Watch, failure: str | None) -> Fold:
+        positions = self.positions()
+        slide = positions[-1, 0] - self.paper.length
+        error = 0.5 * (positions[0, 0] - slide - target)
+        return Fold(
+            error=float(error),
+            length=0.5 * target + float(error),
+            slide=float(slide),
+            max_curvature=watch.max_curvature,
+            max_speed=watch.max_speed,
+            failure=failure,
+            record=self.simulation.record,
+        )
+
+
+class _Watch:
+    """Looks at a sheet after every step: asks for the next motion, and sees whether it snaps."""
+
+    def __init__(self, jaw: JawMotion, rod: Rod) -> None:
+        self._jaw, self._rod = jaw, rod
+        self._end: float | None = None
+        self.max_speed = self.max_curvature = 0.0
+        self.snapped = False
+
+    def __call__(self, simulation: Simulation) -> bool:
+        speed = float(np.linalg.norm(simulation.velocities(self._rod), axis=1).max())
+        self.max_speed = max(self.max_speed, speed)
+        self.max_curvature = max(self.max_curvature, float(np.abs(simulation.curvatures(self._rod)).max()))
+        self.snapped = speed > max(_SNAP * self._jaw.speed, _FAST)
+        if self._end is None and simulation.time > self._jaw.end - 1e-9 and not self._jaw.go_on():
+            self._end = self._jaw.end + _SETTLING
+        return self.snapped or (self._end is not None and simulation.time > self._end - 1e-9)

@@ -1,0 +1,164 @@
+"""A simulated sheet is carried out on; what the continuum's equilibria and Coulomb's law say is the oracle."""
+
+from __future__ import annotations
+
+import ast
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import withe
+from withe.folding import Noise, Paper, SimulatedSheet, plan
+
+ROOM = Path(__file__).resolve().parents[2] / "python" / "withe" / "folding"
+COARSE = {"edges": 75, "time_step": 0.02}
+PLANNER = {"planning", "plans", "grid", "manifold", "moment_free", "sheets", "timing"}
+WORLD = {"simulated_sheet", "jaw_motion", "noise", "paper_rods"}
+
+
+def reached(module: str) -> set[str]:
+    """Modules of the room that one imports, directly or not."""
+    found, pending = set(), [module]
+    while pending:
+        tree = ast.parse((ROOM / f"{pending.pop()}.py").read_text())
+        for node in ast.walk(tree):
+            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("withe.folding."):
+                name = node.module.rpartition(".")[2]
+                if name not in found:
+                    found.add(name)
+                    pending.append(name)
+    return found
+
+
+def still(poses: np.ndarray, times: np.ndarray | None = None) -> SimpleNamespace:
+    """A motion: rows of x, z, angle, a second apart."""
+    poses = np.asarray(poses, dtype=float)
+    x, z, angle = poses.T
+    zero = np.zeros_like(x)
+    rows = np.stack([x, zero, z, zero, np.sin(angle / 2), zero, np.cos(angle / 2)], axis=1)
+    return SimpleNamespace(times=np.arange(len(x), dtype=float) if times is None else times, poses=rows, target=0.297)
+
+
+@pytest.fixture(scope="module")
+def a4():
+    return Paper.a4()
+
+
+@pytest.fixture(scope="module")
+def half(a4):
+    return plan(a4)
+
+
+def test_planners_know_no_simulated_sheet_and_it_knows_no_planner():
+    assert {path.stem for path in ROOM.glob("*.py")} >= PLANNER | WORLD
+    for module in PLANNER:
+        assert not reached(module) & WORLD, module
+    for module in WORLD:
+        assert not reached(module) & PLANNER, module
+
+
+def test_a_sheet_slides_as_the_continuum_and_coulomb_say(a4, half):
+    found = SimulatedSheet(a4, edges=100, time_step=0.02).fold(half, progress=False)
+    assert found.failure is None
+    assert half.slide[-1] > 5e-3
+    assert found.slide == pytest.approx(half.slide[-1], abs=1e-4)
+    # The edge is where the plan takes it; the sheet has slid on: the gap is the slide, and the crease off by half.
+    assert found.error == pytest.approx(-0.5 * found.slide, abs=1e-6)
+    assert found.length == pytest.approx(0.5 * 0.297 + found.error)
+    times, slides = found.record.times, found.record.positions("sheet")[:, -1, 0] - 0.297
+    assert slides == pytest.approx(np.interp(times, half.times, half.slide), abs=2e-4)
+
+
+def test_the_sheet_bends_as_planned(a4, half):
+    found = SimulatedSheet(a4, **COARSE).fold(half, progress=False)
+    assert found.max_curvature == pytest.approx(half.max_curvature.max(), rel=0.05)
+
+
+def test_half_a_circle_pushes_the_sheet_away_until_it_snaps(a4):
+    found = SimulatedSheet(a4, **COARSE).fold(plan(a4, method="intuitive"), progress=False)
+    assert found.failure is not None
+    assert "snapped" in found.failure
+    assert found.slide > 0.15
+
+
+def test_seeds_repeat_and_differ(a4):
+    lift = still([(0, 0, 0), (0.0005, 0.02, 0.3), (0.002, 0.04, 0.5)])
+    sheets = [SimulatedSheet(a4, seed, Noise(), **COARSE) for seed in (5, 5, 6)]
+    ends = [(sheet.carry_out([lift], 0.297, progress=False), sheet.positions())[1] for sheet in sheets]
+    again = (sheets[0].carry_out([lift], 0.297, progress=False), sheets[0].positions())[1]
+    assert (ends[0] == ends[1]).all()
+    assert (ends[0] == again).all()
+    assert np.abs(ends[0] - ends[2]).max() > 1e-4
+    assert sheets[0].truth == sheets[1].truth
+    assert sheets[0].paper == a4
+
+
+def test_noise_has_the_spread_that_it_says(a4):
+    def spread(noise: Noise) -> list[float]:
+        truths = [SimulatedSheet(a4, seed, noise, edges=20).truth for seed in range(200)]
+        relative = np.array([(t.gravito_bending_length / 0.048, t.friction / 0.12) for t in truths]) - 1.0
+        assert np.abs(relative.mean(axis=0)).max() < 0.2 * 0.2
+        return list(relative.std(axis=0))
+
+    # A normal distribution that ends at two standard deviations has .88 of its spread.
+    assert spread(Noise()) == pytest.approx([0.88 * 0.05, 0.88 * 0.2], rel=0.15)
+    assert spread(replace(Noise.none(), friction=0.1)) == pytest.approx([0.0, 0.088], rel=0.15)
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_a_curled_sheet_lifts_its_far_edge_by_the_cube_of_lgb(a4, seed):
+    # The last l of it is lifted, y'' = k - w s^2 / (2 EI) at s from the end, and 0 at s = l: y(0) = EI k^2 / (2 w).
+    sheet = SimulatedSheet(a4, seed, replace(Noise.none(), curl=6.0), edges=150)
+    curl = sheet._drawn.curl
+    sheet.carry_out([still([(0, 0, 0), (0, 0, 0)])], 0.297, progress=False)
+    assert sheet.positions()[-1, 2] == pytest.approx(0.048**3 * curl**2 if curl > 0 else 0.0, rel=0.05, abs=1e-5)
+
+
+def test_motions_follow_each_other_and_are_asked_for_in_time(a4):
+    seen = []
+    sheet = SimulatedSheet(a4, **COARSE)
+
+    def motions():
+        yield still([(0, 0, 0), (0.0, 0.02, 0.3)])
+        seen.append((sheet.simulation.time, sheet.positions()[0, 2]))
+        yield still([(0.0, 0.02, 0.3), (0.0, 0.01, 0.2)])
+        seen.append((sheet.simulation.time, sheet.positions()[0, 2]))
+
+    found = sheet.carry_out(motions(), 0.297, progress=False)
+    assert seen == [(pytest.approx(1.0), pytest.approx(0.02)), (pytest.approx(2.0), pytest.approx(0.01))]
+    assert found.record.times[-1] == pytest.approx(2.5)
+
+
+@pytest.mark.parametrize(
+    ("motion", "message"),
+    [
+        (still([(0.05, 0, 0), (0.1, 0, 0)]), "must begin where the jaw is"),
+        (still([(0, 0, 0), (0, 0.01, 0)], np.array([0.0, 0.0])), "times of a motion must be two or more and grow"),
+        (still([(0, 0, 0), (0, np.nan, 0)]), "poses of a motion"),
+    ],
+)
+def test_a_motion_that_cannot_be_carried_out_is_refused(a4, motion, message):
+    with pytest.raises(ValueError, match=message):
+        SimulatedSheet(a4, **COARSE).fold(motion, progress=False)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("a4",), "paper must be a Paper"),
+        ((Paper.a4(), -1), "seed"),
+        ((Paper.a4(), 0, "loud"), "noise must be a Noise"),
+    ],
+)
+def test_a_sheet_of_nonsense_is_refused(arguments, message):
+    with pytest.raises(ValueError, match=message):
+        SimulatedSheet(*arguments)
+    with pytest.raises(ValueError, match="friction"):
+        Noise(friction=-0.1)
+
+
+def test_a_sheet_is_part_of_the_package():
+    assert withe.folding.SimulatedSheet is SimulatedSheet
