@@ -97,9 +97,8 @@ Vec3<ByStart> start_slip(const FrictionSetting& f, const SlippingSurfaces<ByStar
     const int tail = tail_of(pair, b);
     const Vec3<ByStart>& edge = c.sides[b].edge;
     const ByStart inverse = 1.0 / sqrt(dot(edge, edge));
-    const Vec3<ByStart> tangent = inverse * edge,
-                        arm = pair.curve() ? piece_arm(pair, b, c.s, c.normal)
-                                           : contact_arm(pair, b, c.normal, c.between);
+    const Vec3<ByStart> tangent = inverse * edge, arm = pair.curve() ? piece_arm(pair, b, c.s, c.normal)
+                                                                     : contact_arm(pair, b, c.normal, c.between);
     Vec3<ByStart> turn = inverse * cross(tangent, point(tail + 1) - point(tail));
     if (f.spatial) turn += way[12 + b] * tangent;
     slip += turn_sign(f, b) * cross(turn, arm);
@@ -146,8 +145,8 @@ void add_mean_pressing(const ContactProblem& problem, const Touching& t, const R
   }
   const double before = std::sqrt(std::max(dot(d0, d0) + distance * distance - dot(d1, d1), 0.0)),
                share = 1.0 / (before + distance), mean = share * dot(along, d0 + d1);
-  const Vec3d by_d0 = (t.pressing.first * share) * along +
-                      ((t.pressing.by_start - t.pressing.first * share) * mean / before) * d0;
+  const Vec3d by_d0 =
+      (t.pressing.first * share) * along + ((t.pressing.by_start - t.pressing.first * share) * mean / before) * d0;
   for (int i = 0; i < 12; ++i) out.start[i] += w[i / 3] * by_d0[i % 3];
 }
 

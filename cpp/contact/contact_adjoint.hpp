@@ -1,6 +1,6 @@
 #pragma once
-/// Derivatives of a contact's forces by what a step is given, times a vector: the part of contact in the adjoint method.
-/// Second derivatives by hand where the Jacobian has them already, dual numbers elsewhere.
+/// Derivatives of a contact's forces by what a step is given, times a vector: the part of contact in the adjoint
+/// method. Second derivatives by hand where the Jacobian has them already, dual numbers elsewhere.
 
 #include "contact/contact_problem.hpp"
 

@@ -139,7 +139,8 @@ void add_approach_slopes(const ContactProblem& problem, const ContactPair& pair,
   using ByPoints = Dual<12>;
   Vec3<ByPoints> p[4], rate{};
   for (int i = 0; i < 4; ++i)
-    p[i] = {ByPoints::unknown(x[i].x, 3 * i), ByPoints::unknown(x[i].y, 3 * i + 1), ByPoints::unknown(x[i].z, 3 * i + 2)};
+    p[i] = {ByPoints::unknown(x[i].x, 3 * i), ByPoints::unknown(x[i].y, 3 * i + 1),
+            ByPoints::unknown(x[i].z, 3 * i + 2)};
   const Vec3<ByPoints> r = p[0] - p[2], u = p[1] - p[0], w = p[3] - p[2];
   ByPoints s = c.s, t = c.t, weight[4];
   solve_parameters(r, u, w, pair.weight_a, pair.weight_b, c.s_free, c.t_free, s, t);

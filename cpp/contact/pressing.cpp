@@ -77,8 +77,7 @@ void add_curve_pressing(const ContactProblem& problem, const Touching& t, bool w
     std::fill(&derivative[0][0], &derivative[0][0] + 81, 0.0);
     if (geometric) add_curve_hessian(piece, problem.bodies.obstacle(t.pair), end, slopes, 1.0, 9, &derivative[0][0]);
   }
-  if (problem.means_direction())
-    add_start_direction(problem, t, geometric, along, with_hessian ? derivative : nullptr);
+  if (problem.means_direction()) add_start_direction(problem, t, geometric, along, with_hessian ? derivative : nullptr);
   for (int i = 0; i < 9; ++i) {
     out.gradient[i] += t.pressing.first * along[i];
     for (int j = 0; j < 9 && with_hessian; ++j)

@@ -43,8 +43,8 @@ struct ContactPair {
   }
 };
 
-/// Whose coefficients a contact has: a row of `Parameters::pair_friction`, else one of `obstacle_friction`, else those of
-/// the scene; -1: none.
+/// Whose coefficients a contact has: a row of `Parameters::pair_friction`, else one of `obstacle_friction`, else those
+/// of the scene; -1: none.
 struct FrictionOwner {
   Eigen::Index pair = -1, obstacle = -1;
 };

@@ -15,8 +15,8 @@ namespace withe {
 
 /// Derivatives of a scalar by the state that a run began with.
 struct InitialGradient {
-  MatrixX3 positions;   ///< per node [1/m]; directors turn along with their edges, without spin
-  MatrixX3 velocities;  ///< per node [s/m]
+  MatrixX3 positions;    ///< per node [1/m]; directors turn along with their edges, without spin
+  MatrixX3 velocities;   ///< per node [s/m]
   PoseAdjoint supports;  ///< by where what supports hold was
 };
 

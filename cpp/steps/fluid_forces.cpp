@@ -124,7 +124,8 @@ void ResistiveForces::add_adjoint(const StepProblem& problem, const StepData& da
       double forward = 0.0;
       for (int i = 0; i < d; ++i) {
         forward += edge.tangent[i] * by[i];
-        adjoint.coefficients.fluid_viscosity += by[i] * local.gradient[end * d + i] / problem.parameters->fluid_viscosity;
+        adjoint.coefficients.fluid_viscosity +=
+            by[i] * local.gradient[end * d + i] / problem.parameters->fluid_viscosity;
       }
       for (int i = 0; i < d; ++i)
         adjoint.start[dof[end] + i] -=

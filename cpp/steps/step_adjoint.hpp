@@ -47,8 +47,7 @@ struct CoefficientAdjoint {
         obstacle_friction(rows_of_two(model.description.contact.obstacles.size())),
         pair_friction(rows_of_two(model.description.contact.pairs.size())),
         rest_length(VectorX::Zero(model.edge_count)) {
-    for (const auto& places : model.place)
-      natural_curvature.push_back(rows_of_two(places.size()));
+    for (const auto& places : model.place) natural_curvature.push_back(rows_of_two(places.size()));
   }
 
  private:

@@ -21,7 +21,11 @@ def swimming(integrator, *, planar, model="resistive", joint=False):
         scene.join(arm.node(6), branch.start)
     scene.clamp(arm.start)
     water = scene.add_fluid(VISCOSITY, model=model)
-    return scene.build(integrator=integrator, planar=planar or None, time_step=2e-3, adaptive=False, **TIGHT), arm, water
+    return (
+        scene.build(integrator=integrator, planar=planar or None, time_step=2e-3, adaptive=False, **TIGHT),
+        arm,
+        water,
+    )
 
 
 @pytest.mark.parametrize("joint", [False, True])

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from withe import _core
 from withe.parts.description import describe, parameters_of
 from withe.parts.directory import Directory
-from withe.parts.kinds import CustomForcePart, DragPart, FluidPart, LoadPart, MassPart, Part, RodPart, SupportPart
+from withe.parts.kinds import CustomForcePart, DragPart, FluidPart, LoadPart, MassPart, RodPart, SupportPart
 from withe.parts.options import BuildOptions, check_tolerances
 from withe.simulation.settings import Settings
 

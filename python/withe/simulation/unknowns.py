@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -67,7 +67,8 @@ Reader = Callable[[_core.EquilibriumGradient | OfRun], Any]
 NATURAL_WORDS = ("natural_curvature", "natural_twist")
 INITIAL_WORDS = ("initial_positions", "initial_velocities")
 SCENE_WORDS = ("gravity", "friction", "slip_tolerance")
-POSE_WORDS = ("position", "rotation")
+PoseWord = Literal["position", "rotation"]
+POSE_WORDS: tuple[PoseWord, ...] = ("position", "rotation")
 
 
 def unknown_readers(session: Session, wrt: Sequence[Unknown], *, may_be_empty: bool = False) -> list[Reader]:
@@ -138,7 +139,7 @@ def _pose_reader(session: Session, part: SupportPart, word: str) -> Reader:
     def read(gradient: _core.EquilibriumGradient | OfRun) -> FloatArray:
         if isinstance(gradient, OfRun):
             raise ValueError(
-                f"a step has no derivative by the pose of {part.name!r}; equilibria and runs have one, and calls of move"
+                f"a step has no derivative by the pose of {part.name!r}; equilibria, runs and calls of move have one"
             )
         return np.array(gradient.support_positions[index] if word == "position" else gradient.support_rotations[index])
 
