@@ -29,6 +29,7 @@ NAMES = (
     "contact_robustness",
     "perception",
     "real2sim",
+    "deployment",
 )
 
 

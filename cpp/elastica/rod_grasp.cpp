@@ -116,11 +116,11 @@ void GraspTable::guess(double suspended, double curvature, const std::vector<dou
   set_curvature(curvature, path);
 }
 
-bool GraspTable::solve(const GraspQuestion& asked, Data& data) const {
+bool GraspTable::solve(const GraspQuestion& asked, const std::vector<double>& cuts, Data& data) const {
   GraspProblem& problem = data.problem;
   problem.stretch_stiffness = asked.stretch_stiffness;
   problem.given_force = 0;
-  problem.cuts = rod_cuts(asked.suspended);
+  problem.cuts = cuts;
   guess(asked.suspended, std::abs(asked.curvature), problem.cuts, data.path);
   const ShootingOutcome outcome = data.solver.solve(problem, data.path);
   data.iterations = outcome.iterations;

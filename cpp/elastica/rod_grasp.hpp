@@ -47,7 +47,8 @@ class GraspTable {
   };
 
   /// Leaves the solved path in `data`.
-  bool solve(const GraspQuestion& asked, Data& data) const;
+  bool solve(const GraspQuestion& asked, Data& data) const { return solve(asked, rod_cuts(asked.suspended), data); }
+  bool solve(const GraspQuestion& asked, const std::vector<double>& cuts, Data& data) const;
 
   RodGrasp grasp(const GraspQuestion& asked, double twist_stiffness, Data& data) const;
 

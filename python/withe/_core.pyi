@@ -43,6 +43,7 @@ __all__: list[str] = [
     "SheetManifold",
     "SpringDescription",
     "Statistics",
+    "StraightRod",
     "SupportDescription",
     "Tape",
     "World",
@@ -1049,6 +1050,53 @@ class GraspTable:
     ) -> numpy.typing.NDArray[numpy.float64]:
         """
         One row a grasp, for rows of suspended length, curvature, stretching stiffness, axial force and base angle.
+        """
+    def points(
+        self,
+        suspended: typing.SupportsFloat | typing.SupportsIndex,
+        curvature: typing.SupportsFloat | typing.SupportsIndex,
+        stretch_stiffness: typing.SupportsFloat | typing.SupportsIndex,
+        axial_force: typing.SupportsFloat | typing.SupportsIndex,
+    ) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The rod's points: s, position, quaternion.
+        """
+
+class StraightRod:
+    """
+    Poses in which a straight line is laid, for one suspended length.
+    """
+
+    longest: typing.ClassVar[float] = 50.0
+    shortest: typing.ClassVar[float] = 0.3
+    def __init__(
+        self,
+        suspended: typing.SupportsFloat | typing.SupportsIndex,
+        stretch_stiffness: typing.SupportsFloat | typing.SupportsIndex,
+    ) -> None: ...
+    def optima(
+        self, twist_stiffness: typing.SupportsFloat | typing.SupportsIndex
+    ) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The gentle pose and the folded one.
+        """
+    def outline(self, angle_step: typing.SupportsFloat | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Nearest and farthest position on each ray.
+        """
+    def points(
+        self, x: typing.SupportsFloat | typing.SupportsIndex, z: typing.SupportsFloat | typing.SupportsIndex
+    ) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The rod's points: s, position, quaternion.
+        """
+    def poses(
+        self,
+        positions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+        twist_stiffness: typing.SupportsFloat | typing.SupportsIndex,
+    ) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        One row a position.
         """
 
 def check_turns(

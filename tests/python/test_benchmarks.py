@@ -36,6 +36,7 @@ def run(name, folder, *arguments):
         "contact",
         "contact_robustness",
         "real2sim",
+        "deployment",
     ],
 )
 def test_the_short_form_writes_its_figures(name, tmp_path):

@@ -35,6 +35,7 @@ EXAMPLES = {
     "ring_buckling.py": (["--nodes", "40"], r"\(([-+.\d]+) %\)", -3.0, 3.0),
     "robot.py": (["--steps", "2"], r"walked ([-.\d]+) cm", 4.0, 10.0),
     "soft_limb.py": ([], r"tip ([.\d]+) mm off on the mean", 0.3, 0.7),
+    "tapered_arm.py": ([], r"tapered: clearance off by ([.\d]+) mm", 0.0, 1.0),
     "throwing_tip.py": ([], r"within ([.\d]+) mm of each point", 0.0, 1.0),
     "spider.py": (["--duration", "0.2"], r"half the step: no node moves by more than ([.\d]+)%", 0.0, 2.0),
 }

@@ -14,6 +14,7 @@ from withe.deployment.feasibility import Feasibility, Slip
 from withe.deployment.grasping import Grasp, grasp
 from withe.deployment.pattern import Pattern
 from withe.deployment.planning import Phase, Plan, plan
+from withe.deployment.straight import StraightLine, StraightPose
 
 __all__ = [
     "Cable",
@@ -24,6 +25,8 @@ __all__ = [
     "Phase",
     "Plan",
     "Slip",
+    "StraightLine",
+    "StraightPose",
     "grasp",
     "measure",
     "plan",

@@ -18,7 +18,7 @@ FloatArray = npt.NDArray[np.float64]
 _BEND_STIFFNESS = 2.0  # EI in units of w Lgb^2
 _SHARES = (0.0, 0.25, 0.5, 0.7, 0.85, 1.0, 1.2)  # of curvature^2 that a push along the rod may be [w Lgb^3]
 _ENOUGH = 8.0  # [Lgb] of suspended length: for longer ones forces are the same
-_TWIST_STIFFNESS = _BEND_STIFFNESS / 1.5  # GJ of a round rod of incompressible material; it decides stability only
+TWIST_STIFFNESS = _BEND_STIFFNESS / 1.5  # GJ of a round rod of incompressible material; it decides stability only
 
 
 @dataclass(frozen=True)
@@ -122,13 +122,18 @@ def grasp(
     solver = table()
     _require_within(length, "suspended", solver.shortest, solver.longest, "Lgb")
     _require_within(np.abs(bend), "the size of curvature", 0.0, solver.greatest_curvature, "/ Lgb")
-    if not np.all(stretch >= np.maximum(100.0, 4.0 * length)):
+    require_stiff(length, stretch)
+    questions = np.stack([length, bend, 2.0 * stretch, axial, np.zeros_like(axial)], -1).reshape(-1, 5)
+    return _described(solver.grasps(questions, TWIST_STIFFNESS), questions, length.shape)
+
+
+def require_stiff(suspended: FloatArray, stretch: FloatArray) -> None:
+    """Refuse rods that would stretch by an eighth under their own weight."""
+    if not np.all(stretch >= np.maximum(100.0, 4.0 * suspended)):
         raise ValueError(
             f"stretch_stiffness must be at least 100 and 4 times suspended, got {stretch.min():g}: such a rod"
             " would stretch by an eighth under its own weight"
         )
-    questions = np.stack([length, bend, 2.0 * stretch, axial, np.zeros_like(axial)], -1).reshape(-1, 5)
-    return _described(solver.grasps(questions, _TWIST_STIFFNESS), questions, length.shape)
 
 
 def _require_within(values: FloatArray, name: str, low: float, high: float, unit: str) -> None:
@@ -166,7 +171,7 @@ def least_friction(suspended: FloatArray, curvature: FloatArray, stretch_stiffne
         questions = np.stack(
             [length, curvature, np.full(count, 2.0 * stretch_stiffness), share * curvature**2, np.zeros(count)], -1
         )
-        rows = np.asarray(table().grasps(questions, _TWIST_STIFFNESS))
+        rows = np.asarray(table().grasps(questions, TWIST_STIFFNESS))
         good = (rows[:, 11] > 0) & (rows[:, 12] > 0) & (rows[:, 9] > 0)
         with np.errstate(divide="ignore", invalid="ignore"):
             return rows, np.where(good, np.hypot(rows[:, 7], rows[:, 8]) / rows[:, 9], np.inf)
@@ -199,7 +204,7 @@ def pivoting(suspended: float, angles: FloatArray, stretch_stiffness: float) -> 
     count = len(angles)
     questions = np.zeros((count, 5))
     questions[:, 0], questions[:, 2], questions[:, 4] = suspended, 2.0 * stretch_stiffness, angles
-    return _described(table().grasps(questions, _TWIST_STIFFNESS), questions, (count,))
+    return _described(table().grasps(questions, TWIST_STIFFNESS), questions, (count,))
 
 
 def rotation_vectors(quaternions: FloatArray) -> FloatArray:

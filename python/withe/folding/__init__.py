@@ -16,6 +16,7 @@ from withe.folding.noise import Noise
 from withe.folding.paper import Paper
 from withe.folding.planning import plan
 from withe.folding.plans import Plan
+from withe.folding.seeing import SeenEdge, find_edge, overhead_camera
 from withe.folding.sheets import Elastica
 from withe.folding.simulated_sheet import Fold, SimulatedSheet
 
@@ -27,9 +28,12 @@ __all__ = [
     "Noise",
     "Paper",
     "Plan",
+    "SeenEdge",
     "SimulatedSheet",
     "droop",
     "elastica",
+    "find_edge",
     "measure",
+    "overhead_camera",
     "plan",
 ]

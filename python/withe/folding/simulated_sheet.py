@@ -17,7 +17,9 @@ from withe.folding.jaw_motion import JawMotion, Motion
 from withe.folding.noise import Drawn, Noise
 from withe.folding.paper import Paper
 from withe.folding.paper_rods import add_paper
+from withe.folding.views import strip_picture, table_picture
 from withe.parts.handles import Rod
+from withe.perception.camera import Camera
 from withe.recording.record import Record
 from withe.scene.scene import Scene
 from withe.simulation.simulation import Simulation
@@ -134,7 +136,8 @@ class SimulatedSheet:
             raise ValueError(f"noise must be a Noise, got {noise!r}")
         seed = validation.integer(seed, "seed", 0, 2**63 - 1)
         edges = validation.integer(edges, "edges", 20, 100_000)
-        self.paper = paper
+        self.paper, self._seed = paper, seed
+        self._grain = np.random.default_rng(seed)
         self.jaw = Jaw() if jaw is None else jaw
         self._drawn = Drawn.of(Noise.none() if noise is None else noise, seed)
         self.truth = replace(
@@ -163,6 +166,52 @@ class SimulatedSheet:
     def positions(self) -> FloatArray:
         """Where the sheet is now, from the lifted edge on, of shape (edges + 1, 3) [m]."""
         return self.simulation.positions(self.rod)
+
+    def picture(self, camera: Camera, size: tuple[int, int] = (640, 480)) -> npt.NDArray[np.uint8]:
+        """Take a picture of the sheet as it lies now, on a dark table.
+
+        Parameters
+        ----------
+        camera : withe.perception.Camera
+        size : (int, int) [px]
+            Width and height.
+
+        Returns
+        -------
+        ndarray of uint8, shape (height, width, 3)
+            Red, green, blue, with a sensor's noise.
+
+        Raises
+        ------
+        ImportError
+            OpenCV is not installed.
+        """
+        return table_picture(self.positions(), self.paper.width, camera, size, self._grain)
+
+    def strip_picture(self, length: float | None = None, scale: float = 4000.0) -> npt.NDArray[np.uint8]:
+        """Take a picture of a strip of the sheet that is clamped level and hangs, from the side, for `measure`.
+
+        Parameters
+        ----------
+        length : float [m]
+            Of the strip; by default 2.2 Lgb as the planner believes.
+        scale : float [px/m]
+
+        Returns
+        -------
+        ndarray of uint8, shape (height, width, 3)
+            The strip comes in from the left.
+
+        Raises
+        ------
+        ValueError
+            A length or scale that is not positive.
+        ImportError
+            OpenCV is not installed.
+        """
+        length = 2.2 * self.paper.gravito_bending_length if length is None else validation.positive(length, "length")
+        scale = validation.positive(scale, "scale")
+        return strip_picture(self.truth, self._drawn.curl, length, scale, self._grain)
 
     def fold(self, plan: FoldingMotion, *, progress: bool = True) -> Fold:
         """Carry out a plan, from the flat sheet.
@@ -219,6 +268,7 @@ class SimulatedSheet:
             As `fold`, or what a generator raised.
         """
         self.simulation.reset()
+        self._grain = np.random.default_rng(self._seed)
         jaw = JawMotion(motions, self._drawn, self.jaw.depth, self.paper.thickness)
         watch = _Watch(jaw, self.rod)
         self._follow(jaw)

@@ -13,7 +13,7 @@ from withe.common.progress import Progress
 from withe.common.progress import progress as progress_bar
 from withe.errors import ConvergenceError
 from withe.real2sim.gathering import gather
-from withe.real2sim.least_squares import Secants, lone_frame
+from withe.real2sim.least_squares import Secants, lone_frame, seen
 from withe.real2sim.parsing import parse_unknowns
 from withe.real2sim.results import Fit
 from withe.real2sim.targets import Residual, Target, bind, frames_of
@@ -143,7 +143,7 @@ class _Motion(Coordinates):
 
     def jacobian(self, coordinates: FloatArray, state: FloatArray, frame: int) -> FloatArray:
         """By forward differences of runs, and by velocities."""
-        now, columns = self._values(state[0]), []
+        now, columns = seen(self._values(state[0])), []
         late = self._place_of_delay()
         for i, scale in enumerate(self.scales):
             if i == late:
@@ -156,7 +156,7 @@ class _Motion(Coordinates):
                 raise ConvergenceError(
                     f"a run fails for {self.names[i]} a little off what it is: shorten its time step"
                 )
-            columns.append((ahead[0] - now) / step[i])
+            columns.append((seen(ahead[0]) - now) / step[i])
         return np.stack(columns, axis=1)
 
     def _values(self, positions: FloatArray) -> FloatArray:
