@@ -71,7 +71,7 @@ void add_implicit_friction(const ContactProblem& problem, const Touching& t, con
   ByStart scalar;
   for (int i = 0; i < kContactUnknowns; ++i) scalar += rows[i] * gradient[i];
   for (int i = 0; i < kContactUnknowns; ++i) out.start[i] += scalar.slope[i];
-  const double off = dot(c.way, c.normal).value, square = dot(c.way, c.way).value - off * off;
+  const double off = dot(c.way, c.normal).value, square = std::max(dot(c.way, c.way).value - off * off, 0.0);
   out.slip_tolerance += by_tolerance(scalar.value, square, f.rate, problem.parameters->slip_tolerance);
   // Friction is linear in both coefficients.
   for (const bool along : {true, false}) {

@@ -1,7 +1,6 @@
 #include "steps/contact_forces.hpp"
 
 #include <cmath>
-#include <stdexcept>
 
 namespace withe {
 
