@@ -11,6 +11,7 @@ namespace {
 
 /// An equilibrium leaves this much of the forces in it out of balance.
 constexpr double kBalanced = 1e-6;
+constexpr const char* kHands = "a hand takes part in it; hold the rod by clamp(hold='edge')";
 constexpr const char* kFriction =
     "anchored or semi-explicit friction takes part in it; take friction_model='implicit' or 'lagged', or friction=0";
 constexpr const char* kHeldByFriction =
@@ -27,6 +28,7 @@ bool known_friction(FrictionLaw law) { return law == FrictionLaw::implicit || la
 std::vector<EquilibriumGradient> World::equilibrium_gradients(const std::vector<ReadoutAdjoint>& by) const {
   const Implementation& self = *implementation_;
   const Model& model = self.model;
+  require(!self.has_hands(), std::string("there is no gradient of this equilibrium: ") + kHands);
   if (!self.static_gradient) {
     Options statics = self.options;
     statics.integrator = Integrator::statics;
@@ -74,6 +76,7 @@ std::shared_ptr<Tape> World::start_tape() {
     self.tape->refuse("integrator '" +
                       std::string(self.options.integrator == Integrator::verlet ? "verlet" : "static") +
                       "' has none; take any other");
+  if (self.has_hands()) self.tape->refuse(kHands);
   if (contact) {
     const ContactDescription& given = self.description.contact;
     const auto loses = [](double restitution) { return restitution >= 0.0 && restitution < 1.0; };
