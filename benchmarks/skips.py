@@ -85,6 +85,11 @@ def _rough_floor(scene: withe.Scene, arm: withe.Rod) -> None:
     _floor(scene, arm, friction=1e-12)
 
 
+def _hand(scene: withe.Scene, arm: withe.Rod) -> None:
+    """It yields by so much that it holds nothing."""
+    scene.grasp(arm, 0.3, 0.02, stiffness=(1e-15, 1e-15))
+
+
 def _thin_fluid(scene: withe.Scene, arm: withe.Rod) -> None:
     scene.add_fluid(1e-30, model="resistive")
 
@@ -152,6 +157,7 @@ def skips(nodes: int) -> list[Skip]:
             lambda: _simulation(nodes, _floor),
         ),
         Skip("a fluid", "its terms", lambda: _simulation(nodes, _thin_fluid), lambda: _simulation(nodes)),
+        Skip("hands", "their terms", lambda: _simulation(nodes, _hand), lambda: _simulation(nodes)),
         Skip("moving boundaries", "their terms", lambda: _moving(_simulation(nodes)), lambda: _simulation(nodes)),
         Skip("actuation", "its terms", lambda: _actuated(_simulation(nodes)), lambda: _simulation(nodes)),
     ]

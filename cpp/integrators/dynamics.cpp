@@ -238,6 +238,8 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
   assembler.project(v1);
   if (!model.constraints.empty()) assembler.add_held_part(work.held_velocity, 1.0, v1);
   add_work(equations, parameters, working, work, result);
+  if (const HandForces* hands = equations.hands())
+    result.support_work += hands->work(equations.problem(), work.newton.data);
   double contact_loss = 0.0;
   if (const Contact* contact = equations.contact()) {
     const double by_obstacles = contact->obstacle_work();
@@ -259,6 +261,7 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
   if (!model.planar()) compute_configuration(model, state, q1, work.after);
   if (state.motion.velocity[0].size() != 0) remember_motion(q1, dt, state);
   accept_configuration(model, q1, work.after, state);
+  if (const HandForces* hands = equations.hands()) hands->accept(work.after, state);
   state.v = v1;
   state.acceleration = acceleration;
   state.time += dt;

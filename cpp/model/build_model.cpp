@@ -5,6 +5,7 @@
 #include "common/check.hpp"
 #include "geometry/curvature.hpp"
 #include "geometry/rotation.hpp"
+#include "model/hands.hpp"
 #include "model/layout.hpp"
 #include "model/model.hpp"
 
@@ -314,6 +315,8 @@ class Builder {
       } else if (holds_edge(description.kind)) {
         s.edge = static_cast<int>(e);
         s.other_node = model_.edge_tail[e] == s.node ? model_.edge_head[e] : model_.edge_tail[e];
+      } else if (s.is_hand()) {
+        find_touched(model_, s);
       }
       model_.supports.push_back(s);
     }

@@ -3,6 +3,7 @@
 /// adds. Nodes that are joined already share one index here. Nothing in it changes after `build`.
 
 #include <array>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -65,6 +66,7 @@ enum class SupportKind {
   hold_edge,       ///< both nodes of the end edge and its angle, the source's clamp
   spinning_clamp,  ///< a clamp that may turn about the rod's tangent
   spinning_edge,   ///< both nodes of the end edge
+  hand,            ///< all edges that a length of the rod lies on, see HandDescription
 };
 
 inline bool holds_frame(SupportKind kind) { return kind == SupportKind::clamp || kind == SupportKind::spinning_clamp; }
@@ -75,6 +77,21 @@ inline bool may_spin(SupportKind kind) {
   return kind == SupportKind::spinning_clamp || kind == SupportKind::spinning_edge;
 }
 
+/// What a hand holds: the rod from `at` - `length` / 2 to `at` + `length` / 2, as one piece of the shape that it has as
+/// it is grasped, or, where the hand yields, by a bed of springs as long; see forces/hand.hpp.
+struct HandDescription {
+  double at = 0, length = 0;  ///< arc length at rest [m]
+  /// Of the hand in the world as it grasps: where it is, and its axes as columns. Not posed: the rod's point and its
+  /// directors d1, d2, t.
+  bool posed = false;
+  Vector3 position = Vector3::Zero();
+  Matrix3 rotation = Matrix3::Identity();
+  bool yields = false;
+  /// Where it yields: along d1, d2, t of what it holds [N/m], and about them [N m/rad].
+  std::array<double, 6> stiffness{};
+  double force_limit = std::numeric_limits<double>::infinity();  ///< beyond which it slips [N]
+};
+
 /// Something that holds a node of a rod.
 struct SupportDescription {
   SupportKind kind = SupportKind::pin;
@@ -83,6 +100,7 @@ struct SupportDescription {
   bool gripped = false;            ///< put on while the scene runs, so that it must not change what is stored
   Vector3 axis =
       Vector3::Zero();  ///< about which a spinning clamp turns that was put on then; else that of the drawing
+  HandDescription hand;
 };
 
 enum class LoadKind {

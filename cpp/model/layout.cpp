@@ -69,45 +69,96 @@ void lay_out_unknowns(Model& model) {
     if (model.bend[b].sign[0] < 0 || model.bend[b].sign[1] < 0) model.reversed_bend.push_back(static_cast<int>(b));
 }
 
-void add_constraints(Model& model) {
-  const auto at = [](int i) { return static_cast<std::size_t>(i); };
-  std::vector<bool> node_held(at(model.node_count), false), frame_held(at(model.frame_count), false);
-  model.constraints.clear();
-  for (Support& support : model.supports) {
-    support.first_constraint = static_cast<int>(model.constraints.size());
-    if (!support.active) continue;
-    const auto hold_node = [&](int node, const Matrix3& free) {
-      require(!node_held[at(node)], "node is already held: release the support that is there first");
-      node_held[at(node)] = true;
-      Constraint c{model.node_dof[at(node)], model.dimension, free};
-      if (model.planar()) {
-        Eigen::Matrix<double, 3, 2> axes;
-        axes << model.plane->first, model.plane->second;
-        c.free.setZero();
-        c.free.topLeftCorner<2, 2>() = axes.transpose() * free * axes;
+namespace {
+
+/// Who holds what, while constraints are gathered.
+class Holder {
+ public:
+  explicit Holder(Model& model)
+      : model_(model),
+        by_edge_(at(model.node_count), false),
+        node_(by_edge_),
+        edge_(at(model.edge_count), false),
+        frame_(at(model.frame_count), false) {}
+
+  const std::vector<bool>& nodes() const { return node_; }
+
+  void hold(Support& support) {
+    support.nodes.clear();
+    support.edges.clear();
+    if (!support.active || support.yields()) return;
+    if (support.is_hand()) {
+      for (int node : support.span) {
+        if (is(node_, node) && is(by_edge_, node)) continue;  // between two edges that are held: by whom came first
+        hold_node(support, node);
       }
-      model.constraints.push_back(c);
-    };
-    hold_node(support.node, support.description.free);
-    if (support.other_node >= 0) hold_node(support.other_node, support.description.free);
-    const bool spinning = may_spin(support.description.kind);
-    if (support.edge >= 0 && !model.planar() && !spinning)
-      model.constraints.push_back({model.edge_dof[at(support.edge)], 1, Matrix3::Zero()});
-    if (support.frame >= 0) {
-      require(!frame_held[at(support.frame)], "joint is already clamped: release the clamp that is there first");
-      frame_held[at(support.frame)] = true;
-      const bool turns = spinning && !model.planar();
-      const Vector3& gripped = support.description.axis;
-      const Vector3 axis = gripped.isZero() ? support.tangent : gripped;
-      const Matrix3 free = turns ? Matrix3(axis * axis.transpose()) : Matrix3(Matrix3::Zero());
-      model.constraints.push_back({model.frame_dof[at(support.frame)], model.frame_size(), free});
+      for (const TouchedEdge& touched : support.touched) hold_edge(support, touched.edge, false);
+      return;
     }
+    hold_node(support, support.node);
+    if (support.other_node >= 0) hold_node(support, support.other_node);
+    const bool spinning = may_spin(support.description.kind);
+    if (support.edge >= 0) hold_edge(support, support.edge, spinning);
+    if (support.frame >= 0) hold_frame(support, spinning);
   }
+
+ private:
+  static bool is(const std::vector<bool>& held, int i) { return held[static_cast<std::size_t>(i)]; }
+
+  void hold_node(Support& support, int node) {
+    require(!is(node_, node), "node is already held: release the support that is there first");
+    node_[at(node)] = true;
+    by_edge_[at(node)] = support.is_hand() || support.other_node >= 0;
+    support.nodes.push_back(node);
+    const Matrix3& free = support.description.free;
+    Constraint c{model_.node_dof[at(node)], model_.dimension, free};
+    if (model_.planar()) {
+      Eigen::Matrix<double, 3, 2> axes;
+      axes << model_.plane->first, model_.plane->second;
+      c.free.setZero();
+      c.free.topLeftCorner<2, 2>() = axes.transpose() * free * axes;
+    }
+    model_.constraints.push_back(c);
+  }
+
+  void hold_edge(Support& support, int edge, bool spinning) {
+    require(!is(edge_, edge), "edge is already held: release what holds it first");
+    edge_[at(edge)] = true;
+    if (spinning) return;
+    support.edges.push_back(edge);
+    if (!model_.planar()) model_.constraints.push_back({model_.edge_dof[at(edge)], 1, Matrix3::Zero()});
+  }
+
+  void hold_frame(const Support& support, bool spinning) {
+    require(!is(frame_, support.frame), "joint is already clamped: release the clamp that is there first");
+    frame_[at(support.frame)] = true;
+    const bool turns = spinning && !model_.planar();
+    const Vector3& gripped = support.description.axis;
+    const Vector3 axis = gripped.isZero() ? support.tangent : gripped;
+    const Matrix3 free = turns ? Matrix3(axis * axis.transpose()) : Matrix3(Matrix3::Zero());
+    model_.constraints.push_back({model_.frame_dof[at(support.frame)], model_.frame_size(), free});
+  }
+
+  Model& model_;
+  std::vector<bool> by_edge_, node_, edge_, frame_;
+};
+
+}  // namespace
+
+void add_constraints(Model& model) {
+  model.constraints.clear();
+  Holder holder(model);
+  for (Support& support : model.supports)
+    if (!support.is_hand()) holder.hold(support);
+  for (Support& support : model.supports)
+    if (support.is_hand()) holder.hold(support);
+  const auto held = [&](int node) { return holder.nodes()[at(node)]; };
   model.edge_lumped.clear();
   model.edge_held.clear();
   for (int e = 0; e < model.edge_count; ++e) {
-    model.edge_lumped.push_back(model.rod_curved[at(model.edge_rod[at(e)])]);
-    model.edge_held.push_back(node_held[at(model.edge_tail[at(e)])] || node_held[at(model.edge_head[at(e)])]);
+    const auto i = at(e);
+    model.edge_lumped.push_back(model.rod_curved[at(model.edge_rod[i])]);
+    model.edge_held.push_back(held(model.edge_tail[i]) || held(model.edge_head[i]));
   }
 }
 

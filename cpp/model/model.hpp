@@ -73,6 +73,13 @@ struct Constraint {
   Vector3 held_of(const Vector3& own) const { return own - free * own; }
 };
 
+/// An edge that a hand touches.
+struct TouchedEdge {
+  int edge = 0;
+  double place = 0;  ///< middle of what is touched, from 0 at the edge's tail to 1
+  double share = 0;  ///< of the hand's length that lies on it
+};
+
 /// One support, resolved: what it holds.
 struct Support {
   bool active = false;
@@ -82,7 +89,15 @@ struct Support {
   int other_node = -1;                 ///< hold_edge
   int edge = -1;                       ///< hold_edge
   Vector3 tangent = Vector3::UnitX();  ///< drawn, of what is held: the rod at a frame, or an edge
-  int first_constraint = 0;
+  std::vector<int> nodes, edges;       ///< nodes whose places and edges whose angles it holds
+  // Of a hand:
+  std::vector<TouchedEdge> touched;  ///< in the order of the rod
+  std::vector<int> span;             ///< nodes of these edges, in that order
+  int at_edge = -1;                  ///< which of these edges has the point that it is at
+  double at_place = 0;               ///< where on it
+
+  bool is_hand() const { return description.kind == SupportKind::hand; }
+  bool yields() const { return is_hand() && description.hand.yields; }
 };
 
 /// Numbers that may change while running; one entry per edge, stencil or node. What users set of them has names in

@@ -129,6 +129,7 @@ State initial_state(const Model& model) {
   state.half_tau = model.initial_half_tau;
   for (const ObstacleDescription& o : model.description.contact.obstacles)
     state.obstacles.push_back(obstacle_place(model, o));
+  state.hands.resize(model.supports.size());
   if (model.description.fluid.model == FluidModel::stokeslets || model.description.has_custom_force ||
       !model.constraints.empty())
     for (VectorX& v : state.motion.velocity) v = VectorX::Zero(model.dof_count);

@@ -42,6 +42,18 @@ auto find_record(Records& records, const ContactKey& key) -> decltype(records.da
   return found != records.end() && found->key == key ? &*found : nullptr;
 }
 
+/// Where a hand is, and what it holds as it sees it.
+struct HandState {
+  Vector3 position = Vector3::Zero();      ///< [m]
+  Matrix3 rotation = Matrix3::Identity();  ///< columns: its axes
+  /// As it was grasped, from the hand and in its axes: nodes that it spans, or points on edges where it yields [m].
+  std::vector<Vector3> points;
+  std::vector<Matrix3> edges;  ///< columns d1, d2, t of the edges that it touches
+  // Where it yields, per edge:
+  std::vector<Vector3> slip;  ///< along d1, d2, t of what was grasped [m]
+  VectorX twist;              ///< of the edge against that, which fixes the branch of the angle [rad]
+};
+
 /// Configuration, velocities and the frames they are measured from. The frames advance by time-parallel
 /// transport once per accepted step or load increment.
 /// Mean velocities over the last two steps, the later one first, by which a fluid's force, custom
@@ -65,7 +77,8 @@ struct State {
   VectorX bend_tau, half_tau;           ///< twist of each stencil, which fixes the branch of the angle [rad]
   std::vector<ContactRecord> contacts;  ///< sorted by key
   std::vector<ObstaclePlace> obstacles;
-  VectorX contact_stiffness;  ///< per rod, of contacts that begin [N/m]; where a scene has contact
+  std::vector<HandState> hands;  ///< per support; empty but for hands
+  VectorX contact_stiffness;     ///< per rod, of contacts that begin [N/m]; where a scene has contact
   Motion motion;
 };
 

@@ -59,6 +59,8 @@ class Equations {
   Contact* contact() { return terms_.contact ? &terms_.contact->contact() : nullptr; }
   const Contact* contact() const { return terms_.contact ? &terms_.contact->contact() : nullptr; }
   void forget_contacts();
+  /// Nothing where no hand yields.
+  HandForces* hands() { return terms_.hands; }
   /// How much of a step of z contact allows, from 0 to 1.
   double allowed(const VectorX& z, const VectorX& step);
   /// Predicts the friction of a step of Newton's method from the last evaluation, of which `kept` is left.

@@ -337,10 +337,11 @@ void set_working_rows(const StepProblem& problem, const StepData& data, const Ve
     if (problem.model.planar() && s.frame >= 0) {
       const int dof = problem.model.frame_dof[at(s.frame)];
       rows[dof] += data.elastic_rows[dof] * (ratio(finite_turn(change[dof]), change[dof]) - 1.0);
-    } else if (!problem.model.planar() && s.other_node >= 0) {
-      const int dof = problem.model.edge_dof[at(s.edge)];
-      rows[dof] +=
-          data.elastic_rows[dof] * (ratio(working_turn(problem, data, s.edge, change[dof]), change[dof]) - 1.0);
+    }
+    if (problem.model.planar()) continue;
+    for (int edge : s.edges) {
+      const int dof = problem.model.edge_dof[at(edge)];
+      rows[dof] += data.elastic_rows[dof] * (ratio(working_turn(problem, data, edge, change[dof]), change[dof]) - 1.0);
     }
   }
 }

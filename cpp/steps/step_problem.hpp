@@ -89,6 +89,11 @@ struct TurningSlopes {
   double by[4][kUnknowns];
 };
 
+/// A force, and a moment about a point.
+struct Wrench {
+  Vector3 force = Vector3::Zero(), moment = Vector3::Zero();  ///< [N], [N m]
+};
+
 /// What an evaluation of a problem finds; owned by who asks for it.
 struct StepData {
   VectorX residual;       ///< projected onto free directions
@@ -117,6 +122,7 @@ struct StepData {
   VectorX drag_force;                   ///< [N]
   VectorX flow_force, flow_drag;        ///< of a fluid, and its local drag [N]
   VectorX contact_gradient, contact_floor;
+  std::vector<Wrench> hands;           ///< per support: of those that yield on the rod, about the origin
   std::vector<TurningSlopes> turning;  ///< per edge, of an exact matrix in space
 };
 

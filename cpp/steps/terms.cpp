@@ -1,5 +1,6 @@
 #include "steps/terms.hpp"
 
+#include <algorithm>
 #include <utility>
 
 #include "steps/body_forces.hpp"
@@ -24,6 +25,9 @@ Terms make_terms(const Model& model, const Loads& loads, StepRule rule, bool exa
   const LoadForces* applied = nullptr;
   if (!loads.pieces.empty()) applied = add(std::make_unique<LoadForces>(model, loads));
   if (!scene.springs.empty()) add(std::make_unique<SpringForces>(model));
+  if (std::any_of(model.supports.begin(), model.supports.end(),
+                  [](const Support& s) { return s.active && s.yields(); }))
+    terms.hands = add(std::make_unique<HandForces>(model));
   if (moves && scene.fluid.model == FluidModel::resistive) add(std::make_unique<ResistiveForces>(model));
   if (scene.contact.any()) terms.contact = add(std::make_unique<ContactForces>(model));
   add(std::make_unique<Inertia>(model, exact));

@@ -8,6 +8,7 @@
 #include "steps/contact_forces.hpp"
 #include "steps/custom_term.hpp"
 #include "steps/fluid_forces.hpp"
+#include "steps/hand_forces.hpp"
 
 namespace withe {
 
@@ -17,6 +18,7 @@ struct Terms {
   std::vector<std::unique_ptr<Term>> all;
   ContactForces* contact = nullptr;
   CustomTerm* custom = nullptr;
+  HandForces* hands = nullptr;
   StokesletForces* stokeslets = nullptr;
 };
 

@@ -100,6 +100,8 @@ void World::Implementation::rebuild(Rebuild why) {
   for (std::size_t s = 0; s < all.size(); ++s) all[s].description = description.supports[s];
   for (std::size_t k = 0; k < index.size(); ++k) all[index[k]] = fresh.supports[k];
   fresh.supports = all;
+  std::vector<std::vector<int>> held_before;
+  for (const Support& s : model.supports) held_before.push_back(s.nodes);
   static_equations.reset();
   static_gradient.reset();
   rescue_equations.reset();
@@ -124,6 +126,7 @@ void World::Implementation::rebuild(Rebuild why) {
     for (std::size_t s = 0; s < motions.size(); ++s) {
       motions[s].position = motions[s].from_position = motions[s].to_position =
           node_position(model, state.q, model.supports[s].node);
+      if (model.supports[s].is_hand()) grasp(static_cast<int>(s));
     }
   } else {
     const Model old = std::move(model);
@@ -149,6 +152,7 @@ void World::Implementation::rebuild(Rebuild why) {
     newton = std::make_unique<Newton>(model, options);
     equations = std::make_unique<Equations>(model, equation_options(options));
     relax_frames(is_new);
+    if (why == Rebuild::running) regrip(held_before);
     set_mass(model, parameters, mass);
     support_work += kinetic_energy(model, mass, state.v) - before;
   }
@@ -180,6 +184,7 @@ State World::Implementation::transferred(const Model& old, const State& from) co
     to.obstacles[o] = obstacle_place(model, drawn, way_from_drawn(old, drawn, from.obstacles[o]));
   }
   to.contacts = from.contacts;
+  std::copy_n(from.hands.begin(), std::min(from.hands.size(), to.hands.size()), to.hands.begin());
   to.contact_stiffness = from.contact_stiffness;
   Configuration c;
   compute_configuration(old, from, from.q, c);

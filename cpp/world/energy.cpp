@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "common/text.hpp"
+#include "steps/hand_forces.hpp"
 #include "steps/spring_forces.hpp"
 #include "world/implementation.hpp"
 
@@ -48,7 +49,8 @@ Energy mechanical_energy(const Model& model, const EnergyCoefficients& k, const 
   e.bend = turned.bend;
   e.twist = turned.twist;
   e.gravity = gravity_energy(model, k, state.q, [](int) { return 1.0; });
-  e.spring = spring_energy(model, k.spring_stiffness, k.spring_rest_length, state.q);
+  e.spring = spring_energy(model, k.spring_stiffness, k.spring_rest_length, state.q) +
+             hand_energy(model, k.elastic.measure, state, c);
   return e;
 }
 

@@ -91,6 +91,7 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
   const auto undo = [&] {
     forget_custom(system, forces_before, moments_before);
     release_obstacles(system);
+    release_hands(system);
     static_cast<Moving&>(*this) = before;
     apply_ramps(state.time);
     parameters.loads = loads;
@@ -110,6 +111,7 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
   try {
     solve_for_custom_at_rest(system, time);
     aim_obstacles(system, time);
+    aim_hands(system);
     if (drifts(system))
       newton->balance(work.newton.data, r.newton);
     else
@@ -127,8 +129,10 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
     undo();
     throw;
   }
-  release_obstacles(system);
   system.respond({});
+  if (r.converged) settle_hands(system);
+  release_obstacles(system);
+  release_hands(system);
   if (!r.converged) {
     undo();
     const bool held =

@@ -86,9 +86,23 @@ void exchange(Archive& io, const Model& model, Settings& settings) {
 }
 
 template <class Archive>
+void exchange(Archive& io, HandState& hand) {
+  constexpr const char* kImpossible = "snapshot is damaged: impossible hand";
+  auto& [position, rotation, points, edges, slip, twist] = hand;
+  io(position), io(rotation);
+  exchange_size(io, points, 1 << 28, kImpossible);
+  for (Vector3& point : points) io(point);
+  exchange_size(io, edges, 1 << 28, kImpossible);
+  for (Matrix3& edge : edges) io(edge);
+  exchange_size(io, slip, 1 << 28, kImpossible);
+  for (Vector3& by : slip) io(by);
+  exchange(io, twist);
+}
+
+template <class Archive>
 void exchange(Archive& io, State& state) {
   auto& [time, q, v, acceleration, acceleration_current, load_force, friction_force, tangent, director, frame, bend_tau,
-         half_tau, contacts, obstacles, contact_stiffness, motion] = state;
+         half_tau, contacts, obstacles, hands, contact_stiffness, motion] = state;
   io(time), io(q), io(v), io(acceleration), io(acceleration_current);
   exchange(io, load_force);
   exchange(io, friction_force);
@@ -98,6 +112,7 @@ void exchange(Archive& io, State& state) {
   io(bend_tau), io(half_tau);
   exchange_contacts(io, contacts);
   for (auto& [point, other, turn] : obstacles) exchange(io, point), exchange(io, other), exchange(io, turn);
+  for (HandState& hand : hands) exchange(io, hand);
   io(contact_stiffness);
   auto& [known, velocity, times] = motion;
   io(known);
@@ -135,8 +150,10 @@ void exchange(Archive& io, StepControl& control) {
 
 template <class Archive>
 void exchange(Archive& io, Found& found) {
-  auto& [custom_force, custom_moments, reaction_residual, reaction_place, reaction_current] = found;
+  auto& [custom_force, custom_moments, reaction_residual, reaction_place, hand_wrenches, reaction_current] = found;
   io(custom_force), io(custom_moments), io(reaction_residual), io(reaction_place), io(reaction_current);
+  exchange_size(io, hand_wrenches, 1 << 20, "snapshot is damaged: impossible number of hands");
+  for (auto& [force, moment] : hand_wrenches) io(force), io(moment);
 }
 
 template <class Archive>

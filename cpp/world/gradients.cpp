@@ -11,6 +11,7 @@ namespace {
 
 /// An equilibrium leaves this much of the forces in it out of balance.
 constexpr double kBalanced = 1e-6;
+constexpr const char* kHands = "a hand takes part in it; hold the rod by clamp(hold='edge')";
 constexpr const char* kFriction = "friction takes part in it; take friction=0";
 
 }  // namespace
@@ -18,6 +19,7 @@ constexpr const char* kFriction = "friction takes part in it; take friction=0";
 std::vector<EquilibriumGradient> World::equilibrium_gradients(const std::vector<ReadoutAdjoint>& by) const {
   const Implementation& self = *implementation_;
   const Model& model = self.model;
+  require(!self.has_hands(), std::string("there is no gradient of this equilibrium: ") + kHands);
   if (!self.static_gradient) {
     Options statics = self.options;
     statics.integrator = Integrator::statics;
@@ -57,6 +59,7 @@ std::shared_ptr<Tape> World::start_tape() {
     self.tape->refuse("integrator '" +
                       std::string(self.options.integrator == Integrator::verlet ? "verlet" : "static") +
                       "' has none; take any other");
+  if (self.has_hands()) self.tape->refuse(kHands);
   if (const Contact* contact = self.equations->contact()) {
     const ContactDescription& given = self.description.contact;
     const auto loses = [](double restitution) { return restitution >= 0.0 && restitution < 1.0; };

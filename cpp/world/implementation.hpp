@@ -139,6 +139,20 @@ struct World::Implementation : Running {
   void find_custom_force(Equations& target, double dt);
   void update_custom_force(Equations& target) const;
 
+  // hands.cpp
+  bool has_hands() const;
+  void aim_hands(Equations& system) const;
+  static void release_hands(Equations& system);
+  /// In an equilibrium that hands were aimed for.
+  void settle_hands(Equations& system);
+  double hand_energy_of(int hand) const;
+  void grasp(int hand);
+  void regrip(const std::vector<std::vector<int>>& held_before);
+  /// The unknowns that hands hold, where `motions` say.
+  void hold_hands(HeldTarget& target) const;
+  bool hold_edges(int hand, VectorX& q) const;
+  Reaction hand_reaction(int hand, const VectorX& held, const VectorX& q) const;
+
   // stepping.cpp
   enum class Attempt { failed, gained_energy, rescued, inaccurate, hard, easy };
   /// Equal parts in which the rest of a time step, from a fraction of it on, is taken.
@@ -239,6 +253,8 @@ struct World::Implementation : Running {
 
 /// Position of a node in space, from any configuration vector.
 Vector3 node_position(const Model& model, const VectorX& q, int node);
+/// Puts a node in space into a configuration vector.
+void put_node(const Model& model, int node, const Vector3& position, VectorX& q);
 /// Rotation of a joint frame from the drawn axes.
 Matrix3 frame_rotation(const Model& model, const State& state, int frame);
 

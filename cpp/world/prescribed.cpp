@@ -60,6 +60,15 @@ void World::Implementation::aim_supports(double time) {
   hold_now(work.held);
 }
 
+void put_node(const Model& model, int node, const Vector3& position, VectorX& q) {
+  const int dof = model.node_dof[at(node)];
+  if (model.planar())
+    q.segment<2>(dof) << (position - model.plane->origin).dot(model.plane->first),
+        (position - model.plane->origin).dot(model.plane->second);
+  else
+    q.segment<3>(dof) = position;
+}
+
 /// The held unknowns when supports are where `motions` say.
 void World::Implementation::hold_now(HeldTarget& target) const {
   target.q = state.q;
@@ -68,14 +77,8 @@ void World::Implementation::hold_now(HeldTarget& target) const {
     const Support& support = model.supports[s];
     if (!support.active) continue;
     const SupportMotion& motion = motions[s];
-    const auto put = [&](int node, const Vector3& position) {
-      const int dof = model.node_dof[at(node)];
-      if (model.planar())
-        target.q.segment<2>(dof) << (position - model.plane->origin).dot(model.plane->first),
-            (position - model.plane->origin).dot(model.plane->second);
-      else
-        target.q.segment<3>(dof) = position;
-    };
+    if (support.is_hand()) continue;
+    const auto put = [&](int node, const Vector3& position) { put_node(model, node, position, target.q); };
     put(support.node, motion.position);
     const bool spinning = may_spin(support.description.kind);
     if (support.frame >= 0 && !(spinning && !model.planar())) {
@@ -107,6 +110,7 @@ void World::Implementation::hold_now(HeldTarget& target) const {
       }
     }
   }
+  hold_hands(target);
 }
 
 CustomForces World::Implementation::custom_forces(double time, const VectorX& q, const VectorX& v, bool derivatives) {

@@ -121,10 +121,11 @@ struct StepControl {
 
 /// What was found last, for read-outs and for who does not ask again.
 struct Found {
-  MatrixX3 custom_force;      ///< of the last step [N]
-  MatrixX3 custom_moments;    ///< likewise, where there are any [N m]
-  VectorX reaction_residual;  ///< full residual of the last solve
-  VectorX reaction_place;     ///< the configuration in which its forces act, in the middle of midpoint steps
+  MatrixX3 custom_force;              ///< of the last step [N]
+  MatrixX3 custom_moments;            ///< likewise, where there are any [N m]
+  VectorX reaction_residual;          ///< full residual of the last solve
+  VectorX reaction_place;             ///< the configuration in which its forces act, in the middle of midpoint steps
+  std::vector<Wrench> hand_wrenches;  ///< likewise, of hands that yield: per support, about the origin
   bool reaction_current = false;
 };
 

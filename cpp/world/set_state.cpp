@@ -98,8 +98,7 @@ VectorX World::Implementation::placed(const std::vector<RodState>& rods) const {
     }
   for (const Support& support : model.supports) {
     if (!support.active) continue;
-    for (int node : {support.node, support.other_node}) {
-      if (node < 0) continue;
+    for (int node : support.nodes) {
       for (const Constraint& c : model.constraints) {
         if (c.first != model.node_dof[at(node)]) continue;
         const Vector3 moved = c.held_change(state.q, q);
@@ -156,7 +155,8 @@ void World::Implementation::place_rods(const std::vector<RodState>& rods) {
         const Vector3 d1 = (told - t * t.dot(told)).normalized();
         const Vector3 now = to_eigen(before.edge[at(edge)].d1);
         for (const Support& support : model.supports)
-          require(!support.active || support.edge != edge || may_spin(support.description.kind) ||
+          require(!support.active ||
+                      std::find(support.edges.begin(), support.edges.end(), edge) == support.edges.end() ||
                       (d1 - now).norm() < kAligned,
                   "directors turn an edge that a support holds" + place_of_node(support.node).words +
                       ": turn the support there first, or release it");

@@ -59,6 +59,25 @@ std::vector<LoadDescription> read_added_loads(Reader& r, const SceneDescription&
   return loads;
 }
 
+void write_hand(Writer& w, const HandDescription& hand) {
+  w(hand.at), w(hand.length), w(hand.posed), w(hand.position), w(hand.rotation), w(hand.yields);
+  for (double k : hand.stiffness) w(k);
+  w(hand.force_limit);
+}
+
+void read_hand(Reader& r, HandDescription& hand) {
+  r(hand.at), r(hand.length), r(hand.posed), r(hand.position), r(hand.rotation), r(hand.yields);
+  for (double& k : hand.stiffness) r(k);
+  r(hand.force_limit);
+}
+
+bool same_hand(const HandDescription& a, const HandDescription& b) {
+  Writer of_a, of_b;
+  write_hand(of_a, a);
+  write_hand(of_b, b);
+  return of_a.bytes == of_b.bytes;
+}
+
 /// As it was set while running; where it was not, that of the drawing holds.
 void write_friction(Writer& w, const ContactDescription& contact) {
   w(contact.friction);
@@ -184,6 +203,7 @@ std::string World::snapshot() const {
     w(d.free);
     w(d.gripped);
     w(d.axis);
+    write_hand(w, d.hand);
   }
   write_added_loads(w, self.description);
   const bool set = !same_friction(self.description.contact, self.drawn_contact);
@@ -224,7 +244,7 @@ void World::restore(const std::string& bytes) {
     int kind = 0;
     r(on);
     r(kind);
-    require(kind >= 0 && kind <= 4, "snapshot is damaged: unknown support");
+    require(kind >= 0 && kind <= static_cast<int>(SupportKind::hand), "snapshot is damaged: unknown support");
     d.kind = static_cast<SupportKind>(kind);
     r(d.pass.rod);
     r(d.pass.node);
@@ -235,6 +255,7 @@ void World::restore(const std::string& bytes) {
     r(d.free);
     r(d.gripped);
     r(d.axis);
+    read_hand(r, d.hand);
     supports.push_back(d);
     active.push_back(on);
   }
@@ -242,7 +263,8 @@ void World::restore(const std::string& bytes) {
     for (std::size_t s = 0; s < supports.size(); ++s) {
       const SupportDescription &a = supports[s], &b = fresh->description.supports[s];
       if (active[s] != fresh->model.supports[s].active || a.kind != b.kind || a.pass.rod != b.pass.rod ||
-          a.pass.node != b.pass.node || a.free != b.free || a.gripped != b.gripped || a.axis != b.axis)
+          a.pass.node != b.pass.node || a.free != b.free || a.gripped != b.gripped || a.axis != b.axis ||
+          !same_hand(a.hand, b.hand))
         return false;
     }
     return true;

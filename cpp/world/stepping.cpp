@@ -299,10 +299,12 @@ bool World::Implementation::inner_step(double dt, int slot, double& error) {
   aim_supports(end);
   Equations& system = equations_of_step();
   aim_obstacles(system, end);
+  aim_hands(system);
   const auto undo = [&] {
     work.repeated = false;
     system.respond({});
     release_obstacles(system);
+    release_hands(system);
     motions = kept_motions;
     if (ramped) apply_ramps(start);
   };
@@ -329,6 +331,7 @@ bool World::Implementation::inner_step(double dt, int slot, double& error) {
   }
   system.respond({});
   release_obstacles(system);
+  release_hands(system);
   const bool reacts = options.integrator != Integrator::fourth_order || slot == 2;
   if (tape) record_step(rule_of_step(), dt, reacts);
   error = r.error;
@@ -391,6 +394,10 @@ void World::Implementation::check_reversible(const Parameters& p) const {
               ((!contact.rods || contact.restitution == 1.0) && (contact.obstacle_restitution.array() == 1.0).all() &&
                std::all_of(contact.pairs.begin(), contact.pairs.end(), elastic)),
           "integrator 'verlet' knows elastic impacts only: take restitution=1, or an implicit integrator");
+  require(
+      options.integrator != Integrator::verlet || std::none_of(model.supports.begin(), model.supports.end(),
+                                                               [](const Support& s) { return s.active && s.yields(); }),
+      "integrator 'verlet' knows rigid hands only: take an implicit integrator for one that yields");
   if (options.integrator != Integrator::fourth_order) return;
   require(!description.contact.any(),
           "integrator 'fourth_order' goes back in time within each step, which contact does not allow: take integrator "
@@ -400,6 +407,10 @@ void World::Implementation::check_reversible(const Parameters& p) const {
           "integrator 'fourth_order' goes back in time within each step, which viscosity does not allow" + instead);
   require(description.fluid.model == FluidModel::none,
           "integrator 'fourth_order' goes back in time within each step, which a fluid does not allow" + instead);
+  for (const Support& s : model.supports)
+    require(
+        !s.active || !s.yields() || !std::isfinite(s.description.hand.force_limit),
+        "integrator 'fourth_order' goes back in time within each step, which hands that slip do not allow" + instead);
   require((p.spring_damping.array() == 0.0).all(),
           "integrator 'fourth_order' goes back in time within each step, which damping of springs does not allow" +
               instead);

@@ -37,6 +37,7 @@ int World::add_support(const SupportDescription& support) {
       }
     }
     self.rebuild(Rebuild::running);
+    self.check_reversible(self.parameters);
   } catch (...) {
     auto before = std::make_unique<Implementation>(backup);
     before->take_callbacks(self);
@@ -49,6 +50,10 @@ int World::add_support(const SupportDescription& support) {
     const Support& bearing = self.model.supports[at(index)];
     self.description.supports[at(index)].axis = frame_rotation(self.model, self.state, bearing.frame) * bearing.tangent;
     self.rebuild(Rebuild::running);
+  }
+  if (self.model.supports[at(index)].is_hand()) {
+    self.grasp(index);
+    return index;
   }
   const Support& s = self.model.supports[at(index)];
   SupportMotion& m = self.motions[at(index)];
@@ -77,6 +82,8 @@ void World::remove_support(int support) {
   require(
       support >= 0 && support < static_cast<int>(self.model.supports.size()) && self.model.supports[at(support)].active,
       "no such support, or it is released already: " + std::to_string(support));
+  // What is stored in a hand that lets go stays with it.
+  if (self.model.supports[at(support)].yields()) self.support_work -= self.hand_energy_of(support);
   self.model.supports[at(support)].active = false;
   self.rebuild(Rebuild::running);
 }
@@ -106,8 +113,9 @@ void World::prescribe_support(int support, const Vector3& position, const Matrix
             "a clamp that may spin keeps its tangent: take hold='edge' to turn it");
   if (self.model.planar()) {
     const Plane& plane = *self.model.plane;
-    if (std::abs((position - plane.origin).dot(plane.normal)) > 1e-9 * self.model.length_scale ||
-        (rotation * plane.normal - plane.normal).norm() > 1e-9)
+    const Vector3& from = held.is_hand() ? self.motions[at(support)].position : plane.origin;  // which may be beside it
+    if (std::abs((position - from).dot(plane.normal)) > 1e-9 * self.model.length_scale ||
+        (rotation * self.motions[at(support)].rotation.transpose() * plane.normal - plane.normal).norm() > 1e-9)
       self.leave_plane("a moving support");
   }
   if (self.options.integrator == Integrator::fourth_order && !self.parameters.held_lumped) {
@@ -134,6 +142,7 @@ Matrix3 World::support_rotation(int support) const { return implementation_->mot
 void World::Implementation::note_reactions() {
   reaction_residual = work.newton.data.full_residual;
   reaction_place = work.newton.data.z;
+  hand_wrenches = work.newton.data.hands;
   reaction_current = true;
 }
 
@@ -146,6 +155,7 @@ Reaction World::reaction(int support) const {
   const Model& model = self.model;
   const Support& s = model.supports[at(support)];
   const VectorX held = self.equations->assembler().held_part(self.reaction_residual);
+  if (s.is_hand()) return self.hand_reaction(support, held, self.reaction_place);
   Reaction out;
   out.force = node_vector(model, held, s.node);
   if (s.frame >= 0) {

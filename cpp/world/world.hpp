@@ -22,7 +22,7 @@ struct Energy {  // [J]
   double kinetic = 0, stretch = 0, bend = 0, twist = 0, gravity = 0;
   double loads = 0;  ///< minus the work done by loads and custom forces since the start
   double contact = 0;
-  double spring = 0;
+  double spring = 0;      ///< of springs, and of hands that yield
   double total = 0;       ///< sum of the above
   double work = 0;        ///< done by supports and actuation since the start
   double dissipated = 0;  ///< by viscosity, drag, dampers, fluids and contact since the start
@@ -46,6 +46,12 @@ struct Statistics {
 struct Reaction {
   Vector3 force = Vector3::Zero();   ///< of the support on the rod [N]
   Vector3 moment = Vector3::Zero();  ///< of the support on the rod, about the node [N m]
+};
+
+/// How far what a hand holds is from where it held it, of the whole: along the hand's axes and about them.
+struct Deflection {
+  Vector3 shift = Vector3::Zero(), turn = Vector3::Zero();  ///< [m], [rad]
+  Vector3 slip = Vector3::Zero();                           ///< by what it has slipped besides [m]
 };
 
 struct Momentum {
@@ -208,7 +214,8 @@ class World {
   void prescribe_support(int support, const Vector3& position, const Matrix3& rotation);
   Vector3 support_position(int support) const;
   Matrix3 support_rotation(int support) const;
-  Reaction reaction(int support) const;
+  Reaction reaction(int support) const;      ///< of a hand: about where it is
+  Deflection deflection(int support) const;  ///< of a hand
 
   // Obstacles. Their place is that of the point they are drawn with: a plane's, a sphere's centre, a capsule's start.
   // They turn about the normal of a plane, the axis of a capsule, the centre of a sphere, by `turn` since drawn [rad].

@@ -8,11 +8,12 @@ namespace withe::bindings {
 namespace {
 
 constexpr Words<JointForm, 2> kJointForms{{{"frame", JointForm::frame}, {"pairs", JointForm::pairs}}};
-constexpr Words<SupportKind, 5> kSupportKinds{{{"pin", SupportKind::pin},
+constexpr Words<SupportKind, 6> kSupportKinds{{{"pin", SupportKind::pin},
                                                {"clamp", SupportKind::clamp},
                                                {"hold_edge", SupportKind::hold_edge},
                                                {"spinning_clamp", SupportKind::spinning_clamp},
-                                               {"spinning_edge", SupportKind::spinning_edge}}};
+                                               {"spinning_edge", SupportKind::spinning_edge},
+                                               {"hand", SupportKind::hand}}};
 constexpr Words<LoadKind, 4> kLoadKinds{{{"force", LoadKind::force},
                                          {"moment", LoadKind::moment},
                                          {"distributed", LoadKind::distributed},
@@ -120,10 +121,22 @@ void register_joints_and_supports(py::module_& module) {
       .def_readwrite("links", &JointDescription::links);
   def_word(joint, "form", &JointDescription::form, kJointForms);
 
+  py::class_<HandDescription>(module, "HandDescription", "What a hand holds.")
+      .def(py::init<>())
+      .def_readwrite("at", &HandDescription::at)
+      .def_readwrite("length", &HandDescription::length)
+      .def_readwrite("posed", &HandDescription::posed)
+      .def_readwrite("position", &HandDescription::position)
+      .def_readwrite("rotation", &HandDescription::rotation)
+      .def_readwrite("yields", &HandDescription::yields)
+      .def_readwrite("stiffness", &HandDescription::stiffness)
+      .def_readwrite("force_limit", &HandDescription::force_limit);
+
   py::class_<SupportDescription> support(module, "SupportDescription", "Something that holds a node.");
   support.def(py::init<>())
       .def_readwrite("pass_", &SupportDescription::pass)
-      .def_readwrite("free", &SupportDescription::free);
+      .def_readwrite("free", &SupportDescription::free)
+      .def_readwrite("hand", &SupportDescription::hand);
   def_word(support, "kind", &SupportDescription::kind, kSupportKinds);
 }
 

@@ -115,6 +115,10 @@ void register_results(py::module_& module) {
       .def_readonly("solve_time", &Statistics::solve_time)
       .def_readonly("fluid_time", &Statistics::fluid_time)
       .def_readonly("total_time", &Statistics::total_time);
+  py::class_<Deflection>(module, "Deflection", "How far what a hand holds has gone.")
+      .def_readonly("shift", &Deflection::shift)
+      .def_readonly("turn", &Deflection::turn)
+      .def_readonly("slip", &Deflection::slip);
   py::class_<Reaction>(module, "Reaction", "Of a support on the rod.")
       .def_readonly("force", &Reaction::force)
       .def_readonly("moment", &Reaction::moment);
@@ -334,6 +338,9 @@ void define_supports(WorldClass& world) {
       py::arg("support"));
   world.def(
       "reaction", [](const GuardedWorld& self, int support) { return self.reading().reaction(support); },
+      py::arg("support"));
+  world.def(
+      "deflection", [](const GuardedWorld& self, int support) { return self.reading().deflection(support); },
       py::arg("support"));
 }
 

@@ -14,12 +14,14 @@ __all__: list[str] = [
     "ContactPairDescription",
     "ContactTable",
     "ConvergenceFailure",
+    "Deflection",
     "Energy",
     "EquilibriumGradient",
     "EquilibriumPath",
     "EquilibriumResult",
     "FluidDescription",
     "GraspTable",
+    "HandDescription",
     "InitialGradient",
     "JointDescription",
     "Linearisation",
@@ -179,11 +181,48 @@ class JointDescription:
     @links.setter
     def links(self, arg0: collections.abc.Sequence[RevoluteLink]) -> None: ...
 
+class HandDescription:
+    """
+    What a hand holds.
+    """
+
+    posed: bool
+    yields: bool
+    def __init__(self) -> None: ...
+    @property
+    def at(self) -> float: ...
+    @at.setter
+    def at(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    @property
+    def force_limit(self) -> float: ...
+    @force_limit.setter
+    def force_limit(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    @property
+    def length(self) -> float: ...
+    @length.setter
+    def length(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    @property
+    def position(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]: ...
+    @position.setter
+    def position(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None: ...
+    @property
+    def rotation(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 3]"]: ...
+    @rotation.setter
+    def rotation(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"]) -> None: ...
+    @property
+    def stiffness(self) -> typing.Annotated[list[float], "FixedSize(6)"]: ...
+    @stiffness.setter
+    def stiffness(
+        self,
+        arg0: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(6)"],
+    ) -> None: ...
+
 class SupportDescription:
     """
     Something that holds a node.
     """
 
+    hand: HandDescription
     kind: str
     pass_: RodPass
     def __init__(self) -> None: ...
@@ -733,6 +772,17 @@ class Statistics:
     @property
     def total_time(self) -> float: ...
 
+class Deflection:
+    """
+    How far what a hand holds has gone.
+    """
+    @property
+    def shift(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]: ...
+    @property
+    def slip(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]: ...
+    @property
+    def turn(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]: ...
+
 class Reaction:
     """
     Of a support on the rod.
@@ -842,6 +892,7 @@ class World:
     def curvatures(
         self, rod: typing.SupportsInt | typing.SupportsIndex
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 2]"]: ...
+    def deflection(self, support: typing.SupportsInt | typing.SupportsIndex) -> Deflection: ...
     def directors(
         self, rod: typing.SupportsInt | typing.SupportsIndex
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 9]"]: ...

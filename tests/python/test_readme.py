@@ -51,6 +51,16 @@ def test_the_knot_of_the_readme_is_pulled_tight():
     assert pull > 5.5e-3 * bending / 4e-3**2  # what the knot takes without friction, at e / h = 75
 
 
+def test_the_hand_of_the_readme_lifts_the_rope():
+    names = {}
+    for block in blocks("simulation.grasp"):
+        names.clear()
+        exec(compile(block.replace("hand.release()", "force = hand.wrench().force"), str(README), "exec"), names)
+    weight = 9.81 * 700.0 * np.pi * 6e-3**2 * 0.9
+    assert 0.3 * weight < names["force"][2] < weight
+    assert names["simulation"].positions(names["rope"])[:, 2].max() == pytest.approx(0.3, abs=1e-6)
+
+
 def test_gradients_of_the_readme_have_the_shapes_that_it_says():
     names = {}
     for block in blocks("differentiable=True"):

@@ -67,7 +67,9 @@ def test_derivatives_are_those_of_the_residuals():
             ahead = residual.value(positions + step * changes[:, :, i], 0)
             behind = residual.value(positions - step * changes[:, :, i], 0)
             scale = np.abs(found).max()
-            assert found[:, i] == pytest.approx((ahead - behind) / (2 * step), abs=1e-5 * scale)
+            told = np.isfinite(ahead)
+            assert told.sum() == (69 if camera is None else 25)  # a distance each in pixels, and both ends
+            assert found[told, i] == pytest.approx((ahead - behind)[told] / (2 * step), abs=1e-5 * scale)
 
 
 def test_frames_without_points_are_skipped():

@@ -12,6 +12,7 @@ ROOT = Path(__file__).resolve().parent.parent.parent
 # Options of each example, the number that it prints, and between what that number must lie.
 EXAMPLES = {
     "upright_arm.py": (["--duration", "4"], r"tip at most [.\d]+ mm aside, ([.\d]+) mm in the end", 0.0, 1.0),
+    "carry_rope.py": (["--step", "1e-2"], r"carries up to (\d+)% of the weight", 40.0, 110.0),
     "flagella.py": (["--step", "2e-3", "--duration", "6"], r"drawn together by (\d+)%", 20.0, 80.0),
     "flagella_contact.py": (
         ["--counts", "2", "--frictions", "0.3", "--steps", "200"],
@@ -36,6 +37,7 @@ EXAMPLES = {
     "ring_buckling.py": (["--nodes", "40"], r"\(([-+.\d]+) %\)", -3.0, 3.0),
     "robot.py": (["--steps", "2"], r"walked ([-.\d]+) cm", 4.0, 10.0),
     "soft_limb.py": ([], r"tip ([.\d]+) mm off on the mean", 0.3, 0.7),
+    "tapered_arm.py": ([], r"tapered: clearance off by ([.\d]+) mm", 0.0, 1.0),
     "throwing_tip.py": ([], r"within ([.\d]+) mm of each point", 0.0, 1.0),
     "spider.py": (["--duration", "0.2"], r"half the step: no node moves by more than ([.\d]+)%", 0.0, 2.0),
 }

@@ -12,10 +12,12 @@ from withe import _core
 from withe.parts.contacts import describe_contact
 from withe.parts.directory import Directory
 from withe.parts.fluid import describe_fluid
+from withe.parts.hands import check_free
 from withe.parts.joints import JointGroup, connected, gather
 from withe.parts.kinds import (
     CustomForcePart,
     DragPart,
+    Grasp,
     JoinPart,
     LoadPart,
     MassPart,
@@ -100,7 +102,22 @@ def describe_support(part: SupportPart) -> _core.SupportDescription:
     support.kind = part.kind
     support.pass_ = _core.RodPass(*part.node)
     support.free = part.free
+    if part.grasp is not None:
+        support.hand = _describe_hand(part.grasp)
     return support
+
+
+def _describe_hand(grasp: Grasp) -> _core.HandDescription:
+    hand = _core.HandDescription()
+    hand.at, hand.length = grasp.at, grasp.length
+    if grasp.pose is not None:
+        hand.posed = True
+        hand.position, hand.rotation = grasp.pose
+    if grasp.stiffness is not None:
+        hand.yields = True
+        hand.stiffness = grasp.stiffness.tolist()
+        hand.force_limit = grasp.force_limit
+    return hand
 
 
 def _describe_rod(directory: Directory, rod: RodPart, coefficient: float) -> _core.RodDescription:
@@ -154,7 +171,12 @@ def _describe_joint(group: JointGroup) -> _core.JointDescription:
 
 def _describe_supports(directory: Directory) -> list[_core.SupportDescription]:
     holder: dict[int, SupportPart] = {}
+    hands = [part for part in directory.all(SupportPart) if part.grasp is not None]
+    for hand in hands:  # rods may have been joined since
+        check_free(directory, hand, [part for part in directory.all(SupportPart) if part is not hand])
     for part in directory.all(SupportPart):
+        if part.grasp is not None:
+            continue
         for row in held_rows(directory, part):
             other = holder.setdefault(row, part)
             if other is not part:

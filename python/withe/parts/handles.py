@@ -19,6 +19,7 @@ __all__ = [
     "Drag",
     "EdgeHandle",
     "Fluid",
+    "Hand",
     "Handle",
     "Joint",
     "Layout",
@@ -132,6 +133,11 @@ class Joint(Handle):
 @dataclass(frozen=True)
 class Support(Handle):
     """What holds a node: made by `clamp` and `pin`."""
+
+
+@dataclass(frozen=True)
+class Hand(Support):
+    """What holds a length of a rod: made by `grasp`."""
 
 
 @dataclass(frozen=True)

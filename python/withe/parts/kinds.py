@@ -14,6 +14,7 @@ from withe.parts.handles import (
     CustomForce,
     Drag,
     Fluid,
+    Hand,
     Handle,
     Joint,
     Layout,
@@ -37,6 +38,7 @@ __all__ = [
     "FluidModel",
     "FluidPart",
     "FrictionModel",
+    "Grasp",
     "JoinPart",
     "LoadPart",
     "MassPart",
@@ -60,7 +62,7 @@ FrictionModel = Literal["implicit", "lagged", "anchored", "semi_explicit"]
 Overlap = Literal["error", "separate"]
 FluidModel = Literal["stokeslets", "resistive"]
 LoadKind = Literal["force", "moment", "load", "pressure"]
-SupportKind = Literal["pin", "clamp", "hold_edge", "spinning_clamp", "spinning_edge"]
+SupportKind = Literal["pin", "clamp", "hold_edge", "spinning_clamp", "spinning_edge", "hand"]
 LOAD_KINDS: tuple[str, ...] = get_args(LoadKind)
 SUPPORT_KINDS: tuple[str, ...] = get_args(SupportKind)
 
@@ -124,14 +126,27 @@ class JoinPart:
 
 
 @dataclass(frozen=True, eq=False)
+class Grasp:
+    """What a hand holds, and how."""
+
+    at: float  # arc length [m]
+    length: float  # [m]
+    pose: tuple[FloatArray, FloatArray] | None  # position (3,) [m] and rotation (3, 3) as it grasps
+    stiffness: FloatArray | None  # (6,): along d1, d2, t [N/m], about them [N m/rad]; None: it does not yield
+    force_limit: float  # [N]
+    edges: tuple[int, ...]  # that it touches
+
+
+@dataclass(frozen=True, eq=False)
 class SupportPart:
-    """What holds a node."""
+    """What holds a node, or, a hand, a length of a rod."""
 
     name: str
     kind: SupportKind
     node: Pass
     node_name: str
     free: FloatArray  # projector onto the directions along which the node may slide, (3, 3)
+    grasp: Grasp | None = None  # of a hand
 
 
 @dataclass(frozen=True, eq=False)
@@ -276,4 +291,6 @@ def handle_of(part: Part, scene_id: str, layout: Layout) -> Handle:
     """The handle of a part."""
     if isinstance(part, RodPart):
         return Rod(scene_id, part.name, layout, part.index)
+    if isinstance(part, SupportPart) and part.grasp is not None:
+        return Hand(scene_id, part.name)
     return _HANDLES[type(part)](scene_id, part.name)

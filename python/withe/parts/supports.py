@@ -11,6 +11,7 @@ import numpy.typing as npt
 from withe.common import validation
 from withe.parts.directory import Directory
 from withe.parts.handles import NodeHandle
+from withe.parts.hands import check_free
 from withe.parts.kinds import SupportKind, SupportPart
 
 __all__ = ["check_not_held", "held_rows", "make_clamp", "make_pin"]
@@ -55,14 +56,18 @@ def check_not_held(directory: Directory, part: SupportPart, others: Iterable[Sup
     ValueError
         A node that it would hold, or one that is joined to it, is held by one of the others.
     """
+    others = list(others)
+    check_free(directory, part, others)
     held = held_rows(directory, part)
     for other in others:
+        if part.grasp is not None or other.grasp is not None:
+            continue
         if directory.row(other.node) == directory.row(part.node):
             raise ValueError(f"node {part.node_name!r} is already held by {other.name!r}: release that first")
         if not held.isdisjoint(held_rows(directory, other)):
             raise ValueError(
                 f"{part.name!r} at {part.node_name!r} would hold a node that {other.name!r} at {other.node_name!r} "
-                "holds: hold='edge' takes both nodes of an edge"
+                "holds: hold='edge' takes both nodes of an edge; hands may hold neighbouring edges"
             )
 
 

@@ -27,8 +27,8 @@ FloatArray = npt.NDArray[np.float64]
 class Centrelines(Target):
     """Points seen along rods, without knowing which point of the rod each is.
 
-    A residual is the way from a seen point to the nearest one of the simulated line. With `ends`, the first and the
-    last point are the ends of the line, in either order.
+    A residual is the way from a seen point to the nearest one of the simulated line; in pixels the distance, to the
+    left of the line positive. With `ends`, the first and the last point are the ends of the line, in either order.
 
     Parameters
     ----------
@@ -108,7 +108,26 @@ class _LineResidual(Residual):
         nearest = line[edges] + shares[:, None] * (line[edges + 1] - line[edges])
         values = np.full((self._samples, line.shape[1]), np.nan)
         values[: len(seen)] = (nearest - seen) / self._sigma
+        inner = self._inner(len(seen))
+        if line.shape[1] == 2:
+            left = self._left(line, seen, edges, nearest)
+            values[inner, 0] = (left * (nearest - seen)).sum(axis=1)[inner] / self._sigma
+            values[inner, 1] = np.nan
         return values.ravel()
+
+    def _inner(self, count: int) -> slice:
+        """Points that may be anywhere along the line."""
+        return slice(1, count - 1) if self._ends else slice(0, count)
+
+    @staticmethod
+    def _left(line: FloatArray, seen: FloatArray, edges: npt.NDArray[np.int64], nearest: FloatArray) -> FloatArray:
+        """Unit vectors along the way between each point and the nearest one of the line, to the left of it."""
+        chord, away = line[edges + 1] - line[edges], nearest - seen
+        normal = np.stack([-chord[:, 1], chord[:, 0]], axis=1) / np.linalg.norm(chord, axis=1)[:, None]
+        distance = np.linalg.norm(away, axis=1)
+        far = distance > 1e-9 * np.linalg.norm(chord, axis=1)
+        sign = np.where((away * normal).sum(axis=1) < 0.0, -1.0, 1.0)
+        return np.where(far[:, None], sign[:, None] * away / np.where(far, distance, 1.0)[:, None], normal)
 
     def derivative(self, positions: FloatArray, frame: int) -> FloatArray:
         line, seen = self._line(positions), self._seen[frame]
@@ -125,6 +144,11 @@ class _LineResidual(Residual):
         away = line[edges] + shares[:, None] * chord - seen
         across = np.eye(dimension) - tangent[:, :, None] * tangent[:, None]
         turned = tangent[:, :, None] * away[:, None] / length[:, :, None]
+        if dimension == 2:  # a distance changes with what goes along the way alone
+            inner = self._inner(len(seen))
+            left = self._left(line, seen, edges, line[edges] + shares[:, None] * chord)
+            across[inner], turned[inner] = 0.0, 0.0
+            across[inner, 0] = left[inner]
         by_node = np.broadcast_to(np.eye(3), (len(self._rows), 3, 3))
         if self._camera is not None:
             by_node = pixel_derivative(self._camera, positions[self._rows])

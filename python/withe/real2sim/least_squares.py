@@ -31,6 +31,8 @@ _RANK = 1e-9  # singular values below it, relative to the greatest, belong to di
 _SMALL = 1e-5  # a step that would lessen the residual by less than this share of it is the last
 _TRIALS = 8
 _TRIALS_OF_SECANTS = 2  # then derivatives are asked for anew
+_WORTH = 0.01
+_SMALL_OF_SECANTS = 1e-2  # likewise, of what each number that was seen leaves
 
 
 class Problem(Protocol):
@@ -80,6 +82,7 @@ class Secants:
 
     def __init__(self) -> None:
         self.updated = False
+        self._gain = np.inf  # of the last step
         self._last: tuple[FloatArray, FloatArray, FloatArray] | None = None  # coordinates, residual, derivatives
 
     def jacobian(
@@ -96,6 +99,11 @@ class Secants:
             found = found + np.outer(missed, way / problem.scales) / (way @ way)
         self._last = (coordinates.copy(), seen(residual), found)
         return found
+
+    def are_worth_renewing(self, gain: float, count: int) -> bool:
+        """Whether as many steps as derivatives by the coordinates cost would not bring the gain down to a hundredth."""
+        rate, self._gain = gain / self._gain, gain
+        return self.updated and rate ** (count + 1) > _WORTH
 
     def renew(self) -> bool:
         """Ask the problem next, if those at hand were updated."""
@@ -165,10 +173,14 @@ def lone_frame(
         jacobian = _seen_rows(derivatives[:, free] * scales, residual)
         step = _bounded(jacobian, -seen(residual), 1.0)
         gain = float(np.linalg.norm(jacobian @ step))
-        if gain <= _SMALL * _size(residual) or gain <= tolerance:
+        rows = max(int(np.isfinite(residual).sum()), 1)
+        small = _SMALL if secants is None else _SMALL_OF_SECANTS / np.sqrt(rows)
+        if gain <= small * _size(residual) or gain <= tolerance:
             if secants is not None and secants.renew():
                 continue
             return FrameSolution(coordinates, residual, jacobian, iteration, True)
+        if secants is not None and secants.are_worth_renewing(gain, len(scales)) and secants.renew():
+            continue
         for _ in range(_TRIALS if secants is None or not secants.updated else _TRIALS_OF_SECANTS):
             trial = coordinates.copy()
             trial[free] += scales * step

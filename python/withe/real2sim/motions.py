@@ -13,7 +13,7 @@ from withe.common.progress import Progress
 from withe.common.progress import progress as progress_bar
 from withe.errors import ConvergenceError
 from withe.real2sim.gathering import gather
-from withe.real2sim.least_squares import Secants, lone_frame
+from withe.real2sim.least_squares import Secants, lone_frame, seen
 from withe.real2sim.parsing import parse_unknowns
 from withe.real2sim.results import Fit
 from withe.real2sim.targets import Residual, Target, bind, frames_of
@@ -70,7 +70,9 @@ def fit_motion(
     Raises
     ------
     ValueError
-        Targets without times, or what cannot be unknown.
+        Targets without times, in which nothing was seen, or what cannot be unknown.
+    ConvergenceError
+        The run fails with the first guess.
 
     Examples
     --------
@@ -85,6 +87,8 @@ def fit_motion(
     times = np.asarray(listed[0].times)
     if any(not np.array_equal(target.times, times) for target in listed):
         raise ValueError("times of all targets must be the same")
+    if not any(target.told(frame) for target in listed for frame in range(target.frames)):
+        raise ValueError(f"targets must show something at some time, got nothing at all {len(times)}")
     copy = simulation.copy()
     late = validation.number(delay, "delay")
     words = [unknown for unknown in unknowns if isinstance(unknown, str)] if not isinstance(unknowns, str) else []
@@ -126,10 +130,10 @@ class _Motion(Coordinates):
         super().__init__(simulation, unknowns)
         self._start, self._begin, self._bar = simulation.snapshot(), begin, bar
         self._residual, self._times, self._delay = residual, times, delay
-        self.runs = 0
+        self.runs, self._ran = 0, False
 
     def residual(self, coordinates: FloatArray, frame: int) -> tuple[FloatArray, FloatArray] | None:
-        """Residuals of all times, one after the other, and what `_seen` has; None where the run fails."""
+        """Residuals of all times, one after the other, and `_shapes`; None where the run fails, but the first one."""
         try:
             self.simulation.restore(self._start)
             self.forget()
@@ -138,12 +142,15 @@ class _Motion(Coordinates):
                 self._begin(self.simulation)
             shapes = self._shapes(coordinates)
         except (ConvergenceError, ValueError):
+            if not self._ran:
+                raise
             return None
+        self._ran = True
         return self._values(shapes[0]), shapes
 
     def jacobian(self, coordinates: FloatArray, state: FloatArray, frame: int) -> FloatArray:
         """By forward differences of runs, and by velocities."""
-        now, columns = self._values(state[0]), []
+        now, columns = seen(self._values(state[0])), []
         late = self._place_of_delay()
         for i, scale in enumerate(self.scales):
             if i == late:
@@ -156,7 +163,7 @@ class _Motion(Coordinates):
                 raise ConvergenceError(
                     f"a run fails for {self.names[i]} a little off what it is: shorten its time step"
                 )
-            columns.append((ahead[0] - now) / step[i])
+            columns.append((seen(ahead[0]) - now) / step[i])
         return np.stack(columns, axis=1)
 
     def _values(self, positions: FloatArray) -> FloatArray:

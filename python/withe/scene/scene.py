@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import uuid
-from typing import Any, Literal, cast
+from typing import Any, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -11,15 +11,15 @@ import numpy.typing as npt
 from withe.common import validation
 from withe.parts.applied_loads import AppliedLoads, Bearer
 from withe.parts.directory import Directory
-from withe.parts.handles import Joint, Load, NodeHandle, Rod, RodPlace, Support
-from withe.parts.kinds import JoinKind, JointForm, LoadPart, RodPart, SupportPart
+from withe.parts.handles import Joint, Load, NodeHandle, Rod, RodPlace
+from withe.parts.kinds import JoinKind, JointForm, LoadPart, RodPart
 from withe.parts.materials import Material, Section, Stiffness
 from withe.parts.options import Bending, BuildOptions, Integrator, LineSearch, Solver
 from withe.parts.rods import Natural, make_rod
-from withe.parts.supports import check_not_held, make_clamp, make_pin
 from withe.scene.contacts import Contacts
 from withe.scene.joints import JoinedNodes
 from withe.scene.loads import Loads
+from withe.scene.supports import Supports
 from withe.simulation.simulation import Simulation
 
 __all__ = ["Scene"]
@@ -27,7 +27,7 @@ __all__ = ["Scene"]
 FloatArray = npt.NDArray[np.float64]
 
 
-class Scene(AppliedLoads, Loads, Contacts):
+class Scene(AppliedLoads, Loads, Contacts, Supports):
     """A description of rods, joints, supports and loads, from which simulations are built.
 
     Parameters
@@ -217,49 +217,6 @@ class Scene(AppliedLoads, Loads, Contacts):
         """
         return cast(Joint, self._directory.add(self._joints.join(a, b, kind, axis, form, name)))
 
-    # Supports
-
-    def clamp(
-        self,
-        node: NodeHandle | str,
-        *,
-        hold: Literal["frame", "edge"] = "frame",
-        free: npt.ArrayLike | None = None,
-        spin: bool = False,
-        name: str | None = None,
-    ) -> Support:
-        """Hold a node in place, and the direction and roll of its rod.
-
-        Parameters
-        ----------
-        node : NodeHandle or str
-        hold : {"frame", "edge"}
-            Clamp the rod at the node itself, as a wall does, or hold its end edge: both its nodes and
-            its angle.
-        free : array_like of shape (3,) or (2, 3)
-            Directions along which the clamp may slide.
-        spin : bool
-            Whether it may turn about the rod's tangent, which it goes on holding.
-        name : str
-
-        Returns
-        -------
-        Support
-
-        Raises
-        ------
-        ValueError
-            A node that is held already.
-        """
-        return _hold(self._directory, make_clamp(self._directory, node, hold, free, spin, name))
-
-    def pin(self, node: NodeHandle | str, *, free: npt.ArrayLike | None = None, name: str | None = None) -> Support:
-        """Hold a node in place, and leave its rod free to turn.
-
-        Arguments, result and refusals are those of `clamp`.
-        """
-        return _hold(self._directory, make_pin(self._directory, node, free, name))
-
     # Simulations
 
     def build(
@@ -363,8 +320,3 @@ class _Drawn:
 
     def take(self, part: LoadPart) -> Load:
         return cast(Load, self.directory.add(part))
-
-
-def _hold(directory: Directory, part: SupportPart) -> Support:
-    check_not_held(directory, part, directory.all(SupportPart))
-    return cast(Support, directory.add(part))

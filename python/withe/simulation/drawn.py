@@ -103,6 +103,8 @@ def _check(session: Session, part: RodPart) -> list[tuple[int, SupportPart]]:
             refuse(f"where {spring.name!r} is as long as it was drawn: give rest_length=")
     found = []
     for index, support in session.settings.supports.values():
+        if support.grasp is not None:
+            refuse("where a hand holds a rod")
         if support.node[0] != part.index:
             continue
         node = support.node[1]

@@ -11,7 +11,7 @@ from withe.parts.handles import CustomForce
 from withe.parts.kinds import CustomForcePart, RodPart
 from withe.simulation.custom_forces import CustomForces
 from withe.simulation.loads import new_values
-from withe.simulation.motion import Path, Turn, evaluate_path
+from withe.simulation.motion import Path, Turn, Waypoints, evaluate_path
 from withe.simulation.obstacles import find_obstacle, obstacle_pose
 from withe.simulation.session import Session
 
@@ -47,7 +47,7 @@ def apply_functions(session: Session, force_time: float, end_time: float) -> Non
         if _finished(path, min(session.world.time, end_time)):
             continue
         present = np.array(session.world.support_rotation(index))
-        owner = f"support {name!r}"
+        owner = f"{'hand' if support.grasp is not None else 'support'} {name!r}"
         position, rotation = evaluate_path(path, end_time, present, support.kind != "pin", owner)
         session.world.prescribe_support(index, position, rotation)
 
@@ -94,7 +94,7 @@ def _check_in_plane(session: Session, value: FloatArray, what: str, along_normal
 
 def _finished(path: Path, time: float) -> bool:
     """Whether a path has come to its end, and was followed there."""
-    if not isinstance(path, Turn):
+    if not isinstance(path, Turn | Waypoints):
         return False
-    begin, end = path.times
+    begin, end = path.times[0], path.times[-1]
     return bool(time > end or (time == end and begin < end))

@@ -9,8 +9,9 @@ import numpy.typing as npt
 
 from withe.knots import link
 from withe.parts.contacts import contact_table
-from withe.parts.handles import NodeHandle, Obstacle, Rod, Spring, Support
+from withe.parts.handles import Hand, NodeHandle, Obstacle, Rod, Spring, Support
 from withe.parts.kinds import ObstaclePart, SpringPart
+from withe.simulation.hands import Deflection, HeldPose, hand_deflection, hand_wrench, support_pose
 from withe.simulation.readouts import Energy, Momentum, Plan, Reaction, RodEnergy, Statistics
 from withe.simulation.session import Session
 from withe.simulation.springs import spring_tension
@@ -168,6 +169,45 @@ class Measurements:
         index, _ = find_support(self._session, support)
         reaction = self._session.world.reaction(index)
         return Reaction(np.array(reaction.force), np.array(reaction.moment))
+
+    def wrench(self, hand: Hand | str, about: npt.ArrayLike | None = None) -> Reaction:
+        """Force and moment of a hand on the rod, of all that it holds as one.
+
+        In motion, those of the last step: midpoint steps have them in their middle. Together with gravity and other
+        forces they are by what momentum and angular momentum grew.
+
+        Parameters
+        ----------
+        hand : Hand or str
+        about : array_like of shape (3,) [m]
+            The point of the world that the moment is about; by default where the hand is.
+
+        Raises
+        ------
+        ValueError
+            No hand, or released.
+        """
+        return hand_wrench(self._session, hand, about)
+
+    def deflection(self, hand: Hand | str) -> Deflection:
+        """How far what a hand that yields holds has gone from where it was grasped; zero of one that does not.
+
+        Raises
+        ------
+        ValueError
+            No hand, or released.
+        """
+        return hand_deflection(self._session, hand)
+
+    def pose(self, support: Support | NodeHandle | str) -> HeldPose:
+        """Position and rotation of a support or a hand now.
+
+        Raises
+        ------
+        ValueError
+            Nothing holds that node.
+        """
+        return support_pose(self._session, support)
 
     def contacts(self) -> npt.NDArray[np.void]:
         """What touches now.

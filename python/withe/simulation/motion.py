@@ -10,12 +10,25 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common import drawing, validation
+from withe.parts.hands import quaternion_matrix
 
-__all__ = ["Path", "Pose", "RotationLike", "Turn", "axis_angle", "evaluate_path", "oriented"]
+__all__ = [
+    "Path",
+    "PathLike",
+    "Pose",
+    "RotationLike",
+    "Turn",
+    "Waypoints",
+    "axis_angle",
+    "evaluate_path",
+    "make_path",
+    "oriented",
+]
 
 FloatArray = npt.NDArray[np.float64]
 Pose = tuple[FloatArray, FloatArray]  # position (3,) [m], rotation (3, 3) from the drawn orientation
 Path = Callable[[float], Any]
+PathLike = Path | npt.ArrayLike | tuple[Path, Path]
 
 
 class HasMatrix(Protocol):
@@ -83,6 +96,77 @@ class Turn:
         }
 
 
+@dataclass(frozen=True, eq=False)
+class Waypoints:
+    """A support on its way through poses at given times: evenly from one to the next, turning at an even rate.
+
+    Attributes
+    ----------
+    times : shape (poses,) [s]
+    positions : shape (poses, 3) [m]
+    rotations : shape (poses, 3, 3), or (0, 3, 3) where only positions are given
+    """
+
+    times: FloatArray
+    positions: FloatArray
+    rotations: FloatArray
+
+    def __call__(self, time: float) -> Any:
+        """Position, and rotation where there are any, at a time."""
+        after = int(np.clip(np.searchsorted(self.times, time, side="right"), 1, len(self.times) - 1))
+        begin, end = self.times[after - 1 : after + 1]
+        share = min(max((time - float(begin)) / float(end - begin), 0.0), 1.0)
+        position = (1.0 - share) * self.positions[after - 1] + share * self.positions[after]
+        if not len(self.rotations):
+            return position
+        before = self.rotations[after - 1]
+        axis, angle = axis_angle(self.rotations[after] @ before.T)
+        return position, drawing.rotation_about(share * angle * axis) @ before
+
+    def arrays(self) -> dict[str, FloatArray]:
+        """Its numbers, for a file."""
+        return {"times": self.times, "positions": self.positions, "rotations": self.rotations}
+
+
+def make_path(path: PathLike, turns: bool, owner: str) -> Path:
+    """What a user gives as a path, as a function of time.
+
+    Raises
+    ------
+    ValueError
+        No motion: not a function, a pair of functions, or rows (t, x, y, z) or (t, x, y, z, qw, qx, qy, qz) in which
+        time grows.
+    """
+    if callable(path):
+        return path
+    what = f"path of {owner}"
+    if isinstance(path, tuple) and len(path) == 2 and all(callable(part) for part in path):
+        return Both(*path)
+    rows = validation.number_array(path, what, ("poses", 4), ("poses", 8))
+    if len(rows) < 2:
+        raise ValueError(f"{what} must have two rows or more to lead anywhere, got {len(rows)}")
+    steps = np.diff(rows[:, 0])
+    if steps.min() <= 0.0:
+        row = int(np.argmin(steps))
+        raise ValueError(f"{what} must have times that grow, got {rows[row, 0]:g} s and then {rows[row + 1, 0]:g} s")
+    if rows.shape[1] == 8 and not turns:
+        raise ValueError(f"{what} must have positions only, (t, x, y, z): a pin holds no direction")
+    turned = [quaternion_matrix(row[4:], f"row {i} of the {what}") for i, row in enumerate(rows) if len(row) == 8]
+    return Waypoints(rows[:, 0].copy(), rows[:, 1:4].copy(), np.array(turned).reshape(-1, 3, 3))
+
+
+@dataclass(frozen=True, eq=False)
+class Both:
+    """A function for the position and one for the rotation, such as a CubicSpline and a RotationSpline of SciPy."""
+
+    position: Path
+    rotation: Path
+
+    def __call__(self, time: float) -> Any:
+        """Both at a time."""
+        return self.position(time), self.rotation(time)
+
+
 def axis_angle(rotation: FloatArray) -> tuple[FloatArray, float]:
     """Unit vector and angle of a rotation, from 0 to pi."""
     cosine = min(max(0.5 * (float(np.trace(rotation)) - 1.0), -1.0), 1.0)
@@ -102,7 +186,7 @@ def evaluate_path(path: Path, time: float, present: FloatArray, turns: bool, own
     Parameters
     ----------
     path : callable
-        Returns a position, or a position and a rotation.
+        Returns a position, a position and a rotation, or seven numbers x, y, z, qw, qx, qy, qz.
     time : float [s]
     present : ndarray of shape (3, 3)
         Rotation to keep where the path gives none.
@@ -120,6 +204,9 @@ def evaluate_path(path: Path, time: float, present: FloatArray, turns: bool, own
         return path(time)
     what = f"path of {owner} at t = {time:g}"
     value = path(time)
+    if turns and isinstance(value, np.ndarray) and value.shape == (7,):
+        value = validation.number_array(value, what, (7,))
+        value = value[:3], quaternion_matrix(value[3:], what)
     if isinstance(value, tuple | list) and len(value) == 2:
         position = validation.vector(value[0], f"position on the {what}")
         if not turns:

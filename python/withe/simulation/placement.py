@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
 import numpy.typing as npt
 
 from withe.parts.friction import Friction
 from withe.parts.handles import NodeHandle, Obstacle, Rod, Support
+from withe.parts.hands import make_hand
 from withe.parts.supports import make_clamp, make_pin
-from withe.simulation.motion import Path, RotationLike
+from withe.simulation.hands import RunningHand, find_hand
+from withe.simulation.motion import PathLike, RotationLike
 from withe.simulation.obstacles import find_obstacle, move_obstacle, set_pair_friction
 from withe.simulation.session import Session
 from withe.simulation.states import set_state, set_velocities
@@ -52,6 +54,59 @@ class Placement:
         """
         return put_on(self._session, make_pin(self._session.directory, node, free, name))
 
+    def grasp(
+        self,
+        rod: Rod | str,
+        at: float,
+        length: float = 0.0,
+        *,
+        pose: Any = None,
+        stiffness: npt.ArrayLike | None = None,
+        force_limit: float | None = None,
+        name: str | None = None,
+    ) -> RunningHand:
+        """Take hold of a rod by a hand, where it is and as it is now: nothing jumps. See `Scene.grasp`.
+
+        A hand that does not yield brings what it holds to rest, or to its own motion, within the next time step.
+
+        Returns
+        -------
+        RunningHand
+            A handle with methods of its own: ``move``, ``wrench``, ``release``, ``pose``, ``deflection``.
+
+        Raises
+        ------
+        ValueError
+            As `Scene.grasp`.
+
+        Examples
+        --------
+        >>> hand = simulation.grasp(arm, at=0.2, stiffness=(500.0, 0.1), force_limit=2.0)
+        >>> simulation.step(10)
+        >>> hand.deflection.shift.shape
+        (3,)
+        """
+        part = make_hand(self._session.directory, rod, at, length, pose, stiffness, force_limit, name)
+        handle = put_on(self._session, part)
+        return RunningHand(handle.scene_id, handle.name, self._session)
+
+    def hand(self, hand: Support | str) -> RunningHand:
+        """A hand of this simulation, by its handle or name, with the methods of what `grasp` returns.
+
+        Raises
+        ------
+        ValueError
+            No hand, or released.
+
+        Examples
+        --------
+        >>> _ = simulation.grasp(arm, at=0.2, name="left")
+        >>> simulation.hand("left").release()
+        """
+        find_hand(self._session, hand)
+        name = hand if isinstance(hand, str) else hand.name
+        return RunningHand(self._session.directory.scene_id, name, self._session)
+
     def release(self, support: Support | NodeHandle | str) -> None:
         """Let go of a node.
 
@@ -76,7 +131,7 @@ class Placement:
         tangent: npt.ArrayLike | None = None,
         roll: float | None = None,
         over: float = 0.0,
-        path: Path | None = None,
+        path: PathLike | None = None,
     ) -> None:
         """Move a support or an obstacle, or let it move along a path from now on. What is not given stays as it is.
 
@@ -88,7 +143,7 @@ class Placement:
             ``energy().work``.
         position : array_like of shape (3,) [m]
         rotation : array_like of shape (3, 3), or a SciPy Rotation
-            Relative to the orientation as drawn.
+            Relative to the orientation as drawn; of a hand, its axes in the world as columns.
         tangent : array_like of shape (3,)
             Where the rod is to point, instead: the smallest turn from the drawn tangent, and then ...
         roll : float [rad]
@@ -98,9 +153,13 @@ class Placement:
             itself.
         over : float [s]
             Reached after so long, evenly; within the next step by default.
-        path : callable
-            Instead of all these: a function of time [s] that returns a position, or a position and a
-            rotation; of an obstacle, a position and a roll (of a sphere, times the axis, shape (3,)).
+        path : callable, pair of callables, or array_like of shape (poses, 4) or (poses, 8)
+            Instead of all these: a function of time [s] that returns a position, a position and a
+            rotation, or seven numbers x, y, z, qw, qx, qy, qz; or one for the position and one for the rotation, such
+            as a CubicSpline and a RotationSpline of SciPy; of an obstacle, a function that returns a position and a
+            roll (of a sphere, times the axis, shape (3,)). Or rows (t, x, y, z) or (t, x, y, z, qw, qx, qy, qz), times
+            of the simulation [s] that grow, and unit quaternions with the scalar first: evenly from one to the next,
+            at rest before the first and after the last.
 
         Raises
         ------
@@ -116,6 +175,8 @@ class Placement:
         if obstacle is None:
             move_support(self._session, support, position, rotation, tangent, roll, over, path)
             return
+        if path is not None and not callable(path):
+            raise ValueError(f"path of {obstacle[1]!r} must be a function of time")
         if rotation is not None:
             raise ValueError(f"rotation of {obstacle[1]!r} must be None: an obstacle turns by a roll about its axis")
         move_obstacle(self._session, *obstacle, position, tangent, roll, over, path)

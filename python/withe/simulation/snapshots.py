@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from dataclasses import replace
 from pathlib import Path as FilePath
@@ -13,9 +14,10 @@ import numpy.typing as npt
 from withe import io
 from withe.common import validation
 from withe.parts.directory import Directory
-from withe.parts.kinds import LOAD_KINDS, SUPPORT_KINDS, LoadPart, ObstaclePart, SupportPart
+from withe.parts.hands import pose_of
+from withe.parts.kinds import LOAD_KINDS, SUPPORT_KINDS, Grasp, LoadPart, ObstaclePart, SupportPart
 from withe.parts.parameters import RodParameters
-from withe.simulation.motion import Path, Turn
+from withe.simulation.motion import Path, Turn, Waypoints
 from withe.simulation.session import Session
 from withe.simulation.settings import Settings
 
@@ -50,14 +52,14 @@ class Snapshot:
 
     def _function_names(self) -> tuple[str, ...]:
         """Loads and supports whose functions no file can hold."""
-        paths = (name for name, path in self._settings.paths.items() if not isinstance(path, Turn))
+        paths = (name for name, path in self._settings.paths.items() if not isinstance(path, Turn | Waypoints))
         return tuple(sorted({*self._settings.functions, *paths, *self._missing}))
 
     def __getstate__(self) -> dict[str, Any]:
         settings = self._settings.copy()
         settings.functions = {}
         settings.loads = {name: replace(load, function=None) for name, load in settings.loads.items()}
-        settings.paths = {name: path for name, path in settings.paths.items() if isinstance(path, Turn)}
+        settings.paths = {name: path for name, path in settings.paths.items() if isinstance(path, Turn | Waypoints)}
         return {
             "_state": self._state,
             "_time": self._time,
@@ -90,10 +92,11 @@ class Snapshot:
             arrays |= {f"rod_{index}_{word}": values for word, values in rod.arrays().items()}
         supports = []
         for number, (name, (index, part)) in enumerate(settings.supports.items()):
-            supports.append({"name": name, "index": index, "kind": part.kind, "node": part.node_name})
+            entry = {"name": name, "index": index, "kind": part.kind, "node": part.node_name}
+            supports.append(entry | (_written(part.grasp) if part.grasp is not None else {}))
             arrays[f"support_{number}_free"] = part.free
             turn = settings.paths.get(name)
-            if isinstance(turn, Turn):
+            if isinstance(turn, Turn | Waypoints):
                 arrays |= {f"support_{number}_{word}": values for word, values in turn.arrays().items()}
         loads = []
         for number, load in enumerate(settings.loads.values()):
@@ -147,7 +150,8 @@ class Snapshot:
             free = validation.number_array(arrays[f"support_{number}_free"], "free", (3, 3))
             index = validation.integer(entry["index"], "index", 0, 10_000_000)
             # Which node that is, the simulation that restores it knows by the name.
-            supports[name] = index, SupportPart(name, kind, (-1, -1), str(entry["node"]), free)  # type: ignore[arg-type]
+            grasp = _read(entry) if kind == "hand" else None
+            supports[name] = index, SupportPart(name, kind, (-1, -1), str(entry["node"]), free, grasp)  # type: ignore[arg-type]
             if f"support_{number}_drawn" in arrays:
                 paths[name] = Turn(
                     *(
@@ -158,6 +162,17 @@ class Snapshot:
                             ("rolls", (2,)),
                             ("times", (2,)),
                             ("drawn", (2, 3)),
+                        )
+                    )
+                )
+            elif f"support_{number}_times" in arrays:
+                paths[name] = Waypoints(
+                    *(
+                        validation.number_array(arrays[f"support_{number}_{word}"], word, shape)
+                        for word, shape in (
+                            ("times", ("poses",)),
+                            ("positions", ("poses", 3)),
+                            ("rotations", ("poses", 3, 3)),
                         )
                     )
                 )
@@ -237,7 +252,7 @@ def _matched(snapshot: Snapshot, mine: Settings, directory: Directory, scene: Di
         raise ValueError("snapshot belongs to another scene")
     for name, (index, part) in settings.supports.items():
         node, _ = directory.node(part.node_name, f"node held by {name!r}")
-        settings.supports[name] = index, SupportPart(name, part.kind, node, part.node_name, part.free)
+        settings.supports[name] = index, replace(part, node=node)
         known = scene.parts.get(name)
         if known is not None and not isinstance(known, SupportPart):
             raise ValueError(f"snapshot belongs to another scene: {name!r} is no support in this one")
@@ -254,3 +269,28 @@ def _matched(snapshot: Snapshot, mine: Settings, directory: Directory, scene: Di
                 f"snapshot needs the function of time of {name!r}, which no file holds: set it on this simulation first"
             )
     return settings
+
+
+def _written(grasp: Grasp) -> dict[str, Any]:
+    """A hand, for the header of a file."""
+    return {
+        "at": grasp.at,
+        "length": grasp.length,
+        "pose": None if grasp.pose is None else [grasp.pose[0].tolist(), grasp.pose[1].tolist()],
+        "stiffness": None if grasp.stiffness is None else grasp.stiffness.tolist(),
+        "force_limit": grasp.force_limit if math.isfinite(grasp.force_limit) else None,
+        "edges": list(grasp.edges),
+    }
+
+
+def _read(entry: dict[str, Any]) -> Grasp:
+    """That back."""
+    pose, stiffness, limit = entry["pose"], entry["stiffness"], entry["force_limit"]
+    return Grasp(
+        at=validation.number(entry["at"], "at"),
+        length=validation.non_negative(entry["length"], "length"),
+        pose=None if pose is None else pose_of(tuple(pose), "pose"),
+        stiffness=None if stiffness is None else validation.per_item(stiffness, "stiffness", 6, "directions"),
+        force_limit=math.inf if limit is None else validation.positive(limit, "force_limit"),
+        edges=tuple(validation.integer(edge, "edge", 0, 10_000_000) for edge in entry["edges"]),
+    )

@@ -12,7 +12,7 @@ from withe.parts.description import describe_support
 from withe.parts.handles import Handle, NodeHandle, Support
 from withe.parts.kinds import SupportPart
 from withe.parts.supports import check_not_held
-from withe.simulation.motion import Path, RotationLike, Turn, axis_angle, evaluate_path, oriented
+from withe.simulation.motion import PathLike, RotationLike, Turn, axis_angle, evaluate_path, make_path, oriented
 from withe.simulation.session import Session
 
 __all__ = ["find_support", "hold", "move_support", "release"]
@@ -71,19 +71,18 @@ def move_support(
     tangent: npt.ArrayLike | None,
     roll: float | None,
     over: float,
-    path: Path | None,
+    path: PathLike | None,
 ) -> None:
     """Move a support; see `Simulation.move`."""
     index, part = find_support(session, support)
     turns = part.kind != "pin"
-    owner = f"support {part.name!r}"
+    owner = _owner(part)
     if path is not None:
         if any(value is not None for value in (position, rotation, tangent, roll)) or over != 0.0:
             raise ValueError(f"path of {owner} must be given alone")
-        validation.function(path, f"path of {owner}")
-        now = session.world.time
-        evaluate_path(path, now, session.world.support_rotation(index), turns, owner)
-        session.settings.paths[part.name] = path
+        way = make_path(path, turns, owner)
+        evaluate_path(way, session.world.time, session.world.support_rotation(index), turns, owner)
+        session.settings.paths[part.name] = way
         session.note("move", part, {})
         return
     if rotation is not None and (tangent is not None or roll is not None):
@@ -121,7 +120,9 @@ def _turn(
 ) -> Turn:
     """The way of a support from where it is to a tangent and a roll."""
     rod = session.directory.rod(session.directory.layout.rods[part.node[0]].name)
-    if part.kind in ("clamp", "spinning_clamp"):
+    if part.grasp is not None:
+        drawn = np.eye(3)[2], np.eye(3)[0]
+    elif part.kind in ("clamp", "spinning_clamp"):
         drawn = drawing.drawn_frame(rod.tangents, rod.directors, rod.lengths, part.node[1], rod.closed)
     else:
         edge = min(part.node[1], len(rod.tangents) - 1)
@@ -137,7 +138,7 @@ def _turn(
     if isinstance(before, Turn):
         full_turn = 2.0 * np.pi
         start_roll += full_turn * float(np.round((before.roll_at(now) - start_roll) / full_turn))
-    owner = f"support {part.name!r}"
+    owner = _owner(part)
     end_tangent = start_tangent if tangent is None else validation.unit_vector(tangent, f"tangent of {owner}")
     end_roll = start_roll if roll is None else validation.number(roll, f"roll of {owner}")
     # Rotations at the ends of a step do not tell full turns between them.
@@ -155,3 +156,7 @@ def _turn(
         times=np.array([now, now + over]),
         drawn=np.stack(drawn),
     )
+
+
+def _owner(part: SupportPart) -> str:
+    return f"{'hand' if part.grasp is not None else 'support'} {part.name!r}"

@@ -1,0 +1,47 @@
+#pragma once
+/// An elastic connection between a hand and a point of a rod, with the frame of the edge that it is on.
+///
+/// The hand, at p with its axes R, has grasped the point at p + R a, and the directors G = R F (columns d1, d2, t).
+/// Then
+///   E = (K u . u) / 2 + (C1 r1^2 + C2 r2^2 + C3 r3^2) / 2,   u = G^T (x - p - R a) - s,
+/// with x where the point is now, K = diag(k1, k2, k3) [N/m] along d1, d2, t, and r the strains of
+/// elasticity/bend_twist.hpp from G to the edge's frame, which are the rotation vector between them (exactly where the
+/// rod bends or twists alone): C1, C2, C3 [N m/rad] about d1, d2, t. s is by how much it has slipped.
+///
+/// The force on the rod is f = -G K u at x. What the hand does when it moves by dp and turns by dw is its wrench about
+/// p,
+///   f . dp + ((x - p) x f + m) . dw,
+/// with m the moment on the rod: both of a rigid motion leave E as it is.
+///
+/// Beyond a limit L the point slips: f keeps its direction, |f| = L, and s follows, so that K u is back at L (return
+/// mapping of elastic, perfectly plastic friction [Simo and Hughes 1998, section 1.4]).
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/types.hpp"
+
+namespace withe {
+
+/// Of a point that slips beyond `limit` [N], with K u in the axes of what is grasped.
+struct CappedForce {
+  Vector3 force = Vector3::Zero();  ///< [N]
+  double share = 1.0;               ///< of K u that is left
+};
+
+inline CappedForce capped(const Vector3& elastic, double limit) {
+  const double size = elastic.norm();
+  if (size <= limit) return {elastic, 1.0};
+  return {(limit / size) * elastic, limit / size};
+}
+
+/// Derivative of the force by u [N/m]: c (K - K n n^T K / (n . K n)) where it slips, n along the force. Exact for
+/// k1 = k2 = k3, else its symmetric part, nearly.
+inline Matrix3 capped_stiffness(const Vector3& stiffness, const CappedForce& f) {
+  Matrix3 K = stiffness.asDiagonal();
+  if (f.share >= 1.0) return K;
+  const Vector3 n = f.force.normalized(), Kn = stiffness.cwiseProduct(n);
+  return f.share * (K - Kn * Kn.transpose() / n.dot(Kn));
+}
+
+}  // namespace withe

@@ -1,0 +1,320 @@
+#include "steps/hand_forces.hpp"
+
+#include <stdexcept>
+
+#include "elasticity/bend_twist.hpp"
+#include "elasticity/put_local.hpp"
+#include "forces/hand.hpp"
+#include "geometry/curvature.hpp"
+#include "geometry/rotation.hpp"
+#include "model/edge_vectors.hpp"
+#include "steps/rounding.hpp"
+
+namespace withe {
+namespace {
+
+Vector3 point_on(const Model& model, const VectorX& q, const TouchedEdge& touched) {
+  const Vector3 tail = node_vector(model, q, model.edge_tail[at(touched.edge)]),
+                head = node_vector(model, q, model.edge_head[at(touched.edge)]);
+  const Vector3 point = tail + touched.place * (head - tail);
+  return model.planar() ? Vector3(model.plane->origin + point) : point;
+}
+
+EdgeFrame<double> frame_of(const Matrix3& grip) {
+  return {to_vec3(grip.col(2)), to_vec3(grip.col(0)), to_vec3(grip.col(1)), 1.0, {}, {}};
+}
+
+/// How an edge is displaced from what a hand has grasped.
+struct Shift {
+  Matrix3 grip;       ///< G
+  Vector3 point, by;  ///< x [m]; u, in the axes of G [m]
+};
+
+Shift shift_of(const Model& model, const VectorX& q, const HandState& hand, const HandPose& pose,
+               const TouchedEdge& touched, std::size_t i) {
+  Shift out;
+  out.grip = pose.rotation * hand.edges[i];
+  out.point = point_on(model, q, touched);
+  out.by = out.grip.transpose() * (out.point - pose.position - pose.rotation * hand.points[i]) - hand.slip[i];
+  return out;
+}
+
+Vector3 shift_stiffness(const HandDescription& hand, double share) {
+  return share * Vector3(hand.stiffness[0], hand.stiffness[1], hand.stiffness[2]);
+}
+
+/// Bending towards d1 turns about d2.
+BendTwistStiffness<double> turn_stiffness(const HandDescription& hand, double share) {
+  return {share * hand.stiffness[4], share * hand.stiffness[3], share * hand.stiffness[5]};
+}
+
+/// In a plane a hand turns about its normal alone.
+double planar_stiffness(const Model& model, const HandDescription& hand, double share, const Matrix3& grip) {
+  const Vector3 n = grip.transpose() * model.plane->normal;
+  double sum = 0.0;
+  for (int i = 0; i < 3; ++i) sum += share * hand.stiffness[at(3 + i)] * n[i] * n[i];
+  return sum;
+}
+
+/// The direction of what is grasped, as an edge of unit length in the axes of the plane.
+PlanarEdge<double> planar_grip(const Model& model, const Matrix3& grip) {
+  const Vector3 t = grip.col(2);
+  return {{t.dot(model.plane->first), t.dot(model.plane->second)}, 1.0};
+}
+
+PlanarBend<double> planar_turn(const Model& model, const BendMeasure& measure, const HandDescription& hand,
+                               double share, const Matrix3& grip, const EdgeFrame<double>& edge) {
+  const PlanarEdge<double> from = planar_grip(model, grip);
+  const double kappa = planar_kappa(from.tangent.x, from.tangent.y, edge.tangent.x, edge.tangent.y);
+  return planar_bend(measure, kappa, 0.0, planar_stiffness(model, hand, share, grip));
+}
+
+/// Adds what a force at a place on an edge is to its nodes, `first_head` being where the head's numbers begin.
+template <int Size>
+void put_shift(const Eigen::Matrix<double, Size, 1>& gradient, const Eigen::Matrix<double, Size, Size>& hessian,
+               double place, int first_head, bool with_matrix, Local& out) {
+  const double share[2] = {1.0 - place, place};
+  const int first[2] = {0, first_head};
+  for (int a = 0; a < 2; ++a)
+    for (int i = 0; i < Size; ++i) {
+      out.gradient[first[a] + i] += share[a] * gradient[i];
+      for (int b = 0; with_matrix && b < 2; ++b)
+        for (int j = 0; j < Size; ++j) out.hessian[first[a] + i][first[b] + j] += share[a] * share[b] * hessian(i, j);
+    }
+}
+
+}  // namespace
+
+/// One edge that a hand holds, as an evaluation finds it.
+struct HandForces::Piece {
+  const TouchedEdge& touched;
+  const HandDescription& hand;
+  Shift shift;
+  Vector3 stiffness;
+  CappedForce elastic;  ///< -f, in the axes of G
+};
+
+HandForces::HandForces(const Model& model) : model_(model) {
+  std::vector<int> dofs;
+  const auto add_node = [&](int node) {
+    for (int i = 0; i < model.dimension; ++i) dofs.push_back(model.node_dof[at(node)] + i);
+  };
+  for (std::size_t s = 0; s < model.supports.size(); ++s) {
+    const Support& support = model.supports[s];
+    if (!support.active || !support.yields()) continue;
+    slips_ = slips_ || std::isfinite(support.description.hand.force_limit);
+    for (std::size_t i = 0; i < support.touched.size(); ++i) {
+      const int edge = support.touched[i].edge;
+      held_.push_back({static_cast<int>(s), static_cast<int>(i)});
+      add_node(model.edge_tail[at(edge)]);
+      if (!model.planar()) dofs.push_back(model.edge_dof[at(edge)]);
+      add_node(model.edge_head[at(edge)]);
+    }
+  }
+  table_ = ElementTable(model.planar() ? 4 : 7, std::move(dofs));
+}
+
+std::string HandForces::note() const {
+  return std::to_string(held_.size()) +
+         " edge(s) are held by hands that yield: each adds to the matrix of its own nodes";
+}
+
+HandPose HandForces::pose_of(const StepProblem& problem, int support) const {
+  const HandState& start = problem.start->hands[at(support)];
+  if (end_.empty()) return {start.position, start.rotation};
+  const HandPose& end = end_[at(support)];
+  if (!problem.in_middle()) return end;
+  const Vector3 turn = rotation_log(end.rotation * start.rotation.transpose());
+  return {0.5 * (start.position + end.position), rotation_exp(0.5 * turn) * start.rotation};
+}
+
+void HandForces::begin(StepProblem& problem) {
+  now_.resize(model_.supports.size());
+  for (std::size_t s = 0; s < now_.size(); ++s)
+    if (model_.supports[s].active && model_.supports[s].yields()) now_[s] = pose_of(problem, static_cast<int>(s));
+}
+
+HandForces::Piece HandForces::piece(const StepProblem& problem, const VectorX& z, int element) const {
+  const Held& held = held_[at(element)];
+  const Support& support = model_.supports[at(held.support)];
+  const TouchedEdge& touched = support.touched[at(held.touched)];
+  const HandDescription& hand = support.description.hand;
+  const Shift shift =
+      shift_of(model_, z, problem.start->hands[at(held.support)], now_[at(held.support)], touched, at(held.touched));
+  const Vector3 stiffness = shift_stiffness(hand, touched.share);
+  return {touched, hand, shift, stiffness, capped(stiffness.cwiseProduct(shift.by), touched.share * hand.force_limit)};
+}
+
+void HandForces::add(const StepProblem& problem, StepData& data, const Assembler&, std::span<double> values) const {
+  const bool with_matrix = !values.empty();
+  data.hands.assign(model_.supports.size(), Wrench{});
+  for (int k = 0; k < table_.count(); ++k) {
+    const Piece p = piece(problem, data.z, k);
+    const HandState& hand = problem.start->hands[at(held_[at(k)].support)];
+    const EdgeFrame<double>& edge = data.configuration.edge[at(p.touched.edge)];
+    const Matrix3& G = p.shift.grip;
+    const Vector3 pull = G * p.elastic.force;  // -f
+    const Matrix3 K = G * capped_stiffness(p.stiffness, p.elastic) * G.transpose();
+    Local local{};
+    Vector3 moment;
+    double energy = 0.0;
+    if (model_.planar()) {
+      const PlanarBend<double> turn =
+          planar_turn(model_, problem.parameters->measure, p.hand, p.touched.share, G, edge);
+      const PlanarEdge<double> both[2] = {planar_grip(model_, G), planar_edge(edge)};
+      PlanarForces<double> forces;
+      planar_bend_forces<true>(turn, both, forces);
+      put_planar_half({forces.force[1], 0.0, forces.by[1][1], {}, {}, 0.0}, with_matrix, local);
+      moment = -turn.slope * model_.plane->normal;
+      energy = turn.energy;
+      Eigen::Matrix<double, 3, 2> axes;
+      axes << model_.plane->first, model_.plane->second;
+      put_shift<2>(axes.transpose() * pull, axes.transpose() * K * axes, p.touched.place, 2, with_matrix, local);
+    } else {
+      const EdgeFrame<double> grip = frame_of(G);
+      const auto strain = bend_twist_strain(grip, edge, hand.twist(held_[at(k)].touched));
+      BendTwistDerivatives<double> d;
+      const BendTwistStiffness<double> C = turn_stiffness(p.hand, p.touched.share);
+      bend_twist_hessian(problem.parameters->measure, grip, edge, strain, {0.0, 0.0, 0.0}, C, d);
+      const Vector3 T = G.col(2), ge = to_eigen(d.gradient_e[0]);
+      moment = T.cross(ge) + d.gradient_angle[0] * T;
+      apply_transport(grip, edge, d);
+      energy = d.energy;
+      for (int i = 0; i < 3; ++i) {
+        local.gradient[i] = -d.gradient_e[1][i];
+        local.gradient[4 + i] = d.gradient_e[1][i];
+        const double across = d.e_angle[1][1][i];
+        local.hessian[i][3] = local.hessian[3][i] = -across;
+        local.hessian[4 + i][3] = local.hessian[3][4 + i] = across;
+        for (int j = 0; j < 3; ++j) {
+          const double h = d.ee[1][1].row[i][j];
+          local.hessian[i][j] = local.hessian[4 + i][4 + j] = h;
+          local.hessian[i][4 + j] = local.hessian[4 + i][j] = -h;
+        }
+      }
+      local.gradient[3] = d.gradient_angle[1];
+      local.hessian[3][3] = d.angle_angle[1][1];
+      put_shift<3>(pull, K, p.touched.place, 4, with_matrix, local);
+    }
+    add_element(table_, k, local, data, values);
+    data.potential += energy + 0.5 * p.shift.by.dot(p.stiffness.cwiseProduct(p.shift.by));
+    Wrench& wrench = data.hands[at(held_[at(k)].support)];
+    wrench.force -= pull;
+    wrench.moment += moment - p.shift.point.cross(pull);
+  }
+}
+
+void HandForces::add_adjoint(const StepProblem&, const StepData&, const Assembler&, StepAdjoint&) const {
+  throw std::invalid_argument("no gradient is known through hands that yield");
+}
+
+/// Positions round by eps |x|, and with them what is between an edge and where it was grasped.
+void HandForces::add_rounding(const StepProblem& problem, StepData& data) const {
+  for (int k = 0; k < table_.count(); ++k) {
+    const Piece p = piece(problem, data.z, k);
+    const EdgeFrame<double>& edge = data.configuration.edge[at(p.touched.edge)];
+    double turn = 0.0;
+    for (int i = 3; i < 6; ++i) turn = std::max(turn, p.touched.share * p.hand.stiffness[at(i)]);
+    const double by_turn = kRounding * turn * (1.0 + data.rounding.reach * edge.inverse_length),
+                 by_shift = kRounding * p.stiffness.maxCoeff() * data.rounding.reach;
+    const int* dofs = table_.dofs(k);
+    for (int i = 0; i < table_.width(); ++i)
+      data.floor[dofs[i]] += !model_.planar() && i == 3 ? by_turn : by_shift + by_turn * edge.inverse_length;
+  }
+}
+
+double HandForces::dissipated(const StepProblem& problem, const StepData& data, const Assembler&,
+                              const VectorX& change) const {
+  double lost = 0.0;
+  const VectorX end = problem.start->q + change;
+  for (int k = 0; problem.moves() && k < table_.count(); ++k) {
+    const Piece p = piece(problem, data.z, k);
+    const Held& held = held_[at(k)];
+    const HandState& hand = problem.start->hands[at(held.support)];
+    const HandPose from{hand.position, hand.rotation}, to = end_.empty() ? from : end_[at(held.support)];
+    const Vector3 u0 = shift_of(model_, problem.start->q, hand, from, p.touched, at(held.touched)).by,
+                  u1 = shift_of(model_, end, hand, to, p.touched, at(held.touched)).by;
+    const CappedForce last = capped(p.stiffness.cwiseProduct(u1), p.touched.share * p.hand.force_limit);
+    if (last.share >= 1.0 && p.elastic.share >= 1.0) continue;
+    // What both sides put in, without what is stored of it; at a step's end, its force times the slip.
+    const Vector3 kept = last.share * u1;
+    lost += problem.in_middle()
+                ? p.elastic.force.dot(u1 - u0) - 0.5 * p.stiffness.dot(kept.cwiseAbs2() - u0.cwiseAbs2())
+                : last.force.dot(u1 - kept);
+  }
+  return lost;
+}
+
+double HandForces::work(const StepProblem& problem, const StepData& data) const {
+  double done = 0.0;
+  for (std::size_t s = 0; s < end_.size(); ++s) {
+    if (!model_.supports[s].active || !model_.supports[s].yields()) continue;
+    const HandState& start = problem.start->hands[s];
+    const Wrench& wrench = data.hands[s];
+    const Vector3 moment = wrench.moment - now_[s].position.cross(wrench.force);
+    done += wrench.force.dot(end_[s].position - start.position) +
+            moment.dot(rotation_log(end_[s].rotation * start.rotation.transpose()));
+  }
+  return done;
+}
+
+void HandForces::accept(const Configuration& c, State& state) const {
+  for (std::size_t s = 0; s < end_.size(); ++s) {
+    state.hands[s].position = end_[s].position;
+    state.hands[s].rotation = end_[s].rotation;
+  }
+  for (const Held& held : held_) {
+    const Support& support = model_.supports[at(held.support)];
+    const TouchedEdge& touched = support.touched[at(held.touched)];
+    const HandDescription& own = support.description.hand;
+    HandState& hand = state.hands[at(held.support)];
+    const Shift shift = shift_of(model_, state.q, hand, {hand.position, hand.rotation}, touched, at(held.touched));
+    const Vector3 K = shift_stiffness(own, touched.share);
+    hand.slip[at(held.touched)] +=
+        (1.0 - capped(K.cwiseProduct(shift.by), touched.share * own.force_limit).share) * shift.by;
+    if (model_.planar()) continue;
+    double& twist = hand.twist(held.touched);
+    twist = bend_twist_strain(frame_of(shift.grip), c.edge[at(touched.edge)], twist).tau;
+  }
+}
+
+double hand_energy(const Model& model, const BendMeasure& measure, const State& state, const Configuration& c,
+                   int only) {
+  double energy = 0.0;
+  for (std::size_t s = 0; s < model.supports.size(); ++s) {
+    const Support& support = model.supports[s];
+    if (!support.active || !support.yields() || (only >= 0 && at(only) != s)) continue;
+    const HandState& hand = state.hands[s];
+    const HandDescription& own = support.description.hand;
+    for (std::size_t i = 0; i < support.touched.size(); ++i) {
+      const TouchedEdge& touched = support.touched[i];
+      const EdgeFrame<double>& edge = c.edge[at(touched.edge)];
+      const Shift shift = shift_of(model, state.q, hand, {hand.position, hand.rotation}, touched, i);
+      energy += 0.5 * shift.by.dot(shift_stiffness(own, touched.share).cwiseProduct(shift.by));
+      if (model.planar()) {
+        energy += planar_turn(model, measure, own, touched.share, shift.grip, edge).energy;
+        continue;
+      }
+      const auto strain = bend_twist_strain(frame_of(shift.grip), edge, hand.twist(static_cast<Eigen::Index>(i)));
+      energy += bend_twist_moments<false>(measure, strain, {0.0, 0.0, 0.0}, turn_stiffness(own, touched.share)).energy;
+    }
+  }
+  return energy;
+}
+
+HandDeflection hand_deflection(const Model& model, const State& state, const Configuration& c, int support) {
+  const Support& s = model.supports[at(support)];
+  const HandState& hand = state.hands[at(support)];
+  HandDeflection out;
+  for (std::size_t i = 0; i < s.touched.size(); ++i) {
+    const TouchedEdge& touched = s.touched[i];
+    const Shift shift = shift_of(model, state.q, hand, {hand.position, hand.rotation}, touched, i);
+    const Matrix3 turned = edge_directors(model, c, touched.edge) * shift.grip.transpose();
+    out.shift += touched.share * (hand.edges[i] * shift.by);
+    out.slip += touched.share * (hand.edges[i] * hand.slip[i]);
+    out.turn += touched.share * (hand.rotation.transpose() * rotation_log(turned));
+  }
+  return out;
+}
+
+}  // namespace withe

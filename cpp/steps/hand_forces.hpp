@@ -1,0 +1,65 @@
+#pragma once
+/// Hands that yield, see forces/hand.hpp: each holds every edge that it touches by a share of its stiffness.
+
+#include <vector>
+
+#include "steps/term.hpp"
+
+namespace withe {
+
+/// Where a hand is.
+struct HandPose {
+  Vector3 position = Vector3::Zero();
+  Matrix3 rotation = Matrix3::Identity();
+};
+
+class HandForces final : public Term {
+ public:
+  explicit HandForces(const Model& model);
+
+  void declare(std::vector<ElementTable*>& tables) override { tables.push_back(&table_); }
+  bool has_potential() const override { return !slips_; }
+  bool dissipates(const Parameters&) const override { return slips_; }
+  std::string note() const override;
+  void begin(StepProblem& problem) override;
+  void add(const StepProblem& problem, StepData& data, const Assembler& assembler,
+           std::span<double> values) const override;
+  void add_adjoint(const StepProblem& problem, const StepData& data, const Assembler& assembler,
+                   StepAdjoint& adjoint) const override;
+  void add_rounding(const StepProblem& problem, StepData& data) const override;
+  double dissipated(const StepProblem& problem, const StepData& data, const Assembler& assembler,
+                    const VectorX& change) const override;
+
+  /// Where hands are at the end of the steps to come, per support; empty: where they are at the start.
+  void aim(std::vector<HandPose> end) { end_ = std::move(end); }
+  /// What hands have done in a step that has just been evaluated [J].
+  double work(const StepProblem& problem, const StepData& data) const;
+  /// Takes a state whose q is that of the end of a step there: hands are where they were aimed at, and slip where the
+  /// force is too great. `c`: of that q; not used in a plane.
+  void accept(const Configuration& c, State& state) const;
+
+ private:
+  struct Held {
+    int support = 0, touched = 0;
+  };
+  struct Piece;
+  HandPose pose_of(const StepProblem& problem, int support) const;
+  Piece piece(const StepProblem& problem, const VectorX& z, int element) const;
+
+  const Model& model_;
+  std::vector<Held> held_;  ///< of each element
+  ElementTable table_;
+  bool slips_ = false;
+  std::vector<HandPose> end_, now_;  ///< at the end of the step; where forces act
+};
+
+/// What hands that yield have stored, or only one support of them [J].
+double hand_energy(const Model& model, const BendMeasure& measure, const State& state, const Configuration& c,
+                   int only = -1);
+/// How far what a hand holds has gone, in the hand's axes.
+struct HandDeflection {
+  Vector3 shift = Vector3::Zero(), turn = Vector3::Zero(), slip = Vector3::Zero();
+};
+HandDeflection hand_deflection(const Model& model, const State& state, const Configuration& c, int support);
+
+}  // namespace withe

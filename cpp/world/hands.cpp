@@ -1,0 +1,166 @@
+/// Hands: what they hold as they grasp, where they put it, and their wrench.
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include <Eigen/Geometry>
+
+#include "common/check.hpp"
+#include "geometry/frames.hpp"
+#include "model/edge_vectors.hpp"
+#include "steps/hand_forces.hpp"
+#include "world/implementation.hpp"
+
+namespace withe {
+namespace {
+
+Vector3 point_on(const Model& model, const VectorX& q, int edge, double place) {
+  return (1.0 - place) * node_position(model, q, model.edge_tail[at(edge)]) +
+         place * node_position(model, q, model.edge_head[at(edge)]);
+}
+
+}  // namespace
+
+bool World::Implementation::has_hands() const {
+  return std::any_of(model.supports.begin(), model.supports.end(),
+                     [](const Support& s) { return s.active && s.is_hand(); });
+}
+
+/// Tells hands that yield where `motions` lead; `release_hands`: that there is no step.
+void World::Implementation::aim_hands(Equations& system) const {
+  if (!system.hands()) return;
+  std::vector<HandPose> poses;
+  for (const SupportMotion& m : motions) poses.push_back({m.position, m.rotation});
+  system.hands()->aim(std::move(poses));
+}
+
+void World::Implementation::release_hands(Equations& system) {
+  if (system.hands()) system.hands()->aim({});
+}
+
+void World::Implementation::settle_hands(Equations& system) {
+  if (!system.hands()) return;
+  Configuration c;
+  compute_configuration(model, state, state.q, c);
+  system.hands()->accept(c, state);
+}
+
+double World::Implementation::hand_energy_of(int hand) const {
+  Configuration c;
+  compute_configuration(model, state, state.q, c);
+  return hand_energy(model, parameters.measure, state, c, hand);
+}
+
+/// A hand takes what it touches as it is now.
+void World::Implementation::grasp(int hand) {
+  const Support& s = model.supports[at(hand)];
+  SupportMotion& m = motions[at(hand)];
+  Configuration c;
+  compute_configuration(model, state, state.q, c);
+  const HandDescription& own = description.supports[at(hand)].hand;
+  m = SupportMotion{};
+  m.position = own.posed ? own.position : point_on(model, state.q, s.at_edge, s.at_place);
+  m.rotation = own.posed ? own.rotation : edge_directors(model, c, s.at_edge);
+  m.from_position = m.to_position = m.position;
+  m.from_rotation = m.to_rotation = m.rotation;
+  m.start = m.end = state.time;
+  HandState& held = state.hands[at(hand)];
+  held = HandState{m.position, m.rotation, {}, {}, {}, {}};
+  const Matrix3 into = m.rotation.transpose();
+  for (const TouchedEdge& touched : s.touched) held.edges.push_back(into * edge_directors(model, c, touched.edge));
+  if (!s.yields()) {
+    for (int node : s.span) held.points.push_back(into * (node_position(model, state.q, node) - m.position));
+    return;
+  }
+  for (const TouchedEdge& touched : s.touched)
+    held.points.push_back(into * (point_on(model, state.q, touched.edge, touched.place) - m.position));
+  held.slip.assign(s.touched.size(), Vector3::Zero());
+  held.twist.setZero(static_cast<Eigen::Index>(s.touched.size()));
+}
+
+/// A hand that comes to hold a node that another has held between them takes it where it is now.
+void World::Implementation::regrip(const std::vector<std::vector<int>>& held_before) {
+  for (std::size_t h = 0; h < model.supports.size(); ++h) {
+    const Support& s = model.supports[h];
+    if (!s.active || !s.is_hand() || state.hands[h].points.size() != s.span.size() || h >= held_before.size()) continue;
+    for (int node : s.nodes) {
+      if (std::find(held_before[h].begin(), held_before[h].end(), node) != held_before[h].end()) continue;
+      const auto i = std::find(s.span.begin(), s.span.end(), node) - s.span.begin();
+      state.hands[h].points[static_cast<std::size_t>(i)] =
+          motions[h].rotation.transpose() * (node_position(model, state.q, node) - motions[h].position);
+    }
+  }
+}
+
+/// Edges after all nodes: one between two hands has a node of either.
+void World::Implementation::hold_hands(HeldTarget& target) const {
+  for (std::size_t h = 0; h < model.supports.size(); ++h) {
+    const Support& s = model.supports[h];
+    for (std::size_t i = 0; s.active && i < s.span.size(); ++i)
+      if (std::find(s.nodes.begin(), s.nodes.end(), s.span[i]) != s.nodes.end())
+        put_node(model, s.span[i], motions[h].position + motions[h].rotation * state.hands[h].points[i], target.q);
+  }
+  for (std::size_t h = 0; h < model.supports.size(); ++h)
+    if (model.supports[h].active && model.supports[h].is_hand() && !hold_edges(static_cast<int>(h), target.q))
+      target.reachable = false;
+}
+
+/// Where a hand puts the edges that it holds, once all nodes have their places in `q`.
+bool World::Implementation::hold_edges(int hand, VectorX& q) const {
+  if (model.planar()) return true;
+  const Support& s = model.supports[at(hand)];
+  for (std::size_t i = 0; i < s.touched.size(); ++i) {
+    const int edge = s.touched[i].edge;
+    const auto e = at(edge);
+    const Matrix3 frame = motions[at(hand)].rotation * state.hands[at(hand)].edges[i];
+    Vec3d t = to_vec3(frame.col(2)), d = to_vec3(frame.col(0));
+    const auto own = [&](int node) { return std::find(s.nodes.begin(), s.nodes.end(), node) != s.nodes.end(); };
+    if (!own(model.edge_tail[e]) || !own(model.edge_head[e])) {
+      // Its node towards a neighbour that is held too is where that is.
+      const Vec3d across = edge_vector(model, q, edge);
+      const Vec3d now = (1.0 / std::sqrt(dot(across, across))) * across;
+      if (dot(t, now) < -0.5) return false;
+      d = parallel_transport(d, t, now);
+      t = now;
+    }
+    if (dot(state.tangent[e], t) < -0.5) return false;
+    const double angle = signed_angle(parallel_transport(state.director[e], state.tangent[e], t), d, t);
+    const int dof = model.edge_dof[e];
+    q(dof) = state.q(dof) + std::remainder(angle - state.q(dof), 2.0 * std::numbers::pi);
+  }
+  return true;
+}
+
+/// Of the hand on the rod, about where the hand is; `held`: rows of what supports hold, at `q`.
+Reaction World::Implementation::hand_reaction(int hand, const VectorX& held, const VectorX& q) const {
+  const Support& s = model.supports[at(hand)];
+  Reaction out;
+  if (s.yields()) {
+    const Wrench& wrench = hand_wrenches[at(hand)];
+    return {wrench.force, wrench.moment - motions[at(hand)].position.cross(wrench.force)};
+  }
+  for (int node : s.nodes) {
+    const Vector3 force = node_vector(model, held, node);
+    out.force += force;
+    out.moment += (node_position(model, q, node) - motions[at(hand)].position).cross(force);
+  }
+  for (int edge : s.edges)
+    if (!model.planar())
+      out.moment += held(model.edge_dof[at(edge)]) * to_eigen(edge_vector(model, q, edge)).normalized();
+  return out;
+}
+
+Deflection World::deflection(int support) const {
+  Implementation& self = *implementation_;
+  require(support >= 0 && support < static_cast<int>(self.model.supports.size()) &&
+              self.model.supports[at(support)].active && self.model.supports[at(support)].is_hand(),
+          "no such hand, or it is released: " + std::to_string(support));
+  if (!self.model.supports[at(support)].yields()) return {};
+  Configuration c;
+  compute_configuration(self.model, self.state, self.state.q, c);
+  const HandDeflection found = hand_deflection(self.model, self.state, c, support);
+  return {found.shift, found.turn, found.slip};
+}
+
+}  // namespace withe

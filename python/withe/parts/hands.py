@@ -1,0 +1,171 @@
+"""Turns what a user says about a hand into a `SupportPart`."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from withe.common import validation
+from withe.parts.directory import Directory
+from withe.parts.handles import Rod
+from withe.parts.kinds import Grasp, RodPart, SupportPart
+
+__all__ = ["check_free", "held_edges", "make_hand", "pose_of", "quaternion_matrix", "touched_edges"]
+
+FloatArray = npt.NDArray[np.float64]
+
+_TOUCHED = 1e-9  # of an edge's length: less than that is rounding
+
+
+def make_hand(
+    directory: Directory,
+    rod: Rod | str,
+    at: float,
+    length: float,
+    pose: Any,
+    stiffness: npt.ArrayLike | None,
+    force_limit: float | None,
+    name: str | None,
+) -> SupportPart:
+    """A hand, checked; not yet in the directory."""
+    name = directory.new_name(name, "hand")
+    part = directory.rod(rod, "rod to grasp")
+    at = validation.number(at, f"at of {name!r}")
+    length = validation.non_negative(length, f"length of {name!r}")
+    whole = float(part.arcs.sum())
+    slack = _TOUCHED * whole
+    if part.closed:
+        if not -slack <= at <= whole + slack or length > whole + slack:
+            raise ValueError(
+                f"{name!r} must be on {part.owner}, from 0 to {whole:g} m, and no longer, got at={at:g} m and "
+                f"length={length:g} m"
+            )
+    elif at - 0.5 * length < -slack or at + 0.5 * length > whole + slack:
+        raise ValueError(
+            f"{name!r} must be on {part.owner}, from 0 to {whole:g} m, got {at - 0.5 * length:g} to "
+            f"{at + 0.5 * length:g} m (at={at:g}, length={length:g})"
+        )
+    place = None if pose is None else pose_of(pose, f"pose of {name!r}")
+    stiff = None if stiffness is None else _stiffness(stiffness, f"stiffness of {name!r}")
+    limit = math.inf
+    if force_limit is not None:
+        limit = validation.positive(force_limit, f"force_limit of {name!r}")
+        if stiff is None:
+            raise ValueError(f"force_limit of {name!r} needs a hand that yields: give its stiffness too")
+    edges = touched_edges(part, at, length)
+    grasp = Grasp(at, length, place, stiff, limit, edges)
+    node = (part.index, edges[0])
+    return SupportPart(name, "hand", node, f"{part.name}.node({edges[0]})", np.zeros((3, 3)), grasp)
+
+
+def pose_of(pose: Any, what: str) -> tuple[FloatArray, FloatArray]:
+    """Position and rotation, from a pair of them, seven numbers, or a matrix of shape (4, 4)."""
+    if isinstance(pose, tuple | list) and len(pose) == 2:
+        return (
+            validation.vector(pose[0], f"position in the {what}"),
+            validation.rotation_matrix(pose[1], f"rotation in the {what}"),
+        )
+    array = validation.number_array(pose, what, (7,), (4, 4))
+    if array.shape == (7,):
+        return array[:3], quaternion_matrix(array[3:], what)
+    if np.abs(array[3] - (0.0, 0.0, 0.0, 1.0)).max() > 1e-9:
+        raise ValueError(f"{what} must have the last row 0 0 0 1, got {array[3]}")
+    return array[:3, 3].copy(), validation.rotation_matrix(array[:3, :3], f"rotation in the {what}")
+
+
+def quaternion_matrix(quaternion: FloatArray, what: str) -> FloatArray:
+    """Rotation of a unit quaternion w, x, y, z."""
+    size = float(np.linalg.norm(quaternion))
+    if abs(size - 1.0) > 1e-6:
+        raise ValueError(f"{what} must have a quaternion qw, qx, qy, qz of length 1, got one of {size:g}")
+    w, x, y, z = quaternion / size
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def touched_edges(rod: RodPart, at: float, length: float) -> tuple[int, ...]:
+    """Edges of a rod that a hand touches, in their order."""
+    count, arcs = len(rod.arcs), rod.arcs
+    turns = (-1, 0, 1) if rod.closed else (0,)
+    whole = float(arcs.sum())
+    begins = np.concatenate([[0.0], np.cumsum(arcs)])
+    found = []
+    for turn in turns:
+        low = np.maximum(at - 0.5 * length, begins[:-1] + turn * whole)
+        high = np.minimum(at + 0.5 * length, begins[1:] + turn * whole)
+        found += [int(edge) for edge in np.flatnonzero(high - low > _TOUCHED * arcs)]
+    if not found:
+        place = at % whole if rod.closed else at
+        edge = int(np.searchsorted(begins[1:] - _TOUCHED * arcs, place, side="right"))
+        found = [min(edge, count - 1)]
+    return tuple(dict.fromkeys(found))
+
+
+def check_free(directory: Directory, part: SupportPart, others: list[SupportPart]) -> None:
+    """Refuse a hand on what is held already, and a support on what a hand holds.
+
+    Two that hold edges may hold neighbours: who came first holds the node between them. A hand that yields holds no
+    node, but nothing else may hold its edges.
+
+    Raises
+    ------
+    ValueError
+        What it would hold is held by one of the others.
+    """
+    edges, nodes = held_edges(directory, part), _nodes(directory, part)
+    for other in others:
+        if part.grasp is None and other.grasp is None:
+            continue
+        theirs, rows = held_edges(directory, other), _nodes(directory, other)
+        if edges & theirs:
+            both = "overlaps" if other.grasp is not None and part.grasp is not None else "is on what is held by"
+            raise ValueError(f"{part.name!r} {both} {other.name!r}: they would hold the same edge; release that first")
+        hard = {row for row in nodes & rows if not (edges and theirs)}
+        if hard:
+            raise ValueError(
+                f"{part.name!r} is on what is held by {other.name!r} at {other.node_name!r}: release that first"
+            )
+
+
+def held_edges(directory: Directory, part: SupportPart) -> set[tuple[int, int]]:
+    """Edges that a support holds, as (rod, edge)."""
+    index, node = part.node
+    if part.grasp is not None:
+        return {(index, edge) for edge in part.grasp.edges}
+    if part.kind in ("hold_edge", "spinning_edge"):
+        rod = directory.layout.rods[index]
+        return {(index, node if node + 1 < rod.nodes or rod.closed else node - 1)}
+    return set()
+
+
+def _nodes(directory: Directory, part: SupportPart) -> set[int]:
+    """Rows of the nodes that it touches."""
+    index, _ = part.node
+    count = directory.layout.rods[index].nodes
+    edges = held_edges(directory, part)
+    if not edges:
+        return {directory.row(part.node)}
+    return {directory.row((index, (edge + step) % count)) for _, edge in edges for step in (0, 1)}
+
+
+def _stiffness(stiffness: npt.ArrayLike, what: str) -> FloatArray:
+    """Six numbers, from one pair, or from three along and three about."""
+    if isinstance(stiffness, tuple | list) and len(stiffness) == 2:
+        parts = [
+            np.full(3, validation.positive(item, f"{what} {word}"))
+            if validation.is_scalar(item)
+            else validation.per_item(item, f"{what} {word}", 3, "directions")
+            for item, word in zip(stiffness, ("along directions", "about them"), strict=True)
+        ]
+        return np.concatenate(parts)
+    if validation.is_scalar(stiffness):
+        raise ValueError(f"{what} must be a pair, (N/m, N m/rad), or six numbers, got {stiffness!r:.80}")
+    return validation.per_item(stiffness, what, 6, "directions")

@@ -1,0 +1,144 @@
+"""Hands of a simulation: put on, moved, read and taken off by their own methods."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from withe.common import validation
+from withe.parts.handles import Hand, Handle
+from withe.simulation.motion import PathLike, RotationLike
+from withe.simulation.readouts import Reaction
+from withe.simulation.session import Session
+from withe.simulation.supports import find_support, move_support, release
+
+__all__ = ["Deflection", "HeldPose", "RunningHand", "find_hand", "hand_deflection", "hand_wrench", "support_pose"]
+
+FloatArray = npt.NDArray[np.float64]
+
+
+class HeldPose(NamedTuple):
+    """Where a support is.
+
+    Attributes
+    ----------
+    position : ndarray of shape (3,) [m]
+    rotation : ndarray of shape (3, 3)
+        Of a hand: its axes as columns. Of a clamp: from the orientation as drawn.
+    """
+
+    position: FloatArray
+    rotation: FloatArray
+
+
+class Deflection(NamedTuple):
+    """How far what a yielding hand holds is from where it holds it, in the hand's axes; of a long hand the mean.
+
+    Attributes
+    ----------
+    shift : ndarray of shape (3,) [m]
+        Which the stiffness resists.
+    turn : ndarray of shape (3,) [rad]
+        As a rotation vector.
+    slip : ndarray of shape (3,) [m]
+        By how much it has slipped besides, beyond the force limit.
+    """
+
+    shift: FloatArray
+    turn: FloatArray
+    slip: FloatArray
+
+
+@dataclass(frozen=True)
+class RunningHand(Hand):
+    """A hand of a simulation, as `Simulation.grasp` returns it: its handle, which acts on that simulation.
+
+    Copies and pickles are plain handles. A copy of the simulation has a hand of the same name:
+    ``copy.hand(hand.name)``.
+
+    Examples
+    --------
+    >>> hand = simulation.grasp(arm, at=0.2, length=0.02)
+    >>> hand.move(position=hand.pose.position + (0, 0, 0.1), over=0.5)
+    >>> simulation.step(10)
+    >>> hand.wrench().force.shape
+    (3,)
+    >>> hand.release()
+    """
+
+    session: Session = field(repr=False, compare=False)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Hand, (self.scene_id, self.name)
+
+    @property
+    def pose(self) -> HeldPose:
+        """Where the hand is now. See `Simulation.pose`."""
+        return support_pose(self.session, self)
+
+    def move(
+        self,
+        position: npt.ArrayLike | None = None,
+        rotation: RotationLike | None = None,
+        *,
+        tangent: npt.ArrayLike | None = None,
+        roll: float | None = None,
+        over: float = 0.0,
+        path: PathLike | None = None,
+    ) -> None:
+        """Move the hand. See `Simulation.move`; its rotation is that of its axes in the world."""
+        move_support(self.session, self, position, rotation, tangent, roll, over, path)
+
+    def wrench(self, about: npt.ArrayLike | None = None) -> Reaction:
+        """Force and moment of the hand on the rod, as one. See `Simulation.wrench`."""
+        return hand_wrench(self.session, self, about)
+
+    @property
+    def deflection(self) -> Deflection:
+        """How far the rod has gone in the hand. See `Simulation.deflection`."""
+        return hand_deflection(self.session, self)
+
+    def release(self) -> None:
+        """Let go. See `Simulation.release`."""
+        release(self.session, self)
+
+
+def find_hand(session: Session, hand: Handle | str) -> int:
+    """Index of a hand in the engine.
+
+    Raises
+    ------
+    ValueError
+        No hand, or released.
+    """
+    index, part = find_support(session, hand)
+    if part.grasp is None:
+        raise ValueError(f"hand must be what grasp returned, got the support {part.name!r}")
+    return index
+
+
+def hand_wrench(session: Session, hand: Handle | str, about: npt.ArrayLike | None) -> Reaction:
+    """Force and moment of a hand on the rod; see `Simulation.wrench`."""
+    index = find_hand(session, hand)
+    found = session.world.reaction(index)
+    force, moment = np.array(found.force), np.array(found.moment)
+    if about is not None:
+        point = validation.vector(about, "about")
+        moment += np.cross(np.array(session.world.support_position(index)) - point, force)
+    return Reaction(force, moment)
+
+
+def hand_deflection(session: Session, hand: Handle | str) -> Deflection:
+    """How far the rod has gone in a hand; see `Simulation.deflection`."""
+    found = session.world.deflection(find_hand(session, hand))
+    return Deflection(np.array(found.shift), np.array(found.turn), np.array(found.slip))
+
+
+def support_pose(session: Session, support: Handle | str) -> HeldPose:
+    """Where a support is; see `Simulation.pose`."""
+    index, _ = find_support(session, support)
+    world = session.world
+    return HeldPose(np.array(world.support_position(index)), np.array(world.support_rotation(index)))

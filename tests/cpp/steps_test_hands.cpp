@@ -1,0 +1,156 @@
+// Hands that yield, among the equations: forces are those of their energy, matrices the derivatives of forces, and what
+// they do to the rod is what the rod feels.
+
+#include <gtest/gtest.h>
+
+#include "derivative_check.hpp"
+#include "model/edge_vectors.hpp"
+#include "states.hpp"
+#include "steps/equations.hpp"
+
+namespace withe {
+namespace {
+
+using testing::Case;
+using testing::derivative_matches;
+using testing::gradient_matches;
+using testing::MatrixX;
+using testing::RandomNumbers;
+using testing::SceneBuilder;
+
+constexpr StepRule kRules[] = {StepRule::statics, StepRule::backward_euler, StepRule::midpoint,
+                               StepRule::energy_momentum};
+
+HandDescription yielding(double at, double length) {
+  HandDescription hand;
+  hand.at = at;
+  hand.length = length;
+  hand.yields = true;
+  hand.stiffness = {3.0, 5.0, 4.0, 0.6, 0.9, 0.7};
+  return hand;
+}
+
+/// A short hand within an edge and a long one over three, away from where they grasped.
+std::vector<Case> cases(bool planar, double force_limit) {
+  SceneBuilder builder;
+  testing::RodMaterial material;
+  if (planar) material.bend2 = material.bend1;
+  builder.add_rod(planar ? testing::arc(7) : testing::helix(7), material, false, Vector3(0.0, 1.0, 0.0));
+  const double whole = builder.scene.rods[0].rest_lengths.sum();
+  for (const auto& [share, length] : {std::pair{0.2, 0.0}, {0.65, 0.4}}) {
+    builder.support(SupportKind::hand, {0, 0});
+    HandDescription& hand = builder.scene.supports.back().hand = yielding(share * whole, length * whole);
+    hand.force_limit = force_limit;
+    if (force_limit < 1.0) hand.stiffness = {4.0, 4.0, 4.0, 0.6, 0.9, 0.7};  // whose matrix is exact
+  }
+  std::vector<Case> out = testing::states_of(planar ? "arc" : "helix", builder.scene);
+  RandomNumbers random(5);
+  for (Case& c : out)
+    for (std::size_t s = 0; s < c.model.supports.size(); ++s) {
+      HandState& hand = c.state.hands[s];
+      Configuration drawn;
+      compute_configuration(c.model, c.state, c.state.q, drawn);
+      const Vector3 normal = planar ? c.model.plane->normal : Vector3(0.3, -0.8, 0.5).normalized();
+      const auto in_plane = [&](Vector3 v) -> Vector3 { return planar ? Vector3(v - normal * normal.dot(v)) : v; };
+      hand.rotation = rotation_exp(0.2 * normal);
+      hand.position = in_plane(0.1 * random.vector()) + Vector3(0.2, 0.0, -0.1);
+      hand.twist.setZero(static_cast<Eigen::Index>(c.model.supports[s].touched.size()));
+      for (const TouchedEdge& touched : c.model.supports[s].touched) {
+        const Vector3 tail = node_vector(c.model, c.state.q, c.model.edge_tail[at(touched.edge)]),
+                      head = node_vector(c.model, c.state.q, c.model.edge_head[at(touched.edge)]);
+        const Vector3 origin = planar ? c.model.plane->origin : Vector3(Vector3::Zero());
+        hand.points.push_back(in_plane(0.1 * random.vector()) +
+                              hand.rotation.transpose() *
+                                  (origin + tail + touched.place * (head - tail) - hand.position));
+        hand.edges.push_back(hand.rotation.transpose() * edge_directors(c.model, drawn, touched.edge));
+        hand.slip.push_back(Vector3::Zero());
+      }
+    }
+  return out;
+}
+
+std::vector<Case> all_cases(double force_limit = INFINITY) {
+  std::vector<Case> out = cases(false, force_limit);
+  for (Case& c : cases(true, force_limit)) out.push_back(std::move(c));
+  return out;
+}
+
+/// The residual of the hands alone: what is left without them taken off.
+struct Alone {
+  Alone(const Case& of, StepRule rule)
+      : c(of), parameters(initial_parameters(of.model)), with(of.model, {.rule = rule}) {
+    with.begin(c.state, parameters, rule, rule == StepRule::statics ? 0.0 : 0.3);
+  }
+  VectorX operator()(const VectorX& q) {
+    with.evaluate(q, false, nullptr, data);
+    return data.full_residual;
+  }
+  const Case& c;
+  Parameters parameters;
+  Equations with;
+  StepData data;
+};
+
+TEST(HandForces, MatrixIsTheDerivativeOfTheResidualUnderEveryRuleHeldOrSlipping) {
+  for (double limit : {static_cast<double>(INFINITY), 0.05})
+    for (StepRule rule : kRules)
+      for (Case c : all_cases(limit)) {
+        if (rule == StepRule::energy_momentum && c.q == c.state.q)
+          c.q += 10.0 * c.increment * RandomNumbers(8).vector(c.q.size());
+        Alone residual(c, rule);
+        const Eigen::Index n = c.model.dof_count;
+        residual.with.evaluate(c.q, true, nullptr, residual.data);
+        MatrixX J(n, n);
+        for (Eigen::Index i = 0; i < n; ++i) {
+          VectorX e = VectorX::Unit(n, i), y(n);
+          residual.with.assembler().solver().multiply({e.data(), static_cast<std::size_t>(n)},
+                                                      {y.data(), static_cast<std::size_t>(n)});
+          J.col(i) = y;
+        }
+        EXPECT_TRUE(derivative_matches([&](const VectorX& q) { return residual(q); }, c.q, J, 0.3 * c.increment))
+            << c.name << ", rule " << static_cast<int>(rule) << ", limit " << limit;
+      }
+}
+
+TEST(HandForces, ForcesAreThoseOfTheEnergyThatReadOutsHave) {
+  for (Case c : all_cases()) {
+    Alone with(c, StepRule::statics);
+    const auto energy = [&](const VectorX& q) {
+      State there = c.state;
+      there.q = q;
+      Configuration configuration;
+      compute_configuration(c.model, there, q, configuration);
+      return hand_energy(c.model, with.parameters.measure, there, configuration);
+    };
+    Model without = c.model;
+    for (Support& support : without.supports) support.active = false;
+    Case bare = c;
+    bare.model = without;
+    Alone rest(bare, StepRule::statics);
+    const VectorX forces = with(c.q) - rest(c.q);
+    EXPECT_TRUE(gradient_matches(energy, c.q, forces, 0.3 * c.increment)) << c.name;
+    EXPECT_NEAR(with.data.potential - rest.data.potential, energy(c.q), 1e-12) << c.name;
+  }
+}
+
+TEST(HandForces, WrenchIsWhatTheRodFeels) {
+  for (double limit : {static_cast<double>(INFINITY), 0.05})
+    for (Case c : all_cases(limit)) {
+      Alone with(c, StepRule::statics);
+      Model without = c.model;
+      for (Support& support : without.supports) support.active = false;
+      Case bare = c;
+      bare.model = without;
+      Alone rest(bare, StepRule::statics);
+      const VectorX forces = rest(c.q) - with(c.q);
+      Wrench sum;
+      for (const Wrench& wrench : with.data.hands) sum.force += wrench.force, sum.moment += wrench.moment;
+      if (c.model.planar()) sum.moment -= c.model.plane->origin.cross(sum.force);  // where its unknowns begin
+      for (const auto& [u, omega] : testing::rigid_motions(c.model))
+        EXPECT_NEAR(forces.dot(testing::rigid_motion(c, u, omega)), sum.force.dot(u) + sum.moment.dot(omega), 1e-12)
+            << c.name;
+    }
+}
+
+}  // namespace
+}  // namespace withe
