@@ -113,6 +113,16 @@ void Surfaces::set_friction(ContactPair& pair) const {
   pair.set_friction(share * f.along, share * f.across);
 }
 
+FrictionOwner Surfaces::friction_owner(const ContactPair& pair) const {
+  FrictionOwner out;
+  if (pair.key.b < 0) out.obstacle = -1 - pair.key.b;
+  const int other = pair.key.b < 0 ? pair.key.b : pair.rod_b;
+  const auto& pairs = model_.description.contact.pairs;
+  for (Eigen::Index i = 0; i < pair_friction_.rows(); ++i)
+    if (pairs[static_cast<std::size_t>(i)].is_of(pair.rod_a, other) && pair_friction_(i, 0) >= 0.0) out.pair = i;
+  return out;
+}
+
 double Surfaces::tolerance(int edge) const {
   const double given = model_.description.contact.distance_tolerance;
   return given > 0.0 ? given : 0.1 * radius(edge);

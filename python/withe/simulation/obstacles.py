@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from withe.common import validation
 from withe.common.outlines import ObstacleOutline
-from withe.parts.contacts import Body, body_of, pair_friction, pair_of, touching
+from withe.parts.contacts import Body, BodyPair, body_of, pair_friction, pair_of, touching
 from withe.parts.directory import Directory
 from withe.parts.friction import Coefficients, Friction, check_law, coefficients, pair_between, with_obstacle, with_pair
 from withe.parts.handles import Handle, Obstacle
@@ -122,6 +122,7 @@ def set_pair_friction(session: Session, a: Body, b: Body, friction: Friction) ->
     session.world.set_friction(with_pair(contact, bodies, given.pair, shares))
     session.settings.frictions[names] = given
     find_friction_fields(session)
+    session.note("set_friction", BodyPair(first, second), {"friction": friction})
 
 
 def set_obstacle_friction(session: Session, part: ObstaclePart, value: Friction) -> None:
