@@ -30,6 +30,7 @@ NAMES = (
     "perception",
     "real2sim",
     "deployment",
+    "folding_trials",
 )
 
 
