@@ -211,3 +211,51 @@ def test_runs_in_which_friction_comes_or_goes_say_so(pair):
     record = touching.run(differentiable=True, before_step=before_step)
     with pytest.raises(ValueError, match="friction came or went"):
         record.gradient({"positions": np.zeros((4, NODES, 3))}, ["gravity"])
+
+
+def leaning(stiffness, friction=0.0):
+    """A clamped arm that lies on a floor with its end, in equilibrium."""
+    scene = withe.Scene()
+    material = withe.Material(youngs_modulus=1e6, poisson_ratio=0.4, density=1200.0)
+    arm = scene.add_rod(start=(0, 0, 0.03), end=(0.3, 0, 0.03), nodes=NODES, radius=5e-3, material=material)
+    scene.clamp(arm.start)
+    scene.add_floor(0.0, friction=friction)
+    scene.enable_contact(stiffness=stiffness, distance_tolerance=2e-3)
+    simulation = scene.build(integrator="static", **TIGHT)
+    found = simulation.equilibrium()
+    assert len(simulation.contacts()) > 0
+    return simulation, arm, found
+
+
+def test_gradient_of_an_equilibrium_in_contact_of_a_given_stiffness_is_that_of_differences():
+    sim, arm, found = leaning(2e4)
+    weight = np.random.default_rng(21).normal(size=(NODES, 3)) * (1, 0, 1)
+    (by_modulus,) = found.gradient(weight, [(arm, "youngs_modulus")])
+
+    def of():
+        sim.equilibrium()
+        return float((weight * sim.positions()).sum())
+
+    wide, near = (difference(sim, of, lambda h: sim.set(arm, youngs_modulus=1e6 + h), size) for size in (200.0, 100.0))
+    assert by_modulus == pytest.approx((4.0 * near - wide) / 3.0, rel=1e-5)
+
+
+def test_equilibria_in_contact_without_a_gradient_say_what_to_do():
+    _, arm, found = leaning(None)
+    with pytest.raises(ValueError, match=r"give enable_contact\(stiffness=\)"):
+        found.gradient(np.zeros((NODES, 3)), [(arm, "youngs_modulus")])
+    _, arm, found = leaning(2e4, friction=0.3)
+    with pytest.raises(ValueError, match="an equilibrium that friction holds"):
+        found.gradient(np.zeros((NODES, 3)), [(arm, "youngs_modulus")])
+
+
+@pytest.mark.parametrize("integrator", ["verlet", "static"])
+def test_runs_of_integrators_without_a_gradient_say_so(integrator):
+    scene = withe.Scene()
+    material = withe.Material(youngs_modulus=1e6, poisson_ratio=0.4, density=1200.0)
+    arm = scene.add_rod(start=(0, 0, 0), end=(0.3, 0, 0), nodes=5, radius=5e-3, material=material)
+    scene.clamp(arm.start)
+    simulation = scene.build(integrator=integrator, time_step=1e-5)
+    record = simulation.run(2e-5, record_every=2e-5, progress=False, differentiable=True)
+    with pytest.raises(ValueError, match=f"integrator '{integrator}' has none; take any other"):
+        record.gradient({"positions": np.zeros((2, 5, 3))}, ["gravity"])
