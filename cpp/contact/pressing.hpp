@@ -5,6 +5,9 @@
 
 namespace withe {
 
+/// Directions at both ends of a step whose ways along it differ by less, over the way, are the same but for rounding.
+inline constexpr double kSameDirection = 1e-12;
+
 /// Adds minus the forces of a contact, and their derivative when asked for: that with how pressing turns, or, without
 /// `geometric`, the part that resists where surfaces near.
 void add_pressing(const ContactProblem& problem, const Touching& t, bool with_hessian, bool geometric,

@@ -74,15 +74,23 @@ bool Surfaces::set_friction(const Parameters& p) {
 }
 
 void Surfaces::set_friction(ContactPair& pair) const {
-  const bool obstacle = pair.key.b < 0;
-  const int other = obstacle ? pair.key.b : pair.rod_b;
-  const Eigen::Index row = -1 - pair.key.b;
-  pair.set_friction(obstacle ? obstacle_friction_(row, 0) : friction_,
-                    obstacle ? obstacle_friction_(row, 1) : friction_);
+  const auto [own, obstacle] = friction_owner(pair);
+  if (own >= 0)
+    pair.set_friction(pair_friction_(own, 0), pair_friction_(own, 1));
+  else if (obstacle >= 0)
+    pair.set_friction(obstacle_friction_(obstacle, 0), obstacle_friction_(obstacle, 1));
+  else
+    pair.set_friction(friction_, friction_);
+}
+
+FrictionOwner Surfaces::friction_owner(const ContactPair& pair) const {
+  FrictionOwner out;
+  if (pair.key.b < 0) out.obstacle = -1 - pair.key.b;
+  const int other = pair.key.b < 0 ? pair.key.b : pair.rod_b;
   const auto& pairs = model_.description.contact.pairs;
   for (Eigen::Index i = 0; i < pair_friction_.rows(); ++i)
-    if (pairs[static_cast<std::size_t>(i)].is_of(pair.rod_a, other) && pair_friction_(i, 0) >= 0.0)
-      pair.set_friction(pair_friction_(i, 0), pair_friction_(i, 1));
+    if (pairs[static_cast<std::size_t>(i)].is_of(pair.rod_a, other) && pair_friction_(i, 0) >= 0.0) out.pair = i;
+  return out;
 }
 
 double Surfaces::tolerance(int edge) const {

@@ -43,6 +43,12 @@ struct ContactPair {
   }
 };
 
+/// Whose coefficients a contact has: a row of `Parameters::pair_friction`, else one of `obstacle_friction`, else those
+/// of the scene; -1: none.
+struct FrictionOwner {
+  Eigen::Index pair = -1, obstacle = -1;
+};
+
 /// The order in which contacts are found: those with obstacles, one obstacle after the other, then those of edges.
 bool comes_before(const ContactKey& a, const ContactKey& b);
 
@@ -70,6 +76,7 @@ class Surfaces {
   bool set_friction(const Parameters& parameters);
   /// Gives a pair the coefficients of its bodies.
   void set_friction(ContactPair& pair) const;
+  FrictionOwner friction_owner(const ContactPair& pair) const;
   /// Whether friction is there at all.
   bool frictional() const { return frictional_; }
   /// Unknowns of two surfaces, -1 where there is none; angles where there is friction.

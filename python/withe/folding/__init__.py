@@ -14,7 +14,7 @@ from withe.folding.jaw import Jaw
 from withe.folding.manifold import elastica
 from withe.folding.noise import Noise
 from withe.folding.paper import Paper
-from withe.folding.planning import plan
+from withe.folding.planning import plan, replan
 from withe.folding.plans import Plan
 from withe.folding.seeing import SeenEdge, find_edge, overhead_camera
 from withe.folding.sheets import Elastica
@@ -36,4 +36,5 @@ __all__ = [
     "measure",
     "overhead_camera",
     "plan",
+    "replan",
 ]

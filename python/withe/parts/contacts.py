@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -19,7 +20,17 @@ from withe.parts.kinds import (
     RodPart,
 )
 
-__all__ = ["CONTACT", "Body", "body_of", "contact_table", "describe_contact", "make_obstacle", "pair_of", "touching"]
+__all__ = [
+    "CONTACT",
+    "Body",
+    "BodyPair",
+    "body_of",
+    "contact_table",
+    "describe_contact",
+    "make_obstacle",
+    "pair_of",
+    "touching",
+]
 
 FloatArray = npt.NDArray[np.float64]
 Body = Rod | Obstacle | str
@@ -80,6 +91,23 @@ def touching(directory: Directory, handle: Body) -> RodPart | ObstaclePart:
     if not isinstance(part, RodPart | ObstaclePart):
         raise ValueError(f"what touches must be a rod or an obstacle, got {part.name!r}")
     return part
+
+
+@dataclass(frozen=True)
+class BodyPair:
+    """Two that may touch."""
+
+    first: RodPart | ObstaclePart
+    second: RodPart | ObstaclePart
+
+    @property
+    def name(self) -> str:
+        """The same in either order."""
+        return ", ".join(sorted((self.first.name, self.second.name)))
+
+    def bodies(self, directory: Directory) -> set[int]:
+        """How the engine calls them."""
+        return {body_of(directory, self.first), body_of(directory, self.second)}
 
 
 def body_of(directory: Directory, part: RodPart | ObstaclePart) -> int:

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from withe.common import validation
 from withe.common.outlines import ObstacleOutline
-from withe.parts.contacts import Body, body_of, touching
+from withe.parts.contacts import Body, BodyPair, body_of, touching
 from withe.parts.directory import Directory
 from withe.parts.friction import Friction, check_law, friction_pair, with_obstacle, with_pair
 from withe.parts.handles import Handle, Obstacle
@@ -116,6 +116,7 @@ def set_pair_friction(session: Session, a: Body, b: Body, friction: Friction) ->
     check_law(pair, contact.friction_law, what)
     bodies = body_of(session.directory, first), body_of(session.directory, second)
     session.world.set_friction(with_pair(contact, bodies, pair))
+    session.note("set_friction", BodyPair(first, second), {"friction": friction})
 
 
 def set_obstacle_friction(session: Session, part: ObstaclePart, value: Friction) -> None:
