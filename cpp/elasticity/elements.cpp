@@ -2,9 +2,8 @@
 
 #include <algorithm>
 
-#include "elasticity/bend_twist.hpp"
+#include "elasticity/half_stencil.hpp"
 #include "elasticity/put_local.hpp"
-#include "geometry/rotation.hpp"
 
 namespace withe {
 namespace {
@@ -52,11 +51,6 @@ void put(Local& out, int at, const Vec3d& v) {
   out.gradient[at + 1] = v.y;
   out.gradient[at + 2] = v.z;
 }
-Matrix3 dense(const Mat3<double>& a) {
-  Matrix3 m;
-  for (int i = 0; i < 3; ++i) m.row(i) << a.row[i].x, a.row[i].y, a.row[i].z;
-  return m;
-}
 
 void bend_planar_local(const TurnCoefficients& k, const Configuration& c, const BendStencil& s, Eigen::Index i,
                        bool with_hessian, Local& out) {
@@ -82,29 +76,6 @@ void half_planar_local(const TurnCoefficients& k, const Configuration& c, const 
   const Vec2<double> turn = turned(edge[a].tangent), coupling = f.by[b][a] * turn;
   out.energy = p.energy;
   put_planar_half({f.force[b], dot(turn, f.force[a]), f.by[b][b], coupling, coupling, p.curvature}, with_hessian, out);
-}
-
-/// Second derivatives by the spin of the frame that is in slot `a` of a half stencil: with itself, with the vector of
-/// the edge in the other slot, and with that one's angle. A spin eta moves the frame's unit tangent T by eta x T and
-/// its directors by T . eta.
-struct SpinHessian {
-  Matrix3 spin, edge;
-  Vector3 angle;
-};
-SpinHessian spin_hessian(const BendTwistDerivatives<double>& d, int a, const Vector3& T) {
-  const int b = 1 - a;
-  const Vector3 ge = to_eigen(d.gradient_e[a]);
-  const Matrix3 X = cross_matrix(T);  // X^T-side of eta -> eta x T
-  const Matrix3 Haa = dense(d.ee[a][a]);
-  const Matrix3 Hab = a == 0 ? dense(d.ee[0][1]) : Matrix3(dense(d.ee[0][1]).transpose());  // frame edge, real edge
-  const Vector3 haa = to_eigen(d.e_angle[a][a]);                                            // frame edge, frame angle
-  const Vector3 hab = to_eigen(d.e_angle[a][b]);                                            // frame edge, edge's angle
-  const Vector3 hba = to_eigen(d.e_angle[b][a]);                                            // real edge, frame angle
-  Matrix3 S = X * Haa * X.transpose() + d.angle_angle[a][a] * T * T.transpose();
-  const Vector3 Xh = X * haa;
-  S += Xh * T.transpose() + T * Xh.transpose() + 0.5 * (ge * T.transpose() + T * ge.transpose());
-  S.diagonal().array() -= ge.dot(T);
-  return {S, X * Hab + T * hba.transpose(), X * hab + d.angle_angle[0][1] * T};
 }
 
 /// The energy k (s - s0)^2 / 2 of unit stiffness and of a natural strain of s - 1 has the gradient of the strain s.
@@ -232,59 +203,20 @@ void half_local(const Model& model, const VectorX& q, const TurnCoefficients& k,
   const auto i = static_cast<Eigen::Index>(stencil);
   if (model.planar()) return half_planar_local(k, c, s, i, with_hessian, out);
   const EdgeFrame<double>& edge = c.edge[static_cast<std::size_t>(s.edge)];
-  const EdgeFrame<double>& end = c.attached[static_cast<std::size_t>(stencil)];
-  const EdgeFrame<double>&f0 = s.frame_first ? end : edge, &f1 = s.frame_first ? edge : end;
-  const int a = s.frame_first ? 0 : 1, b = 1 - a;  // slots of the frame and of the edge
+  const EdgeFrame<double>& attached = c.attached[static_cast<std::size_t>(stencil)];
+  const EdgeFrame<double>&f0 = s.frame_first ? attached : edge, &f1 = s.frame_first ? edge : attached;
   const BendTwistDerivatives<double> d =
       bend_twist(k.measure, f0, f1, strain_row(c.half_strain, i), natural_of(k), stiffness_of(k), with_hessian);
-  out.energy = d.energy;
-  put(out, 0, -d.gradient_e[b]);
-  out.gradient[3] = d.gradient_angle[b];
-  put(out, 4, d.gradient_e[b]);
-
-  const Vector3 T = to_eigen(end.tangent), ge = to_eigen(d.gradient_e[a]);
-  const Vector3 moment = T.cross(ge) + d.gradient_angle[a] * T;
-  const auto frame_dof = model.frame_dof[static_cast<std::size_t>(s.frame)];
-  const Vector3 w = q.segment<3>(frame_dof);
-  const Matrix3 J = cayley_spin(w);
-  Eigen::Map<Vector3>(out.gradient + 7) = J.transpose() * moment;
-  Vector3 axis = Vector3::Zero();
+  AttachedEnd<double> end{s.frame_first ? 0 : 1,
+                          attached.tangent,
+                          to_vec3(q.segment<3>(model.frame_dof[static_cast<std::size_t>(s.frame)])),
+                          {}};
   if (s.hinge >= 0)
-    axis = c.frame[static_cast<std::size_t>(s.frame)] * model.hinges[static_cast<std::size_t>(s.hinge)].axis;
-  out.gradient[10] = axis.dot(moment);
-  if (!with_hessian) return;
-
-  const auto [S, Se, Sangle] = spin_hessian(d, a, T);
-  const Vector3 u = moment - 0.5 * w.cross(moment);
-  const double cay = 1.0 / (1.0 + 0.25 * w.squaredNorm());
-  const Matrix3 Hww = J.transpose() * S * J - (0.25 * cay * cay) * (u * w.transpose() + w * u.transpose());
-  const Matrix3 Hwe = J.transpose() * Se;
-  const Vector3 Hwangle = J.transpose() * Sangle;
-  const Matrix3 E = dense(d.ee[b][b]);
-  const Vector3 hbb = to_eigen(d.e_angle[b][b]);
-  for (int r = 0; r < 3; ++r) {
-    for (int col = 0; col < 3; ++col) {
-      out.hessian[r][col] = out.hessian[4 + r][4 + col] = E(r, col);
-      out.hessian[r][4 + col] = out.hessian[4 + r][col] = -E(r, col);
-      out.hessian[7 + r][7 + col] = Hww(r, col);
-      out.hessian[7 + r][col] = out.hessian[col][7 + r] = -Hwe(r, col);
-      out.hessian[7 + r][4 + col] = out.hessian[4 + col][7 + r] = Hwe(r, col);
-    }
-    out.hessian[r][3] = out.hessian[3][r] = -hbb(r);
-    out.hessian[4 + r][3] = out.hessian[3][4 + r] = hbb(r);
-    out.hessian[7 + r][3] = out.hessian[3][7 + r] = Hwangle(r);
-  }
-  out.hessian[3][3] = d.angle_angle[b][b];
-  // A hinge turns the attached end about `axis`, after the frame.
-  const Vector3 Hw_hinge = J.transpose() * (S * axis + 0.5 * axis.cross(moment));
-  const Vector3 He_hinge = Se.transpose() * axis;
-  for (int r = 0; r < 3; ++r) {
-    out.hessian[7 + r][10] = out.hessian[10][7 + r] = Hw_hinge(r);
-    out.hessian[r][10] = out.hessian[10][r] = -He_hinge(r);
-    out.hessian[4 + r][10] = out.hessian[10][4 + r] = He_hinge(r);
-  }
-  out.hessian[3][10] = out.hessian[10][3] = Sangle.dot(axis);
-  out.hessian[10][10] = axis.dot(S * axis);
+    end.axis =
+        to_vec3(c.frame[static_cast<std::size_t>(s.frame)] * model.hinges[static_cast<std::size_t>(s.hinge)].axis);
+  out.energy = d.energy;
+  put_half_gradient(d, end, out.gradient);
+  if (with_hessian) put_half_matrix(d, end, out.hessian);
 }
 
 void stretch_gradients(const Model& model, const Configuration& c, int edge, StrainGradients& out) {

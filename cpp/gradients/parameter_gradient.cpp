@@ -118,9 +118,12 @@ class Chain {
       const double la = model_.edge_arc(a), lb = model_.edge_arc(b);
       const double va = model_.bend_share(i, 0) * la, vb = model_.bend_share(i, 1) * lb;
       const EdgeNumbers of_a = edge_numbers(model_, p_, a, 0), of_b = edge_numbers(model_, p_, b, 3);
-      const ByEdges bend1 = in_series(of_a.bend[0], va, of_b.bend[0], vb),
-                    bend2 = in_series(of_a.bend[1], va, of_b.bend[1], vb),
-                    twist = twist_stiffness(in_series(of_a.twist, 0.5 * la, of_b.twist, 0.5 * lb), bend1, bend2,
+      const auto together = [](double v0, const ByEdges& k0, double v1, const ByEdges& k1) {
+        return in_series(flexibility(v0, k0), flexibility(v1, k1));
+      };
+      const ByEdges bend1 = together(va, of_a.bend[0], vb, of_b.bend[0]),
+                    bend2 = together(va, of_a.bend[1], vb, of_b.bend[1]),
+                    twist = twist_stiffness(together(0.5 * la, of_a.twist, 0.5 * lb, of_b.twist), bend1, bend2,
                                             arc_of_bend(model_, i));
       const ByEdges sum =
           by_.bend_stiffness(i, 0) * bend1 + by_.bend_stiffness(i, 1) * bend2 + by_.bend_stiffness(i, 2) * twist;

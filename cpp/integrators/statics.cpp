@@ -239,10 +239,9 @@ class Statics {
 
   /// Levenberg-Marquardt on the potential: every accepted step lowers it.
   bool descend(int max_steps, NewtonResult& last) {
-    const Model& model = equations_.model();
-    VectorX shift, z, step, weight;
+    VectorX z;
     path_.go_to(1.0);
-    weight = equations_.mass().rows;
+    const VectorX weight = equations_.mass().rows;
     double damping = 0.0;
     for (int k = 0; k < max_steps; ++k) {
       work_.poll();
@@ -256,50 +255,57 @@ class Statics {
       }
       if ((balance.floor || (balance.either && damping <= lowest_ * 1e2)) ||
           (k % 10 == 9 && damping <= lowest_ * 1e4)) {
-        // Near a minimum full Newton steps finish the work, if they stay near.
-        z = state_.q;
-        const double energy = here.potential;
-        const NewtonResult r = newton_.solve(equations_, z, {.max_iterations = 30}, work_);
-        last.iterations += r.iterations;
-        last.residual = r.residual;
-        if (r.converged && work_.data.potential <= energy + 1e-9 * std::abs(energy) + least_energy() &&
-            !turned_too_far(state_, work_.data.configuration, model.planar())) {
-          accept(z);
-          return true;
-        }
+        if (finish(here.potential, last)) return true;
         evaluate(1.0);
       }
-      bool accepted = false;
-      for (int tries = 0; tries < 40 && !accepted; ++tries) {
-        shift = damping * weight.cwiseMax(1e-300);
-        ++work_.counters.factorizations;
-        LinearSolver& solver = equations_.assembler().solver();
-        const Factorization f = solver.factorize({shift.data(), static_cast<std::size_t>(shift.size())});
-        if (f.status != FactorStatus::ok || f.negative_pivots > 0) {
-          damping *= 8.0;
-          continue;
-        }
-        step = -here.residual;
-        solver.solve({step.data(), static_cast<std::size_t>(step.size())});
-        if (newton_.norms().cap(step) < 1.0 || equations_.allowed(state_.q, step) < 1.0) {
-          damping *= 4.0;
-          continue;
-        }
-        z = state_.q + step;
-        equations_.evaluate(z, false, nullptr, work_.data);
-        const double gain = here.residual.dot(step);  // negative
-        const double rounding = 1e-13 * (std::abs(here.potential) + here.magnitude.cwiseAbs().dot(step.cwiseAbs()));
-        if (std::isfinite(work_.data.potential) && work_.data.potential - here.potential <= 0.1 * gain + rounding) {
-          accepted = true;
-        } else {
-          damping *= 4.0;
-        }
-      }
+      const bool lower = find_lower(here, weight, damping, z);
       ++last.iterations;
       ++work_.counters.iterations;
-      if (!accepted) return false;
+      if (!lower) return false;
       accept(z);
       damping = std::max(damping * 0.2, lowest_);
+    }
+    return false;
+  }
+
+  /// Near a minimum full Newton steps finish the work, if they stay near.
+  bool finish(double energy, NewtonResult& last) {
+    VectorX z = state_.q;
+    const NewtonResult r = newton_.solve(equations_, z, {.max_iterations = 30}, work_);
+    last.iterations += r.iterations;
+    last.residual = r.residual;
+    if (!r.converged || work_.data.potential > energy + 1e-9 * std::abs(energy) + least_energy() ||
+        turned_too_far(state_, work_.data.configuration, equations_.model().planar()))
+      return false;
+    accept(z);
+    return true;
+  }
+
+  /// A damped step from `here` to a lower potential, with more damping until there is one.
+  bool find_lower(const StepData& here, const VectorX& weight, double& damping, VectorX& z) {
+    VectorX shift, step;
+    for (int tries = 0; tries < 40; ++tries) {
+      shift = damping * weight.cwiseMax(1e-300);
+      ++work_.counters.factorizations;
+      LinearSolver& solver = equations_.assembler().solver();
+      const Factorization f = solver.factorize({shift.data(), static_cast<std::size_t>(shift.size())});
+      if (f.status != FactorStatus::ok || f.negative_pivots > 0) {
+        damping *= 8.0;
+        continue;
+      }
+      step = -here.residual;
+      solver.solve({step.data(), static_cast<std::size_t>(step.size())});
+      if (newton_.norms().cap(step) < 1.0 || equations_.allowed(state_.q, step) < 1.0) {
+        damping *= 4.0;
+        continue;
+      }
+      z = state_.q + step;
+      equations_.evaluate(z, false, nullptr, work_.data);
+      const double gain = here.residual.dot(step);  // negative
+      const double rounding = 1e-13 * (std::abs(here.potential) + here.magnitude.cwiseAbs().dot(step.cwiseAbs()));
+      if (std::isfinite(work_.data.potential) && work_.data.potential - here.potential <= 0.1 * gain + rounding)
+        return true;
+      damping *= 4.0;
     }
     return false;
   }

@@ -4,6 +4,24 @@
 
 namespace withe {
 
+namespace {
+
+/// What follows from where unknowns are.
+void note_places(Model& model) {
+  const auto at = [](int i) { return static_cast<std::size_t>(i); };
+  model.tail_dof.clear();
+  model.head_dof.clear();
+  for (int e = 0; e < model.edge_count; ++e) {
+    model.tail_dof.push_back(model.node_dof[at(model.edge_tail[at(e)])]);
+    model.head_dof.push_back(model.node_dof[at(model.edge_head[at(e)])]);
+  }
+  model.reversed_bend.clear();
+  for (std::size_t b = 0; b < model.bend.size(); ++b)
+    if (model.bend[b].sign[0] < 0 || model.bend[b].sign[1] < 0) model.reversed_bend.push_back(static_cast<int>(b));
+}
+
+}  // namespace
+
 void lay_out_unknowns(Model& model) {
   const auto& rods = model.description.rods;
   const auto at = [](int i) { return static_cast<std::size_t>(i); };
@@ -58,15 +76,7 @@ void lay_out_unknowns(Model& model) {
     }
   for (int node = 0; node < model.node_count; ++node) place_node(node, false);
   model.dof_count = next;
-  model.tail_dof.clear();
-  model.head_dof.clear();
-  for (int e = 0; e < model.edge_count; ++e) {
-    model.tail_dof.push_back(model.node_dof[at(model.edge_tail[at(e)])]);
-    model.head_dof.push_back(model.node_dof[at(model.edge_head[at(e)])]);
-  }
-  model.reversed_bend.clear();
-  for (std::size_t b = 0; b < model.bend.size(); ++b)
-    if (model.bend[b].sign[0] < 0 || model.bend[b].sign[1] < 0) model.reversed_bend.push_back(static_cast<int>(b));
+  note_places(model);
 }
 
 namespace {

@@ -257,8 +257,8 @@ class BendStiffness {
     edge_ = b;
     share_ = share_b;
     part_ = part(b, share_b);
-    const Vector2 bending(1.0 / (before.bend1 + part_.bend1), 1.0 / (before.bend2 + part_.bend2));
-    const double twist = 1.0 / (before.twist + part_.twist), square = 0.5 * (before.square + part_.square);
+    const Vector2 bending(in_series(before.bend1, part_.bend1), in_series(before.bend2, part_.bend2));
+    const double twist = in_series(before.twist, part_.twist), square = 0.5 * (before.square + part_.square);
     return {bending(0), bending(1), twist_stiffness(model_, twist, bending, model_.bend_owner[at(stencil)], square)};
   }
 
@@ -270,7 +270,7 @@ class BendStiffness {
   Part part(int edge, double share) const {
     const double length = model_.edge_arc(edge), chord = model_.edge_length(edge), bent = share * length;
     const Vector2 k = bend_of(model_, p_, edge);
-    return {bent / k(0), bent / k(1), 0.5 * length / p_.edge_twist(edge),
+    return {flexibility(bent, k(0)), flexibility(bent, k(1)), flexibility(0.5 * length, p_.edge_twist(edge)),
             length == chord ? 0.0 : square_of_turn(chord, length)};
   }
 

@@ -1,6 +1,7 @@
 #include <Eigen/Geometry>
 #include <Eigen/SVD>
 #include <cmath>
+#include <utility>
 
 #include "model/model.hpp"
 
@@ -43,27 +44,14 @@ bool fits(const ObstacleDescription& o, const Vector3& corner, const Vector3& no
   return axis.cross(normal).norm() <= size && start * end < 0.0;
 }
 
-}  // namespace
-
-std::optional<Plane> find_plane(const SceneDescription& scene, std::optional<bool> asked, std::string& reason) {
-  // Who asks for a plane sees to it that such forces stay in it.
-  const bool sure = asked.value_or(false);
-  if (scene.has_custom_force && !sure) {
-    reason = "a custom force may point anywhere";
-    return std::nullopt;
-  }
-  for (const LoadDescription& load : scene.loads)
-    if (load.varies && !load.added && !sure) {
-      reason = "a load that varies may leave any plane";
-      return std::nullopt;
-    }
-  std::vector<Vector3> directions;
-  collect_directions(scene, directions);
+/// The normal of the plane that directions span; nothing, with the reason, where they span none.
+std::optional<Vector3> normal_of(const SceneDescription& scene, bool asked, std::vector<Vector3>& directions,
+                                 std::string& reason) {
   Matrix3 spread = Matrix3::Zero();
   for (const Vector3& d : directions) spread += d * d.transpose();
   spread /= static_cast<double>(std::max<std::size_t>(directions.size(), 1));
   Eigen::JacobiSVD<Matrix3> svd(spread, Eigen::ComputeFullU);
-  if (svd.singularValues()(1) < 1e-20 && asked.value_or(false)) {
+  if (svd.singularValues()(1) < 1e-20 && asked) {
     // A straight scene lies in many planes: the one asked for holds the first director.
     directions.emplace_back(scene.rods.front().directors.row(0));
     spread += directions.back() * directions.back().transpose();
@@ -83,63 +71,80 @@ std::optional<Plane> find_plane(const SceneDescription& scene, std::optional<boo
       normal = candidate.normalized();
     }
   }
-  const auto off_plane = [&](const Vector3& v) { return std::abs(v.dot(normal)) > kTolerance * 100 * v.norm(); };
   for (const Vector3& d : directions)
-    if (off_plane(d)) {
+    if (std::abs(d.dot(normal)) > kTolerance * 100 * d.norm()) {
       reason = "rods, gravity and forces do not share a plane";
       return std::nullopt;
     }
+  return normal;
+}
+
+/// Why a rod leaves the plane in which its nodes are; empty: it does not.
+std::string why_off_plane(const SceneDescription& scene, const RodDescription& rod, const Vector3& normal) {
+  if ((rod.natural_twist.array() != 0.0).any()) return "rod '" + rod.name + "' has natural twist";
+  for (Eigen::Index e = 0; e < rod.directors.rows(); ++e) {
+    const double c = std::abs(Vector3(rod.directors.row(e)).dot(normal));
+    if (!isotropic(rod) && c > 1e-9 && c < 1.0 - 1e-9)
+      return "the section of rod '" + rod.name + "' lies at an angle to the plane";
+  }
+  // Directors must keep their angle to the plane, or the rod is drawn with twist.
+  for (Eigen::Index e = 1; e < rod.directors.rows(); ++e)
+    if (std::abs((rod.directors.row(e) - rod.directors.row(0)).dot(normal)) > 1e-8)
+      return "rod '" + rod.name + "' is drawn with twist";
+  const Vector3 d1 = rod.directors.row(0);
+  const Vector3 t = (scene.positions.row(rod.nodes[1]) - scene.positions.row(rod.nodes[0])).normalized();
+  const Vector3 d2 = t.cross(d1);
+  const Vector2 p(d2.dot(normal), -d1.dot(normal));
+  for (Eigen::Index s = 0; s < rod.natural_curvature.rows(); ++s) {
+    const Vector2 k = rod.natural_curvature.row(s);
+    if (std::abs(k(0) * p(1) - k(1) * p(0)) > 1e-8 * k.norm())
+      return "the natural curvature of rod '" + rod.name + "' leaves the plane";
+  }
+  return "";
+}
+
+/// The same of all that is in the scene.
+std::string why_off_plane(const SceneDescription& scene, const Vector3& normal) {
   const auto across = [&](const Vector3& v) { return v.cross(normal).norm() > kTolerance * 100 * v.norm(); };
   for (const LoadDescription& load : scene.loads)
     for (const auto& value : load.values.rowwise())
-      if (!load.added && is_axial(load.kind) && across(value.transpose())) {
-        reason = "a moment turns, or a pressure pushes, out of the plane";
-        return std::nullopt;
-      }
-  for (const RodDescription& rod : scene.rods) {
-    if ((rod.natural_twist.array() != 0.0).any()) {
-      reason = "rod '" + rod.name + "' has natural twist";
-      return std::nullopt;
-    }
-    for (Eigen::Index e = 0; e < rod.directors.rows(); ++e) {
-      const double c = std::abs(Vector3(rod.directors.row(e)).dot(normal));
-      if (!isotropic(rod) && c > 1e-9 && c < 1.0 - 1e-9) {
-        reason = "the section of rod '" + rod.name + "' lies at an angle to the plane";
-        return std::nullopt;
-      }
-    }
-    // Directors must keep their angle to the plane, or the rod is drawn with twist.
-    for (Eigen::Index e = 1; e < rod.directors.rows(); ++e)
-      if (std::abs((rod.directors.row(e) - rod.directors.row(0)).dot(normal)) > 1e-8) {
-        reason = "rod '" + rod.name + "' is drawn with twist";
-        return std::nullopt;
-      }
-    const Vector3 d1 = rod.directors.row(0);
-    const int next = rod.nodes[1];
-    const Vector3 t = (scene.positions.row(next) - scene.positions.row(rod.nodes[0])).normalized();
-    const Vector3 d2 = t.cross(d1);
-    const Vector2 p(d2.dot(normal), -d1.dot(normal));
-    for (Eigen::Index s = 0; s < rod.natural_curvature.rows(); ++s) {
-      const Vector2 k = rod.natural_curvature.row(s);
-      if (std::abs(k(0) * p(1) - k(1) * p(0)) > 1e-8 * k.norm()) {
-        reason = "the natural curvature of rod '" + rod.name + "' leaves the plane";
-        return std::nullopt;
-      }
-    }
-  }
+      if (!load.added && is_axial(load.kind) && across(value.transpose()))
+        return "a moment turns, or a pressure pushes, out of the plane";
+  for (const RodDescription& rod : scene.rods)
+    if (std::string reason = why_off_plane(scene, rod, normal); !reason.empty()) return reason;
   for (const SupportDescription& support : scene.supports) {
     const Vector3 image = support.free * normal;
-    if ((image - normal * normal.dot(image)).norm() > 1e-9) {
-      reason = "a support may slide out of the plane";
-      return std::nullopt;
-    }
+    if ((image - normal * normal.dot(image)).norm() > 1e-9) return "a support may slide out of the plane";
   }
   const Vector3 corner = scene.positions.row(scene.rods.front().nodes.front());
   for (const ObstacleDescription& o : scene.contact.obstacles)
-    if (!fits(o, corner, normal)) {
-      reason = "an obstacle reaches out of the plane";
+    if (!fits(o, corner, normal)) return "an obstacle reaches out of the plane";
+  return "";
+}
+
+}  // namespace
+
+std::optional<Plane> find_plane(const SceneDescription& scene, std::optional<bool> asked, std::string& reason) {
+  // Who asks for a plane sees to it that such forces stay in it.
+  const bool sure = asked.value_or(false);
+  if (scene.has_custom_force && !sure) {
+    reason = "a custom force may point anywhere";
+    return std::nullopt;
+  }
+  for (const LoadDescription& load : scene.loads)
+    if (load.varies && !load.added && !sure) {
+      reason = "a load that varies may leave any plane";
       return std::nullopt;
     }
+  std::vector<Vector3> directions;
+  collect_directions(scene, directions);
+  const std::optional<Vector3> found = normal_of(scene, sure, directions, reason);
+  if (!found) return std::nullopt;
+  const Vector3& normal = *found;
+  if (std::string why = why_off_plane(scene, normal); !why.empty()) {
+    reason = std::move(why);
+    return std::nullopt;
+  }
   Plane plane;
   plane.normal = normal;
   plane.origin = scene.positions.row(scene.rods.front().nodes.front());

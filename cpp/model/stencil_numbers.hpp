@@ -12,11 +12,15 @@
 
 namespace withe {
 
-/// Two parts of edges in series: V / K = V0 / K0 + V1 / K1.
+/// V / K of a part of an edge of length V; infinite where nothing resists.
 template <class Scalar>
-Scalar in_series(const Scalar& k0, double v0, const Scalar& k1, double v1) {
-  if (value_of(k0) == 0.0 || value_of(k1) == 0.0) return Scalar(0.0);
-  return 1.0 / (v0 / k0 + v1 / k1);
+Scalar flexibility(double length, const Scalar& stiffness) {
+  return value_of(stiffness) == 0.0 ? Scalar(INFINITY) : length / stiffness;
+}
+/// Stiffness of two parts in series, whose flexibilities add up.
+template <class Scalar>
+Scalar in_series(const Scalar& flexibility0, const Scalar& flexibility1) {
+  return 1.0 / (flexibility0 + flexibility1);
 }
 
 /// A moment along the middle of an arc that turns by phi bends its ends, to either side: 1 / Kt + phi^2 / (12 K), K

@@ -103,6 +103,96 @@ struct CableEnd {
   HalfEdge half;
 };
 
+/// What is known of lines before they are followed.
+struct Found {
+  const BitImage& mask;
+  const TraceOptions& options;
+  const SkeletonGraph& graph;
+  const Continuations& links;
+};
+
+/// Outlines of cables, as they are fitted.
+struct Outlines {
+  std::vector<CableOutline> cables;
+  std::vector<HiddenStretch> stretches;
+  std::vector<CableEnd> on_flanks;  ///< ends on the flank of another cable, which has to be known first
+};
+
+Outlines outline_cables(const Found& found, const std::vector<CablePath>& paths,
+                        const std::vector<std::vector<Vector2>>& ends, double shortest, std::vector<Cable>& cables) {
+  Outlines out;
+  for (const CablePath& path : paths) {
+    CableOutline outline(found.graph, found.links, path);
+    std::vector<CableEnd> flanks;
+    const int number = static_cast<int>(out.cables.size());
+    if (!path.closed) {
+      for (const bool at_end : {false, true}) {
+        const HalfEdge half = at_end ? opposite(path.entries.back()) : path.entries.front();
+        if (found.links.zone_of[static_cast<std::size_t>(half)] < 0) {
+          outline.extend(at_end, ends[static_cast<std::size_t>(half)]);
+        } else {
+          flanks.push_back({number, at_end, half});
+        }
+      }
+    }
+    if (outline.empty() || outline.length() < shortest) continue;
+    out.on_flanks.insert(out.on_flanks.end(), flanks.begin(), flanks.end());
+    cables.push_back(outline.fit(found.mask, found.options, number, out.stretches));
+    out.cables.push_back(std::move(outline));
+  }
+  return out;
+}
+
+using Joints = std::vector<std::pair<CableEnd, CableRow>>;
+
+/// Extends ends to the flanks that they point at, and fits their cables again.
+Joints extend_to_flanks(const Found& found, Outlines& outlines, std::vector<Cable>& cables) {
+  std::vector<char> again(outlines.cables.size(), 0);
+  Joints joints;
+  const std::vector<HiddenStretch> before = outlines.stretches;
+  for (const CableEnd& end : outlines.on_flanks) {
+    const Branch& branch = found.links.branches[static_cast<std::size_t>(end.half)];
+    const int zone = found.links.zone_of[static_cast<std::size_t>(end.half)];
+    const double longest = 12 * 2 * branch.half_width;
+    const RayHit hit = cast_ray(cables, before, zone, branch.point, branch.tangent, longest);
+    CableOutline& outline = outlines.cables[static_cast<std::size_t>(end.cable)];
+    again[static_cast<std::size_t>(end.cable)] = 1;
+    if (hit.through.cable < 0) {
+      outline.extend(end.at_end, grow_end(found.mask, branch));
+      continue;
+    }
+    const Cable& through = cables[static_cast<std::size_t>(hit.through.cable)];
+    const double half_width = 0.5 * through.widths[static_cast<std::size_t>(hit.through.row)];
+    const double distance = hit.distance - half_width / std::max(hit.sine, 0.3);
+    std::vector<Vector2> points;
+    for (double s = 1; s < distance; s += 1) points.push_back(branch.point + s * branch.tangent);
+    if (distance > 0) points.push_back(branch.point + distance * branch.tangent);
+    outline.extend(end.at_end, points);
+    joints.emplace_back(end, hit.through);
+  }
+  for (std::size_t c = 0; c < outlines.cables.size(); ++c) {
+    if (!again[c]) continue;
+    const int number = static_cast<int>(c);
+    std::erase_if(outlines.stretches, [number](const HiddenStretch& stretch) { return stretch.cable == number; });
+    cables[c] = outlines.cables[c].fit(found.mask, found.options, number, outlines.stretches);
+  }
+  return joints;
+}
+
+void join_flanks(const Found& found, Outlines& outlines, Tracing& tracing) {
+  for (const auto& [end, through] : extend_to_flanks(found, outlines, tracing.cables)) {
+    const Cable& cable = tracing.cables[static_cast<std::size_t>(end.cable)];
+    const int row = end.at_end ? static_cast<int>(cable.centreline.rows()) - 1 : 0;
+    const Vector2 point = cable.centreline.row(row).transpose();
+    // The other cable may have been fitted again as well, so its row is looked up anew.
+    const Cable& other = tracing.cables[static_cast<std::size_t>(through.cable)];
+    Eigen::Index nearest = through.row;
+    (other.centreline.rowwise() - point.transpose()).rowwise().squaredNorm().minCoeff(&nearest);
+    if (through.cable == end.cable) nearest = std::min<Eigen::Index>(through.row, other.centreline.rows() - 1);
+    tracing.joints.push_back({point, {end.cable, row}, {through.cable, static_cast<int>(nearest)}});
+  }
+}
+
 }  // namespace
 
 Tracing trace_lines(const BitImage& mask, const TraceOptions& options, const ColorImage* image) {
@@ -132,71 +222,10 @@ Tracing trace_lines(const BitImage& mask, const TraceOptions& options, const Col
   const std::vector<CablePath> paths = collect_paths(graph, links);
   watch.lap("paths");
 
-  std::vector<CableOutline> outlines;
-  std::vector<HiddenStretch> stretches;
-  std::vector<CableEnd> on_flanks;
-  for (const CablePath& path : paths) {
-    CableOutline outline(graph, links, path);
-    std::vector<CableEnd> flanks;
-    const int number = static_cast<int>(outlines.size());
-    if (!path.closed) {
-      for (const bool at_end : {false, true}) {
-        const HalfEdge half = at_end ? opposite(path.entries.back()) : path.entries.front();
-        if (links.zone_of[static_cast<std::size_t>(half)] < 0) {
-          outline.extend(at_end, ends[static_cast<std::size_t>(half)]);
-        } else {
-          flanks.push_back({number, at_end, half});
-        }
-      }
-    }
-    if (outline.empty() || outline.length() < shortest) continue;
-    on_flanks.insert(on_flanks.end(), flanks.begin(), flanks.end());
-    tracing.cables.push_back(outline.fit(smoothed, options, number, stretches));
-    outlines.push_back(std::move(outline));
-  }
-
-  // Ends on the flank of another cable, which had to be known first.
-  std::vector<char> again(outlines.size(), 0);
-  std::vector<std::pair<CableEnd, CableRow>> joints;
-  const std::vector<HiddenStretch> before = stretches;
-  for (const CableEnd& end : on_flanks) {
-    const Branch& branch = links.branches[static_cast<std::size_t>(end.half)];
-    const int zone = links.zone_of[static_cast<std::size_t>(end.half)];
-    const double longest = 12 * 2 * branch.half_width;
-    const RayHit hit = cast_ray(tracing.cables, before, zone, branch.point, branch.tangent, longest);
-    CableOutline& outline = outlines[static_cast<std::size_t>(end.cable)];
-    again[static_cast<std::size_t>(end.cable)] = 1;
-    if (hit.through.cable < 0) {
-      outline.extend(end.at_end, grow_end(smoothed, branch));
-      continue;
-    }
-    const Cable& through = tracing.cables[static_cast<std::size_t>(hit.through.cable)];
-    const double half_width = 0.5 * through.widths[static_cast<std::size_t>(hit.through.row)];
-    const double distance = hit.distance - half_width / std::max(hit.sine, 0.3);
-    std::vector<Vector2> points;
-    for (double s = 1; s < distance; s += 1) points.push_back(branch.point + s * branch.tangent);
-    if (distance > 0) points.push_back(branch.point + distance * branch.tangent);
-    outline.extend(end.at_end, points);
-    joints.emplace_back(end, hit.through);
-  }
-  for (std::size_t c = 0; c < outlines.size(); ++c) {
-    if (!again[c]) continue;
-    const int number = static_cast<int>(c);
-    std::erase_if(stretches, [number](const HiddenStretch& stretch) { return stretch.cable == number; });
-    tracing.cables[c] = outlines[c].fit(smoothed, options, number, stretches);
-  }
-  for (const auto& [end, through] : joints) {
-    const Cable& cable = tracing.cables[static_cast<std::size_t>(end.cable)];
-    const int row = end.at_end ? static_cast<int>(cable.centreline.rows()) - 1 : 0;
-    const Vector2 point = cable.centreline.row(row).transpose();
-    // The other cable may have been fitted again as well, so its row is looked up anew.
-    const Cable& other = tracing.cables[static_cast<std::size_t>(through.cable)];
-    Eigen::Index nearest = through.row;
-    (other.centreline.rowwise() - point.transpose()).rowwise().squaredNorm().minCoeff(&nearest);
-    if (through.cable == end.cable) nearest = std::min<Eigen::Index>(through.row, other.centreline.rows() - 1);
-    tracing.joints.push_back({point, {end.cable, row}, {through.cable, static_cast<int>(nearest)}});
-  }
-  tracing.crossings = find_crossings(tracing.cables, stretches);
+  const Found found{smoothed, options, graph, links};
+  Outlines outlines = outline_cables(found, paths, ends, shortest, tracing.cables);
+  join_flanks(found, outlines, tracing);
+  tracing.crossings = find_crossings(tracing.cables, outlines.stretches);
   watch.lap("fit");
   return tracing;
 }

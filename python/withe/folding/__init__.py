@@ -9,6 +9,7 @@ the sheet per length. That makes one solution serve every paper.
 2.3762 rad, 3.4000 Lgb lifted, ratio of forces 0.3837
 """
 
+from withe.folding.closed_loop import fold
 from withe.folding.hanging_strip import Measured, droop, measure
 from withe.folding.jaw import Jaw
 from withe.folding.manifold import elastica
@@ -33,6 +34,7 @@ __all__ = [
     "droop",
     "elastica",
     "find_edge",
+    "fold",
     "measure",
     "overhead_camera",
     "plan",
