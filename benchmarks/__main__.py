@@ -26,10 +26,12 @@ NAMES = (
     "ablation",
     "conservation",
     "contact",
+    "contact_fold",
     "contact_robustness",
     "perception",
     "real2sim",
     "deployment",
+    "folding_trials",
 )
 
 

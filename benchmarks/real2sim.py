@@ -66,6 +66,25 @@ def _tags(report: Report, step: int) -> None:
     report.table("Tags off in frames 85 to 168 [mm]", ("curvature", "tip, mean", "tip, most", "all, RMS"), rows)
 
 
+def _stiffness(report: Report) -> None:
+    """Stills of limbs whose curvatures are unknown do not tell their modulus, and the fit says so."""
+    pixels, limbs, rows = log().pixels, ("upper", "lower"), []
+    for factor in (0.25, 1.0, 100.0):
+        simulation, places = robot()
+        for limb in limbs:
+            simulation.set(limb, youngs_modulus=factor * simulation.get(limb, "youngs_modulus"))
+        camera = calibrate(simulation, Tags(pixels, places), slice(0, 85, 4), progress=False)
+        found = fit(simulation, Tags(pixels[85:], camera.places, camera), CONSTANT, progress=False)
+        off = 1e3 * found.residuals / camera.scale
+        rows.append((f"{factor:g}", f"{np.sqrt(2.0 * (off**2).mean()):.2f}"))
+        if factor == 1.0:
+            seen = Tags(pixels[:85:8], camera.places, camera)
+            asked = fit(simulation, seen, [*CONSTANT, (limbs, "youngs_modulus")], progress=False)
+    report.table("Moduli other than the given one", ("times the modulus", "RMS of all tags [mm]"), rows)
+    said = any("youngs_modulus" in name for each in asked.unobservable for name in each.weights)
+    report.goal("stills: the modulus is said to be unobservable", float(said), 1.0)
+
+
 def _arm(nodes: int) -> withe.Simulation:
     scene = withe.Scene()
     rubber = withe.Material(youngs_modulus=1e6, density=1000.0)
@@ -190,6 +209,7 @@ def main() -> None:
     report = Report("real2sim", quick=quick)
     _curvatures(report)
     _tags(report, 20 if quick else 4)
+    _stiffness(report)
     _errors(report, 2 if quick else 100)
     _photograph(report, 2 if quick else 300)
     _ringing(report, 1 if quick else 4)

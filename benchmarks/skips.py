@@ -85,6 +85,14 @@ def _rough_floor(scene: withe.Scene, arm: withe.Rod) -> None:
     _floor(scene, arm, friction=1e-12)
 
 
+def _uneven_floor(scene: withe.Scene, arm: withe.Rod) -> None:
+    scene.add_floor(height=-0.01, friction=lambda points: np.full(len(points), 0.3))
+
+
+def _even_floor(scene: withe.Scene, arm: withe.Rod) -> None:
+    _floor(scene, arm, friction=0.3)
+
+
 def _hand(scene: withe.Scene, arm: withe.Rod) -> None:
     """It yields by so much that it holds nothing."""
     scene.grasp(arm, 0.3, 0.02, stiffness=(1e-15, 1e-15))
@@ -155,6 +163,12 @@ def skips(nodes: int) -> list[Skip]:
             "unsymmetric solver, slip",
             lambda: _simulation(nodes, _rough_floor),
             lambda: _simulation(nodes, _floor),
+        ),
+        Skip(
+            "friction that varies over a floor",
+            "a look at where nodes are",
+            lambda: _simulation(nodes, _uneven_floor),
+            lambda: _simulation(nodes, _even_floor),
         ),
         Skip("a fluid", "its terms", lambda: _simulation(nodes, _thin_fluid), lambda: _simulation(nodes)),
         Skip("hands", "their terms", lambda: _simulation(nodes, _hand), lambda: _simulation(nodes)),

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "contact/candidates.hpp"
+#include "contact/contact_adjoint.hpp"
 #include "contact/contact_linearisation.hpp"
 #include "contact/contact_set.hpp"
 #include "contact/contact_stiffness.hpp"
@@ -80,6 +81,10 @@ class Contact {
   void unknowns(int i, int (&dofs)[kContactUnknowns]) const { surfaces_.unknowns(set_[i].pair, dofs); }
   /// Minus its forces, and their derivative when asked for.
   void local(int i, bool with_hessian, ContactLocal& out, const ContactLinearisation& linearisation = {}) const;
+  /// rows^T times its derivatives by what the step is given; see contact_adjoint.hpp.
+  ContactAdjoint adjoint(int i, const double (&rows)[kContactUnknowns], double by_approach) const {
+    return contact_adjoint(problem_, set_[i], rows, by_approach);
+  }
   /// Rounding of contact i's force for coordinates up to `reach` [N].
   double rounding(int i, double reach, const ContactLinearisation& linearisation) const;
   /// Energy of contact and of anchors at q1, and at the start of the step [J].

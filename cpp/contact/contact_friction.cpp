@@ -19,6 +19,23 @@ double slip_rate(const ContactProblem& problem, double regularisation) {
   return 7.5 / (regularisation * problem.parameters->slip_tolerance * problem.duration);
 }
 
+FrictionForce<double> friction_now(const ContactProblem& problem, const Touching& t) {
+  double unused[kContactUnknowns] = {};
+  return friction_gradient(friction_setting(problem, t, 1.0, nullptr), t.now, unused);
+}
+
+}  // namespace
+
+bool regularises_friction(const Model& model) {
+  const FrictionLaw law = model.description.contact.friction_law;
+  return law == FrictionLaw::implicit || law == FrictionLaw::lagged;
+}
+
+double tangential_stiffness(const ContactPair& pair, double stiffness) {
+  const double pressing = stiffness * 2.0 * kDepth * pair.small_radius();
+  return pair.friction * pressing / (kGive * pair.tolerance);
+}
+
 FrictionSetting friction_setting(const ContactProblem& problem, const Touching& t, double regularisation,
                                  const Vec3d* predicted) {
   const ContactDescription& contact = problem.description();
@@ -49,23 +66,6 @@ FrictionSetting friction_setting(const ContactProblem& problem, const Touching& 
   f.source[0] = problem.start->tangent[at(pair.key.a)];
   if (pair.key.b >= 0) f.source[1] = problem.start->tangent[at(pair.key.b)];
   return f;
-}
-
-FrictionForce<double> friction_now(const ContactProblem& problem, const Touching& t) {
-  double unused[kContactUnknowns] = {};
-  return friction_gradient(friction_setting(problem, t, 1.0, nullptr), t.now, unused);
-}
-
-}  // namespace
-
-bool regularises_friction(const Model& model) {
-  const FrictionLaw law = model.description.contact.friction_law;
-  return law == FrictionLaw::implicit || law == FrictionLaw::lagged;
-}
-
-double tangential_stiffness(const ContactPair& pair, double stiffness) {
-  const double pressing = stiffness * 2.0 * kDepth * pair.small_radius();
-  return pair.friction * pressing / (kGive * pair.tolerance);
 }
 
 double friction_slope(const ContactProblem& problem, const Touching& t, const ContactLinearisation& linearisation) {

@@ -11,6 +11,10 @@ namespace withe {
 bool regularises_friction(const Model& model);
 /// Of an anchor, for a contact of that stiffness [N/m].
 double tangential_stiffness(const ContactPair& pair, double stiffness);
+/// Of a contact that presses, or of a lagged one as it was at the start. `regularisation`, `predicted`: see
+/// `ContactLinearisation`; what it refers to must outlive it.
+FrictionSetting friction_setting(const ContactProblem& problem, const Touching& t, double regularisation,
+                                 const Vec3d* predicted);
 /// Friction by the slip, at most [N/m].
 double friction_slope(const ContactProblem& problem, const Touching& t, const ContactLinearisation& linearisation);
 /// Adds minus the friction on a contact, and its derivative when asked for. False where there is none.

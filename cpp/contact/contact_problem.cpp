@@ -29,6 +29,15 @@ double ContactProblem::mass_of(const ContactPair& pair) const {
   return pair.key.b < 0 ? mass(pair.key.a) : std::min(mass(pair.key.a), mass(pair.key.b));
 }
 
+void ContactProblem::add_mass_slopes(const ContactPair& pair, double by, VectorX& edge_mass) const {
+  if (pair.curve() && pair.piece.weights->edges == 2) {
+    for (int edge : pair.piece.edge) edge_mass(edge) += 0.5 * by;
+    return;
+  }
+  const VectorX& mass = parameters->edge_mass;
+  edge_mass(pair.key.b < 0 || mass(pair.key.a) <= mass(pair.key.b) ? pair.key.a : pair.key.b) += by;
+}
+
 bool ContactProblem::turns(const ContactPair& pair) const {
   if (pair.curve()) return false;
   if (pressing == Pressing::mean_direction) return true;

@@ -112,9 +112,15 @@ struct ContactProblem {
   }
   /// Of the edges, or half of both beside a node, that a contact holds up [kg].
   double mass_of(const ContactPair& pair) const;
+  /// Adds `by` times its derivatives by masses of edges.
+  void add_mass_slopes(const ContactPair& pair, double by, VectorX& edge_mass) const;
   /// Whether surfaces press along the mean direction of the step. Curves have a mean of their own; and in a midpoint
   /// step only rods do, which thereby keep their angular momentum, unless friction is to stay symmetric.
   bool turns(const ContactPair& pair) const;
+  /// Whether curves do, along shares of the directions at both ends.
+  bool means_direction() const {
+    return pressing == Pressing::mean_direction || (pressing == Pressing::mean && unsymmetric());
+  }
   /// A curve's distance as the step begins, an obstacle being where it was; and its nodes.
   CurveDistance<double> curve_at_start(const ContactPair& pair, Vec3d (&x)[4]) const;
   /// End points as the step begins, those of an obstacle where they were.

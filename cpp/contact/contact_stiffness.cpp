@@ -202,6 +202,8 @@ double ContactStiffness::accept(const ContactSet& set, Keep keep, double spare, 
       put_in += change_stiffness(t, ratio, yielded_at(t, ratio, keep), record);
     } else if (ratio < 1.0 || record.approach > 0.0) {
       put_in += change_stiffness(t, ratio, worn(t), record);
+    } else if (problem_.pressing == Pressing::still) {
+      record.yielded = worn(t);  // an equilibrium that has been found stays one
     } else if (t.yielded > 0.0) {
       ContactRecord unused;
       wanted += change_stiffness(t, 1.0, faded(t), unused);

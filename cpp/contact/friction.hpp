@@ -44,6 +44,20 @@ struct FrictionSetting {
   const Vec3d* predicted = nullptr;  ///< friction over its limit, as a step of Newton's method predicts it
 };
 
+/// What of that comes from the start of the step, on any scalar.
+template <class Scalar>
+struct SlipStart {
+  Scalar unknown[kContactUnknowns];
+  Vec3<Scalar> source[2];
+  Scalar before;
+
+  explicit SlipStart(const FrictionSetting& f) : before(f.before) {
+    for (int i = 0; i < kContactUnknowns; ++i) unknown[i] = Scalar(f.start[i]);
+    for (int b = 0; b < 2; ++b) source[b] = {Scalar(f.source[b].x), Scalar(f.source[b].y), Scalar(f.source[b].z)};
+  }
+  Vec3<Scalar> point(int i) const { return {unknown[3 * i], unknown[3 * i + 1], unknown[3 * i + 2]}; }
+};
+
 template <class Scalar>
 struct FrictionForce {
   Vec3<Scalar> force;    ///< of b on a, and back, turned round [N]
@@ -198,7 +212,8 @@ void set_weights(const ContactPair& pair, SlippingSurfaces<Scalar>& c) {
 
 /// Where the surfaces touch, and how hard they press.
 template <class Scalar>
-void find_contact(const FrictionSetting& f, const Vec3<Scalar> (&x)[4], SlippingSurfaces<Scalar>& c) {
+void find_contact(const FrictionSetting& f, const SlipStart<Scalar>& start, const Vec3<Scalar> (&x)[4],
+                  SlippingSurfaces<Scalar>& c) {
   using std::sqrt;
   const auto lift = [](const Vec3d& v) { return Vec3<Scalar>{Scalar(v.x), Scalar(v.y), Scalar(v.z)}; };
   const ContactPair& pair = *f.pair;
@@ -219,22 +234,17 @@ void find_contact(const FrictionSetting& f, const Vec3<Scalar> (&x)[4], Slipping
     c.normal = c.inverse * c.between;
   }
   set_weights(pair, c);
-  if (!f.slides) {
-    c.before = f.before;
-    c.law = f.pressing.at(f.before, value_of(c.distance));
-    c.pressing = chain(c.distance, -c.law.first, -c.law.by_end);
-  } else {
+  Scalar before = start.before;
+  if (f.slides) {
     // See add_mean_pressing in pressing.cpp.
     Vec3<Scalar> d0{};
-    for (int i = 0; i < 4; ++i) {
-      const Vec3d start{f.start[3 * i], f.start[3 * i + 1], f.start[3 * i + 2]};
-      d0 += c.w[i] * lift(pair.rod_b < 0 && i > 1 ? start - f.drift : start);
-    }
-    const Scalar before = sqrt(dot(d0, d0) + c.distance * c.distance - dot(c.between, c.between));
-    c.before = value_of(before);
-    c.law = f.pressing.at(c.before, value_of(c.distance));
-    c.pressing = chain(c.distance, -c.law.first, -c.law.by_end) + chain(before, 0.0, -c.law.by_start);
+    for (int i = 0; i < 4; ++i)
+      d0 += c.w[i] * (pair.rod_b < 0 && i > 1 ? start.point(i) - lift(f.drift) : start.point(i));
+    before = sqrt(dot(d0, d0) + c.distance * c.distance - dot(c.between, c.between));
   }
+  c.before = value_of(before);
+  c.law = f.pressing.at(c.before, value_of(c.distance));
+  c.pressing = chain(c.distance, -c.law.first, -c.law.by_end) + chain(before, 0.0, -c.law.by_start);
   if (pair.rod_b < 0 && !pair.curve()) c.w[2] = c.w[3] = Scalar(0.0);
 }
 
@@ -269,12 +279,12 @@ void direct_friction(const FrictionSetting& f, SlippingSurfaces<Scalar>& c) {
       Scalar(pair.across) * c.plain + (Scalar(pair.along - pair.across) * dot(c.along, c.plain)) * c.along;
 }
 
-/// How far the surfaces have slipped, and the friction on that.
+/// How far the surfaces have slipped from `start`, and the friction on that.
 template <class Scalar>
-SlippingSurfaces<Scalar> slipping_surfaces(const FrictionSetting& f, const Scalar (&unknown)[kContactUnknowns]) {
+SlippingSurfaces<Scalar> slipping_surfaces(const FrictionSetting& f, const SlipStart<Scalar>& start,
+                                           const Scalar (&unknown)[kContactUnknowns]) {
   using std::sqrt;
   const auto point = [&](int i) { return Vec3<Scalar>{unknown[3 * i], unknown[3 * i + 1], unknown[3 * i + 2]}; };
-  const auto before = [&](int i) { return Vec3d{f.start[3 * i], f.start[3 * i + 1], f.start[3 * i + 2]}; };
   const auto lift = [](const Vec3d& v) { return Vec3<Scalar>{Scalar(v.x), Scalar(v.y), Scalar(v.z)}; };
   const Vec3<Scalar> x[4] = {point(0), point(1), point(2), point(3)};
   SlippingSurfaces<Scalar> c;
@@ -283,12 +293,12 @@ SlippingSurfaces<Scalar> slipping_surfaces(const FrictionSetting& f, const Scala
     const int tail = curve ? b : 2 * b;
     c.sides[b].tail = tail;
     c.sides[b].edge = x[tail + 1] - x[tail];
-    c.sides[b].change = c.sides[b].edge - lift(before(tail + 1) - before(tail));
+    c.sides[b].change = c.sides[b].edge - (start.point(tail + 1) - start.point(tail));
   }
-  find_contact(f, x, c);
+  find_contact(f, start, x, c);
   for (int i = 0; i < 3 && curve; ++i) c.node[i] = x[i];
   c.way = -lift(f.drift);
-  for (int i = 0; i < 4; ++i) c.way += c.w[i] * (x[i] - lift(before(i)));
+  for (int i = 0; i < 4; ++i) c.way += c.w[i] * (x[i] - start.point(i));
   c.bodies = f.centreline ? 0 : curve ? f.pair->piece.weights->edges : f.pair->rod_b < 0 ? 1 : 2;
   for (int b = 0; b < c.bodies; ++b) {
     SlippingEdge<Scalar>& side = c.sides[b];
@@ -297,8 +307,8 @@ SlippingSurfaces<Scalar> slipping_surfaces(const FrictionSetting& f, const Scala
     side.arm = curve ? piece_arm(*f.pair, b, c.s, c.normal) : contact_arm(*f.pair, b, c.normal, c.between);
     side.turn = side.inverse * cross(side.tangent, side.change);
     if (f.spatial) {
-      side.turn += (unknown[12 + b] - f.start[12 + b]) * side.tangent;
-      const Vec3<Scalar> source = lift(f.source[b]);
+      side.turn += (unknown[12 + b] - start.unknown[12 + b]) * side.tangent;
+      const Vec3<Scalar>& source = start.source[b];
       side.spin = -((side.inverse / (1.0 + dot(source, side.tangent))) * cross(source, side.tangent));
     }
     c.way += Scalar(turn_sign(f, b)) * cross(side.turn, side.arm);
@@ -307,6 +317,11 @@ SlippingSurfaces<Scalar> slipping_surfaces(const FrictionSetting& f, const Scala
   c.friction = friction_force(f, c.normal, c.way - dot(c.way, c.normal) * c.normal, c.pressing);
   if (!f.pair->isotropic()) direct_friction(f, c);
   return c;
+}
+
+template <class Scalar>
+SlippingSurfaces<Scalar> slipping_surfaces(const FrictionSetting& f, const Scalar (&unknown)[kContactUnknowns]) {
+  return slipping_surfaces(f, SlipStart<Scalar>(f), unknown);
 }
 
 /// Adds to `gradient` the generalised forces J^T F (minus the friction on the rods).

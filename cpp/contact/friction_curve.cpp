@@ -23,10 +23,20 @@ struct Curve {
   const CurveWeights& w;
   double s, weight[3], weight_slope[3];  ///< w_i, w_i'
   double lever[2] = {};                  ///< r m_b
+  int ways[kWays], count = 0;            ///< those that are there: in a plane two a node
+
+  /// Calls see(j) for each of them, those of nodes alone without `angles`.
+  template <class See>
+  void each_way(bool angles, const See& see) const {
+    for (int i = 0; i < count; ++i)
+      if (angles || ways[i] < kAngle) see(ways[i]);
+  }
 };
 
 Curve curve_of(const FrictionSetting& f, const SlippingSurfaces<double>& c) {
-  Curve out{.w = *f.pair->piece.weights, .s = c.s, .weight = {}, .weight_slope = {}};
+  Curve out{.w = *f.pair->piece.weights, .s = c.s, .weight = {}, .weight_slope = {}, .ways = {}};
+  for (int j = 0; j < kWays; ++j)
+    if (f.spatial || (j < 3 * out.w.nodes && j % 3 < 2)) out.ways[out.count++] = j;
   for (int i = 0; i < 3; ++i) {
     out.weight[i] = out.w.at(i, c.s);
     out.weight_slope[i] = out.w.slope[i] + out.w.bend[i] * c.s;
@@ -42,11 +52,11 @@ void add_contact_slopes(const FrictionSetting& f, const SlippingSurfaces<double>
   const CurveSlopes slopes = curve_slopes(f.pair->piece, distance);
   const PointDistance<double> point = distance_to(*f.obstacle, curve_point(curve.w, x, c.s));
   const Vec3d tangent = curve_direction(curve.w, x, c.s);
-  for (int j = 0; j < kAngle; ++j) {
+  curve.each_way(false, [&](int j) {
     d.s[j] = slopes.s[j];
     d.pressing[j] = -c.law.by_end * slopes.distance[j];
     d.normal[j] = normal_change(*f.obstacle, point, curve.weight[j / 3] * kAxis[j % 3] + d.s[j] * tangent);
-  }
+  });
 }
 
 void add_turn_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& c, const Curve& curve, Slopes& d) {
@@ -62,7 +72,8 @@ void add_turn_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& c
       d.turn[3 * side.tail + k] -= turned;
     }
     if (f.spatial) d.turn[kAngle + b] = rho * side.tangent;
-    for (int j = 0; j < kAngle; ++j) d.turn[j] += (f.pair->radius_a * curve.w.share_slope[b] * d.s[j]) * side.turn;
+    const double grown = f.pair->radius_a * curve.w.share_slope[b];
+    curve.each_way(false, [&](int j) { d.turn[j] += (grown * d.s[j]) * side.turn; });
   }
 }
 
@@ -86,14 +97,14 @@ void add_force_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& 
   for (int b = 0; b < c.bodies; ++b) turn += curve.lever[b] * c.sides[b].turn;
   for (int i = 0; i < curve.w.nodes; ++i)
     moved_on += curve.weight_slope[i] * (x[i] - Vec3d{f.start[3 * i], f.start[3 * i + 1], f.start[3 * i + 2]});
-  for (int j = 0; j < kWays; ++j) {
+  curve.each_way(true, [&](int j) {
     const Vec3d& across = d.normal[j];
     Vec3d moved = d.s[j] * moved_on + cross(n, d.turn[j]) - cross(turn, across);
     if (j < kAngle) moved += curve.weight[j / 3] * kAxis[j % 3];
     if (turns) moved -= cross(f.turn, obstacle_arm_slope(f, curve, x, d, j));
     d.force[j] = g.factor * (moved - off * across) - (g.factor * (dot(n, moved) + dot(slip, across))) * n +
                  (2.0 * g.by_square * dot(slip, moved - off * across)) * dual + (g.by_pressing * d.pressing[j]) * slip;
-  }
+  });
 }
 
 /// From the force of the greater coefficient to that of `direct_friction`.
@@ -107,14 +118,14 @@ void direct_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& c, 
   const double of_edge[3] = {-1.0, 1.0, 0.0};
   Vec3d bend{};
   for (int i = 0; i < curve.w.nodes; ++i) bend += curve.w.bend[i] * x[i];
-  for (int j = 0; j < kWays; ++j) {
+  curve.each_way(true, [&](int j) {
     Vec3d change = d.s[j] * bend;
     if (j < kAngle) change += (edge ? of_edge : curve.weight_slope)[j / 3] * kAxis[j % 3];
     const Vec3d turned = inverse * (change - dot(t, change) * t), &leant = d.normal[j];
     const Vec3d along = turned - (dot(turned, n) + dot(t, leant)) * n - dot(t, n) * leant;
     d.force[j] = across * d.force[j] + (more * (dot(along, c.plain) + dot(c.along, d.force[j]))) * c.along +
                  (more * share) * along;
-  }
+  });
 }
 
 /// What the moment m = F x n does to an edge, r m_b (m x t / |e| + (t . m) spin), and to its angle.
@@ -124,13 +135,13 @@ void add_couples(const FrictionSetting& f, const SlippingSurfaces<double>& c, co
   const Vec3d &t = side.tangent, m = cross(c.friction.force, c.normal);
   const double rho = curve.lever[b], inverse = side.inverse, along = dot(t, m);
   const double grown = f.pair->radius_a * curve.w.share_slope[b];
-  Vec3d couple[kWays];
-  double axial[kWays];
-  for (int j = 0; j < kWays; ++j) {
+  Vec3d couple[kWays] = {};
+  double axial[kWays] = {};
+  curve.each_way(true, [&](int j) {
     const Vec3d moment = rho * d.moment[j] + (grown * d.s[j]) * m;
     axial[j] = f.spatial ? dot(t, moment) : 0.0;
     couple[j] = inverse * cross(moment, t) + axial[j] * side.spin;
-  }
+  });
   // By the edge itself; see add_couple_slopes of friction_jacobian.cpp.
   const Vec3d& source = f.source[b];
   const double facing = f.spatial ? dot(source, t) : 0.0, share = inverse / (1.0 + facing);
@@ -148,13 +159,13 @@ void add_couples(const FrictionSetting& f, const SlippingSurfaces<double>& c, co
     axial[head] += rho * lean;
     axial[tail] -= rho * lean;
   }
-  for (int j = 0; j < kWays; ++j) {
+  curve.each_way(true, [&](int j) {
     for (int k = 0; k < 3; ++k) {
       jacobian[3 * side.tail + 3 + k][unknown_of(j)] += couple[j][k];
       jacobian[3 * side.tail + k][unknown_of(j)] -= couple[j][k];
     }
     if (f.spatial) jacobian[12 + b][unknown_of(j)] += axial[j];
-  }
+  });
 }
 
 }  // namespace
@@ -168,12 +179,13 @@ void add_curve_friction_jacobian(const FrictionSetting& f, const SlippingSurface
   add_turn_slopes(f, c, curve, d);
   add_force_slopes(f, c, curve, x, d);
   if (!f.pair->isotropic()) direct_slopes(f, c, curve, x, d);
-  for (int j = 0; j < kWays; ++j) d.moment[j] = cross(d.force[j], c.normal) + cross(c.friction.force, d.normal[j]);
+  curve.each_way(true,
+                 [&](int j) { d.moment[j] = cross(d.force[j], c.normal) + cross(c.friction.force, d.normal[j]); });
   for (int i = 0; i < curve.w.nodes; ++i)
-    for (int j = 0; j < kWays; ++j) {
+    curve.each_way(true, [&](int j) {
       const Vec3d force = curve.weight[i] * d.force[j] + (curve.weight_slope[i] * d.s[j]) * c.friction.force;
       for (int k = 0; k < 3; ++k) jacobian[3 * i + k][unknown_of(j)] += force[k];
-    }
+    });
   for (int b = 0; b < c.bodies; ++b) add_couples(f, c, curve, b, d, jacobian);
 }
 

@@ -24,6 +24,8 @@ double smooth_step(double x) {
   return x * x * (3.0 - 2.0 * x);
 }
 
+double smooth_slope(double x) { return x > 0.0 && x < 1.0 ? 6.0 * x * (1.0 - x) : 0.0; }
+
 /// Steps in a swing by which what an impact gives back, e of the speed, is known to a hundredth: in the one in which it
 /// turns round nothing of the speed is lost, which is the more the less is to be left.
 double steps_in_swing(double restitution) { return std::clamp(10.0 / std::max(restitution, 1e-3), 12.0, 40.0); }
@@ -68,6 +70,23 @@ double impact_share(const ContactProblem& problem, const Touching& t) {
   return smooth_step(t.approach / rest_speed(problem, t.pair) - 1.0) * smooth_step(2.0 - t.age / over);
 }
 
+ImpactShareSlopes impact_share_slopes(const ContactProblem& problem, const Touching& t) {
+  ImpactShareSlopes out;
+  if (!(t.approach > 0.0)) return out;
+  const double rest = rest_speed(problem, t.pair), swing = swing_time(problem, t),
+               over = kSwings * swing + kSteps * problem.duration;
+  const double fast = t.approach / rest - 1.0, fresh = 2.0 - t.age / over;
+  const double by_fast = smooth_slope(fast) * smooth_step(fresh), by_fresh = smooth_step(fast) * smooth_slope(fresh);
+  out.approach = by_fast / rest;
+  const double by_rest = -by_fast * t.approach / (rest * rest);
+  if (rest > problem.parameters->slip_tolerance)
+    out.gravity = 0.5 * by_rest * rest / problem.parameters->gravity;
+  else
+    out.slip_tolerance = by_rest;
+  out.mass = by_fresh * t.age / (over * over) * kSwings * 0.5 * swing / problem.mass_of(t.pair);
+  return out;
+}
+
 bool meets(const ContactProblem& problem, const ContactPair& pair) {
   return !problem.starting && !std::binary_search(problem.unrecorded.begin(), problem.unrecorded.end(), pair.key);
 }
@@ -95,6 +114,44 @@ double approach_speed(const ContactProblem& problem, const ContactPair& pair) {
   Vec3d rate{};
   for (int i = 0; i < 4; ++i) rate += w[i] * v[i];
   return std::max(0.0, -dot(c.between, rate) / std::sqrt(std::max(dot(c.between, c.between), 1e-300)));
+}
+
+void add_approach_slopes(const ContactProblem& problem, const ContactPair& pair, double by,
+                         double (&start)[kContactUnknowns], double (&velocity)[kContactUnknowns]) {
+  if (by == 0.0 || !(approach_speed(problem, pair) > 0.0)) return;
+  Vec3d x[4], v[4];
+  problem.bodies.end_points(pair, problem.start->v, v);
+  const Vec3d moved = (1.0 / problem.duration) * problem.shift_of(pair);
+  if (pair.curve()) {
+    const CurveDistance<double> distance = problem.curve_at_start(pair, x);
+    const CurveSlopes slopes = curve_slopes(pair.piece, distance);
+    double H[9][9] = {};
+    add_curve_hessian(pair.piece, problem.bodies.obstacle(pair), distance, slopes, 1.0, 9, &H[0][0]);
+    for (int i = 0; i < 3 * pair.piece.weights->nodes; ++i) {
+      velocity[i] -= by * slopes.distance[i];
+      for (int j = 0; j < 9; ++j) start[j] -= by * H[i][j] * (v[i / 3] - moved)[i % 3];
+    }
+    return;
+  }
+  problem.start_points(pair, x);
+  if (pair.key.b < 0) v[2] = v[3] = moved;
+  const ClosestPoints c = closest_points(x[0], x[1], x[2], x[3], pair.weight_a, pair.weight_b);
+  using ByPoints = Dual<12>;
+  Vec3<ByPoints> p[4], rate{};
+  for (int i = 0; i < 4; ++i)
+    p[i] = {ByPoints::unknown(x[i].x, 3 * i), ByPoints::unknown(x[i].y, 3 * i + 1),
+            ByPoints::unknown(x[i].z, 3 * i + 2)};
+  const Vec3<ByPoints> r = p[0] - p[2], u = p[1] - p[0], w = p[3] - p[2];
+  ByPoints s = c.s, t = c.t, weight[4];
+  solve_parameters(r, u, w, pair.weight_a, pair.weight_b, c.s_free, c.t_free, s, t);
+  end_weights(s, t, weight);
+  for (int i = 0; i < 4; ++i) rate += weight[i] * Vec3<ByPoints>{v[i].x, v[i].y, v[i].z};
+  const Vec3<ByPoints> between = r + s * u - t * w;
+  const ByPoints inverse = 1.0 / sqrt(dot(between, between)), speed = -inverse * dot(between, rate);
+  for (int i = 0; i < 12; ++i) {
+    start[i] += by * speed.slope[i];
+    velocity[i] -= by * inverse.value * weight[i / 3].value * between[i % 3].value;
+  }
 }
 
 void set_pressing(const ContactProblem& problem, Touching& t) {

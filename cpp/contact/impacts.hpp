@@ -20,6 +20,18 @@ double first_approach(const ContactProblem& problem, const ContactPair& pair);
 double swing_time(const ContactProblem& problem, const Touching& t);
 /// 1 for surfaces that have just met, 0 for those that rest on each other.
 double impact_share(const ContactProblem& problem, const Touching& t);
+/// Derivatives of that.
+struct ImpactShareSlopes {
+  double approach = 0;        ///< by the speed at which they met [s/m]
+  double slip_tolerance = 0;  ///< [s/m]
+  double gravity = 0;         ///< by its size [s^2/m]
+  double mass = 0;            ///< by what the contact holds up [1/kg]
+};
+ImpactShareSlopes impact_share_slopes(const ContactProblem& problem, const Touching& t);
+/// Adds `by` times the derivatives of the approach speed by unknowns of a contact as the step begins, and by their
+/// rates.
+void add_approach_slopes(const ContactProblem& problem, const ContactPair& pair, double by,
+                         double (&start)[kContactUnknowns], double (&velocity)[kContactUnknowns]);
 /// Whether a step of dt would be too long for what an impact loses by its restitution.
 bool unresolved(const ContactProblem& problem, const Touching& t, double dt);
 /// Sets the law by which surfaces press in a step, and the force at its end, of a contact with its stiffness and speed

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 namespace withe {
 namespace {
@@ -49,7 +50,7 @@ void add_start_direction(const ContactProblem& problem, const Touching& t, bool 
     size += std::abs(way[i]);
   }
   // Where gradients differ by no more than rounding, any shares will do.
-  const bool same = std::abs(p0 - p1) <= 1e-12 * size;
+  const bool same = std::abs(p0 - p1) <= kSameDirection * size;
   const double share = same ? 0.5 : (t.proximity.distance - start.distance - p1) / (p0 - p1),
                b = std::clamp(share, 0.0, 1.0);
   const bool fixed = same || share != b || !geometric;
@@ -77,8 +78,7 @@ void add_curve_pressing(const ContactProblem& problem, const Touching& t, bool w
     std::fill(&derivative[0][0], &derivative[0][0] + 81, 0.0);
     if (geometric) add_curve_hessian(piece, problem.bodies.obstacle(t.pair), end, slopes, 1.0, 9, &derivative[0][0]);
   }
-  if (problem.pressing == Pressing::mean_direction || (problem.pressing == Pressing::mean && problem.unsymmetric()))
-    add_start_direction(problem, t, geometric, along, with_hessian ? derivative : nullptr);
+  if (problem.means_direction()) add_start_direction(problem, t, geometric, along, with_hessian ? derivative : nullptr);
   for (int i = 0; i < 9; ++i) {
     out.gradient[i] += t.pressing.first * along[i];
     for (int j = 0; j < 9 && with_hessian; ++j)
@@ -143,6 +143,19 @@ void add_mean_pressing(const ContactProblem& problem, const Touching& t, bool wi
 }
 
 }  // namespace
+
+void distance_slope(const Touching& t, double (&out)[12]) {
+  std::fill(std::begin(out), std::end(out), 0.0);
+  if (t.pair.curve()) {
+    const CurveSlopes slopes = curve_slopes(t.pair.piece, t.proximity.curve);
+    std::copy(slopes.distance, slopes.distance + 9, out);
+    return;
+  }
+  double w[4];
+  end_weights(t.proximity.points.s, t.proximity.points.t, w);
+  const Vec3d direction = (1.0 / t.proximity.distance) * t.proximity.points.between;
+  for (int i = 0; i < 12; ++i) out[i] = w[i / 3] * direction[i % 3];
+}
 
 void add_pressing(const ContactProblem& problem, const Touching& t, bool with_hessian, bool geometric,
                   ContactLocal& out) {

@@ -53,10 +53,20 @@ Surfaces::Surfaces(const Model& model) : model_(model) {
   note_frictional();
 }
 
+/// Where friction varies, also where it is none for the time being: the form of the equations stays.
 void Surfaces::note_frictional() {
   const bool rods = model_.description.contact.rods;
-  frictional_ = rods && (parameters_.friction > 0.0 || (parameters_.pair_friction.col(0).array() > 0.0).any());
-  for (const ContactPair& p : obstacle_pairs_) frictional_ = frictional_ || p.friction > 0.0;
+  const SurfaceParameters& p = parameters_;
+  frictional_ = rods && (p.friction > 0.0 || (p.pair_friction.col(0).array() > 0.0).any());
+  int rod = -1, other = 0;
+  for (const ContactPair& pair : obstacle_pairs_) {
+    if (frictional_) return;
+    if (pair.rod_a == rod && pair.key.b == other) continue;
+    rod = pair.rod_a;
+    other = pair.key.b;
+    const BodyFriction f = friction_of(rod, other);
+    frictional_ = f.along > 0.0 || f.across > 0.0;
+  }
 }
 
 bool Surfaces::set_parameters(const SurfaceParameters& parameters) {
@@ -67,19 +77,40 @@ bool Surfaces::set_parameters(const SurfaceParameters& parameters) {
   return true;
 }
 
+Surfaces::BodyFriction Surfaces::friction_of(int rod, int other) const {
+  const SurfaceParameters& p = parameters_;
+  BodyFriction f{p.friction, p.friction, -1};
+  if (other < 0) f = {p.obstacle_friction(-1 - other, 0), p.obstacle_friction(-1 - other, 1), -1};
+  const auto& pairs = model_.description.contact.pairs;
+  for (Eigen::Index i = 0; i < p.pair_friction.rows(); ++i) {
+    if (!pairs[static_cast<std::size_t>(i)].is_of(rod, other)) continue;
+    if (p.pair_friction(i, 0) >= 0.0) f = {p.pair_friction(i, 0), p.pair_friction(i, 1), f.given};
+    if (p.pair_shares[static_cast<std::size_t>(i)].size() > 0) f.given = static_cast<int>(i);
+  }
+  return f;
+}
+
+Eigen::Index Surfaces::place_along(const ContactPair& pair) const {
+  const auto rod = at(pair.rod_a);
+  const int edge = pair.key.a - model_.rod_first_edge[rod];
+  const auto nodes = static_cast<int>(model_.description.rods[rod].nodes.size());
+  if (!pair.curve()) return nodes + edge;
+  const bool first = pair.piece.weights->edges == 1 && pair.key.end == 0;
+  return (edge + (first ? 0 : 1)) % nodes;
+}
+
 void Surfaces::set_parameters(ContactPair& pair) const {
   const SurfaceParameters& p = parameters_;
   const bool obstacle = pair.key.b < 0;
   const int other = obstacle ? pair.key.b : pair.rod_b;
-  const Eigen::Index row = -1 - pair.key.b;
-  pair.set_friction(obstacle ? p.obstacle_friction(row, 0) : p.friction,
-                    obstacle ? p.obstacle_friction(row, 1) : p.friction);
-  pair.restitution = obstacle ? p.obstacle_restitution(row) : p.restitution;
+  const BodyFriction f = friction_of(pair.rod_a, other);
+  const double share = f.given < 0 || !obstacle ? 1.0 : p.pair_shares[at(f.given)](place_along(pair));
+  pair.set_friction(share * f.along, share * f.across);
+  pair.restitution = obstacle ? p.obstacle_restitution(-1 - other) : p.restitution;
   pair.stiffness = 0.0;
   const auto& pairs = model_.description.contact.pairs;
-  for (Eigen::Index i = 0; i < p.pair_friction.rows(); ++i) {
+  for (Eigen::Index i = 0; i < p.pair_restitution.size(); ++i) {
     if (!pairs[static_cast<std::size_t>(i)].is_of(pair.rod_a, other)) continue;
-    if (p.pair_friction(i, 0) >= 0.0) pair.set_friction(p.pair_friction(i, 0), p.pair_friction(i, 1));
     if (p.pair_restitution(i) >= 0.0) pair.restitution = p.pair_restitution(i);
     pair.stiffness = p.pair_contact_stiffness(i);
   }
@@ -91,6 +122,17 @@ double Surfaces::given_stiffness(int rod, int other) const {
   for (Eigen::Index i = 0; i < parameters_.pair_contact_stiffness.size(); ++i)
     if (pairs[static_cast<std::size_t>(i)].is_of(rod, other)) given = parameters_.pair_contact_stiffness(i);
   return given > 0.0 ? given : parameters_.contact_stiffness;
+}
+
+FrictionOwner Surfaces::friction_owner(const ContactPair& pair) const {
+  FrictionOwner out;
+  if (pair.key.b < 0) out.obstacle = -1 - pair.key.b;
+  const int other = pair.key.b < 0 ? pair.key.b : pair.rod_b;
+  const MatrixX2& own = parameters_.pair_friction;
+  const auto& pairs = model_.description.contact.pairs;
+  for (Eigen::Index i = 0; i < own.rows(); ++i)
+    if (pairs[static_cast<std::size_t>(i)].is_of(pair.rod_a, other) && own(i, 0) >= 0.0) out.pair = i;
+  return out;
 }
 
 double Surfaces::tolerance(int edge) const {
@@ -176,13 +218,13 @@ void Surfaces::add_obstacles() {
     for (int rod = 0; rod < static_cast<int>(model_.description.rods.size()); ++rod) {
       p.rod_a = rod;
       if (!may_meet(rod, p.key.b)) continue;
-      set_parameters(p);
       add_edges(p, obstacles_.back());
       add_pieces(p, obstacles_.back(), rod);
     }
   }
   std::sort(obstacle_pairs_.begin(), obstacle_pairs_.end(),
             [](const ContactPair& a, const ContactPair& b) { return obstacle_order(a.key, b.key); });
+  for (ContactPair& pair : obstacle_pairs_) set_parameters(pair);
 }
 
 const ContactPair& Surfaces::obstacle_pair(const ContactKey& key) const {

@@ -43,6 +43,12 @@ struct ContactPair {
   }
 };
 
+/// Whose coefficients a contact has: a row of `Parameters::pair_friction`, else one of `obstacle_friction`, else those
+/// of the scene; -1: none.
+struct FrictionOwner {
+  Eigen::Index pair = -1, obstacle = -1;
+};
+
 /// The order in which contacts are found: those with obstacles, one obstacle after the other, then those of edges.
 bool comes_before(const ContactKey& a, const ContactKey& b);
 
@@ -70,10 +76,11 @@ class Surfaces {
   const SurfaceParameters& parameters() const { return parameters_; }
   /// Takes over parameters that are not those there are; whether there were any.
   bool set_parameters(const SurfaceParameters& parameters);
-  /// Gives a pair what its bodies have.
+  /// Gives a pair what its bodies have, and where their friction varies that of its place.
   void set_parameters(ContactPair& pair) const;
   /// Stiffness that is given to what a rod has with another, or an obstacle as -1 - index [N/m]; 0: none is.
   double given_stiffness(int rod, int other) const;
+  FrictionOwner friction_owner(const ContactPair& pair) const;
   /// Whether friction is there at all.
   bool frictional() const { return frictional_; }
   /// Unknowns of two surfaces, -1 where there is none; angles where there is friction.
@@ -89,6 +96,15 @@ class Surfaces {
   void add_pieces(const ContactPair& prototype, const Obstacle& obstacle, int rod);
   /// Whether an obstacle is large enough to be touched by a curve.
   bool smooth(const Obstacle& obstacle, int edge) const;
+  /// Coefficients of two bodies along and across a, wherever they touch; and the place of their pair among those given,
+  /// or -1.
+  struct BodyFriction {
+    double along, across;
+    int given;
+  };
+  BodyFriction friction_of(int rod, int other) const;
+  /// Place of what touches in `ContactPairDescription::shares`.
+  Eigen::Index place_along(const ContactPair& pair) const;
   /// Whether two bodies may touch.
   bool may_meet(int first, int second) const;
   void unknowns_of_edges(const ContactKey& key, int (&dofs)[kContactUnknowns]) const;

@@ -6,11 +6,12 @@ namespace withe {
 
 namespace {
 
-constexpr double kLeastShare = 1.0 / 256;  // of a way between two poses
+constexpr double kLeastShare = 1.0 / 256;  // of a way between two poses on which a sheet is dragged
 
-bool move_to(TipTarget target, const SheetPose& from, const SheetPose& to, SheetMotionData& data) {
+bool move_to(TipTarget target, const SheetPose& from, const SheetPose& to, SheetMotionData& data,
+             double least = kLeastShare) {
   data.problem.target = target;
-  return follow(data.solver, data.problem, kLeastShare, data.path, data.trial,
+  return follow(data.solver, data.problem, least, data.path, data.trial,
                 [&](double share, SheetProblem::Path& /*guess*/) {
                   for (std::size_t i = 0; i < 3; ++i) data.problem.goal[i] = from[i] + share * (to[i] - from[i]);
                 });
@@ -27,8 +28,8 @@ void set_sheet_forces(const SheetShape& shape, const SheetForces& forces, SheetM
   for (int k = 0; k < SheetProblem::kSegments; ++k) data.path.nodes.push_back(across_segment(shape, data.path, k));
 }
 
-bool move_sheet(const SheetPose& pose, SheetMotionData& data) {
-  return move_to(TipTarget::pose, pose_of(data.path), pose, data);
+bool move_sheet(const SheetPose& pose, SheetMotionData& data, double least_share) {
+  return move_to(TipTarget::pose, pose_of(data.path), pose, data, least_share);
 }
 
 bool drag_sheet(const SheetPose& pose, const SheetFriction& friction, double& slide, SheetMotionData& data) {

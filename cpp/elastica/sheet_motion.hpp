@@ -28,8 +28,8 @@ struct SheetMotionData {
 void set_sheet_forces(const SheetShape& shape, const SheetForces& forces, SheetMotionData& data);
 
 /// Moves the tip from where data.path has it to a pose; false where the way ends before, which is a snap or a limit of
-/// what was asked for.
-bool move_sheet(const SheetPose& pose, SheetMotionData& data);
+/// what was asked for: steps of less than a share of it are not tried.
+bool move_sheet(const SheetPose& pose, SheetMotionData& data, double least_share = 1.0 / 16);
 
 /// Coulomb's law for a sheet that lies as a rigid body behind its lift-off point: |T| <= friction (R + what lies).
 struct SheetFriction {

@@ -45,6 +45,11 @@ class Chain {
     out.spring_stiffness = by.spring_stiffness;
     out.spring_rest_length = by.spring_rest_length;
     out.spring_damping = by.spring_damping;
+    out.fluid_viscosity = by.fluid_viscosity;
+    out.friction = by.friction;
+    out.slip_tolerance = by.slip_tolerance;
+    out.obstacle_friction = by.obstacle_friction;
+    out.pair_friction = by.pair_friction;
     add_masses();
     add_stiffnesses();
     add_natural();
@@ -85,6 +90,8 @@ class Chain {
       if (s.hinge >= 0) by_inertia(s.edge) += 0.5 * by_.mass(model_.hinges[at(s.hinge)].dof);
     }
     out.edge_rotary = by_inertia.cwiseProduct(model_.edge_arc);
+    out.edge_density += by_.edge_mass.cwiseProduct(model_.edge_arc);
+    if (by_.gravity_size != 0.0) out.gravity += by_.gravity_size * p_.gravity.normalized();
   }
 
   void add_edge(int edge, const double* slope) {

@@ -16,6 +16,8 @@ struct ParameterGradient {
   std::vector<VectorX> natural_twist, natural_stretch;
   MatrixX3 loads;
   VectorX spring_stiffness, spring_rest_length, spring_damping;
+  double fluid_viscosity = 0, friction = 0, slip_tolerance = 0;
+  MatrixX2 obstacle_friction, pair_friction;
   /// Per edge, of equilibria of rods without joints that are no chords of arcs: by its rest length, and so by lengths
   /// of stencils and what masses weigh, at fixed natural curvature and twist [1/m].
   VectorX rest_length;

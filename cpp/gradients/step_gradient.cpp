@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <utility>
 
 #include "geometry/rotation.hpp"
 #include "model/edge_vectors.hpp"
@@ -132,7 +133,7 @@ void StepGradient::pull_back(StateAdjoint& state, CoefficientAdjoint& by, HeldAd
   if (step_->rule == StepRule::energy_momentum && !model.planar())
     for (int dof : model.frame_dof)
       rows.segment<3>(dof) = (cayley_spin(z_.segment<3>(dof)).inverse() * rows.segment<3>(dof)).eval();
-  StepAdjoint adjoint(model, rows, by);
+  StepAdjoint adjoint(model, rows, state.approach, by);
   for (const std::unique_ptr<Term>& term : equations_.terms())
     term->add_adjoint(equations_.problem(), data_, assembler, adjoint);
   if (moves()) {
@@ -147,6 +148,7 @@ void StepGradient::pull_back(StateAdjoint& state, CoefficientAdjoint& by, HeldAd
   if (!moves()) return;
   state.q = start;
   state.v = velocity;
+  state.approach = std::move(adjoint.approach);
 }
 
 void StepGradient::add_frames(const StateAdjoint& state, const StepAdjoint& adjoint, VectorX& start) const {
@@ -175,7 +177,9 @@ void StepGradient::add_transport(const StateAdjoint& state, const StepAdjoint& a
                  at_z = turns - adjoint.end_turn[e] - adjoint.start_turn[e];
     Vec3d by = (at_z * inverse0 / f.inverse_length) * f.spin +
                ((adjoint.end_turn[e] + state.q[angle]) * inverse0 / last.inverse_length) * last.spin;
-    const double torque = data_.full_residual[angle] - data_.inertia[angle];
+    // Friction says itself how its torques depend on the start.
+    const double friction = data_.contact_gradient.size() != 0 ? data_.contact_gradient[angle] : 0.0,
+                 torque = data_.full_residual[angle] - data_.inertia[angle] - friction;
     const Vec3d u = torque * edge_vector(model, rows_, e);
     const Vec3d s = inverse0 * e0;
     const double k = inverse0 / (1.0 + dot(s, f.tangent));

@@ -23,6 +23,7 @@ namespace withe {
 struct StateAdjoint {
   VectorX q;  ///< positions [1/m], turns of directors and of frames [1/rad], angles of hinges
   VectorX v;  ///< [s/m], [s/rad]
+  ApproachAdjoint approach = {};
 };
 
 /// What is differentiated: a step from `start` to q1.

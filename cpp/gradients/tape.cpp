@@ -74,13 +74,14 @@ class Tape::Player {
   VectorX held_;
 };
 
-Tape::Tape(const Model& model, EquationOptions options, State first, const Parameters& parameters)
+Tape::Tape(const Model& model, EquationOptions options, State first, const Parameters& parameters, bool frictional)
     : model_(model),
       options_(options),
       first_(std::move(first)),
       acting_(parameters),
       last_(first_.q),
-      last_velocity_(first_.v) {}
+      last_velocity_(first_.v),
+      frictional_(frictional) {}
 
 void Tape::record(const AcceptedStep& step) {
   const State& after = step.after;
@@ -261,7 +262,7 @@ InitialGradient Tape::gradient(const std::vector<MomentAdjoint>& given, const Pa
   const Assembler& assembler = player.gradient(rule).equations().assembler();
   assembler.project(adjoint.v);
   moments.add(0, assembler, acting_.start(), [&] { return first_; }, adjoint);
-  return {at_nodes(model_, adjoint.q), at_nodes(model_, adjoint.v)};
+  return {at_nodes(model_, adjoint.q), at_nodes(model_, adjoint.v), by_poses(model_, first_.q, adjoint.q)};
 }
 
 RunJacobian Tape::jacobian() const {

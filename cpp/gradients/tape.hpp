@@ -15,8 +15,9 @@ namespace withe {
 
 /// Derivatives of a scalar by the state that a run began with.
 struct InitialGradient {
-  MatrixX3 positions;   ///< per node [1/m]; directors turn along with their edges, without spin
-  MatrixX3 velocities;  ///< per node [s/m]
+  MatrixX3 positions;    ///< per node [1/m]; directors turn along with their edges, without spin
+  MatrixX3 velocities;   ///< per node [s/m]
+  PoseAdjoint supports;  ///< by where what supports hold was
 };
 
 /// Takes derivatives of a scalar by what acted from a step on until the next that it is given; or by what a read-out at
@@ -55,8 +56,8 @@ struct AcceptedStep {
 
 class Tape {
  public:
-  /// Of a run that begins so; these are kept.
-  Tape(const Model& model, EquationOptions options, State first, const Parameters& parameters);
+  /// Of a run that begins so, with friction or not; these are kept.
+  Tape(const Model& model, EquationOptions options, State first, const Parameters& parameters, bool frictional);
 
   long count() const { return static_cast<long>(steps_.size()); }
   void record(const AcceptedStep& step);
@@ -70,6 +71,11 @@ class Tape {
   bool continues(const State& state) const;
   /// Whether these are as many loads as at the start.
   bool has_loads(const Parameters& parameters) const { return parameters.loads.rows() == acting_.load_rows(); }
+
+  /// Whether friction is there, or not, and pairs of bodies have their own, as at the start.
+  bool has_friction(const ContactDescription& contact, bool frictional) const {
+    return frictional == frictional_ && contact.pairs.size() == model_.description.contact.pairs.size();
+  }
 
   /// Throws std::invalid_argument where none is known.
   /// `visit_poses` may be empty.
@@ -116,6 +122,7 @@ class Tape {
   std::vector<Step> steps_;
   VectorX last_, last_velocity_;  ///< what the last step led to
   std::string refused_;
+  bool frictional_;
 };
 
 }  // namespace withe

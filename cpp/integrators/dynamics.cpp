@@ -7,11 +7,15 @@
 #include "common/timer.hpp"
 #include "integrators/inner_solve.hpp"
 #include "integrators/newton_system.hpp"
+#include "integrators/squeezed.hpp"
 #include "integrators/step_parts.hpp"
 #include "steps/inertia.hpp"
 
 namespace withe {
 namespace {
+
+// Over a step, the time since the middle of the one before where that was much longer.
+constexpr double kMuchLonger = 2.0;
 
 /// By how much the energy in stretching an edge of stiffness 1 N grows beyond the work of the axial force of a step
 /// [J], that in its middle or at its end. An edge under pressure that turns gains by the latter: it gives way by l0 (1
@@ -93,6 +97,14 @@ void find_held_velocity(const Model& model, const StepPlan& plan, const State& s
   }
 }
 
+/// Time between the velocities of supports before and after a step: those of backward Euler are means over its steps,
+/// and lie in their middles, which counts where the last one was much longer.
+double held_time(const StepPlan& plan, const State& state) {
+  if (plan.rule != StepRule::backward_euler || state.motion.known == 0) return plan.dt;
+  const double between = state.time + 0.5 * plan.dt - state.motion.time[0];
+  return between > kMuchLonger * plan.dt ? between : plan.dt;
+}
+
 /// Finds the fluid's force for a step of dt: that on velocities as they are taken to be within the step, to the order
 /// of the scheme, at the positions that go with them. Under the midpoint rules those of the last two steps are carried
 /// on: velocities at their ends would ring on stiff modes, and the guess with them.
@@ -167,17 +179,25 @@ void add_work(const Equations& equations, const Parameters& parameters, const Ve
   if (equations.dissipates(parameters)) result.dissipated = equations.dissipated(data, change);
 }
 
-void add_support_work(const Equations& equations, const VectorX& v0, const VectorX& v1, double dt, StepWorkspace& work,
-                      StepResult& result) {
+void add_support_work(const Equations& equations, const VectorX& v0, const VectorX& v1, double dt, double held_time,
+                      StepWorkspace& work, StepResult& result) {
   VectorX& full_residual = work.newton.data.full_residual;
   VectorX& momentum = work.difference;  // by how much it grows
+  VectorX& rate = work.mean;
   work.z = v1 - v0;
   multiply(equations.model(), equations.mass(), work.z, momentum);
+  rate = momentum / dt;
+  if (held_time != dt) {
+    work.z /= dt;
+    for (const Constraint& c : equations.model().constraints)
+      work.z.segment(c.first, c.size) += (1.0 / held_time - 1.0 / dt) * c.held_change(v0, v1).head(c.size);
+    multiply(equations.model(), equations.mass(), work.z, rate);
+  }
   for (const Constraint& c : equations.model().constraints) {
     const Vector3 gain = c.held(momentum), assumed = c.held(work.assumed);
     const Vector3 force = c.held(full_residual) - assumed, mean = 0.5 * (c.held(v0) + c.held(v1));
     result.support_work += force.dot(c.part(work.change)) + gain.dot(mean);
-    full_residual.segment(c.first, c.size) += (gain / dt - assumed).head(c.size);
+    full_residual.segment(c.first, c.size) += (c.held(rate) - assumed).head(c.size);
   }
 }
 
@@ -198,7 +218,7 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
   const bool holds = !model.constraints.empty();
   if (holds) {
     find_held_velocity(model, plan, state, work);
-    work.held_acceleration = (work.held_velocity - state.v) / dt;
+    work.held_acceleration = (work.held_velocity - state.v) / held_time(plan, state);
   }
   equations.begin(state, parameters, plan.rule, h, holds ? &work.held_acceleration : nullptr);
   if (equations.contact() && equations.contact()->blocked()) return result;
@@ -220,6 +240,8 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
     work.change = work.z - state.q;
     if (equations.allowed(state.q, work.change) < 1.0) return result;
     contact->update(q1);
+    result.squeezed = squeezed_contact(equations, work.change);
+    if (result.squeezed >= 0) return result;
     result.too_deep = contact->too_deep();
     if (result.too_deep) {
       work.deep = work.z;
@@ -253,7 +275,7 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
   if (!model.constraints.empty()) {
     work.assumed = work.newton.data.inertia;
     if (conserves) set_working_rows(equations.problem(), work.newton.data, work.change, work.newton.data.full_residual);
-    add_support_work(equations, state.v, v1, dt, work, result);
+    add_support_work(equations, state.v, v1, dt, held_time(plan, state), work, result);
   }
   VectorX& acceleration = work.mean;
   acceleration = (v1 - state.v) / dt;

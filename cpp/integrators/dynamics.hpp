@@ -23,6 +23,7 @@ struct StepPlan {
 struct StepResult {
   bool accepted = false;
   bool too_deep = false;  ///< surfaces are too deep in each other: contact must be stiffer
+  int squeezed = -1;      ///< a contact that is pressed by what does not yield, see squeezed.hpp
   NewtonResult newton;
   double largest_turn = 0;   ///< of an edge [rad]
   double stretch_gain = 0;   ///< energy that midpoint brings into stretching from nowhere [J]

@@ -143,7 +143,7 @@ StepResult verlet_step(Equations& equations, const Parameters& parameters, doubl
   }
   if (!model.constraints.empty()) {
     work.assumed.setZero(model.dof_count);
-    add_support_work(equations, state.v, next.v, dt, work, result);
+    add_support_work(equations, state.v, next.v, dt, dt, work, result);
   }
   next.acceleration_current = true;
   next.time = state.time + dt;

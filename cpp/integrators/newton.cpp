@@ -179,7 +179,8 @@ class Newton::Solve {
     if (uses(Heuristic::predict_friction)) system_.equations.predict_friction(work_.step, shorten, work_.contact);
     if (mixed_) predict_axial_force(system_.equations.problem(), work_.data, work_.step, work_.axial_force);
     axial_known_ = mixed_;
-    if (contact_ && uses(Heuristic::surface_search) && !step_between_surfaces(shorten)) return false;
+    if (contact_ && uses(Heuristic::surface_search) && !leaves_surfaces_alone() && !step_between_surfaces(shorten))
+      return false;
     if (result_.iterations == 0) result_.cut = contact_ && shorten < kCut;
     if (how_.give_up_if_cut && result_.cut && uses(Heuristic::reject_cut)) return false;
     if (line_search_) {
@@ -195,6 +196,13 @@ class Newton::Solve {
       z_ += work_.step;
     reuse_.note_step(shorten < 1.0 ? INFINITY : newton_.norms_.displacement(work_.step));
     return !how_.predicted || !how_.predicted->strict || !loses_path(*how_.predicted, reuse_, result_.iterations == 0);
+  }
+
+  /// Whether nothing touches where the step begins and ends: then it is one as in a scene without surfaces.
+  bool leaves_surfaces_alone() {
+    if (contact_->count() > 0) return false;
+    work_.trial = z_ + work_.step;
+    return !system_.equations.touches(work_.trial);
   }
 
   bool step_between_surfaces(double& shorten) {

@@ -21,9 +21,9 @@ void add_work(const Equations& equations, const Parameters& parameters, const Ve
 /// The supports' work is that of the forces on what they hold, over its way, and
 /// (v0 + v1) / 2 times M (v1 - v0) there: the latter, with what the others' equations say of theirs, is exactly what
 /// the kinetic energy grows by. Puts M (v1 - v0) / dt into the reactions in place of `work.assumed`, the inertia in the
-/// residual.
-void add_support_work(const Equations& equations, const VectorX& v0, const VectorX& v1, double dt, StepWorkspace& work,
-                      StepResult& result);
+/// residual; of what is held itself, M (v1 - v0) / `held_time`, which lies between those two velocities of supports.
+void add_support_work(const Equations& equations, const VectorX& v0, const VectorX& v1, double dt, double held_time,
+                      StepWorkspace& work, StepResult& result);
 
 /// Of an explicit step from a state to q: the configuration there, and that of `next`. Returns by how much edges turn
 /// at most [rad].

@@ -30,8 +30,8 @@ struct RodDescription {
   VectorX drag;                ///< force per length and velocity [Pa s]
   MatrixX2 natural_curvature;  ///< per stencil, of the smooth rod, towards d1 and d2 [1/m]
   VectorX natural_twist;       ///< per stencil [rad/m]
-  VectorX contact_radius;      ///< of the round surface that touches others, and that a fluid flows around [m]; empty:
-                               ///< it touches nothing
+  VectorX contact_radius;      ///< of the round surface that touches others [m]; empty: it touches nothing
+  VectorX fluid_radius;        ///< of what a fluid flows around [m]
 };
 
 /// One rod passing through, starting or ending at a shared node: rod index and node index within the rod.
@@ -175,6 +175,8 @@ struct ContactPairDescription {
   double across = -1;    ///< of a rod and an obstacle, across the rod [-]; negative: as `friction` says
   double stiffness = 0;  ///< [N/m]; 0: that of the scene
   double restitution = -1;  ///< coefficient [-]; negative: that of the scene
+  VectorX shares;  ///< of a rod and an obstacle: what its nodes, then its edges, rub with, over these coefficients [-];
+                   ///< empty: 1
 
   bool is_of(int a, int b) const { return (first == a && second == b) || (first == b && second == a); }
 };

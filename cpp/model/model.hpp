@@ -110,6 +110,7 @@ struct SurfaceParameters {
   MatrixX2 obstacle_friction;      ///< per obstacle, along and across rods [-]
   VectorX obstacle_restitution;    ///< per obstacle [-]
   MatrixX2 pair_friction;          ///< per pair, along and across; negative: that of its bodies [-]
+  std::vector<VectorX> pair_shares;  ///< per pair, see `ContactPairDescription::shares`
   VectorX pair_restitution;        ///< per pair; negative: that of its bodies [-]
   VectorX pair_contact_stiffness;  ///< per pair; 0: that of the scene [N/m]
 

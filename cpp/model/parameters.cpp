@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <numbers>
@@ -106,11 +107,13 @@ void set_contact(const ContactDescription& contact, Parameters& parameters) {
     p.obstacle_restitution.setOnes(static_cast<Eigen::Index>(contact.obstacles.size()));
   const auto pairs = static_cast<Eigen::Index>(contact.pairs.size());
   p.pair_friction.resize(pairs, 2);
+  p.pair_shares.resize(contact.pairs.size());
   p.pair_restitution.resize(pairs);
   p.pair_contact_stiffness.resize(pairs);
   for (Eigen::Index i = 0; i < pairs; ++i) {
     const ContactPairDescription& pair = contact.pairs[static_cast<std::size_t>(i)];
     p.pair_friction.row(i) << pair.friction, pair.across >= 0.0 ? pair.across : pair.friction;
+    p.pair_shares[static_cast<std::size_t>(i)] = pair.shares;
     p.pair_restitution(i) = pair.restitution;
     p.pair_contact_stiffness(i) = pair.stiffness;
   }
@@ -121,7 +124,8 @@ bool SurfaceParameters::operator==(const SurfaceParameters& other) const {
   return friction == other.friction && slip_tolerance == other.slip_tolerance && restitution == other.restitution &&
          contact_stiffness == other.contact_stiffness && same(obstacle_friction, other.obstacle_friction) &&
          same(obstacle_restitution, other.obstacle_restitution) && same(pair_friction, other.pair_friction) &&
-         same(pair_restitution, other.pair_restitution) && same(pair_contact_stiffness, other.pair_contact_stiffness);
+         same(pair_restitution, other.pair_restitution) && same(pair_contact_stiffness, other.pair_contact_stiffness) &&
+         std::equal(pair_shares.begin(), pair_shares.end(), other.pair_shares.begin(), other.pair_shares.end(), same);
 }
 
 void check_load(const SceneDescription& scene, const LoadDescription& load) {

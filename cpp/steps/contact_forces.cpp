@@ -1,9 +1,28 @@
 #include "steps/contact_forces.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
 namespace withe {
+
+namespace {
+
+void add_coefficients(const ContactProblem& problem, const ContactPair& pair, const ContactAdjoint& by,
+                      CoefficientAdjoint& out) {
+  const FrictionOwner owner = problem.surfaces->friction_owner(pair);
+  out.slip_tolerance += by.slip_tolerance;
+  out.gravity_size += by.gravity;
+  problem.add_mass_slopes(pair, by.mass, out.edge_mass);
+  if (owner.pair >= 0)
+    out.pair_friction.row(owner.pair) += Eigen::RowVector2d(by.along, by.across);
+  else if (owner.obstacle >= 0)
+    out.obstacle_friction.row(owner.obstacle) += Eigen::RowVector2d(by.along, by.across);
+  else
+    out.friction += by.along + by.across;
+}
+
+}  // namespace
 
 ContactForces::ContactForces(const Model& model) : contact_(model) { rows_.set(contact_.surfaces(), contact_.near()); }
 
@@ -48,13 +67,35 @@ void ContactForces::add(const StepProblem& problem, StepData& data, const Assemb
   if (!contact_.frictional() && !problem.in_middle()) data.potential += contact_.energy();
 }
 
-/// Without friction contact is a function of q1 alone, but under the midpoint rules.
-void ContactForces::add_adjoint(const StepProblem& problem, const StepData&, const Assembler&, StepAdjoint&) const {
+void ContactForces::add_adjoint(const StepProblem& problem, const StepData&, const Assembler&,
+                                StepAdjoint& adjoint) const {
   if (contact_.count() == 0) return;
-  if (contact_.frictional()) throw std::invalid_argument("no gradient is known through friction yet: take friction=0");
-  if (problem.in_middle())
-    throw std::invalid_argument(
-        "no gradient is known through contact under the midpoint rules yet: take integrator='backward_euler'");
+  if (!contact_.frictional() && !problem.in_middle()) return;  // a function of q1 alone
+  const auto& shares = problem.parameters->surfaces.pair_shares;
+  if (std::any_of(shares.begin(), shares.end(), [](const VectorX& s) { return s.size() > 0; }))
+    throw std::invalid_argument("no gradient is known through friction that varies along a rod or over an obstacle");
+  int dofs[kContactUnknowns];
+  double rows[kContactUnknowns];
+  ContactLocal local;
+  for (int i = 0; i < contact_.count(); ++i) {
+    const Touching& t = contact_.contacts()[i];
+    contact_.unknowns(i, dofs);
+    for (int k = 0; k < kContactUnknowns; ++k) rows[k] = dofs[k] >= 0 ? adjoint.rows[dofs[k]] : 0.0;
+    const auto after = adjoint.approach_after.find(t.pair.key);
+    const bool remembered = t.lagged < 0 && after != adjoint.approach_after.end();
+    const ContactAdjoint by = contact_.adjoint(i, rows, remembered ? after->second : 0.0);
+    if (problem.in_middle()) contact_.local(i, true, local);
+    for (int k = 0; k < kContactUnknowns; ++k) {
+      if (dofs[k] < 0) continue;
+      adjoint.start[dofs[k]] += by.start[k];
+      adjoint.velocity[dofs[k]] += by.velocity[k];
+      // q1 = 2 z - q0
+      for (int j = 0; j < kContactUnknowns && problem.in_middle(); ++j)
+        adjoint.start[dofs[k]] -= rows[j] * local.hessian[j][k];
+    }
+    if (by.approach != 0.0) adjoint.approach[t.pair.key] += by.approach;
+    add_coefficients(contact_.problem(), t.pair, by, adjoint.coefficients);
+  }
 }
 
 void ContactForces::add_rounding(const StepProblem&, StepData& data) const { data.floor += data.contact_floor; }
@@ -63,6 +104,12 @@ double ContactForces::allowed(const StepProblem& problem, const VectorX& z, cons
   problem.set_end(z, end_);
   change_ = problem.end_rate() * step;
   return contact_.allowed(end_, change_);
+}
+
+bool ContactForces::touches(const StepProblem& problem, const VectorX& z) {
+  problem.set_end(z, end_);
+  contact_.update(end_);
+  return contact_.count() > 0;
 }
 
 void ContactForces::predict_friction(const StepProblem& problem, const VectorX& step, double kept,

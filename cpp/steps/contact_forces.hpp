@@ -25,6 +25,8 @@ class ContactForces final : public Term {
                    StepAdjoint& adjoint) const override;
   void add_rounding(const StepProblem& problem, StepData& data) const override;
 
+  /// Whether anything touches at z.
+  bool touches(const StepProblem& problem, const VectorX& z);
   /// How much of a step of z contact allows, from 0 to 1.
   double allowed(const StepProblem& problem, const VectorX& z, const VectorX& step);
   /// Predicts the friction of a step of Newton's method from the last evaluation, of which `kept` is left.

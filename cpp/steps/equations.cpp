@@ -178,6 +178,8 @@ double Equations::allowed(const VectorX& z, const VectorX& step) {
   return terms_.contact ? terms_.contact->allowed(problem_, z, step) : 1.0;
 }
 
+bool Equations::touches(const VectorX& z) { return terms_.contact && terms_.contact->touches(problem_, z); }
+
 void Equations::predict_friction(const VectorX& step, double kept, ContactLinearisation& linearisation) {
   if (terms_.contact) terms_.contact->predict_friction(problem_, step, kept, linearisation);
 }

@@ -63,6 +63,8 @@ class Equations {
   HandForces* hands() { return terms_.hands; }
   /// How much of a step of z contact allows, from 0 to 1.
   double allowed(const VectorX& z, const VectorX& step);
+  /// Whether anything touches at z: what is evaluated next.
+  bool touches(const VectorX& z);
   /// Predicts the friction of a step of Newton's method from the last evaluation, of which `kept` is left.
   void predict_friction(const VectorX& step, double kept, ContactLinearisation& linearisation);
   double contact_loss(const StepData& data, const VectorX& change, double obstacle_work) const;

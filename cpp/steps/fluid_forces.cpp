@@ -54,8 +54,7 @@ void StokesletForces::add(const StepProblem& problem, StepData& data, const Asse
 }
 
 void StokesletForces::add_adjoint(const StepProblem&, const StepData&, const Assembler&, StepAdjoint&) const {
-  if (acts_)
-    throw std::invalid_argument("no gradient is known through a fluid of Stokeslets: take model='resistive' or drag");
+  throw std::invalid_argument("no gradient is known through a fluid of Stokeslets: take model='resistive' or drag");
 }
 
 double StokesletForces::dissipated(const StepProblem&, const StepData& data, const Assembler&,
@@ -79,13 +78,12 @@ ResistiveForces::ResistiveForces(const Model& model) {
   for (int e = 0; e < model.edge_count; ++e) {
     const auto rod = at(model.edge_rod[at(e)]);
     const RodDescription& d = scene.rods[rod];
-    const double radius = d.contact_radius[e - model.rod_first_edge[rod]];
+    const double radius = d.fluid_radius[e - model.rod_first_edge[rod]];
     resistance_.push_back(resistive_coefficients(radius, d.rest_lengths.sum(), scene.fluid.wavelength));
   }
 }
 
-void ResistiveForces::set_local(const StepProblem& problem, const StepData& data, int edge, bool with_hessian,
-                                Local& local) const {
+ResistiveEdge ResistiveForces::edge_of(const StepProblem& problem, const StepData& data, int edge) const {
   const Model& model = problem.model;
   const EdgeFrame<double>& f = data.configuration.edge[at(edge)];
   const double half = 0.5 * model.edge_length[edge] * problem.parameters->fluid_viscosity;
@@ -100,7 +98,7 @@ void ResistiveForces::set_local(const StepProblem& problem, const StepData& data
   for (int end = 0; end < 2; ++end)
     for (int k = 0; k < model.dimension; ++k)
       resistive.change[end][k] = data.z[dof[end] + k] - problem.start->q[dof[end] + k];
-  resistive_local(resistive, with_hessian, local);
+  return resistive;
 }
 
 void ResistiveForces::add(const StepProblem& problem, StepData& data, const Assembler& assembler,
@@ -108,14 +106,36 @@ void ResistiveForces::add(const StepProblem& problem, StepData& data, const Asse
   if (!problem.moves()) return;
   Local local;
   for (int e = 0; e < problem.model.edge_count; ++e) {
-    set_local(problem, data, e, !values.empty(), local);
+    resistive_local(edge_of(problem, data, e), !values.empty(), local);
     add_element(assembler.stretch, e, local, data, values);
   }
 }
 
-void ResistiveForces::add_adjoint(const StepProblem& problem, const StepData&, const Assembler&, StepAdjoint&) const {
-  if (problem.moves())
-    throw std::invalid_argument("no gradient is known through a fluid yet: take drag, which has one");
+/// By the start alone as far as edges moved from there: their tangents are those at z.
+void ResistiveForces::add_adjoint(const StepProblem& problem, const StepData& data, const Assembler& assembler,
+                                  StepAdjoint& adjoint) const {
+  if (!problem.moves()) return;
+  const Model& model = problem.model;
+  Local local;
+  double rows[kMaxLocal];
+  for (int e = 0; e < model.edge_count; ++e) {
+    const ResistiveEdge edge = edge_of(problem, data, e);
+    resistive_local(edge, false, local);
+    gather(assembler.stretch, e, adjoint.rows, rows);
+    const int d = model.dimension, dof[2] = {model.tail_dof[at(e)], model.head_dof[at(e)]};
+    for (int end = 0; end < 2; ++end) {
+      const double* by = rows + end * d;
+      double forward = 0.0;
+      for (int i = 0; i < d; ++i) {
+        forward += edge.tangent[i] * by[i];
+        adjoint.coefficients.fluid_viscosity +=
+            by[i] * local.gradient[end * d + i] / problem.parameters->fluid_viscosity;
+      }
+      for (int i = 0; i < d; ++i)
+        adjoint.start[dof[end] + i] -=
+            edge.inverse_duration * (edge.across * by[i] + (edge.along - edge.across) * forward * edge.tangent[i]);
+    }
+  }
 }
 
 double ResistiveForces::dissipated(const StepProblem& problem, const StepData& data, const Assembler& assembler,
@@ -124,7 +144,7 @@ double ResistiveForces::dissipated(const StepProblem& problem, const StepData& d
   if (!problem.moves()) return work;
   Local local;
   for (int e = 0; e < problem.model.edge_count; ++e) {
-    set_local(problem, data, e, false, local);
+    resistive_local(edge_of(problem, data, e), false, local);
     work += work_of(assembler.stretch, e, local, change);
   }
   return work;

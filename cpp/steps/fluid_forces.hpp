@@ -23,7 +23,7 @@ class ResistiveForces final : public Term {
                     const VectorX& change) const override;
 
  private:
-  void set_local(const StepProblem& problem, const StepData& data, int edge, bool with_hessian, Local& local) const;
+  ResistiveEdge edge_of(const StepProblem& problem, const StepData& data, int edge) const;
 
   std::vector<ResistiveCoefficients> resistance_;  ///< per edge
 };

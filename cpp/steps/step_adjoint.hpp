@@ -1,7 +1,9 @@
 #pragma once
 /// Derivatives of a step by what it is given, times a vector: what the adjoint method asks of each term.
 
-#include "model/model.hpp"
+#include <map>
+
+#include "model/state.hpp"
 
 namespace withe {
 
@@ -16,6 +18,11 @@ struct CoefficientAdjoint {
   VectorX gravity;                                               ///< per unknown, by its force [1/N]
   MatrixX3 loads;                                                ///< by `Parameters::loads`
   VectorX spring_stiffness, spring_rest_length, spring_damping;  ///< per spring
+  VectorX edge_mass;                                             ///< of contacts, by line density times length
+  double gravity_size = 0;                                       ///< of contacts, by that of gravity [s^2/m]
+  double fluid_viscosity = 0;                                    ///< [1/(Pa s)]
+  double friction = 0, slip_tolerance = 0;                       ///< of the scene [-], [s/m]
+  MatrixX2 obstacle_friction, pair_friction;                     ///< per obstacle, per pair of bodies [-]
   std::vector<MatrixX2> natural_curvature;  ///< per rod and stencil, by the smooth one, where it is read out [m]
   VectorX rest_length;                      ///< per edge, by that in the axial strain, and where it is read out [1/m]
 
@@ -38,11 +45,19 @@ struct CoefficientAdjoint {
         spring_stiffness(VectorX::Zero(static_cast<Eigen::Index>(model.description.springs.size()))),
         spring_rest_length(spring_stiffness),
         spring_damping(spring_stiffness),
+        edge_mass(stretch_stiffness),
+        obstacle_friction(rows_of_two(model.description.contact.obstacles.size())),
+        pair_friction(rows_of_two(model.description.contact.pairs.size())),
         rest_length(VectorX::Zero(model.edge_count)) {
-    for (const auto& places : model.place)
-      natural_curvature.push_back(MatrixX2::Zero(static_cast<Eigen::Index>(places.size()), 2));
+    for (const auto& places : model.place) natural_curvature.push_back(rows_of_two(places.size()));
   }
+
+ private:
+  static MatrixX2 rows_of_two(std::size_t count) { return MatrixX2::Zero(static_cast<Eigen::Index>(count), 2); }
 };
+
+/// Derivatives of a scalar by speeds of approach that contacts remember [s/m].
+using ApproachAdjoint = std::map<ContactKey, double>;
 
 /// rows^T times the derivatives of a step's residual, at fixed z. An edge's frame and a joint's are functions of the
 /// start: they are taken by how they turn, in the configuration that they are part of.
@@ -53,9 +68,11 @@ struct StepAdjoint {
   VectorX acceleration;                        ///< by the acceleration of what supports hold; meaningful where held
   VectorX start_turn, end_turn;                ///< per edge: by the angle of its directors at the start, at q1 [rad]
   MatrixX3 start_spin, middle_spin, end_spin;  ///< per frame: by its rotation vector at the start, at z, at q1 [rad]
+  const ApproachAdjoint& approach_after;       ///< by what is remembered at the end
+  ApproachAdjoint approach;                    ///< by what was remembered at the start
   CoefficientAdjoint& coefficients;
 
-  StepAdjoint(const Model& model, const VectorX& rows_of, CoefficientAdjoint& by)
+  StepAdjoint(const Model& model, const VectorX& rows_of, const ApproachAdjoint& by_approach, CoefficientAdjoint& by)
       : rows(rows_of),
         start(VectorX::Zero(model.dof_count)),
         velocity(start),
@@ -65,6 +82,7 @@ struct StepAdjoint {
         start_spin(MatrixX3::Zero(model.frame_count, 3)),
         middle_spin(start_spin),
         end_spin(start_spin),
+        approach_after(by_approach),
         coefficients(by) {}
 };
 

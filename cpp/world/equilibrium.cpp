@@ -112,6 +112,8 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
     solve_for_custom_at_rest(system, time);
     aim_obstacles(system, time);
     aim_hands(system);
+    VectorX reached = state.q;
+    if (boundary(1.0, reached)) check_squeezed(system, reached, dt);
     if (drifts(system))
       newton->balance(work.newton.data, r.newton);
     else

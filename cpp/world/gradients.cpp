@@ -12,8 +12,17 @@ namespace {
 /// An equilibrium leaves this much of the forces in it out of balance.
 constexpr double kBalanced = 1e-6;
 constexpr const char* kHands = "a hand takes part in it; hold the rod by clamp(hold='edge')";
-constexpr const char* kFriction = "friction takes part in it; take friction=0";
+constexpr const char* kFriction =
+    "anchored or semi-explicit friction takes part in it; take friction_model='implicit' or 'lagged', or friction=0";
+constexpr const char* kHeldByFriction =
+    "no gradient is known of an equilibrium that friction holds, for it goes with the way there: take friction=0, or "
+    "run with differentiable=True";
+constexpr const char* kStiffness =
+    "its contacts took a stiffness of their own; give enable_contact(stiffness=), great enough";
+constexpr const char* kFrictionChanged = "friction came or went while it ran; begin another run there";
 constexpr const char* kRestitution = "impacts lose energy by their restitution; take restitution=1";
+
+bool known_friction(FrictionLaw law) { return law == FrictionLaw::implicit || law == FrictionLaw::lagged; }
 
 bool loses_in_impacts(const ContactDescription& contact) {
   const auto loses = [](double restitution) { return restitution >= 0.0 && restitution < 1.0; };
@@ -41,6 +50,12 @@ std::vector<EquilibriumGradient> World::equilibrium_gradients(const std::vector<
     accept_configuration(model, self.state.q, configuration, frames);
   }
   gradient.begin({frames, self.parameters, StepRule::statics, 0.0, frames.q});
+  const Contact* contact = gradient.equations().contact();
+  if (contact && contact->count() > 0) {
+    require(!contact->frictional(), kHeldByFriction);
+    require(contact->has_given_stiffness(self.state),
+            std::string("no gradient is known of this equilibrium: ") + kStiffness);
+  }
   require(gradient.imbalance() < kBalanced,
           "the simulation is in no equilibrium, so that there is no gradient of one: call equilibrium() again");
   std::vector<EquilibriumGradient> out;
@@ -61,16 +76,16 @@ std::vector<EquilibriumGradient> World::equilibrium_gradients(const std::vector<
 
 std::shared_ptr<Tape> World::start_tape() {
   Implementation& self = *implementation_;
-  self.tape = std::make_shared<Tape>(self.model, equation_options(self.options), self.state, self.parameters);
+  const Contact* contact = self.equations->contact();
+  self.tape = std::make_shared<Tape>(self.model, equation_options(self.options), self.state, self.parameters,
+                                     contact && contact->frictional());
   if (self.options.integrator == Integrator::verlet || self.options.integrator == Integrator::statics)
     self.tape->refuse("integrator '" +
                       std::string(self.options.integrator == Integrator::verlet ? "verlet" : "static") +
                       "' has none; take any other");
   if (self.has_hands()) self.tape->refuse(kHands);
-  if (const Contact* contact = self.equations->contact()) {
-    if (self.options.integrator != Integrator::backward_euler)
-      self.tape->refuse("contact takes part in it; take integrator='backward_euler'");
-    else if (contact->frictional())
+  if (contact) {
+    if (contact->frictional() && !known_friction(self.description.contact.friction_law))
       self.tape->refuse(kFriction);
     else if (loses_in_impacts(self.description.contact))
       self.tape->refuse(kRestitution);
@@ -112,12 +127,14 @@ void World::Implementation::record_step(StepRule rule, double dt, bool reacts) {
   const char* unknown = nullptr;
   if (const Contact* contact = equations_of_step().contact()) {
     const ContactProblem& problem = contact->problem();
-    if (contact->frictional())
+    if (contact->frictional() && !known_friction(description.contact.friction_law))
       unknown = kFriction;
     else if (loses_in_impacts(description.contact))
       unknown = kRestitution;
+    else if (!tape->has_friction(description.contact, contact->frictional()))
+      unknown = kFrictionChanged;
     else if (!contact->has_given_stiffness(state))
-      unknown = "its contacts took a stiffness of their own; give enable_contact(stiffness=), great enough";
+      unknown = kStiffness;
     else if (!problem.shift.empty() || !problem.turn.empty())
       unknown = "an obstacle moved";
   }

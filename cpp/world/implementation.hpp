@@ -80,6 +80,7 @@ struct World::Implementation : Running {
   void mark();
   void return_to_mark();
   /// Callbacks, which belong to who runs the scene.
+  void check_shares(const ContactPairDescription& pair) const;
   void take_callbacks(const Implementation& other);
   /// Matrices of earlier steps.
   void forget_matrix();
@@ -209,6 +210,10 @@ struct World::Implementation : Running {
   /// `hint`: what to try, where the caller knows better than `what_to_try`.
   [[noreturn]] void fail(const NewtonResult& newton, double dt, const std::string& what,
                          const std::string& hint = "") const;
+
+  // squeezed.cpp
+  void check_squeezed(Equations& system, const VectorX& q, double dt);
+  [[noreturn]] void fail_squeezed(const Equations& system, int contact, double dt) const;
 
   // step_length.cpp
   void watch_step(double dt, const Equations& system);

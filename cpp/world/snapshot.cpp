@@ -90,6 +90,8 @@ void write_contact(Writer& w, const ContactDescription& contact) {
   for (const ContactPairDescription& p : contact.pairs) {
     w(p.first), w(p.second), w(p.ignored);
     for (double x : {p.friction, p.across, p.stiffness, p.restitution}) w(x);
+    w(static_cast<std::int64_t>(p.shares.size()));
+    w(p.shares);
   }
 }
 
@@ -109,6 +111,10 @@ ContactDescription read_contact(Reader& r, ContactDescription contact) {
   for (ContactPairDescription& p : contact.pairs) {
     r(p.first), r(p.second), r(p.ignored);
     for (double* x : {&p.friction, &p.across, &p.stiffness, &p.restitution}) r(*x);
+    r(count);
+    require(count >= 0 && count < 1 << 28, "snapshot is damaged: impossible friction");
+    p.shares.resize(count);
+    r(p.shares);
   }
   return contact;
 }

@@ -203,6 +203,7 @@ void World::set_contact(const ContactDescription& contact) {
   Implementation& self = *implementation_;
   ContactDescription& own = self.description.contact;
   check_contact(contact, own);
+  for (const ContactPairDescription& pair : contact.pairs) self.check_shares(pair);
   ContactDescription wanted = own;
   wanted.friction = contact.friction;
   wanted.slip_tolerance = contact.slip_tolerance;
@@ -228,6 +229,48 @@ void World::set_contact(const ContactDescription& contact) {
   if (const Contact* touching = self.equations->contact(); touching && stiffer)
     touching->take_given_stiffness(self.state, self.parameters);
   // What surfaces and anchors hold changes with the numbers that they are made of.
+  self.actuation_work += energy() - before;
+}
+
+/// One share for each node and edge of the rod of a pair, not negative.
+void World::Implementation::check_shares(const ContactPairDescription& pair) const {
+  if (pair.shares.size() == 0) return;
+  require((pair.first < 0) != (pair.second < 0), "friction varies between a rod and an obstacle only");
+  const auto& rod = description.rods[at(std::max(pair.first, pair.second))];
+  const auto size = static_cast<Eigen::Index>(rod.nodes.size()) + rod.rest_lengths.size();
+  require(pair.shares.size() == size, "friction of rod '" + rod.name + "' needs one number a node and an edge, ", size);
+  require(pair.shares.allFinite() && pair.shares.minCoeff() >= 0.0, "friction must be finite and not negative");
+}
+
+void World::set_friction_shares(int pair, const VectorX& shares) {
+  Implementation& self = *implementation_;
+  auto& pairs = self.description.contact.pairs;
+  require(pair >= 0 && pair < static_cast<int>(pairs.size()), "no such pair: ", pair);
+  ContactPairDescription& own = pairs[at(pair)];
+  if (own.shares.size() == shares.size() && own.shares == shares) return;
+  ContactPairDescription wanted = own;
+  wanted.shares = shares;
+  self.check_shares(wanted);
+  const Contact* contact = self.equations->contact();
+  // What anchors hold changes with the coefficients that they are made of.
+  const bool stores = contact && contact->anchored();
+  const auto energy = [&] {
+    return stores ? contact->energy_of(self.state, self.parameters, self.energy_scratch.contact) : 0.0;
+  };
+  const double before = energy();
+  const bool same_form = own.shares.size() > 0;
+  own.shares = shares;
+  if (same_form) {
+    self.model.description.contact.pairs[at(pair)].shares = shares;
+    self.parameters.surfaces.pair_shares[at(pair)] = shares;
+    update_derived(self.model, Derived::nothing, 0, self.parameters);
+    self.state.acceleration_current = false;
+    for (const System which : kSystems)
+      if (Equations* known = self.system(which); known && known->contact())
+        known->contact()->set_parameters(self.parameters);
+  } else {
+    self.take_contact();
+  }
   self.actuation_work += energy() - before;
 }
 

@@ -229,6 +229,9 @@ class World {
   /// Takes over friction, slip tolerance, restitution and stiffness of a description of the same bodies, and pairs that
   /// it has besides. What this does to the energy at the present state is work of actuation.
   void set_contact(const ContactDescription& contact);
+  /// What the nodes, then the edges, of a rod rub with on an obstacle, over the coefficients of their pair, which is
+  /// one of the description's.
+  void set_friction_shares(int pair, const VectorX& shares);
 
   // Read-outs: copies.
   MatrixX3 positions() const;   ///< every node once [m]

@@ -53,7 +53,8 @@ void register_rod(py::module_& module) {
       .def_readwrite("drag", &RodDescription::drag)
       .def_readwrite("natural_curvature", &RodDescription::natural_curvature)
       .def_readwrite("natural_twist", &RodDescription::natural_twist)
-      .def_readwrite("contact_radius", &RodDescription::contact_radius);
+      .def_readwrite("contact_radius", &RodDescription::contact_radius)
+      .def_readwrite("fluid_radius", &RodDescription::fluid_radius);
 }
 
 void register_contact(py::module_& module) {
@@ -72,7 +73,8 @@ void register_contact(py::module_& module) {
       .def_readwrite("friction", &ContactPairDescription::friction)
       .def_readwrite("across", &ContactPairDescription::across)
       .def_readwrite("stiffness", &ContactPairDescription::stiffness)
-      .def_readwrite("restitution", &ContactPairDescription::restitution);
+      .def_readwrite("restitution", &ContactPairDescription::restitution)
+      .def_readwrite("shares", &ContactPairDescription::shares);
   py::class_<ContactDescription> contact(module, "ContactDescription", "What touches, and how.");
   contact.def(py::init<>())
       .def_readwrite("rods", &ContactDescription::rods)

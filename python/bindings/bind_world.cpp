@@ -27,6 +27,11 @@ void register_gradients(py::module_& module) {
       .def_readonly("spring_stiffness", &ParameterGradient::spring_stiffness)
       .def_readonly("spring_rest_length", &ParameterGradient::spring_rest_length)
       .def_readonly("spring_damping", &ParameterGradient::spring_damping)
+      .def_readonly("fluid_viscosity", &ParameterGradient::fluid_viscosity)
+      .def_readonly("friction", &ParameterGradient::friction)
+      .def_readonly("slip_tolerance", &ParameterGradient::slip_tolerance)
+      .def_readonly("obstacle_friction", &ParameterGradient::obstacle_friction)
+      .def_readonly("pair_friction", &ParameterGradient::pair_friction)
       .def_readonly("rest_length", &ParameterGradient::rest_length);
   py::class_<EquilibriumGradient>(module, "EquilibriumGradient", "Derivatives of a scalar of an equilibrium.")
       .def_readonly("parameters", &EquilibriumGradient::parameters)
@@ -39,7 +44,8 @@ void register_gradients(py::module_& module) {
       .def_readonly("rotations", &PoseAdjoint::rotations);
   py::class_<InitialGradient>(module, "InitialGradient", "Derivatives of a scalar of a run by the state at its start.")
       .def_readonly("positions", &InitialGradient::positions)
-      .def_readonly("velocities", &InitialGradient::velocities);
+      .def_readonly("velocities", &InitialGradient::velocities)
+      .def_readonly("supports", &InitialGradient::supports);
   py::class_<RunJacobian>(module, "RunJacobian", "Derivatives of the state that a run leads to.")
       .def_readonly("state", &RunJacobian::state)
       .def_readonly("rows", &RunJacobian::rows);
@@ -330,6 +336,10 @@ void define_supports(WorldClass& world) {
       "set_contact",
       [](GuardedWorld& self, const ContactDescription& contact) { self.changing().set_contact(contact); },
       py::arg("contact"));
+  world.def(
+      "set_friction_shares",
+      [](GuardedWorld& self, int pair, const VectorX& shares) { self.steering().set_friction_shares(pair, shares); },
+      py::arg("pair"), py::arg("shares"));
   world.def_property_readonly("contact", [](const GuardedWorld& self) { return self.reading().description().contact; });
   world.def(
       "support_position",

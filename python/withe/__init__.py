@@ -13,6 +13,7 @@ by rounding, so set it to "baseline" everywhere to find the same bits on unlike 
 from withe import deployment, folding, learning, perception, real2sim, shapes, view
 from withe._core import __version__
 from withe.errors import CoarseMeshWarning, CoarseStepWarning, ConvergenceError
+from withe.parts.friction_fields import FrictionMap
 from withe.parts.handles import (
     CustomForce,
     Drag,
@@ -48,6 +49,7 @@ __all__ = [
     "Energy",
     "Equilibrium",
     "Fluid",
+    "FrictionMap",
     "Hand",
     "Joint",
     "Linearisation",

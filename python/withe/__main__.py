@@ -1,4 +1,4 @@
-"""The command line: ``withe perceive IMAGE``, ``withe deploy PATTERN``."""
+"""The command line: ``withe perceive IMAGE``, ``withe deploy PATTERN``, ``withe fold --paper a4``."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import sys
 from collections.abc import Sequence
 
 from withe.deployment import command as deploy
+from withe.folding import command as fold
 from withe.perception import command as perceive
 
 __all__ = ["main"]
@@ -18,6 +19,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     commands = parser.add_subparsers(required=True, metavar="command")
     perceive.add_parser(commands)
     deploy.add_parser(commands)
+    fold.add_parser(commands)
     parsed = parser.parse_args(arguments)
     try:
         return int(parsed.run(parsed))

@@ -19,7 +19,7 @@ import numpy.typing as npt
 from withe.common.extras import require
 from withe.parts.handles import Support
 from withe.simulation.simulation import Simulation
-from withe.simulation.unknowns import Unknown
+from withe.simulation.unknowns import SCENE_WORDS, Unknown
 
 __all__ = ["equilibrium", "rollout"]
 
@@ -86,6 +86,12 @@ def rollout(
 
         return [getattr(record, name)() for name in listed], pull_back
 
+    for unknown in values:
+        if not isinstance(unknown, str) and isinstance(unknown[0], Support):
+            raise ValueError(
+                f"a rollout takes no {unknown[1]!r} of a support: runs have gradients by calls of move, "
+                "Record.gradient(...).calls, and by where a support is from their start on, Record.gradient"
+            )
     found = _apply(simulation, values, solve)
     return found[0] if isinstance(of, str) else found
 
@@ -197,14 +203,18 @@ def _summed(gradient: FloatArray, shape: Sequence[int]) -> FloatArray:
 def _set(simulation: Simulation, unknown: Unknown, value: FloatArray) -> None:
     if not isinstance(unknown, str):
         target, word = unknown
-        if isinstance(target, Support):
+        if isinstance(target, tuple):
+            if word != "friction":
+                raise ValueError(f"two bodies have a friction alone, got {word!r}")
+            simulation.set_friction(*target, float(value) if value.ndim == 0 else (float(value[0]), float(value[1])))
+        elif isinstance(target, Support):
             if word != "position":
                 raise ValueError(f"of {_name(unknown)} no tensor is taken: supports have a position")
             simulation.move(target, position=value)
         else:
             simulation.set(target, **{word: value if value.ndim else float(value)})
-    elif unknown == "gravity":
-        simulation.set(gravity=value)
+    elif unknown in SCENE_WORDS:
+        simulation.set(**{unknown: value if value.ndim else float(value)})
     elif unknown == "initial_velocities":
         simulation.set_velocities(None, value)
     elif unknown == "initial_positions":

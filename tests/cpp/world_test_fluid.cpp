@@ -14,7 +14,7 @@ constexpr Integrator kSchemes[] = {Integrator::backward_euler, Integrator::impli
                                    Integrator::energy_momentum, Integrator::verlet};
 
 SceneDescription in_fluid(SceneBuilder builder, FluidModel model) {
-  for (RodDescription& rod : builder.scene.rods) rod.contact_radius.setConstant(rod.rest_lengths.size(), 5e-3);
+  for (RodDescription& rod : builder.scene.rods) rod.fluid_radius.setConstant(rod.rest_lengths.size(), 5e-3);
   builder.scene.fluid = {model, 0.1, 5e-3, 0.0};
   return builder.scene;
 }

@@ -137,6 +137,17 @@ def add_fluid(world, data):
     )
 
 
+def grasp(where, d):
+    """Anywhere along a rod, rigid or not."""
+    where.grasp(
+        d.draw(rod),
+        d.draw(number),
+        d.draw(number),
+        stiffness=d.draw(st.one_of(st.none(), st.tuples(positive, positive))),
+        force_limit=d.draw(st.one_of(st.none(), positive)),
+    )
+
+
 ON_SCENE = {
     "add_rod": add_rod,
     "add_obstacle": add_obstacle,
@@ -155,6 +166,7 @@ ON_SCENE = {
         d.draw(node), hold=d.draw(st.sampled_from(["frame", "edge"])), free=d.draw(st.one_of(st.none(), triple))
     ),
     "pin": lambda w, d: w.scene.pin(d.draw(node), free=d.draw(st.one_of(st.none(), triple))),
+    "grasp": lambda w, d: grasp(w.scene, d),
     "add_force": lambda w, d: w.scene.add_force(d.draw(node), d.draw(small_triple), follower=d.draw(st.booleans())),
     "add_moment": lambda w, d: w.scene.add_moment(d.draw(node), d.draw(small_triple)),
     "add_load": lambda w, d: w.scene.add_load(d.draw(rod), d.draw(small_triple), follower=d.draw(st.booleans())),
@@ -253,6 +265,10 @@ ON_SIMULATION = {
     "velocities": lambda w, d: w.simulation.set_velocities(d.draw(rod), d.draw(triple)),
     "clamp": lambda w, d: w.simulation.clamp(d.draw(node), hold=d.draw(st.sampled_from(["frame", "edge"]))),
     "pin": lambda w, d: w.simulation.pin(d.draw(node)),
+    "grasp": lambda w, d: grasp(w.simulation, d),
+    "move_hand": lambda w, d: w.simulation.hand("hand 1").move(position=d.draw(small_triple), over=d.draw(positive)),
+    "wrench": lambda w, d: w.simulation.wrench("hand 1", about=d.draw(triple)),
+    "let_go": lambda w, d: w.simulation.hand("hand 1").release(),
     "release": lambda w, d: w.simulation.release(d.draw(node)),
     "move": move,
     "path": lambda w, d: w.simulation.move(d.draw(node), path=function_of_time(d)),

@@ -34,6 +34,7 @@ def run(name, folder, *arguments):
         "gradients",
         "parallel",
         "contact",
+        "contact_fold",
         "contact_robustness",
         "real2sim",
         "deployment",

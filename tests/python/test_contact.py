@@ -268,7 +268,7 @@ REFUSED: list[tuple[Callable[[withe.Scene], Any], str]] = [
     (lambda scene: scene.set_contact_group("nobody", "inner"), "'nobody'"),
     (lambda scene: scene.ignore_contact("inner", "inner"), "what touches 'inner' is not in the scene"),
     (unknown_group, "group of rod 'a' must be text, got None"),
-    (coarse_tolerance, "distance_tolerance must not exceed the radius of rod 'a'"),
+    (coarse_tolerance, "distance_tolerance must not exceed the contact radius of rod 'a'"),
 ]
 
 

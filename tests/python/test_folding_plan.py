@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 import withe
-from withe.folding import Jaw, Paper, elastica, plan
+from withe.__main__ import main
+from withe.folding import Jaw, Paper, elastica, plan, replan
+from withe.folding.sheets import at_poses, forces_of
 
 PAPERS = {"a4": Paper.a4, "us_letter": Paper.us_letter, "cardboard": Paper.cardboard}
 
@@ -17,6 +19,11 @@ PAPERS = {"a4": Paper.a4, "us_letter": Paper.us_letter, "cardboard": Paper.cardb
 @cache
 def planned(paper, target="half", method="ucs"):
     return plan(PAPERS[paper](), target, method=method)
+
+
+@cache
+def freely(paper, target="half", curvature=2.5):
+    return plan(PAPERS[paper](), target, method="slip", grasp="free", curvature=curvature)
 
 
 def inner_edges(folded):
@@ -73,6 +80,91 @@ def test_half_a_circle_slides_far_and_snaps():
     assert np.isnan(folded.slide[-1])
 
 
+@pytest.mark.parametrize(("paper", "target"), [("a4", "half"), ("a4", 0.25)])
+def test_a_free_moment_needs_no_friction_and_bears_another_stiffness(paper, target):
+    folded = freely(paper, target)
+    assert np.abs(folded.sheet.tangential_force).max() == 0.0
+    assert np.abs(folded.slide).max() == 0.0
+    lgb = folded.paper.gravito_bending_length
+    assert folded.max_curvature.max() * lgb < 2.5
+    inner = (inner_edges(folded) - [folded.jaw.depth, 0])[1:]
+    for factor in (0.9, 0.95, 1.05, 1.1):  # the same poses, another paper, half of the friction
+        other = lgb * factor
+        poses = np.column_stack([inner / other, folded.angles[1:]])
+        sheet = at_poses(poses, forces_of(folded.sheet)[1:])
+        assert sheet.valid.all()
+        assert sheet.stable.all()
+        lying = (folded.paper.length - folded.jaw.depth) / other - sheet.suspended
+        ratio = np.abs(sheet.tangential_force) / (sheet.normal_force + lying)
+        assert ratio.max() < 1.1 * 0.5 * folded.paper.friction
+        assert ratio.max() > 1e-3  # the stiffness does matter
+
+
+def test_curvature_of_2_11_folds_a4_in_half():
+    assert freely("a4", "half", 2.11).max_curvature.max() * 0.048 < 2.11
+
+
+def test_us_letter_is_folded_in_half_without_slide():
+    folded = freely("us_letter")
+    assert 0 < folded.slip_ratio.max() < 0.12
+    assert np.abs(folded.slide).max() == 0.0
+
+
+def test_a_bound_of_curvature_that_is_too_low_says_which_would_do():
+    with pytest.raises(ValueError, match=r"the least with which it can be there is 4\."):
+        plan(Paper.cardboard(), method="slip", grasp="free", curvature=3.5)
+
+
+def test_least_slide_without_a_moment_is_less_than_that_of_least_force():
+    with pytest.warns(UserWarning, match="the sheet slides"):
+        folded = plan(Paper.a4(), method="slip")
+    assert 0 < folded.slide[-1] < planned("a4").slide[-1]
+    rough = Paper(0.297, 0.21, 0.048, friction=0.3)
+    assert np.abs(plan(rough, method="slip").slide).max() < 1e-4
+
+
+def test_looking_one_step_ahead_ends_in_a_long_slide():
+    folded = plan(Paper.a4(), method="local")
+    assert np.nanmax(folded.slide) > 0.05
+    assert folded.poses[-1, 0] == pytest.approx(0.297, abs=1e-8)
+
+
+@pytest.mark.parametrize(("at", "slide"), [(100, 0.004), (160, 0.004), (200, -0.003)])
+def test_the_rest_of_a_fold_is_planned_anew_from_where_the_sheet_slid(at, slide):
+    folded = planned("a4")
+    rest = replan(folded, folded.poses[at], slide)
+    np.testing.assert_allclose(rest.poses[0], folded.poses[at], atol=1e-9)
+    np.testing.assert_allclose(rest.poses[-1], folded.poses[-1] + [slide, 0, 0, 0, 0, 0, 0], atol=1e-6)
+    lgb = folded.paper.gravito_bending_length
+    inner = inner_edges(rest) - [rest.jaw.depth + slide, 0]
+    off = rest.angles - elastica(inner[:, 0] / lgb, inner[:, 1] / lgb).angle
+    np.testing.assert_allclose(off, off[0] * np.linspace(1, 0, len(rest)), atol=1e-6)
+    assert np.abs(np.diff(rest.angles)).max() < 0.1
+    again = replan(rest, rest.poses[50], slide)
+    assert again.target == pytest.approx(rest.target)
+
+
+def test_a_pose_far_from_any_sheet_is_refused():
+    folded = planned("a4")
+    with pytest.raises(ValueError, match="pose must be one of a sheet without moment"):
+        replan(folded, [2.0, 0, 0.1, 0, 0, 0, 1], 0.0)
+    with pytest.raises(ValueError, match="slide must"):
+        replan(folded, folded.poses[100], float("nan"))
+
+
+def test_the_command_writes_a_plan(tmp_path, capsys):
+    out = tmp_path / "fold.csv"
+    assert (
+        main(["fold", "--paper", "a4", "--target", "half", "--method", "slip", "--grasp", "free", "--out", f"{out}"])
+        == 0
+    )
+    assert "slides 0.0 mm" in capsys.readouterr().out
+    np.testing.assert_allclose(np.loadtxt(out, delimiter=",", skiprows=1)[:, 1:], freely("a4").poses, atol=1e-8)
+    assert main(["fold", "--target", "0.5", "--out", f"{out}"]) == 2
+    assert "target must be on the sheet" in capsys.readouterr().err
+    assert main(["fold", "--lgb", "-1", "--out", f"{out}"]) == 2
+
+
 def test_limits_of_speed_and_acceleration_hold():
     slow = plan(Paper.a4(), speed=0.03, acceleration=0.05, turning=0.4)
     velocity = np.diff(slow.poses[:, [0, 2]], axis=0) / np.diff(slow.times)[:, None]
@@ -122,6 +214,10 @@ def test_saved_tables_hold_the_plan(tmp_path):
         ({"target": 0.02}, "target is 0.02 m"),
         ({"method": "best"}, "method must be"),
         ({"grasp": "tight"}, "grasp must be"),
+        ({"grasp": "free"}, "of method 'slip'"),
+        ({"uncertainty": (0.1, 1.5)}, "uncertainty must be shares"),
+        ({"uncertainty": 0.1}, "uncertainty must"),
+        ({"curvature": 0.0}, "curvature must be positive"),
         ({"speed": 0.0}, "speed must be positive"),
         ({"acceleration": float("nan")}, "acceleration must"),
         ({"jaw": Jaw(depth=0.1)}, "jaw must hold less than a fifth"),

@@ -186,7 +186,7 @@ def test_gradient_of_a_run_through_joints_that_turn_is_that_of_differences(integ
 
     cases = [
         *settings(drawn, random),
-        ((moment, "moment"), np.array([1.0, 0, 0]), lambda h: sim.set(moment, moment=(0.02 + h, -0.01, 0.015)), 1e-3),
+        ((moment, "moment"), np.array([1.0, 0, 0]), lambda h: sim.set(moment, moment=(0.02 + h, -0.01, 0.015)), 5e-4),
         ("initial_velocities", way, lambda h: sim.set_velocities(None, 2.0 * velocities + h * way), 1e-4),
     ]
     start = sim.snapshot()
@@ -312,8 +312,6 @@ def test_what_has_no_gradient_says_so():
         sim.run(0.01, record_every=0.01, progress=False).gradient({"positions": zeros}, ["gravity"])
     record = sim.run(0.01, record_every=0.01, progress=False, differentiable=True)
     assert np.all(record.gradient({"positions": zeros}, ["gravity"])[0] == 0.0)
-    with pytest.raises(ValueError, match="pose"):
-        record.gradient({"positions": zeros}, [(drawn.wall, "position")])
     with pytest.raises(ValueError, match="derivatives by"):
         record.gradient({"curvatures": zeros}, ["gravity"])
     with pytest.raises(ValueError, match="before it is saved"):
@@ -387,93 +385,3 @@ def test_radii_that_have_no_gradient_say_so():
         gradient(withe.Tube(0.02, 0.01), floor=False)
     with pytest.raises(ValueError, match="surfaces would move"):
         gradient(withe.Circle(0.01), floor=True)
-
-
-CONTACTS = ("floor", "slope in a plane", "sphere", "capsule", "crossing", "floor lying")
-
-
-def touching(kind):
-    """A soft arm that meets what is below it within 30 ms, by contact of a given stiffness, without friction."""
-    scene = withe.Scene()
-    material = withe.Material(youngs_modulus=1e6, poisson_ratio=0.4, density=1200.0, viscosity=100.0)
-    s = np.linspace(0.0, 1.0, NODES)
-    wave = 0.0 * s if "plane" in kind else 0.02 * np.sin(3.0 * s)
-    low = 1.05e-2 if kind == "floor lying" else 1.6e-2
-    points = np.stack([0.3 * s, wave, low + 0.03 * s * (1 - s)], 1)
-    arm = scene.add_rod(points=points, radius=1e-2, material=material, name="arm")
-    scene.add_drag(0.1)
-    if kind in ("floor", "floor lying"):
-        scene.add_floor(0.0)
-    elif kind == "slope in a plane":
-        scene.add_plane((0, 0, 0), (0.1, 0, 1))
-    elif kind == "sphere":
-        scene.add_sphere((0.13, 0.01, -0.05), 0.05)
-    elif kind == "capsule":
-        scene.add_capsule((0.1, -0.1, -0.03), (0.14, 0.1, -0.02), 0.03)
-    else:
-        other = scene.add_rod(
-            start=(0.11, -0.1, -0.008), end=(0.15, 0.1, -0.004), nodes=7, radius=1e-2, material=material
-        )
-        scene.clamp(other.start)
-    scene.enable_contact(stiffness=2e5, distance_tolerance=4e-3)
-    simulation = scene.build(integrator="backward_euler", time_step=2e-3, adaptive=False, **TIGHT)
-    simulation.set_velocities(arm, (0.1, 0.0, -0.6))
-    return simulation, arm
-
-
-@pytest.mark.parametrize("kind", CONTACTS)
-def test_gradient_of_a_run_through_contact_is_that_of_differences(kind):
-    sim, arm = touching(kind)
-    random = np.random.default_rng(8)
-    ways = random.normal(size=(2, NODES, 3)) * (1, 0 if "plane" in kind else 1, 1)
-    nodes = len(sim.positions())
-    weights = random.normal(size=(4, nodes, 3)) * (1, 0 if "plane" in kind else 1, 1)
-    start = sim.snapshot()
-
-    def run(**options):
-        return sim.run(30e-3, record_every=10e-3, progress=False, **options)
-
-    record = run(differentiable=True)
-    assert len(sim.contacts()) > 0
-    zero = np.zeros((nodes - NODES, 3))
-    cases = [
-        ((arm, "youngs_modulus"), 1.0, lambda h: sim.set(arm, youngs_modulus=1e6 + h), 30.0),
-        ((arm, "density"), 1.0, lambda h: sim.set(arm, density=1200.0 + h), 0.03),
-        ("gravity", np.array([0, 0, 1.0]), lambda h: sim.set(None, gravity=(0, 0, -9.81 + h)), 1e-3),
-        (
-            "initial_velocities",
-            np.concatenate([ways[0], zero]),
-            lambda h: sim.set_velocities(arm, np.array([0.1, 0.0, -0.6]) + h * ways[0]),
-            1e-5,
-        ),
-        (
-            "initial_positions",
-            np.concatenate([ways[1], zero]),
-            lambda h: move_with_directors(sim, arm, h * ways[1]),
-            1e-7,
-        ),
-    ]
-    gradients = record.gradient({"positions": weights}, [unknown for unknown, *_ in cases])
-    sim.restore(start)
-    for gradient, (unknown, along, change, size) in zip(gradients, cases, strict=True):
-        expected = difference(sim, lambda: float((weights * run().positions()).sum()), change, size)
-        assert np.sum(gradient * along) == pytest.approx(expected, rel=1e-5, abs=1e-10), unknown
-
-
-def test_contact_that_no_gradient_goes_through_says_what_to_do():
-    def refusal(integrator="backward_euler", friction=0.0, restitution=1.0, stiffness=None):
-        scene = withe.Scene()
-        material = withe.Material(youngs_modulus=1e6, poisson_ratio=0.4, density=1200.0)
-        scene.add_rod(start=(0, 0, 0.011), end=(0.2, 0, 0.012), nodes=5, radius=1e-2, material=material)
-        scene.add_floor(0.0, friction=friction, restitution=restitution)
-        scene.enable_contact(stiffness=stiffness)
-        simulation = scene.build(integrator=integrator, time_step=1e-3)
-        record = simulation.run(0.05, record_every=0.05, progress=False, differentiable=True)
-        with pytest.raises(ValueError, match="no gradient is known of this run") as refused:
-            record.gradient({"positions": np.full((2, 5, 3), (0.0, 0.0, 1.0))}, ["gravity"])
-        return str(refused.value)
-
-    assert "take integrator='backward_euler'" in refusal(integrator="implicit_midpoint", stiffness=1e5)
-    assert "take friction=0" in refusal(friction=0.3, stiffness=1e5)
-    assert "take restitution=1" in refusal(restitution=0.5, stiffness=1e5)
-    assert "give enable_contact(stiffness=)" in refusal()

@@ -108,11 +108,13 @@ def test_what_is_no_tensor_of_float64_is_refused():
         ({}, "must map"),
         ({(arm, "colour"): double}, "colour"),
         ({"colour": double}, "no 'colour'"),
-        ({(sim["wall"], "rotation"): double}, "supports have a position"),
+        ({(sim["wall"], "position"): double}, "a rollout takes no 'position' of a support"),
         ({"initial_positions": torch.tensor(sim.positions() + 1.0)}, "a support holds"),
     ):
         with pytest.raises(ValueError, match=message):
             withe.learning.rollout(sim, values, 0.02)
+    with pytest.raises(ValueError, match="supports have a position"):
+        withe.learning.equilibrium(sim, {(sim["wall"], "rotation"): double})
     with pytest.raises(ValueError, match="of must be"):
         withe.learning.rollout(sim, {(arm, "youngs_modulus"): double}, 0.02, of="colours")
     with pytest.raises(ValueError, match=r"must be a withe\.Simulation"):

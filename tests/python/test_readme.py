@@ -100,3 +100,13 @@ def test_what_a_camera_saw_of_an_arm_is_explained(tmp_path, monkeypatch):
     assert names["found"].converged.all()
     assert names["found"].rms.max() < 5.4  # pixels: 1 % of the length, with one arm for two limbs
     assert names["simulation"].get(arm, "natural_curvature").any()
+
+
+def test_the_cable_of_the_readme_is_laid(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    names = {}
+    for block in blocks("deployment.plan"):
+        assert "floor=0.4)" in block
+        exec(compile(block.replace("floor=0.4)", "floor=0.4, nodes=50, progress=False)"), str(README), "exec"), names)
+    assert (tmp_path / "wave.csv").stat().st_size > 1000
+    assert names["found"].error < 2e-3

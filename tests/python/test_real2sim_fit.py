@@ -318,6 +318,11 @@ def test_bad_targets_are_refused(make, message):
         make()
 
 
+def test_what_is_wrong_with_conditions_is_heard():
+    with pytest.raises(ValueError, match="leg"):
+        fit(arm(), Tags([[(1, 0, 0)]], ["arm.end"]), ARM, conditions=lambda s, f: s.set("leg", density=1.0))
+
+
 def test_turns_in_space_need_an_axis():
     targets = Curvatures([[0.1]], names([0, 15, 30]), [(1,)])
     with pytest.raises(ValueError, match="normal must be given"):

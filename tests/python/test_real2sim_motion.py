@@ -128,6 +128,8 @@ def test_the_shape_of_what_rings_is_told_with_its_stiffness(unknown):
         (Tags([[(0, 0, 0)]], ["arm.end"], times=[0.1]), ["dealy"], {}, "must be tuples, or 'delay' once"),
         (Tags([[(0, 0, 0)]], ["arm.end"], times=[0.1]), [], {}, "unknowns must be at least one"),
         (Tags([[(0, 0, 0)]], ["arm.end"], times=[0.1]), UNKNOWNS, {"delay": -0.2}, "times plus delay must not be"),
+        (Tags([[[np.nan] * 3]], ["arm.end"], times=[0.1]), UNKNOWNS, {}, "show something at some time"),
+        (Tags([[(0, 0, 0)]], ["arm.end"], times=[0.1]), UNKNOWNS, {"begin": lambda s: s.release("leg")}, "leg"),
         (
             [Tags([[(0, 0, 0)]], ["arm.end"], times=[t], sigma=1) for t in (0.1, 0.2)],
             UNKNOWNS,
@@ -139,3 +141,12 @@ def test_the_shape_of_what_rings_is_told_with_its_stiffness(unknown):
 def test_bad_input_is_refused(targets, unknowns, options, message):
     with pytest.raises(ValueError, match=message):
         fit_motion(ringing(), targets, unknowns, progress=False, **options)
+
+
+def test_a_run_that_fails_with_the_first_guess_says_why():
+    def fall(simulation):
+        raise withe.ConvergenceError("it does not come to rest")
+
+    target = Tags([[(0, 0, 0)]], ["arm.end"], times=[0.1])
+    with pytest.raises(withe.ConvergenceError, match="does not come to rest"):
+        fit_motion(ringing(), target, UNKNOWNS, begin=fall, progress=False)

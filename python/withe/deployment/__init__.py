@@ -10,6 +10,7 @@ length, unless they belong to a particular cable: then in m and N.
 """
 
 from withe.deployment.cable import Cable, MeasuredCable, measure
+from withe.deployment.deploying import Deployment, deploy
 from withe.deployment.feasibility import Feasibility, Slip
 from withe.deployment.grasping import Grasp, grasp
 from withe.deployment.pattern import Pattern
@@ -18,6 +19,7 @@ from withe.deployment.straight import StraightLine, StraightPose
 
 __all__ = [
     "Cable",
+    "Deployment",
     "Feasibility",
     "Grasp",
     "MeasuredCable",
@@ -27,6 +29,7 @@ __all__ = [
     "Slip",
     "StraightLine",
     "StraightPose",
+    "deploy",
     "grasp",
     "measure",
     "plan",

@@ -9,12 +9,13 @@ the sheet per length. That makes one solution serve every paper.
 2.3762 rad, 3.4000 Lgb lifted, ratio of forces 0.3837
 """
 
+from withe.folding.closed_loop import fold
 from withe.folding.hanging_strip import Measured, droop, measure
 from withe.folding.jaw import Jaw
 from withe.folding.manifold import elastica
 from withe.folding.noise import Noise
 from withe.folding.paper import Paper
-from withe.folding.planning import plan
+from withe.folding.planning import plan, replan
 from withe.folding.plans import Plan
 from withe.folding.seeing import SeenEdge, find_edge, overhead_camera
 from withe.folding.sheets import Elastica
@@ -33,7 +34,9 @@ __all__ = [
     "droop",
     "elastica",
     "find_edge",
+    "fold",
     "measure",
     "overhead_camera",
     "plan",
+    "replan",
 ]

@@ -16,7 +16,7 @@ import numpy.typing as npt
 from withe.folding.manifold import elastica
 from withe.folding.sheets import Elastica, at_forces, join, take
 
-__all__ = ["SPACING", "Grid", "lift", "make_grid", "shortest_path"]
+__all__ = ["SPACING", "Grid", "gentle", "lift", "make_grid", "shortest_path"]
 
 FloatArray = npt.NDArray[np.float64]
 IndexArray = npt.NDArray[np.intp]
@@ -66,6 +66,14 @@ def lift() -> Elastica:
         if np.abs(step).max() < 1e-13:
             break
     return at_forces(np.stack([ahead, zeros, _LIFTS], axis=1))
+
+
+def gentle(lifted: FloatArray) -> FloatArray:
+    """Normal force of the lift at lengths between its nodes."""
+    from scipy.interpolate import CubicSpline
+
+    raised = lift()
+    return np.asarray(CubicSpline(raised.suspended, raised.normal_force)(lifted))
 
 
 @cache

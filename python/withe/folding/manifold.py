@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from typing import Any
 
@@ -12,12 +10,11 @@ import numpy.typing as npt
 
 from withe._core import SheetManifold
 from withe.common import validation
-from withe.folding.sheets import Elastica, described
+from withe.folding.sheets import Elastica, described, shared
 
 __all__ = ["elastica"]
 
 FloatArray = npt.NDArray[np.float64]
-_LEAST_SHARE = 500  # poses that are worth a thread of their own
 
 
 @cache
@@ -88,10 +85,7 @@ def elastica(
     growth = validation.non_negative(width_growth, "width_growth")
     manifold = _manifold()
     solve = manifold.at_position if by_position else manifold.at_length_and_angle
-    parts = max(1, min(os.cpu_count() or 1, first.size // _LEAST_SHARE))
-    shares = zip(np.array_split(first.ravel(), parts), np.array_split(second.ravel(), parts), strict=True)
-    with ThreadPoolExecutor(parts) as pool:  # the engine releases the interpreter
-        rows = np.concatenate(list(pool.map(lambda share: solve(share[0], share[1], growth, moment), shares)))
+    rows = shared(lambda one, other: solve(one, other, growth, moment), first.ravel(), second.ravel())
     return described(rows, first.shape)
 
 

@@ -2,26 +2,62 @@
 
 from __future__ import annotations
 
+import warnings
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
-from withe.folding import moment_free
-from withe.folding.grid import SPACING
-from withe.folding.jaw import Jaw, outer_edge
+from withe.folding import free_moment, moment_free
+from withe.folding.free_moment import Holding, Way
+from withe.folding.jaw import Jaw, inner_edge, outer_edge
+from withe.folding.manifold import elastica
 from withe.folding.paper import Paper
-from withe.folding.plans import Plan
-from withe.folding.sheets import Elastica, poses_of
+from withe.folding.plans import FLAT, Plan
+from withe.folding.sheets import Elastica, at_forces, at_poses, forces_of, join, poses_of, take
 from withe.folding.timing import evenly, travel_times
 
-__all__ = ["plan"]
+__all__ = ["plan", "replan"]
 
 FloatArray = npt.NDArray[np.float64]
-Method = Literal["intuitive", "ucs"]
-Grasp = Literal["moment_free"]
+Method = Literal["intuitive", "local", "ucs", "slip"]
+Grasp = Literal["moment_free", "free"]
 _POSES = 251
+_POSES_OF_REST = 101
+
+
+@dataclass(frozen=True)
+class _Task:
+    """What was asked for, checked."""
+
+    paper: Paper
+    target: float
+    method: str
+    grasp: str
+    jaw: Jaw
+    uncertainty: tuple[float, float]
+    curvature: float
+    speed: float
+    turning: float
+    acceleration: float
+
+    @property
+    def length(self) -> float:
+        """Of the sheet beyond the jaw [Lgb]."""
+        return (self.paper.length - self.jaw.depth) / self.paper.gravito_bending_length
+
+    @property
+    def holding(self) -> Holding:
+        lgb, jaw = self.paper.gravito_bending_length, self.jaw
+        sizes = (jaw.depth / lgb, jaw.finger / lgb, self.paper.thickness / lgb)
+        return Holding(self.length, *sizes, self.curvature, self.uncertainty[0])
+
+    def outer(self, sheet: Elastica) -> FloatArray:
+        """Outer edges (x, z [m], angle) of sheets that hang from the jaw's inner edge."""
+        lgb = self.paper.gravito_bending_length
+        return outer_edge(poses_of(sheet) * [lgb, lgb, 1.0], self.jaw.depth)
 
 
 def plan(
@@ -30,6 +66,8 @@ def plan(
     *,
     method: Method = "ucs",
     grasp: Grasp = "moment_free",
+    uncertainty: tuple[float, float] = (0.1, 0.5),
+    curvature: float = 2.5,
     jaw: Jaw | None = None,
     speed: float = 0.05,
     acceleration: float = 0.2,
@@ -43,11 +81,19 @@ def plan(
     target : float or "half" [m]
         Where the lifted edge comes down, from where it lay (the dissertation's C); the crease is in the middle. "half":
         on the far edge.
-    method : {"ucs", "intuitive"}
+    method : {"ucs", "slip", "local", "intuitive"}
         "ucs": least accumulated ratio of the table's tangential to its normal force, on a grid of positions
-        [dissertation, Alg. 7, with costs that accumulate]. "intuitive": half a circle [dissertation, (7.18)].
-    grasp : {"moment_free"}
-        The angle of the jaw is that at which the sheet ends without curvature [dissertation, (7.6)].
+        [dissertation, Alg. 7, with costs that accumulate]. "slip": no predicted slide where such a way exists, or else
+        as little as can be; then short and little bent. "local": from each pose to the next one of least tangential
+        force, after Petrik et al. 2016, with the right stiffness. "intuitive": half a circle [dissertation, (7.18)].
+    grasp : {"moment_free", "free"}
+        "moment_free": the angle of the jaw is that at which the sheet ends without curvature [dissertation, (7.6)].
+        "free", of method "slip": the jaw turns the edge as it likes, and curvature is bounded.
+    uncertainty : pair of float
+        Of method "slip" with a free moment: shares by which Lgb may be more or less, and friction less, than the
+        paper's. A way without slide is one on which no such sheet slides.
+    curvature : float [1/Lgb]
+        Bound of a free moment's curvature.
     jaw : Jaw, optional
         How it holds the sheet; by default 10 mm of it.
     speed, acceleration : float [m/s], [m/s^2]
@@ -62,35 +108,50 @@ def plan(
     Raises
     ------
     ValueError
-        A target outside the sheet, or one that no pose of the grasp has; sizes and limits that are not positive; no
-        path, with what blocks it.
+        A target outside the sheet, or one that no pose of the grasp has; sizes and limits that are not positive; a
+        bound of curvature that is too low, with the least that would do; no path, with what blocks it.
+
+    Warns
+    -----
+    UserWarning
+        Every way of method "slip" slides: with the least friction at which one would not.
 
     Examples
     --------
     >>> import withe
-    >>> folded = withe.folding.plan(withe.folding.Paper.a4())
+    >>> folded = withe.folding.plan(withe.folding.Paper.a4(), method="slip", grasp="free")
     >>> folded.poses.shape
     (251, 7)
+    >>> print(f"{1e3 * abs(folded.slide).max():.1f} mm")
+    0.0 mm
     """
     if not isinstance(paper, Paper):
         raise ValueError(f"paper must be a Paper, got {paper!r}")
     jaw = Jaw() if jaw is None else jaw
-    validation.choice(method, "method", ("intuitive", "ucs"))
-    validation.choice(grasp, "grasp", ("moment_free",))
-    limits = (
-        validation.positive(speed, "speed"),
-        validation.positive(turning, "turning"),
-        validation.positive(acceleration, "acceleration"),
-    )
-    where = _target(paper, target)
+    validation.choice(method, "method", ("intuitive", "local", "ucs", "slip"))
+    validation.choice(grasp, "grasp", ("moment_free", "free"))
+    if grasp == "free" and method != "slip":
+        raise ValueError(f"grasp 'free' is one of method 'slip', not of {method!r}")
+    lgb_share, friction_share = validation.number_array(uncertainty, "uncertainty", (2,))
+    if not (0 <= lgb_share <= 0.3 and 0 <= friction_share < 1):
+        raise ValueError(f"uncertainty must be shares up to .3 of Lgb and below 1 of friction, got {uncertainty}")
     if jaw.depth > 0.2 * paper.length:
         raise ValueError(f"jaw must hold less than a fifth of the sheet, {paper.length:g} m long, got {jaw.depth:g} m")
+    task = _Task(
+        paper=paper,
+        target=_target(paper, target),
+        method=method,
+        grasp=grasp,
+        jaw=jaw,
+        uncertainty=(float(lgb_share), float(friction_share)),
+        curvature=validation.positive(curvature, "curvature"),
+        speed=validation.positive(speed, "speed"),
+        turning=validation.positive(turning, "turning"),
+        acceleration=validation.positive(acceleration, "acceleration"),
+    )
     if method == "intuitive":
-        angles = np.linspace(0.0, np.pi, _POSES)
-        outer = np.stack([0.5 * where * (1 - np.cos(angles)), 0.5 * where * np.sin(angles), angles], axis=1)
-        outer[-1, 1] = paper.thickness + jaw.finger
-        return _finished(paper, where, method, grasp, jaw, outer, None, limits)
-    return _over_manifold(paper, where, method, grasp, jaw, limits)
+        return _half_circle(task)
+    return _free(task) if grasp == "free" else _over_manifold(task)
 
 
 def _target(paper: Paper, target: float | str) -> float:
@@ -103,35 +164,116 @@ def _target(paper: Paper, target: float | str) -> float:
     return where
 
 
-def _over_manifold(
-    paper: Paper, where: float, method: str, grasp: str, jaw: Jaw, limits: tuple[float, float, float]
-) -> Plan:
-    lgb = paper.gravito_bending_length
-    length = (paper.length - jaw.depth) / lgb
-    goal = moment_free.goal_pose(where / lgb, paper.thickness / lgb, jaw.depth / lgb, jaw.finger / lgb)
-    goal = _checked_goal(goal, where, length, paper)
-    nodes = moment_free.uniform_cost(length, goal)
+def _half_circle(task: _Task) -> Plan:
+    angles = np.linspace(0.0, np.pi, _POSES)
+    radius = 0.5 * task.target
+    outer = np.stack([radius * (1 - np.cos(angles)), radius * np.sin(angles), angles], axis=1)
+    outer[-1, 1] = task.paper.thickness + task.jaw.finger
+    return _finished(task, outer, None)
+
+
+def _over_manifold(task: _Task) -> Plan:
+    length = task.length
+    goal = _checked_goal(_goal(task), task)
+    if task.method == "ucs":
+        nodes = moment_free.uniform_cost(length, goal)
+    elif task.method == "slip":
+        nodes = moment_free.least_slide(length, task.paper.friction, goal)
+    else:
+        nodes = moment_free.greedy(length, goal)
     if nodes is None:
+        ends = "the step of least force leads nowhere" if task.method == "local" else "those do not connect"
+        raise ValueError(f"no path to {task.target:g} m over poses that lift less than {length:.2f} Lgb: {ends}")
+    path = moment_free.smoothed(nodes, length, task.holding.ratio)
+    sheet = path.at(evenly(task.outer(path.pose), _POSES, task.speed, task.turning))
+    if not sheet.valid.all():
+        raise ValueError(f"no path to {task.target:g} m: between poses of the grid there are some without equilibrium")
+    _warn_of_slide(float(task.holding.ratio(sheet).max()), task)
+    return _finished(task, task.outer(sheet), sheet)
+
+
+def replan(present: Plan, pose: npt.ArrayLike, slide: float) -> Plan:
+    """Plan the rest of a fold anew, from where the jaw is and where the sheet has slid to.
+
+    Least accumulated force ratio over the manifold of poses without moment, whatever the present plan's method was; the
+    difference of the present angle to that manifold's is taken out evenly along the way [dissertation, (7.14)-(7.16)].
+
+    Parameters
+    ----------
+    present : Plan
+    pose : array_like of shape (7,) [m], [-]
+        Of the sheet's outer edge, as those of `present`.
+    slide : float [m]
+        How far the sheet has slid towards +x from where it lay when the first plan was made.
+
+    Returns
+    -------
+    Plan
+        In the same frame, from the pose on; its target and its times are those of the rest.
+
+    Raises
+    ------
+    ValueError
+        A pose that no sheet without moment can be near, or from which there is no path.
+
+    Examples
+    --------
+    >>> import withe
+    >>> folded = withe.folding.plan(withe.folding.Paper.a4())
+    >>> rest = withe.folding.replan(folded, folded.poses[150], slide=0.004)
+    >>> print(f"{rest.poses[-1, 0] - folded.poses[-1, 0]:.4f} m")
+    0.0040 m
+    """
+    x, _, z, _, qy, _, qw = validation.number_array(pose, "pose", (7,))
+    slide = validation.number(slide, "slide")
+    task = _Task(
+        paper=present.paper,
+        target=present.target - present.offset,
+        method="ucs",
+        grasp="moment_free",
+        jaw=present.jaw,
+        uncertainty=(0.0, 0.0),
+        curvature=2.5,
+        speed=present.limits[0],
+        turning=present.limits[1],
+        acceleration=present.limits[2],
+    )
+    lgb = task.paper.gravito_bending_length
+    angle = 2.0 * np.arctan2(qy, qw) % (2.0 * np.pi)
+    inner = inner_edge(np.array([[x - slide, z, angle]]), task.jaw.depth)[0] / [lgb, lgb, 1.0]
+    start = elastica([inner[0]], [inner[1]])
+    if not start.valid[0]:
+        raise ValueError(f"pose must be one of a sheet without moment, or near it: none has its edge at {x:g}, {z:g} m")
+    goal = _checked_goal(_goal(task), task)
+    nodes = moment_free.uniform_cost(task.length, goal, start)
+    if nodes is None:
+        raise ValueError(f"no path from {x:g}, {z:g} m to {task.target:g} m over poses without moment")
+    path = moment_free.smoothed(nodes, task.length, task.holding.ratio)
+    sheet = path.at(evenly(task.outer(path.pose), _POSES_OF_REST, task.speed, task.turning))
+    wanted = poses_of(sheet) + np.outer(np.linspace(1.0, 0.0, len(sheet.x)), [0.0, 0.0, inner[2] - start.angle[0]])
+    held = at_poses(wanted, forces_of(sheet))
+    if not held.valid.all():
         raise ValueError(
-            f"no path to {where:g} m: poses without moment that lift less than {length:.2f} Lgb do not connect"
+            f"pose must be near those of a sheet without moment: its angle is off by {inner[2] - start.angle[0]:.2f}"
         )
-    path = moment_free.smoothed(nodes, length, SPACING)
-    scale = np.array([lgb, lgb, 1.0])
-    outer = outer_edge(poses_of(path) * scale, jaw.depth)
-    sheet = moment_free.along(path, evenly(outer, _POSES, limits[0], limits[1]))
-    outer = outer_edge(poses_of(sheet) * scale, jaw.depth)
-    return _finished(paper, where, method, grasp, jaw, outer, sheet, limits)
+    return _finished(task, task.outer(held), held, offset=slide)
 
 
-def _checked_goal(goal: Elastica | None, where: float, length: float, paper: Paper) -> Elastica:
+def _goal(task: _Task) -> Elastica | None:
+    paper, jaw, lgb = task.paper, task.jaw, task.paper.gravito_bending_length
+    return moment_free.goal_pose(task.target / lgb, paper.thickness / lgb, jaw.depth / lgb, jaw.finger / lgb)
+
+
+def _checked_goal(goal: Elastica | None, task: _Task) -> Elastica:
+    where, lgb = task.target, task.paper.gravito_bending_length
     if goal is None:
         raise ValueError(
-            f"target is {where:g} m, {where / paper.gravito_bending_length:.2f} Lgb: no pose without moment that lifts "
-            "less than 6.84 Lgb, and more than .958, brings the edge there"
+            f"target is {where:g} m, {where / lgb:.2f} Lgb: no pose without moment that lifts less than 6.84 Lgb, and "
+            "more than .958, brings the edge there"
         )
     lifted = float(goal.suspended[0])
     for bound, wrong, what in (
-        (length, lifted >= length, "less than the sheet has"),
+        (task.length, lifted >= task.length, "less than the sheet has"),
         (moment_free.PENALTY, lifted <= moment_free.PENALTY, "more, so as not to be bent too sharply"),
     ):
         if wrong:
@@ -139,34 +281,83 @@ def _checked_goal(goal: Elastica | None, where: float, length: float, paper: Pap
     return goal
 
 
-def _finished(
-    paper: Paper,
-    where: float,
-    method: str,
-    grasp: str,
-    jaw: Jaw,
-    outer: FloatArray,
-    sheet: Elastica | None,
-    limits: tuple[float, float, float],
-) -> Plan:
+def _warn_of_slide(ratio: float, task: _Task) -> None:
+    if task.method == "slip" and ratio > task.paper.friction:
+        warnings.warn(
+            f"the sheet slides: this way needs friction {ratio:.3f}, the paper has {task.paper.friction:g}",
+            UserWarning,
+            stacklevel=4,  # where the user called plan
+        )
+
+
+def _free(task: _Task) -> Plan:
+    """Without the table's friction where that can be, then with some, then for a sheet that is just as thought."""
+    limit = task.paper.friction * (1 - task.uncertainty[1])
+    exact = replace(task.holding, share=0.0)
+    best: tuple[Way, Holding] | None = None
+    friction = task.paper.friction
+    for holding, pulls, most in (
+        (task.holding, False, friction),
+        (task.holding, True, friction),
+        (exact, True, np.inf),
+    ):
+        lattice = free_moment.make_lattice(holding, pulls, most)
+        found = free_moment.goals(lattice, holding, task.target / task.paper.gravito_bending_length)
+        found = take(found, holding.bearable(found))
+        way = free_moment.way_to(lattice, holding, found, holding.worst_ratio(found), limit) if len(found.x) else None
+        if way is not None and (best is None or holding.share == 0 or way.ratio < best[0].ratio):
+            best = way, holding
+        # Where some of the sheets that it may be slide anyway, the way is that for the sheet that it should be.
+        if best is not None and best[0].ratio <= (friction if pulls else limit):
+            break
+    if best is None:
+        raise ValueError(_blocked(task))
+    way, holding = best
+    places = free_moment.smoothed(way, holding, limit)
+    sheet = at_forces(free_moment.forces_at(places))
+    index = evenly(task.outer(sheet), _POSES - 1, task.speed, task.turning)
+    even = np.stack([np.interp(index, np.arange(len(places)), places[:, i]) for i in range(3)], axis=1)
+    sheet = join(at_forces([FLAT]), at_forces(free_moment.forces_at(even)))
+    _warn_of_slide(float(task.holding.ratio(sheet).max()), task)
+    return _finished(task, task.outer(sheet), sheet)
+
+
+def _blocked(task: _Task) -> str:
+    """Why no pose brings the edge there, or which bound would."""
+    said = f"no path brings the edge to {task.target:g} m with curvature of at most {task.curvature:g} / Lgb"
+    for factor in (1.5, 2.25, 3.4):
+        holding = replace(task.holding, share=0.0, curvature=factor * task.curvature)
+        lattice = free_moment.make_lattice(holding, True)
+        found = free_moment.goals(lattice, holding, task.target / task.paper.gravito_bending_length)
+        found = take(found, holding.bearable(found))
+        if len(found.x):
+            least = float(found.max_curvature.min())
+            if least > task.curvature:
+                return f"{said}: the least with which it can be there is {least:.2f}"
+            break
+    return f"{said} and lifting less than {task.length:.2f} Lgb: no pose there connects with the flat sheet"
+
+
+def _finished(task: _Task, outer: FloatArray, sheet: Elastica | None, offset: float = 0.0) -> Plan:
     """Put times to outer edges (x, z [m], angle), and see to the jaw's room."""
-    speed, turning, acceleration = limits
     x, z, angle = outer.T
     back = angle > 0.5 * np.pi
-    side, clearance = "edge", float(jaw.clearance(x, z, angle, "edge")[back].min())
+    side, clearance = "edge", float(task.jaw.clearance(x, z, angle, "edge")[back].min())
     if clearance < 0:
-        side, clearance = "side", float(jaw.clearance(x, z, angle, "side")[back].min())
+        side, clearance = "side", float(task.jaw.clearance(x, z, angle, "side")[back].min())
     zero = np.zeros_like(x)
     return Plan(
-        paper=paper,
-        target=where,
-        method=method,
-        grasp=grasp,
-        jaw=jaw,
+        paper=task.paper,
+        target=task.target + offset,
+        method=task.method,
+        grasp=task.grasp,
+        jaw=task.jaw,
+        limits=(task.speed, task.turning, task.acceleration),
+        offset=offset,
         side=side,
         clearance=clearance,
-        poses=np.stack([x, zero, z, zero, np.sin(0.5 * angle), zero, np.cos(0.5 * angle)], axis=1),
+        poses=np.stack([x + offset, zero, z, zero, np.sin(0.5 * angle), zero, np.cos(0.5 * angle)], axis=1),
         angles=angle,
-        times=travel_times(outer, speed, turning, acceleration),
+        times=travel_times(outer, task.speed, task.turning, task.acceleration),
         _foreseen=sheet,
     )

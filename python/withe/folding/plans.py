@@ -12,15 +12,18 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from withe.common import validation
+from withe.common.extras import require
+from withe.folding.figures import draw_fold, side_view
 from withe.folding.jaw import Jaw, inner_edge
 from withe.folding.paper import Paper
 from withe.folding.sheets import Elastica, at_forces, drag, forces_of, join, take
 from withe.io import written_beside
 
-__all__ = ["Plan"]
+__all__ = ["FLAT", "Plan"]
 
 FloatArray = npt.NDArray[np.float64]
-_FLAT = (0.05, 0.0, 0.1)  # forces of a sheet of which next to nothing is lifted [w Lgb], [Lgb]
+FLAT = (0.05, 0.0, 0.1)  # forces of a sheet of which next to nothing is lifted [w Lgb], [Lgb]
 _SHORT = 0.5  # the same of a sheet that a plan knows: poses say little of so short a part [Lgb]
 _LOW = 1e-5  # an edge less high than this lies on the table [Lgb]
 
@@ -43,6 +46,10 @@ class Plan:
         Where the outer edge comes down: x of the last pose. The crease is in the middle.
     method, grasp : str
     jaw : Jaw
+    limits : tuple of float [m/s], [rad/s], [m/s^2]
+        Speed, rate of turning, acceleration.
+    offset : float [m]
+        How far the sheet had slid when the plan was made: 0, but where a fold was planned anew.
     side : str
         From where the jaw's fingers come: "edge", from beyond the sheet's edge in line with the sheet; "side", from the
         side of the sheet, across it, where there would be no room for them beyond the edge.
@@ -61,6 +68,8 @@ class Plan:
     method: str
     grasp: str
     jaw: Jaw
+    limits: tuple[float, float, float]
+    offset: float
     side: str
     clearance: float
     poses: FloatArray
@@ -71,7 +80,7 @@ class Plan:
     @cached_property
     def _inner(self) -> FloatArray:
         """Poses of the jaw's inner edge in Lgb."""
-        outer = np.stack([self.poses[:, 0], self.poses[:, 2], self.angles], axis=1)
+        outer = np.stack([self.poses[:, 0] - self.offset, self.poses[:, 2], self.angles], axis=1)
         lgb = self.paper.gravito_bending_length
         return inner_edge(outer, self.jaw.depth) / [lgb, lgb, 1.0]
 
@@ -87,7 +96,7 @@ class Plan:
             forces, ahead = forces_of(self._foreseen)[begin], take(self._foreseen, slice(0, begin))
         else:
             begin = int(np.argmax(self._inner[:, 1] > _LOW))
-            forces, ahead = np.array(_FLAT), at_forces([_FLAT] * begin)
+            forces, ahead = np.array(FLAT), at_forces([FLAT] * begin)
         sheet, slide = drag(self._inner[begin:], forces, self.paper.friction, self._length)
         return join(ahead, sheet), np.concatenate([np.zeros(begin), slide])
 
@@ -109,7 +118,7 @@ class Plan:
 
     @cached_property
     def slide(self) -> FloatArray:
-        """How far the sheet has slid towards +x at each pose [m], of shape (n,).
+        """How far the sheet has slid towards +x at each pose [m], of shape (n,), since the plan was made.
 
         Predicted with exact elastica, what lies as a rigid body, and Coulomb's law with the friction of the paper; NaN
         from where no equilibrium is within reach: there the sheet snaps.
@@ -130,6 +139,35 @@ class Plan:
         way = f"{self.method}, {self.grasp}, {len(self)} poses in {self.times[-1]:.1f} s"
         return f"Plan({way}, greatest {greatest}, fingers from the {self.side})"
 
+    def plot(self, axes: Any | None = None, poses: int = 10) -> Any:
+        """Draw the sheet from the side at some of the poses, as planned, without slide.
+
+        Parameters
+        ----------
+        axes : matplotlib.axes.Axes, optional
+            To draw into; by default those of a new figure.
+        poses : int
+            How many, evenly in travel.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+
+        Raises
+        ------
+        ImportError
+            matplotlib is not installed.
+        """
+        if axes is None:
+            axes = require("matplotlib.pyplot", "view").subplots(layout="constrained")[1]
+        sheet, lgb = self.sheet, self.paper.gravito_bending_length
+        index = np.unique(np.linspace(0, len(self) - 1, validation.integer(poses, "poses", 1, 1000)).astype(int))
+        index = index[sheet.valid[index]]
+        outer = self.poses[:, [0, 2]]
+        views = [side_view(forces, self._length) * lgb + [self.jaw.depth, 0.0] for forces in forces_of(sheet)[index]]
+        draw_fold(axes, views, outer[index], outer, (-0.05 * self.paper.length, 1.05 * self.paper.length))
+        return axes
+
     def to_dict(self) -> dict[str, Any]:
         """Everything, with frames and units, as JSON takes it; what is not finite is None."""
 
@@ -148,6 +186,8 @@ class Plan:
             "target": self.target,
             "method": self.method,
             "grasp": self.grasp,
+            "limits": dict(zip(("speed", "turning", "acceleration"), self.limits, strict=True)),
+            "offset": self.offset,
             "jaw": {**vars(self.jaw), "side": self.side, "clearance": self.clearance},
             "times": self.times.tolist(),
             "poses": self.poses.tolist(),

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,9 +12,10 @@ import numpy.typing as npt
 
 from withe._core import dragged_sheet, sheets_at_forces, sheets_at_poses
 
-__all__ = ["Elastica", "at_forces", "at_poses", "described", "drag", "forces_of", "join", "poses_of", "take"]
+__all__ = ["Elastica", "at_forces", "at_poses", "described", "drag", "forces_of", "join", "poses_of", "shared", "take"]
 
 FloatArray = npt.NDArray[np.float64]
+_LEAST_SHARE = 500  # sheets that are worth a thread of their own
 
 
 @dataclass(frozen=True)
@@ -58,10 +62,10 @@ class Elastica:
     stable: npt.NDArray[np.bool_]
 
 
-def described(rows: FloatArray, shape: tuple[int, ...]) -> Elastica:
+def described(rows: FloatArray, shape: tuple[int, ...], *, keep: bool = False) -> Elastica:
     """Give rows of the engine's table their names; in a shape that has as many entries as there are rows."""
     valid = rows[:, 7] > 0
-    columns = [np.where(valid, rows[:, i], np.nan).reshape(shape) for i in (0, 1, 2, 3, 4, 5, 6, 9)]
+    columns = [np.where(valid | keep, rows[:, i], np.nan).reshape(shape) for i in (0, 1, 2, 3, 4, 5, 6, 9)]
     x, z, angle, suspended, normal, tangential, curvature, moment = columns
     return Elastica(
         x=x,
@@ -88,6 +92,16 @@ def take(sheet: Elastica, index: npt.NDArray[np.generic] | slice) -> Elastica:
     return Elastica(**{name: value[index] for name, value in vars(sheet).items()})
 
 
+def shared(solve: Callable[..., FloatArray], *columns: FloatArray) -> FloatArray:
+    """Rows of many sheets, by threads: the engine releases the interpreter."""
+    parts = max(1, min(os.cpu_count() or 1, len(columns[0]) // _LEAST_SHARE))
+    if parts == 1:
+        return solve(*columns)
+    shares = zip(*(np.array_split(column, parts) for column in columns), strict=True)
+    with ThreadPoolExecutor(parts) as pool:
+        return np.concatenate(list(pool.map(lambda share: solve(*share), shares)))
+
+
 def forces_of(sheet: Elastica) -> FloatArray:
     """The three numbers that name an equilibrium, of shape (..., 3): normal force, tangential force, lifted length."""
     return np.stack([sheet.normal_force, sheet.tangential_force, sheet.suspended], axis=-1)
@@ -98,16 +112,21 @@ def poses_of(sheet: Elastica) -> FloatArray:
     return np.stack([sheet.x, sheet.z, sheet.angle], axis=-1)
 
 
-def at_forces(forces: npt.ArrayLike) -> Elastica:
-    """Equilibria by the numbers of `forces_of`: an initial value problem, with whatever moment at the tip."""
+def at_forces(forces: npt.ArrayLike, *, keep: bool = False) -> Elastica:
+    """Equilibria by the numbers of `forces_of`: an initial value problem, with whatever moment at the tip.
+
+    `keep`: numbers of what is not valid too, for searches that pass through such.
+    """
     forces = np.asarray(forces, dtype=float)
-    return described(sheets_at_forces(forces.reshape(-1, 3), 0.0), forces.shape[:-1])
+    rows = shared(lambda share: sheets_at_forces(share, 0.0), forces.reshape(-1, 3))
+    return described(rows, forces.shape[:-1], keep=keep)
 
 
 def at_poses(poses: npt.ArrayLike, forces: npt.ArrayLike) -> Elastica:
     """Equilibria of sheets held at poses (x, z, angle), each followed without a jump from one of known forces."""
     poses, forces = np.broadcast_arrays(np.asarray(poses, dtype=float), np.asarray(forces, dtype=float))
-    return described(sheets_at_poses(poses.reshape(-1, 3), forces.reshape(-1, 3), 0.0), poses.shape[:-1])
+    rows = shared(lambda share, known: sheets_at_poses(share, known, 0.0), poses.reshape(-1, 3), forces.reshape(-1, 3))
+    return described(rows, poses.shape[:-1])
 
 
 def drag(poses: npt.ArrayLike, forces: npt.ArrayLike, friction: float, length: float) -> tuple[Elastica, FloatArray]:

@@ -64,6 +64,8 @@ class Fold:
         moment.
     record : Record
         Of rod "sheet", from the lifted edge on, over obstacle "table".
+    seen_slides : tuple of float [m]
+        What a camera saw of the slide on the way; NaN where it did not see the far edge.
     """
 
     error: float
@@ -73,6 +75,7 @@ class Fold:
     max_speed: float
     failure: str | None
     record: Record
+    seen_slides: tuple[float, ...] = ()
 
 
 class SimulatedSheet:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy.typing as npt
 from withe import _core
 from withe.common import validation
 from withe.parts.directory import Directory
-from withe.parts.friction import Friction, check_law, friction_pair
+from withe.parts.friction import Coefficients, Friction, check_law, coefficients
 from withe.parts.handles import Obstacle, Rod
 from withe.parts.kinds import (
     ContactSettings,
@@ -19,7 +20,19 @@ from withe.parts.kinds import (
     RodPart,
 )
 
-__all__ = ["CONTACT", "Body", "body_of", "contact_table", "describe_contact", "make_obstacle", "pair_of", "touching"]
+__all__ = [
+    "CONTACT",
+    "Body",
+    "BodyPair",
+    "body_of",
+    "contact_table",
+    "describe_contact",
+    "drawn_frictions",
+    "make_obstacle",
+    "pair_friction",
+    "pair_of",
+    "touching",
+]
 
 FloatArray = npt.NDArray[np.float64]
 Body = Rod | Obstacle | str
@@ -49,7 +62,7 @@ def make_obstacle(
     restitution: float,
 ) -> ObstaclePart:
     """An obstacle, checked; not yet in the directory."""
-    both = friction_pair(friction, f"friction of {name!r}")
+    both = coefficients(friction, f"friction of {name!r}")
     restitution = validation.share(restitution, f"restitution of {name!r}")
     return ObstaclePart(name, kind, point, other, radius, both, restitution)
 
@@ -68,6 +81,15 @@ def pair_of(directory: Directory, a: Body, b: Body) -> tuple[str, str]:
     return (first.name, second.name) if first.name <= second.name else (second.name, first.name)
 
 
+def pair_friction(directory: Directory, a: Body, b: Body, friction: Friction) -> Coefficients:
+    """Friction of two bodies, checked; see `Scene.set_friction`."""
+    parts = [touching(directory, body) for body in (a, b)]
+    rods = [part for part in parts if isinstance(part, RodPart)]
+    directed = len(rods) == 1
+    what = f"friction of {parts[0].name!r} and {parts[1].name!r}"
+    return coefficients(friction, what, directed=directed, edges=len(rods[0].lengths) if directed else None)
+
+
 def touching(directory: Directory, handle: Body) -> RodPart | ObstaclePart:
     """What a handle or name of something that touches means.
 
@@ -82,6 +104,23 @@ def touching(directory: Directory, handle: Body) -> RodPart | ObstaclePart:
     return part
 
 
+@dataclass(frozen=True)
+class BodyPair:
+    """Two that may touch."""
+
+    first: RodPart | ObstaclePart
+    second: RodPart | ObstaclePart
+
+    @property
+    def name(self) -> str:
+        """The same in either order."""
+        return ", ".join(sorted((self.first.name, self.second.name)))
+
+    def bodies(self, directory: Directory) -> set[int]:
+        """How the engine calls them."""
+        return {body_of(directory, self.first), body_of(directory, self.second)}
+
+
 def body_of(directory: Directory, part: RodPart | ObstaclePart) -> int:
     """How the engine calls a rod (its index) or an obstacle (-1 - index)."""
     return part.index if isinstance(part, RodPart) else -1 - directory.all(ObstaclePart).index(part)
@@ -93,7 +132,7 @@ def describe_contact(directory: Directory) -> _core.ContactDescription:
     Raises
     ------
     ValueError
-        A distance tolerance above the radius of a rod.
+        A distance tolerance above the contact radius of a rod.
     """
     settings: ContactSettings = directory.contact
     contact = _core.ContactDescription()
@@ -113,23 +152,25 @@ def describe_contact(directory: Directory) -> _core.ContactDescription:
     obstacles = directory.all(ObstaclePart)
     rods = directory.all(RodPart)
     for rod in rods:
-        smallest = float(rod.section.radii.min())
+        smallest = float(rod.contact_radius.min())
         if settings.distance_tolerance is not None and settings.distance_tolerance > smallest:
             raise ValueError(
-                f"distance_tolerance must not exceed the radius of rod {rod.name!r}, {smallest:g} m, "
+                f"distance_tolerance must not exceed the contact radius of rod {rod.name!r}, {smallest:g} m, "
                 f"got {settings.distance_tolerance:g} m"
             )
     contact.obstacles = [_describe_obstacle(part) for part in obstacles]
     for part in obstacles:
-        check_law(part.friction, settings.friction_model, f"friction of {part.name!r}")
-    contact.obstacle_friction = np.array([part.friction[0] for part in obstacles], dtype=float)
-    contact.obstacle_across = np.array([part.friction[1] for part in obstacles], dtype=float)
+        check_law(part.friction.pair, settings.friction_model, f"friction of {part.name!r}")
+    contact.obstacle_friction = np.array([part.friction.pair[0] for part in obstacles], dtype=float)
+    contact.obstacle_across = np.array([part.friction.pair[1] for part in obstacles], dtype=float)
     contact.obstacle_restitution = np.array([part.restitution for part in obstacles], dtype=float)
     bodies = {rod.name: rod.index for rod in rods} | {part.name: -1 - i for i, part in enumerate(obstacles)}
     for (a, b), own in settings.pairs.items():
         if own.friction is not None:
-            check_law(own.friction, settings.friction_model, f"friction of {a!r} and {b!r}")
-    pairs = [_pair(bodies[a], bodies[b], own) for (a, b), own in settings.pairs.items()]
+            check_law(own.friction.pair, settings.friction_model, f"friction of {a!r} and {b!r}")
+    owned = {(bodies[a], bodies[b]): own for (a, b), own in settings.pairs.items()}
+    pairs = [_pair(first, second, own) for (first, second), own in owned.items()]
+    _vary_friction(pairs, owned, rods, obstacles)
     members = list(settings.groups.items())
     for i, (a, group) in enumerate(members):
         pairs += [_pair(bodies[a], bodies[b], PairSettings(ignored=True)) for b, other in members[i:] if other == group]
@@ -151,10 +192,38 @@ def _pair(first: int, second: int, own: PairSettings) -> _core.ContactPairDescri
     pair = _core.ContactPairDescription()
     pair.first, pair.second = first, second
     pair.ignored = own.ignored
-    pair.friction, pair.across = (-1.0, -1.0) if own.friction is None else own.friction
+    pair.friction, pair.across = (-1.0, -1.0) if own.friction is None else own.friction.pair
     pair.stiffness = own.stiffness or 0.0
     pair.restitution = -1.0 if own.restitution is None else own.restitution
     return pair
+
+
+def _vary_friction(
+    pairs: list[_core.ContactPairDescription],
+    owned: dict[tuple[int, int], PairSettings],
+    rods: list[RodPart],
+    obstacles: list[ObstaclePart],
+) -> None:
+    """Give rods and obstacles what their friction is where it varies; pairs that have nothing else of their own too."""
+    for i, obstacle in enumerate(obstacles):
+        for rod in rods:
+            bodies = {rod.index, -1 - i}
+            place = next((k for k, both in enumerate(owned) if set(both) == bodies), None)
+            own = None if place is None else pairs[place]
+            friction = None if place is None else list(owned.values())[place].friction
+            shares = (friction or obstacle.friction).shares(rod.points, rod.closed, f"friction of {obstacle.name!r}")
+            if shares is None:
+                continue
+            if own is None:
+                own = _pair(rod.index, -1 - i, PairSettings())
+                pairs.append(own)
+            own.shares = shares
+
+
+def drawn_frictions(scene: Directory) -> dict[tuple[str, ...], Coefficients]:
+    """Friction of obstacles, and of pairs that have their own, as it was drawn."""
+    found: dict[tuple[str, ...], Coefficients] = {(part.name,): part.friction for part in scene.all(ObstaclePart)}
+    return found | {names: own.friction for names, own in scene.contact.pairs.items() if own.friction is not None}
 
 
 def contact_table(directory: Directory, table: _core.ContactTable) -> npt.NDArray[np.void]:

@@ -130,7 +130,8 @@ def _describe_rod(directory: Directory, rod: RodPart, coefficient: float) -> _co
     description.arc_lengths = rod.arcs
     description.natural_curvature = rod.natural_curvature
     description.natural_twist = rod.natural_twist
-    description.contact_radius = rod.section.radii
+    description.contact_radius = rod.contact_radius
+    description.fluid_radius = rod.section.radii
     _fill(description, rod.parameters.changed("drag", coefficient, rod.section, rod.owner))
     return description
 

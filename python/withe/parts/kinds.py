@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common.drawing import voronoi_lengths
+from withe.parts.friction import Coefficients
 from withe.parts.handles import (
     CustomForce,
     Drag,
@@ -90,6 +91,7 @@ class RodPart:
     arcs: FloatArray  # of the curve that they are chords of, (edges,) [m]
     voronoi: FloatArray  # (stencils,) [m]
     section: SectionProperties
+    contact_radius: FloatArray  # (edges,) [m]
     parameters: RodParameters
     natural_curvature: FloatArray  # (stencils, 2) [1/m]
     natural_twist: FloatArray  # (stencils,) [rad/m]
@@ -222,7 +224,7 @@ class ObstaclePart:
     point: FloatArray  # on the plane; start of the axis (3,) [m]
     other: FloatArray  # normal; end of the axis (3,)
     radius: float
-    friction: tuple[float, float]  # along and across rods
+    friction: Coefficients
     restitution: float
 
     @property
@@ -238,7 +240,7 @@ class PairSettings:
     """What two bodies have of their own; None: what the scene has."""
 
     ignored: bool = False
-    friction: tuple[float, float] | None = None  # along and across a rod
+    friction: Coefficients | None = None
     restitution: float | None = None
     stiffness: float | None = None  # [N/m]
 

@@ -35,6 +35,7 @@ def make_rod(
     normal: npt.ArrayLike | None,
     radius: npt.ArrayLike | None,
     section: Section | None,
+    contact_radius: npt.ArrayLike | None,
     material: Material | None,
     stiffness: Stiffness | None,
     line_density: npt.ArrayLike | None,
@@ -57,6 +58,9 @@ def make_rod(
     tangents = drawing.edge_vectors(centreline, closed) / lengths[:, None]
     directors = _directors(normal, tangents, owner)
     properties = _section(radius, section, len(lengths), owner)
+    touching = properties.touching
+    if contact_radius is not None:
+        touching = validation.per_item(contact_radius, f"contact_radius of {owner}", len(lengths), "edges")
     parameters = _parameters(material, stiffness, line_density, properties, owner)
 
     validation.choice(natural, f"natural of {owner}", get_args(Natural))
@@ -91,6 +95,7 @@ def make_rod(
         arcs=arcs,
         voronoi=voronoi,
         section=properties,
+        contact_radius=touching,
         parameters=parameters,
         natural_curvature=curvature,
         natural_twist=twist,

@@ -40,6 +40,11 @@ class SectionProperties:
     radii: FloatArray
     widths: FloatArray | None = None
 
+    @property
+    def touching(self) -> FloatArray:
+        """Radius of the round surface that touches others, by default: half the smaller side, shape (edges,) [m]."""
+        return self.radii if self.widths is None else 0.5 * self.widths.min(axis=1)
+
     @cached_property
     def moments(self) -> FloatArray:
         """Both second moments of area, shape (edges, 2) [m^4]."""

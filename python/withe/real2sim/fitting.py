@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import Any, Literal
 
 import numpy as np
@@ -11,6 +12,7 @@ import numpy.typing as npt
 from withe.common import validation
 from withe.common.progress import Progress
 from withe.common.progress import progress as progress_bar
+from withe.errors import ConvergenceError
 from withe.real2sim.gathering import gather
 from withe.real2sim.least_squares import FrameSolution, all_frames, lone_frame
 from withe.real2sim.parsing import parse_unknowns
@@ -63,7 +65,8 @@ def fit(
     shared : sequence of tuples
         Further unknowns that all frames share: natural curvature of one rod under several loads.
     conditions : callable, optional
-        Called with a simulation and the frame before each equilibrium, to set loads or to move supports.
+        Called with a simulation and the frame before each equilibrium, to set loads or to move supports. Once more
+        with a copy and the first frame, so that a ValueError in it is heard.
     tolerance : float, optional
         Norm of residuals below which a frame is done, 1e-10; the sum of their sizes with "source", 2.5e-3.
     max_iterations : int, optional
@@ -106,6 +109,9 @@ def fit(
     good = [f for f in range(listed[0].frames) if np.isfinite(residual.value(copy.positions(), f)).any()]
     if not good:
         raise ValueError(f"targets must show something in some frame, got nothing in all {listed[0].frames}")
+    if conditions is not None:
+        with suppress(ConvergenceError):
+            conditions(simulation.copy(), good[0])  # where it raises ValueError, not each frame is to blame
     limit = (50 if method == "gauss_newton" else 1000) if max_iterations is None else max_iterations
     limit = validation.integer(limit, "max_iterations", 1, 2**31 - 1)
     goal = validation.positive(

@@ -70,7 +70,9 @@ def fit_motion(
     Raises
     ------
     ValueError
-        Targets without times, or what cannot be unknown.
+        Targets without times, in which nothing was seen, or what cannot be unknown.
+    ConvergenceError
+        The run fails with the first guess.
 
     Examples
     --------
@@ -85,6 +87,8 @@ def fit_motion(
     times = np.asarray(listed[0].times)
     if any(not np.array_equal(target.times, times) for target in listed):
         raise ValueError("times of all targets must be the same")
+    if not any(target.told(frame) for target in listed for frame in range(target.frames)):
+        raise ValueError(f"targets must show something at some time, got nothing at all {len(times)}")
     copy = simulation.copy()
     late = validation.number(delay, "delay")
     words = [unknown for unknown in unknowns if isinstance(unknown, str)] if not isinstance(unknowns, str) else []
@@ -126,10 +130,10 @@ class _Motion(Coordinates):
         super().__init__(simulation, unknowns)
         self._start, self._begin, self._bar = simulation.snapshot(), begin, bar
         self._residual, self._times, self._delay = residual, times, delay
-        self.runs = 0
+        self.runs, self._ran = 0, False
 
     def residual(self, coordinates: FloatArray, frame: int) -> tuple[FloatArray, FloatArray] | None:
-        """Residuals of all times, one after the other, and what `_seen` has; None where the run fails."""
+        """Residuals of all times, one after the other, and `_shapes`; None where the run fails, but the first one."""
         try:
             self.simulation.restore(self._start)
             self.forget()
@@ -138,7 +142,10 @@ class _Motion(Coordinates):
                 self._begin(self.simulation)
             shapes = self._shapes(coordinates)
         except (ConvergenceError, ValueError):
+            if not self._ran:
+                raise
             return None
+        self._ran = True
         return self._values(shapes[0]), shapes
 
     def jacobian(self, coordinates: FloatArray, state: FloatArray, frame: int) -> FloatArray:

@@ -91,24 +91,29 @@ class Record:
             ``{"positions": dL_dx, "curvatures": {arm: dL_dk}}``, each shaped like the read-out of the record.
         wrt : sequence
             What to differentiate by: see `Equilibrium.gradient`; also "initial_positions" and "initial_velocities", of
-            shape (nodes, 3), where directors turn along with their edges. May be empty where ``calls`` are what is
-            wanted.
+            shape (nodes, 3), where directors turn along with their edges; the "viscosity" of a resistive fluid; the
+            "friction" of an obstacle or, ``((arm, floor), "friction")``, of two bodies with one of their own, that of
+            rods with each other, "friction", and "slip_tolerance". By "position" and "rotation" of a support: as if it
+            held elsewhere by the same all the while, from the start of the run on, where all that is free begins as it
+            does. May be empty where ``calls`` are what is wanted.
 
         Returns
         -------
         list
             For each of `wrt`, dL over it, shaped like `Simulation.get`: over the value that it had at the start of the
             run, as long as that acted. Its attribute ``calls`` has what was set later: one entry a call of `set`,
-            `set_natural_curvature`, `set_natural_twist`, `set_natural_stretch` and `move` (of supports), in their
-            order, with ``time`` [s], ``call``, ``target``, ``over`` and ``gradients``, a dict of dL over the value that
-            each word was given, shaped like that value (of a ramp: its end; of a rotation: by a rotation vector that
-            turns it). Under the midpoint rules calls of `move` have none where L goes by reaction moments.
+            `set_natural_curvature`, `set_natural_twist`, `set_natural_stretch`, `set_friction` and `move` (of
+            supports), in their order, with ``time`` [s], ``call``, ``target``, ``over`` and ``gradients``, a dict of dL
+            over the value that each word was given, shaped like that value (of a ramp: its end; of a rotation: by a
+            rotation vector that turns it). Under the midpoint rules calls of `move` have none where L goes by reaction
+            moments.
 
         Raises
         ------
         ValueError
-            The run was without ``differentiable=True``, or has no gradient and says why; a wrong shape; a derivative
-            out of the plane of a planar scene.
+            The run was without ``differentiable=True``, or has no gradient and says why (contact whose stiffness was
+            not given, anchored friction, restitution below 1, Stokeslets, integrator "verlet"); a wrong shape; a
+            derivative out of the plane of a planar scene; a friction of 0.
 
         Notes
         -----

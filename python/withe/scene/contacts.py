@@ -14,11 +14,11 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
-from withe.parts.contacts import Body, make_obstacle, pair_of, touching
+from withe.parts.contacts import Body, make_obstacle, pair_friction, pair_of
 from withe.parts.directory import Directory
-from withe.parts.friction import Friction, friction_pair
+from withe.parts.friction import Coefficients, Friction
 from withe.parts.handles import Obstacle, Rod
-from withe.parts.kinds import ContactModel, FrictionModel, Overlap, PairSettings, RodPart
+from withe.parts.kinds import ContactModel, FrictionModel, Overlap, PairSettings
 
 __all__ = ["Contacts"]
 
@@ -36,11 +36,13 @@ class Contacts:
         Parameters
         ----------
         height : float [m]
-        friction : float or pair of float
+        friction : float, pair of float, or callable
             Coefficient between the floor and every rod; see `set_friction` for single rods. Two coefficients are those
             along and across a rod, as of snakes and of bristles: for a slip in the direction s on rods with the tangent
             t, friction is the normal force times mu_along (s . t) t + mu_across (s - (s . t) t)
-            [Hu et al. 2009, PNAS 106].
+            [Hu et al. 2009, PNAS 106]. A callable has friction vary over the floor: `f(points)`, points of shape (n, 3)
+            [m], answers n coefficients, or an image of it does, a `FrictionMap`. It is asked before each step, where
+            nodes and edges are then, and moves and turns with its obstacle.
         restitution : float
             Speed after an impact over that before it, from 0 to 1; see `enable_contact`.
         name : str
@@ -82,7 +84,7 @@ class Contacts:
         point : array_like of shape (3,) [m]
         normal : array_like of shape (3,)
             Of any length.
-        friction : float or pair of float
+        friction : float, pair of float, or callable
         restitution : float
         name : str
 
@@ -115,7 +117,7 @@ class Contacts:
         ----------
         center : array_like of shape (3,) [m]
         radius : float [m]
-        friction : float or pair of float
+        friction : float, pair of float, or callable
         restitution : float
         name : str
 
@@ -150,7 +152,7 @@ class Contacts:
         start, end : array_like of shape (3,) [m]
             Of its axis.
         radius : float [m]
-        friction : float or pair of float
+        friction : float, pair of float, or callable
         restitution : float
         name : str
 
@@ -168,6 +170,7 @@ class Contacts:
     def enable_contact(
         self,
         *,
+        rods: bool = True,
         friction: float = 0.0,
         restitution: float = 1.0,
         model: ContactModel = "imcv2",
@@ -184,6 +187,9 @@ class Contacts:
 
         Parameters
         ----------
+        rods : bool
+            Whether rods touch each other and themselves; False leaves them to obstacles alone, with what is said here
+            of contact and friction.
         friction : float
             Coefficient between rods.
         restitution : float
@@ -248,7 +254,7 @@ class Contacts:
         settings = self._directory.contact
         self._directory.contact = replace(
             settings,
-            rods=True,
+            rods=validation.truth(rods, "rods"),
             friction=validation.non_negative(friction, "friction"),
             restitution=validation.share(restitution, "restitution"),
             model=cast(ContactModel, validation.choice(model, "model of contact", get_args(ContactModel))),
@@ -265,10 +271,29 @@ class Contacts:
     def set_friction(self, a: Rod | Obstacle | str, b: Rod | Obstacle | str, friction: Friction) -> None:
         """Give two rods, or a rod and an obstacle, a friction coefficient of their own.
 
-        A rod and an obstacle may have two, along and across the rod; see `add_floor`.
+        Parameters
+        ----------
+        a, b : Rod, Obstacle or str
+        friction : float, pair of float, array_like of shape (edges,), or callable
+            One coefficient; of a rod and an obstacle also two, along and across the rod; one for each edge of the rod;
+            or a function of position on the obstacle. See `add_floor`.
+
+        Raises
+        ------
+        ValueError
+            Two obstacles, friction that is negative or not finite, or more than one coefficient for two rods.
+
+        Examples
+        --------
+        >>> import numpy, withe
+        >>> scene = withe.Scene()
+        >>> rubber = withe.Material(youngs_modulus=1e6, density=1000.0)
+        >>> snake = scene.add_rod(start=(0, 0, 0.01), end=(0.3, 0, 0.01), nodes=31, radius=0.01, material=rubber)
+        >>> floor = scene.add_floor()
+        >>> scene.set_friction(snake, floor, numpy.linspace(0.1, 0.5, 30))
         """
-        rods = all(isinstance(touching(self._directory, body), RodPart) for body in (a, b))
-        _set_pair(self._directory, a, b, friction=friction_pair(friction, "friction", directed=not rods))
+        own = pair_friction(self._directory, a, b, friction)
+        _set_pair(self._directory, a, b, friction=own)
 
     def set_restitution(self, a: Rod | Obstacle | str, b: Rod | Obstacle | str, restitution: float) -> None:
         """Give two rods, or a rod and an obstacle, a coefficient of restitution of their own, from 0 to 1."""
@@ -310,7 +335,7 @@ def _set_pair(
     b: Body,
     *,
     ignored: bool = False,
-    friction: tuple[float, float] | None = None,
+    friction: Coefficients | None = None,
     restitution: float | None = None,
     stiffness: float | None = None,
 ) -> None:

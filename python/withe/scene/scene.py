@@ -92,6 +92,7 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
         normal: npt.ArrayLike | None = None,
         radius: npt.ArrayLike | None = None,
         section: Section | None = None,
+        contact_radius: npt.ArrayLike | None = None,
         material: Material | None = None,
         stiffness: Stiffness | None = None,
         line_density: npt.ArrayLike | None = None,
@@ -122,6 +123,9 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
             Of a circular section.
         section : Circle, Tube or Rectangle
             Section instead of a radius; a rectangle's width lies along the first director.
+        contact_radius : float or array_like of shape (edges,) [m]
+            Of the round surface that touches obstacles and rods, apart from the section, which gives stiffness and
+            mass and is drawn. By default the radius, of a rectangle half its smaller side: what lies flat.
         material : Material
         stiffness : Stiffness
             Stiffnesses instead of a material, with `line_density`.
@@ -166,6 +170,7 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
             normal=normal,
             radius=radius,
             section=section,
+            contact_radius=contact_radius,
             material=material,
             stiffness=stiffness,
             line_density=line_density,

@@ -10,16 +10,31 @@ import numpy as np
 import numpy.typing as npt
 
 from withe import _core
-from withe.parts.kinds import DragPart, LoadPart, MassPart, Part, RodPart, SpringPart, SupportPart
+from withe.parts.contacts import BodyPair
+from withe.parts.kinds import (
+    DragPart,
+    FluidPart,
+    LoadPart,
+    MassPart,
+    ObstaclePart,
+    Part,
+    RodPart,
+    SpringPart,
+    SupportPart,
+)
 from withe.parts.parameters import ACTING_WORDS, NATURAL_WORDS
 from withe.parts.springs import SPRING_WORDS
 from withe.simulation.moves import Way
 from withe.simulation.session import Session
 from withe.simulation.unknowns import (
+    POSE_WORDS,
+    SCENE_WORDS,
     OfRun,
     Reader,
     dragged_rods,
     edges_of,
+    friction_reader,
+    part_of,
     reader_of,
     rod_slopes,
     sum_of_slopes,
@@ -52,16 +67,16 @@ class CallGradient:
     ----------
     time : float [s]
         When it was called.
-    call : {"set", "set_natural_curvature", "set_natural_twist", "set_natural_stretch", "move"}
+    call : {"set", "set_natural_curvature", "set_natural_twist", "set_natural_stretch", "set_friction", "move"}
     target : str or None
-        Name of the part; None: the scene.
+        Name of the part, or of both bodies ("arm, floor"); None: the scene.
     over : float [s]
         After which the value was reached; 0: at once.
     gradients : dict
         By each word that was set, shaped like the value that it was given: dL over that value, as long as it acted. A
         curvature given with discrete=True has that by the curvature [1/m] of every stencil; a rotation by a rotation
         vector, (3,) [1/rad], that turns the target. Words that have no gradient (functions of time, paths, tangents and
-        rolls, friction, the viscosity of a fluid) are left out.
+        rolls, a friction of 0) are left out.
     """
 
     time: float
@@ -77,8 +92,8 @@ class Gradients(list[Any]):
     Attributes
     ----------
     calls : list of CallGradient
-        By what calls of `set`, `set_natural_curvature`, `set_natural_twist`, `set_natural_stretch` and `move` (of
-        supports) gave while the run went, in their order.
+        By what calls of `set`, `set_natural_curvature`, `set_natural_twist`, `set_natural_stretch`, `set_friction` and
+        `move` (of supports) gave while the run went, in their order.
     """
 
     def __init__(self, values: Sequence[Any], calls: list[CallGradient]) -> None:
@@ -91,7 +106,7 @@ class _Call:
     step: int
     time: float
     method: str
-    part: Part | None
+    part: Part | BodyPair | None
     values: Mapping[str, Any]
     over: float
     session: Session  # as it was left
@@ -104,7 +119,9 @@ class RunJournal:
         self._tape = tape
         self.calls: list[_Call] = []
 
-    def note(self, session: Session, method: str, part: Part | None, values: Mapping[str, Any], over: float) -> None:
+    def note(
+        self, session: Session, method: str, part: Part | BodyPair | None, values: Mapping[str, Any], over: float
+    ) -> None:
         """A call has set these."""
         self._tape.divide()
         after = replace(session, settings=session.settings.copy(), journal=None)
@@ -163,9 +180,9 @@ class _Epoch:
         return out
 
     def _set_on_way(self, index: int, call: _Call, part: SupportPart) -> None:
-        for word in ("position", "rotation"):
+        for word in POSE_WORDS:
             before = self.ways.get((part.name, word))
-            start = before.weights(before.reached(call.time)) if before is not None else {}
+            start = before.weights(before.reached(call.time)) if before is not None else {-1: np.eye(3)}
             moved = index if word in call.values else None
             if moved is None and part.name in call.session.settings.paths:
                 start = {}
@@ -215,13 +232,28 @@ class Ledger:
         for call, sums in zip(calls, self._by_calls, strict=True):
             for word in [word for word in sums if not _has_gradient(call, word)]:
                 del sums[word]
-        self.moves = by_moves and any(isinstance(call.part, SupportPart) and call.values for call in calls)
+        self._poses = {
+            place: (part_of(session, unknown[0]).name, unknown[1])
+            for place, unknown in enumerate(wrt)
+            if isinstance(unknown, tuple) and unknown[1] in POSE_WORDS
+        }
+        if self._poses and not by_moves:
+            raise ValueError(
+                "no gradient by the pose of a support is known of reaction moments under the midpoint rules: take "
+                "integrator='energy_momentum' or 'backward_euler'"
+            )
+        for place in self._poses:
+            self.sums[place] = np.zeros(3)
+        moved = any(isinstance(call.part, SupportPart) and call.values for call in calls)
+        self.moves = by_moves and (moved or bool(self._poses))
 
     def visit(self, step: int, moment: int, time: float, found: _core.ParameterGradient) -> None:
         """Derivatives by what acted from a step on, or in a read-out at a moment."""
         after = self._frames[moment] if moment >= 0 else int(np.searchsorted(self._steps, step, side="right"))
         epoch = self._epochs[after]
         for place, (unknown, reader) in enumerate(self._unknowns):
+            if place in self._poses:
+                continue
             value = self._of_start(epoch, unknown, reader, time, found)
             self.sums[place] = value if self.sums[place] is None else self.sums[place] + value
         for key in epoch.live:
@@ -236,13 +268,32 @@ class Ledger:
     def visit_poses(self, step: int, reached: FloatArray, found: _core.PoseAdjoint) -> None:
         """Derivatives by poses of supports at the end of a step."""
         epoch = self._epochs[int(np.searchsorted(self._steps, step, side="right"))]
-        for (name, word), way in epoch.ways.items():
-            index = epoch.session.settings.supports[name][0]
+        for key, way in epoch.ways.items():
+            index, by = self._by_pose(epoch.session, key, found)
             share = float(reached[index]) if len(reached) else 1.0
-            by = (found.positions if word == "position" else found.rotations)[index]
             for call, weight in way.weights(share).items():
-                sums = self._by_calls[call]
-                sums[word] = sums[word] + weight.T @ by
+                if call >= 0:
+                    sums = self._by_calls[call]
+                    sums[key[1]] = sums[key[1]] + weight.T @ by
+                else:
+                    self._add_pose(key, weight.T @ by)
+        for key in set(self._poses.values()) - epoch.ways.keys():
+            self._add_pose(key, self._by_pose(epoch.session, key, found)[1])
+
+    def add_start(self, found: _core.PoseAdjoint) -> None:
+        """Derivatives by where supports hold what the run began with."""
+        for key in set(self._poses.values()):
+            self._add_pose(key, self._by_pose(self._session, key, found)[1])
+
+    @staticmethod
+    def _by_pose(session: Session, key: _Key, found: _core.PoseAdjoint) -> tuple[int, FloatArray]:
+        index = session.settings.supports[key[0]][0]
+        return index, np.array((found.positions if key[1] == "position" else found.rotations)[index])
+
+    def _add_pose(self, key: _Key, by: FloatArray) -> None:
+        for place, own in self._poses.items():
+            if own == key:
+                self.sums[place] = self.sums[place] + by
 
     @property
     def calls(self) -> list[CallGradient]:
@@ -258,7 +309,7 @@ class Ledger:
         """By what the run began with, as far as that acts."""
         if isinstance(unknown, str):
             return reader(OfRun(found)) * (0.0 if ("", unknown) in epoch.live else 1.0)
-        part, word = self._session.directory.find_any(unknown[0], "wrt"), unknown[1]
+        part, word = part_of(self._session, unknown[0]), unknown[1]
         key = (part.name, word)
         if isinstance(part, RodPart) and word in NATURAL_WORDS:
             return reader(OfRun(found)) * epoch.weights(key, time).get(-1, 0.0)
@@ -288,8 +339,12 @@ class Ledger:
             return
         elif isinstance(call.part, LoadPart | MassPart) or (isinstance(call.part, SpringPart) and word in SPRING_WORDS):
             self._add(index, word, reader_of(call.session, call.part, word)(OfRun(found)))
-        elif call.part is None and word == "gravity":
-            self._add(index, word, np.array(found.gravity))
+        elif isinstance(call.part, ObstaclePart | BodyPair):
+            self._add(index, word, friction_reader(call.session, call.part)(OfRun(found)))
+        elif isinstance(call.part, FluidPart) and word == "viscosity":
+            self._add(index, word, found.fluid_viscosity)
+        elif call.part is None:
+            self._add(index, word, np.array(getattr(found, word)))
 
     def _add(self, index: int, word: str, value: Any) -> None:
         shaped = _of_shape(value, np.shape(self._calls[index].values[word]))
@@ -307,8 +362,12 @@ class Ledger:
 def _has_gradient(call: _Call, word: str) -> bool:
     if isinstance(call.part, LoadPart):
         return not callable(call.values[word])
+    if word == "friction":
+        return bool(np.max(call.values[word]) > 0.0)
     if call.part is None:
-        return word == "gravity"
+        return word in SCENE_WORDS
+    if isinstance(call.part, FluidPart):
+        return word == "viscosity"
     return isinstance(call.part, RodPart | MassPart | SpringPart | DragPart | SupportPart)
 
 

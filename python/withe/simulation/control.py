@@ -119,17 +119,18 @@ class Control:
         Parameters
         ----------
         target : handle or str
-            None for what belongs to the whole scene.
+            None for what belongs to the whole scene; two bodies, such as `(arm, floor)`, for what is between them.
         **values
             Of a rod: youngs_modulus, poisson_ratio, density, viscosity, stretch_stiffness, bend_stiffness,
             twist_stiffness, line_density, viscous_time, drag (numbers, or one an edge), natural_curvature,
             natural_twist, natural_stretch (natural over drawn length; see `set_natural_stretch`). Of a load: force,
             moment, load or pressure, constant or a function of time. Of a mass: mass. Of a spring: stiffness,
             rest_length, damping. Of a drag: drag. Of a fluid: viscosity, and the regularization [m] of Stokeslets. Of
-            an obstacle: friction, one coefficient or a pair, along and across rods, and restitution. Of a support:
-            position, rotation, as `move` takes them. Of the scene: gravity, friction and restitution between rods, the
-            slip_tolerance of friction, and the contact_stiffness [N/m], or None for one that follows the forces. See
-            `set_friction`, `set_restitution` and `set_contact_stiffness` for two bodies.
+            an obstacle: friction, one coefficient, a pair, along and across rods, or a function of position, and
+            restitution. Of two bodies: friction, as `Scene.set_friction` takes it. Of a support: position, rotation, as
+            `move` takes them. Of the scene: gravity, friction and restitution between rods, the slip_tolerance of
+            friction, and the contact_stiffness [N/m], or None for one that follows the forces. See `set_restitution`
+            and `set_contact_stiffness` for two bodies.
 
         Raises
         ------

@@ -14,6 +14,7 @@ from withe.simulation.loads import new_values
 from withe.simulation.motion import Path, Turn, Waypoints, evaluate_path
 from withe.simulation.obstacles import find_obstacle, obstacle_pose
 from withe.simulation.session import Session
+from withe.simulation.surfaces import follow_friction_fields
 
 __all__ = ["apply_functions", "check_jacobian", "force_function", "step_callback"]
 
@@ -24,7 +25,7 @@ def step_callback(session: Session) -> Callable[[float, float], None] | None:
     """What to call before every inner step, if anything."""
     now = session.world.time
     moving = any(not _finished(path, now) for path in session.settings.paths.values())
-    if moving or session.settings.functions:
+    if moving or session.settings.functions or session.settings.friction_fields:
         return lambda force_time, end_time: apply_functions(session, force_time, end_time)
     return None
 
@@ -39,6 +40,8 @@ def apply_functions(session: Session, force_time: float, end_time: float) -> Non
                 value = new_values(session, part, function(force_time), what)
                 _check_in_plane(session, value, what, along_normal=part.kind in ("moment", "pressure"))
                 session.world.set_load(index, value)
+    if session.settings.friction_fields:
+        follow_friction_fields(session)
     for name, path in session.settings.paths.items():
         if name not in session.settings.supports and (obstacle := find_obstacle(session.directory, name)) is not None:
             session.world.prescribe_obstacle(obstacle[0], *obstacle_pose(session, obstacle[0], path, end_time))

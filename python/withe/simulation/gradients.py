@@ -115,7 +115,9 @@ class RunDerivatives:
     """What a differentiable run keeps: its tape, what was set, and after how many steps each frame was taken."""
 
     def __init__(self, session: Session) -> None:
-        self._session = replace(session, settings=session.settings.copy(), journal=None)
+        self._session = replace(
+            session, settings=session.settings.copy(), journal=None, contact_then=session.world.contact
+        )
         self._running = session
         self._tape = session.world.start_tape()
         self._journal = session.journal = RunJournal(self._tape)
@@ -150,6 +152,7 @@ class RunDerivatives:
             ledger.visit,
             ledger.visit_poses if ledger.moves else None,
         )
+        ledger.add_start(initial.supports)
         found = iter(ledger.sums)
         values = [
             np.array(getattr(initial, unknown.removeprefix("initial_")))

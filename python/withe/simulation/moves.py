@@ -23,12 +23,12 @@ class Way:
     Attributes
     ----------
     call : int or None
-        Which gave the target; None: it stays where it was.
+        Which gave the target; None: it stays where it was, or is where no call has a share.
     begin, over : float [s]
     turn : ndarray of shape (3,)
         Rotation vector from the start to the target.
     start : dict
-        Weights of calls in where it began.
+        Weights of calls in where it began; -1: what it was at the start of the run.
     """
 
     word: Literal["position", "rotation"]

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from withe.common import validation
+from withe.parts.contacts import touching
 from withe.parts.description import added_mass, drag
 from withe.parts.handles import Drag, Fluid, Load, Mass, Obstacle, Rod, Spring, Support
 from withe.parts.kinds import (
@@ -32,14 +33,18 @@ from withe.simulation.surfaces import (
     OBSTACLE_WORDS,
     SCENE_WORDS,
     obstacle_value,
+    pair_value,
     scene_value,
     set_obstacle,
+    set_pair_friction,
     set_scene,
 )
 
 __all__ = ["Settable", "get_value", "set_values"]
 
-Settable = Rod | Load | Mass | Spring | Drag | Fluid | Obstacle | Support
+Settable = (
+    Rod | Load | Mass | Spring | Drag | Fluid | Obstacle | Support | tuple[Rod | Obstacle | str, Rod | Obstacle | str]
+)
 _POSE = ("position", "rotation")  # of supports
 _FLUID = ("viscosity", "regularization")
 _SET_ROD = (*ROD_WORDS, *NATURAL_WORDS)
@@ -49,6 +54,9 @@ def set_values(session: Session, target: Settable | str | None, values: dict[str
     """Change parameters; see `Simulation.set`."""
     if not values:
         raise ValueError("set must be given what to set, such as youngs_modulus=1e6")
+    if isinstance(target, tuple):
+        _set_between(session, target, values)
+        return
     part = None if target is None else session.directory.find_any(target, "target")
     if isinstance(part, SupportPart):
         _only(values, _POSE, f"support {part.name!r}")
@@ -56,6 +64,23 @@ def set_values(session: Session, target: Settable | str | None, values: dict[str
         return
     _set_values(session, part, values)
     session.note("set", part, values)
+
+
+def _set_between(session: Session, bodies: tuple[Any, ...], values: dict[str, Any]) -> None:
+    if len(bodies) != 2:
+        raise ValueError(f"target must be a part, or two bodies that touch, got {len(bodies)}")
+    _only(values, ("friction",), "a pair of bodies")
+    set_pair_friction(session, *bodies, values["friction"])
+
+
+def _between(session: Session, bodies: tuple[Any, ...], word: str) -> Any:
+    if len(bodies) != 2 or word != "friction":
+        raise ValueError(f"two bodies that touch have 'friction' only, got {word!r} of {len(bodies)}")
+    given = pair_value(session, *bodies)
+    if given is not None:
+        return given
+    obstacle = next((body for body in bodies if isinstance(touching(session.directory, body), ObstaclePart)), None)
+    return get_value(session, "friction", None) if obstacle is None else get_value(session, obstacle, word)
 
 
 def _set_values(session: Session, part: Part | None, values: dict[str, Any]) -> None:
@@ -102,6 +127,8 @@ def get_value(session: Session, target: Settable | Support | str, word: str | No
         if not isinstance(target, str) or target != "gravity":
             raise ValueError("word must be given, such as get(arm, 'youngs_modulus')")
         return session.settings.gravity.copy()
+    if isinstance(target, tuple):
+        return _between(session, target, word)
     part = session.directory.find_any(target, "target")
     if isinstance(part, RodPart):
         if word in NATURAL_WORDS:

@@ -156,7 +156,8 @@ class Equilibrium:
         ------
         ValueError
             The simulation has left this equilibrium, or it follows not from what acts (a rod free to spin, a limit
-            point); a wrong shape, a derivative out of the plane of a planar scene; something without a gradient.
+            point, friction that holds it); contact whose stiffness was not given; a wrong shape, a derivative out of
+            the plane of a planar scene; something without a gradient.
 
         Examples
         --------

@@ -10,9 +10,10 @@ import numpy as np
 import numpy.typing as npt
 
 from withe import _core
+from withe.parts.contacts import drawn_frictions
 from withe.parts.description import describe, parameters_of
 from withe.parts.directory import Directory
-from withe.parts.kinds import CustomForcePart, DragPart, FluidPart, LoadPart, MassPart, Part, RodPart, SupportPart
+from withe.parts.kinds import CustomForcePart, DragPart, FluidPart, LoadPart, MassPart, RodPart, SupportPart
 from withe.parts.options import BuildOptions, check_tolerances
 from withe.simulation.settings import Settings
 
@@ -24,7 +25,7 @@ FloatArray = npt.NDArray[np.float64]
 class Journal(Protocol):
     """Who hears what is set."""
 
-    def note(self, session: Session, method: str, part: Part | None, values: Mapping[str, Any], over: float) -> None:
+    def note(self, session: Session, method: str, part: Any, values: Mapping[str, Any], over: float) -> None:
         """A call has set these, of a part or the scene, reached after so long [s]."""
 
 
@@ -46,6 +47,8 @@ class Session:
         Parts of the scene, in its order.
     journal : Journal or None
         Of a differentiable run, while it goes.
+    contact_then : ContactDescription or None
+        Of a session that is kept as it was: its contact then.
     """
 
     scene: Directory
@@ -57,6 +60,7 @@ class Session:
     drawn_loads: tuple[LoadPart, ...]
     custom_forces: tuple[CustomForcePart, ...]
     journal: Journal | None = None
+    contact_then: _core.ContactDescription | None = None
 
     @classmethod
     def begin(cls, scene: Directory, gravity: FloatArray, options: BuildOptions) -> Session:
@@ -81,6 +85,7 @@ class Session:
             gravity=gravity.copy(),
             supports={part.name: (index, part) for index, part in enumerate(scene.all(SupportPart))},
             functions={part.name: part.function for part in drawn_loads if part.function is not None},
+            frictions=drawn_frictions(scene),
         )
         return cls(
             scene=scene,
@@ -103,10 +108,15 @@ class Session:
             journal=None,
         )
 
-    def note(self, method: str, part: Part | None, values: Mapping[str, Any], over: float = 0.0) -> None:
-        """Tell the journal, if there is one, what a call has set."""
+    def note(self, method: str, part: Any, values: Mapping[str, Any], over: float = 0.0) -> None:
+        """Tell the journal, if there is one, what a call has set: of a part, two bodies, or nothing (the scene)."""
         if self.journal is not None:
             self.journal.note(self, method, part, values, over)
+
+    @property
+    def contact(self) -> _core.ContactDescription:
+        """With present coefficients of friction."""
+        return self.contact_then if self.contact_then is not None else self.world.contact
 
     @property
     def loads(self) -> list[LoadPart]:

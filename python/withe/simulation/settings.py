@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
+from withe.parts.friction import Coefficients
 from withe.parts.kinds import LoadPart, SupportPart
 from withe.parts.parameters import RodParameters
 from withe.simulation.motion import Path
@@ -33,6 +34,10 @@ class Settings:
         Loads that vary, by name.
     paths : dict of str to callable
         Supports that move along a path, by name.
+    friction_fields : dict of int to (int, str, Coefficients)
+        Friction that varies over an obstacle: by the pair of the engine, the rod, the obstacle's name and the field.
+    frictions : dict of tuple of str to Coefficients
+        Of obstacles, by their name, and of a rod and an obstacle, by both names, where it was set or varies.
     loads : dict of str to LoadPart
         Those put on while running, in order.
     """
@@ -45,6 +50,8 @@ class Settings:
     supports: dict[str, tuple[int, SupportPart]]
     functions: dict[str, Callable[[float], npt.ArrayLike]] = field(default_factory=dict)
     paths: dict[str, Path] = field(default_factory=dict)
+    friction_fields: dict[int, tuple[int, str, Coefficients]] = field(default_factory=dict)
+    frictions: dict[tuple[str, ...], Coefficients] = field(default_factory=dict)
     loads: dict[str, LoadPart] = field(default_factory=dict)
 
     def copy(self) -> Settings:
@@ -58,5 +65,7 @@ class Settings:
             dict(self.supports),
             dict(self.functions),
             dict(self.paths),
+            dict(self.friction_fields),
+            dict(self.frictions),
             dict(self.loads),
         )

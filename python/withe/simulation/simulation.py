@@ -33,6 +33,7 @@ from withe.simulation.springs import spring_outlines
 from withe.simulation.state_space import StateSpace
 from withe.simulation.states import restore_frame
 from withe.simulation.stepping import Stepping
+from withe.simulation.surfaces import find_friction_fields
 
 __all__ = ["Simulation"]
 
@@ -68,7 +69,9 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
     @classmethod
     def _build(cls, directory: Directory, gravity: FloatArray, options: BuildOptions) -> Simulation:
         """A simulation of a directory that nobody else changes."""
-        return cls._of(Stepping(Session.begin(directory, gravity, options)))
+        session = Session.begin(directory, gravity, options)
+        find_friction_fields(session)
+        return cls._of(Stepping(session))
 
     @classmethod
     def _of(cls, stepping: Stepping, initial: Snapshot | None = None) -> Simulation:
@@ -368,6 +371,7 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
             "snapshot": self.snapshot(),
             "functions": session.settings.functions,
             "paths": session.settings.paths,
+            "friction": (session.settings.friction_fields, session.settings.frictions),
         }
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -375,6 +379,7 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
         self.__dict__.update(built.__dict__)
         self._session.settings.functions = state["functions"]
         self._session.settings.paths = state["paths"]
+        self._session.settings.friction_fields, self._session.settings.frictions = state["friction"]
         self.restore(state["snapshot"])
 
     # Pictures

@@ -40,7 +40,7 @@ class Snapshot:
         self._state = state
         self._time = time
         self._settings = settings
-        self._missing = missing  # names of loads and supports whose functions are not in the file
+        self._missing = missing  # names of loads, supports and obstacles whose functions are not in the file
 
     @property
     def time(self) -> float:
@@ -51,15 +51,17 @@ class Snapshot:
         return f"Snapshot(t = {self._time:g} s)"
 
     def _function_names(self) -> tuple[str, ...]:
-        """Loads and supports whose functions no file can hold."""
+        """Loads, supports and obstacles whose functions no file can hold."""
         paths = (name for name, path in self._settings.paths.items() if not isinstance(path, Turn | Waypoints))
-        return tuple(sorted({*self._settings.functions, *paths, *self._missing}))
+        fields = (obstacle for _, obstacle, _ in self._settings.friction_fields.values())
+        return tuple(sorted({*self._settings.functions, *paths, *fields, *self._missing}))
 
     def __getstate__(self) -> dict[str, Any]:
         settings = self._settings.copy()
         settings.functions = {}
         settings.loads = {name: replace(load, function=None) for name, load in settings.loads.items()}
         settings.paths = {name: path for name, path in settings.paths.items() if isinstance(path, Turn | Waypoints)}
+        settings.friction_fields, settings.frictions = {}, {}
         return {
             "_state": self._state,
             "_time": self._time,
@@ -258,8 +260,13 @@ def _matched(snapshot: Snapshot, mine: Settings, directory: Directory, scene: Di
             raise ValueError(f"snapshot belongs to another scene: {name!r} is no support in this one")
     for name in snapshot._missing:
         drawn = scene.parts.get(name)
+        varies = any(obstacle == name for _, obstacle, _ in mine.friction_fields.values())
+        if varies:
+            settings.friction_fields, settings.frictions = dict(mine.friction_fields), dict(mine.frictions)
         if (name in settings.supports or isinstance(drawn, ObstaclePart)) and name in mine.paths:
             settings.paths[name] = mine.paths[name]
+        elif varies:
+            continue
         elif name in mine.functions:
             settings.functions[name] = mine.functions[name]
         elif isinstance(drawn, LoadPart) and drawn.function is not None:

@@ -5,18 +5,33 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from withe import _core
 from withe.common import validation
-from withe.parts.contacts import Body, body_of, touching
-from withe.parts.friction import Friction, as_given, check_law, friction_pair, obstacle_friction, with_obstacle
+from withe.parts.contacts import Body, BodyPair, body_of, pair_friction, pair_of, touching
+from withe.parts.friction import (
+    Coefficients,
+    Friction,
+    as_given,
+    check_law,
+    coefficients,
+    obstacle_friction,
+    pair_between,
+    pair_in,
+    with_obstacle,
+    with_pair,
+)
 from withe.parts.kinds import ObstaclePart, RodPart
 from withe.simulation.session import Session
 
 __all__ = [
     "OBSTACLE_WORDS",
     "SCENE_WORDS",
+    "find_friction_fields",
+    "follow_friction_fields",
     "obstacle_value",
+    "pair_value",
     "scene_value",
     "set_obstacle",
     "set_pair_friction",
@@ -24,6 +39,8 @@ __all__ = [
     "set_pair_stiffness",
     "set_scene",
 ]
+
+FloatArray = npt.NDArray[np.float64]
 
 SCENE_WORDS = ("friction", "slip_tolerance", "restitution", "contact_stiffness")
 OBSTACLE_WORDS = ("friction", "restitution")
@@ -61,17 +78,36 @@ def scene_value(session: Session, word: str) -> float | None:
 def set_obstacle(session: Session, part: ObstaclePart, values: dict[str, Any]) -> None:
     """Change friction and restitution of an obstacle, all or none."""
     contact = session.world.contact
-    index = session.directory.all(ObstaclePart).index(part)
+    given = None
     if "friction" in values:
-        what = f"friction of {part.name!r}"
-        pair = friction_pair(values["friction"], what)
-        check_law(pair, contact.friction_law, what)
-        contact = with_obstacle(contact, index, pair)
+        given = coefficients(values["friction"], f"friction of {part.name!r}")
+        contact = _with_obstacle_friction(session, part, given, contact)
     if "restitution" in values:
         restitution = np.array(contact.obstacle_restitution)
-        restitution[index] = validation.share(values["restitution"], f"restitution of {part.name!r}")
+        share = validation.share(values["restitution"], f"restitution of {part.name!r}")
+        restitution[session.directory.all(ObstaclePart).index(part)] = share
         contact.obstacle_restitution = restitution
     session.world.set_contact(contact)
+    if given is not None:
+        session.settings.frictions[(part.name,)] = given
+        find_friction_fields(session)
+
+
+def _with_obstacle_friction(
+    session: Session, part: ObstaclePart, given: Coefficients, contact: _core.ContactDescription
+) -> _core.ContactDescription:
+    """The same with other friction of an obstacle, and of rods that have none of their own with it."""
+    check_law(given.pair, contact.friction_law, f"friction of {part.name!r}")
+    index = session.directory.all(ObstaclePart).index(part)
+    contact = with_obstacle(contact, index, given.pair)
+    for rod in session.directory.all(RodPart):
+        bodies = rod.index, -1 - index
+        own = pair_between(contact.pairs, bodies)
+        shares = _shares_now(session, rod, part, given)
+        if (own is None and shares is None) or (own is not None and own.friction >= 0.0):
+            continue
+        contact = with_pair(contact, bodies, (-1.0, -1.0), shares)
+    return contact
 
 
 def obstacle_value(session: Session, part: ObstaclePart, word: str) -> Friction:
@@ -80,17 +116,32 @@ def obstacle_value(session: Session, part: ObstaclePart, word: str) -> Friction:
     index = session.directory.all(ObstaclePart).index(part)
     if word == "restitution":
         return float(contact.obstacle_restitution[index])
+    given = session.settings.frictions.get((part.name,))
+    if given is not None and given.field is not None:
+        return given.field
     return as_given(obstacle_friction(contact, index))
 
 
 def set_pair_friction(session: Session, a: Body, b: Body, friction: Friction) -> None:
     """Give two bodies another friction coefficient of their own; see `Simulation.set_friction`."""
     first, second, contact = _pair(session, a, b, "friction")
-    what = f"friction of {first.name!r} and {second.name!r}"
-    rods = isinstance(first, RodPart) and isinstance(second, RodPart)
-    along, across = friction_pair(friction, what, directed=not rods)
-    check_law((along, across), contact.friction_law, what)
-    _set_pair(session, first, second, contact, friction=along, across=across)
+    given = pair_friction(session.directory, a, b, friction)
+    check_law(given.pair, contact.friction_law, f"friction of {first.name!r} and {second.name!r}")
+    rod, obstacle = (first, second) if isinstance(first, RodPart) else (second, first)
+    shares = None
+    if isinstance(rod, RodPart) and isinstance(obstacle, ObstaclePart):
+        shares = _shares_now(session, rod, obstacle, given)
+    bodies = body_of(session.directory, first), body_of(session.directory, second)
+    session.world.set_contact(with_pair(contact, bodies, given.pair, shares))
+    session.settings.frictions[pair_of(session.directory, a, b)] = given
+    find_friction_fields(session)
+    session.note("set_friction", BodyPair(first, second), {"friction": friction})
+
+
+def pair_value(session: Session, a: Body, b: Body) -> Friction | None:
+    """Friction that two bodies have of their own, as it was given; None where they have none."""
+    given = session.settings.frictions.get(pair_of(session.directory, a, b))
+    return None if given is None else given.given
 
 
 def set_pair_restitution(session: Session, a: Body, b: Body, restitution: float) -> None:
@@ -133,12 +184,50 @@ def _set_pair(
     """Rods are called by their index, obstacles by -1 - index."""
     bodies = body_of(session.directory, first), body_of(session.directory, second)
     pairs = list(contact.pairs)
-    found = next((own for own in pairs if {own.first, own.second} == set(bodies)), None)
-    if found is None:
-        found = _core.ContactPairDescription()
-        found.first, found.second = bodies
-        pairs.append(found)
+    found = pair_in(pairs, bodies)
     for word, number in numbers.items():
         setattr(found, word, number)
     contact.pairs = pairs
     session.world.set_contact(contact)
+
+
+def find_friction_fields(session: Session) -> None:
+    """Find which pairs of the engine have friction that varies over an obstacle."""
+    obstacles, rods = session.directory.all(ObstaclePart), session.directory.all(RodPart)
+    frictions, fields = session.settings.frictions, session.settings.friction_fields
+    fields.clear()
+    if not any(given.field for given in frictions.values()):
+        return
+    for number, pair in enumerate(session.world.contact.pairs):
+        if not len(pair.shares):
+            continue
+        rod, obstacle = rods[max(pair.first, pair.second)], obstacles[-1 - min(pair.first, pair.second)]
+        first, second = sorted((rod.name, obstacle.name))
+        given = frictions.get((first, second)) or frictions.get((obstacle.name,))
+        if given is not None and given.field is not None:
+            fields[number] = rod.index, obstacle.name, given
+
+
+def follow_friction_fields(session: Session) -> None:
+    """Take friction that varies over obstacles from where rods are now."""
+    obstacles = {part.name: part for part in session.directory.all(ObstaclePart)}
+    rods = session.directory.all(RodPart)
+    for number, (rod, name, given) in session.settings.friction_fields.items():
+        shares = _shares_now(session, rods[rod], obstacles[name], given)
+        if shares is not None:
+            session.world.set_friction_shares(number, shares)
+
+
+def _shares_now(session: Session, rod: RodPart, obstacle: ObstaclePart, given: Coefficients) -> FloatArray | None:
+    """What nodes and edges of a rod have of a coefficient; fields move and turn with their obstacle."""
+    nodes = np.array(session.world.positions())[session.directory.layout.rows(rod.index)]
+    if given.field is not None:
+        index = session.directory.all(ObstaclePart).index(obstacle)
+        place, turn = np.array(session.world.obstacle_position(index)), np.array(session.world.obstacle_turn(index))
+        nodes = nodes - place
+        if turn.any():
+            from scipy.spatial.transform import Rotation
+
+            nodes = Rotation.from_rotvec(-turn).apply(nodes)
+        nodes = nodes + obstacle.point
+    return given.shares(nodes, rod.closed, f"friction of {obstacle.name!r}")

@@ -4,14 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from withe import _core
-from withe.parts.handles import Drag, Load, Mass, NodeHandle, Rod, Spring, Support
-from withe.parts.kinds import DragPart, LoadPart, MassPart, ObstaclePart, Part, RodPart, SpringPart, SupportPart
+from withe.parts.contacts import Body, BodyPair, touching
+from withe.parts.friction import as_given, obstacle_friction
+from withe.parts.handles import Drag, Fluid, Load, Mass, NodeHandle, Obstacle, Rod, Spring, Support
+from withe.parts.kinds import (
+    DragPart,
+    FluidPart,
+    LoadPart,
+    MassPart,
+    ObstaclePart,
+    Part,
+    RodPart,
+    SpringPart,
+    SupportPart,
+)
 from withe.parts.parameters import ACTING_WORDS, NATURAL_WORDS, ROD_WORDS, RodParameters
 from withe.parts.springs import SPRING_WORDS
 from withe.simulation.drawn import points_reader
@@ -20,20 +32,25 @@ from withe.simulation.session import Session
 
 __all__ = [
     "INITIAL_WORDS",
+    "POSE_WORDS",
+    "SCENE_WORDS",
     "OfRun",
     "Reader",
     "Unknown",
     "dragged_rods",
     "edges_of",
+    "friction_reader",
+    "part_of",
     "reader_of",
     "rod_slopes",
+    "scene_reader",
     "sum_of_slopes",
     "unknown_readers",
 ]
 
 FloatArray = npt.NDArray[np.float64]
-Unknown = tuple[Rod | Load | Mass | Drag | Spring | Support | str, str] | str
-"""What to differentiate by: a part and a word of `set`, or "gravity", "initial_positions", "initial_velocities"."""
+Unknown = tuple[Rod | Load | Mass | Drag | Fluid | Spring | Support | Obstacle | str | tuple[Body, Body], str] | str
+"""What to differentiate by: a part and a word of `set`, two bodies and "friction", or a word of the scene."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +64,9 @@ Reader = Callable[[_core.EquilibriumGradient | OfRun], Any]
 """Reads a derivative, shaped like `get`."""
 
 INITIAL_WORDS = ("initial_positions", "initial_velocities")
-_POSE = ("position", "rotation")
+SCENE_WORDS = ("gravity", "friction", "slip_tolerance")
+PoseWord = Literal["position", "rotation"]
+POSE_WORDS: tuple[PoseWord, ...] = ("position", "rotation")
 
 
 def unknown_readers(session: Session, wrt: Sequence[Unknown], *, may_be_empty: bool = False) -> list[Reader]:
@@ -59,17 +78,32 @@ def unknown_readers(session: Session, wrt: Sequence[Unknown], *, may_be_empty: b
 
 def _reader(session: Session, unknown: Unknown) -> Reader:
     if isinstance(unknown, str):
-        return _scene_reader(unknown)
+        return scene_reader(session, unknown)
     if not isinstance(unknown, tuple) or len(unknown) != 2 or not isinstance(unknown[1], str):
         raise ValueError(f"wrt must hold pairs of a part and a word of set, or words of the scene; got {unknown!r}")
     target, word = unknown
     if isinstance(target, NodeHandle):
         raise ValueError(f"wrt must name a part, got the node {target.name}: the support there, or its rod")
-    return reader_of(session, session.directory.find_any(target, "wrt"), word)
+    return reader_of(session, part_of(session, target), word)
 
 
-def reader_of(session: Session, part: Part, word: str) -> Reader:
+def part_of(session: Session, target: Any) -> Part | BodyPair:
+    """What `wrt` names: a part, or two bodies."""
+    if isinstance(target, tuple):
+        if len(target) != 2:
+            raise ValueError(f"two bodies with a friction of their own are a pair, got {target!r}")
+        return BodyPair(*(touching(session.directory, body) for body in target))
+    return session.directory.find_any(target, "wrt")
+
+
+def reader_of(session: Session, part: Part | BodyPair, word: str) -> Reader:
     """What reads the derivative by a word of a part."""
+    if isinstance(part, ObstaclePart | BodyPair) and word == "friction":
+        given = _friction_given(session, part)
+        read = friction_reader(session, part)
+        return lambda g: read(g) if np.ndim(given) else float(read(g).sum())
+    if isinstance(part, FluidPart) and word == "viscosity":
+        return lambda g: float(g.parameters.fluid_viscosity)
     if isinstance(part, RodPart):
         return _rod_reader(session, part, word)
     if isinstance(part, LoadPart) and word == part.kind:
@@ -83,7 +117,7 @@ def reader_of(session: Session, part: Part, word: str) -> Reader:
     if isinstance(part, DragPart) and word == "drag":
         edges = np.concatenate([np.arange(*edges_of(session, rod.index)) for rod in dragged_rods(session, part)])
         return lambda g: float(g.parameters.drag[edges].sum())
-    if isinstance(part, SupportPart) and word in _POSE:
+    if isinstance(part, SupportPart) and word in POSE_WORDS:
         return _pose_reader(session, part, word)
     raise ValueError(f"no gradient is known by {word!r} of {part.name!r}")
 
@@ -103,18 +137,54 @@ def _pose_reader(session: Session, part: SupportPart, word: str) -> Reader:
     def read(gradient: _core.EquilibriumGradient | OfRun) -> FloatArray:
         if isinstance(gradient, OfRun):
             raise ValueError(
-                f"no gradient of a run by the pose of {part.name!r} is known; equilibria have one, and calls of move"
+                f"a step has no derivative by the pose of {part.name!r}; equilibria, runs and calls of move have one"
             )
         return np.array(gradient.support_positions[index] if word == "position" else gradient.support_rotations[index])
 
     return read
 
 
-def _scene_reader(word: str) -> Reader:
+def friction_reader(session: Session, part: ObstaclePart | BodyPair) -> Reader:
+    """What reads the derivative by the coefficients along and across rods, shape (2,)."""
+    if isinstance(part, ObstaclePart):
+        obstacle = session.directory.all(ObstaclePart).index(part)
+        return lambda g: np.array(g.parameters.obstacle_friction[obstacle])
+    bodies = part.bodies(session.directory)
+    pair = next(i for i, own in enumerate(session.contact.pairs) if {own.first, own.second} == bodies)
+    return lambda g: np.array(g.parameters.pair_friction[pair])
+
+
+def _friction_given(session: Session, part: ObstaclePart | BodyPair) -> float | tuple[float, float]:
+    contact = session.contact
+    if isinstance(part, ObstaclePart):
+        given = as_given(obstacle_friction(contact, session.directory.all(ObstaclePart).index(part)))
+    else:
+        bodies = part.bodies(session.directory)
+        found = [own for own in contact.pairs if {own.first, own.second} == bodies and own.friction >= 0.0]
+        if not found:
+            raise ValueError(f"{part.name} have no friction of their own: give them one by set_friction")
+        own = found[0]
+        given = as_given((own.friction, own.across if own.across >= 0.0 else own.friction))
+    _check_rubs(np.max(given), part.name)
+    return given
+
+
+def _check_rubs(friction: float, what: str) -> None:
+    if not friction > 0.0:
+        raise ValueError(f"friction of {what} is 0, where its derivative has one side alone: set a small one")
+
+
+def scene_reader(session: Session, word: str) -> Reader:
+    """What reads the derivative by a word of the scene."""
     if word == "gravity":
         return lambda g: np.array(g.parameters.gravity)
+    if word in SCENE_WORDS:
+        if word == "friction":
+            _check_rubs(session.contact.friction, "rods")
+        return lambda g: float(getattr(g.parameters, word))
     if word not in INITIAL_WORDS:
-        raise ValueError(f"wrt knows gravity, {', '.join(INITIAL_WORDS)}, and pairs of a part and a word; got {word!r}")
+        words = ", ".join((*SCENE_WORDS, *INITIAL_WORDS))
+        raise ValueError(f"wrt knows {words}, and pairs of a part and a word; got {word!r}")
 
     def refuse(gradient: _core.EquilibriumGradient | OfRun) -> Any:
         raise ValueError(f"an equilibrium has no {word}; a run has")
@@ -217,6 +287,8 @@ def _radius_slopes(session: Session, part: RodPart, parameters: RodParameters) -
         raise ValueError(
             f"no gradient by radius of {part.owner} where rods or obstacles touch: their surfaces would move with it"
         )
+    if session.directory.all(FluidPart):
+        raise ValueError(f"no gradient by radius of {part.owner} in a fluid, whose resistance would change with it")
     per_radius = 1.0 / section.radii
     if p.youngs_modulus is None:
         return {"rotary_inertia": 2.0 * p.rotary_inertia * per_radius}

@@ -1,0 +1,162 @@
+"""Plans carried out in the simulated world, and how well the cable then lies."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from withe.common import validation
+from withe.deployment.cable import Cable
+from withe.deployment.pattern import distances
+from withe.deployment.planning import Plan
+from withe.deployment.world import Setup, lay
+from withe.recording import Record
+
+__all__ = ["Deployment", "deploy"]
+
+FloatArray = npt.NDArray[np.float64]
+# Standard deviations of what a trial has and a planner does not know, at noise 1.
+_LGB, _FRICTION = 0.05, 0.20  # shares
+_CURVATURE, _OFFSET, _TURN = 0.5, 5e-4, np.radians(0.5)  # [1/m], [m], [rad]
+
+
+@dataclass(frozen=True)
+class Deployment:
+    """How a cable came to lie.
+
+    Attributes
+    ----------
+    laid : ndarray of shape (nodes, 3) [m]
+        Its centreline from the free end, after the jaw let go.
+    error, std : float [m]
+        Mean and standard deviation of the distance of each point from its place on the plan's pattern
+        (dissertation (9.11), whose sum under the root lacks a square).
+    nearest_error, nearest_std : float [m]
+        The same of the distance from the nearest point of what the user gave.
+    slipped : ndarray of shape (nodes,) [m]
+        How far each point of the pattern moved along the floor after it was laid; zero beyond the pattern.
+    released : float [m]
+        How far the pattern moved at most when the jaw let go.
+    record : Record
+        Of the motion, with the rod "cable".
+    """
+
+    laid: FloatArray
+    error: float
+    std: float
+    nearest_error: float
+    nearest_std: float
+    slipped: FloatArray
+    released: float
+    record: Record
+
+
+def deploy(
+    plan: Plan,
+    cable: Cable | None = None,
+    *,
+    floor: float,
+    seed: int = 0,
+    noise: float = 0.0,
+    nodes: int = 200,
+    time_step: float = 0.01,
+    progress: bool = True,
+) -> Deployment:
+    """Carry out a plan in the rod engine: the whole cable in space, from hanging to laid, on a floor with friction.
+
+    Nothing of the plan but the jaw's motion is known there: the cable has thickness, weight, torsion and inertia,
+    touches the floor where it comes to, and sticks to it by anchored friction at its surface, on which it may roll.
+    Backward Euler steps; density 1180 kg/m^3, Kelvin-Voigt viscosity of .02 s. The jaw holds a point and a direction.
+
+    Parameters
+    ----------
+    plan : Plan
+    cable : Cable
+        The true one, if it is not the planner's; held as far from its free end as the plan says.
+    floor : float
+        Coefficient of friction between cable and floor.
+    seed : int
+        Of the trial's noise.
+    noise : float
+        Scale of what a planner does not know, drawn once a trial: 1 stands for standard deviations of 5 % in Lgb, 20 %
+        in friction, a natural curvature of .5 / m, and a jaw that is off by .5 mm and .5 degrees on each axis.
+    nodes : int
+        Of the rod, 20 to 2000.
+    time_step : float [s]
+    progress : bool
+        Whether a bar is shown.
+
+    Returns
+    -------
+    Deployment
+
+    Raises
+    ------
+    ValueError
+        Negative friction or noise, a cable shorter than the plan holds, wrong numbers of nodes.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import withe
+    >>> line = withe.deployment.Pattern(np.stack([np.linspace(0.0, 0.1, 50), np.zeros(50)], 1))
+    >>> motion = withe.deployment.plan(withe.deployment.Cable(0.3, 1.6e-3, 0.02), line, speed=0.06)
+    >>> found = withe.deployment.deploy(motion, floor=0.5, nodes=30, progress=False)
+    >>> print(found.error < 1e-3)
+    True
+    """
+    friction = validation.non_negative(floor, "floor")
+    noise = validation.non_negative(noise, "noise")
+    nodes = validation.integer(nodes, "nodes", 20, 2000)
+    true = plan.cable if cable is None else cable
+    if true.length < plan.cable.length:
+        raise ValueError(f"the cable is {true.length:g} m long, the plan holds it at {plan.cable.length:g} m")
+    random = np.random.default_rng(validation.integer(seed, "seed", 0, 2**63 - 1))
+    drawn = noise * random.normal(size=10)
+    setup = Setup(
+        cable=replace(
+            true,
+            length=plan.cable.length,
+            gravito_bending_length=true.gravito_bending_length * float(np.exp(_LGB * drawn[0])),
+        ),
+        friction=friction * float(np.exp(_FRICTION * drawn[1])),
+        nodes=nodes,
+        time_step=validation.positive(time_step, "time_step"),
+        natural_curvature=(_CURVATURE * drawn[2], _CURVATURE * drawn[3]),
+        jaw_offset=(_OFFSET * drawn[4], _OFFSET * drawn[5], _OFFSET * drawn[6]),
+        jaw_turn=(_TURN * drawn[7], _TURN * drawn[8], _TURN * drawn[9]),
+    )
+    held, laid, record = lay(setup, plan, progress=progress)
+    return _compared(plan, held, laid, record)
+
+
+def _compared(plan: Plan, held: FloatArray, laid: FloatArray, record: Record) -> Deployment:
+    pattern = plan.pattern
+    s = np.linspace(0.0, plan.cable.length, len(laid))
+    on = s <= pattern.length
+    places = np.stack([np.interp(s[on], pattern.arc_length, pattern.points[:, i]) for i in range(2)], 1)
+    away = np.linalg.norm(laid[on, :2] - places, axis=1)
+    nearest = distances(laid[on, :2], pattern.raw)
+    slipped = np.zeros(len(laid))
+    slipped[on] = _slipped(plan, record, laid, s)[on]
+    return Deployment(
+        laid=laid,
+        error=float(away.mean()),
+        std=float(away.std()),
+        nearest_error=float(nearest.mean()),
+        nearest_std=float(nearest.std()),
+        slipped=slipped,
+        released=float(np.linalg.norm((laid - held)[on], axis=1).max()),
+        record=record,
+    )
+
+
+def _slipped(plan: Plan, record: Record, laid: FloatArray, s: FloatArray) -> FloatArray:
+    """From where each point is in the first frame after it is the lift-off point."""
+    frames = record.positions("cable")
+    lift_off = np.interp(record.times, plan.times, plan.laid)
+    first = np.minimum(np.searchsorted(lift_off, s, side="right"), len(frames) - 1)
+    there = frames[first, np.arange(len(s)), :2]
+    return np.asarray(np.linalg.norm(laid[:, :2] - there, axis=1))

@@ -1,0 +1,121 @@
+"""A fold that is watched: the sheet is looked at on the way, and the rest planned anew [dissertation, Alg. 8]."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from withe.common import validation
+from withe.folding.planning import replan
+from withe.folding.plans import Plan
+from withe.folding.seeing import find_edge, overhead_camera
+from withe.folding.simulated_sheet import Fold, SimulatedSheet
+from withe.folding.timing import travel_times
+from withe.perception.camera import Camera
+
+__all__ = ["fold"]
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class _Part:
+    """Poses from one stop of the jaw to the next."""
+
+    times: FloatArray
+    poses: FloatArray
+
+
+def fold(
+    plan: Plan,
+    sheet: SimulatedSheet,
+    *,
+    replans: int = 5,
+    camera: Camera | None = None,
+    tolerance: float = 5e-4,
+    progress: bool = True,
+) -> Fold:
+    """Carry out a plan in parts, and plan the rest anew after each from where a camera sees that the sheet has slid to.
+
+    Poses of the rest begin where the jaw is, and are those of the sheet where it lies now; by how much the jaw's angle
+    is off that of the manifold there goes to zero evenly along the way [dissertation, (7.14)-(7.16)]. The edge comes
+    down where the sheet is now, and not where it was.
+
+    Parameters
+    ----------
+    plan : Plan
+    sheet : SimulatedSheet
+    replans : int
+        How many times the jaw stops and the sheet is looked at, at equal distances of the way. The dissertation's N is
+        one more.
+    camera : withe.perception.Camera, optional
+        Over the table; by default `overhead_camera` over the sheet's far edge.
+    tolerance : float [m]
+        A plan stays where the sheet has slid less than this since it was made; also where its far edge is not seen.
+    progress : bool
+        Whether to show a progress bar.
+
+    Returns
+    -------
+    Fold
+        With the slides that were seen.
+
+    Raises
+    ------
+    ValueError
+        Not a plan or a sheet, a negative tolerance, no path from where the sheet has slid to.
+    ImportError
+        OpenCV is not installed.
+
+    Examples
+    --------
+    >>> import withe
+    >>> paper = withe.folding.Paper.a4()
+    >>> sheet = withe.folding.SimulatedSheet(paper, seed=1, noise=withe.folding.Noise())
+    >>> folded = withe.folding.fold(withe.folding.plan(paper), sheet)  # doctest: +SKIP
+    """
+    if not isinstance(plan, Plan):
+        raise ValueError(f"plan must be a Plan, got {plan!r:.80}")
+    if not isinstance(sheet, SimulatedSheet):
+        raise ValueError(f"sheet must be a SimulatedSheet, got {sheet!r:.80}")
+    stops = validation.integer(replans, "replans", 0, 1000)
+    watched = overhead_camera(plan.paper.length) if camera is None else camera
+    least = validation.non_negative(tolerance, "tolerance")
+    seen: list[float] = []
+    parts = _parts(plan, sheet, stops, watched, least, seen)
+    folded = sheet.carry_out(parts, plan.target, duration=float(plan.times[-1]), progress=progress)
+    return replace(folded, seen_slides=tuple(seen))
+
+
+def _parts(
+    plan: Plan, sheet: SimulatedSheet, stops: int, camera: Camera, tolerance: float, seen: list[float]
+) -> Iterator[_Part]:
+    """One part after the other; what is yielded is carried out before the next is asked for."""
+    present, poses, known = plan, plan.poses, plan.offset
+    for left in range(stops, -1, -1):
+        last = int(np.ceil((len(poses) - 1) / (left + 1)))
+        yield _timed(poses[: last + 1], plan)
+        poses = poses[last:]
+        if left == 0:
+            return
+        seen.append(_slide(sheet, camera, plan))
+        if abs(seen[-1] - known) > tolerance:  # not where the edge is hidden: NaN
+            present, known = replan(present, poses[0], seen[-1]), seen[-1]
+            poses = np.vstack([poses[:1], present.poses[1:]])
+
+
+def _slide(sheet: SimulatedSheet, camera: Camera, plan: Plan) -> float:
+    """How far the sheet has slid, as a camera sees it; NaN where its far edge is hidden."""
+    try:
+        return find_edge(sheet.picture(camera), camera, plan.paper).x - plan.paper.length
+    except ValueError:
+        return float("nan")
+
+
+def _timed(poses: FloatArray, plan: Plan) -> _Part:
+    angles = np.unwrap(2.0 * np.arctan2(poses[:, 4], poses[:, 6]))
+    places = np.stack([poses[:, 0], poses[:, 2], angles], axis=1)
+    return _Part(travel_times(places, *plan.limits), poses)

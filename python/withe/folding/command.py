@@ -1,0 +1,66 @@
+"""The command `withe fold`."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import warnings
+from pathlib import Path
+
+import numpy as np
+
+from withe.folding.paper import Paper
+from withe.folding.planning import plan
+
+__all__ = ["add_parser", "run"]
+
+_PAPERS = {"a4": Paper.a4, "us_letter": Paper.us_letter, "cardboard": Paper.cardboard}
+
+
+def _target(text: str) -> float | str:
+    return text if text == "half" else float(text)
+
+
+def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add `fold` to the commands of a parser."""
+    parser = commands.add_parser(
+        "fold",
+        help="plan how a gripper folds paper",
+        description="Plan how a gripper folds paper; write poses and times as CSV, or everything as JSON.",
+    )
+    parser.add_argument("--paper", choices=sorted(_PAPERS), default="a4")
+    parser.add_argument("--lgb", type=float, metavar="M", help="gravito-bending length [m], if not the paper's")
+    parser.add_argument("--friction", type=float, help="coefficient between sheet and table (default: 0.12)")
+    parser.add_argument("--target", type=_target, default="half", help="where the edge comes down [m], or half")
+    parser.add_argument("--method", choices=["ucs", "slip", "local", "intuitive"], default="ucs")
+    parser.add_argument("--grasp", choices=["moment_free", "free"], default="moment_free")
+    parser.add_argument("--curvature", type=float, default=2.5, metavar="K", help="bound of a free grasp [1/Lgb]")
+    parser.add_argument("--out", type=Path, default=Path("fold.csv"), help="NAME.csv or NAME.json")
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Plan, write the file and say what was planned."""
+    paper = _PAPERS[arguments.paper]()
+    paper = Paper(
+        paper.length,
+        paper.width,
+        paper.gravito_bending_length if arguments.lgb is None else arguments.lgb,
+        paper.friction if arguments.friction is None else arguments.friction,
+    )
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        found = plan(
+            paper,
+            arguments.target,
+            method=arguments.method,
+            grasp=arguments.grasp,
+            curvature=arguments.curvature,
+        )
+    for warning in said:
+        sys.stderr.write(f"withe: {warning.message}\n")
+    file = found.save(arguments.out)
+    slide = found.slide[-1]
+    end = f"slides {1e3 * slide:.1f} mm" if np.isfinite(slide) else "snaps before the end"
+    sys.stdout.write(f"{found!r}\npredicted: {end}\n{file}\n")
+    return 0

@@ -1,0 +1,56 @@
+"""Pictures of plans: the sheet's side at some of its poses, from the exact equilibria."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+__all__ = ["draw_fold", "side_view"]
+
+FloatArray = npt.NDArray[np.float64]
+_STEPS = 400
+
+
+def side_view(forces: FloatArray, length: float) -> FloatArray:
+    """Points of a sheet from its far end to the jaw's inner edge, of shape (points, 2), x and z in Lgb.
+
+    `forces`: those of one equilibrium, R, H and the suspended length; the fourth-order Runge-Kutta method.
+    """
+    normal, tangential, suspended = forces
+
+    def slope(s: float, y: FloatArray) -> FloatArray:
+        sine, cosine = np.sin(y[0]), np.cos(y[0])
+        return np.array([0.5 * y[1], (normal - s) * cosine - tangential * sine, cosine, sine])
+
+    states = [np.zeros(4)]
+    h = suspended / _STEPS
+    for i in range(_STEPS):
+        s, y = i * h, states[-1]
+        a = slope(s, y)
+        b = slope(s + h / 2, y + h / 2 * a)
+        c = slope(s + h / 2, y + h / 2 * b)
+        d = slope(s + h, y + h * c)
+        states.append(y + h / 6 * (a + 2 * b + 2 * c + d))
+    hanging = np.array(states)[:, 2:]
+    points = np.stack([suspended - hanging[:, 0], hanging[:, 1]], axis=1)
+    return np.concatenate([[[length, 0.0]], points])
+
+
+def draw_fold(
+    axes: Any, sheets: list[FloatArray], outer: FloatArray, way: FloatArray, table: tuple[float, float]
+) -> None:
+    """Draw sheets (points in m) light to dark, what the jaw holds of each in black, and the way of the edge."""
+    from matplotlib import colormaps
+
+    colours = colormaps["viridis"](np.linspace(0.9, 0.1, len(sheets)))
+    axes.plot(table, (0, 0), color="0.75", linewidth=4, zorder=0, solid_capstyle="butt")
+    axes.plot(way[:, 0], way[:, 1], color="tab:red", linewidth=1, linestyle=":", label="way of the edge")
+    for points, edge, colour in zip(sheets, outer, colours, strict=True):
+        axes.plot(points[:, 0], points[:, 1], color=colour, linewidth=1.4)
+        axes.plot([points[-1, 0], edge[0]], [points[-1, 1], edge[1]], color="black", linewidth=2.5)
+    axes.set_aspect("equal")
+    axes.set(xlabel="x [m]", ylabel="z [m]")
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.legend(frameon=False, loc="upper right")

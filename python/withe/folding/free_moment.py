@@ -1,0 +1,307 @@
+"""Ways of a jaw that turns the sheet's end as it likes, with whatever moment that takes; curvature is bounded instead.
+
+An equilibrium is then named by three numbers: R and H, the table's forces at the lift-off point, and the suspended
+length. Where H = 0 the table is not asked for friction, and what lies does not slide however slick it is: a surface
+with a gentle part, R about 1.5, and a folded one, R about 4.9, that are one. All in units of Lgb and w.
+
+Short parts are ruled by bending alone, forces growing as 1 / length; so the lattice has R and H times the length, where
+that is below 1.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from itertools import product
+
+import numpy as np
+import numpy.typing as npt
+
+from withe.folding.sheets import Elastica, at_forces, at_poses, forces_of, join, poses_of, take
+
+__all__ = ["Holding", "Lattice", "Way", "forces_at", "goals", "make_lattice", "smoothed", "way_to"]
+
+FloatArray = npt.NDArray[np.float64]
+_STEEPEST = 5.5  # [rad] of an edge; at 4.7 it points straight down, at 6.3 it would lie under the sheet
+_TURN = 0.5  # [Lgb/rad] lengths that angles count as
+_SHORTEST = 0.05  # [Lgb]
+_SWEEPS = 4  # branches of goals that are followed
+
+
+@dataclass(frozen=True)
+class Holding:
+    """A sheet and its jaw [Lgb], and how far it may bend [1/Lgb].
+
+    `length` of the sheet from the jaw's inner edge on; `share` by which Lgb may be other than thought.
+    """
+
+    length: float
+    depth: float
+    finger: float
+    thickness: float
+    curvature: float
+    share: float
+
+    def outer(self, sheet: Elastica) -> tuple[FloatArray, FloatArray]:
+        """Where the outer edge is, from where it lay; and how high over what the fingers need at least there."""
+        x = sheet.x + self.depth * (1 - np.cos(sheet.angle))
+        z = sheet.z + self.depth * np.sin(sheet.angle)
+        return x, z - self.thickness - self.finger * np.abs(np.cos(sheet.angle))
+
+    def ratio(self, sheet: Elastica, length: float | None = None) -> FloatArray:
+        """Friction coefficient that the sheet needs not to slide."""
+        lying = (self.length if length is None else length) - sheet.suspended
+        return np.asarray(np.abs(sheet.tangential_force) / (sheet.normal_force + lying))
+
+    def worst_ratio(self, sheet: Elastica) -> FloatArray:
+        """The same at the same poses if Lgb is more or less by the share; infinite where that has no stable pose."""
+        worst = self.ratio(sheet)
+        for factor in (1 - self.share, 1 + self.share) if self.share > 0 else ():
+            other = at_poses(poses_of(sheet) / [factor, factor, 1.0], forces_of(sheet))
+            ratio = self.ratio(other, self.length / factor)
+            worst = np.maximum(worst, np.where(other.valid & other.stable, ratio, np.inf))
+        return worst
+
+    def bearable(self, sheet: Elastica) -> npt.NDArray[np.bool_]:
+        """Whether the sheet can be there, the jaw too, and is not bent too far."""
+        _, room = self.outer(sheet)
+        back = (sheet.angle > 0.5 * np.pi) & (room < -1e-9)
+        fits = (sheet.suspended < self.length) & (sheet.angle < _STEEPEST) & (sheet.max_curvature <= self.curvature)
+        return sheet.valid & sheet.stable & fits & ~back
+
+
+def forces_at(places: FloatArray) -> FloatArray:
+    """Forces and lengths from places in the lattice: R and H scaled, lifted length."""
+    scale = np.minimum(places[..., 2:], 1.0)
+    return np.concatenate([places[..., :2] / scale, places[..., 2:]], axis=-1)
+
+
+def places_at(forces: FloatArray) -> FloatArray:
+    """Undo `forces_at`."""
+    scale = np.minimum(forces[..., 2:], 1.0)
+    return np.concatenate([forces[..., :2] * scale, forces[..., 2:]], axis=-1)
+
+
+@dataclass(frozen=True)
+class Lattice:
+    """Equilibria over places, of one shape; those that are no good have a ratio of infinity.
+
+    Attributes
+    ----------
+    axes : tuple of three arrays
+    sheet : Elastica
+        Arrays of shape (nodes,).
+    ratio : ndarray of shape (nodes,)
+        Needed friction, of the worst Lgb.
+    edges : ndarray of shape (edges, 2)
+    lengths : ndarray of shape (edges,)
+    """
+
+    axes: tuple[FloatArray, FloatArray, FloatArray]
+    sheet: Elastica
+    ratio: FloatArray
+    edges: npt.NDArray[np.intp]
+    lengths: FloatArray
+
+
+def _ways(first: Elastica, second: Elastica) -> FloatArray:
+    turn = _TURN * (second.angle - first.angle)
+    return np.asarray(np.sqrt((second.x - first.x) ** 2 + (second.z - first.z) ** 2 + turn**2))
+
+
+@lru_cache(maxsize=16)
+def make_lattice(holding: Holding, pulls: bool, most: float = np.inf, fine: int = 1) -> Lattice:
+    """Solve all nodes: H = 0 alone, or, with `pulls`, H to either side, but what needs more friction than `most`.
+
+    `fine` divides spacings.
+    """
+    count = (20 if pulls else 48) * fine
+    # Without weight forces grow as the square of the curvature that they make.
+    greatest = max(2.4 * holding.curvature, 0.75 * holding.curvature**2)
+    normal = np.linspace(greatest / count, greatest, count)
+    widest = min(greatest / 2, most * (holding.length + 3.0))
+    sideways = np.linspace(-widest, widest, count + 1) if pulls else np.zeros(1)
+    short = np.geomspace(_SHORTEST, 0.5, count // 6, endpoint=False)
+    lifted = np.concatenate([short, np.linspace(0.5, holding.length * (1 - 1e-6), count)])
+    axes = (normal, sideways, lifted)
+    places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+    sheet = at_forces(forces_at(places).reshape(-1, 3))
+    good = holding.bearable(sheet)
+    good[good] = holding.ratio(take(sheet, good)) <= most
+    ratio = np.full(len(good), np.inf)
+    some = take(sheet, good)
+    ratio[good] = holding.worst_ratio(some)
+    edges = _neighbours(places.shape[:3], np.isfinite(ratio))
+    lengths = _ways(take(sheet, edges[:, 0]), take(sheet, edges[:, 1]))
+    return Lattice(axes, sheet, ratio, edges, lengths)
+
+
+def _neighbours(shape: tuple[int, ...], good: npt.NDArray[np.bool_]) -> npt.NDArray[np.intp]:
+    """Pairs of good nodes next to each other, also over corners."""
+    name = np.arange(np.prod(shape)).reshape(shape)
+    pairs = []
+    for step in product((-1, 0, 1), repeat=3):
+        if step <= (0, 0, 0):
+            continue
+        near = name[tuple(slice(max(0, -s), n - max(0, s)) for s, n in zip(step, shape, strict=True))].ravel()
+        far = name[tuple(slice(max(0, s), n + min(0, s)) for s, n in zip(step, shape, strict=True))].ravel()
+        both = good[near] & good[far]
+        pairs.append(np.stack([near[both], far[both]], axis=1))
+    return np.concatenate(pairs)
+
+
+def goals(lattice: Lattice, holding: Holding, x: float) -> Elastica:
+    """Equilibria whose outer edge is at x with the fingers on what lies there: one for each H, a branch of them.
+
+    Whether they are bearable is not asked.
+    """
+    over, room = holding.outer(lattice.sheet)
+    known = lattice.sheet.valid & (lattice.sheet.angle > 0.5 * np.pi) & (lattice.sheet.angle < _STEEPEST)
+    away = np.where(known, np.hypot(over - x, room), np.inf)
+    away = np.where(lattice.sheet.max_curvature > 1.2 * holding.curvature, np.inf, away)
+    found: list[FloatArray] = []
+    sweeps = 0
+    for node in np.argsort(away)[:400:10]:
+        first = _on_goal(forces_of(take(lattice.sheet, np.array([node])))[0], holding, x)
+        if first is None or any(np.abs(first - other).max() < 0.1 for other in found):
+            continue
+        found += [first, *_swept(first, lattice.axes[1], holding, x)]
+        sweeps += 1
+        if sweeps == _SWEEPS:
+            break
+    return at_forces(np.array(found).reshape(-1, 3))
+
+
+def _swept(first: FloatArray, sideways: FloatArray, holding: Holding, x: float) -> list[FloatArray]:
+    """Goals at other H, followed from one; whole steps of H, so that H = 0 is among them."""
+    found: list[FloatArray] = []
+    if len(sideways) == 1:
+        return found
+    step = (sideways[1] - sideways[0]) / 4
+    for sign in (1.0, -1.0):
+        last, before = first, first
+        for index in range(1, 2 * len(sideways)):
+            start = last + (last - before if index > 2 else 0.0)
+            level = step * (np.round(first[1] / step) + sign * index)
+            at = _on_goal(np.array([start[0], level, start[2]]), holding, x)
+            if at is None:
+                break
+            last, before = at, last
+            found.append(at)
+    return found
+
+
+def _on_goal(forces: FloatArray, holding: Holding, x: float) -> FloatArray | None:
+    """Newton's method on R and the length, by differences, with H kept."""
+    moves = np.array([[0, 0, 0], [1e-6, 0, 0], [0, 0, 1e-6]])
+    for _ in range(25):
+        sheet = at_forces(forces + moves, keep=True)
+        gaps = np.stack(holding.outer(sheet), axis=1) - [x, 0.0]
+        if not np.isfinite(gaps).all():
+            return None
+        if np.abs(gaps[0]).max() < 1e-9:
+            return forces
+        slopes = (gaps[1:] - gaps[0]).T / 1e-6
+        if abs(np.linalg.det(slopes)) < 1e-9:
+            return None
+        step = np.linalg.solve(slopes, -gaps[0])
+        step *= min(1.0, 0.2 / np.abs(step).max())
+        forces = forces + np.array([step[0], 0.0, step[1]])
+    return None
+
+
+@dataclass(frozen=True)
+class Way:
+    """Places from flat to a goal, and the greatest ratio on the way."""
+
+    places: FloatArray
+    ratio: float
+
+
+def _goal_links(lattice: Lattice, goal: Elastica) -> tuple[npt.NDArray[np.intp], FloatArray]:
+    """Edges from goals, named on from the lattice's nodes, to nodes around their places."""
+    place = places_at(forces_of(goal))
+    shape = tuple(len(axis) for axis in lattice.axes)
+    pairs = []
+    for g, row in enumerate(place):
+        spans = []
+        for axis, value in zip(lattice.axes, row, strict=True):
+            middle = int(np.clip(np.searchsorted(axis, value), 0, len(axis) - 1))
+            spans.append(range(max(0, middle - 2), min(len(axis), middle + 2)))
+        names = [int(np.ravel_multi_index(index, shape)) for index in product(*spans)]
+        pairs += [(name, len(lattice.ratio) + g) for name in names if np.isfinite(lattice.ratio[name])]
+    edges = np.array(pairs, dtype=int).reshape(-1, 2)
+    ends = take(goal, edges[:, 1] - len(lattice.ratio))
+    return edges, _ways(take(lattice.sheet, edges[:, 0]), ends)
+
+
+def way_to(lattice: Lattice, holding: Holding, goal: Elastica, goal_ratio: FloatArray, limit: float) -> Way | None:
+    """Shortest way, bends counted, on which no ratio is above the limit; or the least greatest where none is.
+
+    None where no way is at all.
+    """
+    from scipy.sparse import csr_array
+    from scipy.sparse.csgraph import connected_components, dijkstra
+
+    count, goals_count = len(lattice.ratio), len(goal.x)
+    flat, total = count + goals_count, count + goals_count + 1
+    links, link_lengths = _goal_links(lattice, goal)
+    shape = tuple(len(axis) for axis in lattice.axes)
+    first = np.arange(count).reshape(shape)[:, :, 0].ravel()
+    first = first[np.isfinite(lattice.ratio[first])]
+    starts = np.stack([np.full_like(first, flat), first], axis=1)
+    edges = np.concatenate([lattice.edges, links, starts])
+    lengths = np.concatenate([lattice.lengths, link_lengths, np.full(len(first), _SHORTEST)])
+    ratio = np.concatenate([lattice.ratio, goal_ratio, [0.0]])
+    needed = ratio[edges].max(axis=1)
+    ends = np.arange(count, flat)
+
+    def open_to(bound: float) -> npt.NDArray[np.intp]:
+        kept = edges[needed <= bound]
+        graph = csr_array((np.ones(len(kept)), (kept[:, 0], kept[:, 1])), shape=(total, total))
+        label = connected_components(graph, directed=False)[1]
+        return np.asarray(ends[label[ends] == label[flat]])
+
+    if not len(open_to(limit)):
+        low, high = limit, 1e3
+        if not len(open_to(high)):
+            return None
+        while high - low > 1e-4 * max(high, 0.01):
+            middle = 0.5 * (low + high) if high < 2 else np.sqrt(max(low, 1e-3) * high)
+            low, high = (low, middle) if len(open_to(middle)) else (middle, high)
+        limit = high
+    kept = needed <= limit
+    bend = np.concatenate([lattice.sheet.max_curvature, goal.max_curvature, [0.0]]) / holding.curvature
+    weight = lengths * (1.0 + np.nan_to_num(bend)[edges].mean(axis=1)) + 1e-9
+    graph = csr_array((weight[kept], (edges[kept, 0], edges[kept, 1])), shape=(total, total))
+    distance, before = dijkstra(graph, directed=False, indices=flat, return_predecessors=True)
+    end = ends[np.argmin(distance[ends])]
+    way = [int(end)]
+    while before[way[-1]] != flat:
+        way.append(int(before[way[-1]]))
+    nodes = np.array(way[::-1])
+    sheet = take(join(lattice.sheet, goal), nodes)
+    return Way(places_at(forces_of(sheet)), float(ratio[nodes].max()))
+
+
+def smoothed(way: Way, holding: Holding, limit: float) -> FloatArray:
+    """Places of a way without its lattice's corners, densely; ends stay, and so does what was kept on the way."""
+    from scipy.ndimage import gaussian_filter1d
+
+    sheet = at_forces(forces_at(way.places))
+    first, second = take(sheet, slice(0, -1)), take(sheet, slice(1, None))
+    travelled = np.concatenate([[0.0], np.cumsum(_ways(first, second) + 1e-6)])
+    count = 300
+    even = np.linspace(0.0, travelled[-1], count)
+    dense = np.stack([np.interp(even, travelled, way.places[:, i]) for i in range(3)], axis=1)
+    for sigma in (12.0, 6.0, 3.0, 1.5):
+        pad = int(4 * sigma)
+        padded = np.concatenate([2 * dense[0] - dense[pad:0:-1], dense, 2 * dense[-1] - dense[-2 : -pad - 2 : -1]])
+        smooth = gaussian_filter1d(padded, sigma, axis=0)[pad : pad + count]
+        if (smooth[:, 2] <= 0).any():
+            continue
+        sheet = at_forces(forces_at(smooth), keep=True)
+        loose = replace(holding, finger=0.0, thickness=0.0, curvature=1.02 * holding.curvature)
+        if loose.bearable(sheet).all() and holding.worst_ratio(sheet).max() <= 1.05 * max(limit, way.ratio) + 1e-9:
+            return np.asarray(smooth)
+    return dense

@@ -1,0 +1,95 @@
+"""What is pressed by what does not yield, and what supports and floors bear."""
+
+import numpy as np
+import pytest
+
+import withe
+
+RUBBER = withe.Material(youngs_modulus=1e6, poisson_ratio=0.5, density=1200.0)
+RADIUS = 5e-3
+WEIGHT = 1200.0 * np.pi * RADIUS**2 * 0.3 * 9.81
+SCHEMES = ["static", "backward_euler", "implicit_midpoint", "energy_momentum"]
+
+
+def lying(material=RUBBER, height=RADIUS, held=True, contact=None, **options):
+    scene = withe.Scene()
+    rod = scene.add_rod(
+        start=(0, 0, height), end=(0.3, 0, height), nodes=31, radius=RADIUS, material=material, name="rod"
+    )
+    if held:
+        scene.clamp(rod.start, name="hand")
+    scene.add_floor(name="floor")
+    if contact is not None:
+        scene.enable_contact(**contact)
+    return scene.build(**options)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("share", [0.06, 0.3, 0.9])
+def test_a_held_node_that_is_moved_into_a_floor_is_an_error_that_names_both(scheme, share):
+    simulation = lying(integrator=scheme, time_step=1e-3)
+    simulation.move("hand", position=(0, 0, (1.0 - share) * RADIUS), over=0.02)
+    message = r"rod 'rod' is pressed .* into 'floor'.* by what does not yield"
+    with pytest.raises(withe.ConvergenceError, match=message) as error:
+        simulation.step(30)
+    assert (error.value.rod, error.value.node) == ("rod", 0)
+    assert np.isfinite(simulation.positions()).all()
+    # At once: in the step in which 4 % of the radius are passed; and the rest of the rod knows nothing of it.
+    assert simulation.get("hand", "position")[2] >= 0.95 * RADIUS
+    assert np.abs(simulation.velocities()).max() < 2.0
+    assert np.linalg.norm(simulation.reaction("hand").force) < 1e3 * WEIGHT
+
+
+@pytest.mark.parametrize("share", [0.005, 0.01, 0.02, 0.03, 0.039])
+def test_a_held_node_that_presses_by_less_stays_so_without_end(share):
+    simulation = lying(integrator="backward_euler", time_step=2e-3)
+    simulation.move("hand", position=(0, 0, (1.0 - share) * RADIUS), over=0.02)
+    forces = []
+    for _ in range(4):
+        simulation.run(duration=0.25, progress=False)
+        forces.append(np.linalg.norm(simulation.reaction("hand").force))
+    assert max(forces) < 1e2 * WEIGHT
+    assert forces[-1] <= 1.01 * forces[-2]
+
+
+def test_a_floor_that_is_moved_into_a_held_node_is_the_same_error():
+    simulation = lying(integrator="backward_euler", time_step=1e-3)
+    simulation.move("floor", position=(0, 0, 0.3 * RADIUS), over=0.02)
+    with pytest.raises(withe.ConvergenceError, match=r"rod 'rod' is pressed .* into 'floor'"):
+        simulation.run(duration=0.03, progress=False)
+
+
+@pytest.mark.parametrize("last", [1e-7, 1e-6, 1e-5, 1e-4, 1e-3])
+def test_a_reaction_after_a_short_last_step_is_the_mass_times_the_acceleration_of_the_path(last):
+    scene = withe.Scene(gravity=(0, 0, 0))
+    rod = scene.add_rod(start=(0, 0, 0), end=(0.05, 0, 0), nodes=6, radius=RADIUS, material=RUBBER, name="rod")
+    scene.clamp(rod.start, name="hand")
+    simulation = scene.build(integrator="backward_euler", time_step=5e-3)
+    simulation.move("hand", path=lambda t: (0, 0, 0.01 * t**2))
+    simulation.run(duration=0.5, progress=False)
+    expected = 1200.0 * np.pi * RADIUS**2 * 0.05 * 0.02
+    assert simulation.reaction("hand").force[2] == pytest.approx(expected, rel=1e-3)
+    simulation.run(duration=last, progress=False)
+    # The rod shakes; it was 200 times too great.
+    assert simulation.reaction("hand").force[2] == pytest.approx(expected, rel=0.3)
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.4])
+@pytest.mark.parametrize("height", [1.0, 1.04, 1.2])
+@pytest.mark.parametrize("modulus", [1e6, 1e9])
+def test_statics_take_a_balanced_cable_on_a_floor_as_balanced(modulus, height, friction):
+    material = withe.Material(youngs_modulus=modulus, poisson_ratio=0.3, density=1200.0)
+    scene = withe.Scene()
+    scene.add_rod(
+        start=(0, 0, height * RADIUS), end=(0.5, 0.1, height * RADIUS), nodes=51, radius=RADIUS, material=material
+    )
+    scene.add_floor(friction=friction)
+    scene.enable_contact(friction=friction)
+    simulation = scene.build(integrator="backward_euler", time_step=5e-3)
+    simulation.run(duration=0.3, progress=False)
+    for _ in range(3):
+        found = simulation.equilibrium()
+        assert found.residual < 1e-6
+    contacts = simulation.contacts()
+    weight = 1200.0 * np.pi * RADIUS**2 * np.hypot(0.5, 0.1) * 9.81
+    assert contacts["normal_force"].sum() == pytest.approx(weight, rel=1e-6)

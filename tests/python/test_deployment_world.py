@@ -1,0 +1,83 @@
+"""Plans carried out in the rod engine, which knows nothing of how they were made."""
+
+import ast
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import withe
+from withe.deployment import Cable, Pattern, deploy, plan
+
+CABLE = Cable(0.36, 1.6e-3, 0.02)  # short and soft, so that little is simulated
+NODES = 60
+
+
+def bend(turned, radius=0.06, straight=0.06):
+    """A straight piece, then an arc into which it runs smoothly."""
+    s = np.linspace(0.0, 0.2, 200)
+    share = np.clip((s - straight) / 0.05, 0.0, 1.0)
+    curvature = turned / radius * share**2 * (3 - 2 * share)
+    heading = np.concatenate([[0.0], np.cumsum(0.5 * (curvature[1:] + curvature[:-1]) * np.diff(s))])
+    steps = 0.5 * (np.cos(heading[1:]) + np.cos(heading[:-1])), 0.5 * (np.sin(heading[1:]) + np.sin(heading[:-1]))
+    return np.concatenate([[[0.0, 0.0]], np.cumsum(np.stack(steps, 1) * s[1], axis=0)])
+
+
+@pytest.fixture(scope="module")
+def arc():
+    return Pattern(bend(1.0), smoothing=3e-4)
+
+
+@pytest.fixture(scope="module")
+def laid(arc):
+    return deploy(plan(CABLE, arc, speed=0.04), floor=0.6, nodes=NODES, progress=False)
+
+
+def test_a_bend_is_laid_within_a_millimetre(laid):
+    assert laid.error < 1e-3
+    assert laid.nearest_error <= laid.error + 3e-4
+    np.testing.assert_allclose(laid.laid[:, 2], CABLE.radius, rtol=0.03)  # it lies
+    assert laid.slipped.max() < 3e-3
+    assert laid.record.positions("cable").shape[1:] == (NODES, 3)
+
+
+def test_the_intuitive_way_is_worse(arc, laid):
+    guessed = deploy(plan(CABLE, arc, "intuitive", speed=0.04), floor=0.6, nodes=NODES, progress=False)
+    assert guessed.error > 5 * laid.error
+
+
+def test_noise_is_drawn_from_the_seed(arc):
+    motion = plan(CABLE, Pattern(bend(0.0)), speed=0.06)
+    first, again, other = (
+        deploy(motion, floor=0.5, noise=1.0, seed=seed, nodes=30, progress=False) for seed in (1, 1, 2)
+    )
+    np.testing.assert_array_equal(first.laid, again.laid)
+    assert np.abs(first.laid - other.laid).max() > 1e-4
+
+
+def test_the_world_imports_no_planner():
+    folder = Path(withe.deployment.__file__).parent
+    tree = ast.parse((folder / "world.py").read_text())
+    names = {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
+    ours = {name for name in names if name.startswith("withe.deployment")}
+    assert ours == {"withe.deployment.cable"}  # sizes of a cable, and nothing that plans
+    assert not {name for name in names if name.startswith("withe._core")}
+    tree = ast.parse((folder / "cable.py").read_text())
+    names = {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
+    assert not {name for name in names if name.startswith("withe.deployment")}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"floor": -0.1}, "floor must not be negative"),
+        ({"floor": 0.4, "noise": -1.0}, "noise must not be negative"),
+        ({"floor": 0.4, "nodes": 5}, "nodes must lie in"),
+        ({"floor": 0.4, "time_step": 0.0}, "time_step must be positive"),
+        ({"floor": 0.4, "seed": -1}, "seed"),
+        ({"floor": 0.4, "cable": Cable(0.1, 1e-3, 0.02)}, "the plan holds it at"),
+    ],
+)
+def test_bad_input_says_what_is_wrong(arc, arguments, message):
+    with pytest.raises(ValueError, match=message):
+        deploy(plan(CABLE, arc), **arguments)

@@ -1,0 +1,57 @@
+"""A sheet that slides is folded right all the same, where a camera says by how much it slid."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from withe.folding import Noise, Paper, SimulatedSheet, fold, overhead_camera, plan
+
+pytest.importorskip("cv2")
+
+A4 = Paper.a4()
+COARSE = {"edges": 75, "time_step": 0.02}
+
+
+@pytest.fixture(scope="module")
+def half():
+    return plan(A4, method="ucs")
+
+
+def test_the_edges_meet_though_the_sheet_slides(half):
+    sheet = SimulatedSheet(A4, 2, Noise(), **COARSE)
+    blind = sheet.fold(half, progress=False)
+    watched = fold(half, sheet, progress=False)
+    assert blind.seen_slides == ()
+    assert abs(blind.error) > 2e-3
+    assert watched.failure is None
+    assert abs(watched.error) < 1e-3
+    assert len(watched.seen_slides) == 5
+    # What was seen last is where the sheet lay then; it has slid no farther than the crease is off.
+    assert watched.seen_slides[-1] == pytest.approx(watched.slide, abs=5e-4)
+
+
+def test_a_fold_that_is_not_corrected_goes_the_planned_way(half):
+    sheet = SimulatedSheet(A4, **COARSE)
+    blind = sheet.fold(half, progress=False)
+    watched = fold(half, sheet, replans=2, tolerance=1.0, progress=False)
+    assert watched.slide == pytest.approx(blind.slide, abs=2e-4)
+    assert watched.record.positions("sheet")[-1, 0] == pytest.approx(half.poses[-1, :3], abs=1e-6)
+
+
+def test_a_hidden_edge_is_said_and_not_guessed(half):
+    aside = overhead_camera(1.5)
+    watched = fold(half, SimulatedSheet(A4, **COARSE), replans=1, camera=aside, progress=False)
+    assert np.isnan(watched.seen_slides).all()
+
+
+def test_nonsense_is_refused(half):
+    sheet = SimulatedSheet(A4, **COARSE)
+    with pytest.raises(ValueError, match="plan must be a Plan"):
+        fold("half", sheet)
+    with pytest.raises(ValueError, match="sheet must be a SimulatedSheet"):
+        fold(half, A4)
+    with pytest.raises(ValueError, match="replans"):
+        fold(half, sheet, replans=-1)
+    with pytest.raises(ValueError, match="tolerance"):
+        fold(half, sheet, tolerance=-1.0)
