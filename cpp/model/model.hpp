@@ -103,16 +103,16 @@ struct Support {
 /// How surfaces that touch press and rub: between rods, on obstacles, and of pairs of bodies that have something of
 /// their own.
 struct SurfaceParameters {
-  double friction = 0;             ///< between rods [-]
-  double slip_tolerance = 1e-3;    ///< nu [m/s]
-  double restitution = 1;          ///< between rods [-]
-  double contact_stiffness = 0;    ///< [N/m]; 0: found by the rule
-  MatrixX2 obstacle_friction;      ///< per obstacle, along and across rods [-]
-  VectorX obstacle_restitution;    ///< per obstacle [-]
-  MatrixX2 pair_friction;          ///< per pair, along and across; negative: that of its bodies [-]
+  double friction = 0;               ///< between rods [-]
+  double slip_tolerance = 1e-3;      ///< nu [m/s]
+  double restitution = 1;            ///< between rods [-]
+  double contact_stiffness = 0;      ///< [N/m]; 0: found by the rule
+  MatrixX2 obstacle_friction;        ///< per obstacle, along and across rods [-]
+  VectorX obstacle_restitution;      ///< per obstacle [-]
+  MatrixX2 pair_friction;            ///< per pair, along and across; negative: that of its bodies [-]
   std::vector<VectorX> pair_shares;  ///< per pair, see `ContactPairDescription::shares`
-  VectorX pair_restitution;        ///< per pair; negative: that of its bodies [-]
-  VectorX pair_contact_stiffness;  ///< per pair; 0: that of the scene [N/m]
+  VectorX pair_restitution;          ///< per pair; negative: that of its bodies [-]
+  VectorX pair_contact_stiffness;    ///< per pair; 0: that of the scene [N/m]
 
   bool operator==(const SurfaceParameters& other) const;
 };

@@ -19,7 +19,8 @@ constexpr const char* kHeldByFriction =
     "run with differentiable=True";
 constexpr const char* kStiffness =
     "its contacts took a stiffness of their own; give enable_contact(stiffness=), great enough";
-constexpr const char* kFrictionChanged = "friction came or went while it ran; begin another run there";
+constexpr const char* kFrictionChanged =
+    "friction came or went while it ran, or what two bodies have of their own; begin another run there";
 constexpr const char* kRestitution = "impacts lose energy by their restitution; take restitution=1";
 
 bool known_friction(FrictionLaw law) { return law == FrictionLaw::implicit || law == FrictionLaw::lagged; }

@@ -226,8 +226,14 @@ void World::set_contact(const ContactDescription& contact) {
   const SurfaceParameters& now = self.parameters.surfaces;
   const bool stiffer = now.contact_stiffness != stiffness || now.pair_contact_stiffness.size() != of_pairs.size() ||
                        now.pair_contact_stiffness != of_pairs;
-  if (const Contact* touching = self.equations->contact(); touching && stiffer)
+  if (const Contact* touching = self.equations->contact(); touching && stiffer) {
     touching->take_given_stiffness(self.state, self.parameters);
+    VectorX before_of_pairs = VectorX::Zero(now.pair_contact_stiffness.size());
+    const Eigen::Index known = std::min(of_pairs.size(), before_of_pairs.size());
+    before_of_pairs.head(known) = of_pairs.head(known);
+    if (self.tape && (now.contact_stiffness != stiffness || now.pair_contact_stiffness != before_of_pairs))
+      self.tape->refuse("the stiffness of contact was set while it ran; begin another run there");
+  }
   // What surfaces and anchors hold changes with the numbers that they are made of.
   self.actuation_work += energy() - before;
 }

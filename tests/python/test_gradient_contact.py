@@ -259,3 +259,24 @@ def test_runs_of_integrators_without_a_gradient_say_so(integrator):
     record = simulation.run(2e-5, record_every=2e-5, progress=False, differentiable=True)
     with pytest.raises(ValueError, match=f"integrator '{integrator}' has none; take any other"):
         record.gradient({"positions": np.zeros((2, 5, 3))}, ["gravity"])
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda s, arm, floor: s.set(contact_stiffness=3e5), "the stiffness of contact was set"),
+        (lambda s, arm, floor: s.set_contact_stiffness(arm, floor, 3e5), "the stiffness of contact was set"),
+        (lambda s, arm, floor: s.set(floor, restitution=0.5), "take restitution=1"),
+    ],
+)
+def test_runs_in_which_contact_becomes_stiffer_or_loses_energy_say_so(change, message):
+    touching = Touching("floor", "implicit")
+    steps = iter(range(100))
+
+    def before_step(simulation):
+        if next(steps) == 8:
+            change(simulation, touching.arm, touching.other)
+
+    record = touching.run(differentiable=True, before_step=before_step)
+    with pytest.raises(ValueError, match=message):
+        record.gradient({"positions": np.zeros((4, NODES, 3))}, ["gravity"])
