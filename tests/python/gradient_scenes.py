@@ -80,7 +80,7 @@ def settings(drawn, random):
     yield (arm, "bend_stiffness"), uneven * bend, lambda h: sim.set(arm, bend_stiffness=bend * (1.0 + h * uneven)), 1e-4
     yield (arm, "natural_curvature"), bent, lambda h: sim.set(arm, natural_curvature=curvature + h * bent), 1e-3
     stretch, longer = sim.get(arm, "natural_stretch"), np.random.default_rng(23).normal(size=NODES - 1)
-    yield (arm, "natural_stretch"), longer, lambda h: sim.set(arm, natural_stretch=stretch + h * longer), 1e-5
+    yield (arm, "natural_stretch"), longer, lambda h: sim.set(arm, natural_stretch=stretch + h * longer), 1e-4
     yield (arm, "natural_twist"), turned, lambda h: sim.set(arm, natural_twist=twist + h * turned), 1e-3
     yield (drawn.force, "force"), np.array([0, 0, 1.0]), lambda h: sim.set(drawn.force, force=(0, 0, 0.3 + h)), 1e-4
     yield (drawn.mass, "mass"), 1.0, lambda h: sim.set(drawn.mass, mass=0.01 + h), 3e-6

@@ -15,12 +15,13 @@ MODULES = [
 
 
 def words():
-    """What an example may take as given: an arm that hangs from a wall with a load at its tip."""
+    """What an example may take as given: an arm that hangs from a wall, far above a floor, with a load at its tip."""
     scene = withe.Scene()
     # Viscous, as rubber is: without, it whips in modes that steps of 5 ms do not resolve, and says so.
     rubber = withe.Material(youngs_modulus=1e6, density=1000.0, viscosity=2e3)
     arm = scene.add_rod(start=(0, 0, 0), end=(0.3, 0, 0), nodes=31, radius=5e-3, material=rubber, name="arm")
     scene.clamp(arm.start)
+    floor = scene.add_floor(-1.0)
     tip_load = scene.add_force(arm.end, (0, 0, -0.01))
     simulation = scene.build()
     record = simulation.copy().run(duration=0.1, record_every=0.02, progress=False)
@@ -29,6 +30,7 @@ def words():
         "withe": withe,
         "scene": scene,
         "arm": arm,
+        "floor": floor,
         "tip_load": tip_load,
         "simulation": simulation,
         "record": record,
