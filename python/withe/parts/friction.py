@@ -117,7 +117,7 @@ def friction_pair(value: Friction | npt.ArrayLike, what: str, *, directed: bool 
     return validation.non_negative(along, f"{what} along"), validation.non_negative(across, f"{what} across")
 
 
-def as_given(pair: tuple[float, float]) -> Friction:
+def as_given(pair: tuple[float, float]) -> float | tuple[float, float]:
     """One number where both are the same."""
     return pair[0] if pair[0] == pair[1] else pair
 
