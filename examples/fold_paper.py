@@ -20,7 +20,7 @@ OUT = Path("out")
 paper = Paper.a4()
 plans = {
     "moment-free grasp, least force ratio": plan(paper, method="ucs"),
-    "free moment at the jaw, no slide": plan(paper, method="slip", grasp="free"),
+    "free moment at the jaw": plan(paper, method="slip", grasp="free"),
 }
 
 OUT.mkdir(exist_ok=True)

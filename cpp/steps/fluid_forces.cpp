@@ -15,6 +15,7 @@
 
 #include <stdexcept>
 
+#include "common/check.hpp"
 #include "steps/inertia.hpp"
 
 namespace withe {
@@ -78,6 +79,7 @@ ResistiveForces::ResistiveForces(const Model& model) {
   for (int e = 0; e < model.edge_count; ++e) {
     const auto rod = at(model.edge_rod[at(e)]);
     const RodDescription& d = scene.rods[rod];
+    require(d.fluid_radius.size() == d.rest_lengths.size(), "a rod in a fluid needs one radius an edge");
     const double radius = d.fluid_radius[e - model.rod_first_edge[rod]];
     resistance_.push_back(resistive_coefficients(radius, d.rest_lengths.sum(), scene.fluid.wavelength));
   }

@@ -78,7 +78,10 @@ class SceneBuilder {
     return *this;
   }
   int support(SupportKind kind, RodPass pass, const Matrix3& free = Matrix3::Zero()) {
-    scene.supports.push_back({kind, pass, free});
+    SupportDescription& added = scene.supports.emplace_back();
+    added.kind = kind;
+    added.pass = pass;
+    added.free = free;
     return static_cast<int>(scene.supports.size()) - 1;
   }
   int load(LoadKind kind, RodPass pass, const Vector3& value, bool follower = false) {

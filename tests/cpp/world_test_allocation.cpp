@@ -39,7 +39,7 @@ TEST(Step, InAFluidDoesNotAllocateAfterWarmUp) {
     for (Integrator integrator :
          {Integrator::backward_euler, Integrator::implicit_midpoint, Integrator::energy_momentum, Integrator::verlet}) {
       SceneBuilder builder = testing::hanging_arm();
-      builder.scene.rods[0].contact_radius.setConstant(builder.scene.rods[0].rest_lengths.size(), 5e-3);
+      builder.scene.rods[0].fluid_radius.setConstant(builder.scene.rods[0].rest_lengths.size(), 5e-3);
       builder.scene.fluid = {model, 0.1, 5e-3, 0.0};
       World world(builder.scene, testing::options(integrator, integrator == Integrator::verlet ? 2e-5 : 2e-3));
       world.step(20);

@@ -38,6 +38,7 @@ def run(name, folder, *arguments):
         "contact_robustness",
         "real2sim",
         "deployment",
+        "folding_trials",
     ],
 )
 def test_the_short_form_writes_its_figures(name, tmp_path):

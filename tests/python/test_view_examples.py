@@ -20,7 +20,12 @@ EXAMPLES = {
         1e-6,
         0.05,
     ),
-    "fold_sheet.py": (["--edges", "75", "--time-step", "0.02"], r"it slides by ([.\d]+) mm \(predicted 7", 7.5, 7.9),
+    "fold_sheet.py": (
+        ["--edges", "75", "--time-step", "0.02"],
+        r"Least force: it slides by ([.\d]+) mm \(predicted 7",
+        7.5,
+        7.9,
+    ),
     "friction.py": (["--forces", "11"], r"at most ([.\d]+)% off", 0.0, 1.0),
     "granny_reef.py": (
         ["--frictions", "0.5", "--moduli", "--leaning", "--step", "5e-3"],

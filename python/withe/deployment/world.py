@@ -100,6 +100,8 @@ def _path(setup: Setup, motion: Motion) -> Any:
     def at(time: float) -> tuple[FloatArray, Any]:
         time = float(np.clip(time, motion.times[0], motion.times[-1]))
         rise = min(1.0, time)  # [s]: what is wrong comes in smoothly
-        return where(time) + rise * offset, turn**rise * Rotation.from_quat(turned(time)) * first
+        place = where(time) + rise * offset
+        place[2] = max(place[2], setup.cable.radius)  # the floor stops the jaw
+        return place, turn**rise * Rotation.from_quat(turned(time)) * first
 
     return at
