@@ -253,8 +253,8 @@ void update_viscous_times(const Model& model, Parameters& p) {
 
 /// In a plane the one bending stiffness stands in the first column.
 Vector2 bend_of(const Model& model, const Parameters& p, int edge) {
+  if (!model.planar()) return p.edge_bend.row(edge);
   const Vector2 b = p.edge_bend.row(edge);
-  if (!model.planar()) return b;
   const Vector2 c = model.planar_components[at(model.edge_rod[at(edge)])];
   return {c(0) * c(0) * b(0) + c(1) * c(1) * b(1), 0.0};
 }
