@@ -56,6 +56,7 @@ __all__: list[str] = [
     "hsv_mask",
     "sheets_at_forces",
     "sheets_at_poses",
+    "slides_to_rest",
     "smooth_curvatures",
     "thin",
     "trace_lines",
@@ -1230,6 +1231,16 @@ def sheets_at_poses(
 ) -> numpy.typing.NDArray[numpy.float64]:
     """
     Sheets held at poses, each followed from forces of its own, one row a sheet.
+    """
+
+def slides_to_rest(
+    forces: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    friction: typing.SupportsFloat | typing.SupportsIndex,
+    sheet_length: typing.SupportsFloat | typing.SupportsIndex,
+    width_growth: typing.SupportsFloat | typing.SupportsIndex,
+) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    How far sheets that are held still slide until friction holds them.
     """
 
 def smooth_curvatures(
