@@ -18,7 +18,7 @@ from withe.folding.figures import draw_fold, side_view
 from withe.folding.jaw import Jaw, inner_edge
 from withe.folding.paper import Paper
 from withe.folding.sheets import Elastica, at_forces, drag, forces_of, join, take
-from withe.io import written_beside
+from withe.io import pose_path, save_poses, written_beside
 
 __all__ = ["FLAT", "SHORT", "Plan"]
 
@@ -105,6 +105,17 @@ class Plan:
             forces, ahead = np.array(FLAT), at_forces([FLAT] * begin)
         sheet, slide = drag(self._inner[begin:], forces, self.paper.friction, self._length)
         return join(ahead, sheet), np.concatenate([np.zeros(begin), slide])
+
+    @property
+    def path(self) -> FloatArray:
+        """Rows t, x, y, z, qw, qx, qy, qz of shape (n, 8), for hands of a simulation, which have the scalar first.
+
+        >>> import withe
+        >>> plan = withe.folding.plan(withe.folding.Paper.a4())
+        >>> hand = scene.grasp(sheet, at=0.005, length=0.01, pose=plan.path[0, 1:])  # doctest: +SKIP
+        >>> simulation.move(hand, path=plan.path)  # doctest: +SKIP
+        """
+        return pose_path(self.times, self.poses)
 
     @property
     def sheet(self) -> Elastica:
@@ -214,7 +225,8 @@ class Plan:
         ----------
         path : path-like
             "NAME.csv": columns t, x, y, z, qx, qy, qz, qw, the fields of geometry_msgs' PoseArray and
-            trajectory_msgs' MultiDOFJointTrajectory; "NAME.json": everything.
+            trajectory_msgs' MultiDOFJointTrajectory, which `withe.io.load_poses` reads for a hand; "NAME.json":
+            everything.
 
         Returns
         -------
@@ -227,13 +239,9 @@ class Plan:
         """
         path = Path(path)
         if path.suffix == ".csv":
-            rows = np.column_stack([self.times, self.poses])
-            lines = [",".join(f"{value:.9g}" for value in row) for row in rows]
-            text = "\n".join(["t,x,y,z,qx,qy,qz,qw", *lines]) + "\n"
-        elif path.suffix == ".json":
-            text = json.dumps(self.to_dict(), indent=1)
-        else:
+            return save_poses(path, self.times, self.poses)
+        if path.suffix != ".json":
             raise ValueError(f"path must end in .csv or .json, got {path.name!r}")
         with written_beside(path) as beside:
-            beside.write_text(text, encoding="utf-8")
+            beside.write_text(json.dumps(self.to_dict(), indent=1), encoding="utf-8")
         return path
