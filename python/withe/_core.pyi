@@ -10,6 +10,7 @@ import scipy.sparse
 import typing
 
 __all__: list[str] = [
+    "Batch",
     "ContactDescription",
     "ContactPairDescription",
     "ContactTable",
@@ -56,6 +57,7 @@ __all__: list[str] = [
     "hsv_mask",
     "sheets_at_forces",
     "sheets_at_poses",
+    "slides_to_rest",
     "smooth_curvatures",
     "thin",
     "trace_lines",
@@ -1082,6 +1084,62 @@ class World:
     @property
     def time(self) -> float: ...
 
+class Batch:
+    """
+    Worlds that are stepped and read in one call.
+    """
+    def __init__(
+        self, worlds: collections.abc.Sequence[typing.Any], workers: typing.SupportsInt | typing.SupportsIndex
+    ) -> None: ...
+    def failure(self, lane: typing.SupportsInt | typing.SupportsIndex) -> typing.Any:
+        """
+        Message and numbers, or None.
+        """
+    def forgive(self, lane: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    def read(
+        self, what: str, rod: typing.SupportsInt | typing.SupportsIndex, out: numpy.typing.NDArray[numpy.float64]
+    ) -> None:
+        """
+        Fill an array with a read-out of every lane.
+        """
+    def replace(self, lane: typing.SupportsInt | typing.SupportsIndex, world: typing.Any) -> None: ...
+    def restore(
+        self, lanes: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], snapshots: collections.abc.Sequence[bytes]
+    ) -> None: ...
+    def set_natural_curvature(
+        self,
+        lanes: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
+        rod: typing.SupportsInt | typing.SupportsIndex,
+        values: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+        over: typing.SupportsFloat | typing.SupportsIndex,
+    ) -> None: ...
+    def set_natural_stretch(
+        self,
+        lanes: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
+        rod: typing.SupportsInt | typing.SupportsIndex,
+        values: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+        over: typing.SupportsFloat | typing.SupportsIndex,
+    ) -> None: ...
+    def set_natural_twist(
+        self,
+        lanes: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
+        rod: typing.SupportsInt | typing.SupportsIndex,
+        values: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+        over: typing.SupportsFloat | typing.SupportsIndex,
+    ) -> None: ...
+    def step(
+        self,
+        lanes: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
+        count: typing.SupportsInt | typing.SupportsIndex,
+        functions: collections.abc.Mapping[typing.SupportsInt | typing.SupportsIndex, tuple[typing.Any, typing.Any]],
+    ) -> None:
+        """
+        Advance lanes by `count` time steps; functions of Python are called with the lock of the interpreter.
+        """
+    def take_warnings(self) -> tuple[str, str]: ...
+    @property
+    def workers(self) -> int: ...
+
 class SheetManifold:
     """
     All poses in which a sheet can be held, tabulated once.
@@ -1233,6 +1291,16 @@ def sheets_at_poses(
 ) -> numpy.typing.NDArray[numpy.float64]:
     """
     Sheets held at poses, each followed from forces of its own, one row a sheet.
+    """
+
+def slides_to_rest(
+    forces: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    friction: typing.SupportsFloat | typing.SupportsIndex,
+    sheet_length: typing.SupportsFloat | typing.SupportsIndex,
+    width_growth: typing.SupportsFloat | typing.SupportsIndex,
+) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    How far sheets that are held still slide until friction holds them.
     """
 
 def smooth_curvatures(

@@ -20,11 +20,11 @@ from withe.folding.paper import Paper
 from withe.folding.sheets import Elastica, at_forces, drag, forces_of, join, take
 from withe.io import written_beside
 
-__all__ = ["FLAT", "Plan"]
+__all__ = ["FLAT", "SHORT", "Plan"]
 
 FloatArray = npt.NDArray[np.float64]
 FLAT = (0.05, 0.0, 0.1)  # forces of a sheet of which next to nothing is lifted [w Lgb], [Lgb]
-_SHORT = 0.5  # the same of a sheet that a plan knows: poses say little of so short a part [Lgb]
+SHORT = 0.5  # the same of a sheet that a plan knows: poses say little of so short a part [Lgb]
 _LOW = 1e-5  # an edge less high than this lies on the table [Lgb]
 
 
@@ -56,6 +56,10 @@ class Plan:
     clearance : float [m]
         Least height of the fingers over the table while the edge looks back (angle > pi / 2), coming from `side`. At
         the start the lower finger needs the edge to hang over that of the table, or to be bent up.
+    uncertainty : tuple of float
+        Shares by which Lgb and friction may be other than thought.
+    curvature : float [1/Lgb]
+        Bound of a free moment's curvature.
     poses : ndarray of shape (n, 7) [m], [-]
         x, y, z and the quaternion x, y, z, w of the outer edge.
     angles : ndarray of shape (n,) [rad]
@@ -72,6 +76,8 @@ class Plan:
     offset: float
     side: str
     clearance: float
+    uncertainty: tuple[float, float]
+    curvature: float
     poses: FloatArray
     angles: FloatArray
     times: FloatArray
@@ -92,7 +98,7 @@ class Plan:
     def _motion(self) -> tuple[Elastica, FloatArray]:
         """From where the sheet first hangs freely; what is lifted less than that is lifted without force."""
         if self._foreseen is not None:
-            begin = int(np.argmax(self._foreseen.suspended > _SHORT))
+            begin = int(np.argmax(self._foreseen.suspended > SHORT))
             forces, ahead = forces_of(self._foreseen)[begin], take(self._foreseen, slice(0, begin))
         else:
             begin = int(np.argmax(self._inner[:, 1] > _LOW))
@@ -188,6 +194,8 @@ class Plan:
             "grasp": self.grasp,
             "limits": dict(zip(("speed", "turning", "acceleration"), self.limits, strict=True)),
             "offset": self.offset,
+            "uncertainty": dict(zip(("gravito_bending_length", "friction"), self.uncertainty, strict=True)),
+            "curvature": self.curvature,
             "jaw": {**vars(self.jaw), "side": self.side, "clearance": self.clearance},
             "times": self.times.tolist(),
             "poses": self.poses.tolist(),

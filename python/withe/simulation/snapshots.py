@@ -21,7 +21,7 @@ from withe.simulation.motion import POSE_WORDS, PathTable, Turn, Waypoints
 from withe.simulation.session import Session
 from withe.simulation.settings import Settings
 
-__all__ = ["Snapshot", "restore"]
+__all__ = ["Snapshot", "adopt", "matched", "restore"]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -197,8 +197,18 @@ def restore(session: Session, snapshot: Snapshot) -> None:
     ValueError
         A snapshot of another scene, a damaged one, or one that needs functions of time that the session does not have.
     """
-    settings = _matched(snapshot, session.settings, session.directory, session.scene)
+    settings = matched(session, snapshot)
     session.world.restore(snapshot._state)
+    adopt(session, settings)
+
+
+def matched(session: Session, snapshot: Snapshot) -> Settings:
+    """What `adopt` takes over once the engine is back at a snapshot; see `restore`."""
+    return _matched(snapshot, session.settings, session.directory, session.scene)
+
+
+def adopt(session: Session, settings: Settings) -> None:
+    """Take over settings of a snapshot to which the engine went back."""
     parts = session.directory.parts
     for name in set(parts) - set(session.scene.parts) - set(settings.supports):
         del parts[name]
