@@ -134,7 +134,10 @@ class Placement:
         over: float = 0.0,
         path: PathLike | None = None,
     ) -> None:
-        """Move a support or an obstacle, or let it move along a path from now on. What is not given stays as it is.
+        """Move a support or an obstacle, or let it move along a path from now on.
+
+        What is not given goes on as it does: a position, a tangent, a rotation or a roll that is on its way arrives
+        when it was to arrive, and a path goes on in what else it gives.
 
         Parameters
         ----------
