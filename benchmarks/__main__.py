@@ -32,6 +32,7 @@ NAMES = (
     "real2sim",
     "deployment",
     "deployment_tables",
+    "folding",
     "folding_trials",
 )
 

@@ -39,6 +39,7 @@ def run(name, folder, *arguments):
         "real2sim",
         "deployment",
         "deployment_tables",
+        "folding",
         "folding_trials",
     ],
 )

@@ -21,6 +21,7 @@ from withe.deployment.motion import Course, Path, Phase, Start, course, lengthen
 from withe.deployment.optimising import optimised, runs
 from withe.deployment.pattern import Pattern
 from withe.deployment.pattern import crossings as crossings_of
+from withe.io import pose_path, save_poses, written_beside
 
 __all__ = ["Plan", "PlanController", "plan"]
 
@@ -79,6 +80,11 @@ class Plan:
     fastest: float
     needed_friction: FloatArray
 
+    @property
+    def path(self) -> FloatArray:
+        """Rows t, x, y, z, qw, qx, qy, qz of shape (n, 8), for hands of a simulation, which have the scalar first."""
+        return pose_path(self.times, np.column_stack([self.positions, self.rotations]))
+
     def feasibility(self, friction: float) -> Feasibility:
         """Say where friction holds the cable and where it will slip; see `Pattern.feasibility`."""
         return examine(
@@ -94,7 +100,8 @@ class Plan:
         Parameters
         ----------
         path : str or Path
-            ``.csv``, with the header t,x,y,z,qx,qy,qz,qw [s, m], or ``.json``, with phases, cable and pattern beside.
+            ``.csv``, with the header t,x,y,z,qx,qy,qz,qw [s, m], which `withe.io.load_poses` reads, or ``.json``, with
+            phases, cable and pattern beside.
 
         Raises
         ------
@@ -103,10 +110,10 @@ class Plan:
         """
         path = FilePath(path)
         if path.suffix == ".csv":
-            rows = np.column_stack([self.times, self.positions, self.rotations])
-            np.savetxt(path, rows, delimiter=",", header="t,x,y,z,qx,qy,qz,qw", comments="", fmt="%.9g")
+            save_poses(path, self.times, np.column_stack([self.positions, self.rotations]))
         elif path.suffix == ".json":
-            path.write_text(json.dumps(self.to_dict()), encoding="utf-8")
+            with written_beside(path) as beside:
+                beside.write_text(json.dumps(self.to_dict()), encoding="utf-8")
         else:
             raise ValueError(f"path must end in .csv or .json, got {path.name!r}")
 
