@@ -31,6 +31,7 @@ NAMES = (
     "perception",
     "real2sim",
     "deployment",
+    "folding",
     "folding_trials",
 )
 

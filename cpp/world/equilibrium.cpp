@@ -205,7 +205,7 @@ PathPoint path_point(const World& world, const Model& model, const ArcPoint& poi
 void stop(SupportMotion& motion, double time) {
   motion.from_position = motion.to_position = motion.position;
   motion.from_rotation = motion.to_rotation = motion.rotation;
-  motion.start = motion.end = time;
+  motion.shift = motion.turn = {time, time};
 }
 
 }  // namespace

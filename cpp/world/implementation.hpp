@@ -226,6 +226,8 @@ struct World::Implementation : Running {
 
   // supports.cpp
   SupportMotion standing(const Support& support) const;
+  void check_pose(int support, const std::optional<Vector3>& position, const std::optional<Matrix3>& rotation);
+  void lump_held();
 
   // equilibrium.cpp
   EquilibriumResult equilibrium(double dt);

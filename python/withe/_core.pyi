@@ -57,6 +57,7 @@ __all__: list[str] = [
     "hsv_mask",
     "sheets_at_forces",
     "sheets_at_poses",
+    "slides_to_rest",
     "smooth_curvatures",
     "thin",
     "trace_lines",
@@ -675,7 +676,7 @@ class Tape:
         moments: collections.abc.Sequence[MomentAdjoint],
         visit: collections.abc.Callable[[int, int, float, ParameterGradient], None],
         visit_poses: collections.abc.Callable[
-            [int, typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"], PoseAdjoint], None
+            [int, typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"], PoseAdjoint], None
         ]
         | None,
     ) -> InitialGradient: ...
@@ -948,15 +949,15 @@ class World:
     def move_obstacle(
         self,
         obstacle: typing.SupportsInt | typing.SupportsIndex,
-        position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"],
-        turn: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"],
+        position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] | None,
+        turn: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] | None,
         over: typing.SupportsFloat | typing.SupportsIndex,
     ) -> None: ...
     def move_support(
         self,
         support: typing.SupportsInt | typing.SupportsIndex,
-        position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"],
-        rotation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"],
+        position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] | None,
+        rotation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"] | None,
         over: typing.SupportsFloat | typing.SupportsIndex,
     ) -> None: ...
     def natural_curvature(
@@ -981,14 +982,14 @@ class World:
     def prescribe_obstacle(
         self,
         obstacle: typing.SupportsInt | typing.SupportsIndex,
-        position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"],
-        turn: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"],
+        position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] | None,
+        turn: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] | None,
     ) -> None: ...
     def prescribe_support(
         self,
         support: typing.SupportsInt | typing.SupportsIndex,
-        position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"],
-        rotation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"],
+        position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] | None,
+        rotation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"] | None,
     ) -> None: ...
     def reaction(self, support: typing.SupportsInt | typing.SupportsIndex) -> Reaction: ...
     def remove_load(self, load: typing.SupportsInt | typing.SupportsIndex) -> None: ...
@@ -1063,6 +1064,9 @@ class World:
     def support_rotation(
         self, support: typing.SupportsInt | typing.SupportsIndex
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 3]"]: ...
+    def support_turn(
+        self, support: typing.SupportsInt | typing.SupportsIndex
+    ) -> tuple[typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 3]"], float]: ...
     def take_step_warning(self) -> str: ...
     def take_warning(self) -> str: ...
     def tensions(
@@ -1288,6 +1292,16 @@ def sheets_at_poses(
 ) -> numpy.typing.NDArray[numpy.float64]:
     """
     Sheets held at poses, each followed from forces of its own, one row a sheet.
+    """
+
+def slides_to_rest(
+    forces: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    friction: typing.SupportsFloat | typing.SupportsIndex,
+    sheet_length: typing.SupportsFloat | typing.SupportsIndex,
+    width_growth: typing.SupportsFloat | typing.SupportsIndex,
+) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    How far sheets that are held still slide until friction holds them.
     """
 
 def smooth_curvatures(

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import withe
-from withe.deployment import Cable, Pattern, deploy, plan
+from withe.deployment import Cable, Pattern, deploy, place, plan
 
 CABLE = Cable(0.36, 1.6e-3, 0.02)  # short and soft, so that little is simulated
 NODES = 60
@@ -81,3 +81,36 @@ def test_the_world_imports_no_planner():
 def test_bad_input_says_what_is_wrong(arc, arguments, message):
     with pytest.raises(ValueError, match=message):
         deploy(plan(CABLE, arc), **arguments)
+
+
+def test_quasi_static_laying_is_what_slow_laying_tends_to(arc):
+    motion = plan(CABLE, arc, speed=0.01)
+    slow = deploy(motion, floor=0.6, nodes=NODES, progress=False)
+    still = deploy(motion, floor=0.6, nodes=NODES, quasi_static=True, progress=False)
+    assert np.linalg.norm(slow.laid - still.laid, axis=1).max() < 4e-4
+    assert not np.any(still.record.energy().kinetic)
+
+
+def test_a_cable_put_on_its_pattern_moves_only_where_friction_fails(arc):
+    motion = plan(CABLE, arc)
+    rough, smooth = (place(motion, floor=friction, nodes=NODES, progress=False) for friction in (0.6, 0.02))
+    assert rough.error < 2e-4
+    assert smooth.error > 5 * rough.error
+    still, moving = (place(motion, floor=0.1, nodes=NODES, quasi_static=q, progress=False) for q in (True, False))
+    assert np.abs(still.laid - moving.laid).max() < 5e-4
+
+
+def test_optimising_makes_up_for_what_slips():
+    pattern = Pattern(bend(1.0, radius=0.03), smoothing=3e-4)  # needs more friction than there is
+    exact, better = (
+        plan(CABLE, pattern, controller, friction=0.25, progress=False) for controller in ("exact", "optimised")
+    )
+    assert exact.needed_friction[5:].max() > 0.35
+    slipped, laid = (deploy(motion, floor=0.25, quasi_static=True, progress=False) for motion in (exact, better))
+    assert slipped.error > 1e-3
+    assert laid.error < 0.5 * slipped.error
+
+
+def test_optimising_needs_the_friction(arc):
+    with pytest.raises(ValueError, match="'optimised' needs friction"):
+        plan(CABLE, arc, "optimised")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -13,11 +13,12 @@ from withe.parts.materials import Material
 from withe.recording import Record
 from withe.scene import Scene
 
-__all__ = ["Motion", "Setup", "lay"]
+__all__ = ["Motion", "Setup", "lay", "place"]
 
 FloatArray = npt.NDArray[np.float64]
 _DENSITY, _VISCOUS_TIME, _GRAVITY = 1180.0, 0.02, 9.81  # [kg/m^3], [s], [m/s^2]
 _SETTLING = 2.0  # [s] after the jaw has opened
+_STRESSED = 1.0  # [s] in which a cable that is put down takes its stress
 _RECORD_EVERY = 0.1  # [s]
 
 
@@ -48,6 +49,7 @@ class Setup:
     natural_curvature: tuple[float, float] = (0.0, 0.0)  # [1/m]
     jaw_offset: tuple[float, float, float] = (0.0, 0.0, 0.0)  # [m]
     jaw_turn: tuple[float, float, float] = (0.0, 0.0, 0.0)  # [rad], a rotation vector
+    quasi_static: bool = False  # a row of equilibria: neither inertia nor viscosity
 
 
 def lay(setup: Setup, motion: Motion, *, progress: bool) -> tuple[FloatArray, FloatArray, Record]:
@@ -60,29 +62,61 @@ def lay(setup: Setup, motion: Motion, *, progress: bool) -> tuple[FloatArray, Fl
     record : Record
         Of the motion, every tenth of a second.
     """
-    scene, cable = _scene(setup, motion.positions[0])
-    simulation = scene.build(integrator="backward_euler", time_step=setup.time_step, planar=False)
-    if any(setup.natural_curvature):
+    jaw = motion.positions[0]
+    scene, cable = _scene(setup, np.linspace(jaw - [0.0, 0.0, setup.cable.length], jaw, setup.nodes))
+    scene.clamp(cable.end)
+    simulation = scene.build(integrator=_integrator(setup), time_step=setup.time_step, planar=False)
+    if any(setup.natural_curvature) or setup.quasi_static:
         simulation.set_natural_curvature(cable, setup.natural_curvature)
         simulation.equilibrium()
     simulation.move(cable.end, path=_path(setup, motion))
-    record = simulation.run(float(motion.times[-1]), record_every=_RECORD_EVERY, progress=progress)
+    every = max(_RECORD_EVERY, setup.time_step)
+    record = simulation.run(float(motion.times[-1]), record_every=every, progress=progress)
     held = simulation.positions(cable)
     simulation.release(cable.end)
-    simulation.run(_SETTLING, progress=False)
+    if setup.quasi_static:
+        simulation.step()
+    else:
+        simulation.run(_SETTLING, progress=False)
     return held, simulation.positions(cable), record
 
 
-def _scene(setup: Setup, jaw: FloatArray) -> tuple[Scene, Any]:
+def place(setup: Setup, points: FloatArray, *, progress: bool) -> tuple[FloatArray, Record]:
+    """Put a cable on the floor in the shape of a curve, free of stress, and let its stress come within a second.
+
+    Parameters
+    ----------
+    setup : Setup
+    points : ndarray of shape (nodes, 2) [m]
+        Its nodes, from the free end.
+
+    Returns
+    -------
+    laid : ndarray of shape (nodes, 3) [m]
+        After it has come to rest, both ends free.
+    record : Record
+    """
+    scene, cable = _scene(setup, np.column_stack([points, np.full(len(points), setup.cable.radius)]))
+    scene.ignore_contact(cable, cable)  # where a pattern touches itself, the cable lies in itself
+    simulation = scene.build(integrator=_integrator(setup), time_step=setup.time_step, planar=False)
+    simulation.set_natural_curvature(cable, setup.natural_curvature, over=_STRESSED)
+    duration = _STRESSED if setup.quasi_static else _STRESSED + _SETTLING
+    record = simulation.run(duration, record_every=max(_RECORD_EVERY, setup.time_step), progress=progress)
+    return simulation.positions(cable), record
+
+
+def _integrator(setup: Setup) -> Literal["static", "backward_euler"]:
+    return "static" if setup.quasi_static else "backward_euler"
+
+
+def _scene(setup: Setup, points: FloatArray) -> tuple[Scene, Any]:
     cable = setup.cable
     weight = _DENSITY * np.pi * cable.radius**2 * _GRAVITY
     bend = 2.0 * weight * cable.gravito_bending_length**3
     modulus = 4.0 * bend / (np.pi * cable.radius**4)
     material = Material(youngs_modulus=modulus, poisson_ratio=0.5, density=_DENSITY, viscosity=_VISCOUS_TIME * modulus)
     scene = Scene(gravity=(0.0, 0.0, -_GRAVITY))
-    start = jaw - [0.0, 0.0, cable.length]
-    rod = scene.add_rod(start=start, end=jaw, nodes=setup.nodes, radius=cable.radius, material=material, name="cable")
-    scene.clamp(rod.end)
+    rod = scene.add_rod(points=points, radius=cable.radius, material=material, name="cable")
     scene.add_floor(friction=setup.friction)
     scene.enable_contact(friction=setup.friction)
     return scene, rod
