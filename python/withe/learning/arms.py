@@ -24,7 +24,8 @@ FloatArray = npt.NDArray[np.float64]
 
 _NODES, _LENGTH, _RADIUS = 21, 1.0, 0.05  # [-], [m], [m]
 _MODULUS, _DENSITY, _DRAG = 1e7, 1000.0, 10.0  # [Pa], [kg/m^3], [Pa s]
-_SEGMENTS = np.array([3, 4, 4, 4, 4])  # inner nodes of each
+_SEGMENTS = (3, 4, 4, 4, 4)  # inner nodes of each
+_SEGMENT_OF, _SHARES = np.repeat(np.arange(5), _SEGMENTS), 1.0 / np.array(_SEGMENTS)
 _MOST_BEND, _MOST_TWIST = 2.0, 0.5 * np.pi  # of a segment in sum [-], [rad]
 _SEEN = np.arange(2, _NODES, 2)  # nodes whose positions and velocities are observed
 _LOW, _HIGH = np.array([-0.6, -0.6, 0.3]), np.array([0.6, 0.6, 0.9])  # where targets are [m]
@@ -106,17 +107,17 @@ class Arm(Task):
 
     def act(self, robots: Batch, actions: FloatArray, chosen: IntArray) -> None:
         """Lead the natural curvatures on, and twists."""
-        parts = actions.reshape(len(chosen), -1, 5)
-        curvature = np.zeros((len(chosen), _NODES - 2, 2))
-        for i in range(self.components):
-            bends = np.clip(self.bends[chosen, :, i] + self.bend_step * parts[:, i], -_MOST_BEND, _MOST_BEND)
-            self.bends[chosen, :, i] = bends
-            curvature[..., i] = np.repeat(bends / _SEGMENTS, _SEGMENTS, axis=1)
+        parts = actions.reshape(len(chosen), -1, 5).swapaxes(1, 2)
+        bends = self.bends[chosen] + self.bend_step * parts[..., : self.components]
+        self.bends[chosen] = bends = np.minimum(np.maximum(bends, -_MOST_BEND), _MOST_BEND)
+        curvature = (bends * _SHARES[:, None])[:, _SEGMENT_OF]
+        if self.components == 1:
+            curvature = np.concatenate([curvature, np.zeros_like(curvature)], axis=2)
         robots.set_natural_curvature("arm", curvature, over=self.control_step, discrete=True, lanes=chosen)
         if self.twisted:
-            twists = np.clip(self.twists[chosen] + _TWIST_STEP * parts[:, -1], -_MOST_TWIST, _MOST_TWIST)
+            twists = np.clip(self.twists[chosen] + _TWIST_STEP * parts[..., -1], -_MOST_TWIST, _MOST_TWIST)
             self.twists[chosen] = twists
-            rates = np.repeat(twists / _SEGMENTS, _SEGMENTS, axis=1) * ((_NODES - 1) / _LENGTH)
+            rates = (twists * _SHARES)[:, _SEGMENT_OF] * ((_NODES - 1) / _LENGTH)
             robots.set_natural_twist("arm", rates, over=self.control_step, lanes=chosen)
 
     def observe(self, robots: Batch) -> FloatArray:

@@ -72,7 +72,7 @@ class _Environment:
         self._episodes = Episodes(task, 1, 1)
         self.render_mode = render_mode
         self._screen = _screen(render_mode, self._episodes)
-        self._lane = np.zeros(1, np.intc)
+        self._lane = self._episodes.robots.lanes
         self._closed = False
         self._episodes.begin(self._lane, [np.random.default_rng(0)])
         self.observation_space, self.action_space = _boxes(self._episodes)
@@ -184,7 +184,7 @@ class _VectorEnvironment:
         self.num_envs = num_envs
         self.render_mode = render_mode
         self._screen = _screen(render_mode, self._episodes)
-        self._all = np.arange(num_envs, dtype=np.intc)
+        self._all = self._episodes.robots.lanes
         self._episodes.begin(self._all, [np.random.default_rng(0) for _ in range(num_envs)])
         self.single_observation_space, self.single_action_space = _boxes(self._episodes)
         self._episodes.begun[:] = False
@@ -246,7 +246,7 @@ class _VectorEnvironment:
         over = self._over.copy()
         if self._autoreset == "disabled" and over.any():
             raise ValueError(f"episodes of robots {np.flatnonzero(over).tolist()} are over: reset them")
-        chosen = self._all[~over]
+        chosen = self._all[~over] if over.any() else self._all
         outcome = self._episodes.act(values[chosen], chosen)
         rewards, terminated, truncated = outcome.reward, outcome.terminated, outcome.truncated
         infos: dict[str, Any] = {}
