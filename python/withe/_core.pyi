@@ -485,7 +485,6 @@ class Options:
         "continuation_secant",
     )
     adaptive: bool
-    energy_guard: bool
     integrator: str
     line_search: str
     mixed: bool
