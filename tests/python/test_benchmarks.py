@@ -40,6 +40,7 @@ def run(name, folder, *arguments):
         "contact_robustness",
         "real2sim",
         "deployment",
+        "deployment_tables",
         "folding",
         "folding_trials",
         pytest.param("rl_throughput", marks=pytest.mark.skipif(not HAVE_GYMNASIUM, reason="needs gymnasium")),
