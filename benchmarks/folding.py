@@ -14,6 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 from reporting import OUT, Report, arguments, bar
+from scipy import ndimage
 
 from withe import folding
 from withe.folding import free_moment, grid, moment_free
@@ -35,12 +36,13 @@ KNOWN = {  # by searches of their own: without moment, with a free one
     "cardboard .20": (None, 0.56),
 }
 FRICTION = 0.12
+POINT = folding.Jaw(depth=0.0, finger=0.0)  # what the known figures without moment are of
 COLOURS = {"ucs": "#ffffff", "slip, free moment": "#f4a261", "intuitive": "#e63946"}
 
 
-def holding_of(paper: folding.Paper, curvature: float) -> Holding:
-    """A sheet whose Lgb is known, and the jaw that plans have by default."""
-    jaw, lgb = folding.Jaw(), paper.gravito_bending_length
+def holding_of(paper: folding.Paper, curvature: float, jaw: folding.Jaw | None = None) -> Holding:
+    """A sheet whose Lgb is known, and by default the jaw that plans have."""
+    jaw, lgb = jaw or folding.Jaw(), paper.gravito_bending_length
     sizes = (jaw.depth / lgb, jaw.finger / lgb, paper.thickness / lgb)
     return Holding((paper.length - jaw.depth) / lgb, *sizes, curvature, 0.0)
 
@@ -121,33 +123,45 @@ def needed(pose: Elastica, length: float) -> np.ndarray:
     return np.abs(pose.tangential_force) / (pose.normal_force + length - pose.suspended)
 
 
-def bottleneck(paper: folding.Paper, target: float | str, spacing: float) -> tuple[float, Elastica] | None:
-    """Least greatest ratio from flat to a goal without moment, and the pose where it is; None where no path is."""
-    hold, lgb = holding_of(paper, 1.0), paper.gravito_bending_length
+def bottleneck(
+    paper: folding.Paper, target: float | str, spacing: float, jaw: folding.Jaw | None = None
+) -> tuple[float, Elastica] | None:
+    """Least greatest ratio from flat to a goal without moment, and the pose where it is; None where no path is.
+
+    Over lifted length and angle, the latter from that of sheets without tangential force on: poses are smooth in these.
+    """
+    hold, lgb = holding_of(paper, 1.0, jaw), paper.gravito_bending_length
     x = (paper.length if target == "half" else target) / lgb
     goal = moment_free.goal_pose(x, hold.thickness, hold.depth, hold.finger)
     if goal is None or goal.suspended[0] >= hold.length:
         return None
-    made = grid.make_grid(spacing)
-    ratio = needed(made.pose, hold.length)
-    inside = (made.pose.suspended < hold.length) & (made.pose.suspended > moment_free.PENALTY)
-    inside[: made.lifts] = made.pose.suspended[: made.lifts] < hold.length
+    raised = grid.lift()
+    lengths = np.linspace(0.3, hold.length - 1e-6, int(hold.length / spacing))
+    angles = np.arange(-40, int(4.5 / spacing)) * spacing
+    length, angle = np.meshgrid(lengths, angles, indexing="ij")
+    pose = folding.elastica(length=length, angle=np.interp(length, raised.suspended, raised.angle) + angle)
+    ratio = np.where(pose.valid, np.where(angle == 0, 0.0, needed(pose, hold.length)), np.inf)
+    flat = np.where(lengths < raised.suspended[-1])[0]  # their ratio is 0
+    away = np.abs(pose.suspended - goal.suspended) + np.abs(pose.angle - goal.angle)
+    near = np.unravel_index(np.nanargmin(np.where(np.isfinite(ratio), away, np.nan)), ratio.shape)
 
-    def crossing(bound: float) -> Elastica | None:
-        network = grid.make_network(made, np.ones_like(ratio), inside & (ratio <= bound))
-        return grid.shortest_path(network, None, goal)
+    def passable(bound: float) -> bool:
+        parts, _ = ndimage.label(ratio <= bound, structure=np.ones((3, 3)))
+        return bool(parts[near] and parts[near] in parts[flat, 40])
 
-    low, high = 0.0, 10.0
-    path = crossing(high)
-    if path is None:
+    low, high = float(needed(goal, hold.length)[0]), 100.0
+    if not passable(high):
         return None
-    while high - low > 1e-4:
+    low = max(low, float(ratio[near]))
+    if passable(low):
+        return low, goal
+    while high - low > 1e-5 * high:
         middle = 0.5 * (low + high)
-        tried = crossing(middle)
-        low, high, path = (middle, high, path) if tried is None else (low, middle, tried)
-    ratios = needed(path, hold.length)
-    top = int(np.argmax(ratios))
-    return float(ratios[top]), take(path, slice(top, top + 1))
+        low, high = (low, middle) if passable(middle) else (middle, high)
+    parts, _ = ndimage.label(ratio <= low, structure=np.ones((3, 3)))
+    sides = [ndimage.binary_dilation(parts == part, np.ones((3, 3))) for part in (parts[flat[-1], 40], parts[near])]
+    top = np.unravel_index(np.argmin(np.where(sides[0] & sides[1], ratio, np.inf)), ratio.shape)
+    return high, Elastica(**{name: np.array([value[top]]) for name, value in vars(pose).items()})
 
 
 def free_ratio(paper: folding.Paper, target: float | str, curvature: float, fine: int) -> float | None:
@@ -173,14 +187,17 @@ def ridge(report: Report, quick: bool) -> dict[str, Elastica]:
     rows, tops = [], {}
     with bar(len(cases), "ridge", "cases") as shown:
         for name, (paper, target, curvature) in cases.items():
-            held = [bottleneck(paper, target, spacing) for spacing in (grid.SPACING, grid.SPACING / 2)[: 2 - quick]]
+            resolutions = (0.04, 0.02)[: 2 - quick]
+            edge = [bottleneck(paper, target, spacing, POINT) for spacing in resolutions]
+            held = [bottleneck(paper, target, spacing) for spacing in resolutions]
             free = [free_ratio(paper, target, curvature, fine) for fine in (1, 2)[: 2 - quick]]
             known_held, known_free = KNOWN[name]
             rows.append(
                 (
                     name,
-                    " ".join("none" if found is None else f"{found[0]:.4f}" for found in held),
+                    " ".join("none" if found is None else f"{found[0]:.4f}" for found in edge),
                     known_held or "",
+                    " ".join("none" if found is None else f"{found[0]:.4f}" for found in held),
                     f"{curvature:g}",
                     " ".join("none" if found is None else f"{found:.4f}" for found in free),
                     known_free,
@@ -190,13 +207,21 @@ def ridge(report: Report, quick: bool) -> dict[str, Elastica]:
                 tops[name] = held[-1][1]
             if not quick:
                 if known_held is not None:
-                    off = np.nan if held[-1] is None else held[-1][0] - known_held
+                    off = np.nan if edge[-1] is None else edge[-1][0] - known_held
                     report.goal(f"{name}: ridge without moment, off", abs(off), 0.01 * known_held, at_least=False)
                 value = np.inf if free[-1] is None else free[-1]
                 bound = FRICTION / 2 if known_free == 0.0 else known_free
                 report.goal(f"{name}: least ratio with a free moment", value, bound, at_least=False)
             shown.advance(1)
-    header = ("case", "no moment", "known", "curvature [1/Lgb]", "free moment", "known")
+    header = (
+        "case",
+        "no moment, held at its edge",
+        "known",
+        "held by the jaw",
+        "curvature [1/Lgb]",
+        "free moment",
+        "known",
+    )
     report.table("Friction that a fold needs at least, at two resolutions", header, rows)
     return tops
 
