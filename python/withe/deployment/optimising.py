@@ -12,7 +12,7 @@ import numpy.typing as npt
 from withe.common.progress import Progress
 from withe.deployment.cable import Cable
 from withe.deployment.feasibility import Controller
-from withe.deployment.motion import Path, displaced
+from withe.deployment.motion import Path, Start, displaced
 from withe.deployment.pattern import Pattern
 from withe.deployment.world import Motion, Setup, lay
 from withe.errors import ConvergenceError
@@ -54,17 +54,13 @@ class Trial:
 class _Engine:
     """Lays the cable quasi-statically along paths, and says where it comes to lie."""
 
-    def __init__(
-        self, path: Path, cable: Cable, pattern: Pattern, friction: float, motion_of: MotionOf, shown: Progress
-    ) -> None:
-        nodes = max(_NODES, round(_NODES_PER_LGB * cable.length / cable.gravito_bending_length))
-        self.setup = Setup(cable=cable, friction=friction, nodes=nodes, time_step=_TIME_STEP, quasi_static=True)
-        self.motion_of, self.shown = motion_of, shown
-        self.path = _thinned(path, _PATH_POINTS_PER_LGB / cable.gravito_bending_length)
-        self.spacing = _KNOTS * cable.gravito_bending_length
+    def __init__(self, path: Path, setup: Setup, pattern: Pattern, motion_of: MotionOf, shown: Progress) -> None:
+        self.setup, self.motion_of, self.shown = setup, motion_of, shown
+        self.path = _thinned(path, _PATH_POINTS_PER_LGB / setup.cable.gravito_bending_length)
+        self.spacing = _KNOTS * setup.cable.gravito_bending_length
         self.centres = _centres(path, pattern, self.spacing)
         self.basis = _splines(self.path, self.centres, self.spacing)
-        s = np.linspace(0.0, cable.length, nodes)
+        s = self.setup.arc_length
         self.s = s[s <= pattern.length]
         self.places = np.stack([np.interp(self.s, pattern.arc_length, pattern.points[:, i]) for i in range(2)], 1)
 
@@ -97,7 +93,13 @@ class _Engine:
 
 
 def optimised(
-    path: Path, cable: Cable, pattern: Pattern, friction: float, motion_of: MotionOf, shown: Progress
+    path: Path,
+    cable: Cable,
+    pattern: Pattern,
+    friction: float,
+    motion_of: MotionOf,
+    start: Start,
+    shown: Progress,
 ) -> tuple[Path, Controller]:
     """Shift a path sideways so that the cable comes to lie on its pattern, friction permitting.
 
@@ -111,7 +113,15 @@ def optimised(
     ConvergenceError
         The engine finds no equilibrium on the way of either.
     """
-    engine = _Engine(path, cable, pattern, friction, motion_of, shown)
+    setup = Setup(
+        cable=cable,
+        friction=friction,
+        nodes=max(_NODES, round(_NODES_PER_LGB * cable.length / cable.gravito_bending_length)),
+        time_step=_TIME_STEP,
+        quasi_static=True,
+        start_held=start == "held",
+    )
+    engine = _Engine(path, setup, pattern, motion_of, shown)
     unshifted = np.zeros(len(engine.centres))
     tried = [trial for controller in get_args(Controller) if (trial := engine.trial(unshifted, controller))]
     if not tried:
