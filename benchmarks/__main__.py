@@ -20,6 +20,7 @@ NAMES = (
     "settings",
     "gradients",
     "parallel",
+    "rl_throughput",
     "work_precision",
     "friction_precision",
     "robustness",
@@ -31,6 +32,8 @@ NAMES = (
     "perception",
     "real2sim",
     "deployment",
+    "deployment_tables",
+    "folding",
     "folding_trials",
 )
 

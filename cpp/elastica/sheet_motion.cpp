@@ -53,15 +53,17 @@ bool drag_sheet(const SheetPose& pose, const SheetFriction& friction, double& sl
     const auto& [up, forward, length] = data.path.values;
     return std::abs(forward) - friction.coefficient * (up + friction.sheet_length - length);
   };
+  const auto some_lies = [&] { return data.path.values[2] < friction.sheet_length; };
   const bool stuck = move_to(from, {pose[0] - slide, pose[1], pose[2]}, data);
-  if (stuck && excess() <= 0) return true;
+  if (stuck && excess() <= 0) return some_lies();
   // Where it would stick it has no equilibrium, or one beyond friction: it slides as its forces push it.
   const double sign = (stuck ? data.path.values[1] : before.values[1]) > 0 ? 1.0 : -1.0;
   if (!stuck) data.path = before;
   if (!slide_to(pose_of(data.path), pose, sign * friction.coefficient, friction.sheet_length, data)) return false;
   const double slid = pose[0] - tip_back(data.path) - slide;
   slide += slid;
-  return sign * slid > -1e-9;  // friction that would push a sheet along is no friction: what was found lies past a snap
+  // Friction that would push a sheet along is no friction: what was found lies past a snap.
+  return sign * slid > -1e-9 && some_lies();
 }
 
 }  // namespace withe

@@ -83,7 +83,7 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
   const Lagged lagged_before = lagged();
   const MatrixX3 loads = parameters.loads;
   const double time = state.time + dt;
-  if (actuated()) apply_ramps(time, actuation_work);
+  if (actuated()) apply_ramps(time, configuration(), actuation_work);
   aim_supports(time);
   Equations& system = statics();
   update_custom_force(system);

@@ -129,7 +129,8 @@ struct World::Implementation : Running {
   void set(std::span<const ParameterSetting> settings);
   void apply_ramps(double time);
   Eigen::VectorBlock<VectorX> natural_stretch(int rod);
-  void apply_ramps(double time, double& work);
+  void apply_ramps(double time, const Configuration& c, double& work);
+  const Configuration& configuration() const;
   void retire_ramps();
   bool actuated() const;
   void aim_supports(double time);

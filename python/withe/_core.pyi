@@ -478,7 +478,6 @@ class Options:
         "remember_plain",
         "friction_order",
         "few_iterations",
-        "repeat_from_end",
         "hold_sticking",
         "predict_friction",
         "supports_linear",

@@ -150,9 +150,24 @@ def test_least_slide_without_a_moment_is_less_than_that_of_least_force():
     assert np.abs(plan(rough, method="slip").slide).max() < 1e-4
 
 
-def test_looking_one_step_ahead_ends_in_a_long_slide():
+@pytest.mark.parametrize(("paper", "target"), [("us_letter", 0.2), ("cardboard", "half"), ("cardboard", 0.2)])
+def test_a_path_on_which_the_sheet_jumps_says_so_and_promises_no_slide(paper, target):
+    """In simulation US Letter at .20 m slides back by 88 mm at .24 m/s, and cardboard snaps."""
+    folded = planned(paper, target)
+    assert 0.5 * folded.times[-1] < folded.jumps_at < folded.times[-1]
+    before = folded.times < folded.jumps_at
+    assert np.isfinite(folded.slide[before]).all()
+    assert np.isnan(folded.slide[~before]).all()
+    assert np.nanmax(np.abs(folded.slide)) < 0.03
+    assert np.isfinite(folded.slip_ratio).all()  # what the path asks for is known all the same
+    assert planned("a4").jumps_at is None
+
+
+def test_looking_one_step_ahead_lifts_the_whole_sheet():
     folded = plan(Paper.a4(), method="local")
-    assert np.nanmax(folded.slide) > 0.05
+    lifted = folded.sheet.suspended / ((folded.paper.length - folded.jaw.depth) / folded.paper.gravito_bending_length)
+    assert lifted[np.searchsorted(folded.times, folded.jumps_at)] > 0.99
+    assert folded.jumps_at < 0.6 * folded.times[-1]
     assert folded.poses[-1, 0] == pytest.approx(0.297, abs=1e-8)
 
 

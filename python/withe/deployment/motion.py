@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
-from withe.deployment.cable import Cable
+from withe.deployment.cable import JAW, Cable
 from withe.deployment.grasping import Grasp, pivoting
 from withe.deployment.pattern import Pattern
 
-__all__ = ["Course", "Path", "Phase", "Piece", "course", "displaced", "lengthened", "upright_way", "way_along"]
+__all__ = ["Course", "Path", "Phase", "Piece", "Start", "course", "displaced", "lengthened", "upright_way", "way_along"]
 
 FloatArray = npt.NDArray[np.float64]
+Start = Literal["free", "held"]
 _GRAVITY = 9.81
 _LAST_HELD = 0.5  # [Lgb] that still hang when the jaw lets go
-_JAW = 0.010  # [m], its width
 _CLEARANCE = 0.02  # [m] of the free end above the floor at the beginning
 _FASTEST_SHARE = 0.01  # of the acceleration of gravity: swing then moves the cable by less than a millimetre
 _PIVOT_ANGLES = 61
@@ -62,9 +63,9 @@ def lengthened(pattern: Pattern, cable: Cable, tail: float) -> Path:
     """A pattern and its tail, along which the curvature fades out."""
     lgb = cable.gravito_bending_length
     heading = np.unwrap(np.arctan2(pattern.tangent[:, 1], pattern.tangent[:, 0]))
-    more = tail - max(_LAST_HELD * lgb, _JAW)
+    more = tail - max(_LAST_HELD * lgb, JAW)
     if more <= 0.0:
-        last = pattern.arc_length <= cable.length - max(0.11 * lgb, 0.5 * _JAW)
+        last = pattern.arc_length <= cable.length - 0.11 * lgb - 0.5 * JAW
         return Path(pattern.arc_length[last], pattern.points[last], heading[last], pattern.curvature[last])
     spacing = pattern.arc_length[1]
     s = np.linspace(0.0, more, max(2, int(np.ceil(more / spacing))) + 1)
@@ -158,7 +159,7 @@ class Piece:
 def way_along(cable: Cable, path: Path, grasps: Grasp) -> Piece:
     """Poses of the jaw while each place of the path is the lift-off point."""
     forward = _about_z(path.heading)
-    positions = _on_floor(cable, path) + cable.gravito_bending_length * _turned(forward, grasps.position)
+    positions = _on_floor(cable, path) + _turned(forward, _in_jaw(cable, grasps))
     rotations = _continuous(_product(forward, _from_vectors(grasps.rotation)))
     return Piece(path.arc_length, positions, rotations, path.length, laying=True)
 
@@ -172,9 +173,9 @@ def upright_way(cable: Cable, path: Path) -> Piece:
     return Piece(path.arc_length, positions, rotations, path.length, laying=True)
 
 
-def course(cable: Cable, path: Path, way: Piece, speed: float, time_step: float) -> Course:
+def course(cable: Cable, path: Path, way: Piece, speed: float, time_step: float, start: Start) -> Course:
     """Hang, touch down and go along a way, at a speed of the lift-off point [m/s] and with rows every time step [s]."""
-    down = _touch_down(cable, path, way)
+    down = _touch_down(cable, path, way, start)
     pieces, phases, clock = [], [], 0.0
     for name, piece in (("hang", _hang(down)), ("touch down", down), ("lay", way)):
         duration = piece.duration(speed)
@@ -186,21 +187,27 @@ def course(cable: Cable, path: Path, way: Piece, speed: float, time_step: float)
     return Course(rows[0], rows[1], _continuous(rows[2]), rows[3], tuple(phases))
 
 
+def _in_jaw(cable: Cable, grasps: Grasp) -> FloatArray:
+    """Middle of a jaw that holds the cable straight behind where it is grasped, in the frame of the lift-off point."""
+    along = _turned(_from_vectors(grasps.rotation), np.broadcast_to([0.5 * JAW, 0.0, 0.0], grasps.position.shape))
+    return cable.gravito_bending_length * grasps.position + along
+
+
 def _on_floor(cable: Cable, path: Path) -> FloatArray:
     return np.column_stack([path.points, np.full(len(path.points), cable.radius)])
 
 
-def _touch_down(cable: Cable, path: Path, way: Piece) -> Piece:
-    """From the upright cable that stands on its free end to the first pose of laying."""
-    lgb = cable.gravito_bending_length
-    suspended = cable.length / lgb
+def _touch_down(cable: Cable, path: Path, way: Piece, start: Start) -> Piece:
+    """From the upright cable that stands on its free end, which rolls if it is free, to the first pose of laying."""
+    suspended = (cable.length - 0.5 * JAW) / cable.gravito_bending_length
     angles = np.linspace(_UPRIGHT, 0.0, _PIVOT_ANGLES)
     found = pivoting(suspended, angles, cable.stretch_stiffness)
     heading = np.full(_PIVOT_ANGLES, path.heading[0])
     forward = _about_z(heading)
-    rolled = np.column_stack([-cable.radius * angles, np.zeros((_PIVOT_ANGLES, 2))])
+    rolls = cable.radius if start == "free" else 0.0
+    rolled = np.column_stack([-rolls * angles, np.zeros((_PIVOT_ANGLES, 2))])
     base = np.append(path.points[0], cable.radius)
-    positions = base + _turned(forward, rolled + lgb * found.position)
+    positions = base + _turned(forward, rolled + _in_jaw(cable, found))
     quaternions = _product(forward, _from_vectors(found.rotation))
     # The last pose is that of laying, exactly: a controller or a bent beginning may differ from the straight one.
     share = np.linspace(0.0, 1.0, _PIVOT_ANGLES)[:, None]

@@ -13,18 +13,21 @@ import numpy.typing as npt
 
 from withe.common import validation
 from withe.common.progress import progress as bar
-from withe.deployment.cable import Cable
+from withe.deployment.cable import JAW, Cable
 from withe.deployment.drawing import draw_plan
 from withe.deployment.feasibility import Controller, Feasibility, examine, grasps_along
 from withe.deployment.grasping import Grasp
-from withe.deployment.motion import Course, Path, Phase, course, lengthened, upright_way, way_along
+from withe.deployment.motion import Course, Path, Phase, Start, course, lengthened, upright_way, way_along
 from withe.deployment.optimising import optimised, runs
 from withe.deployment.pattern import Pattern
+from withe.deployment.pattern import crossings as crossings_of
+from withe.io import pose_path, save_poses, written_beside
 
 __all__ = ["Plan", "PlanController", "plan"]
 
 FloatArray = npt.NDArray[np.float64]
 PlanController = Literal["exact", "least_friction", "optimised", "intuitive"]
+_TAIL_SHARES = (1.0, 0.5, 0.5, 0.5)  # of the one before, where a tail crosses
 _TAIL = 4.0  # [Lgb] of cable beyond the pattern, where there is so much: shorter ends need much friction
 _OPTIMISING_SPEED, _OPTIMISING_STEP = 0.025, 0.04  # [m/s], [s]: of quasi-static runs, where only the way counts
 _MOST_FRICTION = 3.0  # no floor has more
@@ -38,7 +41,7 @@ class Plan:
     ----------
     times : ndarray of shape (n,) [s]
     positions : ndarray of shape (n, 3) [m]
-        Of the cable's centreline in the jaw.
+        Of the cable's centreline in the middle of the jaw, which holds 10 mm of it.
     rotations : ndarray of shape (n, 4)
         Quaternions (x, y, z, w). A jaw's first axis is the cable's tangent, away from its free end; at lift-off of a
         straight cable that lies along x its axes would be x, y, z.
@@ -46,11 +49,13 @@ class Plan:
         Arc length of the lift-off point; zero before laying.
     phases : tuple of Phase
     cable : Cable
-        As long as what is between its free end and the jaw.
+        As long as what is between its free end and the middle of the jaw.
     pattern : Pattern
     tail : float [m]
         How much of the cable lies beyond the pattern, straight on.
     controller : str
+    start : str
+        "free", or "held" so that the free end slides up and down only.
     speed : float [m/s]
         Of the lift-off point along the pattern.
     fastest : float [m/s]
@@ -70,9 +75,15 @@ class Plan:
     pattern: Pattern
     tail: float
     controller: str
+    start: str
     speed: float
     fastest: float
     needed_friction: FloatArray
+
+    @property
+    def path(self) -> FloatArray:
+        """Rows t, x, y, z, qw, qx, qy, qz of shape (n, 8), for hands of a simulation, which have the scalar first."""
+        return pose_path(self.times, np.column_stack([self.positions, self.rotations]))
 
     def feasibility(self, friction: float) -> Feasibility:
         """Say where friction holds the cable and where it will slip; see `Pattern.feasibility`."""
@@ -89,7 +100,8 @@ class Plan:
         Parameters
         ----------
         path : str or Path
-            ``.csv``, with the header t,x,y,z,qx,qy,qz,qw [s, m], or ``.json``, with phases, cable and pattern beside.
+            ``.csv``, with the header t,x,y,z,qx,qy,qz,qw [s, m], which `withe.io.load_poses` reads, or ``.json``, with
+            phases, cable and pattern beside.
 
         Raises
         ------
@@ -98,10 +110,10 @@ class Plan:
         """
         path = FilePath(path)
         if path.suffix == ".csv":
-            rows = np.column_stack([self.times, self.positions, self.rotations])
-            np.savetxt(path, rows, delimiter=",", header="t,x,y,z,qx,qy,qz,qw", comments="", fmt="%.9g")
+            save_poses(path, self.times, np.column_stack([self.positions, self.rotations]))
         elif path.suffix == ".json":
-            path.write_text(json.dumps(self.to_dict()), encoding="utf-8")
+            with written_beside(path) as beside:
+                beside.write_text(json.dumps(self.to_dict()), encoding="utf-8")
         else:
             raise ValueError(f"path must end in .csv or .json, got {path.name!r}")
 
@@ -124,6 +136,7 @@ class Plan:
         """All numbers as lists, for JSON. SI units."""
         return {
             "controller": self.controller,
+            "start": self.start,
             "speed": self.speed,
             "fastest": self.fastest,
             "phases": [{"name": phase.name, "start": phase.start, "end": phase.end} for phase in self.phases],
@@ -158,6 +171,7 @@ def plan(
     friction: float | None = None,
     speed: float = 0.025,
     tail: float | None = None,
+    start: Start = "free",
     crossings: Literal["refuse", "over"] = "refuse",
     time_step: float = 0.02,
     progress: bool = True,
@@ -183,10 +197,13 @@ def plan(
     speed : float [m/s]
         Of the lift-off point.
     tail : float [m]
-        How much cable is laid beyond the pattern: the jaw holds it pattern.length + tail from its free end. None:
-        4 Lgb, or all that there is.
+        How much cable is laid beyond the pattern: the middle of the jaw is pattern.length + tail from its free end.
+        None: 4 Lgb, or all that there is, or less where that would cross the pattern.
+    start : {"free", "held"}
+        Whether the cable's free end stands on the floor by itself, or is held so that it slides up and down only, and
+        does not roll, until the jaw opens.
     crossings : {"refuse", "over"}
-        Whether the pattern may cross itself: the cable is then laid over itself, as if it had no thickness.
+        Whether pattern and tail may cross: the cable is then laid over itself, as if it had no thickness.
     time_step : float [s]
         Between the rows of the plan.
     progress : bool
@@ -199,7 +216,7 @@ def plan(
     Raises
     ------
     ValueError
-        The cable is shorter than pattern and tail, or cannot bend so tightly; the pattern crosses itself; no floor has
+        The cable is shorter than pattern and tail, or cannot bend so tightly; pattern or tail cross; no floor has
         the friction that the pattern needs; speed, tail, time step or friction not positive; "optimised" without
         friction.
 
@@ -216,25 +233,25 @@ def plan(
     validation.choice(controller, "controller", get_args(PlanController))
     speed = validation.positive(speed, "speed")
     time_step = validation.positive(time_step, "time_step")
-    held, tail = _held(cable, pattern, tail)
     validation.choice(crossings, "crossings", ("refuse", "over"))
-    if len(pattern.crossings) and crossings == "refuse":
-        first, second = 1e3 * pattern.crossings[0]
-        where = f"it does at {first:.0f} and {second:.0f} mm"
-        raise ValueError(f"the pattern must not cross itself, {where}; crossings='over' lays it so")
-    path = lengthened(pattern, held, tail)
+    validation.choice(start, "start", get_args(Start))
+    if crossings == "refuse":
+        held, tail, path = _uncrossed(pattern, cable, tail)
+    else:
+        held, tail = _held(cable, pattern, tail)
+        path = lengthened(pattern, held, tail)
     if controller == "intuitive":
         needed, way = np.full(len(pattern.points), np.nan), upright_way(held, path)
     elif controller == "optimised":
         if friction is None:
             raise ValueError("controller 'optimised' needs friction, the floor's coefficient")
-        path, followed = _improved(held, pattern, path, validation.positive(friction, "friction"), progress)
+        path, followed = _improved(held, pattern, path, validation.positive(friction, "friction"), start, progress)
         needed = _needed(pattern, held, followed, grasps_along(pattern, held, followed))
         way = way_along(held, path, grasps_along(path, held, followed))
     else:
         grasps = grasps_along(path, held, controller)
         needed, way = _needed(pattern, held, controller, grasps), way_along(held, path, grasps)
-    motion = course(held, path, way, speed, time_step)
+    motion = course(held, path, way, speed, time_step, start)
     return Plan(
         times=motion.times,
         positions=motion.positions,
@@ -245,21 +262,24 @@ def plan(
         pattern=pattern,
         tail=tail,
         controller=controller,
+        start=start,
         speed=speed,
         fastest=way.fastest(),
         needed_friction=needed,
     )
 
 
-def _improved(cable: Cable, pattern: Pattern, path: Path, friction: float, progress: bool) -> tuple[Path, Controller]:
+def _improved(
+    cable: Cable, pattern: Pattern, path: Path, friction: float, start: Start, progress: bool
+) -> tuple[Path, Controller]:
     """The path that lays best in the engine, and which controller goes along it."""
 
     def motion_of(tried: Path, controller: Controller) -> Course:
         way = way_along(cable, tried, grasps_along(tried, cable, controller))
-        return course(cable, tried, way, _OPTIMISING_SPEED, _OPTIMISING_STEP)
+        return course(cable, tried, way, _OPTIMISING_SPEED, _OPTIMISING_STEP, start)
 
     with bar(runs(path, cable, pattern), "optimising", progress, unit="runs") as shown:
-        return optimised(path, cable, pattern, friction, motion_of, shown)
+        return optimised(path, cable, pattern, friction, motion_of, start, shown)
 
 
 def _needed(pattern: Pattern, cable: Cable, controller: Controller, grasps: Grasp) -> FloatArray:
@@ -274,13 +294,34 @@ def _needed(pattern: Pattern, cable: Cable, controller: Controller, grasps: Gras
 
 
 def _held(cable: Cable, pattern: Pattern, tail: float | None) -> tuple[Cable, float]:
-    """The cable up to the jaw, and how much of it lies beyond the pattern."""
-    room = cable.length - pattern.length
+    """The cable up to the middle of the jaw, and how much of it lies beyond the pattern."""
+    room = cable.length - 0.5 * JAW - pattern.length
     if room < 0.0:
-        raise ValueError(f"the cable is {cable.length:g} m long, the pattern {pattern.length:.4g} m")
+        holds = f"; a jaw holds {1e3 * JAW:g} mm of it"
+        raise ValueError(f"the cable is {cable.length:g} m long, the pattern {pattern.length:.4g} m{holds}")
     if tail is None:
         tail = min(room, _TAIL * cable.gravito_bending_length)
     tail = validation.non_negative(tail, "tail")
     if tail > room:
-        raise ValueError(f"the cable is {cable.length:g} m long, pattern and tail {pattern.length + tail:.4g} m")
+        both = f"pattern and tail {pattern.length + tail:.4g} m; a jaw holds {1e3 * JAW:g} mm of it"
+        raise ValueError(f"the cable is {cable.length:g} m long, {both}")
     return replace(cable, length=pattern.length + tail), tail
+
+
+def _uncrossed(pattern: Pattern, cable: Cable, tail: float | None) -> tuple[Cable, float, Path]:
+    """The longest of a few tails that does not cross the pattern or itself, or the one that was asked for."""
+    if len(pattern.crossings):
+        first, second = 1e3 * pattern.crossings[0]
+        where = f"it does at {first:.0f} and {second:.0f} mm"
+        raise ValueError(f"the pattern must not cross itself, {where}; crossings='over' lays it so")
+    held, given = _held(cable, pattern, tail)
+    shares = (1.0,) if tail is not None else _TAIL_SHARES
+    for share in shares:
+        held, given = _held(cable, pattern, share * given)
+        path = lengthened(pattern, held, given)
+        found = crossings_of(path.points, path.length / (len(path.points) - 1))
+        if not len(found):
+            return held, given, path
+    first, second = 1e3 * found[0]
+    where = f"{second:.0f} mm from the free end it crosses the cable at {first:.0f} mm"
+    raise ValueError(f"the tail must not cross the pattern, {where}: give a shorter tail, or crossings='over'")

@@ -59,7 +59,7 @@ class Holding:
         """The same at the same poses if Lgb is more or less by the share; infinite where that has no stable pose."""
         worst = self.ratio(sheet)
         for factor in (1 - self.share, 1 + self.share) if self.share > 0 else ():
-            other = at_poses(poses_of(sheet) / [factor, factor, 1.0], forces_of(sheet))
+            other = at_poses(poses_of(sheet) / [factor, factor, 1.0], _of_other(forces_of(sheet), factor))
             ratio = self.ratio(other, self.length / factor)
             worst = np.maximum(worst, np.where(other.valid & other.stable, ratio, np.inf))
         return worst
@@ -70,6 +70,16 @@ class Holding:
         back = (sheet.angle > 0.5 * np.pi) & (room < -1e-9)
         fits = (sheet.suspended < self.length) & (sheet.angle < _STEEPEST) & (sheet.max_curvature <= self.curvature)
         return sheet.valid & sheet.stable & fits & ~back
+
+
+def _of_other(forces: FloatArray, factor: float) -> FloatArray:
+    """Forces of about the same sheet if Lgb is more by a factor, in its own units: near which an equilibrium is sought.
+
+    Those of long parts are their weight, those of short ones bending.
+    """
+    weighs = np.minimum(1.0, 0.5 * forces[:, 2:])
+    scale = weighs / factor + (1.0 - weighs) * factor**2
+    return forces * np.concatenate([scale, scale, np.full_like(scale, 1.0 / factor)], axis=1)
 
 
 def forces_at(places: FloatArray) -> FloatArray:
