@@ -108,7 +108,7 @@ def test_the_cable_of_the_readme_is_laid(tmp_path, monkeypatch):
     for block in blocks("deployment.plan"):
         assert "floor=0.4)" in block
         exec(compile(block.replace("floor=0.4)", "floor=0.4, nodes=50, progress=False)"), str(README), "exec"), names)
-    assert (tmp_path / "wave.csv").stat().st_size > 1000
+    assert (tmp_path / "motion.csv").stat().st_size > 1000
     assert names["found"].error < 2e-3
 
 
