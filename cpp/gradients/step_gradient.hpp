@@ -90,7 +90,7 @@ class StepGradient {
   StepData data_;
   Configuration own_end_;
   const Configuration* end_ = nullptr;  ///< at q1, in space
-  VectorX rates_;  ///< of velocities at the end by q1 [1/s]
+  VectorX rates_;                       ///< of velocities at the end by q1 [1/s]
   VectorX held_acceleration_, z_, by_end_, by_z_, rows_, columns_;
   VectorX by_rows_;  ///< of the residual, by which reactions go directly; empty: none
   std::vector<double> exact_;

@@ -79,7 +79,8 @@ def _of_other(forces: FloatArray, factor: float) -> FloatArray:
     """
     weighs = np.minimum(1.0, 0.5 * forces[:, 2:])
     scale = weighs / factor + (1.0 - weighs) * factor**2
-    return forces * np.concatenate([scale, scale, np.full_like(scale, 1.0 / factor)], axis=1)
+    scales: FloatArray = np.concatenate([scale, scale, np.full_like(scale, 1.0 / factor)], axis=1)
+    return forces * scales
 
 
 def forces_at(places: FloatArray) -> FloatArray:
