@@ -253,6 +253,18 @@ def test_a_path_gives_the_position_at_the_end_of_every_step():
     assert simulation.positions(arm)[0] == pytest.approx((0, 0, 0), abs=1e-14)
 
 
+def test_a_path_of_positions_is_asked_no_more_once_a_position_is_given():
+    _, arm, simulation = cantilever(planar=False, time_step=0.01)
+    asked = []
+    simulation.move(arm.start, path=lambda t: asked.append(t) or (0.0, 0.0, t))
+    simulation.step(2)
+    simulation.move(arm.start, position=(0, 0, 0))
+    before = len(asked)
+    simulation.step(2)
+    assert len(asked) == before
+    assert simulation.positions(arm)[0] == pytest.approx((0, 0, 0), abs=1e-14)
+
+
 def test_a_pin_moves_but_does_not_turn():
     scene = withe.Scene()
     rod = scene.add_rod(start=(0, 0, 0), end=(0.2, 0, 0), nodes=5, radius=5e-3, material=RUBBER)

@@ -46,8 +46,10 @@ def move_obstacle(
         if any(value is not None for value in (position, tangent, roll)) or over != 0.0:
             raise ValueError(f"path of {name!r} must be given alone")
         validation.function(path, f"path of {name!r}")
-        obstacle_pose(session, index, path, session.world.time)
-        session.settings.paths[name, "position"] = session.settings.paths[name, "rotation"] = path
+        _, turned = obstacle_pose(session, index, path, session.world.time)
+        session.settings.paths[name, "position"] = path
+        if turned is not None:
+            session.settings.paths[name, "rotation"] = path
         return
     if position is None and roll is None:
         raise ValueError(f"position, roll or path of {name!r} must be given")

@@ -163,8 +163,9 @@ class Placement:
             as a CubicSpline and a RotationSpline of SciPy; of an obstacle, a function that returns a position and a
             roll (of a sphere, times the axis, shape (3,)). Or rows (t, x, y, z) or (t, x, y, z, qw, qx, qy, qz), times
             of the simulation [s] that grow, and unit quaternions with the scalar first: evenly from one to the next,
-            at rest before the first and after the last. `path` of a plan has such rows, and `withe.io.load_poses` reads
-            them from tables of poses, which have the scalar last.
+            at rest before the first and after the last. What a path does not give when it is set goes on as it did.
+            `path` of a plan has such rows, and `withe.io.load_poses` reads them from tables of poses, which have the
+            scalar last.
 
         Raises
         ------

@@ -93,7 +93,7 @@ def move_support(
         way = make_path(path, turns, owner)
         _, turned = evaluate_path(way, session.world.time, turns, owner)
         session.settings.paths[part.name, "position"] = way
-        if turned is not None or (part.name, "rotation") not in session.settings.paths:
+        if turned is not None:
             session.settings.paths[part.name, "rotation"] = way
         session.note("move", part, {})
         return
