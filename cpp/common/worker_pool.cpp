@@ -98,10 +98,11 @@ WorkerPool::~WorkerPool() { dismiss(); }
 
 /// The threads of a parent process are not here to be ended.
 void WorkerPool::dismiss() noexcept {
-  if (crew_ && crew_->process != getpid())
-    (void)crew_.release();
-  else
-    crew_.reset();
+  if (crew_ && crew_->process != getpid()) {
+    [[maybe_unused]] const Crew* gone = crew_.release();
+    return;
+  }
+  crew_.reset();
 }
 
 void WorkerPool::run(std::size_t count, const std::function<void(std::size_t)>& work,
