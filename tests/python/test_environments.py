@@ -173,6 +173,22 @@ def test_robots_begin_again_by_themselves_as_gymnasium_has_it(autoreset):
             np.testing.assert_array_equal(wanted, found)
 
 
+def test_an_arm_alone_begins_again_after_its_last_step():
+    class Short(withe.learning.Follow):
+        steps = 2
+
+    one = withe.learning.VectorEnvironment(Short(), 1)
+    first, _ = one.reset(seed=4)
+    for _ in range(2):
+        _, _, _, truncated, _ = one.step(np.ones((1, 10)))
+    assert truncated.all()
+    again, reward, _, truncated, _ = one.step(np.ones((1, 10)))
+    assert again.shape == first.shape
+    assert not truncated.any()
+    assert reward[0] == 0.0
+    assert one.robots.time[0] == 0.0
+
+
 def test_some_begin_again_by_a_mask():
     many = withe.learning.VectorEnvironment(Touch(), 3, workers=2, autoreset="disabled")
     many.reset(seed=0)

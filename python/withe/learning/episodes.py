@@ -87,9 +87,10 @@ class Episodes:
 
     def act(self, actions: FloatArray, chosen: IntArray) -> Outcome:
         """Do one action each; of robots that are not chosen nothing changes."""
-        self.task.act(self.robots, actions, chosen)
-        self.robots.step(self._count, chosen)
-        self._taken[chosen] += 1
+        if chosen.size > 0:  # a task need not know what none does
+            self.task.act(self.robots, actions, chosen)
+            self.robots.step(self._count, chosen)
+            self._taken[chosen] += 1
         failed = self.robots.failed
         return Outcome(
             np.asarray(self.task.reward(self.robots), np.float64),
