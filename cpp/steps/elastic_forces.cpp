@@ -7,6 +7,7 @@
 #include "elasticity/stretch.hpp"
 #include "geometry/rotation.hpp"
 #include "steps/inertia.hpp"
+#include "steps/regular_stencils.hpp"
 
 namespace withe {
 namespace {
@@ -14,29 +15,17 @@ namespace {
 /// The stencils that kernels take, as they lie in the data.
 StencilBatch regular_batch(const ElasticCoefficients& k, StepData& data, const Assembler& assembler,
                            std::span<double> values, const double* axial_force) {
-  const RegularStencils& regular = assembler.regular;
-  return {.count = static_cast<int>(regular.stencil.size()),
-          .stencil = regular.stencil.data(),
-          .first_unknown = regular.first_unknown.data(),
-          .edges = regular.edges.data(),
-          .owned = regular.owned.data(),
-          .lines = regular.lines.data(),
-          .lower = assembler.solver().symmetry() == Symmetry::symmetric,
-          .by_rows = regular.by_rows,
-          .measure = k.measure,
-          .frames = &data.configuration.edge.data()->tangent.x,
-          .strain = data.configuration.bend_strain.data(),
-          .natural = k.bend_natural.data(),
-          .stiffness = k.bend_stiffness.data(),
-          .column = data.configuration.bend_strain.rows(),
-          .force = data.force.data(),
-          .geometric = axial_force ? axial_force : data.force.data(),
-          .modulus = data.modulus.data(),
-          .residual = data.gradient.data(),
-          .magnitude = data.row_magnitude.data(),
-          .values = values.empty() ? nullptr : values.data(),
-          .velocity = nullptr,
-          .edge_inertia = nullptr};
+  StencilBatch batch = kernel_batch(assembler, k.measure, data.configuration, k.bend_natural, k.bend_stiffness);
+  batch.lines = assembler.regular.lines.data();
+  batch.lower = assembler.solver().symmetry() == Symmetry::symmetric;
+  batch.by_rows = assembler.regular.by_rows;
+  batch.force = data.force.data();
+  batch.geometric = axial_force ? axial_force : data.force.data();
+  batch.modulus = data.modulus.data();
+  batch.residual = data.gradient.data();
+  batch.magnitude = data.row_magnitude.data();
+  if (!values.empty()) batch.values = values.data();
+  return batch;
 }
 
 }  // namespace

@@ -8,13 +8,13 @@ from typing import Any, SupportsIndex, SupportsInt, overload
 import numpy as np
 import numpy.typing as npt
 
-from withe.batch.lanes import Lanes, integer_workers
+from withe.batch.lanes import Lanes
 from withe.batch.reading import Reading
 from withe.batch.setting import Setting
 from withe.common import validation
 from withe.errors import ConvergenceError
 from withe.simulation.functions import force_function, step_callback
-from withe.simulation.running import processors
+from withe.simulation.running import listed_simulations, thread_count
 from withe.simulation.session import Session
 from withe.simulation.simulation import Simulation
 from withe.simulation.snapshots import Snapshot, adopt, matched
@@ -56,14 +56,7 @@ class Batch(Setting, Reading):
     """
 
     def __init__(self, simulations: Iterable[Simulation], workers: int | None = None) -> None:
-        try:
-            listed = list(simulations)
-        except TypeError:
-            raise ValueError(f"simulations must be a list, got {type(simulations).__name__}") from None
-        for index, simulation in enumerate(listed):
-            if not isinstance(simulation, Simulation):
-                raise ValueError(f"simulations must be withe.Simulation, got {type(simulation).__name__} at [{index}]")
-        self._lanes = Lanes(listed, integer_workers(workers, processors()))
+        self._lanes = Lanes(listed_simulations(simulations), thread_count(workers))
 
     # Simulations
 

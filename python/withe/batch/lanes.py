@@ -10,7 +10,6 @@ import numpy as np
 import numpy.typing as npt
 
 from withe import _core
-from withe.common import validation
 from withe.simulation.simulation import Simulation
 
 __all__ = ["Lanes", "output", "row", "stacked"]
@@ -135,8 +134,3 @@ def output(out: FloatArray | None, shape: tuple[int, ...]) -> FloatArray:
     if not (out.flags.c_contiguous and out.flags.writeable):
         raise ValueError("out must be contiguous (order C) and writeable")
     return out
-
-
-def integer_workers(workers: int | None, default: int) -> int:
-    """Number of threads."""
-    return default if workers is None else validation.integer(workers, "workers", 1, 4096)

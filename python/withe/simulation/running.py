@@ -16,7 +16,7 @@ from withe.recording.record import Record
 from withe.simulation.loop import Run
 from withe.simulation.simulation import Simulation
 
-__all__ = ["processors", "run_many"]
+__all__ = ["listed_simulations", "run_many", "thread_count"]
 
 
 def run_many(
@@ -57,17 +57,11 @@ def run_many(
     ConvergenceError, KeyboardInterrupt, or what a callback raised
         With errors="raise"; every simulation keeps what it recorded until then.
     """
-    try:
-        listed = list(simulations)
-    except TypeError:
-        raise ValueError(f"simulations must be a list, got {type(simulations).__name__}") from None
-    for index, simulation in enumerate(listed):
-        if not isinstance(simulation, Simulation):
-            raise ValueError(f"simulations must be withe.Simulation, got {type(simulation).__name__} at [{index}]")
+    listed = listed_simulations(simulations)
     if len({id(simulation) for simulation in listed}) < len(listed):
         raise ValueError("simulations must differ: one is there twice, take a copy()")
     validation.choice(errors, "errors", ("raise", "return"))
-    threads = processors() if workers is None else validation.integer(workers, "workers", 1, 4096)
+    threads = thread_count(workers)
     runs = [
         Run(simulation, simulation._stepping, duration, record_every, before_step, until, record)
         for simulation in listed
@@ -121,7 +115,27 @@ def _result(future: Future[Record], errors: str) -> Record | Exception:
     return error if error is not None else future.result()
 
 
-def processors() -> int:
-    """How many processors this process may use."""
+def listed_simulations(simulations: Iterable[Simulation]) -> list[Simulation]:
+    """Simulations that a user gives, as a list.
+
+    Raises
+    ------
+    ValueError
+        No list, or something in it that is not a simulation.
+    """
+    try:
+        listed = list(simulations)
+    except TypeError:
+        raise ValueError(f"simulations must be a list, got {type(simulations).__name__}") from None
+    for index, simulation in enumerate(listed):
+        if not isinstance(simulation, Simulation):
+            raise ValueError(f"simulations must be withe.Simulation, got {type(simulation).__name__} at [{index}]")
+    return listed
+
+
+def thread_count(workers: int | None) -> int:
+    """Threads that a user asks for; by default, as many as this process may use processors."""
+    if workers is not None:
+        return validation.integer(workers, "workers", 1, 4096)
     affinity: Any = getattr(os, "sched_getaffinity", None)
     return max(1, len(affinity(0)) if affinity is not None else os.cpu_count() or 1)
