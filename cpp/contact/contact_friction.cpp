@@ -5,6 +5,7 @@
 
 #include "contact/friction_jacobian.hpp"
 #include "contact/lagged_friction.hpp"
+#include "contact/plane_contact.hpp"
 
 namespace withe {
 namespace {
@@ -20,6 +21,7 @@ double slip_rate(const ContactProblem& problem, double regularisation) {
 }
 
 FrictionForce<double> friction_now(const ContactProblem& problem, const Touching& t) {
+  if (beside_plane(problem, t)) return plane_friction(problem, t, slip_rate(problem, 1.0));
   double unused[kContactUnknowns] = {};
   return friction_gradient(friction_setting(problem, t, 1.0, nullptr), t.now, unused);
 }
@@ -45,6 +47,7 @@ FrictionSetting friction_setting(const ContactProblem& problem, const Touching& 
   f.pair = &pair;
   if (pair.key.b < 0) f.obstacle = &problem.bodies.obstacle(pair);
   f.points = t.proximity.points;
+  if (pair.curve()) f.curve = &t.proximity.curve;
   f.pressing = t.law;
   f.before = t.before;
   f.slides = problem.turns(pair) && t.law.elastic > 0.0;
@@ -84,6 +87,11 @@ bool add_friction(const ContactProblem& problem, const Touching& t, const Contac
   const Vec3d* predicted = linearisation.friction.of(t.pair.key);
   if (t.lagged >= 0) {
     add_lagged_friction(problem, t, slip_rate(problem, linearisation.regularisation), predicted, with_hessian, out);
+    return true;
+  }
+  if (beside_plane(problem, t)) {
+    const double rate = slip_rate(problem, linearisation.regularisation);
+    add_plane_friction(problem, t, rate, predicted, with_hessian, out);
     return true;
   }
   const FrictionSetting f = friction_setting(problem, t, linearisation.regularisation, predicted);
@@ -130,7 +138,9 @@ void record_lagged_friction(const ContactProblem& problem, const Touching& t, Co
 
 Slipping slipping(const ContactProblem& problem, const Touching& t, const ContactLinearisation& linearisation,
                   const VectorX& change) {
-  if (t.lagged >= 0) return lagged_slipping(problem, t, slip_rate(problem, linearisation.regularisation), change);
+  const double rate = slip_rate(problem, linearisation.regularisation);
+  if (t.lagged >= 0) return lagged_slipping(problem, t, rate, change);
+  if (beside_plane(problem, t)) return plane_slipping(problem, t, rate, change);
   const FrictionSetting f = friction_setting(problem, t, linearisation.regularisation, nullptr);
   int dofs[kContactUnknowns];
   problem.surfaces->unknowns(t.pair, dofs);

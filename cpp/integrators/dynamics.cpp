@@ -7,7 +7,6 @@
 #include "common/timer.hpp"
 #include "integrators/inner_solve.hpp"
 #include "integrators/newton_system.hpp"
-#include "integrators/squeezed.hpp"
 #include "integrators/step_parts.hpp"
 #include "steps/inertia.hpp"
 
@@ -241,7 +240,7 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
     if (equations.allowed(state.q, work.change) < 1.0) return result;
     contact->update(q1);
     result.squeezed = squeezed_contact(equations, work.change);
-    if (result.squeezed >= 0) return result;
+    if (result.squeezed) return result;
     result.too_deep = contact->too_deep();
     if (result.too_deep) {
       work.deep = work.z;
