@@ -30,17 +30,18 @@ PYTHON_SOURCES := $(shell find python/withe -name '*.py' -o -name '*.pyi' -o -na
 # Folders too: a deleted file is a change.
 SOURCE_FOLDERS := $(wildcard cpp/*/) $(shell find python/withe -type d -not -name __pycache__)
 
-.PHONY: help demo view learn test ctest-build ctest ctest-baseline pytest asan asan-python bench wheel lint format format-check types stubs stub-check \
+.PHONY: help demo view learn test ctest-build ctest ctest-baseline pytest asan tsan asan-python bench wheel lint format format-check types stubs stub-check \
     tidy tidy-changed clean distclean
 
 help:
 	@echo "make demo          install what is missing, build, simulate a cantilever, compare with theory"
 	@echo "make view          install what pictures, films and notebooks need"
-	@echo "make learn         install torch, for withe.learning"
+	@echo "make learn         install torch, gymnasium and stable-baselines3, for withe.learning"
 	@echo "make test          all tests, C++ and Python"
 	@echo "make pytest        all tests in Python; TESTS=\"tests/physics -k knot\" runs some"
 	@echo "make ctest-baseline  C++ tests on an emulated machine without AVX (qemu-user)"
 	@echo "make asan          C++ tests under the address and undefined-behaviour sanitizers"
+	@echo "make tsan          C++ tests of what runs in threads under the thread sanitizer"
 	@echo "make asan-python   random sequences of calls through Python under them; SEQUENCES=1000 SEED=7 runs others"
 	@echo "make wheel         dist/*.whl for machines without compiler"
 	@echo "make bench         all benchmarks (45 minutes); NAME=work_precision runs one"
@@ -74,7 +75,7 @@ $(STAMPS)/test_tools: $(STAMPS)/build_tools
 	@touch $@
 
 $(STAMPS)/learn_tools: $(STAMPS)/build_tools
-	@echo "Installing torch into .venv"
+	@echo "Installing torch, gymnasium and stable-baselines3 into .venv"
 	@$(PIP_INSTALL) $(call requirements,learn)
 	@touch $@
 
@@ -128,6 +129,13 @@ asan: $(STAMPS)/build_tools
 	@cmake --preset asan-ubsan
 	@cmake --build --preset asan-ubsan
 	@ctest --preset asan-ubsan --parallel $(JOBS)
+
+# What threads share: the pool of workers and batches.
+tsan: $(STAMPS)/build_tools
+	@cmake --preset tsan
+	@cmake --build build/tsan --target test_common test_world
+	@build/tsan/tests/cpp/test_common --gtest_brief=1 --gtest_filter='WorkerPool.*'
+	@build/tsan/tests/cpp/test_world --gtest_brief=1 --gtest_filter='Batch.*'
 
 # The interpreter is not built for them, so the sanitizer's library must be loaded first; pybind11's exceptions need the
 # C++ library beside it. Python's own allocator would hide what runs past the end of small objects.

@@ -31,6 +31,8 @@ NAMES = (
     "perception",
     "real2sim",
     "deployment",
+    "deployment_tables",
+    "folding",
     "folding_trials",
 )
 

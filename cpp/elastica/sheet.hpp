@@ -51,7 +51,7 @@ class SheetProblem {
   void put_end(const Path& path, System& system) const;
 };
 
-/// Runge-Kutta steps a segment: at most .4 Lgb, and .3 of the length sqrt(EI / force) over which forces bend.
+/// Runge-Kutta steps a segment: at most .4 Lgb, and .22 of the length sqrt(EI / force) over which forces bend.
 int sheet_steps(const SheetProblem::Path& path);
 
 /// State at the end of a segment, integrated from that at its start.

@@ -8,12 +8,26 @@ namespace {
 
 constexpr double kLeastShare = 1.0 / 256;  // of a way between two poses on which a sheet is dragged
 
-bool move_to(TipTarget target, const SheetPose& from, const SheetPose& to, SheetMotionData& data,
-             double least = kLeastShare) {
-  data.problem.target = target;
+bool move_to(const SheetPose& from, const SheetPose& to, SheetMotionData& data, double least = kLeastShare) {
+  data.problem.target = TipTarget::pose;
   return follow(data.solver, data.problem, least, data.path, data.trial,
                 [&](double share, SheetProblem::Path& /*guess*/) {
                   for (std::size_t i = 0; i < 3; ++i) data.problem.goal[i] = from[i] + share * (to[i] - from[i]);
+                });
+}
+
+/// Height and angle to those of a pose, while the ratio of forces becomes the friction coefficient (with its sign): a
+/// sheet that is held beyond friction is let go little by little.
+bool slide_to(const SheetPose& from, const SheetPose& to, double friction, double sheet_length, SheetMotionData& data,
+              double least = kLeastShare) {
+  const auto& [up, forward, length] = data.path.values;
+  const double before = forward / (up + sheet_length - length);
+  data.problem.target = TipTarget::sliding;
+  data.problem.sheet_length = sheet_length;
+  return follow(data.solver, data.problem, least, data.path, data.trial,
+                [&](double share, SheetProblem::Path& /*guess*/) {
+                  for (std::size_t i = 0; i < 3; ++i) data.problem.goal[i] = from[i] + share * (to[i] - from[i]);
+                  data.problem.friction = before + share * (friction - before);
                 });
 }
 
@@ -29,7 +43,7 @@ void set_sheet_forces(const SheetShape& shape, const SheetForces& forces, SheetM
 }
 
 bool move_sheet(const SheetPose& pose, SheetMotionData& data, double least_share) {
-  return move_to(TipTarget::pose, pose_of(data.path), pose, data, least_share);
+  return move_to(pose_of(data.path), pose, data, least_share);
 }
 
 bool drag_sheet(const SheetPose& pose, const SheetFriction& friction, double& slide, SheetMotionData& data) {
@@ -39,17 +53,17 @@ bool drag_sheet(const SheetPose& pose, const SheetFriction& friction, double& sl
     const auto& [up, forward, length] = data.path.values;
     return std::abs(forward) - friction.coefficient * (up + friction.sheet_length - length);
   };
-  const bool stuck = move_to(TipTarget::pose, from, {pose[0] - slide, pose[1], pose[2]}, data);
-  if (stuck && excess() <= 0) return true;
+  const auto some_lies = [&] { return data.path.values[2] < friction.sheet_length; };
+  const bool stuck = move_to(from, {pose[0] - slide, pose[1], pose[2]}, data);
+  if (stuck && excess() <= 0) return some_lies();
   // Where it would stick it has no equilibrium, or one beyond friction: it slides as its forces push it.
   const double sign = (stuck ? data.path.values[1] : before.values[1]) > 0 ? 1.0 : -1.0;
-  data.problem.friction = sign * friction.coefficient;
-  data.problem.sheet_length = friction.sheet_length;
   if (!stuck) data.path = before;
-  if (!move_to(TipTarget::sliding, pose_of(data.path), pose, data)) return false;
+  if (!slide_to(pose_of(data.path), pose, sign * friction.coefficient, friction.sheet_length, data)) return false;
   const double slid = pose[0] - tip_back(data.path) - slide;
   slide += slid;
-  return sign * slid > -1e-9;  // friction that would push a sheet along is no friction: what was found lies past a snap
+  // Friction that would push a sheet along is no friction: what was found lies past a snap.
+  return sign * slid > -1e-9 && some_lies();
 }
 
 }  // namespace withe

@@ -39,7 +39,7 @@ struct SheetFriction {
 
 /// Moves the tip as move_sheet does, and lets the sheet slide where its forces would exceed friction. `slide` is how
 /// far it has slid back, away from where its tip lay [Lgb]; poses are those of the tip in the frame of the floor. False
-/// where no equilibrium is within reach: the sheet snaps.
+/// where no equilibrium is within reach, the sheet snaps, and where nothing of it lies any more.
 bool drag_sheet(const SheetPose& pose, const SheetFriction& friction, double& slide, SheetMotionData& data);
 
 }  // namespace withe

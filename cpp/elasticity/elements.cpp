@@ -162,6 +162,29 @@ BendTwistEnergy half_energy_of(const ElasticCoefficients& k, const Configuration
   return energy_of_row(k.measure, c.half_strain, k.half_natural, k.half_stiffness, stencil);
 }
 
+double natural_change_energy(const Model& model, const ElasticCoefficients& k, const Parameters& now,
+                             const Configuration& c) {
+  double energy = 0.0;
+  const auto add = [&](double stiffness, double before, double after, double strain) {
+    energy += stiffness * (after - before) * (0.5 * (before + after) - strain);
+  };
+  for (int i = 0; i < model.edge_count; ++i) {
+    const double rest = model.edge_length(i), after = now.edge_natural_stretch(i) - 1.0;
+    if (after != k.stretch_natural(i))
+      add(k.stretch_stiffness(i) * rest, k.stretch_natural(i), after, c.length(i) / rest - 1.0);
+  }
+  const auto add_rows = [&](const auto& stiffness, const Columns3& before, const auto& after, const Columns3& strain) {
+    for (Eigen::Index i = 0; i < strain.rows(); ++i) {
+      if (before.row(i) == after.row(i)) continue;
+      const Vector3 s = measured(k.measure, strain.row(i));
+      for (int j = 0; j < 3; ++j) add(stiffness(i, j), before(i, j), after(i, j), s(j));
+    }
+  };
+  add_rows(k.bend_stiffness, k.bend_natural, now.bend_natural, c.bend_strain);
+  add_rows(k.half_stiffness, k.half_natural, now.half_natural, c.half_strain);
+  return energy;
+}
+
 void stretch_local(const Model& model, const ElasticCoefficients& k, const Configuration& c, int edge,
                    bool with_hessian, const double* given_force, Local& out) {
   const EdgeFrame<double>& f = c.edge[static_cast<std::size_t>(edge)];

@@ -85,5 +85,9 @@ struct BendTwistEnergy {
 };
 BendTwistEnergy bend_energy_of(const ElasticCoefficients& coefficients, const Configuration& c, int stencil);
 BendTwistEnergy half_energy_of(const ElasticCoefficients& coefficients, const Configuration& c, int stencil);
+/// By how much the energy grows where strains stay and natural strains become those of the parameters [J]: per stencil
+/// k (n1 - n0) ((n0 + n1) / 2 - s), without the rounding of two energies.
+double natural_change_energy(const Model& model, const ElasticCoefficients& coefficients, const Parameters& now,
+                             const Configuration& c);
 
 }  // namespace withe

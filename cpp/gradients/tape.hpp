@@ -38,9 +38,9 @@ struct MomentAdjoint {
   ReadoutAdjoint by;
 };
 
-/// Takes derivatives by poses of supports at the end of a step, and per support how far it had come then from where its
-/// motion began, from 0 to 1 (empty: all are there).
-using PoseVisitor = std::function<void(long step, const VectorX& reached, const PoseAdjoint&)>;
+/// Takes derivatives by poses of supports at the end of a step, and per support how far its position and its rotation
+/// had come then from where they set out, from 0 to 1 (empty: all are there).
+using PoseVisitor = std::function<void(long step, const MatrixX& reached, const PoseAdjoint&)>;
 
 /// A step that has been accepted.
 struct AcceptedStep {
@@ -49,7 +49,7 @@ struct AcceptedStep {
   const VectorX& end;             ///< q1
   const State& after;             ///< at its end
   const Parameters& parameters;   ///< as they acted
-  VectorX reached;                ///< see `PoseVisitor`
+  MatrixX reached;                ///< see `PoseVisitor`
   bool reacts = true;             ///< whether reactions are those of this step from here on
   const char* unknown = nullptr;  ///< why no gradient goes through it, unless it is cut off again
 };
@@ -91,7 +91,7 @@ class Tape {
     VectorX end;
     VectorX held;  ///< velocities at its end of what supports hold, one after the other; none: they rest, as before it
     VectorX gain;  ///< see `StepTaken::held_gain`; none: nothing
-    VectorX reached;
+    MatrixX reached;
     std::vector<ContactRecord> contacts;  ///< at its end
     bool reacts;
     const char* unknown;  ///< why no gradient goes through it, if so

@@ -205,12 +205,83 @@ bool solve_flow(Equations& equations, const VectorX& q, const VectorX& v, Counte
   return equations.begin_flow(q, v);
 }
 
+namespace {
+
+/// Whether the step to q1 may stay: no edge turns by much, and contact found what it met.
+bool acceptable(Equations& equations, const StepPlan& plan, const State& state, const VectorX& q1, StepWorkspace& work,
+                StepResult& result) {
+  const ElasticCoefficients* watched = plan.rule == StepRule::energy_momentum ? nullptr : &equations.elastic();
+  const Turning turned = turning(equations.model(), state, q1, watched, plan.rule == StepRule::backward_euler);
+  result.largest_turn = turned.largest;
+  if (!q1.allFinite() || !(result.largest_turn <= 1.5)) return false;
+  result.stretch_gain = turned.stretch_gain + (watched ? equations.gained(q1) : 0.0);
+  Contact* contact = equations.contact();
+  if (!contact) return true;
+  // Iterates pass through nothing, but they may find a way around what a rod would have met.
+  work.change = work.z - state.q;
+  if (equations.allowed(state.q, work.change) < 1.0) return false;
+  contact->update(q1);
+  result.squeezed = squeezed_contact(equations, work.change);
+  if (result.squeezed) return false;
+  result.too_deep = contact->too_deep();
+  return !result.too_deep;
+}
+
+/// Velocity at the end, `work.velocity`, of a step whose mean velocity is `work.mean`.
+void find_end_velocity(const Equations& equations, const StepPlan& plan, const State& state, StepWorkspace& work) {
+  VectorX& v1 = work.velocity;
+  if (plan.rule == StepRule::backward_euler)
+    v1 = work.mean;
+  else
+    v1 = 2.0 * work.mean - state.v;
+  if (plan.rule == StepRule::energy_momentum)
+    set_turning_velocities(equations.model(), state.v, work.change, plan.dt, v1);
+  equations.assembler().project(v1);
+  if (!equations.model().constraints.empty()) equations.assembler().add_held_part(work.held_velocity, 1.0, v1);
+}
+
+/// What acted, and what was lost; full residuals become minus the reactions. Returns what friction and restitution
+/// took [J].
+double account(Equations& equations, const Parameters& parameters, const StepPlan& plan, const State& state,
+               StepWorkspace& work, StepResult& result) {
+  const bool conserves = plan.rule == StepRule::energy_momentum;
+  StepData& data = work.newton.data;
+  const VectorX& working = conserves ? work.working : work.change;
+  add_work(equations, parameters, working, work, result);
+  if (const HandForces* hands = equations.hands()) result.support_work += hands->work(equations.problem(), data);
+  double contact_loss = 0.0;
+  if (const Contact* contact = equations.contact()) {
+    const double by_obstacles = contact->obstacle_work();
+    contact_loss = equations.contact_loss(data, working, by_obstacles);
+    result.dissipated += contact_loss;
+    result.support_work += by_obstacles;
+  }
+  if (!equations.model().constraints.empty()) {
+    work.assumed = data.inertia;
+    if (conserves) set_working_rows(equations.problem(), data, work.change, data.full_residual);
+    add_support_work(equations, state.v, work.velocity, plan.dt, held_time(plan, state), work, result);
+  }
+  return contact_loss;
+}
+
+/// The state becomes that at the end of the step.
+void advance(const Equations& equations, const StepPlan& plan, const VectorX& q1, StepWorkspace& work, State& state) {
+  const Model& model = equations.model();
+  if (!model.planar()) compute_configuration(model, state, q1, work.after);
+  if (state.motion.velocity[0].size() != 0) remember_motion(q1, plan.dt, state);
+  accept_configuration(model, q1, work.after, state);
+  state.v = work.velocity;
+  state.acceleration = work.mean;
+  state.time += plan.dt;
+}
+
+}  // namespace
+
 StepResult implicit_step(Equations& equations, const Newton& newton, const Options& options,
                          const Parameters& parameters, const StepPlan& plan, State& state, Predictor& predictor,
                          StepWorkspace& work) {
   StepResult result;
   const Model& model = equations.model();
-  const Assembler& assembler = equations.assembler();
   const bool euler = plan.rule == StepRule::backward_euler;
   const double dt = plan.dt, h = euler ? dt : 0.5 * dt;
   if (!work.held.reachable) return result;
@@ -229,66 +300,23 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
     q1 = work.z;
   else
     q1 = 2.0 * work.z - state.q;
-  const ElasticCoefficients* watched = plan.rule == StepRule::energy_momentum ? nullptr : &equations.elastic();
-  const Turning turned = turning(model, state, q1, watched, euler);
-  result.largest_turn = turned.largest;
-  if (!q1.allFinite() || !(result.largest_turn <= 1.5)) return result;
-  result.stretch_gain = turned.stretch_gain + (watched ? equations.gained(q1) : 0.0);
-  if (Contact* contact = equations.contact()) {
-    // Iterates pass through nothing, but they may find a way around what a rod would have met.
-    work.change = work.z - state.q;
-    if (equations.allowed(state.q, work.change) < 1.0) return result;
-    contact->update(q1);
-    result.squeezed = squeezed_contact(equations, work.change);
-    if (result.squeezed) return result;
-    result.too_deep = contact->too_deep();
-    if (result.too_deep) {
-      work.deep = work.z;
-      return result;
-    }
-  }
+  if (!acceptable(equations, plan, state, q1, work, result)) return result;
   work.change = q1 - state.q;
   const bool conserves = plan.rule == StepRule::energy_momentum;
   if (conserves) set_working_change(equations.problem(), work.newton.data, work.change, work.working);
-  const VectorX& working = conserves ? work.working : work.change;
-  if (equations.contact()) result.pressing_gain = equations.contact()->pressing_gain(working);
+  if (equations.contact())
+    result.pressing_gain = equations.contact()->pressing_gain(conserves ? work.working : work.change);
   work.mean = work.change / dt;
-  VectorX& v1 = work.velocity;
-  if (euler)
-    v1 = work.mean;
-  else
-    v1 = 2.0 * work.mean - state.v;
-  if (conserves) set_turning_velocities(model, state.v, work.change, dt, v1);
-  assembler.project(v1);
-  if (!model.constraints.empty()) assembler.add_held_part(work.held_velocity, 1.0, v1);
-  add_work(equations, parameters, working, work, result);
-  if (const HandForces* hands = equations.hands())
-    result.support_work += hands->work(equations.problem(), work.newton.data);
-  double contact_loss = 0.0;
-  if (const Contact* contact = equations.contact()) {
-    const double by_obstacles = contact->obstacle_work();
-    contact_loss = equations.contact_loss(work.newton.data, working, by_obstacles);
-    result.dissipated += contact_loss;
-    result.support_work += by_obstacles;
-  }
-  if (!model.constraints.empty()) {
-    work.assumed = work.newton.data.inertia;
-    if (conserves) set_working_rows(equations.problem(), work.newton.data, work.change, work.newton.data.full_residual);
-    add_support_work(equations, state.v, v1, dt, held_time(plan, state), work, result);
-  }
+  find_end_velocity(equations, plan, state, work);
+  const double contact_loss = account(equations, parameters, plan, state, work, result);
   VectorX& acceleration = work.mean;
-  acceleration = (v1 - state.v) / dt;
+  acceleration = (work.velocity - state.v) / dt;
   if (options.tolerance) result.error = estimated_error(equations, newton, options, plan, predictor, work);
   predictor.record(state.time + 0.5 * dt, plan.slot, acceleration, equations.mass().rows, work.assumed);
   if (Contact* contact = equations.contact())
     result.dissipated -= contact->accept(state, Keep::energy, std::max(contact_loss, 0.0));
-  if (!model.planar()) compute_configuration(model, state, q1, work.after);
-  if (state.motion.velocity[0].size() != 0) remember_motion(q1, dt, state);
-  accept_configuration(model, q1, work.after, state);
+  advance(equations, plan, q1, work, state);
   if (const HandForces* hands = equations.hands()) hands->accept(work.after, state);
-  state.v = v1;
-  state.acceleration = acceleration;
-  state.time += dt;
   result.accepted = true;
   return result;
 }

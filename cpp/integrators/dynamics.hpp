@@ -39,8 +39,6 @@ struct StepResult {
 struct StepWorkspace {
   NewtonWorkspace newton;
   HeldTarget held;
-  bool repeated = false;  ///< the same step as before, with stiffer contact
-  VectorX deep;           ///< where that led
   VectorX z, move, change, working, mean, velocity, held_velocity, held_acceleration, assumed, difference,
       whole_acceleration;
   Configuration after;

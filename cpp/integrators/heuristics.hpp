@@ -25,7 +25,6 @@ enum class Heuristic : unsigned {
   remember_plain,
   friction_order,
   few_iterations,
-  repeat_from_end,
   hold_sticking,
   predict_friction,
   supports_linear,

@@ -14,8 +14,8 @@ namespace {
 enum class Guess : std::size_t { accelerated, steady, rest, other_method, continuation };
 using Guesses = std::array<Guess, 5>;
 
-// Iterations of guesses that may be wrong, and of repeated steps.
-constexpr int kFew = 12, kRepeated = 24;
+// Iterations of guesses that may be wrong.
+constexpr int kFew = 12;
 // Steps without the mixed method after it has gone round in circles.
 constexpr int kPlainSolves = 16;
 // The slip over which friction grows, over that of the scene, and iterations at each.
@@ -93,11 +93,6 @@ class InnerSolve {
   NewtonResult run() {
     NewtonResult found;
     int spent = 0;
-    if (work_.repeated && uses(Heuristic::repeat_from_end)) {
-      found = repeat();
-      if (found.converged) return found;
-      spent = found.iterations;
-    }
     for (Guess guess : order()) {
       if (!applies(guess)) continue;
       GuessRecord& record = history_.records[static_cast<std::size_t>(guess)];
@@ -132,7 +127,7 @@ class InnerSolve {
     if (guess == Guess::other_method && !uses(Heuristic::start_other_method)) return false;
     if (guess == Guess::continuation && !uses(Heuristic::start_continuation)) return false;
     if (guess == Guess::continuation) return regularised_;
-    return guess != Guess::accelerated || (points_ != 0 && !work_.repeated);
+    return guess != Guess::accelerated || points_ != 0;
   }
 
   /// What is always tried: rest, and where friction does not let surfaces jump all but the extrapolated motion. Others
@@ -152,15 +147,6 @@ class InnerSolve {
   bool mixed(Guess guess) const { return (guess == Guess::other_method) != mixed_; }
 
   bool uses(Heuristic h) const { return options_.heuristics.uses(h); }
-
-  NewtonResult repeat() {
-    work_.z = work_.deep;
-    start_axial_force(equations_, work_.z, work_.newton.axial_force);
-    return newton_.solve(
-        equations_, work_.z,
-        {.max_iterations = std::min(kRepeated, options_.max_iterations), .mixed = mixed_, .interval = h_},
-        work_.newton);
-  }
 
   /// Puts the guess into `work.z`.
   void guess_at(Guess guess) {

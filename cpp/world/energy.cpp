@@ -75,19 +75,18 @@ void EnergyCoefficients::set(const Model& model, const Parameters& p) {
   spring_rest_length = p.spring_rest_length;
 }
 
-/// Takes ramps on to a time at a state that stays, and adds what that changes of the elastic energy [J].
-void World::Implementation::apply_ramps(double time, double& work) {
-  auto& [c, k, touching] = energy_scratch;
-  const bool stretched = std::any_of(ramps.begin(), ramps.end(), [](const NaturalRamp& r) { return r.stretch.active; });
-  const auto energy = [&] {
-    k.set(model, parameters);
-    const BendTwistEnergy e = bend_twist_energy(model, k.elastic, c);
-    return e.bend + e.twist + (stretched ? stretch_energy(model, k.elastic, c) : 0.0);
-  };
-  compute_configuration(model, state, state.q, c);
-  work -= energy();
+/// Takes ramps on to a time at a configuration that stays, and adds what that changes of the elastic energy [J].
+void World::Implementation::apply_ramps(double time, const Configuration& c, double& work) {
+  EnergyCoefficients& before = energy_scratch.coefficients;
+  before.set(model, parameters);
   apply_ramps(time);
-  work += energy();
+  work += natural_change_energy(model, before.elastic, parameters, c);
+}
+
+/// That of the present state.
+const Configuration& World::Implementation::configuration() const {
+  compute_configuration(model, state, state.q, energy_scratch.configuration);
+  return energy_scratch.configuration;
 }
 
 void World::Implementation::begin_setting() {

@@ -83,7 +83,7 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
   const Lagged lagged_before = lagged();
   const MatrixX3 loads = parameters.loads;
   const double time = state.time + dt;
-  if (actuated()) apply_ramps(time, actuation_work);
+  if (actuated()) apply_ramps(time, configuration(), actuation_work);
   aim_supports(time);
   Equations& system = statics();
   update_custom_force(system);
@@ -205,7 +205,7 @@ PathPoint path_point(const World& world, const Model& model, const ArcPoint& poi
 void stop(SupportMotion& motion, double time) {
   motion.from_position = motion.to_position = motion.position;
   motion.from_rotation = motion.to_rotation = motion.rotation;
-  motion.start = motion.end = time;
+  motion.shift = motion.turn = {time, time};
 }
 
 }  // namespace

@@ -71,6 +71,11 @@ void exchange(Archive& io, const Model& model, Parameters& p) {
 }
 
 template <class Archive>
+void exchange(Archive& io, Span& span) {
+  io(span.start), io(span.end);
+}
+
+template <class Archive>
 void exchange(Archive& io, const Model& model, Settings& settings) {
   auto& [parameters, ramps, obstacle_motions] = settings;
   exchange(io, model, parameters);
@@ -80,9 +85,9 @@ void exchange(Archive& io, const Model& model, Settings& settings) {
   };
   for (auto& [curvature, twist, stretch] : ramps)
     exchange_ramp(curvature), exchange_ramp(twist), exchange_ramp(stretch);
-  for (auto& [from, to, start, end] : obstacle_motions) {
+  for (auto& [from, to, shift, turn] : obstacle_motions) {
     for (ObstacleWay* way : {&from, &to}) io(way->shift), io(way->turn);
-    io(start), io(end);
+    exchange(io, shift), exchange(io, turn);
   }
 }
 
@@ -126,9 +131,9 @@ void exchange(Archive& io, Moving& moving) {
   exchange(io, state);
   predictor.exchange(io);
   for (auto& motion : motions) {
-    auto& [position, rotation, from_position, to_position, from_rotation, to_rotation, start, end, stretch] = motion;
+    auto& [position, rotation, from_position, to_position, from_rotation, to_rotation, shift, turn, stretch] = motion;
     io(position), io(rotation), io(from_position), io(to_position), io(from_rotation), io(to_rotation);
-    io(start), io(end), io(stretch);
+    exchange(io, shift), exchange(io, turn), io(stretch);
   }
   for (double* x : {&support_work, &actuation_work, &dissipated, &load_work}) io(*x);
 }

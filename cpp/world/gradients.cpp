@@ -139,13 +139,14 @@ void World::Implementation::record_step(StepRule rule, double dt, bool reacts) {
     else if (!problem.shift.empty() || !problem.turn.empty())
       unknown = "an obstacle moved";
   }
-  const bool there =
-      std::all_of(motions.begin(), motions.end(), [&](const SupportMotion& m) { return state.time >= m.end; });
-  VectorX reached;
-  if (!there) reached.resize(static_cast<Eigen::Index>(motions.size()));
-  for (Eigen::Index s = 0; s < reached.size(); ++s) {
+  const bool there = std::all_of(motions.begin(), motions.end(), [&](const SupportMotion& m) {
+    return state.time >= std::max(m.shift.end, m.turn.end);
+  });
+  MatrixX reached;
+  if (!there) reached.resize(static_cast<Eigen::Index>(motions.size()), 2);
+  for (Eigen::Index s = 0; s < reached.rows(); ++s) {
     const SupportMotion& m = motions[static_cast<std::size_t>(s)];
-    reached(s) = ramp_fraction(state.time, m.start, m.end);
+    reached.row(s) << m.shift.fraction(state.time), m.turn.fraction(state.time);
   }
   tape->record({rule, dt, work.move, state, parameters, reached, reacts, unknown});
 }

@@ -64,7 +64,7 @@ void World::Implementation::grasp(int hand) {
   m.rotation = own.posed ? own.rotation : edge_directors(model, c, s.at_edge);
   m.from_position = m.to_position = m.position;
   m.from_rotation = m.to_rotation = m.rotation;
-  m.start = m.end = state.time;
+  m.shift = m.turn = {state.time, state.time};
   HandState& held = state.hands[at(hand)];
   held = HandState{m.position, m.rotation, {}, {}, {}, {}};
   const Matrix3 into = m.rotation.transpose();

@@ -129,7 +129,8 @@ struct World::Implementation : Running {
   void set(std::span<const ParameterSetting> settings);
   void apply_ramps(double time);
   Eigen::VectorBlock<VectorX> natural_stretch(int rod);
-  void apply_ramps(double time, double& work);
+  void apply_ramps(double time, const Configuration& c, double& work);
+  const Configuration& configuration() const;
   void retire_ramps();
   bool actuated() const;
   void aim_supports(double time);
@@ -226,6 +227,8 @@ struct World::Implementation : Running {
 
   // supports.cpp
   SupportMotion standing(const Support& support) const;
+  void check_pose(int support, const std::optional<Vector3>& position, const std::optional<Matrix3>& rotation);
+  void lump_held();
 
   // equilibrium.cpp
   EquilibriumResult equilibrium(double dt);

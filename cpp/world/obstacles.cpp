@@ -11,8 +11,8 @@ namespace withe {
 namespace {
 
 ObstacleWay way_at(const ObstacleMotion& m, double time) {
-  const double share = ramp_fraction(time, m.start, m.end);
-  return {(1.0 - share) * m.from.shift + share * m.to.shift, (1.0 - share) * m.from.turn + share * m.to.turn};
+  const double share = m.shift.fraction(time), turned = m.turn.fraction(time);
+  return {(1.0 - share) * m.from.shift + share * m.to.shift, (1.0 - turned) * m.from.turn + turned * m.to.turn};
 }
 
 }  // namespace
@@ -49,27 +49,36 @@ void World::Implementation::check_turn(int obstacle, const Vector3& turn) const 
           "obstacle '" + drawn.name + "' can turn about " + (plane ? "its normal" : "its axis") + " only");
 }
 
-void World::move_obstacle(int obstacle, const Vector3& position, const Vector3& turn, double over) {
+void World::move_obstacle(int obstacle, const std::optional<Vector3>& position, const std::optional<Vector3>& turn,
+                          double over) {
   Implementation& self = *implementation_;
   require(std::isfinite(over) && over >= 0.0, "over must be finite and not negative");
   const Vector3 from = obstacle_position(obstacle);
   const ObstacleWay before = self.obstacle_way(obstacle);
   prescribe_obstacle(obstacle, position, turn);
   ObstacleMotion& m = self.obstacle_motions[at(obstacle)];
-  m.from = {from - self.description.contact.obstacles[at(obstacle)].point, before.turn};
-  m.end = self.state.time + over;
+  const Span way{self.state.time, self.state.time + over};
+  if (position) {
+    m.from.shift = from - self.description.contact.obstacles[at(obstacle)].point;
+    m.shift = way;
+  }
+  if (turn) {
+    m.from.turn = before.turn;
+    m.turn = way;
+  }
 }
 
-void World::prescribe_obstacle(int obstacle, const Vector3& position, const Vector3& turn) {
+void World::prescribe_obstacle(int obstacle, const std::optional<Vector3>& position,
+                               const std::optional<Vector3>& turn) {
   Implementation& self = *implementation_;
-  const Vector3 way = position - obstacle_position(obstacle);
-  require(position.allFinite(), "position must be finite");
-  self.check_turn(obstacle, turn);
+  const Vector3 way = position.value_or(obstacle_position(obstacle)) - obstacle_position(obstacle);
+  require(way.allFinite(), "position must be finite");
+  if (turn) self.check_turn(obstacle, *turn);
   const ObstacleDescription& drawn = self.description.contact.obstacles[at(obstacle)];
   // What a plane moves along itself out of the rods' plane, no rod sees without friction; with it, it pulls them out.
   if (self.model.planar()) {
     const Vector3& n = self.model.plane->normal;
-    if (std::abs(way.dot(n)) > 1e-9 * self.model.length_scale || n.cross(turn).norm() > 1e-9 * turn.norm())
+    if (std::abs(way.dot(n)) > 1e-9 * self.model.length_scale || (turn && n.cross(*turn).norm() > 1e-9 * turn->norm()))
       self.leave_plane("a moving obstacle");
   }
   if (self.obstacle_motions.empty()) {
@@ -78,8 +87,15 @@ void World::prescribe_obstacle(int obstacle, const Vector3& position, const Vect
       self.obstacle_motions[o].from = self.obstacle_motions[o].to = self.obstacle_way(static_cast<int>(o));
   }
   ObstacleMotion& m = self.obstacle_motions[at(obstacle)];
-  m.from = m.to = {position - drawn.point, turn};
-  m.start = m.end = self.state.time;
+  const Span now{self.state.time, self.state.time};
+  if (position) {
+    m.from.shift = m.to.shift = *position - drawn.point;
+    m.shift = now;
+  }
+  if (turn) {
+    m.from.turn = m.to.turn = *turn;
+    m.turn = now;
+  }
   self.state.acceleration_current = false;
 }
 

@@ -43,22 +43,26 @@ bool World::Implementation::actuated() const {
 }
 
 void World::Implementation::set_motion_at(SupportMotion& motion, double time) const {
-  const double s = ramp_fraction(time, motion.start, motion.end);
+  const double s = motion.shift.fraction(time), turned = motion.turn.fraction(time);
   motion.position = (1.0 - s) * motion.from_position + s * motion.to_position;
   motion.rotation =
-      rotation_exp(s * rotation_log(motion.to_rotation * motion.from_rotation.transpose())) * motion.from_rotation;
+      rotation_exp(turned * rotation_log(motion.to_rotation * motion.from_rotation.transpose())) * motion.from_rotation;
 }
 
 /// A support that is to be elsewhere at once gets there evenly in the course of the time step: shorter steps meet less
 /// of a jump, or cutting them would be in vain.
 void World::Implementation::spread_jumps(double duration) {
-  for (SupportMotion& m : motions)
-    if (m.start == m.end && (m.position != m.to_position || m.rotation != m.to_rotation)) {
+  const Span step{state.time, state.time + duration};
+  for (SupportMotion& m : motions) {
+    if (m.shift.start == m.shift.end && m.position != m.to_position) {
       m.from_position = m.position;
-      m.from_rotation = m.rotation;
-      m.start = state.time;
-      m.end = state.time + duration;
+      m.shift = step;
     }
+    if (m.turn.start == m.turn.end && m.rotation != m.to_rotation) {
+      m.from_rotation = m.rotation;
+      m.turn = step;
+    }
+  }
 }
 
 /// Moves supports to where they shall be at a time, and notes what that says of the held unknowns.

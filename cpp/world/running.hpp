@@ -12,23 +12,30 @@
 
 namespace withe {
 
-/// Where a support is, and where it is going.
+/// How far something has come that goes evenly from a start to an end, at a time; from 0 to 1.
+double ramp_fraction(double time, double start, double end);
+
+/// When something sets out, and when it is there [s].
+struct Span {
+  double start = 0, end = 0;
+
+  double fraction(double time) const { return ramp_fraction(time, start, end); }
+};
+
+/// Where a support is, and where it is going: its position and its rotation each on a way of its own.
 struct SupportMotion {
   Vector3 position = Vector3::Zero();      ///< now [m]
   Matrix3 rotation = Matrix3::Identity();  ///< now, from the drawn orientation
   Vector3 from_position = Vector3::Zero(), to_position = Vector3::Zero();
   Matrix3 from_rotation = Matrix3::Identity(), to_rotation = Matrix3::Identity();
-  double start = 0, end = 0;  ///< of the ramp [s]
-  double stretch = 1;         ///< of a held edge: its length when it was gripped, over the drawn one
+  Span shift, turn;    ///< when each of them goes
+  double stretch = 1;  ///< of a held edge: its length when it was gripped, over the drawn one
 };
 
-/// How far something has come that goes evenly from a start to an end, at a time; from 0 to 1.
-double ramp_fraction(double time, double start, double end);
-
-/// Where an obstacle goes.
+/// Where an obstacle goes, and how it turns.
 struct ObstacleMotion {
   ObstacleWay from, to;
-  double start = 0, end = 0;  ///< [s]
+  Span shift, turn;
 };
 
 /// What goes evenly from one value to another.

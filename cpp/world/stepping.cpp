@@ -294,14 +294,13 @@ bool World::Implementation::inner_step(double dt, int slot, double& error) {
   ask_callback(middle, end);
   const bool ramped = actuated();
   double actuation = 0.0;
-  if (ramped) apply_ramps(middle, actuation);
+  if (ramped) apply_ramps(middle, configuration(), actuation);
   kept_motions = motions;
   aim_supports(end);
   Equations& system = equations_of_step();
   aim_obstacles(system, end);
   aim_hands(system);
   const auto undo = [&] {
-    work.repeated = false;
     system.respond({});
     release_obstacles(system);
     release_hands(system);
@@ -316,9 +315,7 @@ bool World::Implementation::inner_step(double dt, int slot, double& error) {
     for (int tries = 0; r.too_deep && tries < kMostStiffenings; ++tries) {
       dissipated -= system.contact()->stiffen(state, Keep::energy);
       work.newton.matrix.owner = nullptr;
-      work.repeated = true;
       r = step_by_rule(dt, slot);
-      work.repeated = false;
     }
   } catch (...) {
     undo();
@@ -344,7 +341,7 @@ bool World::Implementation::inner_step(double dt, int slot, double& error) {
   contact_guard.put_in = r.pressing_gain;
   if (reacts) keep_reactions();
   if (ramped) {
-    apply_ramps(end, actuation);
+    apply_ramps(end, model.planar() ? configuration() : work.after, actuation);
     actuation_work += actuation;
   }
   return true;

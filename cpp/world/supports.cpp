@@ -28,7 +28,7 @@ SupportMotion World::Implementation::standing(const Support& support) const {
   }
   m.from_position = m.to_position = m.position;
   m.from_rotation = m.to_rotation = m.rotation;
-  m.start = m.end = state.time;
+  m.shift = m.turn = {state.time, state.time};
   return m;
 }
 
@@ -93,55 +93,82 @@ void World::remove_support(int support) {
   self.rebuild(Rebuild::running);
 }
 
-void World::move_support(int support, const Vector3& position, const Matrix3& rotation, double over) {
+void World::move_support(int support, const std::optional<Vector3>& position, const std::optional<Matrix3>& rotation,
+                         double over) {
   Implementation& self = *implementation_;
   require(std::isfinite(over) && over >= 0.0, "over must be finite and not negative");
   prescribe_support(support, position, rotation);
   SupportMotion& m = self.motions[at(support)];
-  m.from_position = m.position;
-  m.from_rotation = m.rotation;
-  m.start = self.state.time;
-  m.end = self.state.time + over;
+  const Span way{self.state.time, self.state.time + over};
+  if (position) {
+    m.from_position = m.position;
+    m.shift = way;
+  }
+  if (rotation) {
+    m.from_rotation = m.rotation;
+    m.turn = way;
+  }
 }
 
-void World::prescribe_support(int support, const Vector3& position, const Matrix3& rotation) {
+/// Refuses a pose that is none; one that leaves a plane makes the scene spatial.
+void World::Implementation::check_pose(int support, const std::optional<Vector3>& position,
+                                       const std::optional<Matrix3>& rotation) {
+  require(!position || position->allFinite(), "position must be finite");
+  require(
+      !rotation || (rotation->allFinite() && (rotation->transpose() * *rotation - Matrix3::Identity()).norm() < 1e-6 &&
+                    rotation->determinant() > 0.0),
+      "rotation must be a proper rotation matrix");
+  const Support& held = model.supports[at(support)];
+  const SupportMotion& now = motions[at(support)];
+  if (rotation && held.description.kind == SupportKind::spinning_clamp)
+    require((*rotation * held.tangent - now.rotation * held.tangent).norm() < 1e-9,
+            "a clamp that may spin keeps its tangent: take hold='edge' to turn it");
+  if (!model.planar()) return;
+  const Plane& plane = *model.plane;
+  const Vector3& from = held.is_hand() ? now.position : plane.origin;  // which may be beside it
+  if ((position && std::abs((*position - from).dot(plane.normal)) > 1e-9 * model.length_scale) ||
+      (rotation && (*rotation * now.rotation.transpose() * plane.normal - plane.normal).norm() > 1e-9))
+    leave_plane("a moving support");
+}
+
+/// Under the fourth-order scheme velocities of supports are known to second order: see mass_matrix.hpp.
+void World::Implementation::lump_held() {
+  account_for_settings();
+  MassMatrix mass;
+  set_mass(model, parameters, mass);
+  support_work -= kinetic_energy(model, mass, state.v);
+  parameters.held_lumped = true;
+  update_derived(model, parameters);
+  set_mass(model, parameters, mass);
+  support_work += kinetic_energy(model, mass, state.v);
+}
+
+void World::prescribe_support(int support, const std::optional<Vector3>& position,
+                              const std::optional<Matrix3>& rotation) {
   Implementation& self = *implementation_;
   require(
       support >= 0 && support < static_cast<int>(self.model.supports.size()) && self.model.supports[at(support)].active,
       "no such support, or it is released: " + std::to_string(support));
-  require(position.allFinite() && rotation.allFinite(), "position and rotation must be finite");
-  require((rotation.transpose() * rotation - Matrix3::Identity()).norm() < 1e-6 && rotation.determinant() > 0.0,
-          "rotation must be a proper rotation matrix");
-  const Support& held = self.model.supports[at(support)];
-  if (held.description.kind == SupportKind::spinning_clamp)
-    require((rotation * held.tangent - self.motions[at(support)].rotation * held.tangent).norm() < 1e-9,
-            "a clamp that may spin keeps its tangent: take hold='edge' to turn it");
-  if (self.model.planar()) {
-    const Plane& plane = *self.model.plane;
-    const Vector3& from = held.is_hand() ? self.motions[at(support)].position : plane.origin;  // which may be beside it
-    if (std::abs((position - from).dot(plane.normal)) > 1e-9 * self.model.length_scale ||
-        (rotation * self.motions[at(support)].rotation.transpose() * plane.normal - plane.normal).norm() > 1e-9)
-      self.leave_plane("a moving support");
-  }
-  if (self.options.integrator == Integrator::fourth_order && !self.parameters.held_lumped) {
-    // Velocities of supports are known to second order: see mass_matrix.hpp.
-    self.account_for_settings();
-    MassMatrix mass;
-    set_mass(self.model, self.parameters, mass);
-    self.support_work -= kinetic_energy(self.model, mass, self.state.v);
-    self.parameters.held_lumped = true;
-    update_derived(self.model, self.parameters);
-    set_mass(self.model, self.parameters, mass);
-    self.support_work += kinetic_energy(self.model, mass, self.state.v);
-  }
+  self.check_pose(support, position, rotation);
+  if (self.options.integrator == Integrator::fourth_order && !self.parameters.held_lumped) self.lump_held();
   SupportMotion& m = self.motions[at(support)];
-  m.to_position = m.from_position = position;
-  m.to_rotation = m.from_rotation = rotation;
-  m.start = m.end = self.state.time;
+  const Span now{self.state.time, self.state.time};
+  if (position) {
+    m.to_position = m.from_position = *position;
+    m.shift = now;
+  }
+  if (rotation) {
+    m.to_rotation = m.from_rotation = *rotation;
+    m.turn = now;
+  }
 }
 
 Vector3 World::support_position(int support) const { return implementation_->motions.at(at(support)).position; }
 Matrix3 World::support_rotation(int support) const { return implementation_->motions.at(at(support)).rotation; }
+std::pair<Matrix3, double> World::support_turn(int support) const {
+  const SupportMotion& m = implementation_->motions.at(at(support));
+  return {m.to_rotation, m.turn.end};
+}
 
 /// Of the last evaluation.
 void World::Implementation::note_reactions() {

@@ -6,6 +6,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <Eigen/SparseCore>
@@ -209,21 +210,26 @@ class World {
   // Supports; indices are rows of description().supports.
   int add_support(const SupportDescription& support);  ///< holds the present position and orientation
   void remove_support(int support);                    ///< the next one to be added takes its row
-  /// Target position [m] and rotation relative to the drawn orientation, reached `over` seconds from now.
-  void move_support(int support, const Vector3& position, const Matrix3& rotation, double over);
-  /// Position and rotation at the end of the coming inner step (from the step callback).
-  void prescribe_support(int support, const Vector3& position, const Matrix3& rotation);
+  /// Target position [m] and rotation relative to the drawn orientation, reached `over` seconds from now. What is not
+  /// given goes on as it does.
+  void move_support(int support, const std::optional<Vector3>& position, const std::optional<Matrix3>& rotation,
+                    double over);
+  /// Position and rotation at the end of the coming inner step (from the step callback); likewise.
+  void prescribe_support(int support, const std::optional<Vector3>& position, const std::optional<Matrix3>& rotation);
   Vector3 support_position(int support) const;
   Matrix3 support_rotation(int support) const;
+  /// The rotation that a support turns to, and when it is there [s].
+  std::pair<Matrix3, double> support_turn(int support) const;
   Reaction reaction(int support) const;      ///< of a hand: about where it is
   Deflection deflection(int support) const;  ///< of a hand
 
   // Obstacles. Their place is that of the point they are drawn with: a plane's, a sphere's centre, a capsule's start.
   // They turn about the normal of a plane, the axis of a capsule, the centre of a sphere, by `turn` since drawn [rad].
-  /// Reached `over` seconds from now.
-  void move_obstacle(int obstacle, const Vector3& position, const Vector3& turn, double over);
-  /// At the end of the coming inner step.
-  void prescribe_obstacle(int obstacle, const Vector3& position, const Vector3& turn);
+  /// Reached `over` seconds from now. What is not given goes on as it does.
+  void move_obstacle(int obstacle, const std::optional<Vector3>& position, const std::optional<Vector3>& turn,
+                     double over);
+  /// At the end of the coming inner step; likewise.
+  void prescribe_obstacle(int obstacle, const std::optional<Vector3>& position, const std::optional<Vector3>& turn);
   Vector3 obstacle_position(int obstacle) const;  ///< [m]
   Vector3 obstacle_turn(int obstacle) const;      ///< [rad]
   /// Takes over friction, slip tolerance, restitution and stiffness of a description of the same bodies, and pairs that

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <limits>
 
 #include "bindings.hpp"
 #include "common/check.hpp"
@@ -110,6 +111,25 @@ py::tuple dragged_sheet(const Numbers& poses, const Numbers& forces, double fric
   return py::make_tuple(rows, slides);
 }
 
+/// How far each of many sheets must have slid, held at its pose with forces of its own, for friction to hold it; NaN
+/// where no equilibrium is within reach.
+Numbers slides_to_rest(const Numbers& forces, double friction, double sheet_length, double width_growth) {
+  require(forces.ndim() == 2 && forces.shape(1) == 3, "forces must have shape (sheets, 3)");
+  Numbers slides(forces.shape(0));
+  const double* in = forces.data();
+  double* out = slides.mutable_data();
+  const py::gil_scoped_release unlocked;
+  SheetMotionData data;
+  for (py::ssize_t i = 0; i < forces.shape(0); ++i, in += 3) {
+    set_sheet_forces({width_growth, 0.0}, {in[0], in[1], in[2]}, data);
+    const SheetPose pose{tip_back(data.path), tip_up(data.path), tip_angle(data.path)};
+    double slide = 0;
+    const bool there = drag_sheet(pose, {friction, sheet_length}, slide, data);
+    out[i] = there ? slide : std::numeric_limits<double>::quiet_NaN();
+  }
+  return slides;
+}
+
 }  // namespace
 
 void register_elastica(py::module_& module) {
@@ -135,6 +155,8 @@ void register_elastica(py::module_& module) {
   module.def("dragged_sheet", &dragged_sheet, py::arg("poses"), py::arg("forces"), py::arg("friction"),
              py::arg("sheet_length"), py::arg("width_growth"),
              "A sheet moved from pose to pose, sliding by Coulomb's law: one row a pose, and how far it has slid.");
+  module.def("slides_to_rest", &slides_to_rest, py::arg("forces"), py::arg("friction"), py::arg("sheet_length"),
+             py::arg("width_growth"), "How far sheets that are held still slide until friction holds them.");
 }
 
 }  // namespace withe::bindings

@@ -303,25 +303,23 @@ void define_supports(WorldClass& world) {
       py::arg("support"));
   world.def(
       "move_support",
-      [](GuardedWorld& self, int support, const Vector3& position, const Matrix3& rotation, double over) {
-        self.changing().move_support(support, position, rotation, over);
-      },
+      [](GuardedWorld& self, int support, const std::optional<Vector3>& position,
+         const std::optional<Matrix3>& rotation,
+         double over) { self.changing().move_support(support, position, rotation, over); },
       py::arg("support"), py::arg("position"), py::arg("rotation"), py::arg("over"));
   world.def(
       "prescribe_support",
-      [](GuardedWorld& self, int support, const Vector3& position, const Matrix3& rotation) {
-        self.steering().prescribe_support(support, position, rotation);
-      },
+      [](GuardedWorld& self, int support, const std::optional<Vector3>& position,
+         const std::optional<Matrix3>& rotation) { self.steering().prescribe_support(support, position, rotation); },
       py::arg("support"), py::arg("position"), py::arg("rotation"));
   world.def(
       "move_obstacle",
-      [](GuardedWorld& self, int obstacle, const Vector3& position, const Vector3& turn, double over) {
-        self.changing().move_obstacle(obstacle, position, turn, over);
-      },
+      [](GuardedWorld& self, int obstacle, const std::optional<Vector3>& position, const std::optional<Vector3>& turn,
+         double over) { self.changing().move_obstacle(obstacle, position, turn, over); },
       py::arg("obstacle"), py::arg("position"), py::arg("turn"), py::arg("over"));
   world.def(
       "prescribe_obstacle",
-      [](GuardedWorld& self, int obstacle, const Vector3& position, const Vector3& turn) {
+      [](GuardedWorld& self, int obstacle, const std::optional<Vector3>& position, const std::optional<Vector3>& turn) {
         self.steering().prescribe_obstacle(obstacle, position, turn);
       },
       py::arg("obstacle"), py::arg("position"), py::arg("turn"));
@@ -348,6 +346,9 @@ void define_supports(WorldClass& world) {
   world.def(
       "support_rotation",
       [](const GuardedWorld& self, int support) { return self.reading().support_rotation(support); },
+      py::arg("support"));
+  world.def(
+      "support_turn", [](const GuardedWorld& self, int support) { return self.reading().support_turn(support); },
       py::arg("support"));
   world.def(
       "reaction", [](const GuardedWorld& self, int support) { return self.reading().reaction(support); },

@@ -15,6 +15,7 @@ namespace py = pybind11;
 void register_model(py::module_& module);
 void register_integrators(py::module_& module);
 void register_world(py::module_& module);
+void register_batch(py::module_& module);
 void register_vision(py::module_& module);
 void register_elastica(py::module_& module);
 void register_deployment(py::module_& module);

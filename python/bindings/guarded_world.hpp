@@ -55,13 +55,7 @@ class GuardedWorld {
       if (poll) check_signals();
       if (!callback.is_none()) callback(force_time, end_time);
     });
-    if (!forces.is_none())
-      world_.set_force_function(
-          [&](double time, const MatrixX3& positions, const MatrixX3& velocities, bool derivatives) {
-            const py::gil_scoped_acquire gil;
-            const InCallback mark(*this);
-            return custom_forces(forces(time, positions, velocities, derivatives));
-          });
+    if (!forces.is_none()) ask(forces);
     world_.set_poll([&] {
       if (Clock::now() - polled < std::chrono::milliseconds(100)) return;
       const py::gil_scoped_acquire gil;
@@ -71,9 +65,20 @@ class GuardedWorld {
     return advance(world_);
   }
 
+  /// While this lasts, a batch steps the world, as `run` would, but for signals.
+  class InBatch;
+
  private:
   using Clock = std::chrono::steady_clock;
 
+  void ask(const py::object& forces) {
+    world_.set_force_function(
+        [this, &forces](double time, const MatrixX3& positions, const MatrixX3& velocities, bool derivatives) {
+          const py::gil_scoped_acquire gil;
+          const InCallback mark(*this);
+          return custom_forces(forces(time, positions, velocities, derivatives));
+        });
+  }
   static CustomForces custom_forces(const py::tuple& found) {
     CustomForces out;
     out.forces = found[0].cast<MatrixX3>();
@@ -109,6 +114,27 @@ class GuardedWorld {
   World world_;
   bool stepping_ = false;
   std::optional<unsigned long> callback_thread_;
+};
+
+class GuardedWorld::InBatch {
+ public:
+  /// The functions of Python must outlive this.
+  InBatch(GuardedWorld& world, const py::object& callback, const py::object& forces) : stepping_(begun(world)) {
+    if (!callback.is_none())
+      world.world_.set_step_callback([&world, &callback](World&, double force_time, double end_time) {
+        const py::gil_scoped_acquire gil;
+        const InCallback mark(world);
+        callback(force_time, end_time);
+      });
+    if (!forces.is_none()) world.ask(forces);
+  }
+
+ private:
+  static GuardedWorld& begun(GuardedWorld& world) {
+    refuse(world.stepping_);
+    return world;
+  }
+  Stepping stepping_;
 };
 
 }  // namespace withe::bindings

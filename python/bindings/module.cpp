@@ -6,6 +6,7 @@ PYBIND11_MODULE(_core, module) {
   withe::bindings::register_model(module);
   withe::bindings::register_integrators(module);
   withe::bindings::register_world(module);
+  withe::bindings::register_batch(module);
   withe::bindings::register_vision(module);
   withe::bindings::register_elastica(module);
   withe::bindings::register_deployment(module);

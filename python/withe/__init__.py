@@ -12,6 +12,7 @@ by rounding, so set it to "baseline" everywhere to find the same bits on unlike 
 
 from withe import deployment, folding, learning, perception, real2sim, shapes, view
 from withe._core import __version__
+from withe.batch import Batch
 from withe.errors import CoarseMeshWarning, CoarseStepWarning, ConvergenceError
 from withe.parts.friction_fields import FrictionMap
 from withe.parts.handles import (
@@ -39,6 +40,7 @@ from withe.simulation.simulation import Simulation
 from withe.simulation.snapshots import Snapshot
 
 __all__ = [
+    "Batch",
     "Circle",
     "CoarseMeshWarning",
     "CoarseStepWarning",

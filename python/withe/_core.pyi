@@ -10,6 +10,7 @@ import scipy.sparse
 import typing
 
 __all__: list[str] = [
+    "Batch",
     "ContactDescription",
     "ContactPairDescription",
     "ContactTable",
@@ -56,6 +57,7 @@ __all__: list[str] = [
     "hsv_mask",
     "sheets_at_forces",
     "sheets_at_poses",
+    "slides_to_rest",
     "smooth_curvatures",
     "thin",
     "trace_lines",
@@ -476,7 +478,6 @@ class Options:
         "remember_plain",
         "friction_order",
         "few_iterations",
-        "repeat_from_end",
         "hold_sticking",
         "predict_friction",
         "supports_linear",
@@ -673,7 +674,7 @@ class Tape:
         moments: collections.abc.Sequence[MomentAdjoint],
         visit: collections.abc.Callable[[int, int, float, ParameterGradient], None],
         visit_poses: collections.abc.Callable[
-            [int, typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"], PoseAdjoint], None
+            [int, typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"], PoseAdjoint], None
         ]
         | None,
     ) -> InitialGradient: ...
@@ -946,15 +947,15 @@ class World:
     def move_obstacle(
         self,
         obstacle: typing.SupportsInt | typing.SupportsIndex,
-        position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"],
-        turn: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"],
+        position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] | None,
+        turn: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] | None,
         over: typing.SupportsFloat | typing.SupportsIndex,
     ) -> None: ...
     def move_support(
         self,
         support: typing.SupportsInt | typing.SupportsIndex,
-        position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"],
-        rotation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"],
+        position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] | None,
+        rotation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"] | None,
         over: typing.SupportsFloat | typing.SupportsIndex,
     ) -> None: ...
     def natural_curvature(
@@ -979,14 +980,14 @@ class World:
     def prescribe_obstacle(
         self,
         obstacle: typing.SupportsInt | typing.SupportsIndex,
-        position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"],
-        turn: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"],
+        position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] | None,
+        turn: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] | None,
     ) -> None: ...
     def prescribe_support(
         self,
         support: typing.SupportsInt | typing.SupportsIndex,
-        position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"],
-        rotation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"],
+        position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] | None,
+        rotation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"] | None,
     ) -> None: ...
     def reaction(self, support: typing.SupportsInt | typing.SupportsIndex) -> Reaction: ...
     def remove_load(self, load: typing.SupportsInt | typing.SupportsIndex) -> None: ...
@@ -1061,6 +1062,9 @@ class World:
     def support_rotation(
         self, support: typing.SupportsInt | typing.SupportsIndex
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 3]"]: ...
+    def support_turn(
+        self, support: typing.SupportsInt | typing.SupportsIndex
+    ) -> tuple[typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 3]"], float]: ...
     def take_step_warning(self) -> str: ...
     def take_warning(self) -> str: ...
     def tensions(
@@ -1078,6 +1082,62 @@ class World:
     def statistics(self) -> Statistics: ...
     @property
     def time(self) -> float: ...
+
+class Batch:
+    """
+    Worlds that are stepped and read in one call.
+    """
+    def __init__(
+        self, worlds: collections.abc.Sequence[typing.Any], workers: typing.SupportsInt | typing.SupportsIndex
+    ) -> None: ...
+    def failure(self, lane: typing.SupportsInt | typing.SupportsIndex) -> typing.Any:
+        """
+        Message and numbers, or None.
+        """
+    def forgive(self, lane: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    def read(
+        self, what: str, rod: typing.SupportsInt | typing.SupportsIndex, out: numpy.typing.NDArray[numpy.float64]
+    ) -> None:
+        """
+        Fill an array with a read-out of every lane.
+        """
+    def replace(self, lane: typing.SupportsInt | typing.SupportsIndex, world: typing.Any) -> None: ...
+    def restore(
+        self, lanes: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], snapshots: collections.abc.Sequence[bytes]
+    ) -> None: ...
+    def set_natural_curvature(
+        self,
+        lanes: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
+        rod: typing.SupportsInt | typing.SupportsIndex,
+        values: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+        over: typing.SupportsFloat | typing.SupportsIndex,
+    ) -> None: ...
+    def set_natural_stretch(
+        self,
+        lanes: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
+        rod: typing.SupportsInt | typing.SupportsIndex,
+        values: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+        over: typing.SupportsFloat | typing.SupportsIndex,
+    ) -> None: ...
+    def set_natural_twist(
+        self,
+        lanes: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
+        rod: typing.SupportsInt | typing.SupportsIndex,
+        values: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+        over: typing.SupportsFloat | typing.SupportsIndex,
+    ) -> None: ...
+    def step(
+        self,
+        lanes: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
+        count: typing.SupportsInt | typing.SupportsIndex,
+        functions: collections.abc.Mapping[typing.SupportsInt | typing.SupportsIndex, tuple[typing.Any, typing.Any]],
+    ) -> None:
+        """
+        Advance lanes by `count` time steps; functions of Python are called with the lock of the interpreter.
+        """
+    def take_warnings(self) -> tuple[str, str]: ...
+    @property
+    def workers(self) -> int: ...
 
 class SheetManifold:
     """
@@ -1230,6 +1290,16 @@ def sheets_at_poses(
 ) -> numpy.typing.NDArray[numpy.float64]:
     """
     Sheets held at poses, each followed from forces of its own, one row a sheet.
+    """
+
+def slides_to_rest(
+    forces: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    friction: typing.SupportsFloat | typing.SupportsIndex,
+    sheet_length: typing.SupportsFloat | typing.SupportsIndex,
+    width_growth: typing.SupportsFloat | typing.SupportsIndex,
+) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    How far sheets that are held still slide until friction holds them.
     """
 
 def smooth_curvatures(

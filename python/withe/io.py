@@ -18,9 +18,10 @@ import numpy.typing as npt
 
 from withe.common.frames import Frames, edges_to_nodes, stencils_to_nodes
 
-__all__ = ["load_arrays", "save_arrays", "write_vtk", "written_beside"]
+__all__ = ["load_arrays", "load_poses", "pose_path", "save_arrays", "save_poses", "write_vtk", "written_beside"]
 
 _HEADER = "header"
+_POSE_COLUMNS = ("t", "x", "y", "z", "qx", "qy", "qz", "qw")
 
 
 @contextmanager
@@ -159,6 +160,82 @@ def _read_header(path: Path, text: npt.NDArray[Any], kind: str, version: int) ->
     if header.get("version") != version:
         raise ValueError(f"{path} is a {kind} of version {header.get('version')!r}, this withe reads version {version}")
     return header
+
+
+def save_poses(path: str | os.PathLike[str], times: npt.NDArray[np.float64], poses: npt.NDArray[np.float64]) -> Path:
+    """Write poses and their times as a table for robots, at once or not at all.
+
+    Parameters
+    ----------
+    path : path
+        Where to; columns t, x, y, z, qx, qy, qz, qw with a header of these names, in the order of the fields of
+        geometry_msgs' Pose and of trajectory_msgs' MultiDOFJointTrajectory.
+    times : ndarray of shape (n,) [s]
+    poses : ndarray of shape (n, 7) [m], [-]
+        x, y, z and the quaternion x, y, z, w.
+
+    Returns
+    -------
+    pathlib.Path
+        The file.
+
+    Raises
+    ------
+    OSError
+        The file cannot be written.
+    """
+    path = Path(path)
+    with written_beside(path) as beside:
+        rows = np.column_stack([times, poses])
+        np.savetxt(beside, rows, delimiter=",", header=",".join(_POSE_COLUMNS), comments="", fmt="%.9g")
+    return path
+
+
+def load_poses(path: str | os.PathLike[str]) -> npt.NDArray[np.float64]:
+    """Read a table of poses as a path for a hand or a clamp: columns are found by their names, in whatever order.
+
+    Parameters
+    ----------
+    path : path
+        A table with a header that has t, x, y, z, qx, qy, qz, qw [s], [m], such as `save` of a plan writes.
+
+    Returns
+    -------
+    ndarray of shape (n, 8)
+        Rows t, x, y, z, qw, qx, qy, qz, as ``simulation.move(hand, path=...)`` takes them: the scalar first.
+
+    Raises
+    ------
+    ValueError
+        A column is missing, or what stands there are not numbers.
+    OSError
+        The file cannot be read.
+
+    Examples
+    --------
+    >>> from withe import folding, io
+    >>> plan = folding.plan(folding.Paper.a4())
+    >>> io.load_poses(plan.save("fold.csv")).shape  # doctest: +SKIP
+    (251, 8)
+    """
+    with open(path, encoding="utf-8") as stream:
+        names = [name.strip() for name in stream.readline().split(",")]
+        missing = [name for name in _POSE_COLUMNS if name not in names]
+        if missing:
+            raise ValueError(f"{path} must have the columns {', '.join(_POSE_COLUMNS)}, got none named {missing[0]!r}")
+        lines = [line for line in stream if line.strip()]
+        if not lines:
+            raise ValueError(f"{path} must have poses below its header, got none")
+        try:
+            rows = np.loadtxt(lines, delimiter=",", ndmin=2, usecols=[names.index(name) for name in _POSE_COLUMNS])
+        except ValueError as error:
+            raise ValueError(f"{path} must hold numbers: {error}") from None
+    return pose_path(rows[:, 0], rows[:, 1:])
+
+
+def pose_path(times: npt.NDArray[np.float64], poses: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Rows t, x, y, z, qw, qx, qy, qz of shape (n, 8), as hands take them, from poses with the scalar last."""
+    return np.column_stack([times, poses[:, :3], poses[:, 6], poses[:, 3:6]])
 
 
 def write_vtk(record: Frames, folder: str | os.PathLike[str]) -> Path:

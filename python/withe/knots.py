@@ -1,4 +1,4 @@
-"""Centrelines of knots, and what tells one from another: writhe and crossings."""
+"""Centrelines of knots, and what tells one from another: crossings, Alexander polynomial, signature, writhe."""
 
 from __future__ import annotations
 
@@ -7,10 +7,19 @@ from typing import Literal, get_args
 import numpy as np
 import numpy.typing as npt
 
-from withe.common import validation
+from withe.common import diagrams, validation
 from withe.common.drawing import natural_shape
 
-__all__ = ["granny_knot", "link", "overhand_knot", "reef_knot", "signed_crossings", "writhe"]
+__all__ = [
+    "alexander_polynomial",
+    "granny_knot",
+    "link",
+    "overhand_knot",
+    "reef_knot",
+    "signature",
+    "signed_crossings",
+    "writhe",
+]
 
 FloatArray = npt.NDArray[np.float64]
 Tails = Literal["up", "sideways"]
@@ -323,3 +332,67 @@ def signed_crossings(points: npt.ArrayLike, direction: npt.ArrayLike = (0.0, 0.0
             below = height[j[k]] + t[k] * (height[j[k] + 1] - height[j[k]])
             count += int(np.sign(area[k]) * np.sign(above - below))
     return count
+
+
+def alexander_polynomial(points: npt.ArrayLike, closed: bool = False) -> npt.NDArray[np.int64]:
+    """Alexander polynomial of a knot: 1 of what is no knot, 1 - t + t^2 of a trefoil.
+
+    Parameters
+    ----------
+    points : array_like of shape (nodes, 3)
+    closed : bool
+        Whether the last point is joined to the first. The ends of an open curve are joined outside, straight away
+        from its middle.
+
+    Returns
+    -------
+    ndarray of int
+        Coefficients from the lowest power of t, the first of which is not zero; they sum to 1.
+
+    Raises
+    ------
+    ValueError
+        Wrong shape, not finite, or far more crossings than knots have that are tied by hand.
+
+    Examples
+    --------
+    >>> import withe
+    >>> withe.knots.alexander_polynomial(withe.knots.overhand_knot())
+    array([ 1, -1,  1])
+    """
+    return diagrams.alexander(_diagram(points, closed))
+
+
+def signature(points: npt.ArrayLike, closed: bool = False) -> int:
+    """Signature of a knot, which changes sign in a mirror: it tells a granny knot, 4 or -4, from a reef knot, 0.
+
+    Parameters
+    ----------
+    points : array_like of shape (nodes, 3)
+    closed : bool
+        See `alexander_polynomial`.
+
+    Returns
+    -------
+    int
+        -2 of the right-handed trefoil.
+
+    Raises
+    ------
+    ValueError
+        Wrong shape or not finite.
+
+    Examples
+    --------
+    >>> import withe
+    >>> withe.knots.signature(withe.knots.reef_knot())
+    0
+    """
+    return diagrams.signature(_diagram(points, closed))
+
+
+def _diagram(points: npt.ArrayLike, closed: bool) -> diagrams.Diagram:
+    curve = validation.number_array(points, "points", ("n", 3))
+    if len(curve) < 4:
+        raise ValueError(f"points must be at least 4, got {len(curve)}")
+    return diagrams.diagram(curve if closed else diagrams.closed_far_away(curve))

@@ -38,6 +38,8 @@ def run(name, folder, *arguments):
         "contact_robustness",
         "real2sim",
         "deployment",
+        "deployment_tables",
+        "folding",
         "folding_trials",
     ],
 )

@@ -12,6 +12,7 @@ from withe.__main__ import main
 from withe.deployment import Cable, Pattern, plan
 
 CABLE = Cable.dlo(2)
+JAW = 0.01  # [m] that are held
 
 
 def wave(height=0.03, count=300):
@@ -34,7 +35,7 @@ def during(motion, name):
 
 
 def test_each_pose_of_laying_is_the_grasp_of_its_place(motion):
-    # Algorithm 12, written anew with matrices: q = qC + R_t q*, R = R_t exp(e).
+    # Algorithm 12, written anew with matrices: q = qC + R_t q*, R = R_t exp(e), and half a jaw further.
     pattern, lgb = motion.pattern, CABLE.gravito_bending_length
     rows = np.flatnonzero(during(motion, "lay") & (motion.laid > 0.01) & (motion.laid < pattern.length - 0.01))[::40]
     for row in rows:
@@ -44,12 +45,14 @@ def test_each_pose_of_laying_is_the_grasp_of_its_place(motion):
             for x in (pattern.points, pattern.tangent)
         )
         curvature = np.interp(s, pattern.arc_length, pattern.curvature)
-        found = withe.deployment.grasp((motion.cable.length - s) / lgb, -curvature * lgb, CABLE.stretch_stiffness)
+        found = withe.deployment.grasp(
+            (motion.cable.length - 0.5 * JAW - s) / lgb, -curvature * lgb, CABLE.stretch_stiffness
+        )
         x = np.append(tangent, 0.0) / np.linalg.norm(tangent)
         frame = np.stack([x, np.cross([0, 0, 1], x), [0, 0, 1]], 1)
-        position = np.append(point, CABLE.radius) + lgb * frame @ found.position
-        np.testing.assert_allclose(motion.positions[row], position, atol=2e-5)
         rotation = frame @ Rotation.from_rotvec(found.rotation).as_matrix()
+        position = np.append(point, CABLE.radius) + lgb * frame @ found.position + 0.5 * JAW * rotation[:, 0]
+        np.testing.assert_allclose(motion.positions[row], position, atol=2e-5)
         np.testing.assert_allclose(Rotation.from_quat(motion.rotations[row]).as_matrix(), rotation, atol=2e-3)
 
 
@@ -155,3 +158,14 @@ def test_a_pattern_that_crosses_itself_is_laid_over_itself_on_request():
     pattern = Pattern(loop())
     assert pattern.crossings.shape == (1, 2)
     assert plan(CABLE, pattern, "intuitive", crossings="over").laid[-1] == pytest.approx(pattern.length)
+
+
+def test_a_tail_that_would_cross_the_pattern_is_shortened_or_refused():
+    s = np.linspace(0.0, 1.0, 300)
+    angle = 2 * np.pi * 0.9 * np.clip(s - 0.35, 0.0, None) / 0.65  # a straight piece, and nearly a circle towards it
+    way = 0.6 * np.stack([np.cos(angle), np.sin(angle)], 1) / 300
+    pattern = Pattern(np.concatenate([[[0.0, 0.0]], np.cumsum(way, axis=0)]))
+    with pytest.raises(ValueError, match="the tail must not cross the pattern"):
+        plan(CABLE, pattern, "intuitive", tail=0.17)
+    assert plan(CABLE, pattern, "intuitive").tail < 0.12
+    assert plan(CABLE, pattern, "intuitive", tail=0.17, crossings="over").tail == 0.17

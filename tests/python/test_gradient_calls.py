@@ -292,7 +292,7 @@ def test_gradient_by_where_supports_were_moved_is_that_of_differences(integrator
     acts = {
         1: [lambda s, d, g: s.move(d.wall, position=g["first"], rotation=turned(g["first turn"]), over=5.3e-3)],
         3: [lambda s, d, g: s.move(d.wall, rotation=turned(g["second turn"]), over=6e-3)],  # while it is on its way
-        5: [lambda s, d, g: s.move(d.wall, position=g["second"], over=1.0)],
+        5: [lambda s, d, g: s.move(d.wall, position=g["second"], over=1.0)],  # while it still turns
         8: [lambda s, d, g: s.move(d.wall, position=g["third"], rotation=turned(g["third turn"]))],  # in a time step
     }
     run = Run(

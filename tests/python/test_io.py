@@ -11,9 +11,10 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
+import withe
 from curling_motion import CurlingSimulation, Handle
 from simple_scenes import cantilever
-from withe.io import load_arrays, save_arrays
+from withe.io import load_arrays, load_poses, save_arrays, save_poses
 from withe.recording import EnergyHistory, Record
 from withe.recording.recorder import Recorder
 
@@ -299,3 +300,54 @@ def test_a_file_name_may_be_as_long_as_the_system_allows(record, tmp_path):
     path = record.save(tmp_path / ("n" * 251 + ".npz"))
     np.testing.assert_array_equal(Record.load(path).times, record.times)
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_poses_come_back_by_their_names_with_the_scalar_first(tmp_path):
+    random = np.random.default_rng(4)
+    times, poses = np.arange(5.0), random.normal(size=(5, 7))
+    rows = load_poses(save_poses(tmp_path / "poses.csv", times, poses))
+    np.testing.assert_allclose(rows, np.column_stack([times, poses[:, :3], poses[:, 6], poses[:, 3:6]]), rtol=1e-8)
+    header, *lines = (tmp_path / "poses.csv").read_text().splitlines()
+    assert header == "t,x,y,z,qx,qy,qz,qw"
+    order = random.permutation(9)  # another tool's columns, and one more
+
+    def shuffled(line, extra):
+        cells = [*line.split(","), extra]
+        return ",".join(cells[i] for i in order)
+
+    other = tmp_path / "other.csv"
+    other.write_text("\n".join([shuffled(header, "grip"), *(shuffled(line, "7") for line in lines)]))
+    np.testing.assert_array_equal(load_poses(other), rows)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("t,x,y,z,qw,qx,qy\n0,0,0,0,1,0,0\n", "none named 'qz'"),
+        ("", "none named 't'"),
+        ("t,x,y,z,qx,qy,qz,qw\n", "got none"),
+        ("t,x,y,z,qx,qy,qz,qw\n0,0,0,0,0,zero,0,1\n", "must hold numbers"),
+    ],
+)
+def test_tables_without_poses_say_what_they_lack(tmp_path, text, message):
+    (tmp_path / "poses.csv").write_text(text)
+    with pytest.raises(ValueError, match=message):
+        load_poses(tmp_path / "poses.csv")
+
+
+def test_a_hand_goes_where_a_table_of_poses_says(tmp_path):
+    rubber = withe.Material(youngs_modulus=1e6, density=1000.0)
+    scene = withe.Scene()
+    rod = scene.add_rod(start=(0, 0, 0), end=(0.3, 0, 0), nodes=16, radius=0.002, material=rubber)
+    angles = np.linspace(0.0, 1.0, 11)
+    zero = np.zeros(11)
+    poses = np.column_stack([0.01 * angles, zero, 0.02 * angles, zero, np.sin(angles / 2), zero, np.cos(angles / 2)])
+    rows = load_poses(save_poses(tmp_path / "lift.csv", np.linspace(0.0, 1.0, 11), poses))
+    hand = scene.grasp(rod, at=0.005, length=0.01, pose=rows[0, 1:])
+    simulation = scene.build(integrator="backward_euler", time_step=0.05)
+    simulation.move(hand, path=rows)
+    simulation.run(1.0, progress=False)
+    position, rotation = simulation.pose(hand)
+    np.testing.assert_allclose(position, poses[-1, :3], atol=1e-12)
+    turned = [[np.cos(1), 0, np.sin(1)], [0, 1, 0], [-np.sin(1), 0, np.cos(1)]]
+    np.testing.assert_allclose(rotation, turned, atol=1e-8)

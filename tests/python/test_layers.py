@@ -31,6 +31,8 @@ LATE = {
     "cv2",
     "dask",
     "elastica",
+    "gymnasium",
+    "stable_baselines3",
 }
 
 
@@ -193,7 +195,12 @@ def test_python_rooms_see_only_rooms_above_them_and_import_extras_late():
 
 
 @pytest.mark.parametrize(
-    ("public", "shared"), [(withe.Scene, {"_directory", "_bearer"}), (withe.Simulation, {"_session", "_bearer"})]
+    ("public", "shared"),
+    [
+        (withe.Scene, {"_directory", "_bearer"}),
+        (withe.Simulation, {"_session", "_bearer"}),
+        (withe.Batch, {"_lanes"}),
+    ],
 )
 def test_what_a_public_class_is_made_of_shares_one_object(public, shared):
     for cls in public.__bases__:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 def test_reset_copies_pickles_snapshots_and_files_go_on_to_the_bit():
     script = Path(__file__).with_name("random_sequences.py")
-    result = subprocess.run([sys.executable, script, "15", "2"], capture_output=True, text=True, timeout=600)
+    result = subprocess.run([sys.executable, script, "15", "2"], capture_output=True, text=True, timeout=3600)
     assert result.returncode == 0, f"exit status {result.returncode}\n{result.stdout[-3000:]}\n{result.stderr[-3000:]}"
     counted = {what: int(n) for n, what in re.findall(r"(\d+) ([a-zA-Z_ ]+)", result.stdout.rpartition("failed:")[2])}
     assert counted["sequences that agree"] >= 14

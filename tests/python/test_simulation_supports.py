@@ -68,6 +68,110 @@ def test_a_support_moves_and_turns_to_where_it_is_told(hold, planar):
     assert simulation.positions(arm)[-1] == pytest.approx((-0.1, 0, 0.2), abs=1e-2)
 
 
+WAYS = {  # where a clamp was told to go in pairs of calls, the second at .3 s, and where it is at .5 s and in the end
+    "position, rotation": [
+        {"position": (0.1, 0, 0.2), "over": 1.0},
+        {"rotation": Rotation.from_euler("y", -80, True), "over": 0.4},
+    ],
+    "rotation, position": [
+        {"rotation": Rotation.from_euler("y", -80, True), "over": 1.0},
+        {"position": (0.1, 0, 0.2), "over": 0.4},
+    ],
+    "position, tangent": [{"position": (0.1, 0, 0.2), "over": 1.0}, {"tangent": (0.5, 0, 1), "over": 0.4}],
+    "tangent, position": [{"tangent": (0.5, 0, 1), "over": 1.0}, {"position": (0.1, 0, 0.2), "over": 0.4}],
+    "path, rotation": [
+        {"path": lambda t: (t, 0, 2 * t)},
+        {"rotation": Rotation.from_euler("y", -80, True), "over": 0.4},
+    ],
+    "rotation, path": [
+        {"rotation": Rotation.from_euler("y", -80, True), "over": 1.0},
+        {"path": lambda t: (t - 0.3, 0, 2 * t - 0.6)},
+    ],
+    "tangent, path": [{"tangent": (0.5, 0, 1), "over": 1.0}, {"path": [(0.3, 0, 0, 0), (2, 1.7, 0, 3.4)]}],
+}
+
+
+@pytest.mark.parametrize("part", ["frame", "edge", "hand"])
+@pytest.mark.parametrize("planar", [True, False])
+@pytest.mark.parametrize("pair", WAYS)
+def test_a_position_and_a_rotation_go_on_when_the_other_is_given(pair, planar, part):
+    first, second = WAYS[pair]
+
+    def moved(*calls):
+        """Where the support is at .5 s and at 2 s, of calls (time, arguments)."""
+        scene = withe.Scene(gravity=(0, 0, -1e-3))
+        arm = scene.add_rod(start=(0, 0, 0), end=(0.2, 0, 0), nodes=9, radius=5e-3, material=RUBBER)
+        if part != "hand":
+            scene.clamp(arm.start, hold=part, name="grip")
+        simulation = scene.build(integrator="backward_euler", time_step=0.05, planar=planar)
+        if part == "hand":
+            simulation.grasp(arm, 0.1, 0.03, pose=((0, 0, 0), np.eye(3)), name="grip")
+        found = []
+        for when in (0.3, 0.5, 2.0):
+            for call in [call for time, call in calls if time < when - 0.01]:
+                simulation.move("grip", **call)
+            calls = [(time, call) for time, call in calls if time >= when - 0.01]
+            simulation.step(round((when - simulation.time) / 0.05))
+            found.append(simulation.pose("grip"))
+        return found[1:]
+
+    both = moved((0.0, first), (0.3, second))
+    alone = dict(zip(pair.split(", "), (moved((0.0, first)), moved((0.3, second))), strict=True))
+    place = alone.get("position", alone.get("path"))
+    turn = alone.get("rotation", alone.get("tangent"))
+    for pose, of_place, of_turn in zip(both, place, turn, strict=True):
+        np.testing.assert_allclose(pose.position, of_place.position, atol=1e-12)
+        np.testing.assert_allclose(pose.rotation, of_turn.rotation, atol=1e-12)
+    assert np.linalg.norm(place[0].position - place[1].position) > 0.05
+    assert np.linalg.norm(turn[1].rotation - np.eye(3)) > 0.5
+
+
+def test_a_tangent_and_a_roll_go_on_when_the_other_is_given(tmp_path):
+    _, arm, simulation = cantilever(planar=False, time_step=0.02, integrator="backward_euler")
+    simulation.move("wall", tangent=(1, 0, 1), over=1.0)
+    simulation.step(10)
+    simulation.move("wall", roll=2.5 * np.pi, over=0.4)
+    state = simulation.snapshot()
+    state.save(tmp_path / "state.npz")
+    simulation.step(50)
+    end = simulation.pose("wall").rotation
+    tangent = np.array([1, 0, 1]) / np.sqrt(2)
+    np.testing.assert_allclose(end @ (1, 0, 0), tangent, atol=1e-12)
+    _, other, straight = cantilever(planar=False, time_step=0.02, integrator="backward_euler")
+    straight.move(other.start, tangent=tangent, roll=0.5 * np.pi)
+    straight.step(1)
+    np.testing.assert_allclose(end, straight.pose(other.start).rotation, atol=1e-12)
+    simulation.restore(withe.Snapshot.load(tmp_path / "state.npz"))
+    simulation.step(50)
+    np.testing.assert_array_equal(simulation.pose(arm.start).rotation, end)
+    # A rotation that is on its way, too.
+    simulation.move("wall", rotation=np.eye(3), over=1.0)
+    simulation.step(10)
+    simulation.move("wall", roll=0.25, over=0.1)
+    simulation.step(50)
+    np.testing.assert_allclose(
+        simulation.pose("wall").rotation, Rotation.from_rotvec((0.25, 0, 0)).as_matrix(), atol=1e-12
+    )
+
+
+@pytest.mark.parametrize("first", ["position", "roll"])
+def test_an_obstacle_goes_on_when_it_is_told_to_turn(first):
+    given = {"position": {"position": (0, 0, -0.3), "over": 0.1}, "roll": {"roll": 0.4, "over": 0.1}}
+    second = "roll" if first == "position" else "position"
+    scene = withe.Scene()
+    scene.add_rod(start=(0, 0, 0), end=(0.2, 0, 0), nodes=5, radius=5e-3, material=RUBBER)
+    roller = scene.add_capsule((0, -0.1, -0.5), (0, 0.1, -0.5), 0.02)
+    simulation = scene.build(time_step=1e-2)
+    start = simulation.get(roller, "position")
+    simulation.move(roller, **given[first])
+    simulation.step(5)
+    simulation.move(roller, **given[second])
+    simulation.step(20)
+    np.testing.assert_allclose(simulation.get(roller, "position"), (0, 0, -0.3), atol=1e-14)
+    np.testing.assert_allclose(simulation.get(roller, "turn"), (0, 0.4, 0), atol=1e-14)
+    assert np.linalg.norm(start - (0, 0, -0.3)) > 0.2
+
+
 @pytest.mark.parametrize("hold", ["frame", "edge"])
 @pytest.mark.parametrize("planar", [True, False])
 def test_a_stretched_and_turned_end_is_gripped_as_it_is(hold, planar):

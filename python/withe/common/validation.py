@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 __all__ = [
+    "broadcast_arrays",
     "choice",
     "function",
     "has_masked",
@@ -158,6 +159,18 @@ def number_array(value: Any, what: str, *shapes: tuple[int | str, ...]) -> Float
     if result.size and np.abs(result).max() > _LARGEST:
         raise ValueError(f"{what} must be less than {_LARGEST:g} in size, got {np.abs(result).max():g}")
     return result
+
+
+def broadcast_arrays(**values: Any) -> tuple[FloatArray, ...]:
+    """Arrays of real, finite numbers of whatever shape, broadcast together; names are those of the arguments."""
+    arrays = [
+        number_array(value, name, tuple(f"n{i}" for i in range(np.ndim(value)))) for name, value in values.items()
+    ]
+    try:
+        return tuple(np.broadcast_arrays(*arrays))
+    except ValueError:
+        shapes = " and ".join(str(array.shape) for array in arrays)
+        raise ValueError(f"{' and '.join(values)} must have shapes that broadcast, got {shapes}") from None
 
 
 def has_masked(value: Any) -> bool:

@@ -10,11 +10,12 @@ length, unless they belong to a particular cable: then in m and N.
 """
 
 from withe.deployment.cable import Cable, MeasuredCable, measure
-from withe.deployment.deploying import Deployment, deploy
+from withe.deployment.deploying import Deployment, deploy, place
 from withe.deployment.feasibility import Feasibility, Slip
 from withe.deployment.grasping import Grasp, grasp
+from withe.deployment.motion import Phase
 from withe.deployment.pattern import Pattern
-from withe.deployment.planning import Phase, Plan, plan
+from withe.deployment.planning import Plan, plan
 from withe.deployment.straight import StraightLine, StraightPose
 
 __all__ = [
@@ -32,5 +33,6 @@ __all__ = [
     "deploy",
     "grasp",
     "measure",
+    "place",
     "plan",
 ]

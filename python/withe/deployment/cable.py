@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 from withe.common import validation
 
-__all__ = ["Cable", "MeasuredCable", "measure"]
+__all__ = ["JAW", "Cable", "MeasuredCable", "measure"]
 
+JAW = 0.010  # [m] of a cable that a jaw holds
 LOOP_HEIGHT = 1.142240  # of a loop that hangs on a floor, touching it tangentially [Lgb]: .90660 (EI / w)^(1/3)
 _TABLE = {  # Lgb, radius, length [m] [Choi, dissertation, table 9.1]
     1: (0.018, 1.6e-3, 0.875),

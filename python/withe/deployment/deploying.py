@@ -9,16 +9,19 @@ import numpy.typing as npt
 
 from withe.common import validation
 from withe.deployment.cable import Cable
+from withe.deployment.motion import lengthened
 from withe.deployment.pattern import distances
 from withe.deployment.planning import Plan
 from withe.deployment.world import Setup, lay
+from withe.deployment.world import place as place_in_world
 from withe.recording import Record
 
-__all__ = ["Deployment", "deploy"]
+__all__ = ["Deployment", "deploy", "place"]
 
 FloatArray = npt.NDArray[np.float64]
 # Standard deviations of what a trial has and a planner does not know, at noise 1.
 _LGB, _FRICTION = 0.05, 0.20  # shares
+_LYING = 1.1  # [radii]: how high the centreline of what lies may be
 _CURVATURE, _OFFSET, _TURN = 0.5, 5e-4, np.radians(0.5)  # [1/m], [m], [rad]
 
 
@@ -36,7 +39,8 @@ class Deployment:
     nearest_error, nearest_std : float [m]
         The same of the distance from the nearest point of what the user gave.
     slipped : ndarray of shape (nodes,) [m]
-        How far each point of the pattern moved along the floor after it was laid; zero beyond the pattern.
+        How far each point of the pattern moved along the floor once it lay there; zero beyond the pattern, and where
+        the cable lies over itself.
     released : float [m]
         How far the pattern moved at most when the jaw let go.
     record : Record
@@ -61,14 +65,16 @@ def deploy(
     seed: int = 0,
     noise: float = 0.0,
     nodes: int = 200,
-    time_step: float = 0.01,
+    time_step: float | None = None,
+    quasi_static: bool = False,
     progress: bool = True,
 ) -> Deployment:
     """Carry out a plan in the rod engine: the whole cable in space, from hanging to laid, on a floor with friction.
 
     Nothing of the plan but the jaw's motion is known there: the cable has thickness, weight, torsion and inertia,
     touches the floor where it comes to, and sticks to it by anchored friction at its surface, on which it may roll.
-    Backward Euler steps; density 1180 kg/m^3, Kelvin-Voigt viscosity of .02 s. The jaw holds a point and a direction.
+    Backward Euler steps; density 1180 kg/m^3, Kelvin-Voigt viscosity of .02 s. The jaw holds 10 mm of the cable; its
+    pads yield by .5 mm/N and 20 rad/(N m), so that a jaw too low rests on the floor.
 
     Parameters
     ----------
@@ -85,6 +91,10 @@ def deploy(
     nodes : int
         Of the rod, 20 to 2000.
     time_step : float [s]
+        By default .01, or .1 where the motion is quasi-static.
+    quasi_static : bool
+        Whether the cable passes through equilibria, as if everything went infinitely slowly: some four times as fast
+        to compute, and free of swing.
     progress : bool
         Whether a bar is shown.
 
@@ -123,18 +133,86 @@ def deploy(
         ),
         friction=friction * float(np.exp(_FRICTION * drawn[1])),
         nodes=nodes,
-        time_step=validation.positive(time_step, "time_step"),
+        time_step=_time_step(time_step, quasi_static),
         natural_curvature=(_CURVATURE * drawn[2], _CURVATURE * drawn[3]),
         jaw_offset=(_OFFSET * drawn[4], _OFFSET * drawn[5], _OFFSET * drawn[6]),
         jaw_turn=(_TURN * drawn[7], _TURN * drawn[8], _TURN * drawn[9]),
+        quasi_static=quasi_static,
+        start_held=plan.start == "held",
     )
     held, laid, record = lay(setup, plan, progress=progress)
-    return _compared(plan, held, laid, record)
+    return _compared(plan, setup.arc_length, held, laid, record)
 
 
-def _compared(plan: Plan, held: FloatArray, laid: FloatArray, record: Record) -> Deployment:
+def place(
+    plan: Plan,
+    *,
+    floor: float,
+    nodes: int = 200,
+    time_step: float | None = None,
+    quasi_static: bool = True,
+    progress: bool = True,
+) -> Deployment:
+    """Put the cable of a plan on its pattern as if by hand, and see what the floor holds of it.
+
+    It begins as a rod without stress that lies on the pattern and its tail; its natural curvature then goes to zero
+    within a second. Ends are free. What friction cannot hold moves here too. Where a pattern touches itself, the cable
+    passes through itself.
+
+    Parameters
+    ----------
+    plan : Plan
+        Of which cable, pattern and tail are used.
+    floor, nodes, time_step, quasi_static, progress
+        See `deploy`.
+
+    Returns
+    -------
+    Deployment
+        `released` is zero, `slipped` what moved.
+
+    Raises
+    ------
+    ValueError
+        Negative friction, wrong numbers of nodes.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import withe
+    >>> angle = np.linspace(0.0, 1.2, 100)
+    >>> arc = withe.deployment.Pattern(0.2 * np.stack([np.sin(angle), 1 - np.cos(angle)], 1))
+    >>> motion = withe.deployment.plan(withe.deployment.Cable.dlo(2), arc)
+    >>> found = withe.deployment.place(motion, floor=0.4, nodes=60, progress=False)
+    >>> print(found.error < 2e-4)
+    True
+    """
+    setup = Setup(
+        cable=plan.cable,
+        friction=validation.non_negative(floor, "floor"),
+        nodes=validation.integer(nodes, "nodes", 20, 2000),
+        time_step=_time_step(time_step, quasi_static),
+        quasi_static=quasi_static,
+    )
+    path = lengthened(plan.pattern, plan.cable, plan.tail)
+    s = setup.arc_length
+    end = np.array([np.cos(path.heading[-1]), np.sin(path.heading[-1])])
+    points = np.stack([np.interp(s, path.arc_length, path.points[:, i]) for i in range(2)], 1)
+    points += np.maximum(s - path.length, 0.0)[:, None] * end
+    laid, record = place_in_world(setup, points, progress=progress)
+    found = _compared(plan, s, laid, laid, record)
+    moved = np.where(s <= plan.pattern.length, np.linalg.norm(laid[:, :2] - points, axis=1), 0.0)
+    return replace(found, slipped=moved)
+
+
+def _time_step(given: float | None, quasi_static: bool) -> float:
+    if given is None:
+        return 0.1 if quasi_static else 0.01
+    return validation.positive(given, "time_step")
+
+
+def _compared(plan: Plan, s: FloatArray, held: FloatArray, laid: FloatArray, record: Record) -> Deployment:
     pattern = plan.pattern
-    s = np.linspace(0.0, plan.cable.length, len(laid))
     on = s <= pattern.length
     places = np.stack([np.interp(s[on], pattern.arc_length, pattern.points[:, i]) for i in range(2)], 1)
     away = np.linalg.norm(laid[on, :2] - places, axis=1)
@@ -154,9 +232,12 @@ def _compared(plan: Plan, held: FloatArray, laid: FloatArray, record: Record) ->
 
 
 def _slipped(plan: Plan, record: Record, laid: FloatArray, s: FloatArray) -> FloatArray:
-    """From where each point is in the first frame after it is the lift-off point."""
+    """From where each point is in the first frame from which on it lies on the floor, and behind the lift-off point."""
     frames = record.positions("cable")
     lift_off = np.interp(record.times, plan.times, plan.laid)
-    first = np.minimum(np.searchsorted(lift_off, s, side="right"), len(frames) - 1)
+    above = frames[..., 2] > _LYING * plan.cable.radius
+    lies = len(frames) - above[::-1].argmax(0)
+    lies[~above.any(0)] = 0
+    first = np.minimum(np.maximum(np.searchsorted(lift_off, s, side="right"), lies), len(frames) - 1)
     there = frames[first, np.arange(len(s)), :2]
     return np.asarray(np.linalg.norm(laid[:, :2] - there, axis=1))

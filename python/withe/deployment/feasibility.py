@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
-from withe.deployment.cable import Cable
+from withe.deployment.cable import JAW, Cable
 from withe.deployment.grasping import Grasp, grasp, least_friction, table
 from withe.deployment.smoothing import least_tension
 
@@ -143,7 +143,9 @@ def examine(
 
 
 def grasps_along(pattern: Laid, cable: Cable, controller: str) -> Grasp:
-    """Grasps while each place of a pattern is the lift-off point [units of the cable].
+    """Grasps while each place of a pattern is the lift-off point [units of the cable], at the near side of a jaw.
+
+    The middle of the jaw is at the cable's length from its free end.
 
     Raises
     ------
@@ -166,7 +168,7 @@ def grasps_along(pattern: Laid, cable: Cable, controller: str) -> Grasp:
             f"the pattern bends to a radius of {1e3 / tightest:.2g} mm at {at:.0f} mm; this cable is laid down to"
             f" {1e3 * lgb / limit:.2g} mm, its gravito-bending length over {limit:g}"
         )
-    suspended = np.maximum((cable.length - pattern.arc_length) / lgb, table().shortest)
+    suspended = np.maximum((cable.length - 0.5 * JAW - pattern.arc_length) / lgb, table().shortest)
     curvature = -lgb * pattern.curvature  # grasps bend to the right
     if controller == "least_friction":
         return least_friction(suspended, curvature, cable.stretch_stiffness)

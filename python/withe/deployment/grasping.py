@@ -108,17 +108,9 @@ def grasp(
     [[ 2.566  0.     5.488]
      [ 2.307 -1.699  5.334]] [0.    0.302]
     """
-    names = ("suspended", "curvature", "stretch_stiffness", "axial_force")
-    given = (suspended, curvature, stretch_stiffness, axial_force)
-    arrays = [
-        validation.number_array(value, name, tuple(f"n{i}" for i in range(np.ndim(value))))
-        for name, value in zip(names, given, strict=True)
-    ]
-    try:
-        length, bend, stretch, axial = np.broadcast_arrays(*arrays)
-    except ValueError:
-        shapes = ", ".join(str(array.shape) for array in arrays)
-        raise ValueError(f"{', '.join(names)} must have shapes that broadcast, got {shapes}") from None
+    length, bend, stretch, axial = validation.broadcast_arrays(
+        suspended=suspended, curvature=curvature, stretch_stiffness=stretch_stiffness, axial_force=axial_force
+    )
     solver = table()
     _require_within(length, "suspended", solver.shortest, solver.longest, "Lgb")
     _require_within(np.abs(bend), "the size of curvature", 0.0, solver.greatest_curvature, "/ Lgb")

@@ -142,19 +142,7 @@ class Pattern:
     @cached_property
     def crossings(self) -> FloatArray:
         """Pairs of arc lengths at which the pattern crosses itself, shape (crossings, 2) [m]."""
-        a, b = self.points[:-1], self.points[1:]
-        way = b - a
-        apart = a[None] - a[:, None]
-        turn = way[:, None, 0] * way[None, :, 1] - way[:, None, 1] * way[None, :, 0]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            along = (apart[..., 0] * way[None, :, 1] - apart[..., 1] * way[None, :, 0]) / turn
-            other = (apart[..., 0] * way[:, None, 1] - apart[..., 1] * way[:, None, 0]) / turn
-        first, second = np.nonzero((along >= 0) & (along < 1) & (other >= 0) & (other < 1))
-        later = second > first + 1
-        first, second = first[later], second[later]
-        spacing = self.arc_length[1]
-        places = np.stack([first + along[first, second], second + other[first, second]], 1)
-        return np.asarray(spacing * places)
+        return crossings(self.points, self.arc_length[1])
 
     def feasibility(self, cable: Cable, friction: float, controller: Controller = "exact") -> Feasibility:
         """Say where friction holds the cable on the pattern while it is laid, and where not.
@@ -190,6 +178,22 @@ class Pattern:
     def __repr__(self) -> str:
         away = f"{1e3 * self.deviation:.1f} mm from what was given"
         return f"Pattern({self.length:.3f} m, {len(self.points)} points, {away})"
+
+
+def crossings(points: FloatArray, spacing: float) -> FloatArray:
+    """Pairs of arc lengths at which a polyline of even spacing [m] crosses itself, shape (crossings, 2) [m]."""
+    a, b = points[:-1], points[1:]
+    way = b - a
+    apart = a[None] - a[:, None]
+    turn = way[:, None, 0] * way[None, :, 1] - way[:, None, 1] * way[None, :, 0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        along = (apart[..., 0] * way[None, :, 1] - apart[..., 1] * way[None, :, 0]) / turn
+        other = (apart[..., 0] * way[:, None, 1] - apart[..., 1] * way[:, None, 0]) / turn
+    first, second = np.nonzero((along >= 0) & (along < 1) & (other >= 0) & (other < 1))
+    later = second > first + 1
+    first, second = first[later], second[later]
+    places = np.stack([first + along[first, second], second + other[first, second]], 1)
+    return np.asarray(spacing * places)
 
 
 def distances(points: FloatArray, curve: FloatArray) -> FloatArray:

@@ -5,41 +5,32 @@ from __future__ import annotations
 import json
 import os
 from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import Any, Literal
+from pathlib import Path as FilePath
+from typing import Any, Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
-from withe.deployment.cable import Cable
+from withe.common.progress import progress as bar
+from withe.deployment.cable import JAW, Cable
 from withe.deployment.drawing import draw_plan
 from withe.deployment.feasibility import Controller, Feasibility, examine, grasps_along
-from withe.deployment.grasping import Grasp, pivoting
+from withe.deployment.grasping import Grasp
+from withe.deployment.motion import Course, Path, Phase, Start, course, lengthened, upright_way, way_along
+from withe.deployment.optimising import optimised, runs
 from withe.deployment.pattern import Pattern
+from withe.deployment.pattern import crossings as crossings_of
+from withe.io import pose_path, save_poses, written_beside
 
-__all__ = ["Phase", "Plan", "PlanController", "plan"]
+__all__ = ["Plan", "PlanController", "plan"]
 
 FloatArray = npt.NDArray[np.float64]
-PlanController = Literal["exact", "least_friction", "intuitive"]
-_GRAVITY = 9.81
+PlanController = Literal["exact", "least_friction", "optimised", "intuitive"]
+_TAIL_SHARES = (1.0, 0.5, 0.5, 0.5)  # of the one before, where a tail crosses
 _TAIL = 4.0  # [Lgb] of cable beyond the pattern, where there is so much: shorter ends need much friction
-_LAST_HELD = 0.5  # [Lgb] that still hang when the jaw lets go
-_JAW = 0.010  # [m], its width
-_CLEARANCE = 0.02  # [m] of the free end above the floor at the beginning
+_OPTIMISING_SPEED, _OPTIMISING_STEP = 0.025, 0.04  # [m/s], [s]: of quasi-static runs, where only the way counts
 _MOST_FRICTION = 3.0  # no floor has more
-_FASTEST_SHARE = 0.01  # of the acceleration of gravity: swing then moves the cable by less than a millimetre
-_PIVOT_ANGLES = 61
-_UPRIGHT = 0.5 * np.pi - 1e-3
-
-
-@dataclass(frozen=True)
-class Phase:
-    """A part of a motion: "hang", "touch down" or "lay", and when it begins and ends [s]."""
-
-    name: str
-    start: float
-    end: float
 
 
 @dataclass(frozen=True)
@@ -50,7 +41,7 @@ class Plan:
     ----------
     times : ndarray of shape (n,) [s]
     positions : ndarray of shape (n, 3) [m]
-        Of the cable's centreline in the jaw.
+        Of the cable's centreline in the middle of the jaw, which holds 10 mm of it.
     rotations : ndarray of shape (n, 4)
         Quaternions (x, y, z, w). A jaw's first axis is the cable's tangent, away from its free end; at lift-off of a
         straight cable that lies along x its axes would be x, y, z.
@@ -58,18 +49,21 @@ class Plan:
         Arc length of the lift-off point; zero before laying.
     phases : tuple of Phase
     cable : Cable
-        As long as what is between its free end and the jaw.
+        As long as what is between its free end and the middle of the jaw.
     pattern : Pattern
     tail : float [m]
         How much of the cable lies beyond the pattern, straight on.
     controller : str
+    start : str
+        "free", or "held" so that the free end slides up and down only.
     speed : float [m/s]
         Of the lift-off point along the pattern.
     fastest : float [m/s]
         The speed at which the jaw's acceleration while it lays reaches a hundredth of gravity's. Faster, the cable
         swings, and that, not friction, soon decides how well it lies.
     needed_friction : ndarray of shape (pattern's nodes,)
-        Coefficient that each place of the pattern needs; NaN for "intuitive", which is not computed from forces.
+        Coefficient that each place of the pattern needs; NaN for "intuitive", which is not computed from forces. An
+        "optimised" plan has that of what it began from: where that slips, it makes up for it.
     """
 
     times: FloatArray
@@ -81,14 +75,23 @@ class Plan:
     pattern: Pattern
     tail: float
     controller: str
+    start: str
     speed: float
     fastest: float
     needed_friction: FloatArray
 
+    @property
+    def path(self) -> FloatArray:
+        """Rows t, x, y, z, qw, qx, qy, qz of shape (n, 8), for hands of a simulation, which have the scalar first."""
+        return pose_path(self.times, np.column_stack([self.positions, self.rotations]))
+
     def feasibility(self, friction: float) -> Feasibility:
         """Say where friction holds the cable and where it will slip; see `Pattern.feasibility`."""
         return examine(
-            self.pattern, self.cable, friction, "least_friction" if self.controller == "least_friction" else "exact"
+            self.pattern,
+            self.cable,
+            friction,
+            "exact" if self.controller in ("exact", "intuitive") else "least_friction",
         )
 
     def save(self, path: str | os.PathLike[str]) -> None:
@@ -97,19 +100,20 @@ class Plan:
         Parameters
         ----------
         path : str or Path
-            ``.csv``, with the header t,x,y,z,qx,qy,qz,qw [s, m], or ``.json``, with phases, cable and pattern beside.
+            ``.csv``, with the header t,x,y,z,qx,qy,qz,qw [s, m], which `withe.io.load_poses` reads, or ``.json``, with
+            phases, cable and pattern beside.
 
         Raises
         ------
         ValueError
             Another ending.
         """
-        path = Path(path)
+        path = FilePath(path)
         if path.suffix == ".csv":
-            rows = np.column_stack([self.times, self.positions, self.rotations])
-            np.savetxt(path, rows, delimiter=",", header="t,x,y,z,qx,qy,qz,qw", comments="", fmt="%.9g")
+            save_poses(path, self.times, np.column_stack([self.positions, self.rotations]))
         elif path.suffix == ".json":
-            path.write_text(json.dumps(self.to_dict()), encoding="utf-8")
+            with written_beside(path) as beside:
+                beside.write_text(json.dumps(self.to_dict()), encoding="utf-8")
         else:
             raise ValueError(f"path must end in .csv or .json, got {path.name!r}")
 
@@ -132,6 +136,7 @@ class Plan:
         """All numbers as lists, for JSON. SI units."""
         return {
             "controller": self.controller,
+            "start": self.start,
             "speed": self.speed,
             "fastest": self.fastest,
             "phases": [{"name": phase.name, "start": phase.start, "end": phase.end} for phase in self.phases],
@@ -163,10 +168,13 @@ def plan(
     pattern: Pattern,
     controller: PlanController = "exact",
     *,
+    friction: float | None = None,
     speed: float = 0.025,
     tail: float | None = None,
+    start: Start = "free",
     crossings: Literal["refuse", "over"] = "refuse",
     time_step: float = 0.02,
+    progress: bool = True,
 ) -> Plan:
     """Plan the whole motion: hang, touch down by pivoting on the free end, lay, let go.
 
@@ -179,18 +187,27 @@ def plan(
     ----------
     cable : Cable
     pattern : Pattern
-    controller : {"exact", "least_friction", "intuitive"}
-        No force along the cable where it lifts off; the push that needs least friction; or the jaw straight above the
-        lift-off point at the height of what still hangs, upright, the baseline of the dissertation (figure 9.2).
+    controller : {"exact", "least_friction", "optimised", "intuitive"}
+        No force along the cable where it lifts off; the push that needs least friction; the better of these along a
+        path that is shifted until the cable lies on its pattern in the rod engine, some 40 quasi-static runs; or
+        the jaw straight above the lift-off point at the height of what still hangs, upright, the baseline of the
+        dissertation (figure 9.2).
+    friction : float
+        Coefficient between cable and floor, for "optimised".
     speed : float [m/s]
         Of the lift-off point.
     tail : float [m]
-        How much cable is laid beyond the pattern: the jaw holds it pattern.length + tail from its free end. None:
-        4 Lgb, or all that there is.
+        How much cable is laid beyond the pattern: the middle of the jaw is pattern.length + tail from its free end.
+        None: 4 Lgb, or all that there is, or less where that would cross the pattern.
+    start : {"free", "held"}
+        Whether the cable's free end stands on the floor by itself, or is held so that it slides up and down only, and
+        does not roll, until the jaw opens.
     crossings : {"refuse", "over"}
-        Whether the pattern may cross itself: the cable is then laid over itself, as if it had no thickness.
+        Whether pattern and tail may cross: the cable is then laid over itself, as if it had no thickness.
     time_step : float [s]
         Between the rows of the plan.
+    progress : bool
+        Whether "optimised" shows a bar.
 
     Returns
     -------
@@ -199,8 +216,9 @@ def plan(
     Raises
     ------
     ValueError
-        The cable is shorter than pattern and tail, or cannot bend so tightly; the pattern crosses itself; no floor has
-        the friction that the pattern needs; speed, tail or time step not positive.
+        The cable is shorter than pattern and tail, or cannot bend so tightly; pattern or tail cross; no floor has
+        the friction that the pattern needs; speed, tail, time step or friction not positive; "optimised" without
+        friction.
 
     Examples
     --------
@@ -212,46 +230,56 @@ def plan(
     >>> print([phase.name for phase in motion.phases], f"{motion.needed_friction.max():.1f}")
     ['hang', 'touch down', 'lay'] 0.2
     """
-    validation.choice(controller, "controller", ("exact", "least_friction", "intuitive"))
+    validation.choice(controller, "controller", get_args(PlanController))
     speed = validation.positive(speed, "speed")
     time_step = validation.positive(time_step, "time_step")
-    held, tail = _held(cable, pattern, tail)
     validation.choice(crossings, "crossings", ("refuse", "over"))
-    if len(pattern.crossings) and crossings == "refuse":
-        first, second = 1e3 * pattern.crossings[0]
-        where = f"it does at {first:.0f} and {second:.0f} mm"
-        raise ValueError(f"the pattern must not cross itself, {where}; crossings='over' lays it so")
-    path = _lengthened(pattern, held, tail)
+    validation.choice(start, "start", get_args(Start))
+    if crossings == "refuse":
+        held, tail, path = _uncrossed(pattern, cable, tail)
+    else:
+        held, tail = _held(cable, pattern, tail)
+        path = lengthened(pattern, held, tail)
     if controller == "intuitive":
-        needed, way = np.full(len(pattern.points), np.nan), _upright_way(held, path)
+        needed, way = np.full(len(pattern.points), np.nan), upright_way(held, path)
+    elif controller == "optimised":
+        if friction is None:
+            raise ValueError("controller 'optimised' needs friction, the floor's coefficient")
+        path, followed = _improved(held, pattern, path, validation.positive(friction, "friction"), start, progress)
+        needed = _needed(pattern, held, followed, grasps_along(pattern, held, followed))
+        way = way_along(held, path, grasps_along(path, held, followed))
     else:
         grasps = grasps_along(path, held, controller)
-        needed, way = _needed(pattern, held, controller, grasps), _way(held, path, grasps)
-    down = _touch_down(held, path, way)
-    pieces, phases, clock = [], [], 0.0
-    for name, piece in (("hang", _hang(held, down, speed)), ("touch down", down), ("lay", way)):
-        duration = piece.duration(speed)
-        pieces.append(piece.sampled(np.linspace(0.0, 1.0, max(2, int(np.ceil(duration / time_step)) + 1)), speed))
-        phases.append(Phase(name, clock, clock + duration))
-        pieces[-1] = (clock + pieces[-1][0], *pieces[-1][1:])
-        clock += duration
-    times, positions, rotations, laid = (
-        np.concatenate([piece[i] if k == 0 else piece[i][1:] for k, piece in enumerate(pieces)]) for i in range(4)
-    )
+        needed, way = _needed(pattern, held, controller, grasps), way_along(held, path, grasps)
+    motion = course(held, path, way, speed, time_step, start)
     return Plan(
-        times=times,
-        positions=positions,
-        rotations=_continuous(rotations),
-        laid=np.minimum(laid, pattern.length),
-        phases=tuple(phases),
+        times=motion.times,
+        positions=motion.positions,
+        rotations=motion.rotations,
+        laid=np.minimum(motion.laid, pattern.length),
+        phases=motion.phases,
         cable=held,
         pattern=pattern,
         tail=tail,
         controller=controller,
+        start=start,
         speed=speed,
         fastest=way.fastest(),
         needed_friction=needed,
     )
+
+
+def _improved(
+    cable: Cable, pattern: Pattern, path: Path, friction: float, start: Start, progress: bool
+) -> tuple[Path, Controller]:
+    """The path that lays best in the engine, and which controller goes along it."""
+
+    def motion_of(tried: Path, controller: Controller) -> Course:
+        way = way_along(cable, tried, grasps_along(tried, cable, controller))
+        return course(cable, tried, way, _OPTIMISING_SPEED, _OPTIMISING_STEP, start)
+
+    with bar(runs(path, cable, pattern), "optimising", progress, unit="runs") as shown:
+        return optimised(path, cable, pattern, friction, motion_of, start, shown)
 
 
 def _needed(pattern: Pattern, cable: Cable, controller: Controller, grasps: Grasp) -> FloatArray:
@@ -266,183 +294,34 @@ def _needed(pattern: Pattern, cable: Cable, controller: Controller, grasps: Gras
 
 
 def _held(cable: Cable, pattern: Pattern, tail: float | None) -> tuple[Cable, float]:
-    """The cable up to the jaw, and how much of it lies beyond the pattern."""
-    room = cable.length - pattern.length
+    """The cable up to the middle of the jaw, and how much of it lies beyond the pattern."""
+    room = cable.length - 0.5 * JAW - pattern.length
     if room < 0.0:
-        raise ValueError(f"the cable is {cable.length:g} m long, the pattern {pattern.length:.4g} m")
+        holds = f"; a jaw holds {1e3 * JAW:g} mm of it"
+        raise ValueError(f"the cable is {cable.length:g} m long, the pattern {pattern.length:.4g} m{holds}")
     if tail is None:
         tail = min(room, _TAIL * cable.gravito_bending_length)
     tail = validation.non_negative(tail, "tail")
     if tail > room:
-        raise ValueError(f"the cable is {cable.length:g} m long, pattern and tail {pattern.length + tail:.4g} m")
+        both = f"pattern and tail {pattern.length + tail:.4g} m; a jaw holds {1e3 * JAW:g} mm of it"
+        raise ValueError(f"the cable is {cable.length:g} m long, {both}")
     return replace(cable, length=pattern.length + tail), tail
 
 
-@dataclass(frozen=True)
-class _Path:
-    """The pattern and the tail behind it, as far as the lift-off point goes; `grasps_along` sees a pattern in it."""
-
-    arc_length: FloatArray
-    points: FloatArray
-    heading: FloatArray
-    curvature: FloatArray
-
-    @property
-    def length(self) -> float:
-        return float(self.arc_length[-1])
-
-
-def _lengthened(pattern: Pattern, cable: Cable, tail: float) -> _Path:
-    lgb = cable.gravito_bending_length
-    heading = np.unwrap(np.arctan2(pattern.tangent[:, 1], pattern.tangent[:, 0]))
-    more = tail - max(_LAST_HELD * lgb, _JAW)
-    if more <= 0.0:
-        last = pattern.arc_length <= cable.length - max(0.11 * lgb, 0.5 * _JAW)
-        return _Path(pattern.arc_length[last], pattern.points[last], heading[last], pattern.curvature[last])
-    spacing = pattern.arc_length[1]
-    s = np.linspace(0.0, more, max(2, int(np.ceil(more / spacing))) + 1)
-    share = np.minimum(s / min(more, 2.0 * lgb), 1.0)  # the curvature fades out
-    curvature = pattern.curvature[-1] * (1.0 - 3.0 * share**2 + 2.0 * share**3)
-    steps = np.diff(s)
-    turned = heading[-1] + np.concatenate([[0.0], np.cumsum(0.5 * (curvature[1:] + curvature[:-1]) * steps)])
-    middle = 0.5 * (turned[1:] + turned[:-1])
-    points = pattern.points[-1] + np.cumsum(np.stack([np.cos(middle), np.sin(middle)], 1) * steps[:, None], axis=0)
-    return _Path(
-        np.concatenate([pattern.arc_length, pattern.length + s[1:]]),
-        np.concatenate([pattern.points, points]),
-        np.concatenate([heading, turned[1:]]),
-        np.concatenate([pattern.curvature, curvature[1:]]),
-    )
-
-
-@dataclass(frozen=True)
-class _Piece:
-    """Poses along a parameter that runs smoothly in time; `reach` is the way that the speed counts along it [m]."""
-
-    parameter: FloatArray
-    positions: FloatArray
-    quaternions: FloatArray  # (w, x, y, z), continuous
-    reach: float
-    laying: bool = False
-
-    def duration(self, speed: float) -> float:
-        if not self.laying:
-            return max(1.0, 1.875 * self.reach / speed)  # a quintic's greatest speed is 1.875 times its mean
-        return self.reach / speed + self._ramp()
-
-    def _ramp(self) -> float:
-        return 2.0  # [s] to reach the speed, and to stop
-
-    def _progress(self, share: FloatArray, speed: float) -> FloatArray:
-        """Share of the parameter at shares of the duration."""
-        if not self.laying:
-            return share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
-        duration, ramp = self.duration(speed), self._ramp()
-        t = share * duration
-
-        def ramped(time: FloatArray) -> FloatArray:  # integral of the smoothstep of fifth order over time
-            u = np.clip(time / ramp, 0.0, 1.0)
-            return ramp * u**4 * (2.5 - 3.0 * u + u**2) + np.maximum(time - ramp, 0.0)
-
-        travelled = ramped(t) - ramped(t - (duration - ramp))
-        return np.asarray(travelled / travelled[-1])
-
-    def sampled(self, share: FloatArray, speed: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """Times, positions, quaternions and laid length."""
-        from scipy.interpolate import CubicSpline
-
-        progress = self._progress(share, speed)
-        at = self.parameter[0] + progress * (self.parameter[-1] - self.parameter[0])
-        quaternions = CubicSpline(self.parameter, self.quaternions)(at)
-        quaternions /= np.linalg.norm(quaternions, axis=1)[:, None]
-        laid = at if self.laying else np.zeros_like(at)
-        return (
-            share * self.duration(speed),
-            CubicSpline(self.parameter, self.positions)(at),
-            quaternions[:, [1, 2, 3, 0]],
-            laid,
-        )
-
-    def fastest(self) -> float:
-        """Speed at which the acceleration along the piece reaches its share of gravity's [m/s]."""
-        from scipy.interpolate import CubicSpline
-
-        bend = np.linalg.norm(CubicSpline(self.parameter, self.positions)(self.parameter, 2), axis=1)
-        return float(np.sqrt(_FASTEST_SHARE * _GRAVITY / max(bend.max(), 1e-6)))
-
-
-def _way(cable: Cable, path: _Path, grasps: Grasp) -> _Piece:
-    """Poses of the jaw while each place of the path is the lift-off point."""
-    forward = _about_z(path.heading)
-    positions = _on_floor(cable, path) + cable.gravito_bending_length * _turned(forward, grasps.position)
-    rotations = _continuous(_product(forward, _from_vectors(grasps.rotation)))
-    return _Piece(path.arc_length, positions, rotations, path.length, laying=True)
-
-
-def _upright_way(cable: Cable, path: _Path) -> _Piece:
-    """The jaw straight above the lift-off point, as high as what still hangs is long."""
-    upright = np.array([np.sqrt(0.5), 0.0, -np.sqrt(0.5), 0.0])  # x turned up
-    rotations = _continuous(_product(_about_z(path.heading), np.broadcast_to(upright, (len(path.points), 4))))
-    positions = _on_floor(cable, path)
-    positions[:, 2] += cable.length - path.arc_length
-    return _Piece(path.arc_length, positions, rotations, path.length, laying=True)
-
-
-def _on_floor(cable: Cable, path: _Path) -> FloatArray:
-    return np.column_stack([path.points, np.full(len(path.points), cable.radius)])
-
-
-def _touch_down(cable: Cable, path: _Path, way: _Piece) -> _Piece:
-    """From the upright cable that stands on its free end to the first pose of laying."""
-    lgb = cable.gravito_bending_length
-    suspended = cable.length / lgb
-    angles = np.linspace(_UPRIGHT, 0.0, _PIVOT_ANGLES)
-    found = pivoting(suspended, angles, cable.stretch_stiffness)
-    heading = np.full(_PIVOT_ANGLES, path.heading[0])
-    forward = _about_z(heading)
-    rolled = np.column_stack([-cable.radius * angles, np.zeros((_PIVOT_ANGLES, 2))])
-    base = np.append(path.points[0], cable.radius)
-    positions = base + _turned(forward, rolled + lgb * found.position)
-    quaternions = _product(forward, _from_vectors(found.rotation))
-    # The last pose is that of laying, exactly: a controller or a bent beginning may differ from the straight one.
-    share = np.linspace(0.0, 1.0, _PIVOT_ANGLES)[:, None]
-    blend = share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
-    positions = positions + blend * (way.positions[0] - positions[-1])
-    last = way.quaternions[0] * np.sign(way.quaternions[0] @ quaternions[-1])
-    quaternions = _continuous(quaternions)
-    quaternions = quaternions + blend * (last * np.sign(last @ quaternions[-1]) - quaternions[-1])
-    reach = float(np.linalg.norm(np.diff(positions, axis=0), axis=1).sum())
-    return _Piece(share[:, 0], positions, quaternions / np.linalg.norm(quaternions, axis=1)[:, None], reach)
-
-
-def _hang(cable: Cable, down: _Piece, speed: float) -> _Piece:
-    """Straight down to where touching down begins."""
-    heights = np.linspace(_CLEARANCE, 0.0, 5)
-    positions = down.positions[0] + np.column_stack([np.zeros((5, 2)), heights])
-    return _Piece(np.linspace(0.0, 1.0, 5), positions, np.repeat(down.quaternions[:1], 5, axis=0), _CLEARANCE)
-
-
-def _about_z(angle: FloatArray) -> FloatArray:
-    zero = np.zeros_like(angle)
-    return np.stack([np.cos(0.5 * angle), zero, zero, np.sin(0.5 * angle)], -1)
-
-
-def _from_vectors(vectors: FloatArray) -> FloatArray:
-    angle = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return np.concatenate([np.cos(0.5 * angle), 0.5 * np.sinc(0.5 * angle / np.pi) * vectors], -1)
-
-
-def _product(a: FloatArray, b: FloatArray) -> FloatArray:
-    w = a[..., :1] * b[..., :1] - (a[..., 1:] * b[..., 1:]).sum(-1, keepdims=True)
-    return np.concatenate([w, a[..., :1] * b[..., 1:] + b[..., :1] * a[..., 1:] + np.cross(a[..., 1:], b[..., 1:])], -1)
-
-
-def _turned(quaternions: FloatArray, vectors: FloatArray) -> FloatArray:
-    twice = 2.0 * np.cross(quaternions[..., 1:], vectors)
-    return np.asarray(vectors + quaternions[..., :1] * twice + np.cross(quaternions[..., 1:], twice))
-
-
-def _continuous(quaternions: FloatArray) -> FloatArray:
-    """Of both signs of each quaternion the one near its predecessor."""
-    agree = np.where((quaternions[1:] * quaternions[:-1]).sum(-1) < 0.0, -1.0, 1.0)
-    return np.asarray(quaternions * np.concatenate([[1.0], np.cumprod(agree)])[:, None])
+def _uncrossed(pattern: Pattern, cable: Cable, tail: float | None) -> tuple[Cable, float, Path]:
+    """The longest of a few tails that does not cross the pattern or itself, or the one that was asked for."""
+    if len(pattern.crossings):
+        first, second = 1e3 * pattern.crossings[0]
+        where = f"it does at {first:.0f} and {second:.0f} mm"
+        raise ValueError(f"the pattern must not cross itself, {where}; crossings='over' lays it so")
+    held, given = _held(cable, pattern, tail)
+    shares = (1.0,) if tail is not None else _TAIL_SHARES
+    for share in shares:
+        held, given = _held(cable, pattern, share * given)
+        path = lengthened(pattern, held, given)
+        found = crossings_of(path.points, path.length / (len(path.points) - 1))
+        if not len(found):
+            return held, given, path
+    first, second = 1e3 * found[0]
+    where = f"{second:.0f} mm from the free end it crosses the cable at {first:.0f} mm"
+    raise ValueError(f"the tail must not cross the pattern, {where}: give a shorter tail, or crossings='over'")

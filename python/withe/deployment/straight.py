@@ -111,15 +111,7 @@ class StraightLine:
         ValueError
             Not numbers, not finite, or shapes that do not broadcast.
         """
-        arrays = [
-            validation.number_array(value, name, tuple(f"n{i}" for i in range(np.ndim(value))))
-            for name, value in (("x", x), ("z", z))
-        ]
-        try:
-            x, z = np.broadcast_arrays(*arrays)
-        except ValueError:
-            shapes = " and ".join(str(array.shape) for array in arrays)
-            raise ValueError(f"x and z must have shapes that broadcast, got {shapes}") from None
+        x, z = validation.broadcast_arrays(x=x, z=z)
         rows = self._rod.poses(np.stack([x.ravel(), z.ravel()], 1), TWIST_STIFFNESS)
         return _described(rows, x.shape)
 

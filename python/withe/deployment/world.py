@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
-from withe.deployment.cable import Cable
+from withe.deployment.cable import JAW, Cable
 from withe.parts.materials import Material
 from withe.recording import Record
 from withe.scene import Scene
 
-__all__ = ["Motion", "Setup", "lay"]
+__all__ = ["Motion", "Setup", "lay", "place"]
 
 FloatArray = npt.NDArray[np.float64]
 _DENSITY, _VISCOUS_TIME, _GRAVITY = 1180.0, 0.02, 9.81  # [kg/m^3], [s], [m/s^2]
 _SETTLING = 2.0  # [s] after the jaw has opened
+_JAW_STIFFNESS = (2e3, 0.05)  # [N/m, N m/rad], of its pads: hundreds of times the cable's
+_STRESSED = 1.0  # [s] in which a cable that is put down takes its stress
 _RECORD_EVERY = 0.1  # [s]
 
 
@@ -48,6 +50,13 @@ class Setup:
     natural_curvature: tuple[float, float] = (0.0, 0.0)  # [1/m]
     jaw_offset: tuple[float, float, float] = (0.0, 0.0, 0.0)  # [m]
     jaw_turn: tuple[float, float, float] = (0.0, 0.0, 0.0)  # [rad], a rotation vector
+    quasi_static: bool = False  # a row of equilibria: neither inertia nor viscosity
+    start_held: bool = False  # the free end is guided: it slides up and down only, until the jaw opens
+
+    @property
+    def arc_length(self) -> FloatArray:
+        """Of each node, from the free end to the far side of the jaw, whose middle is at the cable's length [m]."""
+        return np.linspace(0.0, self.cable.length + 0.5 * JAW, self.nodes)
 
 
 def lay(setup: Setup, motion: Motion, *, progress: bool) -> tuple[FloatArray, FloatArray, Record]:
@@ -60,48 +69,85 @@ def lay(setup: Setup, motion: Motion, *, progress: bool) -> tuple[FloatArray, Fl
     record : Record
         Of the motion, every tenth of a second.
     """
-    scene, cable = _scene(setup, motion.positions[0])
-    simulation = scene.build(integrator="backward_euler", time_step=setup.time_step, planar=False)
-    if any(setup.natural_curvature):
+    jaw = motion.positions[0]
+    below = setup.arc_length - setup.cable.length
+    scene, cable = _scene(setup, jaw + below[:, None] * [0.0, 0.0, 1.0])
+    jaw_part = scene.grasp(cable, at=setup.cable.length, length=JAW, stiffness=_JAW_STIFFNESS, name="jaw")
+    if setup.start_held:
+        scene.pin(cable.start, free=(0.0, 0.0, 1.0))
+    simulation = scene.build(integrator=_integrator(setup), time_step=setup.time_step, planar=False)
+    if any(setup.natural_curvature) or setup.quasi_static:
         simulation.set_natural_curvature(cable, setup.natural_curvature)
         simulation.equilibrium()
-    simulation.move(cable.end, path=_path(setup, motion))
-    record = simulation.run(float(motion.times[-1]), record_every=_RECORD_EVERY, progress=progress)
-    held = simulation.positions(cable)
-    simulation.release(cable.end)
-    simulation.run(_SETTLING, progress=False)
-    return held, simulation.positions(cable), record
+    held = simulation.hand(jaw_part)
+    held.move(path=_path(setup, motion, held.pose.rotation))
+    every = max(_RECORD_EVERY, setup.time_step)
+    record = simulation.run(float(motion.times[-1]), record_every=every, progress=progress)
+    before = simulation.positions(cable)
+    held.release()
+    if setup.start_held:
+        simulation.release(cable.start)
+    if setup.quasi_static:
+        simulation.step()
+    else:
+        simulation.run(_SETTLING, progress=False)
+    return before, simulation.positions(cable), record
 
 
-def _scene(setup: Setup, jaw: FloatArray) -> tuple[Scene, Any]:
+def place(setup: Setup, points: FloatArray, *, progress: bool) -> tuple[FloatArray, Record]:
+    """Put a cable on the floor in the shape of a curve, free of stress, and let its stress come within a second.
+
+    Parameters
+    ----------
+    setup : Setup
+    points : ndarray of shape (nodes, 2) [m]
+        Its nodes, from the free end.
+
+    Returns
+    -------
+    laid : ndarray of shape (nodes, 3) [m]
+        After it has come to rest, both ends free.
+    record : Record
+    """
+    scene, cable = _scene(setup, np.column_stack([points, np.full(len(points), setup.cable.radius)]))
+    scene.ignore_contact(cable, cable)  # where a pattern touches itself, the cable lies in itself
+    simulation = scene.build(integrator=_integrator(setup), time_step=setup.time_step, planar=False)
+    simulation.set_natural_curvature(cable, setup.natural_curvature, over=_STRESSED)
+    duration = _STRESSED if setup.quasi_static else _STRESSED + _SETTLING
+    record = simulation.run(duration, record_every=max(_RECORD_EVERY, setup.time_step), progress=progress)
+    return simulation.positions(cable), record
+
+
+def _integrator(setup: Setup) -> Literal["static", "backward_euler"]:
+    return "static" if setup.quasi_static else "backward_euler"
+
+
+def _scene(setup: Setup, points: FloatArray) -> tuple[Scene, Any]:
     cable = setup.cable
     weight = _DENSITY * np.pi * cable.radius**2 * _GRAVITY
     bend = 2.0 * weight * cable.gravito_bending_length**3
     modulus = 4.0 * bend / (np.pi * cable.radius**4)
     material = Material(youngs_modulus=modulus, poisson_ratio=0.5, density=_DENSITY, viscosity=_VISCOUS_TIME * modulus)
     scene = Scene(gravity=(0.0, 0.0, -_GRAVITY))
-    start = jaw - [0.0, 0.0, cable.length]
-    rod = scene.add_rod(start=start, end=jaw, nodes=setup.nodes, radius=cable.radius, material=material, name="cable")
-    scene.clamp(rod.end)
+    rod = scene.add_rod(points=points, radius=cable.radius, material=material, name="cable")
     scene.add_floor(friction=setup.friction)
     scene.enable_contact(friction=setup.friction)
     return scene, rod
 
 
-def _path(setup: Setup, motion: Motion) -> Any:
-    """Position and rotation of the jaw by time, relative to the first one."""
+def _path(setup: Setup, motion: Motion, begin: Any) -> Any:
+    """Position and rotation of the jaw by time; the rod's axes in it are `begin` when it hangs."""
     from scipy.interpolate import CubicSpline
     from scipy.spatial.transform import Rotation
 
     where, turned = CubicSpline(motion.times, motion.positions), CubicSpline(motion.times, motion.rotations)
     first = Rotation.from_quat(motion.rotations[0]).inv()
     offset, turn = np.array(setup.jaw_offset), Rotation.from_rotvec(setup.jaw_turn)
+    drawn = Rotation.from_matrix(begin)
 
     def at(time: float) -> tuple[FloatArray, Any]:
         time = float(np.clip(time, motion.times[0], motion.times[-1]))
         rise = min(1.0, time)  # [s]: what is wrong comes in smoothly
-        place = where(time) + rise * offset
-        place[2] = max(place[2], setup.cable.radius)  # the floor stops the jaw
-        return place, turn**rise * Rotation.from_quat(turned(time)) * first
+        return where(time) + rise * offset, turn**rise * Rotation.from_quat(turned(time)) * first * drawn
 
     return at

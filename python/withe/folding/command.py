@@ -7,8 +7,6 @@ import sys
 import warnings
 from pathlib import Path
 
-import numpy as np
-
 from withe.folding.paper import Paper
 from withe.folding.planning import plan
 
@@ -60,7 +58,7 @@ def run(arguments: argparse.Namespace) -> int:
     for warning in said:
         sys.stderr.write(f"withe: {warning.message}\n")
     file = found.save(arguments.out)
-    slide = found.slide[-1]
-    end = f"slides {1e3 * slide:.1f} mm" if np.isfinite(slide) else "snaps before the end"
+    jump = found.jumps_at
+    end = f"slides {1e3 * found.slide[-1]:.1f} mm" if jump is None else f"jumps at {jump:.1f} s, before the end"
     sys.stdout.write(f"{found!r}\npredicted: {end}\n{file}\n")
     return 0

@@ -25,7 +25,9 @@ FloatArray = npt.NDArray[np.float64]
 _STEEPEST = 5.5  # [rad] of an edge; at 4.7 it points straight down, at 6.3 it would lie under the sheet
 _TURN = 0.5  # [Lgb/rad] lengths that angles count as
 _SHORTEST = 0.05  # [Lgb]
-_SWEEPS = 4  # branches of goals that are followed
+_NEAR = 1.2  # cells
+_THIN = 0.2  # of a cell
+_BEST = 3  # goals that are looked at more closely
 
 
 @dataclass(frozen=True)
@@ -57,7 +59,7 @@ class Holding:
         """The same at the same poses if Lgb is more or less by the share; infinite where that has no stable pose."""
         worst = self.ratio(sheet)
         for factor in (1 - self.share, 1 + self.share) if self.share > 0 else ():
-            other = at_poses(poses_of(sheet) / [factor, factor, 1.0], forces_of(sheet))
+            other = at_poses(poses_of(sheet) / [factor, factor, 1.0], _of_other(forces_of(sheet), factor))
             ratio = self.ratio(other, self.length / factor)
             worst = np.maximum(worst, np.where(other.valid & other.stable, ratio, np.inf))
         return worst
@@ -68,6 +70,16 @@ class Holding:
         back = (sheet.angle > 0.5 * np.pi) & (room < -1e-9)
         fits = (sheet.suspended < self.length) & (sheet.angle < _STEEPEST) & (sheet.max_curvature <= self.curvature)
         return sheet.valid & sheet.stable & fits & ~back
+
+
+def _of_other(forces: FloatArray, factor: float) -> FloatArray:
+    """Forces of about the same sheet if Lgb is more by a factor, in its own units: near which an equilibrium is sought.
+
+    Those of long parts are their weight, those of short ones bending.
+    """
+    weighs = np.minimum(1.0, 0.5 * forces[:, 2:])
+    scale = weighs / factor + (1.0 - weighs) * factor**2
+    return forces * np.concatenate([scale, scale, np.full_like(scale, 1.0 / factor)], axis=1)
 
 
 def forces_at(places: FloatArray) -> FloatArray:
@@ -151,63 +163,103 @@ def _neighbours(shape: tuple[int, ...], good: npt.NDArray[np.bool_]) -> npt.NDAr
 
 
 def goals(lattice: Lattice, holding: Holding, x: float) -> Elastica:
-    """Equilibria whose outer edge is at x with the fingers on what lies there: one for each H, a branch of them.
+    """Equilibria whose outer edge is at x with the fingers on what lies there, near all nodes that are next to such.
 
-    Whether they are bearable is not asked.
+    They form curves, of which these are points, in no order; where H = 0 alone is asked for, a few points, and those
+    are among the others too. The least ratio is found to much less than a cell. Whether they are bearable is not asked,
+    but for that.
     """
-    over, room = holding.outer(lattice.sheet)
-    known = lattice.sheet.valid & (lattice.sheet.angle > 0.5 * np.pi) & (lattice.sheet.angle < _STEEPEST)
-    away = np.where(known, np.hypot(over - x, room), np.inf)
-    away = np.where(lattice.sheet.max_curvature > 1.2 * holding.curvature, np.inf, away)
-    found: list[FloatArray] = []
-    sweeps = 0
-    for node in np.argsort(away)[:400:10]:
-        first = _on_goal(forces_of(take(lattice.sheet, np.array([node])))[0], holding, x)
-        if first is None or any(np.abs(first - other).max() < 0.1 for other in found):
-            continue
-        found += [first, *_swept(first, lattice.axes[1], holding, x)]
-        sweeps += 1
-        if sweeps == _SWEEPS:
-            break
-    return at_forces(np.array(found).reshape(-1, 3))
+    near = _next_to_goals(lattice, holding, x)
+    found = _on_goal(near, holding, x, len(lattice.axes[1]) > 1)
+    if len(lattice.axes[1]) > 1:
+        level = near[near[:, 1] == 0.0]
+        found = np.concatenate(
+            [_on_goal(level, holding, x, False), _least(_thinned(found, lattice), lattice, holding, x)]
+        )
+    return at_forces(forces_at(_thinned(found, lattice)))
 
 
-def _swept(first: FloatArray, sideways: FloatArray, holding: Holding, x: float) -> list[FloatArray]:
-    """Goals at other H, followed from one; whole steps of H, so that H = 0 is among them."""
-    found: list[FloatArray] = []
-    if len(sideways) == 1:
-        return found
-    step = (sideways[1] - sideways[0]) / 4
-    for sign in (1.0, -1.0):
-        last, before = first, first
-        for index in range(1, 2 * len(sideways)):
-            start = last + (last - before if index > 2 else 0.0)
-            level = step * (np.round(first[1] / step) + sign * index)
-            at = _on_goal(np.array([start[0], level, start[2]]), holding, x)
-            if at is None:
-                break
-            last, before = at, last
-            found.append(at)
-    return found
+def _cell(lattice: Lattice) -> FloatArray:
+    """Size of one, where the lattice is even."""
+    return np.array([axis[-1] - axis[-2] if len(axis) > 1 else 1.0 for axis in lattice.axes])
 
 
-def _on_goal(forces: FloatArray, holding: Holding, x: float) -> FloatArray | None:
-    """Newton's method on R and the length, by differences, with H kept."""
-    moves = np.array([[0, 0, 0], [1e-6, 0, 0], [0, 0, 1e-6]])
+def _next_to_goals(lattice: Lattice, holding: Holding, x: float) -> FloatArray:
+    """Places of nodes that are about a cell away, by the slopes that differences of neighbours give."""
+    shape = tuple(len(axis) for axis in lattice.axes)
+    over, room = (values.reshape(shape) for values in holding.outer(lattice.sheet))
+    gap = np.stack([over - x, room], axis=-1)
+    axes = [i for i in range(3) if shape[i] > 1]
+    slopes = np.stack([np.gradient(gap, axis=i) for i in axes], axis=-1)  # per cell
+    fits = np.isfinite(slopes).all(axis=(-2, -1)) & np.isfinite(gap).all(axis=-1)
+    fits &= (lattice.sheet.angle > 0.5 * np.pi).reshape(shape)
+    fits &= (lattice.sheet.max_curvature < 1.3 * holding.curvature).reshape(shape)
+    index = np.argwhere(fits)
+    step = np.einsum("nij,nj->ni", np.linalg.pinv(slopes[fits], rcond=1e-6), gap[fits])
+    index = index[np.abs(step).max(axis=1) < _NEAR]
+    return np.stack([axis[i] for axis, i in zip(lattice.axes, index.T, strict=True)], axis=1)
+
+
+def _on_goal(places: FloatArray, holding: Holding, x: float, pulls: bool) -> FloatArray:
+    """Newton's method from many places, by differences, steps as short as can be; what does not get there is left out.
+
+    Without `pulls` H is kept.
+    """
+    free = [0, 1, 2] if pulls else [0, 2]
+    moves = np.concatenate([np.zeros((1, 3)), 1e-6 * np.eye(3)[free]])
+    places = places.copy()
+    there = np.zeros(len(places), dtype=bool)
+    left = np.arange(len(places))
     for _ in range(25):
-        sheet = at_forces(forces + moves, keep=True)
-        gaps = np.stack(holding.outer(sheet), axis=1) - [x, 0.0]
-        if not np.isfinite(gaps).all():
-            return None
-        if np.abs(gaps[0]).max() < 1e-9:
-            return forces
-        slopes = (gaps[1:] - gaps[0]).T / 1e-6
-        if abs(np.linalg.det(slopes)) < 1e-9:
-            return None
-        step = np.linalg.solve(slopes, -gaps[0])
-        step *= min(1.0, 0.2 / np.abs(step).max())
-        forces = forces + np.array([step[0], 0.0, step[1]])
-    return None
+        sheet = at_forces(forces_at(places[left, None] + moves), keep=True)
+        gaps = np.stack(holding.outer(sheet), axis=-1) - [x, 0.0]
+        good = np.isfinite(gaps).all(axis=(1, 2)) & (places[left, 2] > _SHORTEST)
+        done = np.abs(gaps[:, 0]).max(axis=1) < 1e-9
+        there[left[done & good]] = True
+        left, gaps = left[good & ~done], gaps[good & ~done]
+        if not len(left):
+            break
+        slopes = (gaps[:, 1:] - gaps[:, :1]).transpose(0, 2, 1) / 1e-6
+        step = -np.einsum("nij,nj->ni", np.linalg.pinv(slopes, rcond=1e-9), gaps[:, 0])
+        step *= np.minimum(1.0, 0.3 / np.maximum(np.abs(step).max(axis=1), 1e-12))[:, None]
+        places[left[:, None], free] += step
+    return places[there]
+
+
+def _thinned(places: FloatArray, lattice: Lattice) -> FloatArray:
+    """The first of those that are nearly the same."""
+    cells = np.round(places / (_THIN * _cell(lattice)))
+    return np.asarray(places[np.sort(np.unique(cells, axis=0, return_index=True)[1])])
+
+
+def _least(places: FloatArray, lattice: Lattice, holding: Holding, x: float) -> FloatArray:
+    """Places, and from the best of them on along their curves those of less and less ratio, as long as these bear."""
+
+    def ratios(tried: FloatArray) -> FloatArray:
+        sheet = at_forces(forces_at(tried))
+        good = holding.bearable(sheet)
+        ratio = np.full(len(tried), np.inf)
+        ratio[good] = holding.ratio(take(sheet, good))
+        return ratio
+
+    ratio = ratios(places)
+    if not np.isfinite(ratio).any():
+        return places
+    better = [places]
+    for start in np.argsort(ratio)[:_BEST]:
+        if not np.isfinite(ratio[start]):
+            break
+        place, least, reach = places[start], ratio[start], 0.5 * _cell(lattice)
+        for _ in range(14):
+            around = place + reach * np.concatenate([np.eye(3), -np.eye(3)])
+            tried = _on_goal(around, holding, x, pulls=True)
+            needed = ratios(tried)
+            if len(tried) and needed.min() < least:
+                place, least = tried[np.argmin(needed)], needed.min()
+                better.append(place[None])
+            else:
+                reach = 0.4 * reach
+    return np.concatenate(better)
 
 
 @dataclass(frozen=True)

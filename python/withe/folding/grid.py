@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -16,7 +17,7 @@ import numpy.typing as npt
 from withe.folding.manifold import elastica
 from withe.folding.sheets import Elastica, at_forces, join, take
 
-__all__ = ["SPACING", "Grid", "gentle", "lift", "make_grid", "shortest_path"]
+__all__ = ["SPACING", "Grid", "Network", "gentle", "lift", "make_grid", "make_network", "shortest_path"]
 
 FloatArray = npt.NDArray[np.float64]
 IndexArray = npt.NDArray[np.intp]
@@ -68,12 +69,17 @@ def lift() -> Elastica:
     return at_forces(np.stack([ahead, zeros, _LIFTS], axis=1))
 
 
-def gentle(lifted: FloatArray) -> FloatArray:
-    """Normal force of the lift at lengths between its nodes."""
+@cache
+def _gentle() -> Any:
     from scipy.interpolate import CubicSpline
 
     raised = lift()
-    return np.asarray(CubicSpline(raised.suspended, raised.normal_force)(lifted))
+    return CubicSpline(raised.suspended, raised.normal_force)
+
+
+def gentle(lifted: FloatArray) -> FloatArray:
+    """Normal force of the lift at lengths between its nodes."""
+    return np.asarray(_gentle()(lifted))
 
 
 @cache
@@ -93,52 +99,84 @@ def make_grid(spacing: float = SPACING) -> Grid:
         edges.append(np.stack([near[both], far[both]], axis=1))
     pose = join(raised, take(blocks, blocks.valid))
     for k in np.flatnonzero(raised.suspended > 1.0):
-        edges.append(links(pose, raised.x[k], raised.z[k], spacing, int(k), len(raised.x)))
+        near = np.flatnonzero(np.hypot(pose.x - raised.x[k], pose.z - raised.z[k]) < 1.5 * spacing)
+        near = near[near >= len(raised.x)]
+        edges.append(np.stack([np.full_like(near, k), near], axis=1))
     joined = np.concatenate(edges)
     way = [getattr(pose, axis)[joined[:, 1]] - getattr(pose, axis)[joined[:, 0]] for axis in ("x", "z")]
     return Grid(spacing, len(raised.x), pose, joined, np.hypot(*way))
 
 
-def links(pose: Elastica, x: float, z: float, spacing: float, name: int, first: int) -> IndexArray:
-    """Edges from one node to all blocks nearby, `first` the first of these."""
-    near = first + np.flatnonzero(np.hypot(pose.x[first:] - x, pose.z[first:] - z) < 1.5 * spacing)
-    return np.stack([np.full_like(near, name), near], axis=1)
+@dataclass(frozen=True)
+class Network:
+    """Nodes of a grid that may be passed, and the cost from each to its neighbours: what one search after another uses.
+
+    Attributes
+    ----------
+    grid : Grid
+    cost : ndarray of shape (nodes,)
+        Per length.
+    allowed : ndarray of bool, shape (nodes,)
+    graph : scipy.sparse.csr_array of shape (nodes, nodes)
+        Cost of each edge, in both directions.
+    """
+
+    grid: Grid
+    cost: FloatArray
+    allowed: npt.NDArray[np.bool_]
+    graph: Any
 
 
-def shortest_path(
-    grid: Grid, cost: FloatArray, allowed: npt.NDArray[np.bool_], start: Elastica | None, goal: Elastica
-) -> Elastica | None:
+def make_network(grid: Grid, cost: FloatArray, allowed: npt.NDArray[np.bool_]) -> Network:
+    """Join the nodes that are allowed. `cost` per length, of shape (nodes,), as `allowed`."""
+    from scipy.sparse import csr_array
+
+    kept = allowed[grid.edges].all(axis=1)
+    first, second = grid.edges[kept].T
+    weight = _weights(grid.lengths[kept], cost[first], cost[second])
+    there_and_back = (np.concatenate([first, second]), np.concatenate([second, first]))
+    graph = csr_array((np.tile(weight, 2), there_and_back), shape=(len(allowed), len(allowed)))
+    return Network(grid, cost, allowed, graph)
+
+
+def _weights(lengths: FloatArray, first: FloatArray | float, second: FloatArray | float) -> FloatArray:
+    return np.asarray(lengths * (0.5 * (first + second) + _LEAST_COST))
+
+
+def _links(network: Network, end: Elastica) -> tuple[IndexArray, FloatArray]:
+    """Blocks around a pose, and the cost of the way to each."""
+    grid = network.grid
+    away = np.hypot(grid.pose.x - end.x[0], grid.pose.z - end.z[0])
+    near = network.allowed & (away < 1.5 * grid.spacing)
+    near[: grid.lifts] = False
+    nodes = np.flatnonzero(near)
+    return nodes, _weights(away[nodes], network.cost[nodes], float(end.force_ratio[0]))
+
+
+def shortest_path(network: Network, start: Elastica | None, goal: Elastica) -> Elastica | None:
     """Nodes of the path of least accumulated cost times length, uniform cost search [dissertation, Alg. 7, mended].
 
-    From flat, or from a pose; to a pose. `cost` per length, of shape (nodes,), as `allowed`. None where no path is.
+    From flat, or from a pose; to a pose. None where no path is.
     """
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import dijkstra
 
-    ends = [end for end in (start, goal) if end is not None]
-    pose, edges, lengths = grid.pose, [grid.edges], [grid.lengths]
-    count = len(pose.x)
-    for i, end in enumerate(ends):
-        joined = links(pose, end.x[0], end.z[0], grid.spacing, count + i, grid.lifts)
-        edges.append(joined)
-        lengths.append(np.hypot(pose.x[joined[:, 1]] - end.x, pose.z[joined[:, 1]] - end.z))
-    for end in ends:
-        pose = join(pose, end)
-    if start is not None and np.hypot(start.x - goal.x, start.z - goal.z)[0] < 1.5 * grid.spacing:
-        edges.append(np.array([[count, count + 1]]))
-        lengths.append(np.hypot(start.x - goal.x, start.z - goal.z))
-    pairs, length = np.concatenate(edges), np.concatenate(lengths)
-    ratio = np.concatenate([cost, [c for end in ends for c in end.force_ratio]])
-    inside = np.concatenate([allowed, np.ones(len(ends), dtype=bool)])
-    kept = inside[pairs].all(axis=1)
-    pairs, length = pairs[kept], length[kept]
-    weight = length * (0.5 * ratio[pairs].sum(axis=1) + _LEAST_COST)
-    graph = csr_array((weight, (pairs[:, 0], pairs[:, 1])), shape=(len(inside), len(inside)))
-    source, target = (count if start is not None else 0), len(inside) - 1
-    _, before = dijkstra(graph, directed=False, indices=source, return_predecessors=True)
-    if before[target] < 0:
+    grid, graph, source = network.grid, network.graph, 0
+    if start is not None:
+        if np.hypot(start.x - goal.x, start.z - goal.z)[0] < 1.5 * grid.spacing:
+            return join(start, goal)
+        source = graph.shape[0]
+        nodes, costs = _links(network, start)
+        rows = np.append(graph.indptr, graph.indptr[-1] + len(nodes))
+        parts = (np.append(graph.data, costs), np.append(graph.indices, nodes), rows)
+        graph = csr_array(parts, shape=(source + 1, source + 1))
+    distance, before = dijkstra(graph, indices=source, return_predecessors=True)
+    last, costs = _links(network, goal)
+    total = distance[last] + costs
+    if not len(last) or not np.isfinite(total).any():
         return None
-    way = [target]
-    while way[-1] != source:
+    way = [int(last[np.argmin(total)])]
+    while before[way[-1]] not in (source, -9999):
         way.append(int(before[way[-1]]))
-    return take(pose, np.array(way[::-1]))
+    first = take(grid.pose, slice(0, 1)) if start is None else start
+    return join(join(first, take(grid.pose, np.array(way[::-1]))), goal)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import cache
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -79,24 +78,11 @@ def elastica(
     by_length = x is None and z is None and length is not None and angle is not None
     if not by_position and not by_length:
         raise ValueError("elastica needs x and z, or length and angle")
-    names = ("x", "z") if by_position else ("length", "angle")
-    first, second = _broadcast(names, (x, z) if by_position else (length, angle))
+    given = {"x": x, "z": z} if by_position else {"length": length, "angle": angle}
+    first, second = validation.broadcast_arrays(**given)
     moment = validation.number(tip_moment, "tip_moment")
     growth = validation.non_negative(width_growth, "width_growth")
     manifold = _manifold()
     solve = manifold.at_position if by_position else manifold.at_length_and_angle
     rows = shared(lambda one, other: solve(one, other, growth, moment), first.ravel(), second.ravel())
     return described(rows, first.shape)
-
-
-def _broadcast(names: tuple[str, str], values: tuple[Any, Any]) -> tuple[FloatArray, FloatArray]:
-    arrays = []
-    for name, value in zip(names, values, strict=True):
-        ndim = np.ndim(value)
-        arrays.append(validation.number_array(value, name, tuple(f"n{i}" for i in range(ndim))))
-    try:
-        first, second = np.broadcast_arrays(*arrays)
-    except ValueError:
-        shapes = " and ".join(str(array.shape) for array in arrays)
-        raise ValueError(f"{names[0]} and {names[1]} must have shapes that broadcast, got {shapes}") from None
-    return first, second

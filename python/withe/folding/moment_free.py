@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
 
-from withe.folding.grid import gentle, lift, make_grid, shortest_path
+from withe.folding.grid import Network, gentle, lift, make_grid, make_network, shortest_path
 from withe.folding.manifold import elastica
-from withe.folding.sheets import Elastica, at_forces, drag, forces_of, join, poses_of, take
+from withe.folding.sheets import Elastica, at_forces, join, poses_of, slides_to_rest, take
 
-__all__ = ["PENALTY", "Path", "goal_pose", "greedy", "least_slide", "smoothed", "uniform_cost"]
+__all__ = ["PENALTY", "goal_pose", "greedy", "least_slide", "smoothed", "uniform_cost"]
 
 FloatArray = npt.NDArray[np.float64]
 PENALTY = 0.958  # [Lgb] shorter lifted parts would be bent too sharply [7.8.5]
@@ -25,23 +24,31 @@ def goal_pose(x: float, z: float, depth: float, finger: float) -> Elastica | Non
 
     `finger`: thickness of that between the edge and what lies under it.
     """
-    angle = np.pi
-    for _ in range(60):
+    angle = last_angle = np.pi
+    last_change = 0.0
+    for i in range(60):  # the secant method, from one step to what is found
         inner = (x - depth + depth * np.cos(angle), z + finger * abs(np.cos(angle)) - depth * np.sin(angle))
         pose = elastica([inner[0]], [inner[1]])
         if not pose.valid[0]:
             return None
         change = float(pose.angle[0]) - angle
-        angle += change
         if abs(change) < 1e-10:
             return pose
+        slope = (change - last_change) / (angle - last_angle) if i and angle != last_angle else -1.0
+        last_angle, last_change = angle, change
+        angle -= change / slope
     return None
 
 
 def uniform_cost(length: float, goal: Elastica, start: Elastica | None = None) -> Elastica | None:
     """Nodes from flat, or a pose, to a goal over a sheet's part of the manifold, at least accumulated force ratio."""
+    return shortest_path(_by_ratio(length), start, goal)
+
+
+@lru_cache(maxsize=8)
+def _by_ratio(length: float) -> Network:
     grid = make_grid()
-    return shortest_path(grid, grid.pose.force_ratio, _allowed(length), start, goal)
+    return make_network(grid, grid.pose.force_ratio, _allowed(length))
 
 
 def _allowed(length: float) -> npt.NDArray[np.bool_]:
@@ -63,13 +70,17 @@ def least_slide(length: float, friction: float, goal: Elastica, start: Elastica 
     slide, allowed = _needed_slide(length, friction), _allowed(length)
     cost = 1.0 + 0.4 * grid.pose.max_curvature
     low, high = 0.0, float(slide[allowed & np.isfinite(slide)].max())
-    best = shortest_path(grid, cost, allowed & (slide <= 0.0), start, goal)
+
+    def within(bound: float) -> Elastica | None:
+        return shortest_path(make_network(grid, cost, allowed & (slide <= bound)), start, goal)
+
+    best = within(0.0)
     if best is not None:
         return best
-    best = shortest_path(grid, cost, allowed & (slide <= high), start, goal)
+    best = within(high)
     while best is not None and high - low > 2e-3:
         middle = 0.5 * (low + high)
-        nodes = shortest_path(grid, cost, allowed & (slide <= middle), start, goal)
+        nodes = within(middle)
         low, high, best = (middle, high, best) if nodes is None else (low, middle, nodes)
     return best
 
@@ -80,10 +91,8 @@ def _needed_slide(length: float, friction: float) -> FloatArray:
     pose = make_grid().pose
     ratio = np.abs(pose.tangential_force) / (pose.normal_force + length - pose.suspended)
     slide = np.zeros(len(ratio))
-    for node in np.flatnonzero(_allowed(length) & (ratio > friction)):
-        one = take(pose, slice(node, node + 1))
-        sheet, slid = drag(poses_of(one), forces_of(one)[0], friction, length)
-        slide[node] = abs(slid[0]) if sheet.valid[0] else np.inf
+    slides = _allowed(length) & (ratio > friction)
+    slide[slides] = slides_to_rest(take(pose, slides), friction, length)
     return slide
 
 
@@ -121,47 +130,42 @@ def _head(nodes: Elastica) -> int:
     return int(np.argmax(pulls)) if pulls.any() else 0
 
 
-@dataclass(frozen=True)
-class Path:
-    """Poses, densely; the first `head` of them lifted without tangential force."""
+def smoothed(
+    nodes: Elastica, length: float, needed: Callable[[Elastica], FloatArray], cut: Callable[[FloatArray], FloatArray]
+) -> Elastica:
+    """Exact poses along a path through nodes, without their grid's corners; ends stay, and so does the lift.
 
-    pose: Elastica
-    head: int
-
-    def at(self, places: FloatArray) -> Elastica:
-        """Exact poses at places, which are indices with fractions."""
-        index = np.arange(len(self.pose.x))
-        low, high = places[places <= self.head - 1], places[places > self.head - 1]
-        lifted = np.interp(low, index, self.pose.suspended)
-        head = at_forces(np.stack([gentle(lifted), np.zeros_like(lifted), lifted], axis=1))
-        rest = elastica(np.interp(high, index, self.pose.x), np.interp(high, index, self.pose.z))
-        return join(head, rest)
-
-
-def smoothed(nodes: Elastica, length: float, needed: Callable[[Elastica], FloatArray]) -> Path:
-    """A path through nodes without their grid's corners; ends stay, and what is lifted without tangential force.
-
-    Nothing that is `needed` of its poses is made greater than at the nodes.
+    `cut` says at which places, indices with fractions, of poses of shape (n, 3) that are nearly those of the path.
+    Nothing that is `needed` of poses is made greater than at the nodes. Some may not be valid.
     """
     from scipy.ndimage import gaussian_filter1d
 
     spacing = make_grid().spacing
-    head = _head(nodes)
-    rest = take(nodes, slice(max(0, head - 1), None))
-    way = np.stack([rest.x, rest.z], axis=1)
-    travelled = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(way, axis=0).T))])
-    count = max(5, int(2 * travelled[-1] / spacing))
+    head = max(0, _head(nodes) - 1)
+    known = poses_of(nodes)
+    travelled = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(known[head:, :2], axis=0).T))])
+    count = 2 * max(2, int(travelled[-1] / spacing)) + 1
     even = np.linspace(0.0, travelled[-1], count)
-    way = np.stack([np.interp(even, travelled, way[:, i]) for i in range(2)], axis=1)
-    bound = 1.02 * needed(rest).max()
-    pose = rest
+    way = np.stack([np.interp(even, travelled, known[head:, i]) for i in range(3)], axis=1)
+    bound = 1.02 * needed(nodes).max()
     for spread in (3.0, 1.5, 0.75, 0.4):
         sigma = min(2 * spread, count / 8)
         pad = min(count - 2, int(4 * sigma) + 1)
         padded = np.concatenate([2 * way[0] - way[pad:0:-1], way, 2 * way[-1] - way[-2 : -pad - 2 : -1]])
         smooth = gaussian_filter1d(padded, sigma, axis=0)[pad : pad + count]
-        tried = elastica(smooth[1:, 0], smooth[1:, 1])
-        if (tried.valid & (tried.suspended < length)).all() and needed(tried).max() <= bound:
-            pose = join(take(rest, slice(0, 1)), tried)
-            break
-    return Path(join(take(nodes, slice(0, max(0, head - 1))), pose), head)
+        sheet = _along(nodes, head, smooth, cut)
+        if (sheet.valid & (sheet.suspended < length)).all() and needed(sheet).max() <= bound:
+            return sheet
+    return _along(nodes, head, way, cut)
+
+
+def _along(nodes: Elastica, head: int, way: FloatArray, cut: Callable[[FloatArray], FloatArray]) -> Elastica:
+    """Poses without moment on a way that goes on after the first `head` nodes, which are of the lift."""
+    from scipy.interpolate import CubicSpline
+
+    places = cut(np.concatenate([poses_of(nodes)[:head], way]))
+    low, high = places[places < head], places[places >= head]
+    lifted = np.interp(low, np.arange(head + 1), nodes.suspended[: head + 1])
+    lift_part = at_forces(np.stack([gentle(lifted), np.zeros_like(lifted), lifted], axis=1))
+    x, z = CubicSpline(np.arange(len(way)), way[:, :2])(high - head).T
+    return join(lift_part, elastica(x, z))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -15,7 +16,7 @@ from withe.folding.free_moment import Holding, Way
 from withe.folding.jaw import Jaw, inner_edge, outer_edge
 from withe.folding.manifold import elastica
 from withe.folding.paper import Paper
-from withe.folding.plans import FLAT, Plan
+from withe.folding.plans import FLAT, SHORT, Plan
 from withe.folding.sheets import Elastica, at_forces, at_poses, forces_of, join, poses_of, take
 from withe.folding.timing import evenly, travel_times
 
@@ -54,10 +55,14 @@ class _Task:
         sizes = (jaw.depth / lgb, jaw.finger / lgb, self.paper.thickness / lgb)
         return Holding(self.length, *sizes, self.curvature, self.uncertainty[0])
 
-    def outer(self, sheet: Elastica) -> FloatArray:
-        """Outer edges (x, z [m], angle) of sheets that hang from the jaw's inner edge."""
+    def outer(self, inner: FloatArray) -> FloatArray:
+        """Outer edges (x, z [m], angle) from the jaw's inner edges [Lgb]."""
         lgb = self.paper.gravito_bending_length
-        return outer_edge(poses_of(sheet) * [lgb, lgb, 1.0], self.jaw.depth)
+        return outer_edge(inner * [lgb, lgb, 1.0], self.jaw.depth)
+
+    def cut(self, count: int) -> Callable[[FloatArray], FloatArray]:
+        """Find places along inner edges that are as far from each other, in time."""
+        return lambda inner: evenly(self.outer(inner), count, self.speed, self.turning)
 
 
 def plan(
@@ -184,19 +189,20 @@ def _over_manifold(task: _Task) -> Plan:
     if nodes is None:
         ends = "the step of least force leads nowhere" if task.method == "local" else "those do not connect"
         raise ValueError(f"no path to {task.target:g} m over poses that lift less than {length:.2f} Lgb: {ends}")
-    path = moment_free.smoothed(nodes, length, task.holding.ratio)
-    sheet = path.at(evenly(task.outer(path.pose), _POSES, task.speed, task.turning))
+    sheet = moment_free.smoothed(nodes, length, task.holding.ratio, task.cut(_POSES))
     if not sheet.valid.all():
         raise ValueError(f"no path to {task.target:g} m: between poses of the grid there are some without equilibrium")
     _warn_of_slide(float(task.holding.ratio(sheet).max()), task)
-    return _finished(task, task.outer(sheet), sheet)
+    return _finished(task, task.outer(poses_of(sheet)), sheet)
 
 
 def replan(present: Plan, pose: npt.ArrayLike, slide: float) -> Plan:
     """Plan the rest of a fold anew, from where the jaw is and where the sheet has slid to.
 
-    Least accumulated force ratio over the manifold of poses without moment, whatever the present plan's method was; the
-    difference of the present angle to that manifold's is taken out evenly along the way [dissertation, (7.14)-(7.16)].
+    Without moment it is a search over the manifold again: by least slide if the present plan is of method "slip", or
+    else by least accumulated force ratio; the difference of the present angle to that manifold's is taken out evenly
+    along the way [dissertation, (7.14)-(7.16)]. With a free moment the present plan goes on: how its forces differ from
+    those at the pose is taken out over a third of the rest.
 
     Parameters
     ----------
@@ -214,7 +220,8 @@ def replan(present: Plan, pose: npt.ArrayLike, slide: float) -> Plan:
     Raises
     ------
     ValueError
-        A pose that no sheet without moment can be near, or from which there is no path.
+        A pose that no sheet without moment can be near, or from which there is no path; with a free moment one that is
+        too far from those of the present plan.
 
     Examples
     --------
@@ -229,11 +236,11 @@ def replan(present: Plan, pose: npt.ArrayLike, slide: float) -> Plan:
     task = _Task(
         paper=present.paper,
         target=present.target - present.offset,
-        method="ucs",
-        grasp="moment_free",
+        method="slip" if present.method == "slip" else "ucs",
+        grasp=present.grasp,
         jaw=present.jaw,
-        uncertainty=(0.0, 0.0),
-        curvature=2.5,
+        uncertainty=present.uncertainty,
+        curvature=present.curvature,
         speed=present.limits[0],
         turning=present.limits[1],
         acceleration=present.limits[2],
@@ -241,22 +248,49 @@ def replan(present: Plan, pose: npt.ArrayLike, slide: float) -> Plan:
     lgb = task.paper.gravito_bending_length
     angle = 2.0 * np.arctan2(qy, qw) % (2.0 * np.pi)
     inner = inner_edge(np.array([[x - slide, z, angle]]), task.jaw.depth)[0] / [lgb, lgb, 1.0]
+    wanted, forces = _on_from(present, inner) if task.grasp == "free" else _anew_from(task, inner)
+    sheet = at_poses(wanted, forces)
+    if not sheet.valid.all():
+        raise ValueError(f"pose must be nearer to those of a plan: no sheet is held on the way from {x:g}, {z:g} m")
+    return _finished(task, task.outer(poses_of(sheet)), sheet, offset=slide)
+
+
+def _anew_from(task: _Task, inner: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Poses of the jaw's inner edge, and forces near those of the sheet, by a search over the manifold."""
     start = elastica([inner[0]], [inner[1]])
     if not start.valid[0]:
-        raise ValueError(f"pose must be one of a sheet without moment, or near it: none has its edge at {x:g}, {z:g} m")
-    goal = _checked_goal(_goal(task), task)
-    nodes = moment_free.uniform_cost(task.length, goal, start)
-    if nodes is None:
-        raise ValueError(f"no path from {x:g}, {z:g} m to {task.target:g} m over poses without moment")
-    path = moment_free.smoothed(nodes, task.length, task.holding.ratio)
-    sheet = path.at(evenly(task.outer(path.pose), _POSES_OF_REST, task.speed, task.turning))
-    wanted = poses_of(sheet) + np.outer(np.linspace(1.0, 0.0, len(sheet.x)), [0.0, 0.0, inner[2] - start.angle[0]])
-    held = at_poses(wanted, forces_of(sheet))
-    if not held.valid.all():
         raise ValueError(
-            f"pose must be near those of a sheet without moment: its angle is off by {inner[2] - start.angle[0]:.2f}"
+            "pose must be one of a sheet without moment, or near it: none is lifted with the jaw's inner edge at "
+            f"{inner[0]:.2f}, {inner[1]:.2f} Lgb"
         )
-    return _finished(task, task.outer(held), held, offset=slide)
+    goal = _checked_goal(_goal(task), task)
+    if task.method == "slip":
+        nodes = moment_free.least_slide(task.length, task.paper.friction, goal, start)
+    else:
+        nodes = moment_free.uniform_cost(task.length, goal, start)
+    if nodes is None:
+        raise ValueError(f"no path from there to {task.target:g} m over poses without moment")
+    sheet = moment_free.smoothed(nodes, task.length, task.holding.ratio, task.cut(_POSES_OF_REST))
+    wanted = poses_of(sheet)
+    wanted[:, 2] += np.linspace(1.0, 0.0, len(wanted)) * (inner[2] - start.angle[0])
+    return wanted, forces_of(sheet)
+
+
+def _on_from(present: Plan, inner: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """The same, for a jaw that takes a moment, by going over to the present plan."""
+    known = present.sheet
+    away = np.abs(poses_of(known) - inner).max(axis=1)
+    begin = int(np.argmin(np.where(known.suspended > SHORT, away, np.inf)))
+    forces = forces_of(known)[begin:]
+    start = at_poses([inner], forces[:1])
+    if not start.valid[0]:
+        raise ValueError(f"pose must be near those of the plan: the nearest is off by {away[begin]:.2f} Lgb or rad")
+    index = np.linspace(0.0, len(forces) - 1.0, _POSES_OF_REST)
+    way = np.stack([np.interp(index, np.arange(len(forces)), forces[:, i]) for i in range(3)], axis=1)
+    left = np.clip(1.0 - 3.0 * np.linspace(0.0, 1.0, _POSES_OF_REST), 0.0, None)
+    way += np.outer(left, forces_of(start)[0] - forces[0])
+    sheet = at_forces(way)
+    return poses_of(sheet), forces_of(sheet)
 
 
 def _goal(task: _Task) -> Elastica | None:
@@ -315,11 +349,11 @@ def _free(task: _Task) -> Plan:
     way, holding = best
     places = free_moment.smoothed(way, holding, limit)
     sheet = at_forces(free_moment.forces_at(places))
-    index = evenly(task.outer(sheet), _POSES - 1, task.speed, task.turning)
+    index = task.cut(_POSES - 1)(poses_of(sheet))
     even = np.stack([np.interp(index, np.arange(len(places)), places[:, i]) for i in range(3)], axis=1)
     sheet = join(at_forces([FLAT]), at_forces(free_moment.forces_at(even)))
     _warn_of_slide(float(task.holding.ratio(sheet).max()), task)
-    return _finished(task, task.outer(sheet), sheet)
+    return _finished(task, task.outer(poses_of(sheet)), sheet)
 
 
 def _blocked(task: _Task) -> str:
@@ -356,6 +390,8 @@ def _finished(task: _Task, outer: FloatArray, sheet: Elastica | None, offset: fl
         offset=offset,
         side=side,
         clearance=clearance,
+        uncertainty=task.uncertainty,
+        curvature=task.curvature,
         poses=np.stack([x + offset, zero, z, zero, np.sin(0.5 * angle), zero, np.cos(0.5 * angle)], axis=1),
         angles=angle,
         times=travel_times(outer, task.speed, task.turning, task.acceleration),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -18,13 +18,15 @@ from withe.folding.figures import draw_fold, side_view
 from withe.folding.jaw import Jaw, inner_edge
 from withe.folding.paper import Paper
 from withe.folding.sheets import Elastica, at_forces, drag, forces_of, join, take
-from withe.io import written_beside
+from withe.io import pose_path, save_poses, written_beside
 
-__all__ = ["FLAT", "Plan"]
+__all__ = ["FLAT", "SHORT", "Plan"]
 
 FloatArray = npt.NDArray[np.float64]
 FLAT = (0.05, 0.0, 0.1)  # forces of a sheet of which next to nothing is lifted [w Lgb], [Lgb]
-_SHORT = 0.5  # the same of a sheet that a plan knows: poses say little of so short a part [Lgb]
+SHORT = 0.5  # the same of a sheet that a plan knows: poses say little of so short a part [Lgb]
+_GRAVITY = 9.81  # [m/s^2]
+_COAST = 5e-3  # [m]
 _LOW = 1e-5  # an edge less high than this lies on the table [Lgb]
 
 
@@ -56,6 +58,10 @@ class Plan:
     clearance : float [m]
         Least height of the fingers over the table while the edge looks back (angle > pi / 2), coming from `side`. At
         the start the lower finger needs the edge to hang over that of the table, or to be bent up.
+    uncertainty : tuple of float
+        Shares by which Lgb and friction may be other than thought.
+    curvature : float [1/Lgb]
+        Bound of a free moment's curvature.
     poses : ndarray of shape (n, 7) [m], [-]
         x, y, z and the quaternion x, y, z, w of the outer edge.
     angles : ndarray of shape (n,) [rad]
@@ -72,6 +78,8 @@ class Plan:
     offset: float
     side: str
     clearance: float
+    uncertainty: tuple[float, float]
+    curvature: float
     poses: FloatArray
     angles: FloatArray
     times: FloatArray
@@ -92,13 +100,30 @@ class Plan:
     def _motion(self) -> tuple[Elastica, FloatArray]:
         """From where the sheet first hangs freely; what is lifted less than that is lifted without force."""
         if self._foreseen is not None:
-            begin = int(np.argmax(self._foreseen.suspended > _SHORT))
+            begin = int(np.argmax(self._foreseen.suspended > SHORT))
             forces, ahead = forces_of(self._foreseen)[begin], take(self._foreseen, slice(0, begin))
         else:
             begin = int(np.argmax(self._inner[:, 1] > _LOW))
             forces, ahead = np.array(FLAT), at_forces([FLAT] * begin)
         sheet, slide = drag(self._inner[begin:], forces, self.paper.friction, self._length)
-        return join(ahead, sheet), np.concatenate([np.zeros(begin), slide])
+        sheet, slide = join(ahead, sheet), np.concatenate([np.zeros(begin), slide])
+        speed = np.abs(np.diff(slide)) * self.paper.gravito_bending_length / np.diff(self.times)
+        coasts = speed**2 > 2.0 * self.paper.friction * _GRAVITY * _COAST
+        lost = np.concatenate([[False], coasts]) | ~sheet.stable
+        lost[:begin] = False
+        known = np.cumsum(lost) == 0
+        return replace(sheet, valid=sheet.valid & known, stable=sheet.stable & known), slide
+
+    @property
+    def path(self) -> FloatArray:
+        """Rows t, x, y, z, qw, qx, qy, qz of shape (n, 8), for hands of a simulation, which have the scalar first.
+
+        >>> import withe
+        >>> plan = withe.folding.plan(withe.folding.Paper.a4())
+        >>> hand = scene.grasp(sheet, at=0.005, length=0.01, pose=plan.path[0, 1:])  # doctest: +SKIP
+        >>> simulation.move(hand, path=plan.path)  # doctest: +SKIP
+        """
+        return pose_path(self.times, self.poses)
 
     @property
     def sheet(self) -> Elastica:
@@ -120,11 +145,21 @@ class Plan:
     def slide(self) -> FloatArray:
         """How far the sheet has slid towards +x at each pose [m], of shape (n,), since the plan was made.
 
-        Predicted with exact elastica, what lies as a rigid body, and Coulomb's law with the friction of the paper; NaN
-        from where no equilibrium is within reach: there the sheet snaps.
+        Predicted with exact elastica, what lies as a rigid body, and Coulomb's law with the friction of the paper, for
+        a sheet without inertia; NaN from `jumps_at` on.
         """
         sheet, slide = self._motion
         return np.where(sheet.valid, slide * self.paper.gravito_bending_length, np.nan)
+
+    @property
+    def jumps_at(self) -> float | None:
+        """Time from which the slide is not predicted [s]; None where it is to the end.
+
+        There the sheet jumps: no equilibrium is within reach, or none that is stable, all of the sheet is lifted, or it
+        slides so fast that it would coast on by more than 5 mm, v^2 / (2 friction g).
+        """
+        lost = ~self._motion[0].valid
+        return float(self.times[np.argmax(lost)]) if lost.any() else None
 
     @cached_property
     def max_curvature(self) -> FloatArray:
@@ -188,6 +223,8 @@ class Plan:
             "grasp": self.grasp,
             "limits": dict(zip(("speed", "turning", "acceleration"), self.limits, strict=True)),
             "offset": self.offset,
+            "uncertainty": dict(zip(("gravito_bending_length", "friction"), self.uncertainty, strict=True)),
+            "curvature": self.curvature,
             "jaw": {**vars(self.jaw), "side": self.side, "clearance": self.clearance},
             "times": self.times.tolist(),
             "poses": self.poses.tolist(),
@@ -195,6 +232,7 @@ class Plan:
             "prediction": {
                 "slip_ratio": listed(self.slip_ratio),
                 "slide": listed(self.slide),
+                "jumps_at": self.jumps_at,
                 "max_curvature": listed(self.max_curvature),
             },
         }
@@ -206,7 +244,8 @@ class Plan:
         ----------
         path : path-like
             "NAME.csv": columns t, x, y, z, qx, qy, qz, qw, the fields of geometry_msgs' PoseArray and
-            trajectory_msgs' MultiDOFJointTrajectory; "NAME.json": everything.
+            trajectory_msgs' MultiDOFJointTrajectory, which `withe.io.load_poses` reads for a hand; "NAME.json":
+            everything.
 
         Returns
         -------
@@ -219,13 +258,9 @@ class Plan:
         """
         path = Path(path)
         if path.suffix == ".csv":
-            rows = np.column_stack([self.times, self.poses])
-            lines = [",".join(f"{value:.9g}" for value in row) for row in rows]
-            text = "\n".join(["t,x,y,z,qx,qy,qz,qw", *lines]) + "\n"
-        elif path.suffix == ".json":
-            text = json.dumps(self.to_dict(), indent=1)
-        else:
+            return save_poses(path, self.times, self.poses)
+        if path.suffix != ".json":
             raise ValueError(f"path must end in .csv or .json, got {path.name!r}")
         with written_beside(path) as beside:
-            beside.write_text(text, encoding="utf-8")
+            beside.write_text(json.dumps(self.to_dict(), indent=1), encoding="utf-8")
         return path

@@ -10,9 +10,21 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from withe._core import dragged_sheet, sheets_at_forces, sheets_at_poses
+from withe import _core
 
-__all__ = ["Elastica", "at_forces", "at_poses", "described", "drag", "forces_of", "join", "poses_of", "shared", "take"]
+__all__ = [
+    "Elastica",
+    "at_forces",
+    "at_poses",
+    "described",
+    "drag",
+    "forces_of",
+    "join",
+    "poses_of",
+    "shared",
+    "slides_to_rest",
+    "take",
+]
 
 FloatArray = npt.NDArray[np.float64]
 _LEAST_SHARE = 500  # sheets that are worth a thread of their own
@@ -118,14 +130,16 @@ def at_forces(forces: npt.ArrayLike, *, keep: bool = False) -> Elastica:
     `keep`: numbers of what is not valid too, for searches that pass through such.
     """
     forces = np.asarray(forces, dtype=float)
-    rows = shared(lambda share: sheets_at_forces(share, 0.0), forces.reshape(-1, 3))
+    rows = shared(lambda share: _core.sheets_at_forces(share, 0.0), forces.reshape(-1, 3))
     return described(rows, forces.shape[:-1], keep=keep)
 
 
 def at_poses(poses: npt.ArrayLike, forces: npt.ArrayLike) -> Elastica:
     """Equilibria of sheets held at poses (x, z, angle), each followed without a jump from one of known forces."""
     poses, forces = np.broadcast_arrays(np.asarray(poses, dtype=float), np.asarray(forces, dtype=float))
-    rows = shared(lambda share, known: sheets_at_poses(share, known, 0.0), poses.reshape(-1, 3), forces.reshape(-1, 3))
+    rows = shared(
+        lambda share, known: _core.sheets_at_poses(share, known, 0.0), poses.reshape(-1, 3), forces.reshape(-1, 3)
+    )
     return described(rows, poses.shape[:-1])
 
 
@@ -135,5 +149,19 @@ def drag(poses: npt.ArrayLike, forces: npt.ArrayLike, friction: float, length: f
     Returns the equilibria, not valid from where none is reached without a jump, and how far the sheet has slid
     towards its far edge [Lgb].
     """
-    rows, slides = dragged_sheet(np.asarray(poses, dtype=float), np.asarray(forces, dtype=float), friction, length, 0.0)
+    rows, slides = _core.dragged_sheet(
+        np.asarray(poses, dtype=float), np.asarray(forces, dtype=float), friction, length, 0.0
+    )
     return described(rows, (len(rows),)), slides
+
+
+def slides_to_rest(sheet: Elastica, friction: float, length: float) -> FloatArray:
+    """How far sheets slide while their jaws stand still, until friction holds them [Lgb]; infinite for those that snap.
+
+    What lies, of sheets `length` long, slides as a rigid body by Coulomb's law. `sheet`: of shape (n,).
+    """
+
+    def solve(forces: FloatArray) -> FloatArray:
+        return _core.slides_to_rest(forces, friction, length, 0.0)
+
+    return np.nan_to_num(np.abs(shared(solve, forces_of(sheet))), nan=np.inf)

@@ -8,6 +8,7 @@ from typing import Any, cast
 import numpy as np
 import numpy.typing as npt
 
+from withe.batch import Batch
 from withe.common import validation
 from withe.parts.applied_loads import AppliedLoads, Bearer
 from withe.parts.directory import Directory
@@ -310,6 +311,38 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
         if bending == "tangent":
             directory.parts.update({rod.name: rod.without_arcs() for rod in directory.all(RodPart)})
         return Simulation._build(directory, self._gravity.copy(), options)
+
+    def build_batch(self, n: int, *, workers: int | None = None, **options: Any) -> Batch:
+        """Build the scene many times over, for simulations that go side by side, as in reinforcement learning.
+
+        Parameters
+        ----------
+        n : int
+            How many simulations.
+        workers : int, optional
+            Number of threads that step them; by default one a processor.
+        **options
+            As in `build`.
+
+        Returns
+        -------
+        Batch
+
+        Raises
+        ------
+        ValueError
+            See `build`; or n or workers below 1.
+
+        Examples
+        --------
+        >>> batch = scene.build_batch(3, time_step=5e-3)
+        >>> batch.set(arm, youngs_modulus=[0.8e6, 1.0e6, 1.2e6])
+        >>> batch.step(10)
+        """
+        count = validation.integer(n, "n", 1, 1_000_000)
+        threads = None if workers is None else validation.integer(workers, "workers", 1, 4096)
+        first = self.build(**options)
+        return Batch([first, *(first.copy() for _ in range(count - 1))], threads)
 
     @property
     def _bearer(self) -> Bearer:

@@ -24,10 +24,10 @@ from withe.parts.kinds import (
 )
 from withe.parts.parameters import ACTING_WORDS, NATURAL_WORDS
 from withe.parts.springs import SPRING_WORDS
+from withe.simulation.motion import POSE_WORDS
 from withe.simulation.moves import Way
 from withe.simulation.session import Session
 from withe.simulation.unknowns import (
-    POSE_WORDS,
     SCENE_WORDS,
     OfRun,
     Reader,
@@ -181,13 +181,13 @@ class _Epoch:
 
     def _set_on_way(self, index: int, call: _Call, part: SupportPart) -> None:
         for word in POSE_WORDS:
-            before = self.ways.get((part.name, word))
-            start = before.weights(before.reached(call.time)) if before is not None else {-1: np.eye(3)}
-            moved = index if word in call.values else None
-            if moved is None and part.name in call.session.settings.paths:
-                start = {}
-            turn = call.values[word] if word == "rotation" and moved is not None else np.zeros(3)
-            self.ways[part.name, word] = Way(word, moved, call.time, call.over, turn, start)
+            if word in call.values:
+                before = self.ways.get((part.name, word))
+                start = before.weights(before.reached(call.time)) if before is not None else {-1: np.eye(3)}
+                turn = call.values[word] if word == "rotation" else np.zeros(3)
+                self.ways[part.name, word] = Way(word, index, call.time, call.over, turn, start)
+            elif (part.name, word) in call.session.settings.paths:
+                self.ways[part.name, word] = Way(word, None, call.time, 0.0)
 
     def weights(self, key: _Key, time: float) -> _Weights:
         """How much each call has in a natural shape at a time."""
@@ -270,7 +270,7 @@ class Ledger:
         epoch = self._epochs[int(np.searchsorted(self._steps, step, side="right"))]
         for key, way in epoch.ways.items():
             index, by = self._by_pose(epoch.session, key, found)
-            share = float(reached[index]) if len(reached) else 1.0
+            share = float(reached[index, POSE_WORDS.index(key[1])]) if len(reached) else 1.0
             for call, weight in way.weights(share).items():
                 if call >= 0:
                     sums = self._by_calls[call]

@@ -11,7 +11,7 @@ from withe.parts.handles import CustomForce
 from withe.parts.kinds import CustomForcePart, RodPart
 from withe.simulation.custom_forces import CustomForces
 from withe.simulation.loads import new_values
-from withe.simulation.motion import Path, Turn, Waypoints, evaluate_path
+from withe.simulation.motion import Path, Turn, Waypoints, evaluate_path, paths_by_owner
 from withe.simulation.obstacles import find_obstacle, obstacle_pose
 from withe.simulation.session import Session
 from withe.simulation.surfaces import follow_friction_fields
@@ -42,17 +42,21 @@ def apply_functions(session: Session, force_time: float, end_time: float) -> Non
                 session.world.set_load(index, value)
     if session.settings.friction_fields:
         follow_friction_fields(session)
-    for name, path in session.settings.paths.items():
+    for name, path, words in paths_by_owner(session.settings.paths):
         if name not in session.settings.supports and (obstacle := find_obstacle(session.directory, name)) is not None:
-            session.world.prescribe_obstacle(obstacle[0], *obstacle_pose(session, obstacle[0], path, end_time))
+            place, turn = obstacle_pose(session, obstacle[0], path, end_time)
+            session.world.prescribe_obstacle(
+                obstacle[0], place if "position" in words else None, turn if "rotation" in words else None
+            )
             continue
         index, support = session.settings.supports[name]
         if _finished(path, min(session.world.time, end_time)):
             continue
-        present = np.array(session.world.support_rotation(index))
         owner = f"{'hand' if support.grasp is not None else 'support'} {name!r}"
-        position, rotation = evaluate_path(path, end_time, present, support.kind != "pin", owner)
-        session.world.prescribe_support(index, position, rotation)
+        position, rotation = evaluate_path(path, end_time, support.kind != "pin", owner)
+        session.world.prescribe_support(
+            index, position if "position" in words else None, rotation if "rotation" in words else None
+        )
 
 
 def force_function(session: Session) -> CustomForces | None:
@@ -99,5 +103,5 @@ def _finished(path: Path, time: float) -> bool:
     """Whether a path has come to its end, and was followed there."""
     if not isinstance(path, Turn | Waypoints):
         return False
-    begin, end = path.times[0], path.times[-1]
+    begin, end = path.times.min(), path.times.max()
     return bool(time > end or (time == end and begin < end))

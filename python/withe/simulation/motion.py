@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -13,9 +13,12 @@ from withe.common import drawing, validation
 from withe.parts.hands import quaternion_matrix
 
 __all__ = [
+    "POSE_WORDS",
     "Path",
     "PathLike",
+    "PathTable",
     "Pose",
+    "PoseWord",
     "RotationLike",
     "Turn",
     "Waypoints",
@@ -23,11 +26,16 @@ __all__ = [
     "evaluate_path",
     "make_path",
     "oriented",
+    "paths_by_owner",
 ]
 
 FloatArray = npt.NDArray[np.float64]
-Pose = tuple[FloatArray, FloatArray]  # position (3,) [m], rotation (3, 3) from the drawn orientation
+# Position (3,) [m], rotation (3, 3) from the drawn orientation; None: not given.
+Pose = tuple[FloatArray | None, FloatArray | None]
 Path = Callable[[float], Any]
+PoseWord = Literal["position", "rotation"]
+POSE_WORDS: tuple[PoseWord, ...] = ("position", "rotation")
+PathTable = dict[tuple[str, PoseWord], Path]  # by the name of what is moved, and what is moved of it
 PathLike = Path | npt.ArrayLike | tuple[Path, Path]
 
 
@@ -49,38 +57,39 @@ def oriented(drawn_tangent: FloatArray, drawn_director: FloatArray, tangent: Flo
 
 @dataclass(frozen=True, eq=False)
 class Turn:
-    """A support on its way to a tangent and a roll; unlike a rotation matrix, it counts full turns.
+    """A rotation on its way to a tangent and a roll; unlike a rotation matrix, it counts full turns.
 
     Attributes
     ----------
-    positions : shape (2, 3) [m]
     tangents : shape (2, 3)
     rolls : shape (2,) [rad]
-    times : shape (2,) [s]
+    times : shape (2, 2) [s]
+        When the tangent sets out and is there, and when the roll.
     drawn : shape (2, 3)
         Tangent and first director as drawn.
     """
 
-    positions: FloatArray
     tangents: FloatArray
     rolls: FloatArray
     times: FloatArray
     drawn: FloatArray
 
-    def __call__(self, time: float) -> Pose:
-        """Position and rotation at a time."""
-        span = float(self.times[1] - self.times[0])
-        share = min(max((time - float(self.times[0])) / span, 0.0), 1.0) if span > 0.0 else 1.0
+    def __call__(self, time: float) -> FloatArray:
+        """Rotation at a time."""
+        share = self._share(0, time)
         swing = drawing.rotation_between(self.tangents[0], self.tangents[1], self._spare())
         axis, angle = axis_angle(swing)
         tangent = drawing.rotation_about(share * angle * axis) @ self.tangents[0]
-        position = (1.0 - share) * self.positions[0] + share * self.positions[1]
-        roll = (1.0 - share) * float(self.rolls[0]) + share * float(self.rolls[1])
-        return position, oriented(self.drawn[0], self.drawn[1], tangent, roll)
+        return oriented(self.drawn[0], self.drawn[1], tangent, self.roll_at(time))
 
     def roll_at(self, time: float) -> float:
         """Roll at a time [rad]."""
-        return float(np.interp(time, self.times, self.rolls)) if self.times[1] > self.times[0] else float(self.rolls[1])
+        share = self._share(1, time)
+        return (1.0 - share) * float(self.rolls[0]) + share * float(self.rolls[1])
+
+    def _share(self, way: int, time: float) -> float:
+        begin, end = self.times[way]
+        return float(min(max((time - begin) / (end - begin), 0.0), 1.0)) if end > begin else 1.0
 
     def _spare(self) -> FloatArray:
         return drawing.default_normal(self.tangents[0])
@@ -88,7 +97,6 @@ class Turn:
     def arrays(self) -> dict[str, FloatArray]:
         """Its numbers, for a file."""
         return {
-            "positions": self.positions,
             "tangents": self.tangents,
             "rolls": self.rolls,
             "times": self.times,
@@ -126,6 +134,14 @@ class Waypoints:
     def arrays(self) -> dict[str, FloatArray]:
         """Its numbers, for a file."""
         return {"times": self.times, "positions": self.positions, "rotations": self.rotations}
+
+
+def paths_by_owner(paths: PathTable) -> list[tuple[str, Path, set[PoseWord]]]:
+    """Each path once: whose it is, and what it moves of that."""
+    found: dict[tuple[str, int], tuple[str, Path, set[PoseWord]]] = {}
+    for (name, word), path in paths.items():
+        found.setdefault((name, id(path)), (name, path, set()))[2].add(word)
+    return list(found.values())
 
 
 def make_path(path: PathLike, turns: bool, owner: str) -> Path:
@@ -180,7 +196,7 @@ def axis_angle(rotation: FloatArray) -> tuple[FloatArray, float]:
     return np.asarray(vectors[:, int(np.argmax(values))], np.float64), np.pi
 
 
-def evaluate_path(path: Path, time: float, present: FloatArray, turns: bool, owner: str) -> Pose:
+def evaluate_path(path: Path, time: float, turns: bool, owner: str) -> Pose:
     """Position and rotation that a path gives, checked.
 
     Parameters
@@ -188,8 +204,6 @@ def evaluate_path(path: Path, time: float, present: FloatArray, turns: bool, own
     path : callable
         Returns a position, a position and a rotation, or seven numbers x, y, z, qw, qx, qy, qz.
     time : float [s]
-    present : ndarray of shape (3, 3)
-        Rotation to keep where the path gives none.
     turns : bool
         Whether the support holds a direction at all.
     owner : str
@@ -201,7 +215,7 @@ def evaluate_path(path: Path, time: float, present: FloatArray, turns: bool, own
         Anything else, or a rotation for a support that holds none.
     """
     if isinstance(path, Turn):
-        return path(time)
+        return None, path(time)
     what = f"path of {owner} at t = {time:g}"
     value = path(time)
     if turns and isinstance(value, np.ndarray) and value.shape == (7,):
@@ -212,4 +226,4 @@ def evaluate_path(path: Path, time: float, present: FloatArray, turns: bool, own
         if not turns:
             raise ValueError(f"{what} must be a position only: a pin holds no direction")
         return position, validation.rotation_matrix(value[1], f"rotation on the {what}")
-    return validation.vector(value, what), present
+    return validation.vector(value, what), None

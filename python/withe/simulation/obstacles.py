@@ -47,13 +47,12 @@ def move_obstacle(
             raise ValueError(f"path of {name!r} must be given alone")
         validation.function(path, f"path of {name!r}")
         obstacle_pose(session, index, path, session.world.time)
-        session.settings.paths[name] = path
+        session.settings.paths[name, "position"] = session.settings.paths[name, "rotation"] = path
         return
     if position is None and roll is None:
         raise ValueError(f"position, roll or path of {name!r} must be given")
-    place, turn = np.array(session.world.obstacle_position(index)), np.array(session.world.obstacle_turn(index))
-    if position is not None:
-        place = validation.vector(position, f"position of {name!r}")
+    place = None if position is None else validation.vector(position, f"position of {name!r}")
+    turn = None
     axis = session.directory.all(ObstaclePart)[index].axis
     if (tangent is None) != (axis is not None or roll is None):
         what = "a sphere turns about the tangent that is given with a roll"
@@ -66,16 +65,20 @@ def move_obstacle(
         about = validation.unit_vector(tangent, f"tangent of {name!r}") if axis is None else axis
         turn = validation.number(roll, f"roll of {name!r}") * about
     session.world.move_obstacle(index, place, turn, over)
-    session.settings.paths.pop(name, None)
+    # What is not given goes on as it does.
+    if place is not None:
+        session.settings.paths.pop((name, "position"), None)
+    if turn is not None:
+        session.settings.paths.pop((name, "rotation"), None)
 
 
-def obstacle_pose(session: Session, index: int, path: Path, time: float) -> tuple[FloatArray, FloatArray]:
-    """Where the path of an obstacle leads, and how it has turned since it was drawn [rad]."""
+def obstacle_pose(session: Session, index: int, path: Path, time: float) -> tuple[FloatArray, FloatArray | None]:
+    """Where the path of an obstacle leads, and how it has turned since it was drawn [rad], if the path says."""
     part = session.directory.all(ObstaclePart)[index]
     value = path(time)
     what = f"path of {part.name!r} at t = {time:g}"
     if not (isinstance(value, tuple | list) and len(value) == 2):
-        return validation.vector(value, what), np.array(session.world.obstacle_turn(index))
+        return validation.vector(value, what), None
     place, roll = validation.vector(value[0], f"position on the {what}"), f"roll on the {what}"
     if part.axis is None:
         return place, validation.vector(value[1], roll)

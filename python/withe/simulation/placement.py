@@ -134,7 +134,10 @@ class Placement:
         over: float = 0.0,
         path: PathLike | None = None,
     ) -> None:
-        """Move a support or an obstacle, or let it move along a path from now on. What is not given stays as it is.
+        """Move a support or an obstacle, or let it move along a path from now on.
+
+        What is not given goes on as it does: a position, a tangent, a rotation or a roll that is on its way arrives
+        when it was to arrive, and a path goes on in what else it gives.
 
         Parameters
         ----------
@@ -160,7 +163,8 @@ class Placement:
             as a CubicSpline and a RotationSpline of SciPy; of an obstacle, a function that returns a position and a
             roll (of a sphere, times the axis, shape (3,)). Or rows (t, x, y, z) or (t, x, y, z, qw, qx, qy, qz), times
             of the simulation [s] that grow, and unit quaternions with the scalar first: evenly from one to the next,
-            at rest before the first and after the last.
+            at rest before the first and after the last. `path` of a plan has such rows, and `withe.io.load_poses` reads
+            them from tables of poses, which have the scalar last.
 
         Raises
         ------

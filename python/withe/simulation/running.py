@@ -16,7 +16,7 @@ from withe.recording.record import Record
 from withe.simulation.loop import Run
 from withe.simulation.simulation import Simulation
 
-__all__ = ["run_many"]
+__all__ = ["processors", "run_many"]
 
 
 def run_many(
@@ -67,7 +67,7 @@ def run_many(
     if len({id(simulation) for simulation in listed}) < len(listed):
         raise ValueError("simulations must differ: one is there twice, take a copy()")
     validation.choice(errors, "errors", ("raise", "return"))
-    threads = _processors() if workers is None else validation.integer(workers, "workers", 1, 4096)
+    threads = processors() if workers is None else validation.integer(workers, "workers", 1, 4096)
     runs = [
         Run(simulation, simulation._stepping, duration, record_every, before_step, until, record)
         for simulation in listed
@@ -121,6 +121,7 @@ def _result(future: Future[Record], errors: str) -> Record | Exception:
     return error if error is not None else future.result()
 
 
-def _processors() -> int:
+def processors() -> int:
+    """How many processors this process may use."""
     affinity: Any = getattr(os, "sched_getaffinity", None)
     return max(1, len(affinity(0)) if affinity is not None else os.cpu_count() or 1)

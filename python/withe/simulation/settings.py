@@ -11,7 +11,7 @@ import numpy.typing as npt
 from withe.parts.friction import Coefficients
 from withe.parts.kinds import LoadPart, SupportPart
 from withe.parts.parameters import RodParameters
-from withe.simulation.motion import Path
+from withe.simulation.motion import PathTable
 
 __all__ = ["Settings"]
 
@@ -32,8 +32,8 @@ class Settings:
         Those that hold, with their index in the engine.
     functions : dict of str to callable
         Loads that vary, by name.
-    paths : dict of str to callable
-        Supports that move along a path, by name.
+    paths : dict of (str, {"position", "rotation"}) to callable
+        Supports and obstacles that move along a path, by name, and what of them does.
     friction_fields : dict of int to (int, str, Coefficients)
         Friction that varies over an obstacle: by the pair of the engine, the rod, the obstacle's name and the field.
     frictions : dict of tuple of str to Coefficients
@@ -49,7 +49,7 @@ class Settings:
     gravity: FloatArray
     supports: dict[str, tuple[int, SupportPart]]
     functions: dict[str, Callable[[float], npt.ArrayLike]] = field(default_factory=dict)
-    paths: dict[str, Path] = field(default_factory=dict)
+    paths: PathTable = field(default_factory=dict)
     friction_fields: dict[int, tuple[int, str, Coefficients]] = field(default_factory=dict)
     frictions: dict[tuple[str, ...], Coefficients] = field(default_factory=dict)
     loads: dict[str, LoadPart] = field(default_factory=dict)

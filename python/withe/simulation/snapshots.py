@@ -17,15 +17,15 @@ from withe.parts.directory import Directory
 from withe.parts.hands import pose_of
 from withe.parts.kinds import LOAD_KINDS, SUPPORT_KINDS, Grasp, LoadPart, ObstaclePart, SupportPart
 from withe.parts.parameters import RodParameters
-from withe.simulation.motion import Path, Turn, Waypoints
+from withe.simulation.motion import POSE_WORDS, PathTable, Turn, Waypoints
 from withe.simulation.session import Session
 from withe.simulation.settings import Settings
 
-__all__ = ["Snapshot", "restore"]
+__all__ = ["Snapshot", "adopt", "matched", "restore"]
 
 FloatArray = npt.NDArray[np.float64]
 
-_FILE_VERSION = 3
+_FILE_VERSION = 4
 
 
 class Snapshot:
@@ -52,7 +52,7 @@ class Snapshot:
 
     def _function_names(self) -> tuple[str, ...]:
         """Loads, supports and obstacles whose functions no file can hold."""
-        paths = (name for name, path in self._settings.paths.items() if not isinstance(path, Turn | Waypoints))
+        paths = (name for (name, _), path in self._settings.paths.items() if not isinstance(path, Turn | Waypoints))
         fields = (obstacle for _, obstacle, _ in self._settings.friction_fields.values())
         return tuple(sorted({*self._settings.functions, *paths, *fields, *self._missing}))
 
@@ -60,7 +60,7 @@ class Snapshot:
         settings = self._settings.copy()
         settings.functions = {}
         settings.loads = {name: replace(load, function=None) for name, load in settings.loads.items()}
-        settings.paths = {name: path for name, path in settings.paths.items() if isinstance(path, Turn | Waypoints)}
+        settings.paths = {key: path for key, path in settings.paths.items() if isinstance(path, Turn | Waypoints)}
         settings.friction_fields, settings.frictions = {}, {}
         return {
             "_state": self._state,
@@ -97,9 +97,10 @@ class Snapshot:
             entry = {"name": name, "index": index, "kind": part.kind, "node": part.node_name}
             supports.append(entry | (_written(part.grasp) if part.grasp is not None else {}))
             arrays[f"support_{number}_free"] = part.free
-            turn = settings.paths.get(name)
-            if isinstance(turn, Turn | Waypoints):
-                arrays |= {f"support_{number}_{word}": values for word, values in turn.arrays().items()}
+            for half in POSE_WORDS:
+                moving = settings.paths.get((name, half))
+                if isinstance(moving, Turn | Waypoints):
+                    arrays |= {f"support_{number}_{half}_{word}": values for word, values in moving.arrays().items()}
         loads = []
         for number, load in enumerate(settings.loads.values()):
             loads.append({"name": load.name, "kind": load.kind, "node": load.node, "follower": load.follower})
@@ -146,7 +147,7 @@ class Snapshot:
             }
             rods.append(RodParameters.from_arrays(mine, len(mine["stretch_stiffness"]), f"rod {index}"))
         supports: dict[str, tuple[int, SupportPart]] = {}
-        paths: dict[str, Path] = {}
+        paths: PathTable = {}
         for number, entry in enumerate(header["supports"]):
             name, kind = str(entry["name"]), validation.choice(entry["kind"], "kind", SUPPORT_KINDS)
             free = validation.number_array(arrays[f"support_{number}_free"], "free", (3, 3))
@@ -154,30 +155,9 @@ class Snapshot:
             # Which node that is, the simulation that restores it knows by the name.
             grasp = _read(entry) if kind == "hand" else None
             supports[name] = index, SupportPart(name, kind, (-1, -1), str(entry["node"]), free, grasp)  # type: ignore[arg-type]
-            if f"support_{number}_drawn" in arrays:
-                paths[name] = Turn(
-                    *(
-                        validation.number_array(arrays[f"support_{number}_{word}"], word, shape)
-                        for word, shape in (
-                            ("positions", (2, 3)),
-                            ("tangents", (2, 3)),
-                            ("rolls", (2,)),
-                            ("times", (2,)),
-                            ("drawn", (2, 3)),
-                        )
-                    )
-                )
-            elif f"support_{number}_times" in arrays:
-                paths[name] = Waypoints(
-                    *(
-                        validation.number_array(arrays[f"support_{number}_{word}"], word, shape)
-                        for word, shape in (
-                            ("times", ("poses",)),
-                            ("positions", ("poses", 3)),
-                            ("rotations", ("poses", 3, 3)),
-                        )
-                    )
-                )
+            for half in POSE_WORDS:
+                if (way := _read_path(arrays, f"support_{number}_{half}_")) is not None:
+                    paths[name, half] = way
         loads: dict[str, LoadPart] = {}
         for number, entry in enumerate(header.get("loads", [])):  # which files had none of at first
             name, kind = str(entry["name"]), validation.choice(entry["kind"], "kind", LOAD_KINDS)
@@ -217,8 +197,18 @@ def restore(session: Session, snapshot: Snapshot) -> None:
     ValueError
         A snapshot of another scene, a damaged one, or one that needs functions of time that the session does not have.
     """
-    settings = _matched(snapshot, session.settings, session.directory, session.scene)
+    settings = matched(session, snapshot)
     session.world.restore(snapshot._state)
+    adopt(session, settings)
+
+
+def matched(session: Session, snapshot: Snapshot) -> Settings:
+    """What `adopt` takes over once the engine is back at a snapshot; see `restore`."""
+    return _matched(snapshot, session.settings, session.directory, session.scene)
+
+
+def adopt(session: Session, settings: Settings) -> None:
+    """Take over settings of a snapshot to which the engine went back."""
     parts = session.directory.parts
     for name in set(parts) - set(session.scene.parts) - set(settings.supports):
         del parts[name]
@@ -263,8 +253,9 @@ def _matched(snapshot: Snapshot, mine: Settings, directory: Directory, scene: Di
         varies = any(obstacle == name for _, obstacle, _ in mine.friction_fields.values())
         if varies:
             settings.friction_fields, settings.frictions = dict(mine.friction_fields), dict(mine.frictions)
-        if (name in settings.supports or isinstance(drawn, ObstaclePart)) and name in mine.paths:
-            settings.paths[name] = mine.paths[name]
+        own: PathTable = {key: path for key, path in mine.paths.items() if key[0] == name}
+        if (name in settings.supports or isinstance(drawn, ObstaclePart)) and own:
+            settings.paths = own | settings.paths
         elif varies:
             continue
         elif name in mine.functions:
@@ -276,6 +267,19 @@ def _matched(snapshot: Snapshot, mine: Settings, directory: Directory, scene: Di
                 f"snapshot needs the function of time of {name!r}, which no file holds: set it on this simulation first"
             )
     return settings
+
+
+def _read_path(arrays: dict[str, npt.NDArray[Any]], prefix: str) -> Turn | Waypoints | None:
+    """That along which something moves, if it is in a file."""
+
+    def read(*shapes: tuple[str, tuple[int | str, ...]]) -> list[FloatArray]:
+        return [validation.number_array(arrays[prefix + word], word, shape) for word, shape in shapes]
+
+    if prefix + "drawn" in arrays:
+        return Turn(*read(("tangents", (2, 3)), ("rolls", (2,)), ("times", (2, 2)), ("drawn", (2, 3))))
+    if prefix + "times" in arrays:
+        return Waypoints(*read(("times", ("poses",)), ("positions", ("poses", 3)), ("rotations", ("poses", 3, 3))))
+    return None
 
 
 def _written(grasp: Grasp) -> dict[str, Any]:

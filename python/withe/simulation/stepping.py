@@ -23,7 +23,7 @@ from withe.simulation.session import Session
 from withe.simulation.supports import find_support
 from withe.simulation.unknowns import Unknown
 
-__all__ = ["Stepping"]
+__all__ = ["Stepping", "convergence_error", "pass_on"]
 
 
 class Stepping:
@@ -157,18 +157,28 @@ class Stepping:
         try:
             yield
         except _core.ConvergenceFailure as failure:
-            message, time, step, rod, node, residual = failure.args
-            name = self.session.directory.layout.rods[rod].name if rod >= 0 else None
-            raise ConvergenceError(message, time, step, name, node if node >= 0 else None, residual) from None
+            raise convergence_error(self.session, failure.args) from None
         finally:
-            if warning := world.take_warning():
-                warnings.warn(warning, CoarseMeshWarning, stacklevel=_levels_to_user())
-            if warning := world.take_step_warning():
-                warnings.warn(warning, CoarseStepWarning, stacklevel=_levels_to_user())
+            pass_on(world.take_warning(), world.take_step_warning())
+
+
+def convergence_error(session: Session, numbers: tuple[Any, ...]) -> ConvergenceError:
+    """A failure of the engine, with the names of a scene."""
+    message, time, step, rod, node, residual = numbers
+    name = session.directory.layout.rods[rod].name if rod >= 0 else None
+    return ConvergenceError(message, time, step, name, node if node >= 0 else None, residual)
+
+
+def pass_on(mesh: str, steps: str) -> None:
+    """Give warnings of the engine, of coarse meshes and coarse steps, where there are any."""
+    if mesh:
+        warnings.warn(mesh, CoarseMeshWarning, stacklevel=_levels_to_user())
+    if steps:
+        warnings.warn(steps, CoarseStepWarning, stacklevel=_levels_to_user())
 
 
 def _levels_to_user() -> int:
-    """How many calls lie between what calls this and the line outside of withe that led here."""
+    """How many calls lie between what warns and the line outside of withe that led here."""
     level, frame = 1, sys._getframe(1)
     while frame.f_back is not None and frame.f_globals.get("__name__", "").split(".")[0] in ("withe", "contextlib"):
         frame = frame.f_back

@@ -12,7 +12,16 @@ from withe.parts.description import describe_support
 from withe.parts.handles import Handle, NodeHandle, Support
 from withe.parts.kinds import SupportPart
 from withe.parts.supports import check_not_held
-from withe.simulation.motion import PathLike, RotationLike, Turn, axis_angle, evaluate_path, make_path, oriented
+from withe.simulation.motion import (
+    POSE_WORDS,
+    PathLike,
+    RotationLike,
+    Turn,
+    axis_angle,
+    evaluate_path,
+    make_path,
+    oriented,
+)
 from withe.simulation.session import Session
 
 __all__ = ["find_support", "hold", "move_support", "release"]
@@ -33,7 +42,8 @@ def release(session: Session, support: Handle | str) -> None:
     index, part = find_support(session, support)
     session.world.remove_support(index)
     del session.settings.supports[part.name]
-    session.settings.paths.pop(part.name, None)
+    for word in POSE_WORDS:
+        session.settings.paths.pop((part.name, word), None)
     if part.name not in session.scene.parts:
         session.directory.remove(part.name)
 
@@ -81,8 +91,10 @@ def move_support(
         if any(value is not None for value in (position, rotation, tangent, roll)) or over != 0.0:
             raise ValueError(f"path of {owner} must be given alone")
         way = make_path(path, turns, owner)
-        evaluate_path(way, session.world.time, session.world.support_rotation(index), turns, owner)
-        session.settings.paths[part.name] = way
+        _, turned = evaluate_path(way, session.world.time, turns, owner)
+        session.settings.paths[part.name, "position"] = way
+        if turned is not None or (part.name, "rotation") not in session.settings.paths:
+            session.settings.paths[part.name, "rotation"] = way
         session.note("move", part, {})
         return
     if rotation is not None and (tangent is not None or roll is not None):
@@ -90,35 +102,33 @@ def move_support(
     if not turns and any(value is not None for value in (rotation, tangent, roll)):
         raise ValueError(f"rotation, tangent and roll of {owner} must be None: a pin holds no direction")
     over = validation.non_negative(over, "over")
-    target = np.array(session.world.support_position(index))
-    if position is not None:
-        target = validation.vector(position, f"position of {owner}")
-    if tangent is None and roll is None:
-        matrix = np.array(session.world.support_rotation(index))
-        if rotation is not None:
-            matrix = validation.rotation_matrix(rotation, f"rotation of {owner}")
-        given = {"position": target} if position is not None else {}
-        if rotation is not None and session.journal is not None:
-            axis, angle = axis_angle(matrix @ np.array(session.world.support_rotation(index)).T)
-            given["rotation"] = angle * axis
-        session.world.move_support(index, target, matrix, over)
-        session.settings.paths.pop(part.name, None)
-        session.note("move", part, given, over)
-        return
-    session.settings.paths[part.name] = _turn(session, index, part, target, tangent, roll, over)
-    session.note("move", part, {})
+    target = None if position is None else validation.vector(position, f"position of {owner}")
+    matrix = None if rotation is None else validation.rotation_matrix(rotation, f"rotation of {owner}")
+    turn = None if tangent is None and roll is None else _turn(session, index, part, tangent, roll, over)
+    given = {} if target is None else {"position": target}
+    if matrix is not None and session.journal is not None:
+        axis, angle = axis_angle(matrix @ np.array(session.world.support_rotation(index)).T)
+        given["rotation"] = angle * axis
+    session.world.move_support(index, target, matrix, over)
+    # What is not given goes on as it does.
+    if target is not None:
+        session.settings.paths.pop((part.name, "position"), None)
+    if matrix is not None:
+        session.settings.paths.pop((part.name, "rotation"), None)
+    if turn is not None:
+        session.settings.paths[part.name, "rotation"] = turn
+    session.note("move", part, given, over)
 
 
 def _turn(
     session: Session,
     index: int,
     part: SupportPart,
-    target: FloatArray,
     tangent: npt.ArrayLike | None,
     roll: float | None,
     over: float,
 ) -> Turn:
-    """The way of a support from where it is to a tangent and a roll."""
+    """The way of a support from where it is to a tangent and a roll; one that is not given goes on as it does."""
     rod = session.directory.rod(session.directory.layout.rods[part.node[0]].name)
     if part.grasp is not None:
         drawn = np.eye(3)[2], np.eye(3)[0]
@@ -128,34 +138,55 @@ def _turn(
         edge = min(part.node[1], len(rod.tangents) - 1)
         drawn = rod.tangents[edge], rod.directors[edge]
     now = session.world.time
-    matrix = np.array(session.world.support_rotation(index))
-    start_tangent = matrix @ drawn[0]
-    start_tangent /= np.linalg.norm(start_tangent)
-    flat = oriented(drawn[0], drawn[1], start_tangent, 0.0) @ drawn[1]
-    turned = matrix @ drawn[1]
-    start_roll = float(np.arctan2(np.cross(flat, turned) @ start_tangent, flat @ turned))
-    before = session.settings.paths.get(part.name)
+    start_tangent, start_roll = _tangent_and_roll(np.array(session.world.support_rotation(index)), drawn)
+    # Where it goes without this.
+    before = session.settings.paths.get((part.name, "rotation"))
     if isinstance(before, Turn):
-        full_turn = 2.0 * np.pi
-        start_roll += full_turn * float(np.round((before.roll_at(now) - start_roll) / full_turn))
+        start_roll = _beside(before.roll_at(now), start_roll)
+        end_tangent, end_roll = before.tangents[1], float(before.rolls[1])
+        tangent_end, roll_end = np.maximum(before.times[:, 1], now)
+    else:
+        leads_to, end = session.world.support_turn(index)
+        end_tangent, end_roll = _tangent_and_roll(np.array(leads_to), drawn)
+        end_roll = _beside(start_roll, end_roll)
+        tangent_end = roll_end = max(end, now)
     owner = _owner(part)
-    end_tangent = start_tangent if tangent is None else validation.unit_vector(tangent, f"tangent of {owner}")
-    end_roll = start_roll if roll is None else validation.number(roll, f"roll of {owner}")
-    # Rotations at the ends of a step do not tell full turns between them.
-    step = float(session.options.time_step)
-    way = abs(end_roll - start_roll)
-    if way * min(step / over if over > 0.0 else 1.0, 1.0) > np.pi:
-        raise ValueError(
-            f"roll of {owner} must turn by at most half a turn in a time step, got {end_roll - start_roll:g} rad "
-            f"{'at once' if over == 0.0 else f'over {over:g} s'}: take over={1.5 * way / np.pi * step:.2g} or more"
-        )
+    if tangent is not None:
+        end_tangent, tangent_end = validation.unit_vector(tangent, f"tangent of {owner}"), now + over
+    if roll is not None:
+        end_roll, roll_end = validation.number(roll, f"roll of {owner}"), now + over
+        _check_turns(session, end_roll - start_roll, over, owner)
     return Turn(
-        positions=np.stack([np.array(session.world.support_position(index)), target]),
         tangents=np.stack([start_tangent, end_tangent]),
         rolls=np.array([start_roll, end_roll]),
-        times=np.array([now, now + over]),
+        times=np.array([(now, tangent_end), (now, roll_end)]),
         drawn=np.stack(drawn),
     )
+
+
+def _tangent_and_roll(rotation: FloatArray, drawn: tuple[FloatArray, FloatArray]) -> tuple[FloatArray, float]:
+    """Where a rotation points, and by how much it rolls about that, from -pi to pi."""
+    tangent = rotation @ drawn[0]
+    tangent /= np.linalg.norm(tangent)
+    flat = oriented(drawn[0], drawn[1], tangent, 0.0) @ drawn[1]
+    turned = rotation @ drawn[1]
+    return tangent, float(np.arctan2(np.cross(flat, turned) @ tangent, flat @ turned))
+
+
+def _beside(known: float, roll: float) -> float:
+    """A roll, and full turns, that is nearest to another."""
+    full_turn = 2.0 * np.pi
+    return roll + full_turn * float(np.round((known - roll) / full_turn))
+
+
+def _check_turns(session: Session, way: float, over: float, owner: str) -> None:
+    """Rotations at the ends of a step do not tell full turns between them."""
+    step = float(session.options.time_step)
+    if abs(way) * min(step / over if over > 0.0 else 1.0, 1.0) > np.pi:
+        raise ValueError(
+            f"roll of {owner} must turn by at most half a turn in a time step, got {way:g} rad "
+            f"{'at once' if over == 0.0 else f'over {over:g} s'}: take over={1.5 * abs(way) / np.pi * step:.2g} or more"
+        )
 
 
 def _owner(part: SupportPart) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -28,11 +28,11 @@ from withe.parts.parameters import ACTING_WORDS, NATURAL_WORDS, ROD_WORDS, RodPa
 from withe.parts.springs import SPRING_WORDS
 from withe.simulation.drawn import points_reader
 from withe.simulation.loads import load_rows
+from withe.simulation.motion import POSE_WORDS
 from withe.simulation.session import Session
 
 __all__ = [
     "INITIAL_WORDS",
-    "POSE_WORDS",
     "SCENE_WORDS",
     "OfRun",
     "Reader",
@@ -65,8 +65,6 @@ Reader = Callable[[_core.EquilibriumGradient | OfRun], Any]
 
 INITIAL_WORDS = ("initial_positions", "initial_velocities")
 SCENE_WORDS = ("gravity", "friction", "slip_tolerance")
-PoseWord = Literal["position", "rotation"]
-POSE_WORDS: tuple[PoseWord, ...] = ("position", "rotation")
 
 
 def unknown_readers(session: Session, wrt: Sequence[Unknown], *, may_be_empty: bool = False) -> list[Reader]:

@@ -1,0 +1,260 @@
+"""Batches: many simulations of one shape, stepped in one call."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any, SupportsIndex, SupportsInt, overload
+
+import numpy as np
+import numpy.typing as npt
+
+from withe.batch.lanes import Lanes, integer_workers
+from withe.batch.reading import Reading
+from withe.batch.setting import Setting
+from withe.common import validation
+from withe.errors import ConvergenceError
+from withe.simulation.functions import force_function, step_callback
+from withe.simulation.running import processors
+from withe.simulation.session import Session
+from withe.simulation.simulation import Simulation
+from withe.simulation.snapshots import Snapshot, adopt, matched
+from withe.simulation.stepping import convergence_error, pass_on
+
+__all__ = ["Batch"]
+
+_MAX_STEPS = 2**31 - 1
+
+
+class Batch(Setting, Reading):
+    """Many simulations of one shape, stepped in one call over threads, and read out into one array.
+
+    Each goes on to the bit as it would alone, for any number of workers. `batch[i]` is one of them, a `Simulation` that
+    may be set, read, moved and clamped by itself between steps. One whose step cannot be solved has failed: it stays in
+    its last accepted state and is passed over, until it is restored, reset or replaced, and the others go on.
+
+    Parameters
+    ----------
+    simulations : iterable of Simulation
+        All different, with the same rods and nodes, as many obstacles, and the same time_step. Numbers may differ:
+        materials, radii, places of obstacles, options of the solver. `Scene.build_batch` makes them of one scene.
+    workers : int, optional
+        Number of threads; by default one a processor.
+
+    Raises
+    ------
+    ValueError
+        None, something that is not a simulation, one that is there twice or has another shape, or workers below 1.
+
+    Examples
+    --------
+    >>> import withe
+    >>> batch = withe.Batch([scene.build(time_step=5e-3) for _ in range(3)], workers=2)
+    >>> batch.set_natural_curvature(arm, [(0, 2.0), (0, 4.0), (0, 6.0)], over=0.1)
+    >>> batch.step(20)
+    >>> batch.positions(arm).shape
+    (3, 31, 3)
+    """
+
+    def __init__(self, simulations: Iterable[Simulation], workers: int | None = None) -> None:
+        try:
+            listed = list(simulations)
+        except TypeError:
+            raise ValueError(f"simulations must be a list, got {type(simulations).__name__}") from None
+        for index, simulation in enumerate(listed):
+            if not isinstance(simulation, Simulation):
+                raise ValueError(f"simulations must be withe.Simulation, got {type(simulation).__name__} at [{index}]")
+        self._lanes = Lanes(listed, integer_workers(workers, processors()))
+
+    # Simulations
+
+    def __len__(self) -> int:
+        return len(self._lanes)
+
+    def __iter__(self) -> Iterator[Simulation]:
+        return iter(self._lanes.simulations)
+
+    @overload
+    def __getitem__(self, index: int) -> Simulation: ...
+
+    @overload
+    def __getitem__(self, index: str) -> Any: ...
+
+    def __getitem__(self, index: int | str) -> Any:
+        """One simulation, by its number; or the handle of the part, node or edge of a name."""
+        if isinstance(index, str):
+            return self._lanes.first[index]
+        return self._lanes.simulations[index]
+
+    def __setitem__(self, index: int, simulation: Simulation) -> None:
+        """Put another simulation of the same shape in the place of one."""
+        size = len(self)
+        number = validation.integer(index, "index", -size, size - 1) % size
+        if not isinstance(simulation, Simulation):
+            raise ValueError(f"simulation must be a withe.Simulation, got {type(simulation).__name__}")
+        self._lanes.engine.replace(number, simulation._session.world)
+        self._lanes.simulations[number] = simulation
+
+    @property
+    def workers(self) -> int:
+        """Number of threads."""
+        return int(self._lanes.engine.workers)
+
+    @property
+    def time_step(self) -> float:
+        """As it was given to `Scene.build` [s]."""
+        return self._lanes.first.time_step
+
+    def __repr__(self) -> str:
+        rods = ", ".join(rod.name for rod in self.rods)
+        return f"Batch({len(self)} simulations, {self.workers} workers; rods {rods})"
+
+    # Stepping
+
+    def step(self, count: int = 1, lanes: npt.ArrayLike | None = None) -> None:
+        """Advance by exactly `count` time steps, all simulations or some, those that have failed excepted.
+
+        Custom forces and functions of time are called one at a time, with the lock of the interpreter.
+
+        Parameters
+        ----------
+        count : int
+        lanes : array_like of shape (n,), bool, or of numbers, optional
+            Which simulations; all by default.
+
+        Raises
+        ------
+        ValueError
+            A count that is not a whole number, or negative; lanes that there are not.
+        KeyboardInterrupt, or what a callback raised
+            Every simulation is in its last accepted state; times may differ.
+        RuntimeError
+            Called by a callback, or while another thread runs one of them.
+
+        Examples
+        --------
+        >>> batch = scene.build_batch(4)
+        >>> batch.step(2, lanes=[0, 3])
+        >>> batch.time
+        array([0.01, 0.  , 0.  , 0.01])
+        """
+        numbers = self._lanes.chosen(lanes)
+        steps = validation.integer(count, "number of steps", 0, _MAX_STEPS)
+        self._lanes.refuse_in_run("step")
+        functions: dict[SupportsInt | SupportsIndex, tuple[Any, Any]] = {
+            int(numbers[place]): (step_callback(simulation._session), force_function(simulation._session))
+            for place, simulation in self._lanes.each(numbers)
+            if _calls_python(simulation._session)
+        }
+        try:
+            self._lanes.engine.step(numbers, steps, functions)
+        finally:
+            pass_on(*self._lanes.engine.take_warnings())
+
+    @property
+    def failed(self) -> npt.NDArray[np.bool_]:
+        """Which simulations have failed, shape (n,)."""
+        return np.array([self._lanes.engine.failure(i) is not None for i in range(len(self))])
+
+    @property
+    def failures(self) -> tuple[ConvergenceError | None, ...]:
+        """What went wrong in each, or None."""
+        found = (self._lanes.engine.failure(i) for i in range(len(self)))
+        return tuple(
+            None if numbers is None else convergence_error(simulation._session, numbers)
+            for simulation, numbers in zip(self, found, strict=True)
+        )
+
+    # State
+
+    def snapshot(self, lanes: npt.ArrayLike | None = None) -> tuple[Snapshot, ...]:
+        """The whole state of each, to go back to with `restore`, bit by bit.
+
+        Parameters
+        ----------
+        lanes : array_like of shape (n,), bool, or of numbers, optional
+            Which simulations; all by default.
+        """
+        return tuple(simulation.snapshot() for _, simulation in self._lanes.each(self._lanes.chosen(lanes)))
+
+    def restore(self, snapshots: Snapshot | Sequence[Snapshot], lanes: npt.ArrayLike | None = None) -> None:
+        """Go back to snapshots; a simulation that had failed goes on from there.
+
+        Parameters
+        ----------
+        snapshots : Snapshot, or a sequence of one for each simulation
+            One alone is for all.
+        lanes : array_like of shape (n,), bool, or of numbers, optional
+            Which simulations; all by default.
+
+        Raises
+        ------
+        ValueError
+            Not as many snapshots as simulations, or see `Simulation.restore`.
+        RuntimeError
+            Called by a callback of a run.
+
+        Examples
+        --------
+        >>> batch = scene.build_batch(2)
+        >>> before = batch.snapshot()
+        >>> batch.step(5)
+        >>> batch.restore(before)
+        """
+        numbers = self._lanes.chosen(lanes)
+        given = [snapshots] * len(numbers) if isinstance(snapshots, Snapshot) else list(snapshots)
+        for index, snapshot in enumerate(given):
+            if not isinstance(snapshot, Snapshot):
+                raise ValueError(f"snapshots must be withe.Snapshot, got {type(snapshot).__name__} at [{index}]")
+        if len(given) != len(numbers):
+            raise ValueError(f"snapshots must be one for each of {len(numbers)} simulations, got {len(given)}")
+        self._lanes.refuse_in_run("restore")
+        chosen = [simulation for _, simulation in self._lanes.each(numbers)]
+        settings = [matched(each._session, snapshot) for each, snapshot in zip(chosen, given, strict=True)]
+        self._lanes.engine.restore(numbers, [snapshot._state for snapshot in given])
+        for simulation, own in zip(chosen, settings, strict=True):
+            adopt(simulation._session, own)
+            simulation._stepping.frame_time = None
+
+    def reset(self, mask: npt.ArrayLike | None = None) -> None:
+        """Go back to the scenes as they were drawn, and undo everything that was set since.
+
+        Parameters
+        ----------
+        mask : array_like of shape (n,), bool, or of numbers, optional
+            Which simulations; all by default.
+
+        Raises
+        ------
+        ValueError
+            A mask of another length.
+        RuntimeError
+            Called by a callback of a run.
+
+        Examples
+        --------
+        >>> batch = scene.build_batch(3)
+        >>> batch.step(2)
+        >>> batch.reset([True, False, False])
+        >>> batch.time
+        array([0.  , 0.01, 0.01])
+        """
+        numbers = self._lanes.chosen(mask, "mask")
+        self.restore([simulation._initial for _, simulation in self._lanes.each(numbers)], numbers)
+
+    def copy(self) -> Batch:
+        """Another batch in the same state, which goes its own way from here. Those that have failed are tried again."""
+        return Batch([simulation.copy() for simulation in self], self.workers)
+
+    def __copy__(self) -> Batch:
+        return self.copy()
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Batch:
+        return self.copy()
+
+    def __reduce__(self) -> tuple[type[Batch], tuple[list[Simulation], int]]:
+        return Batch, (list(self), self.workers)
+
+
+def _calls_python(session: Session) -> bool:
+    settings = session.settings
+    return bool(settings.functions or settings.paths or settings.friction_fields or session.custom_forces)

@@ -1,0 +1,136 @@
+"""The simulations of a batch, by number: which ones a call is about, and values that have a row for each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import fields, is_dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from withe import _core
+from withe.common import validation
+from withe.simulation.simulation import Simulation
+
+__all__ = ["Lanes", "output", "row", "stacked"]
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.intc]
+
+
+class Lanes:
+    """The simulations of a batch and the engine's view of them.
+
+    Attributes
+    ----------
+    simulations : list of Simulation
+    engine : _core.Batch
+    """
+
+    def __init__(self, simulations: list[Simulation], workers: int) -> None:
+        self.simulations = simulations
+        self.engine = _core.Batch([each._session.world for each in simulations], workers)
+        self._all = np.arange(len(simulations), dtype=np.intc)
+
+    def __len__(self) -> int:
+        return len(self.simulations)
+
+    @property
+    def first(self) -> Simulation:
+        """Has the shape of all."""
+        return self.simulations[0]
+
+    def chosen(self, given: npt.ArrayLike | None, what: str = "lanes") -> IntArray:
+        """Numbers of the simulations that an argument names: None for all, a mask, or numbers.
+
+        Raises
+        ------
+        ValueError
+            A mask of another length, a number that there is not or that comes twice.
+        """
+        if given is None:
+            return self._all
+        size = len(self)
+        array = np.asarray(given)
+        if array.dtype == np.bool_:
+            if array.shape != (size,):
+                raise ValueError(f"{what} must have shape ({size},) as a mask, got {array.shape}")
+            return np.flatnonzero(array).astype(np.intc)
+        if array.size == 0:
+            return self._all[:0]
+        if array.dtype.kind not in "iu" or array.ndim > 1:
+            raise ValueError(f"{what} must be a mask of shape ({size},), or numbers of simulations, got {given!r:.80}")
+        numbers = np.atleast_1d(array)
+        for number in numbers[(numbers < -size) | (numbers >= size)]:
+            raise ValueError(f"{what} must lie in {-size}..{size - 1}, got {number}")
+        numbers = (numbers % size).astype(np.intc)
+        if len(np.unique(numbers)) < len(numbers):
+            raise ValueError(f"{what} must differ, got {given!r:.80}")
+        return numbers
+
+    def each(self, numbers: IntArray) -> Iterator[tuple[int, Simulation]]:
+        """Place in a call's values, and simulation, of the lanes of a call."""
+        for place, number in enumerate(numbers):
+            yield place, self.simulations[number]
+
+    def refuse_in_run(self, what: str) -> None:
+        """Refuse what would change a simulation behind the back of its run."""
+        for simulation in self.simulations:
+            simulation._stepping.refuse_in_run(what)
+
+    def gathered(self, read: Callable[[Simulation], Any]) -> Any:
+        """What every simulation answers, stacked."""
+        return stacked([read(simulation) for simulation in self.simulations])
+
+
+def row(value: Any, index: int, count: int, what: str) -> Any:
+    """What one simulation gets of a value: its row of an array; numbers, words, functions and None are for all.
+
+    Raises
+    ------
+    ValueError
+        An array without a row for each.
+    """
+    if value is None or isinstance(value, str | float | int) or callable(value):
+        return value
+    if isinstance(value, Sequence | np.ndarray):
+        if np.ndim(value) == 0:
+            return value
+        if len(value) != count:
+            raise ValueError(f"{what} must have a row for each of {count} simulations, got {len(value)}")
+        return value[index]
+    return value
+
+
+def stacked(answers: list[Any]) -> Any:
+    """Answers of one kind with one more axis in front: arrays, numbers, or objects of these."""
+    first = answers[0]
+    if is_dataclass(first) and not isinstance(first, type):
+        return type(first)(**{f.name: stacked([getattr(a, f.name) for a in answers]) for f in fields(first)})
+    if isinstance(first, np.ndarray | float | int | bool) and all(np.shape(a) == np.shape(first) for a in answers):
+        return np.stack(answers)
+    return tuple(answers)
+
+
+def output(out: FloatArray | None, shape: tuple[int, ...]) -> FloatArray:
+    """Where to put a read-out: the user's array, or a new one.
+
+    Raises
+    ------
+    ValueError
+        An array of another shape, type or layout.
+    """
+    if out is None:
+        return np.empty(shape)
+    if not isinstance(out, np.ndarray) or out.dtype != np.float64 or out.shape != shape:
+        came = f"{out.dtype} {out.shape}" if isinstance(out, np.ndarray) else type(out).__name__
+        raise ValueError(f"out must be a float64 array of shape {shape}, got {came}")
+    if not (out.flags.c_contiguous and out.flags.writeable):
+        raise ValueError("out must be contiguous (order C) and writeable")
+    return out
+
+
+def integer_workers(workers: int | None, default: int) -> int:
+    """Number of threads."""
+    return default if workers is None else validation.integer(workers, "workers", 1, 4096)

@@ -1,0 +1,149 @@
+"""What may be read of a batch: the read-outs of `Simulation` with one more axis in front."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from withe.batch.lanes import Lanes, output
+from withe.parts.handles import Hand, NodeHandle, Obstacle, Rod, Spring, Support
+from withe.parts.kinds import RodPart
+from withe.simulation.readouts import Energy, Momentum, Reaction, RodEnergy, Statistics
+
+__all__ = ["Reading"]
+
+FloatArray = npt.NDArray[np.float64]
+
+
+class Reading:
+    """Methods of `Batch` that read; `out`, where there is one, is an array of the user that is filled and returned."""
+
+    _lanes: Lanes
+
+    @property
+    def rods(self) -> tuple[Rod, ...]:
+        """Handles of all rods, in the order of the scene."""
+        return self._lanes.first.rods
+
+    @property
+    def time(self) -> FloatArray:
+        """Time of every simulation since its start, shape (n,) [s]."""
+        return _read(self._lanes, "time", -1, (), None)
+
+    def positions(self, rod: Rod | str | None = None, out: FloatArray | None = None) -> FloatArray:
+        """Positions of the nodes of a rod, or of every node of the scene once.
+
+        Parameters
+        ----------
+        rod : Rod or str, optional
+        out : ndarray of shape (n, nodes, 3), float64, optional
+            Is filled and returned.
+
+        Returns
+        -------
+        ndarray of shape (n, nodes, 3) [m]
+
+        Raises
+        ------
+        ValueError
+            Not a rod of this scene, or an `out` of another shape, type or layout.
+
+        Examples
+        --------
+        >>> batch = scene.build_batch(3)
+        >>> batch.positions(arm).shape
+        (3, 31, 3)
+        """
+        return _of_nodes(self._lanes, "positions", rod, out)
+
+    def velocities(self, rod: Rod | str | None = None, out: FloatArray | None = None) -> FloatArray:
+        """Velocities of the nodes of a rod, or of every node once, shape (n, nodes, 3) [m/s]."""
+        return _of_nodes(self._lanes, "velocities", rod, out)
+
+    def directors(self, rod: Rod | str, out: FloatArray | None = None) -> FloatArray:
+        """Material frames of the edges, shape (n, edges, 3, 3), rows d1, d2, tangent."""
+        part = _rod(self._lanes, rod)
+        return _read(self._lanes, "directors", part.index, (len(part.lengths), 3, 3), out)
+
+    def curvatures(self, rod: Rod | str, out: FloatArray | None = None) -> FloatArray:
+        """Curvatures towards d1 and d2, shape (n, stencils, 2) [1/m]."""
+        part = _rod(self._lanes, rod)
+        return _read(self._lanes, "curvatures", part.index, (len(part.voronoi), 2), out)
+
+    def twists(self, rod: Rod | str, out: FloatArray | None = None) -> FloatArray:
+        """Twists, shape (n, stencils) [rad/m]."""
+        part = _rod(self._lanes, rod)
+        return _read(self._lanes, "twists", part.index, (len(part.voronoi),), out)
+
+    def tensions(self, rod: Rod | str, out: FloatArray | None = None) -> FloatArray:
+        """Axial forces of the edges, pulling is positive, shape (n, edges) [N]."""
+        part = _rod(self._lanes, rod)
+        return _read(self._lanes, "tensions", part.index, (len(part.lengths),), out)
+
+    def spins(self, rod: Rod | str, out: FloatArray | None = None) -> FloatArray:
+        """Angular velocities of the edges about their tangents, shape (n, edges) [rad/s]."""
+        part = _rod(self._lanes, rod)
+        return _read(self._lanes, "spins", part.index, (len(part.lengths),), out)
+
+    def energy(self, rod: Rod | str | None = None) -> Energy | RodEnergy:
+        """Energies of every simulation, or of one rod in each: every field is an array of shape (n,) [J]."""
+        return self._lanes.gathered(lambda s: s.energy() if rod is None else s.energy(rod))  # type: ignore[no-any-return]
+
+    def momentum(self) -> Momentum:
+        """Momenta of every simulation, linear and angular, each of shape (n, 3)."""
+        return self._lanes.gathered(lambda s: s.momentum())  # type: ignore[no-any-return]
+
+    def reaction(self, support: Support | NodeHandle | str) -> Reaction:
+        """Force and moment of a support on the rod in every simulation, each of shape (n, 3) [N], [N m]."""
+        return self._lanes.gathered(lambda s: s.reaction(support))  # type: ignore[no-any-return]
+
+    def wrench(self, hand: Hand | str) -> Reaction:
+        """Force and moment of a hand on the rod about where it is, each of shape (n, 3) [N], [N m]."""
+        return self._lanes.gathered(lambda s: s.wrench(hand))  # type: ignore[no-any-return]
+
+    def spring_tension(self, spring: Spring | str) -> FloatArray:
+        """Axial force of a spring and its damper, pulling is positive, shape (n,) [N]."""
+        return self._lanes.gathered(lambda s: s.spring_tension(spring))  # type: ignore[no-any-return]
+
+    def obstacle_position(self, obstacle: Obstacle | str) -> FloatArray:
+        """Where an obstacle is, shape (n, 3) [m]."""
+        return self._lanes.gathered(lambda s: s.obstacle_position(obstacle))  # type: ignore[no-any-return]
+
+    def contacts(self) -> list[npt.NDArray[np.void]]:
+        """What touches in every simulation: a table for each, as `Simulation.contacts` has it."""
+        return [simulation.contacts() for simulation in self._lanes.simulations]
+
+    @property
+    def statistics(self) -> Statistics:
+        """What the work so far took; every field is an array of shape (n,)."""
+        return self._lanes.gathered(lambda s: s.statistics)  # type: ignore[no-any-return]
+
+    def get(self, target: Any, word: str | None = None) -> Any:
+        """The present value of what `set` sets, in every simulation.
+
+        Returns
+        -------
+        ndarray of shape (n, ...)
+            Or a tuple of values that are no numbers.
+        """
+        return self._lanes.gathered(lambda s: s.get(target, word))
+
+
+def _rod(lanes: Lanes, rod: Rod | str) -> RodPart:
+    return lanes.first._session.directory.rod(rod)
+
+
+def _of_nodes(lanes: Lanes, what: str, rod: Rod | str | None, out: FloatArray | None) -> FloatArray:
+    directory = lanes.first._session.directory
+    if rod is None:
+        return _read(lanes, what, -1, (directory.layout.node_count, 3), out)
+    index = directory.rod(rod).index
+    return _read(lanes, what, index, (len(directory.layout.rows(index)), 3), out)
+
+
+def _read(lanes: Lanes, what: str, rod: int, shape: tuple[int, ...], out: FloatArray | None) -> FloatArray:
+    result = output(out, (len(lanes), *shape))
+    lanes.engine.read(what, rod, result)
+    return result

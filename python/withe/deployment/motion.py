@@ -1,0 +1,253 @@
+"""Paths of a lift-off point, and the poses of the jaw along them: hanging, touching down, laying."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from withe.deployment.cable import JAW, Cable
+from withe.deployment.grasping import Grasp, pivoting
+from withe.deployment.pattern import Pattern
+
+__all__ = ["Course", "Path", "Phase", "Piece", "Start", "course", "displaced", "lengthened", "upright_way", "way_along"]
+
+FloatArray = npt.NDArray[np.float64]
+Start = Literal["free", "held"]
+_GRAVITY = 9.81
+_LAST_HELD = 0.5  # [Lgb] that still hang when the jaw lets go
+_CLEARANCE = 0.02  # [m] of the free end above the floor at the beginning
+_FASTEST_SHARE = 0.01  # of the acceleration of gravity: swing then moves the cable by less than a millimetre
+_PIVOT_ANGLES = 61
+_UPRIGHT = 0.5 * np.pi - 1e-3
+
+
+@dataclass(frozen=True)
+class Phase:
+    """A part of a motion: "hang", "touch down" or "lay", and when it begins and ends [s]."""
+
+    name: str
+    start: float
+    end: float
+
+
+@dataclass(frozen=True)
+class Course:
+    """The whole motion of a jaw in time: arrays of shape (n,), (n, 3), (n, 4) as quaternions (x, y, z, w), and (n,)."""
+
+    times: FloatArray
+    positions: FloatArray
+    rotations: FloatArray
+    laid: FloatArray
+    phases: tuple[Phase, ...]
+
+
+@dataclass(frozen=True)
+class Path:
+    """The pattern and the tail behind it, as far as the lift-off point goes; `grasps_along` sees a pattern in it."""
+
+    arc_length: FloatArray
+    points: FloatArray
+    heading: FloatArray
+    curvature: FloatArray
+
+    @property
+    def length(self) -> float:
+        """How far the lift-off point goes [m]."""
+        return float(self.arc_length[-1])
+
+
+def lengthened(pattern: Pattern, cable: Cable, tail: float) -> Path:
+    """A pattern and its tail, along which the curvature fades out."""
+    lgb = cable.gravito_bending_length
+    heading = np.unwrap(np.arctan2(pattern.tangent[:, 1], pattern.tangent[:, 0]))
+    more = tail - max(_LAST_HELD * lgb, JAW)
+    if more <= 0.0:
+        last = pattern.arc_length <= cable.length - 0.11 * lgb - 0.5 * JAW
+        return Path(pattern.arc_length[last], pattern.points[last], heading[last], pattern.curvature[last])
+    spacing = pattern.arc_length[1]
+    s = np.linspace(0.0, more, max(2, int(np.ceil(more / spacing))) + 1)
+    share = np.minimum(s / min(more, 2.0 * lgb), 1.0)  # the curvature fades out
+    curvature = pattern.curvature[-1] * (1.0 - 3.0 * share**2 + 2.0 * share**3)
+    steps = np.diff(s)
+    turned = heading[-1] + np.concatenate([[0.0], np.cumsum(0.5 * (curvature[1:] + curvature[:-1]) * steps)])
+    middle = 0.5 * (turned[1:] + turned[:-1])
+    points = pattern.points[-1] + np.cumsum(np.stack([np.cos(middle), np.sin(middle)], 1) * steps[:, None], axis=0)
+    return Path(
+        np.concatenate([pattern.arc_length, pattern.length + s[1:]]),
+        np.concatenate([pattern.points, points]),
+        np.concatenate([heading, turned[1:]]),
+        np.concatenate([pattern.curvature, curvature[1:]]),
+    )
+
+
+def displaced(path: Path, shift: FloatArray) -> Path:
+    """A path moved to its left by some way at each of its points, shape (n,) [m]; it goes on by its own arc length."""
+    from scipy.interpolate import make_interp_spline
+
+    left = np.stack([-np.sin(path.heading), np.cos(path.heading)], 1)
+    moved = make_interp_spline(path.arc_length, path.points + shift[:, None] * left, k=5)
+    fine = np.linspace(path.arc_length[0], path.length, 4 * len(path.points))
+    speed = np.linalg.norm(moved(fine, 1), axis=1)
+    travelled = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(fine))])
+    s = np.linspace(0.0, min(path.length, travelled[-1]), len(path.points))
+    at = np.interp(s, travelled, fine)
+    first, second = moved(at, 1), moved(at, 2)
+    bend = (first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / np.linalg.norm(first, axis=1) ** 3
+    return Path(s, moved(at), np.unwrap(np.arctan2(first[:, 1], first[:, 0])), bend)
+
+
+@dataclass(frozen=True)
+class Piece:
+    """Poses along a parameter that runs smoothly in time; `reach` is the way that the speed counts along it [m]."""
+
+    parameter: FloatArray
+    positions: FloatArray
+    quaternions: FloatArray  # (w, x, y, z), continuous
+    reach: float
+    laying: bool = False
+
+    def duration(self, speed: float) -> float:
+        """How long it takes at a speed [m/s], in s."""
+        if not self.laying:
+            return max(1.0, 1.875 * self.reach / speed)  # a quintic's greatest speed is 1.875 times its mean
+        return self.reach / speed + self._ramp()
+
+    def _ramp(self) -> float:
+        return 2.0  # [s] to reach the speed, and to stop
+
+    def _progress(self, share: FloatArray, speed: float) -> FloatArray:
+        """Share of the parameter at shares of the duration."""
+        if not self.laying:
+            return share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
+        duration, ramp = self.duration(speed), self._ramp()
+        t = share * duration
+
+        def ramped(time: FloatArray) -> FloatArray:  # integral of the smoothstep of fifth order over time
+            u = np.clip(time / ramp, 0.0, 1.0)
+            return ramp * u**4 * (2.5 - 3.0 * u + u**2) + np.maximum(time - ramp, 0.0)
+
+        travelled = ramped(t) - ramped(t - (duration - ramp))
+        return np.asarray(travelled / travelled[-1])
+
+    def sampled(self, share: FloatArray, speed: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Times, positions, quaternions and laid length."""
+        from scipy.interpolate import CubicSpline
+
+        progress = self._progress(share, speed)
+        at = self.parameter[0] + progress * (self.parameter[-1] - self.parameter[0])
+        quaternions = CubicSpline(self.parameter, self.quaternions)(at)
+        quaternions /= np.linalg.norm(quaternions, axis=1)[:, None]
+        laid = at if self.laying else np.zeros_like(at)
+        return (
+            share * self.duration(speed),
+            CubicSpline(self.parameter, self.positions)(at),
+            quaternions[:, [1, 2, 3, 0]],
+            laid,
+        )
+
+    def fastest(self) -> float:
+        """Speed at which the acceleration along the piece reaches its share of gravity's [m/s]."""
+        from scipy.interpolate import CubicSpline
+
+        bend = np.linalg.norm(CubicSpline(self.parameter, self.positions)(self.parameter, 2), axis=1)
+        return float(np.sqrt(_FASTEST_SHARE * _GRAVITY / max(bend.max(), 1e-6)))
+
+
+def way_along(cable: Cable, path: Path, grasps: Grasp) -> Piece:
+    """Poses of the jaw while each place of the path is the lift-off point."""
+    forward = _about_z(path.heading)
+    positions = _on_floor(cable, path) + _turned(forward, _in_jaw(cable, grasps))
+    rotations = _continuous(_product(forward, _from_vectors(grasps.rotation)))
+    return Piece(path.arc_length, positions, rotations, path.length, laying=True)
+
+
+def upright_way(cable: Cable, path: Path) -> Piece:
+    """The jaw straight above the lift-off point, as high as what still hangs is long."""
+    upright = np.array([np.sqrt(0.5), 0.0, -np.sqrt(0.5), 0.0])  # x turned up
+    rotations = _continuous(_product(_about_z(path.heading), np.broadcast_to(upright, (len(path.points), 4))))
+    positions = _on_floor(cable, path)
+    positions[:, 2] += cable.length - path.arc_length
+    return Piece(path.arc_length, positions, rotations, path.length, laying=True)
+
+
+def course(cable: Cable, path: Path, way: Piece, speed: float, time_step: float, start: Start) -> Course:
+    """Hang, touch down and go along a way, at a speed of the lift-off point [m/s] and with rows every time step [s]."""
+    down = _touch_down(cable, path, way, start)
+    pieces, phases, clock = [], [], 0.0
+    for name, piece in (("hang", _hang(down)), ("touch down", down), ("lay", way)):
+        duration = piece.duration(speed)
+        times, *rest = piece.sampled(np.linspace(0.0, 1.0, max(2, int(np.ceil(duration / time_step)) + 1)), speed)
+        pieces.append((clock + times, *rest))
+        phases.append(Phase(name, clock, clock + duration))
+        clock += duration
+    rows = [np.concatenate([piece[i] if k == 0 else piece[i][1:] for k, piece in enumerate(pieces)]) for i in range(4)]
+    return Course(rows[0], rows[1], _continuous(rows[2]), rows[3], tuple(phases))
+
+
+def _in_jaw(cable: Cable, grasps: Grasp) -> FloatArray:
+    """Middle of a jaw that holds the cable straight behind where it is grasped, in the frame of the lift-off point."""
+    along = _turned(_from_vectors(grasps.rotation), np.broadcast_to([0.5 * JAW, 0.0, 0.0], grasps.position.shape))
+    return cable.gravito_bending_length * grasps.position + along
+
+
+def _on_floor(cable: Cable, path: Path) -> FloatArray:
+    return np.column_stack([path.points, np.full(len(path.points), cable.radius)])
+
+
+def _touch_down(cable: Cable, path: Path, way: Piece, start: Start) -> Piece:
+    """From the upright cable that stands on its free end, which rolls if it is free, to the first pose of laying."""
+    suspended = (cable.length - 0.5 * JAW) / cable.gravito_bending_length
+    angles = np.linspace(_UPRIGHT, 0.0, _PIVOT_ANGLES)
+    found = pivoting(suspended, angles, cable.stretch_stiffness)
+    heading = np.full(_PIVOT_ANGLES, path.heading[0])
+    forward = _about_z(heading)
+    rolls = cable.radius if start == "free" else 0.0
+    rolled = np.column_stack([-rolls * angles, np.zeros((_PIVOT_ANGLES, 2))])
+    base = np.append(path.points[0], cable.radius)
+    positions = base + _turned(forward, rolled + _in_jaw(cable, found))
+    quaternions = _product(forward, _from_vectors(found.rotation))
+    # The last pose is that of laying, exactly: a controller or a bent beginning may differ from the straight one.
+    share = np.linspace(0.0, 1.0, _PIVOT_ANGLES)[:, None]
+    blend = share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
+    positions = positions + blend * (way.positions[0] - positions[-1])
+    last = way.quaternions[0] * np.sign(way.quaternions[0] @ quaternions[-1])
+    quaternions = _continuous(quaternions)
+    quaternions = quaternions + blend * (last * np.sign(last @ quaternions[-1]) - quaternions[-1])
+    reach = float(np.linalg.norm(np.diff(positions, axis=0), axis=1).sum())
+    return Piece(share[:, 0], positions, quaternions / np.linalg.norm(quaternions, axis=1)[:, None], reach)
+
+
+def _hang(down: Piece) -> Piece:
+    """Straight down to where touching down begins."""
+    heights = np.linspace(_CLEARANCE, 0.0, 5)
+    positions = down.positions[0] + np.column_stack([np.zeros((5, 2)), heights])
+    return Piece(np.linspace(0.0, 1.0, 5), positions, np.repeat(down.quaternions[:1], 5, axis=0), _CLEARANCE)
+
+
+def _about_z(angle: FloatArray) -> FloatArray:
+    zero = np.zeros_like(angle)
+    return np.stack([np.cos(0.5 * angle), zero, zero, np.sin(0.5 * angle)], -1)
+
+
+def _from_vectors(vectors: FloatArray) -> FloatArray:
+    angle = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return np.concatenate([np.cos(0.5 * angle), 0.5 * np.sinc(0.5 * angle / np.pi) * vectors], -1)
+
+
+def _product(a: FloatArray, b: FloatArray) -> FloatArray:
+    w = a[..., :1] * b[..., :1] - (a[..., 1:] * b[..., 1:]).sum(-1, keepdims=True)
+    return np.concatenate([w, a[..., :1] * b[..., 1:] + b[..., :1] * a[..., 1:] + np.cross(a[..., 1:], b[..., 1:])], -1)
+
+
+def _turned(quaternions: FloatArray, vectors: FloatArray) -> FloatArray:
+    twice = 2.0 * np.cross(quaternions[..., 1:], vectors)
+    return np.asarray(vectors + quaternions[..., :1] * twice + np.cross(quaternions[..., 1:], twice))
+
+
+def _continuous(quaternions: FloatArray) -> FloatArray:
+    """Of both signs of each quaternion the one near its predecessor."""
+    agree = np.where((quaternions[1:] * quaternions[:-1]).sum(-1) < 0.0, -1.0, 1.0)
+    return np.asarray(quaternions * np.concatenate([[1.0], np.cumprod(agree)])[:, None])

@@ -1,0 +1,188 @@
+"""Ways of the lift-off point that are improved against the rod engine, until the cable comes to lie on its pattern."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import get_args
+
+import numpy as np
+import numpy.typing as npt
+
+from withe.common.progress import Progress
+from withe.deployment.cable import Cable
+from withe.deployment.feasibility import Controller
+from withe.deployment.motion import Path, Start, displaced
+from withe.deployment.pattern import Pattern
+from withe.deployment.world import Motion, Setup, lay
+from withe.errors import ConvergenceError
+
+__all__ = ["Trial", "optimised", "runs"]
+
+FloatArray = npt.NDArray[np.float64]
+MotionOf = Callable[[Path, Controller], Motion]
+_KNOTS = 1.0  # [Lgb] between the knots of the shift
+_COLOURS = 7  # knots so far apart are shifted at the same time: each moves the cable 3.5 knots to either side
+_PROBE = 5e-4  # [m] by which knots are shifted to see what moves
+_NODES, _NODES_PER_LGB = 100, 4  # of the cable in the engine
+_TIME_STEP = 0.2  # [s]
+_PATH_POINTS_PER_LGB = 5
+_DAMPING = 0.03  # of the greatest diagonal entry
+_ROUNDS = 3  # of derivatives by differences
+_STEPS = 4  # of Gauss-Newton's method with each
+_GOOD = 2e-4  # [m]: better than the engine tells at this coarseness
+_GAIN = 0.97  # of the error that a step must leave at most to go on
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What a path is shifted by, shape (knots,), what goes along it, and how far the cable lies from its places.
+
+    The last has shape (nodes, 2); [m].
+    """
+
+    shift: FloatArray
+    controller: Controller
+    away: FloatArray
+
+    @property
+    def error(self) -> float:
+        """Root of the mean square [m]."""
+        return float(np.sqrt((self.away**2).sum(1).mean()))
+
+
+class _Engine:
+    """Lays the cable quasi-statically along paths, and says where it comes to lie."""
+
+    def __init__(self, path: Path, setup: Setup, pattern: Pattern, motion_of: MotionOf, shown: Progress) -> None:
+        self.setup, self.motion_of, self.shown = setup, motion_of, shown
+        self.path = _thinned(path, _PATH_POINTS_PER_LGB / setup.cable.gravito_bending_length)
+        self.spacing = _KNOTS * setup.cable.gravito_bending_length
+        self.centres = _centres(path, pattern, self.spacing)
+        self.basis = _splines(self.path, self.centres, self.spacing)
+        s = self.setup.arc_length
+        self.s = s[s <= pattern.length]
+        self.places = np.stack([np.interp(self.s, pattern.arc_length, pattern.points[:, i]) for i in range(2)], 1)
+
+    def trial(self, shift: FloatArray, controller: Controller) -> Trial | None:
+        """None where there is no such way, or the engine finds no equilibrium on it."""
+        self.shown.advance(1)
+        try:
+            motion = self.motion_of(displaced(self.path, self.basis @ shift), controller)
+            _, laid, _ = lay(self.setup, motion, progress=False)
+        except (ConvergenceError, ValueError):
+            return None
+        return Trial(shift, controller, laid[: len(self.s), :2] - self.places)
+
+    def slopes(self, now: Trial) -> FloatArray:
+        """Derivative of all distances by all knots, shape (2 nodes, knots), by differences."""
+        colours = min(len(self.centres), _COLOURS)
+        owner = np.abs(self.s[:, None] - self.centres)
+        slopes = np.zeros((len(self.s), 2, len(self.centres)))
+        for colour in range(colours):
+            knots = np.arange(colour, len(self.centres), colours)
+            probe = now.shift.copy()
+            probe[knots] += _PROBE
+            trial = self.trial(probe, now.controller)
+            if trial is None:
+                continue
+            nearest = knots[owner[:, knots].argmin(1)]
+            rows = np.flatnonzero(np.abs(self.s - self.centres[nearest]) < 0.5 * _COLOURS * self.spacing)
+            slopes[rows, :, nearest[rows]] = (trial.away - now.away)[rows] / _PROBE
+        return slopes.reshape(2 * len(self.s), -1)
+
+
+def optimised(
+    path: Path,
+    cable: Cable,
+    pattern: Pattern,
+    friction: float,
+    motion_of: MotionOf,
+    start: Start,
+    shown: Progress,
+) -> tuple[Path, Controller]:
+    """Shift a path sideways so that the cable comes to lie on its pattern, friction permitting.
+
+    The shift is a cubic spline with a knot each Lgb. What the engine makes of a shift of one knot is found by
+    differences, several distant knots at a time, for a shift moves the cable only nearby. With that derivative,
+    corrected after each trial [Broyden 1965], damped least squares [Levenberg 1944, Marquardt 1963] lower the distances
+    of the laid cable from its places. It begins from the better of the two controllers.
+
+    Raises
+    ------
+    ConvergenceError
+        The engine finds no equilibrium on the way of either.
+    """
+    setup = Setup(
+        cable=cable,
+        friction=friction,
+        nodes=max(_NODES, round(_NODES_PER_LGB * cable.length / cable.gravito_bending_length)),
+        time_step=_TIME_STEP,
+        quasi_static=True,
+        start_held=start == "held",
+    )
+    engine = _Engine(path, setup, pattern, motion_of, shown)
+    unshifted = np.zeros(len(engine.centres))
+    tried = [trial for controller in get_args(Controller) if (trial := engine.trial(unshifted, controller))]
+    if not tried:
+        raise ConvergenceError("the rod engine found no equilibrium on the way to be optimised")
+    best = min(tried, key=lambda trial: trial.error)
+    for _ in range(_ROUNDS):
+        if best.error < _GOOD:
+            break
+        before = best.error
+        best = _descended(engine, best)
+        if best.error > _GAIN * before:
+            break
+    return displaced(path, _splines(path, engine.centres, engine.spacing) @ best.shift), best.controller
+
+
+def runs(path: Path, cable: Cable, pattern: Pattern) -> int:
+    """How many runs of the engine it takes at most."""
+    knots = len(_centres(path, pattern, _KNOTS * cable.gravito_bending_length))
+    return 2 + _ROUNDS * (min(knots, _COLOURS) + _STEPS)
+
+
+def _thinned(path: Path, density: float) -> Path:
+    """The path with fewer points, as many a length [1/m]."""
+    count = max(20, round(density * path.length))
+    s = np.linspace(0.0, path.length, min(count, len(path.points)))
+    points = np.stack([np.interp(s, path.arc_length, path.points[:, i]) for i in range(2)], 1)
+    return Path(s, points, *(np.interp(s, path.arc_length, row) for row in (path.heading, path.curvature)))
+
+
+def _centres(path: Path, pattern: Pattern, spacing: float) -> FloatArray:
+    """Arc lengths of the middles of splines; they leave the path's end alone, where the jaw lets go [m]."""
+    last = min(pattern.length + spacing, path.length - 2.0 * spacing)
+    return np.arange(-spacing, max(last, 0.0), spacing)
+
+
+def _splines(path: Path, centres: FloatArray, spacing: float) -> FloatArray:
+    """Cubic B-splines along the path, shape (points, knots)."""
+    u = np.abs(path.arc_length[:, None] - centres) / spacing
+    near, far = 2.0 / 3.0 - u**2 + 0.5 * u**3, np.maximum(2.0 - u, 0.0) ** 3 / 6.0
+    return np.where(u < 1.0, near, far)
+
+
+def _descended(engine: _Engine, best: Trial) -> Trial:
+    """A few steps of damped least squares, from new slopes."""
+    damping, slopes = _DAMPING, engine.slopes(best)
+    for _ in range(_STEPS):
+        square = slopes.T @ slopes
+        scale = float(square.diagonal().max())
+        step = -np.linalg.solve(square + damping * scale * np.eye(len(square)), slopes.T @ best.away.ravel())
+        trial = engine.trial(best.shift + step, best.controller)
+        if trial is None:
+            damping *= 10.0
+            continue
+        missed = (trial.away - best.away).ravel() - slopes @ step
+        slopes = slopes + np.outer(missed, step) / (step @ step)
+        if trial.error >= best.error:
+            damping *= 10.0
+            continue
+        damping *= 0.3
+        enough = trial.error < _GOOD or trial.error > _GAIN * best.error
+        best = trial
+        if enough:
+            break
+    return best

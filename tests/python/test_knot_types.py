@@ -1,0 +1,90 @@
+"""Knots told apart by their Alexander polynomial and signature: against tables, from all sides, bent and moved."""
+
+import numpy as np
+import pytest
+
+from withe import knots
+from withe.common import diagrams
+
+
+def torus(p, q, count=300):
+    t = np.linspace(0.0, 2.0 * np.pi, count, endpoint=False)
+    r = 2.0 + np.cos(q * t)
+    return np.stack([r * np.cos(p * t), r * np.sin(p * t), -np.sin(q * t)], 1)
+
+
+def figure_eight(count=300):
+    t = np.linspace(0.0, 2.0 * np.pi, count, endpoint=False)
+    r = 2.0 + np.cos(2.0 * t)
+    return np.stack([r * np.cos(3.0 * t), r * np.sin(3.0 * t), np.sin(4.0 * t)], 1)
+
+
+# Published polynomials and signatures [Rolfsen 1976]; torus knots of positive numbers are right-handed.
+TABLE = {
+    "unknot": (torus(1, 0), [1], 0),
+    "an unknot that winds": (torus(1, 7), [1], 0),
+    "trefoil": (torus(2, 3), [1, -1, 1], -2),
+    "trefoil, the other way": (torus(3, 2), [1, -1, 1], -2),
+    "figure eight": (figure_eight(), [-1, 3, -1], 0),
+    "5_1": (torus(2, 5), [1, -1, 1, -1, 1], -4),
+    "8_19": (torus(3, 4), [1, -1, 0, 1, 0, -1, 1], -6),
+    "10_124": (torus(3, 5), [1, -1, 0, 1, -1, 1, 0, -1, 1], -8),
+}
+
+
+@pytest.mark.parametrize("name", TABLE)
+def test_polynomial_and_signature_are_those_of_the_tables_from_every_side(name):
+    points, polynomial, signature = TABLE[name]
+    random = np.random.default_rng(3)
+    for _ in range(8):
+        axes, _ = np.linalg.qr(random.normal(size=(3, 3)))
+        seen = diagrams._seen(points @ axes * [1.0, 1.0, np.sign(np.linalg.det(axes))])
+        assert diagrams.alexander(seen).tolist() == polynomial
+        assert diagrams.signature(seen) == signature
+    assert knots.alexander_polynomial(points, closed=True).tolist() == polynomial
+    assert knots.signature(points, closed=True) == signature
+
+
+def test_a_mirror_keeps_the_polynomial_and_turns_the_signature():
+    for points, polynomial, signature in TABLE.values():
+        mirrored = points * [1.0, 1.0, -1.0]
+        assert knots.alexander_polynomial(mirrored, closed=True).tolist() == polynomial
+        assert knots.signature(mirrored, closed=True) == -signature
+
+
+def test_reef_and_granny_differ_by_the_signature_alone():
+    reef, granny = knots.reef_knot(), knots.granny_knot()
+    assert knots.alexander_polynomial(reef).tolist() == [1, -2, 3, -2, 1]  # that of a trefoil, squared
+    assert knots.alexander_polynomial(granny).tolist() == [1, -2, 3, -2, 1]
+    assert knots.signature(reef) == 0
+    assert abs(knots.signature(granny)) == 4
+
+
+@pytest.mark.parametrize("n", [1, 2, 3])
+def test_open_overhand_knots_are_torus_knots(n):
+    points = knots.overhand_knot(n)
+    assert knots.alexander_polynomial(points).tolist() == [(-1) ** k for k in range(2 * n + 1)]
+    assert abs(knots.signature(points)) == 2 * n
+
+
+def test_a_curve_that_is_laid_down_from_its_end_is_no_knot():
+    # Each strand lies on those before: a descending diagram.
+    s = np.linspace(0.0, 4.0 * np.pi, 400)
+    laid = np.stack([np.sin(2 * s), np.cos(3 * s + 0.4) + 0.1 * s, 1e-3 * s], 1)
+    assert len(diagrams._seen(laid).sign) > 2
+    assert knots.alexander_polynomial(laid).tolist() == [1]
+    assert knots.signature(laid) == 0
+
+
+@pytest.mark.parametrize(
+    ("points", "message"),
+    [
+        (np.zeros((3, 3)), "points must be at least 4"),
+        (np.zeros((5, 2)), "points"),
+        (np.full((5, 3), np.nan), "points"),
+    ],
+)
+def test_bad_input_says_what_is_wrong(points, message):
+    for function in (knots.alexander_polynomial, knots.signature):
+        with pytest.raises(ValueError, match=message):
+            function(points)
