@@ -44,7 +44,7 @@ help:
 	@echo "make tsan          C++ tests of what runs in threads under the thread sanitizer"
 	@echo "make asan-python   random sequences of calls through Python under them; SEQUENCES=1000 SEED=7 runs others"
 	@echo "make wheel         dist/*.whl for machines without compiler"
-	@echo "make bench         all benchmarks (45 minutes); NAME=work_precision runs one"
+	@echo "make bench         all benchmarks (about an hour); NAME=work_precision runs one"
 	@echo "make lint          ruff; make format applies formatters, make format-check only looks"
 	@echo "make types         mypy --strict"
 	@echo "make stubs         regenerate the stubs of the compiled module (make stub-check compares)"

@@ -20,6 +20,7 @@ NAMES = (
     "settings",
     "gradients",
     "parallel",
+    "rl_throughput",
     "work_precision",
     "friction_precision",
     "robustness",

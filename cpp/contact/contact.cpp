@@ -118,7 +118,7 @@ void Contact::restart(const State& state, double duration) {
     if (t.law.elastic > 0.0) problem_.leaving.push_back(t);
   }
   std::sort(problem_.unrecorded.begin(), problem_.unrecorded.end());
-  problem_.start_energy = set_.energy(problem_);
+  problem_.start_energy = set_.kept_energy(problem_);
   problem_.start_pressing = set_.pressing_energy();
   if (!target_.empty()) move_obstacles();
   if (frictional() && problem_.lags()) lag_friction();
@@ -248,7 +248,7 @@ void Contact::initialise(State& state, const Parameters& parameters) const {
 
 double Contact::energy_of(const State& state, const Parameters& parameters, ContactAtRest& rest) const {
   find_at_rest(state, parameters, rest);
-  return rest.set.energy(rest.problem);
+  return rest.set.kept_energy(rest.problem);
 }
 
 std::vector<ContactReport> Contact::report(const State& state, const Parameters& parameters) const {

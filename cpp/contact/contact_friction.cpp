@@ -102,9 +102,18 @@ bool add_friction(const ContactProblem& problem, const Touching& t, const Contac
 }
 
 double anchor_energy(const ContactProblem& problem, const Touching& t) {
-  if (!problem.anchored() || !(t.pair.friction > 0.0)) return 0.0;
+  if (!problem.anchored() || !(t.pair.friction > 0.0) || t.proximity.distance >= t.pair.reach()) return 0.0;
   const FrictionForce<double> anchor = friction_now(problem, t);
   return 0.5 * dot(anchor.force, anchor.stick);
+}
+
+double kept_anchor_energy(const ContactProblem& problem, const Touching& t) {
+  if (!problem.anchored() || !(t.pair.friction > 0.0)) return 0.0;
+  const FrictionSetting f = friction_setting(problem, t, 1.0, nullptr);
+  SlippingSurfaces<double> c = slipping_surfaces(f, t.now);
+  c.friction.force = f.tangential_stiffness * t.stick;
+  if (!t.pair.isotropic()) direct_friction(f, c);
+  return 0.5 * dot(c.friction.force, t.stick);
 }
 
 /// Friction's force on the obstacle, the opposite of that on a, times the way of the surface.

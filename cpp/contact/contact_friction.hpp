@@ -20,8 +20,11 @@ double friction_slope(const ContactProblem& problem, const Touching& t, const Co
 /// Adds minus the friction on a contact, and its derivative when asked for. False where there is none.
 bool add_friction(const ContactProblem& problem, const Touching& t, const ContactLinearisation& linearisation,
                   bool with_hessian, ContactLocal& out);
-/// What an anchor stores [J].
+/// What an anchor stores as a step ends, nothing where the contact opens [J].
 double anchor_energy(const ContactProblem& problem, const Touching& t);
+/// What it stores as the next begins: all that the last left, also where the surfaces now press too little to hold it.
+/// The next step takes that, and counts it.
+double kept_anchor_energy(const ContactProblem& problem, const Touching& t);
 /// Work of an obstacle's turning against friction [J].
 double turning_work(const ContactProblem& problem, const Touching& t);
 /// Notes friction at the end of the step, where it is not lagged.

@@ -73,12 +73,16 @@ double ContactSet::pressing_energy() const {
 }
 
 double ContactSet::energy(const ContactProblem& problem) const {
-  double sum = 0.0;
-  for (const Touching& t : touching_) {
-    if (t.lagged >= 0) continue;
-    sum += t.energy.value;
-    sum += anchor_energy(problem, t);
-  }
+  double sum = pressing_energy();
+  for (const Touching& t : touching_)
+    if (t.lagged < 0) sum += anchor_energy(problem, t);
+  return sum;
+}
+
+double ContactSet::kept_energy(const ContactProblem& problem) const {
+  double sum = pressing_energy();
+  for (const Touching& t : touching_)
+    if (t.lagged < 0) sum += kept_anchor_energy(problem, t);
   return sum;
 }
 

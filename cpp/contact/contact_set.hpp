@@ -36,9 +36,10 @@ class ContactSet {
   /// Gives a contact what a record that has changed says.
   void renew(const ContactProblem& problem, int i, const ContactRecord& record);
 
-  /// What pressing stores, and that with what anchors do [J].
+  /// What pressing stores, and that with what anchors do, as a step ends and as the next begins [J].
   double pressing_energy() const;
   double energy(const ContactProblem& problem) const;
+  double kept_energy(const ContactProblem& problem) const;
   /// Greatest depth of surfaces in each other, over the smaller radius.
   double depth() const;
 

@@ -167,7 +167,7 @@ TEST(Supports, CanBeAddedReleasedAndAddedAgain) {
     World world(scene, options(Integrator::implicit_midpoint));
     world.step(10);
     const MatrixX3 before = world.positions();
-    const int pin = world.add_support({SupportKind::pin, {0, 11}, Matrix3::Zero()});
+    const int pin = world.add_support(testing::support(SupportKind::pin, {0, 11}));
     EXPECT_EQ(pin, 1);
     EXPECT_TRUE(testing::same_bits(before, world.positions()));
     world.step(10);
@@ -178,7 +178,7 @@ TEST(Supports, CanBeAddedReleasedAndAddedAgain) {
     EXPECT_THROW(world.reaction(pin), std::invalid_argument);
     EXPECT_THROW(world.remove_support(pin), std::invalid_argument);
     EXPECT_THROW(world.move_support(pin, Vector3::Zero(), Matrix3::Identity(), 0.0), std::invalid_argument);
-    const int again = world.add_support({SupportKind::clamp, {0, 11}, Matrix3::Zero()});
+    const int again = world.add_support(testing::support(SupportKind::clamp, {0, 11}));
     EXPECT_EQ(again, pin);  // rows of released supports are taken again, or those who clamp and let go grow for ever
     EXPECT_EQ(world.description().supports.size(), 2u);
     const Vector3 held = world.positions().row(11);
@@ -193,7 +193,7 @@ TEST(Supports, AddedToARodAtRestExertNothing) {
       World world(scene, options(Integrator::statics));
       world.equilibrium();
       const MatrixX3 before = world.positions();
-      const int added = world.add_support({kind, {0, 11}, Matrix3::Zero()});
+      const int added = world.add_support(testing::support(kind, {0, 11}));
       world.equilibrium();
       EXPECT_LT((world.positions() - before).norm(), 1e-7) << static_cast<int>(kind);
       EXPECT_LT(world.reaction(added).force.norm(), 2e-4 * weight_of(scene));
@@ -204,7 +204,7 @@ TEST(Supports, OfANodeThatIsHeldAreRefusedAndNothingChanges) {
   World world(testing::hanging_arm().scene, Options{});
   world.step(3);
   const World before(world);
-  EXPECT_THROW(world.add_support({SupportKind::pin, {0, 0}, Matrix3::Zero()}), std::invalid_argument);
+  EXPECT_THROW(world.add_support(testing::support(SupportKind::pin, {0, 0})), std::invalid_argument);
   EXPECT_TRUE(same_state(world, before));
   world.step(2);
 }
@@ -238,7 +238,7 @@ TEST(Supports, LeaveTwoFramesOfOneNodeAsTheyAre) {
   World world(builder.scene, options(Integrator::implicit_midpoint));
   world.step(20);
   const Energy before = world.energy();
-  world.add_support({SupportKind::pin, {1, 4}, Matrix3::Zero()});
+  world.add_support(testing::support(SupportKind::pin, {1, 4}));
   const Energy after = world.energy();
   EXPECT_NEAR(after.bend, before.bend, 1e-12 * before.bend);
   EXPECT_NEAR(after.twist, before.twist, 1e-12 * before.bend);
@@ -269,7 +269,8 @@ TEST(Plane, IsNotLeftWhereTheUserAskedForIt) {
   EXPECT_THROW(world.set_gravity(Vector3(0, 2.0, -9.81)), std::invalid_argument);
   EXPECT_THROW(world.move_support(0, Vector3(0, 0.1, 0), Matrix3::Identity(), 0.0), std::invalid_argument);
   const Vector3 tilted = Vector3(0, 1, 1).normalized();
-  EXPECT_THROW(world.add_support({SupportKind::pin, {0, 11}, tilted * tilted.transpose()}), std::invalid_argument);
+  EXPECT_THROW(world.add_support(testing::support(SupportKind::pin, {0, 11}, tilted * tilted.transpose())),
+               std::invalid_argument);
   EXPECT_TRUE(same_state(world, before));
 }
 

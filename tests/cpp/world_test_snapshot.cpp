@@ -163,10 +163,10 @@ TEST(Snapshot, RemembersSupportsThatCameAndWent) {
     for (const SceneDescription& scene : {testing::hanging_arm().scene, testing::cantilever().scene}) {
       const auto change = [](World& w) {
         w.step(3);
-        w.add_support({SupportKind::pin, {0, 11}, Matrix3::Zero()});
+        w.add_support(testing::support(SupportKind::pin, {0, 11}));
         w.step(2);
         w.remove_support(0);
-        w.add_support({SupportKind::clamp, {0, 5}, Matrix3::Zero()});
+        w.add_support(testing::support(SupportKind::clamp, {0, 5}));
         w.step(2);
       };
       expect_same_continuation(scene, integrator, change, five, "supports before");
@@ -177,8 +177,8 @@ TEST(Snapshot, RemembersSupportsThatCameAndWent) {
 TEST(Snapshot, TellsApartSupportsOfTheSameNumber) {
   const SceneDescription scene = testing::hanging_arm().scene;
   World a(scene, options_for(Integrator::implicit_midpoint)), b(scene, options_for(Integrator::implicit_midpoint));
-  a.add_support({SupportKind::pin, {0, 11}, Matrix3::Zero()});
-  b.add_support({SupportKind::pin, {0, 6}, Matrix3::Zero()});
+  a.add_support(testing::support(SupportKind::pin, {0, 11}));
+  b.add_support(testing::support(SupportKind::pin, {0, 6}));
   b.restore(a.snapshot());
   a.step(5);
   b.step(5);
@@ -289,7 +289,7 @@ TEST(Snapshot, ForgedWithAValidSealEndsInAnErrorOrInAWorldThatRuns) {
   Options o = options(Integrator::implicit_midpoint);
   o.max_halvings = 3;
   World world(builder.scene, o);
-  world.add_support({SupportKind::pin, {0, 4}, Matrix3::Zero()});
+  world.add_support(testing::support(SupportKind::pin, {0, 4}));
   world.step(2);
   const std::string sound = world.snapshot(), body = sound.substr(0, sound.size() - 8);
   ASSERT_EQ(sealed(body), sound);

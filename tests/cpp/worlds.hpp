@@ -27,6 +27,15 @@ inline Options options(Integrator integrator, double time_step = 5e-3) {
   return o;
 }
 
+/// One that holds a node, which may slide along what `free` projects onto.
+inline SupportDescription support(SupportKind kind, const RodPass& pass, const Matrix3& free = Matrix3::Zero()) {
+  SupportDescription s;
+  s.kind = kind;
+  s.pass = pass;
+  s.free = free;
+  return s;
+}
+
 /// A bent arm in space, clamped at its start, that hangs and swings.
 inline SceneBuilder hanging_arm(int nodes = 12, const RodMaterial& material = rubber()) {
   SceneBuilder builder;

@@ -114,6 +114,33 @@ def test_energy_of_fourth_order_steps_adds_up_far_better_than_midpoints(what, pl
     assert fourth < midpoint
 
 
+@pytest.mark.parametrize("friction", [0.3, (0.2, 0.5)], ids=["isotropic", "directed"])
+@pytest.mark.parametrize("model", ["anchored", "implicit"])
+@pytest.mark.parametrize("what", ["flat", "tilted", "rods"])
+def test_what_friction_takes_is_booked_however_short_the_steps(what, model, friction):
+    """What an anchor holds when surfaces part, or press too little for it, is lost, and was booked nowhere."""
+    rubber = withe.Material(youngs_modulus=1e6, poisson_ratio=0.5, density=1100.0)
+    for step in (4e-3, 1e-3, 2.5e-4):
+        scene = withe.Scene(gravity=(0, 0, 0) if what == "rods" else (0, 0, -9.81))
+        tilt = 0.3 if what == "tilted" else 0.0
+        end = (0.15 * np.cos(tilt), 0, 0.012 + 0.15 * np.sin(tilt))
+        rod = scene.add_rod(start=(0, 0, 0.012), end=end, nodes=11, radius=5e-3, material=rubber)
+        if what == "rods":
+            scene.add_rod(start=(0.06, -0.05, 0), end=(0.09, 0.05, 0), nodes=7, radius=4e-3, material=rubber)
+        else:
+            scene.add_floor(friction=friction)
+        scene.enable_contact(friction=0.3, friction_model=model)
+        simulation = scene.build(integrator="energy_momentum", time_step=step)
+        simulation.set_velocities(rod, (0.3, 0.1, -0.2))
+        first, moving = balance(simulation), simulation.energy().kinetic
+        worst = 0.0
+        for _ in range(round(0.2 / step)):
+            simulation.step()
+            worst = max(worst, abs(balance(simulation) - first))
+        assert simulation.energy().dissipated > 0.01 * moving
+        assert worst < 1e-6 * moving
+
+
 def test_energy_of_a_cantilever_at_rest_is_what_its_parts_say():
     """Work of gravity is what bending and stretching store, and half of it where all is linear."""
     simulation, _ = rods.heavy_cantilever(1e-3, 40)

@@ -74,6 +74,28 @@ def test_the_free_end_of_a_bar_falls_behind_where_its_other_end_is_jerked():
     assert simulation.velocities(bar)[1, 0] == pytest.approx(-0.05, rel=1e-3)
 
 
+@pytest.mark.parametrize("integrator", ["implicit_midpoint", "energy_momentum", "backward_euler"])
+@pytest.mark.parametrize("planar", [True, False])
+def test_a_support_that_starts_at_full_speed_works_with_half_of_it(integrator, planar):
+    """An impulse m v from rest to v does the work m v^2 / 2, though the support goes on at v through the whole step."""
+    scene = withe.Scene(gravity=(0, 0, 0))
+    light = withe.Material(youngs_modulus=1e4, poisson_ratio=0.5, density=1.0)
+    rod = scene.add_rod(start=(0, 0, 0), end=(0.2, 0, 0.1), nodes=6, radius=2e-3, material=light, normal=(0, 0, 1))
+    hand = scene.pin(rod.start)
+    heavy, speed, step = 2.0, 0.3, 1e-3
+    scene.add_mass(rod.start, heavy)
+    simulation = scene.build(integrator=integrator, time_step=step, planar=planar)
+    simulation.move(hand, path=lambda t: (speed * t, 0, 0))
+    simulation.step()
+    force = simulation.reaction(hand).force[0]
+    assert force * step == pytest.approx(heavy * speed, rel=1e-4)
+    assert simulation.energy().work == pytest.approx(0.5 * heavy * speed**2, rel=1e-4)
+    assert simulation.energy().kinetic == pytest.approx(simulation.energy().work, rel=1e-4)
+    simulation.step()
+    assert abs(simulation.reaction(hand).force[0]) < 1e-4 * force
+    assert simulation.energy().work == pytest.approx(0.5 * heavy * speed**2, rel=1e-4)
+
+
 @pytest.mark.parametrize("nodes", [11, 21])
 @pytest.mark.parametrize("while_running", [False, True])
 def test_a_shaft_turns_in_a_bearing_without_a_motion_of_its_line(nodes, while_running):

@@ -1,5 +1,6 @@
 """The short form of each benchmark runs, and leaves a file that says what it should. Nothing is timed here."""
 
+import importlib.util
 import json
 import os
 import subprocess
@@ -11,6 +12,7 @@ import pytest
 
 FOLDER = Path(__file__).resolve().parents[2] / "benchmarks"
 sys.path.insert(0, str(FOLDER))
+HAVE_GYMNASIUM = importlib.util.find_spec("gymnasium") is not None
 
 
 def run(name, folder, *arguments):
@@ -41,6 +43,7 @@ def run(name, folder, *arguments):
         "deployment_tables",
         "folding",
         "folding_trials",
+        pytest.param("rl_throughput", marks=pytest.mark.skipif(not HAVE_GYMNASIUM, reason="needs gymnasium")),
     ],
 )
 def test_the_short_form_writes_its_figures(name, tmp_path):

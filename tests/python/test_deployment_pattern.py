@@ -5,6 +5,7 @@ import pytest
 
 import withe
 from withe.deployment import Cable, Pattern, measure
+from withe.perception.synthetic import render_mask
 
 
 def arc(radius, turned, count=400):
@@ -17,8 +18,12 @@ def wave(height=0.03, count=300):
     return np.stack([x, height * np.sin(4 * np.pi * x)], 1)
 
 
-def test_the_loop_that_hangs_on_a_floor_is_as_high_as_measure_says():
-    # theta'' = (R - s) cos(theta) / 2 from the floor to the layer below, where theta is back at pi and z at 0.
+@pytest.fixture(scope="module")
+def loop():
+    """Of a cable that is folded back over itself, x and z [Lgb].
+
+    theta'' = (R - s) cos(theta) / 2 from the floor to the layer below, where theta is back at pi and z at 0.
+    """
     from scipy.integrate import solve_ivp
     from scipy.optimize import brentq
 
@@ -29,15 +34,34 @@ def test_the_loop_that_hangs_on_a_floor_is_as_high_as_measure_says():
         turned.terminal, turned.direction = True, -1
 
         def slopes(s, y):
-            return [y[1], 0.5 * (reaction - s) * np.cos(y[0]), np.sin(y[0])]
+            return [y[1], 0.5 * (reaction - s) * np.cos(y[0]), np.sin(y[0]), np.cos(y[0])]
 
-        return solve_ivp(slopes, (0.0, 9.0), [0.0, 0.0, 0.0], events=turned, rtol=1e-11, atol=1e-12, dense_output=True)
+        start = [0.0, 0.0, 0.0, 0.0]
+        return solve_ivp(slopes, (0.0, 9.0), start, events=turned, rtol=1e-11, atol=1e-12, dense_output=True)
 
     reaction = brentq(lambda r: over(r).y[2, -1], 4.6, 4.85, xtol=1e-12)
     found = over(reaction)
-    height = found.sol(np.linspace(0.0, found.t[-1], 20001))[2].max()
+    return found.sol(np.linspace(0.0, found.t[-1], 20001))[[3, 2]].T
+
+
+def test_the_loop_that_hangs_on_a_floor_is_as_high_as_measure_says(loop):
+    height = loop[:, 1].max()
     assert measure(height=height).gravito_bending_length == pytest.approx(1.0, abs=1e-5)
     assert measure(height=0.0366, error=1e-3).error == pytest.approx(1e-3 / 1.1422, rel=1e-4)
+
+
+@pytest.mark.parametrize(("lgb", "radius"), [(0.018, 1.6e-3), (0.032, 1.6e-3), (0.034, 2e-3), (0.0286, 3.2e-3)])
+def test_a_picture_of_a_loop_measures_the_cable_within_half_a_pixel(loop, lgb, radius):
+    pixel, random = 2.5e-4, np.random.default_rng(5)
+    for _ in range(3):
+        away = random.uniform(0.0, 1.0, 2)
+        line = np.concatenate([[[-3.0, 0.0]], loop[::50], [[loop[-1, 0] - 2.0, 0.0]]])
+        line = (lgb * line * [1.0, -1.0] + [0.13, 0.07]) / pixel + away
+        mask = render_mask([line], [2.0 * radius / pixel], [False], (380, 900))
+        image = np.where(mask[..., None], (200, 70, 90), (235, 235, 230)) + random.normal(0.0, 4.0, (380, 900, 3))
+        found = measure(image=np.clip(image, 0, 255).astype(np.uint8), scale=pixel)
+        assert found.gravito_bending_length == pytest.approx(lgb, abs=0.75 * pixel)
+        assert found.error == pytest.approx(0.5 * pixel / 1.1422, rel=1e-4)
 
 
 def test_cables_of_the_experiments():
@@ -180,6 +204,9 @@ def test_bad_patterns_say_what_is_wrong(arguments, message):
         (lambda: Cable(1e-3, 1e-3, 0.03), "thickness"),
         (lambda: Cable.dlo(6), "number"),
         (lambda: measure(height=-1.0), "height must be positive"),
+        (lambda: measure(), "exactly one of height and image"),
+        (lambda: measure(image=np.zeros((50, 50, 3), np.uint8)), "needs scale"),
+        (lambda: measure(image=np.zeros((50, 50, 3), np.uint8), scale=1e-3), "it is plain"),
         (lambda: Pattern(wave()).feasibility(Cable.dlo(2), -0.1), "friction"),
         (lambda: Pattern(wave()).feasibility(Cable(0.3, 1e-3, 0.03), 0.4), "pattern 0.5"),
         (lambda: Pattern(arc(0.03, 3.0)).feasibility(Cable(1.0, 0.04, 0.05), 0.4), "tighter than the cable's own"),

@@ -126,6 +126,8 @@ def test_the_command_line_plans_and_says_what_holds(tmp_path, capsys):
         assert (tmp_path / f"wave_plan.{ending}").stat().st_size > 1000
     assert main(["deploy", str(source), "--length", "0.885", "--out", str(tmp_path)]) == 2
     assert "needs --dlo, or --length, --radius and --lgb" in capsys.readouterr().err
+    assert main(["deploy", str(tmp_path / "wave_plan.csv"), "--dlo", "2"]) == 2  # a motion, whose t, x are no x, y
+    assert "wave_plan.csv must hold rows x,y in m, got '0,-0.0" in capsys.readouterr().err
     source.write_text("x,y\n0,0\nfar,away\n")
     assert main(["deploy", str(source), "--dlo", "2"]) == 2
     assert "rows x,y in m, got 'far,away'" in capsys.readouterr().err

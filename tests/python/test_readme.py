@@ -108,5 +108,16 @@ def test_the_cable_of_the_readme_is_laid(tmp_path, monkeypatch):
     for block in blocks("deployment.plan"):
         assert "floor=0.4)" in block
         exec(compile(block.replace("floor=0.4)", "floor=0.4, nodes=50, progress=False)"), str(README), "exec"), names)
-    assert (tmp_path / "wave.csv").stat().st_size > 1000
+    assert (tmp_path / "motion.csv").stat().st_size > 1000
     assert names["found"].error < 2e-3
+
+
+@pytest.mark.filterwarnings("ignore::withe.CoarseStepWarning")
+def test_the_robots_of_the_readme_learn():
+    pytest.importorskip("stable_baselines3")
+    names = {"__name__": "readme"}
+    (block,) = blocks("class Touch")
+    exec(compile(block.replace("20_000", "256"), str(README), "exec"), names)
+    assert names["seen"].shape == (100, 6)
+    assert np.all(names["rewards"] < 0.0)
+    assert names["policy"].predict(names["seen"][0])[0].shape == (2,)

@@ -95,6 +95,11 @@ class Batch(Setting, Reading):
         self._lanes.simulations[number] = simulation
 
     @property
+    def lanes(self) -> npt.NDArray[np.intc]:
+        """Numbers of all simulations, shape (n,)."""
+        return self._lanes.numbers
+
+    @property
     def workers(self) -> int:
         """Number of threads."""
         return int(self._lanes.engine.workers)

@@ -32,6 +32,7 @@ class Lanes:
         self.simulations = simulations
         self.engine = _core.Batch([each._session.world for each in simulations], workers)
         self._all = np.arange(len(simulations), dtype=np.intc)
+        self._all.flags.writeable = False
 
     def __len__(self) -> int:
         return len(self.simulations)
@@ -49,7 +50,7 @@ class Lanes:
         ValueError
             A mask of another length, a number that there is not or that comes twice.
         """
-        if given is None:
+        if given is None or given is self._all:
             return self._all
         size = len(self)
         array = np.asarray(given)
@@ -68,6 +69,11 @@ class Lanes:
         if len(np.unique(numbers)) < len(numbers):
             raise ValueError(f"{what} must differ, got {given!r:.80}")
         return numbers
+
+    @property
+    def numbers(self) -> IntArray:
+        """Of all simulations."""
+        return self._all
 
     def each(self, numbers: IntArray) -> Iterator[tuple[int, Simulation]]:
         """Place in a call's values, and simulation, of the lanes of a call."""

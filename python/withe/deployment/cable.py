@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 
+import numpy as np
+import numpy.typing as npt
+
 from withe.common import validation
+from withe.perception.masks import border_filter
+from withe.perception.tracing import check_image, read_image
 
 __all__ = ["JAW", "Cable", "MeasuredCable", "measure"]
 
@@ -83,8 +89,14 @@ class MeasuredCable:
     error: float
 
 
-def measure(*, height: float, error: float = 5e-4) -> MeasuredCable:
-    """Find a cable's gravito-bending length Lgb = (EI / 2w)^(1/3) with a ruler.
+def measure(
+    *,
+    height: float | None = None,
+    image: str | os.PathLike[str] | npt.ArrayLike | None = None,
+    scale: float | None = None,
+    error: float | None = None,
+) -> MeasuredCable:
+    """Find a cable's gravito-bending length Lgb = (EI / 2w)^(1/3) with a ruler or a camera.
 
     Fold the cable back over itself on a table, one layer on the other, and let it go: it forms a loop whose highest
     point is 1.1422 Lgb above the lower layer, however long the cable is [Pan et al. 2020; (9.10) has it for another
@@ -94,8 +106,13 @@ def measure(*, height: float, error: float = 5e-4) -> MeasuredCable:
     ----------
     height : float [m]
         Of the loop's highest point above the table, from centreline to centreline.
+    image : str, Path or array_like of shape (height, width, 3)
+        Instead: a picture from the side, the table level, of the loop and nothing else before a plain background. The
+        lowest pixels of the cable belong to the layer that lies on the table.
+    scale : float [m]
+        Of one pixel of the image.
     error : float [m]
-        Standard deviation of it.
+        Standard deviation of the height; by default .5 mm, or half a pixel of an image.
 
     Returns
     -------
@@ -104,7 +121,8 @@ def measure(*, height: float, error: float = 5e-4) -> MeasuredCable:
     Raises
     ------
     ValueError
-        A height that is not positive, a negative error.
+        None or both of height and image, one that is not positive, an image without scale or without a loop, a negative
+        error.
 
     Examples
     --------
@@ -113,5 +131,34 @@ def measure(*, height: float, error: float = 5e-4) -> MeasuredCable:
     >>> print(f"{1e3 * found.gravito_bending_length:.1f} mm, give or take {1e3 * found.error:.1f}")
     32.0 mm, give or take 0.4
     """
-    height, error = validation.positive(height, "height"), validation.non_negative(error, "error")
+    if (height is None) == (image is None):
+        raise ValueError("measure needs exactly one of height and image")
+    if image is not None:
+        if scale is None:
+            raise ValueError("an image needs scale, the size of a pixel in m")
+        pixel = validation.positive(scale, "scale")
+        height = pixel * _loop_height(image)
+        error = 0.5 * pixel if error is None else error
+    height, error = (
+        validation.positive(height, "height"),
+        validation.non_negative(5e-4 if error is None else error, "error"),
+    )
     return MeasuredCable(height / LOOP_HEIGHT, error / LOOP_HEIGHT)
+
+
+def _loop_height(image: str | os.PathLike[str] | npt.ArrayLike) -> float:
+    """From the centreline that lies to the highest one [px]: all that is seen less the cable's thickness."""
+    from scipy.ndimage import distance_transform_edt
+
+    picture = read_image(image) if isinstance(image, str | os.PathLike) else check_image(image)
+    mask = border_filter(picture)
+    rows = np.flatnonzero(mask.any(1))
+    if not rows.size:
+        raise ValueError("image must show a loop of cable, it is plain")
+    extent = int(rows[-1] - rows[0]) + 1
+    upper = np.zeros_like(mask)
+    upper[: rows[0] + extent // 2] = True  # there the two layers are apart
+    thickness = 2.0 * float(distance_transform_edt(mask)[upper].max()) - 1.0
+    if extent < 4.0 * thickness:
+        raise ValueError(f"image must show a loop of cable, got what is {extent} pixels high and {thickness:.0f} thick")
+    return extent - thickness

@@ -84,12 +84,12 @@ def _points(path: Path) -> npt.NDArray[np.float64]:
     bad = next((row for row in rows if not _is_row(row)), None)
     if bad is not None:
         raise ValueError(f"{path.name} must hold rows x,y in m, got {bad!r}")
-    return np.array([[float(number) for number in row.split(",")[:2]] for row in rows]).reshape(-1, 2)
+    return np.array([[float(number) for number in row.split(",")] for row in rows]).reshape(-1, 2)
 
 
 def _is_row(line: str) -> bool:
     numbers = line.split(",")
     try:
-        return len(numbers) >= 2 and all(np.isreal(float(number)) for number in numbers[:2])
+        return len(numbers) == 2 and all(np.isreal(float(number)) for number in numbers)
     except ValueError:
         return False

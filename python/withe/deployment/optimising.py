@@ -36,9 +36,9 @@ _GAIN = 0.97  # of the error that a step must leave at most to go on
 
 @dataclass(frozen=True)
 class Trial:
-    """What a path is shifted by, shape (knots,), what goes along it, and how far the cable lies from its places.
+    """What a path is shifted by, what goes along it, and how far the cable then lies from its places.
 
-    The last has shape (nodes, 2); [m].
+    Shapes (knots + 3,), the last three of which move it as a whole, and (nodes, 2) [m].
     """
 
     shift: FloatArray
@@ -68,14 +68,33 @@ class _Engine:
         """None where there is no such way, or the engine finds no equilibrium on it."""
         self.shown.advance(1)
         try:
-            motion = self.motion_of(displaced(self.path, self.basis @ shift), controller)
+            motion = self.motion_of(_shifted(self.path, self.basis, shift), controller)
             _, laid, _ = lay(self.setup, motion, progress=False)
         except (ConvergenceError, ValueError):
             return None
         return Trial(shift, controller, laid[: len(self.s), :2] - self.places)
 
+    def aligned(self, trial: Trial) -> Trial:
+        """The trial moved as a whole to where it misses least, which takes no run: the floor is the same everywhere.
+
+        The laid cable turns and moves with its path, whose first point turns in its place.
+        """
+        first = self.path.points[0]
+        back = _turn(-trial.shift[-1] / self.path.length)
+        laid = (trial.away + self.places - first - trial.shift[-3:-1]) @ back  # as if it had not been moved
+        wanted = self.places - first
+        centred, target = laid - laid.mean(0), wanted - wanted.mean(0)
+        turned = np.stack([-centred[:, 1], centred[:, 0]], 1)
+        angle = float(np.arctan2((turned * target).sum(), (centred * target).sum()))
+        way = wanted.mean(0) - laid.mean(0) @ _turn(angle)
+        shift = np.concatenate([trial.shift[:-3], way, [angle * self.path.length]])
+        return Trial(shift, trial.controller, way + laid @ _turn(angle) - wanted)
+
     def slopes(self, now: Trial) -> FloatArray:
-        """Derivative of all distances by all knots, shape (2 nodes, knots), by differences."""
+        """Derivative of all distances by the shift, shape (2 nodes, knots + 3).
+
+        By differences for knots. A path that moves as a whole takes the laid cable with it.
+        """
         colours = min(len(self.centres), _COLOURS)
         owner = np.abs(self.s[:, None] - self.centres)
         slopes = np.zeros((len(self.s), 2, len(self.centres)))
@@ -89,7 +108,11 @@ class _Engine:
             nearest = knots[owner[:, knots].argmin(1)]
             rows = np.flatnonzero(np.abs(self.s - self.centres[nearest]) < 0.5 * _COLOURS * self.spacing)
             slopes[rows, :, nearest[rows]] = (trial.away - now.away)[rows] / _PROBE
-        return slopes.reshape(2 * len(self.s), -1)
+        laid = now.away + self.places
+        arm = (laid - self.path.points[0] - now.shift[-3:-1]) / self.path.length
+        turned = np.stack([-arm[:, 1], arm[:, 0]], 1)
+        moved = np.broadcast_to(np.eye(2), (len(laid), 2, 2))
+        return np.concatenate([slopes, moved, turned[:, :, None]], axis=2).reshape(2 * len(self.s), -1)
 
 
 def optimised(
@@ -103,10 +126,10 @@ def optimised(
 ) -> tuple[Path, Controller]:
     """Shift a path sideways so that the cable comes to lie on its pattern, friction permitting.
 
-    The shift is a cubic spline with a knot each Lgb. What the engine makes of a shift of one knot is found by
-    differences, several distant knots at a time, for a shift moves the cable only nearby. With that derivative,
-    corrected after each trial [Broyden 1965], damped least squares [Levenberg 1944, Marquardt 1963] lower the distances
-    of the laid cable from its places. It begins from the better of the two controllers.
+    The shift is a cubic spline with a knot each Lgb, and a motion of the whole. What the engine makes of a shift of one
+    knot is found by differences, several distant knots at a time, for a shift moves the cable only nearby. With that
+    derivative, corrected after each trial [Broyden 1965], damped least squares [Levenberg 1944, Marquardt 1963] lower
+    the distances of the laid cable from its places. It begins from the better of the two controllers.
 
     Raises
     ------
@@ -122,11 +145,11 @@ def optimised(
         start_held=start == "held",
     )
     engine = _Engine(path, setup, pattern, motion_of, shown)
-    unshifted = np.zeros(len(engine.centres))
+    unshifted = np.zeros(len(engine.centres) + 3)
     tried = [trial for controller in get_args(Controller) if (trial := engine.trial(unshifted, controller))]
     if not tried:
         raise ConvergenceError("the rod engine found no equilibrium on the way to be optimised")
-    best = min(tried, key=lambda trial: trial.error)
+    best = engine.aligned(min(tried, key=lambda trial: trial.error))
     for _ in range(_ROUNDS):
         if best.error < _GOOD:
             break
@@ -134,7 +157,7 @@ def optimised(
         best = _descended(engine, best)
         if best.error > _GAIN * before:
             break
-    return displaced(path, _splines(path, engine.centres, engine.spacing) @ best.shift), best.controller
+    return _shifted(path, _splines(path, engine.centres, engine.spacing), best.shift), best.controller
 
 
 def runs(path: Path, cable: Cable, pattern: Pattern) -> int:
@@ -162,6 +185,19 @@ def _splines(path: Path, centres: FloatArray, spacing: float) -> FloatArray:
     u = np.abs(path.arc_length[:, None] - centres) / spacing
     near, far = 2.0 / 3.0 - u**2 + 0.5 * u**3, np.maximum(2.0 - u, 0.0) ** 3 / 6.0
     return np.where(u < 1.0, near, far)
+
+
+def _shifted(path: Path, basis: FloatArray, shift: FloatArray) -> Path:
+    """The path shifted to its left, then moved, and turned about its beginning by an angle times its length."""
+    bent = displaced(path, basis @ shift[:-3])
+    angle = shift[-1] / path.length
+    points = path.points[0] + shift[-3:-1] + (bent.points - path.points[0]) @ _turn(angle)
+    return Path(bent.arc_length, points, bent.heading + angle, bent.curvature)
+
+
+def _turn(angle: float) -> FloatArray:
+    """What rows are multiplied by from the right to be turned."""
+    return np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
 
 
 def _descended(engine: _Engine, best: Trial) -> Trial:

@@ -1,0 +1,98 @@
+"""The arm of the learning tasks under seeded actions: how far its tip is from a converged run, and how fast it goes."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import numpy as np
+
+import withe
+from withe.learning.arms import Arm
+
+__all__ = ["ACTIONS", "FreeArm", "PlanarArm", "actions_of", "control_steps", "penetration", "tip_error", "tips"]
+
+ACTIONS = 60
+FINE = 32  # shorter steps of the converged run
+
+
+class FreeArm(withe.learning.Follow):
+    """The arm that follows, for any step length and options."""
+
+
+class PlanarArm(withe.learning.Obstacles2D):
+    """The planar arm in steps of .1 s, with nothing in its way."""
+
+    control_step = 0.1
+    bend_step = 0.05
+    places = ()
+
+
+def actions_of(seed: int, size: int, count: int = ACTIONS) -> np.ndarray:
+    """Seeded actions, shape (count, size)."""
+    return np.random.default_rng(seed).uniform(-1.0, 1.0, (count, size))
+
+
+def _converged(task: Arm) -> Arm:
+    """The same in short steps, solved tightly."""
+    task.time_step = task.time_step / FINE
+    build = task.build
+
+    def tight(generator: np.random.Generator) -> withe.Simulation:
+        original = withe.Scene.build
+
+        def strictly(scene: withe.Scene, **options: Any) -> withe.Simulation:
+            return original(scene, **(options | {"step_tolerance": 1e-9, "force_tolerance": 1e-8}))
+
+        withe.Scene.build = strictly
+        try:
+            return build(generator)
+        finally:
+            withe.Scene.build = original
+
+    task.build = tight
+    return task
+
+
+def tips(task: Arm, seed: int, count: int = ACTIONS) -> np.ndarray:
+    """Tip after each action, shape (count, 3) [m]."""
+    env = withe.learning.Environment(task)
+    env.reset(seed=seed)
+    found = []
+    for action in actions_of(seed, task.action_size, count):
+        env.step(action)
+        found.append(env.simulation.positions("arm")[-1])
+    return np.array(found)
+
+
+def tip_error(kind: type[Arm], seed: int, count: int = ACTIONS) -> float:
+    """RMS distance of the tip from that of a converged run [m]."""
+    apart = tips(kind(), seed, count) - tips(_converged(kind()), seed, count)
+    return float(np.sqrt(np.mean(np.sum(apart**2, axis=1))))
+
+
+def penetration(kind: type[Arm], seed: int, radius: float, count: int = 50) -> float:
+    """Deepest that the arm sinks into an obstacle, over the smaller radius."""
+    env = withe.learning.Environment(kind())
+    env.reset(seed=seed)
+    deepest = 0.0
+    for action in actions_of(seed, env.task.action_size, count):
+        env.step(action)
+        contacts = env.simulation.contacts()
+        if len(contacts):
+            deepest = max(deepest, -float(contacts["gap"].min()))
+    return deepest / radius
+
+
+def control_steps(kind: type[Arm], count: int, workers: int, steps: int) -> float:
+    """Control steps a second of `count` environments, Python included; after a few that warm up."""
+    envs = withe.learning.VectorEnvironment(kind(), count, workers)
+    envs.reset(seed=1)
+    generator = np.random.default_rng(0)
+    every = generator.uniform(-1.0, 1.0, (steps + 3, count, envs.task.action_size))
+    for actions in every[:3]:
+        envs.step(actions)
+    start = time.perf_counter()
+    for actions in every[3:]:
+        envs.step(actions)
+    return count * steps / (time.perf_counter() - start)

@@ -1,0 +1,51 @@
+"""Learning with robots made of rods: runs as torch functions, environments for reinforcement learning, controllers.
+
+>>> import withe
+>>> x = withe.learning.rollout(simulation, {(arm, "youngs_modulus"): E}, duration=2.0)  # doctest: +SKIP
+>>> x[-1, -1, 2].backward()  # doctest: +SKIP
+>>> robots = gymnasium.make_vec("withe/Follow-v0", num_envs=64)  # doctest: +SKIP
+
+Torch, Gymnasium and Stable-Baselines3 are imported when they are first used (``pip install ".[learn]"`` in a clone of
+withe). What a robot is to do is a `Task`, which needs none of them; `Environment` and `VectorEnvironment` make
+Gymnasium environments of it. ``withe/Follow-v0``, ``Reach-v0``, ``Obstacles2D-v0``, ``Obstacles3D-v0``, ``Crawl-v0``
+and ``Wrap-v0`` are known to ``gymnasium.make`` and ``gymnasium.make_vec`` when Gymnasium is imported before withe, or
+after a call of `register`.
+"""
+
+import sys
+from typing import Any
+
+from withe.learning.arms import Follow, Obstacles2D, Obstacles3D, Reach
+from withe.learning.environments import environment_class
+from withe.learning.functions import equilibrium, rollout
+from withe.learning.limbs import Crawl, Wrap
+from withe.learning.registration import register
+from withe.learning.task import Task
+from withe.learning.training import train_policy
+
+__all__ = [
+    "Crawl",
+    "Environment",
+    "Follow",
+    "Obstacles2D",
+    "Obstacles3D",
+    "Reach",
+    "Task",
+    "VectorEnvironment",
+    "Wrap",
+    "equilibrium",
+    "register",
+    "rollout",
+    "train_policy",
+]
+
+
+def __getattr__(name: str) -> Any:
+    """`Environment` and `VectorEnvironment`, subclasses of Gymnasium's, made when they are first asked for."""
+    if name in ("Environment", "VectorEnvironment"):
+        return environment_class(name)
+    raise AttributeError(f"module 'withe.learning' has no attribute {name!r}")
+
+
+if "gymnasium" in sys.modules:
+    register()

@@ -1,0 +1,345 @@
+"""A soft arm that follows, reaches, and finds its way past obstacles: the tasks of [arXiv 2511.06667].
+
+An upright arm of 1 m, held at its lowest edge, is bent in five segments: an action adds to the discrete curvature that
+each segment has in sum, spread evenly over its nodes. Newton's method is not stopped early, and twist stays in range.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from withe.batch import Batch
+from withe.learning.task import IntArray, Task
+from withe.parts.kinds import ObstaclePart
+from withe.parts.materials import Material
+from withe.scene.scene import Scene
+from withe.simulation.simulation import Simulation
+
+__all__ = ["Follow", "Obstacles2D", "Obstacles3D", "Reach"]
+
+FloatArray = npt.NDArray[np.float64]
+
+_NODES, _LENGTH, _RADIUS = 21, 1.0, 0.05  # [-], [m], [m]
+_MODULUS, _DENSITY, _DRAG = 1e7, 1000.0, 10.0  # [Pa], [kg/m^3], [Pa s]
+_SEGMENTS = (3, 4, 4, 4, 4)  # inner nodes of each
+_SEGMENT_OF, _SHARES = np.repeat(np.arange(5), _SEGMENTS), 1.0 / np.array(_SEGMENTS)
+_MOST_BEND, _MOST_TWIST = 2.0, 0.5 * np.pi  # of a segment in sum [-], [rad]
+_SEEN = np.arange(2, _NODES, 2)  # nodes whose positions and velocities are observed
+_LOW, _HIGH = np.array([-0.6, -0.6, 0.3]), np.array([0.6, 0.6, 0.9])  # where targets are [m]
+_NEAR, _CLOSE = 0.1, 0.05  # of the tip to its target [m]
+_TWIST_STEP = 0.05  # of an action [rad]
+
+
+class Arm(Task):
+    """What the tasks share: the arm, its segments, what is seen of it.
+
+    Attributes
+    ----------
+    bend_step : float [-]
+        Discrete curvature that an action of 1 adds to a segment, in sum.
+    axes : tuple of int
+        Coordinates that are observed: two in a plane.
+    components : int
+        Of curvature that are driven.
+    """
+
+    control_step = 0.1
+    steps = 100
+    bend_step = 0.05
+    axes: tuple[int, ...] = (0, 1, 2)
+    components = 2
+    planar = False
+    twisted = False
+    time_step = 1.0 / 40.0  # tip within 1 cm RMS of a run with short steps; see benchmarks/rl_throughput.py
+
+    def __init__(self) -> None:
+        self.action_size = 5 * (self.components + self.twisted)
+
+    def build(self, generator: np.random.Generator) -> Simulation:
+        """The arm, upright, among the obstacles of the task."""
+        scene = Scene()
+        rubber = Material(youngs_modulus=_MODULUS, poisson_ratio=0.5, density=_DENSITY)
+        arm = scene.add_rod(
+            start=(0, 0, 0),
+            end=(0, 0, _LENGTH),
+            nodes=_NODES,
+            radius=_RADIUS,
+            normal=(1, 0, 0),
+            material=rubber,
+            name="arm",
+        )
+        scene.clamp(arm.start, hold="edge")
+        scene.add_drag(_DRAG, rods=[arm])
+        self.add_obstacles(scene, generator)
+        return scene.build(
+            time_step=self.time_step,
+            planar=self.planar,
+            step_tolerance=1e-6,
+            force_tolerance=1e-5,
+        )
+
+    def add_obstacles(self, scene: Scene, generator: np.random.Generator) -> None:
+        """Put what is in the way into the scene; nothing by default."""
+
+    def prepare(self, robots: Batch) -> None:
+        """Bends and targets of every robot."""
+        count = len(robots)
+        self.bends = np.zeros((count, 5, self.components))
+        self.twists = np.zeros((count, 5))
+        self.target = np.zeros((count, 3))
+        self._x = np.empty((count, _NODES, 3))
+        self._v = np.empty((count, _NODES, 3))
+
+    def begin(self, robots: Batch, chosen: IntArray, generators: list[np.random.Generator]) -> None:
+        """Straight, with a target of each generator."""
+        self.bends[chosen] = 0.0
+        self.twists[chosen] = 0.0
+        for lane, generator in zip(chosen, generators, strict=True):
+            self.aim(int(lane), generator)
+
+    def aim(self, lane: int, generator: np.random.Generator) -> None:
+        """Where the target of a robot is at the start of its episode."""
+        raise NotImplementedError
+
+    def act(self, robots: Batch, actions: FloatArray, chosen: IntArray) -> None:
+        """Lead the natural curvatures on, and twists."""
+        parts = actions.reshape(len(chosen), -1, 5).swapaxes(1, 2)
+        bends = self.bends[chosen] + self.bend_step * parts[..., : self.components]
+        self.bends[chosen] = bends = np.minimum(np.maximum(bends, -_MOST_BEND), _MOST_BEND)
+        curvature = (bends * _SHARES[:, None])[:, _SEGMENT_OF]
+        if self.components == 1:
+            curvature = np.concatenate([curvature, np.zeros_like(curvature)], axis=2)
+        robots.set_natural_curvature("arm", curvature, over=self.control_step, discrete=True, lanes=chosen)
+        if self.twisted:
+            twists = np.clip(self.twists[chosen] + _TWIST_STEP * parts[..., -1], -_MOST_TWIST, _MOST_TWIST)
+            self.twists[chosen] = twists
+            rates = (twists * _SHARES)[:, _SEGMENT_OF] * ((_NODES - 1) / _LENGTH)
+            robots.set_natural_twist("arm", rates, over=self.control_step, lanes=chosen)
+
+    def observe(self, robots: Batch) -> FloatArray:
+        """Positions and velocities of every second node, bends, twists, and what the task adds."""
+        count = len(robots)
+        x, v = robots.positions("arm", out=self._x), robots.velocities("arm", out=self._v)
+        parts = [x[:, _SEEN][..., self.axes], v[:, _SEEN][..., self.axes], self.bends]
+        if self.twisted:
+            parts.append(self.twists)
+        return np.hstack([part.reshape(count, -1) for part in parts] + self.seen(robots))
+
+    def seen(self, robots: Batch) -> list[FloatArray]:
+        """What is observed besides the arm: arrays with a row for each robot."""
+        return [self.target[:, self.axes]]
+
+    def distances(self, robots: Batch) -> FloatArray:
+        """Of every tip to its target, shape (n,) [m]."""
+        tips = robots.positions("arm", out=self._x)[:, -1]
+        return np.asarray(np.linalg.norm((tips - self.target)[:, self.axes], axis=1))
+
+    def reward(self, robots: Batch) -> FloatArray:
+        """Minus the distance squared, and more the closer."""
+        d = self.distances(robots)
+        return -(d**2) + np.where(d < _CLOSE, 2.0, np.where(d < _NEAR, 0.5, 0.0))
+
+    def draw(self, axes: Any, robots: Batch) -> None:
+        """The target."""
+        axes.plot(*self.target[:1].T, "o", color="#d1495b", markersize=9)
+
+
+class Follow(Arm):
+    """The tip is to follow a target that goes about at .5 m/s and turns now and then.
+
+    Actions: for each segment what is added to its curvature towards x, then towards y, (10,). Observed: positions and
+    velocities of nodes 2, 4 .. 20, bends of the segments, position and velocity of the target, (76,). Reward -d^2, and
+    .5 within .1 m, 2 within .05 m. 500 steps of .1 s.
+
+    Examples
+    --------
+    >>> env = gymnasium.make("withe/Follow-v0")  # doctest: +SKIP
+    """
+
+    steps = 500
+    speed = 0.5  # [m/s]
+    turning = 0.025  # chance of a new direction, an action
+
+    def prepare(self, robots: Batch) -> None:
+        """Targets move, by numbers drawn as an episode begins."""
+        super().prepare(robots)
+        count = len(robots)
+        self.way = np.zeros((count, 3))  # velocity of the target [m/s]
+        self._taken = np.zeros(count, np.int64)
+        self._turns = np.zeros((count, self.steps), bool)
+        self._ways = np.zeros((count, self.steps + 1, 3))
+
+    def aim(self, lane: int, generator: np.random.Generator) -> None:
+        """Anywhere, on its way anywhere."""
+        self.target[lane] = generator.uniform(_LOW, _HIGH)
+        ways = generator.normal(size=(self.steps + 1, 3))
+        self._ways[lane] = self.speed * ways / np.linalg.norm(ways, axis=1, keepdims=True)
+        self._turns[lane] = generator.random(self.steps) < self.turning
+        self._taken[lane] = 0
+        self.way[lane] = self._ways[lane, -1]
+
+    def act(self, robots: Batch, actions: FloatArray, chosen: IntArray) -> None:
+        """The target goes on too; walls send it back."""
+        super().act(robots, actions, chosen)
+        taken = self._taken[chosen] % self.steps
+        way = np.where(self._turns[chosen, taken, None], self._ways[chosen, taken], self.way[chosen])
+        there = self.target[chosen] + self.control_step * way
+        outside = (there < _LOW) | (there > _HIGH)
+        self.way[chosen] = np.where(outside, -way, way)
+        self.target[chosen] = np.clip(np.where(outside, self.target[chosen], there), _LOW, _HIGH)
+        self._taken[chosen] += 1
+
+    def seen(self, robots: Batch) -> list[FloatArray]:
+        """The target and its velocity."""
+        return [self.target, self.way]
+
+
+class Reach(Arm):
+    """The tip is to come to a pose: a position, and upright but for a yaw of up to 90 degrees.
+
+    Actions: for each segment curvatures and twist, (15,). Observed besides the arm: twists, quaternion of the tip,
+    position and quaternion of the target, scalar last, (86,). With o = 1 - (q . q*)^2 the reward is -d^2 - o^2 / 2, and
+    besides 1 - o / 2 (1.5 if o < .1) within .1 m, or 4 - 2 o (4.5 if o < .1, 6 if o < .05) within .05 m. 100 steps of
+    .1 s.
+
+    Examples
+    --------
+    >>> env = gymnasium.make("withe/Reach-v0")  # doctest: +SKIP
+    """
+
+    twisted = True
+
+    def prepare(self, robots: Batch) -> None:
+        """Targets have an orientation."""
+        super().prepare(robots)
+        self.goal = np.tile((0.0, 0.0, 0.0, 1.0), (len(robots), 1))
+
+    def aim(self, lane: int, generator: np.random.Generator) -> None:
+        """Anywhere, yawed."""
+        self.target[lane] = generator.uniform(_LOW, _HIGH)
+        yaw = generator.uniform(-0.5 * np.pi, 0.5 * np.pi)
+        self.goal[lane] = (0.0, 0.0, np.sin(0.5 * yaw), np.cos(0.5 * yaw))
+
+    def orientations(self, robots: Batch) -> FloatArray:
+        """Quaternions of the last edges, scalar last, the one of the drawn arm (0, 0, 0, 1)."""
+        from scipy.spatial.transform import Rotation
+
+        frames = robots.directors("arm")[:, -1].swapaxes(1, 2)
+        q = Rotation.from_matrix(frames).as_quat()
+        return np.asarray(q * np.where(q[:, 3:] < 0.0, -1.0, 1.0))
+
+    def seen(self, robots: Batch) -> list[FloatArray]:
+        """Orientation of the tip, pose of the target."""
+        return [self.orientations(robots), self.target, self.goal]
+
+    def reward(self, robots: Batch) -> FloatArray:
+        """For the place and the orientation."""
+        d = self.distances(robots)
+        o = 1.0 - np.sum(self.orientations(robots) * self.goal, axis=1) ** 2
+        near = np.where(o < 0.1, 1.5, 1.0) - 0.5 * o
+        close = np.where(o < 0.05, 6.0, np.where(o < 0.1, 4.5, 4.0)) - 2.0 * o
+        bonus = np.where(d < _CLOSE, close, np.where(d < _NEAR, near, 0.0))
+        return np.asarray(-(d**2) - 0.5 * o**2 + bonus)
+
+
+class _Obstructed(Arm):
+    """The tip is to come to a goal behind obstacles; steps of .5 s."""
+
+    control_step = 0.5
+    steps = 50
+    bend_step = 0.25
+    aimed_at = (0.8, 0.0, 0.15)  # [m]
+
+    def aim(self, lane: int, generator: np.random.Generator) -> None:
+        """Always there."""
+        self.target[lane] = self.aimed_at
+
+
+class Obstacles2D(_Obstructed):
+    """The tip is to come to (.8, .15) m in the plane of x and z, past six round obstacles of radius .1 m.
+
+    Actions: for each segment what is added to its curvature, (5,). Observed: positions and velocities of nodes
+    2, 4 .. 20, bends, the goal, (47,). Reward as in `Follow`. 50 steps of .5 s.
+
+    Examples
+    --------
+    >>> env = gymnasium.make("withe/Obstacles2D-v0")  # doctest: +SKIP
+    """
+
+    axes = (0, 2)
+    components = 1
+    planar = True
+    places = ((0.2, 0.12), (0.6, 0.12), (0.4, 0.0), (0.4, 0.37), (0.4, 0.57), (0.4, 0.77))  # x, z [m]
+
+    def add_obstacles(self, scene: Scene, generator: np.random.Generator) -> None:
+        """Capsules across the plane."""
+        for x, z in self.places:
+            scene.add_capsule((x, -0.2, z), (x, 0.2, z), 0.1)
+
+
+class Obstacles3D(_Obstructed):
+    """The tip is to come to (.8, 0, .35) m through eight capsules of radius .03 m, which every episode draws anew.
+
+    Actions: as in `Follow`, (10,). Observed: positions and velocities of nodes 2, 4 .. 20, bends, the goal, ends of the
+    capsules, (121,). Reward as in `Follow`. 50 steps of .5 s.
+
+    Examples
+    --------
+    >>> env = gymnasium.make("withe/Obstacles3D-v0")  # doctest: +SKIP
+    """
+
+    redraw = True
+    aimed_at = (0.8, 0.0, 0.35)
+    low, high = np.array([0.3, -0.6, -0.1]), np.array([0.6, 0.6, 0.8])  # where the capsules are [m]
+    count, radius, length, apart = 8, 0.03, 1.0, 0.015  # [-], [m]
+
+    def prepare(self, robots: Batch) -> None:
+        """Obstacles are seen."""
+        super().prepare(robots)
+        self.ends = np.zeros((len(robots), self.count * 6))
+
+    def begin(self, robots: Batch, chosen: IntArray, generators: list[np.random.Generator]) -> None:
+        """Notes where the capsules are."""
+        super().begin(robots, chosen, generators)
+        for lane in chosen:
+            capsules = robots[int(lane)]._session.directory.all(ObstaclePart)
+            self.ends[lane] = np.ravel([(capsule.point, capsule.other) for capsule in capsules])
+
+    def seen(self, robots: Batch) -> list[FloatArray]:
+        """The goal, and the obstacles."""
+        return [self.target, self.ends]
+
+    def add_obstacles(self, scene: Scene, generator: np.random.Generator) -> None:
+        """Capsules of random direction whose axes are in the box, and not too near each other."""
+        for start, end in self._drawn(generator):
+            scene.add_capsule(start, end, self.radius)
+
+    def _drawn(self, generator: np.random.Generator) -> list[tuple[FloatArray, FloatArray]]:
+        found: list[tuple[FloatArray, FloatArray]] = []
+        while len(found) < self.count:
+            middles = generator.uniform(self.low, self.high, (64, 3))
+            ways = generator.normal(size=(64, 3))
+            ways *= 0.5 * self.length / np.linalg.norm(ways, axis=1, keepdims=True)
+            for start, end in zip(middles - ways, middles + ways, strict=True):
+                inside = (np.minimum(start, end) >= self.low) & (np.maximum(start, end) <= self.high)
+                clear = all(_segment_distance(start, end, *other) >= self.apart for other in found)
+                if inside.all() and clear and len(found) < self.count:
+                    found.append((start, end))
+        return found
+
+
+def _segment_distance(a0: FloatArray, a1: FloatArray, b0: FloatArray, b1: FloatArray) -> float:
+    """Of two segments [m]: where both lines are nearest if that is on both, else at an end of one."""
+    u, v, w = a1 - a0, b1 - b0, a0 - b0
+    uu, uv, vv, uw, vw = u @ u, u @ v, v @ v, u @ w, v @ w
+    determinant = uu * vv - uv * uv
+    if determinant > 1e-12 * uu * vv:
+        s, t = (uv * vw - vv * uw) / determinant, (uu * vw - uv * uw) / determinant
+        if 0.0 <= s <= 1.0 and 0.0 <= t <= 1.0:
+            return float(np.linalg.norm(w + s * u - t * v))
+    ends = [(a0, b0, v), (a1, b0, v), (b0, a0, u), (b1, a0, u)]
+    shares = [float(np.clip((point - start) @ way / (way @ way), 0.0, 1.0)) for point, start, way in ends]
+    return min(float(np.linalg.norm(p - x - s * y)) for (p, x, y), s in zip(ends, shares, strict=True))

@@ -1,0 +1,331 @@
+"""Gymnasium environments of a task: of one robot, and of many on one batch."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from withe.common.extras import require
+from withe.learning.episodes import Episodes
+from withe.learning.rendering import Screen
+from withe.learning.task import Task
+
+__all__ = ["environment_class", "maker", "vector_maker"]
+
+FloatArray = npt.NDArray[np.float64]
+RENDER_MODES = ("rgb_array", "human")
+
+
+def _require() -> Any:
+    return require("gymnasium", "learn")
+
+
+def _boxes(episodes: Episodes) -> tuple[Any, Any]:
+    """What is seen, and what may be done, as Gymnasium says it."""
+    box = _require().spaces.Box
+    seen = episodes.observe()
+    return (
+        box(-np.inf, np.inf, seen.shape[1:], np.float32),
+        box(-1.0, 1.0, (episodes.action_size,), np.float32),
+    )
+
+
+def _screen(render_mode: str | None, episodes: Episodes) -> Screen | None:
+    if render_mode is None:
+        return None
+    if render_mode not in RENDER_MODES:
+        raise ValueError(f"render_mode must be {' or '.join(map(repr, RENDER_MODES))} or None, got {render_mode!r}")
+    return Screen(episodes.robots, episodes.task.draw, window=render_mode == "human")
+
+
+class _Environment:
+    """One robot that does a task, as a Gymnasium environment.
+
+    Parameters
+    ----------
+    task : Task
+    render_mode : {"rgb_array", "human"}, optional
+        Pictures from `render`, shape (480, 640, 3), uint8; or a window.
+
+    Raises
+    ------
+    ValueError
+        Not a task, one whose control step is no whole number of time steps, or an unknown render mode. From `step`, an
+        action of another shape, not finite, or outside of -1..1.
+    ImportError
+        Gymnasium is not installed.
+
+    Examples
+    --------
+    >>> env = withe.learning.Environment(withe.learning.Follow())  # doctest: +SKIP
+    >>> observation, info = env.reset(seed=7)  # doctest: +SKIP
+    >>> observation, reward, terminated, truncated, info = env.step(env.action_space.sample())  # doctest: +SKIP
+    """
+
+    np_random: np.random.Generator
+
+    def __init__(self, task: Task, render_mode: str | None = None) -> None:
+        self._episodes = Episodes(task, 1, 1)
+        self.render_mode = render_mode
+        self._screen = _screen(render_mode, self._episodes)
+        self._lane = self._episodes.robots.lanes
+        self._closed = False
+        self._episodes.begin(self._lane, [np.random.default_rng(0)])
+        self.observation_space, self.action_space = _boxes(self._episodes)
+        self._episodes.begun[:] = False
+        self.metadata = {"render_modes": list(RENDER_MODES), "render_fps": round(1.0 / task.control_step)}
+
+    @property
+    def task(self) -> Task:
+        """What the robot does."""
+        return self._episodes.task
+
+    @property
+    def simulation(self) -> Any:
+        """The robot."""
+        return self._episodes.robots[0]
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
+        """Begin an episode; equal seeds give equal episodes."""
+        self._check(False)
+        super().reset(seed=seed)  # type: ignore[misc]
+        self._episodes.begin(self._lane, [self.np_random])
+        self._show()
+        return self._episodes.observe()[0], {}
+
+    def step(self, action: npt.ArrayLike) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        """Do an action, for one control step."""
+        self._check(True)
+        outcome = self._episodes.act(self._episodes.checked([np.asarray(action)], 1), self._lane)
+        self._show()
+        info = {"failed": True} if outcome.failed[0] else {}
+        return (
+            self._episodes.observe()[0],
+            float(outcome.reward[0]),
+            bool(outcome.terminated[0]),
+            bool(outcome.truncated[0]),
+            info,
+        )
+
+    def render(self) -> npt.NDArray[np.uint8] | None:
+        """A picture, shape (480, 640, 3); none of a window."""
+        self._check(True)
+        if self._screen is None or self.render_mode == "human":
+            return None
+        return self._screen.picture()
+
+    def close(self) -> None:
+        """Take down the window; what follows is refused."""
+        if self._screen is not None:
+            self._screen.close()
+        self._closed = True
+
+    def _show(self) -> None:
+        if self.render_mode == "human" and self._screen is not None:
+            self._screen.show()
+
+    def _check(self, begun: bool) -> None:
+        errors = _require().error
+        if self._closed:
+            raise errors.ClosedEnvironmentError("the environment is closed: make another one")
+        if begun and not self._episodes.begun[0]:
+            raise errors.ResetNeeded("call reset before step or render")
+
+
+class _VectorEnvironment:
+    """Many robots that do a task, each in an episode of its own, stepped in one call: a Gymnasium vector environment.
+
+    The episodes of robot i are those of `Environment` with the seed of i, for any number of workers.
+
+    Parameters
+    ----------
+    task : Task
+    num_envs : int
+    workers : int, optional
+        Number of threads; by default one a processor.
+    render_mode : {"rgb_array", "human"}, optional
+        Pictures of the first robot.
+    autoreset : {"next_step", "same_step", "disabled"}
+        As Gymnasium has it: when the next episode of a robot begins. With "disabled" by
+        ``reset(options={"reset_mask": mask})``.
+
+    Raises
+    ------
+    ValueError
+        See `Environment`; or workers below 1, a mask of another length.
+    ImportError
+        Gymnasium is not installed.
+
+    Examples
+    --------
+    >>> robots = withe.learning.VectorEnvironment(withe.learning.Follow(), 64, workers=2)  # doctest: +SKIP
+    >>> observations, infos = robots.reset(seed=7)  # doctest: +SKIP
+    >>> observations, rewards, *_ = robots.step(robots.action_space.sample())  # doctest: +SKIP
+    """
+
+    def __init__(
+        self,
+        task: Task,
+        num_envs: int = 1,
+        workers: int | None = None,
+        render_mode: str | None = None,
+        autoreset: str = "next_step",
+    ) -> None:
+        gymnasium = _require()
+        modes = {mode.name.lower(): mode for mode in gymnasium.vector.AutoresetMode}
+        if autoreset not in modes:
+            raise ValueError(f"autoreset must be {' or '.join(map(repr, modes))}, got {autoreset!r}")
+        self._episodes = Episodes(task, num_envs, workers)
+        self._autoreset = autoreset
+        self.num_envs = num_envs
+        self.render_mode = render_mode
+        self._screen = _screen(render_mode, self._episodes)
+        self._all = self._episodes.robots.lanes
+        self._episodes.begin(self._all, [np.random.default_rng(0) for _ in range(num_envs)])
+        self.single_observation_space, self.single_action_space = _boxes(self._episodes)
+        self._episodes.begun[:] = False
+        batch_space = gymnasium.vector.utils.batch_space
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self._generators = [np.random.default_rng() for _ in range(num_envs)]
+        self._over = np.zeros(num_envs, bool)
+        self.metadata = {
+            "render_modes": list(RENDER_MODES),
+            "render_fps": round(1.0 / task.control_step),
+            "autoreset_mode": modes[autoreset],
+        }
+
+    @property
+    def task(self) -> Task:
+        """What the robots do."""
+        return self._episodes.task
+
+    @property
+    def robots(self) -> Any:
+        """The robots, a `withe.Batch`."""
+        return self._episodes.robots
+
+    def reset(
+        self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
+        """Begin episodes of all robots, or of those of ``options["reset_mask"]``, shape (n,), bool.
+
+        Seeds are one for each robot, or the first of a row of numbers.
+        """
+        self._check(False)
+        chosen = self._all
+        if options is not None and "reset_mask" in options:
+            mask = np.asarray(options["reset_mask"])
+            if mask.dtype != np.bool_ or mask.shape != (self.num_envs,):
+                raise ValueError(
+                    f"reset_mask must be bool of shape ({self.num_envs},), got {mask.dtype} of shape {mask.shape}"
+                )
+            chosen = self._all[mask]
+        seeds: list[int | None] = [None] * self.num_envs
+        if isinstance(seed, int | np.integer):
+            seeds = [int(seed) + i for i in range(self.num_envs)]
+        elif seed is not None:
+            seeds = list(seed)
+        if len(seeds) != self.num_envs:
+            raise ValueError(f"seed must be one number, or one for each of {self.num_envs} robots, got {len(seeds)}")
+        for lane in chosen:
+            if seeds[lane] is not None:
+                self._generators[lane] = np.random.default_rng(seeds[lane])
+        self._begin(chosen)
+        self._show()
+        return self._episodes.observe(), {}
+
+    def step(self, actions: npt.ArrayLike) -> tuple[Any, FloatArray, Any, Any, dict[str, Any]]:
+        """Do an action with every robot, for one control step; one whose episode is over begins another instead."""
+        self._check(True)
+        values = self._episodes.checked(actions, self.num_envs)
+        over = self._over.copy()
+        if self._autoreset == "disabled" and over.any():
+            raise ValueError(f"episodes of robots {np.flatnonzero(over).tolist()} are over: reset them")
+        chosen = self._all[~over] if over.any() else self._all
+        outcome = self._episodes.act(values[chosen], chosen)
+        rewards, terminated, truncated = outcome.reward, outcome.terminated, outcome.truncated
+        infos: dict[str, Any] = {}
+        if (failed := outcome.failed & ~over).any():
+            infos |= {"failed": failed, "_failed": failed}
+        if over.any():
+            self._begin(self._all[over])
+            rewards[over], terminated[over], truncated[over] = 0.0, False, False
+        self._over = terminated | truncated
+        if self._autoreset == "same_step" and self._over.any():
+            ended = self._over.copy()
+            infos |= {
+                "final_obs": self._episodes.observe(),
+                "_final_obs": ended,
+                "final_info": {},
+                "_final_info": ended,
+            }
+            self._begin(self._all[ended])
+        self._show()
+        return self._episodes.observe(), rewards, terminated, truncated, infos
+
+    def render(self) -> Any:
+        """A picture of the first robot, in a tuple as Gymnasium wants it; none of a window."""
+        self._check(True)
+        if self._screen is None or self.render_mode == "human":
+            return None
+        return (self._screen.picture(),)
+
+    def close_extras(self, **options: Any) -> None:
+        """Take down the window."""
+        if self._screen is not None:
+            self._screen.close()
+
+    def _begin(self, chosen: npt.NDArray[np.intc]) -> None:
+        self._episodes.begin(chosen, [self._generators[lane] for lane in chosen])
+        self._over[chosen] = False
+
+    def _show(self) -> None:
+        if self.render_mode == "human" and self._screen is not None:
+            self._screen.show()
+
+    def _check(self, begun: bool) -> None:
+        errors = _require().error
+        if self.closed:  # type: ignore[attr-defined]
+            raise errors.ClosedEnvironmentError("the environment is closed: make another one")
+        if begun and not self._episodes.begun.all():
+            raise errors.ResetNeeded("call reset before step or render")
+
+
+@cache
+def environment_class(name: str) -> Any:
+    """The class of that name, a subclass of Gymnasium's."""
+    gymnasium = _require()
+    own, base = {
+        "Environment": (_Environment, gymnasium.Env),
+        "VectorEnvironment": (_VectorEnvironment, gymnasium.vector.VectorEnv),
+    }[name]
+    return type(name, (own, base), {"__doc__": own.__doc__, "__module__": "withe.learning"})
+
+
+def maker(task: Callable[..., Task]) -> Callable[..., Any]:
+    """What `gymnasium.make` calls: options of the environment, the rest are the task's."""
+
+    def make(render_mode: str | None = None, **options: Any) -> Any:
+        return environment_class("Environment")(task(**options), render_mode)
+
+    return make
+
+
+def vector_maker(task: Callable[..., Task]) -> Callable[..., Any]:
+    """What `gymnasium.make_vec` calls."""
+
+    def make(
+        num_envs: int = 1,
+        workers: int | None = None,
+        render_mode: str | None = None,
+        autoreset: str = "next_step",
+        **options: Any,
+    ) -> Any:
+        return environment_class("VectorEnvironment")(task(**options), num_envs, workers, render_mode, autoreset)
+
+    return make

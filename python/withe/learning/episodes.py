@@ -1,0 +1,112 @@
+"""Episodes of a task: when they begin, an action's way through the simulation, when they end."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from withe.batch import Batch
+from withe.common import validation
+from withe.learning.task import Task
+
+__all__ = ["Episodes", "Outcome"]
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.intc]
+BoolArray = npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of actions, an entry for each robot.
+
+    Attributes
+    ----------
+    reward : ndarray of shape (n,)
+    terminated, truncated, failed : ndarray of shape (n,), bool
+        Failed: the simulation found no solution, and the episode is truncated.
+    """
+
+    reward: FloatArray
+    terminated: BoolArray
+    truncated: BoolArray
+    failed: BoolArray
+
+
+class Episodes:
+    """Robots that do a task, each at its own place in its episode.
+
+    Parameters
+    ----------
+    task : Task
+    count : int
+        How many robots.
+    workers : int, optional
+        Number of threads.
+    """
+
+    def __init__(self, task: Task, count: int, workers: int | None) -> None:
+        if not isinstance(task, Task):
+            raise ValueError(f"task must be a withe.learning.Task, got {type(task).__name__}")
+        self.task = task
+        number = validation.integer(count, "number of environments", 1, 1_000_000)
+        first = task.build(np.random.default_rng(0))
+        self.robots = Batch([first, *(first.copy() for _ in range(number - 1))], workers)
+        self.begun = np.zeros(number, bool)
+        self._taken = np.zeros(number, np.int64)
+        ratio = validation.positive(task.control_step, "control_step") / first.time_step
+        self._count = round(ratio)
+        if self._count < 1 or abs(ratio - self._count) > 1e-6 * ratio:
+            raise ValueError(
+                f"control_step must be a whole number of time steps of {first.time_step:g} s, "
+                f"got {task.control_step:g} s"
+            )
+        self.action_size = validation.integer(task.action_size, "action_size", 1, 1_000_000)
+        self.steps = validation.integer(task.steps, "steps", 1, 2**31 - 1)
+        task.prepare(self.robots)
+
+    def __len__(self) -> int:
+        return len(self.robots)
+
+    def begin(self, chosen: IntArray, generators: list[np.random.Generator]) -> None:
+        """Begin episodes of some robots, with a generator of random numbers for each of them."""
+        if self.task.redraw:
+            for lane, generator in zip(chosen, generators, strict=True):
+                self.robots[int(lane)] = self.task.build(generator)
+        else:
+            self.robots.reset(chosen)
+        self._taken[chosen] = 0
+        self.begun[chosen] = True
+        self.task.begin(self.robots, chosen, generators)
+
+    def observe(self) -> npt.NDArray[np.float32]:
+        """What is seen of every robot."""
+        return np.asarray(self.task.observe(self.robots), np.float32)
+
+    def act(self, actions: FloatArray, chosen: IntArray) -> Outcome:
+        """Do one action each; of robots that are not chosen nothing changes."""
+        self.task.act(self.robots, actions, chosen)
+        self.robots.step(self._count, chosen)
+        self._taken[chosen] += 1
+        failed = self.robots.failed
+        return Outcome(
+            np.asarray(self.task.reward(self.robots), np.float64),
+            np.asarray(self.task.finished(self.robots), bool) & ~failed,
+            (self._taken >= self.steps) | failed,
+            failed,
+        )
+
+    def checked(self, actions: npt.ArrayLike, count: int) -> FloatArray:
+        """Actions as numbers.
+
+        Raises
+        ------
+        ValueError
+            Another shape, not finite, or outside of the box.
+        """
+        values = validation.number_array(actions, "action", (count, self.action_size))
+        if np.abs(values).max(initial=0.0) > 1.0:
+            raise ValueError(f"action must lie in -1..1, got {values.flat[np.abs(values).argmax()]:g}")
+        return values

@@ -1,0 +1,100 @@
+"""Pictures of the first robot of a batch while it learns, by matplotlib."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from withe.batch import Batch
+from withe.common.extras import require
+from withe.simulation.obstacles import obstacle_outlines
+
+__all__ = ["Screen"]
+
+_SIZE = (640, 480)  # [px]
+_COLORS = ("#00798c", "#edae49", "#66a182", "#8d96a3", "#d1495b", "#2e4057")
+
+
+class Screen:
+    """A figure that shows the first robot.
+
+    Parameters
+    ----------
+    robots : Batch
+    draw : callable
+        Called with axes and the robots, adds what the task knows.
+    window : bool
+        Whether it is a window, or pictures are asked for.
+    """
+
+    def __init__(self, robots: Batch, draw: Callable[[Any, Batch], None], window: bool) -> None:
+        self._robots, self._draw = robots, draw
+        self._window = window
+        self._figure: Any = None
+
+    def picture(self) -> npt.NDArray[np.uint8]:
+        """The present state, shape (480, 640, 3)."""
+        self._paint()
+        self._figure.canvas.draw()
+        return np.array(self._figure.canvas.buffer_rgba())[..., :3]
+
+    def show(self) -> None:
+        """Bring the window up to date."""
+        self._paint()
+        require("matplotlib.pyplot", "view").pause(1e-3)
+
+    def close(self) -> None:
+        """Take the figure down."""
+        if self._figure is not None and self._window:
+            require("matplotlib.pyplot", "view").close(self._figure)
+        self._figure = None
+
+    def _paint(self) -> None:
+        if self._figure is None:
+            size = (_SIZE[0] / 100.0, _SIZE[1] / 100.0)
+            if self._window:
+                self._figure = require("matplotlib.pyplot", "view").figure(figsize=size, dpi=100)
+            else:
+                self._figure = require("matplotlib.figure", "view").Figure(figsize=size, dpi=100)
+                require("matplotlib.backends.backend_agg", "view").FigureCanvasAgg(self._figure)
+            self._axes = self._figure.add_axes((0.0, 0.0, 1.0, 1.0), projection="3d")
+            self._reach = self._extent()
+        axes = self._axes
+        axes.clear()
+        simulation = self._robots[0]
+        low, high = self._reach
+        for axis, bottom, top in zip("xyz", low, high, strict=True):
+            axes.set(**{f"{axis}lim": (bottom, top), f"{axis}label": f"{axis} [m]"})
+        axes.set_box_aspect(high - low)
+        scale = 0.55 * _SIZE[1] * 0.72 / float((high - low).max())  # points a metre, about
+        for number, rod in enumerate(simulation.rods):
+            x = simulation.positions(rod)
+            width = float(np.clip(2.0 * np.mean(simulation.get(rod, "radius")) * scale, 1.5, 40.0))
+            axes.plot(*x.T, color=_COLORS[number % len(_COLORS)], linewidth=width, solid_capstyle="round")
+        self._obstacles(simulation, scale)
+        self._draw(axes, self._robots)
+        axes.text2D(0.02, 0.95, f"{simulation.time:.2f} s", transform=axes.transAxes)
+
+    def _obstacles(self, simulation: Any, scale: float) -> None:
+        for outline in obstacle_outlines(simulation._session.directory):
+            if outline.kind == "plane":
+                continue
+            start = simulation.obstacle_position(outline.name)
+            ends = np.array([start, start + (outline.axis if outline.kind == "capsule" else 0.0)])
+            width = float(np.clip(2.0 * outline.radius * scale, 1.5, 80.0))
+            self._axes.plot(*ends.T, color="#9aa5b1", linewidth=width, solid_capstyle="round", alpha=0.45)
+
+    def _extent(self) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+        """A box that the robot stays in, for all it is known: as far as its rods reach from where they are held."""
+        simulation = self._robots[0]
+        x = simulation.positions()
+        length = sum(
+            float(np.linalg.norm(np.diff(simulation.positions(rod), axis=0), axis=1).sum()) for rod in simulation.rods
+        )
+        reach = min(length, 1.2 * float(np.ptp(x, axis=0).max()))
+        middle = 0.5 * (x.min(axis=0) + x.max(axis=0))
+        half = np.maximum(0.5 * np.ptp(x, axis=0), 0.75 * reach)
+        return middle - half, middle + half

@@ -1,0 +1,129 @@
+"""Controllers learned by Stable-Baselines3: no more than what joins it to robots of withe."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from withe.common import validation
+from withe.common.extras import require
+from withe.common.progress import progress as progress_bar
+from withe.learning.environments import environment_class
+from withe.learning.task import Task
+
+__all__ = ["train_policy"]
+
+
+def train_policy(
+    task: Task,
+    steps: int,
+    *,
+    environments: int = 16,
+    workers: int | None = None,
+    seed: int = 0,
+    progress: bool = True,
+    **options: Any,
+) -> Any:
+    """Train a controller by proximal policy optimisation, on robots that are stepped side by side.
+
+    A thin example: everything else that Stable-Baselines3 can do, it does with `VectorEnvironment` too.
+
+    Parameters
+    ----------
+    task : Task
+    steps : int
+        Control steps of all robots together.
+    environments : int
+        How many robots.
+    workers : int, optional
+        Threads that step them; by default one a processor.
+    seed : int
+        Equal seeds give equal controllers, where torch runs the same.
+    progress : bool
+        Whether to show a progress bar on a terminal.
+    **options
+        Of ``stable_baselines3.PPO``, such as n_steps and learning_rate.
+
+    Returns
+    -------
+    stable_baselines3.PPO
+        ``action, _ = policy.predict(observation, deterministic=True)``; its ``save`` and ``load`` keep it. Rewards of
+        episodes that ended last are in ``policy.ep_info_buffer``.
+
+    Raises
+    ------
+    ValueError
+        Not a task, or numbers below 1.
+    ImportError
+        Gymnasium, torch or Stable-Baselines3 is not installed.
+
+    Examples
+    --------
+    >>> policy = withe.learning.train_policy(withe.learning.Follow(), 1_000_000)  # doctest: +SKIP
+    """
+    total = validation.integer(steps, "steps", 1, 2**31 - 1)
+    number = validation.integer(environments, "environments", 1, 1_000_000)
+    baselines = require("stable_baselines3", "learn")
+    require("torch", "learn").set_num_threads(1)  # small networks lose by more
+    robots = environment_class("VectorEnvironment")(task, number, workers, autoreset="same_step")
+    monitored = require("stable_baselines3.common.vec_env", "learn").VecMonitor(_adapter()(robots))
+    given = {"n_steps": max(2, 2048 // number), "batch_size": 256, "device": "cpu"} | options
+    policy = baselines.PPO("MlpPolicy", monitored, seed=seed, **given)
+    with progress_bar(total, "training", progress, unit="steps") as bar:
+
+        def report(inside: dict[str, Any], _: dict[str, Any]) -> bool:
+            bar.update(min(inside["self"].num_timesteps, total))
+            return True
+
+        policy.learn(total, callback=report)
+    return policy
+
+
+@cache
+def _adapter() -> Any:
+    """A vector environment as Stable-Baselines3 wants it; made when that is there."""
+    base = require("stable_baselines3.common.vec_env", "learn").VecEnv
+
+    class Adapter(base):  # type: ignore[misc,valid-type]
+        def __init__(self, robots: Any) -> None:
+            self.robots = robots
+            super().__init__(robots.num_envs, robots.single_observation_space, robots.single_action_space)
+
+        def reset(self) -> Any:
+            seeds = [int(seed) if seed is not None else None for seed in self._seeds]
+            observations, _ = self.robots.reset(seed=seeds)
+            self._reset_seeds()
+            return observations
+
+        def step_async(self, actions: Any) -> None:
+            self._actions = actions
+
+        def step_wait(self) -> Any:
+            seen, rewards, terminated, truncated, infos = self.robots.step(self._actions)
+            over = terminated | truncated
+            each: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
+            for lane in np.flatnonzero(over):
+                each[lane] = {
+                    "terminal_observation": infos["final_obs"][lane],
+                    "TimeLimit.truncated": bool(truncated[lane] and not terminated[lane]),
+                }
+            return seen, rewards.astype(np.float32), over, each
+
+        def close(self) -> None:
+            self.robots.close()
+
+        def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
+            return [getattr(self.robots, attr_name, None)] * len(list(self._get_indices(indices)))
+
+        def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
+            raise AttributeError("robots on one batch share their attributes: set them on the task")
+
+        def env_method(self, method_name: str, *arguments: Any, indices: Any = None, **options: Any) -> list[Any]:
+            raise AttributeError("robots on one batch have no methods of their own: call those of the task")
+
+        def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
+            return [False] * len(list(self._get_indices(indices)))
+
+    return Adapter

@@ -1,0 +1,307 @@
+"""Environments for reinforcement learning: Gymnasium's checker, equal seeds, what is refused."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+import withe
+from withe.learning.arms import _segment_distance
+
+gymnasium = pytest.importorskip("gymnasium")
+withe.learning.register()
+
+NAMES = ["Follow", "Reach", "Obstacles2D", "Obstacles3D", "Crawl", "Wrap"]
+SIZES = {
+    "Follow": (76, 10, 500),
+    "Reach": (86, 15, 100),
+    "Obstacles2D": (47, 5, 50),
+    "Obstacles3D": (121, 10, 50),
+    "Crawl": (94, 18, 100),
+    "Wrap": (98, 20, 60),
+}
+
+pytestmark = [
+    pytest.mark.filterwarnings("ignore::withe.CoarseStepWarning"),  # random actions make arms whip
+    pytest.mark.filterwarnings("ignore:.*Box observation space.*:UserWarning"),
+]
+
+
+class Touch(withe.learning.Task):
+    """The tip of a short arm is to touch a point: the example of the docstring."""
+
+    action_size, control_step, steps = 2, 0.1, 3
+    goal = np.array([0.1, 0.0, 0.25])
+
+    def build(self, generator):
+        scene = withe.Scene()
+        rubber = withe.Material(youngs_modulus=1e6, density=1000.0, viscosity=1e3)
+        arm = scene.add_rod(start=(0, 0, 0), end=(0, 0, 0.3), nodes=9, radius=1e-2, material=rubber, name="arm")
+        scene.clamp(arm.start)
+        return scene.build(time_step=0.02)
+
+    def act(self, robots, actions, chosen):
+        robots.set_natural_curvature("arm", 6.0 * actions, over=self.control_step, lanes=chosen)
+
+    def observe(self, robots):
+        return np.hstack([robots.positions("arm")[:, -1], robots.velocities("arm")[:, -1]])
+
+    def reward(self, robots):
+        return -np.linalg.norm(robots.positions("arm")[:, -1] - self.goal, axis=1)
+
+
+def episodes(environment, actions, seed):
+    """Observations and rewards of an episode with given actions."""
+    seen, rewards = [environment.reset(seed=seed)[0]], []
+    for action in actions:
+        observation, reward, *_ = environment.step(action)
+        seen.append(observation)
+        rewards.append(reward)
+    return np.array(seen), np.array(rewards)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_gymnasiums_checker_passes(name):
+    environment = gymnasium.make(f"withe/{name}-v0", disable_env_checker=True).unwrapped
+    seen, done, steps = SIZES[name]
+    assert environment.observation_space.shape == (seen,)
+    assert environment.action_space.shape == (done,)
+    assert environment.task.steps == steps
+    from gymnasium.utils.env_checker import check_env
+
+    check_env(environment)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_equal_seeds_give_equal_episodes_alone_and_in_a_batch_of_any_number_of_workers(name):
+    actions = np.random.default_rng(5).uniform(-1, 1, (6, 3, SIZES[name][1]))
+    alone = gymnasium.make(f"withe/{name}-v0", disable_env_checker=True)
+    wanted = [episodes(alone, actions[:, lane], 11 + lane) for lane in range(3)]
+    for workers in (1, 2, 3):
+        many = gymnasium.make_vec(f"withe/{name}-v0", 3, "vector_entry_point", workers=workers)
+        seen, rewards = episodes(many, actions, 11)
+        for lane in range(3):
+            np.testing.assert_array_equal(seen[:, lane], wanted[lane][0])
+            np.testing.assert_array_equal(rewards[:, lane], wanted[lane][1])
+
+
+def test_an_action_bends_the_segments_by_as_much_as_it_says():
+    env = withe.learning.Environment(withe.learning.Follow())
+    env.reset(seed=0)
+    action = np.zeros((2, 5))
+    action[0, 1], action[1, 4] = 1.0, -0.5
+    for _ in range(50):
+        env.step(action.ravel())
+    natural = env.simulation.get("arm", "natural_curvature")
+    turn = 2.0 * np.tan(0.5 * 0.05 * natural)  # discrete curvature of edges of .05 m
+    np.testing.assert_allclose(turn[3:7, 0].sum(), 2.0, atol=1e-12)  # 50 times .05, held at 2
+    np.testing.assert_allclose(turn[15:, 1].sum(), -1.25, atol=1e-12)
+    assert np.abs(np.delete(turn, range(3, 7), axis=0)[:, 0]).max() == 0.0
+
+
+def test_rewards_are_those_of_the_distance():
+    task = withe.learning.Follow()
+    env = withe.learning.Environment(task)
+    env.reset(seed=0)
+    tip = env.simulation.positions("arm")[-1]
+    for distance, bonus in ((0.3, 0.0), (0.11, 0.0), (0.09, 0.5), (0.06, 0.5), (0.04, 2.0)):
+        task.target[0] = tip + distance * np.array([0.0, 1.0, 0.0])
+        found = task.reward(env.unwrapped._episodes.robots)[0]
+        np.testing.assert_allclose(found, bonus - distance**2, atol=1e-12)
+
+
+def test_the_pose_to_reach_is_rewarded_by_distance_and_orientation():
+    task = withe.learning.Reach()
+    env = withe.learning.Environment(task)
+    env.reset(seed=0)
+    robots = env._episodes.robots
+    task.target[0] = env.simulation.positions("arm")[-1]
+    for yaw in (0.0, 0.3, 0.9, 1.5):
+        task.goal[0] = (0, 0, np.sin(yaw / 2), np.cos(yaw / 2))
+        o = np.sin(yaw / 2) ** 2
+        bonus = (6.0 if o < 0.05 else 4.5 if o < 0.1 else 4.0) - 2.0 * o
+        np.testing.assert_allclose(task.reward(robots)[0], bonus - 0.5 * o**2, atol=1e-9)
+
+
+def test_targets_keep_their_speed_and_stay_in_their_box():
+    task = withe.learning.Follow()
+    env = withe.learning.VectorEnvironment(task, 20, workers=1)
+    env.reset(seed=3)
+    before, turns = task.target.copy(), 0
+    for _ in range(200):
+        way = task.way.copy()
+        task_actions = np.zeros((20, 10))
+        robots = env.robots
+        task.act(robots, task_actions, np.arange(20, dtype=np.intc))
+        assert np.all((task.target >= [-0.6, -0.6, 0.3]) & (task.target <= [0.6, 0.6, 0.9]))
+        np.testing.assert_allclose(np.linalg.norm(task.way, axis=1), 0.5)
+        assert np.linalg.norm(task.target - before, axis=1).max() <= 0.05 + 1e-12
+        turns += int(np.sum(np.abs(task.way - way).max(axis=1) > 1e-12))
+        before = task.target.copy()
+    assert 0.02 < turns / 4000 < 0.3  # by chance, and at walls
+
+
+def test_drawn_capsules_are_in_their_box_apart_and_new_in_each_episode():
+    task = withe.learning.Obstacles3D()
+    env = withe.learning.VectorEnvironment(task, 3, workers=1)
+    env.reset(seed=1)
+    first = task.ends.copy()
+    ends = first.reshape(3, 8, 2, 3)
+    assert np.all((ends >= task.low) & (ends <= task.high))
+    np.testing.assert_allclose(np.linalg.norm(ends[..., 1, :] - ends[..., 0, :], axis=-1), 1.0)
+    for capsules in ends:
+        for a, b in itertools.combinations(capsules, 2):
+            s = np.linspace(0, 1, 400)[:, None]
+            sampled = np.linalg.norm((a[0] + s * (a[1] - a[0]))[:, None] - (b[0] + s * (b[1] - b[0])), axis=-1).min()
+            exact = _segment_distance(*a, *b)
+            assert exact >= 0.015
+            assert sampled - 3e-3 <= exact <= sampled + 1e-12
+    env.reset(seed=2)
+    np.testing.assert_array_equal(task.ends[0], first[1])
+    assert not np.array_equal(task.ends[2], first[2])
+
+
+@pytest.mark.parametrize("autoreset", ["next_step", "same_step"])
+def test_robots_begin_again_by_themselves_as_gymnasium_has_it(autoreset):
+    mode = gymnasium.vector.AutoresetMode[autoreset.upper()]
+    reference = gymnasium.vector.SyncVectorEnv([lambda: withe.learning.Environment(Touch())] * 2, autoreset_mode=mode)
+    many = withe.learning.VectorEnvironment(Touch(), 2, workers=1, autoreset=autoreset)
+    np.testing.assert_array_equal(reference.reset(seed=4)[0], many.reset(seed=4)[0])
+    for step in range(9):
+        actions = np.random.default_rng(step).uniform(-1, 1, (2, 2)).astype(np.float32)
+        for wanted, found in zip(reference.step(actions)[:4], many.step(actions)[:4], strict=True):
+            np.testing.assert_array_equal(wanted, found)
+
+
+def test_some_begin_again_by_a_mask():
+    many = withe.learning.VectorEnvironment(Touch(), 3, workers=2, autoreset="disabled")
+    many.reset(seed=0)
+    for _ in range(3):
+        _, _, _, truncated, _ = many.step(np.ones((3, 2)))
+    assert truncated.all()
+    many.reset(options={"reset_mask": np.array([True, False, True])})
+    np.testing.assert_allclose(many.robots.time, [0.0, 0.3, 0.0])
+    with pytest.raises(ValueError, match=r"episodes of robots \[1\] are over"):
+        many.step(np.ones((3, 2)))
+
+
+class Brittle(Touch):
+    """Folds to and fro where an action is 1, which no step of 20 ms reaches in 6 iterations."""
+
+    steps = 20
+
+    def build(self, generator):
+        scene = withe.Scene()
+        rubber = withe.Material(youngs_modulus=1e6, density=1000.0, viscosity=1e3)
+        arm = scene.add_rod(start=(0, 0, 0), end=(0, 0, 0.3), nodes=9, radius=1e-2, material=rubber, name="arm")
+        scene.clamp(arm.start)
+        return scene.build(time_step=0.02, adaptive=False, max_iterations=6)
+
+    def act(self, robots, actions, chosen):
+        zigzag = np.where(np.arange(7) % 2, 55.0, -55.0)[:, None] * np.ones(2)
+        robots.set_natural_curvature("arm", (actions[:, :1] == 1.0)[..., None] * zigzag, lanes=chosen)
+
+
+def test_a_robot_whose_simulation_fails_ends_its_episode_and_no_others():
+    many = withe.learning.VectorEnvironment(Brittle(), 2, workers=2)
+    many.reset(seed=0)
+    _, _, terminated, truncated, infos = many.step(np.array([[1.0, 0.0], [0.0, 0.0]]))
+    assert truncated.tolist() == [True, False]
+    assert not terminated.any()
+    assert infos["failed"].tolist() == [True, False]
+    _, _, _, truncated, infos = many.step(np.zeros((2, 2)))
+    assert not truncated.any()
+    assert not infos
+    np.testing.assert_allclose(many.robots.time, [0.0, 0.2])
+
+
+def test_pictures_are_drawn():
+    pytest.importorskip("matplotlib")
+    env = withe.learning.Environment(withe.learning.Obstacles2D(), render_mode="rgb_array")
+    env.reset(seed=0)
+    first = env.render()
+    assert first.shape == (480, 640, 3)
+    assert first.dtype == np.uint8
+    assert np.ptp(first) > 200
+    for _ in range(2):
+        env.step(np.ones(5))
+    assert np.any(env.render() != first)
+    many = withe.learning.VectorEnvironment(Touch(), 2, workers=1, render_mode="rgb_array")
+    many.reset(seed=0)
+    assert many.render()[0].shape == (480, 640, 3)
+
+
+def closed(env):
+    env.close()
+    return env
+
+
+BAD = [
+    (lambda env: env.step(np.full(2, 1.5)), ValueError, "action must lie in -1..1, got 1.5"),
+    (lambda env: env.step(np.ones(3)), ValueError, "action must have shape (1, 2), got (1, 3)"),
+    (lambda env: env.step([np.nan, 0]), ValueError, "action must be finite, got nan"),
+    (lambda env: closed(env).step(np.ones(2)), gymnasium.error.ClosedEnvironmentError, "the environment is closed"),
+    (lambda env: closed(env).reset(), gymnasium.error.ClosedEnvironmentError, "the environment is closed"),
+    (
+        lambda env: withe.learning.Environment(Touch()).step(np.ones(2)),
+        gymnasium.error.ResetNeeded,
+        "call reset before step",
+    ),
+    (lambda env: withe.learning.Environment(Touch(), "ascii"), ValueError, "render_mode must be 'rgb_array' or"),
+    (lambda env: withe.learning.Environment(3), ValueError, "task must be a withe.learning.Task, got int"),
+    (lambda env: withe.learning.VectorEnvironment(Touch(), 0), ValueError, "number of environments must lie in 1.."),
+    (lambda env: withe.learning.VectorEnvironment(Touch(), 2, 0), ValueError, "workers must lie in 1..4096, got 0"),
+    (
+        lambda env: withe.learning.VectorEnvironment(Touch(), 2, autoreset="never"),
+        ValueError,
+        "autoreset must be 'next_step' or",
+    ),
+    (
+        lambda env: withe.learning.VectorEnvironment(Touch(), 2, 1).reset(options={"reset_mask": np.ones(3, bool)}),
+        ValueError,
+        "reset_mask must be bool of shape (2,), got bool of shape (3,)",
+    ),
+    (
+        lambda env: withe.learning.VectorEnvironment(Touch(), 2, 1).reset(seed=[1, 2, 3]),
+        ValueError,
+        "seed must be one number, or one for each of 2 robots, got 3",
+    ),
+]
+
+
+@pytest.mark.parametrize(("call", "kind", "message"), BAD)
+def test_bad_input_says_what_was_expected(call, kind, message):
+    env = withe.learning.Environment(Touch())
+    env.reset(seed=0)
+    with pytest.raises(kind) as error:
+        call(env)
+    assert message in str(error.value)
+
+
+def test_a_control_step_is_a_whole_number_of_time_steps():
+    task = Touch()
+    task.control_step = 0.05
+    with pytest.raises(ValueError, match=r"control_step must be a whole number of time steps of 0.02 s, got 0.05 s"):
+        withe.learning.Environment(task)
+
+
+def test_a_policy_is_trained_the_same_for_equal_seeds():
+    pytest.importorskip("stable_baselines3")
+
+    def policy():
+        return withe.learning.train_policy(
+            Touch(), 96, environments=4, workers=2, seed=3, progress=False, n_steps=12, batch_size=24, n_epochs=2
+        )
+
+    seen = np.linspace(-0.1, 0.3, 6, dtype=np.float32)
+    first, second = (policy().predict(seen, deterministic=True)[0] for _ in range(2))
+    np.testing.assert_array_equal(first, second)
+    assert first.shape == (2,)
+
+
+def test_training_refuses_what_is_no_task():
+    pytest.importorskip("stable_baselines3")
+    with pytest.raises(ValueError, match=r"steps must lie in 1"):
+        withe.learning.train_policy(Touch(), 0)
+    with pytest.raises(ValueError, match=r"task must be a withe.learning.Task, got int"):
+        withe.learning.train_policy(3, 10)
