@@ -109,10 +109,12 @@ double anchor_energy(const ContactProblem& problem, const Touching& t) {
 
 double kept_anchor_energy(const ContactProblem& problem, const Touching& t) {
   if (!problem.anchored() || !(t.pair.friction > 0.0)) return 0.0;
+  const double stiffness = tangential_stiffness(t.pair, t.stiffness);
+  if (t.pair.isotropic()) return 0.5 * stiffness * dot(t.stick, t.stick);
   const FrictionSetting f = friction_setting(problem, t, 1.0, nullptr);
   SlippingSurfaces<double> c = slipping_surfaces(f, t.now);
-  c.friction.force = f.tangential_stiffness * t.stick;
-  if (!t.pair.isotropic()) direct_friction(f, c);
+  c.friction.force = stiffness * t.stick;
+  direct_friction(f, c);
   return 0.5 * dot(c.friction.force, t.stick);
 }
 
