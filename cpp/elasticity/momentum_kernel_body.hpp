@@ -1,3 +1,4 @@
+#pragma once
 // The discrete gradient of bending and twisting in space, and of stretching, on packs; included by
 // stencil_kernels_body.hpp.
 
@@ -32,66 +33,100 @@ void put_row(Pack (&row)[11], const Vec3<Pack> (&edge)[2], const Pack (&angle)[2
   row[7] = angle[1];
 }
 
+/// Frames of a step, per edge of a stencil.
+template <bool inner>
+struct MomentumFrames {
+  EdgeFrame<Pack> start[2], middle[2], end[2];
+
+  MomentumFrames(const StencilBatch& batch, const MomentumBatch& step, const Lanes<inner>& lanes)
+      : start{frames_of(step.start_frames, lanes.edge[0]), frames_of(step.start_frames, lanes.edge[1])},
+        middle{frames_of(batch.frames, lanes.edge[0]), frames_of(batch.frames, lanes.edge[1])},
+        end{frames_of(step.end_frames, lanes.edge[0]), frames_of(step.end_frames, lanes.edge[1])} {}
+
+  MovingEdge<Pack> moving(int j) const { return moving_edge(start[j], middle[j], end[j]); }
+};
+
+/// The moment between the two frames of a stencil, and what its edges make of it.
+template <bool inner>
+struct MomentumForces {
+  MomentumFrames<inner> frames;
+  DiscreteMoment<Pack> m;
+  MovingEdge<Pack> edge[2];
+  Vec3<Pack> moment[2], mean[2];
+  BendTwistDerivatives<Pack> d;  ///< its gradient only
+};
+
+template <bool with_matrix, bool inner>
+MomentumForces<inner> momentum_forces(const StencilBatch& batch, const MomentumBatch& step, const Lanes<inner>& lanes) {
+  const Vec3<Pack> n = lanes.three(batch.natural, batch.column), k = lanes.three(batch.stiffness, batch.column);
+  const Vec3<Pack> s0 = lanes.three(step.start_strain, batch.column), s1 = lanes.three(step.end_strain, batch.column);
+  const MomentumFrames<inner> f(batch, step, lanes);
+  DiscreteMoment<Pack> m;
+  discrete_moment<with_matrix>(batch.measure, f.start[0], f.end[0], f.start[1], f.end[1], s0, s1, n, k, m);
+  MomentumForces<inner> out{f, m, {f.moving(0), f.moving(1)}, {m.moment, -m.moment}, {}, {}};
+  for (int j = 0; j < 2; ++j) {
+    out.d.gradient_e[j] = out.edge[j].force(out.moment[j]);
+    out.d.gradient_angle[j] = out.edge[j].torque(out.moment[j]);
+    out.mean[j] = (out.edge[j].inverse_mean / f.middle[j].inverse_length) * f.middle[j].tangent;
+  }
+  return out;
+}
+
+/// Derivatives by the middle, whose changes are half of those of the end. `transported`: see DiscreteStep.
+template <bool transported, bool inner>
+void momentum_matrix(const StencilBatch& batch, const MomentumForces<inner>& forces, const Lanes<inner>& lanes,
+                     Pack (&H)[11][11 + kLanes]) {
+  const MomentumFrames<inner>& f = forces.frames;
+  const MovingEdge<Pack>(&edge)[2] = forces.edge;
+  const EdgeColumns<Pack> columns[2] = {edge_columns(forces.m.by_a, f.end[0]), edge_columns(forces.m.by_b, f.end[1])};
+  for (auto& row : H)
+    for (Pack& entry : row) entry = 0.0;
+  const auto add_node_rows = [&](int tail, int i, const Pack(&row)[11]) {
+    for (int j = 0; j < 11; ++j) {
+      H[tail + i][j] -= row[j];
+      H[tail + 4 + i][j] += row[j];
+    }
+  };
+  for (int i = 0; i < 2; ++i) {
+    EdgeBlock<Pack> block[2];
+    for (int j = 0; j < 2; ++j) block[j] = edge_block(edge[i], i == 0 ? 1.0 : -1.0, columns[j]);
+    add_edge_geometry(edge[i], forces.moment[i], block[i]);
+    if constexpr (transported) {
+      for (EdgeBlock<Pack>& b : block) add_transport(f.middle[i], b);
+      add_spin_change(edge[i], f.middle[i], forces.d.gradient_angle[i], block[i]);
+    }
+    // Changes of the end are twice those of the middle; the mixed method has axial forces of its own.
+    const Pack transverse = lanes.owned[i] * (lanes.of_edge(batch.geometric, i) * edge[i].inverse_mean);
+    Mat3<Pack> stretching{};
+    add_stretch_hessian(forces.mean[i], f.end[i].tangent, lanes.owned[i] * lanes.of_edge(batch.modulus, i), transverse,
+                        stretching);
+    Pack row[11];
+    for (int r = 0; r < 3; ++r) {
+      Vec3<Pack> by_edge[2] = {2.0 * block[0].ee.row[r], 2.0 * block[1].ee.row[r]};
+      by_edge[i] += stretching.row[r];
+      const Pack by_angle[2] = {2.0 * block[0].e_angle[r], 2.0 * block[1].e_angle[r]};
+      put_row(row, by_edge, by_angle);
+      add_node_rows(4 * i, r, row);
+    }
+    const Vec3<Pack> by_edge[2] = {2.0 * block[0].angle_e, 2.0 * block[1].angle_e};
+    const Pack by_angle[2] = {2.0 * block[0].angle_angle, 2.0 * block[1].angle_angle};
+    put_row(row, by_edge, by_angle);
+    for (int j = 0; j < 11; ++j) H[3 + 4 * i][j] = row[j];
+  }
+}
+
 template <bool with_matrix, bool inner>
 [[gnu::flatten]] void momentum_pack(const StencilBatch& batch, const MomentumBatch& step, int first) {
   const Lanes<inner> lanes(batch, first);
   const int live = inner ? kLanes : lanes.live;
-  const Vec3<Pack> n = lanes.three(batch.natural, batch.column), k = lanes.three(batch.stiffness, batch.column);
-  const Vec3<Pack> s0 = lanes.three(step.start_strain, batch.column), s1 = lanes.three(step.end_strain, batch.column);
-  const EdgeFrame<Pack> f0[2] = {frames_of(step.start_frames, lanes.edge[0]),
-                                 frames_of(step.start_frames, lanes.edge[1])};
-  const EdgeFrame<Pack> f1[2] = {frames_of(step.end_frames, lanes.edge[0]), frames_of(step.end_frames, lanes.edge[1])};
-  const EdgeFrame<Pack> f[2] = {frames_of(batch.frames, lanes.edge[0]), frames_of(batch.frames, lanes.edge[1])};
-  DiscreteMoment<Pack> m;
-  discrete_moment<with_matrix>(batch.measure, f0[0], f1[0], f0[1], f1[1], s0, s1, n, k, m);
-  const MovingEdge<Pack> edge[2] = {moving_edge(f0[0], f[0], f1[0]), moving_edge(f0[1], f[1], f1[1])};
-  const Vec3<Pack> moment[2] = {m.moment, -m.moment};
-
-  BendTwistDerivatives<Pack> d;  // its gradient only
-  Vec3<Pack> mean[2], tension[2];
-  for (int j = 0; j < 2; ++j) {
-    d.gradient_e[j] = edge[j].force(moment[j]);
-    d.gradient_angle[j] = edge[j].torque(moment[j]);
-    mean[j] = (edge[j].inverse_mean / f[j].inverse_length) * f[j].tangent;
-    tension[j] = (lanes.owned[j] * lanes.of_edge(batch.force, j)) * mean[j];
-  }
-  apply_transport_gradient(f[0], f[1], d);
-  add_forces<true>(batch, first, live, d, tension);
+  MomentumForces<inner> forces = momentum_forces<with_matrix>(batch, step, lanes);
+  Vec3<Pack> tension[2];
+  for (int j = 0; j < 2; ++j) tension[j] = (lanes.owned[j] * lanes.of_edge(batch.force, j)) * forces.mean[j];
+  apply_transport_gradient(forces.frames.middle[0], forces.frames.middle[1], forces.d);
+  add_forces<true>(batch, first, live, forces.d, tension);
   if constexpr (with_matrix) {
-    const EdgeColumns<Pack> columns[2] = {edge_columns(m.by_a, f1[0]), edge_columns(m.by_b, f1[1])};
     Pack H[11][11 + kLanes];
-    for (int i = 0; i < 11; ++i)
-      for (int j = 0; j < 11 + kLanes; ++j) H[i][j] = 0.0;
-    const auto add_node_rows = [&](int tail, int i, const Pack(&row)[11]) {
-      for (int j = 0; j < 11; ++j) {
-        H[tail + i][j] -= row[j];
-        H[tail + 4 + i][j] += row[j];
-      }
-    };
-    for (int i = 0; i < 2; ++i) {
-      EdgeBlock<Pack> block[2];
-      for (int j = 0; j < 2; ++j) block[j] = edge_block(edge[i], i == 0 ? 1.0 : -1.0, columns[j]);
-      add_edge_geometry(edge[i], moment[i], block[i]);
-      for (EdgeBlock<Pack>& b : block) add_transport(f[i], b);
-      add_spin_change(edge[i], f[i], d.gradient_angle[i], block[i]);
-      // Changes of the end are twice those of the middle; the mixed method has axial forces of its own.
-      const Pack transverse = lanes.owned[i] * (lanes.of_edge(batch.geometric, i) * edge[i].inverse_mean);
-      Mat3<Pack> stretching{};
-      add_stretch_hessian(mean[i], f1[i].tangent, lanes.owned[i] * lanes.of_edge(batch.modulus, i), transverse,
-                          stretching);
-      Pack row[11];
-      for (int r = 0; r < 3; ++r) {
-        Vec3<Pack> by_edge[2] = {2.0 * block[0].ee.row[r], 2.0 * block[1].ee.row[r]};
-        by_edge[i] += stretching.row[r];
-        const Pack by_angle[2] = {2.0 * block[0].e_angle[r], 2.0 * block[1].e_angle[r]};
-        put_row(row, by_edge, by_angle);
-        add_node_rows(4 * i, r, row);
-      }
-      const Vec3<Pack> by_edge[2] = {2.0 * block[0].angle_e, 2.0 * block[1].angle_e};
-      const Pack by_angle[2] = {2.0 * block[0].angle_angle, 2.0 * block[1].angle_angle};
-      put_row(row, by_edge, by_angle);
-      for (int j = 0; j < 11; ++j) H[3 + 4 * i][j] = row[j];
-    }
+    momentum_matrix<true>(batch, forces, lanes, H);
     if (!batch.by_rows) exchange_triangles(H);
     add_lines<Block, false>(batch, first, live, H);
   }

@@ -56,6 +56,17 @@ struct StencilKernels {
   /// Discrete gradients, see discrete_elements.hpp; of the lines above, whole ones are filled.
   void (*momentum_bend)(const StencilBatch&, const MomentumBatch&);
   void (*planar_momentum_bend)(const StencilBatch&, const MomentumBatch&);
+
+  // For gradients, in space.
+  /// How strains f (kappa1, kappa2, tau) change where unknowns change so; three columns, like `strain`.
+  void (*strain_changes)(const StencilBatch&, const double* change, double* out);
+  /// Adds k g (g1 - g)^T to the matrix, g the gradients of strains and g1 those at the end: see add_rate_slopes.
+  void (*rate_slopes)(const StencilBatch&, const MomentumBatch&);
+  /// Of the discrete gradient, where it leaves nodes nothing of the directors' transport: rows^T times its derivatives by
+  /// K (mean strain - natural strain); three columns.
+  void (*momentum_changes)(const StencilBatch&, const MomentumBatch&, const double* rows, double* out);
+  /// Adds rows^T times its derivatives by the end; padded by kPadding.
+  void (*momentum_product)(const StencilBatch&, const MomentumBatch&, const double* rows, double* out);
 };
 
 const StencilKernels& stencil_kernels();

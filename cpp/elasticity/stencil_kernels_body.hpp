@@ -1,5 +1,6 @@
 // The kernels of stencil_kernels.hpp on packs; included once by the translation unit of each instruction set.
 
+#include "elasticity/adjoint_kernel_body.hpp"
 #include "elasticity/momentum_kernel_body.hpp"
 #include "elasticity/planar_kernel_body.hpp"
 #include "elasticity/stencil_packs.hpp"
@@ -80,7 +81,8 @@ void bend_forces(const StencilBatch& batch) { bend_packs<Wanted::forces>(batch);
 }  // namespace
 
 extern const StencilKernels kStencilKernels;
-const StencilKernels kStencilKernels{bend,          planar_bend,         bend_forces, planar_bend_forces,
-                                     momentum_bend, planar_momentum_bend};
+const StencilKernels kStencilKernels{
+    bend,           planar_bend, bend_forces,      planar_bend_forces, momentum_bend, planar_momentum_bend,
+    strain_changes, rate_slopes, momentum_changes, momentum_product};
 
 }  // namespace withe::WITHE_INSTRUCTION_SET

@@ -171,8 +171,8 @@ struct EdgeChanges {
   Pack angle[2];
 };
 
-/// From one number per unknown.
-EdgeChanges edge_changes(const StencilBatch& batch, int first, const double* table) {
+/// One number per unknown of a pack of stencils; the last angle comes twice, in the places 7 and 8.
+void load_unknowns(const StencilBatch& batch, int first, const double* table, Pack (&v)[12]) {
   const double* place[kLanes];
   for (int l = 0; l < kLanes; ++l)
     place[l] = table + batch.first_unknown[first + l < batch.count ? first + l : batch.count - 1];
@@ -181,10 +181,15 @@ EdgeChanges edge_changes(const StencilBatch& batch, int first, const double* tab
     for (int l = 0; l < kLanes; ++l) from[l] = place[l] + at;
     load_rows<4>(from, into);
   };
-  Pack v[12];  // the last angle comes twice
   numbers_from(0, v);
   numbers_from(4, v + 4);
   numbers_from(7, v + 8);
+}
+
+/// From one number per unknown.
+EdgeChanges edge_changes(const StencilBatch& batch, int first, const double* table) {
+  Pack v[12];
+  load_unknowns(batch, first, table, v);
   return {{{v[4] - v[0], v[5] - v[1], v[6] - v[2]}, {v[9] - v[4], v[10] - v[5], v[11] - v[6]}}, {v[3], v[7]}};
 }
 

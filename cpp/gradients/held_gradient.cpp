@@ -60,7 +60,7 @@ void StepGradient::turn_held(VectorX& start, VectorX& pose) const {
     if (support.other_node < 0) continue;
     const int e = support.edge;
     const double by_angle = pose[model.edge_dof[at(e)]];
-    const EdgeFrame<double>& f = end_.edge[at(e)];
+    const EdgeFrame<double>& f = end_->edge[at(e)];
     const Vec3d e0 = edge_vector(model, step_->start.q, e);
     const double longer = 1.0 / (f.inverse_length * std::sqrt(dot(e0, e0)));
     add_to_edge(model, e, -by_angle * f.spin, pose);

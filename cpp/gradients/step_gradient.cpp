@@ -50,7 +50,13 @@ void StepGradient::begin(const StepTaken& step) {
   else
     z_ = step.end;
   equations_.evaluate(z_, true, nullptr, data_);
-  if (!model.planar()) compute_configuration(model, step.start, step.end, end_);
+  end_ = &data_.configuration;
+  if (middle && !model.planar()) {
+    const StepProblem& problem = equations_.problem();
+    const bool found = problem.conserves_energy() || problem.viscous_acts();
+    if (!found) compute_configuration(model, step.start, step.end, own_end_);
+    end_ = found ? &data_.end_configuration : &own_end_;
+  }
   Assembler& assembler = equations_.assembler();
   LinearSolver& solver = assembler.solver();
   exact_.assign(solver.values().begin(), solver.values().end());
@@ -77,7 +83,7 @@ void StepGradient::set_end(const StateAdjoint& state) {
   by_end_ = state.q;
   if (model.planar()) return;
   for (int e = 0; e < model.edge_count; ++e)
-    add_to_edge(model, e, state.q[model.edge_dof[at(e)]] * end_.edge[at(e)].spin, by_end_);
+    add_to_edge(model, e, state.q[model.edge_dof[at(e)]] * end_->edge[at(e)].spin, by_end_);
   for (int dof : model.frame_dof)
     by_end_.segment<3>(dof) = cayley_spin(step_->end.segment<3>(dof)).transpose() * state.q.segment<3>(dof);
 }
@@ -168,7 +174,7 @@ void StepGradient::add_transport(const StateAdjoint& state, const StepAdjoint& a
   for (int e = 0; e < model.edge_count; ++e) {
     const int angle = model.edge_dof[at(e)];
     const EdgeFrame<double>& f = data_.configuration.edge[at(e)];
-    const EdgeFrame<double>& last = end_.edge[at(e)];
+    const EdgeFrame<double>& last = end_->edge[at(e)];
     const Vec3d e0 = edge_vector(model, step_->start.q, e);
     const double inverse0 = 1.0 / std::sqrt(dot(e0, e0));
     // Where all of an edge's angles, of the start too, grow alike and its reference director turns back, nothing

@@ -88,7 +88,8 @@ class StepGradient {
   Equations equations_;
   std::optional<StepTaken> step_;
   StepData data_;
-  Configuration end_;
+  Configuration own_end_;
+  const Configuration* end_ = nullptr;  ///< at q1, in space
   VectorX rates_;  ///< of velocities at the end by q1 [1/s]
   VectorX held_acceleration_, z_, by_end_, by_z_, rows_, columns_;
   VectorX by_rows_;  ///< of the residual, by which reactions go directly; empty: none

@@ -14,6 +14,8 @@
 namespace withe {
 namespace {
 
+/// States are kept this many steps apart; those between are played again.
+constexpr std::size_t kStretch = 100;
 constexpr double kRounding = 1e-12;  // by which supports that rest move, of the scene's length; angles likewise
 
 MatrixX3 at_nodes(const Model& model, const VectorX& by) {
@@ -77,10 +79,10 @@ class Tape::Player {
 Tape::Tape(const Model& model, EquationOptions options, State first, const Parameters& parameters, bool frictional)
     : model_(model),
       options_(options),
-      first_(std::move(first)),
       acting_(parameters),
-      last_(first_.q),
-      last_velocity_(first_.v),
+      starts_{std::move(first)},
+      last_(starts_.front().q),
+      last_velocity_(starts_.front().v),
       frictional_(frictional) {}
 
 void Tape::record(const AcceptedStep& step) {
@@ -94,6 +96,7 @@ void Tape::record(const AcceptedStep& step) {
     steps_.back().held.resize(0);
     steps_.back().gain.resize(0);
   }
+  if (steps_.size() % kStretch == 0) starts_.push_back(after);
   last_ = after.q;
   last_velocity_ = after.v;
 }
@@ -126,6 +129,7 @@ VectorX Tape::held_velocities(const VectorX& v) const {
 void Tape::cut(long count, const State& after) {
   if (count >= this->count()) return;
   steps_.resize(static_cast<std::size_t>(count));
+  starts_.resize(steps_.size() / kStretch + 1);
   acting_.cut(steps_.size());
   last_ = after.q;
   last_velocity_ = after.v;
@@ -147,20 +151,13 @@ void Tape::check_known() const {
 }
 
 void Tape::walk_back(Player& player, const std::function<void(const Passage&)>& visit) const {
-  const auto stride = static_cast<std::size_t>(std::ceil(std::sqrt(static_cast<double>(steps_.size()) + 1.0)));
-  std::vector<State> starts;  // of every stretch of so many steps
-  State state = first_;
-  for (std::size_t k = 0; k < steps_.size(); ++k) {
-    if (k % stride == 0) starts.push_back(state);
-    player.advance(steps_[k], state);
-  }
   std::vector<State> states;
   ActingNumbers::Player acting;
   std::size_t stretch = acting_.count() - 1;
   for (std::size_t k = steps_.size(); k-- > 0;) {
-    const std::size_t first = k / stride * stride;
-    if (k == steps_.size() - 1 || k % stride == stride - 1) {
-      states.assign(1, starts[k / stride]);
+    const std::size_t first = k / kStretch * kStretch;
+    if (k == steps_.size() - 1 || k % kStretch == kStretch - 1) {
+      states.assign(1, starts_[k / kStretch]);
       for (std::size_t j = first; j < k; ++j) {
         states.push_back(states.back());
         player.advance(steps_[j], states.back());
@@ -205,7 +202,7 @@ class Tape::Moments {
       if (!by.needs_state()) continue;
       CoefficientAdjoint coefficients(tape_.model_, parameters.loads.rows());
       add_readouts(tape_.model_, assembler, parameters, state(), by, adjoint, coefficients);
-      const double time = steps == 0 ? tape_.first_.time : tape_.steps_[steps - 1].time;
+      const double time = steps == 0 ? tape_.starts_.front().time : tape_.steps_[steps - 1].time;
       visit_(static_cast<long>(steps), static_cast<long>(left_) - 1, time,
              parameter_gradient(tape_.model_, parameters, coefficients));
     }
@@ -242,7 +239,7 @@ InitialGradient Tape::gradient(const std::vector<MomentAdjoint>& given, const Pa
   const CoefficientAdjoint none(model_, acting_.load_rows());
   CoefficientAdjoint coefficients = none;
   HeldAdjoint held(model_);
-  double time = first_.time;
+  double time = starts_.front().time;
   bool begins = true;
   Player player(*this);
   walk_back(player, [&](const Passage& passage) {
@@ -261,8 +258,8 @@ InitialGradient Tape::gradient(const std::vector<MomentAdjoint>& given, const Pa
   const StepRule rule = steps_.empty() ? StepRule::backward_euler : steps_.front().rule;
   const Assembler& assembler = player.gradient(rule).equations().assembler();
   assembler.project(adjoint.v);
-  moments.add(0, assembler, acting_.start(), [&] { return first_; }, adjoint);
-  return {at_nodes(model_, adjoint.q), at_nodes(model_, adjoint.v), by_poses(model_, first_.q, adjoint.q)};
+  moments.add(0, assembler, acting_.start(), [&] { return starts_.front(); }, adjoint);
+  return {at_nodes(model_, adjoint.q), at_nodes(model_, adjoint.v), by_poses(model_, starts_.front().q, adjoint.q)};
 }
 
 RunJacobian Tape::jacobian() const {

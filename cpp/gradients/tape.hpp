@@ -117,9 +117,9 @@ class Tape {
 
   Model model_;
   EquationOptions options_;
-  State first_;
   ActingNumbers acting_;
   std::vector<Step> steps_;
+  std::vector<State> starts_;     ///< of every stretch of steps that are played again together
   VectorX last_, last_velocity_;  ///< what the last step led to
   std::string refused_;
   bool frictional_;

@@ -19,6 +19,7 @@ struct Options {
   Integrator integrator = Integrator::implicit_midpoint;
   double time_step = 5e-3;          ///< [s]
   bool adaptive = true;             ///< halve on failure, grow back
+  bool energy_guard = true;         ///< with `adaptive`: steps that gain energy from nowhere are taken otherwise
   std::optional<double> tolerance;  ///< [m], error-controlled steps
   std::optional<double> duration;   ///< [s], over which `tolerance` holds; else 1 s
   std::optional<bool> planar;       ///< nothing: decide

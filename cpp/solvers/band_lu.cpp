@@ -11,6 +11,9 @@
 namespace withe {
 namespace {
 
+/// Half bandwidth of a rod in space.
+constexpr int kRodWidth = 10;
+
 /// values(): row after row of the band, 2 w + 1 numbers each (w the half bandwidth), column i - w first.
 ///
 /// While column j is eliminated, rows j ... j + w are active. Row i of `work_` holds columns i - w ... i + 2 w:
@@ -137,6 +140,18 @@ class BandLu final : public LinearSolver {
 
   void eliminate(int j, int last_row, int last_column) {
     const int count = last_column - j;
+    // Beyond the last column the pivot row has zeros, so that counts known beforehand do for all there are: the band of
+    // a rod in space, without exchanges and with them.
+    if (width_ == kRodWidth && last_row == j + kRodWidth)
+      count <= kRodWidth ? eliminate_rows<kRodWidth>(j, last_row, count)
+                         : eliminate_rows<2 * kRodWidth>(j, last_row, count);
+    else
+      eliminate_rows<0>(j, last_row, count);
+  }
+
+  /// `known`: how many columns; 0: `count`.
+  template <int known>
+  void eliminate_rows(int j, int last_row, int count) {
     const double* __restrict pivot_row = entry(j, j) + 1;
     const double inverse = 1.0 / pivot_row[-1];
     inverse_pivots_[j] = inverse;
@@ -145,7 +160,7 @@ class BandLu final : public LinearSolver {
       double* __restrict target = entry(row, j) + 1;
       const double factor = target[-1] * inverse;
       *multiplier++ = factor;
-      for (int c = 0; c < count; ++c) target[c] -= factor * pivot_row[c];
+      for (int c = 0; c < (known > 0 ? known : count); ++c) target[c] -= factor * pivot_row[c];
     }
   }
 

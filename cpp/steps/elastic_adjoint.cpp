@@ -4,16 +4,32 @@
 // change from the start: s - s0 under backward Euler, (s1 - s0) / 2 under the midpoint rules. Everything but g is a
 // number, so what multiplies rows^T is (s - n) times `along` = rows^T g, and so on.
 
-#include <array>
-#include <numeric>
-#include <utility>
-
-#include "elasticity/discrete_elements.hpp"
 #include "geometry/rotation.hpp"
-#include "steps/elastic_forces.hpp"
+#include "steps/regular_stencils.hpp"
 
 namespace withe {
 namespace {
+
+/// Coefficients of bending and twisting in a step, and derivatives by them.
+struct TurningNumbers {
+  const Columns3 &stiffness, &natural;
+  const VectorX& viscous_time;
+  Columns3 &by_stiffness, &by_natural;
+  VectorX& by_time;
+  double rate;  ///< 1 / h; without viscosity 0
+  bool elastic;
+
+  /// `along`: rows^T times the strain's gradient; `change`: of the strain from the start, as viscosity takes it.
+  void add(Eigen::Index i, int s, double along, double strain, double change) const {
+    if (elastic) {
+      by_stiffness(i, s) += (strain - natural(i, s)) * along;
+      by_natural(i, s) -= stiffness(i, s) * along;
+    }
+    if (rate == 0.0) return;
+    by_stiffness(i, s) += rate * viscous_time(i) * change * along;
+    by_time(i) += rate * stiffness(i, s) * change * along;
+  }
+};
 
 /// One stencil's part: its strains in the configurations that matter, and what its numbers are.
 class StencilAdjoint {
@@ -50,10 +66,18 @@ class StencilAdjoint {
     const int* dofs = table_.dofs(element_);
     for (int i = 0; i < table_.width(); ++i)
       if (dofs[i] >= 0) adjoint_.start[dofs[i]] += factor * by_start * gradient[i];
-    for (const auto& [place, edge] : angles) turn[edge] += factor * gradient[place];
+    for (int i = 0; i < angles.count; ++i) turn[angles.edge[i]] += factor * gradient[angles.place[i]];
   }
 
-  std::vector<std::pair<int, int>> angles;  ///< where angles are among the unknowns, and of which edges
+  void add_turning(const TurningNumbers& numbers, const Columns3& viscous_stiffness) {
+    for (int s = 0; s < middle.count; ++s) {
+      const bool viscous = numbers.rate != 0.0;
+      numbers.add(element_, s, along(s), middle.strain[s], viscous ? change(s) : 0.0);
+      if (viscous) add_start(s, viscous_stiffness(element_, s));
+    }
+  }
+
+  Angles angles;
 
  private:
   const StepProblem& problem_;
@@ -63,167 +87,53 @@ class StencilAdjoint {
   double rows_[kMaxLocal];
 };
 
-/// Of discrete gradients. They are functions of the two ends of a step alone, but for what torques leave nodes of the
-/// directors' transport, spin times the torque; and those which exchange the ends leave alone. So derivatives by the
-/// start are those by the end of the step backwards.
-class DiscreteAdjoint {
- public:
-  DiscreteAdjoint(const StepProblem& problem, const StepData& data, StepAdjoint& adjoint)
-      : problem_(problem),
-        adjoint_(adjoint),
-        back_(-data.change),
-        back_q_(problem.start->q),
-        start_(problem.start_configuration),
-        forth_{problem.start_configuration, data.configuration, data.end_configuration, data.end, data.change, false},
-        backwards_{data.end_configuration, data.configuration, start_, back_q_, back_, false},
-        rows_(adjoint.rows) {
-    const Model& model = problem.model;
-    for (int dof : model.frame_dof) {
-      if (model.planar()) break;
-      // Backwards a frame turns by the opposite Cayley vector. Its rows are moments.
-      back_q_.segment<3>(dof) = back_.segment<3>(dof);
-      rows_.segment<3>(dof) = (cayley_spin(data.z.segment<3>(dof)) * rows_.segment<3>(dof)).eval();
-    }
-    for (int e = 0; !model.planar() && e < model.edge_count; ++e) {
-      // The start's angles as those of a step backwards: counted from where the end's tangents are.
-      EdgeFrame<double>& start = start_.edge[at(e)];
-      const Vec3d& source = data.end_configuration.edge[at(e)].tangent;
-      start.spin = (-start.inverse_length / (1.0 + dot(source, start.tangent))) * cross(source, start.tangent);
-      const Vec3d& spin = data.configuration.edge[at(e)].spin;
-      const int tail = model.tail_dof[at(e)], head = model.head_dof[at(e)];
-      for (int i = 0; i < 3; ++i) rows_[model.edge_dof[at(e)]] += spin[i] * (rows_[head + i] - rows_[tail + i]);
-    }
+/// Sum of factors times gradients of strains f (kappa1, kappa2, tau), which are `strain`, of ordinary stencils in
+/// space.
+VectorX strain_forces(const Model& model, const Assembler& assembler, const BendMeasure& measure,
+                      const Configuration& c, const Columns3& strain, const Columns3& factors) {
+  // Of the energy k (s - n)^2 / 2 with s - n = 1.
+  const Columns3 natural = strain.array() - 1.0;
+  const VectorX none = VectorX::Zero(model.edge_count);
+  VectorX out = VectorX::Zero(model.dof_count + kPadding), magnitude = out;
+  StencilBatch batch = kernel_batch(assembler, measure, c, natural, factors);
+  batch.force = none.data();
+  batch.residual = out.data();
+  batch.magnitude = magnitude.data();
+  stencil_kernels().bend(batch);
+  return out;
+}
+
+/// Of ordinary stencils in space, all at once: see StencilAdjoint.
+void add_regular(const StepProblem& problem, const StepData& data, const Assembler& assembler,
+                 const TurningNumbers& numbers, StepAdjoint& adjoint) {
+  const Model& model = problem.model;
+  const BendMeasure& measure = problem.elastic.measure;
+  const Columns3 strain = measured_strains(measure, data.configuration);
+  Columns3 along = Columns3::Zero(strain.rows(), 3), change = along, start, end;
+  stencil_kernels().strain_changes(
+      kernel_batch(assembler, measure, data.configuration, numbers.natural, numbers.stiffness), adjoint.rows.data(),
+      along.data());
+  const bool viscous = numbers.rate != 0.0, middle = problem.in_middle();
+  if (viscous) {
+    start = measured_strains(measure, problem.start_configuration);
+    if (middle) end = measured_strains(measure, data.end_configuration);
+    change = middle ? Columns3(0.5 * (end - start)) : Columns3(strain - start);
   }
-
-  /// `evaluate(step, k, with_matrix, local)`, with stiffnesses and natural strains `k`; `frame`: -1, or whose unknowns
-  /// are among the element's.
-  template <class Evaluate>
-  void add_turning(const ElementTable& table, int i, const TurnCoefficients& k,
-                   const std::vector<std::pair<int, int>>& angles, int frame, const Evaluate& evaluate,
-                   Columns3& by_stiffness, Columns3& by_natural) {
-    double rows[kMaxLocal];
-    gather(table, i, rows_, rows);
-    const auto work = [&](const TurnCoefficients& of) {
-      Local local;
-      evaluate(forth_, of, false, local);
-      double sum = 0.0;
-      for (int r = 0; r < table.width(); ++r) sum += rows[r] * local.gradient[r];
-      return sum;
-    };
-    for (int s = 0; s < (problem_.model.planar() ? 1 : 3); ++s) {
-      TurnCoefficients unit{k.measure, {}, k.natural};
-      (s == 0 ? unit.stiffness.x : s == 1 ? unit.stiffness.y : unit.stiffness.z) = 1.0;
-      const double now = work(unit);
-      by_stiffness(i, s) += now;
-      (s == 0 ? unit.natural.x : s == 1 ? unit.natural.y : unit.natural.z) += 1.0;
-      by_natural(i, s) += k.stiffness[s] * (work(unit) - now);
-    }
-    const auto [start, end] = add_ends(table, i, rows, angles,
-                                       [&](const DiscreteStep& step, Local& local) { evaluate(step, k, true, local); });
-    if (frame < 0 || problem_.model.planar()) return;
-    const int dof = problem_.model.frame_dof[at(frame)];
-    const auto by_spin = [&](const VectorX& q, const LocalVector& by) -> Vector3 {
-      return cayley_spin(q.segment<3>(dof)).transpose().inverse() * Eigen::Map<const Vector3>(by.data() + 7);
-    };
-    adjoint_.start_spin.row(frame) += by_spin(back_q_, start).transpose();
-    adjoint_.end_spin.row(frame) += by_spin(forth_.end_q, end).transpose();
-  }
-
-  using LocalVector = std::array<double, kMaxLocal>;
-  /// q1 = 2 z - q0, and matrices of steps are twice derivatives by their ends. Returns those by the start and by the
-  /// end.
-  template <class Evaluate>
-  std::pair<LocalVector, LocalVector> add_ends(const ElementTable& table, int element, const double* rows,
-                                               const std::vector<std::pair<int, int>>& angles,
-                                               const Evaluate& evaluate) {
-    Local by_end, by_start;
-    evaluate(forth_, by_end);
-    evaluate(backwards_, by_start);
-    const int* dofs = table.dofs(element);
-    LocalVector end{}, start{};
-    for (std::size_t c = 0; c < static_cast<std::size_t>(table.width()); ++c) {
-      for (int r = 0; r < table.width(); ++r) {
-        end[c] += 0.5 * rows[r] * by_end.hessian[r][c];
-        start[c] += 0.5 * rows[r] * by_start.hessian[r][c];
-      }
-      if (dofs[c] >= 0) adjoint_.start[dofs[c]] += start[c] - end[c];
-    }
-    for (const auto& [angle, edge] : angles) {
-      const auto place = static_cast<std::size_t>(angle);
-      adjoint_.start_turn[edge] += start[place];
-      adjoint_.end_turn[edge] += end[place];
-      // From angles so counted to turns of directors that are carried along with the edge.
-      const int tail = problem_.model.tail_dof[at(edge)], head = problem_.model.head_dof[at(edge)];
-      for (int i = 0; i < 3; ++i) {
-        adjoint_.start[head + i] -= start[place] * start_.edge[at(edge)].spin[i];
-        adjoint_.start[tail + i] += start[place] * start_.edge[at(edge)].spin[i];
-      }
-    }
-    return {start, end};
-  }
-
-  const DiscreteStep& forth() const { return forth_; }
-  const VectorX& rows() const { return rows_; }
-
- private:
-  const StepProblem& problem_;
-  StepAdjoint& adjoint_;
-  VectorX back_, back_q_;
-  Configuration start_;
-  DiscreteStep forth_, backwards_;
-  VectorX rows_;  ///< with what those of nodes make of torques among those of angles
-};
+  for (int b : assembler.regular.stencil)
+    for (int s = 0; s < 3; ++s) numbers.add(b, s, along(b, s), strain(b, s), change(b, s));
+  if (!viscous) return;
+  const double share = middle ? 0.5 : 1.0;
+  const Columns3 factors = share * problem.viscous.bend_stiffness.cwiseProduct(along);
+  const auto add = [&](const Configuration& c, const Columns3& strains, double sign, double by_start, VectorX& turn) {
+    const VectorX force = strain_forces(model, assembler, measure, c, strains, factors);
+    adjoint.start += (sign * by_start) * force.head(model.dof_count);
+    for (int e = 0; e < model.edge_count; ++e) turn[e] += sign * force[model.edge_dof[at(e)]];
+  };
+  add(problem.start_configuration, start, -1.0, 1.0, adjoint.start_turn);
+  if (middle) add(data.end_configuration, end, 1.0, -1.0, adjoint.end_turn);
+}
 
 }  // namespace
-
-void ElasticForces::add_discrete_adjoint(const StepProblem& problem, const StepData& data, const Assembler& assembler,
-                                         StepAdjoint& adjoint) const {
-  const Model& model = problem.model;
-  const ElasticCoefficients& k = problem.elastic;
-  CoefficientAdjoint& by = adjoint.coefficients;
-  DiscreteAdjoint discrete(problem, data, adjoint);
-  Local local;
-  double rows[kMaxLocal];
-  // Of EA = 1 N, and of a natural strain of one less, which pulls by as much more.
-  ElasticCoefficients unit, strained;
-  unit.stretch_stiffness = strained.stretch_stiffness = VectorX::Ones(model.edge_count);
-  unit.stretch_natural = k.stretch_natural;
-  strained.stretch_natural = k.stretch_natural.array() - 1.0;
-  for (int e = 0; e < model.edge_count; ++e) {
-    gather(assembler.stretch, e, discrete.rows(), rows);
-    const auto along = [&](const ElasticCoefficients& of) {
-      discrete_stretch_local(model, of, discrete.forth(), e, false, nullptr, local);
-      return std::inner_product(rows, rows + assembler.stretch.width(), local.gradient, 0.0);
-    };
-    const double pull = along(unit);
-    by.stretch_stiffness(e) += pull;
-    by.stretch_natural(e) -= k.stretch_stiffness(e) * (along(strained) - pull);
-    discrete.add_ends(assembler.stretch, e, rows, {}, [&](const DiscreteStep& step, Local& out) {
-      discrete_stretch_local(model, k, step, e, true, nullptr, out);
-    });
-  }
-  const bool planar = model.planar();
-  for (int b = 0; b < static_cast<int>(model.bend.size()); ++b) {
-    std::vector<std::pair<int, int>> angles;
-    if (!planar) angles = {{3, model.bend[at(b)].edge[0]}, {7, model.bend[at(b)].edge[1]}};
-    discrete.add_turning(
-        assembler.bend, b, bend_coefficients(k, b), angles, -1,
-        [&](const DiscreteStep& step, const TurnCoefficients& of, bool with_matrix, Local& out) {
-          discrete_bend_local(model, of, step, b, with_matrix, out);
-        },
-        by.bend_stiffness, by.bend_natural);
-  }
-  for (int h = 0; h < static_cast<int>(model.half.size()); ++h) {
-    std::vector<std::pair<int, int>> angles;
-    if (!planar) angles = {{3, model.half[at(h)].edge}};
-    discrete.add_turning(
-        assembler.half, h, half_coefficients(k, h), angles, model.half[at(h)].frame,
-        [&](const DiscreteStep& step, const TurnCoefficients& of, bool with_matrix, Local& out) {
-          discrete_half_local(model, of, step, h, with_matrix, out);
-        },
-        by.half_stiffness, by.half_natural);
-  }
-}
 
 void ElasticForces::add_adjoint(const StepProblem& problem, const StepData& data, const Assembler& assembler,
                                 StepAdjoint& adjoint) const {
@@ -254,32 +164,33 @@ void ElasticForces::add_adjoint(const StepProblem& problem, const StepData& data
     part.add_start(0, model.edge_length(e) * kv.stretch_stiffness(e));
   }
 
-  const auto add_turning = [&](StencilAdjoint& part, int i, const Columns3& stiffness, const Columns3& natural,
-                               double viscous_time, const Columns3& viscous_stiffness, Columns3& by_stiffness,
-                               Columns3& by_natural, double& by_time) {
-    for (int s = 0; s < part.middle.count; ++s) {
-      const double along = part.along(s);
-      if (elastic) {
-        by_stiffness(i, s) += (part.middle.strain[s] - natural(i, s)) * along;
-        by_natural(i, s) -= stiffness(i, s) * along;
-      }
-      if (!viscous) continue;
-      by_stiffness(i, s) += rate * viscous_time * part.change(s) * along;
-      by_time += rate * stiffness(i, s) * part.change(s) * along;
-      part.add_start(s, viscous_stiffness(i, s));
-    }
-  };
-  for (int b = 0; b < static_cast<int>(model.bend.size()); ++b) {
+  const TurningNumbers numbers{k.bend_stiffness,     k.bend_natural,  problem.parameters->bend_viscous_time,
+                               by.bend_stiffness,    by.bend_natural, by.bend_time,
+                               viscous ? rate : 0.0, elastic};
+  if (!model.planar()) add_regular(problem, data, assembler, numbers, adjoint);
+  for_each_single_bend(model, assembler, [&](int b) {
     StencilAdjoint part(problem, assembler.bend, b, adjoint);
     bend_gradients(model, k.measure, data.configuration, b, part.middle);
     if (viscous) {
       bend_gradients(model, k.measure, problem.start_configuration, b, part.start);
       if (middle) bend_gradients(model, k.measure, data.end_configuration, b, part.end);
     }
-    if (!model.planar()) part.angles = {{3, model.bend[at(b)].edge[0]}, {7, model.bend[at(b)].edge[1]}};
-    add_turning(part, b, k.bend_stiffness, k.bend_natural, problem.parameters->bend_viscous_time(b), kv.bend_stiffness,
-                by.bend_stiffness, by.bend_natural, by.bend_time(b));
-  }
+    part.angles = bend_angles(model, b);
+    part.add_turning(numbers, kv.bend_stiffness);
+  });
+  add_half_adjoint(problem, data, assembler, adjoint);
+}
+
+void ElasticForces::add_half_adjoint(const StepProblem& problem, const StepData& data, const Assembler& assembler,
+                                     StepAdjoint& adjoint) const {
+  const Model& model = problem.model;
+  const bool elastic = !problem.conserves_energy();
+  const ElasticCoefficients &k = problem.elastic, &kv = problem.viscous;
+  const bool viscous = problem.viscous_acts(), middle = problem.in_middle();
+  CoefficientAdjoint& by = adjoint.coefficients;
+  const TurningNumbers numbers{
+      k.half_stiffness, k.half_natural, problem.parameters->half_viscous_time,  by.half_stiffness,
+      by.half_natural,  by.half_time,   viscous ? 1.0 / problem.interval : 0.0, elastic};
   for (int h = 0; h < static_cast<int>(model.half.size()); ++h) {
     StencilAdjoint part(problem, assembler.half, h, adjoint);
     half_gradients(model, data.z, k.measure, data.configuration, h, part.middle);
@@ -287,9 +198,8 @@ void ElasticForces::add_adjoint(const StepProblem& problem, const StepData& data
       half_gradients(model, problem.start->q, k.measure, problem.start_configuration, h, part.start);
       if (middle) half_gradients(model, data.end, k.measure, data.end_configuration, h, part.end);
     }
-    if (!model.planar()) part.angles = {{3, model.half[at(h)].edge}};
-    add_turning(part, h, k.half_stiffness, k.half_natural, problem.parameters->half_viscous_time(h), kv.half_stiffness,
-                by.half_stiffness, by.half_natural, by.half_time(h));
+    part.angles = half_angles(model, h);
+    part.add_turning(numbers, kv.half_stiffness);
     if (model.planar() || !problem.moves() || (!elastic && !viscous)) continue;
     // How the frame's turns enter, beyond its unknowns.
     const int frame = model.half[at(h)].frame;

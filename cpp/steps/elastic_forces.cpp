@@ -238,7 +238,7 @@ void ElasticForces::add_discrete_gradient(const StepProblem& problem, StepData& 
 
 /// Under the midpoint rules the rate of a strain s is that between the ends, (s1 - s0) / dt, where the matrix has that
 /// of the middle: k g g^T for k g g1^T, g and g1 the gradients of s in the middle and at the end.
-void ElasticForces::add_rate_slopes(const StepProblem& problem, const StepData& data, const Assembler& assembler,
+void ElasticForces::add_rate_slopes(const StepProblem& problem, StepData& data, const Assembler& assembler,
                                     std::span<double> values) const {
   const Model& model = problem.model;
   const ElasticCoefficients& k = problem.viscous;
@@ -260,11 +260,17 @@ void ElasticForces::add_rate_slopes(const StepProblem& problem, const StepData& 
     const double stiffness = k.stretch_stiffness[e] * model.edge_length[e];
     add(assembler.stretch, e, &stiffness, 1);
   }
-  for (int b = 0; b < static_cast<int>(model.bend.size()); ++b) {
+  if (!model.planar())
+    stencil_kernels().rate_slopes(regular_batch(k, data, assembler, values, nullptr),
+                                  {.start_frames = nullptr,
+                                   .end_frames = &data.end_configuration.edge.data()->tangent.x,
+                                   .start_strain = nullptr,
+                                   .end_strain = data.end_configuration.bend_strain.data()});
+  for_each_single_bend(model, assembler, [&](int b) {
     bend_gradients(model, k.measure, data.configuration, b, middle);
     bend_gradients(model, k.measure, data.end_configuration, b, end);
     add(assembler.bend, b, &k.bend_stiffness(b, 0), k.bend_stiffness.rows());
-  }
+  });
   for (int h = 0; h < static_cast<int>(model.half.size()); ++h) {
     half_gradients(model, data.z, k.measure, data.configuration, h, middle);
     half_gradients(model, data.end, k.measure, data.end_configuration, h, end);

@@ -34,13 +34,24 @@ class ElasticForces final : public Term {
   void add_discrete_gradient(const StepProblem& problem, StepData& data, const Assembler& assembler,
                              std::span<double> values) const;
 
-  void add_rate_slopes(const StepProblem& problem, const StepData& data, const Assembler& assembler,
+  void add_rate_slopes(const StepProblem& problem, StepData& data, const Assembler& assembler,
                        std::span<double> values) const;
   void add_discrete_adjoint(const StepProblem& problem, const StepData& data, const Assembler& assembler,
                             StepAdjoint& adjoint) const;
+  void add_half_adjoint(const StepProblem& problem, const StepData& data, const Assembler& assembler,
+                        StepAdjoint& adjoint) const;
 
   VectorX inverse_rest_;  ///< per edge: 1 / L [1 / m]
 };
+
+/// Visits stencils that kernels for gradients do not take: in a plane all.
+template <class Visit>
+void for_each_single_bend(const Model& model, const Assembler& assembler, const Visit& visit) {
+  if (model.planar())
+    for (int b = 0; b < static_cast<int>(model.bend.size()); ++b) visit(b);
+  else
+    for (int b : assembler.regular.other_bend) visit(b);
+}
 
 /// What acts in an evaluation: elasticity, with viscosity where the rule takes both as one.
 const ElasticCoefficients& acting_coefficients(const StepProblem& problem, const StepData& data);

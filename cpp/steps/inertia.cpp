@@ -8,6 +8,7 @@
 #include "geometry/rotation.hpp"
 #include "model/edge_vectors.hpp"
 #include "steps/turning_inertia.hpp"
+#include "steps/turning_slopes.hpp"
 
 namespace withe {
 namespace {
@@ -36,45 +37,10 @@ TurningEdge<double> turning_edge(const StepProblem& problem, const StepData& dat
   return out;
 }
 
-template <class Scalar>
-TurningForce<Scalar> turning_force(const StepProblem& problem, double inertia, const TurningEdge<Scalar>& turning,
-                                   const Vec3<Scalar>& moved) {
+TurningForce<double> turning_force(const StepProblem& problem, double inertia, const TurningEdge<double>& turning,
+                                   const Vec3d& moved) {
   return problem.in_middle() ? midpoint_turning(inertia, 2.0 * problem.interval, problem.conserves_energy(), turning)
                              : euler_turning(inertia, problem.interval, turning, moved);
-}
-
-using ByEdge = Dual<TurningSlopes::kUnknowns>;
-
-TurningSlopes turning_slopes(const StepProblem& problem, const StepData& data, int edge) {
-  const Model& model = problem.model;
-  const auto vector = [](const Vec3d& v, int first) -> Vec3<ByEdge> {
-    return {ByEdge::unknown(v.x, first), ByEdge::unknown(v.y, first + 1), ByEdge::unknown(v.z, first + 2)};
-  };
-  const int angle = model.edge_dof[at(edge)];
-  const Vec3<ByEdge> e = vector(edge_vector(model, data.z, edge), 0),
-                     e0 = vector(edge_vector(model, problem.start->q, edge), 4), e1 = ByEdge(2.0) * e - e0;
-  const ByEdge length = sqrt(dot(e, e)), length0 = sqrt(dot(e0, e0)), length1 = sqrt(dot(e1, e1));
-  const Vec3<ByEdge> source = (1.0 / length0) * e0;
-  const Vec3d& director = problem.start->director[at(edge)];
-  const EdgeFrame<ByEdge> f =
-      edge_frame<ByEdge>(e, length, source, {director.x, director.y, director.z}, ByEdge(1.0), ByEdge(0.0));
-  const TurningEdge<ByEdge> turning{
-      .tangent = f.tangent,
-      .spin = f.spin,
-      .inverse_length = f.inverse_length,
-      .start_tangent = source,
-      .end_tangent = (1.0 / length1) * e1,
-      .start_length = length0,
-      .end_length = length1,
-      .change = ByEdge::unknown(data.z[angle], 3) - ByEdge::unknown(problem.start->q[angle], 7),
-      .start_rate = ByEdge::unknown(problem.start->v[angle], 8)};
-  const TurningForce<ByEdge> force = turning_force(problem, problem.parameters->edge_inertia[edge], turning, e - e0);
-  TurningSlopes out;
-  for (int k = 0; k < TurningSlopes::kUnknowns; ++k) {
-    for (int i = 0; i < 3; ++i) out.by[i][k] = force.head[i].slope[k];
-    out.by[3][k] = force.torque.slope[k];
-  }
-  return out;
 }
 
 /// Inertia of edges that spin and turn: under backward Euler what the mass matrix knows nothing of, under the midpoint
@@ -117,9 +83,13 @@ void set_turning_frames(const StepProblem& problem, StepData& data) {
 void add_edge_slopes(const StepProblem& problem, StepData& data, const ElementTable& edges, std::span<double> values) {
   const Model& model = problem.model;
   const double inverse = 1.0 / problem.interval;
+  const VectorX& q0 = problem.start->q;
   data.turning.resize(at(model.edge_count));
   for (int e = 0; e < model.edge_count; ++e) {
-    const TurningSlopes& slopes = data.turning[at(e)] = turning_slopes(problem, data, e);
+    const int angle = model.edge_dof[at(e)];
+    const TurningSlopes& slopes = data.turning[at(e)] = turning_slopes(
+        {problem.rule, problem.duration(), problem.parameters->edge_inertia[e], to_eigen(edge_vector(model, data.z, e)),
+         to_eigen(edge_vector(model, q0, e)), data.z[angle] - q0[angle], problem.start->v[angle]});
     double hessian[7][7];
     for (int column = 0; column < 7; ++column) {
       const int unknown = column < 3 ? column : column == 3 ? 3 : column - 4;
@@ -130,7 +100,7 @@ void add_edge_slopes(const StepProblem& problem, StepData& data, const ElementTa
       }
       hessian[3][column] = sign * slopes.by[3][unknown];
     }
-    hessian[3][3] -= inverse * inverse * problem.mass.rows[model.edge_dof[at(e)]];
+    hessian[3][3] -= inverse * inverse * problem.mass.rows[angle];
     edges.add_hessian(e, hessian, 1.0, values);
   }
 }

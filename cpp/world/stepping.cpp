@@ -152,8 +152,9 @@ bool World::Implementation::may_grow(double dt, double times) const {
 World::Implementation::Attempt World::Implementation::try_step(double dt) {
   const bool fourth = options.integrator == Integrator::fourth_order;
   const bool euler = options.integrator == Integrator::backward_euler;
-  const bool guarded = options.adaptive && guard.fallback_steps == 0 &&
-                       (options.integrator == Integrator::implicit_midpoint || fourth || euler);
+  const bool asks = options.adaptive && options.energy_guard;
+  const bool guarded =
+      asks && guard.fallback_steps == 0 && (options.integrator == Integrator::implicit_midpoint || fourth || euler);
   const bool watched = options.adaptive && equations->contact() && options.integrator != Integrator::verlet;
   const bool keeps = guarded || watched || options.tolerance || fourth;
   if (keeps) kept = *this;
@@ -181,7 +182,7 @@ World::Implementation::Attempt World::Implementation::try_step(double dt) {
   }
   const bool unresolved = watched && equations_of_step().contact()->unresolved(dt);
   const bool gained = !unresolved && guarded && gains_energy(),
-             pumped = !unresolved && !gained && watched && contact_pumps(dt);
+             pumped = !unresolved && !gained && watched && asks && contact_pumps(dt);
   if (unresolved && may_cut()) {
     take_back();
     return Attempt::inaccurate;

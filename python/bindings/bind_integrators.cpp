@@ -48,6 +48,7 @@ void register_integrators(py::module_& module) {
   options.def(py::init<>())
       .def_readwrite("time_step", &Options::time_step)
       .def_readwrite("adaptive", &Options::adaptive)
+      .def_readwrite("energy_guard", &Options::energy_guard)
       .def_readwrite("tolerance", &Options::tolerance)
       .def_readwrite("duration", &Options::duration)
       .def_readwrite("planar", &Options::planar)

@@ -484,6 +484,7 @@ class Options:
         "continuation_secant",
     )
     adaptive: bool
+    energy_guard: bool
     integrator: str
     line_search: str
     mixed: bool

@@ -7,6 +7,7 @@ import sys
 import textwrap
 import threading
 import time
+import warnings
 
 import numpy as np
 import pytest
@@ -354,3 +355,21 @@ def test_a_record_refuses_masked_entries():
     _, _, simulation = cantilever()
     with pytest.raises(ValueError, match="must have a value everywhere"):
         simulation.run(0.01, progress=False, record={"x": lambda s: np.ma.masked_greater(s.positions(), 0.1)})
+
+
+def test_without_the_energy_guard_midpoint_steps_stay_what_they_are():
+    def swung(**options):
+        scene = withe.Scene(gravity=(0, 0, -1.8))
+        stiff = withe.Stiffness(stretch=1e5, bend=0.05, twist=0.05)
+        rod = scene.add_rod(
+            start=(0, 0, 0), end=(1, 0, 0), nodes=12, radius=1e-3, stiffness=stiff, line_density=1.0, name="rod"
+        )
+        scene.pin(rod.start)
+        simulation = scene.build(time_step=0.1, **options)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", withe.CoarseStepWarning)
+            simulation.step(25)
+        return simulation.statistics.energy_momentum_steps
+
+    assert swung() > 0
+    assert swung(energy_guard=False) == 0

@@ -77,6 +77,7 @@ class Arm(Task):
         return scene.build(
             time_step=self.time_step,
             planar=self.planar,
+            energy_guard=False,
             step_tolerance=1e-6,
             force_tolerance=1e-5,
         )

@@ -60,7 +60,7 @@ class Screen:
             else:
                 self._figure = require("matplotlib.figure", "view").Figure(figsize=size, dpi=100)
                 require("matplotlib.backends.backend_agg", "view").FigureCanvasAgg(self._figure)
-            self._axes = self._figure.add_axes((0.0, 0.0, 1.0, 1.0), projection="3d")
+            self._axes = self._figure.add_axes((0.0, 0.07, 0.92, 0.91), projection="3d")
             self._reach = self._extent()
         axes = self._axes
         axes.clear()
@@ -83,9 +83,13 @@ class Screen:
             if outline.kind == "plane":
                 continue
             start = simulation.obstacle_position(outline.name)
-            ends = np.array([start, start + (outline.axis if outline.kind == "capsule" else 0.0)])
             width = float(np.clip(2.0 * outline.radius * scale, 1.5, 80.0))
-            self._axes.plot(*ends.T, color="#9aa5b1", linewidth=width, solid_capstyle="round", alpha=0.45)
+            look: dict[str, Any] = {"color": "#9aa5b1", "alpha": 0.45}
+            if not outline.axis.any():  # a sphere
+                self._axes.plot(*start[:, None], "o", markersize=width, markeredgewidth=0.0, **look)
+            else:
+                ends = np.array([start, start + outline.axis])
+                self._axes.plot(*ends.T, linewidth=width, solid_capstyle="round", **look)
 
     def _extent(self) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
         """A box that the robot stays in, for all it is known: as far as its rods reach from where they are held."""

@@ -34,6 +34,7 @@ class BuildOptions:
     force_tolerance: float
     max_iterations: int
     max_halvings: int | None
+    energy_guard: bool = True
 
     def checked(self) -> BuildOptions:
         """The same as plain numbers, with the number of halvings that a tolerance asks for.
@@ -54,6 +55,7 @@ class BuildOptions:
             tolerance=None if self.tolerance is None else validation.positive(self.tolerance, "tolerance"),
             duration=None if self.duration is None else validation.positive(self.duration, "duration"),
             adaptive=validation.truth(self.adaptive, "adaptive"),
+            energy_guard=validation.truth(self.energy_guard, "energy_guard"),
             mixed=validation.truth(self.mixed, "mixed"),
             planar=None if self.planar is None else validation.truth(self.planar, "planar"),
             max_iterations=validation.integer(self.max_iterations, "max_iterations", 1, 10_000),

@@ -1,0 +1,20 @@
+#pragma once
+/// How the inertia of an edge about itself (turning_inertia.hpp) changes with the edge and with the start of a step.
+
+#include "common/types.hpp"
+#include "steps/step_problem.hpp"
+
+namespace withe {
+
+/// An edge in a step over `duration`, by what its derivatives are taken.
+struct TurningStep {
+  StepRule rule;
+  double duration;      ///< [s]
+  double inertia;       ///< of the edge about itself [kg m^2]
+  Vector3 edge, start;  ///< its vector at z, and at the start [m]
+  double change, rate;  ///< of its angle, from the start to z, and its rate at the start
+};
+
+TurningSlopes turning_slopes(const TurningStep& step);
+
+}  // namespace withe
