@@ -9,7 +9,10 @@ import pytest
 
 import withe
 from withe.deployment import Cable, Pattern, deploy, place, plan
+from withe.deployment.pattern import distances
 from withe.deployment.world import Setup, lay
+from withe.perception import trace
+from withe.perception.synthetic import render_mask
 
 CABLE = Cable(0.36, 1.6e-3, 0.02)  # short and soft, so that little is simulated
 NODES = 60
@@ -41,6 +44,45 @@ def test_a_bend_is_laid_within_a_millimetre(laid):
     np.testing.assert_allclose(laid.laid[:, 2], CABLE.radius, rtol=0.03)  # it lies
     assert laid.slipped.max() < 3e-3
     assert laid.record.positions("cable").shape[1:] == (NODES, 3)
+
+
+PIXEL = 5e-4  # [m]
+
+
+def photographed(points, width, seed=2):
+    """A picture from above of a line on a plain table, x to the right and y upwards, and where its corner is [m]."""
+    corner = np.array([points[:, 0].min() - 0.03, points[:, 1].max() + 0.03])
+    line = (points[:, :2] - corner) * [1.0, -1.0] / PIXEL
+    columns, rows = np.ceil(line.max(0) + 60).astype(int)
+    mask = render_mask([line], [width / PIXEL], [False], (rows, columns))
+    noise = np.random.default_rng(seed).normal(0.0, 5.0, (rows, columns, 3))
+    image = np.where(mask[..., None], (190, 60, 60), (230, 230, 235)) + noise
+    return np.clip(image, 0, 255).astype(np.uint8), corner
+
+
+def read_back(points):
+    """What perception makes of a picture of a cable that lies there."""
+    image, corner = photographed(points, 2.0 * CABLE.radius)
+    (seen,) = trace(image).centrelines
+    return corner + PIXEL * seen * [1.0, -1.0]
+
+
+def test_a_camera_above_reads_what_the_nodes_say(laid):
+    seen, nodes = read_back(laid.laid), laid.laid[:, :2]
+    assert distances(nodes, seen).max() < 1e-3
+    assert distances(seen, nodes).max() < 1e-3
+
+
+def test_a_drawing_is_photographed_traced_laid_and_read_back():
+    drawn = bend(1.0) + np.array([0.2, -0.1])
+    image, corner = photographed(drawn, 4e-3)
+    pattern = Pattern(image=image, scale=PIXEL)  # from the left upper corner; it may begin at either end
+    motion = plan(CABLE, pattern)
+    found = deploy(motion, floor=0.6, nodes=NODES, quasi_static=True, progress=False)
+    s = np.linspace(0.0, motion.cable.length, NODES)
+    away = distances(drawn, corner + read_back(found.laid[s <= pattern.length + 5e-3]))
+    assert away.mean() < 2e-3
+    assert away.max() < 6e-3
 
 
 def test_the_intuitive_way_is_worse(arc, laid):

@@ -5,13 +5,14 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import numpy.typing as npt
 
 from withe.deployment.cable import Cable
 from withe.deployment.pattern import Pattern
-from withe.deployment.planning import plan
+from withe.deployment.planning import PlanController, plan
 
 __all__ = ["add_parser", "run"]
 
@@ -33,7 +34,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser.add_argument("--radius", type=float, help="of the cable [m]")
     parser.add_argument("--lgb", type=float, help="its gravito-bending length (EI / 2w)^(1/3) [m]")
     parser.add_argument("--friction", type=float, default=0.4, help="coefficient with the floor (default: %(default)s)")
-    parser.add_argument("--controller", choices=["exact", "least_friction", "intuitive"], default="exact")
+    parser.add_argument("--controller", choices=get_args(PlanController), default="exact")
     parser.add_argument("--speed", type=float, default=0.025, help="along the pattern [m/s] (default: %(default)s)")
     parser.add_argument(
         "--smoothing", type=float, default=1e-3, help="farthest from what is given [m] (default: %(default)s)"
@@ -50,7 +51,7 @@ def run(arguments: argparse.Namespace) -> int:
         pattern = Pattern(_points(arguments.pattern), smoothing=arguments.smoothing)
     else:
         pattern = Pattern(image=arguments.pattern, scale=arguments.scale, smoothing=arguments.smoothing)
-    motion = plan(cable, pattern, arguments.controller, speed=arguments.speed)
+    motion = plan(cable, pattern, arguments.controller, friction=arguments.friction, speed=arguments.speed)
     arguments.out.mkdir(parents=True, exist_ok=True)
     stem = arguments.out / f"{arguments.pattern.stem}_plan"
     written = [stem.with_suffix(".csv"), stem.with_suffix(".json")]
