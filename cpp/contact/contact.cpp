@@ -65,9 +65,8 @@ void Contact::find_at_rest(const State& state, const Parameters& parameters, Con
   problem.starting = true;
   rest.set.find(problem, state.q,
                 [&](const auto& add) { candidates_.find(state.q, problem.bodies, rest.search, add); });
-  std::vector<ContactRecord> records;
-  ContactStiffness(problem).renew(rest.set, records);
-  problem.renewed.swap(records);
+  ContactStiffness(problem).renew(rest.set, rest.records);
+  problem.renewed.swap(rest.records);
 }
 
 Contact::Contact(const Model& model) : surfaces_(model), candidates_(model, surfaces_) {
