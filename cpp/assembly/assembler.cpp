@@ -117,8 +117,13 @@ void ElementTable::add_gradient(int element, const double* gradient, double scal
 void ElementTable::add_hessian(int element, const double* hessian, int stride, double scale,
                                std::span<double> values) const {
   const int* offset = offsets_.data() + entry_start(element);
+  const int* unknown = dofs(element);
   for (int i = 0; i < width_; ++i) {
     const int columns = symmetric_ ? i + 1 : width_;
+    if (unknown[i] < 0) {
+      offset += columns;
+      continue;
+    }
     for (int j = 0; j < columns; ++j, ++offset)
       if (*offset >= 0) values[static_cast<std::size_t>(*offset)] += scale * hessian[i * stride + j];
   }

@@ -23,6 +23,7 @@ void set_start(const State& state, double duration, ContactProblem& problem) {
   problem.leaving.clear();
   problem.lagged.clear();
   problem.lagged_friction.clear();
+  problem.find_offsets();
 }
 
 ContactReport report_of(const ContactProblem& problem, const Touching& t) {
@@ -64,6 +65,8 @@ void Contact::find_at_rest(const State& state, const Parameters& parameters, Con
   problem.starting = true;
   rest.set.find(problem, state.q,
                 [&](const auto& add) { candidates_.find(state.q, problem.bodies, rest.search, add); });
+  ContactStiffness(problem).renew(rest.set, rest.records);
+  problem.renewed.swap(rest.records);
 }
 
 Contact::Contact(const Model& model) : surfaces_(model), candidates_(model, surfaces_) {
@@ -107,10 +110,8 @@ void Contact::restart(const State& state, double duration) {
   problem_.starting = true;
   find(state.q);
   problem_.starting = false;
-  if (problem_.pressing != Pressing::still) {
-    ContactStiffness(problem_).renew(set_, scratch_.records);
-    problem_.renewed.swap(scratch_.records);
-  }
+  ContactStiffness(problem_).renew(set_, scratch_.records);
+  problem_.renewed.swap(scratch_.records);
   for (const Touching& t : set_) {
     if (problem_.record_of(t.pair.key) == nullptr) problem_.unrecorded.push_back(t.pair.key);
     if (t.law.elastic > 0.0) problem_.leaving.push_back(t);

@@ -42,6 +42,7 @@ struct ContactAtRest {
   ContactProblem problem;
   ContactSet set;
   CandidateSearch search;
+  std::vector<ContactRecord> records;
 };
 
 class Contact {

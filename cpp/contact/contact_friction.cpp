@@ -5,6 +5,7 @@
 
 #include "contact/friction_jacobian.hpp"
 #include "contact/lagged_friction.hpp"
+#include "contact/plane_contact.hpp"
 
 namespace withe {
 namespace {
@@ -20,6 +21,7 @@ double slip_rate(const ContactProblem& problem, double regularisation) {
 }
 
 FrictionForce<double> friction_now(const ContactProblem& problem, const Touching& t) {
+  if (beside_plane(problem, t)) return plane_friction(problem, t, slip_rate(problem, 1.0));
   double unused[kContactUnknowns] = {};
   return friction_gradient(friction_setting(problem, t, 1.0, nullptr), t.now, unused);
 }
@@ -45,6 +47,7 @@ FrictionSetting friction_setting(const ContactProblem& problem, const Touching& 
   f.pair = &pair;
   if (pair.key.b < 0) f.obstacle = &problem.bodies.obstacle(pair);
   f.points = t.proximity.points;
+  if (pair.curve()) f.curve = &t.proximity.curve;
   f.pressing = t.law;
   f.before = t.before;
   f.slides = problem.turns(pair) && t.law.elastic > 0.0;
@@ -86,6 +89,11 @@ bool add_friction(const ContactProblem& problem, const Touching& t, const Contac
     add_lagged_friction(problem, t, slip_rate(problem, linearisation.regularisation), predicted, with_hessian, out);
     return true;
   }
+  if (beside_plane(problem, t)) {
+    const double rate = slip_rate(problem, linearisation.regularisation);
+    add_plane_friction(problem, t, rate, predicted, with_hessian, out);
+    return true;
+  }
   const FrictionSetting f = friction_setting(problem, t, linearisation.regularisation, predicted);
   const SlippingSurfaces<double> surfaces = slipping_surfaces(f, t.now);
   add_friction_gradient(f, surfaces, out.gradient);
@@ -101,10 +109,12 @@ double anchor_energy(const ContactProblem& problem, const Touching& t) {
 
 double kept_anchor_energy(const ContactProblem& problem, const Touching& t) {
   if (!problem.anchored() || !(t.pair.friction > 0.0)) return 0.0;
+  const double stiffness = tangential_stiffness(t.pair, t.stiffness);
+  if (t.pair.isotropic()) return 0.5 * stiffness * dot(t.stick, t.stick);
   const FrictionSetting f = friction_setting(problem, t, 1.0, nullptr);
   SlippingSurfaces<double> c = slipping_surfaces(f, t.now);
-  c.friction.force = f.tangential_stiffness * t.stick;
-  if (!t.pair.isotropic()) direct_friction(f, c);
+  c.friction.force = stiffness * t.stick;
+  direct_friction(f, c);
   return 0.5 * dot(c.friction.force, t.stick);
 }
 
@@ -139,7 +149,9 @@ void record_lagged_friction(const ContactProblem& problem, const Touching& t, Co
 
 Slipping slipping(const ContactProblem& problem, const Touching& t, const ContactLinearisation& linearisation,
                   const VectorX& change) {
-  if (t.lagged >= 0) return lagged_slipping(problem, t, slip_rate(problem, linearisation.regularisation), change);
+  const double rate = slip_rate(problem, linearisation.regularisation);
+  if (t.lagged >= 0) return lagged_slipping(problem, t, rate, change);
+  if (beside_plane(problem, t)) return plane_slipping(problem, t, rate, change);
   const FrictionSetting f = friction_setting(problem, t, linearisation.regularisation, nullptr);
   int dofs[kContactUnknowns];
   problem.surfaces->unknowns(t.pair, dofs);

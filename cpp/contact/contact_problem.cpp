@@ -4,6 +4,15 @@
 #include <cmath>
 
 namespace withe {
+namespace {
+
+// The force with which a rod resists what bends it, EI / L^2, where its length L is so many radii.
+constexpr double kSlender = 100.0;
+
+bool by_bodies(const BodyOffset& a, const BodyOffset& b) { return a.rod != b.rod ? a.rod < b.rod : a.other < b.other; }
+
+}  // namespace
+
 ContactParameters::ContactParameters(const Surfaces& surfaces, const Parameters& parameters)
     : version(parameters.version),
       gravity(parameters.gravity.norm()),
@@ -16,10 +25,39 @@ ContactParameters::ContactParameters(const Surfaces& surfaces, const Parameters&
     const double r = surfaces.radius(e);
     if (!(r > 0.0)) continue;
     const double weight = parameters.edge_density(e) * model.edge_arc(e) * parameters.gravity.norm();
-    const double force = weight + 1e-4 * parameters.edge_bend.row(e).maxCoeff() / (r * r);
+    const double force = weight + parameters.edge_bend.row(e).minCoeff() / (kSlender * kSlender * r * r);
     double& least = least_stiffness(model.edge_rod[at(e)]);
     least = std::max(least, force / (2.0 * kDepth * r));
   }
+}
+
+void ContactProblem::find_offsets() {
+  offsets.clear();
+  if (pressing == Pressing::still) return;
+  const std::vector<ContactRecord>& records = start->contacts;
+  if (std::all_of(records.begin(), records.end(), [](const ContactRecord& r) { return r.yielded == 0.0; })) return;
+  for (const ContactRecord& r : records) {
+    const int other = r.key.b < 0 ? r.key.b : model().edge_rod[at(r.key.b)];
+    if (r.force > 0.0) offsets.push_back({model().edge_rod[at(r.key.a)], other, r.force, r.force * r.yielded});
+  }
+  std::sort(offsets.begin(), offsets.end(), by_bodies);
+  std::size_t last = 0;
+  for (std::size_t i = 1; i < offsets.size(); ++i) {
+    if (by_bodies(offsets[last], offsets[i])) {
+      offsets[++last] = offsets[i];
+      continue;
+    }
+    offsets[last].force += offsets[i].force;
+    offsets[last].moment += offsets[i].moment;
+  }
+  if (!offsets.empty()) offsets.resize(last + 1);
+}
+
+double ContactProblem::offset(const ContactPair& pair) const {
+  const BodyOffset bodies{pair.rod_a, pair.key.b < 0 ? pair.key.b : pair.rod_b};
+  const auto found = std::lower_bound(offsets.begin(), offsets.end(), bodies, by_bodies);
+  if (found == offsets.end() || by_bodies(bodies, *found)) return 0.0;
+  return std::min(found->moment / found->force, kMostYield * pair.small_radius());
 }
 
 double ContactProblem::mass_of(const ContactPair& pair) const {

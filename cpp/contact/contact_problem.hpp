@@ -1,6 +1,7 @@
 #pragma once
 /// What contact is given by in one step: const while the step is solved.
 
+#include <algorithm>
 #include <vector>
 
 #include "contact/bodies.hpp"
@@ -10,6 +11,9 @@ namespace withe {
 
 /// Surfaces that carry the greatest force of their rod are this deep in each other, over the smaller radius.
 inline constexpr double kDepth = 0.01;
+
+/// Greatest depth that presses no more, over the smaller radius, where it is not for the sake of energy.
+inline constexpr double kMostYield = 0.02;
 
 /// How surfaces press in a step (see pressing_law.hpp): in statics and explicit steps, where nothing is known of
 /// impacts; by the force at its end; by that of the whole step, where they have just met; and along the mean direction
@@ -57,6 +61,13 @@ struct LaggedFriction {
   Vec3d column(int i) const { return {slip[0][i], slip[1][i], slip[2][i]}; }
 };
 
+/// How deep two bodies are in each other before they press, where they press as a step begins.
+struct BodyOffset {
+  int rod = 0, other = 0;  ///< the latter, or an obstacle as -1 - index
+  double force = 0;        ///< [N]
+  double moment = 0;       ///< sum of forces times depths that press no more [N m]
+};
+
 /// What contact needs of the parameters.
 struct ContactParameters {
   ContactParameters() = default;
@@ -79,7 +90,9 @@ struct ContactProblem {
   std::vector<Vec3d> shift;            ///< of each obstacle in the step [m]; empty: none moves
   std::vector<Vec3d> turn;             ///< likewise [rad]; empty: none turns
   bool starting = false;               ///< what touches as the step begins is about to be found
-  std::vector<ContactRecord> renewed;  ///< of contacts whose surfaces near each other anew in the step; sorted
+  std::vector<BodyOffset> offsets;     ///< of bodies that have any
+  std::vector<ContactRecord> renewed;  ///< of contacts that begin with the scene, or whose surfaces near each other
+                                       ///< anew in the step; sorted
   std::vector<ContactKey> unrecorded;  ///< what touches at the start and has no record
   std::vector<Touching> leaving;       ///< what gives back in the step what it took, wherever it ends
   std::vector<Touching> lagged;        ///< contacts of the start, for their friction alone
@@ -105,6 +118,14 @@ struct ContactProblem {
   const ContactRecord* record_of(const ContactKey& key) const {
     const ContactRecord* found = renewed.empty() ? nullptr : find_record(renewed, key);
     return found ? found : find_record(start->contacts, key);
+  }
+  /// Depth in which a contact begins to press: that of its bodies, the mean by force, so that what takes over from what
+  /// rests is neither lower nor higher [m].
+  double offset(const ContactPair& pair) const;
+  void find_offsets();
+  /// Whether surfaces at that distance, of which so much presses no more, are near enough to press.
+  bool touch(const ContactPair& pair, double distance, double yielded) const {
+    return distance + (offsets.empty() ? 0.0 : std::min(yielded, offset(pair))) < pair.reach();
   }
   /// Whether a stiffness is given.
   bool fixed(const ContactPair& pair) const {

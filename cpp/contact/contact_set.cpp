@@ -14,7 +14,7 @@ namespace {
 /// Sets what is remembered of a contact, its energy and how it presses.
 void set_from(const ContactProblem& problem, const ContactRecord* record, Touching& t) {
   t.stiffness = t.pair.share * (record ? record->stiffness : first_stiffness(problem, t.pair));
-  t.yielded = record ? record->yielded : 0.0;
+  t.yielded = record ? record->yielded : problem.offset(t.pair);
   t.approach = record ? record->approach : first_approach(problem, t.pair);
   t.age = record ? record->age : 0.0;
   if (record) t.stick = record->stick;

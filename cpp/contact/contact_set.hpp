@@ -18,7 +18,9 @@ class ContactSet {
     for (Touching& t : touching_) problem.bodies.values(t.pair, q, t.now);
     const std::size_t first = touching_.size();
     within_reach([&](const ContactPair& pair, const Proximity& proximity) {
-      set_forces(problem, add(problem, pair, proximity));
+      Touching& t = add(problem, pair, proximity);
+      set_forces(problem, t);
+      if (!problem.touch(pair, proximity.distance, t.yielded)) touching_.pop_back();
     });
     add_leaving(problem, first);
   }

@@ -15,10 +15,12 @@ bool by_key(const ContactRecord& a, const ContactRecord& b) { return a.key < b.k
 // A stiffness follows forces that outgrow it at once, and is then so many times what they want; and it follows those
 // for which it is so many times too great.
 constexpr double kAhead = 1.25, kSlack = 32.0;
-// Greatest depth that has yielded, over the smaller radius; what is beyond the depth that lasts presses again little by
+// Of the depth that has yielded, over the smaller radius, what is beyond that which lasts presses again little by
 // little: this much of it is left after a step.
-constexpr double kMostYield = 0.02, kLastingYield = 0.01;
-constexpr double kFading = 0.9;
+constexpr double kLastingYield = 0.01, kFading = 0.9;
+// What surfaces that a scene draws near each other may press with, beside what their edges weigh, over the force that
+// their contact is stiff for.
+constexpr double kDrawnForce = 1e-6;
 
 /// A contact that is yet to come starts as stiff as its rods' greatest force has wanted, so that those which take over
 /// from each other while surfaces slide have no need to change; that fades where it is much more than is wanted now.
@@ -37,14 +39,44 @@ double wanted_stiffness(const ContactPair& pair, double force) {
   return force / (2.0 * kDepth * pair.small_radius() * pair.share);
 }
 
-/// What has yielded wears off where surfaces that separate press no more, without work.
-double worn(const Touching& t) { return std::clamp(t.pair.reach() - t.proximity.distance, 0.0, t.yielded); }
+/// What has yielded wears off where surfaces that separate press no more, without work, down to what their bodies'
+/// contacts begin with.
+double worn(const ContactProblem& problem, const Touching& t) {
+  const double least = std::min(problem.offset(t.pair), t.yielded);
+  return std::clamp(t.pair.reach() - t.proximity.distance, least, t.yielded);
+}
 
 /// And fades where it is deep and surfaces rest, which takes work.
-double faded(const Touching& t) {
+double faded(const ContactProblem& problem, const Touching& t) {
   const double lasting = kLastingYield * t.pair.small_radius();
   const double left = t.yielded > lasting ? lasting + kFading * (t.yielded - lasting) : t.yielded;
-  return std::min(worn(t), left);
+  return std::min(worn(problem, t), left);
+}
+
+/// Of the weight of an edge what a contact holds up, where edges touch several others [N].
+double weight_on(const ContactProblem& problem, const ContactSet& set, const ContactPair& pair) {
+  const auto contacts = static_cast<double>(std::count_if(set.begin(), set.end(), [&](const Touching& t) {
+    return t.lagged < 0 && t.pair.rod_a == pair.rod_a && t.pair.rod_b == pair.rod_b &&
+           (pair.rod_b >= 0 || t.pair.key.b == pair.key.b);
+  }));
+  const std::vector<int>& first = problem.model().rod_first_edge;
+  const double share = std::min(1.0, (first[at(pair.rod_a + 1)] - first[at(pair.rod_a)]) / contacts);
+  return share * pair.share * problem.mass_of(pair) * problem.parameters->gravity;
+}
+
+/// Distances of centrelines, with what has yielded, between which a contact's force, or energy, falls to what is
+/// `wanted` for unit stiffness.
+struct Bracket {
+  double low, high;
+};
+Bracket distance_at(const Touching& t, bool force, double wanted) {
+  Bracket b{t.proximity.distance + t.yielded, t.pair.reach()};
+  for (int k = 0; k < 60; ++k) {
+    const double middle = 0.5 * (b.low + b.high);
+    const ContactEnergy e = contact_energy(t.law.law, middle, t.pair.radii(), t.pair.tolerance);
+    ((force ? -e.first : e.value) > wanted ? b.low : b.high) = middle;
+  }
+  return b;
 }
 
 /// What stops an edge's mass at the speed at which the ends meet, within the step or within the depth of contact; and
@@ -101,13 +133,7 @@ double first_stiffness(const ContactProblem& problem, const ContactPair& pair) {
 double ContactStiffness::yielded_at(const Touching& t, double ratio, Keep keep) const {
   const ContactPair& pair = t.pair;
   const bool force = keep == Keep::force || t.approach == 0.0;
-  const double wanted = (force ? -t.energy.first : t.energy.value) / (t.stiffness * ratio);
-  double low = t.proximity.distance + t.yielded, high = pair.reach();
-  for (int k = 0; k < 60; ++k) {
-    const double middle = 0.5 * (low + high);
-    const ContactEnergy e = contact_energy(t.law.law, middle, pair.radii(), pair.tolerance);
-    ((force ? -e.first : e.value) > wanted ? low : high) = middle;
-  }
+  const auto [low, high] = distance_at(t, force, (force ? -t.energy.first : t.energy.value) / (t.stiffness * ratio));
   if (keep == Keep::energy) return high - t.proximity.distance;
   return std::min(low - t.proximity.distance, kMostYield * pair.small_radius());
 }
@@ -174,7 +200,7 @@ void ContactStiffness::remember(const ContactSet& set, const VectorX& stiffness,
                                 std::vector<ContactRecord>& records) const {
   records.clear();
   for (const Touching& t : set) {
-    if (t.lagged >= 0 || t.proximity.distance >= t.pair.reach()) continue;
+    if (t.lagged >= 0 || !problem_.touch(t.pair, t.proximity.distance, t.yielded)) continue;
     records.push_back(record(t));
     if (problem_.record_of(t.pair.key) == nullptr)
       records.back().stiffness = start_stiffness(problem_, t.pair, stiffness);
@@ -195,18 +221,18 @@ double ContactStiffness::accept(const ContactSet& set, Keep keep, double spare, 
   double put_in = 0.0, wanted = 0.0;
   for (const Touching& t : set) {
     const ContactPair& pair = t.pair;
-    if (t.lagged >= 0 || t.proximity.distance >= pair.reach()) continue;
+    if (t.lagged >= 0 || !problem_.touch(pair, t.proximity.distance, t.yielded)) continue;
     ContactRecord record = this->record(t);
     const double ratio = source && !problem_.fixed(pair) ? common / record.stiffness : wanted_ratio(t, record);
     if (ratio > 1.0) {
       put_in += change_stiffness(t, ratio, yielded_at(t, ratio, keep), record);
     } else if (ratio < 1.0 || record.approach > 0.0) {
-      put_in += change_stiffness(t, ratio, worn(t), record);
+      put_in += change_stiffness(t, ratio, worn(problem_, t), record);
     } else if (problem_.pressing == Pressing::still) {
-      record.yielded = worn(t);  // an equilibrium that has been found stays one
+      record.yielded = worn(problem_, t);  // an equilibrium that has been found stays one
     } else if (t.yielded > 0.0) {
       ContactRecord unused;
-      wanted += change_stiffness(t, 1.0, faded(t), unused);
+      wanted += change_stiffness(t, 1.0, faded(problem_, t), unused);
       fading.push_back({&t, records.size()});
     }
     for (int rod : {pair.rod_a, pair.rod_b})
@@ -217,7 +243,7 @@ double ContactStiffness::accept(const ContactSet& set, Keep keep, double spare, 
   spare -= put_in;
   const double part = wanted > spare ? spare / wanted : 1.0;
   for (const auto& [t, number] : fading) {
-    const double left = worn(*t) + part * (faded(*t) - worn(*t));
+    const double left = worn(problem_, *t) + part * (faded(problem_, *t) - worn(problem_, *t));
     put_in += change_stiffness(*t, 1.0, left, records[number]);
   }
   finish(set, records);
@@ -260,21 +286,38 @@ double ContactStiffness::stiffen(const ContactSet& set, const ContactSet& start,
 
 void ContactStiffness::renew(ContactSet& start, std::vector<ContactRecord>& records) const {
   records.clear();
+  const bool still = problem_.pressing == Pressing::still, begins = !still || problem_.start->contacts.empty();
   for (int i = 0; i < start.count(); ++i) {
     const Touching& t = start[i];
     ContactRecord record;
+    bool drawn = false;
     if (const ContactRecord* known = find_record(problem_.start->contacts, t.pair.key)) {
       if (known->approach == 0.0) continue;  // they rest until they have left each other
       record = *known;
     } else {
       record.key = t.pair.key;
       record.stiffness = t.stiffness / t.pair.share;
+      record.yielded = t.yielded;
+      record.force = weight_on(problem_, start, t.pair);
+      drawn = begins && begins_at_rest(t, record);
+      if (drawn) start.renew(problem_, i, record);
     }
-    if (!begins_anew(t, record)) continue;
-    start.renew(problem_, i, record);
+    const bool anew = !still && begins_anew(t, record);
+    if (!drawn && !anew) continue;
+    if (anew) start.renew(problem_, i, record);
     records.push_back(record);
   }
   std::sort(records.begin(), records.end(), by_key);
+}
+
+/// Nothing presses surfaces that a scene begins with onto each other but what holds them up, whatever their contact is
+/// stiff for: what is beyond that presses no more. Where the stiffness is given, its law holds as it stands.
+bool ContactStiffness::begins_at_rest(const Touching& t, ContactRecord& record) const {
+  if (problem_.fixed(t.pair)) return false;
+  const double most = record.force + kDrawnForce * 2.0 * kDepth * t.pair.small_radius() * t.stiffness;
+  if (!(-t.energy.first > most)) return false;
+  record.yielded = distance_at(t, true, most / t.stiffness).high - t.proximity.distance;
+  return true;
 }
 
 /// Surfaces that a scene begins with within the tolerance of contact fall onto each other if they store less than what

@@ -45,10 +45,12 @@ class ContactStiffness {
   /// begin; `start`: what touches there. Returns the energy put in [J].
   double stiffen(const ContactSet& set, const ContactSet& start, Keep keep, std::vector<ContactRecord>& records,
                  VectorX& stiffness) const;
-  /// Which surfaces near each other anew as the step begins, of those that touch by then; gives them to `start`.
+  /// Which contacts begin with the scene, of those that touch as the step begins, and which surfaces near each other
+  /// anew by then; gives them to `start`.
   void renew(ContactSet& start, std::vector<ContactRecord>& records) const;
 
  private:
+  bool begins_at_rest(const Touching& t, ContactRecord& record) const;
   bool begins_anew(const Touching& t, ContactRecord& record) const;
   ContactRecord record(const Touching& t) const;
   void finish(const ContactSet& set, std::vector<ContactRecord>& records) const;

@@ -133,6 +133,36 @@ Vec3<Scalar> curve_direction(const CurveWeights& w, const Vec3<Scalar>* x, const
   return u;
 }
 
+/// Sets the three distances of `curve_distance`, g1 and g2, and returns g0.
+template <class Scalar>
+Scalar curve_parabola(const CurveWeights& w, const Obstacle& o, const Vec3<Scalar>* x, const Vec3d& drift,
+                      CurveDistance<Scalar>& d) {
+  Scalar value = 0.0;
+  d.slope = d.bend = Scalar(0.0);
+  if (o.kind != ObstacleKind::plane) {
+    for (int j = 0; j < 3; ++j) {
+      d.sample[j] = distance_to(o, curve_point(w, x, Scalar(w.sample(j))), drift);
+      value += w.value_by[j] * d.sample[j].distance;
+      d.slope += w.slope_by[j] * d.sample[j].distance;
+      d.bend += kBendBy[j] * d.sample[j].distance;
+    }
+    return value;
+  }
+  // Heights above a plane are linear in the nodes.
+  PointDistance<Scalar> node;
+  for (int i = 0; i < w.nodes; ++i) {
+    node = distance_to(o, x[i], drift);
+    value += w.middle[i] * node.distance;
+    d.slope += w.slope[i] * node.distance;
+    d.bend += w.bend[i] * node.distance;
+  }
+  for (int j = 0; j < 3; ++j) {
+    const double s = w.sample(j);
+    d.sample[j] = {value + s * (d.slope + (0.5 * s) * d.bend), node.normal};
+  }
+  return value;
+}
+
 /// How near a piece with nodes x comes to an obstacle, or to where it was before its `drift`.
 template <class Scalar>
 CurveDistance<Scalar> curve_distance(const CurvePiece& piece, const Obstacle& o, const Vec3<Scalar>* x,
@@ -140,14 +170,7 @@ CurveDistance<Scalar> curve_distance(const CurvePiece& piece, const Obstacle& o,
   using std::sqrt;
   const CurveWeights& w = *piece.weights;
   CurveDistance<Scalar> d;
-  Scalar value = 0.0;
-  d.slope = d.bend = Scalar(0.0);
-  for (int j = 0; j < 3; ++j) {
-    d.sample[j] = distance_to(o, curve_point(w, x, Scalar(w.sample(j))), drift);
-    value += w.value_by[j] * d.sample[j].distance;
-    d.slope += w.slope_by[j] * d.sample[j].distance;
-    d.bend += kBendBy[j] * d.sample[j].distance;
-  }
+  const Scalar value = curve_parabola(w, o, x, drift, d);
   d.stiff = 0.5 * (d.bend + sqrt(d.bend * d.bend + 4.0 * piece.least_bend * piece.least_bend));
   d.s = -d.slope / d.stiff;
   const double s = value_of(d.s);

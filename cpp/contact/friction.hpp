@@ -16,6 +16,7 @@
 /// symmetric and not negative, so F . S is not either.
 
 #include <cmath>
+#include <type_traits>
 
 #include "common/dual.hpp"
 #include "contact/pressing_law.hpp"
@@ -28,9 +29,10 @@ namespace withe {
 struct FrictionSetting {
   const ContactPair* pair = nullptr;
   const Obstacle* obstacle = nullptr;
-  ClosestPoints points;                 ///< whose class is kept
-  double start[kContactUnknowns] = {};  ///< unknowns at the start of the step
-  Vec3d source[2];                      ///< tangents that the frames of a and b are transported from
+  ClosestPoints points;                          ///< whose class is kept
+  const CurveDistance<double>* curve = nullptr;  ///< at the unknowns themselves, not at others
+  double start[kContactUnknowns] = {};           ///< unknowns at the start of the step
+  Vec3d source[2];                               ///< tangents that the frames of a and b are transported from
   PressingLaw pressing;
   double before = 0;    ///< distance at the start, as far as it is always the same [m]
   bool slides = false;  ///< or that of the points that are closest at the end
@@ -210,6 +212,14 @@ void set_weights(const ContactPair& pair, SlippingSurfaces<Scalar>& c) {
   c.w[3] = Scalar(0.0);
 }
 
+/// How near a curve is.
+template <class Scalar>
+CurveDistance<Scalar> distance_of(const FrictionSetting& f, const Vec3<Scalar> (&x)[4]) {
+  if constexpr (std::is_same_v<Scalar, double>)
+    if (f.curve != nullptr) return *f.curve;
+  return curve_distance(f.pair->piece, *f.obstacle, x);
+}
+
 /// Where the surfaces touch, and how hard they press.
 template <class Scalar>
 void find_contact(const FrictionSetting& f, const SlipStart<Scalar>& start, const Vec3<Scalar> (&x)[4],
@@ -220,7 +230,7 @@ void find_contact(const FrictionSetting& f, const SlipStart<Scalar>& start, cons
   c.s = f.points.s;
   c.t = f.points.t;
   if (pair.curve()) {
-    const CurveDistance<Scalar> d = curve_distance(pair.piece, *f.obstacle, x);
+    const CurveDistance<Scalar> d = distance_of(f, x);
     c.s = d.s;
     c.distance = d.distance;
     c.normal = distance_to(*f.obstacle, curve_point(*pair.piece.weights, x, c.s)).normal;

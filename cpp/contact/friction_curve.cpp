@@ -48,7 +48,8 @@ Curve curve_of(const FrictionSetting& f, const SlippingSurfaces<double>& c) {
 /// Where it touches, how hard, and along which normal.
 void add_contact_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& c, const Curve& curve,
                         const Vec3d (&x)[3], Slopes& d) {
-  const CurveDistance<double> distance = curve_distance(f.pair->piece, *f.obstacle, x);
+  const Vec3d nodes[4] = {x[0], x[1], x[2], {}};
+  const CurveDistance<double> distance = distance_of(f, nodes);
   const CurveSlopes slopes = curve_slopes(f.pair->piece, distance);
   const PointDistance<double> point = distance_to(*f.obstacle, curve_point(curve.w, x, c.s));
   const Vec3d tangent = curve_direction(curve.w, x, c.s);

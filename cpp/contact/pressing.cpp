@@ -4,6 +4,8 @@
 #include <cmath>
 #include <iterator>
 
+#include "contact/plane_contact.hpp"
+
 namespace withe {
 namespace {
 
@@ -159,6 +161,10 @@ void distance_slope(const Touching& t, double (&out)[12]) {
 
 void add_pressing(const ContactProblem& problem, const Touching& t, bool with_hessian, bool geometric,
                   ContactLocal& out) {
+  if (beside_plane(problem, t)) {
+    add_plane_pressing(problem, t, with_hessian, geometric, out);
+    return;
+  }
   if (t.pair.curve()) {
     add_curve_pressing(problem, t, with_hessian, geometric, out);
     return;

@@ -7,7 +7,6 @@
 #include "common/timer.hpp"
 #include "integrators/inner_solve.hpp"
 #include "integrators/newton_system.hpp"
-#include "integrators/squeezed.hpp"
 #include "integrators/step_parts.hpp"
 #include "steps/inertia.hpp"
 
@@ -223,7 +222,7 @@ bool acceptable(Equations& equations, const StepPlan& plan, const State& state, 
   if (equations.allowed(state.q, work.change) < 1.0) return false;
   contact->update(q1);
   result.squeezed = squeezed_contact(equations, work.change);
-  if (result.squeezed >= 0) return false;
+  if (result.squeezed) return false;
   result.too_deep = contact->too_deep();
   return !result.too_deep;
 }

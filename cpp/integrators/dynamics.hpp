@@ -4,6 +4,7 @@
 #include "integrators/fourth_order.hpp"
 #include "integrators/newton.hpp"
 #include "integrators/predictor.hpp"
+#include "integrators/squeezed.hpp"
 
 namespace withe {
 
@@ -23,7 +24,7 @@ struct StepPlan {
 struct StepResult {
   bool accepted = false;
   bool too_deep = false;  ///< surfaces are too deep in each other: contact must be stiffer
-  int squeezed = -1;      ///< a contact that is pressed by what does not yield, see squeezed.hpp
+  Squeezed squeezed;      ///< what is pressed by what does not yield
   NewtonResult newton;
   double largest_turn = 0;   ///< of an edge [rad]
   double stretch_gain = 0;   ///< energy that midpoint brings into stretching from nowhere [J]

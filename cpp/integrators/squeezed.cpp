@@ -1,6 +1,7 @@
 #include "integrators/squeezed.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "contact/pressing.hpp"
 
@@ -11,26 +12,50 @@ namespace {
 /// little beside its nodes.
 constexpr double kFree = 0.05;
 
-}  // namespace
+/// How much deeper surfaces are in each other than a step may end with [m].
+double excess(const Touching& t) { return t.pair.radii() - t.proximity.distance - kDeepest * t.pair.small_radius(); }
 
-int squeezed_contact(const Equations& equations, VectorX& scratch) {
-  const Contact* contact = equations.contact();
-  if (contact == nullptr || equations.model().constraints.empty()) return -1;
-  for (int i = 0; i < contact->count(); ++i) {
-    const Touching& t = contact->contacts()[i];
-    if (t.lagged >= 0 || !(t.pair.radii() - t.proximity.distance > kDeepest * t.pair.small_radius())) continue;
-    double slope[12];
-    int dofs[kContactUnknowns];
-    distance_slope(t, slope);
-    contact->unknowns(i, dofs);
-    scratch.setZero(equations.model().dof_count);
-    for (int k = 0; k < 12; ++k)
-      if (dofs[k] >= 0) scratch(dofs[k]) += slope[k];
-    const double all = scratch.norm();
-    equations.assembler().project(scratch);
-    if (scratch.norm() <= kFree * all) return i;
+/// How a distance changes with the unknowns that are free; returns the size of the whole slope.
+double free_slope(const Equations& equations, int contact, VectorX& out) {
+  double slope[12];
+  int dofs[kContactUnknowns];
+  distance_slope(equations.contact()->contacts()[contact], slope);
+  equations.contact()->unknowns(contact, dofs);
+  out.setZero(equations.model().dof_count);
+  for (int k = 0; k < 12; ++k)
+    if (dofs[k] >= 0) out(dofs[k]) += slope[k];
+  const double all = out.norm();
+  equations.assembler().project(out);
+  return all;
+}
+
+/// What relieves one contact presses on the other by the share `c`: neither is relieved where the sum of their depths
+/// is too great, whatever moves.
+int opposite_contact(const Equations& equations, int contact, const VectorX& slope) {
+  const ContactSet& set = equations.contact()->contacts();
+  VectorX other;
+  for (int j = 0; j < set.count(); ++j) {
+    if (j == contact || set[j].lagged >= 0 || set[j].pair.rod_a != set[contact].pair.rod_a) continue;
+    free_slope(equations, j, other);
+    const double size = slope.norm(), c = size / std::max(other.norm(), 1e-300);
+    if ((slope + c * other).norm() <= kFree * size && excess(set[contact]) + c * excess(set[j]) > 0.0) return j;
   }
   return -1;
+}
+
+}  // namespace
+
+Squeezed squeezed_contact(const Equations& equations, VectorX& scratch) {
+  const Contact* contact = equations.contact();
+  if (contact == nullptr) return {};
+  for (int i = 0; i < contact->count(); ++i) {
+    const Touching& t = contact->contacts()[i];
+    if (t.lagged >= 0 || !(excess(t) > 0.0)) continue;
+    const double all = free_slope(equations, i, scratch);
+    if (scratch.norm() <= kFree * all) return {i};
+    if (const int other = opposite_contact(equations, i, scratch); other >= 0) return {i, other};
+  }
+  return {};
 }
 
 }  // namespace withe

@@ -214,7 +214,7 @@ struct World::Implementation : Running {
 
   // squeezed.cpp
   void check_squeezed(Equations& system, const VectorX& q, double dt);
-  [[noreturn]] void fail_squeezed(const Equations& system, int contact, double dt) const;
+  [[noreturn]] void fail_squeezed(const Equations& system, const Squeezed& squeezed, double dt) const;
 
   // step_length.cpp
   void watch_step(double dt, const Equations& system);

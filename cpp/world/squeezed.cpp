@@ -12,28 +12,41 @@ namespace withe {
 /// Refuses a place of supports in which what they hold is inside something that does not yield either. `q`: where they
 /// shall be, and all else as it is.
 void World::Implementation::check_squeezed(Equations& system, const VectorX& q, double dt) {
-  if (!system.contact() || model.constraints.empty()) return;
+  if (!system.contact()) return;
   system.begin(state, parameters, StepRule::statics, 0.0);
   system.contact()->update(q);
-  const int found = squeezed_contact(system, work.change);
-  if (found >= 0) fail_squeezed(system, found, dt);
+  if (const Squeezed found = squeezed_contact(system, work.change)) fail_squeezed(system, found, dt);
 }
 
-void World::Implementation::fail_squeezed(const Equations& system, int contact, double dt) const {
-  const Touching& t = system.contact()->contacts()[contact];
-  const double depth = t.pair.radii() - t.proximity.distance, share = 100.0 * depth / t.pair.small_radius();
+void World::Implementation::fail_squeezed(const Equations& system, const Squeezed& squeezed, double dt) const {
+  const ContactSet& set = system.contact()->contacts();
+  const Touching& t = set[squeezed.contact];
+  const double depth = t.pair.radii() - t.proximity.distance;
   const auto rod_of = [&](int edge) { return "rod '" + description.rods[at(model.edge_rod[at(edge)])].name + "'"; };
-  const std::string other =
-      t.pair.key.b < 0 ? "'" + description.contact.obstacles[at(-1 - t.pair.key.b)].name + "'" : rod_of(t.pair.key.b);
+  const auto other = [&](const ContactKey& key) {
+    return key.b < 0 ? "'" + description.contact.obstacles[at(-1 - key.b)].name + "'" : rod_of(key.b);
+  };
   const int node = model.edge_tail[at(t.pair.key.a)];
   const Place place = place_of_node(t.proximity.points.s > 0.5 ? model.edge_head[at(t.pair.key.a)] : node);
-  throw ConvergenceFailure(
-      rod_of(t.pair.key.a) + " is pressed " + text(depth) + " m into " + other + ", " + text(share, 2) +
-          " % of its contact radius," + place.words + " (time " + text(state.time, 6) + " s, step " + text(dt) +
-          " s), by what does not yield: neither does what holds it, nor that, and no force between them is right; the "
-          "world is left in its last accepted state. Move the support less far, hold the rod by what yields, such as a "
-          "spring, or where it does not touch, or take a smaller contact_radius",
-      state.time, dt, place.rod, place.node, 0.0);
+  const auto share = [&](double length) { return text(100.0 * length / t.pair.small_radius(), 2); };
+  const std::string when = place.words + " (time " + text(state.time, 6) + " s, step " + text(dt) + " s)";
+  std::string what = rod_of(t.pair.key.a);
+  if (squeezed.against < 0) {
+    what += " is pressed " + text(depth) + " m into " + other(t.pair.key) + ", " + share(depth) +
+            " % of its contact radius," + when +
+            ", by what does not yield: neither does what holds it, nor that, and no force between them is right; the "
+            "world is left in its last accepted state. Move the support less far, hold the rod by what yields, such as "
+            "a spring, or where it does not touch, or take a smaller contact_radius";
+  } else {
+    const Touching& a = set[squeezed.against];
+    const double both = depth + a.pair.radii() - a.proximity.distance;
+    what += " is squeezed between " + other(t.pair.key) + " and " + other(a.pair.key) + ", which leave it " +
+            text(both) + " m less than it is thick, " + share(both) + " % of its contact radius," + when +
+            ": neither of them yields, and no force between them is right; the world is left in its last accepted "
+            "state. Move them less near to each other, press with what yields, such as a hand with stiffness= or a rod "
+            "on springs, or take a smaller contact_radius";
+  }
+  throw ConvergenceFailure(what, state.time, dt, place.rod, place.node, 0.0);
 }
 
 }  // namespace withe

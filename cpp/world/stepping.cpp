@@ -325,7 +325,7 @@ bool World::Implementation::inner_step(double dt, int slot, double& error) {
   last_newton = r.newton;
   if (!r.accepted) {
     undo();
-    if (r.squeezed >= 0) fail_squeezed(system, r.squeezed, dt);
+    if (r.squeezed) fail_squeezed(system, r.squeezed, dt);
     return false;
   }
   system.respond({});

@@ -196,6 +196,64 @@ struct ContactStep {
   Contact contact;
 };
 
+/// What all contacts do at c.q, and its derivative.
+struct ContactSum {
+  VectorX gradient;
+  MatrixX hessian;
+};
+
+ContactSum sum_of_contacts(const Case& c, bool conserving) {
+  const ContactStep step(c, conserving);
+  const Eigen::Index n = c.model.dof_count;
+  ContactSum sum{VectorX::Zero(n), MatrixX::Zero(n, n)};
+  for (int i = 0; i < step.contact.count(); ++i) {
+    ContactLocal local;
+    int dofs[kContactUnknowns];
+    step.contact.local(i, true, local);
+    step.contact.unknowns(i, dofs);
+    for (int k = 0; k < kContactUnknowns; ++k) {
+      if (dofs[k] < 0) continue;
+      sum.gradient(dofs[k]) += local.gradient[k];
+      for (int l = 0; l < kContactUnknowns; ++l)
+        if (dofs[l] >= 0) sum.hessian(dofs[k], dofs[l]) += local.hessian[k][l];
+    }
+  }
+  return sum;
+}
+
+/// The closed form of a rod in a plane beside a plane, against the general formulas.
+TEST(Contact, OfARodInAPlaneWithAPlaneIsThatOfTheSameRodInSpace) {
+  testing::RandomNumbers random(23);
+  for (const Named& drawn : touching_scenes()) {
+    if (drawn.name != "plane in a plane") continue;
+    for (FrictionLaw law : {FrictionLaw::implicit, FrictionLaw::anchored})
+      for (int k = 0; k < 40; ++k) {
+        Named named = drawn;
+        named.scene.contact.friction_law = law;
+        named.scene.contact.centreline_friction = k % 5 == 4;
+        const double size = 0.2 * std::pow(10.0, -0.03 * k);
+        Case flat = slipped(named, 0.0, true), space = slipped(named, 0.0, false);
+        const Plane& plane = *flat.model.plane;
+        MatrixX axes = MatrixX::Zero(space.model.dof_count, flat.model.dof_count);
+        for (int i = 0; i < flat.model.node_count; ++i) {
+          axes.block<3, 1>(space.model.node_dof[at(i)], flat.model.node_dof[at(i)]) = plane.first;
+          axes.block<3, 1>(space.model.node_dof[at(i)], flat.model.node_dof[at(i)] + 1) = plane.second;
+        }
+        const VectorX change = size * random.vector(flat.model.dof_count);
+        flat.q += change;
+        space.q += axes * change;
+        flat.state.v = random.vector(flat.model.dof_count);
+        space.state.v = axes * flat.state.v;
+        const ContactSum a = sum_of_contacts(flat, k % 2 == 1), b = sum_of_contacts(space, k % 2 == 1);
+        EXPECT_GT(a.gradient.norm(), 0.0);
+        EXPECT_LT((a.gradient - axes.transpose() * b.gradient).norm(), 1e-11 * a.gradient.norm()) << k;
+        // Shares of mean directions are quotients of differences.
+        const double accuracy = k % 2 == 1 ? 1e-7 : 1e-11;
+        EXPECT_LT((a.hessian - axes.transpose() * b.hessian * axes).norm(), accuracy * a.hessian.norm()) << k;
+      }
+  }
+}
+
 /// Eigenvalues of pressing alone.
 VectorX pressing_eigenvalues(const Case& c, bool geometric) {
   ContactStep step(c);

@@ -93,3 +93,38 @@ def test_statics_take_a_balanced_cable_on_a_floor_as_balanced(modulus, height, f
     contacts = simulation.contacts()
     weight = 1200.0 * np.pi * RADIUS**2 * np.hypot(0.5, 0.1) * 9.81
     assert contacts["normal_force"].sum() == pytest.approx(weight, rel=1e-6)
+
+
+def between(plate, scheme="backward_euler", friction=0.0, **options):
+    """A rod on a floor, under a plate that is moved down to `plate` radii."""
+    scene = withe.Scene()
+    scene.add_rod(start=(0, 0, RADIUS), end=(0.3, 0, RADIUS), nodes=31, radius=RADIUS, material=RUBBER, name="rod")
+    scene.add_floor(name="floor", friction=friction)
+    scene.add_plane((0, 0, 2.2 * RADIUS), (0, 0, -1), name="plate", friction=friction)
+    simulation = scene.build(integrator=scheme, time_step=1e-3, **options)
+    simulation.move("plate", position=(0, 0, plate * RADIUS), over=0.02)
+    return simulation
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("friction", [0.0, 0.4])
+@pytest.mark.parametrize("plate", [0.5, 1.7, 1.9])
+def test_a_rod_between_obstacles_that_leave_it_no_room_is_an_error_that_names_all(scheme, friction, plate):
+    simulation = between(plate, scheme, friction)
+    message = r"rod 'rod' is squeezed between '(floor|plate)' and '(floor|plate)'.* neither of them yields"
+    with pytest.raises(withe.ConvergenceError, match=message) as error:
+        simulation.step(30)
+    assert error.value.rod == "rod"
+    assert np.isfinite(simulation.positions()).all()
+    assert simulation.get("plate", "position")[2] >= 1.9 * RADIUS
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_a_rod_that_obstacles_squeeze_by_less_stays_so(scheme):
+    simulation = between(1.97, scheme)
+    simulation.step(60)
+    contacts = simulation.contacts()
+    up = contacts["normal"][:, 2] > 0.0
+    pressed = contacts["normal_force"][~up].sum()
+    assert pressed > WEIGHT
+    assert contacts["normal_force"][up].sum() == pytest.approx(pressed + WEIGHT, rel=1e-2)

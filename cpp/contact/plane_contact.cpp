@@ -1,0 +1,312 @@
+#include "contact/plane_contact.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "contact/pressing.hpp"
+
+namespace withe {
+namespace {
+
+// A node's height and its place along the plane stand one after the other.
+constexpr int kHeight = 0, kPlace = 1, kWays = 6;
+
+/// Across and along a plane.
+struct Axes {
+  Vec3d normal, along;
+
+  explicit Axes(const Obstacle& o) : normal(o.other), along{o.other.y, -o.other.x, 0.0} {}
+
+  /// Adds a vector or a matrix of heights and places to those of the unknowns.
+  void add(const double (&ways)[kWays], double (&out)[kContactUnknowns]) const {
+    for (int i = 0; i < 3; ++i) {
+      const double h = ways[2 * i + kHeight], y = ways[2 * i + kPlace];
+      out[3 * i] += normal.x * h + along.x * y;
+      out[3 * i + 1] += normal.y * h + along.y * y;
+    }
+  }
+  void add(const double (&ways)[kWays][kWays], double (&out)[kContactUnknowns][kContactUnknowns]) const {
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) {
+        const double hh = ways[2 * i][2 * j], hy = ways[2 * i][2 * j + 1], yh = ways[2 * i + 1][2 * j],
+                     yy = ways[2 * i + 1][2 * j + 1];
+        const double hx = normal.x * hh + along.x * yh, yx = normal.x * hy + along.x * yy;
+        const double hz = normal.y * hh + along.y * yh, yz = normal.y * hy + along.y * yy;
+        out[3 * i][3 * j] += hx * normal.x + yx * along.x;
+        out[3 * i][3 * j + 1] += hx * normal.y + yx * along.y;
+        out[3 * i + 1][3 * j] += hz * normal.x + yz * along.x;
+        out[3 * i + 1][3 * j + 1] += hz * normal.y + yz * along.y;
+      }
+  }
+};
+
+/// Derivatives of a piece's distance by heights, and of the place s where it touches.
+struct HeightSlopes {
+  double distance[3], s[3];
+
+  HeightSlopes(const CurveWeights& w, const CurveDistance<double>& d) {
+    const double share = d.bend_share(), half = 0.5 * d.s * d.s * share, by_s = d.free ? -1.0 / d.stiff : 0.0;
+    for (int i = 0; i < 3; ++i) {
+      distance[i] = w.middle[i] + d.s * w.slope[i] + half * w.bend[i];
+      s[i] = by_s * (w.slope[i] + d.s * share * w.bend[i]);
+    }
+  }
+};
+
+/// See `add_start_direction` of pressing.cpp.
+void add_start_direction(const ContactProblem& problem, const Touching& t, const Axes& axes, bool geometric,
+                         double (&along)[3], double (*derivative)[3]) {
+  const ContactPair& pair = t.pair;
+  Vec3d x0[4];
+  const CurveDistance<double> start = problem.curve_at_start(pair, x0);
+  const HeightSlopes first(*pair.piece.weights, start);
+  const double shift = dot(axes.normal, problem.shift_of(pair));
+  double way[3] = {}, turned[3], p0 = 0.0, p1 = 0.0, size = 0.0;
+  for (int i = 0; i < pair.piece.weights->nodes; ++i) {
+    const Vec3d moved = Vec3d{t.now[3 * i], t.now[3 * i + 1], 0.0} - x0[i];
+    way[i] = dot(axes.normal, moved) - shift;
+  }
+  for (int i = 0; i < 3; ++i) {
+    turned[i] = first.distance[i] - along[i];
+    p0 += first.distance[i] * way[i];
+    p1 += along[i] * way[i];
+    size += std::abs(way[i]);
+  }
+  const bool same = std::abs(p0 - p1) <= kSameDirection * size;
+  const double share = same ? 0.5 : (t.proximity.distance - start.distance - p1) / (p0 - p1),
+               b = std::clamp(share, 0.0, 1.0);
+  const bool fixed = same || share != b || !geometric;
+  for (int j = 0; j < 3 && derivative; ++j) {
+    double bent = 0.0;
+    for (int i = 0; i < 3; ++i) bent += way[i] * derivative[i][j];
+    const double change = fixed ? 0.0 : -(bent + b * (turned[j] - bent)) / (p0 - p1);
+    for (int i = 0; i < 3; ++i) derivative[i][j] = (1.0 - b) * derivative[i][j] + turned[i] * change;
+  }
+  for (int i = 0; i < 3; ++i) along[i] += b * turned[i];
+}
+
+/// An edge of a piece, and how it turns.
+struct PlaneEdge {
+  double across, along;    ///< parts of it [m]
+  double across0, along0;  ///< as the step began
+  double inverse_square;   ///< of its length [1/m^2]
+  double turn;             ///< phi
+};
+
+/// How far such a surface has slipped, and the friction on that.
+class PlaneSlip {
+ public:
+  PlaneSlip(const ContactProblem& problem, const Touching& t, double rate)
+      : pair_(t.pair), w_(*t.pair.piece.weights), axes_(problem.bodies.obstacle(t.pair)), s_(t.proximity.curve.s) {
+    for (int i = 0; i < w_.nodes; ++i) {
+      const Vec3d x{t.now[3 * i], t.now[3 * i + 1], 0.0};
+      const Vec3d x0 = local_position(problem.model(), problem.start->q, pair_.piece.node[i]);
+      height_[i] = dot(axes_.normal, x);
+      height0_[i] = dot(axes_.normal, x0);
+      place_[i] = dot(axes_.along, x);
+      place0_[i] = dot(axes_.along, x0);
+      weight_[i] = w_.at(i, s_);
+      weight_slope_[i] = w_.slope[i] + w_.bend[i] * s_;
+      slip_ += weight_[i] * (place_[i] - place0_[i]);
+    }
+    slip_ -= dot(axes_.along, problem.shift_of(pair_));
+    if (problem.anchored()) slip_ += dot(axes_.along, t.stick);
+    edges_ = problem.description().centreline_friction ? 0 : w_.edges;
+    for (int b = 0; b < edges_; ++b) {
+      PlaneEdge& e = edge_[b];
+      e = {height_[b + 1] - height_[b],
+           place_[b + 1] - place_[b],
+           height0_[b + 1] - height0_[b],
+           place0_[b + 1] - place0_[b],
+           0.0,
+           0.0};
+      e.inverse_square = 1.0 / (e.across * e.across + e.along * e.along);
+      e.turn = e.inverse_square * (e.across * e.along0 - e.along * e.across0);
+      lever_[b] = pair_.radius_a * (w_.share[b] + w_.share_slope[b] * s_);
+      slip_ += lever_[b] * e.turn;
+    }
+    find_force(problem, t, rate);
+  }
+
+  const Axes& axes() const { return axes_; }
+  double force() const { return force_; }
+  double slip() const { return slip_; }
+  double limit() const { return limit_; }
+  const ForceLaw& law() const { return law_; }
+  bool sticking() const { return sticking_; }
+  double stick() const { return stick_; }
+
+  /// Its derivative by heights and places.
+  void slope(const HeightSlopes& d, double (&out)[kWays]) const {
+    double by_s = 0.0;
+    for (int i = 0; i < w_.nodes; ++i) by_s += weight_slope_[i] * (place_[i] - place0_[i]);
+    for (int b = 0; b < edges_; ++b) by_s += pair_.radius_a * w_.share_slope[b] * edge_[b].turn;
+    for (int i = 0; i < 3; ++i) {
+      out[2 * i + kHeight] = by_s * d.s[i];
+      out[2 * i + kPlace] = i < w_.nodes ? weight_[i] : 0.0;
+    }
+    for (int b = 0; b < edges_; ++b) {
+      const PlaneEdge& e = edge_[b];
+      const double factor = lever_[b] * e.inverse_square;
+      const double by_across = factor * (e.along0 - 2.0 * e.turn * e.across),
+                   by_along = -factor * (e.across0 + 2.0 * e.turn * e.along);
+      out[2 * (b + 1) + kHeight] += by_across;
+      out[2 * (b + 1) + kPlace] += by_along;
+      out[2 * b + kHeight] -= by_across;
+      out[2 * b + kPlace] -= by_along;
+    }
+  }
+
+  void add_gradient(ContactLocal& out) const {
+    double ways[kWays] = {};
+    for (int i = 0; i < w_.nodes; ++i) ways[2 * i + kPlace] = weight_[i] * force_;
+    for (int b = 0; b < edges_; ++b) {
+      const PlaneEdge& e = edge_[b];
+      const double couple = lever_[b] * force_ * e.inverse_square;
+      ways[2 * (b + 1) + kHeight] += couple * e.along;
+      ways[2 * (b + 1) + kPlace] -= couple * e.across;
+      ways[2 * b + kHeight] -= couple * e.along;
+      ways[2 * b + kPlace] += couple * e.across;
+    }
+    axes_.add(ways, out.gradient);
+  }
+
+  /// `by_end`: of what presses, by the distance.
+  void add_hessian(const Touching& t, const Vec3d* predicted, ContactLocal& out) const {
+    const HeightSlopes d(w_, t.proximity.curve);
+    double turned[kWays], change[kWays];
+    slope(d, turned);
+    const Vec3d known = predicted ? *predicted : Vec3d{};
+    const double dual = predicted && law_.factor > 0.0 ? limit_ / law_.factor * dot(axes_.along, known) : slip_;
+    const double by_slip = law_.factor + 2.0 * law_.by_square * slip_ * dual;
+    for (int k = 0; k < kWays; ++k) change[k] = by_slip * turned[k];
+    for (int i = 0; i < 3; ++i) change[2 * i + kHeight] -= law_.by_pressing * slip_ * t.pressing.by_end * d.distance[i];
+    double matrix[kWays][kWays] = {};
+    for (int i = 0; i < w_.nodes; ++i) {
+      for (int k = 0; k < kWays; ++k) matrix[2 * i + kPlace][k] = weight_[i] * change[k];
+      for (int k = 0; k < 3; ++k) matrix[2 * i + kPlace][2 * k + kHeight] += weight_slope_[i] * force_ * d.s[k];
+    }
+    for (int b = 0; b < edges_; ++b) add_couple(b, change, d, matrix);
+    axes_.add(matrix, out.hessian);
+  }
+
+ private:
+  void find_force(const ContactProblem& problem, const Touching& t, double rate) {
+    const double mu = pair_.friction, pressing = -t.pressing.first;
+    limit_ = mu * pressing;
+    if (!problem.anchored()) {
+      law_ = tanh_law(mu, pressing, slip_ * slip_, rate);
+      force_ = law_.factor * slip_;
+      sticking_ = rate * std::abs(slip_) < 7.5;
+      return;
+    }
+    const double stiffness = tangential_stiffness(pair_, t.stiffness), most = std::max(limit_ / stiffness, 0.0);
+    sticking_ = std::abs(slip_) <= most;
+    const double size = std::abs(slip_);
+    law_ = sticking_ ? ForceLaw{stiffness, 0.0, 0.0}
+                     : ForceLaw{limit_ / size, -0.5 * limit_ / (size * size * size), mu / size};
+    force_ = law_.factor * slip_;
+    stick_ = force_ / stiffness;
+  }
+
+  /// What the moment r m_b F does to the ends of an edge, F r m_b (b, -a) / |e|^2.
+  void add_couple(int b, const double (&change)[kWays], const HeightSlopes& d, double (&matrix)[kWays][kWays]) const {
+    const PlaneEdge& e = edge_[b];
+    const double arm[2] = {e.inverse_square * e.along, -e.inverse_square * e.across};
+    double rows[2][kWays];
+    const double grown = pair_.radius_a * w_.share_slope[b] * force_;
+    for (int k = 0; k < kWays; ++k) {
+      const double moment = lever_[b] * change[k] + (k % 2 == kHeight ? grown * d.s[k / 2] : 0.0);
+      rows[kHeight][k] = arm[0] * moment;
+      rows[kPlace][k] = arm[1] * moment;
+    }
+    const double moment = lever_[b] * force_;
+    const double both = 2.0 * arm[0] * arm[1], own[2][2] = {{both, e.inverse_square - 2.0 * arm[0] * arm[0]},
+                                                            {2.0 * arm[1] * arm[1] - e.inverse_square, -both}};
+    for (int r = 0; r < 2; ++r) {
+      rows[r][2 * (b + 1) + kHeight] += moment * own[r][kHeight];
+      rows[r][2 * (b + 1) + kPlace] += moment * own[r][kPlace];
+      rows[r][2 * b + kHeight] -= moment * own[r][kHeight];
+      rows[r][2 * b + kPlace] -= moment * own[r][kPlace];
+      for (int k = 0; k < kWays; ++k) {
+        matrix[2 * (b + 1) + r][k] += rows[r][k];
+        matrix[2 * b + r][k] -= rows[r][k];
+      }
+    }
+  }
+
+  const ContactPair& pair_;
+  const CurveWeights& w_;
+  Axes axes_;
+  double s_;
+  double height_[3] = {}, height0_[3] = {}, place_[3] = {}, place0_[3] = {};
+  double weight_[3] = {}, weight_slope_[3] = {};
+  int edges_ = 0;  ///< with an arm
+  PlaneEdge edge_[2];
+  double lever_[2] = {};  ///< r m_b
+  double slip_ = 0, limit_ = 0, force_ = 0, stick_ = 0;
+  bool sticking_ = false;
+  ForceLaw law_;
+};
+
+}  // namespace
+
+bool beside_plane(const ContactProblem& problem, const Touching& t) {
+  if (!t.pair.curve() || !problem.model().planar() || t.lagged >= 0) return false;
+  return problem.bodies.flat(t.pair) && t.pair.isotropic() && problem.turn.empty();
+}
+
+void add_plane_pressing(const ContactProblem& problem, const Touching& t, bool with_hessian, bool geometric,
+                        ContactLocal& out) {
+  const CurvePiece& piece = t.pair.piece;
+  const CurveDistance<double>& end = t.proximity.curve;
+  const Axes axes(problem.bodies.obstacle(t.pair));
+  const HeightSlopes slopes(*piece.weights, end);
+  double along[3], derivative[3][3] = {};
+  std::copy(slopes.distance, slopes.distance + 3, along);
+  if (with_hessian && geometric) {
+    // See add_curve_hessian: d^2 D = -phi ds^2 + (s^2 / 2) phi'' dg2^2.
+    const double bent = 0.5 * end.s * end.s * end.bend_change(piece.least_bend);
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j)
+        derivative[i][j] =
+            bent * piece.weights->bend[i] * piece.weights->bend[j] - end.stiff * slopes.s[i] * slopes.s[j];
+  }
+  if (problem.means_direction())
+    add_start_direction(problem, t, axes, geometric, along, with_hessian ? derivative : nullptr);
+  double ways[kWays] = {};
+  for (int i = 0; i < 3; ++i) ways[2 * i + kHeight] = t.pressing.first * along[i];
+  axes.add(ways, out.gradient);
+  if (!with_hessian) return;
+  double matrix[kWays][kWays] = {};
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j)
+      matrix[2 * i][2 * j] = t.pressing.first * derivative[i][j] + t.pressing.by_end * along[i] * slopes.distance[j];
+  axes.add(matrix, out.hessian);
+}
+
+void add_plane_friction(const ContactProblem& problem, const Touching& t, double rate, const Vec3d* predicted,
+                        bool with_hessian, ContactLocal& out) {
+  const PlaneSlip slip(problem, t, rate);
+  slip.add_gradient(out);
+  if (with_hessian) slip.add_hessian(t, predicted, out);
+}
+
+FrictionForce<double> plane_friction(const ContactProblem& problem, const Touching& t, double rate) {
+  const PlaneSlip slip(problem, t, rate);
+  return {slip.force() * slip.axes().along, slip.stick() * slip.axes().along, slip.sticking()};
+}
+
+Slipping plane_slipping(const ContactProblem& problem, const Touching& t, double rate, const VectorX& change) {
+  const PlaneSlip slip(problem, t, rate);
+  const Vec3d &normal = slip.axes().normal, &along = slip.axes().along;
+  double slope[kWays], moved = 0.0;
+  slip.slope(HeightSlopes(*t.pair.piece.weights, t.proximity.curve), slope);
+  for (int i = 0; i < t.pair.piece.weights->nodes; ++i) {
+    const Vec3d by = local_position(problem.model(), change, t.pair.piece.node[i]);
+    moved += slope[2 * i + kHeight] * dot(normal, by) + slope[2 * i + kPlace] * dot(along, by);
+  }
+  return {slip.slip() * along, moved * along, slip.law(), slip.limit()};
+}
+
+}  // namespace withe

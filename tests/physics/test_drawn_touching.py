@@ -1,0 +1,111 @@
+"""Rods that are drawn within touching distance of each other or of a floor start at rest, however stiff they are.
+
+Contact has a force within its tolerance of touching; nothing presses what a scene draws there but what it weighs.
+"""
+
+import numpy as np
+import pytest
+
+import withe
+
+RADIUS, LENGTH, DENSITY, GRAVITY = 5e-3, 0.3, 1200.0, 9.81
+WEIGHT = DENSITY * np.pi * RADIUS**2 * LENGTH * GRAVITY
+MODULI = [1e5, 1e7, 1e9, 2e11]
+GAPS = [-0.03, 0.0, 0.01, 0.03, 0.06, 0.09]  # over the radius
+SCHEMES = ["backward_euler", "implicit_midpoint", "energy_momentum", "verlet"]
+
+
+def material(modulus):
+    return withe.Material(youngs_modulus=modulus, poisson_ratio=0.3, density=DENSITY)
+
+
+def pile(modulus, gap, turn, gravity=GRAVITY, floor=True):
+    """One rod upon another, turned against it, on a floor."""
+    scene = withe.Scene(gravity=(0, 0, -gravity))
+    height, rods = RADIUS * (1.0 + gap), []
+    for angle in (0.0, turn):
+        half = 0.5 * LENGTH * np.array([np.cos(angle), np.sin(angle), 0.0])
+        middle = np.array([0.0, 0.0, height])
+        rods.append(
+            scene.add_rod(start=middle - half, end=middle + half, nodes=21, radius=RADIUS, material=material(modulus))
+        )
+        height += RADIUS * (2.0 + gap)
+    if floor:
+        scene.add_floor()
+    scene.enable_contact()
+    return scene, rods
+
+
+def heights(simulation, rods):
+    return np.array([simulation.positions(rod)[:, 2].mean() for rod in rods])
+
+
+@pytest.mark.parametrize("modulus", MODULI)
+@pytest.mark.parametrize("gap", GAPS)
+@pytest.mark.parametrize("turn", [0.0, 0.3, 1.5])
+def test_a_pile_that_is_drawn_touching_is_not_pressed_apart(modulus, gap, turn):
+    """It was by 27 N, for a weight of .28."""
+    scene, rods = pile(modulus, gap, turn)
+    simulation = scene.build(integrator="backward_euler", time_step=1e-3)
+    assert simulation.contacts()["normal_force"].sum() <= 3.0 * WEIGHT
+    drawn = heights(simulation, rods)
+    for _ in range(40):
+        simulation.step()
+        assert (heights(simulation, rods) <= drawn + 2e-3 * RADIUS).all()
+
+
+@pytest.mark.parametrize("modulus", MODULI)
+@pytest.mark.parametrize("gap", GAPS)
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_a_rod_that_is_drawn_on_a_floor_stays_there(modulus, gap, scheme):
+    scene = withe.Scene()
+    height = RADIUS * (1.0 + gap)
+    rod = scene.add_rod(
+        start=(0, 0, height), end=(LENGTH, 0, height), nodes=21, radius=RADIUS, material=material(modulus)
+    )
+    scene.add_floor(friction=0.3)
+    step = 1e-3 if scheme != "verlet" else 0.2 * LENGTH / 20 / np.sqrt(modulus / DENSITY)
+    simulation = scene.build(integrator=scheme, time_step=min(step, 1e-3))
+    assert simulation.contacts()["normal_force"].sum() <= 1.03 * WEIGHT
+    fastest, fallen = 0.0, RADIUS * (max(gap, 0.0) + 0.05)
+    for _ in range(60):
+        simulation.step()
+        fastest = max(fastest, np.abs(simulation.velocities(rod)).max())
+        assert heights(simulation, [rod]) <= height + 2e-3 * RADIUS
+    assert fastest <= np.sqrt(2.0 * GRAVITY * fallen)
+
+
+@pytest.mark.parametrize("modulus", MODULI)
+@pytest.mark.parametrize("turn", [0.0, 1.5])
+def test_rods_that_are_drawn_touching_without_gravity_stay(modulus, turn):
+    """What is left of the force, a millionth, is far below what bends them."""
+    scene, rods = pile(modulus, 0.0, turn, gravity=0.0, floor=False)
+    simulation = scene.build(integrator="implicit_midpoint", time_step=1e-3)
+    drawn = heights(simulation, rods)
+    stiff = modulus * np.pi * RADIUS**4 / 4 / (100 * RADIUS) ** 2  # EI / L^2 [N]
+    contacts = simulation.contacts()
+    assert contacts["normal_force"].max() <= 1.01e-6 * stiff
+    simulation.step(20)
+    share = np.abs(heights(simulation, rods) - drawn).max() / RADIUS
+    mass = DENSITY * np.pi * RADIUS**2 * LENGTH
+    assert share * RADIUS <= 1e-6 * stiff * len(contacts) / mass * 0.02**2
+
+
+@pytest.mark.parametrize("gap", GAPS)
+def test_what_contact_stores_as_a_scene_is_drawn_is_in_its_books(gap):
+    scene, _ = pile(1e9, gap, 0.3)
+    simulation = scene.build(integrator="energy_momentum", time_step=1e-3)
+    drawn = simulation.energy().total
+    scale = WEIGHT * RADIUS
+    for _ in range(30):
+        simulation.step()
+        energy = simulation.energy()
+        assert energy.total + energy.dissipated == pytest.approx(drawn, abs=1e-7 * scale)
+
+
+def test_a_contact_whose_stiffness_is_given_keeps_its_law():
+    scene, _ = pile(1e9, 0.0, 1.5)
+    scene.enable_contact(stiffness=1e4)
+    force = scene.build(time_step=1e-3).contacts()["normal_force"]
+    expected = 2e4 * (np.log(2.0) / 15.0 * 0.1 * RADIUS) * 0.5
+    assert force.max() == pytest.approx(expected, rel=1e-3)
