@@ -36,6 +36,7 @@ void ContactProblem::find_offsets() {
   if (pressing == Pressing::still) return;
   const std::vector<ContactRecord>& records = start->contacts;
   if (std::all_of(records.begin(), records.end(), [](const ContactRecord& r) { return r.yielded == 0.0; })) return;
+  offsets.reserve(records.size());
   for (const ContactRecord& r : records) {
     const int other = r.key.b < 0 ? r.key.b : model().edge_rod[at(r.key.b)];
     if (r.force > 0.0) offsets.push_back({model().edge_rod[at(r.key.a)], other, r.force, r.force * r.yielded});

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <utility>
 
 #include "contact/contact_friction.hpp"
 #include "contact/contact_work.hpp"
@@ -53,16 +55,35 @@ double faded(const ContactProblem& problem, const Touching& t) {
   return std::min(worn(problem, t), left);
 }
 
-/// Of the weight of an edge what a contact holds up, where edges touch several others [N].
-double weight_on(const ContactProblem& problem, const ContactSet& set, const ContactPair& pair) {
-  const auto contacts = static_cast<double>(std::count_if(set.begin(), set.end(), [&](const Touching& t) {
-    return t.lagged < 0 && t.pair.rod_a == pair.rod_a && t.pair.rod_b == pair.rod_b &&
-           (pair.rod_b >= 0 || t.pair.key.b == pair.key.b);
-  }));
-  const std::vector<int>& first = problem.model().rod_first_edge;
-  const double share = std::min(1.0, (first[at(pair.rod_a + 1)] - first[at(pair.rod_a)]) / contacts);
-  return share * pair.share * problem.mass_of(pair) * problem.parameters->gravity;
-}
+/// Of the weight of an edge what a contact holds up, where edges touch several others. Contacts of the same bodies,
+/// which follow each other, are counted once.
+class SharedWeight {
+ public:
+  SharedWeight(const ContactProblem& problem, const ContactSet& set) : problem_(problem), set_(set) {}
+
+  double on(const ContactPair& pair) {  // [N]
+    const std::pair<int, int> bodies = bodies_of(pair);
+    if (contacts_ == 0 || bodies != bodies_) {
+      bodies_ = bodies;
+      contacts_ = std::count_if(set_.begin(), set_.end(),
+                                [&](const Touching& t) { return t.lagged < 0 && bodies_of(t.pair) == bodies; });
+    }
+    const std::vector<int>& first = problem_.model().rod_first_edge;
+    const int edges = first[at(pair.rod_a + 1)] - first[at(pair.rod_a)];
+    const double share = std::min(1.0, static_cast<double>(edges) / static_cast<double>(contacts_));
+    return share * pair.share * problem_.mass_of(pair) * problem_.parameters->gravity;
+  }
+
+ private:
+  static std::pair<int, int> bodies_of(const ContactPair& pair) {
+    return {pair.rod_a, pair.key.b < 0 ? pair.key.b : pair.rod_b};
+  }
+
+  const ContactProblem& problem_;
+  const ContactSet& set_;
+  std::pair<int, int> bodies_;
+  std::ptrdiff_t contacts_ = 0;
+};
 
 /// Distances of centrelines, with what has yielded, between which a contact's force, or energy, falls to what is
 /// `wanted` for unit stiffness.
@@ -287,6 +308,7 @@ double ContactStiffness::stiffen(const ContactSet& set, const ContactSet& start,
 void ContactStiffness::renew(ContactSet& start, std::vector<ContactRecord>& records) const {
   records.clear();
   const bool still = problem_.pressing == Pressing::still, begins = !still || problem_.start->contacts.empty();
+  SharedWeight weight(problem_, start);
   for (int i = 0; i < start.count(); ++i) {
     const Touching& t = start[i];
     ContactRecord record;
@@ -298,7 +320,7 @@ void ContactStiffness::renew(ContactSet& start, std::vector<ContactRecord>& reco
       record.key = t.pair.key;
       record.stiffness = t.stiffness / t.pair.share;
       record.yielded = t.yielded;
-      record.force = weight_on(problem_, start, t.pair);
+      record.force = weight.on(t.pair);
       drawn = begins && begins_at_rest(t, record);
       if (drawn) start.renew(problem_, i, record);
     }

@@ -221,7 +221,7 @@ bool acceptable(Equations& equations, const StepPlan& plan, const State& state, 
   work.change = work.z - state.q;
   if (equations.allowed(state.q, work.change) < 1.0) return false;
   contact->update(q1);
-  result.squeezed = squeezed_contact(equations, work.change);
+  result.squeezed = squeezed_contact(equations, work.change, work.mean);
   if (result.squeezed) return false;
   result.too_deep = contact->too_deep();
   return !result.too_deep;

@@ -30,14 +30,18 @@ double free_slope(const Equations& equations, int contact, VectorX& out) {
 }
 
 /// What relieves one contact presses on the other by the share `c`: neither is relieved where the sum of their depths
-/// is too great, whatever moves.
-int opposite_contact(const Equations& equations, int contact, const VectorX& slope) {
+/// is too great, whatever moves. Such a contact moves what moves the first most, which few do.
+int opposite_contact(const Equations& equations, int contact, const VectorX& slope, VectorX& other) {
   const ContactSet& set = equations.contact()->contacts();
-  VectorX other;
-  for (int j = 0; j < set.count(); ++j) {
+  Eigen::Index steepest = 0;
+  const double size = slope.norm(), most = slope.cwiseAbs().maxCoeff(&steepest);
+  for (int j = 0; j < set.count() && most > 0.0; ++j) {
     if (j == contact || set[j].lagged >= 0 || set[j].pair.rod_a != set[contact].pair.rod_a) continue;
+    int dofs[kContactUnknowns];
+    equations.contact()->unknowns(j, dofs);
+    if (std::find(dofs, dofs + 12, steepest) == dofs + 12) continue;
     free_slope(equations, j, other);
-    const double size = slope.norm(), c = size / std::max(other.norm(), 1e-300);
+    const double c = size / std::max(other.norm(), 1e-300);
     if ((slope + c * other).norm() <= kFree * size && excess(set[contact]) + c * excess(set[j]) > 0.0) return j;
   }
   return -1;
@@ -45,15 +49,15 @@ int opposite_contact(const Equations& equations, int contact, const VectorX& slo
 
 }  // namespace
 
-Squeezed squeezed_contact(const Equations& equations, VectorX& scratch) {
+Squeezed squeezed_contact(const Equations& equations, VectorX& slope, VectorX& other) {
   const Contact* contact = equations.contact();
   if (contact == nullptr) return {};
   for (int i = 0; i < contact->count(); ++i) {
     const Touching& t = contact->contacts()[i];
     if (t.lagged >= 0 || !(excess(t) > 0.0)) continue;
-    const double all = free_slope(equations, i, scratch);
-    if (scratch.norm() <= kFree * all) return {i};
-    if (const int other = opposite_contact(equations, i, scratch); other >= 0) return {i, other};
+    const double all = free_slope(equations, i, slope);
+    if (slope.norm() <= kFree * all) return {i};
+    if (const int against = opposite_contact(equations, i, slope, other); against >= 0) return {i, against};
   }
   return {};
 }

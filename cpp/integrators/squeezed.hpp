@@ -15,7 +15,7 @@ struct Squeezed {
 };
 
 /// The first contact that is deeper than a step may end with, and whose distance no free unknown can change; or only
-/// together with another, which becomes as much deeper as it is relieved. `scratch` has a number for each unknown.
-Squeezed squeezed_contact(const Equations& equations, VectorX& scratch);
+/// together with another, which becomes as much deeper as it is relieved. `slope` and `other` are scratch.
+Squeezed squeezed_contact(const Equations& equations, VectorX& slope, VectorX& other);
 
 }  // namespace withe

@@ -15,7 +15,7 @@ void World::Implementation::check_squeezed(Equations& system, const VectorX& q, 
   if (!system.contact()) return;
   system.begin(state, parameters, StepRule::statics, 0.0);
   system.contact()->update(q);
-  if (const Squeezed found = squeezed_contact(system, work.change)) fail_squeezed(system, found, dt);
+  if (const Squeezed found = squeezed_contact(system, work.change, work.mean)) fail_squeezed(system, found, dt);
 }
 
 void World::Implementation::fail_squeezed(const Equations& system, const Squeezed& squeezed, double dt) const {

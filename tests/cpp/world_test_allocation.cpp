@@ -1,5 +1,8 @@
 // Steps do not allocate once every vector has its size.
 
+#include <algorithm>
+#include <string>
+
 #include <gtest/gtest.h>
 
 #include "allocation_counter.hpp"
@@ -85,18 +88,33 @@ struct Rubbing {
   FrictionLaw law;
 };
 
-/// Allocations of the last `steps` steps of a scene, after `before`.
-std::size_t allocations(SceneBuilder builder, const Rubbing& rubbing, Integrator integrator, int before, int steps) {
+/// Allocations of some steps. `layouts`: steps in which the matrix gets room for edges that touch as they never have.
+struct Allocated {
+  std::size_t layouts = 0, others = 0;
+};
+
+Allocated allocated_by(World& world, int steps) {
+  constexpr std::size_t kLayout = 1000;  // for every column several
+  Allocated sum;
+  for (int k = 0; k < steps; ++k) {
+    const std::size_t before = allocation_count;
+    world.step(1);
+    const std::size_t own = allocation_count - before;
+    if (own > kLayout)
+      ++sum.layouts;
+    else
+      sum.others += own;
+  }
+  return sum;
+}
+
+World rubbing_world(SceneBuilder builder, const Rubbing& rubbing, Integrator integrator) {
   ContactDescription& contact = builder.scene.contact;
   contact.friction = rubbing.friction;
   contact.friction_law = rubbing.law;
   contact.obstacle_friction = VectorX::Constant(1, rubbing.friction);
   contact.obstacle_restitution = VectorX::Ones(1);
-  World world(builder.scene, testing::options(integrator, integrator == Integrator::verlet ? 2e-5 : 2e-3));
-  world.step(before);
-  const std::size_t count = allocation_count;
-  world.step(steps);
-  return allocation_count - count;
+  return World(builder.scene, testing::options(integrator, integrator == Integrator::verlet ? 2e-5 : 2e-3));
 }
 
 constexpr Rubbing kRubbing[] = {{0.0, FrictionLaw::implicit},
@@ -107,16 +125,25 @@ constexpr Rubbing kRubbing[] = {{0.0, FrictionLaw::implicit},
 constexpr Integrator kWithContact[] = {Integrator::backward_euler, Integrator::implicit_midpoint,
                                        Integrator::energy_momentum, Integrator::verlet};
 
+std::string name_of(Integrator integrator, const Rubbing& rubbing) {
+  return " integrator " + std::to_string(static_cast<int>(integrator)) + " friction " +
+         std::to_string(static_cast<int>(rubbing.law)) + " " + std::to_string(rubbing.friction);
+}
+
 TEST(Step, OnAFloorDoesNotAllocateAfterWarmUp) {
   for (Integrator integrator : kWithContact)
-    for (const Rubbing& rubbing : kRubbing)
-      EXPECT_EQ(allocations(lying(floor_at(0.0), false), rubbing, integrator, 150, 50), 0u)
-          << static_cast<int>(integrator) << " friction " << static_cast<int>(rubbing.law) << " " << rubbing.friction;
+    for (const Rubbing& rubbing : kRubbing) {
+      World world = rubbing_world(lying(floor_at(0.0), false), rubbing, integrator);
+      world.step(150);
+      const Allocated later = allocated_by(world, 50);
+      EXPECT_EQ(later.layouts + later.others, 0u) << name_of(integrator, rubbing);
+    }
 }
 
 /// Where contacts come and go, the vectors that hold them grow when there are more than ever before: each of them once,
-/// at most, as long as there are not twice as many.
-constexpr std::size_t kVectors = 16;
+/// at most, as long as there are not twice as many. And the more pairs of edges have touched, the fewer are left for
+/// which the matrix has no room yet; what goes with it is new then.
+constexpr std::size_t kVectors = 19;
 
 TEST(Step, WithContactsThatComeAndGoAllocatesForMoreThanEverOnly) {
   const SceneBuilder scenes[] = {
@@ -128,10 +155,13 @@ TEST(Step, WithContactsThatComeAndGoAllocatesForMoreThanEverOnly) {
   };
   for (const SceneBuilder& scene : scenes)
     for (Integrator integrator : kWithContact)
-      for (const Rubbing& rubbing : kRubbing)
-        EXPECT_LE(allocations(scene, rubbing, integrator, 200, 100), kVectors)
-            << "scene " << &scene - scenes << " integrator " << static_cast<int>(integrator) << " friction "
-            << static_cast<int>(rubbing.law) << " " << rubbing.friction;
+      for (const Rubbing& rubbing : kRubbing) {
+        World world = rubbing_world(scene, rubbing, integrator);
+        const Allocated first = allocated_by(world, 200), later = allocated_by(world, 100);
+        const std::string what = "scene " + std::to_string(&scene - scenes) + name_of(integrator, rubbing);
+        EXPECT_LE(later.others, kVectors * (1 + later.layouts)) << what;
+        EXPECT_LT(later.layouts, std::max<std::size_t>(first.layouts, 1)) << what;
+      }
 }
 
 /// Nor where surfaces are pushed deep into each other, so that steps are repeated with stiffer contact.
