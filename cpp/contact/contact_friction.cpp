@@ -50,6 +50,7 @@ FrictionSetting friction_setting(const ContactProblem& problem, const Touching& 
   if (pair.curve()) f.curve = &t.proximity.curve;
   f.pressing = t.law;
   f.before = t.before;
+  f.middle = pair.key.b >= 0 && problem.turns(pair);
   f.slides = problem.turns(pair) && t.law.elastic > 0.0;
   f.law = contact.friction_law;
   f.tangential_stiffness = tangential_stiffness(pair, t.stiffness);
