@@ -101,9 +101,10 @@ void World::Implementation::hold_hands(HeldTarget& target) const {
       if (std::find(s.nodes.begin(), s.nodes.end(), s.span[i]) != s.nodes.end())
         put_node(model, s.span[i], motions[h].position + motions[h].rotation * state.hands[h].points[i], target.q);
   }
-  for (std::size_t h = 0; h < model.supports.size(); ++h)
-    if (model.supports[h].active && model.supports[h].is_hand() && !hold_edges(static_cast<int>(h), target.q))
-      target.reachable = false;
+  for (std::size_t h = 0; h < model.supports.size(); ++h) {
+    const Support& s = model.supports[h];
+    if (s.active && s.is_hand() && !s.yields() && !hold_edges(static_cast<int>(h), target.q)) target.reachable = false;
+  }
 }
 
 /// Where a hand puts the edges that it holds, once all nodes have their places in `q`.
