@@ -24,6 +24,7 @@ class PlanarArm(withe.learning.Obstacles2D):
     """The planar arm in steps of .1 s, with nothing in its way."""
 
     control_step = 0.1
+    time_step = 0.05
     bend_step = 0.05
     places = ()
 
