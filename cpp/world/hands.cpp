@@ -35,6 +35,16 @@ void World::Implementation::aim_hands(Equations& system) const {
   system.hands()->aim(std::move(poses));
 }
 
+/// Whether one that yields does.
+bool World::Implementation::hands_move(const std::vector<SupportMotion>& from,
+                                       const std::vector<SupportMotion>& to) const {
+  for (std::size_t s = 0; s < to.size(); ++s)
+    if (model.supports[s].active && model.supports[s].yields() &&
+        (from[s].position != to[s].position || from[s].rotation != to[s].rotation))
+      return true;
+  return false;
+}
+
 void World::Implementation::release_hands(Equations& system) {
   if (system.hands()) system.hands()->aim({});
 }

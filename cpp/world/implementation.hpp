@@ -150,6 +150,7 @@ struct World::Implementation : Running {
 
   // hands.cpp
   bool has_hands() const;
+  bool hands_move(const std::vector<SupportMotion>& from, const std::vector<SupportMotion>& to) const;
   void aim_hands(Equations& system) const;
   static void release_hands(Equations& system);
   /// In an equilibrium that hands were aimed for.

@@ -295,6 +295,30 @@ def test_what_a_weak_hand_holds_may_turn_far_in_it():
     assert turned > 150.0
 
 
+@pytest.mark.parametrize("planar", [True, False], ids=["planar", "spatial"])
+def test_an_equilibrium_follows_a_hand_that_yields_as_it_turns(planar):
+    """All at once as in parts, on one branch: the rod takes M L / B of the turn, the hand the rest."""
+
+    def turned(parts, degrees=170.0):
+        scene = rods.weightless()
+        arm = rods.straight(scene, 40, normal=(0, 0, 1))
+        scene.clamp(arm.start)
+        hand = scene.grasp(arm, 0.99, stiffness=(8000.0, 10.0))
+        simulation = scene.build(integrator="static", planar=planar)
+        axes = simulation.pose(hand).rotation
+        for k in range(parts):
+            turn = rods.rotation((0.0, 1.0, 0.0), np.radians(degrees) * (k + 1) / parts)
+            simulation.move(hand, rotation=turn @ axes)
+            found = simulation.equilibrium()
+            assert found.stable and not found.branch_changed
+        return simulation.positions(arm), np.linalg.norm(simulation.deflection(hand).turn)
+
+    at_once, in_parts = turned(1), turned(34)
+    np.testing.assert_allclose(at_once[0], in_parts[0], atol=1e-8)
+    assert at_once[1] == pytest.approx(in_parts[1], abs=1e-7)
+    assert at_once[1] > 1.0
+
+
 def test_half_a_turn_in_a_hand_is_named():
     simulation, _ = drawn_motion(12, False)
     with pytest.raises(withe.ConvergenceError, match=r"stiffness about its axes: .* of rod 'rod 1' .* 180 degrees"):
