@@ -19,23 +19,30 @@ from withe.learning.arms import Follow, Obstacles2D, Obstacles3D, Reach
 from withe.learning.environments import environment_class
 from withe.learning.functions import equilibrium, rollout
 from withe.learning.limbs import Crawl, Wrap
+from withe.learning.network_training import Alternating, Cosine, train_network
+from withe.learning.networks import Network, Training
 from withe.learning.registration import register
 from withe.learning.task import Task
 from withe.learning.training import train_policy
 
 __all__ = [
+    "Alternating",
+    "Cosine",
     "Crawl",
     "Environment",
     "Follow",
+    "Network",
     "Obstacles2D",
     "Obstacles3D",
     "Reach",
     "Task",
+    "Training",
     "VectorEnvironment",
     "Wrap",
     "equilibrium",
     "register",
     "rollout",
+    "train_network",
     "train_policy",
 ]
 

@@ -1,0 +1,236 @@
+"""Small networks that stand in for what is slow to compute: numbers in, numbers out, from NumPy or from torch.
+
+>>> import withe
+>>> network = withe.learning.train_network(x, y, hidden=(64, 64, 64), seed=0)  # doctest: +SKIP
+>>> network.save("hanging.pt")  # doctest: +SKIP
+>>> withe.learning.Network.load("hanging.pt")(x[0])  # doctest: +SKIP
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from withe.common import validation
+from withe.common.extras import require
+from withe.io import written_beside
+
+__all__ = ["ACTIVATIONS", "Network", "Training"]
+
+FloatArray = npt.NDArray[np.floating[Any]]
+ACTIVATIONS = {"relu": "ReLU", "silu": "SiLU", "tanh": "Tanh"}
+_FORMAT, _VERSION = "withe network", 1
+_CHUNK = 2048  # rows whose activations stay in the processor's cache
+
+
+@dataclass(frozen=True)
+class Training:
+    """How a network was trained.
+
+    Attributes
+    ----------
+    seed : int
+    epochs : int
+        How many were run: passes over the data.
+    best : int
+        That after which it is kept, counted from 1: the one of least loss on the data held out; 0, untrained.
+    held_out_until : int
+        After that epoch what was held out was trained on too.
+    loss : float
+        On the data held out, after the best epoch.
+    seconds : float
+    stopped : str
+        Why: "epochs", "time", "loss" or "interrupted".
+    """
+
+    seed: int
+    epochs: int
+    best: int
+    held_out_until: int
+    loss: float
+    seconds: float
+    stopped: str
+
+
+class Network:
+    """A multilayer perceptron with its scales inside. `train_network` makes them, `load` reads one from a file.
+
+    Linear layers with an activation between each two, y = b + W f(... f(b0 + W0 (x - m) / s)), and outputs scaled back;
+    weights in single precision. It knows nothing of what lies outside its `domain`.
+
+    Attributes
+    ----------
+    inputs, outputs : tuple of str
+        Names of the columns.
+    hidden : tuple of int
+        Widths of the layers between.
+    activation : {"relu", "silu", "tanh"}
+    training : Training
+    """
+
+    def __init__(
+        self,
+        inputs: Sequence[str],
+        outputs: Sequence[str],
+        hidden: Sequence[int],
+        activation: str,
+        tensors: dict[str, Any],
+        training: Training,
+    ) -> None:
+        self.inputs, self.outputs, self.hidden = tuple(inputs), tuple(outputs), tuple(hidden)
+        self.activation = activation
+        self.training = training
+        self._tensors = tensors
+        self._ready: dict[tuple[Any, Any], Callable[[Any], Any]] = {}
+
+    @property
+    def domain(self) -> npt.NDArray[np.float64]:
+        """Least and greatest inputs of its data, of shape (2, inputs)."""
+        return np.array(self._tensors["domain"].double().numpy())
+
+    def __call__(self, x: Any) -> Any:
+        """Ask.
+
+        Parameters
+        ----------
+        x : array_like or Tensor of shape (..., inputs)
+            Computed in the precision that it comes in, single or double.
+
+        Returns
+        -------
+        ndarray or Tensor of shape (..., outputs)
+            What `x` is; a tensor has gradients.
+
+        Raises
+        ------
+        ValueError
+            Another shape, not numbers, or, of arrays, not finite.
+
+        Examples
+        --------
+        >>> network([[0.5, 2.25]])  # doctest: +SKIP
+        """
+        torch = require("torch", "learn")
+        if isinstance(x, torch.Tensor):
+            if x.ndim == 0 or x.shape[-1] != len(self.inputs):
+                raise ValueError(f"x must have shape (..., {len(self.inputs)}), got {tuple(x.shape)}")
+            if not x.is_floating_point():
+                raise ValueError(f"x must be a tensor of floating point numbers, got {x.dtype}")
+            return self._function(x.dtype, x.device)(x)
+        given = np.asarray(x)
+        single = given.dtype == np.float32
+        if given.ndim == 0 or given.shape[-1] != len(self.inputs):
+            raise ValueError(f"x must have shape (..., {len(self.inputs)}), got {given.shape}")
+        if not single:
+            given = validation.number_array(x, "x", given.shape)
+        elif not np.isfinite(given).all():
+            raise ValueError("x must be finite")
+        rows = torch.from_numpy(np.ascontiguousarray(given).reshape(-1, len(self.inputs)))
+        function = self._function(rows.dtype, rows.device)
+        with torch.inference_mode():
+            found = torch.cat([function(part) for part in rows.split(_CHUNK)]) if len(rows) else function(rows)
+        return found.numpy().reshape(*given.shape[:-1], len(self.outputs))
+
+    def _function(self, dtype: Any, device: Any) -> Callable[[Any], Any]:
+        """The network in a precision, on a device; made when it is first needed there."""
+        key = (dtype, device)
+        if key not in self._ready:
+            functional = require("torch", "learn").nn.functional
+            activate = getattr(functional, self.activation)
+            there = {name: tensor.to(device, dtype) for name, tensor in self._tensors.items()}
+            layers = [(there[f"{2 * i}.weight"], there[f"{2 * i}.bias"]) for i in range(len(self.hidden) + 1)]
+
+            def function(x: Any) -> Any:
+                x = (x - there["x_mean"]) / there["x_scale"]
+                for weight, bias in layers[:-1]:
+                    x = activate(functional.linear(x, weight, bias))
+                return there["y_mean"] + there["y_scale"] * functional.linear(x, *layers[-1])
+
+            self._ready[key] = function
+        return self._ready[key]
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**vars(self), "_ready": {}}
+
+    def __repr__(self) -> str:
+        widths = " x ".join(map(str, self.hidden))
+        named = f"{', '.join(self.inputs)} -> {', '.join(self.outputs)}"
+        return f"Network({named}, {widths} {self.activation}, held-out loss {self.training.loss:.2g})"
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write it to a file, as torch's own format with nothing in it but numbers, words and tensors.
+
+        Parameters
+        ----------
+        path : path-like
+
+        Returns
+        -------
+        Path
+        """
+        path = Path(path)
+        content = {
+            "format": _FORMAT,
+            "version": _VERSION,
+            "inputs": list(self.inputs),
+            "outputs": list(self.outputs),
+            "hidden": list(self.hidden),
+            "activation": self.activation,
+            "tensors": self._tensors,
+            "training": asdict(self.training),
+        }
+        with written_beside(path) as beside:
+            require("torch", "learn").save(content, beside)
+        return path
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Network:
+        """Read it from a file. Such a file can run no code.
+
+        Parameters
+        ----------
+        path : path-like
+
+        Returns
+        -------
+        Network
+
+        Raises
+        ------
+        ValueError
+            A file of something else, or of another version.
+        FileNotFoundError
+            No such file.
+        """
+        torch = require("torch", "learn")
+        try:
+            content = torch.load(path, map_location="cpu", weights_only=True)
+        except OSError:
+            raise
+        except Exception as error:  # of many kinds, by what the bytes happen to say
+            raise ValueError(f"{path} is no network of withe: torch cannot read it") from error
+        if not isinstance(content, dict) or content.get("format") != _FORMAT:
+            raise ValueError(f"{path} is no network of withe")
+        if content.get("version") != _VERSION:
+            raise ValueError(
+                f"{path} is a network of version {content.get('version')}, this withe reads version {_VERSION}: "
+                "train it again"
+            )
+        kept = {name: content[name] for name in ("inputs", "outputs", "hidden", "activation", "tensors")}
+        return cls(**kept, training=Training(**content["training"]))
+
+
+def make_layers(inputs: int, outputs: int, hidden: Sequence[int], activation: str) -> Any:
+    """Linear layers with an activation between each two, as a torch module that can be trained."""
+    nn = require("torch", "learn").nn
+    layers: list[Any] = []
+    for wide, next_wide in pairwise((inputs, *hidden)):
+        layers += [nn.Linear(wide, next_wide), getattr(nn, ACTIVATIONS[activation])()]
+    return nn.Sequential(*layers, nn.Linear(hidden[-1], outputs))
