@@ -299,7 +299,7 @@ def _needed(pattern: Pattern, cable: Cable, controller: Controller, grasps: Gras
     count = len(pattern.points)
     force = np.concatenate([grasps.force, np.repeat(grasps.force[-1:], count, axis=0)])[:count]
     found = examine(pattern, cable, _MOST_FRICTION, controller, force)
-    hopeless = [slip for slip in found.slips if slip.test != "free end"]
+    hopeless = [slip for slip in found.slips if slip.test in ("floor", "lift-off")]
     if hopeless and not helped:
         raise ValueError(f"no floor holds this cable on this pattern: {max(hopeless, key=lambda slip: slip.needed)}")
     return found.needed
