@@ -333,10 +333,12 @@ class Obstacles3D(_Obstructed):
             middles = generator.uniform(self.low, self.high, (64, 3))
             ways = generator.normal(size=(64, 3))
             ways *= 0.5 * self.length / np.linalg.norm(ways, axis=1, keepdims=True)
-            for start, end in zip(middles - ways, middles + ways, strict=True):
-                inside = (np.minimum(start, end) >= self.low) & (np.maximum(start, end) <= self.high)
+            starts, ends = middles - ways, middles + ways
+            inside = (np.minimum(starts, ends) >= self.low) & (np.maximum(starts, ends) <= self.high)
+            for place in np.flatnonzero(inside.all(axis=1)):
+                start, end = starts[place], ends[place]
                 clear = all(_segment_distance(start, end, *other) >= self.apart for other in found)
-                if inside.all() and clear and len(found) < self.count:
+                if clear and len(found) < self.count:
                     found.append((start, end))
         return found
 
