@@ -10,10 +10,22 @@ import numpy as np
 import withe
 from withe.learning.arms import Arm
 
-__all__ = ["ACTIONS", "FreeArm", "PlanarArm", "actions_of", "control_steps", "penetration", "tip_error", "tips"]
+__all__ = [
+    "ACTIONS",
+    "FreeArm",
+    "PlanarArm",
+    "actions_of",
+    "control_steps",
+    "converged_tips",
+    "penetration",
+    "settled_tip",
+    "tip_error",
+    "tips",
+]
 
 ACTIONS = 60
 FINE = 32  # shorter steps of the converged run
+WARM = 10  # control steps before the clock runs
 
 
 class FreeArm(withe.learning.Follow):
@@ -24,6 +36,7 @@ class PlanarArm(withe.learning.Obstacles2D):
     """The planar arm in steps of .1 s, with nothing in its way."""
 
     control_step = 0.1
+    time_step = 0.05
     bend_step = 0.05
     places = ()
 
@@ -65,9 +78,23 @@ def tips(task: Arm, seed: int, count: int = ACTIONS) -> np.ndarray:
     return np.array(found)
 
 
+def converged_tips(kind: type[Arm], seed: int, count: int = ACTIONS) -> np.ndarray:
+    """Tip after each action in short steps, shape (count, 3) [m]."""
+    return tips(_converged(kind()), seed, count)
+
+
+def settled_tip(turns: np.ndarray, gravity: float) -> np.ndarray:
+    """Tip of the free arm at rest, bent by these turns of its nodes, shape (2, 19) [m]."""
+    arm = FreeArm().build(np.random.default_rng(0))
+    arm.set(gravity=(0.0, 0.0, -gravity))
+    arm.set_natural_curvature("arm", 20.0 * turns.T)
+    arm.equilibrium()
+    return arm.positions("arm")[-1]
+
+
 def tip_error(kind: type[Arm], seed: int, count: int = ACTIONS) -> float:
     """RMS distance of the tip from that of a converged run [m]."""
-    apart = tips(kind(), seed, count) - tips(_converged(kind()), seed, count)
+    apart = tips(kind(), seed, count) - converged_tips(kind, seed, count)
     return float(np.sqrt(np.mean(np.sum(apart**2, axis=1))))
 
 
@@ -85,14 +112,14 @@ def penetration(kind: type[Arm], seed: int, radius: float, count: int = 50) -> f
 
 
 def control_steps(kind: type[Arm], count: int, workers: int, steps: int) -> float:
-    """Control steps a second of `count` environments, Python included; after a few that warm up."""
+    """Control steps a second of `count` environments, Python included; after some that bring arms into motion."""
     envs = withe.learning.VectorEnvironment(kind(), count, workers)
     envs.reset(seed=1)
     generator = np.random.default_rng(0)
-    every = generator.uniform(-1.0, 1.0, (steps + 3, count, envs.task.action_size))
-    for actions in every[:3]:
+    every = generator.uniform(-1.0, 1.0, (steps + WARM, count, envs.task.action_size))
+    for actions in every[:WARM]:
         envs.step(actions)
     start = time.perf_counter()
-    for actions in every[3:]:
+    for actions in every[WARM:]:
         envs.step(actions)
     return count * steps / (time.perf_counter() - start)

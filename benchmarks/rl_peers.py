@@ -12,7 +12,16 @@ from multiprocessing import get_context
 
 import numpy as np
 
-__all__ = ["ElasticaArm", "bends_of", "converged_error", "many_steps_a_second", "steps_a_second", "tips_of"]
+__all__ = [
+    "ElasticaArm",
+    "bends_of",
+    "chain_tip",
+    "converged_error",
+    "many_steps_a_second",
+    "settled_tip",
+    "steps_a_second",
+    "tips_of",
+]
 
 EDGES, LENGTH, RADIUS, MODULUS, DENSITY, DRAG = 20, 1.0, 0.05, 1e7, 1000.0, 10.0
 CONTROL_STEP = 0.1  # [s]
@@ -35,9 +44,13 @@ class ElasticaArm:
     Parameters
     ----------
     time_step : float [s]
+    drag : float [Pa s]
+    shear : float
+        How much stiffer in shear than it is.
+    gravity : float [m/s^2]
     """
 
-    def __init__(self, time_step: float) -> None:
+    def __init__(self, time_step: float, drag: float = DRAG, shear: float = 1.0, gravity: float = 9.81) -> None:
         import elastica
         from elastica.timestepper.symplectic_steppers import PositionVerlet
 
@@ -57,14 +70,16 @@ class ElasticaArm:
             youngs_modulus=MODULUS,
             shear_modulus=MODULUS / 3.0,
         )
+        self.rod.shear_matrix[:2] *= shear
         self._system.append(self.rod)
         self._system.constrain(self.rod).using(
             elastica.OneEndFixedBC, constrained_position_idx=(0,), constrained_director_idx=(0,)
         )
-        self._system.add_forcing_to(self.rod).using(elastica.GravityForces, acc_gravity=np.array([0.0, 0.0, -9.81]))
+        self._system.add_forcing_to(self.rod).using(elastica.GravityForces, acc_gravity=np.array([0.0, 0.0, -gravity]))
         self._system.dampen(self.rod).using(
             elastica.AnalyticalLinearDamper,
-            translational_damping_constant=DRAG / (DENSITY * _AREA),
+            # Of nodes [kg/s], not of a mass or a length: a node goes by exp(-constant / mass t).
+            translational_damping_constant=drag * self.rod.mass / (DENSITY * _AREA),
             rotational_damping_constant=0.0,
             time_step=float(self._time_step),
         )
@@ -97,6 +112,26 @@ def tips_of(arm: ElasticaArm, actions: np.ndarray) -> np.ndarray:
         arm.act(turns)
         found.append(arm.tip)
     return np.array(found)
+
+
+def settled_tip(turns: np.ndarray, gravity: float, shear: float = 1.0, time_step: float = 1e-4) -> np.ndarray:
+    """Tip at rest, bent by these turns [m]: after 6 s in much drag."""
+    arm = ElasticaArm(time_step, 20.0 * DENSITY * _AREA, shear, gravity)
+    for _ in range(60):
+        arm.act(turns)
+    return arm.tip
+
+
+def chain_tip(turns: np.ndarray) -> np.ndarray:
+    """Tip of a chain of straight edges that turns so at its nodes [m]: the arm without weight."""
+    from scipy.spatial.transform import Rotation
+
+    edge, frame = LENGTH / EDGES, Rotation.identity()
+    tip = np.array([0.0, 0.0, edge])
+    for towards_d1, towards_d2 in turns.T:
+        frame = frame * Rotation.from_rotvec([-towards_d2, towards_d1, 0.0])
+        tip = tip + frame.apply([0.0, 0.0, edge])
+    return np.asarray(tip)
 
 
 def converged_error(time_step: float, fine: float, actions: np.ndarray) -> float:

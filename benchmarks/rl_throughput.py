@@ -64,6 +64,11 @@ def throughput(report: Report, quick: bool, shown: object) -> dict[tuple[str, in
     )
     report.figures["control steps a second"] = {f"{name}, {n}": t.as_json() for (name, n), t in timings.items()}
     most = max(count for _, count in timings)
+    if not quick:
+        pairs = [[rl_arms.control_steps(rl_arms.FreeArm, most, n, 4) for n in (1, WORKERS)] for _ in range(3)]
+        gain = float(np.median([many / one for one, many in pairs]))
+        report.figures[f"free arm, {most}: control steps a second, one thread and {WORKERS}"] = pairs
+        report.goal(f"free: {WORKERS} threads over one, {most} environments", gain, 0.9 * WORKERS)
     for name, (_, goal) in KINDS.items():
         report.goal(f"{name}: control steps a second, {most} environments", timings[name, most].median, goal)
     return timings
@@ -118,6 +123,35 @@ def peers(report: Report, quick: bool, ours: dict[tuple[str, int], Timing]) -> N
     )
 
 
+def agreement(report: Report, quick: bool) -> None:
+    """The free arm in PyElastica and in withe: how far tips are apart, at rest and in motion."""
+    if not HAVE_ELASTICA or quick:
+        report.goal("tips of PyElastica and withe apart in motion [mm]", None, 10, at_least=False)
+        return
+    import rl_peers
+
+    turns = rl_peers.bends_of(np.repeat(rl_arms.actions_of(0, 10, 1), 8, axis=0))[-1]
+    chain = rl_peers.chain_tip(turns)
+    rows = []
+    for words, gravity, shear in (("no weight", 0.0, 1.0), ("weight", 9.81, 1.0), ("weight", 9.81, 10.0)):
+        theirs = rl_peers.settled_tip(turns, gravity, shear, 1e-4 if shear == 1.0 else 5e-5)
+        ours = rl_arms.settled_tip(turns, gravity)
+        closed = "" if gravity else f"{1e3 * max(np.linalg.norm(tip - chain) for tip in (theirs, ours)):.1g}"
+        rows.append((f"at rest, {words}", f"{shear:g}", f"{1e3 * np.linalg.norm(theirs - ours):.2g}", closed))
+    actions, ours = rl_arms.actions_of(0, 10), rl_arms.converged_tips(rl_arms.FreeArm, 0)
+    for shear in (1.0, 10.0):
+        theirs = rl_peers.tips_of(rl_peers.ElasticaArm(1e-4 if shear == 1.0 else 5e-5, shear=shear), actions)
+        apart = float(np.sqrt(np.mean(np.sum((theirs - ours) ** 2, axis=1))))
+        rows.append((f"{len(actions)} actions", f"{shear:g}", f"{1e3 * apart:.2g}", ""))
+        if shear == 1.0:
+            report.goal("tips of PyElastica and withe apart in motion [mm]", 1e3 * apart, 10, at_least=False)
+    report.table(
+        "Tips of PyElastica and withe, both in short steps",
+        ("arm", "its stiffness in shear", "apart [mm]", "from a chain's closed form [mm]"),
+        rows,
+    )
+
+
 def draw(timings: dict[tuple[str, int], Timing]) -> None:
     """Control steps a second over the number of environments, out/benchmarks/rl_throughput.png."""
     import matplotlib
@@ -151,6 +185,7 @@ def main() -> None:
         timings = throughput(report, quick, shown)
         share_of_solving(report, quick)
         shown.advance(1)
+        agreement(report, quick)
         peers(report, quick, timings)
         shown.advance(1)
     draw(timings)

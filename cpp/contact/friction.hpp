@@ -6,7 +6,9 @@
 ///   S = sum_i w_i (x_i - x_i^0) + phi_a x r_a - phi_b x r_b,   phi = t x (e - e^0) / |e| + t (theta - theta^0),
 /// with r from the centreline to the surface. Where an obstacle touches a smooth curve (curve.hpp), w_i are its
 /// weights, and phi is that of both edges in the shares 1/2 - s and 1/2 + s. The force F on S goes back through the
-/// same J, so its work, F . S, is never negative, whatever the integrator.
+/// same J, so its work, F . S, is never negative, whatever the integrator. Under the midpoint rules t, |e| and the way
+/// between two rods, which r_b - r_a is, are those in the middle of the step: a rotation of both rods there is no slip,
+/// and so friction leaves their angular momentum as it is.
 ///   implicit, lagged: F = mu N tanh(K |S| / (2 dt)) S / |S|, K = 15 / nu [Choi, dissertation, (5.7)-(5.14),
 ///                     there between centrelines]
 ///   anchored:         F = k_t (stick + S), of length mu N at most: an elastic stick that slips [Simo and Hughes 1998]
@@ -34,6 +36,7 @@ struct FrictionSetting {
   PressingLaw pressing;
   double before = 0;    ///< distance at the start, as far as it is always the same [m]
   bool slides = false;  ///< or that of the points that are closest at the end
+  bool middle = false;  ///< edges turn, on their arms, as they stand in the middle of the step
   FrictionLaw law = FrictionLaw::implicit;
   double tangential_stiffness = 0;  ///< of an anchor [N/m]
   double rate = 0;                  ///< K / (2 dt) [1/m]
@@ -73,11 +76,11 @@ inline double arm_length(const ContactPair& pair, int side) {
   return (side == 0 ? pair.radius_a : pair.radius_b) / pair.radii();
 }
 
-/// That arm.
+/// That arm, by the lever that its length is over.
 template <class Scalar>
-Vec3<Scalar> contact_arm(const ContactPair& pair, int side, const Vec3<Scalar>& normal, const Vec3<Scalar>& between) {
+Vec3<Scalar> contact_arm(const ContactPair& pair, int side, const Vec3<Scalar>& lever) {
   const double length = arm_length(pair, side);
-  return Scalar(side == 0 ? -length : length) * (pair.rod_b < 0 ? normal : between);
+  return Scalar(side == 0 ? -length : length) * lever;
 }
 
 /// The same of an edge beside a piece of a curve, whose surface turns by its share in the rotations of both.
@@ -173,10 +176,10 @@ template <class Scalar>
 struct SlippingEdge {
   int tail = 0;               ///< its node among those of the contact; its head is the next
   Vec3<Scalar> edge, change;  ///< now, and since the start of the step [m]
-  Vec3<Scalar> tangent, arm;
-  Vec3<Scalar> turn;    ///< phi
-  Vec3<Scalar> spin{};  ///< of the frame, by the edge [1/m]
-  Scalar inverse;       ///< of the length [1/m]
+  Vec3<Scalar> tangent, arm;  ///< where the edge turns
+  Vec3<Scalar> turn;          ///< phi
+  Vec3<Scalar> spin{};        ///< of the frame, by the edge [1/m]
+  Scalar inverse;             ///< of the length there [1/m]
 };
 
 /// Two surfaces that press against each other, at given unknowns.
@@ -187,6 +190,7 @@ struct SlippingSurfaces {
   int bodies = 0;                  ///< with an arm
   Scalar s, t, distance;           ///< a curve's t is nothing
   Vec3<Scalar> normal, between{};  ///< of the centrelines; nothing beside a plane
+  Vec3<Scalar> lever;              ///< between them where edges turn; the normal of an obstacle
   Scalar inverse = 0.0;            ///< of the length of `between` [1/m]; 0: nothing
   Scalar pressing;                 ///< N
   PressingForce law;               ///< of minus N
@@ -300,11 +304,13 @@ SlippingSurfaces<Scalar> slipping_surfaces(const FrictionSetting& f, const SlipS
   c.way = -lift(f.drift);
   for (int i = 0; i < 4; ++i) c.way += c.w[i] * (x[i] - start.point(i));
   c.bodies = f.centreline ? 0 : curve ? f.pair->piece.weights->edges : f.pair->rod_b < 0 ? 1 : 2;
+  c.lever = f.pair->rod_b < 0 ? c.normal : f.middle ? c.between - 0.5 * c.way : c.between;
   for (int b = 0; b < c.bodies; ++b) {
     SlippingEdge<Scalar>& side = c.sides[b];
-    side.inverse = 1.0 / sqrt(dot(side.edge, side.edge));
-    side.tangent = side.inverse * side.edge;
-    side.arm = curve ? piece_arm(*f.pair, b, c.s, c.normal) : contact_arm(*f.pair, b, c.normal, c.between);
+    const Vec3<Scalar> edge = f.middle ? side.edge - 0.5 * side.change : side.edge;
+    side.inverse = 1.0 / sqrt(dot(edge, edge));
+    side.tangent = side.inverse * edge;
+    side.arm = curve ? piece_arm(*f.pair, b, c.s, c.normal) : contact_arm(*f.pair, b, c.lever);
     side.turn = side.inverse * cross(side.tangent, side.change);
     if (f.spatial) {
       side.turn += (unknown[12 + b] - start.unknown[12 + b]) * side.tangent;

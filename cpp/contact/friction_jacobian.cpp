@@ -60,20 +60,27 @@ void add_contact_slopes(const FrictionSetting& f, const SlippingSurfaces<double>
   if (f.slides) add_start_slopes(f, c, d);
 }
 
+/// Of an edge that turns, in its end's.
+double edge_share(const FrictionSetting& f) { return f.middle ? 0.5 : 1.0; }
+
 /// By how much edges turn and spin, and on what lever.
 void add_turn_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& c, Slopes& d) {
   for (int j = 0; j < kWays; ++j) {
     const Vec3d& moved = d.between[j];
     d.lever[j] = f.pair->rod_b < 0 ? c.inverse * (moved - dot(c.normal, moved) * c.normal) : moved;
+    if (!f.middle) continue;
+    const Vec3d way = d.s[j] * c.sides[0].change - d.t[j] * c.sides[1].change;
+    d.lever[j] -= 0.5 * (j < 3 ? kAxis[j] + way : way);
   }
+  const double share = edge_share(f);
   for (int b = 0; b < c.bodies; ++b) {
     const SlippingEdge<double>& side = c.sides[b];
     const double rho = arm_length(*f.pair, b), inverse = side.inverse, angle = dot(side.turn, side.tangent);
     const Vec3d start = side.edge - side.change, bend = side.turn - angle * side.tangent;
     for (int k = 0; k < 3; ++k) {
       const double along = side.tangent[k];
-      d.turn[kEdge[b] + k] = (rho * inverse) * (inverse * cross(start, kAxis[k]) - (2.0 * along) * bend +
-                                                angle * (kAxis[k] - along * side.tangent));
+      d.turn[kEdge[b] + k] = (rho * inverse) * (inverse * cross(start, kAxis[k]) - (2.0 * share * along) * bend +
+                                                (share * angle) * (kAxis[k] - along * side.tangent));
     }
     if (f.spatial) d.turn[kAngle[b]] = rho * side.tangent;
   }
@@ -109,8 +116,8 @@ void direct_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& c, 
 }
 
 /// The slip, with the part along the normal that it loses as that turns, and the force on it.
-void add_force_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& c, const Vec3d& lever, Slopes& d) {
-  const Vec3d &n = c.normal, turn = turn_of(f, c);
+void add_force_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& c, Slopes& d) {
+  const Vec3d &n = c.normal, &lever = c.lever, turn = turn_of(f, c);
   const Vec3d way = whole_way(f, c);
   const double off = dot(way, n);
   const Vec3d slip = way - off * n;
@@ -140,16 +147,16 @@ void add_couple_slopes(const FrictionSetting& f, const SlippingEdge<double>& sid
   // With p the tangent that frames are transported from, spin = -p x t / (|e| (1 + p . t)), and
   // dspin = -(p x de / |e| + spin ((2 + p . t) t + p) . de) / (|e| (1 + p . t)).
   const Vec3d& source = f.source[b];
-  const double facing = dot(source, t), share = inverse / (1.0 + facing);
+  const double facing = dot(source, t), share = inverse / (1.0 + facing), moved = edge_share(f);
   const Vec3d bend = inverse * cross(m, t), mean = (2.0 + facing) * t + source;
   for (int k = 0; k < 3; ++k) {
-    const double lean = inverse * (m[k] - along * t[k]);
+    const double by = moved * rho, lean = inverse * (m[k] - along * t[k]);
     Vec3d& own = couple[kEdge[b] + k];
-    own += (rho * inverse) * (inverse * cross(m, kAxis[k]) - (2.0 * t[k]) * bend);
+    own += (by * inverse) * (inverse * cross(m, kAxis[k]) - (2.0 * t[k]) * bend);
     if (!f.spatial) continue;
-    axial[kEdge[b] + k] += rho * lean;
-    own += (rho * (lean - along * share * mean[k])) * side.spin -
-           (rho * along * share * inverse) * cross(source, kAxis[k]);
+    axial[kEdge[b] + k] += by * lean;
+    own +=
+        (by * (lean - along * share * mean[k])) * side.spin - (by * along * share * inverse) * cross(source, kAxis[k]);
   }
 }
 
@@ -198,11 +205,11 @@ void add_friction_jacobian(const FrictionSetting& f, const SlippingSurfaces<doub
     return;
   }
   const bool obstacle = f.pair->rod_b < 0;
-  const Vec3d &force = c.friction.force, &lever = obstacle ? c.normal : c.between;
+  const Vec3d &force = c.friction.force, &lever = c.lever;
   Slopes d;
   add_contact_slopes(f, c, d);
   add_turn_slopes(f, c, d);
-  add_force_slopes(f, c, lever, d);
+  add_force_slopes(f, c, d);
   if (!f.pair->isotropic()) direct_slopes(f, c, d);
   for (int j = 0; j < kWays; ++j) d.moment[j] = cross(d.force[j], lever) + cross(force, d.lever[j]);
   for (int b = 0; b < (obstacle ? 1 : 2); ++b) add_rows(f, c, b, cross(force, lever), d, jacobian);

@@ -139,25 +139,55 @@ void planar_bend_local(const Model& model, const TurnCoefficients& elastic, cons
   put_planar_bend(f, with_matrix, out);
 }
 
-void planar_half_local(const Model& model, const TurnCoefficients& elastic, const DiscreteStep& step, int stencil,
-                       bool with_matrix, Local& out) {
-  const FrameStencil& s = model.half[at(stencil)];
-  const int a = s.frame_first ? 0 : 1, b = 1 - a;  // slots of the frame and of the edge
-  const auto direction = [&](const EdgeFrame<double>& f) { return planar_edge(f).tangent; };
-  const PlanarMovingEdge<double> edge = planar_moving_edge(step, s.edge, 1.0);
+PlanarHalfForces planar_attached_forces(const TurnCoefficients& elastic, const DiscreteStep& step, int index,
+                                        const AttachedStep& attached) {
+  const int a = attached.first ? 0 : 1, b = 1 - a;  // slots of what is attached and of the edge
+  const PlanarMovingEdge<double> edge = planar_moving_edge(step, index, 1.0);
   Vec2<double> t0[2], t1[2];
-  t0[a] = direction(step.start.attached[at(stencil)]), t1[a] = direction(step.end.attached[at(stencil)]);
+  t0[a] = planar_edge(attached.start).tangent, t1[a] = planar_edge(attached.end).tangent;
   t0[b] = edge.t0, t1[b] = edge.t1;
-  const PlanarMoment<double> m =
-      planar_moment(elastic.measure, t0[0], t1[0], t0[1], t1[1], step.start.half_strain(stencil, 0),
-                    step.end.half_strain(stencil, 0), elastic.natural.x, elastic.stiffness.x);
-  const double sign = s.frame_first ? -1.0 : 1.0;  // of the moment on the edge
+  const PlanarMoment<double> m = planar_moment(elastic.measure, t0[0], t1[0], t0[1], t1[1], attached.start_strain.x,
+                                               attached.end_strain.x, elastic.natural.x, elastic.stiffness.x);
+  const double sign = attached.first ? -1.0 : 1.0;  // of the moment on the edge
   const double by_turn[2] = {2.0 * sign * m.by_a, 2.0 * sign * m.by_b};
   const Vec2<double> column = edge.column(by_turn[b]);
   PlanarHalfForces f{sign * m.moment * edge.force, -sign * m.moment, {}, by_turn[a] * edge.force, -column, -by_turn[a]};
   add_outer(f.edge_edge, 1.0, edge.force, column);
   edge.add_geometry(2.0, sign * m.moment, f.edge_edge);
-  put_planar_half(f, with_matrix, out);
+  return f;
+}
+
+/// Moments between an edge and what is attached to it, once the rows of the edge are put.
+struct AttachedMoments {
+  MovingEdge<double> edge;
+  Vec3d spin;
+  double sign;                  ///< of the moment on the edge
+  DiscreteMoment<double> m;     ///< of the first on the second, and its derivatives
+  EdgeColumns<double> by_edge;  ///< where asked for
+};
+
+AttachedMoments put_attached_edge(const TurnCoefficients& elastic, const DiscreteStep& step, int index,
+                                  const AttachedStep& attached, bool with_matrix, Local& out) {
+  const EdgeFrame<double>&e0 = step.start.edge[at(index)], &e1 = step.end.edge[at(index)];
+  const bool first = attached.first;
+  AttachedMoments a{moving_edge(step, index), spin_of(step, index), first ? -1.0 : 1.0, {}, {}};
+  a.m = moment_between(elastic.measure, first ? attached.start : e0, first ? attached.end : e1,
+                       first ? e0 : attached.start, first ? e1 : attached.end, attached.start_strain,
+                       attached.end_strain, elastic.natural, elastic.stiffness, with_matrix);
+  const EdgePlace place{0, 4, 3};
+  const Vec3d moment = a.sign * a.m.moment;
+  add_edge_forces(out, place, a.edge, a.spin, moment);
+  if (!with_matrix) return a;
+  a.by_edge = edge_columns(first ? a.m.by_b : a.m.by_a, e1);
+  EdgeBlock<double> block = edge_block(a.edge, a.sign, a.by_edge);
+  finish_block(a.edge, step, index, moment, true, block);
+  add_edge_rows(out, place, place, block);
+  return a;
+}
+
+AttachedStep attached_frame(const Model& model, const DiscreteStep& step, int stencil) {
+  return {step.start.attached[at(stencil)], step.end.attached[at(stencil)], row_of(step.start.half_strain, stencil),
+          row_of(step.end.half_strain, stencil), model.half[at(stencil)].frame_first};
 }
 
 /// How the moment `m` between an edge and a frame changes with the unknowns of a half stencil at the end: the frame
@@ -216,23 +246,12 @@ void discrete_bend_local(const Model& model, const TurnCoefficients& elastic, co
 /// The work of the frame's moment is that over its Cayley vector.
 void discrete_half_local(const Model& model, const TurnCoefficients& elastic, const DiscreteStep& step, int stencil,
                          bool with_matrix, Local& out) {
-  if (model.planar()) return planar_half_local(model, elastic, step, stencil, with_matrix, out);
   const FrameStencil& s = model.half[at(stencil)];
+  const AttachedStep attached = attached_frame(model, step, stencil);
+  if (model.planar()) return put_planar_half(planar_attached_forces(elastic, step, s.edge, attached), with_matrix, out);
   clear(out, 11, with_matrix);
-  const MovingEdge<double> edge = moving_edge(step, s.edge);
-  const EdgeFrame<double>&e0 = step.start.edge[at(s.edge)], &e1 = step.end.edge[at(s.edge)];
-  const EdgeFrame<double>&f0 = step.start.attached[at(stencil)], &f1 = step.end.attached[at(stencil)];
-  const bool first = s.frame_first;
-  const DiscreteMoment<double> m =
-      moment_between(elastic.measure, first ? f0 : e0, first ? f1 : e1, first ? e0 : f0, first ? e1 : f1,
-                     row_of(step.start.half_strain, stencil), row_of(step.end.half_strain, stencil), elastic.natural,
-                     elastic.stiffness, with_matrix);
-  const double sign = first ? -1.0 : 1.0;  // of the moment on the edge
-  const EdgePlace place{0, 4, 3};
-  const Vec3d moment = sign * m.moment;
-  const Vec3d spin = spin_of(step, s.edge);
-  add_edge_forces(out, place, edge, spin, moment);
-  const Vector3 w = step.end_q.segment<3>(model.frame_dof[at(s.frame)]), on_frame = -sign * to_eigen(m.moment);
+  const AttachedMoments a = put_attached_edge(elastic, step, s.edge, attached, with_matrix, out);
+  const Vector3 w = step.end_q.segment<3>(model.frame_dof[at(s.frame)]), on_frame = -a.sign * to_eigen(a.m.moment);
   Vector3 axis = Vector3::Zero();
   HingeArm h{Vector3::Zero(), Matrix3::Zero(), Vector3::Zero()};
   if (s.hinge >= 0) {
@@ -244,22 +263,18 @@ void discrete_half_local(const Model& model, const TurnCoefficients& elastic, co
   out.gradient[10] = h.arm.dot(on_frame);
   if (!with_matrix) return;
 
-  const EdgeColumns<double> columns = edge_columns(first ? m.by_b : m.by_a, e1);
-  EdgeBlock<double> block = edge_block(edge, sign, columns);
-  finish_block(edge, step, s.edge, moment, true, block);
-  add_edge_rows(out, place, place, block);
-  const Eigen::Matrix<double, 3, 11> by = moment_columns(columns, first ? m.by_a : m.by_b, w, axis);
+  const Eigen::Matrix<double, 3, 11> by = moment_columns(a.by_edge, attached.first ? a.m.by_a : a.m.by_b, w, axis);
   // Rows of the edge by the frame and its hinge.
   for (int k = 7; k < 11; ++k) {
-    const Vec3d change = to_vec3(Vector3(2.0 * sign * by.col(k)));
-    const Vec3d f = edge_force(edge, spin, change);
+    const Vec3d change = to_vec3(Vector3(2.0 * a.sign * by.col(k)));
+    const Vec3d f = edge_force(a.edge, a.spin, change);
     for (int i = 0; i < 3; ++i) {
       out.hessian[4 + i][k] += f[i];
       out.hessian[i][k] -= f[i];
     }
-    out.hessian[3][k] += edge.torque(change);
+    out.hessian[3][k] += a.edge.torque(change);
   }
-  const Eigen::Matrix<double, 3, 11> frame_rows = (-2.0 * sign) * by;
+  const Eigen::Matrix<double, 3, 11> frame_rows = (-2.0 * a.sign) * by;
   Eigen::Matrix<double, 1, 11> hinge_row = h.arm.transpose() * frame_rows;
   hinge_row.segment<3>(7) += 2.0 * on_frame.transpose() * h.by_frame;
   hinge_row(10) += 2.0 * on_frame.dot(h.by_angle);
@@ -267,6 +282,18 @@ void discrete_half_local(const Model& model, const TurnCoefficients& elastic, co
     for (int i = 0; i < 3; ++i) out.hessian[7 + i][k] = frame_rows(i, k);
     out.hessian[10][k] = hinge_row(k);
   }
+}
+
+Vector3 discrete_held_local(const Model& model, const TurnCoefficients& elastic, const DiscreteStep& step, int edge,
+                            const AttachedStep& hold, bool with_matrix, Local& out) {
+  if (model.planar()) {
+    const PlanarHalfForces f = planar_attached_forces(elastic, step, edge, hold);
+    put_planar_half(f, with_matrix, out);
+    return f.moment * model.plane->normal;
+  }
+  clear(out, 7, with_matrix);
+  const AttachedMoments a = put_attached_edge(elastic, step, edge, hold, with_matrix, out);
+  return -a.sign * to_eigen(a.m.moment);
 }
 
 void discrete_stretch_local(const Model& model, const ElasticCoefficients& elastic, const DiscreteStep& step, int edge,

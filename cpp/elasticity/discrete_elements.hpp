@@ -40,4 +40,16 @@ void discrete_bend_local(const Model& model, const TurnCoefficients& elastic, co
 void discrete_half_local(const Model& model, const TurnCoefficients& elastic, const DiscreteStep& step, int stencil,
                          bool with_matrix, Local& out);
 
+/// What an edge is attached to, at both ends of a step, and the strains between both.
+struct AttachedStep {
+  EdgeFrame<double> start, end;
+  Vec3d start_strain, end_strain;
+  bool first;  ///< whether the stencil goes from there to the edge
+};
+
+/// Of a half stencil whose frame is given, in the unknowns of its edge alone: tail, angle and head, or in a plane tail
+/// and head. Returns the moment on the frame, whose work is that over the Cayley vector of its turn.
+Vector3 discrete_held_local(const Model& model, const TurnCoefficients& elastic, const DiscreteStep& step, int edge,
+                            const AttachedStep& hold, bool with_matrix, Local& out);
+
 }  // namespace withe

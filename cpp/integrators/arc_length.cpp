@@ -123,7 +123,7 @@ class ArcLength {
       if (!work_.data.residual.allFinite()) break;
       const Balance balance = newton_.balance(work_.data, newton);
       if ((balance.floor && k > 0) || (balance.either && last <= tolerance)) {
-        accept(z);
+        path_.accept(z);
         factor_ = factor;
         find_direction(&start_.tangent, true, start_.rate);
         if (here_.found) return std::max(k, 1);
@@ -166,15 +166,6 @@ class ArcLength {
     equations_.assembler().solver().solve({vector.data(), static_cast<std::size_t>(vector.size())});
   }
 
-  void accept(const VectorX& q) {
-    if (Contact* contact = equations_.contact()) {
-      contact->update(q);
-      contact->accept(state_, Keep::force, INFINITY);
-    }
-    compute_configuration(equations_.model(), state_, q, scratch_);
-    accept_configuration(equations_.model(), q, scratch_, state_);
-  }
-
   /// Goes to where a value that has changed its sign between `start_` and the present point, an arc away, is zero: by
   /// the secant, with the Illinois rule [Dowell and Jarratt 1971].
   template <class Value>
@@ -212,7 +203,7 @@ class ArcLength {
         newton_.solve(equations_, z, {.target = &path_.target(), .max_iterations = kMostIterations}, work_);
     result_.newton.iterations += r.iterations;
     if (!r.converged) return;
-    accept(z);
+    path_.accept(z);
     factor_ = arc_.end;
     find_direction(&start_.tangent, true, start_.rate);
   }
@@ -238,7 +229,6 @@ class ArcLength {
   Homotopy::Tangent here_;
   ArcPoint point_;
   ArcResult result_;
-  Configuration scratch_;
 };
 
 }  // namespace

@@ -10,6 +10,8 @@ namespace {
 // Edges turn by so much in the difference that stands for a derivative [rad]: what it leaves out and what rounding adds
 // are then both below a millionth.
 constexpr double kLittleTurn = 1e-6;
+// A factor of that kind for hands that yield.
+constexpr double kLittleFactor = 1e-6;
 
 bool turns(const LoadPiece& piece) { return piece.shape != LoadShape::dead_node && piece.load >= 0; }
 
@@ -43,10 +45,15 @@ void Homotopy::start_out_of_balance() {
   go_to(0.0);
 }
 
+void Homotopy::apply(double factor) {
+  loads_(factor, parameters_.loads);
+  if (boundary_.aim) boundary_.aim(factor);
+  equations_.begin(state_, parameters_, StepRule::statics, 0.0);
+}
+
 void Homotopy::go_to(double factor) {
   factor_ = factor;
-  loads_(factor, parameters_.loads);
-  equations_.begin(state_, parameters_, StepRule::statics, 0.0);
+  apply(factor);
   if (imbalance_.size() == 0) imbalance_.setZero(state_.q.size());
   target_ = (1.0 - factor) * imbalance_;
 }
@@ -57,23 +64,34 @@ void Homotopy::evaluate(const VectorX& z, bool with_matrix, const double* axial_
   work_.data.potential -= target_.dot(z);
 }
 
+void Homotopy::accept(const VectorX& q) {
+  const Model& model = equations_.model();
+  if (Contact* contact = equations_.contact()) {
+    contact->update(q);
+    contact->accept(state_, Keep::force, INFINITY);
+  }
+  compute_configuration(model, state_, q, scratch_);
+  accept_configuration(model, q, scratch_, state_);
+  if (HandForces* hands = equations_.hands()) hands->accept(scratch_, state_);
+}
+
 void Homotopy::find_pull(const VectorX& z, VectorX& pull, VectorX& held) {
-  double little = 1.0;
+  double little = boundary_.aim ? kLittleFactor : 1.0;
   for (int tries = 0; tries < 20; ++tries) {
     moved_ = z;
-    const bool reached = boundary_(factor_ + little, moved_);
+    const bool reached = boundary_.hold(factor_ + little, moved_);
     held = moved_ - z;
     const double turn = reached ? newton_.norms().turn(held) : INFINITY;
     if (turn <= kLittleTurn) break;
     little *= std::isfinite(turn) ? 0.9 * kLittleTurn / turn : 1e-3;
   }
   held /= little;
-  moves_ = !held.isZero(0.0);
+  moves_ = boundary_.aim || !held.isZero(0.0);
   equations_.evaluate(z, false, nullptr, work_.data);
   pull = work_.data.residual;
-  loads_(factor_ + little, parameters_.loads);
+  apply(factor_ + little);
   equations_.evaluate(moved_, false, nullptr, work_.data);
-  loads_(factor_, parameters_.loads);
+  apply(factor_);
   pull = (pull - work_.data.residual) / little - imbalance_;
 }
 

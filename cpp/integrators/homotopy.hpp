@@ -9,9 +9,13 @@
 
 namespace withe {
 
-/// Sets the held unknowns of q to where supports are at a factor. False where the frames of the present state are too
-/// far from there.
-using Boundary = std::function<bool(double factor, VectorX& q)>;
+/// Where supports are at a factor.
+struct Boundary {
+  /// Sets the held unknowns of q. False where the frames of the present state are too far from there.
+  std::function<bool(double factor, VectorX& q)> hold;
+  /// Tells hands that yield; nothing where none moves.
+  std::function<void(double factor)> aim;
+};
 /// Sets rows of `Parameters::loads` that grow with the factor.
 using LoadPath = std::function<void(double factor, MatrixX3& loads)>;
 
@@ -36,7 +40,7 @@ class Homotopy {
   void start_out_of_balance();
   /// Loads and what is left out of balance at a factor; the frames count from the present state.
   void go_to(double factor);
-  bool hold(double factor, VectorX& q) const { return boundary_(factor, q); }
+  bool hold(double factor, VectorX& q) const { return boundary_.hold(factor, q); }
   /// Whether supports did so where a tangent was last found.
   bool supports_move() const { return moves_; }
   /// What grad V - f is to be at the factor last gone to.
@@ -53,10 +57,15 @@ class Homotopy {
   void find_tangent(Tangent& out);
   /// -dF/ds at z, projected, at the factor last gone to; `held`: how the held unknowns change with it.
   void find_pull(const VectorX& z, VectorX& pull, VectorX& held);
+  /// Goes on from q: contacts, frames and hands remember it.
+  void accept(const VectorX& q);
   /// Residual F(z, s), and the matrix when asked for.
   void evaluate(const VectorX& z, bool with_matrix, const double* axial_force);
 
  private:
+  /// Loads and hands at a factor, from which the equations begin.
+  void apply(double factor);
+
   Equations& equations_;
   const Newton& newton_;
   Parameters& parameters_;
@@ -65,6 +74,7 @@ class Homotopy {
   State& state_;
   NewtonWorkspace& work_;
   VectorX imbalance_, target_, held_, moved_;
+  Configuration scratch_;
   double factor_ = 0.0;
   bool moves_ = false;
 };

@@ -60,7 +60,7 @@ class Statics {
       state_ = start;
       path_.go_to(1.0);
       if (!path_.hold(1.0, state_.q)) return result;
-      accept(state_.q);
+      path_.accept(state_.q);
       result.converged = settle(1.0, result.newton) || (equations_.has_potential() && descend(1000, result.newton));
     }
     if (!result.converged) return result;
@@ -76,16 +76,6 @@ class Statics {
   }
 
  private:
-  void accept(const VectorX& q) {
-    if (Contact* contact = equations_.contact()) {
-      contact->update(q);
-      contact->accept(state_, Keep::force, INFINITY);
-    }
-    Configuration& c = scratch_;
-    compute_configuration(equations_.model(), state_, q, c);
-    accept_configuration(equations_.model(), q, c, state_);
-  }
-
   /// Follows the path from the present state to its end. False where not even a jump leads on.
   bool follow(StaticResult& result) {
     path_.start_out_of_balance();
@@ -168,7 +158,7 @@ class Statics {
     note(r, last);
     last.step = r.step;
     if (!r.converged || turned_too_far(state_, work_.data.configuration, equations_.model().planar())) return false;
-    accept(z_);
+    path_.accept(z_);
     return true;
   }
 
@@ -194,7 +184,7 @@ class Statics {
       z_ = state_.q;
       if (!path_.hold(next, z_) || !clear_way(z_)) return false;
     }
-    accept(z_);
+    path_.accept(z_);
     if (!settle(next, result.newton)) return false;
     VectorX change = state_.q - before;
     for (int dof : equations_.model().frame_dof) change.segment(dof, equations_.model().frame_size()).setZero();
@@ -226,7 +216,7 @@ class Statics {
       const double rounding = 1e-10 * (std::abs(potential) + std::abs(found)) + least_energy();
       const bool falls = !equations_.has_potential() || found <= potential + rounding;
       if (r.converged && falls && !turned_too_far(state_, work_.data.configuration, model.planar())) {
-        accept(z);
+        path_.accept(z);
         if (at_rest) return true;
         potential = found;
         h *= r.iterations <= 4 ? 10.0 : r.iterations <= 8 ? 3.0 : 1.0;
@@ -262,7 +252,7 @@ class Statics {
       ++last.iterations;
       ++work_.counters.iterations;
       if (!lower) return false;
-      accept(z);
+      path_.accept(z);
       damping = std::max(damping * 0.2, lowest_);
     }
     return false;
@@ -277,7 +267,7 @@ class Statics {
     if (!r.converged || work_.data.potential > energy + 1e-9 * std::abs(energy) + least_energy() ||
         turned_too_far(state_, work_.data.configuration, equations_.model().planar()))
       return false;
-    accept(z);
+    path_.accept(z);
     return true;
   }
 
@@ -367,7 +357,7 @@ class Statics {
     VectorX direction = lowest_mode(seed);
     direction *= 1e-3 * equations_.model().length_scale / std::max(newton_.norms().displacement(direction), 1e-300);
     direction *= newton_.norms().cap(direction);
-    accept(state_.q + direction);
+    path_.accept(state_.q + direction);
   }
 
   /// What the potential rounds to where little of it is left: a coil that relaxes into its natural shape ends at none.
@@ -381,7 +371,6 @@ class Statics {
   NewtonWorkspace& work_;
   double energy_scale_ = 0.0;  ///< greatest potential met [J]
   double lowest_ = 0.0;
-  Configuration scratch_;
   Homotopy path_;
   Homotopy::Tangent tangent_;
   VectorX step_, z_;

@@ -3,6 +3,7 @@
 #include <stdexcept>
 
 #include "elasticity/bend_twist.hpp"
+#include "elasticity/discrete_elements.hpp"
 #include "elasticity/put_local.hpp"
 #include "forces/hand.hpp"
 #include "geometry/curvature.hpp"
@@ -92,6 +93,7 @@ struct HandForces::Piece {
   Shift shift;
   Vector3 stiffness;
   CappedForce elastic;  ///< -f, in the axes of G
+  Matrix3 by;           ///< d(-f) / dx
 };
 
 HandForces::HandForces(const Model& model) : model_(model) {
@@ -121,8 +123,7 @@ std::string HandForces::note() const {
 
 HandPose HandForces::pose_of(const StepProblem& problem, int support) const {
   const HandState& start = problem.start->hands[at(support)];
-  if (end_.empty()) return {start.position, start.rotation};
-  const HandPose& end = end_[at(support)];
+  const HandPose end = end_pose(problem, support);
   if (!problem.in_middle()) return end;
   const Vector3 turn = rotation_log(end.rotation * start.rotation.transpose());
   return {0.5 * (start.position + end.position), rotation_exp(0.5 * turn) * start.rotation};
@@ -134,73 +135,143 @@ void HandForces::begin(StepProblem& problem) {
     if (model_.supports[s].active && model_.supports[s].yields()) now_[s] = pose_of(problem, static_cast<int>(s));
 }
 
-HandForces::Piece HandForces::piece(const StepProblem& problem, const VectorX& z, int element) const {
+HandPose HandForces::end_pose(const StepProblem& problem, int support) const {
+  const HandState& start = problem.start->hands[at(support)];
+  return end_.empty() ? HandPose{start.position, start.rotation} : end_[at(support)];
+}
+
+/// In an energy-momentum step u and G are the means of both ends: with w the Cayley vector of the hand's turn, u1 - u0
+/// = G^T (dx - dp - w x (x - p)), so that the work of -f is what K u . u / 2 changes by.
+HandForces::Piece HandForces::piece(const StepProblem& problem, const StepData& data, int element) const {
   const Held& held = held_[at(element)];
   const Support& support = model_.supports[at(held.support)];
   const TouchedEdge& touched = support.touched[at(held.touched)];
   const HandDescription& hand = support.description.hand;
-  const Shift shift =
-      shift_of(model_, z, problem.start->hands[at(held.support)], now_[at(held.support)], touched, at(held.touched));
+  const HandState& start = problem.start->hands[at(held.support)];
+  const auto at_pose = [&](const VectorX& q, const HandPose& pose) {
+    return shift_of(model_, q, start, pose, touched, at(held.touched));
+  };
+  Shift shift;
+  Matrix3 last;
+  if (problem.conserves_energy()) {
+    const Shift from = at_pose(problem.start->q, {start.position, start.rotation}),
+                to = at_pose(data.end, end_pose(problem, held.support));
+    shift = {0.5 * (from.grip + to.grip), 0.5 * (from.point + to.point), 0.5 * (from.by + to.by)};
+    last = to.grip;
+  } else {
+    shift = at_pose(data.z, now_[at(held.support)]);
+    last = shift.grip;
+  }
   const Vector3 stiffness = shift_stiffness(hand, touched.share);
-  return {touched, hand, shift, stiffness, capped(stiffness.cwiseProduct(shift.by), touched.share * hand.force_limit)};
+  const CappedForce elastic = capped(stiffness.cwiseProduct(shift.by), touched.share * hand.force_limit);
+  return {touched,   hand,    shift,
+          stiffness, elastic, shift.grip * capped_stiffness(stiffness, elastic) * last.transpose()};
+}
+
+/// What an edge that is held feels of the turn between it and what the hand has grasped.
+struct HandForces::Turn {
+  Vector3 moment = Vector3::Zero();  ///< on the hand's side
+  double energy = 0.0;
+};
+
+HandForces::Turn HandForces::put_planar_turn(const StepProblem& problem, const StepData& data, const Piece& p,
+                                             bool with_matrix, Local& local) const {
+  const Matrix3& G = p.shift.grip;
+  const PlanarBend<double> turn = planar_turn(model_, problem.parameters->measure, p.hand, p.touched.share, G,
+                                              data.configuration.edge[at(p.touched.edge)]);
+  const PlanarEdge<double> both[2] = {planar_grip(model_, G), planar_edge(data.configuration.edge[at(p.touched.edge)])};
+  PlanarForces<double> forces;
+  planar_bend_forces<true>(turn, both, forces);
+  put_planar_half({forces.force[1], 0.0, forces.by[1][1], {}, {}, 0.0}, with_matrix, local);
+  return {-turn.slope * model_.plane->normal, turn.energy};
+}
+
+HandForces::Turn HandForces::put_turn(const StepProblem& problem, const StepData& data, const Piece& p, double twist,
+                                      Local& local) const {
+  const EdgeFrame<double>&edge = data.configuration.edge[at(p.touched.edge)], grip = frame_of(p.shift.grip);
+  BendTwistDerivatives<double> d;
+  bend_twist_hessian(problem.parameters->measure, grip, edge, bend_twist_strain(grip, edge, twist), {0.0, 0.0, 0.0},
+                     turn_stiffness(p.hand, p.touched.share), d);
+  const Vector3 T = p.shift.grip.col(2);
+  const Turn turn{T.cross(to_eigen(d.gradient_e[0])) + d.gradient_angle[0] * T, d.energy};
+  apply_transport(grip, edge, d);
+  for (int i = 0; i < 3; ++i) {
+    local.gradient[i] = -d.gradient_e[1][i];
+    local.gradient[4 + i] = d.gradient_e[1][i];
+    const double across = d.e_angle[1][1][i];
+    local.hessian[i][3] = local.hessian[3][i] = -across;
+    local.hessian[4 + i][3] = local.hessian[3][4 + i] = across;
+    for (int j = 0; j < 3; ++j) {
+      const double h = d.ee[1][1].row[i][j];
+      local.hessian[i][j] = local.hessian[4 + i][4 + j] = h;
+      local.hessian[i][4 + j] = local.hessian[4 + i][j] = -h;
+    }
+  }
+  local.gradient[3] = d.gradient_angle[1];
+  local.hessian[3][3] = d.angle_angle[1][1];
+  return turn;
+}
+
+HandForces::Turn HandForces::put_discrete_turn(const StepProblem& problem, const StepData& data, const Piece& p,
+                                               const Held& held, bool with_matrix, Local& local) const {
+  const HandState& hand = problem.start->hands[at(held.support)];
+  const Matrix3 from = hand.rotation * hand.edges[at(held.touched)],
+                to = end_pose(problem, held.support).rotation * hand.edges[at(held.touched)];
+  const EdgeFrame<double>&edge0 = problem.start_configuration.edge[at(p.touched.edge)],
+        &edge1 = data.end_configuration.edge[at(p.touched.edge)];
+  const BendMeasure& measure = problem.parameters->measure;
+  AttachedStep grip{.start = frame_of(from), .end = frame_of(to), .start_strain = {}, .end_strain = {}, .first = true};
+  TurnCoefficients elastic{measure, {}, {}};
+  if (model_.planar()) {
+    const auto direction = [&](const Matrix3& G) {
+      const PlanarEdge<double> e = planar_grip(model_, G);
+      return Vec3d{e.tangent.x, e.tangent.y, 0.0};
+    };
+    const auto kappa = [](const Vec3d& a, const Vec3d& b) { return planar_kappa(a.x, a.y, b.x, b.y); };
+    grip.start.tangent = direction(from);
+    grip.end.tangent = direction(to);
+    grip.start_strain.x = kappa(grip.start.tangent, edge0.tangent);
+    grip.end_strain.x = kappa(grip.end.tangent, edge1.tangent);
+    elastic.stiffness.x = planar_stiffness(model_, p.hand, p.touched.share, to);
+  } else {
+    const BendTwistStrain<double> s0 = bend_twist_strain(grip.start, edge0, hand.twist(held.touched)),
+                                  s1 = bend_twist_strain(grip.end, edge1, s0.tau);
+    grip.start_strain = {s0.kappa1, s0.kappa2, s0.tau};
+    grip.end_strain = {s1.kappa1, s1.kappa2, s1.tau};
+    const BendTwistStiffness<double> C = turn_stiffness(p.hand, p.touched.share);
+    elastic.stiffness = {C.bend1, C.bend2, C.twist};
+  }
+  const DiscreteStep step{.start = problem.start_configuration,
+                          .middle = data.configuration,
+                          .end = data.end_configuration,
+                          .end_q = data.end,
+                          .change = data.change};
+  return {discrete_held_local(model_, elastic, step, p.touched.edge, grip, with_matrix, local), 0.0};
 }
 
 void HandForces::add(const StepProblem& problem, StepData& data, const Assembler&, std::span<double> values) const {
   const bool with_matrix = !values.empty();
   data.hands.assign(model_.supports.size(), Wrench{});
+  Eigen::Matrix<double, 3, 2> axes;
+  if (model_.planar()) axes << model_.plane->first, model_.plane->second;
   for (int k = 0; k < table_.count(); ++k) {
-    const Piece p = piece(problem, data.z, k);
-    const HandState& hand = problem.start->hands[at(held_[at(k)].support)];
-    const EdgeFrame<double>& edge = data.configuration.edge[at(p.touched.edge)];
-    const Matrix3& G = p.shift.grip;
-    const Vector3 pull = G * p.elastic.force;  // -f
-    const Matrix3 K = G * capped_stiffness(p.stiffness, p.elastic) * G.transpose();
+    const Held& held = held_[at(k)];
+    const Piece p = piece(problem, data, k);
+    const Vector3 pull = p.shift.grip * p.elastic.force;  // -f
     Local local{};
-    Vector3 moment;
-    double energy = 0.0;
-    if (model_.planar()) {
-      const PlanarBend<double> turn =
-          planar_turn(model_, problem.parameters->measure, p.hand, p.touched.share, G, edge);
-      const PlanarEdge<double> both[2] = {planar_grip(model_, G), planar_edge(edge)};
-      PlanarForces<double> forces;
-      planar_bend_forces<true>(turn, both, forces);
-      put_planar_half({forces.force[1], 0.0, forces.by[1][1], {}, {}, 0.0}, with_matrix, local);
-      moment = -turn.slope * model_.plane->normal;
-      energy = turn.energy;
-      Eigen::Matrix<double, 3, 2> axes;
-      axes << model_.plane->first, model_.plane->second;
-      put_shift<2>(axes.transpose() * pull, axes.transpose() * K * axes, p.touched.place, 2, with_matrix, local);
-    } else {
-      const EdgeFrame<double> grip = frame_of(G);
-      const auto strain = bend_twist_strain(grip, edge, hand.twist(held_[at(k)].touched));
-      BendTwistDerivatives<double> d;
-      const BendTwistStiffness<double> C = turn_stiffness(p.hand, p.touched.share);
-      bend_twist_hessian(problem.parameters->measure, grip, edge, strain, {0.0, 0.0, 0.0}, C, d);
-      const Vector3 T = G.col(2), ge = to_eigen(d.gradient_e[0]);
-      moment = T.cross(ge) + d.gradient_angle[0] * T;
-      apply_transport(grip, edge, d);
-      energy = d.energy;
-      for (int i = 0; i < 3; ++i) {
-        local.gradient[i] = -d.gradient_e[1][i];
-        local.gradient[4 + i] = d.gradient_e[1][i];
-        const double across = d.e_angle[1][1][i];
-        local.hessian[i][3] = local.hessian[3][i] = -across;
-        local.hessian[4 + i][3] = local.hessian[3][4 + i] = across;
-        for (int j = 0; j < 3; ++j) {
-          const double h = d.ee[1][1].row[i][j];
-          local.hessian[i][j] = local.hessian[4 + i][4 + j] = h;
-          local.hessian[i][4 + j] = local.hessian[4 + i][j] = -h;
-        }
-      }
-      local.gradient[3] = d.gradient_angle[1];
-      local.hessian[3][3] = d.angle_angle[1][1];
-      put_shift<3>(pull, K, p.touched.place, 4, with_matrix, local);
-    }
+    const Turn turn = problem.conserves_energy() ? put_discrete_turn(problem, data, p, held, with_matrix, local)
+                      : model_.planar() ? put_planar_turn(problem, data, p, with_matrix, local)
+                                        : put_turn(problem, data, p,
+                                                   problem.start->hands[at(held.support)].twist(held.touched), local);
+    if (model_.planar())
+      put_shift<2>(axes.transpose() * pull, axes.transpose() * p.by * axes, p.touched.place, 2, with_matrix, local);
+    else
+      put_shift<3>(pull, p.by, p.touched.place, 4, with_matrix, local);
     add_element(table_, k, local, data, values);
-    data.potential += energy + 0.5 * p.shift.by.dot(p.stiffness.cwiseProduct(p.shift.by));
-    Wrench& wrench = data.hands[at(held_[at(k)].support)];
+    data.potential += turn.energy + 0.5 * p.shift.by.dot(p.stiffness.cwiseProduct(p.shift.by));
+    Wrench& wrench = data.hands[at(held.support)];
     wrench.force -= pull;
-    wrench.moment += moment - p.shift.point.cross(pull);
+    wrench.moment += turn.moment - p.shift.point.cross(pull);
   }
 }
 
@@ -211,7 +282,7 @@ void HandForces::add_adjoint(const StepProblem&, const StepData&, const Assemble
 /// Positions round by eps |x|, and with them what is between an edge and where it was grasped.
 void HandForces::add_rounding(const StepProblem& problem, StepData& data) const {
   for (int k = 0; k < table_.count(); ++k) {
-    const Piece p = piece(problem, data.z, k);
+    const Piece p = piece(problem, data, k);
     const EdgeFrame<double>& edge = data.configuration.edge[at(p.touched.edge)];
     double turn = 0.0;
     for (int i = 3; i < 6; ++i) turn = std::max(turn, p.touched.share * p.hand.stiffness[at(i)]);
@@ -228,10 +299,10 @@ double HandForces::dissipated(const StepProblem& problem, const StepData& data, 
   double lost = 0.0;
   const VectorX end = problem.start->q + change;
   for (int k = 0; problem.moves() && k < table_.count(); ++k) {
-    const Piece p = piece(problem, data.z, k);
+    const Piece p = piece(problem, data, k);
     const Held& held = held_[at(k)];
     const HandState& hand = problem.start->hands[at(held.support)];
-    const HandPose from{hand.position, hand.rotation}, to = end_.empty() ? from : end_[at(held.support)];
+    const HandPose from{hand.position, hand.rotation}, to = end_pose(problem, held.support);
     const Vector3 u0 = shift_of(model_, problem.start->q, hand, from, p.touched, at(held.touched)).by,
                   u1 = shift_of(model_, end, hand, to, p.touched, at(held.touched)).by;
     const CappedForce last = capped(p.stiffness.cwiseProduct(u1), p.touched.share * p.hand.force_limit);
@@ -252,8 +323,9 @@ double HandForces::work(const StepProblem& problem, const StepData& data) const 
     const HandState& start = problem.start->hands[s];
     const Wrench& wrench = data.hands[s];
     const Vector3 moment = wrench.moment - now_[s].position.cross(wrench.force);
+    const Matrix3 turned = end_[s].rotation * start.rotation.transpose();
     done += wrench.force.dot(end_[s].position - start.position) +
-            moment.dot(rotation_log(end_[s].rotation * start.rotation.transpose()));
+            moment.dot(problem.conserves_energy() ? cayley_inverse(turned) : rotation_log(turned));
   }
   return done;
 }

@@ -43,8 +43,17 @@ class HandForces final : public Term {
     int support = 0, touched = 0;
   };
   struct Piece;
+  struct Turn;
+  /// Where forces act, and where it is at the end of the step.
   HandPose pose_of(const StepProblem& problem, int support) const;
-  Piece piece(const StepProblem& problem, const VectorX& z, int element) const;
+  HandPose end_pose(const StepProblem& problem, int support) const;
+  Piece piece(const StepProblem& problem, const StepData& data, int element) const;
+  Turn put_planar_turn(const StepProblem& problem, const StepData& data, const Piece& p, bool with_matrix,
+                       Local& local) const;
+  Turn put_turn(const StepProblem& problem, const StepData& data, const Piece& p, double twist, Local& local) const;
+  /// Whose work in an energy-momentum step is what the energy changes by.
+  Turn put_discrete_turn(const StepProblem& problem, const StepData& data, const Piece& p, const Held& held,
+                         bool with_matrix, Local& local) const;
 
   const Model& model_;
   std::vector<Held> held_;  ///< of each element

@@ -187,6 +187,10 @@ void Batch::step(std::span<const int> lanes, int count, const std::function<void
       check);
 }
 
+void Batch::read_failed(bool* out) const {
+  for (const auto& failure : failures_) *out++ = failure.has_value();
+}
+
 std::size_t Batch::readout_size(LaneReadout what, int rod) const {
   const SceneDescription& scene = lanes_[0]->description();
   const bool of_nodes = what == LaneReadout::positions || what == LaneReadout::velocities;
@@ -212,6 +216,24 @@ std::size_t Batch::readout_size(LaneReadout what, int rod) const {
 
 void Batch::read(LaneReadout what, int rod, double* out) const {
   for (const World* world : lanes_) read_lane(*world, what, rod, out);
+}
+
+void Batch::make_smooth(std::span<const int> lanes, int rod, const double* voronoi, double* curvature) const {
+  const std::size_t stencils = readout_size(LaneReadout::twists, rod);
+  for (const int i : lanes)
+    for (std::size_t s = 0; s < stencils; ++s, curvature += 2)
+      Eigen::Map<Vector2>{curvature} =
+          smooth_curvature(Eigen::Map<const Vector2>{curvature}, voronoi[at(i) * stencils + s]);
+}
+
+void Batch::check_turns(std::span<const int> lanes, int rod, const double* voronoi, const double* curvature,
+                        const std::string& owner) const {
+  const auto stencils = static_cast<Eigen::Index>(readout_size(LaneReadout::twists, rod));
+  for (const int i : lanes) {
+    const Eigen::Map<const VectorX> own{voronoi + i * stencils, stencils};
+    withe::check_turns({curvature, stencils, 2}, own, [&] { return owner; });
+    curvature += 2 * stencils;
+  }
 }
 
 void Batch::set_natural_curvature(std::span<const int> lanes, int rod, const double* curvature, double over) {

@@ -7,6 +7,7 @@
 #include <functional>
 #include <optional>
 #include <span>
+#include <string>
 #include <thread>
 #include <vector>
 
@@ -39,6 +40,8 @@ class Batch {
   void step(std::span<const int> lanes, int count, const std::function<void()>& check);
 
   const std::optional<ConvergenceFailure>& failure(int lane) const { return failures_.at(at(lane)); }
+  /// Whether each lane has failed.
+  void read_failed(bool* out) const;
   void forgive(int lane) { failures_.at(at(lane)).reset(); }
   /// Another world takes a lane's place.
   void replace(int lane, World& world);
@@ -48,6 +51,12 @@ class Batch {
   /// Of all lanes, one after the other.
   void read(LaneReadout what, int rod, double* out) const;
 
+  /// Makes discrete curvatures 2 tan(phi / 2) of the lanes that are named smooth ones [1/m], with the Voronoi lengths
+  /// of each lane's rod, a row a lane of the batch [m].
+  void make_smooth(std::span<const int> lanes, int rod, const double* voronoi, double* curvature) const;
+  /// Refuses curvatures that turn a rod by pi or more at a node; `owner` begins the message.
+  void check_turns(std::span<const int> lanes, int rod, const double* voronoi, const double* curvature,
+                   const std::string& owner) const;
   /// Leads natural curvatures there, a row a stencil and these for every lane that is named, one after the other.
   void set_natural_curvature(std::span<const int> lanes, int rod, const double* curvature, double over);
   void set_natural_twist(std::span<const int> lanes, int rod, const double* twist, double over);

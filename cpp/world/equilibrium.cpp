@@ -99,13 +99,24 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
   };
   std::vector<SupportMotion> from = before.motions;
   const std::vector<SupportMotion> target = motions;
-  const Boundary boundary = [&](double fraction, VectorX& q) {
+  const auto move_to = [&](double fraction) {
     for (std::size_t s = 0; s < motions.size(); ++s) put_between(from[s], target[s], fraction, motions[s]);
-    hold_now(work.held);
-    system.assembler().add_held_change(q, work.held.q, 1.0, q);
-    motions = target;
-    return work.held.reachable;
   };
+  Boundary boundary{.hold =
+                        [&](double fraction, VectorX& q) {
+                          move_to(fraction);
+                          hold_now(work.held);
+                          system.assembler().add_held_change(q, work.held.q, 1.0, q);
+                          motions = target;
+                          return work.held.reachable;
+                        },
+                    .aim = nullptr};
+  if (hands_move(from, target))
+    boundary.aim = [&](double fraction) {
+      move_to(fraction);
+      aim_hands(system);
+      motions = target;
+    };
   rest();
   StaticResult r;
   try {
@@ -113,7 +124,7 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
     aim_obstacles(system, time);
     aim_hands(system);
     VectorX reached = state.q;
-    if (boundary(1.0, reached)) check_squeezed(system, reached, dt);
+    if (boundary.hold(1.0, reached)) check_squeezed(system, reached, dt);
     if (drifts(system))
       newton->balance(work.newton.data, r.newton);
     else
@@ -238,12 +249,19 @@ EquilibriumPath World::equilibrium_path(const PathOptions& wanted) {
     const auto move_to = [&](double factor) {
       for (std::size_t s = 0; s < target.size(); ++s) put_between(from[s], target[s], factor, self.motions[s]);
     };
-    const Boundary boundary = [&](double factor, VectorX& q) {
-      move_to(factor);
-      self.hold_now(self.work.held);
-      system.assembler().add_held_change(q, self.work.held.q, 1.0, q);
-      return self.work.held.reachable;
-    };
+    Boundary boundary{.hold =
+                          [&](double factor, VectorX& q) {
+                            move_to(factor);
+                            self.hold_now(self.work.held);
+                            system.assembler().add_held_change(q, self.work.held.q, 1.0, q);
+                            return self.work.held.reachable;
+                          },
+                      .aim = nullptr};
+    if (self.hands_move(from, target))
+      boundary.aim = [&](double factor) {
+        move_to(factor);
+        self.aim_hands(system);
+      };
     self.rest();
     const LoadPath loads = by_loads ? scaled : growing_loads(system, self.parameters, self.state, self.work.newton);
     Homotopy path(system, *self.newton, self.parameters, boundary, loads, self.state, self.work.newton);
@@ -255,9 +273,11 @@ EquilibriumPath World::equilibrium_path(const PathOptions& wanted) {
     r = follow_arc(system, *self.newton, self.options, path,
                    {wanted.start, wanted.end, wanted.most_points, wanted.turn}, self.state, self.work.newton, visit);
     system.respond({});
+    self.release_hands(system);
     move_to(r.factor);
     for (SupportMotion& m : self.motions) stop(m, self.state.time);
   } catch (...) {
+    self.release_hands(self.statics());
     self.forget_custom(self.statics(), forces_before, moments_before);
     static_cast<Moving&>(self) = before;
     self.parameters.loads = full;

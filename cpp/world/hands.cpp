@@ -35,6 +35,16 @@ void World::Implementation::aim_hands(Equations& system) const {
   system.hands()->aim(std::move(poses));
 }
 
+/// Whether one that yields does.
+bool World::Implementation::hands_move(const std::vector<SupportMotion>& from,
+                                       const std::vector<SupportMotion>& to) const {
+  for (std::size_t s = 0; s < to.size(); ++s)
+    if (model.supports[s].active && model.supports[s].yields() &&
+        (from[s].position != to[s].position || from[s].rotation != to[s].rotation))
+      return true;
+  return false;
+}
+
 void World::Implementation::release_hands(Equations& system) {
   if (system.hands()) system.hands()->aim({});
 }
@@ -101,9 +111,10 @@ void World::Implementation::hold_hands(HeldTarget& target) const {
       if (std::find(s.nodes.begin(), s.nodes.end(), s.span[i]) != s.nodes.end())
         put_node(model, s.span[i], motions[h].position + motions[h].rotation * state.hands[h].points[i], target.q);
   }
-  for (std::size_t h = 0; h < model.supports.size(); ++h)
-    if (model.supports[h].active && model.supports[h].is_hand() && !hold_edges(static_cast<int>(h), target.q))
-      target.reachable = false;
+  for (std::size_t h = 0; h < model.supports.size(); ++h) {
+    const Support& s = model.supports[h];
+    if (s.active && s.is_hand() && !s.yields() && !hold_edges(static_cast<int>(h), target.q)) target.reachable = false;
+  }
 }
 
 /// Where a hand puts the edges that it holds, once all nodes have their places in `q`.

@@ -150,6 +150,7 @@ struct World::Implementation : Running {
 
   // hands.cpp
   bool has_hands() const;
+  bool hands_move(const std::vector<SupportMotion>& from, const std::vector<SupportMotion>& to) const;
   void aim_hands(Equations& system) const;
   static void release_hands(Equations& system);
   /// In an equilibrium that hands were aimed for.
@@ -207,6 +208,7 @@ struct World::Implementation : Running {
   std::string crushed() const;
   std::string unresolved() const;
   void check_resolution();
+  std::string overturned() const;
   std::string what_to_try() const;
   /// `hint`: what to try, where the caller knows better than `what_to_try`.
   [[noreturn]] void fail(const NewtonResult& newton, double dt, const std::string& what,

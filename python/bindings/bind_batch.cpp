@@ -79,6 +79,18 @@ class GuardedBatch {
     batch_.read(readout, rod, out.mutable_data());
   }
 
+  /// Curvatures as `set_natural_curvature` takes them; refused where they turn a rod by pi or more.
+  void set_natural_curvature(const Lanes& lanes, int rod, Numbers values, double over, const Numbers& voronoi,
+                             bool discrete, const std::string& owner) {
+    if (static_cast<std::size_t>(voronoi.size()) != at(size()) * batch_.readout_size(LaneReadout::twists, rod))
+      throw std::invalid_argument("voronoi has another size than the batch");
+    set(lanes, values, LaneReadout::curvatures, rod, [&](std::span<const int> named, const double* given) {
+      if (discrete) batch_.make_smooth(named, rod, voronoi.data(), values.mutable_data());
+      batch_.check_turns(named, rod, voronoi.data(), given, owner);
+      batch_.set_natural_curvature(named, rod, given, over);
+    });
+  }
+
   template <class Set>
   void set(const Lanes& lanes, const Numbers& values, LaneReadout like, int rod, Set set) {
     idle();
@@ -137,18 +149,22 @@ void register_batch(py::module_& module) {
             "Advance lanes by `count` time steps; functions of Python are called with the lock of the interpreter.");
   batch.def("replace", &GuardedBatch::replace, py::arg("lane"), py::arg("world"));
   batch.def("failure", &failure_of, py::arg("lane"), "Message and numbers, or None.");
+  batch.def(
+      "failed",
+      [](GuardedBatch& self) {
+        py::array_t<bool> out(self.size());
+        self.batch().read_failed(out.mutable_data());
+        return out;
+      },
+      "Which lanes have failed.");
   batch.def("forgive", [](GuardedBatch& self, int lane) { self.batch().forgive(lane); }, py::arg("lane"));
   batch.def("take_warnings", &GuardedBatch::take_warnings);
   batch.def("read", &GuardedBatch::read, py::arg("what"), py::arg("rod"), py::arg("out").noconvert(),
             "Fill an array with a read-out of every lane.");
   batch.def("restore", &GuardedBatch::restore, py::arg("lanes"), py::arg("snapshots"));
-  batch.def(
-      "set_natural_curvature",
-      [](GuardedBatch& self, const Lanes& lanes, int rod, const Numbers& values, double over) {
-        self.set(lanes, values, LaneReadout::curvatures, rod,
-                 [&](std::span<const int> l, const double* v) { self.batch().set_natural_curvature(l, rod, v, over); });
-      },
-      py::arg("lanes"), py::arg("rod"), py::arg("values"), py::arg("over"));
+  batch.def("set_natural_curvature", &GuardedBatch::set_natural_curvature, py::arg("lanes"), py::arg("rod"),
+            py::arg("values"), py::arg("over"), py::arg("voronoi"), py::arg("discrete"), py::arg("owner"),
+            "Rows of the lanes, smooth or discrete, which are made smooth in place; refused before any is led.");
   batch.def(
       "set_natural_twist",
       [](GuardedBatch& self, const Lanes& lanes, int rod, const Numbers& values, double over) {

@@ -1091,6 +1091,10 @@ class Batch:
     def __init__(
         self, worlds: collections.abc.Sequence[typing.Any], workers: typing.SupportsInt | typing.SupportsIndex
     ) -> None: ...
+    def failed(self) -> numpy.typing.NDArray[numpy.bool]:
+        """
+        Which lanes have failed.
+        """
     def failure(self, lane: typing.SupportsInt | typing.SupportsIndex) -> typing.Any:
         """
         Message and numbers, or None.
@@ -1112,7 +1116,13 @@ class Batch:
         rod: typing.SupportsInt | typing.SupportsIndex,
         values: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
         over: typing.SupportsFloat | typing.SupportsIndex,
-    ) -> None: ...
+        voronoi: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+        discrete: bool,
+        owner: str,
+    ) -> None:
+        """
+        Rows of the lanes, smooth or discrete, which are made smooth in place; refused before any is led.
+        """
     def set_natural_stretch(
         self,
         lanes: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],

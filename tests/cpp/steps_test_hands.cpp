@@ -77,15 +77,30 @@ std::vector<Case> all_cases(double force_limit = INFINITY) {
 
 /// The residual of the hands alone: what is left without them taken off.
 struct Alone {
-  Alone(const Case& of, StepRule rule)
-      : c(of), parameters(initial_parameters(of.model)), with(of.model, {.rule = rule}) {
-    with.begin(c.state, parameters, rule, rule == StepRule::statics ? 0.0 : 0.3);
+  Alone(const Case& of, StepRule under)
+      : c(of),
+        rule(under),
+        interval(under == StepRule::statics ? 0.0 : 0.3),
+        parameters(initial_parameters(of.model)),
+        with(of.model, {.rule = under}) {
+    with.begin(c.state, parameters, rule, interval);
+  }
+  /// Hands turn by an angle in the step, and move.
+  void aim(double angle) {
+    std::vector<HandPose> poses;
+    const Vector3 axis = c.model.planar() ? c.model.plane->normal : Vector3(0.6, 0.0, 0.8);
+    for (const HandState& hand : c.state.hands)
+      poses.push_back({hand.position + Vector3(0.02, 0.0, 0.0), rotation_exp(angle * axis) * hand.rotation});
+    with.hands()->aim(std::move(poses));
+    with.begin(c.state, parameters, rule, interval);
   }
   VectorX operator()(const VectorX& q) {
     with.evaluate(q, false, nullptr, data);
     return data.full_residual;
   }
   const Case& c;
+  StepRule rule;
+  double interval;
   Parameters parameters;
   Equations with;
   StepData data;
@@ -98,6 +113,7 @@ TEST(HandForces, MatrixIsTheDerivativeOfTheResidualUnderEveryRuleHeldOrSlipping)
         if (rule == StepRule::energy_momentum && c.q == c.state.q)
           c.q += 10.0 * c.increment * RandomNumbers(8).vector(c.q.size());
         Alone residual(c, rule);
+        residual.aim(0.3);
         const Eigen::Index n = c.model.dof_count;
         residual.with.evaluate(c.q, true, nullptr, residual.data);
         MatrixX J(n, n);

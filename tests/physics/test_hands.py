@@ -250,6 +250,81 @@ def test_what_hands_do_is_work_at_second_order(stiffness):
     assert_order([error(step) for step in steps], 2.0)
 
 
+def drawn_motion(number, planar):
+    """A rod, and a weak or firm hand that yields on its way to and fro."""
+    random = np.random.default_rng([3, number])
+    scene = withe.Scene(gravity=(0.0, -9.81, 0.0))
+    rubber = withe.Material(youngs_modulus=1e6, density=1e3, poisson_ratio=0.5)
+    rod = scene.add_rod(start=(0, 0, 0), end=(0.2, 0, 0), nodes=15, radius=4e-3, material=rubber)
+    simulation = scene.build(integrator="energy_momentum", time_step=10.0 ** random.uniform(-3.0, -2.1), planar=planar)
+    hand = simulation.grasp(
+        rod, at=random.uniform(0.03, 0.17), length=random.uniform(0.0, 0.04),
+        stiffness=(200.0, 10.0 ** random.uniform(-6.0, -1.0)), force_limit=random.choice([0.5, 1e3]),
+    )  # fmt: skip
+    place, axes = hand.pose
+    axis = np.array((0.0, 0.0, 1.0) if planar else (0.36, 0.48, 0.8))
+    way = random.uniform(-0.03, 0.03, 3) * (1.0, 1.0, 0.0 if planar else 1.0)
+    swing, speed = random.uniform(0.5, 2.0), random.uniform(5.0, 12.0)
+
+    def path(t):
+        return place + way * np.sin(12.0 * t), rods.rotation(axis, swing * np.sin(speed * t)) @ axes
+
+    hand.move(path=path)
+    return simulation, hand
+
+
+@pytest.mark.parametrize("planar", [True, False], ids=["planar", "spatial"])
+@pytest.mark.parametrize("number", range(8))
+def test_energy_momentum_steps_balance_what_a_yielding_hand_does_and_stores(number, planar):
+    """Turns in the hand beyond 120 degrees, where a step once found no place for it, and slips among them."""
+    simulation, _ = drawn_motion(number, planar)
+    start = balance(simulation)
+    while simulation.time < 0.6:
+        simulation.step()
+        e = simulation.energy()
+        assert balance(simulation) == pytest.approx(start, abs=1e-7 * (e.kinetic + e.bend + e.spring + 1e-3))
+
+
+def test_what_a_weak_hand_holds_may_turn_far_in_it():
+    turned = 0.0
+    for number in range(8):
+        simulation, hand = drawn_motion(number, False)
+        while simulation.time < 0.6:
+            simulation.step()
+            turned = max(turned, np.degrees(np.linalg.norm(hand.deflection.turn)))
+    assert turned > 150.0
+
+
+@pytest.mark.parametrize("planar", [True, False], ids=["planar", "spatial"])
+def test_an_equilibrium_follows_a_hand_that_yields_as_it_turns(planar):
+    """All at once as in parts, on one branch: the rod takes M L / B of the turn, the hand the rest."""
+
+    def turned(parts, degrees=170.0):
+        scene = rods.weightless()
+        arm = rods.straight(scene, 40, normal=(0, 0, 1))
+        scene.clamp(arm.start)
+        hand = scene.grasp(arm, 0.99, stiffness=(8000.0, 10.0))
+        simulation = scene.build(integrator="static", planar=planar)
+        axes = simulation.pose(hand).rotation
+        for k in range(parts):
+            turn = rods.rotation((0.0, 1.0, 0.0), np.radians(degrees) * (k + 1) / parts)
+            simulation.move(hand, rotation=turn @ axes)
+            found = simulation.equilibrium()
+            assert found.stable and not found.branch_changed
+        return simulation.positions(arm), np.linalg.norm(simulation.deflection(hand).turn)
+
+    at_once, in_parts = turned(1), turned(34)
+    np.testing.assert_allclose(at_once[0], in_parts[0], atol=1e-8)
+    assert at_once[1] == pytest.approx(in_parts[1], abs=1e-7)
+    assert at_once[1] > 1.0
+
+
+def test_half_a_turn_in_a_hand_is_named():
+    simulation, _ = drawn_motion(12, False)
+    with pytest.raises(withe.ConvergenceError, match=r"stiffness about its axes: .* of rod 'rod 1' .* 180 degrees"):
+        simulation.run(0.6)
+
+
 def test_a_rod_drawn_out_of_a_hand_slips_at_the_limit_and_what_that_takes_is_dissipated():
     limit, k = 0.3, 200.0
     scene = rods.weightless()

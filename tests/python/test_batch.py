@@ -271,3 +271,20 @@ def test_bad_input_is_a_value_error_that_says_what_was_expected(call, message):
 def test_a_batch_of_none_or_without_workers_is_refused(n, workers):
     with pytest.raises(ValueError, match=r"must"):
         cantilever()[0].build_batch(n, workers=workers)
+
+
+def test_discrete_curvatures_mean_the_angles_of_each_simulations_own_nodes():
+    simulations = []
+    for length in (0.2, 0.5):
+        scene = withe.Scene()
+        rubber = withe.Material(youngs_modulus=1e6, density=1000.0)
+        scene.add_rod(start=(0, 0, 0), end=(length, 0, 0), nodes=11, radius=5e-3, material=rubber, name="arm")
+        simulations.append(scene.build(time_step=5e-3))
+    batch = withe.Batch(simulations, workers=1)
+    batch.set_natural_curvature("arm", [(0.0, 0.2), (0.0, 0.2)], discrete=True)
+    for simulation, voronoi in zip(simulations, (0.02, 0.05), strict=True):
+        natural = simulation.get("arm", "natural_curvature")
+        np.testing.assert_allclose(natural[:, 1] * voronoi, 2.0 * np.arctan(0.1), rtol=1e-12)
+    with pytest.raises(ValueError, match="less than pi at every node"):
+        batch.set_natural_curvature("arm", [(0.0, 0.0), (0.0, 80.0)])
+    assert simulations[0].get("arm", "natural_curvature")[0, 1] > 0.0

@@ -104,11 +104,12 @@ def test_the_world_imports_no_planner():
     tree = ast.parse((folder / "world.py").read_text())
     names = {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
     ours = {name for name in names if name.startswith("withe.deployment")}
-    assert ours == {"withe.deployment.cable"}  # sizes of a cable, and nothing that plans
+    assert ours == {"withe.deployment.cable", "withe.deployment.posts"}  # sizes, and nothing that plans
     assert not {name for name in names if name.startswith("withe._core")}
-    tree = ast.parse((folder / "cable.py").read_text())
-    names = {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
-    assert not {name for name in names if name.startswith("withe.deployment")}
+    for module in ("cable.py", "posts.py"):
+        tree = ast.parse((folder / module).read_text())
+        names = {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
+        assert not {name for name in names if name.startswith("withe.deployment")}
 
 
 @pytest.mark.parametrize(

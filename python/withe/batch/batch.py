@@ -84,8 +84,7 @@ class Batch(Setting, Reading):
         number = validation.integer(index, "index", -size, size - 1) % size
         if not isinstance(simulation, Simulation):
             raise ValueError(f"simulation must be a withe.Simulation, got {type(simulation).__name__}")
-        self._lanes.engine.replace(number, simulation._session.world)
-        self._lanes.simulations[number] = simulation
+        self._lanes.replace(number, simulation)
 
     @property
     def lanes(self) -> npt.NDArray[np.intc]:
@@ -151,7 +150,7 @@ class Batch(Setting, Reading):
     @property
     def failed(self) -> npt.NDArray[np.bool_]:
         """Which simulations have failed, shape (n,)."""
-        return np.array([self._lanes.engine.failure(i) is not None for i in range(len(self))])
+        return self._lanes.engine.failed()
 
     @property
     def failures(self) -> tuple[ConvergenceError | None, ...]:

@@ -10,6 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from withe import _core
+from withe.parts.handles import Rod
+from withe.parts.kinds import RodPart
 from withe.simulation.simulation import Simulation
 
 __all__ = ["Lanes", "output", "row", "stacked"]
@@ -32,6 +34,9 @@ class Lanes:
         self.engine = _core.Batch([each._session.world for each in simulations], workers)
         self._all = np.arange(len(simulations), dtype=np.intc)
         self._all.flags.writeable = False
+        self._rods: dict[str, RodPart] = {}
+        self._voronoi: dict[int, FloatArray] = {}
+        self._nodes = [len(self.first._session.directory.layout.rows(rod.index)) for rod in self.first.rods]
 
     def __len__(self) -> int:
         return len(self.simulations)
@@ -40,6 +45,40 @@ class Lanes:
     def first(self) -> Simulation:
         """Has the shape of all."""
         return self.simulations[0]
+
+    def replace(self, number: int, simulation: Simulation) -> None:
+        """Another simulation of the same shape takes the place of one."""
+        self.engine.replace(number, simulation._session.world)
+        self.simulations[number] = simulation
+        self._rods.clear()
+        self._voronoi.clear()
+
+    def rod(self, rod: Rod | str) -> RodPart:
+        """The rod of the first simulation that a handle or a name stands for; names are looked up once.
+
+        Raises
+        ------
+        ValueError
+            There is no such rod.
+        """
+        if not isinstance(rod, str):
+            return self.first._session.directory.rod(rod)
+        part = self._rods.get(rod)
+        if part is None:
+            part = self._rods[rod] = self.first._session.directory.rod(rod)
+        return part
+
+    def nodes(self, rod: int) -> int:
+        """How many nodes a rod has."""
+        return self._nodes[rod]
+
+    def voronoi(self, rod: RodPart) -> FloatArray:
+        """Voronoi lengths of a rod in every simulation, shape (n, stencils) [m]."""
+        found = self._voronoi.get(rod.index)
+        if found is None:
+            own = [simulation._session.directory.rod(rod.name).voronoi for simulation in self.simulations]
+            found = self._voronoi[rod.index] = np.array(own)
+        return found
 
     def chosen(self, given: npt.ArrayLike | None, what: str = "lanes") -> IntArray:
         """Numbers of the simulations that an argument names: None for all, a mask, or numbers.

@@ -9,7 +9,6 @@ import numpy.typing as npt
 
 from withe.batch.lanes import Lanes, output
 from withe.parts.handles import Hand, NodeHandle, Obstacle, Rod, Spring, Support
-from withe.parts.kinds import RodPart
 from withe.simulation.readouts import Energy, Momentum, Reaction, RodEnergy, Statistics
 
 __all__ = ["Reading"]
@@ -64,27 +63,27 @@ class Reading:
 
     def directors(self, rod: Rod | str, out: FloatArray | None = None) -> FloatArray:
         """Material frames of the edges, shape (n, edges, 3, 3), rows d1, d2, tangent."""
-        part = _rod(self._lanes, rod)
+        part = self._lanes.rod(rod)
         return _read(self._lanes, "directors", part.index, (len(part.lengths), 3, 3), out)
 
     def curvatures(self, rod: Rod | str, out: FloatArray | None = None) -> FloatArray:
         """Curvatures towards d1 and d2, shape (n, stencils, 2) [1/m]."""
-        part = _rod(self._lanes, rod)
+        part = self._lanes.rod(rod)
         return _read(self._lanes, "curvatures", part.index, (len(part.voronoi), 2), out)
 
     def twists(self, rod: Rod | str, out: FloatArray | None = None) -> FloatArray:
         """Twists, shape (n, stencils) [rad/m]."""
-        part = _rod(self._lanes, rod)
+        part = self._lanes.rod(rod)
         return _read(self._lanes, "twists", part.index, (len(part.voronoi),), out)
 
     def tensions(self, rod: Rod | str, out: FloatArray | None = None) -> FloatArray:
         """Axial forces of the edges, pulling is positive, shape (n, edges) [N]."""
-        part = _rod(self._lanes, rod)
+        part = self._lanes.rod(rod)
         return _read(self._lanes, "tensions", part.index, (len(part.lengths),), out)
 
     def spins(self, rod: Rod | str, out: FloatArray | None = None) -> FloatArray:
         """Angular velocities of the edges about their tangents, shape (n, edges) [rad/s]."""
-        part = _rod(self._lanes, rod)
+        part = self._lanes.rod(rod)
         return _read(self._lanes, "spins", part.index, (len(part.lengths),), out)
 
     def energy(self, rod: Rod | str | None = None) -> Energy | RodEnergy:
@@ -131,16 +130,11 @@ class Reading:
         return self._lanes.gathered(lambda s: s.get(target, word))
 
 
-def _rod(lanes: Lanes, rod: Rod | str) -> RodPart:
-    return lanes.first._session.directory.rod(rod)
-
-
 def _of_nodes(lanes: Lanes, what: str, rod: Rod | str | None, out: FloatArray | None) -> FloatArray:
-    directory = lanes.first._session.directory
     if rod is None:
-        return _read(lanes, what, -1, (directory.layout.node_count, 3), out)
-    index = directory.rod(rod).index
-    return _read(lanes, what, index, (len(directory.layout.rows(index)), 3), out)
+        return _read(lanes, what, -1, (lanes.first._session.directory.layout.node_count, 3), out)
+    index = lanes.rod(rod).index
+    return _read(lanes, what, index, (lanes.nodes(index), 3), out)
 
 
 def _read(lanes: Lanes, what: str, rod: int, shape: tuple[int, ...], out: FloatArray | None) -> FloatArray:

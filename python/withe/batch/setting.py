@@ -8,10 +8,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from withe import _core
 from withe.batch.lanes import IntArray, Lanes, row
 from withe.common import validation
-from withe.common.drawing import smooth_curvature
 from withe.parts.handles import NodeHandle, Obstacle, Rod, Support
 
 __all__ = ["Setting"]
@@ -58,18 +56,21 @@ class Setting:
         >>> batch = scene.build_batch(3)
         >>> batch.set_natural_curvature(arm, [(0, 2.0), (0, 4.0), (0, 6.0)], over=0.2)
         """
-        part = self._lanes.first._session.directory.rod(rod)
+        part = self._lanes.rod(rod)
         numbers, stencils = self._lanes.chosen(lanes), len(part.voronoi)
         what = f"natural_curvature of {part.owner}"
         values = validation.number_array(curvature, what, (len(numbers), 2), (len(numbers), stencils, 2))
         if values.ndim == 2:
             values = np.repeat(values[:, None], stencils, axis=1)
-        if validation.truth(discrete, "discrete"):
-            flat = np.tile(part.voronoi, len(numbers))
-            values = smooth_curvature(values.reshape(-1, 2), flat).reshape(values.shape)
-        for lane in values[np.any(np.hypot(values[..., 0], values[..., 1]) * part.voronoi >= 3.14, axis=1)]:
-            _core.check_turns(lane, part.voronoi, what)
-        _lead(self._lanes.engine.set_natural_curvature, part.index, values, over, numbers)
+        self._lanes.engine.set_natural_curvature(
+            numbers,
+            part.index,
+            values,
+            validation.non_negative(over, "over"),
+            self._lanes.voronoi(part),
+            validation.truth(discrete, "discrete"),
+            what,
+        )
 
     def set_natural_twist(
         self, rod: Rod | str, twist: npt.ArrayLike, over: float = 0.0, *, lanes: npt.ArrayLike | None = None
@@ -89,7 +90,7 @@ class Setting:
         ValueError
             Wrong shape, not finite, or not zero in a simulation that was built with planar=True.
         """
-        part = self._lanes.first._session.directory.rod(rod)
+        part = self._lanes.rod(rod)
         numbers = self._lanes.chosen(lanes)
         values = _spread(twist, f"natural_twist of {part.owner}", len(numbers), len(part.voronoi))
         _lead(self._lanes.engine.set_natural_twist, part.index, values, over, numbers)
@@ -113,7 +114,7 @@ class Setting:
         ValueError
             Wrong shape, not finite, or not positive.
         """
-        part = self._lanes.first._session.directory.rod(rod)
+        part = self._lanes.rod(rod)
         numbers, what = self._lanes.chosen(lanes), f"natural_stretch of {part.owner}"
         values = _spread(stretch, what, len(numbers), len(part.lengths))
         if np.any(values <= 0.0):

@@ -33,6 +33,8 @@ FloatArray = npt.NDArray[np.float64]
 
 # Beyond any quantity of this world in SI units; products of a few such numbers are still finite.
 _LARGEST = 1e50
+# Numbers that BLAS adds up by itself, without threads.
+_ALONE = 8192
 
 
 def number(value: Any, what: str) -> float:
@@ -131,6 +133,22 @@ def number_array(value: Any, what: str, *shapes: tuple[int | str, ...]) -> Float
     ValueError
         Not numbers, another shape, or not finite.
     """
+    plain = type(value) is np.ndarray and value.dtype.kind in "iuf" and value.shape in shapes
+    result = np.array(value if plain else _raw_numbers(value, what, shapes), np.float64, order="C")
+    if _in_range(result):
+        return result
+    bad = ~np.isfinite(result)
+    if bad.any():
+        place = tuple(int(i) for i in np.argwhere(bad)[0])
+        where = f" at {list(place)}" if place else ""
+        raise ValueError(f"{what} must be finite, got {result[place]}{where}")
+    if result.size and np.abs(result).max() > _LARGEST:
+        raise ValueError(f"{what} must be less than {_LARGEST:g} in size, got {np.abs(result).max():g}")
+    return result
+
+
+def _raw_numbers(value: Any, what: str, shapes: tuple[tuple[int | str, ...], ...]) -> npt.NDArray[Any]:
+    """What is given as an array of numbers in one of several shapes; they may be of any type, and not finite."""
     wanted = " or ".join(_shape(shape) for shape in shapes)
     if has_masked(value):
         raise ValueError(f"{what} must have a value everywhere, got a masked array with masked entries")
@@ -148,17 +166,20 @@ def number_array(value: Any, what: str, *shapes: tuple[int | str, ...]) -> Float
     if not any(_fits(raw.shape, shape) for shape in shapes):
         came = _shape(raw.shape) if raw.shape else "a single number"
         raise ValueError(f"{what} must have shape {wanted}, got {came}")
-    result = np.array(raw, np.float64, order="C")
-    if np.vdot(result, result) <= _LARGEST**2:  # then each of them is in range; unlike `dot` it never warns
-        return result
-    bad = ~np.isfinite(result)
-    if bad.any():
-        place = tuple(int(i) for i in np.argwhere(bad)[0])
-        where = f" at {list(place)}" if place else ""
-        raise ValueError(f"{what} must be finite, got {result[place]}{where}")
-    if result.size and np.abs(result).max() > _LARGEST:
-        raise ValueError(f"{what} must be less than {_LARGEST:g} in size, got {np.abs(result).max():g}")
-    return result
+    return raw
+
+
+def _in_range(values: FloatArray) -> bool:
+    """Whether all are finite and not too large, for certain. Unlike `dot`, `vdot` never warns.
+
+    From 10,001 numbers on it takes threads of its own, which then spin for a while on processors that others need.
+    """
+    flat = values.reshape(-1)
+    for start in range(0, flat.size, _ALONE):
+        part = flat[start : start + _ALONE]
+        if not np.vdot(part, part) <= _LARGEST**2:
+            return False
+    return True
 
 
 def broadcast_arrays(**values: Any) -> tuple[FloatArray, ...]:

@@ -15,7 +15,9 @@ from withe.deployment.feasibility import Feasibility, Slip
 from withe.deployment.grasping import Grasp, grasp
 from withe.deployment.motion import Phase
 from withe.deployment.pattern import Pattern
+from withe.deployment.placing import posts_along
 from withe.deployment.planning import Plan, plan
+from withe.deployment.posts import Post
 from withe.deployment.straight import StraightLine, StraightPose
 
 __all__ = [
@@ -27,6 +29,7 @@ __all__ = [
     "Pattern",
     "Phase",
     "Plan",
+    "Post",
     "Slip",
     "StraightLine",
     "StraightPose",
@@ -35,4 +38,5 @@ __all__ = [
     "measure",
     "place",
     "plan",
+    "posts_along",
 ]

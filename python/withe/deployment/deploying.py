@@ -11,6 +11,7 @@ from withe.common import validation
 from withe.deployment.cable import Cable
 from withe.deployment.motion import lengthened
 from withe.deployment.pattern import distances
+from withe.deployment.placing import passed
 from withe.deployment.planning import Plan
 from withe.deployment.world import Setup, lay
 from withe.deployment.world import place as place_in_world
@@ -45,6 +46,8 @@ class Deployment:
         How far the pattern moved at most when the jaw let go.
     record : Record
         Of the motion, with the rod "cable".
+    passed : ndarray of bool of shape (posts,)
+        Whether the cable lies on the floor beside each post of the plan, on the same side of it as the pattern.
     """
 
     laid: FloatArray
@@ -55,6 +58,7 @@ class Deployment:
     slipped: FloatArray
     released: float
     record: Record
+    passed: npt.NDArray[np.bool_]
 
 
 def deploy(
@@ -139,6 +143,7 @@ def deploy(
         jaw_turn=(_TURN * drawn[7], _TURN * drawn[8], _TURN * drawn[9]),
         quasi_static=quasi_static,
         start_held=plan.start == "held",
+        posts=plan.posts,
     )
     held, laid, record = lay(setup, plan, progress=progress)
     return _compared(plan, setup.arc_length, held, laid, record)
@@ -228,6 +233,7 @@ def _compared(plan: Plan, s: FloatArray, held: FloatArray, laid: FloatArray, rec
         slipped=slipped,
         released=float(np.linalg.norm((laid - held)[on], axis=1).max()),
         record=record,
+        passed=passed(plan.posts, pattern, plan.cable, laid[on]),
     )
 
 

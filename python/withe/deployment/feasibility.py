@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from withe.common import validation
 from withe.deployment.cable import JAW, Cable
-from withe.deployment.grasping import Grasp, grasp, least_friction, table
+from withe.deployment.grasping import TWIST_STIFFNESS, Grasp, grasp, least_friction, table
 from withe.deployment.smoothing import least_tension
 
 __all__ = ["Controller", "Feasibility", "Slip", "examine"]
@@ -18,6 +18,7 @@ __all__ = ["Controller", "Feasibility", "Slip", "examine"]
 FloatArray = npt.NDArray[np.float64]
 Controller = Literal["exact", "least_friction"]
 _BEND_STIFFNESS = 2.0  # EI in units of w Lgb^2
+_NEIGHBOURS = 4.0  # radii along a cable within which its parts are no obstacle to each other, times pi
 
 
 @dataclass(frozen=True)
@@ -31,7 +32,7 @@ class Slip:
     needed : float
         Greatest coefficient of friction that the stretch would need.
     test : str
-        What fails first there: "floor", "lift-off" or "free end".
+        What fails first there: "floor", "lift-off", "free end", "tail" or "overlap".
     """
 
     start: float
@@ -40,15 +41,15 @@ class Slip:
     test: str
 
     def __str__(self) -> str:
-        return (
-            f"{1e3 * self.start:.0f} to {1e3 * self.end:.0f} mm slips ({self.test}): it would need a coefficient of"
-            f" friction of {self.needed:.2f}"
-        )
+        where = f"{1e3 * self.start:.0f} to {1e3 * self.end:.0f} mm"
+        if self.test == "overlap":
+            return f"{where} lies on the cable itself, which pushes itself aside"
+        return f"{where} slips ({self.test}): it would need a coefficient of friction of {self.needed:.2f}"
 
 
 @dataclass(frozen=True)
 class Feasibility:
-    """The coefficient of friction that each place of a pattern needs, by three tests.
+    """The coefficient of friction that each place of a pattern needs, by three tests, and what two more say.
 
     Attributes
     ----------
@@ -65,6 +66,17 @@ class Feasibility:
         Between it and the free end at most friction times weight can turn and shear the cable: it needs
         2 EI kappa / (w s^2) and EI kappa' / (w s), s the way from the free end. A pattern that begins with curvature
         always slips a little.
+    tail : ndarray of shape (nodes,)
+        The greatest need at lift-off of all places before. Where a bend slips inwards by c while it is laid, what is
+        laid behind it runs ahead by the integral of the curvature times c, for the cable does not stretch. The jaw
+        knows nothing of that. As long as much hangs, this gives; the stiff rest, from some 2.5 Lgb on, pulls
+        all that lies behind the bend back along itself, straight or not.
+    overlap : ndarray of bool of shape (nodes,)
+        Where the pattern comes nearer to itself than the cable is thick: it cannot lie there, and pushes itself aside.
+    rolled : ndarray of shape (nodes,) [m]
+        By how much the tail pulls the cable back even where friction holds, to first order. The floor's force across
+        the cable at lift-off, Fy, acts at its surface, a radius below the centreline; the cable rolls inwards by
+        c = radius^2 Fy / (GJ / suspended length) and runs ahead as above.
     friction : float
         What there is.
     slips : tuple of Slip
@@ -75,12 +87,15 @@ class Feasibility:
     floor: FloatArray
     lift_off: FloatArray
     free_end: FloatArray
+    tail: FloatArray
+    overlap: npt.NDArray[np.bool_]
+    rolled: FloatArray
     friction: float
     slips: tuple[Slip, ...]
 
     @property
     def needed(self) -> FloatArray:
-        """The greatest of the three, shape (nodes,)."""
+        """The greatest of floor, lift-off and free end, shape (nodes,)."""
         return np.asarray(np.maximum.reduce([self.floor, self.lift_off, self.free_end]))
 
     @property
@@ -106,8 +121,10 @@ class Laid(Protocol):
 
 
 class Curve(Laid, Protocol):
-    """With the derivatives of curvature that forces on the floor depend on."""
+    """With its points, and the derivatives of curvature that forces on the floor depend on."""
 
+    @property
+    def points(self) -> FloatArray: ...
     @property
     def curvature_slope(self) -> FloatArray: ...
     @property
@@ -138,8 +155,18 @@ def examine(
         sheared = _BEND_STIFFNESS * np.abs(slope) / s
     free_end = np.nan_to_num(np.maximum(turned, sheared), nan=0.0, posinf=np.inf)
     free_end[0] = free_end[1]
-    slips = _slips(pattern.arc_length, {"floor": floor, "lift-off": lift_off, "free end": free_end}, friction)
-    return Feasibility(pattern.arc_length, floor, lift_off, free_end, friction, slips)
+    tail = np.maximum.accumulate(np.concatenate([[0.0], lift_off[:-1]]))
+    overlap = _overlap(pattern.points, pattern.arc_length, cable.radius)
+    tests = {
+        "floor": floor,
+        "lift-off": lift_off,
+        "free end": free_end,
+        "tail": np.where(lift_off > friction, 0.0, tail),
+        "overlap": np.where(overlap, np.inf, 0.0),
+    }
+    rolled = lgb * _rolled(s, curvature, force[:, 1], cable)
+    slips = _slips(pattern.arc_length, tests, friction)
+    return Feasibility(pattern.arc_length, floor, lift_off, free_end, tail, overlap, rolled, friction, slips)
 
 
 def grasps_along(pattern: Laid, cable: Cable, controller: str) -> Grasp:
@@ -183,6 +210,22 @@ def _floor(s: FloatArray, curvature: FloatArray, slope: FloatArray, bend: FloatA
     at_nodes[1:-1] = np.maximum(size[1:], size[:-1])
     at_nodes[[0, -1]] = size[[0, -1]]
     return at_nodes
+
+
+def _rolled(s: FloatArray, curvature: FloatArray, across: FloatArray, cable: Cable) -> FloatArray:
+    """How far a cable that rolls at lift-off has run ahead [Lgb]."""
+    lgb = cable.gravito_bending_length
+    suspended = (cable.length - 0.5 * JAW) / lgb - s
+    inwards = (cable.radius / lgb) ** 2 * np.abs(across) * suspended / TWIST_STIFFNESS
+    ahead = np.abs(curvature) * inwards
+    return np.concatenate([[0.0], np.cumsum(0.5 * (ahead[1:] + ahead[:-1]) * np.diff(s))])
+
+
+def _overlap(points: FloatArray, arc_length: FloatArray, radius: float) -> npt.NDArray[np.bool_]:
+    """Where a curve comes nearer to a part of itself than two radii, which is not its neighbour."""
+    away = np.linalg.norm(points[:, None] - points[None], axis=-1)
+    far = np.abs(arc_length[:, None] - arc_length[None]) > _NEIGHBOURS * np.pi * radius
+    return np.asarray(((away < 2.0 * radius) & far).any(1))
 
 
 def _slips(arc_length: FloatArray, tests: dict[str, FloatArray], friction: float) -> tuple[Slip, ...]:

@@ -20,6 +20,7 @@ __all__ = ["Pattern"]
 
 FloatArray = npt.NDArray[np.float64]
 _FUNCTION_SAMPLES = 2001
+_EASED = 101  # samples of an average
 _BENT_START = 1.0  # [rad]: curvature at a function's start times its length that asks for a lead-in
 
 
@@ -110,6 +111,78 @@ class Pattern:
             raw = np.concatenate([_lead_in(raw, start, self.lead_in), raw])
         self.raw = raw
         self._resample(smoothing, nodes)
+
+    @classmethod
+    def bends(
+        cls,
+        turns: npt.ArrayLike,
+        radii: npt.ArrayLike,
+        straights: npt.ArrayLike,
+        *,
+        easing: float = 0.1,
+        smoothing: float = 1e-3,
+        nodes: int = 301,
+    ) -> Pattern:
+        """Straight pieces and bends by turns, from the origin along x; the curvature between them changes smoothly.
+
+        Parameters
+        ----------
+        turns : array_like of shape (bends,) [rad]
+            How far each bend turns, positive to the left.
+        radii : array_like of shape (bends,) [m]
+            Of the bends, if they changed into straight pieces at once.
+        straights : array_like of shape (bends + 1,) [m]
+            Lengths of the straight pieces before, between and after them.
+        easing : float [m]
+            Length over which curvature is averaged, with a cosine's weights.
+        smoothing, nodes
+            See `Pattern`.
+
+        Returns
+        -------
+        Pattern
+
+        Raises
+        ------
+        ValueError
+            Numbers of bends that do not fit, radii or easing that are not positive, negative straight pieces, or less
+            than half of the easing before the first bend or after the last.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import withe
+        >>> letter = withe.deployment.Pattern.bends([np.pi], [0.1], [0.15, 0.15])
+        >>> print(f"{letter.length:.2f} m, ends at y = {letter.points[-1, 1]:.2f} m")
+        0.61 m, ends at y = 0.20 m
+        """
+        turned = validation.number_array(turns, "turns", ("bends",))
+        bent = validation.number_array(radii, "radii", (len(turned),))
+        straight = validation.number_array(straights, "straights", (len(turned) + 1,))
+        easing = validation.positive(easing, "easing")
+        if not np.all(bent > 0.0):
+            raise ValueError(f"radii must be positive, got {bent.min():g}")
+        if straight.min() < 0.0 or min(straight[0], straight[-1]) < 0.5 * easing:
+            raise ValueError(
+                f"straights must not be negative, and first and last at least half of easing, {0.5 * easing:g} m,"
+                f" got {straight}"
+            )
+        lengths = np.empty(2 * len(turned) + 1)
+        lengths[::2], lengths[1::2] = straight, np.abs(turned) * bent
+        ends = np.concatenate([[0.0], np.cumsum(lengths)])
+        s = np.linspace(0.0, ends[-1], _FUNCTION_SAMPLES)
+        headings = np.concatenate([[0.0, 0.0], np.repeat(np.cumsum(turned), 2)])
+
+        def heading_at(at: FloatArray) -> FloatArray:
+            return np.asarray(np.interp(at, ends, headings))
+
+        share = (np.arange(_EASED) + 0.5) / _EASED - 0.5
+        weights = 1.0 + np.cos(2.0 * np.pi * share)
+        heading = sum(w * heading_at(s + easing * u) for w, u in zip(weights / weights.sum(), share, strict=True))
+        middle = 0.5 * (heading[1:] + heading[:-1])
+        steps = s[1] * np.stack([np.cos(middle), np.sin(middle)], 1)
+        points = np.concatenate([np.zeros((1, 2)), np.cumsum(steps, axis=0)])
+        return cls(points, smoothing=smoothing, nodes=nodes)
 
     def _resample(self, smoothing: float, nodes: int) -> None:
         from scipy.interpolate import make_interp_spline

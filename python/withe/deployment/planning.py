@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import os
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path as FilePath
 from typing import Any, Literal, get_args
 
@@ -21,6 +22,8 @@ from withe.deployment.motion import Course, Path, Phase, Start, course, lengthen
 from withe.deployment.optimising import optimised, runs
 from withe.deployment.pattern import Pattern
 from withe.deployment.pattern import crossings as crossings_of
+from withe.deployment.placing import require_room
+from withe.deployment.posts import Post
 from withe.io import pose_path, save_poses, written_beside
 
 __all__ = ["Plan", "PlanController", "plan"]
@@ -64,6 +67,8 @@ class Plan:
     needed_friction : ndarray of shape (pattern's nodes,)
         Coefficient that each place of the pattern needs; NaN for "intuitive", which is not computed from forces. An
         "optimised" plan has that of what it began from: where that slips, it makes up for it.
+    posts : tuple of Post
+        Between which the cable is laid.
     """
 
     times: FloatArray
@@ -79,6 +84,7 @@ class Plan:
     speed: float
     fastest: float
     needed_friction: FloatArray
+    posts: tuple[Post, ...] = ()
 
     @property
     def path(self) -> FloatArray:
@@ -152,6 +158,7 @@ class Plan:
                 "deviation": self.pattern.deviation,
                 "needed_friction": [None if not np.isfinite(x) else x for x in self.needed_friction.tolist()],
             },
+            "posts": [asdict(post) for post in self.posts],
             "motion": {
                 "t": self.times.tolist(),
                 "position": self.positions.tolist(),
@@ -173,6 +180,7 @@ def plan(
     tail: float | None = None,
     start: Start = "free",
     crossings: Literal["refuse", "over"] = "refuse",
+    posts: Sequence[Post] = (),
     time_step: float = 0.02,
     progress: bool = True,
 ) -> Plan:
@@ -204,6 +212,8 @@ def plan(
         does not roll, until the jaw opens.
     crossings : {"refuse", "over"}
         Whether pattern and tail may cross: the cable is then laid over itself, as if it had no thickness.
+    posts : sequence of Post
+        Between which the cable is laid. They help to hold it: such a pattern may need more friction than any floor has.
     time_step : float [s]
         Between the rows of the plan.
     progress : bool
@@ -216,9 +226,9 @@ def plan(
     Raises
     ------
     ValueError
-        The cable is shorter than pattern and tail, or cannot bend so tightly; pattern or tail cross; no floor has
-        the friction that the pattern needs; speed, tail, time step or friction not positive; "optimised" without
-        friction.
+        The cable is shorter than pattern and tail, or cannot bend so tightly; pattern or tail cross; a post stands in
+        the way; no floor has the friction that the pattern needs; speed, tail, time step or friction not positive;
+        "optimised" without friction.
 
     Examples
     --------
@@ -235,6 +245,7 @@ def plan(
     time_step = validation.positive(time_step, "time_step")
     validation.choice(crossings, "crossings", ("refuse", "over"))
     validation.choice(start, "start", get_args(Start))
+    require_room(posts, pattern, cable)
     if crossings == "refuse":
         held, tail, path = _uncrossed(pattern, cable, tail)
     else:
@@ -246,11 +257,11 @@ def plan(
         if friction is None:
             raise ValueError("controller 'optimised' needs friction, the floor's coefficient")
         path, followed = _improved(held, pattern, path, validation.positive(friction, "friction"), start, progress)
-        needed = _needed(pattern, held, followed, grasps_along(pattern, held, followed))
+        needed = _needed(pattern, held, followed, grasps_along(pattern, held, followed), bool(posts))
         way = way_along(held, path, grasps_along(path, held, followed))
     else:
         grasps = grasps_along(path, held, controller)
-        needed, way = _needed(pattern, held, controller, grasps), way_along(held, path, grasps)
+        needed, way = _needed(pattern, held, controller, grasps, bool(posts)), way_along(held, path, grasps)
     motion = course(held, path, way, speed, time_step, start)
     return Plan(
         times=motion.times,
@@ -266,6 +277,7 @@ def plan(
         speed=speed,
         fastest=way.fastest(),
         needed_friction=needed,
+        posts=tuple(posts),
     )
 
 
@@ -282,13 +294,13 @@ def _improved(
         return optimised(path, cable, pattern, friction, motion_of, start, shown)
 
 
-def _needed(pattern: Pattern, cable: Cable, controller: Controller, grasps: Grasp) -> FloatArray:
-    """Friction that each place of the pattern needs."""
+def _needed(pattern: Pattern, cable: Cable, controller: Controller, grasps: Grasp, helped: bool) -> FloatArray:
+    """Friction that each place of the pattern needs; refused if no floor has it and nothing else helps."""
     count = len(pattern.points)
     force = np.concatenate([grasps.force, np.repeat(grasps.force[-1:], count, axis=0)])[:count]
     found = examine(pattern, cable, _MOST_FRICTION, controller, force)
-    hopeless = [slip for slip in found.slips if slip.test != "free end"]
-    if hopeless:
+    hopeless = [slip for slip in found.slips if slip.test in ("floor", "lift-off")]
+    if hopeless and not helped:
         raise ValueError(f"no floor holds this cable on this pattern: {max(hopeless, key=lambda slip: slip.needed)}")
     return found.needed
 

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.deployment.cable import JAW, Cable
+from withe.deployment.posts import Post
 from withe.parts.materials import Material
 from withe.recording import Record
 from withe.scene import Scene
@@ -52,6 +53,7 @@ class Setup:
     jaw_turn: tuple[float, float, float] = (0.0, 0.0, 0.0)  # [rad], a rotation vector
     quasi_static: bool = False  # a row of equilibria: neither inertia nor viscosity
     start_held: bool = False  # the free end is guided: it slides up and down only, until the jaw opens
+    posts: tuple[Post, ...] = ()
 
     @property
     def arc_length(self) -> FloatArray:
@@ -131,6 +133,9 @@ def _scene(setup: Setup, points: FloatArray) -> tuple[Scene, Any]:
     scene = Scene(gravity=(0.0, 0.0, -_GRAVITY))
     rod = scene.add_rod(points=points, radius=cable.radius, material=material, name="cable")
     scene.add_floor(friction=setup.friction)
+    for post in setup.posts:
+        foot, head = (post.x, post.y, 0.0), (post.x, post.y, post.height - post.radius)
+        scene.add_capsule(foot, head, post.radius, friction=setup.friction)
     scene.enable_contact(friction=setup.friction)
     return scene, rod
 

@@ -100,7 +100,7 @@ class _Environment:
     def step(self, action: npt.ArrayLike) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Do an action, for one control step."""
         self._check(True)
-        outcome = self._episodes.act(self._episodes.checked([np.asarray(action)], 1), self._lane)
+        outcome = self._episodes.act(self._episodes.checked(np.asarray(action)[None], 1), self._lane)
         self._show()
         info = {"failed": True} if outcome.failed[0] else {}
         return (

@@ -79,7 +79,7 @@ class Task(ABC):
         """Set what actions of the chosen robots mean, shape (chosen, action_size), for the coming control step."""
 
     @abstractmethod
-    def observe(self, robots: Batch) -> FloatArray:
+    def observe(self, robots: Batch) -> npt.NDArray[np.floating[Any]]:
         """What is seen of every robot, shape (n, ...)."""
 
     @abstractmethod

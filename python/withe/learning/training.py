@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 from typing import Any
 
@@ -23,6 +24,7 @@ def train_policy(
     environments: int = 16,
     workers: int | None = None,
     seed: int = 0,
+    callback: Callable[[Any], None] | None = None,
     progress: bool = True,
     **options: Any,
 ) -> Any:
@@ -41,6 +43,8 @@ def train_policy(
         Threads that step them; by default one a processor.
     seed : int
         Equal seeds give equal controllers, where torch runs the same.
+    callback : callable, optional
+        Called with the policy before the first action and after each update: to keep it, or to see how good it is.
     progress : bool
         Whether to show a progress bar on a terminal.
     **options
@@ -71,13 +75,21 @@ def train_policy(
     monitored = require("stable_baselines3.common.vec_env", "learn").VecMonitor(_adapter()(robots))
     given = {"n_steps": max(2, 2048 // number), "batch_size": 256, "device": "cpu"} | options
     policy = baselines.PPO("MlpPolicy", monitored, seed=seed, **given)
-    with progress_bar(total, "training", progress, unit="steps") as bar:
+    base = require("stable_baselines3.common.callbacks", "learn").BaseCallback
 
-        def report(inside: dict[str, Any], _: dict[str, Any]) -> bool:
-            bar.update(min(inside["self"].num_timesteps, total))
+    class Report(base):  # type: ignore[misc,valid-type]
+        def _on_rollout_start(self) -> None:
+            if callback is not None:
+                callback(policy)
+
+        def _on_step(self) -> bool:
+            bar.update(min(self.num_timesteps, total))
             return True
 
-        policy.learn(total, callback=report)
+    with progress_bar(total, "training", progress, unit="steps") as bar:
+        policy.learn(total, callback=Report())
+    if callback is not None:
+        callback(policy)
     return policy
 
 

@@ -105,8 +105,8 @@ class Record:
             `set_natural_curvature`, `set_natural_twist`, `set_natural_stretch`, `set_friction` and `move` (of
             supports), in their order, with ``time`` [s], ``call``, ``target``, ``over`` and ``gradients``, a dict of dL
             over the value that each word was given, shaped like that value (of a ramp: its end; of a rotation: by a
-            rotation vector that turns it). Under the midpoint rules calls of `move` have none where L goes by reaction
-            moments.
+            rotation vector that turns it; of curvatures with ``discrete=True``: by smooth ones). Under the midpoint
+            rules calls of `move` have none where L goes by reaction moments.
 
         Raises
         ------

@@ -236,9 +236,10 @@ class Contacts:
         resolved, unless ``adaptive=False``. Rods shake within after an impact, so that as a whole they part more slowly
         than e says. Surfaces that meet more slowly than sqrt(g r / 100), r the smaller radius, or than the slip
         tolerance, rest on each other, and so do those that stay in contact for longer than an impact lasts. What
-        contact takes for good is part of `Simulation.energy().dissipated`, and what it stores is `.contact`. Friction
-        between rods acts where a step ends, and so changes the angular momentum of what flies free at first order in
-        the step: by a thousandth in an impact of rods that cross, in steps of 2 ms; without friction it is kept.
+        contact takes for good is part of `Simulation.energy().dissipated`, and what it stores is `.contact`.
+        Contact and friction between rods in flight keep their momenta in implicit midpoint and energy-momentum steps;
+        "lagged" and "semi_explicit" friction, which act where a step begins, keep the linear one, and the angular one
+        at first order in the step: to some thousandths in an impact of rods that cross, in steps of 2 ms.
 
         Examples
         --------

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Container, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
@@ -47,10 +47,10 @@ class EquilibriumPath:
     limit_points: npt.NDArray[np.int64]
     finished: bool
     iterations: int
-    _positions: FloatArray
-    _reactions: tuple[FloatArray, FloatArray]
-    _rows: Callable[[Rod | str], npt.NDArray[np.int64]]
-    _support: Callable[[Support | NodeHandle | str], int]
+    _positions: FloatArray = field(repr=False)
+    _reactions: tuple[FloatArray, FloatArray] = field(repr=False)
+    _rows: Callable[[Rod | str], npt.NDArray[np.int64]] = field(repr=False)
+    _support: Callable[[Support | NodeHandle | str], int] = field(repr=False)
 
     def positions(self, rod: Rod | str | None = None) -> FloatArray:
         """Positions of the nodes of a rod, or of every node once, shape (points, nodes, 3) [m]."""

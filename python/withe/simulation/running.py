@@ -14,6 +14,7 @@ from withe.common import validation
 from withe.common.progress import progress as progress_bar
 from withe.recording.record import Record
 from withe.simulation.loop import Run
+from withe.simulation.remote import run_on
 from withe.simulation.simulation import Simulation
 
 __all__ = ["listed_simulations", "run_many", "thread_count"]
@@ -24,6 +25,7 @@ def run_many(
     duration: float,
     *,
     workers: int | None = None,
+    client: Any = None,
     errors: Literal["raise", "return"] = "raise",
     record_every: float | None = None,
     progress: bool | Literal["always"] = True,
@@ -40,6 +42,10 @@ def run_many(
     duration : float [s]
     workers : int
         Number of threads; by default one a processor.
+    client : dask.distributed.Client, optional
+        Runs them on its workers, in other processes or on other machines that have withe, in place of threads. Each
+        ends in the state that its run came to, with the same bits where processors are alike; `Simulation.record` stays
+        what it was. Functions are sent along.
     errors : {"raise", "return"}
         Whether the first exception ends everything, or takes the place of its record.
     record_every, progress, before_step, until, record
@@ -53,14 +59,27 @@ def run_many(
     Raises
     ------
     ValueError
-        Something that is not a simulation, or one that is there twice.
+        Something that is not a simulation, or one that is there twice; workers beside a client, or not a client.
+    ImportError
+        A client is given and Dask is not installed.
     ConvergenceError, KeyboardInterrupt, or what a callback raised
-        With errors="raise"; every simulation keeps what it recorded until then.
+        With errors="raise"; every simulation keeps what it recorded until then. On a client those that did not end
+        stay where they were.
+
+    Examples
+    --------
+    >>> from dask.distributed import Client  # doctest: +SKIP
+    >>> records = withe.run_many(simulations, 2.0, client=Client("tcp://scheduler:8786"))  # doctest: +SKIP
     """
     listed = listed_simulations(simulations)
     if len({id(simulation) for simulation in listed}) < len(listed):
         raise ValueError("simulations must differ: one is there twice, take a copy()")
     validation.choice(errors, "errors", ("raise", "return"))
+    if client is not None:
+        if workers is not None:
+            raise ValueError("workers is a number of threads of this process: leave it out beside client")
+        options = {"record_every": record_every, "before_step": before_step, "until": until, "record": record}
+        return run_on(client, listed, duration, errors, progress, options)
     threads = thread_count(workers)
     runs = [
         Run(simulation, simulation._stepping, duration, record_every, before_step, until, record)

@@ -1,0 +1,91 @@
+"""A stiff cable is placed between posts: a letter that the floor alone would not hold, S or U.
+
+A USB cable (the fifth of the dissertation, Lgb = 80 mm) is laid down between pairs of posts that leave 3 mm on either
+side of it. While it is laid the jaw keeps it on its pattern; what friction does not hold then, the posts do. The
+intuitive way, with the jaw straight above the place where the cable touches down, misses them.
+
+Writes out/place_cable.png.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from withe.deployment import Cable, Deployment, Pattern, deploy, plan, posts_along
+
+FRICTION = 0.4
+EASING = 0.14  # [m]
+LETTERS = {  # turns [rad], radii, straight pieces [m]; where posts stand, as shares of the way
+    "U": ((np.pi,), (0.095,), (0.14, 0.14), np.linspace(0.12, 0.88, 7)),
+    "S": ((1.8, -1.8), (0.105, 0.105), (0.09, 0.05, 0.08), np.linspace(0.1, 0.85, 8)),
+}
+COLOURS = {"exact": "#3465a4", "intuitive": "#b2182b"}
+
+
+def laid(letter: str, controller: str, nodes: int) -> Deployment:
+    """The cable after it was placed, through equilibria."""
+    turns, radii, straights, shares = LETTERS[letter]
+    pattern, cable = Pattern.bends(turns, radii, straights, easing=EASING), Cable.dlo(5)
+    posts = posts_along(pattern, cable, shares * pattern.length)
+    motion = plan(cable, pattern, controller, posts=posts, crossings="over")
+    return deploy(motion, floor=FRICTION, quasi_static=True, nodes=nodes, progress=False)
+
+
+def draw(axes: object, letter: str, found: dict[str, Deployment]) -> None:
+    """From above: posts, and where each way of laying left the cable."""
+    import matplotlib.pyplot as plt
+
+    turns, radii, straights, shares = LETTERS[letter]
+    pattern, cable = Pattern.bends(turns, radii, straights, easing=EASING), Cable.dlo(5)
+    for post in posts_along(pattern, cable, shares * pattern.length):
+        axes.add_patch(plt.Circle((1e3 * post.x, 1e3 * post.y), 1e3 * post.radius, color="0.55"))
+    axes.plot(*(1e3 * pattern.points.T), color="0.6", lw=0.8, ls=":", label="pattern")
+    for way, result in found.items():
+        missed = int((~result.passed).sum())
+        axes.plot(
+            *(1e3 * result.laid[:, :2].T),
+            color=COLOURS[way],
+            lw=2.5 if way == "exact" else 1.5,
+            label=f"{way}: {missed} of {len(result.passed)} posts missed",
+        )
+    axes.set(aspect="equal", xlabel="x [mm]", ylabel="y [mm]", title=letter)
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), frameon=False)
+
+
+def main() -> None:
+    """Place, check, draw."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--nodes", type=int, default=150, help="of the cable")
+    parser.add_argument("--letters", nargs="*", choices=LETTERS, default=list(LETTERS))
+    parser.add_argument("--out", type=Path, default=Path("out"))
+    arguments = parser.parse_args()
+    arguments.out.mkdir(parents=True, exist_ok=True)
+
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    figure, axes = plt.subplots(1, len(arguments.letters), figsize=(10.0, 4.4), layout="constrained", squeeze=False)
+    placed = True
+    for panel, letter in zip(axes[0], arguments.letters, strict=True):
+        found = {way: laid(letter, way, arguments.nodes) for way in COLOURS}
+        for way, result in found.items():
+            print(
+                f"{letter}, {way}: passes {result.passed.sum()} of {len(result.passed)} posts on its side", flush=True
+            )
+        placed &= bool(found["exact"].passed.all()) and not found["intuitive"].passed.all()
+        draw(panel, letter, found)
+    path = arguments.out / "place_cable.png"
+    figure.savefig(path, dpi=130)
+    print(f"Wrote {path}.")
+    if not placed:
+        sys.exit("The exact way must pass every post on its right side, the intuitive one must not.")
+
+
+if __name__ == "__main__":
+    main()
