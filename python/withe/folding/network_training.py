@@ -89,7 +89,7 @@ def train(
             loss="squared" if small else "absolute",
             weights=_WEIGHTS if small else 1.0,
             scale_outputs=small,
-            schedule=Cosine(epochs=300, batch=2048, rate=8e-3) if small else Alternating(),
+            schedule=Cosine(epochs=500, batch=2048, rate=8e-3) if small else Alternating(),
             held_out=0.05 if small else 0.2,
             seed=seed,
             threads=threads,
@@ -115,7 +115,7 @@ def _spread(random: np.random.Generator, count: int) -> Elastica:
     """Sheets spread evenly over what the small network is asked: many of them where x is small."""
 
     def draw(many: int) -> tuple[FloatArray, FloatArray]:
-        length = np.exp(random.uniform(*np.log(_STRAIGHT), many))
+        length = np.exp(random.uniform(np.log(_STRAIGHT[0]), np.log(_STRAIGHT[1]), many))
         angle = random.uniform(0.02, 0.5 * np.pi, many)
         tip = 2.0 * length * np.sin(angle)  # distance from where it lay
         return tip * np.sin(angle), tip * np.cos(angle)

@@ -107,7 +107,8 @@ FORMS = {
 class SheetNetwork:
     """What a network has learned of sheets that hang from a jaw without moment. `train` makes one, `load` reads one.
 
-    Its answers are those of `elastica(x, z)`, about right; it cannot say that a sheet touches the table elsewhere.
+    Its answers are those of `elastica(x, z)`, about right. It cannot say that a sheet touches the table elsewhere,
+    so it also answers at x > 9.1, z < .8, where `elastica` refuses most positions for that.
 
     Attributes
     ----------

@@ -11,11 +11,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from withe.common import validation
+from withe.common.extras import require
 from withe.common.progress import progress as progress_bar
 from withe.folding.closed_loop import fold
 from withe.folding.hanging_strip import measure
@@ -61,7 +62,7 @@ class Trial:
     """
 
     paper: Paper
-    target: float | str = "half"
+    target: float | Literal["half"] = "half"
     seed: int = 0
     noise: Noise = field(default_factory=Noise)
     replans: int = 0
@@ -123,7 +124,9 @@ def run_trials(
     Raises
     ------
     ValueError
-        Not trials, or both processes and a client.
+        Not trials, both processes and a client, or not a client.
+    ImportError
+        Dask is not installed, and there is a client.
     """
     trials = list(trials)
     for each in trials:
@@ -131,6 +134,8 @@ def run_trials(
             raise ValueError(f"trials must be Trials, got {each!r:.80}")
     if client is not None and processes is not None:
         raise ValueError("trials run in processes or on a client, not in both")
+    if client is not None and not isinstance(client, require("distributed", "cluster").Client):
+        raise ValueError(f"client must be a dask.distributed.Client, got {type(client).__name__}")
     count = validation.integer(os.cpu_count() or 1 if processes is None else processes, "processes", 1, 10_000)
     return _run(trials, min(count, len(trials)), client, progress)
 
