@@ -15,7 +15,7 @@ def tumbling(number: int) -> tuple[withe.Scene, list[Any], np.random.Generator]:
     random = np.random.default_rng([7, number])
     scene = withe.Scene(gravity=(0.0, 0.0, 0.0))
     rods, height = [], 0.0
-    for k in range(3):
+    for _ in range(3):
         radius = random.uniform(3e-3, 6e-3)
         height += radius
         s = np.linspace(-HALF_LENGTH, HALF_LENGTH, int(random.integers(9, 16)))

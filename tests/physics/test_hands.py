@@ -310,7 +310,8 @@ def test_an_equilibrium_follows_a_hand_that_yields_as_it_turns(planar):
             turn = rods.rotation((0.0, 1.0, 0.0), np.radians(degrees) * (k + 1) / parts)
             simulation.move(hand, rotation=turn @ axes)
             found = simulation.equilibrium()
-            assert found.stable and not found.branch_changed
+            assert found.stable
+            assert not found.branch_changed
         return simulation.positions(arm), np.linalg.norm(simulation.deflection(hand).turn)
 
     at_once, in_parts = turned(1), turned(34)
