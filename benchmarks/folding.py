@@ -7,12 +7,12 @@ Draws the manifold of sheets that are held without moment, the ridge that has to
 
 from __future__ import annotations
 
-import time
 import warnings
-from collections.abc import Callable
 from dataclasses import replace
 
+import folding_network
 import numpy as np
+from folding_network import processor_seconds
 from reporting import OUT, Report, arguments, bar
 from scipy import ndimage
 
@@ -45,16 +45,6 @@ def holding_of(paper: folding.Paper, curvature: float, jaw: folding.Jaw | None =
     jaw, lgb = jaw or folding.Jaw(), paper.gravito_bending_length
     sizes = (jaw.depth / lgb, jaw.finger / lgb, paper.thickness / lgb)
     return Holding((paper.length - jaw.depth) / lgb, *sizes, curvature, 0.0)
-
-
-def processor_seconds(call: Callable[[], object], repeats: int) -> float:
-    """Of the fastest of some runs, for the machine may be busy; all threads together."""
-    seconds = []
-    for _ in range(repeats):
-        start = time.process_time()
-        call()
-        seconds.append(time.process_time() - start)
-    return min(seconds)
 
 
 def scattered(count: int) -> tuple[np.ndarray, np.ndarray]:
@@ -132,7 +122,7 @@ def bottleneck(
     """
     hold, lgb = holding_of(paper, 1.0, jaw), paper.gravito_bending_length
     x = (paper.length if target == "half" else target) / lgb
-    goal = moment_free.goal_pose(x, hold.thickness, hold.depth, hold.finger)
+    goal = moment_free.goal_pose(folding.elastica, x, hold.thickness, hold.depth, hold.finger)
     if goal is None or goal.suspended[0] >= hold.length:
         return None
     raised = grid.lift()
@@ -293,6 +283,7 @@ def main() -> None:
     report = Report("folding", quick=options.quick)
     equilibria(report, options.quick)
     speed(report, options.quick)
+    folding_network.compare(report, options.quick)
     tops = ridge(report, options.quick)
     if not options.quick:
         draw(tops.get("A4 half"))

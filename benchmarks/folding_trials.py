@@ -1,23 +1,25 @@
 """Sheets of the dissertation's chapter 7 folded in simulation, with noise that no planner sees, beside its table 7.2.
 
-python benchmarks/folding_trials.py [--quick] [--trials 3] [--cases "A4 half" ...]
+python benchmarks/folding_trials.py [--quick] [--trials 3] [--cases "A4 half" ...] [--ways ucs ...] [--resume]
+
+Every fold is printed, and written to out/benchmarks/folding_trials.jsonl, as it ends. Ctrl-C makes the tables of what
+there is; --resume goes on after that.
 """
 
 from __future__ import annotations
 
-import multiprocessing
+import argparse
+import contextlib
+import json
 import os
-import warnings
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from itertools import product
-from typing import get_args
+from pathlib import Path
 
 import numpy as np
-from reporting import OUT, Report, arguments, bar
+from reporting import OUT, Report, arguments
 
 from withe import folding
-from withe.folding.planning import Method
 
 CASES = {
     "A4 half": (folding.Paper.a4(), "half"),
@@ -45,91 +47,116 @@ SEEDS = 1000  # the first of them
 COARSE = {"edges": 75, "time_step": 0.02}
 
 
+Key = tuple[str, float, str]  # case, friction, way
+
+
+def trial_of(key: Key, seed: int, sheet: dict) -> folding.Trial:
+    """One fold: its sheet differs from the paper in what the seed says."""
+    case, friction, way = key
+    paper, target = CASES[case]
+    asked, watched = WAYS[way]
+    return folding.Trial(
+        replace(paper, friction=friction),
+        target,
+        seed,
+        replans=5 if watched else 0,
+        planner={"curvature": CURVATURES.get(case, 2.5), **asked},
+        sheet=sheet,
+        name=name_of(key),
+    )
+
+
+def name_of(key: Key) -> str:
+    """Of a trial."""
+    return ", ".join(map(str, key))
+
+
 @dataclass(frozen=True)
-class Trial:
-    """One fold: what was asked for, and what came of it; no plan where `failure` begins with "no plan"."""
+class Folded:
+    """What came of one, as a line of a file."""
 
     case: str
     friction: float
     way: str
     seed: int
-    length: float = np.nan
-    error: float = np.nan
-    slide: float = np.nan
-    curvature: float = np.nan
-    failure: str | None = None
+    sheet: dict
+    length: float
+    error: float
+    slide: float
+    curvature: float
+    failure: str | None
+    seconds: float
+
+    @property
+    def key(self) -> Key:
+        """Which group it belongs to."""
+        return self.case, self.friction, self.way
+
+    @classmethod
+    def of(cls, key: Key, outcome: folding.Outcome) -> Folded:
+        """From what `run_trials` hands out."""
+        return cls(
+            *key,
+            outcome.trial.seed,
+            dict(outcome.trial.sheet),
+            outcome.length,
+            outcome.error,
+            outcome.slide,
+            outcome.max_curvature,
+            outcome.failure,
+            outcome.seconds,
+        )
+
+    def __str__(self) -> str:
+        head = f"{self.case}, {self.friction:g}, {self.way}, seed {self.seed}: "
+        done = f"error {1e3 * self.error:.2f} mm, slide {1e3 * self.slide:.2f} mm"
+        return f"{head}{self.failure or done} ({self.seconds:.0f} s)"
 
 
-def carry_out(trial: Trial, options: dict) -> Trial:
-    """Measure the sheet's Lgb from a picture, plan with that and with the friction of the table's data, and fold."""
-    paper, target = CASES[trial.case]
-    paper = replace(paper, friction=trial.friction)
-    sheet = folding.SimulatedSheet(paper, trial.seed, folding.Noise(), **options)
-    measured = folding.measure(image=sheet.strip_picture(), scale=4000.0).gravito_bending_length
-    asked, watched = WAYS[trial.way]
-    asked = {"curvature": CURVATURES.get(trial.case, 2.5), **asked}
+def known(file: Path) -> list[Folded]:
+    """Folds of an earlier run, the last line perhaps cut off."""
+    folds = []
+    for line in file.read_text().splitlines() if file.exists() else ():
+        with contextlib.suppress(json.JSONDecodeError):
+            folds.append(Folded(**json.loads(line)))
+    return folds
+
+
+def run(wanted: dict[Key, list[folding.Trial]], options: argparse.Namespace) -> tuple[list[Folded], bool]:
+    """Carry out trials; each is printed and written as it ends. Returns them, and whether all came to their end."""
+    file = OUT / "folding_trials.jsonl"
+    OUT.mkdir(parents=True, exist_ok=True)
+    if not options.resume:
+        file.unlink(missing_ok=True)
+    asked = [(key, trial.seed, trial.sheet) for key, trials in wanted.items() for trial in trials]
+    folds = [fold for fold in known(file) if (fold.key, fold.seed, fold.sheet) in asked]
+    done = {(fold.key, fold.seed) for fold in folds}
+    left = [trial for key, trials in wanted.items() for trial in trials if (key, trial.seed) not in done]
+    keys = {name_of(key): key for key in wanted}
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UserWarning)  # of slide that is predicted: it is measured here
-            plan = folding.plan(replace(paper, gravito_bending_length=measured), target, **asked)
-    except ValueError as error:
-        return replace(trial, failure=f"no plan: {error}")
-    try:
-        fold = folding.fold(plan, sheet, progress=False) if watched else sheet.fold(plan, progress=False)
-    except ValueError as error:
-        return replace(trial, failure=f"no plan on the way: {error}")
-    return replace(
-        trial,
-        length=fold.length,
-        error=fold.error,
-        slide=fold.slide,
-        curvature=fold.max_curvature,
-        failure=fold.failure,
-    )
+        for outcome in folding.run_trials(left, processes=options.processes):
+            folds.append(Folded.of(keys[outcome.trial.name], outcome))
+            with file.open("a") as stream:
+                stream.write(json.dumps(asdict(folds[-1])) + "\n")
+            print(folds[-1], flush=True)
+    except KeyboardInterrupt:
+        print(f"\ninterrupted: {len(folds)} folds of {len(asked)} are in the table; --resume goes on", flush=True)
+        return folds, False
+    return folds, True
 
 
-def run(
-    groups: dict[tuple[str, float, str], list[Trial]], options: dict, processes: int
-) -> dict[tuple[str, float, str], list[Trial]]:
-    """Carry out all trials, in processes: what moves a jaw is Python's, of which one thread runs at a time."""
-    total = sum(len(trials) for trials in groups.values())
-    with bar(total, "folding", "folds") as shown:
-        if processes == 1:
-            done = {}
-            for key, trials in groups.items():
-                done[key] = []
-                for trial in trials:
-                    done[key].append(carry_out(trial, options))
-                    shown.advance(1)
-            return done
-        context = multiprocessing.get_context("spawn")
-        with ProcessPoolExecutor(processes, mp_context=context) as pool:
-            futures = {
-                pool.submit(carry_out, trial, options): (key, i)
-                for key, trials in groups.items()
-                for i, trial in enumerate(trials)
-            }
-            try:
-                for future in as_completed(futures):
-                    key, i = futures[future]
-                    groups[key][i] = future.result()
-                    shown.advance(1)
-            except BaseException:
-                pool.shutdown(wait=False, cancel_futures=True)
-                raise
-    return groups
-
-
-def row(trials: list[Trial]) -> tuple[str, ...]:
+def row(folds: list[Folded], count: int) -> tuple[str, ...]:
     """A line of the table."""
-    first, folded = trials[0], [trial for trial in trials if trial.failure is None]
+    first, folded = folds[0], [fold for fold in folds if fold.failure is None]
     published = PUBLISHED.get(first.case, {}).get(first.way, "") if first.friction == FRICTIONS[0] else ""
-    head = (first.case, f"{first.friction:g}", first.way, f"{len(folded)} of {len(trials)}")
+    of = f"{len(folds)}" if len(folds) == count else f"{len(folds)}, {count - len(folds)} not run"
+    head = (first.case, f"{first.friction:g}", first.way, f"{len(folded)} of {of}")
+    seconds = f"{np.mean([fold.seconds for fold in folds]):.0f}"
     if not folded:
-        why = "no plan" if all((trial.failure or "").startswith("no plan") for trial in trials) else "none folds"
-        return (*head, why, published, "", "", "")
-    lengths, errors = np.array([t.length for t in folded]), np.abs([t.error for t in folded])
-    slides, curvatures = [t.slide for t in folded], [t.curvature for t in folded]
+        why = "no plan" if all((fold.failure or "").startswith("no plan") for fold in folds) else "none folds"
+        return (*head, why, published, "", "", "", seconds)
+    lengths, errors = np.array([f.length for f in folded]), np.abs([f.error for f in folded])
+    slides, curvatures = [f.slide for f in folded], [f.curvature for f in folded]
     return (
         *head,
         f"{100 * lengths.mean():.2f} {100 * lengths.std():.2f}",
@@ -137,21 +164,22 @@ def row(trials: list[Trial]) -> tuple[str, ...]:
         f"{1e3 * np.median(errors):.2f} {1e3 * errors.max():.2f}",
         f"{1e3 * np.mean(slides):.2f} {1e3 * np.std(slides):.2f}",
         f"{max(curvatures):.0f}",
+        seconds,
     )
 
 
-def goals(report: Report, groups: dict[tuple[str, float, str], list[Trial]]) -> None:
+def goals(report: Report, groups: dict[Key, list[Folded]]) -> None:
     """On the slippery table: what is folded without a camera, and with one."""
-    for (case, friction, way), trials in groups.items():
+    for (case, friction, way), folds in groups.items():
         soft = case in ("A4 half", "A4 .25", "US half")
         if friction != FRICTIONS[0] or way not in ("slip", "ucs closed") or (way == "slip" and not soft):
             continue
         bound = 0.5e-3 if way == "slip" else 1e-3 if soft else 5e-3
-        good = [t.failure is None and abs(t.error) < bound and (way != "slip" or abs(t.slide) < 1e-3) for t in trials]
+        good = [f.failure is None and abs(f.error) < bound and (way != "slip" or abs(f.slide) < 1e-3) for f in folds]
         report.goal(f"{case}, {way}: share within {1e3 * bound:g} mm", float(np.mean(good)), 0.95)
 
 
-def draw(groups: dict[tuple[str, float, str], list[Trial]]) -> None:
+def draw(groups: dict[Key, list[Folded]]) -> None:
     """Errors of all trials, case by case, those that failed at the border."""
     import matplotlib
 
@@ -168,9 +196,9 @@ def draw(groups: dict[tuple[str, float, str], list[Trial]]) -> None:
         for j, way in enumerate(ways):
             places, errors = [], []
             for i, case in enumerate(cases):
-                for trial in groups.get((case, friction, way), []):
+                for fold in groups.get((case, friction, way), []):
                     places.append(i + 0.8 * (j + 0.5) / len(ways) - 0.4)
-                    errors.append(1e3 * abs(trial.error) if trial.failure is None else 300.0)
+                    errors.append(1e3 * abs(fold.error) if fold.failure is None else 300.0)
             panel.plot(places, np.maximum(errors, 1e-2), ".", label=way, alpha=0.7)
         panel.set(yscale="log", ylim=(8e-3, 400), ylabel="error of the crease [mm]", title=f"friction {friction:g}")
         panel.set_xticks(range(len(cases)), cases)
@@ -190,15 +218,21 @@ def main() -> None:
         ("--trials", {"type": int, "default": 3}),
         ("--cases", {"nargs": "*", "choices": list(CASES), "default": list(CASES)}),
         ("--frictions", {"nargs": "*", "type": float, "default": list(FRICTIONS)}),
+        ("--ways", {"nargs": "*", "choices": list(WAYS), "default": list(WAYS)}),
         ("--processes", {"type": int, "default": os.cpu_count() or 1}),
+        ("--edges", {"type": int, "default": 150, "help": "of the sheet"}),
+        ("--time-step", {"type": float, "default": 0.01, "help": "[s]"}),
+        ("--resume", {"action": "store_true", "help": "keep the folds of an earlier run"}),
     )
-    ways = [way for way, (asked, _) in WAYS.items() if asked["method"] in get_args(Method)]
-    cases, frictions, count, sheet = options.cases, options.frictions, options.trials, {}
+    cases, frictions, ways, count = options.cases, options.frictions, options.ways, options.trials
+    sheet = {"edges": options.edges, "time_step": options.time_step}
     if options.quick:
-        cases, frictions, count, ways, sheet = cases[:1], frictions[:1], 1, ["ucs closed"], COARSE
+        cases, frictions, count, ways, sheet, options.processes = cases[:1], frictions[:1], 1, ["ucs closed"], COARSE, 1
     report = Report("folding_trials", quick=options.quick)
-    groups = {key: [Trial(*key, SEEDS + i) for i in range(count)] for key in product(cases, frictions, ways)}
-    groups = run(groups, sheet, 1 if options.quick else options.processes)
+    wanted = {key: [trial_of(key, SEEDS + i, sheet) for i in range(count)] for key in product(cases, frictions, ways)}
+    folds, whole = run(wanted, options)
+    groups = {key: [fold for fold in folds if fold.key == key] for key in wanted}
+    groups = {key: folds for key, folds in groups.items() if folds}
     header = (
         "case",
         "friction",
@@ -209,16 +243,15 @@ def main() -> None:
         "error [mm]",
         "slide [mm]",
         "curv. [1/m]",
+        "s a fold",
     )
-    report.table("Folds: mean and spread; error: median and greatest", header, [row(t) for t in groups.values()])
-    report.figures["failures"] = [
-        f"{t.case}, {t.friction:g}, {t.way}, seed {t.seed}: {t.failure}"
-        for ts in groups.values()
-        for t in ts
-        if t.failure
-    ]
-    goals(report, groups)
-    draw(groups)
+    rows = [row(folds, count) for folds in groups.values()]
+    report.table("Folds: mean and spread; error: median and greatest", header, rows)
+    report.figures["failures"] = [str(fold) for fold in folds if fold.failure]
+    if whole:
+        goals(report, groups)
+    if groups:
+        draw(groups)
     report.write()
 
 

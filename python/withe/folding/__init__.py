@@ -13,13 +13,16 @@ from withe.folding.closed_loop import fold
 from withe.folding.hanging_strip import Measured, droop, measure
 from withe.folding.jaw import Jaw
 from withe.folding.manifold import elastica
+from withe.folding.network_training import train
 from withe.folding.noise import Noise
 from withe.folding.paper import Paper
 from withe.folding.planning import plan, replan
 from withe.folding.plans import Plan
 from withe.folding.seeing import SeenEdge, find_edge, overhead_camera
+from withe.folding.sheet_network import SheetNetwork
 from withe.folding.sheets import Elastica
 from withe.folding.simulated_sheet import Fold, SimulatedSheet
+from withe.folding.trials import Outcome, Trial, run_trials
 
 __all__ = [
     "Elastica",
@@ -27,10 +30,13 @@ __all__ = [
     "Jaw",
     "Measured",
     "Noise",
+    "Outcome",
     "Paper",
     "Plan",
     "SeenEdge",
+    "SheetNetwork",
     "SimulatedSheet",
+    "Trial",
     "droop",
     "elastica",
     "find_edge",
@@ -39,4 +45,6 @@ __all__ = [
     "overhead_camera",
     "plan",
     "replan",
+    "run_trials",
+    "train",
 ]

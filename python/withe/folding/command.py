@@ -33,6 +33,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser.add_argument("--method", choices=["ucs", "slip", "local", "intuitive"], default="ucs")
     parser.add_argument("--grasp", choices=["moment_free", "free"], default="moment_free")
     parser.add_argument("--curvature", type=float, default=2.5, metavar="K", help="bound of a free grasp [1/Lgb]")
+    parser.add_argument("--manifold", choices=["exact", "network"], default="exact")
     parser.add_argument("--out", type=Path, default=Path("fold.csv"), help="NAME.csv or NAME.json")
     parser.set_defaults(run=run)
 
@@ -54,6 +55,7 @@ def run(arguments: argparse.Namespace) -> int:
             method=arguments.method,
             grasp=arguments.grasp,
             curvature=arguments.curvature,
+            manifold=arguments.manifold,
         )
     for warning in said:
         sys.stderr.write(f"withe: {warning.message}\n")

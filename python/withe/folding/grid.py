@@ -7,6 +7,7 @@ positions say little where so short a part is lifted.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -14,13 +15,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from withe.folding.manifold import elastica
 from withe.folding.sheets import Elastica, at_forces, join, take
 
-__all__ = ["SPACING", "Grid", "Network", "gentle", "lift", "make_grid", "make_network", "shortest_path"]
+__all__ = ["SPACING", "Grid", "Network", "Solve", "gentle", "lift", "make_grid", "make_network", "shortest_path"]
 
 FloatArray = npt.NDArray[np.float64]
 IndexArray = npt.NDArray[np.intp]
+Solve = Callable[[npt.ArrayLike, npt.ArrayLike], Elastica]
+"""Equilibria without moment at positions x, z: `elastica`, or a network that has learned it."""
 
 SPACING = 0.0548
 _WIDE, _HIGH = 10.3, 4.7  # [Lgb] of what sheets of up to 6.84 Lgb reach
@@ -83,11 +85,11 @@ def gentle(lifted: FloatArray) -> FloatArray:
 
 
 @cache
-def make_grid(spacing: float = SPACING) -> Grid:
+def make_grid(solve: Solve, spacing: float = SPACING) -> Grid:
     """Solve the middles of all blocks; edges join neighbours, also over corners, and the lift with blocks nearby."""
     columns, rows = int(_WIDE / spacing), int(_HIGH / spacing)
     x, z = np.meshgrid(spacing * (np.arange(columns) + 0.5), spacing * (np.arange(rows) + 0.5), indexing="ij")
-    blocks = elastica(x, z)
+    blocks = solve(x, z)
     raised = lift()
     name = np.full((columns, rows), -1)
     name[blocks.valid] = len(raised.x) + np.arange(blocks.valid.sum())

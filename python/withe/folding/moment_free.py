@@ -8,8 +8,7 @@ from functools import lru_cache
 import numpy as np
 import numpy.typing as npt
 
-from withe.folding.grid import Network, gentle, lift, make_grid, make_network, shortest_path
-from withe.folding.manifold import elastica
+from withe.folding.grid import Network, Solve, gentle, lift, make_grid, make_network, shortest_path
 from withe.folding.sheets import Elastica, at_forces, join, poses_of, slides_to_rest, take
 
 __all__ = ["PENALTY", "goal_pose", "greedy", "least_slide", "smoothed", "uniform_cost"]
@@ -19,7 +18,7 @@ PENALTY = 0.958  # [Lgb] shorter lifted parts would be bent too sharply [7.8.5]
 _MOST_STEPS = 2000
 
 
-def goal_pose(x: float, z: float, depth: float, finger: float) -> Elastica | None:
+def goal_pose(solve: Solve, x: float, z: float, depth: float, finger: float) -> Elastica | None:
     """Pose without moment whose outer edge, `depth` beyond, is at x and finger's height over z; None if there is none.
 
     `finger`: thickness of that between the edge and what lies under it.
@@ -28,7 +27,7 @@ def goal_pose(x: float, z: float, depth: float, finger: float) -> Elastica | Non
     last_change = 0.0
     for i in range(60):  # the secant method, from one step to what is found
         inner = (x - depth + depth * np.cos(angle), z + finger * abs(np.cos(angle)) - depth * np.sin(angle))
-        pose = elastica([inner[0]], [inner[1]])
+        pose = solve([inner[0]], [inner[1]])
         if not pose.valid[0]:
             return None
         change = float(pose.angle[0]) - angle
@@ -40,34 +39,36 @@ def goal_pose(x: float, z: float, depth: float, finger: float) -> Elastica | Non
     return None
 
 
-def uniform_cost(length: float, goal: Elastica, start: Elastica | None = None) -> Elastica | None:
+def uniform_cost(solve: Solve, length: float, goal: Elastica, start: Elastica | None = None) -> Elastica | None:
     """Nodes from flat, or a pose, to a goal over a sheet's part of the manifold, at least accumulated force ratio."""
-    return shortest_path(_by_ratio(length), start, goal)
+    return shortest_path(_by_ratio(solve, length), start, goal)
 
 
 @lru_cache(maxsize=8)
-def _by_ratio(length: float) -> Network:
-    grid = make_grid()
-    return make_network(grid, grid.pose.force_ratio, _allowed(length))
+def _by_ratio(solve: Solve, length: float) -> Network:
+    grid = make_grid(solve)
+    return make_network(grid, grid.pose.force_ratio, _allowed(solve, length))
 
 
-def _allowed(length: float) -> npt.NDArray[np.bool_]:
+def _allowed(solve: Solve, length: float) -> npt.NDArray[np.bool_]:
     """Nodes of the grid that are part of a sheet's manifold."""
-    grid = make_grid()
+    grid = make_grid(solve)
     lifted = grid.pose.suspended
     allowed = (lifted < length) & (lifted > PENALTY)
     allowed[: grid.lifts] = lift().suspended < length
     return allowed
 
 
-def least_slide(length: float, friction: float, goal: Elastica, start: Elastica | None = None) -> Elastica | None:
+def least_slide(
+    solve: Solve, length: float, friction: float, goal: Elastica, start: Elastica | None = None
+) -> Elastica | None:
     """Nodes of the shortest path on which the sheet slides least, bends counted.
 
     At each pose there is a range of slides at which friction holds the sheet, and it slides no further than to the
     nearer end of that; so what a path slides is the farthest of these ends from 0.
     """
-    grid = make_grid()
-    slide, allowed = _needed_slide(length, friction), _allowed(length)
+    grid = make_grid(solve)
+    slide, allowed = _needed_slide(solve, length, friction), _allowed(solve, length)
     cost = 1.0 + 0.4 * grid.pose.max_curvature
     low, high = 0.0, float(slide[allowed & np.isfinite(slide)].max())
 
@@ -86,23 +87,23 @@ def least_slide(length: float, friction: float, goal: Elastica, start: Elastica 
 
 
 @lru_cache(maxsize=8)
-def _needed_slide(length: float, friction: float) -> FloatArray:
+def _needed_slide(solve: Solve, length: float, friction: float) -> FloatArray:
     """How far a sheet must have slid at each node of the grid, for friction to hold it there [Lgb]."""
-    pose = make_grid().pose
+    pose = make_grid(solve).pose
     ratio = np.abs(pose.tangential_force) / (pose.normal_force + length - pose.suspended)
     slide = np.zeros(len(ratio))
-    slides = _allowed(length) & (ratio > friction)
+    slides = _allowed(solve, length) & (ratio > friction)
     slide[slides] = slides_to_rest(take(pose, slides), friction, length)
     return slide
 
 
-def greedy(length: float, goal: Elastica) -> Elastica | None:
+def greedy(solve: Solve, length: float, goal: Elastica) -> Elastica | None:
     """From pose to pose next to it, always that of least tangential force, back over the sheet [Petrik 2016].
 
     Looks no further than one step of a block, within 60 degrees of where it goes, and comes down when it is over the
     goal; None where it comes to an end before.
     """
-    grid = make_grid()
+    grid = make_grid(solve)
     raised = lift()
     way = take(raised, slice(0, int(np.searchsorted(raised.suspended, 0.95 * length))))  # no force: nothing is less
     heading, turns = 0.5 * np.pi, np.linspace(-np.pi / 3, np.pi / 3, 25)
@@ -112,7 +113,7 @@ def greedy(length: float, goal: Elastica) -> Elastica | None:
         around = heading + turns
         x, z = way.x[-1] + grid.spacing * np.cos(around), way.z[-1] + grid.spacing * np.sin(around)
         ahead = (x >= way.x[-1]) & (z > 0)
-        pose = elastica(x[ahead], z[ahead])
+        pose = solve(x[ahead], z[ahead])
         good = pose.valid & (pose.suspended < length)
         if not good.any():
             return None
@@ -120,7 +121,7 @@ def greedy(length: float, goal: Elastica) -> Elastica | None:
         heading = around[ahead][best]
         way = join(way, take(pose, slice(best, best + 1)))
     down = np.arange(way.z[-1] - grid.spacing, goal.z[0], -grid.spacing)
-    pose = elastica(np.full_like(down, goal.x[0]), down)
+    pose = solve(np.full_like(down, goal.x[0]), down)
     return join(join(way, pose), goal) if (pose.valid & (pose.suspended < length)).all() else None
 
 
@@ -131,16 +132,20 @@ def _head(nodes: Elastica) -> int:
 
 
 def smoothed(
-    nodes: Elastica, length: float, needed: Callable[[Elastica], FloatArray], cut: Callable[[FloatArray], FloatArray]
+    solve: Solve,
+    nodes: Elastica,
+    length: float,
+    needed: Callable[[Elastica], FloatArray],
+    cut: Callable[[FloatArray], FloatArray],
 ) -> Elastica:
-    """Exact poses along a path through nodes, without their grid's corners; ends stay, and so does the lift.
+    """Poses along a path through nodes, without their grid's corners; ends stay, and so does the lift.
 
     `cut` says at which places, indices with fractions, of poses of shape (n, 3) that are nearly those of the path.
     Nothing that is `needed` of poses is made greater than at the nodes. Some may not be valid.
     """
     from scipy.ndimage import gaussian_filter1d
 
-    spacing = make_grid().spacing
+    spacing = make_grid(solve).spacing
     head = max(0, _head(nodes) - 1)
     known = poses_of(nodes)
     travelled = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(known[head:, :2], axis=0).T))])
@@ -153,13 +158,15 @@ def smoothed(
         pad = min(count - 2, int(4 * sigma) + 1)
         padded = np.concatenate([2 * way[0] - way[pad:0:-1], way, 2 * way[-1] - way[-2 : -pad - 2 : -1]])
         smooth = gaussian_filter1d(padded, sigma, axis=0)[pad : pad + count]
-        sheet = _along(nodes, head, smooth, cut)
+        sheet = _along(solve, nodes, head, smooth, cut)
         if (sheet.valid & (sheet.suspended < length)).all() and needed(sheet).max() <= bound:
             return sheet
-    return _along(nodes, head, way, cut)
+    return _along(solve, nodes, head, way, cut)
 
 
-def _along(nodes: Elastica, head: int, way: FloatArray, cut: Callable[[FloatArray], FloatArray]) -> Elastica:
+def _along(
+    solve: Solve, nodes: Elastica, head: int, way: FloatArray, cut: Callable[[FloatArray], FloatArray]
+) -> Elastica:
     """Poses without moment on a way that goes on after the first `head` nodes, which are of the lift."""
     from scipy.interpolate import CubicSpline
 
@@ -168,4 +175,4 @@ def _along(nodes: Elastica, head: int, way: FloatArray, cut: Callable[[FloatArra
     lifted = np.interp(low, np.arange(head + 1), nodes.suspended[: head + 1])
     lift_part = at_forces(np.stack([gentle(lifted), np.zeros_like(lifted), lifted], axis=1))
     x, z = CubicSpline(np.arange(len(way)), way[:, :2])(high - head).T
-    return join(lift_part, elastica(x, z))
+    return join(lift_part, solve(x, z))

@@ -13,10 +13,12 @@ import numpy.typing as npt
 from withe.common import validation
 from withe.folding import free_moment, moment_free
 from withe.folding.free_moment import Holding, Way
+from withe.folding.grid import Solve
 from withe.folding.jaw import Jaw, inner_edge, outer_edge
 from withe.folding.manifold import elastica
 from withe.folding.paper import Paper
 from withe.folding.plans import FLAT, SHORT, Plan
+from withe.folding.sheet_network import shipped
 from withe.folding.sheets import Elastica, at_forces, at_poses, forces_of, join, poses_of, take
 from withe.folding.timing import evenly, travel_times
 
@@ -25,6 +27,7 @@ __all__ = ["plan", "replan"]
 FloatArray = npt.NDArray[np.float64]
 Method = Literal["intuitive", "local", "ucs", "slip"]
 Grasp = Literal["moment_free", "free"]
+Manifold = Literal["exact", "network"]
 _POSES = 251
 _POSES_OF_REST = 101
 
@@ -40,6 +43,7 @@ class _Task:
     jaw: Jaw
     uncertainty: tuple[float, float]
     curvature: float
+    manifold: str
     speed: float
     turning: float
     acceleration: float
@@ -48,6 +52,11 @@ class _Task:
     def length(self) -> float:
         """Of the sheet beyond the jaw [Lgb]."""
         return (self.paper.length - self.jaw.depth) / self.paper.gravito_bending_length
+
+    @property
+    def solve(self) -> Solve:
+        """How equilibria without moment are found."""
+        return elastica if self.manifold == "exact" else shipped()
 
     @property
     def holding(self) -> Holding:
@@ -74,6 +83,7 @@ def plan(
     uncertainty: tuple[float, float] = (0.1, 0.5),
     curvature: float = 2.5,
     jaw: Jaw | None = None,
+    manifold: Manifold = "exact",
     speed: float = 0.05,
     acceleration: float = 0.2,
     turning: float = 1.0,
@@ -101,6 +111,9 @@ def plan(
         Bound of a free moment's curvature.
     jaw : Jaw, optional
         How it holds the sheet; by default 10 mm of it.
+    manifold : {"exact", "network"}
+        Of grasps without moment: where equilibria come from, each from its equations, or all from the network that
+        comes with withe (`SheetNetwork`), as the dissertation has them. No slower without it; it needs torch.
     speed, acceleration : float [m/s], [m/s^2]
         At most; of the sheet's outer edge.
     turning : float [rad/s]
@@ -137,6 +150,11 @@ def plan(
     validation.choice(grasp, "grasp", ("moment_free", "free"))
     if grasp == "free" and method != "slip":
         raise ValueError(f"grasp 'free' is one of method 'slip', not of {method!r}")
+    validation.choice(manifold, "manifold", ("exact", "network"))
+    if manifold == "network" and (grasp == "free" or method == "intuitive"):
+        raise ValueError(
+            f"manifold 'network' knows sheets without moment: method {method!r} with grasp {grasp!r} asks for others"
+        )
     lgb_share, friction_share = validation.number_array(uncertainty, "uncertainty", (2,))
     if not (0 <= lgb_share <= 0.3 and 0 <= friction_share < 1):
         raise ValueError(f"uncertainty must be shares up to .3 of Lgb and below 1 of friction, got {uncertainty}")
@@ -150,6 +168,7 @@ def plan(
         jaw=jaw,
         uncertainty=(float(lgb_share), float(friction_share)),
         curvature=validation.positive(curvature, "curvature"),
+        manifold=manifold,
         speed=validation.positive(speed, "speed"),
         turning=validation.positive(turning, "turning"),
         acceleration=validation.positive(acceleration, "acceleration"),
@@ -181,15 +200,15 @@ def _over_manifold(task: _Task) -> Plan:
     length = task.length
     goal = _checked_goal(_goal(task), task)
     if task.method == "ucs":
-        nodes = moment_free.uniform_cost(length, goal)
+        nodes = moment_free.uniform_cost(task.solve, length, goal)
     elif task.method == "slip":
-        nodes = moment_free.least_slide(length, task.paper.friction, goal)
+        nodes = moment_free.least_slide(task.solve, length, task.paper.friction, goal)
     else:
-        nodes = moment_free.greedy(length, goal)
+        nodes = moment_free.greedy(task.solve, length, goal)
     if nodes is None:
         ends = "the step of least force leads nowhere" if task.method == "local" else "those do not connect"
         raise ValueError(f"no path to {task.target:g} m over poses that lift less than {length:.2f} Lgb: {ends}")
-    sheet = moment_free.smoothed(nodes, length, task.holding.ratio, task.cut(_POSES))
+    sheet = moment_free.smoothed(task.solve, nodes, length, task.holding.ratio, task.cut(_POSES))
     if not sheet.valid.all():
         raise ValueError(f"no path to {task.target:g} m: between poses of the grid there are some without equilibrium")
     _warn_of_slide(float(task.holding.ratio(sheet).max()), task)
@@ -241,6 +260,7 @@ def replan(present: Plan, pose: npt.ArrayLike, slide: float) -> Plan:
         jaw=present.jaw,
         uncertainty=present.uncertainty,
         curvature=present.curvature,
+        manifold=present.manifold,
         speed=present.limits[0],
         turning=present.limits[1],
         acceleration=present.limits[2],
@@ -257,7 +277,7 @@ def replan(present: Plan, pose: npt.ArrayLike, slide: float) -> Plan:
 
 def _anew_from(task: _Task, inner: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Poses of the jaw's inner edge, and forces near those of the sheet, by a search over the manifold."""
-    start = elastica([inner[0]], [inner[1]])
+    start = task.solve([inner[0]], [inner[1]])
     if not start.valid[0]:
         raise ValueError(
             "pose must be one of a sheet without moment, or near it: none is lifted with the jaw's inner edge at "
@@ -265,12 +285,12 @@ def _anew_from(task: _Task, inner: FloatArray) -> tuple[FloatArray, FloatArray]:
         )
     goal = _checked_goal(_goal(task), task)
     if task.method == "slip":
-        nodes = moment_free.least_slide(task.length, task.paper.friction, goal, start)
+        nodes = moment_free.least_slide(task.solve, task.length, task.paper.friction, goal, start)
     else:
-        nodes = moment_free.uniform_cost(task.length, goal, start)
+        nodes = moment_free.uniform_cost(task.solve, task.length, goal, start)
     if nodes is None:
         raise ValueError(f"no path from there to {task.target:g} m over poses without moment")
-    sheet = moment_free.smoothed(nodes, task.length, task.holding.ratio, task.cut(_POSES_OF_REST))
+    sheet = moment_free.smoothed(task.solve, nodes, task.length, task.holding.ratio, task.cut(_POSES_OF_REST))
     wanted = poses_of(sheet)
     wanted[:, 2] += np.linspace(1.0, 0.0, len(wanted)) * (inner[2] - start.angle[0])
     return wanted, forces_of(sheet)
@@ -295,7 +315,8 @@ def _on_from(present: Plan, inner: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 def _goal(task: _Task) -> Elastica | None:
     paper, jaw, lgb = task.paper, task.jaw, task.paper.gravito_bending_length
-    return moment_free.goal_pose(task.target / lgb, paper.thickness / lgb, jaw.depth / lgb, jaw.finger / lgb)
+    sizes = (paper.thickness / lgb, jaw.depth / lgb, jaw.finger / lgb)
+    return moment_free.goal_pose(task.solve, task.target / lgb, *sizes)
 
 
 def _checked_goal(goal: Elastica | None, task: _Task) -> Elastica:
@@ -392,6 +413,7 @@ def _finished(task: _Task, outer: FloatArray, sheet: Elastica | None, offset: fl
         clearance=clearance,
         uncertainty=task.uncertainty,
         curvature=task.curvature,
+        manifold=task.manifold,
         poses=np.stack([x + offset, zero, z, zero, np.sin(0.5 * angle), zero, np.cos(0.5 * angle)], axis=1),
         angles=angle,
         times=travel_times(outer, task.speed, task.turning, task.acceleration),

@@ -62,6 +62,8 @@ class Plan:
         Shares by which Lgb and friction may be other than thought.
     curvature : float [1/Lgb]
         Bound of a free moment's curvature.
+    manifold : str
+        Where its equilibria are from: "exact" or "network".
     poses : ndarray of shape (n, 7) [m], [-]
         x, y, z and the quaternion x, y, z, w of the outer edge.
     angles : ndarray of shape (n,) [rad]
@@ -80,6 +82,7 @@ class Plan:
     clearance: float
     uncertainty: tuple[float, float]
     curvature: float
+    manifold: str
     poses: FloatArray
     angles: FloatArray
     times: FloatArray
@@ -225,6 +228,7 @@ class Plan:
             "offset": self.offset,
             "uncertainty": dict(zip(("gravito_bending_length", "friction"), self.uncertainty, strict=True)),
             "curvature": self.curvature,
+            "manifold": self.manifold,
             "jaw": {**vars(self.jaw), "side": self.side, "clearance": self.clearance},
             "times": self.times.tolist(),
             "poses": self.poses.tolist(),

@@ -1,0 +1,228 @@
+"""Networks that have learned how sheets hang from a jaw without moment, in place of exact equilibria.
+
+Two of them: "small", whose weights come with withe, and "source", that of Choi, dissertation, 7.5.2, which is trained
+by whoever wants it. They answer like `elastica`, a batch of a thousand some fifty times as fast, and have gradients; a
+plan needs neither. All in Lgb and w Lgb.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from withe.common import validation
+from withe.common.extras import require
+from withe.folding.sheets import Elastica
+from withe.learning.networks import Network
+
+__all__ = ["FORMS", "SHIPPED", "SheetNetwork", "shipped", "straight"]
+
+FloatArray = npt.NDArray[np.float64]
+SHIPPED = Path(__file__).parent / "small.pt"
+_LENGTHS = (0.958, 6.84)  # lifted lengths between which positions name one pose [Lgb]
+_TAUT = -40.0  # least tangential force [w Lgb]
+
+
+def straight(x: Any, z: Any) -> Any:
+    """Length of a straight sheet from the table to the tip [Lgb]: no shorter one reaches there.
+
+    x = l (1 - cos phi), z = l sin phi, so l = (x^2 + z^2) / 2x. Lifted lengths are 1.2 to 2 times that, and where they
+    vary steeply with x, near x = 0, so does it.
+    """
+    return (x * x + z * z) / (2.0 * x)
+
+
+def _from_straight(module: Any, x: Any, z: Any) -> tuple[Any, ...]:
+    return module.log(straight(x, z)), module.arctan2(x, z)
+
+
+def _with_straight(module: Any, x: Any, z: Any, said: tuple[Any, ...]) -> dict[str, Any]:
+    angle, share, direction, size, curvature = said
+    force = module.exp(size)
+    return {
+        "angle": angle,
+        "suspended": straight(x, z) * module.exp(share),
+        "normal_force": force * module.cos(direction),
+        "tangential_force": force * module.sin(direction),
+        "force_ratio": abs(module.tan(direction)),
+        "max_curvature": module.exp(curvature),
+    }
+
+
+@dataclass(frozen=True)
+class Form:
+    """What a network is asked and what it says, as functions of NumPy or torch, whose names are the same.
+
+    Attributes
+    ----------
+    inputs, outputs : tuple of str
+        Names by which a file is known again.
+    ask : callable
+        (module, x, z) -> inputs.
+    tell : callable
+        (module, x, z, outputs) -> what is known of the sheet, by the names of `Elastica`.
+    learn : callable
+        Outputs to be learned, from equilibria.
+    """
+
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    ask: Callable[[Any, Any, Any], tuple[Any, ...]]
+    tell: Callable[[Any, Any, Any, tuple[Any, ...]], dict[str, Any]]
+    learn: Callable[[Elastica], tuple[FloatArray, ...]]
+
+
+FORMS = {
+    # Forces by direction and size: the ratio is the tangent of the direction, and neither is large anywhere.
+    "small": Form(
+        ("log of straight length", "angle from the vertical"),
+        ("angle", "log of length to straight length", "direction of force", "log of force", "log of curvature"),
+        _from_straight,
+        _with_straight,
+        lambda pose: (
+            pose.angle,
+            np.log(pose.suspended / straight(pose.x, pose.z)),
+            np.arctan2(pose.tangential_force, pose.normal_force),
+            np.log(np.hypot(pose.tangential_force, pose.normal_force)),
+            np.log(pose.max_curvature),
+        ),
+    ),
+    "source": Form(
+        ("x", "z"),
+        ("force ratio", "angle", "suspended"),
+        lambda module, x, z: (x, z),
+        lambda module, x, z, said: dict(zip(("force_ratio", "angle", "suspended"), said, strict=True)),
+        lambda pose: (pose.force_ratio, pose.angle, pose.suspended),
+    ),
+}
+
+
+class SheetNetwork:
+    """What a network has learned of sheets that hang from a jaw without moment. `train` makes one, `load` reads one.
+
+    Its answers are those of `elastica(x, z)`, about right. It cannot say that a sheet touches the table elsewhere,
+    so it also answers at x > 9.1, z < .8, where `elastica` refuses most positions for that.
+
+    Attributes
+    ----------
+    network : withe.learning.Network
+
+    Examples
+    --------
+    >>> import withe
+    >>> network = withe.folding.SheetNetwork.load()  # doctest: +SKIP
+    >>> network(3.0, 2.25).angle  # doctest: +SKIP
+    """
+
+    def __init__(self, network: Network) -> None:
+        names = (network.inputs, network.outputs)
+        found = [form for form in FORMS.values() if (form.inputs, form.outputs) == names]
+        if not found:
+            raise ValueError(f"network must have learned sheets, got one of {network!r}")
+        self.network = network
+        self._form = found[0]
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str] | None = None) -> SheetNetwork:
+        """Read one from a file; by default the small one that comes with withe.
+
+        Raises
+        ------
+        ValueError
+            A file of something else, or of another version.
+        ImportError
+            torch is not installed.
+        """
+        return cls(Network.load(SHIPPED if path is None else path))
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write it to a file."""
+        return self.network.save(path)
+
+    def __call__(self, x: npt.ArrayLike, z: npt.ArrayLike) -> Elastica:
+        """How sheets hang whose tips are at positions.
+
+        Parameters
+        ----------
+        x, z : array_like, broadcast together [Lgb]
+
+        Returns
+        -------
+        Elastica
+            As `elastica` has it, and refused where that refuses, as far as the network knows; all that is valid is
+            called stable. What a network has not learned is NaN.
+
+        Raises
+        ------
+        ValueError
+            Not numbers, not finite, or shapes that do not broadcast.
+        """
+        x, z = validation.broadcast_arrays(x=x, z=z)
+        there = (x > 0) & (z > 0)
+        x_there, z_there = x[there], z[there]
+        asked = np.stack(self._form.ask(np, x_there, z_there), axis=-1)
+        said = self.network(asked.astype(np.float32)).astype(float)
+        known = self._form.tell(np, x_there, z_there, tuple(said.T))
+        inside = ((asked >= self.network.domain[0]) & (asked <= self.network.domain[1])).all(axis=1)
+        inside &= (known["suspended"] > _LENGTHS[0]) & (known["suspended"] < _LENGTHS[1])
+        inside &= known.get("tangential_force", 0.0) > _TAUT
+        valid = np.zeros(x.shape, bool)
+        valid[there] = inside
+
+        def column(name: str) -> FloatArray:
+            values = np.full(x.shape, np.nan)
+            if name in known:
+                values[valid] = known[name][inside]
+            return values
+
+        names = ("angle", "suspended", "normal_force", "tangential_force", "force_ratio", "max_curvature")
+        return Elastica(
+            x=np.where(valid, x, np.nan),
+            z=np.where(valid, z, np.nan),
+            **{name: column(name) for name in names},
+            tip_moment=np.where(valid, 0.0, np.nan),
+            valid=valid,
+            stable=valid.copy(),
+        )
+
+    def tensors(self, x: Any, z: Any) -> dict[str, Any]:
+        """The same of torch tensors, with gradients.
+
+        Parameters
+        ----------
+        x, z : Tensor [Lgb]
+            Of floating point numbers, broadcast together. What is not positive, or far outside, has no meaning, and is
+            not refused.
+
+        Returns
+        -------
+        dict of Tensor
+            By the names of `Elastica`: "angle", "suspended", "force_ratio", and of the small one "normal_force",
+            "tangential_force" and "max_curvature".
+
+        Examples
+        --------
+        >>> network.tensors(x, z)["force_ratio"].sum().backward()  # doctest: +SKIP
+        """
+        torch = require("torch", "learn")
+        if not isinstance(x, torch.Tensor) or not isinstance(z, torch.Tensor):
+            raise ValueError("x and z must be tensors: ask the network itself for arrays")
+        x, z = torch.broadcast_tensors(x, z)
+        said = self.network(torch.stack(self._form.ask(torch, x, z), dim=-1))
+        return self._form.tell(torch, x, z, said.unbind(-1))
+
+    def __repr__(self) -> str:
+        return f"Sheet{self.network!r}"
+
+
+@cache
+def shipped() -> SheetNetwork:
+    """The small one that comes with withe."""
+    return SheetNetwork.load()

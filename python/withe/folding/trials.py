@@ -1,0 +1,220 @@
+"""Trials of folding, many at once: sheets that are not quite what the planner thinks, plans, and what comes of them."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import time
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal
+
+import numpy as np
+
+from withe.common import validation
+from withe.common.extras import require
+from withe.common.progress import progress as progress_bar
+from withe.folding.closed_loop import fold
+from withe.folding.hanging_strip import measure
+from withe.folding.noise import Noise
+from withe.folding.paper import Paper
+from withe.folding.planning import plan
+from withe.folding.simulated_sheet import SimulatedSheet
+
+__all__ = ["Outcome", "Trial", "run_trials"]
+
+_SCALE = 4000.0  # of the picture of a strip [px/m]
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One fold from beginning to end: a strip is photographed and measured, a motion is planned and carried out.
+
+    Parameters
+    ----------
+    paper : Paper
+        As it is thought to be; of its Lgb the planner is told only what the photograph says.
+    target : float or "half" [m]
+    seed : int
+        Of how the sheet differs from the paper.
+    noise : Noise
+        How much.
+    replans : int
+        How often the sheet is looked at on the way; 0, the loop is open.
+    planner : mapping
+        Options of `plan`.
+    sheet : mapping
+        Options of `SimulatedSheet`.
+    name : str
+        For whoever asks, to know it again.
+
+    Examples
+    --------
+    >>> import withe
+    >>> paper = withe.folding.Paper.a4()
+    >>> free = {"method": "slip", "grasp": "free"}
+    >>> trials = [withe.folding.Trial(paper, seed=seed, planner=free) for seed in range(9)]
+    >>> errors = [outcome.error for outcome in withe.folding.run_trials(trials)]  # doctest: +SKIP
+    """
+
+    paper: Paper
+    target: float | Literal["half"] = "half"
+    seed: int = 0
+    noise: Noise = field(default_factory=Noise)
+    replans: int = 0
+    planner: Mapping[str, Any] = field(default_factory=dict)
+    sheet: Mapping[str, Any] = field(default_factory=dict)
+    name: str = ""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of a trial.
+
+    Attributes
+    ----------
+    trial : Trial
+    gravito_bending_length : float [m]
+        As it was measured.
+    error, length, slide : float [m]
+    max_curvature : float [1/m]
+        As those of `Fold`; NaN where there was no plan.
+    failure : str or None
+        Why there is no fold: what the planner or the sheet said. It begins with "no plan" where the planner did.
+    seconds : float
+        Of the processor, on the thread that carried it out.
+    """
+
+    trial: Trial
+    gravito_bending_length: float = np.nan
+    error: float = np.nan
+    length: float = np.nan
+    slide: float = np.nan
+    max_curvature: float = np.nan
+    failure: str | None = None
+    seconds: float = 0.0
+
+
+def run_trials(
+    trials: Sequence[Trial], *, processes: int | None = None, client: Any | None = None, progress: bool = True
+) -> Iterator[Outcome]:
+    """Carry out trials side by side, and hand out what came of each as it comes.
+
+    What has come is kept when Ctrl-C ends the rest. Trials are the same whatever they run beside.
+
+    Parameters
+    ----------
+    trials : sequence of Trial
+    processes : int, optional
+        By default one a processor; 1: in this one. A script that uses more begins under ``if __name__ == "__main__":``.
+    client : dask.distributed.Client, optional
+        Of a cluster that carries them out instead, with withe installed on it.
+    progress : bool
+        Whether to show a progress bar on a terminal.
+
+    Returns
+    -------
+    iterator of Outcome
+        In whatever order they end; ``outcome.trial`` says of which.
+
+    Raises
+    ------
+    ValueError
+        Not trials, both processes and a client, or not a client.
+    ImportError
+        Dask is not installed, and there is a client.
+    """
+    trials = list(trials)
+    for each in trials:
+        if not isinstance(each, Trial):
+            raise ValueError(f"trials must be Trials, got {each!r:.80}")
+    if client is not None and processes is not None:
+        raise ValueError("trials run in processes or on a client, not in both")
+    if client is not None and not isinstance(client, require("distributed", "cluster").Client):
+        raise ValueError(f"client must be a dask.distributed.Client, got {type(client).__name__}")
+    count = validation.integer(os.cpu_count() or 1 if processes is None else processes, "processes", 1, 10_000)
+    return _run(trials, min(count, len(trials)), client, progress)
+
+
+def _run(trials: list[Trial], processes: int, client: Any | None, progress: bool) -> Iterator[Outcome]:
+    with progress_bar(len(trials), "folding", progress, unit="folds") as bar:
+        if processes <= 1 and client is None:
+            for trial in trials:
+                yield carry_out(trial)
+                bar.advance(1)
+            return
+        with _workers(processes) if client is None else _cluster(client) as workers:
+            for future in as_completed([workers.submit(carry_out, trial) for trial in trials]):
+                yield future.result()
+                bar.advance(1)
+
+
+@contextmanager
+def _workers(processes: int) -> Iterator[Executor]:
+    """Processes of our own, which end at once if we are interrupted, and not when their fold is done."""
+    before = set(multiprocessing.active_children())
+    context = multiprocessing.get_context("spawn")
+    pool = ProcessPoolExecutor(processes, mp_context=context, initializer=_begin)
+    try:
+        yield pool
+    except BaseException:  # a generator that is closed early, too
+        pool.shutdown(wait=False, cancel_futures=True)
+        for child in set(multiprocessing.active_children()) - before:
+            child.terminate()
+        raise
+    pool.shutdown()
+
+
+def _begin() -> None:
+    """Ctrl-C on a terminal reaches every process: ours end without a word, and the one that asked says what it has."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
+@contextmanager
+def _cluster(client: Any) -> Iterator[Executor]:
+    """Workers of Dask; what has not begun is dropped if we are interrupted."""
+    executor: Executor = client.get_executor(pure=False)
+    try:
+        yield executor
+    except BaseException:
+        executor.shutdown(wait=False, cancel_futures=True)
+        raise
+    executor.shutdown()
+
+
+def carry_out(trial: Trial) -> Outcome:
+    """One trial, here and now."""
+    began = time.thread_time()
+    done = _carried_out(trial)
+    return replace(done, seconds=time.thread_time() - began)
+
+
+def _carried_out(trial: Trial) -> Outcome:
+    sheet = SimulatedSheet(trial.paper, trial.seed, trial.noise, **trial.sheet)
+    measured = measure(image=sheet.strip_picture(scale=_SCALE), scale=_SCALE).gravito_bending_length
+    outcome = Outcome(trial, measured)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # of slide that is predicted: it is measured here
+            planned = plan(replace(trial.paper, gravito_bending_length=measured), trial.target, **trial.planner)
+    except ValueError as error:
+        return replace(outcome, failure=f"no plan: {error}")
+    try:
+        if trial.replans:
+            done = fold(planned, sheet, replans=trial.replans, progress=False)
+        else:
+            done = sheet.fold(planned, progress=False)
+    except ValueError as error:
+        return replace(outcome, failure=f"no plan on the way: {error}")
+    return replace(
+        outcome,
+        error=done.error,
+        length=done.length,
+        slide=done.slide,
+        max_curvature=done.max_curvature,
+        failure=done.failure,
+    )
