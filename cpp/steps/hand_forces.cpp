@@ -123,7 +123,7 @@ std::string HandForces::note() const {
 
 HandPose HandForces::pose_of(const StepProblem& problem, int support) const {
   const HandState& start = problem.start->hands[at(support)];
-  const HandPose end = end_pose(problem, support);
+  HandPose end = end_pose(problem, support);
   if (!problem.in_middle()) return end;
   const Vector3 turn = rotation_log(end.rotation * start.rotation.transpose());
   return {0.5 * (start.position + end.position), rotation_exp(0.5 * turn) * start.rotation};

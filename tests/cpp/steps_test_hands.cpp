@@ -51,7 +51,9 @@ std::vector<Case> cases(bool planar, double force_limit) {
       Configuration drawn;
       compute_configuration(c.model, c.state, c.state.q, drawn);
       const Vector3 normal = planar ? c.model.plane->normal : Vector3(0.3, -0.8, 0.5).normalized();
-      const auto in_plane = [&](Vector3 v) -> Vector3 { return planar ? Vector3(v - normal * normal.dot(v)) : v; };
+      const auto in_plane = [&](const Vector3& v) -> Vector3 {
+        return planar ? Vector3(v - normal * normal.dot(v)) : v;
+      };
       hand.rotation = rotation_exp(0.2 * normal);
       hand.position = in_plane(0.1 * random.vector()) + Vector3(0.2, 0.0, -0.1);
       hand.twist.setZero(static_cast<Eigen::Index>(c.model.supports[s].touched.size()));
