@@ -16,7 +16,7 @@ from typing import Any, Literal
 import numpy as np
 
 from withe.common import validation
-from withe.common.extras import require
+from withe.common.cluster import cluster_executor, require_client
 from withe.common.progress import progress as progress_bar
 from withe.folding.closed_loop import fold
 from withe.folding.hanging_strip import measure
@@ -134,8 +134,8 @@ def run_trials(
             raise ValueError(f"trials must be Trials, got {each!r:.80}")
     if client is not None and processes is not None:
         raise ValueError("trials run in processes or on a client, not in both")
-    if client is not None and not isinstance(client, require("distributed", "cluster").Client):
-        raise ValueError(f"client must be a dask.distributed.Client, got {type(client).__name__}")
+    if client is not None:
+        require_client(client)
     count = validation.integer(os.cpu_count() or 1 if processes is None else processes, "processes", 1, 10_000)
     return _run(trials, min(count, len(trials)), client, progress)
 
@@ -147,7 +147,7 @@ def _run(trials: list[Trial], processes: int, client: Any | None, progress: bool
                 yield carry_out(trial)
                 bar.advance(1)
             return
-        with _workers(processes) if client is None else _cluster(client) as workers:
+        with _workers(processes) if client is None else cluster_executor(client) as workers:
             for future in as_completed([workers.submit(carry_out, trial) for trial in trials]):
                 yield future.result()
                 bar.advance(1)
@@ -172,18 +172,6 @@ def _workers(processes: int) -> Iterator[Executor]:
 def _begin() -> None:
     """Ctrl-C on a terminal reaches every process: ours end without a word, and the one that asked says what it has."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)
-
-
-@contextmanager
-def _cluster(client: Any) -> Iterator[Executor]:
-    """Workers of Dask; what has not begun is dropped if we are interrupted."""
-    executor: Executor = client.get_executor(pure=False)
-    try:
-        yield executor
-    except BaseException:
-        executor.shutdown(wait=False, cancel_futures=True)
-        raise
-    executor.shutdown()
 
 
 def carry_out(trial: Trial) -> Outcome:

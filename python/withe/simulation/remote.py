@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from concurrent.futures import as_completed
 from typing import Any, Literal
 
-from withe.common.extras import require
+from withe.common.cluster import cluster_executor, require_client
 from withe.common.progress import progress as progress_bar
 from withe.recording.record import Record
 from withe.simulation.simulation import Simulation
@@ -46,25 +47,23 @@ def run_on(
     ImportError
         Dask is not installed.
     """
-    distributed = require("distributed", "cluster")
-    if not isinstance(client, distributed.Client):
-        raise ValueError(f"client must be a dask.distributed.Client, got {type(client).__name__}")
-    futures = [client.submit(_run, simulation, duration, options, pure=False) for simulation in simulations]
-    place = {future.key: index for index, future in enumerate(futures)}
-    found: list[Record | Exception | None] = [None] * len(futures)
-    try:
-        with progress_bar(len(futures), "simulating", progress, unit="runs") as bar:
-            for future in distributed.as_completed(futures):
-                index, error = place[future.key], future.exception()
-                if error is None:
-                    found[index], state = future.result()
-                    simulations[index].restore(state)
-                elif errors == "raise" or not isinstance(error, Exception):
-                    raise error
-                else:
-                    found[index] = error
-                future.release()
-                bar.advance(1)
-    finally:
-        client.cancel(futures)
+    require_client(client)
+    found: list[Record | Exception | None] = [None] * len(simulations)
+    with (
+        progress_bar(len(simulations), "simulating", progress, unit="runs") as bar,
+        cluster_executor(client) as workers,
+    ):
+        place = {
+            workers.submit(_run, simulation, duration, options): index for index, simulation in enumerate(simulations)
+        }
+        for future in as_completed(place):
+            index, error = place[future], future.exception()
+            if error is None:
+                found[index], state = future.result()
+                simulations[index].restore(state)
+            elif errors == "raise" or not isinstance(error, Exception):
+                raise error
+            else:
+                found[index] = error
+            bar.advance(1)
     return [each for each in found if each is not None]
