@@ -50,7 +50,7 @@ def holding_of(paper: folding.Paper, curvature: float, jaw: folding.Jaw | None =
 def scattered(count: int) -> tuple[np.ndarray, np.ndarray]:
     """Positions of which most are on the manifold."""
     random = np.random.default_rng(7)
-    return random.uniform(0.0, 10.3, count), random.uniform(0.0, 4.7, count)
+    return random.uniform(0.0, grid.WIDE, count), random.uniform(0.0, grid.HIGH, count)
 
 
 def equilibria(report: Report, quick: bool) -> None:

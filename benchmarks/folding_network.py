@@ -11,6 +11,7 @@ import numpy as np
 from reporting import OUT, Report
 
 from withe import folding
+from withe.folding.grid import HIGH, WIDE
 from withe.folding.sheet_network import SHIPPED
 from withe.folding.sheets import Elastica, take
 
@@ -69,7 +70,7 @@ def compare(report: Report, quick: bool) -> None:
     torch.set_num_threads(1)
     random = np.random.default_rng(11)
     count = 2_000 if quick else 100_000
-    exact = folding.elastica(random.uniform(0.0, 10.3, count), random.uniform(0.0, 4.7, count))
+    exact = folding.elastica(random.uniform(0.0, WIDE, count), random.uniform(0.0, HIGH, count))
     exact = take(exact, exact.valid)
     networks = {"small": folding.SheetNetwork.load(), "source": _source(quick)}
     single, batch = times(folding.elastica, exact, 2_000 if quick else 20_000)

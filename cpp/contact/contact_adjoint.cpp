@@ -151,27 +151,23 @@ void add_mean_pressing(const ContactProblem& problem, const Touching& t, const R
   for (int i = 0; i < 12; ++i) out.start[i] += w[i / 3] * by_d0[i % 3];
 }
 
-/// Of `add_curve_pressing`, f (g1 + b (g0 - g1)), with b = (D1 - D0 - p1) / (p0 - p1), p = g . (x1 - x0).
+/// Of `add_curve_pressing`, f (g1 + b (g0 - g1)), see `StartShare`.
 void add_curve_pressing(const ContactProblem& problem, const Touching& t, const Rows& rows, ContactAdjoint& out) {
   const CurvePiece& piece = t.pair.piece;
   Vec3d x0[4];
   const CurveDistance<double> start = problem.curve_at_start(t.pair, x0);
   const CurveSlopes first = curve_slopes(piece, start), last = curve_slopes(piece, t.proximity.curve);
   const double (&g0)[9] = first.distance, (&g1)[9] = last.distance;
-  double H[9][9] = {}, way[9] = {}, p0 = 0.0, p1 = 0.0, y0 = 0.0, y1 = 0.0, size = 0.0;
+  double H[9][9] = {}, way[9] = {}, y0 = 0.0, y1 = 0.0;
   add_curve_hessian(piece, problem.bodies.obstacle(t.pair), start, first, 1.0, 9, &H[0][0]);
   for (int i = 0; i < 3 * piece.weights->nodes; ++i) {
     way[i] = (point_of(t.now, i / 3) - x0[i / 3] - problem.shift_of(t.pair))[i % 3];
-    p0 += g0[i] * way[i];
-    p1 += g1[i] * way[i];
     y0 += rows[i] * g0[i];
     y1 += rows[i] * g1[i];
-    size += std::abs(way[i]);
   }
-  const bool same = std::abs(p0 - p1) <= kSameDirection * size;
-  const double share = same ? 0.5 : (t.proximity.distance - start.distance - p1) / (p0 - p1),
-               b = std::clamp(share, 0.0, 1.0), force = t.pressing.first,
-               by_share = same || share != b ? 0.0 : force * (y0 - y1) / (p0 - p1);
+  const StartShare share = start_share(g0, g1, way, t.proximity.distance - start.distance);
+  const double b = share.value, force = t.pressing.first,
+               by_share = share.fixed ? 0.0 : force * (y0 - y1) / share.apart;
   for (int i = 0; i < 9; ++i) {
     double bent = 0.0, turned = 0.0;
     for (int j = 0; j < 9; ++j) {

@@ -53,36 +53,20 @@ struct HeightSlopes {
   }
 };
 
-/// See `add_start_direction` of pressing.cpp.
-void add_start_direction(const ContactProblem& problem, const Touching& t, const Axes& axes, bool geometric,
-                         double (&along)[3], double (*derivative)[3]) {
+/// From the gradient by heights at the end of the step to the mean with that at its start, see pressing.cpp.
+void add_height_start(const ContactProblem& problem, const Touching& t, const Axes& axes, bool geometric,
+                      double (&along)[3], double (*derivative)[3]) {
   const ContactPair& pair = t.pair;
   Vec3d x0[4];
   const CurveDistance<double> start = problem.curve_at_start(pair, x0);
-  const HeightSlopes first(*pair.piece.weights, start);
   const double shift = dot(axes.normal, problem.shift_of(pair));
-  double way[3] = {}, turned[3], p0 = 0.0, p1 = 0.0, size = 0.0;
+  double way[3] = {};
   for (int i = 0; i < pair.piece.weights->nodes; ++i) {
     const Vec3d moved = Vec3d{t.now[3 * i], t.now[3 * i + 1], 0.0} - x0[i];
     way[i] = dot(axes.normal, moved) - shift;
   }
-  for (int i = 0; i < 3; ++i) {
-    turned[i] = first.distance[i] - along[i];
-    p0 += first.distance[i] * way[i];
-    p1 += along[i] * way[i];
-    size += std::abs(way[i]);
-  }
-  const bool same = std::abs(p0 - p1) <= kSameDirection * size;
-  const double share = same ? 0.5 : (t.proximity.distance - start.distance - p1) / (p0 - p1),
-               b = std::clamp(share, 0.0, 1.0);
-  const bool fixed = same || share != b || !geometric;
-  for (int j = 0; j < 3 && derivative; ++j) {
-    double bent = 0.0;
-    for (int i = 0; i < 3; ++i) bent += way[i] * derivative[i][j];
-    const double change = fixed ? 0.0 : -(bent + b * (turned[j] - bent)) / (p0 - p1);
-    for (int i = 0; i < 3; ++i) derivative[i][j] = (1.0 - b) * derivative[i][j] + turned[i] * change;
-  }
-  for (int i = 0; i < 3; ++i) along[i] += b * turned[i];
+  add_start_direction(HeightSlopes(*pair.piece.weights, start).distance, way, t.proximity.distance - start.distance,
+                      geometric, along, derivative);
 }
 
 /// An edge of a piece, and how it turns.
@@ -273,7 +257,7 @@ void add_plane_pressing(const ContactProblem& problem, const Touching& t, bool w
             bent * piece.weights->bend[i] * piece.weights->bend[j] - end.stiff * slopes.s[i] * slopes.s[j];
   }
   if (problem.means_direction())
-    add_start_direction(problem, t, axes, geometric, along, with_hessian ? derivative : nullptr);
+    add_height_start(problem, t, axes, geometric, along, with_hessian ? derivative : nullptr);
   double ways[kWays] = {};
   for (int i = 0; i < 3; ++i) ways[2 * i + kHeight] = t.pressing.first * along[i];
   axes.add(ways, out.gradient);

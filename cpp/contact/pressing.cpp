@@ -32,37 +32,18 @@ void add_end_pressing(const Touching& t, bool with_hessian, bool geometric, Cont
     for (int j = 0; j < 12; ++j) out.hessian[i][j] += turn * H[i][j] + (t.pressing.by_end - turn) * g[i] * g[j];
 }
 
-/// From the gradient of D at the end of the step to the mean of `add_curve_pressing`,
-///   m = (1 - b) g1 + b g0,   b = (D1 - D0 - p1) / (p0 - p1),   p = g . (x1 - x0).
-/// The derivative of g1 becomes that of m; nothing: none is asked for.
-void add_start_direction(const ContactProblem& problem, const Touching& t, bool geometric, double (&along)[9],
-                         double (*derivative)[9]) {
+/// From the gradient of D at the end of the step to the mean of `add_curve_pressing`.
+void add_curve_start(const ContactProblem& problem, const Touching& t, bool geometric, double (&along)[9],
+                     double (*derivative)[9]) {
   const ContactPair& pair = t.pair;
   Vec3d x0[4], x1[4];
   t.end_points(x1);
   const CurveDistance<double> start = problem.curve_at_start(pair, x0);
-  const CurveSlopes first = curve_slopes(pair.piece, start);
   const Vec3d shift = problem.shift_of(pair);
-  double way[9] = {}, turned[9], p0 = 0.0, p1 = 0.0, size = 0.0;
+  double way[9] = {};
   for (int i = 0; i < 3 * pair.piece.weights->nodes; ++i) way[i] = (x1[i / 3] - x0[i / 3] - shift)[i % 3];
-  for (int i = 0; i < 9; ++i) {
-    turned[i] = first.distance[i] - along[i];
-    p0 += first.distance[i] * way[i];
-    p1 += along[i] * way[i];
-    size += std::abs(way[i]);
-  }
-  // Where gradients differ by no more than rounding, any shares will do.
-  const bool same = std::abs(p0 - p1) <= kSameDirection * size;
-  const double share = same ? 0.5 : (t.proximity.distance - start.distance - p1) / (p0 - p1),
-               b = std::clamp(share, 0.0, 1.0);
-  const bool fixed = same || share != b || !geometric;
-  for (int j = 0; j < 9 && derivative; ++j) {
-    double bent = 0.0;
-    for (int i = 0; i < 9; ++i) bent += way[i] * derivative[i][j];
-    const double change = fixed ? 0.0 : -(bent + b * (turned[j] - bent)) / (p0 - p1);
-    for (int i = 0; i < 9; ++i) derivative[i][j] = (1.0 - b) * derivative[i][j] + turned[i] * change;
-  }
-  for (int i = 0; i < 9; ++i) along[i] += b * turned[i];
+  add_start_direction(curve_slopes(pair.piece, start).distance, way, t.proximity.distance - start.distance, geometric,
+                      along, derivative);
 }
 
 /// Of a smooth curve, along the gradient of D at the end of the step; or, where its force is that of the whole step and
@@ -80,7 +61,7 @@ void add_curve_pressing(const ContactProblem& problem, const Touching& t, bool w
     std::fill(&derivative[0][0], &derivative[0][0] + 81, 0.0);
     if (geometric) add_curve_hessian(piece, problem.bodies.obstacle(t.pair), end, slopes, 1.0, 9, &derivative[0][0]);
   }
-  if (problem.means_direction()) add_start_direction(problem, t, geometric, along, with_hessian ? derivative : nullptr);
+  if (problem.means_direction()) add_curve_start(problem, t, geometric, along, with_hessian ? derivative : nullptr);
   for (int i = 0; i < 9; ++i) {
     out.gradient[i] += t.pressing.first * along[i];
     for (int j = 0; j < 9 && with_hessian; ++j)

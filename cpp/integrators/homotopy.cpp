@@ -47,13 +47,17 @@ void Homotopy::start_out_of_balance() {
 
 void Homotopy::apply(double factor) {
   loads_(factor, parameters_.loads);
-  if (boundary_.aim) boundary_.aim(factor);
-  equations_.begin(state_, parameters_, StepRule::statics, 0.0);
+  if (!boundary_.aim) return;
+  boundary_.aim(factor);
+  begin();
 }
+
+void Homotopy::begin() { equations_.begin(state_, parameters_, StepRule::statics, 0.0); }
 
 void Homotopy::go_to(double factor) {
   factor_ = factor;
   apply(factor);
+  if (!boundary_.aim) begin();
   if (imbalance_.size() == 0) imbalance_.setZero(state_.q.size());
   target_ = (1.0 - factor) * imbalance_;
 }

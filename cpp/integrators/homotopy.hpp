@@ -63,8 +63,9 @@ class Homotopy {
   void evaluate(const VectorX& z, bool with_matrix, const double* axial_force);
 
  private:
-  /// Loads and hands at a factor, from which the equations begin.
+  /// Loads at a factor, and hands, with which equations have to begin anew.
   void apply(double factor);
+  void begin();
 
   Equations& equations_;
   const Newton& newton_;

@@ -42,6 +42,30 @@ void put_between(const SupportMotion& from, const SupportMotion& to, double frac
 
 }  // namespace
 
+void World::Implementation::move_between(const std::vector<SupportMotion>& from, const std::vector<SupportMotion>& to,
+                                         double factor) {
+  for (std::size_t s = 0; s < motions.size(); ++s) put_between(from[s], to[s], factor, motions[s]);
+}
+
+/// `from` and `to` must outlive it; it leaves `motions` where they were last asked for.
+Boundary World::Implementation::boundary_between(Equations& system, const std::vector<SupportMotion>& from,
+                                                 const std::vector<SupportMotion>& to) {
+  Boundary boundary{.hold =
+                        [this, &system, &from, &to](double factor, VectorX& q) {
+                          move_between(from, to, factor);
+                          hold_now(work.held);
+                          system.assembler().add_held_change(q, work.held.q, 1.0, q);
+                          return work.held.reachable;
+                        },
+                    .aim = nullptr};
+  if (hands_move(from, to))
+    boundary.aim = [this, &system, &from, &to](double factor) {
+      move_between(from, to, factor);
+      aim_hands(system);
+    };
+  return boundary;
+}
+
 /// Forgets that anything moved.
 void World::Implementation::rest() {
   state.v.setZero();
@@ -99,24 +123,7 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
   };
   std::vector<SupportMotion> from = before.motions;
   const std::vector<SupportMotion> target = motions;
-  const auto move_to = [&](double fraction) {
-    for (std::size_t s = 0; s < motions.size(); ++s) put_between(from[s], target[s], fraction, motions[s]);
-  };
-  Boundary boundary{.hold =
-                        [&](double fraction, VectorX& q) {
-                          move_to(fraction);
-                          hold_now(work.held);
-                          system.assembler().add_held_change(q, work.held.q, 1.0, q);
-                          motions = target;
-                          return work.held.reachable;
-                        },
-                    .aim = nullptr};
-  if (hands_move(from, target))
-    boundary.aim = [&](double fraction) {
-      move_to(fraction);
-      aim_hands(system);
-      motions = target;
-    };
+  const Boundary boundary = boundary_between(system, from, target);
   rest();
   StaticResult r;
   try {
@@ -142,6 +149,7 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
     undo();
     throw;
   }
+  motions = target;
   system.respond({});
   if (r.converged) settle_hands(system);
   release_obstacles(system);
@@ -241,27 +249,12 @@ EquilibriumPath World::equilibrium_path(const PathOptions& wanted) {
       self.reaction_current = false;
       out.iterations += equilibrium().iterations;
     }
-    std::vector<SupportMotion> from = self.motions;
+    const std::vector<SupportMotion> from = self.motions;
     self.aim_supports(self.state.time);
     const std::vector<SupportMotion> target = self.motions;
     Equations& system = self.statics();
     self.solve_for_custom_at_rest(system, self.state.time);
-    const auto move_to = [&](double factor) {
-      for (std::size_t s = 0; s < target.size(); ++s) put_between(from[s], target[s], factor, self.motions[s]);
-    };
-    Boundary boundary{.hold =
-                          [&](double factor, VectorX& q) {
-                            move_to(factor);
-                            self.hold_now(self.work.held);
-                            system.assembler().add_held_change(q, self.work.held.q, 1.0, q);
-                            return self.work.held.reachable;
-                          },
-                      .aim = nullptr};
-    if (self.hands_move(from, target))
-      boundary.aim = [&](double factor) {
-        move_to(factor);
-        self.aim_hands(system);
-      };
+    const Boundary boundary = self.boundary_between(system, from, target);
     self.rest();
     const LoadPath loads = by_loads ? scaled : growing_loads(system, self.parameters, self.state, self.work.newton);
     Homotopy path(system, *self.newton, self.parameters, boundary, loads, self.state, self.work.newton);
@@ -274,7 +267,7 @@ EquilibriumPath World::equilibrium_path(const PathOptions& wanted) {
                    {wanted.start, wanted.end, wanted.most_points, wanted.turn}, self.state, self.work.newton, visit);
     system.respond({});
     self.release_hands(system);
-    move_to(r.factor);
+    self.move_between(from, target, r.factor);
     for (SupportMotion& m : self.motions) stop(m, self.state.time);
   } catch (...) {
     self.release_hands(self.statics());

@@ -80,8 +80,7 @@ std::string World::Implementation::unresolved() const {
     node = where;
     how = does;
   };
-  Configuration& c = energy_scratch.configuration;
-  compute_configuration(model, state, state.q, c);
+  const Configuration& c = configuration();
   const auto see_twist = [&](double tau, const auto& kappa, double natural, double turn, int where) {
     const double x = kappa(0) * kappa(0) + kappa(1) * kappa(1);
     see(bend_factor(parameters.measure, x).value * tau - natural, where, "twists");
@@ -126,8 +125,7 @@ std::string World::take_warning() {
 std::string World::Implementation::overturned() const {
   constexpr double kNearlyHalf = 170.0;  // [degrees]
   if (!equations->hands()) return "";
-  Configuration c;
-  compute_configuration(model, state, state.q, c);
+  const Configuration& c = configuration();
   for (std::size_t s = 0; s < model.supports.size(); ++s) {
     if (!model.supports[s].active || !model.supports[s].yields()) continue;
     const double turn = hand_deflection(model, state, c, static_cast<int>(s)).turn.norm() * 180.0 / std::numbers::pi;

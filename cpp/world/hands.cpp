@@ -51,23 +51,18 @@ void World::Implementation::release_hands(Equations& system) {
 
 void World::Implementation::settle_hands(Equations& system) {
   if (!system.hands()) return;
-  Configuration c;
-  compute_configuration(model, state, state.q, c);
-  system.hands()->accept(c, state);
+  system.hands()->accept(configuration(), state);
 }
 
 double World::Implementation::hand_energy_of(int hand) const {
-  Configuration c;
-  compute_configuration(model, state, state.q, c);
-  return hand_energy(model, parameters.measure, state, c, hand);
+  return hand_energy(model, parameters.measure, state, configuration(), hand);
 }
 
 /// A hand takes what it touches as it is now.
 void World::Implementation::grasp(int hand) {
   const Support& s = model.supports[at(hand)];
   SupportMotion& m = motions[at(hand)];
-  Configuration c;
-  compute_configuration(model, state, state.q, c);
+  const Configuration& c = configuration();
   const HandDescription& own = description.supports[at(hand)].hand;
   m = SupportMotion{};
   m.position = own.posed ? own.position : point_on(model, state.q, s.at_edge, s.at_place);
@@ -168,9 +163,7 @@ Deflection World::deflection(int support) const {
               self.model.supports[at(support)].active && self.model.supports[at(support)].is_hand(),
           "no such hand, or it is released: " + std::to_string(support));
   if (!self.model.supports[at(support)].yields()) return {};
-  Configuration c;
-  compute_configuration(self.model, self.state, self.state.q, c);
-  const HandDeflection found = hand_deflection(self.model, self.state, c, support);
+  const HandDeflection found = hand_deflection(self.model, self.state, self.configuration(), support);
   return {found.shift, found.turn, found.slip};
 }
 

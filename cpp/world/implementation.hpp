@@ -234,6 +234,9 @@ struct World::Implementation : Running {
 
   // equilibrium.cpp
   EquilibriumResult equilibrium(double dt);
+  void move_between(const std::vector<SupportMotion>& from, const std::vector<SupportMotion>& to, double factor);
+  Boundary boundary_between(Equations& system, const std::vector<SupportMotion>& from,
+                            const std::vector<SupportMotion>& to);
   [[noreturn]] void fail_equilibrium(const NewtonResult& newton, double dt) const;
   EquilibriumResult settle(Equations& system, StaticResult& result, double time);
   bool drifts(Equations& system);

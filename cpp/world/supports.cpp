@@ -16,8 +16,7 @@ SupportMotion World::Implementation::standing(const Support& support) const {
   if (support.frame >= 0) {
     m.rotation = frame_rotation(model, state, support.frame);
   } else if (support.edge >= 0) {
-    Configuration c;
-    compute_configuration(model, state, state.q, c);
+    const Configuration& c = configuration();
     const Vector3 t = to_eigen(model.initial_tangent[at(support.edge)]),
                   d1 = to_eigen(model.initial_director[at(support.edge)]);
     Matrix3 drawn;

@@ -17,7 +17,19 @@ import numpy.typing as npt
 
 from withe.folding.sheets import Elastica, at_forces, join, take
 
-__all__ = ["SPACING", "Grid", "Network", "Solve", "gentle", "lift", "make_grid", "make_network", "shortest_path"]
+__all__ = [
+    "HIGH",
+    "SPACING",
+    "WIDE",
+    "Grid",
+    "Network",
+    "Solve",
+    "gentle",
+    "lift",
+    "make_grid",
+    "make_network",
+    "shortest_path",
+]
 
 FloatArray = npt.NDArray[np.float64]
 IndexArray = npt.NDArray[np.intp]
@@ -25,7 +37,7 @@ Solve = Callable[[npt.ArrayLike, npt.ArrayLike], Elastica]
 """Equilibria without moment at positions x, z: `elastica`, or a network that has learned it."""
 
 SPACING = 0.0548
-_WIDE, _HIGH = 10.3, 4.7  # [Lgb] of what sheets of up to 6.84 Lgb reach
+WIDE, HIGH = 10.3, 4.7  # [Lgb] of what sheets of up to 6.84 Lgb reach
 _LIFTS = np.linspace(0.1, 3.0, 59)  # lifted lengths
 _STEPS = ((1, 0), (0, 1), (1, 1), (1, -1))
 _LEAST_COST = 1e-6  # an edge without cost would be no edge
@@ -87,7 +99,7 @@ def gentle(lifted: FloatArray) -> FloatArray:
 @cache
 def make_grid(solve: Solve, spacing: float = SPACING) -> Grid:
     """Solve the middles of all blocks; edges join neighbours, also over corners, and the lift with blocks nearby."""
-    columns, rows = int(_WIDE / spacing), int(_HIGH / spacing)
+    columns, rows = int(WIDE / spacing), int(HIGH / spacing)
     x, z = np.meshgrid(spacing * (np.arange(columns) + 0.5), spacing * (np.arange(rows) + 0.5), indexing="ij")
     blocks = solve(x, z)
     raised = lift()

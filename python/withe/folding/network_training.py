@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
+from withe.folding.grid import HIGH, WIDE
 from withe.folding.manifold import elastica
 from withe.folding.sheet_network import FORMS, SheetNetwork
 from withe.folding.sheets import Elastica, join, take
@@ -17,7 +18,6 @@ from withe.learning.network_training import Alternating, Cosine, train_network
 __all__ = ["train"]
 
 FloatArray = npt.NDArray[np.float64]
-_WIDE, _HIGH = 10.3, 4.7  # [Lgb] of what sheets of up to 6.84 Lgb reach
 _STRAIGHT = (0.48, 5.72)  # least and greatest straight length of all sheets [Lgb]
 _SAMPLES = {"small": 300_000, "source": 95_796}
 # Of errors of angle, length, direction and size of the force, curvature, as parts of their spread.
@@ -108,7 +108,7 @@ def _drawn(count: int, draw: Callable[[int], tuple[FloatArray, FloatArray]]) -> 
 
 def _even(random: np.random.Generator, count: int) -> Elastica:
     """Sheets at positions spread evenly."""
-    return _drawn(count, lambda many: (random.uniform(0.0, _WIDE, many), random.uniform(0.0, _HIGH, many)))
+    return _drawn(count, lambda many: (random.uniform(0.0, WIDE, many), random.uniform(0.0, HIGH, many)))
 
 
 def _spread(random: np.random.Generator, count: int) -> Elastica:
