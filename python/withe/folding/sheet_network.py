@@ -14,17 +14,16 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from withe._core import SheetManifold
 from withe.common import validation
 from withe.common.extras import require
-from withe.folding.sheets import Elastica
+from withe.folding.sheets import LONGEST, SHORTEST, Elastica
 from withe.learning.surrogates import Form, Surrogate
 
 __all__ = ["FORMS", "SHIPPED", "SheetNetwork", "shipped", "straight"]
 
 FloatArray = npt.NDArray[np.float64]
 SHIPPED = Path(__file__).parent / "small.pt"
-_LENGTHS = (0.958, 6.84)  # lifted lengths between which positions name one pose [Lgb]
-_TAUT = -40.0  # least tangential force [w Lgb]
 
 
 def straight(x: Any, z: Any) -> Any:
@@ -124,8 +123,8 @@ class SheetNetwork(Surrogate):
         said = self.network(asked.astype(np.float32)).astype(float)
         known = self._form.tell(np, x_there, z_there, tuple(said.T))
         inside = ((asked >= self.network.domain[0]) & (asked <= self.network.domain[1])).all(axis=1)
-        inside &= (known["suspended"] > _LENGTHS[0]) & (known["suspended"] < _LENGTHS[1])
-        inside &= known.get("tangential_force", 0.0) > _TAUT
+        inside &= (known["suspended"] > SHORTEST) & (known["suspended"] < LONGEST)
+        inside &= known.get("tangential_force", 0.0) > -SheetManifold.greatest_pull
         valid = np.zeros(x.shape, bool)
         valid[there] = inside
 
