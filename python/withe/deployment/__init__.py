@@ -12,8 +12,10 @@ length, unless they belong to a particular cable: then in m and N.
 from withe.deployment.cable import Cable, MeasuredCable, measure
 from withe.deployment.deploying import Deployment, deploy, place
 from withe.deployment.feasibility import Feasibility, Slip
+from withe.deployment.grasp_network import GraspNetwork
 from withe.deployment.grasping import Grasp, grasp
 from withe.deployment.motion import Phase
+from withe.deployment.network_training import train
 from withe.deployment.pattern import Pattern
 from withe.deployment.placing import posts_along
 from withe.deployment.planning import Plan, plan
@@ -25,6 +27,7 @@ __all__ = [
     "Deployment",
     "Feasibility",
     "Grasp",
+    "GraspNetwork",
     "MeasuredCable",
     "Pattern",
     "Phase",
@@ -39,4 +42,5 @@ __all__ = [
     "place",
     "plan",
     "posts_along",
+    "train",
 ]

@@ -9,12 +9,11 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.folding.grid import Network, Solve, gentle, lift, make_grid, make_network, shortest_path
-from withe.folding.sheets import Elastica, at_forces, join, poses_of, slides_to_rest, take
+from withe.folding.sheets import SHORTEST, Elastica, at_forces, join, poses_of, slides_to_rest, take
 
-__all__ = ["PENALTY", "goal_pose", "greedy", "least_slide", "smoothed", "uniform_cost"]
+__all__ = ["goal_pose", "greedy", "least_slide", "smoothed", "uniform_cost"]
 
 FloatArray = npt.NDArray[np.float64]
-PENALTY = 0.958  # [Lgb] shorter lifted parts would be bent too sharply [7.8.5]
 _MOST_STEPS = 2000
 
 
@@ -54,7 +53,7 @@ def _allowed(solve: Solve, length: float) -> npt.NDArray[np.bool_]:
     """Nodes of the grid that are part of a sheet's manifold."""
     grid = make_grid(solve)
     lifted = grid.pose.suspended
-    allowed = (lifted < length) & (lifted > PENALTY)
+    allowed = (lifted < length) & (lifted > SHORTEST)
     allowed[: grid.lifts] = lift().suspended < length
     return allowed
 
