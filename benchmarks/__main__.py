@@ -35,6 +35,7 @@ NAMES = (
     "deployment_tables",
     "folding",
     "folding_trials",
+    "folding_replay",
 )
 
 

@@ -43,6 +43,7 @@ def run(name, folder, *arguments):
         "deployment_tables",
         "folding",
         "folding_trials",
+        "folding_replay",
         pytest.param("rl_throughput", marks=pytest.mark.skipif(not HAVE_GYMNASIUM, reason="needs gymnasium")),
     ],
 )
