@@ -41,6 +41,7 @@ def run(name, folder, *arguments):
         "real2sim",
         "deployment",
         "deployment_tables",
+        "deployment_uses",
         "folding",
         "folding_trials",
         pytest.param("rl_throughput", marks=pytest.mark.skipif(not HAVE_GYMNASIUM, reason="needs gymnasium")),
