@@ -6,12 +6,13 @@ Each use without noise, through equilibria where it is placement, and in noisy t
 Lgb, friction, natural curvature and what the gripper is off by. A placement succeeds if the cable passes every post on
 its right side; a knot if it is there when its ends were pulled 20 mm apart. Knots are tied without looking: grippers
 reach where a rehearsal with exact grasps found the cable. The cases are those of examples/place_cable.py and
-examples/tie_knot.py.
+examples/tie_knot.py. Ctrl-C makes the table of what there is.
 """
 
 from __future__ import annotations
 
 import sys
+from itertools import product
 
 from reporting import ROOT, Report, arguments, bar
 
@@ -19,6 +20,7 @@ sys.path.insert(0, str(ROOT / "examples"))
 import place_cable
 import tie_knot
 
+from withe.common.progress import Progress
 from withe.deployment import tie
 from withe.errors import ConvergenceError
 
@@ -54,6 +56,21 @@ class Knots:
         return tie_knot.is_tied(name, found), f"{len(found.missed)} moves missed"
 
 
+def tried(knots: Knots, use: str, way: str, trials: int, shown: Progress) -> tuple[str, str, str]:
+    """Whether it succeeds without noise, in how many noisy trials, and what each came to."""
+    attempt = knots.tied if use in tie_knot.TYING else placed
+    done, said = [], []
+    for seed in range(trials + 1):
+        try:
+            success, words = attempt(use, way, seed, 1.0 if seed else 0.0)
+        except ConvergenceError:
+            success, words = False, "engine gave up"
+        done.append(success)
+        said.append(words)
+        shown.advance(1)
+    return "yes" if done[0] else "no", f"{sum(done[1:])} of {trials}", "; ".join(said)
+
+
 def main() -> None:
     """Try, count, compare."""
     options = arguments(
@@ -67,27 +84,19 @@ def main() -> None:
         uses, ways, trials = ["trefoil"], ["exact"], 0
     report = Report("deployment_uses", quick=options.quick)
     knots = Knots(90 if options.quick else NODES)
-    rows = []
+    rows: list[tuple] = []
     with bar(len(uses) * len(ways) * (1 + trials), "trying", "trials") as shown:
-        for use in uses:
-            for way in ways:
-                tried = knots.tied if use in tie_knot.TYING else placed
-                done, said = [], []
-                for seed in range(trials + 1):
-                    try:
-                        success, words = tried(use, way, seed, 1.0 if seed else 0.0)
-                    except ConvergenceError:
-                        success, words = False, "engine gave up"
-                    done.append(success)
-                    said.append(words)
-                    shown.advance(1)
-                noisy = f"{sum(done[1:])} of {trials}"
-                rows.append((use, way, "yes" if done[0] else "no", noisy, "; ".join(said), PUBLISHED[use]))
+        try:
+            for use, way in product(uses, ways):
+                row = tried(knots, use, way, trials, shown)
+                rows.append((use, way, *row, PUBLISHED[use]))
                 print(*rows[-1], sep="  ", flush=True)
-                if way == "exact":
-                    report.goal(f"{use}: without noise", float(done[0]), 1.0)
-                    share = sum(done[1:]) / trials if trials else None
-                    report.goal(f"{use}: share of noisy trials", share, GOALS[use])
+        except KeyboardInterrupt:
+            report.figures["interrupted"] = f"{len(rows)} of {len(uses) * len(ways)} rows"
+    for use, way, alone, noisy, *_ in rows:
+        if way == "exact":
+            report.goal(f"{use}: without noise", float(alone == "yes"), 1.0)
+            report.goal(f"{use}: share of noisy trials", int(noisy.split()[0]) / trials if trials else None, GOALS[use])
     header = ("use", "way", "without noise", "noisy trials", "without noise, then each trial", "published, of 10")
     report.table("Uses: exact and intuitive ways of laying", header, rows)
     report.write()
