@@ -33,6 +33,7 @@ NAMES = (
     "real2sim",
     "deployment",
     "deployment_tables",
+    "deployment_uses",
     "folding",
     "folding_trials",
     "folding_replay",

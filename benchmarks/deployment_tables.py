@@ -1,6 +1,6 @@
 """Tables 9.2 and 9.3 of the dissertation from simulation: seven patterns, cables and floors, and ways to lay.
 
-python benchmarks/deployment_tables.py [--quick] [--whole] [--cables 2] [--patterns circle ...] [--trials 0]
+python benchmarks/deployment_tables.py [--quick] [--whole] [--cables 2] [--patterns circle ...] [--trials 0] [--refine]
 
 By default cable 2 alone, which takes some 20 minutes of one thread; --whole takes cables 1 to 3 and three noisy trials
 of each cell, and hours. Ctrl-C makes the tables of what there is. Cables are laid quasi-statically, but for the
@@ -17,6 +17,7 @@ from itertools import product
 from pathlib import Path
 
 import numpy as np
+from deployment_refining import refine
 from reporting import OUT, Report, arguments, bar
 
 from withe.deployment import Cable, Deployment, Pattern, Plan, deploy, place, plan
@@ -283,7 +284,13 @@ def main() -> None:
         ("--ways", {"nargs": "*", "choices": WAYS, "default": list(WAYS)}),
         ("--trials", {"type": int, "default": 0, "help": "noisy trials of each cell"}),
         ("--nodes", {"type": int, "default": 200, "help": "of the cable"}),
+        ("--refine", {"action": "store_true", "help": "instead: meshes and half the speed, in five cells"}),
     )
+    if options.refine:
+        report = Report("deployment_refining")
+        refine(report, Patterns(301).plan)
+        report.write()
+        return
     cables, trials = ([1, 2, 3], 3) if options.whole else (options.cables, options.trials)
     ways = tuple(way for way in WAYS if way in options.ways or way in ("placed", "exact"))
     if importlib.util.find_spec("torch") is None:

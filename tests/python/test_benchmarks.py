@@ -41,6 +41,7 @@ def run(name, folder, *arguments):
         "real2sim",
         "deployment",
         "deployment_tables",
+        "deployment_uses",
         "folding",
         "folding_trials",
         "folding_replay",
