@@ -21,6 +21,7 @@ from withe.deployment.placing import posts_along
 from withe.deployment.planning import Plan, plan
 from withe.deployment.posts import Post
 from withe.deployment.straight import StraightLine, StraightPose
+from withe.deployment.tying import Move, Tying, tie
 
 __all__ = [
     "Cable",
@@ -29,6 +30,7 @@ __all__ = [
     "Grasp",
     "GraspNetwork",
     "MeasuredCable",
+    "Move",
     "Pattern",
     "Phase",
     "Plan",
@@ -36,11 +38,13 @@ __all__ = [
     "Slip",
     "StraightLine",
     "StraightPose",
+    "Tying",
     "deploy",
     "grasp",
     "measure",
     "place",
     "plan",
     "posts_along",
+    "tie",
     "train",
 ]
