@@ -250,7 +250,8 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
         ----------
         integrator : {"implicit_midpoint", "backward_euler", "energy_momentum", "fourth_order", "verlet", "static"}
             "fourth_order" is five midpoint steps in one, the third back in time; it takes no viscosity, and
-            drag only up to mass over time_step.
+            drag only up to mass over time_step. "energy_momentum" follows what turns fast best: the tip of an
+            arm on a turning hub ten times more closely than midpoint at the same step.
         time_step : float [s]
         adaptive : bool
             Whether an implicit step that fails is halved; steps grow back. And whether midpoint and fourth-order
