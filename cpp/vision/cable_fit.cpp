@@ -159,6 +159,11 @@ std::size_t find_waist(const std::vector<Place>& places, double half_width) {
   return (first + last) / 2;
 }
 
+/// Between the rows of a line over a length [px].
+double row_spacing(const MatrixX2& line, bool closed, double total) {
+  return total / static_cast<double>(closed ? line.rows() : line.rows() - 1);
+}
+
 }  // namespace
 
 std::vector<FitSample> CableOutline::flank_samples(const BitImage& mask, const MatrixX2& line, double spacing,
@@ -219,87 +224,58 @@ std::vector<FitSample> CableOutline::flank_samples(const BitImage& mask, const M
   return samples;
 }
 
-Cable CableOutline::fit(const BitImage& mask, const TraceOptions& options, int number,
-                        std::vector<HiddenStretch>& stretches) const {
-  Cable cable;
-  cable.closed = closed_ && points_.size() >= 8;
-  double total = 0;
-  std::vector<double> station = stations(total);
+double CableOutline::median_half_width() const {
   std::vector<double> half_widths;
   for (const Point& point : points_) half_widths.push_back(point.half_width);
   const auto middle = half_widths.begin() + static_cast<std::ptrdiff_t>(half_widths.size() / 2);
   std::nth_element(half_widths.begin(), middle, half_widths.end());
-  const double half_width = std::max(*middle, 0.5);
-  const double stiffness = options.stiffness_length * std::clamp(half_width, 1.5, 12.0);
-  const double spacing = std::min(2.0, stiffness);
+  return *middle;
+}
 
+std::vector<FitSample> CableOutline::point_samples(const std::vector<double>& station) const {
   std::vector<FitSample> samples;
-  const auto make_samples = [&] {
-    samples.clear();
-    for (std::size_t i = 0; i < points_.size(); ++i) samples.push_back({points_[i].position, station[i], 1.0});
-    // One more sample keeps the line determined where there are fewer than two.
-    if (samples.size() == 1) samples.push_back({samples[0].point + Vector2(1, 0), samples[0].station + 1, 1.0});
+  for (std::size_t i = 0; i < points_.size(); ++i) samples.push_back({points_[i].position, station[i], 1.0});
+  // One more sample keeps the line determined where there are fewer than two.
+  if (samples.size() == 1) samples.push_back({samples[0].point + Vector2(1, 0), samples[0].station + 1, 1.0});
+  return samples;
+}
+
+double CableOutline::lengthen_gaps(const MatrixX2& line, bool closed, double total,
+                                   std::vector<double>& station) const {
+  const std::ptrdiff_t n = line.rows();
+  const double h = row_spacing(line, closed, total);
+  std::vector<double> arc(static_cast<std::size_t>(n) + 1, 0.0);
+  for (std::ptrdiff_t i = 0; i < n; ++i) {
+    const double step = i + 1 < n || closed ? (line.row((i + 1) % n) - line.row(i)).norm() : 0.0;
+    arc[static_cast<std::size_t>(i) + 1] = arc[static_cast<std::size_t>(i)] + step;
+  }
+  const auto arc_at = [&](double s) {
+    const double place = std::clamp(s / h, 0.0, static_cast<double>(n) - 1e-9);
+    const auto i = static_cast<std::size_t>(place);
+    return arc[i] + (place - static_cast<double>(i)) * (arc[i + 1] - arc[i]);
   };
-  make_samples();
-  total = std::max(total, 1.0);
-  MatrixX2 line = fit_least_bending(samples, total, spacing, stiffness, cable.closed);
-
-  // The way through a gap is longer than its chord: measured on the first fit, it moves the samples behind it.
-  bool gaps = closing_zone_ != kNoGap;
-  bool shallow = closing_shows_ != Flank::unknown;
-  for (const Point& point : points_) {
-    gaps = gaps || point.zone_before != kNoGap;
-    shallow = shallow || point.shows != Flank::unknown;
+  const double closing = std::max(total - station.back(), arc_at(total) - arc_at(station.back()));
+  double shift = 0;
+  std::vector<double> moved = station;
+  for (std::size_t i = 1; i < points_.size(); ++i) {
+    if (points_[i].zone_before != kNoGap) {
+      const double gap = station[i] - station[i - 1];
+      shift += std::clamp(arc_at(station[i]) - arc_at(station[i - 1]), gap, 3 * gap) - gap;
+    }
+    moved[i] = station[i] + shift;
   }
-  if (gaps) {
-    const std::ptrdiff_t n = line.rows();
-    const double h = total / static_cast<double>(cable.closed ? n : n - 1);
-    std::vector<double> arc(static_cast<std::size_t>(n) + 1, 0.0);
-    for (std::ptrdiff_t i = 0; i < n; ++i) {
-      const double step = i + 1 < n || cable.closed ? (line.row((i + 1) % n) - line.row(i)).norm() : 0.0;
-      arc[static_cast<std::size_t>(i) + 1] = arc[static_cast<std::size_t>(i)] + step;
-    }
-    const auto arc_at = [&](double s) {
-      const double place = std::clamp(s / h, 0.0, static_cast<double>(n) - 1e-9);
-      const auto i = static_cast<std::size_t>(place);
-      return arc[i] + (place - static_cast<double>(i)) * (arc[i + 1] - arc[i]);
-    };
-    const double closing = total - station.back();
-    const double closing_arc = arc_at(total) - arc_at(station.back());
-    double shift = 0;
-    std::vector<double> moved = station;
-    for (std::size_t i = 1; i < points_.size(); ++i) {
-      if (points_[i].zone_before != kNoGap) {
-        const double gap = station[i] - station[i - 1];
-        shift += std::clamp(arc_at(station[i]) - arc_at(station[i - 1]), gap, 3 * gap) - gap;
-      }
-      moved[i] = station[i] + shift;
-    }
-    total = moved.back() + (cable.closed ? std::max(closing, closing_arc) : 0.0);
-    total = std::max(total, 1.0);
-    station = moved;
-    // Flanks are looked for from the line without them; those of shallow crossings again from the line that they gave.
-    const int rounds = shallow ? 3 : 2;
-    for (int round = 0; round < rounds; ++round) {
-      make_samples();
-      const double step = total / static_cast<double>(cable.closed ? line.rows() : line.rows() - 1);
-      if (round > 0) {
-        const std::vector<FitSample> flanks = flank_samples(mask, line, step, station);
-        samples.insert(samples.end(), flanks.begin(), flanks.end());
-      }
-      line = fit_least_bending(samples, total, spacing, stiffness, cable.closed);
-    }
-  }
+  station = moved;
+  return std::max(moved.back() + (closed ? closing : 0.0), 1.0);
+}
 
-  std::vector<double> rows;
-  const double h = total / static_cast<double>(cable.closed ? line.rows() : line.rows() - 1);
-  cable.centreline = resample(line, options.spacing, cable.closed, &rows);
-  const auto count = static_cast<std::size_t>(cable.centreline.rows());
+void CableOutline::describe_rows(const std::vector<double>& places, const std::vector<double>& station, int number,
+                                 Cable& cable, std::vector<HiddenStretch>& stretches) const {
+  const std::size_t count = places.size();
   cable.widths.resize(count);
   cable.hidden.assign(count, 0);
   std::size_t next = 0;
   for (std::size_t r = 0; r < count; ++r) {
-    const double s = rows[r] * h;
+    const double s = places[r];
     while (next < points_.size() && station[next] < s) ++next;
     const bool wraps = next == points_.size() || next == 0;
     const Point& after = points_[next == points_.size() ? (cable.closed ? 0 : next - 1) : next];
@@ -319,6 +295,45 @@ Cable CableOutline::fit(const BitImage& mask, const TraceOptions& options, int n
       stretches.push_back({gap, number, row, row});
     }
   }
+}
+
+Cable CableOutline::fit(const BitImage& mask, const TraceOptions& options, int number,
+                        std::vector<HiddenStretch>& stretches) const {
+  Cable cable;
+  cable.closed = closed_ && points_.size() >= 8;
+  double total = 0;
+  std::vector<double> station = stations(total);
+  const double stiffness = options.stiffness_length * std::clamp(std::max(median_half_width(), 0.5), 1.5, 12.0);
+  const double spacing = std::min(2.0, stiffness);
+  total = std::max(total, 1.0);
+  MatrixX2 line = fit_least_bending(point_samples(station), total, spacing, stiffness, cable.closed);
+
+  bool gaps = closing_zone_ != kNoGap;
+  bool shallow = closing_shows_ != Flank::unknown;
+  for (const Point& point : points_) {
+    gaps = gaps || point.zone_before != kNoGap;
+    shallow = shallow || point.shows != Flank::unknown;
+  }
+  if (gaps) {
+    total = lengthen_gaps(line, cable.closed, total, station);
+    // Flanks are looked for from the line without them; those of shallow crossings again from the line that they gave.
+    const int rounds = shallow ? 3 : 2;
+    for (int round = 0; round < rounds; ++round) {
+      std::vector<FitSample> samples = point_samples(station);
+      if (round > 0) {
+        const std::vector<FitSample> flanks =
+            flank_samples(mask, line, row_spacing(line, cable.closed, total), station);
+        samples.insert(samples.end(), flanks.begin(), flanks.end());
+      }
+      line = fit_least_bending(samples, total, spacing, stiffness, cable.closed);
+    }
+  }
+
+  std::vector<double> places;
+  cable.centreline = resample(line, options.spacing, cable.closed, &places);
+  const double h = row_spacing(line, cable.closed, total);
+  for (double& place : places) place *= h;
+  describe_rows(places, station, number, cable, stretches);
   return cable;
 }
 

@@ -48,6 +48,14 @@ class CableOutline {
   static Flank flank_that_shows(const Continuations& links, HalfEdge from, HalfEdge to);
   void add_way(const std::vector<Vector2>& way, int zone);
   std::vector<double> stations(double& total) const;
+  double median_half_width() const;
+  std::vector<FitSample> point_samples(const std::vector<double>& station) const;
+  /// The way through a gap is longer than its chord: measured on a first line, it moves the points behind it. Returns
+  /// the length of the whole.
+  double lengthen_gaps(const MatrixX2& line, bool closed, double total, std::vector<double>& station) const;
+  /// Widths of rows, by their places along the cable, and which of them are hidden.
+  void describe_rows(const std::vector<double>& places, const std::vector<double>& station, int number, Cable& cable,
+                     std::vector<HiddenStretch>& stretches) const;
   std::vector<FitSample> flank_samples(const BitImage& mask, const MatrixX2& line, double spacing,
                                        const std::vector<double>& station) const;
 

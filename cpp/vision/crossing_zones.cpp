@@ -152,115 +152,159 @@ bool is_forked(std::size_t link, const SkeletonGraph& graph, Union& sets, const 
 }
 
 /// Joins nodes to zones and says which edges are inside.
-void find_zones(const SkeletonGraph& graph, const ZoneOptions& options, const std::vector<char>& known_links,
-                Continuations& result) {
-  Union sets(graph.nodes.size());
-  std::vector<std::size_t> long_links;
-  for (std::size_t e = 0; e < graph.edges.size(); ++e) {
-    const SkeletonEdge& edge = graph.edges[e];
-    if (edge.removed || !is_junction(graph, edge.nodes[0]) || !is_junction(graph, edge.nodes[1])) continue;
-    // Between two crossings the mask is wider than the cable: the narrowest place tells its width.
-    const double width = 2 * inner_half_width(edge);
-    if (known_links[e] || edge.length < options.short_link * width) {
-      sets.join(edge.nodes[0], edge.nodes[1]);
-      result.inside[e] = 1;
-    } else {
-      long_links.push_back(e);
-    }
+class ZoneFinder {
+ public:
+  ZoneFinder(const SkeletonGraph& graph, const ZoneOptions& options, Continuations& result)
+      : graph_(graph), options_(options), result_(result), sets_(graph.nodes.size()) {}
+
+  void run(const std::vector<char>& known_links) {
+    const std::vector<std::size_t> long_links = join_short_links(known_links);
+    merge_links(long_links);
+    take_in_ways_around_holes();
+    number_zones();
+    measure_waists();
+    attach_branches();
   }
-  const std::vector<std::vector<int>> leaving = edges_leaving(graph, sets);
-  const auto ends_at = [&](std::size_t link) {
+
+ private:
+  const SkeletonNode& node(int number) const { return graph_.nodes[static_cast<std::size_t>(number)]; }
+
+  Zone& zone_at(int node) {
+    return result_.zones[static_cast<std::size_t>(zone_of_root_[static_cast<std::size_t>(sets_.root(node))])];
+  }
+
+  /// Joins the ends of links that are short, or known to be inside; returns the other links.
+  std::vector<std::size_t> join_short_links(const std::vector<char>& known_links) {
+    std::vector<std::size_t> long_links;
+    for (std::size_t e = 0; e < graph_.edges.size(); ++e) {
+      const SkeletonEdge& edge = graph_.edges[e];
+      if (edge.removed || !is_junction(graph_, edge.nodes[0]) || !is_junction(graph_, edge.nodes[1])) continue;
+      // Between two crossings the mask is wider than the cable: the narrowest place tells its width.
+      const double width = 2 * inner_half_width(edge);
+      if (known_links[e] || edge.length < options_.short_link * width)
+        take_in(e);
+      else
+        long_links.push_back(e);
+    }
+    leaving_ = edges_leaving(graph_, sets_);
+    return long_links;
+  }
+
+  void take_in(std::size_t link) {
+    sets_.join(graph_.edges[link].nodes[0], graph_.edges[link].nodes[1]);
+    result_.inside[link] = 1;
+  }
+
+  /// Longer links are inside too where two cables run on each other.
+  void merge_links(const std::vector<std::size_t>& long_links) {
+    std::vector<std::size_t> merged;
+    for (const std::size_t e : long_links) {
+      const SkeletonEdge& edge = graph_.edges[e];
+      const auto strands = find_side_by_side(graph_, static_cast<int>(e), result_.branches, ends_at(e));
+      if (strands) {
+        result_.doubts.push_back({edge.points[edge.points.size() / 2].position(), Doubt::parallel_strands});
+        result_.side_by_side.push_back(*strands);
+      }
+      if (strands || is_wide(e)) merged.push_back(e);
+    }
+    for (const std::size_t e : merged) take_in(e);
+  }
+
+  /// Half edges that leave the sets of nodes at both ends of a link; none where both are one.
+  std::array<std::vector<HalfEdge>, 2> ends_at(std::size_t link) {
     std::array<std::vector<HalfEdge>, 2> ends;
-    const std::array<int, 2>& nodes = graph.edges[link].nodes;
-    if (sets.root(nodes[0]) == sets.root(nodes[1])) return ends;
+    const std::array<int, 2>& nodes = graph_.edges[link].nodes;
+    if (sets_.root(nodes[0]) == sets_.root(nodes[1])) return ends;
     for (const std::size_t end : {0U, 1U}) {
-      const int set = sets.root(nodes[end]);
-      for (const int other : leaving[static_cast<std::size_t>(set)]) {
+      const int set = sets_.root(nodes[end]);
+      for (const int other : leaving_[static_cast<std::size_t>(set)]) {
         if (other == static_cast<int>(link)) continue;
-        const bool starts = sets.root(graph.edges[static_cast<std::size_t>(other)].nodes[0]) == set;
+        const bool starts = sets_.root(graph_.edges[static_cast<std::size_t>(other)].nodes[0]) == set;
         ends[end].push_back(2 * other + (starts ? 0 : 1));
       }
     }
     return ends;
-  };
-  std::vector<std::size_t> merged;
-  for (const std::size_t e : long_links) {
-    const SkeletonEdge& edge = graph.edges[e];
-    const auto strands = find_side_by_side(graph, static_cast<int>(e), result.branches, ends_at(e));
-    if (strands) {
-      result.doubts.push_back({edge.points[edge.points.size() / 2].position(), Doubt::parallel_strands});
-      result.side_by_side.push_back(*strands);
-      merged.push_back(e);
-      continue;
-    }
-    if (edge.length > options.merged_link * 2 * inner_half_width(edge)) continue;
+  }
+
+  /// Whether a link is wider than one cable, or as wide and forked at both ends.
+  bool is_wide(std::size_t link) {
+    const SkeletonEdge& edge = graph_.edges[link];
+    if (edge.length > options_.merged_link * 2 * inner_half_width(edge)) return false;
     double widest = 0;
-    for (const int node : edge.nodes) {
-      for (const int other : leaving[static_cast<std::size_t>(sets.root(node))]) {
-        if (other == static_cast<int>(e)) continue;
-        widest = std::max(widest, inner_half_width(graph.edges[static_cast<std::size_t>(other)]));
+    for (const int number : edge.nodes) {
+      for (const int other : leaving_[static_cast<std::size_t>(sets_.root(number))]) {
+        if (other == static_cast<int>(link)) continue;
+        widest = std::max(widest, inner_half_width(graph_.edges[static_cast<std::size_t>(other)]));
       }
     }
     const double widening = widest > 0 ? inner_half_width(edge) / widest : 0;
-    if (widening > options.merged_widening ||
-        (widening > 0.85 && is_forked(e, graph, sets, leaving, result.branches))) {
-      merged.push_back(e);
-    }
-  }
-  for (const std::size_t e : merged) {
-    sets.join(graph.edges[e].nodes[0], graph.edges[e].nodes[1]);
-    result.inside[e] = 1;
+    return widening > options_.merged_widening ||
+           (widening > 0.85 && is_forked(link, graph_, sets_, leaving_, result_.branches));
   }
 
-  // A hole in a zone has two sides: what runs beside a link is inside as well. A cable's loop is no straight way.
-  for (std::size_t e = 0; e < graph.edges.size(); ++e) {
-    const SkeletonEdge& edge = graph.edges[e];
-    if (edge.removed || result.inside[e] || edge.nodes[0] < 0) continue;
-    if (sets.root(edge.nodes[0]) != sets.root(edge.nodes[1])) continue;
-    const Vector2 chord = graph.nodes[static_cast<std::size_t>(edge.nodes[1])].position -
-                          graph.nodes[static_cast<std::size_t>(edge.nodes[0])].position;
-    const double longest = options.merged_link * 2 * inner_half_width(edge);
-    if (edge.length < std::min(longest, 1.6 * chord.norm())) result.inside[e] = 1;
+  /// A hole in a zone has two sides: what runs beside a link is inside as well. A cable's loop is no straight way.
+  void take_in_ways_around_holes() {
+    for (std::size_t e = 0; e < graph_.edges.size(); ++e) {
+      const SkeletonEdge& edge = graph_.edges[e];
+      if (edge.removed || result_.inside[e] || edge.nodes[0] < 0) continue;
+      if (sets_.root(edge.nodes[0]) != sets_.root(edge.nodes[1])) continue;
+      const Vector2 chord = node(edge.nodes[1]).position - node(edge.nodes[0]).position;
+      const double longest = options_.merged_link * 2 * inner_half_width(edge);
+      if (edge.length < std::min(longest, 1.6 * chord.norm())) result_.inside[e] = 1;
+    }
   }
 
-  std::vector<int> zone_of_root(graph.nodes.size(), -1);
-  for (std::size_t n = 0; n < graph.nodes.size(); ++n) {
-    if (graph.nodes[n].edges.size() < 2) continue;
-    const auto root = static_cast<std::size_t>(sets.root(static_cast<int>(n)));
-    if (zone_of_root[root] < 0) {
-      zone_of_root[root] = static_cast<int>(result.zones.size());
-      result.zones.emplace_back();
+  void number_zones() {
+    zone_of_root_.assign(graph_.nodes.size(), -1);
+    for (std::size_t n = 0; n < graph_.nodes.size(); ++n) {
+      if (graph_.nodes[n].edges.size() < 2) continue;
+      int& number = zone_of_root_[static_cast<std::size_t>(sets_.root(static_cast<int>(n)))];
+      if (number < 0) {
+        number = static_cast<int>(result_.zones.size());
+        result_.zones.emplace_back();
+      }
+      Zone& zone = result_.zones[static_cast<std::size_t>(number)];
+      zone.nodes.push_back(static_cast<int>(n));
+      zone.center += graph_.nodes[n].position;
     }
-    Zone& zone = result.zones[static_cast<std::size_t>(zone_of_root[root])];
-    zone.nodes.push_back(static_cast<int>(n));
-    zone.center += graph.nodes[n].position;
+    for (Zone& zone : result_.zones) zone.center /= static_cast<double>(zone.nodes.size());
   }
-  for (Zone& zone : result.zones) {
-    zone.center /= static_cast<double>(zone.nodes.size());
-    zone.waist = std::numeric_limits<double>::infinity();
-    for (const int node : zone.nodes) {
-      zone.waist = std::min(zone.waist, graph.nodes[static_cast<std::size_t>(node)].half_width);
+
+  /// The narrowest place of each zone.
+  void measure_waists() {
+    for (Zone& zone : result_.zones) {
+      zone.waist = std::numeric_limits<double>::infinity();
+      for (const int number : zone.nodes) zone.waist = std::min(zone.waist, node(number).half_width);
     }
-  }
-  for (std::size_t e = 0; e < graph.edges.size(); ++e) {
-    if (!result.inside[e]) continue;
-    const auto root = static_cast<std::size_t>(sets.root(graph.edges[e].nodes[0]));
-    double& waist = result.zones[static_cast<std::size_t>(zone_of_root[root])].waist;
-    for (const SkeletonPoint& point : graph.edges[e].points) waist = std::min<double>(waist, point.half_width);
-  }
-  for (std::size_t e = 0; e < graph.edges.size(); ++e) {
-    const SkeletonEdge& edge = graph.edges[e];
-    if (edge.removed || result.inside[e] || edge.nodes[0] < 0) continue;
-    for (int end = 0; end < 2; ++end) {
-      const int node = edge.nodes[static_cast<std::size_t>(end)];
-      if (graph.nodes[static_cast<std::size_t>(node)].edges.size() < 2) continue;
-      const int zone = zone_of_root[static_cast<std::size_t>(sets.root(node))];
-      const HalfEdge half = 2 * static_cast<int>(e) + end;
-      result.zone_of[static_cast<std::size_t>(half)] = zone;
-      result.zones[static_cast<std::size_t>(zone)].branches.push_back(half);
+    for (std::size_t e = 0; e < graph_.edges.size(); ++e) {
+      if (!result_.inside[e]) continue;
+      double& waist = zone_at(graph_.edges[e].nodes[0]).waist;
+      for (const SkeletonPoint& point : graph_.edges[e].points) waist = std::min<double>(waist, point.half_width);
     }
   }
-}
+
+  void attach_branches() {
+    for (std::size_t e = 0; e < graph_.edges.size(); ++e) {
+      const SkeletonEdge& edge = graph_.edges[e];
+      if (edge.removed || result_.inside[e] || edge.nodes[0] < 0) continue;
+      for (int end = 0; end < 2; ++end) {
+        const int number = edge.nodes[static_cast<std::size_t>(end)];
+        if (node(number).edges.size() < 2) continue;
+        Zone& zone = zone_at(number);
+        const HalfEdge half = 2 * static_cast<int>(e) + end;
+        result_.zone_of[static_cast<std::size_t>(half)] = static_cast<int>(&zone - result_.zones.data());
+        zone.branches.push_back(half);
+      }
+    }
+  }
+
+  const SkeletonGraph& graph_;
+  const ZoneOptions& options_;
+  Continuations& result_;
+  Union sets_;
+  std::vector<std::vector<int>> leaving_;  ///< edges that leave each set of nodes
+  std::vector<int> zone_of_root_;
+};
 
 void match_zone(const Zone& zone, const ZoneOptions& options, Continuations& result) {
   std::vector<Branch> branches;
@@ -348,7 +392,7 @@ Continuations find_continuations(const SkeletonGraph& graph, const ZoneOptions& 
     result.partner.assign(branches.size(), -1);
     result.inside.assign(graph.edges.size(), 0);
     result.ways.resize(branches.size());
-    find_zones(graph, options, known_links, result);
+    ZoneFinder(graph, options, result).run(known_links);
     for (const Zone& zone : result.zones) match_zone(zone, options, result);
     for (const SideBySide& strands : result.side_by_side) split_side_by_side(graph, strands, image, result);
     if (!find_split_crossings(graph, options, result, known_links)) return result;

@@ -147,6 +147,110 @@ void pair_ends(const std::vector<Vector2>& points, const Intersection& intersect
   }
 }
 
+/// Ends of edges that meet in intersections, paired where the bend is least.
+struct Meeting {
+  std::vector<Intersection> intersections;
+  std::vector<int> intersection_of;  ///< per half edge, or -1
+  std::vector<int> trimmed;          ///< points left out of each half edge, where the mask is widened
+};
+
+Meeting meet(const SkeletonGraph& graph, double widest, Continuations& links) {
+  Meeting meeting;
+  meeting.intersections = match_intersections(graph, 10 * widest, links.inside);
+  meeting.intersection_of.assign(2 * graph.edges.size(), -1);
+  meeting.trimmed.assign(2 * graph.edges.size(), 0);
+  for (std::size_t i = 0; i < meeting.intersections.size(); ++i) {
+    const Intersection& intersection = meeting.intersections[i];
+    std::vector<Vector2> points;
+    for (const HalfEdge half : intersection.ends) {
+      meeting.intersection_of[static_cast<std::size_t>(half)] = static_cast<int>(i);
+      const SkeletonEdge& edge = graph.edges[static_cast<std::size_t>(edge_of(half))];
+      const int n = static_cast<int>(edge.points.size());
+      // New ends where the line has left the widened part of the mask.
+      const int trim = std::clamp(static_cast<int>(widest), 0, std::max(n / 2 - 1, 0));
+      meeting.trimmed[static_cast<std::size_t>(half)] = trim;
+      points.push_back(n == 0
+                           ? intersection.center
+                           : edge.points[static_cast<std::size_t>(end_of(half) == 0 ? trim : n - 1 - trim)].position());
+    }
+    pair_ends(points, intersection, links.partner);
+  }
+  return meeting;
+}
+
+/// The rows of one cable, as they come.
+class Rows {
+ public:
+  bool empty() const { return rows_.empty(); }
+
+  void add(const Vector2& point, double width, bool hidden) {
+    rows_.push_back(point);
+    cable_.widths.push_back(width);
+    cable_.hidden.push_back(hidden ? 1 : 0);
+  }
+
+  /// A straight way, hidden, a row each pixel, as wide as what is before it; without its end.
+  void lead_to(const Vector2& to) {
+    const Vector2 from = rows_.back();
+    const double width = cable_.widths.back();
+    const int steps = static_cast<int>((to - from).norm());
+    for (int k = 1; k < steps; ++k) add(from + static_cast<double>(k) / steps * (to - from), width, true);
+  }
+
+  /// Over the middle of an intersection.
+  void lead_over(const Vector2& center) {
+    lead_to(center);
+    add(center, cable_.widths.back(), true);
+  }
+
+  Cable finished(bool closed) {
+    cable_.closed = closed;
+    cable_.centreline.resize(static_cast<Eigen::Index>(rows_.size()), 2);
+    for (std::size_t i = 0; i < rows_.size(); ++i)
+      cable_.centreline.row(static_cast<Eigen::Index>(i)) = rows_[i].transpose();
+    return std::move(cable_);
+  }
+
+ private:
+  std::vector<Vector2> rows_;
+  Cable cable_;
+};
+
+Rows rows_of(const SkeletonGraph& graph, const Meeting& meeting, const CablePath& path) {
+  Rows rows;
+  for (const HalfEdge entry : path.entries) {
+    const SkeletonEdge& edge = graph.edges[static_cast<std::size_t>(edge_of(entry))];
+    const int n = static_cast<int>(edge.points.size());
+    const int first = meeting.trimmed[static_cast<std::size_t>(entry)];
+    const int last = n - 1 - meeting.trimmed[static_cast<std::size_t>(opposite(entry))];
+    const int at = meeting.intersection_of[static_cast<std::size_t>(entry)];
+    for (int i = first; i <= last; ++i) {
+      const SkeletonPoint& point = edge.points[static_cast<std::size_t>(end_of(entry) == 0 ? i : n - 1 - i)];
+      if (i == first && !rows.empty()) {
+        if (at >= 0) rows.lead_over(meeting.intersections[static_cast<std::size_t>(at)].center);
+        rows.lead_to(point.position());
+      }
+      rows.add(point.position(), 2 * point.half_width + 1, false);
+    }
+  }
+  return rows;
+}
+
+/// Where two strands run over the same middle they cross.
+void find_crossings(const std::vector<Intersection>& intersections, Tracing& tracing) {
+  for (const Intersection& intersection : intersections) {
+    std::vector<CableRow> visits;
+    for (std::size_t c = 0; c < tracing.cables.size(); ++c) {
+      const MatrixX2& line = tracing.cables[c].centreline;
+      for (Eigen::Index row = 0; row < line.rows(); ++row) {
+        if (line.row(row).transpose() == intersection.center)
+          visits.push_back({static_cast<int>(c), static_cast<int>(row)});
+      }
+    }
+    if (visits.size() == 2) tracing.crossings.push_back({intersection.center, visits[0], visits[1], 0});
+  }
+}
+
 }  // namespace
 
 Tracing trace_mbest(const BitImage& mask) {
@@ -161,81 +265,12 @@ Tracing trace_mbest(const BitImage& mask) {
   Continuations links;
   links.partner.assign(2 * graph.edges.size(), -1);
   links.inside.assign(graph.edges.size(), 0);
-  const std::vector<Intersection> intersections = match_intersections(graph, 10 * widest, links.inside);
-  std::vector<int> intersection_of(2 * graph.edges.size(), -1);
-  std::vector<int> trimmed(2 * graph.edges.size(), 0);
-  for (std::size_t i = 0; i < intersections.size(); ++i) {
-    std::vector<Vector2> points;
-    for (const HalfEdge half : intersections[i].ends) {
-      intersection_of[static_cast<std::size_t>(half)] = static_cast<int>(i);
-      const SkeletonEdge& edge = graph.edges[static_cast<std::size_t>(edge_of(half))];
-      const int n = static_cast<int>(edge.points.size());
-      // New ends where the line has left the widened part of the mask.
-      const int trim = std::clamp(static_cast<int>(widest), 0, std::max(n / 2 - 1, 0));
-      trimmed[static_cast<std::size_t>(half)] = trim;
-      points.push_back(n == 0
-                           ? intersections[i].center
-                           : edge.points[static_cast<std::size_t>(end_of(half) == 0 ? trim : n - 1 - trim)].position());
-    }
-    pair_ends(points, intersections[i], links.partner);
-  }
-
+  const Meeting meeting = meet(graph, widest, links);
   for (const CablePath& path : collect_paths(graph, links)) {
-    std::vector<Vector2> rows;
-    Cable cable;
-    cable.closed = path.closed;
-    const auto add_segment = [&](const Vector2& to) {
-      const Vector2 from = rows.back();
-      const double width = cable.widths.back();
-      const int steps = static_cast<int>((to - from).norm());
-      for (int k = 1; k < steps; ++k) {
-        rows.push_back(from + static_cast<double>(k) / steps * (to - from));
-        cable.widths.push_back(width);
-        cable.hidden.push_back(1);
-      }
-    };
-    for (const HalfEdge entry : path.entries) {
-      const SkeletonEdge& edge = graph.edges[static_cast<std::size_t>(edge_of(entry))];
-      const int n = static_cast<int>(edge.points.size());
-      const int first = trimmed[static_cast<std::size_t>(entry)];
-      const int last = n - 1 - trimmed[static_cast<std::size_t>(opposite(entry))];
-      const int at = intersection_of[static_cast<std::size_t>(entry)];
-      for (int i = first; i <= last; ++i) {
-        const SkeletonPoint& point = edge.points[static_cast<std::size_t>(end_of(entry) == 0 ? i : n - 1 - i)];
-        if (i == first && !rows.empty()) {
-          if (at >= 0) {
-            add_segment(intersections[static_cast<std::size_t>(at)].center);
-            rows.push_back(intersections[static_cast<std::size_t>(at)].center);
-            cable.widths.push_back(cable.widths.back());
-            cable.hidden.push_back(1);
-          }
-          add_segment(point.position());
-        }
-        rows.push_back(point.position());
-        cable.widths.push_back(2 * point.half_width + 1);
-        cable.hidden.push_back(0);
-      }
-    }
-    if (rows.empty()) continue;
-    cable.centreline.resize(static_cast<Eigen::Index>(rows.size()), 2);
-    for (std::size_t i = 0; i < rows.size(); ++i) {
-      cable.centreline.row(static_cast<Eigen::Index>(i)) = rows[i].transpose();
-    }
-    tracing.cables.push_back(std::move(cable));
+    Rows rows = rows_of(graph, meeting, path);
+    if (!rows.empty()) tracing.cables.push_back(rows.finished(path.closed));
   }
-
-  // Where two strands run over the same middle they cross.
-  for (const Intersection& intersection : intersections) {
-    std::vector<CableRow> visits;
-    for (std::size_t c = 0; c < tracing.cables.size(); ++c) {
-      const MatrixX2& line = tracing.cables[c].centreline;
-      for (Eigen::Index row = 0; row < line.rows(); ++row) {
-        if (line.row(row).transpose() == intersection.center)
-          visits.push_back({static_cast<int>(c), static_cast<int>(row)});
-      }
-    }
-    if (visits.size() == 2) tracing.crossings.push_back({intersection.center, visits[0], visits[1], 0});
-  }
+  find_crossings(meeting.intersections, tracing);
   return tracing;
 }
 
