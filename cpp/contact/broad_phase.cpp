@@ -24,34 +24,31 @@ void Box::include(const Box& other) {
   }
 }
 
-const std::vector<BroadPhase::Pair>& BroadPhase::find(const std::vector<Box>& boxes) {
-  pairs_.clear();
-  entries_.clear();
-  large_.clear();
-  if (boxes.size() < 2) return pairs_;
-  double size = 0.0, origin[3], end[3];
-  for (int k = 0; k < 3; ++k) {
-    origin[k] = INFINITY;
-    end[k] = -INFINITY;
-  }
+/// About as wide as a box.
+BroadPhase::Grid BroadPhase::Grid::of(const std::vector<Box>& boxes) {
+  Grid grid{{INFINITY, INFINITY, INFINITY}, 0.0};
+  double size = 0.0, end[3] = {-INFINITY, -INFINITY, -INFINITY};
   for (const Box& box : boxes) {
     double longest = 0.0;
     for (int k = 0; k < 3; ++k) {
       longest = std::max(longest, box.high[k] - box.low[k]);
-      origin[k] = std::min(origin[k], box.low[k]);
+      grid.origin[k] = std::min(grid.origin[k], box.low[k]);
       end[k] = std::max(end[k], box.high[k]);
     }
     size += longest;
   }
-  const double extent = std::max({end[0] - origin[0], end[1] - origin[1], end[2] - origin[2]});
-  const double width =
-      std::max({size / static_cast<double>(boxes.size()), extent / static_cast<double>(kSide - 2), 1e-300});
-  const auto cell_of = [&](double x, int k) { return static_cast<long long>((x - origin[k]) / width); };
+  const double extent = std::max({end[0] - grid.origin[0], end[1] - grid.origin[1], end[2] - grid.origin[2]});
+  grid.width = std::max({size / static_cast<double>(boxes.size()), extent / static_cast<double>(kSide - 2), 1e-300});
+  return grid;
+}
+
+/// Boxes that cover many cells are set aside.
+void BroadPhase::sort_into_cells(const std::vector<Box>& boxes, const Grid& grid) {
   for (std::size_t i = 0; i < boxes.size(); ++i) {
     long long first[3], last[3], count = 1;
     for (int k = 0; k < 3; ++k) {
-      first[k] = cell_of(boxes[i].low[k], k);
-      last[k] = cell_of(boxes[i].high[k], k);
+      first[k] = grid.cell(boxes[i].low[k], k);
+      last[k] = grid.cell(boxes[i].high[k], k);
       count *= last[k] - first[k] + 1;
     }
     if (count > kMostCells) {
@@ -65,6 +62,10 @@ const std::vector<BroadPhase::Pair>& BroadPhase::find(const std::vector<Box>& bo
   }
   std::sort(entries_.begin(), entries_.end(),
             [](const Entry& a, const Entry& b) { return a.cell != b.cell ? a.cell < b.cell : a.box < b.box; });
+}
+
+/// Boxes that share several cells are a pair in the first of them only.
+void BroadPhase::pair_within_cells(const std::vector<Box>& boxes, const Grid& grid) {
   for (std::size_t begin = 0; begin < entries_.size();) {
     std::size_t stop = begin + 1;
     while (stop < entries_.size() && entries_[stop].cell == entries_[begin].cell) ++stop;
@@ -73,21 +74,33 @@ const std::vector<BroadPhase::Pair>& BroadPhase::find(const std::vector<Box>& bo
         const Box &a = boxes[static_cast<std::size_t>(entries_[i].box)],
                   &b = boxes[static_cast<std::size_t>(entries_[j].box)];
         if (!a.overlaps(b)) continue;
-        // Boxes that share several cells are a pair in the first of them only.
         long long first = 0;
-        for (int k = 0; k < 3; ++k) first = first * kSide + cell_of(std::max(a.low[k], b.low[k]), k);
+        for (int k = 0; k < 3; ++k) first = first * kSide + grid.cell(std::max(a.low[k], b.low[k]), k);
         if (first == entries_[begin].cell) pairs_.push_back({entries_[i].box, entries_[j].box});
       }
     begin = stop;
   }
-  for (std::size_t l = 0; l < large_.size(); ++l)
+}
+
+void BroadPhase::pair_large(const std::vector<Box>& boxes) {
+  for (const int mine : large_)
     for (int other = 0; other < static_cast<int>(boxes.size()); ++other) {
-      const int mine = large_[l];
       const bool other_large = std::binary_search(large_.begin(), large_.end(), other);
       if (other == mine || (other_large && other < mine)) continue;
       if (boxes[static_cast<std::size_t>(mine)].overlaps(boxes[static_cast<std::size_t>(other)]))
         pairs_.push_back({std::min(mine, other), std::max(mine, other)});
     }
+}
+
+const std::vector<BroadPhase::Pair>& BroadPhase::find(const std::vector<Box>& boxes) {
+  pairs_.clear();
+  entries_.clear();
+  large_.clear();
+  if (boxes.size() < 2) return pairs_;
+  const Grid grid = Grid::of(boxes);
+  sort_into_cells(boxes, grid);
+  pair_within_cells(boxes, grid);
+  pair_large(boxes);
   std::sort(pairs_.begin(), pairs_.end(),
             [](const Pair& a, const Pair& b) { return a.a != b.a ? a.a < b.a : a.b < b.b; });
   return pairs_;

@@ -35,6 +35,18 @@ class BroadPhase {
     long long cell;
     int box;
   };
+  /// Cubes of one width.
+  struct Grid {
+    double origin[3], width;
+
+    static Grid of(const std::vector<Box>& boxes);
+    long long cell(double x, int axis) const { return static_cast<long long>((x - origin[axis]) / width); }
+  };
+
+  void sort_into_cells(const std::vector<Box>& boxes, const Grid& grid);
+  void pair_within_cells(const std::vector<Box>& boxes, const Grid& grid);
+  void pair_large(const std::vector<Box>& boxes);
+
   std::vector<Entry> entries_;
   std::vector<int> large_;
   std::vector<Pair> pairs_;
