@@ -27,9 +27,9 @@ from withe.simulation.simulation import Simulation
 __all__ = ["Fold", "SimulatedSheet"]
 
 FloatArray = npt.NDArray[np.float64]
-_SETTLING = 0.5  # after the last motion [s]
-_SNAP = 10.0  # times as fast as the jaw is no folding any more,
-_FAST = 0.2  # where it is faster than this [m/s]
+SETTLING = 0.5  # after the last motion [s]
+SNAP = 10.0  # times as fast as the jaw is no folding any more,
+FAST = 0.2  # where it is faster than this [m/s]
 _LONGEST = 600.0  # [s]
 _FRAMES = 0.05  # [s]
 
@@ -283,7 +283,7 @@ class SimulatedSheet:
         watch = _Watch(jaw, self.rod)
         self._follow(jaw)
         failure = None
-        with progress_bar(duration + _SETTLING, "folding", progress) as bar:
+        with progress_bar(duration + SETTLING, "folding", progress) as bar:
 
             def ended(simulation: Simulation) -> bool:
                 bar.update(simulation.time)
@@ -341,7 +341,7 @@ class _Watch:
         speed = float(np.linalg.norm(simulation.velocities(self._rod), axis=1).max())
         self.max_speed = max(self.max_speed, speed)
         self.max_curvature = max(self.max_curvature, float(np.abs(simulation.curvatures(self._rod)).max()))
-        self.snapped = speed > max(_SNAP * self._jaw.speed, _FAST)
+        self.snapped = speed > max(SNAP * self._jaw.speed, FAST)
         if self._end is None and simulation.time > self._jaw.end - 1e-9 and not self._jaw.go_on():
-            self._end = self._jaw.end + _SETTLING
+            self._end = self._jaw.end + SETTLING
         return self.snapped or (self._end is not None and simulation.time > self._end - 1e-9)
