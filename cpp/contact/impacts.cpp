@@ -15,8 +15,12 @@ constexpr double kLeastApproach = 1e-9;
 // restitution says: slower ones have a four-hundredth of the energy that is to be left. That speed is so much of that
 // of approach, at least.
 constexpr double kParting = 0.05, kLeastParting = 0.1;
-// What an impact gives back is known within this many swings, to this much of the speed of approach.
-constexpr double kResolvedSwings = 4.0, kKnown = 0.01;
+// What an impact gives back is known within this many swings.
+constexpr double kResolvedSwings = 4.0;
+// Backward Euler leaves 1 / (w dt)^2 of the speed with which surfaces meet where a step is long for a swing, w dt = pi
+// dt over its time: after this many swings less than a hundredth, so that what gives back no more needs no steps of its
+// own.
+constexpr double kLeftBehind = 0.01, kLongSwings = 3.2;
 
 /// From 0 to 1 where x does, without a corner.
 double smooth_step(double x) {
@@ -26,7 +30,7 @@ double smooth_step(double x) {
 
 double smooth_slope(double x) { return x > 0.0 && x < 1.0 ? 6.0 * x * (1.0 - x) : 0.0; }
 
-/// Steps in a swing by which what an impact gives back, e of the speed, is known to `kKnown`: in the one in which it
+/// Steps in a swing by which what an impact gives back, e of the speed, is known to a hundredth: in the one in which it
 /// turns round nothing of the speed is lost, which is the more the less is to be left.
 double steps_in_swing(double restitution) { return std::clamp(10.0 / std::max(restitution, 1e-3), 12.0, 40.0); }
 
@@ -180,10 +184,9 @@ void set_pressing(const ContactProblem& problem, Touching& t) {
 
 bool unresolved(const ContactProblem& problem, const Touching& t, double dt) {
   if (t.lagged >= 0 || !(t.law.restitution < 1.0)) return false;
-  // The force at the end of a step lets nothing part that it has stopped within it: where nothing is to be given back,
-  // steps of any length do.
-  if (problem.pressing == Pressing::end && t.pair.restitution <= kKnown) return false;
   const double swing = swing_time(problem, t);
+  const bool keeps_nothing = problem.pressing == Pressing::end && t.pair.restitution <= kLeftBehind;
+  if (keeps_nothing && dt > kLongSwings * swing) return false;
   return t.age < kResolvedSwings * swing && steps_in_swing(t.pair.restitution) * dt > swing;
 }
 

@@ -151,7 +151,7 @@ class SimulatedSheet:
         scene = Scene(gravity=9.81 * np.array([np.sin(self._drawn.tilt), 0.0, -np.cos(self._drawn.tilt)]))
         self.rod = add_paper(scene, self.truth, _places(paper.length, self.jaw.depth, edges), self._drawn.curl)
         # Surfaces press on each other from a twentieth of the thickness on; a jaw at the sheet's height does not.
-        scene.add_floor(-0.55 * paper.thickness, friction=self.truth.friction, restitution=0.0, name="table")
+        scene.add_floor(-0.55 * paper.thickness, friction=self._friction(), restitution=0.0, name="table")
         scene.enable_contact(friction=validation.non_negative(own_friction, "own_friction"), restitution=0.0)
         scene.grasp(
             self.rod,
@@ -162,6 +162,13 @@ class SimulatedSheet:
             name="jaw",
         )
         self.simulation: Simulation = scene.build(integrator="backward_euler", time_step=time_step, planar=True)
+
+    def _friction(self) -> float | Callable[[FloatArray], FloatArray]:
+        """Of the table: one number where it is the same everywhere, for that costs nothing."""
+        drawn, of_paper = self._drawn, self.paper.friction
+        if not drawn.patches[:, 0].any():
+            return self.truth.friction
+        return lambda points: of_paper * drawn.friction_at(points[:, 0])
 
     def positions(self) -> FloatArray:
         """Where the sheet is now, from the lifted edge on, of shape (edges + 1, 3) [m]."""
