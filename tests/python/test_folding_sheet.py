@@ -123,10 +123,11 @@ def test_friction_of_a_table_varies_from_place_to_place(a4):
 def pulled(sheet: SimulatedSheet) -> tuple[np.ndarray, float]:
     """Places of the nodes beyond the jaw that pulls a sheet back over the table, and its tension there."""
     seen = []
+    first = int(np.searchsorted(sheet.positions()[:, 0], sheet.jaw.depth))
 
     def motions():
         yield still([(0, 0, 0), (-0.02, 0, 0)])
-        seen.append((sheet.positions()[sheet._held :, 0], sheet.simulation.tensions(sheet.rod)[sheet._held]))
+        seen.append((sheet.positions()[first:, 0], sheet.simulation.tensions(sheet.rod)[first]))
 
     sheet.carry_out(motions(), 0.297, progress=False)
     return seen[0]
