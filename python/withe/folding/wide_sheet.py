@@ -5,9 +5,7 @@ Knows no planner, nor the equilibria that planners know.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -16,11 +14,11 @@ from withe.common import validation
 from withe.common.progress import progress as progress_bar
 from withe.errors import ConvergenceError
 from withe.folding.jaw import Jaw
-from withe.folding.jaw_motion import JawMotion
+from withe.folding.jaw_motion import JawMotion, lead
 from withe.folding.noise import Drawn, Noise
 from withe.folding.paper import Paper
 from withe.folding.paper_rods import strip_numbers
-from withe.folding.simulated_sheet import FAST, SETTLING, SNAP, FoldingMotion
+from withe.folding.simulated_sheet import FAST, SETTLING, SNAP, FoldingMotion, node_places
 from withe.parts.handles import Rod
 from withe.parts.materials import Stiffness
 from withe.recording.record import Record
@@ -137,9 +135,7 @@ class WideSheet:
         )
         more = uneven * np.clip(np.random.default_rng((seed, 2)).normal(), -2.0, 2.0)
         self.frictions = self.truth.friction * np.array([1.0 - more, 1.0 + more])
-        self._held = max(1, round(edges * self.jaw.depth / paper.length))
-        inside = np.linspace(0.0, self.jaw.depth, self._held + 1)
-        self._places = np.concatenate([inside, np.linspace(self.jaw.depth, paper.length, edges - self._held + 1)[1:]])
+        self._places = node_places(paper.length, self.jaw.depth, edges)
         self._sides = np.array([-0.25, 0.25]) * paper.width
         scene, self.strips = self._scene(validation.non_negative(own_friction, "own_friction"))
         self.simulation: Simulation = scene.build(integrator="backward_euler", time_step=time_step)
@@ -178,9 +174,14 @@ class WideSheet:
         for strip, friction in zip(strips, self.frictions, strict=True):
             scene.set_friction(strip, table, float(friction))
             scene.ignore_contact(strip, cross)
-            for i in range(self._held):
-                scene.pin(strip.node(i))
-            scene.clamp(strip.node(self._held))
+            scene.grasp(
+                strip,
+                at=0.5 * self.jaw.depth,
+                length=self.jaw.depth,
+                stiffness=(0.5 * self.jaw.stiffness[0], 0.5 * self.jaw.stiffness[1]),
+                force_limit=0.5 * self.jaw.force_limit,
+                name=f"jaw on {strip.name}",
+            )
         scene.ignore_contact(*strips)
         scene.ignore_contact(cross, table)
         return scene, (strips[0], strips[1])
@@ -206,8 +207,9 @@ class WideSheet:
         """
         simulation = self.simulation
         simulation.reset()
-        jaw = JawMotion([plan], self._drawn, self.jaw.depth, self.paper.thickness)
-        self._follow(jaw)
+        jaw = JawMotion([plan], self._drawn)
+        for strip, y in zip(self.strips, self._sides, strict=True):
+            lead(simulation.hand(f"jaw on {strip.name}"), jaw, self.jaw.depth, float(y))
         end, failure = jaw.end + SETTLING, None
         with progress_bar(end, "folding", progress) as bar:
 
@@ -223,23 +225,6 @@ class WideSheet:
         if failure is None and simulation.time < end - 1e-9:
             failure = f"snapped at {simulation.time:.2f} s"
         return self._result(plan.target, failure)
-
-    def _follow(self, jaw: JawMotion) -> None:
-        """Move all nodes that the jaw holds with it, and the directions at its inner edge."""
-
-        def path(place: float, y: float, turns: bool) -> Callable[[float], Any]:
-            def at(time: float) -> Any:
-                x, z, angle = jaw(time)
-                cosine, sine = np.cos(angle), np.sin(angle)
-                position = np.array([x + place * cosine, y, z - place * sine])
-                rotation = np.array([[cosine, 0.0, sine], [0.0, 1.0, 0.0], [-sine, 0.0, cosine]])
-                return (position, rotation) if turns else position
-
-            return at
-
-        for strip, y in zip(self.strips, self._sides, strict=True):
-            for i in range(self._held + 1):
-                self.simulation.move(strip.node(i), path=path(self._places[i], float(y), i == self._held))
 
     def _result(self, target: float, failure: str | None) -> WideFold:
         ends = [self.simulation.positions(strip)[[0, -1], 0] for strip in self.strips]
