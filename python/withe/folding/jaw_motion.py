@@ -10,8 +10,9 @@ import numpy.typing as npt
 
 from withe.common import validation
 from withe.folding.noise import Drawn
+from withe.simulation.hands import RunningHand
 
-__all__ = ["JawMotion", "Motion"]
+__all__ = ["JawMotion", "Motion", "lead"]
 
 FloatArray = npt.NDArray[np.float64]
 _COMES_IN = 0.1  # of the first motion, over which the jaw's errors grow
@@ -61,9 +62,9 @@ class JawMotion:
         Greatest of the edge so far.
     """
 
-    def __init__(self, motions: Iterable[Motion], drawn: Drawn, depth: float, thickness: float) -> None:
+    def __init__(self, motions: Iterable[Motion], drawn: Drawn) -> None:
         self._motions: Iterator[Any] = iter(motions)
-        self._drawn, self._depth, self._thickness = drawn, depth, thickness
+        self._drawn = drawn
         self._way = _Way(next(self._motions), 0.0, np.zeros(3))
         self._comes_in = _COMES_IN * (self._way.times[-1] - self._way.times[0])
         self.speed = self._way.speed
@@ -83,8 +84,18 @@ class JawMotion:
         return True
 
     def __call__(self, time: float) -> FloatArray:
-        """Pose of the outer edge at a time: x, z [m], angle. The table stops the jaw, and so does the sheet on it."""
-        x, z, angle = self._way(time) + self._drawn.off(time, min(1.0, time / self._comes_in))
-        lowest = z - max(0.0, self._depth * np.sin(angle))
-        under = self._thickness if angle > 0.5 * np.pi else 0.0
-        return np.array([x, z + max(0.0, under - lowest), angle])
+        """Pose of the outer edge at a time: x, z [m], angle. What the jaw holds is there if no table is."""
+        return self._way(time) + self._drawn.off(time, min(1.0, time / self._comes_in))
+
+
+def lead(hand: RunningHand, jaw: JawMotion, depth: float, y: float = 0.0) -> None:
+    """Move a hand with a jaw that holds `depth` of a flat sheet, at y: the hand's place is the middle of that."""
+    flat, middle = hand.pose.rotation, 0.5 * depth
+
+    def path(time: float) -> tuple[FloatArray, FloatArray]:
+        x, z, angle = jaw(time)
+        cosine, sine = np.cos(angle), np.sin(angle)
+        turn = np.array([[cosine, 0.0, sine], [0.0, 1.0, 0.0], [-sine, 0.0, cosine]])
+        return np.array([x + middle * cosine, y, z - middle * sine]), turn @ flat
+
+    hand.move(path=path)
