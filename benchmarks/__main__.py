@@ -33,8 +33,10 @@ NAMES = (
     "real2sim",
     "deployment",
     "deployment_tables",
+    "deployment_uses",
     "folding",
     "folding_trials",
+    "folding_replay",
 )
 
 

@@ -5,13 +5,13 @@ python benchmarks/deployment.py [--quick]
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 
 import numpy as np
-from reporting import Report, arguments, bar
+from deployment_network import compare
+from reporting import Report, arguments, bar, processor_seconds
 
-from withe.deployment import Cable, Pattern, StraightLine, grasp, plan
+from withe.deployment import Cable, Feasibility, Pattern, StraightLine, grasp, plan
 
 DATA = Path(__file__).resolve().parent.parent / "tests" / "data"
 PATTERNS = ("line", "circle", "sine", "letterU", "letterC", "letterL", "letterA")
@@ -39,16 +39,6 @@ def _table(report: Report) -> None:
     report.goal("forces: change beyond 7 Lgb [w Lgb]", change, 1e-3, at_least=False)
 
 
-def _least_seconds(call: object, repeats: int) -> float:
-    """Processor's time of the fastest of some runs, for the machine may be busy."""
-    seconds = []
-    for _ in range(repeats):
-        start = time.process_time()
-        call()  # type: ignore[operator]
-        seconds.append(time.process_time() - start)
-    return min(seconds)
-
-
 def _speed(report: Report, quick: bool) -> None:
     """One thread: a grasp, and a whole pattern."""
     count, repeats = (20, 1) if quick else (200, 7)
@@ -56,7 +46,7 @@ def _speed(report: Report, quick: bool) -> None:
     grasp(1.0, 0.0)  # makes the table
     rows = []
     for suspended in (1.5, 4.0, 7.0, 14.0, 28.0, 50.0):
-        took = 1e3 * _least_seconds(lambda length=suspended: grasp(length, curvature), repeats) / count
+        took = 1e3 * processor_seconds(lambda length=suspended: grasp(length, curvature), repeats) / count
         rows.append((f"{suspended:g}", f"{took:.3f}"))
         if suspended in (7.0, 50.0):
             report.goal(f"a grasp at {suspended:g} Lgb [ms]", took, {7.0: 0.3, 50.0: 2.0}[suspended], at_least=False)
@@ -65,9 +55,11 @@ def _speed(report: Report, quick: bool) -> None:
     cable = Cable.dlo(2)
     suspended = (cable.length - pattern.arc_length) / cable.gravito_bending_length
     bends = -pattern.curvature * cable.gravito_bending_length
-    took = _least_seconds(lambda: grasp(suspended, bends, cable.stretch_stiffness), repeats)
+    took = processor_seconds(lambda: grasp(suspended, bends, cable.stretch_stiffness), repeats)
     report.goal("a pattern of 200 nodes exactly, DLO 2 [s]", took, 0.15, at_least=False)
-    report.figures["plan of the sine, whole motion [s]"] = _least_seconds(lambda: plan(cable, pattern), min(3, repeats))
+    report.figures["plan of the sine, whole motion [s]"] = processor_seconds(
+        lambda: plan(cable, pattern), min(3, repeats)
+    )
 
 
 def _points(name: str) -> np.ndarray:
@@ -89,12 +81,23 @@ def _friction(report: Report, quick: bool) -> None:
                 inner = slice(3, -3)
                 needs = [found[inner].max() for found in (exact.floor, exact.lift_off, pushed.lift_off)]
                 saved.append(needs[2] / needs[1] if needs[1] > 0.05 else 1.0)
-                slip = sum(slip.end - slip.start for slip in exact.slips if slip.test != "free end")
-                rows.append((name, number, *(f"{need:.2f}" for need in needs), f"{1e3 * slip:.0f}"))
+                slips, pulled = (_stretch(exact, tests) for tests in (("floor", "lift-off"), ("tail", "overlap")))
+                rows.append((name, number, *(f"{need:.2f}" for need in needs), f"{slips:.0f}", f"{pulled:.0f}"))
                 shown.advance(1)
-    header = ("pattern", "DLO", "floor", "lift-off", "lift-off, least friction", "slips at .4 [mm]")
+    slipping = ("slips at .4 [mm]", "else pulled or pushed aside by itself [mm]")
+    header = ("pattern", "DLO", "floor", "lift-off", "lift-off, least friction", *slipping)
     report.table("Needed coefficient of friction, greatest along the pattern (smoothed by 1 mm)", header, rows)
     report.figures["friction with a push over without, median"] = float(np.median(saved))
+
+
+def _stretch(found: Feasibility, tests: tuple[str, ...]) -> float:
+    """How much of a pattern fails one of some tests [mm]; stretches that fail two count once."""
+    s = found.arc_length
+    fails = np.zeros(len(s), bool)
+    for slip in found.slips:
+        if slip.test in tests:
+            fails |= (s >= slip.start) & (s <= slip.end)
+    return 1e3 * float(s[1] * fails.sum())
 
 
 def main() -> None:
@@ -103,6 +106,7 @@ def main() -> None:
     report = Report("deployment", quick=options.quick)
     _table(report)
     _speed(report, options.quick)
+    compare(report, options.quick)
     _friction(report, options.quick)
     report.write()
 

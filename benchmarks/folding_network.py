@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import importlib.util
-import time
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
-from reporting import OUT, Report
+from reporting import OUT, Report, kilobytes, processor_seconds
 
 from withe import folding
 from withe.folding.grid import HIGH, WIDE
 from withe.folding.sheet_network import SHIPPED
 from withe.folding.sheets import Elastica, take
 
-SOURCE = OUT.parent / "networks" / "source.pt"  # from tools/train_folding_networks.py
+SOURCE = OUT.parent / "networks" / "folding_source.pt"  # from tools/train_networks.py
 SOURCE_SECONDS = 120.0  # for which it is trained here where that file is not
 GOALS = {  # median, 95 %, most
     "angle": (5e-4, 4e-3, 5e-2),
@@ -24,16 +22,6 @@ GOALS = {  # median, 95 %, most
 }
 # The dissertation's own weights against a table of exact equilibria .25 Lgb apart: median and 95 %.
 PUBLISHED = {"angle": (0.0015, 0.0054), "suspended": (0.012, 0.025), "force_ratio": (0.0033, 0.029)}
-
-
-def processor_seconds(call: Callable[[], object], repeats: int) -> float:
-    """Of the fastest of some runs, for the machine may be busy."""
-    seconds = []
-    for _ in range(repeats):
-        start = time.process_time()
-        call()
-        seconds.append(time.process_time() - start)
-    return min(seconds)
 
 
 def errors(network: folding.SheetNetwork, exact: Elastica) -> tuple[dict[str, np.ndarray], float]:
@@ -54,11 +42,6 @@ def times(ask: Callable[[object, object], object], exact: Elastica, count: int) 
     return one, processor_seconds(lambda: ask(*many), 3) / count
 
 
-def kilobytes(path: Path) -> str:
-    """Size of a file."""
-    return f"{path.stat().st_size / 1e3:.0f}"
-
-
 def compare(report: Report, quick: bool) -> None:
     """The small network, the dissertation's and exact equilibria side by side, at positions that are new to all."""
     if importlib.util.find_spec("torch") is None:
@@ -68,6 +51,7 @@ def compare(report: Report, quick: bool) -> None:
 
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
+    OUT.mkdir(parents=True, exist_ok=True)
     random = np.random.default_rng(11)
     count = 2_000 if quick else 100_000
     exact = folding.elastica(random.uniform(0.0, WIDE, count), random.uniform(0.0, HIGH, count))

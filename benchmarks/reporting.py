@@ -26,7 +26,19 @@ import numpy as np
 import withe
 from withe.common.progress import Progress, progress
 
-__all__ = ["DATA", "HAVE_ELASTICA", "OUT", "Report", "Timing", "arguments", "bar", "interleaved", "once"]
+__all__ = [
+    "DATA",
+    "HAVE_ELASTICA",
+    "OUT",
+    "Report",
+    "Timing",
+    "arguments",
+    "bar",
+    "interleaved",
+    "kilobytes",
+    "once",
+    "processor_seconds",
+]
 
 ROOT = Path(__file__).resolve().parent.parent
 DATA = ROOT / "benchmarks" / "data"
@@ -85,6 +97,16 @@ def once(action: Callable[[], object]) -> float:
     return time.thread_time() - start
 
 
+def processor_seconds(call: Callable[[], object], repeats: int) -> float:
+    """Of all threads, in the fastest of some runs, for the machine may be busy."""
+    seconds = []
+    for _ in range(repeats):
+        start = time.process_time()
+        call()
+        seconds.append(time.process_time() - start)
+    return min(seconds)
+
+
 def interleaved(actions: dict[str, Callable[[], float]], rounds: int, advance: Callable[[], object] = lambda: None):
     """Timings of actions that each return seconds, taken in turns so that a slow spell of the machine meets all."""
     seconds: dict[str, list[float]] = {name: [] for name in actions}
@@ -93,6 +115,11 @@ def interleaved(actions: dict[str, Callable[[], float]], rounds: int, advance: C
             seconds[name].append(action())
             advance()
     return {name: Timing(tuple(values)) for name, values in seconds.items()}
+
+
+def kilobytes(path: Path) -> str:
+    """Size of a file."""
+    return f"{path.stat().st_size / 1e3:.0f}"
 
 
 # --- the report ------------------------------------------------------------------------------------------------

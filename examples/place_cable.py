@@ -26,13 +26,15 @@ LETTERS = {  # turns [rad], radii, straight pieces [m]; where posts stand, as sh
 COLOURS = {"exact": "#3465a4", "intuitive": "#b2182b"}
 
 
-def laid(letter: str, controller: str, nodes: int) -> Deployment:
-    """The cable after it was placed, through equilibria."""
+def laid(
+    letter: str, controller: str, nodes: int, *, seed: int = 0, noise: float = 0.0, static: bool = True
+) -> Deployment:
+    """The cable after it was placed, through equilibria or in time, and in a noisy trial."""
     turns, radii, straights, shares = LETTERS[letter]
     pattern, cable = Pattern.bends(turns, radii, straights, easing=EASING), Cable.dlo(5)
     posts = posts_along(pattern, cable, shares * pattern.length)
     motion = plan(cable, pattern, controller, posts=posts, crossings="over")
-    return deploy(motion, floor=FRICTION, quasi_static=True, nodes=nodes, progress=False)
+    return deploy(motion, floor=FRICTION, seed=seed, noise=noise, quasi_static=static, nodes=nodes, progress=False)
 
 
 def draw(axes: object, letter: str, found: dict[str, Deployment]) -> None:

@@ -117,35 +117,52 @@ void SheetManifold::fill_column(std::size_t column, std::size_t start_row, Shoot
   for (std::size_t i = start_row + 1; i < lengths_.size() && fill(i, path); ++i) last_row_[column] = i;
 }
 
-bool SheetManifold::find_position(double x, double z, Cell& cell) const {
-  if (!(x >= 0 && z >= 0 && x + z > 0)) return false;
-  const double direction = std::atan2(x, z), distance = std::sqrt(x * x + z * z);
-  if (direction < directions_.front()) return false;
+namespace {
+
+double reach_of(const Path& path) { return std::hypot(tip_back(path), tip_up(path)); }
+
+/// Weights of values at places in the polynomial through them, at x.
+template <std::size_t most>
+std::array<double, most> polynomial_weights(const std::array<double, most>& places, std::size_t count, double x) {
+  std::array<double, most> weights{};
+  for (std::size_t i = 0; i < count; ++i) {
+    weights[i] = 1.0;
+    for (std::size_t j = 0; j < count; ++j)
+      if (j != i) weights[i] *= (x - places[j]) / (places[i] - places[j]);
+  }
+  return weights;
+}
+
+template <std::size_t most>
+bool is_monotonic(const std::array<double, most>& values, std::size_t count) {
+  const bool grows = values[1] > values[0];
+  for (std::size_t i = 1; i < count; ++i)
+    if (values[i] == values[i - 1] || (values[i] > values[i - 1]) != grows) return false;
+  return true;
+}
+
+}  // namespace
+
+std::optional<SheetManifold::Cell> SheetManifold::find_position(double direction, double distance) const {
+  if (direction < directions_.front()) return {};
   const auto after = std::upper_bound(directions_.begin() + 1, directions_.end() - 1, direction);
   const auto j = static_cast<std::size_t>(after - directions_.begin()) - 1;
   const double along = (direction - directions_[j]) / (directions_[j + 1] - directions_[j]);
   std::size_t low = std::max(first_row_[j], first_row_[j + 1]), high = std::min(last_row_[j], last_row_[j + 1]);
-  if (low >= high) return false;
+  if (low >= high) return {};
   const auto reach = [&](std::size_t row) {
-    const auto of = [](const Path& path) {
-      return std::sqrt(tip_back(path) * tip_back(path) + tip_up(path) * tip_up(path));
-    };
-    return (1 - along) * of(node(row, j)) + along * of(node(row, j + 1));
+    return (1 - along) * reach_of(node(row, j)) + along * reach_of(node(row, j + 1));
   };
-  double near = reach(low), far = reach(high);
-  if (distance < near || distance > far) return false;
+  if (distance < reach(low) || distance > reach(high)) return {};
   while (high - low > 1) {
     const std::size_t middle = (low + high) / 2;
-    const double there = reach(middle);
-    (there <= distance ? low : high) = middle;
-    (there <= distance ? near : far) = there;
+    (reach(middle) <= distance ? low : high) = middle;
   }
-  cell = {low, j, (distance - near) / (far - near), along};
-  return true;
+  return Cell{low, j};
 }
 
-bool SheetManifold::find_angle(double length, double angle, Cell& cell) const {
-  if (!(length >= lengths_.front() && length <= lengths_.back())) return false;
+std::optional<SheetManifold::Cell> SheetManifold::find_angle(double length, double angle) const {
+  if (!(length >= lengths_.front() && length <= lengths_.back())) return {};
   const auto after = std::upper_bound(lengths_.begin() + 1, lengths_.end() - 1, length);
   const auto i = static_cast<std::size_t>(after - lengths_.begin()) - 1;
   const double along = (length - lengths_[i]) / (lengths_[i + 1] - lengths_[i]);
@@ -155,24 +172,61 @@ bool SheetManifold::find_angle(double length, double angle, Cell& cell) const {
   };
   for (std::size_t j = 0; j + 1 < directions_.size(); ++j) {
     if (!there(j) || !there(j + 1)) continue;
-    const double before = angle_at(j), behind = angle_at(j + 1);
-    if ((before - angle) * (behind - angle) > 0) continue;
-    cell = {i, j, along, (angle - before) / (behind - before)};
-    return true;
+    if ((angle_at(j) - angle) * (angle_at(j + 1) - angle) <= 0) return Cell{i, j};
   }
-  return false;
+  return {};
 }
 
-void SheetManifold::interpolate(const Cell& cell, Path& path) const {
+SheetManifold::Patch SheetManifold::patch_around(const Cell& cell) const {
+  const std::size_t column = std::clamp<std::size_t>(cell.column, 1, directions_.size() - kPoints + 1) - 1;
+  std::size_t low = 0, high = lengths_.size() - 1;
+  for (std::size_t j = column; j < column + kPoints; ++j) {
+    low = std::max(low, first_row_[j]);
+    high = std::min(high, last_row_[j]);
+  }
+  if (low > cell.row || high < std::max(cell.row + 1, low + kPoints - 1)) return {cell, 2, {}, {}};
+  const std::size_t row = std::clamp(std::max<std::size_t>(cell.row, 1) - 1, low, high - kPoints + 1);
+  return {{row, column}, kPoints, {}, {}};
+}
+
+SheetManifold::Patch SheetManifold::patch_at_position(const Cell& cell, double direction, double distance) const {
+  Patch patch = patch_around(cell);
+  Weights places{}, reaches{};
+  for (std::size_t j = 0; j < patch.points; ++j) places[j] = directions_[patch.first.column + j];
+  patch.columns = polynomial_weights(places, patch.points, direction);
+  // Everything is smooth in the distance, too, along a direction.
+  for (std::size_t i = 0; i < patch.points; ++i)
+    for (std::size_t j = 0; j < patch.points; ++j)
+      reaches[i] += patch.columns[j] * reach_of(node(patch.first.row + i, patch.first.column + j));
+  patch.rows = polynomial_weights(reaches, patch.points, distance);
+  return patch;
+}
+
+SheetManifold::Patch SheetManifold::patch_at_angle(const Cell& cell, double length, double angle) const {
+  const auto weigh = [&](Patch& patch) {
+    Weights places{}, angles{};
+    for (std::size_t i = 0; i < patch.points; ++i) places[i] = lengths_[patch.first.row + i];
+    patch.rows = polynomial_weights(places, patch.points, length);
+    for (std::size_t j = 0; j < patch.points; ++j)
+      for (std::size_t i = 0; i < patch.points; ++i)
+        angles[j] += patch.rows[i] * tip_angle(node(patch.first.row + i, patch.first.column + j));
+    patch.columns = polynomial_weights(angles, patch.points, angle);
+    return is_monotonic(angles, patch.points);
+  };
+  Patch patch = patch_around(cell);
+  if (weigh(patch)) return patch;
+  patch = {cell, 2, {}, {}};  // near the greatest angle of a length, past which it falls again
+  weigh(patch);
+  return patch;
+}
+
+void SheetManifold::interpolate(const Patch& patch, Path& path) const {
   path.nodes.resize(SheetProblem::kSegments + 1);
   for (auto& y : path.nodes) y.fill(0.0);
   path.values.fill(0.0);
-  for (std::size_t i = 0; i < 2; ++i) {
-    for (std::size_t j = 0; j < 2; ++j) {
-      const double share = (i ? cell.along_row : 1 - cell.along_row) * (j ? cell.along_column : 1 - cell.along_column);
-      add_scaled(share, node(cell.row + i, cell.column + j), path);
-    }
-  }
+  for (std::size_t i = 0; i < patch.points; ++i)
+    for (std::size_t j = 0; j < patch.points; ++j)
+      add_scaled(patch.rows[i] * patch.columns[j], node(patch.first.row + i, patch.first.column + j), path);
   const double length = path.values[2];
   for (auto& y : path.nodes) y = {y[0], y[1] / length, y[2] * length, y[3] * length};
   path.values[0] /= length * length;
@@ -195,9 +249,11 @@ bool solve_shape(const SheetShape& shape, SheetManifold::Data& data) {
 }  // namespace
 
 SheetSolution SheetManifold::at_position(double x, double z, const SheetShape& shape, Data& data) const {
-  Cell cell{};
-  if (!find_position(x, z, cell)) return {};
-  interpolate(cell, data.path);
+  if (!(x >= 0 && z >= 0 && x + z > 0)) return {};
+  const double direction = std::atan2(x, z), distance = std::hypot(x, z);
+  const auto cell = find_position(direction, distance);
+  if (!cell) return {};
+  interpolate(patch_at_position(*cell, direction, distance), data.path);
   data.problem.target = TipTarget::position;
   data.problem.goal = {x, z};
   if (!solve_shape(shape, data)) return {};
@@ -208,9 +264,9 @@ SheetSolution SheetManifold::at_position(double x, double z, const SheetShape& s
 
 SheetSolution SheetManifold::at_length_and_angle(double length, double angle, const SheetShape& shape,
                                                  Data& data) const {
-  Cell cell{};
-  if (!find_angle(length, angle, cell)) return {};
-  interpolate(cell, data.path);
+  const auto cell = find_angle(length, angle);
+  if (!cell) return {};
+  interpolate(patch_at_angle(*cell, length, angle), data.path);
   data.problem.target = TipTarget::length_and_angle;
   data.problem.goal = {length, angle};
   return solve_shape(shape, data) ? describe_sheet(shape, data.path) : SheetSolution{};

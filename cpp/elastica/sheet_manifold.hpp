@@ -1,8 +1,10 @@
 #pragma once
 /// All poses in which a sheet can be held without moment: the manifold of solutions with theta >= 0, tabulated once so
-/// that every other solution begins next to its answer. For one position of the tip there are several equilibria; those
-/// of this manifold are one family, reached from the flat sheet without a jump.
+/// that every other solution begins next to its answer, by cubic interpolation. For one position of the tip there are
+/// several equilibria; those of this manifold are one family, reached from the flat sheet without a jump.
 
+#include <array>
+#include <optional>
 #include <vector>
 
 #include "elastica/sheet_solution.hpp"
@@ -30,18 +32,29 @@ class SheetManifold {
   SheetSolution at_length_and_angle(double length, double angle, const SheetShape& shape, Data& data) const;
 
  private:
+  /// Between two rows and two columns; the first of each.
   struct Cell {
     std::size_t row, column;
-    double along_row, along_column;  ///< in 0..1 between two rows, two columns
+  };
+  static constexpr std::size_t kPoints = 4;
+  using Weights = std::array<double, kPoints>;
+  /// Rows and columns around a cell that all have solutions, 4 by 4 or just the cell's, and what each of them weighs.
+  struct Patch {
+    Cell first;
+    std::size_t points;  ///< each way
+    Weights rows, columns;
   };
   const SheetProblem::Path& node(std::size_t row, std::size_t column) const {
     return nodes_[row * directions_.size() + column];
   }
   void fill_row(std::size_t row, ShootingSolver<SheetProblem>& solver);
   void fill_column(std::size_t column, std::size_t start_row, ShootingSolver<SheetProblem>& solver);
-  bool find_position(double x, double z, Cell& cell) const;
-  bool find_angle(double length, double angle, Cell& cell) const;
-  void interpolate(const Cell& cell, SheetProblem::Path& path) const;
+  std::optional<Cell> find_position(double direction, double distance) const;
+  std::optional<Cell> find_angle(double length, double angle) const;
+  Patch patch_around(const Cell& cell) const;
+  Patch patch_at_position(const Cell& cell, double direction, double distance) const;
+  Patch patch_at_angle(const Cell& cell, double length, double angle) const;
+  void interpolate(const Patch& patch, SheetProblem::Path& path) const;
 
   std::vector<double> lengths_, directions_;
   std::vector<SheetProblem::Path> nodes_;          // empty where there is no solution, or a taut one

@@ -147,7 +147,10 @@ void register_elastica(py::module_& module) {
              double tip_moment) {
             return solve_all(self, &SheetManifold::at_length_and_angle, length, angle, width_growth, tip_moment);
           },
-          py::arg("length"), py::arg("angle"), py::arg("width_growth"), py::arg("tip_moment"), "One row a pose.");
+          py::arg("length"), py::arg("angle"), py::arg("width_growth"), py::arg("tip_moment"), "One row a pose.")
+      .def_readonly_static("shortest", &SheetManifold::kShortest)
+      .def_readonly_static("longest", &SheetManifold::kLongest)
+      .def_readonly_static("greatest_pull", &SheetManifold::kGreatestPull);
   module.def("sheets_at_forces", &sheets_at_forces, py::arg("forces"), py::arg("width_growth"),
              "Sheets of given floor forces and suspended length, one row a sheet.");
   module.def("sheets_at_poses", &sheets_at_poses, py::arg("poses"), py::arg("forces"), py::arg("width_growth"),

@@ -1158,6 +1158,10 @@ class SheetManifold:
     """
     All poses in which a sheet can be held, tabulated once.
     """
+
+    greatest_pull: typing.ClassVar[float] = 40.0
+    longest: typing.ClassVar[float] = 6.84
+    shortest: typing.ClassVar[float] = 0.958
     def __init__(self) -> None: ...
     def at_length_and_angle(
         self,

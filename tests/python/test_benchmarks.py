@@ -41,8 +41,10 @@ def run(name, folder, *arguments):
         "real2sim",
         "deployment",
         "deployment_tables",
+        "deployment_uses",
         "folding",
         "folding_trials",
+        "folding_replay",
         pytest.param("rl_throughput", marks=pytest.mark.skipif(not HAVE_GYMNASIUM, reason="needs gymnasium")),
     ],
 )

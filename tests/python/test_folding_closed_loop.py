@@ -31,6 +31,16 @@ def test_the_edges_meet_though_the_sheet_slides(half):
     assert watched.seen_slides[-1] == pytest.approx(watched.slide, abs=5e-4)
 
 
+@pytest.mark.parametrize("target", ["half", 0.25])
+def test_no_slide_is_seen_where_there_is_none(target):
+    # Not by the corners of the lifted edge over the far one, nor by those of a picture's pixels.
+    planned = plan(A4, target, method="slip", grasp="free")
+    watched = fold(planned, SimulatedSheet(A4, **COARSE), progress=False)
+    assert abs(watched.slide) < 1e-4
+    assert np.nanmax(np.abs(watched.seen_slides)) < 2e-4
+    assert abs(watched.error) < 1e-4
+
+
 def test_a_fold_that_is_not_corrected_goes_the_planned_way(half):
     sheet = SimulatedSheet(A4, **COARSE)
     blind = sheet.fold(half, progress=False)

@@ -108,6 +108,39 @@ def test_noise_has_the_spread_that_it_says(a4):
     assert spread(replace(Noise.none(), friction=0.1)) == pytest.approx([0.0, 0.088], rel=0.15)
 
 
+def test_friction_of_a_table_varies_from_place_to_place(a4):
+    x = np.linspace(0.0, 0.6, 2001)
+    drawn = [SimulatedSheet(a4, seed, Noise(friction=0.0), edges=20)._drawn for seed in range(100)]
+    share = np.array([each.friction_at(x) for each in drawn])
+    assert share.mean() == pytest.approx(1.0, abs=0.01)
+    assert share.std() == pytest.approx(0.1, rel=0.1)
+    # It is the same within a few millimetres, and another half a wave on.
+    near, far = (share[:, gap:] - share[:, :-gap] for gap in (10, 1000))
+    assert near.std() < 0.4 * share.std() < far.std()
+    assert (SimulatedSheet(a4, 0, Noise.none(), edges=20)._drawn.friction_at(x) == 1.0).all()
+
+
+def pulled(sheet: SimulatedSheet) -> tuple[np.ndarray, float]:
+    """Places of the nodes beyond the jaw that pulls a sheet back over the table, and its tension there."""
+    seen = []
+
+    def motions():
+        yield still([(0, 0, 0), (-0.02, 0, 0)])
+        seen.append((sheet.positions()[sheet._held :, 0], sheet.simulation.tensions(sheet.rod)[sheet._held]))
+
+    sheet.carry_out(motions(), 0.297, progress=False)
+    return seen[0]
+
+
+def test_a_sheet_is_pulled_with_the_friction_of_where_it_lies(a4):
+    varied = SimulatedSheet(a4, 2, replace(Noise.none(), friction_variation=0.3), **COARSE)
+    (x, tension), (_, even) = pulled(varied), pulled(SimulatedSheet(a4, 2, **COARSE))
+    lies = np.linspace(x[2], x[-1], 2001)  # the first two are borne by the jaw
+    share = varied._drawn.friction_at(lies).mean()
+    assert abs(share - 1.0) > 0.03
+    assert tension / even == pytest.approx(share, abs=0.01)
+
+
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_a_curled_sheet_lifts_its_far_edge_by_the_cube_of_lgb(a4, seed):
     # The last l of it is lifted, y'' = k - w s^2 / (2 EI) at s from the end, and 0 at s = l: y(0) = EI k^2 / (2 w).

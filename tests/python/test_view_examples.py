@@ -45,6 +45,8 @@ EXAMPLES = {
     "soft_limb.py": ([], r"tip ([.\d]+) mm off on the mean", 0.3, 0.7),
     "tapered_arm.py": ([], r"tapered: clearance off by ([.\d]+) mm", 0.0, 1.0),
     "throwing_tip.py": ([], r"within ([.\d]+) mm of each point", 0.0, 1.0),
+    "tie_knot.py": (["--knots", "trefoil", "--nodes", "100"], r"trefoil: tied (\d) of 1", 1, 1),
+    "write_word.py": (["--nodes", "200", "--ways", "exact"], r"exact: ([.\d]+) mm off on the mean", 0.0, 2.5),
     "spider.py": (["--duration", "0.2"], r"half the step: no node moves by more than ([.\d]+)%", 0.0, 2.0),
 }
 

@@ -12,20 +12,25 @@ length, unless they belong to a particular cable: then in m and N.
 from withe.deployment.cable import Cable, MeasuredCable, measure
 from withe.deployment.deploying import Deployment, deploy, place
 from withe.deployment.feasibility import Feasibility, Slip
+from withe.deployment.grasp_network import GraspNetwork
 from withe.deployment.grasping import Grasp, grasp
 from withe.deployment.motion import Phase
+from withe.deployment.network_training import train
 from withe.deployment.pattern import Pattern
 from withe.deployment.placing import posts_along
 from withe.deployment.planning import Plan, plan
 from withe.deployment.posts import Post
 from withe.deployment.straight import StraightLine, StraightPose
+from withe.deployment.tying import Move, Tying, tie
 
 __all__ = [
     "Cable",
     "Deployment",
     "Feasibility",
     "Grasp",
+    "GraspNetwork",
     "MeasuredCable",
+    "Move",
     "Pattern",
     "Phase",
     "Plan",
@@ -33,10 +38,13 @@ __all__ = [
     "Slip",
     "StraightLine",
     "StraightPose",
+    "Tying",
     "deploy",
     "grasp",
     "measure",
     "place",
     "plan",
     "posts_along",
+    "tie",
+    "train",
 ]

@@ -17,10 +17,11 @@ from withe.deployment.world import Setup, lay
 from withe.deployment.world import place as place_in_world
 from withe.recording import Record
 
-__all__ = ["Deployment", "deploy", "place"]
+__all__ = ["DRAWN", "Deployment", "deploy", "drawn_setup", "place"]
 
 FloatArray = npt.NDArray[np.float64]
 # Standard deviations of what a trial has and a planner does not know, at noise 1.
+DRAWN = 10  # numbers of a trial
 _LGB, _FRICTION = 0.05, 0.20  # shares
 _LYING = 1.1  # [radii]: how high the centreline of what lies may be
 _CURVATURE, _OFFSET, _TURN = 0.5, 5e-4, np.radians(0.5)  # [1/m], [m], [rad]
@@ -128,22 +129,14 @@ def deploy(
     if true.length < plan.cable.length:
         raise ValueError(f"the cable is {true.length:g} m long, the plan holds it at {plan.cable.length:g} m")
     random = np.random.default_rng(validation.integer(seed, "seed", 0, 2**63 - 1))
-    drawn = noise * random.normal(size=10)
-    setup = Setup(
-        cable=replace(
-            true,
-            length=plan.cable.length,
-            gravito_bending_length=true.gravito_bending_length * float(np.exp(_LGB * drawn[0])),
-        ),
-        friction=friction * float(np.exp(_FRICTION * drawn[1])),
+    setup = drawn_setup(
+        plan,
+        true,
+        friction,
+        noise * random.normal(size=DRAWN),
         nodes=nodes,
         time_step=_time_step(time_step, quasi_static),
-        natural_curvature=(_CURVATURE * drawn[2], _CURVATURE * drawn[3]),
-        jaw_offset=(_OFFSET * drawn[4], _OFFSET * drawn[5], _OFFSET * drawn[6]),
-        jaw_turn=(_TURN * drawn[7], _TURN * drawn[8], _TURN * drawn[9]),
         quasi_static=quasi_static,
-        start_held=plan.start == "held",
-        posts=plan.posts,
     )
     held, laid, record = lay(setup, plan, progress=progress)
     return _compared(plan, setup.arc_length, held, laid, record)
@@ -208,6 +201,28 @@ def place(
     found = _compared(plan, s, laid, laid, record)
     moved = np.where(s <= plan.pattern.length, np.linalg.norm(laid[:, :2] - points, axis=1), 0.0)
     return replace(found, slipped=moved)
+
+
+def drawn_setup(
+    plan: Plan, cable: Cable, friction: float, drawn: FloatArray, *, nodes: int, time_step: float, quasi_static: bool
+) -> Setup:
+    """What is there in a trial, from `DRAWN` numbers of standard normal distribution, times the noise."""
+    return Setup(
+        cable=replace(
+            cable,
+            length=plan.cable.length,
+            gravito_bending_length=cable.gravito_bending_length * float(np.exp(_LGB * drawn[0])),
+        ),
+        friction=friction * float(np.exp(_FRICTION * drawn[1])),
+        nodes=nodes,
+        time_step=time_step,
+        natural_curvature=(_CURVATURE * drawn[2], _CURVATURE * drawn[3]),
+        jaw_offset=(_OFFSET * drawn[4], _OFFSET * drawn[5], _OFFSET * drawn[6]),
+        jaw_turn=(_TURN * drawn[7], _TURN * drawn[8], _TURN * drawn[9]),
+        quasi_static=quasi_static,
+        start_held=plan.start == "held",
+        posts=plan.posts,
+    )
 
 
 def _time_step(given: float | None, quasi_static: bool) -> float:

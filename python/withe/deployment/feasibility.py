@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from withe.common import validation
 from withe.deployment.cable import JAW, Cable
+from withe.deployment.grasp_network import shipped
 from withe.deployment.grasping import TWIST_STIFFNESS, Grasp, grasp, least_friction, table
 from withe.deployment.smoothing import least_tension
 
@@ -177,7 +178,7 @@ def grasps_along(pattern: Laid, cable: Cable, controller: str) -> Grasp:
     Raises
     ------
     ValueError
-        The cable is shorter than the pattern, or cannot bend so tightly.
+        The cable is shorter than the pattern, or cannot bend so tightly, or beyond what the network has learned.
     """
     lgb = cable.gravito_bending_length
     if cable.length < pattern.length:
@@ -199,6 +200,8 @@ def grasps_along(pattern: Laid, cable: Cable, controller: str) -> Grasp:
     curvature = -lgb * pattern.curvature  # grasps bend to the right
     if controller == "least_friction":
         return least_friction(suspended, curvature, cable.stretch_stiffness)
+    if controller == "network":
+        return shipped()(suspended, curvature, cable.stretch_stiffness)
     return grasp(suspended, curvature, cable.stretch_stiffness)
 
 

@@ -13,6 +13,7 @@ import numpy.typing as npt
 from withe.common import validation
 from withe.deployment.cable import Cable
 from withe.deployment.feasibility import Controller, Feasibility, examine
+from withe.deployment.letters import written
 from withe.deployment.smoothing import fourth_differences, smooth
 from withe.perception import trace
 
@@ -183,6 +184,39 @@ class Pattern:
         steps = s[1] * np.stack([np.cos(middle), np.sin(middle)], 1)
         points = np.concatenate([np.zeros((1, 2)), np.cumsum(steps, axis=0)])
         return cls(points, smoothing=smoothing, nodes=nodes)
+
+    @classmethod
+    def word(cls, text: str, height: float, *, smoothing: float = 1e-3, nodes: int = 301) -> Pattern:
+        """A word of small letters, written without lifting the pen from its beginning to its end.
+
+        Parameters
+        ----------
+        text : str
+            Letters a to z and spaces. Dots are left out, and bars across f and t.
+        height : float [m]
+            Of a small x. Letters have bends of a third of that, which a floor of friction 1 holds where it is some 4
+            gravito-bending lengths of the cable, and are about 4 heights long each.
+        smoothing, nodes
+            See `Pattern`.
+
+        Returns
+        -------
+        Pattern
+            It crosses itself in loops: `plan(..., crossings="over")` lays the cable over itself there.
+
+        Raises
+        ------
+        ValueError
+            No text, other characters, or a height that is not positive.
+
+        Examples
+        --------
+        >>> import withe
+        >>> word = withe.deployment.Pattern.word("lace", height=0.05)
+        >>> print(f"{word.length:.2f} m, crosses itself {len(word.crossings)} times")
+        0.96 m, crosses itself 7 times
+        """
+        return cls(written(text, validation.positive(height, "height")), smoothing=smoothing, nodes=nodes)
 
     def _resample(self, smoothing: float, nodes: int) -> None:
         from scipy.interpolate import make_interp_spline

@@ -29,7 +29,7 @@ from withe.io import pose_path, save_poses, written_beside
 __all__ = ["Plan", "PlanController", "plan"]
 
 FloatArray = npt.NDArray[np.float64]
-PlanController = Literal["exact", "least_friction", "optimised", "intuitive"]
+PlanController = Literal["exact", "least_friction", "optimised", "network", "intuitive"]
 _TAIL_SHARES = (1.0, 0.5, 0.5, 0.5)  # of the one before, where a tail crosses
 _TAIL = 4.0  # [Lgb] of cable beyond the pattern, where there is so much: shorter ends need much friction
 _OPTIMISING_SPEED, _OPTIMISING_STEP = 0.025, 0.04  # [m/s], [s]: of quasi-static runs, where only the way counts
@@ -65,8 +65,9 @@ class Plan:
         The speed at which the jaw's acceleration while it lays reaches a hundredth of gravity's. Faster, the cable
         swings, and that, not friction, soon decides how well it lies.
     needed_friction : ndarray of shape (pattern's nodes,)
-        Coefficient that each place of the pattern needs; NaN for "intuitive", which is not computed from forces. An
-        "optimised" plan has that of what it began from: where that slips, it makes up for it.
+        Coefficient that each place of the pattern needs; NaN for "intuitive" and "network", which know no forces
+        (`feasibility` finds them). An "optimised" plan has that of what it began from: where that slips, it makes up
+        for it.
     posts : tuple of Post
         Between which the cable is laid.
     """
@@ -97,7 +98,7 @@ class Plan:
             self.pattern,
             self.cable,
             friction,
-            "exact" if self.controller in ("exact", "intuitive") else "least_friction",
+            "least_friction" if self.controller in ("least_friction", "optimised") else "exact",
         )
 
     def save(self, path: str | os.PathLike[str]) -> None:
@@ -195,10 +196,11 @@ def plan(
     ----------
     cable : Cable
     pattern : Pattern
-    controller : {"exact", "least_friction", "optimised", "intuitive"}
+    controller : {"exact", "least_friction", "optimised", "network", "intuitive"}
         No force along the cable where it lifts off; the push that needs least friction; the better of these along a
-        path that is shifted until the cable lies on its pattern in the rod engine, some 40 quasi-static runs; or
-        the jaw straight above the lift-off point at the height of what still hangs, upright, the baseline of the
+        path that is shifted until the cable lies on its pattern in the rod engine, some 40 quasi-static runs; "exact"
+        from the small network that comes with withe, which asks nothing of friction (it needs torch); or the jaw
+        straight above the lift-off point at the height of what still hangs, upright, the baseline of the
         dissertation (figure 9.2).
     friction : float
         Coefficient between cable and floor, for "optimised".
@@ -228,7 +230,7 @@ def plan(
     ValueError
         The cable is shorter than pattern and tail, or cannot bend so tightly; pattern or tail cross; a post stands in
         the way; no floor has the friction that the pattern needs; speed, tail, time step or friction not positive;
-        "optimised" without friction.
+        "optimised" without friction; "network" for a cable or pattern beyond what it has learned.
 
     Examples
     --------
@@ -251,8 +253,11 @@ def plan(
     else:
         held, tail = _held(cable, pattern, tail)
         path = lengthened(pattern, held, tail)
+    unknown = np.full(len(pattern.points), np.nan)
     if controller == "intuitive":
-        needed, way = np.full(len(pattern.points), np.nan), upright_way(held, path)
+        needed, way = unknown, upright_way(held, path)
+    elif controller == "network":
+        needed, way = unknown, way_along(held, path, grasps_along(path, held, controller))
     elif controller == "optimised":
         if friction is None:
             raise ValueError("controller 'optimised' needs friction, the floor's coefficient")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, Protocol
 
@@ -10,16 +11,19 @@ import numpy.typing as npt
 
 from withe.deployment.cable import JAW, Cable
 from withe.deployment.posts import Post
+from withe.parts.handles import Rod
 from withe.parts.materials import Material
 from withe.recording import Record
 from withe.scene import Scene
+from withe.simulation import Simulation
+from withe.simulation.hands import RunningHand
 
-__all__ = ["Motion", "Setup", "lay", "place"]
+__all__ = ["JAW_STIFFNESS", "Motion", "Setup", "hung", "jaw_path", "lay", "place"]
 
 FloatArray = npt.NDArray[np.float64]
 _DENSITY, _VISCOUS_TIME, _GRAVITY = 1180.0, 0.02, 9.81  # [kg/m^3], [s], [m/s^2]
 _SETTLING = 2.0  # [s] after the jaw has opened
-_JAW_STIFFNESS = (2e3, 0.05)  # [N/m, N m/rad], of its pads: hundreds of times the cable's
+JAW_STIFFNESS = (2e3, 0.05)  # [N/m, N m/rad], of its pads: hundreds of times the cable's
 _STRESSED = 1.0  # [s] in which a cable that is put down takes its stress
 _RECORD_EVERY = 0.1  # [s]
 
@@ -71,10 +75,8 @@ def lay(setup: Setup, motion: Motion, *, progress: bool) -> tuple[FloatArray, Fl
     record : Record
         Of the motion, every tenth of a second.
     """
-    jaw = motion.positions[0]
-    below = setup.arc_length - setup.cable.length
-    scene, cable = _scene(setup, jaw + below[:, None] * [0.0, 0.0, 1.0])
-    jaw_part = scene.grasp(cable, at=setup.cable.length, length=JAW, stiffness=_JAW_STIFFNESS, name="jaw")
+    scene, cable = _scene(setup, _hanging(setup, motion))
+    jaw_part = scene.grasp(cable, at=setup.cable.length, length=JAW, stiffness=JAW_STIFFNESS, name="jaw")
     if setup.start_held:
         scene.pin(cable.start, free=(0.0, 0.0, 1.0))
     simulation = scene.build(integrator=_integrator(setup), time_step=setup.time_step, planar=False)
@@ -82,7 +84,7 @@ def lay(setup: Setup, motion: Motion, *, progress: bool) -> tuple[FloatArray, Fl
         simulation.set_natural_curvature(cable, setup.natural_curvature)
         simulation.equilibrium()
     held = simulation.hand(jaw_part)
-    held.move(path=_path(setup, motion, held.pose.rotation))
+    held.move(path=jaw_path(setup, motion, held.pose.rotation))
     every = max(_RECORD_EVERY, setup.time_step)
     record = simulation.run(float(motion.times[-1]), record_every=every, progress=progress)
     before = simulation.positions(cable)
@@ -120,27 +122,65 @@ def place(setup: Setup, points: FloatArray, *, progress: bool) -> tuple[FloatArr
     return simulation.positions(cable), record
 
 
+def hung(
+    setups: Sequence[Setup], motions: Sequence[Motion], heights: Sequence[float]
+) -> tuple[Simulation, list[Rod], list[RunningHand]]:
+    """Several cables on one floor, each hanging from a jaw where its motion begins, or higher by some way [m].
+
+    The first setup says what the floor is like. Jaws are held: `jaw_path` leads them.
+    """
+    scene = _floor(setups[0])
+    cables, jaws = [], []
+    for number, (setup, motion, height) in enumerate(zip(setups, motions, heights, strict=True)):
+        points = _hanging(setup, motion) + np.array([0.0, 0.0, height])
+        cable = _add_cable(scene, setup.cable, points, f"cable {number}")
+        at = setup.cable.length
+        jaws.append(scene.grasp(cable, at=at, length=JAW, stiffness=JAW_STIFFNESS, name=f"jaw {number}"))
+        cables.append(cable)
+    simulation = scene.build(integrator=_integrator(setups[0]), time_step=setups[0].time_step, planar=False)
+    for setup, cable in zip(setups, cables, strict=True):
+        if any(setup.natural_curvature):
+            simulation.set_natural_curvature(cable, setup.natural_curvature)
+    if any(any(setup.natural_curvature) for setup in setups):
+        simulation.equilibrium()
+    return simulation, cables, [simulation.hand(jaw) for jaw in jaws]
+
+
+def _hanging(setup: Setup, motion: Motion) -> FloatArray:
+    """Straight down from where the jaw is at first."""
+    below = setup.arc_length - setup.cable.length
+    return np.asarray(motion.positions[0] + below[:, None] * [0.0, 0.0, 1.0])
+
+
 def _integrator(setup: Setup) -> Literal["static", "backward_euler"]:
     return "static" if setup.quasi_static else "backward_euler"
 
 
-def _scene(setup: Setup, points: FloatArray) -> tuple[Scene, Any]:
-    cable = setup.cable
-    weight = _DENSITY * np.pi * cable.radius**2 * _GRAVITY
-    bend = 2.0 * weight * cable.gravito_bending_length**3
-    modulus = 4.0 * bend / (np.pi * cable.radius**4)
-    material = Material(youngs_modulus=modulus, poisson_ratio=0.5, density=_DENSITY, viscosity=_VISCOUS_TIME * modulus)
+def _scene(setup: Setup, points: FloatArray) -> tuple[Scene, Rod]:
+    scene = _floor(setup)
+    return scene, _add_cable(scene, setup.cable, points, "cable")
+
+
+def _floor(setup: Setup) -> Scene:
+    """The floor with its posts."""
     scene = Scene(gravity=(0.0, 0.0, -_GRAVITY))
-    rod = scene.add_rod(points=points, radius=cable.radius, material=material, name="cable")
     scene.add_floor(friction=setup.friction)
     for post in setup.posts:
         foot, head = (post.x, post.y, 0.0), (post.x, post.y, post.height - post.radius)
         scene.add_capsule(foot, head, post.radius, friction=setup.friction)
     scene.enable_contact(friction=setup.friction)
-    return scene, rod
+    return scene
 
 
-def _path(setup: Setup, motion: Motion, begin: Any) -> Any:
+def _add_cable(scene: Scene, cable: Cable, points: FloatArray, name: str) -> Rod:
+    weight = _DENSITY * np.pi * cable.radius**2 * _GRAVITY
+    bend = 2.0 * weight * cable.gravito_bending_length**3
+    modulus = 4.0 * bend / (np.pi * cable.radius**4)
+    material = Material(youngs_modulus=modulus, poisson_ratio=0.5, density=_DENSITY, viscosity=_VISCOUS_TIME * modulus)
+    return scene.add_rod(points=points, radius=cable.radius, material=material, name=name)
+
+
+def jaw_path(setup: Setup, motion: Motion, begin: Any) -> Any:
     """Position and rotation of the jaw by time; the rod's axes in it are `begin` when it hangs."""
     from scipy.interpolate import CubicSpline
     from scipy.spatial.transform import Rotation

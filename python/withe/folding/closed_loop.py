@@ -19,6 +19,7 @@ from withe.perception.camera import Camera
 __all__ = ["fold"]
 
 FloatArray = npt.NDArray[np.float64]
+_NEAR = 0.01  # of where the lifted edge appears, an edge on the table cannot be told from it [m]
 
 
 @dataclass(frozen=True)
@@ -101,18 +102,23 @@ def _parts(
         poses = poses[last:]
         if left == 0:
             return
-        seen.append(_slide(sheet, camera, plan))
+        seen.append(_slide(sheet, camera, plan, poses[0]))
         if abs(seen[-1] - known) > tolerance:  # not where the edge is hidden: NaN
             present, known = replan(present, poses[0], seen[-1]), seen[-1]
             poses = np.vstack([poses[:1], present.poses[1:]])
 
 
-def _slide(sheet: SimulatedSheet, camera: Camera, plan: Plan) -> float:
-    """How far the sheet has slid, as a camera sees it; NaN where its far edge is hidden."""
+def _slide(sheet: SimulatedSheet, camera: Camera, plan: Plan, pose: FloatArray) -> float:
+    """How far the sheet has slid, as a camera sees it; NaN where its far edge is hidden.
+
+    The lifted edge, at a pose of the jaw, has corners like those of the far edge, and hides these in the end.
+    """
+    lifted = camera.to_plane(camera.project(pose[None, :3]))[0, 0]
     try:
-        return find_edge(sheet.picture(camera), camera, plan.paper).x - plan.paper.length
+        seen = find_edge(sheet.picture(camera), camera, plan.paper).x
     except ValueError:
         return float("nan")
+    return seen - plan.paper.length if seen > lifted + _NEAR else float("nan")
 
 
 def _timed(poses: FloatArray, plan: Plan) -> _Part:

@@ -13,7 +13,8 @@ from withe.folding.grid import HIGH, WIDE
 from withe.folding.manifold import elastica
 from withe.folding.sheet_network import FORMS, SheetNetwork
 from withe.folding.sheets import Elastica, join, take
-from withe.learning.network_training import Alternating, Cosine, train_network
+from withe.learning.network_training import Alternating, Cosine
+from withe.learning.surrogates import train_form
 
 __all__ = ["train"]
 
@@ -79,18 +80,13 @@ def train(
     found = [draw(random, round(share * count)) for draw, share in parts]
     pose = found[0] if len(found) == 1 else join(*found)
     return SheetNetwork(
-        train_network(
-            np.stack(form.ask(np, pose.x, pose.z), axis=1),
-            np.stack(form.learn(pose), axis=1),
-            inputs=form.inputs,
-            outputs=form.outputs,
-            hidden=(64, 64, 64) if small else (392, 392, 392, 392),
-            activation="silu" if small else "relu",
-            loss="squared" if small else "absolute",
+        train_form(
+            form,
+            (pose.x, pose.z),
+            pose,
+            Cosine(epochs=500, batch=2048, rate=8e-3) if small else Alternating(),
+            hidden=(64, 64, 64) if small else None,
             weights=_WEIGHTS if small else 1.0,
-            scale_outputs=small,
-            schedule=Cosine(epochs=500, batch=2048, rate=8e-3) if small else Alternating(),
-            held_out=0.05 if small else 0.2,
             seed=seed,
             threads=threads,
             time_limit=time_limit,

@@ -15,6 +15,7 @@ FloatArray = npt.NDArray[np.float64]
 _MOST = 2.0  # standard deviations; what is farther out is drawn again
 _WAVES = 6  # of the jitter
 _SLOWEST, _FASTEST = 0.5, 4.0  # of these [Hz]
+_SHORTEST, _LONGEST = 0.03, 0.3  # waves of friction along the table [m]
 
 
 @dataclass(frozen=True)
@@ -27,6 +28,8 @@ class Noise:
         Relative, of Lgb.
     friction : float
         Relative, of the coefficient between sheet and table.
+    friction_variation : float
+        Relative to that, from place to place along the table, in waves of 30 to 300 mm.
     curl : float [1/m]
         Of the curvature that the sheet has without forces.
     tilt : float [rad]
@@ -53,6 +56,7 @@ class Noise:
 
     gravito_bending_length: float = 0.05
     friction: float = 0.2
+    friction_variation: float = 0.1
     curl: float = 0.5
     tilt: float = np.radians(0.5)
     position: float = 3e-4
@@ -74,7 +78,7 @@ class Drawn:
     """One trial's numbers: factors of Lgb and of friction, curl [1/m], tilt [rad], and how the jaw is off.
 
     `shift` is (x, z [m], angle [rad]); `waves` of shape (waves, 2, 3): amplitude [m], frequency [rad/s] and phase of
-    the jitter in x and z.
+    the jitter in x and z; `patches` of shape (waves, 3): amplitude, wave number [rad/m] and phase of friction along x.
     """
 
     gravito_bending_length: float
@@ -83,6 +87,7 @@ class Drawn:
     tilt: float
     shift: FloatArray
     waves: FloatArray
+    patches: FloatArray
 
     @classmethod
     def of(cls, noise: Noise, seed: int) -> Drawn:
@@ -92,6 +97,9 @@ class Drawn:
         amplitude = noise.jitter * np.sqrt(2.0 / _WAVES) * np.ones((_WAVES, 2))
         frequency = 2.0 * np.pi * random.uniform(_SLOWEST, _FASTEST, (_WAVES, 2))
         phase = random.uniform(0.0, 2.0 * np.pi, (_WAVES, 2))
+        lengths = np.exp(random.uniform(np.log(_SHORTEST), np.log(_LONGEST), _WAVES))
+        share = noise.friction_variation * np.sqrt(2.0 / _WAVES) * np.ones(_WAVES)
+        patches = np.stack([share, 2.0 * np.pi / lengths, random.uniform(0.0, 2.0 * np.pi, _WAVES)], axis=1)
         return cls(
             gravito_bending_length=1.0 + noise.gravito_bending_length * normal[0],
             friction=max(0.0, 1.0 + noise.friction * normal[1]),
@@ -99,7 +107,14 @@ class Drawn:
             tilt=noise.tilt * normal[3],
             shift=normal[4:] * [noise.position, noise.position, noise.angle],
             waves=np.stack([amplitude, frequency, phase], axis=2),
+            patches=patches,
         )
+
+    def friction_at(self, x: FloatArray) -> FloatArray:
+        """Friction at places along the table [m], over that of the paper; not below 0."""
+        amplitude, wave, phase = self.patches.T
+        share = (amplitude * np.sin(np.multiply.outer(x, wave) + phase)).sum(axis=-1)
+        return np.asarray(np.maximum(0.0, self.friction * (1.0 + share)))
 
     def off(self, time: float, share: float) -> FloatArray:
         """How far the jaw is from where it should be, (x, z [m], angle [rad]); `share` of it has come in."""

@@ -10,21 +10,30 @@ from withe.parts.handles import Rod
 from withe.parts.materials import Stiffness
 from withe.scene.scene import Scene
 
-__all__ = ["add_paper"]
+__all__ = ["add_paper", "strip_numbers"]
 
 _DENSITY = 800.0  # of paper [kg/m^3]
 _GRAVITY = 9.81  # [m/s^2], by which Lgb is defined
 
 
-def add_paper(scene: Scene, paper: Paper, places: npt.NDArray[np.float64], curl: float) -> Rod:
-    """Add a flat sheet, seen from its side, with nodes at places along x, as rod "sheet".
+def strip_numbers(paper: Paper) -> tuple[float, float, float]:
+    """Mass per length, bending and stretching stiffness of a sheet, seen from its side [kg/m], [N m^2], [N].
 
-    Its bending stiffness is 2 w Lgb^3, w the weight per length, its stretching stiffness that of a strip of a uniform
-    material of its thickness h, 12 EI / h^2. `curl` is its natural curvature [1/m], about -y.
+    It bends as Lgb says, EI = 2 w Lgb^3, w the weight per length, and stretches as a strip of a uniform material of its
+    thickness h, EA = 12 EI / h^2.
     """
     line_density = _DENSITY * paper.thickness * paper.width
     bend = 2.0 * line_density * _GRAVITY * paper.gravito_bending_length**3
-    stiffness = Stiffness(stretch=12.0 * bend / paper.thickness**2, bend=(bend, bend), twist=bend)
+    return line_density, bend, 12.0 * bend / paper.thickness**2
+
+
+def add_paper(scene: Scene, paper: Paper, places: npt.NDArray[np.float64], curl: float) -> Rod:
+    """Add a flat sheet, seen from its side, with nodes at places along x, as rod "sheet".
+
+    `curl` is its natural curvature [1/m], about -y.
+    """
+    line_density, bend, stretch = strip_numbers(paper)
+    stiffness = Stiffness(stretch=stretch, bend=(bend, bend), twist=bend)
     zero = np.zeros_like(places)
     return scene.add_rod(
         points=np.stack([places, zero, zero], axis=1),

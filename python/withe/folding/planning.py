@@ -19,7 +19,7 @@ from withe.folding.manifold import elastica
 from withe.folding.paper import Paper
 from withe.folding.plans import FLAT, SHORT, Plan
 from withe.folding.sheet_network import shipped
-from withe.folding.sheets import Elastica, at_forces, at_poses, forces_of, join, poses_of, take
+from withe.folding.sheets import LONGEST, SHORTEST, Elastica, at_forces, at_poses, forces_of, join, poses_of, take
 from withe.folding.timing import evenly, travel_times
 
 __all__ = ["plan", "replan"]
@@ -323,13 +323,13 @@ def _checked_goal(goal: Elastica | None, task: _Task) -> Elastica:
     where, lgb = task.target, task.paper.gravito_bending_length
     if goal is None:
         raise ValueError(
-            f"target is {where:g} m, {where / lgb:.2f} Lgb: no pose without moment that lifts less than 6.84 Lgb, and "
-            "more than .958, brings the edge there"
+            f"target is {where:g} m, {where / lgb:.2f} Lgb: no pose without moment that lifts less than {LONGEST:g} "
+            f"Lgb, and more than {SHORTEST:g}, brings the edge there"
         )
     lifted = float(goal.suspended[0])
     for bound, wrong, what in (
         (task.length, lifted >= task.length, "less than the sheet has"),
-        (moment_free.PENALTY, lifted <= moment_free.PENALTY, "more, so as not to be bent too sharply"),
+        (SHORTEST, lifted <= SHORTEST, "more, so as not to be bent too sharply"),
     ):
         if wrong:
             raise ValueError(f"target is {where:g} m: there {lifted:.2f} Lgb are lifted, not {what}: {bound:.2f}")

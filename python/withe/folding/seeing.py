@@ -21,6 +21,7 @@ __all__ = ["SeenEdge", "find_edge", "overhead_camera"]
 
 FloatArray = npt.NDArray[np.float64]
 _CORNERS, _QUALITY, _APART = 40, 0.05, 12.0  # at most, of the best, [px]
+_BLUR, _BLOCK = 1.5, 7  # of what is inside [px]: steps of single pixels along an edge look like corners
 _WINDOW = (5, 5)  # half of what a corner is refined by [px]
 _BORDER = 8  # of the picture, at which the sheet is cut off [px]
 _OFF = 0.01  # of the width, by which two corners' distance may differ from it
@@ -125,7 +126,8 @@ def find_edge(
     grey = cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY)
     near = cv2.dilate(inside.astype(np.uint8), np.ones((7, 7), np.uint8))
     near[:_BORDER], near[-_BORDER:], near[:, :_BORDER], near[:, -_BORDER:] = 0, 0, 0, 0
-    found = cv2.goodFeaturesToTrack(inside.astype(np.uint8) * 255, _CORNERS, _QUALITY, _APART, mask=near)
+    soft = cv2.GaussianBlur(inside.astype(np.uint8) * 255, (0, 0), _BLUR)
+    found = cv2.goodFeaturesToTrack(soft, _CORNERS, _QUALITY, _APART, mask=near, blockSize=_BLOCK)
     corners = np.empty((0, 2)) if found is None else _refined(cv2, grey, found)
     places = camera.to_plane(corners)[:, :2] if len(corners) else corners
     best: SeenEdge | None = None

@@ -7,9 +7,6 @@ plan needs neither. All in Lgb and w Lgb.
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -17,17 +14,16 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from withe._core import SheetManifold
 from withe.common import validation
 from withe.common.extras import require
-from withe.folding.sheets import Elastica
-from withe.learning.networks import Network
+from withe.folding.sheets import LONGEST, SHORTEST, Elastica
+from withe.learning.surrogates import Form, Surrogate
 
 __all__ = ["FORMS", "SHIPPED", "SheetNetwork", "shipped", "straight"]
 
 FloatArray = npt.NDArray[np.float64]
 SHIPPED = Path(__file__).parent / "small.pt"
-_LENGTHS = (0.958, 6.84)  # lifted lengths between which positions name one pose [Lgb]
-_TAUT = -40.0  # least tangential force [w Lgb]
 
 
 def straight(x: Any, z: Any) -> Any:
@@ -56,29 +52,6 @@ def _with_straight(module: Any, x: Any, z: Any, said: tuple[Any, ...]) -> dict[s
     }
 
 
-@dataclass(frozen=True)
-class Form:
-    """What a network is asked and what it says, as functions of NumPy or torch, whose names are the same.
-
-    Attributes
-    ----------
-    inputs, outputs : tuple of str
-        Names by which a file is known again.
-    ask : callable
-        (module, x, z) -> inputs.
-    tell : callable
-        (module, x, z, outputs) -> what is known of the sheet, by the names of `Elastica`.
-    learn : callable
-        Outputs to be learned, from equilibria.
-    """
-
-    inputs: tuple[str, ...]
-    outputs: tuple[str, ...]
-    ask: Callable[[Any, Any, Any], tuple[Any, ...]]
-    tell: Callable[[Any, Any, Any, tuple[Any, ...]], dict[str, Any]]
-    learn: Callable[[Elastica], tuple[FloatArray, ...]]
-
-
 FORMS = {
     # Forces by direction and size: the ratio is the tangent of the direction, and neither is large anywhere.
     "small": Form(
@@ -104,7 +77,7 @@ FORMS = {
 }
 
 
-class SheetNetwork:
+class SheetNetwork(Surrogate):
     """What a network has learned of sheets that hang from a jaw without moment. `train` makes one, `load` reads one.
 
     Its answers are those of `elastica(x, z)`, about right. It cannot say that a sheet touches the table elsewhere,
@@ -121,30 +94,9 @@ class SheetNetwork:
     >>> network(3.0, 2.25).angle  # doctest: +SKIP
     """
 
-    def __init__(self, network: Network) -> None:
-        names = (network.inputs, network.outputs)
-        found = [form for form in FORMS.values() if (form.inputs, form.outputs) == names]
-        if not found:
-            raise ValueError(f"network must have learned sheets, got one of {network!r}")
-        self.network = network
-        self._form = found[0]
-
-    @classmethod
-    def load(cls, path: str | os.PathLike[str] | None = None) -> SheetNetwork:
-        """Read one from a file; by default the small one that comes with withe.
-
-        Raises
-        ------
-        ValueError
-            A file of something else, or of another version.
-        ImportError
-            torch is not installed.
-        """
-        return cls(Network.load(SHIPPED if path is None else path))
-
-    def save(self, path: str | os.PathLike[str]) -> Path:
-        """Write it to a file."""
-        return self.network.save(path)
+    FORMS = FORMS
+    SHIPPED = SHIPPED
+    LEARNED = "sheets"
 
     def __call__(self, x: npt.ArrayLike, z: npt.ArrayLike) -> Elastica:
         """How sheets hang whose tips are at positions.
@@ -171,8 +123,8 @@ class SheetNetwork:
         said = self.network(asked.astype(np.float32)).astype(float)
         known = self._form.tell(np, x_there, z_there, tuple(said.T))
         inside = ((asked >= self.network.domain[0]) & (asked <= self.network.domain[1])).all(axis=1)
-        inside &= (known["suspended"] > _LENGTHS[0]) & (known["suspended"] < _LENGTHS[1])
-        inside &= known.get("tangential_force", 0.0) > _TAUT
+        inside &= (known["suspended"] > SHORTEST) & (known["suspended"] < LONGEST)
+        inside &= known.get("tangential_force", 0.0) > -SheetManifold.greatest_pull
         valid = np.zeros(x.shape, bool)
         valid[there] = inside
 
@@ -217,9 +169,6 @@ class SheetNetwork:
         x, z = torch.broadcast_tensors(x, z)
         said = self.network(torch.stack(self._form.ask(torch, x, z), dim=-1))
         return self._form.tell(torch, x, z, said.unbind(-1))
-
-    def __repr__(self) -> str:
-        return f"Sheet{self.network!r}"
 
 
 @cache

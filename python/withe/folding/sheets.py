@@ -13,6 +13,8 @@ import numpy.typing as npt
 from withe import _core
 
 __all__ = [
+    "LONGEST",
+    "SHORTEST",
     "Elastica",
     "at_forces",
     "at_poses",
@@ -27,6 +29,9 @@ __all__ = [
 ]
 
 FloatArray = npt.NDArray[np.float64]
+SHORTEST, LONGEST = _core.SheetManifold.shortest, _core.SheetManifold.longest
+"""Lifted lengths between which positions of a tip without moment name one pose; shorter ones are bent too sharply, and
+no method plans over them [Choi, dissertation, 7.8.5]. [Lgb]"""
 _LEAST_SHARE = 500  # sheets that are worth a thread of their own
 
 

@@ -158,13 +158,20 @@ class SimulatedSheet:
         )
         self.rod = add_paper(scene, self.truth, self._places, self._drawn.curl)
         # Surfaces press on each other from a twentieth of the thickness on; a jaw at the sheet's height does not.
-        scene.add_floor(-0.55 * paper.thickness, friction=self.truth.friction, restitution=0.0, name="table")
+        scene.add_floor(-0.55 * paper.thickness, friction=self._friction(), restitution=0.0, name="table")
         scene.enable_contact(friction=validation.non_negative(own_friction, "own_friction"), restitution=0.0)
         for i in range(held):
             scene.pin(self.rod.node(i))
         scene.clamp(self.rod.node(held))
         self._held = held
         self.simulation: Simulation = scene.build(integrator="backward_euler", time_step=time_step, planar=True)
+
+    def _friction(self) -> float | Callable[[FloatArray], FloatArray]:
+        """Of the table: one number where it is the same everywhere, for that costs nothing."""
+        drawn, of_paper = self._drawn, self.paper.friction
+        if not drawn.patches[:, 0].any():
+            return self.truth.friction
+        return lambda points: of_paper * drawn.friction_at(points[:, 0])
 
     def positions(self) -> FloatArray:
         """Where the sheet is now, from the lifted edge on, of shape (edges + 1, 3) [m]."""

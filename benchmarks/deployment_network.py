@@ -1,0 +1,110 @@
+"""Networks that know where to hold a rod beside exact grasps: errors, size, time. Part of deployment.py."""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+
+import numpy as np
+from reporting import OUT, Report, kilobytes, processor_seconds
+
+from withe import deployment
+from withe.deployment.grasp_network import CURVATURES, LENGTHS, SHIPPED, STIFFNESSES
+
+DATA = Path(__file__).resolve().parent.parent / "tests" / "data"
+SOURCE = OUT.parent / "networks" / "deployment_source.pt"  # from tools/train_networks.py
+SOURCE_SECONDS = 120.0  # for which it is trained here where that file is not
+NODES = 200  # of a pattern
+GOALS = {"position": (2e-3, 1e-2), "rotation": (2e-3, 1e-2)}  # median, 95 %: [Lgb], [rad]
+# The dissertation's own weights on the table: median, 95 % and greatest.
+PUBLISHED = {"position": (0.073, 0.34, 0.79), "rotation": (0.015, 0.046, 0.077)}
+NUMBER = 2  # of the cable of the pattern
+
+
+def errors(found: deployment.Grasp, exact: deployment.Grasp) -> dict[str, np.ndarray]:
+    """Median, 95 % and greatest distance of positions [Lgb] and of rotation vectors [rad]."""
+    away = {name: np.linalg.norm(getattr(found, name) - getattr(exact, name), axis=1) for name in GOALS}
+    return {name: np.percentile(error, (50, 95, 100)) for name, error in away.items()}
+
+
+def compare(report: Report, quick: bool) -> None:
+    """The small network, the dissertation's and exact grasps side by side, where all are new, and on the table."""
+    if importlib.util.find_spec("torch") is None:
+        print("\nNetworks: torch is not installed")
+        return
+    import torch
+
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    OUT.mkdir(parents=True, exist_ok=True)
+    new, table = _new(500 if quick else 10_000), _table()
+    pattern = _pattern()
+    rows = [("exact", *[""] * 5, *_times(deployment.grasp, pattern, 1 if quick else 5), "")]
+    for name, network in {"small": deployment.GraspNetwork.load(), "source": _source(quick)}.items():
+        here, there = errors(network(*new), deployment.grasp(*new)), errors(network(*table), deployment.grasp(*table))
+        file = SHIPPED if name == "small" else network.save(OUT / "deployment_source.pt")
+        training = network.network.training
+        cells = [" ".join(f"{value:.1e}" for value in found[key]) for found in (here, there) for key in GOALS]
+        times = _times(network, pattern, 1 if quick else 20)
+        rows.append((name, *cells, kilobytes(file), *times, f"{training.seconds:.0f} ({training.stopped})"))
+        if name == "small" and not quick:
+            _hold_against_goals(report, here, there)
+            report.goal(f"small network: a pattern of {NODES} nodes [ms]", float(times[1]), 5.0, at_least=False)
+    published = [" ".join(f"{value:.1e}" for value in PUBLISHED[key]) for key in GOALS]
+    rows.append(("source, published", "", "", *published, *[""] * 4))
+    header = (
+        "grasps",
+        "new positions [Lgb]: median 95 % most",
+        "new rotations [rad]",
+        "table's positions",
+        "table's rotations",
+        "kB",
+        "us a question",
+        f"ms a pattern of {NODES} nodes",
+        "trained in [s]",
+    )
+    report.table("Networks beside exact grasps, one thread", header, rows)
+    torch.set_num_threads(threads)
+
+
+def _new(count: int) -> tuple[np.ndarray, ...]:
+    """Questions that no network was trained on, .5 Lgb and more."""
+    random = np.random.default_rng(11)
+    length = np.exp(random.uniform(np.log(0.5), np.log(LENGTHS[1]), count))
+    return length, random.uniform(-CURVATURES[1], CURVATURES[1], count), random.uniform(*STIFFNESSES, count)
+
+
+def _table() -> tuple[np.ndarray, ...]:
+    rows = np.genfromtxt(DATA / "rod_grasps.csv", delimiter=",", names=True)
+    return rows["lsbar"], rows["kappabar"], rows["ksbar"]
+
+
+def _pattern() -> tuple[np.ndarray, np.ndarray, float]:
+    """Questions of the published sine, laid from beginning to end."""
+    points = np.genfromtxt(DATA / "patterns" / "sine.csv", delimiter=",", skip_header=1)
+    pattern, cable = deployment.Pattern(points, nodes=NODES), deployment.Cable.dlo(NUMBER)
+    lgb = cable.gravito_bending_length
+    return (cable.length - pattern.arc_length) / lgb, -pattern.curvature * lgb, cable.stretch_stiffness
+
+
+def _times(ask: object, pattern: tuple, repeats: int) -> tuple[str, str]:
+    """Processor time of one question by itself [us], and of a pattern at once [ms]."""
+    ask(*pattern)  # type: ignore[operator]
+    one = processor_seconds(lambda: [ask(5.0, 0.25) for _ in range(20)], repeats) / 20  # type: ignore[operator]
+    many = processor_seconds(lambda: ask(*pattern), repeats)  # type: ignore[operator]
+    return f"{1e6 * one:.0f}", f"{1e3 * many:.2f}"
+
+
+def _source(quick: bool) -> deployment.GraspNetwork:
+    """The dissertation's network: trained before, or here for a while."""
+    if SOURCE.exists() and not quick:
+        return deployment.GraspNetwork.load(SOURCE)
+    limit = 1.0 if quick else SOURCE_SECONDS
+    return deployment.train("source", samples=500 if quick else None, time_limit=limit)
+
+
+def _hold_against_goals(report: Report, here: dict[str, np.ndarray], there: dict[str, np.ndarray]) -> None:
+    for name, bounds in GOALS.items():
+        for where, found in (("10,000 new grasps", here), ("the table", there)):
+            for what, value, bound in zip(("median", "95 %"), found[name], bounds, strict=False):
+                report.goal(f"small network, {name}, {where}: {what}", float(value), bound, at_least=False)

@@ -1,0 +1,196 @@
+"""Networks that have learned where to hold a rod so that it is laid down where it should lie, in place of exact grasps.
+
+Two of them: "small", whose weights come with withe, and "source", that of Choi, dissertation, 9.3.3, which is trained
+by whoever wants it. They answer like `grasp`, a pattern of 200 nodes some hundred times as fast, and have gradients; of
+forces they know nothing. All in Lgb.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from withe.common import validation
+from withe.common.extras import require
+from withe.deployment.grasping import Grasp
+from withe.learning.surrogates import Form, Surrogate
+
+__all__ = ["CURVATURES", "FORMS", "LENGTHS", "SHIPPED", "STIFFNESSES", "GraspNetwork", "shipped", "side"]
+
+FloatArray = npt.NDArray[np.float64]
+SHIPPED = Path(__file__).parent / "small.pt"
+LENGTHS = (0.1, 50.0)  # [Lgb]: what networks learn, and answer
+CURVATURES = (0.0, 4.0)  # [1/Lgb], to either side
+STIFFNESSES = (300.0, 8000.0)
+_LEAST_FORCE = 0.01  # [w Lgb]
+_NAMES = ("x", "y", "z", "ex", "ey", "ez")
+
+
+def side(module: Any, curvature: Any) -> Any:
+    """What is odd in curvature over what the small network learns of it, so that straight rods are laid straight."""
+    return module.tanh(curvature)
+
+
+def _string(module: Any, length: Any, curvature: Any, stretch: Any) -> tuple[Any, Any]:
+    """How far sideways and how high the end is of a string that hangs where the rod does, stretched a little [Lgb].
+
+    Its horizontal force is that of a rod so tightly bent that its weight does not matter, EI curvature^2 / 2, here
+    curvature^2, and a little more, so that straight rods are nothing special.
+    """
+    force = curvature * curvature + _LEAST_FORCE
+    size = module.sqrt(length * length + force * force)
+    sideways = force * module.log((length + size) / force) + 0.5 * force * length / stretch
+    return sideways, size - force + 0.25 * length * length / stretch
+
+
+def _tell(module: Any, length: Any, curvature: Any, stretch: Any, said: tuple[Any, ...]) -> dict[str, Any]:
+    x, y, z, ex, ey, ez = said
+    turned = side(module, curvature)
+    sideways, high = _string(module, length, curvature, stretch)
+    return dict(zip(_NAMES, (x, turned * (y - sideways), z + high, turned * ex, ey, turned * ez), strict=True))
+
+
+def _tell_mirrored(module: Any, length: Any, curvature: Any, stretch: Any, said: tuple[Any, ...]) -> dict[str, Any]:
+    x, y, z, ex, ey, ez = said
+    turned = module.sign(curvature)
+    return dict(zip(_NAMES, (x, turned * y, z, turned * ex, ey, turned * ez), strict=True))
+
+
+def _learn(solutions: tuple[FloatArray, FloatArray, FloatArray, Grasp]) -> tuple[FloatArray, ...]:
+    length, curvature, stretch, found = solutions
+    (x, y, z), (ex, ey, ez), turned = found.position.T, found.rotation.T, side(np, curvature)
+    sideways, high = _string(np, length, curvature, stretch)
+    return x, y / turned + sideways, z - high, ex / turned, ey, ez / turned
+
+
+FORMS = {
+    # Beyond some Lgb the rod hangs as a string does: what is learned is how it differs from one.
+    "small": Form(
+        ("log of suspended length", "size of curvature", "log of stretch stiffness"),
+        ("x", "y beside a string", "z above a string", "ex over side", "ey", "ez over side"),
+        lambda module, length, curvature, stretch: (module.log(length), abs(curvature), module.log(stretch)),
+        _tell,
+        _learn,
+    ),
+    "source": Form(
+        ("suspended length", "size of curvature", "stretch stiffness"),
+        _NAMES,
+        lambda module, length, curvature, stretch: (length, abs(curvature), stretch),
+        _tell_mirrored,
+        lambda solutions: (*solutions[3].position.T, *solutions[3].rotation.T),
+    ),
+}
+
+
+class GraspNetwork(Surrogate):
+    """What a network has learned of grasps that lay a rod. `train` makes one, `load` reads one.
+
+    Its answers are those of `grasp(suspended, curvature, stretch_stiffness)`, about right, and mirrored for negative
+    curvature.
+
+    Attributes
+    ----------
+    network : withe.learning.Network
+
+    Examples
+    --------
+    >>> import withe
+    >>> network = withe.deployment.GraspNetwork.load()  # doctest: +SKIP
+    >>> network(5.0, 0.25).position  # doctest: +SKIP
+    """
+
+    FORMS = FORMS
+    SHIPPED = SHIPPED
+    LEARNED = "grasps"
+
+    def __call__(
+        self, suspended: npt.ArrayLike, curvature: npt.ArrayLike, stretch_stiffness: npt.ArrayLike = 2087.0
+    ) -> Grasp:
+        """Grasps that lay a rod with given curvatures.
+
+        Parameters
+        ----------
+        suspended : array_like [Lgb]
+            Length that hangs, .1 to 50.
+        curvature : array_like [1/Lgb]
+            At lift-off, -4 to 4; see `grasp` for its sign.
+        stretch_stiffness : array_like
+            300 to 8000.
+
+        Returns
+        -------
+        Grasp
+            As `grasp` has it. A network knows no forces: these and the residual are NaN. All exact grasps in its range
+            are stable, and so its own are called.
+
+        Raises
+        ------
+        ValueError
+            Not numbers, beyond what the network has learned, or shapes that do not broadcast.
+        """
+        asked = validation.broadcast_arrays(
+            suspended=suspended, curvature=curvature, stretch_stiffness=stretch_stiffness
+        )
+        require_learned(*asked)
+        rows = np.stack(self._form.ask(np, *asked), axis=-1)
+        known = self._form.tell(np, *asked, tuple(np.moveaxis(self.network(rows), -1, 0)))
+        columns = [known[name] for name in _NAMES]
+        shape = asked[0].shape
+        return Grasp(
+            position=np.stack(columns[:3], axis=-1),
+            rotation=np.stack(columns[3:], axis=-1),
+            force=np.full((*shape, 3), np.nan),
+            stable=np.ones(shape, bool),
+            residual=np.full(shape, np.nan),
+        )
+
+    def tensors(self, suspended: Any, curvature: Any, stretch_stiffness: Any) -> dict[str, Any]:
+        """The same of torch tensors, with gradients.
+
+        Parameters
+        ----------
+        suspended, curvature, stretch_stiffness : Tensor
+            Of floating point numbers, broadcast together. What is beyond its range has no meaning, and is not refused.
+
+        Returns
+        -------
+        dict of Tensor
+            "x", "y", "z" [Lgb] of the position, "ex", "ey", "ez" [rad] of the rotation vector.
+
+        Examples
+        --------
+        >>> network.tensors(length, curvature, stiffness)["z"].sum().backward()  # doctest: +SKIP
+        """
+        torch = require("torch", "learn")
+        asked = (suspended, curvature, stretch_stiffness)
+        if not all(isinstance(values, torch.Tensor) for values in asked):
+            raise ValueError(
+                "suspended, curvature and stretch_stiffness must be tensors: ask the network itself for arrays"
+            )
+        asked = torch.broadcast_tensors(*asked)
+        said = self.network(torch.stack(self._form.ask(torch, *asked), dim=-1))
+        return self._form.tell(torch, *asked, said.unbind(-1))
+
+
+def require_learned(suspended: FloatArray, curvature: FloatArray, stretch_stiffness: FloatArray) -> None:
+    """Refuse what networks have not learned."""
+    for values, name, (low, high) in (
+        (suspended, "suspended", LENGTHS),
+        (np.abs(curvature), "the size of curvature", CURVATURES),
+        (stretch_stiffness, "stretch_stiffness", STIFFNESSES),
+    ):
+        beyond = values[(values < low) | (values > high)]
+        if beyond.size:
+            raise ValueError(
+                f"{name} must be from {low:g} to {high:g} for a network, got {beyond[0]:g}: exact grasps go further"
+            )
+
+
+@cache
+def shipped() -> GraspNetwork:
+    """The small one that comes with withe."""
+    return GraspNetwork.load()

@@ -1,0 +1,271 @@
+"""Cables tied into knots: laid down one after the other, then picked and placed by grippers at given points."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from withe.common import validation
+from withe.deployment.cable import JAW
+from withe.deployment.deploying import DRAWN, drawn_setup
+from withe.deployment.planning import Plan
+from withe.deployment.world import JAW_STIFFNESS, Setup, hung, jaw_path
+from withe.parts.handles import Rod
+from withe.simulation import Simulation
+from withe.simulation.hands import RunningHand
+
+__all__ = ["Move", "Tying", "tie"]
+
+FloatArray = npt.NDArray[np.float64]
+_OPENING = 0.012  # [m] from where a gripper reaches to what it still takes hold of
+_HIGHER = 1.2  # [m] by which a cable hangs higher than the one that is laid before it
+_LOWERED = 3.0  # [s] in which it comes down from there
+_RESTS = 0.5  # [s] after grippers have opened
+_LEG = 2.0  # [s] from point to point
+
+
+@dataclass(frozen=True)
+class Move:
+    """What one gripper does: it takes a cable, carries it from point to point, and lets go.
+
+    Parameters
+    ----------
+    cable : int
+        Which one, in the order of the plans.
+    at : float [m]
+        Arc length from the cable's free end where it is to be held.
+    by : array_like of shape (legs, 3) [m]
+        Where each leg ends, from where the cable is taken; z is up. A leg takes two seconds.
+    turn : array_like of shape (legs,) [rad]
+        By how much the gripper is then turned about the vertical; by default not at all.
+
+    Raises
+    ------
+    ValueError
+        A negative cable or arc length, wrong shapes, or what is not finite.
+    """
+
+    cable: int
+    at: float
+    by: npt.ArrayLike
+    turn: npt.ArrayLike | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "cable", validation.integer(self.cable, "cable of a move", 0, 100))
+        object.__setattr__(self, "at", validation.non_negative(self.at, "at of a move"))
+        by = validation.number_array(self.by, "by of a move", ("legs", 3))
+        turn = np.zeros(len(by)) if self.turn is None else self.turn
+        object.__setattr__(self, "by", by)
+        object.__setattr__(self, "turn", validation.number_array(turn, "turn of a move", (len(by),)))
+
+
+@dataclass(frozen=True)
+class Tying:
+    """How cables came to lie.
+
+    Attributes
+    ----------
+    names : tuple of str
+        What had been done: "laid 0", ..., "step 0", ...
+    shapes : tuple of tuple of ndarray of shape (nodes, 3) [m]
+        Centrelines after each, cable by cable, all grippers open.
+    picks : tuple of tuple of ndarray of shape (3,) [m]
+        Where each gripper reached, step by step.
+    missed : tuple of (int, int)
+        Step and move of grippers that found no cable there.
+    """
+
+    names: tuple[str, ...]
+    shapes: tuple[tuple[FloatArray, ...], ...]
+    picks: tuple[tuple[FloatArray, ...], ...]
+    missed: tuple[tuple[int, int], ...]
+
+    @property
+    def centrelines(self) -> tuple[FloatArray, ...]:
+        """In the end, from the free ends; `withe.knots` says which knot they are."""
+        return self.shapes[-1]
+
+
+def tie(
+    plans: Sequence[Plan],
+    steps: Sequence[Sequence[Move]],
+    *,
+    floor: float,
+    picks: Sequence[Sequence[npt.ArrayLike]] | None = None,
+    seed: int = 0,
+    noise: float = 0.0,
+    nodes: int = 130,
+    time_step: float = 0.01,
+) -> Tying:
+    """Lay cables on one floor, one after the other, then pick and place them.
+
+    Everything happens in the rod engine, in time, as in `deploy`. All grippers of a step begin together and go from
+    point to point together: one may lift a strand while another leads an end below it. They look at nothing: without
+    `picks` each takes its cable where it is, which is a rehearsal; with the picks of a rehearsal it reaches there, and
+    holds what is within 12 mm, or nothing.
+
+    Parameters
+    ----------
+    plans : sequence of Plan
+        A cable each; later ones are laid over earlier ones.
+    steps : sequence of sequences of Move
+    floor : float
+        Coefficient of friction of cables with the floor and each other.
+    picks : sequence of sequences of array_like of shape (3,) [m], optional
+        `Tying.picks` of a rehearsal.
+    seed, noise
+        See `deploy`: all that differs in a trial is drawn for each cable and its gripper, friction once.
+    nodes : int
+        Of each cable, 20 to 2000.
+    time_step : float [s]
+
+    Returns
+    -------
+    Tying
+
+    Raises
+    ------
+    ValueError
+        No plan, a move of a cable that is not there or beyond its end, moves of a step with different numbers of legs,
+        picks that do not fit, negative friction or noise.
+    """
+    _check(plans, steps, picks)
+    friction = validation.non_negative(floor, "floor")
+    noise = validation.non_negative(noise, "noise")
+    random = np.random.default_rng(validation.integer(seed, "seed", 0, 2**63 - 1))
+    setups = [
+        drawn_setup(
+            plan,
+            plan.cable,
+            friction,
+            noise * random.normal(size=DRAWN),
+            nodes=validation.integer(nodes, "nodes", 20, 2000),
+            time_step=validation.positive(time_step, "time_step"),
+            quasi_static=False,
+        )
+        for plan in plans
+    ]
+    table = _Table(plans, setups)
+    for number in range(len(plans)):
+        table.lay(number)
+    for number, step in enumerate(steps):
+        table.carry(number, step, None if picks is None else [np.asarray(pick, float) for pick in picks[number]])
+    return Tying(tuple(table.names), tuple(table.shapes), tuple(table.picks), tuple(table.missed))
+
+
+def _check(
+    plans: Sequence[Plan], steps: Sequence[Sequence[Move]], picks: Sequence[Sequence[npt.ArrayLike]] | None
+) -> None:
+    if not plans:
+        raise ValueError("plans must be one or more")
+    for number, step in enumerate(steps):
+        for move in step:
+            if move.cable >= len(plans):
+                raise ValueError(f"step {number} moves cable {move.cable}, there are {len(plans)}")
+            longest = plans[move.cable].cable.length + 0.5 * JAW
+            if move.at > longest:
+                raise ValueError(
+                    f"step {number} holds cable {move.cable} at {move.at:g} m, it is {longest:.4g} m long to the jaw"
+                )
+        if len({len(np.asarray(move.by)) for move in step}) > 1:
+            raise ValueError(f"the moves of step {number} must have as many legs as each other")
+    if picks is not None and [len(step) for step in steps] != [len(step) for step in picks]:
+        raise ValueError("picks must be one for each move of each step")
+
+
+class _Table:
+    """The floor, what lies and hangs there, and what was done."""
+
+    def __init__(self, plans: Sequence[Plan], setups: Sequence[Setup]) -> None:
+        self.plans, self.setups = plans, setups
+        self.heights = [_HIGHER * number for number in range(len(plans))]
+        self.simulation: Simulation
+        self.cables: list[Rod]
+        self.jaws: list[RunningHand]
+        self.simulation, self.cables, self.jaws = hung(setups, plans, self.heights)
+        self.names: list[str] = []
+        self.shapes: list[tuple[FloatArray, ...]] = []
+        self.picks: list[tuple[FloatArray, ...]] = []
+        self.missed: list[tuple[int, int]] = []
+
+    def lay(self, number: int) -> None:
+        """Lower a cable to where its motion begins, lay it, and let go."""
+        jaw, plan, height = self.jaws[number], self.plans[number], self.heights[number]
+        lowered = _LOWERED if height > 0.0 else 0.0
+        begin = self.simulation.time
+        path = jaw_path(self.setups[number], plan, jaw.pose.rotation)
+
+        def at(time: float) -> tuple[FloatArray, object]:
+            position, rotation = path(time - begin - lowered)
+            left = 1.0 - _smooth((time - begin) / lowered) if lowered else 0.0
+            return position + np.array([0.0, 0.0, height * left]), rotation
+
+        jaw.move(path=at)
+        self.simulation.run(lowered + float(plan.times[-1]), progress=False)
+        jaw.release()
+        self._rest(f"laid {number}")
+
+    def carry(self, number: int, step: Sequence[Move], picks: list[FloatArray] | None) -> None:
+        """Take hold, carry all together, and let go."""
+        reached, hands = [], []
+        for index, move in enumerate(step):
+            pick, hand = self._taken(move, None if picks is None else picks[index], f"step {number} move {index}")
+            reached.append(pick)
+            if hand is None:
+                self.missed.append((number, index))
+                continue
+            hand.move(path=_legs(hand, self.simulation.time, np.asarray(move.by), np.asarray(move.turn)))
+            hands.append(hand)
+        self.picks.append(tuple(reached))
+        self.simulation.run(_LEG * max((len(np.asarray(move.by)) for move in step), default=0), progress=False)
+        for hand in hands:
+            hand.release()
+        self._rest(f"step {number}")
+
+    def _taken(self, move: Move, pick: FloatArray | None, name: str) -> tuple[FloatArray, RunningHand | None]:
+        """Where a gripper reaches, and what it holds there."""
+        setup, cable = self.setups[move.cable], self.cables[move.cable]
+        points, s = self.simulation.positions(cable), setup.arc_length
+        if pick is None:
+            at = move.at
+            pick = np.array([np.interp(at, s, points[:, axis]) for axis in range(3)])
+        else:
+            away = np.linalg.norm(points[:, :2] - (pick + np.array(setup.jaw_offset))[:2], axis=1)
+            if away.min() > _OPENING:
+                return pick, None
+            at = float(s[away.argmin()])
+        at = float(np.clip(at, 0.5 * JAW, s[-1] - 0.5 * JAW))
+        return pick, self.simulation.grasp(cable, at=at, length=JAW, stiffness=JAW_STIFFNESS, name=name)
+
+    def _rest(self, name: str) -> None:
+        self.simulation.run(_RESTS, progress=False)
+        self.names.append(name)
+        self.shapes.append(tuple(self.simulation.positions(cable) for cable in self.cables))
+
+
+def _smooth(share: float) -> float:
+    """From 0 to 1, at rest at both ends."""
+    u = min(max(share, 0.0), 1.0)
+    return u**3 * (10.0 - 15.0 * u + 6.0 * u**2)
+
+
+def _legs(hand: RunningHand, begin: float, by: FloatArray, turn: FloatArray) -> Callable[[float], Any]:
+    """Pose by time, at rest after each leg."""
+    from scipy.spatial.transform import Rotation
+
+    place, held = np.array(hand.pose.position), Rotation.from_matrix(hand.pose.rotation)
+    points, angles = np.concatenate([np.zeros((1, 3)), by]), np.concatenate([[0.0], turn])
+
+    def at(time: float) -> tuple[FloatArray, object]:
+        legs = min(max((time - begin) / _LEG, 0.0), len(by) - 1e-9)
+        leg = int(legs)
+        share = _smooth(legs - leg)
+        moved = points[leg] + share * (points[leg + 1] - points[leg])
+        turned = angles[leg] + share * (angles[leg + 1] - angles[leg])
+        return place + moved, Rotation.from_rotvec([0.0, 0.0, turned]) * held
+
+    return at

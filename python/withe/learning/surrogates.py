@@ -1,0 +1,122 @@
+"""Networks that stand in for a solver: what they are asked, what they say, and how they are known again in a file."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from withe.common import validation
+from withe.learning.network_training import Alternating, Cosine, train_network
+from withe.learning.networks import Network
+
+__all__ = ["Form", "Surrogate", "train_form"]
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Form:
+    """What a network is asked and what it says, as functions of NumPy or torch, whose names are the same.
+
+    Attributes
+    ----------
+    inputs, outputs : tuple of str
+        Names by which a file is known again.
+    ask : callable
+        (module, *question) -> inputs.
+    tell : callable
+        (module, *question, outputs) -> what is known, by name.
+    learn : callable
+        Outputs to be learned, from exact solutions.
+    """
+
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    ask: Callable[..., tuple[Any, ...]]
+    tell: Callable[..., dict[str, Any]]
+    learn: Callable[[Any], tuple[FloatArray, ...]]
+
+
+class Surrogate:
+    """A network with the meaning of its numbers; `Surrogate` itself has none, the classes made of it do.
+
+    Attributes
+    ----------
+    network : withe.learning.Network
+    """
+
+    FORMS: ClassVar[Mapping[str, Form]] = {}
+    SHIPPED: ClassVar[Path]
+    LEARNED: ClassVar[str] = ""  # what, in a word
+
+    def __init__(self, network: Network) -> None:
+        names = (network.inputs, network.outputs)
+        found = [form for form in self.FORMS.values() if (form.inputs, form.outputs) == names]
+        if not found:
+            raise ValueError(f"network must have learned {self.LEARNED}, got one of {network!r}")
+        self.network = network
+        self._form = found[0]
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str] | None = None) -> Self:
+        """Read one from a file; by default the small one that comes with withe.
+
+        Raises
+        ------
+        ValueError
+            A file of something else, or of another version.
+        ImportError
+            torch is not installed.
+        """
+        return cls(Network.load(cls.SHIPPED if path is None else path))
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write it to a file."""
+        return self.network.save(path)
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__.removesuffix('Network')}{self.network!r}"
+
+
+def train_form(
+    form: Form,
+    question: tuple[FloatArray, ...],
+    solutions: Any,
+    schedule: Cosine | Alternating,
+    *,
+    hidden: tuple[int, ...] | None = None,
+    weights: npt.ArrayLike = 1.0,
+    seed: int,
+    threads: int,
+    time_limit: float | None,
+    progress: bool,
+) -> Network:
+    """Train a network of a form on exact solutions.
+
+    With `hidden` it is small and smooth: SiLU, squares of errors of scaled outputs. Without, it is that of Choi,
+    dissertation, 7.5.2 and 9.3.3: four layers of 392 with ReLU, mean absolute error of outputs as they are.
+    """
+    small = hidden is not None
+    return train_network(
+        np.stack(form.ask(np, *question), axis=1),
+        np.stack(form.learn(solutions), axis=1),
+        inputs=form.inputs,
+        outputs=form.outputs,
+        hidden=(392, 392, 392, 392) if hidden is None else hidden,
+        activation="silu" if small else "relu",
+        loss="squared" if small else "absolute",
+        weights=weights,
+        scale_outputs=small,
+        schedule=schedule,
+        held_out=0.05 if small else 0.2,
+        seed=validation.integer(seed, "seed", 0, 2**63 - 1),
+        threads=threads,
+        time_limit=time_limit,
+        progress=progress,
+    )
