@@ -6,6 +6,7 @@ from scipy.spatial.transform import Rotation
 
 import withe
 from gradient_scenes import TIGHT
+from test_gradient_forward import nodes_of
 
 STEP, NODES = 2e-3, 11
 HELD, HELD_EDGES = slice(2, 6), slice(2, 5)  # by a rigid hand
@@ -273,3 +274,25 @@ def test_what_has_no_gradient_with_hands_says_what_to_do():
     record = rigid.run(differentiable=True)
     with pytest.raises(ValueError, match="it is no hand that yields"):
         record.gradient({"positions": np.zeros((7, NODES, 3))}, [(rigid.hand, "stiffness")])
+
+
+@pytest.mark.parametrize("kind", ["rigid", "yielding"])
+@pytest.mark.parametrize("planar", [True, False])
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+def test_gradient_of_a_run_in_a_hand_is_that_of_its_steps_one_after_the_other(integrator, planar, kind):
+    held, count = Held(kind, planar=planar, integrator=integrator), 4
+    sim, arm = held.simulation, held.arm
+    wrt = [(arm, "youngs_modulus"), "gravity", *([(held.hand, "stiffness")] if kind == "yielding" else [])]
+    weights = np.random.default_rng(36).normal(size=(2, NODES, 3)) * ((1, 0, 1) if planar else (1, 1, 1))
+    weights[0] = 0.0
+    start = sim.snapshot()
+    record = sim.run(count * STEP, record_every=count * STEP, progress=False, differentiable=True)
+    found = record.gradient({"positions": weights}, wrt)
+    at_end = weights[1].ravel() @ nodes_of(sim, "positions")
+    sim.restore(start)
+    by_inputs = np.zeros((len(at_end), 1))
+    for _ in range(count):
+        A, B = sim.step_jacobian(wrt)
+        by_inputs = A @ by_inputs + B.toarray()
+        sim.step(1)
+    assert at_end @ by_inputs == pytest.approx(np.concatenate([np.ravel(part) for part in found]), rel=1e-10, abs=1e-13)
