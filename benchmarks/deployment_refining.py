@@ -1,4 +1,4 @@
-"""Finer meshes and slower jaws: how little these change of how cables lie. Part of deployment_tables.py (--refine)."""
+"""Finer meshes and slower hands: how little they change of how cables lie. Part of deployment_tables.py (--refine)."""
 
 from __future__ import annotations
 

@@ -84,7 +84,7 @@ def speed(report: Report, quick: bool) -> None:
         folding.plan(paper, method="slip", grasp="free")
 
     def slide() -> None:
-        moment_free._needed_slide.cache_clear()
+        moment_free._needed_slides.cache_clear()
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)
             folding.plan(paper, method="slip")

@@ -77,6 +77,7 @@ def main() -> None:
     }
     rows = [("withe, 150 edges", f"{1e3 * folded.slide:.2f}", f"{took:.1f}")]
     rows.append(("continuum", f"{1e3 * plan.slide[-1]:.2f}", ""))
+    report.goal("slide, off from the continuum [m]", abs(plan.slide[-1] - folded.slide), 1e-4, at_least=False)
     if HAVE_ELASTICA:
         for elements in (40,) if options.quick else (40, 60):
             duration = 0.2 if options.quick else np.inf

@@ -84,6 +84,7 @@ class Folded:
     error: float
     slide: float
     curvature: float
+    needed: float
     failure: str | None
     seconds: float
 
@@ -103,6 +104,7 @@ class Folded:
             outcome.error,
             outcome.slide,
             outcome.max_curvature,
+            outcome.needed_friction,
             outcome.failure,
             outcome.seconds,
         )
@@ -151,10 +153,12 @@ def row(folds: list[Folded], count: int) -> tuple[str, ...]:
     published = PUBLISHED.get(first.case, {}).get(first.way, "") if first.friction == FRICTIONS[0] else ""
     of = f"{len(folds)}" if len(folds) == count else f"{len(folds)}, {count - len(folds)} not run"
     head = (first.case, f"{first.friction:g}", first.way, f"{len(folded)} of {of}")
+    asked = [fold.needed for fold in folds if np.isfinite(fold.needed)]
+    needed = f"{np.median(asked):.3f}" if asked else ""
     seconds = f"{np.mean([fold.seconds for fold in folds]):.0f}"
     if not folded:
         why = "no plan" if all((fold.failure or "").startswith("no plan") for fold in folds) else "none folds"
-        return (*head, why, published, "", "", "", seconds)
+        return (*head, why, published, "", "", "", needed, seconds)
     lengths, errors = np.array([f.length for f in folded]), np.abs([f.error for f in folded])
     slides, curvatures = [f.slide for f in folded], [f.curvature for f in folded]
     return (
@@ -164,6 +168,7 @@ def row(folds: list[Folded], count: int) -> tuple[str, ...]:
         f"{1e3 * np.median(errors):.2f} {1e3 * errors.max():.2f}",
         f"{1e3 * np.mean(slides):.2f} {1e3 * np.std(slides):.2f}",
         f"{max(curvatures):.0f}",
+        needed,
         seconds,
     )
 
@@ -243,10 +248,12 @@ def main() -> None:
         "error [mm]",
         "slide [mm]",
         "curv. [1/m]",
+        "needs friction",
         "s a fold",
     )
     rows = [row(folds, count) for folds in groups.values()]
     report.table("Folds: mean and spread; error: median and greatest", header, rows)
+    report.figures["slowest [s]"] = max((fold.seconds for fold in folds), default=0.0)
     report.figures["failures"] = [str(fold) for fold in folds if fold.failure]
     if whole:
         goals(report, groups)

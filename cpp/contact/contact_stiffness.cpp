@@ -199,8 +199,8 @@ ContactRecord ContactStiffness::record(const Touching& t) const {
   record.force = -t.energy.first;
   record.stiffness = t.stiffness / t.pair.share;
   record.yielded = t.yielded;
-  const bool coming = t.age == 0.0 && t.apart();
-  if (problem_.pressing != Pressing::still && (coming || impact_share(problem_, t) > 0.0)) {
+  const bool coming = problem_.pressing != Pressing::still && comes_near(problem_, t);
+  if (coming || (problem_.pressing != Pressing::still && impact_share(problem_, t) > 0.0)) {
     record.approach = t.approach;
     record.age = coming ? 0.0 : t.age + problem_.duration;
   }

@@ -91,6 +91,10 @@ ImpactShareSlopes impact_share_slopes(const ContactProblem& problem, const Touch
   return out;
 }
 
+bool comes_near(const ContactProblem& problem, const Touching& t) {
+  return t.age == 0.0 && t.apart() && t.proximity.distance < start_distance(problem, t.pair);
+}
+
 bool meets(const ContactProblem& problem, const ContactPair& pair) {
   return !problem.starting && !std::binary_search(problem.unrecorded.begin(), problem.unrecorded.end(), pair.key);
 }

@@ -12,6 +12,9 @@ double rest_speed(const ContactProblem& problem, const ContactPair& pair);
 double least_approach(const ContactProblem& problem, const ContactPair& pair);
 /// At which surfaces near each other as the step begins [m/s].
 double approach_speed(const ContactProblem& problem, const ContactPair& pair);
+/// Whether an impact is still on its way in at the end of a step: it has not pressed surfaces together yet, nor turned
+/// them round within the tolerance, where what is light enough rests.
+bool comes_near(const ContactProblem& problem, const Touching& t);
 /// Whether surfaces meet in this step.
 bool meets(const ContactProblem& problem, const ContactPair& pair);
 /// That of an impact which the step begins; 0: none.

@@ -44,9 +44,10 @@ std::array<Scalar, 4> across(const SheetSlope<Scalar>& slope, int segment, int s
 }  // namespace
 
 int sheet_steps(const SheetProblem::Path& path) {
-  const double force = std::max(std::abs(path.values[0]), std::abs(path.values[1]));
-  const double step = std::min(0.4, 0.22 * std::sqrt(2.0 / std::max(force, 1e-3)));
-  const double steps = std::ceil(path.values[2] / (SheetProblem::kSegments * step));
+  const auto& [up, forward, length] = path.values;
+  const double force = std::max({std::hypot(up, forward), std::hypot(up - length, forward), 1e-3});
+  const double step = std::min(0.4, std::sqrt(2.0 / force) * std::pow(5e-4 / force, 0.125));
+  const double steps = std::ceil(length / (SheetProblem::kSegments * step));
   return static_cast<int>(std::clamp(steps, 1.0, 50.0));  // also where Newton's method went astray
 }
 
@@ -117,22 +118,29 @@ void SheetProblem::put_end(const Path& path, System& system) const {
 
 namespace {
 
-/// Where a function of the state passes zero within a step: the state there, by false position with the value of an end
-/// that stays halved [Dowell and Jarratt 1971]. What is sought there is greatest or least, so an error of 1e-6 of the
-/// step is one of 1e-12 in it.
-template <class Function>
+/// What has a zero where something is greatest or least: the slope of the curvature, the curvature, the climb.
+using Signs = std::array<double, 3>;
+
+Signs signs_at(const SheetSlope<double>& slope, double s, const std::array<double, 4>& y) {
+  const auto [curvature, by_moment, along, climb] = slope(s, y);
+  const double width = 1.0 + slope.growth * (slope.length - s);
+  return {by_moment + slope.growth * y[1] / width, curvature, y[3] == 0 ? 0.0 : climb};  // 2 b theta'', theta', Z'
+}
+
+/// State where a sign passes zero within a step, by false position with the value of an end that stays halved [Dowell
+/// and Jarratt 1971]. What is sought there is greatest or least, so an error of 1e-5 of the step is one of 1e-10 in it.
 std::array<double, 4> state_at_zero(const SheetSlope<double>& slope, double s, double h, const std::array<double, 4>& y,
-                                    const std::array<double, 4>& end, const Function& f) {
-  double low = 0, high = h, at_low = f(s, y), at_high = f(s + h, end), last = high;
+                                    std::size_t which, double at_low, double at_high) {
+  double low = 0, high = h, last = high;
   std::array<double, 4> state = y;
   int side = 0;
   for (int i = 0; i < 30; ++i) {
     const double place = (low * at_high - high * at_low) / (at_high - at_low);
     state = y;
     runge_kutta_step<2>(slope, s, place, state);
-    if (std::abs(place - last) < 1e-6 * h) break;
+    if (std::abs(place - last) < 1e-5 * h) break;
     last = place;
-    const double value = f(s + place, state);
+    const double value = signs_at(slope, s + place, state)[which];
     if (value == 0) break;
     if ((value < 0) == (at_low < 0)) {
       low = place;
@@ -156,32 +164,26 @@ SheetExtremes sheet_extremes(const SheetShape& shape, const SheetProblem::Path& 
   const SheetSlope<double> slope{shape.width_growth, path.values[0], path.values[1], length};
   const int steps = sheet_steps(path);
   const double h = length / (SheetProblem::kSegments * steps);
-  const auto curvature = [&](double s, const std::array<double, 4>& y) { return slope(s, y)[0]; };
-  const auto curvature_slope = [&](double s, const std::array<double, 4>& y) {
-    const double width = 1.0 + shape.width_growth * (length - s);
-    return slope(s, y)[1] + shape.width_growth * y[1] / width;  // 2 b theta''
-  };
-  const auto climb = [&](double /*s*/, const std::array<double, 4>& y) { return y[3] == 0 ? 0.0 : std::sin(y[0]); };
   SheetExtremes found;
   const auto see = [&](double s, const std::array<double, 4>& y) {
-    found.largest_curvature = std::max(found.largest_curvature, std::abs(curvature(s, y)));
+    const double curvature = 0.5 * y[1] / (1.0 + shape.width_growth * (length - s));
+    found.largest_curvature = std::max(found.largest_curvature, std::abs(curvature));
     found.smallest_angle = std::min(found.smallest_angle, y[0]);
     found.largest_angle = std::max(found.largest_angle, y[0]);
     found.lowest = std::min(found.lowest, y[3]);
   };
   for (int k = 0; k < SheetProblem::kSegments; ++k) {
     std::array<double, 4> y = path.nodes[static_cast<std::size_t>(k)];
+    Signs before = signs_at(slope, k * steps * h, y);
     for (int i = 0; i < steps; ++i) {
       const double s = (k * steps + i) * h;
-      const std::array<double, 4> before = y;
+      const std::array<double, 4> start = y;
       runge_kutta_step<2>(slope, s, h, y);
       see(s + h, y);
-      const auto look = [&](const auto& f) {
-        if (f(s, before) * f(s + h, y) < 0) see(s, state_at_zero(slope, s, h, before, y, f));
-      };
-      look(curvature_slope);
-      look(curvature);
-      look(climb);
+      const Signs after = signs_at(slope, s + h, y);
+      for (std::size_t j = 0; j < after.size(); ++j)
+        if (before[j] * after[j] < 0) see(s, state_at_zero(slope, s, h, start, j, before[j], after[j]));
+      before = after;
     }
   }
   return found;

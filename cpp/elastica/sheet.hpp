@@ -51,7 +51,8 @@ class SheetProblem {
   void put_end(const Path& path, System& system) const;
 };
 
-/// Runge-Kutta steps a segment: at most .4 Lgb, and .22 of the length sqrt(EI / force) over which forces bend.
+/// Runge-Kutta steps a segment: at most .4 Lgb, and so many that the first integral, of which an error is about
+/// 1e-5 F (h / sqrt(EI / F))^8 at a step h and a force F, holds to some 1e-9 w Lgb^2.
 int sheet_steps(const SheetProblem::Path& path);
 
 /// State at the end of a segment, integrated from that at its start.

@@ -312,7 +312,9 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
   VectorX& acceleration = work.mean;
   acceleration = (work.velocity - state.v) / dt;
   if (options.tolerance) result.error = estimated_error(equations, newton, options, plan, predictor, work);
-  predictor.record(state.time + 0.5 * dt, plan.slot, acceleration, equations.mass().rows, work.assumed);
+  work.difference = work.change / dt;
+  predictor.record({state.time + 0.5 * dt, h, dt, plan.slot}, state.v, work.difference, acceleration,
+                   equations.mass().rows, work.assumed);
   if (Contact* contact = equations.contact())
     result.dissipated -= contact->accept(state, Keep::energy, std::max(contact_loss, 0.0));
   advance(equations, plan, q1, work, state);

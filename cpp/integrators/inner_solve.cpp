@@ -86,7 +86,7 @@ class InnerSolve {
         regularised_(frictional_ && equations.contact()->regularises()),
         energy_momentum_(plan.rule == StepRule::energy_momentum),
         mixed_(!energy_momentum_ || history_.plain_solves == 0),
-        points_(predictor.points(plan.slot)) {
+        steady_(predictor.steady(plan.slot)) {
     if (energy_momentum_ && !mixed_) --history_.plain_solves;
   }
 
@@ -127,7 +127,7 @@ class InnerSolve {
     if (guess == Guess::other_method && !uses(Heuristic::start_other_method)) return false;
     if (guess == Guess::continuation && !uses(Heuristic::start_continuation)) return false;
     if (guess == Guess::continuation) return regularised_;
-    return guess != Guess::accelerated || points_ != 0;
+    return guess != Guess::accelerated || !steady_;
   }
 
   /// What is always tried: rest, and where friction does not let surfaces jump all but the extrapolated motion. Others
@@ -151,8 +151,8 @@ class InnerSolve {
   /// Puts the guess into `work.z`.
   void guess_at(Guess guess) {
     if (guess == Guess::accelerated) {
-      predictor_.extrapolate(state_.time + 0.5 * plan_.dt, points_, work_.mean);
-      work_.move = h_ * state_.v + (h_ * h_) * work_.mean;
+      predictor_.predict({state_.time + 0.5 * plan_.dt, h_, plan_.dt, plan_.slot}, state_.v, work_.mean);
+      work_.move = h_ * work_.mean;
     } else {
       work_.move = (guess == Guess::rest || guess == Guess::continuation ? 0.0 : h_) * state_.v;
     }
@@ -220,7 +220,7 @@ class InnerSolve {
   bool frictional_;
   bool regularised_;  ///< whether friction's regularisation is what Newton's method may fail on
   bool energy_momentum_, mixed_;
-  int points_;  ///< of the extrapolation
+  bool steady_;  ///< whether nothing predicts better than a steady motion
 };
 
 }  // namespace

@@ -4,8 +4,8 @@
 
 namespace withe {
 
-void Predictor::extrapolate(double time, int points, VectorX& out) const {
-  std::array<double, kDepth> weight;  // Lagrange's
+void Predictor::extrapolate(double time, const History& history, int points, VectorX& out) const {
+  std::array<double, kDepth> weight{};  // Lagrange's
   for (int i = 0; i < points; ++i) {
     const auto a = static_cast<std::size_t>(i);
     weight[a] = 1.0;
@@ -14,7 +14,7 @@ void Predictor::extrapolate(double time, int points, VectorX& out) const {
       if (j != i) weight[a] *= (time - time_[b]) / (time_[a] - time_[b]);
     }
   }
-  const auto& [a, b, c, d] = acceleration_;
+  const auto& [a, b, c, d] = history;
   const auto& [wa, wb, wc, wd] = weight;
   switch (points) {
     case 0:
@@ -34,25 +34,42 @@ void Predictor::extrapolate(double time, int points, VectorX& out) const {
   }
 }
 
-void Predictor::record(double time, int slot, const VectorX& acceleration, const VectorX& weight, VectorX& scratch) {
+void Predictor::predict(const Step& step, const VectorX& v0, Choice choice, VectorX& out) const {
+  extrapolate(step.middle, choice.velocities ? velocity_ : acceleration_, choice.points, out);
+  if (!choice.velocities) out = v0 + step.h * out;
+}
+
+void Predictor::choose(const Step& step, const VectorX& v0, const VectorX& velocity, const VectorX& weight,
+                       VectorX& scratch) {
+  Choice& best = best_[static_cast<std::size_t>(step.slot)];
+  double least = INFINITY;
+  const auto consider = [&](Choice choice) {
+    predict(step, v0, choice, scratch);
+    const double error = (scratch - velocity).cwiseAbs2().dot(weight);
+    if (!(error < least)) return;
+    least = error;
+    best = choice;
+  };
+  for (int points = 0; points <= count_; ++points) consider({false, points});
+  // Under backward Euler a step's mean velocity is that at its end, and both are one.
+  if (step.h < step.dt)
+    for (int points = 1; points <= count_; ++points) consider({true, points});
+  // With a longer history the next degree up is worth a trial.
+  if (!best.velocities && count_ < kDepth && best.points == count_) ++best.points;
+}
+
+void Predictor::record(const Step& step, const VectorX& v0, const VectorX& velocity, const VectorX& acceleration,
+                       const VectorX& weight, VectorX& scratch) {
   resize(acceleration.size());
   for (int i = 0; i < count_; ++i)
-    if (time_[static_cast<std::size_t>(i)] == time) count_ = i;  // the same step again
-  double least = INFINITY;
-  for (int points = 0; points <= count_; ++points) {
-    extrapolate(time, points, scratch);
-    const double error = (scratch - acceleration).cwiseAbs2().dot(weight);
-    if (error < least) {
-      least = error;
-      best_[static_cast<std::size_t>(slot)] = points;
-    }
-  }
-  // With a longer history the next degree up is worth a trial.
-  if (count_ < kDepth && best_[static_cast<std::size_t>(slot)] == count_) ++best_[static_cast<std::size_t>(slot)];
-  std::rotate(acceleration_.begin(), acceleration_.end() - 1, acceleration_.end());
+    if (time_[static_cast<std::size_t>(i)] == step.middle) count_ = i;  // the same step again
+  choose(step, v0, velocity, weight, scratch);
+  for (History* history : {&acceleration_, &velocity_})
+    std::rotate(history->begin(), history->end() - 1, history->end());
   std::rotate(time_.begin(), time_.end() - 1, time_.end());
   acceleration_[0] = acceleration;
-  time_[0] = time;
+  velocity_[0] = velocity;
+  time_[0] = step.middle;
   count_ = std::min(count_ + 1, kDepth);
 }
 
@@ -72,11 +89,12 @@ void Predictor::differentiate(int order, double share, double dt, const VectorX&
 
 bool Predictor::plausible() const {
   bool fine = count_ >= 0 && count_ <= kDepth;
-  for (const int b : best_) fine = fine && b >= 0 && b <= kDepth;
+  for (const Choice& b : best_) fine = fine && b.points >= (b.velocities ? 1 : 0) && b.points <= kDepth;
   for (int i = 0; i < kDepth; ++i)
     for (int j = 0; j < i && i < count_; ++j)
       fine = fine && time_[static_cast<std::size_t>(i)] != time_[static_cast<std::size_t>(j)];
-  for (const VectorX& a : acceleration_) fine = fine && a.allFinite();
+  for (const History* history : {&acceleration_, &velocity_})
+    for (const VectorX& a : *history) fine = fine && a.allFinite();
   for (const VectorX& a : slow_) fine = fine && a.allFinite() && a.size() == slow_[0].size();
   return fine;
 }

@@ -1,5 +1,5 @@
 #pragma once
-/// The mean acceleration of a coming step, extrapolated from those of the last ones.
+/// The mean velocity of a coming step, extrapolated from the last ones.
 
 #include <algorithm>
 #include <array>
@@ -8,42 +8,65 @@
 
 namespace withe {
 
-/// Polynomials in time through the mean accelerations of the last steps, each taken at the middle of its step. Used is
-/// the degree that would have predicted the last one best: modes that the step does not resolve flip sign from step to
-/// step, and every degree amplifies them more. Steps of a composition differ in how far they look ahead, so each has a
-/// slot.
+/// Polynomials in time through means of the last steps, each taken at the middle of its step: through their
+/// accelerations a, which gives v0 + h a from the velocity v0 that the step starts with, or through their velocities.
+/// Modes that a midpoint step does not resolve flip the sign of v0 and a from step to step, and every degree in a
+/// amplifies them more; their mean velocities are small. Used is what would have predicted the last step best. Steps of
+/// a composition differ in how far they look ahead, so each has a slot.
 class Predictor {
  public:
   static constexpr int kDepth = 4, kSlots = 5;
+
+  /// What is extrapolated, through how many of the last steps; accelerations through none: v0 goes on.
+  struct Choice {
+    bool velocities = false;
+    int points = 1;
+  };
+
+  /// A step of dt: h from its start to where its forces act, dt / 2 or dt.
+  struct Step {
+    double middle = 0, h = 0, dt = 0;  ///< [s]
+    int slot = 0;
+  };
 
   void clear() {
     count_ = 0;
     for (VectorX& a : slow_) a.resize(0);
   }
   bool empty() const { return count_ == 0; }
-  /// Number of steps that the coming prediction in `slot` uses; 0: none is better.
-  int points(int slot) const { return std::min(best_[static_cast<std::size_t>(slot)], count_); }
-  /// Acceleration expected at `time` from the last `points` steps.
-  void extrapolate(double time, int points, VectorX& out) const;
-  /// Takes in the mean acceleration of a step about `time`; `weight` per unknown says how much an error there matters.
-  void record(double time, int slot, const VectorX& acceleration, const VectorX& weight, VectorX& scratch);
+  Choice choice(int slot) const {
+    const Choice best = best_[static_cast<std::size_t>(slot)];
+    return {best.velocities && count_ > 0, std::min(best.points, count_)};
+  }
+  /// Whether the coming step is expected to go on as it starts, for nothing else is better.
+  bool steady(int slot) const { return choice(slot).points == 0; }
+  /// Mean velocity expected of a step that starts with `v0`.
+  void predict(const Step& step, const VectorX& v0, VectorX& out) const { predict(step, v0, choice(step.slot), out); }
+  /// Takes in a step from velocity `v0`; `weight` per unknown says how much an error there matters.
+  void record(const Step& step, const VectorX& v0, const VectorX& velocity, const VectorX& acceleration,
+              const VectorX& weight, VectorX& scratch);
 
   /// Derivative of the accelerations in time, of an odd `order` up to three, through order + 2 running means that each
   /// forget `share` of the past in a step of dt. To be asked for in every step or in none.
   void differentiate(int order, double share, double dt, const VectorX& acceleration, VectorX& out);
 
   void resize(Eigen::Index size) {
-    for (VectorX& a : acceleration_)
-      if (a.size() != size) a.setZero(size);
+    for (auto* history : {&acceleration_, &velocity_})
+      for (VectorX& a : *history)
+        if (a.size() != size) a.setZero(size);
   }
   bool plausible() const;
   /// Reads or writes everything; see archive.hpp of `world`.
   template <class Archive>
   void exchange(Archive& io) {
     io(count_);
-    for (int& b : best_) io(b);
+    for (Choice& b : best_) {
+      io(b.velocities);
+      io(b.points);
+    }
     for (double& t : time_) io(t);
     for (VectorX& a : acceleration_) io(a);
+    for (VectorX& v : velocity_) io(v);
     bool smoothed = slow_[0].size() > 0;
     io(smoothed);
     for (VectorX& a : slow_) {
@@ -53,10 +76,16 @@ class Predictor {
   }
 
  private:
+  using History = std::array<VectorX, kDepth>;
+
+  void extrapolate(double time, const History& history, int points, VectorX& out) const;
+  void predict(const Step& step, const VectorX& v0, Choice choice, VectorX& out) const;
+  void choose(const Step& step, const VectorX& v0, const VectorX& velocity, const VectorX& weight, VectorX& scratch);
+
   int count_ = 0;
-  std::array<int, kSlots> best_{1, 1, 1, 1, 1};
+  std::array<Choice, kSlots> best_;
   std::array<double, kDepth> time_{};  ///< latest first
-  std::array<VectorX, kDepth> acceleration_;
+  History acceleration_, velocity_;
   std::array<VectorX, 5> slow_;  ///< running means, empty until wanted
 };
 

@@ -140,9 +140,10 @@ void exchange(Archive& io, Moving& moving) {
 
 template <class Archive>
 void exchange(Archive& io, StepControl& control) {
-  auto& [level, easy_steps, patience, grown, error_rate, grid_origin, grid_steps, steps_taken, guard, contact_guard,
-         step_watch, alarm] = control;
-  io(level), io(easy_steps), io(patience), io(grown), io(error_rate), io(grid_origin), io(grid_steps), io(steps_taken);
+  auto& [level, easy_steps, patience, grown, error_rate, mean_step, event_reserve, grid_origin, grid_steps, steps_taken,
+         guard, contact_guard, step_watch, alarm] = control;
+  io(level), io(easy_steps), io(patience), io(grown), io(error_rate), io(mean_step), io(event_reserve), io(grid_origin),
+      io(grid_steps), io(steps_taken);
   auto& [turn, scale, excess, stretch_gain, fallback_steps, energy] = guard;
   io(turn), io(scale), io(excess), io(stretch_gain), io(fallback_steps);
   exchange(io, energy);

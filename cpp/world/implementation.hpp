@@ -179,6 +179,9 @@ struct World::Implementation : Running {
   void cut(Attempt why, Division& division, double dt);
   bool grow(Attempt attempt, double dt);
   double local_order() const;
+  double allowed_error(double dt) const;
+  bool bears_event(double error, double dt) const;
+  void account_for_error(double error, double dt);
   bool may_grow(double dt, double times) const;
   Attempt try_step(double dt);
   void take_back();

@@ -117,8 +117,10 @@ struct StepControl {
   int easy_steps = 0;             ///< since it changed
   int patience = kLeastPatience;  ///< of them before longer steps are tried
   bool grown = false;             ///< fewer easy steps than the least patience ago
-  double error_rate = 0;   ///< greatest estimated error of the last steps over the power of the step that it goes with
-  double grid_origin = 0;  ///< time = grid_origin + grid_steps time_step after whole steps, free of summed rounding
+  double error_rate = 0;  ///< greatest estimated error of the last steps over the power of the step that it goes with
+  double mean_step = 0;   ///< under error control, over some of the last steps, weighed by their lengths [s]
+  double event_reserve = 1;  ///< of the error that events such as impacts may make beyond their time, what is left [-]
+  double grid_origin = 0;    ///< time = grid_origin + grid_steps time_step after whole steps, free of summed rounding
   std::int64_t grid_steps = 0;
   std::int64_t steps_taken = 0;  ///< inner steps accepted since the scene was built
   EnergyGuard guard;

@@ -17,6 +17,8 @@ constexpr int kMostStiffenings = 4;
 constexpr int kMostPatience = 64;
 // Steps from one look at how well the mesh resolves the motion to the next, and at the energy of an explicit one.
 constexpr int kResolutionPeriod = 64, kAlarmPeriod = 16;
+// Share of the tolerance that is kept for events, and of the duration, over what steps are averaged.
+constexpr double kEventShare = 0.2, kAverage = 1.0 / 64.0;
 
 }  // namespace
 
@@ -141,10 +143,32 @@ double World::Implementation::local_order() const {
   }
 }
 
+/// Error that is allowed in a step of dt [m]: its part of what is allowed over the duration.
+double World::Implementation::allowed_error(double dt) const {
+  if (!options.tolerance) return INFINITY;
+  return (1.0 - kEventShare) * *options.tolerance * dt / options.duration.value_or(1.0);
+}
+
+/// Most steps go by the error per unit of time. In an impact that would cost far more steps than it is worth: of all
+/// ways to make the same error in sum, equal errors in every step take the fewest. So an event may make as great an
+/// error in a step as the steps around it make on average, as long as what it makes beyond its time is left in a share
+/// of the tolerance that is kept for that, and that time brings back.
+bool World::Implementation::bears_event(double error, double dt) const {
+  const double excess = error - allowed_error(dt);
+  return error <= allowed_error(mean_step) && excess <= event_reserve * kEventShare * *options.tolerance;
+}
+
+void World::Implementation::account_for_error(double error, double dt) {
+  const double duration = options.duration.value_or(1.0);
+  const double excess = std::max(error - allowed_error(dt), 0.0);
+  event_reserve = std::min(1.0, event_reserve - excess / (kEventShare * *options.tolerance) + dt / duration);
+  mean_step -= (dt - mean_step) * std::expm1(-dt / (kAverage * duration));
+}
+
 /// Whether a step of dt `times` longer would be accurate enough, the tolerance too growing with it.
 bool World::Implementation::may_grow(double dt, double times) const {
   if (!options.tolerance) return true;
-  const double allowed = *options.tolerance * dt / options.duration.value_or(1.0);
+  const double allowed = allowed_error(dt);
   return error_rate * std::pow(times * dt, local_order()) < 0.8 * times * allowed;
 }
 
@@ -162,7 +186,7 @@ World::Implementation::Attempt World::Implementation::try_step(double dt) {
   // Actuation changes what is stored without a motion, so the start is looked at while it is as it was.
   if (guarded && !guard.energy && actuated()) guard.energy = energy();
   const EnergyGuard guard_before = guard;
-  const double allowed = options.tolerance ? *options.tolerance * dt / options.duration.value_or(1.0) : INFINITY;
+  const double allowed = allowed_error(dt);
   work.newton.finest = 0.01 * allowed;  // so that what Newton leaves is no part of the error
   double error = 0.0;
   bool done = false;
@@ -176,7 +200,8 @@ World::Implementation::Attempt World::Implementation::try_step(double dt) {
     statistics.rejected_steps += 1;
     return Attempt::failed;
   }
-  if (error > allowed) {
+  const bool event = error > allowed;
+  if (event && !bears_event(error, dt)) {
     take_back();
     return Attempt::inaccurate;
   }
@@ -197,7 +222,8 @@ World::Implementation::Attempt World::Implementation::try_step(double dt) {
   }
   watch_step(dt, equations_of_step());
   commit_step();
-  if (watched && equations_of_step().contact()->unresolved(2.0 * dt)) return Attempt::hard;
+  if (options.tolerance) account_for_error(error, dt);
+  if (event || (watched && equations_of_step().contact()->unresolved(2.0 * dt))) return Attempt::hard;
   if (!options.tolerance) return Attempt::easy;
   // An oscillation has no error twice a period: what counts is the greatest of the last steps, were they longer.
   // Far below what is allowed an estimate is mostly rounding.

@@ -6,21 +6,55 @@ import pytest
 import withe
 
 
-@pytest.mark.parametrize("friction_model", ["anchored", "implicit", "lagged", "semi_explicit"])
-@pytest.mark.parametrize("model", ["imcv2", "barrier"])
-def test_a_dropped_cable_comes_to_rest_for_a_minute(model, friction_model):
-    """.5 m long, 5 mm thick, yawed by 10 degrees against the axes; kinetic energy falls to rounding of the weight's."""
+def dropped(friction=0.4, model="imcv2", friction_model="anchored", restitution=1.0, **build):
+    """.5 m long, 5 mm thick, 5 cm up, yawed by 10 degrees against the axes; and the energy that it will fall by."""
     rubber = withe.Material(youngs_modulus=1e6, poisson_ratio=0.5, density=1200.0)
     yaw, middle = np.radians(10.0), np.array([0.0, 0.0, 0.05])
     half = 0.25 * np.array([np.cos(yaw), np.sin(yaw), 0.0])
     scene = withe.Scene()
     scene.add_rod(start=middle - half, end=middle + half, nodes=51, radius=5e-3, material=rubber)
-    scene.add_floor(friction=0.4)
-    scene.enable_contact(friction=0.4, model=model, friction_model=friction_model)
-    simulation = scene.build(integrator="backward_euler", time_step=5e-3)
-    fallen = simulation.energy().gravity
+    scene.add_floor(friction=friction, restitution=restitution)
+    scene.enable_contact(friction=friction, model=model, friction_model=friction_model, restitution=restitution)
+    simulation = scene.build(time_step=5e-3, **build)
+    return simulation, simulation.energy().gravity * 0.9
+
+
+@pytest.mark.parametrize("friction_model", ["anchored", "implicit", "lagged", "semi_explicit"])
+@pytest.mark.parametrize("model", ["imcv2", "barrier"])
+def test_a_dropped_cable_comes_to_rest_for_a_minute(model, friction_model):
+    """Kinetic energy falls to rounding of the weight's."""
+    simulation, fallen = dropped(model=model, friction_model=friction_model, integrator="backward_euler")
     simulation.run(duration=5.0, progress=False)
-    fallen -= simulation.energy().gravity
     for _ in range(11):
         simulation.run(duration=5.0, progress=False)
         assert simulation.energy().kinetic < 1e-15 * fallen
+
+
+@pytest.mark.parametrize("restitution", [1.0, 0.5])
+@pytest.mark.parametrize("friction_model", ["anchored", "implicit"])
+@pytest.mark.parametrize("model", ["imcv2", "barrier"])
+def test_midpoint_steps_bring_it_to_rest_too(model, friction_model, restitution):
+    """It is so light that it rests within the tolerance of contact, in steps of full length."""
+    simulation, fallen = dropped(
+        model=model, friction_model=friction_model, restitution=restitution, integrator="implicit_midpoint"
+    )
+    kinetic = []
+    for end in (20.0, 40.0, 60.0):
+        simulation.run(duration=end - simulation.time, progress=False)
+        kinetic.append(simulation.energy().kinetic / fallen)
+    assert kinetic[-1] < 1e-12
+    assert kinetic[2] < 0.01 * kinetic[1] < 1e-4 * kinetic[0] or kinetic[1] < 1e-18  # what swings on an anchor decays
+    assert simulation.statistics.steps < 1.3 * 60.0 / 5e-3
+
+
+def test_without_friction_a_drop_loses_nothing_in_elastic_impacts():
+    simulation, fallen = dropped(friction=0.0, integrator="energy_momentum")
+    start = simulation.energy().total
+    top = 0.0
+    while simulation.time < 3.0:
+        simulation.step()
+        energy = simulation.energy()
+        top = max(top, float(simulation.positions()[:, 2].max())) if simulation.time > 2.0 else 0.0
+        assert energy.total + energy.dissipated == pytest.approx(start, abs=1e-6 * fallen)
+    assert energy.dissipated < 1e-9 * fallen
+    assert top == pytest.approx(0.05, abs=5e-4)

@@ -69,6 +69,20 @@ def test_restitution_is_what_it_says_at_any_step(integrator: Any, restitution: f
         assert reached == pytest.approx(restitution**2, abs=0.02)
 
 
+def test_restitution_is_of_the_work_that_presses_surfaces_together() -> None:
+    """Weight works over the depth p too: v1^2 = e^2 v0^2 - (1 - e^2) 2 g p [Stronge 1990]."""
+    for radius, height, restitution in ((5e-3, 2e-3, 0.5), (0.02, 2e-3, 0.5), (0.02, 2e-3, 0.8)):
+        simulation, rod, fall = falling(radius, height, 1e-4, "energy_momentum", restitution=restitution)
+        heights = []
+        while simulation.time < 1.4 * fall * (1.0 + restitution):
+            simulation.step()
+            heights.append(float(simulation.positions(rod)[:, 2].mean()) - radius)
+        lowest = int(np.argmin(heights[: int(1.4 * fall / 1e-4)]))
+        depth, rise = -heights[lowest], max(heights[lowest:])
+        assert depth > 0.02 * height
+        assert rise == pytest.approx(restitution**2 * (height + depth) - depth, rel=0.01)
+
+
 def test_steps_that_outlast_an_impact_that_gives_nothing_back_are_not_cut() -> None:
     # A sheet of paper that falls flat: edges swing on their contacts in microseconds, of which nobody wants to know.
     scene = withe.Scene()

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import withe
-from withe.folding import Noise, Paper, SimulatedSheet, plan
+from withe.folding import Jaw, Noise, Paper, SimulatedSheet, plan
 
 ROOM = Path(__file__).resolve().parents[2] / "python" / "withe" / "folding"
 COARSE = {"edges": 75, "time_step": 0.02}
@@ -123,10 +123,11 @@ def test_friction_of_a_table_varies_from_place_to_place(a4):
 def pulled(sheet: SimulatedSheet) -> tuple[np.ndarray, float]:
     """Places of the nodes beyond the jaw that pulls a sheet back over the table, and its tension there."""
     seen = []
+    first = int(np.searchsorted(sheet.positions()[:, 0], sheet.jaw.depth))
 
     def motions():
         yield still([(0, 0, 0), (-0.02, 0, 0)])
-        seen.append((sheet.positions()[sheet._held :, 0], sheet.simulation.tensions(sheet.rod)[sheet._held]))
+        seen.append((sheet.positions()[first:, 0], sheet.simulation.tensions(sheet.rod)[first]))
 
     sheet.carry_out(motions(), 0.297, progress=False)
     return seen[0]
@@ -161,7 +162,10 @@ def test_motions_follow_each_other_and_are_asked_for_in_time(a4):
         seen.append((sheet.simulation.time, sheet.positions()[0, 2]))
 
     found = sheet.carry_out(motions(), 0.297, progress=False)
-    assert seen == [(pytest.approx(1.0), pytest.approx(0.02)), (pytest.approx(2.0), pytest.approx(0.01))]
+    assert [time for time, _ in seen] == pytest.approx([1.0, 2.0])
+    weight = 9.81 * 800.0 * a4.thickness * a4.width * a4.length
+    yields = weight / sheet.jaw.stiffness[0]  # of which the jaw carries a part
+    assert [height for _, height in seen] == pytest.approx([0.02, 0.01], abs=yields)
     assert found.record.times[-1] == pytest.approx(2.5)
 
 
@@ -195,3 +199,33 @@ def test_a_sheet_of_nonsense_is_refused(arguments, message):
 
 def test_a_sheet_is_part_of_the_package():
     assert withe.folding.SimulatedSheet is SimulatedSheet
+
+
+@pytest.mark.parametrize("force_limit", [20.0, 1.5])
+@pytest.mark.parametrize("case", ["flat", "tilted", "folded"])
+def test_a_jaw_that_comes_too_low_yields_and_rests_on_the_table(a4, half, case, force_limit):
+    """It presses by its stiffness times how much too low it is, up to its limit, and no step is cut for it."""
+    stiffness, low = 2e3, 1e-3
+    sheet = SimulatedSheet(a4, jaw=Jaw(stiffness=(stiffness, 10.0), force_limit=force_limit))
+    angle = 0.4 if case == "tilted" else 0.0
+    above, below = (0.02, 0.03, angle), (0.02, 0.01 * np.sin(angle) - low, angle)
+    motions = [still([(0, 0, 0), (0.02, 0.06, 0.5 * angle), above, below, below])]
+    if case == "folded":
+        x, _, z, _, sine, _, cosine = half.poses[-1]
+        angle = 2.0 * np.arctan2(sine, cosine)
+        motions = [half, still([(x, z, angle), (x, z - low, angle), (x, z - low, angle)])]
+    found = sheet.carry_out(motions, 0.1485, progress=False)
+    assert found.failure is None
+    simulation, positions = sheet.simulation, sheet.positions()
+    assert simulation.statistics.rejected_steps == 0
+    assert simulation.statistics.steps == round(simulation.time / 0.01)
+    assert positions[:, 2].min() > -0.1 * a4.thickness  # the table has not given way
+    force, held = simulation.wrench("jaw").force, simulation.deflection("jaw")
+    size, shift = np.linalg.norm(force), np.linalg.norm(held.shift + held.slip)
+    assert size == pytest.approx(min(stiffness * shift, force_limit), rel=1e-6)
+    assert size <= force_limit * (1.0 + 1e-12)
+    # The plan of a fold ends with a finger's thickness between the layers.
+    assert shift > (low - sheet.jaw.finger if case == "folded" else low) * 0.99
+    assert -force[2] > 0.95 * size
+    if case == "flat":
+        assert shift == pytest.approx(low, rel=0.02)

@@ -69,7 +69,7 @@ class Touching:
         zero = np.zeros((len(sim.positions()) - NODES, 3))
         yield (arm, "youngs_modulus"), 1.0, lambda h: sim.set(arm, youngs_modulus=1e6 + h), 30.0
         yield (arm, "density"), 1.0, lambda h: sim.set(arm, density=1200.0 + h), 0.03
-        yield "gravity", np.array([0, 0, 1.0]), lambda h: sim.set(None, gravity=(0, 0, -9.81 + h)), 1e-3
+        yield "gravity", np.array([0, 0, 1.0]), lambda h: sim.set(None, gravity=(0, 0, -9.81 + h)), 4e-4
         moved = np.concatenate([ways[0], zero])
         yield "initial_velocities", moved, lambda h: sim.set_velocities(arm, self.velocity + h * ways[0]), 2e-6
         moved = np.concatenate([ways[1], zero])

@@ -22,12 +22,14 @@ __all__ = [
     "SPACING",
     "WIDE",
     "Grid",
+    "IndexArray",
     "Network",
     "Solve",
     "gentle",
     "lift",
     "make_grid",
     "make_network",
+    "nodes_near",
     "shortest_path",
 ]
 
@@ -157,14 +159,21 @@ def _weights(lengths: FloatArray, first: FloatArray | float, second: FloatArray 
     return np.asarray(lengths * (0.5 * (first + second) + _LEAST_COST))
 
 
+def _away(grid: Grid, end: Elastica) -> FloatArray:
+    return np.asarray(np.hypot(grid.pose.x - end.x[0], grid.pose.z - end.z[0]))
+
+
+def nodes_near(network: Network, end: Elastica) -> IndexArray:
+    """Blocks around a pose that may be passed."""
+    near = network.allowed & (_away(network.grid, end) < 1.5 * network.grid.spacing)
+    near[: network.grid.lifts] = False
+    return np.flatnonzero(near)
+
+
 def _links(network: Network, end: Elastica) -> tuple[IndexArray, FloatArray]:
     """Blocks around a pose, and the cost of the way to each."""
-    grid = network.grid
-    away = np.hypot(grid.pose.x - end.x[0], grid.pose.z - end.z[0])
-    near = network.allowed & (away < 1.5 * grid.spacing)
-    near[: grid.lifts] = False
-    nodes = np.flatnonzero(near)
-    return nodes, _weights(away[nodes], network.cost[nodes], float(end.force_ratio[0]))
+    nodes = nodes_near(network, end)
+    return nodes, _weights(_away(network.grid, end)[nodes], network.cost[nodes], float(end.force_ratio[0]))
 
 
 def shortest_path(network: Network, start: Elastica | None, goal: Elastica) -> Elastica | None:

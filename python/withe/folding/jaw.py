@@ -26,26 +26,37 @@ class Jaw:
         Thickness of either finger.
     reach : float [m]
         Length of the fingers beyond the sheet's edge, to where the gripper is out of the way.
+    stiffness : (float, float) [N/m, N m/rad]
+        With which the fingers hold the sheet in place, and against turning in them: a jaw that comes too low yields,
+        and rests on the table.
+    force_limit : float [N]
+        With which they press on the table at most; beyond it the sheet slips in the jaw.
 
     Raises
     ------
     ValueError
-        A size that is negative.
+        A size that is negative, a stiffness or a force limit that is not positive.
 
     Examples
     --------
     >>> import withe
     >>> withe.folding.Jaw(depth=0.01, finger=0.001)
-    Jaw(depth=0.01, finger=0.001, reach=0.06)
+    Jaw(depth=0.01, finger=0.001, reach=0.06, stiffness=(2000.0, 10.0), force_limit=10.0)
     """
 
     depth: float = 0.01
     finger: float = 5e-4
     reach: float = 0.06
+    stiffness: tuple[float, float] = (2e3, 10.0)
+    force_limit: float = 10.0
 
     def __post_init__(self) -> None:
         for name in ("depth", "finger", "reach"):
             object.__setattr__(self, name, validation.non_negative(getattr(self, name), name))
+        along, about = self.stiffness
+        pair = validation.positive(along, "stiffness along"), validation.positive(about, "stiffness about")
+        object.__setattr__(self, "stiffness", pair)
+        object.__setattr__(self, "force_limit", validation.positive(self.force_limit, "force_limit"))
 
     def clearance(self, x: FloatArray, z: FloatArray, angle: FloatArray, side: str) -> FloatArray:
         """Height of the lowest point of the fingers over the table [m], the sheet's outer edge being at (x, z).

@@ -61,9 +61,9 @@ class JawMotion:
         Greatest of the edge so far.
     """
 
-    def __init__(self, motions: Iterable[Motion], drawn: Drawn, depth: float, thickness: float) -> None:
+    def __init__(self, motions: Iterable[Motion], drawn: Drawn) -> None:
         self._motions: Iterator[Any] = iter(motions)
-        self._drawn, self._depth, self._thickness = drawn, depth, thickness
+        self._drawn = drawn
         self._way = _Way(next(self._motions), 0.0, np.zeros(3))
         self._comes_in = _COMES_IN * (self._way.times[-1] - self._way.times[0])
         self.speed = self._way.speed
@@ -83,8 +83,5 @@ class JawMotion:
         return True
 
     def __call__(self, time: float) -> FloatArray:
-        """Pose of the outer edge at a time: x, z [m], angle. The table stops the jaw, and so does the sheet on it."""
-        x, z, angle = self._way(time) + self._drawn.off(time, min(1.0, time / self._comes_in))
-        lowest = z - max(0.0, self._depth * np.sin(angle))
-        under = self._thickness if angle > 0.5 * np.pi else 0.0
-        return np.array([x, z + max(0.0, under - lowest), angle])
+        """Pose of the outer edge at a time: x, z [m], angle. What the jaw holds is there if no table is."""
+        return self._way(time) + self._drawn.off(time, min(1.0, time / self._comes_in))

@@ -4,17 +4,29 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import lru_cache
+from heapq import heappop, heappush
 
 import numpy as np
 import numpy.typing as npt
 
-from withe.folding.grid import Network, Solve, gentle, lift, make_grid, make_network, shortest_path
+from withe.folding.grid import (
+    IndexArray,
+    Network,
+    Solve,
+    gentle,
+    lift,
+    make_grid,
+    make_network,
+    nodes_near,
+    shortest_path,
+)
 from withe.folding.sheets import SHORTEST, Elastica, at_forces, join, poses_of, slides_to_rest, take
 
 __all__ = ["goal_pose", "greedy", "least_slide", "smoothed", "uniform_cost"]
 
 FloatArray = npt.NDArray[np.float64]
 _MOST_STEPS = 2000
+_ROOM = 2e-3  # of a path on which the sheet slides least, for it to be short [Lgb]
 
 
 def goal_pose(solve: Solve, x: float, z: float, depth: float, finger: float) -> Elastica | None:
@@ -67,33 +79,61 @@ def least_slide(
     nearer end of that; so what a path slides is the farthest of these ends from 0.
     """
     grid = make_grid(solve)
-    slide, allowed = _needed_slide(solve, length, friction), _allowed(solve, length)
-    cost = 1.0 + 0.4 * grid.pose.max_curvature
-    low, high = 0.0, float(slide[allowed & np.isfinite(slide)].max())
+    cost, allowed = 1.0 + 0.4 * grid.pose.max_curvature, _allowed(solve, length)
+    network = make_network(grid, cost, allowed)
+    begin = np.array([0]) if start is None else nodes_near(network, start)
+    within = _needed_slides(solve, length, friction).spread(network, begin, nodes_near(network, goal))
+    return None if within is None else shortest_path(make_network(grid, cost, within), start, goal)
 
-    def within(bound: float) -> Elastica | None:
-        return shortest_path(make_network(grid, cost, allowed & (slide <= bound)), start, goal)
 
-    best = within(0.0)
-    if best is not None:
-        return best
-    best = within(high)
-    while best is not None and high - low > 2e-3:
-        middle = 0.5 * (low + high)
-        nodes = within(middle)
-        low, high, best = (middle, high, best) if nodes is None else (low, middle, nodes)
-    return best
+class _NeededSlides:
+    """How far a sheet must have slid at nodes of the grid, for friction to hold it there [Lgb]; found where asked for.
+
+    Most nodes are of no concern to a path, and sheets that snap, whose slide has no end, take long.
+    """
+
+    def __init__(self, pose: Elastica, friction: float, length: float) -> None:
+        self._pose, self._friction, self._length = pose, friction, length
+        ratio = np.abs(pose.tangential_force) / (pose.normal_force + length - pose.suspended)
+        self._slide = np.where(ratio > friction, np.nan, 0.0)
+
+    def at(self, nodes: IndexArray) -> FloatArray:
+        """Infinite where the sheet snaps."""
+        unknown = nodes[np.isnan(self._slide[nodes])]
+        if len(unknown):
+            self._slide[unknown] = slides_to_rest(take(self._pose, unknown), self._friction, self._length)
+        return self._slide[nodes]
+
+    def spread(self, network: Network, begin: IndexArray, ends: IndexArray) -> npt.NDArray[np.bool_] | None:
+        """Nodes that are reached without a greater slide than the least at which one of the ends is; None if none is.
+
+        Always on from those of least slide, as Prim's algorithm goes; all of those that are no worse at a time.
+        """
+        first, neighbours = network.graph.indptr, network.graph.indices
+        seen, reached = np.zeros((2, len(network.allowed)), dtype=bool)
+        waiting: list[tuple[float, int]] = []
+        bound, found, next_nodes = 0.0, False, begin
+        while True:
+            new = next_nodes[~seen[next_nodes]]
+            seen[new] = True
+            for slide, node in zip(self.at(new), new, strict=True):
+                if np.isfinite(slide):
+                    heappush(waiting, (float(slide), int(node)))
+            if not waiting or (found and waiting[0][0] > bound):
+                return reached if found else None
+            bound = max(bound, waiting[0][0])
+            wave = []
+            while waiting and waiting[0][0] <= bound:
+                wave.append(heappop(waiting)[1])
+            reached[wave] = True
+            if not found and np.isin(wave, ends).any():
+                found, bound = True, bound + _ROOM
+            next_nodes = np.unique(np.concatenate([neighbours[first[node] : first[node + 1]] for node in wave]))
 
 
 @lru_cache(maxsize=8)
-def _needed_slide(solve: Solve, length: float, friction: float) -> FloatArray:
-    """How far a sheet must have slid at each node of the grid, for friction to hold it there [Lgb]."""
-    pose = make_grid(solve).pose
-    ratio = np.abs(pose.tangential_force) / (pose.normal_force + length - pose.suspended)
-    slide = np.zeros(len(ratio))
-    slides = _allowed(solve, length) & (ratio > friction)
-    slide[slides] = slides_to_rest(take(pose, slides), friction, length)
-    return slide
+def _needed_slides(solve: Solve, length: float, friction: float) -> _NeededSlides:
+    return _NeededSlides(make_grid(solve).pose, friction, length)
 
 
 def greedy(solve: Solve, length: float, goal: Elastica) -> Elastica | None:

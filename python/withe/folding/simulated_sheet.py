@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -149,21 +149,18 @@ class SimulatedSheet:
             friction=paper.friction * self._drawn.friction,
         )
         scene = Scene(gravity=9.81 * np.array([np.sin(self._drawn.tilt), 0.0, -np.cos(self._drawn.tilt)]))
-        held = max(1, round(edges * self.jaw.depth / paper.length))
-        self._places = np.concatenate(
-            [
-                np.linspace(0.0, self.jaw.depth, held + 1),
-                np.linspace(self.jaw.depth, paper.length, edges - held + 1)[1:],
-            ]
-        )
-        self.rod = add_paper(scene, self.truth, self._places, self._drawn.curl)
+        self.rod = add_paper(scene, self.truth, _places(paper.length, self.jaw.depth, edges), self._drawn.curl)
         # Surfaces press on each other from a twentieth of the thickness on; a jaw at the sheet's height does not.
         scene.add_floor(-0.55 * paper.thickness, friction=self._friction(), restitution=0.0, name="table")
         scene.enable_contact(friction=validation.non_negative(own_friction, "own_friction"), restitution=0.0)
-        for i in range(held):
-            scene.pin(self.rod.node(i))
-        scene.clamp(self.rod.node(held))
-        self._held = held
+        scene.grasp(
+            self.rod,
+            at=0.5 * self.jaw.depth,
+            length=self.jaw.depth,
+            stiffness=self.jaw.stiffness,
+            force_limit=self.jaw.force_limit,
+            name="jaw",
+        )
         self.simulation: Simulation = scene.build(integrator="backward_euler", time_step=time_step, planar=True)
 
     def _friction(self) -> float | Callable[[FloatArray], FloatArray]:
@@ -279,7 +276,7 @@ class SimulatedSheet:
         """
         self.simulation.reset()
         self._grain = np.random.default_rng(self._seed)
-        jaw = JawMotion(motions, self._drawn, self.jaw.depth, self.paper.thickness)
+        jaw = JawMotion(motions, self._drawn)
         watch = _Watch(jaw, self.rod)
         self._follow(jaw)
         failure = None
@@ -298,20 +295,17 @@ class SimulatedSheet:
         return self._result(target, watch, failure)
 
     def _follow(self, jaw: JawMotion) -> None:
-        """Move all nodes that the jaw holds with it, and the direction at its inner edge."""
+        """Move the hand with the jaw: its place is the middle of what it holds."""
+        hand = self.simulation.hand("jaw")
+        flat, middle = hand.pose.rotation, 0.5 * self.jaw.depth
 
-        def path(place: float, turns: bool) -> Callable[[float], Any]:
-            def at(time: float) -> Any:
-                x, z, angle = jaw(time)
-                cosine, sine = np.cos(angle), np.sin(angle)
-                position = np.array([x + place * cosine, 0.0, z - place * sine])
-                rotation = np.array([[cosine, 0.0, sine], [0.0, 1.0, 0.0], [-sine, 0.0, cosine]])
-                return (position, rotation) if turns else position
+        def path(time: float) -> tuple[FloatArray, FloatArray]:
+            x, z, angle = jaw(time)
+            cosine, sine = np.cos(angle), np.sin(angle)
+            turn = np.array([[cosine, 0.0, sine], [0.0, 1.0, 0.0], [-sine, 0.0, cosine]])
+            return np.array([x + middle * cosine, 0.0, z - middle * sine]), turn @ flat
 
-            return at
-
-        for i in range(self._held + 1):
-            self.simulation.move(self.rod.node(i), path=path(self._places[i], i == self._held))
+        hand.move(path=path)
 
     def _result(self, target: float, watch: _Watch, failure: str | None) -> Fold:
         positions = self.positions()
@@ -326,6 +320,16 @@ class SimulatedSheet:
             failure=failure,
             record=self.simulation.record,
         )
+
+
+def _places(length: float, depth: float, edges: int) -> FloatArray:
+    """Nodes along a sheet, so that the inner edge of the jaw is in the middle of an edge: that is how far it is held.
+
+    The direction of an edge is that of the sheet in its middle, to second order in its length.
+    """
+    held = max(0, round(edges * depth / length - 0.5))
+    last = depth * (held + 1.0) / (held + 0.5) if depth > 0.0 else length / edges
+    return np.concatenate([np.linspace(0.0, last, held + 2), np.linspace(last, length, edges - held)[1:]])
 
 
 class _Watch:

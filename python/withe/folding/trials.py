@@ -80,6 +80,8 @@ class Outcome:
     trial : Trial
     gravito_bending_length : float [m]
         As it was measured.
+    needed_friction : float
+        Least friction with which the sheet would not slide on the way that was planned; NaN where there is none.
     error, length, slide : float [m]
     max_curvature : float [1/m]
         As those of `Fold`; NaN where there was no plan.
@@ -91,6 +93,7 @@ class Outcome:
 
     trial: Trial
     gravito_bending_length: float = np.nan
+    needed_friction: float = np.nan
     error: float = np.nan
     length: float = np.nan
     slide: float = np.nan
@@ -191,6 +194,7 @@ def _carried_out(trial: Trial) -> Outcome:
             planned = plan(replace(trial.paper, gravito_bending_length=measured), trial.target, **trial.planner)
     except ValueError as error:
         return replace(outcome, failure=f"no plan: {error}")
+    outcome = replace(outcome, needed_friction=float(np.nanmax(planned.slip_ratio)))
     try:
         if trial.replans:
             done = fold(planned, sheet, replans=trial.replans, progress=False)

@@ -231,10 +231,11 @@ class Contacts:
         work as contact stores [Gonzalez 1996; Laursen and Chawla 1997], so that those with obstacles are elastic at any
         time step; rods that cross lose some per cent in steps as long as the impact, and less in shorter ones. Backward
         Euler, and "lagged" and "semi_explicit" friction, lose most of an impact shorter than a few steps, and nothing
-        in the limit of short ones. With a
-        restitution e below 1 contact gives back e^2 of the energy that it took; steps are cut until an impact is
-        resolved, unless ``adaptive=False``. Rods shake within after an impact, so that as a whole they part more slowly
-        than e says. Surfaces that meet more slowly than sqrt(g r / 100), r the smaller radius, or than the slip
+        in the limit of short ones. A restitution e below 1 is the energetic coefficient: contact gives back e^2 of the
+        work that pressed it together [Stronge 1990, Proc. R. Soc. A 431]; steps are cut until an impact is resolved,
+        unless ``adaptive=False``. Weight works over the depth p too, v1^2 = e^2 v0^2 - (1 - e^2) 2 g p, which is no
+        longer e v0 for falls of some depths only. Rods shake within after an impact, so that as a whole they part more
+        slowly than e says. Surfaces that meet more slowly than sqrt(g r / 100), r the smaller radius, or than the slip
         tolerance, rest on each other, and so do those that stay in contact for longer than an impact lasts. What
         contact takes for good is part of `Simulation.energy().dissipated`, and what it stores is `.contact`.
         Contact and friction between rods in flight keep their momenta in implicit midpoint and energy-momentum steps;

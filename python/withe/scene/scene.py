@@ -257,7 +257,8 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
             steps that would gain more than a thousandth of the energy are taken as energy-momentum ones, which are
             as accurate there or more so; `statistics.energy_momentum_steps` counts them.
         tolerance : float [m]
-            Cut steps so that the error of positions stays below it, over `duration`.
+            Cut steps so that the error of positions stays below it, over `duration`. A fifth of it is kept for events
+            such as impacts, in which steps go by the error of each rather than by that per unit of time.
         planar : bool
             Force two or three dimensions; by default a scene that lies in a plane is solved in it. A
             straight scene without gravity lies in many, and ``True`` takes that of its first director.
