@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import sys
 from dataclasses import replace
+from functools import partial
 from itertools import product
 
 import numpy as np
@@ -31,15 +32,15 @@ from withe.errors import ConvergenceError
 WAYS = ("exact", "intuitive")
 PUBLISHED = {"S": "9, 0", "U": "9, 0", "trefoil": "9, 0", "reef": "7, 0"}  # of 10: optimal, intuitive
 GOALS = {"S": 0.9, "U": 0.9, "trefoil": 0.9, "reef": 0.7}
-NODES = 130
+NODES, QUICK_NODES = 130, 60
 RULER = 5e-4  # [m], standard deviation
 
 
-def placed(letter: str, way: str, seed: int, noise: float) -> tuple[bool, str]:
+def placed(letter: str, way: str, seed: int, noise: float, nodes: int = NODES) -> tuple[bool, str]:
     """Whether every post was passed on its right side, and how many were."""
     static = noise == 0.0 and way != "intuitive"
     known = measured(Cable.dlo(5), seed) if noise else None
-    found = place_cable.laid(letter, way, NODES, known=known, seed=seed, noise=noise, static=static)
+    found = place_cable.laid(letter, way, nodes, known=known, seed=seed, noise=noise, static=static)
     return bool(found.passed.all()), f"{found.passed.sum()} of {len(found.passed)} posts"
 
 
@@ -71,7 +72,7 @@ class Knots:
 
 def tried(knots: Knots, use: str, way: str, trials: int, shown: Progress) -> tuple[str, str, str]:
     """Whether it succeeds without noise, in how many noisy trials, and what each came to."""
-    attempt = knots.tied if use in tie_knot.TYING else placed
+    attempt = knots.tied if use in tie_knot.TYING else partial(placed, nodes=knots.nodes)
     done, said = [], []
     for seed in range(trials + 1):
         try:
@@ -92,11 +93,11 @@ def main() -> None:
         ("--uses", {"nargs": "*", "choices": tuple(GOALS), "default": list(GOALS)}),
         ("--ways", {"nargs": "*", "choices": WAYS, "default": list(WAYS)}),
     )
-    uses, ways, trials = options.uses, options.ways, options.trials
+    uses, ways, trials, nodes = options.uses, options.ways, options.trials, NODES
     if options.quick:
-        uses, ways, trials = ["trefoil"], ["exact"], 0
+        uses, ways, trials, nodes = ["U"], ["exact"], 0, QUICK_NODES
     report = Report("deployment_uses", quick=options.quick)
-    knots = Knots(90 if options.quick else NODES)
+    knots = Knots(nodes)
     rows: list[tuple] = []
     with bar(len(uses) * len(ways) * (1 + trials), "trying", "trials") as shown:
         try:
