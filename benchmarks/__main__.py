@@ -36,6 +36,7 @@ NAMES = (
     "deployment_uses",
     "folding",
     "folding_trials",
+    "folding_spin",
     "folding_replay",
 )
 

@@ -44,6 +44,7 @@ def run(name, folder, *arguments):
         "deployment_uses",
         "folding",
         "folding_trials",
+        "folding_spin",
         "folding_replay",
         pytest.param("rl_throughput", marks=pytest.mark.skipif(not HAVE_GYMNASIUM, reason="needs gymnasium")),
     ],

@@ -23,6 +23,7 @@ from withe.folding.sheet_network import SheetNetwork
 from withe.folding.sheets import Elastica
 from withe.folding.simulated_sheet import Fold, SimulatedSheet
 from withe.folding.trials import Outcome, Trial, run_trials
+from withe.folding.wide_sheet import WideFold, WideSheet
 
 __all__ = [
     "Elastica",
@@ -37,6 +38,8 @@ __all__ = [
     "SheetNetwork",
     "SimulatedSheet",
     "Trial",
+    "WideFold",
+    "WideSheet",
     "droop",
     "elastica",
     "find_edge",

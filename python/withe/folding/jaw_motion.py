@@ -10,8 +10,9 @@ import numpy.typing as npt
 
 from withe.common import validation
 from withe.folding.noise import Drawn
+from withe.simulation.hands import RunningHand
 
-__all__ = ["JawMotion", "Motion"]
+__all__ = ["JawMotion", "Motion", "lead"]
 
 FloatArray = npt.NDArray[np.float64]
 _COMES_IN = 0.1  # of the first motion, over which the jaw's errors grow
@@ -85,3 +86,16 @@ class JawMotion:
     def __call__(self, time: float) -> FloatArray:
         """Pose of the outer edge at a time: x, z [m], angle. What the jaw holds is there if no table is."""
         return self._way(time) + self._drawn.off(time, min(1.0, time / self._comes_in))
+
+
+def lead(hand: RunningHand, jaw: JawMotion, depth: float, y: float = 0.0) -> None:
+    """Move a hand with a jaw that holds `depth` of a flat sheet, at y: the hand's place is the middle of that."""
+    flat, middle = hand.pose.rotation, 0.5 * depth
+
+    def path(time: float) -> tuple[FloatArray, FloatArray]:
+        x, z, angle = jaw(time)
+        cosine, sine = np.cos(angle), np.sin(angle)
+        turn = np.array([[cosine, 0.0, sine], [0.0, 1.0, 0.0], [-sine, 0.0, cosine]])
+        return np.array([x + middle * cosine, y, z - middle * sine]), turn @ flat
+
+    hand.move(path=path)

@@ -13,7 +13,7 @@ from withe.common import validation
 from withe.common.progress import progress as progress_bar
 from withe.errors import ConvergenceError
 from withe.folding.jaw import Jaw
-from withe.folding.jaw_motion import JawMotion, Motion
+from withe.folding.jaw_motion import JawMotion, Motion, lead
 from withe.folding.noise import Drawn, Noise
 from withe.folding.paper import Paper
 from withe.folding.paper_rods import add_paper
@@ -24,12 +24,12 @@ from withe.recording.record import Record
 from withe.scene.scene import Scene
 from withe.simulation.simulation import Simulation
 
-__all__ = ["Fold", "SimulatedSheet"]
+__all__ = ["FAST", "SETTLING", "SNAP", "Fold", "FoldingMotion", "SimulatedSheet", "node_places"]
 
 FloatArray = npt.NDArray[np.float64]
-_SETTLING = 0.5  # after the last motion [s]
-_SNAP = 10.0  # times as fast as the jaw is no folding any more,
-_FAST = 0.2  # where it is faster than this [m/s]
+SETTLING = 0.5  # after the last motion [s]
+SNAP = 10.0  # times as fast as the jaw is no folding any more,
+FAST = 0.2  # where it is faster than this [m/s]
 _LONGEST = 600.0  # [s]
 _FRAMES = 0.05  # [s]
 
@@ -149,7 +149,7 @@ class SimulatedSheet:
             friction=paper.friction * self._drawn.friction,
         )
         scene = Scene(gravity=9.81 * np.array([np.sin(self._drawn.tilt), 0.0, -np.cos(self._drawn.tilt)]))
-        self.rod = add_paper(scene, self.truth, _places(paper.length, self.jaw.depth, edges), self._drawn.curl)
+        self.rod = add_paper(scene, self.truth, node_places(paper.length, self.jaw.depth, edges), self._drawn.curl)
         # Surfaces press on each other from a twentieth of the thickness on; a jaw at the sheet's height does not.
         scene.add_floor(-0.55 * paper.thickness, friction=self._friction(), restitution=0.0, name="table")
         scene.enable_contact(friction=validation.non_negative(own_friction, "own_friction"), restitution=0.0)
@@ -278,9 +278,9 @@ class SimulatedSheet:
         self._grain = np.random.default_rng(self._seed)
         jaw = JawMotion(motions, self._drawn)
         watch = _Watch(jaw, self.rod)
-        self._follow(jaw)
+        lead(self.simulation.hand("jaw"), jaw, self.jaw.depth)
         failure = None
-        with progress_bar(duration + _SETTLING, "folding", progress) as bar:
+        with progress_bar(duration + SETTLING, "folding", progress) as bar:
 
             def ended(simulation: Simulation) -> bool:
                 bar.update(simulation.time)
@@ -293,19 +293,6 @@ class SimulatedSheet:
         if watch.snapped:
             failure = f"snapped at {self.simulation.time:.2f} s"
         return self._result(target, watch, failure)
-
-    def _follow(self, jaw: JawMotion) -> None:
-        """Move the hand with the jaw: its place is the middle of what it holds."""
-        hand = self.simulation.hand("jaw")
-        flat, middle = hand.pose.rotation, 0.5 * self.jaw.depth
-
-        def path(time: float) -> tuple[FloatArray, FloatArray]:
-            x, z, angle = jaw(time)
-            cosine, sine = np.cos(angle), np.sin(angle)
-            turn = np.array([[cosine, 0.0, sine], [0.0, 1.0, 0.0], [-sine, 0.0, cosine]])
-            return np.array([x + middle * cosine, 0.0, z - middle * sine]), turn @ flat
-
-        hand.move(path=path)
 
     def _result(self, target: float, watch: _Watch, failure: str | None) -> Fold:
         positions = self.positions()
@@ -322,7 +309,7 @@ class SimulatedSheet:
         )
 
 
-def _places(length: float, depth: float, edges: int) -> FloatArray:
+def node_places(length: float, depth: float, edges: int) -> FloatArray:
     """Nodes along a sheet, so that the inner edge of the jaw is in the middle of an edge: that is how far it is held.
 
     The direction of an edge is that of the sheet in its middle, to second order in its length.
@@ -345,7 +332,7 @@ class _Watch:
         speed = float(np.linalg.norm(simulation.velocities(self._rod), axis=1).max())
         self.max_speed = max(self.max_speed, speed)
         self.max_curvature = max(self.max_curvature, float(np.abs(simulation.curvatures(self._rod)).max()))
-        self.snapped = speed > max(_SNAP * self._jaw.speed, _FAST)
+        self.snapped = speed > max(SNAP * self._jaw.speed, FAST)
         if self._end is None and simulation.time > self._jaw.end - 1e-9 and not self._jaw.go_on():
-            self._end = self._jaw.end + _SETTLING
+            self._end = self._jaw.end + SETTLING
         return self.snapped or (self._end is not None and simulation.time > self._end - 1e-9)

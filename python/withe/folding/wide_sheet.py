@@ -1,0 +1,235 @@
+"""A sheet that is wide: two strips side by side, joined at their ends, that may slide by different ways.
+
+Knows no planner, nor the equilibria that planners know.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from withe.common import validation
+from withe.common.progress import progress as progress_bar
+from withe.errors import ConvergenceError
+from withe.folding.jaw import Jaw
+from withe.folding.jaw_motion import JawMotion, lead
+from withe.folding.noise import Drawn, Noise
+from withe.folding.paper import Paper
+from withe.folding.paper_rods import strip_numbers
+from withe.folding.simulated_sheet import FAST, SETTLING, SNAP, FoldingMotion, node_places
+from withe.parts.handles import Rod
+from withe.parts.materials import Stiffness
+from withe.recording.record import Record
+from withe.scene.scene import Scene
+from withe.simulation.simulation import Simulation
+
+__all__ = ["WideFold", "WideSheet"]
+
+FloatArray = npt.NDArray[np.float64]
+_IN_PLANE = 1e3  # times as stiff in its plane as out of it is a strip; more changes no spin by a hundredth of a degree
+_TWIST = 1.5  # G J / EI of a flat strip, Poisson's ratio 1/3
+_CROSS_WEIGHT = 0.05  # of what joins the far ends, per length, over that of a strip
+_FRAMES = 0.05  # [s]
+
+
+@dataclass(frozen=True)
+class WideFold:
+    """What became of a fold of a wide sheet.
+
+    Attributes
+    ----------
+    error : float [m]
+        Of the length from the lifted edge to the crease, mean of both sides, as that of `Fold`.
+    length : float [m]
+    slides : ndarray of shape (2,) [m]
+        How far the far end of either strip has slid along x, that of less y first.
+    spin : float [rad]
+        Angle of the crease to where it should be, by the lengths of both sides: positive where that of less y is
+        longer [dissertation, 7.8.4].
+    failure : str or None
+        Why it is no fold.
+    record : Record
+        Of rods "strip 0" and "strip 1".
+    """
+
+    error: float
+    length: float
+    slides: FloatArray
+    spin: float
+    failure: str | None
+    record: Record
+
+
+class WideSheet:
+    """Two strips of a sheet on a table, joined at their far ends and held by one jaw: what slides unevenly turns.
+
+    As `SimulatedSheet`, in space. Each strip is a rod with half of the sheet's width, at the middle of its half, and
+    rubs on the table with a coefficient of its own. What joins their far ends weighs next to nothing.
+
+    Parameters
+    ----------
+    paper : Paper
+    seed : int
+    noise : Noise, optional
+        `friction_variation` is not for wide sheets: their tables are even along x.
+    unevenness : float
+        Standard deviation, relative, of half the difference between the strips' coefficients; at most twice that.
+    jaw : Jaw, optional
+    edges : int
+        Of each strip.
+    time_step : float [s]
+        Of backward Euler.
+    own_friction : float
+        Of a strip on itself.
+
+    Attributes
+    ----------
+    paper, truth : Paper
+    frictions : ndarray of shape (2,)
+        On the table, of either strip.
+    simulation : Simulation
+    strips : tuple of two Rod
+
+    Raises
+    ------
+    ValueError
+        Not a paper, numbers out of range.
+
+    Examples
+    --------
+    >>> import withe
+    >>> sheet = withe.folding.WideSheet(withe.folding.Paper.a4(), seed=1)
+    >>> folded = sheet.fold(withe.folding.plan(sheet.paper))  # doctest: +SKIP
+    >>> print(f"{np.degrees(folded.spin):.2f} degrees")  # doctest: +SKIP
+    """
+
+    def __init__(
+        self,
+        paper: Paper,
+        seed: int = 0,
+        noise: Noise | None = None,
+        *,
+        unevenness: float = 0.1,
+        jaw: Jaw | None = None,
+        edges: int = 75,
+        time_step: float = 0.02,
+        own_friction: float = 0.3,
+    ) -> None:
+        if not isinstance(paper, Paper):
+            raise ValueError(f"paper must be a Paper, got {paper!r}")
+        if noise is not None and not isinstance(noise, Noise):
+            raise ValueError(f"noise must be a Noise, got {noise!r}")
+        seed = validation.integer(seed, "seed", 0, 2**63 - 1)
+        edges = validation.integer(edges, "edges", 20, 100_000)
+        uneven = validation.non_negative(unevenness, "unevenness")
+        if uneven > 0.5:
+            raise ValueError(f"unevenness must be .5 at most, or friction would be negative, got {uneven:g}")
+        self.paper, self.jaw = paper, Jaw() if jaw is None else jaw
+        self._drawn = Drawn.of(Noise.none() if noise is None else noise, seed)
+        self.truth = replace(
+            paper,
+            gravito_bending_length=paper.gravito_bending_length * self._drawn.gravito_bending_length,
+            friction=paper.friction * self._drawn.friction,
+        )
+        more = uneven * np.clip(np.random.default_rng((seed, 2)).normal(), -2.0, 2.0)
+        self.frictions = self.truth.friction * np.array([1.0 - more, 1.0 + more])
+        self._places = node_places(paper.length, self.jaw.depth, edges)
+        self._sides = np.array([-0.25, 0.25]) * paper.width
+        scene, self.strips = self._scene(validation.non_negative(own_friction, "own_friction"))
+        self.simulation: Simulation = scene.build(integrator="backward_euler", time_step=time_step)
+
+    def _scene(self, own_friction: float) -> tuple[Scene, tuple[Rod, Rod]]:
+        tilt, paper = self._drawn.tilt, self.paper
+        scene = Scene(gravity=9.81 * np.array([np.sin(tilt), 0.0, -np.cos(tilt)]))
+        line_density, bend, stretch = strip_numbers(replace(self.truth, width=0.5 * paper.width))
+        stiffness = Stiffness(stretch=stretch, bend=(_IN_PLANE * bend, bend), twist=_TWIST * bend)
+        zero, radius = np.zeros_like(self._places), 0.5 * paper.thickness
+        strips = tuple(
+            scene.add_rod(
+                points=np.stack([self._places, zero + y, zero], axis=1),
+                normal=(0.0, 1.0, 0.0),
+                radius=radius,
+                stiffness=stiffness,
+                line_density=line_density,
+                natural_curvature=(0.0, self._drawn.curl),
+                name=f"strip {i}",
+            )
+            for i, y in enumerate(self._sides)
+        )
+        rigid = Stiffness(stretch=stretch, bend=_IN_PLANE * bend, twist=_IN_PLANE * bend)
+        cross = scene.add_rod(
+            points=[(paper.length, y, 0.0) for y in np.linspace(self._sides[0], self._sides[1], 3)],
+            normal=(1.0, 0.0, 0.0),
+            radius=radius,
+            stiffness=rigid,
+            line_density=_CROSS_WEIGHT * line_density,
+            name="cross",
+        )
+        scene.join(strips[0].end, cross.start)
+        scene.join(strips[1].end, cross.end)
+        table = scene.add_floor(-0.55 * paper.thickness, friction=self.truth.friction, restitution=0.0, name="table")
+        scene.enable_contact(friction=own_friction, restitution=0.0)
+        for strip, friction in zip(strips, self.frictions, strict=True):
+            scene.set_friction(strip, table, float(friction))
+            scene.ignore_contact(strip, cross)
+            scene.grasp(
+                strip,
+                at=0.5 * self.jaw.depth,
+                length=self.jaw.depth,
+                stiffness=(0.5 * self.jaw.stiffness[0], 0.5 * self.jaw.stiffness[1]),
+                force_limit=0.5 * self.jaw.force_limit,
+                name=f"jaw on {strip.name}",
+            )
+        scene.ignore_contact(*strips)
+        scene.ignore_contact(cross, table)
+        return scene, (strips[0], strips[1])
+
+    def fold(self, plan: FoldingMotion, *, progress: bool = True) -> WideFold:
+        """Carry out a plan, from the flat sheet.
+
+        Parameters
+        ----------
+        plan : Plan
+            Or anything else with `times`, `poses` and `target` like those of a plan.
+        progress : bool
+            Whether to show a progress bar.
+
+        Returns
+        -------
+        WideFold
+
+        Raises
+        ------
+        ValueError
+            As `SimulatedSheet.fold`.
+        """
+        simulation = self.simulation
+        simulation.reset()
+        jaw = JawMotion([plan], self._drawn)
+        for strip, y in zip(self.strips, self._sides, strict=True):
+            lead(simulation.hand(f"jaw on {strip.name}"), jaw, self.jaw.depth, float(y))
+        end, failure = jaw.end + SETTLING, None
+        with progress_bar(end, "folding", progress) as bar:
+
+            def snapped(simulation: Simulation) -> bool:
+                bar.update(simulation.time)
+                speeds = [np.linalg.norm(simulation.velocities(strip), axis=1).max() for strip in self.strips]
+                return bool(max(speeds) > max(SNAP * jaw.speed, FAST))
+
+            try:
+                simulation.run(end, _FRAMES, progress=False, until=snapped)
+            except ConvergenceError as error:
+                failure = f"no solution: {error}"
+        if failure is None and simulation.time < end - 1e-9:
+            failure = f"snapped at {simulation.time:.2f} s"
+        return self._result(plan.target, failure)
+
+    def _result(self, target: float, failure: str | None) -> WideFold:
+        ends = [self.simulation.positions(strip)[[0, -1], 0] for strip in self.strips]
+        slides = np.array([far - self.paper.length for _, far in ends])
+        errors = 0.5 * (np.array([edge for edge, _ in ends]) - slides - target)
+        spin = np.arctan2(errors[0] - errors[1], self._sides[1] - self._sides[0])
+        error = float(errors.mean())
+        return WideFold(error, 0.5 * target + error, slides, float(spin), failure, self.simulation.record)
