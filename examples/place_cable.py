@@ -27,14 +27,26 @@ COLOURS = {"exact": "#3465a4", "intuitive": "#b2182b"}
 
 
 def laid(
-    letter: str, controller: str, nodes: int, *, seed: int = 0, noise: float = 0.0, static: bool = True
+    letter: str,
+    controller: str,
+    nodes: int,
+    *,
+    known: Cable | None = None,
+    seed: int = 0,
+    noise: float = 0.0,
+    static: bool = True,
 ) -> Deployment:
-    """The cable after it was placed, through equilibria or in time, and in a noisy trial."""
+    """The cable after it was placed, through equilibria or in time, without noise or in a noisy trial.
+
+    `known` is what the planner takes it for.
+    """
     turns, radii, straights, shares = LETTERS[letter]
     pattern, cable = Pattern.bends(turns, radii, straights, easing=EASING), Cable.dlo(5)
     posts = posts_along(pattern, cable, shares * pattern.length)
-    motion = plan(cable, pattern, controller, posts=posts, crossings="over")
-    return deploy(motion, floor=FRICTION, seed=seed, noise=noise, quasi_static=static, nodes=nodes, progress=False)
+    motion = plan(known or cable, pattern, controller, posts=posts, crossings="over")
+    return deploy(
+        motion, cable, floor=FRICTION, seed=seed, noise=noise, quasi_static=static, nodes=nodes, progress=False
+    )
 
 
 def draw(axes: object, letter: str, found: dict[str, Deployment]) -> None:

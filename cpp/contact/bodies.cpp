@@ -67,7 +67,8 @@ Proximity Bodies::proximity(const ContactPair& pair, const VectorX& q, bool whol
     p.curve = curve_distance(pair.piece, o, x);
     p.distance = p.curve.distance;
     p.points.s = p.curve.s;
-    p.normal = distance_to(o, curve_point(*pair.piece.weights, x, p.curve.s)).normal;
+    p.normal =
+        o.kind == ObstacleKind::plane ? o.other : distance_to(o, curve_point(*pair.piece.weights, x, p.curve.s)).normal;
     return p;
   }
   // Far apart by their middles: no need for more.

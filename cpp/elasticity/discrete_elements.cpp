@@ -296,6 +296,34 @@ Vector3 discrete_held_local(const Model& model, const TurnCoefficients& elastic,
   return -a.sign * to_eigen(a.m.moment);
 }
 
+Eigen::Matrix<double, 7, 3> discrete_held_spin(const Model& model, const TurnCoefficients& elastic,
+                                               const DiscreteStep& step, int edge, const AttachedStep& hold) {
+  Eigen::Matrix<double, 7, 3> out = Eigen::Matrix<double, 7, 3>::Zero();
+  if (model.planar()) {
+    // By the turn in the middle, of which that at the end is twice.
+    const Vec2<double> by_turn = 0.5 * planar_attached_forces(elastic, step, edge, hold).edge_frame;
+    for (int i = 0; i < 2; ++i) {
+      out.row(2 + i) = by_turn[i] * model.plane->normal.transpose();
+      out.row(i) = -out.row(2 + i);
+    }
+    return out;
+  }
+  Local unused;
+  clear(unused, 7, true);
+  const AttachedMoments a = put_attached_edge(elastic, step, edge, hold, true, unused);
+  const Mat3<double>& by_spin = hold.first ? a.m.by_a : a.m.by_b;
+  for (int axis = 0; axis < 3; ++axis) {
+    const Vec3d moment{a.sign * by_spin.row[0][axis], a.sign * by_spin.row[1][axis], a.sign * by_spin.row[2][axis]};
+    const Vec3d f = edge_force(a.edge, a.spin, moment);
+    out(3, axis) = a.edge.torque(moment);
+    for (int i = 0; i < 3; ++i) {
+      out(4 + i, axis) = f[i];
+      out(i, axis) = -f[i];
+    }
+  }
+  return out;
+}
+
 void discrete_stretch_local(const Model& model, const ElasticCoefficients& elastic, const DiscreteStep& step, int edge,
                             bool with_matrix, const double* given_force, Local& out) {
   const auto [force, modulus, inverse_mean] = mean_stretch(model, elastic, step.start, step.end, edge);

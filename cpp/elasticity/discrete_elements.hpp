@@ -51,5 +51,9 @@ struct AttachedStep {
 /// and head. Returns the moment on the frame, whose work is that over the Cayley vector of its turn.
 Vector3 discrete_held_local(const Model& model, const TurnCoefficients& elastic, const DiscreteStep& step, int edge,
                             const AttachedStep& hold, bool with_matrix, Local& out);
+/// How these rows, of tail, angle and head, or in a plane of tail and head, change as what the edge is attached to
+/// turns at the end of the step, by a rotation vector [N/rad], [N m/rad].
+Eigen::Matrix<double, 7, 3> discrete_held_spin(const Model& model, const TurnCoefficients& elastic,
+                                               const DiscreteStep& step, int edge, const AttachedStep& hold);
 
 }  // namespace withe

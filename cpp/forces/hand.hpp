@@ -35,9 +35,16 @@ inline CappedForce capped(const Vector3& elastic, double limit) {
   return {(limit / size) * elastic, limit / size};
 }
 
-/// Derivative of the force by u [N/m]: c (K - K n n^T K / (n . K n)) where it slips, n along the force. Exact for
-/// k1 = k2 = k3, else its symmetric part, nearly.
-inline Matrix3 capped_stiffness(const Vector3& stiffness, const CappedForce& f) {
+/// Derivative of the force by K u: c (I - n n^T) where it slips, c K u being the force and n along it.
+inline Matrix3 capped_slope(const CappedForce& f) {
+  if (f.share >= 1.0) return Matrix3::Identity();
+  const Vector3 n = f.force.normalized();
+  return f.share * (Matrix3::Identity() - n * n.transpose());
+}
+
+/// Derivative of the force by u [N/m], in its place a symmetric matrix where it slips: c (K - K n n^T K / (n . K n)).
+/// Exact for k1 = k2 = k3.
+inline Matrix3 symmetric_stiffness(const Vector3& stiffness, const CappedForce& f) {
   Matrix3 K = stiffness.asDiagonal();
   if (f.share >= 1.0) return K;
   const Vector3 n = f.force.normalized(), Kn = stiffness.cwiseProduct(n);

@@ -1,6 +1,8 @@
 #pragma once
 /// Finite rotations: exponential, logarithm, and the Cayley map with its derivative.
 
+#include <cmath>
+
 #include <Eigen/Geometry>
 
 #include "common/types.hpp"
@@ -18,6 +20,16 @@ inline Matrix3 rotation_exp(const Vector3& vector) {
   const double angle = vector.norm();
   if (angle < 1e-300) return Matrix3::Identity();
   return Eigen::AngleAxisd(angle, vector / angle).toRotationMatrix();
+}
+
+/// Spatial spin = rotation_spin(v) dv of exp(v): I + (1 - cos a) / a^2 V + (a - sin a) / a^3 V^2, a = |v|.
+inline Matrix3 rotation_spin(const Vector3& vector) {
+  const double square = vector.squaredNorm(), angle = std::sqrt(square);
+  const Matrix3 V = cross_matrix(vector);
+  const bool little = angle < 1e-3;
+  const double half = angle < 1e-8 ? 1.0 : std::sin(0.5 * angle) / (0.5 * angle),
+               second = little ? 1.0 / 6.0 - square / 120.0 : (angle - std::sin(angle)) / (square * angle);
+  return Matrix3::Identity() + 0.5 * half * half * V + second * V * V;
 }
 
 /// Rotation vector of a rotation, |result| <= pi.

@@ -57,15 +57,20 @@ void StepGradient::turn_held(VectorX& start, VectorX& pose) const {
       pose.segment<3>(dof) = by_spin;
       start.segment<3>(dof) -= cayley(w).transpose() * by_spin;
     }
-    if (support.other_node < 0) continue;
-    const int e = support.edge;
-    const double by_angle = pose[model.edge_dof[at(e)]];
-    const EdgeFrame<double>& f = end_->edge[at(e)];
-    const Vec3d e0 = edge_vector(model, step_->start.q, e);
-    const double longer = 1.0 / (f.inverse_length * std::sqrt(dot(e0, e0)));
-    add_to_edge(model, e, -by_angle * f.spin, pose);
-    add_to_edge(model, e, (-by_angle * longer) * f.spin, start);
+    if (support.other_node >= 0) turn_held_edge(support.edge, start, pose);
+    if (!support.is_hand() || support.yields()) continue;
+    for (int edge : support.edges) turn_held_edge(edge, start, pose);
   }
+}
+
+void StepGradient::turn_held_edge(int e, VectorX& start, VectorX& pose) const {
+  const Model& model = equations_.model();
+  const double by_angle = pose[model.edge_dof[at(e)]];
+  const EdgeFrame<double>& f = end_->edge[at(e)];
+  const Vec3d e0 = edge_vector(model, step_->start.q, e);
+  const double longer = 1.0 / (f.inverse_length * std::sqrt(dot(e0, e0)));
+  add_to_edge(model, e, -by_angle * f.spin, pose);
+  add_to_edge(model, e, (-by_angle * longer) * f.spin, start);
 }
 
 namespace {
@@ -86,23 +91,54 @@ Vector3 arm_of(const Model& model, const VectorX& q, const Support& support) {
   return node_vector(model, q, support.other_node) - node_vector(model, q, support.node);
 }
 
+/// Of a hand that does not yield. An edge beside another hand has a node of that: its director is what this hand says,
+/// carried from the tangent t that it has there to that which it has.
+void add_hand(const Model& model, const VectorX& q, VectorX& held, const Support& hand, const HandsHeld& hands,
+              std::size_t support, Vector3& rotation) {
+  for (std::size_t i = 0; i < hand.touched.size() && !model.planar(); ++i) {
+    const int e = hand.touched[i].edge;
+    const Vector3 along = to_eigen(edge_vector(model, q, e)), now = along.normalized(),
+                  t = (hands.poses[support].rotation * hands.grasped[support].edges[i]).col(2);
+    const double by_angle = held(model.edge_dof[at(e)]);
+    const Vector3 spin = -t.cross(now) / (1.0 + t.dot(now));
+    add_to_edge(model, e, to_vec3(Vector3(by_angle / along.norm() * spin)), held);
+    rotation += by_angle * (t + t.cross(spin));
+  }
+}
+
 }  // namespace
 
-PoseAdjoint by_poses(const Model& model, const VectorX& q, const VectorX& held) {
+PoseAdjoint by_poses(const Model& model, const VectorX& q, const VectorX& held_unknowns, const HandAdjoint& by_hands,
+                     const HandsHeld& hands) {
   const auto count = static_cast<Eigen::Index>(model.supports.size());
   PoseAdjoint out{MatrixX3::Zero(count, 3), MatrixX3::Zero(count, 3)};
+  if (by_hands.positions.rows() == count) out = {by_hands.positions, by_hands.rotations};
+  VectorX held = held_unknowns;
+  std::vector<Vector3> turned(model.supports.size(), Vector3::Zero());
+  for (std::size_t s = 0; s < model.supports.size(); ++s)
+    if (model.supports[s].active && model.supports[s].is_hand() && !model.supports[s].yields())
+      add_hand(model, q, held, model.supports[s], hands, s, turned[s]);
   for (std::size_t s = 0; s < model.supports.size(); ++s) {
     const Support& support = model.supports[s];
-    if (!support.active) continue;
-    Vector3 position = node_vector(model, held, support.node), rotation = Vector3::Zero();
-    if (support.frame >= 0) rotation = frame_turn(model, held, support);
-    if (support.other_node >= 0) {
-      const Vector3 other = node_vector(model, held, support.other_node), arm = arm_of(model, q, support);
-      position += other;
-      rotation += arm.cross(other) + edge_turn(model, held, support, arm);
+    if (!support.active || support.yields()) continue;
+    Vector3 position = Vector3::Zero(), rotation = turned[s];
+    if (support.is_hand()) {
+      for (int node : support.nodes) {
+        const Vector3 by = node_vector(model, held, node);
+        position += by;
+        rotation += (node_position(model, q, node) - hands.poses[s].position).cross(by);
+      }
+    } else {
+      position = node_vector(model, held, support.node);
+      if (support.frame >= 0) rotation = frame_turn(model, held, support);
+      if (support.other_node >= 0) {
+        const Vector3 other = node_vector(model, held, support.other_node), arm = arm_of(model, q, support);
+        position += other;
+        rotation += arm.cross(other) + edge_turn(model, held, support, arm);
+      }
     }
-    out.positions.row(static_cast<Eigen::Index>(s)) = position.transpose();
-    out.rotations.row(static_cast<Eigen::Index>(s)) = rotation.transpose();
+    out.positions.row(static_cast<Eigen::Index>(s)) += position.transpose();
+    out.rotations.row(static_cast<Eigen::Index>(s)) += rotation.transpose();
   }
   return out;
 }

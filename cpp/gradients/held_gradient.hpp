@@ -1,7 +1,7 @@
 #pragma once
 /// From derivatives by unknowns that supports hold to those by poses of supports.
 
-#include "model/model.hpp"
+#include "steps/hand_forces.hpp"
 
 namespace withe {
 
@@ -19,7 +19,15 @@ struct DrawnAdjoint {
 
 DrawnAdjoint by_drawing(const Model& model, const VectorX& q, const VectorX& held);
 
-/// `held`: in coordinates of the state, in which the unknowns are q.
-PoseAdjoint by_poses(const Model& model, const VectorX& q, const VectorX& held);
+/// Hands, per support: where they are, and what they have grasped.
+struct HandsHeld {
+  const std::vector<HandPose>& poses;
+  const std::vector<HandState>& grasped;
+};
+
+/// `held`: in coordinates of the state, in which the unknowns are q; `by_hands`: what comes besides, of yielding ones
+/// all.
+PoseAdjoint by_poses(const Model& model, const VectorX& q, const VectorX& held, const HandAdjoint& by_hands,
+                     const HandsHeld& hands);
 
 }  // namespace withe

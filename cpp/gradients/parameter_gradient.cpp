@@ -50,6 +50,8 @@ class Chain {
     out.slip_tolerance = by.slip_tolerance;
     out.obstacle_friction = by.obstacle_friction;
     out.pair_friction = by.pair_friction;
+    out.hand_stiffness = by.hand_stiffness;
+    out.hand_limit = by.hand_limit;
     add_masses();
     add_stiffnesses();
     add_natural();

@@ -1,5 +1,7 @@
 // Reactions are rows of the residual of what supports hold, as `World::reaction` makes forces and moments of them.
 
+#include <algorithm>
+#include <cmath>
 #include <stdexcept>
 
 #include "geometry/rotation.hpp"
@@ -11,19 +13,21 @@ namespace withe {
 void StepGradient::check_reactions() const {
   const Model& model = equations_.model();
   if (step_->rule != StepRule::energy_momentum) return;
+  constexpr double kRest = 1e-12;  // [rad]: what rounding makes of angles of hands that rest
+  const auto turns = [&](int dof) { return std::abs(step_->end[dof] - step_->start.q[dof]) > kRest; };
   for (const Support& s : model.supports) {
     if (!s.active) continue;
-    const int dof = model.planar() && s.frame >= 0         ? model.frame_dof[at(s.frame)]
-                    : !model.planar() && s.other_node >= 0 ? model.edge_dof[at(s.edge)]
-                                                           : -1;
-    if (dof >= 0 && step_->end[dof] != step_->start.q[dof])
+    const bool turned = model.planar() ? s.frame >= 0 && turns(model.frame_dof[at(s.frame)])
+                                       : std::any_of(s.edges.begin(), s.edges.end(),
+                                                     [&](int edge) { return turns(model.edge_dof[at(edge)]); });
+    if (turned)
       throw std::invalid_argument(
           "no gradient is known of reactions of supports that turn in energy-momentum steps: take integrator "
           "'implicit_midpoint' with adaptive=False, or 'backward_euler'");
   }
 }
 
-void StepGradient::add_reactions(const SupportAdjoint& by, CoefficientAdjoint& coefficients) {
+void StepGradient::add_reactions(const SupportAdjoint& by, CoefficientAdjoint& coefficients, HandAdjoint& hands) {
   check_reactions();
   const Model& model = equations_.model();
   by_rows_.setZero(model.dof_count);
@@ -31,14 +35,19 @@ void StepGradient::add_reactions(const SupportAdjoint& by, CoefficientAdjoint& c
     const auto i = static_cast<Eigen::Index>(s);
     return i < table.rows() ? Vector3(table.row(i)) : Vector3(Vector3::Zero());
   };
-  for (std::size_t s = 0; s < model.supports.size(); ++s)
-    if (model.supports[s].active) add_reaction(model.supports[s], row(by.forces, s), row(by.moments, s));
+  for (std::size_t s = 0; s < model.supports.size(); ++s) {
+    if (!model.supports[s].active) continue;
+    if (model.supports[s].is_hand())
+      add_hand_reaction(static_cast<int>(s), row(by.forces, s), row(by.moments, s), hands);
+    else
+      add_reaction(model.supports[s], row(by.forces, s), row(by.moments, s));
+  }
   by_rows_ = equations_.assembler().held_part(by_rows_);
   if (model.planar()) return;
   for (const Support& support : model.supports) {
     if (!support.active) continue;
     if (support.frame >= 0) add_frame_reaction(model.frame_dof[at(support.frame)], coefficients);
-    if (support.other_node >= 0) add_held_inertia(model.edge_dof[at(support.edge)], coefficients);
+    for (int edge : support.edges) add_held_inertia(model.edge_dof[at(edge)], coefficients);
   }
   if (moves()) return;
   // An equilibrium's rows are those of reference directors that turn along with their edges: without what those which
@@ -67,14 +76,43 @@ void StepGradient::add_reaction(const Support& s, const Vector3& by_force, const
   const Vector3 other = node_vector(model, held, s.other_node);
   add_to_node(model, s.other_node, by_force + by_moment.cross(arm), by_rows_);
   Vector3 by_arm = other.cross(by_moment);
-  if (!model.planar()) {
-    const int angle = model.edge_dof[at(s.edge)];
-    const Vector3 t = arm.normalized();
-    by_rows_[angle] += by_moment.dot(t);
-    by_arm += held[angle] / arm.norm() * (by_moment - by_moment.dot(t) * t);
-  }
+  if (!model.planar()) by_arm += add_angle_reaction(s.edge, arm, by_moment, held);
   add_to_node(model, s.other_node, by_arm, by_z_);
   add_to_node(model, s.node, -by_arm, by_z_);
+}
+
+/// Of the torque on an edge along `arm`. Returns the derivative by that.
+Vector3 StepGradient::add_angle_reaction(int edge, const Vector3& arm, const Vector3& by_moment, const VectorX& held) {
+  const int angle = equations_.model().edge_dof[at(edge)];
+  const Vector3 t = arm.normalized();
+  by_rows_[angle] += by_moment.dot(t);
+  return held[angle] / arm.norm() * (by_moment - by_moment.dot(t) * t);
+}
+
+/// About where the hand is at the end of the step.
+void StepGradient::add_hand_reaction(int support, const Vector3& by_force, const Vector3& by_moment,
+                                     HandAdjoint& hands) {
+  const Model& model = equations_.model();
+  const Support& hand = model.supports[at(support)];
+  if (hand.yields()) {
+    if (by_force.isZero() && by_moment.isZero()) return;
+    throw std::invalid_argument("no gradient is known of what a hand that yields holds with: take one that is rigid");
+  }
+  const HandState& start = step_->start.hands[at(support)];
+  const Vector3 position = step_->hands ? (*step_->hands)[at(support)].position : start.position;
+  const VectorX held = equations_.assembler().held_part(data_.full_residual);
+  for (int node : hand.nodes) {
+    const Vector3 arm = node_position(model, z_, node) - position,
+                  by_arm = node_vector(model, held, node).cross(by_moment);
+    add_to_node(model, node, by_force + by_moment.cross(arm), by_rows_);
+    add_to_node(model, node, by_arm, by_z_);
+    hands.positions.row(support) -= by_arm.transpose();
+  }
+  for (std::size_t i = 0; i < hand.edges.size() && !model.planar(); ++i) {
+    const int edge = hand.edges[i];
+    const Vector3 by_arm = add_angle_reaction(edge, to_eigen(edge_vector(model, z_, edge)), by_moment, held);
+    add_to_edge(model, edge, to_vec3(by_arm), by_z_);
+  }
 }
 
 /// A moment is J(w)^-T times the rows of its frame, w being where the frame is turned to; rows of energy-momentum steps

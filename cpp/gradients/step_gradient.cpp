@@ -37,6 +37,7 @@ void StepGradient::begin(const StepTaken& step) {
     held_acceleration_ = (*step.held_velocity - step.start.v) / step.duration;
   else if (holds)
     held_acceleration_.setZero(model.dof_count);
+  if (HandForces* hands = equations_.hands()) hands->aim(step.hands ? *step.hands : std::vector<HandPose>{});
   equations_.begin(step.start, step.parameters, step.rule, middle ? 0.5 * step.duration : step.duration,
                    holds ? &held_acceleration_ : nullptr);
   if (step.rule == StepRule::energy_momentum) {
@@ -118,7 +119,12 @@ void StepGradient::pull_back(StateAdjoint& state, CoefficientAdjoint& by, HeldAd
                              const SupportAdjoint* reactions) {
   const Model& model = equations_.model();
   const Assembler& assembler = equations_.assembler();
+  const HandForces* yielding = equations_.hands();
+  if (state.hands.positions.size() == 0) state.hands = HandAdjoint(model);
+  VectorX rows;
+  StepAdjoint adjoint(model, rows, state.approach, state.hands, by);
   set_end(state);
+  if (yielding) yielding->add_slip_adjoint(equations_.problem(), step_->end, adjoint, by_end_);
   // v1 = rate (q1 - q0) - (end_rate - 1) v0, but that angles' rates may be those of finite rotations.
   VectorX start = VectorX::Zero(model.dof_count), velocity = start;
   if (moves()) {
@@ -132,14 +138,13 @@ void StepGradient::pull_back(StateAdjoint& state, CoefficientAdjoint& by, HeldAd
   start -= (end_rate() - 1.0) * by_end_;
   by_z_ = end_rate() * by_end_;
   by_rows_.resize(0);
-  if (reactions) add_reactions(*reactions, by);
+  if (reactions) add_reactions(*reactions, by, adjoint.hands_end);
   solve();
 
-  VectorX rows = rows_;
+  rows = rows_;
   if (step_->rule == StepRule::energy_momentum && !model.planar())
     for (int dof : model.frame_dof)
       rows.segment<3>(dof) = (cayley_spin(z_.segment<3>(dof)).inverse() * rows.segment<3>(dof)).eval();
-  StepAdjoint adjoint(model, rows, state.approach, by);
   for (const std::unique_ptr<Term>& term : equations_.terms())
     term->add_adjoint(equations_.problem(), data_, assembler, adjoint);
   if (moves()) {
@@ -151,10 +156,14 @@ void StepGradient::pull_back(StateAdjoint& state, CoefficientAdjoint& by, HeldAd
     }
   }
   add_held(adjoint, state.v, start, velocity, held);
+  held.hands = adjoint.hands_end;
+  held.hands.positions += state.hands.positions;
+  held.hands.rotations += state.hands.rotations;
   if (!moves()) return;
   state.q = start;
   state.v = velocity;
   state.approach = std::move(adjoint.approach);
+  state.hands = std::move(adjoint.hands);
 }
 
 void StepGradient::add_frames(const StateAdjoint& state, const StepAdjoint& adjoint, VectorX& start) const {

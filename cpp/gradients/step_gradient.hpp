@@ -24,6 +24,7 @@ struct StateAdjoint {
   VectorX q;  ///< positions [1/m], turns of directors and of frames [1/rad], angles of hinges
   VectorX v;  ///< [s/m], [s/rad]
   ApproachAdjoint approach = {};
+  HandAdjoint hands = {};  ///< empty: nothing
 };
 
 /// What is differentiated: a step from `start` to q1.
@@ -36,6 +37,8 @@ struct StepTaken {
   const VectorX* held_velocity = nullptr;  ///< of supports at the end, meaningful where held; nothing: they rest
   /// Per constraint, how much of the gain on the mean velocity before goes into that at the end; nothing: none.
   const VectorX* held_gain = nullptr;
+  /// Of hands at the end, per support; nothing: they are where they were.
+  const std::vector<HandPose>* hands = nullptr;
 };
 
 /// Derivatives of a scalar by the reactions of supports in a step, as `World::reaction` has them; or empty.
@@ -45,10 +48,11 @@ struct SupportAdjoint {
 
 /// Derivatives of a scalar by what supports prescribe, meaningful where held.
 struct HeldAdjoint {
-  VectorX pose;  ///< by where they hold at the end of a step, in coordinates of the state
-  VectorX mean;  ///< by the mean velocity of the step that is to be gone back through next [s/m], [s/rad]
+  VectorX pose;       ///< by where they hold at the end of a step, in coordinates of the state
+  VectorX mean;       ///< by the mean velocity of the step that is to be gone back through next [s/m], [s/rad]
+  HandAdjoint hands;  ///< by where hands are at the end of a step, beyond what follows from what they hold
 
-  explicit HeldAdjoint(const Model& model) : pose(VectorX::Zero(model.dof_count)), mean(pose) {}
+  explicit HeldAdjoint(const Model& model) : pose(VectorX::Zero(model.dof_count)), mean(pose), hands(model) {}
 };
 
 class StepGradient {
@@ -70,8 +74,10 @@ class StepGradient {
 
  private:
   void set_end(const StateAdjoint& state);
-  void add_reactions(const SupportAdjoint& by, CoefficientAdjoint& coefficients);
+  void add_reactions(const SupportAdjoint& by, CoefficientAdjoint& coefficients, HandAdjoint& hands);
   void add_reaction(const Support& support, const Vector3& by_force, const Vector3& by_moment);
+  void add_hand_reaction(int support, const Vector3& by_force, const Vector3& by_moment, HandAdjoint& hands);
+  Vector3 add_angle_reaction(int edge, const Vector3& arm, const Vector3& by_moment, const VectorX& held);
   void add_frame_reaction(int dof, CoefficientAdjoint& coefficients);
   void add_held_inertia(int angle, CoefficientAdjoint& coefficients) const;
   void check_reactions() const;
@@ -81,6 +87,7 @@ class StepGradient {
   void add_held(const StepAdjoint& adjoint, const VectorX& end_velocity, VectorX& start, VectorX& velocity,
                 HeldAdjoint& held) const;
   void turn_held(VectorX& start, VectorX& pose) const;
+  void turn_held_edge(int edge, VectorX& start, VectorX& pose) const;
   bool moves() const { return step_->rule != StepRule::statics; }
   bool in_middle() const { return equations_.problem().in_middle(); }
   double end_rate() const { return equations_.problem().end_rate(); }

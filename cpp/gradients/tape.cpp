@@ -24,6 +24,26 @@ MatrixX3 at_nodes(const Model& model, const VectorX& by) {
   return out;
 }
 
+/// Takes hands of a state to where they are.
+void place_hands(const std::vector<HandPose>& poses, State& state) {
+  for (std::size_t s = 0; s < poses.size(); ++s) {
+    state.hands[s].position = poses[s].position;
+    state.hands[s].rotation = poses[s].rotation;
+  }
+}
+
+std::vector<HandPose> poses_of(const State& state) {
+  std::vector<HandPose> poses;
+  for (const HandState& hand : state.hands) poses.push_back({hand.position, hand.rotation});
+  return poses;
+}
+
+bool same_poses(const std::vector<HandPose>& a, const std::vector<HandPose>& b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const HandPose& one, const HandPose& other) {
+    return one.position == other.position && one.rotation == other.rotation;
+  });
+}
+
 }  // namespace
 
 /// Goes through the states of a run again, and back.
@@ -47,13 +67,24 @@ class Tape::Player {
     VectorX v = (rate / step.duration) * (step.end - state.q) - (rate - 1.0) * state.v;
     if (step.rule == StepRule::energy_momentum)
       set_turning_velocities(model_, state.v, step.end - state.q, step.duration, v);
-    const Assembler& assembler = gradient(step.rule).equations().assembler();
+    Equations& equations = gradient(step.rule).equations();
+    const Assembler& assembler = equations.assembler();
     assembler.project(v);
     if (const VectorX* held = held_velocity(step)) assembler.add_held_part(*held, 1.0, v);
     if (!model_.planar()) compute_configuration(model_, state, step.end, configuration_);
     accept_configuration(model_, step.end, configuration_, state);
+    if (HandForces* hands = equations.hands()) {
+      hands->aim(hands_after(step, state));
+      hands->accept(configuration_, state);
+    }
+    place_hands(step.hands, state);
     state.v = v;
     state.contacts = step.contacts;
+  }
+
+  /// Where hands are at the end of a step from a state.
+  static std::vector<HandPose> hands_after(const Step& step, const State& start) {
+    return step.hands.empty() ? poses_of(start) : step.hands;
   }
 
   /// Per unknown, meaningful where held; nothing where supports rest.
@@ -76,29 +107,42 @@ class Tape::Player {
   VectorX held_;
 };
 
-Tape::Tape(const Model& model, EquationOptions options, State first, const Parameters& parameters, bool frictional)
+Tape::Tape(const Model& model, EquationOptions options, State first, const Parameters& parameters, bool frictional,
+           std::vector<HandPose> hands)
     : model_(model),
       options_(options),
       acting_(parameters),
       starts_{std::move(first)},
       last_(starts_.front().q),
       last_velocity_(starts_.front().v),
-      frictional_(frictional) {}
+      last_hands_(std::move(hands)),
+      frictional_(frictional) {
+  place_hands(last_hands_, starts_.front());
+}
 
 void Tape::record(const AcceptedStep& step) {
   const State& after = step.after;
   acting_.record(steps_.size(), step.parameters);
   steps_.push_back({step.rule, step.duration, after.time, step.end, held_velocities(after.v), held_gains(step),
-                    step.reached, after.contacts, step.reacts, step.unknown});
+                    step.reached, moved_hands(step.hands), after.contacts, step.reacts, step.unknown});
   const VectorX before = held_velocities(last_velocity_);
   const double moved = steps_.back().held.norm() + before.norm();
   if (moved * std::abs(step.duration) <= kRounding * std::max(model_.length_scale, 1.0)) {
     steps_.back().held.resize(0);
     steps_.back().gain.resize(0);
   }
-  if (steps_.size() % kStretch == 0) starts_.push_back(after);
+  if (steps_.size() % kStretch == 0) {
+    starts_.push_back(after);
+    place_hands(last_hands_, starts_.back());
+  }
   last_ = after.q;
   last_velocity_ = after.v;
+}
+
+std::vector<HandPose> Tape::moved_hands(const std::vector<HandPose>& hands) {
+  if (same_poses(hands, last_hands_)) return {};
+  last_hands_ = hands;
+  return hands;
 }
 
 VectorX Tape::held_gains(const AcceptedStep& step) const {
@@ -126,13 +170,14 @@ VectorX Tape::held_velocities(const VectorX& v) const {
   return out;
 }
 
-void Tape::cut(long count, const State& after) {
+void Tape::cut(long count, const State& after, std::vector<HandPose> hands) {
   if (count >= this->count()) return;
   steps_.resize(static_cast<std::size_t>(count));
   starts_.resize(steps_.size() / kStretch + 1);
   acting_.cut(steps_.size());
   last_ = after.q;
   last_velocity_ = after.v;
+  last_hands_ = std::move(hands);
 }
 
 void Tape::refuse(const std::string& why) {
@@ -167,14 +212,15 @@ void Tape::walk_back(Player& player, const std::function<void(const Passage&)>& 
     while (acting_.first(stretch) > k) --stretch;
     const Parameters& parameters = acting_.play(model_, stretch, acting);
     StepGradient& gradient = player.gradient(step.rule);
+    const std::vector<HandPose> hands = Player::hands_after(step, states[k - first]);
     gradient.begin({states[k - first], parameters, step.rule, step.duration, step.end, player.held_velocity(step),
-                    step.gain.size() != 0 ? &step.gain : nullptr});
+                    step.gain.size() != 0 ? &step.gain : nullptr, &hands});
     const std::function<State()> end = [&] {
       State after = states[k - first];
       player.advance(step, after);
       return after;
     };
-    visit({k, stretch, gradient, parameters, end});
+    visit({k, stretch, gradient, parameters, hands, end});
   }
 }
 
@@ -248,7 +294,9 @@ InitialGradient Tape::gradient(const std::vector<MomentAdjoint>& given, const Pa
     if (begins) time = acting_time(steps_[k]);
     held.pose.setZero();
     passage.gradient.pull_back(adjoint, coefficients, held, moments.reactions(k));
-    if (visit_poses) visit_poses(static_cast<long>(k), steps_[k].reached, by_poses(model_, steps_[k].end, held.pose));
+    if (visit_poses)
+      visit_poses(static_cast<long>(k), steps_[k].reached,
+                  by_poses(model_, steps_[k].end, held.pose, held.hands, {passage.hands, starts_.front().hands}));
     begins = k == acting_.first(passage.stretch) || k == 0;
     if (!begins) return;
     visit(static_cast<long>(k), -1, time, parameter_gradient(model_, passage.parameters, coefficients));
@@ -259,11 +307,19 @@ InitialGradient Tape::gradient(const std::vector<MomentAdjoint>& given, const Pa
   const Assembler& assembler = player.gradient(rule).equations().assembler();
   assembler.project(adjoint.v);
   moments.add(0, assembler, acting_.start(), [&] { return starts_.front(); }, adjoint);
-  return {at_nodes(model_, adjoint.q), at_nodes(model_, adjoint.v), by_poses(model_, starts_.front().q, adjoint.q)};
+  const State& first = starts_.front();
+  const std::vector<HandPose> hands = poses_of(first);
+  return {at_nodes(model_, adjoint.q), at_nodes(model_, adjoint.v),
+          by_poses(model_, first.q, adjoint.q, adjoint.hands, {hands, first.hands})};
 }
 
 RunJacobian Tape::jacobian() const {
   check_known();
+  for (const Support& s : model_.supports)
+    if (s.active && s.yields() && std::isfinite(s.description.hand.force_limit))
+      throw std::invalid_argument(
+          "no Jacobian is known with a hand that slips, for how far it has is no part of a state vector: grasp without "
+          "force_limit=");
   if (acting_.count() > 1) throw std::invalid_argument("no Jacobian is known of a run in which something was set");
   const SparseMatrix basis = free_basis(model_), back = basis.transpose();
   const Eigen::Index free = basis.cols();

@@ -50,21 +50,23 @@ struct AcceptedStep {
   const State& after;             ///< at its end
   const Parameters& parameters;   ///< as they acted
   MatrixX reached;                ///< see `PoseVisitor`
+  std::vector<HandPose> hands;    ///< where hands are at its end, per support; empty: there is none
   bool reacts = true;             ///< whether reactions are those of this step from here on
   const char* unknown = nullptr;  ///< why no gradient goes through it, unless it is cut off again
 };
 
 class Tape {
  public:
-  /// Of a run that begins so, with friction or not; these are kept.
-  Tape(const Model& model, EquationOptions options, State first, const Parameters& parameters, bool frictional);
+  /// Of a run that begins so, with friction or not; these are kept. `hands`: see `AcceptedStep`.
+  Tape(const Model& model, EquationOptions options, State first, const Parameters& parameters, bool frictional,
+       std::vector<HandPose> hands);
 
   long count() const { return static_cast<long>(steps_.size()); }
   void record(const AcceptedStep& step);
   /// What acts from here on is to be told apart from what acted before.
   void divide() { acting_.divide(); }
   /// Forgets all but so many.
-  void cut(long count, const State& after);
+  void cut(long count, const State& after, std::vector<HandPose> hands);
   /// Says why no gradient goes through this run; the first reason stays.
   void refuse(const std::string& why);
   /// Whether that is what the last step led to.
@@ -92,12 +94,14 @@ class Tape {
     VectorX held;  ///< velocities at its end of what supports hold, one after the other; none: they rest, as before it
     VectorX gain;  ///< see `StepTaken::held_gain`; none: nothing
     MatrixX reached;
+    std::vector<HandPose> hands;          ///< at its end; none: where they were before it
     std::vector<ContactRecord> contacts;  ///< at its end
     bool reacts;
     const char* unknown;  ///< why no gradient goes through it, if so
   };
   class Player;
   class Moments;
+  std::vector<HandPose> moved_hands(const std::vector<HandPose>& hands);
   VectorX held_velocities(const VectorX& v) const;
   VectorX held_gains(const AcceptedStep& step) const;
 
@@ -111,6 +115,7 @@ class Tape {
     std::size_t step, stretch;
     StepGradient& gradient;
     const Parameters& parameters;
+    const std::vector<HandPose>& hands;
     const std::function<State()>& end;
   };
   void walk_back(Player& player, const std::function<void(const Passage&)>& visit) const;
@@ -119,8 +124,9 @@ class Tape {
   EquationOptions options_;
   ActingNumbers acting_;
   std::vector<Step> steps_;
-  std::vector<State> starts_;     ///< of every stretch of steps that are played again together
-  VectorX last_, last_velocity_;  ///< what the last step led to
+  std::vector<State> starts_;         ///< of every stretch of steps that are played again together
+  VectorX last_, last_velocity_;      ///< what the last step led to
+  std::vector<HandPose> last_hands_;  ///< likewise
   std::string refused_;
   bool frictional_;
 };

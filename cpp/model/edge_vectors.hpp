@@ -13,6 +13,12 @@ inline Vector3 node_vector(const Model& model, const VectorX& v, int node) {
   return v(dof) * model.plane->first + v(dof + 1) * model.plane->second;
 }
 
+/// Position of a node in space, from any configuration vector.
+inline Vector3 node_position(const Model& model, const VectorX& q, int node) {
+  const Vector3 place = node_vector(model, q, node);
+  return model.planar() ? Vector3(model.plane->origin + place) : place;
+}
+
 /// Adds to the rows of a node what is given in the axes of space.
 inline void add_to_node(const Model& model, int node, const Vector3& by, VectorX& rows) {
   const int dof = model.node_dof[at(node)];

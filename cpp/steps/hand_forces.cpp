@@ -1,74 +1,13 @@
 #include "steps/hand_forces.hpp"
 
-#include <stdexcept>
-
-#include "elasticity/bend_twist.hpp"
 #include "elasticity/discrete_elements.hpp"
-#include "elasticity/put_local.hpp"
-#include "forces/hand.hpp"
 #include "geometry/curvature.hpp"
 #include "geometry/rotation.hpp"
-#include "model/edge_vectors.hpp"
+#include "steps/hand_piece.hpp"
 #include "steps/rounding.hpp"
 
 namespace withe {
 namespace {
-
-Vector3 point_on(const Model& model, const VectorX& q, const TouchedEdge& touched) {
-  const Vector3 tail = node_vector(model, q, model.edge_tail[at(touched.edge)]),
-                head = node_vector(model, q, model.edge_head[at(touched.edge)]);
-  const Vector3 point = tail + touched.place * (head - tail);
-  return model.planar() ? Vector3(model.plane->origin + point) : point;
-}
-
-EdgeFrame<double> frame_of(const Matrix3& grip) {
-  return {to_vec3(grip.col(2)), to_vec3(grip.col(0)), to_vec3(grip.col(1)), 1.0, {}, {}};
-}
-
-/// How an edge is displaced from what a hand has grasped.
-struct Shift {
-  Matrix3 grip;       ///< G
-  Vector3 point, by;  ///< x [m]; u, in the axes of G [m]
-};
-
-Shift shift_of(const Model& model, const VectorX& q, const HandState& hand, const HandPose& pose,
-               const TouchedEdge& touched, std::size_t i) {
-  Shift out;
-  out.grip = pose.rotation * hand.edges[i];
-  out.point = point_on(model, q, touched);
-  out.by = out.grip.transpose() * (out.point - pose.position - pose.rotation * hand.points[i]) - hand.slip[i];
-  return out;
-}
-
-Vector3 shift_stiffness(const HandDescription& hand, double share) {
-  return share * Vector3(hand.stiffness[0], hand.stiffness[1], hand.stiffness[2]);
-}
-
-/// Bending towards d1 turns about d2.
-BendTwistStiffness<double> turn_stiffness(const HandDescription& hand, double share) {
-  return {share * hand.stiffness[4], share * hand.stiffness[3], share * hand.stiffness[5]};
-}
-
-/// In a plane a hand turns about its normal alone.
-double planar_stiffness(const Model& model, const HandDescription& hand, double share, const Matrix3& grip) {
-  const Vector3 n = grip.transpose() * model.plane->normal;
-  double sum = 0.0;
-  for (int i = 0; i < 3; ++i) sum += share * hand.stiffness[at(3 + i)] * n[i] * n[i];
-  return sum;
-}
-
-/// The direction of what is grasped, as an edge of unit length in the axes of the plane.
-PlanarEdge<double> planar_grip(const Model& model, const Matrix3& grip) {
-  const Vector3 t = grip.col(2);
-  return {{t.dot(model.plane->first), t.dot(model.plane->second)}, 1.0};
-}
-
-PlanarBend<double> planar_turn(const Model& model, const BendMeasure& measure, const HandDescription& hand,
-                               double share, const Matrix3& grip, const EdgeFrame<double>& edge) {
-  const PlanarEdge<double> from = planar_grip(model, grip);
-  const double kappa = planar_kappa(from.tangent.x, from.tangent.y, edge.tangent.x, edge.tangent.y);
-  return planar_bend(measure, kappa, 0.0, planar_stiffness(model, hand, share, grip));
-}
 
 /// Adds what a force at a place on an edge is to its nodes, `first_head` being where the head's numbers begin.
 template <int Size>
@@ -85,16 +24,6 @@ void put_shift(const Eigen::Matrix<double, Size, 1>& gradient, const Eigen::Matr
 }
 
 }  // namespace
-
-/// One edge that a hand holds, as an evaluation finds it.
-struct HandForces::Piece {
-  const TouchedEdge& touched;
-  const HandDescription& hand;
-  Shift shift;
-  Vector3 stiffness;
-  CappedForce elastic;  ///< -f, in the axes of G
-  Matrix3 by;           ///< d(-f) / dx
-};
 
 HandForces::HandForces(const Model& model) : model_(model) {
   std::vector<int> dofs;
@@ -164,8 +93,9 @@ HandForces::Piece HandForces::piece(const StepProblem& problem, const StepData& 
   }
   const Vector3 stiffness = shift_stiffness(hand, touched.share);
   const CappedForce elastic = capped(stiffness.cwiseProduct(shift.by), touched.share * hand.force_limit);
-  return {touched,   hand,    shift,
-          stiffness, elastic, shift.grip * capped_stiffness(stiffness, elastic) * last.transpose()};
+  const Matrix3 slope =
+      problem.exact ? Matrix3(capped_slope(elastic) * stiffness.asDiagonal()) : symmetric_stiffness(stiffness, elastic);
+  return {touched, hand, shift, stiffness, elastic, shift.grip * slope * last.transpose()};
 }
 
 /// What an edge that is held feels of the turn between it and what the hand has grasped.
@@ -212,16 +142,18 @@ HandForces::Turn HandForces::put_turn(const StepProblem& problem, const StepData
   return turn;
 }
 
-HandForces::Turn HandForces::put_discrete_turn(const StepProblem& problem, const StepData& data, const Piece& p,
-                                               const Held& held, bool with_matrix, Local& local) const {
+/// What a held edge is attached to over an energy-momentum step, and how stiffly.
+HandForces::Grip HandForces::grip_over(const StepProblem& problem, const StepData& data, const Held& held) const {
+  const Support& support = model_.supports[at(held.support)];
+  const TouchedEdge& touched = support.touched[at(held.touched)];
   const HandState& hand = problem.start->hands[at(held.support)];
   const Matrix3 from = hand.rotation * hand.edges[at(held.touched)],
                 to = end_pose(problem, held.support).rotation * hand.edges[at(held.touched)];
-  const EdgeFrame<double>&edge0 = problem.start_configuration.edge[at(p.touched.edge)],
-        &edge1 = data.end_configuration.edge[at(p.touched.edge)];
-  const BendMeasure& measure = problem.parameters->measure;
-  AttachedStep grip{.start = frame_of(from), .end = frame_of(to), .start_strain = {}, .end_strain = {}, .first = true};
-  TurnCoefficients elastic{measure, {}, {}};
+  const EdgeFrame<double>&edge0 = problem.start_configuration.edge[at(touched.edge)],
+        &edge1 = data.end_configuration.edge[at(touched.edge)];
+  Grip out{{.start = frame_of(from), .end = frame_of(to), .start_strain = {}, .end_strain = {}, .first = true},
+           {problem.parameters->measure, {}, {}}};
+  AttachedStep& grip = out.attached;
   if (model_.planar()) {
     const auto direction = [&](const Matrix3& G) {
       const PlanarEdge<double> e = planar_grip(model_, G);
@@ -232,21 +164,28 @@ HandForces::Turn HandForces::put_discrete_turn(const StepProblem& problem, const
     grip.end.tangent = direction(to);
     grip.start_strain.x = kappa(grip.start.tangent, edge0.tangent);
     grip.end_strain.x = kappa(grip.end.tangent, edge1.tangent);
-    elastic.stiffness.x = planar_stiffness(model_, p.hand, p.touched.share, to);
+    out.elastic.stiffness.x = planar_stiffness(model_, support.description.hand, touched.share, to);
   } else {
     const BendTwistStrain<double> s0 = bend_twist_strain(grip.start, edge0, hand.twist(held.touched)),
                                   s1 = bend_twist_strain(grip.end, edge1, s0.tau);
     grip.start_strain = {s0.kappa1, s0.kappa2, s0.tau};
     grip.end_strain = {s1.kappa1, s1.kappa2, s1.tau};
-    const BendTwistStiffness<double> C = turn_stiffness(p.hand, p.touched.share);
-    elastic.stiffness = {C.bend1, C.bend2, C.twist};
+    const BendTwistStiffness<double> C = turn_stiffness(support.description.hand, touched.share);
+    out.elastic.stiffness = {C.bend1, C.bend2, C.twist};
   }
+  return out;
+}
+
+HandForces::Turn HandForces::put_discrete_turn(const StepProblem& problem, const StepData& data, const Held& held,
+                                               bool with_matrix, Local& local) const {
+  const Grip grip = grip_over(problem, data, held);
   const DiscreteStep step{.start = problem.start_configuration,
                           .middle = data.configuration,
                           .end = data.end_configuration,
                           .end_q = data.end,
                           .change = data.change};
-  return {discrete_held_local(model_, elastic, step, p.touched.edge, grip, with_matrix, local), 0.0};
+  const int edge = model_.supports[at(held.support)].touched[at(held.touched)].edge;
+  return {discrete_held_local(model_, grip.elastic, step, edge, grip.attached, with_matrix, local), 0.0};
 }
 
 void HandForces::add(const StepProblem& problem, StepData& data, const Assembler&, std::span<double> values) const {
@@ -259,7 +198,7 @@ void HandForces::add(const StepProblem& problem, StepData& data, const Assembler
     const Piece p = piece(problem, data, k);
     const Vector3 pull = p.shift.grip * p.elastic.force;  // -f
     Local local{};
-    const Turn turn = problem.conserves_energy() ? put_discrete_turn(problem, data, p, held, with_matrix, local)
+    const Turn turn = problem.conserves_energy() ? put_discrete_turn(problem, data, held, with_matrix, local)
                       : model_.planar() ? put_planar_turn(problem, data, p, with_matrix, local)
                                         : put_turn(problem, data, p,
                                                    problem.start->hands[at(held.support)].twist(held.touched), local);
@@ -273,10 +212,6 @@ void HandForces::add(const StepProblem& problem, StepData& data, const Assembler
     wrench.force -= pull;
     wrench.moment += turn.moment - p.shift.point.cross(pull);
   }
-}
-
-void HandForces::add_adjoint(const StepProblem&, const StepData&, const Assembler&, StepAdjoint&) const {
-  throw std::invalid_argument("no gradient is known through hands that yield");
 }
 
 /// Positions round by eps |x|, and with them what is between an edge and where it was grasped.

@@ -9,8 +9,8 @@ namespace withe {
 
 /// Where a hand is.
 struct HandPose {
-  Vector3 position = Vector3::Zero();
-  Matrix3 rotation = Matrix3::Identity();
+  Vector3 position = Vector3::Zero();      ///< [m]
+  Matrix3 rotation = Matrix3::Identity();  ///< columns: its axes
 };
 
 class HandForces final : public Term {
@@ -32,6 +32,12 @@ class HandForces final : public Term {
 
   /// Where hands are at the end of the steps to come, per support; empty: where they are at the start.
   void aim(std::vector<HandPose> end) { end_ = std::move(end); }
+  /// Adds to derivatives by what a step is given those by what it leaves of slips, `adjoint.hands_after`: to `by_end`,
+  /// that by q1, and to the adjoint. To come before `add_adjoint`.
+  void add_slip_adjoint(const StepProblem& problem, const VectorX& q1, StepAdjoint& adjoint, VectorX& by_end) const;
+  bool slips() const { return slips_; }
+  /// Whether something slips where a state is, or would with any more force.
+  bool at_limit(const State& state) const;
   /// What hands have done in a step that has just been evaluated [J].
   double work(const StepProblem& problem, const StepData& data) const;
   /// Takes a state whose q is that of the end of a step there: hands are where they were aimed at, and slip where the
@@ -43,6 +49,7 @@ class HandForces final : public Term {
     int support = 0, touched = 0;
   };
   struct Piece;
+  struct Grip;
   struct Turn;
   /// Where forces act, and where it is at the end of the step.
   HandPose pose_of(const StepProblem& problem, int support) const;
@@ -52,13 +59,20 @@ class HandForces final : public Term {
                        Local& local) const;
   Turn put_turn(const StepProblem& problem, const StepData& data, const Piece& p, double twist, Local& local) const;
   /// Whose work in an energy-momentum step is what the energy changes by.
-  Turn put_discrete_turn(const StepProblem& problem, const StepData& data, const Piece& p, const Held& held,
-                         bool with_matrix, Local& local) const;
+  Turn put_discrete_turn(const StepProblem& problem, const StepData& data, const Held& held, bool with_matrix,
+                         Local& local) const;
+  Grip grip_over(const StepProblem& problem, const StepData& data, const Held& held) const;
+  void add_pose(const StepProblem& problem, int support, const Vector3& by_position, const Vector3& by_rotation,
+                StepAdjoint& adjoint) const;
+  void add_shift_adjoint(const StepProblem& problem, const StepData& data, int element, const Vector3& by_point,
+                         StepAdjoint& adjoint) const;
+  Vector3 add_turn_adjoint(const StepProblem& problem, const StepData& data, int element, const double* rows,
+                           CoefficientAdjoint& by) const;
 
   const Model& model_;
   std::vector<Held> held_;  ///< of each element
   ElementTable table_;
-  bool slips_ = false;
+  bool slips_ = false;               ///< whether any may
   std::vector<HandPose> end_, now_;  ///< at the end of the step; where forces act
 };
 

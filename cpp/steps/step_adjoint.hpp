@@ -7,6 +7,9 @@
 
 namespace withe {
 
+/// One row per hand: along and about its axes.
+using MatrixX6 = Eigen::Matrix<double, Eigen::Dynamic, 6, Eigen::RowMajor>;
+
 /// Derivatives of a scalar by the coefficients that the equations of a step are made of.
 struct CoefficientAdjoint {
   VectorX stretch_stiffness, stretch_time;  ///< per edge: by EA [1/N] and by viscous time [1/s]
@@ -23,6 +26,8 @@ struct CoefficientAdjoint {
   double fluid_viscosity = 0;                                    ///< [1/(Pa s)]
   double friction = 0, slip_tolerance = 0;                       ///< of the scene [-], [s/m]
   MatrixX2 obstacle_friction, pair_friction;                     ///< per obstacle, per pair of bodies [-]
+  MatrixX6 hand_stiffness;                  ///< per support, see `HandDescription` [m/N], [rad/(N m)]
+  VectorX hand_limit;                       ///< per support [1/N]
   std::vector<MatrixX2> natural_curvature;  ///< per rod and stencil, by the smooth one, where it is read out [m]
   VectorX rest_length;                      ///< per edge, by that in the axial strain, and where it is read out [1/m]
 
@@ -48,12 +53,34 @@ struct CoefficientAdjoint {
         edge_mass(stretch_stiffness),
         obstacle_friction(rows_of_two(model.description.contact.obstacles.size())),
         pair_friction(rows_of_two(model.description.contact.pairs.size())),
+        hand_stiffness(MatrixX6::Zero(static_cast<Eigen::Index>(model.supports.size()), 6)),
+        hand_limit(VectorX::Zero(static_cast<Eigen::Index>(model.supports.size()))),
         rest_length(VectorX::Zero(model.edge_count)) {
     for (const auto& places : model.place) natural_curvature.push_back(rows_of_two(places.size()));
   }
 
  private:
   static MatrixX2 rows_of_two(std::size_t count) { return MatrixX2::Zero(static_cast<Eigen::Index>(count), 2); }
+};
+
+/// Derivatives of a scalar by where hands are, and by how far what yielding ones hold has slipped in them.
+struct HandAdjoint {
+  MatrixX3 positions, rotations;  ///< per support, the latter by a rotation vector [1/m], [1/rad]
+  MatrixX3 slips;                 ///< per edge that is held, hand by hand [1/m]
+
+  HandAdjoint() = default;
+  explicit HandAdjoint(const Model& model)
+      : positions(MatrixX3::Zero(static_cast<Eigen::Index>(model.supports.size()), 3)), rotations(positions) {
+    Eigen::Index held = 0;
+    for (const Support& s : model.supports)
+      if (s.active && s.yields()) held += static_cast<Eigen::Index>(s.touched.size());
+    slips = MatrixX3::Zero(held, 3);
+  }
+  void add(const HandAdjoint& other) {
+    positions += other.positions;
+    rotations += other.rotations;
+    slips += other.slips;
+  }
 };
 
 /// Derivatives of a scalar by speeds of approach that contacts remember [s/m].
@@ -70,9 +97,12 @@ struct StepAdjoint {
   MatrixX3 start_spin, middle_spin, end_spin;  ///< per frame: by its rotation vector at the start, at z, at q1 [rad]
   const ApproachAdjoint& approach_after;       ///< by what is remembered at the end
   ApproachAdjoint approach;                    ///< by what was remembered at the start
+  const HandAdjoint& hands_after;              ///< by slips at the end
+  HandAdjoint hands, hands_end;                ///< by hands at the start, and by where they are at the end
   CoefficientAdjoint& coefficients;
 
-  StepAdjoint(const Model& model, const VectorX& rows_of, const ApproachAdjoint& by_approach, CoefficientAdjoint& by)
+  StepAdjoint(const Model& model, const VectorX& rows_of, const ApproachAdjoint& by_approach,
+              const HandAdjoint& by_hands, CoefficientAdjoint& by)
       : rows(rows_of),
         start(VectorX::Zero(model.dof_count)),
         velocity(start),
@@ -83,6 +113,9 @@ struct StepAdjoint {
         middle_spin(start_spin),
         end_spin(start_spin),
         approach_after(by_approach),
+        hands_after(by_hands),
+        hands(model),
+        hands_end(model),
         coefficients(by) {}
 };
 

@@ -24,12 +24,6 @@ bool same_frame(const Model& a, int frame_a, const Model& b, int frame_b) {
 
 }  // namespace
 
-Vector3 node_position(const Model& model, const VectorX& q, int node) {
-  const int dof = model.node_dof[at(node)];
-  if (!model.planar()) return q.segment<3>(dof);
-  return model.plane->origin + q(dof) * model.plane->first + q(dof + 1) * model.plane->second;
-}
-
 Matrix3 frame_rotation(const Model& model, const State& state, int frame) {
   if (model.planar()) return rotation_exp(state.q(model.frame_dof[at(frame)]) * model.plane->normal);
   return cayley(state.q.segment<3>(model.frame_dof[at(frame)])) * state.frame[at(frame)];

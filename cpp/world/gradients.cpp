@@ -11,7 +11,9 @@ namespace {
 
 /// An equilibrium leaves this much of the forces in it out of balance.
 constexpr double kBalanced = 1e-6;
-constexpr const char* kHands = "a hand takes part in it; hold the rod by clamp(hold='edge')";
+constexpr const char* kAtLimit =
+    "no gradient is known of an equilibrium in which a hand holds with all its force, for it goes with the way there: "
+    "give a greater force_limit, or run with differentiable=True";
 constexpr const char* kFriction =
     "anchored or semi-explicit friction takes part in it; take friction_model='implicit' or 'lagged', or friction=0";
 constexpr const char* kHeldByFriction =
@@ -36,7 +38,6 @@ bool loses_in_impacts(const ContactDescription& contact) {
 std::vector<EquilibriumGradient> World::equilibrium_gradients(const std::vector<ReadoutAdjoint>& by) const {
   const Implementation& self = *implementation_;
   const Model& model = self.model;
-  require(!self.has_hands(), std::string("there is no gradient of this equilibrium: ") + kHands);
   if (!self.static_gradient) {
     Options statics = self.options;
     statics.integrator = Integrator::statics;
@@ -44,13 +45,15 @@ std::vector<EquilibriumGradient> World::equilibrium_gradients(const std::vector<
   }
   StepGradient& gradient = *self.static_gradient;
   State frames = self.state;
+  const std::vector<HandPose> hands = self.hand_poses();
   if (!model.planar()) {
     // Directors are measured from where they are, and so turn with their edges without a change of their angles.
     Configuration configuration;
     compute_configuration(model, self.state, self.state.q, configuration);
     accept_configuration(model, self.state.q, configuration, frames);
   }
-  gradient.begin({frames, self.parameters, StepRule::statics, 0.0, frames.q});
+  gradient.begin({frames, self.parameters, StepRule::statics, 0.0, frames.q, nullptr, nullptr, &hands});
+  if (const HandForces* yielding = gradient.equations().hands()) require(!yielding->at_limit(self.state), kAtLimit);
   const Contact* contact = gradient.equations().contact();
   if (contact && contact->count() > 0) {
     require(!contact->frictional(), kHeldByFriction);
@@ -69,7 +72,8 @@ std::vector<EquilibriumGradient> World::equilibrium_gradients(const std::vector<
     if (scalar.needs_state())
       add_readouts(model, gradient.equations().assembler(), self.parameters, frames, scalar, adjoint, coefficients);
     gradient.pull_back(adjoint, coefficients, held, scalar.has_reactions() ? &scalar.reactions : nullptr);
-    out.push_back({parameter_gradient(model, self.parameters, coefficients), by_poses(model, self.state.q, held.pose),
+    out.push_back({parameter_gradient(model, self.parameters, coefficients),
+                   by_poses(model, self.state.q, held.pose, held.hands, {hands, self.state.hands}),
                    by_drawing(model, self.state.q, held.pose)});
   }
   return out;
@@ -79,12 +83,11 @@ std::shared_ptr<Tape> World::start_tape() {
   Implementation& self = *implementation_;
   const Contact* contact = self.equations->contact();
   self.tape = std::make_shared<Tape>(self.model, equation_options(self.options), self.state, self.parameters,
-                                     contact && contact->frictional());
+                                     contact && contact->frictional(), self.hand_poses());
   if (self.options.integrator == Integrator::verlet || self.options.integrator == Integrator::statics)
     self.tape->refuse("integrator '" +
                       std::string(self.options.integrator == Integrator::verlet ? "verlet" : "static") +
                       "' has none; take any other");
-  if (self.has_hands()) self.tape->refuse(kHands);
   if (contact) {
     if (contact->frictional() && !known_friction(self.description.contact.friction_law))
       self.tape->refuse(kFriction);
@@ -148,7 +151,7 @@ void World::Implementation::record_step(StepRule rule, double dt, bool reacts) {
     const SupportMotion& m = motions[static_cast<std::size_t>(s)];
     reached.row(s) << m.shift.fraction(state.time), m.turn.fraction(state.time);
   }
-  tape->record({rule, dt, work.move, state, parameters, reached, reacts, unknown});
+  tape->record({rule, dt, work.move, state, parameters, reached, hand_poses(), reacts, unknown});
 }
 
 }  // namespace withe

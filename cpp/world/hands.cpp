@@ -27,12 +27,15 @@ bool World::Implementation::has_hands() const {
                      [](const Support& s) { return s.active && s.is_hand(); });
 }
 
-/// Tells hands that yield where `motions` lead; `release_hands`: that there is no step.
-void World::Implementation::aim_hands(Equations& system) const {
-  if (!system.hands()) return;
+std::vector<HandPose> World::Implementation::hand_poses() const {
   std::vector<HandPose> poses;
   for (const SupportMotion& m : motions) poses.push_back({m.position, m.rotation});
-  system.hands()->aim(std::move(poses));
+  return poses;
+}
+
+/// Tells hands that yield where `motions` lead; `release_hands`: that there is no step.
+void World::Implementation::aim_hands(Equations& system) const {
+  if (system.hands()) system.hands()->aim(hand_poses());
 }
 
 /// Whether one that yields does.

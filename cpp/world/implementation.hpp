@@ -4,6 +4,7 @@
 #include <atomic>
 
 #include "integrators/statics.hpp"
+#include "model/edge_vectors.hpp"
 #include "world/running.hpp"
 
 namespace withe {
@@ -152,6 +153,8 @@ struct World::Implementation : Running {
   bool has_hands() const;
   bool hands_move(const std::vector<SupportMotion>& from, const std::vector<SupportMotion>& to) const;
   void aim_hands(Equations& system) const;
+  /// Where hands are, per support.
+  std::vector<HandPose> hand_poses() const;
   static void release_hands(Equations& system);
   /// In an equilibrium that hands were aimed for.
   void settle_hands(Equations& system);
@@ -280,8 +283,6 @@ struct World::Implementation : Running {
   void check_explicit();
 };
 
-/// Position of a node in space, from any configuration vector.
-Vector3 node_position(const Model& model, const VectorX& q, int node);
 /// Puts a node in space into a configuration vector.
 void put_node(const Model& model, int node, const Vector3& position, VectorX& q);
 /// Rotation of a joint frame from the drawn axes.

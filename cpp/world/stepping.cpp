@@ -241,7 +241,7 @@ void World::Implementation::take_back() {
 
 void World::Implementation::return_to_start() {
   static_cast<Moving&>(*this) = kept;
-  if (tape) tape->cut(taped, state);
+  if (tape) tape->cut(taped, state, hand_poses());
   apply_ramps(state.time);
 }
 

@@ -19,6 +19,8 @@ void register_gradients(py::module_& module) {
       .def_readonly("viscous_time", &ParameterGradient::edge_viscous_time)
       .def_readonly("drag", &ParameterGradient::edge_drag)
       .def_readonly("added_mass", &ParameterGradient::added_mass)
+      .def_readonly("hand_stiffness", &ParameterGradient::hand_stiffness)
+      .def_readonly("hand_limit", &ParameterGradient::hand_limit)
       .def_readonly("gravity", &ParameterGradient::gravity)
       .def_readonly("natural_curvature", &ParameterGradient::natural_curvature)
       .def_readonly("natural_twist", &ParameterGradient::natural_twist)

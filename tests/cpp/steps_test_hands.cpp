@@ -1,6 +1,9 @@
 // Hands that yield, among the equations: forces are those of their energy, matrices the derivatives of forces, and what
 // they do to the rod is what the rod feels.
 
+#include <memory>
+#include <utility>
+
 #include <gtest/gtest.h>
 
 #include "derivative_check.hpp"
@@ -168,6 +171,130 @@ TEST(HandForces, WrenchIsWhatTheRodFeels) {
         EXPECT_NEAR(forces.dot(testing::rigid_motion(c, u, omega)), sum.force.dot(u) + sum.moment.dot(omega), 1e-12)
             << c.name;
     }
+}
+
+/// A step of a scene whose hands have other poses, slips and stiffness, by numbers in a row: per hand how its start is
+/// displaced and turned, how its end is, six stiffnesses and the limit, over their own; then slips.
+struct Varied {
+  Varied(const Case& of, StepRule under, const VectorX& numbers) : c(of), rule(under) {
+    Eigen::Index next = 0;
+    const auto vector = [&] { return Vector3(numbers.segment<3>(std::exchange(next, next + 3))); };
+    const Vector3 axis = c.model.planar() ? c.model.plane->normal : Vector3(0.6, 0.0, 0.8);
+    for (std::size_t s = 0; s < c.state.hands.size(); ++s) {
+      HandState& hand = c.state.hands[s];
+      const Vector3 to = hand.position + Vector3(0.02, 0.0, 0.0);
+      const Matrix3 turned = rotation_exp(0.3 * axis) * hand.rotation;
+      hand.position += vector();
+      hand.rotation = rotation_exp(vector()) * hand.rotation;
+      const Vector3 shift = vector(), turn = vector();
+      poses.push_back({to + shift, rotation_exp(turn) * turned});
+      HandDescription& own = c.model.supports[s].description.hand;
+      for (double& k : own.stiffness) k *= 1.0 + numbers(next++);
+      own.force_limit *= 1.0 + numbers(next++);
+    }
+    for (HandState& hand : c.state.hands)
+      for (Vector3& slip : hand.slip) slip += vector();
+  }
+  static Eigen::Index size(const Case& c) {
+    Eigen::Index count = 0;
+    for (const HandState& hand : c.state.hands) count += 19 + 3 * static_cast<Eigen::Index>(hand.slip.size());
+    return count;
+  }
+  /// Residual at z; and what hands remember of that of a step to q1, the slips one after the other.
+  void evaluate(const VectorX& z, StepData& data) {
+    parameters = initial_parameters(c.model);
+    equations = std::make_unique<Equations>(c.model, EquationOptions{.rule = rule, .exact = true});
+    equations->hands()->aim(poses);
+    equations->begin(c.state, parameters, rule, rule == StepRule::statics ? 0.0 : 0.3);
+    equations->evaluate(z, false, nullptr, data);
+  }
+  VectorX slips(const VectorX& q1) const {
+    State after = c.state;
+    Configuration configuration;
+    compute_configuration(c.model, c.state, q1, configuration);
+    after.q = q1;
+    equations->hands()->accept(configuration, after);
+    std::vector<double> out;
+    for (const HandState& hand : after.hands)
+      for (const Vector3& slip : hand.slip) out.insert(out.end(), {slip.x(), slip.y(), slip.z()});
+    return Eigen::Map<const VectorX>(out.data(), static_cast<Eigen::Index>(out.size()));
+  }
+  /// What the adjoint says of the numbers.
+  VectorX gradient(const StepAdjoint& by) const {
+    VectorX out(size(c));
+    Eigen::Index next = 0;
+    const auto put = [&](const auto& row) {
+      out.segment(next, row.size()) = row.transpose();
+      next += row.size();
+    };
+    for (Eigen::Index s = 0; s < by.hands.positions.rows(); ++s) {
+      put(by.hands.positions.row(s));
+      put(by.hands.rotations.row(s));
+      put(by.hands_end.positions.row(s));
+      put(by.hands_end.rotations.row(s));
+      const HandDescription& own = c.model.supports[static_cast<std::size_t>(s)].description.hand;
+      for (int i = 0; i < 6; ++i) out(next++) = by.coefficients.hand_stiffness(s, i) * own.stiffness[at(i)];
+      const double limit = by.coefficients.hand_limit(s);
+      out(next++) = limit == 0.0 ? 0.0 : limit * own.force_limit;
+    }
+    for (Eigen::Index k = 0; k < by.hands.slips.rows(); ++k) put(by.hands.slips.row(k));
+    return out;
+  }
+
+  Case c;
+  StepRule rule;
+  std::vector<HandPose> poses;
+  Parameters parameters;
+  std::unique_ptr<Equations> equations;
+};
+
+/// Directions that stay in the plane of a planar scene: what leaves it has no meaning there.
+VectorX allowed(const Case& c) {
+  VectorX out = VectorX::Ones(Varied::size(c));
+  if (!c.model.planar()) return out;
+  const Vector3 in_plane = Vector3::Ones() - c.model.plane->normal.cwiseAbs(), about = c.model.plane->normal.cwiseAbs();
+  for (std::size_t s = 0; s < c.state.hands.size(); ++s)
+    for (int i = 0; i < 4; ++i)
+      out.segment<3>(static_cast<Eigen::Index>(19 * s) + 3 * i) = i % 2 == 0 ? in_plane : about;
+  const auto slips = static_cast<Eigen::Index>(19 * c.state.hands.size());
+  out.tail(out.size() - slips).setZero();  // along d1, d2, t, whichever of these lie in the plane
+  return out;
+}
+
+TEST(HandForces, AdjointIsTheDerivativeByPosesSlipsAndStiffness) {
+  RandomNumbers random(21);
+  for (double limit : {static_cast<double>(INFINITY), 0.05})
+    for (StepRule rule : kRules)
+      for (Case c : all_cases(limit)) {
+        if (rule == StepRule::energy_momentum && c.q == c.state.q)
+          c.q += 10.0 * c.increment * random.vector(c.q.size());
+        const VectorX none = VectorX::Zero(Varied::size(c)), free = allowed(c);
+        const VectorX rows = random.vector(c.model.dof_count);
+        Varied step(c, rule, none);
+        StepData data;
+        step.evaluate(c.q, data);
+        const Eigen::Index slips = step.slips(c.q).size();
+        CoefficientAdjoint coefficients(c.model, 0);
+        HandAdjoint after(c.model);
+        for (Eigen::Index k = 0; k < after.slips.rows(); ++k) after.slips.row(k) = 3.0 * random.vector().transpose();
+        if (c.model.planar()) after.slips.setZero();
+        const VectorX by_slips = Eigen::Map<const VectorX>(after.slips.data(), slips);
+        StepAdjoint adjoint(c.model, rows, {}, after, coefficients);
+        VectorX by_end = VectorX::Zero(c.model.dof_count);
+        step.equations->hands()->add_slip_adjoint(step.equations->problem(), c.q, adjoint, by_end);
+        step.equations->hands()->add_adjoint(step.equations->problem(), data, step.equations->assembler(), adjoint);
+        const auto scalar = [&](const VectorX& numbers) {
+          Varied other(c, rule, free.cwiseProduct(numbers));
+          StepData there;
+          other.evaluate(c.q, there);
+          return rows.dot(there.full_residual) + by_slips.dot(other.slips(c.q));
+        };
+        EXPECT_TRUE(gradient_matches(scalar, none, free.cwiseProduct(step.gradient(adjoint)), 1e-3))
+            << c.name << ", rule " << static_cast<int>(rule) << ", limit " << limit;
+        if (by_end.isZero()) continue;  // nothing slips
+        const auto kept = [&](const VectorX& q1) { return by_slips.dot(step.slips(q1)); };
+        EXPECT_TRUE(gradient_matches(kept, c.q, by_end, 0.3 * c.increment)) << c.name << ", limit " << limit;
+      }
 }
 
 }  // namespace

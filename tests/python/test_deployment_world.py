@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import withe
-from withe.deployment import Cable, Pattern, deploy, place, plan
+from withe.deployment import Cable, Pattern, deploy, deploying, place, plan, trial_cable
 from withe.deployment.pattern import distances
 from withe.deployment.world import Setup, lay
 from withe.perception import trace
@@ -97,6 +97,19 @@ def test_noise_is_drawn_from_the_seed(arc):
     )
     np.testing.assert_array_equal(first.laid, again.laid)
     assert np.abs(first.laid - other.laid).max() > 1e-4
+
+
+def test_the_cable_of_a_trial_is_that_which_is_laid(monkeypatch):
+    motion, seen = plan(CABLE, Pattern(bend(0.0)), speed=0.06), []
+    monkeypatch.setattr(deploying, "lay", lambda setup, plan, progress: seen.append(setup) or ([], [], None))
+    monkeypatch.setattr(deploying, "_compared", lambda *given: None)
+    for seed in (3, 4):
+        deploy(motion, floor=0.5, noise=0.7, seed=seed, nodes=30, progress=False)
+        true = trial_cable(CABLE, seed, 0.7)
+        assert seen[-1].cable.gravito_bending_length == true.gravito_bending_length
+        assert abs(np.log(true.gravito_bending_length / CABLE.gravito_bending_length)) < 0.15
+    assert seen[0].cable != seen[1].cable
+    assert trial_cable(CABLE, 3, 0.0) == CABLE
 
 
 def test_the_world_imports_no_planner():

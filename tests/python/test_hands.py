@@ -182,10 +182,3 @@ def test_what_hands_do_not_go_with_says_so():
     scene.grasp(rod, 0.2, stiffness=(100.0, 0.1), force_limit=1.0)
     with pytest.raises(ValueError, match="knows rigid hands only"):
         scene.build(integrator="verlet", time_step=1e-6)
-    scene, rod = drawn()
-    scene.grasp(rod, 0.2)
-    simulation = scene.build(integrator="static", planar=False)
-    simulation.equilibrium()
-    record = scene.build(planar=False).run(0.02, progress=False, differentiable=True)
-    with pytest.raises(ValueError, match="a hand takes part in it"):
-        record.gradient({"positions": record.positions()}, ["gravity"])

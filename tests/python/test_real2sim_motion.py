@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import withe
+from gradient_scenes import TIGHT
 from ringing_rod import UNKNOWNS, let_go, ringing
 from withe.common.progress import Progress
 from withe.real2sim import Tags, fit_motion
@@ -150,3 +151,52 @@ def test_a_run_that_fails_with_the_first_guess_says_why():
     target = Tags([[(0, 0, 0)]], ["arm.end"], times=[0.1])
     with pytest.raises(withe.ConvergenceError, match="does not come to rest"):
         fit_motion(ringing(), target, UNKNOWNS, begin=fall, progress=False)
+
+
+def test_the_gradient_of_a_motion_is_that_of_differences():
+    start, target = ringing(viscosity=2000.0, adaptive=False, **TIGHT), seen(0.013, viscosity=3000.0)
+    unknowns = [("arm", "natural_curvature", "linear"), *UNKNOWNS[:2]]
+    motion = _Motion(
+        start.copy(),
+        [*parse_unknowns(start, unknowns), Delay(0.0, 2.0)],
+        bind([target], start),
+        target.times,
+        0.0,
+        let_go,
+        Progress(1),
+    )
+    motion.differentiable = True
+    at = np.array([0.3, -0.2, 0.05, -0.1, 0.0132])
+    residual, state = motion.residual(at, 0)
+    found = motion.slope(at, state, residual)
+
+    def of(coordinates):
+        return 0.5 * np.sum(motion.residual(coordinates, 0)[0] ** 2)
+
+    for i, size in enumerate((1e-3, 1e-3, 1e-4, 1e-3, 1e-6)):
+        step = np.zeros(5)
+        step[i] = size
+        near, far = ((of(at + k * step) - of(at - k * step)) / (2.0 * k * size) for k in (1.0, 2.0))
+        assert found[i] == pytest.approx((4.0 * near - far) / 3.0, rel=1e-6, abs=1e-7 * np.abs(found).max()), i
+
+
+def test_lbfgs_finds_what_gauss_newton_does():
+    start, target = ringing(modulus=1.1e6, viscosity=2600.0), seen(0.013, viscosity=3000.0)
+    found = fit_motion(start, target, UNKNOWNS, begin=let_go, method="lbfgs", progress=False)
+    assert found.converged.all()
+    assert found.value("arm", "youngs_modulus")[0] == pytest.approx([1e6], rel=1e-3)
+    assert found.value("arm", "viscosity")[0] == pytest.approx([3000.0], rel=1e-2)
+    assert found.value("delay")[0] == pytest.approx([0.013], abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("unknowns", "options", "message"),
+    [
+        ([("wall", "rotation")], {}, "cannot be unknown with method='lbfgs'"),
+        (UNKNOWNS, {"method": "newton"}, "method must be 'gauss_newton' or 'lbfgs'"),
+    ],
+)
+def test_what_lbfgs_does_not_go_with_says_what_to_do(unknowns, options, message):
+    target = Tags([[(0, 0, 0)]], ["arm.end"], times=[0.1])
+    with pytest.raises(ValueError, match=message):
+        fit_motion(ringing(), target, unknowns, progress=False, **({"method": "lbfgs"} | options))

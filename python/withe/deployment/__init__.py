@@ -10,7 +10,7 @@ length, unless they belong to a particular cable: then in m and N.
 """
 
 from withe.deployment.cable import Cable, MeasuredCable, measure
-from withe.deployment.deploying import Deployment, deploy, place
+from withe.deployment.deploying import Deployment, deploy, place, trial_cable
 from withe.deployment.feasibility import Feasibility, Slip
 from withe.deployment.grasp_network import GraspNetwork
 from withe.deployment.grasping import Grasp, grasp
@@ -47,4 +47,5 @@ __all__ = [
     "posts_along",
     "tie",
     "train",
+    "trial_cable",
 ]

@@ -17,7 +17,7 @@ from withe.deployment.world import Setup, lay
 from withe.deployment.world import place as place_in_world
 from withe.recording import Record
 
-__all__ = ["DRAWN", "Deployment", "deploy", "drawn_setup", "place"]
+__all__ = ["DRAWN", "Deployment", "deploy", "drawn_setup", "place", "trial_cable"]
 
 FloatArray = npt.NDArray[np.float64]
 # Standard deviations of what a trial has and a planner does not know, at noise 1.
@@ -128,12 +128,11 @@ def deploy(
     true = plan.cable if cable is None else cable
     if true.length < plan.cable.length:
         raise ValueError(f"the cable is {true.length:g} m long, the plan holds it at {plan.cable.length:g} m")
-    random = np.random.default_rng(validation.integer(seed, "seed", 0, 2**63 - 1))
     setup = drawn_setup(
         plan,
         true,
         friction,
-        noise * random.normal(size=DRAWN),
+        _drawn(seed, noise),
         nodes=nodes,
         time_step=_time_step(time_step, quasi_static),
         quasi_static=quasi_static,
@@ -203,16 +202,51 @@ def place(
     return replace(found, slipped=moved)
 
 
+def trial_cable(cable: Cable, seed: int, noise: float = 1.0) -> Cable:
+    """The cable of a noisy trial of `deploy`, for planners that measure it beforehand.
+
+    Parameters
+    ----------
+    cable : Cable
+        That is given to `deploy`.
+    seed, noise
+        Of the trial.
+
+    Returns
+    -------
+    Cable
+
+    Raises
+    ------
+    ValueError
+        A negative seed or noise.
+
+    Examples
+    --------
+    >>> import withe
+    >>> nominal = withe.deployment.Cable.dlo(2)
+    >>> true = withe.deployment.trial_cable(nominal, seed=1)
+    >>> print(f"{1e3 * nominal.gravito_bending_length:.1f} {1e3 * true.gravito_bending_length:.1f} mm")
+    32.0 32.6 mm
+    """
+    return _cable_of(cable, _drawn(seed, validation.non_negative(noise, "noise")))
+
+
+def _drawn(seed: int, noise: float) -> FloatArray:
+    """What a trial has, in standard deviations."""
+    return noise * np.random.default_rng(validation.integer(seed, "seed", 0, 2**63 - 1)).normal(size=DRAWN)
+
+
+def _cable_of(cable: Cable, drawn: FloatArray) -> Cable:
+    return replace(cable, gravito_bending_length=cable.gravito_bending_length * float(np.exp(_LGB * drawn[0])))
+
+
 def drawn_setup(
     plan: Plan, cable: Cable, friction: float, drawn: FloatArray, *, nodes: int, time_step: float, quasi_static: bool
 ) -> Setup:
     """What is there in a trial, from `DRAWN` numbers of standard normal distribution, times the noise."""
     return Setup(
-        cable=replace(
-            cable,
-            length=plan.cable.length,
-            gravito_bending_length=cable.gravito_bending_length * float(np.exp(_LGB * drawn[0])),
-        ),
+        cable=replace(_cable_of(cable, drawn), length=plan.cable.length),
         friction=friction * float(np.exp(_FRICTION * drawn[1])),
         nodes=nodes,
         time_step=time_step,

@@ -18,6 +18,7 @@ from withe.folding.noise import Noise
 from withe.folding.paper import Paper
 from withe.folding.planning import plan, replan
 from withe.folding.plans import Plan
+from withe.folding.plunging import plunge
 from withe.folding.seeing import SeenEdge, find_edge, overhead_camera
 from withe.folding.sheet_network import SheetNetwork
 from withe.folding.sheets import Elastica
@@ -47,6 +48,7 @@ __all__ = [
     "measure",
     "overhead_camera",
     "plan",
+    "plunge",
     "replan",
     "run_trials",
     "train",

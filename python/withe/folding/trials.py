@@ -23,6 +23,7 @@ from withe.folding.hanging_strip import measure
 from withe.folding.noise import Noise
 from withe.folding.paper import Paper
 from withe.folding.planning import plan
+from withe.folding.plunging import plunge
 from withe.folding.simulated_sheet import SimulatedSheet
 
 __all__ = ["Outcome", "Trial", "run_trials"]
@@ -43,6 +44,8 @@ class Trial:
         Of how the sheet differs from the paper.
     noise : Noise
         How much.
+    plunges : bool
+        Whether the plan ends in a `plunge`, tried on a sheet that is as the planner thinks.
     replans : int
         How often the sheet is looked at on the way; 0, the loop is open.
     planner : mapping
@@ -65,6 +68,7 @@ class Trial:
     target: float | Literal["half"] = "half"
     seed: int = 0
     noise: Noise = field(default_factory=Noise)
+    plunges: bool = False
     replans: int = 0
     planner: Mapping[str, Any] = field(default_factory=dict)
     sheet: Mapping[str, Any] = field(default_factory=dict)
@@ -192,6 +196,8 @@ def _carried_out(trial: Trial) -> Outcome:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # of slide that is predicted: it is measured here
             planned = plan(replace(trial.paper, gravito_bending_length=measured), trial.target, **trial.planner)
+            if trial.plunges:
+                planned = plunge(planned, sheet=trial.sheet, progress=False)
     except ValueError as error:
         return replace(outcome, failure=f"no plan: {error}")
     outcome = replace(outcome, needed_friction=float(np.nanmax(planned.slip_ratio)))

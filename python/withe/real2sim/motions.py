@@ -16,8 +16,11 @@ from withe.real2sim.gathering import gather
 from withe.real2sim.least_squares import Secants, lone_frame, seen
 from withe.real2sim.parsing import parse_unknowns
 from withe.real2sim.results import Fit
+from withe.real2sim.scalar_methods import minimise_by
 from withe.real2sim.targets import Residual, Target, bind, frames_of
 from withe.real2sim.unknowns import Coordinates, Delay, Unknown
+from withe.recording.record import Record
+from withe.simulation.motion import POSE_WORDS
 from withe.simulation.simulation import Simulation
 
 __all__ = ["fit_motion"]
@@ -26,6 +29,7 @@ FloatArray = npt.NDArray[np.float64]
 
 _DIFFERENCE = 1e-4  # of the scale of an unknown
 _RUNS = 8  # iterations that a progress bar counts on
+_CHANGE = 1e-9  # of the sum of squares: an iteration of L-BFGS that changes it by less is the last
 
 
 def fit_motion(
@@ -35,6 +39,7 @@ def fit_motion(
     *,
     begin: Callable[[Simulation], object] | None = None,
     delay: float = 0.0,
+    method: Literal["gauss_newton", "lbfgs"] = "gauss_newton",
     max_iterations: int = 50,
     progress: bool | Literal["always"] = True,
 ) -> Fit:
@@ -43,6 +48,9 @@ def fit_motion(
     Gauss-Newton on the residuals of all frames. Derivatives are differences of runs at the beginning and at the end,
     one run an unknown (those by the delay are velocities); secants update them in between. Between time steps
     positions are those of cubic polynomials through positions and velocities.
+
+    With ``method="lbfgs"`` the sum of squares has its gradient by one way back through each run (`Record.gradient`),
+    for however many unknowns; at the end comes one run an unknown, for the covariance.
 
     Parameters
     ----------
@@ -59,6 +67,9 @@ def fit_motion(
         go, which depends on them, and to let it go.
     delay : float [s]
         Of the clocks; the first guess if it is unknown.
+    method : {"gauss_newton", "lbfgs"}
+        The latter needs a run with a gradient; a planar scene, where `begin` is given; no unknown poses of supports or
+        drawn nodes.
     max_iterations : int
     progress : bool or "always"
 
@@ -102,12 +113,34 @@ def fit_motion(
     if times[0] + late < 0.0:
         raise ValueError(f"times plus delay must not be negative, got {times[0] + late:g} s")
     limit = validation.integer(max_iterations, "max_iterations", 1, 2**31 - 1)
+    if method not in ("gauss_newton", "lbfgs"):
+        raise ValueError(f"method must be 'gauss_newton' or 'lbfgs', got {method!r}")
+    by_gradients = method == "lbfgs"
+    if by_gradients:
+        _check_gradients(copy, parsed, begin)
     with progress_bar(_RUNS + 2 * len(parsed), "fitting", progress, unit="runs") as bar:
         motion = _Motion(copy, parsed, bind(listed, copy), times, late, begin, bar)
         free = np.ones(len(motion.names), bool)
-        solution = lone_frame(motion, 0, motion.begin(), free, 1e-12, limit, Secants())
+        if by_gradients:
+            motion.differentiable = True
+            solution = minimise_by(motion, 0, motion.begin(), motion.slope, _CHANGE, limit)
+        else:
+            solution = lone_frame(motion, 0, motion.begin(), free, 1e-12, limit, Secants())
     motion.per_frame = free
-    return gather(motion, listed, {0: solution}, {0: motion.runs}, len(solution.residual), 1)
+    return gather(motion, listed, {0: solution}, {0: motion.solves}, len(solution.residual), 1)
+
+
+def _check_gradients(
+    simulation: Simulation, unknowns: list[Unknown], begin: Callable[[Simulation], object] | None
+) -> None:
+    instead = "take method='gauss_newton'"
+    for unknown in unknowns:
+        if any(isinstance(word, tuple) and word[1] in POSE_WORDS for word in unknown.words):
+            raise ValueError(f"{unknown.names[0]} cannot be unknown with method='lbfgs', as supports move: {instead}")
+    if begin is not None and not simulation.plan.planar:
+        raise ValueError(
+            "begin with method='lbfgs' needs a planar scene, as in space directors turn with what it does: " + instead
+        )
 
 
 def _tuples(unknowns: Sequence[Any]) -> list[Any]:
@@ -130,7 +163,10 @@ class _Motion(Coordinates):
         super().__init__(simulation, unknowns)
         self._start, self._begin, self._bar = simulation.snapshot(), begin, bar
         self._residual, self._times, self._delay = residual, times, delay
-        self.runs, self._ran = 0, False
+        self.solves, self._ran = 0, False
+        self.differentiable = False
+        self._record: Record
+        self._left, self._share, self._gap = np.zeros(0, np.int64), np.zeros(0), np.zeros(0)
 
     def residual(self, coordinates: FloatArray, frame: int) -> tuple[FloatArray, FloatArray] | None:
         """Residuals of all times, one after the other, and `_shapes`; None where the run fails, but the first one."""
@@ -166,6 +202,57 @@ class _Motion(Coordinates):
             columns.append((seen(ahead[0]) - now) / step[i])
         return np.stack(columns, axis=1)
 
+    def slope(self, coordinates: FloatArray, state: FloatArray, residual: FloatArray) -> FloatArray:
+        """Derivatives of half the sum of squares of the last run, by the adjoint method."""
+        by_points = np.zeros_like(self._record.positions())
+        by_speeds = np.zeros_like(by_points)
+        first = 0
+        by_seen = np.empty_like(state[0])
+        for time, shape in enumerate(state[0]):
+            derivative = np.nan_to_num(self._residual.derivative(shape, time))
+            rows = slice(first, first + len(derivative))
+            by_seen[time] = np.tensordot(residual[rows], derivative, 1)
+            first = rows.stop
+        s, gap = self._share, self._gap
+        np.add.at(by_points, self._left + 1, (3 - 2 * s) * s**2 * by_seen)
+        np.add.at(by_points, self._left, (1 - (3 - 2 * s) * s**2) * by_seen)
+        np.add.at(by_speeds, self._left, gap * s * (1 - s) ** 2 * by_seen)
+        np.add.at(by_speeds, self._left + 1, -gap * s**2 * (1 - s) * by_seen)
+        words = [word for unknown in self.unknowns for word in unknown.words]
+        *found, by_start, by_start_speeds = self._record.gradient(
+            {"positions": by_points, "velocities": by_speeds}, [*words, "initial_positions", "initial_velocities"]
+        )
+        out, first = np.zeros(len(coordinates)), 0
+        for unknown, place in zip(self.unknowns, self.slices, strict=True):
+            if isinstance(unknown, Delay):
+                out[place] = np.sum(by_seen * state[1])
+                continue
+            own = [[each] for each in found[first : first + len(unknown.words)]]
+            out[place] = unknown.chain(coordinates[place], own)[0]
+            first += len(unknown.words)
+        if self._begin is not None:
+            starts = self._starts(coordinates)
+            out += np.tensordot(starts[0], by_start, 2) + np.tensordot(starts[1], by_start_speeds, 2)
+        return out
+
+    def _starts(self, coordinates: FloatArray) -> FloatArray:
+        """Derivatives of positions and velocities at the start by the coordinates, (2, n, nodes, 3): differences."""
+        assert self._begin is not None
+        late, out = self._place_of_delay(), []
+        for i, scale in enumerate(self.scales):
+            ends = []
+            for step in () if i == late else (_DIFFERENCE * scale, -_DIFFERENCE * scale):
+                there = coordinates.copy()
+                there[i] += step
+                self.simulation.restore(self._start)
+                self.forget()
+                self.write(there)
+                self._begin(self.simulation)
+                ends.append(np.stack([self.simulation.positions(), self.simulation.velocities()]))
+            nothing = np.zeros((2, *self.simulation.positions().shape))
+            out.append((ends[0] - ends[1]) / (2.0 * _DIFFERENCE * scale) if ends else nothing)
+        return np.stack(out, axis=1)
+
     def _values(self, positions: FloatArray) -> FloatArray:
         return np.concatenate([self._residual.value(shape, time) for time, shape in enumerate(positions)])
 
@@ -192,13 +279,18 @@ class _Motion(Coordinates):
         step = self.simulation.time_step
         duration = step * max(np.ceil(asked[-1] / step), 1.0)
         start = self.simulation.time
-        record = self.simulation.run(float(duration), record_every=step, progress=False)
-        self.runs += 1
+        record = self.simulation.run(
+            float(duration), record_every=step, progress=False, differentiable=self.differentiable
+        )
+        self._record = record
+        self.solves += 1
         self._bar.advance(1)
         knots, points, speeds = record.times - start, record.positions(), record.velocities()
         left = np.clip(np.searchsorted(knots, asked, side="right") - 1, 0, len(knots) - 2)
+        self._left = left
         gap = (knots[left + 1] - knots[left])[:, None, None]
         share = (asked - knots[left])[:, None, None] / gap
+        self._share, self._gap = share, gap
         # Cubic Hermite polynomials and their derivatives.
         jump = points[left + 1] - points[left]
         before, after = gap * speeds[left], gap * speeds[left + 1]

@@ -2,36 +2,58 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Protocol
+
 import numpy as np
 import numpy.typing as npt
 
-from withe.real2sim.least_squares import FrameSolution, seen
+from withe.real2sim.least_squares import FrameSolution, Problem, seen
 from withe.real2sim.stills import Stills
 
-__all__ = ["descend", "minimise"]
+__all__ = ["Slope", "descend", "minimise", "minimise_by"]
 
 FloatArray = npt.NDArray[np.float64]
+Slope = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
+"""Derivatives of half the sum of squared residuals: by coordinates, from them, the state, and the residuals seen."""
 
 _FIRST_STEP = 0.1  # of Algorithm 6
 _INCREMENT = 1e-3  # its epsilon, which is not printed [rad]; 1e-6 to 1e-2 all do
 
 
+class Counted(Problem, Protocol):
+    """Says how many equilibria or runs it has solved."""
+
+    solves: int
+
+
 def minimise(stills: Stills, frame: int, start: FloatArray, tolerance: float, max_iterations: int) -> FrameSolution:
     """Half the sum of squared residuals by SciPy's L-BFGS-B."""
+
+    def slope(coordinates: FloatArray, state: FloatArray, residual: FloatArray) -> FloatArray:
+        return residual @ np.nan_to_num(stills.jacobian(coordinates, state, frame))
+
+    return minimise_by(stills, frame, start, slope, tolerance**2, max_iterations)
+
+
+def minimise_by(
+    problem: Counted, frame: int, start: FloatArray, slope: Slope, change: float, max_iterations: int
+) -> FrameSolution:
+    """The same for any problem; ends when an iteration changes the sum by no more than so much of it."""
     from scipy.optimize import minimize
 
     def loss(unit: FloatArray) -> tuple[float, FloatArray]:
-        coordinates = unit * stills.scales
-        found = stills.residual(coordinates, frame)
+        coordinates = unit * problem.scales
+        found = problem.residual(coordinates, frame)
         if found is None:
             return 1e30, np.zeros_like(unit)
         residual = seen(found[0])
-        gradient = residual @ np.nan_to_num(stills.jacobian(coordinates, found[1], frame)) * stills.scales
-        return 0.5 * float(residual @ residual), gradient
+        return 0.5 * float(residual @ residual), slope(coordinates, found[1], residual) * problem.scales
 
-    options = {"maxiter": max_iterations, "ftol": tolerance**2, "gtol": 1e-12, "maxcor": 20}
-    result = minimize(loss, start / stills.scales, jac=True, method="L-BFGS-B", options=options)
-    return _closed(stills, frame, result.x * stills.scales, int(result.nit), bool(result.success), str(result.message))
+    options = {"maxiter": max_iterations, "ftol": change, "gtol": 1e-12, "maxcor": 20}
+    result = minimize(loss, start / problem.scales, jac=True, method="L-BFGS-B", options=options)
+    end, reason = result.x * problem.scales, str(result.message)
+    return _closed(problem, frame, end, int(result.nit), bool(result.success), reason)
 
 
 def descend(stills: Stills, frame: int, start: FloatArray, tolerance: float, max_iterations: int) -> FrameSolution:
@@ -63,16 +85,16 @@ def descend(stills: Stills, frame: int, start: FloatArray, tolerance: float, max
 
 
 def _closed(
-    stills: Stills, frame: int, coordinates: FloatArray, iterations: int, converged: bool, reason: str
+    problem: Counted, frame: int, coordinates: FloatArray, iterations: int, converged: bool, reason: str
 ) -> FrameSolution:
-    """The end of a search. Equilibria for the covariance alone do not count."""
-    solves = stills.solves
-    found = stills.residual(coordinates, frame)
+    """The end of a search. What is solved for the covariance alone does not count."""
+    solves = problem.solves
+    found = problem.residual(coordinates, frame)
     if found is None:
         empty = np.zeros((0, len(coordinates)))
         return FrameSolution(coordinates, np.zeros(0), empty, iterations, False, "no equilibrium there")
-    residual, positions = found
-    jacobian = stills.jacobian(coordinates, positions, frame) * stills.scales
+    residual, state = found
+    jacobian = problem.jacobian(coordinates, state, frame) * problem.scales
     jacobian[np.isnan(residual)] = 0.0
-    stills.solves = solves
+    problem.solves = solves
     return FrameSolution(coordinates, residual, jacobian, iterations, converged, "" if converged else reason)

@@ -103,10 +103,10 @@ class Record:
             For each of `wrt`, dL over it, shaped like `Simulation.get`: over the value that it had at the start of the
             run, as long as that acted. Its attribute ``calls`` has what was set later: one entry a call of `set`,
             `set_natural_curvature`, `set_natural_twist`, `set_natural_stretch`, `set_friction` and `move` (of
-            supports), in their order, with ``time`` [s], ``call``, ``target``, ``over`` and ``gradients``, a dict of dL
-            over the value that each word was given, shaped like that value (of a ramp: its end; of a rotation: by a
-            rotation vector that turns it; of curvatures with ``discrete=True``: by smooth ones). Under the midpoint
-            rules calls of `move` have none where L goes by reaction moments.
+            supports and hands), in their order, with ``time`` [s], ``call``, ``target``, ``over`` and ``gradients``, a
+            dict of dL over the value that each word was given, shaped like that value (of a ramp: its end; of a
+            rotation: by a rotation vector that turns it; of curvatures with ``discrete=True``: by smooth ones). Under
+            the midpoint rules calls of `move` have none where L goes by reaction moments.
 
         Raises
         ------

@@ -144,8 +144,9 @@ class Equilibrium:
             Pairs of a part and a word of `Simulation.get`: of a rod natural_curvature, natural_twist, natural_stretch,
             youngs_modulus, poisson_ratio, density, bend_stiffness and so on, and "radius" [m] of a withe.Circle, one an
             edge, and "points" [m], the nodes as they were drawn, (nodes, 3), both as if the scene were built anew; of a
-            load its value; of a mass "mass"; of a support "position" [m] and "rotation" (a rotation vector [rad], about
-            where it is). Or "gravity".
+            load its value; of a mass "mass"; of a support or a hand "position" [m] and "rotation" (a rotation vector
+            [rad], about where it is); of a hand that yields "stiffness", all six as `Scene.grasp` takes them, and
+            "force_limit". Or "gravity".
 
         Returns
         -------
@@ -156,8 +157,8 @@ class Equilibrium:
         ------
         ValueError
             The simulation has left this equilibrium, or it follows not from what acts (a rod free to spin, a limit
-            point, friction that holds it); contact whose stiffness was not given; a wrong shape, a derivative out of
-            the plane of a planar scene; something without a gradient.
+            point, friction or a hand at its force limit that holds it); contact whose stiffness was not given; a wrong
+            shape, a derivative out of the plane of a planar scene; something without a gradient.
 
         Examples
         --------

@@ -63,6 +63,7 @@ class OfRun:
 Reader = Callable[[_core.EquilibriumGradient | OfRun], Any]
 """Reads a derivative, shaped like `get`."""
 
+HAND_WORDS = ("stiffness", "force_limit")
 INITIAL_WORDS = ("initial_positions", "initial_velocities")
 SCENE_WORDS = ("gravity", "friction", "slip_tolerance")
 
@@ -117,6 +118,8 @@ def reader_of(session: Session, part: Part | BodyPair, word: str) -> Reader:
         return lambda g: float(g.parameters.drag[edges].sum())
     if isinstance(part, SupportPart) and word in POSE_WORDS:
         return _pose_reader(session, part, word)
+    if isinstance(part, SupportPart) and word in HAND_WORDS:
+        return _hand_reader(session, part, word)
     raise ValueError(f"no gradient is known by {word!r} of {part.name!r}")
 
 
@@ -140,6 +143,18 @@ def _pose_reader(session: Session, part: SupportPart, word: str) -> Reader:
         return np.array(gradient.support_positions[index] if word == "position" else gradient.support_rotations[index])
 
     return read
+
+
+def _hand_reader(session: Session, part: SupportPart, word: str) -> Reader:
+    grasp = part.grasp
+    if grasp is None or grasp.stiffness is None:
+        raise ValueError(f"{part.name!r} has no {word} to differentiate by: it is no hand that yields")
+    index = session.settings.supports[part.name][0]
+    if word == "stiffness":
+        return lambda g: np.array(g.parameters.hand_stiffness[index])
+    if not np.isfinite(grasp.force_limit):
+        raise ValueError(f"{part.name!r} has no force_limit to differentiate by")
+    return lambda g: float(g.parameters.hand_limit[index])
 
 
 def friction_reader(session: Session, part: ObstaclePart | BodyPair) -> Reader:

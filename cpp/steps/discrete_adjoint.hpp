@@ -1,0 +1,154 @@
+#pragma once
+/// Derivatives of discrete gradients, the elastic forces of energy-momentum steps, by both ends of a step.
+
+#include <array>
+#include <utility>
+
+#include "elasticity/discrete_elements.hpp"
+#include "geometry/rotation.hpp"
+#include "model/edge_vectors.hpp"
+#include "steps/regular_stencils.hpp"
+
+namespace withe {
+
+/// Of discrete gradients. They are functions of the two ends of a step alone, but for what torques leave nodes of the
+/// directors' transport, spin times the torque; and those which exchange the ends leave alone. So derivatives by the
+/// start are those by the end of the step backwards.
+class DiscreteAdjoint {
+ public:
+  DiscreteAdjoint(const StepProblem& problem, const StepData& data, StepAdjoint& adjoint)
+      : problem_(problem),
+        adjoint_(adjoint),
+        back_(-data.change),
+        back_q_(problem.start->q),
+        start_(problem.start_configuration),
+        forth_{problem.start_configuration, data.configuration, data.end_configuration, data.end, data.change, false},
+        backwards_{data.end_configuration, data.configuration, start_, back_q_, back_, false},
+        rows_(adjoint.rows) {
+    const Model& model = problem.model;
+    for (int dof : model.frame_dof) {
+      if (model.planar()) break;
+      // Backwards a frame turns by the opposite Cayley vector. Its rows are moments.
+      back_q_.segment<3>(dof) = back_.segment<3>(dof);
+      rows_.segment<3>(dof) = (cayley_spin(data.z.segment<3>(dof)) * rows_.segment<3>(dof)).eval();
+    }
+    for (int e = 0; !model.planar() && e < model.edge_count; ++e) {
+      // The start's angles as those of a step backwards: counted from where the end's tangents are.
+      EdgeFrame<double>& start = start_.edge[at(e)];
+      const Vec3d& source = data.end_configuration.edge[at(e)].tangent;
+      start.spin = (-start.inverse_length / (1.0 + dot(source, start.tangent))) * cross(source, start.tangent);
+      const Vec3d& spin = data.configuration.edge[at(e)].spin;
+      const int tail = model.tail_dof[at(e)], head = model.head_dof[at(e)];
+      for (int i = 0; i < 3; ++i) rows_[model.edge_dof[at(e)]] += spin[i] * (rows_[head + i] - rows_[tail + i]);
+    }
+  }
+
+  /// `evaluate(step, k, with_matrix, local)`, with stiffnesses and natural strains `k`; `frame`: -1, or whose unknowns
+  /// are among the element's.
+  template <class Evaluate>
+  void add_turning(const ElementTable& table, int i, const TurnCoefficients& k, const Angles& angles, int frame,
+                   const Evaluate& evaluate, Columns3& by_stiffness, Columns3& by_natural) {
+    double rows[kMaxLocal];
+    gather(table, i, rows_, rows);
+    const auto work = [&](const TurnCoefficients& of) {
+      Local local;
+      evaluate(forth_, of, false, local);
+      double sum = 0.0;
+      for (int r = 0; r < table.width(); ++r) sum += rows[r] * local.gradient[r];
+      return sum;
+    };
+    for (int s = 0; s < (problem_.model.planar() ? 1 : 3); ++s) {
+      TurnCoefficients unit{k.measure, {}, k.natural};
+      (s == 0 ? unit.stiffness.x : s == 1 ? unit.stiffness.y : unit.stiffness.z) = 1.0;
+      const double now = work(unit);
+      by_stiffness(i, s) += now;
+      (s == 0 ? unit.natural.x : s == 1 ? unit.natural.y : unit.natural.z) += 1.0;
+      by_natural(i, s) += k.stiffness[s] * (work(unit) - now);
+    }
+    const auto [start, end] = add_ends(table, i, rows, angles,
+                                       [&](const DiscreteStep& step, Local& local) { evaluate(step, k, true, local); });
+    if (frame < 0 || problem_.model.planar()) return;
+    const int dof = problem_.model.frame_dof[at(frame)];
+    const auto by_spin = [&](const VectorX& q, const LocalVector& by) -> Vector3 {
+      return cayley_spin(q.segment<3>(dof)).transpose().inverse() * Eigen::Map<const Vector3>(by.data() + 7);
+    };
+    adjoint_.start_spin.row(frame) += by_spin(back_q_, start).transpose();
+    adjoint_.end_spin.row(frame) += by_spin(forth_.end_q, end).transpose();
+  }
+
+  using LocalVector = std::array<double, kMaxLocal>;
+  /// q1 = 2 z - q0, and matrices of steps are twice derivatives by their ends. Returns those by the start and by the
+  /// end.
+  template <class Evaluate>
+  std::pair<LocalVector, LocalVector> add_ends(const ElementTable& table, int element, const double* rows,
+                                               const Angles& angles, const Evaluate& evaluate) {
+    Local by_end, by_start;
+    evaluate(forth_, by_end);
+    evaluate(backwards_, by_start);
+    const int* dofs = table.dofs(element);
+    LocalVector end{}, start{};
+    for (std::size_t c = 0; c < static_cast<std::size_t>(table.width()); ++c) {
+      for (int r = 0; r < table.width(); ++r) {
+        end[c] += 0.5 * rows[r] * by_end.hessian[r][c];
+        start[c] += 0.5 * rows[r] * by_start.hessian[r][c];
+      }
+      if (dofs[c] >= 0) adjoint_.start[dofs[c]] += start[c] - end[c];
+    }
+    for (int i = 0; i < angles.count; ++i) {
+      const auto place = static_cast<std::size_t>(angles.place[i]);
+      add_turn(angles.edge[i], start[place], end[place]);
+    }
+    return {start, end};
+  }
+
+  /// Of ordinary stencils in space, all at once: `axial` and `modulus` per edge, see StencilBatch.
+  void add_regular(const Assembler& assembler, const ElasticCoefficients& k, const VectorX& axial,
+                   const VectorX& modulus, Columns3& by_stiffness, Columns3& by_natural) {
+    const Model& model = problem_.model;
+    StencilBatch batch = kernel_batch(assembler, k.measure, forth_.middle, k.bend_natural, k.bend_stiffness);
+    batch.geometric = axial.data();
+    batch.modulus = modulus.data();
+    const MomentumBatch forth{.start_frames = frames_of(forth_.start),
+                              .end_frames = frames_of(forth_.end),
+                              .start_strain = forth_.start.bend_strain.data(),
+                              .end_strain = forth_.end.bend_strain.data()};
+    const MomentumBatch back{.start_frames = frames_of(forth_.end),
+                             .end_frames = frames_of(start_),
+                             .start_strain = forth_.end.bend_strain.data(),
+                             .end_strain = start_.bend_strain.data()};
+    const StencilKernels& kernels = stencil_kernels();
+    Columns3 along = Columns3::Zero(k.bend_stiffness.rows(), 3);
+    kernels.momentum_changes(batch, forth, rows_.data(), along.data());
+    VectorX end = VectorX::Zero(model.dof_count + kPadding), start = end;
+    kernels.momentum_product(batch, forth, rows_.data(), end.data());
+    kernels.momentum_product(batch, back, rows_.data(), start.data());
+    const Columns3 strain = 0.5 * (measured_strains(k.measure, forth_.start) + measured_strains(k.measure, forth_.end));
+    for (int b : assembler.regular.stencil) {
+      by_stiffness.row(b) += (strain.row(b) - k.bend_natural.row(b)).cwiseProduct(along.row(b));
+      by_natural.row(b) -= k.bend_stiffness.row(b).cwiseProduct(along.row(b));
+    }
+    adjoint_.start += (start - end).head(model.dof_count);
+    for (int e = 0; e < model.edge_count; ++e) add_turn(e, start[model.edge_dof[at(e)]], end[model.edge_dof[at(e)]]);
+  }
+
+  const DiscreteStep& forth() const { return forth_; }
+  const DiscreteStep& backwards() const { return backwards_; }
+  const VectorX& rows() const { return rows_; }
+
+ private:
+  /// Derivatives by an edge's angle. From angles counted so to turns of directors that are carried along with the edge.
+  void add_turn(int edge, double start, double end) {
+    adjoint_.start_turn[edge] += start;
+    adjoint_.end_turn[edge] += end;
+    add_to_edge(problem_.model, edge, -start * start_.edge[at(edge)].spin, adjoint_.start);
+  }
+
+  const StepProblem& problem_;
+  StepAdjoint& adjoint_;
+  VectorX back_, back_q_;
+  Configuration start_;
+  DiscreteStep forth_, backwards_;
+  VectorX rows_;  ///< with what those of nodes make of torques among those of angles
+};
+
+}  // namespace withe

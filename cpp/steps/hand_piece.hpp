@@ -1,0 +1,84 @@
+#pragma once
+/// What a hand that yields does to one edge that it holds: what its forces and their derivatives are made of.
+
+#include "elasticity/bend_twist.hpp"
+#include "elasticity/discrete_elements.hpp"
+#include "elasticity/put_local.hpp"
+#include "forces/hand.hpp"
+#include "model/edge_vectors.hpp"
+#include "steps/hand_forces.hpp"
+
+namespace withe {
+
+inline Vector3 held_point(const Model& model, const VectorX& q, const TouchedEdge& touched) {
+  const Vector3 tail = node_position(model, q, model.edge_tail[at(touched.edge)]),
+                head = node_position(model, q, model.edge_head[at(touched.edge)]);
+  return tail + touched.place * (head - tail);
+}
+
+inline EdgeFrame<double> frame_of(const Matrix3& grip) {
+  return {to_vec3(grip.col(2)), to_vec3(grip.col(0)), to_vec3(grip.col(1)), 1.0, {}, {}};
+}
+
+/// How an edge is displaced from what a hand has grasped.
+struct Shift {
+  Matrix3 grip;       ///< G
+  Vector3 point, by;  ///< x [m]; u, in the axes of G [m]
+};
+
+inline Shift shift_of(const Model& model, const VectorX& q, const HandState& hand, const HandPose& pose,
+                      const TouchedEdge& touched, std::size_t i) {
+  Shift out;
+  out.grip = pose.rotation * hand.edges[i];
+  out.point = held_point(model, q, touched);
+  out.by = out.grip.transpose() * (out.point - pose.position - pose.rotation * hand.points[i]) - hand.slip[i];
+  return out;
+}
+
+inline Vector3 shift_stiffness(const HandDescription& hand, double share) {
+  return share * Vector3(hand.stiffness[0], hand.stiffness[1], hand.stiffness[2]);
+}
+
+/// Bending towards d1 turns about d2.
+inline BendTwistStiffness<double> turn_stiffness(const HandDescription& hand, double share) {
+  return {share * hand.stiffness[4], share * hand.stiffness[3], share * hand.stiffness[5]};
+}
+
+/// In a plane a hand turns about its normal alone.
+inline double planar_stiffness(const Model& model, const HandDescription& hand, double share, const Matrix3& grip) {
+  const Vector3 n = grip.transpose() * model.plane->normal;
+  double sum = 0.0;
+  for (int i = 0; i < 3; ++i) sum += share * hand.stiffness[at(3 + i)] * n[i] * n[i];
+  return sum;
+}
+
+/// The direction of what is grasped, as an edge of unit length in the axes of the plane.
+inline PlanarEdge<double> planar_grip(const Model& model, const Matrix3& grip) {
+  const Vector3 t = grip.col(2);
+  return {{t.dot(model.plane->first), t.dot(model.plane->second)}, 1.0};
+}
+
+inline PlanarBend<double> planar_turn(const Model& model, const BendMeasure& measure, const HandDescription& hand,
+                                      double share, const Matrix3& grip, const EdgeFrame<double>& edge) {
+  const PlanarEdge<double> from = planar_grip(model, grip);
+  const double kappa = planar_kappa(from.tangent.x, from.tangent.y, edge.tangent.x, edge.tangent.y);
+  return planar_bend(measure, kappa, 0.0, planar_stiffness(model, hand, share, grip));
+}
+
+/// One edge that a hand holds, as an evaluation finds it.
+struct HandForces::Piece {
+  const TouchedEdge& touched;
+  const HandDescription& hand;
+  Shift shift;
+  Vector3 stiffness;
+  CappedForce elastic;  ///< -f, in the axes of G
+  Matrix3 by;           ///< d(-f) / dx
+};
+
+/// What such an edge is attached to over an energy-momentum step.
+struct HandForces::Grip {
+  AttachedStep attached;
+  TurnCoefficients elastic;
+};
+
+}  // namespace withe
