@@ -200,7 +200,7 @@ ContactRecord ContactStiffness::record(const Touching& t) const {
   record.stiffness = t.stiffness / t.pair.share;
   record.yielded = t.yielded;
   const bool coming = problem_.pressing != Pressing::still && comes_near(problem_, t);
-  if (coming || (problem_.pressing != Pressing::still && impact_share(problem_, t) > 0.0)) {
+  if (coming || (problem_.pressing != Pressing::still && impact_lasts(problem_, t))) {
     record.approach = t.approach;
     record.age = coming ? 0.0 : t.age + problem_.duration;
   }

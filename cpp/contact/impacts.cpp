@@ -9,12 +9,15 @@ namespace {
 
 // An impact is over after so many swings of its contact and steps, and forgotten after twice as many.
 constexpr double kSwings = 12.0, kSteps = 4.0;
+// What gives nothing back leaves where it came to at kParting kLeastParting of the speed of approach: within some 90
+// swings, which are those of a contact at its stiffest. What contact stores until then is lost as well.
+constexpr double kSwingsOut = 128.0;
 // The speed of approach of what rests, if it does not fall on; over the speed of rest.
 constexpr double kLeastApproach = 1e-9;
 // Surfaces that part faster than this, over the speed at which they will have parted, give back no more than
 // restitution says: slower ones have a four-hundredth of the energy that is to be left. That speed is so much of that
 // of approach, at least.
-constexpr double kParting = 0.05, kLeastParting = 0.1;
+constexpr double kParting = 0.05, kLeastParting = 0.3;
 // What an impact gives back is known within this many swings.
 constexpr double kResolvedSwings = 4.0;
 // Backward Euler leaves 1 / (w dt)^2 of the speed with which surfaces meet where a step is long for a swing, w dt = pi
@@ -53,6 +56,13 @@ double distance_before(const ContactProblem& problem, const Touching& t) {
   return std::sqrt(std::max(dot(d0, d0) + t.proximity.distance * t.proximity.distance - dot(d1, d1), 0.0));
 }
 
+/// As `impact_share`, of an impact that is over after so many swings.
+double share_within(const ContactProblem& problem, const Touching& t, double swings) {
+  if (!(t.approach > 0.0)) return 0.0;
+  const double over = swings * swing_time(problem, t) + kSteps * problem.duration;
+  return smooth_step(t.approach / rest_speed(problem, t.pair) - 1.0) * smooth_step(2.0 - t.age / over);
+}
+
 }  // namespace
 
 double rest_speed(const ContactProblem& problem, const ContactPair& pair) {
@@ -68,10 +78,10 @@ double swing_time(const ContactProblem& problem, const Touching& t) {
   return std::numbers::pi * std::sqrt(0.5 * problem.mass_of(t.pair) * t.pair.share / t.stiffness);
 }
 
-double impact_share(const ContactProblem& problem, const Touching& t) {
-  if (!(t.approach > 0.0)) return 0.0;
-  const double over = kSwings * swing_time(problem, t) + kSteps * problem.duration;
-  return smooth_step(t.approach / rest_speed(problem, t.pair) - 1.0) * smooth_step(2.0 - t.age / over);
+double impact_share(const ContactProblem& problem, const Touching& t) { return share_within(problem, t, kSwings); }
+
+bool impact_lasts(const ContactProblem& problem, const Touching& t) {
+  return impact_share(problem, t) > 0.0 || (t.pair.restitution < 1.0 && share_within(problem, t, kSwingsOut) > 0.0);
 }
 
 ImpactShareSlopes impact_share_slopes(const ContactProblem& problem, const Touching& t) {
@@ -170,12 +180,13 @@ void set_pressing(const ContactProblem& problem, Touching& t) {
   t.energy.first *= t.stiffness;
   t.energy.second *= t.stiffness;
   t.pressing = {t.energy.first, t.energy.second, 0.0};
-  const double share = problem.pressing == Pressing::still ? 0.0 : impact_share(problem, t);
-  if (share == 0.0) return;
+  if (problem.pressing == Pressing::still) return;
+  const double share = impact_share(problem, t);
+  const double lost = (1.0 - pair.restitution * pair.restitution) * share_within(problem, t, kSwingsOut);
   // Friction that goes with the force k E'(D0) asks for the same force at the end of the step before.
   const bool lags = problem.lags() && pair.friction > 0.0;
   if (problem.pressing >= Pressing::mean && !lags) t.law.elastic = share;
-  t.law.restitution = std::sqrt(1.0 - share * (1.0 - pair.restitution * pair.restitution));
+  t.law.restitution = std::sqrt(1.0 - lost);
   t.law.parting = kParting * std::max(t.law.restitution, kLeastParting) * t.approach * problem.duration;
   if (t.law.elastic == 0.0 && !(t.law.restitution < 1.0)) return;
   t.before = problem.turns(pair) ? distance_before(problem, t) : start_distance(problem, pair);

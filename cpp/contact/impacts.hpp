@@ -23,7 +23,9 @@ double first_approach(const ContactProblem& problem, const ContactPair& pair);
 double swing_time(const ContactProblem& problem, const Touching& t);
 /// 1 for surfaces that have just met, 0 for those that rest on each other.
 double impact_share(const ContactProblem& problem, const Touching& t);
-/// Derivatives of that.
+/// Whether surfaces still behave otherwise for having met: in restitution for longer than in what presses elastically.
+bool impact_lasts(const ContactProblem& problem, const Touching& t);
+/// Derivatives of the share.
 struct ImpactShareSlopes {
   double approach = 0;        ///< by the speed at which they met [s/m]
   double slip_tolerance = 0;  ///< [s/m]

@@ -98,6 +98,20 @@ def test_steps_that_outlast_an_impact_that_gives_nothing_back_are_not_cut() -> N
     assert np.abs(simulation.velocities(sheet)).max() < 1e-4
 
 
+@pytest.mark.parametrize("integrator", [*CONSERVING, "backward_euler"])
+def test_what_gives_nothing_back_stays_where_it_falls(integrator: Any) -> None:
+    """What contact stores in the impact was given back as the impact came of age: .07 of the fall in short steps."""
+    for time_step in (2e-3, 5e-4, 1e-4):
+        simulation, rod, fall = falling(4e-3, 0.01, time_step, integrator, restitution=0.0)
+        simulation.run(1.2 * fall, progress=False)
+        heights = []
+        while simulation.time < 2.5 * fall:
+            simulation.step()
+            heights.append(float(simulation.positions(rod)[:, 2].mean()))
+        assert max(heights) < heights[-1] + 1e-3 * 0.01
+        assert simulation.energy().kinetic < 1e-9
+
+
 def head_on(time_step: float, restitution: float | None = None, **contact: Any) -> withe.Simulation:
     scene = withe.Scene(gravity=(0, 0, 0))
     rods = [
