@@ -85,7 +85,7 @@ def draw(record: withe.Record, low: np.ndarray, pressing: np.ndarray, path: Path
         (1.0, pressing[np.argmin(np.abs(low - 1e-3))]), slope=1e-3 * STIFFNESS, color="0.7", label="its stiffness"
     )
     force.axhline(LIMIT, color="0.7", linestyle=":", label="its limit")
-    force.set(xlabel="too low by [mm]", ylabel="[N]", ylim=(-0.1, 1.15 * LIMIT))
+    force.set(xlabel="too low by [mm]", ylabel="force [N]", ylim=(-0.1, 1.15 * LIMIT))
     force.legend()
     figure.savefig(path, dpi=110)
     plt.close(figure)

@@ -16,6 +16,7 @@ __all__ = ["JawMotion", "Motion", "lead"]
 
 FloatArray = npt.NDArray[np.float64]
 _COMES_IN = 0.1  # of the first motion, over which the jaw's errors grow
+_FOLLOWS = 0.2  # [s]
 _JUMP = np.array([1e-3, 1e-3, 0.05])  # between motions, at most [m], [m], [rad]
 
 
@@ -47,27 +48,30 @@ class _Way:
         if (np.abs(self.poses[0] - before) > _JUMP).any():
             where, asked = (f"({x:.4g} m, {z:.4g} m, {angle:.3g} rad)" for x, z, angle in (before, self.poses[0]))
             raise ValueError(f"poses of a motion must begin where the jaw is, at {where}, got {asked}")
-        self.speed = float((np.hypot(*np.diff(self.poses[:, :2], axis=0).T) / np.diff(times)).max())
+        self._speeds = np.hypot(*np.diff(self.poses[:, :2], axis=0).T) / np.diff(times)
+
+    def speed(self, begin: float, end: float) -> float:
+        """Greatest within a time [m/s]."""
+        last = len(self._speeds) - 1
+        first, behind = np.clip(np.searchsorted(self.times, (begin, end), side="right") - 1, 0, last)
+        return float(self._speeds[first : behind + 1].max())
 
     def __call__(self, time: float) -> FloatArray:
         return np.array([np.interp(time, self.times, self.poses[:, i]) for i in range(3)])
 
 
 class JawMotion:
-    """Motions in a row. Each is asked for when the one before has ended, so that it may depend on what came of that.
-
-    Attributes
-    ----------
-    speed : float [m/s]
-        Greatest of the edge so far.
-    """
+    """Motions in a row. Each is asked for when the one before has ended, so that it may depend on what came of that."""
 
     def __init__(self, motions: Iterable[Motion], drawn: Drawn) -> None:
         self._motions: Iterator[Any] = iter(motions)
         self._drawn = drawn
         self._way = _Way(next(self._motions), 0.0, np.zeros(3))
         self._comes_in = _COMES_IN * (self._way.times[-1] - self._way.times[0])
-        self.speed = self._way.speed
+
+    def lately(self, time: float) -> float:
+        """Greatest speed of the edge in the last moments before a time [m/s]: as long as a sheet takes to follow."""
+        return self._way.speed(time - _FOLLOWS, time)
 
     @property
     def end(self) -> float:
@@ -80,7 +84,6 @@ class JawMotion:
         if motion is None:
             return False
         self._way = _Way(motion, self.end, self._way.poses[-1])
-        self.speed = max(self.speed, self._way.speed)
         return True
 
     def __call__(self, time: float) -> FloatArray:

@@ -28,7 +28,7 @@ __all__ = ["FAST", "SETTLING", "SNAP", "Fold", "FoldingMotion", "SimulatedSheet"
 
 FloatArray = npt.NDArray[np.float64]
 SETTLING = 0.5  # after the last motion [s]
-SNAP = 10.0  # times as fast as the jaw is no folding any more,
+SNAP = 10.0  # times as fast as the jaw has lately been is no folding any more,
 FAST = 0.2  # where it is faster than this [m/s]
 _LONGEST = 600.0  # [s]
 _FRAMES = 0.05  # [s]
@@ -332,7 +332,7 @@ class _Watch:
         speed = float(np.linalg.norm(simulation.velocities(self._rod), axis=1).max())
         self.max_speed = max(self.max_speed, speed)
         self.max_curvature = max(self.max_curvature, float(np.abs(simulation.curvatures(self._rod)).max()))
-        self.snapped = speed > max(SNAP * self._jaw.speed, FAST)
+        self.snapped = speed > max(SNAP * self._jaw.lately(simulation.time), FAST)
         if self._end is None and simulation.time > self._jaw.end - 1e-9 and not self._jaw.go_on():
             self._end = self._jaw.end + SETTLING
         return self.snapped or (self._end is not None and simulation.time > self._end - 1e-9)

@@ -216,7 +216,7 @@ class WideSheet:
             def snapped(simulation: Simulation) -> bool:
                 bar.update(simulation.time)
                 speeds = [np.linalg.norm(simulation.velocities(strip), axis=1).max() for strip in self.strips]
-                return bool(max(speeds) > max(SNAP * jaw.speed, FAST))
+                return bool(max(speeds) > max(SNAP * jaw.lately(simulation.time), FAST))
 
             try:
                 simulation.run(end, _FRAMES, progress=False, until=snapped)
