@@ -141,6 +141,19 @@ def test_targets_keep_their_speed_and_stay_in_their_box():
     assert 0.02 < turns / 4000 < 0.3  # by chance, and at walls
 
 
+@pytest.mark.parametrize(("task", "seed", "count"), [("Follow", 4, 300), ("Obstacles3D", 47, 20)])
+def test_actions_drawn_at_random_bring_arms_to_no_speed_of_their_own(task, seed, count):
+    """Midpoint steps that are not watched gain energy: tips came to 11 and 180 m/s, and arms were crushed."""
+    env = withe.learning.Environment(getattr(withe.learning, task)())
+    env.reset(seed=seed)
+    actions = np.random.default_rng(seed).uniform(-1.0, 1.0, (count, env.task.action_size))
+    fastest = 0.0
+    for action in actions:
+        env.step(action)
+        fastest = max(fastest, float(np.linalg.norm(env.simulation.velocities("arm"), axis=1).max()))
+    assert fastest < 5.0
+
+
 def test_drawn_capsules_are_in_their_box_apart_and_new_in_each_episode():
     task = withe.learning.Obstacles3D()
     env = withe.learning.VectorEnvironment(task, 3, workers=1)

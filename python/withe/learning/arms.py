@@ -78,7 +78,6 @@ class Arm(Task):
         return scene.build(
             time_step=self.time_step,
             planar=self.planar,
-            energy_guard=False,
             step_tolerance=1e-4,  # .1 mm: 1 % of what the steps' length costs, for a fifth of the work less
             force_tolerance=1e-3,
         )

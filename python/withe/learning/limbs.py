@@ -90,7 +90,7 @@ class Crawl(_Limbs):
         for rod in rods[1:]:
             scene.join(rods[0].start, rod.start)
         scene.add_floor(float(points[-1, 2]) - self.radius, friction=self.friction)
-        return scene.build(integrator="backward_euler", time_step=5e-3, energy_guard=False)
+        return scene.build(integrator="backward_euler", time_step=5e-3)
 
     def prepare(self, robots: Batch) -> None:
         """Remembers where the body was."""
@@ -164,7 +164,7 @@ class Wrap(_Limbs):
         scene.add_drag(0.5)
         scene.add_sphere((0.0, 0.0, self.depth), self.ball, name="ball")
         scene.enable_contact()
-        return scene.build(integrator="backward_euler", time_step=1e-2, energy_guard=False)
+        return scene.build(integrator="backward_euler", time_step=1e-2)
 
     def prepare(self, robots: Batch) -> None:
         """Remembers where the balls are."""
