@@ -45,7 +45,8 @@ std::array<Scalar, 4> across(const SheetSlope<Scalar>& slope, int segment, int s
 
 int sheet_steps(const SheetProblem::Path& path) {
   const auto& [up, forward, length] = path.values;
-  const double force = std::max({std::hypot(up, forward), std::hypot(up - length, forward), 1e-3});
+  const double farthest = std::max(up * up, (up - length) * (up - length));
+  const double force = std::max(std::sqrt(farthest + forward * forward), 1e-3);
   const double step = std::min(0.4, std::sqrt(2.0 / force) * std::pow(5e-4 / force, 0.125));
   const double steps = std::ceil(length / (SheetProblem::kSegments * step));
   return static_cast<int>(std::clamp(steps, 1.0, 50.0));  // also where Newton's method went astray

@@ -119,7 +119,10 @@ void SheetManifold::fill_column(std::size_t column, std::size_t start_row, Shoot
 
 namespace {
 
-double reach_of(const Path& path) { return std::hypot(tip_back(path), tip_up(path)); }
+double reach_of(const Path& path) {
+  const double x = tip_back(path), z = tip_up(path);
+  return std::sqrt(x * x + z * z);
+}
 
 /// Weights of values at places in the polynomial through them, at x.
 template <std::size_t most>
@@ -250,7 +253,7 @@ bool solve_shape(const SheetShape& shape, SheetManifold::Data& data) {
 
 SheetSolution SheetManifold::at_position(double x, double z, const SheetShape& shape, Data& data) const {
   if (!(x >= 0 && z >= 0 && x + z > 0)) return {};
-  const double direction = std::atan2(x, z), distance = std::hypot(x, z);
+  const double direction = std::atan2(x, z), distance = std::sqrt(x * x + z * z);
   const auto cell = find_position(direction, distance);
   if (!cell) return {};
   interpolate(patch_at_position(*cell, direction, distance), data.path);
