@@ -199,10 +199,12 @@ ContactRecord ContactStiffness::record(const Touching& t) const {
   record.force = -t.energy.first;
   record.stiffness = t.stiffness / t.pair.share;
   record.yielded = t.yielded;
-  const bool coming = problem_.pressing != Pressing::still && comes_near(problem_, t);
-  if (coming || (problem_.pressing != Pressing::still && impact_lasts(problem_, t))) {
-    record.approach = t.approach;
-    record.age = coming ? 0.0 : t.age + problem_.duration;
+  if (problem_.pressing != Pressing::still) {
+    const bool coming = comes_near(problem_, t);
+    if (coming || impact_lasts(problem_, t)) {
+      record.approach = t.approach;
+      record.age = coming ? 0.0 : t.age + problem_.duration;
+    }
   }
   record_friction(problem_, t, record);
   return record;

@@ -182,7 +182,9 @@ void set_pressing(const ContactProblem& problem, Touching& t) {
   t.pressing = {t.energy.first, t.energy.second, 0.0};
   if (problem.pressing == Pressing::still) return;
   const double share = impact_share(problem, t);
-  const double lost = (1.0 - pair.restitution * pair.restitution) * share_within(problem, t, kSwingsOut);
+  const double lost =
+      pair.restitution < 1.0 ? (1.0 - pair.restitution * pair.restitution) * share_within(problem, t, kSwingsOut) : 0.0;
+  if (share == 0.0 && lost == 0.0) return;
   // Friction that goes with the force k E'(D0) asks for the same force at the end of the step before.
   const bool lags = problem.lags() && pair.friction > 0.0;
   if (problem.pressing >= Pressing::mean && !lags) t.law.elastic = share;

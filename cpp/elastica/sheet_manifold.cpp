@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "common/interpolation.hpp"
+
 namespace withe {
 
 namespace {
@@ -124,18 +126,6 @@ double reach_of(const Path& path) {
   return std::sqrt(x * x + z * z);
 }
 
-/// Weights of values at places in the polynomial through them, at x.
-template <std::size_t most>
-std::array<double, most> polynomial_weights(const std::array<double, most>& places, std::size_t count, double x) {
-  std::array<double, most> weights{};
-  for (std::size_t i = 0; i < count; ++i) {
-    weights[i] = 1.0;
-    for (std::size_t j = 0; j < count; ++j)
-      if (j != i) weights[i] *= (x - places[j]) / (places[i] - places[j]);
-  }
-  return weights;
-}
-
 template <std::size_t most>
 bool is_monotonic(const std::array<double, most>& values, std::size_t count) {
   const bool grows = values[1] > values[0];
@@ -196,12 +186,12 @@ SheetManifold::Patch SheetManifold::patch_at_position(const Cell& cell, double d
   Patch patch = patch_around(cell);
   Weights places{}, reaches{};
   for (std::size_t j = 0; j < patch.points; ++j) places[j] = directions_[patch.first.column + j];
-  patch.columns = polynomial_weights(places, patch.points, direction);
+  patch.columns = lagrange_weights(places, patch.points, direction);
   // Everything is smooth in the distance, too, along a direction.
   for (std::size_t i = 0; i < patch.points; ++i)
     for (std::size_t j = 0; j < patch.points; ++j)
       reaches[i] += patch.columns[j] * reach_of(node(patch.first.row + i, patch.first.column + j));
-  patch.rows = polynomial_weights(reaches, patch.points, distance);
+  patch.rows = lagrange_weights(reaches, patch.points, distance);
   return patch;
 }
 
@@ -209,11 +199,11 @@ SheetManifold::Patch SheetManifold::patch_at_angle(const Cell& cell, double leng
   const auto weigh = [&](Patch& patch) {
     Weights places{}, angles{};
     for (std::size_t i = 0; i < patch.points; ++i) places[i] = lengths_[patch.first.row + i];
-    patch.rows = polynomial_weights(places, patch.points, length);
+    patch.rows = lagrange_weights(places, patch.points, length);
     for (std::size_t j = 0; j < patch.points; ++j)
       for (std::size_t i = 0; i < patch.points; ++i)
         angles[j] += patch.rows[i] * tip_angle(node(patch.first.row + i, patch.first.column + j));
-    patch.columns = polynomial_weights(angles, patch.points, angle);
+    patch.columns = lagrange_weights(angles, patch.points, angle);
     return is_monotonic(angles, patch.points);
   };
   Patch patch = patch_around(cell);

@@ -2,18 +2,12 @@
 
 #include <algorithm>
 
+#include "common/interpolation.hpp"
+
 namespace withe {
 
 void Predictor::extrapolate(double time, const History& history, int points, VectorX& out) const {
-  std::array<double, kDepth> weight{};  // Lagrange's
-  for (int i = 0; i < points; ++i) {
-    const auto a = static_cast<std::size_t>(i);
-    weight[a] = 1.0;
-    for (int j = 0; j < points; ++j) {
-      const auto b = static_cast<std::size_t>(j);
-      if (j != i) weight[a] *= (time - time_[b]) / (time_[a] - time_[b]);
-    }
-  }
+  const auto weight = lagrange_weights(time_, static_cast<std::size_t>(points), time);
   const auto& [a, b, c, d] = history;
   const auto& [wa, wb, wc, wd] = weight;
   switch (points) {

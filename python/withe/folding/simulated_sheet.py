@@ -10,28 +10,22 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
-from withe.common.progress import progress as progress_bar
-from withe.errors import ConvergenceError
+from withe.folding.carrying import Watch, carried
 from withe.folding.jaw import Jaw
 from withe.folding.jaw_motion import JawMotion, Motion, lead
 from withe.folding.noise import Drawn, Noise
 from withe.folding.paper import Paper
 from withe.folding.paper_rods import add_paper
 from withe.folding.views import strip_picture, table_picture
-from withe.parts.handles import Rod
 from withe.perception.camera import Camera
 from withe.recording.record import Record
 from withe.scene.scene import Scene
 from withe.simulation.simulation import Simulation
 
-__all__ = ["FAST", "SETTLING", "SNAP", "Fold", "FoldingMotion", "SimulatedSheet", "node_places"]
+__all__ = ["Fold", "FoldingMotion", "SimulatedSheet", "node_places"]
 
 FloatArray = npt.NDArray[np.float64]
-SETTLING = 0.5  # after the last motion [s]
-SNAP = 10.0  # times as fast as the jaw has lately been is no folding any more,
-FAST = 0.2  # where it is faster than this [m/s]
-_LONGEST = 600.0  # [s]
-_FRAMES = 0.05  # [s]
+_LONGEST = 600.0  # [s] that a progress bar expects of motions that it does not know
 
 
 class FoldingMotion(Motion, Protocol):
@@ -277,24 +271,10 @@ class SimulatedSheet:
         self.simulation.reset()
         self._grain = np.random.default_rng(self._seed)
         jaw = JawMotion(motions, self._drawn)
-        watch = _Watch(jaw, self.rod)
         lead(self.simulation.hand("jaw"), jaw, self.jaw.depth)
-        failure = None
-        with progress_bar(duration + SETTLING, "folding", progress) as bar:
+        return self._result(target, carried(self.simulation, jaw, [self.rod], duration, progress))
 
-            def ended(simulation: Simulation) -> bool:
-                bar.update(simulation.time)
-                return watch(simulation)
-
-            try:
-                self.simulation.run(_LONGEST, _FRAMES, progress=False, until=ended)
-            except ConvergenceError as error:
-                failure = f"no solution: {error}"
-        if watch.snapped:
-            failure = f"snapped at {self.simulation.time:.2f} s"
-        return self._result(target, watch, failure)
-
-    def _result(self, target: float, watch: _Watch, failure: str | None) -> Fold:
+    def _result(self, target: float, watch: Watch) -> Fold:
         positions = self.positions()
         slide = positions[-1, 0] - self.paper.length
         error = 0.5 * (positions[0, 0] - slide - target)
@@ -304,7 +284,7 @@ class SimulatedSheet:
             slide=float(slide),
             max_curvature=watch.max_curvature,
             max_speed=watch.max_speed,
-            failure=failure,
+            failure=watch.failure,
             record=self.simulation.record,
         )
 
@@ -317,22 +297,3 @@ def node_places(length: float, depth: float, edges: int) -> FloatArray:
     held = max(0, round(edges * depth / length - 0.5))
     last = depth * (held + 1.0) / (held + 0.5) if depth > 0.0 else length / edges
     return np.concatenate([np.linspace(0.0, last, held + 2), np.linspace(last, length, edges - held)[1:]])
-
-
-class _Watch:
-    """Looks at a sheet after every step: asks for the next motion, and sees whether it snaps."""
-
-    def __init__(self, jaw: JawMotion, rod: Rod) -> None:
-        self._jaw, self._rod = jaw, rod
-        self._end: float | None = None
-        self.max_speed = self.max_curvature = 0.0
-        self.snapped = False
-
-    def __call__(self, simulation: Simulation) -> bool:
-        speed = float(np.linalg.norm(simulation.velocities(self._rod), axis=1).max())
-        self.max_speed = max(self.max_speed, speed)
-        self.max_curvature = max(self.max_curvature, float(np.abs(simulation.curvatures(self._rod)).max()))
-        self.snapped = speed > max(SNAP * self._jaw.lately(simulation.time), FAST)
-        if self._end is None and simulation.time > self._jaw.end - 1e-9 and not self._jaw.go_on():
-            self._end = self._jaw.end + SETTLING
-        return self.snapped or (self._end is not None and simulation.time > self._end - 1e-9)

@@ -11,14 +11,13 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
-from withe.common.progress import progress as progress_bar
-from withe.errors import ConvergenceError
+from withe.folding.carrying import carried
 from withe.folding.jaw import Jaw
 from withe.folding.jaw_motion import JawMotion, lead
 from withe.folding.noise import Drawn, Noise
 from withe.folding.paper import Paper
 from withe.folding.paper_rods import strip_numbers
-from withe.folding.simulated_sheet import FAST, SETTLING, SNAP, FoldingMotion, node_places
+from withe.folding.simulated_sheet import FoldingMotion, node_places
 from withe.parts.handles import Rod
 from withe.parts.materials import Stiffness
 from withe.recording.record import Record
@@ -31,7 +30,6 @@ FloatArray = npt.NDArray[np.float64]
 _IN_PLANE = 1e3  # times as stiff in its plane as out of it is a strip; more changes no spin by a hundredth of a degree
 _TWIST = 1.5  # G J / EI of a flat strip, Poisson's ratio 1/3
 _CROSS_WEIGHT = 0.05  # of what joins the far ends, per length, over that of a strip
-_FRAMES = 0.05  # [s]
 
 
 @dataclass(frozen=True)
@@ -210,21 +208,8 @@ class WideSheet:
         jaw = JawMotion([plan], self._drawn)
         for strip, y in zip(self.strips, self._sides, strict=True):
             lead(simulation.hand(f"jaw on {strip.name}"), jaw, self.jaw.depth, float(y))
-        end, failure = jaw.end + SETTLING, None
-        with progress_bar(end, "folding", progress) as bar:
-
-            def snapped(simulation: Simulation) -> bool:
-                bar.update(simulation.time)
-                speeds = [np.linalg.norm(simulation.velocities(strip), axis=1).max() for strip in self.strips]
-                return bool(max(speeds) > max(SNAP * jaw.lately(simulation.time), FAST))
-
-            try:
-                simulation.run(end, _FRAMES, progress=False, until=snapped)
-            except ConvergenceError as error:
-                failure = f"no solution: {error}"
-        if failure is None and simulation.time < end - 1e-9:
-            failure = f"snapped at {simulation.time:.2f} s"
-        return self._result(plan.target, failure)
+        duration = float(plan.times[-1] - plan.times[0])
+        return self._result(plan.target, carried(simulation, jaw, self.strips, duration, progress).failure)
 
     def _result(self, target: float, failure: str | None) -> WideFold:
         ends = [self.simulation.positions(strip)[[0, -1], 0] for strip in self.strips]

@@ -1,0 +1,71 @@
+"""A simulated sheet while a jaw carries it: how far it goes on, and when it is no folding any more."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from withe.common.progress import progress as progress_bar
+from withe.errors import ConvergenceError
+from withe.folding.jaw_motion import JawMotion
+from withe.parts.handles import Rod
+from withe.simulation.simulation import Simulation
+
+__all__ = ["Watch", "carried"]
+
+_SETTLING = 0.5  # after the last motion [s]
+_SNAP = 10.0  # times as fast as the jaw has lately been is no folding any more,
+_FAST = 0.2  # where it is faster than this [m/s]
+_LONGEST = 600.0  # [s]
+_FRAMES = 0.05  # [s]
+
+
+class Watch:
+    """Looks at a sheet after every step: asks for the next motion, and sees whether it snaps.
+
+    Attributes
+    ----------
+    max_speed : float [m/s]
+    max_curvature : float [1/m]
+        Greatest so far.
+    failure : str or None
+        Why it is no fold.
+    """
+
+    def __init__(self, jaw: JawMotion, rods: Sequence[Rod]) -> None:
+        self._jaw, self._rods = jaw, rods
+        self._end: float | None = None
+        self.max_speed = self.max_curvature = 0.0
+        self.failure: str | None = None
+
+    def __call__(self, simulation: Simulation) -> bool:
+        """Whether it is over."""
+        speed = max(float(np.linalg.norm(simulation.velocities(rod), axis=1).max()) for rod in self._rods)
+        curvature = max(float(np.abs(simulation.curvatures(rod)).max()) for rod in self._rods)
+        self.max_speed = max(self.max_speed, speed)
+        self.max_curvature = max(self.max_curvature, curvature)
+        if speed > max(_SNAP * self._jaw.lately(simulation.time), _FAST):
+            self.failure = f"snapped at {simulation.time:.2f} s"
+        if self._end is None and simulation.time > self._jaw.end - 1e-9 and not self._jaw.go_on():
+            self._end = self._jaw.end + _SETTLING
+        return self.failure is not None or (self._end is not None and simulation.time > self._end - 1e-9)
+
+
+def carried(simulation: Simulation, jaw: JawMotion, rods: Sequence[Rod], duration: float, progress: bool) -> Watch:
+    """Run until the jaw has done its motions and the sheet has settled, or until it snaps.
+
+    `duration` [s] is what a progress bar expects of the motions.
+    """
+    watch = Watch(jaw, rods)
+    with progress_bar(duration + _SETTLING, "folding", progress) as bar:
+
+        def ended(simulation: Simulation) -> bool:
+            bar.update(simulation.time)
+            return watch(simulation)
+
+        try:
+            simulation.run(_LONGEST, _FRAMES, progress=False, until=ended)
+        except ConvergenceError as error:
+            watch.failure = f"no solution: {error}"
+    return watch
