@@ -112,6 +112,7 @@ class ArcLength {
     VectorX z = state_.q + step_;
     double factor = factor_ + arc * rate_, last = INFINITY;
     NewtonResult& newton = result_.newton;
+    Stagnation stagnation;
     const double tolerance = options_.step_tolerance * equations_.model().length_scale;
     for (int k = 0; k <= kMostIterations; ++k) {
       work_.poll();
@@ -122,7 +123,8 @@ class ArcLength {
       path_.evaluate(z, true, options_.mixed ? work_.axial_force.data() : nullptr);
       if (!work_.data.residual.allFinite()) break;
       const Balance balance = newton_.balance(work_.data, newton);
-      if ((balance.floor && k > 0) || (balance.either && last <= tolerance)) {
+      stagnation.note(newton.residual, last);
+      if ((balance.floor && stagnation.reached()) || (balance.either && last <= tolerance)) {
         path_.accept(z);
         factor_ = factor;
         find_direction(&start_.tangent, true, start_.rate);

@@ -66,12 +66,14 @@ void MatrixReuse::note_step(double length) {
   step_ = distance_ = length;
   age_ = fresh_ ? MatrixAge::fresh : made_here_ ? MatrixAge::within : MatrixAge::across;
   if (!allowed_) return;
-  bool measured = false;
+  double here = 4.0 * record_.contraction[at(age_)];
   if (std::isfinite(last_step_) && std::isfinite(step_)) {
-    record_.contraction[at(last_age_)] = step_ / last_step_;
-    measured = last_age_ == age_;
+    const double rate = step_ / last_step_;
+    double& greatest = measured_[at(last_age_)];
+    record_.contraction[at(last_age_)] = greatest = std::max(greatest, rate);
+    if (last_age_ == age_) here = rate;
   }
-  const double here = std::min(0.5, (measured ? 1.0 : 4.0) * record_.contraction[at(age_)]);
+  here = std::min(here, 0.5);
   distance_ = step_ * here / (1.0 - here);
   const double next = record_.contraction[at(age_ == MatrixAge::across ? MatrixAge::across : MatrixAge::within)];
   fresh_ = !std::isfinite(step_) || next > 0.5 || (!heuristics_.uses(Heuristic::reuse_within_step) && made_here_) ||

@@ -16,7 +16,8 @@ enum class MatrixAge { fresh, within, across };
 /// Contraction rates of chord iterations with earlier factorisations.
 struct MatrixHistory {
   double interval = 0;  ///< that the last one belongs to [s]
-  /// Contraction rate per MatrixAge: error after an iteration over error before.
+  /// Contraction rate per MatrixAge: error after an iteration over error before. The greatest of a solve: the nearer to
+  /// the solution, the smaller it is, and what the last iterations had says nothing of the first ones of the next step.
   std::array<double, 3> contraction{1e-2, 1e-2, 1e-2};
   int waited = 0;     ///< time steps since one was last tried across
   bool slow = false;  ///< the last time step took many iterations with one
@@ -72,6 +73,7 @@ class MatrixReuse {
   double tolerance_;
   const Without& heuristics_;
   bool fresh_ = true, made_here_ = false;
+  std::array<double, 3> measured_{};  ///< greatest contraction rates of this solve
   MatrixAge age_ = MatrixAge::fresh, last_age_ = MatrixAge::fresh;
   double step_ = INFINITY, last_step_ = INFINITY;
   double distance_ = INFINITY;  ///< from the solution, estimated [m]

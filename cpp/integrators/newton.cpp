@@ -77,7 +77,6 @@ Balance Newton::balance(const StepData& e, NewtonResult& result) const {
   result.residual = (size / norms_.arms().array()).maxCoeff();
   balance.either = over_floor.min(over_share).maxCoeff() <= 0.0;
   balance.floor = balance.either && over_floor.maxCoeff() <= 0.0;
-  balance.relative = balance.either && over_share.maxCoeff() <= 0.0;
   return balance;
 }
 
@@ -144,6 +143,7 @@ class Newton::Solve {
     result_.step = reuse_.step();
     balance_ = newton_.balance(work_.data, result_);
     if (!balance_.finite) return Verdict::failed;
+    stagnation_.note(result_.residual, reuse_.step());
     if (converged()) return Verdict::converged;
     if (result_.iterations == how_.max_iterations) return Verdict::failed;
     if (result_.iterations == 0) first_residual_ = result_.residual;
@@ -154,11 +154,13 @@ class Newton::Solve {
     return Verdict::go_on;
   }
 
-  /// Rounding alone is no proof before the first step: a light load on a stiff rod hides in it. Points on the way end
-  /// by their steps alone, whatever rounding leaves: the same scene elsewhere in space takes the same steps.
+  /// A guess is no solution before a step shows it: residuals within the bound of rounding, and within the tolerance of
+  /// what a rod is stressed by, may be all of its weight. Points on the way end by their steps alone, whatever rounding
+  /// leaves: the same scene elsewhere in space takes the same steps.
   bool converged() const {
     if (how_.predicted && how_.predicted->enough > 0.0) return reuse_.step() <= how_.predicted->enough;
-    return (balance_.floor && (result_.iterations > 0 || balance_.relative)) || (balance_.either && reuse_.at_end());
+    if (result_.iterations == 0) return (work_.data.residual.array() == 0.0).all();
+    return (balance_.either && reuse_.at_end()) || (balance_.floor && stagnation_.reached());
   }
 
   /// Takes a step; false where there is none, or none that may lead to the solution.
@@ -194,7 +196,10 @@ class Newton::Solve {
       z_.swap(work_.trial);
     else
       z_ += work_.step;
-    reuse_.note_step(shorten < 1.0 ? INFINITY : newton_.norms_.displacement(work_.step));
+    const double length = newton_.norms_.displacement(work_.step);
+    // A step that is cut says nothing of where the solution is, unless all of it is within the tolerance.
+    const bool near = shorten > 0.0 && length <= shorten * reuse_.tolerance();
+    reuse_.note_step(shorten == 1.0 || near ? length : INFINITY);
     return !how_.predicted || !how_.predicted->strict || !loses_path(*how_.predicted, reuse_, result_.iterations == 0);
   }
 
@@ -225,6 +230,7 @@ class Newton::Solve {
   bool spare_matrix_ = false;  ///< made since the last factorisation
   NewtonResult result_;
   Balance balance_;
+  Stagnation stagnation_;
   double first_residual_ = 0.0;
 };
 

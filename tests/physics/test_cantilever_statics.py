@@ -8,6 +8,7 @@ import pytest
 
 import rods
 import theory
+import withe
 from convergence import assert_order, assert_order_at_least
 
 EDGES = (40, 80, 160)
@@ -77,6 +78,18 @@ def test_small_self_weight_sinks_by_an_eighth_of_it():
         errors.append(tip(simulation, arm)[0] / (1e-4 / 8.0) - 1.0)
     assert_order(errors, order=3.0)
     assert abs(errors[-1]) < 1e-6
+
+
+@SPACES
+@pytest.mark.parametrize("edges", [1000, 3000, 5000])
+def test_small_self_weight_sinks_by_an_eighth_of_it_on_the_finest_meshes(edges, planar):
+    """The whole weight of a node may be less than the bound of what rounding leaves of its row."""
+    scene = withe.Scene(gravity=(0.0, 0.0, -1e-3))
+    arm = rods.straight(scene, edges, stiffness=rods.stiffness(stretch=4e5))
+    scene.clamp(arm.start)
+    simulation = scene.build(integrator="static", planar=planar)
+    simulation.equilibrium()
+    assert tip(simulation, arm)[0] == pytest.approx(1e-3 / 8.0, rel=2e-6)
 
 
 def test_support_of_a_cantilever_carries_its_load_exactly():

@@ -294,3 +294,54 @@ def test_midpoint_and_fourth_order_by_default_gain_at_most_a_thousandth(integrat
     most = max(simulation.energy().total for _ in range(300) if not simulation.step())
     assert most <= first * (1.0 + 1.01e-3)
     assert simulation.statistics.energy_momentum_steps > 0
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_a_fine_mesh_closes_the_balance_as_a_coarse_one_does(seed):
+    """Thousands of rows that are each within their rounding error bound may bend a rod, all in the same sense."""
+    draw = np.random.default_rng([20, seed])
+    slenderness, nodes = 10.0 ** draw.uniform(1.3, 2.7), int(draw.integers(1000, 3000))
+    scene = withe.Scene(gravity=draw.uniform(0.3, 3.0) * np.array([0.6, 0.0, -0.8]))
+    ends = {"stretch": 16.0 * slenderness**2}  # EA L^2 / EI = 16 (L / d)^2 of a round section
+    rod = rods.straight(scene, nodes - 1, (0.0, 1.0, 0.0), stiffness=rods.stiffness(**ends))
+    scene.clamp(rod.start)
+    if seed % 2:
+        scene.clamp(rod.end)
+    period = 2.0 * np.pi / (22.373 if seed % 2 else 3.516)
+    simulation = scene.build(
+        integrator="energy_momentum",
+        time_step=draw.uniform(0.03, 0.3) * period,
+        planar=seed % 3 == 0,
+        step_tolerance=1e-12,
+        force_tolerance=1e-12,
+    )
+    first, moved, worst = balance(simulation), 0.0, 0.0
+    for _ in range(6):
+        simulation.step()
+        energy = simulation.energy()
+        moved = max(moved, energy.kinetic + energy.bend + energy.stretch)
+        worst = max(worst, abs(balance(simulation) - first))
+    assert worst < 1e-8 * moved
+
+
+@pytest.mark.parametrize(("nodes", "weight"), [(1000, 1e-2), (3000, 1.0), (3000, 1e-3)])
+def test_a_stressed_rod_of_a_fine_mesh_falls_as_one_of_a_coarse_mesh_does(nodes, weight):
+    """All that a load is may lie below the share of the stresses, and the rounding, that each row may be off by."""
+
+    def fallen(count):
+        scene = rods.weightless()
+        s, radius = np.linspace(0.0, 1.0, count), 1.0 / np.pi
+        points = radius * np.stack([np.sin(s / radius), 0.0 * s, 1.0 - np.cos(s / radius)], axis=1)
+        rod = scene.add_rod(
+            points=points, radius=1e-3, line_density=1.0, stiffness=rods.stiffness(stretch=1e6), natural="straight"
+        )
+        scene.clamp(rod.start)
+        scene.clamp(rod.end)
+        simulation = scene.build(planar=True, time_step=2e-3)
+        simulation.equilibrium()
+        before = simulation.positions(rod)[count // 2, 2]
+        simulation.set(gravity=(0.0, 0.0, -weight))
+        simulation.step(20)
+        return before - simulation.positions(rod)[count // 2, 2]
+
+    assert fallen(nodes) == pytest.approx(fallen(200), rel=1e-3)
