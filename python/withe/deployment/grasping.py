@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -105,7 +105,8 @@ def grasp(
     ValueError
         Not numbers, out of range, or shapes that do not broadcast.
     ConvergenceError
-        There is no such grasp, as with an axial force that is too large.
+        There is no such grasp, as with an axial force that is too large, or a thick rod so bent that its twist lifts
+        it off the floor.
 
     Examples
     --------
@@ -163,10 +164,17 @@ def _described(rows: FloatArray, questions: FloatArray, shape: tuple[int, ...]) 
     )
 
 
+<<<<<<< 0d8aa39
+def least_friction(
+    suspended: FloatArray, curvature: FloatArray, shear: FloatArray, stretch_stiffness: float, radius: float
+) -> Grasp:
+=======
 def least_friction(suspended: FloatArray, curvature: FloatArray, stretch_stiffness: float, radius: float) -> Grasp:
+>>>>>>> 96ab70df244317647be0b7d312806d98e1e693cb
     """Grasps with the push along the rod that needs least friction at lift-off, shapes (n,); see `grasp`.
 
-    The push is a share of curvature^2: the best of a few, and of the parabola through it and its neighbours.
+    `shear` is the force across, along y, of what lies on what hangs, which the floor need not give [w Lgb]. The push is
+    a share of curvature^2: the best of a few, and of the parabola through it and its neighbours.
     """
     count = len(suspended)
     near = np.minimum(suspended, _ENOUGH)
@@ -177,7 +185,7 @@ def least_friction(suspended: FloatArray, curvature: FloatArray, stretch_stiffne
         rows = np.asarray(table().grasps(questions, TWIST_STIFFNESS))
         good = (rows[:, 11] > 0) & (rows[:, 12] > 0) & (rows[:, 9] > 0)
         with np.errstate(divide="ignore", invalid="ignore"):
-            return rows, np.where(good, np.hypot(rows[:, 7], rows[:, 8]) / rows[:, 9], np.inf)
+            return rows, np.where(good, np.hypot(rows[:, 7], rows[:, 8] - shear) / rows[:, 9], np.inf)
 
     tried = [rows_at(np.full(count, share)) for share in _SHARES]
     needed = np.stack([need for _, need in tried])
@@ -197,6 +205,21 @@ def least_friction(suspended: FloatArray, curvature: FloatArray, stretch_stiffne
         chosen, _ = rows_at(np.where(curvature == 0.0, 0.0, push / curvature**2), suspended)
     questions = np.stack([suspended, curvature, push, push, push, push], -1)
     return _described(chosen, questions, (count,))
+
+
+def twisted(found: Grasp, suspended: FloatArray, curvature: FloatArray, radius: float) -> Grasp:
+    """Grasps of a thin rod, without force along the floor, turned about the rod as those of a thick one are.
+
+    The couples at lift-off and of the jaw balance about the upright axis, force_y x = 2 curvature - radius force_y t_z.
+    Where the jaw is changes too, at a curvature of .5 / Lgb by up to some .3 radius; that is left out.
+    """
+    from scipy.spatial.transform import Rotation
+
+    held = Rotation.from_rotvec(found.rotation)
+    up = held.as_matrix()[:, 2, 0]
+    across = _BEND_STIFFNESS * curvature / (found.position[:, 0] + radius * up)
+    angle = -radius * across * suspended / TWIST_STIFFNESS
+    return replace(found, rotation=(held * Rotation.from_rotvec(angle[:, None] * [1.0, 0.0, 0.0])).as_rotvec())
 
 
 def pivoting(suspended: float, angles: FloatArray, stretch_stiffness: float) -> Grasp:
