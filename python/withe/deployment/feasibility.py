@@ -196,7 +196,6 @@ def grasps_along(pattern: Laid, cable: Cable, controller: str) -> Grasp:
         )
     suspended = np.maximum((cable.length - 0.5 * JAW - pattern.arc_length) / lgb, table().shortest)
     curvature = -lgb * pattern.curvature  # grasps bend to the right
-<<<<<<< 0d8aa39
     thick = cable.radius / lgb
     if controller == "network":
         return twisted(shipped()(suspended, curvature, cable.stretch_stiffness), suspended, curvature, thick)
@@ -208,13 +207,6 @@ def grasps_along(pattern: Laid, cable: Cable, controller: str) -> Grasp:
     except ConvergenceError as error:
         bend = f"whose radius at {at:.0f} mm is {1e3 / tightest:.2g} mm"
         raise ValueError(f"no floor holds this cable on this pattern, {bend}: {error}") from error
-=======
-    if controller == "least_friction":
-        return least_friction(suspended, curvature, cable.stretch_stiffness, cable.radius / lgb)
-    if controller == "network":
-        return shipped()(suspended, curvature, cable.stretch_stiffness)
-    return grasp(suspended, curvature, cable.stretch_stiffness, radius=cable.radius / lgb)
->>>>>>> 96ab70df244317647be0b7d312806d98e1e693cb
 
 
 def _floor(s: FloatArray, curvature: FloatArray, slope: FloatArray, bend: FloatArray) -> FloatArray:

@@ -164,13 +164,9 @@ def _described(rows: FloatArray, questions: FloatArray, shape: tuple[int, ...]) 
     )
 
 
-<<<<<<< 0d8aa39
 def least_friction(
     suspended: FloatArray, curvature: FloatArray, shear: FloatArray, stretch_stiffness: float, radius: float
 ) -> Grasp:
-=======
-def least_friction(suspended: FloatArray, curvature: FloatArray, stretch_stiffness: float, radius: float) -> Grasp:
->>>>>>> 96ab70df244317647be0b7d312806d98e1e693cb
     """Grasps with the push along the rod that needs least friction at lift-off, shapes (n,); see `grasp`.
 
     `shear` is the force across, along y, of what lies on what hangs, which the floor need not give [w Lgb]. The push is
