@@ -1,7 +1,8 @@
 #pragma once
-/// All poses in which a sheet of one width can be held without moment: the manifold of solutions with theta >= 0, tabulated once so
-/// that every other solution begins next to its answer, by cubic interpolation. For one position of the tip there are
-/// several equilibria; those of this manifold are one family, reached from the flat sheet without a jump.
+/// All poses in which a sheet of one width can be held without moment: the manifold of solutions with theta >= 0,
+/// tabulated once so that every other solution begins next to its answer, by cubic interpolation. For one position of
+/// the tip there are several equilibria; those of this manifold are one family, reached from the flat sheet without a
+/// jump.
 
 #include <array>
 #include <optional>
@@ -17,8 +18,8 @@ class SheetManifold {
  public:
   static constexpr double kShortest = 0.958, kLongest = 6.84;  ///< [Lgb] suspended lengths served by position
   static constexpr double kShortestRow = 0.05;                 ///< [Lgb] and by length and angle
-  static constexpr double kGreatestPull = 40.0;  ///< [w Lgb] backward force on a taut sheet that ends the
-                                                 ///< table; w that of its narrower end
+  static constexpr double kGreatestPull = 40.0;                ///< [w Lgb] backward force on a taut sheet that ends the
+                                                               ///< table; w that of its narrower end
 
   explicit SheetManifold(const SheetWidth& width = {});
 
