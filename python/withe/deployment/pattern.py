@@ -278,7 +278,7 @@ class Pattern:
         >>> circle = withe.deployment.Pattern(0.09 * np.stack([np.sin(angle), 1 - np.cos(angle)], 1), lead_in=0.15)
         >>> found = circle.feasibility(withe.deployment.Cable.dlo(2), friction=0.4)
         >>> print(found.feasible, f"{found.lift_off.max():.2f}")
-        True 0.27
+        True 0.26
         """
         return examine(self, cable, friction, controller)
 
