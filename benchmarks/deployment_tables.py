@@ -119,18 +119,14 @@ def marks(motion: Plan, friction: float) -> str:
 
 
 def unforeseen(motion: Plan, friction: float, found: Deployment) -> float:
-    """Greatest slip away from all stretches that were said to slip, beyond what rolling explains [mm].
-
-    Zero below a millimetre.
-    """
+    """Greatest slip away from all stretches that were said to slip [mm], zero below a millimetre."""
     near = NEAR * motion.cable.gravito_bending_length
     s = np.linspace(0.0, motion.cable.length, len(found.laid))
     away = np.ones(len(s), bool)
     said = motion.feasibility(friction)
     for slip in said.slips:
         away &= (s < slip.start - near) | (s > slip.end + near)
-    rolled = np.interp(s, said.arc_length, said.rolled)
-    worst = float((found.slipped - rolled)[away].max(initial=0.0))
+    worst = float(found.slipped[away].max(initial=0.0))
     return 1e3 * worst if worst > SLIPPED else 0.0
 
 

@@ -19,6 +19,13 @@ constexpr double kDecay = 0.6;        ///< as much of the exponent with which a 
 template <class Scalar>
 using Vector = std::array<Scalar, 3>;
 
+/// The moment of the floor's force, which acts a lever below the centreline, on the state at lift-off.
+template <std::size_t count, class Scalar>
+void put_lever(double lever, const Vector<Scalar>& floor, std::array<Scalar, count>& y) {
+  y[3] -= lever * floor[1];
+  y[4] += lever * floor[0];
+}
+
 /// The equations of the header: t, m, then what follows from them (r, or a quaternion and r).
 template <class Scalar>
 struct RodSlope {
@@ -38,8 +45,10 @@ struct RodSlope {
     slope[5] = stretch * (y[1] * n[0] - y[0] * n[1]);
     if constexpr (count >= 9)
       for (std::size_t i = 0; i < 3; ++i) slope[6 + i] = stretch * y[i];
-    if constexpr (count == 13) {  // q' = (m / 2) q / 2
-      const Scalar *q = &y[9], *m = &y[3];
+    if constexpr (count == 13) {  // q' = w q / 2, w = t x t' the turning without twist
+      const Scalar* q = &y[9];
+      const Scalar twist = y[0] * y[3] + y[1] * y[4] + y[2] * y[5];
+      const Scalar m[3] = {y[3] - twist * y[0], y[4] - twist * y[1], y[5] - twist * y[2]};
       slope[9] = -0.25 * (m[0] * q[1] + m[1] * q[2] + m[2] * q[3]);
       slope[10] = 0.25 * (m[0] * q[0] + m[1] * q[3] - m[2] * q[2]);
       slope[11] = 0.25 * (m[1] * q[0] + m[2] * q[1] - m[0] * q[3]);
@@ -112,6 +121,7 @@ void RodProblem<end>::linearise(const Path& path, System& system) const {
       const auto at = static_cast<std::size_t>(i);
       state[at] = i < kCoupled ? Number::unknown(y[at], i) : Number(y[at]);
     }
+    if (k == 0) put_lever(lever, slope.floor, state);
     across<kCoupled>(slope, cuts[k], cuts[k + 1], rod_steps(force, cuts[k], cuts[k + 1], y), state);
     typename System::Link& link = system.links[k];
     for (int i = 0; i < kStates; ++i) {
@@ -127,7 +137,7 @@ void RodProblem<end>::linearise(const Path& path, System& system) const {
 template <RodEnd end>
 void RodProblem<end>::put_end(const Path& path, System& system) const {
   const auto& y = path.nodes.back();
-  // Of m only two components are free, for m.t = 0: not the one along which t is greatest.
+  // Of m only two components are free, for m.t is known: not the one along which t is greatest.
   std::array<std::size_t, 2> rows{6, 8};
   if constexpr (end == RodEnd::no_moment) {
     std::size_t along = 0;
@@ -141,6 +151,12 @@ void RodProblem<end>::put_end(const Path& path, System& system) const {
     std::fill_n(system.end_by_parameters[i], kParameters, 0.0);
     system.end_by_state[i][rows[at]] = 1.0;
     system.end_gap[i] = y[rows[at]] - (end == RodEnd::no_moment ? 0.0 : goal[at]);
+    if constexpr (end == RodEnd::no_moment) {  // m = (m.t) t
+      const std::size_t tangent = rows[at] - 3;
+      system.end_by_state[i][tangent] = -twist(path);
+      system.end_by_parameters[i][0] = lever * y[tangent];
+      system.end_gap[i] -= twist(path) * y[tangent];
+    }
   }
 }
 
@@ -150,6 +166,7 @@ RodShape rod_shape(const RodProblem<end>& problem, const typename RodProblem<end
   shape.suspended = problem.cuts.back();
   shape.stretch_stiffness = problem.stretch_stiffness;
   shape.floor_force = problem.floor_force(path);
+  shape.twist = problem.twist(path);
   shape.lowest = std::numeric_limits<double>::infinity();
   const RodSlope<double> slope{shape.floor_force, 1.0 / problem.stretch_stiffness};
   std::array<double, 13> y{};
@@ -167,11 +184,14 @@ RodShape rod_shape(const RodProblem<end>& problem, const typename RodProblem<end
                             {unit * y[9], unit * y[10], unit * y[11], unit * y[12]}});
     shape.lowest = std::min(shape.lowest, y[8]);
   };
-  const auto start_of = [&](const auto& node) { std::copy_n(node.begin(), 6, y.begin()); };
-  start_of(path.nodes[0]);
+  const auto start_of = [&](std::size_t k) {
+    std::copy_n(path.nodes[k].begin(), 6, y.begin());
+    if (k == 0) put_lever(problem.lever, shape.floor_force, y);
+  };
+  start_of(0);
   keep(0.0);
   for (std::size_t k = 0; k + 1 < problem.cuts.size(); ++k) {
-    start_of(path.nodes[k]);
+    start_of(k);
     const double from = problem.cuts[k], to = problem.cuts[k + 1];
     const int steps = rod_steps(shape.floor_force, from, to, path.nodes[k]);
     for (int i = 1; i <= spread; ++i) {
@@ -183,7 +203,10 @@ RodShape rod_shape(const RodProblem<end>& problem, const typename RodProblem<end
       shape.residual = std::max(shape.residual, std::abs(y[i] - path.nodes[k + 1][i]));
   }
   if constexpr (end == RodEnd::no_moment)
-    for (std::size_t i = 3; i < 6; ++i) shape.residual = std::max(shape.residual, std::abs(path.nodes.back()[i]));
+    for (std::size_t i = 0; i < 3; ++i) {
+      const double bending = path.nodes.back()[3 + i] - shape.twist * path.nodes.back()[i];
+      shape.residual = std::max(shape.residual, std::abs(bending));
+    }
   return shape;
 }
 

@@ -8,6 +8,10 @@
 ///   t(0) = x,  m(0) = -2 kappa z,  r(0) = 0:
 /// curvature kappa in the floor's plane (kappa > 0 bends towards -y), none across it, for a floor gives no moment about
 /// y; and no twist anywhere, for m.t is constant along a rod whose section bends alike in all directions.
+///
+/// A rod of some thickness rests on its surface, and F acts a lever below its centreline: then
+///   m(0) = lever (F_x y - F_y x) - 2 kappa z,
+/// and m.t = -lever F_y twists it all along.
 /// [Kirchhoff's rod with stretch; dissertation (9.1), with what (9.3) leaves of it.]
 
 #include <array>
@@ -36,10 +40,12 @@ class RodProblem {
 
   double stretch_stiffness = 1e9;  ///< EA [w Lgb]
   double given_force = 0;          ///< the third component of F
+  double lever = 0;                ///< of F below the centreline [Lgb]
   std::array<double, 2> goal{};    ///< of the position
   std::vector<double> cuts;        ///< s of each node; the last one is the suspended length
 
   RodVector floor_force(const Path& path) const;
+  double twist(const Path& path) const { return -lever * floor_force(path)[1]; }  ///< m.t
   void linearise(const Path& path, System& system) const;
 
  private:
@@ -61,6 +67,7 @@ struct RodShape {
   RodVector floor_force{};
   std::vector<double> places;    ///< s of the points
   std::vector<RodPoint> points;  ///< at `spread` points a segment of the path, the cuts among them
+  double twist = 0;              ///< m.t, which the points' rotations do not show: they are transported in parallel
   double residual = 0;           ///< largest gap at a cut or at the end
   double lowest = 0;             ///< least height of the points
 };

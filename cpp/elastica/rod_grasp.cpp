@@ -50,6 +50,12 @@ void mirror(Path& path) {
   }
 }
 
+/// Further by an angle about its own first axis.
+std::array<double, 4> rolled(const std::array<double, 4>& q, double angle) {
+  const double c = std::cos(0.5 * angle), s = std::sin(0.5 * angle);
+  return {q[0] * c - q[1] * s, q[1] * c + q[0] * s, q[2] * c + q[3] * s, q[3] * c - q[2] * s};
+}
+
 }  // namespace
 
 GraspTable::GraspTable() {
@@ -120,6 +126,7 @@ bool GraspTable::solve(const GraspQuestion& asked, const std::vector<double>& cu
   GraspProblem& problem = data.problem;
   problem.stretch_stiffness = asked.stretch_stiffness;
   problem.given_force = 0;
+  problem.lever = asked.lever;
   problem.cuts = cuts;
   guess(asked.suspended, std::abs(asked.curvature), problem.cuts, data.path);
   const ShootingOutcome outcome = data.solver.solve(problem, data.path);
@@ -150,6 +157,7 @@ RodGrasp GraspTable::grasp(const GraspQuestion& asked, double twist_stiffness, D
   const double segment = data.problem.cuts[1];
   const RodShape shape = rod_shape(data.problem, data.path, static_cast<int>(std::ceil(segment / kLongestElement)));
   found.tip = shape.points.back();
+  found.tip.rotation = rolled(found.tip.rotation, shape.twist * shape.suspended / twist_stiffness);
   found.floor_force = shape.floor_force;
   found.residual = shape.residual;
   found.solved = shape.lowest > -kBelowFloor && (asked.base_angle != 0 || shape.floor_force[2] > 0);

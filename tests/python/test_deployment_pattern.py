@@ -232,14 +232,6 @@ def test_what_lies_behind_a_bend_that_slips_at_lift_off_is_pulled_back_by_the_ta
     assert "tail" not in {slip.test for slip in bend.feasibility(cable, 1.05 * worst).slips}
 
 
-def test_a_thicker_cable_rolls_farther_by_the_square_of_its_radius_and_a_straight_one_not_at_all():
-    bend, line = Pattern.bends([1.5], [0.08], [0.12, 0.1]), Pattern([[0.0, 0.0], [0.1, 0.0], [0.3, 0.0]])
-    thin, thick = (Cable(0.8, radius, 0.03) for radius in (0.8e-3, 1.6e-3))
-    ratio = bend.feasibility(thick, 1.0).rolled[-1] / bend.feasibility(thin, 1.0).rolled[-1]
-    assert ratio == pytest.approx(4.0, rel=0.02)
-    assert line.feasibility(thick, 1.0).rolled.max() < 1e-9
-
-
 def test_a_pattern_that_ends_on_its_beginning_is_said_to_lie_on_itself():
     angle = np.linspace(0.0, 2 * np.pi, 300)
     ring = Pattern(0.1 * np.stack([np.sin(angle), 1 - np.cos(angle)], 1))

@@ -46,7 +46,10 @@ def test_each_pose_of_laying_is_the_grasp_of_its_place(motion):
         )
         curvature = np.interp(s, pattern.arc_length, pattern.curvature)
         found = withe.deployment.grasp(
-            (motion.cable.length - 0.5 * JAW - s) / lgb, -curvature * lgb, CABLE.stretch_stiffness
+            (motion.cable.length - 0.5 * JAW - s) / lgb,
+            -curvature * lgb,
+            CABLE.stretch_stiffness,
+            radius=CABLE.radius / lgb,
         )
         x = np.append(tangent, 0.0) / np.linalg.norm(tangent)
         frame = np.stack([x, np.cross([0, 0, 1], x), [0, 0, 1]], 1)

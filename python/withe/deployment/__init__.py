@@ -10,10 +10,11 @@ length, unless they belong to a particular cable: then in m and N.
 """
 
 from withe.deployment.cable import Cable, MeasuredCable, measure
-from withe.deployment.deploying import Deployment, deploy, place, trial_cable
+from withe.deployment.deploying import Deployment, deploy, hang, place, trial_cable
 from withe.deployment.feasibility import Feasibility, Slip
 from withe.deployment.grasp_network import GraspNetwork
 from withe.deployment.grasping import Grasp, grasp
+from withe.deployment.hanging import MeasuredCurvature, measure_curvature
 from withe.deployment.motion import Phase
 from withe.deployment.network_training import train
 from withe.deployment.pattern import Pattern
@@ -30,6 +31,7 @@ __all__ = [
     "Grasp",
     "GraspNetwork",
     "MeasuredCable",
+    "MeasuredCurvature",
     "Move",
     "Pattern",
     "Phase",
@@ -41,7 +43,9 @@ __all__ = [
     "Tying",
     "deploy",
     "grasp",
+    "hang",
     "measure",
+    "measure_curvature",
     "place",
     "plan",
     "posts_along",

@@ -27,18 +27,21 @@ _TABLE = {  # Lgb, radius, length [m] [Choi, dissertation, table 9.1]
 
 @dataclass(frozen=True)
 class Cable:
-    """A round cable, straight where nothing acts on it.
+    """A round cable.
 
     Parameters
     ----------
     length, radius : float [m]
     gravito_bending_length : float [m]
         Lgb = (EI / 2w)^(1/3), EI the bending stiffness and w the weight per length: `measure` finds it with a ruler.
+    natural_curvature : (float, float) [1/m]
+        Where nothing acts on it, towards x and y of the plan while it hangs from the jaw: `measure_curvature` finds it.
+        "optimised" plans make up for it; others lay the cable as if it were straight.
 
     Raises
     ------
     ValueError
-        A length that is not positive, or a cable that is no longer than it is thick.
+        A length that is not positive, a cable that is no longer than it is thick, or bent tighter by itself than that.
 
     Examples
     --------
@@ -51,10 +54,15 @@ class Cable:
     length: float
     radius: float
     gravito_bending_length: float
+    natural_curvature: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
         for name in ("length", "radius", "gravito_bending_length"):
             object.__setattr__(self, name, validation.positive(getattr(self, name), name))
+        bent = validation.number_array(self.natural_curvature, "natural_curvature", (2,))
+        object.__setattr__(self, "natural_curvature", (float(bent[0]), float(bent[1])))
+        if np.hypot(*bent) * self.radius >= 1.0:
+            raise ValueError(f"natural_curvature must be less than 1 / radius, {1 / self.radius:g} / m, got {bent}")
         if self.length <= 2.0 * self.radius:
             raise ValueError(f"length must exceed the cable's thickness of {2 * self.radius:g} m, got {self.length:g}")
 

@@ -14,10 +14,11 @@ from withe.deployment.pattern import distances
 from withe.deployment.placing import passed
 from withe.deployment.planning import Plan
 from withe.deployment.world import Setup, lay
+from withe.deployment.world import hang as hang_in_world
 from withe.deployment.world import place as place_in_world
 from withe.recording import Record
 
-__all__ = ["DRAWN", "Deployment", "deploy", "drawn_setup", "place", "trial_cable"]
+__all__ = ["DRAWN", "Deployment", "deploy", "drawn_setup", "hang", "place", "trial_cable"]
 
 FloatArray = npt.NDArray[np.float64]
 # Standard deviations of what a trial has and a planner does not know, at noise 1.
@@ -232,13 +233,43 @@ def trial_cable(cable: Cable, seed: int, noise: float = 1.0) -> Cable:
     return _cable_of(cable, _drawn(seed, validation.non_negative(noise, "noise")))
 
 
+def hang(cable: Cable, *, nodes: int = 200) -> FloatArray:
+    """How a cable hangs in the rod engine from a jaw at its end, at rest: what a camera sees before it is laid.
+
+    Parameters
+    ----------
+    cable : Cable
+    nodes : int
+        20 to 2000.
+
+    Returns
+    -------
+    ndarray of shape (nodes, 3) [m]
+        Its centreline from the free end; the jaw is upright above the origin.
+
+    Examples
+    --------
+    >>> import withe
+    >>> bent = withe.deployment.Cable(0.87, 1.8e-3, 0.08, natural_curvature=(0.5, 0.0))
+    >>> print(withe.deployment.hang(bent)[0].round(3) + 0.0)
+    [0.007 0.    0.   ]
+    """
+    return hang_in_world(Setup(cable=cable, friction=0.0, nodes=validation.integer(nodes, "nodes", 20, 2000)))
+
+
 def _drawn(seed: int, noise: float) -> FloatArray:
     """What a trial has, in standard deviations."""
     return noise * np.random.default_rng(validation.integer(seed, "seed", 0, 2**63 - 1)).normal(size=DRAWN)
 
 
 def _cable_of(cable: Cable, drawn: FloatArray) -> Cable:
-    return replace(cable, gravito_bending_length=cable.gravito_bending_length * float(np.exp(_LGB * drawn[0])))
+    bent = np.asarray(cable.natural_curvature) + _CURVATURE * drawn[2:4]
+    longer = float(np.exp(_LGB * drawn[0]))
+    return replace(
+        cable,
+        gravito_bending_length=cable.gravito_bending_length * longer,
+        natural_curvature=(float(bent[0]), float(bent[1])),
+    )
 
 
 def drawn_setup(
@@ -250,7 +281,6 @@ def drawn_setup(
         friction=friction * float(np.exp(_FRICTION * drawn[1])),
         nodes=nodes,
         time_step=time_step,
-        natural_curvature=(_CURVATURE * drawn[2], _CURVATURE * drawn[3]),
         jaw_offset=(_OFFSET * drawn[4], _OFFSET * drawn[5], _OFFSET * drawn[6]),
         jaw_turn=(_TURN * drawn[7], _TURN * drawn[8], _TURN * drawn[9]),
         quasi_static=quasi_static,

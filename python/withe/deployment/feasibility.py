@@ -11,8 +11,9 @@ import numpy.typing as npt
 from withe.common import validation
 from withe.deployment.cable import JAW, Cable
 from withe.deployment.grasp_network import shipped
-from withe.deployment.grasping import TWIST_STIFFNESS, Grasp, grasp, least_friction, table
+from withe.deployment.grasping import Grasp, grasp, least_friction, table, twisted
 from withe.deployment.smoothing import least_tension
+from withe.errors import ConvergenceError
 
 __all__ = ["Controller", "Feasibility", "Slip", "examine"]
 
@@ -74,10 +75,8 @@ class Feasibility:
         all that lies behind the bend back along itself, straight or not.
     overlap : ndarray of bool of shape (nodes,)
         Where the pattern comes nearer to itself than the cable is thick: it cannot lie there, and pushes itself aside.
-    rolled : ndarray of shape (nodes,) [m]
-        By how much the tail pulls the cable back even where friction holds, to first order. The floor's force across
-        the cable at lift-off, Fy, acts at its surface, a radius below the centreline; the cable rolls inwards by
-        c = radius^2 Fy / (GJ / suspended length) and runs ahead as above.
+        Pushed by its thickness of two radii, a cable moves along (48 Lgb^3 2 radius / friction)^(1/4) to either side,
+        as a beam that friction loads does. That much more slips.
     friction : float
         What there is.
     slips : tuple of Slip
@@ -90,7 +89,6 @@ class Feasibility:
     free_end: FloatArray
     tail: FloatArray
     overlap: npt.NDArray[np.bool_]
-    rolled: FloatArray
     friction: float
     slips: tuple[Slip, ...]
 
@@ -163,11 +161,10 @@ def examine(
         "lift-off": lift_off,
         "free end": free_end,
         "tail": np.where(lift_off > friction, 0.0, tail),
-        "overlap": np.where(overlap, np.inf, 0.0),
+        "overlap": np.where(_pushed(overlap, pattern.arc_length, cable, friction), np.inf, 0.0),
     }
-    rolled = lgb * _rolled(s, curvature, force[:, 1], cable)
     slips = _slips(pattern.arc_length, tests, friction)
-    return Feasibility(pattern.arc_length, floor, lift_off, free_end, tail, overlap, rolled, friction, slips)
+    return Feasibility(pattern.arc_length, floor, lift_off, free_end, tail, overlap, friction, slips)
 
 
 def grasps_along(pattern: Laid, cable: Cable, controller: str) -> Grasp:
@@ -178,7 +175,8 @@ def grasps_along(pattern: Laid, cable: Cable, controller: str) -> Grasp:
     Raises
     ------
     ValueError
-        The cable is shorter than the pattern, or cannot bend so tightly, or beyond what the network has learned.
+        The cable is shorter than the pattern, or cannot bend so tightly, or no floor holds it so, or it is beyond what
+        the network has learned.
     """
     lgb = cable.gravito_bending_length
     if cable.length < pattern.length:
@@ -198,11 +196,17 @@ def grasps_along(pattern: Laid, cable: Cable, controller: str) -> Grasp:
         )
     suspended = np.maximum((cable.length - 0.5 * JAW - pattern.arc_length) / lgb, table().shortest)
     curvature = -lgb * pattern.curvature  # grasps bend to the right
-    if controller == "least_friction":
-        return least_friction(suspended, curvature, cable.stretch_stiffness)
+    thick = cable.radius / lgb
     if controller == "network":
-        return shipped()(suspended, curvature, cable.stretch_stiffness)
-    return grasp(suspended, curvature, cable.stretch_stiffness)
+        return twisted(shipped()(suspended, curvature, cable.stretch_stiffness), suspended, curvature, thick)
+    try:
+        if controller == "least_friction":
+            shear = _BEND_STIFFNESS * lgb**2 * np.gradient(pattern.curvature, pattern.arc_length)
+            return least_friction(suspended, curvature, shear, cable.stretch_stiffness, thick)
+        return grasp(suspended, curvature, cable.stretch_stiffness, radius=thick)
+    except ConvergenceError as error:
+        bend = f"whose radius at {at:.0f} mm is {1e3 / tightest:.2g} mm"
+        raise ValueError(f"no floor holds this cable on this pattern, {bend}: {error}") from error
 
 
 def _floor(s: FloatArray, curvature: FloatArray, slope: FloatArray, bend: FloatArray) -> FloatArray:
@@ -215,20 +219,19 @@ def _floor(s: FloatArray, curvature: FloatArray, slope: FloatArray, bend: FloatA
     return at_nodes
 
 
-def _rolled(s: FloatArray, curvature: FloatArray, across: FloatArray, cable: Cable) -> FloatArray:
-    """How far a cable that rolls at lift-off has run ahead [Lgb]."""
-    lgb = cable.gravito_bending_length
-    suspended = (cable.length - 0.5 * JAW) / lgb - s
-    inwards = (cable.radius / lgb) ** 2 * np.abs(across) * suspended / TWIST_STIFFNESS
-    ahead = np.abs(curvature) * inwards
-    return np.concatenate([[0.0], np.cumsum(0.5 * (ahead[1:] + ahead[:-1]) * np.diff(s))])
-
-
 def _overlap(points: FloatArray, arc_length: FloatArray, radius: float) -> npt.NDArray[np.bool_]:
     """Where a curve comes nearer to a part of itself than two radii, which is not its neighbour."""
     away = np.linalg.norm(points[:, None] - points[None], axis=-1)
     far = np.abs(arc_length[:, None] - arc_length[None]) > _NEIGHBOURS * np.pi * radius
     return np.asarray(((away < 2.0 * radius) & far).any(1))
+
+
+def _pushed(
+    overlap: npt.NDArray[np.bool_], arc_length: FloatArray, cable: Cable, friction: float
+) -> npt.NDArray[np.bool_]:
+    """What moves with the stretches that overlap."""
+    reach = (96.0 * cable.gravito_bending_length**3 * cable.radius / friction) ** 0.25
+    return np.asarray((np.abs(arc_length[:, None] - arc_length[overlap]) <= reach).any(1))
 
 
 def _slips(arc_length: FloatArray, tests: dict[str, FloatArray], friction: float) -> tuple[Slip, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -17,6 +17,7 @@ __all__ = ["Grasp", "grasp"]
 FloatArray = npt.NDArray[np.float64]
 _BEND_STIFFNESS = 2.0  # EI in units of w Lgb^2
 _SHARES = (0.0, 0.25, 0.5, 0.7, 0.85, 1.0, 1.2)  # of curvature^2 that a push along the rod may be [w Lgb^3]
+_THICKEST = 0.25  # [Lgb]: a rod's radius
 _ENOUGH = 8.0  # [Lgb] of suspended length: for longer ones forces are the same
 TWIST_STIFFNESS = _BEND_STIFFNESS / 1.5  # GJ of a round rod of incompressible material; it decides stability only
 
@@ -65,6 +66,7 @@ def grasp(
     stretch_stiffness: npt.ArrayLike = 2087.0,
     *,
     axial_force: npt.ArrayLike = 0.0,
+    radius: npt.ArrayLike = 0.0,
 ) -> Grasp:
     """Find the grasp that lays a rod with a given curvature at its lift-off point.
 
@@ -77,6 +79,9 @@ def grasp(
     (Choi, dissertation, (9.1) and what (9.3) leaves of it), solved by multiple shooting with exact derivatives. The two
     unknowns are the floor's forces across the rod, along y and z; none acts along it, or a given one.
 
+    A rod of some radius rests on its surface, where friction acts: m(0) gains radius (force_x y - force_y x), and
+    -radius force_y twists what hangs. Held by a jaw that is turned as far, the rod does not roll where it lies.
+
     Parameters
     ----------
     suspended : array_like [Lgb]
@@ -88,6 +93,8 @@ def grasp(
         EA Lgb^2 / EI, 4 (Lgb / radius)^2 of a round rod (9.10); at least 100, and 4 times the suspended length.
     axial_force : array_like [w Lgb]
         Of the floor on the suspended part along x. A push of some .82 curvature^2 needs least friction.
+    radius : array_like [Lgb]
+        How far below the centreline the floor's force acts: at most .25; 0 in the dissertation.
 
     Returns
     -------
@@ -98,7 +105,8 @@ def grasp(
     ValueError
         Not numbers, out of range, or shapes that do not broadcast.
     ConvergenceError
-        There is no such grasp, as with an axial force that is too large.
+        There is no such grasp, as with an axial force that is too large, or a thick rod so bent that its twist lifts
+        it off the floor.
 
     Examples
     --------
@@ -108,14 +116,19 @@ def grasp(
     [[ 2.566  0.     5.488]
      [ 2.307 -1.699  5.334]] [0.    0.302]
     """
-    length, bend, stretch, axial = validation.broadcast_arrays(
-        suspended=suspended, curvature=curvature, stretch_stiffness=stretch_stiffness, axial_force=axial_force
+    length, bend, stretch, axial, lever = validation.broadcast_arrays(
+        suspended=suspended,
+        curvature=curvature,
+        stretch_stiffness=stretch_stiffness,
+        axial_force=axial_force,
+        radius=radius,
     )
     solver = table()
     _require_within(length, "suspended", solver.shortest, solver.longest, "Lgb")
     _require_within(np.abs(bend), "the size of curvature", 0.0, solver.greatest_curvature, "/ Lgb")
+    _require_within(lever, "radius", 0.0, _THICKEST, "Lgb")
     require_stiff(length, stretch)
-    questions = np.stack([length, bend, 2.0 * stretch, axial, np.zeros_like(axial)], -1).reshape(-1, 5)
+    questions = np.stack([length, bend, 2.0 * stretch, axial, np.zeros_like(axial), lever], -1).reshape(-1, 6)
     return _described(solver.grasps(questions, TWIST_STIFFNESS), questions, length.shape)
 
 
@@ -137,7 +150,7 @@ def _require_within(values: FloatArray, name: str, low: float, high: float, unit
 def _described(rows: FloatArray, questions: FloatArray, shape: tuple[int, ...]) -> Grasp:
     unsolved = np.flatnonzero(rows[:, 11] == 0)
     if unsolved.size:
-        suspended, curvature, _, axial, _ = questions[unsolved[0]]
+        suspended, curvature, _, axial, _, _ = questions[unsolved[0]]
         raise ConvergenceError(
             f"no grasp found for suspended={suspended:g}, curvature={curvature:g}, axial_force={axial:g}"
         )
@@ -151,22 +164,24 @@ def _described(rows: FloatArray, questions: FloatArray, shape: tuple[int, ...]) 
     )
 
 
-def least_friction(suspended: FloatArray, curvature: FloatArray, stretch_stiffness: float) -> Grasp:
+def least_friction(
+    suspended: FloatArray, curvature: FloatArray, shear: FloatArray, stretch_stiffness: float, radius: float
+) -> Grasp:
     """Grasps with the push along the rod that needs least friction at lift-off, shapes (n,); see `grasp`.
 
-    The push is a share of curvature^2: the best of a few, and of the parabola through it and its neighbours.
+    `shear` is the force across, along y, of what lies on what hangs, which the floor need not give [w Lgb]. The push is
+    a share of curvature^2: the best of a few, and of the parabola through it and its neighbours.
     """
     count = len(suspended)
     near = np.minimum(suspended, _ENOUGH)
 
     def rows_at(share: FloatArray, length: FloatArray = near) -> tuple[FloatArray, FloatArray]:
-        questions = np.stack(
-            [length, curvature, np.full(count, 2.0 * stretch_stiffness), share * curvature**2, np.zeros(count)], -1
-        )
+        stretch, angle, lever = (np.full(count, value) for value in (2.0 * stretch_stiffness, 0.0, radius))
+        questions = np.stack([length, curvature, stretch, share * curvature**2, angle, lever], -1)
         rows = np.asarray(table().grasps(questions, TWIST_STIFFNESS))
         good = (rows[:, 11] > 0) & (rows[:, 12] > 0) & (rows[:, 9] > 0)
         with np.errstate(divide="ignore", invalid="ignore"):
-            return rows, np.where(good, np.hypot(rows[:, 7], rows[:, 8]) / rows[:, 9], np.inf)
+            return rows, np.where(good, np.hypot(rows[:, 7], rows[:, 8] - shear) / rows[:, 9], np.inf)
 
     tried = [rows_at(np.full(count, share)) for share in _SHARES]
     needed = np.stack([need for _, need in tried])
@@ -184,8 +199,23 @@ def least_friction(suspended: FloatArray, curvature: FloatArray, stretch_stiffne
     push = np.stack([rows for rows, _ in candidates])[choice, column, 7]
     with np.errstate(divide="ignore", invalid="ignore"):
         chosen, _ = rows_at(np.where(curvature == 0.0, 0.0, push / curvature**2), suspended)
-    questions = np.stack([suspended, curvature, push, push, push], -1)
+    questions = np.stack([suspended, curvature, push, push, push, push], -1)
     return _described(chosen, questions, (count,))
+
+
+def twisted(found: Grasp, suspended: FloatArray, curvature: FloatArray, radius: float) -> Grasp:
+    """Grasps of a thin rod, without force along the floor, turned about the rod as those of a thick one are.
+
+    The couples at lift-off and of the jaw balance about the upright axis, force_y x = 2 curvature - radius force_y t_z.
+    Where the jaw is changes too, at a curvature of .5 / Lgb by up to some .3 radius; that is left out.
+    """
+    from scipy.spatial.transform import Rotation
+
+    held = Rotation.from_rotvec(found.rotation)
+    up = held.as_matrix()[:, 2, 0]
+    across = _BEND_STIFFNESS * curvature / (found.position[:, 0] + radius * up)
+    angle = -radius * across * suspended / TWIST_STIFFNESS
+    return replace(found, rotation=(held * Rotation.from_rotvec(angle[:, None] * [1.0, 0.0, 0.0])).as_rotvec())
 
 
 def pivoting(suspended: float, angles: FloatArray, stretch_stiffness: float) -> Grasp:
@@ -194,7 +224,7 @@ def pivoting(suspended: float, angles: FloatArray, stretch_stiffness: float) -> 
     Rotations are those from the floor's frame.
     """
     count = len(angles)
-    questions = np.zeros((count, 5))
+    questions = np.zeros((count, 6))
     questions[:, 0], questions[:, 2], questions[:, 4] = suspended, 2.0 * stretch_stiffness, angles
     return _described(table().grasps(questions, TWIST_STIFFNESS), questions, (count,))
 

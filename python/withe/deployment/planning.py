@@ -151,6 +151,7 @@ class Plan:
                 "length": self.cable.length,
                 "radius": self.cable.radius,
                 "gravito_bending_length": self.cable.gravito_bending_length,
+                "natural_curvature": list(self.cable.natural_curvature),
                 "tail": self.tail,
             },
             "pattern": {
@@ -199,9 +200,9 @@ def plan(
     controller : {"exact", "least_friction", "optimised", "network", "intuitive"}
         No force along the cable where it lifts off; the push that needs least friction; the better of these along a
         path that is shifted until the cable lies on its pattern in the rod engine, some 40 quasi-static runs; "exact"
-        from the small network that comes with withe, which asks nothing of friction (it needs torch); or the jaw
-        straight above the lift-off point at the height of what still hangs, upright, the baseline of the
-        dissertation (figure 9.2).
+        from the small network that comes with withe, which asks nothing of friction and knows thin cables only, turned
+        as thick ones are (it needs torch); or the jaw straight above the lift-off point at the height of what still
+        hangs, upright, the baseline of the dissertation (figure 9.2).
     friction : float
         Coefficient between cable and floor, for "optimised".
     speed : float [m/s]

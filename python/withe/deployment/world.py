@@ -52,7 +52,6 @@ class Setup:
     friction: float
     nodes: int = 200
     time_step: float = 0.01  # [s]
-    natural_curvature: tuple[float, float] = (0.0, 0.0)  # [1/m]
     jaw_offset: tuple[float, float, float] = (0.0, 0.0, 0.0)  # [m]
     jaw_turn: tuple[float, float, float] = (0.0, 0.0, 0.0)  # [rad], a rotation vector
     quasi_static: bool = False  # a row of equilibria: neither inertia nor viscosity
@@ -80,8 +79,8 @@ def lay(setup: Setup, motion: Motion, *, progress: bool) -> tuple[FloatArray, Fl
     if setup.start_held:
         scene.pin(cable.start, free=(0.0, 0.0, 1.0))
     simulation = scene.build(integrator=_integrator(setup), time_step=setup.time_step, planar=False)
-    if any(setup.natural_curvature) or setup.quasi_static:
-        simulation.set_natural_curvature(cable, setup.natural_curvature)
+    if any(setup.cable.natural_curvature) or setup.quasi_static:
+        simulation.set_natural_curvature(cable, setup.cable.natural_curvature)
         simulation.equilibrium()
     held = simulation.hand(jaw_part)
     held.move(path=jaw_path(setup, motion, held.pose.rotation))
@@ -96,6 +95,18 @@ def lay(setup: Setup, motion: Motion, *, progress: bool) -> tuple[FloatArray, Fl
     else:
         simulation.run(_SETTLING, progress=False)
     return before, simulation.positions(cable), record
+
+
+def hang(setup: Setup) -> FloatArray:
+    """The cable at rest as it hangs from a jaw, its free end off the floor: shape (nodes, 3) [m]."""
+    points = setup.arc_length[:, None] * [0.0, 0.0, 1.0]
+    scene = Scene(gravity=(0.0, 0.0, -_GRAVITY))
+    cable = _add_cable(scene, setup.cable, points, "cable")
+    scene.grasp(cable, at=setup.cable.length, length=JAW, stiffness=JAW_STIFFNESS, name="jaw")
+    simulation = scene.build(planar=False)
+    simulation.set_natural_curvature(cable, setup.cable.natural_curvature)
+    simulation.equilibrium()
+    return simulation.positions(cable)
 
 
 def place(setup: Setup, points: FloatArray, *, progress: bool) -> tuple[FloatArray, Record]:
@@ -116,7 +127,7 @@ def place(setup: Setup, points: FloatArray, *, progress: bool) -> tuple[FloatArr
     scene, cable = _scene(setup, np.column_stack([points, np.full(len(points), setup.cable.radius)]))
     scene.ignore_contact(cable, cable)  # where a pattern touches itself, the cable lies in itself
     simulation = scene.build(integrator=_integrator(setup), time_step=setup.time_step, planar=False)
-    simulation.set_natural_curvature(cable, setup.natural_curvature, over=_STRESSED)
+    simulation.set_natural_curvature(cable, (0.0, 0.0), over=_STRESSED)
     duration = _STRESSED if setup.quasi_static else _STRESSED + _SETTLING
     record = simulation.run(duration, record_every=max(_RECORD_EVERY, setup.time_step), progress=progress)
     return simulation.positions(cable), record
@@ -139,9 +150,9 @@ def hung(
         cables.append(cable)
     simulation = scene.build(integrator=_integrator(setups[0]), time_step=setups[0].time_step, planar=False)
     for setup, cable in zip(setups, cables, strict=True):
-        if any(setup.natural_curvature):
-            simulation.set_natural_curvature(cable, setup.natural_curvature)
-    if any(any(setup.natural_curvature) for setup in setups):
+        if any(setup.cable.natural_curvature):
+            simulation.set_natural_curvature(cable, setup.cable.natural_curvature)
+    if any(any(setup.cable.natural_curvature) for setup in setups):
         simulation.equilibrium()
     return simulation, cables, [simulation.hand(jaw) for jaw in jaws]
 

@@ -49,8 +49,10 @@ TEST(RodProblem, DerivativesMatchDifferences) {
   const GraspTable table;
   GraspTable::Data data;
   for (const double curvature : {0.3, 2.5}) {
-    ASSERT_TRUE(table.solve({4.0, curvature, kStretchStiffness, 0.1}, data));
-    expect_derivatives(data.problem, data.path);
+    for (const double lever : {0.0, 0.1}) {
+      ASSERT_TRUE(table.solve({4.0, curvature, kStretchStiffness, 0.1, 0.0, lever}, data));
+      expect_derivatives(data.problem, data.path);
+    }
     RodProblem<RodEnd::plane_of_xz> held;
     RodProblem<RodEnd::plane_of_xz>::Path path;
     held.stretch_stiffness = kStretchStiffness;
