@@ -24,7 +24,7 @@ def catenary(span, length, weight):
     return weight * c * np.cosh(span / (2.0 * c))
 
 
-def cable(edges=100, **build):
+def cable(edges=200, **build):
     """A cable of unit length and weight, pinned at both ends, in a ring at .4 of it."""
     scene = withe.Scene(gravity=(0.0, 0.0, -1.0))
     rod = rods.straight(scene, edges, stiffness=rods.stiffness(bend=1e-4, twist=1e-4, stretch=1e4))
@@ -37,13 +37,16 @@ def cable(edges=100, **build):
 @pytest.mark.parametrize("planar", [True, False], ids=["planar", "spatial"])
 def test_a_heavy_cable_slides_through_a_ring_until_it_pulls_alike_on_both_sides(planar):
     simulation, rod, ring = cable(planar=planar)
-    simulation.move(ring, (0.46, 0.0, 0.0))
-    simulation.move(rod.end, (0.92, 0.0, 0.0))
-    assert simulation.equilibrium().stable
+    for part in np.linspace(0.2, 1.0, 5):
+        simulation.move(ring, (0.4 + 0.06 * part, 0.0, 0.0))
+        simulation.move(rod.end, (1.0 - 0.08 * part, 0.0, 0.0))
+        assert simulation.equilibrium().stable
     passage = simulation.passage(ring)
     assert passage.at == pytest.approx(0.5, abs=1e-9)
     assert passage.pull == 0.0
-    assert passage.press == pytest.approx(0.5, rel=0.02)
+    assert passage.press == pytest.approx(0.5, rel=0.05)  # and a little more, since the cable is not quite limp
+    carried = sum(simulation.reaction(end).force[2] for end in (rod.start, rod.end))
+    assert carried + passage.press == pytest.approx(1.0, abs=1e-9)
     assert simulation.wrench(ring).force == pytest.approx((0.0, 0.0, passage.press), abs=1e-9)
     simulation.move(rod.end, (0.9, 0.0, 0.0))
     simulation.equilibrium()
@@ -51,7 +54,7 @@ def test_a_heavy_cable_slides_through_a_ring_until_it_pulls_alike_on_both_sides(
     def pull(at):
         return catenary(0.46, at, 1.0) - catenary(0.44, 1.0 - at, 1.0)
 
-    assert simulation.passage(ring).at == pytest.approx(brentq(pull, 0.48, 0.55), abs=2e-3)
+    assert simulation.passage(ring).at == pytest.approx(brentq(pull, 0.48, 0.55), abs=1.5e-3)
 
 
 def overhang(edges):
@@ -69,10 +72,9 @@ def overhang(edges):
 
 
 def test_a_rod_in_two_rings_is_a_beam_on_two_supports():
-    errors = [abs(overhang(edges) - 1.0) for edges in (20, 40, 80, 160)]
-    assert errors[-1] < 1e-4
-    assert errors[0] > 10.0 * errors[2]
-    assert errors[1] > 10.0 * errors[3]
+    errors = [overhang(edges) - 1.0 for edges in (20, 40, 80, 160)]
+    assert_order(errors, 2.0)
+    assert abs(errors[-1]) < 2e-4
 
 
 @pytest.mark.parametrize("planar", [True, False], ids=["planar", "spatial"])
@@ -119,43 +121,52 @@ def test_a_cantilever_that_is_fed_swings_as_slowly_as_it_is_long():
     assert slowest(simulation) == pytest.approx(pinned(60), rel=1e-3)
 
 
-def bent(push=0.02, friction=0.0, edges=60, **build):
+def bent(friction, edges=120):
     """A light rod over two rings that do not rub, and under one between them that is pushed down."""
     scene = rods.weightless()
-    rod = rods.straight(scene, edges, stiffness=rods.stiffness(stretch=1e6), normal=(0.0, 1.0, 0.0))
+    rod = rods.straight(scene, edges, stiffness=rods.stiffness(stretch=1e6), normal=(0.0, 0.0, 1.0))
     outer = [scene.grasp(rod, at, slides=True) for at in (0.33, 0.67)]
     middle = scene.grasp(rod, 0.5, slides=True, friction=friction, name="middle")
     return scene, rod, outer, middle
 
 
+def test_three_rings_bend_a_rod_as_a_beam():
+    scene, rod, outer, middle = bent(0.0)
+    scene.pin(rod.end, free=(0, 0, 1))
+    simulation = rods.sharp(scene, planar=True)
+    simulation.move(middle, (0.5, 0.0, -0.005))
+    simulation.equilibrium()
+    press = 48.0 * 0.005 / 0.34**3
+    assert simulation.passage(middle).press == pytest.approx(press, rel=5e-3)
+    assert [simulation.passage(ring).press for ring in outer] == pytest.approx([0.5 * press] * 2, rel=5e-3)
+
+
 def test_a_rod_is_drawn_through_a_ring_by_friction_times_what_presses():
-    scene, rod, _, middle = bent(friction=0.3)
+    scene, rod, _, middle = bent(0.3)
     end = scene.pin(rod.end, free=(0, 0, 1))
     simulation = rods.sharp(scene, time_step=0.1, planar=True)
-    down = np.array([0.5, 0.0, -0.02])
-    simulation.move(middle, down)
+    simulation.move(middle, (0.5, 0.0, -0.005))
     simulation.equilibrium()
-    assert simulation.passage(middle).press == pytest.approx(48.0 * 0.02 / 0.34**3, rel=0.02)
-    assert abs(simulation.passage(middle).pull) < 0.3 * simulation.passage(middle).press
+    assert abs(simulation.passage(middle).pull) < (0.3 + 1e-9) * simulation.passage(middle).press
     for way in (0.01, 0.03, 0.06):
         simulation.move(end, (1.0 + way, 0.0, 0.0))
         simulation.equilibrium()
         passage = simulation.passage(middle)
-        assert passage.pull == pytest.approx(0.3 * passage.press, rel=1e-9)
+        assert passage.pull == pytest.approx(0.3 * passage.press, rel=1e-8)
         assert passage.at == pytest.approx(0.5 - way, abs=2e-3)
         assert simulation.reaction(end).force[0] == pytest.approx(passage.pull, rel=2e-3)
 
 
 def test_friction_stops_a_rod_that_slides():
-    scene, rod, _, middle = bent(friction=0.2)
+    scene, rod, _, middle = bent(0.2)
     simulation = scene.build(integrator="backward_euler", time_step=2e-3, planar=True)
-    simulation.move(middle, (0.5, 0.0, -0.02), over=0.5)
+    simulation.move(middle, (0.5, 0.0, -0.005), over=0.5)
     simulation.run(2.0)
-    simulation.set_velocities(rod, (1.0, 0.0, 0.0))
+    simulation.set_velocities(rod, (0.5, 0.0, 0.0))
     at, press = simulation.passage(middle).at, simulation.passage(middle).press
-    simulation.run(1.5 / (0.2 * press))
-    assert at - simulation.passage(middle).at == pytest.approx(0.5 / (0.2 * press), rel=0.03)
-    assert np.abs(simulation.velocities(rod)).max() < 1e-3
+    simulation.run(1.0 / (0.2 * press))
+    assert at - simulation.passage(middle).at == pytest.approx(0.125 / (0.2 * press), rel=0.02)
+    assert abs(simulation.momentum().linear[0]) < 1e-3
 
 
 def swinging(integrator, time_step, friction=0.0, feed_rate=None, limit=None, planar=False, edges=16):

@@ -109,7 +109,7 @@ def test_what_rings_do_not_go_with_says_so():
     with pytest.raises(ValueError, match="must be a ring, which grasp"):
         simulation.passage(hand)
     with pytest.raises(ValueError, match="a rod slides through a ring"):
-        simulation.run(0.01, differentiable=True).gradient({"positions": np.ones((2, 21, 3))}, ["gravity"])
+        simulation.run(0.01, differentiable=True).gradient({"positions": np.ones((11, 21, 3))}, ["gravity"])
     scene, rod = drawn()
     scene.clamp(rod.start)
     scene.grasp(rod, 0.2, slides=True, friction=0.1)

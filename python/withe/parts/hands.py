@@ -60,8 +60,8 @@ def make_hand(
     place = None if pose is None else pose_of(pose, f"pose of {name!r}")
     if validation.truth(sliding.slides, f"slides of {name!r}"):
         grasp = _make_ring(part, at, length, place, stiffness, force_limit, sliding, name)
-        node = min(int(np.searchsorted(np.cumsum(part.arcs), at)), len(part.arcs) - 1)
-        return SupportPart(name, "hand", (part.index, node), f"{part.name}.node({node})", np.zeros((3, 3)), grasp)
+        edge = touched_edges(part, at, 0.0)[0]
+        return SupportPart(name, "hand", (part.index, edge), f"{part.name}.node({edge})", np.zeros((3, 3)), grasp)
     for word, value in (("friction", sliding.friction or None), ("feed_rate", sliding.feed_rate)):
         if value is not None:
             raise ValueError(f"{word} of {name!r} needs a ring, which lets the rod slide: give slides=True")
