@@ -215,13 +215,20 @@ void Assembler::analyse() {
 
 void Assembler::multiply_transposed(const VectorX& x, VectorX& out) const {
   out.resize(pattern_.size);
+  for (int column = 0; column < pattern_.size; ++column) out[column] = transposed_row(column, x);
+}
+
+void Assembler::multiply_held_transposed(const VectorX& x, VectorX& out) const {
+  for (const Constraint& c : model_.constraints)
+    for (int i = 0; i < c.size; ++i) out[c.first + i] = transposed_row(c.first + i, x);
+}
+
+double Assembler::transposed_row(int column, const VectorX& x) const {
   const std::span<const double> values = std::as_const(*solver_).values();
-  for (int column = 0; column < pattern_.size; ++column) {
-    double sum = 0.0;
-    for (int k = pattern_.column_starts[at(column)]; k < pattern_.column_starts[at(column) + 1]; ++k)
-      sum += values[static_cast<std::size_t>(entries_[at(k)])] * x[pattern_.row_indices[at(k)]];
-    out[column] = sum;
-  }
+  double sum = 0.0;
+  for (int k = pattern_.column_starts[at(column)]; k < pattern_.column_starts[at(column) + 1]; ++k)
+    sum += values[static_cast<std::size_t>(entries_[at(k)])] * x[pattern_.row_indices[at(k)]];
+  return sum;
 }
 
 void Assembler::find_edge_couplings() {
@@ -267,7 +274,29 @@ void Assembler::find_blocks() {
 }
 
 void Assembler::project_matrix() {
+  project_matrix([](std::size_t) {});
+}
+
+void Assembler::project_for_now() {
+  replaced_.clear();
+  const std::span<const double> values = std::as_const(*solver_).values();
+  project_matrix([&](std::size_t place) { replaced_.emplace_back(place, values[place]); });
+}
+
+/// Rows and columns of two constraints meet: what was changed last is the first to go back.
+void Assembler::take_back_projection() {
   const std::span<double> values = solver_->values();
+  for (std::size_t i = replaced_.size(); i-- > 0;) values[replaced_[i].first] = replaced_[i].second;
+}
+
+template <class Before>
+void Assembler::project_matrix(const Before& before) {
+  const std::span<double> values = solver_->values();
+  const auto put = [&](std::ptrdiff_t offset, double value) {
+    const auto place = static_cast<std::size_t>(offset);
+    before(place);
+    values[place] = value;
+  };
   for (const Block& block : blocks_) {
     const int n = block.constraint.size;
     const Matrix3& P = block.constraint.free;
@@ -277,7 +306,7 @@ void Assembler::project_matrix() {
       for (int i = 0; i < n; ++i)
         for (int j = 0; j < n; ++j) w[i] += P(i, j) * v[j];
       for (int i = 0; i < n; ++i)
-        if (c.offset[i] >= 0) values[static_cast<std::size_t>(c.offset[i])] = w[i];
+        if (c.offset[i] >= 0) put(c.offset[i], w[i]);
     };
     for (const Coupling& c : block.rows) apply(c);
     for (const Coupling& c : block.columns) apply(c);
@@ -292,7 +321,7 @@ void Assembler::project_matrix() {
     if (scale == 0.0) scale = 1.0;
     own = p * own * p + scale * (Matrix3::Identity() - p);
     for (int i = 0; i < n; ++i)
-      for (int j = 0; j < n; ++j) values[static_cast<std::size_t>(block.own[i][j])] = own(i, j);
+      for (int j = 0; j < n; ++j) put(block.own[i][j], own(i, j));
   }
 }
 

@@ -2,6 +2,7 @@
 /// Stencil -> matrix: the pattern of a model, and where each stencil's numbers go, found once.
 
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "elasticity/elements.hpp"
@@ -84,8 +85,9 @@ class Assembler {
   void turn_rows(int first, const Matrix3& by, std::span<double> values) const;
   void add_block(int first, const Matrix3& block, std::span<double> values) const;
 
-  /// out = A^T x with the solver's values; exact matrices only.
+  /// out = A^T x with the solver's values; exact matrices only. `multiply_held`: of what supports hold alone.
   void multiply_transposed(const VectorX& x, VectorX& out) const;
+  void multiply_held_transposed(const VectorX& x, VectorX& out) const;
 
   double greatest_diagonal() const;
   /// Its greatest entry over that of `weight`.
@@ -107,6 +109,9 @@ class Assembler {
   /// Takes out what supports hold: rows and columns are projected onto the free directions, and the held
   /// ones get a positive diagonal, so that the pattern stays and held increments vanish.
   void project_matrix();
+  /// Likewise, and back.
+  void project_for_now();
+  void take_back_projection();
   void project(VectorX& vector) const;
   /// The part of a vector along held directions.
   VectorX held_part(const VectorX& vector) const;
@@ -133,6 +138,10 @@ class Assembler {
     std::ptrdiff_t own[3][3];
   };
   void analyse();
+  /// `before(place)`: called before an entry is changed.
+  template <class Before>
+  void project_matrix(const Before& before);
+  double transposed_row(int column, const VectorX& x) const;
   void find_blocks();
   void find_edge_couplings();
 
@@ -149,6 +158,7 @@ class Assembler {
   std::vector<std::ptrdiff_t> diagonal_;
   std::vector<std::ptrdiff_t> entries_;  ///< of the pattern, one after the other; exact matrices only
   std::vector<Block> blocks_;
+  std::vector<std::pair<std::size_t, double>> replaced_;  ///< entries that a projection has changed
 };
 
 }  // namespace withe

@@ -18,6 +18,7 @@ void set_start(const State& state, double duration, ContactProblem& problem) {
   problem.bodies.place(state.obstacles);
   problem.shift.clear();
   problem.turn.clear();
+  problem.velocity.clear();
   problem.renewed.clear();
   problem.unrecorded.clear();
   problem.leaving.clear();
@@ -107,6 +108,8 @@ void Contact::restart(const State& state, double duration) {
   current_ = false;
   blocked_ = false;
   set_start(state, duration, problem_);
+  for (std::size_t o = 0; o < target_.size(); ++o)
+    problem_.velocity.push_back((1.0 / duration) * (target_[o].point - state.obstacles[o].point));
   problem_.starting = true;
   find(state.q);
   problem_.starting = false;

@@ -111,10 +111,16 @@ Vec3<ByStart> start_slip(const FrictionSetting& f, const SlippingSurfaces<ByStar
 void add_lagged_friction(const ContactProblem& problem, const Touching& t, const Rows& rows, ContactAdjoint& out) {
   if (problem.description().friction_law == FrictionLaw::semi_explicit)
     throw std::invalid_argument("no gradient is known through semi-explicit friction: take friction_model='lagged'");
+  if (dot(problem.turn_of(t.pair), problem.turn_of(t.pair)) > 0.0)
+    throw std::invalid_argument(
+        "no gradient is known through lagged friction on an obstacle that turns: take friction_model='implicit'");
   const FrictionSetting f = friction_setting(problem, t, 1.0, nullptr);
   const SlipStart<ByStart> start = start_of(f);
   SlippingSurfaces<ByStart> c;
-  const Vec3<ByStart> x[4] = {start.point(0), start.point(1), start.point(2), start.point(3)};
+  Vec3<ByStart> x[4];
+  // The obstacle stands at its end: rods are from there what they were from where it was.
+  const Vec3<ByStart> shift = lifted(problem.shift_of(t.pair));
+  for (int i = 0; i < 4; ++i) x[i] = t.pair.curve() || i < 2 ? start.point(i) + shift : start.point(i);
   for (int b = 0; b < 2; ++b) c.sides[b].edge = x[tail_of(t.pair, b) + 1] - x[tail_of(t.pair, b)];
   find_contact(f, start, x, c);
   ByStart moved[kContactUnknowns], multiplied[kContactUnknowns];
@@ -122,8 +128,7 @@ void add_lagged_friction(const ContactProblem& problem, const Touching& t, const
     moved[i] = t.now[i] - start.unknown[i];
     multiplied[i] = rows[i];
   }
-  const Vec3<ByStart> slip =
-      start_slip(f, c, moved) - lifted(problem.lagged_friction[static_cast<std::size_t>(t.lagged)].drift);
+  const Vec3<ByStart> slip = start_slip(f, c, moved) - (shift - dot(shift, c.normal) * c.normal);
   const ByStart square = dot(slip, slip),
                 share = c.pressing * slip_factor(square, f.rate) * dot(slip, start_slip(f, c, multiplied)),
                 scalar = t.pair.friction * share;

@@ -89,6 +89,7 @@ struct ContactProblem {
   Bodies bodies;                       ///< with obstacles where they are at the end
   std::vector<Vec3d> shift;            ///< of each obstacle in the step [m]; empty: none moves
   std::vector<Vec3d> turn;             ///< likewise [rad]; empty: none turns
+  std::vector<Vec3d> velocity;         ///< of each obstacle, as its points move in the step [m/s]; empty: none moves
   bool starting = false;               ///< what touches as the step begins is about to be found
   std::vector<BodyOffset> offsets;     ///< of bodies that have any
   std::vector<ContactRecord> renewed;  ///< of contacts that begin with the scene, or whose surfaces near each other
@@ -114,6 +115,8 @@ struct ContactProblem {
   /// Way of a pair's obstacle in the step [m], and by which it turns then [rad].
   Vec3d shift_of(const ContactPair& pair) const { return of_obstacle(pair, shift); }
   Vec3d turn_of(const ContactPair& pair) const { return of_obstacle(pair, turn); }
+  /// Known before anything is found, unlike the way.
+  Vec3d velocity_of(const ContactPair& pair) const { return of_obstacle(pair, velocity); }
   /// What is remembered of a contact as the step begins, or nothing.
   const ContactRecord* record_of(const ContactKey& key) const {
     const ContactRecord* found = renewed.empty() ? nullptr : find_record(renewed, key);

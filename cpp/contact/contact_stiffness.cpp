@@ -108,11 +108,11 @@ double impact_stiffness(const ContactProblem& problem, const ContactPair& pair) 
   const auto end_node = [&](int edge, int end) { return (end == 0 ? model.edge_tail : model.edge_head)[at(edge)]; };
   const VectorX& velocities = problem.start->v;
   const bool obstacle = pair.key.b < 0;
-  const Vec3d shift = problem.shift_of(pair);
+  const Vec3d moved = problem.velocity_of(pair);
   double square = 0.0;
   for (int k = 0; k < (pair.curve() ? pair.piece.weights->nodes : 2); ++k) {
     const int node_a = pair.curve() ? pair.piece.node[k] : end_node(pair.key.a, k);
-    const Vec3d v = local_position(model, velocities, node_a) - (1.0 / problem.duration) * shift;
+    const Vec3d v = local_position(model, velocities, node_a) - moved;
     if (obstacle) {
       square = std::max(square, dot(v, v));
       continue;

@@ -117,7 +117,7 @@ double first_approach(const ContactProblem& problem, const ContactPair& pair) {
 double approach_speed(const ContactProblem& problem, const ContactPair& pair) {
   Vec3d x[4], v[4];
   problem.bodies.end_points(pair, problem.start->v, v);
-  const Vec3d shift = problem.shift_of(pair), moved = (1.0 / problem.duration) * shift;
+  const Vec3d moved = problem.velocity_of(pair);
   if (pair.curve()) {
     const CurveSlopes slopes = curve_slopes(pair.piece, problem.curve_at_start(pair, x));
     double rate = 0.0;
@@ -139,7 +139,7 @@ void add_approach_slopes(const ContactProblem& problem, const ContactPair& pair,
   if (by == 0.0 || !(approach_speed(problem, pair) > 0.0)) return;
   Vec3d x[4], v[4];
   problem.bodies.end_points(pair, problem.start->v, v);
-  const Vec3d moved = (1.0 / problem.duration) * problem.shift_of(pair);
+  const Vec3d moved = problem.velocity_of(pair);
   if (pair.curve()) {
     const CurveDistance<double> distance = problem.curve_at_start(pair, x);
     const CurveSlopes slopes = curve_slopes(pair.piece, distance);

@@ -26,6 +26,8 @@ class ActingNumbers {
   std::size_t first(std::size_t stretch) const { return stretches_[stretch].first; }
   /// What was before any step.
   const Parameters& start() const { return *stretches_.front().base; }
+  /// Of the natural shapes that acted last.
+  long natural_version() const { return stretches_.back().natural_version; }
   Eigen::Index load_rows() const { return start().loads.rows(); }
   /// What acts in a stretch, made of what `out` is of another one, or of nothing yet.
   struct Player {

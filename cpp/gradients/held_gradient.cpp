@@ -108,11 +108,16 @@ void add_hand(const Model& model, const VectorX& q, VectorX& held, const Support
 
 }  // namespace
 
+MatrixX3 by_places(const Model& model, const MatrixX3& obstacles) {
+  if (!model.planar()) return obstacles;
+  return obstacles.col(0) * model.plane->first.transpose() + obstacles.col(1) * model.plane->second.transpose();
+}
+
 PoseAdjoint by_poses(const Model& model, const VectorX& q, const VectorX& held_unknowns, const HandAdjoint& by_hands,
                      const HandsHeld& hands) {
   const auto count = static_cast<Eigen::Index>(model.supports.size());
-  PoseAdjoint out{MatrixX3::Zero(count, 3), MatrixX3::Zero(count, 3)};
-  if (by_hands.positions.rows() == count) out = {by_hands.positions, by_hands.rotations};
+  PoseAdjoint out{MatrixX3::Zero(count, 3), MatrixX3::Zero(count, 3), {}};
+  if (by_hands.positions.rows() == count) out = {by_hands.positions, by_hands.rotations, {}};
   VectorX held = held_unknowns;
   std::vector<Vector3> turned(model.supports.size(), Vector3::Zero());
   for (std::size_t s = 0; s < model.supports.size(); ++s)

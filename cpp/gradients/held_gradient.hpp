@@ -5,10 +5,11 @@
 
 namespace withe {
 
-/// Derivatives of a scalar by poses of supports; zero for those that are released.
+/// Derivatives of a scalar by poses of supports, zero for those that are released, and by places of obstacles.
 struct PoseAdjoint {
   MatrixX3 positions;  ///< per support [1/m]
   MatrixX3 rotations;  ///< per support, by a rotation vector [1/rad]
+  MatrixX3 obstacles;  ///< per obstacle, by its position [1/m]
 };
 
 /// Derivatives by what supports hold as it was drawn.
@@ -24,6 +25,9 @@ struct HandsHeld {
   const std::vector<HandPose>& poses;
   const std::vector<HandState>& grasped;
 };
+
+/// By places of obstacles, `ObstaclePlace` being in the axes of the unknowns, in those of space.
+MatrixX3 by_places(const Model& model, const MatrixX3& obstacles);
 
 /// `held`: in coordinates of the state, in which the unknowns are q; `by_hands`: what comes besides, of yielding ones
 /// all.

@@ -84,7 +84,7 @@ class Chain {
         out.edge_density(e) += arc / 6.0 * by_.mass_coupling(e);
         out.edge_drag(e) += arc / 6.0 * by_.drag_coupling(e);
       }
-      out.rest_length(e) += out.edge_density(e) * p_.edge_density(e) / arc;
+      out.rest_length(e) += (out.edge_density(e) * p_.edge_density(e) + out.edge_drag(e) * p_.edge_drag(e)) / arc;
       if (!model_.planar()) by_inertia(e) = by_.mass(model_.edge_dof[at(e)]);
     }
     for (const FrameStencil& s : model_.half) {
@@ -93,6 +93,7 @@ class Chain {
     }
     out.edge_rotary = by_inertia.cwiseProduct(model_.edge_arc);
     out.edge_density += by_.edge_mass.cwiseProduct(model_.edge_arc);
+    out.rest_length += by_inertia.cwiseProduct(p_.edge_rotary) + by_.edge_mass.cwiseProduct(p_.edge_density);
     if (by_.gravity_size != 0.0) out.gravity += by_.gravity_size * p_.gravity.normalized();
   }
 
@@ -141,8 +142,11 @@ class Chain {
             by_.bend_stiffness(i, 1) * by_length(bend2, of.bend[1], model_.bend_share(i, end)) +
             by_.bend_stiffness(i, 2) * by_length(twist, of.twist, 0.5);
       }
-      out.edge_viscous_time(a) += by_.bend_time(i) * la / (la + lb);
-      out.edge_viscous_time(b) += by_.bend_time(i) * lb / (la + lb);
+      const double both = la + lb;
+      out.edge_viscous_time(a) += by_.bend_time(i) * la / both;
+      out.edge_viscous_time(b) += by_.bend_time(i) * lb / both;
+      for (int edge : {a, b})
+        out.rest_length(edge) += by_.bend_time(i) * (p_.edge_viscous_time(edge) - p_.bend_viscous_time(i)) / both;
     }
     for (Eigen::Index i = 0; i < by_.half_stiffness.rows(); ++i) {
       const int e = model_.half[static_cast<std::size_t>(i)].edge;

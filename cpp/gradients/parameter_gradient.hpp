@@ -20,8 +20,8 @@ struct ParameterGradient {
   MatrixX2 obstacle_friction, pair_friction;
   MatrixX6 hand_stiffness;  ///< per support, see `HandDescription`
   VectorX hand_limit;
-  /// Per edge, of equilibria of rods without joints that are no chords of arcs: by its rest length, and so by lengths
-  /// of stencils and what masses weigh, at fixed natural curvature and twist [1/m].
+  /// Per edge, of rods without joints and fluids that are no chords of arcs: by its rest length, and so by lengths of
+  /// stencils, masses and drag, at fixed natural curvature and twist [1/m].
   VectorX rest_length;
 };
 

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include <Eigen/Geometry>
+
 #include "geometry/rotation.hpp"
 #include "gradients/step_gradient.hpp"
 #include "model/edge_vectors.hpp"
@@ -27,7 +29,8 @@ void StepGradient::check_reactions() const {
   }
 }
 
-void StepGradient::add_reactions(const SupportAdjoint& by, CoefficientAdjoint& coefficients, HandAdjoint& hands) {
+void StepGradient::add_reactions(const ReactionAdjoint& reactions, StepAdjoint& adjoint) {
+  const SupportAdjoint& by = reactions.by;
   check_reactions();
   const Model& model = equations_.model();
   by_rows_.setZero(model.dof_count);
@@ -38,7 +41,8 @@ void StepGradient::add_reactions(const SupportAdjoint& by, CoefficientAdjoint& c
   for (std::size_t s = 0; s < model.supports.size(); ++s) {
     if (!model.supports[s].active) continue;
     if (model.supports[s].is_hand())
-      add_hand_reaction(static_cast<int>(s), row(by.forces, s), row(by.moments, s), hands);
+      add_hand_reaction(static_cast<int>(s), row(by.forces, s), row(by.moments, s), reactions.about[s].position,
+                        adjoint);
     else
       add_reaction(model.supports[s], row(by.forces, s), row(by.moments, s));
   }
@@ -46,8 +50,8 @@ void StepGradient::add_reactions(const SupportAdjoint& by, CoefficientAdjoint& c
   if (model.planar()) return;
   for (const Support& support : model.supports) {
     if (!support.active) continue;
-    if (support.frame >= 0) add_frame_reaction(model.frame_dof[at(support.frame)], coefficients);
-    for (int edge : support.edges) add_held_inertia(model.edge_dof[at(edge)], coefficients);
+    if (support.frame >= 0) add_frame_reaction(model.frame_dof[at(support.frame)], adjoint.coefficients);
+    for (int edge : support.edges) add_held_inertia(model.edge_dof[at(edge)], adjoint.coefficients);
   }
   if (moves()) return;
   // An equilibrium's rows are those of reference directors that turn along with their edges: without what those which
@@ -89,24 +93,25 @@ Vector3 StepGradient::add_angle_reaction(int edge, const Vector3& arm, const Vec
   return held[angle] / arm.norm() * (by_moment - by_moment.dot(t) * t);
 }
 
-/// About where the hand is at the end of the step.
+/// Moments are about where the hand is read out, whose derivative is that by where it is at the end of the step.
 void StepGradient::add_hand_reaction(int support, const Vector3& by_force, const Vector3& by_moment,
-                                     HandAdjoint& hands) {
+                                     const Vector3& about, StepAdjoint& adjoint) {
   const Model& model = equations_.model();
   const Support& hand = model.supports[at(support)];
   if (hand.yields()) {
     if (by_force.isZero() && by_moment.isZero()) return;
-    throw std::invalid_argument("no gradient is known of what a hand that yields holds with: take one that is rigid");
+    const Vector3 end = step_->hands ? (*step_->hands)[at(support)].position : step_->start.hands[at(support)].position;
+    equations_.hands()->add_wrench_adjoint(equations_.problem(), data_, support,
+                                           by_force + by_moment.cross(end - about), by_moment, adjoint, by_z_);
+    return;
   }
-  const HandState& start = step_->start.hands[at(support)];
-  const Vector3 position = step_->hands ? (*step_->hands)[at(support)].position : start.position;
   const VectorX held = equations_.assembler().held_part(data_.full_residual);
   for (int node : hand.nodes) {
-    const Vector3 arm = node_position(model, z_, node) - position,
+    const Vector3 arm = node_position(model, z_, node) - about,
                   by_arm = node_vector(model, held, node).cross(by_moment);
     add_to_node(model, node, by_force + by_moment.cross(arm), by_rows_);
     add_to_node(model, node, by_arm, by_z_);
-    hands.positions.row(support) -= by_arm.transpose();
+    adjoint.hands_end.positions.row(support) -= by_arm.transpose();
   }
   for (std::size_t i = 0; i < hand.edges.size() && !model.planar(); ++i) {
     const int edge = hand.edges[i];

@@ -38,6 +38,8 @@ void StepGradient::begin(const StepTaken& step) {
   else if (holds)
     held_acceleration_.setZero(model.dof_count);
   if (HandForces* hands = equations_.hands()) hands->aim(step.hands ? *step.hands : std::vector<HandPose>{});
+  if (Contact* contact = equations_.contact())
+    contact->aim(step.obstacles ? *step.obstacles : std::vector<ObstaclePlace>{});
   equations_.begin(step.start, step.parameters, step.rule, middle ? 0.5 * step.duration : step.duration,
                    holds ? &held_acceleration_ : nullptr);
   if (step.rule == StepRule::energy_momentum) {
@@ -60,8 +62,7 @@ void StepGradient::begin(const StepTaken& step) {
   }
   Assembler& assembler = equations_.assembler();
   LinearSolver& solver = assembler.solver();
-  exact_.assign(solver.values().begin(), solver.values().end());
-  assembler.project_matrix();
+  assembler.project_for_now();
   bool solved = solver.factorize().status == FactorStatus::ok;
   shifted_ = !solved;
   if (shifted_) {
@@ -69,7 +70,7 @@ void StepGradient::begin(const StepTaken& step) {
     rows_.setConstant(model.dof_count, kNeutral * assembler.greatest_diagonal());
     solved = solver.factorize({rows_.data(), static_cast<std::size_t>(rows_.size())}).status == FactorStatus::ok;
   }
-  std::copy(exact_.begin(), exact_.end(), solver.values().begin());
+  assembler.take_back_projection();
   if (!solved) throw std::invalid_argument(kSingular);
 }
 
@@ -90,7 +91,7 @@ void StepGradient::set_end(const StateAdjoint& state) {
 }
 
 /// rows = -(R_z^T)^-1 (zbar + R_z^T w) + w, the former on what is free and w the derivatives by rows of supports, and
-/// what it makes of the columns of R_z.
+/// what it makes of the columns of R_z: -zbar on what is free.
 void StepGradient::solve() {
   const Assembler& assembler = equations_.assembler();
   const bool reacts = by_rows_.size() != 0;
@@ -106,8 +107,10 @@ void StepGradient::solve() {
   // A scalar that neutral modes leave alone has a gradient, one that goes with them has none.
   bool follows = moves() || kFree * assembler.greatest_diagonal() * rows_.cwiseAbs().maxCoeff() <= size;
   if (reacts) rows_ += by_rows_;
-  assembler.multiply_transposed(rows_, columns_);
+  columns_ = -by_z_;
+  assembler.multiply_held_transposed(rows_, columns_);
   if (shifted_) {
+    assembler.multiply_transposed(rows_, columns_);
     VectorX left = by_z_ + columns_;
     assembler.project(left);
     follows = follows && left.cwiseAbs().maxCoeff() <= kSolved * size;
@@ -116,7 +119,7 @@ void StepGradient::solve() {
 }
 
 void StepGradient::pull_back(StateAdjoint& state, CoefficientAdjoint& by, HeldAdjoint& held,
-                             const SupportAdjoint* reactions) {
+                             const ReactionAdjoint* reactions) {
   const Model& model = equations_.model();
   const Assembler& assembler = equations_.assembler();
   const HandForces* yielding = equations_.hands();
@@ -138,7 +141,7 @@ void StepGradient::pull_back(StateAdjoint& state, CoefficientAdjoint& by, HeldAd
   start -= (end_rate() - 1.0) * by_end_;
   by_z_ = end_rate() * by_end_;
   by_rows_.resize(0);
-  if (reactions) add_reactions(*reactions, by, adjoint.hands_end);
+  if (reactions) add_reactions(*reactions, adjoint);
   solve();
 
   rows = rows_;
@@ -159,11 +162,14 @@ void StepGradient::pull_back(StateAdjoint& state, CoefficientAdjoint& by, HeldAd
   held.hands = adjoint.hands_end;
   held.hands.positions += state.hands.positions;
   held.hands.rotations += state.hands.rotations;
+  held.obstacles = adjoint.obstacles_end;
+  if (state.obstacles.size() != 0) held.obstacles += state.obstacles;
   if (!moves()) return;
   state.q = start;
   state.v = velocity;
   state.approach = std::move(adjoint.approach);
   state.hands = std::move(adjoint.hands);
+  state.obstacles = std::move(adjoint.obstacles);
 }
 
 void StepGradient::add_frames(const StateAdjoint& state, const StepAdjoint& adjoint, VectorX& start) const {
@@ -189,7 +195,7 @@ void StepGradient::add_transport(const StateAdjoint& state, const StepAdjoint& a
     // Where all of an edge's angles, of the start too, grow alike and its reference director turns back, nothing
     // changes.
     const double turns = columns_[angle] + adjoint.start[angle],
-                 at_z = turns - adjoint.end_turn[e] - adjoint.start_turn[e];
+                 at_z = turns + adjoint.middle_turn[e] - adjoint.end_turn[e] - adjoint.start_turn[e];
     Vec3d by = (at_z * inverse0 / f.inverse_length) * f.spin +
                ((adjoint.end_turn[e] + state.q[angle]) * inverse0 / last.inverse_length) * last.spin;
     // Friction says itself how its torques depend on the start.

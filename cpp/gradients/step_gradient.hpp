@@ -24,7 +24,8 @@ struct StateAdjoint {
   VectorX q;  ///< positions [1/m], turns of directors and of frames [1/rad], angles of hinges
   VectorX v;  ///< [s/m], [s/rad]
   ApproachAdjoint approach = {};
-  HandAdjoint hands = {};  ///< empty: nothing
+  HandAdjoint hands = {};   ///< empty: nothing
+  MatrixX3 obstacles = {};  ///< by their places, per obstacle, in the axes of the unknowns [1/m]; empty: nothing
 };
 
 /// What is differentiated: a step from `start` to q1.
@@ -39,6 +40,8 @@ struct StepTaken {
   const VectorX* held_gain = nullptr;
   /// Of hands at the end, per support; nothing: they are where they were.
   const std::vector<HandPose>* hands = nullptr;
+  /// Of obstacles at the end; nothing: they are where they were.
+  const std::vector<ObstaclePlace>* obstacles = nullptr;
 };
 
 /// Derivatives of a scalar by the reactions of supports in a step, as `World::reaction` has them; or empty.
@@ -46,11 +49,19 @@ struct SupportAdjoint {
   MatrixX3 forces, moments;  ///< per support [1/N], [1/(N m)]; zero for those after the last row
 };
 
+/// Those that are read out after a step, and where hands are then, about which their moments are; they may have gone
+/// on, where a step consists of parts.
+struct ReactionAdjoint {
+  const SupportAdjoint& by;
+  std::vector<HandPose> about;  ///< per support; none: there is no hand
+};
+
 /// Derivatives of a scalar by what supports prescribe, meaningful where held.
 struct HeldAdjoint {
-  VectorX pose;       ///< by where they hold at the end of a step, in coordinates of the state
-  VectorX mean;       ///< by the mean velocity of the step that is to be gone back through next [s/m], [s/rad]
-  HandAdjoint hands;  ///< by where hands are at the end of a step, beyond what follows from what they hold
+  VectorX pose;        ///< by where they hold at the end of a step, in coordinates of the state
+  VectorX mean;        ///< by the mean velocity of the step that is to be gone back through next [s/m], [s/rad]
+  HandAdjoint hands;   ///< by where hands are at the end of a step, beyond what follows from what they hold
+  MatrixX3 obstacles;  ///< by places of obstacles then, as in `StateAdjoint`
 
   explicit HeldAdjoint(const Model& model) : pose(VectorX::Zero(model.dof_count)), mean(pose), hands(model) {}
 };
@@ -70,13 +81,14 @@ class StepGradient {
   /// unknowns (at the end, in coordinates of the state) contribute. `reactions`: of this step, by which the scalar goes
   /// besides. Throws std::invalid_argument where no gradient is known.
   void pull_back(StateAdjoint& state, CoefficientAdjoint& by, HeldAdjoint& held,
-                 const SupportAdjoint* reactions = nullptr);
+                 const ReactionAdjoint* reactions = nullptr);
 
  private:
   void set_end(const StateAdjoint& state);
-  void add_reactions(const SupportAdjoint& by, CoefficientAdjoint& coefficients, HandAdjoint& hands);
+  void add_reactions(const ReactionAdjoint& reactions, StepAdjoint& adjoint);
   void add_reaction(const Support& support, const Vector3& by_force, const Vector3& by_moment);
-  void add_hand_reaction(int support, const Vector3& by_force, const Vector3& by_moment, HandAdjoint& hands);
+  void add_hand_reaction(int support, const Vector3& by_force, const Vector3& by_moment, const Vector3& about,
+                         StepAdjoint& adjoint);
   Vector3 add_angle_reaction(int edge, const Vector3& arm, const Vector3& by_moment, const VectorX& held);
   void add_frame_reaction(int dof, CoefficientAdjoint& coefficients);
   void add_held_inertia(int angle, CoefficientAdjoint& coefficients) const;
@@ -99,8 +111,7 @@ class StepGradient {
   const Configuration* end_ = nullptr;  ///< at q1, in space
   VectorX rates_;                       ///< of velocities at the end by q1 [1/s]
   VectorX held_acceleration_, z_, by_end_, by_z_, rows_, columns_;
-  VectorX by_rows_;  ///< of the residual, by which reactions go directly; empty: none
-  std::vector<double> exact_;
+  VectorX by_rows_;       ///< of the residual, by which reactions go directly; empty: none
   bool shifted_ = false;  ///< the factorised matrix, against neutral modes
 };
 

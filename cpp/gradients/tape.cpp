@@ -78,6 +78,7 @@ class Tape::Player {
       hands->accept(configuration_, state);
     }
     place_hands(step.hands, state);
+    if (!step.obstacles.empty()) state.obstacles = step.obstacles;
     state.v = v;
     state.contacts = step.contacts;
   }
@@ -116,6 +117,7 @@ Tape::Tape(const Model& model, EquationOptions options, State first, const Param
       last_(starts_.front().q),
       last_velocity_(starts_.front().v),
       last_hands_(std::move(hands)),
+      last_obstacles_(starts_.front().obstacles),
       frictional_(frictional) {
   place_hands(last_hands_, starts_.front());
 }
@@ -124,7 +126,8 @@ void Tape::record(const AcceptedStep& step) {
   const State& after = step.after;
   acting_.record(steps_.size(), step.parameters);
   steps_.push_back({step.rule, step.duration, after.time, step.end, held_velocities(after.v), held_gains(step),
-                    step.reached, moved_hands(step.hands), after.contacts, step.reacts, step.unknown});
+                    step.reached, moved_hands(step.hands), moved_obstacles(after.obstacles), after.contacts,
+                    step.reacts, step.unknown});
   const VectorX before = held_velocities(last_velocity_);
   const double moved = steps_.back().held.norm() + before.norm();
   if (moved * std::abs(step.duration) <= kRounding * std::max(model_.length_scale, 1.0)) {
@@ -139,10 +142,31 @@ void Tape::record(const AcceptedStep& step) {
   last_velocity_ = after.v;
 }
 
+void Tape::note_moment(const Parameters& now) {
+  if (steps_.empty() || now.natural_version == acting_.natural_version()) return;
+  natural_[count()] = {now.natural_curvature, now.natural_twist, now.edge_natural_stretch};
+}
+
+std::vector<HandPose> Tape::hands_after(long steps) const {
+  for (long k = steps; k-- > 0;)
+    if (const Step& step = steps_[static_cast<std::size_t>(k)]; !step.hands.empty()) return step.hands;
+  return poses_of(starts_.front());
+}
+
 std::vector<HandPose> Tape::moved_hands(const std::vector<HandPose>& hands) {
   if (same_poses(hands, last_hands_)) return {};
   last_hands_ = hands;
   return hands;
+}
+
+std::vector<ObstaclePlace> Tape::moved_obstacles(const std::vector<ObstaclePlace>& obstacles) {
+  const auto same = [](const ObstaclePlace& a, const ObstaclePlace& b) {
+    const Vec3d point = a.point - b.point, other = a.other - b.other, turn = a.turn - b.turn;
+    return dot(point, point) + dot(other, other) + dot(turn, turn) == 0.0;
+  };
+  if (std::equal(obstacles.begin(), obstacles.end(), last_obstacles_.begin(), last_obstacles_.end(), same)) return {};
+  last_obstacles_ = obstacles;
+  return obstacles;
 }
 
 VectorX Tape::held_gains(const AcceptedStep& step) const {
@@ -175,9 +199,11 @@ void Tape::cut(long count, const State& after, std::vector<HandPose> hands) {
   steps_.resize(static_cast<std::size_t>(count));
   starts_.resize(steps_.size() / kStretch + 1);
   acting_.cut(steps_.size());
+  natural_.erase(natural_.upper_bound(count), natural_.end());
   last_ = after.q;
   last_velocity_ = after.v;
   last_hands_ = std::move(hands);
+  last_obstacles_ = after.obstacles;
 }
 
 void Tape::refuse(const std::string& why) {
@@ -196,16 +222,17 @@ void Tape::check_known() const {
 }
 
 void Tape::walk_back(Player& player, const std::function<void(const Passage&)>& visit) const {
-  std::vector<State> states;
+  std::vector<State> states(std::min(kStretch, steps_.size()));  // written anew, without allocation
   ActingNumbers::Player acting;
   std::size_t stretch = acting_.count() - 1;
   for (std::size_t k = steps_.size(); k-- > 0;) {
     const std::size_t first = k / kStretch * kStretch;
     if (k == steps_.size() - 1 || k % kStretch == kStretch - 1) {
-      states.assign(1, starts_[k / kStretch]);
+      states.front() = starts_[k / kStretch];
       for (std::size_t j = first; j < k; ++j) {
-        states.push_back(states.back());
-        player.advance(steps_[j], states.back());
+        State& next = states[j + 1 - first];
+        next = states[j - first];
+        player.advance(steps_[j], next);
       }
     }
     const Step& step = steps_[k];
@@ -214,7 +241,8 @@ void Tape::walk_back(Player& player, const std::function<void(const Passage&)>& 
     StepGradient& gradient = player.gradient(step.rule);
     const std::vector<HandPose> hands = Player::hands_after(step, states[k - first]);
     gradient.begin({states[k - first], parameters, step.rule, step.duration, step.end, player.held_velocity(step),
-                    step.gain.size() != 0 ? &step.gain : nullptr, &hands});
+                    step.gain.size() != 0 ? &step.gain : nullptr, &hands,
+                    step.obstacles.empty() ? nullptr : &step.obstacles});
     const std::function<State()> end = [&] {
       State after = states[k - first];
       player.advance(step, after);
@@ -235,7 +263,8 @@ class Tape::Moments {
         throw std::invalid_argument("a moment lies outside of the run");
       last = moment.steps;
       moment.by.check(tape.model_);
-      if (moment.by.has_reactions()) reactions_.emplace_back(reacting_step(moment.steps), &moment.by.reactions);
+      if (moment.by.has_reactions())
+        reactions_.push_back({reacting_step(moment.steps), {moment.by.reactions, tape.hands_after(moment.steps)}});
     }
   }
 
@@ -246,18 +275,19 @@ class Tape::Moments {
       const ReadoutAdjoint& by = moments_[left_ - 1].by;
       add_unknowns(tape_.model_, by, adjoint);
       if (!by.needs_state()) continue;
-      CoefficientAdjoint coefficients(tape_.model_, parameters.loads.rows());
-      add_readouts(tape_.model_, assembler, parameters, state(), by, adjoint, coefficients);
+      const Parameters& shown = shown_parameters(static_cast<long>(steps), parameters);
+      CoefficientAdjoint coefficients(tape_.model_, shown.loads.rows());
+      add_readouts(tape_.model_, assembler, shown, state(), by, adjoint, coefficients);
       const double time = steps == 0 ? tape_.starts_.front().time : tape_.steps_[steps - 1].time;
       visit_(static_cast<long>(steps), static_cast<long>(left_) - 1, time,
-             parameter_gradient(tape_.model_, parameters, coefficients));
+             parameter_gradient(tape_.model_, shown, coefficients));
     }
   }
 
   /// By the reactions of a step; or nothing. To be asked from the last step on.
-  const SupportAdjoint* reactions(std::size_t step) {
-    if (reactions_.empty() || reactions_.back().first != step) return nullptr;
-    const SupportAdjoint* found = reactions_.back().second;
+  std::optional<ReactionAdjoint> reactions(std::size_t step) {
+    if (reactions_.empty() || reactions_.back().first != step) return std::nullopt;
+    std::optional<ReactionAdjoint> found = std::move(reactions_.back().second);
     reactions_.pop_back();
     return found;
   }
@@ -270,11 +300,23 @@ class Tape::Moments {
         "reactions at the start of a run come from before it, and have no gradient: give zeros for the first frame");
   }
 
+  /// With the natural shape that was there after so many steps.
+  const Parameters& shown_parameters(long steps, const Parameters& acted) {
+    const auto found = tape_.natural_.find(steps);
+    if (found == tape_.natural_.end()) return acted;
+    shown_ = acted;
+    shown_.natural_curvature = found->second.curvature;
+    shown_.natural_twist = found->second.twist;
+    shown_.edge_natural_stretch = found->second.stretch;
+    return shown_;
+  }
+
   const Tape& tape_;
   const std::vector<MomentAdjoint>& moments_;
   const ParameterVisitor& visit_;
   std::size_t left_;
-  std::vector<std::pair<std::size_t, const SupportAdjoint*>> reactions_;
+  Parameters shown_;
+  std::vector<std::pair<std::size_t, ReactionAdjoint>> reactions_;
 };
 
 InitialGradient Tape::gradient(const std::vector<MomentAdjoint>& given, const ParameterVisitor& visit,
@@ -285,6 +327,7 @@ InitialGradient Tape::gradient(const std::vector<MomentAdjoint>& given, const Pa
   const CoefficientAdjoint none(model_, acting_.load_rows());
   CoefficientAdjoint coefficients = none;
   HeldAdjoint held(model_);
+  VectorX drawn = held.pose;
   double time = starts_.front().time;
   bool begins = true;
   Player player(*this);
@@ -293,10 +336,15 @@ InitialGradient Tape::gradient(const std::vector<MomentAdjoint>& given, const Pa
     moments.add(k + 1, passage.gradient.equations().assembler(), passage.parameters, passage.end, adjoint);
     if (begins) time = acting_time(steps_[k]);
     held.pose.setZero();
-    passage.gradient.pull_back(adjoint, coefficients, held, moments.reactions(k));
-    if (visit_poses)
-      visit_poses(static_cast<long>(k), steps_[k].reached,
-                  by_poses(model_, steps_[k].end, held.pose, held.hands, {passage.hands, starts_.front().hands}));
+    const std::optional<ReactionAdjoint> reactions = moments.reactions(k);
+    passage.gradient.pull_back(adjoint, coefficients, held, reactions ? &*reactions : nullptr);
+    drawn += held.pose;
+    if (visit_poses) {
+      PoseAdjoint poses =
+          by_poses(model_, steps_[k].end, held.pose, held.hands, {passage.hands, starts_.front().hands});
+      poses.obstacles = by_places(model_, held.obstacles);
+      visit_poses(static_cast<long>(k), steps_[k].reached, poses);
+    }
     begins = k == acting_.first(passage.stretch) || k == 0;
     if (!begins) return;
     visit(static_cast<long>(k), -1, time, parameter_gradient(model_, passage.parameters, coefficients));
@@ -309,8 +357,17 @@ InitialGradient Tape::gradient(const std::vector<MomentAdjoint>& given, const Pa
   moments.add(0, assembler, acting_.start(), [&] { return starts_.front(); }, adjoint);
   const State& first = starts_.front();
   const std::vector<HandPose> hands = poses_of(first);
-  return {at_nodes(model_, adjoint.q), at_nodes(model_, adjoint.v),
-          by_poses(model_, first.q, adjoint.q, adjoint.hands, {hands, first.hands})};
+  PoseAdjoint poses = by_poses(model_, first.q, adjoint.q, adjoint.hands, {hands, first.hands});
+  poses.obstacles = by_places(model_, adjoint.obstacles);
+  VectorX spins = VectorX::Zero(model_.planar() ? 0 : model_.edge_count);
+  drawn += adjoint.q;
+  for (Eigen::Index e = 0; e < spins.size(); ++e) {
+    const int angle = model_.edge_dof[static_cast<std::size_t>(e)];
+    spins(e) = adjoint.q(angle);
+    drawn(angle) -= spins(e);
+  }
+  return {at_nodes(model_, adjoint.q), at_nodes(model_, adjoint.v), std::move(poses), std::move(spins),
+          by_drawing(model_, first.q, drawn)};
 }
 
 RunJacobian Tape::jacobian() const {

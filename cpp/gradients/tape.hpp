@@ -2,6 +2,7 @@
 /// A run as the adjoint method needs it: what each step led to, so that states come again without a solve.
 
 #include <functional>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -15,9 +16,12 @@ namespace withe {
 
 /// Derivatives of a scalar by the state that a run began with.
 struct InitialGradient {
-  MatrixX3 positions;    ///< per node [1/m]; directors turn along with their edges, without spin
-  MatrixX3 velocities;   ///< per node [s/m]
-  PoseAdjoint supports;  ///< by where what supports hold was
+  MatrixX3 positions;   ///< per node [1/m]; directors turn along with their edges, without spin
+  MatrixX3 velocities;  ///< per node [s/m]
+  PoseAdjoint poses;    ///< by where what supports hold was, and obstacles
+  VectorX spins;        ///< per edge, by how its directors were turned about it [1/rad]
+  /// By what supports hold as it was drawn, and the state with it, but for `spins`; where no support moves.
+  DrawnAdjoint drawn;
 };
 
 /// Takes derivatives of a scalar by what acted from a step on until the next that it is given; or by what a read-out at
@@ -38,18 +42,24 @@ struct MomentAdjoint {
   ReadoutAdjoint by;
 };
 
-/// Takes derivatives by poses of supports at the end of a step, and per support how far its position and its rotation
-/// had come then from where they set out, from 0 to 1 (empty: all are there).
-using PoseVisitor = std::function<void(long step, const MatrixX& reached, const PoseAdjoint&)>;
+/// How far positions and rotations of supports, and positions of obstacles, have come from where they set out, from 0
+/// to 1; empty: all are there.
+struct Reached {
+  MatrixX supports;
+  VectorX obstacles;
+};
+
+/// Takes derivatives by poses at the end of a step, and how far they had come then.
+using PoseVisitor = std::function<void(long step, const Reached& reached, const PoseAdjoint&)>;
 
 /// A step that has been accepted.
 struct AcceptedStep {
   StepRule rule;
   double duration;
-  const VectorX& end;             ///< q1
-  const State& after;             ///< at its end
-  const Parameters& parameters;   ///< as they acted
-  MatrixX reached;                ///< see `PoseVisitor`
+  const VectorX& end;            ///< q1
+  const State& after;            ///< at its end
+  const Parameters& parameters;  ///< as they acted
+  Reached reached;
   std::vector<HandPose> hands;    ///< where hands are at its end, per support; empty: there is none
   bool reacts = true;             ///< whether reactions are those of this step from here on
   const char* unknown = nullptr;  ///< why no gradient goes through it, unless it is cut off again
@@ -63,6 +73,8 @@ class Tape {
 
   long count() const { return static_cast<long>(steps_.size()); }
   void record(const AcceptedStep& step);
+  /// What is read out now goes by these: natural shapes on their way, which act in the middle of steps.
+  void note_moment(const Parameters& now);
   /// What acts from here on is to be told apart from what acted before.
   void divide() { acting_.divide(); }
   /// Forgets all but so many.
@@ -93,15 +105,25 @@ class Tape {
     VectorX end;
     VectorX held;  ///< velocities at its end of what supports hold, one after the other; none: they rest, as before it
     VectorX gain;  ///< see `StepTaken::held_gain`; none: nothing
-    MatrixX reached;
-    std::vector<HandPose> hands;          ///< at its end; none: where they were before it
-    std::vector<ContactRecord> contacts;  ///< at its end
+    Reached reached;
+    std::vector<HandPose> hands;           ///< at its end; none: where they were before it
+    std::vector<ObstaclePlace> obstacles;  ///< likewise
+    std::vector<ContactRecord> contacts;   ///< at its end
     bool reacts;
     const char* unknown;  ///< why no gradient goes through it, if so
   };
+  /// As it is read out, where it is another than the one that acted last.
+  struct NaturalShape {
+    std::vector<MatrixX2> curvature;
+    std::vector<VectorX> twist;
+    VectorX stretch;
+  };
   class Player;
   class Moments;
+  /// Where hands are after so many steps.
+  std::vector<HandPose> hands_after(long steps) const;
   std::vector<HandPose> moved_hands(const std::vector<HandPose>& hands);
+  std::vector<ObstaclePlace> moved_obstacles(const std::vector<ObstaclePlace>& obstacles);
   VectorX held_velocities(const VectorX& v) const;
   VectorX held_gains(const AcceptedStep& step) const;
 
@@ -124,9 +146,11 @@ class Tape {
   EquationOptions options_;
   ActingNumbers acting_;
   std::vector<Step> steps_;
-  std::vector<State> starts_;         ///< of every stretch of steps that are played again together
-  VectorX last_, last_velocity_;      ///< what the last step led to
-  std::vector<HandPose> last_hands_;  ///< likewise
+  std::map<long, NaturalShape> natural_;  ///< by the number of steps
+  std::vector<State> starts_;             ///< of every stretch of steps that are played again together
+  VectorX last_, last_velocity_;          ///< what the last step led to
+  std::vector<HandPose> last_hands_;      ///< likewise
+  std::vector<ObstaclePlace> last_obstacles_;
   std::string refused_;
   bool frictional_;
 };

@@ -22,6 +22,22 @@ void add_coefficients(const ContactProblem& problem, const ContactPair& pair, co
     out.friction += by.along + by.across;
 }
 
+/// Contact is as it is where rods and an obstacle are elsewhere by the same: derivatives by the obstacle's place are
+/// those by all nodes, turned round. Its velocity is its way in the step over the time.
+void add_obstacle(const Model& model, const ContactPair& pair, const int (&dofs)[kContactUnknowns],
+                  const ContactAdjoint& by, const double (&by_end)[kContactUnknowns], double duration,
+                  StepAdjoint& adjoint) {
+  const int obstacle = -1 - pair.key.b;
+  constexpr int kCoordinates = 12;  // of nodes, before angles
+  for (int k = 0; k < kCoordinates; ++k) {
+    const int axis = k % 3;
+    if (dofs[k] < 0 || axis >= model.dimension) continue;
+    const double by_velocity = duration > 0.0 ? by.velocity[k] / duration : 0.0;
+    adjoint.obstacles(obstacle, axis) += by_velocity - by.start[k];
+    adjoint.obstacles_end(obstacle, axis) -= by_velocity + by_end[k];
+  }
+}
+
 }  // namespace
 
 ContactForces::ContactForces(const Model& model) : contact_(model) { rows_.set(contact_.surfaces(), contact_.near()); }
@@ -70,7 +86,6 @@ void ContactForces::add(const StepProblem& problem, StepData& data, const Assemb
 void ContactForces::add_adjoint(const StepProblem& problem, const StepData&, const Assembler&,
                                 StepAdjoint& adjoint) const {
   if (contact_.count() == 0) return;
-  if (!contact_.frictional() && !problem.in_middle()) return;  // a function of q1 alone
   const auto& shares = problem.parameters->surfaces.pair_shares;
   if (std::any_of(shares.begin(), shares.end(), [](const VectorX& s) { return s.size() > 0; }))
     throw std::invalid_argument("no gradient is known through friction that varies along a rod or over an obstacle");
@@ -84,15 +99,20 @@ void ContactForces::add_adjoint(const StepProblem& problem, const StepData&, con
     const auto after = adjoint.approach_after.find(t.pair.key);
     const bool remembered = t.lagged < 0 && after != adjoint.approach_after.end();
     const ContactAdjoint by = contact_.adjoint(i, rows, remembered ? after->second : 0.0);
-    if (problem.in_middle()) contact_.local(i, true, local);
+    const bool obstacle = t.pair.key.b < 0;
+    double by_end[kContactUnknowns] = {};
+    if (problem.in_middle() || obstacle) {
+      contact_.local(i, true, local);
+      for (int k = 0; k < kContactUnknowns; ++k)
+        for (int j = 0; j < kContactUnknowns; ++j) by_end[k] += rows[j] * local.hessian[j][k];
+    }
     for (int k = 0; k < kContactUnknowns; ++k) {
       if (dofs[k] < 0) continue;
       adjoint.start[dofs[k]] += by.start[k];
       adjoint.velocity[dofs[k]] += by.velocity[k];
-      // q1 = 2 z - q0
-      for (int j = 0; j < kContactUnknowns && problem.in_middle(); ++j)
-        adjoint.start[dofs[k]] -= rows[j] * local.hessian[j][k];
+      if (problem.in_middle()) adjoint.start[dofs[k]] -= by_end[k];  // q1 = 2 z - q0
     }
+    if (obstacle) add_obstacle(problem.model, t.pair, dofs, by, by_end, contact_.problem().duration, adjoint);
     if (by.approach != 0.0) adjoint.approach[t.pair.key] += by.approach;
     add_coefficients(contact_.problem(), t.pair, by, adjoint.coefficients);
   }

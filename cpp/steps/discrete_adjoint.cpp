@@ -21,8 +21,10 @@ void ElasticForces::add_discrete_adjoint(const StepProblem& problem, const StepD
     double along = 0.0;
     for (int i = 0; i < model.dimension; ++i) along += f.tangent[i] * (rows[model.dimension + i] - rows[i]);
     along *= mean.inverse_mean / f.inverse_length;
-    by.stretch_stiffness(e) += (1.0 / (mean.inverse_mean * model.edge_length(e)) - 1.0 - k.stretch_natural(e)) * along;
+    const double stretch = 1.0 / (mean.inverse_mean * model.edge_length(e));
+    by.stretch_stiffness(e) += (stretch - 1.0 - k.stretch_natural(e)) * along;
     by.stretch_natural(e) -= k.stretch_stiffness(e) * along;
+    by.rest_length(e) -= k.stretch_stiffness(e) * stretch / model.edge_length(e) * along;
     axial[e] = mean.force;
     modulus[e] = mean.modulus;
   }

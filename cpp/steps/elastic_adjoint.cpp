@@ -87,6 +87,43 @@ class StencilAdjoint {
   double rows_[kMaxLocal];
 };
 
+/// Of stretching: EA (eps - n) and kv times the change of eps act along an edge.
+void add_stretch(const StepProblem& problem, const StepData& data, bool elastic, StepAdjoint& adjoint) {
+  const Model& model = problem.model;
+  const ElasticCoefficients &k = problem.elastic, &kv = problem.viscous;
+  const bool viscous = problem.viscous_acts(), middle = problem.in_middle();
+  const double share = middle ? 0.5 : 1.0;
+  CoefficientAdjoint& by = adjoint.coefficients;
+  for (int e = 0; e < model.edge_count; ++e) {
+    const int tail = model.tail_dof[at(e)], head = model.head_dof[at(e)];
+    const double length = model.edge_length(e);
+    const auto strain = [&](const Configuration& c) { return c.length(e) / length - 1.0; };
+    double along = 0.0;
+    for (int i = 0; i < model.dimension; ++i)
+      along += data.configuration.edge[at(e)].tangent[i] * (adjoint.rows[head + i] - adjoint.rows[tail + i]);
+    if (elastic) {
+      const double now = strain(data.configuration);
+      by.stretch_stiffness(e) += (now - k.stretch_natural(e)) * along;
+      by.stretch_natural(e) -= k.stretch_stiffness(e) * along;
+      by.rest_length(e) -= k.stretch_stiffness(e) * (1.0 + now) / length * along;
+    }
+    if (!viscous) continue;
+    const Configuration &start = problem.start_configuration,
+                        &end = middle ? data.end_configuration : data.configuration;
+    const double change = share * (strain(end) - strain(start)),
+                 force = share * kv.stretch_stiffness(e) / length * along, rate = 1.0 / problem.interval;
+    by.stretch_stiffness(e) += rate * problem.parameters->edge_viscous_time(e) * change * along;
+    by.stretch_time(e) += rate * k.stretch_stiffness(e) * change * along;
+    by.rest_length(e) -= kv.stretch_stiffness(e) * change / length * along;
+    for (int i = 0; i < model.dimension; ++i) {
+      double by_start = -force * start.edge[at(e)].tangent[i];
+      if (middle) by_start -= force * end.edge[at(e)].tangent[i];  // q1 = 2 z - q0
+      adjoint.start[head + i] += by_start;
+      adjoint.start[tail + i] -= by_start;
+    }
+  }
+}
+
 /// Sum of factors times gradients of strains f (kappa1, kappa2, tau), which are `strain`, of ordinary stencils in
 /// space.
 VectorX strain_forces(const Model& model, const Assembler& assembler, const BendMeasure& measure,
@@ -147,23 +184,7 @@ void ElasticForces::add_adjoint(const StepProblem& problem, const StepData& data
   const bool viscous = problem.viscous_acts(), middle = problem.in_middle();
   const double rate = problem.moves() ? 1.0 / problem.interval : 0.0;
   CoefficientAdjoint& by = adjoint.coefficients;
-
-  for (int e = 0; e < model.edge_count; ++e) {
-    StencilAdjoint part(problem, assembler.stretch, e, adjoint);
-    stretch_gradients(model, data.configuration, e, part.middle);
-    const double along = model.edge_length(e) * part.along(0);
-    if (elastic) by.stretch_stiffness(e) += (part.middle.strain[0] - k.stretch_natural(e)) * along;
-    if (elastic) by.stretch_natural(e) -= k.stretch_stiffness(e) * along;
-    if (elastic)
-      by.rest_length(e) -= k.stretch_stiffness(e) * (1.0 + part.middle.strain[0]) / model.edge_length(e) * along;
-    if (!viscous) continue;
-    stretch_gradients(model, problem.start_configuration, e, part.start);
-    if (middle) stretch_gradients(model, data.end_configuration, e, part.end);
-    by.stretch_stiffness(e) += rate * problem.parameters->edge_viscous_time(e) * part.change(0) * along;
-    by.stretch_time(e) += rate * k.stretch_stiffness(e) * part.change(0) * along;
-    part.add_start(0, model.edge_length(e) * kv.stretch_stiffness(e));
-  }
-
+  add_stretch(problem, data, elastic, adjoint);
   const TurningNumbers numbers{k.bend_stiffness,     k.bend_natural,  problem.parameters->bend_viscous_time,
                                by.bend_stiffness,    by.bend_natural, by.bend_time,
                                viscous ? rate : 0.0, elastic};

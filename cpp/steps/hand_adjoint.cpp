@@ -20,20 +20,6 @@ Vector3 rows_of_point(const Model& model, const VectorX& rows, const TouchedEdge
          touched.place * node_vector(model, rows, model.edge_head[at(touched.edge)]);
 }
 
-void add_to_point(const Model& model, const TouchedEdge& touched, const Vector3& by, VectorX& out) {
-  add_to_node(model, model.edge_tail[at(touched.edge)], (1.0 - touched.place) * by, out);
-  add_to_node(model, model.edge_head[at(touched.edge)], touched.place * by, out);
-}
-
-/// By stiffnesses about d1, d2, t, from what is found by those of both bendings and of twist, or in a plane of the one.
-void add_turn_stiffness(const Model& model, const Matrix3& grip, double share, const Vector3& by, int support,
-                        MatrixX6& out) {
-  if (model.planar())
-    out.row(support).tail<3>() += share * by.x() * (grip.transpose() * model.plane->normal).cwiseAbs2().transpose();
-  else
-    out.row(support).tail<3>() += share * Vector3(by.y(), by.x(), by.z()).transpose();
-}
-
 AttachedStep reversed(const AttachedStep& step) {
   return {step.end, step.start, step.end_strain, step.start_strain, step.first};
 }

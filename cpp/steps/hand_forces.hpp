@@ -32,6 +32,10 @@ class HandForces final : public Term {
   /// Adds to derivatives by what a step is given those by what it leaves of slips, `adjoint.hands_after`: to `by_end`,
   /// that by q1, and to the adjoint. To come before `add_adjoint`.
   void add_slip_adjoint(const StepProblem& problem, const VectorX& q1, StepAdjoint& adjoint, VectorX& by_end) const;
+  /// Adds derivatives of a scalar that goes with what one hand holds with, by that force and moment: what they depend
+  /// on at z to `by_z`, all else to the adjoint. Throws std::invalid_argument where none is known.
+  void add_wrench_adjoint(const StepProblem& problem, const StepData& data, int support, const Vector3& by_force,
+                          const Vector3& by_moment, StepAdjoint& adjoint, VectorX& by_z) const;
   bool slips() const { return slips_; }
   const RingForces& rings() const { return rings_; }
   /// Whether something slips where a state is, or would with any more force.
@@ -64,6 +68,10 @@ class HandForces final : public Term {
                 StepAdjoint& adjoint) const;
   void add_shift_adjoint(const StepProblem& problem, const StepData& data, int element, const Vector3& by_point,
                          StepAdjoint& adjoint) const;
+  void add_moment_adjoint(const StepProblem& problem, const StepData& data, int element, const Vector3& by_moment,
+                          StepAdjoint& adjoint, VectorX& by_z) const;
+  void add_planar_moment_adjoint(const StepProblem& problem, const StepData& data, int element, double by,
+                                 StepAdjoint& adjoint, VectorX& by_z) const;
   Vector3 add_turn_adjoint(const StepProblem& problem, const StepData& data, int element, const double* rows,
                            CoefficientAdjoint& by) const;
 

@@ -65,6 +65,21 @@ inline PlanarBend<double> planar_turn(const Model& model, const BendMeasure& mea
   return planar_bend(measure, kappa, 0.0, planar_stiffness(model, hand, share, grip));
 }
 
+/// Adds to the rows of an edge's nodes what is by the point that is held.
+inline void add_to_point(const Model& model, const TouchedEdge& touched, const Vector3& by, VectorX& out) {
+  add_to_node(model, model.edge_tail[at(touched.edge)], (1.0 - touched.place) * by, out);
+  add_to_node(model, model.edge_head[at(touched.edge)], touched.place * by, out);
+}
+
+/// By stiffnesses about d1, d2, t, from what is found by those of both bendings and of twist, or in a plane of the one.
+inline void add_turn_stiffness(const Model& model, const Matrix3& grip, double share, const Vector3& by, int support,
+                               MatrixX6& out) {
+  if (model.planar())
+    out.row(support).tail<3>() += share * by.x() * (grip.transpose() * model.plane->normal).cwiseAbs2().transpose();
+  else
+    out.row(support).tail<3>() += share * Vector3(by.y(), by.x(), by.z()).transpose();
+}
+
 /// One edge that a hand holds, as an evaluation finds it.
 struct HandForces::Piece {
   const TouchedEdge& touched;

@@ -94,11 +94,14 @@ struct StepAdjoint {
   VectorX start, velocity;                     ///< by q0 (its angles: of directors) and v0
   VectorX acceleration;                        ///< by the acceleration of what supports hold; meaningful where held
   VectorX start_turn, end_turn;                ///< per edge: by the angle of its directors at the start, at q1 [rad]
+  VectorX middle_turn;                         ///< likewise, at z, of what is no part of the residual
   MatrixX3 start_spin, middle_spin, end_spin;  ///< per frame: by its rotation vector at the start, at z, at q1 [rad]
   const ApproachAdjoint& approach_after;       ///< by what is remembered at the end
   ApproachAdjoint approach;                    ///< by what was remembered at the start
   const HandAdjoint& hands_after;              ///< by slips at the end
   HandAdjoint hands, hands_end;                ///< by hands at the start, and by where they are at the end
+  /// Per obstacle, by its place at the start and at the end, in the axes of the unknowns [1/m].
+  MatrixX3 obstacles, obstacles_end;
   CoefficientAdjoint& coefficients;
 
   StepAdjoint(const Model& model, const VectorX& rows_of, const ApproachAdjoint& by_approach,
@@ -109,6 +112,7 @@ struct StepAdjoint {
         acceleration(start),
         start_turn(VectorX::Zero(model.edge_count)),
         end_turn(start_turn),
+        middle_turn(start_turn),
         start_spin(MatrixX3::Zero(model.frame_count, 3)),
         middle_spin(start_spin),
         end_spin(start_spin),
@@ -116,6 +120,8 @@ struct StepAdjoint {
         hands_after(by_hands),
         hands(model),
         hands_end(model),
+        obstacles(MatrixX3::Zero(static_cast<Eigen::Index>(model.description.contact.obstacles.size()), 3)),
+        obstacles_end(obstacles),
         coefficients(by) {}
 };
 

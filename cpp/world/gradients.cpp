@@ -73,9 +73,11 @@ std::vector<EquilibriumGradient> World::equilibrium_gradients(const std::vector<
     add_unknowns(model, scalar, adjoint);
     if (scalar.needs_state())
       add_readouts(model, gradient.equations().assembler(), self.parameters, frames, scalar, adjoint, coefficients);
-    gradient.pull_back(adjoint, coefficients, held, scalar.has_reactions() ? &scalar.reactions : nullptr);
-    out.push_back({parameter_gradient(model, self.parameters, coefficients),
-                   by_poses(model, self.state.q, held.pose, held.hands, {hands, self.state.hands}),
+    const ReactionAdjoint reactions{scalar.reactions, hands};
+    gradient.pull_back(adjoint, coefficients, held, scalar.has_reactions() ? &reactions : nullptr);
+    PoseAdjoint poses = by_poses(model, self.state.q, held.pose, held.hands, {hands, self.state.hands});
+    poses.obstacles = by_places(model, held.obstacles);
+    out.push_back({parameter_gradient(model, self.parameters, coefficients), std::move(poses),
                    by_drawing(model, self.state.q, held.pose)});
   }
   return out;
@@ -98,6 +100,10 @@ std::shared_ptr<Tape> World::start_tape() {
       self.tape->refuse(kRestitution);
   }
   return self.tape;
+}
+
+void World::note_moment() {
+  if (implementation_->tape) implementation_->tape->note_moment(implementation_->parameters);
 }
 
 void World::stop_tape() { implementation_->tape.reset(); }
@@ -133,7 +139,6 @@ void World::Implementation::check_tape() {
 void World::Implementation::record_step(StepRule rule, double dt, bool reacts) {
   const char* unknown = nullptr;
   if (const Contact* contact = equations_of_step().contact()) {
-    const ContactProblem& problem = contact->problem();
     if (contact->frictional() && !known_friction(description.contact.friction_law))
       unknown = kFriction;
     else if (loses_in_impacts(description.contact))
@@ -142,19 +147,26 @@ void World::Implementation::record_step(StepRule rule, double dt, bool reacts) {
       unknown = kFrictionChanged;
     else if (!contact->has_given_stiffness(state))
       unknown = kStiffness;
-    else if (!problem.shift.empty() || !problem.turn.empty())
-      unknown = "an obstacle moved";
   }
-  const bool there = std::all_of(motions.begin(), motions.end(), [&](const SupportMotion& m) {
-    return state.time >= std::max(m.shift.end, m.turn.end);
-  });
-  MatrixX reached;
-  if (!there) reached.resize(static_cast<Eigen::Index>(motions.size()), 2);
-  for (Eigen::Index s = 0; s < reached.rows(); ++s) {
-    const SupportMotion& m = motions[static_cast<std::size_t>(s)];
-    reached.row(s) << m.shift.fraction(state.time), m.turn.fraction(state.time);
+  tape->record({rule, dt, work.move, state, parameters, reached(), hand_poses(), reacts, unknown});
+}
+
+Reached World::Implementation::reached() const {
+  Reached out;
+  const auto moves = [&](const auto& m) { return state.time < std::max(m.shift.end, m.turn.end); };
+  if (std::any_of(motions.begin(), motions.end(), moves)) {
+    out.supports.resize(static_cast<Eigen::Index>(motions.size()), 2);
+    for (Eigen::Index s = 0; s < out.supports.rows(); ++s) {
+      const SupportMotion& m = motions[static_cast<std::size_t>(s)];
+      out.supports.row(s) << m.shift.fraction(state.time), m.turn.fraction(state.time);
+    }
   }
-  tape->record({rule, dt, work.move, state, parameters, reached, hand_poses(), reacts, unknown});
+  if (std::any_of(obstacle_motions.begin(), obstacle_motions.end(), moves)) {
+    out.obstacles.resize(static_cast<Eigen::Index>(obstacle_motions.size()));
+    for (Eigen::Index o = 0; o < out.obstacles.size(); ++o)
+      out.obstacles(o) = obstacle_motions[static_cast<std::size_t>(o)].shift.fraction(state.time);
+  }
+  return out;
 }
 
 }  // namespace withe

@@ -233,6 +233,7 @@ struct World::Implementation : Running {
   // gradients.cpp
   void check_tape();
   void record_step(StepRule rule, double dt, bool reacts);
+  Reached reached() const;
 
   // supports.cpp
   SupportMotion standing(const Support& support) const;

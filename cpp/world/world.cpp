@@ -47,6 +47,11 @@ const Plan& World::plan() const {
   if (!implementation_->plan_current) implementation_->make_plan();
   return implementation_->plan;
 }
+std::optional<Vector3> World::plane_normal() const {
+  const Model& model = implementation_->model;
+  if (!model.planar()) return std::nullopt;
+  return model.plane->normal;
+}
 double World::time() const { return implementation_->state.time; }
 void World::interrupt() { implementation_->interrupted = true; }
 

@@ -131,10 +131,10 @@ struct Linearisation {
   SparseMatrix displacement;  ///< (3 nodes) x free unknowns: node displacements [m] of each unknown
 };
 
-/// Derivatives of scalars of an equilibrium by what acts, and by where supports hold.
+/// Derivatives of scalars of an equilibrium by what acts, and by where supports hold and obstacles are.
 struct EquilibriumGradient {
   ParameterGradient parameters;
-  PoseAdjoint supports;
+  PoseAdjoint poses;
   DrawnAdjoint drawn;
 };
 
@@ -168,6 +168,8 @@ class World {
   const SceneDescription& description() const;
   const Options& options() const;
   const Plan& plan() const;
+  /// Normal of the plane that the scene moves in, if it does.
+  std::optional<Vector3> plane_normal() const;
   const Statistics& statistics() const;
   double time() const;
 
@@ -281,6 +283,8 @@ class World {
   std::vector<EquilibriumGradient> equilibrium_gradients(const std::vector<ReadoutAdjoint>& by) const;
   /// Keeps the steps from here on, for gradients; nothing: no more.
   std::shared_ptr<Tape> start_tape();
+  /// A frame has been taken of the run that is recorded.
+  void note_moment();
   void stop_tape();
   /// From where another world of the same scene is to where this one is, as a vector; see state_vector.hpp.
   VectorX state_difference(const World& reference) const;

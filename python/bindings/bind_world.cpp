@@ -37,17 +37,25 @@ void register_gradients(py::module_& module) {
       .def_readonly("rest_length", &ParameterGradient::rest_length);
   py::class_<EquilibriumGradient>(module, "EquilibriumGradient", "Derivatives of a scalar of an equilibrium.")
       .def_readonly("parameters", &EquilibriumGradient::parameters)
-      .def_property_readonly("support_positions", [](const EquilibriumGradient& g) { return g.supports.positions; })
-      .def_property_readonly("support_rotations", [](const EquilibriumGradient& g) { return g.supports.rotations; })
+      .def_property_readonly("support_positions", [](const EquilibriumGradient& g) { return g.poses.positions; })
+      .def_property_readonly("support_rotations", [](const EquilibriumGradient& g) { return g.poses.rotations; })
+      .def_property_readonly("obstacle_positions", [](const EquilibriumGradient& g) { return g.poses.obstacles; })
       .def_property_readonly("held_nodes", [](const EquilibriumGradient& g) { return g.drawn.nodes; })
       .def_property_readonly("held_spins", [](const EquilibriumGradient& g) { return g.drawn.spins; });
-  py::class_<PoseAdjoint>(module, "PoseAdjoint", "Derivatives of a scalar by poses of supports.")
+  py::class_<PoseAdjoint>(module, "PoseAdjoint", "Derivatives of a scalar by poses of supports and obstacles.")
       .def_readonly("positions", &PoseAdjoint::positions)
-      .def_readonly("rotations", &PoseAdjoint::rotations);
+      .def_readonly("rotations", &PoseAdjoint::rotations)
+      .def_readonly("obstacles", &PoseAdjoint::obstacles);
+  py::class_<Reached>(module, "Reached", "How far what moves has come, from 0 to 1; empty: all is there.")
+      .def_readonly("supports", &Reached::supports)
+      .def_readonly("obstacles", &Reached::obstacles);
   py::class_<InitialGradient>(module, "InitialGradient", "Derivatives of a scalar of a run by the state at its start.")
       .def_readonly("positions", &InitialGradient::positions)
       .def_readonly("velocities", &InitialGradient::velocities)
-      .def_readonly("supports", &InitialGradient::supports);
+      .def_readonly("poses", &InitialGradient::poses)
+      .def_readonly("spins", &InitialGradient::spins)
+      .def_property_readonly("held_nodes", [](const InitialGradient& g) { return g.drawn.nodes; })
+      .def_property_readonly("held_spins", [](const InitialGradient& g) { return g.drawn.spins; });
   py::class_<RunJacobian>(module, "RunJacobian", "Derivatives of the state that a run leads to.")
       .def_readonly("state", &RunJacobian::state)
       .def_readonly("rows", &RunJacobian::rows);
@@ -376,6 +384,7 @@ void define_supports(WorldClass& world) {
 void define_readouts(WorldClass& world) {
   world.def_property_readonly("time", [](const GuardedWorld& self) { return self.reading().time(); });
   world.def_property_readonly("plan", [](const GuardedWorld& self) { return self.reading().plan(); });
+  world.def_property_readonly("plane_normal", [](const GuardedWorld& self) { return self.reading().plane_normal(); });
   world.def_property_readonly("statistics", [](const GuardedWorld& self) { return self.reading().statistics(); });
   world.def("positions", [](const GuardedWorld& self) { return self.reading().positions(); });
   world.def("velocities", [](const GuardedWorld& self) { return self.reading().velocities(); });
@@ -413,6 +422,7 @@ void define_readouts(WorldClass& world) {
       },
       py::arg("by"));
   world.def("start_tape", [](GuardedWorld& self) { return self.changing().start_tape(); });
+  world.def("note_moment", [](GuardedWorld& self) { self.changing().note_moment(); });
   world.def("stop_tape", [](GuardedWorld& self) { self.changing().stop_tape(); });
   world.def(
       "state_difference",

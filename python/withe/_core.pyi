@@ -35,6 +35,7 @@ __all__: list[str] = [
     "PathPoint",
     "Plan",
     "PoseAdjoint",
+    "Reached",
     "Reaction",
     "ReadoutAdjoint",
     "RevoluteLink",
@@ -594,6 +595,8 @@ class EquilibriumGradient:
     @property
     def held_spins(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
     @property
+    def obstacle_positions(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
+    @property
     def parameters(self) -> ParameterGradient: ...
     @property
     def support_positions(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
@@ -602,21 +605,38 @@ class EquilibriumGradient:
 
 class PoseAdjoint:
     """
-    Derivatives of a scalar by poses of supports.
+    Derivatives of a scalar by poses of supports and obstacles.
     """
+    @property
+    def obstacles(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
     @property
     def positions(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
     @property
     def rotations(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
+
+class Reached:
+    """
+    How far what moves has come, from 0 to 1; empty: all is there.
+    """
+    @property
+    def obstacles(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+    @property
+    def supports(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]: ...
 
 class InitialGradient:
     """
     Derivatives of a scalar of a run by the state at its start.
     """
     @property
+    def held_nodes(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
+    @property
+    def held_spins(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
+    @property
+    def poses(self) -> PoseAdjoint: ...
+    @property
     def positions(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
     @property
-    def supports(self) -> PoseAdjoint: ...
+    def spins(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
     @property
     def velocities(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
 
@@ -689,10 +709,7 @@ class Tape:
         self,
         moments: collections.abc.Sequence[MomentAdjoint],
         visit: collections.abc.Callable[[int, int, float, ParameterGradient], None],
-        visit_poses: collections.abc.Callable[
-            [int, typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"], PoseAdjoint], None
-        ]
-        | None,
+        visit_poses: collections.abc.Callable[[int, Reached, PoseAdjoint], None] | None,
     ) -> InitialGradient: ...
     def jacobian(self) -> RunJacobian: ...
     @property
@@ -999,6 +1016,7 @@ class World:
     def natural_twist(
         self, rod: typing.SupportsInt | typing.SupportsIndex
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+    def note_moment(self) -> None: ...
     def obstacle_position(
         self, obstacle: typing.SupportsInt | typing.SupportsIndex
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]: ...
@@ -1114,6 +1132,8 @@ class World:
     def contact(self) -> ContactDescription: ...
     @property
     def plan(self) -> Plan: ...
+    @property
+    def plane_normal(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"] | None: ...
     @property
     def statistics(self) -> Statistics: ...
     @property

@@ -14,8 +14,10 @@ INTEGRATORS = ("backward_euler", "implicit_midpoint", "energy_momentum")
 class Touching:
     """A soft arm that meets what is below it within 30 ms, by contact of a given stiffness."""
 
-    def __init__(self, kind, friction="none", integrator="backward_euler"):
+    def __init__(self, kind, friction="none", integrator="backward_euler", offset=(0.0, 0.0, 0.0)):
+        """`offset`: of the obstacle."""
         self.planar = "plane" in kind
+        offset = np.array(offset)
         scene = withe.Scene()
         material = withe.Material(youngs_modulus=1e6, poisson_ratio=0.4, density=1200.0, viscosity=100.0)
         s = np.linspace(0.0, 1.0, NODES)
@@ -30,15 +32,17 @@ class Touching:
         rubs = {"none": 0.0, "directed": (0.3, 0.5)}.get(friction, 0.4)
         self.other = None
         if kind.startswith("floor"):
-            self.other = scene.add_floor(0.0, friction=rubs)
+            self.other = scene.add_plane(offset, (0, 0, 1), friction=rubs)
         elif kind == "slope in a plane":
-            self.other = scene.add_plane((0, 0, 0), (0.1, 0, 1), friction=rubs)
+            self.other = scene.add_plane(offset, (0.1, 0, 1), friction=rubs)
         elif kind == "sphere":
-            self.other = scene.add_sphere((0.13, 0.01, -0.05), 0.05, friction=rubs)
+            self.other = scene.add_sphere(offset + np.array((0.13, 0.01, -0.05)), 0.05, friction=rubs)
         elif kind == "capsule":
-            self.other = scene.add_capsule((0.1, -0.1, -0.03), (0.14, 0.1, -0.02), 0.03, friction=rubs)
+            ends = offset + np.array([(0.1, -0.1, -0.03), (0.14, 0.1, -0.02)])
+            self.other = scene.add_capsule(*ends, 0.03, friction=rubs)
         elif kind == "post":  # smaller than an edge, so that it touches straight ones
-            self.other = scene.add_capsule((0.1, -0.1, -0.008), (0.14, 0.1, -0.004), 8e-3, friction=rubs)
+            ends = offset + np.array([(0.1, -0.1, -0.008), (0.14, 0.1, -0.004)])
+            self.other = scene.add_capsule(*ends, 8e-3, friction=rubs)
         else:
             ends = {"start": (0.11, -0.1, -0.008), "end": (0.15, 0.1, -0.004)}
             rod = scene.add_rod(**ends, nodes=7, radius=1e-2, material=material)
@@ -183,7 +187,7 @@ def test_friction_without_a_gradient_says_what_to_do():
     zeros = np.zeros((4, NODES, 3))
     record = touching.run(differentiable=True)
     for unknown, message in (
-        ((floor, "position"), "no gradient is known by 'position'"),
+        ((floor, "rotation"), "no gradient is known by 'rotation'"),
         ("friction", "set a small one"),
         (((arm, floor), "friction"), "by set_friction"),
         (((arm, floor, arm), "friction"), "are a pair"),

@@ -1,4 +1,4 @@
-"""Gradients of equilibria by nodes as they were drawn, against scenes built anew."""
+"""Gradients of equilibria and of runs by nodes as they were drawn, against scenes built anew."""
 
 import numpy as np
 import pytest
@@ -18,9 +18,14 @@ CASES = [
 class Arm:
     """A curved arm of oval sections, held and loaded."""
 
-    def __init__(self, points, *, planar, support, natural="as_built"):
+    def __init__(self, points, *, planar, support, natural="as_built", integrator="static"):
         scene = withe.Scene()
-        rubber = withe.Material(youngs_modulus=1e6, poisson_ratio=0.4, density=1200.0)
+        rubber = withe.Material(
+            youngs_modulus=1e6,
+            poisson_ratio=0.4,
+            density=1200.0,
+            viscosity=0.0 if integrator in ("static", "fourth_order") else 300.0,
+        )
         self.arm = scene.add_rod(
             points=points,
             closed=support == "closed",
@@ -40,7 +45,12 @@ class Arm:
             self.held = [scene.clamp(self.arm.start, hold="edge" if support == "edge" else "frame")]
         scene.add_force(self.arm.node(8), (0.05, 0, 0.3))
         scene.add_mass(self.arm.node(5), 0.02)
-        self.simulation = scene.build(integrator="static", planar=planar or None, **TIGHT)
+        scene.add_drag(0.2)
+        options = {} if integrator == "static" else {"time_step": 2e-3, "adaptive": False}
+        self.simulation = scene.build(integrator=integrator, planar=planar or None, **options, **TIGHT)
+        if integrator not in ("static", "fourth_order"):
+            uneven = np.linspace(1.0, 2.0, len(points) - (support != "closed"))
+            self.simulation.set(self.arm, viscous_time=3e-4 * uneven)
 
 
 def drawn(planar, closed=False):
@@ -100,8 +110,58 @@ def tip(arm):
     return float(arm.simulation.positions()[-1].sum())
 
 
+@pytest.mark.parametrize("integrator", ["backward_euler", "implicit_midpoint", "fourth_order", "energy_momentum"])
+@pytest.mark.parametrize(
+    ("planar", "support", "natural"),
+    [
+        (True, "frame", "as_built"),
+        (True, "edge", "straight"),
+        (False, "frame", "as_built"),
+        (False, "edge", "as_built"),
+        (False, "pins", "straight"),
+        (False, "closed", "as_built"),
+    ],
+)
+def test_gradient_of_a_run_by_drawn_nodes_is_that_of_scenes_built_anew(integrator, planar, support, natural):
+    random, points = np.random.default_rng(32), drawn(planar, support == "closed")
+    flat = (1, 0, 1) if planar else (1, 1, 1)
+    way = random.normal(size=(NODES, 3)) * flat
+    bent = 0.0 if planar else 2.0
+
+    def run(h, **options):
+        made = Arm(points + h * way, planar=planar, support=support, natural=natural, integrator=integrator)
+        steps = iter(range(100))
+
+        def before_step(simulation):
+            if next(steps) == 3:
+                simulation.set_natural_curvature(made.arm, (bent, 3.0), over=6e-3)
+
+        return made, made.simulation.run(20e-3, record_every=4e-3, progress=False, before_step=before_step, **options)
+
+    first, record = run(0.0, differentiable=True)
+    weights = {
+        "positions": random.normal(size=(6, NODES, 3)) * flat,
+        "velocities": 0.01 * random.normal(size=(6, NODES, 3)) * flat,
+        "curvatures": 1e-3 * random.normal(size=record.curvatures(first.arm).shape),
+    }
+    by = weights | {"curvatures": {first.arm: weights["curvatures"]}}
+    (gradient,) = record.gradient(by, [(first.arm, "points")])
+
+    def of(h):
+        made, other = run(h)
+        shown = {
+            "positions": other.positions(),
+            "velocities": other.velocities(),
+            "curvatures": other.curvatures(made.arm),
+        }
+        return float(sum((weights[word] * shown[word]).sum() for word in weights))
+
+    wide, near = ((of(h) - of(-h)) / (2.0 * h) for h in (2e-5, 1e-5))
+    assert np.sum(gradient * way) == pytest.approx((4.0 * near - wide) / 3.0, rel=1e-6)
+
+
 def test_drawn_nodes_that_have_no_gradient_say_so():
-    def refusal(change, run=False, **rod):
+    def refusal(change, **rod):
         scene = withe.Scene()
         rubber = withe.Material(youngs_modulus=1e6, poisson_ratio=0.4, density=1200.0)
         arm = scene.add_rod(**({"points": drawn(False)} | rod), radius=1e-2, material=rubber, name="arm")
@@ -109,14 +169,9 @@ def test_drawn_nodes_that_have_no_gradient_say_so():
         wall = scene.clamp(arm.start)
         scene.clamp(other.end)
         simulation = change(scene, arm, other, wall) or scene.build(integrator="implicit_midpoint")
-        if run:
-            found = simulation.run(0.01, record_every=0.01, progress=False, differentiable=True)
-            by = {"positions": np.zeros_like(found.positions())}
-        else:
-            found = simulation.equilibrium()
-            by = {"positions": np.zeros_like(simulation.positions())}
+        found = simulation.equilibrium()
         with pytest.raises(ValueError, match="by points") as refused:
-            found.gradient(by, [(arm, "points")])
+            found.gradient(np.zeros_like(simulation.positions()), [(arm, "points")])
         return str(refused.value)
 
     def moved(scene, arm, other, wall):
@@ -133,4 +188,21 @@ def test_drawn_nodes_that_have_no_gradient_say_so():
     assert "has moved" in refusal(moved)
     assert "draw the nodes themselves" in refusal(lambda *_: None, nodes=21)
     assert "inner node" in refusal(lambda scene, arm, other, wall: scene.clamp(arm.node(4)) and None)
-    assert "equilibria have one" in refusal(lambda *_: None, run=True)
+
+
+def test_runs_by_drawn_nodes_that_have_no_gradient_say_so():
+    def refusal(before=lambda made: None, within=lambda made: None):
+        made = Arm(drawn(False), planar=False, support="frame", integrator="implicit_midpoint")
+        before(made)
+        record = made.simulation.run(
+            4e-3, record_every=4e-3, progress=False, differentiable=True, before_step=lambda simulation: within(made)
+        )
+        with pytest.raises(ValueError, match="by points of rod 'arm'") as refused:
+            record.gradient({"positions": np.zeros((2, NODES, 3))}, [(made.arm, "points")])
+        return str(refused.value)
+
+    assert "began elsewhere than it was drawn" in refusal(lambda made: made.simulation.equilibrium())
+    assert "has moved" in refusal(within=lambda made: made.simulation.move(made.held[0], position=(0, 0, 1e-3)))
+    made = Arm(drawn(False), planar=False, support="frame", integrator="implicit_midpoint")
+    with pytest.raises(ValueError, match="a step has no derivative by points"):
+        made.simulation.step_jacobian([(made.arm, "points")])

@@ -190,3 +190,24 @@ def test_what_is_no_read_out_says_so():
     with pytest.raises(ValueError, match="no read-out"):
         found.jacobian((arm, "colours"), ["gravity"])
     assert isinstance(record, withe.Record)
+
+
+@pytest.mark.parametrize("integrator", ["backward_euler", "implicit_midpoint", "energy_momentum"])
+def test_gradient_of_tensions_goes_by_the_natural_stretch_that_a_ramp_has_come_to_when_they_are_read(integrator):
+    drawn = Drawn(planar=True, joint=False, integrator=integrator, adaptive=False, time_step=2e-3)
+    sim, arm = drawn.simulation, drawn.arm
+    start, weights = sim.snapshot(), np.random.default_rng(3).normal(size=(4, NODES - 1))
+
+    def run(h=0.0, **options):
+        sim.restore(start)
+        sim.set(arm, youngs_modulus=1e6 + h)
+        sim.set_natural_stretch(arm, 1.02, over=20e-3)
+        return sim.run(12e-3, record_every=4e-3, progress=False, **options)
+
+    (found,) = run(differentiable=True).gradient({"tensions": {arm: weights}}, [(arm, "youngs_modulus")])
+
+    def of(h):
+        return float((weights * run(h).tensions(arm)).sum())
+
+    wide, near = ((of(h) - of(-h)) / (2.0 * h) for h in (600.0, 300.0))
+    assert found == pytest.approx((4.0 * near - wide) / 3.0, rel=1e-6)

@@ -86,16 +86,18 @@ class Record:
         by : mapping
             Words of read-outs and derivatives of L by what they say: "positions", of shape (frames, nodes, 3) [1/m],
             "velocities", likewise [s/m], or both by rods; of rods "directors", "curvatures", "twists", "tensions",
-            "spins"; of supports "reaction_forces" [1/N] and "reaction_moments" [1/(N m)], of shape (frames, 3), by
-            which `Simulation.reaction` would answer at each frame after the first. Such as
+            "spins"; of supports and hands "reaction_forces" [1/N] and "reaction_moments" [1/(N m)], of shape
+            (frames, 3), by what `Simulation.reaction` and `Simulation.wrench` would answer at each frame after the
+            first. Such as
             ``{"positions": dL_dx, "curvatures": {arm: dL_dk}}``, each shaped like the read-out of the record.
         wrt : sequence
             What to differentiate by: see `Equilibrium.gradient`; also "initial_positions" and "initial_velocities", of
             shape (nodes, 3), where directors turn along with their edges; the "viscosity" of a resistive fluid; the
             "friction" of an obstacle or, ``((arm, floor), "friction")``, of two bodies with one of their own, that of
-            rods with each other, "friction", and "slip_tolerance". By "position" and "rotation" of a support: as if it
-            held elsewhere by the same all the while, from the start of the run on, where all that is free begins as it
-            does. May be empty where ``calls`` are what is wanted.
+            rods with each other, "friction", and "slip_tolerance". By "position" and "rotation" of a support, and by
+            "position" of an obstacle: as if it were elsewhere by the same all the while, from the start of the run on,
+            where all that is free begins as it does. By "points" of a rod: as if the scene were built anew and run;
+            it must begin as it was drawn. May be empty where ``calls`` are what is wanted.
 
         Returns
         -------
@@ -103,9 +105,10 @@ class Record:
             For each of `wrt`, dL over it, shaped like `Simulation.get`: over the value that it had at the start of the
             run, as long as that acted. Its attribute ``calls`` has what was set later: one entry a call of `set`,
             `set_natural_curvature`, `set_natural_twist`, `set_natural_stretch`, `set_friction` and `move` (of
-            supports and hands), in their order, with ``time`` [s], ``call``, ``target``, ``over`` and ``gradients``, a
-            dict of dL over the value that each word was given, shaped like that value (of a ramp: its end; of a
-            rotation: by a rotation vector that turns it; of curvatures with ``discrete=True``: by smooth ones). Under
+            supports, hands, and positions of obstacles), in their order, with ``time`` [s], ``call``, ``target``,
+            ``over`` and ``gradients``, a dict of dL over the value that each word was given, shaped like that value
+            (of a ramp: its end; of a rotation: by a rotation vector that turns it; of curvatures with
+            ``discrete=True``: by smooth ones). Under
             the midpoint rules calls of `move` have none where L goes by reaction moments.
 
         Raises

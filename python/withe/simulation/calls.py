@@ -20,12 +20,13 @@ from withe.parts.kinds import (
     Part,
     RodPart,
     SpringPart,
-    SupportPart,
 )
 from withe.parts.parameters import ACTING_WORDS, NATURAL_WORDS
 from withe.parts.springs import SPRING_WORDS
+from withe.simulation.drawn import DrawnNodes
 from withe.simulation.motion import POSE_WORDS
 from withe.simulation.moves import Way
+from withe.simulation.obstacles import find_obstacle
 from withe.simulation.session import Session
 from withe.simulation.unknowns import (
     SCENE_WORDS,
@@ -93,7 +94,7 @@ class Gradients(list[Any]):
     ----------
     calls : list of CallGradient
         By what calls of `set`, `set_natural_curvature`, `set_natural_twist`, `set_natural_stretch`, `set_friction` and
-        `move` (of supports) gave while the run went, in their order.
+        `move` gave while the run went, in their order.
     """
 
     def __init__(self, values: Sequence[Any], calls: list[CallGradient]) -> None:
@@ -162,8 +163,8 @@ class _Epoch:
         """The next one, after a call."""
         out = _Epoch(call.session, dict(self.live), dict(self.ramps), dict(self.made_of), dict(self.ways))
         name = "" if call.part is None else call.part.name
-        if isinstance(call.part, SupportPart):
-            out._set_on_way(index, call, call.part)
+        if call.method == "move":
+            out._set_on_way(index, call, name)
             return out
         for word in call.values:
             key = (name, word)
@@ -179,15 +180,15 @@ class _Epoch:
                     out.made_of[rod.name, "drag"] = {_OF_DRAGS}
         return out
 
-    def _set_on_way(self, index: int, call: _Call, part: SupportPart) -> None:
+    def _set_on_way(self, index: int, call: _Call, name: str) -> None:
         for word in POSE_WORDS:
             if word in call.values:
-                before = self.ways.get((part.name, word))
+                before = self.ways.get((name, word))
                 start = before.weights(before.reached(call.time)) if before is not None else {-1: np.eye(3)}
                 turn = call.values[word] if word == "rotation" else np.zeros(3)
-                self.ways[part.name, word] = Way(word, index, call.time, call.over, turn, start)
-            elif (part.name, word) in call.session.settings.paths:
-                self.ways[part.name, word] = Way(word, None, call.time, 0.0)
+                self.ways[name, word] = Way(word, index, call.time, call.over, turn, start)
+            elif (name, word) in call.session.settings.paths:
+                self.ways[name, word] = Way(word, None, call.time, 0.0)
 
     def weights(self, key: _Key, time: float) -> _Weights:
         """How much each call has in a natural shape at a time."""
@@ -213,10 +214,11 @@ class Ledger:
         wrt: Sequence[Any],
         readers: list[Reader],
         *,
+        drawn: Sequence[DrawnNodes],
         by_moves: bool,
     ) -> None:
         """`frames`: how many calls came before each; `by_moves`: whether derivatives by poses are known."""
-        self._session, self._calls, self._frames = session, calls, frames
+        self._session, self._calls, self._frames, self._drawn = session, calls, frames, drawn
         self._unknowns = list(zip(wrt, readers, strict=True))
         self.sums: list[Any] = [None] * len(self._unknowns)
         self._epochs = [_Epoch(session)]
@@ -225,7 +227,7 @@ class Ledger:
         self._steps = [call.step for call in calls]
         self._by_calls: list[dict[str, Any]] = [
             {word: _of_shape(np.zeros(np.shape(value)), np.shape(value)) for word, value in call.values.items()}
-            if by_moves or not isinstance(call.part, SupportPart)
+            if by_moves or call.method != "move"
             else {}
             for call in calls
         ]
@@ -239,12 +241,12 @@ class Ledger:
         }
         if self._poses and not by_moves:
             raise ValueError(
-                "no gradient by the pose of a support is known of reaction moments under the midpoint rules: take "
-                "integrator='energy_momentum' or 'backward_euler'"
+                "no gradient by the pose of a support or an obstacle is known of reaction moments under the midpoint "
+                "rules: take integrator='energy_momentum' or 'backward_euler'"
             )
         for place in self._poses:
             self.sums[place] = np.zeros(3)
-        moved = any(isinstance(call.part, SupportPart) and call.values for call in calls)
+        moved = any(call.method == "move" and call.values for call in calls)
         self.moves = by_moves and (moved or bool(self._poses))
 
     def visit(self, step: int, moment: int, time: float, found: _core.ParameterGradient) -> None:
@@ -256,6 +258,9 @@ class Ledger:
                 continue
             value = self._of_start(epoch, unknown, reader, time, found)
             self.sums[place] = value if self.sums[place] is None else self.sums[place] + value
+        for nodes in self._drawn:
+            shares = (epoch.weights((nodes.rod, word), time) for word in ("natural_curvature", "natural_twist"))
+            nodes.add(found, *(weights.get(-1, 0.0) for weights in shares))
         for key in epoch.live:
             self._add_live(epoch, key, found)
         for key, ramp in epoch.ramps.items():
@@ -265,12 +270,12 @@ class Ledger:
                     assert isinstance(part, RodPart)
                     self._add(index, key[1], weight * np.asarray(getattr(found, key[1])[part.index]))
 
-    def visit_poses(self, step: int, reached: FloatArray, found: _core.PoseAdjoint) -> None:
-        """Derivatives by poses of supports at the end of a step."""
+    def visit_poses(self, step: int, reached: _core.Reached, found: _core.PoseAdjoint) -> None:
+        """Derivatives by poses of supports and obstacles at the end of a step."""
         epoch = self._epochs[int(np.searchsorted(self._steps, step, side="right"))]
         for key, way in epoch.ways.items():
-            index, by = self._by_pose(epoch.session, key, found)
-            share = float(reached[index, POSE_WORDS.index(key[1])]) if len(reached) else 1.0
+            by = self._by_pose(epoch.session, key, found)
+            share = _share(epoch.session, key, reached)
             for call, weight in way.weights(share).items():
                 if call >= 0:
                     sums = self._by_calls[call]
@@ -278,17 +283,20 @@ class Ledger:
                 else:
                     self._add_pose(key, weight.T @ by)
         for key in set(self._poses.values()) - epoch.ways.keys():
-            self._add_pose(key, self._by_pose(epoch.session, key, found)[1])
+            self._add_pose(key, self._by_pose(epoch.session, key, found))
 
     def add_start(self, found: _core.PoseAdjoint) -> None:
         """Derivatives by where supports hold what the run began with."""
         for key in set(self._poses.values()):
-            self._add_pose(key, self._by_pose(self._session, key, found)[1])
+            self._add_pose(key, self._by_pose(self._session, key, found))
 
     @staticmethod
-    def _by_pose(session: Session, key: _Key, found: _core.PoseAdjoint) -> tuple[int, FloatArray]:
+    def _by_pose(session: Session, key: _Key, found: _core.PoseAdjoint) -> FloatArray:
+        obstacle = find_obstacle(session.directory, key[0])
+        if obstacle is not None:
+            return np.array(found.obstacles[obstacle[0]])
         index = session.settings.supports[key[0]][0]
-        return index, np.array((found.positions if key[1] == "position" else found.rotations)[index])
+        return np.array((found.positions if key[1] == "position" else found.rotations)[index])
 
     def _add_pose(self, key: _Key, by: FloatArray) -> None:
         for place, own in self._poses.items():
@@ -359,16 +367,27 @@ class Ledger:
         return _of_shape(sum_of_slopes(found, kept, word, first, last), shape)
 
 
+def _share(session: Session, key: _Key, reached: _core.Reached) -> float:
+    """Of its way that a pose has behind it."""
+    obstacle = find_obstacle(session.directory, key[0])
+    if obstacle is not None:
+        return float(reached.obstacles[obstacle[0]]) if len(reached.obstacles) else 1.0
+    index = session.settings.supports[key[0]][0]
+    return float(reached.supports[index, POSE_WORDS.index(key[1])]) if len(reached.supports) else 1.0
+
+
 def _has_gradient(call: _Call, word: str) -> bool:
     if isinstance(call.part, LoadPart):
         return not callable(call.values[word])
     if word == "friction":
         return bool(np.max(call.values[word]) > 0.0)
+    if call.method == "move":
+        return True
     if call.part is None:
         return word in SCENE_WORDS
     if isinstance(call.part, FluidPart):
         return word == "viscosity"
-    return isinstance(call.part, RodPart | MassPart | SpringPart | DragPart | SupportPart)
+    return isinstance(call.part, RodPart | MassPart | SpringPart | DragPart)
 
 
 def _by_drag(epoch: _Epoch, part: DragPart, found: Any, *, initial: bool) -> float:

@@ -12,10 +12,20 @@ import numpy.typing as npt
 from withe import _core
 from withe.common import validation
 from withe.parts.handles import NodeHandle
+from withe.parts.kinds import SupportPart
 from withe.simulation.calls import Gradients, Ledger, RunJournal
+from withe.simulation.drawn import DrawnNodes, Moment
 from withe.simulation.losses import check_in_plane, readout_adjoints, readout_shape
 from withe.simulation.session import Session
-from withe.simulation.unknowns import INITIAL_WORDS, Unknown, unknown_readers
+from withe.simulation.unknowns import (
+    INITIAL_WORDS,
+    Unknown,
+    check_list,
+    edges_of,
+    is_points,
+    unknown_reader,
+    unknown_readers,
+)
 
 __all__ = [
     "Loss",
@@ -38,12 +48,13 @@ def equilibrium_gradient(session: Session, by: Loss, wrt: Sequence[Unknown]) -> 
     """Derivatives of a scalar of the present equilibrium; see `Equilibrium.gradient`."""
     readers = unknown_readers(session, wrt)
     if isinstance(by, Mapping):
-        tables = {word: _with_frame(value) for word, value in by.items()}
+        adjoints = readout_adjoints(session, {word: _with_frame(value) for word, value in by.items()}, 1)
     else:
         by_positions = validation.number_array(by, "dL_dx", (session.directory.layout.node_count, 3))
         check_in_plane(session, by_positions, "dL_dx")
-        tables = {"positions": by_positions[None]}
-    (found,) = session.world.equilibrium_gradients(readout_adjoints(session, tables, 1))
+        adjoints = [_core.ReadoutAdjoint()]
+        adjoints[0].positions = by_positions
+    (found,) = session.world.equilibrium_gradients(adjoints)
     return [read(found) for read in readers]
 
 
@@ -98,10 +109,9 @@ def _with_frame(value: Any) -> Any:
 
 def _in_plane(session: Session) -> FloatArray | None:
     """Projector onto the plane in which a planar scene moves."""
-    plan = session.world.plan
-    if not plan.planar:
+    normal = session.world.plane_normal
+    if normal is None:
         return None
-    normal = np.asarray(plan.plane_normal)
     return np.eye(3) - np.outer(normal, normal)
 
 
@@ -119,6 +129,7 @@ class RunDerivatives:
             session, settings=session.settings.copy(), journal=None, contact_then=session.world.contact
         )
         self._running = session
+        self._begin = Moment.now(session)
         self._tape = session.world.start_tape()
         self._journal = session.journal = RunJournal(self._tape)
         self._steps: list[int] = []
@@ -126,6 +137,7 @@ class RunDerivatives:
 
     def note_frame(self) -> None:
         """A frame has been taken."""
+        self._running.world.note_moment()
         self._steps.append(self._tape.count)
         self._calls.append(len(self._journal.calls))
 
@@ -136,15 +148,18 @@ class RunDerivatives:
 
     def gradient(self, by: Mapping[str, Any], wrt: Sequence[Unknown]) -> Gradients:
         """See `Record.gradient`."""
-        readers = unknown_readers(self._session, wrt, may_be_empty=bool(self._journal.calls))
+        check_list(wrt, may_be_empty=bool(self._journal.calls))
+        drawn = {place: self._drawn(unknown) for place, unknown in enumerate(wrt) if is_points(unknown)}
+        acting = [place for place, unknown in enumerate(wrt) if unknown not in INITIAL_WORDS and place not in drawn]
+        kept = [wrt[place] for place in acting]
         adjoints = readout_adjoints(self._session, by, len(self._steps))
-        acting = [place for place, unknown in enumerate(wrt) if unknown not in INITIAL_WORDS]
         ledger = Ledger(
             self._session,
             self._journal.calls,
             self._calls,
-            [wrt[place] for place in acting],
-            [readers[place] for place in acting],
+            kept,
+            [unknown_reader(self._session, unknown) for unknown in kept],
+            drawn=list(drawn.values()),
             by_moves=not ("reaction_moments" in by and self._session.options.integrator in _OF_FINITE_TURNS),
         )
         initial = self._tape.gradient(
@@ -152,12 +167,19 @@ class RunDerivatives:
             ledger.visit,
             ledger.visit_poses if ledger.moves else None,
         )
-        ledger.add_start(initial.supports)
-        found = iter(ledger.sums)
-        values = [
-            np.array(getattr(initial, unknown.removeprefix("initial_")))
-            if isinstance(unknown, str) and unknown in INITIAL_WORDS
-            else next(found)
-            for unknown in wrt
-        ]
+        ledger.add_start(initial.poses)
+        values: list[Any] = [None] * len(wrt)
+        for place, value in zip(acting, ledger.sums, strict=True):
+            values[place] = value
+        for place, nodes in drawn.items():
+            values[place] = nodes.gradient(initial)
+        for place, unknown in enumerate(wrt):
+            if unknown in INITIAL_WORDS:
+                values[place] = np.array(getattr(initial, unknown.removeprefix("initial_")))
         return Gradients(values, ledger.calls)
+
+    def _drawn(self, unknown: Any) -> DrawnNodes:
+        part = self._session.directory.rod(unknown[0])
+        if any(isinstance(call.part, SupportPart) for call in self._journal.calls):
+            raise ValueError(f"no gradient by points of {part.owner} is known once a support has moved")
+        return DrawnNodes(self._session, part, edges_of(self._session, part.index)[0], self._begin, run=True)

@@ -59,10 +59,9 @@ def readout_adjoints(session: Session, by: Mapping[str, Any], frames: int) -> li
 
 def check_in_plane(session: Session, array: FloatArray, name: str) -> None:
     """Refuse derivatives that point out of the plane in which a planar scene moves."""
-    plan = session.world.plan
-    if not plan.planar or not array.size:
+    normal = session.world.plane_normal
+    if normal is None or not array.size:
         return
-    normal = np.asarray(plan.plane_normal)
     if np.abs(array @ normal).max() > 1e-9 * max(np.abs(array).max(), 1e-300):
         raise ValueError(
             f"{name} must lie in the plane of the scene, where it moves: build with planar=False, or leave out "

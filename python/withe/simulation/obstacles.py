@@ -42,6 +42,7 @@ def move_obstacle(
 ) -> None:
     """Move an obstacle; see `Simulation.move`."""
     over = validation.non_negative(over, "over")
+    part = session.directory.all(ObstaclePart)[index]
     if path is not None:
         if any(value is not None for value in (position, tangent, roll)) or over != 0.0:
             raise ValueError(f"path of {name!r} must be given alone")
@@ -50,12 +51,12 @@ def move_obstacle(
         session.settings.paths[name, "position"] = path
         if turned is not None:
             session.settings.paths[name, "rotation"] = path
+        session.note("move", part, {}, 0.0)
         return
     if position is None and roll is None:
         raise ValueError(f"position, roll or path of {name!r} must be given")
     place = None if position is None else validation.vector(position, f"position of {name!r}")
-    turn = None
-    axis = session.directory.all(ObstaclePart)[index].axis
+    turn, axis = None, part.axis
     if (tangent is None) != (axis is not None or roll is None):
         what = "a sphere turns about the tangent that is given with a roll"
         raise ValueError(
@@ -72,6 +73,7 @@ def move_obstacle(
         session.settings.paths.pop((name, "position"), None)
     if turn is not None:
         session.settings.paths.pop((name, "rotation"), None)
+    session.note("move", part, {} if place is None else {"position": place}, over)
 
 
 def obstacle_pose(session: Session, index: int, path: Path, time: float) -> tuple[FloatArray, FloatArray | None]:

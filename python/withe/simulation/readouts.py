@@ -137,7 +137,8 @@ class Equilibrium:
         dL_dx : array_like of shape (nodes, 3) [1/m], or mapping
             Derivative of L by the positions of all nodes of the scene, as `Simulation.positions()` has them. Or words
             of read-outs with derivatives by them: "positions", so or by rods; of rods "directors", "curvatures",
-            "twists", "tensions", of supports "reaction_forces" [1/N] and "reaction_moments" [1/(N m)], such as
+            "twists", "tensions", of supports and hands "reaction_forces" [1/N] and "reaction_moments" [1/(N m)], as
+            `Simulation.reaction` and `Simulation.wrench` answer, such as
             ``{"curvatures": {arm: dL_dk}, "reaction_forces": {wall: dL_dF}}``, each shaped like the read-out. A number
             that a read-out depends on directly, as a tension does on the stiffness, counts with that too.
         wrt : sequence
@@ -146,7 +147,7 @@ class Equilibrium:
             edge, and "points" [m], the nodes as they were drawn, (nodes, 3), both as if the scene were built anew; of a
             load its value; of a mass "mass"; of a support or a hand "position" [m] and "rotation" (a rotation vector
             [rad], about where it is); of a hand that yields "stiffness", all six as `Scene.grasp` takes them, and
-            "force_limit". Or "gravity".
+            "force_limit"; of an obstacle "position" [m]. Or "gravity".
 
         Returns
         -------

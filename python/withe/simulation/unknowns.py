@@ -37,14 +37,17 @@ __all__ = [
     "OfRun",
     "Reader",
     "Unknown",
+    "check_list",
     "dragged_rods",
     "edges_of",
     "friction_reader",
+    "is_points",
     "part_of",
     "reader_of",
     "rod_slopes",
     "scene_reader",
     "sum_of_slopes",
+    "unknown_reader",
     "unknown_readers",
 ]
 
@@ -68,14 +71,25 @@ INITIAL_WORDS = ("initial_positions", "initial_velocities")
 SCENE_WORDS = ("gravity", "friction", "slip_tolerance")
 
 
-def unknown_readers(session: Session, wrt: Sequence[Unknown], *, may_be_empty: bool = False) -> list[Reader]:
+def unknown_readers(session: Session, wrt: Sequence[Unknown]) -> list[Reader]:
     """For each of `wrt` what reads its derivative, shaped like `get`, from what the engine finds."""
+    check_list(wrt)
+    return [unknown_reader(session, unknown) for unknown in wrt]
+
+
+def check_list(wrt: Sequence[Unknown], *, may_be_empty: bool = False) -> None:
+    """Refuse what is no list, or empty."""
     if isinstance(wrt, str) or not isinstance(wrt, Sequence) or not (wrt or may_be_empty):
         raise ValueError('wrt must be a list of what to differentiate by, such as [(arm, "youngs_modulus"), "gravity"]')
-    return [_reader(session, unknown) for unknown in wrt]
 
 
-def _reader(session: Session, unknown: Unknown) -> Reader:
+def is_points(unknown: Unknown) -> bool:
+    """Whether it names the nodes of a rod as it was drawn."""
+    return isinstance(unknown, tuple) and len(unknown) == 2 and isinstance(unknown[1], str) and unknown[1] == "points"
+
+
+def unknown_reader(session: Session, unknown: Unknown) -> Reader:
+    """What reads the derivative by one of `wrt`."""
     if isinstance(unknown, str):
         return scene_reader(session, unknown)
     if not isinstance(unknown, tuple) or len(unknown) != 2 or not isinstance(unknown[1], str):
@@ -116,6 +130,8 @@ def reader_of(session: Session, part: Part | BodyPair, word: str) -> Reader:
     if isinstance(part, DragPart) and word == "drag":
         edges = np.concatenate([np.arange(*edges_of(session, rod.index)) for rod in dragged_rods(session, part)])
         return lambda g: float(g.parameters.drag[edges].sum())
+    if isinstance(part, ObstaclePart) and word == "position":
+        return _place_reader(session, part)
     if isinstance(part, SupportPart) and word in POSE_WORDS:
         return _pose_reader(session, part, word)
     if isinstance(part, SupportPart) and word in HAND_WORDS:
@@ -136,13 +152,23 @@ def _pose_reader(session: Session, part: SupportPart, word: str) -> Reader:
     index = session.settings.supports[part.name][0]
 
     def read(gradient: _core.EquilibriumGradient | OfRun) -> FloatArray:
-        if isinstance(gradient, OfRun):
-            raise ValueError(
-                f"a step has no derivative by the pose of {part.name!r}; equilibria, runs and calls of move have one"
-            )
-        return np.array(gradient.support_positions[index] if word == "position" else gradient.support_rotations[index])
+        found = _of_equilibrium(gradient, part.name)
+        return np.array(found.support_positions[index] if word == "position" else found.support_rotations[index])
 
     return read
+
+
+def _place_reader(session: Session, part: ObstaclePart) -> Reader:
+    index = session.directory.all(ObstaclePart).index(part)
+    return lambda g: np.array(_of_equilibrium(g, part.name).obstacle_positions[index])
+
+
+def _of_equilibrium(gradient: _core.EquilibriumGradient | OfRun, name: str) -> _core.EquilibriumGradient:
+    if isinstance(gradient, OfRun):
+        raise ValueError(
+            f"a step has no derivative by the pose of {name!r}; equilibria, runs and calls of move have one"
+        )
+    return gradient
 
 
 def _hand_reader(session: Session, part: SupportPart, word: str) -> Reader:
@@ -223,7 +249,7 @@ def _points_reader(session: Session, part: RodPart) -> Reader:
 
     def checked(gradient: _core.EquilibriumGradient | OfRun) -> FloatArray:
         if isinstance(gradient, OfRun):
-            raise ValueError(f"no gradient of a run by points of {part.owner} is known; equilibria have one")
+            raise ValueError(f"a step has no derivative by points of {part.owner}; equilibria and runs have one")
         return read(gradient)
 
     return checked
@@ -242,8 +268,10 @@ def _rod_reader(session: Session, part: RodPart, word: str) -> Reader:
     scalar = word != "radius" and np.ndim(session.settings.rods[part.index].get(word)) == 0
 
     def read(gradient: _core.EquilibriumGradient | OfRun) -> Any:
-        found = sum_of_slopes(gradient.parameters, slopes, word, first, last)
-        return float(found.sum()) if scalar else found
+        found = gradient.parameters
+        if scalar:
+            return float(sum(np.vdot(getattr(found, name)[first:last], slope) for name, slope in slopes.items()))
+        return sum_of_slopes(found, slopes, word, first, last)
 
     return read
 
@@ -274,19 +302,19 @@ def _slopes(parameters: RodParameters, word: str) -> dict[str, FloatArray]:
         return {word: np.ones_like(getattr(p, word))}
     if p.youngs_modulus is None or p.poisson_ratio is None or p.density is None:
         raise ValueError(f"no gradient by {word}: the rod's stiffness was given directly, without a material")
-    modulus = p.youngs_modulus * np.ones(len(p.stretch_stiffness))
+    softness = 1.0 / p.youngs_modulus
     if word == "youngs_modulus":
         return {
-            "stretch_stiffness": p.stretch_stiffness / modulus,
-            "bend_stiffness": p.bend_stiffness / modulus[:, None],
-            "twist_stiffness": p.twist_stiffness / modulus,
-            "viscous_time": -p.viscous_time / modulus,
+            "stretch_stiffness": p.stretch_stiffness * softness,
+            "bend_stiffness": (p.bend_stiffness.T * softness).T,  # bending has a column a director
+            "twist_stiffness": p.twist_stiffness * softness,
+            "viscous_time": p.viscous_time * -softness,
         }
     if word == "poisson_ratio":
         return {"twist_stiffness": -p.twist_stiffness / (1.0 + p.poisson_ratio)}
     if word == "density":
         return {"line_density": p.line_density / p.density, "rotary_inertia": p.rotary_inertia / p.density}
-    return {"viscous_time": 1.0 / modulus}
+    return {"viscous_time": softness * np.ones(len(p.viscous_time))}
 
 
 def _radius_slopes(session: Session, part: RodPart, parameters: RodParameters) -> dict[str, FloatArray]:
