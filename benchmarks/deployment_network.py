@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import importlib.util
 from pathlib import Path
 
+import networks
 import numpy as np
-from reporting import OUT, Report, kilobytes, processor_seconds
+from reporting import Report, processor_seconds
 
 from withe import deployment
 from withe.deployment.grasp_network import CURVATURES, LENGTHS, SHIPPED, STIFFNESSES
 
 DATA = Path(__file__).resolve().parent.parent / "tests" / "data"
-SOURCE = OUT.parent / "networks" / "deployment_source.pt"  # from tools/train_networks.py
-SOURCE_SECONDS = 120.0  # for which it is trained here where that file is not
 NODES = 200  # of a pattern
 GOALS = {"position": (2e-3, 1e-2), "rotation": (2e-3, 1e-2)}  # median, 95 %: [Lgb], [rad]
 # The dissertation's own weights on the table: median, 95 % and greatest.
@@ -24,34 +22,29 @@ NUMBER = 2  # of the cable of the pattern
 def errors(found: deployment.Grasp, exact: deployment.Grasp) -> dict[str, np.ndarray]:
     """Median, 95 % and greatest distance of positions [Lgb] and of rotation vectors [rad]."""
     away = {name: np.linalg.norm(getattr(found, name) - getattr(exact, name), axis=1) for name in GOALS}
-    return {name: np.percentile(error, (50, 95, 100)) for name, error in away.items()}
+    return {name: networks.percentiles(error) for name, error in away.items()}
 
 
 def compare(report: Report, quick: bool) -> None:
     """The small network, the dissertation's and exact grasps side by side, where all are new, and on the table."""
-    if importlib.util.find_spec("torch") is None:
-        print("\nNetworks: torch is not installed")
+    if not networks.torch_is_there():
         return
-    import torch
-
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)
-    OUT.mkdir(parents=True, exist_ok=True)
     new, table = _new(500 if quick else 10_000), _table()
     pattern = _pattern()
-    rows = [("exact", *[""] * 5, *_times(deployment.grasp, pattern, 1 if quick else 5), "")]
-    for name, network in {"small": deployment.GraspNetwork.load(), "source": _source(quick)}.items():
-        here, there = errors(network(*new), deployment.grasp(*new)), errors(network(*table), deployment.grasp(*table))
-        file = SHIPPED if name == "small" else network.save(OUT / "deployment_source.pt")
-        training = network.network.training
-        cells = [" ".join(f"{value:.1e}" for value in found[key]) for found in (here, there) for key in GOALS]
-        times = _times(network, pattern, 1 if quick else 20)
-        rows.append((name, *cells, kilobytes(file), *times, f"{training.seconds:.0f} ({training.stopped})"))
-        if name == "small" and not quick:
-            _hold_against_goals(report, here, there)
-            report.goal(f"small network: a pattern of {NODES} nodes [ms]", float(times[1]), 5.0, at_least=False)
-    published = [" ".join(f"{value:.1e}" for value in PUBLISHED[key]) for key in GOALS]
-    rows.append(("source, published", "", "", *published, *[""] * 4))
+    with networks.one_thread():
+        rows = [("exact", *[""] * 5, *_times(deployment.grasp, pattern, 1 if quick else 5), "")]
+        for name, network in networks.loaded(
+            deployment.GraspNetwork, deployment.train, "deployment", quick, 500
+        ).items():
+            here, there = (errors(network(*asked), deployment.grasp(*asked)) for asked in (new, table))
+            size, spent = networks.size_and_training(network, SHIPPED if name == "small" else None)
+            cells = networks.cells(found[key] for found in (here, there) for key in GOALS)
+            times = _times(network, pattern, 1 if quick else 20)
+            rows.append((name, *cells, size, *times, spent))
+            if name == "small" and not quick:
+                _hold_against_goals(report, here, there)
+                report.goal(f"small network: a pattern of {NODES} nodes [ms]", float(times[1]), 5.0, at_least=False)
+    rows.append(("source, published", "", "", *networks.cells(PUBLISHED[key] for key in GOALS), *[""] * 4))
     header = (
         "grasps",
         "new positions [Lgb]: median 95 % most",
@@ -64,7 +57,6 @@ def compare(report: Report, quick: bool) -> None:
         "trained in [s]",
     )
     report.table("Networks beside exact grasps, one thread", header, rows)
-    torch.set_num_threads(threads)
 
 
 def _new(count: int) -> tuple[np.ndarray, ...]:
@@ -93,14 +85,6 @@ def _times(ask: object, pattern: tuple, repeats: int) -> tuple[str, str]:
     one = processor_seconds(lambda: [ask(5.0, 0.25) for _ in range(20)], repeats) / 20  # type: ignore[operator]
     many = processor_seconds(lambda: ask(*pattern), repeats)  # type: ignore[operator]
     return f"{1e6 * one:.0f}", f"{1e3 * many:.2f}"
-
-
-def _source(quick: bool) -> deployment.GraspNetwork:
-    """The dissertation's network: trained before, or here for a while."""
-    if SOURCE.exists() and not quick:
-        return deployment.GraspNetwork.load(SOURCE)
-    limit = 1.0 if quick else SOURCE_SECONDS
-    return deployment.train("source", samples=500 if quick else None, time_limit=limit)
 
 
 def _hold_against_goals(report: Report, here: dict[str, np.ndarray], there: dict[str, np.ndarray]) -> None:

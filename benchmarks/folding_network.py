@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import importlib.util
 from collections.abc import Callable
 
+import networks
 import numpy as np
-from reporting import OUT, Report, kilobytes, processor_seconds
+from reporting import Report, processor_seconds
 
 from withe import folding
 from withe.folding.grid import HIGH, WIDE
 from withe.folding.sheet_network import SHIPPED
 from withe.folding.sheets import Elastica, take
 
-SOURCE = OUT.parent / "networks" / "folding_source.pt"  # from tools/train_networks.py
-SOURCE_SECONDS = 120.0  # for which it is trained here where that file is not
 GOALS = {  # median, 95 %, most
     "angle": (5e-4, 4e-3, 5e-2),
     "suspended": (1e-3, 8e-3, 5e-2),
@@ -30,8 +28,7 @@ def errors(network: folding.SheetNetwork, exact: Elastica) -> tuple[dict[str, np
     found = {}
     for name in GOALS:
         counted = pose.valid & ((exact.force_ratio < 1) | (name != "force_ratio"))
-        error = np.abs(getattr(pose, name) - getattr(exact, name))[counted]
-        found[name] = np.percentile(error, (50, 95, 100)) if len(error) else np.full(3, np.nan)  # hardly trained
+        found[name] = networks.percentiles(np.abs(getattr(pose, name) - getattr(exact, name))[counted])
     return found, 1.0 - pose.valid.mean()
 
 
@@ -44,34 +41,26 @@ def times(ask: Callable[[object, object], object], exact: Elastica, count: int) 
 
 def compare(report: Report, quick: bool) -> None:
     """The small network, the dissertation's and exact equilibria side by side, at positions that are new to all."""
-    if importlib.util.find_spec("torch") is None:
-        print("\nNetworks: torch is not installed")
+    if not networks.torch_is_there():
         return
-    import torch
-
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)
-    OUT.mkdir(parents=True, exist_ok=True)
     random = np.random.default_rng(11)
     count = 2_000 if quick else 100_000
     exact = folding.elastica(random.uniform(0.0, WIDE, count), random.uniform(0.0, HIGH, count))
     exact = take(exact, exact.valid)
-    networks = {"small": folding.SheetNetwork.load(), "source": _source(quick)}
-    single, batch = times(folding.elastica, exact, 2_000 if quick else 20_000)
-    rows = [("exact", "0", "0", "0", "", "", f"{1e6 * single:.0f}", f"{1 / batch:.2g}", "")]
-    for name, network in networks.items():
-        found, refused = errors(network, exact)
-        single, batch = times(network, exact, 20_000 if quick else 1_000_000)
-        training = network.network.training
-        file = SHIPPED if name == "small" else network.save(OUT / "folding_source.pt")
-        cells = [" ".join(f"{value:.1e}" for value in found[key]) for key in GOALS]
-        spent = f"{training.seconds:.0f} ({training.stopped})"
-        times_of = (f"{1e6 * single:.0f}", f"{1 / batch:.2g}", spent)
-        rows.append((name, *cells, f"{100 * refused:.2f}", kilobytes(file), *times_of))
-        if name == "small" and not quick:
-            _hold_against_goals(report, found, 1 / batch, training.seconds)
-    published = [" ".join(f"{value:.1e}" for value in PUBLISHED[key]) for key in GOALS]
-    rows.append(("source, published", *published, "", "1900", "", "", ""))
+    with networks.one_thread():
+        single, batch = times(folding.elastica, exact, 2_000 if quick else 20_000)
+        rows = [("exact", "0", "0", "0", "", "", f"{1e6 * single:.0f}", f"{1 / batch:.2g}", "")]
+        for name, network in networks.loaded(folding.SheetNetwork, folding.train, "folding", quick, 2_000).items():
+            found, refused = errors(network, exact)
+            single, batch = times(network, exact, 20_000 if quick else 1_000_000)
+            size, spent = networks.size_and_training(network, SHIPPED if name == "small" else None)
+            cells = networks.cells(found[key] for key in GOALS)
+            asked = f"{1e6 * single:.0f}", f"{1 / batch:.2g}"
+            rows.append((name, *cells, f"{100 * refused:.2f}", size, *asked, spent))
+            if name == "small" and not quick:
+                _hold_against_goals(report, found, 1 / batch, network.network.training.seconds)
+    published = networks.cells(PUBLISHED[key] for key in GOALS)
+    rows.append(("source, published", *published, "", networks.PUBLISHED_SIZE, "", "", ""))
     header = (
         "manifold",
         "angle [rad]: median 95 % most",
@@ -84,15 +73,6 @@ def compare(report: Report, quick: bool) -> None:
         "trained in [s]",
     )
     report.table("Networks beside exact equilibria, one thread", header, rows)
-    torch.set_num_threads(threads)
-
-
-def _source(quick: bool) -> folding.SheetNetwork:
-    """The dissertation's network: trained before, or here for a while."""
-    if SOURCE.exists() and not quick:
-        return folding.SheetNetwork.load(SOURCE)
-    limit = 1.0 if quick else SOURCE_SECONDS
-    return folding.train("source", samples=2_000 if quick else None, time_limit=limit)
 
 
 def _hold_against_goals(report: Report, found: dict[str, np.ndarray], speed: float, seconds: float) -> None:

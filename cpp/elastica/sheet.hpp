@@ -1,9 +1,8 @@
 #pragma once
 /// The suspended part of a sheet, seen from the side: a heavy elastica that leaves a flat floor and is held at its tip.
 ///
-/// In units of the gravito-bending length Lgb = (EI / 2w)^(1/3) and of the weight per length w at the tip, s from the
-/// lift-off point, theta the angle of the tangent above the floor, m the moment, b the width relative to that at the
-/// tip:
+/// In units of the gravito-bending length Lgb = (EI / 2w)^(1/3) and of the weight per length w where b = 1, s from the
+/// lift-off point, theta the angle of the tangent above the floor, m the moment, b the width (`SheetWidth`):
 ///   theta' = m / (2 b),  m' = (R - W) cos(theta) - T sin(theta),  X' = cos(theta),  Z' = sin(theta),
 ///   W(s) = the weight of the part before s,  theta(0) = m(0) = X(0) = Z(0) = 0.
 /// R and T are the floor's forces on the sheet at lift-off, up and forward (the way the sheet leaves). That the moment
@@ -13,14 +12,14 @@
 #include <array>
 #include <vector>
 
+#include "elastica/sheet_width.hpp"
 #include "elastica/shooting.hpp"
 
 namespace withe {
 
-/// b(t) = 1 + width_growth t, t the distance from the tip. [1/Lgb], [w Lgb^2].
 struct SheetShape {
-  double width_growth = 0;
-  double tip_moment = 0;
+  SheetWidth width;
+  double tip_moment = 0;  ///< [w Lgb^2]
 };
 
 /// What is asked of the tip besides its moment.
@@ -51,12 +50,16 @@ class SheetProblem {
   void put_end(const Path& path, System& system) const;
 };
 
-/// Runge-Kutta steps a segment: at most .4 Lgb, and so many that the first integral, of which an error is about
-/// 1e-5 F (h / sqrt(EI / F))^8 at a step h and a force F, holds to some 1e-9 w Lgb^2.
-int sheet_steps(const SheetProblem::Path& path);
+/// Runge-Kutta steps across a segment: at most .4 Lgb, and so many that the first integral, of which an error is about
+/// 1e-5 F (h / sqrt(EI / F))^8 at a step h and a force F, holds to some 1e-9 w Lgb^2. Where the width changes by itself
+/// within r, 1 / b has a pole at that distance, and the error is about 1e-5 (h / r)^8.
+int sheet_steps(const SheetWidth& width, const SheetProblem::Path& path, int segment);
 
 /// State at the end of a segment, integrated from that at its start.
 std::array<double, 4> across_segment(const SheetShape& shape, const SheetProblem::Path& path, int segment);
+
+/// Of what of a sheet of a length is not lifted [w Lgb].
+double lying_weight(const SheetWidth& width, const SheetProblem::Path& path, double sheet_length);
 
 inline double tip_back(const SheetProblem::Path& path) { return path.values[2] - path.nodes.back()[2]; }
 inline double tip_up(const SheetProblem::Path& path) { return path.nodes.back()[3]; }

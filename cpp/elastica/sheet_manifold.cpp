@@ -35,27 +35,35 @@ bool follow_goal(ShootingSolver<SheetProblem>& solver, SheetProblem& problem, co
   });
 }
 
-bool bearable(const Path& path) { return path.values[1] > -SheetManifold::kGreatestPull && path.values[0] > 0; }
+double mean_width(const SheetWidth& width, double length) {
+  return width.even() ? 1.0 : width.weight_at(length) / length;
+}
 
-/// Numbers that stay smooth towards short lengths, where gravity does nothing.
-void add_scaled(double share, const Path& from, Path& sum) {
+/// Where a sheet is narrow a pull bends it the more sharply.
+bool bearable(const SheetWidth& width, const Path& path) {
+  const double narrow = std::min(width.width_at(0.0), width.width_at(path.values[2]));
+  return path.values[1] > -SheetManifold::kGreatestPull * narrow && path.values[0] > 0;
+}
+
+/// Numbers that stay smooth towards short lengths, where gravity does nothing; forces over the mean width.
+void add_scaled(double share, double width, const Path& from, Path& sum) {
   const double length = from.values[2];
   for (std::size_t k = 0; k < from.nodes.size(); ++k) {
     const auto& y = from.nodes[k];
     auto& to = sum.nodes[k];
     to[0] += share * y[0];
-    to[1] += share * y[1] * length;
+    to[1] += share * y[1] * length / width;
     to[2] += share * y[2] / length;
     to[3] += share * y[3] / length;
   }
-  sum.values[0] += share * from.values[0] * length * length;
-  sum.values[1] += share * from.values[1] * length * length;
+  sum.values[0] += share * from.values[0] * length * length / width;
+  sum.values[1] += share * from.values[1] * length * length / width;
   sum.values[2] += share * length;
 }
 
 }  // namespace
 
-SheetManifold::SheetManifold() {
+SheetManifold::SheetManifold(const SheetWidth& width) : width_(width) {
   for (std::size_t i = 0; i < kShortRows; ++i)
     lengths_.push_back(kShortestRow * std::pow(kFirstLongRow / kShortestRow, static_cast<double>(i) / kShortRows));
   for (std::size_t i = 0; i <= kLongRows; ++i)
@@ -72,13 +80,31 @@ SheetManifold::SheetManifold() {
   for (std::size_t j = 0; j < directions_.size(); ++j) fill_column(j, middle, solver);
 }
 
-void SheetManifold::fill_row(std::size_t row, ShootingSolver<SheetProblem>& solver) {
+/// Lifted without tangential force; an uneven sheet by making an even one of the same mean width more and more so.
+std::optional<Path> SheetManifold::first_path(double length, ShootingSolver<SheetProblem>& solver) const {
+  Path path = gentle_lift(length), trial;
   SheetProblem problem;
-  const double length = lengths_[row];
-  Path path = gentle_lift(length);
   problem.target = TipTarget::length_and_angle;
   problem.goal = {length, tip_angle(path)};
-  if (!solver.solve(problem, path).converged) return;
+  if (!solver.solve(problem, path).converged) return {};
+  if (width_.even()) return path;
+  const double mean = mean_width(width_, length);
+  const bool there = follow(solver, problem, 1e-3, path, trial, [&](double share, Path& /*guess*/) {
+    problem.shape.width = width_.blended(share, 1 / mean);
+  });
+  if (!there) return {};
+  path.values = {path.values[0] * mean, path.values[1] * mean, path.values[2]};
+  for (auto& y : path.nodes) y[1] *= mean;
+  return path;
+}
+
+void SheetManifold::fill_row(std::size_t row, ShootingSolver<SheetProblem>& solver) {
+  SheetProblem problem;
+  problem.shape.width = width_;
+  const double length = lengths_[row];
+  const std::optional<Path> lifted = first_path(length, solver);
+  if (!lifted) return;
+  Path path = *lifted;
   const Path middle = path;
   problem.target = TipTarget::length_and_direction;
   problem.goal = {length, std::atan2(tip_back(path), tip_up(path))};
@@ -86,7 +112,7 @@ void SheetManifold::fill_row(std::size_t row, ShootingSolver<SheetProblem>& solv
   const auto first = static_cast<std::size_t>(std::lower_bound(directions_.begin(), directions_.end() - 1, goal[1]) -
                                               directions_.begin());
   const auto fill = [&](std::size_t j, Path& now) {
-    if (!follow_goal(solver, problem, {length, directions_[j]}, now) || !bearable(now)) return false;
+    if (!follow_goal(solver, problem, {length, directions_[j]}, now) || !bearable(width_, now)) return false;
     nodes_[row * directions_.size() + j] = now;
     return true;
   };
@@ -101,9 +127,10 @@ void SheetManifold::fill_row(std::size_t row, ShootingSolver<SheetProblem>& solv
 void SheetManifold::fill_column(std::size_t column, std::size_t start_row, ShootingSolver<SheetProblem>& solver) {
   if (node(start_row, column).nodes.empty()) return;
   SheetProblem problem;
+  problem.shape.width = width_;
   problem.target = TipTarget::length_and_direction;
   const auto fill = [&](std::size_t i, Path& now) {
-    if (!follow_goal(solver, problem, {lengths_[i], directions_[column]}, now) || !bearable(now)) return false;
+    if (!follow_goal(solver, problem, {lengths_[i], directions_[column]}, now) || !bearable(width_, now)) return false;
     nodes_[i * directions_.size() + column] = now;
     return true;
   };
@@ -219,29 +246,25 @@ void SheetManifold::interpolate(const Patch& patch, Path& path) const {
   path.values.fill(0.0);
   for (std::size_t i = 0; i < patch.points; ++i)
     for (std::size_t j = 0; j < patch.points; ++j)
-      add_scaled(patch.rows[i] * patch.columns[j], node(patch.first.row + i, patch.first.column + j), path);
-  const double length = path.values[2];
-  for (auto& y : path.nodes) y = {y[0], y[1] / length, y[2] * length, y[3] * length};
-  path.values[0] /= length * length;
-  path.values[1] /= length * length;
+      add_scaled(patch.rows[i] * patch.columns[j], mean_width(width_, lengths_[patch.first.row + i]),
+                 node(patch.first.row + i, patch.first.column + j), path);
+  const double length = path.values[2], width = mean_width(width_, length);
+  for (auto& y : path.nodes) y = {y[0], y[1] * width / length, y[2] * length, y[3] * length};
+  path.values[0] *= width / (length * length);
+  path.values[1] *= width / (length * length);
 }
 
-namespace {
-
-/// From the uniform sheet without moment to the shape that is asked for, at the same goal.
-bool solve_shape(const SheetShape& shape, SheetManifold::Data& data) {
+/// Without moment at the tip, and on from there to the moment that is asked for.
+bool SheetManifold::solve(double tip_moment, Data& data) const {
   SheetProblem& problem = data.problem;
-  problem.shape = {};
+  problem.shape = {width_, 0.0};
   if (!data.solver.solve(problem, data.path).converged) return false;
-  if (shape.width_growth == 0 && shape.tip_moment == 0) return true;
-  return follow(data.solver, problem, 1.0 / 512, data.path, data.trial, [&](double share, Path& /*guess*/) {
-    problem.shape = {share * shape.width_growth, share * shape.tip_moment};
-  });
+  if (tip_moment == 0) return true;
+  return follow(data.solver, problem, 1.0 / 512, data.path, data.trial,
+                [&](double share, SheetProblem::Path& /*guess*/) { problem.shape.tip_moment = share * tip_moment; });
 }
 
-}  // namespace
-
-SheetSolution SheetManifold::at_position(double x, double z, const SheetShape& shape, Data& data) const {
+SheetSolution SheetManifold::at_position(double x, double z, double tip_moment, Data& data) const {
   if (!(x >= 0 && z >= 0 && x + z > 0)) return {};
   const double direction = std::atan2(x, z), distance = std::sqrt(x * x + z * z);
   const auto cell = find_position(direction, distance);
@@ -249,20 +272,19 @@ SheetSolution SheetManifold::at_position(double x, double z, const SheetShape& s
   interpolate(patch_at_position(*cell, direction, distance), data.path);
   data.problem.target = TipTarget::position;
   data.problem.goal = {x, z};
-  if (!solve_shape(shape, data)) return {};
-  SheetSolution found = describe_sheet(shape, data.path);
+  if (!solve(tip_moment, data)) return {};
+  SheetSolution found = describe_sheet(data.problem.shape, data.path);
   found.valid = found.valid && found.suspended > kShortest && found.suspended < kLongest;
   return found;
 }
 
-SheetSolution SheetManifold::at_length_and_angle(double length, double angle, const SheetShape& shape,
-                                                 Data& data) const {
+SheetSolution SheetManifold::at_length_and_angle(double length, double angle, double tip_moment, Data& data) const {
   const auto cell = find_angle(length, angle);
   if (!cell) return {};
   interpolate(patch_at_angle(*cell, length, angle), data.path);
   data.problem.target = TipTarget::length_and_angle;
   data.problem.goal = {length, angle};
-  return solve_shape(shape, data) ? describe_sheet(shape, data.path) : SheetSolution{};
+  return solve(tip_moment, data) ? describe_sheet(data.problem.shape, data.path) : SheetSolution{};
 }
 
 }  // namespace withe

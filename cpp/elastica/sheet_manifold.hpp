@@ -1,7 +1,8 @@
 #pragma once
-/// All poses in which a sheet can be held without moment: the manifold of solutions with theta >= 0, tabulated once so
-/// that every other solution begins next to its answer, by cubic interpolation. For one position of the tip there are
-/// several equilibria; those of this manifold are one family, reached from the flat sheet without a jump.
+/// All poses in which a sheet of one width can be held without moment: the manifold of solutions with theta >= 0,
+/// tabulated once so that every other solution begins next to its answer, by cubic interpolation. For one position of
+/// the tip there are several equilibria; those of this manifold are one family, reached from the flat sheet without a
+/// jump.
 
 #include <array>
 #include <optional>
@@ -17,9 +18,10 @@ class SheetManifold {
  public:
   static constexpr double kShortest = 0.958, kLongest = 6.84;  ///< [Lgb] suspended lengths served by position
   static constexpr double kShortestRow = 0.05;                 ///< [Lgb] and by length and angle
-  static constexpr double kGreatestPull = 40.0;  ///< [w Lgb] backward force on a taut sheet that ends the table
+  static constexpr double kGreatestPull = 40.0;                ///< [w Lgb] backward force on a taut sheet that ends the
+                                                               ///< table; w that of its narrower end
 
-  SheetManifold();
+  explicit SheetManifold(const SheetWidth& width = {});
 
   /// Caller's scratch.
   struct Data {
@@ -28,8 +30,8 @@ class SheetManifold {
     SheetProblem::Path path, trial;
   };
 
-  SheetSolution at_position(double x, double z, const SheetShape& shape, Data& data) const;
-  SheetSolution at_length_and_angle(double length, double angle, const SheetShape& shape, Data& data) const;
+  SheetSolution at_position(double x, double z, double tip_moment, Data& data) const;
+  SheetSolution at_length_and_angle(double length, double angle, double tip_moment, Data& data) const;
 
  private:
   /// Between two rows and two columns; the first of each.
@@ -47,6 +49,7 @@ class SheetManifold {
   const SheetProblem::Path& node(std::size_t row, std::size_t column) const {
     return nodes_[row * directions_.size() + column];
   }
+  std::optional<SheetProblem::Path> first_path(double length, ShootingSolver<SheetProblem>& solver) const;
   void fill_row(std::size_t row, ShootingSolver<SheetProblem>& solver);
   void fill_column(std::size_t column, std::size_t start_row, ShootingSolver<SheetProblem>& solver);
   std::optional<Cell> find_position(double direction, double distance) const;
@@ -55,7 +58,9 @@ class SheetManifold {
   Patch patch_at_position(const Cell& cell, double direction, double distance) const;
   Patch patch_at_angle(const Cell& cell, double length, double angle) const;
   void interpolate(const Patch& patch, SheetProblem::Path& path) const;
+  bool solve(double tip_moment, Data& data) const;
 
+  SheetWidth width_;
   std::vector<double> lengths_, directions_;
   std::vector<SheetProblem::Path> nodes_;          // empty where there is no solution, or a taut one
   std::vector<std::size_t> first_row_, last_row_;  // of each column

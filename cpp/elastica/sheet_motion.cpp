@@ -20,8 +20,8 @@ bool move_to(const SheetPose& from, const SheetPose& to, SheetMotionData& data, 
 /// sheet that is held beyond friction is let go little by little.
 bool slide_to(const SheetPose& from, const SheetPose& to, double friction, double sheet_length, SheetMotionData& data,
               double least = kLeastShare) {
-  const auto& [up, forward, length] = data.path.values;
-  const double before = forward / (up + sheet_length - length);
+  const double lies = lying_weight(data.problem.shape.width, data.path, sheet_length);
+  const double before = data.path.values[1] / (data.path.values[0] + lies);
   data.problem.target = TipTarget::sliding;
   data.problem.sheet_length = sheet_length;
   return follow(data.solver, data.problem, least, data.path, data.trial,
@@ -50,8 +50,8 @@ bool drag_sheet(const SheetPose& pose, const SheetFriction& friction, double& sl
   const SheetProblem::Path before = data.path;
   const SheetPose from = pose_of(before);
   const auto excess = [&] {
-    const auto& [up, forward, length] = data.path.values;
-    return std::abs(forward) - friction.coefficient * (up + friction.sheet_length - length);
+    const double lies = lying_weight(data.problem.shape.width, data.path, friction.sheet_length);
+    return std::abs(data.path.values[1]) - friction.coefficient * (data.path.values[0] + lies);
   };
   const auto some_lies = [&] { return data.path.values[2] < friction.sheet_length; };
   const bool stuck = move_to(from, {pose[0] - slide, pose[1], pose[2]}, data);

@@ -31,7 +31,8 @@ void set_sheet_forces(const SheetShape& shape, const SheetForces& forces, SheetM
 /// what was asked for: steps of less than a share of it are not tried.
 bool move_sheet(const SheetPose& pose, SheetMotionData& data, double least_share = 1.0 / 16);
 
-/// Coulomb's law for a sheet that lies as a rigid body behind its lift-off point: |T| <= friction (R + what lies).
+/// Coulomb's law for a sheet that lies as a rigid body behind its lift-off point: |T| <= friction (R + weight of
+/// what lies).
 struct SheetFriction {
   double coefficient = 0;
   double sheet_length = 0;  ///< [Lgb]

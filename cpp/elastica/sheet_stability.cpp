@@ -16,7 +16,7 @@ std::array<double, kElements + 1> sampled_angles(const SheetShape& shape, const 
   const double length = path.values[2], h = length / kSegments;
   const auto curvature = [&](std::size_t k) {
     const double s = h * static_cast<double>(k);
-    return 0.5 * path.nodes[k][1] / (1.0 + shape.width_growth * (length - s));
+    return 0.5 * path.nodes[k][1] / shape.width.width_at(length - s);
   };
   std::array<double, kElements + 1> angles{};
   for (std::size_t k = 0; k < kSegments; ++k) {
@@ -34,15 +34,16 @@ std::array<double, kElements + 1> sampled_angles(const SheetShape& shape, const 
 
 bool sheet_is_stable(const SheetShape& shape, const SheetProblem::Path& path) {
   const auto angles = sampled_angles(shape, path);
-  const double length = path.values[2], h = length / static_cast<double>(kElements), growth = shape.width_growth;
-  const auto stiffness = [&](double s) { return 2.0 * (1.0 + growth * (length - s)) / h; };
+  const double length = path.values[2], h = length / static_cast<double>(kElements);
+  const double lifted = shape.width.weight_at(length);
+  const auto stiffness = [&](double s) { return 2.0 * shape.width.width_at(length - s) / h; };
   // L D L^T of the tridiagonal matrix, applied to both constraints on the way; of D only its inertia is needed.
   int negative = 0;
   double pivot = 0, by_x = 0, by_z = 0, xx = 0, xz = 0, zz = 0;
   for (std::size_t i = 1; i < kElements; ++i) {
     const double s = h * static_cast<double>(i), before = stiffness(s - 0.5 * h);
     const double sine = std::sin(angles[i]), cosine = std::cos(angles[i]);
-    const double weight = s + growth * s * (length - 0.5 * s);
+    const double weight = shape.width.even() ? s : lifted - shape.width.weight_at(length - s);
     const double diagonal =
         before + stiffness(s + 0.5 * h) - h * ((path.values[0] - weight) * sine + path.values[1] * cosine);
     const double factor = i == 1 ? 0.0 : before / pivot;

@@ -30,6 +30,9 @@ std::vector<ElementTable*> tables_of(const Terms& terms) {
   return tables;
 }
 
+/// Who asks for derivatives of a step that has been taken asks no more whether it is solved.
+bool bounds_rounding(const StepProblem& problem) { return !(problem.exact && problem.moves()); }
+
 }  // namespace
 
 Equations::Equations(const Model& model, const EquationOptions& options)
@@ -114,7 +117,7 @@ void Equations::evaluate(const VectorX& z, bool with_matrix, const double* axial
   data.contact = &contact;
   if (with_matrix) pass_mark();
   find(data, with_matrix);
-  if (data.rounding.number != problem_.number) set_rounding_bounds(problem_, data);
+  if (bounds_rounding(problem_) && data.rounding.number != problem_.number) set_rounding_bounds(problem_, data);
   std::span<double> values;
   if (with_matrix) {
     values = assembler_.solver().values();
@@ -130,9 +133,11 @@ void Equations::evaluate(const VectorX& z, bool with_matrix, const double* axial
 void Equations::finish(StepData& data) const {
   const int n = model().dof_count;
   data.full_residual = data.gradient.head(n);
-  data.magnitude = data.row_magnitude.head(n);
-  data.floor = data.rounding.rows + data.rounding.relative * data.magnitude;
-  for (const std::unique_ptr<Term>& term : terms_.all) term->add_rounding(problem_, data);
+  if (bounds_rounding(problem_)) {
+    data.magnitude = data.row_magnitude.head(n);
+    data.floor = data.rounding.rows + data.rounding.relative * data.magnitude;
+    for (const std::unique_ptr<Term>& term : terms_.all) term->add_rounding(problem_, data);
+  }
   data.residual = data.full_residual;
   assembler_.project(data.residual);
 }

@@ -1,6 +1,7 @@
 /// Sheets that hang from a jaw, for withe.folding. Arrays are checked there; here only what would crash.
 
 #include <pybind11/numpy.h>
+#include <pybind11/stl.h>
 
 #include <algorithm>
 #include <iterator>
@@ -16,7 +17,7 @@ namespace withe::bindings {
 namespace {
 
 using Numbers = py::array_t<double, py::array::c_style | py::array::forcecast>;
-using Solve = SheetSolution (SheetManifold::*)(double, double, const SheetShape&, SheetManifold::Data&) const;
+using Solve = SheetSolution (SheetManifold::*)(double, double, double, SheetManifold::Data&) const;
 
 constexpr py::ssize_t kColumns = 10;
 
@@ -36,7 +37,7 @@ void put(const SheetSolution& found, double* row) {
 
 /// One row a pose: x, z, angle, suspended, normal force, tangential force, greatest curvature, valid, stable, moment.
 Numbers solve_all(const SheetManifold& manifold, Solve solve, const Numbers& first, const Numbers& second,
-                  double width_growth, double tip_moment) {
+                  double tip_moment) {
   require(first.ndim() == 1 && second.ndim() == 1 && first.size() == second.size(),
           "both arrays must have shape (poses,)");
   Numbers rows({first.size(), kColumns});
@@ -45,21 +46,21 @@ Numbers solve_all(const SheetManifold& manifold, Solve solve, const Numbers& fir
   const py::gil_scoped_release unlocked;
   SheetManifold::Data data;
   for (py::ssize_t i = 0; i < first.size(); ++i, row += kColumns) {
-    const SheetSolution found = (manifold.*solve)(a[i], b[i], {width_growth, tip_moment}, data);
+    const SheetSolution found = (manifold.*solve)(a[i], b[i], tip_moment, data);
     put(found, row);
   }
   return rows;
 }
 
 /// Rows as above of equilibria named by normal force, tangential force and suspended length.
-Numbers sheets_at_forces(const Numbers& forces, double width_growth) {
+Numbers sheets_at_forces(const Numbers& forces, const SheetWidth& width) {
   require(forces.ndim() == 2 && forces.shape(1) == 3, "forces must have shape (sheets, 3)");
   Numbers rows({forces.shape(0), kColumns});
   const double* in = forces.data();
   double* row = rows.mutable_data();
   const py::gil_scoped_release unlocked;
   SheetMotionData data;
-  const SheetShape shape{width_growth, 0.0};
+  const SheetShape shape{width, 0.0};
   for (py::ssize_t i = 0; i < forces.shape(0); ++i, in += 3, row += kColumns) {
     set_sheet_forces(shape, {in[0], in[1], in[2]}, data);
     put(describe_sheet(shape, data.path), row);
@@ -68,7 +69,7 @@ Numbers sheets_at_forces(const Numbers& forces, double width_growth) {
 }
 
 /// Rows as above of sheets held at poses (x, z, angle), each followed from forces of its own.
-Numbers sheets_at_poses(const Numbers& poses, const Numbers& forces, double width_growth) {
+Numbers sheets_at_poses(const Numbers& poses, const Numbers& forces, const SheetWidth& width) {
   require(poses.ndim() == 2 && poses.shape(1) == 3 && forces.ndim() == 2 && forces.shape(1) == 3 &&
               forces.shape(0) == poses.shape(0),
           "poses and forces must have shape (sheets, 3)");
@@ -77,7 +78,7 @@ Numbers sheets_at_poses(const Numbers& poses, const Numbers& forces, double widt
   double* row = rows.mutable_data();
   const py::gil_scoped_release unlocked;
   SheetMotionData data;
-  const SheetShape shape{width_growth, 0.0};
+  const SheetShape shape{width, 0.0};
   for (py::ssize_t i = 0; i < poses.shape(0); ++i, pose += 3, in += 3, row += kColumns) {
     set_sheet_forces(shape, {in[0], in[1], in[2]}, data);
     const bool there = move_sheet({pose[0], pose[1], pose[2]}, data);
@@ -89,7 +90,7 @@ Numbers sheets_at_poses(const Numbers& poses, const Numbers& forces, double widt
 /// Rows as above, and the slide, of a sheet that is moved from pose to pose and slides by Coulomb's law; after a pose
 /// that it has no way to, rows are of no sheet.
 py::tuple dragged_sheet(const Numbers& poses, const Numbers& forces, double friction, double sheet_length,
-                        double width_growth) {
+                        const SheetWidth& width) {
   require(poses.ndim() == 2 && poses.shape(1) == 3, "poses must have shape (poses, 3)");
   require(forces.ndim() == 1 && forces.size() == 3, "forces must have shape (3,)");
   Numbers rows({poses.shape(0), kColumns}), slides(poses.shape(0));
@@ -98,7 +99,7 @@ py::tuple dragged_sheet(const Numbers& poses, const Numbers& forces, double fric
   {
     const py::gil_scoped_release unlocked;
     SheetMotionData data;
-    const SheetShape shape{width_growth, 0.0};
+    const SheetShape shape{width, 0.0};
     set_sheet_forces(shape, {in[0], in[1], in[2]}, data);
     double slide = 0;
     bool there = true;
@@ -113,15 +114,16 @@ py::tuple dragged_sheet(const Numbers& poses, const Numbers& forces, double fric
 
 /// How far each of many sheets must have slid, held at its pose with forces of its own, for friction to hold it; NaN
 /// where no equilibrium is within reach.
-Numbers slides_to_rest(const Numbers& forces, double friction, double sheet_length, double width_growth) {
+Numbers slides_to_rest(const Numbers& forces, double friction, double sheet_length, const SheetWidth& width) {
   require(forces.ndim() == 2 && forces.shape(1) == 3, "forces must have shape (sheets, 3)");
   Numbers slides(forces.shape(0));
   const double* in = forces.data();
   double* out = slides.mutable_data();
   const py::gil_scoped_release unlocked;
   SheetMotionData data;
+  const SheetShape shape{width, 0.0};
   for (py::ssize_t i = 0; i < forces.shape(0); ++i, in += 3) {
-    set_sheet_forces({width_growth, 0.0}, {in[0], in[1], in[2]}, data);
+    set_sheet_forces(shape, {in[0], in[1], in[2]}, data);
     const SheetPose pose{tip_back(data.path), tip_up(data.path), tip_angle(data.path)};
     double slide = 0;
     const bool there = drag_sheet(pose, {friction, sheet_length}, slide, data);
@@ -133,33 +135,37 @@ Numbers slides_to_rest(const Numbers& forces, double friction, double sheet_leng
 }  // namespace
 
 void register_elastica(py::module_& module) {
+  py::class_<SheetWidth>(module, "SheetWidth", "Width of a sheet over the distance from its tip, in straight pieces.")
+      .def(py::init<>(), "1 everywhere.")
+      .def(py::init<const std::vector<double>&, const std::vector<double>&>(), py::arg("places"), py::arg("widths"))
+      .def("width_at", &SheetWidth::width_at, py::arg("place"))
+      .def("weight_at", &SheetWidth::weight_at, py::arg("place"), "Of the part from the tip to a place.");
   py::class_<SheetManifold>(module, "SheetManifold", "All poses in which a sheet can be held, tabulated once.")
-      .def(py::init<>())
+      .def(py::init<const SheetWidth&>(), py::arg("width"), py::call_guard<py::gil_scoped_release>())
       .def(
           "at_position",
-          [](const SheetManifold& self, const Numbers& x, const Numbers& z, double width_growth, double tip_moment) {
-            return solve_all(self, &SheetManifold::at_position, x, z, width_growth, tip_moment);
+          [](const SheetManifold& self, const Numbers& x, const Numbers& z, double tip_moment) {
+            return solve_all(self, &SheetManifold::at_position, x, z, tip_moment);
           },
-          py::arg("x"), py::arg("z"), py::arg("width_growth"), py::arg("tip_moment"), "One row a pose.")
+          py::arg("x"), py::arg("z"), py::arg("tip_moment"), "One row a pose.")
       .def(
           "at_length_and_angle",
-          [](const SheetManifold& self, const Numbers& length, const Numbers& angle, double width_growth,
-             double tip_moment) {
-            return solve_all(self, &SheetManifold::at_length_and_angle, length, angle, width_growth, tip_moment);
+          [](const SheetManifold& self, const Numbers& length, const Numbers& angle, double tip_moment) {
+            return solve_all(self, &SheetManifold::at_length_and_angle, length, angle, tip_moment);
           },
-          py::arg("length"), py::arg("angle"), py::arg("width_growth"), py::arg("tip_moment"), "One row a pose.")
+          py::arg("length"), py::arg("angle"), py::arg("tip_moment"), "One row a pose.")
       .def_readonly_static("shortest", &SheetManifold::kShortest)
       .def_readonly_static("longest", &SheetManifold::kLongest)
       .def_readonly_static("greatest_pull", &SheetManifold::kGreatestPull);
-  module.def("sheets_at_forces", &sheets_at_forces, py::arg("forces"), py::arg("width_growth"),
+  module.def("sheets_at_forces", &sheets_at_forces, py::arg("forces"), py::arg("width"),
              "Sheets of given floor forces and suspended length, one row a sheet.");
-  module.def("sheets_at_poses", &sheets_at_poses, py::arg("poses"), py::arg("forces"), py::arg("width_growth"),
+  module.def("sheets_at_poses", &sheets_at_poses, py::arg("poses"), py::arg("forces"), py::arg("width"),
              "Sheets held at poses, each followed from forces of its own, one row a sheet.");
   module.def("dragged_sheet", &dragged_sheet, py::arg("poses"), py::arg("forces"), py::arg("friction"),
-             py::arg("sheet_length"), py::arg("width_growth"),
+             py::arg("sheet_length"), py::arg("width"),
              "A sheet moved from pose to pose, sliding by Coulomb's law: one row a pose, and how far it has slid.");
   module.def("slides_to_rest", &slides_to_rest, py::arg("forces"), py::arg("friction"), py::arg("sheet_length"),
-             py::arg("width_growth"), "How far sheets that are held still slide until friction holds them.");
+             py::arg("width"), "How far sheets that are held still slide until friction holds them.");
 }
 
 }  // namespace withe::bindings

@@ -46,6 +46,7 @@ __all__: list[str] = [
     "RunJacobian",
     "SceneDescription",
     "SheetManifold",
+    "SheetWidth",
     "SpringDescription",
     "Statistics",
     "StraightRod",
@@ -1205,6 +1206,27 @@ class Batch:
     @property
     def workers(self) -> int: ...
 
+class SheetWidth:
+    """
+    Width of a sheet over the distance from its tip, in straight pieces.
+    """
+    @typing.overload
+    def __init__(self) -> None:
+        """
+        1 everywhere.
+        """
+    @typing.overload
+    def __init__(
+        self,
+        places: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
+        widths: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
+    ) -> None: ...
+    def weight_at(self, place: typing.SupportsFloat | typing.SupportsIndex) -> float:
+        """
+        Of the part from the tip to a place.
+        """
+    def width_at(self, place: typing.SupportsFloat | typing.SupportsIndex) -> float: ...
+
 class SheetManifold:
     """
     All poses in which a sheet can be held, tabulated once.
@@ -1213,12 +1235,11 @@ class SheetManifold:
     greatest_pull: typing.ClassVar[float] = 40.0
     longest: typing.ClassVar[float] = 6.84
     shortest: typing.ClassVar[float] = 0.958
-    def __init__(self) -> None: ...
+    def __init__(self, width: SheetWidth) -> None: ...
     def at_length_and_angle(
         self,
         length: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
         angle: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        width_growth: typing.SupportsFloat | typing.SupportsIndex,
         tip_moment: typing.SupportsFloat | typing.SupportsIndex,
     ) -> numpy.typing.NDArray[numpy.float64]:
         """
@@ -1228,7 +1249,6 @@ class SheetManifold:
         self,
         x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
         z: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        width_growth: typing.SupportsFloat | typing.SupportsIndex,
         tip_moment: typing.SupportsFloat | typing.SupportsIndex,
     ) -> numpy.typing.NDArray[numpy.float64]:
         """
@@ -1319,7 +1339,7 @@ def dragged_sheet(
     forces: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
     friction: typing.SupportsFloat | typing.SupportsIndex,
     sheet_length: typing.SupportsFloat | typing.SupportsIndex,
-    width_growth: typing.SupportsFloat | typing.SupportsIndex,
+    width: SheetWidth,
 ) -> tuple:
     """
     A sheet moved from pose to pose, sliding by Coulomb's law: one row a pose, and how far it has slid.
@@ -1346,8 +1366,7 @@ def hsv_mask(
     """
 
 def sheets_at_forces(
-    forces: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    width_growth: typing.SupportsFloat | typing.SupportsIndex,
+    forces: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], width: SheetWidth
 ) -> numpy.typing.NDArray[numpy.float64]:
     """
     Sheets of given floor forces and suspended length, one row a sheet.
@@ -1356,7 +1375,7 @@ def sheets_at_forces(
 def sheets_at_poses(
     poses: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
     forces: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    width_growth: typing.SupportsFloat | typing.SupportsIndex,
+    width: SheetWidth,
 ) -> numpy.typing.NDArray[numpy.float64]:
     """
     Sheets held at poses, each followed from forces of its own, one row a sheet.
@@ -1366,7 +1385,7 @@ def slides_to_rest(
     forces: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
     friction: typing.SupportsFloat | typing.SupportsIndex,
     sheet_length: typing.SupportsFloat | typing.SupportsIndex,
-    width_growth: typing.SupportsFloat | typing.SupportsIndex,
+    width: SheetWidth,
 ) -> numpy.typing.NDArray[numpy.float64]:
     """
     How far sheets that are held still slide until friction holds them.

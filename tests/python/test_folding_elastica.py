@@ -4,6 +4,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
+from scipy.interpolate import CubicSpline
 
 import withe
 from withe.folding import elastica
@@ -95,6 +97,41 @@ def test_a_moment_at_the_tip_bends_it_there():
     assert bent.angle > free.angle + 0.1
 
 
+WIDTHS = [(0.0, 0.15), (2.0, 0.4), (3.5, 1.0), (7.0, 0.1)]
+
+
+def test_a_sheet_of_any_width_obeys_its_equations():
+    """Integrated anew from the lift-off point, by SciPy, piece by piece."""
+    x, z = scattered(40, 6)
+    pose = elastica(x, z, width=WIDTHS)
+    assert pose.valid.sum() > 25
+    places, widths = np.array(WIDTHS).T
+    weight = CubicSpline(np.linspace(0, 7, 70001), np.interp(np.linspace(0, 7, 70001), places, widths)).antiderivative()
+    for i in np.flatnonzero(pose.valid):
+        length, up, forward = pose.suspended[i], pose.normal_force[i], pose.tangential_force[i]
+
+        def slope(s, y, length=length, up=up, forward=forward):
+            before = weight(length) - weight(length - s)
+            turn = 0.5 * y[1] / np.interp(length - s, places, widths)
+            return turn, (up - before) * np.cos(y[0]) - forward * np.sin(y[0]), np.cos(y[0]), np.sin(y[0])
+
+        angle, moment, along, height = solve_ivp(
+            slope, (0.0, length), np.zeros(4), "DOP853", rtol=1e-9, atol=1e-11, max_step=0.02
+        ).y[:, -1]
+        assert (angle, moment) == pytest.approx((pose.angle[i], 0.0), abs=2e-5)
+        assert (length - along, height) == pytest.approx((x[i], z[i]), abs=2e-6)
+
+
+def test_a_sheet_twice_as_wide_hangs_the_same_way_with_twice_the_forces():
+    x, z = scattered(100, 7)
+    once, twice = elastica(x, z, width=WIDTHS), elastica(x, z, width=np.array(WIDTHS) * [1.0, 2.0])
+    assert (once.valid == twice.valid).all()
+    np.testing.assert_allclose(twice.angle, once.angle, atol=1e-8)
+    np.testing.assert_allclose(twice.normal_force, 2.0 * once.normal_force, rtol=1e-7, atol=1e-9)
+    even = elastica(x, z, width=[(0.0, 1.0), (3.0, 1.0)])
+    np.testing.assert_allclose(even.angle, elastica(x, z).angle, atol=1e-9)
+
+
 @pytest.mark.parametrize(
     ("x", "z"), [(50.0, 2.0), (-0.5, 1.0), (3.0, -0.1), (0.0, 0.0), (0.1, 0.1), (0.0, 3.0), (10.5, 4.5)]
 )
@@ -113,7 +150,10 @@ def test_positions_outside_the_manifold_are_refused(x, z):
         ({"x": [1.0, 2.0], "z": [1.0, 2.0, 3.0]}, "broadcast"),
         ({"x": float("nan"), "z": 1.0}, "x must"),
         ({"x": "far", "z": 1.0}, "x must"),
-        ({"x": 1.0, "z": 1.0, "width_growth": -1.0}, "width_growth"),
+        ({"x": 1.0, "z": 1.0, "width": [(0.0, -1.0)]}, "width must be positive"),
+        ({"x": 1.0, "z": 1.0, "width": [(0.0, 1.0), (0.0, 2.0)]}, "width must have places that grow from 0"),
+        ({"x": 1.0, "z": 1.0, "width": [(1.0, 1.0)]}, "width must have places that grow from 0"),
+        ({"x": 1.0, "z": 1.0, "width": 2.0}, "width"),
     ],
 )
 def test_bad_input_says_what_is_wrong(arguments, message):

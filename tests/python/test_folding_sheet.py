@@ -15,7 +15,7 @@ from withe.folding import Jaw, Noise, Paper, SimulatedSheet, plan
 
 ROOM = Path(__file__).resolve().parents[2] / "python" / "withe" / "folding"
 COARSE = {"edges": 75, "time_step": 0.02}
-PLANNER = {"planning", "plans", "grid", "manifold", "moment_free", "free_moment", "sheets", "timing"}
+PLANNER = {"planning", "plans", "grid", "manifold", "moment_free", "free_moment", "sheets", "timing", "widths"}
 WORLD = {"carrying", "simulated_sheet", "wide_sheet", "jaw_motion", "noise", "paper_rods", "views"}
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 import warnings
+from dataclasses import replace
 from pathlib import Path
 
 from withe.folding.paper import Paper
@@ -12,7 +13,7 @@ from withe.folding.planning import plan
 
 __all__ = ["add_parser", "run"]
 
-_PAPERS = {"a4": Paper.a4, "us_letter": Paper.us_letter, "cardboard": Paper.cardboard}
+_PAPERS = {"a4": Paper.a4, "us_letter": Paper.us_letter, "cardboard": Paper.cardboard, "origami": Paper.origami}
 
 
 def _target(text: str) -> float | str:
@@ -41,11 +42,10 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 def run(arguments: argparse.Namespace) -> int:
     """Plan, write the file and say what was planned."""
     paper = _PAPERS[arguments.paper]()
-    paper = Paper(
-        paper.length,
-        paper.width,
-        paper.gravito_bending_length if arguments.lgb is None else arguments.lgb,
-        paper.friction if arguments.friction is None else arguments.friction,
+    paper = replace(
+        paper,
+        gravito_bending_length=paper.gravito_bending_length if arguments.lgb is None else arguments.lgb,
+        friction=paper.friction if arguments.friction is None else arguments.friction,
     )
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")

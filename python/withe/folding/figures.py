@@ -7,31 +7,36 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from withe.folding.widths import Width
+
 __all__ = ["draw_fold", "side_view"]
 
 FloatArray = npt.NDArray[np.float64]
 _STEPS = 400
 
 
-def side_view(forces: FloatArray, length: float) -> FloatArray:
+def side_view(forces: FloatArray, length: float, width: Width) -> FloatArray:
     """Points of a sheet from its far end to the jaw's inner edge, of shape (points, 2), x and z in Lgb.
 
     `forces`: those of one equilibrium, R, H and the suspended length; the fourth-order Runge-Kutta method.
     """
     normal, tangential, suspended = forces
+    places, lifted = suspended - np.linspace(0.0, suspended, 2 * _STEPS + 1), float(width.weight(suspended))
+    weights, widths = lifted - width.weight(places), np.interp(places, width.places, width.widths)
 
-    def slope(s: float, y: FloatArray) -> FloatArray:
+    def slope(place: int, y: FloatArray) -> FloatArray:  # places are half steps apart
         sine, cosine = np.sin(y[0]), np.cos(y[0])
-        return np.array([0.5 * y[1], (normal - s) * cosine - tangential * sine, cosine, sine])
+        moment = (normal - weights[place]) * cosine - tangential * sine
+        return np.array([0.5 * y[1] / widths[place], moment, cosine, sine])
 
     states = [np.zeros(4)]
     h = suspended / _STEPS
     for i in range(_STEPS):
-        s, y = i * h, states[-1]
+        s, y = 2 * i, states[-1]
         a = slope(s, y)
-        b = slope(s + h / 2, y + h / 2 * a)
-        c = slope(s + h / 2, y + h / 2 * b)
-        d = slope(s + h, y + h * c)
+        b = slope(s + 1, y + h / 2 * a)
+        c = slope(s + 1, y + h / 2 * b)
+        d = slope(s + 2, y + h * c)
         states.append(y + h / 6 * (a + 2 * b + 2 * c + d))
     hanging = np.array(states)[:, 2:]
     points = np.stack([suspended - hanging[:, 0], hanging[:, 1]], axis=1)

@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.folding.sheets import Elastica, at_forces, at_poses, forces_of, join, poses_of, take
+from withe.folding.widths import EVEN, Width
 
 __all__ = ["Holding", "Lattice", "Way", "forces_at", "goals", "make_lattice", "smoothed", "way_to"]
 
@@ -34,7 +35,8 @@ _BEST = 3  # goals that are looked at more closely
 class Holding:
     """A sheet and its jaw [Lgb], and how far it may bend [1/Lgb].
 
-    `length` of the sheet from the jaw's inner edge on; `share` by which Lgb may be other than thought.
+    `length` of the sheet from the jaw's inner edge on, and its `width` there; `share` by which Lgb may be other than
+    thought.
     """
 
     length: float
@@ -43,6 +45,7 @@ class Holding:
     thickness: float
     curvature: float
     share: float
+    width: Width = EVEN
 
     def outer(self, sheet: Elastica) -> tuple[FloatArray, FloatArray]:
         """Where the outer edge is, from where it lay; and how high over what the fingers need at least there."""
@@ -50,26 +53,30 @@ class Holding:
         z = sheet.z + self.depth * np.sin(sheet.angle)
         return x, z - self.thickness - self.finger * np.abs(np.cos(sheet.angle))
 
-    def ratio(self, sheet: Elastica, length: float | None = None) -> FloatArray:
+    def ratio(self, sheet: Elastica) -> FloatArray:
         """Friction coefficient that the sheet needs not to slide."""
-        lying = (self.length if length is None else length) - sheet.suspended
+        lying = self.width.lying(sheet.suspended, self.length)
         return np.asarray(np.abs(sheet.tangential_force) / (sheet.normal_force + lying))
 
     def worst_ratio(self, sheet: Elastica) -> FloatArray:
         """The same at the same poses if Lgb is more or less by the share; infinite where that has no stable pose."""
         worst = self.ratio(sheet)
         for factor in (1 - self.share, 1 + self.share) if self.share > 0 else ():
-            other = at_poses(poses_of(sheet) / [factor, factor, 1.0], _of_other(forces_of(sheet), factor))
-            ratio = self.ratio(other, self.length / factor)
+            it = replace(self, length=self.length / factor, width=self.width.of_other(factor))
+            other = at_poses(poses_of(sheet) / [factor, factor, 1.0], _of_other(forces_of(sheet), factor), it.width)
+            ratio = it.ratio(other)
             worst = np.maximum(worst, np.where(other.valid & other.stable, ratio, np.inf))
         return worst
 
+    def has_room(self, sheet: Elastica, least: float = -1e-9) -> npt.NDArray[np.bool_]:
+        """Whether an edge that looks back is over the table by what the fingers need, and more than `least`."""
+        _, room = self.outer(sheet)
+        return np.asarray((sheet.angle <= 0.5 * np.pi) | (room >= least))
+
     def bearable(self, sheet: Elastica) -> npt.NDArray[np.bool_]:
         """Whether the sheet can be there, the jaw too, and is not bent too far."""
-        _, room = self.outer(sheet)
-        back = (sheet.angle > 0.5 * np.pi) & (room < -1e-9)
         fits = (sheet.suspended < self.length) & (sheet.angle < _STEEPEST) & (sheet.max_curvature <= self.curvature)
-        return sheet.valid & sheet.stable & fits & ~back
+        return sheet.valid & sheet.stable & fits & self.has_room(sheet)
 
 
 def _of_other(forces: FloatArray, factor: float) -> FloatArray:

@@ -7,7 +7,6 @@ positions say little where so short a part is lifted.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -15,7 +14,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from withe.folding.manifold import Manifold
 from withe.folding.sheets import Elastica, at_forces, join, take
+from withe.folding.widths import EVEN, Width
 
 __all__ = [
     "HIGH",
@@ -24,7 +25,6 @@ __all__ = [
     "Grid",
     "IndexArray",
     "Network",
-    "Solve",
     "gentle",
     "lift",
     "make_grid",
@@ -35,9 +35,6 @@ __all__ = [
 
 FloatArray = npt.NDArray[np.float64]
 IndexArray = npt.NDArray[np.intp]
-Solve = Callable[[npt.ArrayLike, npt.ArrayLike], Elastica]
-"""Equilibria without moment at positions x, z: `elastica`, or a network that has learned it."""
-
 SPACING = 0.0548
 WIDE, HIGH = 10.3, 4.7  # [Lgb] of what sheets of up to 6.84 Lgb reach
 _LIFTS = np.linspace(0.1, 3.0, 59)  # lifted lengths
@@ -68,43 +65,55 @@ class Grid:
 
 
 @cache
-def lift() -> Elastica:
+def lift(width: Width = EVEN) -> Elastica:
     """Sheets raised without tangential force and without moment at the tip, by lifted length: the gentle branch."""
-    normal = np.minimum(_LIFTS / 2, 1.5)
-    ahead = normal + 1e-3
-    zeros = np.zeros_like(normal)
-    for _ in range(30):  # the secant method on the moment at the tip
-        moment, next_moment = (
-            at_forces(np.stack([force, zeros, _LIFTS], axis=1)).tip_moment for force in (normal, ahead)
-        )
-        change = np.where(np.abs(ahead - normal) > 1e-15, next_moment - moment, 1.0)
-        step = np.where(change == 0, 0.0, -next_moment * (ahead - normal) / np.where(change == 0, 1.0, change))
+    normal = np.zeros_like(_LIFTS)
+    for i, lifted in enumerate(_LIFTS):
+        # As much as a short strip, that hardly turns, has on the table; or on from the lengths before.
+        guess = _least_lift(lifted, width) if i < 2 else 2.0 * normal[i - 1] - normal[i - 2]
+        normal[i] = _without_moment(lifted, guess, width)
+    return at_forces(np.stack([normal, np.zeros_like(normal), _LIFTS], axis=1), width)
+
+
+def _least_lift(lifted: float, width: Width) -> float:
+    """Mean of the weight before s, which makes the moment at the tip zero where angles are small."""
+    before = width.lying(np.linspace(0.0, lifted, 201), lifted)
+    return float(np.trapezoid(before, dx=1.0 / 200))
+
+
+def _without_moment(lifted: float, normal: float, width: Width) -> float:
+    """Normal force, by the secant method on the moment at the tip."""
+    ahead = normal * (1.0 + 1e-3)
+    for _ in range(30):
+        moment, next_moment = at_forces([(force, 0.0, lifted) for force in (normal, ahead)], width).tip_moment
+        change = next_moment - moment
+        step = -next_moment * (ahead - normal) / change if change != 0.0 else 0.0
         normal, ahead = ahead, ahead + step
-        if np.abs(step).max() < 1e-13:
+        if abs(step) < 1e-13:
             break
-    return at_forces(np.stack([ahead, zeros, _LIFTS], axis=1))
+    return ahead
 
 
 @cache
-def _gentle() -> Any:
+def _gentle(width: Width) -> Any:
     from scipy.interpolate import CubicSpline
 
-    raised = lift()
+    raised = lift(width)
     return CubicSpline(raised.suspended, raised.normal_force)
 
 
-def gentle(lifted: FloatArray) -> FloatArray:
+def gentle(lifted: FloatArray, width: Width) -> FloatArray:
     """Normal force of the lift at lengths between its nodes."""
-    return np.asarray(_gentle()(lifted))
+    return np.asarray(_gentle(width)(lifted))
 
 
 @cache
-def make_grid(solve: Solve, spacing: float = SPACING) -> Grid:
+def make_grid(solve: Manifold, spacing: float = SPACING) -> Grid:
     """Solve the middles of all blocks; edges join neighbours, also over corners, and the lift with blocks nearby."""
     columns, rows = int(WIDE / spacing), int(HIGH / spacing)
     x, z = np.meshgrid(spacing * (np.arange(columns) + 0.5), spacing * (np.arange(rows) + 0.5), indexing="ij")
     blocks = solve(x, z)
-    raised = lift()
+    raised = lift(solve.width)
     name = np.full((columns, rows), -1)
     name[blocks.valid] = len(raised.x) + np.arange(blocks.valid.sum())
     edges = [np.stack([np.arange(len(raised.x) - 1), np.arange(1, len(raised.x))], axis=1)]

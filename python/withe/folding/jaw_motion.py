@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from copy import copy
 from typing import Any, Protocol
 
 import numpy as np
@@ -69,6 +70,13 @@ class JawMotion:
         self._way = _Way(next(self._motions), 0.0, np.zeros(3))
         self._comes_in = _COMES_IN * (self._way.times[-1] - self._way.times[0])
 
+    def on_from_here(self, motions: Iterable[Motion]) -> JawMotion:
+        """Other motions, from the end of the present one on, of a jaw that has come there in the same way."""
+        other = copy(self)
+        other._motions = iter(motions)
+        other.go_on()
+        return other
+
     def lately(self, time: float) -> float:
         """Greatest speed of the edge in the last moments before a time [m/s]: as long as a sheet takes to follow."""
         return self._way.speed(time - _FOLLOWS, time)
@@ -91,9 +99,12 @@ class JawMotion:
         return self._way(time) + self._drawn.off(time, min(1.0, time / self._comes_in))
 
 
-def lead(hand: RunningHand, jaw: JawMotion, depth: float, y: float = 0.0) -> None:
-    """Move a hand with a jaw that holds `depth` of a flat sheet, at y: the hand's place is the middle of that."""
-    flat, middle = hand.pose.rotation, 0.5 * depth
+def lead(hand: RunningHand, flat: FloatArray, jaw: JawMotion, depth: float, y: float = 0.0) -> None:
+    """Move a hand with a jaw that holds `depth` of a sheet, at y: the hand's place is the middle of that.
+
+    `flat`: its rotation while the sheet is flat.
+    """
+    middle = 0.5 * depth
 
     def path(time: float) -> tuple[FloatArray, FloatArray]:
         x, z, angle = jaw(time)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
@@ -9,16 +11,38 @@ import numpy.typing as npt
 
 from withe._core import SheetManifold
 from withe.common import validation
+from withe.folding.sheet_network import shipped
 from withe.folding.sheets import Elastica, described, shared
+from withe.folding.widths import EVEN, Width
 
-__all__ = ["elastica"]
+__all__ = ["Manifold", "elastica"]
 
 FloatArray = npt.NDArray[np.float64]
 
 
 @cache
-def _manifold() -> SheetManifold:
-    return SheetManifold()
+def _table(width: Width) -> SheetManifold:
+    return SheetManifold(width.engine)
+
+
+@dataclass(frozen=True)
+class Manifold:
+    """Equilibria of a sheet that is held without moment, by positions: each from its equations, or all learned."""
+
+    width: Width = EVEN
+    learned: bool = False
+
+    def __call__(self, x: npt.ArrayLike, z: npt.ArrayLike) -> Elastica:
+        """As `elastica`."""
+        if self.learned:
+            return shipped()(x, z)
+        first, second = validation.broadcast_arrays(x=x, z=z)
+        return _solved(_table(self.width).at_position, first, second, 0.0)
+
+
+def _solved(solve: Callable[..., FloatArray], first: FloatArray, second: FloatArray, moment: float) -> Elastica:
+    rows = shared(lambda one, other: solve(one, other, moment), first.ravel(), second.ravel())
+    return described(rows, first.shape)
 
 
 def elastica(
@@ -28,12 +52,13 @@ def elastica(
     length: npt.ArrayLike | None = None,
     angle: npt.ArrayLike | None = None,
     tip_moment: float = 0.0,
-    width_growth: float = 0.0,
+    width: npt.ArrayLike | None = None,
 ) -> Elastica:
     """Find how the lifted part of a sheet hangs from a jaw.
 
     The sheet leaves the flat table without curvature (a table only pushes); the jaw holds its tip with a given moment.
-    In units of Lgb and w, with W the weight of the part before s and b the width relative to the tip's,
+    In units of Lgb and w, with W the weight of the part before s and b the width relative to that at which w is the
+    weight per length,
 
         theta' = m / (2 b),  m' = (R - W) cos(theta) - T sin(theta),  theta(0) = m(0) = 0,  m(suspended) = tip_moment
 
@@ -50,9 +75,9 @@ def elastica(
         on x and z they depend steeply near x = 0.
     tip_moment : float [w Lgb^2]
         Of the jaw on the sheet: twice the curvature at the tip, in 1/Lgb, that it makes there.
-    width_growth : float [1/Lgb]
-        The width is 1 + width_growth * (distance from the tip) times that at the tip, and w the weight per length
-        there: a square folded over its diagonal widens from the jaw on.
+    width : array_like of shape (places, 2) [Lgb], [-], optional
+        Distances from the tip, 0 and growing, and b there, straight between and as the last one beyond: a square
+        folded over its diagonal widens from the jaw to its middle. By default 1 everywhere.
 
     Returns
     -------
@@ -65,8 +90,8 @@ def elastica(
     Raises
     ------
     ValueError
-        Not numbers, not finite, shapes that do not broadcast, or neither x and z nor length and angle; width_growth
-        negative.
+        Not numbers, not finite, shapes that do not broadcast, or neither x and z nor length and angle; widths that
+        are not positive, places that do not grow from 0.
 
     Examples
     --------
@@ -81,8 +106,14 @@ def elastica(
     given = {"x": x, "z": z} if by_position else {"length": length, "angle": angle}
     first, second = validation.broadcast_arrays(**given)
     moment = validation.number(tip_moment, "tip_moment")
-    growth = validation.non_negative(width_growth, "width_growth")
-    manifold = _manifold()
-    solve = manifold.at_position if by_position else manifold.at_length_and_angle
-    rows = shared(lambda one, other: solve(one, other, growth, moment), first.ravel(), second.ravel())
-    return described(rows, first.shape)
+    table = _table(EVEN if width is None else _checked_width(width))
+    return _solved(table.at_position if by_position else table.at_length_and_angle, first, second, moment)
+
+
+def _checked_width(width: npt.ArrayLike) -> Width:
+    places, widths = validation.number_array(width, "width", ("places", 2)).T
+    if not len(places) or places[0] != 0.0 or (np.diff(places) <= 0.0).any():
+        raise ValueError(f"width must have places that grow from 0, got {places.tolist()}")
+    if (widths <= 0.0).any():
+        raise ValueError(f"width must be positive everywhere, got {widths.tolist()}")
+    return Width(tuple(places.tolist()), tuple(widths.tolist()))

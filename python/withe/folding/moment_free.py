@@ -9,10 +9,10 @@ from heapq import heappop, heappush
 import numpy as np
 import numpy.typing as npt
 
+from withe.folding.free_moment import Holding
 from withe.folding.grid import (
     IndexArray,
     Network,
-    Solve,
     gentle,
     lift,
     make_grid,
@@ -20,7 +20,9 @@ from withe.folding.grid import (
     nodes_near,
     shortest_path,
 )
+from withe.folding.manifold import Manifold
 from withe.folding.sheets import SHORTEST, Elastica, at_forces, join, poses_of, slides_to_rest, take
+from withe.folding.widths import Width
 
 __all__ = ["goal_pose", "greedy", "least_slide", "smoothed", "uniform_cost"]
 
@@ -29,7 +31,7 @@ _MOST_STEPS = 2000
 _ROOM = 2e-3  # of a path on which the sheet slides least, for it to be short [Lgb]
 
 
-def goal_pose(solve: Solve, x: float, z: float, depth: float, finger: float) -> Elastica | None:
+def goal_pose(solve: Manifold, x: float, z: float, depth: float, finger: float) -> Elastica | None:
     """Pose without moment whose outer edge, `depth` beyond, is at x and finger's height over z; None if there is none.
 
     `finger`: thickness of that between the edge and what lies under it.
@@ -50,28 +52,28 @@ def goal_pose(solve: Solve, x: float, z: float, depth: float, finger: float) -> 
     return None
 
 
-def uniform_cost(solve: Solve, length: float, goal: Elastica, start: Elastica | None = None) -> Elastica | None:
+def uniform_cost(solve: Manifold, holding: Holding, goal: Elastica, start: Elastica | None = None) -> Elastica | None:
     """Nodes from flat, or a pose, to a goal over a sheet's part of the manifold, at least accumulated force ratio."""
-    return shortest_path(_by_ratio(solve, length), start, goal)
+    return shortest_path(_by_ratio(solve, holding), start, goal)
 
 
 @lru_cache(maxsize=8)
-def _by_ratio(solve: Solve, length: float) -> Network:
+def _by_ratio(solve: Manifold, holding: Holding) -> Network:
     grid = make_grid(solve)
-    return make_network(grid, grid.pose.force_ratio, _allowed(solve, length))
+    return make_network(grid, grid.pose.force_ratio, _allowed(solve, holding))
 
 
-def _allowed(solve: Solve, length: float) -> npt.NDArray[np.bool_]:
-    """Nodes of the grid that are part of a sheet's manifold."""
+def _allowed(solve: Manifold, holding: Holding) -> npt.NDArray[np.bool_]:
+    """Nodes of the grid that are part of a sheet's manifold, and at which the jaw does not reach into the table."""
     grid = make_grid(solve)
     lifted = grid.pose.suspended
-    allowed = (lifted < length) & (lifted > SHORTEST)
-    allowed[: grid.lifts] = lift().suspended < length
+    allowed = (lifted < holding.length) & (lifted > SHORTEST) & holding.has_room(grid.pose)
+    allowed[: grid.lifts] = lift(solve.width).suspended < holding.length
     return allowed
 
 
 def least_slide(
-    solve: Solve, length: float, friction: float, goal: Elastica, start: Elastica | None = None
+    solve: Manifold, holding: Holding, friction: float, goal: Elastica, start: Elastica | None = None
 ) -> Elastica | None:
     """Nodes of the shortest path on which the sheet slides least, bends counted.
 
@@ -79,10 +81,10 @@ def least_slide(
     nearer end of that; so what a path slides is the farthest of these ends from 0.
     """
     grid = make_grid(solve)
-    cost, allowed = 1.0 + 0.4 * grid.pose.max_curvature, _allowed(solve, length)
+    cost, allowed = 1.0 + 0.4 * grid.pose.max_curvature, _allowed(solve, holding)
     network = make_network(grid, cost, allowed)
     begin = np.array([0]) if start is None else nodes_near(network, start)
-    within = _needed_slides(solve, length, friction).spread(network, begin, nodes_near(network, goal))
+    within = _needed_slides(solve, holding.length, friction).spread(network, begin, nodes_near(network, goal))
     return None if within is None else shortest_path(make_network(grid, cost, within), start, goal)
 
 
@@ -92,16 +94,17 @@ class _NeededSlides:
     Most nodes are of no concern to a path, and sheets that snap, whose slide has no end, take long.
     """
 
-    def __init__(self, pose: Elastica, friction: float, length: float) -> None:
-        self._pose, self._friction, self._length = pose, friction, length
-        ratio = np.abs(pose.tangential_force) / (pose.normal_force + length - pose.suspended)
+    def __init__(self, pose: Elastica, friction: float, length: float, width: Width) -> None:
+        self._pose, self._friction, self._length, self._width = pose, friction, length, width
+        ratio = np.abs(pose.tangential_force) / (pose.normal_force + width.lying(pose.suspended, length))
         self._slide = np.where(ratio > friction, np.nan, 0.0)
 
     def at(self, nodes: IndexArray) -> FloatArray:
         """Infinite where the sheet snaps."""
         unknown = nodes[np.isnan(self._slide[nodes])]
         if len(unknown):
-            self._slide[unknown] = slides_to_rest(take(self._pose, unknown), self._friction, self._length)
+            some = take(self._pose, unknown)
+            self._slide[unknown] = slides_to_rest(some, self._friction, self._length, self._width)
         return self._slide[nodes]
 
     def spread(self, network: Network, begin: IndexArray, ends: IndexArray) -> npt.NDArray[np.bool_] | None:
@@ -132,19 +135,21 @@ class _NeededSlides:
 
 
 @lru_cache(maxsize=8)
-def _needed_slides(solve: Solve, length: float, friction: float) -> _NeededSlides:
-    return _NeededSlides(make_grid(solve).pose, friction, length)
+def _needed_slides(solve: Manifold, length: float, friction: float) -> _NeededSlides:
+    return _NeededSlides(make_grid(solve).pose, friction, length, solve.width)
 
 
-def greedy(solve: Solve, length: float, goal: Elastica) -> Elastica | None:
+def greedy(solve: Manifold, holding: Holding, goal: Elastica) -> Elastica | None:
     """From pose to pose next to it, always that of least tangential force, back over the sheet [Petrik 2016].
 
     Looks no further than one step of a block, within 60 degrees of where it goes, and comes down when it is over the
     goal; None where it comes to an end before.
     """
     grid = make_grid(solve)
-    raised = lift()
-    way = take(raised, slice(0, int(np.searchsorted(raised.suspended, 0.95 * length))))  # no force: nothing is less
+    raised = lift(solve.width)
+    way = take(
+        raised, slice(0, int(np.searchsorted(raised.suspended, 0.95 * holding.length)))
+    )  # no force: nothing is less
     heading, turns = 0.5 * np.pi, np.linspace(-np.pi / 3, np.pi / 3, 25)
     while goal.x[0] - way.x[-1] > grid.spacing:
         if len(way.x) > _MOST_STEPS:
@@ -153,7 +158,7 @@ def greedy(solve: Solve, length: float, goal: Elastica) -> Elastica | None:
         x, z = way.x[-1] + grid.spacing * np.cos(around), way.z[-1] + grid.spacing * np.sin(around)
         ahead = (x >= way.x[-1]) & (z > 0)
         pose = solve(x[ahead], z[ahead])
-        good = pose.valid & (pose.suspended < length)
+        good = pose.valid & (pose.suspended < holding.length) & holding.has_room(pose)
         if not good.any():
             return None
         best = np.argmin(np.where(good, np.abs(pose.tangential_force), np.inf))
@@ -161,7 +166,7 @@ def greedy(solve: Solve, length: float, goal: Elastica) -> Elastica | None:
         way = join(way, take(pose, slice(best, best + 1)))
     down = np.arange(way.z[-1] - grid.spacing, goal.z[0], -grid.spacing)
     pose = solve(np.full_like(down, goal.x[0]), down)
-    return join(join(way, pose), goal) if (pose.valid & (pose.suspended < length)).all() else None
+    return join(join(way, pose), goal) if (pose.valid & (pose.suspended < holding.length)).all() else None
 
 
 def _head(nodes: Elastica) -> int:
@@ -171,16 +176,15 @@ def _head(nodes: Elastica) -> int:
 
 
 def smoothed(
-    solve: Solve,
+    solve: Manifold,
     nodes: Elastica,
-    length: float,
-    needed: Callable[[Elastica], FloatArray],
+    holding: Holding,
     cut: Callable[[FloatArray], FloatArray],
 ) -> Elastica:
     """Poses along a path through nodes, without their grid's corners; ends stay, and so does the lift.
 
     `cut` says at which places, indices with fractions, of poses of shape (n, 3) that are nearly those of the path.
-    Nothing that is `needed` of poses is made greater than at the nodes. Some may not be valid.
+    No more friction is needed than at the nodes. Some poses may not be valid.
     """
     from scipy.ndimage import gaussian_filter1d
 
@@ -191,20 +195,21 @@ def smoothed(
     count = 2 * max(2, int(travelled[-1] / spacing)) + 1
     even = np.linspace(0.0, travelled[-1], count)
     way = np.stack([np.interp(even, travelled, known[head:, i]) for i in range(3)], axis=1)
-    bound = 1.02 * needed(nodes).max()
+    bound, room = 1.02 * holding.ratio(nodes).max(), -0.1 * spacing
     for spread in (3.0, 1.5, 0.75, 0.4):
         sigma = min(2 * spread, count / 8)
         pad = min(count - 2, int(4 * sigma) + 1)
         padded = np.concatenate([2 * way[0] - way[pad:0:-1], way, 2 * way[-1] - way[-2 : -pad - 2 : -1]])
         smooth = gaussian_filter1d(padded, sigma, axis=0)[pad : pad + count]
         sheet = _along(solve, nodes, head, smooth, cut)
-        if (sheet.valid & (sheet.suspended < length)).all() and needed(sheet).max() <= bound:
+        good = sheet.valid & (sheet.suspended < holding.length) & holding.has_room(sheet, room)
+        if good.all() and holding.ratio(sheet).max() <= bound:
             return sheet
     return _along(solve, nodes, head, way, cut)
 
 
 def _along(
-    solve: Solve, nodes: Elastica, head: int, way: FloatArray, cut: Callable[[FloatArray], FloatArray]
+    solve: Manifold, nodes: Elastica, head: int, way: FloatArray, cut: Callable[[FloatArray], FloatArray]
 ) -> Elastica:
     """Poses without moment on a way that goes on after the first `head` nodes, which are of the lift."""
     from scipy.interpolate import CubicSpline
@@ -212,6 +217,6 @@ def _along(
     places = cut(np.concatenate([poses_of(nodes)[:head], way]))
     low, high = places[places < head], places[places >= head]
     lifted = np.interp(low, np.arange(head + 1), nodes.suspended[: head + 1])
-    lift_part = at_forces(np.stack([gentle(lifted), np.zeros_like(lifted), lifted], axis=1))
+    lift_part = at_forces(np.stack([gentle(lifted, solve.width), np.zeros_like(lifted), lifted], axis=1), solve.width)
     x, z = CubicSpline(np.arange(len(way)), way[:, :2])(high - head).T
     return join(lift_part, solve(x, z))

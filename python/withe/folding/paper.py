@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
 
 from withe.common import validation
 
 __all__ = ["Paper"]
+
+FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -16,17 +22,20 @@ class Paper:
     Parameters
     ----------
     length, width : float [m]
-        Along the fold's way, and across it.
+        Along the fold's way, and across it where it is widest.
     gravito_bending_length : float [m]
         Lgb = (EI / 2w)^(1/3), EI the bending stiffness and w the weight per length: `measure` finds it with a ruler.
     friction : float
         Coefficient between sheet and table.
     thickness : float [m]
+    outline : sequence of pairs of float
+        How wide it is where: shares of the length, from the lifted edge on, and shares of the width there, straight
+        between. By default it is as wide everywhere.
 
     Raises
     ------
     ValueError
-        A length that is not positive, or negative friction.
+        A length that is not positive, negative friction, an outline that does not go from 0 to 1 or is nowhere 1 wide.
 
     Examples
     --------
@@ -42,11 +51,23 @@ class Paper:
     gravito_bending_length: float
     friction: float = 0.12
     thickness: float = 1e-4
+    outline: Sequence[tuple[float, float]] = ((0.0, 1.0), (1.0, 1.0))
 
     def __post_init__(self) -> None:
         for name in ("length", "width", "gravito_bending_length", "thickness"):
             object.__setattr__(self, name, validation.positive(getattr(self, name), name))
         object.__setattr__(self, "friction", validation.non_negative(self.friction, "friction"))
+        object.__setattr__(self, "outline", _checked_outline(self.outline))
+
+    def width_at(self, place: npt.ArrayLike) -> FloatArray:
+        """How wide it is [m] at distances from the lifted edge [m]."""
+        shares, widths = np.array(self.outline).T
+        return np.asarray(self.width * np.interp(np.asarray(place, dtype=float) / self.length, shares, widths))
+
+    @property
+    def is_strip(self) -> bool:
+        """Whether it is as wide everywhere."""
+        return all(width == 1.0 for _, width in self.outline)
 
     @classmethod
     def a4(cls) -> Paper:
@@ -62,3 +83,31 @@ class Paper:
     def cardboard(cls) -> Paper:
         """Cardboard of the size of US Letter, Lgb 132 mm [Choi, dissertation, 7.8.3]."""
         return cls(0.2794, 0.2159, 0.132)
+
+    @classmethod
+    def origami(cls, side: float = 0.35) -> Paper:
+        """Square origami paper, Lgb 43 mm [Choi, dissertation, 7.8.3], to be folded over its diagonal.
+
+        It is held by a corner: its width grows from there to the middle, and falls again.
+
+        Parameters
+        ----------
+        side : float [m]
+            The dissertation does not say it; for its C = .30 m at least .213 m. Of smaller sheets little lies that
+            could hold them where they are.
+        """
+        diagonal = np.sqrt(2.0) * validation.positive(side, "side")
+        return cls(diagonal, diagonal, 0.043, outline=((0.0, 0.0), (0.5, 1.0), (1.0, 0.0)))
+
+
+def _checked_outline(outline: Sequence[tuple[float, float]]) -> tuple[tuple[float, float], ...]:
+    rows = validation.number_array(outline, "outline", ("places", 2))
+    shares, widths = rows.T
+    if len(rows) < 2 or shares[0] != 0.0 or shares[-1] != 1.0 or (np.diff(shares) <= 0.0).any():
+        raise ValueError(f"outline must have shares of the length that grow from 0 to 1, got {shares.tolist()}")
+    if (widths < 0.0).any() or widths.max() != 1.0 or (widths[1:-1] == 0.0).any():
+        raise ValueError(
+            "outline must have shares of the width of which the greatest is 1, and none is 0 between the ends, "
+            f"got {widths.tolist()}"
+        )
+    return tuple((float(share), float(width)) for share, width in rows)

@@ -12,12 +12,14 @@ from withe.scene.scene import Scene
 
 __all__ = ["add_paper", "strip_numbers"]
 
+FloatArray = npt.NDArray[np.float64]
+
 _DENSITY = 800.0  # of paper [kg/m^3]
 _GRAVITY = 9.81  # [m/s^2], by which Lgb is defined
 
 
 def strip_numbers(paper: Paper) -> tuple[float, float, float]:
-    """Mass per length, bending and stretching stiffness of a sheet, seen from its side [kg/m], [N m^2], [N].
+    """Mass per length, bending and stretching stiffness of a sheet where it is widest [kg/m], [N m^2], [N].
 
     It bends as Lgb says, EI = 2 w Lgb^3, w the weight per length, and stretches as a strip of a uniform material of its
     thickness h, EA = 12 EI / h^2.
@@ -27,20 +29,24 @@ def strip_numbers(paper: Paper) -> tuple[float, float, float]:
     return line_density, bend, 12.0 * bend / paper.thickness**2
 
 
-def add_paper(scene: Scene, paper: Paper, places: npt.NDArray[np.float64], curl: float) -> Rod:
+def add_paper(scene: Scene, paper: Paper, places: FloatArray, curl: float) -> Rod:
     """Add a flat sheet, seen from its side, with nodes at places along x, as rod "sheet".
 
     `curl` is its natural curvature [1/m], about -y.
     """
     line_density, bend, stretch = strip_numbers(paper)
-    stiffness = Stiffness(stretch=stretch, bend=(bend, bend), twist=bend)
+    width: float | FloatArray = 1.0
+    if not paper.is_strip:
+        width = paper.width_at(0.5 * (places[1:] + places[:-1])) / paper.width
+    bends = np.multiply.outer(width, (bend, bend))
+    stiffness = Stiffness(stretch=stretch * width, bend=bends, twist=bend * width)
     zero = np.zeros_like(places)
     return scene.add_rod(
         points=np.stack([places, zero, zero], axis=1),
         normal=(0.0, 1.0, 0.0),
         radius=0.5 * paper.thickness,
         stiffness=stiffness,
-        line_density=line_density,
+        line_density=line_density * width,
         natural_curvature=(0.0, curl),
         name="sheet",
     )

@@ -13,21 +13,20 @@ import numpy.typing as npt
 from withe.common import validation
 from withe.folding import free_moment, moment_free
 from withe.folding.free_moment import Holding, Way
-from withe.folding.grid import Solve
 from withe.folding.jaw import Jaw, inner_edge, outer_edge
-from withe.folding.manifold import elastica
+from withe.folding.manifold import Manifold
 from withe.folding.paper import Paper
-from withe.folding.plans import FLAT, SHORT, Plan
-from withe.folding.sheet_network import shipped
+from withe.folding.plans import SHORT, Plan, flat_forces
 from withe.folding.sheets import LONGEST, SHORTEST, Elastica, at_forces, at_poses, forces_of, join, poses_of, take
 from withe.folding.timing import evenly, travel_times
+from withe.folding.widths import Width, free_width
 
-__all__ = ["plan", "replan"]
+__all__ = ["plan", "plan_above", "replan"]
 
 FloatArray = npt.NDArray[np.float64]
 Method = Literal["intuitive", "local", "ucs", "slip"]
 Grasp = Literal["moment_free", "free"]
-Manifold = Literal["exact", "network"]
+Source = Literal["exact", "network"]
 _POSES = 251
 _POSES_OF_REST = 101
 
@@ -54,15 +53,20 @@ class _Task:
         return (self.paper.length - self.jaw.depth) / self.paper.gravito_bending_length
 
     @property
-    def solve(self) -> Solve:
+    def width(self) -> Width:
+        """Of what hangs freely."""
+        return free_width(self.paper, self.jaw.depth)
+
+    @property
+    def solve(self) -> Manifold:
         """How equilibria without moment are found."""
-        return elastica if self.manifold == "exact" else shipped()
+        return Manifold(self.width, learned=self.manifold == "network")
 
     @property
     def holding(self) -> Holding:
         lgb, jaw = self.paper.gravito_bending_length, self.jaw
         sizes = (jaw.depth / lgb, jaw.finger / lgb, self.paper.thickness / lgb)
-        return Holding(self.length, *sizes, self.curvature, self.uncertainty[0])
+        return Holding(self.length, *sizes, self.curvature, self.uncertainty[0], self.width)
 
     def outer(self, inner: FloatArray) -> FloatArray:
         """Outer edges (x, z [m], angle) from the jaw's inner edges [Lgb]."""
@@ -83,7 +87,7 @@ def plan(
     uncertainty: tuple[float, float] = (0.1, 0.5),
     curvature: float = 2.5,
     jaw: Jaw | None = None,
-    manifold: Manifold = "exact",
+    manifold: Source = "exact",
     speed: float = 0.05,
     acceleration: float = 0.2,
     turning: float = 1.0,
@@ -155,11 +159,16 @@ def plan(
         raise ValueError(
             f"manifold 'network' knows sheets without moment: method {method!r} with grasp {grasp!r} asks for others"
         )
+    if not paper.is_strip and (manifold == "network" or grasp == "free"):
+        what = "manifold 'network'" if manifold == "network" else "grasp 'free'"
+        raise ValueError(f"{what} is for sheets that are as wide everywhere: paper's outline is another")
     lgb_share, friction_share = validation.number_array(uncertainty, "uncertainty", (2,))
     if not (0 <= lgb_share <= 0.3 and 0 <= friction_share < 1):
         raise ValueError(f"uncertainty must be shares up to .3 of Lgb and below 1 of friction, got {uncertainty}")
     if jaw.depth > 0.2 * paper.length:
         raise ValueError(f"jaw must hold less than a fifth of the sheet, {paper.length:g} m long, got {jaw.depth:g} m")
+    if paper.width_at(jaw.depth) <= 0.0:
+        raise ValueError(f"jaw must hold a sheet whose edge is a corner by some of it, got {jaw.depth:g} m")
     task = _Task(
         paper=paper,
         target=_target(paper, target),
@@ -197,18 +206,17 @@ def _half_circle(task: _Task) -> Plan:
 
 
 def _over_manifold(task: _Task) -> Plan:
-    length = task.length
     goal = _checked_goal(_goal(task), task)
     if task.method == "ucs":
-        nodes = moment_free.uniform_cost(task.solve, length, goal)
+        nodes = moment_free.uniform_cost(task.solve, task.holding, goal)
     elif task.method == "slip":
-        nodes = moment_free.least_slide(task.solve, length, task.paper.friction, goal)
+        nodes = moment_free.least_slide(task.solve, task.holding, task.paper.friction, goal)
     else:
-        nodes = moment_free.greedy(task.solve, length, goal)
+        nodes = moment_free.greedy(task.solve, task.holding, goal)
     if nodes is None:
         ends = "the step of least force leads nowhere" if task.method == "local" else "those do not connect"
-        raise ValueError(f"no path to {task.target:g} m over poses that lift less than {length:.2f} Lgb: {ends}")
-    sheet = moment_free.smoothed(task.solve, nodes, length, task.holding.ratio, task.cut(_POSES))
+        raise ValueError(f"no path to {task.target:g} m over poses that lift less than {task.length:.2f} Lgb: {ends}")
+    sheet = moment_free.smoothed(task.solve, nodes, task.holding, task.cut(_POSES))
     if not sheet.valid.all():
         raise ValueError(f"no path to {task.target:g} m: between poses of the grid there are some without equilibrium")
     _warn_of_slide(float(task.holding.ratio(sheet).max()), task)
@@ -252,10 +260,23 @@ def replan(present: Plan, pose: npt.ArrayLike, slide: float) -> Plan:
     """
     x, _, z, _, qy, _, qw = validation.number_array(pose, "pose", (7,))
     slide = validation.number(slide, "slide")
-    task = _Task(
+    task = replace(_task_of(present), method="slip" if present.method == "slip" else "ucs")
+    lgb = task.paper.gravito_bending_length
+    angle = 2.0 * np.arctan2(qy, qw) % (2.0 * np.pi)
+    inner = inner_edge(np.array([[x - slide, z, angle]]), task.jaw.depth)[0] / [lgb, lgb, 1.0]
+    wanted, forces = _on_from(present, inner, task.width) if task.grasp == "free" else _anew_from(task, inner)
+    sheet = at_poses(wanted, forces, task.width)
+    if not sheet.valid.all():
+        raise ValueError(f"pose must be nearer to those of a plan: no sheet is held on the way from {x:g}, {z:g} m")
+    return _finished(task, task.outer(poses_of(sheet)), sheet, offset=slide)
+
+
+def _task_of(present: Plan) -> _Task:
+    """What a plan was asked for, from where the sheet lies."""
+    return _Task(
         paper=present.paper,
         target=present.target - present.offset,
-        method="slip" if present.method == "slip" else "ucs",
+        method=present.method,
         grasp=present.grasp,
         jaw=present.jaw,
         uncertainty=present.uncertainty,
@@ -265,14 +286,14 @@ def replan(present: Plan, pose: npt.ArrayLike, slide: float) -> Plan:
         turning=present.limits[1],
         acceleration=present.limits[2],
     )
-    lgb = task.paper.gravito_bending_length
-    angle = 2.0 * np.arctan2(qy, qw) % (2.0 * np.pi)
-    inner = inner_edge(np.array([[x - slide, z, angle]]), task.jaw.depth)[0] / [lgb, lgb, 1.0]
-    wanted, forces = _on_from(present, inner) if task.grasp == "free" else _anew_from(task, inner)
-    sheet = at_poses(wanted, forces)
-    if not sheet.valid.all():
-        raise ValueError(f"pose must be nearer to those of a plan: no sheet is held on the way from {x:g}, {z:g} m")
-    return _finished(task, task.outer(poses_of(sheet)), sheet, offset=slide)
+
+
+def plan_above(present: Plan, height: float) -> Plan:
+    """Plan as far as over the target: what a plan with a free moment was asked for, but for its last part.
+
+    Where the edge would have to be pressed down, it is the last part that asks for friction. `height` in m.
+    """
+    return _free(_task_of(present), height / present.paper.gravito_bending_length)
 
 
 def _anew_from(task: _Task, inner: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -285,31 +306,31 @@ def _anew_from(task: _Task, inner: FloatArray) -> tuple[FloatArray, FloatArray]:
         )
     goal = _checked_goal(_goal(task), task)
     if task.method == "slip":
-        nodes = moment_free.least_slide(task.solve, task.length, task.paper.friction, goal, start)
+        nodes = moment_free.least_slide(task.solve, task.holding, task.paper.friction, goal, start)
     else:
-        nodes = moment_free.uniform_cost(task.solve, task.length, goal, start)
+        nodes = moment_free.uniform_cost(task.solve, task.holding, goal, start)
     if nodes is None:
         raise ValueError(f"no path from there to {task.target:g} m over poses without moment")
-    sheet = moment_free.smoothed(task.solve, nodes, task.length, task.holding.ratio, task.cut(_POSES_OF_REST))
+    sheet = moment_free.smoothed(task.solve, nodes, task.holding, task.cut(_POSES_OF_REST))
     wanted = poses_of(sheet)
     wanted[:, 2] += np.linspace(1.0, 0.0, len(wanted)) * (inner[2] - start.angle[0])
     return wanted, forces_of(sheet)
 
 
-def _on_from(present: Plan, inner: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _on_from(present: Plan, inner: FloatArray, width: Width) -> tuple[FloatArray, FloatArray]:
     """The same, for a jaw that takes a moment, by going over to the present plan."""
     known = present.sheet
     away = np.abs(poses_of(known) - inner).max(axis=1)
     begin = int(np.argmin(np.where(known.suspended > SHORT, away, np.inf)))
     forces = forces_of(known)[begin:]
-    start = at_poses([inner], forces[:1])
+    start = at_poses([inner], forces[:1], width)
     if not start.valid[0]:
         raise ValueError(f"pose must be near those of the plan: the nearest is off by {away[begin]:.2f} Lgb or rad")
     index = np.linspace(0.0, len(forces) - 1.0, _POSES_OF_REST)
     way = np.stack([np.interp(index, np.arange(len(forces)), forces[:, i]) for i in range(3)], axis=1)
     left = np.clip(1.0 - 3.0 * np.linspace(0.0, 1.0, _POSES_OF_REST), 0.0, None)
     way += np.outer(left, forces_of(start)[0] - forces[0])
-    sheet = at_forces(way)
+    sheet = at_forces(way, width)
     return poses_of(sheet), forces_of(sheet)
 
 
@@ -345,8 +366,11 @@ def _warn_of_slide(ratio: float, task: _Task) -> None:
         )
 
 
-def _free(task: _Task) -> Plan:
-    """Without the table's friction where that can be, then with some, then for a sheet that is just as thought."""
+def _free(task: _Task, rise: float = 0.0) -> Plan:
+    """Without the table's friction where that can be, then with some, then for a sheet that is just as thought.
+
+    To where the edge is down, or so high above that [Lgb].
+    """
     limit = task.paper.friction * (1 - task.uncertainty[1])
     exact = replace(task.holding, share=0.0)
     best: tuple[Way, Holding] | None = None
@@ -357,7 +381,8 @@ def _free(task: _Task) -> Plan:
         (exact, True, np.inf),
     ):
         lattice = free_moment.make_lattice(holding, pulls, most)
-        found = free_moment.goals(lattice, holding, task.target / task.paper.gravito_bending_length)
+        raised = replace(holding, thickness=holding.thickness + rise)
+        found = free_moment.goals(lattice, raised, task.target / task.paper.gravito_bending_length)
         found = take(found, holding.bearable(found))
         way = free_moment.way_to(lattice, holding, found, holding.worst_ratio(found), limit) if len(found.x) else None
         if way is not None and (best is None or holding.share == 0 or way.ratio < best[0].ratio):
@@ -367,12 +392,15 @@ def _free(task: _Task) -> Plan:
             break
     if best is None:
         raise ValueError(_blocked(task))
-    way, holding = best
+    return _along(task, *best, limit)
+
+
+def _along(task: _Task, way: Way, holding: Holding, limit: float) -> Plan:
     places = free_moment.smoothed(way, holding, limit)
     sheet = at_forces(free_moment.forces_at(places))
     index = task.cut(_POSES - 1)(poses_of(sheet))
     even = np.stack([np.interp(index, np.arange(len(places)), places[:, i]) for i in range(3)], axis=1)
-    sheet = join(at_forces([FLAT]), at_forces(free_moment.forces_at(even)))
+    sheet = join(at_forces([flat_forces(task.width)]), at_forces(free_moment.forces_at(even)))
     _warn_of_slide(float(task.holding.ratio(sheet).max()), task)
     return _finished(task, task.outer(poses_of(sheet)), sheet)
 

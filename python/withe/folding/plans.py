@@ -18,16 +18,22 @@ from withe.folding.figures import draw_fold, side_view
 from withe.folding.jaw import Jaw, inner_edge
 from withe.folding.paper import Paper
 from withe.folding.sheets import Elastica, at_forces, drag, forces_of, join, take
+from withe.folding.widths import Width, free_width
 from withe.io import pose_path, save_poses, written_beside
 
-__all__ = ["FLAT", "SHORT", "Plan"]
+__all__ = ["SHORT", "Plan", "flat_forces"]
 
 FloatArray = npt.NDArray[np.float64]
-FLAT = (0.05, 0.0, 0.1)  # forces of a sheet of which next to nothing is lifted [w Lgb], [Lgb]
 SHORT = 0.5  # the same of a sheet that a plan knows: poses say little of so short a part [Lgb]
 _GRAVITY = 9.81  # [m/s^2]
 _COAST = 5e-3  # [m]
 _LOW = 1e-5  # an edge less high than this lies on the table [Lgb]
+_LEAST = 0.1  # lifted, of a sheet that is flat [Lgb]
+
+
+def flat_forces(width: Width) -> tuple[float, float, float]:
+    """Forces of a sheet of which next to nothing is lifted [w Lgb], [Lgb]: half of its weight lies on the table."""
+    return 0.5 * float(width.weight(_LEAST)), 0.0, _LEAST
 
 
 @dataclass(frozen=True)
@@ -100,6 +106,11 @@ class Plan:
         return (self.paper.length - self.jaw.depth) / self.paper.gravito_bending_length
 
     @cached_property
+    def _width(self) -> Width:
+        """Of what hangs freely."""
+        return free_width(self.paper, self.jaw.depth)
+
+    @cached_property
     def _motion(self) -> tuple[Elastica, FloatArray]:
         """From where the sheet first hangs freely; what is lifted less than that is lifted without force."""
         if self._foreseen is not None:
@@ -107,8 +118,9 @@ class Plan:
             forces, ahead = forces_of(self._foreseen)[begin], take(self._foreseen, slice(0, begin))
         else:
             begin = int(np.argmax(self._inner[:, 1] > _LOW))
-            forces, ahead = np.array(FLAT), at_forces([FLAT] * begin)
-        sheet, slide = drag(self._inner[begin:], forces, self.paper.friction, self._length)
+            flat = flat_forces(self._width)
+            forces, ahead = np.array(flat), at_forces([flat] * begin, self._width)
+        sheet, slide = drag(self._inner[begin:], forces, self.paper.friction, self._length, self._width)
         sheet, slide = join(ahead, sheet), np.concatenate([np.zeros(begin), slide])
         speed = np.abs(np.diff(slide)) * self.paper.gravito_bending_length / np.diff(self.times)
         coasts = speed**2 > 2.0 * self.paper.friction * _GRAVITY * _COAST
@@ -137,12 +149,13 @@ class Plan:
     def slip_ratio(self) -> FloatArray:
         """Friction coefficient below which the sheet slides at a pose, of shape (n,).
 
-        Size of the tangential force over the normal force under all that lies, |H| / (R + L - lifted). Where the method
-        does not keep the sheet from sliding ("intuitive") it is that of the predicted motion, friction at most; NaN
-        from where that has no equilibrium within reach.
+        Size of the tangential force over the normal force under all that lies, |H| / (R + weight of what lies). Where
+        the method does not keep the sheet from sliding ("intuitive") it is that of the predicted motion, friction at
+        most; NaN from where that has no equilibrium within reach.
         """
         sheet = self.sheet
-        return np.asarray(np.abs(sheet.tangential_force) / (sheet.normal_force + self._length - sheet.suspended))
+        lying = self._width.lying(sheet.suspended, self._length)
+        return np.asarray(np.abs(sheet.tangential_force) / (sheet.normal_force + lying))
 
     @cached_property
     def slide(self) -> FloatArray:
@@ -202,7 +215,10 @@ class Plan:
         index = np.unique(np.linspace(0, len(self) - 1, validation.integer(poses, "poses", 1, 1000)).astype(int))
         index = index[sheet.valid[index]]
         outer = self.poses[:, [0, 2]]
-        views = [side_view(forces, self._length) * lgb + [self.jaw.depth, 0.0] for forces in forces_of(sheet)[index]]
+        views = [
+            side_view(forces, self._length, self._width) * lgb + [self.jaw.depth, 0.0]
+            for forces in forces_of(sheet)[index]
+        ]
         draw_fold(axes, views, outer[index], outer, (-0.05 * self.paper.length, 1.05 * self.paper.length))
         return axes
 

@@ -1,9 +1,9 @@
-"""The last part of a fold whose edge would have to be pressed down: quickly, and found by trying it on a simulation."""
+"""The last part of a fold whose edge would have to be pressed down: quickly, and found by trying it on simulations."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
 
@@ -12,33 +12,78 @@ import numpy.typing as npt
 
 from withe.common import validation
 from withe.common.progress import progress as progress_bar
+from withe.folding.paper import Paper
+from withe.folding.planning import plan_above
 from withe.folding.plans import Plan
 from withe.folding.sheets import at_forces, forces_of
-from withe.folding.simulated_sheet import Fold, SimulatedSheet
+from withe.folding.simulated_sheet import Fold, Held, SimulatedSheet
+from withe.folding.widths import free_width
 
 __all__ = ["plunge"]
 
 FloatArray = npt.NDArray[np.float64]
-_HEIGHTS = (1.0, 0.6)  # from which it goes down [Lgb]
-_DURATIONS = (0.1, 0.05)  # [s]
+_HEIGHTS = (0.6, 0.8, 1.0)  # over the target, from which it goes down [Lgb]
+_SHORT = 0.2  # of the target, of a second try [Lgb]: a sheet that slides back must still lie under its edge
 _CORRECTIONS = 4
 _ENOUGH = 2e-4  # [m]
 _HOLDING = 0.3  # in the end [s]
 
 
-def plunge(plan: Plan, *, press: float = 5e-4, sheet: Mapping[str, Any] | None = None, progress: bool = True) -> Plan:
+@dataclass(frozen=True)
+class _Part:
+    """Of a plan's poses."""
+
+    times: FloatArray
+    poses: FloatArray
+
+
+class _Tried:
+    """One sheet that a paper may be: led slowly to where plunges begin, once, and from there by every one of them."""
+
+    def __init__(self, slow: Plan, sheet: SimulatedSheet) -> None:
+        self._sheet, self._target = sheet, slow.target
+        self._held: Held | None = None
+
+        def motions() -> Iterator[Plan]:
+            yield slow
+            self._held = sheet.hold()
+
+        sheet.carry_out(motions(), slow.target, duration=float(slow.times[-1]), progress=False)
+
+    def fold(self, way: _Part) -> Fold | None:
+        """None where the sheet has snapped before."""
+        return None if self._held is None else self._sheet.carry_on(self._held, [way], self._target)
+
+
+def plunge(
+    plan: Plan,
+    *,
+    press: float = 2e-3,
+    duration: float = 0.05,
+    within: float = 5e-3,
+    sheet: Mapping[str, Any] | None = None,
+    progress: bool = True,
+) -> Plan:
     """End a plan quickly, and with the edge pressed onto the sheet that it comes down on.
 
     Where more friction is needed in the end than there is, the edge is drawn back or pushed on as it comes down slowly.
-    It is led down within .05 or .1 s instead, before the sheet can follow, and `press` lower than it can go: the jaw
+    It is led down within `duration` instead, before the sheet can follow, and `press` lower than it can go: the jaw
     yields, and presses both layers on the table with that times its stiffness, up to its force limit, so that they
-    stay. From where, how fast, and how much to the side it goes is tried on a `SimulatedSheet` of the plan's paper
-    without noise: of four ways that on which the sheet slides least, corrected by where the edge comes down.
+    stay. It goes down from over the target: from the least height to which the sheet is led without slide, whatever of
+    the plan's `uncertainty` it is, or from where least friction is needed. A plan with a free moment is made anew up to
+    there, others are cut off. How much to the side it goes, and whether the edge ends level or as the plan has it, is
+    tried on simulated sheets without noise: that of the plan's paper, and those at the bounds of the uncertainty, Lgb
+    more and less, with its friction and with the least. It is the way on which their creases differ least, aimed so
+    that the worst of them is best.
 
     Parameters
     ----------
     plan : Plan
     press : float [m]
+    duration : float [s]
+        Of the way down. The stiffer the sheet the sooner it follows, and the quicker the jaw must be.
+    within : float [m]
+        How far off the crease may be on the worst of these sheets.
     sheet : mapping, optional
         Options of `SimulatedSheet`.
     progress : bool
@@ -52,8 +97,8 @@ def plunge(plan: Plan, *, press: float = 5e-4, sheet: Mapping[str, Any] | None =
     Raises
     ------
     ValueError
-        Not a plan, or one that is not over its target in the end; a press that is not positive; no way on which the
-        simulated sheet is folded.
+        Not a plan, or one that is not over its target in the end; numbers that are not positive; no way on which all of
+        the simulated sheets are folded within bounds, with the friction that the slow way needs.
 
     Examples
     --------
@@ -65,49 +110,109 @@ def plunge(plan: Plan, *, press: float = 5e-4, sheet: Mapping[str, Any] | None =
     if not isinstance(plan, Plan):
         raise ValueError(f"plan must be a Plan, got {plan!r:.80}")
     press = validation.positive(press, "press")
-    ways = list(product(_HEIGHTS, _DURATIONS))
-    with progress_bar(len(ways) + _CORRECTIONS, "plunging", progress) as bar:
-
-        def tried(height: float, duration: float, aside: float) -> tuple[Plan, Fold]:
-            way = _plunging(plan, height, duration, aside, press)
-            done = SimulatedSheet(plan.paper, jaw=plan.jaw, **(sheet or {})).fold(way, progress=False)
+    duration, bound = validation.positive(duration, "duration"), validation.positive(within, "within")
+    slow = _above(plan)
+    papers = _papers(plan)
+    ways = list(product((np.pi, float(plan.angles[-1])), (0.0, -_SHORT * plan.paper.gravito_bending_length)))
+    with progress_bar(len(papers) * (1 + len(ways) + _CORRECTIONS), "plunging", progress) as bar:
+        tried = []
+        for paper in papers:
+            tried.append(_Tried(slow, SimulatedSheet(paper, jaw=plan.jaw, **(sheet or {}))))
             bar.advance(1)
-            return way, done
 
-        first = [(way, tried(*way, 0.0)) for way in ways]
-        folded = [(way, found) for way, found in first if found[1].failure is None]
-        if not folded:
-            reasons = ", ".join(dict.fromkeys(str(found[1].failure) for _, found in first))
-            raise ValueError(f"plan must end where an edge can be pressed down: no plunge folds the sheet ({reasons})")
-        (height, duration), best = min(folded, key=lambda each: abs(each[1][1].slide))
-        aside, last = 0.0, best
-        for _ in range(_CORRECTIONS):
-            if abs(best[1].error) < _ENOUGH or last[1].failure is not None:
+        def creases(angle: float, aside: float) -> tuple[float, float]:
+            """Middle of the errors of all, and how far the worst is from it."""
+            way = _down(slow, angle, aside, press, duration)
+            found = [each.fold(way) for each in tried]
+            bar.advance(len(tried))
+            if any(fold is None or fold.failure is not None for fold in found):
+                return 0.0, np.inf
+            errors = [fold.error for fold in found if fold is not None]
+            return 0.5 * (max(errors) + min(errors)), 0.5 * (max(errors) - min(errors))
+
+        first = {way: creases(*way) for way in ways}
+        (angle, aside), (middle, spread) = min(first.items(), key=lambda each: each[1][1])
+        best = abs(middle) + spread, aside
+        share = 1.0
+        for _ in range(_CORRECTIONS if np.isfinite(spread) else 0):
+            if abs(middle) < _ENOUGH:
                 break
-            aside -= 2.0 * last[1].error
-            last = tried(height, duration, aside)
-            if last[1].failure is None and abs(last[1].error) < abs(best[1].error):
-                best = last
-    return best[0]
+            aimed = aside - 2.0 * share * middle
+            found = creases(angle, aimed)
+            if not np.isfinite(found[1]):  # too far: an edge may miss the sheet
+                share *= 0.5
+                continue
+            aside, (middle, spread) = aimed, found
+            best = min(best, (abs(middle) + spread, aside))
+    if best[0] > bound:
+        raise ValueError(_missed(plan, best[0], bound))
+    return _ended(slow, _down(slow, angle, best[1], press, duration))
 
 
-def _plunging(plan: Plan, height: float, duration: float, aside: float, press: float) -> Plan:
-    """The plan down to a height [Lgb], then straight to its end, `aside` further in x, and `press` too low."""
-    z = plan.poses[:, 2]
-    over = (plan.angles > 0.5 * np.pi) & (z < height * plan.paper.gravito_bending_length)
-    if not over.any():
+def _papers(plan: Plan) -> list[Paper]:
+    """What the paper may be: as it is thought to be, and the bounds."""
+    paper, (lgb, friction) = plan.paper, plan.uncertainty
+    shares = {(1.0, 1.0), *product((1.0 - lgb, 1.0 + lgb), (1.0, 1.0 - friction))}
+    return [
+        replace(
+            paper, gravito_bending_length=of_lgb * paper.gravito_bending_length, friction=of_friction * paper.friction
+        )
+        for of_lgb, of_friction in sorted(shares)
+    ]
+
+
+def _above(plan: Plan) -> Plan:
+    """The slow way to over the target."""
+    lgb, limit = plan.paper.gravito_bending_length, plan.paper.friction * (1.0 - plan.uncertainty[1])
+    best: tuple[float, Plan] | None = None
+    for height in _HEIGHTS:
+        slow = plan_above(plan, height * lgb) if plan.grasp == "free" else _cut(plan, height * lgb)
+        needed = float(np.nanmax(slow.slip_ratio))
+        if best is None or needed < best[0]:
+            best = needed, slow
+        if needed <= limit:
+            break
+    assert best is not None
+    return best[1]
+
+
+def _cut(plan: Plan, height: float) -> Plan:
+    """Up to where a plan is last so high."""
+    low = (plan.angles > 0.5 * np.pi) & (plan.poses[:, 2] < height)
+    if not low.any():
         raise ValueError("plan must come down in the end: its edge is never low and turned over")
-    keep = max(2, int(np.argmax(over)))
-    x_end, z_end, angle = plan.target + aside, plan.paper.thickness - press, plan.angles[-1]
-    end = np.array([x_end, 0.0, z_end, 0.0, np.sin(0.5 * angle), 0.0, np.cos(0.5 * angle)])
-    start = plan.times[keep - 1]
-    times = [*plan.times[:keep], start + duration, start + duration + _HOLDING]
-    known = forces_of(plan.sheet)[:keep]
-    foreseen = at_forces(np.vstack([known, np.full((2, 3), np.nan)]))
+    keep = slice(0, max(2, int(np.argmax(low))))
+    foreseen = at_forces(forces_of(plan.sheet)[keep], free_width(plan.paper, plan.jaw.depth))
+    return replace(plan, poses=plan.poses[keep], angles=plan.angles[keep], times=plan.times[keep], _foreseen=foreseen)
+
+
+def _down(slow: Plan, angle: float, aside: float, press: float, duration: float) -> _Part:
+    """From its last pose straight down to the target, `aside` further in x and `press` too low, and pressed there."""
+    end = [slow.target + aside, 0.0, slow.paper.thickness - press, 0.0, np.sin(0.5 * angle), 0.0, np.cos(0.5 * angle)]
+    times = slow.times[-1] + np.array([0.0, duration, duration + _HOLDING])
+    return _Part(times, np.vstack([slow.poses[-1], end, end]))
+
+
+def _ended(slow: Plan, way: _Part) -> Plan:
+    """A plan with a way down."""
+    added = len(way.times) - 1
+    angle = 2.0 * np.arctan2(way.poses[-1, 4], way.poses[-1, 6])
+    forces = np.vstack([forces_of(slow.sheet), np.full((added, 3), np.nan)])
     return replace(
-        plan,
-        poses=np.vstack([plan.poses[:keep], end, end]),
-        angles=np.concatenate([plan.angles[:keep], [angle, angle]]),
-        times=np.array(times),
-        _foreseen=foreseen,
+        slow,
+        poses=np.vstack([slow.poses, way.poses[1:]]),
+        angles=np.concatenate([slow.angles, np.full(added, angle)]),
+        times=np.concatenate([slow.times, way.times[1:]]),
+        _foreseen=at_forces(forces, free_width(slow.paper, slow.jaw.depth)),
+    )
+
+
+def _missed(plan: Plan, worst: float, bound: float) -> str:
+    lgb, friction = (100.0 * share for share in plan.uncertainty)
+    sheets = f"all sheets with Lgb off by up to {lgb:g} % and friction less by up to {friction:g} %"
+    how = f"the best is off by {1e3 * worst:.1f} mm on one of them" if np.isfinite(worst) else "on each way one snaps"
+    needed = float(np.nanmax(plan.slip_ratio))
+    return (
+        f"no plunge folds {sheets} within {1e3 * bound:g} mm: {how}; led down slowly, it would need friction "
+        f"{needed:.3f}, and the paper has {plan.paper.friction:g}"
     )

@@ -30,15 +30,15 @@ _TURN = np.radians(20.0)  # of an edge, at most
 
 @dataclass(frozen=True)
 class SeenEdge:
-    """The far edge of a sheet, as a camera sees it.
+    """The far edge of a sheet, as a camera sees it; of one that ends in a corner, that.
 
     Attributes
     ----------
     x : float [m]
         Of its middle.
     angle : float [rad]
-        By which it is turned on the table, from y towards -x.
-    corners : ndarray of shape (2, 2) [m]
+        By which it is turned on the table, from y towards -x; NaN of a corner.
+    corners : ndarray of shape (2, 2), or (1, 2) [m]
         x and y; that of less y first.
     """
 
@@ -87,7 +87,8 @@ def find_edge(
     """Find the far edge of a sheet that lies on the table.
 
     The sheet is told from the table by colour, and its corners are those of Shi and Tomasi, refined [dissertation,
-    7.6.2]. Of all pairs of corners that are as far from each other as the sheet is wide it is the farthest.
+    7.6.2]. Of all pairs of corners that are as far from each other as the sheet is wide there it is the farthest; of a
+    sheet that ends in a corner, the farthest corner.
 
     Parameters
     ----------
@@ -130,19 +131,34 @@ def find_edge(
     found = cv2.goodFeaturesToTrack(soft, _CORNERS, _QUALITY, _APART, mask=near, blockSize=_BLOCK)
     corners = np.empty((0, 2)) if found is None else _refined(cv2, grey, found)
     places = camera.to_plane(corners)[:, :2] if len(corners) else corners
+    wide = float(paper.width_at(paper.length))
+    best = _farthest_edge(places, wide) if wide > 0.0 else _farthest_corner(places)
+    if best is None and wide == 0.0:
+        raise ValueError("image must show the sheet's far corner, got no corner")
+    if best is None:
+        raise ValueError(
+            f"image must show the corners of the sheet's far edge, {wide:g} m apart, got {len(places)} corners "
+            "and no two that are so"
+        )
+    return best
+
+
+def _farthest_corner(places: FloatArray) -> SeenEdge | None:
+    if not len(places):
+        return None
+    far = places[np.argmax(places[:, 0])]
+    return SeenEdge(float(far[0]), float("nan"), far[None])
+
+
+def _farthest_edge(places: FloatArray, width: float) -> SeenEdge | None:
     best: SeenEdge | None = None
     for i, j in combinations(range(len(places)), 2):
         pair = places[[i, j]] if places[i, 1] < places[j, 1] else places[[j, i]]
         along = pair[1] - pair[0]
         angle = float(np.arctan2(-along[0], along[1]))
-        fits = abs(np.hypot(*along) / paper.width - 1.0) < _OFF and abs(angle) < _TURN
+        fits = abs(np.hypot(*along) / width - 1.0) < _OFF and abs(angle) < _TURN
         if fits and (best is None or pair[:, 0].mean() > best.x):
             best = SeenEdge(float(pair[:, 0].mean()), angle, pair)
-    if best is None:
-        raise ValueError(
-            f"image must show the corners of the sheet's far edge, {paper.width:g} m apart, got {len(places)} corners "
-            "and no two that are so"
-        )
     return best
 
 

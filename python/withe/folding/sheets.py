@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe import _core
+from withe.folding.widths import EVEN, Width
 
 __all__ = [
     "LONGEST",
@@ -50,6 +51,7 @@ class Elastica:
     suspended : ndarray [Lgb]
         Length that is lifted.
     normal_force, tangential_force : ndarray [w Lgb]
+        w is the sheet's weight per length, that at width 1 of one that is not as wide everywhere.
         Of the table on the sheet at the lift-off point: upwards, and in the direction in which the sheet leaves
         (positive where the sheet is pushed together, negative where it is pulled taut).
     force_ratio : ndarray
@@ -129,44 +131,48 @@ def poses_of(sheet: Elastica) -> FloatArray:
     return np.stack([sheet.x, sheet.z, sheet.angle], axis=-1)
 
 
-def at_forces(forces: npt.ArrayLike, *, keep: bool = False) -> Elastica:
+def at_forces(forces: npt.ArrayLike, width: Width = EVEN, *, keep: bool = False) -> Elastica:
     """Equilibria by the numbers of `forces_of`: an initial value problem, with whatever moment at the tip.
 
     `keep`: numbers of what is not valid too, for searches that pass through such.
     """
     forces = np.asarray(forces, dtype=float)
-    rows = shared(lambda share: _core.sheets_at_forces(share, 0.0), forces.reshape(-1, 3))
+    rows = shared(lambda share: _core.sheets_at_forces(share, width.engine), forces.reshape(-1, 3))
     return described(rows, forces.shape[:-1], keep=keep)
 
 
-def at_poses(poses: npt.ArrayLike, forces: npt.ArrayLike) -> Elastica:
+def at_poses(poses: npt.ArrayLike, forces: npt.ArrayLike, width: Width = EVEN) -> Elastica:
     """Equilibria of sheets held at poses (x, z, angle), each followed without a jump from one of known forces."""
     poses, forces = np.broadcast_arrays(np.asarray(poses, dtype=float), np.asarray(forces, dtype=float))
     rows = shared(
-        lambda share, known: _core.sheets_at_poses(share, known, 0.0), poses.reshape(-1, 3), forces.reshape(-1, 3)
+        lambda share, known: _core.sheets_at_poses(share, known, width.engine),
+        poses.reshape(-1, 3),
+        forces.reshape(-1, 3),
     )
     return described(rows, poses.shape[:-1])
 
 
-def drag(poses: npt.ArrayLike, forces: npt.ArrayLike, friction: float, length: float) -> tuple[Elastica, FloatArray]:
+def drag(
+    poses: npt.ArrayLike, forces: npt.ArrayLike, friction: float, length: float, width: Width = EVEN
+) -> tuple[Elastica, FloatArray]:
     """Move the tip of a sheet from pose to pose, slowly; what lies slides as a rigid body by Coulomb's law.
 
     Returns the equilibria, not valid from where none is reached without a jump, and how far the sheet has slid
     towards its far edge [Lgb].
     """
     rows, slides = _core.dragged_sheet(
-        np.asarray(poses, dtype=float), np.asarray(forces, dtype=float), friction, length, 0.0
+        np.asarray(poses, dtype=float), np.asarray(forces, dtype=float), friction, length, width.engine
     )
     return described(rows, (len(rows),)), slides
 
 
-def slides_to_rest(sheet: Elastica, friction: float, length: float) -> FloatArray:
+def slides_to_rest(sheet: Elastica, friction: float, length: float, width: Width = EVEN) -> FloatArray:
     """How far sheets slide while their jaws stand still, until friction holds them [Lgb]; infinite for those that snap.
 
     What lies, of sheets `length` long, slides as a rigid body by Coulomb's law. `sheet`: of shape (n,).
     """
 
     def solve(forces: FloatArray) -> FloatArray:
-        return _core.slides_to_rest(forces, friction, length, 0.0)
+        return _core.slides_to_rest(forces, friction, length, width.engine)
 
     return np.nan_to_num(np.abs(shared(solve, forces_of(sheet))), nan=np.inf)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from copy import copy
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -21,10 +22,12 @@ from withe.perception.camera import Camera
 from withe.recording.record import Record
 from withe.scene.scene import Scene
 from withe.simulation.simulation import Simulation
+from withe.simulation.snapshots import Snapshot
 
-__all__ = ["Fold", "FoldingMotion", "SimulatedSheet", "node_places"]
+__all__ = ["Fold", "FoldingMotion", "Held", "SimulatedSheet", "node_places"]
 
 FloatArray = npt.NDArray[np.float64]
+_STRIP = ((0.0, 1.0), (1.0, 1.0))
 _LONGEST = 600.0  # [s] that a progress bar expects of motions that it does not know
 
 
@@ -70,6 +73,14 @@ class Fold:
     failure: str | None
     record: Record
     seen_slides: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class Held:
+    """A sheet and its jaw on the way, to go on from."""
+
+    state: Snapshot
+    jaw: JawMotion
 
 
 class SimulatedSheet:
@@ -142,8 +153,10 @@ class SimulatedSheet:
             gravito_bending_length=paper.gravito_bending_length * self._drawn.gravito_bending_length,
             friction=paper.friction * self._drawn.friction,
         )
+        places = node_places(paper.length, self.jaw.depth, edges)
+        self._widths = paper.width_at(places)
         scene = Scene(gravity=9.81 * np.array([np.sin(self._drawn.tilt), 0.0, -np.cos(self._drawn.tilt)]))
-        self.rod = add_paper(scene, self.truth, node_places(paper.length, self.jaw.depth, edges), self._drawn.curl)
+        self.rod = add_paper(scene, self.truth, places, self._drawn.curl)
         # Surfaces press on each other from a twentieth of the thickness on; a jaw at the sheet's height does not.
         scene.add_floor(-0.55 * paper.thickness, friction=self._friction(), restitution=0.0, name="table")
         scene.enable_contact(friction=validation.non_negative(own_friction, "own_friction"), restitution=0.0)
@@ -156,6 +169,7 @@ class SimulatedSheet:
             name="jaw",
         )
         self.simulation: Simulation = scene.build(integrator="backward_euler", time_step=time_step, planar=True)
+        self._flat = self.simulation.hand("jaw").pose.rotation
 
     def _friction(self) -> float | Callable[[FloatArray], FloatArray]:
         """Of the table: one number where it is the same everywhere, for that costs nothing."""
@@ -187,10 +201,10 @@ class SimulatedSheet:
         ImportError
             OpenCV is not installed.
         """
-        return table_picture(self.positions(), self.paper.width, camera, size, self._grain)
+        return table_picture(self.positions(), self._widths, camera, size, self._grain)
 
     def strip_picture(self, length: float | None = None, scale: float = 4000.0) -> npt.NDArray[np.uint8]:
-        """Take a picture of a strip of the sheet that is clamped level and hangs, from the side, for `measure`.
+        """Take a picture from the side, for `measure`, of a strip of such a sheet that is clamped level and hangs.
 
         Parameters
         ----------
@@ -212,7 +226,8 @@ class SimulatedSheet:
         """
         length = 2.2 * self.paper.gravito_bending_length if length is None else validation.positive(length, "length")
         scale = validation.positive(scale, "scale")
-        return strip_picture(self.truth, self._drawn.curl, length, scale, self._grain)
+        strip = replace(self.truth, outline=_STRIP)
+        return strip_picture(strip, self._drawn.curl, length, scale, self._grain)
 
     def fold(self, plan: FoldingMotion, *, progress: bool = True) -> Fold:
         """Carry out a plan, from the flat sheet.
@@ -270,9 +285,21 @@ class SimulatedSheet:
         """
         self.simulation.reset()
         self._grain = np.random.default_rng(self._seed)
-        jaw = JawMotion(motions, self._drawn)
-        lead(self.simulation.hand("jaw"), jaw, self.jaw.depth)
-        return self._result(target, carried(self.simulation, jaw, [self.rod], duration, progress))
+        return self._carried(JawMotion(motions, self._drawn), target, duration, progress)
+
+    def hold(self) -> Held:
+        """What is now, between two motions: one that is asked for may `hold`, to `carry_on` from there otherwise."""
+        return Held(self.simulation.snapshot(), copy(self._motion))
+
+    def carry_on(self, held: Held, motions: Iterable[Motion], target: float) -> Fold:
+        """Carry out other motions from where a sheet was held, as `carry_out` those from the flat sheet."""
+        self.simulation.restore(held.state)
+        return self._carried(held.jaw.on_from_here(motions), target, _LONGEST, False)
+
+    def _carried(self, motion: JawMotion, target: float, duration: float, progress: bool) -> Fold:
+        self._motion = motion
+        lead(self.simulation.hand("jaw"), self._flat, motion, self.jaw.depth)
+        return self._result(target, carried(self.simulation, motion, [self.rod], duration, progress))
 
     def _result(self, target: float, watch: Watch) -> Fold:
         positions = self.positions()

@@ -44,14 +44,16 @@ class Trial:
         Of how the sheet differs from the paper.
     noise : Noise
         How much.
-    plunges : bool
-        Whether the plan ends in a `plunge`, tried on a sheet that is as the planner thinks.
+    plunges : mapping, optional
+        Options of a `plunge` in which the plan ends, tried on sheets as the planner thinks that they may be.
     replans : int
         How often the sheet is looked at on the way; 0, the loop is open.
     planner : mapping
         Options of `plan`.
     sheet : mapping
         Options of `SimulatedSheet`.
+    believed : Paper, optional
+        What the planner takes the paper for, but for its Lgb; by default it knows it.
     name : str
         For whoever asks, to know it again.
 
@@ -68,10 +70,11 @@ class Trial:
     target: float | Literal["half"] = "half"
     seed: int = 0
     noise: Noise = field(default_factory=Noise)
-    plunges: bool = False
+    plunges: Mapping[str, Any] | None = None
     replans: int = 0
     planner: Mapping[str, Any] = field(default_factory=dict)
     sheet: Mapping[str, Any] = field(default_factory=dict)
+    believed: Paper | None = None
     name: str = ""
 
 
@@ -195,9 +198,10 @@ def _carried_out(trial: Trial) -> Outcome:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # of slide that is predicted: it is measured here
-            planned = plan(replace(trial.paper, gravito_bending_length=measured), trial.target, **trial.planner)
-            if trial.plunges:
-                planned = plunge(planned, sheet=trial.sheet, progress=False)
+            paper = replace(trial.believed or trial.paper, gravito_bending_length=measured)
+            planned = plan(paper, trial.target, **trial.planner)
+            if trial.plunges is not None:
+                planned = plunge(planned, sheet=trial.sheet, progress=False, **trial.plunges)
     except ValueError as error:
         return replace(outcome, failure=f"no plan: {error}")
     outcome = replace(outcome, needed_friction=float(np.nanmax(planned.slip_ratio)))

@@ -48,11 +48,11 @@ def strip_picture(paper: Paper, curl: float, length: float, scale: float, random
 
 
 def table_picture(
-    positions: FloatArray, width: float, camera: Camera, size: tuple[int, int], random: np.random.Generator
+    positions: FloatArray, widths: FloatArray, camera: Camera, size: tuple[int, int], random: np.random.Generator
 ) -> Picture:
-    """A sheet on the table: its upper side is bright, its lower one bluish, and what stands steeply is darker."""
+    """A sheet on the table, so wide at its nodes: its upper side bright, its lower one bluish, steep parts darker."""
     steps = np.diff(positions, axis=0)
-    sides = [positions + np.array([0.0, sign * 0.5 * width, 0.0]) for sign in (-1.0, 1.0)]
+    sides = [positions + np.multiply.outer(sign * 0.5 * widths, [0.0, 1.0, 0.0]) for sign in (-1.0, 1.0)]
     seen = [camera.project(side) for side in sides]
     order = np.argsort(positions[:-1, 2] + positions[1:, 2], kind="stable")
     quads, colours = [], []

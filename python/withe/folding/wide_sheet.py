@@ -117,6 +117,8 @@ class WideSheet:
     ) -> None:
         if not isinstance(paper, Paper):
             raise ValueError(f"paper must be a Paper, got {paper!r}")
+        if not paper.is_strip:
+            raise ValueError("paper must be as wide everywhere for two strips of one width, its outline is another")
         if noise is not None and not isinstance(noise, Noise):
             raise ValueError(f"noise must be a Noise, got {noise!r}")
         seed = validation.integer(seed, "seed", 0, 2**63 - 1)
@@ -207,7 +209,8 @@ class WideSheet:
         simulation.reset()
         jaw = JawMotion([plan], self._drawn)
         for strip, y in zip(self.strips, self._sides, strict=True):
-            lead(simulation.hand(f"jaw on {strip.name}"), jaw, self.jaw.depth, float(y))
+            hand = simulation.hand(f"jaw on {strip.name}")
+            lead(hand, hand.pose.rotation, jaw, self.jaw.depth, float(y))
         duration = float(plan.times[-1] - plan.times[0])
         return self._result(plan.target, carried(simulation, jaw, self.strips, duration, progress).failure)
 

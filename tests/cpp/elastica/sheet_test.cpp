@@ -12,12 +12,15 @@
 namespace withe {
 namespace {
 
-SheetProblem::Path solved(double x, double z, const SheetShape& shape = {}) {
+SheetProblem::Path solved(double x, double z, double tip_moment = 0.0) {
   static const SheetManifold manifold;
   SheetManifold::Data data;
-  EXPECT_TRUE(manifold.at_position(x, z, shape, data).valid) << x << " " << z;
+  EXPECT_TRUE(manifold.at_position(x, z, tip_moment, data).valid) << x << " " << z;
   return data.path;
 }
+
+/// Of a square folded over its diagonal, the corner held: to the middle and on.
+SheetWidth diamond() { return {{0.0, 2.5, 6.5}, {0.1, 1.0, 0.0}}; }
 
 TEST(RungeKutta, IsOfEighthOrderOnAPendulum) {
   const auto slope = [](double, const std::array<double, 2>& y) {
@@ -37,7 +40,7 @@ TEST(SheetProblem, DerivativesMatchDifferences) {
   for (const TipTarget target : {TipTarget::position, TipTarget::length_and_angle, TipTarget::length_and_direction,
                                  TipTarget::pose, TipTarget::sliding}) {
     SheetProblem problem;
-    problem.shape = {0.3, 0.2};
+    problem.shape = {diamond(), 0.2};
     problem.target = target;
     problem.goal = {2.0, 0.7, 1.5};
     problem.friction = -0.4;
@@ -74,29 +77,46 @@ TEST(SheetProblem, DerivativesMatchDifferences) {
   }
 }
 
+TEST(SheetWidth, WeightIsTheIntegralOfTheWidth) {
+  const SheetWidth width = diamond();
+  double weight = 0;
+  constexpr int kParts = 70000;
+  for (int i = 0; i < kParts; ++i) weight += width.width_at(7.0 * (i + 0.5) / kParts) * 7.0 / kParts;
+  EXPECT_NEAR(width.weight_at(7.0), weight, 1e-8);
+  EXPECT_NEAR(width.weight_at(2.5), 2.5 * 0.55, 1e-14);
+  EXPECT_NEAR(width.width_at(4.5), 0.5, 1e-14);
+  EXPECT_EQ(width.width_at(8.0), 0.0);
+  const SheetWidth half = width.blended(0.5, 2.0);
+  for (double t : {0.0, 1.0, 2.5, 4.0, 6.0}) {
+    EXPECT_NEAR(half.width_at(t), 0.5 + width.width_at(t), 1e-14);
+    EXPECT_NEAR(half.weight_at(t), 0.5 * t + width.weight_at(t), 1e-14);
+  }
+}
+
 TEST(SheetManifold, ShapesKeepTheMomentAboutTheTip) {
   // Moments about the lift-off point: weight at its centre, the tip's force and moment, nothing from the floor.
-  for (const SheetShape& shape : {SheetShape{}, SheetShape{0.0, 0.8}, SheetShape{0.7, 0.0}}) {
-    for (const auto& [x, z] : {std::pair{1.0, 1.5}, {3.0, 2.0}, {6.0, 1.25}}) {
-      const auto path = solved(x, z, shape);
-      const double length = path.values[2], growth = shape.width_growth;
-      // The moment of the weight, integral of b X, by parts of X cut finely.
-      const SheetProblem::Path& p = path;
-      double weight_moment = 0;
-      const auto slope = [&](double s, const std::array<double, 5>& y) {
-        const double b = 1 + growth * (length - s), w = s + growth * s * (length - s / 2);
+  using Asked = std::array<double, 3>;  // x, z, moment
+  for (const SheetWidth& width : {SheetWidth(), diamond()}) {
+    const SheetManifold manifold(width);
+    for (const auto& [x, z, moment] : {Asked{1.0, 1.5, 0.0}, {3.0, 2.0, 0.0}, {6.0, 1.25, 0.0}, {3.0, 2.0, 0.05}}) {
+      SheetManifold::Data data;
+      ASSERT_TRUE(manifold.at_position(x, z, moment, data).valid) << x << " " << z;
+      // The moment of the weight, integral of b X, by parts of X cut finely, ends of pieces among them.
+      const SheetProblem::Path& p = data.path;
+      const double length = p.values[2], weight = width.weight_at(length);
+      const auto slope = [&width, &p, length, weight](double s, const std::array<double, 5>& y) {
+        const double b = width.width_at(length - s), w = weight - width.weight_at(length - s);
         return std::array<double, 5>{y[1] / (2 * b), (p.values[0] - w) * std::cos(y[0]) - p.values[1] * std::sin(y[0]),
                                      std::cos(y[0]), std::sin(y[0]), b * y[2]};
       };
       std::array<double, 5> y{};
-      for (int i = 0; i < 400; ++i) runge_kutta_step<3>(slope, length * i / 400, length / 400, y);
-      weight_moment = y[4];
-      const double weight = length + growth * length * length / 2;
+      constexpr int kSteps = 4000;
+      for (int i = 0; i < kSteps; ++i) runge_kutta_step<3>(slope, length * i / kSteps, length / kSteps, y);
       const double tip_x = length - x;
       const double tip_up = weight - p.values[0], tip_forward = -p.values[1];
-      EXPECT_NEAR(y[0], p.nodes.back()[0], 1e-7);
-      EXPECT_NEAR(y[3], z, 1e-7);
-      EXPECT_NEAR(tip_x * tip_up - z * tip_forward - weight_moment + shape.tip_moment, 0.0, 1e-7);
+      EXPECT_NEAR(y[0], p.nodes.back()[0], 1e-6);
+      EXPECT_NEAR(y[3], z, 1e-6);
+      EXPECT_NEAR(tip_x * tip_up - z * tip_forward - y[4] + moment, 0.0, 1e-6);
     }
   }
 }
@@ -111,9 +131,9 @@ TEST(SheetStability, AClampedColumnBucklesAtEulersLoad) {
     column.nodes.push_back({1e-3 * std::sin(wave * s), 2e-3 * wave * std::cos(wave * s), s, 0.0});
   }
   column.values = {0.0, 0.998 * load, length};
-  EXPECT_TRUE(sheet_is_stable({}, column));
+  EXPECT_TRUE(sheet_is_stable(SheetShape{}, column));
   column.values[1] = 1.002 * load;
-  EXPECT_FALSE(sheet_is_stable({}, column));
+  EXPECT_FALSE(sheet_is_stable(SheetShape{}, column));
 }
 
 SheetMotionData held(const SheetForces& forces) {
