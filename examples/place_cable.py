@@ -18,6 +18,7 @@ import numpy as np
 from withe.deployment import Cable, Deployment, Pattern, deploy, plan, posts_along
 
 FRICTION = 0.4
+HELD = 1.5  # coefficient of friction of a floor that would hold the letters: what the real one does not, posts do
 EASING = 0.14  # [m]
 LETTERS = {  # turns [rad], radii, straight pieces [m]; where posts stand, as shares of the way
     "U": ((np.pi,), (0.095,), (0.14, 0.14), np.linspace(0.12, 0.88, 7)),
@@ -38,12 +39,12 @@ def laid(
 ) -> Deployment:
     """The cable after it was placed, through equilibria or in time, without noise or in a noisy trial.
 
-    `known` is what the planner takes it for.
+    `known` is what the planner takes it for. "optimised" plans are improved as if the floor held the cable.
     """
     turns, radii, straights, shares = LETTERS[letter]
     pattern, cable = Pattern.bends(turns, radii, straights, easing=EASING), Cable.dlo(5)
     posts = posts_along(pattern, cable, shares * pattern.length)
-    motion = plan(known or cable, pattern, controller, posts=posts, crossings="over")
+    motion = plan(known or cable, pattern, controller, posts=posts, crossings="over", friction=HELD, progress=False)
     return deploy(
         motion, cable, floor=FRICTION, seed=seed, noise=noise, quasi_static=static, nodes=nodes, progress=False
     )

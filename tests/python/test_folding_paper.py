@@ -94,5 +94,6 @@ def test_papers_are_as_published():
     assert Paper.a4().length > Paper.a4().width
     with pytest.raises(ValueError, match="width must be positive"):
         Paper(0.3, 0.0, 0.05)
-    with pytest.raises(ValueError, match="friction must not be negative"):
-        Paper(0.3, 0.2, 0.05, friction=-0.1)
+    for friction in (-0.1, 0.0):
+        with pytest.raises(ValueError, match="friction must be positive"):
+            Paper(0.3, 0.2, 0.05, friction=friction)

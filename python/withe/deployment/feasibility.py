@@ -181,13 +181,7 @@ def grasps_along(pattern: Laid, cable: Cable, controller: str) -> Grasp:
     lgb = cable.gravito_bending_length
     if cable.length < pattern.length:
         raise ValueError(f"the cable is {cable.length:g} m long, the pattern {pattern.length:.4g} m")
-    tightest = float(np.abs(pattern.curvature).max())
-    at = 1e3 * float(pattern.arc_length[np.abs(pattern.curvature).argmax()])
-    if tightest * cable.radius >= 1.0:
-        raise ValueError(
-            f"the pattern bends to a radius of {1e3 / tightest:.2g} mm at {at:.0f} mm, tighter than the cable's own of"
-            f" {1e3 * cable.radius:.2g} mm"
-        )
+    tightest, at = require_bendable(pattern, cable)
     limit = float(table().greatest_curvature)
     if tightest * lgb > limit:
         raise ValueError(
@@ -207,6 +201,18 @@ def grasps_along(pattern: Laid, cable: Cable, controller: str) -> Grasp:
     except ConvergenceError as error:
         bend = f"whose radius at {at:.0f} mm is {1e3 / tightest:.2g} mm"
         raise ValueError(f"no floor holds this cable on this pattern, {bend}: {error}") from error
+
+
+def require_bendable(pattern: Laid, cable: Cable) -> tuple[float, float]:
+    """Refuse bends tighter than the cable is thick; the tightest curvature [1/m] and where it is [mm]."""
+    sizes = np.abs(pattern.curvature)
+    tightest, at = float(sizes.max()), 1e3 * float(pattern.arc_length[sizes.argmax()])
+    if tightest * cable.radius >= 1.0:
+        raise ValueError(
+            f"the pattern bends to a radius of {1e3 / tightest:.2g} mm at {at:.0f} mm, tighter than the cable's own of"
+            f" {1e3 * cable.radius:.2g} mm"
+        )
+    return tightest, at
 
 
 def _floor(s: FloatArray, curvature: FloatArray, slope: FloatArray, bend: FloatArray) -> FloatArray:

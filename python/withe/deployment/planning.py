@@ -16,7 +16,7 @@ from withe.common import validation
 from withe.common.progress import progress as bar
 from withe.deployment.cable import JAW, Cable
 from withe.deployment.drawing import draw_plan
-from withe.deployment.feasibility import Controller, Feasibility, examine, grasps_along
+from withe.deployment.feasibility import Controller, Feasibility, examine, grasps_along, require_bendable
 from withe.deployment.grasping import Grasp
 from withe.deployment.motion import Course, Path, Phase, Start, course, lengthened, upright_way, way_along
 from withe.deployment.optimising import optimised, runs
@@ -248,6 +248,10 @@ def plan(
     time_step = validation.positive(time_step, "time_step")
     validation.choice(crossings, "crossings", ("refuse", "over"))
     validation.choice(start, "start", get_args(Start))
+    for given, name, kind in ((cable, "cable", Cable), (pattern, "pattern", Pattern)):
+        if not isinstance(given, kind):
+            raise ValueError(f"{name} must be a withe.deployment.{kind.__name__}, got {type(given).__name__}")
+    require_bendable(pattern, cable)
     require_room(posts, pattern, cable)
     if crossings == "refuse":
         held, tail, path = _uncrossed(pattern, cable, tail)

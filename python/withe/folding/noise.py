@@ -13,6 +13,7 @@ __all__ = ["Drawn", "Noise"]
 
 FloatArray = npt.NDArray[np.float64]
 _MOST = 2.0  # standard deviations; what is farther out is drawn again
+_LEAST_FRICTION = 0.01  # over that of the paper: a sheet without friction is no paper
 _WAVES = 6  # of the jitter
 _SLOWEST, _FASTEST = 0.5, 4.0  # of these [Hz]
 _SHORTEST, _LONGEST = 0.03, 0.3  # waves of friction along the table [m]
@@ -102,7 +103,7 @@ class Drawn:
         patches = np.stack([share, 2.0 * np.pi / lengths, random.uniform(0.0, 2.0 * np.pi, _WAVES)], axis=1)
         return cls(
             gravito_bending_length=1.0 + noise.gravito_bending_length * normal[0],
-            friction=max(0.0, 1.0 + noise.friction * normal[1]),
+            friction=max(_LEAST_FRICTION, 1.0 + noise.friction * normal[1]),
             curl=noise.curl * normal[2],
             tilt=noise.tilt * normal[3],
             shift=normal[4:] * [noise.position, noise.position, noise.angle],

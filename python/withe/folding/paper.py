@@ -35,7 +35,7 @@ class Paper:
     Raises
     ------
     ValueError
-        A length that is not positive, negative friction, an outline that does not go from 0 to 1 or is nowhere 1 wide.
+        A length or friction that is not positive, an outline that does not go from 0 to 1 or is nowhere 1 wide.
 
     Examples
     --------
@@ -54,9 +54,8 @@ class Paper:
     outline: Sequence[tuple[float, float]] = ((0.0, 1.0), (1.0, 1.0))
 
     def __post_init__(self) -> None:
-        for name in ("length", "width", "gravito_bending_length", "thickness"):
+        for name in ("length", "width", "gravito_bending_length", "friction", "thickness"):
             object.__setattr__(self, name, validation.positive(getattr(self, name), name))
-        object.__setattr__(self, "friction", validation.non_negative(self.friction, "friction"))
         object.__setattr__(self, "outline", _checked_outline(self.outline))
 
     def width_at(self, place: npt.ArrayLike) -> FloatArray:
