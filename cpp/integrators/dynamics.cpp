@@ -243,12 +243,12 @@ void find_end_velocity(const Equations& equations, const StepPlan& plan, const S
 /// What acted, and what was lost; full residuals become minus the reactions. Returns what friction and restitution
 /// took [J].
 double account(Equations& equations, const Parameters& parameters, const StepPlan& plan, const State& state,
-               StepWorkspace& work, StepResult& result) {
+               const VectorX& q1, StepWorkspace& work, StepResult& result) {
   const bool conserves = plan.rule == StepRule::energy_momentum;
   StepData& data = work.newton.data;
   const VectorX& working = conserves ? work.working : work.change;
   add_work(equations, parameters, working, work, result);
-  if (const HandForces* hands = equations.hands()) result.support_work += hands->work(equations.problem(), data);
+  if (const HandForces* hands = equations.hands()) result.support_work += hands->work(equations.problem(), data, q1);
   double contact_loss = 0.0;
   if (const Contact* contact = equations.contact()) {
     const double by_obstacles = contact->obstacle_work();
@@ -308,7 +308,7 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
     result.pressing_gain = equations.contact()->pressing_gain(conserves ? work.working : work.change);
   work.mean = work.change / dt;
   find_end_velocity(equations, plan, state, work);
-  const double contact_loss = account(equations, parameters, plan, state, work, result);
+  const double contact_loss = account(equations, parameters, plan, state, q1, work, result);
   VectorX& acceleration = work.mean;
   acceleration = (work.velocity - state.v) / dt;
   if (options.tolerance) result.error = estimated_error(equations, newton, options, plan, predictor, work);
@@ -318,7 +318,7 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
   if (Contact* contact = equations.contact())
     result.dissipated -= contact->accept(state, Keep::energy, std::max(contact_loss, 0.0));
   advance(equations, plan, q1, work, state);
-  if (const HandForces* hands = equations.hands()) hands->accept(work.after, state);
+  if (const HandForces* hands = equations.hands()) result.support_work -= hands->accept(work.after, state);
   result.accepted = true;
   return result;
 }

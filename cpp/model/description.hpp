@@ -90,6 +90,11 @@ struct HandDescription {
   /// Where it yields: along d1, d2, t of what it holds [N/m], and about them [N m/rad].
   std::array<double, 6> stiffness{};
   double force_limit = std::numeric_limits<double>::infinity();  ///< beyond which it slips [N]
+  /// A ring, see forces/ring.hpp: it yields, with stiffness[0] across the rod and along it.
+  bool slides = false;
+  double friction = 0;   ///< of a ring that lets the rod slide [-]
+  bool feeds = false;    ///< whether a drive holds the rod along itself
+  double feed_rate = 0;  ///< of the drive at first: length at rest towards the end of the rod [m/s]
 };
 
 /// Something that holds a node of a rod.

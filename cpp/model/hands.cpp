@@ -10,6 +10,21 @@ namespace {
 
 constexpr double kTouched = 1e-9;  // of an edge's length: less than that is rounding
 
+RodCurve curve_of(const Model& model, int rod) {
+  const RodDescription& description = model.description.rods[at(rod)];
+  RodCurve curve;
+  curve.nodes = description.nodes;
+  curve.closed = description.closed;
+  const int first = model.rod_first_edge[at(rod)], count = model.rod_first_edge[at(rod) + 1] - first;
+  for (int i = 0; i < count; ++i) {
+    curve.arc.push_back(curve.whole);
+    curve.length.push_back(model.edge_arc(first + i));
+    curve.whole += curve.length.back();
+  }
+  if (!curve.closed) curve.arc.push_back(curve.whole);
+  return curve;
+}
+
 }  // namespace
 
 void find_touched(const Model& model, Support& hand) {
@@ -48,6 +63,7 @@ void find_touched(const Model& model, Support& hand) {
     if (head != hand.span.front()) hand.span.push_back(head);
   }
   hand.node = hand.span.front();
+  if (own.slides) hand.curve = curve_of(model, static_cast<int>(rod));
 }
 
 }  // namespace withe

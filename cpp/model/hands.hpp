@@ -1,5 +1,5 @@
 #pragma once
-/// Which edges of a rod a hand touches.
+/// Which edges of a rod a hand touches, and where a ring is on it.
 
 #include "model/model.hpp"
 

@@ -11,6 +11,7 @@
 #include "geometry/bend_measure.hpp"
 #include "geometry/frames.hpp"
 #include "model/description.hpp"
+#include "model/rod_curve.hpp"
 
 namespace withe {
 
@@ -95,9 +96,11 @@ struct Support {
   std::vector<int> span;             ///< nodes of these edges, in that order
   int at_edge = -1;                  ///< which of these edges has the point that it is at
   double at_place = 0;               ///< where on it
+  RodCurve curve;                    ///< of a ring: its rod
 
   bool is_hand() const { return description.kind == SupportKind::hand; }
   bool yields() const { return is_hand() && description.hand.yields; }
+  bool slides() const { return is_hand() && description.hand.slides; }
 };
 
 /// How surfaces that touch press and rub: between rods, on obstacles, and of pairs of bodies that have something of

@@ -42,6 +42,14 @@ auto find_record(Records& records, const ContactKey& key) -> decltype(records.da
   return found != records.end() && found->key == key ? &*found : nullptr;
 }
 
+/// How a rod passes a ring; see forces/ring.hpp.
+struct RingState {
+  SplinePlace place;         ///< where
+  double origin = 0;         ///< s0, arc length there at first [m]
+  double fed = 0, slip = 0;  ///< [m]
+  bool left = false;         ///< whether the rod has: an end has passed
+};
+
 /// Where a hand is, and what it holds as it sees it.
 struct HandState {
   Vector3 position = Vector3::Zero();      ///< [m]
@@ -52,6 +60,7 @@ struct HandState {
   // Where it yields, per edge:
   std::vector<Vector3> slip;  ///< along d1, d2, t of what was grasped [m]
   VectorX twist;              ///< of the edge against that, which fixes the branch of the angle [rad]
+  RingState ring;             ///< where it slides
 };
 
 /// Configuration, velocities and the frames they are measured from. The frames advance by time-parallel

@@ -6,6 +6,7 @@
 
 #include <optional>
 
+#include "common/check.hpp"
 #include "geometry/rotation.hpp"
 #include "steps/discrete_adjoint.hpp"
 #include "steps/hand_piece.hpp"
@@ -132,6 +133,7 @@ Vector3 HandForces::add_turn_adjoint(const StepProblem& problem, const StepData&
 
 void HandForces::add_adjoint(const StepProblem& problem, const StepData& data, const Assembler&,
                              StepAdjoint& adjoint) const {
+  require(rings_.count() == 0, "no gradient is known of a rod that slides through a ring");
   std::optional<DiscreteAdjoint> discrete;
   if (problem.conserves_energy()) discrete.emplace(problem, data, adjoint);
   Columns3 by_stiffness = Columns3::Zero(table_.count(), 3), by_natural = by_stiffness;

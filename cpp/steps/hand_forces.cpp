@@ -25,14 +25,14 @@ void put_shift(const Eigen::Matrix<double, Size, 1>& gradient, const Eigen::Matr
 
 }  // namespace
 
-HandForces::HandForces(const Model& model) : model_(model) {
+HandForces::HandForces(const Model& model) : model_(model), rings_(model), slips_(rings_.slips()) {
   std::vector<int> dofs;
   const auto add_node = [&](int node) {
     for (int i = 0; i < model.dimension; ++i) dofs.push_back(model.node_dof[at(node)] + i);
   };
   for (std::size_t s = 0; s < model.supports.size(); ++s) {
     const Support& support = model.supports[s];
-    if (!support.active || !support.yields()) continue;
+    if (!support.active || !support.yields() || support.slides()) continue;
     slips_ = slips_ || std::isfinite(support.description.hand.force_limit);
     for (std::size_t i = 0; i < support.touched.size(); ++i) {
       const int edge = support.touched[i].edge;
@@ -46,8 +46,14 @@ HandForces::HandForces(const Model& model) : model_(model) {
 }
 
 std::string HandForces::note() const {
-  return std::to_string(held_.size()) +
-         " edge(s) are held by hands that yield: each adds to the matrix of its own nodes";
+  std::string out;
+  if (!held_.empty())
+    out = std::to_string(held_.size()) +
+          " edge(s) are held by hands that yield: each adds to the matrix of its own nodes";
+  if (rings_.count() > 0)
+    out += (out.empty() ? "" : "; ") + std::to_string(rings_.count()) +
+           " ring(s) let rods slide: each adds to the matrix of the three nodes around it";
+  return out;
 }
 
 HandPose HandForces::pose_of(const StepProblem& problem, int support) const {
@@ -212,10 +218,12 @@ void HandForces::add(const StepProblem& problem, StepData& data, const Assembler
     wrench.force -= pull;
     wrench.moment += turn.moment - p.shift.point.cross(pull);
   }
+  if (rings_.count() > 0) rings_.add(problem, data, end_, values);
 }
 
 /// Positions round by eps |x|, and with them what is between an edge and where it was grasped.
 void HandForces::add_rounding(const StepProblem& problem, StepData& data) const {
+  if (rings_.count() > 0) rings_.add_rounding(problem, data);
   for (int k = 0; k < table_.count(); ++k) {
     const Piece p = piece(problem, data, k);
     const EdgeFrame<double>& edge = data.configuration.edge[at(p.touched.edge)];
@@ -231,9 +239,10 @@ void HandForces::add_rounding(const StepProblem& problem, StepData& data) const 
 
 double HandForces::dissipated(const StepProblem& problem, const StepData& data, const Assembler&,
                               const VectorX& change) const {
-  double lost = 0.0;
+  if (!problem.moves()) return 0.0;
   const VectorX end = problem.start->q + change;
-  for (int k = 0; problem.moves() && k < table_.count(); ++k) {
+  double lost = rings_.dissipated(problem, end_, end);
+  for (int k = 0; k < table_.count(); ++k) {
     const Piece p = piece(problem, data, k);
     const Held& held = held_[at(k)];
     const HandState& hand = problem.start->hands[at(held.support)];
@@ -251,10 +260,11 @@ double HandForces::dissipated(const StepProblem& problem, const StepData& data, 
   return lost;
 }
 
-double HandForces::work(const StepProblem& problem, const StepData& data) const {
-  double done = 0.0;
+double HandForces::work(const StepProblem& problem, const StepData& data, const VectorX& q1) const {
+  double done = rings_.work(problem, end_, q1);
   for (std::size_t s = 0; s < end_.size(); ++s) {
-    if (!model_.supports[s].active || !model_.supports[s].yields()) continue;
+    const Support& support = model_.supports[s];
+    if (!support.active || !support.yields() || support.slides()) continue;
     const HandState& start = problem.start->hands[s];
     const Wrench& wrench = data.hands[s];
     const Vector3 moment = wrench.moment - now_[s].position.cross(wrench.force);
@@ -265,10 +275,11 @@ double HandForces::work(const StepProblem& problem, const StepData& data) const 
   return done;
 }
 
-void HandForces::accept(const Configuration& c, State& state) const {
+double HandForces::accept(const Configuration& c, State& state) const {
   for (std::size_t s = 0; s < end_.size(); ++s) {
     state.hands[s].position = end_[s].position;
     state.hands[s].rotation = end_[s].rotation;
+    state.hands[s].ring.fed = end_[s].fed;
   }
   for (const Held& held : held_) {
     const Support& support = model_.supports[at(held.support)];
@@ -283,6 +294,7 @@ void HandForces::accept(const Configuration& c, State& state) const {
     double& twist = hand.twist(held.touched);
     twist = bend_twist_strain(frame_of(shift.grip), c.edge[at(touched.edge)], twist).tau;
   }
+  return rings_.accept(state);
 }
 
 double hand_energy(const Model& model, const BendMeasure& measure, const State& state, const Configuration& c,
@@ -292,6 +304,10 @@ double hand_energy(const Model& model, const BendMeasure& measure, const State& 
     const Support& support = model.supports[s];
     if (!support.active || !support.yields() || (only >= 0 && at(only) != s)) continue;
     const HandState& hand = state.hands[s];
+    if (support.slides()) {
+      if (!hand.ring.left) energy += passage_of(model, state, static_cast<int>(s)).energy;
+      continue;
+    }
     const HandDescription& own = support.description.hand;
     for (std::size_t i = 0; i < support.touched.size(); ++i) {
       const TouchedEdge& touched = support.touched[i];
@@ -313,6 +329,10 @@ HandDeflection hand_deflection(const Model& model, const State& state, const Con
   const Support& s = model.supports[at(support)];
   const HandState& hand = state.hands[at(support)];
   HandDeflection out;
+  if (s.slides()) {
+    if (!hand.ring.left) out.shift = hand.rotation.transpose() * passage_of(model, state, support).across;
+    return out;
+  }
   for (std::size_t i = 0; i < s.touched.size(); ++i) {
     const TouchedEdge& touched = s.touched[i];
     const Shift shift = shift_of(model, state.q, hand, {hand.position, hand.rotation}, touched, i);

@@ -3,21 +3,18 @@
 
 #include <vector>
 
-#include "steps/term.hpp"
+#include "steps/ring_forces.hpp"
 
 namespace withe {
-
-/// Where a hand is.
-struct HandPose {
-  Vector3 position = Vector3::Zero();      ///< [m]
-  Matrix3 rotation = Matrix3::Identity();  ///< columns: its axes
-};
 
 class HandForces final : public Term {
  public:
   explicit HandForces(const Model& model);
 
-  void declare(std::vector<ElementTable*>& tables) override { tables.push_back(&table_); }
+  void declare(std::vector<ElementTable*>& tables) override {
+    tables.push_back(&table_);
+    if (rings_.count() > 0) tables.push_back(&rings_.table());
+  }
   bool has_potential() const override { return !slips_; }
   bool dissipates(const Parameters&) const override { return slips_; }
   std::string note() const override;
@@ -40,13 +37,14 @@ class HandForces final : public Term {
   void add_wrench_adjoint(const StepProblem& problem, const StepData& data, int support, const Vector3& by_force,
                           const Vector3& by_moment, StepAdjoint& adjoint, VectorX& by_z) const;
   bool slips() const { return slips_; }
+  const RingForces& rings() const { return rings_; }
   /// Whether something slips where a state is, or would with any more force.
   bool at_limit(const State& state) const;
   /// What hands have done in a step that has just been evaluated [J].
-  double work(const StepProblem& problem, const StepData& data) const;
+  double work(const StepProblem& problem, const StepData& data, const VectorX& q1) const;
   /// Takes a state whose q is that of the end of a step there: hands are where they were aimed at, and slip where the
-  /// force is too great. `c`: of that q; not used in a plane.
-  void accept(const Configuration& c, State& state) const;
+  /// force is too great. `c`: of that q; not used in a plane. Returns what stays with rings that rods have left [J].
+  double accept(const Configuration& c, State& state) const;
 
  private:
   struct Held {
@@ -78,6 +76,7 @@ class HandForces final : public Term {
                            CoefficientAdjoint& by) const;
 
   const Model& model_;
+  RingForces rings_;
   std::vector<Held> held_;  ///< of each element
   ElementTable table_;
   bool slips_ = false;               ///< whether any may

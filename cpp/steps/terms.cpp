@@ -55,6 +55,7 @@ std::vector<std::string> asymmetries_of(const Model& model, const Loads& loads, 
   if (scene.fluid.model == FluidModel::resistive && rule != StepRule::statics)
     found.emplace_back("resistive-force theory");
   if (exact && terms.hands && terms.hands->slips()) found.emplace_back("hands that slip");
+  if (!exact && terms.hands && terms.hands->rings().slips()) found.emplace_back("rings that rub or slip");
   if (exact && rule != StepRule::statics && (!model.planar() || rule != StepRule::backward_euler))
     found.emplace_back("every derivative of inertia and viscosity");
   return found;

@@ -37,6 +37,7 @@ namespace {
 /// A place between two of a support, or beyond.
 void put_between(const SupportMotion& from, const SupportMotion& to, double fraction, SupportMotion& out) {
   out.position = from.position + fraction * (to.position - from.position);
+  out.fed = from.fed + fraction * (to.fed - from.fed);
   out.rotation = rotation_exp(fraction * rotation_log(to.rotation * from.rotation.transpose())) * from.rotation;
 }
 
@@ -225,6 +226,8 @@ void stop(SupportMotion& motion, double time) {
   motion.from_position = motion.to_position = motion.position;
   motion.from_rotation = motion.to_rotation = motion.rotation;
   motion.shift = motion.turn = {time, time};
+  motion.fed_before = motion.fed;
+  motion.feeds_since = time;
 }
 
 }  // namespace

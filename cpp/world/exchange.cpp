@@ -94,7 +94,7 @@ void exchange(Archive& io, const Model& model, Settings& settings) {
 template <class Archive>
 void exchange(Archive& io, HandState& hand) {
   constexpr const char* kImpossible = "snapshot is damaged: impossible hand";
-  auto& [position, rotation, points, edges, slip, twist] = hand;
+  auto& [position, rotation, points, edges, slip, twist, ring] = hand;
   io(position), io(rotation);
   exchange_size(io, points, 1 << 28, kImpossible);
   for (Vector3& point : points) io(point);
@@ -103,6 +103,8 @@ void exchange(Archive& io, HandState& hand) {
   exchange_size(io, slip, 1 << 28, kImpossible);
   for (Vector3& by : slip) io(by);
   exchange(io, twist);
+  auto& [place, origin, fed, slid, left] = ring;
+  io(place.piece), io(place.along), io(place.beyond), io(origin), io(fed), io(slid), io(left);
 }
 
 template <class Archive>
@@ -131,9 +133,10 @@ void exchange(Archive& io, Moving& moving) {
   exchange(io, state);
   predictor.exchange(io);
   for (auto& motion : motions) {
-    auto& [position, rotation, from_position, to_position, from_rotation, to_rotation, shift, turn, stretch] = motion;
+    auto& [position, rotation, from_position, to_position, from_rotation, to_rotation, shift, turn, stretch, fed,
+           fed_before, feed_rate, feeds_since] = motion;
     io(position), io(rotation), io(from_position), io(to_position), io(from_rotation), io(to_rotation);
-    exchange(io, shift), exchange(io, turn), io(stretch);
+    exchange(io, shift), exchange(io, turn), io(stretch), io(fed), io(fed_before), io(feed_rate), io(feeds_since);
   }
   for (double* x : {&support_work, &actuation_work, &dissipated, &load_work}) io(*x);
 }

@@ -23,6 +23,7 @@ constexpr const char* kStiffness =
     "its contacts took a stiffness of their own; give enable_contact(stiffness=), great enough";
 constexpr const char* kFrictionChanged =
     "friction came or went while it ran, or what two bodies have of their own; begin another run there";
+constexpr const char* kRing = "a rod slides through a ring in it; take a hand without slides=True";
 constexpr const char* kRestitution = "impacts lose energy by their restitution; take restitution=1";
 
 bool known_friction(FrictionLaw law) { return law == FrictionLaw::implicit || law == FrictionLaw::lagged; }
@@ -43,6 +44,7 @@ std::vector<EquilibriumGradient> World::equilibrium_gradients(const std::vector<
     statics.integrator = Integrator::statics;
     self.static_gradient = std::make_unique<StepGradient>(model, equation_options(statics));
   }
+  require(!self.has_rings(), std::string("no gradient is known of this equilibrium: ") + kRing);
   StepGradient& gradient = *self.static_gradient;
   State frames = self.state;
   const std::vector<HandPose> hands = self.hand_poses();
@@ -90,6 +92,7 @@ std::shared_ptr<Tape> World::start_tape() {
     self.tape->refuse("integrator '" +
                       std::string(self.options.integrator == Integrator::verlet ? "verlet" : "static") +
                       "' has none; take any other");
+  if (self.has_rings()) self.tape->refuse(kRing);
   if (contact) {
     if (contact->frictional() && !known_friction(self.description.contact.friction_law))
       self.tape->refuse(kFriction);

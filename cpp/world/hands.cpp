@@ -20,6 +20,11 @@ Vector3 point_on(const Model& model, const VectorX& q, int edge, double place) {
          place * node_position(model, q, model.edge_head[at(edge)]);
 }
 
+Vector3 curve_point(const Model& model, const VectorX& q, const RodCurve& curve, const SplinePlace& place) {
+  const auto position = [&](int node) { return node_position(model, q, node); };
+  return to_eigen(point_at(curve, place, position, Vector3::Zero()).across);
+}
+
 }  // namespace
 
 bool World::Implementation::has_hands() const {
@@ -27,9 +32,14 @@ bool World::Implementation::has_hands() const {
                      [](const Support& s) { return s.active && s.is_hand(); });
 }
 
+bool World::Implementation::has_rings() const {
+  return std::any_of(model.supports.begin(), model.supports.end(),
+                     [](const Support& s) { return s.active && s.slides(); });
+}
+
 std::vector<HandPose> World::Implementation::hand_poses() const {
   std::vector<HandPose> poses;
-  for (const SupportMotion& m : motions) poses.push_back({m.position, m.rotation});
+  for (const SupportMotion& m : motions) poses.push_back({m.position, m.rotation, m.fed});
   return poses;
 }
 
@@ -43,7 +53,7 @@ bool World::Implementation::hands_move(const std::vector<SupportMotion>& from,
                                        const std::vector<SupportMotion>& to) const {
   for (std::size_t s = 0; s < to.size(); ++s)
     if (model.supports[s].active && model.supports[s].yields() &&
-        (from[s].position != to[s].position || from[s].rotation != to[s].rotation))
+        (from[s].position != to[s].position || from[s].rotation != to[s].rotation || from[s].fed != to[s].fed))
       return true;
   return false;
 }
@@ -68,17 +78,26 @@ void World::Implementation::grasp(int hand) {
   const Configuration& c = configuration();
   const HandDescription& own = description.supports[at(hand)].hand;
   m = SupportMotion{};
-  m.position = own.posed ? own.position : point_on(model, state.q, s.at_edge, s.at_place);
+  const RingState ring = s.slides() ? RingState{s.curve.place(own.at), own.at, 0.0, 0.0, false} : RingState{};
+  const Vector3 taken =
+      s.slides() ? curve_point(model, state.q, s.curve, ring.place) : point_on(model, state.q, s.at_edge, s.at_place);
+  m.position = own.posed ? own.position : taken;
+  m.feed_rate = own.feed_rate;
+  m.feeds_since = state.time;
   m.rotation = own.posed ? own.rotation : edge_directors(model, c, s.at_edge);
   m.from_position = m.to_position = m.position;
   m.from_rotation = m.to_rotation = m.rotation;
   m.shift = m.turn = {state.time, state.time};
   HandState& held = state.hands[at(hand)];
-  held = HandState{m.position, m.rotation, {}, {}, {}, {}};
+  held = HandState{m.position, m.rotation, {}, {}, {}, {}, ring};
   const Matrix3 into = m.rotation.transpose();
   for (const TouchedEdge& touched : s.touched) held.edges.push_back(into * edge_directors(model, c, touched.edge));
   if (!s.yields()) {
     for (int node : s.span) held.points.push_back(into * (node_position(model, state.q, node) - m.position));
+    return;
+  }
+  if (s.slides()) {
+    held.points = {into * (taken - m.position)};
     return;
   }
   for (const TouchedEdge& touched : s.touched)
@@ -158,6 +177,38 @@ Reaction World::Implementation::hand_reaction(int hand, const VectorX& held, con
     if (!model.planar())
       out.moment += held(model.edge_dof[at(edge)]) * to_eigen(edge_vector(model, q, edge)).normalized();
   return out;
+}
+
+void World::feed(int support, double rate) {
+  Implementation& self = *implementation_;
+  require(support >= 0 && support < static_cast<int>(self.model.supports.size()) &&
+              self.model.supports[at(support)].active && self.model.supports[at(support)].description.hand.feeds,
+          "no such ring that feeds, or it is released: " + std::to_string(support));
+  require(std::isfinite(rate), "feed_rate must be finite");
+  SupportMotion& m = self.motions[at(support)];
+  m.fed_before = m.fed;
+  m.feeds_since = self.state.time;
+  m.feed_rate = rate;
+}
+
+RingPassage World::passage(int support) const {
+  const Implementation& self = *implementation_;
+  require(support >= 0 && support < static_cast<int>(self.model.supports.size()) &&
+              self.model.supports[at(support)].active && self.model.supports[at(support)].slides(),
+          "no such ring, or it is released: " + std::to_string(support));
+  if (self.state.hands[at(support)].ring.left) return {};
+  const Passage found = passage_of(self.model, self.state, support);
+  return {true, found.at, found.pull,
+          self.model.supports[at(support)].description.hand.stiffness[0] * found.across.norm(),
+          self.motions[at(support)].feed_rate};
+}
+
+std::vector<int> World::left_rings() const {
+  const Implementation& self = *implementation_;
+  std::vector<int> left;
+  for (std::size_t s = 0; s < self.model.supports.size(); ++s)
+    if (self.model.supports[s].active && self.state.hands[s].ring.left) left.push_back(static_cast<int>(s));
+  return left;
 }
 
 Deflection World::deflection(int support) const {

@@ -151,6 +151,7 @@ struct World::Implementation : Running {
 
   // hands.cpp
   bool has_hands() const;
+  bool has_rings() const;
   bool hands_move(const std::vector<SupportMotion>& from, const std::vector<SupportMotion>& to) const;
   void aim_hands(Equations& system) const;
   /// Where hands are, per support.

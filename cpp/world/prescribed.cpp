@@ -47,6 +47,7 @@ void World::Implementation::set_motion_at(SupportMotion& motion, double time) co
   motion.position = (1.0 - s) * motion.from_position + s * motion.to_position;
   motion.rotation =
       rotation_exp(turned * rotation_log(motion.to_rotation * motion.from_rotation.transpose())) * motion.from_rotation;
+  motion.fed = motion.fed_before + motion.feed_rate * (time - motion.feeds_since);
 }
 
 /// A support that is to be elsewhere at once gets there evenly in the course of the time step: shorter steps meet less

@@ -30,6 +30,9 @@ struct SupportMotion {
   Matrix3 from_rotation = Matrix3::Identity(), to_rotation = Matrix3::Identity();
   Span shift, turn;    ///< when each of them goes
   double stretch = 1;  ///< of a held edge: its length when it was gripped, over the drawn one
+  // Of the drive of a ring: what it has fed, now and at a time from which it feeds evenly.
+  double fed = 0, fed_before = 0;         ///< [m]
+  double feed_rate = 0, feeds_since = 0;  ///< [m/s], [s]
 };
 
 /// Where an obstacle goes, and how it turns.

@@ -63,13 +63,13 @@ std::vector<LoadDescription> read_added_loads(Reader& r, const SceneDescription&
 void write_hand(Writer& w, const HandDescription& hand) {
   w(hand.at), w(hand.length), w(hand.posed), w(hand.position), w(hand.rotation), w(hand.yields);
   for (double k : hand.stiffness) w(k);
-  w(hand.force_limit);
+  w(hand.force_limit), w(hand.slides), w(hand.friction), w(hand.feeds), w(hand.feed_rate);
 }
 
 void read_hand(Reader& r, HandDescription& hand) {
   r(hand.at), r(hand.length), r(hand.posed), r(hand.position), r(hand.rotation), r(hand.yields);
   for (double& k : hand.stiffness) r(k);
-  r(hand.force_limit);
+  r(hand.force_limit), r(hand.slides), r(hand.friction), r(hand.feeds), r(hand.feed_rate);
 }
 
 bool same_hand(const HandDescription& a, const HandDescription& b) {
@@ -285,6 +285,15 @@ void check_running(const World::Implementation& self) {
   for (const VectorX* v :
        {&self.parameters.spring_stiffness, &self.parameters.spring_rest_length, &self.parameters.spring_damping})
     require(v->allFinite() && (v->array() >= 0.0).all(), "snapshot is damaged: impossible spring");
+  for (std::size_t s = 0; s < self.model.supports.size(); ++s) {
+    const Support& support = self.model.supports[s];
+    if (!support.active || !support.slides()) continue;
+    const HandState& hand = self.state.hands[s];
+    const SplinePlace& place = hand.ring.place;
+    require(hand.points.size() == 1 && place.along >= 0.0 && place.along <= 1.0 &&
+                (support.curve.closed || (place.piece >= 0 && place.piece < support.curve.pieces())),
+            "snapshot is damaged: impossible ring");
+  }
   require(self.state.motion.known >= 0 && self.state.motion.known <= 2, "snapshot is damaged: impossible history");
   require(self.predictor.plausible(), "snapshot is damaged: impossible history");
 }

@@ -438,7 +438,8 @@ void World::Implementation::check_reversible(const Parameters& p) const {
           "integrator 'fourth_order' goes back in time within each step, which a fluid does not allow" + instead);
   for (const Support& s : model.supports)
     require(
-        !s.active || !s.yields() || !std::isfinite(s.description.hand.force_limit),
+        !s.active || !s.yields() ||
+            (!std::isfinite(s.description.hand.force_limit) && s.description.hand.friction == 0.0),
         "integrator 'fourth_order' goes back in time within each step, which hands that slip do not allow" + instead);
   require((p.spring_damping.array() == 0.0).all(),
           "integrator 'fourth_order' goes back in time within each step, which damping of springs does not allow" +

@@ -55,6 +55,15 @@ struct Deflection {
   Vector3 slip = Vector3::Zero();                           ///< by what it has slipped besides [m]
 };
 
+/// How a rod passes a ring.
+struct RingPassage {
+  bool passes = false;   ///< until an end of the rod has passed
+  double at = 0;         ///< arc length of the rod [m]
+  double pull = 0;       ///< of the ring on the rod, back along it [N]
+  double press = 0;      ///< across it [N]
+  double feed_rate = 0;  ///< of its drive [m/s]
+};
+
 struct Momentum {
   Vector3 linear = Vector3::Zero();   ///< [kg m/s]
   Vector3 angular = Vector3::Zero();  ///< about the origin [kg m^2/s]
@@ -224,6 +233,10 @@ class World {
   std::pair<Matrix3, double> support_turn(int support) const;
   Reaction reaction(int support) const;      ///< of a hand: about where it is
   Deflection deflection(int support) const;  ///< of a hand
+  /// The drive of a ring feeds the rod towards its end from now on, by length at rest [m/s].
+  void feed(int support, double rate);
+  RingPassage passage(int support) const;  ///< of a ring
+  std::vector<int> left_rings() const;     ///< rings whose rods have left them, not released yet
 
   // Obstacles. Their place is that of the point they are drawn with: a plane's, a sphere's centre, a capsule's start.
   // They turn about the normal of a plane, the axis of a capsule, the centre of a sphere, by `turn` since drawn [rad].

@@ -132,7 +132,11 @@ void register_joints_and_supports(py::module_& module) {
       .def_readwrite("rotation", &HandDescription::rotation)
       .def_readwrite("yields", &HandDescription::yields)
       .def_readwrite("stiffness", &HandDescription::stiffness)
-      .def_readwrite("force_limit", &HandDescription::force_limit);
+      .def_readwrite("force_limit", &HandDescription::force_limit)
+      .def_readwrite("slides", &HandDescription::slides)
+      .def_readwrite("friction", &HandDescription::friction)
+      .def_readwrite("feeds", &HandDescription::feeds)
+      .def_readwrite("feed_rate", &HandDescription::feed_rate);
 
   py::class_<SupportDescription> support(module, "SupportDescription", "Something that holds a node.");
   support.def(py::init<>())

@@ -136,6 +136,12 @@ void register_results(py::module_& module) {
       .def_readonly("shift", &Deflection::shift)
       .def_readonly("turn", &Deflection::turn)
       .def_readonly("slip", &Deflection::slip);
+  py::class_<RingPassage>(module, "RingPassage", "How a rod passes a ring.")
+      .def_readonly("passes", &RingPassage::passes)
+      .def_readonly("at", &RingPassage::at)
+      .def_readonly("pull", &RingPassage::pull)
+      .def_readonly("press", &RingPassage::press)
+      .def_readonly("feed_rate", &RingPassage::feed_rate);
   py::class_<Reaction>(module, "Reaction", "Of a support on the rod.")
       .def_readonly("force", &Reaction::force)
       .def_readonly("moment", &Reaction::moment);
@@ -366,6 +372,13 @@ void define_supports(WorldClass& world) {
   world.def(
       "deflection", [](const GuardedWorld& self, int support) { return self.reading().deflection(support); },
       py::arg("support"));
+  world.def(
+      "feed", [](GuardedWorld& self, int support, double rate) { self.steering().feed(support, rate); },
+      py::arg("support"), py::arg("rate"));
+  world.def(
+      "passage", [](const GuardedWorld& self, int support) { return self.reading().passage(support); },
+      py::arg("support"));
+  world.def("left_rings", [](const GuardedWorld& self) { return self.reading().left_rings(); });
 }
 
 void define_readouts(WorldClass& world) {

@@ -13,7 +13,7 @@ by rounding, so set it to "baseline" everywhere to find the same bits on unlike 
 from withe import deployment, folding, learning, perception, real2sim, shapes, view
 from withe._core import __version__
 from withe.batch import Batch
-from withe.errors import CoarseMeshWarning, CoarseStepWarning, ConvergenceError
+from withe.errors import CoarseMeshWarning, CoarseStepWarning, ConvergenceError, RingLeftWarning
 from withe.parts.friction_fields import FrictionMap
 from withe.parts.handles import (
     CustomForce,
@@ -65,6 +65,7 @@ __all__ = [
     "Reaction",
     "Record",
     "Rectangle",
+    "RingLeftWarning",
     "Rod",
     "RodEnergy",
     "Scene",

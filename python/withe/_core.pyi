@@ -39,6 +39,7 @@ __all__: list[str] = [
     "Reaction",
     "ReadoutAdjoint",
     "RevoluteLink",
+    "RingPassage",
     "RodDescription",
     "RodPass",
     "RodState",
@@ -194,7 +195,9 @@ class HandDescription:
     What a hand holds.
     """
 
+    feeds: bool
     posed: bool
+    slides: bool
     yields: bool
     def __init__(self) -> None: ...
     @property
@@ -202,9 +205,17 @@ class HandDescription:
     @at.setter
     def at(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
     @property
+    def feed_rate(self) -> float: ...
+    @feed_rate.setter
+    def feed_rate(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    @property
     def force_limit(self) -> float: ...
     @force_limit.setter
     def force_limit(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    @property
+    def friction(self) -> float: ...
+    @friction.setter
+    def friction(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
     @property
     def length(self) -> float: ...
     @length.setter
@@ -829,6 +840,21 @@ class Deflection:
     @property
     def turn(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]: ...
 
+class RingPassage:
+    """
+    How a rod passes a ring.
+    """
+    @property
+    def at(self) -> float: ...
+    @property
+    def feed_rate(self) -> float: ...
+    @property
+    def passes(self) -> bool: ...
+    @property
+    def press(self) -> float: ...
+    @property
+    def pull(self) -> float: ...
+
 class Reaction:
     """
     Of a support on the rod.
@@ -962,6 +988,10 @@ class World:
         """
         Follow a path of equilibria through limit points.
         """
+    def feed(
+        self, support: typing.SupportsInt | typing.SupportsIndex, rate: typing.SupportsFloat | typing.SupportsIndex
+    ) -> None: ...
+    def left_rings(self) -> list[int]: ...
     def linearise(self, forces: typing.Any) -> Linearisation: ...
     def load(
         self, load: typing.SupportsInt | typing.SupportsIndex
@@ -1000,6 +1030,7 @@ class World:
         """
         Present values, a row an edge, stencil or node.
         """
+    def passage(self, support: typing.SupportsInt | typing.SupportsIndex) -> RingPassage: ...
     def positions(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
     def prescribe_obstacle(
         self,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-__all__ = ["CoarseMeshWarning", "CoarseStepWarning", "ConvergenceError"]
+__all__ = ["CoarseMeshWarning", "CoarseStepWarning", "ConvergenceError", "RingLeftWarning"]
 
 
 class CoarseMeshWarning(UserWarning):
@@ -25,6 +25,10 @@ class CoarseStepWarning(UserWarning):
 
     Given once a simulation, within 64 steps.
     """
+
+
+class RingLeftWarning(UserWarning):
+    """An end of a rod has passed out of a ring that let it slide: the ring is released."""
 
 
 class ConvergenceError(RuntimeError):

@@ -42,6 +42,7 @@ EXAMPLES = {
     "ring_buckling.py": (["--nodes", "40"], r"\(([-+.\d]+) %\)", -3.0, 3.0),
     "place_cable.py": (["--nodes", "110", "--letters", "U"], r"U, exact: passes (\d+) of 14 posts", 14.0, 14.0),
     "press_sheet.py": (["--edges", "75"], r"presses with ([.\d]+) N for each mm", 1.95, 2.0),
+    "pull_rope.py": (["--step", "1e-2"], r"([.\d]+) cm of the rope are through the eye", 75.0, 90.0),
     "robot.py": (["--steps", "2"], r"walked ([-.\d]+) cm", 4.0, 10.0),
     "soft_limb.py": ([], r"tip ([.\d]+) mm off on the mean", 0.3, 0.7),
     "tapered_arm.py": ([], r"tapered: clearance off by ([.\d]+) mm", 0.0, 1.0),

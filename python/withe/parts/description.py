@@ -117,6 +117,9 @@ def _describe_hand(grasp: Grasp) -> _core.HandDescription:
         hand.yields = True
         hand.stiffness = grasp.stiffness.tolist()
         hand.force_limit = grasp.force_limit
+    hand.slides, hand.friction = grasp.slides, grasp.friction
+    if grasp.feed_rate is not None:
+        hand.feeds, hand.feed_rate = True, grasp.feed_rate
     return hand
 
 

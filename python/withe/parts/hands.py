@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -13,11 +13,19 @@ from withe.parts.directory import Directory
 from withe.parts.handles import Rod
 from withe.parts.kinds import Grasp, RodPart, SupportPart
 
-__all__ = ["check_free", "held_edges", "make_hand", "pose_of", "quaternion_matrix", "touched_edges"]
+__all__ = ["Sliding", "check_free", "held_edges", "make_hand", "pose_of", "quaternion_matrix", "touched_edges"]
 
 FloatArray = npt.NDArray[np.float64]
 
 _TOUCHED = 1e-9  # of an edge's length: less than that is rounding
+
+
+class Sliding(NamedTuple):
+    """What a user says of a ring."""
+
+    slides: bool
+    friction: float
+    feed_rate: float | None
 
 
 def make_hand(
@@ -28,6 +36,7 @@ def make_hand(
     pose: Any,
     stiffness: npt.ArrayLike | None,
     force_limit: float | None,
+    sliding: Sliding,
     name: str | None,
 ) -> SupportPart:
     """A hand, checked; not yet in the directory."""
@@ -49,6 +58,13 @@ def make_hand(
             f"{at + 0.5 * length:g} m (at={at:g}, length={length:g})"
         )
     place = None if pose is None else pose_of(pose, f"pose of {name!r}")
+    if validation.truth(sliding.slides, f"slides of {name!r}"):
+        grasp = _make_ring(part, at, length, place, stiffness, force_limit, sliding, name)
+        edge = touched_edges(part, at, 0.0)[0]
+        return SupportPart(name, "hand", (part.index, edge), f"{part.name}.node({edge})", np.zeros((3, 3)), grasp)
+    for word, value in (("friction", sliding.friction or None), ("feed_rate", sliding.feed_rate)):
+        if value is not None:
+            raise ValueError(f"{word} of {name!r} needs a ring, which lets the rod slide: give slides=True")
     stiff = None if stiffness is None else _stiffness(stiffness, f"stiffness of {name!r}")
     limit = math.inf
     if force_limit is not None:
@@ -59,6 +75,43 @@ def make_hand(
     grasp = Grasp(at, length, place, stiff, limit, edges)
     node = (part.index, edges[0])
     return SupportPart(name, "hand", node, f"{part.name}.node({edges[0]})", np.zeros((3, 3)), grasp)
+
+
+def _make_ring(
+    rod: RodPart,
+    at: float,
+    length: float,
+    pose: tuple[FloatArray, FloatArray] | None,
+    stiffness: npt.ArrayLike | None,
+    force_limit: float | None,
+    sliding: Sliding,
+    name: str,
+) -> Grasp:
+    if length != 0.0:
+        raise ValueError(f"length of {name!r} must be 0: a ring holds a rod at one place, got {length:g} m")
+    if stiffness is None:
+        # An edge stretches by more than the rod is off the middle of the ring then.
+        edge = touched_edges(rod, at, 0.0)[0]
+        k = float(rod.parameters.stretch_stiffness[edge] / rod.lengths[edge])
+    elif not validation.is_scalar(stiffness):
+        raise ValueError(
+            f"stiffness of {name!r} must be one number [N/m]: a ring holds no direction, got {stiffness!r:.80}"
+        )
+    else:
+        k = validation.positive(stiffness, f"stiffness of {name!r}")
+    friction = validation.non_negative(sliding.friction, f"friction of {name!r}")
+    rate = None if sliding.feed_rate is None else validation.number(sliding.feed_rate, f"feed_rate of {name!r}")
+    if rate is not None and friction > 0.0:
+        raise ValueError(
+            f"friction of {name!r} must be 0 where a drive feeds the rod (feed_rate): give the drive a force_limit, "
+            "beyond which it slips"
+        )
+    limit = math.inf
+    if force_limit is not None:
+        limit = validation.positive(force_limit, f"force_limit of {name!r}")
+        if rate is None:
+            raise ValueError(f"force_limit of {name!r} is that of a drive: give its feed_rate too, or friction instead")
+    return Grasp(at, 0.0, pose, np.full(6, k), limit, (), True, friction, rate)
 
 
 def pose_of(pose: Any, what: str) -> tuple[FloatArray, FloatArray]:
@@ -113,7 +166,7 @@ def check_free(directory: Directory, part: SupportPart, others: list[SupportPart
     """Refuse a hand on what is held already, and a support on what a hand holds.
 
     Two that hold edges may hold neighbours: who came first holds the node between them. A hand that yields holds no
-    node, but nothing else may hold its edges.
+    node, but nothing else may hold its edges. A ring holds nothing.
 
     Raises
     ------
@@ -122,7 +175,7 @@ def check_free(directory: Directory, part: SupportPart, others: list[SupportPart
     """
     edges, nodes = held_edges(directory, part), _nodes(directory, part)
     for other in others:
-        if part.grasp is None and other.grasp is None:
+        if (part.grasp is None and other.grasp is None) or _is_ring(part) or _is_ring(other):
             continue
         theirs, rows = held_edges(directory, other), _nodes(directory, other)
         if edges & theirs:
@@ -133,6 +186,10 @@ def check_free(directory: Directory, part: SupportPart, others: list[SupportPart
             raise ValueError(
                 f"{part.name!r} is on what is held by {other.name!r} at {other.node_name!r}: release that first"
             )
+
+
+def _is_ring(part: SupportPart) -> bool:
+    return part.grasp is not None and part.grasp.slides
 
 
 def held_edges(directory: Directory, part: SupportPart) -> set[tuple[int, int]]:

@@ -136,7 +136,10 @@ class Grasp:
     pose: tuple[FloatArray, FloatArray] | None  # position (3,) [m] and rotation (3, 3) as it grasps
     stiffness: FloatArray | None  # (6,): along d1, d2, t [N/m], about them [N m/rad]; None: it does not yield
     force_limit: float  # [N]
-    edges: tuple[int, ...]  # that it touches
+    edges: tuple[int, ...]  # that it touches; none of a ring
+    slides: bool = False  # a ring, which the rod passes through
+    friction: float = 0.0  # of a ring [-]
+    feed_rate: float | None = None  # at first, where a drive holds the rod along itself [m/s]
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from withe.parts.directory import Directory
 from withe.parts.handles import Hand, NodeHandle, Rod, Support
-from withe.parts.hands import make_hand
+from withe.parts.hands import Sliding, make_hand
 from withe.parts.kinds import SupportPart
 from withe.parts.supports import check_not_held, make_clamp, make_pin
 
@@ -70,6 +70,9 @@ class Supports:
         pose: Any = None,
         stiffness: npt.ArrayLike | None = None,
         force_limit: float | None = None,
+        slides: bool = False,
+        friction: float = 0.0,
+        feed_rate: float | None = None,
         name: str | None = None,
     ) -> Hand:
         """Take hold of a rod by a hand, anywhere along it.
@@ -95,7 +98,16 @@ class Supports:
             Along d1, d2 and the tangent of what is held, and about them; of a pair each is one number for all three
             or three. By default the hand does not yield.
         force_limit : float [N]
-            Beyond which what is held slips through a hand that yields, as dry friction lets it.
+            Beyond which what is held slips through a hand that yields, as dry friction lets it; or a drive.
+        slides : bool
+            Whether it is a ring, which the rod passes through: it holds the rod across, by one stiffness [N/m], and
+            neither along itself nor its direction. By default it is as stiff as an edge there is to stretching.
+            Two rings hold a direction. Rods leave a ring whose end passes it, with a `RingLeftWarning`.
+        friction : float
+            Coulomb's coefficient of a ring that is not driven.
+        feed_rate : float [m/s]
+            Of a drive in the ring, which holds the rod along itself: by how much of its undeformed length it feeds the
+            rod towards its end, forwards through the ring. 0 holds it, until ``hand.feed`` sets another.
         name : str
 
         Returns
@@ -106,7 +118,8 @@ class Supports:
         ------
         ValueError
             Off the rod, an edge that is held already (two hands may hold neighbours: who came first holds the node
-            between them), a node that a clamp or a pin holds, or a stiffness or force limit that is not positive.
+            between them), a node that a clamp or a pin holds, a stiffness or force limit that is not positive,
+            friction that is negative, friction of a ring that is driven, or either without a ring.
 
         Examples
         --------
@@ -117,7 +130,8 @@ class Supports:
         >>> scene.grasp(rope, at=0.5, length=0.02, stiffness=(1e3, 1.0), force_limit=5.0)
         Hand(name='hand 1')
         """
-        part = make_hand(self._directory, rod, at, length, pose, stiffness, force_limit, name)
+        sliding = Sliding(slides, friction, feed_rate)
+        part = make_hand(self._directory, rod, at, length, pose, stiffness, force_limit, sliding, name)
         return cast(Hand, _hold(self._directory, part))
 
 

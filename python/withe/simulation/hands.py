@@ -10,12 +10,25 @@ import numpy.typing as npt
 
 from withe.common import validation
 from withe.parts.handles import Hand, Handle
+from withe.parts.kinds import Grasp
 from withe.simulation.motion import PathLike, RotationLike
 from withe.simulation.readouts import Reaction
 from withe.simulation.session import Session
 from withe.simulation.supports import find_support, move_support, release
 
-__all__ = ["Deflection", "HeldPose", "RunningHand", "find_hand", "hand_deflection", "hand_wrench", "support_pose"]
+__all__ = [
+    "Deflection",
+    "HeldPose",
+    "Passage",
+    "RunningHand",
+    "feed_ring",
+    "find_hand",
+    "hand_deflection",
+    "hand_wrench",
+    "release_left_rings",
+    "ring_passage",
+    "support_pose",
+]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -50,6 +63,27 @@ class Deflection(NamedTuple):
     shift: FloatArray
     turn: FloatArray
     slip: FloatArray
+
+
+class Passage(NamedTuple):
+    """How a rod passes a ring.
+
+    Attributes
+    ----------
+    at : float [m]
+        Arc length of the rod where the ring is, undeformed.
+    pull : float [N]
+        Of friction or a drive, backwards along the rod; negative: forwards. 0 where nothing holds the rod along itself.
+    press : float [N]
+        Force across the rod.
+    feed_rate : float or None [m/s]
+        Of the drive; None without one.
+    """
+
+    at: float
+    pull: float
+    press: float
+    feed_rate: float | None
 
 
 @dataclass(frozen=True)
@@ -101,6 +135,15 @@ class RunningHand(Hand):
         """How far the rod has gone in the hand. See `Simulation.deflection`."""
         return hand_deflection(self.session, self)
 
+    @property
+    def passage(self) -> Passage:
+        """How the rod passes this ring. See `Simulation.passage`."""
+        return ring_passage(self.session, self)
+
+    def feed(self, rate: float) -> None:
+        """Feed the rod at a rate from now on. See `Simulation.feed`."""
+        feed_ring(self.session, self, rate)
+
     def release(self) -> None:
         """Let go. See `Simulation.release`."""
         release(self.session, self)
@@ -135,6 +178,38 @@ def hand_deflection(session: Session, hand: Handle | str) -> Deflection:
     """How far the rod has gone in a hand; see `Simulation.deflection`."""
     found = session.world.deflection(find_hand(session, hand))
     return Deflection(np.array(found.shift), np.array(found.turn), np.array(found.slip))
+
+
+def ring_passage(session: Session, hand: Handle | str) -> Passage:
+    """How a rod passes a ring; see `Simulation.passage`."""
+    index, grasp = _find_ring(session, hand)
+    found = session.world.passage(index)
+    return Passage(found.at, found.pull, found.press, None if grasp.feed_rate is None else found.feed_rate)
+
+
+def feed_ring(session: Session, hand: Handle | str, rate: float) -> None:
+    """Set what a drive feeds; see `Simulation.feed`."""
+    index, grasp = _find_ring(session, hand)
+    name = hand if isinstance(hand, str) else hand.name
+    if grasp.feed_rate is None:
+        raise ValueError(f"hand {name!r} has no drive: grasp with slides=True and feed_rate=0")
+    session.world.feed(index, validation.number(rate, f"rate of {name!r}"))
+
+
+def release_left_rings(session: Session) -> list[str]:
+    """Take off rings that rods have left; their names."""
+    left = set(session.world.left_rings())
+    names = [name for name, (index, _) in session.settings.supports.items() if index in left] if left else []
+    for name in names:
+        release(session, name)
+    return names
+
+
+def _find_ring(session: Session, hand: Handle | str) -> tuple[int, Grasp]:
+    index, part = find_support(session, hand)
+    if part.grasp is None or not part.grasp.slides:
+        raise ValueError(f"hand must be a ring, which grasp(slides=True) returns, got {part.name!r}")
+    return index, part.grasp
 
 
 def support_pose(session: Session, support: Handle | str) -> HeldPose:

@@ -11,7 +11,15 @@ from withe.knots import link
 from withe.parts.contacts import contact_table
 from withe.parts.handles import Hand, NodeHandle, Obstacle, Rod, Spring, Support
 from withe.parts.kinds import ObstaclePart, SpringPart
-from withe.simulation.hands import Deflection, HeldPose, hand_deflection, hand_wrench, support_pose
+from withe.simulation.hands import (
+    Deflection,
+    HeldPose,
+    Passage,
+    hand_deflection,
+    hand_wrench,
+    ring_passage,
+    support_pose,
+)
 from withe.simulation.readouts import Energy, Momentum, Plan, Reaction, RodEnergy, Statistics
 from withe.simulation.session import Session
 from withe.simulation.springs import spring_tension
@@ -203,6 +211,22 @@ class Measurements:
             No hand, or released.
         """
         return hand_deflection(self._session, hand)
+
+    def passage(self, ring: Hand | str) -> Passage:
+        """How a rod passes a ring now: where along itself, and what the ring does to it there.
+
+        Raises
+        ------
+        ValueError
+            No ring, or released, or left by its rod.
+
+        Examples
+        --------
+        >>> ring = simulation.grasp(arm, at=0.2, slides=True, friction=0.3)
+        >>> round(simulation.passage(ring).at, 9)
+        0.2
+        """
+        return ring_passage(self._session, ring)
 
     def pose(self, support: Support | NodeHandle | str) -> HeldPose:
         """Position and rotation of a support or a hand now.

@@ -8,9 +8,9 @@ import numpy.typing as npt
 
 from withe.parts.friction import Friction
 from withe.parts.handles import NodeHandle, Obstacle, Rod, Support
-from withe.parts.hands import make_hand
+from withe.parts.hands import Sliding, make_hand
 from withe.parts.supports import make_clamp, make_pin
-from withe.simulation.hands import RunningHand, find_hand
+from withe.simulation.hands import RunningHand, feed_ring, find_hand
 from withe.simulation.motion import PathLike, RotationLike
 from withe.simulation.obstacles import find_obstacle, move_obstacle
 from withe.simulation.session import Session
@@ -64,6 +64,9 @@ class Placement:
         pose: Any = None,
         stiffness: npt.ArrayLike | None = None,
         force_limit: float | None = None,
+        slides: bool = False,
+        friction: float = 0.0,
+        feed_rate: float | None = None,
         name: str | None = None,
     ) -> RunningHand:
         """Take hold of a rod by a hand, where it is and as it is now: nothing jumps. See `Scene.grasp`.
@@ -73,7 +76,8 @@ class Placement:
         Returns
         -------
         RunningHand
-            A handle with methods of its own: ``move``, ``wrench``, ``release``, ``pose``, ``deflection``.
+            A handle with methods of its own: ``move``, ``wrench``, ``release``, ``pose``, ``deflection``, of a ring
+            ``passage`` and ``feed``.
 
         Raises
         ------
@@ -87,7 +91,8 @@ class Placement:
         >>> hand.deflection.shift.shape
         (3,)
         """
-        part = make_hand(self._session.directory, rod, at, length, pose, stiffness, force_limit, name)
+        sliding = Sliding(slides, friction, feed_rate)
+        part = make_hand(self._session.directory, rod, at, length, pose, stiffness, force_limit, sliding, name)
         handle = put_on(self._session, part)
         return RunningHand(handle.scene_id, handle.name, self._session)
 
@@ -107,6 +112,22 @@ class Placement:
         find_hand(self._session, hand)
         name = hand if isinstance(hand, str) else hand.name
         return RunningHand(self._session.directory.scene_id, name, self._session)
+
+    def feed(self, ring: Support | str, rate: float) -> None:
+        """Let the drive of a ring feed its rod from now on; see ``feed_rate`` of `Scene.grasp`.
+
+        Parameters
+        ----------
+        ring : Hand or str
+        rate : float [m/s]
+            Undeformed length of the rod that goes through the ring towards its end; negative: back.
+
+        Raises
+        ------
+        ValueError
+            A ring without a drive, or released.
+        """
+        feed_ring(self._session, ring, rate)
 
     def release(self, support: Support | NodeHandle | str) -> None:
         """Let go of a node.

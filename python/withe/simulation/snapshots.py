@@ -291,12 +291,16 @@ def _written(grasp: Grasp) -> dict[str, Any]:
         "stiffness": None if grasp.stiffness is None else grasp.stiffness.tolist(),
         "force_limit": grasp.force_limit if math.isfinite(grasp.force_limit) else None,
         "edges": list(grasp.edges),
+        "slides": grasp.slides,
+        "friction": grasp.friction,
+        "feed_rate": grasp.feed_rate,
     }
 
 
 def _read(entry: dict[str, Any]) -> Grasp:
     """That back."""
     pose, stiffness, limit = entry["pose"], entry["stiffness"], entry["force_limit"]
+    rate = entry["feed_rate"]
     return Grasp(
         at=validation.number(entry["at"], "at"),
         length=validation.non_negative(entry["length"], "length"),
@@ -304,4 +308,7 @@ def _read(entry: dict[str, Any]) -> Grasp:
         stiffness=None if stiffness is None else validation.per_item(stiffness, "stiffness", 6, "directions"),
         force_limit=math.inf if limit is None else validation.positive(limit, "force_limit"),
         edges=tuple(validation.integer(edge, "edge", 0, 10_000_000) for edge in entry["edges"]),
+        slides=validation.truth(entry["slides"], "slides"),
+        friction=validation.non_negative(entry["friction"], "friction"),
+        feed_rate=None if rate is None else validation.number(rate, "feed_rate"),
     )

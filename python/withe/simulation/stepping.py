@@ -11,10 +11,11 @@ from typing import Any
 import numpy as np
 
 from withe import _core
-from withe.errors import CoarseMeshWarning, CoarseStepWarning, ConvergenceError
+from withe.errors import CoarseMeshWarning, CoarseStepWarning, ConvergenceError, RingLeftWarning
 from withe.recording.recorder import Recorder
 from withe.simulation.functions import apply_functions, force_function, step_callback
 from withe.simulation.gradients import equilibrium_gradient, equilibrium_jacobian
+from withe.simulation.hands import release_left_rings
 from withe.simulation.linearisation import Linearisation, Stability
 from withe.simulation.loads import load_index
 from withe.simulation.paths import EquilibriumPath, PathOptions, path_of
@@ -160,6 +161,12 @@ class Stepping:
             raise convergence_error(self.session, failure.args) from None
         finally:
             pass_on(world.take_warning(), world.take_step_warning())
+            for name in release_left_rings(self.session):
+                warnings.warn(
+                    f"the end of a rod has passed out of ring {name!r} (time {world.time:.6g} s): it is released",
+                    RingLeftWarning,
+                    stacklevel=_levels_to_user(),
+                )
 
 
 def convergence_error(session: Session, numbers: tuple[Any, ...]) -> ConvergenceError:

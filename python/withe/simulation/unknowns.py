@@ -175,6 +175,8 @@ def _hand_reader(session: Session, part: SupportPart, word: str) -> Reader:
     grasp = part.grasp
     if grasp is None or grasp.stiffness is None:
         raise ValueError(f"{part.name!r} has no {word} to differentiate by: it is no hand that yields")
+    if grasp.slides:
+        raise ValueError(f"no gradient is known by the {word} of {part.name!r}, which is a ring")
     index = session.settings.supports[part.name][0]
     if word == "stiffness":
         return lambda g: np.array(g.parameters.hand_stiffness[index])

@@ -1,0 +1,82 @@
+#pragma once
+/// A ring that a rod passes through: it holds the rod across, and lets it slide.
+///
+/// The rod is the smooth curve c of geometry/rod_spline.hpp. It passes the ring, at p, where it is nearest,
+///   r = c - p,   r . c' = 0,   so that with the nodes   D da = -(c' . dc + r . dc').
+/// The ring has the energy
+///   E = k r . r / 2 + k u^2 / 2,   u = s0 - fed - slip - s,
+/// the second part where something holds the rod along itself: friction, or a drive that feeds it; fed is the length at
+/// rest that has gone towards the end of the rod since it passed the ring at s0. By node i, of weights w_i in c and
+/// w_i' in c',
+///   dE/dx_i = k w_i r + T (s' / D) (w_i c' + w_i' r),   T = k u,
+/// since a makes the first part least: frictionless, the force is across the rod. E knows nothing of the ring's axes,
+/// so that the forces have no moment about p.
+///
+/// T pulls the rod back by P = T s' |c'| / D (T itself, where the rod is not stretched). Friction bears
+/// |P| <= mu k |r| [Coulomb], a drive its force limit. Beyond it slip follows, so that P is at the limit (return
+/// mapping, as in forces/hand.hpp).
+
+#include <cmath>
+
+#include "common/dual.hpp"
+#include "geometry/rod_spline.hpp"
+
+namespace withe {
+
+struct Ring {
+  double stiffness = 0;           ///< k [N/m]
+  bool holds = false;             ///< along the rod
+  double friction = 0;            ///< mu [-]
+  double force_limit = INFINITY;  ///< of a drive [N]
+
+  bool slips() const { return friction > 0.0 || std::isfinite(force_limit); }
+};
+
+template <class Scalar>
+struct RingForce {
+  Scalar tension;      ///< T [N]
+  double elastic = 0;  ///< k u [N]
+  Vec3<Scalar> by[3];  ///< generalised forces, minus those on the nodes [N]
+};
+
+/// T within its limit, at a point where the curve is nearest.
+template <class Scalar>
+Scalar ring_tension(const Ring& ring, const Scalar& u, const Scalar& arc_slope, const SplinePoint<Scalar>& c) {
+  using std::sqrt;
+  const Scalar elastic = ring.stiffness * u;
+  if (!ring.slips()) return elastic;
+  Scalar most(ring.force_limit);
+  if (ring.friction > 0.0) {
+    const Scalar square = dot(c.across, c.across);
+    most = value_of(square) > 0.0 ? (ring.friction * ring.stiffness) * sqrt(square) : Scalar(0.0);
+  }
+  const Scalar limit = most * c.off_slope / (arc_slope * sqrt(dot(c.along, c.along)));
+  if (std::abs(value_of(elastic)) <= value_of(limit)) return elastic;
+  return value_of(elastic) > 0.0 ? limit : -1.0 * limit;
+}
+
+/// At a place, whose a changes with the nodes; `origin`: s0 - fed - slip.
+template <class Scalar>
+RingForce<Scalar> ring_force(const Ring& ring, const SplinePiece& piece, const Scalar& a, double origin,
+                             const Vec3<Scalar> (&x)[3]) {
+  const SplineWeights<Scalar> w = spline_weights(piece, a);
+  const SplinePoint<Scalar> c = spline_point(w, x);
+  RingForce<Scalar> out{};
+  for (int i = 0; i < 3; ++i) out.by[i] = (ring.stiffness * w.value[i]) * c.across;
+  if (!ring.holds) return out;
+  const Scalar slope = spline_arc_slope(piece, a), u = origin - spline_arc(piece, a);
+  out.elastic = ring.stiffness * value_of(u);
+  out.tension = ring_tension(ring, u, slope, c);
+  const Scalar per = out.tension * slope / c.off_slope;
+  for (int i = 0; i < 3; ++i) out.by[i] += per * (w.value[i] * c.along + w.slope[i] * c.across);
+  return out;
+}
+
+/// a of the nearest point as the nodes move: its value is given.
+template <class Scalar>
+Scalar following_place(const SplinePiece& piece, double a, const Vec3<Scalar> (&x)[3]) {
+  const SplinePoint<Scalar> c = spline_point(spline_weights(piece, Scalar(a)), x);
+  return a - (c.off - value_of(c.off)) / value_of(c.off_slope);
+}
+
+}  // namespace withe

@@ -1,0 +1,61 @@
+#pragma once
+/// Rings that rods pass through, see forces/ring.hpp: the part of `HandForces` that slides along.
+
+#include <vector>
+
+#include "forces/ring.hpp"
+#include "model/rod_curve.hpp"
+#include "steps/term.hpp"
+
+namespace withe {
+
+/// Where a hand is.
+struct HandPose {
+  Vector3 position = Vector3::Zero();      ///< [m]
+  Matrix3 rotation = Matrix3::Identity();  ///< columns: its axes
+  double fed = 0.0;                        ///< by the drive of a ring [m]
+};
+
+class RingForces {
+ public:
+  explicit RingForces(const Model& model);
+
+  ElementTable& table() { return table_; }
+  int count() const { return static_cast<int>(rings_.size()); }
+  /// Whether friction or a limit lets any slip along.
+  bool slips() const { return slips_; }
+
+  /// `end`: where hands are at the end of the step, per support; empty: where they are at the start.
+  void add(const StepProblem& problem, StepData& data, const std::vector<HandPose>& end,
+           std::span<double> values) const;
+  void add_rounding(const StepProblem& problem, StepData& data) const;
+  /// What slip takes, and what rings and their drives do, in a step that ends at `q1` [J].
+  double dissipated(const StepProblem& problem, const std::vector<HandPose>& end, const VectorX& q1) const;
+  double work(const StepProblem& problem, const std::vector<HandPose>& end, const VectorX& q1) const;
+  /// Takes a state there whose hands are where they go to. Returns what stays with rings that rods have left [J].
+  double accept(State& state) const;
+
+ private:
+  struct Held {
+    int support = 0, first_element = 0;
+  };
+
+  const Model& model_;
+  std::vector<Held> rings_;
+  ElementTable table_;
+  bool slips_ = false;
+};
+
+/// How a rod passes a ring.
+struct Passage {
+  SplinePlace place;
+  Vector3 across = Vector3::Zero();  ///< r [m]
+  double at = 0;                     ///< arc length [m]
+  double slipped = 0;                ///< what there is of u beyond the limit [m]
+  double tension = 0;                ///< T [N]
+  double pull = 0;                   ///< P [N]
+  double energy = 0;                 ///< [J]
+};
+Passage passage_of(const Model& model, const State& state, int support);
+
+}  // namespace withe

@@ -1,0 +1,119 @@
+"""Rings at the border: their words in scene and simulation, what they refuse, and what goes on from a snapshot."""
+
+import pickle
+
+import numpy as np
+import pytest
+
+import withe
+
+
+def drawn():
+    scene = withe.Scene()
+    rubber = withe.Material(youngs_modulus=1e6, density=1000.0)
+    rod = scene.add_rod(start=(0, 0, 0), end=(0.4, 0, 0), nodes=21, radius=4e-3, material=rubber, name="rod")
+    return scene, rod
+
+
+def built(**words):
+    scene, rod = drawn()
+    scene.clamp(rod.start)
+    return scene.build(integrator="implicit_midpoint", time_step=1e-3, planar=False, **words), rod
+
+
+def test_scene_and_simulation_have_the_same_words():
+    answers = []
+    for early in (True, False):
+        scene, rod = drawn()
+        words = {"at": 0.13, "slides": True, "stiffness": 300.0, "friction": 0.2, "name": "eye"}
+        if early:
+            scene.grasp(rod, **words)
+        simulation = scene.build(time_step=1e-3, planar=False)
+        if not early:
+            simulation.grasp(rod, **words)
+        simulation.step(20)
+        answers.append((simulation.positions(), simulation.wrench("eye").force, simulation.passage("eye")))
+    for one, other in zip(*answers, strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+def test_a_ring_is_as_stiff_as_an_edge_by_default():
+    simulation, rod = built()
+    ring = simulation.grasp(rod, 0.33, slides=True)
+    simulation.step(5)
+    edge = 1e6 * np.pi * 4e-3**2 / 0.02
+    assert ring.passage.press == pytest.approx(edge * np.linalg.norm(ring.deflection.shift), rel=1e-12)
+    assert ring.passage.press > 0.0
+
+
+@pytest.mark.parametrize(
+    "words", [{"friction": 0.4}, {"feed_rate": 0.3, "force_limit": 2.0}], ids=["friction", "drive"]
+)
+def test_snapshots_copies_pickles_and_files_go_on_with_the_same_bits(words, tmp_path):
+    simulation, rod = built()
+    simulation.step(3)
+    ring = simulation.grasp(rod, 0.17, slides=True, **words)
+    ring.move(path=[(0.0, 0.17, 0.0, 0.0), (0.2, 0.2, 0.05, 0.1)])
+    simulation.step(5)
+    if "feed_rate" in words:
+        ring.feed(-0.2)
+    state, copy, pickled = simulation.snapshot(), simulation.copy(), pickle.loads(pickle.dumps(simulation))
+    state.save(tmp_path / "state.npz")
+    fresh = built()[0]
+    simulation.step(5)
+    end, passage = simulation.positions(), ring.passage
+    for other in (copy, pickled):
+        other.step(5)
+        np.testing.assert_array_equal(other.positions(), end)
+        assert other.passage(ring.name) == passage
+    ring.release()
+    simulation.restore(state)
+    simulation.step(5)
+    np.testing.assert_array_equal(simulation.positions(), end)
+    fresh.restore(withe.Snapshot.load(tmp_path / "state.npz"))
+    fresh.step(5)
+    np.testing.assert_array_equal(fresh.positions(), end)
+    assert fresh.passage(ring.name) == passage
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ({"at": 0.5}, "must be on rod 'rod', from 0 to 0.4 m"),
+        ({"slides": 1}, "slides of 'hand 1' must be"),
+        ({"length": 0.02}, "length of 'hand 1' must be 0: a ring"),
+        ({"stiffness": (1.0, 1.0)}, "stiffness of 'hand 1' must be one number"),
+        ({"stiffness": 0.0}, "stiffness of 'hand 1' must be positive"),
+        ({"friction": -0.1}, "friction of 'hand 1' must not be negative"),
+        ({"friction": np.nan}, "friction of 'hand 1' must be"),
+        ({"feed_rate": np.inf}, "feed_rate of 'hand 1' must be"),
+        ({"feed_rate": 0.1, "friction": 0.2}, "friction of 'hand 1' must be 0 where a drive"),
+        ({"force_limit": 1.0}, "force_limit of 'hand 1' is that of a drive"),
+        ({"feed_rate": 0.1, "force_limit": 0.0}, "force_limit of 'hand 1' must be positive"),
+        ({"slides": False, "friction": 0.2}, "friction of 'hand 1' needs a ring"),
+        ({"slides": False, "feed_rate": 0.0}, "feed_rate of 'hand 1' needs a ring"),
+    ],
+)
+def test_bad_input_is_named(words, message):
+    scene, rod = drawn()
+    for where in (scene, scene.build()):
+        with pytest.raises(ValueError, match=message):
+            where.grasp(rod, **({"at": 0.1, "slides": True} | words))
+
+
+def test_what_rings_do_not_go_with_says_so():
+    simulation, rod = built()
+    ring, hand = simulation.grasp(rod, 0.2, slides=True, name="eye"), simulation.grasp(rod, 0.3, name="grip")
+    with pytest.raises(ValueError, match="'eye' has no drive"):
+        ring.feed(0.1)
+    with pytest.raises(ValueError, match="must be a ring, which grasp"):
+        simulation.passage(hand)
+    with pytest.raises(ValueError, match="a rod slides through a ring"):
+        simulation.run(0.01, differentiable=True).gradient({"positions": np.ones((11, 21, 3))}, ["gravity"])
+    scene, rod = drawn()
+    scene.clamp(rod.start)
+    scene.grasp(rod, 0.2, slides=True, friction=0.1)
+    with pytest.raises(ValueError, match="knows rigid hands only"):
+        scene.build(integrator="verlet", time_step=1e-6)
+    with pytest.raises(ValueError, match="hands that slip do not allow"):
+        scene.build(integrator="fourth_order", time_step=1e-3)
