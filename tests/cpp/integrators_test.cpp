@@ -56,7 +56,7 @@ void expect_matrix_is_exact(Case c, Scheme scheme, double dt, bool exact = false
   MatrixX free(n, n), J(n, n);
   equations.evaluate(c.q, true, nullptr, evaluation);
   const VectorX with_matrix = rows;
-  const double scale = evaluation.magnitude.maxCoeff();
+  const double scale = evaluation.row_magnitude.maxCoeff();
   for (Eigen::Index i = 0; i < n; ++i) {
     VectorX e = VectorX::Unit(n, i), y(n);
     if (!exact) equations.assembler().project(e);
