@@ -275,7 +275,7 @@ class Tape::Moments {
       const ReadoutAdjoint& by = moments_[left_ - 1].by;
       add_unknowns(tape_.model_, by, adjoint);
       if (!by.needs_state()) continue;
-      const Parameters& shown = shown_parameters(static_cast<long>(steps), parameters);
+      const Parameters& shown = shown_parameters(static_cast<long>(steps), &parameters);
       CoefficientAdjoint coefficients(tape_.model_, shown.loads.rows());
       add_readouts(tape_.model_, assembler, shown, state(), by, adjoint, coefficients);
       const double time = steps == 0 ? tape_.starts_.front().time : tape_.steps_[steps - 1].time;
@@ -301,10 +301,10 @@ class Tape::Moments {
   }
 
   /// With the natural shape that was there after so many steps.
-  const Parameters& shown_parameters(long steps, const Parameters& acted) {
+  const Parameters& shown_parameters(long steps, const Parameters* acted) {
     const auto found = tape_.natural_.find(steps);
-    if (found == tape_.natural_.end()) return acted;
-    shown_ = acted;
+    if (found == tape_.natural_.end()) return *acted;
+    shown_ = *acted;
     shown_.natural_curvature = found->second.curvature;
     shown_.natural_twist = found->second.twist;
     shown_.edge_natural_stretch = found->second.stretch;

@@ -14,6 +14,7 @@ enum class Heuristic : unsigned {
   matrix_worth,
   reject_growing,
   reject_cut,
+  reject_stagnation,
   surface_search,
   search_descent,
   drop_geometric,

@@ -39,6 +39,8 @@ class Stagnation {
     step_ = step;
   }
   bool reached() const { return reached_; }
+  /// Iterations since residuals last halved.
+  int stalls() const { return stalls_; }
 
  private:
   double residual_ = INFINITY, step_ = INFINITY;

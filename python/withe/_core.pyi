@@ -480,6 +480,7 @@ class Options:
         "matrix_worth",
         "reject_growing",
         "reject_cut",
+        "reject_stagnation",
         "surface_search",
         "search_descent",
         "drop_geometric",

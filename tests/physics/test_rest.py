@@ -34,17 +34,17 @@ def test_a_dropped_cable_comes_to_rest_for_a_minute(model, friction_model):
 @pytest.mark.parametrize("friction_model", ["anchored", "implicit"])
 @pytest.mark.parametrize("model", ["imcv2", "barrier"])
 def test_midpoint_steps_bring_it_to_rest_too(model, friction_model, restitution):
-    """It is so light that it rests within the tolerance of contact, in steps of full length."""
+    """It is so light that it rests within the tolerance of contact, in steps of full length; jumps take 10 s."""
     simulation, fallen = dropped(
         model=model, friction_model=friction_model, restitution=restitution, integrator="implicit_midpoint"
     )
     kinetic = []
-    for end in (20.0, 40.0, 60.0):
+    for end in (30.0, 50.0, 70.0):
         simulation.run(duration=end - simulation.time, progress=False)
         kinetic.append(simulation.energy().kinetic / fallen)
     assert kinetic[-1] < 1e-12
     assert kinetic[2] < 0.01 * kinetic[1] < 1e-4 * kinetic[0] or kinetic[1] < 1e-18  # what swings on an anchor decays
-    assert simulation.statistics.steps < 1.3 * 60.0 / 5e-3
+    assert simulation.statistics.steps < 1.3 * 70.0 / 5e-3
 
 
 def test_without_friction_a_drop_loses_nothing_in_elastic_impacts():
