@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 
+#include "common/hypotenuse.hpp"
 #include "elastica/rod_grasp.hpp"
 #include "elastica/runge_kutta.hpp"
 
@@ -15,9 +16,6 @@ using Path = HeldProblem::Path;
 constexpr double kFoldedForce = 4.913426;  ///< of the floor on a long folded rod that does not stretch [w Lgb]
 constexpr double kFoldedSolved = 9.0;      ///< length at which that is nearly so
 constexpr double kBelowFloor = 1e-6, kLongestMove = 0.4, kLongestElement = 0.12;
-
-/// Not std::hypot: it asks for glibc 2.35, and a wheel must do with 2.34.
-double distance(double x, double z) { return std::sqrt(x * x + z * z); }
 
 std::vector<double> scaled(const std::vector<double>& cuts, double factor) {
   std::vector<double> result = cuts;
@@ -103,7 +101,7 @@ bool StraightRod::follow_to(double x, double z, Path& path, HeldProblem& problem
   ShootingSolver<HeldProblem> solver;
   Path trial;
   const double from_x = path.nodes.back()[6], from_z = path.nodes.back()[8];
-  const double way = distance(x - from_x, z - from_z);
+  const double way = hypotenuse(x - from_x, z - from_z);
   const int parts = std::max(1, static_cast<int>(std::ceil(way / kLongestMove)));
   for (int i = 0; i < parts; ++i) {
     if (!follow(solver, problem, 0.3, path, trial, [&](double share, Path& /*at*/) {
@@ -116,7 +114,7 @@ bool StraightRod::follow_to(double x, double z, Path& path, HeldProblem& problem
 }
 
 std::optional<RodShape> StraightRod::at_position(double x, double z) const {
-  const auto way = [&](const Path& path) { return distance(x - path.nodes.back()[6], z - path.nodes.back()[8]); };
+  const auto way = [&](const Path& path) { return hypotenuse(x - path.nodes.back()[6], z - path.nodes.back()[8]); };
   Path path = folded_ && way(*folded_) < way(gentle_) ? *folded_ : gentle_;
   HeldProblem problem = problem_;
   if (!follow_to(x, z, path, problem) || !allowed(problem, path)) return std::nullopt;
@@ -126,7 +124,7 @@ std::optional<RodShape> StraightRod::at_position(double x, double z) const {
 /// How far along a ray positions are allowed, from an allowed one.
 double StraightRod::extent(HeldProblem problem, Path path, double angle, double outwards) const {
   const double c = std::cos(angle), d = std::sin(angle), length = problem_.cuts.back();
-  double inside = distance(path.nodes.back()[6], path.nodes.back()[8]);
+  double inside = hypotenuse(path.nodes.back()[6], path.nodes.back()[8]);
   double step = 0.16 * length;
   while (step > 5e-4 * length) {
     const double next = inside + outwards * step;

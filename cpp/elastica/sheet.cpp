@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "common/dual.hpp"
+#include "common/hypotenuse.hpp"
 #include "elastica/runge_kutta.hpp"
 
 namespace withe {
@@ -87,7 +88,7 @@ double longest_step_at(const SheetWidth& width, const SheetProblem::Path& path, 
   const double down = width.weight_at(length) - width.weight_at(t);
   const auto& piece = width.pieces()[width.piece_before(t)];
   const double b = std::max(piece.width_at(t), 1e-6);
-  const double step = longest_step(std::max(std::hypot(up - down, forward), 1e-3), b);
+  const double step = longest_step(std::max(hypotenuse(up - down, forward), 1e-3), b);
   return piece.slope == 0 ? step : std::min(step, 0.3 * b / std::abs(piece.slope));
 }
 

@@ -5,6 +5,8 @@
 #include <queue>
 #include <utility>
 
+#include "common/hypotenuse.hpp"
+
 namespace withe {
 
 namespace {
@@ -27,11 +29,7 @@ NeighbourList neighbours(const BitImage& skeleton, const PixelIndex& index, Pixe
   return list;
 }
 
-/// Not std::hypot: it asks for glibc 2.35, and a wheel must do with 2.34.
-double step_length(const SkeletonPoint& a, const SkeletonPoint& b) {
-  const double x = a.x - b.x, y = a.y - b.y;
-  return std::sqrt(x * x + y * y);
-}
+double step_length(const SkeletonPoint& a, const SkeletonPoint& b) { return hypotenuse(a.x - b.x, a.y - b.y); }
 
 double median_half_width(const std::vector<SkeletonPoint>& points) {
   if (points.empty()) return 0;
