@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "derivative_check.hpp"
+#include "case_residual.hpp"
 #include "model/edge_vectors.hpp"
 #include "states.hpp"
 #include "steps/equations.hpp"
@@ -15,14 +15,15 @@ namespace withe {
 namespace {
 
 using testing::Case;
+using testing::CaseResidual;
 using testing::derivative_matches;
+using testing::expect_forces_of_energy;
+using testing::expect_wrench_is_felt;
 using testing::gradient_matches;
+using testing::kRules;
 using testing::MatrixX;
 using testing::RandomNumbers;
 using testing::SceneBuilder;
-
-constexpr StepRule kRules[] = {StepRule::statics, StepRule::backward_euler, StepRule::midpoint,
-                               StepRule::energy_momentum};
 
 HandDescription yielding(double at, double length) {
   HandDescription hand;
@@ -80,36 +81,14 @@ std::vector<Case> all_cases(double force_limit = INFINITY) {
   return out;
 }
 
-/// The residual of the hands alone: what is left without them taken off.
-struct Alone {
-  Alone(const Case& of, StepRule under)
-      : c(of),
-        rule(under),
-        interval(under == StepRule::statics ? 0.0 : 0.3),
-        parameters(initial_parameters(of.model)),
-        with(of.model, {.rule = under}) {
-    with.begin(c.state, parameters, rule, interval);
-  }
-  /// Hands turn by an angle in the step, and move.
-  void aim(double angle) {
-    std::vector<HandPose> poses;
-    const Vector3 axis = c.model.planar() ? c.model.plane->normal : Vector3(0.6, 0.0, 0.8);
-    for (const HandState& hand : c.state.hands)
-      poses.push_back({hand.position + Vector3(0.02, 0.0, 0.0), rotation_exp(angle * axis) * hand.rotation});
-    with.hands()->aim(std::move(poses));
-    with.begin(c.state, parameters, rule, interval);
-  }
-  VectorX operator()(const VectorX& q) {
-    with.evaluate(q, false, nullptr, data);
-    return data.full_residual;
-  }
-  const Case& c;
-  StepRule rule;
-  double interval;
-  Parameters parameters;
-  Equations with;
-  StepData data;
-};
+/// Hands turn by an angle in the step, and move.
+std::vector<HandPose> turned_hands(const Case& c, double angle) {
+  std::vector<HandPose> poses;
+  const Vector3 axis = c.model.planar() ? c.model.plane->normal : Vector3(0.6, 0.0, 0.8);
+  for (const HandState& hand : c.state.hands)
+    poses.push_back({hand.position + Vector3(0.02, 0.0, 0.0), rotation_exp(angle * axis) * hand.rotation});
+  return poses;
+}
 
 TEST(HandForces, MatrixIsTheDerivativeOfTheResidualUnderEveryRuleHeldOrSlipping) {
   for (double limit : {static_cast<double>(INFINITY), 0.05})
@@ -117,60 +96,21 @@ TEST(HandForces, MatrixIsTheDerivativeOfTheResidualUnderEveryRuleHeldOrSlipping)
       for (Case c : all_cases(limit)) {
         if (rule == StepRule::energy_momentum && c.q == c.state.q)
           c.q += 10.0 * c.increment * RandomNumbers(8).vector(c.q.size());
-        Alone residual(c, rule);
-        residual.aim(0.3);
-        const Eigen::Index n = c.model.dof_count;
-        residual.with.evaluate(c.q, true, nullptr, residual.data);
-        MatrixX J(n, n);
-        for (Eigen::Index i = 0; i < n; ++i) {
-          VectorX e = VectorX::Unit(n, i), y(n);
-          residual.with.assembler().solver().multiply({e.data(), static_cast<std::size_t>(n)},
-                                                      {y.data(), static_cast<std::size_t>(n)});
-          J.col(i) = y;
-        }
+        CaseResidual residual(c, rule);
+        residual.aim(turned_hands(c, 0.3));
+        const MatrixX J = residual.matrix(c.q);
         EXPECT_TRUE(derivative_matches([&](const VectorX& q) { return residual(q); }, c.q, J, 0.3 * c.increment))
             << c.name << ", rule " << static_cast<int>(rule) << ", limit " << limit;
       }
 }
 
 TEST(HandForces, ForcesAreThoseOfTheEnergyThatReadOutsHave) {
-  for (Case c : all_cases()) {
-    Alone with(c, StepRule::statics);
-    const auto energy = [&](const VectorX& q) {
-      State there = c.state;
-      there.q = q;
-      Configuration configuration;
-      compute_configuration(c.model, there, q, configuration);
-      return hand_energy(c.model, with.parameters.measure, there, configuration);
-    };
-    Model without = c.model;
-    for (Support& support : without.supports) support.active = false;
-    Case bare = c;
-    bare.model = without;
-    Alone rest(bare, StepRule::statics);
-    const VectorX forces = with(c.q) - rest(c.q);
-    EXPECT_TRUE(gradient_matches(energy, c.q, forces, 0.3 * c.increment)) << c.name;
-    EXPECT_NEAR(with.data.potential - rest.data.potential, energy(c.q), 1e-12) << c.name;
-  }
+  for (const Case& c : all_cases()) expect_forces_of_energy(c, 0.3 * c.increment);
 }
 
 TEST(HandForces, WrenchIsWhatTheRodFeels) {
   for (double limit : {static_cast<double>(INFINITY), 0.05})
-    for (Case c : all_cases(limit)) {
-      Alone with(c, StepRule::statics);
-      Model without = c.model;
-      for (Support& support : without.supports) support.active = false;
-      Case bare = c;
-      bare.model = without;
-      Alone rest(bare, StepRule::statics);
-      const VectorX forces = rest(c.q) - with(c.q);
-      Wrench sum;
-      for (const Wrench& wrench : with.data.hands) sum.force += wrench.force, sum.moment += wrench.moment;
-      if (c.model.planar()) sum.moment -= c.model.plane->origin.cross(sum.force);  // where its unknowns begin
-      for (const auto& [u, omega] : testing::rigid_motions(c.model))
-        EXPECT_NEAR(forces.dot(testing::rigid_motion(c, u, omega)), sum.force.dot(u) + sum.moment.dot(omega), 1e-12)
-            << c.name;
-    }
+    for (const Case& c : all_cases(limit)) expect_wrench_is_felt(c, StepRule::statics);
 }
 
 /// A step of a scene whose hands have other poses, slips and stiffness, by numbers in a row: per hand how its start is

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "derivative_check.hpp"
+#include "case_residual.hpp"
 #include "model/edge_vectors.hpp"
 #include "states.hpp"
 #include "steps/equations.hpp"
@@ -11,15 +11,16 @@
 namespace withe {
 namespace {
 
+using testing::bare;
 using testing::Case;
+using testing::CaseResidual;
 using testing::derivative_matches;
-using testing::gradient_matches;
+using testing::expect_forces_of_energy;
+using testing::expect_wrench_is_felt;
+using testing::kRules;
 using testing::MatrixX;
 using testing::RandomNumbers;
 using testing::SceneBuilder;
-
-constexpr StepRule kRules[] = {StepRule::statics, StepRule::backward_euler, StepRule::midpoint,
-                               StepRule::energy_momentum};
 
 /// What holds the rod along itself, beside nothing: a drive, one that slips, and friction.
 enum class Along { nothing, drive, slipping_drive, friction };
@@ -65,42 +66,13 @@ std::vector<Case> cases(bool planar, Along along) {
   return out;
 }
 
-struct Alone {
-  Alone(const Case& of, StepRule under)
-      : c(of),
-        rule(under),
-        interval(under == StepRule::statics ? 0.0 : 0.3),
-        parameters(initial_parameters(of.model)),
-        with(of.model, {.rule = under}) {
-    begin();
-  }
-  void begin() { with.begin(c.state, parameters, rule, interval); }
-  /// Rings move within the step, and their drives feed.
-  void aim() {
-    for (const HandState& hand : c.state.hands)
-      poses.push_back({hand.position + 0.02 * (c.model.planar() ? c.model.plane->first : Vector3(0.6, 0.0, 0.8)),
-                       hand.rotation, 0.03});
-    if (with.hands()) with.hands()->aim(poses);
-    begin();
-  }
-  VectorX operator()(const VectorX& q) {
-    with.evaluate(q, false, nullptr, data);
-    return data.full_residual;
-  }
-  const Case& c;
-  StepRule rule;
-  double interval;
-  Parameters parameters;
-  Equations with;
+/// Rings move within the step, and their drives feed.
+std::vector<HandPose> moved_rings(const Case& c) {
   std::vector<HandPose> poses;
-  StepData data;
-};
-
-/// Without rings.
-Case bare(const Case& c) {
-  Case out = c;
-  for (Support& support : out.model.supports) support.active = false;
-  return out;
+  for (const HandState& hand : c.state.hands)
+    poses.push_back({hand.position + 0.02 * (c.model.planar() ? c.model.plane->first : Vector3(0.6, 0.0, 0.8)),
+                     hand.rotation, 0.03});
+  return poses;
 }
 
 TEST(RodCurve, IsNearestWhereAFineScanFindsIt) {
@@ -157,17 +129,9 @@ TEST(RingForces, MatrixIsTheDerivativeOfTheResidualUnderEveryRule) {
         for (Case c : cases(planar, along)) {
           // Within the pieces that rings are on, where the matrix of an energy-momentum step is exact.
           if (rule == StepRule::energy_momentum) c.q = c.state.q + 3e-3 * RandomNumbers(8).vector(c.q.size());
-          Alone residual(c, rule);
-          residual.aim();
-          const Eigen::Index n = c.model.dof_count;
-          residual.with.evaluate(c.q, true, nullptr, residual.data);
-          MatrixX J(n, n);
-          for (Eigen::Index i = 0; i < n; ++i) {
-            VectorX e = VectorX::Unit(n, i), y(n);
-            residual.with.assembler().solver().multiply({e.data(), static_cast<std::size_t>(n)},
-                                                        {y.data(), static_cast<std::size_t>(n)});
-            J.col(i) = y;
-          }
+          CaseResidual residual(c, rule);
+          residual.aim(moved_rings(c));
+          const MatrixX J = residual.matrix(c.q);
           EXPECT_TRUE(derivative_matches([&](const VectorX& q) { return residual(q); }, c.q, J, 0.1 * c.increment))
               << c.name << ", rule " << static_cast<int>(rule) << ", along " << static_cast<int>(along);
         }
@@ -176,39 +140,14 @@ TEST(RingForces, MatrixIsTheDerivativeOfTheResidualUnderEveryRule) {
 TEST(RingForces, ForcesAreThoseOfTheEnergyThatReadOutsHave) {
   for (bool planar : {false, true})
     for (Along along : {Along::nothing, Along::drive})
-      for (Case c : cases(planar, along)) {
-        Alone with(c, StepRule::statics);
-        const auto energy = [&](const VectorX& q) {
-          State there = c.state;
-          there.q = q;
-          Configuration configuration;
-          compute_configuration(c.model, there, q, configuration);
-          return hand_energy(c.model, with.parameters.measure, there, configuration);
-        };
-        const Case without = bare(c);
-        Alone rest(without, StepRule::statics);
-        const VectorX forces = with(c.q) - rest(c.q);
-        EXPECT_TRUE(gradient_matches(energy, c.q, forces, 0.1 * c.increment)) << c.name;
-        EXPECT_NEAR(with.data.potential - rest.data.potential, energy(c.q), 1e-12) << c.name;
-      }
+      for (const Case& c : cases(planar, along)) expect_forces_of_energy(c, 0.1 * c.increment);
 }
 
 TEST(RingForces, WrenchIsWhatTheRodFeels) {
   for (bool planar : {false, true})
     for (Along along : {Along::nothing, Along::slipping_drive, Along::friction})
       for (StepRule rule : {StepRule::backward_euler, StepRule::midpoint})
-        for (Case c : cases(planar, along)) {
-          Alone with(c, rule);
-          const Case without = bare(c);
-          Alone rest(without, rule);
-          const VectorX forces = rest(c.q) - with(c.q);
-          Wrench sum;
-          for (const Wrench& wrench : with.data.hands) sum.force += wrench.force, sum.moment += wrench.moment;
-          if (planar) sum.moment -= c.model.plane->origin.cross(sum.force);  // where its unknowns begin
-          for (const auto& [u, omega] : testing::rigid_motions(c.model))
-            EXPECT_NEAR(forces.dot(testing::rigid_motion(c, u, omega)), sum.force.dot(u) + sum.moment.dot(omega), 1e-12)
-                << c.name;
-        }
+        for (const Case& c : cases(planar, along)) expect_wrench_is_felt(c, rule);
 }
 
 TEST(RingForces, EnergyMomentumStepsBalanceEnergyHoweverFarTheRodSlides) {
@@ -218,10 +157,11 @@ TEST(RingForces, EnergyMomentumStepsBalanceEnergyHoweverFarTheRodSlides) {
         for (Case c : cases(planar, along)) {
           const VectorX change = size * RandomNumbers(9).vector(c.q.size());
           c.q = c.state.q + 0.5 * change;
-          Alone with(c, StepRule::energy_momentum);
-          with.aim();
+          CaseResidual with(c, StepRule::energy_momentum);
+          const std::vector<HandPose> poses = moved_rings(c);
+          with.aim(poses);
           const Case without = bare(c);
-          Alone rest(without, StepRule::energy_momentum);
+          CaseResidual rest(without, StepRule::energy_momentum);
           const VectorX forces = with(c.q) - rest(c.q), q1 = c.state.q + change;
           // Angles of a step are not those that work; rings act on nodes alone.
           double work = 0.0;
@@ -235,8 +175,8 @@ TEST(RingForces, EnergyMomentumStepsBalanceEnergyHoweverFarTheRodSlides) {
           State after = c.state;
           after.q = q1;
           const RingForces& rings = with.with.hands()->rings();
-          const double lost = rings.dissipated(with.with.problem(), with.poses, q1),
-                       done = rings.work(with.with.problem(), with.poses, q1);
+          const double lost = rings.dissipated(with.with.problem(), poses, q1),
+                       done = rings.work(with.with.problem(), poses, q1);
           const double before = energy(c.state);
           compute_configuration(c.model, after, q1, configuration);
           with.with.hands()->accept(configuration, after);

@@ -142,9 +142,7 @@ def measure(
     if (height is None) == (image is None):
         raise ValueError("measure needs exactly one of height and image")
     if image is not None:
-        if scale is None:
-            raise ValueError("an image needs scale, the size of a pixel in m")
-        pixel = validation.positive(scale, "scale")
+        pixel = pixel_size(scale)
         height = pixel * _loop_height(image)
         error = 0.5 * pixel if error is None else error
     height, error = (
@@ -152,6 +150,19 @@ def measure(
         validation.non_negative(5e-4 if error is None else error, "error"),
     )
     return MeasuredCable(height / LOOP_HEIGHT, error / LOOP_HEIGHT)
+
+
+def pixel_size(scale: float | None) -> float:
+    """The size of a pixel of an image [m].
+
+    Raises
+    ------
+    ValueError
+        None, or not positive.
+    """
+    if scale is None:
+        raise ValueError("an image needs scale, the size of a pixel in m")
+    return validation.positive(scale, "scale")
 
 
 def _loop_height(image: str | os.PathLike[str] | npt.ArrayLike) -> float:

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
+from withe.deployment.cable import pixel_size
 from withe.perception.masks import border_filter
 from withe.perception.tracing import check_image, read_image
 
@@ -83,11 +84,9 @@ def measure_curvature(
     if (aside is None) == (image is None):
         raise ValueError("measure_curvature needs exactly one of aside and image")
     if image is not None:
-        if scale is None:
-            raise ValueError("an image needs scale, the size of a pixel in m")
-        scale = validation.positive(scale, "scale")
-        error = 0.5 * scale if error is None else error
-        aside = _aside(image, scale, lgb)
+        pixel = pixel_size(scale)
+        error = 0.5 * pixel if error is None else error
+        aside = _aside(image, pixel, lgb)
     across = _across(np.zeros(1), lgb)[0]
     error = validation.non_negative(_ERROR if error is None else error, "error")
     return MeasuredCurvature(validation.number(aside, "aside") / across, error / across)
