@@ -1,5 +1,6 @@
 #pragma once
-/// Unsymmetric band solver: P A = L U, partial pivoting by rows [Golub and Van Loan 2013, sec. 4.3.3].
+/// Unsymmetric band solver: P A = L U, threshold pivoting by rows [Golub and Van Loan 2013, sec. 4.3.3; Duff, Erisman
+/// and Reid 2017, sec. 5.2].
 
 #include <memory>
 

@@ -29,7 +29,7 @@ enum class Symmetry { symmetric, unsymmetric };
 
 enum class SolverKind {
   automatic,  ///< band where the half bandwidth is small, otherwise sparse
-  band,       ///< LDL^T of fixed half bandwidth, or band LU with partial pivoting
+  band,       ///< LDL^T of fixed half bandwidth, or band LU with threshold pivoting
   sparse,     ///< multifrontal LDL^T or LU
 };
 

@@ -1,0 +1,37 @@
+#pragma once
+/// The arithmetic of the unsymmetric band solver, by the instruction set in use. Raw pointers only: the kernels behind
+/// share no code with the rest.
+///
+/// While column j is eliminated, rows j ... j + w are active (w the half bandwidth). Row i of `work` holds columns
+/// i - w ... i + 2 w: exchanges widen U to 2 w. Multipliers stay where they were made, as the exchanges of later
+/// columns are applied to the right-hand side in turn. Rows are padded with zeros, so that they are read in packs.
+
+#include "common/instruction_set.hpp"
+
+namespace withe {
+
+/// Rows of U and of multipliers are this multiple of numbers long.
+constexpr int kBandLuPadding = 4;
+constexpr int band_lu_padded(int count) { return (count + kBandLuPadding - 1) / kBandLuPadding * kBandLuPadding; }
+
+struct BandLuFactor {
+  int size = 0, width = 0;
+  int value_stride = 0, work_stride = 0, multiplier_stride = 0;
+  double* work = nullptr;         ///< size rows: U from the diagonal on
+  double* multipliers = nullptr;  ///< size rows: of the rows below, by which the pivot row was taken off them
+  double* inverse_pivots = nullptr;
+  int* pivot_rows = nullptr;    ///< with which row each was exchanged
+  int* last_columns = nullptr;  ///< of each row of U
+};
+
+struct BandLuKernels {
+  /// From row after row of the band, 2 w + 1 numbers each, and what is added to the diagonal (or nothing); false where
+  /// a pivot is zero or not finite.
+  bool (*factorize)(const BandLuFactor& factor, const double* values, const double* shift);
+  void (*solve)(const BandLuFactor& factor, double* x);
+  void (*solve_transposed)(const BandLuFactor& factor, double* x);
+};
+
+const BandLuKernels& band_lu_kernels();
+
+}  // namespace withe

@@ -1,0 +1,181 @@
+// The kernels of band_lu_kernels.hpp on packs; included once by the translation unit of each instruction set.
+
+#include "common/pack.hpp"
+#include "solvers/band_lu_kernels.hpp"
+
+namespace withe::WITHE_INSTRUCTION_SET {
+namespace {
+
+static_assert(kBandLuPadding % kLanes == 0);
+
+/// Threshold pivoting: the diagonal is kept where nothing in its column is greater by more than this factor, for
+/// exchanges widen the band [Duff, Erisman and Reid 2017, sec. 5.2].
+constexpr double kPivotThreshold = 0.1;
+
+double magnitude(double a) { return __builtin_fabs(a); }
+bool is_usable(double pivot) { return pivot != 0.0 && pivot * 0.0 == 0.0; }
+int smaller(int a, int b) { return a < b ? a : b; }
+int padded(int count) { return (count + kLanes - 1) / kLanes * kLanes; }
+
+double* entry(const BandLuFactor& a, int row, int column) {
+  return a.work + static_cast<std::ptrdiff_t>(row) * a.work_stride + (column - row + a.width);
+}
+double* multipliers_of(const BandLuFactor& a, int column) {
+  return a.multipliers + static_cast<std::ptrdiff_t>(column) * a.multiplier_stride;
+}
+
+void load_row(const BandLuFactor& a, int row, const double* values, const double* shift) {
+  const double* value = values + static_cast<std::ptrdiff_t>(row) * a.value_stride;
+  double* work = a.work + static_cast<std::ptrdiff_t>(row) * a.work_stride;
+  for (int i = 0; i < a.value_stride; ++i) work[i] = value[i];
+  for (int i = a.value_stride; i < a.work_stride; ++i) work[i] = 0.0;
+  if (shift) work[a.width] += shift[row];
+}
+
+/// A number that is not finite wins, so that it is met as a pivot and reported.
+int find_pivot(const BandLuFactor& a, int column, int last_row) {
+  const double* place = entry(a, column, column);
+  const std::ptrdiff_t step = a.work_stride - 1;
+  double greatest[2] = {0.0, 0.0};
+  const int count = last_row - column;
+  for (int i = 1; i <= count; ++i) {
+    const double other = magnitude(place[step * i]);
+    greatest[i % 2] = other <= greatest[i % 2] ? greatest[i % 2] : other;
+  }
+  const double own = magnitude(place[0]);
+  if (own >= kPivotThreshold * greatest[0] && own >= kPivotThreshold * greatest[1]) return column;
+  int best = column;
+  double most = own;
+  for (int i = 1; i <= count; ++i) {
+    const double other = magnitude(place[step * i]);
+    if (!(other <= most)) {
+      most = other;
+      best = column + i;
+    }
+  }
+  return best;
+}
+
+void exchange(double* a, double* b, int count) {
+  for (int i = 0; i < count; ++i) {
+    const double kept = a[i];
+    a[i] = b[i];
+    b[i] = kept;
+  }
+}
+
+/// Takes multiples of row j off the rows below: `packs` packs behind its pivot, or as many as `count` says.
+template <int packs>
+void eliminate(const BandLuFactor& a, int j, int last_row, int count, double inverse) {
+  const double* pivot_row = entry(a, j, j) + 1;
+  double* multiplier = multipliers_of(a, j);
+  double* target = entry(a, j + 1, j) + 1;
+  Pack kept[packs > 0 ? packs : 1];
+  for (int p = 0; p < packs; ++p) kept[p] = load(pivot_row + p * kLanes);
+  for (int row = j + 1; row <= last_row; ++row, target += a.work_stride - 1) {
+    const double factor = target[-1] * inverse;
+    *multiplier++ = factor;
+    const Pack f = factor;
+    if constexpr (packs > 0)
+      for (int p = 0; p < packs; ++p) store(target + p * kLanes, load(target + p * kLanes) - f * kept[p]);
+    else
+      for (int c = 0; c < count; c += kLanes) store(target + c, load(target + c) - f * load(pivot_row + c));
+  }
+}
+
+void eliminate(const BandLuFactor& a, int j, int last_row, int last_column, double inverse) {
+  const int count = last_column - j;
+  switch (padded(count) / kLanes) {
+    case 1:
+      return eliminate<1>(a, j, last_row, count, inverse);
+    case 2:
+      return eliminate<2>(a, j, last_row, count, inverse);
+    case 3:
+      return eliminate<3>(a, j, last_row, count, inverse);
+    case 4:
+      return eliminate<4>(a, j, last_row, count, inverse);
+    case 5:
+      return eliminate<5>(a, j, last_row, count, inverse);
+    default:
+      return eliminate<0>(a, j, last_row, count, inverse);
+  }
+}
+
+bool factorize(const BandLuFactor& a, const double* values, const double* shift) {
+  for (int row = 0; row < smaller(a.width, a.size); ++row) load_row(a, row, values, shift);
+  int last_column = 0;
+  for (int j = 0; j < a.size; ++j) {
+    const int last_row = smaller(j + a.width, a.size - 1);
+    if (j + a.width < a.size) load_row(a, j + a.width, values, shift);
+    const int pivot_row = find_pivot(a, j, last_row);
+    const int reached = smaller(pivot_row + a.width, a.size - 1);
+    if (reached > last_column) last_column = reached;
+    if (pivot_row != j) exchange(entry(a, j, j), entry(a, pivot_row, j), last_column - j + 1);
+    const double pivot = entry(a, j, j)[0];
+    if (!is_usable(pivot)) return false;
+    a.pivot_rows[j] = pivot_row;
+    a.last_columns[j] = last_column;
+    const double inverse = 1.0 / pivot;
+    a.inverse_pivots[j] = inverse;
+    eliminate(a, j, last_row, last_column, inverse);
+  }
+  return true;
+}
+
+/// Takes `factor` times `count` numbers off as many of x, of which `room` are there. Numbers are padded with zeros.
+void take_off(const double* numbers, int count, double factor, double* x, int room) {
+  const int all = padded(count);
+  if (all <= room) {
+    const Pack f = factor;
+    for (int i = 0; i < all; i += kLanes) store(x + i, load(x + i) - load(numbers + i) * f);
+  } else {
+    for (int i = 0; i < count; ++i) x[i] -= numbers[i] * factor;
+  }
+}
+
+/// `start` less the products of `count` numbers. The sum ends with the first, which is the newest unknown, so that only
+/// its term waits. `known`: how many, or 0.
+template <int known>
+double less_products(double start, const double* numbers, const double* x, int count) {
+  double sum = start;
+#pragma GCC unroll 16
+  for (int i = (known > 0 ? known : count) - 1; i >= 0; --i) sum -= numbers[i] * x[i];
+  return sum;
+}
+double less_products(double start, const double* numbers, const double* x, int count) {
+  if (count == 10) return less_products<10>(start, numbers, x, count);  // the band of a rod in space
+  if (count == 5) return less_products<5>(start, numbers, x, count);    // and in a plane
+  return less_products<0>(start, numbers, x, count);
+}
+
+void exchange_unknowns(const BandLuFactor& a, int j, double* x) {
+  if (a.pivot_rows[j] != j) exchange(x + j, x + a.pivot_rows[j], 1);
+}
+
+void solve(const BandLuFactor& a, double* x) {
+  for (int j = 0; j < a.size; ++j) {
+    exchange_unknowns(a, j, x);
+    const int room = a.size - 1 - j;
+    take_off(multipliers_of(a, j), smaller(a.width, room), x[j], x + j + 1, room);
+  }
+  for (int j = a.size - 1; j >= 0; --j)
+    x[j] = less_products(x[j], entry(a, j, j) + 1, x + j + 1, a.last_columns[j] - j) * a.inverse_pivots[j];
+}
+
+void solve_transposed(const BandLuFactor& a, double* x) {
+  for (int j = 0; j < a.size; ++j) {
+    x[j] *= a.inverse_pivots[j];
+    take_off(entry(a, j, j) + 1, a.last_columns[j] - j, x[j], x + j + 1, a.size - 1 - j);
+  }
+  for (int j = a.size - 1; j >= 0; --j) {
+    x[j] = less_products(x[j], multipliers_of(a, j), x + j + 1, smaller(a.width, a.size - 1 - j));
+    exchange_unknowns(a, j, x);
+  }
+}
+
+}  // namespace
+
+extern const BandLuKernels kBandLuKernels;
+const BandLuKernels kBandLuKernels{&factorize, &solve, &solve_transposed};
+
+}  // namespace withe::WITHE_INSTRUCTION_SET
