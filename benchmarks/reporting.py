@@ -29,6 +29,7 @@ from withe.common.progress import Progress, progress
 __all__ = [
     "DATA",
     "HAVE_ELASTICA",
+    "HAVE_MUJOCO",
     "OUT",
     "Report",
     "Timing",
@@ -44,6 +45,7 @@ ROOT = Path(__file__).resolve().parent.parent
 DATA = ROOT / "benchmarks" / "data"
 LOADED = time.monotonic()
 HAVE_ELASTICA = importlib.util.find_spec("elastica") is not None
+HAVE_MUJOCO = importlib.util.find_spec("mujoco") is not None
 OUT = Path(os.environ.get("WITHE_BENCHMARK_OUT", ROOT / "out" / "benchmarks"))
 
 

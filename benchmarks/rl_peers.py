@@ -1,7 +1,6 @@
 """The free arm of the learning tasks in PyElastica, driven by the same bends.
 
-A Cosserat rod of 20 elements with rest curvatures, in explicit steps. MuJoCo is not here: a chain of 20 capsules with
-springs in its hinges, which it steps explicitly, blows up at steps of 1 ms and more.
+A Cosserat rod of 20 elements with rest curvatures, in explicit steps.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Control steps a second of environments for reinforcement learning, Python included, beside PyElastica as processes.
+"""Control steps a second of environments for reinforcement learning, Python included, beside PyElastica and MuJoCo.
 
 The arm of [arXiv 2511.06667] under seeded actions: free in space and in a plane, among obstacles in a plane and in
 space; 1, 16 and 500 environments on up to two threads. Accuracy: the tip against a converged run of the same model.
@@ -12,7 +12,7 @@ import warnings
 
 import numpy as np
 import rl_arms
-from reporting import HAVE_ELASTICA, OUT, Report, Timing, arguments, bar
+from reporting import HAVE_ELASTICA, HAVE_MUJOCO, OUT, Report, Timing, arguments, bar
 
 import withe
 from withe.learning.arms import Arm, Obstacles2D, Obstacles3D
@@ -26,6 +26,7 @@ KINDS: dict[str, tuple[type[Arm], float]] = {  # and control steps a second to r
 }
 COUNTS = (1, 16, 500)
 PUBLISHED, LIMIT = 2e-4, 4e-4  # steps of PyElastica [s]
+MUJOCO_STEP, MUJOCO_COUNT = 2.5e-3, 64  # the longest step of MuJoCo within 1 cm [s], its arms side by side
 
 
 def accuracy(report: Report, quick: bool) -> None:
@@ -123,6 +124,45 @@ def peers(report: Report, quick: bool, ours: dict[tuple[str, int], Timing]) -> N
     )
 
 
+def mujoco(report: Report, quick: bool) -> None:
+    """MuJoCo: one arm, and a batch on as many threads; turn and turn about with ours."""
+    goals = {1: None, MUJOCO_COUNT: 20.0}
+    names = {count: f"times MuJoCo's at {MUJOCO_STEP:g} s, {count} environments" for count in goals}
+    if not HAVE_MUJOCO or quick:
+        report.goal(names[MUJOCO_COUNT], None, goals[MUJOCO_COUNT])
+        return
+    import rl_mujoco
+    import rl_peers
+
+    bends = 2.0 * np.tan(0.5 * rl_peers.bends_of(rl_arms.actions_of(0, 10)))
+    error = rl_mujoco.converged_error(MUJOCO_STEP, 2e-4, bends)
+    apart = rl_mujoco.tips_of(2e-4, bends, updates=100) - rl_arms.converged_tips(rl_arms.FreeArm, 0)
+    rows = []
+    for count in goals:
+        threads = min(count, WORKERS)
+        pairs = [
+            (
+                rl_mujoco.steps_a_second(MUJOCO_STEP, bends[:12], count, threads),
+                rl_arms.control_steps(rl_arms.FreeArm, count, threads, 400 // count + 10),
+            )
+            for _ in range(3)
+        ]
+        theirs, ours = (Timing(tuple(rates)) for rates in zip(*pairs, strict=True))
+        rows.append((str(count), f"{theirs.median:,.0f}", f"{ours.median:,.0f}"))
+        report.figures[f"MuJoCo, {count}"] = {"theirs": theirs.as_json(), "ours": ours.as_json()}
+        times = float(np.median([b / a for a, b in pairs]))
+        report.figures[names[count]] = times
+        if goals[count] is not None:
+            report.goal(names[count], times, goals[count])
+    distance = float(np.sqrt(np.mean(np.sum(apart**2, axis=1))))
+    report.table(
+        f"MuJoCo's free arm in steps of {MUJOCO_STEP:g} s: error of its tip {1e3 * error:.1f} mm; in short steps "
+        f"{1e3 * distance:.1f} mm from ours",
+        ("environments", "MuJoCo, control steps a second", "withe"),
+        rows,
+    )
+
+
 def agreement(report: Report, quick: bool) -> None:
     """The free arm in PyElastica and in withe: how far tips are apart, at rest and in motion."""
     if not HAVE_ELASTICA or quick:
@@ -187,6 +227,7 @@ def main() -> None:
         shown.advance(1)
         agreement(report, quick)
         peers(report, quick, timings)
+        mujoco(report, quick)
         shown.advance(1)
     draw(timings)
     report.write()
