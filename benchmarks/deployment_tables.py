@@ -1,27 +1,31 @@
 """Tables 9.2 and 9.3 of the dissertation from simulation: seven patterns, cables and floors, and ways to lay.
 
-python benchmarks/deployment_tables.py [--quick] [--whole] [--cables 2] [--patterns circle ...] [--trials 0] [--refine]
+python benchmarks/deployment_tables.py [--quick] [--whole] [--cables 2] [--patterns circle ...] [--trials 0] [--resume]
+                                       [--known] [--refine]
 
 By default cable 2 alone, which takes some 20 minutes of one thread; --whole takes cables 1 to 3 and three noisy trials
-of each cell, and hours. Ctrl-C makes the tables of what there is. Cables are laid quasi-statically, but for the
-intuitive way and noisy trials, at 2.5 cm/s: an upright cable buckles, falls and swings, and no row of equilibria
-follows it. Errors are those of (9.11), point by point: the distance of each point of the cable from its place on the
-pattern. The way "network" needs torch, and is left out without it.
+of each cell, and hours. Each run is printed, and written to out/benchmarks/deployment_tables.jsonl, as it ends. Ctrl-C
+makes the tables of what there is; --resume goes on after that. Cables are laid quasi-statically, but for the intuitive
+way and noisy trials, at 2.5 cm/s: an upright cable buckles, falls and swings, and no row of equilibria follows it.
+Errors are those of (9.11), point by point: the distance of each point of the cable from its place on the pattern. The
+way "network" needs torch, and is left out without it.
 """
 
 from __future__ import annotations
 
 import importlib.util
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, field, replace
 from itertools import product
 from pathlib import Path
 
 import numpy as np
 from deployment_refining import refine
-from reporting import OUT, Report, arguments, bar
+from reporting import OUT, RESUME, Lines, Report, arguments, bar
 
-from withe.deployment import Cable, Deployment, Pattern, Plan, deploy, place, plan
+from withe.deployment import Cable, Deployment, Pattern, Plan, Slip, deploy, place, plan
 from withe.errors import ConvergenceError
+
+Key = tuple[str, int, float, str]  # pattern, cable, friction, way
 
 FOLDER = Path(__file__).resolve().parent.parent / "tests" / "data" / "patterns"
 PATTERNS = ("line", "circle", "sine", "letterU", "letterC", "letterL", "letterA")
@@ -37,8 +41,10 @@ PUBLISHED = {
     "letterL": {1: "9-11, 3.5-4.2", 2: "17-21, 2.9-6.6", 3: "24-33, 3.3-5.1"},
     "letterA": {1: "36-48, 4.7-5.8", 2: "50-52, 3.2-4.3", 3: "43-46, 5.2-8.1"},
 }
+NOISY_WAYS = ("exact", "intuitive", "network")
 NOISY_SPEED = 0.025  # [m/s]
-SLIPPED = 1e-3  # [m]: what counts as a slip that should have been foreseen
+SLIPPED = 1.0  # [mm]: what counts as a slip that should have been foreseen
+LARGE = 5.0  # [mm]: mean error above which a cell is explained
 NEAR = 2.0  # [Lgb] beside a stretch that friction does not hold, which moves with it
 COLOURS = {
     "exact": "#3465a4",
@@ -50,34 +56,107 @@ COLOURS = {
 
 
 @dataclass(frozen=True)
-class Cell:
-    """One way to lay one cable along one pattern on one floor; no result where the engine found no equilibrium."""
+class Run:
+    """One cable, laid or placed once along one pattern on one floor, as a line of a file; lengths in mm.
+
+    Where the engine found no equilibrium, errors are NaN and nothing is laid.
+    """
 
     pattern: str
     cable: int
     friction: float
     way: str
-    result: Deployment | None = None
-    marks: str = ""
-    unforeseen: float = 0.0  # [mm] of slip where no test foresaw any
-    noisy: tuple[float, ...] = ()  # mean errors of trials [mm]
+    seed: int | None  # of what the planner does not know; None: it knows all
+    nodes: int
+    error: float = np.nan
+    std: float = np.nan
+    nearest_error: float = np.nan
+    nearest_std: float = np.nan
+    laid: list[tuple[float, float]] = field(default_factory=list)
+    slipped: list[float] = field(default_factory=list)
 
     @property
-    def error(self) -> float:
-        """Mean, point by point [mm]."""
-        return np.nan if self.result is None else 1e3 * self.result.error
+    def key(self) -> Key:
+        """What was laid how, but for noise."""
+        return self.pattern, self.cable, self.friction, self.way
+
+    def of(self, found: Deployment) -> Run:
+        """With what came of it."""
+        sizes = found.error, found.std, found.nearest_error, found.nearest_std
+        error, std, nearest_error, nearest_std = (round(1e3 * size, 4) for size in sizes)
+        return replace(
+            self,
+            error=error,
+            std=std,
+            nearest_error=nearest_error,
+            nearest_std=nearest_std,
+            laid=(1e3 * found.laid[:, :2]).round(3).tolist(),
+            slipped=(1e3 * found.slipped).round(4).tolist(),
+        )
 
     def __str__(self) -> str:
-        if self.result is None:
+        noise = "" if self.seed is None else f", trial {self.seed}"
+        return f"{self.pattern}, cable {self.cable}, {self.friction:g}, {self.way}{noise}: {self.error:.2f} mm"
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A way to lay a cable along a pattern on a floor: without noise, and in noisy trials."""
+
+    run: Run
+    motion: Plan
+    noisy: tuple[Run, ...] = ()
+
+    @property
+    def foretold(self) -> bool:
+        """Whether tests of feasibility say where it slips."""
+        return self.run.way in ("exact", "network", "least_friction")
+
+    @property
+    def marks(self) -> str:
+        """Tests that say that it will slip: f floor, which is (9.2), l lift-off, e free end, t tail, o overlap."""
+        failed = {slip.test for slip in self._said()}
+        letters = {"floor": "f", "lift-off": "l", "free end": "e", "tail": "t", "overlap": "o"}
+        return "".join(letter for test, letter in letters.items() if test in failed)
+
+    def unforeseen(self) -> float:
+        """Greatest slip away from all stretches that were said to slip [mm], zero below a millimetre."""
+        near = NEAR * self.motion.cable.gravito_bending_length
+        s = np.linspace(0.0, self.motion.cable.length, len(self.run.slipped))
+        away = np.ones(len(s), bool)
+        for slip in self._said():
+            away &= (s < slip.start - near) | (s > slip.end + near)
+        worst = float(np.array(self.run.slipped)[away].max(initial=0.0))
+        return worst if worst > SLIPPED else 0.0
+
+    def slips(self) -> list[tuple[str, str, str]]:
+        """Stretches that slipped, by how much at most [mm], and which tests foresaw it."""
+        s = 1e3 * np.linspace(0.0, self.motion.cable.length, len(self.run.slipped))
+        size = np.array(self.run.slipped)
+        near = 1e3 * NEAR * self.motion.cable.gravito_bending_length
+        rows = []
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], size > SLIPPED, [False]]).astype(int)))
+        for first, after in zip(edges[::2], edges[1::2], strict=True):
+            start, end = s[first], s[after - 1]
+            tests = {x.test for x in self._said() if 1e3 * x.start - near <= end and 1e3 * x.end + near >= start}
+            said = ", ".join(sorted(tests)) or "none"
+            rows.append((f"{start:.0f} to {end:.0f}", f"{size[first:after].max():.1f}", said))
+        return rows
+
+    def _said(self) -> tuple[Slip, ...]:
+        return self.motion.feasibility(self.run.friction).slips
+
+    def __str__(self) -> str:
+        if not np.isfinite(self.run.error):
             return "none"
-        noisy = f" ({np.mean(self.noisy):.1f})" if self.noisy else ""
-        return f"{self.error:.2f} ± {1e3 * self.result.std:.2f}{noisy}"
+        noisy = f" ({np.mean([run.error for run in self.noisy]):.1f})" if self.noisy else ""
+        return f"{self.run.error:.2f} ± {self.run.std:.2f}{noisy}"
 
     def nearest(self) -> str:
         """As text, from the nearest point of what was given."""
-        if self.result is None:
+        if not np.isfinite(self.run.error):
             return "none"
-        return f"{1e3 * self.result.nearest_error:.2f} ± {1e3 * self.result.nearest_std:.2f}"
+        return f"{self.run.nearest_error:.2f} ± {self.run.nearest_std:.2f}"
 
 
 class Patterns:
@@ -111,80 +190,73 @@ class Patterns:
         return self._plans[key]
 
 
-def marks(motion: Plan, friction: float) -> str:
-    """Tests that say that it will slip: f the floor, which is (9.2), l lift-off, e the free end, t tail, o overlap."""
-    failed = {slip.test for slip in motion.feasibility(friction).slips}
-    letters = {"floor": "f", "lift-off": "l", "free end": "e", "tail": "t", "overlap": "o"}
-    return "".join(letter for test, letter in letters.items() if test in failed)
-
-
-def unforeseen(motion: Plan, friction: float, found: Deployment) -> float:
-    """Greatest slip away from all stretches that were said to slip [mm], zero below a millimetre."""
-    near = NEAR * motion.cable.gravito_bending_length
-    s = np.linspace(0.0, motion.cable.length, len(found.laid))
-    away = np.ones(len(s), bool)
-    said = motion.feasibility(friction)
-    for slip in said.slips:
-        away &= (s < slip.start - near) | (s > slip.end + near)
-    worst = float(found.slipped[away].max(initial=0.0))
-    return 1e3 * worst if worst > SLIPPED else 0.0
-
-
-def carried_out(cell: Cell, patterns: Patterns, nodes: int, trials: int) -> Cell:
-    """Lay through equilibria, or in time, and with noise in time."""
-    planned = "exact" if cell.way == "placed" else cell.way
+def carried_out(run: Run, patterns: Patterns) -> Run:
+    """Lay through equilibria, or in time: with noise, and what no row of equilibria follows."""
+    planned = "exact" if run.way == "placed" else run.way
     try:
-        motion = patterns.plan(cell.pattern, cell.cable, planned, cell.friction)
-        if cell.way == "placed":
-            return Cell(*_key(cell), result=place(motion, floor=cell.friction, nodes=nodes, progress=False))
-        static = cell.way != "intuitive"
-        found = deploy(motion, floor=cell.friction, quasi_static=static, nodes=nodes, progress=False)
+        motion = patterns.plan(run.pattern, run.cable, planned, run.friction)
+        if run.way == "placed":
+            return run.of(place(motion, floor=run.friction, nodes=run.nodes, progress=False))
+        found = deploy(
+            motion,
+            floor=run.friction,
+            noise=0.0 if run.seed is None else 1.0,
+            seed=run.seed or 0,
+            quasi_static=run.seed is None and run.way != "intuitive",
+            nodes=run.nodes,
+            progress=False,
+        )
     except ConvergenceError:
-        return Cell(*_key(cell))
-    foretold = cell.way in ("exact", "network", "least_friction")
-    noisy = [
-        1e3 * deploy(motion, floor=cell.friction, noise=1.0, seed=seed, nodes=nodes, progress=False).error
-        for seed in range(trials)
-    ]
-    return Cell(
-        *_key(cell),
-        result=found,
-        marks=marks(motion, cell.friction) if foretold else "",
-        unforeseen=unforeseen(motion, cell.friction, found) if foretold else 0.0,
-        noisy=tuple(noisy),
-    )
+        return run
+    return run.of(found)
 
 
-def _key(cell: Cell) -> tuple[str, int, float, str]:
-    return cell.pattern, cell.cable, cell.friction, cell.way
+def cells_of(runs: list[Run], patterns: Patterns, trials: int) -> dict[Key, Cell]:
+    """Those that were laid without noise; with noisy trials where all of them were."""
+    cells = {}
+    for run in runs:
+        if run.seed is None:
+            noisy = [other for other in runs if other.key == run.key and other.seed is not None]
+            planned = "exact" if run.way == "placed" else run.way
+            motion = patterns.plan(run.pattern, run.cable, planned if planned != "optimised" else "exact", run.friction)
+            cells[run.key] = Cell(run, motion, tuple(noisy) if len(noisy) == trials else ())
+    return cells
 
 
-def tables(report: Report, cells: list[Cell], ways: tuple[str, ...]) -> None:
+def tables(report: Report, cells: dict[Key, Cell], ways: tuple[str, ...]) -> None:
     """Means and standard deviations, point by point and from the nearest point, beside what was published."""
-    rows, nearest = [], []
-    found = {_key(cell): cell for cell in cells}
-    for key in dict.fromkeys(_key(cell)[:3] for cell in cells):
-        here = [found[(*key, way)] for way in ways]
-        exact = found[(*key, "exact")]
-        rows.append((*key, *here, exact.marks or "-", PUBLISHED[key[0]][key[1]]))
-        nearest.append((*key, *(cell.nearest() for cell in here)))
-    header = ("pattern", "DLO", "friction", *ways)
+    rows, nearest, slipped = [], [], []
+    for key in dict.fromkeys(key[:3] for key in cells):
+        here = [cells.get((*key, way)) for way in ways]
+        exact = cells.get((*key, "exact"))
+        marks = "" if exact is None else exact.marks or "-"
+        rows.append((*key, *("" if cell is None else cell for cell in here), marks, PUBLISHED[key[0]][key[1]]))
+        nearest.append((*key, *("" if cell is None else cell.nearest() for cell in here)))
+    for key, cell in cells.items():
+        if cell.foretold and cell.run.error > LARGE:
+            slipped += [(*key, f"{cell.run.error:.1f}", *row) for row in cell.slips()]
+    header = ("pattern", "DLO", "friction")
     report.table(
-        "Mean and standard deviation, point by point [mm]",
-        (*header, "will slip", "published: intuitive, optimal"),
+        "Mean and standard deviation, point by point; mean of noisy trials [mm]",
+        (*header, *ways, "will slip", "published: intuitive, optimal"),
         rows,
     )
-    report.table("The same, from the nearest point of what was given [mm]", header, nearest)
-    report.figures["slips that no test foresaw"] = [
-        f"{c.pattern}, DLO {c.cable}, {c.friction:g}, {c.way}: {c.unforeseen:.1f} mm" for c in cells if c.unforeseen
-    ]
-    report.figures["without equilibrium"] = [" ".join(map(str, _key(cell))) for cell in cells if cell.result is None]
+    report.table("The same, from the nearest point of what was given [mm]", (*header, *ways), nearest)
+    report.table(
+        f"What slips where the mean is above {LARGE:g} mm, and the tests that say so",
+        (*header, "way", "mean", "stretch [mm]", "slips by", "tests"),
+        slipped,
+    )
+    unforeseen = {key: cell.unforeseen() for key, cell in cells.items() if cell.foretold}
+    rows = [(*key, f"{size:.1f}") for key, size in unforeseen.items() if size]
+    report.table("Slips that no test foresaw [mm]", (*header, "way", "slip"), rows)
+    report.figures["without equilibrium"] = [" ".join(map(str, key)) for key in cells if "none" in str(cells[key])]
 
 
-def goals(report: Report, cells: list[Cell], patterns: Patterns) -> None:
+def goals(report: Report, cells: dict[Key, Cell]) -> None:
     """What the ways of laying are to reach beside each other."""
-    error = {_key(cell): cell.error for cell in cells}
-    keys = list(dict.fromkeys(_key(cell)[:3] for cell in cells))
+    error = {key: cell.run.error for key, cell in cells.items()}
+    keys = [key for key in dict.fromkeys(key[:3] for key in cells) if (*key, "exact") in cells]
 
     def over_exact(way: str, among: list) -> list[float]:
         ratios = [error[(*key, way)] / error[(*key, "exact")] for key in among if (*key, way) in error]
@@ -195,8 +267,9 @@ def goals(report: Report, cells: list[Cell], patterns: Patterns) -> None:
 
     held = []
     for name, number, friction in keys:
-        lift_off = patterns.plan(name, number, "exact", friction).feasibility(friction).lift_off[3:-3].max()
-        if name != "letterC" and friction > lift_off + 0.1:
+        motion = cells[name, number, friction, "exact"].motion
+        lift_off = motion.feasibility(friction).lift_off[3:-3].max()
+        if name != "letterC" and friction > lift_off + 0.1 and (name, number, friction, "placed") in error:
             held.append(error[name, number, friction, "exact"] - error[name, number, friction, "placed"])
     report.goal("exact beyond placed where friction holds, most [mm]", max(held, default=None), 1.5, at_least=False)
     slipping = [key for key in keys if error[(*key, "exact")] > 1.0]
@@ -215,10 +288,13 @@ def goals(report: Report, cells: list[Cell], patterns: Patterns) -> None:
     learned = [away for away in learned if np.isfinite(away)]
     report.goal("network from exact, most [mm]", max(learned, default=None), 0.5, at_least=False)
     report.goal("intuitive over exact, median", median(over_exact("intuitive", keys)), 6.0)
-    report.goal(
-        "cells with a slip that no test foresaw", sum(cell.unforeseen > 0.0 for cell in cells), 0, at_least=False
-    )
-    noisy = [float(np.mean(cell.noisy)) for cell in cells if cell.noisy and cell.way == "exact" and cell.error <= 2.0]
+    unforeseen = sum(cell.unforeseen() > 0.0 for cell in cells.values() if cell.foretold)
+    report.goal("cells with a slip that no test foresaw", unforeseen, 0, at_least=False)
+    noisy = [
+        float(np.mean([run.error for run in cells[(*key, "exact")].noisy]))
+        for key in keys
+        if cells[(*key, "exact")].noisy and error[(*key, "exact")] <= 2.0
+    ]
     if noisy:
         report.goal("noisy trials where exact misses by at most 2 mm, most [mm]", max(noisy), 5.0, at_least=False)
 
@@ -230,8 +306,8 @@ def draw(cells: list[Cell], patterns: Patterns, number: int) -> None:
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
-    names = list(dict.fromkeys(cell.pattern for cell in cells))
-    frictions = list(dict.fromkeys(cell.friction for cell in cells))
+    names = list(dict.fromkeys(cell.run.pattern for cell in cells))
+    frictions = list(dict.fromkeys(cell.run.friction for cell in cells))
     figure, axes = plt.subplots(
         len(frictions),
         len(names),
@@ -245,16 +321,14 @@ def draw(cells: list[Cell], patterns: Patterns, number: int) -> None:
         panel.plot(*(1e3 * pattern.raw.T), color="0.8", lw=5, solid_capstyle="round", label="pattern")
         errors = []
         for cell in cells:
-            if (
-                (cell.pattern, cell.cable, cell.friction) == (name, number, friction)
-                and cell.result
-                and cell.way in COLOURS
-            ):
-                s = np.linspace(0.0, 1.0, len(cell.result.laid))
-                on = s * patterns.plan(name, number, "exact", friction).cable.length <= pattern.length
-                line = "--" if cell.way == "intuitive" else "-"
-                panel.plot(*(1e3 * cell.result.laid[on, :2].T), line, color=COLOURS[cell.way], lw=1, label=cell.way)
-                errors.append(f"{cell.error:.1f}")
+            run = cell.run
+            if (run.pattern, run.friction) == (name, friction) and run.laid and run.way in COLOURS:
+                s = np.linspace(0.0, cell.motion.cable.length, len(run.laid))
+                laid = np.array(run.laid)[s <= pattern.length]
+                panel.plot(
+                    *laid.T, "--" if run.way == "intuitive" else "-", color=COLOURS[run.way], lw=1, label=run.way
+                )
+                errors.append(f"{run.error:.1f}")
         panel.set_title(" / ".join(errors) + " mm", fontsize=8)
         panel.set(aspect="equal", xticks=[], yticks=[])
         if column == 0:
@@ -273,13 +347,16 @@ def main() -> None:
     """Lay, list, compare."""
     options = arguments(
         __doc__,
-        ("--whole", {"action": "store_true", "help": "cables 1 to 3, and three noisy trials of each cell"}),
+        ("--whole", {"action": "store_true", "help": "cables 2, 1, 3, and three noisy trials of each cell"}),
         ("--cables", {"nargs": "*", "type": int, "choices": (1, 2, 3), "default": [2]}),
         ("--patterns", {"nargs": "*", "choices": PATTERNS, "default": list(PATTERNS)}),
         ("--frictions", {"nargs": "*", "type": float, "default": list(FRICTIONS)}),
         ("--ways", {"nargs": "*", "choices": WAYS, "default": list(WAYS)}),
         ("--trials", {"type": int, "default": 0, "help": "noisy trials of each cell"}),
+        ("--noisy-ways", {"nargs": "*", "choices": WAYS[1:], "default": list(NOISY_WAYS), "help": "that have them"}),
         ("--nodes", {"type": int, "default": 200, "help": "of the cable"}),
+        RESUME,
+        ("--known", {"action": "store_true", "help": "lay nothing: tables of what an earlier run left"}),
         ("--refine", {"action": "store_true", "help": "instead: meshes and half the speed, in five cells"}),
     )
     if options.refine:
@@ -287,7 +364,7 @@ def main() -> None:
         refine(report, Patterns(301).plan)
         report.write()
         return
-    cables, trials = ([1, 2, 3], 3) if options.whole else (options.cables, options.trials)
+    cables, trials = ([2, 1, 3], 3) if options.whole else (options.cables, options.trials)
     ways = tuple(way for way in WAYS if way in options.ways or way in ("placed", "exact"))
     if importlib.util.find_spec("torch") is None:
         ways = tuple(way for way in ways if way != "network")
@@ -295,27 +372,44 @@ def main() -> None:
     if options.quick:
         names, frictions, ways, nodes = ["letterU"], [0.4], ("placed", "exact"), 60
     report = Report("deployment_tables", quick=options.quick)
-    patterns, cells = Patterns(100 if options.quick else 301), []
-    todo = [
-        [Cell(name, number, friction, way) for way in ways]
-        for number, name, friction in product(cables, names, frictions)
+    patterns = Patterns(101 if options.quick else 301)
+    wanted = [
+        Run(name, number, friction, way, None, nodes)
+        for number, name, friction, way in product(cables, names, frictions, ways)
     ]
-    with bar(len(todo), "laying", "floors") as shown:
-        try:
-            for row in todo:
-                found = [carried_out(cell, patterns, nodes, trials) for cell in row]
-                cells += found
-                print(*_key(row[0])[:3], *found, found[ways.index("exact")].marks, sep="  ", flush=True)
-                shown.advance(1)
-        except KeyboardInterrupt:
-            report.figures["interrupted"] = f"{len(cells) // len(ways)} of {len(todo)} rows"
+    noisy_ways = [way for way in options.noisy_ways if way in ways]
+    wanted += [
+        Run(name, number, friction, way, seed, nodes)
+        for number, way, name, friction, seed in product(cables, noisy_ways, names, frictions, range(trials))
+    ]
+    runs = laid(wanted, patterns, Lines("deployment_tables", resume=options.resume or options.known), options.known)
+    if len(runs) < len(wanted):
+        report.figures["interrupted"] = f"{len(runs)} of {len(wanted)} runs"
+    cells = cells_of(runs, patterns, trials)
     if not cells:
         return
     tables(report, cells, ways)
-    goals(report, cells, patterns)
-    for number in dict.fromkeys(cell.cable for cell in cells):
-        draw([cell for cell in cells if cell.cable == number], patterns, number)
+    goals(report, cells)
+    for number in dict.fromkeys(cell.run.cable for cell in cells.values()):
+        draw([cell for cell in cells.values() if cell.run.cable == number], patterns, number)
     report.write()
+
+
+def laid(wanted: list[Run], patterns: Patterns, lines: Lines, known: bool) -> list[Run]:
+    """Carry out what is wanted; each run is printed and written as it ends. Those that were not interrupted."""
+    done = {(run.key, run.seed, run.nodes): run for run in (Run(**line) for line in lines.known)}
+    left = [run for run in wanted if (run.key, run.seed, run.nodes) not in done]
+    if not known:
+        with bar(len(left), "laying", "runs") as shown:
+            try:
+                for run in left:
+                    found = done[run.key, run.seed, run.nodes] = carried_out(run, patterns)
+                    lines.add(asdict(found))
+                    print(found, flush=True)
+                    shown.advance(1)
+            except KeyboardInterrupt:
+                print("\ninterrupted: --resume goes on", flush=True)
+    return [done[name] for run in wanted if (name := (run.key, run.seed, run.nodes)) in done]
 
 
 if __name__ == "__main__":

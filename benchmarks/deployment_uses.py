@@ -1,31 +1,31 @@
 """Table 9.6 of the dissertation from simulation: cables placed between posts, and knots, both ways of laying.
 
-python benchmarks/deployment_uses.py [--quick] [--trials 1] [--uses S U trefoil reef]
+python benchmarks/deployment_uses.py [--quick] [--trials 1] [--uses S U trefoil reef] [--resume]
 
 Each use without noise, through equilibria where it is placement, and in noisy trials, in time: those of `deploy`, in
 Lgb, friction, natural curvature and what the gripper is off by. For placement the planner has measured the cable: its
 loop with a ruler that is off by .5 mm, and, for the way "optimised", how it bends by itself, from pictures of it as it
 hangs. For knots it has not. A placement succeeds if the cable passes every post on its right side; a knot if it is
 there when its ends were pulled 20 mm apart. Knots are tied without looking: grippers reach where a rehearsal with exact
-grasps found the cable. The cases are those of examples/place_cable.py and examples/tie_knot.py. Ctrl-C makes the table
-of what there is.
+grasps found the cable. The cases are those of examples/place_cable.py and examples/tie_knot.py. Each trial is
+printed, and written to out/benchmarks/deployment_uses.jsonl, as it ends. Ctrl-C makes the table of what there is;
+--resume goes on after that.
 """
 
 from __future__ import annotations
 
 import sys
-from dataclasses import replace
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from itertools import product
 
 import numpy as np
-from reporting import ROOT, Report, arguments, bar
+from reporting import RESUME, ROOT, Lines, Report, arguments, bar
 
 sys.path.insert(0, str(ROOT / "examples"))
 import place_cable
 import tie_knot
 
-from withe.common.progress import Progress
 from withe.deployment import Cable, hang, measure, measure_curvature, tie, trial_cable
 from withe.deployment.cable import LOOP_HEIGHT
 from withe.errors import ConvergenceError
@@ -95,19 +95,30 @@ class Knots:
         return tie_knot.is_tied(name, found), f"{len(found.missed)} moves missed"
 
 
-def tried(knots: Knots, use: str, way: str, trials: int, shown: Progress) -> tuple[str, str, str]:
-    """Whether it succeeds without noise, in how many noisy trials, and what each came to."""
+@dataclass(frozen=True)
+class Tried:
+    """What came of one trial, as a line of a file; that of seed 0 is without noise."""
+
+    use: str
+    way: str
+    seed: int
+    nodes: int
+    success: bool
+    words: str
+
+    def __str__(self) -> str:
+        noise = f"trial {self.seed}" if self.seed else "no noise"
+        return f"{self.use}, {self.way}, {noise}: {'yes' if self.success else 'no'}, {self.words}"
+
+
+def tried(knots: Knots, use: str, way: str, seed: int) -> Tried:
+    """Whether it succeeds, and what it came to."""
     attempt = knots.tied if use in tie_knot.TYING else partial(placed, nodes=knots.nodes)
-    done, said = [], []
-    for seed in range(trials + 1):
-        try:
-            success, words = attempt(use, way, seed, 1.0 if seed else 0.0)
-        except ConvergenceError:
-            success, words = False, "engine gave up"
-        done.append(success)
-        said.append(words)
-        shown.advance(1)
-    return "yes" if done[0] else "no", f"{sum(done[1:])} of {trials}", "; ".join(said)
+    try:
+        success, words = attempt(use, way, seed, 1.0 if seed else 0.0)
+    except ConvergenceError:
+        success, words = False, "engine gave up"
+    return Tried(use, way, seed, knots.nodes, success, words)
 
 
 def main() -> None:
@@ -117,26 +128,38 @@ def main() -> None:
         ("--trials", {"type": int, "default": 1, "help": "noisy ones of each use and way; the dissertation has 10"}),
         ("--uses", {"nargs": "*", "choices": tuple(GOALS), "default": list(GOALS)}),
         ("--ways", {"nargs": "*", "choices": WAYS, "default": list(WAYS)}),
+        RESUME,
     )
     uses, ways, trials, nodes = options.uses, options.ways, options.trials, NODES
     if options.quick:
         uses, ways, trials, nodes = ["U"], ["exact"], 0, QUICK_NODES
     report = Report("deployment_uses", quick=options.quick)
-    knots = Knots(nodes)
-    rows: list[tuple] = []
-    todo = [(use, way) for use, way in product(uses, ways) if way != "optimised" or use not in tie_knot.TYING]
-    with bar(len(todo) * (1 + trials), "trying", "trials") as shown:
+    knots, lines = Knots(nodes), Lines("deployment_uses", resume=options.resume)
+    known = {(t.use, t.way, t.seed): t for t in (Tried(**line) for line in lines.known) if t.nodes == nodes}
+    pairs = [(use, way) for use, way in product(uses, ways) if way != "optimised" or use not in tie_knot.TYING]
+    wanted = [(use, way, seed) for use, way in pairs for seed in range(trials + 1)]
+    with bar(len(wanted), "trying", "trials") as shown:
         try:
-            for use, way in todo:
-                row = tried(knots, use, way, trials, shown)
-                rows.append((use, way, *row, PUBLISHED[use]))
-                print(*rows[-1], sep="  ", flush=True)
+            for key in wanted:
+                if key not in known:
+                    known[key] = tried(knots, *key)
+                    lines.add(asdict(known[key]))
+                    print(known[key], flush=True)
+                shown.advance(1)
         except KeyboardInterrupt:
-            report.figures["interrupted"] = f"{len(rows)} of {len(todo)} rows"
-    for use, way, alone, noisy, *_ in rows:
-        if way == ("optimised" if (use, "optimised") in todo else "exact"):
-            report.goal(f"{use}: without noise", float(alone == "yes"), 1.0)
-            report.goal(f"{use}: share of noisy trials", int(noisy.split()[0]) / trials if trials else None, GOALS[use])
+            report.figures["interrupted"] = f"{sum(key in known for key in wanted)} of {len(wanted)} trials"
+            print("\ninterrupted: --resume goes on", flush=True)
+    rows = []
+    for use, way in pairs:
+        here = [known[use, way, seed] for seed in range(trials + 1) if (use, way, seed) in known]
+        if not here:
+            continue
+        alone, noisy = here[0].success, [one.success for one in here[1:]]
+        said = "; ".join(one.words for one in here)
+        rows.append((use, way, "yes" if alone else "no", f"{sum(noisy)} of {len(noisy)}", said, PUBLISHED[use]))
+        if way == ("optimised" if (use, "optimised") in pairs else "exact"):
+            report.goal(f"{use}: without noise", float(alone), 1.0)
+            report.goal(f"{use}: share of noisy trials", float(np.mean(noisy)) if noisy else None, GOALS[use])
     header = ("use", "way", "without noise", "noisy trials", "without noise, then each trial", "published, of 10")
     report.table("Uses: ways of laying", header, rows)
     report.write()

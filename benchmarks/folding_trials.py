@@ -9,15 +9,12 @@ there is; --resume goes on after that.
 from __future__ import annotations
 
 import argparse
-import contextlib
-import json
 import os
 from dataclasses import asdict, dataclass, replace
 from itertools import product
-from pathlib import Path
 
 import numpy as np
-from reporting import OUT, Report, arguments
+from reporting import OUT, RESUME, Lines, Report, arguments
 
 from withe import folding
 
@@ -127,31 +124,18 @@ class Folded:
         return f"{head}{self.failure or done} ({self.seconds:.0f} s)"
 
 
-def known(file: Path) -> list[Folded]:
-    """Folds of an earlier run, the last line perhaps cut off."""
-    folds = []
-    for line in file.read_text().splitlines() if file.exists() else ():
-        with contextlib.suppress(json.JSONDecodeError):
-            folds.append(Folded(**json.loads(line)))
-    return folds
-
-
 def run(wanted: dict[Key, list[folding.Trial]], options: argparse.Namespace) -> tuple[list[Folded], bool]:
     """Carry out trials; each is printed and written as it ends. Returns them, and whether all came to their end."""
-    file = OUT / "folding_trials.jsonl"
-    OUT.mkdir(parents=True, exist_ok=True)
-    if not options.resume:
-        file.unlink(missing_ok=True)
+    lines = Lines("folding_trials", resume=options.resume)
     asked = [(key, trial.seed, trial.sheet) for key, trials in wanted.items() for trial in trials]
-    folds = [fold for fold in known(file) if (fold.key, fold.seed, fold.sheet) in asked]
+    folds = [fold for fold in (Folded(**line) for line in lines.known) if (fold.key, fold.seed, fold.sheet) in asked]
     done = {(fold.key, fold.seed) for fold in folds}
     left = [trial for key, trials in wanted.items() for trial in trials if (key, trial.seed) not in done]
     keys = {name_of(key): key for key in wanted}
     try:
         for outcome in folding.run_trials(left, processes=options.processes):
             folds.append(Folded.of(keys[outcome.trial.name], outcome))
-            with file.open("a") as stream:
-                stream.write(json.dumps(asdict(folds[-1])) + "\n")
+            lines.add(asdict(folds[-1]))
             print(folds[-1], flush=True)
     except KeyboardInterrupt:
         print(f"\ninterrupted: {len(folds)} folds of {len(asked)} are in the table; --resume goes on", flush=True)
@@ -243,7 +227,7 @@ def main() -> None:
         ("--processes", {"type": int, "default": os.cpu_count() or 1}),
         ("--edges", {"type": int, "default": 150, "help": "of the sheet"}),
         ("--time-step", {"type": float, "default": 0.01, "help": "[s]"}),
-        ("--resume", {"action": "store_true", "help": "keep the folds of an earlier run"}),
+        RESUME,
     )
     cases, frictions, ways, count = options.cases, options.frictions, options.ways, options.trials
     sheet = {"edges": options.edges, "time_step": options.time_step}

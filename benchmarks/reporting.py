@@ -7,6 +7,7 @@ of ``{name, value, target, met}``.
 from __future__ import annotations
 
 import argparse
+import contextlib
 import datetime
 import importlib.util
 import json
@@ -31,6 +32,8 @@ __all__ = [
     "HAVE_ELASTICA",
     "HAVE_MUJOCO",
     "OUT",
+    "RESUME",
+    "Lines",
     "Report",
     "Timing",
     "arguments",
@@ -47,6 +50,7 @@ LOADED = time.monotonic()
 HAVE_ELASTICA = importlib.util.find_spec("elastica") is not None
 HAVE_MUJOCO = importlib.util.find_spec("mujoco") is not None
 OUT = Path(os.environ.get("WITHE_BENCHMARK_OUT", ROOT / "out" / "benchmarks"))
+RESUME = ("--resume", {"action": "store_true", "help": "keep what an earlier run with the same withe left"})
 
 
 def arguments(doc: str | None, *extra: tuple[str, dict]) -> argparse.Namespace:
@@ -122,6 +126,40 @@ def interleaved(actions: dict[str, Callable[[], float]], rounds: int, advance: C
 def kilobytes(path: Path) -> str:
     """Size of a file."""
     return f"{path.stat().st_size / 1e3:.0f}"
+
+
+# --- what a run that is cut off leaves ---------------------------------------------------------------------------
+
+
+class Lines:
+    """Results of a long benchmark, each a line of ``out/benchmarks/NAME.jsonl`` as soon as it is there.
+
+    Parameters
+    ----------
+    name : str
+        Of the file.
+    resume : bool
+        Whether those of an earlier run are kept.
+
+    Attributes
+    ----------
+    known : list of dict
+        Of the earlier run.
+    """
+
+    def __init__(self, name: str, *, resume: bool) -> None:
+        OUT.mkdir(parents=True, exist_ok=True)
+        self._file = OUT / f"{name}.jsonl"
+        self.known: list[dict] = []
+        for line in self._file.read_text().splitlines() if resume and self._file.exists() else ():
+            with contextlib.suppress(json.JSONDecodeError):  # the last one may have been cut off
+                self.known.append(json.loads(line))
+        self._file.write_text("".join(json.dumps(line) + "\n" for line in self.known))
+
+    def add(self, line: dict) -> None:
+        """Write one."""
+        with self._file.open("a") as stream:
+            stream.write(json.dumps(line) + "\n")
 
 
 # --- the report ------------------------------------------------------------------------------------------------

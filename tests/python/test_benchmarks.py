@@ -65,6 +65,20 @@ def test_the_short_form_writes_its_figures(name, tmp_path):
         assert goal["value"] is not None or not goal["met"]
 
 
+def test_a_run_that_was_cut_off_goes_on_with_what_it_had(tmp_path):
+    run("deployment_tables", tmp_path, "--quick")
+    file = tmp_path / "deployment_tables.jsonl"
+    first, second = file.read_text().splitlines()
+    kept = json.dumps(json.loads(first) | {"error": 123.4})
+    file.write_text(kept + "\n" + second[:80])
+    printed = run("deployment_tables", tmp_path, "--quick", "--resume")
+    assert file.read_text().splitlines() == [kept, second]
+    assert "123.40 ± " in printed
+    file.write_text(kept + "\n")
+    run("deployment_tables", tmp_path, "--quick", "--known")
+    assert json.loads((tmp_path / "deployment_tables.json").read_text())["figures"]["interrupted"] == "1 of 2 runs"
+
+
 def test_times_at_an_error_are_read_between_points_of_the_front():
     from work_precision import Point, front, time_at
 
