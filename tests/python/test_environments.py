@@ -328,6 +328,45 @@ def test_a_policy_is_trained_the_same_for_equal_seeds():
     assert first.shape == (2,)
 
 
+def test_scales_of_observations_are_those_of_what_was_seen_and_kept_with_the_policy(tmp_path):
+    baselines = pytest.importorskip("stable_baselines3")
+    class Recorded(Touch):
+        seen = []
+
+        def observe(self, robots):
+            found = super().observe(robots)
+            self.seen.append(np.array(found))
+            return found
+
+    task = Recorded()
+    policy = withe.learning.train_policy(
+        task, 192, environments=4, workers=1, progress=False, n_steps=12, batch_size=24, n_epochs=1
+    )
+    scaling = policy.policy.features_extractor
+    assert float(scaling.count[0]) == 144.0  # all rollouts but the last, from which the policy has learned
+    seen = np.concatenate(task.seen)
+    assert np.all(scaling.mean.numpy() >= seen.min(axis=0) - 1e-6)
+    assert np.all(scaling.mean.numpy() <= seen.max(axis=0) + 1e-6)
+    policy.save(tmp_path / "policy.zip")
+    again = baselines.PPO.load(tmp_path / "policy.zip", device="cpu")
+    some = seen[:5].astype(np.float32)
+    np.testing.assert_array_equal(*(p.predict(some, deterministic=True)[0] for p in (policy, again)))
+
+
+def test_running_means_and_deviations_are_those_of_all_at_once():
+    torch = pytest.importorskip("torch")
+    pytest.importorskip("stable_baselines3")
+    from withe.learning.training import _scaling
+
+    scaling = _scaling()(gymnasium.spaces.Box(-1.0, 1.0, (3,)))
+    drawn = np.random.default_rng(0).normal((5.0, 0.0, -1.0), (0.1, 2.0, 1.0), (4, 8, 6, 3)).astype(np.float32)
+    for part in drawn:
+        scaling.take_in(part)
+    rows = drawn.reshape(-1, 3)
+    scaled = scaling(torch.as_tensor(rows)).numpy()
+    np.testing.assert_allclose(scaled, (rows - rows.mean(0)) / rows.std(0), atol=2e-3)
+
+
 def test_training_refuses_what_is_no_task():
     pytest.importorskip("stable_baselines3")
     with pytest.raises(ValueError, match=r"steps must lie in 1"):

@@ -24,6 +24,7 @@ def train_policy(
     environments: int = 16,
     workers: int | None = None,
     seed: int = 0,
+    normalize: bool = True,
     callback: Callable[[Any], None] | None = None,
     progress: bool = True,
     **options: Any,
@@ -43,6 +44,9 @@ def train_policy(
         Threads that step them; by default one a processor.
     seed : int
         Equal seeds give equal controllers, where torch runs the same.
+    normalize : bool
+        Whether observations are scaled by their running mean and deviation, a part of the policy, and rewards, while it
+        learns, by the deviation of their discounted sum.
     callback : callable, optional
         Called with the policy before the first action and after each update: to keep it, or to see how good it is.
     progress : bool
@@ -72,15 +76,25 @@ def train_policy(
     baselines = require("stable_baselines3", "learn")
     require("torch", "learn").set_num_threads(1)  # small networks lose by more
     robots = environment_class("VectorEnvironment")(task, number, workers, autoreset="same_step")
-    monitored = require("stable_baselines3.common.vec_env", "learn").VecMonitor(_adapter()(robots))
-    given = {"n_steps": max(2, 2048 // number), "batch_size": 256, "device": "cpu"} | options
-    policy = baselines.PPO("MlpPolicy", monitored, seed=seed, **given)
+    given = {"n_steps": max(2, 2048 // number), "batch_size": 256, "gamma": 0.99, "device": "cpu"} | options
+    wrappers = require("stable_baselines3.common.vec_env", "learn")
+    trained = wrappers.VecMonitor(_adapter()(robots))
+    if normalize:
+        trained = wrappers.VecNormalize(trained, norm_obs=False, gamma=given["gamma"])
+        given["policy_kwargs"] = {"features_extractor_class": _scaling()} | given.get("policy_kwargs", {})
+    policy = baselines.PPO("MlpPolicy", trained, seed=seed, **given)
     base = require("stable_baselines3.common.callbacks", "learn").BaseCallback
 
     class Report(base):  # type: ignore[misc,valid-type]
         def _on_rollout_start(self) -> None:
+            # Not before an update, which compares with what was chosen by the old scales.
+            if normalize and self.num_timesteps > 0:
+                policy.policy.features_extractor.take_in(self.seen)
             if callback is not None:
                 callback(policy)
+
+        def _on_rollout_end(self) -> None:
+            self.seen = policy.rollout_buffer.observations
 
         def _on_step(self) -> bool:
             bar.update(min(self.num_timesteps, total))
@@ -91,6 +105,37 @@ def train_policy(
     if callback is not None:
         callback(policy)
     return policy
+
+
+@cache
+def _scaling() -> Any:
+    """Observations by their running mean and deviation, [Chan, Golub and LeVeque 1983]; made when torch is there."""
+    torch = require("torch", "learn")
+    base = require("stable_baselines3.common.torch_layers", "learn").BaseFeaturesExtractor
+
+    class Scaling(base):  # type: ignore[misc,valid-type]
+        most = 10.0  # deviations
+
+        def __init__(self, observation_space: Any) -> None:
+            size = observation_space.shape[0]
+            super().__init__(observation_space, size)
+            for name, value in (("count", 0.0), ("mean", 0.0), ("variance", 1.0)):
+                self.register_buffer(name, torch.full((size,), value))
+
+        def take_in(self, observations: Any) -> None:
+            """Those of a rollout, shape (steps, robots, size)."""
+            seen = torch.as_tensor(observations, dtype=self.mean.dtype).reshape(-1, len(self.mean))
+            count = self.count + len(seen)
+            apart = seen.mean(0) - self.mean
+            within = self.count * self.variance + len(seen) * seen.var(0, correction=0)
+            self.variance.copy_((within + apart**2 * self.count * len(seen) / count) / count)
+            self.mean.add_(apart * len(seen) / count)
+            self.count.copy_(count)
+
+        def forward(self, observations: Any) -> Any:
+            return ((observations - self.mean) / (self.variance + 1e-8).sqrt()).clamp(-self.most, self.most)
+
+    return Scaling
 
 
 @cache
