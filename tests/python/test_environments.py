@@ -330,12 +330,12 @@ def test_a_policy_is_trained_the_same_for_equal_seeds():
 
 def test_scales_of_observations_are_those_of_what_was_seen_and_kept_with_the_policy(tmp_path):
     baselines = pytest.importorskip("stable_baselines3")
-    class Recorded(Touch):
-        seen = []
+    observed = []
 
+    class Recorded(Touch):
         def observe(self, robots):
             found = super().observe(robots)
-            self.seen.append(np.array(found))
+            observed.append(np.array(found))
             return found
 
     task = Recorded()
@@ -344,7 +344,7 @@ def test_scales_of_observations_are_those_of_what_was_seen_and_kept_with_the_pol
     )
     scaling = policy.policy.features_extractor
     assert float(scaling.count[0]) == 144.0  # all rollouts but the last, from which the policy has learned
-    seen = np.concatenate(task.seen)
+    seen = np.concatenate(observed)
     assert np.all(scaling.mean.numpy() >= seen.min(axis=0) - 1e-6)
     assert np.all(scaling.mean.numpy() <= seen.max(axis=0) + 1e-6)
     policy.save(tmp_path / "policy.zip")
