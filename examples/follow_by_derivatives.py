@@ -8,15 +8,16 @@ ahead are then the bounded least squares of
 tip_k where the arm would come to without an action, by a copy of it that goes ahead, K_j what an action does to the
 tip j control steps later. The first of them is done. With one action ahead this is the resolved rate.
 
-python examples/follow_by_derivatives.py [EPISODES]
+python examples/follow_by_derivatives.py [EPISODES [FILM.gif]]
 """
 
 from __future__ import annotations
 
 import sys
+from pathlib import Path
 
 import numpy as np
-from learn_follow import PUBLISHED, discounted_return
+from learn_follow import PUBLISHED, discounted_return, film
 from scipy.optimize import lsq_linear
 
 import withe
@@ -110,11 +111,13 @@ def tip_of_state(arm: withe.Simulation, size: int) -> np.ndarray:
 
 
 def main() -> int:
-    """Discounted returns of both, beside the published one."""
+    """Discounted returns of both, beside the published one; and a film."""
     episodes = int(sys.argv[1]) if len(sys.argv) > 1 else 4
     found = {ahead: discounted_return(Controller(ahead), episodes) for ahead in (1, 5)}
     for ahead, value in found.items():
         print(f"{ahead} action(s) ahead: discounted return {value:.1f}; published for a learned one {PUBLISHED:.0f}")
+    if len(sys.argv) > 2:
+        film(Controller(5), Path(sys.argv[2]), seconds=6.0)
     return 0 if found[5] > found[1] else 1
 
 

@@ -167,7 +167,7 @@ def main() -> None:
     folder = Path(sys.argv[3]) if len(sys.argv) > 3 else Path("out/follow_by_gradients")
     policy = learn(steps, seed, Curve(folder, between=10_000))
     draw_curve(folder, "analytic policy gradients")
-    film(policy, folder / "learned.mp4")
+    film(lambda seen, _: policy.predict(seen, deterministic=True)[0], folder / "learned.mp4")
 
 
 if __name__ == "__main__":

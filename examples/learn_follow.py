@@ -73,15 +73,16 @@ def draw_curve(folder: Path, title: str) -> None:
     plt.close(figure)
 
 
-def film(policy: Any, path: Path, seconds: float = 20.0, seed: int = 5) -> None:
-    """The learned arm, one picture a control step."""
+def film(choose: Any, path: Path, seconds: float = 20.0, seed: int = 5) -> None:
+    """The arm by actions = choose(observations, robots), one picture a control step; .mp4 or .gif."""
     import imageio.v2 as imageio
 
     env = withe.learning.Environment(withe.learning.Follow(), render_mode="rgb_array")
     seen, _ = env.reset(seed=seed)
-    with imageio.get_writer(path, fps=10) as writer:
+    timing = {"duration": 100, "loop": 0} if path.suffix == ".gif" else {"fps": 10}
+    with imageio.get_writer(path, **timing) as writer:
         for _ in range(round(seconds / env.task.control_step)):
-            seen, *_ = env.step(policy.predict(seen, deterministic=True)[0])
+            seen, *_ = env.step(choose(seen[None], [env.simulation])[0])
             writer.append_data(env.render())
     env.close()
 
@@ -105,7 +106,7 @@ def main() -> None:
         policy_kwargs={"net_arch": [128, 128]},
     )
     draw_curve(folder, "proximal policy optimisation")
-    film(policy, folder / "learned.mp4")
+    film(lambda seen, _: policy.predict(seen, deterministic=True)[0], folder / "learned.mp4")
 
 
 if __name__ == "__main__":
