@@ -14,7 +14,8 @@ namespace {
 // lead nowhere in time.
 constexpr int kFirstIterations = 4;
 constexpr double kMostGrowth = 1e3;
-// Steps that are within the tolerance, while so many in a row have not halved the residual, end at a jump of forces.
+// Steps that are within the tolerance, while so many in a row have not halved the residual, end at a jump of forces. In
+// time a shorter interval leads past it; a solve at rest has nothing better than to go on.
 constexpr int kMostStalls = 4;
 // A first step of which less is kept counts as cut.
 constexpr double kCut = 0.5;
@@ -148,7 +149,8 @@ class Newton::Solve {
     stagnation_.note(result_.residual, reuse_.step());
     if (converged()) return Verdict::converged;
     if (result_.iterations == how_.max_iterations) return Verdict::failed;
-    if (uses(Heuristic::reject_stagnation) && stagnation_.stalls() >= kMostStalls && reuse_.at_end())
+    if (uses(Heuristic::reject_stagnation) && how_.interval != 0.0 && stagnation_.stalls() >= kMostStalls &&
+        reuse_.at_end())
       return Verdict::failed;
     if (result_.iterations == 0) first_residual_ = result_.residual;
     if (uses(Heuristic::reject_growing) && how_.interval != 0.0 && result_.iterations >= kFirstIterations &&

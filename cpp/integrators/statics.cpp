@@ -28,6 +28,9 @@ constexpr double kFarthestTurn = 1.0;
 constexpr double kShortest = 1.0 / 64.0;
 // Where no edge turns, the path ends after so many cuts.
 constexpr int kMostCuts = 6, kMostCutsOfFriction = 12;
+// After so many iterations a point of the path is given up. Where Coulomb's friction holds a stiff rod, the border of
+// what slips goes on by a node an iteration, and the solution follows when it has arrived: there all are used.
+constexpr int kMostIterations = 25;
 // A path has no more points than this: what a scene is torn along by a support that goes a thousand lengths away is
 // found by settling there.
 constexpr int kMostPoints = 1000;
@@ -125,6 +128,11 @@ class Statics {
     return true;
   }
 
+  int most_iterations() const {
+    const int most = options_.max_iterations;
+    return equations_.has_potential() ? std::min(kMostIterations, most) : most;
+  }
+
   bool firm() const {
     return tangent_.factorization.status == FactorStatus::ok && tangent_.factorization.negative_pivots == 0;
   }
@@ -152,7 +160,7 @@ class Statics {
     }
     const NewtonResult r = newton_.solve(equations_, z_,
                                          {.target = &path_.target(),
-                                          .max_iterations = std::min(25, options_.max_iterations),
+                                          .max_iterations = most_iterations(),
                                           .predicted = predicted ? &prediction : nullptr},
                                          work_);
     note(r, last);

@@ -14,6 +14,7 @@ from withe.deployment.world import Setup, lay
 from withe.perception import trace
 from withe.perception.synthetic import render_mask
 
+PATTERNS = Path(__file__).resolve().parents[1] / "data" / "patterns"
 CABLE = Cable(0.36, 1.6e-3, 0.02)  # short and soft, so that little is simulated
 NODES = 60
 
@@ -147,6 +148,16 @@ def test_quasi_static_laying_is_what_slow_laying_tends_to(arc):
     still = deploy(motion, floor=0.6, nodes=NODES, quasi_static=True, progress=False)
     assert np.linalg.norm(slow.laid - still.laid, axis=1).max() < 4e-4
     assert not np.any(still.record.energy().kinetic)
+
+
+@pytest.mark.parametrize("nodes", [80, 200])
+def test_equilibria_follow_a_cable_of_any_mesh_that_slips_along_its_length(nodes):
+    """The border of what slips goes on by a node an iteration: the finer the mesh, the more of them it takes."""
+    sine = np.genfromtxt(PATTERNS / "sine.csv", delimiter=",", skip_header=1)
+    motion = plan(Cable.dlo(2), Pattern(sine))
+    found = deploy(motion, floor=0.2, nodes=nodes, quasi_static=True, progress=False)
+    assert found.slipped.max() > 5e-3
+    assert found.error == pytest.approx(4.1e-3, abs=1e-4)  # in time, at 6 mm/s: 4.16 mm
 
 
 def test_a_cable_put_on_its_pattern_moves_only_where_friction_fails(arc):
