@@ -32,17 +32,14 @@ WAYS = {  # how the planner is asked, and whether the fold is watched
     "local": ({"method": "local"}, False),
     "ucs": ({"method": "ucs"}, False),
     "slip": ({"method": "slip", "grasp": "free"}, False),
-    "slip plunge": ({"method": "slip", "grasp": "free"}, False),
     "ucs closed": ({"method": "ucs"}, True),
     "slip closed": ({"method": "slip", "grasp": "free"}, True),
     "ucs as a strip": ({"method": "ucs"}, False),
 }
-PLUNGING, STRIP = "slip plunge", "ucs as a strip"  # pressed down in the end; as the dissertation plans a square
-ONLY = {PLUNGING: ("US half", "US .20", "cardboard half", "cardboard .20"), STRIP: ("origami .30",)}
-INFEASIBLE = "no plan: no plunge folds"  # and the friction that is missing
+STRIP = "ucs as a strip"  # as the dissertation plans a square
+ONLY = {STRIP: ("origami .30",)}
 CURVATURES = {"cardboard half": 4.0, "cardboard .20": 6.5}  # bounds of free moments that such a fold needs [1/Lgb]
 CORNERS = ("origami .30",)  # that bear no moment
-DURATIONS = {"cardboard half": 0.03, "cardboard .20": 0.03}  # of a plunge [s]; others have .05
 PUBLISHED = {  # table 7.2, sheets 21 cm wide [cm]
     "A4 half": {"intuitive": "12.31 .63", "local": "13.51 .13", "ucs": "14.74 .05", "ucs closed": "14.64 .07"},
     "cardboard half": {"intuitive": "5.88 .38", "local": "none", "ucs": "12.8 .27", "ucs closed": "13.75 .19"},
@@ -66,7 +63,6 @@ def trial_of(key: Key, seed: int, sheet: dict) -> folding.Trial:
         replace(paper, friction=friction),
         target,
         seed,
-        plunges={"duration": DURATIONS.get(case, 0.05)} if way == PLUNGING else None,
         replans=5 if watched else 0,
         planner={"curvature": CURVATURES.get(case, 2.5), **asked},
         sheet=sheet,
@@ -94,6 +90,8 @@ class Folded:
     slide: float
     curvature: float
     needed: float
+    plunges: bool
+    blocked: str | None
     failure: str | None
     seconds: float
 
@@ -114,6 +112,8 @@ class Folded:
             outcome.slide,
             outcome.max_curvature,
             outcome.needed_friction,
+            outcome.plunges,
+            outcome.blocked,
             outcome.failure,
             outcome.seconds,
         )
@@ -124,13 +124,14 @@ class Folded:
         return f"{head}{self.failure or done} ({self.seconds:.0f} s)"
 
 
-def run(wanted: dict[Key, list[folding.Trial]], options: argparse.Namespace) -> tuple[list[Folded], bool]:
-    """Carry out trials; each is printed and written as it ends. Returns them, and whether all came to their end."""
+def run(wanted: dict[Key, list[folding.Trial]], options: argparse.Namespace) -> list[Folded]:
+    """Carry out trials; each is printed and written as it ends. Returns those that are."""
     lines = Lines("folding_trials", resume=options.resume)
     asked = [(key, trial.seed, trial.sheet) for key, trials in wanted.items() for trial in trials]
     folds = [fold for fold in (Folded(**line) for line in lines.known) if (fold.key, fold.seed, fold.sheet) in asked]
     done = {(fold.key, fold.seed) for fold in folds}
     left = [trial for key, trials in wanted.items() for trial in trials if (key, trial.seed) not in done]
+    left.sort(key=lambda trial: trial.seed)  # what is interrupted has as many folds in every line, or nearly
     keys = {name_of(key): key for key in wanted}
     try:
         for outcome in folding.run_trials(left, processes=options.processes):
@@ -139,8 +140,8 @@ def run(wanted: dict[Key, list[folding.Trial]], options: argparse.Namespace) -> 
             print(folds[-1], flush=True)
     except KeyboardInterrupt:
         print(f"\ninterrupted: {len(folds)} folds of {len(asked)} are in the table; --resume goes on", flush=True)
-        return folds, False
-    return folds, True
+        return folds
+    return folds
 
 
 def row(folds: list[Folded], count: int) -> tuple[str, ...]:
@@ -151,10 +152,12 @@ def row(folds: list[Folded], count: int) -> tuple[str, ...]:
     head = (first.case, f"{first.friction:g}", first.way, f"{len(folded)} of {of}")
     asked = [fold.needed for fold in folds if np.isfinite(fold.needed)]
     needed = f"{np.median(asked):.3f}" if asked else ""
+    plunges, blocked = sum(fold.plunges for fold in folds), sum(infeasible(fold) for fold in folds)
+    ends = (f"{plunges}" if plunges else "", f"{blocked}" if blocked else "")
     seconds = f"{np.mean([fold.seconds for fold in folds]):.0f}"
     if not folded:
         why = "no plan" if all((fold.failure or "").startswith("no plan") for fold in folds) else "none folds"
-        return (*head, why, published, "", "", "", needed, seconds)
+        return (*head, why, published, "", "", "", needed, *ends, seconds)
     lengths, errors = np.array([f.length for f in folded]), np.abs([f.error for f in folded])
     slides, curvatures = [f.slide for f in folded], [f.curvature for f in folded]
     return (
@@ -165,23 +168,29 @@ def row(folds: list[Folded], count: int) -> tuple[str, ...]:
         f"{1e3 * np.mean(slides):.2f} {1e3 * np.std(slides):.2f}",
         f"{max(curvatures):.0f}",
         needed,
+        *ends,
         seconds,
     )
+
+
+def infeasible(fold: Folded) -> bool:
+    """Whether the planner said that no way bears the sheet's uncertainty, or that there is none."""
+    return fold.blocked is not None or (fold.failure or "").startswith("no plan: no path")
 
 
 def goals(report: Report, groups: dict[Key, list[Folded]]) -> None:
     """On the slippery table: what is folded without a camera, and with one."""
     for (case, friction, way), folds in groups.items():
         soft = case in ("A4 half", "A4 .25", "US half", "origami .30")
-        hard_way = "ucs closed" if soft else PLUNGING
-        if friction != FRICTIONS[0] or way not in ("slip", hard_way) or (way == "slip" and not soft):
+        if friction != FRICTIONS[0] or not (way == "slip" or (soft and way == "ucs closed")):
             continue
-        bound = 0.5e-3 if way == "slip" else 1e-3 if soft else 5e-3
-        good = [f.failure is None and abs(f.error) < bound and (way != "slip" or abs(f.slide) < 1e-3) for f in folds]
-        refused = [not soft and (f.failure or "").startswith(INFEASIBLE) for f in folds]
+        bound = (0.5e-3 if way == "slip" else 1e-3) if soft else 5e-3
+        strict = way == "slip" and soft
+        good = [f.failure is None and abs(f.error) < bound and (not strict or abs(f.slide) < 1e-3) for f in folds]
+        refused = [not soft and infeasible(fold) for fold in folds]
         said = "" if soft else ", or said to be infeasible"
         share = float(np.mean(np.logical_or(good, refused)))
-        report.goal(f"{case}, {way}: share within {1e3 * bound:g} mm{said}", share, 0.95)
+        report.goal(f"{case}, {way}: share of {len(folds)} within {1e3 * bound:g} mm{said}", share, 0.95)
 
 
 def draw(groups: dict[Key, list[Folded]]) -> None:
@@ -236,7 +245,7 @@ def main() -> None:
     report = Report("folding_trials", quick=options.quick)
     keys = [key for key in product(cases, frictions, ways) if key[0] in ONLY.get(key[2], CASES)]
     wanted = {key: [trial_of(key, SEEDS + i, sheet) for i in range(count)] for key in keys}
-    folds, whole = run(wanted, options)
+    folds = run(wanted, options)
     groups = {key: [fold for fold in folds if fold.key == key] for key in wanted}
     groups = {key: folds for key, folds in groups.items() if folds}
     header = (
@@ -250,13 +259,15 @@ def main() -> None:
         "slide [mm]",
         "curv. [1/m]",
         "needs friction",
+        "plunges",
+        "said infeasible",
         "s a fold",
     )
     rows = [row(folds, count) for folds in groups.values()]
     report.table("Folds: mean and spread; error: median and greatest", header, rows)
     report.figures["slowest [s]"] = max((fold.seconds for fold in folds), default=0.0)
     report.figures["failures"] = [str(fold) for fold in folds if fold.failure]
-    if whole:
+    if folds:
         goals(report, groups)
     if groups:
         draw(groups)

@@ -23,7 +23,7 @@ def planned(paper, target="half", method="ucs"):
 
 @cache
 def freely(paper, target="half", curvature=2.5):
-    return plan(PAPERS[paper](), target, method="slip", grasp="free", curvature=curvature)
+    return plan(PAPERS[paper](), target, method="slip", grasp="free", curvature=curvature, ending="slow")
 
 
 def inner_edges(folded):
@@ -104,8 +104,9 @@ def test_curvature_of_2_11_folds_a4_in_half():
     assert freely("a4", "half", 2.11).max_curvature.max() * 0.048 < 2.11
 
 
-def test_us_letter_is_folded_in_half_without_slide():
-    folded = freely("us_letter")
+def test_us_letter_is_folded_in_half_without_slide_if_it_is_as_thought():
+    with pytest.warns(UserWarning, match=r"the sheet slides .* within its uncertainty, where Lgb is 0\.066 m"):
+        folded = freely("us_letter")
     assert 0 < folded.slip_ratio.max() < 0.12
     assert np.abs(folded.slide).max() == 0.0
 
@@ -116,7 +117,7 @@ def test_a_bound_of_curvature_that_is_too_low_says_which_would_do():
     least = float(str(raised.value).split()[-1])
     assert 3.5 < least < 4.2
     with pytest.warns(UserWarning, match="the sheet slides"):
-        bent = plan(Paper.cardboard(), method="slip", grasp="free", curvature=1.05 * least)
+        bent = plan(Paper.cardboard(), method="slip", grasp="free", curvature=1.05 * least, ending="slow")
     assert bent.max_curvature.max() * 0.132 < 1.1 * least
 
 
@@ -256,6 +257,7 @@ def test_saved_tables_hold_the_plan(tmp_path):
         ({"target": 0.02}, "target is 0.02 m"),
         ({"method": "best"}, "method must be"),
         ({"grasp": "tight"}, "grasp must be"),
+        ({"ending": "soft"}, "ending must be"),
         ({"grasp": "free"}, "of method 'slip'"),
         ({"uncertainty": (0.1, 1.5)}, "uncertainty must be shares"),
         ({"uncertainty": 0.1}, "uncertainty must"),

@@ -10,13 +10,14 @@ the sheet per length. That makes one solution serve every paper.
 """
 
 from withe.folding.closed_loop import fold
+from withe.folding.endings import plan
 from withe.folding.hanging_strip import Measured, droop, measure
 from withe.folding.jaw import Jaw
 from withe.folding.manifold import elastica
 from withe.folding.network_training import train
 from withe.folding.noise import Noise
 from withe.folding.paper import Paper
-from withe.folding.planning import plan, replan
+from withe.folding.planning import replan
 from withe.folding.plans import Plan
 from withe.folding.plunging import plunge
 from withe.folding.seeing import SeenEdge, find_edge, overhead_camera

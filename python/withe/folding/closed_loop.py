@@ -43,7 +43,8 @@ def fold(
 
     Poses of the rest begin where the jaw is, and are those of the sheet where it lies now; by how much the jaw's angle
     is off that of the manifold there goes to zero evenly along the way [dissertation, (7.14)-(7.16)]. The edge comes
-    down where the sheet is now, and not where it was.
+    down where the sheet is now, and not where it was. A plunge is not planned anew: the sheet is looked at before it
+    last, and it goes down where the sheet is then.
 
     Parameters
     ----------
@@ -67,7 +68,8 @@ def fold(
     Raises
     ------
     ValueError
-        Not a plan or a sheet, a negative tolerance, no path from where the sheet has slid to.
+        Not a plan or a sheet, a plan without moment that plunges, a negative tolerance, no path from where the sheet
+        has slid to.
     ImportError
         OpenCV is not installed.
 
@@ -82,6 +84,10 @@ def fold(
         raise ValueError(f"plan must be a Plan, got {plan!r:.80}")
     if not isinstance(sheet, SimulatedSheet):
         raise ValueError(f"sheet must be a SimulatedSheet, got {sheet!r:.80}")
+    if plan.plunges_at is not None and plan.grasp != "free":
+        raise ValueError(
+            f"plan must be one with a free moment for its way to a plunge to be planned anew, got {plan!r}"
+        )
     stops = validation.integer(replans, "replans", 0, 1000)
     watched = overhead_camera(plan.paper.length) if camera is None else camera
     least = validation.non_negative(tolerance, "tolerance")
@@ -95,17 +101,33 @@ def _parts(
     plan: Plan, sheet: SimulatedSheet, stops: int, camera: Camera, tolerance: float, seen: list[float]
 ) -> Iterator[_Part]:
     """One part after the other; what is yielded is carried out before the next is asked for."""
-    present, poses, known = plan, plan.poses, plan.offset
+    present, plunge = plan.before_plunge(), _plunge(plan)
+    poses, known = present.poses, plan.offset
     for left in range(stops, -1, -1):
-        last = int(np.ceil((len(poses) - 1) / (left + 1)))
+        parts = left + 1 if plunge is None else max(left, 1)  # the last look is before the plunge
+        last = int(np.ceil((len(poses) - 1) / parts))
         yield _timed(poses[: last + 1], plan)
         poses = poses[last:]
         if left == 0:
-            return
+            break
         seen.append(_slide(sheet, camera, plan, poses[0]))
         if abs(seen[-1] - known) > tolerance:  # not where the edge is hidden: NaN
-            present, known = replan(present, poses[0], seen[-1]), seen[-1]
-            poses = np.vstack([poses[:1], present.poses[1:]])
+            known = seen[-1]
+            if len(poses) > 1:
+                present = replan(present, poses[0], known)
+                poses = np.vstack([poses[:1], present.poses[1:]])
+        if len(poses) == 1:
+            break
+    if plunge is not None:
+        shift = np.array([known - plan.offset, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+        yield _Part(plunge.times, np.vstack([poses[-1:], plunge.poses[1:] + shift]))
+
+
+def _plunge(plan: Plan) -> _Part | None:
+    if plan.plunges_at is None:
+        return None
+    last = plan.times >= plan.plunges_at
+    return _Part(plan.times[last], plan.poses[last])
 
 
 def _slide(sheet: SimulatedSheet, camera: Camera, plan: Plan, pose: FloatArray) -> float:

@@ -8,8 +8,8 @@ import warnings
 from dataclasses import replace
 from pathlib import Path
 
+from withe.folding.endings import plan
 from withe.folding.paper import Paper
-from withe.folding.planning import plan
 
 __all__ = ["add_parser", "run"]
 
@@ -35,6 +35,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser.add_argument("--grasp", choices=["moment_free", "free"], default="moment_free")
     parser.add_argument("--curvature", type=float, default=2.5, metavar="K", help="bound of a free grasp [1/Lgb]")
     parser.add_argument("--manifold", choices=["exact", "network"], default="exact")
+    parser.add_argument("--ending", choices=["auto", "slow", "plunge"], default="auto", help="how the edge comes down")
     parser.add_argument("--out", type=Path, default=Path("fold.csv"), help="NAME.csv or NAME.json")
     parser.set_defaults(run=run)
 
@@ -56,11 +57,14 @@ def run(arguments: argparse.Namespace) -> int:
             grasp=arguments.grasp,
             curvature=arguments.curvature,
             manifold=arguments.manifold,
+            ending=arguments.ending,
         )
     for warning in said:
         sys.stderr.write(f"withe: {warning.message}\n")
     file = found.save(arguments.out)
     jump = found.jumps_at
     end = f"slides {1e3 * found.slide[-1]:.1f} mm" if jump is None else f"jumps at {jump:.1f} s, before the end"
+    if found.plunges_at is not None:
+        end = f"slides {1e3 * found.slide[found.times <= found.plunges_at][-1]:.1f} mm, plunges at {jump:.1f} s"
     sys.stdout.write(f"{found!r}\npredicted: {end}\n{file}\n")
     return 0

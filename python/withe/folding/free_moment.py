@@ -17,7 +17,7 @@ from itertools import product
 import numpy as np
 import numpy.typing as npt
 
-from withe.folding.sheets import Elastica, at_forces, at_poses, forces_of, join, poses_of, take
+from withe.folding.sheets import Elastica, at_forces, at_poses, forces_of, join, of_other, poses_of, take
 from withe.folding.widths import EVEN, Width
 
 __all__ = ["Holding", "Lattice", "Way", "forces_at", "goals", "make_lattice", "smoothed", "way_to"]
@@ -63,7 +63,7 @@ class Holding:
         worst = self.ratio(sheet)
         for factor in (1 - self.share, 1 + self.share) if self.share > 0 else ():
             it = replace(self, length=self.length / factor, width=self.width.of_other(factor))
-            other = at_poses(poses_of(sheet) / [factor, factor, 1.0], _of_other(forces_of(sheet), factor), it.width)
+            other = at_poses(poses_of(sheet) / [factor, factor, 1.0], of_other(forces_of(sheet), factor), it.width)
             ratio = it.ratio(other)
             worst = np.maximum(worst, np.where(other.valid & other.stable, ratio, np.inf))
         return worst
@@ -77,17 +77,6 @@ class Holding:
         """Whether the sheet can be there, the jaw too, and is not bent too far."""
         fits = (sheet.suspended < self.length) & (sheet.angle < _STEEPEST) & (sheet.max_curvature <= self.curvature)
         return sheet.valid & sheet.stable & fits & self.has_room(sheet)
-
-
-def _of_other(forces: FloatArray, factor: float) -> FloatArray:
-    """Forces of about the same sheet if Lgb is more by a factor, in its own units: near which an equilibrium is sought.
-
-    Those of long parts are their weight, those of short ones bending.
-    """
-    weighs = np.minimum(1.0, 0.5 * forces[:, 2:])
-    scale = weighs / factor + (1.0 - weighs) * factor**2
-    scales: FloatArray = np.concatenate([scale, scale, np.full_like(scale, 1.0 / factor)], axis=1)
-    return forces * scales
 
 
 def forces_at(places: FloatArray) -> FloatArray:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -21,7 +20,7 @@ from withe.folding.sheets import LONGEST, SHORTEST, Elastica, at_forces, at_pose
 from withe.folding.timing import evenly, travel_times
 from withe.folding.widths import Width, free_width
 
-__all__ = ["plan", "plan_above", "replan"]
+__all__ = ["Grasp", "Method", "Source", "plan_above", "replan", "slow_plan"]
 
 FloatArray = npt.NDArray[np.float64]
 Method = Literal["intuitive", "local", "ucs", "slip"]
@@ -78,75 +77,21 @@ class _Task:
         return lambda inner: evenly(self.outer(inner), count, self.speed, self.turning)
 
 
-def plan(
+def slow_plan(
     paper: Paper,
-    target: float | Literal["half"] = "half",
+    target: float | Literal["half"],
     *,
-    method: Method = "ucs",
-    grasp: Grasp = "moment_free",
-    uncertainty: tuple[float, float] = (0.1, 0.5),
-    curvature: float = 2.5,
-    jaw: Jaw | None = None,
-    manifold: Source = "exact",
-    speed: float = 0.05,
-    acceleration: float = 0.2,
-    turning: float = 1.0,
+    method: Method,
+    grasp: Grasp,
+    uncertainty: tuple[float, float],
+    curvature: float,
+    jaw: Jaw | None,
+    manifold: Source,
+    speed: float,
+    acceleration: float,
+    turning: float,
 ) -> Plan:
-    """Plan how a jaw lifts one edge of a sheet and lays it down on the sheet.
-
-    Parameters
-    ----------
-    paper : Paper
-    target : float or "half" [m]
-        Where the lifted edge comes down, from where it lay (the dissertation's C); the crease is in the middle. "half":
-        on the far edge.
-    method : {"ucs", "slip", "local", "intuitive"}
-        "ucs": least accumulated ratio of the table's tangential to its normal force, on a grid of positions
-        [dissertation, Alg. 7, with costs that accumulate]. "slip": no predicted slide where such a way exists, or else
-        as little as can be; then short and little bent. "local": from each pose to the next one of least tangential
-        force, after Petrik et al. 2016, with the right stiffness. "intuitive": half a circle [dissertation, (7.18)].
-    grasp : {"moment_free", "free"}
-        "moment_free": the angle of the jaw is that at which the sheet ends without curvature [dissertation, (7.6)].
-        "free", of method "slip": the jaw turns the edge as it likes, and curvature is bounded.
-    uncertainty : pair of float
-        Of method "slip" with a free moment: shares by which Lgb may be more or less, and friction less, than the
-        paper's. A way without slide is one on which no such sheet slides.
-    curvature : float [1/Lgb]
-        Bound of a free moment's curvature.
-    jaw : Jaw, optional
-        How it holds the sheet; by default 10 mm of it.
-    manifold : {"exact", "network"}
-        Of grasps without moment: where equilibria come from, each from its equations, or all from the network that
-        comes with withe (`SheetNetwork`), as the dissertation has them. No slower without it; it needs torch.
-    speed, acceleration : float [m/s], [m/s^2]
-        At most; of the sheet's outer edge.
-    turning : float [rad/s]
-        Rate of turning, at most.
-
-    Returns
-    -------
-    Plan
-
-    Raises
-    ------
-    ValueError
-        A target outside the sheet, or one that no pose of the grasp has; sizes and limits that are not positive; a
-        bound of curvature that is too low, with the least that would do; no path, with what blocks it.
-
-    Warns
-    -----
-    UserWarning
-        Every way of method "slip" slides: with the least friction at which one would not.
-
-    Examples
-    --------
-    >>> import withe
-    >>> folded = withe.folding.plan(withe.folding.Paper.a4(), method="slip", grasp="free")
-    >>> folded.poses.shape
-    (251, 7)
-    >>> print(f"{1e3 * abs(folded.slide).max():.1f} mm")
-    0.0 mm
-    """
+    """Plan a fold whose edge comes down slowly; arguments and what is refused are those of `plan`."""
     if not isinstance(paper, Paper):
         raise ValueError(f"paper must be a Paper, got {paper!r}")
     jaw = Jaw() if jaw is None else jaw
@@ -219,7 +164,6 @@ def _over_manifold(task: _Task) -> Plan:
     sheet = moment_free.smoothed(task.solve, nodes, task.holding, task.cut(_POSES))
     if not sheet.valid.all():
         raise ValueError(f"no path to {task.target:g} m: between poses of the grid there are some without equilibrium")
-    _warn_of_slide(float(task.holding.ratio(sheet).max()), task)
     return _finished(task, task.outer(poses_of(sheet)), sheet)
 
 
@@ -357,42 +301,36 @@ def _checked_goal(goal: Elastica | None, task: _Task) -> Elastica:
     return goal
 
 
-def _warn_of_slide(ratio: float, task: _Task) -> None:
-    if task.method == "slip" and ratio > task.paper.friction:
-        warnings.warn(
-            f"the sheet slides: this way needs friction {ratio:.3f}, the paper has {task.paper.friction:g}",
-            UserWarning,
-            stacklevel=4,  # where the user called plan
-        )
-
-
 def _free(task: _Task, rise: float = 0.0) -> Plan:
     """Without the table's friction where that can be, then with some, then for a sheet that is just as thought.
 
     To where the edge is down, or so high above that [Lgb].
     """
-    limit = task.paper.friction * (1 - task.uncertainty[1])
-    exact = replace(task.holding, share=0.0)
-    best: tuple[Way, Holding] | None = None
     friction = task.paper.friction
-    for holding, pulls, most in (
-        (task.holding, False, friction),
-        (task.holding, True, friction),
-        (exact, True, np.inf),
-    ):
-        lattice = free_moment.make_lattice(holding, pulls, most)
-        raised = replace(holding, thickness=holding.thickness + rise)
-        found = free_moment.goals(lattice, raised, task.target / task.paper.gravito_bending_length)
-        found = take(found, holding.bearable(found))
-        way = free_moment.way_to(lattice, holding, found, holding.worst_ratio(found), limit) if len(found.x) else None
-        if way is not None and (best is None or holding.share == 0 or way.ratio < best[0].ratio):
-            best = way, holding
-        # Where some of the sheets that it may be slide anyway, the way is that for the sheet that it should be.
-        if best is not None and best[0].ratio <= (friction if pulls else limit):
-            break
-    if best is None:
+    limit = friction * (1 - task.uncertainty[1])
+    exact = replace(task.holding, share=0.0)
+    level = _free_way(task, task.holding, False, friction, rise)
+    if level is not None and level.ratio <= limit:
+        return _along(task, level, task.holding, limit)
+    thought = _free_way(task, exact, True, np.inf, rise)
+    # Where the sheet that it should be slides anyway, the way is that for it: others need more friction still.
+    if thought is not None and thought.ratio <= friction:
+        pulled = _free_way(task, task.holding, True, friction, rise)
+        ways = [way for way in (level, pulled) if way is not None and way.ratio <= friction]
+        if ways:
+            return _along(task, min(ways, key=lambda way: way.ratio), task.holding, limit)
+    if thought is None:
         raise ValueError(_blocked(task))
-    return _along(task, *best, limit)
+    return _along(task, thought, exact, limit)
+
+
+def _free_way(task: _Task, holding: Holding, pulls: bool, most: float, rise: float) -> Way | None:
+    lattice = free_moment.make_lattice(holding, pulls, most if pulls else np.inf)
+    raised = replace(holding, thickness=holding.thickness + rise)
+    found = free_moment.goals(lattice, raised, task.target / task.paper.gravito_bending_length)
+    found = take(found, holding.bearable(found))
+    limit = task.paper.friction * (1 - task.uncertainty[1])
+    return free_moment.way_to(lattice, holding, found, holding.worst_ratio(found), limit) if len(found.x) else None
 
 
 def _along(task: _Task, way: Way, holding: Holding, limit: float) -> Plan:
@@ -401,7 +339,6 @@ def _along(task: _Task, way: Way, holding: Holding, limit: float) -> Plan:
     index = task.cut(_POSES - 1)(poses_of(sheet))
     even = np.stack([np.interp(index, np.arange(len(places)), places[:, i]) for i in range(3)], axis=1)
     sheet = join(at_forces([flat_forces(task.width)]), at_forces(free_moment.forces_at(even)))
-    _warn_of_slide(float(task.holding.ratio(sheet).max()), task)
     return _finished(task, task.outer(poses_of(sheet)), sheet)
 
 

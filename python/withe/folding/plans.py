@@ -6,6 +6,7 @@ import json
 import os
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,7 @@ from withe.common.extras import require
 from withe.folding.figures import draw_fold, side_view
 from withe.folding.jaw import Jaw, inner_edge
 from withe.folding.paper import Paper
-from withe.folding.sheets import Elastica, at_forces, drag, forces_of, join, take
+from withe.folding.sheets import Elastica, at_forces, drag, forces_of, join, of_other, take
 from withe.folding.widths import Width, free_width
 from withe.io import pose_path, save_poses, written_beside
 
@@ -75,6 +76,11 @@ class Plan:
     angles : ndarray of shape (n,) [rad]
         Of the edge, counted on beyond pi: quaternions are those of rotations by these about y.
     times : ndarray of shape (n,) [s]
+    plunges_at : float or None [s]
+        When the jaw goes down quickly, as `plunge` found out; None where it comes down slowly.
+    blocked : str or None
+        Why it does not bear what the paper may be, with the friction that is missing; None where it does, or where
+        nobody asked (`plan` says of what it asks).
     """
 
     paper: Paper
@@ -92,6 +98,8 @@ class Plan:
     poses: FloatArray
     angles: FloatArray
     times: FloatArray
+    plunges_at: float | None = None
+    blocked: str | None = None
     _foreseen: Elastica | None = field(default=None, repr=False)
 
     @cached_property
@@ -112,18 +120,24 @@ class Plan:
 
     @cached_property
     def _motion(self) -> tuple[Elastica, FloatArray]:
-        """From where the sheet first hangs freely; what is lifted less than that is lifted without force."""
+        return self._moved(self.paper)
+
+    def _moved(self, paper: Paper) -> tuple[Elastica, FloatArray]:
+        """How a paper hangs and slides [Lgb], from where the sheet first hangs freely; before it has no force."""
+        factor = paper.gravito_bending_length / self.paper.gravito_bending_length
+        width, length = self._width.of_other(factor), self._length / factor
+        flat = flat_forces(width)
         if self._foreseen is not None:
             begin = int(np.argmax(self._foreseen.suspended > SHORT))
-            forces, ahead = forces_of(self._foreseen)[begin], take(self._foreseen, slice(0, begin))
+            ahead = at_forces(of_other(forces_of(self._foreseen)[:begin], factor), width)
+            forces = of_other(forces_of(self._foreseen)[begin : begin + 1], factor)[0]
         else:
             begin = int(np.argmax(self._inner[:, 1] > _LOW))
-            flat = flat_forces(self._width)
-            forces, ahead = np.array(flat), at_forces([flat] * begin, self._width)
-        sheet, slide = drag(self._inner[begin:], forces, self.paper.friction, self._length, self._width)
+            ahead, forces = at_forces(np.tile(flat, (begin, 1)), width), np.array(flat)
+        sheet, slide = drag(self._inner[begin:] / [factor, factor, 1.0], forces, paper.friction, length, width)
         sheet, slide = join(ahead, sheet), np.concatenate([np.zeros(begin), slide])
-        speed = np.abs(np.diff(slide)) * self.paper.gravito_bending_length / np.diff(self.times)
-        coasts = speed**2 > 2.0 * self.paper.friction * _GRAVITY * _COAST
+        speed = np.abs(np.diff(slide)) * paper.gravito_bending_length / np.diff(self.times)
+        coasts = speed**2 > 2.0 * paper.friction * _GRAVITY * _COAST
         lost = np.concatenate([[False], coasts]) | ~sheet.stable
         lost[:begin] = False
         known = np.cumsum(lost) == 0
@@ -164,12 +178,76 @@ class Plan:
         Predicted with exact elastica, what lies as a rigid body, and Coulomb's law with the friction of the paper, for
         a sheet without inertia; NaN from `jumps_at` on.
         """
-        sheet, slide = self._motion
-        return np.where(sheet.valid, slide * self.paper.gravito_bending_length, np.nan)
+        return self.slide_of(self.paper)
+
+    def slide_of(self, paper: Paper) -> FloatArray:
+        """How far another paper slides on these poses [m], of shape (n,), as `slide` says of the plan's.
+
+        Parameters
+        ----------
+        paper : Paper
+            Of the same size; its Lgb and its friction may be others.
+
+        Raises
+        ------
+        ValueError
+            Not a paper, or one of another size.
+
+        Examples
+        --------
+        >>> from dataclasses import replace
+        >>> import withe
+        >>> paper = withe.folding.Paper.a4()
+        >>> stiffer = replace(paper, gravito_bending_length=1.1 * paper.gravito_bending_length)
+        >>> print(f"{1e3 * withe.folding.plan(paper).slide_of(stiffer)[-1]:.1f} mm")
+        """
+        if not isinstance(paper, Paper):
+            raise ValueError(f"paper must be a Paper, got {paper!r:.80}")
+        mine = self.paper
+        if (paper.length, paper.width, paper.outline) != (mine.length, mine.width, mine.outline):
+            raise ValueError(
+                f"paper must be as large as the plan's, {mine.length:g} m by {mine.width:g} m, got {paper!r:.200}"
+            )
+        sheet, slide = self._motion if paper == mine else self._moved(paper)
+        return np.where(sheet.valid, slide * paper.gravito_bending_length, np.nan)
+
+    def before_plunge(self) -> Plan:
+        """The part that is led slowly: all of it where there is no plunge."""
+        if self.plunges_at is None:
+            return self
+        slow = self.times <= self.plunges_at
+        seen = None if self._foreseen is None else take(self._foreseen, slow)
+        parts = {name: getattr(self, name)[slow] for name in ("poses", "angles", "times")}
+        return replace(self, plunges_at=None, _foreseen=seen, **parts)
+
+    @property
+    def papers(self) -> list[Paper]:
+        """What the paper may be within `uncertainty`: as it is thought to be, and the bounds.
+
+        Lgb less and more, each with the paper's friction and with the least; five papers, fewer where a share is 0.
+        """
+        lgb, friction = self.uncertainty
+        shares = [(1.0, 1.0), *product((1.0 - lgb, 1.0 + lgb), (1.0, 1.0 - friction))]
+        return [
+            replace(
+                self.paper,
+                gravito_bending_length=of_lgb * self.paper.gravito_bending_length,
+                friction=of_friction * self.paper.friction,
+            )
+            for of_lgb, of_friction in dict.fromkeys(shares)
+        ]
+
+    @cached_property
+    def worst_slide(self) -> tuple[float, Paper]:
+        """Greatest slide of any of `papers` at any pose before a plunge [m], and whose; infinite of one that jumps."""
+        slow = self.before_plunge()
+        found = [(np.abs(slow.slide_of(paper)).max(), paper) for paper in self.papers]
+        slides = [(float(slide) if np.isfinite(slide) else np.inf, paper) for slide, paper in found]
+        return max(slides, key=lambda each: each[0])
 
     @property
     def jumps_at(self) -> float | None:
-        """Time from which the slide is not predicted [s]; None where it is to the end.
+        """Time from which the slide is not predicted [s], from a plunge on at the latest; None where it is to the end.
 
         There the sheet jumps: no equilibrium is within reach, or none that is stable, all of the sheet is lifted, or it
         slides so fast that it would coast on by more than 5 mm, v^2 / (2 friction g).
@@ -186,8 +264,14 @@ class Plan:
         return len(self.times)
 
     def __repr__(self) -> str:
-        greatest = f"slip ratio {np.max(self.slip_ratio):.3f}, curvature {np.max(self.max_curvature):.0f}/m"
+        slow = self.before_plunge()
+        ratio, curvature = np.max(slow.slip_ratio), np.max(slow.max_curvature)
         way = f"{self.method}, {self.grasp}, {len(self)} poses in {self.times[-1]:.1f} s"
+        if self.plunges_at is not None:
+            way += f", plunges at {self.plunges_at:.1f} s"
+        if self.blocked is not None:
+            way += ", does not bear its uncertainty"
+        greatest = f"slip ratio {ratio:.3f}, curvature {curvature:.0f}/m"
         return f"Plan({way}, greatest {greatest}, fingers from the {self.side})"
 
     def plot(self, axes: Any | None = None, poses: int = 10) -> Any:
@@ -249,6 +333,8 @@ class Plan:
             "times": self.times.tolist(),
             "poses": self.poses.tolist(),
             "angles": self.angles.tolist(),
+            "plunges_at": self.plunges_at,
+            "blocked": self.blocked,
             "prediction": {
                 "slip_ratio": listed(self.slip_ratio),
                 "slide": listed(self.slide),

@@ -23,6 +23,7 @@ __all__ = [
     "drag",
     "forces_of",
     "join",
+    "of_other",
     "poses_of",
     "shared",
     "slides_to_rest",
@@ -124,6 +125,17 @@ def shared(solve: Callable[..., FloatArray], *columns: FloatArray) -> FloatArray
 def forces_of(sheet: Elastica) -> FloatArray:
     """The three numbers that name an equilibrium, of shape (..., 3): normal force, tangential force, lifted length."""
     return np.stack([sheet.normal_force, sheet.tangential_force, sheet.suspended], axis=-1)
+
+
+def of_other(forces: FloatArray, factor: float) -> FloatArray:
+    """Forces of about the same sheet if Lgb is more by a factor, in its own units: near which an equilibrium is sought.
+
+    Those of long parts are their weight, those of short ones bending.
+    """
+    weighs = np.minimum(1.0, 0.5 * forces[:, 2:])
+    scale = weighs / factor + (1.0 - weighs) * factor**2
+    scales: FloatArray = np.concatenate([scale, scale, np.full_like(scale, 1.0 / factor)], axis=1)
+    return forces * scales
 
 
 def poses_of(sheet: Elastica) -> FloatArray:

@@ -11,6 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from typing import Any, Literal
 
 import numpy as np
@@ -19,11 +20,11 @@ from withe.common import validation
 from withe.common.cluster import cluster_executor, require_client
 from withe.common.progress import progress as progress_bar
 from withe.folding.closed_loop import fold
+from withe.folding.endings import plan
 from withe.folding.hanging_strip import measure
 from withe.folding.noise import Noise
 from withe.folding.paper import Paper
-from withe.folding.planning import plan
-from withe.folding.plunging import plunge
+from withe.folding.plans import Plan
 from withe.folding.simulated_sheet import SimulatedSheet
 
 __all__ = ["Outcome", "Trial", "run_trials"]
@@ -44,8 +45,6 @@ class Trial:
         Of how the sheet differs from the paper.
     noise : Noise
         How much.
-    plunges : mapping, optional
-        Options of a `plunge` in which the plan ends, tried on sheets as the planner thinks that they may be.
     replans : int
         How often the sheet is looked at on the way; 0, the loop is open.
     planner : mapping
@@ -70,7 +69,6 @@ class Trial:
     target: float | Literal["half"] = "half"
     seed: int = 0
     noise: Noise = field(default_factory=Noise)
-    plunges: Mapping[str, Any] | None = None
     replans: int = 0
     planner: Mapping[str, Any] = field(default_factory=dict)
     sheet: Mapping[str, Any] = field(default_factory=dict)
@@ -88,7 +86,12 @@ class Outcome:
     gravito_bending_length : float [m]
         As it was measured.
     needed_friction : float
-        Least friction with which the sheet would not slide on the way that was planned; NaN where there is none.
+        Least friction with which the sheet would not slide on the way that was planned, before a plunge; NaN where
+        there is none.
+    plunges : bool
+        Whether the plan ends in a plunge.
+    blocked : str or None
+        Why the plan does not bear its uncertainty, as `Plan.blocked`.
     error, length, slide : float [m]
     max_curvature : float [1/m]
         As those of `Fold`; NaN where there was no plan.
@@ -101,6 +104,8 @@ class Outcome:
     trial: Trial
     gravito_bending_length: float = np.nan
     needed_friction: float = np.nan
+    plunges: bool = False
+    blocked: str | None = None
     error: float = np.nan
     length: float = np.nan
     slide: float = np.nan
@@ -188,23 +193,40 @@ def carry_out(trial: Trial) -> Outcome:
     """One trial, here and now."""
     began = time.thread_time()
     done = _carried_out(trial)
-    return replace(done, seconds=time.thread_time() - began)
+    return replace(done, seconds=done.seconds + time.thread_time() - began)
+
+
+@lru_cache(maxsize=4)
+def _planned(paper: Paper, target: float | str, options: tuple[tuple[str, Any], ...]) -> tuple[Plan, float]:
+    """A plan, and the seconds that it took: trials of one sheet, watched or not, may ask for the same."""
+    began = time.thread_time()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # of slide that is predicted: it is measured here
+        found = plan(paper, target, progress=False, **dict(options))  # type: ignore[arg-type]
+    return found, time.thread_time() - began
+
+
+def _hashable(options: Mapping[str, Any]) -> tuple[tuple[str, Any], ...]:
+    return tuple((name, tuple(value) if isinstance(value, list) else value) for name, value in sorted(options.items()))
 
 
 def _carried_out(trial: Trial) -> Outcome:
     sheet = SimulatedSheet(trial.paper, trial.seed, trial.noise, **trial.sheet)
     measured = measure(image=sheet.strip_picture(scale=_SCALE), scale=_SCALE).gravito_bending_length
     outcome = Outcome(trial, measured)
+    paper = replace(trial.believed or trial.paper, gravito_bending_length=measured)
+    began = time.thread_time()
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UserWarning)  # of slide that is predicted: it is measured here
-            paper = replace(trial.believed or trial.paper, gravito_bending_length=measured)
-            planned = plan(paper, trial.target, **trial.planner)
-            if trial.plunges is not None:
-                planned = plunge(planned, sheet=trial.sheet, progress=False, **trial.plunges)
+        planned, took = _planned(paper, trial.target, _hashable(trial.planner))
     except ValueError as error:
         return replace(outcome, failure=f"no plan: {error}")
-    outcome = replace(outcome, needed_friction=float(np.nanmax(planned.slip_ratio)))
+    outcome = replace(
+        outcome,
+        needed_friction=float(np.nanmax(planned.slip_ratio)),
+        plunges=planned.plunges_at is not None,
+        blocked=planned.blocked,
+        seconds=took - (time.thread_time() - began),
+    )
     try:
         if trial.replans:
             done = fold(planned, sheet, replans=trial.replans, progress=False)

@@ -1,0 +1,144 @@
+"""Plans of folds, ended as the sheet bears it: slowly, or by a plunge that simulations have found."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+
+from withe.common import validation
+from withe.folding.jaw import Jaw
+from withe.folding.paper import Paper
+from withe.folding.planning import Grasp, Method, Source, slow_plan
+from withe.folding.plans import Plan
+from withe.folding.plunging import plunge
+
+__all__ = ["plan"]
+
+Ending = Literal["auto", "slow", "plunge"]
+_BEARABLE = 1e-3  # slide [m]
+
+
+def plan(
+    paper: Paper,
+    target: float | Literal["half"] = "half",
+    *,
+    method: Method = "ucs",
+    grasp: Grasp = "moment_free",
+    uncertainty: tuple[float, float] = (0.1, 0.5),
+    curvature: float = 2.5,
+    jaw: Jaw | None = None,
+    manifold: Source = "exact",
+    ending: Ending = "auto",
+    speed: float = 0.05,
+    acceleration: float = 0.2,
+    turning: float = 1.0,
+    progress: bool = True,
+) -> Plan:
+    """Plan how a jaw lifts one edge of a sheet and lays it down on the sheet.
+
+    Parameters
+    ----------
+    paper : Paper
+    target : float or "half" [m]
+        Where the lifted edge comes down, from where it lay (the dissertation's C); the crease is in the middle. "half":
+        on the far edge.
+    method : {"ucs", "slip", "local", "intuitive"}
+        "ucs": least accumulated ratio of the table's tangential to its normal force, on a grid of positions
+        [dissertation, Alg. 7, with costs that accumulate]. "slip": no predicted slide where such a way exists, or else
+        as little as can be; then short and little bent. "local": from each pose to the next one of least tangential
+        force, after Petrik et al. 2016, with the right stiffness. "intuitive": half a circle [dissertation, (7.18)].
+    grasp : {"moment_free", "free"}
+        "moment_free": the angle of the jaw is that at which the sheet ends without curvature [dissertation, (7.6)].
+        "free", of method "slip": the jaw turns the edge as it likes, and curvature is bounded.
+    uncertainty : pair of float
+        Of method "slip" with a free moment: shares by which Lgb may be more or less, and friction less, than the
+        paper's. A way without slide is one on which no such sheet slides.
+    ending : {"auto", "slow", "plunge"}
+        "auto": of method "slip" with a free moment, a `plunge` where any paper within the uncertainty is predicted to
+        slide by more than 1 mm (`Plan.worst_slide`) on the way that comes down slowly, which it does where that asks
+        for more friction than there may be; elsewhere slow. A plunge is tried on simulated sheets, which takes some
+        10 s. Where none is found either, the plan comes down slowly, and its `blocked` says why. "plunge": always.
+    curvature : float [1/Lgb]
+        Bound of a free moment's curvature.
+    jaw : Jaw, optional
+        How it holds the sheet; by default 10 mm of it.
+    manifold : {"exact", "network"}
+        Of grasps without moment: where equilibria come from, each from its equations, or all from the network that
+        comes with withe (`SheetNetwork`), as the dissertation has them. No slower without it; it needs torch.
+    speed, acceleration : float [m/s], [m/s^2]
+        At most; of the sheet's outer edge.
+    turning : float [rad/s]
+        Rate of turning, at most.
+    progress : bool
+        Whether to show a progress bar while plunges are tried.
+
+    Returns
+    -------
+    Plan
+
+    Raises
+    ------
+    ValueError
+        A target outside the sheet, or one that no pose of the grasp has; sizes and limits that are not positive; a
+        bound of curvature that is too low, with the least that would do; no path, with what blocks it; with ending
+        "plunge", that none is within bounds.
+
+    Warns
+    -----
+    UserWarning
+        Every way of method "slip" slides: with the least friction at which one would not. With a free moment also where
+        the paper does not slide, but another within the uncertainty: with which, and by how much.
+
+    Examples
+    --------
+    >>> import withe
+    >>> folded = withe.folding.plan(withe.folding.Paper.a4(), method="slip", grasp="free")
+    >>> folded.poses.shape
+    (251, 7)
+    >>> print(f"{1e3 * abs(folded.slide).max():.1f} mm")
+    0.0 mm
+    """
+    validation.choice(ending, "ending", ("auto", "slow", "plunge"))
+    slow = slow_plan(
+        paper,
+        target,
+        method=method,
+        grasp=grasp,
+        uncertainty=uncertainty,
+        curvature=curvature,
+        jaw=jaw,
+        manifold=manifold,
+        speed=speed,
+        acceleration=acceleration,
+        turning=turning,
+    )
+    if ending == "plunge":
+        return plunge(slow, progress=progress)
+    if method != "slip":
+        return slow
+    slides = _slides(slow) if grasp == "free" else None
+    needed = float(slow.slip_ratio.max())
+    if needed > paper.friction:
+        slides = f"the sheet slides: this way needs friction {needed:.3f}, the paper has {paper.friction:g}"
+    if slides is not None and grasp == "free" and ending == "auto":
+        try:
+            return plunge(slow, progress=progress)
+        except ValueError as error:
+            slides = f"{slides}; {error}"
+            slow = replace(slow, blocked=slides)
+    if slides is not None:
+        warnings.warn(slides, UserWarning, stacklevel=2)
+    return slow
+
+
+def _slides(slow: Plan) -> str | None:
+    """By how much the worst paper within the uncertainty slides, where that is too much."""
+    slide, paper = slow.worst_slide
+    if slide <= _BEARABLE:
+        return None
+    how = f"by {1e3 * slide:.1f} mm" if np.isfinite(slide) else "and jumps"
+    lgb = paper.gravito_bending_length
+    return f"the sheet slides {how} within its uncertainty, where Lgb is {lgb:.4g} m and friction {paper.friction:.3g}"
