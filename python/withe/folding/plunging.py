@@ -27,7 +27,7 @@ _SHORT = 0.2  # of the target, of a second try [Lgb]: where a sheet has slid bac
 _CORRECTIONS = 4
 _ENOUGH = 5e-5  # [m]
 _HOLDING = 0.3  # in the end [s]
-_MESH = {"edges": 75}  # a finer one changes creases by hundredths of a millimetre
+_COARSE = {"edges": 75}  # of sheets at the bounds, whose creases need not be known to a tenth of a millimetre
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ def plunge(
     within : float [m]
         How far off the crease may be on the worst of these sheets.
     sheet : mapping, optional
-        Options of `SimulatedSheet`; by default 75 edges.
+        Options of `SimulatedSheet`; by default sheets at the bounds have 75 edges.
     progress : bool
         Whether to show a progress bar.
 
@@ -116,9 +116,10 @@ def plunge(
     slow, papers, lgb = _above(plan), plan.papers, plan.paper.gravito_bending_length
     angles = (np.pi, float(plan.angles[-1]))
     with progress_bar(len(papers) + 2 * len(angles), "plunging", progress) as bar:
-        tried = []
+        tried: list[_Tried] = []
         for paper in papers:
-            tried.append(_Tried(slow, SimulatedSheet(paper, jaw=plan.jaw, **(_MESH if sheet is None else sheet))))
+            options = sheet if sheet is not None else _COARSE if tried else {}
+            tried.append(_Tried(slow, SimulatedSheet(paper, jaw=plan.jaw, **options)))
             bar.advance(1)
 
         def crease(each: _Tried, angle: float, aside: float) -> float:
