@@ -98,6 +98,10 @@ def _hand(scene: withe.Scene, arm: withe.Rod) -> None:
     scene.grasp(arm, 0.3, 0.02, stiffness=(1e-15, 1e-15))
 
 
+def _ring(scene: withe.Scene, arm: withe.Rod) -> None:
+    scene.grasp(arm, 0.3, slides=True, stiffness=1e-15)
+
+
 def _thin_fluid(scene: withe.Scene, arm: withe.Rod) -> None:
     scene.add_fluid(1e-30, model="resistive")
 
@@ -172,6 +176,7 @@ def skips(nodes: int) -> list[Skip]:
         ),
         Skip("a fluid", "its terms", lambda: _simulation(nodes, _thin_fluid), lambda: _simulation(nodes)),
         Skip("hands", "their terms", lambda: _simulation(nodes, _hand), lambda: _simulation(nodes)),
+        Skip("rings", "their terms", lambda: _simulation(nodes, _ring), lambda: _simulation(nodes)),
         Skip("moving boundaries", "their terms", lambda: _moving(_simulation(nodes)), lambda: _simulation(nodes)),
         Skip("actuation", "its terms", lambda: _actuated(_simulation(nodes)), lambda: _simulation(nodes)),
     ]

@@ -28,7 +28,7 @@ class HandForces final : public Term {
                     const VectorX& change) const override;
 
   /// Where hands are at the end of the steps to come, per support; empty: where they are at the start.
-  void aim(std::vector<HandPose> end) { end_ = std::move(end); }
+  void aim(const std::vector<HandPose>& end) { end_ = end; }
   /// Adds to derivatives by what a step is given those by what it leaves of slips, `adjoint.hands_after`: to `by_end`,
   /// that by q1, and to the adjoint. To come before `add_adjoint`.
   void add_slip_adjoint(const StepProblem& problem, const VectorX& q1, StepAdjoint& adjoint, VectorX& by_end) const;

@@ -159,7 +159,13 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
     undo();
     fail_equilibrium(r.newton, dt);
   }
-  return settle(system, r, time);
+  const EquilibriumResult found = settle(system, r, time);
+  if (!release_left_rings()) return found;
+  // Without a ring that it has left a rod goes on.
+  EquilibriumResult next = equilibrium(0.0);
+  next.iterations += found.iterations;
+  next.branch_changed = true;
+  return next;
 }
 
 /// Says that none was found.
@@ -286,6 +292,7 @@ EquilibriumPath World::equilibrium_path(const PathOptions& wanted) {
   self.reaction_current = false;
   out.finished = r.finished;
   out.iterations += r.newton.iterations;
+  self.release_left_rings();
   if (out.points.size() < 2 && !r.finished) self.fail(r.newton, 0.0, "no path of equilibria leads from here");
   return out;
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include <Eigen/Geometry>
 
@@ -37,15 +38,22 @@ bool World::Implementation::has_rings() const {
                      [](const Support& s) { return s.active && s.slides(); });
 }
 
+void World::Implementation::find_hand_poses(std::vector<HandPose>& poses) const {
+  poses.clear();
+  for (const SupportMotion& m : motions) poses.push_back({m.position, m.rotation, m.fed});
+}
+
 std::vector<HandPose> World::Implementation::hand_poses() const {
   std::vector<HandPose> poses;
-  for (const SupportMotion& m : motions) poses.push_back({m.position, m.rotation, m.fed});
+  find_hand_poses(poses);
   return poses;
 }
 
 /// Tells hands that yield where `motions` lead; `release_hands`: that there is no step.
-void World::Implementation::aim_hands(Equations& system) const {
-  if (system.hands()) system.hands()->aim(hand_poses());
+void World::Implementation::aim_hands(Equations& system) {
+  if (!system.hands()) return;
+  find_hand_poses(aimed_hands);
+  system.hands()->aim(aimed_hands);
 }
 
 /// Whether one that yields does.
@@ -191,6 +199,31 @@ void World::feed(int support, double rate) {
   m.feed_rate = rate;
 }
 
+void World::set_ring_friction(int support, double friction) {
+  require(support >= 0 && support < static_cast<int>(implementation_->model.supports.size()) &&
+              implementation_->model.supports[at(support)].active && implementation_->model.supports[at(support)].slides(),
+          "no such ring, or it is released: " + std::to_string(support));
+  Implementation& self = accounted();
+  HandDescription& hand = self.model.supports[at(support)].description.hand;
+  require(!hand.feeds, "a ring with a drive has no friction, but a force_limit");
+  require(std::isfinite(friction) && friction >= 0.0, "friction of a ring must be finite and not negative");
+  const double before = self.hand_energy_of(support);
+  const bool held = hand.friction > 0.0, holds = friction > 0.0;
+  self.description.supports[at(support)].hand.friction = hand.friction = friction;
+  RingState& ring = self.state.hands[at(support)].ring;
+  const Passage now = passage_of(self.model, self.state, support);
+  if (held)
+    ring.slip += now.slipped;
+  else
+    ring.slip = ring.origin - ring.fed - now.at;  // it is held from where it is now on
+  self.actuation_work += self.hand_energy_of(support) - before;
+  self.guard.energy.reset();
+  if (held != holds)
+    self.rebuild(Rebuild::running);
+  else
+    self.reaction_current = false;
+}
+
 RingPassage World::passage(int support) const {
   const Implementation& self = *implementation_;
   require(support >= 0 && support < static_cast<int>(self.model.supports.size()) &&
@@ -203,12 +236,18 @@ RingPassage World::passage(int support) const {
           self.motions[at(support)].feed_rate};
 }
 
-std::vector<int> World::left_rings() const {
-  const Implementation& self = *implementation_;
-  std::vector<int> left;
-  for (std::size_t s = 0; s < self.model.supports.size(); ++s)
-    if (self.model.supports[s].active && self.state.hands[s].ring.left) left.push_back(static_cast<int>(s));
-  return left;
+std::vector<LeftRing> World::take_left_rings() { return std::exchange(implementation_->left_rings, {}); }
+
+/// Whether there were any. To be called where a time step ends, so that what follows is the same whoever asks for it.
+bool World::Implementation::release_left_rings() {
+  const std::size_t before = left_rings.size();
+  for (std::size_t s = 0; s < model.supports.size(); ++s)
+    if (model.supports[s].active && state.hands[s].ring.left) left_rings.push_back({static_cast<int>(s), state.time});
+  if (left_rings.size() == before) return false;
+  for (std::size_t k = before; k < left_rings.size(); ++k) model.supports[at(left_rings[k].support)].active = false;
+  rebuild(Rebuild::running);
+  guard.energy.reset();
+  return true;
 }
 
 Deflection World::deflection(int support) const {

@@ -48,6 +48,7 @@ struct World::Implementation : Running {
   std::shared_ptr<Tape> tape;                             ///< of a run that is kept for gradients
   long taped = 0;                                         ///< its length at the start of a step that may be taken back
   StepWorkspace work;
+  std::vector<HandPose> aimed_hands;  ///< scratch
   mutable EnergyScratch energy_scratch;
   /// Before what was set since the state last moved; the work of that is found when it is asked for.
   EnergyCoefficients before_settings;
@@ -70,6 +71,7 @@ struct World::Implementation : Running {
   /// Of a mesh too coarse for the motion, and empty once it was heard; none yet where there was no reason.
   std::optional<std::string> warning;
   std::optional<std::string> step_warning;  ///< likewise, of steps too long for the motion
+  std::vector<LeftRing> left_rings;         ///< not heard of yet
   NewtonResult last_newton;
 
   // lagged.cpp
@@ -152,10 +154,12 @@ struct World::Implementation : Running {
   // hands.cpp
   bool has_hands() const;
   bool has_rings() const;
+  bool release_left_rings();
   bool hands_move(const std::vector<SupportMotion>& from, const std::vector<SupportMotion>& to) const;
-  void aim_hands(Equations& system) const;
+  void aim_hands(Equations& system);
   /// Where hands are, per support.
   std::vector<HandPose> hand_poses() const;
+  void find_hand_poses(std::vector<HandPose>& poses) const;
   static void release_hands(Equations& system);
   /// In an equilibrium that hands were aimed for.
   void settle_hands(Equations& system);

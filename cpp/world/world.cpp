@@ -89,6 +89,7 @@ void World::step(int count) {
     }
     self.state.time = end;
     ++self.grid_steps;
+    self.release_left_rings();
   }
   if (self.options.integrator == Integrator::verlet && count > 0) self.check_explicit();
 }
@@ -112,6 +113,7 @@ void World::advance_to(double time) {
       self.advance(next - self.state.time);
     }
     self.state.time = next;
+    self.release_left_rings();
   }
   if (self.options.integrator == Integrator::verlet) self.check_explicit();
 }

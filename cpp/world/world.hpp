@@ -64,6 +64,12 @@ struct RingPassage {
   double feed_rate = 0;  ///< of its drive [m/s]
 };
 
+/// A ring that is released, since an end of its rod has passed.
+struct LeftRing {
+  int support = 0;
+  double time = 0;  ///< [s]
+};
+
 struct Momentum {
   Vector3 linear = Vector3::Zero();   ///< [kg m/s]
   Vector3 angular = Vector3::Zero();  ///< about the origin [kg m^2/s]
@@ -236,7 +242,10 @@ class World {
   /// The drive of a ring feeds the rod towards its end from now on, by length at rest [m/s].
   void feed(int support, double rate);
   RingPassage passage(int support) const;  ///< of a ring
-  std::vector<int> left_rings() const;     ///< rings whose rods have left them, not released yet
+  /// Of a ring without a drive, from now on [-]. What this does to the energy at the present state is work of actuation.
+  void set_ring_friction(int support, double friction);
+  /// Rings that were released since this was last asked, at the end of the time step in which their rods left them.
+  std::vector<LeftRing> take_left_rings();
 
   // Obstacles. Their place is that of the point they are drawn with: a plane's, a sphere's centre, a capsule's start.
   // They turn about the normal of a plane, the axis of a capsule, the centre of a sphere, by `turn` since drawn [rad].

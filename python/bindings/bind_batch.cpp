@@ -71,6 +71,15 @@ class GuardedBatch {
     return out;
   }
 
+  /// Released since it was last asked: lane, support, when [s].
+  std::vector<std::tuple<int, int, double>> take_left_rings() {
+    std::vector<std::tuple<int, int, double>> out;
+    for (int lane = 0; lane < size(); ++lane)
+      for (const LeftRing& ring : world(lane).changing().take_left_rings())
+        out.emplace_back(lane, ring.support, ring.time);
+    return out;
+  }
+
   void read(const std::string& what, int rod, py::array_t<double, py::array::c_style>& out) const {
     idle();
     const LaneReadout readout = from_word(kReadouts, what);
@@ -159,6 +168,8 @@ void register_batch(py::module_& module) {
       "Which lanes have failed.");
   batch.def("forgive", [](GuardedBatch& self, int lane) { self.batch().forgive(lane); }, py::arg("lane"));
   batch.def("take_warnings", &GuardedBatch::take_warnings);
+  batch.def("take_left_rings", &GuardedBatch::take_left_rings,
+            "Lanes and supports that were released since rods have left them, and when [s].");
   batch.def("read", &GuardedBatch::read, py::arg("what"), py::arg("rod"), py::arg("out").noconvert(),
             "Fill an array with a read-out of every lane.");
   batch.def("restore", &GuardedBatch::restore, py::arg("lanes"), py::arg("snapshots"));

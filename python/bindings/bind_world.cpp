@@ -378,7 +378,18 @@ void define_supports(WorldClass& world) {
   world.def(
       "passage", [](const GuardedWorld& self, int support) { return self.reading().passage(support); },
       py::arg("support"));
-  world.def("left_rings", [](const GuardedWorld& self) { return self.reading().left_rings(); });
+  world.def(
+      "set_ring_friction",
+      [](GuardedWorld& self, int support, double friction) { self.changing().set_ring_friction(support, friction); },
+      py::arg("support"), py::arg("friction"));
+  world.def(
+      "take_left_rings",
+      [](GuardedWorld& self) {
+        std::vector<std::pair<int, double>> out;
+        for (const LeftRing& ring : self.steering().take_left_rings()) out.emplace_back(ring.support, ring.time);
+        return out;
+      },
+      "Supports that were released since rods have left them, and when [s].");
 }
 
 void define_readouts(WorldClass& world) {

@@ -27,8 +27,8 @@ struct CaseResidual {
   }
   void begin() { with.begin(c.state, parameters, rule, interval); }
   /// Hands go there in the step.
-  void aim(std::vector<HandPose> poses) {
-    if (with.hands()) with.hands()->aim(std::move(poses));
+  void aim(const std::vector<HandPose>& poses) {
+    if (with.hands()) with.hands()->aim(poses);
     begin();
   }
   VectorX operator()(const VectorX& q) {

@@ -37,6 +37,30 @@ TEST(Step, DoesNotAllocateAfterWarmUp) {
     }
 }
 
+/// A hand that yields, and a ring that rubs and travels along its rod.
+TEST(Step, WithHandsDoesNotAllocateAfterWarmUp) {
+  for (Integrator integrator :
+       {Integrator::backward_euler, Integrator::implicit_midpoint, Integrator::energy_momentum})
+    for (SceneBuilder builder : {testing::cantilever(), testing::hanging_arm()}) {
+      const double whole = builder.scene.rods[0].rest_lengths.sum();
+      for (const bool slides : {false, true}) {
+        builder.support(SupportKind::hand, {0, 0});
+        HandDescription& hand = builder.scene.supports.back().hand;
+        hand.at = (slides ? 0.6 : 0.9) * whole;
+        hand.yields = true;
+        hand.slides = slides;
+        hand.stiffness = {30.0, 30.0, 30.0, 1e-3, 1e-3, 1e-3};
+        hand.friction = slides ? 0.3 : 0.0;
+      }
+      World world(builder.scene, testing::options(integrator, 2e-3));
+      for (int hand : {1, 2}) world.move_support(hand, world.support_position(hand) + Vector3(0.02, 0, 0.01), {}, 0.1);
+      world.step(20);
+      const std::size_t before = allocation_count;
+      world.step(20);
+      EXPECT_EQ(allocation_count - before, 0u) << static_cast<int>(integrator) << " planar " << world.plan().planar;
+    }
+}
+
 TEST(Step, InAFluidDoesNotAllocateAfterWarmUp) {
   for (FluidModel model : {FluidModel::resistive, FluidModel::stokeslets})
     for (Integrator integrator :

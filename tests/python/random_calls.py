@@ -148,6 +148,17 @@ def grasp(where, d):
     )
 
 
+def ring(where, d):
+    """One that a rod slides through, by itself or fed."""
+    words = {}
+    for word, strategy in [
+        ("stiffness", positive), ("friction", positive), ("feed_rate", number), ("force_limit", positive),
+    ]:  # fmt: skip
+        if d.draw(st.integers(0, 2)) == 0:
+            words[word] = d.draw(strategy)
+    where.grasp(d.draw(rod), d.draw(st.one_of(st.floats(0, 0.2), number)), slides=True, **words)
+
+
 ON_SCENE = {
     "add_rod": add_rod,
     "add_obstacle": add_obstacle,
@@ -167,6 +178,7 @@ ON_SCENE = {
     ),
     "pin": lambda w, d: w.scene.pin(d.draw(node), free=d.draw(st.one_of(st.none(), triple))),
     "grasp": lambda w, d: grasp(w.scene, d),
+    "ring": lambda w, d: ring(w.scene, d),
     "add_force": lambda w, d: w.scene.add_force(d.draw(node), d.draw(small_triple), follower=d.draw(st.booleans())),
     "add_moment": lambda w, d: w.scene.add_moment(d.draw(node), d.draw(small_triple)),
     "add_load": lambda w, d: w.scene.add_load(d.draw(rod), d.draw(small_triple), follower=d.draw(st.booleans())),
@@ -266,6 +278,10 @@ ON_SIMULATION = {
     "clamp": lambda w, d: w.simulation.clamp(d.draw(node), hold=d.draw(st.sampled_from(["frame", "edge"]))),
     "pin": lambda w, d: w.simulation.pin(d.draw(node)),
     "grasp": lambda w, d: grasp(w.simulation, d),
+    "ring": lambda w, d: ring(w.simulation, d),
+    "feed": lambda w, d: w.simulation.hand("hand 1").feed(d.draw(number)),
+    "passage": lambda w, d: w.simulation.passage("hand 1"),
+    "friction_of_ring": lambda w, d: w.simulation.set("hand 1", friction=d.draw(positive)),
     "move_hand": lambda w, d: w.simulation.hand("hand 1").move(position=d.draw(small_triple), over=d.draw(positive)),
     "wrench": lambda w, d: w.simulation.wrench("hand 1", about=d.draw(triple)),
     "let_go": lambda w, d: w.simulation.hand("hand 1").release(),
@@ -348,6 +364,7 @@ def main() -> None:
     warnings.simplefilter("ignore", category=DeprecationWarning)
     # Four nodes under forces of any size are coarse, and are right to say so.
     warnings.simplefilter("ignore", category=withe.CoarseMeshWarning)
+    warnings.simplefilter("ignore", category=withe.RingLeftWarning)
     count, number = int(sys.argv[1]), int(sys.argv[2])
     make_test(count, number)()
     print(f"{calls['sequences']} sequences, {calls['results']} results, {calls['refusals']} refusals")

@@ -164,8 +164,31 @@ def hold(simulation, r):
         simulation.pin(where, name="new", free=(0, 0, 1) if edge else None)
 
 
+def grasp(simulation, r):
+    """Rigid, yielding, slipping; a ring, one that rubs, one that feeds the rod and may slip."""
+    words = r.choice(
+        [{}, {"stiffness": (50.0, 1e-3)}, {"stiffness": (50.0, 1e-3), "force_limit": 0.02}, {"slides": True},
+         {"slides": True, "friction": 0.3}, {"slides": True, "feed_rate": 0.5},
+         {"slides": True, "feed_rate": -0.5, "force_limit": 0.05}]
+    )  # fmt: skip
+    length = 0.0 if "slides" in words else r.choice([0.0, 0.01])
+    simulation.grasp(r.choice("ab"), r.uniform(0.01, 0.08), length, name="hand", **words)
+
+
+def move_hand(simulation, r):
+    place = simulation.pose("hand").position + vector(r, 0.02)
+    simulation.move("hand", position=place, over=r.choice([0.0, 0.004, 0.03]))
+
+
+def ring(simulation, r):
+    if r.random() < 0.5:
+        simulation.set("hand", friction=r.choice([0.0, 0.2, 0.5]))
+    else:
+        simulation.feed("hand", number(r, 1.0))
+
+
 def release(simulation, r):
-    simulation.release(r.choice(["clamp", "pin", "new", "new"]))
+    simulation.release(r.choice(["clamp", "pin", "new", "new", "hand"]))
 
 
 def equilibrium(simulation, r):
@@ -175,6 +198,7 @@ def equilibrium(simulation, r):
 CALLS = {
     step: 4, run: 2, set_rod: 2, set_part: 2, gravity: 1, curvature: 1, twist: 1, velocities: 1, move: 7, path: 1,
     interrupted_path: 1, move_obstacle: 1, hold: 2, release: 2, equilibrium: 1, turn_obstacle: 1, friction: 1, load: 1,
+    grasp: 3, move_hand: 2, ring: 2,
 }  # fmt: skip
 
 

@@ -1,6 +1,7 @@
 """Rings at the border: their words in scene and simulation, what they refuse, and what goes on from a snapshot."""
 
 import pickle
+import warnings
 
 import numpy as np
 import pytest
@@ -117,3 +118,116 @@ def test_what_rings_do_not_go_with_says_so():
         scene.build(integrator="verlet", time_step=1e-6)
     with pytest.raises(ValueError, match="hands that slip do not allow"):
         scene.build(integrator="fourth_order", time_step=1e-3)
+
+
+def flying(friction):
+    """A rod that flies out of a ring on its way, another ring staying on it."""
+    scene = withe.Scene(gravity=(0, 0, 0))
+    rubber = withe.Material(youngs_modulus=1e6, density=1000.0)
+    rod = scene.add_rod(start=(0, 0, 0), end=(0.4, 0, 0), nodes=21, radius=4e-3, material=rubber, name="rod")
+    scene.grasp(rod, 0.07, slides=True, stiffness=50.0, friction=friction, name="eye")
+    scene.grasp(rod, 0.35, slides=True, stiffness=50.0, name="other")
+    scene.add_force(rod.end, lambda t: (0.02, 0.01 * np.sin(9.0 * t), 0.02), name="pull")
+    return scene
+
+
+@pytest.mark.parametrize("integrator", ["backward_euler", "implicit_midpoint", "energy_momentum"])
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+def test_a_rod_leaves_a_ring_in_the_same_step_whoever_takes_it(friction, integrator):
+    """And all goes on with the same bits: single steps, one call, a run, a batch, a copy from just before."""
+
+    def fresh():
+        simulation = flying(friction).build(integrator=integrator, time_step=5e-3)
+        simulation.set_velocities("rod", (1.0, 0.0, 0.0))
+        simulation.move("eye", path=lambda t: (0.07, 0.004 * np.sin(20.0 * t), 0.0))
+        return simulation
+
+    steps, left, before = 40, [], None
+    single = fresh()
+    for k in range(steps):
+        copy = single.copy()
+        with warnings.catch_warnings(record=True) as heard:
+            warnings.simplefilter("always")
+            single.step()
+        if heard:
+            left.append(k)
+            before = copy
+            assert issubclass(heard[0].category, withe.RingLeftWarning)
+            assert f"ring 'eye' (time {single.time:.6g} s)" in str(heard[0].message)
+    assert len(left) == 1
+    assert 5 < left[0] < 30
+    whole, run = fresh(), fresh()
+    batch = withe.Batch([fresh() for _ in range(3)], workers=2)
+    with pytest.warns(withe.RingLeftWarning, match="'eye'"):
+        whole.step(steps)
+    with pytest.warns(withe.RingLeftWarning, match="'eye'"):
+        run.run(steps * 5e-3, record_every=5e-3)
+    with pytest.warns(withe.RingLeftWarning, match="'eye' of simulation 0 .* 2 more rings"):
+        batch.step(steps)
+    with pytest.warns(withe.RingLeftWarning, match="'eye'"):
+        before.step(steps - left[0])
+    for other in (whole, run, before, *batch):
+        np.testing.assert_array_equal(other.positions(), single.positions())
+        np.testing.assert_array_equal(other.velocities(), single.velocities())
+        assert other.energy() == single.energy()
+        with pytest.raises(ValueError, match="'eye' is released"):
+            other.passage("eye")
+        assert other.passage("other") == single.passage("other")
+
+
+def test_an_equilibrium_that_a_rod_leaves_a_ring_for_is_one_without_the_ring():
+    scene = withe.Scene()
+    rubber = withe.Material(youngs_modulus=1e6, density=1000.0)
+    rod = scene.add_rod(start=(0, 0, 0), end=(0.4, 0, 0), nodes=21, radius=4e-3, material=rubber, name="rod")
+    scene.clamp(rod.start)
+    alone = scene.build()
+    for integrator in ("implicit_midpoint", "static"):
+        found = scene.build(integrator=integrator, time_step=0.1)
+        ring = found.grasp(rod, 0.37, slides=True)
+        found.move(ring, position=(0.45, 0.0, 0.0))
+        with pytest.warns(withe.RingLeftWarning):
+            found.step() if integrator == "static" else found.equilibrium()
+        alone.equilibrium()
+        np.testing.assert_allclose(found.positions(), alone.positions(), atol=1e-9)
+
+
+def test_friction_of_a_ring_is_set_while_it_runs():
+    """Less of it lets go what it has held, which is booked; more holds from where the rod is; and copies know it."""
+    scene = withe.Scene(gravity=(0, 0, -9.81))
+    rubber = withe.Material(youngs_modulus=1e6, density=1000.0)
+    rod = scene.add_rod(start=(0, 0, 0), end=(0.4, 0, 0.1), nodes=21, radius=4e-3, material=rubber, name="rod")
+    scene.grasp(rod, 0.1, slides=True)
+    ring = scene.grasp(rod, 0.25, slides=True, friction=2.0, name="eye")
+    simulation = scene.build(integrator="energy_momentum", time_step=1e-3, step_tolerance=1e-13, force_tolerance=1e-13)
+
+    def balance():
+        e = simulation.energy()
+        return e.total - e.work + e.dissipated
+
+    start = balance()
+    for friction, most in [(None, 1e-4), (0.05, 1.0), (0.0, 1.0), (5.0, 1.0)]:
+        if friction is not None:
+            simulation.set(ring, friction=friction)
+            assert simulation.get(ring, "friction") == friction
+        at = simulation.passage(ring).at
+        copy, fresh = simulation.copy(), scene.build(
+            integrator="energy_momentum", time_step=1e-3, step_tolerance=1e-13, force_tolerance=1e-13
+        )
+        fresh.restore(simulation.snapshot())
+        simulation.step(40)
+        passage = simulation.passage(ring)
+        assert abs(passage.pull) <= (friction if friction is not None else 2.0) * passage.press * (1.0 + 1e-9)
+        assert balance() == pytest.approx(start, abs=1e-10)
+        assert (abs(passage.at - at) < 1e-3) == (friction in (None, 5.0))
+        for other in (copy, fresh):
+            other.step(40)
+            np.testing.assert_array_equal(other.positions(), simulation.positions())
+            assert other.get("eye", "friction") == simulation.get(ring, "friction")
+    simulation.reset()
+    assert simulation.get(ring, "friction") == 2.0
+    for bad in (-0.1, np.nan, "much"):
+        with pytest.raises(ValueError, match="friction of 'eye' must"):
+            simulation.set(ring, friction=bad)
+    drive = simulation.grasp(rod, 0.3, slides=True, feed_rate=0.1, name="drive")
+    with pytest.raises(ValueError, match="'drive' has no 'friction' to set"):
+        simulation.set(drive, friction=0.1)

@@ -14,11 +14,12 @@ from withe.batch.setting import Setting
 from withe.common import validation
 from withe.errors import ConvergenceError
 from withe.simulation.functions import force_function, step_callback
+from withe.simulation.hands import forget_left_rings
 from withe.simulation.running import listed_simulations, thread_count
 from withe.simulation.session import Session
 from withe.simulation.simulation import Simulation
 from withe.simulation.snapshots import Snapshot, adopt, matched
-from withe.simulation.stepping import convergence_error, pass_on
+from withe.simulation.stepping import convergence_error, pass_on, report_left
 
 __all__ = ["Batch"]
 
@@ -145,7 +146,25 @@ class Batch(Setting, Reading):
         try:
             self._lanes.engine.step(numbers, steps, functions)
         finally:
+            left = self._left_rings(int(number) for number in functions)
             pass_on(*self._lanes.engine.take_warnings())
+            if left:
+                lane, name, time = left[0]
+                more = f", and {len(left) - 1} more rings: they are" if len(left) > 1 else ": it is"
+                report_left(f"ring {name!r} of simulation {lane} (time {time:.6g} s){more} released")
+
+    def _left_rings(self, heard: Iterable[int]) -> list[tuple[int, str, float]]:
+        """Rings that the engine has released: simulation, name, and when [s]; `heard`: simulations that may know."""
+        lanes = set(heard)
+        for lane, support, time in self._lanes.engine.take_left_rings():
+            forget_left_rings(self[lane]._session, [(support, time)])
+            lanes.add(lane)
+        left = []
+        for lane in sorted(lanes):
+            session = self[lane]._session
+            left += [(lane, *ring) for ring in session.left_rings]
+            session.left_rings = []
+        return left
 
     @property
     def failed(self) -> npt.NDArray[np.bool_]:

@@ -10,6 +10,7 @@ import numpy.typing as npt
 from withe.parts.handles import CustomForce
 from withe.parts.kinds import CustomForcePart, RodPart
 from withe.simulation.custom_forces import CustomForces
+from withe.simulation.hands import forget_left_rings
 from withe.simulation.loads import new_values
 from withe.simulation.motion import Path, Turn, Waypoints, evaluate_path, paths_by_owner
 from withe.simulation.obstacles import find_obstacle, obstacle_pose
@@ -32,6 +33,7 @@ def step_callback(session: Session) -> Callable[[float, float], None] | None:
 
 def apply_functions(session: Session, force_time: float, end_time: float) -> None:
     """Evaluate loads and paths for the coming inner step."""
+    forget_left_rings(session, session.world.take_left_rings())
     if session.settings.functions:
         for index, part in enumerate(session.loads):
             function = session.settings.functions.get(part.name)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,7 +15,7 @@ from withe.parts.kinds import Grasp
 from withe.simulation.motion import PathLike, RotationLike
 from withe.simulation.readouts import Reaction
 from withe.simulation.session import Session
-from withe.simulation.supports import find_support, move_support, release
+from withe.simulation.supports import find_support, forget, move_support, release
 
 __all__ = [
     "Deflection",
@@ -23,10 +24,12 @@ __all__ = [
     "RunningHand",
     "feed_ring",
     "find_hand",
+    "forget_left_rings",
     "hand_deflection",
     "hand_wrench",
-    "release_left_rings",
+    "ring_friction",
     "ring_passage",
+    "set_ring_friction",
     "support_pose",
 ]
 
@@ -196,13 +199,27 @@ def feed_ring(session: Session, hand: Handle | str, rate: float) -> None:
     session.world.feed(index, validation.number(rate, f"rate of {name!r}"))
 
 
-def release_left_rings(session: Session) -> list[str]:
-    """Take off rings that rods have left; their names."""
-    left = set(session.world.left_rings())
-    names = [name for name, (index, _) in session.settings.supports.items() if index in left] if left else []
-    for name in names:
-        release(session, name)
-    return names
+def ring_friction(session: Session, ring: Handle | str) -> float:
+    """Coefficient of friction of a ring."""
+    return _find_ring(session, ring)[1].friction
+
+
+def set_ring_friction(session: Session, ring: Handle | str, friction: float) -> None:
+    """Set it, of a ring without a drive."""
+    index, grasp = _find_ring(session, ring)
+    session.world.set_ring_friction(index, friction)
+    name = ring if isinstance(ring, str) else ring.name
+    part = replace(session.settings.supports[name][1], grasp=replace(grasp, friction=friction))
+    session.settings.supports[name] = index, part
+    session.directory.parts[name] = part
+
+
+def forget_left_rings(session: Session, left: Iterable[tuple[int, float]]) -> None:
+    """Note that the engine has released rings, by their index and when, since rods have left them."""
+    for released, time in left:
+        name, part = next((n, part) for n, (index, part) in session.settings.supports.items() if index == released)
+        forget(session, part)
+        session.left_rings.append((name, time))
 
 
 def _find_ring(session: Session, hand: Handle | str) -> tuple[int, Grasp]:

@@ -25,6 +25,7 @@ from withe.parts.kinds import (
 from withe.parts.parameters import NATURAL_WORDS, ROD_WORDS
 from withe.parts.rods import curvature_given, stretch_array, twist_array
 from withe.parts.springs import SPRING_WORDS
+from withe.simulation.hands import ring_friction, set_ring_friction
 from withe.simulation.loads import load_index, set_load
 from withe.simulation.session import Session
 from withe.simulation.springs import set_spring, spring_value
@@ -59,11 +60,22 @@ def set_values(session: Session, target: Settable | str | None, values: dict[str
         return
     part = None if target is None else session.directory.find_any(target, "target")
     if isinstance(part, SupportPart):
-        _only(values, _POSE, f"support {part.name!r}")
-        move_support(session, part.name, values.get("position"), values.get("rotation"), None, None, 0.0, None)
+        _set_support(session, part, values)
         return
     _set_values(session, part, values)
     session.note("set", part, values)
+
+
+def _set_support(session: Session, part: SupportPart, values: dict[str, Any]) -> None:
+    _only(values, _words_of(part), f"support {part.name!r}")
+    friction = None
+    if "friction" in values:
+        friction = validation.non_negative(values["friction"], f"friction of {part.name!r}")
+        find_support(session, part.name)
+    if values.keys() & set(_POSE):
+        move_support(session, part.name, values.get("position"), values.get("rotation"), None, None, 0.0, None)
+    if friction is not None:
+        set_ring_friction(session, part.name, friction)
 
 
 def _set_between(session: Session, bodies: tuple[Any, ...], values: dict[str, Any]) -> None:
@@ -158,6 +170,8 @@ def get_value(session: Session, target: Settable | Support | str, word: str | No
         index, _ = find_support(session, part.name)
         world = session.world
         return np.array(world.support_position(index) if word == "position" else world.support_rotation(index))
+    elif isinstance(part, SupportPart) and word in _words_of(part):
+        return ring_friction(session, part.name)
     elif isinstance(part, ObstaclePart) and word in ("position", "turn"):
         index = session.directory.all(ObstaclePart).index(part)
         world = session.world
@@ -210,13 +224,15 @@ def _words_of(part: Part) -> tuple[str, ...]:
         return (*ROD_WORDS, *NATURAL_WORDS, "radius")
     if isinstance(part, LoadPart):
         return (part.kind,)
+    if isinstance(part, SupportPart):
+        rubs = part.grasp is not None and part.grasp.slides and part.grasp.feed_rate is None
+        return (*_POSE, "friction") if rubs else _POSE
     words: dict[type[Any], tuple[str, ...]] = {
         MassPart: ("mass",),
         SpringPart: SPRING_WORDS,
         DragPart: ("drag",),
         FluidPart: _FLUID,
         ObstaclePart: (*OBSTACLE_WORDS, "position", "turn"),
-        SupportPart: _POSE,
     }
     return words.get(type(part), ())
 
@@ -224,7 +240,7 @@ def _words_of(part: Part) -> tuple[str, ...]:
 _SETTABLE = (
     "set takes rods (youngs_modulus, natural_curvature, ...), loads (force, moment, load), masses (mass), "
     "springs (stiffness, rest_length, damping), drags (drag), fluids (viscosity, regularization), obstacles (friction, "
-    "restitution), supports (position, rotation), and None for the scene (gravity, friction, slip_tolerance, "
+    "restitution), supports (position, rotation; of rings friction), and None for the scene (gravity, friction, slip_tolerance, "
     "restitution, contact_stiffness)"
 )
 

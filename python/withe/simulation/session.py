@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -49,6 +49,8 @@ class Session:
         Of a differentiable run, while it goes.
     contact_then : ContactDescription or None
         Of a session that is kept as it was: its contact then.
+    left_rings : list of (str, float)
+        Rings that the engine has released since rods have left them, by name, and when [s]; not reported yet.
     """
 
     scene: Directory
@@ -61,6 +63,7 @@ class Session:
     custom_forces: tuple[CustomForcePart, ...]
     journal: Journal | None = None
     contact_then: _core.ContactDescription | None = None
+    left_rings: list[tuple[str, float]] = field(default_factory=list)
 
     @classmethod
     def begin(cls, scene: Directory, gravity: FloatArray, options: BuildOptions) -> Session:
@@ -106,6 +109,7 @@ class Session:
             settings=self.settings.copy(),
             world=self.world.copy(),
             journal=None,
+            left_rings=[],
         )
 
     def note(self, method: str, part: Any, values: Mapping[str, Any], over: float = 0.0) -> None:

@@ -15,7 +15,7 @@ from withe.errors import CoarseMeshWarning, CoarseStepWarning, ConvergenceError,
 from withe.recording.recorder import Recorder
 from withe.simulation.functions import apply_functions, force_function, step_callback
 from withe.simulation.gradients import equilibrium_gradient, equilibrium_jacobian
-from withe.simulation.hands import release_left_rings
+from withe.simulation.hands import forget_left_rings
 from withe.simulation.linearisation import Linearisation, Stability
 from withe.simulation.loads import load_index
 from withe.simulation.paths import EquilibriumPath, PathOptions, path_of
@@ -24,7 +24,7 @@ from withe.simulation.session import Session
 from withe.simulation.supports import find_support
 from withe.simulation.unknowns import Unknown
 
-__all__ = ["Stepping", "convergence_error", "pass_on"]
+__all__ = ["Stepping", "convergence_error", "pass_on", "report_left"]
 
 
 class Stepping:
@@ -160,13 +160,11 @@ class Stepping:
         except _core.ConvergenceFailure as failure:
             raise convergence_error(self.session, failure.args) from None
         finally:
+            forget_left_rings(self.session, world.take_left_rings())
+            left, self.session.left_rings = self.session.left_rings, []
             pass_on(world.take_warning(), world.take_step_warning())
-            for name in release_left_rings(self.session):
-                warnings.warn(
-                    f"the end of a rod has passed out of ring {name!r} (time {world.time:.6g} s): it is released",
-                    RingLeftWarning,
-                    stacklevel=_levels_to_user(),
-                )
+            for name, time in left:
+                report_left(f"ring {name!r} (time {time:.6g} s): it is released")
 
 
 def convergence_error(session: Session, numbers: tuple[Any, ...]) -> ConvergenceError:
@@ -182,6 +180,11 @@ def pass_on(mesh: str, steps: str) -> None:
         warnings.warn(mesh, CoarseMeshWarning, stacklevel=_levels_to_user())
     if steps:
         warnings.warn(steps, CoarseStepWarning, stacklevel=_levels_to_user())
+
+
+def report_left(what: str) -> None:
+    """Say that a ring was left, which one, and what came of it."""
+    warnings.warn(f"the end of a rod has passed out of {what}", RingLeftWarning, stacklevel=_levels_to_user())
 
 
 def _levels_to_user() -> int:

@@ -24,7 +24,7 @@ from withe.simulation.motion import (
 )
 from withe.simulation.session import Session
 
-__all__ = ["find_support", "hold", "move_support", "release"]
+__all__ = ["find_support", "forget", "hold", "move_support", "release"]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -41,6 +41,11 @@ def release(session: Session, support: Handle | str) -> None:
     """Take a support off; see `Simulation.release`."""
     index, part = find_support(session, support)
     session.world.remove_support(index)
+    forget(session, part)
+
+
+def forget(session: Session, part: SupportPart) -> None:
+    """Drop what is known of a support that the engine has released."""
     del session.settings.supports[part.name]
     for word in POSE_WORDS:
         session.settings.paths.pop((part.name, word), None)
