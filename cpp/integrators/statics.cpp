@@ -140,7 +140,9 @@ class Statics {
   /// The point of the path at the factor `next`, predicted along the tangent.
   bool reach(double next, double increment, NewtonResult& last) {
     path_.go_to(next);
-    const bool touching = equations_.contact() && equations_.contact()->count() > 0;
+    // Where surfaces meet, and where rods go through rings, corrections shrink less than on smooth paths.
+    const bool touching = (equations_.contact() && equations_.contact()->count() > 0) ||
+                          (equations_.hands() && equations_.hands()->rings().count() > 0);
     Prediction prediction{.length = 0.0, .strict = !touching};
     bool predicted = tangent_.found;
     if (predicted) {

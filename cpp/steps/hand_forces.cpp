@@ -238,17 +238,20 @@ void HandForces::add_rounding(const StepProblem& problem, StepData& data) const 
 }
 
 double HandForces::dissipated(const StepProblem& problem, const StepData& data, const Assembler&,
-                              const VectorX& change) const {
+                              const VectorX& /*change*/) const {
   if (!problem.moves()) return 0.0;
-  const VectorX end = problem.start->q + change;
-  double lost = rings_.dissipated(problem, end_, end);
+  double lost = rings_.dissipated(problem, end_, data.z);
   for (int k = 0; k < table_.count(); ++k) {
     const Piece p = piece(problem, data, k);
     const Held& held = held_[at(k)];
     const HandState& hand = problem.start->hands[at(held.support)];
     const HandPose from{hand.position, hand.rotation}, to = end_pose(problem, held.support);
-    const Vector3 u0 = shift_of(model_, problem.start->q, hand, from, p.touched, at(held.touched)).by,
-                  u1 = shift_of(model_, end, hand, to, p.touched, at(held.touched)).by;
+    const auto shift = [&](const VectorX& q, const HandPose& pose) {
+      return shift_of(model_, q, hand, pose, p.touched, at(held.touched)).by;
+    };
+    const Vector3 u0 = shift(problem.start->q, from), there = shift(data.z, to);
+    // By the place, for a given pose, u is linear: z is the middle, or the end.
+    const Vector3 u1 = problem.in_middle() ? Vector3(2.0 * there - shift(problem.start->q, to)) : there;
     const CappedForce last = capped(p.stiffness.cwiseProduct(u1), p.touched.share * p.hand.force_limit);
     if (last.share >= 1.0 && p.elastic.share >= 1.0) continue;
     // What both sides put in, without what is stored of it; at a step's end, its force times the slip.

@@ -131,17 +131,18 @@ void RingForces::add_rounding(const StepProblem& problem, StepData& data) const 
   }
 }
 
-double RingForces::dissipated(const StepProblem& problem, const std::vector<HandPose>& end, const VectorX& q1) const {
+double RingForces::dissipated(const StepProblem& problem, const std::vector<HandPose>& end, const VectorX& z) const {
+  const NodePlaces acting{model_, z};
+  const NodePlaces last = problem.in_middle() ? NodePlaces{model_, z, 2.0, &problem.start->q} : acting;
   double lost = 0.0;
   for (const Held& held : rings_) {
     const RingStep step = step_of(model_, problem, end, held.support);
     if (step.start.left || !step.ring.holds) continue;
-    const NodePlaces last{model_, q1};
     const SplinePlace place = nearest_place(step.curve, step.start.place, last, step.to);
     const double k = step.ring.stiffness, u0 = step.origin(step.fed_from) - step.curve.arc_at(step.start.place),
                  u1 = step.origin(step.fed_to) - step.curve.arc_at(place);
     const double kept = kept_way(step.ring, step.curve, place, point_at(step.curve, place, last, step.to), u1);
-    lost += with_found(problem, step, middle_of(problem, q1), [&](const auto& found, const auto& /*axes*/) {
+    lost += with_found(problem, step, acting, [&](const auto& found, const auto& /*axes*/) {
       if (!found.slips && kept == u1) return 0.0;
       // What both sides put in, without what is stored of it; at a step's end, T times the slip.
       return problem.in_middle() ? found.tension * (u1 - u0) - 0.5 * k * (kept * kept - u0 * u0)

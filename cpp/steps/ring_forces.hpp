@@ -29,8 +29,9 @@ class RingForces {
   void add(const StepProblem& problem, StepData& data, const std::vector<HandPose>& end,
            std::span<double> values) const;
   void add_rounding(const StepProblem& problem, StepData& data) const;
-  /// What slip takes, and what rings and their drives do, in a step that ends at `q1` [J].
-  double dissipated(const StepProblem& problem, const std::vector<HandPose>& end, const VectorX& q1) const;
+  /// What slip takes in a step whose forces act at `z` [J].
+  double dissipated(const StepProblem& problem, const std::vector<HandPose>& end, const VectorX& z) const;
+  /// What rings and their drives do in a step that ends at `q1` [J].
   double work(const StepProblem& problem, const std::vector<HandPose>& end, const VectorX& q1) const;
   /// Takes a state there whose hands are where they go to. Returns what stays with rings that rods have left [J].
   double accept(State& state) const;

@@ -201,7 +201,8 @@ void World::feed(int support, double rate) {
 
 void World::set_ring_friction(int support, double friction) {
   require(support >= 0 && support < static_cast<int>(implementation_->model.supports.size()) &&
-              implementation_->model.supports[at(support)].active && implementation_->model.supports[at(support)].slides(),
+              implementation_->model.supports[at(support)].active &&
+              implementation_->model.supports[at(support)].slides(),
           "no such ring, or it is released: " + std::to_string(support));
   Implementation& self = accounted();
   HandDescription& hand = self.model.supports[at(support)].description.hand;
@@ -231,8 +232,10 @@ RingPassage World::passage(int support) const {
           "no such ring, or it is released: " + std::to_string(support));
   if (self.state.hands[at(support)].ring.left) return {};
   const Passage found = passage_of(self.model, self.state, support);
-  return {true, found.at, found.pull,
-          self.model.supports[at(support)].description.hand.stiffness[0] * found.across.norm(),
+  const RodCurve& curve = self.model.supports[at(support)].curve;
+  // A closed rod goes round for ever.
+  const double along = curve.closed ? found.at - curve.whole * std::floor(found.at / curve.whole) : found.at;
+  return {true, along, found.pull, self.model.supports[at(support)].description.hand.stiffness[0] * found.across.norm(),
           self.motions[at(support)].feed_rate};
 }
 

@@ -9,6 +9,7 @@
 #include "common/text.hpp"
 #include "geometry/rotation.hpp"
 #include "model/edge_vectors.hpp"
+#include "steps/ring_forces.hpp"
 #include "world/implementation.hpp"
 
 namespace withe {
@@ -31,6 +32,19 @@ void check_shapes(const Model& model, const RodState& rod) {
   require(fits(rod.twists, stencils) && (rod.twists.size() > 0 || rod.directors.rows() == 0 || stencils == 0),
           "twists need a number a stencil");
   require(rod.directors.rows() > 0 || rod.positions.rows() == 0, "positions need directors");
+}
+
+/// Rings are where rods pass them now, and give way as far as they cannot hold these; one beyond an end of its rod
+/// has let it go.
+void pass_rings_anew(const Model& model, State& state) {
+  for (std::size_t s = 0; s < model.supports.size(); ++s) {
+    if (!model.supports[s].active || !model.supports[s].slides()) continue;
+    RingState& ring = state.hands[s].ring;
+    const Passage now = passage_of(model, state, static_cast<int>(s));
+    ring.place = now.place;
+    ring.slip += now.slipped;
+    ring.left = ring.left || now.place.beyond;
+  }
 }
 
 }  // namespace
@@ -180,6 +194,7 @@ void World::Implementation::place_rods(const std::vector<RodState>& rods) {
   compute_configuration(model, state, state.q, c);
   require(c.bend_strain.allFinite() && c.half_strain.allFinite(), "positions fold an edge right back onto the next");
   accept_configuration(model, VectorX(state.q), c, state);
+  pass_rings_anew(model, state);
   meet_anew();
   forget_motion();
   forget_matrix();

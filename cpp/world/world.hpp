@@ -242,7 +242,7 @@ class World {
   /// The drive of a ring feeds the rod towards its end from now on, by length at rest [m/s].
   void feed(int support, double rate);
   RingPassage passage(int support) const;  ///< of a ring
-  /// Of a ring without a drive, from now on [-]. What this does to the energy at the present state is work of actuation.
+  /// Of a ring without a drive, from now on [-]; what this does to the energy stored there is work of actuation.
   void set_ring_friction(int support, double friction);
   /// Rings that were released since this was last asked, at the end of the time step in which their rods left them.
   std::vector<LeftRing> take_left_rings();

@@ -1087,6 +1087,9 @@ class World:
         twist: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
         over: typing.SupportsFloat | typing.SupportsIndex,
     ) -> None: ...
+    def set_ring_friction(
+        self, support: typing.SupportsInt | typing.SupportsIndex, friction: typing.SupportsFloat | typing.SupportsIndex
+    ) -> None: ...
     def set_spring(self, spring: typing.SupportsInt | typing.SupportsIndex, parameters: SpringDescription) -> None: ...
     def set_state(
         self, rods: collections.abc.Sequence[RodState], time: typing.SupportsFloat | typing.SupportsIndex | None
@@ -1120,6 +1123,10 @@ class World:
     def support_turn(
         self, support: typing.SupportsInt | typing.SupportsIndex
     ) -> tuple[typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 3]"], float]: ...
+    def take_left_rings(self) -> list[tuple[int, float]]:
+        """
+        Supports that were released since rods have left them, and when [s].
+        """
     def take_step_warning(self) -> str: ...
     def take_warning(self) -> str: ...
     def tensions(
@@ -1201,6 +1208,10 @@ class Batch:
     ) -> None:
         """
         Advance lanes by `count` time steps; functions of Python are called with the lock of the interpreter.
+        """
+    def take_left_rings(self) -> list[tuple[int, int, float]]:
+        """
+        Lanes and supports that were released since rods have left them, and when [s].
         """
     def take_warnings(self) -> tuple[str, str]: ...
     @property

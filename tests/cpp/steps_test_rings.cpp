@@ -175,7 +175,7 @@ TEST(RingForces, EnergyMomentumStepsBalanceEnergyHoweverFarTheRodSlides) {
           State after = c.state;
           after.q = q1;
           const RingForces& rings = with.with.hands()->rings();
-          const double lost = rings.dissipated(with.with.problem(), poses, q1),
+          const double lost = rings.dissipated(with.with.problem(), poses, c.q),
                        done = rings.work(with.with.problem(), poses, q1);
           const double before = energy(c.state);
           compute_configuration(c.model, after, q1, configuration);

@@ -39,8 +39,7 @@ TEST(Step, DoesNotAllocateAfterWarmUp) {
 
 /// A hand that yields, and a ring that rubs and travels along its rod.
 TEST(Step, WithHandsDoesNotAllocateAfterWarmUp) {
-  for (Integrator integrator :
-       {Integrator::backward_euler, Integrator::implicit_midpoint, Integrator::energy_momentum})
+  for (Integrator integrator : {Integrator::backward_euler, Integrator::implicit_midpoint, Integrator::energy_momentum})
     for (SceneBuilder builder : {testing::cantilever(), testing::hanging_arm()}) {
       const double whole = builder.scene.rods[0].rest_lengths.sum();
       for (const bool slides : {false, true}) {

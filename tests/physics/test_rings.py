@@ -57,6 +57,25 @@ def test_a_heavy_cable_slides_through_a_ring_until_it_pulls_alike_on_both_sides(
     assert simulation.passage(ring).at == pytest.approx(brentq(pull, 0.48, 0.55), abs=1.5e-3)
 
 
+@pytest.mark.parametrize("planar", [True, False], ids=["planar", "spatial"])
+def test_one_move_leads_where_many_small_ones_do(planar):
+    """Over some twenty edges that go through the ring, while the cable becomes slack."""
+    ends = []
+    for parts in (1, 2, 20):
+        simulation, rod, ring = cable(planar=planar)
+        simulation.equilibrium()
+        for part in np.arange(1, parts + 1) / parts:
+            simulation.move(ring, (0.4 + 0.06 * part, 0.0, 0.0))
+            simulation.move(rod.end, (1.0 - 0.08 * part, 0.0, 0.0))
+            found = simulation.equilibrium()
+            assert found.stable
+            assert not found.branch_changed
+            assert found.iterations < 400
+        ends.append(simulation.positions(rod))
+    for end in ends[1:]:
+        np.testing.assert_allclose(end, ends[0], atol=1e-9)
+
+
 def overhang(edges):
     """Deflection of the end of a light rod that lies in two rings and is loaded at its end, over that of beams."""
     scene = rods.weightless()
@@ -306,3 +325,43 @@ def test_a_rod_through_an_eye_converges_as_its_mesh_and_step_are_refined():
     fine = [end(edges, step) for edges, step in ((16, 2e-3), (32, 1e-3), (64, 5e-4))]
     first, second = np.abs(fine[1] - fine[0]).max(), np.abs(fine[2] - fine[1]).max()
     assert second < 0.35 * first
+
+
+@pytest.mark.parametrize("along", ALONG)
+def test_a_rod_that_is_put_elsewhere_passes_its_rings_there(along):
+    """Along itself by several edges, where a drive allows that, and across; nothing comes from nowhere then."""
+    simulation, rod, ring = swinging("energy_momentum", 1e-3, **along)
+    simulation.step(20)
+    at, way = simulation.passage(ring).at, 1e-4 if along.get("feed_rate") and "limit" not in along else 0.15
+    tangent = simulation.directors(rod)[7, 2]
+    simulation.set_state(rod, positions=simulation.positions(rod) - way * tangent + (0.0, 0.0, 1e-3))
+    assert simulation.passage(ring).at == pytest.approx(at + way, abs=0.1 * way + 5e-3)
+    start = balance(simulation)
+    simulation.step(20)
+    assert balance(simulation) == pytest.approx(start, abs=1e-9 * (simulation.energy().kinetic + 1.0))
+
+
+def test_a_closed_rod_goes_round_through_a_ring():
+    scene = rods.weightless()
+    angle = np.linspace(0.0, 2.0 * np.pi, 40, endpoint=False)
+    points = 0.2 * np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1)
+    rod = scene.add_rod(points=points, closed=True, stiffness=rods.stiffness(), line_density=1.0, radius=0.01)
+    ring = scene.grasp(rod, 0.1, slides=True, feed_rate=1.0)
+    simulation = scene.build(integrator="backward_euler", time_step=0.05)
+    whole = np.linalg.norm(np.diff(points, axis=0, append=points[:1]), axis=1).sum()
+    for _ in range(60):
+        simulation.step()
+        at = simulation.passage(ring).at
+        assert 0.0 <= at < whole
+        assert (at - 0.1 + simulation.time + 0.5 * whole) % whole == pytest.approx(0.5 * whole, abs=0.02)
+
+
+def test_a_rod_that_is_put_beyond_a_ring_has_left_it():
+    scene = rods.weightless()
+    rod = rods.straight(scene, 20, stiffness=rods.stiffness(stretch=1e3))
+    scene.grasp(rod, 0.1, slides=True, name="eye")
+    simulation = scene.build(time_step=1e-2)
+    simulation.set_state(rod, positions=simulation.positions(rod) + np.array([0.2, 0.0, 0.0]))
+    with pytest.warns(withe.RingLeftWarning, match="'eye'"):
+        simulation.step()
+    assert np.abs(simulation.velocities(rod)).max() < 1e-12

@@ -150,8 +150,8 @@ class Batch(Setting, Reading):
             pass_on(*self._lanes.engine.take_warnings())
             if left:
                 lane, name, time = left[0]
-                more = f", and {len(left) - 1} more rings: they are" if len(left) > 1 else ": it is"
-                report_left(f"ring {name!r} of simulation {lane} (time {time:.6g} s){more} released")
+                more = f", and {len(left) - 1} more" if len(left) > 1 else ""
+                report_left(f"ring {name!r} of simulation {lane} (time {time:.6g} s){more}: released")
 
     def _left_rings(self, heard: Iterable[int]) -> list[tuple[int, str, float]]:
         """Rings that the engine has released: simulation, name, and when [s]; `heard`: simulations that may know."""

@@ -87,7 +87,11 @@ def field_shares(field: FrictionField, nodes: FloatArray, closed: bool, what: st
     """
     ends = np.roll(nodes, -1, axis=0) if closed else nodes[1:]
     points = np.concatenate([nodes, 0.5 * (nodes[: len(ends)] + ends)])
-    given = np.asarray(field(points.copy()), float)
+    found = field(points.copy())
+    try:
+        given = np.asarray(found, float)
+    except (TypeError, ValueError):
+        raise ValueError(f"{what} must give numbers, got {found!r:.80}") from None
     if given.ndim == 0:
         given = np.broadcast_to(given, (len(points),))
     if given.shape != (len(points),):

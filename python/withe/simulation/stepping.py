@@ -163,8 +163,9 @@ class Stepping:
             forget_left_rings(self.session, world.take_left_rings())
             left, self.session.left_rings = self.session.left_rings, []
             pass_on(world.take_warning(), world.take_step_warning())
-            for name, time in left:
-                report_left(f"ring {name!r} (time {time:.6g} s): it is released")
+            if left:
+                rings = " and ".join(f"ring {name!r} (time {time:.6g} s)" for name, time in left)
+                report_left(f"{rings}: released")
 
 
 def convergence_error(session: Session, numbers: tuple[Any, ...]) -> ConvergenceError:
