@@ -59,7 +59,7 @@ def test_nonsense_is_refused(half):
     sheet = SimulatedSheet(A4, **COARSE)
     with pytest.raises(ValueError, match="plan must be a Plan"):
         fold("half", sheet)
-    with pytest.raises(ValueError, match="sheet must be a SimulatedSheet"):
+    with pytest.raises(ValueError, match="sheet must be a SimulatedSheet or a WideSheet"):
         fold(half, A4)
     with pytest.raises(ValueError, match="replans"):
         fold(half, sheet, replans=-1)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from withe.folding import Noise, Paper, SimulatedSheet, WideSheet, plan
+from withe.folding import Noise, Paper, SimulatedSheet, WideSheet, find_edge, fold, overhead_camera, plan
 
 A4 = Paper.a4()
 MESH = {"edges": 60, "time_step": 0.02}
@@ -37,6 +37,27 @@ def test_the_side_that_is_more_slippery_slides_farther_and_the_crease_turns(half
     # The side that slides away is too short: its edge comes down where the sheet is no longer.
     lengths = 0.5 * (half.target - found.slides)
     assert found.spin == pytest.approx(np.arctan2(lengths[0] - lengths[1], 0.5 * A4.width), rel=1e-3)
+
+
+def test_a_camera_sees_how_both_sides_lie():
+    pytest.importorskip("cv2")
+    sheet, camera = WideSheet(A4, **MESH), overhead_camera(A4.length)
+    flat = find_edge(sheet.picture(camera), camera, A4)
+    assert flat.x == pytest.approx(A4.length, abs=5e-4)
+    assert flat.angle == pytest.approx(0.0, abs=5e-3)
+    narrow = find_edge(SimulatedSheet(A4, **MESH).picture(camera), camera, A4)
+    assert flat.corners == pytest.approx(narrow.corners, abs=3e-4)
+
+
+def test_the_edges_of_a_wide_sheet_meet_where_it_is_watched(half):
+    pytest.importorskip("cv2")
+    sheet = WideSheet(A4, seed=3, unevenness=0.2, **MESH)
+    watched = fold(half, sheet, progress=False)
+    assert watched.failure is None
+    assert watched.slides.mean() > 5e-3
+    assert abs(watched.error) < 1e-3
+    assert len(watched.seen_slides) == 5
+    assert watched.seen_slides[-1] == pytest.approx(watched.slides.mean(), abs=1e-3)
 
 
 def test_without_slide_nothing_turns():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import overload
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +15,7 @@ from withe.folding.plans import Plan
 from withe.folding.seeing import find_edge, overhead_camera
 from withe.folding.simulated_sheet import Fold, SimulatedSheet
 from withe.folding.timing import travel_times
+from withe.folding.wide_sheet import WideFold, WideSheet
 from withe.perception.camera import Camera
 
 __all__ = ["fold"]
@@ -30,6 +32,7 @@ class _Part:
     poses: FloatArray
 
 
+@overload
 def fold(
     plan: Plan,
     sheet: SimulatedSheet,
@@ -38,7 +41,30 @@ def fold(
     camera: Camera | None = None,
     tolerance: float = 5e-4,
     progress: bool = True,
-) -> Fold:
+) -> Fold: ...
+
+
+@overload
+def fold(
+    plan: Plan,
+    sheet: WideSheet,
+    *,
+    replans: int = 5,
+    camera: Camera | None = None,
+    tolerance: float = 5e-4,
+    progress: bool = True,
+) -> WideFold: ...
+
+
+def fold(
+    plan: Plan,
+    sheet: SimulatedSheet | WideSheet,
+    *,
+    replans: int = 5,
+    camera: Camera | None = None,
+    tolerance: float = 5e-4,
+    progress: bool = True,
+) -> Fold | WideFold:
     """Carry out a plan in parts, and plan the rest anew after each from where a camera sees that the sheet has slid to.
 
     Poses of the rest begin where the jaw is, and are those of the sheet where it lies now; by how much the jaw's angle
@@ -49,7 +75,8 @@ def fold(
     Parameters
     ----------
     plan : Plan
-    sheet : SimulatedSheet
+    sheet : SimulatedSheet or WideSheet
+        Of a wide one the middle of the far edge is followed: a jaw that moves in a plane cannot turn with it.
     replans : int
         How many times the jaw stops and the sheet is looked at, at equal distances of the way. The dissertation's N is
         one more.
@@ -62,7 +89,7 @@ def fold(
 
     Returns
     -------
-    Fold
+    Fold, or WideFold of a wide sheet
         With the slides that were seen.
 
     Raises
@@ -82,8 +109,8 @@ def fold(
     """
     if not isinstance(plan, Plan):
         raise ValueError(f"plan must be a Plan, got {plan!r:.80}")
-    if not isinstance(sheet, SimulatedSheet):
-        raise ValueError(f"sheet must be a SimulatedSheet, got {sheet!r:.80}")
+    if not isinstance(sheet, SimulatedSheet | WideSheet):
+        raise ValueError(f"sheet must be a SimulatedSheet or a WideSheet, got {sheet!r:.80}")
     if plan.plunges_at is not None and plan.grasp != "free":
         raise ValueError(
             f"plan must be one with a free moment for its way to a plunge to be planned anew, got {plan!r}"
@@ -98,7 +125,7 @@ def fold(
 
 
 def _parts(
-    plan: Plan, sheet: SimulatedSheet, stops: int, camera: Camera, tolerance: float, seen: list[float]
+    plan: Plan, sheet: SimulatedSheet | WideSheet, stops: int, camera: Camera, tolerance: float, seen: list[float]
 ) -> Iterator[_Part]:
     """One part after the other; what is yielded is carried out before the next is asked for."""
     present, plunge = plan.before_plunge(), _plunge(plan)
@@ -130,7 +157,7 @@ def _plunge(plan: Plan) -> _Part | None:
     return _Part(plan.times[last], plan.poses[last])
 
 
-def _slide(sheet: SimulatedSheet, camera: Camera, plan: Plan, pose: FloatArray) -> float:
+def _slide(sheet: SimulatedSheet | WideSheet, camera: Camera, plan: Plan, pose: FloatArray) -> float:
     """How far the sheet has slid, as a camera sees it; NaN where its far edge is hidden.
 
     The lifted edge, at a pose of the jaw, has corners like those of the far edge, and hides these in the end.

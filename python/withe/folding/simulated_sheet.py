@@ -24,11 +24,11 @@ from withe.scene.scene import Scene
 from withe.simulation.simulation import Simulation
 from withe.simulation.snapshots import Snapshot
 
-__all__ = ["Fold", "FoldingMotion", "Held", "SimulatedSheet", "node_places"]
+__all__ = ["LONGEST", "Fold", "FoldingMotion", "Held", "SimulatedSheet", "node_places"]
 
 FloatArray = npt.NDArray[np.float64]
 _STRIP = ((0.0, 1.0), (1.0, 1.0))
-_LONGEST = 600.0  # [s] that a progress bar expects of motions that it does not know
+LONGEST = 600.0  # [s] that a progress bar expects of motions that it does not know
 
 
 class FoldingMotion(Motion, Protocol):
@@ -201,7 +201,8 @@ class SimulatedSheet:
         ImportError
             OpenCV is not installed.
         """
-        return table_picture(self.positions(), self._widths, camera, size, self._grain)
+        across = np.multiply.outer(0.5 * self._widths, [0.0, 1.0, 0.0])
+        return table_picture([self.positions() - across, self.positions() + across], camera, size, self._grain)
 
     def strip_picture(self, length: float | None = None, scale: float = 4000.0) -> npt.NDArray[np.uint8]:
         """Take a picture from the side, for `measure`, of a strip of such a sheet that is clamped level and hangs.
@@ -259,7 +260,7 @@ class SimulatedSheet:
         return self.carry_out([plan], plan.target, duration=float(plan.times[-1] - plan.times[0]), progress=progress)
 
     def carry_out(
-        self, motions: Iterable[Motion], target: float, *, duration: float = _LONGEST, progress: bool = True
+        self, motions: Iterable[Motion], target: float, *, duration: float = LONGEST, progress: bool = True
     ) -> Fold:
         """Carry out motions in a row, from the flat sheet.
 
@@ -294,7 +295,7 @@ class SimulatedSheet:
     def carry_on(self, held: Held, motions: Iterable[Motion], target: float) -> Fold:
         """Carry out other motions from where a sheet was held, as `carry_out` those from the flat sheet."""
         self.simulation.restore(held.state)
-        return self._carried(held.jaw.on_from_here(motions), target, _LONGEST, False)
+        return self._carried(held.jaw.on_from_here(motions), target, LONGEST, False)
 
     def _carried(self, motion: JawMotion, target: float, duration: float, progress: bool) -> Fold:
         self._motion = motion

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import numpy.typing as npt
 
@@ -48,11 +50,11 @@ def strip_picture(paper: Paper, curl: float, length: float, scale: float, random
 
 
 def table_picture(
-    positions: FloatArray, widths: FloatArray, camera: Camera, size: tuple[int, int], random: np.random.Generator
+    sides: Sequence[FloatArray], camera: Camera, size: tuple[int, int], random: np.random.Generator
 ) -> Picture:
-    """A sheet on the table, so wide at its nodes: its upper side bright, its lower one bluish, steep parts darker."""
+    """A sheet on the table, by both of its sides: its upper face bright, its lower one bluish, steep parts darker."""
+    positions = 0.5 * (sides[0] + sides[1])
     steps = np.diff(positions, axis=0)
-    sides = [positions + np.multiply.outer(sign * 0.5 * widths, [0.0, 1.0, 0.0]) for sign in (-1.0, 1.0)]
     seen = [camera.project(side) for side in sides]
     order = np.argsort(positions[:-1, 2] + positions[1:, 2], kind="stable")
     quads, colours = [], []

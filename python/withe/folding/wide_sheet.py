@@ -5,6 +5,7 @@ Knows no planner, nor the equilibria that planners know.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,13 +14,15 @@ import numpy.typing as npt
 from withe.common import validation
 from withe.folding.carrying import carried
 from withe.folding.jaw import Jaw
-from withe.folding.jaw_motion import JawMotion, lead
+from withe.folding.jaw_motion import JawMotion, Motion, lead
 from withe.folding.noise import Drawn, Noise
 from withe.folding.paper import Paper
 from withe.folding.paper_rods import strip_numbers
-from withe.folding.simulated_sheet import FoldingMotion, node_places
+from withe.folding.simulated_sheet import LONGEST, FoldingMotion, node_places
+from withe.folding.views import table_picture
 from withe.parts.handles import Rod
 from withe.parts.materials import Stiffness
+from withe.perception.camera import Camera
 from withe.recording.record import Record
 from withe.scene.scene import Scene
 from withe.simulation.simulation import Simulation
@@ -50,6 +53,8 @@ class WideFold:
         Why it is no fold.
     record : Record
         Of rods "strip 0" and "strip 1".
+    seen_slides : tuple of float [m]
+        What a camera saw of the slide on the way, of the middle of the far edge; NaN where it did not see it.
     """
 
     error: float
@@ -58,6 +63,7 @@ class WideFold:
     spin: float
     failure: str | None
     record: Record
+    seen_slides: tuple[float, ...] = ()
 
 
 class WideSheet:
@@ -135,6 +141,7 @@ class WideSheet:
         )
         more = uneven * np.clip(np.random.default_rng((seed, 2)).normal(), -2.0, 2.0)
         self.frictions = self.truth.friction * np.array([1.0 - more, 1.0 + more])
+        self._seed, self._grain = seed, np.random.default_rng(seed)
         self._places = node_places(paper.length, self.jaw.depth, edges)
         self._sides = np.array([-0.25, 0.25]) * paper.width
         scene, self.strips = self._scene(validation.non_negative(own_friction, "own_friction"))
@@ -205,14 +212,42 @@ class WideSheet:
         ValueError
             As `SimulatedSheet.fold`.
         """
+        return self.carry_out([plan], plan.target, duration=float(plan.times[-1] - plan.times[0]), progress=progress)
+
+    def carry_out(
+        self, motions: Iterable[Motion], target: float, *, duration: float = LONGEST, progress: bool = True
+    ) -> WideFold:
+        """Carry out motions in a row, from the flat sheet, as `SimulatedSheet.carry_out`."""
         simulation = self.simulation
         simulation.reset()
-        jaw = JawMotion([plan], self._drawn)
+        self._grain = np.random.default_rng(self._seed)
+        jaw = JawMotion(motions, self._drawn)
         for strip, y in zip(self.strips, self._sides, strict=True):
             hand = simulation.hand(f"jaw on {strip.name}")
             lead(hand, hand.pose.rotation, jaw, self.jaw.depth, float(y))
-        duration = float(plan.times[-1] - plan.times[0])
-        return self._result(plan.target, carried(simulation, jaw, self.strips, duration, progress).failure)
+        return self._result(target, carried(simulation, jaw, self.strips, duration, progress).failure)
+
+    def picture(self, camera: Camera, size: tuple[int, int] = (640, 480)) -> npt.NDArray[np.uint8]:
+        """Take a picture of the sheet as it lies now, as `SimulatedSheet.picture`; it is straight across.
+
+        Parameters
+        ----------
+        camera : withe.perception.Camera
+        size : (int, int) [px]
+            Width and height.
+
+        Returns
+        -------
+        ndarray of uint8, shape (height, width, 3)
+
+        Raises
+        ------
+        ImportError
+            OpenCV is not installed.
+        """
+        first, second = (self.simulation.positions(strip) for strip in self.strips)
+        middle, across = 0.5 * (first + second), second - first  # strips are in the middles of their halves
+        return table_picture([middle - across, middle + across], camera, size, self._grain)
 
     def _result(self, target: float, failure: str | None) -> WideFold:
         ends = [self.simulation.positions(strip)[[0, -1], 0] for strip in self.strips]
