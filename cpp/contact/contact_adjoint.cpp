@@ -171,16 +171,17 @@ void add_curve_pressing(const ContactProblem& problem, const Touching& t, const 
     y1 += rows[i] * g1[i];
   }
   const StartShare share = start_share(g0, g1, way, t.proximity.distance - start.distance);
-  const double b = share.value, force = t.pressing.first,
-               by_share = share.fixed ? 0.0 : force * (y0 - y1) / share.apart;
+  const double b = share.value, force = t.pressing.first, by_share = force * (y0 - y1);
   for (int i = 0; i < 9; ++i) {
-    double bent = 0.0, turned = 0.0;
+    double bent = 0.0, turned = 0.0, parts = -share.by_part[i / 3] * g0[i];
     for (int j = 0; j < 9; ++j) {
       bent += H[i][j] * rows[j];
       turned += H[i][j] * way[j];
+      parts += share.by_part[j / 3] * H[i][j] * way[j];
     }
     out.start[i] += t.pressing.by_start * (y1 + b * (y0 - y1)) * g0[i] + force * b * bent +
-                    by_share * (g1[i] - g0[i] - b * (turned - g0[i] + g1[i]));
+                    by_share * (0.5 * share.by_excess * (g1[i] - g0[i] - turned) +
+                                share.by_apart * (turned - g0[i] + g1[i]) + parts);
   }
 }
 

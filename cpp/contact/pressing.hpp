@@ -9,27 +9,36 @@
 namespace withe {
 
 /// The share b of the gradient g0 of a distance D at the start of a step in a mean of it and of g1 at the end,
-///   m = (1 - b) g1 + b g0,   b = (D1 - D0 - p1) / (p0 - p1),   p = g . (x1 - x0),
-/// so that m . (x1 - x0) = D1 - D0 where b is between 0 and 1.
+///   m = (1 - b) g1 + b g0,   b = 1/2 + e d / (d^2 + a^2),   e = D1 - D0 - (p0 + p1) / 2,   d = p0 - p1,
+/// p = g . (x1 - x0), so that m . (x1 - x0) = D1 - D0, but for a, where b is between 0 and 1. Where d vanishes any
+/// share does that work, and without a, a little of what nodes add to p0, b would jump from one end to the other:
+/// forces with it, where a contact is about to lift off.
 struct StartShare {
   double value;
-  double apart;  ///< p0 - p1
-  bool fixed;    ///< whatever the unknowns do
+  double by_excess, by_apart;  ///< its derivatives by e and d; 0 where it is at an end
+  double by_part[3];           ///< by what each node adds to p0, through a
 };
 
-/// `way`: x1 - x0; `nearer`: D1 - D0.
+/// `way`: x1 - x0, of three nodes; `nearer`: D1 - D0.
 template <int N>
 StartShare start_share(const double (&first)[N], const double (&last)[N], const double (&way)[N], double nearer) {
-  constexpr double kSameDirection = 1e-12;  // gradients that differ by no more differ by rounding: any share will do
-  double p0 = 0.0, p1 = 0.0, size = 0.0;
+  constexpr double kLittle = 1e-4;
+  constexpr int kAxes = N / 3;
+  double part[3] = {}, p1 = 0.0;
   for (int i = 0; i < N; ++i) {
-    p0 += first[i] * way[i];
+    part[i / kAxes] += first[i] * way[i];
     p1 += last[i] * way[i];
-    size += std::abs(way[i]);
   }
-  const bool same = std::abs(p0 - p1) <= kSameDirection * size;
-  const double share = same ? 0.5 : (nearer - p1) / (p0 - p1), value = std::clamp(share, 0.0, 1.0);
-  return {value, p0 - p1, same || share != value};
+  const double p0 = part[0] + part[1] + part[2], excess = nearer - 0.5 * (p0 + p1), apart = p0 - p1;
+  const double least = part[0] * part[0] + part[1] * part[1] + part[2] * part[2],
+               square = apart * apart + kLittle * kLittle * least;
+  if (square == 0.0) return {0.5, 0.0, 0.0, {}};
+  const double share = 0.5 + excess * apart / square, value = std::clamp(share, 0.0, 1.0);
+  if (value != share) return {value, 0.0, 0.0, {}};
+  const double by_square = -excess * apart / (square * square);
+  StartShare out{value, apart / square, excess / square + 2.0 * apart * by_square, {}};
+  for (int n = 0; n < 3; ++n) out.by_part[n] = 2.0 * kLittle * kLittle * by_square * part[n];
+  return out;
 }
 
 /// From g1 to m, and from the derivative of g1 to that of m; `derivative` is nothing where none is asked for.
@@ -43,7 +52,9 @@ void add_start_direction(const double (&first)[N], const double (&way)[N], doubl
   for (int j = 0; j < N && derivative; ++j) {
     double bent = 0.0;
     for (int i = 0; i < N; ++i) bent += way[i] * derivative[i][j];
-    const double change = share.fixed || !geometric ? 0.0 : -(bent + b * (turned[j] - bent)) / share.apart;
+    const double change = !geometric ? 0.0
+                                     : -0.5 * share.by_excess * (turned[j] + bent) +
+                                           share.by_apart * (turned[j] - bent) + share.by_part[j / (N / 3)] * first[j];
     for (int i = 0; i < N; ++i) derivative[i][j] = (1.0 - b) * derivative[i][j] + turned[i] * change;
   }
   for (int i = 0; i < N; ++i) along[i] += b * turned[i];

@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "contact/contact_law.hpp"
+#include "contact/pressing.hpp"
 #include "derivative_check.hpp"
 #include "scenes.hpp"
 
@@ -370,6 +371,29 @@ TEST(Contact, ReadOutsChangeNoBitOfWhatFollows) {
       }
     }
   EXPECT_GT(touching, 100);
+}
+
+/// Of a distance by three heights, over a way in which the directions at both ends do works that differ by `apart`.
+StartShare share_of(double apart, double nearer) {
+  const double way[3] = {-1e-4, -2e-4, -1e-4}, first[3] = {0.1, 0.8, 0.1};
+  const double last[3] = {0.1 + 1e-3, 0.8 - 0.5e-3 + 0.5e4 * apart, 0.1};
+  double p = 0.0;
+  for (int i = 0; i < 3; ++i) p += 0.5 * (first[i] + last[i]) * way[i];
+  return start_share(first, last, way, p + nearer);
+}
+
+TEST(StartShare, DoesTheWorkOfTheDistanceWhereDirectionsDiffer) {
+  for (double apart : {1e-6, 1e-5, -1e-5}) EXPECT_NEAR(share_of(apart, 0.2 * apart).value, 0.7, 2e-4);
+}
+
+TEST(StartShare, GoesFromOneEndToTheOtherWithoutAJump) {
+  // A contact whose distance bends otherwise than in second order: without a, the share is 0 or 1 wherever |d| < 2 e.
+  double before = share_of(-1e-6, 1e-10).value;
+  for (double apart = -1e-6; apart <= 1e-6; apart += 1e-10) {
+    const double now = share_of(apart, 1e-10).value;
+    EXPECT_NEAR(now, before, 0.02) << apart;
+    before = now;
+  }
 }
 
 }  // namespace
