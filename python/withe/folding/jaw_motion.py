@@ -18,6 +18,7 @@ __all__ = ["JawMotion", "Motion", "lead"]
 FloatArray = npt.NDArray[np.float64]
 _COMES_IN = 0.1  # of the first motion, over which the jaw's errors grow
 _FOLLOWS = 0.2  # [s]
+_RINGS = 5  # times that, until what it was given rings no more
 _JUMP = np.array([1e-3, 1e-3, 0.05])  # between motions, at most [m], [m], [rad]
 
 
@@ -78,8 +79,12 @@ class JawMotion:
         return other
 
     def lately(self, time: float) -> float:
-        """Greatest speed of the edge in the last moments before a time [m/s]: as long as a sheet takes to follow."""
-        return self._way.speed(time - _FOLLOWS, time)
+        """Greatest speed of the edge in the last moments before a time [m/s]: as long as a sheet takes to follow.
+
+        Before that it counts less and less, as the sheet rings down.
+        """
+        ages = _FOLLOWS * np.arange(_RINGS)
+        return max(float(np.exp(-age / _FOLLOWS)) * self._way.speed(time - age - _FOLLOWS, time - age) for age in ages)
 
     @property
     def end(self) -> float:
