@@ -239,3 +239,12 @@ def test_a_pattern_that_ends_on_its_beginning_is_said_to_lie_on_itself():
     assert found.overlap[[0, -1]].all()
     assert not found.overlap[100:200].any()
     assert "lies on the cable itself" in str(found)
+
+
+@pytest.mark.parametrize("length", [0.1, 0.3, 1.0])
+@pytest.mark.parametrize("angle", [0.0, 0.3, 1.2])
+def test_a_straight_line_stays_where_it_is(length, angle):
+    way = np.array([np.cos(angle), np.sin(angle)])
+    pattern = withe.deployment.Pattern(np.linspace(0.0, length, 50)[:, None] * way)
+    assert pattern.deviation < 1e-7
+    assert np.abs(pattern.curvature).max() < 1e-3

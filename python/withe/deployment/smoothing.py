@@ -25,17 +25,25 @@ class _Norm:
     def sizes(self, x: FloatArray) -> FloatArray:
         return np.asarray(np.linalg.norm((self.matrix @ x + self.offset).reshape(2, -1), axis=0))
 
+    def rounding(self, x: FloatArray) -> float:
+        """Bound of what rounding leaves of the rows."""
+        return float(np.finfo(float).eps * (abs(self.matrix) @ np.abs(x) + np.abs(self.offset)).max())
+
     def value(self, x: FloatArray) -> float:
         return float(((self.sizes(x) / self.scale) ** self.power).sum() / self.power)
 
     def derivatives(self, x: FloatArray) -> tuple[FloatArray, Any]:
-        """Gradient |r|^(p-2) r and Hessian |r|^(p-2) (1 + (p-2) rr / |r|^2), both through the matrix."""
+        """Gradient |r|^(p-2) r, through the matrix, and B of the Hessian B^T B.
+
+        B = (|r|^(p-2) (1 + (p-2) rr / |r|^2))^(1/2) matrix.
+        """
         rows = (self.matrix @ x + self.offset).reshape(2, -1)
         size = np.linalg.norm(rows, axis=0)
         weight = (size / self.scale) ** (self.power - 2) / self.scale**2
         direction = rows / np.maximum(size, 1e-300)
-        inner = _blocks(weight, (self.power - 2) * weight, direction)
-        return self.matrix.T @ (weight * rows).ravel(), self.matrix.T @ inner @ self.matrix
+        root = np.sqrt(weight)
+        inner = _blocks(root, (np.sqrt(self.power - 1.0) - 1.0) * root, direction)
+        return self.matrix.T @ (weight * rows).ravel(), inner @ self.matrix
 
 
 def _blocks(plain: FloatArray, along: FloatArray, direction: FloatArray) -> Any:
@@ -47,19 +55,32 @@ def _blocks(plain: FloatArray, along: FloatArray, direction: FloatArray) -> Any:
     return sparse.bmat([[sparse.diags(block) for block in row] for row in rows])
 
 
-def _minimised(norm: _Norm, x: FloatArray, extra: Any) -> FloatArray:
-    """Newton's method in norms of rising power; `extra(x)` gives value, gradient and Hessian of what is added."""
+def _solved(root: Any, rest: Any, right: FloatArray) -> FloatArray:
+    """Solves (B^T B + rest) x = right, y = B x being unknown too.
+
+    Fourth differences over short spacings know nothing of straight lines, and their squares, 1 / spacing^8, are above
+    the rest by more than rounding bears [Bjorck 1996, sec. 2.5.3].
+    """
+    from scipy import sparse
     from scipy.sparse.linalg import splu
 
+    unit = float(np.sqrt(rest.diagonal().max()))
+    matrix = sparse.bmat([[unit * sparse.identity(root.shape[0]), -root], [root.T, rest / unit]], format="csc")
+    found = splu(matrix).solve(np.concatenate([np.zeros(root.shape[0]), right / unit]))
+    return np.asarray(found[root.shape[0] :])
+
+
+def _minimised(norm: _Norm, x: FloatArray, extra: Any) -> FloatArray:
+    """Newton's method in norms of rising power; `extra(x)` gives value, gradient and Hessian of what is added."""
     for power in _POWERS:
         scale = float(norm.sizes(x).max())
-        if scale == 0.0:
+        if scale <= norm.rounding(x):  # a straight line
             break
         norm.power, norm.scale = power, scale
         for _ in range(_ROUNDS):
             added, slope, bend = extra(x)
-            gradient, hessian = norm.derivatives(x)
-            step = -splu((hessian + bend).tocsc()).solve(gradient + slope)
+            gradient, root = norm.derivatives(x)
+            step = -_solved(root, bend, gradient + slope)
             value, length = norm.value(x) + added, 1.0
             while length > 1e-4 and not norm.value(x + length * step) + extra(x + length * step)[0] < value:
                 length /= 2
@@ -151,12 +172,11 @@ def fourth_differences(count: int) -> Any:
 def _quadratic(both: Any, raw: FloatArray, deviation: float) -> FloatArray:
     """Least squares of what the floor gives, weighed against those of the distance so that the greatest is .9."""
     from scipy import sparse
-    from scipy.sparse.linalg import splu
 
-    square, unit = (both.T @ both).tocsc(), sparse.identity(len(raw), format="csc")
+    unit = sparse.identity(len(raw))
 
     def solved(log_weight: float) -> FloatArray:
-        return np.asarray(splu(unit + np.exp(log_weight) * square).solve(raw))
+        return _solved(np.exp(0.5 * log_weight) * both, unit, raw)
 
     def farthest(x: FloatArray) -> float:
         return float(np.linalg.norm((x - raw).reshape(2, -1), axis=0).max())
