@@ -314,7 +314,7 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
   if (options.tolerance) result.error = estimated_error(equations, newton, options, plan, predictor, work);
   work.difference = work.change / dt;
   predictor.record({state.time + 0.5 * dt, h, dt, plan.slot}, state.v, work.difference, acceleration,
-                   equations.mass().rows, work.assumed);
+                   equations.mass().rows);
   if (Contact* contact = equations.contact())
     result.dissipated -= contact->accept(state, Keep::energy, std::max(contact_loss, 0.0));
   advance(equations, plan, q1, work, state);

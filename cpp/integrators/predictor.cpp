@@ -6,40 +6,43 @@
 
 namespace withe {
 
-void Predictor::extrapolate(double time, const History& history, int points, VectorX& out) const {
+template <class Use>
+void Predictor::extrapolated(double time, const History& history, int points, const Use& use) const {
   const auto weight = lagrange_weights(time_, static_cast<std::size_t>(points), time);
   const auto& [a, b, c, d] = history;
   const auto& [wa, wb, wc, wd] = weight;
   switch (points) {
     case 0:
-      out.setZero(a.size());
-      break;
+      return use(VectorX::Zero(a.size()));
     case 1:
-      out = wa * a;
-      break;
+      return use(wa * a);
     case 2:
-      out = wa * a + wb * b;
-      break;
+      return use(wa * a + wb * b);
     case 3:
-      out = wa * a + wb * b + wc * c;
-      break;
+      return use(wa * a + wb * b + wc * c);
     default:
-      out = wa * a + wb * b + wc * c + wd * d;
+      return use(wa * a + wb * b + wc * c + wd * d);
   }
 }
 
-void Predictor::predict(const Step& step, const VectorX& v0, Choice choice, VectorX& out) const {
-  extrapolate(step.middle, choice.velocities ? velocity_ : acceleration_, choice.points, out);
-  if (!choice.velocities) out = v0 + step.h * out;
+template <class Use>
+void Predictor::predicted(const Step& step, const VectorX& v0, Choice choice, const Use& use) const {
+  if (choice.velocities)
+    extrapolated(step.middle, velocity_, choice.points, use);
+  else
+    extrapolated(step.middle, acceleration_, choice.points, [&](const auto& a) { use(v0 + step.h * a); });
 }
 
-void Predictor::choose(const Step& step, const VectorX& v0, const VectorX& velocity, const VectorX& weight,
-                       VectorX& scratch) {
+void Predictor::predict(const Step& step, const VectorX& v0, VectorX& out) const {
+  predicted(step, v0, choice(step.slot), [&](const auto& velocity) { out = velocity; });
+}
+
+void Predictor::choose(const Step& step, const VectorX& v0, const VectorX& velocity, const VectorX& weight) {
   Choice& best = best_[static_cast<std::size_t>(step.slot)];
   double least = INFINITY;
   const auto consider = [&](Choice choice) {
-    predict(step, v0, choice, scratch);
-    const double error = (scratch - velocity).cwiseAbs2().dot(weight);
+    double error = INFINITY;
+    predicted(step, v0, choice, [&](const auto& mean) { error = (mean - velocity).cwiseAbs2().dot(weight); });
     if (!(error < least)) return;
     least = error;
     best = choice;
@@ -53,11 +56,11 @@ void Predictor::choose(const Step& step, const VectorX& v0, const VectorX& veloc
 }
 
 void Predictor::record(const Step& step, const VectorX& v0, const VectorX& velocity, const VectorX& acceleration,
-                       const VectorX& weight, VectorX& scratch) {
+                       const VectorX& weight) {
   resize(acceleration.size());
   for (int i = 0; i < count_; ++i)
     if (time_[static_cast<std::size_t>(i)] == step.middle) count_ = i;  // the same step again
-  choose(step, v0, velocity, weight, scratch);
+  choose(step, v0, velocity, weight);
   for (History* history : {&acceleration_, &velocity_})
     std::rotate(history->begin(), history->end() - 1, history->end());
   std::rotate(time_.begin(), time_.end() - 1, time_.end());

@@ -41,10 +41,10 @@ class Predictor {
   /// Whether the coming step is expected to go on as it starts, for nothing else is better.
   bool steady(int slot) const { return choice(slot).points == 0; }
   /// Mean velocity expected of a step that starts with `v0`.
-  void predict(const Step& step, const VectorX& v0, VectorX& out) const { predict(step, v0, choice(step.slot), out); }
+  void predict(const Step& step, const VectorX& v0, VectorX& out) const;
   /// Takes in a step from velocity `v0`; `weight` per unknown says how much an error there matters.
   void record(const Step& step, const VectorX& v0, const VectorX& velocity, const VectorX& acceleration,
-              const VectorX& weight, VectorX& scratch);
+              const VectorX& weight);
 
   /// Derivative of the accelerations in time, of an odd `order` up to three, through order + 2 running means that each
   /// forget `share` of the past in a step of dt. To be asked for in every step or in none.
@@ -78,9 +78,12 @@ class Predictor {
  private:
   using History = std::array<VectorX, kDepth>;
 
-  void extrapolate(double time, const History& history, int points, VectorX& out) const;
-  void predict(const Step& step, const VectorX& v0, Choice choice, VectorX& out) const;
-  void choose(const Step& step, const VectorX& v0, const VectorX& velocity, const VectorX& weight, VectorX& scratch);
+  /// Calls `use` with an expression, so that what it is compared with is computed in the same pass.
+  template <class Use>
+  void extrapolated(double time, const History& history, int points, const Use& use) const;
+  template <class Use>
+  void predicted(const Step& step, const VectorX& v0, Choice choice, const Use& use) const;
+  void choose(const Step& step, const VectorX& v0, const VectorX& velocity, const VectorX& weight);
 
   int count_ = 0;
   std::array<Choice, kSlots> best_;
