@@ -95,6 +95,16 @@ def test_it_slides_as_the_continuum_says(paper):
     assert other.slide > 2.0 * found.slide
 
 
+def test_a_plan_that_another_paper_within_its_uncertainty_slides_on_says_so(paper):
+    with pytest.warns(
+        UserWarning, match=r"the sheet slides by 2\d\d.* mm within its uncertainty, where Lgb is 0.0473 m"
+    ):
+        plan(paper, 0.30, method="slip")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", UserWarning)
+        plan(paper, 0.30, method="slip", uncertainty=(0.0, 0.0))
+
+
 def test_its_far_corner_is_seen(paper):
     camera = overhead_camera(paper.length)
     for seed in range(5):

@@ -54,8 +54,8 @@ def plan(
         "moment_free": the angle of the jaw is that at which the sheet ends without curvature [dissertation, (7.6)].
         "free", of method "slip": the jaw turns the edge as it likes, and curvature is bounded.
     uncertainty : pair of float
-        Of method "slip" with a free moment: shares by which Lgb may be more or less, and friction less, than the
-        paper's. A way without slide is one on which no such sheet slides.
+        Of method "slip": shares by which Lgb may be more or less, and friction less, than the paper's. With a free
+        moment a way without slide is one on which no such sheet slides.
     ending : {"auto", "slow", "plunge"}
         "auto": of method "slip" with a free moment, a `plunge` where any paper within the uncertainty is predicted to
         slide by more than 1 mm (`Plan.worst_slide`) on the way that comes down slowly, which it does where that asks
@@ -89,8 +89,8 @@ def plan(
     Warns
     -----
     UserWarning
-        Every way of method "slip" slides: with the least friction at which one would not. With a free moment also where
-        the paper does not slide, but another within the uncertainty: with which, and by how much.
+        Every way of method "slip" slides: with the least friction at which one would not. Also where the paper does not
+        slide, but another within the uncertainty: with which, and by how much.
 
     Examples
     --------
@@ -119,7 +119,7 @@ def plan(
         return plunge(slow, progress=progress)
     if method != "slip":
         return slow
-    slides = _slides(slow) if grasp == "free" else None
+    slides = _slides(slow)
     needed = float(slow.slip_ratio.max())
     if needed > paper.friction:
         slides = f"the sheet slides: this way needs friction {needed:.3f}, the paper has {paper.friction:g}"

@@ -76,12 +76,13 @@ def train_policy(
     baselines = require("stable_baselines3", "learn")
     require("torch", "learn").set_num_threads(1)  # small networks lose by more
     robots = environment_class("VectorEnvironment")(task, number, workers, autoreset="same_step")
-    given = {"n_steps": max(2, 2048 // number), "batch_size": 256, "gamma": 0.99, "device": "cpu"} | options
+    given: dict[str, Any] = {"n_steps": max(2, 2048 // number), "batch_size": 256, "gamma": 0.99, "device": "cpu"}
+    given |= options
     wrappers = require("stable_baselines3.common.vec_env", "learn")
     trained = wrappers.VecMonitor(_adapter()(robots))
     if normalize:
         trained = wrappers.VecNormalize(trained, norm_obs=False, gamma=given["gamma"])
-        given["policy_kwargs"] = {"features_extractor_class": _scaling()} | given.get("policy_kwargs", {})
+        given["policy_kwargs"] = {"features_extractor_class": _scaling(), **given.get("policy_kwargs", {})}
     policy = baselines.PPO("MlpPolicy", trained, seed=seed, **given)
     base = require("stable_baselines3.common.callbacks", "learn").BaseCallback
 
