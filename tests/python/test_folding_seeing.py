@@ -20,6 +20,12 @@ SCALE = 4000.0
 PLAIN = np.full((60, 80, 3), 90, np.uint8)
 
 
+def both_sides(positions, width):
+    """Edges of a sheet that lies along x."""
+    across = np.array([0.0, 0.5 * width, 0.0])
+    return [positions - across, positions + across]
+
+
 def lying(paper: Paper, slide: float) -> np.ndarray:
     x = np.linspace(0.0, paper.length, 100) + slide
     return np.stack([x, 0 * x, 0 * x], axis=1)
@@ -95,7 +101,9 @@ def test_the_far_edge_is_found_within_half_a_millimetre_at_half_a_millimetre_a_p
     for paper in [Paper.a4(), Paper.us_letter()] * 15:
         slide = random.uniform(-0.02, 0.06)
         camera = drawn_camera(random, paper.length + slide)
-        seen = find_edge(table_picture(lying(paper, slide), paper.width, camera, (640, 480), random), camera, paper)
+        seen = find_edge(
+            table_picture(both_sides(lying(paper, slide), paper.width), camera, (640, 480), random), camera, paper
+        )
         off.append(seen.x - paper.length - slide)
         assert abs(seen.angle) < np.radians(0.2)
         assert np.hypot(*(seen.corners[1] - seen.corners[0])) == pytest.approx(paper.width, abs=5e-4)
@@ -110,7 +118,7 @@ def test_a_layer_that_is_folded_over_does_not_hide_the_edge():
     positions = np.vstack([over[:-1], back[::-1], [[0.16, 0.0, 0.0]]])
     positions[:, 0] += 0.137
     camera = overhead_camera(0.297)
-    image = table_picture(positions, A4.width, camera, (640, 480), np.random.default_rng(0))
+    image = table_picture(both_sides(positions, A4.width), camera, (640, 480), np.random.default_rng(0))
     assert find_edge(image, camera, A4).x == pytest.approx(0.297, abs=3e-4)
 
 
@@ -131,7 +139,9 @@ def test_a_picture_without_a_sheet_is_refused():
     with pytest.raises(ValueError, match="a picture without a sheet"):
         find_edge(np.full((480, 640, 3), 60, np.uint8), camera, A4)
     with pytest.raises(ValueError, match="no two that are so"):
-        find_edge(table_picture(lying(A4, 0.0), 0.1, camera, (640, 480), np.random.default_rng(0)), camera, A4)
+        find_edge(
+            table_picture(both_sides(lying(A4, 0.0), 0.1), camera, (640, 480), np.random.default_rng(0)), camera, A4
+        )
     with pytest.raises(ValueError, match="height must be positive"):
         overhead_camera(0.3, height=0.0)
 

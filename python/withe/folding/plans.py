@@ -200,6 +200,7 @@ class Plan:
         >>> paper = withe.folding.Paper.a4()
         >>> stiffer = replace(paper, gravito_bending_length=1.1 * paper.gravito_bending_length)
         >>> print(f"{1e3 * withe.folding.plan(paper).slide_of(stiffer)[-1]:.1f} mm")
+        7.9 mm
         """
         if not isinstance(paper, Paper):
             raise ValueError(f"paper must be a Paper, got {paper!r:.80}")
