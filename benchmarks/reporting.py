@@ -151,10 +151,12 @@ class Lines:
         OUT.mkdir(parents=True, exist_ok=True)
         self._file = OUT / f"{name}.jsonl"
         self.known: list[dict] = []
-        for line in self._file.read_text().splitlines() if resume and self._file.exists() else ():
+        lines = self._file.read_text().splitlines() if resume and self._file.exists() else []
+        for line in lines:
             with contextlib.suppress(json.JSONDecodeError):  # the last one may have been cut off
                 self.known.append(json.loads(line))
-        self._file.write_text("".join(json.dumps(line) + "\n" for line in self.known))
+        if not resume or len(self.known) < len(lines):
+            self._file.write_text("".join(json.dumps(line) + "\n" for line in self.known))
 
     def add(self, line: dict) -> None:
         """Write one."""
