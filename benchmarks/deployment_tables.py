@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import importlib.util
 from dataclasses import asdict, dataclass, field, replace
+from functools import cached_property
 from itertools import product
 from pathlib import Path
 
@@ -115,7 +116,7 @@ class Cell:
     @property
     def marks(self) -> str:
         """Tests that say that it will slip: f floor, which is (9.2), l lift-off, e free end, t tail, o overlap."""
-        failed = {slip.test for slip in self._said()}
+        failed = {slip.test for slip in self._said}
         letters = {"floor": "f", "lift-off": "l", "free end": "e", "tail": "t", "overlap": "o"}
         return "".join(letter for test, letter in letters.items() if test in failed)
 
@@ -124,7 +125,7 @@ class Cell:
         near = NEAR * self.motion.cable.gravito_bending_length
         s = np.linspace(0.0, self.motion.cable.length, len(self.run.slipped))
         away = np.ones(len(s), bool)
-        for slip in self._said():
+        for slip in self._said:
             away &= (s < slip.start - near) | (s > slip.end + near)
         worst = float(np.array(self.run.slipped)[away].max(initial=0.0))
         return worst if worst > SLIPPED else 0.0
@@ -138,11 +139,12 @@ class Cell:
         edges = np.flatnonzero(np.diff(np.concatenate([[False], size > SLIPPED, [False]]).astype(int)))
         for first, after in zip(edges[::2], edges[1::2], strict=True):
             start, end = s[first], s[after - 1]
-            tests = {x.test for x in self._said() if 1e3 * x.start - near <= end and 1e3 * x.end + near >= start}
+            tests = {x.test for x in self._said if 1e3 * x.start - near <= end and 1e3 * x.end + near >= start}
             said = ", ".join(sorted(tests)) or "none"
             rows.append((f"{start:.0f} to {end:.0f}", f"{size[first:after].max():.1f}", said))
         return rows
 
+    @cached_property
     def _said(self) -> tuple[Slip, ...]:
         return self.motion.feasibility(self.run.friction).slips
 

@@ -1,8 +1,10 @@
 """A stiff cable is placed between posts: a letter that the floor alone would not hold, S or U.
 
 A USB cable (the fifth of the dissertation, Lgb = 80 mm) is laid down between pairs of posts that leave 3 mm on either
-side of it. While it is laid the jaw keeps it on its pattern; what friction does not hold then, the posts do. The
-intuitive way, with the jaw straight above the place where the cable touches down, misses them.
+side of it. Its free end is held, so that it slides up and down only, until the jaw opens: a free one slides ahead, and
+what is laid behind it becomes too long for the bends. While it is laid the jaw keeps it on its pattern; what friction
+does not hold then, the posts do. The intuitive way, with the jaw straight above the place where the cable touches
+down, misses them.
 
 Writes out/place_cable.png.
 """
@@ -44,7 +46,16 @@ def laid(
     turns, radii, straights, shares = LETTERS[letter]
     pattern, cable = Pattern.bends(turns, radii, straights, easing=EASING), Cable.dlo(5)
     posts = posts_along(pattern, cable, shares * pattern.length)
-    motion = plan(known or cable, pattern, controller, posts=posts, crossings="over", friction=HELD, progress=False)
+    motion = plan(
+        known or cable,
+        pattern,
+        controller,
+        posts=posts,
+        start="held",
+        crossings="over",
+        friction=HELD,
+        progress=False,
+    )
     return deploy(
         motion, cable, floor=FRICTION, seed=seed, noise=noise, quasi_static=static, nodes=nodes, progress=False
     )
