@@ -81,6 +81,16 @@ class Run:
         """What was laid how, but for noise."""
         return self.pattern, self.cable, self.friction, self.way
 
+    @property
+    def planned(self) -> str:
+        """Way by which the plan is made: of what is placed, the exact one, on whose pattern and cable it lies."""
+        return "exact" if self.way == "placed" else self.way
+
+    @property
+    def balanced(self) -> bool:
+        """Whether the engine found equilibria."""
+        return bool(np.isfinite(self.error))
+
     def of(self, found: Deployment) -> Run:
         """With what came of it."""
         sizes = found.error, found.std, found.nearest_error, found.nearest_std
@@ -149,14 +159,14 @@ class Cell:
         return self.motion.feasibility(self.run.friction).slips
 
     def __str__(self) -> str:
-        if not np.isfinite(self.run.error):
+        if not self.run.balanced:
             return "none"
         noisy = f" ({np.mean([run.error for run in self.noisy]):.1f})" if self.noisy else ""
         return f"{self.run.error:.2f} ± {self.run.std:.2f}{noisy}"
 
     def nearest(self) -> str:
         """As text, from the nearest point of what was given."""
-        if not np.isfinite(self.run.error):
+        if not self.run.balanced:
             return "none"
         return f"{self.run.nearest_error:.2f} ± {self.run.nearest_std:.2f}"
 
@@ -194,9 +204,8 @@ class Patterns:
 
 def carried_out(run: Run, patterns: Patterns) -> Run:
     """Lay through equilibria, or in time: with noise, and what no row of equilibria follows."""
-    planned = "exact" if run.way == "placed" else run.way
     try:
-        motion = patterns.plan(run.pattern, run.cable, planned, run.friction)
+        motion = patterns.plan(run.pattern, run.cable, run.planned, run.friction)
         if run.way == "placed":
             return run.of(place(motion, floor=run.friction, nodes=run.nodes, progress=False))
         found = deploy(
@@ -219,8 +228,8 @@ def cells_of(runs: list[Run], patterns: Patterns, trials: int) -> dict[Key, Cell
     for run in runs:
         if run.seed is None:
             noisy = [other for other in runs if other.key == run.key and other.seed is not None]
-            planned = "exact" if run.way == "placed" else run.way
-            motion = patterns.plan(run.pattern, run.cable, planned if planned != "optimised" else "exact", run.friction)
+            planned = "exact" if run.way == "optimised" else run.planned
+            motion = patterns.plan(run.pattern, run.cable, planned, run.friction)
             cells[run.key] = Cell(run, motion, tuple(noisy) if len(noisy) == trials else ())
     return cells
 
@@ -252,7 +261,7 @@ def tables(report: Report, cells: dict[Key, Cell], ways: tuple[str, ...]) -> Non
     unforeseen = {key: cell.unforeseen() for key, cell in cells.items() if cell.foretold}
     rows = [(*key, f"{size:.1f}") for key, size in unforeseen.items() if size]
     report.table("Slips that no test foresaw [mm]", (*header, "way", "slip"), rows)
-    report.figures["without equilibrium"] = [" ".join(map(str, key)) for key in cells if "none" in str(cells[key])]
+    report.figures["without equilibrium"] = [" ".join(map(str, key)) for key in cells if not cells[key].run.balanced]
 
 
 def goals(report: Report, cells: dict[Key, Cell]) -> None:
