@@ -28,8 +28,7 @@ constexpr double kFarthestTurn = 1.0;
 constexpr double kShortest = 1.0 / 64.0;
 // Where no edge turns, the path ends after so many cuts.
 constexpr int kMostCuts = 6, kMostCutsOfFriction = 12;
-// After so many iterations a point of the path is given up. Where Coulomb's friction holds a stiff rod, the border of
-// what slips goes on by a node an iteration, and the solution follows when it has arrived: there all are used.
+// After so many iterations a point of the path is given up, but for those of the border of slip.
 constexpr int kMostIterations = 25;
 // A path has no more points than this: what a scene is torn along by a support that goes a thousand lengths away is
 // found by settling there.
@@ -130,7 +129,13 @@ class Statics {
 
   int most_iterations() const {
     const int most = options_.max_iterations;
-    return equations_.has_potential() ? std::min(kMostIterations, most) : most;
+    return equations_.has_potential() ? std::min(kMostIterations, most) : most + border_iterations();
+  }
+
+  /// Where Coulomb's friction holds a stiff rod, the border of what slips goes on by a contact an iteration, and the
+  /// solution follows when it has arrived: so many iterations are no sign that there is none.
+  int border_iterations() const {
+    return equations_.contact() && !equations_.has_potential() ? equations_.contact()->count() : 0;
   }
 
   bool firm() const {
@@ -219,8 +224,9 @@ class Statics {
       const bool at_rest = h >= longest;
       equations_.begin(state_, parameters_, at_rest ? StepRule::statics : StepRule::backward_euler, at_rest ? 0.0 : h);
       z = state_.q;
-      const NewtonResult r =
-          newton_.solve(equations_, z, {.target = &path_.target(), .max_iterations = at_rest ? 40 : 25}, work_);
+      const int border = border_iterations();
+      const int most = (at_rest ? 40 : kMostIterations) + border;
+      const NewtonResult r = newton_.solve(equations_, z, {.target = &path_.target(), .max_iterations = most}, work_);
       note(r, last);
       const double found = work_.data.potential - path_.target().dot(z);
       const double rounding = 1e-10 * (std::abs(potential) + std::abs(found)) + least_energy();
@@ -229,7 +235,7 @@ class Statics {
         path_.accept(z);
         if (at_rest) return true;
         potential = found;
-        h *= r.iterations <= 4 ? 10.0 : r.iterations <= 8 ? 3.0 : 1.0;
+        h *= r.iterations <= 4 + border ? 10.0 : r.iterations <= 8 + border ? 3.0 : 1.0;
       } else {
         h = std::min(h, longest) * 0.25;
       }

@@ -160,6 +160,16 @@ def test_equilibria_follow_a_cable_of_any_mesh_that_slips_along_its_length(nodes
     assert found.error == pytest.approx(4.1e-3, abs=1e-4)  # in time, at 6 mm/s: 4.16 mm
 
 
+def test_equilibria_are_found_where_the_border_of_slip_has_many_nodes_to_go():
+    """Laid along L, half of what lies of the limpest cable turns its slip in one step: 50 of 200 nodes, one by one."""
+    letter = np.genfromtxt(PATTERNS / "letterL.csv", delimiter=",", skip_header=1)
+    motion = plan(Cable.dlo(3), Pattern(letter))
+    coarse, fine = (
+        deploy(motion, floor=0.2, nodes=nodes, quasi_static=True, progress=False).error for nodes in (100, 200)
+    )
+    assert fine == pytest.approx(coarse, abs=5e-5)
+
+
 def test_a_cable_put_on_its_pattern_moves_only_where_friction_fails(arc):
     motion = plan(CABLE, arc)
     rough, smooth = (place(motion, floor=friction, nodes=NODES, progress=False) for friction in (0.6, 0.02))
