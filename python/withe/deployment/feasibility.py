@@ -53,6 +53,11 @@ class Slip:
 class Feasibility:
     """The coefficient of friction that each place of a pattern needs, by three tests, and what two more say.
 
+    None of them says how a cable rolls. Its lower side, stretched where it bends up to the jaw, contracts as it is laid
+    down: friction along it is used up at the lift-off point, however little is needed, and leaves a tension of up to
+    friction times the force there. In a bend that pushes to the inside, below the centreline, and what lies rolls. Of
+    a cable whose radius is a tenth of Lgb a millimetre comes together over a letter, which the stiff tail pulls back.
+
     Attributes
     ----------
     arc_length : ndarray of shape (nodes,) [m]
