@@ -1,5 +1,6 @@
 """Papers, and how stiff they are: strips that hang from a clamp, against beam theory, a table and a rod."""
 
+import itertools
 import warnings
 from pathlib import Path
 
@@ -66,6 +67,41 @@ def test_the_error_is_that_of_drawn_readings():
     assert np.std(drawn) == pytest.approx(exact.error, rel=0.3)
 
 
+def test_a_strip_that_curls_is_measured_from_both_of_its_sides():
+    stiffness, weight, curl, length = 3e-5, 0.5, 0.8, 0.06  # [N m^2], [N/m], [1/m], [m]
+    lgb = (stiffness / (2 * weight)) ** (1 / 3)
+    drops = {}
+    for nodes, sign in itertools.product((81, 161), (1.0, -1.0)):
+        scene = withe.Scene(gravity=(0, 0, -9.81))
+        section = withe.Stiffness(stretch=1e3, bend=stiffness, twist=stiffness)
+        strip = scene.add_rod(
+            start=(0, 0, 0),
+            end=(length, 0, 0),
+            nodes=nodes,
+            radius=1e-3,
+            stiffness=section,
+            line_density=weight / 9.81,
+        )
+        scene.clamp(strip.start)
+        simulation = scene.build(planar=True)
+        simulation.set_natural_curvature(strip, (0.0, sign * curl))
+        simulation.equilibrium()
+        drops[nodes, sign] = -simulation.positions(strip)[-1, 2]
+    one, other = ((4 * drops[161, sign] - drops[81, sign]) / 3 for sign in (1.0, -1.0))
+    found = measure(length=length, drop=max(one, other), turned=min(one, other))
+    assert found.gravito_bending_length == pytest.approx(lgb, rel=2e-4)
+    assert found.curl == pytest.approx(curl, rel=2e-3)
+    assert measure(length=length, drop=one).gravito_bending_length != pytest.approx(lgb, rel=0.01)
+
+
+def test_two_readings_of_a_strip_that_does_not_curl_say_what_one_says_with_less_error():
+    once = measure(length=0.1, drop=0.043)
+    twice = measure(length=0.1, drop=0.043, turned=0.043)
+    assert twice.gravito_bending_length == pytest.approx(once.gravito_bending_length, rel=1e-8)
+    assert twice.curl == pytest.approx(0.0, abs=1e-8)
+    assert once.error / np.sqrt(2.0) < twice.error < once.error  # the length is read once
+
+
 def test_strips_that_say_little_are_named():
     with pytest.warns(UserWarning, match="measure one of 75 to 150 mm"):
         measure(length=0.05, drop=0.05 * droop(1.0))
@@ -81,6 +117,8 @@ def test_strips_that_say_little_are_named():
         ({"length": 0.1, "drop": 0.2}, "tells nothing"),
         ({"length": 0.1, "drop": -0.1}, "drop must be positive"),
         ({"length": 0.1, "drop": 0.04, "error": -1.0}, "error must not be negative"),
+        ({"length": 0.1, "drop": 0.04, "turned": 0.2}, "turned is 2 of length"),
+        ({"length": 0.1, "drop": 0.09, "turned": 0.001}, "a reading of the same strip"),
     ],
 )
 def test_readings_that_cannot_be_are_refused(arguments, message):

@@ -78,6 +78,22 @@ def test_what_the_planner_must_not_see_is_measured():
         assert found.gravito_bending_length == pytest.approx(sheet.truth.gravito_bending_length, rel=3e-3)
 
 
+def test_a_strip_that_curls_is_as_stiff_as_it_is_when_both_of_its_sides_are_seen():
+    random = np.random.default_rng(3)
+    scaled, curls = [], []
+    for paper in [A4, Paper.cardboard()] * 5:
+        curl = random.uniform(-1.0, 1.0)  # upwards
+        length = random.uniform(1.6, 2.9) * paper.gravito_bending_length
+        image, turned = (strip_picture(paper, sign * curl, length, SCALE, random) for sign in (1.0, -1.0))
+        found = measure(image=image, turned=turned, scale=SCALE)
+        scaled.append((found.gravito_bending_length - paper.gravito_bending_length) / found.error)
+        curls.append((found.curl + curl) / found.curl_error)
+        assert found.error < 2e-3 * paper.gravito_bending_length
+        assert found.strip * found.gravito_bending_length == pytest.approx(length, abs=3e-4)
+    assert np.sqrt(np.mean(np.square(scaled))) < 1.3
+    assert np.sqrt(np.mean(np.square(curls))) < 1.3
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

@@ -31,11 +31,15 @@ class Measured:
     gravito_bending_length, error : float [m]
     strip : float [Lgb]
         Length of the strip that was measured.
+    curl, curl_error : float [1/m] or None
+        How a strip that was turned over bends by itself, positive where it bends down before it is turned.
     """
 
     gravito_bending_length: float
     error: float
     strip: float
+    curl: float | None = None
+    curl_error: float | None = None
 
 
 def _hanging(log_angle: float) -> tuple[float, float, float]:
@@ -94,6 +98,7 @@ def measure(
     length: float | None = None,
     drop: float | None = None,
     image: npt.ArrayLike | str | os.PathLike[str] | None = None,
+    turned: float | npt.ArrayLike | str | os.PathLike[str] | None = None,
     scale: float | None = None,
     error: float | None = None,
 ) -> Measured:
@@ -102,14 +107,19 @@ def measure(
     Clamp a strip level, at the edge of a table under a book, so that `length` of it is free: its tip then hangs `drop`
     below the clamp. The strip's equilibrium is that of an elastica under its own weight, exactly, however far it bends.
 
+    Paper curls, and a strip that curls by .5 / m seems stiffer or limper by 3 to 5 %. Clamp it a second time, turned
+    over: from both readings follow Lgb and the curl.
+
     Parameters
     ----------
     length, drop : float [m]
     image : path, or array_like of shape (height, width, 3) of uint8
         Instead of these: the strip from the side, level, before a plain background, cut off at the clamp, so that the
         strip comes in from the left or the right border. What counts is how far from there the tip is, across and down.
+    turned : float [m], path or array_like
+        The same strip turned over: its drop, if the first reading is one by ruler, else its picture.
     scale : float [px/m]
-        Of the picture, where the strip is.
+        Of the pictures, where the strip is.
     error : float [m]
         Standard deviation of either length; by default .5 mm, and .3 pixels of a picture.
 
@@ -127,7 +137,7 @@ def measure(
     ------
     ValueError
         Neither length and drop nor image and scale, lengths that are not positive, a drop that no strip of the length
-        can have, a picture without a sheet.
+        can have, a picture without a sheet, two readings that are not of one strip.
 
     Examples
     --------
@@ -141,19 +151,80 @@ def measure(
     if not by_ruler and not by_picture:
         raise ValueError("measure needs length and drop, or image and scale")
     if by_ruler:
-        along, down = validation.positive(length, "length"), validation.positive(drop, "drop")
+        along = validation.positive(length, "length")
+        drops = [_checked_drop(drop, along, "drop")] + (
+            [] if turned is None else [_checked_drop(turned, along, "turned")]
+        )
         error = validation.non_negative(5e-4 if error is None else error, "error")
-        if not 1e-5 < down / along < 0.98:
-            raise ValueError(
-                f"drop is {down / along:.2g} of length, which tells nothing: strips that tell most droop by .2 to .7 "
-                "of it"
-            )
-    else:
-        per_metre = validation.positive(scale, "scale")
-        error = validation.non_negative(_READ / per_metre if error is None else error, "error")
-        across, down = strip_ends(image)  # type: ignore[arg-type]
-        along, down = _length_of(across, down) / per_metre, down / per_metre
-    return _measured(along, down, error, by_picture)
+        flat = _measured(along, float(np.mean(drops)), error, by_reach=False)
+        return flat if turned is None else _uncurled(flat, np.array([along, *drops]), error)
+    per_metre = validation.positive(scale, "scale")
+    error = validation.non_negative(_READ / per_metre if error is None else error, "error")
+    ends = np.array([strip_ends(x) for x in (image, turned) if x is not None]) / per_metre  # type: ignore[arg-type]
+    across, down = (float(x) for x in ends.mean(axis=0))
+    flat = _measured(_length_of(across, down), down, error, by_reach=True)
+    return flat if turned is None else _uncurled(flat, ends.ravel(), error)
+
+
+def _checked_drop(drop: object, length: float, name: str) -> float:
+    down = validation.positive(drop, name)  # type: ignore[arg-type]
+    if not 1e-5 < down / length < 0.98:
+        raise ValueError(
+            f"{name} is {down / length:.2g} of length, which tells nothing: strips that tell most droop by .2 to .7 of "
+            "it"
+        )
+    return down
+
+
+def _uncurled(flat: Measured, read: FloatArray, error: float) -> Measured:
+    """Lgb, length and curl of a strip from readings of both of its sides; `flat` is what it would be without curl.
+
+    Readings are its length and both drops, or reach and drop of one side and of the other.
+    """
+    from scipy.optimize import least_squares
+
+    angles = {1.0: 0.5, -1.0: 0.5}  # of the tip, found last
+
+    def misfit(unknowns: FloatArray) -> FloatArray:
+        lgb, length, curl = unknowns * scales
+        sides = []
+        for side in angles:
+            drop, reach, angles[side] = _curled(length / lgb, side * curl * lgb, angles[side])
+            sides.append((lgb * reach, lgb * drop))
+        (_, first), (_, second) = sides
+        expected = [length, first, second] if len(read) == 3 else np.ravel(sides)
+        return np.asarray((np.asarray(expected) - read) / flat.gravito_bending_length)
+
+    scales = np.array([flat.gravito_bending_length, flat.gravito_bending_length, 1.0 / flat.gravito_bending_length])
+    try:
+        found = least_squares(misfit, [1.0, flat.strip, 0.0], method="lm", xtol=1e-12, ftol=1e-12)
+    except (RuntimeError, FloatingPointError) as none:
+        raise ValueError("turned must be a reading of the same strip, clamped as far from its tip") from none
+    lgb, length, curl = found.x * scales
+    if not found.success or lgb <= 0.0 or np.abs(found.fun).max() > max(0.02, 10.0 * error / lgb):
+        raise ValueError("turned must be a reading of the same strip, clamped as far from its tip")
+    spread = np.sqrt(np.diag(np.linalg.inv(found.jac.T @ found.jac))) * error / flat.gravito_bending_length * scales
+    return Measured(float(lgb), float(spread[0]), float(length / lgb), float(curl), float(spread[2]))
+
+
+def _curled(strip: float, curl: float, near: float) -> tuple[float, float, float]:
+    """Drop and reach [Lgb] of a strip that bends down by itself by `curl` [1/Lgb], and the angle of its tip.
+
+    As `_hanging`, but phi'(0) = curl: nothing turns the tip. `near` is an angle near that.
+    """
+    from scipy.integrate import solve_ivp
+    from scipy.optimize import newton
+
+    def slopes(u: float, y: FloatArray) -> tuple[float, float, float, float]:
+        return y[1], 0.5 * u * math.sin(y[0]), math.cos(y[0]), math.sin(y[0])
+
+    def hung(angle: float) -> FloatArray:
+        run = solve_ivp(slopes, (0.0, strip), (angle, curl, 0.0, 0.0), "DOP853", rtol=1e-10, atol=1e-12)
+        return np.asarray(run.y[:, -1])
+
+    angle = float(newton(lambda angle: hung(angle)[0] - 0.5 * math.pi, near, x1=near + 1e-3, tol=1e-11))
+    _, _, drop, reach = hung(angle)
+    return float(drop), float(reach), angle
 
 
 def _length_of(reach: float, drop: float) -> float:

@@ -204,7 +204,9 @@ class SimulatedSheet:
         across = np.multiply.outer(0.5 * self._widths, [0.0, 1.0, 0.0])
         return table_picture([self.positions() - across, self.positions() + across], camera, size, self._grain)
 
-    def strip_picture(self, length: float | None = None, scale: float = 4000.0) -> npt.NDArray[np.uint8]:
+    def strip_picture(
+        self, length: float | None = None, scale: float = 4000.0, *, turned: bool = False
+    ) -> npt.NDArray[np.uint8]:
         """Take a picture from the side, for `measure`, of a strip of such a sheet that is clamped level and hangs.
 
         Parameters
@@ -212,6 +214,8 @@ class SimulatedSheet:
         length : float [m]
             Of the strip; by default 2.2 Lgb as the planner believes.
         scale : float [px/m]
+        turned : bool
+            Whether its lower side is up.
 
         Returns
         -------
@@ -228,7 +232,8 @@ class SimulatedSheet:
         length = 2.2 * self.paper.gravito_bending_length if length is None else validation.positive(length, "length")
         scale = validation.positive(scale, "scale")
         strip = replace(self.truth, outline=_STRIP)
-        return strip_picture(strip, self._drawn.curl, length, scale, self._grain)
+        curl = -self._drawn.curl if turned else self._drawn.curl
+        return strip_picture(strip, curl, length, scale, self._grain)
 
     def fold(self, plan: FoldingMotion, *, progress: bool = True) -> Fold:
         """Carry out a plan, from the flat sheet.

@@ -34,7 +34,7 @@ _SCALE = 4000.0  # of the picture of a strip [px/m]
 
 @dataclass(frozen=True)
 class Trial:
-    """One fold from beginning to end: a strip is photographed and measured, a motion is planned and carried out.
+    """One fold from beginning to end: a strip is photographed from both sides, a motion is planned and carried out.
 
     Parameters
     ----------
@@ -212,7 +212,8 @@ def _hashable(options: Mapping[str, Any]) -> tuple[tuple[str, Any], ...]:
 
 def _carried_out(trial: Trial) -> Outcome:
     sheet = SimulatedSheet(trial.paper, trial.seed, trial.noise, **trial.sheet)
-    measured = measure(image=sheet.strip_picture(scale=_SCALE), scale=_SCALE).gravito_bending_length
+    image, turned = (sheet.strip_picture(scale=_SCALE, turned=side) for side in (False, True))
+    measured = measure(image=image, turned=turned, scale=_SCALE).gravito_bending_length
     outcome = Outcome(trial, measured)
     paper = replace(trial.believed or trial.paper, gravito_bending_length=measured)
     began = time.thread_time()
