@@ -152,22 +152,21 @@ def measure(
         raise ValueError("measure needs length and drop, or image and scale")
     if by_ruler:
         along = validation.positive(length, "length")
-        drops = [_checked_drop(drop, along, "drop")] + (
-            [] if turned is None else [_checked_drop(turned, along, "turned")]
-        )
+        readings = {"drop": drop, "turned": turned}
+        drops = [_checked_drop(down, along, name) for name, down in readings.items() if down is not None]
         error = validation.non_negative(5e-4 if error is None else error, "error")
         flat = _measured(along, float(np.mean(drops)), error, by_reach=False)
         return flat if turned is None else _uncurled(flat, np.array([along, *drops]), error)
     per_metre = validation.positive(scale, "scale")
     error = validation.non_negative(_READ / per_metre if error is None else error, "error")
-    ends = np.array([strip_ends(x) for x in (image, turned) if x is not None]) / per_metre  # type: ignore[arg-type]
+    ends = np.array([strip_ends(x) for x in (image, turned) if x is not None]) / per_metre
     across, down = (float(x) for x in ends.mean(axis=0))
     flat = _measured(_length_of(across, down), down, error, by_reach=True)
     return flat if turned is None else _uncurled(flat, ends.ravel(), error)
 
 
 def _checked_drop(drop: object, length: float, name: str) -> float:
-    down = validation.positive(drop, name)  # type: ignore[arg-type]
+    down = validation.positive(drop, name)
     if not 1e-5 < down / length < 0.98:
         raise ValueError(
             f"{name} is {down / length:.2g} of length, which tells nothing: strips that tell most droop by .2 to .7 of "
