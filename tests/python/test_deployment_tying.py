@@ -72,3 +72,5 @@ def test_bad_moves_and_picks_are_named():
         Move(0, -0.1, [(0, 0, 1)])
     with pytest.raises(ValueError, match="picks must be one for each move"):
         tie([line()], [[Move(0, 0.0, [(0, 0, 1)])]], floor=0.5, picks=[[]])
+    with pytest.raises(ValueError, match="floor must be positive"):
+        tie([line()], [[Move(0, 0.0, [(0, 0, 1)])]], floor=0.0)

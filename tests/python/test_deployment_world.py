@@ -129,7 +129,8 @@ def test_the_world_imports_no_planner():
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"floor": -0.1}, "floor must not be negative"),
+        ({"floor": -0.1}, "floor must be positive"),
+        ({"floor": 0.0}, "floor must be positive"),
         ({"floor": 0.4, "noise": -1.0}, "noise must not be negative"),
         ({"floor": 0.4, "nodes": 5}, "nodes must lie in"),
         ({"floor": 0.4, "time_step": 0.0}, "time_step must be positive"),

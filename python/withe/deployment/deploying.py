@@ -88,7 +88,7 @@ def deploy(
     cable : Cable
         The true one, if it is not the planner's; held as far from its free end as the plan says.
     floor : float
-        Coefficient of friction between cable and floor.
+        Coefficient of friction between cable and floor. Without any, nothing stays where it is laid.
     seed : int
         Of the trial's noise.
     noise : float
@@ -111,7 +111,7 @@ def deploy(
     Raises
     ------
     ValueError
-        Negative friction or noise, a cable shorter than the plan holds, wrong numbers of nodes.
+        Friction that is not positive, negative noise, a cable shorter than the plan holds, wrong numbers of nodes.
 
     Examples
     --------
@@ -123,7 +123,7 @@ def deploy(
     >>> print(found.error < 1e-3)
     True
     """
-    friction = validation.non_negative(floor, "floor")
+    friction = validation.positive(floor, "floor")
     noise = validation.non_negative(noise, "noise")
     nodes = validation.integer(nodes, "nodes", 20, 2000)
     true = plan.cable if cable is None else cable
@@ -172,7 +172,7 @@ def place(
     Raises
     ------
     ValueError
-        Negative friction, wrong numbers of nodes.
+        Friction that is not positive, wrong numbers of nodes.
 
     Examples
     --------
@@ -187,7 +187,7 @@ def place(
     """
     setup = Setup(
         cable=plan.cable,
-        friction=validation.non_negative(floor, "floor"),
+        friction=validation.positive(floor, "floor"),
         nodes=validation.integer(nodes, "nodes", 20, 2000),
         time_step=_time_step(time_step, quasi_static),
         quasi_static=quasi_static,

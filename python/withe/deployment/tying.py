@@ -131,10 +131,10 @@ def tie(
     ------
     ValueError
         No plan, a move of a cable that is not there or beyond its end, moves of a step with different numbers of legs,
-        picks that do not fit, negative friction or noise.
+        picks that do not fit, friction that is not positive, negative noise.
     """
     _check(plans, steps, picks)
-    friction = validation.non_negative(floor, "floor")
+    friction = validation.positive(floor, "floor")
     noise = validation.non_negative(noise, "noise")
     random = np.random.default_rng(validation.integer(seed, "seed", 0, 2**63 - 1))
     setups = [
