@@ -110,3 +110,39 @@ def test_free_rod_under_gravity_has_no_equilibrium(planar):
     with pytest.raises(withe.ConvergenceError):
         simulation.equilibrium()
     np.testing.assert_array_equal(simulation.positions(), before)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_drawn_cables_that_are_pulled_over_a_rough_floor_find_equilibria_all_the_way(seed):
+    """Bent as they lie, they straighten and follow a hand; each force is within Coulomb's cone, and they add up to 0."""
+    random = np.random.default_rng(seed)
+    nodes, radius, length = (60, 200, 400)[seed % 3], random.uniform(5e-4, 3e-3), 0.5
+    friction, lgb = 10 ** random.uniform(-1.3, 0.0), 10 ** random.uniform(-2.0, -0.8)
+    weight = 1180.0 * np.pi * radius**2 * 9.81  # [N/m]
+    rubber = withe.Material(
+        youngs_modulus=8.0 * weight * lgb**3 / (np.pi * radius**4), poisson_ratio=0.5, density=1180.0
+    )
+    s = np.linspace(0.0, length, nodes)
+    waves = [random.normal() * np.sin(2 * np.pi * (j + 1) * s / length + random.uniform(0, 6)) for j in range(3)]
+    heading = np.cumsum(random.uniform(2.0, 12.0) * sum(waves)) * length / (nodes - 1)
+    steps = np.column_stack([np.cos(heading), np.sin(heading)])[1:] * length / (nodes - 1)
+    points = np.column_stack([np.vstack([[0.0, 0.0], np.cumsum(steps, axis=0)]), np.full(nodes, radius)])
+
+    scene = withe.Scene(gravity=(0.0, 0.0, -9.81))
+    scene.add_floor(friction=friction)
+    cable = scene.add_rod(points=points, radius=radius, material=rubber)
+    scene.enable_contact(rods=False)
+    scene.pin(cable.end, free=(0.0, 0.0, 1.0), name="hand")
+    simulation = scene.build(integrator="static", time_step=0.1, planar=False)
+    simulation.set_natural_curvature(cable, (0.0, 0.0), over=1.0)
+    way = random.normal(size=2)
+    way *= random.uniform(0.005, 0.05) / np.linalg.norm(way)
+    simulation.move("hand", position=points[-1] + [*way, 0.0], over=1.0)
+    for _ in range(10):
+        simulation.step()
+        contacts = simulation.contacts()
+        pressed = contacts["normal_force"]
+        assert (np.linalg.norm(contacts["friction"], axis=1) <= friction * pressed * (1 + 1e-9) + 1e-12).all()
+        total = contacts["friction"].sum(axis=0) + contacts["normal"].T @ pressed
+        total += simulation.reaction("hand").force - [0.0, 0.0, weight * length]
+        assert np.abs(total).max() < 1e-6 * weight * length
