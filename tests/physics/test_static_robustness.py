@@ -114,7 +114,7 @@ def test_free_rod_under_gravity_has_no_equilibrium(planar):
 
 @pytest.mark.parametrize("seed", range(8))
 def test_drawn_cables_that_are_pulled_over_a_rough_floor_find_equilibria_all_the_way(seed):
-    """Bent as they lie, they straighten and follow a hand; each force is within Coulomb's cone, and they add up to 0."""
+    """Bent as they lie, they straighten and follow a hand; forces are within Coulomb's cone and add up to nothing."""
     random = np.random.default_rng(seed)
     nodes, radius, length = (60, 200, 400)[seed % 3], random.uniform(5e-4, 3e-3), 0.5
     friction, lgb = 10 ** random.uniform(-1.3, 0.0), 10 ** random.uniform(-2.0, -0.8)
