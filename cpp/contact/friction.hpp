@@ -112,6 +112,11 @@ Scalar slip_factor(const Scalar& square, double c) {
   return chain(square, c * t / x, 0.5 * c * c * c * ((1.0 - t * t) - t / x) / x2);
 }
 
+/// Whether an elastic stick of a length, squared, holds, if it bears at most another. What slipped at the end of a step
+/// is at its limit to rounding: it is taken to slip on. As a stick it would hold its neighbours too, and Newton's method
+/// would free one contact an iteration.
+inline bool holds(double square, double most) { return square <= (1.0 - 1e-12) * most * most; }
+
 /// The force F for a slip S and a normal force N.
 template <class Scalar>
 FrictionForce<Scalar> friction_force(const FrictionSetting& f, const Vec3<Scalar>& normal, const Vec3<Scalar>& slip,
@@ -130,7 +135,7 @@ FrictionForce<Scalar> friction_force(const FrictionSetting& f, const Vec3<Scalar
   const Scalar square = dot(stick, stick);
   const Scalar limit = (mu / f.tangential_stiffness) * pressing;
   const double most = std::max(value_of(limit), 0.0);
-  out.sticking = value_of(square) <= most * most;
+  out.sticking = holds(value_of(square), most);
   if (!out.sticking) stick = (limit / sqrt(square)) * stick;
   out.stick = stick;
   out.force = Scalar(f.tangential_stiffness) * stick;

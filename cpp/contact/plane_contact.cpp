@@ -185,7 +185,7 @@ class PlaneSlip {
       return;
     }
     const double stiffness = tangential_stiffness(pair_, t.stiffness), most = std::max(limit_ / stiffness, 0.0);
-    sticking_ = std::abs(slip_) <= most;
+    sticking_ = holds(slip_ * slip_, most);
     const double size = std::abs(slip_);
     law_ = sticking_ ? ForceLaw{stiffness, 0.0, 0.0}
                      : ForceLaw{limit_ / size, -0.5 * limit_ / (size * size * size), mu / size};

@@ -132,7 +132,7 @@ class Statics {
     return equations_.has_potential() ? std::min(kMostIterations, most) : most + border_iterations();
   }
 
-  /// Where Coulomb's friction holds a stiff rod, the border of what slips goes on by a contact an iteration, and the
+  /// Where Coulomb's friction holds a limp rod, the border of what slips goes on by a contact an iteration, and the
   /// solution follows when it has arrived: so many iterations are no sign that there is none.
   int border_iterations() const {
     return equations_.contact() && !equations_.has_potential() ? equations_.contact()->count() : 0;
