@@ -324,6 +324,31 @@ Eigen::Matrix<double, 7, 3> discrete_held_spin(const Model& model, const TurnCoe
   return out;
 }
 
+Eigen::Matrix<double, kMaxLocal, 3> discrete_half_spin(const Model& model, const TurnCoefficients& elastic,
+                                                       const DiscreteStep& step, int stencil) {
+  const FrameStencil& s = model.half[at(stencil)];
+  const AttachedStep attached = attached_frame(model, step, stencil);
+  Eigen::Matrix<double, kMaxLocal, 3> out = Eigen::Matrix<double, kMaxLocal, 3>::Zero();
+  out.topRows<7>() = discrete_held_spin(model, elastic, step, s.edge, attached);
+  if (model.planar()) {
+    const double by_turn = 0.5 * planar_attached_forces(elastic, step, s.edge, attached).frame_frame;
+    out.row(4) = by_turn * model.plane->normal.transpose();
+    return out;
+  }
+  Local unused;
+  clear(unused, kMaxLocal, true);
+  const AttachedMoments a = put_attached_edge(elastic, step, s.edge, attached, true, unused);
+  const Mat3<double>& by_spin = attached.first ? a.m.by_a : a.m.by_b;
+  for (int i = 0; i < 3; ++i)
+    for (int axis = 0; axis < 3; ++axis) out(7 + i, axis) = -a.sign * by_spin.row[i][axis];
+  if (s.hinge < 0) return out;
+  const Hinge& hinge = model.hinges[at(s.hinge)];
+  const HingeArm h = hinge_arm(step.end_q.segment<3>(model.frame_dof[at(s.frame)]),
+                               step.start.frame[at(s.frame)] * hinge.axis, step.change(hinge.dof));
+  out.row(10) = h.arm.transpose() * out.middleRows<3>(7);
+  return out;
+}
+
 void discrete_stretch_local(const Model& model, const ElasticCoefficients& elastic, const DiscreteStep& step, int edge,
                             bool with_matrix, const double* given_force, Local& out) {
   const auto [force, modulus, inverse_mean] = mean_stretch(model, elastic, step.start, step.end, edge);

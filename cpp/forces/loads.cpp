@@ -190,8 +190,12 @@ Loads resolve_loads(const Model& model) {
     } else if (load.kind == LoadKind::distributed) {
       for (int e = first; e <= last; ++e)
         for (int node : {model.edge_tail[at(e)], model.edge_head[at(e)]})
-          loads.pieces.push_back({load.follower ? LoadShape::follower : LoadShape::dead_node,
-                                  index + stride * (e - first), 0.5 * model.edge_arc(e), node, e});
+          loads.pieces.push_back({.shape = load.follower ? LoadShape::follower : LoadShape::dead_node,
+                                  .load = index + stride * (e - first),
+                                  .weight = 0.5 * model.edge_arc(e),
+                                  .node = node,
+                                  .edge = e,
+                                  .along = true});
     } else {
       const int node = rod.nodes[at(load.pass.node)];
       const int count = last - first + 1;

@@ -24,6 +24,7 @@ struct LoadPiece {
   int edge = -1;  ///< that carries a follower or takes a moment
   int frame = -1;
   bool follower = false;  ///< of a moment: whether it turns with its edge or frame
+  bool along = false;     ///< of a load along a rod: whether its weight is a part of the edge's length
 };
 
 struct Loads {

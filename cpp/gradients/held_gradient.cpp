@@ -148,19 +148,11 @@ PoseAdjoint by_poses(const Model& model, const VectorX& q, const VectorX& held_u
   return out;
 }
 
-DrawnAdjoint by_drawing(const Model& model, const VectorX& q, const VectorX& held) {
-  DrawnAdjoint out{MatrixX3::Zero(model.node_count, 3),
-                   MatrixX3::Zero(static_cast<Eigen::Index>(model.supports.size()), 3)};
-  for (int i = 0; i < model.node_count; ++i) out.nodes.row(i) = node_vector(model, held, i).transpose();
-  for (std::size_t s = 0; s < model.supports.size(); ++s) {
-    const Support& support = model.supports[s];
-    if (!support.active) continue;
-    auto spin = out.spins.row(static_cast<Eigen::Index>(s));
-    if (support.frame >= 0)
-      spin = frame_turn(model, held, support).transpose();
-    else if (support.other_node >= 0)
-      spin = edge_turn(model, held, support, arm_of(model, q, support)).transpose();
-  }
+DrawnAdjoint by_drawing(const Model& model, const VectorX& q, const VectorX& by) {
+  DrawnAdjoint out{MatrixX3::Zero(model.node_count, 3), MatrixX3::Zero(model.edge_count, 3)};
+  for (int i = 0; i < model.node_count; ++i) out.nodes.row(i) = node_vector(model, by, i).transpose();
+  for (int e = 0; e < model.edge_count && !model.planar(); ++e)
+    out.edge_turn.row(e) = by(model.edge_dof[at(e)]) * to_eigen(edge_vector(model, q, e)).normalized().transpose();
   return out;
 }
 

@@ -12,13 +12,15 @@ struct PoseAdjoint {
   MatrixX3 obstacles;  ///< per obstacle, by its position [1/m]
 };
 
-/// Derivatives by what supports hold as it was drawn.
+/// Derivatives by what is where it was drawn: what supports hold, and at the start of a run all.
 struct DrawnAdjoint {
-  MatrixX3 nodes;  ///< per node, by where it is held [1/m]
-  MatrixX3 spins;  ///< per support, by how the frame of the end that it holds is turned, at fixed nodes [1/rad]
+  MatrixX3 nodes;      ///< per node [1/m]
+  MatrixX3 edge_turn;  ///< per edge, by how its directors are turned about it, as a rotation vector [1/rad]
 };
 
-DrawnAdjoint by_drawing(const Model& model, const VectorX& q, const VectorX& held);
+/// `by`: of all unknowns; what supports do not hold counts of nodes and edges alone, as frames are where they are
+/// drawn.
+DrawnAdjoint by_drawing(const Model& model, const VectorX& q, const VectorX& by);
 
 /// Hands, per support: where they are, and what they have grasped.
 struct HandsHeld {

@@ -1,5 +1,7 @@
 #include "gradients/parameter_gradient.hpp"
 
+#include "elasticity/elements.hpp"
+#include "model/drawn_frame.hpp"
 #include "model/stencil_numbers.hpp"
 
 namespace withe {
@@ -39,8 +41,12 @@ class Chain {
       out.natural_twist.push_back(VectorX::Zero(p_.natural_twist[r].size()));
       const int first = model.rod_first_edge[r], end = model.rod_first_edge[r + 1];
       out.natural_stretch.push_back(by.stretch_natural.segment(first, end - first));
+      out.drawn_curvature.push_back(MatrixX2::Zero(p_.natural_curvature[r].rows(), 2));
+      out.drawn_twist.push_back(VectorX::Zero(p_.natural_twist[r].size()));
     }
     out.rest_length = by.rest_length;
+    out.edge_turn = by.edge_turn;
+    components_ = by.planar_components;
     out.loads = by.loads;
     out.spring_stiffness = by.spring_stiffness;
     out.spring_rest_length = by.spring_rest_length;
@@ -55,6 +61,9 @@ class Chain {
     add_masses();
     add_stiffnesses();
     add_natural();
+    add_offsets();
+    add_attachments();
+    add_components();
   }
 
   ParameterGradient out;
@@ -162,36 +171,53 @@ class Chain {
     }
   }
 
+  /// What natural strains say of the curvature and twist that they are made of, and of the length.
+  struct ByShape {
+    Vector2 curvature;
+    double twist, length;
+    Vector2 components;  ///< of a plane: by `Model::planar_components`
+  };
+  ByShape by_shape(int rod, const Vector2& curvature, double twist, double voronoi, const Vector3& by) const {
+    using Four = Dual<4>;
+    // Curvatures and lengths enter by their products alone.
+    const Four length = Four::unknown(voronoi, 3);
+    const Vec3<Four> strain =
+        natural_strain(p_.measure, Four::unknown(curvature(0), 0) * length, Four::unknown(curvature(1), 1) * length,
+                       Four::unknown(twist, 2) * length, 1.0);
+    Four sum(0.0);
+    Vector2 components = Vector2::Zero();
+    if (model_.planar()) {
+      const Vector2& c = model_.planar_components[at(rod)];
+      sum = by(0) * (c(0) * strain.x + c(1) * strain.y);
+      components = by(0) * Vector2(strain.x.value, strain.y.value);
+    } else {
+      sum = by(0) * strain.x + by(1) * strain.y + by(2) * strain.z;
+    }
+    return {{sum.slope[0], sum.slope[1]}, sum.slope[2], sum.slope[3], components};
+  }
+
   /// What a stencil's natural strains say of the natural shape that a rod has at one of its own.
   /// Returns what they say of its length.
   double add_shape(int rod, int stencil, double voronoi, const Vector3& by) {
     if (rod < 0 || stencil < 0) return 0.0;
     const auto r = static_cast<std::size_t>(rod);
-    using ByShape = Dual<3>;
-    const Vec3<ByShape> strain = natural_strain(p_.measure, ByShape::unknown(p_.natural_curvature[r](stencil, 0), 0),
-                                                ByShape::unknown(p_.natural_curvature[r](stencil, 1), 1),
-                                                ByShape::unknown(p_.natural_twist[r](stencil), 2), voronoi);
-    ByShape sum(0.0);
-    if (model_.planar())
-      sum = by(0) * (model_.planar_components[r](0) * strain.x + model_.planar_components[r](1) * strain.y);
-    else
-      sum = by(0) * strain.x + by(1) * strain.y + by(2) * strain.z;
-    out.natural_curvature[r](stencil, 0) += sum.slope[0];
-    out.natural_curvature[r](stencil, 1) += sum.slope[1];
-    out.natural_twist[r](stencil) += sum.slope[2];
-    return sum_by_length(r, stencil, voronoi, by);
+    const ByShape found =
+        by_shape(rod, p_.natural_curvature[r].row(stencil), p_.natural_twist[r](stencil), voronoi, by);
+    out.natural_curvature[r].row(stencil) += found.curvature.transpose();
+    out.natural_twist[r](stencil) += found.twist;
+    if (model_.planar()) components_.row(rod) += found.components.transpose();
+    return found.length;
   }
 
-  double sum_by_length(std::size_t r, int stencil, double voronoi, const Vector3& by) const {
-    using ByLength = Dual<1>;
-    const ByLength length = ByLength::unknown(voronoi, 0);
-    // Curvatures and lengths enter by their products alone.
-    const Vec3<ByLength> strain =
-        natural_strain(p_.measure, p_.natural_curvature[r](stencil, 0) * length,
-                       p_.natural_curvature[r](stencil, 1) * length, p_.natural_twist[r](stencil) * length, 1.0);
-    if (!model_.planar()) return (by(0) * strain.x + by(1) * strain.y + by(2) * strain.z).slope[0];
-    const Vector2& c = model_.planar_components[r];
-    return by(0) * (c(0) * strain.x + c(1) * strain.y).slope[0];
+  /// Likewise of the natural shape as it was drawn.
+  double add_drawn_shape(int rod, int stencil, double voronoi, const Vector3& by) {
+    const RodDescription& drawn = model_.description.rods[at(rod)];
+    const ByShape found =
+        by_shape(rod, drawn.natural_curvature.row(stencil), drawn.natural_twist(stencil), voronoi, by);
+    out.drawn_curvature[at(rod)].row(stencil) += found.curvature.transpose();
+    out.drawn_twist[at(rod)](stencil) += found.twist;
+    if (model_.planar()) components_.row(rod) += found.components.transpose();
+    return found.length;
   }
 
   void add_natural() {
@@ -203,16 +229,6 @@ class Chain {
                                            by_.bend_natural.row(bend).transpose());
         for (int edge : model_.bend[at(bend)].edge) out.rest_length(edge) += 0.5 * by_length;
       }
-    for (std::size_t b = 0; b < model_.bend.size(); ++b) {
-      if (model_.bend_owner[b].first >= 0 || model_.bend_owner[b].second < -1) continue;
-      for (int edge : model_.bend[b].edge) {
-        const int rod = model_.edge_rod[at(edge)];
-        const int stencils = static_cast<int>(p_.natural_twist[at(rod)].size());
-        if (stencils == 0) continue;
-        add_shape(rod, edge == model_.rod_first_edge[at(rod)] ? 0 : stencils - 1, 0.5 * model_.edge_arc(edge),
-                  by_.bend_natural.row(static_cast<Eigen::Index>(b)).transpose());
-      }
-    }
     for (std::size_t h = 0; h < model_.half.size(); ++h) {
       const double by_length = add_shape(model_.half_owner[h].first, model_.half_owner[h].second,
                                          model_.half_voronoi(static_cast<Eigen::Index>(h)),
@@ -221,9 +237,87 @@ class Chain {
     }
   }
 
+  /// Across rods natural strains are those of the drawing, and on top what each rod's nearest natural strain, over its
+  /// half of the length, is beyond the one that was drawn.
+  void add_offsets() {
+    if (model_.bend_across.empty()) return;
+    const State drawn = initial_state(model_);
+    Configuration c;
+    compute_configuration(model_, drawn, drawn.q, c);
+    for (int b : model_.bend_across) {
+      const Vector3 by = by_.bend_natural.row(b);
+      add_drawn_strains(b, c, by);
+      if (model_.bend_owner[at(b)].second < -1) continue;
+      for (int edge : model_.bend[at(b)].edge) {
+        const int rod = model_.edge_rod[at(edge)];
+        const int stencils = static_cast<int>(p_.natural_twist[at(rod)].size());
+        if (stencils == 0) continue;
+        const int nearest = edge == model_.rod_first_edge[at(rod)] ? 0 : stencils - 1;
+        const double length = 0.5 * model_.edge_arc(edge);
+        out.rest_length(edge) +=
+            0.5 * (add_shape(rod, nearest, length, by) + add_drawn_shape(rod, nearest, length, -by));
+      }
+    }
+  }
+
+  void add_drawn_strains(int b, const Configuration& drawn, const Vector3& by) {
+    StrainGradients strains;
+    bend_gradients(model_, p_.measure, drawn, b, strains);
+    const int nodes = model_.planar() ? 2 : 4;  // unknowns from one node to the next
+    for (int end = 0; end < 2; ++end) {
+      const int edge = model_.bend[at(b)].edge[end];
+      const EdgeFrame<double>& f = drawn.edge[at(edge)];
+      const double sign = model_.bend[at(b)].sign[end], length = 1.0 / f.inverse_length;
+      for (int s = 0; s < strains.count; ++s) {
+        // A turn w of an edge moves its vector e by w x e, and its directors by w . t.
+        Vector3 by_edge = Vector3::Zero(), turn = by_edge;
+        const double* at_end = strains.gradient[s] + (end == 0 ? 0 : 2 * nodes);
+        for (int i = 0; i < model_.dimension; ++i) by_edge(i) = (end == 0 ? -sign : sign) * at_end[i];
+        if (model_.planar()) {
+          turn = length * (f.tangent.x * by_edge(1) - f.tangent.y * by_edge(0)) * model_.plane->normal;
+        } else {
+          const Vector3 t = to_eigen(f.tangent);
+          turn = length * t.cross(by_edge) + strains.gradient[s][3 + 4 * end] * t;
+        }
+        out.edge_turn.row(edge) += by(s) * turn.transpose();
+      }
+    }
+  }
+
+  void add_attachments() {
+    for (std::size_t h = 0; h < model_.half.size(); ++h) {
+      const Vector3 by = by_.attachment.row(static_cast<Eigen::Index>(h));
+      if (by.isZero(0.0)) continue;
+      const FrameStencil& half = model_.half[h];
+      const int r = model_.edge_rod[at(half.edge)], first = model_.rod_first_edge[at(r)];
+      const RodDescription& rod = model_.description.rods[at(r)];
+      const int node = (half.edge - first + (half.frame_first ? 0 : 1)) % static_cast<int>(rod.nodes.size());
+      const FrameEdges edges = frame_edges(rod, first, node);
+      const DrawnFrameSlopes slopes =
+          drawn_frame_slopes(edges, drawn_edge_frame(model_, edges.before), drawn_edge_frame(model_, edges.after),
+                             model_.edge_length(edges.before), model_.edge_length(edges.after));
+      out.edge_turn.row(edges.before) += by.transpose() * slopes.before;
+      out.edge_turn.row(edges.after) += by.transpose() * slopes.after;
+      out.rest_length(edges.before) += by.dot(slopes.length0);
+      out.rest_length(edges.after) += by.dot(slopes.length1);
+    }
+  }
+
+  /// Components (d2 . n, -d1 . n) of a plane's normal, of a rod's first edge: they change as its directors turn about
+  /// it.
+  void add_components() {
+    for (Eigen::Index r = 0; r < components_.rows(); ++r) {
+      const Vector2& c = model_.planar_components[static_cast<std::size_t>(r)];
+      const int edge = model_.rod_first_edge[static_cast<std::size_t>(r)];
+      out.edge_turn.row(edge) +=
+          (components_(r, 0) * c(1) - components_(r, 1) * c(0)) * drawn_edge_frame(model_, edge).col(2).transpose();
+    }
+  }
+
   const Model& model_;
   const Parameters& p_;
   const CoefficientAdjoint& by_;
+  MatrixX2 components_;  ///< by `Model::planar_components`
 };
 
 }  // namespace

@@ -20,9 +20,15 @@ struct ParameterGradient {
   MatrixX2 obstacle_friction, pair_friction;
   MatrixX6 hand_stiffness;  ///< per support, see `HandDescription`
   VectorX hand_limit;
-  /// Per edge, of rods without joints and fluids that are no chords of arcs: by its rest length, and so by lengths of
-  /// stencils, masses and drag, at fixed natural curvature and twist [1/m].
+  /// Per edge, of rods outside of fluids that are no chords of arcs: by its rest length, and so by lengths of stencils,
+  /// masses, drag and loads along it, at fixed natural curvature and twist [1/m].
   VectorX rest_length;
+  /// Per edge, by how its frame is turned in the drawing, a rotation vector: by what joints and clamps attach, strains
+  /// that a drawing has where rods meet, and loads that follow, at the same natural shape [1/rad].
+  MatrixX3 edge_turn;
+  /// By the natural shapes that were drawn, as far as what was drawn where rods meet is counted from them.
+  std::vector<MatrixX2> drawn_curvature;
+  std::vector<VectorX> drawn_twist;
 };
 
 ParameterGradient parameter_gradient(const Model& model, const Parameters& parameters, const CoefficientAdjoint& by);

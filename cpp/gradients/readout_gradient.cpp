@@ -1,9 +1,10 @@
 #include "gradients/readout_gradient.hpp"
 
 #include "common/check.hpp"
-#include "geometry/rotation.hpp"
+#include "model/drawn_frame.hpp"
 #include "model/edge_vectors.hpp"
 #include "model/stencil_numbers.hpp"
+#include "steps/regular_stencils.hpp"
 
 namespace withe {
 namespace {
@@ -87,6 +88,7 @@ class Readouts {
     const Matrix3 now = edge_directors(model_, c_, e);
     const Vector3 d1 = now.col(0), d2 = now.col(1), t = now.col(2), n = model_.plane->normal;
     const double by = by1.dot(n.cross(d1)) + by2.dot(n.cross(d2)) + by_t.dot(n.cross(t));
+    by_.edge_turn.row(e) += (by1.dot(d2) - by2.dot(d1)) * drawn_edge_frame(model_, e).col(2).transpose();
     const Vector2 way = by * f.inverse_length * Vector2(-f.tangent.y, f.tangent.x);
     out_.q.segment<2>(model_.head_dof[at(e)]) += way;
     out_.q.segment<2>(model_.tail_dof[at(e)]) -= way;
@@ -107,18 +109,44 @@ class Readouts {
                   by_twist / voronoi);
       return;
     }
-    double length = 0.0;
-    for (int h : place.half)
+    add_halves(rod, stencil, place.half, by_curvature, by_twist);
+  }
+
+  /// Of a frame: the mean over both halves, by their lengths V, of k0 (1 - V / C) + S / C, and the sum of twists tau
+  /// over both lengths. What a half carries is a fixed part of its edge.
+  void add_halves(int rod, int stencil, const int (&halves)[2], const Vector2& by_curvature, double by_twist) {
+    const Vector2 natural = p_.natural_curvature[at(rod)].row(stencil);
+    StrainGradients strains;
+    double length = 0.0, by_sum = 0.0;
+    for (int h : halves)
       if (h >= 0) length += model_.half_voronoi(h);
-    for (int h : place.half) {
+    for (int h : halves) {
       if (h < 0) continue;
-      const double voronoi = model_.half_voronoi(h);
-      const double carried = model_.half_share(h) * model_.edge_arc(model_.half[at(h)].edge);
+      const int edge = model_.half[at(h)].edge;
+      const double voronoi = model_.half_voronoi(h), carried = model_.half_share(h) * model_.edge_arc(edge);
       half_gradients(model_, state_.q, kPlain, c_, h, strains);
-      const Vector2 part = (voronoi / length) * by_curvature;
-      add_strains(assembler_.half, h, strains, by_strains(rod, stencil, strains, voronoi, carried, part),
-                  by_twist / length);
+      const Vector2 turn = voronoi * smooth_curvature(discrete_curvature(rod, strains), voronoi);
+      const double twisted = model_.planar() ? 0.0 : strains.strain[2], beyond = voronoi / carried;
+      by_sum += by_curvature.dot(voronoi * (1.0 - beyond) * natural + beyond * turn) + by_twist * twisted;
+      by_.rest_length(edge) += 0.5 / length * (1.0 - beyond) * by_curvature.dot(natural);
+      const Vector2 part = (voronoi / length) * by_curvature,
+                    by = by_strains(rod, stencil, strains, voronoi, carried, part);
+      add_strains(assembler_.half, h, strains, by, by_twist / length);
+      add_attachment(h, strains, by, by_twist / length);
     }
+    for (int h : halves)
+      if (h >= 0) by_.rest_length(model_.half[at(h)].edge) -= 0.5 / (length * length) * by_sum;
+  }
+
+  void add_attachment(int h, const StrainGradients& strains, const Vector2& by, double by_tau) {
+    auto out = by_.attachment.row(h);
+    if (model_.planar()) {
+      out += by(0) * strains.gradient[0][4] * model_.plane->normal.transpose();
+      return;
+    }
+    const auto spin = [&](int s) { return Eigen::Map<const Vector3>(strains.gradient[s] + 7); };
+    const Vector3 sum = by(0) * spin(0) + by(1) * spin(1) + by_tau * spin(2);
+    out += (attached_axes(model_, c_, state_.q, h).transpose() * sum).transpose();
   }
 
   /// Towards both directors.
@@ -148,9 +176,10 @@ class Readouts {
                      const Vector2& by) {
     const double beyond = voronoi / carried;
     by_.natural_curvature[at(rod)].row(stencil) += (1.0 - beyond) * by.transpose();
-    Vector2 out = by_discrete(discrete_curvature(rod, strains), voronoi, beyond * by);
-    if (model_.planar()) out = {model_.planar_components[at(rod)].dot(out), 0.0};
-    return out;
+    const Vector2 out = by_discrete(discrete_curvature(rod, strains), voronoi, beyond * by);
+    if (!model_.planar()) return out;
+    by_.planar_components.row(rod) += strains.strain[0] * out.transpose();
+    return {model_.planar_components[at(rod)].dot(out), 0.0};
   }
 
   void add_strains(const ElementTable& table, int element, const StrainGradients& strains, const Vector2& by,

@@ -359,14 +359,8 @@ InitialGradient Tape::gradient(const std::vector<MomentAdjoint>& given, const Pa
   const std::vector<HandPose> hands = poses_of(first);
   PoseAdjoint poses = by_poses(model_, first.q, adjoint.q, adjoint.hands, {hands, first.hands});
   poses.obstacles = by_places(model_, adjoint.obstacles);
-  VectorX spins = VectorX::Zero(model_.planar() ? 0 : model_.edge_count);
   drawn += adjoint.q;
-  for (Eigen::Index e = 0; e < spins.size(); ++e) {
-    const int angle = model_.edge_dof[static_cast<std::size_t>(e)];
-    spins(e) = adjoint.q(angle);
-    drawn(angle) -= spins(e);
-  }
-  return {at_nodes(model_, adjoint.q), at_nodes(model_, adjoint.v), std::move(poses), std::move(spins),
+  return {at_nodes(model_, adjoint.q), at_nodes(model_, adjoint.v), std::move(poses),
           by_drawing(model_, first.q, drawn)};
 }
 

@@ -19,9 +19,7 @@ struct InitialGradient {
   MatrixX3 positions;   ///< per node [1/m]; directors turn along with their edges, without spin
   MatrixX3 velocities;  ///< per node [s/m]
   PoseAdjoint poses;    ///< by where what supports hold was, and obstacles
-  VectorX spins;        ///< per edge, by how its directors were turned about it [1/rad]
-  /// By what supports hold as it was drawn, and the state with it, but for `spins`; where no support moves.
-  DrawnAdjoint drawn;
+  DrawnAdjoint drawn;   ///< by a drawing in which the run began; where no support moves
 };
 
 /// Takes derivatives of a scalar by what acted from a step on until the next that it is given; or by what a read-out at

@@ -5,6 +5,7 @@
 #include "common/check.hpp"
 #include "geometry/curvature.hpp"
 #include "geometry/rotation.hpp"
+#include "model/drawn_frame.hpp"
 #include "model/hands.hpp"
 #include "model/layout.hpp"
 #include "model/model.hpp"
@@ -47,22 +48,9 @@ class Builder {
   int edges_of(int r) const { return static_cast<int>(rod(r).nodes.size()) - (rod(r).closed ? 0 : 1); }
   int first_edge(int r) const { return model_.rod_first_edge[static_cast<std::size_t>(r)]; }
   int global_node(RodPass pass) const { return rod(pass.rod).nodes[static_cast<std::size_t>(pass.node)]; }
-  /// Edges that arrive at and leave a node of a rod; -1 where there is none.
-  std::pair<int, int> edges_at(RodPass pass) const {
-    const int n = edges_of(pass.rod), first = first_edge(pass.rod);
-    const int in = pass.node > 0 ? pass.node - 1 : rod(pass.rod).closed ? n - 1 : -1;
-    const int out = pass.node < n ? pass.node : -1;
-    return {in < 0 ? -1 : first + in, out < 0 ? -1 : first + out};
-  }
-  Matrix3 drawn_frame(int edge) const {
-    const auto e = static_cast<std::size_t>(edge);
-    const Vector3 t = to_eigen(model_.initial_tangent[e]), d1 = to_eigen(model_.initial_director[e]);
-    Matrix3 frame;
-    frame << d1, t.cross(d1), t;
-    return frame;
-  }
+  EdgesAtNode edges_at(RodPass pass) const { return edges_at_node(rod(pass.rod), first_edge(pass.rod), pass.node); }
   EdgeFrame<double> strain_frame(int edge, int sign) const {
-    const Matrix3 f = drawn_frame(edge);
+    const Matrix3 f = drawn_edge_frame(model_, edge);
     const double s = sign;
     return {to_vec3(s * f.col(2)), to_vec3(f.col(0)), to_vec3(s * f.col(1)), 1.0, {}, {}};
   }
@@ -102,7 +90,7 @@ class Builder {
     model_.length_scale = longest;
     if (!model_.planar()) return;
     for (std::size_t r = 0; r < scene_.rods.size(); ++r) {
-      const Matrix3 f = drawn_frame(model_.rod_first_edge[r]);
+      const Matrix3 f = drawn_edge_frame(model_, model_.rod_first_edge[r]);
       const Vector3& n = model_.plane->normal;
       model_.planar_components.emplace_back(f.col(1).dot(n), -f.col(0).dot(n));
     }
@@ -172,15 +160,15 @@ class Builder {
   bool continues(const Cluster& c) const {
     if (c.passes.size() != 2 || c.form != JointForm::frame) return false;
     const auto [a, b] = ordered(c);
-    const int in = edges_at(a).first, out = edges_at(b).second;
-    if (in < 0 || out < 0 || edges_at(a).second >= 0 || edges_at(b).first >= 0) return false;
+    const int in = edges_at(a).in, out = edges_at(b).out;
+    if (in < 0 || out < 0 || edges_at(a).out >= 0 || edges_at(b).in >= 0) return false;
     // A stencil across a drawn corner would be stiffer by 1 / cos^4 of half its angle, so corners get a frame.
     constexpr double kSmooth = 1e-2;
     return rotation_log(drawn_frame_at(b) * drawn_frame_at(a).transpose()).norm() < kSmooth;
   }
   std::pair<RodPass, RodPass> ordered(const Cluster& c) const {
     const RodPass a = c.passes[0], b = c.passes[1];
-    return edges_at(a).first >= 0 ? std::pair{a, b} : std::pair{b, a};
+    return edges_at(a).in >= 0 ? std::pair{a, b} : std::pair{b, a};
   }
 
   void add_frames() {
@@ -200,20 +188,10 @@ class Builder {
       if (cluster.hinge >= 0) cluster.frame = model_.hinges[static_cast<std::size_t>(cluster.hinge)].frame;
   }
 
-  /// Frame of the rod at a node, extrapolated by half an edge from how it was drawn: columns d1, d2, t.
   Matrix3 drawn_frame_at(RodPass pass) const {
-    auto [in, out] = edges_at(pass);
-    const int n = edges_of(pass.rod), first = first_edge(pass.rod);
-    const bool start = in < 0;
-    if (start && n > 1) in = out, out = first + 1;
-    if (out < 0 && n > 1) out = in, in = first + n - 2;
-    if (in < 0 || out < 0) return drawn_frame(start ? out : in);
-    const Matrix3 a = drawn_frame(in), b = drawn_frame(out);
-    const Vector3 turn = rotation_log(b * a.transpose());
-    const double la = model_.edge_length(in), lb = model_.edge_length(out);
-    if (start) return rotation_exp(-turn * (la / (la + lb))) * a;
-    if (pass.node == n && !rod(pass.rod).closed) return rotation_exp(turn * (lb / (la + lb))) * b;
-    return rotation_exp(turn * (la / (la + lb))) * a;
+    const FrameEdges edges = frame_edges(rod(pass.rod), first_edge(pass.rod), pass.node);
+    return drawn_frame(edges, drawn_edge_frame(model_, edges.before), drawn_edge_frame(model_, edges.after),
+                       model_.edge_length(edges.before), model_.edge_length(edges.after));
   }
 
   void add_half(const Cluster& cluster, RodPass pass, int edge, bool frame_first) {
@@ -273,7 +251,7 @@ class Builder {
         add_pairs(cluster);
       } else {
         const auto [a, b] = ordered(cluster);
-        add_bend(edges_at(a).first, edges_at(b).second, 1, 1, {-1, -1}, true);
+        add_bend(edges_at(a).in, edges_at(b).out, 1, 1, {-1, -1}, true);
       }
     }
     model_.bend_voronoi = to_vector(bend_voronoi_);

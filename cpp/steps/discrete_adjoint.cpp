@@ -3,6 +3,25 @@
 #include "steps/discrete_adjoint.hpp"
 
 namespace withe {
+namespace {
+
+/// By how what is attached to the frame of a half stencil is turned.
+void add_attachment(const StepProblem& problem, const StepData& data, const Assembler& assembler,
+                    const DiscreteAdjoint& discrete, int h, CoefficientAdjoint& by) {
+  const Model& model = problem.model;
+  double rows[kMaxLocal] = {};
+  gather(assembler.half, h, discrete.rows(), rows);
+  const auto add = [&](const DiscreteStep& way, const Configuration& c, const VectorX& q) {
+    const Eigen::Matrix<double, kMaxLocal, 3> by_spin =
+        discrete_half_spin(model, half_coefficients(problem.elastic, h), way, h);
+    by.attachment.row(h) +=
+        Eigen::Map<const Eigen::Matrix<double, 1, kMaxLocal>>(rows) * by_spin * attached_axes(model, c, q, h);
+  };
+  add(discrete.forth(), data.end_configuration, data.end);
+  add(discrete.backwards(), problem.start_configuration, problem.start->q);
+}
+
+}  // namespace
 
 void ElasticForces::add_discrete_adjoint(const StepProblem& problem, const StepData& data, const Assembler& assembler,
                                          StepAdjoint& adjoint) const {
@@ -55,6 +74,7 @@ void ElasticForces::add_discrete_adjoint(const StepProblem& problem, const StepD
           discrete_half_local(model, of, way, h, with_matrix, out);
         },
         by.half_stiffness, by.half_natural);
+    add_attachment(problem, data, assembler, discrete, h, by);
   }
 }
 

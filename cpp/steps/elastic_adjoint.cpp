@@ -170,6 +170,57 @@ void add_regular(const StepProblem& problem, const StepData& data, const Assembl
   if (middle) add(data.end_configuration, end, 1.0, -1.0, adjoint.end_turn);
 }
 
+/// How turns of a half stencil's frame enter, beyond its unknowns, and those of what is attached to it.
+void add_half_turns(const StepProblem& problem, const StepData& data, int h, const StencilAdjoint& part,
+                    StepAdjoint& adjoint) {
+  const Model& model = problem.model;
+  const ElasticCoefficients& kv = problem.viscous;
+  const bool viscous = problem.viscous_acts(), middle = problem.in_middle(), planar = model.planar();
+  const int frame = model.half[at(h)].frame, first = planar ? 4 : 7, count = model.frame_size();
+  const ElasticCoefficients& acting = problem.conserves_energy() ? data.viscous : acting_coefficients(problem, data);
+  Local local;
+  half_local(model, data.z, half_coefficients(acting, h), data.configuration, h, true, local);
+  Vector3 spin = Vector3::Zero(), start = spin, end = spin;
+  const auto& rows = part.rows();
+  for (int i = 0; i < count; ++i) {
+    for (int r = 0; r < (planar ? 5 : kMaxLocal); ++r) spin(i) += rows[r] * local.hessian[r][first + i];
+    for (int s = 0; viscous && s < part.middle.count; ++s) {
+      const double factor = kv.half_stiffness(h, s) * part.along(s);
+      if (!middle) {
+        start(i) -= factor * part.start.gradient[s][first + i];
+        continue;
+      }
+      spin(i) -= factor * part.middle.gradient[s][first + i];
+      start(i) -= 0.5 * factor * part.start.gradient[s][first + i];
+      end(i) += 0.5 * factor * part.end.gradient[s][first + i];
+    }
+  }
+  auto attachment = adjoint.coefficients.attachment.row(h);
+  if (planar) {
+    attachment += (spin(0) + start(0) + end(0)) * model.plane->normal.transpose();
+    return;
+  }
+  const int dof = model.frame_dof[at(frame)];
+  const Vector3 w = data.z.segment<3>(dof);
+  const Matrix3 back = cayley_spin(w).transpose().inverse();
+  const Vector3 moment = back * Eigen::Map<const Vector3>(local.gradient + 7);
+  spin = back * (spin - cayley_moment_slope(w, moment).transpose() * Eigen::Map<const Vector3>(rows + 7));
+  if (middle && viscous) end = cayley_spin(data.end.segment<3>(dof)).transpose().inverse() * end;
+  if (problem.moves()) {
+    adjoint.middle_spin.row(frame) += spin.transpose();
+    adjoint.start_spin.row(frame) += start.transpose();
+    adjoint.end_spin.row(frame) += end.transpose();
+  }
+  const int hinge = model.half[at(h)].hinge;
+  // A hinge's axis goes with the frame, not with what is attached.
+  if (hinge >= 0) spin -= rows[10] * (data.configuration.frame[at(frame)] * model.hinges[at(hinge)].axis).cross(moment);
+  attachment += (attached_axes(model, data.configuration, data.z, h).transpose() * spin).transpose();
+  if (!viscous) return;
+  attachment +=
+      (attached_axes(model, problem.start_configuration, problem.start->q, h).transpose() * start).transpose();
+  if (middle) attachment += (attached_axes(model, data.end_configuration, data.end, h).transpose() * end).transpose();
+}
+
 }  // namespace
 
 void ElasticForces::add_adjoint(const StepProblem& problem, const StepData& data, const Assembler& assembler,
@@ -221,37 +272,7 @@ void ElasticForces::add_half_adjoint(const StepProblem& problem, const StepData&
     }
     part.angles = half_angles(model, h);
     part.add_turning(numbers, kv.half_stiffness);
-    if (model.planar() || !problem.moves() || (!elastic && !viscous)) continue;
-    // How the frame's turns enter, beyond its unknowns.
-    const int frame = model.half[at(h)].frame;
-    const Vector3 w = data.z.segment<3>(model.frame_dof[at(frame)]);
-    Local local;
-    const ElasticCoefficients& acting = elastic ? acting_coefficients(problem, data) : data.viscous;
-    half_local(model, data.z, half_coefficients(acting, h), data.configuration, h, true, local);
-    Vector3 spin = Vector3::Zero(), start = spin, end = spin;
-    const auto& rows = part.rows();
-    for (int i = 0; i < 3; ++i) {
-      for (int r = 0; r < kMaxLocal; ++r) spin(i) += rows[r] * local.hessian[r][7 + i];
-      for (int s = 0; viscous && s < part.middle.count; ++s) {
-        const double factor = kv.half_stiffness(h, s) * part.along(s);
-        if (!middle) {
-          start(i) -= factor * part.start.gradient[s][7 + i];
-          continue;
-        }
-        spin(i) -= factor * part.middle.gradient[s][7 + i];
-        start(i) -= 0.5 * factor * part.start.gradient[s][7 + i];
-        end(i) += 0.5 * factor * part.end.gradient[s][7 + i];
-      }
-    }
-    const Matrix3 J = cayley_spin(w);
-    const Vector3 moment = J.transpose().inverse() * Eigen::Map<const Vector3>(local.gradient + 7);
-    spin -= cayley_moment_slope(w, moment).transpose() * Eigen::Map<const Vector3>(rows + 7);
-    adjoint.middle_spin.row(frame) += (J.transpose().inverse() * spin).transpose();
-    adjoint.start_spin.row(frame) += start.transpose();
-    if (middle && viscous) {
-      const Matrix3 at_end = cayley_spin(data.end.segment<3>(model.frame_dof[at(frame)]));
-      adjoint.end_spin.row(frame) += (at_end.transpose().inverse() * end).transpose();
-    }
+    if (elastic || viscous) add_half_turns(problem, data, h, part, adjoint);
   }
 }
 

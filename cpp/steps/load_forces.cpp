@@ -1,9 +1,22 @@
 #include "steps/load_forces.hpp"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <stdexcept>
 
 namespace withe {
+namespace {
+
+/// By the drawn edge that a piece goes by, `by` being that by its value: what follows keeps its components towards the
+/// drawn directors.
+void add_drawn(const StepProblem& problem, const LoadPiece& piece, const Vector3& by, CoefficientAdjoint& out) {
+  const Vector3 value = problem.parameters->loads.row(piece.load);
+  if (piece.along) out.rest_length(piece.edge) += by.dot(value) / problem.model.edge_arc(piece.edge);
+  const bool follows = piece.shape == LoadShape::follower || piece.follower;
+  if (follows && piece.edge >= 0) out.edge_turn.row(piece.edge) += by.cross(value).transpose();
+}
+
+}  // namespace
 
 LoadForces::LoadForces(const Model& model, const Loads& loads)
     : has_potential_(std::all_of(loads.pieces.begin(), loads.pieces.end(),
@@ -46,11 +59,13 @@ void LoadForces::add_adjoint(const StepProblem& problem, const StepData& data, c
     if (piece.load < 0) continue;
     const ElementTable& table = tables_[k];
     gather(table, 0, adjoint.rows, rows);
+    Vector3 by = Vector3::Zero();
     for (int axis = 0; axis < 3; ++axis) {
       load_local(problem.model, *problem.start, data.z, data.configuration, piece, Vector3::Unit(axis), local);
-      for (int i = 0; i < table.width(); ++i)
-        adjoint.coefficients.loads(piece.load, axis) += rows[i] * local.gradient[i];
+      for (int i = 0; i < table.width(); ++i) by(axis) += rows[i] * local.gradient[i];
     }
+    adjoint.coefficients.loads.row(piece.load) += by.transpose();
+    add_drawn(problem, piece, by, adjoint.coefficients);
     if (piece.shape == LoadShape::frame_moment && piece.follower && !problem.model.planar() && problem.moves())
       throw std::invalid_argument("no gradient of a motion is known through a moment that follows a joint");
   }

@@ -2,6 +2,7 @@
 /// What derivatives of elastic forces are taken with: ordinary stencils for the kernels, and where angles are.
 
 #include "elasticity/stencil_kernels.hpp"
+#include "geometry/rotation.hpp"
 #include "steps/elastic_forces.hpp"
 
 namespace withe {
@@ -15,6 +16,16 @@ inline Angles bend_angles(const Model& model, int b) {
 }
 inline Angles half_angles(const Model& model, int h) {
   return model.planar() ? Angles{} : Angles{1, {3, 0}, {model.half[at(h)].edge, 0}};
+}
+
+/// A turn of what is attached to a half stencil's frame, by a rotation vector in the axes of the drawn scene, in those
+/// of a configuration with unknowns q: through the frame's turn and its hinge's.
+inline Matrix3 attached_axes(const Model& model, const Configuration& c, const VectorX& q, int h) {
+  if (model.planar()) return Matrix3::Identity();
+  const FrameStencil& half = model.half[at(h)];
+  if (half.hinge < 0) return c.frame[at(half.frame)];
+  const Hinge& hinge = model.hinges[at(half.hinge)];
+  return c.frame[at(half.frame)] * rotation_exp(q(hinge.dof) * hinge.axis);
 }
 
 /// Strains f (kappa1, kappa2, tau) of all stencils.

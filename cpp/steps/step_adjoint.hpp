@@ -29,7 +29,11 @@ struct CoefficientAdjoint {
   MatrixX6 hand_stiffness;                  ///< per support, see `HandDescription` [m/N], [rad/(N m)]
   VectorX hand_limit;                       ///< per support [1/N]
   std::vector<MatrixX2> natural_curvature;  ///< per rod and stencil, by the smooth one, where it is read out [m]
-  VectorX rest_length;                      ///< per edge, by that in the axial strain, and where it is read out [1/m]
+  VectorX rest_length;  ///< per edge, by that in the axial strain, in loads along rods, and where it is read out [1/m]
+  /// By rotation vectors [1/rad], in the axes of the drawn scene: per half stencil, by how what is attached to its
+  /// frame is turned there; per edge, by its frame as it was drawn, as far as nothing above follows from that.
+  MatrixX3 attachment, edge_turn;
+  MatrixX2 planar_components;  ///< per rod, by `Model::planar_components`
 
   explicit CoefficientAdjoint(const Model& model, Eigen::Index load_rows)
       : stretch_stiffness(VectorX::Zero(model.edge_count)),
@@ -55,7 +59,10 @@ struct CoefficientAdjoint {
         pair_friction(rows_of_two(model.description.contact.pairs.size())),
         hand_stiffness(MatrixX6::Zero(static_cast<Eigen::Index>(model.supports.size()), 6)),
         hand_limit(VectorX::Zero(static_cast<Eigen::Index>(model.supports.size()))),
-        rest_length(VectorX::Zero(model.edge_count)) {
+        rest_length(VectorX::Zero(model.edge_count)),
+        attachment(MatrixX3::Zero(half_stiffness.rows(), 3)),
+        edge_turn(MatrixX3::Zero(model.edge_count, 3)),
+        planar_components(rows_of_two(model.planar_components.size())) {
     for (const auto& places : model.place) natural_curvature.push_back(rows_of_two(places.size()));
   }
 

@@ -47,6 +47,16 @@ const Plan& World::plan() const {
   if (!implementation_->plan_current) implementation_->make_plan();
   return implementation_->plan;
 }
+bool World::frames_as_drawn() const {
+  constexpr double kNear = 1e-9;
+  const Model& model = implementation_->model;
+  const State& state = implementation_->state;
+  for (int f = 0; f < model.frame_count; ++f)
+    if (!frame_rotation(model, state, f).isIdentity(kNear)) return false;
+  return std::all_of(model.hinges.begin(), model.hinges.end(),
+                     [&](const Hinge& hinge) { return std::abs(state.q(hinge.dof)) < kNear; });
+}
+
 std::optional<Vector3> World::plane_normal() const {
   const Model& model = implementation_->model;
   if (!model.planar()) return std::nullopt;

@@ -176,6 +176,8 @@ class World {
   const Plan& plan() const;
   /// Normal of the plane that the scene moves in, if it does.
   std::optional<Vector3> plane_normal() const;
+  /// Whether frames of joints and clamps, and hinges on them, are turned as they were drawn, within 1e-9.
+  bool frames_as_drawn() const;
   const Statistics& statistics() const;
   double time() const;
 

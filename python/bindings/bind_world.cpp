@@ -34,14 +34,17 @@ void register_gradients(py::module_& module) {
       .def_readonly("slip_tolerance", &ParameterGradient::slip_tolerance)
       .def_readonly("obstacle_friction", &ParameterGradient::obstacle_friction)
       .def_readonly("pair_friction", &ParameterGradient::pair_friction)
-      .def_readonly("rest_length", &ParameterGradient::rest_length);
+      .def_readonly("rest_length", &ParameterGradient::rest_length)
+      .def_readonly("edge_turn", &ParameterGradient::edge_turn)
+      .def_readonly("drawn_curvature", &ParameterGradient::drawn_curvature)
+      .def_readonly("drawn_twist", &ParameterGradient::drawn_twist);
   py::class_<EquilibriumGradient>(module, "EquilibriumGradient", "Derivatives of a scalar of an equilibrium.")
       .def_readonly("parameters", &EquilibriumGradient::parameters)
       .def_property_readonly("support_positions", [](const EquilibriumGradient& g) { return g.poses.positions; })
       .def_property_readonly("support_rotations", [](const EquilibriumGradient& g) { return g.poses.rotations; })
       .def_property_readonly("obstacle_positions", [](const EquilibriumGradient& g) { return g.poses.obstacles; })
-      .def_property_readonly("held_nodes", [](const EquilibriumGradient& g) { return g.drawn.nodes; })
-      .def_property_readonly("held_spins", [](const EquilibriumGradient& g) { return g.drawn.spins; });
+      .def_property_readonly("drawn_nodes", [](const EquilibriumGradient& g) { return g.drawn.nodes; })
+      .def_property_readonly("edge_turn", [](const EquilibriumGradient& g) { return g.drawn.edge_turn; });
   py::class_<PoseAdjoint>(module, "PoseAdjoint", "Derivatives of a scalar by poses of supports and obstacles.")
       .def_readonly("positions", &PoseAdjoint::positions)
       .def_readonly("rotations", &PoseAdjoint::rotations)
@@ -53,9 +56,8 @@ void register_gradients(py::module_& module) {
       .def_readonly("positions", &InitialGradient::positions)
       .def_readonly("velocities", &InitialGradient::velocities)
       .def_readonly("poses", &InitialGradient::poses)
-      .def_readonly("spins", &InitialGradient::spins)
-      .def_property_readonly("held_nodes", [](const InitialGradient& g) { return g.drawn.nodes; })
-      .def_property_readonly("held_spins", [](const InitialGradient& g) { return g.drawn.spins; });
+      .def_property_readonly("drawn_nodes", [](const InitialGradient& g) { return g.drawn.nodes; })
+      .def_property_readonly("edge_turn", [](const InitialGradient& g) { return g.drawn.edge_turn; });
   py::class_<RunJacobian>(module, "RunJacobian", "Derivatives of the state that a run leads to.")
       .def_readonly("state", &RunJacobian::state)
       .def_readonly("rows", &RunJacobian::rows);
@@ -395,6 +397,8 @@ void define_supports(WorldClass& world) {
 void define_readouts(WorldClass& world) {
   world.def_property_readonly("time", [](const GuardedWorld& self) { return self.reading().time(); });
   world.def_property_readonly("plan", [](const GuardedWorld& self) { return self.reading().plan(); });
+  world.def_property_readonly("frames_as_drawn",
+                              [](const GuardedWorld& self) { return self.reading().frames_as_drawn(); });
   world.def_property_readonly("plane_normal", [](const GuardedWorld& self) { return self.reading().plane_normal(); });
   world.def_property_readonly("statistics", [](const GuardedWorld& self) { return self.reading().statistics(); });
   world.def("positions", [](const GuardedWorld& self) { return self.reading().positions(); });

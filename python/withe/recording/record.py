@@ -96,8 +96,9 @@ class Record:
             "friction" of an obstacle or, ``((arm, floor), "friction")``, of two bodies with one of their own, that of
             rods with each other, "friction", and "slip_tolerance". By "position" and "rotation" of a support, and by
             "position" of an obstacle: as if it were elsewhere by the same all the while, from the start of the run on,
-            where all that is free begins as it does. By "points" of a rod: as if the scene were built anew and run;
-            it must begin as it was drawn. May be empty where ``calls`` are what is wanted.
+            where all that is free begins as it does. By "points" of a rod, and with them the ends of others that are
+            joined there: as if the scene were built anew and run; it must begin as it was drawn. May be empty where
+            ``calls`` are what is wanted.
 
         Returns
         -------

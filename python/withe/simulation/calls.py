@@ -194,6 +194,10 @@ class _Epoch:
         """How much each call has in a natural shape at a time."""
         return self.ramps[key].at(time) if key in self.ramps else {-1: 1.0}
 
+    def share_of_start(self, key: _Key, time: float) -> float:
+        """How much of what a word had at the start of the run acts at a time."""
+        return 0.0 if key in self.live else self.weights(key, time).get(-1, 0.0)
+
     def arrays(self, rod: RodPart, word: str, *, initial: bool) -> set[str]:
         """Those of a rod that depend on a word as it was set, or as it was at the start of the run."""
         return {
@@ -259,8 +263,7 @@ class Ledger:
             value = self._of_start(epoch, unknown, reader, time, found)
             self.sums[place] = value if self.sums[place] is None else self.sums[place] + value
         for nodes in self._drawn:
-            shares = (epoch.weights((nodes.rod, word), time) for word in ("natural_curvature", "natural_twist"))
-            nodes.add(found, *(weights.get(-1, 0.0) for weights in shares))
+            nodes.add(found, lambda name, word: epoch.share_of_start((name, word), time))
         for key in epoch.live:
             self._add_live(epoch, key, found)
         for key, ramp in epoch.ramps.items():

@@ -9,8 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe import _core
-from withe.common import drawing
-from withe.parts.kinds import FluidPart, JoinPart, ObstaclePart, RodPart, SpringPart, SupportPart
+from withe.parts.kinds import FluidPart, RodPart, SpringPart
 from withe.parts.rods import redrawn
 from withe.simulation.session import Session
 
@@ -34,6 +33,8 @@ class Moment:
         Rod by rod.
     supports : dict
         Place and rotation of each, by its index.
+    frames_as_drawn : bool
+        Whether joints and clamps are turned as they were drawn.
     """
 
     positions: FloatArray
@@ -41,6 +42,7 @@ class Moment:
     natural_curvature: list[FloatArray]
     natural_twist: list[FloatArray]
     supports: dict[int, tuple[FloatArray, FloatArray]]
+    frames_as_drawn: bool
 
     @classmethod
     def now(cls, session: Session) -> Moment:
@@ -55,12 +57,17 @@ class Moment:
                 index: (np.array(world.support_position(index)), np.array(world.support_rotation(index)))
                 for index, _ in session.settings.supports.values()
             },
+            world.frames_as_drawn,
         )
 
 
-def points_reader(session: Session, part: RodPart, first: int) -> Callable[[_core.EquilibriumGradient], FloatArray]:
-    """Reads derivatives of equilibria by drawn nodes, (nodes, 3) [1/m], of a rod whose edges begin with `first`."""
-    nodes = DrawnNodes(session, part, first, Moment.now(session))
+Share = Callable[[str, str], float]
+"""How much of what was drawn is in the value that a word of a part has: 1, or less once it is set."""
+
+
+def points_reader(session: Session, part: RodPart) -> Callable[[_core.EquilibriumGradient], FloatArray]:
+    """Reads derivatives of equilibria by drawn nodes, (nodes, 3) [1/m], of a rod."""
+    nodes = DrawnNodes(session, part, Moment.now(session))
 
     def read(g: _core.EquilibriumGradient) -> FloatArray:
         nodes.add(g.parameters)
@@ -70,150 +77,173 @@ def points_reader(session: Session, part: RodPart, first: int) -> Callable[[_cor
 
 
 class DrawnNodes:
-    """Derivatives by drawn nodes, from those by rest lengths, natural shape, and what supports hold.
+    """Derivatives by drawn nodes, from those by rest lengths, natural shape, and how edges are turned.
 
-    How these follow from the nodes is geometry alone, whose differences are taken.
+    How these follow from the nodes is geometry alone, whose differences are taken. Rods that are joined to the rod have
+    nodes of it, and are drawn anew with these.
     """
 
-    def __init__(self, session: Session, part: RodPart, first: int, begin: Moment, *, run: bool = False) -> None:
+    def __init__(self, session: Session, part: RodPart, begin: Moment, *, run: bool = False) -> None:
         """`begin`: how the equilibrium is, or the run began, whose scalar it is."""
-        self._session, self._part, self._run = session, part, run
-        self._edges = slice(first, first + len(part.lengths))
-        self._supports = _check(session, part, begin)
-        if run:
-            _check_run(session, part, begin)
+        rows = session.directory.layout.rows
+        self._session, self._part, self._rows = session, part, rows(part.index)
+        self._shapes = []
+        edge = 0
+        for rod in session.directory.all(RodPart):
+            edges = slice(edge, edge + len(rod.lengths))
+            edge = edges.stop
+            shared = [np.flatnonzero(rows(rod.index) == row) for row in self._rows]
+            if any(len(nodes) for nodes in shared):
+                self._shapes.append(_Shape(rod, edges, shared, begin))
+        for shape in self._shapes:
+            _check(session, part, shape.part, begin)
+            if run:
+                _check_run(session, part, shape.part, begin)
+        self._springs = _springs_as_drawn(session, [shape.part for shape in self._shapes])
+        self._by_springs = np.zeros(len(self._springs))
+
+    def add(self, found: _core.ParameterGradient, share: Share = lambda name, word: 1.0) -> None:
+        """Take in derivatives by what acted."""
+        for shape in self._shapes:
+            shape.add(found, share)
+        for i, spring in enumerate(self._springs):
+            self._by_springs[i] += share(spring.name, "rest_length") * found.spring_rest_length[spring.index]
+
+    def gradient(self, g: _core.EquilibriumGradient | _core.InitialGradient) -> FloatArray:
+        """Those that were taken in, and forgets them. `g`: by what is where it was drawn."""
+        by_nodes = np.asarray(g.drawn_nodes).copy()
+        for spring, by in zip(self._springs, self._by_springs, strict=True):
+            by_nodes[spring.rows[1]] += by * spring.direction
+            by_nodes[spring.rows[0]] -= by * spring.direction
+        out = by_nodes[self._rows]
+        for shape in self._shapes:
+            shape.by_turn += np.asarray(g.edge_turn)[shape.edges]
+            shape.add_slopes(out)
+            shape.clear()
+        self._by_springs[:] = 0.0
+        normal = self._session.world.plane_normal
+        if normal is not None:
+            out -= np.outer(out @ normal, normal)
+        return np.asarray(out)
+
+
+class _Shape:
+    """A rod that is drawn anew with nodes of another one, or its own, and derivatives by what follows from that."""
+
+    def __init__(self, part: RodPart, edges: slice, shared: list[npt.NDArray[np.intp]], begin: Moment) -> None:
+        """`edges`: of the scene; `shared`: for each node of the other rod those that go with it."""
+        self.part, self.edges, self._shared = part, edges, shared
         self._follows = (
             np.array_equal(begin.natural_curvature[part.index], part.natural_curvature),
             np.array_equal(begin.natural_twist[part.index], part.natural_twist),
         )
-        self._clear()
+        self.clear()
 
-    @property
-    def rod(self) -> str:
-        """Its name."""
-        return self._part.name
-
-    def _clear(self) -> None:
-        part = self._part
-        self._by_length = np.zeros(len(part.lengths))
+    def clear(self) -> None:
+        """Nothing is taken in."""
+        part = self.part
+        self._by_length, self.by_turn = np.zeros(len(part.lengths)), np.zeros_like(part.tangents)
         self._by_curvature, self._by_twist = np.zeros_like(part.natural_curvature), np.zeros_like(part.natural_twist)
 
-    def add(self, found: _core.ParameterGradient, curvature: float = 1.0, twist: float = 1.0) -> None:
-        """Take in derivatives by what acted; `curvature`, `twist`: how much of the natural shape is the drawn one's."""
-        part = self._part
-        self._by_length += np.asarray(found.rest_length)[self._edges]
+    def add(self, found: _core.ParameterGradient, share: Share) -> None:
+        """See `DrawnNodes.add`."""
+        rod, name = self.part.index, self.part.name
+        self._by_length += np.asarray(found.rest_length)[self.edges]
+        self.by_turn += np.asarray(found.edge_turn)[self.edges]
+        self._by_curvature += np.asarray(found.drawn_curvature[rod])
+        self._by_twist += np.asarray(found.drawn_twist[rod])
         if self._follows[0]:
-            self._by_curvature += curvature * np.asarray(found.natural_curvature[part.index])
+            self._by_curvature += share(name, "natural_curvature") * np.asarray(found.natural_curvature[rod])
         if self._follows[1]:
-            self._by_twist += twist * np.asarray(found.natural_twist[part.index])
+            self._by_twist += share(name, "natural_twist") * np.asarray(found.natural_twist[rod])
 
-    def gradient(self, g: _core.EquilibriumGradient | _core.InitialGradient) -> FloatArray:
-        """Those that were taken in, and forgets them. `g`: by what supports hold, and by the start of a run."""
-        part = self._part
-        spins = [(support, np.asarray(g.held_spins)[index]) for index, support in self._supports]
-        frames = [_frame(part, support) for support, _ in spins]
-        by_directors = None
-        if isinstance(g, _core.InitialGradient) and len(g.spins) > 0:
-            by_directors = np.asarray(g.spins)[self._edges]
+    def add_slopes(self, out: FloatArray) -> None:
+        """What was taken in, by nodes of the other rod, (nodes, 3)."""
+        step = _STEP * float(self.part.lengths.min())
+        for node, nodes in enumerate(self._shared):
+            for axis in range(3) if len(nodes) else ():
+                way = np.zeros(self.part.points.shape)
+                way[nodes, axis] = step
+                near, far = (self._of(times * way) - self._of(-times * way) for times in (1.0, 2.0))
+                out[node, axis] += (8.0 * near - far) / (12.0 * step)
 
-        def of(points: FloatArray) -> float:
-            other = redrawn(part, points)
-            value = self._by_length @ (other.lengths - part.lengths)
-            value += np.sum(self._by_curvature * (other.natural_curvature - part.natural_curvature))
-            value += self._by_twist @ (other.natural_twist - part.natural_twist)
-            if by_directors is not None:
-                value += by_directors @ _spins(part, other)
-            for (support, spin), frame in zip(spins, frames, strict=True):
-                turn = _frame(other, support) @ frame.T
-                value += 0.5 * spin @ (turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1])
-            return float(value)
-
-        out = np.asarray(g.held_nodes)[self._session.directory.layout.rows(part.index)].copy()
-        step = _STEP * float(part.lengths.min())
-        for place in np.ndindex(part.points.shape):
-            way = np.zeros(part.points.shape)
-            way[place] = step
-            near = of(part.points + way) - of(part.points - way)
-            far = of(part.points + 2.0 * way) - of(part.points - 2.0 * way)
-            out[place] += (8.0 * near - far) / (12.0 * step)
-        normal = self._session.world.plane_normal
-        if normal is not None:
-            out -= np.outer(out @ normal, normal)
-        self._clear()
-        return out
+    def _of(self, way: FloatArray) -> float:
+        part = self.part
+        other = redrawn(part, part.points + way)
+        value = self._by_length @ (other.lengths - part.lengths) + np.sum(self.by_turn * _turns(part, other))
+        value += np.sum(self._by_curvature * (other.natural_curvature - part.natural_curvature))
+        return float(value + self._by_twist @ (other.natural_twist - part.natural_twist))
 
 
-def _spins(part: RodPart, other: RodPart) -> FloatArray:
-    """By how much directors are turned about their edges, beyond what carries them along with these [rad]."""
-    t, now = part.tangents, other.tangents
-    along = np.sum(part.directors * now, axis=1) / (1.0 + np.sum(t * now, axis=1))
-    carried = part.directors - along[:, None] * (t + now)
-    return np.asarray(np.sum(now * np.cross(carried, other.directors), axis=1))
+def _turns(part: RodPart, other: RodPart) -> FloatArray:
+    """How the frame of each edge is turned, as rotation vectors but for the third power of the turn."""
+    out = np.zeros_like(part.tangents)
+    for rod, new in (
+        (part.directors, other.directors),
+        (np.cross(part.tangents, part.directors), np.cross(other.tangents, other.directors)),
+        (part.tangents, other.tangents),
+    ):
+        out += 0.5 * np.cross(rod, new)
+    return out
 
 
-def _frame(part: RodPart, support: SupportPart) -> FloatArray:
-    """Directors and tangent of the end that a support holds, as columns."""
-    if support.kind == "pin":
-        return np.eye(3)
-    if support.kind in ("clamp", "spinning_clamp"):
-        tangent, director = drawing.drawn_frame(
-            part.tangents, part.directors, part.lengths, support.node[1], part.closed
-        )
-    else:
-        edge = min(support.node[1], len(part.tangents) - 1)
-        tangent, director = part.tangents[edge], part.directors[edge]
-    return np.stack([director, np.cross(tangent, director), tangent], axis=1)
+@dataclass(frozen=True, eq=False)
+class _DrawnSpring:
+    name: str
+    index: int
+    rows: tuple[int, int]
+    direction: FloatArray  # from the first node to the second
+
+
+def _springs_as_drawn(session: Session, parts: list[RodPart]) -> list[_DrawnSpring]:
+    """Springs at nodes of these rods that are as long at rest as they were drawn."""
+    drawn, rods = {rod.index: rod.points for rod in session.directory.all(RodPart)}, {rod.index for rod in parts}
+    found = []
+    for index, spring in enumerate(session.directory.all(SpringPart)):
+        a, b = (drawn[rod][node] for rod, node in spring.nodes)
+        length = float(np.linalg.norm(b - a))
+        now = session.world.spring(index).rest_length
+        if rods.isdisjoint(rod for rod, _ in spring.nodes) or length == 0.0 or spring.rest_length != length:
+            continue
+        if now == length:
+            rows = (session.directory.row(spring.nodes[0]), session.directory.row(spring.nodes[1]))
+            found.append(_DrawnSpring(spring.name, index, rows, (b - a) / length))
+    return found
 
 
 def _refuse(part: RodPart, why: str) -> None:
     raise ValueError(f"no gradient by points of {part.owner} is known {why}")
 
 
-def _check_run(session: Session, part: RodPart, begin: Moment) -> None:
-    """Refuses runs that do not begin where the rod was drawn, and what moves only runs."""
+def _check_run(session: Session, asked: RodPart, part: RodPart, begin: Moment) -> None:
+    """Refuses runs that do not begin where rods were drawn, and what moves only runs."""
     if session.directory.all(FluidPart):
-        _refuse(part, "in a fluid, whose resistance goes with the whole length of a rod")
+        _refuse(asked, "in a fluid, whose resistance goes with the whole length of a rod")
     near = 1e-9 * part.lengths.min()
     off = np.abs(begin.positions[session.directory.layout.rows(part.index)] - part.points).max() > near
     turned = session.world.plane_normal is None and np.abs(begin.directors[part.index] - part.directors).max() > 1e-9
-    if off or turned:
-        _refuse(part, "by a run that began elsewhere than it was drawn: run from where it is built")
+    if off or turned or not begin.frames_as_drawn:
+        _refuse(asked, "by a run that began elsewhere than it was drawn: run from where it is built")
 
 
-def _check(session: Session, part: RodPart, begin: Moment) -> list[tuple[int, SupportPart]]:
-    """The supports of a rod. Refuses what depends on drawn nodes by more than the engine has derivatives of."""
+def _check(session: Session, asked: RodPart, part: RodPart, begin: Moment) -> None:
+    """Refuses what depends on drawn nodes by more than the engine has derivatives of."""
 
     def refuse(why: str) -> None:
-        _refuse(part, why)
+        _refuse(asked, why)
 
     if part.drawing is None or not np.array_equal(part.arcs, part.lengths):
-        refuse("where nodes= found them or curvature is discrete: draw the nodes themselves")
-    if session.directory.all(JoinPart):
-        refuse("where rods are joined")
-    if session.world.contact.rods or session.directory.all(ObstaclePart):
-        refuse("where rods or obstacles touch")
-    if any(load.kind in ("load", "pressure") for load in session.loads):
-        refuse("under loads along rods")
-    drawn = {rod.index: rod.points for rod in session.directory.all(RodPart)}
-    for spring in session.directory.all(SpringPart):
-        a, b = (drawn[rod][node] for rod, node in spring.nodes)
-        if part.index in (spring.nodes[0][0], spring.nodes[1][0]) and np.isclose(
-            spring.rest_length, np.linalg.norm(b - a), rtol=1e-12
-        ):
-            refuse(f"where {spring.name!r} is as long as it was drawn: give rest_length=")
-    found = []
+        whose = "" if part is asked else f" of {part.owner}, which is joined to it,"
+        refuse(f"where nodes= found those{whose} or curvature is discrete: draw the nodes themselves")
     for index, support in session.settings.supports.values():
-        if support.grasp is not None:
-            refuse("where a hand holds a rod")
         if support.node[0] != part.index:
             continue
-        node = support.node[1]
-        if support.kind != "pin" and (part.closed or node not in (0, len(part.points) - 1)):
-            refuse("where an inner node is clamped")
+        if support.grasp is not None:
+            refuse("where a hand holds a rod")
+        if support.kind in ("spinning_clamp", "spinning_edge"):
+            refuse(f"where {support.name!r} lets it spin about how it was drawn")
         if index not in begin.supports:
             refuse(f"where {support.name!r} came while it ran")
-        at, turn = begin.supports[index][0] - part.points[node], begin.supports[index][1] - np.eye(3)
+        at, turn = begin.supports[index][0] - part.points[support.node[1]], begin.supports[index][1] - np.eye(3)
         if np.abs(at).max() > 1e-9 * part.lengths.min() or np.abs(turn).max() > 1e-9:
             refuse(f"once {support.name!r} has moved")
-        found.append((index, support))
-    return found

@@ -21,7 +21,6 @@ from withe.simulation.unknowns import (
     INITIAL_WORDS,
     Unknown,
     check_list,
-    edges_of,
     is_points,
     unknown_reader,
     unknown_readers,
@@ -182,4 +181,4 @@ class RunDerivatives:
         part = self._session.directory.rod(unknown[0])
         if any(isinstance(call.part, SupportPart) for call in self._journal.calls):
             raise ValueError(f"no gradient by points of {part.owner} is known once a support has moved")
-        return DrawnNodes(self._session, part, edges_of(self._session, part.index)[0], self._begin, run=True)
+        return DrawnNodes(self._session, part, self._begin, run=True)

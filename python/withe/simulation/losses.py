@@ -44,7 +44,8 @@ def readout_shape(session: Session, of: Rod | Support | NodeHandle | str, word: 
 def readout_adjoints(session: Session, by: Mapping[str, Any], frames: int) -> list[_core.ReadoutAdjoint]:
     """One a frame, from arrays by words of read-outs whose first axis is the frame."""
     if not isinstance(by, Mapping) or not by or not set(by) <= set(READOUTS):
-        raise ValueError(f"what a gradient is of must be derivatives by {', '.join(READOUTS)}, got {by!r}")
+        got = ", ".join(map(repr, by)) or "none" if isinstance(by, Mapping) else type(by).__name__
+        raise ValueError(f"what a gradient is of must be derivatives by {', '.join(READOUTS)}, got {got}")
     tables = {word: _table(session, word, value, frames) for word, value in by.items()}
     out = []
     for frame in range(frames):

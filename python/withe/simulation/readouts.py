@@ -144,10 +144,11 @@ class Equilibrium:
         wrt : sequence
             Pairs of a part and a word of `Simulation.get`: of a rod natural_curvature, natural_twist, natural_stretch,
             youngs_modulus, poisson_ratio, density, bend_stiffness and so on, and "radius" [m] of a withe.Circle, one an
-            edge, and "points" [m], the nodes as they were drawn, (nodes, 3), both as if the scene were built anew; of a
-            load its value; of a mass "mass"; of a support or a hand "position" [m] and "rotation" (a rotation vector
-            [rad], about where it is); of a hand that yields "stiffness", all six as `Scene.grasp` takes them, and
-            "force_limit"; of an obstacle "position" [m]. Or "gravity".
+            edge, and "points" [m], the nodes as they were drawn, (nodes, 3), both as if the scene were built anew, the
+            latter with ends of other rods that are joined there; of a load its value; of a mass "mass"; of a support or
+            a hand "position" [m] and "rotation" (a rotation vector [rad], about where it is); of a hand that yields
+            "stiffness", all six as `Scene.grasp` takes them, and "force_limit"; of an obstacle "position" [m]. Or
+            "gravity".
 
         Returns
         -------

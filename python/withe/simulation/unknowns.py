@@ -245,7 +245,7 @@ def dragged_rods(session: Session, part: DragPart) -> list[RodPart]:
 
 
 def _points_reader(session: Session, part: RodPart) -> Reader:
-    read = points_reader(session, part, edges_of(session, part.index)[0])
+    read = points_reader(session, part)
 
     def checked(gradient: _core.EquilibriumGradient | OfRun) -> FloatArray:
         if isinstance(gradient, OfRun):
