@@ -15,8 +15,16 @@ sys.path.insert(0, str(FOLDER))
 HAVE_GYMNASIUM = importlib.util.find_spec("gymnasium") is not None
 
 
+@pytest.fixture
+def interpreted(monkeypatch):
+    """PyElastica takes half a minute to compile, and these tests some hundred of its steps."""
+    numba = pytest.importorskip("numba")
+    monkeypatch.setattr(numba.config, "DISABLE_JIT", 1)
+    pytest.importorskip("elastica")
+
+
 def run(name, folder, *arguments):
-    environment = os.environ | {"WITHE_BENCHMARK_OUT": str(folder)}
+    environment = os.environ | {"WITHE_BENCHMARK_OUT": str(folder), "NUMBA_DISABLE_JIT": "1"}  # as `interpreted` says
     command = [sys.executable, str(FOLDER / f"{name}.py"), *arguments]
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False, timeout=300)
     assert done.returncode == 0, done.stdout + done.stderr
@@ -113,9 +121,9 @@ def test_a_push_is_off_by_its_worst_force_above_the_limit():
 
 
 @pytest.mark.parametrize("method", ["backward_euler", "backward_euler, on centrelines", "PyElastica"])
-def test_a_rod_that_is_pushed_sticks_or_slides_as_a_block_does(method):
+def test_a_rod_that_is_pushed_sticks_or_slides_as_a_block_does(method, request):
     if method == "PyElastica":
-        pytest.importorskip("elastica")
+        request.getfixturevalue("interpreted")
     from friction_precision import SLIDING, STICKING, Point, block, pusher
 
     pushed = pusher(Point("friction", method, 2, 0.015))
@@ -126,6 +134,22 @@ def test_a_rod_that_is_pushed_sticks_or_slides_as_a_block_does(method):
     assert errors.pop(slowest) < 4e-3
     assert max(errors.values()) < 1e-6
     assert max(pushed(force)[0] for force in STICKING) < 1e-6
+
+
+def test_a_jaw_that_is_compiled_goes_as_one_that_is_interpreted(interpreted, monkeypatch):
+    import numba
+    from elastica_sheet import _put_jaw
+
+    monkeypatch.setattr(numba.config, "DISABLE_JIT", 0)
+    put_jaw = numba.njit(_put_jaw)
+    table = np.random.default_rng(5).normal(size=(6, 3))
+    along_rod = np.array([0.0, 0.01, 0.03])
+    for moment in (-0.1, 0.0, 0.23, 0.4, 0.5, 0.7):
+        plain, compiled = ([np.ones((3, 3)), np.ones((3, 3, 2)), np.ones((3, 3)), np.ones((3, 2))] for _ in range(2))
+        _put_jaw(*plain, table, 0.1, moment, 2, along_rod, 2e-4)
+        put_jaw(*compiled, table, 0.1, moment, 2, along_rod, 2e-4)
+        for one, other in zip(plain, compiled, strict=True):
+            np.testing.assert_allclose(one, other, rtol=1e-13, atol=1e-13)
 
 
 def test_our_beam_approaches_its_stored_limit():
