@@ -51,6 +51,8 @@ EXAMPLES = {
     "write_word.py": (["--nodes", "200", "--ways", "exact"], r"exact: ([.\d]+) mm off on the mean", 0.0, 2.5),
     "spider.py": (["--duration", "0.2"], r"half the step: no node moves by more than ([.\d]+)%", 0.0, 2.0),
 }
+# What is made smaller in a notebook, as the options of examples do, and with what.
+SMALLER = {"fold_a_sheet": ("for seed in range(40, 44)", "for seed in range(40, 41)")}
 
 
 @pytest.mark.slow
@@ -75,4 +77,7 @@ def test_a_notebook_runs_from_top_to_bottom(path, tmp_path):
     nbclient = pytest.importorskip("nbclient")
     pytest.importorskip("ipykernel")
     notebook = nbformat.read(path, as_version=4)
+    if path.stem in SMALLER:
+        (cell,) = (cell for cell in notebook.cells if SMALLER[path.stem][0] in cell.source)
+        cell.source = cell.source.replace(*SMALLER[path.stem])
     nbclient.NotebookClient(notebook, timeout=300, resources={"metadata": {"path": str(tmp_path)}}).execute()
