@@ -119,11 +119,12 @@ ctest: ctest-build
 # What only runs on newer machines must not be run on older ones: the engine's tests on an emulated first x86-64.
 ctest-baseline: ctest-build
 	@command -v qemu-x86_64 >/dev/null || { echo "make ctest-baseline needs qemu-x86_64: apt-get install qemu-user"; exit 1; }
-	@for room in common solvers geometry model elasticity contact assembly integrators; do \
-	    qemu-x86_64 -cpu qemu64 $(BUILD)/tests/cpp/test_$$room --gtest_brief=1 || exit 1; done
+	@printf '%s\n' integrators contact solvers assembly elasticity model geometry common | xargs -P $(JOBS) -I ROOM \
+	    qemu-x86_64 -cpu qemu64 $(BUILD)/tests/cpp/test_ROOM --gtest_brief=1
 
+# Each worker has a core: threads of NumPy's and torch's matrices would only wait for each other.
 pytest: $(STAMPS)/installed $(STAMPS)/test_tools
-	@python -m pytest $(or $(TESTS),--numprocesses $(TEST_JOBS) --dist worksteal)
+	@OMP_NUM_THREADS=1 python -m pytest $(or $(TESTS),--numprocesses $(TEST_JOBS) --dist worksteal)
 
 asan: $(STAMPS)/build_tools
 	@cmake --preset asan-ubsan
