@@ -127,6 +127,8 @@ def _quads(picture: NDArray[np.uint8], family: str) -> tuple[list[int], Array]:
     gray = cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY)
     parameters = cv2.aruco.DetectorParameters()
     parameters.minMarkerPerimeterRate = min(0.03, 48.0 / max(gray.shape))  # tags of 12 px and more
+    # Samples along a cell. With OpenCV's 4, first corners that are a pixel off made cells of 3 px illegible.
+    parameters.perspectiveRemovePixelPerCell = 8
     dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, f"DICT_APRILTAG_{family}"))
     corners, numbers, _ = cv2.aruco.ArucoDetector(dictionary, parameters).detectMarkers(gray)
     if numbers is None:
