@@ -113,8 +113,8 @@ Scalar slip_factor(const Scalar& square, double c) {
 }
 
 /// Whether an elastic stick of a length, squared, holds, if it bears at most another. What slipped at the end of a step
-/// is at its limit to rounding: it is taken to slip on. As a stick it would hold its neighbours too, and Newton's method
-/// would free one contact an iteration.
+/// is at its limit to rounding: it is taken to slip on. As a stick it would hold its neighbours too, and Newton's
+/// method would free one contact an iteration.
 inline bool holds(double square, double most) { return square <= (1.0 - 1e-12) * most * most; }
 
 /// The force F for a slip S and a normal force N.
