@@ -1,8 +1,8 @@
 #include "steps/load_forces.hpp"
 
-#include <Eigen/Geometry>
 #include <algorithm>
-#include <stdexcept>
+
+#include "geometry/rotation.hpp"
 
 namespace withe {
 namespace {
@@ -14,6 +14,16 @@ void add_drawn(const StepProblem& problem, const LoadPiece& piece, const Vector3
   if (piece.along) out.rest_length(piece.edge) += by.dot(value) / problem.model.edge_arc(piece.edge);
   const bool follows = piece.shape == LoadShape::follower || piece.follower;
   if (follows && piece.edge >= 0) out.edge_turn.row(piece.edge) += by.cross(value).transpose();
+}
+
+/// By how a joint's frame F is turned beyond its unknowns, of the rows -J(w)^T F M of a moment M that follows it.
+void add_frame_turn(const StepProblem& problem, const StepData& data, const LoadPiece& piece, const double* rows,
+                    StepAdjoint& adjoint) {
+  const Vector3 w = data.z.segment<3>(problem.model.frame_dof[at(piece.frame)]),
+                value = piece.weight * problem.parameters->loads.row(piece.load),
+                moment = data.configuration.frame[at(piece.frame)] * value,
+                spin = cayley_spin(w) * Eigen::Map<const Vector3>(rows);
+  adjoint.middle_spin.row(piece.frame) -= moment.cross(spin).transpose();
 }
 
 }  // namespace
@@ -67,7 +77,7 @@ void LoadForces::add_adjoint(const StepProblem& problem, const StepData& data, c
     adjoint.coefficients.loads.row(piece.load) += by.transpose();
     add_drawn(problem, piece, by, adjoint.coefficients);
     if (piece.shape == LoadShape::frame_moment && piece.follower && !problem.model.planar() && problem.moves())
-      throw std::invalid_argument("no gradient of a motion is known through a moment that follows a joint");
+      add_frame_turn(problem, data, piece, rows, adjoint);
   }
 }
 

@@ -66,12 +66,14 @@ class Joined:
         if kind in ("pinned", "revolute"):
             for end in (self.arm.node(0), self.arm.end, self.arm.node(6)):
                 scene.add_spring(end, self.branch.end, stiffness=30.0)
-        scene.add_spring(self.arm.node(2), self.branch.node(3), stiffness=20.0)
+        self.stay = scene.add_spring(self.arm.node(2), self.branch.node(3), stiffness=20.0)
         scene.add_force(self.branch.end, world @ (0.05, 0, 0.2))
         scene.add_force(self.arm.node(3), world @ (0.1, 0.0 if planar else 0.05, 0.2), follower=True)
         scene.add_moment(self.arm.node(6), world @ axial, follower=True)
         if kind != "pinned":  # which may spin
             scene.add_moment(self.branch.node(2), world @ axial)
+        if kind not in ("pinned", "smooth", "pairs"):
+            scene.add_moment(node, 2.0 * (world @ axial), follower=True)  # on the frame of the joint
         scene.add_load(self.arm, world @ (0.2, 0.0, 0.5))
         scene.add_load(self.branch, world @ (0.2, 0.0, 0.5), follower=True)
         scene.add_mass(self.arm.node(5), 0.02)
@@ -158,8 +160,11 @@ def test_gradient_of_a_run_by_drawn_nodes_of_joined_rods_is_that_of_scenes_built
         made, steps = design.make(h), iter(range(100))
 
         def before_step(simulation):
-            if next(steps) == 3:
+            step = next(steps)
+            if step == 3:
                 simulation.set_natural_curvature(made.arm, (0.0 if planar else 2.0, 3.0), over=6e-3)
+            if step == 5:
+                simulation.set(made.stay, rest_length=0.15)
 
         return made, made.simulation.run(16e-3, record_every=4e-3, progress=False, before_step=before_step, **options)
 

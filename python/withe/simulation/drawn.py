@@ -33,6 +33,8 @@ class Moment:
         Rod by rod.
     supports : dict
         Place and rotation of each, by its index.
+    spring_lengths : list of float [m]
+        At rest.
     frames_as_drawn : bool
         Whether joints and clamps are turned as they were drawn.
     """
@@ -42,6 +44,7 @@ class Moment:
     natural_curvature: list[FloatArray]
     natural_twist: list[FloatArray]
     supports: dict[int, tuple[FloatArray, FloatArray]]
+    spring_lengths: list[float]
     frames_as_drawn: bool
 
     @classmethod
@@ -57,6 +60,7 @@ class Moment:
                 index: (np.array(world.support_position(index)), np.array(world.support_rotation(index)))
                 for index, _ in session.settings.supports.values()
             },
+            [world.spring(index).rest_length for index in range(len(session.directory.all(SpringPart)))],
             world.frames_as_drawn,
         )
 
@@ -92,14 +96,14 @@ class DrawnNodes:
         for rod in session.directory.all(RodPart):
             edges = slice(edge, edge + len(rod.lengths))
             edge = edges.stop
-            shared = [np.flatnonzero(rows(rod.index) == row) for row in self._rows]
-            if any(len(nodes) for nodes in shared):
+            if np.isin(rows(rod.index), self._rows).any():
+                shared = [np.flatnonzero(rows(rod.index) == row) for row in self._rows]
                 self._shapes.append(_Shape(rod, edges, shared, begin))
         for shape in self._shapes:
             _check(session, part, shape.part, begin)
             if run:
                 _check_run(session, part, shape.part, begin)
-        self._springs = _springs_as_drawn(session, [shape.part for shape in self._shapes])
+        self._springs = _springs_as_drawn(session, [shape.part for shape in self._shapes], begin)
         self._by_springs = np.zeros(len(self._springs))
 
     def add(self, found: _core.ParameterGradient, share: Share = lambda name, word: 1.0) -> None:
@@ -195,17 +199,16 @@ class _DrawnSpring:
     direction: FloatArray  # from the first node to the second
 
 
-def _springs_as_drawn(session: Session, parts: list[RodPart]) -> list[_DrawnSpring]:
-    """Springs at nodes of these rods that are as long at rest as they were drawn."""
+def _springs_as_drawn(session: Session, parts: list[RodPart], begin: Moment) -> list[_DrawnSpring]:
+    """Springs at nodes of these rods that begin as long at rest as they were drawn."""
     drawn, rods = {rod.index: rod.points for rod in session.directory.all(RodPart)}, {rod.index for rod in parts}
     found = []
     for index, spring in enumerate(session.directory.all(SpringPart)):
         a, b = (drawn[rod][node] for rod, node in spring.nodes)
         length = float(np.linalg.norm(b - a))
-        now = session.world.spring(index).rest_length
-        if rods.isdisjoint(rod for rod, _ in spring.nodes) or length == 0.0 or spring.rest_length != length:
+        if rods.isdisjoint(rod for rod, _ in spring.nodes) or length == 0.0:
             continue
-        if now == length:
+        if spring.rest_length == length == begin.spring_lengths[index]:
             rows = (session.directory.row(spring.nodes[0]), session.directory.row(spring.nodes[1]))
             found.append(_DrawnSpring(spring.name, index, rows, (b - a) / length))
     return found
