@@ -148,7 +148,7 @@ class Newton::Solve {
     if (!balance_.finite) return Verdict::failed;
     stagnation_.note(result_.residual, reuse_.step());
     if (converged()) return Verdict::converged;
-    if (result_.iterations == how_.max_iterations) return Verdict::failed;
+    if (result_.iterations == how_.max_iterations + std::min(whole_steps_, how_.free_steps)) return Verdict::failed;
     if (uses(Heuristic::reject_stagnation) && how_.interval != 0.0 && stagnation_.stalls() >= kMostStalls &&
         reuse_.at_end())
       return Verdict::failed;
@@ -203,6 +203,7 @@ class Newton::Solve {
     else
       z_ += work_.step;
     const double length = newton_.norms_.displacement(work_.step);
+    if (shorten == 1.0) ++whole_steps_;
     // A step that is cut says nothing of where the solution is, unless all of it is within the tolerance.
     const bool near = shorten > 0.0 && length <= shorten * reuse_.tolerance();
     reuse_.note_step(shorten == 1.0 || near ? length : INFINITY);
@@ -234,6 +235,7 @@ class Newton::Solve {
   MatrixReuse reuse_;
   bool axial_known_;
   bool spare_matrix_ = false;  ///< made since the last factorisation
+  int whole_steps_ = 0;
   NewtonResult result_;
   Balance balance_;
   Stagnation stagnation_;

@@ -61,6 +61,7 @@ struct Prediction {
 struct SolveOptions {
   const VectorX* target = nullptr;  ///< what F(z) is to be; nothing: zero
   int max_iterations = 40;
+  int free_steps = 0;   ///< so many iterations whose steps are taken whole do not count
   bool mixed = true;    ///< with the axial forces as unknowns of their own, where the options allow it
   double interval = 0;  ///< of a time step [s], whose matrix may serve several iterations and the steps to come; the
                         ///< mixed method then sets out from work.axial_force. 0: a new matrix every iteration

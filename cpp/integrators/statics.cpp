@@ -129,7 +129,7 @@ class Statics {
 
   int most_iterations() const {
     const int most = options_.max_iterations;
-    return equations_.has_potential() ? std::min(kMostIterations, most) : most + border_iterations();
+    return equations_.has_potential() ? std::min(kMostIterations, most) : most;
   }
 
   /// Where Coulomb's friction holds a limp rod, the border of what slips goes on by a contact an iteration, and the
@@ -168,6 +168,7 @@ class Statics {
     const NewtonResult r = newton_.solve(equations_, z_,
                                          {.target = &path_.target(),
                                           .max_iterations = most_iterations(),
+                                          .free_steps = border_iterations(),
                                           .predicted = predicted ? &prediction : nullptr},
                                          work_);
     note(r, last);
@@ -225,8 +226,9 @@ class Statics {
       equations_.begin(state_, parameters_, at_rest ? StepRule::statics : StepRule::backward_euler, at_rest ? 0.0 : h);
       z = state_.q;
       const int border = border_iterations();
-      const int most = (at_rest ? 40 : kMostIterations) + border;
-      const NewtonResult r = newton_.solve(equations_, z, {.target = &path_.target(), .max_iterations = most}, work_);
+      const int most = at_rest ? 40 : kMostIterations;
+      const NewtonResult r = newton_.solve(
+          equations_, z, {.target = &path_.target(), .max_iterations = most, .free_steps = border}, work_);
       note(r, last);
       const double found = work_.data.potential - path_.target().dot(z);
       const double rounding = 1e-10 * (std::abs(potential) + std::abs(found)) + least_energy();
