@@ -66,6 +66,10 @@ class Joined:
         if kind in ("pinned", "revolute"):
             for end in (self.arm.node(0), self.arm.end, self.arm.node(6)):
                 scene.add_spring(end, self.branch.end, stiffness=30.0)
+        # A length that was given stays, though it is that of the first drawing.
+        ends = [points[2] for points in drawn(planar, kind)]
+        given = float(np.linalg.norm(ends[1] - ends[0]))
+        scene.add_spring(self.arm.node(2), self.branch.node(2), stiffness=10.0, rest_length=given)
         self.stay = scene.add_spring(self.arm.node(2), self.branch.node(3), stiffness=20.0)
         scene.add_force(self.branch.end, world @ (0.05, 0, 0.2))
         scene.add_force(self.arm.node(3), world @ (0.1, 0.0 if planar else 0.05, 0.2), follower=True)
@@ -187,3 +191,28 @@ def test_gradient_of_a_run_by_drawn_nodes_of_joined_rods_is_that_of_scenes_built
         return float(sum((weights[word] * shown[word]).sum() for word in weights))
 
     assert design.along(gradient) == pytest.approx(difference(scalar), rel=1e-6)
+
+
+@pytest.mark.parametrize("natural", ["as_built", "straight"])
+@pytest.mark.parametrize("word", ["positions", "directors", "curvatures"])
+def test_directors_at_an_angle_to_the_plane_of_a_scene_turn_with_the_drawing(word, natural):
+    random, world = np.random.default_rng(45), Rotation.from_rotvec((0.9, -0.9, 0.1)).as_matrix()
+    arm, branch = drawn(True, "rigid")
+    way = random.normal(size=arm.shape) * (1, 0, 1)
+
+    def shown(h):
+        bent = branch.copy()
+        bent[0] += h * way[joint_of("rigid")]
+        made = Joined(arm + h * way, bent, planar=True, kind="rigid", normal=None, natural=natural, turned=world)
+        found = made.simulation.equilibrium()
+        return made, found, getattr(made.simulation, word)(made.arm)
+
+    made, found, value = shown(0.0)
+    assert made.simulation.plan.planar
+    assert 0.1 < abs(made.simulation.directors(made.arm)[0, 0] @ world[:, 1]) < 0.9
+    weight = random.normal(size=value.shape) * (0.01 if word == "curvatures" else 1.0)
+    if word == "positions":
+        weight = weight * (1, 0, 1) @ world.T
+    (gradient,) = found.gradient({word: {made.arm: weight}}, [(made.arm, "points")])
+    expected = difference(lambda h: float((weight * shown(h)[2]).sum()))
+    assert np.sum(gradient * (way @ world.T)) == pytest.approx(expected, rel=1e-6)

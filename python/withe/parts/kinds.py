@@ -186,6 +186,7 @@ class SpringPart:
     stiffness: float  # [N/m]
     rest_length: float  # [m]
     damping: float  # [N s/m]
+    as_drawn: bool = False  # whether it is as long at rest as it was drawn
 
 
 @dataclass(frozen=True, eq=False)

@@ -38,6 +38,7 @@ def make_spring(
         checked_number(name, "stiffness", stiffness),
         checked_number(name, "rest_length", distance if rest_length is None else rest_length),
         checked_number(name, "damping", damping),
+        rest_length is None,
     )
     if distance == 0.0 and part.rest_length > 0.0:
         raise ValueError(

@@ -208,7 +208,7 @@ def _springs_as_drawn(session: Session, parts: list[RodPart], begin: Moment) -> 
         length = float(np.linalg.norm(b - a))
         if rods.isdisjoint(rod for rod, _ in spring.nodes) or length == 0.0:
             continue
-        if spring.rest_length == length == begin.spring_lengths[index]:
+        if spring.as_drawn and begin.spring_lengths[index] == spring.rest_length:
             rows = (session.directory.row(spring.nodes[0]), session.directory.row(spring.nodes[1]))
             found.append(_DrawnSpring(spring.name, index, rows, (b - a) / length))
     return found

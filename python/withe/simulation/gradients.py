@@ -57,10 +57,10 @@ def equilibrium_gradient(session: Session, by: Loss, wrt: Sequence[Unknown]) -> 
     return [read(found) for read in readers]
 
 
-def equilibrium_gradients(
-    session: Session, by_positions: Sequence[FloatArray], wrt: Sequence[Unknown]
-) -> list[list[Any]]:
+def equilibrium_gradients(session: Session, by_positions: FloatArray, wrt: Sequence[Unknown]) -> list[list[Any]]:
     """Derivatives of several scalars of the present equilibrium, for each of `wrt` one a scalar.
+
+    `by_positions` of shape (scalars, nodes, 3).
 
     The stiffness is factorised once for all of them.
     """
