@@ -23,6 +23,7 @@ from withe.folding.widths import EVEN, Width
 __all__ = ["Holding", "Lattice", "Way", "forces_at", "goals", "make_lattice", "smoothed", "way_to"]
 
 FloatArray = npt.NDArray[np.float64]
+_SLOPE = 0.2  # at which an edge comes down
 _STEEPEST = 5.5  # [rad] of an edge; at 4.7 it points straight down, at 6.3 it would lie under the sheet
 _TURN = 0.5  # [Lgb/rad] lengths that angles count as
 _SHORTEST = 0.05  # [Lgb]
@@ -36,7 +37,8 @@ class Holding:
     """A sheet and its jaw [Lgb], and how far it may bend [1/Lgb].
 
     `length` of the sheet from the jaw's inner edge on, and its `width` there; `share` by which Lgb may be other than
-    thought.
+    thought. On its way to a `goal`, a place of the outer edge, that is over the sheet by as much as it has to go there
+    times a slope, or by `clearance`: an edge that grazes the sheet pushes it, if the jaw is off by the least.
     """
 
     length: float
@@ -46,6 +48,8 @@ class Holding:
     curvature: float
     share: float
     width: Width = EVEN
+    clearance: float = 0.0
+    goal: float = np.inf
 
     def outer(self, sheet: Elastica) -> tuple[FloatArray, FloatArray]:
         """Where the outer edge is, from where it lay; and how high over what the fingers need at least there."""
@@ -70,8 +74,9 @@ class Holding:
 
     def has_room(self, sheet: Elastica, least: float = -1e-9) -> npt.NDArray[np.bool_]:
         """Whether an edge that looks back is over the table by what the fingers need, and more than `least`."""
-        _, room = self.outer(sheet)
-        return np.asarray((sheet.angle <= 0.5 * np.pi) | (room >= least))
+        x, room = self.outer(sheet)
+        above = np.clip(_SLOPE * (self.goal - x), 0.0, self.clearance)
+        return np.asarray((sheet.angle <= 0.5 * np.pi) | (room >= least + above))
 
     def bearable(self, sheet: Elastica) -> npt.NDArray[np.bool_]:
         """Whether the sheet can be there, the jaw too, and is not bent too far."""
@@ -350,7 +355,13 @@ def smoothed(way: Way, holding: Holding, limit: float) -> FloatArray:
         if (smooth[:, 2] <= 0).any():
             continue
         sheet = at_forces(forces_at(smooth), keep=True)
-        loose = replace(holding, finger=0.0, thickness=0.0, curvature=1.02 * holding.curvature)
+        loose = replace(
+            holding,
+            finger=0.0,
+            thickness=0.0,
+            clearance=0.5 * holding.clearance,
+            curvature=1.02 * holding.curvature,
+        )
         if loose.bearable(sheet).all() and holding.worst_ratio(sheet).max() <= 1.05 * max(limit, way.ratio) + 1e-9:
             return np.asarray(smooth)
     return dense

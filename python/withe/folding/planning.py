@@ -28,6 +28,7 @@ Grasp = Literal["moment_free", "free"]
 Source = Literal["exact", "network"]
 _POSES = 251
 _POSES_OF_REST = 101
+_CLEARANCE = 2e-3  # [m] of an edge on its way over the sheet
 
 
 @dataclass(frozen=True)
@@ -66,6 +67,12 @@ class _Task:
         lgb, jaw = self.paper.gravito_bending_length, self.jaw
         sizes = (jaw.depth / lgb, jaw.finger / lgb, self.paper.thickness / lgb)
         return Holding(self.length, *sizes, self.curvature, self.uncertainty[0], self.width)
+
+    @property
+    def free_holding(self) -> Holding:
+        """With a moment, by which the edge comes as it likes."""
+        lgb = self.paper.gravito_bending_length
+        return replace(self.holding, clearance=_CLEARANCE / lgb, goal=self.target / lgb)
 
     def outer(self, inner: FloatArray) -> FloatArray:
         """Outer edges (x, z [m], angle) from the jaw's inner edges [Lgb]."""
@@ -308,17 +315,17 @@ def _free(task: _Task, rise: float = 0.0) -> Plan:
     """
     friction = task.paper.friction
     limit = friction * (1 - task.uncertainty[1])
-    exact = replace(task.holding, share=0.0)
-    level = _free_way(task, task.holding, False, friction, rise)
+    exact = replace(task.free_holding, share=0.0)
+    level = _free_way(task, task.free_holding, False, friction, rise)
     if level is not None and level.ratio <= limit:
-        return _along(task, level, task.holding, limit)
+        return _along(task, level, task.free_holding, limit)
     thought = _free_way(task, exact, True, np.inf, rise)
     # Where the sheet that it should be slides anyway, the way is that for it: others need more friction still.
     if thought is not None and thought.ratio <= friction:
-        pulled = _free_way(task, task.holding, True, friction, rise)
+        pulled = _free_way(task, task.free_holding, True, friction, rise)
         ways = [way for way in (level, pulled) if way is not None and way.ratio <= friction]
         if ways:
-            return _along(task, min(ways, key=lambda way: way.ratio), task.holding, limit)
+            return _along(task, min(ways, key=lambda way: way.ratio), task.free_holding, limit)
     if thought is None:
         raise ValueError(_blocked(task))
     return _along(task, thought, exact, limit)
@@ -346,7 +353,7 @@ def _blocked(task: _Task) -> str:
     """Why no pose brings the edge there, or which bound would."""
     said = f"no path brings the edge to {task.target:g} m with curvature of at most {task.curvature:g} / Lgb"
     for factor in (1.5, 2.25, 3.4):
-        holding = replace(task.holding, share=0.0, curvature=factor * task.curvature)
+        holding = replace(task.free_holding, share=0.0, curvature=factor * task.curvature)
         lattice = free_moment.make_lattice(holding, True)
         found = free_moment.goals(lattice, holding, task.target / task.paper.gravito_bending_length)
         found = take(found, holding.bearable(found))
