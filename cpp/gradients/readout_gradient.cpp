@@ -176,7 +176,7 @@ class Readouts {
                      const Vector2& by) {
     const double beyond = voronoi / carried;
     by_.natural_curvature[at(rod)].row(stencil) += (1.0 - beyond) * by.transpose();
-    const Vector2 out = by_discrete(discrete_curvature(rod, strains), voronoi, beyond * by);
+    Vector2 out = by_discrete(discrete_curvature(rod, strains), voronoi, beyond * by);
     if (!model_.planar()) return out;
     by_.planar_components.row(rod) += strains.strain[0] * out.transpose();
     return {model_.planar_components[at(rod)].dot(out), 0.0};
