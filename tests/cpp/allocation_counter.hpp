@@ -2,11 +2,12 @@
 /// Counts every allocation of an executable; for one of its files only. With glibc, malloc itself is replaced, so that
 /// C libraries count too; sanitizers own malloc and offer a hook instead; elsewhere only operator new counts.
 
+#include <atomic>
 #include <cstdlib>
 #include <new>
 
 namespace {
-std::size_t allocation_count = 0;
+std::atomic<std::size_t> allocation_count = 0;  // worker threads allocate too
 }
 
 #if defined(WITHE_SANITIZED)
