@@ -315,17 +315,18 @@ def _free(task: _Task, rise: float = 0.0) -> Plan:
     """
     friction = task.paper.friction
     limit = friction * (1 - task.uncertainty[1])
-    exact = replace(task.free_holding, share=0.0)
-    level = _free_way(task, task.free_holding, False, friction, rise)
+    holding = task.free_holding
+    exact = replace(holding, share=0.0)
+    level = _free_way(task, holding, False, friction, rise)
     if level is not None and level.ratio <= limit:
-        return _along(task, level, task.free_holding, limit)
+        return _along(task, level, holding, limit)
     thought = _free_way(task, exact, True, np.inf, rise)
     # Where the sheet that it should be slides anyway, the way is that for it: others need more friction still.
     if thought is not None and thought.ratio <= friction:
-        pulled = _free_way(task, task.free_holding, True, friction, rise)
+        pulled = _free_way(task, holding, True, friction, rise)
         ways = [way for way in (level, pulled) if way is not None and way.ratio <= friction]
         if ways:
-            return _along(task, min(ways, key=lambda way: way.ratio), task.free_holding, limit)
+            return _along(task, min(ways, key=lambda way: way.ratio), holding, limit)
     if thought is None:
         raise ValueError(_blocked(task))
     return _along(task, thought, exact, limit)
