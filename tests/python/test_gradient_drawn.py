@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import withe
-from gradient_scenes import TIGHT
+from gradient_scenes import TIGHT, extrapolated
 
 NODES = 11
 SUPPORTS = ("frame", "edge", "both", "end", "pins", "inner", "inner edge")
@@ -89,8 +89,7 @@ def test_gradient_by_drawn_nodes_is_that_of_scenes_built_anew(planar, support, n
         other.simulation.equilibrium()
         return float((weight * shown(other)).sum())
 
-    wide, near = ((of(h) - of(-h)) / (2.0 * h) for h in (2e-5, 1e-5))
-    assert np.sum(gradient * way) == pytest.approx((4.0 * near - wide) / 3.0, rel=1e-6, abs=2e-7)
+    assert np.sum(gradient * way) == pytest.approx(extrapolated(of, 1e-5), rel=1e-6, abs=2e-7)
 
 
 def test_a_shape_that_is_set_later_does_not_follow_drawn_nodes():
@@ -105,8 +104,8 @@ def test_a_shape_that_is_set_later_does_not_follow_drawn_nodes():
     weight = np.zeros((NODES, 3))
     weight[-1] = 1.0
     (gradient,) = found.gradient(weight, [(first.arm, "points")])
-    wide, near = ((tip(arm(h)[0]) - tip(arm(-h)[0])) / (2.0 * h) for h in (2e-5, 1e-5))
-    assert np.sum(gradient * way) == pytest.approx((4.0 * near - wide) / 3.0, rel=1e-6)
+    expected = extrapolated(lambda h: tip(arm(h)[0]), 1e-5)
+    assert np.sum(gradient * way) == pytest.approx(expected, rel=1e-6)
 
 
 def tip(arm):
@@ -161,8 +160,7 @@ def test_gradient_of_a_run_by_drawn_nodes_is_that_of_scenes_built_anew(integrato
         }
         return float(sum((weights[word] * shown[word]).sum() for word in weights))
 
-    wide, near = ((of(h) - of(-h)) / (2.0 * h) for h in (2e-5, 1e-5))
-    assert np.sum(gradient * way) == pytest.approx((4.0 * near - wide) / 3.0, rel=1e-6)
+    assert np.sum(gradient * way) == pytest.approx(extrapolated(of, 1e-5), rel=1e-6)
 
 
 @pytest.mark.parametrize("friction", ["none", "implicit", "lagged"])
@@ -195,8 +193,7 @@ def test_gradient_by_drawn_nodes_of_a_rod_that_falls_on_a_floor_is_that_of_scene
     def of(h):
         return float((weight * run(h)[2].positions()).sum())
 
-    wide, near = ((of(h) - of(-h)) / (2.0 * h) for h in (2e-7, 1e-7))
-    assert np.sum(gradient * way) == pytest.approx((4.0 * near - wide) / 3.0, rel=1e-5)
+    assert np.sum(gradient * way) == pytest.approx(extrapolated(of, 1e-7), rel=1e-5)
 
 
 def test_drawn_nodes_that_have_no_gradient_say_so():

@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import withe
-from gradient_scenes import TIGHT
+from gradient_scenes import TIGHT, extrapolated
 from test_gradient_forward import nodes_of
 
 STEP, NODES = 2e-3, 11
@@ -71,12 +71,6 @@ def scalar(weights, record):
     return sum(float((weights[word] * getattr(record, word)()).sum()) for word in weights)
 
 
-def swept(of, size):
-    """Central difference at zero, of fourth order."""
-    wide, near = ((of(h) - of(-h)) / (2.0 * h) for h in (2.0 * size, size))
-    return (4.0 * near - wide) / 3.0
-
-
 def slips(record_or_simulation, held):
     return np.linalg.norm(record_or_simulation.deflection(held.hand).slip)
 
@@ -100,7 +94,7 @@ def test_gradient_of_a_run_with_a_moving_hand_is_that_of_differences(integrator,
     found = record.gradient(weights, wrt)
 
     def check(gradient, of, size, name):
-        assert gradient == pytest.approx(swept(of, size), rel=1e-6, abs=1e-9), name
+        assert gradient == pytest.approx(extrapolated(of, size), rel=1e-6, abs=1e-9), name
 
     def after(change, **options):
         sim.restore(start)
@@ -178,7 +172,7 @@ def test_gradient_by_the_pose_that_a_hand_began_with_is_that_of_differences(inte
         (by_place @ shift, lambda h: scalar(weights, run(shift=h * shift)), 1e-5),
         (by_turn @ turn, lambda h: scalar(weights, run(turn=h * turn)), 1e-4),
     ):
-        assert gradient == pytest.approx(swept(of, size), rel=1e-6, abs=1e-9)
+        assert gradient == pytest.approx(extrapolated(of, size), rel=1e-6, abs=1e-9)
 
 
 @pytest.mark.parametrize("kind", ["rigid", "yielding"])
@@ -208,7 +202,7 @@ def test_gradient_of_an_equilibrium_in_a_hand_is_that_of_differences(planar, kin
         (found[2] @ shift, lambda h: held.move(sim, shift=h * shift), 1e-4),
         (found[3] @ turn, lambda h: held.move(sim, turn=h * turn), 1e-3),
     ):
-        assert gradient == pytest.approx(swept(lambda h, c=change: of(lambda: c(h)), size), rel=1e-6, abs=1e-9)
+        assert gradient == pytest.approx(extrapolated(lambda h, c=change: of(lambda: c(h)), size), rel=1e-6, abs=1e-9)
     if kind == "rigid":
         return
     uneven = random.uniform(0.5, 1.5, size=6)
@@ -220,7 +214,7 @@ def test_gradient_of_an_equilibrium_in_a_hand_is_that_of_differences(planar, kin
         other.simulation.equilibrium()
         return float((weight * other.simulation.positions()).sum())
 
-    assert found[4] @ (uneven * STIFFNESS) == pytest.approx(swept(with_stiffness, 1e-3), rel=1e-6, abs=1e-9)
+    assert found[4] @ (uneven * STIFFNESS) == pytest.approx(extrapolated(with_stiffness, 1e-3), rel=1e-6, abs=1e-9)
 
 
 @pytest.mark.parametrize("planar", [True, False])
@@ -252,7 +246,7 @@ def test_gradient_of_what_a_rigid_hand_holds_with_is_that_of_differences(integra
             total += float(weights[0, frame] @ wrench.force + weights[1, frame] @ wrench.moment)
         return total
 
-    assert found == pytest.approx(swept(of, 1e3), rel=1e-6, abs=1e-12)
+    assert found == pytest.approx(extrapolated(of, 1e3), rel=1e-6, abs=1e-12)
 
 
 class Wrench:
@@ -322,7 +316,7 @@ def test_gradient_of_what_a_yielding_hand_holds_with_is_that_of_differences(inte
             ("rotation", call.gradients["rotation"] @ turn, lambda h: case.of(turn=h * turn), 1e-4),
         ]
     for name, gradient, of, size in checks:
-        assert gradient == pytest.approx(swept(of, size), rel=1e-6, abs=1e-9), name
+        assert gradient == pytest.approx(extrapolated(of, size), rel=1e-6, abs=1e-9), name
 
 
 @pytest.mark.parametrize("planar", [True, False])
@@ -349,7 +343,7 @@ def test_jacobian_of_what_a_yielding_hand_holds_with_in_equilibrium_is_that_of_d
             (STIFFNESS, lambda h: of(stiffness=(1.0 + h) * STIFFNESS), 1e-3),
         )
     ):
-        expected = swept(change, size)
+        expected = extrapolated(change, size)
         for word in range(2):
             np.testing.assert_allclose(by[word][i] @ way, expected[word], rtol=1e-6, atol=1e-7 * np.abs(expected).max())
 

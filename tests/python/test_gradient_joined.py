@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import withe
-from gradient_scenes import TIGHT
+from gradient_scenes import TIGHT, extrapolated
 
 NODES, BRANCH = 9, 5
 AT_TIP = ("corner", "smooth", "clamped")
@@ -117,11 +117,6 @@ class Design:
         return float(np.sum(gradient * self.ways[0 if self.of == "arm" else 1]))
 
 
-def difference(of):
-    wide, near = ((of(h) - of(-h)) / (2.0 * h) for h in (2e-5, 1e-5))
-    return (4.0 * near - wide) / 3.0
-
-
 @pytest.mark.parametrize("of", ["arm", "branch"])
 @pytest.mark.parametrize("natural", ["as_built", "straight"])
 @pytest.mark.parametrize("kind", KINDS)
@@ -148,7 +143,7 @@ def test_gradient_by_drawn_nodes_of_joined_rods_is_that_of_scenes_built_anew(pla
             other.simulation.equilibrium()
             return float((weight * of_scene(other)).sum())
 
-        assert design.along(gradient) == pytest.approx(difference(scalar), rel=1e-6, abs=2e-7), word
+        assert design.along(gradient) == pytest.approx(extrapolated(scalar, 1e-5), rel=1e-6, abs=2e-7), word
 
 
 @pytest.mark.parametrize("of", ["arm", "branch"])
@@ -190,7 +185,7 @@ def test_gradient_of_a_run_by_drawn_nodes_of_joined_rods_is_that_of_scenes_built
         }
         return float(sum((weights[word] * shown[word]).sum() for word in weights))
 
-    assert design.along(gradient) == pytest.approx(difference(scalar), rel=1e-6)
+    assert design.along(gradient) == pytest.approx(extrapolated(scalar, 1e-5), rel=1e-6)
 
 
 @pytest.mark.parametrize("natural", ["as_built", "straight"])
@@ -214,5 +209,5 @@ def test_directors_at_an_angle_to_the_plane_of_a_scene_turn_with_the_drawing(wor
     if word == "positions":
         weight = weight * (1, 0, 1) @ world.T
     (gradient,) = found.gradient({word: {made.arm: weight}}, [(made.arm, "points")])
-    expected = difference(lambda h: float((weight * shown(h)[2]).sum()))
+    expected = extrapolated(lambda h: float((weight * shown(h)[2]).sum()), 1e-5)
     assert np.sum(gradient * (way @ world.T)) == pytest.approx(expected, rel=1e-6)

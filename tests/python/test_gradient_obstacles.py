@@ -4,17 +4,11 @@ import numpy as np
 import pytest
 
 import withe
-from gradient_scenes import TIGHT
+from gradient_scenes import TIGHT, extrapolated
 from test_gradient_contact import FRICTIONS, INTEGRATORS, NODES, Touching
 
 OBSTACLES = ("floor", "slope in a plane", "sphere", "capsule", "post", "floor slowly")
 FIRST, SECOND = 3, 8  # steps before which an obstacle sets out
-
-
-def extrapolated(of, size):
-    """Central difference at zero, of fourth order."""
-    wide, near = ((of(h) - of(-h)) / (2.0 * h) for h in (2.0 * size, size))
-    return (4.0 * near - wide) / 3.0
 
 
 def run(touching, targets, roll=None, **options):
