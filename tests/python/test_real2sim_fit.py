@@ -46,6 +46,21 @@ def test_the_limbs_of_the_dissertation_are_explained_in_three_iterations_a_frame
     assert found.unobservable == ()
 
 
+def test_what_is_found_in_a_frame_does_not_depend_on_the_frames_before_it():
+    """Their derivatives and their shape are where a frame begins, however far off they are, and whatever was seen."""
+    simulation = arm()
+    rng = np.random.default_rng(5)
+    curvatures = np.stack([np.zeros(14), rng.uniform(-9.0, 9.0, 14)], axis=1)
+    points = drawn(simulation, curvatures, [10, 20, 30])
+    points[3, 1] = points[8, :2] = np.nan
+    tags = Tags(points, names((10, 20, 30)), sigma=1e-4)
+    found = fit(simulation, tags, ARM, progress=False)
+    alone = [fit(simulation, Tags(points[[f]], tags.places, sigma=1e-4), ARM, progress=False) for f in range(14)]
+    assert np.abs(found.values[:, 0] - curvatures[:, 1]).max() < 1e-7
+    assert np.allclose(found.values[:, 0], [one.values[0, 0] for one in alone], rtol=0.0, atol=1e-7)
+    assert np.allclose(found.covariance[:, 0, 0], [one.covariance[0, 0, 0] for one in alone], rtol=1e-6)
+
+
 def test_published_turns_reach_the_published_tolerance():
     simulation, places = robot()
     residual = seen_curvatures(places).bind(simulation)

@@ -13,7 +13,7 @@ from withe.common.progress import progress as progress_bar
 from withe.errors import ConvergenceError
 from withe.perception.camera import Camera
 from withe.real2sim.camera_problem import CameraProblem
-from withe.real2sim.least_squares import FrameSolution, all_frames, lone_frame, reduced, weaknesses
+from withe.real2sim.least_squares import FrameSolution, all_frames, lone_frame, reduced, spectra, weaknesses
 from withe.real2sim.parsing import parse_unknowns
 from withe.real2sim.places import Line, Places
 from withe.real2sim.results import Unobservable
@@ -235,7 +235,7 @@ def _not_told(problem: CameraProblem, solutions: dict[int, FrameSolution], free:
             weakness.effect,
             misfit,
         )
-        for weakness in weaknesses(matrix, rows, misfit)
+        for weakness in weaknesses(spectra([matrix])[0], rows, misfit)
     )
 
 

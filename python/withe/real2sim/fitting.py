@@ -106,7 +106,7 @@ def fit(
     stills = Stills(copy, own + common, residual, conditions)
     start = stills.begin()
     blank = residual.value(copy.positions(), 0)
-    good = [f for f in range(listed[0].frames) if np.isfinite(residual.value(copy.positions(), f)).any()]
+    good = [frame for frame in range(listed[0].frames) if any(target.told(frame) for target in listed)]
     if not good:
         raise ValueError(f"targets must show something in some frame, got nothing in all {listed[0].frames}")
     if conditions is not None:
@@ -142,20 +142,23 @@ def _frame_by_frame(
     stills: Stills, frames: list[int], start: FloatArray, method: str, goal: float, limit: int, bar: Progress
 ) -> tuple[dict[int, FrameSolution], dict[int, int]]:
     """Every frame by itself, beginning with what the one before it found."""
-    solutions, solves = {}, {}
-    guess = start
+    solutions: dict[int, FrameSolution] = {}
+    solves = {}
+    guess, nearby = start, None
     for frame in frames:
         before = stills.solves
         if not stills.per_frame.any():
             solutions[frame] = FrameSolution(start, np.zeros(0), np.zeros((0, 0)), 0, True)
         elif method == "gauss_newton":
-            solutions[frame] = lone_frame(stills, frame, guess, stills.per_frame, goal, limit)
+            solutions[frame] = lone_frame(stills, frame, guess, stills.per_frame, goal, limit, first=nearby)
         elif method == "lbfgs":
             solutions[frame] = minimise(stills, frame, guess, goal, limit)
         else:
             solutions[frame] = descend(stills, frame, guess, goal, limit)
         if solutions[frame].converged:
             guess = solutions[frame].coordinates
+            all_seen = np.isfinite(solutions[frame].residual).all()
+            nearby = solutions[frame].jacobian if all_seen and stills.conditions is None else None
         solves[frame] = stills.solves - before
         bar.advance(1)
     return solutions, solves

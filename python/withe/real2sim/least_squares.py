@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -15,12 +16,14 @@ __all__ = [
     "FrameSolution",
     "Problem",
     "Secants",
+    "Spectrum",
     "Weakness",
     "all_frames",
     "lone_frame",
     "range_of",
     "reduced",
     "seen",
+    "spectra",
     "weaknesses",
 ]
 
@@ -30,7 +33,7 @@ BoolArray = npt.NDArray[np.bool_]
 _RANK = 1e-9  # singular values below it, relative to the greatest, belong to directions that nothing tells
 _SMALL = 1e-5  # a step that would lessen the residual by less than this share of it is the last
 _TRIALS = 8
-_TRIALS_OF_SECANTS = 2  # then derivatives are asked for anew
+_TRIALS_OF_INEXACT = 2  # with derivatives that are updated or of another frame; then they are asked for anew
 _WORTH = 0.01
 _SMALL_OF_SECANTS = 1e-2  # likewise, of what each number that was seen leaves
 
@@ -67,6 +70,13 @@ class Weakness:
     direction: FloatArray
     effect: float  # of a change by one scale, root of the mean square over the residuals
     frames: list[int] = field(default_factory=list)
+
+
+class Spectrum(NamedTuple):
+    """Singular values of a matrix, as many as it has columns, and its right singular vectors as rows."""
+
+    values: FloatArray
+    vectors: FloatArray
 
 
 class Secants:
@@ -120,22 +130,28 @@ def _seen_rows(jacobian: FloatArray, residual: FloatArray) -> FloatArray:
     return np.where(np.isnan(residual)[:, None], 0.0, jacobian)
 
 
+def _norm(numbers: FloatArray) -> float:
+    return math.sqrt(numbers @ numbers)
+
+
 def _size(residual: FloatArray) -> float:
-    return float(np.linalg.norm(seen(residual)))
+    return _norm(seen(residual))
 
 
 def _bounded(matrix: FloatArray, right: FloatArray, radius: float) -> FloatArray:
     """The x of least |matrix x - right| among those with no coordinate beyond a radius, by Levenberg's damping."""
     u, values, vectors = np.linalg.svd(matrix, full_matrices=False)
-    good = values > _RANK * values.max(initial=0.0)
-    values, along = values[good], u[:, good].T @ right
+    rank = int(np.count_nonzero(values > _RANK * values[0])) if values.size else 0
+    values, vectors = values[:rank], vectors[:rank]
+    along = right @ u[:, :rank]
 
     def step(damping: float) -> FloatArray:
-        return np.asarray(vectors[good].T @ (values * along / (values**2 + damping)))
+        return np.asarray((values * along / (values**2 + damping)) @ vectors)
 
-    if np.abs(step(0.0)).max(initial=0.0) <= radius:
-        return step(0.0)
-    low, high = values.min() ** 2 * 1e-6, values.max() ** 2 * max(1.0, np.linalg.norm(along / values) / radius)
+    whole = step(0.0)
+    if np.abs(whole).max(initial=0.0) <= radius:
+        return whole
+    low, high = values[-1] ** 2 * 1e-6, values[0] ** 2 * max(1.0, np.linalg.norm(along / values) / radius)
     while high > 1.1 * low:
         middle = np.sqrt(low * high)
         low, high = (middle, high) if np.abs(step(middle)).max() > radius else (low, middle)
@@ -150,49 +166,57 @@ def lone_frame(
     tolerance: float,
     max_iterations: int,
     secants: Secants | None = None,
+    first: FloatArray | None = None,
 ) -> FrameSolution:
     """Fit one frame, with the coordinates that are not free as they are.
 
-    No coordinate changes by more than its scale in one step, and by a quarter of that when a step brings nothing.
+    No coordinate changes by more than its scale in one step, and by a quarter of that when a step brings nothing. The
+    first step may be taken with derivatives, over scales, that another frame has nearby; no search ends with them.
     """
-    scales = problem.scales[free]
+    which: BoolArray | slice = slice(None) if free.all() else free
+    scales = problem.scales[which]
     found = problem.residual(start, frame)
     if found is None:
         empty = np.full(0, np.nan)
         return FrameSolution(start, empty, np.zeros((0, len(scales))), 0, False, "no equilibrium to begin with")
     coordinates, (residual, state) = start.copy(), found
+    size = _size(residual)
     for iteration in range(1, max_iterations + 1):
+        lagged = first is not None
         try:
-            if secants is None:
-                derivatives = problem.jacobian(coordinates, state, frame)
+            if first is not None:
+                jacobian, first = _seen_rows(first, residual), None
+            elif secants is None:
+                jacobian = _seen_rows(problem.jacobian(coordinates, state, frame)[:, which] * scales, residual)
             else:
                 derivatives = secants.jacobian(problem, coordinates, residual, state, frame)
+                jacobian = _seen_rows(derivatives[:, which] * scales, residual)
         except ConvergenceError as error:
             empty = np.zeros((len(residual), len(scales)))
             return FrameSolution(coordinates, residual, empty, iteration, False, f"no derivatives there: {error}")
-        jacobian = _seen_rows(derivatives[:, free] * scales, residual)
-        step = _bounded(jacobian, -seen(residual), 1.0)
-        gain = float(np.linalg.norm(jacobian @ step))
-        rows = max(int(np.isfinite(residual).sum()), 1)
-        small = _SMALL if secants is None else _SMALL_OF_SECANTS / np.sqrt(rows)
-        if gain <= small * _size(residual) or gain <= tolerance:
-            if secants is not None and secants.renew():
+        right = -seen(residual)
+        step = _bounded(jacobian, right, 1.0)
+        gain = _norm(jacobian @ step)
+        small = _SMALL if secants is None else _SMALL_OF_SECANTS / np.sqrt(np.isfinite(residual).sum())
+        if gain <= small * size or gain <= tolerance:
+            if lagged or (secants is not None and secants.renew()):
                 continue
             return FrameSolution(coordinates, residual, jacobian, iteration, True)
         if secants is not None and secants.are_worth_renewing(gain, len(scales)) and secants.renew():
             continue
-        for _ in range(_TRIALS if secants is None or not secants.updated else _TRIALS_OF_SECANTS):
+        inexact = lagged or (secants is not None and secants.updated)
+        for _ in range(_TRIALS_OF_INEXACT if inexact else _TRIALS):
             trial = coordinates.copy()
-            trial[free] += scales * step
+            trial[which] += scales * step
             found = problem.residual(trial, frame)
-            if found is not None and _size(found[0]) < _size(residual):
-                coordinates, (residual, state) = trial, found
+            if found is not None and (smaller := _size(found[0])) < size:
+                coordinates, (residual, state), size = trial, found, smaller
                 break
-            step = _bounded(jacobian, -seen(residual), 0.25 * float(np.abs(step).max()))
+            step = _bounded(jacobian, right, 0.25 * float(np.abs(step).max()))
         else:
-            if secants is None or not secants.renew():
+            if not lagged and (secants is None or not secants.renew()):
                 return FrameSolution(coordinates, residual, jacobian, iteration, False, "no step lessens the residual")
-        if secants is None and _size(residual) <= tolerance:
+        if secants is None and not lagged and size <= tolerance:
             return FrameSolution(coordinates, residual, jacobian, iteration, True)
     return FrameSolution(coordinates, residual, jacobian, max_iterations, False, "max_iterations were not enough")
 
@@ -318,25 +342,31 @@ def _closed(
     return solutions
 
 
-def weaknesses(jacobian: FloatArray, rows: int, misfit: float) -> list[Weakness]:
+def spectra(matrices: Sequence[FloatArray]) -> list[Spectrum]:
+    """Of matrices of one shape, all at once."""
+    rows, count = matrices[0].shape
+    _, values, vectors = np.linalg.svd(np.stack(matrices), full_matrices=rows < count)
+    values = np.concatenate([values, np.zeros((len(values), count - values.shape[1]))], axis=1)
+    return [Spectrum(*pair) for pair in zip(values, vectors, strict=True)]
+
+
+def weaknesses(spectrum: Spectrum, rows: int, misfit: float) -> list[Weakness]:
     """Directions in which a change by one scale moves the targets by less than the misfit, or than rounding.
 
     Were the misfit systematic, the least squares could be off by more than the scale there.
 
     Parameters
     ----------
-    jacobian : ndarray of shape (residuals, n)
-        By coordinates over their scales.
+    spectrum : Spectrum
+        Of derivatives by coordinates over their scales.
     rows : int
         Residuals that were seen.
     misfit : float
         Root of the mean square of the residuals.
     """
-    count = jacobian.shape[1]
-    if rows == 0 or count == 0:
+    if rows == 0:
         return []
-    _, values, vectors = np.linalg.svd(jacobian, full_matrices=True)
-    values = np.concatenate([values, np.zeros(count - len(values))])
-    effects = values / np.sqrt(rows)
-    least = max(misfit, _RANK * float(effects.max()))
-    return [Weakness(vectors[i], float(effects[i])) for i in range(count) if effects[i] < least or effects[i] == 0.0]
+    effects = spectrum.values / np.sqrt(rows)
+    least = max(misfit, _RANK * float(effects.max(initial=0.0)))
+    weak = (effects < least) | (effects == 0.0)
+    return [Weakness(spectrum.vectors[i], float(effects[i])) for i in np.flatnonzero(weak)]

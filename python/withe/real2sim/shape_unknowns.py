@@ -36,8 +36,9 @@ class NaturalCurvature(Unknown):
         self._directions = np.eye(2) if plane is None else plane[0][None]
         axes = [" towards d1", " towards d2"] if plane is None else [""]
         self.names = tuple(f"natural_curvature of {part.name!r}{axis}{word}" for axis in axes for word in words)
-        self._fields = np.concatenate([functions[:, :, None] * direction for direction in self._directions], axis=1)
-        self._inverse = np.linalg.pinv(self._fields.transpose(0, 2, 1).reshape(-1, len(self.names)))
+        fields = [functions.T[:, :, None] * direction for direction in self._directions]
+        self._rows = np.concatenate(fields).reshape(len(self.names), -1)  # one a function: components of each stencil
+        self._inverse = np.linalg.pinv(self._rows.T)
         largest = np.abs(functions).max(axis=0)
         self.scales = np.tile(1.0 / (self.length * largest), len(axes))
 
@@ -47,7 +48,7 @@ class NaturalCurvature(Unknown):
 
     def write(self, simulation: Simulation, coordinates: FloatArray) -> None:
         """Set them."""
-        simulation.set(self._rod, natural_curvature=np.einsum("snc,n->sc", self._fields, coordinates))
+        simulation.set(self._rod, natural_curvature=(coordinates @ self._rows).reshape(-1, 2))
 
     @property
     def words(self) -> list[Any]:
@@ -56,7 +57,7 @@ class NaturalCurvature(Unknown):
 
     def chain(self, coordinates: FloatArray, found: list[list[Any]]) -> FloatArray:
         """What each function stands for."""
-        return np.asarray(np.tensordot(np.array(found[0]), self._fields, axes=([1, 2], [0, 2])))
+        return np.asarray(np.reshape(found[0], (len(found[0]), -1)) @ self._rows.T)
 
 
 class DrawnShape(Unknown):

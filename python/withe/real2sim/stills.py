@@ -45,7 +45,7 @@ class Equilibria(Coordinates):
         conditions: Conditions | None = None,
     ) -> None:
         super().__init__(simulation, unknowns)
-        self._conditions = conditions
+        self.conditions = conditions
         self.solves = 0
 
     def positions(self, coordinates: FloatArray, frame: int) -> FloatArray:
@@ -65,12 +65,11 @@ class Equilibria(Coordinates):
             raise
 
     def _go(self, coordinates: FloatArray, frame: int) -> FloatArray:
-        unchanged = self._conditions is None and np.array_equal(coordinates, self._written)
-        self.write(coordinates)
-        if unchanged:
+        if self.conditions is None and (coordinates == self._written).all():
             return self.simulation.positions()
-        if self._conditions is not None:
-            self._conditions(self.simulation, frame)
+        self.write(coordinates)
+        if self.conditions is not None:
+            self.conditions(self.simulation, frame)
         self.solves += 1
         self.simulation.equilibrium()
         return self.simulation.positions()

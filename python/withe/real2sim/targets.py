@@ -64,10 +64,14 @@ class Target(ABC):
 
 def turns(points: FloatArray) -> FloatArray:
     """Angles between the chords of points in a plane, counter-clockwise positive, (..., n, 2) -> (..., n - 2) [rad]."""
-    chords = np.diff(points, axis=-2)
+    return _turns_of(points[..., 1:, :] - points[..., :-1, :])
+
+
+def _turns_of(chords: FloatArray) -> FloatArray:
     before, after = chords[..., :-1, :], chords[..., 1:, :]
     cross = before[..., 0] * after[..., 1] - before[..., 1] * after[..., 0]
-    return np.asarray(np.arctan2(cross, (before * after).sum(axis=-1)))
+    along = before[..., 0] * after[..., 0] + before[..., 1] * after[..., 1]
+    return np.asarray(np.arctan2(cross, along))
 
 
 @dataclass(eq=False)
@@ -159,24 +163,21 @@ class _CurvatureResidual(Residual):
         first = np.eye(3)[np.abs(axis).argmin()]
         first = np.cross(first, axis)
         self._plane = np.stack([first / np.linalg.norm(first), np.cross(axis, first) / np.linalg.norm(first)])
-        self._weights = places.weights()[0]
-        self._chords = np.diff(self._weights, axis=0)
+        self._chords = np.diff(places.weights()[0], axis=0)  # of tags, from nodes
         self._bends = np.diff(np.eye(len(target.places) - 1), axis=0)  # of chords against each other
         self._means = np.zeros((len(target.groups), len(target.places) - 2))
         for row, group in enumerate(target.groups):
             self._means[row, np.array(group) - 1] = 1.0 / len(group)
 
     def value(self, positions: FloatArray, frame: int) -> FloatArray:
-        points = self._weights @ positions @ self._plane.T
-        found = self._means @ (2.0 * np.tan(turns(points) / 2.0))
+        found = self._means @ (2.0 * np.tan(_turns_of(self._chords @ positions @ self._plane.T) / 2.0))
         return np.asarray((found - self._values[frame]) / self._sigma)
 
     def derivative(self, positions: FloatArray, frame: int) -> FloatArray:
-        points = self._weights @ positions @ self._plane.T
-        chords = np.diff(points, axis=0)
+        chords = self._chords @ positions @ self._plane.T
         # A chord e turns by (e x de) / |e|^2 about the axis: by (axis x e) . de.
-        across = np.stack([-chords[:, 1], chords[:, 0]], axis=1) / (chords**2).sum(axis=1)[:, None]
-        slope = self._means * (1.0 + np.tan(turns(points) / 2.0) ** 2) / self._sigma
+        across = chords[:, ::-1] * (-1.0, 1.0) / (chords**2).sum(axis=1, keepdims=True)
+        slope = self._means * (1.0 + np.tan(_turns_of(chords) / 2.0) ** 2) / self._sigma
         by_chord = (slope @ self._bends)[:, :, None] * (across @ self._plane)
         return np.asarray(self._chords.T @ by_chord)
 

@@ -99,7 +99,7 @@ class Coordinates:
     def write(self, coordinates: FloatArray) -> None:
         """Set what is not set yet."""
         for unknown, place in zip(self.unknowns, self.slices, strict=True):
-            if not np.array_equal(coordinates[place], self._written[place]):
+            if not (coordinates[place] == self._written[place]).all():
                 unknown.write(self.simulation, coordinates[place])
                 self._written[place] = coordinates[place]
 

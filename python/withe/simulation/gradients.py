@@ -51,8 +51,7 @@ def equilibrium_gradient(session: Session, by: Loss, wrt: Sequence[Unknown]) -> 
     else:
         by_positions = validation.number_array(by, "dL_dx", (session.directory.layout.node_count, 3))
         check_in_plane(session, by_positions, "dL_dx")
-        adjoints = [_core.ReadoutAdjoint()]
-        adjoints[0].positions = by_positions
+        adjoints = [_by_positions(by_positions)]
     (found,) = session.world.equilibrium_gradients(adjoints)
     return [read(found) for read in readers]
 
@@ -60,15 +59,19 @@ def equilibrium_gradient(session: Session, by: Loss, wrt: Sequence[Unknown]) -> 
 def equilibrium_gradients(session: Session, by_positions: FloatArray, wrt: Sequence[Unknown]) -> list[list[Any]]:
     """Derivatives of several scalars of the present equilibrium, for each of `wrt` one a scalar.
 
-    `by_positions` of shape (scalars, nodes, 3).
+    `by_positions` of shape (scalars, nodes, 3), finite, in the plane of a planar scene.
 
     The stiffness is factorised once for all of them.
     """
     readers = unknown_readers(session, wrt)
-    found = session.world.equilibrium_gradients(
-        readout_adjoints(session, {"positions": by_positions}, len(by_positions))
-    )
+    found = session.world.equilibrium_gradients([_by_positions(each) for each in by_positions])
     return [[read(gradient) for gradient in found] for read in readers]
+
+
+def _by_positions(values: FloatArray) -> _core.ReadoutAdjoint:
+    adjoint = _core.ReadoutAdjoint()
+    adjoint.positions = values
+    return adjoint
 
 
 def equilibrium_jacobian(session: Session, of: Any, wrt: Sequence[Unknown]) -> list[FloatArray]:

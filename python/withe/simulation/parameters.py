@@ -197,7 +197,7 @@ def _set_rod(session: Session, part: RodPart, values: dict[str, Any]) -> None:
             natural[word] = stretch_array(value, len(part.lengths), part.owner)
         else:
             parameters = parameters.with_value(word, value, part.section, part.owner)
-    session.world.set(part.index, parameters.acting(before) | natural)
+    session.world.set(part.index, natural if parameters is before else parameters.acting(before) | natural)
     session.settings.rods[part.index] = parameters
 
 
