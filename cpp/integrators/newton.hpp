@@ -33,9 +33,9 @@ class Stagnation {
  public:
   /// After each evaluation: the greatest residual [N], and the step that led there [m], infinite at the start.
   void note(double residual, double step) {
-    stalls_ = residual > 0.5 * residual_ ? stalls_ + 1 : 0;
+    stalls_ = residual > 0.5 * halved_ ? stalls_ + 1 : 0;
     reached_ = stalls_ > 1 || (stalls_ == 1 && step > 0.5 * step_);
-    residual_ = residual;
+    if (stalls_ == 0) halved_ = residual;
     step_ = step;
   }
   bool reached() const { return reached_; }
@@ -43,7 +43,7 @@ class Stagnation {
   int stalls() const { return stalls_; }
 
  private:
-  double residual_ = INFINITY, step_ = INFINITY;
+  double halved_ = INFINITY, step_ = INFINITY;  ///< residual when it last halved, last step
   int stalls_ = 0;
   bool reached_ = false;
 };
