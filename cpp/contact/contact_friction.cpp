@@ -15,11 +15,6 @@ constexpr double kGive = 0.05;
 // On a way this short, over the slip that friction grows with, a tangent says enough.
 constexpr double kShortWay = 0.1;
 
-/// K / (2 dt), over the slip tolerance [1/m].
-double slip_rate(const ContactProblem& problem, double regularisation) {
-  return 7.5 / (regularisation * problem.parameters->slip_tolerance * problem.duration);
-}
-
 FrictionForce<double> friction_now(const ContactProblem& problem, const Touching& t) {
   if (beside_plane(problem, t)) return plane_friction(problem, t, slip_rate(problem, 1.0));
   double unused[kContactUnknowns] = {};
@@ -27,6 +22,14 @@ FrictionForce<double> friction_now(const ContactProblem& problem, const Touching
 }
 
 }  // namespace
+
+double slip_rate(const ContactProblem& problem, double regularisation) {
+  return 7.5 / (regularisation * problem.parameters->slip_tolerance * problem.duration);
+}
+
+bool rubs(const ContactProblem& problem, const Touching& t) {
+  return t.lagged >= 0 || (!problem.lags() && t.pair.friction > 0.0);
+}
 
 bool regularises_friction(const Model& model) {
   const FrictionLaw law = model.description.contact.friction_law;
@@ -84,15 +87,14 @@ double friction_slope(const ContactProblem& problem, const Touching& t, const Co
 
 bool add_friction(const ContactProblem& problem, const Touching& t, const ContactLinearisation& linearisation,
                   bool with_hessian, ContactLocal& out) {
-  if (t.lagged < 0 && (problem.lags() || !(t.pair.friction > 0.0))) return false;
+  if (!rubs(problem, t)) return false;
+  if (beside_plane(problem, t)) {
+    add_plane_contact(problem, t, PlaneForces::friction, linearisation, with_hessian, out);
+    return true;
+  }
   const Vec3d* predicted = linearisation.friction.of(t.pair.key);
   if (t.lagged >= 0) {
     add_lagged_friction(problem, t, slip_rate(problem, linearisation.regularisation), predicted, with_hessian, out);
-    return true;
-  }
-  if (beside_plane(problem, t)) {
-    const double rate = slip_rate(problem, linearisation.regularisation);
-    add_plane_friction(problem, t, rate, predicted, with_hessian, out);
     return true;
   }
   const FrictionSetting f = friction_setting(problem, t, linearisation.regularisation, predicted);

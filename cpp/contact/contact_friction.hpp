@@ -9,7 +9,11 @@ namespace withe {
 
 /// Whether friction grows with slip, so that its slip tolerance can be made greater for a while.
 bool regularises_friction(const Model& model);
-/// Of an anchor, for a contact of that stiffness [N/m].
+/// K / (2 dt), over what makes the slip tolerance greater [1/m].
+double slip_rate(const ContactProblem& problem, double regularisation);
+/// Whether there is friction on a contact in a step.
+bool rubs(const ContactProblem& problem, const Touching& t);
+/// Tangential stiffness of an anchor, for a contact of that stiffness [N/m].
 double tangential_stiffness(const ContactPair& pair, double stiffness);
 /// Of a contact that presses, or of a lagged one as it was at the start. `regularisation`, `predicted`: see
 /// `ContactLinearisation`; what it refers to must outlive it.

@@ -6,6 +6,7 @@
 #include "contact/contact_friction.hpp"
 #include "contact/contact_stiffness.hpp"
 #include "contact/impacts.hpp"
+#include "contact/plane_contact.hpp"
 #include "contact/pressing.hpp"
 
 namespace withe {
@@ -98,6 +99,10 @@ void contact_local(const ContactProblem& problem, const Touching& t, const Conta
   std::fill(std::begin(out.gradient), std::end(out.gradient), 0.0);
   if (with_hessian)
     for (auto& row : out.hessian) std::fill(std::begin(row), std::end(row), 0.0);
+  if (beside_plane(problem, t)) {
+    add_plane_contact(problem, t, PlaneForces::both, linearisation, with_hessian, out);
+    return;
+  }
   if (t.lagged < 0) add_pressing(problem, t, with_hessian, linearisation.geometric, out);
   add_friction(problem, t, linearisation, with_hessian, out);
 }

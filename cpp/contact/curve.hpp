@@ -149,17 +149,20 @@ Scalar curve_parabola(const CurveWeights& w, const Obstacle& o, const Vec3<Scala
     return value;
   }
   // Heights above a plane are linear in the nodes.
-  PointDistance<Scalar> node;
+  Scalar slope = 0.0, bend = 0.0;
   for (int i = 0; i < w.nodes; ++i) {
-    node = distance_to(o, x[i], drift);
-    value += w.middle[i] * node.distance;
-    d.slope += w.slope[i] * node.distance;
-    d.bend += w.bend[i] * node.distance;
+    const Scalar height = height_above(o, x[i], drift);
+    value += w.middle[i] * height;
+    slope += w.slope[i] * height;
+    bend += w.bend[i] * height;
   }
   for (int j = 0; j < 3; ++j) {
     const double s = w.sample(j);
-    d.sample[j] = {value + s * (d.slope + (0.5 * s) * d.bend), node.normal};
+    d.sample[j].distance = value + s * (slope + (0.5 * s) * bend);
+    d.sample[j].normal = {Scalar(o.other.x), Scalar(o.other.y), Scalar(o.other.z)};
   }
+  d.slope = slope;
+  d.bend = bend;
   return value;
 }
 

@@ -25,18 +25,25 @@ struct PointDistance {
   bool beside = false;  ///< a capsule's axis, between its ends
 };
 
+/// Height above a plane that is taken back by `drift`.
+template <class Scalar>
+Scalar height_above(const Obstacle& plane, const Vec3<Scalar>& x, const Vec3d& drift = {}) {
+  const Vec3d &n = plane.other, from = plane.point - drift;
+  return n.x * (x.x - Scalar(from.x)) + n.y * (x.y - Scalar(from.y)) + n.z * (x.z - Scalar(from.z));
+}
+
 /// `drift`: the obstacle is taken back by so much.
 template <class Scalar>
 PointDistance<Scalar> distance_to(const Obstacle& o, const Vec3<Scalar>& x, const Vec3d& drift = {}) {
   using std::sqrt;
   const auto lift = [](const Vec3d& v) { return Vec3<Scalar>{Scalar(v.x), Scalar(v.y), Scalar(v.z)}; };
   PointDistance<Scalar> out;
-  Vec3<Scalar> way = x - lift(o.point - drift);
   if (o.kind == ObstacleKind::plane) {
     out.normal = lift(o.other);
-    out.distance = dot(out.normal, way);
+    out.distance = height_above(o, x, drift);
     return out;
   }
+  Vec3<Scalar> way = x - lift(o.point - drift);
   const Vec3d axis = o.other - o.point;
   const double square = dot(axis, axis);
   if (square > 1e-18 * o.radius * o.radius) {

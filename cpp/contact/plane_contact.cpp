@@ -11,32 +11,41 @@ namespace {
 // A node's height and its place along the plane stand one after the other.
 constexpr int kHeight = 0, kPlace = 1, kWays = 6;
 
+/// Minus the forces of a contact by heights and places, and their derivative when asked for.
+struct PlaneLocal {
+  double gradient[kWays] = {};
+  double hessian[kWays][kWays] = {};
+  bool with_hessian;
+};
+
 /// Across and along a plane.
 struct Axes {
   Vec3d normal, along;
 
   explicit Axes(const Obstacle& o) : normal(o.other), along{o.other.y, -o.other.x, 0.0} {}
 
-  /// Adds a vector or a matrix of heights and places to those of the unknowns.
-  void add(const double (&ways)[kWays], double (&out)[kContactUnknowns]) const {
+  /// Adds what is by heights and places to what is by unknowns.
+  void add(const PlaneLocal& local, ContactLocal& out) const {
     for (int i = 0; i < 3; ++i) {
-      const double h = ways[2 * i + kHeight], y = ways[2 * i + kPlace];
-      out[3 * i] += normal.x * h + along.x * y;
-      out[3 * i + 1] += normal.y * h + along.y * y;
+      const double h = local.gradient[2 * i + kHeight], y = local.gradient[2 * i + kPlace];
+      out.gradient[3 * i] += normal.x * h + along.x * y;
+      out.gradient[3 * i + 1] += normal.y * h + along.y * y;
     }
-  }
-  void add(const double (&ways)[kWays][kWays], double (&out)[kContactUnknowns][kContactUnknowns]) const {
-    for (int i = 0; i < 3; ++i)
+    if (!local.with_hessian) return;
+    for (int i = 0; i < 3; ++i) {
+      const double(&heights)[kWays] = local.hessian[2 * i + kHeight], (&places)[kWays] = local.hessian[2 * i + kPlace];
+      double(&out_x)[kContactUnknowns] = out.hessian[3 * i], (&out_y)[kContactUnknowns] = out.hessian[3 * i + 1];
       for (int j = 0; j < 3; ++j) {
-        const double hh = ways[2 * i][2 * j], hy = ways[2 * i][2 * j + 1], yh = ways[2 * i + 1][2 * j],
-                     yy = ways[2 * i + 1][2 * j + 1];
-        const double hx = normal.x * hh + along.x * yh, yx = normal.x * hy + along.x * yy;
-        const double hz = normal.y * hh + along.y * yh, yz = normal.y * hy + along.y * yy;
-        out[3 * i][3 * j] += hx * normal.x + yx * along.x;
-        out[3 * i][3 * j + 1] += hx * normal.y + yx * along.y;
-        out[3 * i + 1][3 * j] += hz * normal.x + yz * along.x;
-        out[3 * i + 1][3 * j + 1] += hz * normal.y + yz * along.y;
+        const double xh = normal.x * heights[2 * j] + along.x * places[2 * j];
+        const double xy = normal.x * heights[2 * j + 1] + along.x * places[2 * j + 1];
+        const double yh = normal.y * heights[2 * j] + along.y * places[2 * j];
+        const double yy = normal.y * heights[2 * j + 1] + along.y * places[2 * j + 1];
+        out_x[3 * j] += xh * normal.x + xy * along.x;
+        out_x[3 * j + 1] += xh * normal.y + xy * along.y;
+        out_y[3 * j] += yh * normal.x + yy * along.x;
+        out_y[3 * j + 1] += yh * normal.y + yy * along.y;
       }
+    }
   }
 };
 
@@ -141,9 +150,8 @@ class PlaneSlip {
     }
   }
 
-  void add_gradient(ContactLocal& out) const {
-    double ways[kWays] = {};
-    for (int i = 0; i < w_.nodes; ++i) ways[2 * i + kPlace] = weight_[i] * force_;
+  void add_gradient(double (&ways)[kWays]) const {
+    for (int i = 0; i < w_.nodes; ++i) ways[2 * i + kPlace] += weight_[i] * force_;
     for (int b = 0; b < edges_; ++b) {
       const PlaneEdge& e = edge_[b];
       const double couple = lever_[b] * force_ * e.inverse_square;
@@ -152,12 +160,11 @@ class PlaneSlip {
       ways[2 * b + kHeight] -= couple * e.along;
       ways[2 * b + kPlace] += couple * e.across;
     }
-    axes_.add(ways, out.gradient);
   }
 
   /// `by_end`: of what presses, by the distance.
-  void add_hessian(const Touching& t, const Vec3d* predicted, ContactLocal& out) const {
-    const HeightSlopes d(w_, t.proximity.curve);
+  void add_hessian(const Touching& t, const HeightSlopes& d, const Vec3d* predicted,
+                   double (&matrix)[kWays][kWays]) const {
     double turned[kWays], change[kWays];
     slope(d, turned);
     const Vec3d known = predicted ? *predicted : Vec3d{};
@@ -165,13 +172,11 @@ class PlaneSlip {
     const double by_slip = law_.factor + 2.0 * law_.by_square * slip_ * dual;
     for (int k = 0; k < kWays; ++k) change[k] = by_slip * turned[k];
     for (int i = 0; i < 3; ++i) change[2 * i + kHeight] -= law_.by_pressing * slip_ * t.pressing.by_end * d.distance[i];
-    double matrix[kWays][kWays] = {};
     for (int i = 0; i < w_.nodes; ++i) {
-      for (int k = 0; k < kWays; ++k) matrix[2 * i + kPlace][k] = weight_[i] * change[k];
+      for (int k = 0; k < kWays; ++k) matrix[2 * i + kPlace][k] += weight_[i] * change[k];
       for (int k = 0; k < 3; ++k) matrix[2 * i + kPlace][2 * k + kHeight] += weight_slope_[i] * force_ * d.s[k];
     }
     for (int b = 0; b < edges_; ++b) add_couple(b, change, d, matrix);
-    axes_.add(matrix, out.hessian);
   }
 
  private:
@@ -233,22 +238,13 @@ class PlaneSlip {
   ForceLaw law_;
 };
 
-}  // namespace
-
-bool beside_plane(const ContactProblem& problem, const Touching& t) {
-  if (!t.pair.curve() || !problem.model().planar() || t.lagged >= 0) return false;
-  return problem.bodies.flat(t.pair) && t.pair.isotropic() && problem.turn.empty();
-}
-
-void add_plane_pressing(const ContactProblem& problem, const Touching& t, bool with_hessian, bool geometric,
-                        ContactLocal& out) {
+void add_pressing_to(PlaneLocal& out, const ContactProblem& problem, const Touching& t, const Axes& axes,
+                     const HeightSlopes& slopes, bool geometric) {
   const CurvePiece& piece = t.pair.piece;
   const CurveDistance<double>& end = t.proximity.curve;
-  const Axes axes(problem.bodies.obstacle(t.pair));
-  const HeightSlopes slopes(*piece.weights, end);
   double along[3], derivative[3][3] = {};
   std::copy(slopes.distance, slopes.distance + 3, along);
-  if (with_hessian && geometric) {
+  if (out.with_hessian && geometric) {
     // See add_curve_hessian: d^2 D = -phi ds^2 + (s^2 / 2) phi'' dg2^2.
     const double bent = 0.5 * end.s * end.s * end.bend_change(piece.least_bend);
     for (int i = 0; i < 3; ++i)
@@ -257,23 +253,36 @@ void add_plane_pressing(const ContactProblem& problem, const Touching& t, bool w
             bent * piece.weights->bend[i] * piece.weights->bend[j] - end.stiff * slopes.s[i] * slopes.s[j];
   }
   if (problem.means_direction())
-    add_height_start(problem, t, axes, geometric, along, with_hessian ? derivative : nullptr);
-  double ways[kWays] = {};
-  for (int i = 0; i < 3; ++i) ways[2 * i + kHeight] = t.pressing.first * along[i];
-  axes.add(ways, out.gradient);
-  if (!with_hessian) return;
-  double matrix[kWays][kWays] = {};
-  for (int i = 0; i < 3; ++i)
+    add_height_start(problem, t, axes, geometric, along, out.with_hessian ? derivative : nullptr);
+  for (int i = 0; i < 3; ++i) out.gradient[2 * i + kHeight] += t.pressing.first * along[i];
+  for (int i = 0; i < 3 && out.with_hessian; ++i)
     for (int j = 0; j < 3; ++j)
-      matrix[2 * i][2 * j] = t.pressing.first * derivative[i][j] + t.pressing.by_end * along[i] * slopes.distance[j];
-  axes.add(matrix, out.hessian);
+      out.hessian[2 * i + kHeight][2 * j + kHeight] +=
+          t.pressing.first * derivative[i][j] + t.pressing.by_end * along[i] * slopes.distance[j];
 }
 
-void add_plane_friction(const ContactProblem& problem, const Touching& t, double rate, const Vec3d* predicted,
-                        bool with_hessian, ContactLocal& out) {
-  const PlaneSlip slip(problem, t, rate);
-  slip.add_gradient(out);
-  if (with_hessian) slip.add_hessian(t, predicted, out);
+void add_friction_to(PlaneLocal& out, const ContactProblem& problem, const Touching& t, const HeightSlopes& slopes,
+                     const ContactLinearisation& linearisation) {
+  const PlaneSlip slip(problem, t, slip_rate(problem, linearisation.regularisation));
+  slip.add_gradient(out.gradient);
+  if (out.with_hessian) slip.add_hessian(t, slopes, linearisation.friction.of(t.pair.key), out.hessian);
+}
+
+}  // namespace
+
+bool beside_plane(const ContactProblem& problem, const Touching& t) {
+  if (!t.pair.curve() || !problem.model().planar() || t.lagged >= 0) return false;
+  return problem.bodies.flat(t.pair) && t.pair.isotropic() && problem.turn.empty();
+}
+
+void add_plane_contact(const ContactProblem& problem, const Touching& t, PlaneForces which,
+                       const ContactLinearisation& linearisation, bool with_hessian, ContactLocal& out) {
+  const Axes axes(problem.bodies.obstacle(t.pair));
+  const HeightSlopes slopes(*t.pair.piece.weights, t.proximity.curve);
+  PlaneLocal local{.with_hessian = with_hessian};
+  if (which != PlaneForces::friction) add_pressing_to(local, problem, t, axes, slopes, linearisation.geometric);
+  if (which != PlaneForces::pressing && rubs(problem, t)) add_friction_to(local, problem, t, slopes, linearisation);
+  axes.add(local, out);
 }
 
 FrictionForce<double> plane_friction(const ContactProblem& problem, const Touching& t, double rate) {

@@ -17,13 +17,12 @@ namespace withe {
 /// rod.
 bool beside_plane(const ContactProblem& problem, const Touching& t);
 
-/// `add_pressing` of such a contact.
-void add_plane_pressing(const ContactProblem& problem, const Touching& t, bool with_hessian, bool geometric,
-                        ContactLocal& out);
-/// Minus its friction that is not lagged, and the derivative when asked for. `rate`: K / (2 dt) [1/m].
-void add_plane_friction(const ContactProblem& problem, const Touching& t, double rate, const Vec3d* predicted,
-                        bool with_hessian, ContactLocal& out);
-/// That friction on the slip.
+enum class PlaneForces { pressing, friction, both };
+
+/// Adds minus the forces of such a contact, and their derivative when asked for.
+void add_plane_contact(const ContactProblem& problem, const Touching& t, PlaneForces which,
+                       const ContactLinearisation& linearisation, bool with_hessian, ContactLocal& out);
+/// Its friction on the slip. `rate`: K / (2 dt) [1/m].
 FrictionForce<double> plane_friction(const ContactProblem& problem, const Touching& t, double rate);
 /// `slipping` of such a contact.
 Slipping plane_slipping(const ContactProblem& problem, const Touching& t, double rate, const VectorX& change);

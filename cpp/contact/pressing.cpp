@@ -143,7 +143,7 @@ void distance_slope(const Touching& t, double (&out)[12]) {
 void add_pressing(const ContactProblem& problem, const Touching& t, bool with_hessian, bool geometric,
                   ContactLocal& out) {
   if (beside_plane(problem, t)) {
-    add_plane_pressing(problem, t, with_hessian, geometric, out);
+    add_plane_contact(problem, t, PlaneForces::pressing, {.geometric = geometric}, with_hessian, out);
     return;
   }
   if (t.pair.curve()) {

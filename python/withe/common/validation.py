@@ -35,6 +35,8 @@ FloatArray = npt.NDArray[np.float64]
 _LARGEST = 1e50
 # Numbers that BLAS adds up by itself, without threads.
 _ALONE = 8192
+_IDENTITY = np.eye(3)
+_ORTHONORMAL = 1e-15  # to which rotations and their products are rounded
 
 
 def number(value: Any, what: str) -> float:
@@ -256,10 +258,14 @@ def rotation_matrix(value: Any, what: str) -> FloatArray:
     """
     as_matrix = getattr(value, "as_matrix", None)
     matrix = number_array(as_matrix() if callable(as_matrix) else value, what, (3, 3))
-    if np.abs(matrix @ matrix.T - np.eye(3)).max() > 1e-6:
+    off = float(np.abs(matrix @ matrix.T - _IDENTITY).max())
+    if off > 1e-6:
         raise ValueError(f"{what} must be a rotation: its rows are not orthonormal")
-    if np.linalg.det(matrix) < 0.0:
+    (a, b, c), (d, e, f), (g, h, i) = matrix.tolist()
+    if a * (e * i - f * h) + b * (f * g - d * i) + c * (d * h - e * g) < 0.0:
         raise ValueError(f"{what} must be a rotation, got a reflection")
+    if off <= _ORTHONORMAL:
+        return matrix
     u, _, vt = np.linalg.svd(matrix)
     return np.asarray(u @ vt, np.float64)
 
