@@ -33,8 +33,8 @@ struct Axes {
     }
     if (!local.with_hessian) return;
     for (int i = 0; i < 3; ++i) {
-      const double(&heights)[kWays] = local.hessian[2 * i + kHeight], (&places)[kWays] = local.hessian[2 * i + kPlace];
-      double(&out_x)[kContactUnknowns] = out.hessian[3 * i], (&out_y)[kContactUnknowns] = out.hessian[3 * i + 1];
+      const double (&heights)[kWays] = local.hessian[2 * i + kHeight], (&places)[kWays] = local.hessian[2 * i + kPlace];
+      double (&out_x)[kContactUnknowns] = out.hessian[3 * i], (&out_y)[kContactUnknowns] = out.hessian[3 * i + 1];
       for (int j = 0; j < 3; ++j) {
         const double xh = normal.x * heights[2 * j] + along.x * places[2 * j];
         const double xy = normal.x * heights[2 * j + 1] + along.x * places[2 * j + 1];

@@ -73,6 +73,25 @@ def test_before_step_is_called_once_a_time_step():
     assert np.ptp(record.curvatures(arm)) > 0.1
 
 
+def test_steps_are_no_longer_than_a_callback_says():
+    _, _, simulation = cantilever(time_step=0.01)
+    begun = []
+
+    def longest(s):
+        begun.append(s.time)
+        return 0.002 if 0.03 <= s.time < 0.05 else 1.0
+
+    record = simulation.run(0.1, record_every=0.025, longest_step=longest, progress=False)
+    assert np.array_equal(record.times, [0.0, 0.025, 0.05, 0.025 * 3, 0.1])
+    # 10, 10, 5 ms to the first frame, 10 to 35 ms, 2 from there to the next, and then again 10, 10, 5.
+    expected = [*range(0, 21, 10), 25, *range(35, 50, 2), 50, 60, 70, 75, 85, 95]
+    assert np.allclose(begun, 1e-3 * np.array(expected))
+    with pytest.raises(ValueError, match="longest_step must be positive"):
+        simulation.run(0.1, longest_step=lambda s: 0.0, progress=False)
+    with pytest.raises(ValueError, match="longest_step must be a function"):
+        simulation.run(0.1, longest_step=0.01, progress=False)
+
+
 def test_until_ends_the_run_after_the_step_that_fulfils_it():
     _, arm, simulation = cantilever()
     record = simulation.run(10.0, record_every=0.02, until=lambda s: s.positions(arm)[-1, 2] < -0.02, progress=False)

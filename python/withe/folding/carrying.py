@@ -64,8 +64,11 @@ def carried(simulation: Simulation, jaw: JawMotion, rods: Sequence[Rod], duratio
             bar.update(simulation.time)
             return watch(simulation)
 
+        def longest_step(simulation: Simulation) -> float:
+            return jaw.longest_step(simulation.time, simulation.time_step)
+
         try:
-            simulation.run(_LONGEST, _FRAMES, progress=False, until=ended)
+            simulation.run(_LONGEST, _FRAMES, progress=False, until=ended, longest_step=longest_step)
         except ConvergenceError as error:
             watch.failure = f"no solution: {error}"
     return watch

@@ -19,6 +19,8 @@ FloatArray = npt.NDArray[np.float64]
 _COMES_IN = 0.1  # of the first motion, over which the jaw's errors grow
 _FOLLOWS = 0.2  # [s]
 _RINGS = 5  # times that, until what it was given rings no more
+_RESOLVED = 2e-3  # of the way of an edge in a step [m]
+_LANDING = 0.1  # after an edge has been quick, until steps may be longer [s]
 _JUMP = np.array([1e-3, 1e-3, 0.05])  # between motions, at most [m], [m], [rad]
 
 
@@ -85,6 +87,16 @@ class JawMotion:
         """
         ages = _FOLLOWS * np.arange(_RINGS)
         return max(float(np.exp(-age / _FOLLOWS)) * self._way.speed(time - age - _FOLLOWS, time - age) for age in ages)
+
+    def longest_step(self, time: float, longest: float) -> float:
+        """How long a step that begins at a time may be [s]: what is quick, and what it has set in motion, is resolved.
+
+        No step goes beyond the end of a motion.
+        """
+        left = self.end - time
+        longest = left if 1e-9 < left < longest else longest
+        speed = self._way.speed(time - _LANDING, time + longest)
+        return longest if speed * longest <= _RESOLVED else _RESOLVED / speed
 
     @property
     def end(self) -> float:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -51,16 +52,28 @@ class _Tried:
 
         sheet.carry_out(motions(), slow.target, duration=float(slow.times[-1]), progress=False)
 
-    def fold(self, way: _Part) -> Fold | None:
-        """None where the sheet has snapped before."""
-        return None if self._held is None else self._sheet.carry_on(self._held, [way], self._target)
+    def crease(self, way: _Part) -> float:
+        """How far it is off [m]; infinite where the sheet snaps."""
+        fold = self._fold(way)
+        return np.inf if fold is None else fold.error
+
+    def off(self, way: _Part) -> float:
+        """The same, or half of how far the sheet slides where that is more [m]."""
+        fold = self._fold(way)
+        return np.inf if fold is None else max(abs(fold.error), 0.5 * abs(fold.slide))
+
+    def _fold(self, way: _Part) -> Fold | None:
+        if self._held is None:
+            return None
+        fold = self._sheet.carry_on(self._held, [way], self._target)
+        return fold if fold.failure is None else None
 
 
 def plunge(
     plan: Plan,
     *,
     press: float = 2e-3,
-    duration: float = 0.025,
+    duration: float | Sequence[float] = (0.025, 0.05),
     within: float = 5e-3,
     sheet: Mapping[str, Any] | None = None,
     progress: bool = True,
@@ -68,22 +81,24 @@ def plunge(
     """End a plan quickly, and with the edge pressed onto the sheet that it comes down on.
 
     Where more friction is needed in the end than there is, the edge is drawn back or pushed on as it comes down slowly.
-    It is led down within `duration` instead, before the sheet can follow, and `press` lower than it can go: the jaw
+    It is led down within a `duration` instead, before the sheet can follow, and `press` lower than it can go: the jaw
     yields, and presses both layers on the table with that times its stiffness, up to its force limit, so that they
     stay. It goes down from over the target: from the least height to which the sheet is led without slide, whatever of
     the plan's `uncertainty` it is, or from where least friction is needed. A plan with a free moment is made anew up to
-    there, others are cut off. How much to the side it goes, and whether the edge ends level or as the plan has it, is
-    tried on simulated sheets without noise, those of `Plan.papers`: aimed so that the paper as it is thought to be is
-    folded right, it is the way on which the worst of them is best.
+    there, others are cut off. How much to the side it goes, within what time, and whether the edge ends level or as the
+    plan has it, is tried on simulated sheets without noise, those of `Plan.papers`: aimed so that the paper as it is
+    thought to be is folded right, it is the way on which the worst of them is best, by how far its crease is off and
+    by half of how far it slides.
 
     Parameters
     ----------
     plan : Plan
     press : float [m]
-    duration : float [s]
-        Of the way down. The longer it takes the farther the sheet slides meanwhile.
+    duration : float or sequence of float [s]
+        Of the way down, or those that are tried. The longer it takes the farther the sheet may slide meanwhile, the
+        shorter, the more it is thrown.
     within : float [m]
-        How far off the crease may be on the worst of these sheets.
+        How far off the crease may be on the worst of these sheets, and half as far as it may slide.
     sheet : mapping, optional
         Options of `SimulatedSheet`; by default sheets at the bounds have 75 edges.
     progress : bool
@@ -112,49 +127,48 @@ def plunge(
     if plan.plunges_at is not None:
         raise ValueError(f"plan must come down slowly, it plunges at {plan.plunges_at:.2f} s already")
     press = validation.positive(press, "press")
-    duration, bound = validation.positive(duration, "duration"), validation.positive(within, "within")
+    bound = validation.positive(within, "within")
+    durations = np.atleast_1d(validation.number_array(duration, "duration", (), ("n",)))
+    if not durations.size or durations.min() <= 0.0:
+        raise ValueError(f"duration must be positive, got {duration!r:.80}")
     slow, papers, lgb = _above(plan), plan.papers, plan.paper.gravito_bending_length
-    angles = (np.pi, float(plan.angles[-1]))
-    with progress_bar(len(papers) + 2 * len(angles), "plunging", progress) as bar:
+    ways = [partial(_down, slow, *of) for of in product((np.pi, float(plan.angles[-1])), [press], durations.tolist())]
+    with progress_bar(len(papers) + 2 * len(ways), "plunging", progress) as bar:
         tried: list[_Tried] = []
         for paper in papers:
             options = sheet if sheet is not None else _COARSE if tried else {}
             tried.append(_Tried(slow, SimulatedSheet(paper, jaw=plan.jaw, **options)))
             bar.advance(1)
 
-        def crease(each: _Tried, angle: float, aside: float) -> float:
-            fold = each.fold(_down(slow, angle, aside, press, duration))
-            return np.inf if fold is None or fold.failure is not None else fold.error
-
-        best, least = (np.pi, 0.0), np.inf
-        for angle in angles:
-            way = angle, _aimed(partial(crease, tried[0], angle), _SHORT * lgb)
+        best, least = ways[0](0.0), np.inf
+        for down in ways:
+            way = down(_aimed(tried[0], down, _SHORT * lgb))
             bar.advance(1)
             worst = 0.0
             for each in tried:
-                worst = max(worst, abs(crease(each, *way)))
+                worst = max(worst, each.off(way))
                 if worst >= least:
                     break
             best, least = (way, worst) if worst < least else (best, least)
             bar.advance(1)
     if least > bound:
         raise ValueError(_missed(plan, least, bound))
-    return _ended(slow, _down(slow, *best, press, duration))
+    return _ended(slow, best)
 
 
-def _aimed(crease: Callable[[float], float], short: float) -> float:
+def _aimed(sheet: _Tried, down: Callable[[float], _Part], short: float) -> float:
     """How far to the side the edge goes down so that a crease is where it should be [m]."""
     aside = 0.0
-    error = crease(aside)
+    error = sheet.crease(down(aside))
     if not np.isfinite(error):  # its sheet slides back from under the edge
         aside = -short
-        error = crease(aside)
+        error = sheet.crease(down(aside))
     share = 1.0
     for _ in range(_CORRECTIONS):
         if abs(error) < _ENOUGH or not np.isfinite(error):
             break
         other = aside - 2.0 * share * error
-        found = crease(other)
+        found = sheet.crease(down(other))
         if abs(found) < abs(error):
             aside, error = other, found
         else:  # too far: an edge may miss the sheet
@@ -187,7 +201,7 @@ def _cut(plan: Plan, height: float) -> Plan:
     return replace(plan, poses=plan.poses[keep], angles=plan.angles[keep], times=plan.times[keep], _foreseen=foreseen)
 
 
-def _down(slow: Plan, angle: float, aside: float, press: float, duration: float) -> _Part:
+def _down(slow: Plan, angle: float, press: float, duration: float, aside: float) -> _Part:
     """From its last pose straight down to the target, `aside` further in x and `press` too low, and pressed there."""
     end = [slow.target + aside, 0.0, slow.paper.thickness - press, 0.0, np.sin(0.5 * angle), 0.0, np.cos(0.5 * angle)]
     times = slow.times[-1] + np.array([0.0, duration, duration + _HOLDING])

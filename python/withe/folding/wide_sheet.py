@@ -84,7 +84,7 @@ class WideSheet:
     edges : int
         Of each strip.
     time_step : float [s]
-        Of backward Euler: a tenth of the plunges in which plans may end.
+        Of backward Euler; as in `SimulatedSheet`.
     own_friction : float
         Of a strip on itself.
 
@@ -118,7 +118,7 @@ class WideSheet:
         unevenness: float = 0.1,
         jaw: Jaw | None = None,
         edges: int = 75,
-        time_step: float = 0.0025,
+        time_step: float = 0.01,
         own_friction: float = 0.3,
     ) -> None:
         if not isinstance(paper, Paper):

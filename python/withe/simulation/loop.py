@@ -38,6 +38,7 @@ class Run(Generic[S]):
         until: Callable[[S], object] | None,
         record: Mapping[str, Callable[[S], npt.ArrayLike]] | None,
         differentiable: bool = False,
+        longest_step: Callable[[S], float] | None = None,
     ) -> None:
         self.duration = validation.positive(duration, "duration")
         step = stepping.session.options.time_step
@@ -55,13 +56,13 @@ class Run(Generic[S]):
             self._interval = validation.positive(record_every, "record_every")
         if self.duration / self._interval > _MAX_FRAMES:
             raise ValueError(f"record_every must fit the duration, {self.duration:g} s, got {self._interval:g}")
-        for name, value in (("before_step", before_step), ("until", until)):
+        for name, value in (("before_step", before_step), ("until", until), ("longest_step", longest_step)):
             if value is not None:
                 validation.function(value, name)
         if record is not None and not isinstance(record, Mapping):
             raise ValueError(f"record must be a mapping of names to functions, got {type(record).__name__}")
         self._simulation = simulation
-        self._before_step = before_step
+        self._before_step, self._longest_step = before_step, longest_step
         self._until = until
         self._stepping = stepping
         directory = stepping.session.directory
@@ -109,6 +110,9 @@ class Run(Generic[S]):
     def _advance(self, begin: float, end: float) -> None:
         """From one frame to the next; both count from the start of the run [s]."""
         step = self._stepping.session.options.time_step
+        if self._longest_step is not None:
+            self._steps_no_longer_than(self._longest_step, self._start + end, step)
+            return
         ratio = (end - begin) / step
         whole = round(ratio)
         if whole >= 1 and abs(ratio - whole) < 1e-9 * whole:
@@ -122,6 +126,19 @@ class Run(Generic[S]):
             self._stepping.advance_to(target if i == count else start + (target - start) * i / count)
             self._after(begin + (end - begin) * i / count)
             if self._ended:
+                return
+
+    def _steps_no_longer_than(self, longest_step: Callable[[S], float], target: float, step: float) -> None:
+        """To a time."""
+        while not self._ended:
+            self._before()
+            longest = min(step, validation.positive(longest_step(self._simulation), "longest_step"))
+            then = self._stepping.session.world.time + longest
+            if then >= target - 1e-9 * longest:
+                then = target
+            self._stepping.advance_to(then)
+            self._after(then - self._start)
+            if then == target:
                 return
 
     def _whole_steps(self, begin: float, count: int, step: float) -> None:

@@ -213,6 +213,7 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
         until: Callable[[Simulation], object] | None = None,
         record: Mapping[str, Callable[[Simulation], npt.ArrayLike]] | None = None,
         differentiable: bool = False,
+        longest_step: Callable[[Simulation], float] | None = None,
     ) -> Record:
         """Advance by a duration and record what happens.
 
@@ -236,6 +237,9 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
             ``record[name]``.
         differentiable : bool
             Whether to keep what `Record.gradient` needs: the unknowns of every step, 8 bytes each.
+        longest_step : callable
+            Called with the simulation before every time step: how long it may be [s], where the motion is quicker than
+            what the time step of the simulation resolves. Steps are never longer than that.
 
         Returns
         -------
@@ -247,14 +251,16 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
         ConvergenceError, KeyboardInterrupt, or what a callback raised
             What was recorded until then is `simulation.record`.
         ValueError
-            A duration or record_every that is not positive or too short to change the time, or a callback
-            that cannot be called.
+            A duration or record_every that is not positive or too short to change the time, a callback
+            that cannot be called, or a longest step that is not positive.
         RuntimeError
             Called by a callback of a run: those may read, set, hold and copy the simulation, but not advance it
             or take it back.
         """
         self._stepping.refuse_in_run("run")
-        loop = Run(self, self._stepping, duration, record_every, before_step, until, record, differentiable)
+        loop = Run(
+            self, self._stepping, duration, record_every, before_step, until, record, differentiable, longest_step
+        )
         with progress_bar(loop.duration, "simulating", progress) as bar:
             loop.go(bar.update, lambda: False)
         return loop.record
