@@ -158,7 +158,7 @@ def _frame_by_frame(
         if solutions[frame].converged:
             guess = solutions[frame].coordinates
             all_seen = np.isfinite(solutions[frame].residual).all()
-            nearby = solutions[frame].jacobian if all_seen and stills.conditions is None else None
+            nearby = solutions[frame].linear if all_seen and stills.conditions is None else None
         solves[frame] = stills.solves - before
         bar.advance(1)
     return solutions, solves

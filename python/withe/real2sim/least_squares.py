@@ -13,6 +13,7 @@ import numpy.typing as npt
 from withe.errors import ConvergenceError
 
 __all__ = [
+    "Decomposed",
     "FrameSolution",
     "Problem",
     "Secants",
@@ -61,6 +62,7 @@ class FrameSolution:
     iterations: int
     converged: bool
     reason: str = ""
+    linear: Decomposed | None = None  # the derivatives, where they were decomposed last
 
 
 @dataclass(eq=False)
@@ -138,24 +140,35 @@ def _size(residual: FloatArray) -> float:
     return _norm(seen(residual))
 
 
-def _bounded(matrix: FloatArray, right: FloatArray, radius: float) -> FloatArray:
-    """The x of least |matrix x - right| among those with no coordinate beyond a radius, by Levenberg's damping."""
-    u, values, vectors = np.linalg.svd(matrix, full_matrices=False)
-    rank = int(np.count_nonzero(values > _RANK * values[0])) if values.size else 0
-    values, vectors = values[:rank], vectors[:rank]
-    along = right @ u[:, :rank]
+class Decomposed:
+    """A matrix, by its singular values, for least squares with several right sides.
 
-    def step(damping: float) -> FloatArray:
-        return np.asarray((values * along / (values**2 + damping)) @ vectors)
+    Attributes
+    ----------
+    matrix : ndarray
+    """
 
-    whole = step(0.0)
-    if np.abs(whole).max(initial=0.0) <= radius:
-        return whole
-    low, high = values[-1] ** 2 * 1e-6, values[0] ** 2 * max(1.0, np.linalg.norm(along / values) / radius)
-    while high > 1.1 * low:
-        middle = np.sqrt(low * high)
-        low, high = (middle, high) if np.abs(step(middle)).max() > radius else (low, middle)
-    return step(high)
+    def __init__(self, matrix: FloatArray) -> None:
+        self.matrix = matrix
+        u, values, vectors = np.linalg.svd(matrix, full_matrices=False)
+        rank = int(np.count_nonzero(values > _RANK * values[0])) if values.size else 0
+        self._u, self._values, self._vectors = u[:, :rank], values[:rank], vectors[:rank]
+
+    def bounded(self, right: FloatArray, radius: float) -> FloatArray:
+        """The x of least |matrix x - right| among those with no coordinate beyond a radius, by Levenberg's damping."""
+        values, along = self._values, right @ self._u
+
+        def step(damping: float) -> FloatArray:
+            return np.asarray((values * along / (values**2 + damping)) @ self._vectors)
+
+        whole = np.asarray((along / values) @ self._vectors)
+        if np.abs(whole).max(initial=0.0) <= radius:
+            return whole
+        low, high = values[-1] ** 2 * 1e-6, values[0] ** 2 * max(1.0, np.linalg.norm(along / values) / radius)
+        while high > 1.1 * low:
+            middle = np.sqrt(low * high)
+            low, high = (middle, high) if np.abs(step(middle)).max() > radius else (low, middle)
+        return step(high)
 
 
 def lone_frame(
@@ -166,7 +179,7 @@ def lone_frame(
     tolerance: float,
     max_iterations: int,
     secants: Secants | None = None,
-    first: FloatArray | None = None,
+    first: Decomposed | None = None,
 ) -> FrameSolution:
     """Fit one frame, with the coordinates that are not free as they are.
 
@@ -185,23 +198,25 @@ def lone_frame(
         lagged = first is not None
         try:
             if first is not None:
-                jacobian, first = _seen_rows(first, residual), None
-            elif secants is None:
-                jacobian = _seen_rows(problem.jacobian(coordinates, state, frame)[:, which] * scales, residual)
+                linear = Decomposed(_seen_rows(first.matrix, residual)) if np.isnan(residual).any() else first
+                first = None
             else:
-                derivatives = secants.jacobian(problem, coordinates, residual, state, frame)
-                jacobian = _seen_rows(derivatives[:, which] * scales, residual)
+                if secants is None:
+                    derivatives = problem.jacobian(coordinates, state, frame)
+                else:
+                    derivatives = secants.jacobian(problem, coordinates, residual, state, frame)
+                linear = Decomposed(_seen_rows(derivatives[:, which] * scales, residual))
         except ConvergenceError as error:
             empty = np.zeros((len(residual), len(scales)))
             return FrameSolution(coordinates, residual, empty, iteration, False, f"no derivatives there: {error}")
-        right = -seen(residual)
-        step = _bounded(jacobian, right, 1.0)
+        jacobian, right = linear.matrix, -seen(residual)
+        step = linear.bounded(right, 1.0)
         gain = _norm(jacobian @ step)
         small = _SMALL if secants is None else _SMALL_OF_SECANTS / np.sqrt(np.isfinite(residual).sum())
         if gain <= small * size or gain <= tolerance:
             if lagged or (secants is not None and secants.renew()):
                 continue
-            return FrameSolution(coordinates, residual, jacobian, iteration, True)
+            return FrameSolution(coordinates, residual, jacobian, iteration, True, linear=linear)
         if secants is not None and secants.are_worth_renewing(gain, len(scales)) and secants.renew():
             continue
         inexact = lagged or (secants is not None and secants.updated)
@@ -212,12 +227,12 @@ def lone_frame(
             if found is not None and (smaller := _size(found[0])) < size:
                 coordinates, (residual, state), size = trial, found, smaller
                 break
-            step = _bounded(jacobian, right, 0.25 * float(np.abs(step).max()))
+            step = linear.bounded(right, 0.25 * float(np.abs(step).max()))
         else:
             if not lagged and (secants is None or not secants.renew()):
                 return FrameSolution(coordinates, residual, jacobian, iteration, False, "no step lessens the residual")
         if secants is None and not lagged and size <= tolerance:
-            return FrameSolution(coordinates, residual, jacobian, iteration, True)
+            return FrameSolution(coordinates, residual, jacobian, iteration, True, linear=linear)
     return FrameSolution(coordinates, residual, jacobian, max_iterations, False, "max_iterations were not enough")
 
 
@@ -322,14 +337,13 @@ def _damped_step(solutions: dict[int, FrameSolution], local: BoolArray, damping:
     matrix, right = reduced(extra, local)
     free = matrix.shape[1]
     matrix, right = np.concatenate([matrix, root * np.eye(free)]), np.concatenate([right, np.zeros(free)])
-    shared = _bounded(matrix, -right, np.inf)
+    shared = Decomposed(matrix).bounded(-right, np.inf)
     steps = {}
     for frame, solution in extra.items():
         step = np.empty(len(local))
         step[~local] = shared
-        step[local] = _bounded(
-            solution.jacobian[:, local], -solution.residual - solution.jacobian[:, ~local] @ shared, np.inf
-        )
+        left = -solution.residual - solution.jacobian[:, ~local] @ shared
+        step[local] = Decomposed(solution.jacobian[:, local]).bounded(left, np.inf)
         steps[frame] = step
     return steps
 
