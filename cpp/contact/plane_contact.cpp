@@ -89,7 +89,7 @@ struct PlaneEdge {
 /// How far such a surface has slipped, and the friction on that.
 class PlaneSlip {
  public:
-  PlaneSlip(const ContactProblem& problem, const Touching& t, double rate)
+  [[gnu::always_inline]] PlaneSlip(const ContactProblem& problem, const Touching& t, double rate)
       : pair_(t.pair), w_(*t.pair.piece.weights), axes_(problem.bodies.obstacle(t.pair)), s_(t.proximity.curve.s) {
     for (int i = 0; i < w_.nodes; ++i) {
       const Vec3d x{t.now[3 * i], t.now[3 * i + 1], 0.0};

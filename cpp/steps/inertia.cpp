@@ -13,7 +13,8 @@
 namespace withe {
 namespace {
 
-TurningEdge<double> turning_edge(const StepProblem& problem, const StepData& data, int edge) {
+[[gnu::always_inline]] inline TurningEdge<double> turning_edge(const StepProblem& problem, const StepData& data,
+                                                               bool in_middle, bool conserves, int edge) {
   const EdgeFrame<double>& f = data.configuration.edge[at(edge)];
   const int angle = problem.model.edge_dof[at(edge)];
   TurningEdge<double> out{.tangent = f.tangent,
@@ -25,11 +26,11 @@ TurningEdge<double> turning_edge(const StepProblem& problem, const StepData& dat
                           .end_length = 0.0,
                           .change = data.z[angle] - problem.start->q[angle],
                           .start_rate = problem.start->v[angle]};
-  if (problem.conserves_energy()) {
+  if (conserves) {
     out.end_tangent = data.end_configuration.edge[at(edge)].tangent;
     out.start_length = problem.start_configuration.length[edge];
     out.end_length = data.end_configuration.length[edge];
-  } else if (problem.in_middle()) {
+  } else if (in_middle) {
     const Vec3d e1 =
         2.0 * edge_vector(problem.model, data.z, edge) - edge_vector(problem.model, problem.start->q, edge);
     out.end_tangent = (1.0 / std::sqrt(dot(e1, e1))) * e1;
@@ -37,23 +38,34 @@ TurningEdge<double> turning_edge(const StepProblem& problem, const StepData& dat
   return out;
 }
 
-TurningForce<double> turning_force(const StepProblem& problem, double inertia, const TurningEdge<double>& turning,
-                                   const Vec3d& moved) {
-  return problem.in_middle() ? midpoint_turning(inertia, 2.0 * problem.interval, problem.conserves_energy(), turning)
-                             : euler_turning(inertia, problem.interval, turning, moved);
+[[gnu::always_inline]] inline TurningForce<double> turning_force(const StepProblem& problem, const StepData& data,
+                                                                 bool in_middle, bool conserves, double inertia,
+                                                                 int edge) {
+  const TurningEdge<double> turning = turning_edge(problem, data, in_middle, conserves, edge);
+  if (in_middle) return midpoint_turning(inertia, 2.0 * problem.interval, conserves, turning);
+  const Vec3d moved = edge_vector(problem.model, data.z, edge) - edge_vector(problem.model, problem.start->q, edge);
+  return euler_turning(inertia, problem.interval, turning, moved);
 }
 
 /// Inertia of edges that spin and turn: under backward Euler what the mass matrix knows nothing of, under the midpoint
 /// rules all of it.
+template <bool in_middle, bool conserves>
 void set_turning_edges(const StepProblem& problem, StepData& data) {
   const Model& model = problem.model;
   for (int e = 0; e < model.edge_count; ++e) {
-    const Vec3d moved = edge_vector(model, data.z, e) - edge_vector(model, problem.start->q, e);
     const TurningForce<double> force =
-        turning_force(problem, problem.parameters->edge_inertia[e], turning_edge(problem, data, e), moved);
-    if (problem.in_middle()) data.inertia[model.edge_dof[at(e)]] = force.torque;
+        turning_force(problem, data, in_middle, conserves, problem.parameters->edge_inertia[e], e);
+    if (in_middle) data.inertia[model.edge_dof[at(e)]] = force.torque;
     add_to_edge(model, e, force.head, data.gradient);
   }
+}
+void set_turning_edges(const StepProblem& problem, StepData& data) {
+  if (problem.conserves_energy())
+    set_turning_edges<true, true>(problem, data);
+  else if (problem.in_middle())
+    set_turning_edges<true, false>(problem, data);
+  else
+    set_turning_edges<false, false>(problem, data);
 }
 
 /// Inertia of frames under the midpoint rules: moments J^T m where a Cayley vector's spin is J dw; in energy-momentum
@@ -123,8 +135,8 @@ void add_turning_adjoint(const StepProblem& problem, const StepData& data, int e
   }
   adjoint.start[angle] += by[7];
   adjoint.velocity[angle] += by[8];
-  const Vec3d moved = edge_vector(model, data.z, edge) - edge_vector(model, problem.start->q, edge);
-  const TurningForce<double> unit = turning_force(problem, 1.0, turning_edge(problem, data, edge), moved);
+  const TurningForce<double> unit =
+      turning_force(problem, data, problem.in_middle(), problem.conserves_energy(), 1.0, edge);
   adjoint.coefficients.mass[angle] += dot(apart, unit.head) + about * unit.torque;
 }
 

@@ -44,8 +44,9 @@ Vec3<Scalar> spin_couple(double inertia, const Scalar& omega, const Vec3<Scalar>
 /// Of a step of backward Euler over h. psi = theta + spin . e is what turns: the edge's inertia acts on the nodes as
 /// its elastic torque does. It does no work either, since spin is normal to the edge before and now.
 template <class Scalar>
-TurningForce<Scalar> euler_turning(double inertia, double interval, const TurningEdge<Scalar>& edge,
-                                   const Vec3<Scalar>& moved) {
+[[gnu::always_inline]] inline TurningForce<Scalar> euler_turning(double inertia, double interval,
+                                                                 const TurningEdge<Scalar>& edge,
+                                                                 const Vec3<Scalar>& moved) {
   const double inverse = 1.0 / interval;
   const Scalar omega = inverse * edge.change;
   const Scalar torque = inertia * (omega - edge.start_rate) * inverse;
@@ -60,8 +61,8 @@ TurningForce<Scalar> euler_turning(double inertia, double interval, const Turnin
 /// dt, as in a rigid rotation of the whole, and an axial force that vanishes with the square of the step makes the work
 /// of m what kinetic energy changes by.
 template <class Scalar>
-TurningForce<Scalar> midpoint_turning(double inertia, double dt, bool conserves_energy,
-                                      const TurningEdge<Scalar>& edge) {
+[[gnu::always_inline]] inline TurningForce<Scalar> midpoint_turning(double inertia, double dt, bool conserves_energy,
+                                                                    const TurningEdge<Scalar>& edge) {
   const double inverse = 1.0 / dt;
   const Scalar change = 2.0 * edge.change;
   const Scalar turn = conserves_energy ? finite_turn(change) : change;
