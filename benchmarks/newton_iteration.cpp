@@ -15,6 +15,7 @@
 
 #include "scenes.hpp"
 #include "step_problem.hpp"
+#include "steps/elastic_forces.hpp"
 
 namespace withe {
 namespace {
