@@ -16,7 +16,7 @@ from withe.common.progress import progress as progress_bar
 from withe.folding.planning import plan_above
 from withe.folding.plans import Plan
 from withe.folding.sheets import at_forces, forces_of
-from withe.folding.simulated_sheet import Fold, Held, SimulatedSheet
+from withe.folding.simulated_sheet import Held, SimulatedSheet
 from withe.folding.widths import free_width
 
 __all__ = ["plunge"]
@@ -52,21 +52,10 @@ class _Tried:
 
         sheet.carry_out(motions(), slow.target, duration=float(slow.times[-1]), progress=False)
 
-    def crease(self, way: _Part) -> float:
-        """How far it is off [m]; infinite where the sheet snaps."""
-        fold = self._fold(way)
-        return np.inf if fold is None else fold.error
-
-    def off(self, way: _Part) -> float:
-        """The same, or half of how far the sheet slides where that is more [m]."""
-        fold = self._fold(way)
-        return np.inf if fold is None else max(abs(fold.error), 0.5 * abs(fold.slide))
-
-    def _fold(self, way: _Part) -> Fold | None:
-        if self._held is None:
-            return None
-        fold = self._sheet.carry_on(self._held, [way], self._target)
-        return fold if fold.failure is None else None
+    def missed(self, way: _Part) -> tuple[float, float]:
+        """How far the crease is off, and how far the sheet slides [m]; infinite where it snaps."""
+        fold = None if self._held is None else self._sheet.carry_on(self._held, [way], self._target)
+        return (np.inf, np.inf) if fold is None or fold.failure is not None else (fold.error, fold.slide)
 
 
 def plunge(
@@ -88,7 +77,7 @@ def plunge(
     there, others are cut off. How much to the side it goes, within what time, and whether the edge ends level or as the
     plan has it, is tried on simulated sheets without noise, those of `Plan.papers`: aimed so that the paper as it is
     thought to be is folded right, it is the way on which the worst of them is best, by how far its crease is off and
-    by half of how far it slides.
+    by half of how far it slides, of those that fold all of them.
 
     Parameters
     ----------
@@ -98,7 +87,7 @@ def plunge(
         Of the way down, or those that are tried. The longer it takes the farther the sheet may slide meanwhile, the
         shorter, the more it is thrown.
     within : float [m]
-        How far off the crease may be on the worst of these sheets, and half as far as it may slide.
+        How far off the crease may be on the worst of these sheets.
     sheet : mapping, optional
         Options of `SimulatedSheet`; by default sheets at the bounds have 75 edges.
     progress : bool
@@ -140,35 +129,39 @@ def plunge(
             tried.append(_Tried(slow, SimulatedSheet(paper, jaw=plan.jaw, **options)))
             bar.advance(1)
 
-        best, least = ways[0](0.0), np.inf
+        best: _Part | None = None
+        least = nearest = np.inf  # of the best way, and how far the crease is off on that which comes nearest
         for down in ways:
             way = down(_aimed(tried[0], down, _SHORT * lgb))
             bar.advance(1)
-            worst = 0.0
+            error = off = 0.0
             for each in tried:
-                worst = max(worst, each.off(way))
-                if worst >= least:
+                crease, slide = each.missed(way)
+                error, off = max(error, abs(crease)), max(off, abs(crease), 0.5 * abs(slide))
+                if error >= nearest if best is None else error > bound or off >= least:
                     break
-            best, least = (way, worst) if worst < least else (best, least)
+            else:
+                nearest = min(nearest, error)
+                best, least = (way, off) if error <= bound else (best, least)
             bar.advance(1)
-    if least > bound:
-        raise ValueError(_missed(plan, least, bound))
+    if best is None:
+        raise ValueError(_missed(plan, nearest, bound))
     return _ended(slow, best)
 
 
 def _aimed(sheet: _Tried, down: Callable[[float], _Part], short: float) -> float:
     """How far to the side the edge goes down so that a crease is where it should be [m]."""
     aside = 0.0
-    error = sheet.crease(down(aside))
+    error, _ = sheet.missed(down(aside))
     if not np.isfinite(error):  # its sheet slides back from under the edge
         aside = -short
-        error = sheet.crease(down(aside))
+        error, _ = sheet.missed(down(aside))
     share = 1.0
     for _ in range(_CORRECTIONS):
         if abs(error) < _ENOUGH or not np.isfinite(error):
             break
         other = aside - 2.0 * share * error
-        found = sheet.crease(down(other))
+        found, _ = sheet.missed(down(other))
         if abs(found) < abs(error):
             aside, error = other, found
         else:  # too far: an edge may miss the sheet
