@@ -110,6 +110,16 @@ def test_where_nothing_bears_the_uncertainty_the_plan_says_so():
     assert "does not bear its uncertainty" in repr(found)
 
 
+def test_cardboard_is_folded_in_half_on_a_table_on_which_it_would_slide():
+    """Of ways that fold all sheets: one that slides less but misses some of them is no way."""
+    paper = replace(Paper.cardboard(), friction=0.3)
+    with pytest.warns(UserWarning, match="the sheet slides"):
+        slow = plan(paper, method="slip", grasp="free", curvature=4.0, ending="slow")
+    folded = SimulatedSheet(paper, **COARSE).fold(plunge(slow, sheet=COARSE, progress=False), progress=False)
+    assert folded.failure is None
+    assert abs(folded.error) < 1e-3
+
+
 def test_a_watched_plunge_goes_down_where_the_sheet_is_then(ways):
     pytest.importorskip("cv2")
     paper, _, quick = ways

@@ -218,7 +218,7 @@ def test_a_jaw_that_comes_too_low_yields_and_rests_on_the_table(a4, half, case, 
     assert found.failure is None
     simulation, positions = sheet.simulation, sheet.positions()
     assert simulation.statistics.rejected_steps == 0
-    assert simulation.statistics.steps == round(simulation.time / 0.01)
+    assert simulation.statistics.steps - round(simulation.time / 0.01) in range(len(motions) + 1)  # at their ends
     assert positions[:, 2].min() > -0.1 * a4.thickness  # the table has not given way
     force, held = simulation.wrench("jaw").force, simulation.deflection("jaw")
     size, shift = np.linalg.norm(force), np.linalg.norm(held.shift + held.slip)

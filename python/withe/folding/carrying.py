@@ -45,7 +45,7 @@ class Watch:
         curvature = max(float(np.abs(simulation.curvatures(rod)).max()) for rod in self._rods)
         self.max_speed = max(self.max_speed, speed)
         self.max_curvature = max(self.max_curvature, curvature)
-        if speed > max(_SNAP * self._jaw.lately(simulation.time), _FAST):
+        if speed > _FAST and speed > _SNAP * self._jaw.lately(simulation.time):
             self.failure = f"snapped at {simulation.time:.2f} s"
         if self._end is None and simulation.time > self._jaw.end - 1e-9 and not self._jaw.go_on():
             self._end = self._jaw.end + _SETTLING

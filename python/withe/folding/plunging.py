@@ -153,12 +153,12 @@ def _aimed(sheet: _Tried, down: Callable[[float], _Part], short: float) -> float
     """How far to the side the edge goes down so that a crease is where it should be [m]."""
     aside = 0.0
     error, _ = sheet.missed(down(aside))
-    if not np.isfinite(error):  # its sheet slides back from under the edge
+    if not abs(error) <= short:  # its sheet slides back from under the edge
         aside = -short
         error, _ = sheet.missed(down(aside))
     share = 1.0
     for _ in range(_CORRECTIONS):
-        if abs(error) < _ENOUGH or not np.isfinite(error):
+        if abs(error) < _ENOUGH or not abs(error) <= short:
             break
         other = aside - 2.0 * share * error
         found, _ = sheet.missed(down(other))
