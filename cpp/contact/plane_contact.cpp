@@ -89,6 +89,7 @@ struct PlaneEdge {
 /// How far such a surface has slipped, and the friction on that.
 class PlaneSlip {
  public:
+  // Called, it would go through memory.
   [[gnu::always_inline]] PlaneSlip(const ContactProblem& problem, const Touching& t, double rate)
       : pair_(t.pair), w_(*t.pair.piece.weights), axes_(problem.bodies.obstacle(t.pair)), s_(t.proximity.curve.s) {
     for (int i = 0; i < w_.nodes; ++i) {

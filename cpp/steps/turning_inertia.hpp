@@ -1,5 +1,6 @@
 #pragma once
-/// Inertia of an edge about itself, on any scalar: doubles, or dual numbers for its derivatives.
+/// Inertia of an edge about itself, on any scalar: doubles, or dual numbers for its derivatives. Inlined into loops
+/// over edges, whose vectors would go through memory otherwise.
 
 #include <cmath>
 
