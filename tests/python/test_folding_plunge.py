@@ -135,7 +135,7 @@ def test_a_watched_plunge_goes_down_where_the_sheet_is_then(ways):
 
 def test_a_plunge_that_cannot_be_is_refused_with_the_friction_that_is_missing(ways):
     with pytest.raises(ValueError, match=r"would need friction 0\.2\d+, and the paper has 0\.12"):
-        plunge(ways[1], within=1e-5, sheet=COARSE, progress=False)
+        plunge(ways[1], within=1e-5, duration=0.025, sheet=COARSE, progress=False)
 
 
 def test_nonsense_is_refused(ways):
