@@ -32,16 +32,21 @@ struct NumberSlopes {
 };
 
 /// spin = - s x e / G, G = l^2 + l s . e, s the direction at the start.
-VectorSlopes spin_slopes(const Vector3& edge, const Direction& middle, const Direction& start) {
+[[gnu::always_inline]] inline VectorSlopes spin_slopes(const Vector3& edge, const Direction& middle,
+                                                       const Direction& start) {
   const Vector3 &s = start.tangent, across = s.cross(edge);
   const double l = middle.length, along = s.dot(edge), inverse = 1.0 / (l * l + l * along);
   const Vector3 grown = 2.0 * edge + along * middle.tangent + l * s, spin = -inverse * across;
+  // By the vector at the start, A (I - s s^T) / |e0| with A the derivative by s.
   const Matrix3 by_direction = inverse * cross_matrix(edge) - (inverse * l) * spin * edge.transpose();
-  return {spin, -inverse * cross_matrix(s) - inverse * spin * grown.transpose(), by_direction * start.by};
+  const Vector3 along_start = by_direction * s;
+  return {spin, -inverse * cross_matrix(s) - inverse * spin * grown.transpose(),
+          (1.0 / start.length) * (by_direction - along_start * s.transpose())};
 }
 
-void put(const VectorSlopes& force, const Vector3& by_angle, const Vector3& by_rate, const NumberSlopes& torque,
-         double torque_by_angle, double torque_by_rate, TurningSlopes& out) {
+[[gnu::always_inline]] inline void put(const VectorSlopes& force, const Vector3& by_angle, const Vector3& by_rate,
+                                       const NumberSlopes& torque, double torque_by_angle, double torque_by_rate,
+                                       TurningSlopes& out) {
   for (int i = 0; i < 3; ++i) {
     for (int k = 0; k < 3; ++k) {
       out.by[i][k] = force.by(i, k);
