@@ -84,8 +84,7 @@ class WideSheet:
     edges : int
         Of each strip.
     time_step : float [s]
-        Of backward Euler; shorter in plunges, as in `SimulatedSheet`. In steps of 10 ms 75 edges may be thrown over as
-        they land.
+        Of backward Euler; shorter in plunges, as in `SimulatedSheet`.
     own_friction : float
         Of a strip on itself.
 
