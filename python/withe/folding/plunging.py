@@ -121,7 +121,8 @@ def plunge(
     if not durations.size or durations.min() <= 0.0:
         raise ValueError(f"duration must be positive, got {duration!r:.80}")
     slow, papers, lgb = _above(plan), plan.papers, plan.paper.gravito_bending_length
-    ways = [partial(_down, slow, *of) for of in product((np.pi, float(plan.angles[-1])), [press], durations.tolist())]
+    angles = (np.pi, float(plan.angles[-1]))
+    ways = [partial(_down, slow, angle, press, time) for angle, time in product(angles, durations.tolist())]
     with progress_bar(len(papers) + 2 * len(ways), "plunging", progress) as bar:
         tried: list[_Tried] = []
         for paper in papers:
@@ -138,7 +139,8 @@ def plunge(
             for each in tried:
                 crease, slide = each.missed(way)
                 error, off = max(error, abs(crease)), max(off, abs(crease), 0.5 * abs(slide))
-                if error >= nearest if best is None else error > bound or off >= least:
+                hopeless = error >= nearest if best is None else error > bound or off >= least
+                if hopeless:
                     break
             else:
                 nearest = min(nearest, error)

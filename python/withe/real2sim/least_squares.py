@@ -21,7 +21,6 @@ __all__ = [
     "Weakness",
     "all_frames",
     "lone_frame",
-    "range_of",
     "reduced",
     "seen",
     "spectra",
@@ -146,17 +145,19 @@ class Decomposed:
     Attributes
     ----------
     matrix : ndarray
+    range : ndarray
+        An orthonormal basis of what it reaches.
     """
 
     def __init__(self, matrix: FloatArray) -> None:
         self.matrix = matrix
         u, values, vectors = np.linalg.svd(matrix, full_matrices=False)
         rank = int(np.count_nonzero(values > _RANK * values[0])) if values.size else 0
-        self._u, self._values, self._vectors = u[:, :rank], values[:rank], vectors[:rank]
+        self.range, self._values, self._vectors = u[:, :rank], values[:rank], vectors[:rank]
 
     def bounded(self, right: FloatArray, radius: float) -> FloatArray:
         """The x of least |matrix x - right| among those with no coordinate beyond a radius, by Levenberg's damping."""
-        values, along = self._values, right @ self._u
+        values, along = self._values, right @ self.range
 
         def step(damping: float) -> FloatArray:
             return np.asarray((values * along / (values**2 + damping)) @ self._vectors)
@@ -297,17 +298,11 @@ def _total(solutions: dict[int, FrameSolution]) -> float:
     return float(np.sqrt(sum(_size(solution.residual) ** 2 for solution in solutions.values())))
 
 
-def range_of(matrix: FloatArray) -> FloatArray:
-    """An orthonormal basis of what a matrix reaches."""
-    u, values, _ = np.linalg.svd(matrix, full_matrices=False)
-    return np.asarray(u[:, values > _RANK * values.max(initial=0.0)])
-
-
 def reduced(solutions: dict[int, FrameSolution], local: BoolArray) -> tuple[FloatArray, FloatArray]:
     """Derivatives by shared coordinates, and residuals, without what each frame's own coordinates make good."""
     rows, right = [], []
     for solution in solutions.values():
-        basis = range_of(solution.jacobian[:, local])
+        basis = Decomposed(solution.jacobian[:, local]).range
         shared, residual = solution.jacobian[:, ~local], seen(solution.residual)
         rows.append(shared - basis @ (basis.T @ shared))
         right.append(residual - basis @ (basis.T @ residual))

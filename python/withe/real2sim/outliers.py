@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from withe.real2sim.least_squares import FrameSolution, range_of
+from withe.real2sim.least_squares import Decomposed, FrameSolution
 from withe.real2sim.results import Outlier
 
 __all__ = ["find_outliers"]
@@ -73,7 +73,7 @@ def _jumping(jump: FloatArray, jacobian: FloatArray, limit: float) -> list[tuple
     found: list[tuple[int, float]] = []
     while True:
         kept = np.repeat(~left_out, dimension)
-        basis = range_of(jacobian * kept[:, None])
+        basis = Decomposed(jacobian * kept[:, None]).range
         best, most, without = -1, 0.0, rest
         for tag in np.flatnonzero(~left_out & (np.linalg.norm(rest, axis=1) > 0.0)):
             rows = slice(tag * dimension, (tag + 1) * dimension)
