@@ -408,3 +408,22 @@ def test_a_frame_without_equilibrium_says_so_and_the_others_are_fitted(more):
     assert found.reasons == {0: "no equilibrium to begin with"}
     assert found.values[1, 0] == pytest.approx(2.0, abs=1e-6)
     assert np.isnan(found.rms[0])
+
+
+def test_a_fit_prints_what_it_found_in_a_few_lines():
+    simulation = arm()
+    points = drawn(simulation, [(0.0, 2.0), (0.0, 3.0), (0.0, 4.0)], [10, 20, 30])
+    points[1] = np.nan
+    shown = repr(fit(simulation, Tags(points, names((10, 20, 30)), sigma=1e-4), ARM, progress=False)).split("\n")
+    assert shown[0].startswith("Fit(2 of 3 frames converged")
+    assert shown[1].startswith("  natural_curvature of 'arm': 2 to 4, sigma 0.01")
+    assert shown[2:] == ["  frame 1: nothing was seen"]
+    many = repr(fit(simulation, Tags(points, names((10, 20, 30))), [("arm", "natural_curvature", "segment")]))
+    assert len(many.split("\n")) < 40
+
+
+def test_of_two_or_three_frames_none_is_called_an_outlier_for_what_the_others_lack():
+    simulation = arm()
+    points = drawn(simulation, [(0.0, 2.0), (0.0, 3.0), (0.0, 4.0)], [10, 20, 30])
+    points += np.random.default_rng(3).normal(0.0, 1e-4, points.shape) * (1, 0, 1)
+    assert fit(simulation, Tags(points, names((10, 20, 30))), ARM, progress=False).outliers == ()

@@ -61,6 +61,11 @@ class Calibration(Camera):
     residuals: FloatArray
     unobservable: tuple[Unobservable, ...]
 
+    def __repr__(self) -> str:
+        turns = f"roll {self.roll:.4g} rad, tilt {self.tilt:.4g} rad"
+        told = [f"\n  not observable: {each}" for each in self.unobservable]
+        return f"Calibration({self.scale:.5g} px/m, {turns}, RMS of tags {self.rms:.3g} px)" + "".join(told)
+
     @property
     def rms(self) -> float:
         """Root of the mean square distance of tags from where they were seen [px]."""

@@ -50,9 +50,10 @@ def find_outliers(
 def _running_median(values: FloatArray) -> FloatArray:
     """Median over frames as many before as after, which a steady drift does not move, in which the same tags were seen.
 
-    What a model leaves in every frame shifts all residuals when a tag is missing.
+    What a model leaves in every frame shifts all residuals when a tag is missing. NaN where no two such frames are
+    beside one: nothing is known of what is usual there.
     """
-    medians = values.copy()
+    medians = np.full_like(values, np.nan)
     seen = np.asarray(np.isfinite(values).all(axis=2))
     for frame in range(len(values)):
         alike = [

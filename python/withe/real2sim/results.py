@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Iterable
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +16,7 @@ from withe.simulation.simulation import Simulation
 __all__ = ["Fit", "Outlier", "Unobservable"]
 
 FloatArray = npt.NDArray[np.float64]
+_ROWS_SHOWN = 8  # of each kind, in print
 
 
 @dataclass(frozen=True)
@@ -73,7 +75,7 @@ class Unobservable:
         return f"{text}: moves the targets by {self.effect:.2g}, the misfit is {self.misfit:.2g}{where}"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Fit:
     """What a fit found, frame by frame.
 
@@ -112,8 +114,28 @@ class Fit:
     reasons: dict[int, str]
     unobservable: tuple[Unobservable, ...]
     outliers: tuple[Outlier, ...]
-    _unknowns: tuple[Unknown, ...] = field(repr=False)
-    _coordinates: FloatArray = field(repr=False)
+    _unknowns: tuple[Unknown, ...]
+    _coordinates: FloatArray
+
+    def __repr__(self) -> str:
+        left = np.sqrt(np.nanmean(self.rms**2))
+        return "\n  ".join(
+            [
+                f"Fit({self.converged.sum()} of {len(self.values)} frames converged, RMS of the residuals {left:.3g})",
+                *_some(self._ranges()),
+                *_some(f"not observable: {each}" for each in self.unobservable),
+                *_some(f"outlier: {each}" for each in self.outliers),
+                *_some(f"frame {frame}: {reason}" for frame, reason in self.reasons.items()),
+            ]
+        )
+
+    def _ranges(self) -> Iterable[str]:
+        sigmas = np.sqrt(np.diagonal(self.covariance, axis1=1, axis2=2))
+        for name, values, deviations in zip(self.names, self.values.T, sigmas.T, strict=True):
+            lowest, highest = np.nanmin(values), np.nanmax(values)
+            span = f"{lowest:.6g}" if lowest == highest else f"{lowest:.6g} to {highest:.6g}"
+            known = deviations[np.isfinite(deviations)]
+            yield f"{name}: {span}" + (f", sigma {np.median(known):.2g}" if len(known) else "")
 
     @property
     def skipped(self) -> tuple[int, ...]:
@@ -189,3 +211,10 @@ class Fit:
                 return slice(start, start + len(unknown))
             start += len(unknown)
         raise ValueError(f"{word} of rod {name!r} was not fitted; these were: {', '.join(self.names)}")
+
+
+def _some(lines: Iterable[str]) -> list[str]:
+    """The first of some lines, and how many more there are."""
+    first = list(lines)
+    more = len(first) - _ROWS_SHOWN
+    return [*first[:_ROWS_SHOWN], f"and {more} more"] if more > 1 else first
