@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+
 import numpy as np
 import pytest
 
@@ -11,9 +13,36 @@ A4 = Paper.a4()
 MESH = {"edges": 60, "time_step": 0.02}
 
 
+@dataclass
+class Over:
+    """Over along half a circle, and down by 2 mm more than it can go."""
+
+    paper: Paper
+
+    def __post_init__(self):
+        share, reach = np.linspace(0.0, 1.0, 41), 0.5 * self.paper.length
+        angle = np.pi * share - 0.5 * np.sin(2.0 * np.pi * share)
+        x, z = reach * (1.0 - np.cos(angle)) - 4e-3 * share, reach * np.sin(angle) + self.paper.thickness * share
+        none = np.zeros_like(x)
+        self.poses = np.stack([x, none, z, none, np.sin(0.5 * angle), none, np.cos(0.5 * angle)], axis=1)
+        self.poses = np.vstack([self.poses, self.poses[-1] - [0.0, 0.0, 2e-3, 0.0, 0.0, 0.0, 0.0]])
+        self.times = np.append(3.0 * share, 3.3)
+        self.target = self.paper.length
+
+
 @pytest.fixture(scope="module")
 def half():
     return plan(A4)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_layers_that_are_pressed_lie_on_each_other_and_not_side_by_side(seed):
+    paper = replace(A4, friction=0.6)
+    sheet = WideSheet(paper, seed, Noise(friction_variation=0.0), unevenness=0.2, **MESH)
+    found = sheet.fold(Over(paper), progress=False)
+    assert found.failure is None
+    for strip in sheet.strips:
+        assert sheet.simulation.positions(strip)[:2, 2].min() > 0.9 * paper.thickness
 
 
 def test_strips_that_slide_alike_are_one_sheet(half):

@@ -33,6 +33,9 @@ FloatArray = npt.NDArray[np.float64]
 _IN_PLANE = 1e3  # times as stiff in its plane as out of it is a strip; more changes no spin by a hundredth of a degree
 _TWIST = 1.5  # G J / EI of a flat strip, Poisson's ratio 1/3
 _CROSS_WEIGHT = 0.05  # of what joins the far ends, per length, over that of a strip
+_RIB_WEIGHT = 1e-4  # the same of ribs
+_RIB_WIDTH = 0.96  # of the strip's
+_RIB_SPACING = 0.02  # [m]: between ribs a layer sinks by micrometres
 
 
 @dataclass(frozen=True)
@@ -70,7 +73,9 @@ class WideSheet:
     """Two strips of a sheet on a table, joined at their far ends and held by one jaw: what slides unevenly turns.
 
     As `SimulatedSheet`, in space. Each strip is a rod with half of the sheet's width, at the middle of its half, and
-    rubs on the table with a coefficient of its own. What joins their far ends weighs next to nothing.
+    rubs on the table with a coefficient of its own. What joins their far ends weighs next to nothing. Stiff ribs across
+    the half of each strip that is turned over are as wide as it: layers lie on each other by these, where a line on a
+    line would slide off sideways, and bear nothing that presses on it.
 
     Parameters
     ----------
@@ -118,7 +123,7 @@ class WideSheet:
         unevenness: float = 0.1,
         jaw: Jaw | None = None,
         edges: int = 75,
-        time_step: float = 0.0025,
+        time_step: float = 0.01,
         own_friction: float = 0.3,
     ) -> None:
         if not isinstance(paper, Paper):
@@ -191,7 +196,37 @@ class WideSheet:
             )
         scene.ignore_contact(*strips)
         scene.ignore_contact(cross, table)
+        scene.set_contact_group(cross, "across")
+        for strip, y in zip(strips, self._sides, strict=True):
+            for node in self._ribbed():
+                self._add_rib(scene, strip, node, float(y), rigid, _RIB_WEIGHT * line_density)
         return scene, (strips[0], strips[1])
+
+    def _ribbed(self) -> list[int]:
+        """Nodes of a strip that have a rib: under the jaw, and on to the crease of the longest fold.
+
+        None is beside the last edge that the jaw holds: a joint takes some of its neighbours' compliance.
+        """
+        held = int(np.searchsorted(self._places, self.jaw.depth)) - 1
+        spacing = max(1, round(_RIB_SPACING / float(self._places[-1] - self._places[-2])))
+        crease = int(np.searchsorted(self._places, 0.5 * self.paper.length))
+        return [*range(held), *range(held + 3, crease + spacing, spacing)]
+
+    def _add_rib(
+        self, scene: Scene, strip: Rod, node: int, y: float, stiffness: Stiffness, line_density: float
+    ) -> None:
+        reach = 0.25 * _RIB_WIDTH * self.paper.width
+        rib = scene.add_rod(
+            points=[(self._places[node], y + side, 0.0) for side in (-reach, 0.0, reach)],
+            normal=(1.0, 0.0, 0.0),
+            radius=0.5 * self.paper.thickness,
+            stiffness=stiffness,
+            line_density=line_density,
+            name=f"rib {node} of {strip.name}",
+        )
+        scene.join(rib.node(1), strip.node(node))
+        scene.set_contact_group(rib, "across")
+        scene.ignore_contact(rib, "table")
 
     def fold(self, plan: FoldingMotion, *, progress: bool = True) -> WideFold:
         """Carry out a plan, from the flat sheet.
