@@ -70,15 +70,13 @@ RegularStencils regular_stencils(const Model& model, const ElementTable& bend) {
 void ElementTable::find_offsets(const LinearSolver& solver) {
   symmetric_ = solver.symmetry() == Symmetry::symmetric;
   offsets_.clear();
+  starts_.clear();
   for (int e = 0; e < count(); ++e) {
+    starts_.push_back(static_cast<std::ptrdiff_t>(offsets_.size()));
     const int* d = dofs(e);
     for (int i = 0; i < width_; ++i)
-      for (int j = 0; j < (symmetric_ ? i + 1 : width_); ++j) {
-        if (d[i] < 0 || d[j] < 0)
-          offsets_.push_back(-1);
-        else
-          offsets_.push_back(static_cast<int>(solver.place(d[i], d[j])));
-      }
+      for (int j = 0; j < (symmetric_ ? i + 1 : width_); ++j)
+        if (d[i] >= 0 && d[j] >= 0) offsets_.push_back(static_cast<int>(solver.place(d[i], d[j])));
   }
 }
 
@@ -86,8 +84,7 @@ bool ElementTable::regular(int element, std::vector<std::ptrdiff_t>& lines) cons
   const int* d = dofs(element);
   for (int i = 0; i < width_; ++i)
     if (d[i] < 0 || d[i] != d[0] + i) return false;
-  const int* offset = offsets_.data() + entry_start(element);
-  const auto entry = [&](int i, int j) { return offset[symmetric_ ? i * (i + 1) / 2 + j : i * width_ + j]; };
+  const auto entry = [&](int i, int j) { return offsets(element)[symmetric_ ? i * (i + 1) / 2 + j : i * width_ + j]; };
   bool by_rows = !symmetric_, by_columns = true;
   for (int i = 0; i < width_; ++i)
     for (int j = 0; j < (symmetric_ ? i + 1 : width_); ++j) {
@@ -100,8 +97,11 @@ bool ElementTable::regular(int element, std::vector<std::ptrdiff_t>& lines) cons
 }
 
 std::ptrdiff_t ElementTable::offset(int element, int i, int j) const {
-  const int* offset = offsets_.data() + entry_start(element);
-  return symmetric_ ? offset[std::max(i, j) * (std::max(i, j) + 1) / 2 + std::min(i, j)] : offset[i * width_ + j];
+  const int* d = dofs(element);
+  if (d[i] < 0 || d[j] < 0) return -1;
+  const int row = present(element, i), column = present(element, j);
+  if (!symmetric_) return offsets(element)[row * present(element, width_) + column];
+  return offsets(element)[std::max(row, column) * (std::max(row, column) + 1) / 2 + std::min(row, column)];
 }
 
 void ElementTable::add_gradient(int element, const double* gradient, double scale, VectorX& residual,
@@ -116,17 +116,22 @@ void ElementTable::add_gradient(int element, const double* gradient, double scal
 
 void ElementTable::add_hessian(int element, const double* hessian, int stride, double scale,
                                std::span<double> values) const {
-  const int* offset = offsets_.data() + entry_start(element);
+  const int* offset = offsets(element);
   const int* unknown = dofs(element);
   for (int i = 0; i < width_; ++i) {
-    const int columns = symmetric_ ? i + 1 : width_;
-    if (unknown[i] < 0) {
-      offset += columns;
-      continue;
-    }
-    for (int j = 0; j < columns; ++j, ++offset)
-      if (*offset >= 0) values[static_cast<std::size_t>(*offset)] += scale * hessian[i * stride + j];
+    if (unknown[i] < 0) continue;
+    for (int j = 0; j < (symmetric_ ? i + 1 : width_); ++j)
+      if (unknown[j] >= 0) values[static_cast<std::size_t>(*offset++)] += scale * hessian[i * stride + j];
   }
+}
+
+void ElementTable::add_dense_hessian(int element, const double* hessian, int stride, double scale,
+                                     std::span<double> values) const {
+  const int* offset = offsets(element);
+  const int size = present(element, width_);
+  for (int i = 0; i < size; ++i)
+    for (int j = 0; j < (symmetric_ ? i + 1 : size); ++j)
+      values[static_cast<std::size_t>(*offset++)] += scale * hessian[i * stride + j];
 }
 
 Assembler::Assembler(const Model& model, std::vector<ElementTable*> declared, Symmetry symmetry, SolverKind kind,

@@ -1,6 +1,7 @@
 #pragma once
 /// Stencil -> matrix: the pattern of a model, and where each stencil's numbers go, found once.
 
+#include <algorithm>
 #include <memory>
 #include <utility>
 #include <vector>
@@ -40,17 +41,29 @@ class ElementTable {
   void add_hessian(int element, const double (&hessian)[Stride][Stride], double scale, std::span<double> values) const {
     add_hessian(element, &hessian[0][0], Stride, scale, values);
   }
+  /// The same of a hessian of those unknowns alone that are not left out.
+  template <int Stride>
+  void add_dense_hessian(int element, const double (&hessian)[Stride][Stride], double scale,
+                         std::span<double> values) const {
+    add_dense_hessian(element, &hessian[0][0], Stride, scale, values);
+  }
 
  private:
   void add_hessian(int element, const double* hessian, int stride, double scale, std::span<double> values) const;
-  std::ptrdiff_t entry_start(int element) const {
-    return static_cast<std::ptrdiff_t>(element) * (symmetric_ ? width_ * (width_ + 1) / 2 : width_ * width_);
+  void add_dense_hessian(int element, const double* hessian, int stride, double scale, std::span<double> values) const;
+  /// Offsets of an element: of the unknowns that are not left out, row after row, or of the lower triangle.
+  const int* offsets(int element) const { return offsets_.data() + starts_[static_cast<std::size_t>(element)]; }
+  /// How many of an element's first unknowns are not left out.
+  int present(int element, int before) const {
+    const int* d = dofs(element);
+    return before - static_cast<int>(std::count_if(d, d + before, [](int dof) { return dof < 0; }));
   }
 
   int width_ = 0;
   bool symmetric_ = true;
   std::vector<int> dofs_;
   std::vector<int> offsets_;  ///< narrow, since reading them takes most of the time of adding a contact
+  std::vector<std::ptrdiff_t> starts_;
 };
 
 /// Ordinary stencils that the kernels of stencil_kernels.hpp take, and what is left for others.

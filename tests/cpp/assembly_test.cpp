@@ -160,6 +160,32 @@ TEST(ElementTable, ScatterAgreesWithADenseSum) {
     }
 }
 
+TEST(ElementTable, LeavesOutUnknownsThatAreNone) {
+  const Model model = build_model(open_rod(SupportKind::pin).scene, std::nullopt);
+  const int there[3] = {model.node_dof[1], model.node_dof[1] + 1, model.node_dof[2]};
+  double all[5][5], alone[3][3];
+  for (int i = 0; i < 25; ++i) all[i / 5][i % 5] = 1.0 + i;
+  const int place[3] = {0, 2, 3};
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) alone[i][j] = all[place[i]][place[j]];
+  for (Symmetry symmetry : {Symmetry::symmetric, Symmetry::unsymmetric}) {
+    Assembler assembler(model, {}, symmetry, SolverKind::automatic);
+    assembler.couple({there[0], -1, there[1], there[2], -1}, 5);
+    for (double scale : {2.0, -1.0}) {
+      const std::span<double> values = assembler.solver().values();
+      std::fill(values.begin(), values.end(), 0.0);
+      scale > 0.0 ? assembler.contact.add_hessian(0, all, scale, values)
+                  : assembler.contact.add_dense_hessian(0, alone, scale, values);
+      EXPECT_EQ(assembler.contact.offset(0, 1, 0), -1);
+      for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < (symmetry == Symmetry::symmetric ? i + 1 : 3); ++j) {
+          EXPECT_EQ(*assembler.entry(there[i], there[j], values), scale * alone[i][j]);
+          EXPECT_EQ(assembler.contact.offset(0, place[i], place[j]), assembler.solver().offset(there[i], there[j]));
+        }
+    }
+  }
+}
+
 TEST(ElementTable, GradientsAddUpWithTheirMagnitudes) {
   const Model model = build_model(open_rod(SupportKind::pin).scene, std::nullopt);
   const Assembler assembler(model, {}, Symmetry::symmetric, SolverKind::automatic);
