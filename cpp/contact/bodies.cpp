@@ -42,6 +42,15 @@ void Bodies::end_points(const ContactPair& pair, const VectorX& q, Vec3d (&x)[4]
 
 void Bodies::values(const ContactPair& pair, const VectorX& q, double (&values)[kContactUnknowns]) const {
   std::fill(std::begin(values), std::end(values), 0.0);
+  if (pair.curve()) {
+    for (int i = 0; i < pair.piece.weights->nodes; ++i) {
+      const int first = model->node_dof[at(pair.piece.node[i])];
+      for (int k = 0; k < model->dimension; ++k) values[3 * i + k] = q(first + k);
+    }
+    for (int b = 0; b < pair.piece.weights->edges && !model->planar(); ++b)
+      values[12 + b] = q(model->edge_dof[at(pair.piece.edge[b])]);
+    return;
+  }
   Vec3d x[4];
   end_points(pair, q, x);
   for (int i = 0; i < 4; ++i) {
@@ -50,27 +59,38 @@ void Bodies::values(const ContactPair& pair, const VectorX& q, double (&values)[
     values[3 * i + 2] = x[i].z;
   }
   if (model->planar()) return;
-  if (pair.curve()) {
-    for (int b = 0; b < pair.piece.weights->edges; ++b) values[12 + b] = q(model->edge_dof[at(pair.piece.edge[b])]);
-    return;
-  }
   values[12] = q(model->edge_dof[at(pair.key.a)]);
   if (pair.key.b >= 0) values[13] = q(model->edge_dof[at(pair.key.b)]);
+}
+
+CurveDistance<double> Bodies::piece_distance(const ContactPair& pair, const VectorX& q, const Vec3d& drift) const {
+  const Obstacle& o = obstacle(pair);
+  if (o.kind != ObstacleKind::plane) {
+    Vec3d x[4];
+    end_points(pair, q, x);
+    return curve_distance(pair.piece, o, x, drift);
+  }
+  double height[3] = {};
+  for (int i = 0; i < pair.piece.weights->nodes; ++i)
+    height[i] = height_above(o, local_position(*model, q, pair.piece.node[i]), drift);
+  return plane_distance(pair.piece, o, height);
 }
 
 Proximity Bodies::proximity(const ContactPair& pair, const VectorX& q, bool whole) const {
   Proximity p;
   Vec3d x[4];
-  end_points(pair, q, x);
   if (pair.curve()) {
     const Obstacle& o = obstacle(pair);
-    p.curve = curve_distance(pair.piece, o, x);
+    p.curve = piece_distance(pair, q);
     p.distance = p.curve.distance;
     p.points.s = p.curve.s;
-    p.normal =
-        o.kind == ObstacleKind::plane ? o.other : distance_to(o, curve_point(*pair.piece.weights, x, p.curve.s)).normal;
+    p.normal = o.other;
+    if (o.kind == ObstacleKind::plane) return p;
+    end_points(pair, q, x);
+    p.normal = distance_to(o, curve_point(*pair.piece.weights, x, p.curve.s)).normal;
     return p;
   }
+  end_points(pair, q, x);
   // Far apart by their middles: no need for more.
   const Vec3d middle = 0.5 * (x[0] + x[1] - x[2] - x[3]), u = x[1] - x[0], v = x[3] - x[2];
   const double size = 0.5 * (std::sqrt(dot(u, u)) + std::sqrt(dot(v, v))) + (1.0 + kFar) * pair.reach();

@@ -33,6 +33,8 @@ struct Bodies {
   void end_points(const ContactPair& pair, const VectorX& q, Vec3d (&x)[4]) const;
   /// Unknowns of a pair at q (obstacles' points where there are none).
   void values(const ContactPair& pair, const VectorX& q, double (&x)[kContactUnknowns]) const;
+  /// How near a piece of a curve is to its obstacle, or to where that was before its `drift`.
+  CurveDistance<double> piece_distance(const ContactPair& pair, const VectorX& q, const Vec3d& drift = {}) const;
   /// Of surfaces that are farther apart than of interest no more than a lower bound of their distance; `whole`: the
   /// closest points of these too.
   Proximity proximity(const ContactPair& pair, const VectorX& q, bool whole = false) const;

@@ -7,6 +7,7 @@
 #include "contact/contact_friction.hpp"
 #include "contact/contact_work.hpp"
 #include "contact/impacts.hpp"
+#include "contact/plane_contact.hpp"
 
 namespace withe {
 namespace {
@@ -115,8 +116,9 @@ void Contact::restart(const State& state, double duration) {
   problem_.starting = false;
   ContactStiffness(problem_).renew(set_, scratch_.records);
   problem_.renewed.swap(scratch_.records);
+  OrderedLookup records;
   for (const Touching& t : set_) {
-    if (problem_.record_of(t.pair.key) == nullptr) problem_.unrecorded.push_back(t.pair.key);
+    if (problem_.record_of(t.pair.key, records) == nullptr) problem_.unrecorded.push_back(t.pair.key);
     if (t.law.elastic > 0.0) problem_.leaving.push_back(t);
   }
   std::sort(problem_.unrecorded.begin(), problem_.unrecorded.end());
@@ -172,6 +174,12 @@ void Contact::local(int i, bool with_hessian, ContactLocal& out, const ContactLi
   contact_local(problem_, set_[i], linearisation, with_hessian, out);
 }
 
+bool Contact::plane_local(int i, bool with_hessian, PlaneLocal& out, const ContactLinearisation& linearisation) const {
+  if (!beside_plane(problem_, set_[i])) return false;
+  plane_contact(problem_, set_[i], PlaneForces::both, linearisation, with_hessian, out);
+  return true;
+}
+
 double Contact::rounding(int i, double reach, const ContactLinearisation& linearisation) const {
   const Touching& t = set_[i];
   const double stiffness = std::max(t.pressing.by_end, friction_slope(problem_, t, linearisation));
@@ -215,10 +223,11 @@ void Contact::predict_friction(const VectorX& change, ContactLinearisation& line
     return;
   }
   linearisation.friction.renew([&](const auto& add) {
+    OrderedLookup last;
     for (const Touching& t : set_) {
       if ((t.lagged >= 0) != problem_.lags() || !(t.pair.friction > 0.0)) continue;
       const Slipping s = slipping(problem_, t, linearisation, change);
-      const Vec3d* known = linearisation.friction.of(t.pair.key);
+      const Vec3d* known = linearisation.friction.of(t.pair.key, last);
       if (s.limit > 0.0) add(t.pair.key, s.law.predict(s.slip, s.change, known, s.limit));
     }
   });

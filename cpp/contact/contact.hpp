@@ -82,6 +82,9 @@ class Contact {
   void unknowns(int i, int (&dofs)[kContactUnknowns]) const { surfaces_.unknowns(set_[i].pair, dofs); }
   /// Minus its forces, and their derivative when asked for.
   void local(int i, bool with_hessian, ContactLocal& out, const ContactLinearisation& linearisation = {}) const;
+  /// The same of a piece beside a plane, by its nodes' coordinates alone; false where contact i is none.
+  bool plane_local(int i, bool with_hessian, PlaneLocal& out, const ContactLinearisation& linearisation) const;
+  void plane_unknowns(int i, int (&dofs)[kPlaneUnknowns]) const { surfaces_.plane_unknowns(set_[i].pair, dofs); }
   /// rows^T times its derivatives by what the step is given; see contact_adjoint.hpp.
   ContactAdjoint adjoint(int i, const double (&rows)[kContactUnknowns], double by_approach) const {
     return contact_adjoint(problem_, set_[i], rows, by_approach);

@@ -26,7 +26,7 @@ void set_distance_slopes(const ContactProblem& problem, const ContactPair& pair,
   std::fill(std::begin(slopes), std::end(slopes), 0.0);
   Vec3d x[4];
   if (pair.curve()) {
-    const CurveSlopes of_curve = curve_slopes(pair.piece, problem.curve_at_start(pair, x));
+    const CurveSlopes of_curve = curve_slopes(pair.piece, problem.curve_at_start(pair));
     std::copy(std::begin(of_curve.distance), std::end(of_curve.distance), slopes);
     return;
   }
@@ -160,7 +160,8 @@ void add_mean_pressing(const ContactProblem& problem, const Touching& t, const R
 void add_curve_pressing(const ContactProblem& problem, const Touching& t, const Rows& rows, ContactAdjoint& out) {
   const CurvePiece& piece = t.pair.piece;
   Vec3d x0[4];
-  const CurveDistance<double> start = problem.curve_at_start(t.pair, x0);
+  problem.bodies.end_points(t.pair, problem.start->q, x0);
+  const CurveDistance<double> start = problem.curve_at_start(t.pair);
   const CurveSlopes first = curve_slopes(piece, start), last = curve_slopes(piece, t.proximity.curve);
   const double (&g0)[9] = first.distance, (&g1)[9] = last.distance;
   double H[9][9] = {}, way[9] = {}, y0 = 0.0, y1 = 0.0;

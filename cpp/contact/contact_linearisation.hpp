@@ -16,12 +16,15 @@ namespace withe {
 class FrictionPrediction {
  public:
   /// Nothing where there has been no step; what touches since then has none.
-  const Vec3d* of(const ContactKey& key) const {
+  const Vec3d* of(const ContactKey& key, OrderedLookup& lookup) const {
     static constexpr Vec3d kNone{};
     if (!known_) return nullptr;
-    const auto found = std::lower_bound(shares_.begin(), shares_.end(), key,
-                                        [](const Share& share, const ContactKey& k) { return share.first < k; });
-    return found != shares_.end() && found->first == key ? &found->second : &kNone;
+    const Share* found = lookup.find(shares_, key, [](const Share& share) -> const ContactKey& { return share.first; });
+    return found ? &found->second : &kNone;
+  }
+  const Vec3d* of(const ContactKey& key) const {
+    OrderedLookup lookup;
+    return of(key, lookup);
   }
   void clear() { known_ = false; }
   /// Takes what make(add) gives by calls of add(key, share); until it is done the last prediction can be asked for.

@@ -83,11 +83,6 @@ bool ContactProblem::turns(const ContactPair& pair) const {
   return pressing == Pressing::mean && pair.key.b >= 0 && (!frictional() || unsymmetric());
 }
 
-CurveDistance<double> ContactProblem::curve_at_start(const ContactPair& pair, Vec3d (&x)[4]) const {
-  bodies.end_points(pair, start->q, x);
-  return curve_distance(pair.piece, bodies.obstacle(pair), x, shift_of(pair));
-}
-
 void ContactProblem::start_points(const ContactPair& pair, Vec3d (&x)[4]) const {
   bodies.end_points(pair, start->q, x);
   const Vec3d way = shift_of(pair);

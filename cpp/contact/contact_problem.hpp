@@ -26,6 +26,12 @@ struct ContactLocal {
   double hessian[kContactUnknowns][kContactUnknowns];
 };
 
+/// The same of a piece of a planar curve.
+struct PlaneLocal {
+  double gradient[kPlaneUnknowns];
+  double hessian[kPlaneUnknowns][kPlaneUnknowns];
+};
+
 /// One contact at a configuration.
 struct Touching {
   ContactPair pair;
@@ -118,9 +124,13 @@ struct ContactProblem {
   /// Known before anything is found, unlike the way.
   Vec3d velocity_of(const ContactPair& pair) const { return of_obstacle(pair, velocity); }
   /// What is remembered of a contact as the step begins, or nothing.
-  const ContactRecord* record_of(const ContactKey& key) const {
+  const ContactRecord* record_of(const ContactKey& key, OrderedLookup& lookup) const {
     const ContactRecord* found = renewed.empty() ? nullptr : find_record(renewed, key);
-    return found ? found : find_record(start->contacts, key);
+    return found ? found : find_record(start->contacts, key, lookup);
+  }
+  const ContactRecord* record_of(const ContactKey& key) const {
+    OrderedLookup lookup;
+    return record_of(key, lookup);
   }
   /// Depth in which a contact begins to press: that of its bodies, the mean by force, so that what takes over from what
   /// rests is neither lower nor higher [m].
@@ -145,8 +155,10 @@ struct ContactProblem {
   bool means_direction() const {
     return pressing == Pressing::mean_direction || (pressing == Pressing::mean && unsymmetric());
   }
-  /// A curve's distance as the step begins, an obstacle being where it was; and its nodes.
-  CurveDistance<double> curve_at_start(const ContactPair& pair, Vec3d (&x)[4]) const;
+  /// A curve's distance as the step begins, an obstacle being where it was.
+  CurveDistance<double> curve_at_start(const ContactPair& pair) const {
+    return bodies.piece_distance(pair, start->q, shift_of(pair));
+  }
   /// End points as the step begins, those of an obstacle where they were.
   void start_points(const ContactPair& pair, Vec3d (&x)[4]) const;
 

@@ -37,8 +37,8 @@ Touching& ContactSet::add(const ContactProblem& problem, const ContactPair& pair
   return t;
 }
 
-void ContactSet::set_forces(const ContactProblem& problem, Touching& t) {
-  set_from(problem, problem.record_of(t.pair.key), t);
+void ContactSet::set_forces(const ContactProblem& problem, OrderedLookup& records, Touching& t) {
+  set_from(problem, problem.record_of(t.pair.key, records), t);
 }
 
 void ContactSet::renew(const ContactProblem& problem, int i, const ContactRecord& record) {
@@ -49,6 +49,7 @@ void ContactSet::renew(const ContactProblem& problem, int i, const ContactRecord
 /// for friction alone.
 void ContactSet::add_leaving(const ContactProblem& problem, std::size_t first) {
   const std::size_t count = touching_.size();
+  OrderedLookup records;
   for (const Touching& start : problem.leaving) {
     const auto from = touching_.begin() + static_cast<std::ptrdiff_t>(first);  // adding to them moves them
     const auto end = touching_.begin() + static_cast<std::ptrdiff_t>(count);
@@ -56,7 +57,7 @@ void ContactSet::add_leaving(const ContactProblem& problem, std::size_t first) {
       return comes_before(t.pair.key, key);
     });
     if (found != end && found->pair.key == start.pair.key) continue;
-    set_forces(problem, add(problem, start.pair, problem.bodies.proximity(start.pair, q_, true)));
+    set_forces(problem, records, add(problem, start.pair, problem.bodies.proximity(start.pair, q_, true)));
   }
 }
 

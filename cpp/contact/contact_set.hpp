@@ -17,9 +17,10 @@ class ContactSet {
     touching_ = problem.lagged;
     for (Touching& t : touching_) problem.bodies.values(t.pair, q, t.now);
     const std::size_t first = touching_.size();
+    OrderedLookup records;
     within_reach([&](const ContactPair& pair, const Proximity& proximity) {
       Touching& t = add(problem, pair, proximity);
-      set_forces(problem, t);
+      set_forces(problem, records, t);
       if (!problem.touch(pair, proximity.distance, t.yielded)) touching_.pop_back();
     });
     add_leaving(problem, first);
@@ -45,7 +46,7 @@ class ContactSet {
 
  private:
   Touching& add(const ContactProblem& problem, const ContactPair& pair, const Proximity& proximity);
-  static void set_forces(const ContactProblem& problem, Touching& t);
+  static void set_forces(const ContactProblem& problem, OrderedLookup& records, Touching& t);
   void add_leaving(const ContactProblem& problem, std::size_t first);
 
   VectorX q_;

@@ -311,11 +311,12 @@ void ContactStiffness::renew(ContactSet& start, std::vector<ContactRecord>& reco
   records.clear();
   const bool still = problem_.pressing == Pressing::still, begins = !still || problem_.start->contacts.empty();
   SharedWeight weight(problem_, start);
+  OrderedLookup at_start;
   for (int i = 0; i < start.count(); ++i) {
     const Touching& t = start[i];
     ContactRecord record;
     bool drawn = false;
-    if (const ContactRecord* known = find_record(problem_.start->contacts, t.pair.key)) {
+    if (const ContactRecord* known = find_record(problem_.start->contacts, t.pair.key, at_start)) {
       if (known->approach == 0.0) continue;  // they rest until they have left each other
       record = *known;
     } else {

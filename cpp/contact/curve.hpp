@@ -133,28 +133,30 @@ Vec3<Scalar> curve_direction(const CurveWeights& w, const Vec3<Scalar>* x, const
   return u;
 }
 
-/// Sets the three distances of `curve_distance`, g1 and g2, and returns g0.
+/// How near a piece is whose three distances, g1 and g2 are known, and g0.
 template <class Scalar>
-Scalar curve_parabola(const CurveWeights& w, const Obstacle& o, const Vec3<Scalar>* x, const Vec3d& drift,
-                      CurveDistance<Scalar>& d) {
-  Scalar value = 0.0;
-  d.slope = d.bend = Scalar(0.0);
-  if (o.kind != ObstacleKind::plane) {
-    for (int j = 0; j < 3; ++j) {
-      d.sample[j] = distance_to(o, curve_point(w, x, Scalar(w.sample(j))), drift);
-      value += w.value_by[j] * d.sample[j].distance;
-      d.slope += w.slope_by[j] * d.sample[j].distance;
-      d.bend += kBendBy[j] * d.sample[j].distance;
-    }
-    return value;
-  }
-  // Heights above a plane are linear in the nodes.
-  Scalar slope = 0.0, bend = 0.0;
-  for (int i = 0; i < w.nodes; ++i) {
-    const Scalar height = height_above(o, x[i], drift);
-    value += w.middle[i] * height;
-    slope += w.slope[i] * height;
-    bend += w.bend[i] * height;
+void set_distance(const CurvePiece& piece, const Scalar& value, CurveDistance<Scalar>& d) {
+  using std::sqrt;
+  const CurveWeights& w = *piece.weights;
+  d.stiff = 0.5 * (d.bend + sqrt(d.bend * d.bend + 4.0 * piece.least_bend * piece.least_bend));
+  d.s = -d.slope / d.stiff;
+  const double s = value_of(d.s);
+  d.free = s > w.low && s < w.high();
+  if (!d.free) d.s = Scalar(s > w.low ? w.high() : w.low);
+  d.distance = value + d.s * (d.slope + 0.5 * d.stiff * d.s);
+}
+
+/// How near a piece comes to a plane above which its nodes are by `height`, nothing where there is none: distances are
+/// linear in these.
+template <class Scalar>
+CurveDistance<Scalar> plane_distance(const CurvePiece& piece, const Obstacle& o, const Scalar (&height)[3]) {
+  const CurveWeights& w = *piece.weights;
+  CurveDistance<Scalar> d;
+  Scalar value = 0.0, slope = 0.0, bend = 0.0;
+  for (int i = 0; i < 3; ++i) {
+    value += w.middle[i] * height[i];
+    slope += w.slope[i] * height[i];
+    bend += w.bend[i] * height[i];
   }
   for (int j = 0; j < 3; ++j) {
     const double s = w.sample(j);
@@ -163,23 +165,30 @@ Scalar curve_parabola(const CurveWeights& w, const Obstacle& o, const Vec3<Scala
   }
   d.slope = slope;
   d.bend = bend;
-  return value;
+  set_distance(piece, value, d);
+  return d;
 }
 
 /// How near a piece with nodes x comes to an obstacle, or to where it was before its `drift`.
 template <class Scalar>
 CurveDistance<Scalar> curve_distance(const CurvePiece& piece, const Obstacle& o, const Vec3<Scalar>* x,
                                      const Vec3d& drift = {}) {
-  using std::sqrt;
   const CurveWeights& w = *piece.weights;
+  if (o.kind == ObstacleKind::plane) {
+    Scalar height[3] = {};
+    for (int i = 0; i < w.nodes; ++i) height[i] = height_above(o, x[i], drift);
+    return plane_distance(piece, o, height);
+  }
   CurveDistance<Scalar> d;
-  const Scalar value = curve_parabola(w, o, x, drift, d);
-  d.stiff = 0.5 * (d.bend + sqrt(d.bend * d.bend + 4.0 * piece.least_bend * piece.least_bend));
-  d.s = -d.slope / d.stiff;
-  const double s = value_of(d.s);
-  d.free = s > w.low && s < w.high();
-  if (!d.free) d.s = Scalar(s > w.low ? w.high() : w.low);
-  d.distance = value + d.s * (d.slope + 0.5 * d.stiff * d.s);
+  Scalar value = 0.0;
+  d.slope = d.bend = Scalar(0.0);
+  for (int j = 0; j < 3; ++j) {
+    d.sample[j] = distance_to(o, curve_point(w, x, Scalar(w.sample(j))), drift);
+    value += w.value_by[j] * d.sample[j].distance;
+    d.slope += w.slope_by[j] * d.sample[j].distance;
+    d.bend += kBendBy[j] * d.sample[j].distance;
+  }
+  set_distance(piece, value, d);
   return d;
 }
 

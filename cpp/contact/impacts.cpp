@@ -39,8 +39,8 @@ double steps_in_swing(double restitution) { return std::clamp(10.0 / std::max(re
 
 /// Distance as the step begins.
 double start_distance(const ContactProblem& problem, const ContactPair& pair) {
+  if (pair.curve()) return problem.curve_at_start(pair).distance;
   Vec3d x[4];
-  if (pair.curve()) return problem.curve_at_start(pair, x).distance;
   problem.start_points(pair, x);
   return std::sqrt(closest_points(x[0], x[1], x[2], x[3], pair.weight_a, pair.weight_b).square);
 }
@@ -119,7 +119,7 @@ double approach_speed(const ContactProblem& problem, const ContactPair& pair) {
   problem.bodies.end_points(pair, problem.start->v, v);
   const Vec3d moved = problem.velocity_of(pair);
   if (pair.curve()) {
-    const CurveSlopes slopes = curve_slopes(pair.piece, problem.curve_at_start(pair, x));
+    const CurveSlopes slopes = curve_slopes(pair.piece, problem.curve_at_start(pair));
     double rate = 0.0;
     for (int i = 0; i < 3 * pair.piece.weights->nodes; ++i) rate += slopes.distance[i] * (v[i / 3] - moved)[i % 3];
     return std::max(0.0, -rate);
@@ -141,7 +141,7 @@ void add_approach_slopes(const ContactProblem& problem, const ContactPair& pair,
   problem.bodies.end_points(pair, problem.start->v, v);
   const Vec3d moved = problem.velocity_of(pair);
   if (pair.curve()) {
-    const CurveDistance<double> distance = problem.curve_at_start(pair, x);
+    const CurveDistance<double> distance = problem.curve_at_start(pair);
     const CurveSlopes slopes = curve_slopes(pair.piece, distance);
     double H[9][9] = {};
     add_curve_hessian(pair.piece, problem.bodies.obstacle(pair), distance, slopes, 1.0, 9, &H[0][0]);

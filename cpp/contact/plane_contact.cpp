@@ -4,50 +4,36 @@
 #include <cmath>
 
 #include "contact/pressing.hpp"
+#include "geometry/vec2.hpp"
 
 namespace withe {
 namespace {
 
-// A node's height and its place along the plane stand one after the other.
-constexpr int kHeight = 0, kPlace = 1, kWays = 6;
+using Point = Vec2<double>;
+/// A number for each coordinate of a piece's nodes.
+using PieceRow = double[kPlaneUnknowns];
 
-/// Minus the forces of a contact by heights and places, and their derivative when asked for.
-struct PlaneLocal {
-  double gradient[kWays] = {};
-  double hessian[kWays][kWays] = {};
-  bool with_hessian;
-};
+Point in_plane(const Vec3d& v) { return {v.x, v.y}; }
+Point node(const Touching& t, int i) { return {t.now[3 * i], t.now[3 * i + 1]}; }
+Point start_node(const ContactProblem& problem, const ContactPair& pair, int i) {
+  const int first = problem.model().node_dof[at(pair.piece.node[i])];
+  return {problem.start->q(first), problem.start->q(first + 1)};
+}
 
 /// Across and along a plane.
 struct Axes {
-  Vec3d normal, along;
+  Point normal, along;
 
-  explicit Axes(const Obstacle& o) : normal(o.other), along{o.other.y, -o.other.x, 0.0} {}
-
-  /// Adds what is by heights and places to what is by unknowns.
-  void add(const PlaneLocal& local, ContactLocal& out) const {
-    for (int i = 0; i < 3; ++i) {
-      const double h = local.gradient[2 * i + kHeight], y = local.gradient[2 * i + kPlace];
-      out.gradient[3 * i] += normal.x * h + along.x * y;
-      out.gradient[3 * i + 1] += normal.y * h + along.y * y;
-    }
-    if (!local.with_hessian) return;
-    for (int i = 0; i < 3; ++i) {
-      const double (&heights)[kWays] = local.hessian[2 * i + kHeight], (&places)[kWays] = local.hessian[2 * i + kPlace];
-      double (&out_x)[kContactUnknowns] = out.hessian[3 * i], (&out_y)[kContactUnknowns] = out.hessian[3 * i + 1];
-      for (int j = 0; j < 3; ++j) {
-        const double xh = normal.x * heights[2 * j] + along.x * places[2 * j];
-        const double xy = normal.x * heights[2 * j + 1] + along.x * places[2 * j + 1];
-        const double yh = normal.y * heights[2 * j] + along.y * places[2 * j];
-        const double yy = normal.y * heights[2 * j + 1] + along.y * places[2 * j + 1];
-        out_x[3 * j] += xh * normal.x + xy * along.x;
-        out_x[3 * j + 1] += xh * normal.y + xy * along.y;
-        out_y[3 * j] += yh * normal.x + yy * along.x;
-        out_y[3 * j + 1] += yh * normal.y + yy * along.y;
-      }
-    }
-  }
+  explicit Axes(const Obstacle& o) : normal(in_plane(o.other)), along(-turned(normal)) {}
 };
+
+/// h_i n at each node.
+void set_along_normal(const Point& normal, const double (&h)[3], PieceRow& out) {
+  for (int i = 0; i < 3; ++i) {
+    out[2 * i] = h[i] * normal.x;
+    out[2 * i + 1] = h[i] * normal.y;
+  }
+}
 
 /// Derivatives of a piece's distance by heights, and of the place s where it touches.
 struct HeightSlopes {
@@ -66,24 +52,56 @@ struct HeightSlopes {
 void add_height_start(const ContactProblem& problem, const Touching& t, const Axes& axes, bool geometric,
                       double (&along)[3], double (*derivative)[3]) {
   const ContactPair& pair = t.pair;
-  Vec3d x0[4];
-  const CurveDistance<double> start = problem.curve_at_start(pair, x0);
-  const double shift = dot(axes.normal, problem.shift_of(pair));
+  const CurveDistance<double> start = problem.curve_at_start(pair);
+  const Point shift = in_plane(problem.shift_of(pair));
   double way[3] = {};
-  for (int i = 0; i < pair.piece.weights->nodes; ++i) {
-    const Vec3d moved = Vec3d{t.now[3 * i], t.now[3 * i + 1], 0.0} - x0[i];
-    way[i] = dot(axes.normal, moved) - shift;
-  }
+  for (int i = 0; i < pair.piece.weights->nodes; ++i)
+    way[i] = dot(axes.normal, node(t, i) - start_node(problem, pair, i) - shift);
   add_start_direction(HeightSlopes(*pair.piece.weights, start).distance, way, t.proximity.distance - start.distance,
                       geometric, along, derivative);
 }
 
+void set_plane_pressing(const ContactProblem& problem, const Touching& t, const Axes& axes, const HeightSlopes& slopes,
+                        bool geometric, bool with_hessian, PlaneLocal& out) {
+  const CurvePiece& piece = t.pair.piece;
+  const CurveDistance<double>& end = t.proximity.curve;
+  double along[3], derivative[3][3] = {};
+  std::copy(slopes.distance, slopes.distance + 3, along);
+  if (with_hessian && geometric) {
+    // See add_curve_hessian: d^2 D = -phi ds^2 + (s^2 / 2) phi'' dg2^2.
+    const double bent = 0.5 * end.s * end.s * end.bend_change(piece.least_bend);
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j)
+        derivative[i][j] =
+            bent * piece.weights->bend[i] * piece.weights->bend[j] - end.stiff * slopes.s[i] * slopes.s[j];
+  }
+  if (problem.means_direction())
+    add_height_start(problem, t, axes, geometric, along, with_hessian ? derivative : nullptr);
+  set_along_normal(axes.normal, along, out.gradient);
+  for (double& force : out.gradient) force *= t.pressing.first;
+  for (int i = 0; i < 3 && with_hessian; ++i) {
+    double heights[3];
+    PieceRow row;
+    for (int j = 0; j < 3; ++j)
+      heights[j] = t.pressing.first * derivative[i][j] + t.pressing.by_end * along[i] * slopes.distance[j];
+    set_along_normal(axes.normal, heights, row);
+    for (int j = 0; j < kPlaneUnknowns; ++j) {
+      out.hessian[2 * i][j] = axes.normal.x * row[j];
+      out.hessian[2 * i + 1][j] = axes.normal.y * row[j];
+    }
+  }
+}
+
 /// An edge of a piece, and how it turns.
 struct PlaneEdge {
-  double across, along;    ///< parts of it [m]
-  double across0, along0;  ///< as the step began
-  double inverse_square;   ///< of its length [1/m^2]
-  double turn;             ///< phi
+  Point now, start;    ///< [m]
+  double inverse;      ///< of its length, squared [1/m^2]
+  double turn;         ///< phi
+  double lever;        ///< r m_b [m]
+  double lever_slope;  ///< its derivative by s [m]
+
+  /// What a moment of its own does to its head, and, turned round, to its tail [1/m].
+  Point arm() const { return inverse * turned(now); }
 };
 
 /// How far such a surface has slipped, and the friction on that.
@@ -91,34 +109,38 @@ class PlaneSlip {
  public:
   // Called, it would go through memory.
   [[gnu::always_inline]] PlaneSlip(const ContactProblem& problem, const Touching& t, double rate)
-      : pair_(t.pair), w_(*t.pair.piece.weights), axes_(problem.bodies.obstacle(t.pair)), s_(t.proximity.curve.s) {
-    for (int i = 0; i < w_.nodes; ++i) {
-      const Vec3d x{t.now[3 * i], t.now[3 * i + 1], 0.0};
-      const Vec3d x0 = local_position(problem.model(), problem.start->q, pair_.piece.node[i]);
-      height_[i] = dot(axes_.normal, x);
-      height0_[i] = dot(axes_.normal, x0);
-      place_[i] = dot(axes_.along, x);
-      place0_[i] = dot(axes_.along, x0);
-      weight_[i] = w_.at(i, s_);
-      weight_slope_[i] = w_.slope[i] + w_.bend[i] * s_;
-      slip_ += weight_[i] * (place_[i] - place0_[i]);
+      : axes_(problem.bodies.obstacle(t.pair)) {
+    const ContactPair& pair = t.pair;
+    const CurveWeights& w = *pair.piece.weights;
+    const double s = t.proximity.curve.s, radius = problem.description().centreline_friction ? 0.0 : pair.radius_a;
+    const Point drift =
+        problem.anchored() ? in_plane(problem.shift_of(pair) - t.stick) : in_plane(problem.shift_of(pair));
+    double slip = -dot(axes_.along, drift), by_s = 0.0;
+    Point last{}, last0{};
+    for (int i = 0; i < 3; ++i) {
+      weight_[i] = w.at(i, s);
+      weight_slope_[i] = w.slope[i] + w.bend[i] * s;
+      if (i == w.nodes) {
+        edge_[i - 1] = {};
+        break;
+      }
+      const Point x = node(t, i), x0 = start_node(problem, pair, i);
+      const double way = dot(axes_.along, x - x0);
+      slip += weight_[i] * way;
+      by_s += weight_slope_[i] * way;
+      if (i > 0) {
+        const int b = i - 1;
+        const Point now = x - last, start = x0 - last0;
+        const double inverse = 1.0 / dot(now, now), turn = inverse * cross(start, now);
+        edge_[b] = {now, start, inverse, turn, radius * (w.share[b] + w.share_slope[b] * s), radius * w.share_slope[b]};
+        slip += edge_[b].lever * turn;
+        by_s += edge_[b].lever_slope * turn;
+      }
+      last = x;
+      last0 = x0;
     }
-    slip_ -= dot(axes_.along, problem.shift_of(pair_));
-    if (problem.anchored()) slip_ += dot(axes_.along, t.stick);
-    edges_ = problem.description().centreline_friction ? 0 : w_.edges;
-    for (int b = 0; b < edges_; ++b) {
-      PlaneEdge& e = edge_[b];
-      e = {height_[b + 1] - height_[b],
-           place_[b + 1] - place_[b],
-           height0_[b + 1] - height0_[b],
-           place0_[b + 1] - place0_[b],
-           0.0,
-           0.0};
-      e.inverse_square = 1.0 / (e.across * e.across + e.along * e.along);
-      e.turn = e.inverse_square * (e.across * e.along0 - e.along * e.across0);
-      lever_[b] = pair_.radius_a * (w_.share[b] + w_.share_slope[b] * s_);
-      slip_ += lever_[b] * e.turn;
-    }
+    slip_ = slip;
+    by_s_ = by_s;
     find_force(problem, t, rate);
   }
 
@@ -130,144 +152,91 @@ class PlaneSlip {
   bool sticking() const { return sticking_; }
   double stick() const { return stick_; }
 
-  /// Its derivative by heights and places.
-  void slope(const HeightSlopes& d, double (&out)[kWays]) const {
-    double by_s = 0.0;
-    for (int i = 0; i < w_.nodes; ++i) by_s += weight_slope_[i] * (place_[i] - place0_[i]);
-    for (int b = 0; b < edges_; ++b) by_s += pair_.radius_a * w_.share_slope[b] * edge_[b].turn;
-    for (int i = 0; i < 3; ++i) {
-      out[2 * i + kHeight] = by_s * d.s[i];
-      out[2 * i + kPlace] = i < w_.nodes ? weight_[i] : 0.0;
-    }
-    for (int b = 0; b < edges_; ++b) {
-      const PlaneEdge& e = edge_[b];
-      const double factor = lever_[b] * e.inverse_square;
-      const double by_across = factor * (e.along0 - 2.0 * e.turn * e.across),
-                   by_along = -factor * (e.across0 + 2.0 * e.turn * e.along);
-      out[2 * (b + 1) + kHeight] += by_across;
-      out[2 * (b + 1) + kPlace] += by_along;
-      out[2 * b + kHeight] -= by_across;
-      out[2 * b + kPlace] -= by_along;
-    }
+  /// Its derivative. `s`: that of the place where it touches.
+  void slope(const PieceRow& s, PieceRow& out) const {
+    spread(
+        weight_, [](const PlaneEdge& e) { return (e.lever * e.inverse) * (turned(e.start) - (2.0 * e.turn) * e.now); },
+        out);
+    for (int k = 0; k < kPlaneUnknowns; ++k) out[k] += by_s_ * s[k];
   }
 
-  void add_gradient(double (&ways)[kWays]) const {
-    for (int i = 0; i < w_.nodes; ++i) ways[2 * i + kPlace] += weight_[i] * force_;
-    for (int b = 0; b < edges_; ++b) {
-      const PlaneEdge& e = edge_[b];
-      const double couple = lever_[b] * force_ * e.inverse_square;
-      ways[2 * (b + 1) + kHeight] += couple * e.along;
-      ways[2 * (b + 1) + kPlace] -= couple * e.across;
-      ways[2 * b + kHeight] -= couple * e.along;
-      ways[2 * b + kPlace] += couple * e.across;
-    }
-  }
-
-  /// `by_end`: of what presses, by the distance.
-  void add_hessian(const Touching& t, const HeightSlopes& d, const Vec3d* predicted,
-                   double (&matrix)[kWays][kWays]) const {
-    double turned[kWays], change[kWays];
-    slope(d, turned);
-    const Vec3d known = predicted ? *predicted : Vec3d{};
-    const double dual = predicted && law_.factor > 0.0 ? limit_ / law_.factor * dot(axes_.along, known) : slip_;
-    const double by_slip = law_.factor + 2.0 * law_.by_square * slip_ * dual;
-    for (int k = 0; k < kWays; ++k) change[k] = by_slip * turned[k];
-    for (int i = 0; i < 3; ++i) change[2 * i + kHeight] -= law_.by_pressing * slip_ * t.pressing.by_end * d.distance[i];
-    for (int i = 0; i < w_.nodes; ++i) {
-      for (int k = 0; k < kWays; ++k) matrix[2 * i + kPlace][k] += weight_[i] * change[k];
-      for (int k = 0; k < 3; ++k) matrix[2 * i + kPlace][2 * k + kHeight] += weight_slope_[i] * force_ * d.s[k];
-    }
-    for (int b = 0; b < edges_; ++b) add_couple(b, change, d, matrix);
+  /// Adds what it does to the nodes, and the derivative of that when asked for.
+  void add(const Touching& t, const HeightSlopes& d, const Vec3d* predicted, bool with_hessian, PlaneLocal& out) const {
+    PieceRow ways;
+    spread(weight_, [](const PlaneEdge& e) { return e.lever * e.arm(); }, ways);
+    for (int k = 0; k < kPlaneUnknowns; ++k) out.gradient[k] += force_ * ways[k];
+    if (!with_hessian) return;
+    PieceRow s, distance, change, ways_by_s;
+    set_along_normal(axes_.normal, d.s, s);
+    set_along_normal(axes_.normal, d.distance, distance);
+    slope(s, change);
+    const double dual =
+        predicted && law_.factor > 0.0 ? limit_ / law_.factor * dot(axes_.along, in_plane(*predicted)) : slip_;
+    const double by_slip = law_.factor + 2.0 * law_.by_square * slip_ * dual,
+                 by_distance = -law_.by_pressing * slip_ * t.pressing.by_end;
+    for (int k = 0; k < kPlaneUnknowns; ++k) change[k] = by_slip * change[k] + by_distance * distance[k];
+    spread(weight_slope_, [](const PlaneEdge& e) { return e.lever_slope * e.arm(); }, ways_by_s);
+    for (int k = 0; k < kPlaneUnknowns; ++k) s[k] *= force_;
+    for (int i = 0; i < kPlaneUnknowns; ++i)
+      for (int j = 0; j < kPlaneUnknowns; ++j) out.hessian[i][j] += ways[i] * change[j] + ways_by_s[i] * s[j];
+    for (int b = 0; b < 2; ++b) add_turned_arm(b, out);
   }
 
  private:
-  void find_force(const ContactProblem& problem, const Touching& t, double rate) {
-    const double mu = pair_.friction, pressing = -t.pressing.first;
+  /// weight_i t at the nodes, and of each edge a vector at its head and minus that at its tail.
+  template <class OfEdge>
+  void spread(const double (&weight)[3], const OfEdge& of_edge, PieceRow& out) const {
+    const Point first = of_edge(edge_[0]), second = of_edge(edge_[1]);
+    const Point nodes[3] = {weight[0] * axes_.along - first, weight[1] * axes_.along + first - second,
+                            weight[2] * axes_.along + second};
+    for (int i = 0; i < 3; ++i) {
+      out[2 * i] = nodes[i].x;
+      out[2 * i + 1] = nodes[i].y;
+    }
+  }
+
+  [[gnu::always_inline]] void find_force(const ContactProblem& problem, const Touching& t, double rate) {
+    const double mu = t.pair.friction, pressing = -t.pressing.first, slip = slip_;
     limit_ = mu * pressing;
     if (!problem.anchored()) {
-      law_ = tanh_law(mu, pressing, slip_ * slip_, rate);
-      force_ = law_.factor * slip_;
-      sticking_ = rate * std::abs(slip_) < 7.5;
+      law_ = tanh_law(mu, pressing, slip * slip, rate);
+      force_ = law_.factor * slip;
+      stick_ = 0.0;
+      sticking_ = rate * std::abs(slip) < 7.5;
       return;
     }
-    const double stiffness = tangential_stiffness(pair_, t.stiffness), most = std::max(limit_ / stiffness, 0.0);
-    sticking_ = holds(slip_ * slip_, most);
-    const double size = std::abs(slip_);
-    law_ = sticking_ ? ForceLaw{stiffness, 0.0, 0.0}
-                     : ForceLaw{limit_ / size, -0.5 * limit_ / (size * size * size), mu / size};
-    force_ = law_.factor * slip_;
+    const double stiffness = tangential_stiffness(t.pair, t.stiffness), most = std::max(limit_ / stiffness, 0.0);
+    sticking_ = holds(slip * slip, most);
+    const double inverse = 1.0 / std::abs(slip), factor = limit_ * inverse;
+    law_ =
+        sticking_ ? ForceLaw{stiffness, 0.0, 0.0} : ForceLaw{factor, -0.5 * factor * inverse * inverse, mu * inverse};
+    force_ = law_.factor * slip;
     stick_ = force_ / stiffness;
   }
 
-  /// What the moment r m_b F does to the ends of an edge, F r m_b (b, -a) / |e|^2.
-  void add_couple(int b, const double (&change)[kWays], const HeightSlopes& d, double (&matrix)[kWays][kWays]) const {
-    const PlaneEdge& e = edge_[b];
-    const double arm[2] = {e.inverse_square * e.along, -e.inverse_square * e.across};
-    double rows[2][kWays];
-    const double grown = pair_.radius_a * w_.share_slope[b] * force_;
-    for (int k = 0; k < kWays; ++k) {
-      const double moment = lever_[b] * change[k] + (k % 2 == kHeight ? grown * d.s[k / 2] : 0.0);
-      rows[kHeight][k] = arm[0] * moment;
-      rows[kPlace][k] = arm[1] * moment;
-    }
-    const double moment = lever_[b] * force_;
-    const double both = 2.0 * arm[0] * arm[1], own[2][2] = {{both, e.inverse_square - 2.0 * arm[0] * arm[0]},
-                                                            {2.0 * arm[1] * arm[1] - e.inverse_square, -both}};
-    for (int r = 0; r < 2; ++r) {
-      rows[r][2 * (b + 1) + kHeight] += moment * own[r][kHeight];
-      rows[r][2 * (b + 1) + kPlace] += moment * own[r][kPlace];
-      rows[r][2 * b + kHeight] -= moment * own[r][kHeight];
-      rows[r][2 * b + kPlace] -= moment * own[r][kPlace];
-      for (int k = 0; k < kWays; ++k) {
-        matrix[2 * (b + 1) + r][k] += rows[r][k];
-        matrix[2 * b + r][k] -= rows[r][k];
+  /// How the moment F r m_b acts on the ends of an edge that turns: derivative of N e / |e|^2 by e.
+  void add_turned_arm(int b, PlaneLocal& out) const {
+    const double moment = edge_[b].lever * force_;
+    const Point arm = edge_[b].arm();
+    const double twice = 2.0 * moment * arm.x * arm.y, apart = moment * (arm.x * arm.x - arm.y * arm.y);
+    const double own[2][2] = {{-twice, apart}, {apart, twice}};
+    const int tail = 2 * b, head = tail + 2;
+    for (int r = 0; r < 2; ++r)
+      for (int c = 0; c < 2; ++c) {
+        out.hessian[tail + r][tail + c] += own[r][c];
+        out.hessian[tail + r][head + c] -= own[r][c];
+        out.hessian[head + r][tail + c] -= own[r][c];
+        out.hessian[head + r][head + c] += own[r][c];
       }
-    }
   }
 
-  const ContactPair& pair_;
-  const CurveWeights& w_;
   Axes axes_;
-  double s_;
-  double height_[3] = {}, height0_[3] = {}, place_[3] = {}, place0_[3] = {};
-  double weight_[3] = {}, weight_slope_[3] = {};
-  int edges_ = 0;  ///< with an arm
-  PlaneEdge edge_[2];
-  double lever_[2] = {};  ///< r m_b
-  double slip_ = 0, limit_ = 0, force_ = 0, stick_ = 0;
-  bool sticking_ = false;
+  double weight_[3], weight_slope_[3];
+  PlaneEdge edge_[2];  ///< nothing where there is none
+  double slip_, by_s_, limit_, force_, stick_;
+  bool sticking_;
   ForceLaw law_;
 };
-
-void add_pressing_to(PlaneLocal& out, const ContactProblem& problem, const Touching& t, const Axes& axes,
-                     const HeightSlopes& slopes, bool geometric) {
-  const CurvePiece& piece = t.pair.piece;
-  const CurveDistance<double>& end = t.proximity.curve;
-  double along[3], derivative[3][3] = {};
-  std::copy(slopes.distance, slopes.distance + 3, along);
-  if (out.with_hessian && geometric) {
-    // See add_curve_hessian: d^2 D = -phi ds^2 + (s^2 / 2) phi'' dg2^2.
-    const double bent = 0.5 * end.s * end.s * end.bend_change(piece.least_bend);
-    for (int i = 0; i < 3; ++i)
-      for (int j = 0; j < 3; ++j)
-        derivative[i][j] =
-            bent * piece.weights->bend[i] * piece.weights->bend[j] - end.stiff * slopes.s[i] * slopes.s[j];
-  }
-  if (problem.means_direction())
-    add_height_start(problem, t, axes, geometric, along, out.with_hessian ? derivative : nullptr);
-  for (int i = 0; i < 3; ++i) out.gradient[2 * i + kHeight] += t.pressing.first * along[i];
-  for (int i = 0; i < 3 && out.with_hessian; ++i)
-    for (int j = 0; j < 3; ++j)
-      out.hessian[2 * i + kHeight][2 * j + kHeight] +=
-          t.pressing.first * derivative[i][j] + t.pressing.by_end * along[i] * slopes.distance[j];
-}
-
-void add_friction_to(PlaneLocal& out, const ContactProblem& problem, const Touching& t, const HeightSlopes& slopes,
-                     const ContactLinearisation& linearisation) {
-  const PlaneSlip slip(problem, t, slip_rate(problem, linearisation.regularisation));
-  slip.add_gradient(out.gradient);
-  if (out.with_hessian) slip.add_hessian(t, slopes, linearisation.friction.of(t.pair.key), out.hessian);
-}
 
 }  // namespace
 
@@ -276,29 +245,46 @@ bool beside_plane(const ContactProblem& problem, const Touching& t) {
   return problem.bodies.flat(t.pair) && t.pair.isotropic() && problem.turn.empty();
 }
 
+void plane_contact(const ContactProblem& problem, const Touching& t, PlaneForces which,
+                   const ContactLinearisation& linearisation, bool with_hessian, PlaneLocal& out) {
+  const HeightSlopes slopes(*t.pair.piece.weights, t.proximity.curve);
+  if (which != PlaneForces::friction)
+    set_plane_pressing(problem, t, Axes(problem.bodies.obstacle(t.pair)), slopes, linearisation.geometric, with_hessian,
+                       out);
+  else
+    out = {};
+  if (which == PlaneForces::pressing || !rubs(problem, t)) return;
+  const PlaneSlip slip(problem, t, slip_rate(problem, linearisation.regularisation));
+  slip.add(t, slopes, with_hessian ? linearisation.friction.of(t.pair.key) : nullptr, with_hessian, out);
+}
+
 void add_plane_contact(const ContactProblem& problem, const Touching& t, PlaneForces which,
                        const ContactLinearisation& linearisation, bool with_hessian, ContactLocal& out) {
-  const Axes axes(problem.bodies.obstacle(t.pair));
-  const HeightSlopes slopes(*t.pair.piece.weights, t.proximity.curve);
-  PlaneLocal local{.with_hessian = with_hessian};
-  if (which != PlaneForces::friction) add_pressing_to(local, problem, t, axes, slopes, linearisation.geometric);
-  if (which != PlaneForces::pressing && rubs(problem, t)) add_friction_to(local, problem, t, slopes, linearisation);
-  axes.add(local, out);
+  PlaneLocal local;
+  plane_contact(problem, t, which, linearisation, with_hessian, local);
+  const auto place = [](int k) { return 3 * (k / 2) + k % 2; };
+  for (int i = 0; i < kPlaneUnknowns; ++i) {
+    out.gradient[place(i)] += local.gradient[i];
+    for (int j = 0; j < kPlaneUnknowns && with_hessian; ++j) out.hessian[place(i)][place(j)] += local.hessian[i][j];
+  }
 }
 
 FrictionForce<double> plane_friction(const ContactProblem& problem, const Touching& t, double rate) {
   const PlaneSlip slip(problem, t, rate);
-  return {slip.force() * slip.axes().along, slip.stick() * slip.axes().along, slip.sticking()};
+  const Vec3d along{slip.axes().along.x, slip.axes().along.y, 0.0};
+  return {slip.force() * along, slip.stick() * along, slip.sticking()};
 }
 
 Slipping plane_slipping(const ContactProblem& problem, const Touching& t, double rate, const VectorX& change) {
   const PlaneSlip slip(problem, t, rate);
-  const Vec3d &normal = slip.axes().normal, &along = slip.axes().along;
-  double slope[kWays], moved = 0.0;
-  slip.slope(HeightSlopes(*t.pair.piece.weights, t.proximity.curve), slope);
+  const Vec3d along{slip.axes().along.x, slip.axes().along.y, 0.0};
+  PieceRow s, slope;
+  set_along_normal(slip.axes().normal, HeightSlopes(*t.pair.piece.weights, t.proximity.curve).s, s);
+  slip.slope(s, slope);
+  double moved = 0.0;
   for (int i = 0; i < t.pair.piece.weights->nodes; ++i) {
     const Vec3d by = local_position(problem.model(), change, t.pair.piece.node[i]);
-    moved += slope[2 * i + kHeight] * dot(normal, by) + slope[2 * i + kPlace] * dot(along, by);
+    moved += slope[2 * i] * by.x + slope[2 * i + 1] * by.y;
   }
   return {slip.slip() * along, moved * along, slip.law(), slip.limit()};
 }

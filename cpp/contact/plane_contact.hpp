@@ -1,13 +1,12 @@
 #pragma once
 /// A planar rod's curve beside a plane, in closed form.
 ///
-/// With h_i = n . (x_i - p) the heights of a piece's nodes above the plane and y_i = t . x_i their places along it, t
-/// the normal turned by -90 degrees, everything is a function of scalars. Heights alone say how near the piece is
-/// (curve.hpp): g0, g1, g2 are sums of them, D(h), and where it touches, s(h). The slip of a step that began at h0, y0
-/// is
-///   S = sum_i w_i(s) (y_i - y0_i) + r sum_b m_b(s) phi_b - drift,   phi_b = (a_b b0_b - b_b a0_b) / |e_b|^2,
-/// with a, b the parts of an edge across and along the plane, m_b its share in the piece's rotation. These are the
-/// general formulas (friction.hpp, friction_curve.hpp, pressing.cpp) for a normal that does not turn.
+/// With n the plane's normal, t that turned by -90 degrees, and h_i = n . (x_i - p) the heights of a piece's nodes, all
+/// is a function of few scalars. Heights alone say how near the piece is (curve.hpp): g0, g1, g2 are sums of them,
+/// D(h), and where it touches, s(h). The slip of a step that began at x0 is
+///   S = sum_i w_i(s) t . (x_i - x0_i) + r sum_b m_b(s) phi_b - drift,   phi_b = (e0_b x e_b) / |e_b|^2,
+/// with e_b the edges and m_b their shares in the piece's rotation. These are the general formulas (friction.hpp,
+/// friction_curve.hpp, pressing.cpp) for a normal that does not turn.
 
 #include "contact/contact_friction.hpp"
 
@@ -19,7 +18,10 @@ bool beside_plane(const ContactProblem& problem, const Touching& t);
 
 enum class PlaneForces { pressing, friction, both };
 
-/// Adds minus the forces of such a contact, and their derivative when asked for.
+/// Minus the forces of such a contact, and their derivative when asked for.
+void plane_contact(const ContactProblem& problem, const Touching& t, PlaneForces which,
+                   const ContactLinearisation& linearisation, bool with_hessian, PlaneLocal& out);
+/// Adds them to what is by all unknowns of a contact.
 void add_plane_contact(const ContactProblem& problem, const Touching& t, PlaneForces which,
                        const ContactLinearisation& linearisation, bool with_hessian, ContactLocal& out);
 /// Its friction on the slip. `rate`: K / (2 dt) [1/m].

@@ -38,7 +38,8 @@ void add_curve_start(const ContactProblem& problem, const Touching& t, bool geom
   const ContactPair& pair = t.pair;
   Vec3d x0[4], x1[4];
   t.end_points(x1);
-  const CurveDistance<double> start = problem.curve_at_start(pair, x0);
+  problem.bodies.end_points(pair, problem.start->q, x0);
+  const CurveDistance<double> start = problem.curve_at_start(pair);
   const Vec3d shift = problem.shift_of(pair);
   double way[9] = {};
   for (int i = 0; i < 3 * pair.piece.weights->nodes; ++i) way[i] = (x1[i / 3] - x0[i / 3] - shift)[i % 3];

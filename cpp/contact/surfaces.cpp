@@ -245,6 +245,15 @@ void Surfaces::unknowns(const ContactPair& pair, int (&dofs)[kContactUnknowns]) 
     dofs[12 + b] = model_.edge_dof[at(pair.piece.edge[b])];
 }
 
+void Surfaces::plane_unknowns(const ContactPair& pair, int (&dofs)[kPlaneUnknowns]) const {
+  for (int i = 0; i < 3; ++i) {
+    const int node = pair.piece.node[i];
+    const int first = node < 0 ? -1 : model_.node_dof[at(node)];
+    dofs[2 * i] = first;
+    dofs[2 * i + 1] = node < 0 ? -1 : first + 1;
+  }
+}
+
 void Surfaces::unknowns(const ContactKey& key, int (&dofs)[kContactUnknowns]) const {
   if (key.b < 0)
     unknowns(obstacle_pair(key), dofs);

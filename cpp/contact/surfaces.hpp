@@ -15,6 +15,8 @@ constexpr double kNearest = 0.5;
 /// Unknowns of a contact: a0, a1, b0, b1 (3 each), angle of a, angle of b; of a piece of a curve: its nodes (3 each),
 /// three that are none, the angles of its edges.
 inline constexpr int kContactUnknowns = 14;
+/// Unknowns of a piece of a planar curve: its nodes (2 each).
+inline constexpr int kPlaneUnknowns = 6;
 
 /// Two surfaces that may touch, and all that does not change while they do.
 struct ContactPair {
@@ -86,6 +88,8 @@ class Surfaces {
   /// Unknowns of two surfaces, -1 where there is none; angles where there is friction.
   void unknowns(const ContactPair& pair, int (&dofs)[kContactUnknowns]) const;
   void unknowns(const ContactKey& key, int (&dofs)[kContactUnknowns]) const;
+  /// Of a piece of a planar curve, the two of each node; those that there are come first.
+  void plane_unknowns(const ContactPair& pair, int (&dofs)[kPlaneUnknowns]) const;
 
  private:
   void find_neighbours();

@@ -34,12 +34,35 @@ struct ObstaclePlace {
   Vec3d turn{};            ///< about its own axis, since it was drawn; full turns count [rad]
 };
 
+/// Finds items by their keys in a sorted sequence. Those that are asked for mostly come in its order, so that the one
+/// behind the last is looked at first.
+class OrderedLookup {
+ public:
+  /// Nothing where there is none. `key_of(item)`.
+  template <class Items, class KeyOf>
+  auto find(Items& items, const ContactKey& key, const KeyOf& key_of) -> decltype(items.data()) {
+    if (next_ >= items.size() || !(key_of(items[next_]) == key)) {
+      const auto found = std::lower_bound(items.begin(), items.end(), key,
+                                          [&](const auto& item, const ContactKey& k) { return key_of(item) < k; });
+      if (found == items.end() || !(key_of(*found) == key)) return nullptr;
+      next_ = static_cast<std::size_t>(found - items.begin());
+    }
+    return &items[next_++];
+  }
+
+ private:
+  std::size_t next_ = 0;
+};
+
 /// The record of a contact among sorted ones, or nothing.
 template <class Records>
+auto find_record(Records& records, const ContactKey& key, OrderedLookup& lookup) -> decltype(records.data()) {
+  return lookup.find(records, key, [](const ContactRecord& r) -> const ContactKey& { return r.key; });
+}
+template <class Records>
 auto find_record(Records& records, const ContactKey& key) -> decltype(records.data()) {
-  const auto found = std::lower_bound(records.begin(), records.end(), key,
-                                      [](const ContactRecord& r, const ContactKey& k) { return r.key < k; });
-  return found != records.end() && found->key == key ? &*found : nullptr;
+  OrderedLookup lookup;
+  return find_record(records, key, lookup);
 }
 
 /// How a rod passes a ring; see forces/ring.hpp.

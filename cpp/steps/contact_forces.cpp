@@ -65,19 +65,32 @@ void ContactForces::add(const StepProblem& problem, StepData& data, const Assemb
   data.contact_floor.setZero(n);
   const ContactLinearisation& linearisation = *data.contact;
   const double twice = problem.end_rate();
-  ContactLocal local;
-  int dofs[kContactUnknowns];
-  for (int i = 0; i < contact_.count(); ++i) {
-    contact_.local(i, !values.empty(), local, linearisation);
-    contact_.unknowns(i, dofs);
+  const auto add_gradient = [&](int i, const double* gradient, const int* dofs, int unknowns) {
     const double rounding = contact_.rounding(i, data.rounding.reach, linearisation);
-    for (int k = 0; k < kContactUnknowns; ++k) {
+    for (int k = 0; k < unknowns; ++k) {
       if (dofs[k] < 0) continue;
-      data.contact_gradient[dofs[k]] += local.gradient[k];
-      data.row_magnitude[dofs[k]] += std::abs(local.gradient[k]);
+      data.contact_gradient[dofs[k]] += gradient[k];
+      data.row_magnitude[dofs[k]] += std::abs(gradient[k]);
       data.contact_floor[dofs[k]] += rounding;
     }
-    if (!values.empty()) assembler.contact.add_hessian(rows_.row(contact_.key(i)), local.hessian, twice, values);
+  };
+  const bool with_matrix = !values.empty();
+  OrderedLookup rows;
+  ContactLocal local;
+  PlaneLocal plane;
+  int dofs[kContactUnknowns], plane_dofs[kPlaneUnknowns];
+  for (int i = 0; i < contact_.count(); ++i) {
+    if (contact_.plane_local(i, with_matrix, plane, linearisation)) {
+      contact_.plane_unknowns(i, plane_dofs);
+      add_gradient(i, plane.gradient, plane_dofs, kPlaneUnknowns);
+      if (with_matrix)
+        assembler.contact.add_dense_hessian(rows_.row(contact_.key(i), rows), plane.hessian, twice, values);
+      continue;
+    }
+    contact_.local(i, with_matrix, local, linearisation);
+    contact_.unknowns(i, dofs);
+    add_gradient(i, local.gradient, dofs, kContactUnknowns);
+    if (with_matrix) assembler.contact.add_hessian(rows_.row(contact_.key(i), rows), local.hessian, twice, values);
   }
   data.gradient.head(n) += data.contact_gradient;
   if (!contact_.frictional() && !problem.in_middle()) data.potential += contact_.energy();

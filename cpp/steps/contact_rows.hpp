@@ -15,14 +15,15 @@ class ContactRows {
   /// Of all rows, one after the other.
   const std::vector<int>& unknowns() const { return unknowns_; }
   /// -1: none.
-  int row(const ContactKey& key) const {
-    const auto known = std::lower_bound(keys_.begin(), keys_.end(), key);
-    return known != keys_.end() && *known == key ? static_cast<int>(known - keys_.begin()) : -1;
+  int row(const ContactKey& key, OrderedLookup& lookup) const {
+    const ContactKey* known = lookup.find(keys_, key, [](const ContactKey& k) -> const ContactKey& { return k; });
+    return known ? static_cast<int>(known - keys_.data()) : -1;
   }
   /// Whether all that touches has a row.
   bool hold(const Contact& contact) const {
+    OrderedLookup lookup;
     for (int i = 0; i < contact.count(); ++i)
-      if (row(contact.key(i)) < 0) return false;
+      if (row(contact.key(i), lookup) < 0) return false;
     return true;
   }
   void set(const Surfaces& surfaces, std::vector<ContactKey> keys) {
