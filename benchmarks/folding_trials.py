@@ -27,12 +27,14 @@ CASES = {
     "cardboard .20": (folding.Paper.cardboard(), 0.20),
     "origami .30": (folding.Paper.origami(), 0.30),
 }
+REPLANS = 5
+LEFT = (0.02, 0.3)  # of Lgb and friction, in doubt about sheets that are measured and watched
 WAYS = {  # how the planner is asked, and whether the fold is watched
     "intuitive": ({"method": "intuitive"}, False),
     "local": ({"method": "local"}, False),
     "ucs": ({"method": "ucs"}, False),
     "slip": ({"method": "slip", "grasp": "free"}, False),
-    "ucs closed": ({"method": "ucs"}, True),
+    "ucs closed": ({"method": "ucs", "replans": REPLANS, "uncertainty": LEFT}, True),
     "slip closed": ({"method": "slip", "grasp": "free"}, True),
     "ucs as a strip": ({"method": "ucs"}, False),
 }
@@ -63,7 +65,7 @@ def trial_of(key: Key, seed: int, sheet: dict) -> folding.Trial:
         replace(paper, friction=friction),
         target,
         seed,
-        replans=5 if watched else 0,
+        replans=REPLANS if watched else 0,
         planner={"curvature": CURVATURES.get(case, 2.5), **asked},
         sheet=sheet,
         believed=replace(paper, outline=folding.Paper.a4().outline, friction=friction) if way == STRIP else None,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -47,6 +49,31 @@ def test_a_fold_that_is_not_corrected_goes_the_planned_way(half):
     watched = fold(half, sheet, replans=2, tolerance=1.0, progress=False)
     assert watched.slide == pytest.approx(blind.slide, abs=2e-4)
     assert watched.record.positions("sheet")[-1, 0] == pytest.approx(half.poses[-1, :3], abs=1e-6)
+
+
+def test_a_watched_way_plunges_where_its_last_part_would_slide_unseen():
+    sheet = SimulatedSheet(Paper.us_letter(), 1002, Noise(), **COARSE)
+    paper = replace(sheet.paper, gravito_bending_length=sheet.truth.gravito_bending_length)
+    slow = plan(paper)
+    way = plan(paper, replans=5, uncertainty=(0.02, 0.3), progress=False)
+    assert slow.plunges_at is None
+    assert way.plunges_at is not None
+    # Of a sheet that has slid: where it lies when it is seen last, the edge comes down.
+    assert way.plunge_slide == pytest.approx(way.before_plunge().slide[-1], abs=1e-3)
+    assert abs(fold(slow, sheet, progress=False).error) > 3e-3
+    found = fold(way, sheet, progress=False)
+    assert found.failure is None
+    assert abs(found.error) < 5e-4
+
+
+def test_a_plan_is_cut_where_its_edge_comes_down_and_not_where_it_was_low_before():
+    whole = plan(Paper.us_letter())
+    lgb = whole.paper.gravito_bending_length
+    part = whole.down_to(0.4 * lgb)
+    assert part.poses[-1, 2] >= 0.4 * lgb > whole.poses[len(part), 2]
+    assert part.poses[-1, 0] == pytest.approx(whole.target, abs=0.2 * lgb)
+    with pytest.raises(ValueError, match="must come down in the end"):
+        part.down_to(0.3 * lgb)
 
 
 def test_a_hidden_edge_is_said_and_not_guessed(half):

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import overload
 
 import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
-from withe.folding.planning import replan
 from withe.folding.plans import Plan
 from withe.folding.seeing import find_edge, overhead_camera
 from withe.folding.simulated_sheet import Fold, SimulatedSheet
-from withe.folding.timing import travel_times
+from withe.folding.watching import TOLERANCE, watched_parts
 from withe.folding.wide_sheet import WideFold, WideSheet
 from withe.perception.camera import Camera
 
@@ -24,14 +22,6 @@ FloatArray = npt.NDArray[np.float64]
 _NEAR = 0.01  # of where the lifted edge appears, an edge on the table cannot be told from it [m]
 
 
-@dataclass(frozen=True)
-class _Part:
-    """Poses from one stop of the jaw to the next."""
-
-    times: FloatArray
-    poses: FloatArray
-
-
 @overload
 def fold(
     plan: Plan,
@@ -39,7 +29,7 @@ def fold(
     *,
     replans: int = 5,
     camera: Camera | None = None,
-    tolerance: float = 5e-4,
+    tolerance: float = TOLERANCE,
     progress: bool = True,
 ) -> Fold: ...
 
@@ -51,7 +41,7 @@ def fold(
     *,
     replans: int = 5,
     camera: Camera | None = None,
-    tolerance: float = 5e-4,
+    tolerance: float = TOLERANCE,
     progress: bool = True,
 ) -> WideFold: ...
 
@@ -62,7 +52,7 @@ def fold(
     *,
     replans: int = 5,
     camera: Camera | None = None,
-    tolerance: float = 5e-4,
+    tolerance: float = TOLERANCE,
     progress: bool = True,
 ) -> Fold | WideFold:
     """Carry out a plan in parts, and plan the rest anew after each from where a camera sees that the sheet has slid to.
@@ -95,7 +85,7 @@ def fold(
     Raises
     ------
     ValueError
-        Not a plan or a sheet, a plan without moment that plunges, a negative tolerance, no path from where the sheet
+        Not a plan or a sheet, a negative tolerance, no path from where the sheet
         has slid to.
     ImportError
         OpenCV is not installed.
@@ -111,50 +101,18 @@ def fold(
         raise ValueError(f"plan must be a Plan, got {plan!r:.80}")
     if not isinstance(sheet, SimulatedSheet | WideSheet):
         raise ValueError(f"sheet must be a SimulatedSheet or a WideSheet, got {sheet!r:.80}")
-    if plan.plunges_at is not None and plan.grasp != "free":
-        raise ValueError(
-            f"plan must be one with a free moment for its way to a plunge to be planned anew, got {plan!r}"
-        )
     stops = validation.integer(replans, "replans", 0, 1000)
     watched = overhead_camera(plan.paper.length) if camera is None else camera
     least = validation.non_negative(tolerance, "tolerance")
     seen: list[float] = []
-    parts = _parts(plan, sheet, stops, watched, least, seen)
+
+    def look(pose: FloatArray) -> float:
+        seen.append(_slide(sheet, watched, plan, pose))
+        return seen[-1]
+
+    parts = watched_parts(plan, stops, look, least)
     folded = sheet.carry_out(parts, plan.target, duration=float(plan.times[-1]), progress=progress)
     return replace(folded, seen_slides=tuple(seen))
-
-
-def _parts(
-    plan: Plan, sheet: SimulatedSheet | WideSheet, stops: int, camera: Camera, tolerance: float, seen: list[float]
-) -> Iterator[_Part]:
-    """One part after the other; what is yielded is carried out before the next is asked for."""
-    present, plunge = plan.before_plunge(), _plunge(plan)
-    poses, known = present.poses, plan.offset
-    for left in range(stops, -1, -1):
-        parts = left + 1 if plunge is None else max(left, 1)  # the last look is before the plunge
-        last = int(np.ceil((len(poses) - 1) / parts))
-        yield _timed(poses[: last + 1], plan)
-        poses = poses[last:]
-        if left == 0:
-            break
-        seen.append(_slide(sheet, camera, plan, poses[0]))
-        if abs(seen[-1] - known) > tolerance:  # not where the edge is hidden: NaN
-            known = seen[-1]
-            if len(poses) > 1:
-                present = replan(present, poses[0], known)
-                poses = np.vstack([poses[:1], present.poses[1:]])
-        if len(poses) == 1:
-            break
-    if plunge is not None:
-        shift = np.array([known - plan.offset, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
-        yield _Part(plunge.times, np.vstack([poses[-1:], plunge.poses[1:] + shift]))
-
-
-def _plunge(plan: Plan) -> _Part | None:
-    if plan.plunges_at is None:
-        return None
-    last = plan.times >= plan.plunges_at
-    return _Part(plan.times[last], plan.poses[last])
 
 
 def _slide(sheet: SimulatedSheet | WideSheet, camera: Camera, plan: Plan, pose: FloatArray) -> float:
@@ -168,9 +126,3 @@ def _slide(sheet: SimulatedSheet | WideSheet, camera: Camera, plan: Plan, pose: 
     except ValueError:
         return float("nan")
     return seen - plan.paper.length if seen > lifted + _NEAR else float("nan")
-
-
-def _timed(poses: FloatArray, plan: Plan) -> _Part:
-    angles = np.unwrap(2.0 * np.arctan2(poses[:, 4], poses[:, 6]))
-    places = np.stack([poses[:, 0], poses[:, 2], angles], axis=1)
-    return _Part(travel_times(places, *plan.limits), poses)

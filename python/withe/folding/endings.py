@@ -19,6 +19,7 @@ __all__ = ["plan"]
 
 Ending = Literal["auto", "slow", "plunge"]
 _BEARABLE = 1e-3  # slide [m]
+_UNSEEN = 0.5  # from the target, in which a lifted edge hides what it comes down on [Lgb]
 
 
 def plan(
@@ -32,6 +33,7 @@ def plan(
     jaw: Jaw | None = None,
     manifold: Source = "exact",
     ending: Ending = "auto",
+    replans: int = 0,
     speed: float = 0.05,
     acceleration: float = 0.2,
     turning: float = 1.0,
@@ -61,6 +63,10 @@ def plan(
         slide by more than 1 mm (`Plan.worst_slide`) on the way that comes down slowly, which it does where that asks
         for more friction than there may be; elsewhere slow. A plunge is tried on simulated sheets, which takes some
         10 s. Where none is found either, the plan comes down slowly, and its `blocked` says why. "plunge": always.
+        Of other methods "auto" is slow, but for sheets that will be looked at on the way: there it is a plunge where
+        the last part, which no look mends, needs more friction than there may be.
+    replans : int
+        How often that will be, by `fold`. Sheets on which plunges are tried are led so.
     curvature : float [1/Lgb]
         Bound of a free moment's curvature.
     jaw : Jaw, optional
@@ -102,6 +108,7 @@ def plan(
     0.0 mm
     """
     validation.choice(ending, "ending", ("auto", "slow", "plunge"))
+    replans = validation.integer(replans, "replans", 0, 1000)
     slow = slow_plan(
         paper,
         target,
@@ -116,21 +123,24 @@ def plan(
         turning=turning,
     )
     if ending == "plunge":
-        return plunge(slow, progress=progress)
-    if method != "slip":
+        return plunge(slow, replans=replans, progress=progress)
+    said = None
+    if method == "slip":
+        said = _slides(slow)
+        needed = float(slow.slip_ratio.max())
+        if needed > paper.friction:
+            said = f"the sheet slides: this way needs friction {needed:.3f}, the paper has {paper.friction:g}"
+    elif method != "intuitive" and replans:
+        said = _unseen(slow)
+    if said is None:
         return slow
-    slides = _slides(slow)
-    needed = float(slow.slip_ratio.max())
-    if needed > paper.friction:
-        slides = f"the sheet slides: this way needs friction {needed:.3f}, the paper has {paper.friction:g}"
-    if slides is not None and grasp == "free" and ending == "auto":
+    if ending == "auto" and (grasp == "free" or (replans and slow.jumps_at is None)):
         try:
-            return plunge(slow, progress=progress)
+            return plunge(slow, replans=replans, progress=progress)
         except ValueError as error:
-            slides = f"{slides}; {error}"
-            slow = replace(slow, blocked=slides)
-    if slides is not None:
-        warnings.warn(slides, UserWarning, stacklevel=2)
+            said = f"{said}; {error}"
+            slow = replace(slow, blocked=said)
+    warnings.warn(said, UserWarning, stacklevel=2)
     return slow
 
 
@@ -142,3 +152,13 @@ def _slides(slow: Plan) -> str | None:
     how = f"by {1e3 * slide:.1f} mm" if np.isfinite(slide) else "and jumps"
     lgb = paper.gravito_bending_length
     return f"the sheet slides {how} within its uncertainty, where Lgb is {lgb:.4g} m and friction {paper.friction:.3g}"
+
+
+def _unseen(slow: Plan) -> str | None:
+    """What the last part asks for, of which a camera sees nothing, where that is too much."""
+    lgb, (_, share) = slow.paper.gravito_bending_length, slow.uncertainty
+    least = slow.paper.friction * (1.0 - share)
+    needed = float(slow.slip_ratio[slow.poses[:, 0] > slow.poses[-1, 0] - _UNSEEN * lgb].max())
+    if needed <= least:
+        return None
+    return f"the last part, in which nobody sees the sheet slide, needs friction {needed:.3f}, there may be {least:.3g}"

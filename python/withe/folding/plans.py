@@ -78,6 +78,8 @@ class Plan:
     times : ndarray of shape (n,) [s]
     plunges_at : float or None [s]
         When the jaw goes down quickly, as `plunge` found out; None where it comes down slowly.
+    plunge_slide : float [m]
+        How far a sheet that is as thought has slid by then, on which it comes down where it should.
     blocked : str or None
         Why it does not bear what the paper may be, with the friction that is missing; None where it does, or where
         nobody asked (`plan` says of what it asks).
@@ -99,6 +101,7 @@ class Plan:
     angles: FloatArray
     times: FloatArray
     plunges_at: float | None = None
+    plunge_slide: float = 0.0
     blocked: str | None = None
     _foreseen: Elastica | None = field(default=None, repr=False)
 
@@ -221,6 +224,22 @@ class Plan:
         parts = {name: getattr(self, name)[slow] for name in ("poses", "angles", "times")}
         return replace(self, plunges_at=None, _foreseen=seen, **parts)
 
+    def down_to(self, height: float) -> Plan:
+        """The part until its edge, turned over, is lower than a height [m] for good.
+
+        Raises
+        ------
+        ValueError
+            It is not in the end.
+        """
+        high = np.flatnonzero((self.poses[:, 2] >= height) | (self.angles <= 0.5 * np.pi))
+        if not len(high) or high[-1] == len(self) - 1:
+            raise ValueError("plan must come down in the end: its edge is not low and turned over there")
+        keep = slice(0, max(2, int(high[-1]) + 1))
+        foreseen = at_forces(forces_of(self.sheet)[keep], self._width)
+        parts = {name: getattr(self, name)[keep] for name in ("poses", "angles", "times")}
+        return replace(self, _foreseen=foreseen, **parts)
+
     @property
     def papers(self) -> list[Paper]:
         """What the paper may be within `uncertainty`: as it is thought to be, and the bounds.
@@ -335,6 +354,7 @@ class Plan:
             "poses": self.poses.tolist(),
             "angles": self.angles.tolist(),
             "plunges_at": self.plunges_at,
+            "plunge_slide": self.plunge_slide,
             "blocked": self.blocked,
             "prediction": {
                 "slip_ratio": listed(self.slip_ratio),

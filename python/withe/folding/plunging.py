@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from itertools import product
 from typing import Any
@@ -13,10 +13,12 @@ import numpy.typing as npt
 
 from withe.common import validation
 from withe.common.progress import progress as progress_bar
+from withe.folding.jaw_motion import Motion
 from withe.folding.planning import plan_above
 from withe.folding.plans import Plan
 from withe.folding.sheets import at_forces, forces_of
 from withe.folding.simulated_sheet import Held, SimulatedSheet
+from withe.folding.watching import Part, shifted, watched_parts
 from withe.folding.widths import free_width
 
 __all__ = ["plunge"]
@@ -25,37 +27,50 @@ FloatArray = npt.NDArray[np.float64]
 _HEIGHTS = (0.4, 0.6, 0.8, 1.0)  # over the target, from which it goes down [Lgb]
 _NO_SLIDE = 1e-4  # [m]
 _SHORT = 0.2  # of the target, of a second try [Lgb]: where a sheet has slid back, it must lie under its edge
+_OVER = 0.25  # of the target at most, where it goes down [Lgb]
 _CORRECTIONS = 4
 _ENOUGH = 5e-5  # [m]
 _HOLDING = 0.3  # in the end [s]
+_BESIDE = (0.0, 5e-4, -5e-4, -5e-4, 5e-4)  # of where a jaw should be, that holds sheets at the bounds [m]
 _COARSE = {"edges": 75}  # of sheets at the bounds, whose creases need not be known to a tenth of a millimetre
-
-
-@dataclass(frozen=True)
-class _Part:
-    """Of a plan's poses."""
-
-    times: FloatArray
-    poses: FloatArray
 
 
 class _Tried:
     """One sheet that a paper may be: led slowly to where plunges begin, once, and from there by every one of them."""
 
-    def __init__(self, slow: Plan, sheet: SimulatedSheet) -> None:
+    def __init__(self, slow: Plan, sheet: SimulatedSheet, looks: int) -> None:
         self._sheet, self._target = sheet, slow.target
         self._held: Held | None = None
+        self._from = slow.poses[-1:]
+        self.slide = 0.0  # until a plunge begins [m]
+        self._known = 0.0  # of that, what is seen [m]
 
-        def motions() -> Iterator[Plan]:
-            yield slow
-            self._held = sheet.hold()
+        def motions() -> Iterator[Motion]:
+            if not looks:
+                yield slow
+            else:
+                for part in watched_parts(slow, looks, lambda _: self._slid(), ends_above=True):
+                    yield part
+                    self._from, self._known = part.poses[-1:], self._slid()
+            self._held, self.slide = sheet.hold(), self._slid()
 
         sheet.carry_out(motions(), slow.target, duration=float(slow.times[-1]), progress=False)
 
-    def missed(self, way: _Part) -> tuple[float, float]:
-        """How far the crease is off, and how far the sheet slides [m]; infinite where it snaps."""
-        fold = None if self._held is None else self._sheet.carry_on(self._held, [way], self._target)
-        return (np.inf, np.inf) if fold is None or fold.failure is not None else (fold.error, fold.slide)
+    def _slid(self) -> float:
+        return float(self._sheet.positions()[-1, 0]) - self._sheet.paper.length
+
+    @property
+    def snapped(self) -> bool:
+        """Whether it snaps before a plunge could begin."""
+        return self._held is None
+
+    def missed(self, way: Part, aside: float = 0.0) -> tuple[float, float]:
+        """How far the crease is off, and the sheet slides beyond what is seen [m]; infinite where it snaps."""
+        if self._held is None:
+            return np.inf, np.inf
+        own = Part(way.times, np.vstack([self._from, shifted(way.poses[1:], aside)]))
+        fold = self._sheet.carry_on(self._held, [own], self._target)
+        return (np.inf, np.inf) if fold.failure is not None else (fold.error, fold.slide - self._known)
 
 
 def plunge(
@@ -64,6 +79,7 @@ def plunge(
     press: float = 2e-3,
     duration: float | Sequence[float] = (0.025, 0.05),
     within: float = 5e-3,
+    replans: int = 0,
     sheet: Mapping[str, Any] | None = None,
     progress: bool = True,
 ) -> Plan:
@@ -77,7 +93,8 @@ def plunge(
     there, others are cut off. How much to the side it goes, within what time, and whether the edge ends level or as the
     plan has it, is tried on simulated sheets without noise, those of `Plan.papers`: aimed so that the paper as it is
     thought to be is folded right, it is the way on which the worst of them is best, by how far its crease is off and
-    by half of how far it slides, of those that fold all of them.
+    by half of how far it slides, of those that fold all of them. Jaws that hold sheets at the bounds are off by .5 mm
+    to either side: an edge that comes down on the last of a sheet must not miss it.
 
     Parameters
     ----------
@@ -88,6 +105,9 @@ def plunge(
         shorter, the more it is thrown.
     within : float [m]
         How far off the crease may be on the worst of these sheets.
+    replans : int
+        How often the sheet will be looked at on the way (`fold`): these sheets are led so, and what counts is how far
+        they slide in the plunge.
     sheet : mapping, optional
         Options of `SimulatedSheet`; by default sheets at the bounds have 75 edges.
     progress : bool
@@ -117,6 +137,7 @@ def plunge(
         raise ValueError(f"plan must come down slowly, it plunges at {plan.plunges_at:.2f} s already")
     press = validation.positive(press, "press")
     bound = validation.positive(within, "within")
+    looks = validation.integer(replans, "replans", 0, 1000)
     durations = np.atleast_1d(validation.number_array(duration, "duration", (), ("n",)))
     if not durations.size or durations.min() <= 0.0:
         raise ValueError(f"duration must be positive, got {duration!r:.80}")
@@ -127,18 +148,22 @@ def plunge(
         tried: list[_Tried] = []
         for paper in papers:
             options = sheet if sheet is not None else _COARSE if tried else {}
-            tried.append(_Tried(slow, SimulatedSheet(paper, jaw=plan.jaw, **options)))
+            tried.append(_Tried(slow, SimulatedSheet(paper, jaw=plan.jaw, **options), looks))
             bar.advance(1)
+            if tried[0].snapped:
+                raise ValueError(_missed(plan, np.inf, bound))
 
-        best: _Part | None = None
+        best: Part | None = None
         least = nearest = np.inf  # of the best way, and how far the crease is off on that which comes nearest
         for down in ways:
             way = down(_aimed(tried[0], down, _SHORT * lgb))
             bar.advance(1)
             error = off = 0.0
-            for each in tried:
-                crease, slide = each.missed(way)
-                error, off = max(error, abs(crease)), max(off, abs(crease), 0.5 * abs(slide))
+            for each, beside in zip(tried, _BESIDE, strict=False):
+                seen = each.slide - tried[0].slide if looks else 0.0
+                crease, slide = each.missed(way, seen + beside)
+                missed = abs(crease - 0.5 * beside)
+                error, off = max(error, missed), max(off, missed, 0.5 * abs(slide))
                 hopeless = error >= nearest if best is None else error > bound or off >= least
                 if hopeless:
                     break
@@ -148,10 +173,10 @@ def plunge(
             bar.advance(1)
     if best is None:
         raise ValueError(_missed(plan, nearest, bound))
-    return _ended(slow, best)
+    return _ended(slow, best, tried[0].slide)
 
 
-def _aimed(sheet: _Tried, down: Callable[[float], _Part], short: float) -> float:
+def _aimed(sheet: _Tried, down: Callable[[float], Part], short: float) -> float:
     """How far to the side the edge goes down so that a crease is where it should be [m]."""
     aside = 0.0
     error, _ = sheet.missed(down(aside))
@@ -176,9 +201,10 @@ def _above(plan: Plan) -> Plan:
     lgb = plan.paper.gravito_bending_length
     best: tuple[tuple[float, float], Plan] | None = None
     for height in _HEIGHTS:
-        slow = plan_above(plan, height * lgb) if plan.grasp == "free" else _cut(plan, height * lgb)
+        slow = plan_above(plan, height * lgb) if plan.grasp == "free" else plan.down_to(height * lgb)
         slides = slow.worst_slide[0], float(np.nanmax(slow.slip_ratio))
-        if best is None or slides < best[0]:
+        over = abs(float(slow.poses[-1, 0]) - plan.target) <= _OVER * lgb
+        if best is None or (over and slides < best[0]):
             best = slides, slow
         if slides[0] <= _NO_SLIDE:
             break
@@ -186,25 +212,15 @@ def _above(plan: Plan) -> Plan:
     return best[1]
 
 
-def _cut(plan: Plan, height: float) -> Plan:
-    """Up to where a plan is last so high."""
-    low = (plan.angles > 0.5 * np.pi) & (plan.poses[:, 2] < height)
-    if not low.any():
-        raise ValueError("plan must come down in the end: its edge is never low and turned over")
-    keep = slice(0, max(2, int(np.argmax(low))))
-    foreseen = at_forces(forces_of(plan.sheet)[keep], free_width(plan.paper, plan.jaw.depth))
-    return replace(plan, poses=plan.poses[keep], angles=plan.angles[keep], times=plan.times[keep], _foreseen=foreseen)
-
-
-def _down(slow: Plan, angle: float, press: float, duration: float, aside: float) -> _Part:
+def _down(slow: Plan, angle: float, press: float, duration: float, aside: float) -> Part:
     """From its last pose straight down to the target, `aside` further in x and `press` too low, and pressed there."""
     end = [slow.target + aside, 0.0, slow.paper.thickness - press, 0.0, np.sin(0.5 * angle), 0.0, np.cos(0.5 * angle)]
     times = slow.times[-1] + np.array([0.0, duration, duration + _HOLDING])
-    return _Part(times, np.vstack([slow.poses[-1], end, end]))
+    return Part(times, np.vstack([slow.poses[-1], end, end]))
 
 
-def _ended(slow: Plan, way: _Part) -> Plan:
-    """A plan with a way down."""
+def _ended(slow: Plan, way: Part, slide: float) -> Plan:
+    """A plan with a way down, for a sheet that has slid so far until then."""
     added = len(way.times) - 1
     angle = 2.0 * np.arctan2(way.poses[-1, 4], way.poses[-1, 6])
     forces = np.vstack([forces_of(slow.sheet), np.full((added, 3), np.nan)])
@@ -214,6 +230,7 @@ def _ended(slow: Plan, way: _Part) -> Plan:
         angles=np.concatenate([slow.angles, np.full(added, angle)]),
         times=np.concatenate([slow.times, way.times[1:]]),
         plunges_at=float(slow.times[-1]),
+        plunge_slide=slide,
         _foreseen=at_forces(forces, free_width(slow.paper, slow.jaw.depth)),
     )
 

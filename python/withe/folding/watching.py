@@ -1,0 +1,92 @@
+"""A plan in parts, of which the rest is planned anew after each [dissertation, Alg. 8]."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from withe.folding.planning import replan
+from withe.folding.plans import Plan
+from withe.folding.timing import travel_times
+
+__all__ = ["TOLERANCE", "Part", "shifted", "watched_parts"]
+
+FloatArray = npt.NDArray[np.float64]
+TOLERANCE = 5e-4  # a plan stays where the sheet has slid by less since it was made [m]
+
+
+@dataclass(frozen=True)
+class Part:
+    """Poses from one stop of the jaw to the next."""
+
+    times: FloatArray
+    poses: FloatArray
+
+
+def watched_parts(
+    plan: Plan,
+    looks: int,
+    look: Callable[[FloatArray], float],
+    tolerance: float = TOLERANCE,
+    *,
+    ends_above: bool = False,
+) -> Iterator[Part]:
+    """One part after the other; what is yielded is carried out before the next is asked for.
+
+    Parameters
+    ----------
+    plan : Plan
+    looks : int
+        At equal distances of the way; the last one before a plunge, which goes down where the sheet is then.
+    look : callable
+        Of the jaw's pose: how far the sheet has slid [m], NaN where that is not seen.
+    tolerance : float [m]
+    ends_above : bool
+        Whether the plan is the slow way to a plunge that is not in it.
+    """
+    present, plunge = plan.before_plunge(), _plunge(plan)
+    over = ends_above or plunge is not None
+    poses, known = present.poses, plan.offset
+    height, latest = float(poses[-1, 2]), known
+    for left in range(looks, -1, -1):
+        last = int(np.ceil((len(poses) - 1) / (max(left, 1) if over else left + 1)))
+        yield _timed(poses[: last + 1], plan)
+        poses = poses[last:]
+        if left == 0:
+            break
+        seen = look(poses[0])
+        if np.isfinite(seen):
+            latest = seen
+        if abs(latest - known) > tolerance:
+            known = latest
+            if len(poses) > 1:
+                present = replan(present, poses[0], known)
+                if over and plan.grasp != "free":  # that goes all the way down
+                    present = present.down_to(height)
+                poses = np.vstack([poses[:1], present.poses[1:]])
+        if len(poses) == 1:
+            break
+    if plunge is not None:
+        farther = latest - plan.offset - plan.plunge_slide  # than when the plunge was planned
+        yield Part(plunge.times, np.vstack([poses[-1:], shifted(plunge.poses[1:], farther)]))
+
+
+def shifted(poses: FloatArray, slide: float) -> FloatArray:
+    """Poses of a sheet that has slid so far along x."""
+    return np.asarray(poses + [slide, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+
+
+def _plunge(plan: Plan) -> Part | None:
+    if plan.plunges_at is None:
+        return None
+    last = plan.times >= plan.plunges_at
+    return Part(plan.times[last], plan.poses[last])
+
+
+def _timed(poses: FloatArray, plan: Plan) -> Part:
+    angles = np.unwrap(2.0 * np.arctan2(poses[:, 4], poses[:, 6]))
+    places = np.stack([poses[:, 0], poses[:, 2], angles], axis=1)
+    return Part(travel_times(places, *plan.limits), poses)
