@@ -76,7 +76,9 @@ def watched_parts(
 
 def shifted(poses: FloatArray, slide: float) -> FloatArray:
     """Poses of a sheet that has slid so far along x."""
-    return np.asarray(poses + [slide, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    moved = poses.copy()
+    moved[:, 0] += slide
+    return moved
 
 
 def _plunge(plan: Plan) -> Part | None:
