@@ -11,31 +11,36 @@
 namespace withe {
 namespace {
 
+void add_to_node(const Model& model, int node, double bound, VectorX& floor) {
+  const int dof = model.node_dof[at(node)];
+  for (int k = dof; k < dof + model.dimension; ++k) floor(k) += bound;
+}
+
 /// What rounding leaves of inertia. What spins for long has turned by many radians. Sets the greatest coordinate, and
 /// returns the greatest angle, one radian at least.
 double set_inertial_bounds(const StepProblem& problem, const StepData& data, RoundingBounds& out) {
+  const Model& model = problem.model;
   VectorX& floor = out.rows;
-  const auto of_node = [&](int node) {
-    return floor.segment(problem.model.node_dof[at(node)], problem.model.dimension).array();
-  };
   floor = data.z.cwiseAbs();
   out.reach = 0.0;
-  for (int i = 0; i < problem.model.node_count; ++i) {
-    out.reach = std::max(out.reach, of_node(i).maxCoeff());
-    of_node(i) = 0.0;
-  }
+  for (int dof : model.node_dof)
+    for (int k = dof; k < dof + model.dimension; ++k) {
+      out.reach = std::max(out.reach, floor(k));
+      floor(k) = 0.0;
+    }
   const double turned = std::max(1.0, floor.maxCoeff());
   floor.setConstant(turned);
-  for (int i = 0; i < problem.model.node_count; ++i) of_node(i) = std::max(out.reach, 1e-300);
+  for (int dof : model.node_dof)
+    for (int k = dof; k < dof + model.dimension; ++k) floor(k) = std::max(out.reach, 1e-300);
   const double rounding = problem.moves() ? kRounding / (problem.interval * problem.interval) : 0.0;
   floor.array() *= rounding * problem.mass.rows.array();
-  if (!problem.moves() || problem.model.planar()) return turned;
-  for (int e = 0; e < problem.model.edge_count; ++e) {
+  if (!problem.moves() || model.planar()) return turned;
+  for (int e = 0; e < model.edge_count; ++e) {
     // add_spin_couple: `spin` of the torque, and no more than twice that of the couple.
     const Vec3d& spin = data.configuration.edge[at(e)].spin;
     const double couple = 3.0 * rounding * turned * problem.parameters->edge_inertia[e] * std::sqrt(dot(spin, spin));
-    of_node(problem.model.edge_tail[at(e)]) += couple;
-    of_node(problem.model.edge_head[at(e)]) += couple;
+    add_to_node(model, model.edge_tail[at(e)], couple, floor);
+    add_to_node(model, model.edge_head[at(e)], couple, floor);
   }
   return turned;
 }
@@ -60,8 +65,8 @@ void set_rounding_bounds(const StepProblem& problem, StepData& data) {
   };
   const auto bend_add = [&](double moment, double length, std::initializer_list<int> nodes,
                             std::initializer_list<int> angles) {
-    for (int node : nodes)
-      floor.segment(problem.model.node_dof[at(node)], problem.model.dimension).array() += moment / length;
+    const double force = moment / length;
+    for (int node : nodes) add_to_node(problem.model, node, force, floor);
     if (!problem.model.planar())
       for (int edge : angles) floor(problem.model.edge_dof[at(edge)]) += moment;
   };
