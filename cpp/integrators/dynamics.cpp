@@ -87,7 +87,7 @@ double estimated_error(Equations& equations, const Newton& newton, const Options
 /// jump.
 void find_held_velocity(const Model& model, const StepPlan& plan, const State& state, StepWorkspace& work) {
   VectorX& v = work.held_velocity;
-  v = (work.held.q - state.q) / plan.dt;
+  v = (1.0 / plan.dt) * (work.held.q - state.q);
   if (plan.rule == StepRule::backward_euler || state.motion.known == 0) return;
   const double share = 0.5 * plan.dt / (state.time + 0.5 * plan.dt - state.motion.time[0]);
   for (const Constraint& c : model.constraints) {
@@ -126,7 +126,7 @@ bool begin_flow(Equations& equations, double dt, bool euler, const State& state,
 void remember_motion(const VectorX& q1, double dt, State& state) {
   Motion& motion = state.motion;
   motion.velocity[1].swap(motion.velocity[0]);
-  motion.velocity[0] = (q1 - state.q) / dt;
+  motion.velocity[0] = (1.0 / dt) * (q1 - state.q);
   motion.time[1] = motion.time[0];
   motion.time[0] = state.time + 0.5 * dt;
   motion.known = std::min(motion.known + 1, 2);
@@ -185,7 +185,7 @@ void add_support_work(const Equations& equations, const VectorX& v0, const Vecto
   VectorX& rate = work.mean;
   work.z = v1 - v0;
   multiply(equations.model(), equations.mass(), work.z, momentum);
-  rate = momentum / dt;
+  rate = (1.0 / dt) * momentum;
   if (held_time != dt) {
     work.z /= dt;
     for (const Constraint& c : equations.model().constraints)
@@ -288,7 +288,7 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
   const bool holds = !model.constraints.empty();
   if (holds) {
     find_held_velocity(model, plan, state, work);
-    work.held_acceleration = (work.held_velocity - state.v) / held_time(plan, state);
+    work.held_acceleration = (1.0 / held_time(plan, state)) * (work.held_velocity - state.v);
   }
   equations.begin(state, parameters, plan.rule, h, holds ? &work.held_acceleration : nullptr);
   if (equations.contact() && equations.contact()->blocked()) return result;
@@ -306,13 +306,14 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
   if (conserves) set_working_change(equations.problem(), work.newton.data, work.change, work.working);
   if (equations.contact())
     result.pressing_gain = equations.contact()->pressing_gain(conserves ? work.working : work.change);
-  work.mean = work.change / dt;
+  const double rate = 1.0 / dt;
+  work.mean = rate * work.change;
   find_end_velocity(equations, plan, state, work);
   const double contact_loss = account(equations, parameters, plan, state, q1, work, result);
   VectorX& acceleration = work.mean;
-  acceleration = (work.velocity - state.v) / dt;
+  acceleration = rate * (work.velocity - state.v);
   if (options.tolerance) result.error = estimated_error(equations, newton, options, plan, predictor, work);
-  work.difference = work.change / dt;
+  work.difference = rate * work.change;
   predictor.record({state.time + 0.5 * dt, h, dt, plan.slot}, state.v, work.difference, acceleration,
                    equations.mass().rows);
   if (Contact* contact = equations.contact())

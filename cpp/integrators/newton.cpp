@@ -77,7 +77,7 @@ Balance Newton::balance(const StepData& e, NewtonResult& result) const {
   const auto size = e.residual.array().abs();
   const auto over_floor = size - 10.0 * e.floor.array();
   const auto over_share = size - options_.force_tolerance * (force * coordinates + moment * angles);
-  result.residual = (size / norms_.arms().array()).maxCoeff();
+  result.residual = (size * norms_.inverse_arms().array()).maxCoeff();
   balance.either = over_floor.min(over_share).maxCoeff() <= 0.0;
   balance.floor = balance.either && over_floor.maxCoeff() <= 0.0;
   return balance;
@@ -85,7 +85,7 @@ Balance Newton::balance(const StepData& e, NewtonResult& result) const {
 
 int Newton::worst_row(const VectorX& residual) const {
   int row = -1;
-  (residual.array().abs() / norms_.arms().array()).maxCoeff(&row);
+  (residual.array().abs() * norms_.inverse_arms().array()).maxCoeff(&row);
   return row;
 }
 

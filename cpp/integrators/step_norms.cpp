@@ -23,7 +23,7 @@ StepNorms::StepNorms(const Model& model) : model_(model), shortest_edge_(model.e
   coordinates_.setZero(model.dof_count);
   for (int dof : model.node_dof) coordinates_.segment(dof, model.dimension).setOnes();
   angles_ = 1.0 - coordinates_.array();
-  arms_ = coordinates_ + shortest_edge_ * angles_;
+  inverse_arms_ = coordinates_ + (1.0 / shortest_edge_) * angles_;
   (model.planar() ? single_angles_ : rotations_) = model.frame_dof;
   single_angles_.insert(single_angles_.end(), model.edge_dof.begin(), model.edge_dof.end());
   for (const Hinge& hinge : model.hinges) single_angles_.push_back(hinge.dof);

@@ -20,11 +20,11 @@ class StepNorms {
   /// Whether `cap` surely leaves a step alone in which no node moves, and nothing turns, by more than `most`.
   bool leaves_alone(double most) const;
 
-  /// Per unknown: 1 where it is a coordinate of a node, 1 where it is an angle, else 0; and by what a force or moment
-  /// is divided to be a force: 1, or the shortest edge [m].
+  /// Per unknown: 1 where it is a coordinate of a node, 1 where it is an angle, else 0; and what makes a force of a
+  /// force or moment: 1, or the inverse of the shortest edge [1/m].
   const VectorX& coordinates() const { return coordinates_; }
   const VectorX& angles() const { return angles_; }
-  const VectorX& arms() const { return arms_; }
+  const VectorX& inverse_arms() const { return inverse_arms_; }
   double shortest_edge() const { return shortest_edge_; }  ///< [m]
 
  private:
@@ -34,7 +34,7 @@ class StepNorms {
   bool leaves_edges_alone(double most) const;
 
   const Model& model_;
-  VectorX coordinates_, angles_, arms_;
+  VectorX coordinates_, angles_, inverse_arms_;
   std::vector<int> single_angles_, rotations_;  ///< first unknowns of angles, and of rotations in space
   double shortest_edge_ = 1.0;
 };
