@@ -31,11 +31,11 @@ class Touch(withe.learning.Task):
     """The tip of a short arm is to touch a point: the example of the docstring."""
 
     action_size, control_step, steps = 2, 0.1, 3
-    goal = np.array([0.1, 0.0, 0.25])
+    goal, viscosity = np.array([0.1, 0.0, 0.25]), 1e3
 
     def build(self, generator):
         scene = withe.Scene()
-        rubber = withe.Material(youngs_modulus=1e6, density=1000.0, viscosity=1e3)
+        rubber = withe.Material(youngs_modulus=1e6, density=1000.0, viscosity=self.viscosity)
         arm = scene.add_rod(start=(0, 0, 0), end=(0, 0, 0.3), nodes=9, radius=1e-2, material=rubber, name="arm")
         scene.clamp(arm.start)
         return scene.build(time_step=0.02)
@@ -221,7 +221,7 @@ class Brittle(Touch):
 
     def build(self, generator):
         scene = withe.Scene()
-        rubber = withe.Material(youngs_modulus=1e6, density=1000.0, viscosity=1e3)
+        rubber = withe.Material(youngs_modulus=1e6, density=1000.0, viscosity=self.viscosity)
         arm = scene.add_rod(start=(0, 0, 0), end=(0, 0, 0.3), nodes=9, radius=1e-2, material=rubber, name="arm")
         scene.clamp(arm.start)
         return scene.build(time_step=0.02, adaptive=False, max_iterations=6)
@@ -319,7 +319,7 @@ def test_a_policy_is_trained_the_same_for_equal_seeds():
 
     def policy():
         return withe.learning.train_policy(
-            Touch(), 96, environments=4, workers=2, seed=3, progress=False, n_steps=12, batch_size=24, n_epochs=2
+            Touch(), 96, environments=4, workers=2, seed=3, progress=False, batch_size=24, gradient_steps=2
         )
 
     seen = np.linspace(-0.1, 0.3, 6, dtype=np.float32)
@@ -339,16 +339,18 @@ def test_scales_of_observations_are_those_of_what_was_seen_and_kept_with_the_pol
             return found
 
     task = Recorded()
-    policy = withe.learning.train_policy(
-        task, 192, environments=4, workers=1, progress=False, n_steps=12, batch_size=24, n_epochs=1
-    )
-    scaling = policy.policy.features_extractor
-    assert float(scaling.count[0]) == 144.0  # all rollouts but the last, from which the policy has learned
+    policy = withe.learning.train_policy(task, 192, environments=4, workers=1, progress=False, batch_size=24)
+    scaling = policy.actor.features_extractor
+    assert policy.critic.features_extractor is scaling
+    behind = policy.critic_target.features_extractor
+    assert float(scaling.running_count[0]) == 192.0
+    assert 144.0 < float(behind.running_count[0]) <= 192.0  # as of the last update
     seen = np.concatenate(observed)
-    assert np.all(scaling.mean.numpy() >= seen.min(axis=0) - 1e-6)
-    assert np.all(scaling.mean.numpy() <= seen.max(axis=0) + 1e-6)
+    for mean in (scaling.running_mean.numpy(), behind.running_mean.numpy()):
+        assert np.all(mean >= seen.min(axis=0) - 1e-6)
+        assert np.all(mean <= seen.max(axis=0) + 1e-6)
     policy.save(tmp_path / "policy.zip")
-    again = baselines.PPO.load(tmp_path / "policy.zip", device="cpu")
+    again = baselines.SAC.load(tmp_path / "policy.zip", device="cpu")
     some = seen[:5].astype(np.float32)
     np.testing.assert_array_equal(*(p.predict(some, deterministic=True)[0] for p in (policy, again)))
 
@@ -365,6 +367,33 @@ def test_running_means_and_deviations_are_those_of_all_at_once():
     rows = drawn.reshape(-1, 3)
     scaled = scaling(torch.as_tensor(rows)).numpy()
     np.testing.assert_allclose(scaled, (rows - rows.mean(0)) / rows.std(0), atol=2e-3)
+
+
+def test_a_policy_learns_to_hold_the_arc_that_is_nearest():
+    pytest.importorskip("stable_baselines3")
+
+    class Calm(Touch):
+        steps, viscosity = 10, 1e5
+
+    policy = withe.learning.train_policy(
+        Calm(),
+        4000,
+        environments=8,
+        workers=1,
+        progress=False,
+        gamma=0.8,
+        batch_size=64,
+        policy_kwargs={"net_arch": [32, 32]},
+    )
+    robots = withe.learning.VectorEnvironment(Calm(), 1, 1)
+    seen, _ = robots.reset(seed=0)
+    for _ in range(Calm.steps):
+        seen, rewards, *_ = robots.step(policy.predict(seen, deterministic=True)[0])
+    turned = np.linspace(0.01, 1.8, 1000)  # by arcs of .3 m, which the arm at rest is
+    arcs = 0.3 / turned * np.array([1.0 - np.cos(turned), 0.0 * turned, np.sin(turned)])
+    nearest = np.linalg.norm(arcs - Touch.goal[:, None], axis=0).min()
+    assert nearest < 0.03
+    assert -rewards[0] < nearest + 0.03  # .08 further away at the start
 
 
 def test_training_refuses_what_is_no_task():

@@ -29,7 +29,7 @@ def train_policy(
     progress: bool = True,
     **options: Any,
 ) -> Any:
-    """Train a controller by proximal policy optimisation, on robots that are stepped side by side.
+    """Train a controller by soft actor-critic [Haarnoja et al. 2018], on robots that are stepped side by side.
 
     A thin example: everything else that Stable-Baselines3 can do, it does with `VectorEnvironment` too.
 
@@ -45,18 +45,19 @@ def train_policy(
     seed : int
         Equal seeds give equal controllers, where torch runs the same.
     normalize : bool
-        Whether observations are scaled by their running mean and deviation, a part of the policy, and rewards, while it
-        learns, by the deviation of their discounted sum.
+        Whether observations are scaled by their running mean and deviation, a part of the policy.
     callback : callable, optional
-        Called with the policy before the first action and after each update: to keep it, or to see how good it is.
+        Called with the policy before each control step and at the end: to keep it, or to see how good it is.
     progress : bool
         Whether to show a progress bar on a terminal.
     **options
-        Of ``stable_baselines3.PPO``, such as n_steps and learning_rate.
+        Of ``stable_baselines3.SAC``, such as gamma and learning_rate. Unless given, there is an update by 256
+        remembered steps for every 4 control steps, and entropy is worth little from the start, as rewards about 1
+        want it.
 
     Returns
     -------
-    stable_baselines3.PPO
+    stable_baselines3.SAC
         ``action, _ = policy.predict(observation, deterministic=True)``; its ``save`` and ``load`` keep it. Rewards of
         episodes that ended last are in ``policy.ep_info_buffer``.
 
@@ -69,35 +70,38 @@ def train_policy(
 
     Examples
     --------
-    >>> policy = withe.learning.train_policy(withe.learning.Follow(), 1_000_000)  # doctest: +SKIP
+    >>> policy = withe.learning.train_policy(withe.learning.Follow(), 300_000)  # doctest: +SKIP
     """
     total = validation.integer(steps, "steps", 1, 2**31 - 1)
     number = validation.integer(environments, "environments", 1, 1_000_000)
     baselines = require("stable_baselines3", "learn")
     require("torch", "learn").set_num_threads(1)  # small networks lose by more
     robots = environment_class("VectorEnvironment")(task, number, workers, autoreset="same_step")
-    given: dict[str, Any] = {"n_steps": max(2, 2048 // number), "batch_size": 256, "gamma": 0.99, "device": "cpu"}
+    monitor = require("stable_baselines3.common.vec_env", "learn").VecMonitor
+    given: dict[str, Any] = {
+        "train_freq": max(1, 4 // number),
+        "gradient_steps": max(1, number // 4),
+        "learning_starts": min(5000, total // 10),
+        "learning_rate": 1e-3,
+        "buffer_size": max(number, min(total, 1_000_000)),
+        "ent_coef": "auto_0.02",  # of 1, as it is by default, policies learn to be random first
+        "device": "cpu",
+    }
     given |= options
-    wrappers = require("stable_baselines3.common.vec_env", "learn")
-    trained = wrappers.VecMonitor(_adapter()(robots))
     if normalize:
-        trained = wrappers.VecNormalize(trained, norm_obs=False, gamma=given["gamma"])
-        given["policy_kwargs"] = {"features_extractor_class": _scaling(), **given.get("policy_kwargs", {})}
-    policy = baselines.PPO("MlpPolicy", trained, seed=seed, **given)
+        shared = {"features_extractor_class": _scaling(), "share_features_extractor": True}
+        given["policy_kwargs"] = shared | given.get("policy_kwargs", {})
+    policy = baselines.SAC("MlpPolicy", monitor(_adapter()(robots)), seed=seed, **given)
     base = require("stable_baselines3.common.callbacks", "learn").BaseCallback
 
     class Report(base):  # type: ignore[misc,valid-type]
         def _on_rollout_start(self) -> None:
-            # Not before an update, which compares with what was chosen by the old scales.
-            if normalize and self.num_timesteps > 0:
-                policy.policy.features_extractor.take_in(self.seen)
             if callback is not None:
                 callback(policy)
 
-        def _on_rollout_end(self) -> None:
-            self.seen = policy.rollout_buffer.observations
-
         def _on_step(self) -> bool:
+            if normalize:
+                policy.actor.features_extractor.take_in(self.locals["new_obs"])
             bar.update(min(self.num_timesteps, total))
             return True
 
@@ -120,21 +124,24 @@ def _scaling() -> Any:
         def __init__(self, observation_space: Any) -> None:
             size = observation_space.shape[0]
             super().__init__(observation_space, size)
+            # What is called running Stable-Baselines3 carries over to the critics that lag behind.
             for name, value in (("count", 0.0), ("mean", 0.0), ("variance", 1.0)):
-                self.register_buffer(name, torch.full((size,), value))
+                self.register_buffer(f"running_{name}", torch.full((size,), value))
 
         def take_in(self, observations: Any) -> None:
-            """Those of a rollout, shape (steps, robots, size)."""
-            seen = torch.as_tensor(observations, dtype=self.mean.dtype).reshape(-1, len(self.mean))
-            count = self.count + len(seen)
-            apart = seen.mean(0) - self.mean
-            within = self.count * self.variance + len(seen) * seen.var(0, correction=0)
-            self.variance.copy_((within + apart**2 * self.count * len(seen) / count) / count)
-            self.mean.add_(apart * len(seen) / count)
-            self.count.copy_(count)
+            """Those of some robots, shape (..., size)."""
+            mean, variance = self.running_mean, self.running_variance
+            seen = torch.as_tensor(observations, dtype=mean.dtype).reshape(-1, len(mean))
+            count = self.running_count + len(seen)
+            apart = seen.mean(0) - mean
+            within = self.running_count * variance + len(seen) * seen.var(0, correction=0)
+            variance.copy_((within + apart**2 * self.running_count * len(seen) / count) / count)
+            mean.add_(apart * len(seen) / count)
+            self.running_count.copy_(count)
 
         def forward(self, observations: Any) -> Any:
-            return ((observations - self.mean) / (self.variance + 1e-8).sqrt()).clamp(-self.most, self.most)
+            scaled = (observations - self.running_mean) / (self.running_variance + 1e-8).sqrt()
+            return scaled.clamp(-self.most, self.most)
 
     return Scaling
 
