@@ -41,7 +41,7 @@ class Watch:
 
     def __call__(self, simulation: Simulation) -> bool:
         """Whether it is over."""
-        speed = max(float(np.linalg.norm(simulation.velocities(rod), axis=1).max()) for rod in self._rods)
+        speed = max(float((simulation.velocities(rod) ** 2).sum(axis=1).max()) for rod in self._rods) ** 0.5
         curvature = max(float(np.abs(simulation.curvatures(rod)).max()) for rod in self._rods)
         self.max_speed = max(self.max_speed, speed)
         self.max_curvature = max(self.max_curvature, curvature)

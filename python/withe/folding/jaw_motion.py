@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Iterable, Iterator
 from copy import copy
 from typing import Any, Protocol
@@ -52,16 +53,22 @@ class _Way:
         if (np.abs(self.poses[0] - before) > _JUMP).any():
             where, asked = (f"({x:.4g} m, {z:.4g} m, {angle:.3g} rad)" for x, z, angle in (before, self.poses[0]))
             raise ValueError(f"poses of a motion must begin where the jaw is, at {where}, got {asked}")
+        self._instants = self.times.tolist()
         self._speeds = np.hypot(*np.diff(self.poses[:, :2], axis=0).T) / np.diff(times)
 
     def speed(self, begin: float, end: float) -> float:
         """Greatest within a time [m/s]."""
-        last = len(self._speeds) - 1
-        first, behind = np.clip(np.searchsorted(self.times, (begin, end), side="right") - 1, 0, last)
-        return float(self._speeds[first : behind + 1].max())
+        return float(self._speeds[self._part(begin) : self._part(end) + 1].max())
+
+    def _part(self, time: float) -> int:
+        """Between which two of its poses it is."""
+        return min(max(bisect_right(self._instants, time) - 1, 0), len(self._speeds) - 1)
 
     def __call__(self, time: float) -> FloatArray:
-        return np.array([np.interp(time, self.times, self.poses[:, i]) for i in range(3)])
+        i = self._part(time)
+        begin, end = self._instants[i], self._instants[i + 1]
+        share = min(max((time - begin) / (end - begin), 0.0), 1.0)
+        return np.asarray(self.poses[i] + share * (self.poses[i + 1] - self.poses[i]))
 
 
 class JawMotion:

@@ -119,7 +119,7 @@ class Drawn:
 
     def off(self, time: float, share: float) -> FloatArray:
         """How far the jaw is from where it should be, (x, z [m], angle [rad]); `share` of it has come in."""
-        amplitude, frequency, phase = np.moveaxis(self.waves, 2, 0)
+        amplitude, frequency, phase = self.waves[..., 0], self.waves[..., 1], self.waves[..., 2]
         jitter = (amplitude * np.sin(frequency * time + phase)).sum(axis=0)
         return np.asarray(share * (self.shift + np.array([jitter[0], jitter[1], 0.0])))
 
