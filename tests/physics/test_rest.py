@@ -34,17 +34,23 @@ def test_a_dropped_cable_comes_to_rest_for_a_minute(model, friction_model):
 @pytest.mark.parametrize("friction_model", ["anchored", "implicit"])
 @pytest.mark.parametrize("model", ["imcv2", "barrier"])
 def test_midpoint_steps_bring_it_to_rest_too(model, friction_model, restitution):
-    """It is so light that it rests within the tolerance of contact, in steps of full length; jumps take 10 s."""
+    """It is so light that it rests within the tolerance of contact, in steps of full length; jumps take 10 s.
+
+    What rings is not resolved by the step: axial waves, whose velocities turn round from step to step while nodes move
+    by 1e-10 m. Anchors take a tenth of them in some seconds, and none comes back.
+    """
     simulation, fallen = dropped(
         model=model, friction_model=friction_model, restitution=restitution, integrator="implicit_midpoint"
     )
     kinetic = []
-    for end in (30.0, 50.0, 70.0):
+    for end in (30.0, 50.0, 70.0, 100.0, 130.0):
         simulation.run(duration=end - simulation.time, progress=False)
         kinetic.append(simulation.energy().kinetic / fallen)
-    assert kinetic[-1] < 1e-12
-    assert kinetic[2] < 0.01 * kinetic[1] < 1e-4 * kinetic[0] or kinetic[1] < 1e-18  # what swings on an anchor decays
-    assert simulation.statistics.steps < 1.3 * 70.0 / 5e-3
+    assert kinetic[2] < 0.01 * kinetic[1] < 1e-4 * kinetic[0] or kinetic[1] < 1e-18
+    assert kinetic[2] < 1e-12
+    assert kinetic[3] < 1e-14
+    assert kinetic[4] < 1e-16
+    assert simulation.statistics.steps < 1.2 * 130.0 / 5e-3
 
 
 def test_without_friction_a_drop_loses_nothing_in_elastic_impacts():
