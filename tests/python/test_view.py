@@ -16,7 +16,7 @@ from withe.common.extras import require
 from withe.common.outlines import ObstacleOutline
 from withe.recording import Record
 from withe.recording.recorder import Recorder, present
-from withe.view import figures, films, graphics, rendering, scenery
+from withe.view import colors, figures, films, graphics, rendering, scenery
 
 
 @pytest.fixture
@@ -119,11 +119,11 @@ def test_every_quantity_can_colour_the_rods(record, renderer, tmp_path, color_by
     ],
 )
 def test_a_scale_of_colours_begins_and_ends_at_values_or_at_zero(values, limits):
-    assert rendering.color_limits([np.array(rod) for rod in values]) == limits
+    assert colors.color_limits([np.array(rod) for rod in values]) == limits
 
 
 def test_a_scale_of_colours_has_a_width():
-    low, high = rendering.color_limits([np.zeros(3)])
+    low, high = colors.color_limits([np.zeros(3)])
     assert low < high
 
 
@@ -388,7 +388,7 @@ def test_a_capsule_is_drawn_at_its_radius_from_its_axis():
     ],
 )
 def test_scales_begin_and_end_at_round_numbers(limits, nice):
-    assert rendering.nice_limits(*limits) == pytest.approx(nice)
+    assert colors.nice_limits(*limits) == pytest.approx(nice)
 
 
 def test_every_label_of_a_scale_is_a_round_number():
@@ -396,7 +396,7 @@ def test_every_label_of_a_scale_is_a_round_number():
     for _ in range(600):
         middle, half = rng.normal(size=2) * 10.0 ** rng.uniform(-6, 6) * (1.0, 10.0 ** rng.uniform(-7, 0))
         low, high = middle - abs(half), middle + abs(half)  # values that hardly differ among them
-        first, last, labels, digits = rendering.nice_limits(low, high)
+        first, last, labels, digits = colors.nice_limits(low, high)
         assert first <= low + 1e-6 * (high - low)
         assert last >= high - 1e-6 * (high - low)
         assert 3 <= labels <= 6

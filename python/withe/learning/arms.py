@@ -6,6 +6,7 @@ each segment has in sum, spread evenly over its nodes. Newton's method is not st
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from typing import Any
 
 import numpy as np
@@ -102,9 +103,9 @@ class Arm(Task):
         for lane, generator in zip(chosen, generators, strict=True):
             self.aim(int(lane), generator)
 
+    @abstractmethod
     def aim(self, lane: int, generator: np.random.Generator) -> None:
         """Where the target of a robot is at the start of its episode."""
-        raise NotImplementedError
 
     def act(self, robots: Batch, actions: FloatArray, chosen: IntArray) -> None:
         """Lead the natural curvatures on, and twists."""

@@ -14,9 +14,10 @@ from withe.common.extras import require
 from withe.common.frames import Frames
 from withe.common.progress import progress as progress_bar
 from withe.io import written_beside
+from withe.view.colors import ColorBy
 from withe.view.films import Film, film_places
 from withe.view.pinhole import Pinhole
-from withe.view.rendering import ColorBy, Stage
+from withe.view.rendering import Stage
 
 __all__ = ["animate", "picture", "view"]
 

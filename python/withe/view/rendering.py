@@ -6,31 +6,23 @@ This is the stage that pictures, films and the viewer share.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from withe.common.extras import require
-from withe.common.frames import Frames, edges_to_nodes, stencils_to_nodes
+from withe.common.frames import Frames
 from withe.view import scenery
+from withe.view.colors import BARS, ColorBy, color_limits, nice_limits, nodal_values, rod_color
 from withe.view.graphics import render_window
 from withe.view.pinhole import Pinhole, check_pinhole, look_through, towards
 from withe.view.springs import SpringLines
 from withe.view.surfaces import Surface
 
-__all__ = ["Stage", "color_limits", "nice_limits"]
+__all__ = ["Stage"]
 
 FloatArray = npt.NDArray[np.float64]
-ColorBy = Literal["rod", "tension", "curvature", "twist", "speed"]
-
-_PALETTE = ("#2a9d8f", "#e76f51", "#457b9d", "#e9b44c", "#8d6a9f", "#6a994e", "#c8553d", "#4f6d7a")
-_BARS = {
-    "tension": ("tension [N]", "viridis"),
-    "curvature": ("curvature [1/m]", "viridis"),
-    "twist": ("twist [rad/m]", "viridis"),
-    "speed": ("speed [m/s]", "viridis"),
-}
 _DIRECTIONS = {
     "front": (0.0, -1.0, 0.12),
     "side": (1.0, 0.0, 0.12),
@@ -91,8 +83,8 @@ class Stage:
     ) -> None:
         if len(record) == 0:
             raise ValueError("record has no frames to show")
-        if color_by != "rod" and color_by not in _BARS:
-            raise ValueError(f"color_by must be one of 'rod', {str(list(_BARS))[1:-1]}, got {color_by!r}")
+        if color_by != "rod" and color_by not in BARS:
+            raise ValueError(f"color_by must be one of 'rod', {str(list(BARS))[1:-1]}, got {color_by!r}")
         self.size = _checked_size(size)
         self._read(record, color_by)
         in_view = self._positions if frames is None else self._positions[list(frames)]
@@ -143,7 +135,7 @@ class Stage:
             surface.footprint(self._positions[0, rod.rows])
             for surface, rod in zip(self._surfaces, record.rods, strict=True)
         ]
-        self._values = None if color_by == "rod" else [_nodal(record, rod, color_by) for rod in record.rods]
+        self._values = None if color_by == "rod" else [nodal_values(record, rod, color_by) for rod in record.rods]
         self._footprints_of_obstacles: list[FloatArray] = []
         self._places = [record.obstacle_position(obstacle) for obstacle in record.obstacles]
 
@@ -269,7 +261,7 @@ class Stage:
         self._meshes = [_empty_mesh(pyvista, surface) for surface in self._surfaces]
         options: dict[str, Any] = {"ambient": 0.35, "diffuse": 0.8, "specular": 0.3, "specular_power": 30.0}
         if self._values is not None:
-            title, colours = _BARS[color_by]
+            title, colours = BARS[color_by]
             low, high, labels, digits = nice_limits(*color_limits(self._values))
             if low == -high:
                 colours = "coolwarm"
@@ -293,7 +285,7 @@ class Stage:
             }
         for index, mesh in enumerate(self._meshes):
             if self._values is None:
-                options["color"] = _color(index)
+                options["color"] = rod_color(index)
             else:
                 mesh.point_data["value"] = np.zeros(mesh.n_points)
             actor = self.plotter.add_mesh(mesh, reset_camera=False, **options)
@@ -344,7 +336,7 @@ class Stage:
             mesh = _empty_mesh(pyvista, surface)
             mesh.points = points
             mesh.point_data["Normals"] = normals
-            paint = _color(index) if self._values is None else np.array([0.5, 0.53, 0.56])
+            paint = rod_color(index) if self._values is None else np.array([0.5, 0.53, 0.56])
             pale = strength * paint + (1.0 - strength) * np.array([0.93, 0.94, 0.95])
             actor = self.plotter.add_mesh(mesh, color=pale, ambient=0.5, diffuse=0.6, reset_camera=False)
             actor.prop.interpolation = "Phong"
@@ -387,78 +379,11 @@ class Stage:
         self._shadow.texture = texture
 
 
-def color_limits(values: Sequence[FloatArray]) -> tuple[float, float]:
-    """The ends of a scale for all values: zero in the middle where they go both ways, and never what rounding leaves.
-
-    Parameters
-    ----------
-    values : sequence of ndarray
-        One a rod.
-    """
-    low, high = min(float(v.min()) for v in values), max(float(v.max()) for v in values)
-    least = 1e-9 * max(-low, high)
-    low, high = (0.0 if abs(end) <= least else end for end in (low, high))
-    if low < -0.05 * high and high > 0.0:
-        return -max(-low, high), max(-low, high)
-    return low, high if high > low else low + 1e-12
-
-
-def nice_limits(low: float, high: float) -> tuple[float, float, int, str]:
-    """Ends of a scale that begins and ends at round numbers.
-
-    Parameters
-    ----------
-    low, high : float
-        What it must hold.
-
-    Returns
-    -------
-    low, high : float
-    labels : int
-        How many, ends among them, stand at round numbers.
-    format : str
-        With the digits that they need.
-    """
-    size = max(abs(low), abs(high), high - low)
-    if not (1e-9 * size < high - low and 1e-290 < size < 1e290):
-        return low, high, 2, "%.3g"
-    unit = 10.0 ** np.floor(np.log10(high - low))
-    even = low == -high  # keeps zero in the middle, with a label
-    for step in unit * np.array([0.2, 0.25, 0.5, 1.0, 2.0, 2.5]):
-        first, last = np.floor(low / step + 1e-9), np.ceil(high / step - 1e-9)
-        if last - first <= (4 if even else 5):
-            break
-    decimals = next((d for d in range(5) if abs(round(step, d) - step) < 1e-6 * step), None)
-    greatest = max(abs(first), abs(last)) * step
-    plain = decimals is not None and greatest < 1e5
-    # From the first digit of the greatest label to the last of a step, which has two where it begins with 2.5.
-    significant = max(3, int(np.floor(np.log10(greatest) + 1e-9) - np.floor(np.log10(step) + 1e-9)) + 2)
-    form = f"%.{decimals}f" if plain else f"%.{significant}g"
-    return float(first * step), float(last * step), int(last - first) + 1, form
-
-
 def _empty_mesh(pyvista: Any, surface: Surface) -> Any:
     faces = np.column_stack([np.full(len(surface.faces), 4), surface.faces])
     mesh = pyvista.PolyData(np.zeros((int(surface.faces.max()) + 1, 3)), faces.ravel())
     mesh.point_data.active_normals = np.zeros((mesh.n_points, 3))
     return mesh
-
-
-def _color(rod: int) -> FloatArray:
-    code = _PALETTE[rod % len(_PALETTE)]
-    return np.array([int(code[place : place + 2], 16) / 255.0 for place in (1, 3, 5)])
-
-
-def _nodal(record: Frames, rod: Any, color_by: ColorBy) -> FloatArray:
-    """The quantity that colours a rod, at its nodes, shape (frames, nodes)."""
-    if color_by == "tension":
-        return edges_to_nodes(record.tensions(rod), rod.closed)
-    if color_by == "twist":
-        return stencils_to_nodes(record.twists(rod), rod.closed)
-    if color_by == "curvature":
-        return stencils_to_nodes(np.linalg.norm(record.curvatures(rod), axis=-1), rod.closed)
-    speeds: FloatArray = np.linalg.norm(record.velocities(rod), axis=-1)
-    return speeds
 
 
 def _checked_size(size: Sequence[int]) -> tuple[int, int]:

@@ -1,0 +1,92 @@
+"""What colours rods by: which they are, or a quantity along them, and the scale of that."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from withe.common.frames import Frames, edges_to_nodes, stencils_to_nodes
+
+__all__ = ["BARS", "ColorBy", "color_limits", "nice_limits", "nodal_values", "rod_color"]
+
+FloatArray = npt.NDArray[np.float64]
+ColorBy = Literal["rod", "tension", "curvature", "twist", "speed"]
+
+_PALETTE = ("#2a9d8f", "#e76f51", "#457b9d", "#e9b44c", "#8d6a9f", "#6a994e", "#c8553d", "#4f6d7a")
+BARS = {
+    "tension": ("tension [N]", "viridis"),
+    "curvature": ("curvature [1/m]", "viridis"),
+    "twist": ("twist [rad/m]", "viridis"),
+    "speed": ("speed [m/s]", "viridis"),
+}
+
+
+def rod_color(rod: int) -> FloatArray:
+    """Red, green, blue from 0 to 1 of a rod by its number."""
+    code = _PALETTE[rod % len(_PALETTE)]
+    return np.array([int(code[place : place + 2], 16) / 255.0 for place in (1, 3, 5)])
+
+
+def nodal_values(record: Frames, rod: Any, color_by: ColorBy) -> FloatArray:
+    """The quantity that colours a rod, at its nodes, shape (frames, nodes)."""
+    if color_by == "tension":
+        return edges_to_nodes(record.tensions(rod), rod.closed)
+    if color_by == "twist":
+        return stencils_to_nodes(record.twists(rod), rod.closed)
+    if color_by == "curvature":
+        return stencils_to_nodes(np.linalg.norm(record.curvatures(rod), axis=-1), rod.closed)
+    speeds: FloatArray = np.linalg.norm(record.velocities(rod), axis=-1)
+    return speeds
+
+
+def color_limits(values: Sequence[FloatArray]) -> tuple[float, float]:
+    """The ends of a scale for all values: zero in the middle where they go both ways, and never what rounding leaves.
+
+    Parameters
+    ----------
+    values : sequence of ndarray
+        One a rod.
+    """
+    low, high = min(float(v.min()) for v in values), max(float(v.max()) for v in values)
+    least = 1e-9 * max(-low, high)
+    low, high = (0.0 if abs(end) <= least else end for end in (low, high))
+    if low < -0.05 * high and high > 0.0:
+        return -max(-low, high), max(-low, high)
+    return low, high if high > low else low + 1e-12
+
+
+def nice_limits(low: float, high: float) -> tuple[float, float, int, str]:
+    """Ends of a scale that begins and ends at round numbers.
+
+    Parameters
+    ----------
+    low, high : float
+        What it must hold.
+
+    Returns
+    -------
+    low, high : float
+    labels : int
+        How many, ends among them, stand at round numbers.
+    format : str
+        With the digits that they need.
+    """
+    size = max(abs(low), abs(high), high - low)
+    if not (1e-9 * size < high - low and 1e-290 < size < 1e290):
+        return low, high, 2, "%.3g"
+    unit = 10.0 ** np.floor(np.log10(high - low))
+    even = low == -high  # keeps zero in the middle, with a label
+    for step in unit * np.array([0.2, 0.25, 0.5, 1.0, 2.0, 2.5]):
+        first, last = np.floor(low / step + 1e-9), np.ceil(high / step - 1e-9)
+        if last - first <= (4 if even else 5):
+            break
+    decimals = next((d for d in range(5) if abs(round(step, d) - step) < 1e-6 * step), None)
+    greatest = max(abs(first), abs(last)) * step
+    plain = decimals is not None and greatest < 1e5
+    # From the first digit of the greatest label to the last of a step, which has two where it begins with 2.5.
+    significant = max(3, int(np.floor(np.log10(greatest) + 1e-9) - np.floor(np.log10(step) + 1e-9)) + 2)
+    form = f"%.{decimals}f" if plain else f"%.{significant}g"
+    return float(first * step), float(last * step), int(last - first) + 1, form
