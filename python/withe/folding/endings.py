@@ -134,7 +134,7 @@ def plan(
         said = _unseen(slow)
     if said is None:
         return slow
-    if ending == "auto" and (grasp == "free" or (replans and slow.jumps_at is None)):
+    if ending == "auto" and (grasp == "free" or replans):
         try:
             return plunge(slow, replans=replans, progress=progress)
         except ValueError as error:

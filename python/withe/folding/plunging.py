@@ -151,7 +151,7 @@ def plunge(
             tried.append(_Tried(slow, SimulatedSheet(paper, jaw=plan.jaw, **options), looks))
             bar.advance(1)
             if tried[0].snapped:
-                raise ValueError(_missed(plan, np.inf, bound))
+                raise ValueError(f"no plunge begins: the sheet snaps on the slow way there; {_needs(plan)}")
 
         best: Part | None = None
         least = nearest = np.inf  # of the best way, and how far the crease is off on that which comes nearest
@@ -239,8 +239,9 @@ def _missed(plan: Plan, worst: float, bound: float) -> str:
     lgb, friction = (100.0 * share for share in plan.uncertainty)
     sheets = f"all sheets with Lgb off by up to {lgb:g} % and friction less by up to {friction:g} %"
     how = f"the best is off by {1e3 * worst:.1f} mm on one of them" if np.isfinite(worst) else "on each way one snaps"
+    return f"no plunge folds {sheets} within {1e3 * bound:g} mm: {how}; led down slowly, {_needs(plan)}"
+
+
+def _needs(plan: Plan) -> str:
     needed = float(np.nanmax(plan.slip_ratio))
-    return (
-        f"no plunge folds {sheets} within {1e3 * bound:g} mm: {how}; led down slowly, it would need friction "
-        f"{needed:.3f}, and the paper has {plan.paper.friction:g}"
-    )
+    return f"it would need friction {needed:.3f}, and the paper has {plan.paper.friction:g}"
