@@ -38,6 +38,7 @@ class Builder {
     add_frames();
     add_stencils();
     resolve_supports();
+    share_bending();
     lay_out_unknowns(model_);
     add_constraints(model_);
     draw();
@@ -256,7 +257,6 @@ class Builder {
     }
     model_.bend_voronoi = to_vector(bend_voronoi_);
     model_.half_voronoi = to_vector(half_voronoi_);
-    share_bending();
   }
 
   /// [Choi, dissertation 6.2.2]: every pair of edges at the node that is not a rod's own stencil.
@@ -302,11 +302,24 @@ class Builder {
     model_.frame_node = frame_node_;
   }
 
+  /// Edges whose direction a clamp or a hand holds, one that yields too.
+  std::vector<bool> held_edges() const {
+    std::vector<bool> held(static_cast<std::size_t>(model_.edge_count), false);
+    for (const Support& support : model_.supports) {
+      if (support.edge >= 0) held[static_cast<std::size_t>(support.edge)] = true;
+      if (!support.is_hand() || support.slides()) continue;
+      for (const TouchedEdge& touched : support.touched) held[static_cast<std::size_t>(touched.edge)] = true;
+    }
+    return held;
+  }
+
   /// Strains at nodes are a trapezoidal rule along the rod. At a frame the moment ends with a slope, and the first of
   /// Gregory's end corrections to that rule (weights 5/12, 13/12, 1, 1, ... edges) makes it third order there: the node
   /// next to a frame carries a twelfth of an edge for it. Not so where a rod is gripped while it runs, which must leave
-  /// it as it is.
+  /// it as it is; nor along an edge that is held, between whose sides nothing is passed on: what one side
+  /// gave to the other, or took, would be of first order.
   void share_bending() {
+    const std::vector<bool> held = held_edges();
     model_.bend_share = MatrixX2::Constant(static_cast<Eigen::Index>(model_.bend.size()), 2, 0.5);
     model_.half_share = VectorX::Constant(static_cast<Eigen::Index>(model_.half.size()), 0.5);
     std::vector<std::vector<std::pair<Eigen::Index, int>>> bends(static_cast<std::size_t>(model_.edge_count));
@@ -316,7 +329,7 @@ class Builder {
     for (Eigen::Index h = 0; h < model_.half_share.size(); ++h) {
       const FrameStencil& half = model_.half[static_cast<std::size_t>(h)];
       const auto& next = bends[static_cast<std::size_t>(half.edge)];
-      if (gripped_frames_.contains(half.frame)) continue;
+      if (gripped_frames_.contains(half.frame) || held[static_cast<std::size_t>(half.edge)]) continue;
       if (next.size() != 1) continue;  // nobody to carry it, or an end in a joint of pairs
       constexpr double kCarried = 1.0 / 12.0;
       model_.half_share(h) -= kCarried;

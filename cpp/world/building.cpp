@@ -158,6 +158,7 @@ void World::Implementation::carry_over(const Model& old, Rebuild why) {
 void World::Implementation::rebuild(Rebuild why) {
   account_for_settings();
   if (tape) tape->refuse("supports came or went while it ran, or something left its plane");
+  const double stored = why == Rebuild::running ? elastic_energy() : 0.0;
   Model fresh = model_of_active(why);
   drop_scratch();
   const Model old = std::exchange(model, std::move(fresh));
@@ -165,6 +166,8 @@ void World::Implementation::rebuild(Rebuild why) {
     begin_as_drawn();
   else
     carry_over(old, why);
+  // Half stencils go with the support that has held their frame, and edges that are held have others beside them.
+  if (why == Rebuild::running) support_work += elastic_energy() - stored;
   newton = std::make_unique<Newton>(model, options);
   equations = std::make_unique<Equations>(model, equation_options(options));
   if (Contact* contact = equations->contact()) contact->initialise(state, parameters);

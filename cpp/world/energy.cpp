@@ -111,6 +111,15 @@ double World::Implementation::work_of_settings() const {
          (b.gravity - a.gravity) + (b.spring - a.spring);
 }
 
+/// Of stretching, bending and twisting, as it is [J].
+double World::Implementation::elastic_energy() const {
+  auto& [c, now, touching] = energy_scratch;
+  compute_configuration(model, state, state.q, c);
+  now.set(model, parameters);
+  const BendTwistEnergy turned = bend_twist_energy(model, now.elastic, c);
+  return stretch_energy(model, now.elastic, c) + turned.bend + turned.twist;
+}
+
 Energy World::Implementation::energy() const {
   return energy_of(state, load_work, support_work + (actuation_work + work_of_settings()), dissipated);
 }

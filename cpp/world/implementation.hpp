@@ -282,6 +282,7 @@ struct World::Implementation : Running {
   void account_for_settings();
   /// What has been set since changed the energy of the present state by this [J].
   double work_of_settings() const;
+  double elastic_energy() const;
   bool gains_energy();
   bool contact_pumps(double dt);
   void begin_explicit();

@@ -413,3 +413,82 @@ def test_two_hands_on_neighbouring_edges_hold_each_its_own_and_hand_over_the_nod
     second.release()
     simulation.step(10)
     assert np.abs(simulation.positions(rod)[5:7] - x[5:7]).max() > 1e-3
+
+
+def deflection_beyond_what_holds(edges, hold, joint, planar):
+    """Of the end of a beam that one edge or more are held of, over that of a cantilever from the middle of the last.
+
+    A twig that weighs nothing is joined to the beam, `joint` nodes from where what is held ends.
+    """
+    scene, length, stiffness = withe.Scene(gravity=(0, 0, 0)), 1.0 / edges, rods.stiffness(stretch=1e6)
+    beam = scene.add_rod(
+        start=(0, 0, 0), end=(1, 0, 0), nodes=edges + 1, stiffness=stiffness, line_density=1.0, radius=1e-3
+    )
+    held = {"edge": 1, "inner edge": 3}.get(hold, edges // 10)
+    if "edge" in hold:
+        scene.clamp(beam.node(held - 1), hold="edge")
+    else:
+        more = {"stiffness": (1e9, 1e9)} if hold == "stiff hand" else {}
+        scene.grasp(beam, 0.05, 0.1 - 1e-6, **more)
+    fork = (held + joint) * length
+    twig = scene.add_rod(
+        start=(fork, 0, 0), end=(fork, 0, 0.2), nodes=3, stiffness=stiffness, line_density=1e-9, radius=1e-3
+    )
+    scene.join(beam.node(held + joint), twig.start)
+    scene.add_force(beam.end, (0.0, 0.0, -1e-4))
+    simulation = scene.build(integrator="static", planar=planar)
+    simulation.equilibrium()
+    bend = simulation.get(beam, "bend_stiffness").ravel()[0]
+    free = 1.0 - (held - 0.5) * length
+    return -simulation.positions(beam)[-1, 2] / (1e-4 * free**3 / (3.0 * bend))
+
+
+@pytest.mark.parametrize("planar", [None, False])
+@pytest.mark.parametrize("joint", [-1, 0, 1])
+@pytest.mark.parametrize("hold", ["hand", "stiff hand", "edge", "inner edge"])
+def test_a_joint_beside_what_is_held_leaves_a_beam_as_soft_as_it_is(hold, joint, planar):
+    errors = [abs(deflection_beyond_what_holds(edges, hold, joint, planar) - 1.0) for edges in (20, 40, 80)]
+    assert errors[0] < 3e-3  # a twelfth of an edge on the wrong side of what is held is 1.2e-2
+    assert_order(errors, 2.0, 0.2)
+
+
+@pytest.mark.parametrize("hold", ["frame", "edge", "inner frame", "hand", "yielding hand"])
+@pytest.mark.parametrize("drawn", [True, False])
+def test_what_supports_store_beside_joints_is_their_work_as_they_come_and_go(hold, drawn):
+    scene = withe.Scene()
+    beam = scene.add_rod(
+        start=(0, 0, 0), end=(1, 0, 0), nodes=16, stiffness=SOFT, line_density=1.0, radius=0.02, name="beam"
+    )
+    fork = 4 / 15
+    twig = scene.add_rod(
+        start=(fork, 0, 0), end=(fork, 0, 0.2), nodes=3, stiffness=SOFT, line_density=1e-3, radius=0.02
+    )
+    scene.join(beam.node(4), twig.start)
+    scene.clamp(beam.end)
+
+    def put(on):
+        if "hand" in hold:
+            return on.grasp(beam, 0.23, 0.2, **({"stiffness": (1e4, 1e2)} if "yielding" in hold else {}))
+        if hold == "inner frame":
+            return on.clamp(beam.node(2))
+        return on.clamp(beam.start, hold=hold)
+
+    support = put(scene) if drawn else None
+    simulation = scene.build(integrator="implicit_midpoint", time_step=2e-3, **TIGHT)
+    simulation.step(20)
+
+    def balance():
+        energy = simulation.energy()
+        return energy.total + energy.dissipated - energy.work
+
+    stored = simulation.energy().bend
+    assert stored > 1e-3
+    for _ in range(2):
+        before = balance()
+        if support is None:
+            support = put(simulation)
+        else:
+            simulation.release(support)
+            support = None
+        assert abs(balance() - before) < 1e-12 * stored
+        simulation.step(5)
