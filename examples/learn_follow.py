@@ -1,8 +1,8 @@
 """An arm learns to follow a target: soft actor-critic, its learning curve, and the learned arm as a film.
 
-An action adds to the bends, so that noise of actions adds up: with deviations of 1, as proximal policy optimisation
-starts, the tip is 12 cm off after .3 s and 27 cm after 1 s, and the rewards within 5 and 10 cm are not seen. Soft
-actor-critic learns how much noise each state bears, and learns from what it remembers, not from the last steps only.
+An action adds to the bends, so that noise of actions adds up: with deviations of 1 the tip is 12 cm off after .3 s and
+27 cm after 1 s, where rewards begin within 10 cm. Soft actor-critic learns how much noise each state bears, and learns
+from all that it remembers, not from the last steps only.
 
 python examples/learn_follow.py [STEPS] [SEED] [FOLDER]; 2,000,000 steps by default, in out/learn_follow.
 """
