@@ -302,9 +302,15 @@ class Builder {
     model_.frame_node = frame_node_;
   }
 
-  /// Edges whose direction a clamp or a hand holds, one that yields too.
+  /// Edges whose direction a clamp, a hand, one that yields too, or a support at either end holds.
   std::vector<bool> held_edges() const {
     std::vector<bool> held(static_cast<std::size_t>(model_.edge_count), false);
+    std::vector<bool> fixed(static_cast<std::size_t>(model_.node_count), false);
+    for (const Support& support : model_.supports)
+      if (!support.is_hand() && support.description.free.isZero()) fixed[static_cast<std::size_t>(support.node)] = true;
+    for (std::size_t e = 0; e < held.size(); ++e)
+      held[e] =
+          fixed[static_cast<std::size_t>(model_.edge_tail[e])] && fixed[static_cast<std::size_t>(model_.edge_head[e])];
     for (const Support& support : model_.supports) {
       if (support.edge >= 0) held[static_cast<std::size_t>(support.edge)] = true;
       if (!support.is_hand() || support.slides()) continue;

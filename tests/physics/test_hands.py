@@ -424,9 +424,12 @@ def deflection_beyond_what_holds(edges, hold, joint, planar):
     beam = scene.add_rod(
         start=(0, 0, 0), end=(1, 0, 0), nodes=edges + 1, stiffness=stiffness, line_density=1.0, radius=1e-3
     )
-    held = {"edge": 1, "inner edge": 3}.get(hold, edges // 10)
+    held = {"edge": 1, "inner edge": 3, "two pins": 3}.get(hold, edges // 10)
     if "edge" in hold:
         scene.clamp(beam.node(held - 1), hold="edge")
+    elif hold == "two pins":
+        scene.pin(beam.node(held - 1))
+        scene.pin(beam.node(held))
     else:
         more = {"stiffness": (1e9, 1e9)} if hold == "stiff hand" else {}
         scene.grasp(beam, 0.05, 0.1 - 1e-6, **more)
@@ -445,7 +448,7 @@ def deflection_beyond_what_holds(edges, hold, joint, planar):
 
 @pytest.mark.parametrize("planar", [None, False])
 @pytest.mark.parametrize("joint", [-1, 0, 1])
-@pytest.mark.parametrize("hold", ["hand", "stiff hand", "edge", "inner edge"])
+@pytest.mark.parametrize("hold", ["hand", "stiff hand", "edge", "inner edge", "two pins"])
 def test_a_joint_beside_what_is_held_leaves_a_beam_as_soft_as_it_is(hold, joint, planar):
     errors = [abs(deflection_beyond_what_holds(edges, hold, joint, planar) - 1.0) for edges in (20, 40, 80)]
     assert errors[0] < 3e-3  # a twelfth of an edge on the wrong side of what is held is 1.2e-2
