@@ -7,6 +7,7 @@
 #include "contact/contact_friction.hpp"
 #include "contact/contact_set.hpp"
 #include "contact/impacts.hpp"
+#include "contact/mean_points.hpp"
 #include "contact/pressing.hpp"
 
 namespace withe {
@@ -61,7 +62,7 @@ void add_implicit_friction(const ContactProblem& problem, const Touching& t, con
   ByStart now[kContactUnknowns], gradient[kContactUnknowns];
   for (int i = 0; i < kContactUnknowns; ++i) now[i] = t.now[i];
   SlipStart<ByStart> start = start_of(f);
-  if (t.law.elastic > 0.0 && !f.slides) {
+  if (t.law.elastic > 0.0) {
     double slopes[12];
     set_distance_slopes(problem, t.pair, slopes);
     std::copy(std::begin(slopes), std::end(slopes), start.before.slope);
@@ -137,23 +138,24 @@ void add_lagged_friction(const ContactProblem& problem, const Touching& t, const
   out.along += share.value;  // directions count the same
 }
 
-/// Of `add_mean_pressing` in pressing.cpp, whose start enters by d0 and its length alone.
+/// Of `set_mean_pressing` in pressing.cpp.
 void add_mean_pressing(const ContactProblem& problem, const Touching& t, const Rows& rows, ContactAdjoint& out) {
-  const Vec3d& d1 = t.proximity.points.between;
-  const double distance = t.proximity.distance;
-  double w[4];
-  end_weights(t.proximity.points.s, t.proximity.points.t, w);
-  Vec3d start[4], d0{}, along{};
+  Vec3d start[4], end[4];
   problem.start_points(t.pair, start);
+  t.end_points(end);
+  const ContactPair& pair = t.pair;
+  const ClosestPoints first = closest_points(start[0], start[1], start[2], start[3], pair.weight_a, pair.weight_b);
+  Vec3<ByStart> x0[4], x1[4];
   for (int i = 0; i < 4; ++i) {
-    d0 += w[i] * start[i];
-    along += w[i] * point_of(rows, i);
+    x0[i] = {ByStart::unknown(start[i].x, 3 * i), ByStart::unknown(start[i].y, 3 * i + 1),
+             ByStart::unknown(start[i].z, 3 * i + 2)};
+    x1[i] = lifted(end[i]);
   }
-  const double before = std::sqrt(std::max(dot(d0, d0) + distance * distance - dot(d1, d1), 0.0)),
-               share = 1.0 / (before + distance), mean = share * dot(along, d0 + d1);
-  const Vec3d by_d0 =
-      (t.pressing.first * share) * along + ((t.pressing.by_start - t.pressing.first * share) * mean / before) * d0;
-  for (int i = 0; i < 12; ++i) out.start[i] += w[i / 3] * by_d0[i % 3];
+  const MeanPoints<ByStart> mean = mean_points(pair, first, t.proximity.points, x0, x1);
+  ByStart along;
+  for (int i = 0; i < 4; ++i) along += mean.weight[i] * dot(lifted(point_of(rows, i)), mean.ways);
+  const ByStart scalar = chain(mean.start, t.pressing.first, t.pressing.by_start) / (mean.start + mean.end) * along;
+  for (int i = 0; i < 12; ++i) out.start[i] += scalar.slope[i];
 }
 
 /// Of `add_curve_pressing`, f (g1 + b (g0 - g1)), see `StartShare`.

@@ -54,7 +54,6 @@ FrictionSetting friction_setting(const ContactProblem& problem, const Touching& 
   f.pressing = t.law;
   f.before = t.before;
   f.middle = pair.key.b >= 0 && problem.turns(pair);
-  f.slides = problem.turns(pair) && t.law.elastic > 0.0;
   f.law = contact.friction_law;
   f.tangential_stiffness = tangential_stiffness(pair, t.stiffness);
   f.rate = slip_rate(problem, regularisation);

@@ -36,8 +36,7 @@ struct FrictionSetting {
   double start[kContactUnknowns] = {};           ///< unknowns at the start of the step
   Vec3d source[2];                               ///< tangents that the frames of a and b are transported from
   PressingLaw pressing;
-  double before = 0;    ///< distance at the start, as far as it is always the same [m]
-  bool slides = false;  ///< or that of the points that are closest at the end
+  double before = 0;    ///< distance at the start [m]
   bool middle = false;  ///< edges turn, on their arms, as they stand in the middle of the step
   FrictionLaw law = FrictionLaw::implicit;
   double tangential_stiffness = 0;  ///< of an anchor [N/m]
@@ -253,14 +252,7 @@ void find_contact(const FrictionSetting& f, const SlipStart<Scalar>& start, cons
     c.normal = c.inverse * c.between;
   }
   set_weights(pair, c);
-  Scalar before = start.before;
-  if (f.slides) {
-    // See add_mean_pressing in pressing.cpp.
-    Vec3<Scalar> d0{};
-    for (int i = 0; i < 4; ++i)
-      d0 += c.w[i] * (pair.rod_b < 0 && i > 1 ? start.point(i) - lift(f.drift) : start.point(i));
-    before = sqrt(dot(d0, d0) + c.distance * c.distance - dot(c.between, c.between));
-  }
+  const Scalar& before = start.before;
   c.before = value_of(before);
   c.law = f.pressing.at(c.before, value_of(c.distance));
   c.pressing = chain(c.distance, -c.law.first, -c.law.by_end) + chain(before, 0.0, -c.law.by_start);

@@ -22,20 +22,6 @@ struct Slopes {
   Vec3d moment[kWays];  ///< m
 };
 
-/// How hard they press by the distance that the closest points had at the start of the step, which moves with them.
-void add_start_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& c, Slopes& d) {
-  const auto start = [&](int i) {
-    const Vec3d x{f.start[3 * i], f.start[3 * i + 1], f.start[3 * i + 2]};
-    return f.pair->rod_b < 0 && i > 1 ? x - f.drift : x;
-  };
-  const Vec3d u = start(1) - start(0), v = start(3) - start(2);
-  const Vec3d between = start(0) - start(2) + c.s * u - c.t * v;
-  for (int j = 0; j < kWays; ++j) {
-    const double spread = f.pair->weight_a * (c.s - 0.5) * d.s[j] + f.pair->weight_b * (c.t - 0.5) * d.t[j];
-    d.pressing[j] -= c.law.by_start / c.before * (dot(between, d.s[j] * u - d.t[j] * v) + spread);
-  }
-}
-
 /// Where they touch, and how hard they press: by all but the angles.
 void add_contact_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& c, Slopes& d) {
   const ContactPair& pair = *f.pair;
@@ -57,7 +43,6 @@ void add_contact_slopes(const FrictionSetting& f, const SlippingSurfaces<double>
     d.t[kEdge[1] + k] = K[1][1] * across;
     d.between[kEdge[1] + k] = -across * b;
   }
-  if (f.slides) add_start_slopes(f, c, d);
 }
 
 /// Of an edge that turns, in its end's.

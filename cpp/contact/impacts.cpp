@@ -45,17 +45,6 @@ double start_distance(const ContactProblem& problem, const ContactPair& pair) {
   return std::sqrt(closest_points(x[0], x[1], x[2], x[3], pair.weight_a, pair.weight_b).square);
 }
 
-/// The same of the points that are the closest at its end, D0 of `add_mean_pressing`.
-double distance_before(const ContactProblem& problem, const Touching& t) {
-  double w[4];
-  end_weights(t.proximity.points.s, t.proximity.points.t, w);
-  Vec3d start[4], d0{};
-  problem.start_points(t.pair, start);
-  const Vec3d& d1 = t.proximity.points.between;
-  for (int i = 0; i < 4; ++i) d0 += w[i] * start[i];
-  return std::sqrt(std::max(dot(d0, d0) + t.proximity.distance * t.proximity.distance - dot(d1, d1), 0.0));
-}
-
 /// As `impact_share`, of an impact that is over after so many swings.
 double share_within(const ContactProblem& problem, const Touching& t, double swings) {
   if (!(t.approach > 0.0)) return 0.0;
@@ -191,7 +180,7 @@ void set_pressing(const ContactProblem& problem, Touching& t) {
   t.law.restitution = std::sqrt(1.0 - lost);
   t.law.parting = kParting * std::max(t.law.restitution, kLeastParting) * t.approach * problem.duration;
   if (t.law.elastic == 0.0 && !(t.law.restitution < 1.0)) return;
-  t.before = problem.turns(pair) ? distance_before(problem, t) : start_distance(problem, pair);
+  t.before = start_distance(problem, pair);
   t.pressing = t.law.at(t.before, t.proximity.distance);
 }
 

@@ -3,11 +3,22 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <type_traits>
 
+#include "common/dual.hpp"
+#include "contact/mean_points.hpp"
 #include "contact/plane_contact.hpp"
 
 namespace withe {
 namespace {
+
+template <class Scalar>
+Scalar unknown(double value, int index) {
+  if constexpr (std::is_same_v<Scalar, double>)
+    return value;
+  else
+    return Scalar::unknown(value, index);
+}
 
 /// Along the gradient of D at the end of the step.
 void add_end_pressing(const Touching& t, bool with_hessian, bool geometric, ContactLocal& out) {
@@ -70,60 +81,44 @@ void add_curve_pressing(const ContactProblem& problem, const Touching& t, bool w
   }
 }
 
-/// Adds the derivative of `add_mean_pressing`, in which d0 and d1 are the ways between the closest points at the start
-/// and the end, and `before` is D0.
-void add_mean_derivative(const Touching& t, const Vec3d (&start)[4], const Vec3d& d0, double before,
-                         ContactLocal& out) {
+/// Where `ContactProblem::turns` says so, the force f (see pressing_law.hpp) pushes at the points of mean_points.hpp,
+/// between those closest at the start and at the end: pressing turns and brakes nothing, and gains no energy.
+template <class Scalar>
+void set_mean_pressing(const ContactProblem& problem, const Touching& t, Scalar (&out)[12]) {
+  Vec3d start[4], end[4];
+  problem.start_points(t.pair, start);
+  t.end_points(end);
   const ContactPair& pair = t.pair;
-  const ClosestPoints& points = t.proximity.points;
-  Vec3d x[4];
-  t.end_points(x);
-  double w[4];
-  end_weights(points.s, points.t, w);
-  const Vec3d& d1 = points.between;
-  const Vec3d mean = d0 + d1;
-  const double sum = before + t.proximity.distance, force = t.pressing.first / sum;
-  const Vec3d u = x[1] - x[0], v = x[3] - x[2], u0 = start[1] - start[0], v0 = start[3] - start[2];
-  const double ws[4] = {-1, 1, 0, 0}, wt[4] = {0, 0, 1, -1};
-  double K[2][2];
-  parameter_inverse(points.s_free, points.t_free, u, v, pair.weight_a, pair.weight_b, K);
-  for (int j = 0; j < 12; ++j) {
-    const int n = j / 3, k = j % 3;
-    const double by_s = ws[n] * d1[k] + w[n] * u[k], by_t = wt[n] * d1[k] - w[n] * v[k];
-    const double ds = -K[0][0] * by_s - K[0][1] * by_t, dt = -K[1][0] * by_s - K[1][1] * by_t;
-    const Vec3d moved0 = ds * u0 - dt * v0, moved1 = ds * u - dt * v;
-    const double spread = pair.weight_a * (points.s - 0.5) * ds + pair.weight_b * (points.t - 0.5) * dt;
-    const double distance = w[n] * d1[k] / t.proximity.distance;
-    const double earlier = (dot(d0, moved0) + spread) / before;
-    const double change =
-        (t.pressing.by_end * distance + t.pressing.by_start * earlier - force * (distance + earlier)) / sum;
-    for (int i = 0; i < 12; ++i) {
-      const double share = ws[i / 3] * ds + wt[i / 3] * dt;
-      const double turned = moved0[i % 3] + moved1[i % 3] + (i % 3 == k ? w[n] : 0.0);
-      out.hessian[i][j] += (w[i / 3] * change + force * share) * mean[i % 3] + force * w[i / 3] * turned;
-    }
+  const ClosestPoints first = closest_points(start[0], start[1], start[2], start[3], pair.weight_a, pair.weight_b);
+  Vec3<Scalar> x0[4], x1[4];
+  for (int i = 0; i < 4; ++i) {
+    x0[i] = {Scalar(start[i].x), Scalar(start[i].y), Scalar(start[i].z)};
+    x1[i] = {unknown<Scalar>(end[i].x, 3 * i), unknown<Scalar>(end[i].y, 3 * i + 1),
+             unknown<Scalar>(end[i].z, 3 * i + 2)};
+  }
+  const MeanPoints<Scalar> mean = mean_points(pair, first, t.proximity.points, x0, x1);
+  const Scalar force = chain(mean.end, t.pressing.first, t.pressing.by_end) / (mean.start + mean.end);
+  for (int i = 0; i < 4; ++i) {
+    const Vec3<Scalar> on_node = (force * mean.weight[i]) * mean.ways;
+    out[3 * i] = on_node.x;
+    out[3 * i + 1] = on_node.y;
+    out[3 * i + 2] = on_node.z;
   }
 }
 
-/// Where `ContactProblem::turns` says so, the force f (see pressing_law.hpp) pushes along the mean of the way d1
-/// between the closest points at the end and the way d0 between those same points of both rods at the start,
-///   f w_i (d0 + d1) / (D0 + D1),   D0 = sqrt(|d0|^2 + D1^2 - |d1|^2),
-/// whose work over the step is f (D1 - D0). As no points were closer at the start than the closest, and E is convex,
-/// that is never more than what the contact gave: pressing gains no energy, however far surfaces slide. And the force
-/// points along the way between the points in the middle of the step: it turns nothing there.
 void add_mean_pressing(const ContactProblem& problem, const Touching& t, bool with_derivative, ContactLocal& out) {
-  double w[4];
-  end_weights(t.proximity.points.s, t.proximity.points.t, w);
-  Vec3d start[4], d0{};
-  problem.start_points(t.pair, start);
-  const Vec3d& d1 = t.proximity.points.between;
-  for (int i = 0; i < 4; ++i) d0 += w[i] * start[i];
-  const double before =
-      std::sqrt(std::max(dot(d0, d0) + t.proximity.distance * t.proximity.distance - dot(d1, d1), 0.0));
-  const double force = t.pressing.first / (before + t.proximity.distance);
-  const Vec3d mean = d0 + d1;
-  for (int i = 0; i < 12; ++i) out.gradient[i] += force * w[i / 3] * mean[i % 3];
-  if (with_derivative) add_mean_derivative(t, start, d0, before, out);
+  if (!with_derivative) {
+    double gradient[12];
+    set_mean_pressing(problem, t, gradient);
+    for (int i = 0; i < 12; ++i) out.gradient[i] += gradient[i];
+    return;
+  }
+  Dual<12> gradient[12];
+  set_mean_pressing(problem, t, gradient);
+  for (int i = 0; i < 12; ++i) {
+    out.gradient[i] += gradient[i].value;
+    for (int j = 0; j < 12; ++j) out.hessian[i][j] += gradient[i].slope[j];
+  }
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 /// Which contacts have a place in the matrix: their rows in the assembler's table of elements.
 
 #include <algorithm>
+#include <functional>
 #include <vector>
 
 #include "contact/contact.hpp"
@@ -16,7 +17,7 @@ class ContactRows {
   const std::vector<int>& unknowns() const { return unknowns_; }
   /// -1: none.
   int row(const ContactKey& key, OrderedLookup& lookup) const {
-    const ContactKey* known = lookup.find(keys_, key, [](const ContactKey& k) -> const ContactKey& { return k; });
+    const ContactKey* known = lookup.find(keys_, key, std::identity{});
     return known ? static_cast<int>(known - keys_.data()) : -1;
   }
   /// Whether all that touches has a row.

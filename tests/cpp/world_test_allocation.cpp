@@ -180,7 +180,7 @@ TEST(Step, WithContactsThatComeAndGoAllocatesForMoreThanEverOnly) {
     for (Integrator integrator : kWithContact)
       for (const Rubbing& rubbing : kRubbing) {
         World world = rubbing_world(scene, rubbing, integrator);
-        const Allocated first = allocated_by(world, 200), later = allocated_by(world, 100);
+        const Allocated first = allocated_by(world, 300), later = allocated_by(world, 100);
         const std::string what = "scene " + std::to_string(&scene - scenes) + name_of(integrator, rubbing);
         EXPECT_LE(later.others, kVectors * (1 + later.layouts)) << what;
         EXPECT_LT(later.layouts, std::max<std::size_t>(first.layouts, 1)) << what;

@@ -425,3 +425,29 @@ def test_explicit_steps_let_a_rod_slide_as_a_block_does(friction_model: Any) -> 
     contacts = simulation.contacts()
     late = 0.03 if friction_model == "lagged" else 1e-3  # its normal forces are those of the step's start [N]
     np.testing.assert_allclose(-contacts["friction"][:, 0], 0.4 * contacts["normal_force"], rtol=0.01, atol=late)
+
+
+@pytest.mark.parametrize("integrator", ["implicit_midpoint", "energy_momentum"])
+@pytest.mark.parametrize("angle", [90.0, 60.0])
+@pytest.mark.parametrize("time_step", [2e-3, 5e-4])
+def test_rods_that_slide_over_rods_without_friction_are_not_braked(integrator: Any, angle: float, time_step: float):
+    """By the weight times v dt / 2 D they were, .075 of it in the longer steps: forces leaned against the motion."""
+    radius, speed, duration, nodes = 2e-3, 0.3, 0.05, 12
+    stiff = withe.Material(youngs_modulus=1e8, poisson_ratio=0.5, density=1100.0, viscosity=1e4)
+    scene = withe.Scene()
+    across = 0.05 * np.array([np.cos(np.radians(angle)), np.sin(np.radians(angle)), 0.0])
+    for x in (0.08, 0.22):
+        middle = np.array([x, 0.0, 0.0])
+        rail = scene.add_rod(start=middle - across, end=middle + across, nodes=4, radius=radius, material=stiff)
+        for node in range(4):
+            scene.pin(rail.node(node))
+    up = 2.0002 * radius
+    rod = scene.add_rod(start=(0, 0, up), end=(0.3, 0, up), nodes=nodes, radius=radius, material=stiff)
+    scene.enable_contact()
+    simulation = scene.build(integrator=integrator, time_step=time_step)
+    simulation.step(round(0.1 / time_step))
+    simulation.set_velocities(rod, np.tile([speed, 0.0, 0.0], (nodes, 1)))
+    simulation.step(round(duration / time_step))
+    masses = np.r_[0.5, np.ones(nodes - 2), 0.5] / (nodes - 1)
+    lost = speed - np.linalg.norm(masses @ simulation.velocities(rod)[:, :2])
+    assert abs(lost) / (9.81 * duration) < 2e-3
