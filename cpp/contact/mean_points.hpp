@@ -53,9 +53,10 @@ MeanPoints<Scalar> mean_points(const ContactPair& pair, const ClosestPoints& fir
   const Scalar along_a = end.s - start.s, along_b = end.t - start.t;
   const Vec3<Scalar> turned0 = along_a * start.u - along_b * start.v, turned1 = along_a * end.u - along_b * end.v;
   const Vec3<Scalar> back = end.moved(-along_a, -along_b), on = start.between + turned0;
-  // h(b) = c0 + c1 b + c2 b^2, from more than 0 to less. Where nothing slides any share will do, and a half is taken.
-  constexpr double kNone = 1e-12;  // of D^2
-  const Scalar little = kNone * end.square();
+  // h(b) = c0 + c1 b + c2 b^2, from more than 0 to less. Where nothing slides any share will do, and a half is taken:
+  // there both ends are rounding, to which so little is added that it is more.
+  constexpr double kLittle = 1e-10;  // of D^2
+  const Scalar little = kLittle * (start.square() + end.square());
   const Scalar c0 = dot(back, back) + start.spread - end.square() + little,
                at_end = start.square() - dot(on, on) - end.spread - little,
                c2 = dot(turned1, turned1) - dot(turned0, turned0), c1 = at_end - c0 - c2;
