@@ -233,7 +233,6 @@ template <class Scalar>
 void find_contact(const FrictionSetting& f, const SlipStart<Scalar>& start, const Vec3<Scalar> (&x)[4],
                   SlippingSurfaces<Scalar>& c) {
   using std::sqrt;
-  const auto lift = [](const Vec3d& v) { return Vec3<Scalar>{Scalar(v.x), Scalar(v.y), Scalar(v.z)}; };
   const ContactPair& pair = *f.pair;
   c.s = f.points.s;
   c.t = f.points.t;
