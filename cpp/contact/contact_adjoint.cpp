@@ -31,8 +31,7 @@ void set_distance_slopes(const ContactProblem& problem, const ContactPair& pair,
     std::copy(std::begin(of_curve.distance), std::end(of_curve.distance), slopes);
     return;
   }
-  problem.start_points(pair, x);
-  const ClosestPoints c = closest_points(x[0], x[1], x[2], x[3], pair.weight_a, pair.weight_b);
+  const ClosestPoints c = problem.closest_at_start(pair, x);
   double w[4];
   end_weights(c.s, c.t, w);
   for (int i = 0; i < 12; ++i) slopes[i] = w[i / 3] * c.between[i % 3] / std::sqrt(c.square);
@@ -141,17 +140,15 @@ void add_lagged_friction(const ContactProblem& problem, const Touching& t, const
 /// Of `set_mean_pressing` in pressing.cpp.
 void add_mean_pressing(const ContactProblem& problem, const Touching& t, const Rows& rows, ContactAdjoint& out) {
   Vec3d start[4], end[4];
-  problem.start_points(t.pair, start);
+  const ClosestPoints first = problem.closest_at_start(t.pair, start);
   t.end_points(end);
-  const ContactPair& pair = t.pair;
-  const ClosestPoints first = closest_points(start[0], start[1], start[2], start[3], pair.weight_a, pair.weight_b);
   Vec3<ByStart> x0[4], x1[4];
   for (int i = 0; i < 4; ++i) {
     x0[i] = {ByStart::unknown(start[i].x, 3 * i), ByStart::unknown(start[i].y, 3 * i + 1),
              ByStart::unknown(start[i].z, 3 * i + 2)};
     x1[i] = lifted(end[i]);
   }
-  const MeanPoints<ByStart> mean = mean_points(pair, first, t.proximity.points, x0, x1);
+  const MeanPoints<ByStart> mean = mean_points(t.pair, first, t.proximity.points, x0, x1);
   ByStart along;
   for (int i = 0; i < 4; ++i) along += mean.weight[i] * dot(lifted(point_of(rows, i)), mean.ways);
   const ByStart scalar = chain(mean.start, t.pressing.first, t.pressing.by_start) / (mean.start + mean.end) * along;

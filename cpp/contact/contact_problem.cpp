@@ -83,11 +83,12 @@ bool ContactProblem::turns(const ContactPair& pair) const {
   return pressing == Pressing::mean && pair.key.b >= 0 && (!frictional() || unsymmetric());
 }
 
-void ContactProblem::start_points(const ContactPair& pair, Vec3d (&x)[4]) const {
+ClosestPoints ContactProblem::closest_at_start(const ContactPair& pair, Vec3d (&x)[4]) const {
   bodies.end_points(pair, start->q, x);
   const Vec3d way = shift_of(pair);
   x[2] -= way;
   x[3] -= way;
+  return closest_points(x[0], x[1], x[2], x[3], pair.weight_a, pair.weight_b);
 }
 
 }  // namespace withe

@@ -159,8 +159,8 @@ struct ContactProblem {
   CurveDistance<double> curve_at_start(const ContactPair& pair) const {
     return bodies.piece_distance(pair, start->q, shift_of(pair));
   }
-  /// End points as the step begins, those of an obstacle where they were.
-  void start_points(const ContactPair& pair, Vec3d (&x)[4]) const;
+  /// The closest points as the step begins, and end points then, those of an obstacle where they were.
+  ClosestPoints closest_at_start(const ContactPair& pair, Vec3d (&x)[4]) const;
 
  private:
   static Vec3d of_obstacle(const ContactPair& pair, const std::vector<Vec3d>& ways) {

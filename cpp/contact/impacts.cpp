@@ -41,8 +41,7 @@ double steps_in_swing(double restitution) { return std::clamp(10.0 / std::max(re
 double start_distance(const ContactProblem& problem, const ContactPair& pair) {
   if (pair.curve()) return problem.curve_at_start(pair).distance;
   Vec3d x[4];
-  problem.start_points(pair, x);
-  return std::sqrt(closest_points(x[0], x[1], x[2], x[3], pair.weight_a, pair.weight_b).square);
+  return std::sqrt(problem.closest_at_start(pair, x).square);
 }
 
 /// As `impact_share`, of an impact that is over after so many swings.
@@ -113,9 +112,8 @@ double approach_speed(const ContactProblem& problem, const ContactPair& pair) {
     for (int i = 0; i < 3 * pair.piece.weights->nodes; ++i) rate += slopes.distance[i] * (v[i / 3] - moved)[i % 3];
     return std::max(0.0, -rate);
   }
-  problem.start_points(pair, x);
   if (pair.key.b < 0) v[2] = v[3] = moved;
-  const ClosestPoints c = closest_points(x[0], x[1], x[2], x[3], pair.weight_a, pair.weight_b);
+  const ClosestPoints c = problem.closest_at_start(pair, x);
   double w[4];
   end_weights(c.s, c.t, w);
   Vec3d rate{};
@@ -140,9 +138,8 @@ void add_approach_slopes(const ContactProblem& problem, const ContactPair& pair,
     }
     return;
   }
-  problem.start_points(pair, x);
   if (pair.key.b < 0) v[2] = v[3] = moved;
-  const ClosestPoints c = closest_points(x[0], x[1], x[2], x[3], pair.weight_a, pair.weight_b);
+  const ClosestPoints c = problem.closest_at_start(pair, x);
   using ByPoints = Dual<12>;
   Vec3<ByPoints> p[4], rate{};
   for (int i = 0; i < 4; ++i)

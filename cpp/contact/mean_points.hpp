@@ -29,7 +29,7 @@ struct MeanPoints {
 /// Points that are the closest in a configuration, and what of D^2 is the weights of `closest_points`.
 template <class Scalar>
 struct PointsOfRods {
-  Scalar s, t, spread;
+  Scalar s, t, spread, square;  ///< the last: D^2
   Vec3<Scalar> between, u, v;
 
   PointsOfRods(const ContactPair& pair, const ClosestPoints& known, const Vec3<Scalar> (&x)[4])
@@ -38,10 +38,10 @@ struct PointsOfRods {
     solve_parameters(r, u, v, pair.weight_a, pair.weight_b, known.s_free, known.t_free, s, t);
     between = r + s * u - t * v;
     spread = pair.weight_a * (s - 0.5) * (s - 0.5) + pair.weight_b * (t - 0.5) * (t - 0.5);
+    square = dot(between, between) + spread;
   }
   /// Way between the points of other parameters.
   Vec3<Scalar> moved(const Scalar& by_s, const Scalar& by_t) const { return between + by_s * u - by_t * v; }
-  Scalar square() const { return dot(between, between) + spread; }
 };
 
 /// `first`, `last`: the closest points at the start and the end, of which the class is kept; x0, x1: end points there.
@@ -56,16 +56,16 @@ MeanPoints<Scalar> mean_points(const ContactPair& pair, const ClosestPoints& fir
   // h(b) = c0 + c1 b + c2 b^2, from more than 0 to less. Where nothing slides any share will do, and a half is taken:
   // there both ends are rounding, to which so little is added that it is more.
   constexpr double kLittle = 1e-10;  // of D^2
-  const Scalar little = kLittle * (start.square() + end.square());
-  const Scalar c0 = dot(back, back) + start.spread - end.square() + little,
-               at_end = start.square() - dot(on, on) - end.spread - little,
+  const Scalar little = kLittle * (start.square + end.square);
+  const Scalar c0 = dot(back, back) + start.spread - end.square + little,
+               at_end = start.square - dot(on, on) - end.spread - little,
                c2 = dot(turned1, turned1) - dot(turned0, turned0), c1 = at_end - c0 - c2;
   const Scalar share = 2.0 * c0 / (sqrt(c1 * c1 - 4.0 * (c2 * c0)) - c1);
   MeanPoints<Scalar> out;
   end_weights(Scalar(start.s + share * along_a), Scalar(start.t + share * along_b), out.weight);
   out.ways = start.between + back + share * (turned0 + turned1);
-  out.start = sqrt(start.square());
-  out.end = sqrt(end.square());
+  out.start = sqrt(start.square);
+  out.end = sqrt(end.square);
   return out;
 }
 

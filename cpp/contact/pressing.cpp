@@ -86,17 +86,15 @@ void add_curve_pressing(const ContactProblem& problem, const Touching& t, bool w
 template <class Scalar>
 void set_mean_pressing(const ContactProblem& problem, const Touching& t, Scalar (&out)[12]) {
   Vec3d start[4], end[4];
-  problem.start_points(t.pair, start);
+  const ClosestPoints first = problem.closest_at_start(t.pair, start);
   t.end_points(end);
-  const ContactPair& pair = t.pair;
-  const ClosestPoints first = closest_points(start[0], start[1], start[2], start[3], pair.weight_a, pair.weight_b);
   Vec3<Scalar> x0[4], x1[4];
   for (int i = 0; i < 4; ++i) {
     x0[i] = {Scalar(start[i].x), Scalar(start[i].y), Scalar(start[i].z)};
     x1[i] = {unknown<Scalar>(end[i].x, 3 * i), unknown<Scalar>(end[i].y, 3 * i + 1),
              unknown<Scalar>(end[i].z, 3 * i + 2)};
   }
-  const MeanPoints<Scalar> mean = mean_points(pair, first, t.proximity.points, x0, x1);
+  const MeanPoints<Scalar> mean = mean_points(t.pair, first, t.proximity.points, x0, x1);
   const Scalar force = chain(mean.end, t.pressing.first, t.pressing.by_end) / (mean.start + mean.end);
   for (int i = 0; i < 4; ++i) {
     const Vec3<Scalar> on_node = (force * mean.weight[i]) * mean.ways;

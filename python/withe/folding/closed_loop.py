@@ -85,8 +85,7 @@ def fold(
     Raises
     ------
     ValueError
-        Not a plan or a sheet, a negative tolerance, no path from where the sheet
-        has slid to.
+        Not a plan or a sheet, a negative tolerance, no path from where the sheet has slid to.
     ImportError
         OpenCV is not installed.
 

@@ -205,7 +205,7 @@ class WideSheet:
     def _ribbed(self) -> list[int]:
         """Nodes of a strip that have a rib: under the jaw, and on to the crease of the longest fold.
 
-        None is beside the last edge that the jaw holds: a joint takes some of its neighbours' compliance.
+        None is beside the last edge that the jaw holds: a joint there would cost accuracy.
         """
         held = int(np.searchsorted(self._places, self.jaw.depth)) - 1
         spacing = max(1, round(_RIB_SPACING / float(self._places[-1] - self._places[-2])))
