@@ -7,24 +7,31 @@
 namespace withe {
 namespace {
 
-/// By EI1, EI2, GJ of two edges.
-using ByEdges = Dual<6>;
-
-struct EdgeNumbers {
-  ByEdges bend[2], twist;
-};
-
-/// In a plane the one bending stiffness stands in the first place.
-EdgeNumbers edge_numbers(const Model& model, const Parameters& p, int edge, int first) {
-  EdgeNumbers out{{ByEdges::unknown(p.edge_bend(edge, 0), first), ByEdges::unknown(p.edge_bend(edge, 1), first + 1)},
-                  ByEdges::unknown(p.edge_twist(edge), first + 2)};
-  if (model.planar()) {
-    const Vector2 c = model.planar_components[at(model.edge_rod[at(edge)])];
-    out.bend[0] = c(0) * c(0) * out.bend[0] + c(1) * c(1) * out.bend[1];
-    out.bend[1] = ByEdges(0.0);
-  }
-  return out;
+/// EI1, EI2, GJ of an edge; in a plane the one bending stiffness stands in the first place.
+Vector3 edge_stiffness(const Model& model, const Parameters& p, int edge) {
+  const auto bend = p.edge_bend.row(edge);
+  if (!model.planar()) return {bend(0), bend(1), p.edge_twist(edge)};
+  const Vector2 c = model.planar_components[at(model.edge_rod[at(edge)])];
+  return {c(0) * c(0) * bend(0) + c(1) * c(1) * bend(1), 0.0, p.edge_twist(edge)};
 }
+
+/// How much of an edge a stencil has to either side: of its length as it bends and as it twists, once for each
+/// stiffness.
+struct EdgePart {
+  int edge;
+  Vector3 share, stiffness, length;
+
+  EdgePart(const Model& model, const Parameters& p, int of, double bends, double twists)
+      : edge(of),
+        share(bends, bends, twists),
+        stiffness(edge_stiffness(model, p, of)),
+        length(model.edge_arc(of) * share) {}
+
+  Vector3 flexibilities() const {
+    return {flexibility(length(0), stiffness(0)), flexibility(length(1), stiffness(1)),
+            flexibility(length(2), stiffness(2))};
+  }
+};
 
 class Chain {
  public:
@@ -106,67 +113,60 @@ class Chain {
     if (by_.gravity_size != 0.0) out.gravity += by_.gravity_size * p_.gravity.normalized();
   }
 
-  void add_edge(int edge, const double* slope) {
-    out.edge_bend(edge, 0) += slope[0];
-    out.edge_bend(edge, 1) += slope[1];
-    out.edge_twist(edge) += slope[2];
+  /// From derivatives by a stencil's stiffnesses to those by what they are without its arc.
+  static void add_arc(const ArcOfStencil& arc, const Vector3& stiffness, Vector3& by) {
+    if (!arc.turns || stiffness(0) <= 0.0 || stiffness(1) <= 0.0 || stiffness(2) == 0.0) return;
+    using Three = Dual<3>;
+    const Three twist = twist_of_arc(Three::unknown(stiffness(2), 2), Three::unknown(stiffness(0), 0),
+                                     Three::unknown(stiffness(1), 1), arc.square_of_turn, arc.share);
+    const double of_twist = by(2);
+    by(2) = 0.0;
+    for (int k = 0; k < 3; ++k) by(k) += of_twist * twist.slope[k];
   }
 
-  static ByEdges twist_stiffness(const ByEdges& twist, const ByEdges& bend1, const ByEdges& bend2,
-                                 const ArcOfStencil& arc) {
-    if (!arc.turns || value_of(twist) == 0.0 || value_of(bend1) <= 0.0 || value_of(bend2) <= 0.0) return twist;
-    return twist_of_arc(twist, bend1, bend2, arc.square_of_turn, arc.share);
-  }
-
-  /// Minus how the stiffness of a stencil changes with the length of one of its edges, of which it carries a share.
-  static double by_length(const ByEdges& stiffness, const ByEdges& of_edge, double share) {
-    return of_edge.value == 0.0 ? 0.0 : stiffness.value * stiffness.value * share / of_edge.value;
+  /// Stiffnesses K = 1 / (V0 / K0 + V1 / K1) of a stencil follow those of an edge by K^2 V0 / K0^2.
+  void add_part(const EdgePart& part, const Vector3& stiffness, const Vector3& by) {
+    Vector3 by_edge = Vector3::Zero();
+    for (int k = 0; k < 3; ++k) {
+      const double of = part.stiffness(k);
+      if (of == 0.0) continue;
+      const double by_flexibility = -by(k) * stiffness(k) * stiffness(k);
+      by_edge(k) = -by_flexibility * part.length(k) / (of * of);
+      out.rest_length(part.edge) += by_flexibility * part.share(k) / of;
+    }
+    if (model_.planar()) {
+      const Vector2& c = model_.planar_components[at(model_.edge_rod[at(part.edge)])];
+      by_edge.head<2>() = by_edge(0) * c.cwiseAbs2();
+    }
+    out.edge_bend.row(part.edge) += by_edge.head<2>().transpose();
+    out.edge_twist(part.edge) += by_edge(2);
   }
 
   void add_stiffnesses() {
     out.edge_stretch = by_.stretch_stiffness;
     out.edge_viscous_time = by_.stretch_time;
     for (Eigen::Index i = 0; i < by_.bend_stiffness.rows(); ++i) {
-      const int a = model_.bend[static_cast<std::size_t>(i)].edge[0],
-                b = model_.bend[static_cast<std::size_t>(i)].edge[1];
-      const double la = model_.edge_arc(a), lb = model_.edge_arc(b);
-      const double va = model_.bend_share(i, 0) * la, vb = model_.bend_share(i, 1) * lb;
-      const EdgeNumbers of_a = edge_numbers(model_, p_, a, 0), of_b = edge_numbers(model_, p_, b, 3);
-      const auto together = [](double v0, const ByEdges& k0, double v1, const ByEdges& k1) {
-        return in_series(flexibility(v0, k0), flexibility(v1, k1));
-      };
-      const ByEdges bend1 = together(va, of_a.bend[0], vb, of_b.bend[0]),
-                    bend2 = together(va, of_a.bend[1], vb, of_b.bend[1]),
-                    twist = twist_stiffness(together(0.5 * la, of_a.twist, 0.5 * lb, of_b.twist), bend1, bend2,
-                                            arc_of_bend(model_, i));
-      const ByEdges sum =
-          by_.bend_stiffness(i, 0) * bend1 + by_.bend_stiffness(i, 1) * bend2 + by_.bend_stiffness(i, 2) * twist;
-      add_edge(a, sum.slope);
-      add_edge(b, sum.slope + 3);
-      // V / K = V0 / K0 + V1 / K1.
-      for (int end = 0; end < 2; ++end) {
-        const EdgeNumbers& of = end == 0 ? of_a : of_b;
-        out.rest_length(end == 0 ? a : b) -=
-            by_.bend_stiffness(i, 0) * by_length(bend1, of.bend[0], model_.bend_share(i, end)) +
-            by_.bend_stiffness(i, 1) * by_length(bend2, of.bend[1], model_.bend_share(i, end)) +
-            by_.bend_stiffness(i, 2) * by_length(twist, of.twist, 0.5);
+      const auto& edge = model_.bend[static_cast<std::size_t>(i)].edge;
+      const EdgePart part[2] = {EdgePart(model_, p_, edge[0], model_.bend_share(i, 0), 0.5),
+                                EdgePart(model_, p_, edge[1], model_.bend_share(i, 1), 0.5)};
+      const Vector3 stiffness = (part[0].flexibilities() + part[1].flexibilities()).cwiseInverse();
+      Vector3 by = by_.bend_stiffness.row(i).transpose();
+      add_arc(arc_of_bend(model_, i), stiffness, by);
+      const double both = model_.edge_arc(edge[0]) + model_.edge_arc(edge[1]);
+      for (const EdgePart& each : part) {
+        add_part(each, stiffness, by);
+        out.edge_viscous_time(each.edge) += by_.bend_time(i) * model_.edge_arc(each.edge) / both;
+        out.rest_length(each.edge) +=
+            by_.bend_time(i) * (p_.edge_viscous_time(each.edge) - p_.bend_viscous_time(i)) / both;
       }
-      const double both = la + lb;
-      out.edge_viscous_time(a) += by_.bend_time(i) * la / both;
-      out.edge_viscous_time(b) += by_.bend_time(i) * lb / both;
-      for (int edge : {a, b})
-        out.rest_length(edge) += by_.bend_time(i) * (p_.edge_viscous_time(edge) - p_.bend_viscous_time(i)) / both;
     }
     for (Eigen::Index i = 0; i < by_.half_stiffness.rows(); ++i) {
       const int e = model_.half[static_cast<std::size_t>(i)].edge;
-      const EdgeNumbers of = edge_numbers(model_, p_, e, 0);
-      const double inverse = 1.0 / (model_.half_share(i) * model_.edge_arc(e));
-      const ByEdges bend1 = inverse * of.bend[0], bend2 = inverse * of.bend[1],
-                    twist = twist_stiffness(of.twist / model_.half_voronoi(i), bend1, bend2, arc_of_half(model_, i));
-      const ByEdges sum =
-          by_.half_stiffness(i, 0) * bend1 + by_.half_stiffness(i, 1) * bend2 + by_.half_stiffness(i, 2) * twist;
-      add_edge(e, sum.slope);
-      out.rest_length(e) -= sum.value / model_.edge_arc(e);
+      const EdgePart part(model_, p_, e, model_.half_share(i), model_.half_voronoi(i) / model_.edge_arc(e));
+      const Vector3 stiffness = part.flexibilities().cwiseInverse();
+      Vector3 by = by_.half_stiffness.row(i).transpose();
+      add_arc(arc_of_half(model_, i), stiffness, by);
+      add_part(part, stiffness, by);
       out.edge_viscous_time(e) += by_.half_time(i);
     }
   }
@@ -178,22 +178,24 @@ class Chain {
     Vector2 components;  ///< of a plane: by `Model::planar_components`
   };
   ByShape by_shape(int rod, const Vector2& curvature, double twist, double voronoi, const Vector3& by) const {
-    using Four = Dual<4>;
-    // Curvatures and lengths enter by their products alone.
-    const Four length = Four::unknown(voronoi, 3);
-    const Vec3<Four> strain =
-        natural_strain(p_.measure, Four::unknown(curvature(0), 0) * length, Four::unknown(curvature(1), 1) * length,
-                       Four::unknown(twist, 2) * length, 1.0);
-    Four sum(0.0);
+    using Two = Dual<2>;
+    // Curvatures, twist and lengths enter by their products alone, the twist by a factor.
+    const double turn = twist * voronoi;
+    const Vec3<Two> strain = natural_strain(p_.measure, Two::unknown(curvature(0) * voronoi, 0),
+                                            Two::unknown(curvature(1) * voronoi, 1), Two(1.0), 1.0);
+    Two sum(0.0);
+    double by_turn = 0.0;
     Vector2 components = Vector2::Zero();
     if (model_.planar()) {
       const Vector2& c = model_.planar_components[at(rod)];
       sum = by(0) * (c(0) * strain.x + c(1) * strain.y);
       components = by(0) * Vector2(strain.x.value, strain.y.value);
     } else {
-      sum = by(0) * strain.x + by(1) * strain.y + by(2) * strain.z;
+      sum = by(0) * strain.x + by(1) * strain.y + (by(2) * turn) * strain.z;
+      by_turn = by(2) * strain.z.value;
     }
-    return {{sum.slope[0], sum.slope[1]}, sum.slope[2], sum.slope[3], components};
+    const Vector2 by_bent(sum.slope[0], sum.slope[1]);
+    return {voronoi * by_bent, voronoi * by_turn, curvature.dot(by_bent) + twist * by_turn, components};
   }
 
   /// What a stencil's natural strains say of the natural shape that a rod has at one of its own.

@@ -18,7 +18,8 @@ class BandLu final : public LinearSolver {
         width_(pattern.half_bandwidth()),
         value_stride_(2 * width_ + 1),
         values_(static_cast<std::size_t>(pattern.size) * value_stride_ + kPadding, 0.0),
-        work_(static_cast<std::size_t>(pattern.size) * work_stride(), 0.0),
+        before_(band_lu_padded(width_ + kBandLuPadding)),
+        work_((static_cast<std::size_t>(pattern.size) * (band_lu_stride(width_) + 1) + before_) / kBandLuPadding + 1),
         multipliers_(static_cast<std::size_t>(pattern.size) * band_lu_padded(width_), 0.0),
         inverse_pivots_(pattern.size, 0.0),
         pivot_rows_(pattern.size, 0),
@@ -65,15 +66,18 @@ class BandLu final : public LinearSolver {
   std::unique_ptr<LinearSolver> clone() const override { return std::make_unique<BandLu>(*this); }
 
  private:
-  int work_stride() const { return width_ + 1 + band_lu_padded(2 * width_); }
+  struct alignas(kBandLuPadding * sizeof(double)) Block {
+    double numbers[kBandLuPadding] = {};
+  };
+
   BandLuFactor factor() const {
     BandLu& self = const_cast<BandLu&>(*this);
     return {size(),
             width_,
             value_stride_,
-            work_stride(),
+            band_lu_stride(width_),
             band_lu_padded(width_),
-            self.work_.data(),
+            self.work_.data()->numbers + before_,
             self.multipliers_.data(),
             self.inverse_pivots_.data(),
             self.pivot_rows_.data(),
@@ -84,7 +88,8 @@ class BandLu final : public LinearSolver {
   int width_;
   int value_stride_;
   std::vector<double> values_;
-  std::vector<double> work_;
+  int before_;  ///< numbers in front of column 0
+  std::vector<Block> work_;
   std::vector<double> multipliers_;
   std::vector<double> inverse_pivots_;
   std::vector<int> pivot_rows_;

@@ -18,7 +18,7 @@ int smaller(int a, int b) { return a < b ? a : b; }
 int padded(int count) { return (count + kLanes - 1) / kLanes * kLanes; }
 
 double* entry(const BandLuFactor& a, int row, int column) {
-  return a.work + static_cast<std::ptrdiff_t>(row) * a.work_stride + (column - row + a.width);
+  return a.work + static_cast<std::ptrdiff_t>(row) * a.work_stride + column;
 }
 double* multipliers_of(const BandLuFactor& a, int column) {
   return a.multipliers + static_cast<std::ptrdiff_t>(column) * a.multiplier_stride;
@@ -26,24 +26,25 @@ double* multipliers_of(const BandLuFactor& a, int column) {
 
 void load_row(const BandLuFactor& a, int row, const double* values, const double* shift) {
   const double* value = values + static_cast<std::ptrdiff_t>(row) * a.value_stride;
-  double* work = a.work + static_cast<std::ptrdiff_t>(row) * a.work_stride;
+  double* work = entry(a, row, row - a.width);
+  for (int i = -kBandLuPadding; i < 0; ++i) work[i] = 0.0;
   for (int i = 0; i < a.value_stride; ++i) work[i] = value[i];
-  for (int i = a.value_stride; i < a.work_stride; ++i) work[i] = 0.0;
+  for (int i = a.value_stride; i <= a.work_stride - kBandLuPadding; ++i) work[i] = 0.0;
   if (shift) work[a.width] += shift[row];
 }
 
 /// A number that is not finite wins, so that it is met as a pivot and reported.
+double greater(double a, double b) { return b <= a ? a : b; }
+
 int find_pivot(const BandLuFactor& a, int column, int last_row) {
   const double* place = entry(a, column, column);
-  const std::ptrdiff_t step = a.work_stride - 1;
-  double greatest[2] = {0.0, 0.0};
+  const std::ptrdiff_t step = a.work_stride;
   const int count = last_row - column;
-  for (int i = 1; i <= count; ++i) {
-    const double other = magnitude(place[step * i]);
-    greatest[i % 2] = other <= greatest[i % 2] ? greatest[i % 2] : other;
-  }
+  double odd = 0.0, even = 0.0;  // neither waits for the other
+  for (int i = 1; i <= count; i += 2) odd = greater(odd, magnitude(place[step * i]));
+  for (int i = 2; i <= count; i += 2) even = greater(even, magnitude(place[step * i]));
   const double own = magnitude(place[0]);
-  if (own >= kPivotThreshold * greatest[0] && own >= kPivotThreshold * greatest[1]) return column;
+  if (own >= kPivotThreshold * odd && own >= kPivotThreshold * even) return column;
   int best = column;
   double most = own;
   for (int i = 1; i <= count; ++i) {
@@ -64,16 +65,18 @@ void exchange(double* a, double* b, int count) {
   }
 }
 
-/// Takes multiples of row j off the rows below: `packs` packs behind its pivot, or as many as `count` says.
+/// Takes multiples of row j off the rows below: `packs` packs from column `first` on, or as many as `count` says. Of
+/// the first pack columns up to j are never read again.
 template <int packs>
-void eliminate(const BandLuFactor& a, int j, int last_row, int count, double inverse) {
-  const double* pivot_row = entry(a, j, j) + 1;
+void eliminate(const BandLuFactor& a, int j, int last_row, int first, int count, double inverse) {
+  const double* pivot_row = entry(a, j, first);
   double* multiplier = multipliers_of(a, j);
-  double* target = entry(a, j + 1, j) + 1;
+  double* target = entry(a, j + 1, first);
+  const int pivot = j - first;
   Pack kept[packs > 0 ? packs : 1];
   for (int p = 0; p < packs; ++p) kept[p] = load(pivot_row + p * kLanes);
-  for (int row = j + 1; row <= last_row; ++row, target += a.work_stride - 1) {
-    const double factor = target[-1] * inverse;
+  for (int row = j + 1; row <= last_row; ++row, target += a.work_stride) {
+    const double factor = target[pivot] * inverse;
     *multiplier++ = factor;
     const Pack f = factor;
     if constexpr (packs > 0)
@@ -83,21 +86,23 @@ void eliminate(const BandLuFactor& a, int j, int last_row, int count, double inv
   }
 }
 
+/// Packs begin at multiples of their length, so that each is read as it was last written: a read across two that are on
+/// their way to memory waits for both.
 void eliminate(const BandLuFactor& a, int j, int last_row, int last_column, double inverse) {
-  const int count = last_column - j;
+  const int first = (j + 1) / kLanes * kLanes, count = last_column + 1 - first;
   switch (padded(count) / kLanes) {
     case 1:
-      return eliminate<1>(a, j, last_row, count, inverse);
+      return eliminate<1>(a, j, last_row, first, count, inverse);
     case 2:
-      return eliminate<2>(a, j, last_row, count, inverse);
+      return eliminate<2>(a, j, last_row, first, count, inverse);
     case 3:
-      return eliminate<3>(a, j, last_row, count, inverse);
+      return eliminate<3>(a, j, last_row, first, count, inverse);
     case 4:
-      return eliminate<4>(a, j, last_row, count, inverse);
+      return eliminate<4>(a, j, last_row, first, count, inverse);
     case 5:
-      return eliminate<5>(a, j, last_row, count, inverse);
+      return eliminate<5>(a, j, last_row, first, count, inverse);
     default:
-      return eliminate<0>(a, j, last_row, count, inverse);
+      return eliminate<0>(a, j, last_row, first, count, inverse);
   }
 }
 

@@ -99,9 +99,11 @@ void add_edge_slopes(const StepProblem& problem, StepData& data, const ElementTa
   data.turning.resize(at(model.edge_count));
   for (int e = 0; e < model.edge_count; ++e) {
     const int angle = model.edge_dof[at(e)];
-    const TurningSlopes& slopes = data.turning[at(e)] = turning_slopes(
-        {problem.rule, problem.duration(), problem.parameters->edge_inertia[e], to_eigen(edge_vector(model, data.z, e)),
-         to_eigen(edge_vector(model, q0, e)), data.z[angle] - q0[angle], problem.start->v[angle]});
+    TurningSlopes& slopes = data.turning[at(e)];
+    set_turning_slopes(
+        {problem.rule, problem.duration(), problem.parameters->edge_inertia[e], edge_vector(model, data.z, e),
+         edge_vector(model, q0, e), data.z[angle] - q0[angle], problem.start->v[angle]},
+        slopes);
     double hessian[7][7];
     for (int column = 0; column < 7; ++column) {
       const int unknown = column < 3 ? column : column == 3 ? 3 : column - 4;

@@ -64,21 +64,39 @@ struct NumberSlopes {
 }
 
 /// The couple I omega (e - e0) x e / (h l^3) and the torque's part.
-TurningSlopes euler_slopes(const TurningStep& step) {
-  const Direction middle(step.edge), start(step.start);
-  const double inverse = 1.0 / step.duration, omega = inverse * step.change;
-  const double torque = step.inertia * (omega - step.rate) * inverse;
-  const double cubed = step.inertia * inverse / (middle.length * middle.length * middle.length);
-  VectorSlopes force = spin_slopes(step.edge, middle, start);
-  const Vector3 spin = force.value, couple = cubed * step.edge.cross(step.start);  // of omega = 1
-  force.by = torque * force.by - (cubed * omega) * cross_matrix(step.start) -
-             (3.0 * omega / middle.length) * couple * middle.tangent.transpose();
-  force.by_start = torque * force.by_start + (cubed * omega) * cross_matrix(step.edge);
-  const double by_rate = step.inertia * inverse;
-  TurningSlopes out;
-  put(force, inverse * (couple + by_rate * spin), -by_rate * spin, {torque, Vector3::Zero(), Vector3::Zero()},
-      by_rate * inverse, -by_rate, out);
-  return out;
+///
+/// Both lie along x = s x e: the couple by -I omega l0 / (h l^3), the spin by -1 / G. What follows vectors is a turn of
+/// x and a change of its factor: [a] + x g^T by the vector at z, [b] + x k^T by that at the start, a along s and b
+/// along e.
+void set_euler_slopes(const TurningStep& step, TurningSlopes& out) {
+  const Vec3d& e = step.edge;
+  const double l = std::sqrt(dot(e, e)), l0 = std::sqrt(dot(step.start, step.start));
+  const double inverse = 1.0 / step.duration, inverse0 = 1.0 / l0, by_rate = step.inertia * inverse;
+  const Vec3d s = inverse0 * step.start, x = cross(s, e);
+  const double along = dot(s, e), of_length = 1.0 / l, square = of_length * of_length, spin = 1.0 / (l * (l + along));
+  const double omega = inverse * step.change, torque = by_rate * (omega - step.rate);
+  const double couple = by_rate * square * of_length, grown = torque * spin * spin;
+  const Vec3d by_angle = (-inverse * (couple * l0 + by_rate * spin)) * x, by_spin = (by_rate * spin) * x,
+              a = -(torque * spin + omega * couple * l0) * s, b = (torque * spin * inverse0 + omega * couple) * e,
+              g = (grown * (2.0 + along * of_length) + 3.0 * omega * couple * l0 * square) * e + (grown * l) * s,
+              k = (grown * l * inverse0) * (e + l * s);
+  const auto put = [&](int row, const Vec3d& turn, const Vec3d& turn_start) {
+    const double factor = x[row];
+    for (int i = 0; i < 3; ++i) {
+      out.by[row][i] = turn[i] + factor * g[i];
+      out.by[row][4 + i] = turn_start[i] + factor * k[i];
+      out.by[3][i] = out.by[3][4 + i] = 0.0;
+    }
+    out.by[row][3] = by_angle[row];
+    out.by[row][7] = -by_angle[row];
+    out.by[row][8] = by_spin[row];
+  };
+  put(0, {0.0, -a.z, a.y}, {0.0, -b.z, b.y});
+  put(1, {a.z, 0.0, -a.x}, {b.z, 0.0, -b.x});
+  put(2, {-a.y, a.x, 0.0}, {-b.y, b.x, 0.0});
+  out.by[3][3] = by_rate * inverse;
+  out.by[3][7] = -by_rate * inverse;
+  out.by[3][8] = -by_rate;
 }
 
 /// Takes away the axial force I r^2 |t1 - t0|^2 / (4 mean cosine) along the edge of energy-momentum steps, r the rate.
@@ -101,8 +119,9 @@ void add_axial(const TurningStep& step, double rate, double by_angle, const Dire
 }
 
 /// The moment m = I (omega1 t1 - omega0 t0) / dt: the force m x t / l and the torque m . t.
-TurningSlopes midpoint_slopes(const TurningStep& step) {
-  const Direction middle(step.edge), start(step.start), end(2.0 * step.edge - step.start);
+void set_midpoint_slopes(const TurningStep& step, TurningSlopes& out) {
+  const Vector3 edge = to_eigen(step.edge), at_start = to_eigen(step.start);
+  const Direction middle(edge), start(at_start), end(2.0 * edge - at_start);
   const bool finite = step.rule == StepRule::energy_momentum;
   const double inverse = 1.0 / step.duration, tangent = std::tan(step.change), scale = step.inertia * inverse;
   const double turn = finite ? 2.0 * tangent : 2.0 * step.change,
@@ -115,26 +134,24 @@ TurningSlopes midpoint_slopes(const TurningStep& step) {
   const NumberSlopes torque{moment.dot(middle.tangent), by.transpose() * middle.tangent + middle.by * moment,
                             by_start.transpose() * middle.tangent};
   const double torque_by_angle = by_angle.dot(middle.tangent), torque_by_rate = by_rate.dot(middle.tangent);
-  VectorSlopes force = spin_slopes(step.edge, middle, start);
+  VectorSlopes force = spin_slopes(edge, middle, start);
   const Vector3 spin = force.value;
   // m x e / l^2.
   const double square = 1.0 / (middle.length * middle.length);
-  const Matrix3 arm = -square * cross_matrix(step.edge);
-  const Vector3 across = square * moment.cross(step.edge);
+  const Matrix3 arm = -square * cross_matrix(edge);
+  const Vector3 across = square * moment.cross(edge);
   force.by = torque.value * force.by + spin * torque.by.transpose() + arm * by + square * cross_matrix(moment) -
              (2.0 / middle.length) * across * middle.tangent.transpose();
   force.by_start = torque.value * force.by_start + spin * torque.by_start.transpose() + arm * by_start;
   Vector3 force_by_angle = arm * by_angle + torque_by_angle * spin;
   if (finite) add_axial(step, inverse * turn, inverse * by_change, middle, start, end, force, force_by_angle);
-  TurningSlopes out;
   put(force, force_by_angle, arm * by_rate + torque_by_rate * spin, torque, torque_by_angle, torque_by_rate, out);
-  return out;
 }
 
 }  // namespace
 
-TurningSlopes turning_slopes(const TurningStep& step) {
-  return step.rule == StepRule::backward_euler ? euler_slopes(step) : midpoint_slopes(step);
+void set_turning_slopes(const TurningStep& step, TurningSlopes& out) {
+  step.rule == StepRule::backward_euler ? set_euler_slopes(step, out) : set_midpoint_slopes(step, out);
 }
 
 }  // namespace withe

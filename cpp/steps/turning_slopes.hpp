@@ -11,10 +11,10 @@ struct TurningStep {
   StepRule rule;
   double duration;      ///< [s]
   double inertia;       ///< of the edge about itself [kg m^2]
-  Vector3 edge, start;  ///< its vector at z, and at the start [m]
+  Vec3d edge, start;    ///< its vector at z, and at the start [m]
   double change, rate;  ///< of its angle, from the start to z, and its rate at the start
 };
 
-TurningSlopes turning_slopes(const TurningStep& step);
+void set_turning_slopes(const TurningStep& step, TurningSlopes& out);
 
 }  // namespace withe

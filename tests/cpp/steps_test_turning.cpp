@@ -17,8 +17,8 @@ namespace {
 using ByEdge = Dual<TurningSlopes::kUnknowns>;
 
 TurningForce<ByEdge> force_on_duals(const TurningStep& step, const Vector3& across) {
-  const auto vector = [](const Vector3& v, int first) -> Vec3<ByEdge> {
-    return {ByEdge::unknown(v.x(), first), ByEdge::unknown(v.y(), first + 1), ByEdge::unknown(v.z(), first + 2)};
+  const auto vector = [](const Vec3d& v, int first) -> Vec3<ByEdge> {
+    return {ByEdge::unknown(v.x, first), ByEdge::unknown(v.y, first + 1), ByEdge::unknown(v.z, first + 2)};
   };
   const Vec3<ByEdge> e = vector(step.edge, 0), e0 = vector(step.start, 4), e1 = ByEdge(2.0) * e - e0;
   const ByEdge length = sqrt(dot(e, e)), length0 = sqrt(dot(e0, e0)), length1 = sqrt(dot(e1, e1));
@@ -44,10 +44,12 @@ TEST(TurningSlopes, AreThoseOfDualNumbersAtRandomSteps) {
   const auto vector = [&] { return Vector3(number(random), number(random), number(random)); };
   for (int i = 0; i < 300; ++i)
     for (const StepRule rule : {StepRule::backward_euler, StepRule::midpoint, StepRule::energy_momentum}) {
-      TurningStep step{rule, 0.3 + 0.2 * number(random), 1.3, vector(), {}, 0.7 * number(random), number(random)};
-      step.start = step.edge + 0.3 * step.edge.norm() * vector();
-      const TurningForce<ByEdge> force = force_on_duals(step, step.start.unitOrthogonal());
-      const TurningSlopes found = turning_slopes(step);
+      const double duration = 0.3 + 0.2 * number(random);
+      const Vector3 edge = vector(), start = edge + 0.3 * edge.norm() * vector();
+      const TurningStep step{rule, duration, 1.3, to_vec3(edge), to_vec3(start), 0.7 * number(random), number(random)};
+      const TurningForce<ByEdge> force = force_on_duals(step, start.unitOrthogonal());
+      TurningSlopes found;
+      set_turning_slopes(step, found);
       double greatest = 0.0, off = 0.0;
       for (int k = 0; k < TurningSlopes::kUnknowns; ++k)
         for (int row = 0; row < 4; ++row) {

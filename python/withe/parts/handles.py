@@ -55,6 +55,7 @@ class Layout:
         self.rods: list[RodPlace] = []
         self._merges: list[tuple[tuple[int, int], tuple[int, int]]] = []
         self._rows: list[npt.NDArray[np.int64]] | None = None
+        self._node_count = 0
 
     def copy(self) -> Layout:
         """A layout that no longer changes with this one."""
@@ -76,14 +77,19 @@ class Layout:
 
     def rows(self, rod: int) -> npt.NDArray[np.int64]:
         """Rows of the nodes of a rod."""
-        if self._rows is None:
-            self._rows = self._number()
-        return self._rows[rod]
+        return self._numbered()[rod]
 
     @property
     def node_count(self) -> int:
         """Number of nodes, shared ones counted once."""
-        return max((int(self.rows(i).max()) for i in range(len(self.rods))), default=-1) + 1
+        self._numbered()
+        return self._node_count
+
+    def _numbered(self) -> list[npt.NDArray[np.int64]]:
+        if self._rows is None:
+            self._rows = self._number()
+            self._node_count = max((int(rows.max()) for rows in self._rows), default=-1) + 1
+        return self._rows
 
     def _number(self) -> list[npt.NDArray[np.int64]]:
         starts = np.concatenate([[0], np.cumsum([rod.nodes for rod in self.rods])]).astype(int)

@@ -168,16 +168,29 @@ class _CurvatureResidual(Residual):
         self._means = np.zeros((len(target.groups), len(target.places) - 2))
         for row, group in enumerate(target.groups):
             self._means[row, np.array(group) - 1] = 1.0 / len(group)
+        self._measured = b"", np.zeros((0, 2)), np.zeros(0)
+
+    def _measure(self, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Chords in the plane, and tangents of half of the turns between them.
+
+        Those of the last positions are kept: a frame begins where the one before it ended, and values and derivatives
+        are of the same ones.
+        """
+        which = positions.tobytes()
+        if which != self._measured[0]:
+            chords = self._chords @ positions @ self._plane.T
+            self._measured = which, chords, np.tan(0.5 * _turns_of(chords))
+        return self._measured[1:]
 
     def value(self, positions: FloatArray, frame: int) -> FloatArray:
-        found = self._means @ (2.0 * np.tan(_turns_of(self._chords @ positions @ self._plane.T) / 2.0))
-        return np.asarray((found - self._values[frame]) / self._sigma)
+        _, tangents = self._measure(positions)
+        return np.asarray((2.0 * (self._means @ tangents) - self._values[frame]) / self._sigma)
 
     def derivative(self, positions: FloatArray, frame: int) -> FloatArray:
-        chords = self._chords @ positions @ self._plane.T
+        chords, tangents = self._measure(positions)
         # A chord e turns by (e x de) / |e|^2 about the axis: by (axis x e) . de.
         across = chords[:, ::-1] * (-1.0, 1.0) / (chords**2).sum(axis=1, keepdims=True)
-        slope = self._means * (1.0 + np.tan(_turns_of(chords) / 2.0) ** 2) / self._sigma
+        slope = self._means * (1.0 + tangents**2) / self._sigma
         by_chord = (slope @ self._bends)[:, :, None] * (across @ self._plane)
         return np.asarray(self._chords.T @ by_chord)
 

@@ -8,8 +8,6 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
-import numpy as np
-
 from withe import _core
 from withe.errors import CoarseMeshWarning, CoarseStepWarning, ConvergenceError, RingLeftWarning
 from withe.recording.recorder import Recorder
@@ -97,10 +95,10 @@ class Stepping:
     ) -> tuple[Callable[[Any, Sequence[Unknown]], list[Any]], Callable[[Any, Sequence[Unknown]], list[Any]]]:
         """Gradient and Jacobian of the equilibrium that the session is in now."""
         session = self.session
-        found = session.world.positions()
+        found = session.world.positions().tobytes()
 
         def check() -> None:
-            if not np.array_equal(session.world.positions(), found):
+            if session.world.positions().tobytes() != found:
                 raise ValueError("the simulation has left this equilibrium: ask for gradients before it goes on")
 
         def gradient(dL_dx: Any, wrt: Sequence[Unknown]) -> list[Any]:

@@ -111,14 +111,14 @@ def part_of(session: Session, target: Any) -> Part | BodyPair:
 
 def reader_of(session: Session, part: Part | BodyPair, word: str) -> Reader:
     """What reads the derivative by a word of a part."""
+    if isinstance(part, RodPart):
+        return _rod_reader(session, part, word)
     if isinstance(part, ObstaclePart | BodyPair) and word == "friction":
         given = _friction_given(session, part)
         read = friction_reader(session, part)
         return lambda g: read(g) if np.ndim(given) else float(read(g).sum())
     if isinstance(part, FluidPart) and word == "viscosity":
         return lambda g: float(g.parameters.fluid_viscosity)
-    if isinstance(part, RodPart):
-        return _rod_reader(session, part, word)
     if isinstance(part, LoadPart) and word == part.kind:
         return _load_reader(session, part)
     if isinstance(part, MassPart) and word == "mass":
@@ -269,9 +269,12 @@ def _rod_reader(session: Session, part: RodPart, word: str) -> Reader:
 
     def read(gradient: _core.EquilibriumGradient | OfRun) -> Any:
         found = gradient.parameters
-        if scalar:
-            return float(sum(np.vdot(getattr(found, name)[first:last], slope) for name, slope in slopes.items()))
-        return sum_of_slopes(found, slopes, word, first, last)
+        if not scalar:
+            return sum_of_slopes(found, slopes, word, first, last)
+        total = 0.0
+        for name, slope in slopes.items():
+            total += float(np.vdot(getattr(found, name)[first:last], slope))
+        return total
 
     return read
 
