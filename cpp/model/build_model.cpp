@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <map>
 #include <set>
+#include <utility>
 
 #include "common/check.hpp"
 #include "geometry/curvature.hpp"
@@ -322,10 +323,12 @@ class Builder {
   /// Strains at nodes are a trapezoidal rule along the rod. At a frame the moment ends with a slope, and the first of
   /// Gregory's end corrections to that rule (weights 5/12, 13/12, 1, 1, ... edges) makes it third order there: the node
   /// next to a frame carries a twelfth of an edge for it. Not so where a rod is gripped while it runs, which must leave
-  /// it as it is; nor along an edge that is held, between whose sides nothing is passed on: what one side
-  /// gave to the other, or took, would be of first order.
+  /// it as it is; nor along an edge that is held or once was (`UncorrectedEnd`), between whose sides nothing is passed
+  /// on: what one side gave to the other, or took, would be of first order.
   void share_bending() {
     const std::vector<bool> held = held_edges();
+    std::vector<UncorrectedEnd>& ends = model_.description.uncorrected_ends;
+    const std::vector<UncorrectedEnd> before = std::exchange(ends, {});
     model_.bend_share = MatrixX2::Constant(static_cast<Eigen::Index>(model_.bend.size()), 2, 0.5);
     model_.half_share = VectorX::Constant(static_cast<Eigen::Index>(model_.half.size()), 0.5);
     std::vector<std::vector<std::pair<Eigen::Index, int>>> bends(static_cast<std::size_t>(model_.edge_count));
@@ -335,11 +338,20 @@ class Builder {
     for (Eigen::Index h = 0; h < model_.half_share.size(); ++h) {
       const FrameStencil& half = model_.half[static_cast<std::size_t>(h)];
       const auto& next = bends[static_cast<std::size_t>(half.edge)];
-      if (gripped_frames_.contains(half.frame) || held[static_cast<std::size_t>(half.edge)]) continue;
+      if (gripped_frames_.contains(half.frame)) continue;
       if (next.size() != 1) continue;  // nobody to carry it, or an end in a joint of pairs
+      const auto& [bend, side] = next.front();
+      const auto known = std::find_if(before.begin(), before.end(), [&](const UncorrectedEnd& end) {
+        return end.edge == half.edge && end.frame_first == half.frame_first;
+      });
+      if (known != before.end() || held[static_cast<std::size_t>(half.edge)]) {
+        ends.push_back(known != before.end() ? *known : UncorrectedEnd{half.edge, half.frame_first});
+        model_.uncorrected_ends.emplace_back(static_cast<int>(h), static_cast<int>(bend));
+        continue;
+      }
       constexpr double kCarried = 1.0 / 12.0;
       model_.half_share(h) -= kCarried;
-      model_.bend_share(next.front().first, next.front().second) += kCarried;
+      model_.bend_share(bend, side) += kCarried;
     }
   }
 
@@ -357,6 +369,7 @@ class Builder {
     }
     const auto n = static_cast<Eigen::Index>(model_.bend.size());
     model_.bend_offset = MatrixX3::Zero(n, 3);
+    model_.half_offset = MatrixX3::Zero(static_cast<Eigen::Index>(model_.half.size()), 3);
     model_.initial_bend_tau = VectorX::Zero(n);
     for (Eigen::Index b = 0; b < n; ++b) {
       const BendStencil& s = model_.bend[static_cast<std::size_t>(b)];
@@ -381,6 +394,10 @@ class Builder {
       model_.bend_offset.row(b) = measured(natural.measure, drawn.row(b)) - natural.bend_natural.row(b);
     }
     model_.initial_half_tau = VectorX::Zero(static_cast<Eigen::Index>(model_.half.size()));
+    for (std::size_t i = 0; i < model_.uncorrected_ends.size(); ++i) {
+      const UncorrectedEnd& end = scene_.uncorrected_ends[i];
+      add_offsets(model_, i, end.at_frame, end.at_next);
+    }
   }
 
   Model& model_;
@@ -394,6 +411,17 @@ class Builder {
 };
 
 }  // namespace
+
+void add_offsets(Model& model, std::size_t uncorrected_end, const Vector3& at_frame, const Vector3& at_next) {
+  const auto& [half, bend] = model.uncorrected_ends[uncorrected_end];
+  const int rod = model.edge_rod[static_cast<std::size_t>(model.half[static_cast<std::size_t>(half)].edge)];
+  const auto in_model = [&](const Vector3& strain) -> Vector3 {
+    if (!model.planar()) return strain;
+    return {model.planar_components[static_cast<std::size_t>(rod)].dot(strain.head<2>()), 0.0, 0.0};
+  };
+  model.half_offset.row(half) += in_model(at_frame).transpose();
+  model.bend_offset.row(bend) += in_model(at_next).transpose();
+}
 
 Model build_model(const SceneDescription& description, std::optional<bool> planar) {
   require(!description.rods.empty(), "the scene has no rods: add one with add_rod");

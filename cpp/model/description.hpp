@@ -224,6 +224,16 @@ struct FluidDescription {
 /// What bending strain is: the angle between two edges (nearly; see geometry/bend_measure.hpp), or 2 tan of its half.
 enum class Bending { angle, tangent };
 
+/// An end of a rod at a joint or a clamp whose end correction of bending (`Builder::share_bending`) was given up, as a
+/// support held its edge. What the correction amounted to then stays as rest strain, so that nothing jumps.
+struct UncorrectedEnd {
+  int edge = 0;
+  bool frame_first = false;  ///< whether the joint or the clamp is at the edge's tail
+  /// Added to natural strains f (kappa1, kappa2, tau), also in a plane: of the stencil at the frame, and of that at the
+  /// edge's other node.
+  Vector3 at_frame = Vector3::Zero(), at_next = Vector3::Zero();
+};
+
 struct SceneDescription {
   MatrixX3 positions;  ///< every node once [m]
   VectorX added_mass;  ///< per node [kg]
@@ -232,6 +242,7 @@ struct SceneDescription {
   std::vector<RodDescription> rods;
   std::vector<JointDescription> joints;
   std::vector<SupportDescription> supports;
+  std::vector<UncorrectedEnd> uncorrected_ends;  ///< found by `build_model`; once one, always one
   std::vector<LoadDescription> loads;
   std::vector<SpringDescription> springs;
   bool has_custom_force = false;  ///< nodal forces come from a callback

@@ -182,10 +182,13 @@ struct Model {
   std::vector<std::vector<StencilPlace>> place;  ///< [rod][stencil]
   std::vector<Vector2> planar_components;        ///< per rod: kappa = p . (kappa1, kappa2)
   std::vector<std::vector<int>> wall_half;       ///< [rod]: halves at its first and last node, or -1
-  // Drawn values that only joints of form `pairs`, and rods joined at an angle, have.
-  MatrixX3 bend_offset;  ///< per stencil: discrete strains that the drawing adds to the natural ones
+  /// Per stencil: discrete strains on top of the natural ones, of the drawing (at joints of form `pairs`, and where
+  /// rods are joined at an angle) and of ends without correction.
+  MatrixX3 bend_offset, half_offset;
   std::vector<std::pair<int, int>> bend_owner;  ///< (rod, stencil), or (-1, -1) across rods
   std::vector<int> bend_across;                 ///< stencils across rods
+  /// Per entry of `SceneDescription::uncorrected_ends`: its half stencil, and the bend stencil at its other node.
+  std::vector<std::pair<int, int>> uncorrected_ends;
   std::vector<std::pair<int, int>> half_owner;  ///< (rod, nearest stencil); (rod, -1) where the rod has none
 
   // Layout of the unknowns.
@@ -208,6 +211,9 @@ struct Model {
 
 /// Resolves joints and supports, lays out the unknowns, finds the plane. Throws std::invalid_argument.
 Model build_model(const SceneDescription& description, std::optional<bool> planar);
+/// Adds strains f (kappa1, kappa2, tau) to the natural ones of the stencils of an uncorrected end; `update_natural`
+/// must follow.
+void add_offsets(Model& model, std::size_t uncorrected_end, const Vector3& at_frame, const Vector3& at_next);
 /// Parameters as described, derived ones included.
 Parameters initial_parameters(const Model& model);
 /// How surfaces press and rub, as described; update_derived must follow.

@@ -344,7 +344,8 @@ void update_natural_of(const Model& model, Parameters& p, int rod) {
       [&](int b) { update_natural_across(model, p, b); });
   for (int h = 0; h < static_cast<int>(model.half.size()); ++h) {
     const auto& [owner, stencil] = model.half_owner[at(h)];
-    if (owner == rod && stencil >= 0) p.half_natural.row(h) = strain(stencil, model.half_voronoi(h));
+    if (owner == rod && stencil >= 0)
+      p.half_natural.row(h) = model.half_offset.row(h) + strain(stencil, model.half_voronoi(h)).transpose();
   }
 }
 
@@ -353,7 +354,7 @@ void update_natural_of(const Model& model, Parameters& p, int rod) {
 void update_natural(const Model& model, Parameters& p) {
   p.natural_version = next_version();
   p.bend_natural = model.bend_offset;
-  p.half_natural.setZero(static_cast<Eigen::Index>(model.half.size()), 3);
+  p.half_natural = model.half_offset;
   for (int r = 0; r < static_cast<int>(model.place.size()); ++r) update_natural_of(model, p, r);
 }
 

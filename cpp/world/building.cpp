@@ -141,6 +141,8 @@ void World::Implementation::carry_over(const Model& old, Rebuild why) {
   } else {
     kept = Moving{};
   }
+  ElasticCoefficients elastic;
+  set_elastic(parameters, elastic);
   // Frames that come and go carry inertia, and a support may change where the mass of edges sits.
   MassMatrix mass;
   set_mass(old, parameters, mass);
@@ -149,7 +151,10 @@ void World::Implementation::carry_over(const Model& old, Rebuild why) {
   newton = std::make_unique<Newton>(model, options);
   equations = std::make_unique<Equations>(model, equation_options(options));
   relax_frames(is_new);
-  if (why == Rebuild::running) regrip(held_before);
+  if (why == Rebuild::running) {
+    regrip(held_before);
+    keep_moments(old, elastic);
+  }
   set_mass(model, parameters, mass);
   support_work += kinetic_energy(model, mass, state.v) - before;
 }
@@ -166,7 +171,8 @@ void World::Implementation::rebuild(Rebuild why) {
     begin_as_drawn();
   else
     carry_over(old, why);
-  // Half stencils go with the support that has held their frame, and edges that are held have others beside them.
+  description.uncorrected_ends = model.description.uncorrected_ends;
+  // Half stencils go with the support that has held their frame.
   if (why == Rebuild::running) support_work += elastic_energy() - stored;
   newton = std::make_unique<Newton>(model, options);
   equations = std::make_unique<Equations>(model, equation_options(options));

@@ -95,8 +95,7 @@ std::string World::Implementation::unresolved() const {
     const double turn = angle(s.sign[0] * c.edge[at(s.edge[0])].tangent, s.sign[1] * c.edge[at(s.edge[1])].tangent);
     see(turn, s.node[1], "turns");
     if (!model.planar())
-      see_twist(state.bend_tau(row), c.bend_strain.row(row),
-                parameters.bend_natural(row, 2) + model.bend_offset(row, 2), turn, s.node[1]);
+      see_twist(state.bend_tau(row), c.bend_strain.row(row), parameters.bend_natural(row, 2), turn, s.node[1]);
   }
   for (std::size_t h = 0; h < (model.planar() ? 0 : model.half.size()); ++h) {
     const FrameStencil& s = model.half[h];

@@ -97,6 +97,7 @@ struct World::Implementation : Running {
   void drop_scratch();
   void begin_as_drawn();
   void carry_over(const Model& old, Rebuild why);
+  void keep_moments(const Model& old, const ElasticCoefficients& before);
   void make_plan();
   /// Equations for other loads than before.
   void remake_equations();

@@ -9,7 +9,7 @@
 namespace withe {
 namespace {
 
-constexpr std::uint64_t kMagic = 0x4153454854495756ull;
+constexpr std::uint64_t kMagic = 0x4153454854495757ull;
 
 /// FNV-1a.
 std::uint64_t hash_of(std::string_view bytes) {
@@ -241,6 +241,31 @@ StoredSupports read_supports(Reader& r, const SceneDescription& scene) {
   return out;
 }
 
+void write_uncorrected_ends(Writer& w, const std::vector<UncorrectedEnd>& ends) {
+  w(static_cast<std::int64_t>(ends.size()));
+  for (const UncorrectedEnd& end : ends) w(end.edge), w(end.frame_first), w(end.at_frame), w(end.at_next);
+}
+
+std::vector<UncorrectedEnd> read_uncorrected_ends(Reader& r, const Model& model) {
+  std::int64_t count = 0;
+  r(count);
+  require(count >= 0 && count <= 2 * model.edge_count, "snapshot is damaged: impossible number of ends");
+  std::vector<UncorrectedEnd> ends(static_cast<std::size_t>(count));
+  for (UncorrectedEnd& end : ends) {
+    r(end.edge), r(end.frame_first), r(end.at_frame), r(end.at_next);
+    require(end.edge >= 0 && end.edge < model.edge_count, "snapshot is damaged: end of an edge that is not there");
+    require(end.at_frame.allFinite() && end.at_next.allFinite(), "snapshot is damaged: not finite");
+  }
+  return ends;
+}
+
+bool same_ends(const std::vector<UncorrectedEnd>& a, const std::vector<UncorrectedEnd>& b) {
+  Writer of_a, of_b;
+  write_uncorrected_ends(of_a, a);
+  write_uncorrected_ends(of_b, b);
+  return of_a.bytes == of_b.bytes;
+}
+
 bool same_supports(const StoredSupports& stored, const World::Implementation& self) {
   if (stored.active.size() != self.description.supports.size()) return false;
   for (std::size_t s = 0; s < stored.active.size(); ++s) {
@@ -309,6 +334,7 @@ std::string World::snapshot() const {
   w(self.spatial);
   w(!self.obstacle_motions.empty());
   write_supports(w, self);
+  write_uncorrected_ends(w, self.description.uncorrected_ends);
   write_added_loads(w, self.description);
   const bool set = !same_contact(self.description.contact, self.drawn_contact);
   w(set);
@@ -338,7 +364,9 @@ void World::restore(const std::string& bytes) {
   r(spatial);
   r(obstacles_move);
   const StoredSupports supports = read_supports(r, fresh->description);
-  const bool same = spatial == fresh->spatial && same_supports(supports, *fresh);
+  const std::vector<UncorrectedEnd> ends = read_uncorrected_ends(r, fresh->model);
+  const bool same = spatial == fresh->spatial && same_supports(supports, *fresh) &&
+                    same_ends(ends, fresh->description.uncorrected_ends);
   restore_loads(read_added_loads(r, fresh->description), *fresh);
   bool contact_set = false;
   r(contact_set);
@@ -350,6 +378,7 @@ void World::restore(const std::string& bytes) {
   if (!same) {
     fresh->spatial = spatial;
     if (!spatial) fresh->plane_left_by.clear();
+    fresh->description.uncorrected_ends = ends;
     restore_supports(supports, *fresh);
   }
   fresh->obstacle_motions.assign(obstacles_move ? fresh->state.obstacles.size() : 0, ObstacleMotion{});

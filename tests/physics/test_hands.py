@@ -22,11 +22,18 @@ def curve(edges, closed):
     return x, np.linalg.norm(np.diff(x, axis=0), axis=1)
 
 
-def rope(edges=12, weight=1.0, closed=False, **build):
-    """A soft rod in space, free."""
+def rope(edges=12, weight=1.0, closed=False, forked=False, **build):
+    """A soft rod in space, free, or clamped and with a twig."""
     scene = withe.Scene(gravity=(0.0, 0.0, -weight))
     points, _ = curve(edges, closed)
     rod = scene.add_rod(points=points, closed=closed, stiffness=SOFT, line_density=1.0, radius=0.02, name="rope")
+    if forked:
+        fork = points[edges // 2]
+        twig = scene.add_rod(
+            start=fork, end=fork + (0, 0.2, 0), nodes=4, stiffness=SOFT, line_density=1.0, radius=0.02, name="twig"
+        )
+        scene.join(rod.node(edges // 2), twig.start)
+        scene.clamp(rod.start)
     options = {"time_step": 1e-3, "planar": False} | TIGHT | build
     return scene.build(**options), rod
 
@@ -63,16 +70,20 @@ class Still:
 
 
 @pytest.mark.parametrize("yields", [False, True], ids=["rigid", "yielding"])
-@pytest.mark.parametrize("closed", [False, True], ids=["open", "closed"])
-def test_grasp_and_release_anywhere_at_any_time_change_nothing(yields, closed):
-    simulation, rod = rope(closed=closed)
-    whole = curve(12, closed)[1].sum()
+@pytest.mark.parametrize("shape", ["open", "closed", "forked"])
+def test_grasp_and_release_anywhere_at_any_time_change_nothing(yields, shape):
+    closed = shape == "closed"
+    simulation, rod = rope(closed=closed, forked=shape == "forked")
+    lengths = curve(12, closed)[1]
+    whole, clear = lengths.sum(), 1.001 * lengths[0] if shape == "forked" else 0.0
     random = np.random.default_rng(7)
-    simulation.set_velocities(rod, 0.3 * random.normal(size=(rod.nodes, 3)))
+    velocities = 0.3 * random.normal(size=(rod.nodes, 3))
+    velocities[0] *= shape != "forked"  # clamped
+    simulation.set_velocities(rod, velocities)
     for _ in range(100):
         simulation.step(int(random.integers(1, 3)))
         span = random.uniform(0.0, 0.3) * whole
-        at = random.uniform(0.0, whole) if closed else random.uniform(0.5 * span, whole - 0.5 * span)
+        at = random.uniform(0.0, whole) if closed else random.uniform(clear + 0.5 * span, whole - 0.5 * span)
         before = Still(simulation, rod)
         hand = simulation.grasp(rod, at, span, stiffness=(30.0, 0.4) if yields else None)
         before.check()
@@ -495,3 +506,80 @@ def test_what_supports_store_beside_joints_is_their_work_as_they_come_and_go(hol
             support = None
         assert abs(balance() - before) < 1e-12 * stored
         simulation.step(5)
+
+
+def deflections_before_in_and_after_a_hold(edges, after, planar):
+    """Errors of how far the end of a beam sinks under a load that doubles while a hand holds an edge beside a joint.
+
+    And by how much the moment at the wall jumps as it takes hold.
+    """
+    scene, length = withe.Scene(gravity=(0, 0, 0)), 1.0 / edges
+    stiffness = rods.stiffness(stretch=1e6)
+    beam = scene.add_rod(
+        start=(0, 0, 0), end=(1, 0, 0), nodes=edges + 1, stiffness=stiffness, line_density=1.0, radius=1e-3
+    )
+    wall = scene.clamp(beam.start)
+    fork = edges // 2
+    twig = scene.add_rod(
+        start=(0.5, 0, 0), end=(0.5, 0, 0.2), nodes=3, stiffness=stiffness, line_density=1e-9, radius=1e-3
+    )
+    scene.join(beam.node(fork), twig.start)
+    load = scene.add_force(beam.end, (0.0, 0.0, -1e-4))
+    simulation = scene.build(integrator="static", planar=planar)
+    simulation.equilibrium()
+    bend = simulation.get(beam, "bend_stiffness").ravel()[0]
+    held = fork if after else fork - 1
+
+    def deflection():
+        return -simulation.positions(beam)[-1, 2] * 3.0 * bend / 1e-4
+
+    def moment():
+        simulation.equilibrium()
+        return np.linalg.norm(simulation.reaction(wall).moment) / 1e-4
+
+    found, moments = [deflection()], [moment()]
+    hand = simulation.grasp(beam, (held + 0.5) * length, 0.1 * length)
+    moments.append(moment())
+    simulation.set(load, force=(0.0, 0.0, -2e-4))
+    simulation.equilibrium()
+    found.append(deflection())
+    hand.release()
+    simulation.equilibrium()
+    found.append(deflection())
+    return np.array(found) - (1.0, 1.0 + (1.0 - (held + 0.5) * length) ** 3, 2.0), np.diff(moments)[0]
+
+
+@pytest.mark.parametrize("planar", [None, False])
+@pytest.mark.parametrize("after", [True, False])
+def test_a_hand_beside_a_joint_takes_what_bends_there_as_it_is_and_leaves_a_beam_as_soft_as_it_was(after, planar):
+    for edges in (20, 40, 80):
+        errors, jump = deflections_before_in_and_after_a_hold(edges, after, planar)
+        # Of second order; a twelfth of an edge too soft or too stiff is of first, .06 / edges.
+        assert np.abs(errors[1:]).max() < 0.5 / edges**2
+        assert abs(jump) < 0.5 / edges**2
+
+
+def test_snapshots_copies_and_resets_know_of_the_rest_strains_that_a_hand_leaves_beside_a_joint():
+    simulation, rod = rope(forked=True)
+
+    def bits():
+        simulation.step(20)
+        return simulation.positions()
+
+    fresh = bits()
+    hand = simulation.grasp(rod, 0.54, 0.05)
+    held, copy = simulation.snapshot(), simulation.copy()
+    in_hand = bits()
+    hand.release()
+    left = simulation.snapshot()
+    after = bits()
+    simulation.restore(held)
+    np.testing.assert_array_equal(bits(), in_hand)
+    simulation.restore(left)
+    np.testing.assert_array_equal(bits(), after)
+    copy.step(20)
+    np.testing.assert_array_equal(copy.positions(), in_hand)
+    simulation.reset()
+    np.testing.assert_array_equal(bits(), fresh)
+    simulation.restore(left)
+    np.testing.assert_array_equal(bits(), after)
