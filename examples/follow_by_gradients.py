@@ -15,13 +15,14 @@ python examples/follow_by_gradients.py [STEPS] [SEED] [FOLDER]; 300,000 control 
 from __future__ import annotations
 
 import sys
+import warnings
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import torch
-from learn_follow import Curve, draw_curve, film
+from learn_follow import Aimed, Curve, check_tools, draw_curve, film
 
 import withe
 
@@ -39,7 +40,7 @@ class Policy:
     def __init__(self, seed: int) -> None:
         torch.manual_seed(seed)
         torch.set_num_threads(1)
-        sizes = (76, 128, 128, 10)
+        sizes = (79, 128, 128, 10)
         layers: list[Any] = []
         for size, after in pairwise(sizes):
             layers += [torch.nn.Linear(size, after), torch.nn.Tanh()]
@@ -84,13 +85,13 @@ class Pursuit:
         self.way, self.target = np.where(outside, -self.way, self.way), np.where(outside, self.target, there)
 
     def seen(self, arm: withe.Simulation) -> np.ndarray:
-        """As `Follow` is observed, shape (76,)."""
-        nodes = slice(2, None, 2)
-        parts = (arm.positions("arm")[nodes], arm.velocities("arm")[nodes], self.bends, self.target, self.way)
+        """As `Aimed` is observed, shape (79,)."""
+        nodes, aim = slice(2, None, 2), np.tanh((self.target - arm.positions("arm")[-1]) / 0.1)
+        parts = (arm.positions("arm")[nodes], arm.velocities("arm")[nodes], self.bends, self.target, self.way, aim)
         return np.concatenate([part.ravel() for part in parts]).astype(np.float32)
 
     def go(self, policy: Policy) -> tuple[np.ndarray, np.ndarray]:
-        """A horizon: what was seen (HORIZON, 76), and derivatives of L by the actions (HORIZON, 10)."""
+        """A horizon: what was seen (HORIZON, 79), and derivatives of L by the actions (HORIZON, 10)."""
         steps, count = round(CONTROL_STEP / self.arm.time_step), iter(range(10**9))
         seen, targets, free, slopes = [], [], [], []
 
@@ -135,7 +136,7 @@ def learn(steps: int, seed: int, curve: Curve) -> Policy:
     policy, generator = Policy(seed), np.random.default_rng(seed)
     drawn = withe.learning.Follow().build(generator)
     pursuits = [Pursuit(drawn, each) for each in generator.spawn(ARMS)]
-    adam = torch.optim.Adam(policy.network.parameters(), 1e-3)
+    adam = torch.optim.Adam(policy.network.parameters(), 3e-3)
     schedule = torch.optim.lr_scheduler.LinearLR(adam, 1.0, 0.1, steps // (ARMS * HORIZON))
     while policy.num_timesteps < steps:
         curve(policy)
@@ -163,11 +164,13 @@ def learn(steps: int, seed: int, curve: Curve) -> Policy:
 
 def main() -> None:
     """Learn, draw, film."""
+    check_tools()
     steps, seed = int(sys.argv[1]) if len(sys.argv) > 1 else 300_000, int(sys.argv[2]) if len(sys.argv) > 2 else 0
     folder = Path(sys.argv[3]) if len(sys.argv) > 3 else Path("out/follow_by_gradients")
-    policy = learn(steps, seed, Curve(folder, between=10_000))
+    warnings.simplefilter("ignore", withe.CoarseStepWarning)  # steps are as long as a tip within 1 cm allows
+    policy = learn(steps, seed, Curve(folder, between=10_000, task=Aimed()))
     draw_curve(folder, "analytic policy gradients")
-    film(lambda seen, _: policy.predict(seen, deterministic=True)[0], folder / "learned.mp4")
+    film(lambda seen, _: policy.predict(seen, deterministic=True)[0], folder / "learned.mp4", task=Aimed())
 
 
 if __name__ == "__main__":
