@@ -30,7 +30,13 @@ def rope(edges=12, weight=1.0, closed=False, forked=False, **build):
     if forked:
         fork = points[edges // 2]
         twig = scene.add_rod(
-            start=fork, end=fork + (0, 0.2, 0), nodes=4, stiffness=SOFT, line_density=1.0, radius=0.02, name="twig"
+            start=fork,
+            end=fork + np.array([0, 0.2, 0]),
+            nodes=4,
+            stiffness=SOFT,
+            line_density=1.0,
+            radius=0.02,
+            name="twig",
         )
         scene.join(rod.node(edges // 2), twig.start)
         scene.clamp(rod.start)
