@@ -17,7 +17,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from learn_follow import PUBLISHED, discounted_return, film
+from learn_follow import PUBLISHED, check_tools, discounted_return, film
 from scipy.optimize import lsq_linear
 
 import withe
@@ -112,6 +112,8 @@ def tip_of_state(arm: withe.Simulation, size: int) -> np.ndarray:
 
 def main() -> int:
     """Discounted returns of both, beside the published one; and a film."""
+    if len(sys.argv) > 2:
+        check_tools()
     episodes = int(sys.argv[1]) if len(sys.argv) > 1 else 4
     found = {ahead: discounted_return(Controller(ahead), episodes) for ahead in (1, 5)}
     for ahead, value in found.items():

@@ -118,8 +118,8 @@ def film(choose: Any, path: Path, seconds: float = 20.0, seed: int = 5, task: An
 
 
 def check_tools() -> None:
-    """Before it learns for twenty minutes, what draws the film must be there."""
-    missing = [name for name in ("imageio_ffmpeg", "matplotlib", "pyvista") if importlib.util.find_spec(name) is None]
+    """Says before a long run what the film at its end would lack."""
+    missing = [name for name in ("imageio_ffmpeg", "matplotlib") if importlib.util.find_spec(name) is None]
     if missing:
         raise SystemExit(f"the film needs {', '.join(missing)}: pip install 'withe[view]' (make view)")
 

@@ -7,14 +7,6 @@
 namespace withe {
 namespace {
 
-/// EI1, EI2, GJ of an edge; in a plane the one bending stiffness stands in the first place.
-Vector3 edge_stiffness(const Model& model, const Parameters& p, int edge) {
-  const auto bend = p.edge_bend.row(edge);
-  if (!model.planar()) return {bend(0), bend(1), p.edge_twist(edge)};
-  const Vector2 c = model.planar_components[at(model.edge_rod[at(edge)])];
-  return {c(0) * c(0) * bend(0) + c(1) * c(1) * bend(1), 0.0, p.edge_twist(edge)};
-}
-
 /// How much of an edge a stencil has to either side: of its length as it bends and as it twists, once for each
 /// stiffness.
 struct EdgePart {
@@ -24,8 +16,10 @@ struct EdgePart {
   EdgePart(const Model& model, const Parameters& p, int of, double bends, double twists)
       : edge(of),
         share(bends, bends, twists),
-        stiffness(edge_stiffness(model, p, of)),
-        length(model.edge_arc(of) * share) {}
+        stiffness(p.edge_twist(of) * Vector3::UnitZ()),
+        length(model.edge_arc(of) * share) {
+    stiffness.head<2>() = bend_of(model, p, of);
+  }
 
   Vector3 flexibilities() const {
     return {flexibility(length(0), stiffness(0)), flexibility(length(1), stiffness(1)),

@@ -342,7 +342,7 @@ class Builder {
       if (next.size() != 1) continue;  // nobody to carry it, or an end in a joint of pairs
       const auto& [bend, side] = next.front();
       const auto known = std::find_if(before.begin(), before.end(), [&](const UncorrectedEnd& end) {
-        return end.edge == half.edge && end.frame_first == half.frame_first;
+        return end.is_of(half.edge, half.frame_first);
       });
       if (known != before.end() || held[static_cast<std::size_t>(half.edge)]) {
         ends.push_back(known != before.end() ? *known : UncorrectedEnd{half.edge, half.frame_first});

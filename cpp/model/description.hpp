@@ -232,6 +232,8 @@ struct UncorrectedEnd {
   /// Added to natural strains f (kappa1, kappa2, tau), also in a plane: of the stencil at the frame, and of that at the
   /// edge's other node.
   Vector3 at_frame = Vector3::Zero(), at_next = Vector3::Zero();
+
+  bool is_of(int of, bool first) const { return edge == of && frame_first == first; }
 };
 
 struct SceneDescription {

@@ -241,6 +241,8 @@ struct ArcOfStencil {
   double square_of_turn = 0;        ///< [rad^2]
   Vector2 share = Vector2::Zero();  ///< of the curvature's square towards either director
 };
+/// EI1, EI2 of an edge; in a plane the one bending stiffness stands in the first place [N m^2].
+Vector2 bend_of(const Model& model, const Parameters& parameters, int edge);
 ArcOfStencil arc_of_bend(const Model& model, Eigen::Index stencil);
 ArcOfStencil arc_of_half(const Model& model, Eigen::Index stencil);
 

@@ -33,6 +33,13 @@ double square_of_turn_of(const Model& model, int edge) {
 
 }  // namespace
 
+Vector2 bend_of(const Model& model, const Parameters& p, int edge) {
+  if (!model.planar()) return p.edge_bend.row(edge);
+  const Vector2 b = p.edge_bend.row(edge);
+  const Vector2 c = model.planar_components[at(model.edge_rod[at(edge)])];
+  return {c(0) * c(0) * b(0) + c(1) * c(1) * b(1), 0.0};
+}
+
 ArcOfStencil arc_of_bend(const Model& model, Eigen::Index stencil) {
   const auto i = static_cast<std::size_t>(stencil);
   const int* edge = model.bend[i].edge;
@@ -249,14 +256,6 @@ void update_viscous_times(const Model& model, Parameters& p) {
   p.half_viscous_time.resize(static_cast<Eigen::Index>(model.half.size()));
   for (Eigen::Index i = 0; i < p.half_viscous_time.size(); ++i)
     p.half_viscous_time(i) = p.edge_viscous_time(model.half[static_cast<std::size_t>(i)].edge);
-}
-
-/// In a plane the one bending stiffness stands in the first column.
-Vector2 bend_of(const Model& model, const Parameters& p, int edge) {
-  if (!model.planar()) return p.edge_bend.row(edge);
-  const Vector2 b = p.edge_bend.row(edge);
-  const Vector2 c = model.planar_components[at(model.edge_rod[at(edge)])];
-  return {c(0) * c(0) * b(0) + c(1) * c(1) * b(1), 0.0};
 }
 
 /// `square`: of what the arc turns by [rad^2].

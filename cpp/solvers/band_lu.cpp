@@ -18,8 +18,7 @@ class BandLu final : public LinearSolver {
         width_(pattern.half_bandwidth()),
         value_stride_(2 * width_ + 1),
         values_(static_cast<std::size_t>(pattern.size) * value_stride_ + kPadding, 0.0),
-        before_(band_lu_padded(width_ + kBandLuPadding)),
-        work_((static_cast<std::size_t>(pattern.size) * (band_lu_stride(width_) + 1) + before_) / kBandLuPadding + 1),
+        work_((static_cast<std::size_t>(pattern.size) * (band_lu_stride(width_) + 1) + before()) / kBandLuPadding + 1),
         multipliers_(static_cast<std::size_t>(pattern.size) * band_lu_padded(width_), 0.0),
         inverse_pivots_(pattern.size, 0.0),
         pivot_rows_(pattern.size, 0),
@@ -70,6 +69,8 @@ class BandLu final : public LinearSolver {
     double numbers[kBandLuPadding] = {};
   };
 
+  /// Numbers in front of column 0.
+  int before() const { return band_lu_padded(width_ + kBandLuPadding); }
   BandLuFactor factor() const {
     BandLu& self = const_cast<BandLu&>(*this);
     return {size(),
@@ -77,7 +78,7 @@ class BandLu final : public LinearSolver {
             value_stride_,
             band_lu_stride(width_),
             band_lu_padded(width_),
-            self.work_.data()->numbers + before_,
+            self.work_.data()->numbers + before(),
             self.multipliers_.data(),
             self.inverse_pivots_.data(),
             self.pivot_rows_.data(),
@@ -88,7 +89,6 @@ class BandLu final : public LinearSolver {
   int width_;
   int value_stride_;
   std::vector<double> values_;
-  int before_;  ///< numbers in front of column 0
   std::vector<Block> work_;
   std::vector<double> multipliers_;
   std::vector<double> inverse_pivots_;

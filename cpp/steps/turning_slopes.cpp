@@ -80,20 +80,20 @@ void set_euler_slopes(const TurningStep& step, TurningSlopes& out) {
               a = -(torque * spin + omega * couple * l0) * s, b = (torque * spin * inverse0 + omega * couple) * e,
               g = (grown * (2.0 + along * of_length) + 3.0 * omega * couple * l0 * square) * e + (grown * l) * s,
               k = (grown * l * inverse0) * (e + l * s);
-  const auto put = [&](int row, const Vec3d& turn, const Vec3d& turn_start) {
+  const auto set_row = [&](int row, const Vec3d& turn, const Vec3d& turn_start) {
     const double factor = x[row];
     for (int i = 0; i < 3; ++i) {
       out.by[row][i] = turn[i] + factor * g[i];
       out.by[row][4 + i] = turn_start[i] + factor * k[i];
-      out.by[3][i] = out.by[3][4 + i] = 0.0;
     }
     out.by[row][3] = by_angle[row];
     out.by[row][7] = -by_angle[row];
     out.by[row][8] = by_spin[row];
   };
-  put(0, {0.0, -a.z, a.y}, {0.0, -b.z, b.y});
-  put(1, {a.z, 0.0, -a.x}, {b.z, 0.0, -b.x});
-  put(2, {-a.y, a.x, 0.0}, {-b.y, b.x, 0.0});
+  set_row(0, {0.0, -a.z, a.y}, {0.0, -b.z, b.y});
+  set_row(1, {a.z, 0.0, -a.x}, {b.z, 0.0, -b.x});
+  set_row(2, {-a.y, a.x, 0.0}, {-b.y, b.x, 0.0});
+  for (int i = 0; i < 3; ++i) out.by[3][i] = out.by[3][4 + i] = 0.0;
   out.by[3][3] = by_rate * inverse;
   out.by[3][7] = -by_rate * inverse;
   out.by[3][8] = -by_rate;

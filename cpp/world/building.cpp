@@ -24,6 +24,20 @@ bool same_frame(const Model& a, int frame_a, const Model& b, int frame_b) {
 
 }  // namespace
 
+Eigen::Index same_stencil(const Model& model, const BendStencil& stencil) {
+  const auto found = std::find_if(model.bend.begin(), model.bend.end(), [&](const BendStencil& s) {
+    return s.edge[0] == stencil.edge[0] && s.edge[1] == stencil.edge[1] && s.node[1] == stencil.node[1];
+  });
+  return found == model.bend.end() ? -1 : found - model.bend.begin();
+}
+
+Eigen::Index same_stencil(const Model& model, const FrameStencil& stencil) {
+  const auto found = std::find_if(model.half.begin(), model.half.end(), [&](const FrameStencil& s) {
+    return s.edge == stencil.edge && s.frame_first == stencil.frame_first;
+  });
+  return found == model.half.end() ? -1 : found - model.half.begin();
+}
+
 Matrix3 frame_rotation(const Model& model, const State& state, int frame) {
   if (model.planar()) return rotation_exp(state.q(model.frame_dof[at(frame)]) * model.plane->normal);
   return cayley(state.q.segment<3>(model.frame_dof[at(frame)])) * state.frame[at(frame)];
@@ -199,13 +213,11 @@ namespace {
 /// Twists of stencils that both models have.
 void copy_twists(const Model& old, const State& from, const Model& model, State& to) {
   for (std::size_t b = 0; b < model.bend.size(); ++b)
-    for (std::size_t k = 0; k < old.bend.size(); ++k)
-      if (old.bend[k].edge[0] == model.bend[b].edge[0] && old.bend[k].edge[1] == model.bend[b].edge[1])
-        to.bend_tau(static_cast<Eigen::Index>(b)) = from.bend_tau(static_cast<Eigen::Index>(k));
+    if (const Eigen::Index k = same_stencil(old, model.bend[b]); k >= 0)
+      to.bend_tau(static_cast<Eigen::Index>(b)) = from.bend_tau(k);
   for (std::size_t h = 0; h < model.half.size(); ++h)
-    for (std::size_t k = 0; k < old.half.size(); ++k)
-      if (old.half[k].edge == model.half[h].edge && old.half[k].frame_first == model.half[h].frame_first)
-        to.half_tau(static_cast<Eigen::Index>(h)) = from.half_tau(static_cast<Eigen::Index>(k));
+    if (const Eigen::Index k = same_stencil(old, model.half[h]); k >= 0)
+      to.half_tau(static_cast<Eigen::Index>(h)) = from.half_tau(k);
 }
 
 }  // namespace

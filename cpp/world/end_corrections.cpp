@@ -15,17 +15,6 @@ struct Changed {
   Vector3 strain, stiffness, natural, moment_before, stiffness_before;
 };
 
-bool is_end(const UncorrectedEnd& a, const UncorrectedEnd& b) {
-  return a.edge == b.edge && a.frame_first == b.frame_first;
-}
-
-/// Where a list has what is looked for, or -1.
-template <class List, class Is>
-Eigen::Index find_row(const List& list, const Is& is) {
-  const auto found = std::find_if(list.begin(), list.end(), is);
-  return found == list.end() ? -1 : found - list.begin();
-}
-
 /// In the axes of a rod's directors.
 Vector3 in_space(const Model& model, int edge, const Vector3& strain) {
   if (!model.planar()) return strain;
@@ -42,31 +31,30 @@ void World::Implementation::keep_moments(const Model& old, const ElasticCoeffici
   std::vector<UncorrectedEnd>& ends = model.description.uncorrected_ends;
   const Configuration& c = configuration();
   std::vector<Changed> changed;
-  const auto add = [&](std::size_t end, bool at_frame, const Columns3& strain, const MatrixX3& stiffness,
-                       const MatrixX3& natural, Eigen::Index row, const Columns3& stiffness_before,
-                       const Columns3& natural_before, Eigen::Index row_before) {
-    const Vector3 s = measured(parameters.measure, strain.row(row)), k = stiffness_before.row(row_before),
-                  n = natural_before.row(row_before);
-    changed.push_back({end, at_frame, s, stiffness.row(row), natural.row(row), k.cwiseProduct(s - n), k});
+  const auto add = [&](std::size_t end, bool at_frame, Eigen::Index row, Eigen::Index row_before) {
+    const Vector3 s = measured(parameters.measure, (at_frame ? c.half_strain : c.bend_strain).row(row)),
+                  k = (at_frame ? before.half_stiffness : before.bend_stiffness).row(row_before),
+                  n = (at_frame ? before.half_natural : before.bend_natural).row(row_before);
+    changed.push_back({end, at_frame, s, (at_frame ? parameters.half_stiffness : parameters.bend_stiffness).row(row),
+                       (at_frame ? parameters.half_natural : parameters.bend_natural).row(row), k.cwiseProduct(s - n),
+                       k});
+  };
+  const auto known = [&](const UncorrectedEnd& end) {
+    const auto& ends_before = old.description.uncorrected_ends;
+    return std::any_of(ends_before.begin(), ends_before.end(),
+                       [&](const UncorrectedEnd& e) { return e.is_of(end.edge, end.frame_first); });
   };
   std::vector<int> bends;  // of which one may lie between two ends
   for (std::size_t i = 0; i < ends.size(); ++i) {
-    const auto& known = old.description.uncorrected_ends;
-    if (find_row(known, [&](const UncorrectedEnd& end) { return is_end(end, ends[i]); }) >= 0) continue;
+    if (known(ends[i])) continue;
     const auto [half, bend] = model.uncorrected_ends[i];
-    const Eigen::Index old_half = find_row(old.half, [&](const FrameStencil& s) {
-      return s.edge == ends[i].edge && s.frame_first == ends[i].frame_first;
-    });
-    const int* edge = model.bend[at(bend)].edge;
-    const Eigen::Index old_bend =
-        find_row(old.bend, [&](const BendStencil& s) { return s.edge[0] == edge[0] && s.edge[1] == edge[1]; });
-    if (old_half < 0 || old_bend < 0) continue;
-    add(i, true, c.half_strain, parameters.half_stiffness, parameters.half_natural, half, before.half_stiffness,
-        before.half_natural, old_half);
+    const Eigen::Index half_before = same_stencil(old, model.half[at(half)]),
+                       bend_before = same_stencil(old, model.bend[at(bend)]);
+    if (half_before < 0 || bend_before < 0) continue;
+    add(i, true, half, half_before);
     if (std::find(bends.begin(), bends.end(), bend) != bends.end()) continue;
     bends.push_back(bend);
-    add(i, false, c.bend_strain, parameters.bend_stiffness, parameters.bend_natural, bend, before.bend_stiffness,
-        before.bend_natural, old_bend);
+    add(i, false, bend, bend_before);
   }
   Vector3 stored = Vector3::Zero(), kept = stored;
   const auto energy = [](const Vector3& moment, const Vector3& stiffness, int k) {

@@ -293,6 +293,9 @@ struct World::Implementation : Running {
 
 /// Puts a node in space into a configuration vector.
 void put_node(const Model& model, int node, const Vector3& position, VectorX& q);
+/// Row of a stencil of another model of the same scene, or -1.
+Eigen::Index same_stencil(const Model& model, const BendStencil& stencil);
+Eigen::Index same_stencil(const Model& model, const FrameStencil& stencil);
 /// Rotation of a joint frame from the drawn axes.
 Matrix3 frame_rotation(const Model& model, const State& state, int frame);
 
