@@ -17,6 +17,8 @@ __all__ = ["Measured", "droop", "measure"]
 
 _SIDE = (math.log(1e-20), math.log(0.5 * math.pi - 1e-5))  # angles between tip and plumb line [rad], their logarithms
 _STEP = 1e-3  # of differences of these
+_CHANGE = 1e-5  # of differences of Lgb, lengths and curls
+_MOST_STEPS = 30  # to the angle of a tip
 _READ = 0.3  # standard deviation of what is read off a picture [px]
 FloatArray = npt.NDArray[np.float64]
 _TELLING = (1.5, 3.0)  # lengths of strips [Lgb] whose droop depends steeply on Lgb
@@ -42,9 +44,10 @@ class Measured:
     curl_error: float | None = None
 
 
-def _slopes(u: float, y: FloatArray) -> tuple[float, float, float, float]:
+def _slopes(u: float | FloatArray, y: FloatArray) -> FloatArray:
     """Of phi, phi', the drop and the reach, by the way from the tip: 2 phi'' = u sin(phi)."""
-    return y[1], 0.5 * u * math.sin(y[0]), math.cos(y[0]), math.sin(y[0])
+    sine = np.sin(y[0])
+    return np.array([y[1], 0.5 * u * sine, np.cos(y[0]), sine])
 
 
 def _hanging(log_angle: float) -> tuple[float, float, float]:
@@ -157,13 +160,14 @@ def measure(
         readings = {"drop": drop, "turned": turned}
         drops = [_checked_drop(down, along, name) for name, down in readings.items() if down is not None]
         error = validation.non_negative(5e-4 if error is None else error, "error")
-        flat = _measured(along, float(np.mean(drops)), error, by_reach=False)
+        down = float(np.mean(drops))
+        flat = _measured(_angle_where(1, down / along), along, down, error, by_reach=False)
         return flat if turned is None else _uncurled(flat, np.array([along, *drops]), error)
     per_metre = validation.positive(scale, "scale")
     error = validation.non_negative(_READ / per_metre if error is None else error, "error")
     ends = np.array([strip_ends(x) for x in (image, turned) if x is not None]) / per_metre
     across, down = (float(x) for x in ends.mean(axis=0))
-    flat = _measured(_length_of(across, down), down, error, by_reach=True)
+    flat = _measured(_angle_where_tip_is(across, down), across, down, error, by_reach=True)
     return flat if turned is None else _uncurled(flat, ends.ravel(), error)
 
 
@@ -184,57 +188,78 @@ def _uncurled(flat: Measured, read: FloatArray, error: float) -> Measured:
     """
     from scipy.optimize import least_squares
 
-    angles = {1.0: 0.5, -1.0: 0.5}  # of the tip, found last
+    size = flat.gravito_bending_length
+    scales = np.array([size, size, 1.0 / size])
+    angles = np.full((2, 1), 0.5)  # of the tips, found last
 
-    def misfit(unknowns: FloatArray) -> FloatArray:
-        lgb, length, curl = unknowns * scales
-        sides = []
-        for side in angles:
-            drop, reach, angles[side] = _curled(length / lgb, side * curl * lgb, angles[side])
-            sides.append((lgb * reach, lgb * drop))
-        (_, first), (_, second) = sides
-        expected = [length, first, second] if len(read) == 3 else np.ravel(sides)
-        return np.asarray((np.asarray(expected) - read) / flat.gravito_bending_length)
+    def misfits(unknowns: FloatArray) -> FloatArray:
+        """Of columns of unknowns."""
+        lgb, length, curl = unknowns * scales[:, None]
+        found, drops, reaches = _curled(length / lgb, np.stack([curl * lgb, -curl * lgb]), angles)
+        angles[:] = found[:, :1]
+        sides = lgb * np.stack([reaches, drops], axis=1).reshape(4, -1)
+        expected = np.vstack([length, sides[1::2]]) if len(read) == 3 else sides
+        return np.asarray((expected - read[:, None]) / size)
 
-    scales = np.array([flat.gravito_bending_length, flat.gravito_bending_length, 1.0 / flat.gravito_bending_length])
+    def slopes(unknowns: FloatArray) -> FloatArray:
+        changes = _CHANGE * np.eye(3)
+        ahead, back = np.hsplit(misfits(unknowns[:, None] + np.hstack([changes, -changes])), 2)
+        return np.asarray((ahead - back) / (2.0 * _CHANGE))
+
+    begin = [1.0, flat.strip, 0.0]
     try:
-        found = least_squares(misfit, [1.0, flat.strip, 0.0], method="lm", xtol=1e-12, ftol=1e-12)
-    except (RuntimeError, FloatingPointError) as none:
+        found = least_squares(lambda x: misfits(x[:, None])[:, 0], begin, slopes, method="lm", xtol=1e-10)
+    except RuntimeError as none:
         raise ValueError("turned must be a reading of the same strip, clamped as far from its tip") from none
     lgb, length, curl = found.x * scales
     if not found.success or lgb <= 0.0 or np.abs(found.fun).max() > max(0.02, 10.0 * error / lgb):
         raise ValueError("turned must be a reading of the same strip, clamped as far from its tip")
-    spread = np.sqrt(np.diag(np.linalg.inv(found.jac.T @ found.jac))) * error / flat.gravito_bending_length * scales
+    spread = np.sqrt(np.diag(np.linalg.inv(found.jac.T @ found.jac))) * error / size * scales
     return Measured(float(lgb), float(spread[0]), float(length / lgb), float(curl), float(spread[2]))
 
 
-def _curled(strip: float, curl: float, near: float) -> tuple[float, float, float]:
-    """Drop and reach [Lgb] of a strip that bends down by itself by `curl` [1/Lgb], and the angle of its tip.
+def _curled(strip: FloatArray, curl: FloatArray, near: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Angles of tips, drops and reaches [Lgb] of strips that bend down by themselves by `curl` [1/Lgb].
 
-    As `_hanging`, but phi'(0) = curl: nothing turns the tip. `near` is an angle near that.
+    Lengths [Lgb] of shape (n,), curls of shape (sides, n), angles to begin with of shape (sides, 1). The clamp is
+    level: by Newton's method on the tip's angle.
+    """
+    angle, change = near + np.zeros_like(curl), 1e-6
+    for _ in range(_MOST_STEPS):
+        turned, *places = _hung(np.tile(strip, 2), np.tile(curl, 2), np.hstack([angle, angle + change]))
+        here, ahead = np.hsplit(turned - 0.5 * math.pi, 2)
+        if np.abs(here).max() < 1e-10:
+            drop, reach = (place[:, : len(strip)] for place in places)
+            return angle, drop, reach
+        angle = angle - change * here / (ahead - here)
+    raise RuntimeError("no strip hangs so")
+
+
+def _hung(strip: FloatArray, curl: FloatArray, angle: FloatArray) -> FloatArray:
+    """Angles at the clamp, drops and reaches [Lgb] of strips that bend down by themselves by `curl` [1/Lgb].
+
+    As `_hanging`, but phi'(0) = curl: nothing turns the tip. Lengths [Lgb] of shape (n,), curls and angles of tips of
+    shape (sides, n); what is found of shape (3, sides, n).
     """
     from scipy.integrate import solve_ivp
-    from scipy.optimize import newton
 
-    def hung(angle: float) -> FloatArray:
-        run = solve_ivp(_slopes, (0.0, strip), (angle, curl, 0.0, 0.0), "DOP853", rtol=1e-10, atol=1e-12)
-        return np.asarray(run.y[:, -1])
+    def slopes(share: float, y: FloatArray) -> FloatArray:
+        return np.asarray(strip * _slopes(share * strip, y.reshape(begin.shape))).ravel()
 
-    angle = float(newton(lambda angle: hung(angle)[0] - 0.5 * math.pi, near, x1=near + 1e-3, tol=1e-11))
-    _, _, drop, reach = hung(angle)
-    return float(drop), float(reach), angle
+    begin = np.stack([angle, curl, np.zeros_like(angle), np.zeros_like(angle)])
+    run = solve_ivp(slopes, (0.0, 1.0), begin.ravel(), "DOP853", rtol=1e-10, atol=1e-12)
+    return np.asarray(run.y[:, -1].reshape(begin.shape)[[0, 2, 3]])
 
 
-def _length_of(reach: float, drop: float) -> float:
-    """Length of a strip whose tip is so far from its clamp, across and down."""
+def _angle_where_tip_is(reach: float, drop: float) -> float:
+    """Logarithm of the tip's angle at which it is so far from the clamp, across and down."""
     from scipy.optimize import brentq
 
     if not 1e-5 < drop / reach < 50.0:
         raise ValueError(
             f"image must show a strip that bends under its weight, got one that drops {drop / reach:.2g} of its reach"
         )
-    angle = brentq(lambda angle: math.log(_ratio(angle) * reach / drop), *_SIDE, xtol=1e-12, rtol=1e-14)
-    return drop / _hanging(angle)[1]
+    return float(brentq(lambda angle: math.log(_ratio(angle) * reach / drop), *_SIDE, xtol=1e-12, rtol=1e-14))
 
 
 def _ratio(angle: float) -> float:
@@ -242,10 +267,13 @@ def _ratio(angle: float) -> float:
     return drop / reach
 
 
-def _measured(length: float, drop: float, error: float, by_reach: bool) -> Measured:
-    """Lgb, and its error by those of length and drop; or of reach and drop, where these were read."""
-    angle = _angle_where(1, drop / length)
-    strip, _, reach = _hanging(angle)
+def _measured(angle: float, over: float, drop: float, error: float, by_reach: bool) -> Measured:
+    """Lgb, and its error by those of length and drop; or of reach and drop, where these were read.
+
+    `angle`: logarithm of the tip's; `over`: length or reach.
+    """
+    strip, fall, reach = _hanging(angle)
+    length = over / reach if by_reach else over
     if not _TELLING[0] < strip < _TELLING[1]:
         low, high = (1e3 * bound * length / strip for bound in _TELLING)
         warnings.warn(
@@ -257,9 +285,8 @@ def _measured(length: float, drop: float, error: float, by_reach: bool) -> Measu
     # With p the angle, a = length or reach, b = drop: b / a = r(p) and b = Lgb f(p), f = the drop in Lgb.
     first, second = (drops / reaches if by_reach else drops for _, drops, reaches in (ahead, back))
     ratio_slope = first - second
-    fall = strip * drop / length
+    fall *= strip
     fall_slope = ahead[0] * ahead[1] - back[0] * back[1]
-    over = length * (reach if by_reach else 1.0)
     ratio = drop / over
     lgb = length / strip
     by_drop = 1.0 / fall - lgb / fall * fall_slope / ratio_slope / over

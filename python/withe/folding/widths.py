@@ -67,6 +67,8 @@ EVEN = Width()
 
 def free_width(paper: Paper, depth: float) -> Width:
     """Width of what hangs freely from a jaw that holds so much of a paper [m]; 1 is that of the paper."""
+    if paper.is_strip:
+        return EVEN  # whatever its length: what was made for one serves all
     lgb = paper.gravito_bending_length
     shares, widths = np.array(paper.outline).T
     beyond = shares * paper.length > depth
