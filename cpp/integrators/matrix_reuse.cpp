@@ -14,8 +14,6 @@ constexpr double kForgetting = 0.96;
 constexpr int kCostOfMatrix = 3;
 // An iteration with an old matrix costs about a quarter of one with a new one.
 constexpr double kWorth = 2.5;
-// So near the end, over the tolerance, an iteration leaves less than that.
-constexpr double kNearEnd = 1e3;
 
 std::size_t at(MatrixAge age) { return static_cast<std::size_t>(age); }
 
@@ -41,9 +39,7 @@ MatrixReuse::MatrixReuse(MatrixRecord& record, Equations& equations, double inte
   if (heuristics.uses(Heuristic::forget_contraction)) record.contraction[at(MatrixAge::within)] *= kForgetting;
 }
 
-bool MatrixReuse::near_end() const {
-  return distance_ <= kNearEnd * tolerance_ && heuristics_.uses(Heuristic::late_matrix);
-}
+bool MatrixReuse::near_end() const { return at_end() && heuristics_.uses(Heuristic::late_matrix); }
 
 void MatrixReuse::note_matrix(bool whole) {
   fresh_ = made_here_ = true;

@@ -44,7 +44,7 @@ class MatrixReuse {
   bool fresh() const { return fresh_; }
   /// Whether the one before it has to be factorised: it was made for an iteration that was not needed.
   bool pending() const { return !fresh_ && !record_.factorized; }
-  /// Whether the solution is so near that the residual alone may show the end, and a matrix be made in vain.
+  /// Whether the residual alone is looked at first: it may show the end, and a matrix would have been made in vain.
   bool near_end() const;
   /// Whether it is within the tolerance, by what is known of the matrix.
   bool at_end() const { return distance_ <= tolerance_; }

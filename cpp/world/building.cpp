@@ -70,8 +70,9 @@ World::Implementation::Implementation(const Implementation& other)
       statistics(other.statistics),
       separated(other.separated),
       spatial(other.spatial),
-      warning(other.warning),
-      step_warning(other.step_warning) {
+      mesh_warning(other.mesh_warning),
+      step_warning(other.step_warning),
+      branch_warning(other.branch_warning) {
   work.newton.counters = other.work.newton.counters;
   listen();
   newton = std::make_unique<Newton>(model, options);

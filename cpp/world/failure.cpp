@@ -111,13 +111,14 @@ std::string World::Implementation::unresolved() const {
 
 /// Warns once.
 void World::Implementation::check_resolution() {
-  if (warning) return;
-  if (std::string found = unresolved(); !found.empty()) warning = std::move(found);
+  if (mesh_warning) return;
+  if (std::string found = unresolved(); !found.empty()) mesh_warning = std::move(found);
 }
 
-std::string World::take_warning() {
-  std::optional<std::string>& warning = implementation_->warning;
-  return warning ? std::exchange(*warning, {}) : "";
+Warnings World::take_warnings() {
+  const auto take = [](std::optional<std::string>& warning) { return warning ? std::exchange(*warning, {}) : ""; };
+  Implementation& self = *implementation_;
+  return {take(self.mesh_warning), take(self.step_warning), take(self.branch_warning)};
 }
 
 /// What to try where something has turned by nearly half a turn in a hand that yields, whose moment has no bound there.

@@ -69,8 +69,9 @@ struct World::Implementation : Running {
   double separated = 0;  ///< how far overlapping rods were moved before the start [m]
   bool spatial = false;  ///< left its plane while running
   /// Of a mesh too coarse for the motion, and empty once it was heard; none yet where there was no reason.
-  std::optional<std::string> warning;
-  std::optional<std::string> step_warning;  ///< likewise, of steps too long for the motion
+  std::optional<std::string> mesh_warning;
+  std::optional<std::string> step_warning;    ///< likewise, of steps too long for the motion
+  std::optional<std::string> branch_warning;  ///< likewise, of a static step that left its branch
   std::vector<LeftRing> left_rings;         ///< not heard of yet
   NewtonResult last_newton;
 
@@ -247,6 +248,8 @@ struct World::Implementation : Running {
 
   // equilibrium.cpp
   EquilibriumResult equilibrium(double dt);
+  /// A step of the static integrator, of dt and to `end`.
+  void static_step(double end, double dt);
   void move_between(const std::vector<SupportMotion>& from, const std::vector<SupportMotion>& to, double factor);
   Boundary boundary_between(Equations& system, const std::vector<SupportMotion>& from,
                             const std::vector<SupportMotion>& to);

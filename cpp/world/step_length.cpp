@@ -93,11 +93,6 @@ std::string World::Implementation::unresolved_in_time(double dt) const {
          "; a time_step of " + text(kEnough / frequency, 2) + " s would do";
 }
 
-std::string World::take_step_warning() {
-  std::optional<std::string>& warning = implementation_->step_warning;
-  return warning ? std::exchange(*warning, {}) : "";
-}
-
 /// Which vibrations steps resolve: of each rod alone, clamped at one end and free of stress, w = b^2 sqrt(B / m) / L^2,
 /// b = 1.875, and about (n - 1/2) pi of the nth [Euler and Bernoulli]. The slowest rod is said.
 void World::Implementation::add_step_notes() {

@@ -91,9 +91,7 @@ void World::step(int count) {
     }
     const double end = on_grid(self.grid_steps + 1);
     if (self.options.integrator == Integrator::statics) {
-      self.work.newton.poll();
-      if (self.callback) self.callback(end, end);
-      self.equilibrium(dt);
+      self.static_step(end, dt);
     } else {
       self.advance(dt);
     }
@@ -116,9 +114,7 @@ void World::advance_to(double time) {
   for (double i = 1.0; i <= steps; i += 1.0) {
     const double next = i == steps ? time : start + span * i / steps;
     if (self.options.integrator == Integrator::statics) {
-      self.work.newton.poll();
-      if (self.callback) self.callback(next, next);
-      self.equilibrium(next - self.state.time);
+      self.static_step(next, next - self.state.time);
     } else {
       self.advance(next - self.state.time);
     }

@@ -75,6 +75,13 @@ struct Momentum {
   Vector3 angular = Vector3::Zero();  ///< about the origin [kg m^2/s]
 };
 
+/// What is wrong with how a scene is run, each said once; empty where nothing is, or where it was heard.
+struct Warnings {
+  std::string mesh;    ///< it is too coarse for the motion
+  std::string steps;   ///< they are too long for it
+  std::string branch;  ///< a static step has left it
+};
+
 struct EquilibriumResult {
   bool stable = false;
   /// Whether the stiffness says so by itself; else loads that turn with the rod make it unsymmetric, and where it
@@ -284,8 +291,7 @@ class World {
   /// edges meet there. All rods together have what the scene has, but for loads, contact and the energy balance.
   Energy rod_energy(int rod) const;
   Momentum momentum() const;
-  std::string take_warning();       ///< what has not been heard yet of a mesh too coarse for the motion; or nothing
-  std::string take_step_warning();  ///< likewise, of steps too long for it
+  Warnings take_warnings();  ///< what has not been heard yet
   ContactTable contacts() const;
   Linearisation linearise() const;
 

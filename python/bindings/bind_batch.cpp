@@ -61,14 +61,15 @@ class GuardedBatch {
   }
 
   /// What has not been heard yet of any lane.
-  std::pair<std::string, std::string> take_warnings() {
-    std::pair<std::string, std::string> out;
+  std::tuple<std::string, std::string, std::string> take_warnings() {
+    Warnings out;
     for (GuardedWorld* world : worlds_) {
-      std::string mesh = world->changing().take_warning(), steps = world->changing().take_step_warning();
-      if (out.first.empty()) out.first = std::move(mesh);
-      if (out.second.empty()) out.second = std::move(steps);
+      Warnings found = world->changing().take_warnings();
+      if (out.mesh.empty()) out.mesh = std::move(found.mesh);
+      if (out.steps.empty()) out.steps = std::move(found.steps);
+      if (out.branch.empty()) out.branch = std::move(found.branch);
     }
-    return out;
+    return {out.mesh, out.steps, out.branch};
   }
 
   /// Released since it was last asked: lane, support, when [s].

@@ -423,8 +423,10 @@ void define_readouts(WorldClass& world) {
       "spring_tension", [](const GuardedWorld& self, int spring) { return self.reading().spring_tension(spring); },
       py::arg("spring"));
   world.def("spins", [](const GuardedWorld& self, int rod) { return self.reading().spins(rod); }, py::arg("rod"));
-  world.def("take_step_warning", [](GuardedWorld& self) { return self.changing().take_step_warning(); });
-  world.def("take_warning", [](GuardedWorld& self) { return self.changing().take_warning(); });
+  world.def("take_warnings", [](GuardedWorld& self) {
+    const Warnings found = self.changing().take_warnings();
+    return std::make_tuple(found.mesh, found.steps, found.branch);
+  });
   world.def("energy", [](const GuardedWorld& self) { return self.reading().energy(); });
   world.def(
       "rod_energy", [](const GuardedWorld& self, int rod) { return self.reading().rod_energy(rod); }, py::arg("rod"));

@@ -13,7 +13,13 @@ by rounding, so set it to "baseline" everywhere to find the same bits on unlike 
 from withe import deployment, folding, learning, perception, real2sim, shapes, view
 from withe._core import __version__
 from withe.batch import Batch
-from withe.errors import CoarseMeshWarning, CoarseStepWarning, ConvergenceError, RingLeftWarning
+from withe.errors import (
+    BranchChangedWarning,
+    CoarseMeshWarning,
+    CoarseStepWarning,
+    ConvergenceError,
+    RingLeftWarning,
+)
 from withe.parts.friction_fields import FrictionMap
 from withe.parts.handles import (
     CustomForce,
@@ -41,6 +47,7 @@ from withe.simulation.snapshots import Snapshot
 
 __all__ = [
     "Batch",
+    "BranchChangedWarning",
     "Circle",
     "CoarseMeshWarning",
     "CoarseStepWarning",

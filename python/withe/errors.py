@@ -2,7 +2,21 @@
 
 from __future__ import annotations
 
-__all__ = ["CoarseMeshWarning", "CoarseStepWarning", "ConvergenceError", "RingLeftWarning"]
+__all__ = [
+    "BranchChangedWarning",
+    "CoarseMeshWarning",
+    "CoarseStepWarning",
+    "ConvergenceError",
+    "RingLeftWarning",
+]
+
+
+class BranchChangedWarning(UserWarning):
+    """A step of the static integrator has left its branch of equilibria: the scene jumps within it.
+
+    Which of other equilibria it goes to depends on the motion, that such a step does not follow. Given once a
+    simulation; `statistics.branch_changes` counts them. Of `equilibrium` it is the result that says so.
+    """
 
 
 class CoarseMeshWarning(UserWarning):

@@ -1,5 +1,7 @@
 """Equilibria follow their branch, say where they leave it, and are traced through limit points."""
 
+import warnings
+
 import numpy as np
 import pytest
 
@@ -188,6 +190,37 @@ def test_a_support_that_moves_beyond_a_limit_point_says_so_and_its_path_is_trace
     simulation.move(grip, position=(0, 0, 20.0))
     assert not simulation.equilibrium().branch_changed
     assert simulation.positions() == pytest.approx(traced.positions(), abs=1e-4)
+
+
+def test_a_static_step_that_leaves_its_branch_says_so_once():
+    scene, node = lee(20)
+    load = scene.add_force(node, (0, 0, 0))
+    simulation = scene.build(integrator="static", planar=True)
+
+    def step(factor):
+        simulation.set(load, force=(0, 0, -factor * UNIT))
+        simulation.step()
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        step(9.0)
+        step(18.0)
+    other = simulation.copy()
+    with pytest.warns(withe.BranchChangedWarning, match="left its branch of equilibria"):
+        step(20.0)
+    assert simulation.statistics.branch_changes == 1
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        step(-20.0)
+    assert simulation.statistics.branch_changes == 2
+    other.set(load, force=(0, 0, -20.0 * UNIT))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert other.equilibrium().branch_changed
+    batch = withe.Batch([other])
+    other.set(load, force=(0, 0, 20.0 * UNIT))
+    with pytest.warns(withe.BranchChangedWarning):
+        batch.step()
 
 
 def arch(edges):

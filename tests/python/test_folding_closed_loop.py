@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
-from withe.folding import Noise, Paper, SimulatedSheet, fold, overhead_camera, plan
+from withe.folding import Noise, Paper, SimulatedSheet, fold, overhead_camera, plan, replan
+from withe.folding.planning import plan_above
+from withe.folding.watching import watched_parts
 
 pytest.importorskip("cv2")
 
@@ -66,14 +69,32 @@ def test_a_watched_way_plunges_where_its_last_part_would_slide_unseen():
     assert abs(found.error) < 5e-4
 
 
-def test_a_plan_is_cut_where_its_edge_comes_down_and_not_where_it_was_low_before():
-    whole = plan(Paper.us_letter())
-    lgb = whole.paper.gravito_bending_length
-    part = whole.down_to(0.4 * lgb)
-    assert part.poses[-1, 2] >= 0.4 * lgb > whole.poses[len(part), 2]
-    assert part.poses[-1, 0] == pytest.approx(whole.target, abs=0.2 * lgb)
-    with pytest.raises(ValueError, match="must come down in the end"):
-        part.down_to(0.3 * lgb)
+def test_a_plunge_without_moment_begins_over_the_target():
+    """Also of a fold whose slow way skims the sheet on its last half, as that of a square over its diagonal does."""
+    paper = replace(Paper.origami(), friction=0.12)
+    way = plan(paper, 0.3, replans=5, uncertainty=(0.02, 0.3), progress=False)
+    slow = way.before_plunge()
+    assert way.plunges_at is not None
+    assert slow.rise >= 0.4 * paper.gravito_bending_length
+    assert slow.poses[-1, 0] == pytest.approx(0.3, abs=1e-8)
+    assert slow.poses[-1, 2] == pytest.approx(slow.rise + paper.thickness + way.jaw.finger, rel=0.2)
+    sheet = SimulatedSheet(paper, 2003, Noise(), **COARSE)
+    found = fold(way, sheet, progress=False)
+    assert found.failure is None
+    assert abs(found.error) < 2e-3
+
+
+def test_a_sheet_that_slides_off_the_manifold_is_led_on_to_where_it_can_be_held():
+    """The border is near where short parts are lifted: the rest begins at the next pose of the way that is within."""
+    paper, slid = Paper.us_letter(), 0.01
+    slow = plan_above(plan(paper, 0.2), 0.8 * paper.gravito_bending_length)
+    parts = list(watched_parts(slow, 5, lambda _: slid, ends_above=True))
+    with pytest.raises(ValueError, match="none is lifted with the jaw's inner edge"):
+        replan(slow, parts[0].poses[-1], slid)
+    assert parts[-1].poses[-1, [0, 2]] == pytest.approx(slow.poses[-1, [0, 2]] + [slid, 0.0], abs=1e-8)
+    for before, after in pairwise(parts):
+        assert after.poses[0] == pytest.approx(before.poses[-1])
+        assert np.abs(np.diff(after.poses[:, :3], axis=0)).max() < 5e-3
 
 
 def test_a_hidden_edge_is_said_and_not_guessed(half):

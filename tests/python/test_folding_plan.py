@@ -12,6 +12,7 @@ import pytest
 import withe
 from withe.__main__ import main
 from withe.folding import Jaw, Paper, elastica, plan, replan
+from withe.folding.grid import make_grid
 from withe.folding.sheets import at_poses, forces_of
 
 PAPERS = {"a4": Paper.a4, "us_letter": Paper.us_letter, "cardboard": Paper.cardboard}
@@ -44,6 +45,13 @@ def test_a_fold_begins_flat_and_ends_on_its_target(paper, target, where):
     assert folded.poses[-1, 0] == pytest.approx(where, abs=1e-8)
     assert 0 < folded.poses[-1, 2] < 1e-3
     assert folded.target == where
+
+
+def test_strips_of_any_length_are_planned_over_one_manifold():
+    plan(Paper.a4())
+    made = make_grid.cache_info().misses
+    plan(replace(Paper.us_letter(), gravito_bending_length=0.0517))
+    assert make_grid.cache_info().misses == made
 
 
 def test_poses_hold_the_sheet_without_moment():

@@ -8,7 +8,7 @@ positions say little where so short a part is lifted.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -64,7 +64,7 @@ class Grid:
     lengths: FloatArray
 
 
-@cache
+@lru_cache(maxsize=8)
 def lift(width: Width = EVEN) -> Elastica:
     """Sheets raised without tangential force and without moment at the tip, by lifted length: the gentle branch."""
     normal = np.zeros_like(_LIFTS)
@@ -94,7 +94,7 @@ def _without_moment(lifted: float, normal: float, width: Width) -> float:
     return ahead
 
 
-@cache
+@lru_cache(maxsize=8)
 def _gentle(width: Width) -> Any:
     from scipy.interpolate import CubicSpline
 
@@ -107,7 +107,7 @@ def gentle(lifted: FloatArray, width: Width) -> FloatArray:
     return np.asarray(_gentle(width)(lifted))
 
 
-@cache
+@lru_cache(maxsize=8)
 def make_grid(solve: Manifold, spacing: float = SPACING) -> Grid:
     """Solve the middles of all blocks; edges join neighbours, also over corners, and the lift with blocks nearby."""
     columns, rows = int(WIDE / spacing), int(HIGH / spacing)

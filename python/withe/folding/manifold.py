@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -20,7 +20,7 @@ __all__ = ["Manifold", "elastica"]
 FloatArray = npt.NDArray[np.float64]
 
 
-@cache
+@lru_cache(maxsize=8)
 def _table(width: Width) -> SheetManifold:
     return SheetManifold(width.engine)
 

@@ -46,6 +46,7 @@ class _Task:
     speed: float
     turning: float
     acceleration: float
+    rise: float = 0.0
 
     @property
     def length(self) -> float:
@@ -134,9 +135,13 @@ def slow_plan(
         turning=validation.positive(turning, "turning"),
         acceleration=validation.positive(acceleration, "acceleration"),
     )
-    if method == "intuitive":
+    return _planned(task)
+
+
+def _planned(task: _Task) -> Plan:
+    if task.method == "intuitive":
         return _half_circle(task)
-    return _free(task) if grasp == "free" else _over_manifold(task)
+    return _free(task) if task.grasp == "free" else _over_manifold(task)
 
 
 def _target(paper: Paper, target: float | str) -> float:
@@ -154,6 +159,7 @@ def _half_circle(task: _Task) -> Plan:
     radius = 0.5 * task.target
     outer = np.stack([radius * (1 - np.cos(angles)), radius * np.sin(angles), angles], axis=1)
     outer[-1, 1] = task.paper.thickness + task.jaw.finger
+    outer[:, 1] += task.rise * angles / np.pi
     return _finished(task, outer, None)
 
 
@@ -236,15 +242,16 @@ def _task_of(present: Plan) -> _Task:
         speed=present.limits[0],
         turning=present.limits[1],
         acceleration=present.limits[2],
+        rise=present.rise,
     )
 
 
 def plan_above(present: Plan, height: float) -> Plan:
-    """Plan as far as over the target: what a plan with a free moment was asked for, but for its last part.
+    """Plan as far as over the target, by a height [m]: what a plan was asked for, but for its last part.
 
-    Where the edge would have to be pressed down, it is the last part that asks for friction. `height` in m.
+    Where the edge would have to be pressed down, it is the last part that asks for friction.
     """
-    return _free(_task_of(present), height / present.paper.gravito_bending_length)
+    return _planned(replace(_task_of(present), rise=height))
 
 
 def _anew_from(task: _Task, inner: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -287,7 +294,7 @@ def _on_from(present: Plan, inner: FloatArray, width: Width) -> tuple[FloatArray
 
 def _goal(task: _Task) -> Elastica | None:
     paper, jaw, lgb = task.paper, task.jaw, task.paper.gravito_bending_length
-    sizes = (paper.thickness / lgb, jaw.depth / lgb, jaw.finger / lgb)
+    sizes = ((paper.thickness + task.rise) / lgb, jaw.depth / lgb, jaw.finger / lgb)
     return moment_free.goal_pose(task.solve, task.target / lgb, *sizes)
 
 
@@ -308,22 +315,19 @@ def _checked_goal(goal: Elastica | None, task: _Task) -> Elastica:
     return goal
 
 
-def _free(task: _Task, rise: float = 0.0) -> Plan:
-    """Without the table's friction where that can be, then with some, then for a sheet that is just as thought.
-
-    To where the edge is down, or so high above that [Lgb].
-    """
+def _free(task: _Task) -> Plan:
+    """Without the table's friction where that can be, then with some, then for a sheet that is just as thought."""
     friction = task.paper.friction
     limit = friction * (1 - task.uncertainty[1])
     holding = task.free_holding
     exact = replace(holding, share=0.0)
-    level = _free_way(task, holding, False, friction, rise)
+    level = _free_way(task, holding, False, friction)
     if level is not None and level.ratio <= limit:
         return _along(task, level, holding, limit)
-    thought = _free_way(task, exact, True, np.inf, rise)
+    thought = _free_way(task, exact, True, np.inf)
     # Where the sheet that it should be slides anyway, the way is that for it: others need more friction still.
     if thought is not None and thought.ratio <= friction:
-        pulled = _free_way(task, holding, True, friction, rise)
+        pulled = _free_way(task, holding, True, friction)
         ways = [way for way in (level, pulled) if way is not None and way.ratio <= friction]
         if ways:
             return _along(task, min(ways, key=lambda way: way.ratio), holding, limit)
@@ -332,10 +336,11 @@ def _free(task: _Task, rise: float = 0.0) -> Plan:
     return _along(task, thought, exact, limit)
 
 
-def _free_way(task: _Task, holding: Holding, pulls: bool, most: float, rise: float) -> Way | None:
+def _free_way(task: _Task, holding: Holding, pulls: bool, most: float) -> Way | None:
+    lgb = task.paper.gravito_bending_length
     lattice = free_moment.make_lattice(holding, pulls, most if pulls else np.inf)
-    raised = replace(holding, thickness=holding.thickness + rise)
-    found = free_moment.goals(lattice, raised, task.target / task.paper.gravito_bending_length)
+    raised = replace(holding, thickness=holding.thickness + task.rise / lgb)
+    found = free_moment.goals(lattice, raised, task.target / lgb)
     found = take(found, holding.bearable(found))
     limit = task.paper.friction * (1 - task.uncertainty[1])
     return free_moment.way_to(lattice, holding, found, holding.worst_ratio(found), limit) if len(found.x) else None
@@ -382,6 +387,7 @@ def _finished(task: _Task, outer: FloatArray, sheet: Elastica | None, offset: fl
         jaw=task.jaw,
         limits=(task.speed, task.turning, task.acceleration),
         offset=offset,
+        rise=task.rise,
         side=side,
         clearance=clearance,
         uncertainty=task.uncertainty,

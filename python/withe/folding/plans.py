@@ -59,6 +59,8 @@ class Plan:
         Speed, rate of turning, acceleration.
     offset : float [m]
         How far the sheet had slid when the plan was made: 0, but where a fold was planned anew.
+    rise : float [m]
+        How high over the target the edge ends that is led slowly: 0, but where a plunge follows.
     side : str
         From where the jaw's fingers come: "edge", from beyond the sheet's edge in line with the sheet; "side", from the
         side of the sheet, across it, where there would be no room for them beyond the edge.
@@ -92,6 +94,7 @@ class Plan:
     jaw: Jaw
     limits: tuple[float, float, float]
     offset: float
+    rise: float
     side: str
     clearance: float
     uncertainty: tuple[float, float]
@@ -224,30 +227,15 @@ class Plan:
         parts = {name: getattr(self, name)[slow] for name in ("poses", "angles", "times")}
         return replace(self, plunges_at=None, _foreseen=seen, **parts)
 
-    def down_to(self, height: float) -> Plan:
-        """The part until its edge, turned over, is lower than a height [m] for good.
-
-        Raises
-        ------
-        ValueError
-            It is not in the end.
-        """
-        high = np.flatnonzero((self.poses[:, 2] >= height) | (self.angles <= 0.5 * np.pi))
-        if not len(high) or high[-1] == len(self) - 1:
-            raise ValueError("plan must come down in the end: its edge is not low and turned over there")
-        keep = slice(0, max(2, int(high[-1]) + 1))
-        foreseen = at_forces(forces_of(self.sheet)[keep], self._width)
-        parts = {name: getattr(self, name)[keep] for name in ("poses", "angles", "times")}
-        return replace(self, _foreseen=foreseen, **parts)
-
     @property
     def papers(self) -> list[Paper]:
         """What the paper may be within `uncertainty`: as it is thought to be, and the bounds.
 
-        Lgb less and more, each with the paper's friction and with the least; five papers, fewer where a share is 0.
+        Lgb less and more, with the least friction and with the paper's; five papers, fewer where a share is 0.
         """
         lgb, friction = self.uncertainty
-        shares = [(1.0, 1.0), *product((1.0 - lgb, 1.0 + lgb), (1.0, 1.0 - friction))]
+        bounds = product((1.0 - friction, 1.0), (1.0 - lgb, 1.0 + lgb))
+        shares = [(1.0, 1.0), *((of_lgb, of_friction) for of_friction, of_lgb in bounds)]
         return [
             replace(
                 self.paper,
@@ -346,6 +334,7 @@ class Plan:
             "grasp": self.grasp,
             "limits": dict(zip(("speed", "turning", "acceleration"), self.limits, strict=True)),
             "offset": self.offset,
+            "rise": self.rise,
             "uncertainty": dict(zip(("gravito_bending_length", "friction"), self.uncertainty, strict=True)),
             "curvature": self.curvature,
             "manifold": self.manifold,

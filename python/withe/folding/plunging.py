@@ -27,12 +27,12 @@ FloatArray = npt.NDArray[np.float64]
 _HEIGHTS = (0.4, 0.6, 0.8, 1.0)  # over the target, from which it goes down [Lgb]
 _NO_SLIDE = 1e-4  # [m]
 _SHORT = 0.2  # of the target, of a second try [Lgb]: where a sheet has slid back, it must lie under its edge
-_OVER = 0.25  # of the target at most, where it goes down [Lgb]
 _CORRECTIONS = 4
 _ENOUGH = 5e-5  # [m]
+_CREASE = 0.5  # by which it moves with the edge
 _HOLDING = 0.3  # in the end [s]
-_BESIDE = (0.0, 5e-4, -5e-4, -5e-4, 5e-4)  # of where a jaw should be, that holds sheets at the bounds [m]
-_COARSE = {"edges": 75}  # of sheets at the bounds, whose creases need not be known to a tenth of a millimetre
+_BESIDE = (0.0, -5e-4, 5e-4, 5e-4, -5e-4)  # of where a jaw should be, that holds sheets at the bounds [m]
+_COARSE = {"edges": 75, "time_step": 0.02}  # of sheets at the bounds, whose creases need not be known to a tenth of a millimetre
 
 
 class _Tried:
@@ -89,8 +89,7 @@ def plunge(
     It is led down within a `duration` instead, before the sheet can follow, and `press` lower than it can go: the jaw
     yields, and presses both layers on the table with that times its stiffness, up to its force limit, so that they
     stay. It goes down from over the target: from the least height to which the sheet is led without slide, whatever of
-    the plan's `uncertainty` it is, or from where least friction is needed. A plan with a free moment is made anew up to
-    there, others are cut off. How much to the side it goes, within what time, and whether the edge ends level or as the
+    the plan's `uncertainty` it is, or from where least friction is needed. The plan is made anew up to there. How much to the side it goes, within what time, and whether the edge ends level or as the
     plan has it, is tried on simulated sheets without noise, those of `Plan.papers`: aimed so that the paper as it is
     thought to be is folded right, it is the way on which the worst of them is best, by how far its crease is off and
     by half of how far it slides, of those that fold all of them. Jaws that hold sheets at the bounds are off by .5 mm
@@ -154,14 +153,16 @@ def plunge(
                 raise ValueError(f"no plunge begins: the sheet snaps on the slow way there; {_needs(plan)}")
 
         best: Part | None = None
+        aside = 0.0
         least = nearest = np.inf  # of the best way, and how far the crease is off on that which comes nearest
         for down in ways:
-            way = down(_aimed(tried[0], down, _SHORT * lgb))
+            aside, missed_by = _aimed(tried[0], down, _SHORT * lgb, aside)
+            way = down(aside)
             bar.advance(1)
             error = off = 0.0
             for each, beside in zip(tried, _BESIDE, strict=False):
                 seen = each.slide - tried[0].slide if looks else 0.0
-                crease, slide = each.missed(way, seen + beside)
+                crease, slide = missed_by if each is tried[0] else each.missed(way, seen + beside)
                 missed = abs(crease - 0.5 * beside)
                 error, off = max(error, missed), max(off, missed, 0.5 * abs(slide))
                 hopeless = error >= nearest if best is None else error > bound or off >= least
@@ -176,39 +177,46 @@ def plunge(
     return _ended(slow, best, tried[0].slide)
 
 
-def _aimed(sheet: _Tried, down: Callable[[float], Part], short: float) -> float:
-    """How far to the side the edge goes down so that a crease is where it should be [m]."""
-    aside = 0.0
-    error, _ = sheet.missed(down(aside))
-    if not abs(error) <= short:  # its sheet slides back from under the edge
+def _aimed(
+    sheet: _Tried, down: Callable[[float], Part], short: float, aside: float
+) -> tuple[float, tuple[float, float]]:
+    """How far to the side the edge goes down so that a crease is where it should be [m], and what it misses then.
+
+    By the secant method, from a first `aside`. The crease moves by about half of what the edge moves.
+    """
+    missed = sheet.missed(down(aside))
+    if not abs(missed[0]) <= short:  # its sheet slides back from under the edge
         aside = -short
-        error, _ = sheet.missed(down(aside))
-    share = 1.0
+        missed = sheet.missed(down(aside))
+    slope = _CREASE
     for _ in range(_CORRECTIONS):
-        if abs(error) < _ENOUGH or not abs(error) <= short:
+        if abs(missed[0]) < _ENOUGH or not abs(missed[0]) <= short:
             break
-        other = aside - 2.0 * share * error
-        found, _ = sheet.missed(down(other))
-        if abs(found) < abs(error):
-            aside, error = other, found
+        other = aside - missed[0] / slope
+        found = sheet.missed(down(other))
+        if abs(found[0]) < abs(missed[0]):
+            slope = float(np.clip((found[0] - missed[0]) / (other - aside), 0.5 * _CREASE, 2.0 * _CREASE))
+            aside, missed = other, found
         else:  # too far: an edge may miss the sheet
-            share *= 0.5
-    return aside
+            slope *= 2.0
+    return aside, missed
 
 
 def _above(plan: Plan) -> Plan:
     """The slow way to over the target."""
-    lgb = plan.paper.gravito_bending_length
     best: tuple[tuple[float, float], Plan] | None = None
     for height in _HEIGHTS:
-        slow = plan_above(plan, height * lgb) if plan.grasp == "free" else plan.down_to(height * lgb)
+        try:
+            slow = plan_above(plan, height * plan.paper.gravito_bending_length)
+        except ValueError:  # no pose of the grasp is there, or none connects with the flat sheet
+            continue
         slides = slow.worst_slide[0], float(np.nanmax(slow.slip_ratio))
-        over = abs(float(slow.poses[-1, 0]) - plan.target) <= _OVER * lgb
-        if best is None or (over and slides < best[0]):
+        if best is None or slides < best[0]:
             best = slides, slow
         if slides[0] <= _NO_SLIDE:
             break
-    assert best is not None
+    if best is None:
+        raise ValueError(f"no plunge begins: no way leads to over the target; {_needs(plan)}")
     return best[1]
 
 

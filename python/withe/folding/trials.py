@@ -98,7 +98,8 @@ class Outcome:
     failure : str or None
         Why there is no fold: what the planner or the sheet said. It begins with "no plan" where the planner did.
     seconds : float
-        Of the processor, on the thread that carried it out.
+        Of the processor, on the thread that carried it out: what it takes alone. Trials of one sheet share its
+        photographs and plans.
     """
 
     trial: Trial
@@ -163,9 +164,10 @@ def _run(trials: list[Trial], processes: int, client: Any | None, progress: bool
                 bar.advance(1)
             return
         with _workers(processes) if client is None else cluster_executor(client) as workers:
-            for future in as_completed([workers.submit(carry_out, trial) for trial in trials]):
-                yield future.result()
-                bar.advance(1)
+            for future in as_completed([workers.submit(_carry_out_all, group) for group in _alike(trials)]):
+                for outcome in future.result():
+                    yield outcome
+                    bar.advance(1)
 
 
 @contextmanager
@@ -189,11 +191,35 @@ def _begin() -> None:
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
+def _alike(trials: list[Trial]) -> list[list[Trial]]:
+    """Those of one sheet that ask for one plan, open and watched: whoever carries them out plans once."""
+    groups: dict[Any, list[Trial]] = {}
+    for trial in trials:
+        planner, sheet = _hashable(trial.planner), _hashable(trial.sheet)
+        asked = (trial.paper, trial.target, trial.seed, trial.noise, planner, sheet, trial.believed)
+        groups.setdefault(asked, []).append(trial)
+    return list(groups.values())
+
+
+def _carry_out_all(trials: list[Trial]) -> list[Outcome]:
+    return [carry_out(trial) for trial in trials]
+
+
 def carry_out(trial: Trial) -> Outcome:
     """One trial, here and now."""
     began = time.thread_time()
     done = _carried_out(trial)
     return replace(done, seconds=done.seconds + time.thread_time() - began)
+
+
+@lru_cache(maxsize=4)
+def _measured(paper: Paper, seed: int, noise: Noise, options: tuple[tuple[str, Any], ...]) -> tuple[float, float]:
+    """Lgb of a sheet by photographs of a strip of it, and the seconds that it took."""
+    began = time.thread_time()
+    sheet = SimulatedSheet(paper, seed, noise, **dict(options))
+    image, turned = (sheet.strip_picture(scale=_SCALE, turned=side) for side in (False, True))
+    found = measure(image=image, turned=turned, scale=_SCALE).gravito_bending_length
+    return found, time.thread_time() - began
 
 
 @lru_cache(maxsize=4)
@@ -212,13 +238,12 @@ def _hashable(options: Mapping[str, Any]) -> tuple[tuple[str, Any], ...]:
 
 def _carried_out(trial: Trial) -> Outcome:
     sheet = SimulatedSheet(trial.paper, trial.seed, trial.noise, **trial.sheet)
-    image, turned = (sheet.strip_picture(scale=_SCALE, turned=side) for side in (False, True))
-    measured = measure(image=image, turned=turned, scale=_SCALE).gravito_bending_length
+    began = time.thread_time()
+    measured, measuring = _measured(trial.paper, trial.seed, trial.noise, _hashable(trial.sheet))
     outcome = Outcome(trial, measured)
     paper = replace(trial.believed or trial.paper, gravito_bending_length=measured)
-    began = time.thread_time()
     try:
-        planned, took = _planned(paper, trial.target, _hashable(trial.planner))
+        planned, planning = _planned(paper, trial.target, _hashable(trial.planner))
     except ValueError as error:
         return replace(outcome, failure=f"no plan: {error}")
     outcome = replace(
@@ -226,7 +251,7 @@ def _carried_out(trial: Trial) -> Outcome:
         needed_friction=float(np.nanmax(planned.slip_ratio)),
         plunges=planned.plunges_at is not None,
         blocked=planned.blocked,
-        seconds=took - (time.thread_time() - began),
+        seconds=measuring + planning - (time.thread_time() - began),
     )
     try:
         if trial.replans:

@@ -50,7 +50,7 @@ def watched_parts(
     present, plunge = plan.before_plunge(), _plunge(plan)
     over = ends_above or plunge is not None
     poses, known = present.poses, plan.offset
-    height, latest = float(poses[-1, 2]), known
+    latest = known
     for left in range(looks, -1, -1):
         last = int(np.ceil((len(poses) - 1) / (max(left, 1) if over else left + 1)))
         yield _timed(poses[: last + 1], plan)
@@ -63,15 +63,28 @@ def watched_parts(
         if abs(latest - known) > tolerance:
             known = latest
             if len(poses) > 1:
-                present = replan(present, poses[0], known)
-                if over and plan.grasp != "free":  # that goes all the way down
-                    present = present.down_to(height)
-                poses = np.vstack([poses[:1], present.poses[1:]])
+                present, poses = _anew(present, poses, known)
         if len(poses) == 1:
             break
     if plunge is not None:
         farther = latest - plan.offset - plan.plunge_slide  # than when the plunge was planned
         yield Part(plunge.times, np.vstack([poses[-1:], shifted(plunge.poses[1:], farther)]))
+
+
+def _anew(present: Plan, poses: FloatArray, slide: float) -> tuple[Plan, FloatArray]:
+    """The rest of a plan made anew, and the poses that are left: from the first one at which the sheet can be held.
+
+    Where the jaw is now, a sheet that has slid may be beyond the border of the manifold without moment.
+    """
+    for begin in range(len(poses) - 1):
+        try:
+            rest = replan(present, poses[begin], slide)
+        except ValueError:
+            if begin == len(poses) - 2:
+                raise
+        else:
+            return rest, np.vstack([poses[: begin + 1], rest.poses[1:]])
+    raise AssertionError("there are no poses left")
 
 
 def shifted(poses: FloatArray, slide: float) -> FloatArray:

@@ -9,7 +9,13 @@ from contextlib import contextmanager
 from typing import Any
 
 from withe import _core
-from withe.errors import CoarseMeshWarning, CoarseStepWarning, ConvergenceError, RingLeftWarning
+from withe.errors import (
+    BranchChangedWarning,
+    CoarseMeshWarning,
+    CoarseStepWarning,
+    ConvergenceError,
+    RingLeftWarning,
+)
 from withe.recording.recorder import Recorder
 from withe.simulation.functions import apply_functions, force_function, step_callback
 from withe.simulation.gradients import equilibrium_gradient, equilibrium_jacobian
@@ -160,7 +166,7 @@ class Stepping:
         finally:
             forget_left_rings(self.session, world.take_left_rings())
             left, self.session.left_rings = self.session.left_rings, []
-            pass_on(world.take_warning(), world.take_step_warning())
+            pass_on(*world.take_warnings())
             if left:
                 rings = " and ".join(f"ring {name!r} (time {time:.6g} s)" for name, time in left)
                 report_left(f"{rings}: released")
@@ -173,12 +179,14 @@ def convergence_error(session: Session, numbers: tuple[Any, ...]) -> Convergence
     return ConvergenceError(message, time, step, name, node if node >= 0 else None, residual)
 
 
-def pass_on(mesh: str, steps: str) -> None:
-    """Give warnings of the engine, of coarse meshes and coarse steps, where there are any."""
+def pass_on(mesh: str, steps: str, branch: str) -> None:
+    """Give warnings of the engine, of coarse meshes, coarse steps and branches that were left, where there are any."""
     if mesh:
         warnings.warn(mesh, CoarseMeshWarning, stacklevel=_levels_to_user())
     if steps:
         warnings.warn(steps, CoarseStepWarning, stacklevel=_levels_to_user())
+    if branch:
+        warnings.warn(branch, BranchChangedWarning, stacklevel=_levels_to_user())
 
 
 def report_left(what: str) -> None:
