@@ -173,10 +173,11 @@ void World::Implementation::static_step(double end, double dt) {
   work.newton.poll();
   if (callback) callback(end, end);
   if (!equilibrium(dt).branch_changed || branch_warning) return;
-  branch_warning = "the static step to time " + text(end, 6) +
-                   " s left its branch of equilibria: the scene jumps within it, or was at a saddle, and which of other "
-                   "equilibria it goes to depends on how. Time steps show that; equilibrium(path=\"arc_length\") goes "
-                   "on through limit points";
+  branch_warning =
+      "the static step to time " + text(end, 6) +
+      " s left its branch of equilibria: the scene jumps within it, or was at a saddle, and which of other "
+      "equilibria it goes to depends on how. Time steps show that; equilibrium(path=\"arc_length\") goes "
+      "on through limit points";
 }
 
 /// Says that none was found.

@@ -72,7 +72,7 @@ struct World::Implementation : Running {
   std::optional<std::string> mesh_warning;
   std::optional<std::string> step_warning;    ///< likewise, of steps too long for the motion
   std::optional<std::string> branch_warning;  ///< likewise, of a static step that left its branch
-  std::vector<LeftRing> left_rings;         ///< not heard of yet
+  std::vector<LeftRing> left_rings;           ///< not heard of yet
   NewtonResult last_newton;
 
   // lagged.cpp

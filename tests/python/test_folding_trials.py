@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from withe.folding import Paper, Trial, run_trials
+from withe.folding.trials import _alike
 
 pytest.importorskip("cv2")
 
@@ -43,6 +44,13 @@ def test_a_trial_without_a_plan_says_why(alone):
     assert np.isnan(alone["bent"].error)
 
 
+def test_trials_of_one_sheet_and_one_plan_are_carried_out_by_one_process():
+    assert [[trial.name for trial in group] for group in _alike(TRIALS)] == [["open", "closed"], ["bent"]]
+    asked = [(1, {}), (2, {}), (1, {"method": "local"})]
+    others = [Trial(Paper.a4(), seed=seed, planner=planner) for seed, planner in asked]
+    assert [len(group) for group in _alike(others)] == [1, 1, 1]
+
+
 def test_processes_fold_as_one_does(alone):
     for outcome in run_trials(TRIALS, processes=2, progress=False):
         np.testing.assert_array_equal(figures(outcome), figures(alone[outcome.trial.name]))
@@ -67,6 +75,7 @@ def test_ctrl_c_ends_processes_at_once_and_keeps_what_has_come(tmp_path):
         textwrap.dedent("""
         import os, signal, time
         from withe.folding import Paper, Trial, run_trials
+from withe.folding.trials import _alike
 
         if __name__ == "__main__":
             fails = Trial(Paper.a4(), 0.29, planner={"method": "slip", "grasp": "free", "curvature": 0.5})

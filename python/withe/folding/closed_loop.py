@@ -58,9 +58,10 @@ def fold(
     """Carry out a plan in parts, and plan the rest anew after each from where a camera sees that the sheet has slid to.
 
     Poses of the rest begin where the jaw is, and are those of the sheet where it lies now; by how much the jaw's angle
-    is off that of the manifold there goes to zero evenly along the way [dissertation, (7.14)-(7.16)]. The edge comes
-    down where the sheet is now, and not where it was. A plunge is not planned anew: the sheet is looked at before it
-    last, and it goes down where the sheet is then.
+    is off that of the manifold there goes to zero evenly along the way [dissertation, (7.14)-(7.16)]. Where the jaw
+    cannot hold a sheet that has slid so, it goes on as planned until it can. The edge comes down where the sheet is
+    now, and not where it was. A plunge is not planned anew: the sheet is looked at before it last, and it goes down
+    where the sheet is then.
 
     Parameters
     ----------

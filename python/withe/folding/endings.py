@@ -62,7 +62,7 @@ def plan(
         "auto": of method "slip" with a free moment, a `plunge` where any paper within the uncertainty is predicted to
         slide by more than 1 mm (`Plan.worst_slide`) on the way that comes down slowly, which it does where that asks
         for more friction than there may be; elsewhere slow. A plunge is tried on simulated sheets, which takes some
-        10 s. Where none is found either, the plan comes down slowly, and its `blocked` says why. "plunge": always.
+        8 s. Where none is found either, the plan comes down slowly, and its `blocked` says why. "plunge": always.
         Of other methods "auto" is slow, but for sheets that will be looked at on the way: there it is a plunge where
         the last part, which no look mends, needs more friction than there may be.
     replans : int

@@ -32,7 +32,7 @@ _ENOUGH = 5e-5  # [m]
 _CREASE = 0.5  # by which it moves with the edge
 _HOLDING = 0.3  # in the end [s]
 _BESIDE = (0.0, -5e-4, 5e-4, 5e-4, -5e-4)  # of where a jaw should be, that holds sheets at the bounds [m]
-_COARSE = {"edges": 75, "time_step": 0.02}  # of sheets at the bounds, whose creases need not be known to a tenth of a millimetre
+_COARSE = {"edges": 75, "time_step": 0.02}  # of sheets at the bounds, whose creases are known to some .02 mm
 
 
 class _Tried:
@@ -49,15 +49,12 @@ class _Tried:
             if not looks:
                 yield slow
             else:
-                for part in watched_parts(slow, looks, lambda _: self._slid(), ends_above=True):
+                for part in watched_parts(slow, looks, lambda _: sheet.slide, ends_above=True):
                     yield part
-                    self._from, self._known = part.poses[-1:], self._slid()
-            self._held, self.slide = sheet.hold(), self._slid()
+                    self._from, self._known = part.poses[-1:], sheet.slide
+            self._held, self.slide = sheet.hold(), sheet.slide
 
         sheet.carry_out(motions(), slow.target, duration=float(slow.times[-1]), progress=False)
-
-    def _slid(self) -> float:
-        return float(self._sheet.positions()[-1, 0]) - self._sheet.paper.length
 
     @property
     def snapped(self) -> bool:
@@ -89,11 +86,12 @@ def plunge(
     It is led down within a `duration` instead, before the sheet can follow, and `press` lower than it can go: the jaw
     yields, and presses both layers on the table with that times its stiffness, up to its force limit, so that they
     stay. It goes down from over the target: from the least height to which the sheet is led without slide, whatever of
-    the plan's `uncertainty` it is, or from where least friction is needed. The plan is made anew up to there. How much to the side it goes, within what time, and whether the edge ends level or as the
-    plan has it, is tried on simulated sheets without noise, those of `Plan.papers`: aimed so that the paper as it is
-    thought to be is folded right, it is the way on which the worst of them is best, by how far its crease is off and
-    by half of how far it slides, of those that fold all of them. Jaws that hold sheets at the bounds are off by .5 mm
-    to either side: an edge that comes down on the last of a sheet must not miss it.
+    the plan's `uncertainty` it is, or from where least friction is needed. The plan is made anew up to there. How much
+    to the side it goes, within what time, and whether the edge ends level or as the plan has it, is tried on simulated
+    sheets without noise, those of `Plan.papers`: aimed so that the paper as it is thought to be is folded right, it is
+    the way on which the worst of them is best, by how far its crease is off and by half of how far it slides, of those
+    that fold all of them. Jaws that hold sheets at the bounds are off by .5 mm to either side: an edge that comes down
+    on the last of a sheet must not miss it.
 
     Parameters
     ----------
@@ -153,16 +151,16 @@ def plunge(
                 raise ValueError(f"no plunge begins: the sheet snaps on the slow way there; {_needs(plan)}")
 
         best: Part | None = None
-        aside = 0.0
+        begin = 0.0  # aside, as the last way that folds the sheet
         least = nearest = np.inf  # of the best way, and how far the crease is off on that which comes nearest
         for down in ways:
-            aside, missed_by = _aimed(tried[0], down, _SHORT * lgb, aside)
-            way = down(aside)
+            aside, aimed = _aimed(tried[0], down, _SHORT * lgb, begin)
+            way, begin = down(aside), aside if abs(aimed[0]) <= bound else 0.0
             bar.advance(1)
             error = off = 0.0
             for each, beside in zip(tried, _BESIDE, strict=False):
                 seen = each.slide - tried[0].slide if looks else 0.0
-                crease, slide = missed_by if each is tried[0] else each.missed(way, seen + beside)
+                crease, slide = aimed if each is tried[0] else each.missed(way, seen + beside)
                 missed = abs(crease - 0.5 * beside)
                 error, off = max(error, missed), max(off, missed, 0.5 * abs(slide))
                 hopeless = error >= nearest if best is None else error > bound or off >= least

@@ -182,6 +182,11 @@ class SimulatedSheet:
         """Where the sheet is now, from the lifted edge on, of shape (edges + 1, 3) [m]."""
         return self.simulation.positions(self.rod)
 
+    @property
+    def slide(self) -> float:
+        """How far the sheet's far edge has slid over the table by now, in the direction of x [m]."""
+        return float(self.positions()[-1, 0]) - self.paper.length
+
     def picture(self, camera: Camera, size: tuple[int, int] = (640, 480)) -> npt.NDArray[np.uint8]:
         """Take a picture of the sheet as it lies now, on a dark table.
 
@@ -308,13 +313,12 @@ class SimulatedSheet:
         return self._result(target, carried(self.simulation, motion, [self.rod], duration, progress))
 
     def _result(self, target: float, watch: Watch) -> Fold:
-        positions = self.positions()
-        slide = positions[-1, 0] - self.paper.length
-        error = 0.5 * (positions[0, 0] - slide - target)
+        slide = self.slide
+        error = 0.5 * (float(self.positions()[0, 0]) - slide - target)
         return Fold(
-            error=float(error),
-            length=0.5 * target + float(error),
-            slide=float(slide),
+            error=error,
+            length=0.5 * target + error,
+            slide=slide,
             max_curvature=watch.max_curvature,
             max_speed=watch.max_speed,
             failure=watch.failure,
