@@ -18,6 +18,7 @@ __all__ = [
     "control_steps",
     "converged_tips",
     "penetration",
+    "references_agree",
     "settled_tip",
     "tip_error",
     "tips",
@@ -25,6 +26,7 @@ __all__ = [
 
 ACTIONS = 60
 FINE = 32  # shorter steps of the converged run
+AGREE = 2e-3  # of it and of one in steps twice as long [m]: what is chaotic has no converged run
 WARM = 10  # control steps before the clock runs
 
 
@@ -46,9 +48,9 @@ def actions_of(seed: int, size: int, count: int = ACTIONS) -> np.ndarray:
     return np.random.default_rng(seed).uniform(-1.0, 1.0, (count, size))
 
 
-def _converged(task: Arm) -> Arm:
+def _converged(task: Arm, fine: int) -> Arm:
     """The same in short steps, solved tightly."""
-    task.time_step = task.time_step / FINE
+    task.time_step = task.time_step / fine
     build = task.build
 
     def tight(generator: np.random.Generator) -> withe.Simulation:
@@ -78,9 +80,14 @@ def tips(task: Arm, seed: int, count: int = ACTIONS) -> np.ndarray:
     return np.array(found)
 
 
-def converged_tips(kind: type[Arm], seed: int, count: int = ACTIONS) -> np.ndarray:
+def converged_tips(kind: type[Arm], seed: int, count: int = ACTIONS, fine: int = FINE) -> np.ndarray:
     """Tip after each action in short steps, shape (count, 3) [m]."""
-    return tips(_converged(kind()), seed, count)
+    return tips(_converged(kind(), fine), seed, count)
+
+
+def references_agree(kind: type[Arm], seed: int, count: int = ACTIONS) -> bool:
+    """Whether runs in short steps and in half as short ones come to the same."""
+    return _apart(converged_tips(kind, seed, count), converged_tips(kind, seed, count, FINE // 2)) < AGREE
 
 
 def settled_tip(turns: np.ndarray, gravity: float) -> np.ndarray:
@@ -94,8 +101,11 @@ def settled_tip(turns: np.ndarray, gravity: float) -> np.ndarray:
 
 def tip_error(kind: type[Arm], seed: int, count: int = ACTIONS) -> float:
     """RMS distance of the tip from that of a converged run [m]."""
-    apart = tips(kind(), seed, count) - converged_tips(kind, seed, count)
-    return float(np.sqrt(np.mean(np.sum(apart**2, axis=1))))
+    return _apart(tips(kind(), seed, count), converged_tips(kind, seed, count))
+
+
+def _apart(first: np.ndarray, second: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(np.sum((first - second) ** 2, axis=1))))
 
 
 def penetration(kind: type[Arm], seed: int, radius: float, count: int = 50) -> float:
