@@ -134,6 +134,15 @@ void SheetProblem::linearise(const Path& path, System& system) const {
   put_end(path, system);
 }
 
+void SheetProblem::put_gaps(const Path& path, System& system) const {
+  for (int k = 0; k < kSegments; ++k) {
+    const auto end = across_segment(shape, path, k);
+    for (std::size_t i = 0; i < kStates; ++i)
+      system.links[static_cast<std::size_t>(k)].gap[i] = end[i] - path.nodes[static_cast<std::size_t>(k) + 1][i];
+  }
+  put_end(path, system);
+}
+
 double lying_weight(const SheetWidth& width, const SheetProblem::Path& path, double sheet_length) {
   return width.weight_at(sheet_length) - width.weight_at(path.values[2]);
 }

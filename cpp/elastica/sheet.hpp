@@ -45,6 +45,8 @@ class SheetProblem {
   double sheet_length = 0;       ///< of `sliding`: of the whole sheet [Lgb]
 
   void linearise(const Path& path, System& system) const;
+  /// The gaps alone; slopes stay as they are.
+  void put_gaps(const Path& path, System& system) const;
 
  private:
   void put_end(const Path& path, System& system) const;

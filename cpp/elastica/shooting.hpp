@@ -146,6 +146,8 @@ struct ShootingOptions {
   int iterations = 20;
   double step_tolerance = 1e-7;  ///< Newton converges quadratically: what is left after such a step is its square
   double smallest_damping = 1.0 / 64;
+  double chord_step = 1e-2;        ///< after one as short a chord iteration, with the same matrix, is tried
+  double chord_tolerance = 1e-13;  ///< it ends there if what is left of it, at the rate of both steps, is no more
 };
 
 struct ShootingOutcome {
@@ -154,7 +156,8 @@ struct ShootingOutcome {
 };
 
 /// Newton's method with halved steps. A Problem has kStates, kParameters and
-/// `void linearise(const Path&, System&) const`, which fills links and end. The path is left where it came to.
+/// `void linearise(const Path&, System&) const`, which fills links and end. The path is left where it came to. A
+/// Problem that finds gaps for much less than slopes has `void put_gaps(const Path&, System&) const` too.
 template <class Problem>
 class ShootingSolver {
  public:
@@ -173,7 +176,8 @@ class ShootingSolver {
       while (true) {
         trial_ = path;
         add(damping, step_, trial_);
-        if (size < options.step_tolerance) {
+        if (size < options.step_tolerance ||
+            (damping == 1.0 && size < options.chord_step && chord_ends(problem, size, options))) {
           std::swap(path, trial_);
           outcome.converged = true;
           return outcome;
@@ -193,6 +197,19 @@ class ShootingSolver {
   }
 
  private:
+  /// After a step of that size: takes one more with the same matrix, and says whether that is enough. The rate at which
+  /// such steps contract is their ratio.
+  bool chord_ends(const Problem& problem, double size, const ShootingOptions& options) {
+    if constexpr (requires { problem.put_gaps(trial_, system_); }) {
+      problem.put_gaps(trial_, system_);
+      if (!elimination_.solve(system_, chord_)) return false;
+      const double next = largest(chord_);
+      if (!(next * next <= options.chord_tolerance * size)) return false;
+      add(1.0, chord_, trial_);
+      return true;
+    }
+    return false;
+  }
   static double largest(const Path& step) {
     double size = 0;
     const auto see = [&size](double x) { size = std::isfinite(x) ? std::max(size, std::abs(x)) : 1e300; };
@@ -209,7 +226,7 @@ class ShootingSolver {
 
   ShootingSystem<Problem::kStates, Problem::kParameters> system_;
   ShootingElimination<Problem::kStates, Problem::kParameters> elimination_;
-  Path step_, trial_;
+  Path step_, chord_, trial_;
 };
 
 /// Continuation: `ask(share, guess)` poses the problem at a share of the way from what `path` solves to what is wanted,

@@ -75,7 +75,6 @@ def test_ctrl_c_ends_processes_at_once_and_keeps_what_has_come(tmp_path):
         textwrap.dedent("""
         import os, signal, time
         from withe.folding import Paper, Trial, run_trials
-from withe.folding.trials import _alike
 
         if __name__ == "__main__":
             fails = Trial(Paper.a4(), 0.29, planner={"method": "slip", "grasp": "free", "curvature": 0.5})

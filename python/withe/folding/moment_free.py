@@ -31,6 +31,7 @@ _MOST_STEPS = 2000
 _ROOM = 2e-3  # of a path on which the sheet slides least, for it to be short [Lgb]
 
 
+@lru_cache(maxsize=8)
 def goal_pose(solve: Manifold, x: float, z: float, depth: float, finger: float) -> Elastica | None:
     """Pose without moment whose outer edge, `depth` beyond, is at x and finger's height over z; None if there is none.
 

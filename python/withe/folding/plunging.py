@@ -49,7 +49,7 @@ class _Tried:
             if not looks:
                 yield slow
             else:
-                for part in watched_parts(slow, looks, lambda _: sheet.slide, ends_above=True):
+                for part in watched_parts(slow, looks, lambda _: sheet.slide):
                     yield part
                     self._from, self._known = part.poses[-1:], sheet.slide
             self._held, self.slide = sheet.hold(), sheet.slide

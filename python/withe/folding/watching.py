@@ -31,8 +31,6 @@ def watched_parts(
     looks: int,
     look: Callable[[FloatArray], float],
     tolerance: float = TOLERANCE,
-    *,
-    ends_above: bool = False,
 ) -> Iterator[Part]:
     """One part after the other; what is yielded is carried out before the next is asked for.
 
@@ -44,15 +42,12 @@ def watched_parts(
     look : callable
         Of the jaw's pose: how far the sheet has slid [m], NaN where that is not seen.
     tolerance : float [m]
-    ends_above : bool
-        Whether the plan is the slow way to a plunge that is not in it.
     """
     present, plunge = plan.before_plunge(), _plunge(plan)
-    over = ends_above or plunge is not None
     poses, known = present.poses, plan.offset
     latest = known
     for left in range(looks, -1, -1):
-        last = int(np.ceil((len(poses) - 1) / (max(left, 1) if over else left + 1)))
+        last = int(np.ceil((len(poses) - 1) / (max(left, 1) if plan.rise > 0.0 else left + 1)))
         yield _timed(poses[: last + 1], plan)
         poses = poses[last:]
         if left == 0:
@@ -76,15 +71,18 @@ def _anew(present: Plan, poses: FloatArray, slide: float) -> tuple[Plan, FloatAr
 
     Where the jaw is now, a sheet that has slid may be beyond the border of the manifold without moment.
     """
-    for begin in range(len(poses) - 1):
+
+    def from_pose(begin: int) -> tuple[Plan, FloatArray]:
+        rest = replan(present, poses[begin], slide)
+        return rest, np.vstack([poses[: begin + 1], rest.poses[1:]])
+
+    last = len(poses) - 2
+    for begin in range(last):
         try:
-            rest = replan(present, poses[begin], slide)
+            return from_pose(begin)
         except ValueError:
-            if begin == len(poses) - 2:
-                raise
-        else:
-            return rest, np.vstack([poses[: begin + 1], rest.poses[1:]])
-    raise AssertionError("there are no poses left")
+            continue
+    return from_pose(last)
 
 
 def shifted(poses: FloatArray, slide: float) -> FloatArray:
