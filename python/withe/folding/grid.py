@@ -174,15 +174,22 @@ def _away(grid: Grid, end: Elastica) -> FloatArray:
 
 def nodes_near(network: Network, end: Elastica) -> IndexArray:
     """Blocks around a pose that may be passed."""
-    near = network.allowed & (_away(network.grid, end) < 1.5 * network.grid.spacing)
+    return _near(network, end)[0]
+
+
+def _near(network: Network, end: Elastica) -> tuple[IndexArray, FloatArray]:
+    """The same, and how far they are [Lgb]."""
+    away = _away(network.grid, end)
+    near = network.allowed & (away < 1.5 * network.grid.spacing)
     near[: network.grid.lifts] = False
-    return np.flatnonzero(near)
+    nodes = np.flatnonzero(near)
+    return nodes, away[nodes]
 
 
 def _links(network: Network, end: Elastica) -> tuple[IndexArray, FloatArray]:
     """Blocks around a pose, and the cost of the way to each."""
-    nodes = nodes_near(network, end)
-    return nodes, _weights(_away(network.grid, end)[nodes], network.cost[nodes], float(end.force_ratio[0]))
+    nodes, away = _near(network, end)
+    return nodes, _weights(away, network.cost[nodes], float(end.force_ratio[0]))
 
 
 def shortest_path(network: Network, start: Elastica | None, goal: Elastica) -> Elastica | None:
