@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -80,6 +81,7 @@ def tips(task: Arm, seed: int, count: int = ACTIONS) -> np.ndarray:
     return np.array(found)
 
 
+@lru_cache(maxsize=64)
 def converged_tips(kind: type[Arm], seed: int, count: int = ACTIONS, fine: int = FINE) -> np.ndarray:
     """Tip after each action in short steps, shape (count, 3) [m]."""
     return tips(_converged(kind(), fine), seed, count)
