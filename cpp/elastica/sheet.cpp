@@ -3,82 +3,16 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/dual.hpp"
 #include "common/hypotenuse.hpp"
 #include "elastica/runge_kutta.hpp"
+#include "elastica/sheet_slope.hpp"
 
 namespace withe {
 
 namespace {
 
-using SheetDual = Dual<5>;  // by theta and m at the start of a segment, R, T, length
-
-double sine(double x) { return std::sin(x); }
-double cosine(double x) { return std::cos(x); }
-SheetDual sine(const SheetDual& x) { return chain(x, std::sin(x.value), std::cos(x.value)); }
-SheetDual cosine(const SheetDual& x) { return chain(x, std::cos(x.value), -std::sin(x.value)); }
-
-double value_of(double x) { return x; }
-double value_of(const SheetDual& x) { return x.value; }
-
-/// The equations of the header, where the width is one straight piece.
-template <class Scalar>
-struct SheetSlope {
-  Scalar up, forward, length;
-  const SheetWidth::Piece* piece = nullptr;  ///< none of an even sheet
-  Scalar weight{};                           ///< of all that is lifted, of an uneven one
-
-  std::array<Scalar, 4> operator()(const Scalar& s, const std::array<Scalar, 4>& y) const {
-    const Scalar c = cosine(y[0]), d = sine(y[0]);
-    if (piece == nullptr) return {0.5 * y[1], (up - s) * c - forward * d, c, d};
-    const Scalar t = length - s, before = weight - piece->weight_at(t);
-    return {0.5 * (y[1] / piece->width_at(t)), (up - before) * c - forward * d, c, d};
-  }
-};
-
-/// Calls see(slope, s, h) for every step from s to s + h across a segment. Steps end where pieces of the width do.
-template <class Scalar, class See>
-void step_across(const SheetWidth& width, const std::array<Scalar, 3>& values, int segment, int steps, const See& see) {
-  SheetSlope<Scalar> slope{values[0], values[1], values[2]};
-  const Scalar& length = values[2];
-  if (width.even()) {
-    const Scalar h = length / static_cast<double>(SheetProblem::kSegments * steps);
-    for (int i = 0; i < steps; ++i) see(slope, static_cast<double>(segment * steps + i) * h, h);
-    return;
-  }
-  const double whole = value_of(length) / SheetProblem::kSegments;
-  Scalar from = (static_cast<double>(segment) / SheetProblem::kSegments) * length;
-  const Scalar end = (static_cast<double>(segment + 1) / SheetProblem::kSegments) * length;
-  std::size_t piece = width.piece_before(value_of(length - from));
-  slope.weight = width.pieces()[width.piece_before(value_of(length))].weight_at(length);
-  for (bool last = false; !last;) {
-    slope.piece = &width.pieces()[piece];
-    last = piece == 0 || slope.piece->begin <= value_of(length - end);
-    const Scalar to = last ? end : length - slope.piece->begin;
-    const double part = std::ceil(steps * std::abs(value_of(to - from) / whole) - 1e-9);
-    const double count = std::clamp(part, 1.0, static_cast<double>(steps));
-    const Scalar h = (to - from) / count;
-    for (double i = 0; i < count; ++i) see(slope, from + i * h, h);
-    from = to;
-    --piece;
-  }
-}
-
-template <class Scalar>
-std::array<Scalar, 4> across(const SheetWidth& width, const std::array<Scalar, 3>& values, int segment, int steps,
-                             std::array<Scalar, 4> y) {
-  step_across(width, values, segment, steps, [&y](const SheetSlope<Scalar>& slope, const Scalar& s, const Scalar& h) {
-    runge_kutta_step<2>(slope, s, h, y);
-  });
-  return y;
-}
-
-}  // namespace
-
-namespace {
-
 double longest_step(double force, double width) {
-  const double scale = std::sqrt(2.0 * width / force) * std::pow(5e-4 / force, 0.125);
+  const double scale = std::sqrt(2.0 * width / force) * std::sqrt(std::sqrt(std::sqrt(5e-4 / force)));
   return std::min(0.4, scale);
 }
 
@@ -108,38 +42,150 @@ int sheet_steps(const SheetWidth& width, const SheetProblem::Path& path, int seg
   return static_cast<int>(std::clamp(steps, 1.0, 50.0));  // also where Newton's method went astray
 }
 
-std::array<double, 4> across_segment(const SheetShape& shape, const SheetProblem::Path& path, int segment) {
-  const auto& start = path.nodes[static_cast<std::size_t>(segment)];
-  return across<double>(shape.width, path.values, segment, sheet_steps(shape.width, path, segment), start);
+namespace {
+
+using Segments = std::array<BySegment, SheetProblem::kStates>;
+
+/// Steps of an even sheet end at equal shares of the length, those of another one also where pieces of the width do.
+/// The kernels take as many steps of all segments: those that have fewer rest in the end.
+class SheetSchedule {
+ public:
+  SheetSchedule(const SheetWidth& width, const SheetProblem::Path& path) : width_(width), length_(path.values[2]) {
+    for (int k = 0; k < SheetProblem::kSegments; ++k) {
+      const int steps = sheet_steps(width, path, k);
+      width.even() ? add_even(k, steps) : add(k, steps);
+      for (std::size_t j = 0; j < start_.size(); ++j) start_[j][k] = path.nodes[at(k)][j];
+    }
+    segments_ = {path.values[0], path.values[1], length_,       0.0,          0.0,
+                 width.even(),   count(),        steps_.data(), start_.data()};
+    if (width.even()) return;
+    segments_.weight = width.weight_at(length_);
+    segments_.weight_by_length = width.width_at(length_);
+  }
+  SheetSchedule(const SheetSchedule&) = delete;
+  SheetSchedule& operator=(const SheetSchedule&) = delete;
+
+  const SheetSegments& segments() const { return segments_; }
+  int count() const { return static_cast<int>(steps_.size()); }
+  int count(int segment) const { return counts_[at(segment)]; }
+  double start(int segment, int i) const {
+    const SheetStep& step = steps_[at(i)];
+    return step.s[segment] + step.s_by_length[segment] * length_;
+  }
+  double step(int segment, int i) const {
+    const SheetStep& step = steps_[at(i)];
+    return step.h[segment] + step.h_by_length[segment] * length_;
+  }
+  SheetSlope<double, double> slope(int segment, int i) const {
+    const SheetStep& step = steps_[at(i)];
+    return {segments_.up,
+            segments_.forward,
+            length_,
+            segments_.even,
+            {step.begin[segment], step.width[segment], step.slope[segment], step.weight[segment]},
+            segments_.weight};
+  }
+
+ private:
+  static std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+  SheetStep& next_step(int segment) {
+    const auto i = at(counts_[at(segment)]++);
+    if (i == steps_.size()) {
+      steps_.push_back({});
+      std::fill_n(steps_.back().width, SheetProblem::kSegments, 1.0);
+    }
+    return steps_[i];
+  }
+  void add_even(int segment, int steps) {
+    const double share = 1.0 / (SheetProblem::kSegments * steps);
+    for (int i = 0; i < steps; ++i) {
+      SheetStep& step = next_step(segment);
+      step.s_by_length[segment] = (segment * steps + i) * share;
+      step.h_by_length[segment] = share;
+    }
+  }
+  void add(int segment, int steps) {
+    constexpr double kPart = 1.0 / SheetProblem::kSegments;
+    double from = 0, from_by_length = kPart * segment;
+    const double end = kPart * (segment + 1);
+    std::size_t i = width_.piece_before(length_ - from_by_length * length_);
+    for (bool last = false; !last; --i) {
+      const SheetWidth::Piece& piece = width_.pieces()[i];
+      last = i == 0 || piece.begin <= length_ - end * length_;
+      const double to = last ? 0.0 : -piece.begin, to_by_length = last ? end : 1.0;
+      const double way = to - from + (to_by_length - from_by_length) * length_;
+      const double part = std::ceil(steps * std::abs(way) / (kPart * length_) - 1e-9);
+      const double count = std::clamp(part, 1.0, static_cast<double>(steps));
+      const double h = (to - from) / count, h_by_length = (to_by_length - from_by_length) / count;
+      for (double j = 0; j < count; ++j) {
+        SheetStep& step = next_step(segment);
+        step.s[segment] = from + j * h;
+        step.s_by_length[segment] = from_by_length + j * h_by_length;
+        step.h[segment] = h;
+        step.h_by_length[segment] = h_by_length;
+        step.begin[segment] = piece.begin;
+        step.width[segment] = piece.width;
+        step.slope[segment] = piece.slope;
+        step.weight[segment] = piece.weight;
+      }
+      from = to;
+      from_by_length = to_by_length;
+    }
+  }
+
+  const SheetWidth& width_;
+  double length_;
+  std::vector<SheetStep> steps_;
+  std::array<int, SheetProblem::kSegments> counts_{};
+  Segments start_{};
+  SheetSegments segments_{};
+};
+
+/// States after each step, four rows a step.
+std::vector<Segments> advanced(const SheetSchedule& schedule) {
+  std::vector<Segments> states(static_cast<std::size_t>(schedule.count()));
+  sheet_kernels().advance(schedule.segments(), states.data()->data());
+  return states;
+}
+
+}  // namespace
+
+void set_nodes(const SheetShape& shape, SheetProblem::Path& path) {
+  path.nodes.assign(SheetProblem::kSegments + 1, {});
+  const SheetSchedule schedule(shape.width, path);
+  for (int k = 0; k < SheetProblem::kSegments; ++k) {
+    const auto segment = static_cast<std::size_t>(k);
+    std::array<double, 4> y = path.nodes[segment];
+    for (int i = 0; i < schedule.count(k); ++i)
+      runge_kutta_step<2>(schedule.slope(k, i), schedule.start(k, i), schedule.step(k, i), y);
+    path.nodes[segment + 1] = y;
+  }
 }
 
 void SheetProblem::linearise(const Path& path, System& system) const {
+  const SheetSchedule schedule(shape.width, path);
+  BySegment ends[kStates][1 + kSheetUnknowns];
+  sheet_kernels().linearise(schedule.segments(), ends);
   system.links.resize(kSegments);
-  const std::array<SheetDual, 3> values{SheetDual::unknown(path.values[0], 2), SheetDual::unknown(path.values[1], 3),
-                                        SheetDual::unknown(path.values[2], 4)};
   for (int k = 0; k < kSegments; ++k) {
-    const auto& y = path.nodes[static_cast<std::size_t>(k)];
-    const std::array<SheetDual, 4> start{SheetDual::unknown(y[0], 0), SheetDual::unknown(y[1], 1), y[2], y[3]};
-    const auto end = across<SheetDual>(shape.width, values, k, sheet_steps(shape.width, path, k), start);
     System::Link& link = system.links[static_cast<std::size_t>(k)];
-    for (std::size_t i = 0; i < kStates; ++i) {
-      link.by_state[i][0] = end[i].slope[0];
-      link.by_state[i][1] = end[i].slope[1];
+    for (int i = 0; i < kStates; ++i) {
+      link.by_state[i][0] = ends[i][1][k];
+      link.by_state[i][1] = ends[i][2][k];
       link.by_state[i][2] = i == 2 ? 1.0 : 0.0;
       link.by_state[i][3] = i == 3 ? 1.0 : 0.0;
-      for (int j = 0; j < kParameters; ++j) link.by_parameters[i][j] = end[i].slope[2 + j];
-      link.gap[i] = end[i].value - path.nodes[static_cast<std::size_t>(k) + 1][i];
+      for (int j = 0; j < kParameters; ++j) link.by_parameters[i][j] = ends[i][3 + j][k];
+      link.gap[i] = ends[i][0][k] - path.nodes[static_cast<std::size_t>(k) + 1][static_cast<std::size_t>(i)];
     }
   }
   put_end(path, system);
 }
 
 void SheetProblem::put_gaps(const Path& path, System& system) const {
-  for (int k = 0; k < kSegments; ++k) {
-    const auto end = across_segment(shape, path, k);
-    for (std::size_t i = 0; i < kStates; ++i)
-      system.links[static_cast<std::size_t>(k)].gap[i] = end[i] - path.nodes[static_cast<std::size_t>(k) + 1][i];
-  }
+  const Segments ends = advanced(SheetSchedule(shape.width, path)).back();
+  for (std::size_t k = 0; k < kSegments; ++k)
+    for (std::size_t i = 0; i < kStates; ++i) system.links[k].gap[i] = ends[i][k] - path.nodes[k + 1][i];
   put_end(path, system);
 }
 
@@ -187,37 +233,39 @@ void SheetProblem::put_end(const Path& path, System& system) const {
 
 namespace {
 
-/// What has a zero where something is greatest or least: the slope of the curvature, the curvature, the climb.
-using Signs = std::array<double, 3>;
-
-Signs signs_at(const SheetSlope<double>& slope, double s, const std::array<double, 4>& y) {
-  const auto [curvature, by_moment, along, climb] = slope(s, y);
-  const double widening = slope.piece == nullptr ? 0.0 : slope.piece->slope;
-  return {by_moment + 2.0 * widening * curvature, curvature, y[3] == 0 ? 0.0 : climb};  // 2 b theta'', theta', Z'
-}
-
-struct Extreme {
-  std::array<double, 4> state;
-  double curvature;
+/// What has a zero where something is greatest or least, and its slope along s.
+struct Sign {
+  double value, slope;
 };
 
-/// Where a sign passes zero within a step, by false position with the value of an end that stays halved [Dowell and
-/// Jarratt 1971]. What is sought there is greatest or least, so an error of 1e-5 of the step is one of 1e-10 in it.
-Extreme extreme_between(const SheetSlope<double>& slope, double s, double h, const std::array<double, 4>& y,
-                        std::size_t which, double at_low, double at_high) {
-  double low = 0, high = h, last = high;
-  Extreme found{};
+/// Of the slope of the curvature, 2 b theta''; of the curvature; and of the climb Z'.
+std::array<Sign, 3> signs_at(const SheetSlope<double, double>& slope, double s, const std::array<double, 4>& y) {
+  const auto [curvature, by_moment, along, climb] = slope(s, y);
+  double width = 1, widening = 0, before = s;
+  if (!slope.even) {
+    const double t = slope.length - s;
+    width = slope.piece.width_at(t);
+    widening = slope.piece.slope;
+    before = slope.weight - slope.piece.weight_at(t);
+  }
+  const double bends = by_moment + 2.0 * widening * curvature, by_s = bends / (2.0 * width);
+  const double turned = (slope.up - before) * climb + slope.forward * along;
+  return {Sign{bends, -width * along - turned * curvature + 2.0 * widening * by_s}, Sign{curvature, by_s},
+          Sign{y[3] == 0 ? 0.0 : climb, along * curvature}};
+}
+
+/// Where the cubic with such values and slopes at both ends of a step of 1 is zero, by false position with the value
+/// of an end that stays halved [Dowell and Jarratt 1971].
+double zero_between(const Sign& from, const Sign& to, double step) {
+  double low = 0, high = 1, at_low = from.value, at_high = to.value, place = 0;
   int side = 0;
   for (int i = 0; i < 30; ++i) {
-    const double place = (low * at_high - high * at_low) / (at_high - at_low);
-    found.state = y;
-    runge_kutta_step<2>(slope, s, place, found.state);
-    const Signs signs = signs_at(slope, s + place, found.state);
-    found.curvature = signs[1];
-    if (std::abs(place - last) < 1e-5 * h) break;
-    last = place;
-    const double value = signs[which];
-    if (value == 0) break;
+    const double last = place;
+    place = (low * at_high - high * at_low) / (at_high - at_low);
+    if (i > 0 && std::abs(place - last) < 1e-6) break;
+    const double u = place, v = 1 - place;
+    const double value = from.value * v * v * (1 + 2 * u) + to.value * u * u * (1 + 2 * v) +
+                         step * u * v * (from.slope * v - to.slope * u);
     if ((value < 0) == (at_low < 0)) {
       low = place;
       at_low = value;
@@ -230,7 +278,24 @@ Extreme extreme_between(const SheetSlope<double>& slope, double s, double h, con
       side = -1;
     }
   }
-  return found;
+  return place;
+}
+
+/// Moves to where a sign is zero within a step from s to s + h: by a cubic, and a step of Newton's method from there.
+/// What is sought there is greatest or least, so an error of 1e-5 of the step is one of 1e-10 in it.
+void move_to_extreme(const SheetSlope<double, double>& slope, double& s, double h, std::array<double, 4>& y,
+                     std::size_t which, const Sign& from, const Sign& to) {
+  const double place = h * zero_between(from, to, h);
+  runge_kutta_step<2>(slope, s, place, y);
+  s += place;
+  const Sign sign = signs_at(slope, s, y)[which];
+  const double rest = sign.slope == 0 ? 0.0 : std::clamp(-sign.value / sign.slope, -place, h - place);
+  auto middle = y;  // the midpoint rule: the rest is short
+  const auto at_start = slope(s, y);
+  for (std::size_t i = 0; i < y.size(); ++i) middle[i] += 0.5 * rest * at_start[i];
+  const auto halfway = slope(s + 0.5 * rest, middle);
+  for (std::size_t i = 0; i < y.size(); ++i) y[i] += rest * halfway[i];
+  s += rest;
 }
 
 }  // namespace
@@ -243,21 +308,26 @@ SheetExtremes sheet_extremes(const SheetShape& shape, const SheetProblem::Path& 
     found.largest_angle = std::max(found.largest_angle, y[0]);
     found.lowest = std::min(found.lowest, y[3]);
   };
+  const SheetSchedule schedule(shape.width, path);
+  const std::vector<Segments> states = advanced(schedule);
   for (int k = 0; k < SheetProblem::kSegments; ++k) {
-    std::array<double, 4> y = path.nodes[static_cast<std::size_t>(k)];
-    const int steps = sheet_steps(shape.width, path, k);
-    step_across(shape.width, path.values, k, steps, [&](const SheetSlope<double>& slope, double s, double h) {
-      const std::array<double, 4> start = y;
-      const Signs before = signs_at(slope, s, y);
-      runge_kutta_step<2>(slope, s, h, y);
-      const Signs after = signs_at(slope, s + h, y);
-      see(after[1], y);
+    std::array<double, 4> start = path.nodes[static_cast<std::size_t>(k)];
+    for (int i = 0; i < schedule.count(k); ++i) {
+      const auto slope = schedule.slope(k, i);
+      const double s = schedule.start(k, i), h = schedule.step(k, i);
+      std::array<double, 4> end{};
+      for (std::size_t j = 0; j < end.size(); ++j) end[j] = states[static_cast<std::size_t>(i)][j][k];
+      const auto before = signs_at(slope, s, start), after = signs_at(slope, s + h, end);
+      see(after[1].value, end);
       for (std::size_t j = 0; j < after.size(); ++j) {
-        if (before[j] * after[j] >= 0) continue;
-        const Extreme extreme = extreme_between(slope, s, h, start, j, before[j], after[j]);
-        see(extreme.curvature, extreme.state);
+        if (before[j].value * after[j].value >= 0) continue;
+        double at = s;
+        std::array<double, 4> extreme = start;
+        move_to_extreme(slope, at, h, extreme, j, before[j], after[j]);
+        see(slope(at, extreme)[0], extreme);
       }
-    });
+      start = end;
+    }
   }
   return found;
 }

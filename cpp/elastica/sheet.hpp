@@ -12,6 +12,7 @@
 #include <array>
 #include <vector>
 
+#include "elastica/sheet_kernels.hpp"
 #include "elastica/sheet_width.hpp"
 #include "elastica/shooting.hpp"
 
@@ -34,7 +35,7 @@ enum class TipTarget {
 class SheetProblem {
  public:
   static constexpr int kStates = 4, kParameters = 3;  // theta, m, X, Z; R, T, length
-  static constexpr int kSegments = 8;
+  static constexpr int kSegments = kSheetSegments;
   using Path = ShootingPath<kStates, kParameters>;
   using System = ShootingSystem<kStates, kParameters>;
 
@@ -57,8 +58,8 @@ class SheetProblem {
 /// within r, 1 / b has a pole at that distance, and the error is about 1e-5 (h / r)^8.
 int sheet_steps(const SheetWidth& width, const SheetProblem::Path& path, int segment);
 
-/// State at the end of a segment, integrated from that at its start.
-std::array<double, 4> across_segment(const SheetShape& shape, const SheetProblem::Path& path, int segment);
+/// States at the cuts of a path that is integrated from its start on.
+void set_nodes(const SheetShape& shape, SheetProblem::Path& path);
 
 /// Of what of a sheet of a length is not lifted [w Lgb].
 double lying_weight(const SheetWidth& width, const SheetProblem::Path& path, double sheet_length);

@@ -38,8 +38,7 @@ SheetPose pose_of(const SheetProblem::Path& path) { return {tip_back(path), tip_
 void set_sheet_forces(const SheetShape& shape, const SheetForces& forces, SheetMotionData& data) {
   data.problem.shape = shape;
   data.path.values = forces;
-  data.path.nodes.assign(1, {});
-  for (int k = 0; k < SheetProblem::kSegments; ++k) data.path.nodes.push_back(across_segment(shape, data.path, k));
+  set_nodes(shape, data.path);
 }
 
 bool move_sheet(const SheetPose& pose, SheetMotionData& data, double least_share) {

@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <vector>
 
+#include "elastica/sheet_slope.hpp"
+
 namespace withe {
 
 /// b(t), t the distance from the tip [Lgb], relative to the width at which w is the sheet's weight per length; so b is
@@ -15,19 +17,7 @@ class SheetWidth {
   /// Widths at places that begin at 0 and grow.
   SheetWidth(const std::vector<double>& places, const std::vector<double>& widths);
 
-  /// From a place on: b = width + slope (t - begin); `weight` is that of all before it, from the tip on.
-  struct Piece {
-    double begin = 0, width = 1, slope = 0, weight = 0;
-
-    template <class Scalar>
-    Scalar width_at(const Scalar& t) const {
-      return width + slope * (t - begin);
-    }
-    template <class Scalar>
-    Scalar weight_at(const Scalar& t) const {
-      return weight + (t - begin) * (width + (0.5 * slope) * (t - begin));
-    }
-  };
+  using Piece = WidthPiece<double>;
 
   bool even() const { return pieces_.empty(); }
   const std::vector<Piece>& pieces() const { return pieces_; }

@@ -25,12 +25,14 @@ __all__ = [
     "Grid",
     "IndexArray",
     "Network",
+    "Ways",
     "gentle",
     "lift",
     "make_grid",
     "make_network",
     "nodes_near",
     "shortest_path",
+    "ways_to",
 ]
 
 FloatArray = npt.NDArray[np.float64]
@@ -192,30 +194,56 @@ def _links(network: Network, end: Elastica) -> tuple[IndexArray, FloatArray]:
     return nodes, _weights(away, network.cost[nodes], float(end.force_ratio[0]))
 
 
-def shortest_path(network: Network, start: Elastica | None, goal: Elastica) -> Elastica | None:
-    """Nodes of the path of least accumulated cost times length, uniform cost search [dissertation, Alg. 7, mended].
+@dataclass(frozen=True)
+class Ways:
+    """Ways of least cost from every node to a goal.
 
-    From flat, or from a pose; to a pose. None where no path is.
+    Attributes
+    ----------
+    network : Network
+    goal : Elastica
+    cost : ndarray of shape (nodes,)
+        Of the way from a node; infinite where there is none.
+    following : ndarray of int, shape (nodes,)
+        Node after each on its way; as many as there are nodes means the goal.
+    """
+
+    network: Network
+    goal: Elastica
+    cost: FloatArray
+    following: IndexArray
+
+
+def ways_to(network: Network, goal: Elastica) -> Ways:
+    """Search uniform cost, from a goal back, by cost times length [dissertation, Alg. 7, mended].
+
+    Whatever pose one sets out from, it is the same search: a plan and its replans share it.
     """
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import dijkstra
 
-    grid, graph, source = network.grid, network.graph, 0
-    if start is not None:
-        if np.hypot(start.x - goal.x, start.z - goal.z)[0] < 1.5 * grid.spacing:
-            return join(start, goal)
-        source = graph.shape[0]
-        nodes, costs = _links(network, start)
-        rows = np.append(graph.indptr, graph.indptr[-1] + len(nodes))
-        parts = (np.append(graph.data, costs), np.append(graph.indices, nodes), rows)
-        graph = csr_array(parts, shape=(source + 1, source + 1))
-    distance, before = dijkstra(graph, indices=source, return_predecessors=True)
-    last, costs = _links(network, goal)
-    total = distance[last] + costs
-    if not len(last) or not np.isfinite(total).any():
+    graph, count = network.graph, network.graph.shape[0]
+    nodes, costs = _links(network, goal)
+    rows = np.append(graph.indptr, graph.indptr[-1] + len(nodes))
+    parts = (np.append(graph.data, costs), np.append(graph.indices, nodes), rows)
+    cost, following = dijkstra(csr_array(parts, shape=(count + 1, count + 1)), indices=count, return_predecessors=True)
+    return Ways(network, goal, cost[:count], following[:count])
+
+
+def shortest_path(ways: Ways, start: Elastica | None) -> Elastica | None:
+    """Nodes of the way of least cost from flat, or from a pose; None where there is none."""
+    grid, goal = ways.network.grid, ways.goal
+    if start is None:
+        nodes, costs = np.array([0]), np.zeros(1)
+    elif np.hypot(start.x - goal.x, start.z - goal.z)[0] < 1.5 * grid.spacing:
+        return join(start, goal)
+    else:
+        nodes, costs = _links(ways.network, start)
+    total = ways.cost[nodes] + costs
+    if not len(nodes) or not np.isfinite(total).any():
         return None
-    way = [int(last[np.argmin(total)])]
-    while before[way[-1]] not in (source, -9999):
-        way.append(int(before[way[-1]]))
-    first = take(grid.pose, slice(0, 1)) if start is None else start
-    return join(join(first, take(grid.pose, np.array(way[::-1]))), goal)
+    way = [int(nodes[np.argmin(total)])]
+    while ways.following[way[-1]] < len(ways.following):
+        way.append(int(ways.following[way[-1]]))
+    path = join(take(grid.pose, np.array(way)), goal)
+    return path if start is None else join(start, path)

@@ -13,12 +13,14 @@ from withe.folding.free_moment import Holding
 from withe.folding.grid import (
     IndexArray,
     Network,
+    Ways,
     gentle,
     lift,
     make_grid,
     make_network,
     nodes_near,
     shortest_path,
+    ways_to,
 )
 from withe.folding.manifold import Manifold
 from withe.folding.sheets import SHORTEST, Elastica, at_forces, join, poses_of, slides_to_rest, take
@@ -55,7 +57,12 @@ def goal_pose(solve: Manifold, x: float, z: float, depth: float, finger: float) 
 
 def uniform_cost(solve: Manifold, holding: Holding, goal: Elastica, start: Elastica | None = None) -> Elastica | None:
     """Nodes from flat, or a pose, to a goal over a sheet's part of the manifold, at least accumulated force ratio."""
-    return shortest_path(_by_ratio(solve, holding), start, goal)
+    return shortest_path(_ways_by_ratio(solve, holding, goal), start)
+
+
+@lru_cache(maxsize=8)
+def _ways_by_ratio(solve: Manifold, holding: Holding, goal: Elastica) -> Ways:
+    return ways_to(_by_ratio(solve, holding), goal)
 
 
 @lru_cache(maxsize=8)
@@ -86,7 +93,7 @@ def least_slide(
     network = make_network(grid, cost, allowed)
     begin = np.array([0]) if start is None else nodes_near(network, start)
     within = _needed_slides(solve, holding.length, friction).spread(network, begin, nodes_near(network, goal))
-    return None if within is None else shortest_path(make_network(grid, cost, within), start, goal)
+    return None if within is None else shortest_path(ways_to(make_network(grid, cost, within), goal), start)
 
 
 class _NeededSlides:

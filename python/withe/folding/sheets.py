@@ -37,7 +37,7 @@ no method plans over them [Choi, dissertation, 7.8.5]. [Lgb]"""
 _LEAST_SHARE = 500  # sheets that are worth a thread of their own
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Elastica:
     """How a sheet hangs, pose by pose. All arrays have the shape of what was asked for.
 
