@@ -19,11 +19,12 @@ constexpr double kDecay = 0.6;        ///< as much of the exponent with which a 
 template <class Scalar>
 using Vector = std::array<Scalar, 3>;
 
-/// The moment of the floor's force, which acts a lever below the centreline, on the state at lift-off.
+/// The moment of the floor's force, which acts below and behind lift-off, on the state there.
 template <std::size_t count, class Scalar>
-void put_lever(double lever, const Vector<Scalar>& floor, std::array<Scalar, count>& y) {
+void put_lever(double lever, double behind, const Vector<Scalar>& floor, std::array<Scalar, count>& y) {
   y[3] -= lever * floor[1];
   y[4] += lever * floor[0];
+  y[5] += behind * floor[1];
 }
 
 /// The equations of the header: t, m, then what follows from them (r, or a quaternion and r).
@@ -121,7 +122,7 @@ void RodProblem<end>::linearise(const Path& path, System& system) const {
       const auto at = static_cast<std::size_t>(i);
       state[at] = i < kCoupled ? Number::unknown(y[at], i) : Number(y[at]);
     }
-    if (k == 0) put_lever(lever, slope.floor, state);
+    if (k == 0) put_lever(lever, behind, slope.floor, state);
     across<kCoupled>(slope, cuts[k], cuts[k + 1], rod_steps(force, cuts[k], cuts[k + 1], y), state);
     typename System::Link& link = system.links[k];
     for (int i = 0; i < kStates; ++i) {
@@ -186,7 +187,7 @@ RodShape rod_shape(const RodProblem<end>& problem, const typename RodProblem<end
   };
   const auto start_of = [&](std::size_t k) {
     std::copy_n(path.nodes[k].begin(), 6, y.begin());
-    if (k == 0) put_lever(problem.lever, shape.floor_force, y);
+    if (k == 0) put_lever(problem.lever, problem.behind, shape.floor_force, y);
   };
   start_of(0);
   keep(0.0);

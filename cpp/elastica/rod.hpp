@@ -9,9 +9,11 @@
 /// curvature kappa in the floor's plane (kappa > 0 bends towards -y), none across it, for a floor gives no moment about
 /// y; and no twist anywhere, for m.t is constant along a rod whose section bends alike in all directions.
 ///
-/// A rod of some thickness rests on its surface, and F acts a lever below its centreline: then
-///   m(0) = lever (F_x y - F_y x) - 2 kappa z,
-/// and m.t = -lever F_y twists it all along.
+/// A rod of some thickness rests on its surface, and F acts a lever r below its centreline: then
+///   m(0) = r (F_x y - F_y x) + (b F_y - 2 kappa) z,
+/// and m.t = -r F_y twists it all along. Where it lies it may roll, and moves aside by y = -r phi, phi its turn about
+/// itself. Friction f across bends it, EI y'''' = f, and turns it, GJ phi'' = -r f; so y'''' = y'' / b^2 with
+/// b = r sqrt(EI / GJ), and F_y is spread behind lift-off as exp(-s / b): its resultant acts b behind.
 /// [Kirchhoff's rod with stretch; dissertation (9.1), with what (9.3) leaves of it.]
 
 #include <array>
@@ -22,6 +24,8 @@
 namespace withe {
 
 using RodVector = std::array<double, 3>;
+
+constexpr double kRodBendStiffness = 2.0;  ///< EI [w Lgb^2]
 
 /// What is asked of the held end, and which two of the floor's three forces are unknown for it.
 enum class RodEnd {
@@ -41,6 +45,7 @@ class RodProblem {
   double stretch_stiffness = 1e9;  ///< EA [w Lgb]
   double given_force = 0;          ///< the third component of F
   double lever = 0;                ///< of F below the centreline [Lgb]
+  double behind = 0;               ///< b: how far behind lift-off F_y acts [Lgb]
   std::array<double, 2> goal{};    ///< of the position
   std::vector<double> cuts;        ///< s of each node; the last one is the suspended length
 

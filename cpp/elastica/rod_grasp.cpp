@@ -127,6 +127,7 @@ bool GraspTable::solve(const GraspQuestion& asked, const std::vector<double>& cu
   problem.stretch_stiffness = asked.stretch_stiffness;
   problem.given_force = 0;
   problem.lever = asked.lever;
+  problem.behind = asked.lever * std::sqrt(kRodBendStiffness / asked.twist_stiffness);
   problem.cuts = cuts;
   guess(asked.suspended, std::abs(asked.curvature), problem.cuts, data.path);
   const ShootingOutcome outcome = data.solver.solve(problem, data.path);
@@ -150,18 +151,18 @@ bool GraspTable::solve(const GraspQuestion& asked, const std::vector<double>& cu
   return true;
 }
 
-RodGrasp GraspTable::grasp(const GraspQuestion& asked, double twist_stiffness, Data& data) const {
+RodGrasp GraspTable::grasp(const GraspQuestion& asked, Data& data) const {
   RodGrasp found;
   found.solved = solve(asked, data);
   if (!found.solved) return found;
   const double segment = data.problem.cuts[1];
   const RodShape shape = rod_shape(data.problem, data.path, static_cast<int>(std::ceil(segment / kLongestElement)));
   found.tip = shape.points.back();
-  found.tip.rotation = rolled(found.tip.rotation, shape.twist * shape.suspended / twist_stiffness);
+  found.tip.rotation = rolled(found.tip.rotation, shape.twist * shape.suspended / asked.twist_stiffness);
   found.floor_force = shape.floor_force;
   found.residual = shape.residual;
   found.solved = shape.lowest > -kBelowFloor && (asked.base_angle != 0 || shape.floor_force[2] > 0);
-  found.stable = rod_is_stable(shape, twist_stiffness);
+  found.stable = rod_is_stable(shape, asked.twist_stiffness);
   return found;
 }
 

@@ -17,6 +17,7 @@ struct GraspQuestion {
   double axial_force = 0;               ///< of the floor on the rod, along x
   double base_angle = 0;  ///< of the tangent at the floor above x, where a free end stands there: then no curvature
   double lever = 0;       ///< of the floor's force below the centreline, the radius of a rod that rests on its surface
+  double twist_stiffness = 4.0 / 3.0;  ///< GJ, by default that of a round rod of incompressible material
 };
 
 /// What a user sees of one grasp. Lengths in Lgb, forces in w Lgb.
@@ -51,7 +52,7 @@ class GraspTable {
   bool solve(const GraspQuestion& asked, Data& data) const { return solve(asked, rod_cuts(asked.suspended), data); }
   bool solve(const GraspQuestion& asked, const std::vector<double>& cuts, Data& data) const;
 
-  RodGrasp grasp(const GraspQuestion& asked, double twist_stiffness, Data& data) const;
+  RodGrasp grasp(const GraspQuestion& asked, Data& data) const;
 
  private:
   void guess(double suspended, double curvature, const std::vector<double>& cuts, GraspProblem::Path& path) const;

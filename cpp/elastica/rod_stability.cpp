@@ -8,7 +8,6 @@ namespace withe {
 
 namespace {
 
-constexpr double kBendStiffness = 2.0;
 using Matrix = std::array<RodVector, 3>;
 
 double dot(const RodVector& a, const RodVector& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
@@ -72,7 +71,7 @@ Element element(const RodShape& shape, std::size_t i, double twist_stiffness) {
   const RodVector shear = cross(t, n);
   const auto unit = [](std::size_t r, std::size_t c) { return r == c ? 1.0 : 0.0; };
   const Matrix stiffness = filled([&](std::size_t r, std::size_t c) {
-    return (kBendStiffness * (unit(r, c) - t[r] * t[c]) + twist_stiffness * t[r] * t[c]) / h;
+    return (kRodBendStiffness * (unit(r, c) - t[r] * t[c]) + twist_stiffness * t[r] * t[c]) / h;
   });
   const Matrix weight = filled([&](std::size_t r, std::size_t c) {
     const double turned = stretch * (dot(n, t) * unit(r, c) - 0.5 * (n[r] * t[c] + t[r] * n[c]));

@@ -28,8 +28,8 @@ Numbers grasps(const GraspTable& table, const Numbers& questions, double twist_s
   const py::gil_scoped_release unlocked;
   GraspTable::Data data;
   for (py::ssize_t i = 0; i < questions.shape(0); ++i, asked += 6, row += 13) {
-    const GraspQuestion question{asked[0], asked[1], asked[2], asked[3], asked[4], asked[5]};
-    const RodGrasp found = table.grasp(question, twist_stiffness, data);
+    const GraspQuestion question{asked[0], asked[1], asked[2], asked[3], asked[4], asked[5], twist_stiffness};
+    const RodGrasp found = table.grasp(question, data);
     double* to = std::copy(found.tip.position.begin(), found.tip.position.end(), row);
     to = std::copy(found.tip.rotation.begin(), found.tip.rotation.end(), to);
     to = std::copy(found.floor_force.begin(), found.floor_force.end(), to);
@@ -54,7 +54,12 @@ Numbers points_of(const RodShape& shape) {
 Numbers grasp_points(const GraspTable& table, double suspended, double curvature, double stretch_stiffness,
                      double axial_force) {
   GraspTable::Data data;
-  require(table.solve({suspended, curvature, stretch_stiffness, axial_force}, data), "no grasp found");
+  require(table.solve({.suspended = suspended,
+                       .curvature = curvature,
+                       .stretch_stiffness = stretch_stiffness,
+                       .axial_force = axial_force},
+                      data),
+          "no grasp found");
   return points_of(rod_shape(data.problem, data.path, 6));
 }
 

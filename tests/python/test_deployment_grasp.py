@@ -80,7 +80,9 @@ def test_a_thick_rod_is_twisted_by_the_friction_at_its_surface(suspended, curvat
         turning = (moment - along * t) / bend + along / twist * t
         return np.concatenate([longer * t, np.cross(turning, r.T).T.ravel(), -longer * np.cross(t, n)])
 
-    couple = np.cross([0.0, 0.0, -radius], force)  # of the floor, about the centreline
+    # Of the floor, about the centreline at lift-off, some way behind which force_y acts.
+    couple = np.cross([0.0, 0.0, -radius], force)
+    couple += np.cross([-radius * np.sqrt(bend / twist), 0.0, 0.0], [0.0, force[1], 0.0])
     start = np.concatenate([np.zeros(3), np.eye(3).ravel(), [0.0, 0.0, -bend * curvature] - couple])
     end = solve_ivp(slopes, (0.0, suspended), start, rtol=1e-10, atol=1e-11).y[:, -1]
     rotation = Rotation.from_rotvec(found.rotation).as_matrix()

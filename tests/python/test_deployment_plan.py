@@ -152,7 +152,7 @@ def loop(count=300):
         (lambda: plan(CABLE, Pattern(wave()), time_step=-1.0), "time_step must be positive"),
         (lambda: plan(CABLE, Pattern(loop())), "must not cross itself"),
         (lambda: plan(Cable.dlo(5), Pattern(wave(0.06))), "no floor holds this cable on this pattern"),
-        (lambda: plan(Cable(1.5, 0.01, 0.1), Pattern(wave(0.2))), "no floor holds this cable .*: no grasp found"),
+        (lambda: plan(Cable(1.5, 0.015, 0.1), Pattern(wave(0.2))), "no floor holds this cable .*: no grasp found"),
         (lambda: plan(Cable(1.5, 0.04, 0.09), Pattern(wave(0.2)), "intuitive"), "tighter than the cable's own of 40"),
         (lambda: plan(CABLE, wave()), "pattern must be a withe.deployment.Pattern, got ndarray"),
         (lambda: plan(2, Pattern(wave())), "cable must be a withe.deployment.Cable, got int"),

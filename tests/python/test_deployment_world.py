@@ -151,6 +151,13 @@ def test_quasi_static_laying_is_what_slow_laying_tends_to(arc):
     assert not np.any(still.record.energy().kinetic)
 
 
+def test_bends_of_a_thick_cable_are_laid_where_they_should_lie():
+    """Had friction across acted where the cable lifts off, and not behind it, .97 mm."""
+    sine = np.genfromtxt(PATTERNS / "sine.csv", delimiter=",", skip_header=1)
+    found = deploy(plan(Cable.dlo(1), Pattern(sine)), floor=0.4, quasi_static=True, progress=False)
+    assert found.error < 0.7e-3
+
+
 @pytest.mark.parametrize("nodes", [80, 200])
 def test_equilibria_follow_a_cable_of_any_mesh_that_slips_along_its_length(nodes):
     """The border of what slips goes on by a node an iteration: the finer the mesh, the more of them it takes."""
@@ -158,7 +165,7 @@ def test_equilibria_follow_a_cable_of_any_mesh_that_slips_along_its_length(nodes
     motion = plan(Cable.dlo(2), Pattern(sine))
     found = deploy(motion, floor=0.2, nodes=nodes, quasi_static=True, progress=False)
     assert found.slipped.max() > 5e-3
-    assert found.error == pytest.approx(4.1e-3, abs=1e-4)  # in time, at 6 mm/s: 4.16 mm
+    assert found.error == pytest.approx(3.73e-3, abs=1e-4)  # in time, at 6 mm/s, 80 nodes: 3.78 mm
 
 
 def test_equilibria_are_found_where_the_border_of_slip_has_many_nodes_to_go():

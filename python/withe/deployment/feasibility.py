@@ -11,7 +11,7 @@ import numpy.typing as npt
 from withe.common import validation
 from withe.deployment.cable import JAW, Cable
 from withe.deployment.grasp_network import shipped
-from withe.deployment.grasping import Grasp, grasp, least_friction, table, twisted
+from withe.deployment.grasping import Grasp, grasp, least_friction, table, thickened
 from withe.deployment.smoothing import least_tension
 from withe.errors import ConvergenceError
 
@@ -197,7 +197,10 @@ def grasps_along(pattern: Laid, cable: Cable, controller: str) -> Grasp:
     curvature = -lgb * pattern.curvature  # grasps bend to the right
     thick = cable.radius / lgb
     if controller == "network":
-        return twisted(shipped()(suspended, curvature, cable.stretch_stiffness), suspended, curvature, thick)
+        network = shipped()
+        return thickened(
+            lambda length, bend: network(length, bend, cable.stretch_stiffness), suspended, curvature, thick
+        )
     try:
         if controller == "least_friction":
             shear = _BEND_STIFFNESS * lgb**2 * np.gradient(pattern.curvature, pattern.arc_length)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
 
@@ -19,7 +20,7 @@ _BEND_STIFFNESS = 2.0  # EI in units of w Lgb^2
 _SHARES = (0.0, 0.25, 0.5, 0.7, 0.85, 1.0, 1.2)  # of curvature^2 that a push along the rod may be [w Lgb^3]
 _THICKEST = 0.25  # [Lgb]: a rod's radius
 _ENOUGH = 8.0  # [Lgb] of suspended length: for longer ones forces are the same
-TWIST_STIFFNESS = _BEND_STIFFNESS / 1.5  # GJ of a round rod of incompressible material; it decides stability only
+TWIST_STIFFNESS = _BEND_STIFFNESS / 1.5  # GJ of a round rod of incompressible material
 
 
 @dataclass(frozen=True)
@@ -79,8 +80,11 @@ def grasp(
     (Choi, dissertation, (9.1) and what (9.3) leaves of it), solved by multiple shooting with exact derivatives. The two
     unknowns are the floor's forces across the rod, along y and z; none acts along it, or a given one.
 
-    A rod of some radius rests on its surface, where friction acts: m(0) gains radius (force_x y - force_y x), and
-    -radius force_y twists what hangs. Held by a jaw that is turned as far, the rod does not roll where it lies.
+    A rod of some radius r rests on its surface, where friction acts: m(0) gains r (force_x y - force_y x), and
+    -r force_y twists what hangs. Held by a jaw that is turned as far, the rod does not roll where it lies, but for a
+    little behind the lift-off point, where it moves aside as it rolls: friction f across bends it, EI d^4y/ds^4 = f,
+    and turns it, GJ d^2y/ds^2 = r^2 f. So f dies out as exp(-s / b) with b = r sqrt(EI / GJ), force_y acts b behind
+    the lift-off point, and m(0) gains b force_y z. (Not in the dissertation, whose cables are thin.)
 
     Parameters
     ----------
@@ -94,7 +98,8 @@ def grasp(
     axial_force : array_like [w Lgb]
         Of the floor on the suspended part along x. A push of some .82 curvature^2 needs least friction.
     radius : array_like [Lgb]
-        How far below the centreline the floor's force acts: at most .25; 0 in the dissertation.
+        How far below the centreline the floor's force acts: at most .25; 0 in the dissertation. GJ is that of a round
+        rod of incompressible material.
 
     Returns
     -------
@@ -203,18 +208,27 @@ def least_friction(
     return _described(chosen, questions, (count,))
 
 
-def twisted(found: Grasp, suspended: FloatArray, curvature: FloatArray, radius: float) -> Grasp:
-    """Grasps of a thin rod, without force along the floor, turned about the rod as those of a thick one are.
+def thickened(
+    solve: Callable[[FloatArray, FloatArray], Grasp], suspended: FloatArray, curvature: FloatArray, radius: float
+) -> Grasp:
+    """Grasps of a thick rod by those that `solve` knows of a thin one, without force along the floor; nearly.
 
-    The couples at lift-off and of the jaw balance about the upright axis, force_y x = 2 curvature - radius force_y t_z.
-    Where the jaw is changes too, at a curvature of .5 / Lgb by up to some .3 radius; that is left out.
+    That force_y acts behind the lift-off point makes the curvature there less, and twisted is the rod as `grasp` says.
+    Couples at lift-off and of the jaw balance about the upright axis: force_y x = m(0)_z - radius force_y t_z. By how
+    much its twist bends a rod, some .3 radius where the jaw is at a curvature of .5 / Lgb, is left out.
     """
     from scipy.spatial.transform import Rotation
 
+    behind = radius * np.sqrt(_BEND_STIFFNESS / TWIST_STIFFNESS)
+
+    def across(found: Grasp) -> FloatArray:
+        up = Rotation.from_rotvec(found.rotation).as_matrix()[:, 2, 0]
+        return np.asarray(_BEND_STIFFNESS * curvature / (found.position[:, 0] + radius * up + behind))
+
+    first = across(solve(suspended, curvature))
+    found = solve(suspended, curvature - behind * first / _BEND_STIFFNESS)
     held = Rotation.from_rotvec(found.rotation)
-    up = held.as_matrix()[:, 2, 0]
-    across = _BEND_STIFFNESS * curvature / (found.position[:, 0] + radius * up)
-    angle = -radius * across * suspended / TWIST_STIFFNESS
+    angle = -radius * across(found) * suspended / TWIST_STIFFNESS
     return replace(found, rotation=(held * Rotation.from_rotvec(angle[:, None] * [1.0, 0.0, 0.0])).as_rotvec())
 
 
