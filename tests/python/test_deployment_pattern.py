@@ -241,6 +241,24 @@ def test_a_pattern_that_ends_on_its_beginning_is_said_to_lie_on_itself():
     assert "lies on the cable itself" in str(found)
 
 
+def test_what_is_pushed_aside_drags_the_rest_along_as_a_beam_that_friction_loads():
+    angle = np.linspace(0.0, 2 * np.pi, 1500)
+    ring, cable, friction = Pattern(0.1 * np.stack([np.sin(angle), 1 - np.cos(angle)], 1)), Cable.dlo(2), 0.5
+    found = ring.feasibility(cable, friction)
+    last = [slip for slip in found.slips if slip.test == "overlap"][-1]
+    here = np.flatnonzero(found.overlap[len(found.overlap) // 2 :])[0] + len(found.overlap) // 2
+    reach = found.arc_length[here] - last.start
+    # EI d^4y/ds^4 = -load, y = y' = y'' = 0 at s = 0: y = (shear s^3 / 6 - load s^4 / 24) / EI, until its slope is 0.
+    load_over_stiffness = friction / (2.0 * cable.gravito_bending_length**3)
+
+    def pushed(reach):
+        deflection = load_over_stiffness * np.polynomial.Polynomial([0, 0, 0, reach / 3 / 6, -1 / 24])
+        assert deflection.deriv()(reach) == pytest.approx(0.0, abs=1e-12)
+        return deflection(reach)
+
+    assert pushed(reach) <= 2.0 * cable.radius < pushed(reach + 1.01 * found.arc_length[1])
+
+
 @pytest.mark.parametrize("length", [0.1, 0.3, 1.0])
 @pytest.mark.parametrize("angle", [0.0, 0.3, 1.2])
 def test_a_straight_line_stays_where_it_is(length, angle):

@@ -12,13 +12,13 @@ from withe.folding.jaw_motion import JawMotion
 from withe.parts.handles import Rod
 from withe.simulation.simulation import Simulation
 
-__all__ = ["Watch", "carried"]
+__all__ = ["FRAMES", "Watch", "carried"]
 
+FRAMES = 0.05  # between those of a record [s]
 _SETTLING = 0.5  # after the last motion [s]
 _SNAP = 10.0  # times as fast as the jaw has lately been is no folding any more,
 _FAST = 0.2  # where it is faster than this [m/s]
 _LONGEST = 600.0  # [s]
-_FRAMES = 0.05  # [s]
 
 
 class Watch:
@@ -52,10 +52,12 @@ class Watch:
         return self.failure is not None or (self._end is not None and simulation.time > self._end - 1e-9)
 
 
-def carried(simulation: Simulation, jaw: JawMotion, rods: Sequence[Rod], duration: float, progress: bool) -> Watch:
+def carried(
+    simulation: Simulation, jaw: JawMotion, rods: Sequence[Rod], duration: float, record_every: float, progress: bool
+) -> Watch:
     """Run until the jaw has done its motions and the sheet has settled, or until it snaps.
 
-    `duration` [s] is what a progress bar expects of the motions.
+    `duration` [s] is what a progress bar expects of the motions, `record_every` [s] as that of `Simulation.run`.
     """
     watch = Watch(jaw, rods)
     with progress_bar(duration + _SETTLING, "folding", progress) as bar:
@@ -68,7 +70,7 @@ def carried(simulation: Simulation, jaw: JawMotion, rods: Sequence[Rod], duratio
             return jaw.longest_step(simulation.time, simulation.time_step)
 
         try:
-            simulation.run(_LONGEST, _FRAMES, progress=False, until=ended, longest_step=longest_step)
+            simulation.run(_LONGEST, record_every, progress=False, until=ended, longest_step=longest_step)
         except ConvergenceError as error:
             watch.failure = f"no solution: {error}"
     return watch

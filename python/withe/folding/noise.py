@@ -120,6 +120,8 @@ class Drawn:
     def off(self, time: float, share: float) -> FloatArray:
         """How far the jaw is from where it should be, (x, z [m], angle [rad]); `share` of it has come in."""
         amplitude, frequency, phase = self.waves[..., 0], self.waves[..., 1], self.waves[..., 2]
+        if not amplitude.any():
+            return share * self.shift
         jitter = (amplitude * np.sin(frequency * time + phase)).sum(axis=0)
         return np.asarray(share * (self.shift + np.array([jitter[0], jitter[1], 0.0])))
 

@@ -144,7 +144,7 @@ def plunge(
     with progress_bar(len(papers) + 2 * len(ways), "plunging", progress) as bar:
         tried: list[_Tried] = []
         for paper in papers:
-            options = sheet if sheet is not None else _COARSE if tried else {}
+            options = {"record_every": np.inf, **(sheet if sheet is not None else _COARSE if tried else {})}
             tried.append(_Tried(slow, SimulatedSheet(paper, jaw=plan.jaw, **options), looks))
             bar.advance(1)
             if tried[0].snapped:

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
-from withe.folding.carrying import Watch, carried
+from withe.folding.carrying import FRAMES, Watch, carried
 from withe.folding.jaw import Jaw
 from withe.folding.jaw_motion import JawMotion, Motion, lead
 from withe.folding.noise import Drawn, Noise
@@ -104,6 +104,8 @@ class SimulatedSheet:
         Of backward Euler; shorter where the jaw would move by more than 2 mm in a step, and for .1 s after that.
     own_friction : float
         Coefficient of the sheet on itself.
+    record_every : float [s]
+        Between frames of `Fold.record`, at which steps end; infinity keeps none on the way.
 
     Attributes
     ----------
@@ -137,6 +139,7 @@ class SimulatedSheet:
         edges: int = 150,
         time_step: float = 0.01,
         own_friction: float = 0.3,
+        record_every: float = FRAMES,
     ) -> None:
         if not isinstance(paper, Paper):
             raise ValueError(f"paper must be a Paper, got {paper!r}")
@@ -147,6 +150,7 @@ class SimulatedSheet:
         self.paper, self._seed = paper, seed
         self._grain = np.random.default_rng(seed)
         self.jaw = Jaw() if jaw is None else jaw
+        self._record_every = record_every
         self._drawn = Drawn.of(Noise.none() if noise is None else noise, seed)
         self.truth = replace(
             paper,
@@ -310,7 +314,9 @@ class SimulatedSheet:
     def _carried(self, motion: JawMotion, target: float, duration: float, progress: bool) -> Fold:
         self._motion = motion
         lead(self.simulation.hand("jaw"), self._flat, motion, self.jaw.depth)
-        return self._result(target, carried(self.simulation, motion, [self.rod], duration, progress))
+        return self._result(
+            target, carried(self.simulation, motion, [self.rod], duration, self._record_every, progress)
+        )
 
     def _result(self, target: float, watch: Watch) -> Fold:
         slide = self.slide
