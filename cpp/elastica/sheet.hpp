@@ -53,11 +53,6 @@ class SheetProblem {
   void put_end(const Path& path, System& system) const;
 };
 
-/// Runge-Kutta steps across a segment: at most .4 Lgb, and so many that the first integral, of which an error is about
-/// 1e-5 F (h / sqrt(EI / F))^8 at a step h and a force F, holds to some 1e-9 w Lgb^2. Where the width changes by itself
-/// within r, 1 / b has a pole at that distance, and the error is about 1e-5 (h / r)^8.
-int sheet_steps(const SheetWidth& width, const SheetProblem::Path& path, int segment);
-
 /// States at the cuts of a path that is integrated from its start on.
 void set_nodes(const SheetShape& shape, SheetProblem::Path& path);
 

@@ -53,7 +53,12 @@ class Watch:
 
 
 def carried(
-    simulation: Simulation, jaw: JawMotion, rods: Sequence[Rod], duration: float, record_every: float, progress: bool
+    simulation: Simulation,
+    jaw: JawMotion,
+    rods: Sequence[Rod],
+    duration: float,
+    progress: bool,
+    record_every: float = FRAMES,
 ) -> Watch:
     """Run until the jaw has done its motions and the sheet has settled, or until it snaps.
 

@@ -315,7 +315,7 @@ class SimulatedSheet:
         self._motion = motion
         lead(self.simulation.hand("jaw"), self._flat, motion, self.jaw.depth)
         return self._result(
-            target, carried(self.simulation, motion, [self.rod], duration, self._record_every, progress)
+            target, carried(self.simulation, motion, [self.rod], duration, progress, self._record_every)
         )
 
     def _result(self, target: float, watch: Watch) -> Fold:

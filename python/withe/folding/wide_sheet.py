@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
-from withe.folding.carrying import FRAMES, carried
+from withe.folding.carrying import carried
 from withe.folding.jaw import Jaw
 from withe.folding.jaw_motion import JawMotion, Motion, lead
 from withe.folding.noise import Drawn, Noise
@@ -260,7 +260,7 @@ class WideSheet:
         for strip, y in zip(self.strips, self._sides, strict=True):
             hand = simulation.hand(f"jaw on {strip.name}")
             lead(hand, hand.pose.rotation, jaw, self.jaw.depth, float(y))
-        return self._result(target, carried(simulation, jaw, self.strips, duration, FRAMES, progress).failure)
+        return self._result(target, carried(simulation, jaw, self.strips, duration, progress).failure)
 
     def picture(self, camera: Camera, size: tuple[int, int] = (640, 480)) -> npt.NDArray[np.uint8]:
         """Take a picture of the sheet as it lies now, as `SimulatedSheet.picture`; it is straight across.
