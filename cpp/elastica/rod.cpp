@@ -5,8 +5,7 @@
 #include <cstddef>
 #include <limits>
 
-#include "common/dual.hpp"
-#include "elastica/runge_kutta.hpp"
+#include "elastica/rod_kernels.hpp"
 
 namespace withe {
 
@@ -15,49 +14,6 @@ namespace {
 constexpr double kLongestSegment = 0.6, kLongestStep = 0.6;
 constexpr double kTurnPerStep = 0.7;  ///< [rad]
 constexpr double kDecay = 0.6;        ///< as much of the exponent with which a bend dies out along a pulled rod
-
-template <class Scalar>
-using Vector = std::array<Scalar, 3>;
-
-/// The moment of the floor's force, which acts below and behind lift-off, on the state there.
-template <std::size_t count, class Scalar>
-void put_lever(double lever, double behind, const Vector<Scalar>& floor, std::array<Scalar, count>& y) {
-  y[3] -= lever * floor[1];
-  y[4] += lever * floor[0];
-  y[5] += behind * floor[1];
-}
-
-/// The equations of the header: t, m, then what follows from them (r, or a quaternion and r).
-template <class Scalar>
-struct RodSlope {
-  Vector<Scalar> floor;
-  double compliance;
-
-  template <std::size_t count>
-  std::array<Scalar, count> operator()(double s, const std::array<Scalar, count>& y) const {
-    const Scalar n[3] = {-floor[0], -floor[1], s - floor[2]};
-    const Scalar stretch = 1.0 + compliance * (n[0] * y[0] + n[1] * y[1] + n[2] * y[2]);
-    std::array<Scalar, count> slope;
-    slope[0] = 0.5 * (y[4] * y[2] - y[5] * y[1]);
-    slope[1] = 0.5 * (y[5] * y[0] - y[3] * y[2]);
-    slope[2] = 0.5 * (y[3] * y[1] - y[4] * y[0]);
-    slope[3] = stretch * (y[2] * n[1] - y[1] * n[2]);
-    slope[4] = stretch * (y[0] * n[2] - y[2] * n[0]);
-    slope[5] = stretch * (y[1] * n[0] - y[0] * n[1]);
-    if constexpr (count >= 9)
-      for (std::size_t i = 0; i < 3; ++i) slope[6 + i] = stretch * y[i];
-    if constexpr (count == 13) {  // q' = w q / 2, w = t x t' the turning without twist
-      const Scalar* q = &y[9];
-      const Scalar twist = y[0] * y[3] + y[1] * y[4] + y[2] * y[5];
-      const Scalar m[3] = {y[3] - twist * y[0], y[4] - twist * y[1], y[5] - twist * y[2]};
-      slope[9] = -0.25 * (m[0] * q[1] + m[1] * q[2] + m[2] * q[3]);
-      slope[10] = 0.25 * (m[0] * q[0] + m[1] * q[3] - m[2] * q[2]);
-      slope[11] = 0.25 * (m[1] * q[0] + m[2] * q[1] - m[0] * q[3]);
-      slope[12] = 0.25 * (m[2] * q[0] + m[0] * q[2] - m[1] * q[1]);
-    }
-    return slope;
-  }
-};
 
 double size_of(double x, double y, double z) { return std::sqrt(x * x + y * y + z * z); }
 
@@ -70,13 +26,6 @@ int rod_steps(const RodVector& floor, double from, double to, const std::array<d
   return static_cast<int>(std::clamp(std::ceil((to - from) * rate / kTurnPerStep), 1.0, 40.0));
 }
 
-template <int coupled, std::size_t count, class Scalar>
-void across(const RodSlope<Scalar>& slope, double from, double to, int steps, std::array<Scalar, count>& y) {
-  const double h = (to - from) / steps;
-  const auto at = [&](const Scalar& s, const std::array<Scalar, count>& state) { return slope(value_of(s), state); };
-  for (int i = 0; i < steps; ++i) runge_kutta_step<coupled>(at, Scalar(from + i * h), Scalar(h), y);
-}
-
 /// The components of F that a path carries as parameters.
 template <RodEnd end>
 constexpr std::array<std::size_t, 2> unknown_forces() {
@@ -85,6 +34,48 @@ constexpr std::array<std::size_t, 2> unknown_forces() {
 template <RodEnd end>
 constexpr std::size_t known_force() {
   return end == RodEnd::no_moment ? 0 : 1;
+}
+
+template <RodEnd end>
+RodField field_of(const RodProblem<end>& problem, const RodVector& force) {
+  const auto [one, other] = unknown_forces<end>();
+  return {{force[0], force[1], force[2]},
+          1.0 / problem.stretch_stiffness,
+          {static_cast<int>(one), static_cast<int>(other)}};
+}
+
+/// The segments from one on; those beyond the last are the last once more.
+template <RodEnd end>
+RodBlock block_at(const RodProblem<end>& problem, const typename RodProblem<end>::Path& path, const RodVector& force,
+                  std::size_t first, int parts) {
+  RodBlock block{};
+  block.parts = parts;
+  for (std::size_t lane = 0; lane < kRodBlock; ++lane) {
+    const std::size_t k = std::min(first + lane, problem.cuts.size() - 2);
+    const double from = problem.cuts[k], to = problem.cuts[k + 1];
+    const int steps = (rod_steps(force, from, to, path.nodes[k]) + parts - 1) / parts;
+    block.s[lane] = from;
+    block.part[lane] = (to - from) / parts;
+    block.steps[lane] = steps;
+    block.most_steps = std::max(block.most_steps, steps);
+    for (std::size_t j = 0; j < kRodTurning; ++j) block.state[j][lane] = path.nodes[k][j];
+  }
+  if (first == 0) {
+    block.lever[0] = problem.lever;
+    block.behind[0] = problem.behind;
+  }
+  return block;
+}
+
+using Quaternion = std::array<double, 4>;
+
+Quaternion product(const Quaternion& a, const Quaternion& b) {
+  return {a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3], a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
+          a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1], a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0]};
+}
+Quaternion unit(const Quaternion& q) {
+  const double inverse = 1.0 / std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+  return {inverse * q[0], inverse * q[1], inverse * q[2], inverse * q[3]};
 }
 
 }  // namespace
@@ -106,33 +97,54 @@ RodVector RodProblem<end>::floor_force(const Path& path) const {
 }
 
 template <RodEnd end>
-void RodProblem<end>::linearise(const Path& path, System& system) const {
-  using Number = Dual<kCoupled + kParameters>;
-  system.links.resize(cuts.size() - 1);
+template <class Put>
+void RodProblem<end>::for_blocks(const Path& path, const Put& put) const {
   const RodVector force = floor_force(path);
-  RodSlope<Number> slope{{force[0], force[1], force[2]}, 1.0 / stretch_stiffness};
-  for (int j = 0; j < kParameters; ++j) {
-    const std::size_t component = unknown_forces<end>()[static_cast<std::size_t>(j)];
-    slope.floor[component] = Number::unknown(force[component], kCoupled + j);
+  const RodField field = field_of(*this, force);
+  const std::size_t segments = cuts.size() - 1;
+  for (std::size_t first = 0; first < segments; first += kRodBlock) {
+    const RodBlock block = block_at(*this, path, force, first, 1);
+    put(field, block, first, std::min<std::size_t>(kRodBlock, segments - first));
   }
-  for (std::size_t k = 0; k + 1 < cuts.size(); ++k) {
-    const auto& y = path.nodes[k];
-    std::array<Number, kStates> state;
-    for (int i = 0; i < kStates; ++i) {
-      const auto at = static_cast<std::size_t>(i);
-      state[at] = i < kCoupled ? Number::unknown(y[at], i) : Number(y[at]);
+}
+
+template <RodEnd end>
+void RodProblem<end>::linearise(const Path& path, System& system) const {
+  const auto kernel = end == RodEnd::no_moment ? rod_kernels().linearise_turn : rod_kernels().linearise_move;
+  system.links.resize(cuts.size() - 1);
+  for_blocks(path, [&](const RodField& field, const RodBlock& block, std::size_t first, std::size_t count) {
+    ByRodSegment ends[kStates][1 + kRodUnknowns];
+    kernel(field, block, ends);
+    for (std::size_t lane = 0; lane < count; ++lane) {
+      typename System::Link& link = system.links[first + lane];
+      for (int i = 0; i < kStates; ++i) {
+        for (int j = 0; j < kStates; ++j)
+          link.by_state[i][j] = j < kCoupled ? ends[i][1 + j][lane] : (i == j ? 1.0 : 0.0);
+        for (int j = 0; j < kParameters; ++j) link.by_parameters[i][j] = ends[i][1 + kCoupled + j][lane];
+        link.gap[i] = gap(path, first + lane, i, ends[i][0][lane]);
+      }
     }
-    if (k == 0) put_lever(lever, behind, slope.floor, state);
-    across<kCoupled>(slope, cuts[k], cuts[k + 1], rod_steps(force, cuts[k], cuts[k + 1], y), state);
-    typename System::Link& link = system.links[k];
-    for (int i = 0; i < kStates; ++i) {
-      const auto at = static_cast<std::size_t>(i);
-      for (int j = 0; j < kStates; ++j) link.by_state[i][j] = j < kCoupled ? state[at].slope[j] : (i == j ? 1.0 : 0.0);
-      for (int j = 0; j < kParameters; ++j) link.by_parameters[i][j] = state[at].slope[kCoupled + j];
-      link.gap[i] = state[at].value - path.nodes[k + 1][at];
-    }
-  }
+  });
   put_end(path, system);
+}
+
+template <RodEnd end>
+void RodProblem<end>::put_gaps(const Path& path, System& system) const {
+  const auto kernel = end == RodEnd::no_moment ? rod_kernels().turn : rod_kernels().move;
+  for_blocks(path, [&](const RodField& field, const RodBlock& block, std::size_t first, std::size_t count) {
+    ByRodSegment ends[kStates];
+    kernel(field, block, ends);
+    for (std::size_t lane = 0; lane < count; ++lane)
+      for (int i = 0; i < kStates; ++i) system.links[first + lane].gap[i] = gap(path, first + lane, i, ends[i][lane]);
+  });
+  put_end(path, system);
+}
+
+/// Of a number that a segment ends with; what only adds up along the way sets out from its node.
+template <RodEnd end>
+double RodProblem<end>::gap(const Path& path, std::size_t segment, int i, double ends) const {
+  const auto at = static_cast<std::size_t>(i);
+  return (i < kCoupled ? 0.0 : path.nodes[segment][at]) + ends - path.nodes[segment + 1][at];
 }
 
 template <RodEnd end>
@@ -169,39 +181,45 @@ RodShape rod_shape(const RodProblem<end>& problem, const typename RodProblem<end
   shape.floor_force = problem.floor_force(path);
   shape.twist = problem.twist(path);
   shape.lowest = std::numeric_limits<double>::infinity();
-  const RodSlope<double> slope{shape.floor_force, 1.0 / problem.stretch_stiffness};
-  std::array<double, 13> y{};
+  const RodField field = field_of(problem, shape.floor_force);
+  const auto keep = [&](double s, const RodPoint& point) {
+    shape.places.push_back(s);
+    shape.points.push_back(point);
+    shape.lowest = std::min(shape.lowest, point.position[2]);
+  };
   const auto& leaves = path.nodes[0];  // the shortest turn from x to the tangent
   const double half = std::sqrt(0.5 * (1.0 + leaves[0]));
-  y[9] = half;
-  y[11] = -0.5 * leaves[2] / half;
-  y[12] = 0.5 * leaves[1] / half;
-  const auto keep = [&](double s) {
-    const double unit = 1.0 / std::sqrt(y[9] * y[9] + y[10] * y[10] + y[11] * y[11] + y[12] * y[12]);
-    shape.places.push_back(s);
-    shape.points.push_back({{y[0], y[1], y[2]},
-                            {y[3], y[4], y[5]},
-                            {y[6], y[7], y[8]},
-                            {unit * y[9], unit * y[10], unit * y[11], unit * y[12]}});
-    shape.lowest = std::min(shape.lowest, y[8]);
-  };
-  const auto start_of = [&](std::size_t k) {
-    std::copy_n(path.nodes[k].begin(), 6, y.begin());
-    if (k == 0) put_lever(problem.lever, problem.behind, shape.floor_force, y);
-  };
-  start_of(0);
-  keep(0.0);
-  for (std::size_t k = 0; k + 1 < problem.cuts.size(); ++k) {
-    start_of(k);
-    const double from = problem.cuts[k], to = problem.cuts[k + 1];
-    const int steps = rod_steps(shape.floor_force, from, to, path.nodes[k]);
-    for (int i = 1; i <= spread; ++i) {
-      const double begin = from + (to - from) * (i - 1) / spread, stop = from + (to - from) * i / spread;
-      across<13>(slope, begin, stop, (steps + spread - 1) / spread, y);
-      keep(stop);
+  RodPoint start{{leaves[0], leaves[1], leaves[2]},
+                 {leaves[3] - problem.lever * shape.floor_force[1], leaves[4] + problem.lever * shape.floor_force[0],
+                  leaves[5] + problem.behind * shape.floor_force[1]},
+                 {0, 0, 0},
+                 {half, 0, -0.5 * leaves[2] / half, 0.5 * leaves[1] / half}};
+  keep(0.0, start);
+  const std::size_t segments = problem.cuts.size() - 1;
+  std::vector<ByRodSegment> states(static_cast<std::size_t>(spread) * kRodWithRotation);
+  for (std::size_t k = 0; k < segments; ++k) {
+    const std::size_t lane = k % kRodBlock;
+    if (lane == 0) rod_kernels().rotate(field, block_at(problem, path, shape.floor_force, k, spread), states.data());
+    RodPoint point;
+    for (int i = 0; i < spread; ++i) {
+      const ByRodSegment* y = &states[static_cast<std::size_t>(i) * kRodWithRotation];
+      for (std::size_t j = 0; j < 3; ++j) {
+        point.tangent[j] = y[j][lane];
+        point.moment[j] = y[3 + j][lane];
+        point.position[j] = start.position[j] + y[kRodTurning + j][lane];
+      }
+      const ByRodSegment* turned = y + kRodWithPosition;
+      point.rotation =
+          unit(product({turned[0][lane], turned[1][lane], turned[2][lane], turned[3][lane]}, start.rotation));
+      const double share = static_cast<double>(i + 1) / spread;
+      keep(problem.cuts[k] + (problem.cuts[k + 1] - problem.cuts[k]) * share, point);
     }
-    for (std::size_t i = 0; i < 6; ++i)
-      shape.residual = std::max(shape.residual, std::abs(y[i] - path.nodes[k + 1][i]));
+    for (std::size_t i = 0; i < 3; ++i) {
+      const double turning = point.tangent[i] - path.nodes[k + 1][i],
+                   bending = point.moment[i] - path.nodes[k + 1][3 + i];
+      shape.residual = std::max({shape.residual, std::abs(turning), std::abs(bending)});
+    }
+    start = point;
   }
   if constexpr (end == RodEnd::no_moment)
     for (std::size_t i = 0; i < 3; ++i) {

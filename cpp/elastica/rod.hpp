@@ -52,8 +52,13 @@ class RodProblem {
   RodVector floor_force(const Path& path) const;
   double twist(const Path& path) const { return -lever * floor_force(path)[1]; }  ///< m.t
   void linearise(const Path& path, System& system) const;
+  /// The gaps alone; slopes along the rod stay as they are.
+  void put_gaps(const Path& path, System& system) const;
 
  private:
+  template <class Put>
+  void for_blocks(const Path& path, const Put& put) const;
+  double gap(const Path& path, std::size_t segment, int i, double ends) const;
   void put_end(const Path& path, System& system) const;
 };
 

@@ -54,8 +54,8 @@ inline constexpr double kSum[kStages] = {0.054293734116568765,
 
 /// Advances y from s to s + h. `slope(s, y)` returns dy/ds, an array of as many numbers as y. Of these only the first
 /// `coupled` may be looked at by `slope`; the others are integrals along the way.
-template <int coupled, std::size_t count, class Scalar, class Slope>
-void runge_kutta_step(const Slope& slope, const Scalar& s, const Scalar& h, std::array<Scalar, count>& y) {
+template <int coupled, std::size_t count, class Scalar, class Place, class Slope>
+void runge_kutta_step(const Slope& slope, const Place& s, const Place& h, std::array<Scalar, count>& y) {
   using namespace dormand_prince;
   std::array<Scalar, count> slopes[kStages];
   for (int stage = 0; stage < kStages; ++stage) {

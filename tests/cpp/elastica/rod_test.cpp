@@ -63,6 +63,21 @@ TEST(RodProblem, DerivativesMatchDifferences) {
   }
 }
 
+TEST(RodProblem, GapsAloneAreThoseOfTheLinearisation) {
+  const GraspTable table;
+  GraspTable::Data data;
+  ASSERT_TRUE(table.solve({7.0, 1.0, kStretchStiffness, 0.2, 0.0, 0.1}, data));  // segments that fill no whole packs
+  auto path = data.path;
+  for (auto& y : path.nodes) y[3] += 0.01;
+  GraspProblem::System system, gaps;
+  data.problem.linearise(path, system);
+  data.problem.linearise(data.path, gaps);
+  data.problem.put_gaps(path, gaps);
+  for (std::size_t k = 0; k < system.links.size(); ++k)
+    for (std::size_t i = 0; i < 6; ++i) EXPECT_NEAR(gaps.links[k].gap[i], system.links[k].gap[i], 1e-14);
+  for (std::size_t i = 0; i < 2; ++i) EXPECT_NEAR(gaps.end_gap[i], system.end_gap[i], 1e-14);
+}
+
 TEST(RodShape, KeepsUnitTangentsMomentsAcrossThemAndTheEnergyIntegral) {
   const GraspTable table;
   GraspTable::Data data;
