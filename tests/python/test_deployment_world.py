@@ -158,6 +158,17 @@ def test_bends_of_a_thick_cable_are_laid_where_they_should_lie():
     assert found.error < 0.7e-3
 
 
+def test_a_push_holds_on_floors_on_which_a_bend_slips_without():
+    pattern = Pattern(np.genfromtxt(PATTERNS / "letterU.csv", delimiter=",", skip_header=1), nodes=201)
+    slips = {}
+    for controller in ("exact", "least_friction"):
+        motion = plan(Cable.dlo(2), pattern, controller)
+        assert (motion.feasibility(0.25).lift_off[3:-3].max() < 0.25) == (controller == "least_friction")
+        slips[controller] = deploy(motion, floor=0.25, nodes=100, quasi_static=True, progress=False).slipped.max()
+    assert slips["exact"] > 1e-3
+    assert slips["least_friction"] < 4e-4
+
+
 @pytest.mark.parametrize("nodes", [80, 200])
 def test_equilibria_follow_a_cable_of_any_mesh_that_slips_along_its_length(nodes):
     """The border of what slips goes on by a node an iteration: the finer the mesh, the more of them it takes."""

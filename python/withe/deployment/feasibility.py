@@ -11,7 +11,7 @@ import numpy.typing as npt
 from withe.common import validation
 from withe.deployment.cable import JAW, Cable
 from withe.deployment.grasp_network import shipped
-from withe.deployment.grasping import Grasp, grasp, least_friction, table, thickened
+from withe.deployment.grasping import Grasp, carrying, grasp, least_friction, needed_friction, table, thickened
 from withe.deployment.smoothing import least_tension
 from withe.errors import ConvergenceError
 
@@ -68,7 +68,8 @@ class Feasibility:
     lift_off : ndarray of shape (nodes,)
         While it is the lift-off point: the floor's force there along itself, over that across. Along the floor it
         carries what the suspended part needs and the jump to the shear EI kappa' of the part that lies; where the
-        curvature is constant that is |Fy| / Fz.
+        curvature is constant that is |Fy| / Fz. A push along the cable is taken up by up to 3 Lgb of what lies behind
+        too.
     free_end : ndarray of shape (nodes,)
         Between it and the free end at most friction times weight can turn and shear the cable: it needs
         2 EI kappa / (w s^2) and EI kappa' / (w s), s the way from the free end. A pattern that begins with curvature
@@ -154,8 +155,7 @@ def examine(
     )
     floor = _floor(s, curvature, slope, bend)
     # To the left, where the pattern's curvature is positive; the frame of a grasp has y there too.
-    across = force[:, 1] - _BEND_STIFFNESS * slope
-    lift_off = np.hypot(force[:, 0], across) / force[:, 2]
+    lift_off = needed_friction(force, _BEND_STIFFNESS * slope, carrying(s, curvature))
     with np.errstate(divide="ignore", invalid="ignore"):
         turned = 2.0 * _BEND_STIFFNESS * np.abs(curvature) / s**2
         sheared = _BEND_STIFFNESS * np.abs(slope) / s
@@ -206,7 +206,8 @@ def grasps_along(pattern: Laid, cable: Cable, controller: str) -> Grasp:
     try:
         if controller == "least_friction":
             shear = _BEND_STIFFNESS * lgb**2 * np.gradient(pattern.curvature, pattern.arc_length)
-            return least_friction(suspended, curvature, shear, cable.stretch_stiffness, thick)
+            laid = pattern.arc_length / lgb
+            return least_friction(suspended, curvature, shear, laid, cable.stretch_stiffness, thick)
         return grasp(suspended, curvature, cable.stretch_stiffness, radius=thick)
     except ConvergenceError as error:
         bend = f"whose radius at {at:.0f} mm is {1e3 / tightest:.2g} mm"

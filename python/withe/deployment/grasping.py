@@ -17,7 +17,9 @@ __all__ = ["Grasp", "grasp"]
 
 FloatArray = npt.NDArray[np.float64]
 _BEND_STIFFNESS = 2.0  # EI in units of w Lgb^2
-_SHARES = (0.0, 0.25, 0.5, 0.7, 0.85, 1.0, 1.2)  # of curvature^2 that a push along the rod may be [w Lgb^3]
+_SHARES = (0.0, 0.15, 0.3, 0.45, 0.6, 0.75, 0.9, 1.05, 1.2, 1.4, 1.7)  # of the curvature that a push may be [w Lgb^2]
+_CARRYING = 3.0  # [Lgb] along which a push is carried back at most
+_SLICK = 0.2  # coefficient of friction of the slickest floor that is planned for: it is to hold every push
 _THICKEST = 0.25  # [Lgb]: a rod's radius
 _ENOUGH = 8.0  # [Lgb] of suspended length: for longer ones forces are the same
 TWIST_STIFFNESS = _BEND_STIFFNESS / 1.5  # GJ of a round rod of incompressible material
@@ -96,7 +98,8 @@ def grasp(
     stretch_stiffness : array_like
         EA Lgb^2 / EI, 4 (Lgb / radius)^2 of a round rod (9.10); at least 100, and 4 times the suspended length.
     axial_force : array_like [w Lgb]
-        Of the floor on the suspended part along x. A push of some .82 curvature^2 needs least friction.
+        Of the floor on the suspended part along x. Friction at the lift-off point alone is least with a push of some
+        .82 curvature^2.
     radius : array_like [Lgb]
         How far below the centreline the floor's force acts: at most .25; 0 in the dissertation. GJ is that of a round
         rod of incompressible material.
@@ -169,24 +172,54 @@ def _described(rows: FloatArray, questions: FloatArray, shape: tuple[int, ...]) 
     )
 
 
-def least_friction(
-    suspended: FloatArray, curvature: FloatArray, shear: FloatArray, stretch_stiffness: float, radius: float
-) -> Grasp:
-    """Grasps with the push along the rod that needs least friction at lift-off, shapes (n,); see `grasp`.
+def carrying(laid: FloatArray, curvature: FloatArray) -> FloatArray:
+    """Length behind the lift-off point that carries a push along the rod back, shape (n,) [Lgb].
 
-    `shear` is the force across, along y, of what lies on what hangs, which the floor need not give [w Lgb]. The push is
-    a share of curvature^2: the best of a few, and of the parabola through it and its neighbours.
+    At most 3: further back a rod in a bend gives way aside. And none of what lies next to the free end: there friction
+    is needed to turn the rod, by at most friction l^2 / 2 over a length l, so that a curvature takes
+    2 (curvature / friction)^(1/2), of which half is counted.
+    """
+    return np.clip(laid - np.sqrt(np.abs(curvature) / _SLICK), 0.0, _CARRYING)
+
+
+def needed_friction(force: FloatArray, shear: FloatArray, carried: FloatArray) -> FloatArray:
+    """Coefficient of friction that lift-off needs, with what lies behind it, shape (n,).
+
+    `force` is the floor's on what hangs, shape (n, 3), `shear` the force across, along y, of what lies on what hangs,
+    which the floor need not give [w Lgb]. A force across must be held where the rod lifts off. A push along it need
+    not: what lies takes it up too, over a length `carried` [Lgb], with as much friction per weight everywhere,
+    push / (force_z + carried).
+    """
+    up = force[:, 2]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.hypot(force[:, 0] / (up + carried), (force[:, 1] - shear) / up)
+
+
+def least_friction(
+    suspended: FloatArray,
+    curvature: FloatArray,
+    shear: FloatArray,
+    laid: FloatArray,
+    stretch_stiffness: float,
+    radius: float,
+) -> Grasp:
+    """Grasps with the push along the rod that needs least friction, shapes (n,); see `grasp`, `needed_friction`.
+
+    `laid` is the length that lies behind the lift-off point [Lgb]. The push is a share of the curvature, the best of a
+    few, and of the parabola through it and its neighbours; and no more than a slick floor holds behind that point, for
+    a rod that is pushed back as a whole is off all along.
     """
     count = len(suspended)
     near = np.minimum(suspended, _ENOUGH)
+    bend, carried = np.abs(curvature), carrying(laid, curvature)
 
     def rows_at(share: FloatArray, length: FloatArray = near) -> tuple[FloatArray, FloatArray]:
         stretch, angle, lever = (np.full(count, value) for value in (2.0 * stretch_stiffness, 0.0, radius))
-        questions = np.stack([length, curvature, stretch, share * curvature**2, angle, lever], -1)
+        push = np.minimum(share * bend, _SLICK * carried)
+        questions = np.stack([length, curvature, stretch, push, angle, lever], -1)
         rows = np.asarray(table().grasps(questions, TWIST_STIFFNESS))
         good = (rows[:, 11] > 0) & (rows[:, 12] > 0) & (rows[:, 9] > 0)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return rows, np.where(good, np.hypot(rows[:, 7], rows[:, 8] - shear) / rows[:, 9], np.inf)
+        return rows, np.where(good, needed_friction(rows[:, 7:10], shear, carried), np.inf)
 
     tried = [rows_at(np.full(count, share)) for share in _SHARES]
     needed = np.stack([need for _, need in tried])
@@ -203,7 +236,7 @@ def least_friction(
     choice = np.stack([need for _, need in candidates]).argmin(0)
     push = np.stack([rows for rows, _ in candidates])[choice, column, 7]
     with np.errstate(divide="ignore", invalid="ignore"):
-        chosen, _ = rows_at(np.where(curvature == 0.0, 0.0, push / curvature**2), suspended)
+        chosen, _ = rows_at(np.where(bend == 0.0, 0.0, push / bend), suspended)
     questions = np.stack([suspended, curvature, push, push, push, push], -1)
     return _described(chosen, questions, (count,))
 
