@@ -7,8 +7,9 @@ By default cable 2 alone, which takes some 20 minutes of one thread; --whole tak
 of each cell, and hours. Each run is printed, and written to out/benchmarks/deployment_tables.jsonl, as it ends. Ctrl-C
 makes the tables of what there is; --resume goes on after that. Cables are laid quasi-statically, but for the intuitive
 way and noisy trials, at 2.5 cm/s: an upright cable buckles, falls and swings, and no row of equilibria follows it.
-Errors are those of (9.11), point by point: the distance of each point of the cable from its place on the pattern. The
-way "network" needs torch, and is left out without it.
+In noisy trials the planner knows the cable by a picture of its loop. Errors are those of (9.11), point by point: the
+distance of each point of the cable from its place on the pattern. The way "network" needs torch, and is left out
+without it.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from itertools import product
 from pathlib import Path
 
 import numpy as np
+from deployment_measuring import looped
 from deployment_refining import refine
 from reporting import OUT, RESUME, Lines, Report, arguments, bar
 
@@ -172,12 +174,12 @@ class Cell:
 
 
 class Patterns:
-    """Patterns, and plans that do not depend on the floor, each made once."""
+    """Patterns, and plans that do not depend on the floor, each made once; of trials, for the cable as measured."""
 
     def __init__(self, nodes: int) -> None:
         self.nodes = nodes
         self._patterns: dict[str, Pattern] = {}
-        self._plans: dict[tuple[str, int, str], Plan] = {}
+        self._plans: dict[tuple[str, int, str, int | None], Plan] = {}
 
     def pattern(self, name: str) -> Pattern:
         """As published, smoothed by at most a millimetre."""
@@ -186,12 +188,13 @@ class Patterns:
             self._patterns[name] = Pattern(points, nodes=self.nodes)
         return self._patterns[name]
 
-    def plan(self, name: str, number: int, way: str, friction: float) -> Plan:
+    def plan(self, name: str, number: int, way: str, friction: float, seed: int | None = None) -> Plan:
         """The published circle ends on its own beginning: laid over itself."""
-        key = (name, number, way if way != "optimised" else f"{way} {friction}")
+        key = (name, number, way if way != "optimised" else f"{way} {friction}", seed)
         if key not in self._plans:
+            cable = Cable.dlo(number)
             self._plans[key] = plan(
-                Cable.dlo(number),
+                cable if seed is None else looped(cable, seed),
                 self.pattern(name),
                 way,
                 friction=friction,
@@ -205,11 +208,12 @@ class Patterns:
 def carried_out(run: Run, patterns: Patterns) -> Run:
     """Lay through equilibria, or in time: with noise, and what no row of equilibria follows."""
     try:
-        motion = patterns.plan(run.pattern, run.cable, run.planned, run.friction)
+        motion = patterns.plan(run.pattern, run.cable, run.planned, run.friction, run.seed)
         if run.way == "placed":
             return run.of(place(motion, floor=run.friction, nodes=run.nodes, progress=False))
         found = deploy(
             motion,
+            Cable.dlo(run.cable),
             floor=run.friction,
             noise=0.0 if run.seed is None else 1.0,
             seed=run.seed or 0,

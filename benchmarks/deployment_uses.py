@@ -20,6 +20,7 @@ from functools import partial
 from itertools import product
 
 import numpy as np
+from deployment_measuring import PIXEL, photographed
 from reporting import RESUME, ROOT, Lines, Report, arguments, bar
 
 sys.path.insert(0, str(ROOT / "examples"))
@@ -29,14 +30,12 @@ import tie_knot
 from withe.deployment import Cable, hang, measure, measure_curvature, tie, trial_cable
 from withe.deployment.cable import LOOP_HEIGHT
 from withe.errors import ConvergenceError
-from withe.perception.synthetic import render_mask
 
 WAYS = ("exact", "optimised", "intuitive")  # optimised: placement only
 PUBLISHED = {"S": "9, 0", "U": "9, 0", "trefoil": "9, 0", "reef": "7, 0"}  # of 10: optimal, intuitive
 GOALS = {"S": 0.9, "U": 0.9, "trefoil": 0.9, "reef": 0.7}
 NODES, QUICK_NODES = 130, 60
 RULER = 5e-4  # [m], standard deviation
-PIXEL = 5e-4  # [m]
 SHOWN = 7.0  # [Lgb] of a hanging cable in a picture
 
 
@@ -63,17 +62,6 @@ def measured(cable: Cable, seed: int, *, bent: bool) -> Cable:
         for axis in range(2)
     ]
     return replace(cable, gravito_bending_length=lgb, natural_curvature=(seen[0], seen[1]))
-
-
-def photographed(line: np.ndarray, radius: float, random: np.random.Generator) -> np.ndarray:
-    """A picture from the side of what hangs before a plain background and goes on above; x and height [m]."""
-    margin = 40  # [px]
-    corner = np.array([line[:, 0].min() - margin * PIXEL, line[:, 1].max()])
-    seen = (line - corner) * [1.0, -1.0] / PIXEL + random.uniform(0.0, 1.0, 2) * [1.0, 0.0]
-    columns, rows = np.ceil(seen.max(0) + margin).astype(int)
-    mask = render_mask([seen], [2.0 * radius / PIXEL], [False], (rows, columns))
-    image = np.where(mask[..., None], (60, 60, 70), (225, 230, 230)) + random.normal(0.0, 4.0, (rows, columns, 3))
-    return np.clip(image, 0, 255).astype(np.uint8)
 
 
 class Knots:

@@ -259,7 +259,7 @@ def test_what_is_pushed_aside_drags_the_rest_along_as_a_beam_that_friction_loads
         assert deflection.deriv()(reach) == pytest.approx(0.0, abs=1e-12)
         return deflection(reach)
 
-    assert pushed(reach) <= 2.0 * cable.radius < pushed(reach + 1.01 * found.arc_length[1])
+    assert pushed(reach) <= 4.0 * cable.radius < pushed(reach + 1.01 * found.arc_length[1])
 
 
 @pytest.mark.parametrize("length", [0.1, 0.3, 1.0])

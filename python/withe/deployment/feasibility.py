@@ -81,9 +81,9 @@ class Feasibility:
         all that lies behind the bend back along itself, straight or not.
     overlap : ndarray of bool of shape (nodes,)
         Where the pattern comes nearer to itself than the cable is thick: it cannot lie there, and pushes itself aside.
-        Pushed by its thickness of two radii, it keeps its direction there, and moves along
-        (144 Lgb^3 2 radius / friction)^(1/4) to either side, as a beam does that friction loads: its deflection y has
-        EI d^4y/ds^4 = -friction w, with y, its slope and its curvature 0 where it begins to move, and the slope 0
+        Pushed by at most four radii, from one side of itself to the other, it keeps its direction there, and moves
+        along (144 Lgb^3 4 radius / friction)^(1/4) to either side, as a beam does that friction loads: its deflection y
+        has EI d^4y/ds^4 = -friction w, with y, its slope and its curvature 0 where it begins to move, and the slope 0
         where it is pushed. That much more slips.
     friction : float
         What there is.
@@ -247,7 +247,7 @@ def _pushed(
     overlap: npt.NDArray[np.bool_], arc_length: FloatArray, cable: Cable, friction: float
 ) -> npt.NDArray[np.bool_]:
     """What moves with the stretches that overlap."""
-    reach = (288.0 * cable.gravito_bending_length**3 * cable.radius / friction) ** 0.25
+    reach = (576.0 * cable.gravito_bending_length**3 * cable.radius / friction) ** 0.25
     return np.asarray((np.abs(arc_length[:, None] - arc_length[overlap]) <= reach).any(1))
 
 

@@ -205,40 +205,41 @@ def least_friction(
 ) -> Grasp:
     """Grasps with the push along the rod that needs least friction, shapes (n,); see `grasp`, `needed_friction`.
 
-    `laid` is the length that lies behind the lift-off point [Lgb]. The push is a share of the curvature, the best of a
-    few, and of the parabola through it and its neighbours; and no more than a slick floor holds behind that point, for
-    a rod that is pushed back as a whole is off all along.
+    `laid` is the length that lies behind the lift-off point [Lgb]. Where the pose alone is asked, the push is a share
+    of the curvature, the best of a few, and of the parabola through it and its neighbours. Along the way it is the
+    least that is nowhere less and changes by no more than a slick floor holds, for what lies keeps the push with which
+    it was laid; and at most what such a floor holds behind the lift-off point, for a rod that is pushed back as a whole
+    is off all along.
     """
-    count = len(suspended)
     near = np.minimum(suspended, _ENOUGH)
     bend, carried = np.abs(curvature), carrying(laid, curvature)
 
-    def rows_at(share: FloatArray, length: FloatArray = near) -> tuple[FloatArray, FloatArray]:
-        stretch, angle, lever = (np.full(count, value) for value in (2.0 * stretch_stiffness, 0.0, radius))
-        push = np.minimum(share * bend, _SLICK * carried)
-        questions = np.stack([length, curvature, stretch, push, angle, lever], -1)
+    def rows_at(push: FloatArray, length: FloatArray = near) -> tuple[FloatArray, FloatArray]:
+        stretch, angle, lever = (np.full(len(push), value) for value in (2.0 * stretch_stiffness, 0.0, radius))
+        questions = np.stack([length, curvature, stretch, np.minimum(push, _SLICK * carried), angle, lever], -1)
         rows = np.asarray(table().grasps(questions, TWIST_STIFFNESS))
         good = (rows[:, 11] > 0) & (rows[:, 12] > 0) & (rows[:, 9] > 0)
         return rows, np.where(good, needed_friction(rows[:, 7:10], shear, carried), np.inf)
 
-    tried = [rows_at(np.full(count, share)) for share in _SHARES]
+    tried = [rows_at(share * bend) for share in _SHARES]
     needed = np.stack([need for _, need in tried])
     best = np.clip(needed.argmin(0), 1, len(_SHARES) - 2)
-    column = np.arange(count)
+    column = np.arange(len(bend))
     shares = np.array(_SHARES)
     x = np.stack([shares[best + i] for i in (-1, 0, 1)])
     y = np.stack([needed[best + i, column] for i in (-1, 0, 1)])
     with np.errstate(divide="ignore", invalid="ignore"):
         left, right = (x[1] - x[0]) * (y[1] - y[2]), (x[1] - x[2]) * (y[1] - y[0])
         lowest = x[1] - 0.5 * ((x[1] - x[0]) * left - (x[1] - x[2]) * right) / (left - right)
-    refined = rows_at(np.where(np.isfinite(lowest), np.clip(lowest, x[0], x[2]), x[1]))
+    refined = rows_at(bend * np.where(np.isfinite(lowest), np.clip(lowest, x[0], x[2]), x[1]))
     candidates = [refined, *tried]
     choice = np.stack([need for _, need in candidates]).argmin(0)
-    push = np.stack([rows for rows, _ in candidates])[choice, column, 7]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        chosen, _ = rows_at(np.where(bend == 0.0, 0.0, push / bend), suspended)
-    questions = np.stack([suspended, curvature, push, push, push, push], -1)
-    return _described(chosen, questions, (count,))
+    own = np.stack([rows for rows, _ in candidates])[choice, column, 7]
+    along = (own - _SLICK * np.abs(laid[:, None] - laid)).max(1)
+    _, need = rows_at(along)
+    push = np.where(np.isfinite(need), along, own)  # own where there is no such grasp: the bend is too tight
+    chosen, _ = rows_at(push, suspended)
+    return _described(chosen, np.stack([suspended, curvature, push, push, push, push], -1), suspended.shape)
 
 
 def thickened(
