@@ -169,15 +169,6 @@ def test_a_push_holds_on_floors_on_which_a_bend_slips_without():
     assert slips["least_friction"] < 4e-4
 
 
-def test_a_jaw_that_comes_down_does_not_push_the_cable_together():
-    """Had the tail not made up for how much what lies is stretched, by 3.7 times the weight of an Lgb."""
-    line = Pattern(np.linspace(0.0, 0.4, 50)[:, None] * [1.0, 0.0])
-    cable = Cable.dlo(1)
-    found = deploy(plan(cable, line), floor=0.4, nodes=150, quasi_static=True, progress=False)
-    weight = 1180.0 * np.pi * cable.radius**2 * 9.81
-    assert found.record.tensions("cable")[-1].min() > -2.0 * weight * cable.gravito_bending_length
-
-
 @pytest.mark.parametrize("nodes", [80, 200])
 def test_equilibria_follow_a_cable_of_any_mesh_that_slips_along_its_length(nodes):
     """The border of what slips goes on by a node an iteration: the finer the mesh, the more of them it takes."""

@@ -174,11 +174,10 @@ def examine(
     return Feasibility(pattern.arc_length, floor, lift_off, free_end, tail, overlap, friction, slips)
 
 
-def grasps_along(pattern: Laid, cable: Cable, controller: str, stretch: float | FloatArray = 0.0) -> Grasp:
+def grasps_along(pattern: Laid, cable: Cable, controller: str) -> Grasp:
     """Grasps while each place of a pattern is the lift-off point [units of the cable], at the near side of a jaw.
 
-    The middle of the jaw is at the cable's length from its free end. What lies is longer by `stretch` than it was cut
-    [m], and so much more hangs.
+    The middle of the jaw is at the cable's length from its free end.
 
     Raises
     ------
@@ -196,7 +195,7 @@ def grasps_along(pattern: Laid, cable: Cable, controller: str, stretch: float | 
             f"the pattern bends to a radius of {1e3 / tightest:.2g} mm at {at:.0f} mm; this cable is laid down to"
             f" {1e3 * lgb / limit:.2g} mm, its gravito-bending length over {limit:g}"
         )
-    suspended = np.maximum((cable.length - 0.5 * JAW - pattern.arc_length + stretch) / lgb, table().shortest)
+    suspended = np.maximum((cable.length - 0.5 * JAW - pattern.arc_length) / lgb, table().shortest)
     curvature = -lgb * pattern.curvature  # grasps bend to the right
     thick = cable.radius / lgb
     if controller == "network":

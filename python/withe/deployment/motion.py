@@ -18,7 +18,6 @@ FloatArray = npt.NDArray[np.float64]
 Start = Literal["free", "held"]
 _GRAVITY = 9.81
 _LAST_HELD = 0.5  # [Lgb] that still hang when the jaw lets go
-_LAID_TENSION = 0.4 * 1.5  # [w Lgb]: friction of a usual floor, times the force at the lift-off point
 _CLEARANCE = 0.02  # [m] of the free end above the floor at the beginning
 _FASTEST_SHARE = 0.01  # of the acceleration of gravity: swing then moves the cable by less than a millimetre
 _PIVOT_ANGLES = 61
@@ -47,16 +46,12 @@ class Course:
 
 @dataclass(frozen=True)
 class Path:
-    """The pattern and the tail behind it, as far as the lift-off point goes; `grasps_along` sees a pattern in it.
-
-    What lies is under tension, and longer by `stretch` than it was cut, as far as the jaw makes up for that [m].
-    """
+    """The pattern and the tail behind it, as far as the lift-off point goes; `grasps_along` sees a pattern in it."""
 
     arc_length: FloatArray
     points: FloatArray
     heading: FloatArray
     curvature: FloatArray
-    stretch: FloatArray
 
     @property
     def length(self) -> float:
@@ -65,18 +60,13 @@ class Path:
 
 
 def lengthened(pattern: Pattern, cable: Cable, tail: float) -> Path:
-    """A pattern and its tail, along which the curvature fades out.
-
-    Along the tail the jaw makes up for how much what lies is stretched. If it did not, it would come down pushing that
-    much together, with up to ten times the weight of an Lgb; a cable that is let go so rolls aside.
-    """
+    """A pattern and its tail, along which the curvature fades out."""
     lgb = cable.gravito_bending_length
     heading = np.unwrap(np.arctan2(pattern.tangent[:, 1], pattern.tangent[:, 0]))
     more = tail - max(_LAST_HELD * lgb, JAW)
     if more <= 0.0:
         last = pattern.arc_length <= cable.length - 0.11 * lgb - 0.5 * JAW
-        s = pattern.arc_length[last]
-        return Path(s, pattern.points[last], heading[last], pattern.curvature[last], np.zeros_like(s))
+        return Path(pattern.arc_length[last], pattern.points[last], heading[last], pattern.curvature[last])
     spacing = pattern.arc_length[1]
     s = np.linspace(0.0, more, max(2, int(np.ceil(more / spacing))) + 1)
     share = np.minimum(s / min(more, 2.0 * lgb), 1.0)  # the curvature fades out
@@ -85,14 +75,11 @@ def lengthened(pattern: Pattern, cable: Cable, tail: float) -> Path:
     turned = heading[-1] + np.concatenate([[0.0], np.cumsum(0.5 * (curvature[1:] + curvature[:-1]) * steps)])
     middle = 0.5 * (turned[1:] + turned[:-1])
     points = pattern.points[-1] + np.cumsum(np.stack([np.cos(middle), np.sin(middle)], 1) * steps[:, None], axis=0)
-    strain = _LAID_TENSION / (2.0 * cable.stretch_stiffness)
-    made_up = strain * (pattern.length + s) * (3.0 * share**2 - 2.0 * share**3)
     return Path(
         np.concatenate([pattern.arc_length, pattern.length + s[1:]]),
         np.concatenate([pattern.points, points]),
         np.concatenate([heading, turned[1:]]),
         np.concatenate([pattern.curvature, curvature[1:]]),
-        np.concatenate([np.zeros(len(pattern.points)), made_up[1:]]),
     )
 
 
@@ -109,7 +96,7 @@ def displaced(path: Path, shift: FloatArray) -> Path:
     at = np.interp(s, travelled, fine)
     first, second = moved(at, 1), moved(at, 2)
     bend = (first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / np.linalg.norm(first, axis=1) ** 3
-    return Path(s, moved(at), np.unwrap(np.arctan2(first[:, 1], first[:, 0])), bend, path.stretch)
+    return Path(s, moved(at), np.unwrap(np.arctan2(first[:, 1], first[:, 0])), bend)
 
 
 @dataclass(frozen=True)

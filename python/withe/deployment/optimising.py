@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import get_args
 
 import numpy as np
@@ -171,9 +171,7 @@ def _thinned(path: Path, density: float) -> Path:
     count = max(20, round(density * path.length))
     s = np.linspace(0.0, path.length, min(count, len(path.points)))
     points = np.stack([np.interp(s, path.arc_length, path.points[:, i]) for i in range(2)], 1)
-    return Path(
-        s, points, *(np.interp(s, path.arc_length, row) for row in (path.heading, path.curvature, path.stretch))
-    )
+    return Path(s, points, *(np.interp(s, path.arc_length, row) for row in (path.heading, path.curvature)))
 
 
 def _centres(path: Path, pattern: Pattern, spacing: float) -> FloatArray:
@@ -194,7 +192,7 @@ def _shifted(path: Path, basis: FloatArray, shift: FloatArray) -> Path:
     bent = displaced(path, basis @ shift[:-3])
     angle = shift[-1] / path.length
     points = path.points[0] + shift[-3:-1] + (bent.points - path.points[0]) @ _turn(angle)
-    return replace(bent, points=points, heading=bent.heading + angle)
+    return Path(bent.arc_length, points, bent.heading + angle, bent.curvature)
 
 
 def _turn(angle: float) -> FloatArray:

@@ -262,15 +262,15 @@ def plan(
     if controller == "intuitive":
         needed, way = unknown, upright_way(held, path)
     elif controller == "network":
-        needed, way = unknown, way_along(held, path, grasps_along(path, held, controller, path.stretch))
+        needed, way = unknown, way_along(held, path, grasps_along(path, held, controller))
     elif controller == "optimised":
         if friction is None:
             raise ValueError("controller 'optimised' needs friction, the floor's coefficient")
         path, followed = _improved(held, pattern, path, validation.positive(friction, "friction"), start, progress)
         needed = _needed(pattern, held, followed, grasps_along(pattern, held, followed), bool(posts))
-        way = way_along(held, path, grasps_along(path, held, followed, path.stretch))
+        way = way_along(held, path, grasps_along(path, held, followed))
     else:
-        grasps = grasps_along(path, held, controller, path.stretch)
+        grasps = grasps_along(path, held, controller)
         needed, way = _needed(pattern, held, controller, grasps, bool(posts)), way_along(held, path, grasps)
     motion = course(held, path, way, speed, time_step, start)
     return Plan(
@@ -297,7 +297,7 @@ def _improved(
     """The path that lays best in the engine, and which controller goes along it."""
 
     def motion_of(tried: Path, controller: Controller) -> Course:
-        way = way_along(cable, tried, grasps_along(tried, cable, controller, tried.stretch))
+        way = way_along(cable, tried, grasps_along(tried, cable, controller))
         return course(cable, tried, way, _OPTIMISING_SPEED, _OPTIMISING_STEP, start)
 
     with bar(runs(path, cable, pattern), "optimising", progress, unit="runs") as shown:
