@@ -81,6 +81,7 @@ def deploy(
     touches the floor where it comes to, and sticks to it by anchored friction at its surface, on which it may roll.
     Backward Euler steps; density 1180 kg/m^3, Kelvin-Voigt viscosity of .02 s. The jaw holds 10 mm of the cable; its
     pads yield by .5 mm/N and 20 rad/(N m), so that a jaw too low rests on the floor.
+    Nothing resists rolling: a straight cable that is let go under tension, a little askew, rolls aside by millimetres.
 
     Parameters
     ----------
