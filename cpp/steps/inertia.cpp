@@ -2,6 +2,7 @@
 
 #include "steps/inertia.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -282,6 +283,12 @@ void for_each_turn(const Model& model, const Set& set) {
 
 void set_turning_velocities(const Model& model, const VectorX& v0, const VectorX& change, double dt, VectorX& v1) {
   for_each_turn(model, [&](int dof) { v1[dof] = 2.0 * finite_turn(change[dof]) / dt - v0[dof]; });
+}
+
+double farthest_turn(const Model& model, const VectorX& change) {
+  double farthest = 0.0;
+  for_each_turn(model, [&](int dof) { farthest = std::max(farthest, std::abs(change[dof])); });
+  return farthest;
 }
 
 void set_velocity_rates(const Model& model, const VectorX& change, double dt, VectorX& rates) {

@@ -224,7 +224,14 @@ void World::Implementation::relax_joints(const std::vector<bool>& is_told) {
   }
 }
 
+/// What is held goes on with its support, whatever velocities have been set.
+void World::Implementation::keep_held_velocities(const VectorX& before) {
+  equations->assembler().project(state.v);
+  if (!model.constraints.empty()) equations->assembler().add_held_part(before, 1.0, state.v);
+}
+
 void World::Implementation::set_rates(const std::vector<RodState>& rods) {
+  const VectorX before = state.v;
   std::vector<bool> is_told(at(model.edge_count), false);
   for (const RodState& rod : rods) {
     const int first = model.rod_first_edge[at(rod.rod)], end = model.rod_first_edge[at(rod.rod) + 1];
@@ -243,7 +250,7 @@ void World::Implementation::set_rates(const std::vector<RodState>& rods) {
         state.v(model.edge_dof[at(first + static_cast<int>(e))]) = rod.spins(e);
   }
   turn_frames(is_told);
-  equations->assembler().project(state.v);
+  keep_held_velocities(before);
   forget_motion();
 }
 

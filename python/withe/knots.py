@@ -262,8 +262,13 @@ def writhe(points: npt.ArrayLike, closed: bool = False) -> float:
     Returns
     -------
     float
+
+    Raises
+    ------
+    ValueError
+        Wrong shape, not finite, or fewer than 3 different points in a row.
     """
-    x = validation.number_array(points, "points", ("nodes", 3))
+    x = _polygon(points, 3)
     if not closed:
         far = 1e4 * _length(x)
         first, last = x[0] - x[1], x[-1] - x[-2]
@@ -391,8 +396,16 @@ def signature(points: npt.ArrayLike, closed: bool = False) -> int:
     return diagrams.signature(_diagram(points, closed))
 
 
+def _polygon(points: npt.ArrayLike, least: int) -> FloatArray:
+    """Points without those that are where the one before is."""
+    given = validation.number_array(points, "points", ("n", 3))
+    moves = np.ones(len(given), bool)
+    moves[1:] = (np.diff(given, axis=0) != 0.0).any(1)
+    if moves.sum() < least:
+        raise ValueError(f"points must be at least {least} different ones in a row, got {moves.sum()}")
+    return given[moves]
+
+
 def _diagram(points: npt.ArrayLike, closed: bool) -> diagrams.Diagram:
-    curve = validation.number_array(points, "points", ("n", 3))
-    if len(curve) < 4:
-        raise ValueError(f"points must be at least 4, got {len(curve)}")
+    curve = _polygon(points, 4)
     return diagrams.diagram(curve if closed else diagrams.closed_far_away(curve))

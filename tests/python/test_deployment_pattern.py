@@ -235,6 +235,23 @@ def test_what_lies_behind_a_bend_that_slips_at_lift_off_is_pulled_back_by_the_ta
     assert "tail" not in {slip.test for slip in bend.feasibility(cable, 1.05 * worst).slips}
 
 
+@pytest.mark.parametrize("points", [[[0, 0], [0.2, 0], [0.1, 0], [0.3, 0]], [[0, 0], [0.2, 0], [0, 0.005]]])
+def test_a_pattern_that_turns_back_is_refused(points):
+    with pytest.raises(ValueError, match="must not turn back on itself, it does at [23]0. mm"):
+        Pattern(points)
+
+
+def test_a_pattern_with_too_few_nodes_for_its_bends_says_so():
+    with pytest.warns(UserWarning, match="too short for 301 nodes"):
+        Pattern.word("the quick brown fox", 0.05)
+
+
+def test_a_pattern_of_a_millimetre_is_planned_or_refused_at_once():
+    x = np.linspace(0.0, 1e-3, 101)
+    pattern = Pattern(np.stack([x, 6e-5 * np.sin(4e3 * np.pi * x)], 1))
+    withe.deployment.plan(Cable.dlo(2), pattern)
+
+
 def test_a_pattern_that_ends_on_its_beginning_is_said_to_lie_on_itself():
     angle = np.linspace(0.0, 2 * np.pi, 300)
     ring = Pattern(0.1 * np.stack([np.sin(angle), 1 - np.cos(angle)], 1))

@@ -128,3 +128,17 @@ def test_points_of_no_cable_or_radius_are_refused():
         tracing.points(1, tilted())
     with pytest.raises(ValueError, match="radius must be positive"):
         tracing.points(0, tilted(), radius=0.0)
+
+
+@pytest.mark.parametrize("matrix", [None, np.array([[1000.0, 0.0, 320.0], [0.0, 1000.0, 240.0], [0.0, 0.0, 1.0]])])
+@pytest.mark.parametrize("up", [1.0, -1.0])
+def test_a_picture_is_one_from_above_or_from_below(matrix, up):
+    pixels = np.array([(0.0, 0.0), (640.0, 0.0), (640.0, 480.0), (0.0, 480.0)])
+    camera = Camera.from_points(pixels, 1e-3 * pixels * [1.0, -up], matrix=matrix)
+    np.testing.assert_array_equal(camera.looks_from(pixels[:2]), [up, up])
+
+
+def test_points_in_another_order_are_refused():
+    pixels = np.array([(0.0, 0.0), (640.0, 0.0), (640.0, 480.0), (0.0, 480.0)])
+    with pytest.raises(ValueError, match="in their order"):
+        Camera.from_points(pixels, 1e-3 * pixels[[0, 1, 3, 2]])

@@ -242,3 +242,22 @@ def test_a_record_of_another_scene_or_frame_is_refused():
     simulation = scene.build()
     with pytest.raises(ValueError, match="frame"):
         simulation.restore(record, frame=1000)
+
+
+@pytest.mark.parametrize("how", ["spins", "velocities", "positions", "set_velocities"])
+def test_what_is_held_goes_on_with_a_support_that_moves(how):
+    way = np.array([1.0, 0.0, 0.0])
+    scene = withe.Scene(gravity=(0.0, 0.0, 0.0))
+    rubber = withe.Material(youngs_modulus=1e6, density=1000.0)
+    rod = scene.add_rod(start=(0, 0, 0), end=(0, 0, -0.2), nodes=11, radius=4e-3, material=rubber)
+    wall = scene.clamp(rod.start)
+    simulation = scene.build(time_step=1e-3)
+    simulation.set_velocities(None, way)
+    simulation.move(wall, path=lambda time: time * way)
+    simulation.step(5)
+    if how == "set_velocities":
+        simulation.set_velocities(rod, way)
+    else:
+        value = {"spins": 0.0, "velocities": way, "positions": simulation.positions(rod)}[how]
+        simulation.set_state(rod, **{how: value})
+    np.testing.assert_allclose(simulation.velocities(rod)[0], way, atol=1e-9)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import re
 import sys
 from pathlib import Path
 from typing import get_args
@@ -77,15 +78,21 @@ def _cable(arguments: argparse.Namespace) -> Cable:
 
 
 def _points(path: Path) -> npt.NDArray[np.float64]:
-    """Columns x, y of a file; a first row that is no numbers is a header."""
+    """Columns x, y of a file, in the order of its header if it has one."""
     lines = path.read_text(encoding="utf-8").splitlines()
+    names = ["x", "y"]
     if lines and not _is_row(lines[0]):
+        heads = [re.fullmatch(r'\s*"?([xy])([^a-z].*)?', name, re.IGNORECASE) for name in lines[0].split(",")]
+        names = [head[1].lower() if head else "" for head in heads]
+        if sorted(names) != ["x", "y"]:
+            raise ValueError(f"{path.name} must begin with a row x,y or with numbers, got {lines[0]!r}")
         lines = lines[1:]
     rows = [line for line in lines if line.strip()]
     bad = next((row for row in rows if not _is_row(row)), None)
     if bad is not None:
         raise ValueError(f"{path.name} must hold rows x,y in m, got {bad!r}")
-    return np.array([[float(number) for number in row.split(",")] for row in rows]).reshape(-1, 2)
+    numbers = np.array([[float(number) for number in row.split(",")] for row in rows]).reshape(-1, 2)
+    return numbers[:, [names.index("x"), names.index("y")]]
 
 
 def _is_row(line: str) -> bool:

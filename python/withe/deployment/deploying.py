@@ -28,7 +28,7 @@ _LYING = 1.1  # [radii]: how high the centreline of what lies may be
 _CURVATURE, _OFFSET, _TURN = 0.5, 5e-4, np.radians(0.5)  # [1/m], [m], [rad]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Deployment:
     """How a cable came to lie.
 
@@ -124,6 +124,10 @@ def deploy(
     >>> print(found.error < 1e-3)
     True
     """
+    if not isinstance(plan, Plan):
+        raise ValueError(f"plan must be a withe.deployment.Plan, got {plan!r:.80}")
+    if cable is not None and not isinstance(cable, Cable):
+        raise ValueError(f"cable must be a withe.deployment.Cable, got {cable!r:.80}")
     friction = validation.positive(floor, "floor")
     noise = validation.non_negative(noise, "noise")
     nodes = validation.integer(nodes, "nodes", 20, 2000)

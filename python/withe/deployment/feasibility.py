@@ -49,7 +49,7 @@ class Slip:
         return f"{where} slips ({self.test}): it would need a coefficient of friction of {self.needed:.2f}"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Feasibility:
     """The coefficient of friction that each place of a pattern needs, by three tests, and what two more say.
 
@@ -196,6 +196,11 @@ def grasps_along(pattern: Laid, cable: Cable, controller: str) -> Grasp:
             f" {1e3 * lgb / limit:.2g} mm, its gravito-bending length over {limit:g}"
         )
     suspended = np.maximum((cable.length - 0.5 * JAW - pattern.arc_length) / lgb, table().shortest)
+    if suspended.max() > table().longest:
+        raise ValueError(
+            f"the cable is {suspended.max():.0f} of its gravito-bending lengths long, those of up to"
+            f" {table().longest:g} are laid down: hold it nearer to its free end, or is {lgb:g} m in metres?"
+        )
     curvature = -lgb * pattern.curvature  # grasps bend to the right
     thick = cable.radius / lgb
     if controller == "network":

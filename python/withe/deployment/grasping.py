@@ -25,7 +25,7 @@ _ENOUGH = 8.0  # [Lgb] of suspended length: for longer ones forces are the same
 TWIST_STIFFNESS = _BEND_STIFFNESS / 1.5  # GJ of a round rod of incompressible material
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Grasp:
     """How a gripper holds the suspended part of a rod. The arrays have the shape of what was asked for, then (3,).
 

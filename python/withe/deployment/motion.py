@@ -18,6 +18,7 @@ FloatArray = npt.NDArray[np.float64]
 Start = Literal["free", "held"]
 _GRAVITY = 9.81
 _LAST_HELD = 0.5  # [Lgb] that still hang when the jaw lets go
+_TAIL_SPACING = 0.02  # [Lgb]
 _CLEARANCE = 0.02  # [m] of the free end above the floor at the beginning
 _FASTEST_SHARE = 0.01  # of the acceleration of gravity: swing then moves the cable by less than a millimetre
 _PIVOT_ANGLES = 61
@@ -66,8 +67,13 @@ def lengthened(pattern: Pattern, cable: Cable, tail: float) -> Path:
     more = tail - max(_LAST_HELD * lgb, JAW)
     if more <= 0.0:
         last = pattern.arc_length <= cable.length - 0.11 * lgb - 0.5 * JAW
+        if last.sum() < 2:
+            raise ValueError(
+                f"the cable is {cable.length / lgb:.2g} of its gravito-bending lengths long, too stiff to be laid down:"
+                f" is that length, {lgb:g} m, in metres?"
+            )
         return Path(pattern.arc_length[last], pattern.points[last], heading[last], pattern.curvature[last])
-    spacing = pattern.arc_length[1]
+    spacing = max(pattern.arc_length[1], _TAIL_SPACING * lgb)
     s = np.linspace(0.0, more, max(2, int(np.ceil(more / spacing))) + 1)
     share = np.minimum(s / min(more, 2.0 * lgb), 1.0)  # the curvature fades out
     curvature = pattern.curvature[-1] * (1.0 - 3.0 * share**2 + 2.0 * share**3)

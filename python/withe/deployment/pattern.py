@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Callable
 from functools import cached_property
 from typing import Any
@@ -21,6 +22,8 @@ __all__ = ["Pattern"]
 
 FloatArray = npt.NDArray[np.float64]
 _FUNCTION_SAMPLES = 2001
+_SLOWEST = 0.15  # of the way along the curve over that along what was given, where it turns back by 160 degrees
+_MUCH_FARTHER = 1.5
 _EASED = 101  # samples of an average
 _BENT_START = 1.0  # [rad]: curvature at a function's start times its length that asks for a lead-in
 
@@ -69,7 +72,13 @@ class Pattern:
     Raises
     ------
     ValueError
-        None or several of the three, fewer than 3 points, repeated points, NaN, a picture without a curve.
+        None or several of the three, fewer than 3 points, repeated points, points that turn back, NaN, a picture
+        without a curve.
+
+    Warns
+    -----
+    UserWarning
+        It departs by more than the smoothing, for want of nodes.
 
     Examples
     --------
@@ -228,6 +237,7 @@ class Pattern:
         curve = make_interp_spline(even, moved, k=5)
         fine = np.linspace(0.0, even[-1], 20 * nodes)
         speed = np.linalg.norm(curve(fine, 1), axis=1)
+        _require_smooth(speed, fine)
         travelled = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(fine))])
         self.arc_length = np.linspace(0.0, travelled[-1], nodes)
         curve = make_interp_spline(self.arc_length, curve(np.interp(self.arc_length, travelled, fine)), k=5)
@@ -240,6 +250,14 @@ class Pattern:
         self.curvature_slope: FloatArray = _cross(first, third)
         self.curvature_bend: FloatArray = _cross(first, fourth) + _cross(second, third)
         self.deviation = float(distances(sampled, self.points).max())
+        if self.deviation > _MUCH_FARTHER * smoothing:
+            away, asked = 1e3 * self.deviation, 1e3 * smoothing
+            warnings.warn(
+                f"the pattern is {away:.1f} mm from what was given, where {asked:.1f} mm were asked for: its bends are"
+                f" too short for {nodes} nodes over {self.length:.2f} m; give more nodes",
+                UserWarning,
+                stacklevel=3,
+            )
 
     @property
     def length(self) -> float:
@@ -249,7 +267,7 @@ class Pattern:
     @cached_property
     def crossings(self) -> FloatArray:
         """Pairs of arc lengths at which the pattern crosses itself, shape (crossings, 2) [m]."""
-        return crossings(self.points, self.arc_length[1])
+        return crossings(self.points, self.arc_length)
 
     def feasibility(self, cable: Cable, friction: float, controller: Controller = "exact") -> Feasibility:
         """Say where friction holds the cable on the pattern while it is laid, and where not.
@@ -287,8 +305,8 @@ class Pattern:
         return f"Pattern({self.length:.3f} m, {len(self.points)} points, {away})"
 
 
-def crossings(points: FloatArray, spacing: float) -> FloatArray:
-    """Pairs of arc lengths at which a polyline of even spacing [m] crosses itself, shape (crossings, 2) [m]."""
+def crossings(points: FloatArray, arc_length: FloatArray) -> FloatArray:
+    """Pairs of arc lengths at which a polyline crosses itself, shape (crossings, 2) [m]."""
     a, b = points[:-1], points[1:]
     way = b - a
     apart = a[None] - a[:, None]
@@ -300,7 +318,7 @@ def crossings(points: FloatArray, spacing: float) -> FloatArray:
     later = second > first + 1
     first, second = first[later], second[later]
     places = np.stack([first + along[first, second], second + other[first, second]], 1)
-    return np.asarray(spacing * places)
+    return np.interp(places, np.arange(len(arc_length)), arc_length)
 
 
 def distances(points: FloatArray, curve: FloatArray) -> FloatArray:
@@ -310,6 +328,16 @@ def distances(points: FloatArray, curve: FloatArray) -> FloatArray:
     along = ((points[:, None] - start) * way).sum(-1) / size
     nearest = start + np.clip(along, 0.0, 1.0)[..., None] * way
     return np.asarray(np.linalg.norm(points[:, None] - nearest, axis=-1).min(1))
+
+
+def _require_smooth(speed: FloatArray, s: FloatArray) -> None:
+    """Refuse curves that stand still for a moment, where they turn back [m]."""
+    slowest = int(speed.argmin())
+    if speed[slowest] < _SLOWEST:
+        raise ValueError(
+            f"a pattern must not turn back on itself, it does at {1e3 * s[slowest]:.0f} mm: bends are as wide as twice"
+            " their radius"
+        )
 
 
 def _cross(a: FloatArray, b: FloatArray) -> FloatArray:

@@ -76,6 +76,8 @@ def posts_along(
 def require_room(posts: Sequence[Post], pattern: Pattern, cable: Cable) -> None:
     """Refuse posts that stand where the cable is to lie."""
     for post in posts:
+        if not isinstance(post, Post):
+            raise ValueError(f"posts must be withe.deployment.Post, got {post!r:.80}")
         away = float(distances(np.array([[post.x, post.y]]), pattern.points)[0])
         if away < (post.radius + cable.radius) * (1.0 - 1e-6):
             needs = f"its radius and the cable's are {1e3 * (post.radius + cable.radius):.1f} mm"

@@ -36,7 +36,7 @@ _OPTIMISING_SPEED, _OPTIMISING_STEP = 0.025, 0.04  # [m/s], [s]: of quasi-static
 _MOST_FRICTION = 3.0  # no floor has more
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Plan:
     """The path of a jaw that lays a cable; at its end the jaw opens. The floor is the plane z = 0.
 
@@ -341,7 +341,7 @@ def _uncrossed(pattern: Pattern, cable: Cable, tail: float | None) -> tuple[Cabl
     for share in shares:
         held, given = _held(cable, pattern, share * given)
         path = lengthened(pattern, held, given)
-        found = crossings_of(path.points, path.length / (len(path.points) - 1))
+        found = crossings_of(path.points, path.arc_length)
         if not len(found):
             return held, given, path
     first, second = 1e3 * found[0]

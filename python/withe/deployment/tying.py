@@ -160,10 +160,14 @@ def tie(
 def _check(
     plans: Sequence[Plan], steps: Sequence[Sequence[Move]], picks: Sequence[Sequence[npt.ArrayLike]] | None
 ) -> None:
-    if not plans:
-        raise ValueError("plans must be one or more")
+    if isinstance(plans, Plan) or not plans or not all(isinstance(plan, Plan) for plan in plans):
+        raise ValueError(f"plans must be one or more withe.deployment.Plan in a list, got {plans!r:.80}")
     for number, step in enumerate(steps):
+        if isinstance(step, Move):
+            raise ValueError(f"step {number} must be a list of moves that are done together, got one Move")
         for move in step:
+            if not isinstance(move, Move):
+                raise ValueError(f"step {number} must hold withe.deployment.Move, got {move!r:.80}")
             if move.cable >= len(plans):
                 raise ValueError(f"step {number} moves cable {move.cable}, there are {len(plans)}")
             longest = plans[move.cable].cable.length + 0.5 * JAW

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
+from withe.folding.paper import require_length
 from withe.folding.plans import Plan
 from withe.folding.seeing import find_edge, overhead_camera
 from withe.folding.simulated_sheet import Fold, SimulatedSheet
@@ -101,6 +102,7 @@ def fold(
         raise ValueError(f"plan must be a Plan, got {plan!r:.80}")
     if not isinstance(sheet, SimulatedSheet | WideSheet):
         raise ValueError(f"sheet must be a SimulatedSheet or a WideSheet, got {sheet!r:.80}")
+    require_length(sheet.paper, plan.paper)
     stops = validation.integer(replans, "replans", 0, 1000)
     watched = overhead_camera(plan.paper.length) if camera is None else camera
     least = validation.non_negative(tolerance, "tolerance")

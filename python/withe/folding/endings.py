@@ -96,7 +96,8 @@ def plan(
     -----
     UserWarning
         Every way of method "slip" slides: with the least friction at which one would not. Also where the paper does not
-        slide, but another within the uncertainty: with which, and by how much.
+        slide, but another within the uncertainty: with which, and by how much. And where the sheet will jump
+        (`Plan.jumps_at`), but for method "intuitive", which often does.
 
     Examples
     --------
@@ -133,6 +134,8 @@ def plan(
     elif method != "intuitive" and replans:
         said = _unseen(slow)
     if said is None:
+        if method not in ("slip", "intuitive") and slow.jumps_at is not None:
+            warnings.warn(_jumps(slow), UserWarning, stacklevel=2)
         return slow
     if ending == "auto" and (grasp == "free" or replans):
         try:
@@ -152,6 +155,12 @@ def _slides(slow: Plan) -> str | None:
     how = f"by {1e3 * slide:.1f} mm" if np.isfinite(slide) else "and jumps"
     lgb = paper.gravito_bending_length
     return f"the sheet slides {how} within its uncertainty, where Lgb is {lgb:.4g} m and friction {paper.friction:.3g}"
+
+
+def _jumps(slow: Plan) -> str:
+    """That the sheet will not follow to the end, and what may."""
+    free = "" if slow.grasp == "free" else ": method='slip' with grasp='free' holds the sheet by a moment too"
+    return f"the sheet jumps at {slow.jumps_at:.1f} of {slow.times[-1]:.1f} s, where no equilibrium follows{free}"
 
 
 def _unseen(slow: Plan) -> str | None:

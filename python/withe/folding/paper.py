@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from withe.common import validation
 
-__all__ = ["Paper"]
+__all__ = ["Paper", "require_length"]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -97,6 +97,12 @@ class Paper:
         """
         diagonal = np.sqrt(2.0) * validation.positive(side, "side")
         return cls(diagonal, diagonal, 0.043, outline=((0.0, 0.0), (0.5, 1.0), (1.0, 0.0)))
+
+
+def require_length(paper: Paper, planned: Paper) -> None:
+    """Refuse a sheet that is longer or shorter than that of a plan, whose jaw would hold it elsewhere."""
+    if paper.length != planned.length:
+        raise ValueError(f"plan must be for a sheet of {paper.length:g} m, got one for {planned.length:g} m")
 
 
 def _checked_outline(outline: Sequence[tuple[float, float]]) -> tuple[tuple[float, float], ...]:

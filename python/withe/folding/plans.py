@@ -37,7 +37,7 @@ def flat_forces(width: Width) -> tuple[float, float, float]:
     return 0.5 * float(width.weight(_LEAST)), 0.0, _LEAST
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Plan:
     """Poses of a jaw that folds a sheet, and times at which it is there.
 

@@ -15,7 +15,7 @@ from withe.folding.carrying import FRAMES, Watch, carried
 from withe.folding.jaw import Jaw
 from withe.folding.jaw_motion import JawMotion, Motion, lead
 from withe.folding.noise import Drawn, Noise
-from withe.folding.paper import Paper
+from withe.folding.paper import Paper, require_length
 from withe.folding.paper_rods import add_paper
 from withe.folding.views import strip_picture, table_picture
 from withe.perception.camera import Camera
@@ -261,7 +261,8 @@ class SimulatedSheet:
         Raises
         ------
         ValueError
-            Poses that are not finite or do not begin at the flat sheet, times that do not grow.
+            Not a plan, or one for paper of another size; poses that are not finite or do not begin at the flat sheet,
+            times that do not grow.
 
         Examples
         --------
@@ -271,6 +272,9 @@ class SimulatedSheet:
         >>> print(f"slides {1e3 * folded.slide:.1f} mm")  # doctest: +SKIP
         slides 7.7 mm
         """
+        if not all(hasattr(plan, name) for name in ("times", "poses", "target")):
+            raise ValueError(f"plan must be a Plan, or have times, poses and target, got {plan!r:.80}")
+        require_length(self.paper, getattr(plan, "paper", self.paper))
         return self.carry_out([plan], plan.target, duration=float(plan.times[-1] - plan.times[0]), progress=progress)
 
     def carry_out(

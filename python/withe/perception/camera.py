@@ -108,6 +108,8 @@ class Camera:
         if matrix is None and distortion is not None:
             raise ValueError("distortion needs the matrix as well, got None")
         map_ = _direct_linear_transform(camera._normalised(seen), known)
+        if not (map_[2] @ np.column_stack([known, np.ones(len(known))]).T > 0.0).all():
+            raise ValueError("pixels must show metres in their order, got points that lie behind the camera as fitted")
         if flat and matrix is None:
             camera._pose = np.column_stack([map_[:, 0], map_[:, 1], np.full(3, np.nan), map_[:, 2]])
             camera._flat = True
@@ -124,6 +126,29 @@ class Camera:
     def _set_pose(self, rotation: Array, translation: Array) -> None:
         self.rotation, self.translation = rotation, translation
         self._pose = np.column_stack([rotation, translation])
+
+    @property
+    def flat(self) -> bool:
+        """Whether it is calibrated on the plane z = 0 only."""
+        return self._flat
+
+    def looks_from(self, pixels: ArrayLike) -> Array:
+        """Side of the plane z = 0 from which pixels see it, 1 from above and -1 from below, shape (n,).
+
+        Parameters
+        ----------
+        pixels : array_like of shape (n, 2) [px]
+            That see the plane; their rows grow downwards, as pictures have them.
+
+        Returns
+        -------
+        ndarray of shape (n,)
+        """
+        x = self.to_plane(pixels)
+        # From above, x to the right and y away from the eye make a mirror image of rows that grow downwards.
+        seen = x[:, :2] @ self._pose[:, :2].T + self._pose[:, 3]
+        by = self._pose[:2, :2] - (seen[:, :2] / seen[:, 2:])[:, :, None] * self._pose[2, :2]
+        return np.asarray(-np.sign(np.linalg.det(self.matrix[:2, :2]) * np.linalg.det(by)))
 
     def project(self, points: ArrayLike) -> Array:
         """Pixels of points of the world.

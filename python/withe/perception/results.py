@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 FORMAT_VERSION = 1
 
 
-@dataclass
+@dataclass(eq=False)
 class Crossing:
     """One strand over another.
 
@@ -36,7 +36,7 @@ class Crossing:
     confidence: float
 
 
-@dataclass
+@dataclass(eq=False)
 class Joint:
     """The end of a cable on the flank of another, half a width from its centreline.
 
@@ -53,7 +53,7 @@ class Joint:
     through: tuple[int, int]
 
 
-@dataclass
+@dataclass(eq=False)
 class Ambiguity:
     """A place where another reading of the picture is almost as good.
 
@@ -67,7 +67,7 @@ class Ambiguity:
     reason: str
 
 
-@dataclass
+@dataclass(eq=False)
 class Tracing:
     """Every cable of an image, in order.
 
@@ -109,8 +109,9 @@ class Tracing:
         height : float [m]
             z of the plane that the cables lie in (their centrelines).
         radius : float, optional [m]
-            Of the cables: upper strands are lifted over lower ones by two radii and a tenth, so that rods do not
-            start inside each other.
+            Of the cables: upper strands are lifted over lower ones by two radii and a tenth, towards the camera, so
+            that rods do not start inside each other. What a camera that is calibrated on the plane only sees of that
+            height is left out.
 
         Returns
         -------
@@ -127,7 +128,13 @@ class Tracing:
             return camera.to_plane(self.centrelines[cable], height)
         if not radius > 0:
             raise ValueError(f"radius must be positive, got {radius}")
-        return camera.to_plane(self.centrelines[cable], height + lifts(self, camera, height, radius)[cable])
+        line, lift = self.centrelines[cable], lifts(self, camera, height, radius)[cable]
+        lift *= camera.looks_from(line)
+        if not camera.flat:
+            return camera.to_plane(line, height + lift)
+        points = camera.to_plane(line, height)
+        points[:, 2] += lift
+        return points
 
     def to_dict(self) -> dict[str, Any]:
         """Every field in plain Python objects that JSON can hold; labels as runs (label, length) row by row."""

@@ -297,7 +297,7 @@ class Placement:
         set_state(self._session, rod, positions, velocities, twist, directors, spins)
 
     def set_velocities(self, rod: Rod | str | None, velocities: npt.ArrayLike) -> None:
-        """Set the velocities of the nodes of a rod; those that are held stay at rest.
+        """Set the velocities of the nodes of a rod; those that are held go on as their supports do.
 
         Parameters
         ----------
