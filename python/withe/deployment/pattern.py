@@ -335,8 +335,8 @@ def _require_smooth(speed: FloatArray, s: FloatArray) -> None:
     slowest = int(speed.argmin())
     if speed[slowest] < _SLOWEST:
         raise ValueError(
-            f"a pattern must not turn back on itself, it does at {1e3 * s[slowest]:.0f} mm: bends are as wide as twice"
-            " their radius"
+            f"a pattern must not turn back on itself, it does at {1e3 * s[slowest]:.0f} mm: draw the bend in which the"
+            " cable is to turn"
         )
 
 
