@@ -237,7 +237,7 @@ def test_what_lies_behind_a_bend_that_slips_at_lift_off_is_pulled_back_by_the_ta
 
 @pytest.mark.parametrize("points", [[[0, 0], [0.2, 0], [0.1, 0], [0.3, 0]], [[0, 0], [0.2, 0], [0, 0.005]]])
 def test_a_pattern_that_turns_back_is_refused(points):
-    with pytest.raises(ValueError, match="must not turn back on itself, it does at [23]0. mm"):
+    with pytest.raises(ValueError, match=r"must not turn back on itself, it does at [23]0. mm"):
         Pattern(points)
 
 

@@ -165,9 +165,10 @@ class Measurements:
         """Force and moment of a support on the rod.
 
         In motion, the mean of the last step, or of its last part where it was cut (`statistics.steps` counts parts):
-        with all other forces, that by which momentum grew in that time. Times the way and the turn of the step it is what ``energy().work`` counts, to second order in the step. A support that starts or
-        stops at full speed gives what it holds its speed by an impulse, which is part of the force of that step: its
-        work is that times the mean of both speeds, half of what the way of the step would say.
+        with all other forces, that by which momentum grew in that time. Times the way and the turn of the step it is
+        what ``energy().work`` counts, to second order in the step. A support that starts or stops at full speed gives
+        what it holds its speed by an impulse, which is part of the force of that step: its work is that times the mean
+        of both speeds, half of what the way of the step would say.
 
         Parameters
         ----------
