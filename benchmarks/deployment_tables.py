@@ -3,21 +3,25 @@
 python benchmarks/deployment_tables.py [--quick] [--whole] [--cables 2] [--patterns circle ...] [--trials 0] [--resume]
                                        [--known] [--refine]
 
-By default cable 2 alone, which takes some 20 minutes of one thread; --whole takes cables 1 to 3 and three noisy trials
-of each cell, and hours. Each run is printed, and written to out/benchmarks/deployment_tables.jsonl, as it ends. Ctrl-C
-makes the tables of what there is; --resume goes on after that. Cables are laid quasi-statically, but for the intuitive
-way and noisy trials, at 2.5 cm/s: an upright cable buckles, falls and swings, and no row of equilibria follows it.
-In noisy trials the planner knows the cable by a picture of its loop. Errors are those of (9.11), point by point: the
-distance of each point of the cable from its place on the pattern. The way "network" needs torch, and is left out
-without it.
+By default cable 2 alone, which takes some 10 minutes on two cores; --whole takes cables 1 to 3 and three noisy trials
+of each cell, and hours. Runs go side by side, one a core. Each is printed, and written to
+out/benchmarks/deployment_tables.jsonl, as it ends. Ctrl-C makes the tables of what there is; --resume goes on after
+that. Cables are laid quasi-statically, but for the intuitive way and noisy trials, at 2.5 cm/s: an upright cable
+buckles, falls and swings, and no row of equilibria follows it. In noisy trials the planner knows the cable by a picture
+of its loop. Errors are those of (9.11), point by point: the distance of each point of the cable from its place on the
+pattern. The way "network" needs torch, and is left out without it.
 """
 
 from __future__ import annotations
 
 import importlib.util
+import os
+import signal
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from itertools import product
+from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
@@ -411,20 +415,45 @@ def main() -> None:
     report.write()
 
 
+_here: list[Patterns] = []  # of a worker
+
+
+def begin(nodes: int) -> None:
+    """A worker: patterns of its own, one thread; Ctrl-C is for who has begun it, who lets it end what it does."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if importlib.util.find_spec("torch") is not None:
+        import torch
+
+        torch.set_num_threads(1)
+    _here.append(Patterns(nodes))
+
+
+def carried_out_here(run: Run) -> Run:
+    """By a worker."""
+    return carried_out(run, _here[0])
+
+
 def laid(wanted: list[Run], patterns: Patterns, lines: Lines, known: bool) -> list[Run]:
     """Carry out what is wanted; each run is printed and written as it ends. Those that were not interrupted."""
     done = {(run.key, run.seed, run.nodes): run for run in (Run(**line) for line in lines.known)}
     left = [run for run in wanted if (run.key, run.seed, run.nodes) not in done]
-    if not known:
-        with bar(len(left), "laying", "runs") as shown:
-            try:
-                for run in left:
-                    found = done[run.key, run.seed, run.nodes] = carried_out(run, patterns)
+    if not known and left:
+        os.environ.setdefault("OMP_NUM_THREADS", "1")  # of workers
+        workers = ProcessPoolExecutor(
+            min(os.cpu_count() or 1, len(left)), get_context("spawn"), initializer=begin, initargs=(patterns.nodes,)
+        )
+        try:
+            with bar(len(left), "laying", "runs") as shown:
+                for ended in as_completed([workers.submit(carried_out_here, run) for run in left]):
+                    found = ended.result()
+                    done[found.key, found.seed, found.nodes] = found
                     lines.add(asdict(found))
                     print(found, flush=True)
                     shown.advance(1)
-            except KeyboardInterrupt:
-                print("\ninterrupted: --resume goes on", flush=True)
+        except KeyboardInterrupt:
+            print("\ninterrupted: --resume goes on", flush=True)
+        finally:
+            workers.shutdown(cancel_futures=True)
     return [done[name] for run in wanted if (name := (run.key, run.seed, run.nodes)) in done]
 
 

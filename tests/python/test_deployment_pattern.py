@@ -62,6 +62,8 @@ def test_a_picture_of_a_loop_measures_the_cable_within_half_a_pixel(loop, lgb, r
         found = measure(image=np.clip(image, 0, 255).astype(np.uint8), scale=pixel)
         assert found.gravito_bending_length == pytest.approx(lgb, abs=0.75 * pixel)
         assert found.error == pytest.approx(0.5 * pixel / 1.1422, rel=1e-4)
+    with pytest.raises(ValueError, match="scale must be in metres a pixel"):
+        measure(image=np.clip(image, 0, 255).astype(np.uint8), scale=1.0 / pixel)
 
 
 def test_cables_of_the_experiments():
@@ -206,6 +208,15 @@ def test_bad_patterns_say_what_is_wrong(arguments, message):
         (lambda: Cable(1.0, 1e-3, float("nan")), "gravito_bending_length"),
         (lambda: Cable(1e-3, 1e-3, 0.03), "thickness"),
         (lambda: Cable.dlo(6), "number"),
+        (lambda: withe.deployment.plan(Cable(0.8, 1.6e-3, 32.0), Pattern(wave())), "32 m, in metres"),
+        (
+            lambda: withe.deployment.plan(Cable(8.0, 1.6e-3, 0.032), Pattern(wave()), posts=[(0, 0)]),
+            "must be withe.dep",
+        ),
+        (
+            lambda: Pattern(wave()).feasibility(Cable(8.0, 1.6e-3, 0.032), 0.4),
+            "250 of its gravito-bending lengths long",
+        ),
         (lambda: measure(height=-1.0), "height must be positive"),
         (lambda: measure(), "exactly one of height and image"),
         (lambda: measure(image=np.zeros((50, 50, 3), np.uint8)), "needs scale"),

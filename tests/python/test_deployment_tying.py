@@ -63,6 +63,16 @@ def test_bad_steps_are_named(plans, steps, message):
         tie([line()] * plans, steps, floor=0.5)
 
 
+def test_what_is_no_list_of_plans_or_moves_is_named():
+    for plans, steps, message in (
+        (line(), [], "plans must be one or more"),
+        ([line()], [Move(0, 0.0, [(0, 0, 1)])], "step 0 must be a list of moves"),
+        ([line()], [[(0, 0.0, [(0, 0, 1)])]], "step 0 must hold withe.deployment.Move"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            tie(plans, steps, floor=0.5)
+
+
 def test_bad_moves_and_picks_are_named():
     with pytest.raises(ValueError, match="by of a move must have shape"):
         Move(0, 0.0, [1.0, 2.0])

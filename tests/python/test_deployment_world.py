@@ -136,6 +136,7 @@ def test_the_world_imports_no_planner():
         ({"floor": 0.4, "time_step": 0.0}, "time_step must be positive"),
         ({"floor": 0.4, "seed": -1}, "seed"),
         ({"floor": 0.4, "cable": Cable(0.1, 1e-3, 0.02)}, "the plan holds it at"),
+        ({"floor": 0.4, "cable": 0.4}, "cable must be a withe.deployment.Cable, got 0.4"),
     ],
 )
 def test_bad_input_says_what_is_wrong(arc, arguments, message):

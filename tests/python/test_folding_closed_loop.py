@@ -109,6 +109,12 @@ def test_nonsense_is_refused(half):
         fold("half", sheet)
     with pytest.raises(ValueError, match="sheet must be a SimulatedSheet or a WideSheet"):
         fold(half, A4)
+    letter = SimulatedSheet(Paper.us_letter(), **COARSE)
+    for carry in (lambda: fold(half, letter), lambda: letter.fold(half)):
+        with pytest.raises(ValueError, match=r"for a sheet of 0.2794 m, got one for 0.297 m"):
+            carry()
+    with pytest.raises(ValueError, match=r"have times, poses and target, got 'fold.csv'"):
+        sheet.fold("fold.csv")
     with pytest.raises(ValueError, match="replans"):
         fold(half, sheet, replans=-1)
     with pytest.raises(ValueError, match="tolerance"):

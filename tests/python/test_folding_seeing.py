@@ -61,6 +61,8 @@ def test_a_picture_may_be_mirrored_or_a_file(tmp_path):
     path = tmp_path / "strip.png"
     cv2.imwrite(str(path), image[..., ::-1])
     assert measure(image=path, scale=SCALE) == found
+    with pytest.raises(ValueError, match="scale must be in pixels a metre"):
+        measure(image=path, scale=1.0 / SCALE)
 
 
 def test_the_error_of_a_picture_is_that_of_its_readings():

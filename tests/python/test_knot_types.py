@@ -88,3 +88,12 @@ def test_bad_input_says_what_is_wrong(points, message):
     for function in (knots.alexander_polynomial, knots.signature):
         with pytest.raises(ValueError, match=message):
             function(points)
+
+
+def test_points_that_repeat_change_nothing_and_too_few_are_refused():
+    curve = knots.overhand_knot(nodes=60)
+    repeated = np.concatenate([curve[:1], curve, curve[-1:]])
+    assert knots.writhe(repeated) == knots.writhe(curve)
+    assert knots.signature(repeated) == knots.signature(curve)
+    with pytest.raises(ValueError, match="at least 3 different ones"):
+        knots.writhe(curve[:1])

@@ -15,6 +15,7 @@ from withe.perception.tracing import check_image, read_image
 __all__ = ["JAW", "Cable", "MeasuredCable", "measure"]
 
 JAW = 0.010  # [m] of a cable that a jaw holds
+_HIGHEST_LOOP = 10.0  # [m]
 LOOP_HEIGHT = 1.142240  # of a loop that hangs on a floor, touching it tangentially [Lgb]: .90660 (EI / w)^(1/3)
 _TABLE = {  # Lgb, radius, length [m] [Choi, dissertation, table 9.1]
     1: (0.018, 1.6e-3, 0.875),
@@ -144,6 +145,8 @@ def measure(
     if image is not None:
         pixel = pixel_size(scale)
         height = pixel * _loop_height(image)
+        if not height < _HIGHEST_LOOP:
+            raise ValueError(f"scale must be in metres a pixel: at {pixel:g} the loop is {height:.3g} m high")
         error = 0.5 * pixel if error is None else error
     height, error = (
         validation.positive(height, "height"),

@@ -19,6 +19,7 @@ _SIDE = (math.log(1e-20), math.log(0.5 * math.pi - 1e-5))  # angles between tip 
 _STEP = 1e-3  # of differences of these
 _CHANGE = 1e-5  # of differences of Lgb, lengths and curls
 _MOST_STEPS = 30  # to the angle of a tip
+_LONGEST_REACH = 10.0  # [m] of a strip of paper
 _READ = 0.3  # standard deviation of what is read off a picture [px]
 FloatArray = npt.NDArray[np.float64]
 _TELLING = (1.5, 3.0)  # lengths of strips [Lgb] whose droop depends steeply on Lgb
@@ -167,6 +168,8 @@ def measure(
     error = validation.non_negative(_READ / per_metre if error is None else error, "error")
     ends = np.array([strip_ends(x) for x in (image, turned) if x is not None]) / per_metre
     across, down = (float(x) for x in ends.mean(axis=0))
+    if not across < _LONGEST_REACH:
+        raise ValueError(f"scale must be in pixels a metre: at {per_metre:g} the strip reaches {across:.3g} m")
     flat = _measured(_angle_where_tip_is(across, down), across, down, error, by_reach=True)
     return flat if turned is None else _uncurled(flat, ends.ravel(), error)
 
