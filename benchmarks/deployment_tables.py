@@ -419,12 +419,8 @@ _here: list[Patterns] = []  # of a worker
 
 
 def begin(nodes: int) -> None:
-    """A worker: patterns of its own, one thread; Ctrl-C is for who has begun it, who lets it end what it does."""
+    """A worker: patterns of its own; Ctrl-C is for who has begun it, who lets it end what it does."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    if importlib.util.find_spec("torch") is not None:
-        import torch
-
-        torch.set_num_threads(1)
     _here.append(Patterns(nodes))
 
 
@@ -438,7 +434,7 @@ def laid(wanted: list[Run], patterns: Patterns, lines: Lines, known: bool) -> li
     done = {(run.key, run.seed, run.nodes): run for run in (Run(**line) for line in lines.known)}
     left = [run for run in wanted if (run.key, run.seed, run.nodes) not in done]
     if not known and left:
-        os.environ.setdefault("OMP_NUM_THREADS", "1")  # of workers
+        os.environ.setdefault("OMP_NUM_THREADS", "1")  # of workers, torch's too
         workers = ProcessPoolExecutor(
             min(os.cpu_count() or 1, len(left)), get_context("spawn"), initializer=begin, initargs=(patterns.nodes,)
         )

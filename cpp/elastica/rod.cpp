@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "elastica/rod_kernels.hpp"
+#include "elastica/rod_slope.hpp"
 
 namespace withe {
 
@@ -67,18 +68,17 @@ RodBlock block_at(const RodProblem<end>& problem, const typename RodProblem<end>
   return block;
 }
 
-using Quaternion = std::array<double, 4>;
-
-Quaternion product(const Quaternion& a, const Quaternion& b) {
-  return {a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3], a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
-          a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1], a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0]};
-}
 Quaternion unit(const Quaternion& q) {
   const double inverse = 1.0 / std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
   return {inverse * q[0], inverse * q[1], inverse * q[2], inverse * q[3]};
 }
 
 }  // namespace
+
+Quaternion product(const Quaternion& a, const Quaternion& b) {
+  return {a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3], a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
+          a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1], a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0]};
+}
 
 std::vector<double> rod_cuts(double suspended) {
   const auto segments = static_cast<std::size_t>(std::max(4.0, std::ceil(suspended / kLongestSegment - 1e-9)));
@@ -189,9 +189,10 @@ RodShape rod_shape(const RodProblem<end>& problem, const typename RodProblem<end
   };
   const auto& leaves = path.nodes[0];  // the shortest turn from x to the tangent
   const double half = std::sqrt(0.5 * (1.0 + leaves[0]));
-  RodPoint start{{leaves[0], leaves[1], leaves[2]},
-                 {leaves[3] - problem.lever * shape.floor_force[1], leaves[4] + problem.lever * shape.floor_force[0],
-                  leaves[5] + problem.behind * shape.floor_force[1]},
+  auto lifted = leaves;
+  add_lever(problem.lever, problem.behind, field.floor, lifted);
+  RodPoint start{{lifted[0], lifted[1], lifted[2]},
+                 {lifted[3], lifted[4], lifted[5]},
                  {0, 0, 0},
                  {half, 0, -0.5 * leaves[2] / half, 0.5 * leaves[1] / half}};
   keep(0.0, start);

@@ -24,6 +24,8 @@
 namespace withe {
 
 using RodVector = std::array<double, 3>;
+using Quaternion = std::array<double, 4>;  ///< w, x, y, z
+Quaternion product(const Quaternion& a, const Quaternion& b);
 
 constexpr double kRodBendStiffness = 2.0;  ///< EI [w Lgb^2]
 
@@ -68,7 +70,7 @@ std::vector<double> rod_cuts(double suspended);
 /// A point of a solved rod.
 struct RodPoint {
   RodVector tangent{}, moment{}, position{};
-  std::array<double, 4> rotation{1, 0, 0, 0};  ///< unit quaternion (w, x, y, z) from the frame at lift-off
+  Quaternion rotation{1, 0, 0, 0};  ///< from the frame at lift-off
 };
 
 /// Everything that a solved path implies, by one more pass along it.

@@ -51,9 +51,8 @@ void mirror(Path& path) {
 }
 
 /// Further by an angle about its own first axis.
-std::array<double, 4> rolled(const std::array<double, 4>& q, double angle) {
-  const double c = std::cos(0.5 * angle), s = std::sin(0.5 * angle);
-  return {q[0] * c - q[1] * s, q[1] * c + q[0] * s, q[2] * c + q[3] * s, q[3] * c - q[2] * s};
+Quaternion rolled(const Quaternion& q, double angle) {
+  return product(q, {std::cos(0.5 * angle), std::sin(0.5 * angle), 0, 0});
 }
 
 }  // namespace

@@ -16,10 +16,7 @@ using PackDual = Dual<kRodUnknowns, Pack>;
 template <class Scalar, std::size_t count, class See>
 void across(const RodSlope<Scalar, Pack>& slope, const RodBlock& block, int first, std::array<Scalar, count>& y,
             const See& see) {
-  const Pack lever = load(block.lever + first), behind = load(block.behind + first);
-  y[3] -= lever * slope.floor[1];
-  y[4] += lever * slope.floor[0];
-  y[5] += behind * slope.floor[1];
+  add_lever(load(block.lever + first), load(block.behind + first), slope.floor, y);
   const Pack start = load(block.s + first), part = load(block.part + first), steps = load(block.steps + first);
   const Pack h = part / steps;
   constexpr int kCoupled = count == kRodWithRotation ? kRodWithRotation : kRodTurning;

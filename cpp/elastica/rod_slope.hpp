@@ -41,4 +41,12 @@ struct RodSlope {
   }
 };
 
+/// Adds the moment of the floor's force, which acts a lever below and some way behind lift-off, to the state there.
+template <class Scalar, class Number, std::size_t count>
+void add_lever(const Number& lever, const Number& behind, const Scalar (&floor)[3], std::array<Scalar, count>& y) {
+  y[3] -= lever * floor[1];
+  y[4] += lever * floor[0];
+  y[5] += behind * floor[1];
+}
+
 }  // namespace withe

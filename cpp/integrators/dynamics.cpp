@@ -215,9 +215,8 @@ bool acceptable(Equations& equations, const StepPlan& plan, const State& state, 
   const Turning turned = turning(equations.model(), state, q1, watched, plan.rule == StepRule::backward_euler);
   result.largest_turn = turned.largest;
   if (!q1.allFinite() || !(result.largest_turn <= 1.5)) return false;
-  work.change = q1 - state.q;
   // Inertia takes the tangent of half a turn, and is the same for another turn more; friction and twist are not.
-  if (plan.rule == StepRule::energy_momentum && farthest_turn(equations.model(), work.change) >= std::numbers::pi)
+  if (plan.rule == StepRule::energy_momentum && farthest_turn(equations.model(), state.q, q1) >= std::numbers::pi)
     return false;
   result.stretch_gain = turned.stretch_gain + (watched ? equations.gained(q1) : 0.0);
   Contact* contact = equations.contact();

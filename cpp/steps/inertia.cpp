@@ -285,9 +285,9 @@ void set_turning_velocities(const Model& model, const VectorX& v0, const VectorX
   for_each_turn(model, [&](int dof) { v1[dof] = 2.0 * finite_turn(change[dof]) / dt - v0[dof]; });
 }
 
-double farthest_turn(const Model& model, const VectorX& change) {
+double farthest_turn(const Model& model, const VectorX& q0, const VectorX& q1) {
   double farthest = 0.0;
-  for_each_turn(model, [&](int dof) { farthest = std::max(farthest, std::abs(change[dof])); });
+  for_each_turn(model, [&](int dof) { farthest = std::max(farthest, std::abs(q1[dof] - q0[dof])); });
   return farthest;
 }
 

@@ -31,7 +31,7 @@ void add_mass_matrix(const StepProblem& problem, const MassMatrix& mass, double 
 void add_explicit_spin_couple(const StepProblem& problem, StepData& data, int edge, const VectorX& v);
 
 /// Of all angles of an energy-momentum step; its equations hold for less than half a turn [rad].
-double farthest_turn(const Model& model, const VectorX& change);
+double farthest_turn(const Model& model, const VectorX& q0, const VectorX& q1);
 /// Of an energy-momentum step that changes the unknowns by `change`: the velocities of angles at its end.
 void set_turning_velocities(const Model& model, const VectorX& v0, const VectorX& change, double dt, VectorX& v1);
 /// How those change with `change`, per unknown: 2 / dt where it turns nothing.

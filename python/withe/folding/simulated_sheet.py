@@ -24,7 +24,7 @@ from withe.scene.scene import Scene
 from withe.simulation.simulation import Simulation
 from withe.simulation.snapshots import Snapshot
 
-__all__ = ["LONGEST", "Fold", "FoldingMotion", "Held", "SimulatedSheet", "node_places"]
+__all__ = ["LONGEST", "Fold", "FoldingMotion", "Held", "SimulatedSheet", "node_places", "require_motion"]
 
 FloatArray = npt.NDArray[np.float64]
 _STRIP = ((0.0, 1.0), (1.0, 1.0))
@@ -272,9 +272,7 @@ class SimulatedSheet:
         >>> print(f"slides {1e3 * folded.slide:.1f} mm")  # doctest: +SKIP
         slides 7.7 mm
         """
-        if not all(hasattr(plan, name) for name in ("times", "poses", "target")):
-            raise ValueError(f"plan must be a Plan, or have times, poses and target, got {plan!r:.80}")
-        require_length(self.paper, getattr(plan, "paper", self.paper))
+        require_motion(plan, self.paper)
         return self.carry_out([plan], plan.target, duration=float(plan.times[-1] - plan.times[0]), progress=progress)
 
     def carry_out(
@@ -334,6 +332,13 @@ class SimulatedSheet:
             failure=watch.failure,
             record=self.simulation.record,
         )
+
+
+def require_motion(plan: FoldingMotion, paper: Paper) -> None:
+    """Refuse what is no motion, and one that was planned for a longer or shorter sheet."""
+    if not all(hasattr(plan, name) for name in ("times", "poses", "target")):
+        raise ValueError(f"plan must be a Plan, or have times, poses and target, got {plan!r:.80}")
+    require_length(paper, getattr(plan, "paper", paper))
 
 
 def node_places(length: float, depth: float, edges: int) -> FloatArray:

@@ -16,9 +16,9 @@ from withe.folding.carrying import carried
 from withe.folding.jaw import Jaw
 from withe.folding.jaw_motion import JawMotion, Motion, lead
 from withe.folding.noise import Drawn, Noise
-from withe.folding.paper import Paper, require_length
+from withe.folding.paper import Paper
 from withe.folding.paper_rods import strip_numbers
-from withe.folding.simulated_sheet import LONGEST, FoldingMotion, node_places
+from withe.folding.simulated_sheet import LONGEST, FoldingMotion, node_places, require_motion
 from withe.folding.views import table_picture
 from withe.parts.handles import Rod
 from withe.parts.materials import Stiffness
@@ -247,7 +247,7 @@ class WideSheet:
         ValueError
             As `SimulatedSheet.fold`.
         """
-        require_length(self.paper, getattr(plan, "paper", self.paper))
+        require_motion(plan, self.paper)
         return self.carry_out([plan], plan.target, duration=float(plan.times[-1] - plan.times[0]), progress=progress)
 
     def carry_out(
