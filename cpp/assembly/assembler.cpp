@@ -375,6 +375,11 @@ VectorX Assembler::held_part(const VectorX& vector) const {
   return vector - held;
 }
 
+void Assembler::set_held_part(const VectorX& held, VectorX& vector) const {
+  project(vector);
+  add_held_part(held, 1.0, vector);
+}
+
 void Assembler::add_held_part(const VectorX& from, double factor, VectorX& to) const {
   for (const Block& block : blocks_) {
     const Constraint& c = block.constraint;

@@ -128,6 +128,8 @@ class Assembler {
   void project(VectorX& vector) const;
   /// The part of a vector along held directions.
   VectorX held_part(const VectorX& vector) const;
+  /// Puts that of another in its place; `held` may be empty where nothing is held.
+  void set_held_part(const VectorX& held, VectorX& vector) const;
   /// to += factor x the part of `from` along held directions.
   void add_held_part(const VectorX& from, double factor, VectorX& to) const;
   /// out += factor x the part of `to` - `from` along held directions.

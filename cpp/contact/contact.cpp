@@ -219,18 +219,24 @@ std::vector<ContactKey> Contact::near() const {
 void Contact::predict_friction(const VectorX& change, ContactLinearisation& linearisation) const {
   if (!frictional() || problem_.description().friction_law == FrictionLaw::semi_explicit) return;
   if (regularises() && slips_shortly(problem_, linearisation, change)) {
-    linearisation.friction.clear();
+    linearisation.forget_friction();
     return;
   }
-  linearisation.friction.renew([&](const auto& add) {
-    OrderedLookup last;
-    for (const Touching& t : set_) {
-      if ((t.lagged >= 0) != problem_.lags() || !(t.pair.friction > 0.0)) continue;
-      const Slipping s = slipping(problem_, t, linearisation, change);
-      const Vec3d* known = linearisation.friction.of(t.pair.key, last);
-      if (s.limit > 0.0) add(t.pair.key, s.law.predict(s.slip, s.change, known, s.limit));
-    }
-  });
+  const auto predict = [&](FrictionKind kind, FrictionPrediction& prediction) {
+    prediction.renew([&](const auto& add) {
+      OrderedLookup last;
+      for (const Touching& t : set_) {
+        if (kind == FrictionKind::rolling ? !resists_rolling(problem_, t)
+                                          : (t.lagged >= 0) != problem_.lags() || !(t.pair.friction > 0.0))
+          continue;
+        const Slipping s = slipping(problem_, t, kind, linearisation, change);
+        const Vec3d* known = prediction.of(t.pair.key, last);
+        if (s.limit > 0.0) add(t.pair.key, s.law.predict(s.slip, s.change, known, s.limit));
+      }
+    });
+  };
+  predict(FrictionKind::slipping, linearisation.friction);
+  predict(FrictionKind::rolling, linearisation.rolling);
 }
 
 double Contact::accept(State& state, Keep keep, double spare) {

@@ -56,8 +56,10 @@ double by_tolerance(double scalar, double square, double rate, double tolerance)
   return -scalar * (1.0 - share * share) / slip_factor(square, rate) * rate / tolerance;
 }
 
-void add_implicit_friction(const ContactProblem& problem, const Touching& t, const Rows& rows, ContactAdjoint& out) {
-  const FrictionSetting f = friction_setting(problem, t, 1.0, nullptr);
+/// Of friction as its force at the end of the step has it.
+void add_implicit_friction(const ContactProblem& problem, const Touching& t, FrictionKind kind, const Rows& rows,
+                           ContactAdjoint& out) {
+  const FrictionSetting f = friction_setting(problem, t, kind, 1.0, nullptr);
   ByStart now[kContactUnknowns], gradient[kContactUnknowns];
   for (int i = 0; i < kContactUnknowns; ++i) now[i] = t.now[i];
   SlipStart<ByStart> start = start_of(f);
@@ -73,12 +75,18 @@ void add_implicit_friction(const ContactProblem& problem, const Touching& t, con
   for (int i = 0; i < kContactUnknowns; ++i) out.start[i] += scalar.slope[i];
   const double off = dot(c.way, c.normal).value, square = std::max(dot(c.way, c.way).value - off * off, 0.0);
   out.slip_tolerance += by_tolerance(scalar.value, square, f.rate, problem.parameters->slip_tolerance);
+  if (kind == FrictionKind::rolling) {
+    out.rolling += scalar.value / f.friction;
+    return;
+  }
   // Friction is linear in both coefficients.
   for (const bool along : {true, false}) {
     ContactPair pair = t.pair;
     pair.set_friction(along ? 1.0 : 0.0, along ? 0.0 : 1.0);
     FrictionSetting unit = f;
     unit.pair = &pair;
+    unit.friction = pair.friction;
+    unit.isotropic = pair.isotropic();
     double force[kContactUnknowns] = {};
     friction_gradient(unit, t.now, force);
     for (int i = 0; i < kContactUnknowns; ++i) (along ? out.along : out.across) += rows[i] * force[i];
@@ -114,7 +122,7 @@ void add_lagged_friction(const ContactProblem& problem, const Touching& t, const
   if (dot(problem.turn_of(t.pair), problem.turn_of(t.pair)) > 0.0)
     throw std::invalid_argument(
         "no gradient is known through lagged friction on an obstacle that turns: take friction_model='implicit'");
-  const FrictionSetting f = friction_setting(problem, t, 1.0, nullptr);
+  const FrictionSetting f = friction_setting(problem, t, FrictionKind::slipping, 1.0, nullptr);
   const SlipStart<ByStart> start = start_of(f);
   SlippingSurfaces<ByStart> c;
   Vec3<ByStart> x[4];
@@ -233,13 +241,14 @@ void add_impact(const ContactProblem& problem, const Touching& t, const Rows& ro
 
 ContactAdjoint contact_adjoint(const ContactProblem& problem, const Touching& t, const Rows& rows, double by_approach) {
   ContactAdjoint out;
-  if (problem.anchored() && t.pair.friction > 0.0)
+  if (problem.anchored() && t.pair.rubs())
     throw std::invalid_argument(
         "no gradient is known through anchored friction: take friction_model='implicit' or 'lagged'");
   if (t.lagged >= 0)
     add_lagged_friction(problem, t, rows, out);
   else if (t.pair.friction > 0.0 && !problem.lags())
-    add_implicit_friction(problem, t, rows, out);
+    add_implicit_friction(problem, t, FrictionKind::slipping, rows, out);
+  if (resists_rolling(problem, t)) add_implicit_friction(problem, t, FrictionKind::rolling, rows, out);
   if (t.lagged >= 0) return out;
   if (problem.turns(t.pair))
     add_mean_pressing(problem, t, rows, out);

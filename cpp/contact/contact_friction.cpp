@@ -15,10 +15,26 @@ constexpr double kGive = 0.05;
 // On a way this short, over the slip that friction grows with, a tangent says enough.
 constexpr double kShortWay = 0.1;
 
-FrictionForce<double> friction_now(const ContactProblem& problem, const Touching& t) {
+constexpr FrictionKind kKinds[] = {FrictionKind::slipping, FrictionKind::rolling};
+
+double coefficient(const ContactPair& pair, FrictionKind kind) {
+  return kind == FrictionKind::rolling ? pair.rolling : pair.friction;
+}
+
+const Vec3d& start_of_anchor(const Touching& t, FrictionKind kind) {
+  return kind == FrictionKind::rolling ? t.roll : t.stick;
+}
+
+FrictionForce<double> friction_now(const ContactProblem& problem, const Touching& t, FrictionKind kind) {
   if (beside_plane(problem, t)) return plane_friction(problem, t, slip_rate(problem, 1.0));
-  double unused[kContactUnknowns] = {};
-  return friction_gradient(friction_setting(problem, t, 1.0, nullptr), t.now, unused);
+  return slipping_surfaces(friction_setting(problem, t, kind, 1.0, nullptr), t.now).friction;
+}
+
+/// Calls see(kind) for friction of each kind that a contact has.
+template <class See>
+void each_kind(const Touching& t, const See& see) {
+  for (const FrictionKind kind : kKinds)
+    if (coefficient(t.pair, kind) > 0.0) see(kind);
 }
 
 }  // namespace
@@ -28,7 +44,11 @@ double slip_rate(const ContactProblem& problem, double regularisation) {
 }
 
 bool rubs(const ContactProblem& problem, const Touching& t) {
-  return t.lagged >= 0 || (!problem.lags() && t.pair.friction > 0.0);
+  return t.lagged >= 0 || (!problem.lags() && t.pair.rubs());
+}
+
+bool resists_rolling(const ContactProblem& problem, const Touching& t) {
+  return t.pair.rolling > 0.0 && t.lagged < 0 && rubs(problem, t);
 }
 
 bool regularises_friction(const Model& model) {
@@ -36,32 +56,38 @@ bool regularises_friction(const Model& model) {
   return law == FrictionLaw::implicit || law == FrictionLaw::lagged;
 }
 
-double tangential_stiffness(const ContactPair& pair, double stiffness) {
+double anchor_stiffness(const ContactPair& pair, FrictionKind kind, double stiffness) {
   const double pressing = stiffness * 2.0 * kDepth * pair.small_radius();
-  return pair.friction * pressing / (kGive * pair.tolerance);
+  return coefficient(pair, kind) * pressing / (kGive * pair.tolerance);
 }
 
-FrictionSetting friction_setting(const ContactProblem& problem, const Touching& t, double regularisation,
-                                 const Vec3d* predicted) {
+FrictionSetting friction_setting(const ContactProblem& problem, const Touching& t, FrictionKind kind,
+                                 double regularisation, const Vec3d* predicted) {
+  const bool rolling = kind == FrictionKind::rolling;
   const ContactDescription& contact = problem.description();
   const Model& model = problem.model();
   const ContactPair& pair = t.pair;
   FrictionSetting f;
   f.pair = &pair;
   if (pair.key.b < 0) f.obstacle = &problem.bodies.obstacle(pair);
+  f.friction = coefficient(pair, kind);
+  f.rolling = rolling;
+  f.isotropic = rolling || pair.isotropic();
   f.points = t.proximity.points;
   if (pair.curve()) f.curve = &t.proximity.curve;
   f.pressing = t.law;
   f.before = t.before;
   f.middle = pair.key.b >= 0 && problem.turns(pair);
   f.law = contact.friction_law;
-  f.tangential_stiffness = tangential_stiffness(pair, t.stiffness);
+  f.tangential_stiffness = anchor_stiffness(pair, kind, t.stiffness);
   f.rate = slip_rate(problem, regularisation);
-  f.stick = t.stick;
+  f.stick = start_of_anchor(t, kind);
   f.spatial = !model.planar();
   f.centreline = contact.centreline_friction;
-  f.drift = problem.shift_of(pair);
-  f.turn = problem.turn_of(pair);
+  if (!rolling) {
+    f.drift = problem.shift_of(pair);
+    f.turn = problem.turn_of(pair);
+  }
   f.predicted = predicted;
   problem.bodies.values(pair, problem.start->q, f.start);
   if (!f.spatial) return f;
@@ -76,12 +102,14 @@ FrictionSetting friction_setting(const ContactProblem& problem, const Touching& 
 
 double friction_slope(const ContactProblem& problem, const Touching& t, const ContactLinearisation& linearisation) {
   const double mu = t.pair.friction;
-  if (!(mu > 0.0)) return 0.0;
+  if (!t.pair.rubs()) return 0.0;
   const double rate = slip_rate(problem, linearisation.regularisation);
   if (t.lagged >= 0) return mu * problem.lagged_friction[at(t.lagged)].pressing * rate;
   if (problem.lags()) return 0.0;
-  if (problem.anchored()) return tangential_stiffness(t.pair, t.stiffness);
-  return -mu * t.pressing.first * rate;
+  if (!problem.anchored()) return -(mu + t.pair.rolling) * t.pressing.first * rate;
+  double slope = 0.0;
+  for (const FrictionKind kind : kKinds) slope += anchor_stiffness(t.pair, kind, t.stiffness);
+  return slope;
 }
 
 bool add_friction(const ContactProblem& problem, const Touching& t, const ContactLinearisation& linearisation,
@@ -91,33 +119,53 @@ bool add_friction(const ContactProblem& problem, const Touching& t, const Contac
     add_plane_contact(problem, t, PlaneForces::friction, linearisation, with_hessian, out);
     return true;
   }
-  const Vec3d* predicted = linearisation.friction.of(t.pair.key);
   if (t.lagged >= 0) {
+    const Vec3d* predicted = linearisation.friction.of(t.pair.key);
     add_lagged_friction(problem, t, slip_rate(problem, linearisation.regularisation), predicted, with_hessian, out);
     return true;
   }
-  const FrictionSetting f = friction_setting(problem, t, linearisation.regularisation, predicted);
-  const SlippingSurfaces<double> surfaces = slipping_surfaces(f, t.now);
-  add_friction_gradient(f, surfaces, out.gradient);
-  if (with_hessian) add_friction_jacobian(f, surfaces, out.hessian);
+  each_kind(t, [&](FrictionKind kind) {
+    const Vec3d* predicted = with_hessian ? linearisation.predicted(kind).of(t.pair.key) : nullptr;
+    const FrictionSetting f = friction_setting(problem, t, kind, linearisation.regularisation, predicted);
+    const SlippingSurfaces<double> surfaces = slipping_surfaces(f, t.now);
+    add_friction_gradient(f, surfaces, out.gradient);
+    if (with_hessian) add_friction_jacobian(f, surfaces, out.hessian);
+  });
   return true;
 }
 
+double anchor_work(const ContactProblem& problem, const Touching& t, bool mean) {
+  double work = 0.0;
+  each_kind(t, [&](FrictionKind kind) {
+    const FrictionForce<double> now = friction_now(problem, t, kind);
+    const Vec3d& start = start_of_anchor(t, kind);
+    const Vec3d way = now.stick - start;
+    const Vec3d before = mean ? anchor_stiffness(t.pair, kind, t.stiffness) * start : now.force;
+    work += 0.5 * dot(before + now.force, way);
+  });
+  return work;
+}
+
 double anchor_energy(const ContactProblem& problem, const Touching& t) {
-  if (!problem.anchored() || !(t.pair.friction > 0.0) || t.proximity.distance >= t.pair.reach()) return 0.0;
-  const FrictionForce<double> anchor = friction_now(problem, t);
-  return 0.5 * dot(anchor.force, anchor.stick);
+  if (!problem.anchored() || !t.pair.rubs() || t.proximity.distance >= t.pair.reach()) return 0.0;
+  double stored = 0.0;
+  each_kind(t, [&](FrictionKind kind) {
+    const FrictionForce<double> anchor = friction_now(problem, t, kind);
+    stored += 0.5 * dot(anchor.force, anchor.stick);
+  });
+  return stored;
 }
 
 double kept_anchor_energy(const ContactProblem& problem, const Touching& t) {
-  if (!problem.anchored() || !(t.pair.friction > 0.0)) return 0.0;
-  const double stiffness = tangential_stiffness(t.pair, t.stiffness);
-  if (t.pair.isotropic()) return 0.5 * stiffness * dot(t.stick, t.stick);
-  const FrictionSetting f = friction_setting(problem, t, 1.0, nullptr);
+  if (!problem.anchored() || !t.pair.rubs()) return 0.0;
+  const double rolled = 0.5 * anchor_stiffness(t.pair, FrictionKind::rolling, t.stiffness) * dot(t.roll, t.roll);
+  const double stiffness = anchor_stiffness(t.pair, FrictionKind::slipping, t.stiffness);
+  if (t.pair.isotropic()) return rolled + 0.5 * stiffness * dot(t.stick, t.stick);
+  const FrictionSetting f = friction_setting(problem, t, FrictionKind::slipping, 1.0, nullptr);
   SlippingSurfaces<double> c = slipping_surfaces(f, t.now);
   c.friction.force = stiffness * t.stick;
   direct_friction(f, c);
-  return 0.5 * dot(c.friction.force, t.stick);
+  return rolled + 0.5 * dot(c.friction.force, t.stick);
 }
 
 /// Friction's force on the obstacle, the opposite of that on a, times the way of the surface.
@@ -128,7 +176,7 @@ double turning_work(const ContactProblem& problem, const Touching& t) {
     return -dot(lagged_force(problem, t, slip_rate(problem, 1.0), nullptr).force,
                 problem.lagged_friction[at(t.lagged)].turned);
   if (problem.lags()) return 0.0;
-  const FrictionSetting f = friction_setting(problem, t, 1.0, nullptr);
+  const FrictionSetting f = friction_setting(problem, t, FrictionKind::slipping, 1.0, nullptr);
   Vec3d x[4];
   t.end_points(x);
   const SlippingSurfaces<double> c = slipping_surfaces(f, t.now);
@@ -136,11 +184,17 @@ double turning_work(const ContactProblem& problem, const Touching& t) {
 }
 
 void record_friction(const ContactProblem& problem, const Touching& t, ContactRecord& record) {
-  if (!problem.frictional() || problem.lags() || !(t.pair.friction > 0.0)) return;
-  const FrictionForce<double> f = friction_now(problem, t);
-  record.stick = f.stick;
-  record.friction = -f.force;
-  record.sticking = f.sticking;
+  if (!problem.frictional() || problem.lags()) return;
+  each_kind(t, [&](FrictionKind kind) {
+    const FrictionForce<double> f = friction_now(problem, t, kind);
+    if (kind == FrictionKind::rolling) {
+      record.roll = f.stick;
+      return;
+    }
+    record.stick = f.stick;
+    record.friction = -f.force;
+    record.sticking = f.sticking;
+  });
 }
 
 void record_lagged_friction(const ContactProblem& problem, const Touching& t, ContactRecord& record) {
@@ -149,12 +203,12 @@ void record_lagged_friction(const ContactProblem& problem, const Touching& t, Co
   record.sticking = f.sticking;
 }
 
-Slipping slipping(const ContactProblem& problem, const Touching& t, const ContactLinearisation& linearisation,
-                  const VectorX& change) {
+Slipping slipping(const ContactProblem& problem, const Touching& t, FrictionKind kind,
+                  const ContactLinearisation& linearisation, const VectorX& change) {
   const double rate = slip_rate(problem, linearisation.regularisation);
   if (t.lagged >= 0) return lagged_slipping(problem, t, rate, change);
   if (beside_plane(problem, t)) return plane_slipping(problem, t, rate, change);
-  const FrictionSetting f = friction_setting(problem, t, linearisation.regularisation, nullptr);
+  const FrictionSetting f = friction_setting(problem, t, kind, linearisation.regularisation, nullptr);
   int dofs[kContactUnknowns];
   problem.surfaces->unknowns(t.pair, dofs);
   Dual<1> unknown[kContactUnknowns];
@@ -165,7 +219,7 @@ Slipping slipping(const ContactProblem& problem, const Touching& t, const Contac
   const SlippingSurfaces<Dual<1>> surfaces = slipping_surfaces(f, unknown);
   const Vec3<Dual<1>> way = whole_way(f, surfaces), slip = way - dot(way, surfaces.normal) * surfaces.normal;
   Slipping out;
-  out.limit = t.pair.friction * surfaces.pressing.value;
+  out.limit = f.friction * surfaces.pressing.value;
   out.slip = {slip.x.value, slip.y.value, slip.z.value};
   out.change = {slip.x.slope[0], slip.y.slope[0], slip.z.slope[0]};
   out.law = force_law(f, surfaces.pressing.value, dot(out.slip, out.slip), surfaces.friction.sticking);

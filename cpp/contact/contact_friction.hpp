@@ -13,17 +13,21 @@ bool regularises_friction(const Model& model);
 double slip_rate(const ContactProblem& problem, double regularisation);
 /// Whether there is friction on a contact in a step.
 bool rubs(const ContactProblem& problem, const Touching& t);
-/// Tangential stiffness of an anchor, for a contact of that stiffness [N/m].
-double tangential_stiffness(const ContactPair& pair, double stiffness);
+/// Whether there is rolling friction on it.
+bool resists_rolling(const ContactProblem& problem, const Touching& t);
+/// Stiffness of an anchor, for a contact of that stiffness [N/m].
+double anchor_stiffness(const ContactPair& pair, FrictionKind kind, double stiffness);
 /// Of a contact that presses, or of a lagged one as it was at the start. `regularisation`, `predicted`: see
 /// `ContactLinearisation`; what it refers to must outlive it.
-FrictionSetting friction_setting(const ContactProblem& problem, const Touching& t, double regularisation,
-                                 const Vec3d* predicted);
+FrictionSetting friction_setting(const ContactProblem& problem, const Touching& t, FrictionKind kind,
+                                 double regularisation, const Vec3d* predicted);
 /// Friction by the slip, at most [N/m].
 double friction_slope(const ContactProblem& problem, const Touching& t, const ContactLinearisation& linearisation);
 /// Adds minus the friction on a contact, and its derivative when asked for. False where there is none.
 bool add_friction(const ContactProblem& problem, const Touching& t, const ContactLinearisation& linearisation,
                   bool with_hessian, ContactLocal& out);
+/// Work of anchors' forces over the change of their elastic slip; `mean`: of the mean of those at both ends [J].
+double anchor_work(const ContactProblem& problem, const Touching& t, bool mean);
 /// What an anchor stores as a step ends, nothing where the contact opens [J].
 double anchor_energy(const ContactProblem& problem, const Touching& t);
 /// What it stores as the next begins: all that the last left, also where the surfaces now press too little to hold it.
@@ -42,8 +46,8 @@ struct Slipping {
   ForceLaw law;
   double limit = 0;  ///< [N]
 };
-Slipping slipping(const ContactProblem& problem, const Touching& t, const ContactLinearisation& linearisation,
-                  const VectorX& change);
+Slipping slipping(const ContactProblem& problem, const Touching& t, FrictionKind kind,
+                  const ContactLinearisation& linearisation, const VectorX& change);
 /// Whether all surfaces slip so little by `change` that a tangent says enough.
 bool slips_shortly(const ContactProblem& problem, const ContactLinearisation& linearisation, const VectorX& change);
 

@@ -43,10 +43,19 @@ class FrictionPrediction {
   std::vector<Share> shares_, next_;  ///< sorted by key
 };
 
+/// Of surfaces that slip, or of a rod that rolls: see friction.hpp.
+enum class FrictionKind { slipping, rolling };
+
 struct ContactLinearisation {
   double regularisation = 1;      ///< by which the slip tolerance is greater
   bool geometric = true;          ///< derivatives have how pressing turns, the part by which it has negative stiffness
-  FrictionPrediction friction{};  ///< where known, derivatives are what Newton's steps need, not those of the forces
+  FrictionPrediction friction{}, rolling{};  ///< where known, derivatives are what Newton's steps need, not those of
+                                             ///< the forces
+
+  const FrictionPrediction& predicted(FrictionKind kind) const {
+    return kind == FrictionKind::rolling ? rolling : friction;
+  }
+  void forget_friction() { friction.clear(), rolling.clear(); }
 };
 
 }  // namespace withe

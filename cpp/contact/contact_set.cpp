@@ -18,7 +18,7 @@ void set_from(const ContactProblem& problem, const ContactRecord* record, Touchi
   t.yielded = record ? record->yielded : problem.offset(t.pair);
   t.approach = record ? record->approach : first_approach(problem, t.pair);
   t.age = record ? record->age : 0.0;
-  if (record) t.stick = record->stick;
+  if (record) t.stick = record->stick, t.roll = record->roll;
   set_pressing(problem, t);
 }
 

@@ -167,9 +167,11 @@ double ContactStiffness::change_stiffness(const Touching& t, double ratio, doubl
   const double energy = ratio * t.stiffness *
                         contact_energy(t.law.law, t.proximity.distance + yielded, pair.radii(), pair.tolerance).value;
   const double shorter = ratio > 1.0 ? 1.0 / ratio : 1.0 / std::sqrt(ratio);
-  const double put_in =
-      energy - t.energy.value - 0.5 * dot(record.friction, record.stick) * (ratio * shorter * shorter - 1.0);
+  const double rolled = anchor_stiffness(pair, FrictionKind::rolling, t.stiffness) * dot(record.roll, record.roll);
+  const double anchored = 0.5 * (rolled - dot(record.friction, record.stick));
+  const double put_in = energy - t.energy.value + anchored * (ratio * shorter * shorter - 1.0);
   record.stick = shorter * record.stick;
+  record.roll = shorter * record.roll;
   record.stiffness *= ratio;
   record.yielded = yielded;
   return put_in;
@@ -371,6 +373,7 @@ bool ContactStiffness::begins_anew(const Touching& t, ContactRecord& record) con
   record.yielded = yielded_at(renewed, ratio, Keep::energy);
   record.stiffness *= ratio;
   record.stick = (1.0 / std::sqrt(ratio)) * record.stick;
+  record.roll = (1.0 / std::sqrt(ratio)) * record.roll;
   return true;
 }
 

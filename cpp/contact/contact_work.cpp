@@ -72,17 +72,13 @@ double mean_friction_loss(const ContactProblem& problem, const ContactSet& set, 
   if (!problem.frictional() || start.size() != end.size()) return friction_loss(problem, set, change);
   double loss = 0.5 * (start.dot(change) + end.dot(change));
   for (const Touching& t : set) {
-    if (!(t.pair.friction > 0.0)) continue;
+    if (!t.pair.rubs()) continue;
     if (!problem.shift.empty() || !problem.turn.empty()) {
       ContactLocal local{};
       if (add_friction_alone(problem, t, local))
         loss += turning_work(problem, t) - dot(problem.shift_of(t.pair), force_on_nodes(t.pair, local));
     }
-    if (!problem.anchored()) continue;
-    ContactRecord now;
-    record_friction(problem, t, now);
-    const Vec3d before = -tangential_stiffness(t.pair, t.stiffness) * t.stick;
-    loss += 0.5 * dot(before + now.friction, now.stick - t.stick);
+    if (problem.anchored()) loss -= anchor_work(problem, t, true);
   }
   return loss;
 }
@@ -93,10 +89,7 @@ double friction_loss(const ContactProblem& problem, const ContactSet& set, const
     ContactLocal local{};
     if (!add_friction_alone(problem, t, local)) continue;
     loss += work_against(problem, t.pair, local, change) + turning_work(problem, t);
-    if (!problem.anchored()) continue;
-    ContactRecord end;
-    record_friction(problem, t, end);
-    loss += dot(end.friction, end.stick - t.stick);
+    if (problem.anchored()) loss -= anchor_work(problem, t, false);
   }
   return loss;
 }

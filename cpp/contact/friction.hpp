@@ -16,6 +16,11 @@
 /// times the matrix (mu_t / mu) tt^T + (mu_n / mu) (1 - tt^T), t the rod's tangent along the surface: for a slip in the
 /// direction s, F = N (mu_t (s . t) t + mu_n (s . n) n) [Hu, Nirody, Scott and Shelley 2009, eq. 1]. That matrix is
 /// symmetric and not negative, so F . S is not either.
+///
+/// Rolling friction on an obstacle is a couple against the turning of a rod's surface there: the same laws, for the way
+/// R = phi_a x r_a by which the slip is more than what the centreline moves, with a coefficient of its own. Its force on
+/// R goes back through that part of J alone, so that the couple is mu_r r N at most [Johnson, Contact Mechanics, 1985,
+/// section 9.1], and nothing pushes the rod along.
 
 #include <cmath>
 #include <type_traits>
@@ -31,6 +36,8 @@ namespace withe {
 struct FrictionSetting {
   const ContactPair* pair = nullptr;
   const Obstacle* obstacle = nullptr;
+  double friction = 0;   ///< the greater coefficient [-]
+  bool rolling = false;  ///< whether it is rolling friction
   ClosestPoints points;                          ///< whose class is kept
   const CurveDistance<double>* curve = nullptr;  ///< at the unknowns themselves, not at others
   double start[kContactUnknowns] = {};           ///< unknowns at the start of the step
@@ -45,6 +52,7 @@ struct FrictionSetting {
   Vec3d turn{};                     ///< by which it turns then about its own axis [rad]
   Vec3d stick{};                    ///< at the start of the step [m]
   bool spatial = true, centreline = false;
+  bool isotropic = true;         ///< whether friction is the same along the rod and across it
   const Vec3d* predicted = nullptr;  ///< friction over its limit, as a step of Newton's method predicts it
 };
 
@@ -122,7 +130,7 @@ FrictionForce<Scalar> friction_force(const FrictionSetting& f, const Vec3<Scalar
                                      const Scalar& pressing) {
   using std::sqrt;
   FrictionForce<Scalar> out;
-  const double mu = f.pair->friction;
+  const double mu = f.friction;
   if (f.law != FrictionLaw::anchored) {
     const Scalar square = dot(slip, slip);
     out.force = (mu * pressing * slip_factor(square, f.rate)) * slip;
@@ -170,7 +178,7 @@ inline ForceLaw tanh_law(double mu, double pressing, double square, double rate)
 }
 
 inline ForceLaw force_law(const FrictionSetting& f, double pressing, double square, bool sticking) {
-  const double mu = f.pair->friction, limit = mu * pressing;
+  const double mu = f.friction, limit = mu * pressing;
   if (f.law != FrictionLaw::anchored) return tanh_law(mu, pressing, square, f.rate);
   if (sticking) return {f.tangential_stiffness, 0.0, 0.0};
   const double inverse = 1.0 / std::sqrt(square);
@@ -308,7 +316,7 @@ SlippingSurfaces<Scalar> slipping_surfaces(const FrictionSetting& f, const SlipS
   find_contact(f, start, x, c);
   for (int i = 0; i < 3 && curve; ++i) c.node[i] = x[i];
   c.way = -lift(f.drift);
-  for (int i = 0; i < 4; ++i) c.way += c.w[i] * (x[i] - start.point(i));
+  for (int i = 0; i < 4 && !f.rolling; ++i) c.way += c.w[i] * (x[i] - start.point(i));
   c.bodies = f.centreline ? 0 : curve ? f.pair->piece.weights->edges : f.pair->rod_b < 0 ? 1 : 2;
   c.lever = f.pair->rod_b < 0 ? c.normal : f.middle ? c.between - 0.5 * c.way : c.between;
   for (int b = 0; b < c.bodies; ++b) {
@@ -327,7 +335,7 @@ SlippingSurfaces<Scalar> slipping_surfaces(const FrictionSetting& f, const SlipS
   }
   if (dot(f.turn, f.turn) > 0.0) c.way = c.way - cross(lift(f.turn), obstacle_arm(f, c, x));
   c.friction = friction_force(f, c.normal, c.way - dot(c.way, c.normal) * c.normal, c.pressing);
-  if (!f.pair->isotropic()) direct_friction(f, c);
+  if (!f.isotropic) direct_friction(f, c);
   return c;
 }
 
@@ -345,7 +353,7 @@ void add_friction_gradient(const FrictionSetting& f, const SlippingSurfaces<Scal
     gradient[3 * i + 1] += v.y;
     gradient[3 * i + 2] += v.z;
   };
-  for (int i = 0; i < 4; ++i) add(i, c.w[i] * c.friction.force);
+  for (int i = 0; i < 4 && !f.rolling; ++i) add(i, c.w[i] * c.friction.force);
   for (int b = 0; b < c.bodies; ++b) {
     const SlippingEdge<Scalar>& side = c.sides[b];
     const Vec3<Scalar> torque = Scalar(turn_sign(f, b)) * cross(side.arm, c.friction.force);

@@ -92,7 +92,7 @@ void add_force_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& 
   const double off = dot(way, n);
   const Vec3d slip = way - off * n;
   const ForceLaw g = force_law(f, c.pressing, dot(slip, slip), c.friction.sticking);
-  const Vec3d dual = g.dual_slip(slip, f.predicted, f.pair->friction * c.pressing);
+  const Vec3d dual = g.dual_slip(slip, f.predicted, f.friction * c.pressing);
   const bool turns = dot(f.turn, f.turn) > 0.0;
   Vec3d turn{}, moved_on{};
   for (int b = 0; b < c.bodies; ++b) turn += curve.lever[b] * c.sides[b].turn;
@@ -100,8 +100,9 @@ void add_force_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& 
     moved_on += curve.weight_slope[i] * (x[i] - Vec3d{f.start[3 * i], f.start[3 * i + 1], f.start[3 * i + 2]});
   curve.each_way(true, [&](int j) {
     const Vec3d& across = d.normal[j];
-    Vec3d moved = d.s[j] * moved_on + cross(n, d.turn[j]) - cross(turn, across);
-    if (j < kAngle) moved += curve.weight[j / 3] * kAxis[j % 3];
+    Vec3d moved = cross(n, d.turn[j]) - cross(turn, across);
+    if (!f.rolling) moved += d.s[j] * moved_on;
+    if (!f.rolling && j < kAngle) moved += curve.weight[j / 3] * kAxis[j % 3];
     if (turns) moved -= cross(f.turn, obstacle_arm_slope(f, curve, x, d, j));
     d.force[j] = g.factor * (moved - off * across) - (g.factor * (dot(n, moved) + dot(slip, across))) * n +
                  (2.0 * g.by_square * dot(slip, moved - off * across)) * dual + (g.by_pressing * d.pressing[j]) * slip;
@@ -179,10 +180,10 @@ void add_curve_friction_jacobian(const FrictionSetting& f, const SlippingSurface
   add_contact_slopes(f, c, curve, x, d);
   add_turn_slopes(f, c, curve, d);
   add_force_slopes(f, c, curve, x, d);
-  if (!f.pair->isotropic()) direct_slopes(f, c, curve, x, d);
+  if (!f.isotropic) direct_slopes(f, c, curve, x, d);
   curve.each_way(true,
                  [&](int j) { d.moment[j] = cross(d.force[j], c.normal) + cross(c.friction.force, d.normal[j]); });
-  for (int i = 0; i < curve.w.nodes; ++i)
+  for (int i = 0; i < curve.w.nodes && !f.rolling; ++i)
     curve.each_way(true, [&](int j) {
       const Vec3d force = curve.weight[i] * d.force[j] + (curve.weight_slope[i] * d.s[j]) * c.friction.force;
       for (int k = 0; k < 3; ++k) jacobian[3 * i + k][unknown_of(j)] += force[k];

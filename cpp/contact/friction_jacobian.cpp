@@ -107,12 +107,13 @@ void add_force_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& 
   const double off = dot(way, n);
   const Vec3d slip = way - off * n;
   const ForceLaw g = force_law(f, c.pressing, dot(slip, slip), c.friction.sticking);
-  const Vec3d dual = g.dual_slip(slip, f.predicted, f.pair->friction * c.pressing);
+  const Vec3d dual = g.dual_slip(slip, f.predicted, f.friction * c.pressing);
   const Vec3d change_a = c.sides[0].change, change_b = f.pair->rod_b < 0 ? Vec3d{} : c.sides[1].change;
   for (int j = 0; j < kWays; ++j) {
     const Vec3d across = c.inverse * d.between[j];
-    Vec3d moved = d.s[j] * change_a - d.t[j] * change_b + cross(lever, d.turn[j]) - cross(turn, d.lever[j]);
-    if (j < 3) moved += kAxis[j];
+    Vec3d moved = cross(lever, d.turn[j]) - cross(turn, d.lever[j]);
+    if (!f.rolling) moved += d.s[j] * change_a - d.t[j] * change_b;
+    if (!f.rolling && j < 3) moved += kAxis[j];
     if (dot(f.turn, f.turn) > 0.0) moved -= cross(f.turn, obstacle_arm_slope(f, c, d, j));
     moved -= off * across;
     d.force[j] = g.factor * moved - (g.factor * (dot(n, moved) + dot(slip, across))) * n +
@@ -161,19 +162,20 @@ void spread(const double (&w)[4], const Way& way, Row& row) {
 /// Forces on the ends of edge b, and on its angle.
 void add_rows(const FrictionSetting& f, const SlippingSurfaces<double>& c, int b, const Vec3d& m, const Slopes& d,
               double (&jacobian)[kContactUnknowns][kContactUnknowns]) {
-  Vec3d couple[kWays];
+  Vec3d couple[kWays] = {};
   double axial[kWays] = {};
   // w_i F with s and t that give way, too
-  for (int j = 0; j < kWays; ++j) couple[j] = (b == 0 ? d.s[j] : -d.t[j]) * c.friction.force;
+  for (int j = 0; j < kWays && !f.rolling; ++j) couple[j] = (b == 0 ? d.s[j] : -d.t[j]) * c.friction.force;
   if (b < c.bodies) add_couple_slopes(f, c.sides[b], b, m, d.moment, couple, axial);
+  const double of_tail = f.rolling ? 0.0 : c.w[2 * b], of_head = f.rolling ? 0.0 : c.w[2 * b + 1];
   Row forces, couples;
   for (int k = 0; k < 3; ++k) {
     spread(c.w, [&](int j) { return d.force[j][k]; }, forces);
     spread(c.w, [&](int j) { return couple[j][k]; }, couples);
     Row &tail = jacobian[6 * b + k], &head = jacobian[6 * b + 3 + k];
     for (int j = 0; j < kContactUnknowns; ++j) {
-      tail[j] += c.w[2 * b] * forces[j] - couples[j];
-      head[j] += c.w[2 * b + 1] * forces[j] + couples[j];
+      tail[j] += of_tail * forces[j] - couples[j];
+      head[j] += of_head * forces[j] + couples[j];
     }
   }
   if (b >= c.bodies || !f.spatial) return;
@@ -195,7 +197,7 @@ void add_friction_jacobian(const FrictionSetting& f, const SlippingSurfaces<doub
   add_contact_slopes(f, c, d);
   add_turn_slopes(f, c, d);
   add_force_slopes(f, c, d);
-  if (!f.pair->isotropic()) direct_slopes(f, c, d);
+  if (!f.isotropic) direct_slopes(f, c, d);
   for (int j = 0; j < kWays; ++j) d.moment[j] = cross(d.force[j], lever) + cross(force, d.lever[j]);
   for (int b = 0; b < (obstacle ? 1 : 2); ++b) add_rows(f, c, b, cross(force, lever), d, jacobian);
 }

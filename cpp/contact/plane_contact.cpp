@@ -205,7 +205,8 @@ class PlaneSlip {
       sticking_ = rate * std::abs(slip) < 7.5;
       return;
     }
-    const double stiffness = tangential_stiffness(t.pair, t.stiffness), most = std::max(limit_ / stiffness, 0.0);
+    const double stiffness = anchor_stiffness(t.pair, FrictionKind::slipping, t.stiffness),
+                 most = std::max(limit_ / stiffness, 0.0);
     sticking_ = holds(slip * slip, most);
     const double inverse = 1.0 / std::abs(slip), factor = limit_ * inverse;
     law_ =
@@ -242,7 +243,7 @@ class PlaneSlip {
 
 bool beside_plane(const ContactProblem& problem, const Touching& t) {
   if (!t.pair.curve() || !problem.model().planar() || t.lagged >= 0) return false;
-  return problem.bodies.flat(t.pair) && t.pair.isotropic() && problem.turn.empty();
+  return problem.bodies.flat(t.pair) && t.pair.isotropic() && t.pair.rolling == 0.0 && problem.turn.empty();
 }
 
 void plane_contact(const ContactProblem& problem, const Touching& t, PlaneForces which,

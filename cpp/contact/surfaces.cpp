@@ -65,7 +65,7 @@ void Surfaces::note_frictional() {
     rod = pair.rod_a;
     other = pair.key.b;
     const BodyFriction f = friction_of(rod, other);
-    frictional_ = f.along > 0.0 || f.across > 0.0;
+    frictional_ = f.along > 0.0 || f.across > 0.0 || p.obstacle_rolling(-1 - other) > 0.0;
   }
 }
 
@@ -106,6 +106,7 @@ void Surfaces::set_parameters(ContactPair& pair) const {
   const BodyFriction f = friction_of(pair.rod_a, other);
   const double share = f.given < 0 || !obstacle ? 1.0 : p.pair_shares[at(f.given)](place_along(pair));
   pair.set_friction(share * f.along, share * f.across);
+  pair.rolling = obstacle ? p.obstacle_rolling(-1 - other) : 0.0;
   pair.restitution = obstacle ? p.obstacle_restitution(-1 - other) : p.restitution;
   pair.stiffness = 0.0;
   const auto& pairs = model_.description.contact.pairs;

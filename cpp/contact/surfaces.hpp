@@ -29,6 +29,7 @@ struct ContactPair {
   double share = 1;                   ///< of a contact's stiffness
   double friction = 0;                ///< [-]; the greater one, where it is not the same along and across a rod
   double along = 1, across = 1;       ///< that in these directions of a, over it
+  double rolling = 0;                 ///< coefficient of rolling friction, over a's radius [-]
   double stiffness = 0;               ///< of its own [N/m]; 0: none
   double restitution = 1;             ///< [-]
 
@@ -38,6 +39,7 @@ struct ContactPair {
   double small_radius() const { return rod_b < 0 || radius_a < radius_b ? radius_a : radius_b; }
   bool curve() const { return piece.weights != nullptr; }
   bool isotropic() const { return along == across; }
+  bool rubs() const { return friction > 0.0 || rolling > 0.0; }
   void set_friction(double mu_along, double mu_across) {
     friction = mu_along > mu_across ? mu_along : mu_across;
     along = friction > 0.0 ? mu_along / friction : 1.0;

@@ -57,6 +57,7 @@ class Chain {
     out.slip_tolerance = by.slip_tolerance;
     out.obstacle_friction = by.obstacle_friction;
     out.pair_friction = by.pair_friction;
+    out.obstacle_rolling = by.obstacle_rolling;
     out.hand_stiffness = by.hand_stiffness;
     out.hand_limit = by.hand_limit;
     add_masses();

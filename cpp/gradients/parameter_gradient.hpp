@@ -18,6 +18,7 @@ struct ParameterGradient {
   VectorX spring_stiffness, spring_rest_length, spring_damping;
   double fluid_viscosity = 0, friction = 0, slip_tolerance = 0;
   MatrixX2 obstacle_friction, pair_friction;
+  VectorX obstacle_rolling;
   MatrixX6 hand_stiffness;  ///< per support, see `HandDescription`
   VectorX hand_limit;
   /// Per edge, of rods outside of fluids that are no chords of arcs: by its rest length, and so by lengths of stencils,

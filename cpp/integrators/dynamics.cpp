@@ -240,8 +240,7 @@ void find_end_velocity(const Equations& equations, const StepPlan& plan, const S
     v1 = 2.0 * work.mean - state.v;
   if (plan.rule == StepRule::energy_momentum)
     set_turning_velocities(equations.model(), state.v, work.change, plan.dt, v1);
-  equations.assembler().project(v1);
-  if (!equations.model().constraints.empty()) equations.assembler().add_held_part(work.held_velocity, 1.0, v1);
+  equations.assembler().set_held_part(work.held_velocity, v1);
 }
 
 /// What acted, and what was lost; full residuals become minus the reactions. Returns what friction and restitution

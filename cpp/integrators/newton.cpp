@@ -108,7 +108,7 @@ class Newton::Solve {
         axial_known_(mixed_ && (how.interval != 0.0 || how.predicted)) {
     work.contact.regularisation = how.regularisation;
     work.contact.geometric = true;
-    work.contact.friction.clear();
+    work.contact.forget_friction();
   }
 
   NewtonResult run() {
@@ -124,7 +124,7 @@ class Newton::Solve {
       } else {
         reuse_.drop();
       }
-      work_.contact.friction.clear();
+      work_.contact.forget_friction();
       return result_;
     }
   }

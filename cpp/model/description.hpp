@@ -191,6 +191,7 @@ struct ContactDescription {
   double friction = 0;           ///< coefficient between rods [-]
   VectorX obstacle_friction;     ///< per obstacle, along rods [-]
   VectorX obstacle_across;       ///< per obstacle, across rods [-]; empty: as along them
+  VectorX obstacle_rolling;      ///< per obstacle, of rolling friction over a rod's radius [-]; empty: none
   double restitution = 1;        ///< coefficient between rods [-]
   VectorX obstacle_restitution;  ///< per obstacle [-]; empty: 1
   ContactLaw law = ContactLaw::imcv2;

@@ -111,6 +111,7 @@ struct SurfaceParameters {
   double restitution = 1;            ///< between rods [-]
   double contact_stiffness = 0;      ///< [N/m]; 0: found by the rule
   MatrixX2 obstacle_friction;        ///< per obstacle, along and across rods [-]
+  VectorX obstacle_rolling;          ///< per obstacle, of rolling friction over a rod's radius [-]
   VectorX obstacle_restitution;      ///< per obstacle [-]
   MatrixX2 pair_friction;            ///< per pair, along and across; negative: that of its bodies [-]
   std::vector<VectorX> pair_shares;  ///< per pair, see `ContactPairDescription::shares`

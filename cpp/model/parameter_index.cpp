@@ -15,7 +15,7 @@ namespace {
 
 using enum ParameterKind;
 
-constexpr std::array<ParameterInfo, 27> kIndex{{
+constexpr std::array<ParameterInfo, 28> kIndex{{
     {stretch_stiffness, "stretch_stiffness", Extent::edge, 1, "N", Range::positive, Derived::nothing},
     {bend_stiffness, "bend_stiffness", Extent::edge, 2, "N m^2", Range::positive, Derived::stiffness},
     {twist_stiffness, "twist_stiffness", Extent::edge, 1, "N m^2", Range::positive, Derived::stiffness},
@@ -39,6 +39,7 @@ constexpr std::array<ParameterInfo, 27> kIndex{{
     {restitution, "restitution", Extent::scene, 1, "-", Range::non_negative, Derived::nothing},
     {contact_stiffness, "contact_stiffness", Extent::scene, 1, "N/m", Range::non_negative, Derived::nothing},
     {obstacle_friction, "obstacle_friction", Extent::obstacle, 2, "-", Range::non_negative, Derived::nothing},
+    {obstacle_rolling, "obstacle_rolling", Extent::obstacle, 1, "-", Range::non_negative, Derived::nothing},
     {obstacle_restitution, "obstacle_restitution", Extent::obstacle, 1, "-", Range::non_negative, Derived::nothing},
     {pair_friction, "pair_friction", Extent::pair, 2, "-", Range::any, Derived::nothing},
     {pair_restitution, "pair_restitution", Extent::pair, 1, "-", Range::any, Derived::nothing},
@@ -154,6 +155,8 @@ ParameterView parameter_view(const Model& model, Parameters& p, ParameterKind ki
         return &p.surfaces.contact_stiffness;
       case obstacle_friction:
         return p.surfaces.obstacle_friction.data();
+      case obstacle_rolling:
+        return p.surfaces.obstacle_rolling.data();
       case obstacle_restitution:
         return p.surfaces.obstacle_restitution.data();
       case pair_friction:

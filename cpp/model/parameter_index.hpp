@@ -32,6 +32,7 @@ enum class ParameterKind {
   restitution,
   contact_stiffness,
   obstacle_friction,
+  obstacle_rolling,
   obstacle_restitution,
   pair_friction,
   pair_restitution,

@@ -24,6 +24,7 @@ struct ContactRecord {
   double approach = 0;   ///< speed at which the surfaces met [m/s]; 0: they rest on each other
   double age = 0;        ///< time since then [s]
   Vec3d stick{};         ///< elastic slip of an anchored contact, of a's surface over b's [m]
+  Vec3d roll{};          ///< likewise of rolling friction, by a's turning alone [m]
   Vec3d friction{};      ///< on a [N]
   bool sticking = false;
 };

@@ -14,6 +14,7 @@ void add_coefficients(const ContactProblem& problem, const ContactPair& pair, co
   out.slip_tolerance += by.slip_tolerance;
   out.gravity_size += by.gravity;
   problem.add_mass_slopes(pair, by.mass, out.edge_mass);
+  if (pair.key.b < 0) out.obstacle_rolling(-1 - pair.key.b) += by.rolling;
   if (owner.pair >= 0)
     out.pair_friction.row(owner.pair) += Eigen::RowVector2d(by.along, by.across);
   else if (owner.obstacle >= 0)

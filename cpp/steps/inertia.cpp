@@ -192,10 +192,7 @@ void Inertia::add(const StepProblem& problem, StepData& data, const Assembler& a
   const int n = problem.model.dof_count;
   const double inverse = 1.0 / problem.interval;
   data.acceleration = inverse * (inverse * (data.z - problem.start->q) - problem.start->v);
-  if (problem.held_acceleration.size() != 0) {
-    assembler.project(data.acceleration);
-    assembler.add_held_part(problem.held_acceleration, 1.0, data.acceleration);
-  }
+  if (problem.held_acceleration.size() != 0) assembler.set_held_part(problem.held_acceleration, data.acceleration);
   multiply(problem.model, problem.mass, data.acceleration, data.inertia);
   if (!problem.model.planar()) set_turning_edges(problem, data);
   if (problem.in_middle()) set_turning_frames(problem, data);

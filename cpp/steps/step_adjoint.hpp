@@ -26,6 +26,7 @@ struct CoefficientAdjoint {
   double fluid_viscosity = 0;                                    ///< [1/(Pa s)]
   double friction = 0, slip_tolerance = 0;                       ///< of the scene [-], [s/m]
   MatrixX2 obstacle_friction, pair_friction;                     ///< per obstacle, per pair of bodies [-]
+  VectorX obstacle_rolling;                                      ///< per obstacle [-]
   MatrixX6 hand_stiffness;                  ///< per support, see `HandDescription` [m/N], [rad/(N m)]
   VectorX hand_limit;                       ///< per support [1/N]
   std::vector<MatrixX2> natural_curvature;  ///< per rod and stencil, by the smooth one, where it is read out [m]
@@ -57,6 +58,7 @@ struct CoefficientAdjoint {
         edge_mass(stretch_stiffness),
         obstacle_friction(rows_of_two(model.description.contact.obstacles.size())),
         pair_friction(rows_of_two(model.description.contact.pairs.size())),
+        obstacle_rolling(VectorX::Zero(obstacle_friction.rows())),
         hand_stiffness(MatrixX6::Zero(static_cast<Eigen::Index>(model.supports.size()), 6)),
         hand_limit(VectorX::Zero(static_cast<Eigen::Index>(model.supports.size()))),
         rest_length(VectorX::Zero(model.edge_count)),

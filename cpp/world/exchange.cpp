@@ -18,9 +18,9 @@ void exchange_size(Archive& io, Items& items, std::int64_t most, const char* imp
 template <class Archive>
 void exchange_contacts(Archive& io, std::vector<ContactRecord>& contacts) {
   exchange_size(io, contacts, 1 << 28, "snapshot is damaged: impossible number of contacts");
-  for (auto& [key, force, stiffness, yielded, approach, age, stick, friction, sticking] : contacts) {
+  for (auto& [key, force, stiffness, yielded, approach, age, stick, roll, friction, sticking] : contacts) {
     io(key.a), io(key.b), io(key.end), io(force), io(stiffness), io(yielded), io(approach), io(age);
-    for (Vec3d* v : {&stick, &friction}) io(v->x), io(v->y), io(v->z);
+    for (Vec3d* v : {&stick, &roll, &friction}) io(v->x), io(v->y), io(v->z);
     io(sticking);
   }
 }

@@ -68,6 +68,7 @@ class Separation {
     contact.friction = 0.0;
     contact.obstacle_friction.setZero();
     contact.obstacle_across.setZero();
+    contact.obstacle_rolling.setZero();
     for (ContactPairDescription& pair : contact.pairs) pair.friction = pair.across = pair.stiffness = 0.0;
     contact.law = ContactLaw::imcv2;  // finite where surfaces overlap
     contact.stiffness = 1.0;          // given: each step sets it

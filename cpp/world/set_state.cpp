@@ -226,8 +226,7 @@ void World::Implementation::relax_joints(const std::vector<bool>& is_told) {
 
 /// What is held goes on with its support, whatever velocities have been set.
 void World::Implementation::keep_held_velocities(const VectorX& before) {
-  equations->assembler().project(state.v);
-  if (!model.constraints.empty()) equations->assembler().add_held_part(before, 1.0, state.v);
+  equations->assembler().set_held_part(before, state.v);
 }
 
 void World::Implementation::set_rates(const std::vector<RodState>& rods) {

@@ -84,8 +84,10 @@ void write_contact(Writer& w, const ContactDescription& contact) {
   for (double x : {contact.friction, contact.slip_tolerance, contact.restitution, contact.stiffness}) w(x);
   w(contact.obstacle_restitution);
   w(contact.obstacle_friction);
-  w(static_cast<std::int64_t>(contact.obstacle_across.size()));
-  w(contact.obstacle_across);
+  for (const VectorX* each : {&contact.obstacle_across, &contact.obstacle_rolling}) {
+    w(static_cast<std::int64_t>(each->size()));
+    w(*each);
+  }
   w(static_cast<std::int64_t>(contact.pairs.size()));
   for (const ContactPairDescription& p : contact.pairs) {
     w(p.first), w(p.second), w(p.ignored);
@@ -101,10 +103,12 @@ ContactDescription read_contact(Reader& r, ContactDescription contact) {
   r(contact.obstacle_restitution);
   r(contact.obstacle_friction);
   std::int64_t count = 0;
-  r(count);
-  require(count == 0 || count == contact.obstacle_friction.size(), "snapshot is damaged: impossible friction");
-  contact.obstacle_across.resize(count);
-  r(contact.obstacle_across);
+  for (VectorX* each : {&contact.obstacle_across, &contact.obstacle_rolling}) {
+    r(count);
+    require(count == 0 || count == contact.obstacle_friction.size(), "snapshot is damaged: impossible friction");
+    each->resize(count);
+    r(*each);
+  }
   r(count);
   require(count >= 0 && count < 1 << 20, "snapshot is damaged: impossible number of pairs");
   contact.pairs.assign(static_cast<std::size_t>(count), {});

@@ -196,10 +196,11 @@ void check_contact(const ContactDescription& contact, const ContactDescription& 
   const auto valid = [](const VectorX& v) { return v.size() == 0 || (v.allFinite() && v.minCoeff() >= 0.0); };
   const auto share = [](double x) { return x >= 0.0 && x <= 1.0; };
   require(contact.obstacle_friction.size() == own.obstacle_friction.size() &&
-              (contact.obstacle_across.size() == 0 || contact.obstacle_across.size() == own.obstacle_friction.size()),
+              (contact.obstacle_across.size() == 0 || contact.obstacle_across.size() == own.obstacle_friction.size()) &&
+              (contact.obstacle_rolling.size() == 0 || contact.obstacle_rolling.size() == own.obstacle_friction.size()),
           "friction needs one coefficient an obstacle");
   require(std::isfinite(contact.friction) && contact.friction >= 0.0 && valid(contact.obstacle_friction) &&
-              valid(contact.obstacle_across),
+              valid(contact.obstacle_across) && valid(contact.obstacle_rolling),
           "friction must not be negative");
   require(std::isfinite(contact.slip_tolerance) && contact.slip_tolerance > 0.0, "slip_tolerance must be positive");
   require(contact.obstacle_restitution.size() == own.obstacle_restitution.size(),
@@ -222,6 +223,7 @@ void World::set_contact(const ContactDescription& contact) {
   wanted.slip_tolerance = contact.slip_tolerance;
   wanted.obstacle_friction = contact.obstacle_friction;
   wanted.obstacle_across = contact.obstacle_across;
+  wanted.obstacle_rolling = contact.obstacle_rolling;
   wanted.restitution = contact.restitution;
   wanted.obstacle_restitution = contact.obstacle_restitution;
   wanted.stiffness = contact.stiffness;

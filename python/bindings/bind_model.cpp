@@ -81,6 +81,7 @@ void register_contact(py::module_& module) {
       .def_readwrite("friction", &ContactDescription::friction)
       .def_readwrite("obstacle_friction", &ContactDescription::obstacle_friction)
       .def_readwrite("obstacle_across", &ContactDescription::obstacle_across)
+      .def_readwrite("obstacle_rolling", &ContactDescription::obstacle_rolling)
       .def_readwrite("restitution", &ContactDescription::restitution)
       .def_readwrite("obstacle_restitution", &ContactDescription::obstacle_restitution)
       .def_readwrite("distance_tolerance", &ContactDescription::distance_tolerance)

@@ -34,6 +34,7 @@ void register_gradients(py::module_& module) {
       .def_readonly("slip_tolerance", &ParameterGradient::slip_tolerance)
       .def_readonly("obstacle_friction", &ParameterGradient::obstacle_friction)
       .def_readonly("pair_friction", &ParameterGradient::pair_friction)
+      .def_readonly("obstacle_rolling", &ParameterGradient::obstacle_rolling)
       .def_readonly("rest_length", &ParameterGradient::rest_length)
       .def_readonly("edge_turn", &ParameterGradient::edge_turn)
       .def_readonly("drawn_curvature", &ParameterGradient::drawn_curvature)

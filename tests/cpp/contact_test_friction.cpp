@@ -105,7 +105,7 @@ void place_piece(RandomNumbers& random, Other other, bool planar, Touch& c, Vec3
   c.setting.points.square = 1.0;
 }
 
-void random_touch(RandomNumbers& random, Other other, FrictionLaw law, bool planar, Touch& c) {
+void random_touch(RandomNumbers& random, Other other, FrictionLaw law, bool planar, bool rolling, Touch& c) {
   FrictionSetting& f = c.setting;
   Vec3d x[4];
   if (curved(other))
@@ -119,12 +119,16 @@ void random_touch(RandomNumbers& random, Other other, FrictionLaw law, bool plan
   f.obstacle = other == Other::rod ? nullptr : &c.obstacle;
   f.law = law;
   f.spatial = !planar;
-  f.centreline = random.normal() > 0.0;
+  f.centreline = random.normal() > 0.0 && !rolling;
   f.middle = other == Other::rod && random.normal() > 0.0;
   f.pressing = {ContactLaw::imcv2, c.pair.radii(), c.pair.tolerance, 40.0, 0.01 * c.pair.tolerance};
   f.tangential_stiffness = random.normal() > 0.0 ? 1.0 : 100.0;
   f.rate = 3.0;
   slip(random, x, c);
+  f.friction = c.pair.friction;
+  f.isotropic = rolling || c.pair.isotropic();
+  f.rolling = rolling;
+  if (rolling) f.drift = f.turn = Vec3d{};
 }
 
 std::string class_of(const Touch& c, const FrictionForce<double>& friction) {
@@ -165,12 +169,12 @@ Matrix by_hand(const Touch& c) {
 }
 
 /// Compares random contacts; returns how many classes there were.
-std::size_t compare(Other other, FrictionLaw law, bool planar) {
+std::size_t compare(Other other, FrictionLaw law, bool planar, bool rolling) {
   RandomNumbers random(11);
   std::set<std::string> seen;
   for (int k = 0; k < 1000; ++k) {
     Touch c;
-    random_touch(random, other, law, planar, c);
+    random_touch(random, other, law, planar, rolling, c);
     Matrix expected = by_dual_numbers(c);
     if (c.pair.curve()) {  // nodes that are not there, and in a plane what leads out of it
       for (int i = 0; i < kN; ++i) {
@@ -193,8 +197,11 @@ std::size_t compare(Other other, FrictionLaw law, bool planar) {
 
 /// Surfaces or centrelines that slip under the implicit law, and hold or slip under that with anchors.
 void expect_dual_numbers(Other other, bool planar, std::size_t classes) {
-  EXPECT_EQ(compare(other, FrictionLaw::implicit, planar), 2 * classes);
-  EXPECT_EQ(compare(other, FrictionLaw::anchored, planar), 4 * classes);
+  EXPECT_EQ(compare(other, FrictionLaw::implicit, planar, false), 2 * classes);
+  EXPECT_EQ(compare(other, FrictionLaw::anchored, planar, false), 4 * classes);
+  if (other == Other::rod) return;  // rods roll freely on each other
+  EXPECT_EQ(compare(other, FrictionLaw::implicit, planar, true), classes);
+  EXPECT_EQ(compare(other, FrictionLaw::anchored, planar, true), 2 * classes);
 }
 
 class FrictionJacobian : public ::testing::TestWithParam<bool> {};
@@ -203,6 +210,7 @@ class FrictionJacobian : public ::testing::TestWithParam<bool> {};
 FrictionSetting law_setting(const ContactPair& pair, FrictionLaw law) {
   FrictionSetting f;
   f.pair = &pair;
+  f.friction = pair.friction;
   f.law = law;
   f.rate = 3.0;
   f.tangential_stiffness = 40.0;

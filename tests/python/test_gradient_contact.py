@@ -7,7 +7,7 @@ import withe
 from gradient_scenes import NODES, TIGHT, difference, move_with_directors
 
 CONTACTS = ("floor", "slope in a plane", "sphere", "capsule", "post", "crossing", "floor lying", "floor slowly")
-FRICTIONS = ("none", "implicit", "lagged", "directed")
+FRICTIONS = ("none", "implicit", "lagged", "directed", "rolling")
 INTEGRATORS = ("backward_euler", "implicit_midpoint", "energy_momentum")
 
 
@@ -31,23 +31,25 @@ class Touching:
         scene.add_drag(0.1)
         rubs = {"none": 0.0, "directed": (0.3, 0.5)}.get(friction, 0.4)
         self.other = None
+        self.rolling = 0.5 if friction == "rolling" else 0.0
+        kept = {"friction": rubs, "rolling_friction": self.rolling}
         if kind.startswith("floor"):
-            self.other = scene.add_plane(offset, (0, 0, 1), friction=rubs)
+            self.other = scene.add_plane(offset, (0, 0, 1), **kept)
         elif kind == "slope in a plane":
-            self.other = scene.add_plane(offset, (0.1, 0, 1), friction=rubs)
+            self.other = scene.add_plane(offset, (0.1, 0, 1), **kept)
         elif kind == "sphere":
-            self.other = scene.add_sphere(offset + np.array((0.13, 0.01, -0.05)), 0.05, friction=rubs)
+            self.other = scene.add_sphere(offset + np.array((0.13, 0.01, -0.05)), 0.05, **kept)
         elif kind == "capsule":
             ends = offset + np.array([(0.1, -0.1, -0.03), (0.14, 0.1, -0.02)])
-            self.other = scene.add_capsule(*ends, 0.03, friction=rubs)
+            self.other = scene.add_capsule(*ends, 0.03, **kept)
         elif kind == "post":  # smaller than an edge, so that it touches straight ones
             ends = offset + np.array([(0.1, -0.1, -0.008), (0.14, 0.1, -0.004)])
-            self.other = scene.add_capsule(*ends, 8e-3, friction=rubs)
+            self.other = scene.add_capsule(*ends, 8e-3, **kept)
         else:
             ends = {"start": (0.11, -0.1, -0.008), "end": (0.15, 0.1, -0.004)}
             rod = scene.add_rod(**ends, nodes=7, radius=1e-2, material=material)
             scene.clamp(rod.start)
-        law = {"none": "implicit", "directed": "implicit"}.get(friction, friction)
+        law = "lagged" if friction == "lagged" else "implicit"
         scene.enable_contact(
             stiffness=2e5,
             distance_tolerance=4e-3,
@@ -86,6 +88,11 @@ class Touching:
             yield "friction", 1.0, lambda h: sim.set(None, friction=rubs + h), 1e-5
         else:
             yield (self.other, "friction"), way, lambda h: sim.set(self.other, friction=rubs + h * way), 1e-5
+        if self.rolling > 0.0:
+            yield (self.other, "rolling_friction"), 1.0, self._set_rolling, 1e-5
+
+    def _set_rolling(self, h):
+        self.simulation.set(self.other, rolling_friction=self.rolling + h)
 
 
 def check(touching, *, seed=8, rel=1e-5, **kept):
@@ -113,8 +120,8 @@ def check(touching, *, seed=8, rel=1e-5, **kept):
 @pytest.mark.parametrize("kind", CONTACTS)
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 def test_gradient_of_a_run_through_contact_is_that_of_differences(integrator, kind, friction):
-    if friction == "directed" and kind == "crossing":
-        pytest.skip("friction of two rods has no directions")
+    if friction in ("directed", "rolling") and kind == "crossing":
+        pytest.skip("friction of two rods has no directions, and they roll freely on each other")
     check(Touching(kind, friction, integrator))
 
 

@@ -13,7 +13,7 @@ from withe.deployment.motion import lengthened
 from withe.deployment.pattern import distances
 from withe.deployment.placing import passed
 from withe.deployment.planning import Plan
-from withe.deployment.world import Setup, lay
+from withe.deployment.world import ROLLING_FRICTION, Setup, lay
 from withe.deployment.world import hang as hang_in_world
 from withe.deployment.world import place as place_in_world
 from withe.recording import Record
@@ -68,6 +68,7 @@ def deploy(
     cable: Cable | None = None,
     *,
     floor: float,
+    rolling_friction: float = ROLLING_FRICTION,
     seed: int = 0,
     noise: float = 0.0,
     nodes: int = 200,
@@ -78,10 +79,9 @@ def deploy(
     """Carry out a plan in the rod engine: the whole cable in space, from hanging to laid, on a floor with friction.
 
     Nothing of the plan but the jaw's motion is known there: the cable has thickness, weight, torsion and inertia,
-    touches the floor where it comes to, and sticks to it by anchored friction at its surface, on which it may roll.
+    touches the floor where it comes to, and sticks to it by anchored friction at its surface, on which it rolls.
     Backward Euler steps; density 1180 kg/m^3, Kelvin-Voigt viscosity of .02 s. The jaw holds 10 mm of the cable; its
     pads yield by .5 mm/N and 20 rad/(N m), so that a jaw too low rests on the floor.
-    Nothing resists rolling: a straight cable that is let go under tension, a little askew, rolls aside by millimetres.
 
     Parameters
     ----------
@@ -90,6 +90,9 @@ def deploy(
         The true one, if it is not the planner's; held as far from its free end as the plan says.
     floor : float
         Coefficient of friction between cable and floor. Without any, nothing stays where it is laid.
+    rolling_friction : float
+        Of the floor, see `Scene.add_floor`. Without any, a straight cable that is let go under tension, a little askew,
+        rolls aside by millimetres.
     seed : int
         Of the trial's noise.
     noise : float
@@ -112,7 +115,7 @@ def deploy(
     Raises
     ------
     ValueError
-        Friction that is not positive, negative noise, a cable shorter than the plan holds, wrong numbers of nodes.
+        Friction that is not positive, negative noise or rolling friction, a cable shorter than the plan holds, wrong numbers of nodes.
 
     Examples
     --------
@@ -124,8 +127,7 @@ def deploy(
     >>> print(found.error < 1e-3)
     True
     """
-    if not isinstance(plan, Plan):
-        raise ValueError(f"plan must be a withe.deployment.Plan, got {plan!r:.80}")
+    _require_plan(plan)
     if cable is not None and not isinstance(cable, Cable):
         raise ValueError(f"cable must be a withe.deployment.Cable, got {cable!r:.80}")
     friction = validation.positive(floor, "floor")
@@ -143,6 +145,7 @@ def deploy(
         time_step=_time_step(time_step, quasi_static),
         quasi_static=quasi_static,
     )
+    setup = replace(setup, rolling_friction=validation.non_negative(rolling_friction, "rolling_friction"))
     held, laid, record = lay(setup, plan, progress=progress)
     return _compared(plan, setup.arc_length, held, laid, record)
 
@@ -151,6 +154,7 @@ def place(
     plan: Plan,
     *,
     floor: float,
+    rolling_friction: float = ROLLING_FRICTION,
     nodes: int = 200,
     time_step: float | None = None,
     quasi_static: bool = True,
@@ -166,7 +170,7 @@ def place(
     ----------
     plan : Plan
         Of which cable, pattern and tail are used.
-    floor, nodes, time_step, quasi_static, progress
+    floor, rolling_friction, nodes, time_step, quasi_static, progress
         See `deploy`.
 
     Returns
@@ -177,7 +181,7 @@ def place(
     Raises
     ------
     ValueError
-        Friction that is not positive, wrong numbers of nodes.
+        No plan, friction that is not positive, negative rolling friction, wrong numbers of nodes.
 
     Examples
     --------
@@ -190,9 +194,11 @@ def place(
     >>> print(found.error < 2e-4)
     True
     """
+    _require_plan(plan)
     setup = Setup(
         cable=plan.cable,
         friction=validation.positive(floor, "floor"),
+        rolling_friction=validation.non_negative(rolling_friction, "rolling_friction"),
         nodes=validation.integer(nodes, "nodes", 20, 2000),
         time_step=_time_step(time_step, quasi_static),
         quasi_static=quasi_static,
@@ -260,6 +266,11 @@ def hang(cable: Cable, *, nodes: int = 200) -> FloatArray:
     [0.007 0.    0.   ]
     """
     return hang_in_world(Setup(cable=cable, friction=0.0, nodes=validation.integer(nodes, "nodes", 20, 2000)))
+
+
+def _require_plan(plan: object) -> None:
+    if not isinstance(plan, Plan):
+        raise ValueError(f"plan must be a withe.deployment.Plan, got {plan!r:.80}")
 
 
 def _drawn(seed: int, noise: float) -> FloatArray:

@@ -18,11 +18,12 @@ from withe.scene import Scene
 from withe.simulation import Simulation
 from withe.simulation.hands import RunningHand
 
-__all__ = ["JAW_STIFFNESS", "Motion", "Setup", "hung", "jaw_path", "lay", "place"]
+__all__ = ["JAW_STIFFNESS", "ROLLING_FRICTION", "Motion", "Setup", "hung", "jaw_path", "lay", "place"]
 
 FloatArray = npt.NDArray[np.float64]
 _DENSITY, _VISCOUS_TIME, _GRAVITY = 1180.0, 0.02, 9.81  # [kg/m^3], [s], [m/s^2]
 _SETTLING = 2.0  # [s] after the jaw has opened
+ROLLING_FRICTION = 0.01  # of the floor: a couple over normal force times radius, that of rubber on what is hard
 JAW_STIFFNESS = (2e3, 0.05)  # [N/m, N m/rad], of its pads: hundreds of times the cable's
 _STRESSED = 1.0  # [s] in which a cable that is put down takes its stress
 _RECORD_EVERY = 0.1  # [s]
@@ -50,6 +51,7 @@ class Setup:
 
     cable: Cable
     friction: float
+    rolling_friction: float = ROLLING_FRICTION
     nodes: int = 200
     time_step: float = 0.01  # [s]
     jaw_offset: tuple[float, float, float] = (0.0, 0.0, 0.0)  # [m]
@@ -175,7 +177,7 @@ def _scene(setup: Setup, points: FloatArray) -> tuple[Scene, Rod]:
 def _floor(setup: Setup) -> Scene:
     """The floor with its posts."""
     scene = Scene(gravity=(0.0, 0.0, -_GRAVITY))
-    scene.add_floor(friction=setup.friction)
+    scene.add_floor(friction=setup.friction, rolling_friction=setup.rolling_friction)
     for post in setup.posts:
         foot, head = (post.x, post.y, 0.0), (post.x, post.y, post.height - post.radius)
         scene.add_capsule(foot, head, post.radius, friction=setup.friction)

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from withe import _core
 from withe.common import validation
 from withe.parts.directory import Directory
-from withe.parts.friction import Coefficients, Friction, check_law, coefficients
+from withe.parts.friction import Coefficients, Friction, check_law, check_rolling, coefficients
 from withe.parts.handles import Obstacle, Rod
 from withe.parts.kinds import (
     ContactSettings,
@@ -60,11 +60,13 @@ def make_obstacle(
     radius: float,
     friction: Friction,
     restitution: float,
+    rolling_friction: float,
 ) -> ObstaclePart:
     """An obstacle, checked; not yet in the directory."""
     both = coefficients(friction, f"friction of {name!r}")
     restitution = validation.share(restitution, f"restitution of {name!r}")
-    return ObstaclePart(name, kind, point, other, radius, both, restitution)
+    rolling = validation.non_negative(rolling_friction, f"rolling_friction of {name!r}")
+    return ObstaclePart(name, kind, point, other, radius, both, restitution, rolling)
 
 
 def pair_of(directory: Directory, a: Body, b: Body) -> tuple[str, str]:
@@ -161,8 +163,10 @@ def describe_contact(directory: Directory) -> _core.ContactDescription:
     contact.obstacles = [_describe_obstacle(part) for part in obstacles]
     for part in obstacles:
         check_law(part.friction.pair, settings.friction_model, f"friction of {part.name!r}")
+        check_rolling(part.rolling_friction, settings.friction_model, part.name)
     contact.obstacle_friction = np.array([part.friction.pair[0] for part in obstacles], dtype=float)
     contact.obstacle_across = np.array([part.friction.pair[1] for part in obstacles], dtype=float)
+    contact.obstacle_rolling = np.array([part.rolling_friction for part in obstacles], dtype=float)
     contact.obstacle_restitution = np.array([part.restitution for part in obstacles], dtype=float)
     bodies = {rod.name: rod.index for rod in rods} | {part.name: -1 - i for i, part in enumerate(obstacles)}
     for (a, b), own in settings.pairs.items():

@@ -17,6 +17,7 @@ __all__ = [
     "Friction",
     "as_given",
     "check_law",
+    "check_rolling",
     "coefficients",
     "friction_pair",
     "obstacle_friction",
@@ -129,6 +130,14 @@ def check_law(pair: tuple[float, float], friction_model: str, what: str) -> None
         raise ValueError(
             f"{what} along and across a rod must be the same with friction_model={friction_model!r}: take 'anchored' "
             "or 'implicit'"
+        )
+
+
+def check_rolling(rolling_friction: float, friction_model: str, name: str) -> None:
+    """Refuse rolling friction where friction is that of the step's start."""
+    if rolling_friction > 0.0 and friction_model in ("lagged", "semi_explicit"):
+        raise ValueError(
+            f"rolling_friction of {name!r} needs friction_model 'anchored' or 'implicit', got {friction_model!r}"
         )
 
 

@@ -230,6 +230,7 @@ class ObstaclePart:
     radius: float
     friction: Coefficients
     restitution: float
+    rolling_friction: float
 
     @property
     def axis(self) -> FloatArray | None:

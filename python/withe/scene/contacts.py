@@ -29,7 +29,13 @@ class Contacts:
     _directory: Directory
 
     def add_floor(
-        self, height: float = 0.0, *, friction: Friction = 0.0, restitution: float = 1.0, name: str | None = None
+        self,
+        height: float = 0.0,
+        *,
+        friction: Friction = 0.0,
+        restitution: float = 1.0,
+        rolling_friction: float = 0.0,
+        name: str | None = None,
     ) -> Obstacle:
         """Add a floor at a height [m], with its normal along +z.
 
@@ -45,6 +51,9 @@ class Contacts:
             nodes and edges are then, and moves and turns with its obstacle.
         restitution : float
             Speed after an impact over that before it, from 0 to 1; see `enable_contact`.
+        rolling_friction : float
+            Of rods that roll on it: a couple of at most this times the rod's radius times the normal force
+            [Johnson 1985, Contact Mechanics, section 9.1]. "anchored" and "implicit" friction have it.
         name : str
 
         Returns
@@ -62,7 +71,7 @@ class Contacts:
         return cast(
             Obstacle,
             self._directory.add(
-                make_obstacle(name, "plane", np.array([0.0, 0.0, height]), up, 0.0, friction, restitution)
+                make_obstacle(name, "plane", np.array([0.0, 0.0, height]), up, 0.0, friction, restitution, rolling_friction)
             ),
         )
 
@@ -73,6 +82,7 @@ class Contacts:
         *,
         friction: Friction = 0.0,
         restitution: float = 1.0,
+        rolling_friction: float = 0.0,
         name: str | None = None,
     ) -> Obstacle:
         """Add a plane through a point; what is behind it, against its normal, is solid.
@@ -85,7 +95,7 @@ class Contacts:
         normal : array_like of shape (3,)
             Of any length.
         friction : float, pair of float, or callable
-        restitution : float
+        restitution, rolling_friction : float
         name : str
 
         Returns
@@ -96,7 +106,7 @@ class Contacts:
         where = validation.vector(point, f"point of {name!r}")
         across = validation.unit_vector(normal, f"normal of {name!r}")
         return cast(
-            Obstacle, self._directory.add(make_obstacle(name, "plane", where, across, 0.0, friction, restitution))
+            Obstacle, self._directory.add(make_obstacle(name, "plane", where, across, 0.0, friction, restitution, rolling_friction))
         )
 
     def add_sphere(
@@ -106,6 +116,7 @@ class Contacts:
         *,
         friction: Friction = 0.0,
         restitution: float = 1.0,
+        rolling_friction: float = 0.0,
         name: str | None = None,
     ) -> Obstacle:
         """Add a solid sphere.
@@ -118,7 +129,7 @@ class Contacts:
         center : array_like of shape (3,) [m]
         radius : float [m]
         friction : float, pair of float, or callable
-        restitution : float
+        restitution, rolling_friction : float
         name : str
 
         Returns
@@ -129,7 +140,7 @@ class Contacts:
         where = validation.vector(center, f"center of {name!r}")
         radius = validation.positive(radius, f"radius of {name!r}")
         return cast(
-            Obstacle, self._directory.add(make_obstacle(name, "capsule", where, where, radius, friction, restitution))
+            Obstacle, self._directory.add(make_obstacle(name, "capsule", where, where, radius, friction, restitution, rolling_friction))
         )
 
     def add_capsule(
@@ -140,6 +151,7 @@ class Contacts:
         *,
         friction: Friction = 0.0,
         restitution: float = 1.0,
+        rolling_friction: float = 0.0,
         name: str | None = None,
     ) -> Obstacle:
         """Add a solid cylinder with round ends.
@@ -153,7 +165,7 @@ class Contacts:
             Of its axis.
         radius : float [m]
         friction : float, pair of float, or callable
-        restitution : float
+        restitution, rolling_friction : float
         name : str
 
         Returns
@@ -164,7 +176,7 @@ class Contacts:
         first, last = validation.vector(start, f"start of {name!r}"), validation.vector(end, f"end of {name!r}")
         radius = validation.positive(radius, f"radius of {name!r}")
         return cast(
-            Obstacle, self._directory.add(make_obstacle(name, "capsule", first, last, radius, friction, restitution))
+            Obstacle, self._directory.add(make_obstacle(name, "capsule", first, last, radius, friction, restitution, rolling_friction))
         )
 
     def enable_contact(

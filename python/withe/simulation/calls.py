@@ -348,7 +348,11 @@ class Ledger:
             self._add(index, word, _by_drag(epoch, call.part, found, initial=False))
         elif isinstance(call.part, LoadPart) and call.part.name in epoch.session.settings.functions:
             return
-        elif isinstance(call.part, LoadPart | MassPart) or (isinstance(call.part, SpringPart) and word in SPRING_WORDS):
+        elif (
+            isinstance(call.part, LoadPart | MassPart)
+            or (isinstance(call.part, SpringPart) and word in SPRING_WORDS)
+            or word == "rolling_friction"
+        ):
             self._add(index, word, reader_of(call.session, call.part, word)(OfRun(found)))
         elif isinstance(call.part, ObstaclePart | BodyPair):
             self._add(index, word, friction_reader(call.session, call.part)(OfRun(found)))
@@ -382,7 +386,7 @@ def _share(session: Session, key: _Key, reached: _core.Reached) -> float:
 def _has_gradient(call: _Call, word: str) -> bool:
     if isinstance(call.part, LoadPart):
         return not callable(call.values[word])
-    if word == "friction":
+    if word in ("friction", "rolling_friction"):
         return bool(np.max(call.values[word]) > 0.0)
     if call.method == "move":
         return True

@@ -240,8 +240,8 @@ def _words_of(part: Part) -> tuple[str, ...]:
 _SETTABLE = (
     "set takes rods (youngs_modulus, natural_curvature, ...), loads (force, moment, load), masses (mass), "
     "springs (stiffness, rest_length, damping), drags (drag), fluids (viscosity, regularization), obstacles (friction, "
-    "restitution), supports (position, rotation; of rings friction), and None for the scene (gravity, friction, "
-    "slip_tolerance, restitution, contact_stiffness)"
+    "rolling_friction, restitution), supports (position, rotation; of rings friction), and None for the scene "
+    "(gravity, friction, slip_tolerance, restitution, contact_stiffness)"
 )
 
 

@@ -15,6 +15,7 @@ from withe.parts.friction import (
     Friction,
     as_given,
     check_law,
+    check_rolling,
     coefficients,
     obstacle_friction,
     pair_between,
@@ -43,7 +44,7 @@ __all__ = [
 FloatArray = npt.NDArray[np.float64]
 
 SCENE_WORDS = ("friction", "slip_tolerance", "restitution", "contact_stiffness")
-OBSTACLE_WORDS = ("friction", "restitution")
+OBSTACLE_WORDS = ("friction", "restitution", "rolling_friction")
 
 
 def set_scene(session: Session, values: dict[str, Any]) -> None:
@@ -76,8 +77,9 @@ def scene_value(session: Session, word: str) -> float | None:
 
 
 def set_obstacle(session: Session, part: ObstaclePart, values: dict[str, Any]) -> None:
-    """Change friction and restitution of an obstacle, all or none."""
+    """Change friction, rolling friction and restitution of an obstacle, all or none."""
     contact = session.world.contact
+    index = session.directory.all(ObstaclePart).index(part)
     given = None
     if "friction" in values:
         given = coefficients(values["friction"], f"friction of {part.name!r}")
@@ -85,8 +87,13 @@ def set_obstacle(session: Session, part: ObstaclePart, values: dict[str, Any]) -
     if "restitution" in values:
         restitution = np.array(contact.obstacle_restitution)
         share = validation.share(values["restitution"], f"restitution of {part.name!r}")
-        restitution[session.directory.all(ObstaclePart).index(part)] = share
+        restitution[index] = share
         contact.obstacle_restitution = restitution
+    if "rolling_friction" in values:
+        rolling = np.array(contact.obstacle_rolling)
+        rolling[index] = validation.non_negative(values["rolling_friction"], f"rolling_friction of {part.name!r}")
+        check_rolling(rolling[index], contact.friction_law, part.name)
+        contact.obstacle_rolling = rolling
     session.world.set_contact(contact)
     if given is not None:
         session.settings.frictions[(part.name,)] = given
@@ -116,6 +123,8 @@ def obstacle_value(session: Session, part: ObstaclePart, word: str) -> Friction:
     index = session.directory.all(ObstaclePart).index(part)
     if word == "restitution":
         return float(contact.obstacle_restitution[index])
+    if word == "rolling_friction":
+        return float(contact.obstacle_rolling[index])
     given = session.settings.frictions.get((part.name,))
     if given is not None and given.field is not None:
         return given.field

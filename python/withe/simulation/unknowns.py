@@ -117,6 +117,10 @@ def reader_of(session: Session, part: Part | BodyPair, word: str) -> Reader:
         given = _friction_given(session, part)
         read = friction_reader(session, part)
         return lambda g: read(g) if np.ndim(given) else float(read(g).sum())
+    if isinstance(part, ObstaclePart) and word == "rolling_friction":
+        index = session.directory.all(ObstaclePart).index(part)
+        _check_rubs(float(session.contact.obstacle_rolling[index]), f"{part.name}, of rods that roll,")
+        return lambda g: float(g.parameters.obstacle_rolling[index])
     if isinstance(part, FluidPart) and word == "viscosity":
         return lambda g: float(g.parameters.fluid_viscosity)
     if isinstance(part, LoadPart) and word == part.kind:
