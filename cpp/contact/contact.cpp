@@ -216,6 +216,17 @@ std::vector<ContactKey> Contact::near() const {
   return keys;
 }
 
+Contact::TouchingComponents Contact::touching_components() const {
+  const Model& model = problem_.model();
+  TouchingComponents out{std::vector<bool>(at(model.component_count), false)};
+  for (const Touching& t : set_) {
+    out.which[at(model.component_of_edge(t.pair.key.a))] = true;
+    if (t.pair.key.b >= 0) out.which[at(model.component_of_edge(t.pair.key.b))] = true;
+    out.obstacle = out.obstacle || t.pair.key.b < 0;
+  }
+  return out;
+}
+
 void Contact::predict_friction(const VectorX& change, ContactLinearisation& linearisation) const {
   if (!frictional() || problem_.description().friction_law == FrictionLaw::semi_explicit) return;
   if (regularises() && slips_shortly(problem_, linearisation, change)) {

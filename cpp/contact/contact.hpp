@@ -115,6 +115,12 @@ class Contact {
   /// Predicts the friction of a step of Newton's method by which `change` is to be added to q1.
   void predict_friction(const VectorX& change, ContactLinearisation& linearisation) const;
 
+  /// Which connected components touch anything, and whether that is an obstacle.
+  struct TouchingComponents {
+    std::vector<bool> which;
+    bool obstacle = false;
+  };
+  TouchingComponents touching_components() const;
   /// Takes from a predicted change of q what would move surfaces that stick: friction is steep there, and from outside
   /// Newton's method would fall past it.
   void hold_sticking(const State& state, VectorX& change) const;

@@ -100,7 +100,7 @@ Bracket distance_at(const Touching& t, bool force, double wanted) {
   return b;
 }
 
-/// What stops an edge's mass at the speed at which the ends meet, within the step or within the depth of contact; and
+/// What stops an edge's mass at the speed at which its ends near the other surface, within the step or within the depth of contact; and
 /// what stores its energy in that depth, where a step's force does as much work as contact stores.
 double impact_stiffness(const ContactProblem& problem, const ContactPair& pair) {
   if (problem.fixed(pair)) return 0.0;
@@ -108,22 +108,20 @@ double impact_stiffness(const ContactProblem& problem, const ContactPair& pair) 
   const auto end_node = [&](int edge, int end) { return (end == 0 ? model.edge_tail : model.edge_head)[at(edge)]; };
   const VectorX& velocities = problem.start->v;
   const bool obstacle = pair.key.b < 0;
-  const Vec3d moved = problem.velocity_of(pair);
-  double square = 0.0;
+  const Vec3d moved = problem.velocity_of(pair), normal = normal_at_start(problem, pair);
+  double fastest = 0.0;
   for (int k = 0; k < (pair.curve() ? pair.piece.weights->nodes : 2); ++k) {
     const int node_a = pair.curve() ? pair.piece.node[k] : end_node(pair.key.a, k);
-    const Vec3d v = local_position(model, velocities, node_a) - moved;
+    const double v = dot(normal, local_position(model, velocities, node_a) - moved);
     if (obstacle) {
-      square = std::max(square, dot(v, v));
+      fastest = std::max(fastest, -v);
       continue;
     }
-    for (int l = 0; l < 2; ++l) {
-      const Vec3d relative = v - local_position(model, velocities, end_node(pair.key.b, l));
-      square = std::max(square, dot(relative, relative));
-    }
+    for (int l = 0; l < 2; ++l)
+      fastest = std::max(fastest, dot(normal, local_position(model, velocities, end_node(pair.key.b, l))) - v);
   }
   const double depth = kDepth * pair.small_radius(), half = 0.5 * problem.mass_of(pair) / depth;
-  const double stops = half * std::min(std::sqrt(square) / problem.duration, square / depth);
+  const double stops = half * fastest * std::min(1.0 / problem.duration, fastest / depth);
   if (problem.pressing < Pressing::mean) return stops;
   const double speed = approach_speed(problem, pair);
   return std::max(stops, half * speed * speed / depth);

@@ -9,6 +9,7 @@
 #include "integrators/inner_solve.hpp"
 #include "integrators/newton_system.hpp"
 #include "integrators/step_parts.hpp"
+#include "steps/elastic_forces.hpp"
 #include "steps/inertia.hpp"
 
 namespace withe {
@@ -16,16 +17,6 @@ namespace {
 
 // Over a step, the time since the middle of the one before where that was much longer.
 constexpr double kMuchLonger = 2.0;
-
-/// By how much the energy in stretching an edge of stiffness 1 N grows beyond the work of the axial force of a step
-/// [J], that in its middle or at its end. An edge under pressure that turns gains by the latter: it gives way by l0 (1
-/// - cos).
-double stretch_gain(double before, double after, double across, double rest, bool at_end) {
-  const double l0 = std::sqrt(before), l1 = std::sqrt(after);
-  if (at_end) return (l0 * l1 - across) / l1 - 0.5 * (before + after - 2.0 * across) / rest;
-  const double middle = 0.5 * std::sqrt(std::max(before + after + 2.0 * across, 0.0));
-  return middle > 0.0 ? 0.5 * (l1 - l0) * (l1 + l0 - 2.0 * middle) / middle : 0.0;
-}
 
 /// How far a force that acts over a step moves things [m]: filtered by (M / h^2 + K)^-1, so that modes which the step
 /// does not resolve, and which it therefore leaves bounded, count for as little as they move [Hosea and Shampine 1996].
@@ -144,31 +135,6 @@ void extrapolate_velocity(const State& state, double time, VectorX& v) {
         ((time - past.time[0]) / (past.time[0] - past.time[1])) * (past.velocity[0] - past.velocity[1]);
 }
 
-Turning turning(const Model& model, const State& state, const VectorX& q, const ElasticCoefficients* elastic,
-                bool at_end) {
-  double smallest = 1.0, gain = 0.0;
-  for (int e = 0; e < model.edge_count; ++e) {
-    const int a = model.tail_dof[at(e)], b = model.head_dof[at(e)];
-    double across = 0.0, before = 0.0, after = 0.0;
-    for (int i = 0; i < model.dimension; ++i) {
-      const double d0 = state.q(b + i) - state.q(a + i), d1 = q(b + i) - q(a + i);
-      across += d0 * d1;
-      before += d0 * d0;
-      after += d1 * d1;
-    }
-    const double square = across * std::abs(across) / (before * after);  // of the cosine, with its sign
-    if (!std::isfinite(square)) return {INFINITY, INFINITY};
-    smallest = std::min(smallest, square);
-    if (elastic) {
-      // With a natural strain n: an edge of rest length (1 + n) L and stiffness (1 + n) EA.
-      const double natural = 1.0 + elastic->stretch_natural(e);
-      gain += natural * elastic->stretch_stiffness(e) *
-              stretch_gain(before, after, across, natural * model.edge_length(e), at_end);
-    }
-  }
-  return {std::acos(std::copysign(std::sqrt(std::min(std::abs(smallest), 1.0)), smallest)), gain};
-}
-
 void add_work(const Equations& equations, const Parameters& parameters, const VectorX& change, StepWorkspace& work,
               StepResult& result) {
   const StepData& data = work.newton.data;
@@ -211,14 +177,12 @@ namespace {
 /// Whether the step to q1 may stay: no edge turns by much, and contact found what it met.
 bool acceptable(Equations& equations, const StepPlan& plan, const State& state, const VectorX& q1, StepWorkspace& work,
                 StepResult& result) {
-  const ElasticCoefficients* watched = plan.rule == StepRule::energy_momentum ? nullptr : &equations.elastic();
-  const Turning turned = turning(equations.model(), state, q1, watched, plan.rule == StepRule::backward_euler);
-  result.largest_turn = turned.largest;
+  if (plan.watched) equations.find_gains(q1, work.newton.data, work.gains);
+  result.largest_turn = plan.watched ? work.gains.turn.maxCoeff() : largest_turn(equations.model(), state.q, q1);
   if (!q1.allFinite() || !(result.largest_turn <= 1.5)) return false;
   // Inertia takes the tangent of half a turn, and is the same for another turn more; friction and twist are not.
   if (plan.rule == StepRule::energy_momentum && farthest_turn(equations.model(), state.q, q1) >= std::numbers::pi)
     return false;
-  result.stretch_gain = turned.stretch_gain + (watched ? equations.gained(q1) : 0.0);
   Contact* contact = equations.contact();
   if (!contact) return true;
   // Iterates pass through nothing, but they may find a way around what a rod would have met.
@@ -241,6 +205,23 @@ void find_end_velocity(const Equations& equations, const StepPlan& plan, const S
   if (plan.rule == StepRule::energy_momentum)
     set_turning_velocities(equations.model(), state.v, work.change, plan.dt, v1);
   equations.assembler().set_held_part(work.held_velocity, v1);
+}
+
+/// Adds what kinetic energies grow by beyond the work of inertia: of what is free, as what is held goes as it is told.
+void add_kinetic_gains(const Equations& equations, const State& state, StepWorkspace& work) {
+  ComponentGains& gains = work.gains;
+  if (!gains.any_whole()) return;
+  const Model& model = equations.model();
+  VectorX &grown = work.difference, &mean = work.assumed, &way = work.working;
+  way = work.velocity - state.v;
+  multiply(model, equations.mass(), way, grown);
+  mean = 0.5 * (state.v + work.velocity);
+  way = work.change;
+  equations.assembler().project(mean);
+  equations.assembler().project(way);
+  for (int i = 0; i < model.dof_count; ++i)
+    if (const int own = model.dof_component[at(i)]; gains.whole[at(own)])
+      gains.energy[own] += mean[i] * grown[i] - work.newton.data.inertia[i] * way[i];
 }
 
 /// What acted, and what was lost; full residuals become minus the reactions. Returns what friction and restitution
@@ -312,6 +293,7 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
   const double rate = 1.0 / dt;
   work.mean = rate * work.change;
   find_end_velocity(equations, plan, state, work);
+  if (plan.watched) add_kinetic_gains(equations, state, work);
   const double contact_loss = account(equations, parameters, plan, state, q1, work, result);
   VectorX& acceleration = work.mean;
   acceleration = rate * (work.velocity - state.v);

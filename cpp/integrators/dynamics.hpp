@@ -19,6 +19,7 @@ struct StepPlan {
   StepRule rule = StepRule::midpoint;
   double dt = 0;  ///< [s]
   int slot = 0;
+  bool watched = false;  ///< whether `StepWorkspace::gains` are wanted; not of energy-momentum steps
 };
 
 struct StepResult {
@@ -27,7 +28,6 @@ struct StepResult {
   Squeezed squeezed;      ///< what is pressed by what does not yield
   NewtonResult newton;
   double largest_turn = 0;   ///< of an edge [rad]
-  double stretch_gain = 0;   ///< energy that midpoint brings into stretching from nowhere [J]
   double error = 0;          ///< estimated local error [m]
   double load_work = 0;      ///< of loads and custom forces [J]
   double dissipated = 0;     ///< by drag, viscosity and contact [J]
@@ -41,6 +41,7 @@ struct StepWorkspace {
   HeldTarget held;
   VectorX z, move, change, working, mean, velocity, held_velocity, held_acceleration, assumed, difference,
       whole_acceleration;
+  ComponentGains gains;
   Configuration after;
   State from, next;  ///< explicit steps
 };

@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "integrators/step_parts.hpp"
+#include "steps/elastic_forces.hpp"
 
 namespace withe {
 namespace {
@@ -47,7 +48,7 @@ double free_acceleration(Equations& equations, const Parameters& parameters, con
 double resisted_acceleration(Equations& equations, const Parameters& parameters, double dt, const State& state,
                              StepWorkspace& work) {
   const Model& model = equations.model();
-  const double turn = turning(model, state, work.z).largest;
+  const double turn = largest_turn(model, state.q, work.z);
   if (!(turn <= 1.5)) return turn;
   State& next = work.next;
   next = state;
@@ -90,7 +91,7 @@ double advance(const Model& model, const State& state, const VectorX& q, Configu
   if (!model.planar()) return std::acos(std::min(advance_configuration(model, state, q, configuration, next), 1.0));
   compute_configuration(model, state, q, configuration);
   next.q = q;
-  return turning(model, state, q).largest;
+  return largest_turn(model, state.q, q);
 }
 
 void find_acceleration(Equations& equations, const Parameters& parameters, double dt, State& state,

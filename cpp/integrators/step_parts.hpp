@@ -5,14 +5,6 @@
 
 namespace withe {
 
-/// Largest angle by which an edge turns on the way from a state to q [rad], > pi/2 where it ends pointing back; and
-/// what all edges gain in stretching, where their stiffness is given.
-struct Turning {
-  double largest = 0.0, stretch_gain = 0.0;
-};
-Turning turning(const Model& model, const State& state, const VectorX& q, const ElasticCoefficients* elastic = nullptr,
-                bool at_end = false);
-
 /// Work of loads, and what all but contact takes from the motion, over the step, with the forces that acted in it.
 void add_work(const Equations& equations, const Parameters& parameters, const VectorX& change, StepWorkspace& work,
               StepResult& result);

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <map>
+#include <numeric>
 #include <set>
 #include <utility>
 
@@ -42,6 +43,7 @@ class Builder {
     share_bending();
     lay_out_unknowns(model_);
     add_constraints(model_);
+    find_components();
     draw();
   }
 
@@ -353,6 +355,37 @@ class Builder {
       model_.half_share(h) -= kCarried;
       model_.bend_share(bend, side) += kCarried;
     }
+  }
+
+  void find_components() {
+    std::vector<int> parent(static_cast<std::size_t>(model_.node_count));
+    std::iota(parent.begin(), parent.end(), 0);
+    const auto root = [&](int node) {
+      while (parent[static_cast<std::size_t>(node)] != node) node = parent[static_cast<std::size_t>(node)];
+      return node;
+    };
+    const auto connect = [&](int a, int b) { parent[static_cast<std::size_t>(root(a))] = root(b); };
+    for (std::size_t e = 0; e < model_.edge_tail.size(); ++e) connect(model_.edge_tail[e], model_.edge_head[e]);
+    for (const SpringDescription& spring : scene_.springs) connect(spring.nodes[0], spring.nodes[1]);
+    for (const Cluster& cluster : clusters_)
+      for (const RodPass& pass : cluster.passes) connect(global_node(cluster.passes.front()), global_node(pass));
+    std::vector<int> number(parent.size(), -1);
+    const auto component_of = [&](int node) {
+      int& found = number[static_cast<std::size_t>(root(node))];
+      if (found < 0) found = model_.component_count++;
+      return found;
+    };
+    std::vector<int>& out = model_.dof_component;
+    out.assign(static_cast<std::size_t>(model_.dof_count), 0);
+    const auto set = [&](int dof, int size, int node) {
+      std::fill_n(out.begin() + dof, size, component_of(node));
+    };
+    for (int i = 0; i < model_.node_count; ++i) set(model_.node_dof[static_cast<std::size_t>(i)], model_.dimension, i);
+    for (std::size_t e = 0; e < model_.edge_dof.size(); ++e) set(model_.edge_dof[e], 1, model_.edge_tail[e]);
+    for (std::size_t f = 0; f < model_.frame_dof.size(); ++f)
+      set(model_.frame_dof[f], model_.frame_size(), model_.frame_node[f]);
+    for (const Hinge& hinge : model_.hinges)
+      if (hinge.dof >= 0) set(hinge.dof, 1, model_.frame_node[static_cast<std::size_t>(hinge.frame)]);
   }
 
   /// Unknowns, strains and offsets of the drawn state.

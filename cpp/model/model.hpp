@@ -197,6 +197,8 @@ struct Model {
   std::vector<int> frame_node;
   std::vector<int> node_dof, edge_dof, frame_dof;  ///< first unknown of each; edge_dof is empty in a plane
   std::vector<int> tail_dof, head_dof;             ///< per edge: first unknown of its nodes
+  int component_count = 0;         ///< connected components: what joints and springs hold together
+  std::vector<int> dof_component;  ///< per unknown
   std::vector<Constraint> constraints;
   std::vector<Support> supports;
 
@@ -208,6 +210,10 @@ struct Model {
 
   bool planar() const { return plane.has_value(); }
   int frame_size() const { return planar() ? 1 : 3; }
+  int component_of_node(int node) const {
+    return dof_component[static_cast<std::size_t>(node_dof[static_cast<std::size_t>(node)])];
+  }
+  int component_of_edge(int edge) const { return component_of_node(edge_tail[static_cast<std::size_t>(edge)]); }
 };
 
 /// Resolves joints and supports, lays out the unknowns, finds the plane. Throws std::invalid_argument.

@@ -23,8 +23,12 @@ class ElasticForces final : public Term {
                     const VectorX& v) const override;
   /// An axial strain rounds along its edge only.
   void add_rounding(const StepProblem& problem, StepData& data) const override;
+  void add_gains(const StepProblem& problem, StepData& data, const Assembler& assembler, const VectorX& end,
+                 ComponentGains& gains) const override;
 
  private:
+  void add_bend_gains(const StepProblem& problem, StepData& data, const Assembler& assembler, const VectorX& end,
+                      ComponentGains& gains) const;
   void set_axial_forces(const StepProblem& problem, const ElasticCoefficients& k, StepData& data) const;
   void set_mean_axial_forces(const StepProblem& problem, StepData& data) const;
   void add_elastic(const StepProblem& problem, const ElasticCoefficients& k, StepData& data, const Assembler& assembler,
@@ -52,6 +56,9 @@ void for_each_single_bend(const Model& model, const Assembler& assembler, const 
   else
     for (int b : assembler.regular.other_bend) visit(b);
 }
+
+/// Largest angle by which an edge turns on the way from q0 to q1 [rad], > pi/2 where it ends pointing back.
+double largest_turn(const Model& model, const VectorX& q0, const VectorX& q1);
 
 /// What acts in an evaluation: elasticity, with viscosity where the rule takes both as one.
 const ElasticCoefficients& acting_coefficients(const StepProblem& problem, const StepData& data);

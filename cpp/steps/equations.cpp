@@ -155,10 +155,9 @@ bool Equations::dissipates(const Parameters& parameters) const {
                      [&](const std::unique_ptr<Term>& term) { return term->dissipates(parameters); });
 }
 
-double Equations::gained(const VectorX& end) const {
-  double energy = 0.0;
-  for (const std::unique_ptr<Term>& term : terms_.all) energy += term->gained(problem_, end);
-  return energy;
+void Equations::find_gains(const VectorX& end, StepData& data, ComponentGains& gains) const {
+  gains.energy.setZero(model().component_count);
+  for (const std::unique_ptr<Term>& term : terms_.all) term->add_gains(problem_, data, assembler_, end, gains);
 }
 
 std::vector<std::string> Equations::notes() const {

@@ -121,8 +121,8 @@ void SpringForces::add_rounding(const StepProblem& problem, StepData& data) cons
   }
 }
 
-double SpringForces::gained(const StepProblem& problem, const VectorX& end) const {
-  double energy = 0.0;
+void SpringForces::add_gains(const StepProblem& problem, StepData& /*data*/, const Assembler& /*assembler*/,
+                             const VectorX& end, ComponentGains& gains) const {
   for (int s = 0; s < table_.count(); ++s) {
     Spring spring = spring_of(*problem.parameters, s);
     spring.damping = 0.0;
@@ -130,10 +130,10 @@ double SpringForces::gained(const StepProblem& problem, const VectorX& end) cons
     const Vec3d d1 = between(problem.model, end, s), change = d1 - start.d;
     const Vec3d d = problem.in_middle() ? 0.5 * (start.d + d1) : d1;
     const double l0 = length_of(start.d), l1 = length_of(d1);
-    energy += spring.stiffness * (l1 - l0) * (0.5 * (l0 + l1) - spring.rest_length) -
-              dot(pull(spring_force(spring, start, d)), change);
+    const double grown = spring.stiffness * (l1 - l0) * (0.5 * (l0 + l1) - spring.rest_length);
+    gains.energy[problem.model.component_of_node(problem.model.description.springs[at(s)].nodes[0])] +=
+        grown - dot(pull(spring_force(spring, start, d)), change);
   }
-  return energy;
 }
 
 double SpringForces::dissipated(const StepProblem& problem, const StepData& data, const Assembler&,
@@ -151,8 +151,13 @@ double SpringForces::dissipated(const StepProblem& problem, const StepData& data
 double spring_energy(const Model& model, const VectorX& stiffness, const VectorX& rest_length, const VectorX& q) {
   double energy = 0.0;
   for (int s = 0; s < static_cast<int>(stiffness.size()); ++s)
-    energy += spring_energy(Spring{stiffness[s], rest_length[s], 0.0}, length_of(between(model, q, s)));
+    energy += spring_energy(model, stiffness, rest_length, q, s);
   return energy;
+}
+
+double spring_energy(const Model& model, const VectorX& stiffness, const VectorX& rest_length, const VectorX& q,
+                     int spring) {
+  return spring_energy(Spring{stiffness[spring], rest_length[spring], 0.0}, length_of(between(model, q, spring)));
 }
 
 double spring_tension(const Model& model, const Parameters& parameters, const VectorX& q, const VectorX& v,

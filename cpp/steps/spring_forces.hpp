@@ -18,7 +18,8 @@ class SpringForces final : public Term {
   void add_adjoint(const StepProblem& problem, const StepData& data, const Assembler& assembler,
                    StepAdjoint& adjoint) const override;
   void add_rounding(const StepProblem& problem, StepData& data) const override;
-  double gained(const StepProblem& problem, const VectorX& end) const override;
+  void add_gains(const StepProblem& problem, StepData& data, const Assembler& assembler, const VectorX& end,
+                 ComponentGains& gains) const override;
   double dissipated(const StepProblem& problem, const StepData& data, const Assembler& assembler,
                     const VectorX& change) const override;
 
@@ -28,6 +29,9 @@ class SpringForces final : public Term {
 
 /// Of all springs at a configuration [J].
 double spring_energy(const Model& model, const VectorX& stiffness, const VectorX& rest_length, const VectorX& q);
+/// Of one.
+double spring_energy(const Model& model, const VectorX& stiffness, const VectorX& rest_length, const VectorX& q,
+                     int spring);
 /// n of one spring, with velocities v [N].
 double spring_tension(const Model& model, const Parameters& parameters, const VectorX& q, const VectorX& v, int spring);
 

@@ -273,6 +273,7 @@ void CableOutline::describe_rows(const std::vector<double>& places, const std::v
   const std::size_t count = places.size();
   cable.widths.resize(count);
   cable.hidden.assign(count, 0);
+  const std::size_t own = stretches.size();
   std::size_t next = 0;
   for (std::size_t r = 0; r < count; ++r) {
     const double s = places[r];
@@ -295,6 +296,13 @@ void CableOutline::describe_rows(const std::vector<double>& places, const std::v
       stretches.push_back({gap, number, row, row});
     }
   }
+  // Of a ring a stretch across its first row is one, and goes on beyond its last.
+  if (!cable.closed || stretches.size() < own + 2) return;
+  const HiddenStretch first = stretches[own];
+  HiddenStretch& last = stretches.back();
+  if (first.first != 0 || last.last != static_cast<int>(count) - 1 || first.zone != last.zone) return;
+  last.last += first.last + 1;
+  stretches.erase(stretches.begin() + static_cast<std::ptrdiff_t>(own));
 }
 
 Cable CableOutline::fit(const BitImage& mask, const TraceOptions& options, int number,

@@ -14,7 +14,7 @@ struct HiddenStretch {
   int zone = -1;
   int cable = -1;
   int first = 0;
-  int last = 0;
+  int last = 0;  ///< of a ring beyond its last row, where it goes on over its first
 };
 
 /// What a cable is fitted to: points in order, with their half widths; a gap before a point is marked by its zone.

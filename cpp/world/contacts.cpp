@@ -40,7 +40,7 @@ ContactTable World::contacts() const {
   return table;
 }
 
-/// Refuses a drawing in which surfaces are inside each other.
+/// Refuses a drawing in which surfaces are inside each other; bodies that a step has pressed together are.
 void World::Implementation::check_overlap() const {
   const Contact* contact = equations->contact();
   if (contact == nullptr) return;
@@ -48,7 +48,12 @@ void World::Implementation::check_overlap() const {
   const std::vector<ContactReport> reports = contact->report(state, parameters);
   const bool bars = description.contact.law == ContactLaw::barrier;  // which is infinite where surfaces touch
   double depth = bars ? 0.0 : kDeepest;
+  const auto bodies = [&](const ContactKey& key) {
+    return std::pair(model.edge_rod[at(key.a)], key.b < 0 ? key.b : model.edge_rod[at(key.b)]);
+  };
   for (const ContactReport& r : reports) {
+    const auto goes_on = [&](const ContactRecord& record) { return bodies(record.key) == bodies(r.key); };
+    if (std::any_of(state.contacts.begin(), state.contacts.end(), goes_on)) continue;
     const double radius = r.key.b < 0
                               ? contact->surfaces().radius(r.key.a)
                               : std::min(contact->surfaces().radius(r.key.a), contact->surfaces().radius(r.key.b));

@@ -15,6 +15,9 @@ namespace {
 /// Share of the greatest energy that steps may gain from nowhere in all: where midpoint steps gain more,
 /// energy-momentum ones are as accurate or more so, and without any limit the former fail (see integrators/README.md).
 constexpr double kMostGain = 1e-3;
+// By which the greatest energy fades in a step that does not reach it; and what rounding leaves of the balance of a
+// component that travels, over the energy of that, with room.
+constexpr double kFading = 1.0 - 1.0 / 1024.0, kRounding = 1e-7;
 
 /// Of a part of each node's mass, part(node).
 template <class Part>
@@ -103,7 +106,7 @@ void World::Implementation::account_for_settings() {
 
 double World::Implementation::work_of_settings() const {
   if (!newly_set) return 0.0;
-  auto& [c, now, touching] = energy_scratch;
+  auto& [c, now, touching, components] = energy_scratch;
   compute_configuration(model, state, state.q, c);
   now.set(model, parameters);
   const Energy a = mechanical_energy(model, before_settings, c, state), b = mechanical_energy(model, now, c, state);
@@ -113,7 +116,7 @@ double World::Implementation::work_of_settings() const {
 
 /// Of stretching, bending and twisting, as it is [J].
 double World::Implementation::elastic_energy() const {
-  auto& [c, now, touching] = energy_scratch;
+  auto& [c, now, touching, components] = energy_scratch;
   compute_configuration(model, state, state.q, c);
   now.set(model, parameters);
   const BendTwistEnergy turned = bend_twist_energy(model, now.elastic, c);
@@ -126,7 +129,7 @@ Energy World::Implementation::energy() const {
 
 /// Energy of a state, with the work and the losses up to it.
 Energy World::Implementation::energy_of(const State& at, double loads, double work_done, double lost) const {
-  auto& [c, coefficients, touching] = energy_scratch;
+  auto& [c, coefficients, touching, components] = energy_scratch;
   compute_configuration(model, at, at.q, c);
   coefficients.set(model, parameters);
   Energy e = mechanical_energy(model, coefficients, c, at);
@@ -140,7 +143,7 @@ Energy World::Implementation::energy_of(const State& at, double loads, double wo
 
 /// A node's part goes to the rods that meet there, by the masses of their half edges: what is added to it too.
 Energy World::Implementation::rod_energy(int rod) const {
-  auto& [c, coefficients, touching] = energy_scratch;
+  auto& [c, coefficients, touching, components] = energy_scratch;
   compute_configuration(model, state, state.q, c);
   coefficients.set(model, parameters);
   const ElasticCoefficients& k = coefficients.elastic;
@@ -190,35 +193,79 @@ Energy World::Implementation::rod_energy(int rod) const {
 }
 
 /// Plain midpoint pumps energy into stretching when edges turn far within a step, and backward Euler gains where it
-/// should lose, from edges under pressure that give way: whether the step just taken, that started from `kept`, did.
+/// should lose, from edges under pressure that give way: whether the step just taken did so by too much in a component.
 bool World::Implementation::gains_energy() {
-  // Where edges hardly turn, bending gains nothing, and stretching what the step has found. Backward Euler forgets what
-  // it gains, so only much counts.
   const bool euler = options.integrator == Integrator::backward_euler;
-  const bool still = euler ? guard.turn <= 0.3 && guard.stretch_gain <= 1e-3 * guard.scale
-                           : guard.turn <= 0.01 && std::abs(guard.stretch_gain) <= 1e-6 * guard.scale;
-  if (still) {
-    guard.energy.reset();
-    return false;
+  ComponentEnergies& now = energy_scratch.components;
+  bool measured = false;
+  for (int i = 0; i < model.component_count; ++i) {
+    if (!guard.whole[at(i)]) continue;
+    if (!measured) find_component_energies(state, now);
+    measured = true;
+    // What came from nowhere is no measure of what there is.
+    const double gain = guard.gain[i], put_in = now.kinetic[i] + now.elastic[i] - std::max(gain, 0.0);
+    const double greatest = std::min(std::max(now.kinetic[i], 0.1 * now.elastic[i]), put_in);
+    guard.scale[i] = std::max({kFading * guard.scale[i], greatest, kRounding * now.travelling[i]});
+    const double most = kMostGain * guard.scale[i];
+    if (gain > 1e-6 * guard.scale[i] && guard.excess[i] + gain > most) return true;
+    // What was lost is no stock to gain from, but for a little, by which the midpoint rule's energy goes to and fro.
+    guard.excess[i] = std::max(guard.excess[i] + gain, euler ? 0.0 : -0.5 * most);
   }
-  const Energy then =
-      guard.energy ? *guard.energy
-                   : energy_of(kept.state, kept.load_work, kept.support_work + kept.actuation_work, kept.dissipated);
-  const Energy now = energy();
-  const double gain = (now.total - now.work + now.dissipated) - (then.total - then.work + then.dissipated);
-  // What came from nowhere is no measure of what there is.
-  const double put_in = now.kinetic + now.elastic() - std::max(gain, 0.0);
-  const double scale = std::max(
-      {guard.scale, then.kinetic, 0.1 * then.elastic(), std::min(std::max(now.kinetic, 0.1 * now.elastic()), put_in)});
-  guard.energy = then;
-  const double most = kMostGain * scale;
-  if (gain > 1e-6 * scale && guard.excess + gain > most) return true;
-  guard.energy = now;
-  guard.scale = scale;
-  guard.excess += gain;
-  // What was lost is no stock to gain from, but for a little, by which the midpoint rule's energy goes to and fro.
-  guard.excess = std::max(guard.excess, euler ? 0.0 : -0.5 * most);
   return false;
+}
+
+void World::Implementation::find_component_energies(const State& then, ComponentEnergies& out) const {
+  auto& [c, k, touching, components] = energy_scratch;
+  compute_configuration(model, then, then.q, c);
+  k.set(model, parameters);
+  const MassMatrix& mass = k.mass;
+  const VectorX& v = then.v;
+  for (VectorX* x : {&out.kinetic, &out.elastic, &out.travelling, &out.mass}) x->setZero(model.component_count);
+  out.momentum.setZero(model.component_count, 3);
+  for (int i = 0; i < model.dof_count; ++i) out.kinetic[model.dof_component[at(i)]] += 0.5 * mass.rows[i] * v[i] * v[i];
+  for (int i = 0; i < model.node_count; ++i) {
+    const int dof = model.node_dof[at(i)], own = model.component_of_node(i);
+    out.mass[own] += mass.rows[dof];
+    for (int d = 0; d < model.dimension; ++d) out.momentum(own, d) += mass.rows[dof + d] * v[dof + d];
+  }
+  for (int e = 0; e < model.edge_count; ++e) {
+    const int a = model.tail_dof[at(e)], b = model.head_dof[at(e)], n = model.dimension, own = model.component_of_edge(e);
+    out.kinetic[own] -= 0.5 * mass.coupling[e] * (v.segment(b, n) - v.segment(a, n)).squaredNorm();
+    out.elastic[own] += stretch_energy_of(model, k.elastic, c, e);
+  }
+  const auto add = [&](int edge, const BendTwistEnergy& turned) {
+    out.elastic[model.component_of_edge(edge)] += turned.bend + turned.twist;
+  };
+  for (std::size_t b = 0; b < model.bend.size(); ++b)
+    add(model.bend[b].edge[0], bend_energy_of(k.elastic, c, static_cast<int>(b)));
+  for (std::size_t h = 0; h < model.half.size(); ++h)
+    add(model.half[h].edge, half_energy_of(k.elastic, c, static_cast<int>(h)));
+  for (std::size_t s = 0; s < model.description.springs.size(); ++s)
+    out.elastic[model.component_of_node(model.description.springs[s].nodes[0])] +=
+        spring_energy(model, k.spring_stiffness, k.spring_rest_length, then.q, static_cast<int>(s));
+  for (int i = 0; i < model.component_count; ++i) {
+    if (out.mass[i] > 0.0) out.travelling[i] = 0.5 * out.momentum.row(i).squaredNorm() / out.mass[i];
+    out.kinetic[i] -= out.travelling[i];
+  }
+}
+
+/// Kinetic and elastic energy of components that touch anything [J]: about their common centre of mass, but where they
+/// touch obstacles.
+double World::Implementation::touching_energy(const State& then) {
+  ComponentEnergies& energies = energy_scratch.components;
+  find_component_energies(then, energies);
+  double sum = 0.0, mass = 0.0, travelling = 0.0;
+  Vector3 momentum = Vector3::Zero();
+  const auto [which, obstacle] = equations_of_step().contact()->touching_components();
+  for (int i = 0; i < model.component_count; ++i) {
+    if (!which[at(i)]) continue;
+    sum += energies.kinetic[i] + energies.elastic[i];
+    travelling += energies.travelling[i];
+    mass += energies.mass[i];
+    momentum += energies.momentum.row(i).transpose();
+  }
+  if (!obstacle && mass > 0.0) travelling -= 0.5 * momentum.squaredNorm() / mass;
+  return sum + travelling;
 }
 
 /// Where surfaces slide over each other's edges by much within a step, the forces at its end may push more than those
@@ -226,7 +273,7 @@ bool World::Implementation::gains_energy() {
 /// than half of what is left of a share of the greatest energy; losses make room, and so does time, and a little of
 /// what friction and drag take.
 bool World::Implementation::contact_pumps(double dt) {
-  constexpr double kMost = 3e-3, kRoom = 2e-5;  // of the greatest energy; that a time step makes
+  constexpr double kMost = 3e-3, kRoom = 2e-5;  // of the greatest energy of what touches; that a time step makes
   constexpr double kShare = 0.01;               // of what is lost within a step
   auto& [scale, excess, put_in] = contact_guard;
   double gain = put_in;
@@ -238,7 +285,7 @@ bool World::Implementation::contact_pumps(double dt) {
     const Energy now = energy();
     const Energy then = energy_of(kept.state, kept.load_work, kept.support_work + kept.actuation_work, kept.dissipated);
     gain = put_in + (now.total - now.work + now.dissipated) - (then.total - then.work + then.dissipated);
-    for (const Energy& e : {now, then}) scale = std::max(scale, e.kinetic + e.elastic() + e.contact);
+    scale = std::max({scale, touching_energy(state) + now.contact, touching_energy(kept.state) + then.contact});
     if (too_much()) return true;
   }
   excess = std::max(excess + gain - room(), 0.0);

@@ -124,7 +124,8 @@ void World::displace_state(const VectorX& by) {
   fresh->recall(implementation_->lagged());
   fresh->take_callbacks(*implementation_);
   withe::displace_state(fresh->model, by, fresh->state);
-  fresh->meet_anew();
+  fresh->forget_contacts();
+  fresh->check_overlap();
   fresh->forget_motion();
   fresh->forget_matrix();
   implementation_ = std::move(fresh);

@@ -218,7 +218,6 @@ void World::set_ring_friction(int support, double friction) {
   else
     ring.slip = ring.origin - ring.fed - now.at;  // it is held from where it is now on
   self.actuation_work += self.hand_energy_of(support) - before;
-  self.guard.energy.reset();
   if (held != holds)
     self.rebuild(Rebuild::running);
   else
@@ -249,7 +248,6 @@ bool World::Implementation::release_left_rings() {
   if (left_rings.size() == before) return false;
   for (std::size_t k = before; k < left_rings.size(); ++k) model.supports[at(left_rings[k].support)].active = false;
   rebuild(Rebuild::running);
-  guard.energy.reset();
   return true;
 }
 

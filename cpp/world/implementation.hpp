@@ -21,11 +21,19 @@ struct EnergyCoefficients {
   void set(const Model& model, const Parameters& parameters);
 };
 
+/// Per connected component: kinetic energy about its own centre of mass, that of the latter's motion, elastic energy [J];
+/// mass [kg] and momentum [kg m/s].
+struct ComponentEnergies {
+  VectorX kinetic, travelling, elastic, mass;
+  MatrixX3 momentum;
+};
+
 /// Scratch for energies.
 struct EnergyScratch {
   Configuration configuration;
   EnergyCoefficients coefficients;
   ContactAtRest contact;
+  ComponentEnergies components;
 };
 
 /// Why a model is built: at first, because supports changed or the plane was left, or to take a snapshot's state.
@@ -57,6 +65,7 @@ struct World::Implementation : Running {
   GuessHistory marked_guesses;
   StepControl marked_control;
   Moving kept;                                              ///< at the start of a step that may be taken back
+  EnergyGuard guard_before;                                 ///< likewise
   std::vector<SupportMotion> motions_before, kept_motions;  ///< at the start of a time step, of a part of it
   Plan plan;
   bool plan_current = false;  ///< made when it is asked for
@@ -121,7 +130,8 @@ struct World::Implementation : Running {
   void set_rates(const std::vector<RodState>& rods);
   void relax_joints(const std::vector<bool>& is_told);
   void turn_frames(const std::vector<bool>& is_told);
-  void meet_anew();
+  std::vector<bool> moved_rods(const VectorX& before, const VectorX& now) const;
+  void meet_anew(const std::vector<bool>& moved);
   /// What came before no longer tells what comes next.
   void forget_motion();
 
@@ -288,7 +298,10 @@ struct World::Implementation : Running {
   /// What has been set since changed the energy of the present state by this [J].
   double work_of_settings() const;
   double elastic_energy() const;
+  bool watches_energy() const;
   bool gains_energy();
+  void find_component_energies(const State& then, ComponentEnergies& out) const;
+  double touching_energy(const State& then);
   bool contact_pumps(double dt);
   void begin_explicit();
   std::string longest_explicit_step();

@@ -69,14 +69,21 @@ struct NaturalRamp {
   Ramp<VectorX> twist, stretch;
 };
 
-/// Energy balance of the watch over plain midpoint's energy.
+/// Energy balance of the watch over the energy of plain midpoint and backward Euler steps, per connected component: what
+/// other parts of a scene do, and how all drift by, is no measure of what one may gain.
 struct EnergyGuard {
-  double turn = std::numeric_limits<double>::infinity();  ///< of the last step [rad]; before the first, not known
-  double scale = 0;                                       ///< [J]
-  double excess = 0;                                      ///< out of nowhere so far [J]
-  double stretch_gain = 0;                                ///< of the last step, into stretching [J]
-  int fallback_steps = 0;                                 ///< energy-momentum steps still to take in its place
-  std::optional<Energy> energy;                           ///< at the present state, where a step has just found it
+  double turn = 0;         ///< of an edge in the last step at most [rad]
+  VectorX gain;            ///< of the last step [J]
+  std::vector<char> whole; ///< whether all of it is known, see `ComponentGains`
+  VectorX scale;           ///< greatest energy [J]
+  VectorX excess;          ///< out of nowhere so far [J]
+  int fallback_steps = 0;  ///< energy-momentum steps still to take in its place
+
+  void resize(int components) {
+    whole.resize(static_cast<std::size_t>(components));
+    for (VectorX* v : {&gain, &scale, &excess})
+      if (v->size() != components) v->setZero(components);
+  }
 };
 
 /// Energy balance of the watch over what contact puts in where surfaces slide by much within a step.

@@ -168,7 +168,7 @@ void World::Implementation::place_rods(const std::vector<RodState>& rods) {
     for (Eigen::Index e = 0; e < rod.directors.rows(); ++e)
       is_told[at(model.rod_first_edge[at(rod.rod)] + static_cast<int>(e))] = true;
   if (std::find(is_told.begin(), is_told.end(), true) == is_told.end()) return;
-  const VectorX q = placed(rods);
+  const VectorX q = placed(rods), start = state.q;
   Configuration c;
   compute_configuration(model, state, state.q, c);
   const Configuration before = c;
@@ -195,16 +195,28 @@ void World::Implementation::place_rods(const std::vector<RodState>& rods) {
   require(c.bend_strain.allFinite() && c.half_strain.allFinite(), "positions fold an edge right back onto the next");
   accept_configuration(model, VectorX(state.q), c, state);
   pass_rings_anew(model, state);
-  meet_anew();
+  meet_anew(moved_rods(start, state.q));
   forget_motion();
   forget_matrix();
 }
 
-/// Contacts of a state that no step has led to.
-void World::Implementation::meet_anew() {
+/// Which rods have a node that is elsewhere.
+std::vector<bool> World::Implementation::moved_rods(const VectorX& before, const VectorX& now) const {
+  std::vector<bool> moved;
+  for (const RodDescription& rod : description.rods)
+    moved.push_back(std::any_of(rod.nodes.begin(), rod.nodes.end(), [&](int node) {
+      const int dof = model.node_dof[at(node)];
+      return before.segment(dof, model.dimension) != now.segment(dof, model.dimension);
+    }));
+  return moved;
+}
+
+/// Contacts of rods that are where no step has led them to; all others go on.
+void World::Implementation::meet_anew(const std::vector<bool>& moved) {
   Contact* contact = equations->contact();
   if (!contact) return;
-  state.contacts.clear();
+  const auto is_moved = [&](int edge) { return edge >= 0 && moved[at(model.edge_rod[at(edge)])]; };
+  std::erase_if(state.contacts, [&](const ContactRecord& r) { return is_moved(r.key.a) || is_moved(r.key.b); });
   forget_contacts();
   contact->initialise(state, parameters);
   check_overlap();
@@ -299,8 +311,6 @@ void World::Implementation::forget_motion() {
   predictor.clear();
   state.motion.known = 0;
   alarm.reset();
-  guard.turn = EnergyGuard{}.turn;
-  guard.energy.reset();
   reaction_current = false;
 }
 

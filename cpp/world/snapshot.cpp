@@ -150,6 +150,8 @@ std::uint64_t fingerprint(const SceneDescription& scene) {
     w(rod.rest_lengths);
     w(rod.arc_lengths);
     w(rod.directors);
+    w(rod.contact_radius);
+    w(rod.fluid_radius);
   }
   w(static_cast<std::int64_t>(scene.joints.size()));
   w(static_cast<std::int64_t>(drawn_loads(scene)));

@@ -176,16 +176,12 @@ bool World::Implementation::may_grow(double dt, double times) const {
 World::Implementation::Attempt World::Implementation::try_step(double dt) {
   const bool fourth = options.integrator == Integrator::fourth_order;
   const bool euler = options.integrator == Integrator::backward_euler;
-  const bool asks = options.adaptive && options.energy_guard;
-  const bool guarded =
-      asks && guard.fallback_steps == 0 && (options.integrator == Integrator::implicit_midpoint || fourth || euler);
+  const bool asks = options.adaptive && options.energy_guard, guarded = watches_energy();
   const bool watched = options.adaptive && equations->contact() && options.integrator != Integrator::verlet;
   const bool keeps = guarded || watched || options.tolerance || fourth;
   if (keeps) kept = *this;
   if (tape) taped = tape->count();
-  // Actuation changes what is stored without a motion, so the start is looked at while it is as it was.
-  if (guarded && !guard.energy && actuated()) guard.energy = energy();
-  const EnergyGuard guard_before = guard;
+  if (guarded) guard_before = guard;
   const double allowed = allowed_error(dt);
   work.newton.finest = 0.01 * allowed;  // so that what Newton leaves is no part of the error
   double error = 0.0;
@@ -214,7 +210,7 @@ World::Implementation::Attempt World::Implementation::try_step(double dt) {
   }
   if (gained || pumped) {
     take_back();
-    if (pumped) guard = guard_before;
+    if (guarded) guard = guard_before;
     if (euler || !guarded) return Attempt::gained_energy;
     // The same step again, and a while of them, without the flaw.
     guard.fallback_steps = 256;
@@ -270,11 +266,11 @@ double World::Implementation::force_time(double start, double dt) const {
 
 /// One step of the scheme; changes nothing where it does not converge.
 bool World::Implementation::scheme_step(double dt, double& error) {
-  const double turn = std::exchange(guard.turn, 0.0), gain = std::exchange(guard.stretch_gain, 0.0);
-  const bool done =
-      options.integrator == Integrator::fourth_order ? composed_step(dt, error) : inner_step(dt, 0, error);
-  if (!done) guard.turn = turn, guard.stretch_gain = gain;
-  return done;
+  guard.turn = 0.0;
+  guard.resize(model.component_count);
+  guard.gain.setZero();
+  guard.whole.assign(guard.whole.size(), 0);
+  return options.integrator == Integrator::fourth_order ? composed_step(dt, error) : inner_step(dt, 0, error);
 }
 
 /// Reactions are those in the middle of the part in the middle, which is the middle of the step.
@@ -361,7 +357,10 @@ bool World::Implementation::inner_step(double dt, int slot, double& error) {
   if (tape) record_step(rule_of_step(), dt, reacts);
   error = r.error;
   guard.turn = std::max(guard.turn, r.largest_turn);
-  guard.stretch_gain += r.stretch_gain;
+  if (watches_energy()) {
+    guard.gain += work.gains.energy;
+    for (std::size_t i = 0; i < guard.whole.size(); ++i) guard.whole[i] = static_cast<char>(guard.whole[i] || work.gains.whole[i]);
+  }
   load_work += r.load_work;
   dissipated += r.dissipated;
   support_work += r.support_work;
@@ -372,6 +371,13 @@ bool World::Implementation::inner_step(double dt, int slot, double& error) {
     actuation_work += actuation;
   }
   return true;
+}
+
+/// Whether what steps gain from nowhere is found.
+bool World::Implementation::watches_energy() const {
+  return options.adaptive && options.energy_guard && guard.fallback_steps == 0 &&
+         options.integrator != Integrator::energy_momentum && options.integrator != Integrator::verlet &&
+         options.integrator != Integrator::statics;
 }
 
 Equations& World::Implementation::equations_of_step() { return guard.fallback_steps > 0 ? fallback() : *equations; }
@@ -392,7 +398,11 @@ StepResult World::Implementation::step_by_rule(double dt, int slot) {
   Equations& system = equations_of_step();
   update_custom_force(system);
   if (options.integrator == Integrator::verlet) return verlet_step(system, parameters, dt, state, work);
-  return implicit_step(system, *newton, options, parameters, {rule_of_step(), dt, slot}, state, predictor, work);
+  const StepPlan plan{rule_of_step(), dt, slot, watches_energy()};
+  const bool euler = plan.rule == StepRule::backward_euler;
+  work.gains.small_turn = euler ? 0.3 : 0.01;
+  if (plan.watched) work.gains.small_gain = (euler ? 1e-3 : 1e-6) * guard.scale;
+  return implicit_step(system, *newton, options, parameters, plan, state, predictor, work);
 }
 
 /// The residual of a frame's unknowns is J(w)^T moment, w its turn where the forces act; of an energy-momentum step,

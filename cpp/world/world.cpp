@@ -81,7 +81,6 @@ void World::step(int count) {
   if (count < 0) throw std::invalid_argument("number of steps must not be negative, got " + std::to_string(count));
   Implementation& self = *implementation_;
   const Timer timer(self.statistics.total_time);
-  self.guard.energy.reset();
   const double dt = self.options.time_step;
   const auto on_grid = [&](std::int64_t steps) { return self.grid_origin + static_cast<double>(steps) * dt; };
   for (int i = 0; i < count; ++i) {
@@ -107,7 +106,6 @@ void World::advance_to(double time) {
   const double span = time - self.state.time;
   require(std::isfinite(time) && span >= 0.0, "time must not lie before the present, got ", time);
   if (span == 0.0) return;
-  self.guard.energy.reset();
   const Timer timer(self.statistics.total_time);
   const double steps = std::max(1.0, std::ceil(span / self.options.time_step - 1e-9));
   const double start = self.state.time;

@@ -263,7 +263,8 @@ class Placement:
         """Put a rod elsewhere, at once. What is not given stays as it is.
 
         Joints turn with the edges at them. The energy that this puts in does not count as work: the balance of
-        ``energy()`` begins anew. A state out of the plane of a planar simulation makes it three-dimensional, unless
+        ``energy()`` begins anew. What a rod whose nodes move touches is met anew, as in a drawing; other contacts go
+        on. A state out of the plane of a planar simulation makes it three-dimensional, unless
         it was built with planar=True.
 
         Parameters

@@ -25,7 +25,7 @@ __all__ = ["Snapshot", "adopt", "matched", "restore"]
 
 FloatArray = npt.NDArray[np.float64]
 
-_FILE_VERSION = 5
+_FILE_VERSION = 6
 
 
 class Snapshot:

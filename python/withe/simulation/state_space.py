@@ -113,7 +113,7 @@ class StateSpace:
         return np.array(self._session.world.state_difference(reference._session.world))
 
     def displace_state(self, by: npt.ArrayLike) -> None:
-        """Add a difference of states to the present one: the inverse of `state_difference`.
+        """Add a difference of states to the present one: the inverse of `state_difference`. Contacts go on.
 
         Parameters
         ----------
