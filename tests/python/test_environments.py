@@ -100,9 +100,9 @@ def test_an_action_bends_the_segments_by_as_much_as_it_says():
 
 
 def test_rewards_are_those_of_the_distance():
-    task = withe.learning.Follow()
-    env = withe.learning.Environment(task)
+    env = withe.learning.Environment(withe.learning.Follow())
     env.reset(seed=0)
+    task = env.task
     tip = env.simulation.positions("arm")[-1]
     for distance, bonus in ((0.3, 0.0), (0.11, 0.0), (0.09, 0.5), (0.06, 0.5), (0.04, 2.0)):
         task.target[0] = tip + distance * np.array([0.0, 1.0, 0.0])
@@ -110,10 +110,27 @@ def test_rewards_are_those_of_the_distance():
         np.testing.assert_allclose(found, bonus - distance**2, atol=1e-12)
 
 
+def test_one_task_in_several_environments_has_what_it_remembers_in_each():
+    task = withe.learning.Follow()
+    train, check = withe.learning.Environment(task), withe.learning.Environment(task)
+    seen, _ = train.reset(seed=1)
+    check.reset(seed=2)
+    after, *_ = train.step(np.zeros(10))
+    assert np.linalg.norm(after[-6:-3] - seen[-6:-3]) < 0.05 + 1e-6  # .5 m/s for .1 s
+    many = withe.learning.VectorEnvironment(task, 3, workers=1)
+    many.reset(seed=5)
+    train.step(np.zeros(10))
+    several = gymnasium.vector.SyncVectorEnv([lambda: withe.learning.Environment(task)] * 3)
+    several.reset(seed=5)
+    for _ in range(2):
+        np.testing.assert_array_equal(several.step(np.zeros((3, 10)))[0], many.step(np.zeros((3, 10)))[0])
+    assert vars(task) == vars(withe.learning.Follow())
+
+
 def test_the_pose_to_reach_is_rewarded_by_distance_and_orientation():
-    task = withe.learning.Reach()
-    env = withe.learning.Environment(task)
+    env = withe.learning.Environment(withe.learning.Reach())
     env.reset(seed=0)
+    task = env.task
     robots = env._episodes.robots
     task.target[0] = env.simulation.positions("arm")[-1]
     for yaw in (0.0, 0.3, 0.9, 1.5):
@@ -124,9 +141,9 @@ def test_the_pose_to_reach_is_rewarded_by_distance_and_orientation():
 
 
 def test_targets_keep_their_speed_and_stay_in_their_box():
-    task = withe.learning.Follow()
-    env = withe.learning.VectorEnvironment(task, 20, workers=1)
+    env = withe.learning.VectorEnvironment(withe.learning.Follow(), 20, workers=1)
     env.reset(seed=3)
+    task = env.task
     before, turns = task.target.copy(), 0
     for _ in range(200):
         way = task.way.copy()
@@ -155,9 +172,9 @@ def test_actions_drawn_at_random_bring_arms_to_no_speed_of_their_own(task, seed,
 
 
 def test_drawn_capsules_are_in_their_box_apart_and_new_in_each_episode():
-    task = withe.learning.Obstacles3D()
-    env = withe.learning.VectorEnvironment(task, 3, workers=1)
+    env = withe.learning.VectorEnvironment(withe.learning.Obstacles3D(), 3, workers=1)
     env.reset(seed=1)
+    task = env.task
     first = task.ends.copy()
     ends = first.reshape(3, 8, 2, 3)
     assert np.all((ends >= task.low) & (ends <= task.high))
@@ -311,6 +328,13 @@ def test_a_control_step_is_a_whole_number_of_time_steps():
     task = Touch()
     task.control_step = 0.05
     with pytest.raises(ValueError, match=r"control_step must be a whole number of time steps of 0.02 s, got 0.05 s"):
+        withe.learning.Environment(task)
+
+
+def test_a_task_that_cannot_be_copied_is_refused():
+    task = Touch()
+    task.numbers = (i for i in range(3))
+    with pytest.raises(ValueError, match=r"task must be one that copy.deepcopy can copy: Touch, cannot pickle"):
         withe.learning.Environment(task)
 
 

@@ -48,6 +48,7 @@ class _Environment:
     Parameters
     ----------
     task : Task
+        The environment works on a deep copy of its own.
     render_mode : {"rgb_array", "human"}, optional
         Pictures from `render`, shape (480, 640, 3), uint8; or a window.
 
@@ -81,7 +82,7 @@ class _Environment:
 
     @property
     def task(self) -> Task:
-        """What the robot does."""
+        """What the robot does: the environment's own copy of the task that it was given."""
         return self._episodes.task
 
     @property
@@ -144,6 +145,7 @@ class _VectorEnvironment:
     Parameters
     ----------
     task : Task
+        The environment works on a deep copy of its own.
     num_envs : int
     workers : int, optional
         Number of threads; by default one a processor.
@@ -201,7 +203,7 @@ class _VectorEnvironment:
 
     @property
     def task(self) -> Task:
-        """What the robots do."""
+        """What the robots do: the environment's own copy of the task that it was given."""
         return self._episodes.task
 
     @property

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,6 +42,7 @@ class Episodes:
     Parameters
     ----------
     task : Task
+        They work on a deep copy of it: what it remembers of each robot is theirs alone.
     count : int
         How many robots.
     workers : int, optional
@@ -50,8 +52,11 @@ class Episodes:
     def __init__(self, task: Task, count: int, workers: int | None) -> None:
         if not isinstance(task, Task):
             raise ValueError(f"task must be a withe.learning.Task, got {type(task).__name__}")
-        self.task = task
         number = validation.integer(count, "number of environments", 1, 1_000_000)
+        try:
+            self.task = task = copy.deepcopy(task)
+        except TypeError as error:
+            raise ValueError(f"task must be one that copy.deepcopy can copy: {type(task).__name__}, {error}") from error
         first = task.build(np.random.default_rng(0))
         self.robots = Batch([first, *(first.copy() for _ in range(number - 1))], workers)
         self.begun = np.zeros(number, bool)

@@ -23,6 +23,10 @@ class Task(ABC):
     A subclass says how the scene is built, what an action does, what is observed, and how good that is; arrays have a
     row for each robot. `Environment` makes one Gymnasium environment of it, `VectorEnvironment` many in one.
 
+    Each environment works on a deep copy of the task, its attribute `task`. So one task may be given to several, and
+    what a task remembers of its robots is read there: ``env.task``. A subclass that holds what cannot be copied, or
+    what environments are to share, defines ``__deepcopy__``.
+
     Attributes
     ----------
     action_size : int

@@ -36,6 +36,7 @@ def train_policy(
     Parameters
     ----------
     task : Task
+        The robots work on a deep copy of it, ``policy.get_env().get_attr("task")[0]``.
     steps : int
         Control steps of all robots together.
     environments : int
@@ -183,7 +184,9 @@ def _adapter() -> Any:
             return [getattr(self.robots, attr_name, None)] * len(list(self._get_indices(indices)))
 
         def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
-            raise AttributeError("robots on one batch share their attributes: set them on the task")
+            raise AttributeError(
+                "robots on one batch share their attributes: set them on their task, get_attr('task')[0]"
+            )
 
         def env_method(self, method_name: str, *arguments: Any, indices: Any = None, **options: Any) -> list[Any]:
             raise AttributeError("robots on one batch have no methods of their own: call those of the task")
