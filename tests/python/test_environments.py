@@ -191,6 +191,21 @@ def test_drawn_capsules_are_in_their_box_apart_and_new_in_each_episode():
     assert not np.array_equal(task.ends[2], first[2])
 
 
+def test_the_ball_to_wrap_is_where_it_is_seen_from_the_reset_on_and_elsewhere_in_each_episode():
+    alone = withe.learning.Environment(withe.learning.Wrap())
+    many = withe.learning.VectorEnvironment(withe.learning.Wrap(), 2, workers=1)
+    together, _ = many.reset(seed=3)
+    for lane in range(2):
+        seen, _ = alone.reset(seed=3 + lane)
+        np.testing.assert_array_equal(seen, together[lane])
+        for robot in (alone.simulation, many.robots[lane]):
+            np.testing.assert_array_equal(robot.obstacle_position("ball").astype(np.float32), seen[75:78])
+        place = alone.simulation.obstacle_position("ball")
+        alone.step(np.zeros(20))
+        np.testing.assert_array_equal(alone.simulation.obstacle_position("ball"), place)
+    assert np.abs(together[0, 75:77] - together[1, 75:77]).max() > 1e-3
+
+
 @pytest.mark.parametrize("autoreset", ["next_step", "same_step"])
 def test_robots_begin_again_by_themselves_as_gymnasium_has_it(autoreset):
     mode = gymnasium.vector.AutoresetMode[autoreset.upper()]

@@ -135,7 +135,7 @@ class Wrap(_Limbs):
     >>> env = gymnasium.make("withe/Wrap-v0")  # doctest: +SKIP
     """
 
-    action_size, control_step, steps = 20, 0.1, 60
+    action_size, control_step, steps, redraw = 20, 0.1, 60, True
     limbs = tuple(f"limb {i}" for i in range(5))
     parts = (slice(0, 10), slice(10, 19))
     ways = ((0, 0), (0, 1), (1, 0), (1, 1))
@@ -144,7 +144,7 @@ class Wrap(_Limbs):
     ball, depth, spread = 0.04, -0.2, 0.02  # radius of the ball, its height, how far aside it may be [m]
 
     def build(self, generator: np.random.Generator) -> Simulation:
-        """Hanging, the ball in the middle."""
+        """Hanging, the ball somewhere between the limbs."""
         scene = Scene()
         silicone = Material(youngs_modulus=3e5, poisson_ratio=0.5, density=1200.0, viscosity=3e3)
         turns = 2.0 * np.pi * np.arange(5) / 5
@@ -162,22 +162,21 @@ class Wrap(_Limbs):
             )
             scene.clamp(limb.start, hold="edge")
         scene.add_drag(0.5)
-        scene.add_sphere((0.0, 0.0, self.depth), self.ball, name="ball")
+        aside, turn = self.spread * np.sqrt(generator.random()), 2.0 * np.pi * generator.random()
+        scene.add_sphere((aside * np.cos(turn), aside * np.sin(turn), self.depth), self.ball, name="ball")
         scene.enable_contact()
         return scene.build(integrator="backward_euler", time_step=1e-2)
 
     def prepare(self, robots: Batch) -> None:
-        """Remembers where the balls are."""
+        """Balls are seen."""
         super().prepare(robots)
-        self.balls = np.tile((0.0, 0.0, self.depth), (len(robots), 1))
+        self.balls = np.zeros((len(robots), 3))
 
     def begin(self, robots: Batch, chosen: IntArray, generators: list[np.random.Generator]) -> None:
-        """The ball is put elsewhere, where no limb is."""
+        """Notes where the balls are."""
         super().begin(robots, chosen, generators)
-        for lane, generator in zip(chosen, generators, strict=True):
-            aside, turn = self.spread * np.sqrt(generator.random()), 2.0 * np.pi * generator.random()
-            self.balls[lane] = (aside * np.cos(turn), aside * np.sin(turn), self.depth)
-        robots.move("ball", self.balls[chosen], over=self.control_step, lanes=chosen)
+        for lane in chosen:
+            self.balls[lane] = robots[int(lane)].obstacle_position("ball")
 
     def act(self, robots: Batch, actions: FloatArray, chosen: IntArray) -> None:
         """Bend both halves of each limb."""
