@@ -339,6 +339,36 @@ def test_bad_input_says_what_was_expected(call, kind, message):
     assert message in str(error.value)
 
 
+WRONG = [
+    ("reward", lambda robots: np.zeros((len(robots), 1)), "must return shape (4,), got (4, 1)"),
+    ("reward", lambda robots: 1.0, "must return shape (4,), got ()"),
+    ("reward", lambda robots: np.array([0.0, 1.0, np.nan, 2.0]), "must be finite, got nan of robot 2"),
+    ("finished", lambda robots: np.array([True]), "must return shape (4,), got (1,)"),
+    ("observe", lambda robots: robots.positions("arm")[0, -1], "must return shape (4, ...), got (3,)"),
+    ("observe", lambda robots: robots.positions("arm")[:, -1] * np.inf, "must be finite, got"),
+    (
+        "observe",
+        lambda robots: np.zeros((4, 6 if robots.time[0] == 0.0 else 5)),
+        "must return shape (4, 6), got (4, 5)",
+    ),
+]
+
+
+@pytest.mark.filterwarnings("ignore:invalid value:RuntimeWarning")
+@pytest.mark.parametrize(("method", "found", "message"), WRONG)
+def test_what_a_task_returns_in_another_shape_or_not_finite_is_refused(method, found, message):
+    kind = type("Careless", (Touch,), {method: lambda self, robots: found(robots)})
+
+    def stepped():
+        many = withe.learning.VectorEnvironment(kind(), 4, workers=1)
+        many.reset(seed=0)
+        many.step(np.zeros((4, 2)))
+
+    with pytest.raises(ValueError, match=r"Careless") as error:
+        stepped()
+    assert str(error.value).startswith(f"Careless.{method} {message}")
+
+
 def test_a_control_step_is_a_whole_number_of_time_steps():
     task = Touch()
     task.control_step = 0.05

@@ -56,7 +56,8 @@ class _Environment:
     ------
     ValueError
         Not a task, one whose control step is no whole number of time steps, or an unknown render mode. From `step`, an
-        action of another shape, not finite, or outside of -1..1.
+        action of another shape, not finite, or outside of -1..1. From all, a task whose methods return other shapes
+        than they say, or observations or rewards that are not finite.
     ImportError
         Gymnasium is not installed.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -71,6 +72,7 @@ class Episodes:
         self.action_size = validation.integer(task.action_size, "action_size", 1, 1_000_000)
         self.steps = validation.integer(task.steps, "steps", 1, 2**31 - 1)
         task.prepare(self.robots)
+        self._seen: tuple[int, ...] | None = None  # shape of what is seen, once it is known
 
     def __len__(self) -> int:
         return len(self.robots)
@@ -87,22 +89,51 @@ class Episodes:
         self.task.begin(self.robots, chosen, generators)
 
     def observe(self) -> npt.NDArray[np.float32]:
-        """What is seen of every robot."""
-        return np.asarray(self.task.observe(self.robots), np.float32)
+        """What is seen of every robot.
+
+        Raises
+        ------
+        ValueError
+            The task returns another shape than (n, ...) or than at first, or what is not finite.
+        """
+        seen = np.asarray(self.task.observe(self.robots), np.float32)
+        if seen.shape[:1] != (len(self),):
+            raise ValueError(f"{self._name('observe')} must return shape ({len(self)}, ...), got {seen.shape}")
+        if self._seen is None:
+            self._seen = seen.shape
+        self._check(seen, "observe", self._seen)
+        return seen
 
     def act(self, actions: FloatArray, chosen: IntArray) -> Outcome:
-        """Do one action each; of robots that are not chosen nothing changes."""
+        """Do one action each; of robots that are not chosen nothing changes.
+
+        Raises
+        ------
+        ValueError
+            The task returns rewards or ends of another shape than (n,), or rewards that are not finite.
+        """
         if chosen.size > 0:  # a task need not know what none does
             self.task.act(self.robots, actions, chosen)
             self.robots.step(self._count, chosen)
             self._taken[chosen] += 1
         failed = self.robots.failed
-        return Outcome(
-            np.asarray(self.task.reward(self.robots), np.float64),
-            np.asarray(self.task.finished(self.robots), bool) & ~failed,
-            (self._taken >= self.steps) | failed,
-            failed,
-        )
+        reward = np.asarray(self.task.reward(self.robots), np.float64)
+        finished = np.asarray(self.task.finished(self.robots), bool)
+        self._check(reward, "reward", (len(self),))
+        self._check(finished, "finished", (len(self),))
+        return Outcome(reward, finished & ~failed, (self._taken >= self.steps) | failed, failed)
+
+    def _name(self, method: str) -> str:
+        return f"{type(self.task).__name__}.{method}"
+
+    def _check(self, found: npt.NDArray[Any], method: str, shape: tuple[int, ...]) -> None:
+        """Refuse what a method of the task returned, of another shape or not finite."""
+        if found.shape != shape:
+            raise ValueError(f"{self._name(method)} must return shape {shape}, got {found.shape}")
+        finite = np.isfinite(found)
+        if not finite.all():
+            robot = int(np.argwhere(~finite)[0, 0])
+            raise ValueError(f"{self._name(method)} must be finite, got {found[~finite][0]} of robot {robot}")
 
     def checked(self, actions: npt.ArrayLike, count: int) -> FloatArray:
         """Actions as numbers.

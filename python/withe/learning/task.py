@@ -84,11 +84,11 @@ class Task(ABC):
 
     @abstractmethod
     def observe(self, robots: Batch) -> npt.NDArray[np.floating[Any]]:
-        """What is seen of every robot, shape (n, ...)."""
+        """What is seen of every robot, shape (n, ...), finite."""
 
     @abstractmethod
     def reward(self, robots: Batch) -> FloatArray:
-        """How good the present state of every robot is, shape (n,)."""
+        """How good the present state of every robot is, shape (n,), finite."""
 
     def finished(self, robots: Batch) -> npt.NDArray[np.bool_]:
         """Whose episode has come to its end (terminated, not truncated), shape (n,); none by default."""
