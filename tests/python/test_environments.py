@@ -397,6 +397,23 @@ def test_a_policy_is_trained_the_same_for_equal_seeds():
     assert first.shape == (2,)
 
 
+def test_training_that_is_interrupted_returns_what_has_been_learned_and_says_so():
+    pytest.importorskip("stable_baselines3")
+    calls = []
+
+    def interrupt(policy):
+        calls.append(policy.num_timesteps)
+        if len(calls) == 5:
+            raise KeyboardInterrupt
+
+    with pytest.warns(UserWarning, match=r"training was interrupted: .* after 16 of 4000 control steps"):
+        policy = withe.learning.train_policy(
+            Touch(), 4000, environments=4, workers=1, progress=False, batch_size=8, callback=interrupt
+        )
+    assert calls == [0, 4, 8, 12, 16, 16]
+    assert policy.predict(np.zeros(6, np.float32), deterministic=True)[0].shape == (2,)
+
+
 def test_scales_of_observations_are_those_of_what_was_seen_and_kept_with_the_policy(tmp_path):
     baselines = pytest.importorskip("stable_baselines3")
     observed = []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from functools import cache
 from typing import Any
@@ -60,7 +61,8 @@ def train_policy(
     -------
     stable_baselines3.SAC
         ``action, _ = policy.predict(observation, deterministic=True)``; its ``save`` and ``load`` keep it. Rewards of
-        episodes that ended last are in ``policy.ep_info_buffer``.
+        episodes that ended last are in ``policy.ep_info_buffer``. Ctrl-C ends training with what has been learned by
+        then, and a warning that says so.
 
     Raises
     ------
@@ -107,7 +109,11 @@ def train_policy(
             return True
 
     with progress_bar(total, "training", progress, unit="steps") as bar:
-        policy.learn(total, callback=Report())
+        try:
+            policy.learn(total, callback=Report())
+        except KeyboardInterrupt:
+            reached = f"{policy.num_timesteps} of {total} control steps"
+            warnings.warn(f"training was interrupted: the policy is as it was after {reached}", stacklevel=2)
     if callback is not None:
         callback(policy)
     return policy
