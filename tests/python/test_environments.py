@@ -234,6 +234,21 @@ def test_an_arm_alone_begins_again_after_its_last_step():
     assert one.robots.time[0] == 0.0
 
 
+def test_episodes_are_cut_short_by_max_episode_steps_alone_and_in_a_batch():
+    alone = gymnasium.make("withe/Follow-v0", max_episode_steps=3, disable_env_checker=True)
+    many = gymnasium.make_vec("withe/Follow-v0", 2, max_episode_steps=3)
+    alone.reset(seed=6)
+    many.reset(seed=6)
+    for step in range(3):
+        seen, _, _, truncated, _ = many.step(np.zeros((2, 10)))
+        single, _, _, over, _ = alone.step(np.zeros(10))
+        np.testing.assert_array_equal(seen[0], single)
+        assert truncated.tolist() == [over, over] == [step == 2] * 2
+    assert gymnasium.make_vec("withe/Follow-v0", 1, max_episode_steps=-1).task.steps == 500
+    with pytest.raises(ValueError, match=r"max_episode_steps must lie in 1"):
+        gymnasium.make_vec("withe/Follow-v0", 1, max_episode_steps=0)
+
+
 def test_some_begin_again_by_a_mask():
     many = withe.learning.VectorEnvironment(Touch(), 3, workers=2, autoreset="disabled")
     many.reset(seed=0)

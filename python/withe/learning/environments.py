@@ -155,6 +155,8 @@ class _VectorEnvironment:
     autoreset : {"next_step", "same_step", "disabled"}
         As Gymnasium has it: when the next episode of a robot begins. With "disabled" by
         ``reset(options={"reset_mask": mask})``.
+    max_episode_steps : int, optional
+        Actions after which an episode is truncated, where that is fewer than the task's `steps`.
 
     Raises
     ------
@@ -177,12 +179,13 @@ class _VectorEnvironment:
         workers: int | None = None,
         render_mode: str | None = None,
         autoreset: str = "next_step",
+        max_episode_steps: int | None = None,
     ) -> None:
         gymnasium = _require()
         modes = {mode.name.lower(): mode for mode in gymnasium.vector.AutoresetMode}
         if autoreset not in modes:
             raise ValueError(f"autoreset must be {' or '.join(map(repr, modes))}, got {autoreset!r}")
-        self._episodes = Episodes(task, num_envs, workers)
+        self._episodes = Episodes(task, num_envs, workers, max_episode_steps)
         self._autoreset = autoreset
         self.num_envs = num_envs
         self.render_mode = render_mode
@@ -320,15 +323,17 @@ def maker(task: Callable[..., Task]) -> Callable[..., Any]:
 
 
 def vector_maker(task: Callable[..., Task]) -> Callable[..., Any]:
-    """What `gymnasium.make_vec` calls."""
+    """What `gymnasium.make_vec` calls; as for `gymnasium.make`, max_episode_steps=-1 is no limit but the task's."""
 
     def make(
         num_envs: int = 1,
         workers: int | None = None,
         render_mode: str | None = None,
         autoreset: str = "next_step",
+        max_episode_steps: int | None = None,
         **options: Any,
     ) -> Any:
-        return environment_class("VectorEnvironment")(task(**options), num_envs, workers, render_mode, autoreset)
+        most = None if max_episode_steps == -1 else max_episode_steps
+        return environment_class("VectorEnvironment")(task(**options), num_envs, workers, render_mode, autoreset, most)
 
     return make

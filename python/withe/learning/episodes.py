@@ -48,9 +48,11 @@ class Episodes:
         How many robots.
     workers : int, optional
         Number of threads.
+    most : int, optional
+        Actions after which an episode is truncated, where that is fewer than the task has.
     """
 
-    def __init__(self, task: Task, count: int, workers: int | None) -> None:
+    def __init__(self, task: Task, count: int, workers: int | None, most: int | None = None) -> None:
         if not isinstance(task, Task):
             raise ValueError(f"task must be a withe.learning.Task, got {type(task).__name__}")
         number = validation.integer(count, "number of environments", 1, 1_000_000)
@@ -71,6 +73,8 @@ class Episodes:
             )
         self.action_size = validation.integer(task.action_size, "action_size", 1, 1_000_000)
         self.steps = validation.integer(task.steps, "steps", 1, 2**31 - 1)
+        if most is not None:
+            self.steps = min(self.steps, validation.integer(most, "max_episode_steps", 1, 2**31 - 1))
         task.prepare(self.robots)
         self._seen: tuple[int, ...] | None = None  # shape of what is seen, once it is known
 
