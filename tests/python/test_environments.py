@@ -314,6 +314,8 @@ def closed(env):
 
 BAD = [
     (lambda env: env.step(np.full(2, 1.5)), ValueError, "action must lie in -1..1, got 1.5"),
+    (lambda env: env.step([0, -1.00001]), ValueError, "action must lie in -1..1, got -1.00001"),
+    (lambda env: env.step([0, 1.0000015]), ValueError, "action must lie in -1..1, got 1.0000015"),
     (lambda env: env.step(np.ones(3)), ValueError, "action must have shape (1, 2), got (1, 3)"),
     (lambda env: env.step([np.nan, 0]), ValueError, "action must be finite, got nan"),
     (lambda env: closed(env).step(np.ones(2)), gymnasium.error.ClosedEnvironmentError, "the environment is closed"),
@@ -352,6 +354,15 @@ def test_bad_input_says_what_was_expected(call, kind, message):
     with pytest.raises(kind) as error:
         call(env)
     assert message in str(error.value)
+
+
+def test_actions_that_single_precision_rounds_beyond_the_box_are_taken_for_its_border():
+    env = withe.learning.Environment(Touch())
+    one = np.nextafter(np.float32(1.0), np.float32(2.0))
+    env.reset(seed=0)
+    wanted, *_ = env.step(np.array([1.0, -1.0]))
+    env.reset(seed=0)
+    np.testing.assert_array_equal(env.step(np.array([one, -one]))[0], wanted)
 
 
 WRONG = [

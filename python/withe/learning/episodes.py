@@ -19,6 +19,8 @@ FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.intc]
 BoolArray = npt.NDArray[np.bool_]
 
+_ROUNDING = 1e-6  # of numbers about 1 in a few operations of single precision
+
 
 @dataclass(frozen=True)
 class Outcome:
@@ -140,7 +142,7 @@ class Episodes:
             raise ValueError(f"{self._name(method)} must be finite, got {found[~finite][0]} of robot {robot}")
 
     def checked(self, actions: npt.ArrayLike, count: int) -> FloatArray:
-        """Actions as numbers.
+        """Actions as numbers from -1 to 1; what single precision rounds beyond is cut off.
 
         Raises
         ------
@@ -148,6 +150,6 @@ class Episodes:
             Another shape, not finite, or outside of the box.
         """
         values = validation.number_array(actions, "action", (count, self.action_size))
-        if np.abs(values).max(initial=0.0) > 1.0:
-            raise ValueError(f"action must lie in -1..1, got {values.flat[np.abs(values).argmax()]:g}")
-        return values
+        if np.abs(values).max(initial=0.0) > 1.0 + _ROUNDING:
+            raise ValueError(f"action must lie in -1..1, got {values.flat[np.abs(values).argmax()]:.9g}")
+        return np.clip(values, -1.0, 1.0)
