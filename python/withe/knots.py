@@ -30,6 +30,8 @@ _BRAID_RADIUS = 2.5
 _BRAID_SLOPE = 1.5
 # Length of a rod over what its knot takes of it, where nobody asks for a length.
 _TAIL_ROOM = 1.25
+# Distance of points, over the largest coordinate, that is taken for rounding: they are the same.
+_ROUNDING = 1e-12
 
 
 def overhand_knot(
@@ -257,7 +259,7 @@ def writhe(points: npt.ArrayLike, closed: bool = False) -> float:
     ----------
     points : array_like of shape (nodes, 3) [m]
     closed : bool
-        Whether the last point is joined to the first.
+        Whether the last point is joined to the first, which may be repeated at the end.
 
     Returns
     -------
@@ -268,7 +270,7 @@ def writhe(points: npt.ArrayLike, closed: bool = False) -> float:
     ValueError
         Wrong shape, not finite, or fewer than 3 different points in a row.
     """
-    x = _polygon(points, 3)
+    x = _polygon(points, 3, closed)
     if not closed:
         far = 1e4 * _length(x)
         first, last = x[0] - x[1], x[-1] - x[-2]
@@ -310,6 +312,7 @@ def signed_crossings(points: npt.ArrayLike, direction: npt.ArrayLike = (0.0, 0.0
     Parameters
     ----------
     points : array_like of shape (nodes, 3)
+        Of a closed curve with the first one repeated at the end.
     direction : array_like of shape (3,)
         From which it is looked at.
 
@@ -317,16 +320,17 @@ def signed_crossings(points: npt.ArrayLike, direction: npt.ArrayLike = (0.0, 0.0
     -------
     int
     """
-    x = validation.number_array(points, "points", ("nodes", 3))
+    x = _polygon(points, 1, False)
     view = validation.unit_vector(direction, "direction")
     first = np.cross(view, np.eye(3)[int(np.argmin(np.abs(view)))])
     first /= np.linalg.norm(first)
     flat = np.stack([x @ first, x @ np.cross(view, first)], axis=1)
     height = x @ view
     a, edge = flat[:-1], np.diff(flat, axis=0)
+    ends_meet = not _moves(x)[0]
     count = 0
-    for i in range(len(a)):
-        j = np.arange(i + 2, len(a))
+    for i in range(len(a)):  # edges that share a node do not cross
+        j = np.arange(i + 2, len(a) - (1 if ends_meet and i == 0 else 0))
         area = edge[i, 0] * edge[j, 1] - edge[i, 1] * edge[j, 0]
         gap = a[j] - a[i]
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -346,8 +350,8 @@ def alexander_polynomial(points: npt.ArrayLike, closed: bool = False) -> npt.NDA
     ----------
     points : array_like of shape (nodes, 3)
     closed : bool
-        Whether the last point is joined to the first. The ends of an open curve are joined outside, straight away
-        from its middle.
+        Whether the last point is joined to the first, which may be repeated at the end. The ends of an open curve are
+        joined outside, straight away from its middle.
 
     Returns
     -------
@@ -396,16 +400,23 @@ def signature(points: npt.ArrayLike, closed: bool = False) -> int:
     return diagrams.signature(_diagram(points, closed))
 
 
-def _polygon(points: npt.ArrayLike, least: int) -> FloatArray:
-    """Points without those that are where the one before is."""
+def _polygon(points: npt.ArrayLike, least: int, closed: bool) -> FloatArray:
+    """Points without those that are where the one before is; round a closed curve that of the first is the last."""
     given = validation.number_array(points, "points", ("n", 3))
-    moves = np.ones(len(given), bool)
-    moves[1:] = (np.diff(given, axis=0) != 0.0).any(1)
+    moves = _moves(given)
+    if not closed:
+        moves[:1] = True
     if moves.sum() < least:
         raise ValueError(f"points must be at least {least} different ones in a row, got {moves.sum()}")
     return given[moves]
 
 
+def _moves(points: FloatArray) -> npt.NDArray[np.bool_]:
+    """Which points are elsewhere than those before them, the first than the last."""
+    apart = np.abs(points - np.roll(points, 1, axis=0))
+    return np.asarray((apart > _ROUNDING * np.abs(points).max(initial=0.0)).any(1))
+
+
 def _diagram(points: npt.ArrayLike, closed: bool) -> diagrams.Diagram:
-    curve = _polygon(points, 4)
+    curve = _polygon(points, 4, closed)
     return diagrams.diagram(curve if closed else diagrams.closed_far_away(curve))

@@ -90,6 +90,30 @@ def test_bad_input_says_what_is_wrong(points, message):
             function(points)
 
 
+@pytest.mark.parametrize("apart", [0.0, 1e-16])
+def test_closed_curves_may_have_their_first_point_repeated_at_the_end(apart):
+    random = np.random.default_rng(4)
+    closing = np.linspace(0.0, 2.0 * np.pi, 41)
+    circle = np.stack([np.cos(closing), np.sin(closing), 0.0 * closing], axis=1)
+    for _ in range(20):
+        axes, _ = np.linalg.qr(random.normal(size=(3, 3)))
+        turned = circle @ axes.T
+        turned[-1] = turned[0] + apart * random.normal(size=3)
+        assert abs(knots.writhe(turned, closed=True)) < 1e-6
+    polygon = random.normal(size=(14, 3))
+    repeated = np.concatenate([polygon, polygon[:1] + apart])
+    np.testing.assert_allclose(knots.writhe(repeated, closed=True), knots.writhe(polygon, closed=True), atol=1e-9)
+    assert knots.signature(repeated, closed=True) == knots.signature(polygon, closed=True)
+    np.testing.assert_array_equal(*(knots.alexander_polynomial(x, closed=True) for x in (repeated, polygon)))
+    edges = np.roll(polygon, -1, axis=0) - polygon
+    frames = np.stack([np.linalg.qr(np.stack([edge, *np.eye(3)[:2]], axis=1))[0].T for edge in edges])[:, [1, 2, 0]]
+    np.testing.assert_allclose(knots.link(repeated, frames, True), knots.link(polygon, frames, True), atol=1e-9)
+    middle = 0.5 * (polygon[:1] + polygon[1:2])
+    elsewhere = np.concatenate([middle, polygon[1:], polygon[:1], middle])
+    for view in random.normal(size=(20, 3)):
+        assert knots.signed_crossings(repeated, view) == knots.signed_crossings(elsewhere, view)
+
+
 def test_points_that_repeat_change_nothing_and_too_few_are_refused():
     curve = knots.overhand_knot(nodes=60)
     repeated = np.concatenate([curve[:1], curve, curve[-1:]])
