@@ -133,6 +133,40 @@ def test_friction_of_a_pair_and_of_rods_is_set_while_running():
     simulation.set_friction("block", "block", 0.2)
 
 
+@pytest.mark.parametrize("friction", [0.1, (0.3, 0.1), np.linspace(0.1, 0.3, 5)])
+def test_friction_of_a_pair_is_read_as_it_acts_from_copies_pickles_files_and_batches(friction, tmp_path):
+    _, _, scene = sliding(0.4, rods=0.2)
+    simulation = scene.build(time_step=1e-3)
+    before = simulation.snapshot()
+    simulation.set(("block", "floor"), friction=friction)
+    simulation.set(("block", "block"), friction=0.7)
+    from_file, from_pickle = scene.build(time_step=1e-3), scene.build(time_step=1e-3)
+    from_file.restore(withe.Snapshot.load(simulation.snapshot().save(tmp_path / "pair.npz")))
+    from_pickle.restore(pickle.loads(pickle.dumps(simulation.snapshot())))
+    twins = [simulation, simulation.copy(), pickle.loads(pickle.dumps(simulation)), from_file, from_pickle]
+    twins += list(pickle.loads(pickle.dumps(withe.Batch([simulation, from_file]))))
+    for twin in twins:
+        np.testing.assert_array_equal(twin.get(("block", "floor"), "friction"), friction)
+        assert twin.get(("block", "block"), "friction") == 0.7
+        assert twin.get("floor", "friction") == 0.4
+    for twin in twins:
+        twin.restore(before)
+        assert twin.get(("block", "floor"), "friction") == 0.4
+        assert twin.get(("block", "block"), "friction") == 0.2
+
+
+def test_friction_along_a_rod_stays_its_own_where_the_floor_has_a_field(tmp_path):
+    block, _, scene = sliding(withe.FrictionMap([[0.1, 0.9]], (-1.0, 1.0, -1.0, 1.0)))
+    rows = np.linspace(0.1, 0.3, 5)
+    simulation = scene.build(time_step=1e-3)
+    simulation.set((block, "floor"), friction=rows)
+    other = scene.build(time_step=1e-3)
+    other.restore(withe.Snapshot.load(simulation.snapshot().save(tmp_path / "rows.npz")))
+    for twin in (other, pickle.loads(pickle.dumps(simulation))):
+        np.testing.assert_array_equal(twin.get((block, "floor"), "friction"), rows)
+        assert way(twin, block) == way(simulation.copy(), block)
+
+
 @pytest.mark.parametrize(
     ("call", "message"),
     [

@@ -225,9 +225,10 @@ def _vary_friction(
 
 
 def drawn_frictions(scene: Directory) -> dict[tuple[str, ...], Coefficients]:
-    """Friction of obstacles, and of pairs that have their own, as it was drawn."""
+    """Friction that varies over obstacles, and that of pairs that does so, as it was drawn."""
     found: dict[tuple[str, ...], Coefficients] = {(part.name,): part.friction for part in scene.all(ObstaclePart)}
-    return found | {names: own.friction for names, own in scene.contact.pairs.items() if own.friction is not None}
+    found |= {names: own.friction for names, own in scene.contact.pairs.items() if own.friction is not None}
+    return {names: friction for names, friction in found.items() if friction.field is not None}
 
 
 def contact_table(directory: Directory, table: _core.ContactTable) -> npt.NDArray[np.void]:

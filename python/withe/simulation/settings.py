@@ -37,7 +37,8 @@ class Settings:
     friction_fields : dict of int to (int, str, Coefficients)
         Friction that varies over an obstacle: by the pair of the engine, the rod, the obstacle's name and the field.
     frictions : dict of tuple of str to Coefficients
-        Of obstacles, by their name, and of a rod and an obstacle, by both names, where it was set or varies.
+        Fields of friction of obstacles, by their name, and of a rod and an obstacle, by both names. The engine keeps
+        all other friction.
     loads : dict of str to LoadPart
         Those put on while running, in order.
     """

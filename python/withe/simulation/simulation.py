@@ -377,7 +377,7 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
             "snapshot": self.snapshot(),
             "functions": session.settings.functions,
             "paths": session.settings.paths,
-            "friction": (session.settings.friction_fields, session.settings.frictions),
+            "frictions": session.settings.frictions,
         }
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -385,7 +385,7 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
         self.__dict__.update(built.__dict__)
         self._session.settings.functions = state["functions"]
         self._session.settings.paths = state["paths"]
-        self._session.settings.friction_fields, self._session.settings.frictions = state["friction"]
+        self._session.settings.frictions = state["frictions"]
         self.restore(state["snapshot"])
 
     # Pictures

@@ -20,6 +20,7 @@ from withe.parts.parameters import RodParameters
 from withe.simulation.motion import POSE_WORDS, PathTable, Turn, Waypoints
 from withe.simulation.session import Session
 from withe.simulation.settings import Settings
+from withe.simulation.surfaces import find_friction_fields
 
 __all__ = ["Snapshot", "adopt", "matched", "restore"]
 
@@ -208,13 +209,14 @@ def matched(session: Session, snapshot: Snapshot) -> Settings:
 
 
 def adopt(session: Session, settings: Settings) -> None:
-    """Take over settings of a snapshot to which the engine went back."""
+    """Take over settings of a snapshot to which the engine went back, and find what it has that goes by them."""
     parts = session.directory.parts
     for name in set(parts) - set(session.scene.parts) - set(settings.supports):
         del parts[name]
     parts.update({name: part for name, (_, part) in settings.supports.items()})
     parts.update(settings.loads)
     session.settings = settings
+    find_friction_fields(session)
 
 
 def _matched(snapshot: Snapshot, mine: Settings, directory: Directory, scene: Directory) -> Settings:
@@ -250,9 +252,9 @@ def _matched(snapshot: Snapshot, mine: Settings, directory: Directory, scene: Di
             raise ValueError(f"snapshot belongs to another scene: {name!r} is no support in this one")
     for name in snapshot._missing:
         drawn = scene.parts.get(name)
-        varies = any(obstacle == name for _, obstacle, _ in mine.friction_fields.values())
+        varies = any(name in names for names in mine.frictions)
         if varies:
-            settings.friction_fields, settings.frictions = dict(mine.friction_fields), dict(mine.frictions)
+            settings.frictions = dict(mine.frictions)
         own: PathTable = {key: path for key, path in mine.paths.items() if key[0] == name}
         if (name in settings.supports or isinstance(drawn, ObstaclePart)) and own:
             settings.paths = own | settings.paths

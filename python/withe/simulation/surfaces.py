@@ -96,8 +96,7 @@ def set_obstacle(session: Session, part: ObstaclePart, values: dict[str, Any]) -
         contact.obstacle_rolling = rolling
     session.world.set_contact(contact)
     if given is not None:
-        session.settings.frictions[(part.name,)] = given
-        find_friction_fields(session)
+        _note_field(session, (part.name,), given)
 
 
 def _with_obstacle_friction(
@@ -126,8 +125,8 @@ def obstacle_value(session: Session, part: ObstaclePart, word: str) -> Friction:
     if word == "rolling_friction":
         return float(contact.obstacle_rolling[index])
     given = session.settings.frictions.get((part.name,))
-    if given is not None and given.field is not None:
-        return given.field
+    if given is not None:
+        return given.given
     return as_given(obstacle_friction(contact, index))
 
 
@@ -142,15 +141,24 @@ def set_pair_friction(session: Session, a: Body, b: Body, friction: Friction) ->
         shares = _shares_now(session, rod, obstacle, given)
     bodies = body_of(session.directory, first), body_of(session.directory, second)
     session.world.set_contact(with_pair(contact, bodies, given.pair, shares))
-    session.settings.frictions[pair_of(session.directory, a, b)] = given
-    find_friction_fields(session)
+    _note_field(session, pair_of(session.directory, a, b), given)
     session.note("set_friction", BodyPair(first, second), {"friction": friction})
 
 
 def pair_value(session: Session, a: Body, b: Body) -> Friction | None:
     """Friction that two bodies have of their own, as it was given; None where they have none."""
-    given = session.settings.frictions.get(pair_of(session.directory, a, b))
-    return None if given is None else given.given
+    names = pair_of(session.directory, a, b)
+    parts = [touching(session.directory, name) for name in names]
+    first, second = (body_of(session.directory, part) for part in parts)
+    own = pair_between(session.contact.pairs, (first, second))
+    if own is None or own.friction < 0.0:
+        return None
+    if not len(own.shares):
+        return as_given((own.friction, own.across if own.across >= 0.0 else own.friction))
+    if names in session.settings.frictions:
+        return session.settings.frictions[names].given
+    edges = next(len(part.lengths) for part in parts if isinstance(part, RodPart))
+    return np.array(own.shares)[-edges:]
 
 
 def set_pair_restitution(session: Session, a: Body, b: Body, restitution: float) -> None:
@@ -200,21 +208,29 @@ def _set_pair(
     session.world.set_contact(contact)
 
 
+def _note_field(session: Session, names: tuple[str, ...], given: Coefficients) -> None:
+    """Remember what was set, of an obstacle or of a rod and one, if it is a field; the engine keeps other friction."""
+    if given.field is None:
+        session.settings.frictions.pop(names, None)
+    else:
+        session.settings.frictions[names] = given
+    find_friction_fields(session)
+
+
 def find_friction_fields(session: Session) -> None:
     """Find which pairs of the engine have friction that varies over an obstacle."""
     obstacles, rods = session.directory.all(ObstaclePart), session.directory.all(RodPart)
     frictions, fields = session.settings.frictions, session.settings.friction_fields
     fields.clear()
-    if not any(given.field for given in frictions.values()):
+    if not frictions:
         return
     for number, pair in enumerate(session.world.contact.pairs):
         if not len(pair.shares):
             continue
         rod, obstacle = rods[max(pair.first, pair.second)], obstacles[-1 - min(pair.first, pair.second)]
-        first, second = sorted((rod.name, obstacle.name))
-        given = frictions.get((first, second)) or frictions.get((obstacle.name,))
-        if given is not None and given.field is not None:
-            fields[number] = rod.index, obstacle.name, given
+        names = pair_of(session.directory, rod.name, obstacle.name) if pair.friction >= 0.0 else (obstacle.name,)
+        if names in frictions:
+            fields[number] = rod.index, obstacle.name, frictions[names]
 
 
 def follow_friction_fields(session: Session) -> None:
