@@ -141,6 +141,27 @@ def test_one_that_fails_stays_where_it_was_and_holds_up_nobody():
     assert same_state(batch[1], singles[0])
 
 
+@pytest.mark.parametrize("way", ["snapshot", "record", "reset"])
+def test_one_that_failed_goes_on_when_it_is_restored_by_itself(way):
+    batch = arms(adaptive=False, max_iterations=6)
+    batch.step(3)
+    before, record = batch[1].snapshot(), batch[1].copy().run(duration=0.005, progress=False)
+    for _ in range(2):
+        batch.set_natural_curvature("arm", [folded()], lanes=[1])
+        batch.step()
+        assert batch.failed.tolist() == [False, True, False, False]
+        batch.step(2)
+        batch[1].set_natural_curvature("arm", (0, 0))
+        batch.step(2)
+        assert batch.failed[1]
+        batch[1].reset() if way == "reset" else batch[1].restore(before if way == "snapshot" else record, frame=0)
+        assert batch.failures == (None,) * LANES
+        assert not batch.failed.any()
+        start = batch.time[1]
+        batch.step(4)
+        assert batch.time[1] == pytest.approx(start + 0.02)
+
+
 def test_simulations_may_differ_in_numbers_but_not_in_shape():
     def falling(radius, nodes=9, height=-0.05):
         scene = withe.Scene()

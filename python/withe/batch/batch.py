@@ -138,6 +138,7 @@ class Batch(Setting, Reading):
         numbers = self._lanes.chosen(lanes)
         steps = validation.integer(count, "number of steps", 0, _MAX_STEPS)
         self._lanes.refuse_in_run("step")
+        self._lanes.forgive_restored()
         functions: dict[SupportsInt | SupportsIndex, tuple[Any, Any]] = {
             int(numbers[place]): (step_callback(simulation._session), force_function(simulation._session))
             for place, simulation in self._lanes.each(numbers)
@@ -146,6 +147,7 @@ class Batch(Setting, Reading):
         try:
             self._lanes.engine.step(numbers, steps, functions)
         finally:
+            self._lanes.note_failures()
             left = self._left_rings(int(number) for number in functions)
             pass_on(*self._lanes.engine.take_warnings())
             if left:
@@ -169,12 +171,13 @@ class Batch(Setting, Reading):
     @property
     def failed(self) -> npt.NDArray[np.bool_]:
         """Which simulations have failed, shape (n,)."""
+        self._lanes.forgive_restored()
         return self._lanes.engine.failed()
 
     @property
     def failures(self) -> tuple[ConvergenceError | None, ...]:
         """What went wrong in each, or None."""
-        found = (self._lanes.engine.failure(i) for i in range(len(self)))
+        found = (self._lanes.engine.failure(i) if failed else None for i, failed in enumerate(self.failed))
         return tuple(
             None if numbers is None else convergence_error(simulation._session, numbers)
             for simulation, numbers in zip(self, found, strict=True)

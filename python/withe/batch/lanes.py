@@ -36,6 +36,7 @@ class Lanes:
         self._all.flags.writeable = False
         self._rods: dict[str, RodPart] = {}
         self._voronoi: dict[int, FloatArray] = {}
+        self._restorations = np.zeros(len(simulations), np.int64)  # of those that have failed, when they did
         self._nodes = [len(self.first._session.directory.layout.rows(rod.index)) for rod in self.first.rods]
 
     def __len__(self) -> int:
@@ -117,6 +118,17 @@ class Lanes:
         """Place in a call's values, and simulation, of the lanes of a call."""
         for place, number in enumerate(numbers):
             yield place, self.simulations[number]
+
+    def note_failures(self) -> None:
+        """After a step: what has failed is passed over until it is restored, from here on."""
+        for number in np.flatnonzero(self.engine.failed()):
+            self._restorations[number] = self.simulations[number]._session.restorations
+
+    def forgive_restored(self) -> None:
+        """Let simulations go on that had failed, and were restored by themselves since."""
+        for number in np.flatnonzero(self.engine.failed()):
+            if self.simulations[number]._session.restorations != self._restorations[number]:
+                self.engine.forgive(number)
 
     def refuse_in_run(self, what: str) -> None:
         """Refuse what would change a simulation behind the back of its run."""

@@ -51,6 +51,8 @@ class Session:
         Of a session that is kept as it was: its contact then.
     left_rings : list of (str, float)
         Rings that the engine has released since rods have left them, by name, and when [s]; not reported yet.
+    restorations : int
+        How often it went back to a snapshot or to a frame of a record.
     """
 
     scene: Directory
@@ -64,6 +66,7 @@ class Session:
     journal: Journal | None = None
     contact_then: _core.ContactDescription | None = None
     left_rings: list[tuple[str, float]] = field(default_factory=list)
+    restorations: int = 0
 
     @classmethod
     def begin(cls, scene: Directory, gravity: FloatArray, options: BuildOptions) -> Session:

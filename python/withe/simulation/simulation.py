@@ -346,6 +346,7 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
                 f"snapshot must be a withe.Snapshot, got {type(snapshot).__name__}; a withe.Record will do too"
             )
         self._stepping.frame_time = None
+        self._session.restorations += 1
 
     def reset(self) -> None:
         """Go back to the scene as it was drawn, and undo everything that was set since.
