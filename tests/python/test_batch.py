@@ -141,6 +141,33 @@ def test_one_that_fails_stays_where_it_was_and_holds_up_nobody():
     assert same_state(batch[1], singles[0])
 
 
+def test_snapshots_of_which_one_does_not_fit_change_no_simulation():
+    def build(height, balls=1):
+        scene = withe.Scene()
+        rubber = withe.Material(youngs_modulus=1e6, density=1000.0)
+        scene.add_rod(start=(0, 0, height), end=(0.2, 0, height), nodes=9, radius=3e-3, material=rubber, name="arm")
+        for ball in range(balls):
+            scene.add_sphere((0, 0, -1.0 - ball), 0.1)
+        return scene.build()
+
+    batch = withe.Batch([build(0.0), build(0.0)], workers=1)
+    batch.step(2)
+    before = batch.snapshot()
+    batch.set("arm", youngs_modulus=[4e6, 4e6])
+    batch.step(2)
+    positions = batch.positions("arm")
+    for foreign in (build(0.1).snapshot(), build(0.0, balls=2).snapshot()):
+        with pytest.raises(ValueError, match="snapshot belongs to another scene"):
+            batch.restore([before[0], foreign])
+        assert batch.time.tolist() == [0.02, 0.02]
+        np.testing.assert_array_equal(batch.positions("arm"), positions)
+        for simulation in batch:
+            np.testing.assert_array_equal(simulation.get("arm", "youngs_modulus"), 4e6)
+    batch.restore(pickle.loads(pickle.dumps(before[1])))
+    np.testing.assert_array_equal(batch.time, 0.01)
+    np.testing.assert_array_equal(batch[0].get("arm", "youngs_modulus"), 1e6)
+
+
 @pytest.mark.parametrize("way", ["snapshot", "record", "reset"])
 def test_one_that_failed_goes_on_when_it_is_restored_by_itself(way):
     batch = arms(adaptive=False, max_iterations=6)

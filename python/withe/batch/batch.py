@@ -18,7 +18,7 @@ from withe.simulation.hands import forget_left_rings
 from withe.simulation.running import listed_simulations, thread_count
 from withe.simulation.session import Session
 from withe.simulation.simulation import Simulation
-from withe.simulation.snapshots import Snapshot, adopt, matched
+from withe.simulation.snapshots import Snapshot, adopt, check_fits, matched
 from withe.simulation.stepping import convergence_error, pass_on, report_left
 
 __all__ = ["Batch"]
@@ -208,7 +208,7 @@ class Batch(Setting, Reading):
         Raises
         ------
         ValueError
-            Not as many snapshots as simulations, or see `Simulation.restore`.
+            Not as many snapshots as simulations, or see `Simulation.restore`; then no simulation is changed.
         RuntimeError
             Called by a callback of a run.
 
@@ -229,6 +229,8 @@ class Batch(Setting, Reading):
         self._lanes.refuse_in_run("restore")
         chosen = [simulation for _, simulation in self._lanes.each(numbers)]
         settings = [matched(each._session, snapshot) for each, snapshot in zip(chosen, given, strict=True)]
+        for each, snapshot in zip(chosen, given, strict=True):
+            check_fits(each._session, snapshot)
         self._lanes.engine.restore(numbers, [snapshot._state for snapshot in given])
         for simulation, own in zip(chosen, settings, strict=True):
             adopt(simulation._session, own)

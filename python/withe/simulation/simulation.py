@@ -312,7 +312,8 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
 
     def snapshot(self) -> Snapshot:
         """The whole state, to go back to with `restore`, bit by bit."""
-        return Snapshot(self._session.world.snapshot(), self._session.world.time, self._session.settings.copy())
+        session = self._session
+        return Snapshot(session.world.snapshot(), session.world.time, session.settings.copy(), scene=session.scene)
 
     def restore(self, snapshot: Snapshot | Record, frame: int = -1) -> None:
         """Go back to a snapshot, of this simulation or another of the same scene, or to a frame of a record.

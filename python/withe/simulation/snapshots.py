@@ -22,7 +22,7 @@ from withe.simulation.session import Session
 from withe.simulation.settings import Settings
 from withe.simulation.surfaces import find_friction_fields
 
-__all__ = ["Snapshot", "adopt", "matched", "restore"]
+__all__ = ["Snapshot", "adopt", "check_fits", "matched", "restore"]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -37,11 +37,21 @@ class Snapshot:
     restores such a snapshot must have them already.
     """
 
-    def __init__(self, state: bytes, time: float, settings: Settings, missing: tuple[str, ...] = ()) -> None:
+    _scene: Directory | None = None  # in which it was taken, where that is known: simulations of it can go back to it
+
+    def __init__(
+        self,
+        state: bytes,
+        time: float,
+        settings: Settings,
+        missing: tuple[str, ...] = (),
+        scene: Directory | None = None,
+    ) -> None:
         self._state = state
         self._time = time
         self._settings = settings
         self._missing = missing  # names of loads, supports and obstacles whose functions are not in the file
+        self._scene = scene
 
     @property
     def time(self) -> float:
@@ -206,6 +216,18 @@ def restore(session: Session, snapshot: Snapshot) -> None:
 def matched(session: Session, snapshot: Snapshot) -> Settings:
     """What `adopt` takes over once the engine is back at a snapshot; see `restore`."""
     return _matched(snapshot, session.settings, session.directory, session.scene)
+
+
+def check_fits(session: Session, snapshot: Snapshot) -> None:
+    """Refuse a snapshot to which the engine cannot go back; nothing is changed.
+
+    Raises
+    ------
+    ValueError
+        A snapshot of another scene, or a damaged one.
+    """
+    if snapshot._scene is not session.scene:
+        session.world.copy().restore(snapshot._state)
 
 
 def adopt(session: Session, settings: Settings) -> None:
