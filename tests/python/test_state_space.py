@@ -172,6 +172,14 @@ def test_asking_for_a_step_jacobian_leaves_the_simulation_as_it_was():
     np.testing.assert_array_equal(sims[0].positions(), sims[1].positions())
 
 
+@pytest.mark.parametrize("nothing", [(), []])
+def test_a_jacobian_by_nothing_that_acts_has_no_columns(nothing):
+    sim = drawn(planar=True, integrator="backward_euler")
+    A, B = sim.step_jacobian(nothing)
+    assert B.shape == (A.shape[0], 0)
+    np.testing.assert_array_equal(A.toarray(), sim.step_jacobian()[0].toarray())
+
+
 def test_loads_that_vary_with_time_act_as_they_do_in_the_step():
     found = []
     for force in ((0, 0, 0.5), lambda t: (0, 0, 0.5 * t / 3e-3)):

@@ -12,7 +12,7 @@ from withe.common import validation
 from withe.simulation.functions import apply_functions
 from withe.simulation.session import Session
 from withe.simulation.stepping import Stepping
-from withe.simulation.unknowns import OfRun, Unknown, unknown_readers
+from withe.simulation.unknowns import OfRun, Unknown, check_list, unknown_reader
 
 __all__ = ["StateSpace"]
 
@@ -41,7 +41,7 @@ class StateSpace:
         Parameters
         ----------
         wrt : list
-            Pairs of a part and a word of `set`, or "gravity", as in `Record.gradient`.
+            Pairs of a part and a word of `set`, or "gravity", as in `Record.gradient`; none by default.
 
         Returns
         -------
@@ -76,7 +76,8 @@ class StateSpace:
         from scipy.sparse import csr_array
 
         session = self._session
-        readers = unknown_readers(session, wrt) if wrt != () else []
+        check_list(wrt, may_be_empty=True)
+        readers = [unknown_reader(session, unknown) for unknown in wrt]
         if any(isinstance(unknown, str) and unknown.startswith("initial_") for unknown in wrt):
             raise ValueError("step_jacobian has the derivatives by the present state in A: leave them out of wrt")
         ahead = Stepping(session.copy())
