@@ -130,11 +130,20 @@ def test_the_command_line_plans_and_says_what_holds(tmp_path, capsys):
     assert main(["deploy", str(source), "--length", "0.885", "--out", str(tmp_path)]) == 2
     assert "needs --dlo, or --length, --radius and --lgb" in capsys.readouterr().err
     assert main(["deploy", str(tmp_path / "wave_plan.csv"), "--dlo", "2"]) == 2  # a motion, whose t, x are no x, y
-    assert "wave_plan.csv must begin with a row x,y or with numbers, got 't,x,y," in capsys.readouterr().err
+    assert "wave_plan.csv must begin with a row x,y or x,y,z, or with numbers, got 't,x,y," in capsys.readouterr().err
     y_first = tmp_path / "y_first.csv"
     np.savetxt(y_first, wave()[:, ::-1], delimiter=",", header="y [m],x [m]", comments="")
     assert main(["deploy", str(y_first), "--dlo", "2", "--out", str(tmp_path), "--no-picture"]) == 0
     assert (tmp_path / "y_first_plan.csv").read_text() == (tmp_path / "wave_plan.csv").read_text()
+    with_heights = tmp_path / "with_heights.csv"
+    for header in ("x,y,z", "x [m],y [m],z [m]", ""):
+        np.savetxt(with_heights, np.c_[wave(), np.zeros(len(wave()))], delimiter=",", header=header, comments="")
+        with_heights.write_text(with_heights.read_text().lstrip())
+        assert main(["deploy", str(with_heights), "--dlo", "2", "--out", str(tmp_path), "--no-picture"]) == 0
+        assert (tmp_path / "with_heights_plan.csv").read_text() == (tmp_path / "wave_plan.csv").read_text()
+    with_heights.write_text("x,y,z\n0,0,0\n0.1,0\n")
+    assert main(["deploy", str(with_heights), "--dlo", "2"]) == 2
+    assert "rows x,y,z in m, got '0.1,0'" in capsys.readouterr().err
     source.write_text("x,y\n0,0\nfar,away\n")
     assert main(["deploy", str(source), "--dlo", "2"]) == 2
     assert "rows x,y in m, got 'far,away'" in capsys.readouterr().err

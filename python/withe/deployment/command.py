@@ -28,7 +28,11 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
             " and NAME_plan.png, and say where friction will not hold it."
         ),
     )
-    parser.add_argument("pattern", type=Path, help="a CSV file of x, y [m], one row a point, or a picture with --scale")
+    parser.add_argument(
+        "pattern",
+        type=Path,
+        help="a CSV file of x, y [m], one row a point (a third column, z, is not used), or a picture with --scale",
+    )
     parser.add_argument("--scale", type=float, help="size of a pixel of a picture [m]")
     parser.add_argument("--dlo", type=int, help="one of the five cables of the experiments, 1 to 5")
     parser.add_argument("--length", type=float, help="of the cable [m]")
@@ -78,26 +82,26 @@ def _cable(arguments: argparse.Namespace) -> Cable:
 
 
 def _points(path: Path) -> npt.NDArray[np.float64]:
-    """Columns x, y of a file, in the order of its header if it has one."""
+    """Columns x, y of a file, in the order of its header if it has one; there may be a third one, z."""
     lines = path.read_text(encoding="utf-8").splitlines()
-    names = ["x", "y"]
-    if lines and not _is_row(lines[0]):
-        heads = [re.fullmatch(r'\s*"?([xy])([^a-z].*)?', name, re.IGNORECASE) for name in lines[0].split(",")]
+    names = ["x", "y", "z"] if lines and _is_row(lines[0], 3) else ["x", "y"]
+    if lines and not _is_row(lines[0], len(names)):
+        heads = [re.fullmatch(r'\s*"?([xyz])([^a-z].*)?', name, re.IGNORECASE) for name in lines[0].split(",")]
         names = [head[1].lower() if head else "" for head in heads]
-        if sorted(names) != ["x", "y"]:
-            raise ValueError(f"{path.name} must begin with a row x,y or with numbers, got {lines[0]!r}")
+        if sorted(names) not in (["x", "y"], ["x", "y", "z"]):
+            raise ValueError(f"{path.name} must begin with a row x,y or x,y,z, or with numbers, got {lines[0]!r}")
         lines = lines[1:]
     rows = [line for line in lines if line.strip()]
-    bad = next((row for row in rows if not _is_row(row)), None)
+    bad = next((row for row in rows if not _is_row(row, len(names))), None)
     if bad is not None:
-        raise ValueError(f"{path.name} must hold rows x,y in m, got {bad!r}")
-    numbers = np.array([[float(number) for number in row.split(",")] for row in rows]).reshape(-1, 2)
+        raise ValueError(f"{path.name} must hold rows {','.join(names)} in m, got {bad!r}")
+    numbers = np.array([[float(number) for number in row.split(",")] for row in rows]).reshape(-1, len(names))
     return numbers[:, [names.index("x"), names.index("y")]]
 
 
-def _is_row(line: str) -> bool:
+def _is_row(line: str, count: int) -> bool:
     numbers = line.split(",")
     try:
-        return len(numbers) == 2 and all(np.isreal(float(number)) for number in numbers)
+        return len(numbers) == count and all(np.isreal(float(number)) for number in numbers)
     except ValueError:
         return False
