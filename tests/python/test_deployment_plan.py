@@ -176,6 +176,19 @@ def test_bad_input_says_what_is_wrong(call, message):
         call()
 
 
+def test_a_pattern_that_only_lacks_a_tail_says_so():
+    angle = np.linspace(0.0, 2.0 * np.pi, 200)
+    circle = Pattern(0.1 * np.stack([np.sin(angle), 1.0 - np.cos(angle)], 1))
+    cable = Cable(0.8, 1.6e-3, 0.032)
+    lacking = r"no floor .* \(lift-off\): .* A tail is missing: with 128 mm .* there are {} mm, it would need 0\.\d\d"
+    with pytest.raises(ValueError, match=lacking.format(16)):
+        plan(cable, circle)  # a longer one would cross it
+    with pytest.raises(ValueError, match=lacking.format(0)):
+        plan(cable, circle, tail=0.0)
+    with pytest.raises(ValueError, match=r"no floor (?!.*A tail is missing)"):
+        plan(Cable.dlo(5), Pattern(wave(0.06)), tail=0.0)  # which a tail does not hold either
+
+
 def test_a_pattern_that_crosses_itself_is_laid_over_itself_on_request():
     pattern = Pattern(loop())
     assert pattern.crossings.shape == (1, 2)

@@ -16,8 +16,8 @@ from withe.common import validation
 from withe.common.progress import progress as bar
 from withe.deployment.cable import JAW, Cable
 from withe.deployment.drawing import draw_plan
-from withe.deployment.feasibility import Controller, Feasibility, examine, grasps_along, require_bendable
-from withe.deployment.grasping import Grasp
+from withe.deployment.feasibility import Controller, Feasibility, Slip, examine, grasps_along, require_bendable
+from withe.deployment.grasping import Grasp, table
 from withe.deployment.motion import Course, Path, Phase, Start, course, lengthened, upright_way, way_along
 from withe.deployment.optimising import optimised, runs
 from withe.deployment.pattern import Pattern
@@ -309,10 +309,35 @@ def _needed(pattern: Pattern, cable: Cable, controller: Controller, grasps: Gras
     count = len(pattern.points)
     force = np.concatenate([grasps.force, np.repeat(grasps.force[-1:], count, axis=0)])[:count]
     found = examine(pattern, cable, _MOST_FRICTION, controller, force)
-    hopeless = [slip for slip in found.slips if slip.test in ("floor", "lift-off")]
-    if hopeless and not helped:
-        raise ValueError(f"no floor holds this cable on this pattern: {max(hopeless, key=lambda slip: slip.needed)}")
+    worst = _hopeless(found)
+    if worst is not None and not helped:
+        missing = _missing_tail(pattern, cable, controller, worst)
+        raise ValueError(f"no floor holds this cable on this pattern: {worst}{missing}")
     return found.needed
+
+
+def _hopeless(found: Feasibility) -> Slip | None:
+    """The stretch that needs most, of those that no floor holds."""
+    slips = [slip for slip in found.slips if slip.test in ("floor", "lift-off")]
+    return max(slips, key=lambda slip: slip.needed, default=None)
+
+
+def _missing_tail(pattern: Pattern, cable: Cable, controller: Controller, worst: Slip) -> str:
+    """What a tail of the usual length would change, if a floor would hold the pattern with it."""
+    lgb = cable.gravito_bending_length
+    usual, there = _TAIL * lgb, cable.length - pattern.length
+    longer = replace(cable, length=pattern.length + usual)
+    if there >= usual or longer.length > table().longest * lgb:
+        return ""
+    found = examine(pattern, longer, _MOST_FRICTION, controller)
+    if _hopeless(found) is not None:
+        return ""
+    stretch = (found.arc_length >= worst.start) & (found.arc_length <= worst.end)
+    return (
+        f". A tail is missing: with {1e3 * usual:.0f} mm of cable beyond the pattern, where there are"
+        f" {1e3 * there:.0f} mm, it would need {found.needed[stretch].max():.2f}. Give a longer tail or cable;"
+        " crossings='over' lets the tail cross the pattern"
+    )
 
 
 def _held(cable: Cable, pattern: Pattern, tail: float | None) -> tuple[Cable, float]:
