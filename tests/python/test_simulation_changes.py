@@ -156,7 +156,8 @@ def test_friction_of_a_pair_is_read_as_it_acts_from_copies_pickles_files_and_bat
 
 
 def test_friction_along_a_rod_stays_its_own_where_the_floor_has_a_field(tmp_path):
-    block, _, scene = sliding(withe.FrictionMap([[0.1, 0.9]], (-1.0, 1.0, -1.0, 1.0)))
+    table = withe.FrictionMap([[0.1, 0.9]], (-1.0, 1.0, -1.0, 1.0))
+    block, _, scene = sliding(table)
     rows = np.linspace(0.1, 0.3, 5)
     simulation = scene.build(time_step=1e-3)
     simulation.set((block, "floor"), friction=rows)
@@ -164,7 +165,21 @@ def test_friction_along_a_rod_stays_its_own_where_the_floor_has_a_field(tmp_path
     other.restore(withe.Snapshot.load(simulation.snapshot().save(tmp_path / "rows.npz")))
     for twin in (other, pickle.loads(pickle.dumps(simulation))):
         np.testing.assert_array_equal(twin.get((block, "floor"), "friction"), rows)
+        np.testing.assert_array_equal(twin.get("floor", "friction").image, table.image)
         assert way(twin, block) == way(simulation.copy(), block)
+
+
+def test_a_file_of_a_field_of_friction_needs_the_field(tmp_path):
+    block, floor, scene = sliding(0.4)
+    simulation = scene.build(time_step=1e-3)
+    simulation.set((block, floor), friction=withe.FrictionMap([[0.1, 0.9]], (-1.0, 1.0, -1.0, 1.0)))
+    snapshot = withe.Snapshot.load(simulation.snapshot().save(tmp_path / "field.npz"))
+    other = scene.build(time_step=1e-3)
+    with pytest.raises(ValueError, match=r"snapshot needs the friction of 'block' and 'floor', a function of position"):
+        other.restore(snapshot)
+    other.set((block, floor), friction=simulation.get((block, floor), "friction"))
+    other.restore(snapshot)
+    assert way(other, block) == way(simulation, block)
 
 
 @pytest.mark.parametrize(

@@ -38,6 +38,8 @@ class Snapshot:
     """
 
     _scene: Directory | None = None  # in which it was taken, where that is known: simulations of it can go back to it
+    # Whose fields of friction are not in the file, see `Settings.frictions`; None where the file does not say.
+    _fields: tuple[tuple[str, ...], ...] | None = None
 
     def __init__(
         self,
@@ -46,12 +48,14 @@ class Snapshot:
         settings: Settings,
         missing: tuple[str, ...] = (),
         scene: Directory | None = None,
+        fields: tuple[tuple[str, ...], ...] | None = (),
     ) -> None:
         self._state = state
         self._time = time
         self._settings = settings
         self._missing = missing  # names of loads, supports and obstacles whose functions are not in the file
         self._scene = scene
+        self._fields = fields
 
     @property
     def time(self) -> float:
@@ -67,6 +71,10 @@ class Snapshot:
         fields = (obstacle for _, obstacle, _ in self._settings.friction_fields.values())
         return tuple(sorted({*self._settings.functions, *paths, *fields, *self._missing}))
 
+    def _field_names(self) -> tuple[tuple[str, ...], ...] | None:
+        """Whose fields of friction no file can hold."""
+        return None if self._fields is None else tuple(sorted({*self._settings.frictions, *self._fields}))
+
     def __getstate__(self) -> dict[str, Any]:
         settings = self._settings.copy()
         settings.functions = {}
@@ -78,6 +86,7 @@ class Snapshot:
             "_time": self._time,
             "_settings": settings,
             "_missing": self._function_names(),
+            "_fields": self._field_names(),
         }
 
     def __eq__(self, other: object) -> bool:
@@ -127,6 +136,7 @@ class Snapshot:
             "supports": supports,
             "loads": loads,
             "functions": self._function_names(),
+            "friction_fields": self._field_names(),
         }
         return io.save_arrays(path, "snapshot", _FILE_VERSION, header, arrays)
 
@@ -194,10 +204,12 @@ class Snapshot:
             loads=loads,
         )
         missing = tuple(str(name) for name in header["functions"])
+        given = header.get("friction_fields")  # which files had none of at first
+        fields = None if given is None else tuple(tuple(str(name) for name in names) for names in given)
         state = arrays["state"]
         if state.dtype != np.uint8 or state.ndim != 1:
             raise ValueError("its state must be bytes")
-        return cls(state.tobytes(), validation.number(header["time"], "time"), settings, missing)
+        return cls(state.tobytes(), validation.number(header["time"], "time"), settings, missing, fields=fields)
 
 
 def restore(session: Session, snapshot: Snapshot) -> None:
@@ -272,11 +284,19 @@ def _matched(snapshot: Snapshot, mine: Settings, directory: Directory, scene: Di
         known = scene.parts.get(name)
         if known is not None and not isinstance(known, SupportPart):
             raise ValueError(f"snapshot belongs to another scene: {name!r} is no support in this one")
+    for names, friction in mine.frictions.items():
+        unsaid = snapshot._fields is None and any(name in snapshot._missing for name in names)
+        if unsaid or names in (snapshot._fields or ()):
+            settings.frictions[names] = friction
+    for names in snapshot._fields or ():
+        if names not in settings.frictions:
+            raise ValueError(
+                f"snapshot needs the friction of {' and '.join(map(repr, names))}, a function of position, which no"
+                " file holds: set it on this simulation first"
+            )
     for name in snapshot._missing:
         drawn = scene.parts.get(name)
-        varies = any(name in names for names in mine.frictions)
-        if varies:
-            settings.frictions = dict(mine.frictions)
+        varies = any(name in names for names in settings.frictions)
         own: PathTable = {key: path for key, path in mine.paths.items() if key[0] == name}
         if (name in settings.supports or isinstance(drawn, ObstaclePart)) and own:
             settings.paths = own | settings.paths
