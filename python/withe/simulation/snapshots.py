@@ -38,8 +38,6 @@ class Snapshot:
     """
 
     _scene: Directory | None = None  # in which it was taken, where that is known: simulations of it can go back to it
-    # Whose fields of friction are not in the file, see `Settings.frictions`; None where the file does not say.
-    _fields: tuple[tuple[str, ...], ...] | None = None
 
     def __init__(
         self,
@@ -48,14 +46,14 @@ class Snapshot:
         settings: Settings,
         missing: tuple[str, ...] = (),
         scene: Directory | None = None,
-        fields: tuple[tuple[str, ...], ...] | None = (),
+        fields: tuple[tuple[str, ...], ...] = (),
     ) -> None:
         self._state = state
         self._time = time
         self._settings = settings
         self._missing = missing  # names of loads, supports and obstacles whose functions are not in the file
         self._scene = scene
-        self._fields = fields
+        self._fields = fields  # whose fields of friction are not in the file, see `Settings.frictions`
 
     @property
     def time(self) -> float:
@@ -71,9 +69,9 @@ class Snapshot:
         fields = (obstacle for _, obstacle, _ in self._settings.friction_fields.values())
         return tuple(sorted({*self._settings.functions, *paths, *fields, *self._missing}))
 
-    def _field_names(self) -> tuple[tuple[str, ...], ...] | None:
+    def _field_names(self) -> tuple[tuple[str, ...], ...]:
         """Whose fields of friction no file can hold."""
-        return None if self._fields is None else tuple(sorted({*self._settings.frictions, *self._fields}))
+        return tuple(sorted({*self._settings.frictions, *self._fields}))
 
     def __getstate__(self) -> dict[str, Any]:
         settings = self._settings.copy()
@@ -204,8 +202,7 @@ class Snapshot:
             loads=loads,
         )
         missing = tuple(str(name) for name in header["functions"])
-        given = header.get("friction_fields")  # which files had none of at first
-        fields = None if given is None else tuple(tuple(str(name) for name in names) for names in given)
+        fields = tuple(tuple(str(name) for name in names) for names in header["friction_fields"])
         state = arrays["state"]
         if state.dtype != np.uint8 or state.ndim != 1:
             raise ValueError("its state must be bytes")
@@ -285,10 +282,9 @@ def _matched(snapshot: Snapshot, mine: Settings, directory: Directory, scene: Di
         if known is not None and not isinstance(known, SupportPart):
             raise ValueError(f"snapshot belongs to another scene: {name!r} is no support in this one")
     for names, friction in mine.frictions.items():
-        unsaid = snapshot._fields is None and any(name in snapshot._missing for name in names)
-        if unsaid or names in (snapshot._fields or ()):
+        if names in snapshot._fields:
             settings.frictions[names] = friction
-    for names in snapshot._fields or ():
+    for names in snapshot._fields:
         if names not in settings.frictions:
             raise ValueError(
                 f"snapshot needs the friction of {' and '.join(map(repr, names))}, a function of position, which no"
