@@ -189,6 +189,28 @@ def test_lbfgs_finds_what_gauss_newton_does():
     assert found.value("delay")[0] == pytest.approx([0.013], abs=1e-4)
 
 
+@pytest.mark.parametrize("in_pixels", [False, True])
+def test_in_a_planar_scene_lbfgs_takes_tags_with_noise_along_its_normal_and_in_pixels(in_pixels):
+    target, camera = seen(0.0, viscosity=3000.0), None
+    points = np.asarray(target.points)
+    noise = np.random.default_rng(2).normal(0.0, 1.0, points.shape)
+    if in_pixels:
+        turn = withe.common.drawing.rotation_about(np.array((0.0, 0.0, 0.3)))
+        rotation = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]]) @ turn
+        camera = withe.perception.Camera([[1500, 0, 640], [0, 1500, 360], [0, 0, 1]], None, rotation, (0, 0, 1))
+        points = camera.project(points.reshape(-1, 3)).reshape(*points.shape[:2], 2) + 0.3 * noise[..., :2]
+    else:
+        points = points + 2e-4 * noise
+    target = Tags(points, target.places, camera, times=target.times)
+    start = ringing(modulus=1.1e6, viscosity=3000.0)
+    found, other = (
+        fit_motion(start, target, UNKNOWNS[:1], begin=let_go, method=method, progress=False)
+        for method in ("lbfgs", "gauss_newton")
+    )
+    assert found.values == pytest.approx(other.values, rel=1e-4)
+    assert found.values[0, 0] == pytest.approx(1e6, rel=1e-2)
+
+
 @pytest.mark.parametrize(
     ("unknowns", "options", "message"),
     [

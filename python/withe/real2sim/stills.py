@@ -92,11 +92,9 @@ class Equilibria(Coordinates):
         ConvergenceError
             The branch of equilibria ends here.
         """
-        normal = self.simulation._session.world.plane_normal
-        inside = by_positions if normal is None else by_positions - (by_positions @ normal)[..., None] * normal
         words = [word for unknown in self.unknowns for word in unknown.words]
         try:
-            found = equilibrium_gradients(self.simulation._session, inside, words)
+            found = equilibrium_gradients(self.simulation._session, self.in_plane(by_positions), words)
         except ValueError:
             changes = self._differences(coordinates, frame)
             return np.asarray(np.tensordot(by_positions, changes, axes=2))

@@ -103,6 +103,13 @@ class Coordinates:
                 unknown.write(self.simulation, coordinates[place])
                 self._written[place] = coordinates[place]
 
+    def in_plane(self, by_positions: FloatArray) -> FloatArray:
+        """Derivatives by positions, shape (..., 3), without those along the normal of a planar scene."""
+        normal = self.simulation._session.world.plane_normal
+        if normal is None:
+            return by_positions
+        return np.asarray(by_positions - (by_positions @ normal)[..., None] * normal)
+
     def forget(self) -> None:
         """What was set may not be there any more."""
         self._written[:] = np.nan
