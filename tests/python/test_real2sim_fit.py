@@ -5,7 +5,7 @@ import pytest
 
 import withe
 from soft_limb import CONSTANT, LIMB, published, robot, seen_curvatures
-from withe.real2sim import Curvatures, Tags, fit
+from withe.real2sim import Centrelines, Curvatures, Tags, fit
 from withe.real2sim.parsing import parse_unknowns
 from withe.real2sim.stills import Stills
 from withe.real2sim.unknowns import Tilt
@@ -285,6 +285,31 @@ def test_errors_have_the_size_that_the_covariance_says():
     assert 0.9 < np.sqrt(np.mean(scaled**2)) < 1.1
     unknown = fit(coarse, Tags(frames, names(range(5, 31, 5)), camera), ARM, progress=False)
     assert unknown.sigma("arm") == pytest.approx(found.sigma("arm"), rel=0.1)
+
+
+@pytest.mark.parametrize(("normal", "across"), [((0.0, 1.0, 0.0), 0.0), ((0.6, 0.8, 0.0), 50.0)])
+@pytest.mark.parametrize("kind", ["tags", "centrelines"])
+def test_in_a_plane_an_estimated_error_does_not_depend_on_what_lies_across_it(normal, across, kind):
+    along = np.array((normal[1], -normal[0], 0.0))
+    scene = withe.Scene()
+    rubber = withe.Material(youngs_modulus=1e6, density=1000.0)
+    scene.clamp(
+        scene.add_rod(start=(0, 0, 0), end=0.3 * along, nodes=31, radius=5e-3, material=rubber, name="arm").start
+    )
+    simulation = scene.build(integrator="static", planar=True)
+    places = range(3, 31, 3)
+    exact = drawn(simulation, [(0.0, 3.0)], places)[0]
+    rng = np.random.default_rng(11)
+    inside, out = rng.normal(0.0, 5e-4, (30, *exact.shape)), rng.normal(0.0, 5e-4 * across, (30, len(exact), 1))
+    points = exact + inside - (inside @ normal)[..., None] * np.array(normal) + out * np.array(normal)
+    targets = [
+        Tags(points, names(places), sigma=sigma)
+        if kind == "tags"
+        else Centrelines(points, "arm", ends=False, sigma=sigma)
+        for sigma in (5e-4, None)
+    ]
+    given, estimated = (fit(simulation, target, ARM, progress=False).sigma("arm") for target in targets)
+    assert estimated == pytest.approx(given, rel=0.1)
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ from withe.perception.camera import Camera
 from withe.real2sim.fitting import fit
 from withe.real2sim.places import lines_of, node_count, rod_part
 from withe.real2sim.results import Fit
-from withe.real2sim.targets import Residual, Target, checked_times, pixel_derivative
+from withe.real2sim.targets import Residual, Target, across_of_points, checked_times, pixel_derivative
 from withe.simulation.simulation import Simulation
 
 __all__ = ["Centrelines", "rest_shape"]
@@ -84,6 +84,10 @@ class Centrelines(Target):
         """Numbers that a frame tells: a point tells where the line is across itself, an end all of it."""
         points = np.asarray(self.points[frame])
         return points.size - len(points) + (2 if self.ends and len(points) else 0)
+
+    def across(self, normal: FloatArray) -> FloatArray:
+        """The normal at each point; none in pixels."""
+        return across_of_points(self.samples, normal, self.camera is None)
 
     def bind(self, simulation: Simulation) -> Residual:
         """The residual for the nodes of a simulation."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 import numpy.typing as npt
 
@@ -41,10 +43,8 @@ def gather(
     covariance = np.full((frames, count, count), np.nan)
     for frame, spread in _spreads(stills, with_data, own, common).items():
         covariance[frame] = spread
-    seen_in = (
-        list(with_data) if frames == targets[0].frames else list(range(targets[0].frames))
-    )  # a motion is one frame
-    covariance *= _variance(stills, targets, residuals, seen_in) * slopes[:, :, None] * slopes[:, None]
+    told = {f: _told(targets, f, residuals, stills.simulation._session.world.plane_normal) for f in with_data}
+    covariance *= _variance(stills, targets, list(told.values())) * slopes[:, :, None] * slopes[:, None]
     reasons = {f: "nothing was seen" for f in range(frames) if f not in solutions}
     reasons |= {f: s.reason for f, s in solutions.items() if s.reason}
     return Fit(
@@ -63,14 +63,36 @@ def gather(
     )
 
 
-def _variance(stills: Coordinates, targets: list[Target], residuals: FloatArray, seen_in: list[int]) -> float:
+class _Told(NamedTuple):
+    """What the targets tell in one fit: how many numbers, and the sum of the squares that it leaves of them."""
+
+    numbers: int
+    squares: float
+
+
+def _told(targets: list[Target], fitted: int, residuals: FloatArray, normal: FloatArray | None) -> _Told:
+    """Of one row of residuals: a frame, or all of a motion. In a planar scene, without what lies across the plane."""
+    from scipy.linalg import block_diag
+
+    seen_in = range(targets[0].frames) if len(residuals) != targets[0].frames else [fitted]  # a motion is one frame
+    numbers = sum(target.told(frame) for target in targets for frame in seen_in)
+    rows = residuals[fitted].reshape(len(seen_in), -1)
+    squares = float(np.nansum(rows**2))
+    if normal is not None:
+        across = block_diag(*(target.across(normal) for target in targets))
+        seen = np.isfinite(rows) @ across**2 > 1.0 - 1e-9
+        numbers -= int(seen.sum())
+        squares -= float(np.sum((np.nan_to_num(rows) @ across)[seen] ** 2))
+    return _Told(numbers, squares)
+
+
+def _variance(stills: Coordinates, targets: list[Target], told: list[_Told]) -> float:
     """Of a residual: 1 where sigma was given, else what all frames leave over the degrees of freedom."""
     if all(target.sigma is not None for target in targets):
         return 1.0
-    fitted = int(np.isfinite(residuals).any(axis=1).sum())
-    told = sum(target.told(frame) for target in targets for frame in seen_in)
-    free = told - int(stills.per_frame.sum()) * fitted - int((~stills.per_frame).sum())
-    return float(np.nansum(residuals**2)) / free if free > 0 else np.nan
+    numbers = sum(each.numbers for each in told)
+    free = numbers - int(stills.per_frame.sum()) * len(told) - int((~stills.per_frame).sum())
+    return sum(each.squares for each in told) / free if free > 0 else np.nan
 
 
 def _inverse(spectrum: Spectrum) -> FloatArray:

@@ -89,7 +89,8 @@ class Fit:
         Simulated less seen, in units of sigma, or of the target without one; NaN where nothing was seen.
     covariance : ndarray of shape (frames, unknowns, unknowns)
         Of the values, for independent errors of the targets. Their variance is that of sigma, or what all frames
-        leave, divided by the degrees of freedom; NaN without either, infinite where the targets tell nothing.
+        leave, divided by the degrees of freedom; NaN without either, infinite where the targets tell nothing. In a
+        planar scene what lies across its plane counts for neither.
     solves : ndarray of int of shape (frames,)
         Equilibria that the search took in each frame.
     iterations : ndarray of int of shape (frames,)

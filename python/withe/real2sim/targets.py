@@ -20,6 +20,7 @@ __all__ = [
     "Residual",
     "Tags",
     "Target",
+    "across_of_points",
     "bind",
     "checked_times",
     "frames_of",
@@ -60,6 +61,16 @@ class Target(ABC):
     @abstractmethod
     def told(self, frame: int) -> int:
         """Numbers that a frame tells."""
+
+    @abstractmethod
+    def across(self, normal: FloatArray) -> FloatArray:
+        """Directions of a frame's residual that no motion in a plane reaches, as columns: (residuals, n), orthonormal.
+
+        Parameters
+        ----------
+        normal : ndarray of shape (3,)
+            Of the plane.
+        """
 
 
 def turns(points: FloatArray) -> FloatArray:
@@ -144,6 +155,10 @@ class Curvatures(Target):
     def told(self, frame: int) -> int:
         """Numbers that a frame tells."""
         return int(np.isfinite(np.asarray(self.values)[frame]).sum())
+
+    def across(self, normal: FloatArray) -> FloatArray:
+        """None: turns are about one axis."""
+        return np.zeros((len(self.groups), 0))
 
     def bind(self, simulation: Simulation) -> Residual:
         """The residual for the nodes of a simulation."""
@@ -238,6 +253,10 @@ class Tags(Target):
         """Numbers that a frame tells."""
         return int(np.isfinite(np.asarray(self.points)[frame]).sum())
 
+    def across(self, normal: FloatArray) -> FloatArray:
+        """The normal at each tag; none in pixels."""
+        return across_of_points(len(self.places), normal, self.camera is None)
+
     def without(self, outliers: Sequence[tuple[int, int]]) -> Tags:
         """The same without some tags in some frames.
 
@@ -275,6 +294,11 @@ class _TagResidual(Residual):
             by_point = pixel_derivative(self._camera, self._weights @ positions)
         by_node = by_point[:, :, None] * self._weights[:, None, :, None] / self._sigma
         return np.asarray(by_node.reshape(-1, *positions.shape))
+
+
+def across_of_points(count: int, normal: FloatArray, in_metres: bool) -> FloatArray:
+    """`Target.across` of points, (3 count, count) of those in metres, (2 count, 0) in pixels."""
+    return np.asarray(np.kron(np.eye(count), normal[:, None])) if in_metres else np.zeros((2 * count, 0))
 
 
 def pixel_derivative(camera: Camera, points: FloatArray) -> FloatArray:
