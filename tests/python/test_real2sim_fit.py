@@ -252,6 +252,18 @@ def test_a_shape_out_of_reach_leaves_its_residual():
     assert np.linalg.norm(found.residuals[0]) == pytest.approx(least, rel=1e-3)
 
 
+def test_what_a_fit_leaves_beyond_sigma_is_named_and_what_chance_leaves_is_not():
+    simulation, places = arm(), range(5, 31, 5)
+    points = drawn(simulation, [(0.0, 0.1 * k) for k in range(100)], places)
+    points += np.random.default_rng(4).normal(0.0, 5e-4, points.shape)
+    points[7] += 0.01 * np.sin(np.arange(18.0)).reshape(6, 3)
+    for sigma, beyond in ((5e-4, [7]), (5e-5, list(range(100)))):
+        found = fit(simulation, Tags(points, names(places), sigma=sigma), ARM, progress=False)
+        assert found.converged.all()
+        assert list(found.reasons) == beyond
+    assert fit(simulation, Tags(points, names(places)), ARM, progress=False).reasons == {}
+
+
 def test_a_tag_that_jumps_in_one_frame_is_named():
     simulation = arm()
     places = range(5, 31, 5)

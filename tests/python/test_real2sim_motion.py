@@ -84,6 +84,26 @@ def test_errors_have_the_size_that_the_covariance_says():
     assert 0.6 < np.sqrt(np.mean(np.square(scaled))) < 1.4  # 16 numbers
 
 
+def test_a_local_minimum_is_named_where_sigma_is_given_and_the_first_swings_lead_out_of_it():
+    whole = seen(0.0, noise=2e-4)
+    stiff = ringing(modulus=3e6)
+
+    def found(frames, start):
+        target = Tags(np.asarray(whole.points)[:frames], whole.places, times=whole.times[:frames], sigma=2e-4)
+        return fit_motion(start, target, UNKNOWNS[:1], begin=let_go, progress=False)
+
+    local = found(None, stiff)
+    assert local.converged.all()
+    assert local.values[0, 0] > 2e6
+    assert list(local.reasons) == [0]
+    assert "times sigma, too much for chance: a local minimum" in local.reasons[0]
+    assert local.reasons[0] in repr(local)
+    found(8, stiff).apply(stiff)
+    best = found(None, stiff)
+    assert best.values[0, 0] == pytest.approx(1e6, rel=1e-3)
+    assert best.reasons == {}
+
+
 def test_friction_is_told_by_how_a_rod_slides_to_a_stop():
     def sliding(friction):
         scene = withe.Scene()

@@ -45,6 +45,9 @@ def fit(
     Least squares over the residuals of all targets divided by their sigma. Every frame begins with what the frame
     before it found. Natural curvature is of each frame, all else of all of them.
 
+    The search ends in the local minimum that the first guess leads to; the covariance does not know of others. Where
+    sigma is given and residuals are far beyond it, `Fit.reasons` says so: try other first guesses.
+
     Parameters
     ----------
     simulation : Simulation

@@ -17,6 +17,9 @@ __all__ = ["gather"]
 
 FloatArray = npt.NDArray[np.float64]
 
+_MISFIT = 3.0  # times sigma: residuals beyond it, root of the mean square, are too great for it ...
+_CHANCE = 1e-6  # ... if normal errors are as great with a probability below this
+
 
 def gather(
     stills: Coordinates,
@@ -46,7 +49,7 @@ def gather(
     told = {f: _told(targets, f, residuals, stills.simulation._session.world.plane_normal) for f in with_data}
     covariance *= _variance(stills, targets, list(told.values())) * slopes[:, :, None] * slopes[:, None]
     reasons = {f: "nothing was seen" for f in range(frames) if f not in solutions}
-    reasons |= {f: s.reason for f, s in solutions.items() if s.reason}
+    reasons |= _misfits(stills, targets, told) | {f: s.reason for f, s in solutions.items() if s.reason}
     return Fit(
         names=stills.names,
         values=values,
@@ -84,6 +87,24 @@ def _told(targets: list[Target], fitted: int, residuals: FloatArray, normal: Flo
         numbers -= int(seen.sum())
         squares -= float(np.sum((np.nan_to_num(rows) @ across)[seen] ** 2))
     return _Told(numbers, squares)
+
+
+def _misfits(stills: Coordinates, targets: list[Target], told: dict[int, _Told]) -> dict[int, str]:
+    """Frames whose residuals are too great for sigma: their sum of squares is beyond any likely chi-squared."""
+    if any(target.sigma is None for target in targets):
+        return {}
+    from scipy.special import chdtrc
+
+    found = {}
+    for frame, each in told.items():
+        free = each.numbers - int(stills.per_frame.sum())
+        if free > 0 and each.squares > _MISFIT**2 * free and chdtrc(free, each.squares) < _CHANCE:
+            found[frame] = (
+                f"residuals are {np.sqrt(each.squares / free):.2g} times sigma, too much for chance: a local minimum "
+                "(try another first guess or method), outliers, a model that is not that of the targets, or too small "
+                "a sigma"
+            )
+    return found
 
 
 def _variance(stills: Coordinates, targets: list[Target], told: list[_Told]) -> float:

@@ -52,6 +52,11 @@ def fit_motion(
     With ``method="lbfgs"`` the sum of squares has its gradient by one way back through each run (`Record.gradient`),
     for however many unknowns; at the end comes one run an unknown, for the covariance.
 
+    Both end in a local minimum; the covariance does not know of others. There are many where a rod rings: with a
+    stiffness that is two or three times the true one, a run is soon a whole swing ahead. Where sigma is given and
+    residuals are far beyond it, `Fit.reasons` says so: fit the first swings alone and begin with what they tell, or try
+    other first guesses, or ``method="lbfgs"``, which takes other steps.
+
     Parameters
     ----------
     simulation : Simulation

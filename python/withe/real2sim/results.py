@@ -96,9 +96,11 @@ class Fit:
     iterations : ndarray of int of shape (frames,)
         Outer iterations.
     converged : ndarray of bool of shape (frames,)
-        Whether no change of the unknowns would bring the frame nearer; what is out of reach leaves a residual.
+        Whether no small change of the unknowns would bring the frame nearer: also in a local minimum, and where what is
+        out of reach leaves a residual.
     reasons : dict of int to str
-        Why frames did not converge, or were skipped.
+        Why frames did not converge, were skipped, or leave more than sigma explains, where it is given: a sum of
+        squares above 9 sigma^2 per degree of freedom, and above what chance exceeds once in a million frames.
     unobservable : tuple of Unobservable
         Combinations of unknowns that the targets do not tell; print them.
     outliers : tuple of Outlier
