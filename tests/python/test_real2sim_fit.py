@@ -280,6 +280,81 @@ def test_a_tag_that_jumps_in_one_frame_is_named():
     assert cleaned.rms[12] < 0.1 * found.rms[12]
 
 
+def seen_with_gaps(seed, missing, frames=40, whole=None):
+    """Tags of an arm that goes to and fro, with errors of half a millimetre, and with gaps but in one frame."""
+    simulation, places = arm(), range(6, 31, 6)
+    points = drawn(simulation, [(0.0, k) for k in 5.0 * np.sin(np.arange(frames) / 6.0)], places)
+    rng = np.random.default_rng(seed)
+    points += rng.normal(0.0, 5e-4, points.shape)
+    gone = rng.random(points.shape[:2]) < missing
+    if whole is not None:
+        gone[whole] = False
+    points[gone] = np.nan
+    return simulation, points, names(places)
+
+
+@pytest.mark.parametrize("missing", [0.0, 0.1, 0.3])
+@pytest.mark.parametrize("frame", [0, 1, 20, 39])
+@pytest.mark.parametrize("jump", [0.01, 0.05])
+def test_a_tag_that_jumps_is_named_in_every_frame_and_where_others_are_missing(frame, missing, jump):
+    simulation, points, places = seen_with_gaps(2, missing, whole=frame)
+    points[frame, 3] += jump * np.array((0.8, 0.0, 0.6))
+    found = fit(simulation, Tags(points, places), ARM, progress=False)
+    assert [(each.frame, each.tag) for each in found.outliers] == [(frame, 3)]
+    assert found.outliers[0].jump == pytest.approx(jump, rel=0.3)
+
+
+@pytest.mark.parametrize("sigma", [None, 5e-4])
+def test_without_jumps_no_tag_is_named(sigma):
+    for seed in range(20):
+        simulation, points, places = seen_with_gaps(seed, (0.0, 0.3)[seed % 2], frames=20)
+        assert fit(simulation, Tags(points, places, sigma=sigma), ARM, progress=False).outliers == ()
+
+
+def test_a_jump_of_thirteen_sigma_is_named_though_the_fit_follows_it():
+    named = 0
+    for seed in range(10):
+        simulation, points, places = seen_with_gaps(seed, 0.0, frames=20)
+        points[10, 3] += (6e-3, 0.0, 3e-3)
+        found = fit(simulation, Tags(points, places, sigma=5e-4), ARM, progress=False)
+        named += [(each.frame, each.tag) for each in found.outliers] == [(10, 3)]
+    assert named >= 8
+
+
+@pytest.mark.parametrize("missing", [0.0, 0.1, 0.3])
+def test_what_a_wrong_model_leaves_is_hardly_taken_for_jumps(missing):
+    """Curvature that doubles along the arm, fitted by a constant: residuals are up to 40 times the errors."""
+    simulation, places = arm(), range(6, 31, 6)
+    field = np.stack([np.zeros(29), np.linspace(0.6, 1.4, 29)], axis=1)
+    exact = drawn(simulation, [k * field for k in 5.0 * np.sin(np.arange(40) / 6.0)], places)
+    named = seen = 0
+    for seed in range(5):
+        rng = np.random.default_rng(seed)
+        points = exact + rng.normal(0.0, 1e-4, exact.shape)
+        points[rng.random(points.shape[:2]) < missing] = np.nan
+        found = fit(simulation, Tags(points, names(places)), ARM, progress=False)
+        named, seen = named + len(found.outliers), seen + int(np.isfinite(points[:, :, 0]).sum())
+    assert named < 0.01 * seen
+
+
+def test_without_noise_no_tag_is_named_for_what_solvers_leave():
+    simulation, places = arm(), range(6, 31, 6)
+    points = drawn(simulation, [(0.0, k) for k in 5.0 * np.sin(np.arange(30) / 6.0)], places)
+    assert fit(simulation, Tags(points, names(places)), ARM, progress=False).outliers == ()
+
+
+def test_tags_of_which_nothing_tells_whether_they_jump_are_listed():
+    simulation, points, places = seen_with_gaps(2, 0.0, frames=30)
+    points[10:, 0] = np.nan  # no frame around the last one shows it
+    points[29, 0] = points[5, 0]
+    points[15, [1, 2, 4]] = np.nan  # no other tag
+    found = fit(simulation, Tags(points, places), ARM, progress=False)
+    assert found.unchecked == ((15, 3), (29, 0))
+    assert "outliers not looked for at 2 tags in 2 frames" in repr(found)
+    few = fit(simulation, Tags(points[:3], places), ARM, progress=False)
+    assert few.unchecked == tuple((frame, tag) for frame in range(3) for tag in range(5))
+
+
 def test_errors_have_the_size_that_the_covariance_says():
     coarse, fine = arm(), arm(nodes=121)
     truth = np.array([(0.0, 3.0)])
@@ -454,7 +529,8 @@ def test_a_fit_prints_what_it_found_in_a_few_lines():
     shown = repr(fit(simulation, Tags(points, names((10, 20, 30)), sigma=1e-4), ARM, progress=False)).split("\n")
     assert shown[0].startswith("Fit(2 of 3 frames converged")
     assert shown[1].startswith("  natural_curvature of 'arm': 2 to 4, sigma 0.01")
-    assert shown[2:] == ["  frame 1: nothing was seen"]
+    assert shown[2].startswith("  outliers not looked for at 6 tags in 2 frames")
+    assert shown[3:] == ["  frame 1: nothing was seen"]
     many = repr(fit(simulation, Tags(points, names((10, 20, 30))), [("arm", "natural_curvature", "segment")]))
     assert len(many.split("\n")) < 40
 

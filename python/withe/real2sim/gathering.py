@@ -19,6 +19,7 @@ FloatArray = npt.NDArray[np.float64]
 
 _MISFIT = 3.0  # times sigma: residuals beyond it, root of the mean square, are too great for it ...
 _CHANCE = 1e-6  # ... if normal errors are as great with a probability below this
+_RESOLVED = 1e-6  # of the extent of all tags: what fits resolve, and usual errors are at least
 
 
 def gather(
@@ -50,6 +51,7 @@ def gather(
     covariance *= _variance(stills, targets, list(told.values())) * slopes[:, :, None] * slopes[:, None]
     reasons = {f: "nothing was seen" for f in range(frames) if f not in solutions}
     reasons |= _misfits(stills, targets, told) | {f: s.reason for f, s in solutions.items() if s.reason}
+    outliers, unchecked = _outliers(stills, targets, residuals, with_data)
     return Fit(
         names=stills.names,
         values=values,
@@ -60,7 +62,8 @@ def gather(
         converged=np.array([f in solutions and solutions[f].converged for f in range(frames)]),
         reasons=reasons,
         unobservable=_unobservable(stills, residuals, own, common),
-        outliers=_outliers(stills, targets, residuals, with_data),
+        outliers=outliers,
+        unchecked=unchecked,
         _unknowns=tuple(stills.unknowns),
         _coordinates=coordinates,
     )
@@ -192,12 +195,17 @@ def _weights(names: list[str], direction: FloatArray) -> dict[str, float]:
 
 def _outliers(
     stills: Coordinates, targets: list[Target], residuals: FloatArray, solutions: dict[int, FrameSolution]
-) -> tuple[Outlier, ...]:
-    """Tags that jump, where tags are all there is."""
+) -> tuple[tuple[Outlier, ...], tuple[tuple[int, int], ...]]:
+    """Tags that jump, where tags are all there is, and those of which nothing tells whether they do."""
     if len(targets) != 1 or not isinstance(targets[0], Tags):
-        return ()
+        return (), ()
     if len(residuals) != targets[0].frames:  # a motion, all of it one fit
-        return ()
-    scale = targets[0].sigma or 1.0
-    places = scale * residuals.reshape(len(residuals), len(targets[0].places), -1)
-    return find_outliers(places, solutions, stills.per_frame)
+        return (), ()
+    target, points = targets[0], np.asarray(targets[0].points)
+    places = (target.sigma or 1.0) * residuals.reshape(*points.shape)
+    seen = np.isfinite(places).all(axis=2)
+    if not seen.any():
+        return (), ()
+    least = target.sigma or _RESOLVED * float(np.ptp(points[seen], axis=0).max())
+    found, checked = find_outliers(places, solutions, stills.per_frame, least)
+    return found, tuple((int(frame), int(tag)) for frame, tag in np.argwhere(seen & ~checked))

@@ -81,7 +81,7 @@ def fit_motion(
     Returns
     -------
     Fit
-        With one row of values, for the whole motion; `solves` counts runs.
+        With one row of values, for the whole motion; `solves` counts runs. Outliers are not looked for.
 
     Raises
     ------

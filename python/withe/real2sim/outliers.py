@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 import numpy.typing as npt
 
@@ -11,20 +13,27 @@ from withe.real2sim.results import Outlier
 __all__ = ["find_outliers"]
 
 FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
 
-_REACH = 3  # frames before and after, of which the running median is taken
-_JUMP = 10.0  # times the usual scatter
-_LEVERAGE = 0.1  # of 1 - H_ii: below it, hardly anything else tells what the tag does
+_AROUND = 6  # frames, nearest to one, with which a tag is compared
+_ALIGNMENTS = 2  # of frames with each other; further ones change little
+_FEWEST = 4  # of them; one may have an outlier itself
+_JUMP = 4.0  # times the usual error; of normal ones, 7 sigma in pixels and 9 in space
+_LEVERAGE = 0.1  # share of a jump that shows: below it, hardly anything else tells where the tag should be
 
 
 def find_outliers(
-    residuals: FloatArray, solutions: dict[int, FrameSolution], per_frame: npt.NDArray[np.bool_]
-) -> tuple[Outlier, ...]:
-    """Tags that jump.
+    residuals: FloatArray, solutions: dict[int, FrameSolution], per_frame: BoolArray, least: float
+) -> tuple[tuple[Outlier, ...], BoolArray]:
+    """Tags that jump, and where they were looked for.
 
-    A tag that jumps pulls the fit with it, and other tags away. With H the projector onto what the frame's unknowns can
-    explain, leaving tag i out changes the residuals r to r + H_i (1 - H_ii)^-1 r_i [Cook and Weisberg 1982]. The tag
-    that explains most of a jump is left out first.
+    In each frame a tag is compared with a line through what the fit leaves of it in the frames around in which it was
+    seen; these are aligned with each other, as other tags may be missing there. A tag that jumps pulls the fit with it,
+    and other tags away. With H the projector onto what the frame's unknowns can explain, leaving tag i out changes the
+    jumps r to r + H_i (1 - H_ii)^-1 r_i [Cook and Weisberg 1982], and r_i^T (1 - H_ii)^-1 r_i is what the sum of
+    squares loses. That, over the variance with which the line predicts, is a squared error of the tag, whatever its
+    leverage and wherever its frame. Of tags with too great an error, the one that explains most of the sum of squares
+    is left out first.
 
     Parameters
     ----------
@@ -32,63 +41,133 @@ def find_outliers(
     solutions : dict of int to FrameSolution
     per_frame : ndarray of bool
         Which unknowns every frame has of its own.
+    least : float [px or m]
+        Error that is usual at least.
+
+    Returns
+    -------
+    outliers : tuple of Outlier
+    checked : ndarray of bool of shape (frames, tags)
+        False for tags that were not seen, or that too few frames around or too few other tags tell of.
     """
-    jumps = residuals - _running_median(residuals)
-    sizes = np.linalg.norm(jumps, axis=2)
-    if not np.isfinite(sizes).any():
-        return ()
-    usual = 1.4826 * float(np.nanmedian(sizes))
-    found = []
-    for frame in np.flatnonzero(np.nan_to_num(sizes).max(axis=1) > _JUMP * usual):
-        jacobian = solutions[int(frame)].jacobian
-        own = jacobian[:, per_frame] if jacobian.shape[1] == len(per_frame) else jacobian
-        for tag, jump in _jumping(np.nan_to_num(jumps[frame]), own, _JUMP * usual):
-            found.append(Outlier(int(frame), tag, jump, usual))
-    return tuple(found)
+    own = {
+        frame: s.jacobian[:, per_frame] if s.jacobian.shape[1] == len(per_frame) else s.jacobian
+        for frame, s in solutions.items()
+    }
+    expected, spread = _lines(residuals)
+    for _ in range(_ALIGNMENTS):
+        expected, spread = _lines(_aligned(residuals, expected, own))
+    frames = {f: _Frame(residuals[f] - expected[f], jacobian, spread[f]) for f, jacobian in own.items()}
+    sizes = np.full(residuals.shape[:2], np.nan)
+    for frame, each in frames.items():
+        sizes[frame] = each.left_out(each.compared).errors
+    checked = np.isfinite(sizes)
+    if not checked.any():
+        return (), checked
+    usual = max(1.4826 * float(np.median(sizes[checked])), least)
+    found = [
+        Outlier(frame, tag, jump, usual)
+        for frame, each in frames.items()
+        if np.nanmax(sizes[frame], initial=0.0) > _JUMP * usual
+        for tag, jump in each.jumping(_JUMP * usual)
+    ]
+    return tuple(found), checked
 
 
-def _running_median(values: FloatArray) -> FloatArray:
-    """Median over frames as many before as after, which a steady drift does not move, in which the same tags were seen.
+def _lines(values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """What the frames around tell of each value, by a line, as what a model does not explain drifts.
 
-    What a model leaves in every frame shifts all residuals when a tag is missing. NaN where no two such frames are
-    beside one: nothing is known of what is usual there.
+    By repeated medians, which a few outliers do not move [Siegel 1982]. NaN where too few frames tell.
+
+    Returns
+    -------
+    expected : ndarray of shape (frames, tags, dimension)
+    spread : ndarray of shape (frames, tags)
+        Variance of a value less what is expected, over that of a value: of a line by least squares.
     """
-    medians = np.full_like(values, np.nan)
-    seen = np.asarray(np.isfinite(values).all(axis=2))
-    for frame in range(len(values)):
-        alike = [
-            other
-            for step in range(1, _REACH + 1)
-            for other in (frame - step, frame + step)
-            if step <= min(frame, len(values) - 1 - frame) and np.array_equal(seen[other], seen[frame])
-        ]
-        if len(alike) >= 2:
-            medians[frame] = np.median(values[[frame, *alike]], axis=0)
-    return medians
+    expected, spread = np.full_like(values, np.nan), np.full(values.shape[:2], np.nan)
+    for tag in range(values.shape[1]):
+        seen = np.flatnonzero(np.isfinite(values[:, tag]).all(axis=1))
+        count = min(_AROUND, len(seen) - 1)
+        if count < _FEWEST:
+            continue
+        at = seen[_others(seen, count)]
+        away = (at - seen[:, None]).astype(float)
+        there = values[at, tag]
+        pairs = np.array([[j for j in range(count) if j != i] for i in range(count)])
+        rises = (there[:, pairs] - there[:, :, None]) / (away[:, pairs] - away[:, :, None])[..., None]
+        slope = np.median(np.median(rises, axis=2), axis=1)
+        expected[seen, tag] = np.median(there - away[:, :, None] * slope[:, None], axis=1)
+        middle = away.mean(axis=1)
+        spread[seen, tag] = 1.0 + 1.0 / count + middle**2 / ((away - middle[:, None]) ** 2).sum(axis=1)
+    expected[spread > 1.0 / _LEVERAGE] = np.nan
+    return expected, spread
 
 
-def _jumping(jump: FloatArray, jacobian: FloatArray, limit: float) -> list[tuple[int, float]]:
-    """Tags of a frame to leave out, one after the other, each with how far it jumps when it pulls no more."""
-    tags, dimension = jump.shape
-    rest, left_out = jump.copy(), np.zeros(tags, bool)
-    found: list[tuple[int, float]] = []
-    while True:
-        kept = np.repeat(~left_out, dimension)
-        basis = Decomposed(jacobian * kept[:, None]).range
-        best, most, without = -1, 0.0, rest
-        for tag in np.flatnonzero(~left_out & (np.linalg.norm(rest, axis=1) > 0.0)):
-            rows = slice(tag * dimension, (tag + 1) * dimension)
-            alone = np.eye(dimension) - basis[rows] @ basis[rows].T
-            if np.linalg.eigvalsh(alone)[0] < _LEVERAGE:
-                continue
-            deleted = np.linalg.solve(alone, rest[tag])
-            if rest[tag] @ deleted > most:
-                best, most = int(tag), float(rest[tag] @ deleted)
-                without = rest + (basis @ (basis[rows].T @ deleted)).reshape(tags, dimension)
-        if most <= limit**2 or 2 * len(found) >= tags:
-            return found
-        found.append((best, float(np.linalg.norm(without[best]))))
-        rest, left_out[best] = without, True
-        rest[best] = 0.0
-        if np.linalg.norm(rest, axis=1).max() <= limit:
-            return found
+def _aligned(residuals: FloatArray, expected: FloatArray, own: dict[int, FloatArray]) -> FloatArray:
+    """Residuals with the unknowns of each frame changed so that they come as near as can be to what is expected.
+
+    What a model leaves in every frame shifts all residuals of a frame in which a tag is missing, as the unknowns then
+    make up for less. Without that shift, frames in which other tags were seen compare with each other.
+    """
+    aligned = residuals.copy()
+    for frame, jacobian in own.items():
+        away = (expected[frame] - residuals[frame]).ravel()
+        compared = Decomposed(np.where(np.isfinite(away)[:, None], jacobian, 0.0))
+        aligned[frame] += (jacobian @ compared.bounded(np.nan_to_num(away), np.inf)).reshape(aligned[frame].shape)
+    return aligned
+
+
+def _others(seen: npt.NDArray[np.int64], count: int) -> npt.NDArray[np.int64]:
+    """For each of some frames, which others of them are nearest to it: consecutive ones, shape (frames, count)."""
+    own = np.arange(len(seen))
+    first = np.clip(own[:, None] - np.arange(count + 1), 0, len(seen) - 1 - count)
+    farthest = np.maximum(seen[first + count] - seen[:, None], seen[:, None] - seen[first])
+    others = first[own, farthest.argmin(axis=1)][:, None] + np.arange(count)
+    return np.asarray(others + (others >= own[:, None]))
+
+
+class _LeftOut(NamedTuple):
+    """Of each tag, were it left out of a fit: its error, what the sum of squares loses, how far the tag jumps.
+
+    NaN, but for the last, where nothing tells.
+    """
+
+    errors: FloatArray
+    explained: FloatArray
+    jumps: FloatArray
+
+
+class _Frame:
+    """How far the tags of a frame are from what is expected, shape (tags, dimension), and what the fit can explain."""
+
+    def __init__(self, jumps: FloatArray, jacobian: FloatArray, spread: FloatArray) -> None:
+        self._jumps, self._jacobian, self._spread = np.nan_to_num(jumps), jacobian, spread
+        self.compared: BoolArray = np.asarray(np.isfinite(jumps).all(axis=1))
+
+    def left_out(self, kept: BoolArray) -> _LeftOut:
+        """What becomes of each tag that is kept."""
+        tags, dimension = self._jumps.shape
+        basis = Decomposed(self._jacobian * np.repeat(kept, dimension)[:, None]).range
+        jump = np.where(kept[:, None], self._jumps, 0.0).ravel()
+        rest = (jump - basis @ (basis.T @ jump)).reshape(tags, dimension)
+        rows = basis.reshape(tags, dimension, basis.shape[1])
+        alone = np.eye(dimension) - rows @ rows.transpose(0, 2, 1)
+        told = kept & (np.linalg.eigvalsh(alone)[:, 0] >= _LEVERAGE)
+        alone[~told] = np.eye(dimension)
+        deleted = np.linalg.solve(alone, rest[:, :, None])[:, :, 0]
+        explained = np.where(told, (rest * deleted).sum(axis=1), np.nan)
+        return _LeftOut(np.sqrt(explained / self._spread), explained, np.linalg.norm(deleted, axis=1))
+
+    def jumping(self, limit: float) -> list[tuple[int, float]]:
+        """Tags to leave out, one after the other, half of them at most, each with how far it jumps."""
+        kept = self.compared.copy()
+        found: list[tuple[int, float]] = []
+        while 2 * len(found) < np.count_nonzero(self.compared):
+            errors, explained, jumps = self.left_out(kept)
+            if not np.nanmax(errors, initial=0.0) > limit:
+                break
+            tag = int(np.argmax(np.where(errors > limit, explained, 0.0)))
+            found.append((tag, float(jumps[tag])))
+            kept[tag] = False
+        return found

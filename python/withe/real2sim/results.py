@@ -23,15 +23,20 @@ _ROWS_SHOWN = 8  # of each kind, in print
 class Outlier:
     """A tag that jumped in one frame against what the fit left of it in the frames around.
 
+    That is a tag whose error, were it left out of the fit of its frame, is more than four times the usual one. Errors
+    count over the standard deviation that is to be expected: where few other tags or frames tell, more is needed. With
+    normal errors the limit is 7 sigma in pixels and 9 in metres; below it, a tag biases its frame unnamed.
+
     Attributes
     ----------
     frame, tag : int
         From 0.
     jump : float
-        Distance from the running median of its residual, were it left out of the fit, in the unit of the target
-        [px or m].
+        Distance from what the frames around tell of its residual, were it left out of the fit, in the unit of the
+        target [px or m].
     scatter : float
-        Usual distance, 1.48 times the median.
+        Usual error: 1.48 times the median over all tags, at least sigma, or a millionth of the extent of all tags
+        without one.
     """
 
     frame: int
@@ -104,7 +109,10 @@ class Fit:
     unobservable : tuple of Unobservable
         Combinations of unknowns that the targets do not tell; print them.
     outliers : tuple of Outlier
-        Tags that jump in one frame.
+        Tags that jump in one frame. They are looked for in fits of frames to `Tags` alone, not in motions.
+    unchecked : tuple of (int, int)
+        Frames and tags where that would go unnoticed: tags that were seen, but in fewer than four of the frames around,
+        or with hardly any other tag in the frame that tells where they should be.
     """
 
     names: tuple[str, ...]
@@ -117,6 +125,7 @@ class Fit:
     reasons: dict[int, str]
     unobservable: tuple[Unobservable, ...]
     outliers: tuple[Outlier, ...]
+    unchecked: tuple[tuple[int, int], ...]
     _unknowns: tuple[Unknown, ...]
     _coordinates: FloatArray
 
@@ -128,6 +137,7 @@ class Fit:
                 *_some(self._ranges()),
                 *_some(f"not observable: {each}" for each in self.unobservable),
                 *_some(f"outlier: {each}" for each in self.outliers),
+                *self._not_looked_for(),
                 *_some(f"frame {frame}: {reason}" for frame, reason in self.reasons.items()),
             ]
         )
@@ -139,6 +149,14 @@ class Fit:
             span = f"{lowest:.6g}" if lowest == highest else f"{lowest:.6g} to {highest:.6g}"
             known = deviations[np.isfinite(deviations)]
             yield f"{name}: {span}" + (f", sigma {np.median(known):.2g}" if len(known) else "")
+
+    def _not_looked_for(self) -> Iterable[str]:
+        if self.unchecked:
+            frames = len({frame for frame, _ in self.unchecked})
+            yield (
+                f"outliers not looked for at {len(self.unchecked)} tags in {frames} frames: too few frames around, or "
+                "other tags, tell where they should be"
+            )
 
     @property
     def skipped(self) -> tuple[int, ...]:
