@@ -374,17 +374,20 @@ def test_errors_have_the_size_that_the_covariance_says():
     assert unknown.sigma("arm") == pytest.approx(found.sigma("arm"), rel=0.1)
 
 
+def arm_across(normal):
+    """An arm in the upright plane with some normal."""
+    scene = withe.Scene()
+    rubber = withe.Material(youngs_modulus=1e6, density=1000.0)
+    end = 0.3 * np.array((normal[1], -normal[0], 0.0))
+    rod = scene.add_rod(start=(0, 0, 0), end=end, nodes=31, radius=5e-3, material=rubber, name="arm")
+    scene.clamp(rod.start)
+    return scene.build(integrator="static", planar=True)
+
+
 @pytest.mark.parametrize(("normal", "across"), [((0.0, 1.0, 0.0), 0.0), ((0.6, 0.8, 0.0), 50.0)])
 @pytest.mark.parametrize("kind", ["tags", "centrelines"])
 def test_in_a_plane_an_estimated_error_does_not_depend_on_what_lies_across_it(normal, across, kind):
-    along = np.array((normal[1], -normal[0], 0.0))
-    scene = withe.Scene()
-    rubber = withe.Material(youngs_modulus=1e6, density=1000.0)
-    scene.clamp(
-        scene.add_rod(start=(0, 0, 0), end=0.3 * along, nodes=31, radius=5e-3, material=rubber, name="arm").start
-    )
-    simulation = scene.build(integrator="static", planar=True)
-    places = range(3, 31, 3)
+    simulation, places = arm_across(normal), range(3, 31, 3)
     exact = drawn(simulation, [(0.0, 3.0)], places)[0]
     rng = np.random.default_rng(11)
     inside, out = rng.normal(0.0, 5e-4, (30, *exact.shape)), rng.normal(0.0, 5e-4 * across, (30, len(exact), 1))
@@ -397,6 +400,16 @@ def test_in_a_plane_an_estimated_error_does_not_depend_on_what_lies_across_it(no
     ]
     given, estimated = (fit(simulation, target, ARM, progress=False).sigma("arm") for target in targets)
     assert estimated == pytest.approx(given, rel=0.1)
+
+
+def test_exact_tags_beside_the_plane_have_no_error_in_it():
+    normal = np.array((0.6, 0.8, 0.0))
+    simulation, places = arm_across(normal), range(3, 31, 3)
+    points = drawn(simulation, [(0.0, k) for k in np.linspace(-5.0, 5.0, 10)], places)
+    for shift in np.linspace(0.01, 0.1, 10):
+        found = fit(simulation, Tags(points + shift * normal, names(places)), ARM, progress=False)
+        assert (found.covariance >= 0.0).all()
+        assert found.sigma("arm").max() < 1e-3
 
 
 @pytest.mark.parametrize(

@@ -83,13 +83,13 @@ def _told(targets: list[Target], fitted: int, residuals: FloatArray, normal: Flo
     seen_in = range(targets[0].frames) if len(residuals) != targets[0].frames else [fitted]  # a motion is one frame
     numbers = sum(target.told(frame) for target in targets for frame in seen_in)
     rows = residuals[fitted].reshape(len(seen_in), -1)
-    squares = float(np.nansum(rows**2))
+    inside = np.nan_to_num(rows)
     if normal is not None:
         across = block_diag(*(target.across(normal) for target in targets))
         seen = np.isfinite(rows) @ across**2 > 1.0 - 1e-9
         numbers -= int(seen.sum())
-        squares -= float(np.sum((np.nan_to_num(rows) @ across)[seen] ** 2))
-    return _Told(numbers, squares)
+        inside = inside - np.where(seen, inside @ across, 0.0) @ across.T
+    return _Told(numbers, float(np.sum(inside**2)))
 
 
 def _misfits(stills: Coordinates, targets: list[Target], told: dict[int, _Told]) -> dict[int, str]:
