@@ -47,8 +47,8 @@ class FrictionPrediction {
 enum class FrictionKind { slipping, rolling };
 
 struct ContactLinearisation {
-  double regularisation = 1;      ///< by which the slip tolerance is greater
-  bool geometric = true;          ///< derivatives have how pressing turns, the part by which it has negative stiffness
+  double regularisation = 1;  ///< by which the slip tolerance is greater
+  bool geometric = true;      ///< derivatives have how pressing turns, the part by which it has negative stiffness
   FrictionPrediction friction{}, rolling{};  ///< where known, derivatives are what Newton's steps need, not those of
                                              ///< the forces
 

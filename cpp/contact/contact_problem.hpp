@@ -43,8 +43,8 @@ struct Touching {
   double before = 0;             ///< distance at the start of the step, where `law` needs it [m]
   PressingLaw law;
   PressingForce pressing;
-  Vec3d stick{}, roll{};         ///< likewise
-  int lagged = -1;  ///< friction of the start and no pressing: index in ContactProblem::lagged_friction
+  Vec3d stick{}, roll{};  ///< likewise
+  int lagged = -1;        ///< friction of the start and no pressing: index in ContactProblem::lagged_friction
 
   /// Ends of edges as `Bodies::end_points` has them.
   void end_points(Vec3d (&x)[4]) const {

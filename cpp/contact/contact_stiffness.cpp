@@ -100,25 +100,31 @@ Bracket distance_at(const Touching& t, bool force, double wanted) {
   return b;
 }
 
-/// What stops an edge's mass at the speed at which its ends near the other surface, within the step or within the depth of contact; and
-/// what stores its energy in that depth, where a step's force does as much work as contact stores.
+/// What stops an edge's mass at the speed at which the ends meet (along the normal of a plane, which is known before
+/// they do), within the step or within the depth of contact; and what stores its energy in that depth, where a step's
+/// force does as much work as contact stores.
 double impact_stiffness(const ContactProblem& problem, const ContactPair& pair) {
   if (problem.fixed(pair)) return 0.0;
   const Model& model = problem.model();
   const auto end_node = [&](int edge, int end) { return (end == 0 ? model.edge_tail : model.edge_head)[at(edge)]; };
   const VectorX& velocities = problem.start->v;
   const bool obstacle = pair.key.b < 0;
-  const Vec3d moved = problem.velocity_of(pair), normal = normal_at_start(problem, pair);
+  const Vec3d moved = problem.velocity_of(pair);
+  const Obstacle* plane = obstacle ? &problem.bodies.obstacle(pair) : nullptr;
+  if (plane != nullptr && plane->kind != ObstacleKind::plane) plane = nullptr;
+  const auto speed_of = [&](const Vec3d& v) {
+    return plane != nullptr ? std::max(0.0, -dot(plane->other, v)) : std::sqrt(dot(v, v));
+  };
   double fastest = 0.0;
   for (int k = 0; k < (pair.curve() ? pair.piece.weights->nodes : 2); ++k) {
     const int node_a = pair.curve() ? pair.piece.node[k] : end_node(pair.key.a, k);
-    const double v = dot(normal, local_position(model, velocities, node_a) - moved);
+    const Vec3d v = local_position(model, velocities, node_a) - moved;
     if (obstacle) {
-      fastest = std::max(fastest, -v);
+      fastest = std::max(fastest, speed_of(v));
       continue;
     }
     for (int l = 0; l < 2; ++l)
-      fastest = std::max(fastest, dot(normal, local_position(model, velocities, end_node(pair.key.b, l))) - v);
+      fastest = std::max(fastest, speed_of(v - local_position(model, velocities, end_node(pair.key.b, l))));
   }
   const double depth = kDepth * pair.small_radius(), half = 0.5 * problem.mass_of(pair) / depth;
   const double stops = half * fastest * std::min(1.0 / problem.duration, fastest / depth);

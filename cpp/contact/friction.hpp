@@ -18,9 +18,9 @@
 /// symmetric and not negative, so F . S is not either.
 ///
 /// Rolling friction on an obstacle is a couple against the turning of a rod's surface there: the same laws, for the way
-/// R = phi_a x r_a by which the slip is more than what the centreline moves, with a coefficient of its own. Its force on
-/// R goes back through that part of J alone, so that the couple is mu_r r N at most [Johnson, Contact Mechanics, 1985,
-/// section 9.1], and nothing pushes the rod along.
+/// R = phi_a x r_a by which the slip is more than what the centreline moves, with a coefficient of its own. Its force
+/// on R goes back through that part of J alone, so that the couple is mu_r r N at most [Johnson, Contact Mechanics,
+/// 1985, section 9.1], and nothing pushes the rod along.
 
 #include <cmath>
 #include <type_traits>
@@ -36,8 +36,8 @@ namespace withe {
 struct FrictionSetting {
   const ContactPair* pair = nullptr;
   const Obstacle* obstacle = nullptr;
-  double friction = 0;   ///< the greater coefficient [-]
-  bool rolling = false;  ///< whether it is rolling friction
+  double friction = 0;                           ///< the greater coefficient [-]
+  bool rolling = false;                          ///< whether it is rolling friction
   ClosestPoints points;                          ///< whose class is kept
   const CurveDistance<double>* curve = nullptr;  ///< at the unknowns themselves, not at others
   double start[kContactUnknowns] = {};           ///< unknowns at the start of the step
@@ -52,7 +52,7 @@ struct FrictionSetting {
   Vec3d turn{};                     ///< by which it turns then about its own axis [rad]
   Vec3d stick{};                    ///< at the start of the step [m]
   bool spatial = true, centreline = false;
-  bool isotropic = true;         ///< whether friction is the same along the rod and across it
+  bool isotropic = true;             ///< whether friction is the same along the rod and across it
   const Vec3d* predicted = nullptr;  ///< friction over its limit, as a step of Newton's method predicts it
 };
 

@@ -102,19 +102,6 @@ double first_approach(const ContactProblem& problem, const ContactPair& pair) {
   return std::max(approach_speed(problem, pair), least_approach(problem, pair));
 }
 
-Vec3d normal_at_start(const ContactProblem& problem, const ContactPair& pair) {
-  Vec3d x[4];
-  if (pair.curve()) {
-    const Obstacle& obstacle = problem.bodies.obstacle(pair);
-    if (obstacle.kind == ObstacleKind::plane) return obstacle.other;
-    problem.bodies.end_points(pair, problem.start->q, x);
-    for (Vec3d& p : x) p += problem.shift_of(pair);
-    return distance_to(obstacle, curve_point(*pair.piece.weights, x, problem.curve_at_start(pair).s)).normal;
-  }
-  const ClosestPoints c = problem.closest_at_start(pair, x);
-  return (1.0 / std::sqrt(std::max(dot(c.between, c.between), 1e-300))) * c.between;
-}
-
 double approach_speed(const ContactProblem& problem, const ContactPair& pair) {
   Vec3d x[4], v[4];
   problem.bodies.end_points(pair, problem.start->v, v);

@@ -10,8 +10,6 @@ namespace withe {
 double rest_speed(const ContactProblem& problem, const ContactPair& pair);
 /// Of surfaces that near each other so slowly that they rest, if they do not fall on [m/s].
 double least_approach(const ContactProblem& problem, const ContactPair& pair);
-/// From b to a where they are nearest as the step begins.
-Vec3d normal_at_start(const ContactProblem& problem, const ContactPair& pair);
 /// At which surfaces near each other as the step begins [m/s].
 double approach_speed(const ContactProblem& problem, const ContactPair& pair);
 /// Whether an impact is still on its way in at the end of a step: it has not pressed surfaces together yet, nor turned

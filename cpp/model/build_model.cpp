@@ -377,9 +377,7 @@ class Builder {
     };
     std::vector<int>& out = model_.dof_component;
     out.assign(static_cast<std::size_t>(model_.dof_count), 0);
-    const auto set = [&](int dof, int size, int node) {
-      std::fill_n(out.begin() + dof, size, component_of(node));
-    };
+    const auto set = [&](int dof, int size, int node) { std::fill_n(out.begin() + dof, size, component_of(node)); };
     for (int i = 0; i < model_.node_count; ++i) set(model_.node_dof[static_cast<std::size_t>(i)], model_.dimension, i);
     for (std::size_t e = 0; e < model_.edge_dof.size(); ++e) set(model_.edge_dof[e], 1, model_.edge_tail[e]);
     for (std::size_t f = 0; f < model_.frame_dof.size(); ++f)

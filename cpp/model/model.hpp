@@ -197,8 +197,8 @@ struct Model {
   std::vector<int> frame_node;
   std::vector<int> node_dof, edge_dof, frame_dof;  ///< first unknown of each; edge_dof is empty in a plane
   std::vector<int> tail_dof, head_dof;             ///< per edge: first unknown of its nodes
-  int component_count = 0;         ///< connected components: what joints and springs hold together
-  std::vector<int> dof_component;  ///< per unknown
+  int component_count = 0;                         ///< connected components: what joints and springs hold together
+  std::vector<int> dof_component;                  ///< per unknown
   std::vector<Constraint> constraints;
   std::vector<Support> supports;
 

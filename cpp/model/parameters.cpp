@@ -110,8 +110,7 @@ void set_contact(const ContactDescription& contact, Parameters& parameters) {
   p.obstacle_friction.col(0) = contact.obstacle_friction;
   p.obstacle_friction.col(1) = contact.obstacle_across.size() > 0 ? contact.obstacle_across : contact.obstacle_friction;
   p.obstacle_rolling = contact.obstacle_rolling;
-  if (p.obstacle_rolling.size() == 0)
-    p.obstacle_rolling.setZero(static_cast<Eigen::Index>(contact.obstacles.size()));
+  if (p.obstacle_rolling.size() == 0) p.obstacle_rolling.setZero(static_cast<Eigen::Index>(contact.obstacles.size()));
   p.obstacle_restitution = contact.obstacle_restitution;
   if (p.obstacle_restitution.size() == 0)
     p.obstacle_restitution.setOnes(static_cast<Eigen::Index>(contact.obstacles.size()));
@@ -134,8 +133,8 @@ bool SurfaceParameters::operator==(const SurfaceParameters& other) const {
   return friction == other.friction && slip_tolerance == other.slip_tolerance && restitution == other.restitution &&
          contact_stiffness == other.contact_stiffness && same(obstacle_friction, other.obstacle_friction) &&
          same(obstacle_rolling, other.obstacle_rolling) && same(obstacle_restitution, other.obstacle_restitution) &&
-         same(pair_friction, other.pair_friction) &&
-         same(pair_restitution, other.pair_restitution) && same(pair_contact_stiffness, other.pair_contact_stiffness) &&
+         same(pair_friction, other.pair_friction) && same(pair_restitution, other.pair_restitution) &&
+         same(pair_contact_stiffness, other.pair_contact_stiffness) &&
          std::equal(pair_shares.begin(), pair_shares.end(), other.pair_shares.begin(), other.pair_shares.end(), same);
 }
 

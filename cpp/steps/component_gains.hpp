@@ -11,7 +11,8 @@ namespace withe {
 /// and what its energies, kinetic and elastic, grow by beyond the work of the forces of the step [J].
 struct ComponentGains {
   VectorX turn, energy;
-  /// Where edges turn by no more than this [rad], and stretching gains no more than that [J], nothing else is looked at.
+  /// Where edges turn by no more than this [rad], and stretching gains no more than that [J], nothing else is looked
+  /// at.
   double small_turn = 0;
   VectorX small_gain;
   std::vector<char> whole;  ///< whether all was looked at

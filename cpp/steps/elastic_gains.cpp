@@ -8,37 +8,42 @@
 namespace withe {
 namespace {
 
-/// Squares of an edge's length at both ends of a step, and the product of both edges.
+/// An edge at both ends of a step: squares of its length, their product, and the change.
 struct EdgeWay {
   double before = 0.0, after = 0.0, across = 0.0;
+  Vec3d start, change;
 
   EdgeWay(const Model& model, const VectorX& q0, const VectorX& q1, int edge) {
-    const int a = model.tail_dof[at(edge)], b = model.head_dof[at(edge)];
-    for (int i = 0; i < model.dimension; ++i) {
-      const double d0 = q0(b + i) - q0(a + i), d1 = q1(b + i) - q1(a + i);
-      across += d0 * d1;
-      before += d0 * d0;
-      after += d1 * d1;
-    }
+    const int a = model.tail_dof[at(edge)], b = model.head_dof[at(edge)], n = model.dimension;
+    const auto along = [&](const VectorX& q) {
+      return Vec3d{q(b) - q(a), q(b + 1) - q(a + 1), n > 2 ? q(b + 2) - q(a + 2) : 0.0};
+    };
+    start = along(q0);
+    const Vec3d end = along(q1);
+    change = end - start;
+    across = dot(start, end);
+    before = dot(start, start);
+    after = dot(end, end);
   }
 
   /// The square of the cosine, with its sign.
   double square() const { return across * std::abs(across) / (before * after); }
 
   /// Of an edge of stiffness 1 N whose force is that in the step's middle, or at its end. One under pressure that turns
-  /// gains by the latter: it gives way by l0 (1 - cos).
+  /// gains by the latter: it gives way by l0 (1 - cos). Small as it is, it is made of no differences of lengths.
   double stretch_gain(double rest, bool at_end) const {
     const double l0 = std::sqrt(before), l1 = std::sqrt(after);
-    if (at_end) return (l0 * l1 - across) / l1 - 0.5 * (before + after - 2.0 * across) / rest;
+    const Vec3d turned = cross(start, change);
+    const double away = dot(turned, turned) / (l0 * l1 + across);  // l0 l1 (1 - cos)
+    if (at_end) return away / l1 - 0.5 * dot(change, change) / rest;
     const double middle = 0.5 * std::sqrt(std::max(before + after + 2.0 * across, 0.0));
-    return middle > 0.0 ? 0.5 * (l1 - l0) * (l1 + l0 - 2.0 * middle) / middle : 0.0;
+    return middle > 0.0 ? (l1 - l0) * away / ((l0 + l1 + 2.0 * middle) * middle) : 0.0;
   }
 };
 
 double angle_of(double square) {
-  return std::isfinite(square)
-             ? std::acos(std::copysign(std::sqrt(std::min(std::abs(square), 1.0)), square))
-             : INFINITY;
+  return std::isfinite(square) ? std::acos(std::copysign(std::sqrt(std::min(std::abs(square), 1.0)), square))
+                               : INFINITY;
 }
 
 }  // namespace

@@ -80,13 +80,8 @@ std::optional<Profile> profile(const ColorImage& image, const Strand& strand, in
   return sum;
 }
 
-/// Mean squared differences of colours: between the picture in the crossing and the profiles of one strand outside it;
-/// and between these, on either side, which says what differences mean nothing.
-struct Misfit {
-  double inside = 0, outside = 0;
-};
-
-Misfit misfit(const ColorImage& image, const Strand& strand, const Strand& other) {
+/// Mean squared difference between the picture in the crossing and the profiles of one strand outside it.
+double misfit(const ColorImage& image, const Strand& strand, const Strand& other) {
   const double cosine = std::abs(strand.tangent().dot(other.tangent()));
   const double sine = std::sqrt(std::max(0.0, 1 - cosine * cosine));
   const double reach = (other.half_width() + strand.half_width() * cosine) / std::max(sine, 0.15) + 1;
@@ -95,7 +90,7 @@ Misfit misfit(const ColorImage& image, const Strand& strand, const Strand& other
   const int samples = std::max(3, static_cast<int>(strand.half_width() / strand.spacing()));
   const std::optional<Profile> before = profile(image, strand, -rows - 1, -1, samples);
   const std::optional<Profile> behind = profile(image, strand, rows + 1, 1, samples);
-  if (!before && !behind) return {};
+  if (!before && !behind) return 0;
   const Profile& from = before ? *before : *behind;
   const Profile& to = behind ? *behind : *before;
   double sum = 0;
@@ -114,10 +109,7 @@ Misfit misfit(const ColorImage& image, const Strand& strand, const Strand& other
       ++count;
     }
   }
-  Misfit found{count > 0 ? sum / count : 0};
-  for (std::size_t k = 0; k < kLanes; ++k)
-    found.outside += static_cast<double>((from[k] - to[k]).squaredNorm()) / kLanes;
-  return found;
+  return count > 0 ? sum / count : 0;
 }
 
 }  // namespace
@@ -126,10 +118,10 @@ void decide_order(const ColorImage& image, Tracing& tracing) {
   for (Crossing& crossing : tracing.crossings) {
     const Strand first(tracing, crossing.over);
     const Strand second(tracing, crossing.under);
-    const Misfit a = misfit(image, first, second), b = misfit(image, second, first);
-    if (b.inside < a.inside) std::swap(crossing.over, crossing.under);
-    const double sum = a.inside + b.inside, beyond = std::abs(a.inside - b.inside) - 0.5 * (a.outside + b.outside);
-    crossing.confidence = sum > 0 ? std::clamp(beyond / sum, 0.0, 1.0) : 0;
+    const double a = misfit(image, first, second);
+    const double b = misfit(image, second, first);
+    if (b < a) std::swap(crossing.over, crossing.under);
+    crossing.confidence = a + b > 0 ? std::abs(a - b) / (a + b) : 0;
   }
 }
 

@@ -15,9 +15,10 @@ namespace {
 /// Share of the greatest energy that steps may gain from nowhere in all: where midpoint steps gain more,
 /// energy-momentum ones are as accurate or more so, and without any limit the former fail (see integrators/README.md).
 constexpr double kMostGain = 1e-3;
-// By which the greatest energy fades in a step that does not reach it; and what rounding leaves of the balance of a
-// component that travels, over the energy of that, with room.
-constexpr double kFading = 1.0 - 1.0 / 1024.0, kRounding = 1e-7;
+// Energies are measured once in so many steps, and where too much seems to be gained; by how much the greatest fades
+// then; and what rounding leaves of the balance of a component that travels, over the energy of that, with room.
+constexpr int kMeasured = 8;
+constexpr double kFading = 1.0 - 1.0 / 128.0, kRounding = 1e-7;
 
 /// Of a part of each node's mass, part(node).
 template <class Part>
@@ -200,16 +201,20 @@ bool World::Implementation::gains_energy() {
   bool measured = false;
   for (int i = 0; i < model.component_count; ++i) {
     if (!guard.whole[at(i)]) continue;
-    if (!measured) find_component_energies(state, now);
-    measured = true;
-    // What came from nowhere is no measure of what there is.
-    const double gain = guard.gain[i], put_in = now.kinetic[i] + now.elastic[i] - std::max(gain, 0.0);
-    const double greatest = std::min(std::max(now.kinetic[i], 0.1 * now.elastic[i]), put_in);
-    guard.scale[i] = std::max({kFading * guard.scale[i], greatest, kRounding * now.travelling[i]});
-    const double most = kMostGain * guard.scale[i];
-    if (gain > 1e-6 * guard.scale[i] && guard.excess[i] + gain > most) return true;
+    const double gain = guard.gain[i];
+    double& scale = guard.scale[i];
+    const auto too_much = [&] { return gain > 1e-6 * scale && guard.excess[i] + gain > kMostGain * scale; };
+    if (steps_taken % kMeasured == 0 || too_much()) {
+      if (!measured) find_component_energies(state, now);
+      measured = true;
+      // What came from nowhere is no measure of what there is.
+      const double put_in = now.kinetic[i] + now.elastic[i] - std::max(gain, 0.0);
+      const double greatest = std::min(std::max(now.kinetic[i], 0.1 * now.elastic[i]), put_in);
+      scale = std::max({kFading * scale, greatest, kRounding * now.travelling[i]});
+      if (too_much()) return true;
+    }
     // What was lost is no stock to gain from, but for a little, by which the midpoint rule's energy goes to and fro.
-    guard.excess[i] = std::max(guard.excess[i] + gain, euler ? 0.0 : -0.5 * most);
+    guard.excess[i] = std::max(guard.excess[i] + gain, euler ? 0.0 : -0.5 * kMostGain * scale);
   }
   return false;
 }
@@ -229,7 +234,8 @@ void World::Implementation::find_component_energies(const State& then, Component
     for (int d = 0; d < model.dimension; ++d) out.momentum(own, d) += mass.rows[dof + d] * v[dof + d];
   }
   for (int e = 0; e < model.edge_count; ++e) {
-    const int a = model.tail_dof[at(e)], b = model.head_dof[at(e)], n = model.dimension, own = model.component_of_edge(e);
+    const int a = model.tail_dof[at(e)], b = model.head_dof[at(e)], n = model.dimension,
+              own = model.component_of_edge(e);
     out.kinetic[own] -= 0.5 * mass.coupling[e] * (v.segment(b, n) - v.segment(a, n)).squaredNorm();
     out.elastic[own] += stretch_energy_of(model, k.elastic, c, e);
   }
@@ -243,28 +249,45 @@ void World::Implementation::find_component_energies(const State& then, Component
   for (std::size_t s = 0; s < model.description.springs.size(); ++s)
     out.elastic[model.component_of_node(model.description.springs[s].nodes[0])] +=
         spring_energy(model, k.spring_stiffness, k.spring_rest_length, then.q, static_cast<int>(s));
+  // In a frame that goes with the nodes that supports hold, else with the centre of mass.
+  MatrixX3& frame = out.frame;
+  VectorX& nodes = out.held_nodes;
+  frame.setZero(model.component_count, 3);
+  nodes.setZero(model.component_count);
+  for (const Support& support : model.supports)
+    for (const int node : support.nodes) {
+      if (!support.active || support.yields()) continue;
+      const int own = model.component_of_node(node);
+      nodes[own] += 1.0;
+      frame.row(own).head(model.dimension) += v.segment(model.node_dof[at(node)], model.dimension).transpose();
+    }
   for (int i = 0; i < model.component_count; ++i) {
-    if (out.mass[i] > 0.0) out.travelling[i] = 0.5 * out.momentum.row(i).squaredNorm() / out.mass[i];
+    if (nodes[i] > 0.0)
+      frame.row(i) /= nodes[i];
+    else if (out.mass[i] > 0.0)
+      frame.row(i) = out.momentum.row(i) / out.mass[i];
+    out.travelling[i] = frame.row(i).dot(out.momentum.row(i) - 0.5 * out.mass[i] * frame.row(i));
     out.kinetic[i] -= out.travelling[i];
   }
 }
 
-/// Kinetic and elastic energy of components that touch anything [J]: about their common centre of mass, but where they
-/// touch obstacles.
+/// Kinetic and elastic energy of components that touch anything [J]: about their common centre of mass, but where
+/// something is held or an obstacle.
 double World::Implementation::touching_energy(const State& then) {
   ComponentEnergies& energies = energy_scratch.components;
   find_component_energies(then, energies);
   double sum = 0.0, mass = 0.0, travelling = 0.0;
   Vector3 momentum = Vector3::Zero();
-  const auto [which, obstacle] = equations_of_step().contact()->touching_components();
+  auto [which, fixed] = equations_of_step().contact()->touching_components();
   for (int i = 0; i < model.component_count; ++i) {
     if (!which[at(i)]) continue;
+    fixed = fixed || energies.held_nodes[i] > 0.0;
     sum += energies.kinetic[i] + energies.elastic[i];
     travelling += energies.travelling[i];
     mass += energies.mass[i];
     momentum += energies.momentum.row(i).transpose();
   }
-  if (!obstacle && mass > 0.0) travelling -= 0.5 * momentum.squaredNorm() / mass;
+  if (!fixed && mass > 0.0) travelling -= 0.5 * momentum.squaredNorm() / mass;
   return sum + travelling;
 }
 

@@ -21,11 +21,11 @@ struct EnergyCoefficients {
   void set(const Model& model, const Parameters& parameters);
 };
 
-/// Per connected component: kinetic energy about its own centre of mass, that of the latter's motion, elastic energy [J];
-/// mass [kg] and momentum [kg m/s].
+/// Per connected component: kinetic energy beside a frame that travels along with it, what that leaves out, elastic
+/// energy [J]; mass [kg], momentum [kg m/s], velocity of the frame [m/s].
 struct ComponentEnergies {
-  VectorX kinetic, travelling, elastic, mass;
-  MatrixX3 momentum;
+  VectorX kinetic, travelling, elastic, mass, held_nodes;
+  MatrixX3 momentum, frame;
 };
 
 /// Scratch for energies.

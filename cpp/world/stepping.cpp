@@ -359,7 +359,8 @@ bool World::Implementation::inner_step(double dt, int slot, double& error) {
   guard.turn = std::max(guard.turn, r.largest_turn);
   if (watches_energy()) {
     guard.gain += work.gains.energy;
-    for (std::size_t i = 0; i < guard.whole.size(); ++i) guard.whole[i] = static_cast<char>(guard.whole[i] || work.gains.whole[i]);
+    for (std::size_t i = 0; i < guard.whole.size(); ++i)
+      guard.whole[i] = static_cast<char>(guard.whole[i] || work.gains.whole[i]);
   }
   load_work += r.load_work;
   dissipated += r.dissipated;

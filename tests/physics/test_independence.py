@@ -75,7 +75,7 @@ def dropped(change: Any) -> float:
 
 
 CHANGES = {
-    "another is moved": lambda s: s.set_state("b", positions=s.positions("b") + [0, 0.1, 0]),
+    "another is moved": lambda s: s.set_state("b", positions=s.positions("b") + np.array((0.0, 0.1, 0.0))),
     "another is twisted": lambda s: s.set_state("b", twist=0.0),
     "it stays where it is": lambda s: s.set_state("a", positions=s.positions("a"), velocities=s.velocities("a")),
     "displaced by nothing": lambda s: s.displace_state(np.zeros(len(s.state_difference(s)))),

@@ -62,6 +62,21 @@ def test_a_ring_is_closed_and_repeats_no_row():
     assert 0.1 < np.hypot(*(line[0] - line[-1])) <= 2
 
 
+@pytest.mark.parametrize("turn", np.arange(12) * 0.05)
+def test_a_ring_lists_each_crossing_once_wherever_its_rows_begin(turn):
+    """Three, of a curve that goes twice round a centre; one of them was listed again where it held the first row."""
+    t = np.linspace(0.0, 2.0 * np.pi, 1500, endpoint=False)
+    x = 160.0 + 45.0 * (2.0 + np.cos(3.0 * t)) * np.cos(2.0 * t + turn)
+    y = 160.0 + 45.0 * (2.0 + np.cos(3.0 * t)) * np.sin(2.0 * t + turn)
+    rows, columns = np.mgrid[:320, :320]
+    mask = np.zeros((320, 320), bool)
+    for u, v in zip(x, y, strict=True):
+        mask |= (columns - u) ** 2 + (rows - v) ** 2 < 3.5**2
+    tracing = trace_mask(mask)
+    assert tracing.closed == [True]
+    assert len(tracing.crossings) == 3
+
+
 @pytest.mark.parametrize(
     "mask",
     [

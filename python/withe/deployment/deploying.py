@@ -115,7 +115,8 @@ def deploy(
     Raises
     ------
     ValueError
-        Friction that is not positive, negative noise or rolling friction, a cable shorter than the plan holds, wrong numbers of nodes.
+        Friction that is not positive, negative noise or rolling friction, a cable shorter than the plan holds, wrong
+        numbers of nodes.
 
     Examples
     --------

@@ -71,7 +71,9 @@ class Contacts:
         return cast(
             Obstacle,
             self._directory.add(
-                make_obstacle(name, "plane", np.array([0.0, 0.0, height]), up, 0.0, friction, restitution, rolling_friction)
+                make_obstacle(
+                    name, "plane", np.array([0.0, 0.0, height]), up, 0.0, friction, restitution, rolling_friction
+                )
             ),
         )
 
@@ -106,7 +108,10 @@ class Contacts:
         where = validation.vector(point, f"point of {name!r}")
         across = validation.unit_vector(normal, f"normal of {name!r}")
         return cast(
-            Obstacle, self._directory.add(make_obstacle(name, "plane", where, across, 0.0, friction, restitution, rolling_friction))
+            Obstacle,
+            self._directory.add(
+                make_obstacle(name, "plane", where, across, 0.0, friction, restitution, rolling_friction)
+            ),
         )
 
     def add_sphere(
@@ -140,7 +145,10 @@ class Contacts:
         where = validation.vector(center, f"center of {name!r}")
         radius = validation.positive(radius, f"radius of {name!r}")
         return cast(
-            Obstacle, self._directory.add(make_obstacle(name, "capsule", where, where, radius, friction, restitution, rolling_friction))
+            Obstacle,
+            self._directory.add(
+                make_obstacle(name, "capsule", where, where, radius, friction, restitution, rolling_friction)
+            ),
         )
 
     def add_capsule(
@@ -176,7 +184,10 @@ class Contacts:
         first, last = validation.vector(start, f"start of {name!r}"), validation.vector(end, f"end of {name!r}")
         radius = validation.positive(radius, f"radius of {name!r}")
         return cast(
-            Obstacle, self._directory.add(make_obstacle(name, "capsule", first, last, radius, friction, restitution, rolling_friction))
+            Obstacle,
+            self._directory.add(
+                make_obstacle(name, "capsule", first, last, radius, friction, restitution, rolling_friction)
+            ),
         )
 
     def enable_contact(

@@ -351,7 +351,7 @@ class Ledger:
         elif (
             isinstance(call.part, LoadPart | MassPart)
             or (isinstance(call.part, SpringPart) and word in SPRING_WORDS)
-            or word == "rolling_friction"
+            or (isinstance(call.part, ObstaclePart) and word == "rolling_friction")
         ):
             self._add(index, word, reader_of(call.session, call.part, word)(OfRun(found)))
         elif isinstance(call.part, ObstaclePart | BodyPair):
