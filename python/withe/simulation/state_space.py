@@ -55,7 +55,7 @@ class StateSpace:
         ConvergenceError
             The step cannot be solved.
         ValueError
-            What has no gradient, as in `Record.gradient`.
+            What has no gradient, as in `Record.gradient`, and natural shapes on their way (`over=`).
 
         Examples
         --------
