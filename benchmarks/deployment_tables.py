@@ -4,12 +4,13 @@ python benchmarks/deployment_tables.py [--quick] [--whole] [--cables 2] [--patte
                                        [--known] [--refine]
 
 By default cable 2 alone, which takes some 10 minutes on two cores; --whole takes cables 1 to 3 and three noisy trials
-of each cell, and hours. Runs go side by side, one a core. Each is printed, and written to
-out/benchmarks/deployment_tables.jsonl, as it ends. Ctrl-C makes the tables of what there is; --resume goes on after
-that. Cables are laid quasi-statically, but for the intuitive way and noisy trials, at 2.5 cm/s: an upright cable
-buckles, falls and swings, and no row of equilibria follows it. In noisy trials the planner knows the cable by a picture
-of its loop. Errors are those of (9.11), point by point: the distance of each point of the cable from its place on the
-pattern. The way "network" needs torch, and is left out without it.
+of each cell: with --ways placed exact network intuitive half an hour, with "optimised" hours. Runs go side by side,
+one a core. Each is printed, and written to out/benchmarks/deployment_tables.jsonl, as it ends. Ctrl-C makes the tables
+of what there is; --resume goes on after that. Cables are laid quasi-statically, but for the intuitive way and noisy
+trials, at 2.5 cm/s in steps of 20 ms: an upright cable buckles, falls and swings, and no row of equilibria follows it.
+In noisy trials the planner knows the cable by a picture of its loop. Errors are those of (9.11), point by point: the
+distance of each point of the cable from its place on the pattern.
+The way "network" needs torch, and is left out without it.
 """
 
 from __future__ import annotations
