@@ -237,9 +237,7 @@ void Contact::predict_friction(const VectorX& change, ContactLinearisation& line
     prediction.renew([&](const auto& add) {
       OrderedLookup last;
       for (const Touching& t : set_) {
-        if (kind == FrictionKind::rolling ? !resists_rolling(problem_, t)
-                                          : (t.lagged >= 0) != problem_.lags() || !(t.pair.friction > 0.0))
-          continue;
+        if (!has_friction(problem_, t, kind)) continue;
         const Slipping s = slipping(problem_, t, kind, linearisation, change);
         const Vec3d* known = prediction.of(t.pair.key, last);
         if (s.limit > 0.0) add(t.pair.key, s.law.predict(s.slip, s.change, known, s.limit));

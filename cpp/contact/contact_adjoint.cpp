@@ -246,9 +246,9 @@ ContactAdjoint contact_adjoint(const ContactProblem& problem, const Touching& t,
         "no gradient is known through anchored friction: take friction_model='implicit' or 'lagged'");
   if (t.lagged >= 0)
     add_lagged_friction(problem, t, rows, out);
-  else if (t.pair.friction > 0.0 && !problem.lags())
-    add_implicit_friction(problem, t, FrictionKind::slipping, rows, out);
-  if (resists_rolling(problem, t)) add_implicit_friction(problem, t, FrictionKind::rolling, rows, out);
+  else
+    for (const FrictionKind kind : kFrictionKinds)
+      if (has_friction(problem, t, kind)) add_implicit_friction(problem, t, kind, rows, out);
   if (t.lagged >= 0) return out;
   if (problem.turns(t.pair))
     add_mean_pressing(problem, t, rows, out);

@@ -15,8 +15,6 @@ constexpr double kGive = 0.05;
 // On a way this short, over the slip that friction grows with, a tangent says enough.
 constexpr double kShortWay = 0.1;
 
-constexpr FrictionKind kKinds[] = {FrictionKind::slipping, FrictionKind::rolling};
-
 double coefficient(const ContactPair& pair, FrictionKind kind) {
   return kind == FrictionKind::rolling ? pair.rolling : pair.friction;
 }
@@ -33,7 +31,7 @@ FrictionForce<double> friction_now(const ContactProblem& problem, const Touching
 /// Calls see(kind) for friction of each kind that a contact has.
 template <class See>
 void each_kind(const Touching& t, const See& see) {
-  for (const FrictionKind kind : kKinds)
+  for (const FrictionKind kind : kFrictionKinds)
     if (coefficient(t.pair, kind) > 0.0) see(kind);
 }
 
@@ -43,12 +41,14 @@ double slip_rate(const ContactProblem& problem, double regularisation) {
   return 7.5 / (regularisation * problem.parameters->slip_tolerance * problem.duration);
 }
 
-bool rubs(const ContactProblem& problem, const Touching& t) {
-  return t.lagged >= 0 || (!problem.lags() && t.pair.rubs());
+/// Lagged friction is that of contacts of the start, and holds no rolling rod.
+bool has_friction(const ContactProblem& problem, const Touching& t, FrictionKind kind) {
+  if (kind == FrictionKind::rolling && problem.lags()) return false;
+  return coefficient(t.pair, kind) > 0.0 && (t.lagged >= 0) == problem.lags();
 }
 
-bool resists_rolling(const ContactProblem& problem, const Touching& t) {
-  return t.pair.rolling > 0.0 && t.lagged < 0 && rubs(problem, t);
+bool rubs(const ContactProblem& problem, const Touching& t) {
+  return has_friction(problem, t, FrictionKind::slipping) || has_friction(problem, t, FrictionKind::rolling);
 }
 
 bool regularises_friction(const Model& model) {
@@ -108,7 +108,7 @@ double friction_slope(const ContactProblem& problem, const Touching& t, const Co
   if (problem.lags()) return 0.0;
   if (!problem.anchored()) return -(mu + t.pair.rolling) * t.pressing.first * rate;
   double slope = 0.0;
-  for (const FrictionKind kind : kKinds) slope += anchor_stiffness(t.pair, kind, t.stiffness);
+  for (const FrictionKind kind : kFrictionKinds) slope += anchor_stiffness(t.pair, kind, t.stiffness);
   return slope;
 }
 

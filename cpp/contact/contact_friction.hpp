@@ -11,10 +11,9 @@ namespace withe {
 bool regularises_friction(const Model& model);
 /// K / (2 dt), over what makes the slip tolerance greater [1/m].
 double slip_rate(const ContactProblem& problem, double regularisation);
-/// Whether there is friction on a contact in a step.
+/// Whether there is friction on a contact in a step, of a kind or at all.
+bool has_friction(const ContactProblem& problem, const Touching& t, FrictionKind kind);
 bool rubs(const ContactProblem& problem, const Touching& t);
-/// Whether there is rolling friction on it.
-bool resists_rolling(const ContactProblem& problem, const Touching& t);
 /// Stiffness of an anchor, for a contact of that stiffness [N/m].
 double anchor_stiffness(const ContactPair& pair, FrictionKind kind, double stiffness);
 /// Of a contact that presses, or of a lagged one as it was at the start. `regularisation`, `predicted`: see

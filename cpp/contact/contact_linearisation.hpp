@@ -45,6 +45,7 @@ class FrictionPrediction {
 
 /// Of surfaces that slip, or of a rod that rolls: see friction.hpp.
 enum class FrictionKind { slipping, rolling };
+inline constexpr FrictionKind kFrictionKinds[] = {FrictionKind::slipping, FrictionKind::rolling};
 
 struct ContactLinearisation {
   double regularisation = 1;  ///< by which the slip tolerance is greater

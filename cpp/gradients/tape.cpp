@@ -373,7 +373,8 @@ RunJacobian Tape::jacobian() const {
           "force_limit=");
   if (acting_.count() > 1)
     throw std::invalid_argument(
-        "no Jacobian is known of a step in which a natural shape is on its way, or of a run in which something was set: "
+        "no Jacobian is known of a step in which a natural shape is on its way, or of a run in which something was "
+        "set: "
         "set it at once, without over=, or take the gradient of a record");
   const SparseMatrix basis = free_basis(model_), back = basis.transpose();
   const Eigen::Index free = basis.cols();

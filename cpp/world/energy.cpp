@@ -200,8 +200,8 @@ bool World::Implementation::gains_energy() {
   ComponentEnergies& now = energy_scratch.components;
   bool measured = false;
   for (int i = 0; i < model.component_count; ++i) {
-    if (!guard.whole[at(i)]) continue;
-    const double gain = guard.gain[i];
+    if (!gained.whole[at(i)]) continue;
+    const double gain = gained.energy[i];
     double& scale = guard.scale[i];
     const auto too_much = [&] { return gain > 1e-6 * scale && guard.excess[i] + gain > kMostGain * scale; };
     if (steps_taken % kMeasured == 0 || too_much()) {

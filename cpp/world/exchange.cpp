@@ -147,10 +147,9 @@ void exchange(Archive& io, StepControl& control) {
          guard, contact_guard, step_watch, alarm] = control;
   io(level), io(easy_steps), io(patience), io(grown), io(error_rate), io(mean_step), io(event_reserve), io(grid_origin),
       io(grid_steps), io(steps_taken);
-  auto& [turn, gain, whole, scale, excess, fallback_steps] = guard;
-  whole.clear();  // of the last step, which is over
-  io(turn), io(fallback_steps);
-  for (VectorX* v : {&gain, &scale, &excess}) exchange(io, *v);
+  auto& [scale, excess, fallback_steps] = guard;
+  io(fallback_steps);
+  for (VectorX* v : {&scale, &excess}) exchange(io, *v);
   auto& [greatest, gained, put_in] = contact_guard;
   io(greatest), io(gained), io(put_in);
   auto& [change, motion, most, pull, moved, acceleration] = step_watch;

@@ -66,6 +66,8 @@ struct World::Implementation : Running {
   StepControl marked_control;
   Moving kept;                                              ///< at the start of a step that may be taken back
   EnergyGuard guard_before;                                 ///< likewise
+  double turned = 0;                                        ///< of an edge in the last step at most [rad]
+  ComponentGains gained;                                    ///< in the last step, all of its parts
   std::vector<SupportMotion> motions_before, kept_motions;  ///< at the start of a time step, of a part of it
   Plan plan;
   bool plan_current = false;  ///< made when it is asked for

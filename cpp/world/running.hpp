@@ -72,18 +72,9 @@ struct NaturalRamp {
 /// Energy balance of the watch over the energy of plain midpoint and backward Euler steps, per connected component:
 /// what other parts of a scene do, and how all drift by, is no measure of what one may gain.
 struct EnergyGuard {
-  double turn = 0;          ///< of an edge in the last step at most [rad]
-  VectorX gain;             ///< of the last step [J]
-  std::vector<char> whole;  ///< whether all of it is known, see `ComponentGains`
-  VectorX scale;            ///< greatest energy [J]
-  VectorX excess;           ///< out of nowhere so far [J]
-  int fallback_steps = 0;   ///< energy-momentum steps still to take in its place
-
-  void resize(int components) {
-    whole.resize(static_cast<std::size_t>(components));
-    for (VectorX* v : {&gain, &scale, &excess})
-      if (v->size() != components) v->setZero(components);
-  }
+  VectorX scale;           ///< greatest energy [J]; of no size before the first step
+  VectorX excess;          ///< out of nowhere so far [J]
+  int fallback_steps = 0;  ///< energy-momentum steps still to take in its place
 };
 
 /// Energy balance of the watch over what contact puts in where surfaces slide by much within a step.

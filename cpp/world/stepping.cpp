@@ -202,13 +202,13 @@ World::Implementation::Attempt World::Implementation::try_step(double dt) {
     return Attempt::inaccurate;
   }
   const bool unresolved = watched && equations_of_step().contact()->unresolved(dt);
-  const bool gained = !unresolved && guarded && gains_energy(),
-             pumped = !unresolved && !gained && watched && asks && contact_pumps(dt);
+  const bool gains = !unresolved && guarded && gains_energy(),
+             pumped = !unresolved && !gains && watched && asks && contact_pumps(dt);
   if (unresolved && may_cut()) {
     take_back();
     return Attempt::inaccurate;
   }
-  if (gained || pumped) {
+  if (gains || pumped) {
     take_back();
     if (guarded) guard = guard_before;
     if (euler || !guarded) return Attempt::gained_energy;
@@ -245,7 +245,7 @@ void World::Implementation::return_to_start() {
 void World::Implementation::commit_step() {
   statistics.steps += 1;
   steps_taken += 1;
-  statistics.largest_turn = std::max(statistics.largest_turn, guard.turn);
+  statistics.largest_turn = std::max(statistics.largest_turn, turned);
   if (guard.fallback_steps > 0) {
     --guard.fallback_steps;
     statistics.energy_momentum_steps += 1;
@@ -266,10 +266,11 @@ double World::Implementation::force_time(double start, double dt) const {
 
 /// One step of the scheme; changes nothing where it does not converge.
 bool World::Implementation::scheme_step(double dt, double& error) {
-  guard.turn = 0.0;
-  guard.resize(model.component_count);
-  guard.gain.setZero();
-  guard.whole.assign(guard.whole.size(), 0);
+  turned = 0.0;
+  gained.energy.setZero(model.component_count);
+  gained.whole.assign(at(model.component_count), 0);
+  for (VectorX* v : {&guard.scale, &guard.excess})
+    if (v->size() != model.component_count) v->setZero(model.component_count);
   return options.integrator == Integrator::fourth_order ? composed_step(dt, error) : inner_step(dt, 0, error);
 }
 
@@ -356,11 +357,11 @@ bool World::Implementation::inner_step(double dt, int slot, double& error) {
   const bool reacts = options.integrator != Integrator::fourth_order || slot == 2;
   if (tape) record_step(rule_of_step(), dt, reacts);
   error = r.error;
-  guard.turn = std::max(guard.turn, r.largest_turn);
+  turned = std::max(turned, r.largest_turn);
   if (watches_energy()) {
-    guard.gain += work.gains.energy;
-    for (std::size_t i = 0; i < guard.whole.size(); ++i)
-      guard.whole[i] = static_cast<char>(guard.whole[i] || work.gains.whole[i]);
+    gained.energy += work.gains.energy;
+    for (std::size_t i = 0; i < gained.whole.size(); ++i)
+      gained.whole[i] = static_cast<char>(gained.whole[i] || work.gains.whole[i]);
   }
   load_work += r.load_work;
   dissipated += r.dissipated;
@@ -399,11 +400,11 @@ StepResult World::Implementation::step_by_rule(double dt, int slot) {
   Equations& system = equations_of_step();
   update_custom_force(system);
   if (options.integrator == Integrator::verlet) return verlet_step(system, parameters, dt, state, work);
-  const StepPlan plan{rule_of_step(), dt, slot, watches_energy()};
-  const bool euler = plan.rule == StepRule::backward_euler;
+  const StepPlan own{rule_of_step(), dt, slot, watches_energy()};
+  const bool euler = own.rule == StepRule::backward_euler;
   work.gains.small_turn = euler ? 0.3 : 0.01;
-  if (plan.watched) work.gains.small_gain = (euler ? 1e-3 : 1e-6) * guard.scale;
-  return implicit_step(system, *newton, options, parameters, plan, state, predictor, work);
+  if (own.watched) work.gains.small_gain = (euler ? 1e-3 : 1e-6) * guard.scale;
+  return implicit_step(system, *newton, options, parameters, own, state, predictor, work);
 }
 
 /// The residual of a frame's unknowns is J(w)^T moment, w its turn where the forces act; of an energy-momentum step,

@@ -24,6 +24,18 @@ def straight(scene: withe.Scene, edges: int, direction: Sequence[float] = (1.0, 
     return scene.add_rod(start=(0.0, 0.0, 0.0), end=direction, nodes=edges + 1, **options)
 
 
+def ring_on_slope(
+    degrees: float, radius: float, thickness: float, edges: int
+) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    """Nodes of a ring of a rod that just touches a slope through the origin; its normal, and the way down it."""
+    angle = np.radians(degrees)
+    normal = np.array((np.sin(angle), 0.0, np.cos(angle)))
+    down = np.array((np.cos(angle), 0.0, -np.sin(angle)))
+    turn = 2.0 * np.pi * np.arange(edges) / edges
+    points = (radius + thickness) * normal + radius * (np.outer(np.sin(turn), down) - np.outer(np.cos(turn), normal))
+    return points, normal, down
+
+
 def weightless() -> withe.Scene:
     return withe.Scene(gravity=(0.0, 0.0, 0.0))
 

@@ -9,6 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 import withe
+from rods import ring_on_slope
 
 G = 9.81
 RING, THICK = 0.1, 2e-3  # [m]
@@ -16,11 +17,7 @@ RING, THICK = 0.1, 2e-3  # [m]
 
 def rolling_ring(degrees: float, edges: int, step: float = 1e-3, **options: Any) -> tuple[Any, Any, NDArray[Any]]:
     """A stiff ring that just touches a slope, and the direction down it."""
-    angle = np.radians(degrees)
-    normal = np.array((np.sin(angle), 0.0, np.cos(angle)))
-    down = np.array((np.cos(angle), 0.0, -np.sin(angle)))
-    turn = 2.0 * np.pi * np.arange(edges) / edges
-    points = (RING + THICK) * normal + RING * (np.outer(np.sin(turn), down) - np.outer(np.cos(turn), normal))
+    points, normal, down = ring_on_slope(degrees, RING, THICK, edges)
     scene = withe.Scene()
     stiff = withe.Material(youngs_modulus=2e10, poisson_ratio=0.3, density=2000.0)
     ring = scene.add_rod(points=points, radius=THICK, material=stiff, closed=True)

@@ -9,6 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 import withe
+from rods import ring_on_slope
 
 G, THICK, LENGTH = 9.81, 5e-3, 0.2  # [m/s^2], [m]
 GRIP = 0.6
@@ -132,14 +133,10 @@ def test_books_of_thrown_rods_balance(seed: int, integrator: Any) -> None:
         assert missing < 1e-3 * first.kinetic
 
 
-def ring_on_slope(planar: bool, rolling: float) -> float:
+def acceleration(planar: bool, rolling: float) -> float:
     """Acceleration of a stiff ring down 5 degrees."""
-    radius, edges, thick = 0.1, 48, 2e-3
-    angle = np.radians(5.0)
-    normal = np.array((np.sin(angle), 0.0, np.cos(angle)))
-    down = np.array((np.cos(angle), 0.0, -np.sin(angle)))
-    turn = 2.0 * np.pi * np.arange(edges) / edges
-    points = (radius + thick) * normal + radius * (np.outer(np.sin(turn), down) - np.outer(np.cos(turn), normal))
+    radius, edges, thick, angle = 0.1, 48, 2e-3, np.radians(5.0)
+    points, normal, down = ring_on_slope(5.0, radius, thick, edges)
     scene = withe.Scene()
     stiff = withe.Material(youngs_modulus=2e10, poisson_ratio=0.3, density=2000.0)
     ring = scene.add_rod(points=points, radius=thick, material=stiff, closed=True)
@@ -159,7 +156,7 @@ def ring_on_slope(planar: bool, rolling: float) -> float:
 @pytest.mark.parametrize("planar", [True, False])
 def test_a_ring_is_braked_by_the_couple_of_its_section(planar: bool) -> None:
     """Its couple is that of the rod's radius, whatever the ring's."""
-    free, braked = ring_on_slope(planar, 0.0), ring_on_slope(planar, 1.5)
+    free, braked = acceleration(planar, 0.0), acceleration(planar, 1.5)
     print("ring:", planar, free, braked)
     assert abs(braked / free - 1.0) < 0.01
 

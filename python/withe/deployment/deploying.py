@@ -145,8 +145,8 @@ def deploy(
         nodes=nodes,
         time_step=_time_step(time_step, quasi_static),
         quasi_static=quasi_static,
+        rolling_friction=validation.non_negative(rolling_friction, "rolling_friction"),
     )
-    setup = replace(setup, rolling_friction=validation.non_negative(rolling_friction, "rolling_friction"))
     held, laid, record = lay(setup, plan, progress=progress)
     return _compared(plan, setup.arc_length, held, laid, record)
 
@@ -290,12 +290,21 @@ def _cable_of(cable: Cable, drawn: FloatArray) -> Cable:
 
 
 def drawn_setup(
-    plan: Plan, cable: Cable, friction: float, drawn: FloatArray, *, nodes: int, time_step: float, quasi_static: bool
+    plan: Plan,
+    cable: Cable,
+    friction: float,
+    drawn: FloatArray,
+    *,
+    nodes: int,
+    time_step: float,
+    quasi_static: bool,
+    rolling_friction: float = ROLLING_FRICTION,
 ) -> Setup:
     """What is there in a trial, from `DRAWN` numbers of standard normal distribution, times the noise."""
     return Setup(
         cable=replace(_cable_of(cable, drawn), length=plan.cable.length),
         friction=friction * float(np.exp(_FRICTION * drawn[1])),
+        rolling_friction=rolling_friction,
         nodes=nodes,
         time_step=time_step,
         jaw_offset=(_OFFSET * drawn[4], _OFFSET * drawn[5], _OFFSET * drawn[6]),

@@ -309,14 +309,14 @@ def _needed(pattern: Pattern, cable: Cable, controller: Controller, grasps: Gras
     count = len(pattern.points)
     force = np.concatenate([grasps.force, np.repeat(grasps.force[-1:], count, axis=0)])[:count]
     found = examine(pattern, cable, _MOST_FRICTION, controller, force)
-    worst = _hopeless(found)
+    worst = _worst_slip(found)
     if worst is not None and not helped:
         missing = _missing_tail(pattern, cable, controller, worst)
         raise ValueError(f"no floor holds this cable on this pattern: {worst}{missing}")
     return found.needed
 
 
-def _hopeless(found: Feasibility) -> Slip | None:
+def _worst_slip(found: Feasibility) -> Slip | None:
     """The stretch that needs most, of those that no floor holds."""
     slips = [slip for slip in found.slips if slip.test in ("floor", "lift-off")]
     return max(slips, key=lambda slip: slip.needed, default=None)
@@ -330,7 +330,7 @@ def _missing_tail(pattern: Pattern, cable: Cable, controller: Controller, worst:
     if there >= usual or longer.length > table().longest * lgb:
         return ""
     found = examine(pattern, longer, _MOST_FRICTION, controller)
-    if _hopeless(found) is not None:
+    if _worst_slip(found) is not None:
         return ""
     stretch = (found.arc_length >= worst.start) & (found.arc_length <= worst.end)
     return (
