@@ -84,10 +84,8 @@ FrictionSetting friction_setting(const ContactProblem& problem, const Touching& 
   f.stick = start_of_anchor(t, kind);
   f.spatial = !model.planar();
   f.centreline = contact.centreline_friction;
-  if (!rolling) {
-    f.drift = problem.shift_of(pair);
-    f.turn = problem.turn_of(pair);
-  }
+  if (!rolling) f.drift = problem.shift_of(pair);
+  f.turn = problem.turn_of(pair);
   f.predicted = predicted;
   problem.bodies.values(pair, problem.start->q, f.start);
   if (!f.spatial) return f;
@@ -168,19 +166,23 @@ double kept_anchor_energy(const ContactProblem& problem, const Touching& t) {
   return rolled + 0.5 * dot(c.friction.force, t.stick);
 }
 
-/// Friction's force on the obstacle, the opposite of that on a, times the way of the surface.
+/// Friction's forces on the obstacle, the opposite of those on a, times the ways of the surface.
 double turning_work(const ContactProblem& problem, const Touching& t) {
   const Vec3d turn = problem.turn_of(t.pair);
-  if (!(t.pair.friction > 0.0) || dot(turn, turn) == 0.0) return 0.0;
+  if (!t.pair.rubs() || dot(turn, turn) == 0.0) return 0.0;
   if (t.lagged >= 0)
     return -dot(lagged_force(problem, t, slip_rate(problem, 1.0), nullptr).force,
                 problem.lagged_friction[at(t.lagged)].turned);
   if (problem.lags()) return 0.0;
-  const FrictionSetting f = friction_setting(problem, t, FrictionKind::slipping, 1.0, nullptr);
   Vec3d x[4];
   t.end_points(x);
-  const SlippingSurfaces<double> c = slipping_surfaces(f, t.now);
-  return -dot(c.friction.force, cross(turn, obstacle_arm(f, c, x)));
+  double work = 0.0;
+  each_kind(t, [&](FrictionKind kind) {
+    const FrictionSetting f = friction_setting(problem, t, kind, 1.0, nullptr);
+    const SlippingSurfaces<double> c = slipping_surfaces(f, t.now);
+    work -= dot(c.friction.force, cross(turn, obstacle_arm(f, c, x)));
+  });
+  return work;
 }
 
 void record_friction(const ContactProblem& problem, const Touching& t, ContactRecord& record) {

@@ -18,9 +18,9 @@
 /// symmetric and not negative, so F . S is not either.
 ///
 /// Rolling friction on an obstacle is a couple against the turning of a rod's surface there: the same laws, for the way
-/// R = phi_a x r_a by which the slip is more than what the centreline moves, with a coefficient of its own. Its force
-/// on R goes back through that part of J alone, so that the couple is mu_r r N at most [Johnson, Contact Mechanics,
-/// 1985, section 9.1], and nothing pushes the rod along.
+/// R = (phi_a - phi) x r_a by which the slip is more than what the centreline moves, phi the obstacle's turn, with a
+/// coefficient of its own. Its force on R goes back through that part of J alone, so that the couple is mu_r r N at
+/// most [Johnson, Contact Mechanics, 1985, section 9.1], and nothing pushes the rod along.
 
 #include <cmath>
 #include <type_traits>
@@ -269,10 +269,12 @@ void find_contact(const FrictionSetting& f, const SlipStart<Scalar>& start, cons
 /// Whether an edge's turning moves a's surface, or b's against it.
 inline double turn_sign(const FrictionSetting& f, int side) { return side == 0 || f.pair->curve() ? 1.0 : -1.0; }
 
-/// From where an obstacle is placed to where it is touched [m].
+/// On which an obstacle's turning is slip: from where it is placed to where it is touched; of rolling friction, for
+/// which surfaces count that turn against each other, the rod's own [m].
 template <class Scalar>
 Vec3<Scalar> obstacle_arm(const FrictionSetting& f, const SlippingSurfaces<Scalar>& c, const Vec3<Scalar> (&x)[4]) {
   const ContactPair& pair = *f.pair;
+  if (f.rolling) return Scalar(-pair.radius_a) * c.normal;
   if (pair.curve()) return piece_obstacle_arm(pair, *f.obstacle, x, c.s);
   return c.t * c.sides[1].edge + Scalar(pair.radius_b) * c.normal;
 }

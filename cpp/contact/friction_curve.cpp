@@ -78,8 +78,9 @@ void add_turn_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& c
   }
 }
 
-/// Of `piece_obstacle_arm`, a - (delta - r) n with a = c(s): da - (n . da) n - (delta - r) dn.
+/// Of `obstacle_arm`: of a - (delta - r) n with a = c(s), da - (n . da) n - (delta - r) dn.
 Vec3d obstacle_arm_slope(const FrictionSetting& f, const Curve& curve, const Vec3d (&x)[3], const Slopes& d, int j) {
+  if (f.rolling) return -f.pair->radius_a * d.normal[j];
   const PointDistance<double> point = distance_to(*f.obstacle, curve_point(curve.w, x, curve.s));
   Vec3d moved = d.s[j] * curve_direction(curve.w, x, curve.s);
   if (j < kAngle) moved += curve.weight[j / 3] * kAxis[j % 3];

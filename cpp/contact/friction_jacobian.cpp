@@ -80,6 +80,7 @@ Vec3d turn_of(const FrictionSetting& f, const SlippingSurfaces<double>& c) {
 
 /// Of `obstacle_arm`.
 Vec3d obstacle_arm_slope(const FrictionSetting& f, const SlippingSurfaces<double>& c, const Slopes& d, int j) {
+  if (f.rolling) return -f.pair->radius_a * d.lever[j];
   return d.t[j] * c.sides[1].edge + f.pair->radius_b * d.lever[j];
 }
 

@@ -186,3 +186,59 @@ def test_what_has_no_rolling_friction_says_so() -> None:
     scene.enable_contact(friction_model="lagged")
     with pytest.raises(ValueError, match="rolling_friction of 'floor 1' needs friction_model 'anchored' or 'implicit'"):
         scene.build()
+
+
+@pytest.mark.parametrize("planar", [True, False])
+@pytest.mark.parametrize("integrator", SCHEMES)
+def test_what_turns_with_a_drum_does_not_roll_on_it(integrator: Any, planar: bool) -> None:
+    """A ring that fits tightly: the drum does no more work with rolling friction than without."""
+    drum_radius, thick, rate = 0.05, 3e-3, 5.0
+
+    def work(rolling: float) -> tuple[float, float]:
+        scene = withe.Scene(gravity=(0, 0, 0))
+        angles = np.linspace(0.0, 2.0 * np.pi, 48, endpoint=False)
+        points = (drum_radius + thick) * np.stack([np.cos(angles), np.sin(angles), 0.0 * angles], 1)
+        rubber = withe.Material(youngs_modulus=1e6, poisson_ratio=0.5, density=1000.0)
+        ring = scene.add_rod(points=points, closed=True, radius=thick, material=rubber)
+        axis = ((0, 0, -0.1), (0, 0, 0.1))
+        scene.add_capsule(*axis, drum_radius, friction=0.5, rolling_friction=rolling, restitution=0.0, name="drum")
+        simulation = scene.build(integrator=integrator, time_step=2e-3, planar=planar)
+        simulation.set_natural_stretch(ring, 0.98, over=0.05)
+        simulation.run(0.2, progress=False)
+        simulation.set_velocities(ring, np.cross((0, 0, rate), simulation.positions(ring)))
+        simulation.move("drum", roll=0.3 * rate, over=0.3)
+        simulation.run(0.1, progress=False)
+        before = simulation.energy().work
+        simulation.run(0.1, progress=False)
+        pressed = float(simulation.contacts()["normal_force"].sum())
+        return simulation.energy().work - before, thick * pressed * 0.1 * rate
+
+    (free, _), (rolled, scale) = work(0.0), work(0.1)
+    print("turns with it:", integrator, planar, free / scale, rolled / scale)
+    assert abs(rolled - free) < 0.01 * 0.1 * scale
+
+
+@pytest.mark.parametrize(("turning", "nodes"), [("rod", 11), ("drum", 11), ("drum", 21)])
+def test_a_drum_and_a_rod_resist_turning_against_each_other(turning: str, nodes: int) -> None:
+    """Clamps of a rod that is pressed onto it bear (mu + mu_r) r N where the rod turns. A drum turns it, as a gear would,
+    against its own sense by mu r N, and along with it by mu_r r N."""
+    drum_radius, slipping, rolling = 0.03, 0.3, 0.1
+    scene = withe.Scene(gravity=(0, 0, 0))
+    material = withe.Material(youngs_modulus=2e8, poisson_ratio=0.3, density=1000.0)
+    height = drum_radius + THICK
+    rod = scene.add_rod(start=(0, -0.05, height), end=(0, 0.05, height), nodes=nodes, radius=THICK, material=material)
+    clamps = [scene.clamp(end) for end in (rod.start, rod.end)]
+    scene.add_load(rod, (0, 0, -20.0))
+    drum = scene.add_capsule(
+        (0, -0.1, 0), (0, 0.1, 0), drum_radius, friction=slipping, rolling_friction=rolling, name="drum"
+    )
+    simulation = scene.build(time_step=1e-3, integrator="backward_euler")
+    simulation.run(0.2, progress=False)
+    for what in clamps if turning == "rod" else [drum]:
+        simulation.move(what, roll=-2.0 if turning == "rod" else 1.0, over=0.3)
+    simulation.run(0.25, progress=False)
+    pressed = simulation.contacts()["normal_force"].sum()
+    moment = sum(simulation.reaction(clamp).moment[1] for clamp in clamps)
+    print("rolls on it:", turning, nodes, moment / (THICK * pressed))
+    expected = slipping + rolling if turning == "rod" else slipping - rolling
+    assert abs(abs(moment) / (THICK * pressed) - expected) < 2e-3
