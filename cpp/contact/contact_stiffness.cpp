@@ -258,7 +258,8 @@ double ContactStiffness::accept(const ContactSet& set, Keep keep, double spare, 
     } else if (ratio < 1.0 || record.approach > 0.0) {
       put_in += change_stiffness(t, ratio, worn(problem_, t), record);
     } else if (problem_.pressing == Pressing::still) {
-      record.yielded = worn(problem_, t);  // an equilibrium that has been found stays one
+      // An equilibrium that has been found stays one; what has yielded in motion, by more, presses again.
+      record.yielded = std::min(worn(problem_, t), kMostYield * pair.small_radius());
     } else if (t.yielded > 0.0) {
       ContactRecord unused;
       wanted += change_stiffness(t, 1.0, faded(problem_, t), unused);

@@ -72,7 +72,7 @@ void Homotopy::accept(const VectorX& q) {
   const Model& model = equations_.model();
   if (Contact* contact = equations_.contact()) {
     contact->update(q);
-    contact->accept(state_, Keep::force, INFINITY);
+    keeps_stiffness_ ? contact->remember(state_) : void(contact->accept(state_, Keep::force, INFINITY));
   }
   compute_configuration(model, state_, q, scratch_);
   accept_configuration(model, q, scratch_, state_);

@@ -41,6 +41,8 @@ class Homotopy {
   /// Loads and what is left out of balance at a factor; the frames count from the present state.
   void go_to(double factor);
   bool hold(double factor, VectorX& q) const { return boundary_.hold(factor, q); }
+  /// From here on contacts stay as stiff as they are.
+  void keep_stiffness() { keeps_stiffness_ = true; }
   /// Whether supports did so where a tangent was last found.
   bool supports_move() const { return moves_; }
   /// What grad V - f is to be at the factor last gone to.
@@ -77,7 +79,7 @@ class Homotopy {
   VectorX imbalance_, target_, held_, moved_;
   Configuration scratch_;
   double factor_ = 0.0;
-  bool moves_ = false;
+  bool moves_ = false, keeps_stiffness_ = false;
 };
 
 }  // namespace withe

@@ -15,8 +15,10 @@ struct StaticResult {
 
 /// Brings `state` to equilibrium, with supports where `boundary` has them at 1. Loads and natural shapes that are out
 /// of balance at the start, and the motion of supports, are let in as `Homotopy` has it, in steps in which no edge
-/// turns far.
+/// turns far. `stiffness_follows`: whether that of contacts goes with their forces, also with those that are found,
+/// which then are in balance no more where they would have yielded too much.
 StaticResult find_equilibrium(Equations& equations, const Newton& newton, const Options& options,
-                              Parameters& parameters, const Boundary& boundary, State& state, NewtonWorkspace& work);
+                              Parameters& parameters, const Boundary& boundary, State& state, NewtonWorkspace& work,
+                              bool stiffness_follows = true);
 
 }  // namespace withe

@@ -8,6 +8,12 @@
 #include "world/implementation.hpp"
 
 namespace withe {
+namespace {
+
+// Times that an equilibrium is sought anew as contact becomes stiffer, and of these with stiffness that follows forces.
+constexpr int kMostStiffenings = 12, kMostFollowed = 6;
+
+}  // namespace
 
 Equations& World::Implementation::statics() {
   const bool same =
@@ -102,6 +108,13 @@ bool World::Implementation::drifts(Equations& system) {
   return false;
 }
 
+/// Whether forces add up to nothing at the present state, with contact as stiff as it has become.
+bool World::Implementation::balanced(Equations& system, NewtonResult& result) {
+  system.begin(state, parameters, StepRule::statics, 0.0);
+  system.evaluate(state.q, false, nullptr, work.newton.data);
+  return newton->balance(work.newton.data, result).either;
+}
+
 /// Equilibrium after `dt` (0: at the present time, with supports and actuation as they are).
 EquilibriumResult World::Implementation::equilibrium(double dt) {
   account_for_settings();
@@ -138,14 +151,18 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
       newton->balance(work.newton.data, r.newton);
     else
       r = find_equilibrium(system, *newton, options, parameters, boundary, state, work.newton);
-    // Contact that turns out too soft is made stiffer, from where it has settled.
+    // Where contact that follows the forces found has yielded as much as it may, balance is sought anew; in the end
+    // with stiffness that stays, as forces between what does not yield grow with it.
     from = target;
-    for (int tries = 0; r.converged && system.contact() && system.contact()->contacts().depth() > kDeepest && tries < 8;
-         ++tries) {
-      system.contact()->stiffen(state, Keep::force);
-      const bool changed = r.branch_changed;
-      r = find_equilibrium(system, *newton, options, parameters, boundary, state, work.newton);
-      r.branch_changed = r.branch_changed || changed;
+    for (int tries = 0; r.converged && system.contact() && tries < kMostStiffenings; ++tries) {
+      if (system.contact()->contacts().depth() > kDeepest)
+        system.contact()->stiffen(state, Keep::force);
+      else if (balanced(system, r.newton))
+        break;
+      const StaticResult before_it = r;
+      r = find_equilibrium(system, *newton, options, parameters, boundary, state, work.newton, tries < kMostFollowed);
+      r.branch_changed = r.branch_changed || before_it.branch_changed;
+      r.newton.iterations += before_it.newton.iterations;
     }
   } catch (...) {
     undo();
@@ -196,10 +213,9 @@ EquilibriumResult World::Implementation::settle(Equations& system, StaticResult&
   retire_ramps();
   statistics.steps += 1;
   steps_taken += 1;
-  system.begin(state, parameters, StepRule::statics, 0.0);
-  system.evaluate(state.q, false, nullptr, work.newton.data);
+  update_custom_force(system);
+  balanced(system, r.newton);
   note_reactions();
-  newton->balance(work.newton.data, r.newton);
   check_resolution();
   if (r.branch_changed) statistics.branch_changes += 1;
   const bool frictional = system.contact() && system.contact()->frictional();

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy import sparse
 from scipy.linalg import expm
 
 import withe
@@ -178,3 +179,37 @@ def test_a_free_rod_rests_where_a_custom_force_holds_it_and_is_refused_at_once_w
         with pytest.raises(withe.ConvergenceError, match="no support holds the scene"):
             simulation.equilibrium()
         assert len(asked) < 100
+
+
+@pytest.mark.parametrize("given", [False, True])
+@pytest.mark.parametrize("hold", ["frame", "edge", "pins", "hand"])
+def test_reactions_of_an_equilibrium_carry_the_custom_force_of_its_own_place(hold, given):
+    """On held nodes too, at once, and step for step where supports move."""
+    stiffness, nodes = 1.0, 11
+    scene = withe.Scene(gravity=(0, 0, 0))
+    rubber = withe.Material(youngs_modulus=2e6, poisson_ratio=0.4, density=1100.0)
+    rod = scene.add_rod(start=(0, 0, 0.02), end=(0.2, 0, 0.02), nodes=nodes, radius=4e-3, material=rubber)
+    if hold == "pins":
+        supports = [scene.pin(rod.start), scene.pin(rod.end)]
+    elif hold == "hand":
+        supports = [scene.grasp(rod, at=0.1, length=0.05)]
+    else:
+        supports = [scene.clamp(rod.start, hold=hold)]
+    pull = -stiffness * np.diag([0.0, 0.0, 1.0])
+    slope = sparse.kron(sparse.identity(nodes), pull)
+    jacobian = (lambda time, positions, velocities: slope) if given else None
+    scene.add_custom_force(lambda time, positions, velocities: positions @ pull, jacobian=jacobian)
+    simulation = scene.build(integrator="static", time_step=0.1)
+
+    def out_of_balance():
+        borne = sum(simulation.reaction(support).force[2] for support in supports)
+        return borne - stiffness * simulation.positions(rod)[:, 2].sum()
+
+    found = simulation.equilibrium()
+    assert found.residual < 1e-9
+    assert abs(out_of_balance()) < 1e-9
+    for support in supports:
+        simulation.move(support, position=simulation.get(support, "position") + (0, 0, 0.02), over=0.3)
+    for _ in range(3):
+        simulation.step(1)
+        assert abs(out_of_balance()) < 1e-9

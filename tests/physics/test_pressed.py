@@ -128,3 +128,56 @@ def test_a_rod_that_obstacles_squeeze_by_less_stays_so(scheme):
     pressed = contacts["normal_force"][~up].sum()
     assert pressed > WEIGHT
     assert contacts["normal_force"][up].sum() == pytest.approx(pressed + WEIGHT, rel=1e-2)
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+@pytest.mark.parametrize("seed", range(6))
+def test_an_equilibrium_on_a_drum_or_a_rod_is_one(seed, friction):
+    """However hard contact is when a rod is laid down: what it bears is what the clamp does not, and nothing moves on."""
+    drawn = np.random.default_rng(seed)
+    nodes, place, size = int(drawn.integers(15, 45)), drawn.uniform(0.15, 0.24), drawn.uniform(0.03, 0.1)
+    material = withe.Material(youngs_modulus=10 ** drawn.uniform(5.7, 6.5), poisson_ratio=0.4, density=1100.0)
+    scene = withe.Scene()
+    rod = scene.add_rod(start=(0, 0, 0.05), end=(0.3, 0.01, 0.05), nodes=nodes, radius=RADIUS, material=material)
+    clamp = scene.clamp(rod.start)
+    if seed % 2:
+        scene.add_capsule((place, -0.1, 0.02 - size), (place, 0.2, 0.02 - size), size, friction=friction)
+        scene.enable_contact(friction=friction)
+    else:
+        other = scene.add_rod(start=(place, -0.1, 0.01), end=(0.22, 0.15, 0.02), nodes=16, radius=4e-3, material=RUBBER)
+        scene.enable_contact(friction=friction)
+        for end in (other.start, other.end):
+            scene.clamp(end)
+    simulation = scene.build(integrator="static", planar=False)
+    weight = 9.81 * 1100.0 * np.pi * RADIUS**2 * np.hypot(0.3, 0.01)
+    found = simulation.equilibrium()
+    contacts = simulation.contacts()
+    borne = (contacts["normal"] * contacts["normal_force"][:, None] + contacts["friction"])[:, 2].sum()
+    left = weight - simulation.reaction(clamp).force[2]
+    print("on a drum or a rod:", seed, friction, found.residual, borne / left - 1.0)
+    assert found.residual < 1e-9
+    assert abs(borne / left - 1.0) < 2e-3
+    before = simulation.positions(rod)
+    simulation.equilibrium()
+    assert np.abs(simulation.positions(rod) - before).max() < 1e-9 * RADIUS
+
+
+@pytest.mark.parametrize("integrator", ["backward_euler", "implicit_midpoint"])
+@pytest.mark.parametrize("modulus", [1e6, 1e7])
+def test_an_equilibrium_after_steps_presses_as_one_without_them(integrator, modulus):
+    """What has yielded while a clamp pushed a short rod into a wall presses again."""
+
+    def thrust(scheme):
+        scene = withe.Scene(gravity=(0, 0, 0))
+        material = withe.Material(youngs_modulus=modulus, poisson_ratio=0.4, density=1100.0, viscosity=1e-3 * modulus)
+        rod = scene.add_rod(start=(0, 0, 0), end=(0.02, 0, 0), nodes=5, radius=RADIUS, material=material)
+        clamp = scene.clamp(rod.start)
+        scene.add_plane((0.02 + RADIUS, 0, 0), (-1, 0, 0))
+        simulation = scene.build(integrator=scheme, time_step=2e-3)
+        simulation.move(clamp, position=(4e-4, 0, 0), over=0.1)
+        simulation.run(duration=0.4, progress=False)
+        found = simulation.equilibrium()
+        assert found.residual < 1e-9
+        return np.linalg.norm(simulation.reaction(clamp).force)
+
+    assert thrust(integrator) == pytest.approx(thrust("static"), rel=0.1)

@@ -165,7 +165,8 @@ class Measurements:
         """Force and moment of a support on the rod.
 
         In motion, the mean of the last step, or of its last part where it was cut (`statistics.steps` counts parts):
-        with all other forces, that by which momentum grew in that time. Times the way and the turn of the step it is
+        with all other forces, that by which momentum grew in that time; of "fourth_order", that in the middle of the
+        step, which is off the mean by second order. Times the way and the turn of the step it is
         what ``energy().work`` counts, to second order in the step. A support that starts or stops at full speed gives
         what it holds its speed by an impulse, which is part of the force of that step: its work is that times the mean
         of both speeds, half of what the way of the step would say.
