@@ -61,8 +61,12 @@ std::array<int, 3> border_color(const ColorImage& image) {
   return median;
 }
 
+/// Classes this many standard deviations of the lower one apart are no parts of a background's noise.
+constexpr double kApart = 4.0;
+
 /// Highest level of the lower class by Otsu's rule on the square roots of the levels, so that dark cables are not
-/// lost among bright ones, or 256 where the classes are too alike.
+/// lost among bright ones, or 256 where the classes are too alike. Where few pixels are cables that rule would part a
+/// background's noise: then the best of classes that are well apart counts.
 int separate(const std::array<std::int64_t, 256>& histogram, int contrast) {
   std::array<double, 256> value{};
   double total = 0;
@@ -74,21 +78,33 @@ int separate(const std::array<std::int64_t, 256>& histogram, int contrast) {
   }
   double below = 0;
   double below_moment = 0;
+  double below_square = 0;
   double best = -1;
+  double best_apart = -1;
   int level = 256;
+  int level_apart = 256;
   for (std::size_t i = 0; i < 255; ++i) {
-    below += static_cast<double>(histogram[i]);
-    below_moment += value[i] * static_cast<double>(histogram[i]);
+    const auto count = static_cast<double>(histogram[i]);
+    below += count;
+    below_moment += value[i] * count;
+    below_square += static_cast<double>(i) * count;
     if (below == 0 || below == total) continue;
     const double high = (moment - below_moment) / (total - below);
     const double low = below_moment / below;
     const double apart = high - low;
     const double between = below * (total - below) * apart * apart;
-    if (between <= best) continue;
-    best = between;
-    level = high * high - low * low >= contrast ? static_cast<int>(i) : 256;
+    const bool contrasts = high * high - low * low >= contrast;
+    if (between > best) {
+      best = between;
+      level = contrasts ? static_cast<int>(i) : 256;
+    }
+    const double variance = std::max(below_square / below - low * low, 0.0);
+    if (between > best_apart && contrasts && apart >= kApart * std::sqrt(variance)) {
+      best_apart = between;
+      level_apart = static_cast<int>(i);
+    }
   }
-  return level;
+  return level < 256 ? level : level_apart;
 }
 
 }  // namespace

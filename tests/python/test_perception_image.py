@@ -169,6 +169,21 @@ def test_bad_colour_ranges_are_refused(ranges, problem):
         color_filter(ranges)
 
 
+@pytest.mark.parametrize("noise", [0, 4, 8])
+@pytest.mark.parametrize(("width", "height"), [(640, 480), (1920, 1080)])
+def test_a_thin_cable_is_found_in_a_noisy_picture(width, height, noise):
+    """Where one pixel in a thousand is cable, and the background's noise has the two likeliest classes."""
+    random = np.random.default_rng(noise)
+    picture = np.full((height, width, 3), 235.0)
+    columns = np.arange(80, 380)
+    rows = (200 + 15 * np.sin(columns / 40.0)).astype(int)
+    for row in range(4):
+        picture[rows + row, columns] = 60.0
+    picture = np.clip(picture + noise * random.normal(size=picture.shape), 0, 255).astype(np.uint8)
+    assert border_filter(picture).sum() == 4 * len(columns)
+    assert len(trace(picture)) == 1
+
+
 def test_the_border_filter_keeps_dark_cables_beside_bright_ones():
     image = np.full((60, 80, 3), 8, np.uint8)
     image[10:18] = (250, 240, 200)
