@@ -43,8 +43,8 @@ def _draw_floor(figure: Any, axes: Any, pattern: Pattern, jaw: FloatArray, found
     axes.plot(*points[0], "o", color="k", ms=6, label="free end")
     axes.set(xlabel="x [mm]", ylabel="y [mm]", title="pattern", aspect="equal")
     axes.margins(0.08)
-    figure.legend(loc="outside lower left", fontsize="small", ncols=3)
-    figure.colorbar(lines, ax=axes, label="needed coefficient of friction", shrink=0.8)
+    figure.colorbar(lines, ax=axes, label="needed coefficient of friction", location="bottom", aspect=40)
+    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower left", fontsize="small", ncols=3)
 
 
 def _draw_needs(axes: Any, found: Feasibility, title: str) -> None:
