@@ -1,5 +1,6 @@
 """Numbers set while a simulation runs: they act as if it had been built with them, and their work is accounted for."""
 
+import itertools
 import pickle
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 
 import withe
 from simple_scenes import RUBBER
+from withe.parts.parameters import MADE_OF, NATURAL_WORDS, ROD_WORDS
 
 ROD = [
     {"youngs_modulus": 2e6},
@@ -127,6 +129,63 @@ def test_of_several_words_none_is_set_where_one_is_refused():
         simulation.set("arm", youngs_modulus=5e6, natural_twist=1.0, natural_curvature=(0.0, 1e4))
     assert simulation.snapshot() == before
     assert simulation.get("arm", "youngs_modulus") == 1e6
+
+
+def drawn_values(random, edges=20):
+    """A value for every word of a rod: one number, or one an edge."""
+    first = {
+        "youngs_modulus": 1e6,
+        "density": 1e3,
+        "viscosity": 1e4,
+        "stretch_stiffness": 80.0,
+        "bend_stiffness": 5e-4,
+        "twist_stiffness": 3e-4,
+        "line_density": 0.08,
+        "viscous_time": 0.01,
+        "drag": 0.1,
+        "natural_stretch": 1.0,
+    }
+    values = {
+        word: one * random.uniform(0.9, 1.1, edges if random.random() < 0.5 else ()) for word, one in first.items()
+    }
+    values["bend_stiffness"] = 5e-4 * random.uniform(0.9, 1.1, (edges, 2))
+    return values | {
+        "poisson_ratio": random.uniform(0.0, 0.5),
+        "natural_curvature": random.uniform(-2.0, 2.0, (edges - 1, 2)),
+        "natural_twist": random.uniform(-2.0, 2.0, edges - 1),
+    }
+
+
+def test_words_set_together_are_as_given_in_whatever_order():
+    random = np.random.default_rng(4)
+    still = swinging()
+    for pair in itertools.combinations([*ROD_WORDS, *NATURAL_WORDS], 2):
+        values = drawn_values(random)
+        ends = []
+        for words in (pair, pair[::-1]):
+            simulation = still.copy()
+            simulation.set("arm", **{word: values[word] for word in words})
+            for word in words:
+                got = simulation.get("arm", word)
+                assert np.array_equal(got, np.broadcast_to(values[word], np.shape(got))), pair
+            ends.append(simulation.snapshot())
+        assert ends[0] == ends[1], pair
+
+
+def test_no_word_undoes_one_that_is_set_before_it():
+    for place, word in enumerate(ROD_WORDS):
+        assert not MADE_OF.get(word, {}).keys() & set(ROD_WORDS[:place])
+
+
+def test_words_set_together_are_as_given_in_every_lane_of_a_batch():
+    scene = withe.Scene()
+    arm = scene.add_rod(start=(0, 0, 0), end=(0.2, 0, 0), nodes=6, radius=5e-3, material=RUBBER, name="arm")
+    scene.clamp(arm.start)
+    batch = scene.build_batch(2)
+    batch.set(arm, viscous_time=[0.02, 0.03], twist_stiffness=[4e-4, 5e-4], youngs_modulus=[2e6, 3e6])
+    assert [simulation.get(arm, "viscous_time")[0] for simulation in batch] == [0.02, 0.03]
+    assert [simulation.get(arm, "twist_stiffness")[0] for simulation in batch] == [4e-4, 5e-4]
+    assert [simulation.get(arm, "youngs_modulus") for simulation in batch] == [2e6, 3e6]
 
 
 def test_a_ramp_ends_where_a_natural_curvature_is_set_at_once_to_what_it_is():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
@@ -13,7 +13,15 @@ from withe.common import validation
 from withe.parts.materials import Material, Stiffness, bend_stiffness, check_poisson_ratio
 from withe.parts.sections import SectionProperties
 
-__all__ = ["ACTING_WORDS", "MATERIAL_WORDS", "NATURAL_WORDS", "ROD_WORDS", "RodParameters"]
+__all__ = [
+    "ACTING_WORDS",
+    "MADE_OF",
+    "MATERIAL_WORDS",
+    "NATURAL_WORDS",
+    "ROD_WORDS",
+    "RodParameters",
+    "in_order_of_setting",
+]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -39,6 +47,27 @@ ACTING_WORDS = (
     "viscous_time",
     "drag",
 )
+
+MADE_OF: dict[str, dict[str, set[str]]] = {  # what else of ACTING_WORDS a word makes anew, and of which words
+    "youngs_modulus": {
+        "stretch_stiffness": {"youngs_modulus"},
+        "bend_stiffness": {"youngs_modulus"},
+        "twist_stiffness": {"youngs_modulus", "poisson_ratio"},
+        "viscous_time": {"youngs_modulus", "viscosity"},
+    },
+    "poisson_ratio": {"twist_stiffness": {"youngs_modulus", "poisson_ratio"}},
+    "density": {"line_density": {"density"}, "rotary_inertia": {"density"}},
+    "viscosity": {"viscous_time": {"youngs_modulus", "viscosity"}},
+    "line_density": {"line_density": {"line_density"}, "rotary_inertia": {"line_density"}},
+}
+
+
+def in_order_of_setting(words: Iterable[str]) -> list[str]:
+    """Words of a rod as they are to be set together: in the order of ROD_WORDS, in which none undoes one before it.
+
+    Materials make stiffnesses, line density and viscous time anew (MADE_OF); these make nothing of a material.
+    """
+    return sorted(words, key=lambda word: ROD_WORDS.index(word) if word in ROD_WORDS else len(ROD_WORDS))
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from withe.parts.kinds import (
     RodPart,
     SpringPart,
 )
-from withe.parts.parameters import ACTING_WORDS, NATURAL_WORDS
+from withe.parts.parameters import ACTING_WORDS, MADE_OF, NATURAL_WORDS
 from withe.parts.springs import SPRING_WORDS
 from withe.simulation.drawn import DrawnNodes
 from withe.simulation.motion import POSE_WORDS
@@ -45,18 +45,6 @@ __all__ = ["CallGradient", "Gradients", "Ledger", "RunJournal"]
 
 FloatArray = npt.NDArray[np.float64]
 
-_FOLLOWING = {  # the arrays that a word of `set` makes anew, and of which words it makes them
-    "youngs_modulus": {
-        "stretch_stiffness": {"youngs_modulus"},
-        "bend_stiffness": {"youngs_modulus"},
-        "twist_stiffness": {"youngs_modulus", "poisson_ratio"},
-        "viscous_time": {"youngs_modulus", "viscosity"},
-    },
-    "poisson_ratio": {"twist_stiffness": {"youngs_modulus", "poisson_ratio"}},
-    "density": {"line_density": {"density"}, "rotary_inertia": {"density"}},
-    "viscosity": {"viscous_time": {"youngs_modulus", "viscosity"}},
-    "line_density": {"line_density": {"line_density"}, "rotary_inertia": {"line_density"}},
-}
 _OF_DRAGS = "drag of drags"  # makes a rod's drag where add_drag's handles do
 
 
@@ -173,7 +161,7 @@ class _Epoch:
                 continue
             out.live[key] = index
             if isinstance(call.part, RodPart):
-                for array, words in _FOLLOWING.get(word, {word: {word}}).items():
+                for array, words in MADE_OF.get(word, {word: {word}}).items():
                     out.made_of[name, array] = words
             elif isinstance(call.part, DragPart):
                 for rod in dragged_rods(call.session, call.part):

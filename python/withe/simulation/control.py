@@ -132,6 +132,10 @@ class Control:
             restitution between rods, the slip_tolerance of friction, and the contact_stiffness [N/m], or None for one
             that follows the forces. See `set_restitution` and `set_contact_stiffness` for two bodies.
 
+            Of a rod, youngs_modulus sets stretch_stiffness, bend_stiffness, twist_stiffness and viscous_time too,
+            poisson_ratio twist_stiffness, density line_density, and viscosity viscous_time. Where one call has both,
+            the latter are as given, in whatever order; a later call of the former makes them anew.
+
         Raises
         ------
         ValueError

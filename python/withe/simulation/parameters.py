@@ -22,7 +22,7 @@ from withe.parts.kinds import (
     SpringPart,
     SupportPart,
 )
-from withe.parts.parameters import NATURAL_WORDS, ROD_WORDS
+from withe.parts.parameters import NATURAL_WORDS, ROD_WORDS, in_order_of_setting
 from withe.parts.rods import curvature_given, stretch_array, twist_array
 from withe.parts.springs import SPRING_WORDS
 from withe.simulation.hands import ring_friction, set_ring_friction
@@ -62,6 +62,8 @@ def set_values(session: Session, target: Settable | str | None, values: dict[str
     if isinstance(part, SupportPart):
         _set_support(session, part, values)
         return
+    if isinstance(part, RodPart):
+        values = {word: values[word] for word in in_order_of_setting(values)}
     _set_values(session, part, values)
     session.note("set", part, values)
 
