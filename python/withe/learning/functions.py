@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from withe.common.extras import require
 from withe.parts.handles import Support
+from withe.simulation.overlaps import order_of_setting, remaining
 from withe.simulation.simulation import Simulation
 from withe.simulation.unknowns import SCENE_WORDS, Unknown
 
@@ -47,7 +48,8 @@ def rollout(
     values : mapping
         From what `Record.gradient` takes in `wrt` (a part and a word of `set`; "gravity"; "initial_positions",
         "initial_velocities" of all nodes) to tensors, float64, of a shape that `set` takes. Other than `set`,
-        "initial_positions" take directors along by the smallest turn, and joints as they are.
+        "initial_positions" take directors along by the smallest turn, and joints as they are. Where one value sets
+        another (see `Simulation.set`), that is as given, and what it replaces has no part in the gradient.
     duration, record_every : float [s]
         As in `Simulation.run`.
     of : str or list of str
@@ -105,7 +107,7 @@ def equilibrium(simulation: Simulation, values: Values) -> Any:
         Where the search begins; stays as it is.
     values : mapping
         From what `Equilibrium.gradient` takes in `wrt` (a part and a word of `set`; "gravity"; a support and
-        "position") to tensors, float64, of a shape that `set` or `move` takes.
+        "position") to tensors, float64, of a shape that `set` or `move` takes; those that set others as in `rollout`.
 
     Returns
     -------
@@ -170,10 +172,11 @@ def _function() -> Any:
         @staticmethod
         def forward(ctx: Any, simulation: Simulation, wrt: list[Unknown], solve: _Solve, *tensors: Any) -> Any:
             copy = simulation.copy()
-            for unknown, tensor in zip(wrt, tensors, strict=True):
-                _set(copy, unknown, tensor.detach().cpu().numpy())
+            for place in order_of_setting(copy._session, wrt):
+                _set(copy, wrt[place], tensors[place].detach().cpu().numpy())
             found, pull_back = solve(copy, any(ctx.needs_input_grad))
-            ctx.wrt, ctx.pull_back, ctx.shapes = wrt, pull_back, [tensor.shape for tensor in tensors]
+            ctx.wrt, ctx.pull_back = remaining(copy._session, wrt), pull_back
+            ctx.shapes = [tensor.shape for tensor in tensors]
             ctx.normal = np.array(copy.plan.plane_normal) if copy.plan.planar else None
             return tuple(torch.as_tensor(np.array(array), device=tensors[0].device) for array in found)
 

@@ -21,17 +21,19 @@ from withe.parts.kinds import (
     RodPart,
     SpringPart,
 )
-from withe.parts.parameters import ACTING_WORDS, MADE_OF, NATURAL_WORDS
+from withe.parts.parameters import ACTING_WORDS, NATURAL_WORDS
 from withe.parts.springs import SPRING_WORDS
 from withe.simulation.drawn import DrawnNodes
 from withe.simulation.motion import POSE_WORDS
 from withe.simulation.moves import Way
 from withe.simulation.obstacles import find_obstacle
+from withe.simulation.overlaps import OF_DRAGS, made_by
 from withe.simulation.session import Session
 from withe.simulation.unknowns import (
     SCENE_WORDS,
     OfRun,
     Reader,
+    Remaining,
     dragged_rods,
     edges_of,
     friction_reader,
@@ -44,8 +46,6 @@ from withe.simulation.unknowns import (
 __all__ = ["CallGradient", "Gradients", "Ledger", "RunJournal"]
 
 FloatArray = npt.NDArray[np.float64]
-
-_OF_DRAGS = "drag of drags"  # makes a rod's drag where add_drag's handles do
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,12 +160,7 @@ class _Epoch:
                 out.ramps[key] = _Ramp(self.weights(key, call.time), index, call.time, call.over)
                 continue
             out.live[key] = index
-            if isinstance(call.part, RodPart):
-                for array, words in MADE_OF.get(word, {word: {word}}).items():
-                    out.made_of[name, array] = words
-            elif isinstance(call.part, DragPart):
-                for rod in dragged_rods(call.session, call.part):
-                    out.made_of[rod.name, "drag"] = {_OF_DRAGS}
+            out.made_of |= made_by(call.session, call.part, word)
         return out
 
     def _set_on_way(self, index: int, call: _Call, name: str) -> None:
@@ -308,6 +303,8 @@ class Ledger:
         """By what the run began with, as far as that acts."""
         if isinstance(unknown, str):
             return reader(OfRun(found)) * (0.0 if ("", unknown) in epoch.live else 1.0)
+        if isinstance(unknown, Remaining):  # asked for by what lets no call into its runs
+            return reader(OfRun(found))
         part, word = part_of(self._session, unknown[0]), unknown[1]
         key = (part.name, word)
         if isinstance(part, RodPart) and word in NATURAL_WORDS:
@@ -389,7 +386,7 @@ def _by_drag(epoch: _Epoch, part: DragPart, found: Any, *, initial: bool) -> flo
     total = 0.0
     for rod in dragged_rods(epoch.session, part):
         words = epoch.made_of.get((rod.name, "drag"))
-        if (_OF_DRAGS in words) if words is not None else initial:
+        if (OF_DRAGS in words) if words is not None else initial:
             first, last = edges_of(epoch.session, rod.index)
             total += float(np.asarray(found.drag)[first:last].sum())
     return total

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -34,8 +34,10 @@ from withe.simulation.session import Session
 __all__ = [
     "INITIAL_WORDS",
     "SCENE_WORDS",
+    "Array",
     "OfRun",
     "Reader",
+    "Remaining",
     "Unknown",
     "check_list",
     "dragged_rods",
@@ -54,6 +56,18 @@ __all__ = [
 FloatArray = npt.NDArray[np.float64]
 Unknown = tuple[Rod | Load | Mass | Drag | Fluid | Spring | Support | Obstacle | str | tuple[Body, Body], str] | str
 """What to differentiate by: a part and a word of `set`, two bodies and "friction", or a word of the scene."""
+
+
+Array = tuple[str, str]
+"""Name of a rod, and of what the engine works with of it."""
+
+
+@dataclass(frozen=True)
+class Remaining:
+    """A word of a rod or a drag as far as other words leave what it sets: it acts through some arrays alone."""
+
+    unknown: Unknown
+    arrays: frozenset[Array]
 
 
 @dataclass(frozen=True)
@@ -88,8 +102,10 @@ def is_points(unknown: Unknown) -> bool:
     return isinstance(unknown, tuple) and len(unknown) == 2 and isinstance(unknown[1], str) and unknown[1] == "points"
 
 
-def unknown_reader(session: Session, unknown: Unknown) -> Reader:
+def unknown_reader(session: Session, unknown: Unknown | Remaining) -> Reader:
     """What reads the derivative by one of `wrt`."""
+    if isinstance(unknown, Remaining):
+        return _remaining_reader(session, unknown)
     if isinstance(unknown, str):
         return scene_reader(session, unknown)
     if not isinstance(unknown, tuple) or len(unknown) != 2 or not isinstance(unknown[1], str):
@@ -141,6 +157,15 @@ def reader_of(session: Session, part: Part | BodyPair, word: str) -> Reader:
     if isinstance(part, SupportPart) and word in HAND_WORDS:
         return _hand_reader(session, part, word)
     raise ValueError(f"no gradient is known by {word!r} of {part.name!r}")
+
+
+def _remaining_reader(session: Session, remaining: Remaining) -> Reader:
+    part, word = part_of(session, remaining.unknown[0]), remaining.unknown[1]
+    if isinstance(part, RodPart):
+        return _rod_reader(session, part, word, {array for _, array in remaining.arrays})
+    rods = {rod for rod, _ in remaining.arrays}
+    dragged = [edges_of(session, rod.index) for rod in session.directory.all(RodPart) if rod.name in rods]
+    return lambda g: float(sum(g.parameters.drag[first:last].sum() for first, last in dragged))
 
 
 def _load_reader(session: Session, part: LoadPart) -> Reader:
@@ -259,7 +284,8 @@ def _points_reader(session: Session, part: RodPart) -> Reader:
     return checked
 
 
-def _rod_reader(session: Session, part: RodPart, word: str) -> Reader:
+def _rod_reader(session: Session, part: RodPart, word: str, arrays: Iterable[str] | None = None) -> Reader:
+    """`arrays`: through which the word acts; all by default."""
     if word == "points":
         return _points_reader(session, part)
     if word in NATURAL_WORDS:
@@ -269,6 +295,8 @@ def _rod_reader(session: Session, part: RodPart, word: str) -> Reader:
         raise ValueError(f"{part.name!r} has no {word!r} to differentiate by; it has {words}")
     first, last = edges_of(session, part.index)
     slopes = rod_slopes(session, part, word)
+    if arrays is not None:
+        slopes = {name: slope for name, slope in slopes.items() if name in arrays}
     scalar = word != "radius" and np.ndim(session.settings.rods[part.index].get(word)) == 0
 
     def read(gradient: _core.EquilibriumGradient | OfRun) -> Any:
