@@ -1,5 +1,7 @@
 """Fits find what was drawn, say how sure they are, and what the targets do not tell."""
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -11,6 +13,7 @@ from withe.real2sim.stills import Stills
 from withe.real2sim.unknowns import Tilt
 
 ARM = [("arm", "natural_curvature", "constant")]
+DENSITIES = [("arm", "density"), ("arm", "line_density")]
 
 
 def arm(nodes=31, space=False, **options):
@@ -420,6 +423,11 @@ def test_exact_tags_beside_the_plane_have_no_error_in_it():
         (Tags([[(1, 0, 0)]], ["arm.end"]), [("arm", "colour")], {}, "unknowns must be of natural_curvature"),
         (Tags([[(1, 0, 0)]], ["arm.end"]), [*ARM, *ARM], {}, "natural_curvature of rod 'arm' twice"),
         (Tags([[(1, 0, 0)]], ["arm.end"]), ARM, {"shared": ARM}, "in unknowns or in shared, got both"),
+        (Tags([[(1, 0, 0)]], ["arm.end"]), [*DENSITIES], {}, "density of 'arm' cannot be unknown here"),
+        (Tags([[(1, 0, 0)]], ["arm.end"]), DENSITIES[::-1], {}, "density of 'arm' cannot be unknown here"),
+        (Tags([[(1, 0, 0)]], ["arm.end"]), DENSITIES[:1], {"shared": DENSITIES[1:]}, "as other unknowns set all"),
+        (Tags([[(1, 0, 0)]], ["arm.end"]), [*ARM, ("arm", "points")], {}, "points of 'arm' set its natural_curvature"),
+        (Tags([[(1, 0, 0)]], ["arm.end"]), [("arm", "points"), *ARM], {}, "points of 'arm' set its natural_curvature"),
         (Tags([[(1, 0, 0)]], ["arm.end"]), [("arm", "viscosity")], {}, "must be positive to begin with"),
         (Tags([[(1, 0, 0)]], ["arm.end"]), [("arm", "natural_curvature", "cubic")], {}, "'constant' or 'linear' or"),
         (Tags([[(1, 0, 0)]], ["arm.end"]), [("arm", "natural_curvature", np.ones((3, 1)))], {}, r"\(29, n\)"),
@@ -482,6 +490,52 @@ def test_derivatives_are_those_of_equilibria(space):
         ahead, behind = (stills.residual(coordinates + s * np.eye(len(coordinates))[i], 0)[0] for s in (step, -step))
         scale = np.abs(jacobian[:, i]).max()
         assert jacobian[:, i] == pytest.approx((ahead - behind) / (2 * step), abs=1e-5 * scale)
+
+
+def crooked():
+    """A rod in space that its weight bends, twists and stretches."""
+    scene = withe.Scene()
+    rubber = withe.Material(youngs_modulus=1e6, poisson_ratio=0.4, density=1000.0, viscosity=1e3)
+    s = np.linspace(0.0, 1.0, 16)
+    points = np.stack([0.2 * s, 0.03 * np.cos(2.0 * s), 0.02 * np.sin(3.0 * s)], axis=1)
+    rod = scene.add_rod(points=points, radius=4e-3, material=rubber, name="arm")
+    scene.clamp(rod.start)
+    return scene.build(integrator="static")
+
+
+STATIC = ("youngs_modulus", "density", "stretch_stiffness", "bend_stiffness", "twist_stiffness", "line_density")
+PAIRS = [pair for pair in itertools.permutations(STATIC, 2) if {*pair} != {"density", "line_density"}]
+
+
+@pytest.mark.parametrize("pair", PAIRS, ids="-".join)
+def test_derivatives_by_two_unknowns_are_those_of_equilibria_whichever_comes_first(pair):
+    simulation = crooked()
+    tags = Tags(np.zeros((1, 3, 3)), names((5, 10, 15))).bind(simulation)
+    stills = Stills(simulation, parse_unknowns(simulation, [("arm", word) for word in pair]), tags)
+    at = np.array([0.1, -0.2])
+    stills.residual(at + np.array([0.3, 0.0]), 0)  # the first alone changes after this
+    found = stills.residual(at, 0)
+    jacobian = stills.jacobian(at, found[1], 0)
+    firsts = [np.mean(crooked().get("arm", word)) for word in pair]
+    assert [np.mean(simulation.get("arm", word)) for word in pair] == pytest.approx(firsts * np.exp(at), rel=1e-12)
+    for i in range(2):
+        step = 1e-3 * np.eye(2)[i]
+        near, far = ((stills.residual(at + k * step, 0)[0] - stills.residual(at - k * step, 0)[0]) / k for k in (1, 2))
+        assert jacobian[:, i] == pytest.approx((4 * near - far) / 6e-3, rel=1e-5, abs=1e-9)
+
+
+@pytest.mark.parametrize("words", [("youngs_modulus", "twist_stiffness"), ("twist_stiffness", "youngs_modulus")])
+def test_a_stiffness_is_found_with_the_modulus_that_sets_it(words):
+    truth = crooked()
+    truth.set("arm", youngs_modulus=1.3e6, twist_stiffness=1.5 * truth.get("arm", "twist_stiffness"))
+    truth.equilibrium()
+    tags = Tags(truth.positions("arm")[None, 3::3], names(range(3, 16, 3)), sigma=1e-7)
+    found = fit(crooked(), tags, [("arm", word) for word in words], progress=False)
+    fitted = crooked()
+    found.apply(fitted)
+    for word in words:
+        assert found.value("arm", word)[0] == pytest.approx(np.mean(truth.get("arm", word)), rel=1e-6)
+        assert np.mean(fitted.get("arm", word)) == pytest.approx(np.mean(truth.get("arm", word)), rel=1e-6)
 
 
 def test_where_the_engine_knows_no_gradient_differences_take_its_place():

@@ -104,6 +104,19 @@ def test_a_local_minimum_is_named_where_sigma_is_given_and_the_first_swings_lead
     assert best.reasons == {}
 
 
+@pytest.mark.parametrize("method", ["gauss_newton", "lbfgs"])
+@pytest.mark.parametrize("words", [("youngs_modulus", "viscous_time"), ("viscous_time", "youngs_modulus")])
+def test_damping_is_found_with_the_modulus_that_sets_it_whichever_comes_first(words, method):
+    truth = ringing(modulus=1.1e6)
+    truth.set("arm", viscous_time=2e-3)
+    record = truth.run(0.5, record_every=0.02, progress=False)
+    tags = Tags(record.positions("arm")[1:, [6, 12]], ["arm.node(6)", "arm.end"], times=record.times[1:])
+    start = ringing(viscosity=1e3)
+    found = fit_motion(start, tags, [("arm", word) for word in words], begin=let_go, method=method, progress=False)
+    assert found.value("arm", "youngs_modulus")[0] == pytest.approx([1.1e6], rel=1e-4)
+    assert found.value("arm", "viscous_time")[0] == pytest.approx([2e-3], rel=1e-2)
+
+
 def test_friction_is_told_by_how_a_rod_slides_to_a_stop():
     def sliding(friction):
         scene = withe.Scene()

@@ -61,6 +61,8 @@ def fit(
         ``(rod, "points", basis)`` for a rod as it was drawn, in a plane: by how much its edges are turned, over
         functions of the same kinds, (edges, n), as if the scene were built anew: natural curvature follows, and
         supports go where its nodes are drawn. ``(support, "position")`` and ``(support, "rotation")`` for poses.
+        Where one sets another (see `Simulation.set`), as youngs_modulus does twist_stiffness, it acts through what is
+        left to it.
     method : {"gauss_newton", "lbfgs", "source"}
         "source" is gradient descent by forward differences on the sum of absolute residuals [Choi, doctoral
         dissertation, University of California, Los Angeles, Algorithm 6], for constant natural curvature in a plane;
@@ -84,7 +86,8 @@ def fit(
     Raises
     ------
     ValueError
-        Targets of unlike lengths, with no frame in which anything was seen, or what cannot be unknown.
+        Targets of unlike lengths, with no frame in which anything was seen, or what cannot be unknown, or not together
+        with the others.
 
     Examples
     --------

@@ -223,10 +223,9 @@ class _Motion(Coordinates):
         np.add.at(by_points, self._left, (1 - (3 - 2 * s) * s**2) * by_seen)
         np.add.at(by_speeds, self._left, gap * s * (1 - s) ** 2 * by_seen)
         np.add.at(by_speeds, self._left + 1, -gap * s**2 * (1 - s) * by_seen)
-        words = [word for unknown in self.unknowns for word in unknown.words]
         *found, by_start, by_start_speeds = self._record.gradient(
             {"positions": self.in_plane(by_points), "velocities": self.in_plane(by_speeds)},
-            [*words, "initial_positions", "initial_velocities"],
+            [*self.words, "initial_positions", "initial_velocities"],
         )
         out, first = np.zeros(len(coordinates)), 0
         for unknown, place in zip(self.unknowns, self.slices, strict=True):

@@ -7,7 +7,9 @@ from typing import Any
 
 from withe.real2sim.shape_unknowns import DrawnShape, NaturalCurvature, Pose
 from withe.real2sim.unknowns import POSITIVE, Parameter, Unknown
+from withe.simulation.overlaps import remaining
 from withe.simulation.simulation import Simulation
+from withe.simulation.unknowns import Remaining
 
 __all__ = ["parse_unknowns"]
 
@@ -20,7 +22,7 @@ def parse_unknowns(
     Raises
     ------
     ValueError
-        Something else, a word that cannot be unknown, or the same one twice.
+        Something else, a word that cannot be unknown, the same one twice, or one beside others that set all it sets.
     """
     if isinstance(unknowns, str) or not isinstance(unknowns, Sequence):
         raise ValueError(f"{what} must be a list such as [(arm, 'natural_curvature', 'constant')], got {unknowns!r}")
@@ -45,11 +47,32 @@ def parse_unknowns(
                 raise ValueError(f"{what} must be different, got {word} of rod {name!r} twice")
             seen.add((name, word))
         found.append(unknown)
-    shapes_drawn = [unknown for unknown in (*others, *found) if isinstance(unknown, DrawnShape)]
-    for pose in (unknown for unknown in (*others, *found) if isinstance(unknown, Pose)):
-        for shape in shapes_drawn:
-            if pose.rods[0] in shape.supports:
-                raise ValueError(
-                    f"points of {shape.rods[0]!r} move its supports: leave out {pose.word} of {pose.rods[0]!r}"
-                )
+    _check_shapes([*others, *found])
+    _check_parameters(simulation, [*others, *found])
     return found
+
+
+def _check_shapes(unknowns: list[Unknown]) -> None:
+    """Rods as they were drawn have natural curvature and supports with them."""
+    for shape in (unknown for unknown in unknowns if isinstance(unknown, DrawnShape)):
+        rod = shape.rods[0]
+        for other in unknowns:
+            if isinstance(other, Pose) and other.rods[0] in shape.supports:
+                raise ValueError(f"points of {rod!r} move its supports: leave out {other.word} of {other.rods[0]!r}")
+            if isinstance(other, NaturalCurvature) and other.rods[0] == rod:
+                raise ValueError(
+                    f"points of {rod!r} set its natural_curvature: leave one of them out; where its base alone is "
+                    "turned, take (support, 'rotation') instead of points"
+                )
+
+
+def _check_parameters(simulation: Simulation, unknowns: list[Unknown]) -> None:
+    """Each sets something that no other unknown replaces."""
+    parameters = [unknown for unknown in unknowns if isinstance(unknown, Parameter)]
+    kept = iter(remaining(simulation._session, [word for parameter in parameters for word in parameter.words]))
+    for parameter in parameters:
+        own = [next(kept) for _ in parameter.words]
+        if all(isinstance(word, Remaining) and not word.arrays for word in own):
+            raise ValueError(
+                f"{parameter.names[0]} cannot be unknown here, as other unknowns set all that it sets: leave it out"
+            )

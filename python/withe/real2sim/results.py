@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from withe.parts.handles import Rod
 from withe.real2sim.shape_unknowns import DrawnShape
-from withe.real2sim.unknowns import Unknown
+from withe.real2sim.unknowns import Unknown, order_of_writing
 from withe.simulation.simulation import Simulation
 
 __all__ = ["Fit", "Outlier", "Unobservable"]
@@ -205,10 +205,10 @@ class Fit:
         coordinates = self._coordinates[frame]
         if not np.isfinite(coordinates).all():
             raise ValueError(f"frame {frame} was skipped, as nothing was seen in it: give one with values")
-        start = 0
-        for unknown in self._unknowns:
-            unknown.write(simulation, coordinates[start : start + len(unknown)])
-            start += len(unknown)
+        ends = np.cumsum([len(unknown) for unknown in self._unknowns])
+        for index in order_of_writing(simulation, self._unknowns):
+            unknown, end = self._unknowns[index], ends[index]
+            unknown.write(simulation, coordinates[end - len(unknown) : end])
 
     def points(self, rod: Rod | str, frame: int = -1) -> FloatArray:
         """Nodes of a rod as it was drawn, shape (nodes, 3) [m], for what was found of its ``points``.

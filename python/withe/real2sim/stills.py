@@ -92,9 +92,8 @@ class Equilibria(Coordinates):
         ConvergenceError
             The branch of equilibria ends here.
         """
-        words = [word for unknown in self.unknowns for word in unknown.words]
         try:
-            found = equilibrium_gradients(self.simulation._session, self.in_plane(by_positions), words)
+            found = equilibrium_gradients(self.simulation._session, self.in_plane(by_positions), self.words)
         except ValueError:
             changes = self._differences(coordinates, frame)
             return np.asarray(np.tensordot(by_positions, changes, axes=2))

@@ -13,9 +13,11 @@ import numpy.typing as npt
 from withe.parts.handles import Handle
 from withe.parts.parameters import ROD_WORDS
 from withe.real2sim.places import rod_part, turning_axis
+from withe.simulation.overlaps import arrays_of, remaining, setting_rank
 from withe.simulation.simulation import Simulation
+from withe.simulation.unknowns import Array
 
-__all__ = ["POSITIVE", "Coordinates", "Delay", "Parameter", "Tilt", "Unknown"]
+__all__ = ["POSITIVE", "Coordinates", "Delay", "Parameter", "Tilt", "Unknown", "order_of_writing"]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -70,6 +72,13 @@ class Unknown(ABC):
         return np.ones_like(coordinates)
 
 
+def order_of_writing(simulation: Simulation, unknowns: Sequence[Unknown]) -> list[int]:
+    """Places of unknowns in the order in which to write them, so that none undoes one before it."""
+    session = simulation._session
+    ranks = [max((setting_rank(session, word) for word in unknown.words), default=(0, 0)) for unknown in unknowns]
+    return sorted(range(len(ranks)), key=ranks.__getitem__)
+
+
 class Coordinates:
     """All unknowns of a simulation as one vector.
 
@@ -81,6 +90,8 @@ class Coordinates:
         Those of each unknown.
     per_frame : ndarray of bool
         Which of them every frame has of its own.
+    words : list
+        What to ask the engine for derivatives by: those of all unknowns, without what another unknown replaces.
     """
 
     def __init__(self, simulation: Simulation, unknowns: Sequence[Unknown]) -> None:
@@ -91,17 +102,24 @@ class Coordinates:
         ends = np.cumsum([0, *(len(unknown) for unknown in self.unknowns)])
         self.slices = [slice(a, b) for a, b in pairwise(ends)]
         self._written = np.full(len(self.names), np.nan)
+        session = simulation._session
+        self.words = remaining(session, [word for unknown in self.unknowns for word in unknown.words])
+        self._order = order_of_writing(simulation, self.unknowns)
+        self._arrays = [{array for word in u.words for array in arrays_of(session, word)} for u in self.unknowns]
 
     def begin(self) -> FloatArray:
         """Those of what the simulation has now."""
         return np.concatenate([unknown.read(self.simulation) for unknown in self.unknowns])
 
     def write(self, coordinates: FloatArray) -> None:
-        """Set what is not set yet."""
-        for unknown, place in zip(self.unknowns, self.slices, strict=True):
-            if not (coordinates[place] == self._written[place]).all():
-                unknown.write(self.simulation, coordinates[place])
+        """Set what is not set yet, and once more what that has made anew."""
+        made: set[Array] = set()
+        for index in self._order:
+            place, arrays = self.slices[index], self._arrays[index]
+            if made & arrays or not (coordinates[place] == self._written[place]).all():
+                self.unknowns[index].write(self.simulation, coordinates[place])
                 self._written[place] = coordinates[place]
+                made |= arrays
 
     def in_plane(self, by_positions: FloatArray) -> FloatArray:
         """Derivatives by positions, shape (..., 3), without those along the normal of a planar scene."""

@@ -11,7 +11,7 @@ from withe.parts.parameters import MADE_OF, ROD_WORDS
 from withe.simulation.session import Session
 from withe.simulation.unknowns import INITIAL_WORDS, Array, Remaining, Unknown, dragged_rods, part_of
 
-__all__ = ["OF_DRAGS", "made_by", "order_of_setting", "remaining", "setting_rank"]
+__all__ = ["OF_DRAGS", "arrays_of", "made_by", "order_of_setting", "remaining", "setting_rank"]
 
 OF_DRAGS = "drag of drags"  # makes a rod's drag where add_drag's handles do
 
@@ -23,6 +23,11 @@ def made_by(session: Session, part: Part | BodyPair | None, word: str) -> dict[A
     if isinstance(part, DragPart):
         return {(rod.name, "drag"): {OF_DRAGS} for rod in dragged_rods(session, part)}
     return {}
+
+
+def arrays_of(session: Session, unknown: Unknown) -> dict[Array, set[str]]:
+    """The same of one of `wrt`."""
+    return {} if isinstance(unknown, str) else made_by(session, part_of(session, unknown[0]), unknown[1])
 
 
 def setting_rank(session: Session, unknown: Unknown) -> tuple[int, int]:
@@ -57,10 +62,7 @@ def order_of_setting(session: Session, unknowns: Sequence[Unknown]) -> list[int]
 
 def remaining(session: Session, unknowns: Sequence[Unknown]) -> list[Any]:
     """What to ask for derivatives by unknowns that are all set: `Remaining` for those that another undoes in part."""
-    own = [
-        {} if isinstance(unknown, str) else made_by(session, part_of(session, unknown[0]), unknown[1])
-        for unknown in unknowns
-    ]
+    own = [arrays_of(session, unknown) for unknown in unknowns]
     made: dict[Array, set[str]] = {}
     for place in order_of_setting(session, unknowns):
         made |= own[place]
