@@ -6,6 +6,7 @@ import pytest
 import withe
 from soft_limb import CONSTANT, LIMB, log, robot
 from withe.real2sim import Tags, calibrate, fit
+from withe.real2sim.parsing import parse_unknowns
 
 
 def made(places, turns, camera, noise=0.0, tilt=0.0):
@@ -57,6 +58,42 @@ def test_a_robot_seen_from_behind_is_not_mirrored():
     found = calibrate(simulation, Tags(pixels, places), free=("roll", "scale"), progress=False)
     assert found.rms < 1e-3
     assert found.roll == pytest.approx(-0.1, abs=1e-5)
+
+
+def hanging(end, curvatures, side=1):
+    """An arm in the plane of x and z, and pixels of tags for natural curvatures of it, seen from one of both sides."""
+    scene = withe.Scene()
+    rubber = withe.Material(youngs_modulus=1e6, density=1100.0)
+    rod = scene.add_rod(start=(0, 0, 0), end=end, nodes=26, radius=5e-3, material=rubber, name="arm", normal=(0, 1, 0))
+    scene.clamp(rod.start)
+    simulation = scene.build(integrator="static", planar=True)
+    (along,) = parse_unknowns(simulation, [("arm", "natural_curvature", "constant")])
+    moved, places = simulation.copy(), [5, 10, 15, 20, 25]
+    pixels = []
+    for curvature in curvatures:
+        along.write(moved, np.array([curvature]))
+        moved.equilibrium()
+        points = moved.positions("arm")[places]
+        pixels.append((900, 300) + 2000 * points[:, [0, 2]] * (side, -1))
+    noise = np.random.default_rng(0).normal(0, 0.3, (len(curvatures), 5, 2))
+    return simulation, Tags(pixels + noise, [f"arm.node({place})" for place in places])
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_an_arm_that_bends_past_the_vertical_is_not_mirrored(side):
+    bends = np.linspace(-10.0, 2.0, 13)
+    simulation, tags = hanging((0.12, 0, -0.22), bends, side)
+    found = calibrate(simulation, tags, progress=False)
+    curvatures = fit(simulation, Tags(tags.points, found.places, found), [("arm", "natural_curvature")], progress=False)
+    assert curvatures.values[:, 0] == pytest.approx(bends, abs=0.2)
+    assert found.rms < 0.5
+    assert not any("side of the plane" in str(item) for item in found.unobservable)
+
+
+def test_from_which_side_a_vertical_arm_is_seen_is_not_told_and_that_is_said():
+    simulation, tags = hanging((0, 0, -0.25), np.linspace(-6.0, 4.0, 6))
+    found = calibrate(simulation, tags, progress=False)
+    assert any("side of the plane" in str(item) for item in found.unobservable)
 
 
 def test_with_weight_to_tell_it_the_tilt_of_the_base_is_found():

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
+from withe.common.progress import Progress
 from withe.common.progress import progress as progress_bar
 from withe.errors import ConvergenceError
 from withe.perception.camera import Camera
@@ -31,6 +32,8 @@ Free = Literal["roll", "scale", "arcs", "tilt"]
 _FREE = ("roll", "scale", "arcs", "tilt")
 _PIXELS = 1e-6  # norm of residuals that is as good as none
 _ITERATIONS = 50
+_RESOLVED = 1e-3  # [px]: no detector of tags tells less
+_SIDE = "side of the plane on which the camera is"
 
 
 class Calibration(Camera):
@@ -86,6 +89,10 @@ def calibrate(
     The picture is x right, y down, and the camera looks straight at the plane, held nearly upright: a point (x, y) of
     the plane, right and up against gravity, is seen at offset + scale R(roll) (x, -y). The offset is always found.
 
+    Cameras on both sides of the plane are tried, and the one with the smaller residuals is kept. Where the other's are
+    as small, as for a robot that is drawn straight down, `Calibration.unobservable` says so, and the side is that from
+    which the robot appears, on the mean, as it is drawn.
+
     Parameters
     ----------
     simulation : Simulation
@@ -114,21 +121,54 @@ def calibrate(
         The robot has no equilibrium for some frame.
     """
     listed = _checked(simulation, tags, free)
-    copy = simulation.copy()
-    places = Places(copy, tags.places)
-    own: list[Unknown] = (
-        [NaturalCurvature(copy, rod) for rod in copy.rods] if unknowns is None else parse_unknowns(copy, unknowns)
-    )
-    if "roll" in listed or "tilt" in listed:
-        own.append(Tilt(copy))
-    seen = np.asarray(tags.points, np.float64)
     chosen = _chosen(frames, tags.frames)
+    seen = np.asarray(tags.points, np.float64)
     good = [f for f in chosen if np.isfinite(seen[f]).any()]
     if not good:
         raise ValueError(f"tags must be seen in some of the {len(chosen)} frames that were asked for, got none")
-    problem = CameraProblem(copy, own, places, seen)
-    open_ = problem.free(listed)
-    return _calibration(problem, _solve(problem, good, open_, progress), open_)
+    found: list[Calibration] = []
+    failed: list[ConvergenceError] = []
+    with progress_bar(2 * len(good), "calibrating", progress, unit="frames") as bar:
+        for side in (1, -1):
+            problem = _problem(simulation, tags, listed, unknowns, side)
+            open_ = problem.free(listed)
+            try:
+                found.append(_calibration(problem, _solve(problem, good, open_, bar), open_))
+            except ConvergenceError as error:
+                failed.append(error)
+    if not found:
+        raise failed[0]
+    return _better(found)
+
+
+def _problem(
+    simulation: Simulation, tags: Tags, free: Sequence[str], unknowns: Sequence[Any] | None, side: int
+) -> CameraProblem:
+    """Of a camera on one side of the plane."""
+    copy = simulation.copy()
+    own: list[Unknown] = (
+        [NaturalCurvature(copy, rod) for rod in copy.rods] if unknowns is None else parse_unknowns(copy, unknowns)
+    )
+    if "roll" in free or "tilt" in free:
+        own.append(Tilt(copy))
+    return CameraProblem(copy, own, Places(copy, tags.places), np.asarray(tags.points, np.float64), side)
+
+
+def _better(found: list[Calibration]) -> Calibration:
+    """The camera with the smaller residuals, of those that are held upright; the first where that says nothing.
+
+    As with other unknowns, the side is not told where tags move by less than the misfit when it changes.
+    """
+    upright = [camera for camera in found if np.cos(camera.roll) > 0.0] or found
+    if len(upright) == 1:
+        return upright[0]
+    likely, other = upright
+    best, rest = (other, likely) if other.rms < likely.rms - _RESOLVED else (likely, other)
+    squares, more = (float(np.nanmean(camera.residuals**2)) for camera in (best, rest))
+    effect, misfit = float(np.sqrt(max(more - squares, 0.0))), float(np.sqrt(squares))
+    if effect < max(misfit, _RESOLVED):
+        best.unobservable += (Unobservable({_SIDE: 1.0}, effect, misfit),)
+    return best
 
 
 class _Restricted:
@@ -173,18 +213,15 @@ def _chosen(frames: slice | Sequence[int], count: int) -> list[int]:
     return [validation.integer(frame, "frames", 0, count - 1) for frame in frames]
 
 
-def _solve(
-    problem: CameraProblem, frames: list[int], free: BoolArray, progress: bool | Literal["always"]
-) -> dict[int, FloatArray]:
+def _solve(problem: CameraProblem, frames: list[int], free: BoolArray, bar: Progress) -> dict[int, FloatArray]:
     """All coordinates of every frame: first its own for the camera as it begins, then all of them."""
     restricted = _Restricted(problem, free, problem.begin)
     own = restricted.per_frame
     start, guess = {}, problem.begin[free]
-    with progress_bar(len(frames), "calibrating", progress, unit="frames") as bar:
-        for frame in frames:
-            guess = lone_frame(restricted, frame, guess, own, _PIXELS, _ITERATIONS).coordinates
-            start[frame] = guess
-        found = all_frames(restricted, frames, start, _PIXELS, _ITERATIONS, lambda: bar.advance(1))
+    for frame in frames:
+        guess = lone_frame(restricted, frame, guess, own, _PIXELS, _ITERATIONS).coordinates
+        start[frame] = guess
+    found = all_frames(restricted, frames, start, _PIXELS, _ITERATIONS, lambda: bar.advance(1))
     failed = [frame for frame in frames if frame not in found]
     if failed:
         raise ConvergenceError(

@@ -43,6 +43,12 @@ class CameraProblem:
 
     Coordinates: those of the unknowns, roll [rad], logarithm of scale [px/m], offset (2) [px], places of tags [m].
 
+    Parameters
+    ----------
+    side : {1, -1}
+        From which side the plane is seen: that from which tags are, on the mean, to the same side of the first as they
+        are drawn, or the other one.
+
     Attributes
     ----------
     begin : ndarray of shape (coordinates,)
@@ -51,7 +57,9 @@ class CameraProblem:
         Right and down in a level picture, in the world.
     """
 
-    def __init__(self, simulation: Simulation, unknowns: list[Unknown], places: Places, seen: FloatArray) -> None:
+    def __init__(
+        self, simulation: Simulation, unknowns: list[Unknown], places: Places, seen: FloatArray, side: int = 1
+    ) -> None:
         self.equilibria = Equilibria(simulation, unknowns)
         self.places, self.seen = places, seen
         self.count = len(self.equilibria.names)
@@ -60,8 +68,8 @@ class CameraProblem:
         drawn = places.weights()[0] @ simulation.positions()
         self.axes = _level_axes(simulation, places)
         across = drawn[known] @ self.axes[0]
-        if (middle[known, 0] - middle[known, 0].mean()) @ across < 0.0:  # seen from the other side
-            self.axes[0] *= -1.0
+        alike = (middle[known, 0] - middle[known, 0].mean()) @ across >= 0.0
+        self.axes[0] *= side if alike else -side
         length = float(np.abs(places.arcs[known[-1]] - places.arcs[known[0]]))
         scale = float(np.linalg.norm(np.diff(middle[known], axis=0), axis=1).sum()) / length
         offset = middle[known[0]] - scale * self.axes @ drawn[known[0]]
