@@ -1,6 +1,7 @@
 """Environments for reinforcement learning: Gymnasium's checker, equal seeds, what is refused."""
 
 import itertools
+import random
 
 import numpy as np
 import pytest
@@ -423,6 +424,42 @@ def test_a_policy_is_trained_the_same_for_equal_seeds():
     assert first.shape == (2,)
 
 
+@pytest.mark.parametrize("normalize", [True, False])
+@pytest.mark.parametrize("nodes", [1, 2, 3])
+def test_a_policy_is_trained_on_observations_of_several_nodes(nodes, normalize):
+    pytest.importorskip("stable_baselines3")
+
+    class Nodes(Touch):
+        def observe(self, robots):
+            return robots.positions("arm")[:, -nodes:]
+
+    policy = withe.learning.train_policy(
+        Nodes(), 48, environments=2, workers=1, normalize=normalize, progress=False, batch_size=8
+    )
+    assert policy.predict(np.zeros((nodes, 3), np.float32), deterministic=True)[0].shape == (2,)
+    if normalize:
+        assert policy.actor.features_extractor.running_mean.shape == (3 * nodes,)
+
+
+def generators(torch):
+    """States of those that Stable-Baselines3 seeds."""
+    return random.getstate(), np.random.get_state()[1].tolist(), torch.get_rng_state().tolist()  # noqa: NPY002
+
+
+def test_training_leaves_threads_and_generators_as_they_were():
+    torch = pytest.importorskip("torch")
+    pytest.importorskip("stable_baselines3")
+    before = torch.get_num_threads()
+    try:
+        torch.set_num_threads(2)
+        states = generators(torch)
+        withe.learning.train_policy(Touch(), 16, environments=2, workers=1, seed=5, progress=False)
+        assert torch.get_num_threads() == 2
+        assert generators(torch) == states
+    finally:
+        torch.set_num_threads(before)
+
+
 def test_training_that_is_interrupted_returns_what_has_been_learned_and_says_so():
     pytest.importorskip("stable_baselines3")
     calls = []
@@ -514,3 +551,5 @@ def test_training_refuses_what_is_no_task():
         withe.learning.train_policy(Touch(), 0)
     with pytest.raises(ValueError, match=r"task must be a withe.learning.Task, got int"):
         withe.learning.train_policy(3, 10)
+    with pytest.raises(ValueError, match=r"seed must lie in 0"):
+        withe.learning.train_policy(Touch(), 10, seed=-1)

@@ -18,7 +18,7 @@ from withe.common.extras import require
 from withe.common.progress import progress as progress_bar
 from withe.learning.networks import ACTIVATIONS, Network, Training, make_layers
 
-__all__ = ["Alternating", "Cosine", "train_network"]
+__all__ = ["Alternating", "Cosine", "own_torch", "train_network"]
 
 
 @dataclass(frozen=True)
@@ -150,14 +150,14 @@ def train_network(
     schedule = _checked(Cosine() if schedule is None else schedule)
     limit = math.inf if time_limit is None else validation.positive(time_limit, "time_limit")
     count = validation.integer(threads, "threads", 1, 1024)
-    with _own_torch(count, seed):
+    with own_torch(count, seed):
         layers = make_layers(len(names[0]), len(names[1]), widths, activation)
         training, best = _descend(layers, learned, schedule, seed, limit, progress)
     return Network(*names, widths, activation, {**learned.scales, **best}, training)
 
 
 @contextmanager
-def _own_torch(threads: int, seed: int) -> Iterator[None]:
+def own_torch(threads: int, seed: int) -> Iterator[None]:
     """Lend torch some threads and a seed, and give back what it had."""
     torch = require("torch", "learn")
     before = torch.get_num_threads()

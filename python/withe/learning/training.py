@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import math
+import random
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import cache
 from typing import Any
 
@@ -13,6 +16,7 @@ from withe.common import validation
 from withe.common.extras import require
 from withe.common.progress import progress as progress_bar
 from withe.learning.environments import environment_class
+from withe.learning.network_training import own_torch
 from withe.learning.task import Task
 
 __all__ = ["train_policy"]
@@ -45,7 +49,8 @@ def train_policy(
     workers : int, optional
         Threads that step them; by default one a processor.
     seed : int
-        Equal seeds give equal controllers, where torch runs the same.
+        Equal seeds give equal controllers, where torch runs the same. Generators of torch, NumPy and Python, and the
+        threads of torch, are left as they were.
     normalize : bool
         Whether observations are scaled by their running mean and deviation, a part of the policy.
     callback : callable, optional
@@ -67,7 +72,7 @@ def train_policy(
     Raises
     ------
     ValueError
-        Not a task, or numbers below 1.
+        Not a task, numbers below 1, or a seed that is negative or beyond 32 bits.
     ImportError
         Gymnasium, torch or Stable-Baselines3 is not installed.
 
@@ -77,8 +82,8 @@ def train_policy(
     """
     total = validation.integer(steps, "steps", 1, 2**31 - 1)
     number = validation.integer(environments, "environments", 1, 1_000_000)
+    chance = validation.integer(seed, "seed", 0, 2**32 - 1)
     baselines = require("stable_baselines3", "learn")
-    require("torch", "learn").set_num_threads(1)  # small networks lose by more
     robots = environment_class("VectorEnvironment")(task, number, workers, autoreset="same_step")
     monitor = require("stable_baselines3.common.vec_env", "learn").VecMonitor
     given: dict[str, Any] = {
@@ -94,7 +99,26 @@ def train_policy(
     if normalize:
         shared = {"features_extractor_class": _scaling(), "share_features_extractor": True}
         given["policy_kwargs"] = shared | given.get("policy_kwargs", {})
-    policy = baselines.SAC("MlpPolicy", monitor(_adapter()(robots)), seed=seed, **given)
+    with _own_generators(chance):
+        policy = baselines.SAC("MlpPolicy", monitor(_adapter()(robots)), seed=chance, **given)
+        _learn(policy, total, callback, normalize, progress)
+    return policy
+
+
+@contextmanager
+def _own_generators(seed: int) -> Iterator[None]:
+    """Lend Stable-Baselines3 one thread of torch and the generators that it seeds, and give back what they were."""
+    numpy, python = np.random.get_state(), random.getstate()  # noqa: NPY002 (that is the one it draws from)
+    try:
+        with own_torch(1, seed):  # small networks lose by more threads
+            yield
+    finally:
+        np.random.set_state(numpy)  # noqa: NPY002
+        random.setstate(python)
+
+
+def _learn(policy: Any, total: int, callback: Callable[[Any], None] | None, normalize: bool, progress: bool) -> None:
+    """For so many control steps, or until Ctrl-C."""
     base = require("stable_baselines3.common.callbacks", "learn").BaseCallback
 
     class Report(base):  # type: ignore[misc,valid-type]
@@ -113,10 +137,9 @@ def train_policy(
             policy.learn(total, callback=Report())
         except KeyboardInterrupt:
             reached = f"{policy.num_timesteps} of {total} control steps"
-            warnings.warn(f"training was interrupted: the policy is as it was after {reached}", stacklevel=2)
+            warnings.warn(f"training was interrupted: the policy is as it was after {reached}", stacklevel=3)
     if callback is not None:
         callback(policy)
-    return policy
 
 
 @cache
@@ -129,14 +152,14 @@ def _scaling() -> Any:
         most = 10.0  # deviations
 
         def __init__(self, observation_space: Any) -> None:
-            size = observation_space.shape[0]
+            size = math.prod(observation_space.shape)
             super().__init__(observation_space, size)
             # What is called running Stable-Baselines3 carries over to the critics that lag behind.
             for name, value in (("count", 0.0), ("mean", 0.0), ("variance", 1.0)):
                 self.register_buffer(f"running_{name}", torch.full((size,), value))
 
         def take_in(self, observations: Any) -> None:
-            """Those of some robots, shape (..., size)."""
+            """Those of some robots, shape (..., size) or that of the observations."""
             mean, variance = self.running_mean, self.running_variance
             seen = torch.as_tensor(observations, dtype=mean.dtype).reshape(-1, len(mean))
             count = self.running_count + len(seen)
@@ -147,7 +170,7 @@ def _scaling() -> Any:
             self.running_count.copy_(count)
 
         def forward(self, observations: Any) -> Any:
-            scaled = (observations - self.running_mean) / (self.running_variance + 1e-8).sqrt()
+            scaled = (observations.flatten(1) - self.running_mean) / (self.running_variance + 1e-8).sqrt()
             return scaled.clamp(-self.most, self.most)
 
     return Scaling
