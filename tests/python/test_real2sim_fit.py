@@ -422,6 +422,7 @@ def test_exact_tags_beside_the_plane_have_no_error_in_it():
         (Tags([[(1, 0, 0)]], ["arm.end"]), "arm", {}, "unknowns must be a list"),
         (Tags([[(1, 0, 0)]], ["arm.end"]), [("arm", "colour")], {}, "unknowns must be of natural_curvature"),
         (Tags([[(1, 0, 0)]], ["arm.end"]), [*ARM, *ARM], {}, "natural_curvature of rod 'arm' twice"),
+        (Tags([[(1, 0, 0)]], ["arm.end"]), [(("arm", "arm"), "density")], {}, "'density' of 'arm' is given twice"),
         (Tags([[(1, 0, 0)]], ["arm.end"]), ARM, {"shared": ARM}, "in unknowns or in shared, got both"),
         (Tags([[(1, 0, 0)]], ["arm.end"]), [*DENSITIES], {}, "density of 'arm' cannot be unknown here"),
         (Tags([[(1, 0, 0)]], ["arm.end"]), DENSITIES[::-1], {}, "density of 'arm' cannot be unknown here"),

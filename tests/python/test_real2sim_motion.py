@@ -117,6 +117,23 @@ def test_damping_is_found_with_the_modulus_that_sets_it_whichever_comes_first(wo
     assert found.value("arm", "viscous_time")[0] == pytest.approx([2e-3], rel=1e-2)
 
 
+def test_a_drag_and_that_of_a_rod_are_one_unknown_whichever_is_named_first():
+    scene = withe.Scene()
+    rubber = withe.Material(youngs_modulus=1e6, density=1000.0)
+    for name in ("arm", "leg"):
+        scene.add_rod(start=(0, 0, 0), end=(0, 0, -0.2), nodes=4, radius=5e-3, material=rubber, name=name)
+    scene.add_drag(0.3, name="air")
+    simulation = scene.build()
+    simulation.set("arm", drag=0.1)
+    for parts in (("air", "arm"), ("arm", "air")):
+        copy = simulation.copy()
+        (drag,) = parse_unknowns(copy, [(parts, "drag")])
+        drag.write(copy, np.log([2.0]))
+        assert [copy.get(part, "drag") for part in ("air", "leg", "arm")] == [
+            pytest.approx(value) for value in (0.6, np.full(3, 0.6), np.full(3, 0.2))
+        ]
+
+
 def test_friction_is_told_by_how_a_rod_slides_to_a_stop():
     def sliding(friction):
         scene = withe.Scene()

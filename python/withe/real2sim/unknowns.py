@@ -13,7 +13,7 @@ import numpy.typing as npt
 from withe.parts.handles import Handle
 from withe.parts.parameters import ROD_WORDS
 from withe.real2sim.places import rod_part, turning_axis
-from withe.simulation.overlaps import arrays_of, remaining, setting_rank
+from withe.simulation.overlaps import arrays_of, order_of_setting, remaining, setting_rank
 from withe.simulation.simulation import Simulation
 from withe.simulation.unknowns import Array
 
@@ -139,7 +139,9 @@ class Parameter(Unknown):
     per_frame = False
 
     def __init__(self, simulation: Simulation, handles: Sequence[Handle | str], word: str) -> None:
-        parts = [simulation._session.directory.find_any(handle, "unknowns") for handle in handles]
+        session = simulation._session
+        listed = [session.directory.find_any(handle, "unknowns") for handle in handles]
+        parts = [listed[place] for place in order_of_setting(session, [(part.name, word) for part in listed])]
         self.word, self.rods = word, tuple(part.name for part in parts)
         self._first: dict[str, Any] = {}
         for part in parts:
