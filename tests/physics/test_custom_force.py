@@ -209,7 +209,7 @@ def test_reactions_of_an_equilibrium_carry_the_custom_force_of_its_own_place(hol
     assert found.residual < 1e-9
     assert abs(out_of_balance()) < 1e-9
     for support in supports:
-        simulation.move(support, position=simulation.get(support, "position") + (0, 0, 0.02), over=0.3)
+        simulation.move(support, position=simulation.get(support, "position") + np.array((0, 0, 0.02)), over=0.3)
     for _ in range(3):
         simulation.step(1)
         assert abs(out_of_balance()) < 1e-9

@@ -133,7 +133,7 @@ def test_a_rod_that_obstacles_squeeze_by_less_stays_so(scheme):
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 @pytest.mark.parametrize("seed", range(6))
 def test_an_equilibrium_on_a_drum_or_a_rod_is_one(seed, friction):
-    """However hard contact is when a rod is laid down: what it bears is what the clamp does not, and nothing moves on."""
+    """However stiff contact becomes on the way down: it bears what the clamp does not, and nothing moves on."""
     drawn = np.random.default_rng(seed)
     nodes, place, size = int(drawn.integers(15, 45)), drawn.uniform(0.15, 0.24), drawn.uniform(0.03, 0.1)
     material = withe.Material(youngs_modulus=10 ** drawn.uniform(5.7, 6.5), poisson_ratio=0.4, density=1100.0)

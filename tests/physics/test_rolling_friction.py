@@ -220,8 +220,10 @@ def test_what_turns_with_a_drum_does_not_roll_on_it(integrator: Any, planar: boo
 
 @pytest.mark.parametrize(("turning", "nodes"), [("rod", 11), ("drum", 11), ("drum", 21)])
 def test_a_drum_and_a_rod_resist_turning_against_each_other(turning: str, nodes: int) -> None:
-    """Clamps of a rod that is pressed onto it bear (mu + mu_r) r N where the rod turns. A drum turns it, as a gear would,
-    against its own sense by mu r N, and along with it by mu_r r N."""
+    """Clamps of a rod that is pressed onto it bear (mu + mu_r) r N where the rod turns.
+
+    A drum turns it as a gear would, against its own sense, by mu r N, and along with it by mu_r r N.
+    """
     drum_radius, slipping, rolling = 0.03, 0.3, 0.1
     scene = withe.Scene(gravity=(0, 0, 0))
     material = withe.Material(youngs_modulus=2e8, poisson_ratio=0.3, density=1000.0)
