@@ -218,7 +218,7 @@ def load_poses(path: str | os.PathLike[str]) -> npt.NDArray[np.float64]:
     >>> io.load_poses(plan.save("fold.csv")).shape  # doctest: +SKIP
     (251, 8)
     """
-    with open(path, encoding="utf-8") as stream:
+    with open(path, encoding="utf-8-sig") as stream:  # spreadsheets begin files with a byte order mark
         names = [name.strip() for name in stream.readline().split(",")]
         missing = [name for name in _POSE_COLUMNS if name not in names]
         if missing:

@@ -135,6 +135,9 @@ def test_the_command_line_plans_and_says_what_holds(tmp_path, capsys):
     np.savetxt(y_first, wave()[:, ::-1], delimiter=",", header="y [m],x [m]", comments="")
     assert main(["deploy", str(y_first), "--dlo", "2", "--out", str(tmp_path), "--no-picture"]) == 0
     assert (tmp_path / "y_first_plan.csv").read_text() == (tmp_path / "wave_plan.csv").read_text()
+    y_first.write_text(y_first.read_text(), encoding="utf-8-sig")  # as spreadsheets save it
+    assert main(["deploy", str(y_first), "--dlo", "2", "--out", str(tmp_path), "--no-picture"]) == 0
+    assert (tmp_path / "y_first_plan.csv").read_text() == (tmp_path / "wave_plan.csv").read_text()
     with_heights = tmp_path / "with_heights.csv"
     for header in ("x,y,z", "x [m],y [m],z [m]", ""):
         np.savetxt(with_heights, np.c_[wave(), np.zeros(len(wave()))], delimiter=",", header=header, comments="")

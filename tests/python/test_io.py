@@ -318,6 +318,8 @@ def test_poses_come_back_by_their_names_with_the_scalar_first(tmp_path):
     other = tmp_path / "other.csv"
     other.write_text("\n".join([shuffled(header, "grip"), *(shuffled(line, "7") for line in lines)]))
     np.testing.assert_array_equal(load_poses(other), rows)
+    other.write_text(other.read_text(), encoding="utf-8-sig")  # as spreadsheets save it
+    np.testing.assert_array_equal(load_poses(other), rows)
 
 
 @pytest.mark.parametrize(

@@ -83,7 +83,7 @@ def _cable(arguments: argparse.Namespace) -> Cable:
 
 def _points(path: Path) -> npt.NDArray[np.float64]:
     """Columns x, y of a file, in the order of its header if it has one; there may be a third one, z."""
-    lines = path.read_text(encoding="utf-8").splitlines()
+    lines = path.read_text(encoding="utf-8-sig").splitlines()  # spreadsheets begin with a byte order mark
     names = ["x", "y", "z"] if lines and _is_row(lines[0], 3) else ["x", "y"]
     if lines and not _is_row(lines[0], len(names)):
         heads = [re.fullmatch(r'\s*"?([xyz])([^a-z].*)?', name, re.IGNORECASE) for name in lines[0].split(",")]
