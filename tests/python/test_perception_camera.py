@@ -25,6 +25,35 @@ def test_to_plane_inverts_project_with_distortion():
     assert camera.to_plane(camera.project(points), points[:, 2]) == pytest.approx(points, abs=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("distortion", "radius"),
+    [
+        ((0.6, 0.3, 0, 0), 1.2),  # pincushions, which fixed points of the distortion run away from
+        ((1.0, 0, 0, 0), 1.5),
+        ((-0.3, 0, 0, 0), 1.05),  # turns back at 1.054
+        ((-0.5, 0.1, 0, 0), 0.99),  # turns back at 1, and goes on beyond 1.414
+        ((-0.4, 0.15, 0.01, -0.02, 0.03), 0.9),
+    ],
+)
+def test_distortion_is_removed_wherever_the_lens_does_not_turn_back(distortion, radius):
+    camera = Camera(MATRIX, distortion, np.diag([1.0, -1.0, -1.0]), (0, 0, 1.0))
+    random = np.random.default_rng(5)
+    angle, r = random.uniform(0.0, 2.0 * np.pi, 200), radius * np.sqrt(random.uniform(0.0, 1.0, 200))
+    points = np.column_stack([r * np.cos(angle), r * np.sin(angle), np.zeros(200)])
+    assert camera.to_plane(camera.project(points)) == pytest.approx(points, abs=1e-9)
+
+
+@pytest.mark.parametrize("distortion", [(-0.3, 0, 0, 0), (-0.5, 0.1, 0, 0)])
+def test_pixels_where_the_lens_shows_nothing_are_refused(distortion):
+    camera = Camera(MATRIX, distortion, np.diag([1.0, -1.0, -1.0]), (0, 0, 1.0))
+    r = np.linspace(0.0, 1.4, 5000)
+    farthest = 900.0 * (r * (1.0 + distortion[0] * r**2 + distortion[1] * r**4)).max()
+    seen = np.array([[320.0, 240.0], [320.0 + farthest - 0.01, 240.0]])
+    assert camera.project(camera.to_plane(seen)) == pytest.approx(seen, abs=1e-6)
+    with pytest.raises(ValueError, match="distortion turns back before that"):
+        camera.to_plane([*seen, (320.0 + farthest + 0.01, 240.0)])
+
+
 def test_projection_agrees_with_opencv():
     cv2 = pytest.importorskip("cv2")
     camera = tilted()
@@ -58,6 +87,7 @@ def test_a_camera_is_found_from_points_in_three_ways():
     [
         ((np.eye(2),), "matrix must have shape"),
         ((np.zeros((3, 3)),), "matrix must be invertible"),
+        ((2.0 * MATRIX,), "matrix must have the last row 0, 0, 1"),
         ((np.eye(3), (1, 2, 3)), "distortion must have 4 or 5"),
         ((np.eye(3), None, 2 * np.eye(3)), "rotation must be a rotation matrix"),
         ((np.eye(3), None, np.eye(3), (0, np.nan, 0)), "translation must be finite"),

@@ -8,6 +8,10 @@ from numpy.typing import ArrayLike, NDArray
 __all__ = ["Camera"]
 
 Array = NDArray[np.float64]
+_ROUNDING = 1e-13  # of a distorted direction, over its length or 1
+_INVERTED = 1e-9  # the same: what a direction that was found may be off where it is distorted again
+_ITERATIONS = 60  # of Newton's method; where the lens turns back it halves the error only
+_HALVINGS = 30
 
 
 def _checked(values: ArrayLike, shape: tuple[int | None, ...], name: str) -> Array:
@@ -30,7 +34,7 @@ class Camera:
     Parameters
     ----------
     matrix : array_like of shape (3, 3) [px]
-        Focal lengths and principal point.
+        Focal lengths and principal point; its last row is 0, 0, 1.
     distortion : array_like of shape (4,) or (5,), optional
         k1, k2, p1, p2 and k3.
     rotation : array_like of shape (3, 3), optional
@@ -41,7 +45,7 @@ class Camera:
     Raises
     ------
     ValueError
-        A wrong shape, not finite, a singular matrix or a rotation that is none.
+        A wrong shape, not finite, a matrix that is singular or ends otherwise, or a rotation that is none.
     """
 
     def __init__(
@@ -54,6 +58,8 @@ class Camera:
         self.matrix = _checked(matrix, (3, 3), "matrix")
         if abs(np.linalg.det(self.matrix)) < 1e-12:
             raise ValueError("matrix must be invertible, got a singular one")
+        if np.abs(self.matrix[2] - [0.0, 0.0, 1.0]).max() > 1e-9:
+            raise ValueError(f"matrix must have the last row 0, 0, 1, got {self.matrix[2]}")
         coefficients = np.zeros(5)
         if distortion is not None:
             given = _checked(np.ravel(np.asarray(distortion, dtype=float)), (None,), "distortion")
@@ -91,7 +97,8 @@ class Camera:
         Raises
         ------
         ValueError
-            Wrong shapes, too few points, or points that do not determine the camera.
+            Wrong shapes, too few points, points that do not determine the camera, or pixels that the lens shows no
+            direction at.
         """
         seen = _checked(pixels, (None, 2), "pixels")
         known = np.asarray(metres, dtype=float)
@@ -187,8 +194,9 @@ class Camera:
         Raises
         ------
         ValueError
-            A line of sight that does not meet its plane in front of the camera, or a height other than 0 of a
-            camera that is calibrated on the plane only.
+            A pixel that the lens shows no direction at, for its distortion turns back before it; a line of sight that
+            does not meet its plane in front of the camera; or a height other than 0 of a camera that is calibrated on
+            the plane only.
         """
         seen = self._normalised(_checked(pixels, (None, 2), "pixels"))
         z = np.broadcast_to(np.asarray(height, dtype=float), (len(seen),))
@@ -210,17 +218,51 @@ class Camera:
         return np.column_stack([solution[:, :2], z])
 
     def _normalised(self, pixels: Array) -> Array:
-        """Directions (x/z, y/z) of pixels, distortion removed by fixed-point iteration."""
+        """Directions (x/z, y/z) of pixels, distortion removed."""
         distorted = (pixels - self.matrix[:2, 2]) @ np.linalg.inv(self.matrix[:2, :2]).T
         if not self.distortion.any():
             return distorted
-        ideal = distorted.copy()
-        for _ in range(50):
-            change = distorted - self._distort(ideal)
-            ideal += change
-            if np.abs(change).max(initial=0) < 1e-12:
-                break
+        ideal = self._undistort(distorted)
+        lost = _size(self._distort(ideal) - distorted) > _INVERTED * np.maximum(1.0, _size(distorted))
+        if lost.any():
+            column, row = pixels[lost][0]
+            raise ValueError(
+                f"pixels must be seen by the lens, got ({column:g}, {row:g}): its distortion turns back before that"
+            )
         return ideal
+
+    def _undistort(self, distorted: Array) -> Array:
+        """Where distortion gives these, as nearly as it does, shape (n, 2).
+
+        Newton's method from the optical axis. Distortion is the gradient of a potential, convex where the lens does not
+        turn back, and steps that would leave that region or lead farther away are halved.
+        """
+        ideal = np.zeros_like(distorted)
+        tolerance = _ROUNDING * np.maximum(1.0, _size(distorted))
+        limit = self._turning_radius()
+        for _ in range(_ITERATIONS):
+            left = distorted - self._distort(ideal)
+            far = _size(left) > tolerance
+            if not far.any():
+                break
+            at, wanted = ideal[far], distorted[far]
+            step = np.linalg.solve(self._slope(at), left[far][..., None])[..., 0]
+            for _ in range(_HALVINGS):
+                ahead = at + step
+                nearer = _size(wanted - self._distort(ahead)) < _size(left[far])
+                good = nearer & (_size(ahead) < limit) & (np.linalg.eigvalsh(self._slope(ahead))[:, 0] > 0.0)
+                if good.all():
+                    break
+                step[~good] *= 0.5
+            ideal[far] += np.where(good[:, None], step, 0.0)
+        return ideal
+
+    def _turning_radius(self) -> float:
+        """Least x/z at which radial distortion, r (1 + k1 r^2 + k2 r^4 + k3 r^6), does not grow any more."""
+        k1, k2, _, _, k3 = self.distortion
+        squares = np.roots([7.0 * k3, 5.0 * k2, 3.0 * k1, 1.0])
+        real = squares.real[(np.abs(squares.imag) <= 1e-9 * np.abs(squares)) & (squares.real > 0.0)]
+        return float(np.sqrt(real.min())) if real.size else np.inf
 
     def _distort(self, ideal: Array) -> Array:
         k1, k2, p1, p2, k3 = self.distortion
@@ -233,6 +275,22 @@ class Camera:
                 y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y,
             ]
         )
+
+    def _slope(self, ideal: Array) -> Array:
+        """Derivative of `_distort`, shape (n, 2, 2); symmetric."""
+        k1, k2, p1, p2, k3 = self.distortion
+        x, y = ideal.T
+        r2 = x * x + y * y
+        radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
+        growth = 2 * (k1 + r2 * (2 * k2 + 3 * r2 * k3))
+        mixed = x * y * growth + 2 * (p1 * x + p2 * y)
+        along_x = radial + x * x * growth + 2 * p1 * y + 6 * p2 * x
+        along_y = radial + y * y * growth + 6 * p1 * y + 2 * p2 * x
+        return np.stack([np.stack([along_x, mixed], -1), np.stack([mixed, along_y], -1)], -2)
+
+
+def _size(vectors: Array) -> Array:
+    return np.asarray(np.linalg.norm(vectors, axis=1))
 
 
 def _scaled(points: Array) -> tuple[Array, Array]:

@@ -92,7 +92,7 @@ def detect_tags(
     Raises
     ------
     ValueError
-        No picture, a singular matrix, or a size that is not positive.
+        No picture, a singular matrix, a size that is not positive, or a tag where the lens shows no direction.
     ImportError
         OpenCV is not installed.
     """
