@@ -24,6 +24,7 @@ FloatArray = npt.NDArray[np.float64]
 _FUNCTION_SAMPLES = 2001
 _SLOWEST = 0.15  # of the way along the curve over that along what was given, where it turns back by 160 degrees
 _MUCH_FARTHER = 1.5
+_AT_ONCE = 500  # points whose distances from all pieces of a curve are in memory
 _EASED = 101  # samples of an average
 _BENT_START = 1.0  # [rad]: curvature at a function's start times its length that asks for a lead-in
 
@@ -44,9 +45,9 @@ class Pattern:
     scale : float [m]
         Of one pixel.
     smoothing : float [m]
-        How far the pattern may depart from what was given: of all such curves it is that which a floor holds with
-        least friction (the greatest EI x'''' along it is least). A free end has no moment, so that a curve that begins
-        bent begins a little straighter.
+        How far the pattern may depart from what was given, at its nodes: of all such curves it is that which a floor
+        holds with least friction (the greatest EI x'''' along it is least). A free end has no moment, so that a curve
+        that begins bent begins a little straighter.
     lead_in : float [m]
         Length of an extra piece before the beginning, along which curvature grows from zero. None: that over which the
         cable turns by one radian, for a `function` that begins bent.
@@ -249,12 +250,12 @@ class Pattern:
         self.curvature: FloatArray = _cross(first, second)
         self.curvature_slope: FloatArray = _cross(first, third)
         self.curvature_bend: FloatArray = _cross(first, fourth) + _cross(second, third)
-        self.deviation = float(distances(sampled, self.points).max())
+        self.deviation = float(distances(self.raw, self.points).max())
         if self.deviation > _MUCH_FARTHER * smoothing:
             away, asked = 1e3 * self.deviation, 1e3 * smoothing
             warnings.warn(
-                f"the pattern is {away:.1f} mm from what was given, where {asked:.1f} mm were asked for: its bends are"
-                f" too short for {nodes} nodes over {self.length:.2f} m; give more nodes",
+                f"the pattern is {away:.1f} mm from what was given, where {asked:.1f} mm were asked for: {nodes} nodes"
+                f" sample that every {1e3 * even[1]:.1f} mm, too coarsely for its bends; give more nodes",
                 UserWarning,
                 stacklevel=3,
             )
@@ -325,9 +326,14 @@ def distances(points: FloatArray, curve: FloatArray) -> FloatArray:
     """Distance of each point from a polyline, shapes (n, 2) and (m, 2)."""
     start, way = curve[:-1], np.diff(curve, axis=0)
     size = (way**2).sum(1)
-    along = ((points[:, None] - start) * way).sum(-1) / size
-    nearest = start + np.clip(along, 0.0, 1.0)[..., None] * way
-    return np.asarray(np.linalg.norm(points[:, None] - nearest, axis=-1).min(1))
+
+    def nearest(some: FloatArray) -> FloatArray:
+        apart = some[:, None] - start
+        along = np.clip((apart * way).sum(-1) / size, 0.0, 1.0)
+        return np.asarray(np.linalg.norm(apart - along[..., None] * way, axis=-1).min(1))
+
+    parts = range(0, len(points), _AT_ONCE)
+    return np.concatenate([nearest(points[first : first + _AT_ONCE]) for first in parts])
 
 
 def _require_smooth(speed: FloatArray, s: FloatArray) -> None:
