@@ -62,7 +62,23 @@ def test_tensors_have_gradients_those_of_differences(network):
 
 
 def test_its_domain_is_that_of_its_data(network):
-    assert np.allclose(network.domain, [X.min(axis=0), X.max(axis=0)], rtol=1e-6)
+    assert np.array_equal(network.domain, [X.min(axis=0), X.max(axis=0)])
+
+
+@pytest.mark.parametrize("spread", [30.0, 1000.0])
+def test_data_far_from_zero_are_learned_as_those_about_zero_are(spread, tmp_path):
+    u = np.linspace(-1.0, 1.0, 1000)[:, None]
+    wave = np.sin(3.0 * u)
+    time = 1.7e9 + 60.0  # [s], between two numbers of single precision, which are 128 apart
+    options = {"hidden": (16, 16), "schedule": Cosine(20, 64, 1e-2), "progress": False}
+    expected = train_network(u, wave, **options)
+    of_times = train_network(time + spread * u, wave, **options)
+    times = Network.load(train_network(u, time + spread * wave, **options).save(tmp_path / "times.pt"))
+    np.testing.assert_allclose(of_times(time + spread * u), expected(u), atol=0.01)
+    np.testing.assert_allclose((times(u) - time) / spread, expected(u), atol=0.01)
+    x = torch.tensor(u, requires_grad=True)
+    slopes = [torch.autograd.grad(y.sum(), x)[0].numpy() for y in (expected(x), of_times(time + spread * x))]
+    np.testing.assert_allclose(slopes[1], slopes[0], atol=0.03)
 
 
 def test_equal_seeds_give_equal_networks_and_leave_the_seed_and_the_threads_of_torch_alone():

@@ -190,7 +190,7 @@ def _checked(schedule: Cosine | Alternating) -> Cosine | Alternating:
 
 @dataclass
 class _Problem:
-    """Scaled samples as tensors in single precision, which of them are trained on, and the loss."""
+    """Scaled samples as tensors in single precision, their scales in double, which are trained on, and the loss."""
 
     x: Any
     y: Any
@@ -223,8 +223,8 @@ class _Problem:
             scales |= {"y_mean": np.zeros(wanted.shape[1]), "y_scale": np.ones(wanted.shape[1])}
         order = torch.from_numpy(np.random.default_rng(seed).permutation(len(given)))
 
-        def tensor(values: npt.NDArray[np.float64]) -> Any:
-            return torch.from_numpy(np.array(values, dtype=np.float32))
+        def tensor(values: npt.NDArray[np.float64], dtype: type = np.float32) -> Any:
+            return torch.from_numpy(np.array(values, dtype=dtype))
 
         return cls(
             x=tensor((given - scales["x_mean"]) / scales["x_scale"]),
@@ -232,8 +232,8 @@ class _Problem:
             weights=tensor(weight),
             absolute=loss == "absolute",
             scales={
-                **{name: tensor(values) for name, values in scales.items()},
-                "domain": tensor(np.stack([given.min(axis=0), given.max(axis=0)])),
+                **{name: tensor(values, np.float64) for name, values in scales.items()},
+                "domain": tensor(np.stack([given.min(axis=0), given.max(axis=0)]), np.float64),
             },
             held=order[:count],
             used=order[count:],

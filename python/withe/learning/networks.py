@@ -63,7 +63,8 @@ class Network:
     """A multilayer perceptron with its scales inside. `train_network` makes them, `load` reads one from a file.
 
     Linear layers with an activation between each two, y = b + W f(... f(b0 + W0 (x - m) / s)), and outputs scaled back;
-    weights in single precision. It knows nothing of what lies outside its `domain`.
+    weights in single precision, m and s and those of outputs in double. It knows nothing of what lies outside its
+    `domain`.
 
     Attributes
     ----------
@@ -101,7 +102,7 @@ class Network:
         Parameters
         ----------
         x : array_like or Tensor of shape (..., inputs)
-            Computed in the precision that it comes in, single or double.
+            Computed in the precision that it comes in, single or double; scaled, and scaled back, in double.
 
         Returns
         -------
@@ -144,14 +145,20 @@ class Network:
         if key not in self._ready:
             functional = require("torch", "learn").nn.functional
             activate = getattr(functional, self.activation)
-            there = {name: tensor.to(device, dtype) for name, tensor in self._tensors.items()}
-            layers = [(there[f"{2 * i}.weight"], there[f"{2 * i}.bias"]) for i in range(len(self.hidden) + 1)]
+            layers = [
+                tuple(self._tensors[f"{2 * i}.{part}"].to(device, dtype) for part in ("weight", "bias"))
+                for i in range(len(self.hidden) + 1)
+            ]
+            # A mean that is far above the spread has no digits to spare: scales are taken off in double.
+            exact = dtype if device.type == "mps" else require("torch", "learn").float64  # mps has no double
+            scales = ("x_mean", "x_scale", "y_mean", "y_scale")
+            x_mean, x_scale, y_mean, y_scale = (self._tensors[name].to(device, exact) for name in scales)
 
             def function(x: Any) -> Any:
-                x = (x - there["x_mean"]) / there["x_scale"]
+                x = ((x.to(exact) - x_mean) / x_scale).to(dtype)
                 for weight, bias in layers[:-1]:
                     x = activate(functional.linear(x, weight, bias))
-                return there["y_mean"] + there["y_scale"] * functional.linear(x, *layers[-1])
+                return (y_mean + y_scale * functional.linear(x, *layers[-1]).to(exact)).to(dtype)
 
             self._ready[key] = function
         return self._ready[key]
