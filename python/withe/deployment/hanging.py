@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
+from functools import cache
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +21,10 @@ FloatArray = npt.NDArray[np.float64]
 _SEEN = 5.0  # [Lgb] of the cable, from its free end, that a picture must show: above it hangs straight
 _USED = 8.0  # [Lgb]: farther up the jaw may bend it
 _ERROR = 5e-4  # [m]
+# Lengths below are in (EI / w)^(1/3) = 2^(1/3) Lgb.
+_TOP = 10.0  # height above the free end at which slopes are small
+_STRONGEST = 6.6  # over Ai, the slope up there of a cable that curls as much as is measured
+_SEEN_ASIDE = 1.08  # of a free end that hangs at 73 degrees: one row of a picture shows one point of the cable
 
 
 @dataclass(frozen=True)
@@ -40,28 +46,35 @@ def measure_curvature(
     aside: float | None = None,
     image: str | os.PathLike[str] | npt.ArrayLike | None = None,
     scale: float | None = None,
+    depth: float = 0.0,
     error: float | None = None,
 ) -> MeasuredCurvature:
     """Find how a cable bends by itself, with a ruler or a camera.
 
     Let it hang from its jaw, the free end off the floor. Its weight pulls it straight but for the last few Lgb, and
-    the end hangs 2.044 curvature Lgb^2 aside, towards the side to which the cable bends. (With u = s / (2^(1/3) Lgb), s
-    the height above the free end, small slopes obey theta'' = u theta, theta' = curvature at the end: an Airy
-    function.) Two measurements at right angles make `Cable.natural_curvature`: seen along y, and along x.
+    the end hangs aside, towards the side to which the cable bends: by 2.044 curvature Lgb^2 where it bends little, by
+    less where it curls. (With u = s / (2^(1/3) Lgb), s the arc length above the free end, theta'' = u sin theta, theta'
+    = curvature at the end and theta = 0 far above.) Two measurements at right angles make `Cable.natural_curvature`:
+    seen along y, and along x.
 
     Parameters
     ----------
     gravito_bending_length : float [m]
         See `measure`.
     aside : float [m]
-        How far the free end is beside the straight part above it, positive towards the axis that is measured.
+        How far the free end is beside the straight part above it, positive towards the axis that is measured; 1.93 Lgb
+        at most: from there on it curls up, and is less far aside the more it bends.
     image : str, Path or array_like of shape (height, width, 3)
         Instead: a picture from the side of the hanging cable's lower 5 Lgb or more, and nothing else before a plain
-        background, its columns along the axis that is measured.
+        background, its columns along the axis that is measured; of a cable whose end hangs at 70 degrees at most.
     scale : float [m]
         Of one pixel of the image.
+    depth : float [m]
+        How far the free end is aside along the line of sight, if it is: of a cable that bends by more than .3 / Lgb
+        both measurements need what the other one read.
     error : float [m]
-        Standard deviation of what is read; by default .5 mm, or half a pixel of an image.
+        Standard deviation of what is read, aside and depth; by default .5 mm, or of an image half a pixel
+        and what is not known of the shape of the cable's end.
 
     Returns
     -------
@@ -70,8 +83,8 @@ def measure_curvature(
     Raises
     ------
     ValueError
-        None or both of aside and image, an image without scale or without 5 Lgb of a cable, numbers that are not
-        positive or finite.
+        None or both of aside and image, an image without scale or without 5 Lgb of a cable, a cable that curls more
+        than it may, numbers that are not positive or finite.
 
     Examples
     --------
@@ -83,42 +96,110 @@ def measure_curvature(
     lgb = validation.positive(gravito_bending_length, "gravito_bending_length")
     if (aside is None) == (image is None):
         raise ValueError("measure_curvature needs exactly one of aside and image")
-    if image is not None:
-        pixel = pixel_size(scale)
-        error = 0.5 * pixel if error is None else error
-        aside = _aside(image, pixel, lgb)
-    across = _across(np.zeros(1), lgb)[0]
-    error = validation.non_negative(_ERROR if error is None else error, "error")
-    return MeasuredCurvature(validation.number(aside, "aside") / across, error / across)
-
-
-def _across(height: FloatArray, lgb: float) -> FloatArray:
-    """How far aside the cable is at heights above its end, per natural curvature [m^2].
-
-    theta = curvature length Ai(u) / Ai'(0), integrated from above.
-    """
-    from scipy.special import airy, itairy
-
     length = 2.0 ** (1.0 / 3.0) * lgb
-    below, *_ = itairy(np.asarray(height) / length)  # integral of Ai from 0; over all of it a third
-    return np.asarray(length**2 * (1.0 / 3.0 - below) / -airy(0.0)[1])
+    away = validation.number(depth, "depth") / length
+    if image is not None:
+        x, off = _seen_aside(image, pixel_size(scale) / length, away)
+    else:
+        x, off = validation.number(aside, "aside") / length, _ERROR / length
+    off = off if error is None else validation.non_negative(error, "error") / length
+    total = float(np.hypot(x, away))
+    if total > (most := float(_known().x[-1])):
+        raise ValueError(
+            f"aside must be {most * length:.3g} m at most, depth included, got {total * length:.3g} m: the cable curls"
+            " up, and how far aside it is does not tell how much"
+        )
+    (curvature, _), (slope, _) = _known()(total), _known()(total, 1)
+    # It hangs in the plane in which it bends: the curvature's components are as those of how far it hangs aside.
+    ratio = curvature / total if total > 0.0 else slope
+    along, across = (x / total, away / total) if total > 0.0 else (1.0, 0.0)
+    known = off * np.hypot(slope * along**2 + ratio * across**2, (slope - ratio) * along * across)
+    return MeasuredCurvature(float(ratio * x / length), float(known / length))
 
 
-def _aside(image: str | os.PathLike[str] | npt.ArrayLike, scale: float, lgb: float) -> float:
-    """How far the free end is beside the line above it [m], by least squares over all rows of a picture.
+@dataclass(frozen=True)
+class _Hanging:
+    """How a cable hangs: curvature and slope [rad] at its free end, and points down to it, shape (n,)."""
 
-    The line may lean a little, as a camera does.
+    curvature: float
+    tilt: float
+    aside: FloatArray
+    height: FloatArray
+
+
+def _hanging(strength: float) -> _Hanging:
+    """The elastica theta'' = u sin theta, integrated from far above, where theta = strength Ai(u), to its end."""
+    from scipy.integrate import solve_ivp
+    from scipy.special import airy
+
+    def slopes(u: float, y: FloatArray) -> list[float]:
+        return [y[1], u * np.sin(y[0]), -np.sin(y[0]), np.cos(y[0])]
+
+    value, slope, *_ = airy(_TOP)
+    begin = [strength * value, strength * slope, 0.0, 0.0]
+    places = np.linspace(_TOP, 0.0, 501)
+    found = solve_ivp(slopes, (_TOP, 0.0), begin, "DOP853", places, rtol=1e-10, atol=1e-14).y
+    return _Hanging(-float(found[1, -1]), float(found[0, -1]), found[2], found[3] - found[3, -1])
+
+
+@cache
+def _known() -> Any:
+    """Curvature and strength by how far aside the end is, a spline."""
+    from scipy.interpolate import CubicSpline
+
+    strengths = np.linspace(0.0, _STRONGEST, 67)
+    shapes = [_hanging(strength) for strength in strengths]
+    values = np.column_stack([[shape.curvature for shape in shapes], strengths])
+    return CubicSpline([shape.aside[-1] for shape in shapes], values)
+
+
+def _seen_aside(image: str | os.PathLike[str] | npt.ArrayLike, scale: float, depth: float) -> tuple[float, float]:
+    """How far the free end is beside the line above it, by least squares over all rows of a picture; and its error.
+
+    The line may lean a little, as a camera does. The end is lower than its centreline by some part of its radius,
+    whether it is cut off square or is round.
     """
+    from scipy.optimize import least_squares
+
+    above, seen, radius = _centreline(image, scale)
+    most = np.sqrt(max(_SEEN_ASIDE**2 - depth**2, 1e-6))
+
+    def hanging(aside: float) -> _Hanging:
+        return _hanging(float(_known()(np.hypot(aside, depth))[1]))
+
+    def off(unknown: FloatArray) -> FloatArray:
+        aside, lower, offset, lean = unknown
+        shape = hanging(aside)
+        line = np.interp(above - lower, shape.height[::-1], shape.aside[::-1])
+        return np.asarray(line * aside / max(shape.aside[-1], 1e-9) + offset + lean * above - seen)
+
+    far = seen[above > 0.7 * above.max()].mean()
+    guess = np.clip(seen[-1] - far, -0.9 * most, 0.9 * most)
+    low, high = [-most, 0.0, -np.inf, -1.0], [most, radius, np.inf, 1.0]
+    found = least_squares(off, [guess, 0.5 * radius, far, 0.0], bounds=(low, high), x_scale=[1.0, radius, 1.0, 1.0])
+    end = float(found.x[0])
+    if abs(end) > 0.99 * most:
+        raise ValueError("image must show a cable whose end hangs at 70 degrees at most: give aside")
+    return end, float(np.hypot(0.5 * scale, radius / np.sqrt(12.0) * np.tan(hanging(end).tilt)))
+
+
+def _centreline(image: str | os.PathLike[str] | npt.ArrayLike, scale: float) -> tuple[FloatArray, FloatArray, float]:
+    """Heights of rows above the lowest pixel and the cable's middle there, without its end; and its radius."""
+    lgb = 2.0 ** (-1.0 / 3.0)
     picture = read_image(image) if isinstance(image, str | os.PathLike) else check_image(image)
     mask = border_filter(picture)
     rows = np.flatnonzero(mask.any(1))
     height = scale * (rows[-1] - rows) if rows.size else np.zeros(1)
     if height.max() < _SEEN * lgb:
-        shown = f"{1e3 * height.max():.0f} mm"
-        raise ValueError(f"image must show {_SEEN:g} Lgb of a hanging cable, {1e3 * _SEEN * lgb:.0f} mm, got {shown}")
-    used = height <= _USED * lgb
-    columns = np.arange(mask.shape[1])
-    middle = scale * (mask[rows[used]] @ columns) / mask[rows[used]].sum(1)
-    shape = _across(height[used], lgb)
-    known = np.stack([shape, np.ones(used.sum()), height[used]], 1)
-    return float(np.linalg.lstsq(known, middle, rcond=None)[0][0] * _across(np.zeros(1), lgb)[0])
+        raise ValueError(
+            f"image must show {_SEEN:g} Lgb of a hanging cable, {_SEEN * lgb / scale:.0f} pixels,"
+            f" got {height.max() / scale:.0f}"
+        )
+    rows, height = rows[height <= _USED * lgb], height[height <= _USED * lgb]
+    thickness = mask[rows].sum(1)
+    middle = scale * (mask[rows] @ np.arange(mask.shape[1])) / thickness
+    radius = 0.5 * scale * float(np.median(thickness))
+    clear = height > 2.0 * radius
+    if 2.0 * clear.sum() < len(rows):
+        raise ValueError(f"image must show a cable thinner than {_SEEN / 2.0:g} Lgb, got {2.0 * radius / lgb:.1f} Lgb")
+    return height[clear], middle[clear], radius
