@@ -28,6 +28,10 @@ Tails = Literal["up", "sideways"]
 _BRAID_RADIUS = 2.5
 # Rise of a strand along the braid while it turns by pi, over the circumference of half a turn.
 _BRAID_SLOPE = 1.5
+# Longest edge over the radius of the rod. By h^2 / (8 rho) such a chord leaves a helix of that braid, rho = 3.25 braid
+# radii, by 1.25 radii; strands that are 4.8 radii apart, the corners of the braid rounded off, then do not touch.
+_LONGEST_EDGE = 9.0
+_NODES = 301  # or more, where nobody asks for a number
 # Length of a rod over what its knot takes of it, where nobody asks for a length.
 _TAIL_ROOM = 1.25
 # Distance of points, over the largest coordinate, that is taken for rounding: they are the same.
@@ -40,7 +44,7 @@ def overhand_knot(
     length: float | None = None,
     radius: float = 1.6e-3,
     shortening: float | None = None,
-    nodes: int = 301,
+    nodes: int | None = None,
 ) -> FloatArray:
     """Points of a loose overhand knot along the x axis, its tails straight, to be pulled tight at its ends.
 
@@ -58,6 +62,7 @@ def overhand_knot(
     shortening : float [m]
         Length minus the distance of its ends. By default .6 of the length, or more where the knot needs it.
     nodes : int
+        By default 301, or more where edges would be longer than 9 radii: these cut through the knot's bends.
 
     Returns
     -------
@@ -67,7 +72,7 @@ def overhand_knot(
     Raises
     ------
     ValueError
-        A shortening too small for the knot, or a length too small for the shortening.
+        A shortening too small for the knot, a length too small for the shortening, or too few nodes for the length.
 
     Examples
     --------
@@ -80,7 +85,6 @@ def overhand_knot(
     """
     n = validation.integer(n, "n of the knot", 1, 50)
     radius = validation.positive(radius, "radius of the rod")
-    nodes = validation.integer(nodes, "nodes", 10, 10**7)
     braid_radius = _BRAID_RADIUS * radius
     half_turns = 2 * n + 1
     braid = _BRAID_SLOPE * np.pi * braid_radius * half_turns
@@ -129,10 +133,12 @@ def overhand_knot(
     tail = 0.5 * (length - shortening - braid)
     if tail <= 4.0 * braid_radius:
         raise ValueError(f"length of the rod must leave tails beside the braid: {length:g} m is too short")
-    return _even(whole(low, tail), nodes, length, braid_radius)
+    return _even(whole(low, tail), _node_count(nodes, length, radius), length, braid_radius)
 
 
-def reef_knot(*, length: float = 1.0, radius: float = 2e-3, nodes: int = 301, tails: Tails = "up") -> FloatArray:
+def reef_knot(
+    *, length: float = 1.0, radius: float = 2e-3, nodes: int | None = None, tails: Tails = "up"
+) -> FloatArray:
     """Points of a loose reef knot: two half knots of opposite hands on one rod, whose middle is the first one's loop.
 
     Parameters
@@ -142,6 +148,7 @@ def reef_knot(*, length: float = 1.0, radius: float = 2e-3, nodes: int = 301, ta
     radius : float [m]
         Of its section.
     nodes : int
+        By default 301, or more where edges would be longer than 9 radii: these cut through the knot's bends.
     tails : {"up", "sideways"}
         Where the ends go off: along +z, or along x, away from each other, as they do when they are pulled apart.
 
@@ -153,20 +160,21 @@ def reef_knot(*, length: float = 1.0, radius: float = 2e-3, nodes: int = 301, ta
     Raises
     ------
     ValueError
-        A length too small for the knot, or unknown tails.
+        A length too small for the knot, too few nodes for the length, or unknown tails.
     """
     return _two_half_knots(-1.0, length, radius, nodes, tails)
 
 
-def granny_knot(*, length: float = 1.0, radius: float = 2e-3, nodes: int = 301, tails: Tails = "up") -> FloatArray:
+def granny_knot(
+    *, length: float = 1.0, radius: float = 2e-3, nodes: int | None = None, tails: Tails = "up"
+) -> FloatArray:
     """Points of a loose granny knot: like `reef_knot`, with two half knots of the same hand."""
     return _two_half_knots(1.0, length, radius, nodes, tails)
 
 
-def _two_half_knots(second_hand: float, length: float, radius: float, nodes: int, tails: Tails) -> FloatArray:
+def _two_half_knots(second_hand: float, length: float, radius: float, nodes: int | None, tails: Tails) -> FloatArray:
     length = validation.positive(length, "length of the rod")
     radius = validation.positive(radius, "radius of the rod")
-    nodes = validation.integer(nodes, "nodes", 10, 10**7)
     validation.choice(tails, "tails of the knot", get_args(Tails))
     r = _BRAID_RADIUS * radius
     width = _BRAID_SLOPE * np.pi * r * 3.0
@@ -222,7 +230,19 @@ def _two_half_knots(second_hand: float, length: float, radius: float, nodes: int
         bend = top + 4.0 * r * np.stack([-np.sin(angle), np.zeros_like(angle), 1.0 - np.cos(angle)], axis=1)
         up = bend[-1] + np.array([[0.0, 0.0, max(tail - 2.0 * np.pi * r, radius)]])
         arm = np.concatenate([arm, bend, up])
-    return _even(np.concatenate([(arm * mirror)[::-1], arm[1:]]), nodes, length, r)
+    return _even(np.concatenate([(arm * mirror)[::-1], arm[1:]]), _node_count(nodes, length, radius), length, r)
+
+
+def _node_count(nodes: int | None, length: float, radius: float) -> int:
+    """Number of nodes of a knot: those that are asked for, if its edges are short enough, or as many as it takes."""
+    least = int(np.ceil(length / (_LONGEST_EDGE * radius))) + 1
+    asked = validation.integer(max(_NODES, least) if nodes is None else nodes, "nodes", 10, 10**7)
+    if asked < least:
+        raise ValueError(
+            f"nodes must be at least {least} for a knot in {length:g} m of radius {radius:g} m, got {asked}: edges"
+            f" longer than {_LONGEST_EDGE:g} radii cut through its bends"
+        )
+    return asked
 
 
 def _length(points: FloatArray) -> float:

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
 from withe import knots
 from withe.common import diagrams
@@ -67,6 +68,44 @@ def test_open_overhand_knots_are_torus_knots(n):
     assert abs(knots.signature(points)) == 2 * n
 
 
+DRAWN = {  # polynomial and signature
+    "trefoil": (knots.overhand_knot, [1, -1, 1], -2),
+    "7_1": (lambda **options: knots.overhand_knot(3, **options), [1, -1, 1, -1, 1, -1, 1], -6),
+    "reef": (knots.reef_knot, [1, -2, 3, -2, 1], 0),
+    "granny": (lambda **options: knots.granny_knot(tails="sideways", **options), [1, -2, 3, -2, 1], -4),
+}
+
+
+@pytest.mark.parametrize("name", DRAWN)
+@pytest.mark.parametrize(("length", "radius"), [(1.0, 2e-3), (0.7, 4e-4)])
+def test_knots_are_what_they_are_called_or_are_refused_however_few_their_nodes(name, length, radius):
+    draw, polynomial, signature = DRAWN[name]
+    least = int(np.ceil(length / (9.0 * radius))) + 1  # edges of 9 radii
+    for nodes in (None, least, least + 7):
+        points = draw(length=length, radius=radius, nodes=nodes)
+        assert knots.alexander_polynomial(points).tolist() == polynomial
+        assert knots.signature(points) == signature
+        assert nearest_strands(points, 14.0 * radius) > 2.0 * radius
+    with pytest.raises(ValueError, match=f"nodes must be at least {least} for a knot in {length:g} m of radius"):
+        draw(length=length, radius=radius, nodes=least - 1)
+
+
+def nearest_strands(points, apart):
+    """Least distance of points of a polygon that are farther from each other along it."""
+    s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    dense = np.linspace(0.0, s[-1], 4 * int(s[-1] / (0.1 * apart)))
+    x = np.stack([np.interp(dense, s, points[:, k]) for k in range(3)], 1)
+    pairs = cKDTree(x).query_pairs(0.5 * apart, output_type="ndarray")
+    far = pairs[np.abs(np.diff(dense[pairs], axis=1)[:, 0]) > apart]
+    return np.linalg.norm(np.diff(x[far], axis=1), axis=-1).min()
+
+
+def test_a_knot_of_many_turns_has_the_nodes_it_takes():
+    points = knots.overhand_knot(50)
+    assert len(points) > 301
+    assert knots.signature(points) == -100
+
+
 def test_a_curve_that_is_laid_down_from_its_end_is_no_knot():
     # Each strand lies on those before: a descending diagram.
     s = np.linspace(0.0, 4.0 * np.pi, 400)
@@ -115,7 +154,7 @@ def test_closed_curves_may_have_their_first_point_repeated_at_the_end(apart):
 
 
 def test_points_that_repeat_change_nothing_and_too_few_are_refused():
-    curve = knots.overhand_knot(nodes=60)
+    curve = knots.overhand_knot(nodes=80)
     repeated = np.concatenate([curve[:1], curve, curve[-1:]])
     assert knots.writhe(repeated) == knots.writhe(curve)
     assert knots.signature(repeated) == knots.signature(curve)
