@@ -218,7 +218,8 @@ class Contacts:
         restitution : float
             Speed at which surfaces part after an impact over that at which they met, from 0 to 1; see Notes.
         model : {"imcv2", "barrier", "imcv1", "spillmann_teschner"}
-            Energy of contact: the smooth penalty of Choi's dissertation, (5.2), or a barrier, (5.1). Archival, for
+            Energy of contact: the smooth penalty of Choi's dissertation, (5.2), or a barrier, (5.1), which gives way
+            by what yields under growing loads. Archival, for
             comparison: its first penalty, (4.16), and the baseline of its 4.7, a penalty without a tolerance
             that leads out of a depth within one step.
         friction_model : {"anchored", "implicit", "lagged", "semi_explicit"}
@@ -232,7 +233,9 @@ class Contacts:
             Slip slower than this counts as sticking, with less friction than the coefficient allows.
         stiffness : float [N/m] or "source"
             Of contact; by default it follows the forces, so that surfaces are about a hundredth of the
-            smaller radius deep in each other. "source" is the rule (5.17) of Choi's dissertation: 1e5 / m times the
+            smaller radius deep in each other; a tenth where a load grows a thousandfold, for what becomes stiffer under
+            it goes on pressing as hard as before. Between bodies that hardly yield, where that depth decides how hard
+            they press, give it. "source" is the rule (5.17) of Choi's dissertation: 1e5 / m times the
             greatest force on a node in contact, for all contacts; it has a scale, that of its flagella.
         centreline_friction : bool
             Let friction act on the centrelines, as in Choi's dissertation, and not where surfaces touch.
