@@ -262,7 +262,7 @@ class _Obstructed(Arm):
     control_step = 0.5
     steps = 50
     bend_step = 0.25
-    time_step = 1.0 / 30.0  # an action takes five times as long, and moves the arm the less beyond it
+    time_step = 1.0 / 30.0  # led over .5 s an arm swings less
     aimed_at = (0.8, 0.0, 0.15)  # [m]
 
     def aim(self, lane: int, generator: np.random.Generator) -> None:
