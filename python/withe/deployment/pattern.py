@@ -25,7 +25,7 @@ _FUNCTION_SAMPLES = 2001
 _SLOWEST = 0.15  # of the way along the curve over that along what was given, where it turns back by 160 degrees
 _MUCH_FARTHER = 1.5
 _AT_ONCE = 500  # points whose distances from all pieces of a curve are in memory
-_EASED = 101  # samples of an average
+_AVERAGED = 101  # samples of an average
 _BENT_START = 1.0  # [rad]: curvature at a function's start times its length that asks for a lead-in
 
 
@@ -187,7 +187,7 @@ class Pattern:
         def heading_at(at: FloatArray) -> FloatArray:
             return np.asarray(np.interp(at, ends, headings))
 
-        share = (np.arange(_EASED) + 0.5) / _EASED - 0.5
+        share = (np.arange(_AVERAGED) + 0.5) / _AVERAGED - 0.5
         weights = 1.0 + np.cos(2.0 * np.pi * share)
         heading = sum(w * heading_at(s + easing * u) for w, u in zip(weights / weights.sum(), share, strict=True))
         middle = 0.5 * (heading[1:] + heading[:-1])

@@ -163,8 +163,8 @@ def plunge(
                 crease, slide = aimed if each is tried[0] else each.missed(way, seen + beside)
                 missed = abs(crease - 0.5 * beside)
                 error, off = max(error, missed), max(off, missed, 0.5 * abs(slide))
-                hopeless = error >= nearest if best is None else error > bound or off >= least
-                if hopeless:
+                no_better = error >= nearest if best is None else error > bound or off >= least
+                if no_better:
                     break
             else:
                 nearest = min(nearest, error)
