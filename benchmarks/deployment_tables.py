@@ -4,7 +4,7 @@ python benchmarks/deployment_tables.py [--quick] [--whole] [--cables 2] [--patte
                                        [--known] [--refine]
 
 By default cable 2 alone, which takes some 10 minutes on two cores; --whole takes cables 1 to 3 and three noisy trials
-of each cell: with --ways placed exact network intuitive half an hour, with "optimised" hours. Runs go side by side,
+of each cell: with --ways placed exact network intuitive half an hour, with "optimised" an hour. Runs go side by side,
 one a core. Each is printed, and written to out/benchmarks/deployment_tables.jsonl, as it ends. Ctrl-C makes the tables
 of what there is; --resume goes on after that. Cables are laid quasi-statically, but for the intuitive way and noisy
 trials, at 2.5 cm/s in steps of 20 ms: an upright cable buckles, falls and swings, and no row of equilibria follows it.

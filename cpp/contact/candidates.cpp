@@ -8,6 +8,8 @@ namespace {
 
 // Pairs nearer than this beyond their reach, over the sum of their radii, are part of the matrix's pattern.
 constexpr double kNear = 0.5;
+// Surfaces that go through each other by more than this between two states, over the smaller radius, should have met.
+constexpr double kGrazed = 0.1;
 // What rounding leaves of a distance to go.
 constexpr double kSafe = 1.0 - 1e-9;
 
@@ -22,12 +24,18 @@ double way_between(const std::vector<Obstacle>& from, const std::vector<Obstacle
   return std::sqrt(square);
 }
 
+/// How near centrelines may come: a share of how near they are as a way begins, or this, whichever is less.
+struct Limit {
+  double share, nearest;  ///< [-], [m]
+};
+Limit apart(const ContactPair& pair) { return {kNearest, pair.nearest()}; }
+
 /// How much of a way may be made, by conservative advancement: the distance, a function of that much, falls no faster
 /// than by `speed`.
 template <class Distance>
-double advance(const ContactPair& pair, double speed, const Distance& distance_at) {
+double advance(const Limit& limit, double speed, const Distance& distance_at) {
   const double start = distance_at(0.0);
-  const double least = std::min(kNearest * start, pair.nearest());
+  const double least = std::min(limit.share * start, limit.nearest);
   double tau = 0.0, distance = start;
   for (int k = 0; k < 100; ++k) {
     tau += (distance - 0.99 * least) / speed;
@@ -40,7 +48,7 @@ double advance(const ContactPair& pair, double speed, const Distance& distance_a
 
 /// How much of a way a piece of a curve may make.
 double allowed_of_piece(const Bodies& bodies, const ContactPair& pair, const VectorX& q, const VectorX* change,
-                        const Vec3d& shift) {
+                        const Vec3d& shift, const Limit& limit) {
   Vec3d x[4], d[4] = {};
   bodies.end_points(pair, q, x);
   if (change) bodies.end_points(pair, *change, d);
@@ -53,7 +61,7 @@ double allowed_of_piece(const Bodies& bodies, const ContactPair& pair, const Vec
   // positive.
   speed = 1.5 * std::sqrt(speed);
   if (speed == 0.0) return 1.0;
-  return advance(pair, speed, [&](double tau) {
+  return advance(limit, speed, [&](double tau) {
     Vec3d moved[3];
     for (int i = 0; i < 3; ++i) moved[i] = x[i] + tau * d[i];
     return curve_distance(pair.piece, bodies.obstacle(pair), moved).distance;
@@ -63,8 +71,8 @@ double allowed_of_piece(const Bodies& bodies, const ContactPair& pair, const Vec
 /// The same of straight lines, whose distance falls no faster than the ends move against each other. `change`: of q;
 /// nothing: rods stay. `shift`: of the obstacle.
 double allowed_of(const Bodies& bodies, const ContactPair& pair, const VectorX& q, const VectorX* change,
-                  const Vec3d& shift) {
-  if (pair.curve()) return allowed_of_piece(bodies, pair, q, change, shift);
+                  const Vec3d& shift, const Limit& limit) {
+  if (pair.curve()) return allowed_of_piece(bodies, pair, q, change, shift, limit);
   Vec3d x[4], d[4] = {Vec3d{}, Vec3d{}, shift, shift};
   bodies.end_points(pair, q, x);
   const int edges[2] = {pair.key.a, pair.key.b};
@@ -78,13 +86,22 @@ double allowed_of(const Bodies& bodies, const ContactPair& pair, const VectorX& 
   speed = std::sqrt(speed);
   const Vec3d middle = 0.5 * (x[0] + x[1] - x[2] - x[3]), u = x[1] - x[0], v = x[3] - x[2];
   const double bound =
-      std::sqrt(dot(middle, middle)) - 0.5 * (std::sqrt(dot(u, u)) + std::sqrt(dot(v, v))) - pair.nearest();
+      std::sqrt(dot(middle, middle)) - 0.5 * (std::sqrt(dot(u, u)) + std::sqrt(dot(v, v))) - limit.nearest;
   if (speed <= bound) return 1.0;
-  return advance(pair, speed, [&](double tau) {
+  return advance(limit, speed, [&](double tau) {
     const ClosestPoints c = closest_points(x[0] + tau * d[0], x[1] + tau * d[1], x[2] + tau * d[2], x[3] + tau * d[3],
                                            pair.weight_a, pair.weight_b);
     return std::sqrt(dot(c.between, c.between));
   });
+}
+
+/// Distance of centrelines, from an obstacle where it was before its shift.
+double distance_of(const Bodies& bodies, const ContactPair& pair, const VectorX& q, const Vec3d& shift) {
+  if (pair.curve()) return bodies.piece_distance(pair, q, shift).distance;
+  Vec3d x[4];
+  bodies.end_points(pair, q, x);
+  const Vec3d between = closest_points(x[0], x[1], x[2] - shift, x[3] - shift, pair.weight_a, pair.weight_b).between;
+  return std::sqrt(dot(between, between));
 }
 
 }  // namespace
@@ -216,14 +233,34 @@ double Candidates::allowed(const VectorX& q, const Bodies& bodies, const VectorX
   const double here = moved_ + way_from_last(q, bodies), coming = farthest(model_, change);
   for (std::size_t p = 0; p < pairs_.size(); ++p) {
     if (bounds_[p].open - here >= coming || bodies.flat(pairs_[p])) continue;
-    least = std::min(least, allowed_of(bodies, pairs_[p], q, &change, Vec3d{}));
+    least = std::min(least, allowed_of(bodies, pairs_[p], q, &change, Vec3d{}, apart(pairs_[p])));
   }
   return least;
 }
 
 bool Candidates::blocked(const VectorX& q, const Bodies& bodies, const std::vector<Vec3d>& shift) const {
   for (const ContactPair& pair : surfaces_.obstacle_pairs())
-    if (!bodies.flat(pair) && allowed_of(bodies, pair, q, nullptr, shift[at(-1 - pair.key.b)]) < 1.0) return true;
+    if (!bodies.flat(pair) && allowed_of(bodies, pair, q, nullptr, shift[at(-1 - pair.key.b)], apart(pair)) < 1.0)
+      return true;
+  return false;
+}
+
+bool Candidates::missed(const VectorX& q, const Bodies& bodies, const VectorX& back,
+                        const std::vector<Vec3d>& shift) const {
+  double way = 2.0 * farthest(model_, back);
+  for (const Vec3d& s : shift) way = std::max(way, way + 2.0 * std::sqrt(dot(s, s)));
+  const double here = moved_ + way_from_last(q, bodies);
+  const VectorX before = q + back;
+  for (std::size_t p = 0; p < bounds_.size(); ++p) {
+    const ContactPair& pair = pairs_[p];
+    // Who is as deep on the way, and apart at its ends, has gone farther than a radius.
+    if (way < pair.small_radius() || bounds_[p].clear - here >= way || bodies.flat(pair)) continue;
+    const Vec3d moved = pair.key.b < 0 && !shift.empty() ? shift[at(-1 - pair.key.b)] : Vec3d{};
+    const double touching = pair.radii();
+    if (distance_of(bodies, pair, q, Vec3d{}) < touching || distance_of(bodies, pair, before, moved) < touching)
+      continue;
+    if (allowed_of(bodies, pair, q, &back, -moved, {1.0, touching - kGrazed * pair.small_radius()}) < 1.0) return true;
+  }
   return false;
 }
 

@@ -106,6 +106,10 @@ class Contact {
   void allow_depth(double deepest) { deepest_ = deepest; }
   /// Whether a step of dt would be too long for what an impact loses by its restitution.
   bool unresolved(double dt) const;
+  /// Whether the step from q0, now at its end, is too long to see that surfaces met.
+  bool missed(const VectorX& q0) const {
+    return candidates_.missed(set_.q(), problem_.bodies, q0 - set_.q(), problem_.shift);
+  }
   /// What touches or is near at q1, sorted: what the matrix should have room for.
   std::vector<ContactKey> near() const;
 
@@ -127,6 +131,8 @@ class Contact {
 
   /// Keeps in `state`, still where the step began, what contacts at q1 must remember: see `ContactStiffness::accept`.
   double accept(State& state, Keep keep, double spare);
+  /// Whether what was accepted last presses as it did, but for rounding; where depths are kept.
+  bool presses_alike() const { return scratch_.change <= 1e-9 * scratch_.pressing; }
   /// The same for a step so short that stiffness stays as it is.
   void remember(State& state);
   /// Makes contacts of bodies that are too deep in each other stiffer; returns the energy put in [J].

@@ -153,14 +153,15 @@ double first_stiffness(const ContactProblem& problem, const ContactPair& pair) {
 }
 
 /// The depth that must press no more for a contact that becomes stiffer to press as hard as before, which takes energy;
-/// to store as much as before, in an impact; or, where energy does not count, the former, but not so much that surfaces
-/// could sink into each other for good.
+/// to store as much as before, in an impact; or the former, but not so much that surfaces could sink into each other
+/// for good.
 double ContactStiffness::yielded_at(const Touching& t, double ratio, Keep keep) const {
   const ContactPair& pair = t.pair;
-  const bool force = keep == Keep::force || t.approach == 0.0;
+  const bool force = keep != Keep::energy || t.approach == 0.0;
   const auto [low, high] = distance_at(t, force, (force ? -t.energy.first : t.energy.value) / (t.stiffness * ratio));
   if (keep == Keep::energy) return high - t.proximity.distance;
-  return std::min(low - t.proximity.distance, kMostYield * pair.small_radius());
+  const double yielded = low - t.proximity.distance;
+  return keep == Keep::force ? yielded : std::min(yielded, kMostYield * pair.small_radius());
 }
 
 /// Gives a contact another stiffness, and another depth that presses no more. Anchors that become stiffer keep their
@@ -179,6 +180,13 @@ double ContactStiffness::change_stiffness(const Touching& t, double ratio, doubl
   record.stiffness *= ratio;
   record.yielded = yielded;
   return put_in;
+}
+
+/// With which a contact presses where it stands, by its record [N].
+double ContactStiffness::force_of(const Touching& t, const ContactRecord& record) {
+  const double distance = t.proximity.distance + record.yielded;
+  const ContactEnergy energy = contact_energy(t.law.law, distance, t.pair.radii(), t.pair.tolerance);
+  return -record.stiffness * t.pair.share * energy.first;
 }
 
 double ContactStiffness::wanted_ratio(const Touching& t, const ContactRecord& record) const {
@@ -239,9 +247,10 @@ void ContactStiffness::remember(const ContactSet& set, const VectorX& stiffness,
 
 double ContactStiffness::accept(const ContactSet& set, Keep keep, double spare, StiffnessScratch& scratch,
                                 VectorX& stiffness) const {
-  auto& [records, fading, greatest, force] = scratch;
+  auto& [records, fading, greatest, force, pressing, change] = scratch;
   records.clear();
   fading.clear();
+  pressing = change = 0.0;
   const bool given = problem_.surfaces->parameters().contact_stiffness > 0.0;
   const VectorX& least = problem_.parameters->least_stiffness;
   const bool source = problem_.description().stiffness_rule == StiffnessRule::source && !given;
@@ -258,13 +267,16 @@ double ContactStiffness::accept(const ContactSet& set, Keep keep, double spare, 
     } else if (ratio < 1.0 || record.approach > 0.0) {
       put_in += change_stiffness(t, ratio, worn(problem_, t), record);
     } else if (problem_.pressing == Pressing::still) {
-      // An equilibrium that has been found stays one; what has yielded in motion, by more, presses again.
-      record.yielded = std::min(worn(problem_, t), kMostYield * pair.small_radius());
+      // An equilibrium that has been found stays one; what has yielded in motion, by more, may press again.
+      const double most = keep == Keep::depth ? kMostYield * pair.small_radius() : INFINITY;
+      record.yielded = std::min(worn(problem_, t), most);
     } else if (t.yielded > 0.0) {
       ContactRecord unused;
       wanted += change_stiffness(t, 1.0, faded(problem_, t), unused);
       fading.push_back({&t, records.size()});
     }
+    pressing = std::max(pressing, record.force);
+    if (keep == Keep::depth) change = std::max(change, std::abs(force_of(t, record) - record.force));
     for (int rod : {pair.rod_a, pair.rod_b})
       if (rod >= 0) greatest(rod) = std::max(greatest(rod), source ? common : wanted_stiffness(pair, -t.energy.first));
     records.push_back(record);

@@ -10,8 +10,9 @@
 
 namespace withe {
 
-/// What is never more where a contact becomes stiffer under load.
-enum class Keep { force, energy };
+/// What is never more where a contact becomes stiffer under load: its force; the depth that presses no more, for which
+/// it may press harder, out of balance; or, in an impact, its energy.
+enum class Keep { force, depth, energy };
 
 /// Of a contact that begins, for a whole node [N/m]. `stiffness`: of contacts that begin, per rod.
 double start_stiffness(const ContactProblem& problem, const ContactPair& pair, const VectorX& stiffness);
@@ -27,8 +28,9 @@ struct StiffnessScratch {
   };
   std::vector<ContactRecord> records;
   std::vector<Fading> fading;
-  VectorX greatest;  ///< stiffness wanted, per rod [N/m]
-  VectorX force;     ///< per unknown [N]
+  VectorX greatest;                 ///< stiffness wanted, per rod [N/m]
+  VectorX force;                    ///< per unknown [N]
+  double pressing = 0, change = 0;  ///< the greatest force, and by how much one has changed [N]
 };
 
 class ContactStiffness {
@@ -56,6 +58,7 @@ class ContactStiffness {
   void finish(const ContactSet& set, std::vector<ContactRecord>& records) const;
   double yielded_at(const Touching& t, double ratio, Keep keep) const;
   double change_stiffness(const Touching& t, double ratio, double yielded, ContactRecord& record) const;
+  static double force_of(const Touching& t, const ContactRecord& record);
   /// By how much a contact's stiffness is to change, by the force that it carries.
   double wanted_ratio(const Touching& t, const ContactRecord& record) const;
   double source_stiffness(const ContactSet& set, VectorX& force) const;

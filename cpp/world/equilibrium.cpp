@@ -108,13 +108,6 @@ bool World::Implementation::drifts(Equations& system) {
   return false;
 }
 
-/// Whether forces add up to nothing at the present state, with contact as stiff as it has become.
-bool World::Implementation::balanced(Equations& system, NewtonResult& result) {
-  system.begin(state, parameters, StepRule::statics, 0.0);
-  system.evaluate(state.q, false, nullptr, work.newton.data);
-  return newton->balance(work.newton.data, result).either;
-}
-
 /// Equilibrium after `dt` (0: at the present time, with supports and actuation as they are).
 EquilibriumResult World::Implementation::equilibrium(double dt) {
   account_for_settings();
@@ -156,8 +149,8 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
     from = target;
     for (int tries = 0; r.converged && system.contact() && tries < kMostStiffenings; ++tries) {
       if (system.contact()->contacts().depth() > kDeepest)
-        system.contact()->stiffen(state, Keep::force);
-      else if (balanced(system, r.newton))
+        system.contact()->stiffen(state, Keep::depth);
+      else if (system.contact()->presses_alike())
         break;
       const StaticResult before_it = r;
       r = find_equilibrium(system, *newton, options, parameters, boundary, state, work.newton, tries < kMostFollowed);
@@ -214,8 +207,10 @@ EquilibriumResult World::Implementation::settle(Equations& system, StaticResult&
   statistics.steps += 1;
   steps_taken += 1;
   update_custom_force(system);
-  balanced(system, r.newton);
+  system.begin(state, parameters, StepRule::statics, 0.0);
+  system.evaluate(state.q, false, nullptr, work.newton.data);
   note_reactions();
+  newton->balance(work.newton.data, r.newton);
   check_resolution();
   if (r.branch_changed) statistics.branch_changes += 1;
   const bool frictional = system.contact() && system.contact()->frictional();
@@ -295,6 +290,7 @@ EquilibriumPath World::equilibrium_path(const PathOptions& wanted) {
     self.rest();
     const LoadPath loads = by_loads ? scaled : growing_loads(system, self.parameters, self.state, self.work.newton);
     Homotopy path(system, *self.newton, self.parameters, boundary, loads, self.state, self.work.newton);
+    path.keep_balance();
     if (!by_loads) path.start_out_of_balance();
     const ArcVisitor visit = [&](const ArcPoint& point) {
       self.note_reactions();

@@ -269,7 +269,6 @@ struct World::Implementation : Running {
   [[noreturn]] void fail_equilibrium(const NewtonResult& newton, double dt) const;
   EquilibriumResult settle(Equations& system, StaticResult& result, double time);
   bool drifts(Equations& system);
-  bool balanced(Equations& system, NewtonResult& result);
   void rest();
   Equations& statics();
   Equations& fallback();

@@ -201,7 +201,8 @@ World::Implementation::Attempt World::Implementation::try_step(double dt) {
     take_back();
     return Attempt::inaccurate;
   }
-  const bool unresolved = watched && equations_of_step().contact()->unresolved(dt);
+  const Contact* contact = watched ? equations_of_step().contact() : nullptr;
+  const bool unresolved = contact && (contact->unresolved(dt) || contact->missed(kept.state.q));
   const bool gains = !unresolved && guarded && gains_energy(),
              pumped = !unresolved && !gains && watched && asks && contact_pumps(dt);
   if (unresolved && may_cut()) {
@@ -219,7 +220,7 @@ World::Implementation::Attempt World::Implementation::try_step(double dt) {
   watch_step(dt, equations_of_step());
   commit_step();
   if (options.tolerance) account_for_error(error, dt);
-  if (event || (watched && equations_of_step().contact()->unresolved(2.0 * dt))) return Attempt::hard;
+  if (event || (contact && contact->unresolved(2.0 * dt))) return Attempt::hard;
   if (!options.tolerance) return Attempt::easy;
   // An oscillation has no error twice a period: what counts is the greatest of the last steps, were they longer.
   // Far below what is allowed an estimate is mostly rounding.

@@ -451,3 +451,58 @@ def test_rods_that_slide_over_rods_without_friction_are_not_braked(integrator: A
     masses = np.r_[0.5, np.ones(nodes - 2), 0.5] / (nodes - 1)
     lost = speed - np.linalg.norm(masses @ simulation.velocities(rod)[:, :2])
     assert abs(lost) / (9.81 * duration) < 2e-3
+
+
+FLYING = withe.Material(youngs_modulus=7e9, poisson_ratio=0.3, density=2700.0)
+
+
+def grazed(kind, offset, step, integrator, speed=20.0):
+    """What a bat, or a ball in its place, does to a rod beside its way, in the rod's speed along it [m/s]."""
+    thick = 5e-3
+    scene = withe.Scene(gravity=(0, 0, 0))
+    target = scene.add_rod(
+        start=(-0.02, offset, 0.03), end=(0.02, offset, 0.03), nodes=3, radius=thick, material=FLYING, name="target"
+    )
+    if kind == "bat":
+        bat = scene.add_rod(start=(-0.05, 0, 0), end=(0.05, 0, 0), nodes=11, radius=thick, material=FLYING, name="bat")
+        scene.enable_contact()
+    else:
+        scene.add_sphere((0, 0, 0), thick, name="ball")
+    simulation = scene.build(time_step=step, integrator=integrator)
+    if kind == "bat":
+        simulation.set_velocities(bat, (0, 0, speed))
+    else:
+        simulation.move("ball", position=(0, 0, speed * 6e-3), over=6e-3)
+    before = simulation.momentum().linear
+    simulation.step(round(6e-3 / step))
+    if kind == "bat" and integrator != "backward_euler":
+        assert np.allclose(simulation.momentum().linear, before, rtol=0, atol=1e-9 * np.abs(before).max())
+    return simulation.velocities(target)[1, 2]
+
+
+@pytest.mark.parametrize("integrator", ["implicit_midpoint", "energy_momentum", "backward_euler"])
+@pytest.mark.parametrize("kind", ["bat", "ball"])
+@pytest.mark.parametrize("offset", [2e-3, 5e-3, 7e-3])
+def test_what_grazes_within_a_step_meets(kind, offset, integrator):
+    """In steps of twice and four times the sum of radii, 10 mm, by which bodies are beside each other by less."""
+    for step in (1e-3, 2e-3):
+        assert grazed(kind, offset, step, integrator) > 1.0
+    assert abs(grazed(kind, 0.0105, 1e-3, integrator)) < 1e-9
+
+
+def test_an_arc_onto_a_floor_goes_on_in_balance():
+    """What contact has yielded as a load grows is no reason to lose the path."""
+    scene = withe.Scene(gravity=(0, 0, 0))
+    rubber = withe.Material(youngs_modulus=1e6, poisson_ratio=0.5, density=1000.0)
+    arm = scene.add_rod(start=(0, 0, 0.04), end=(0.3, 0, 0.04), nodes=31, radius=4e-3, material=rubber)
+    clamp = scene.clamp(arm.start)
+    load = scene.add_force(arm.end, (0, 0, -0.05))
+    scene.add_floor()
+    simulation = scene.build(integrator="static")
+    path = simulation.equilibrium(path="arc_length", load=load)
+    assert path.finished
+    borne = simulation.reaction(clamp).force[2] + simulation.contacts()["normal_force"].sum()
+    assert borne == pytest.approx(0.05, rel=1e-3)
+    before = simulation.positions(arm)
+    simulation.equilibrium()
+    assert np.abs(simulation.positions(arm) - before).max() < 0.05 * 4e-3

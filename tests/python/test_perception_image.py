@@ -265,6 +265,10 @@ def test_a_torch_network_makes_the_mask_as_module_and_as_file(tmp_path):
     assert len(trace(image, mask=network_mask(network))) == 1
     pytest.importorskip("cv2")
     assert np.array_equal(network_mask(network, size=(80, 120))(image), image[..., 0] > 0)
+    with torch.no_grad():
+        network[0].bias.fill_(np.nan)
+    with pytest.raises(ValueError, match="model must answer with finite values"):
+        network_mask(network)(image)
     broken = tmp_path / "broken.pt"
     broken.write_bytes(b"no network")
     with pytest.raises(ValueError, match="model must be an ONNX or TorchScript file"):

@@ -39,6 +39,11 @@ def test_curvatures_of_the_pixels_are_those_published():
         ({"tags": [1]}, "time,tagid_x_1,tagid_y_1\n5,1,2\n5,1,2\n", "numbers that grow"),
         ({"tags": [1]}, "time,tagid_x_1,tagid_y_1\n5,0,0\n6,,\n", "tags must be seen in some frame"),
         ({"tags": [1], "skip": 2}, "time,tagid_x_1,tagid_y_1\n5,1,2\n", "more than skip=2 rows"),
+        (
+            {"tags": [1]},
+            "time,tagid_x_1,tagid_y_1\n0,101,5,202,5\n",
+            "name every column, got 5 cells and 3 names in row 1",
+        ),
         ({"tags": [1]}, "", "which is empty"),
     ],
 )

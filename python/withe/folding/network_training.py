@@ -50,8 +50,8 @@ def train(
     threads : int
         Of torch.
     time_limit : float, optional [s]
-        Training stops there, and so it does at Ctrl-C, with the best network so far. ``network.training`` says how it
-        ended.
+        Training stops there, and so it does at Ctrl-C, with the best network so far. ``network.network.training`` says
+        how it ended.
     progress : bool
         Whether to show a progress bar.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from typing import Any
 
@@ -42,7 +43,10 @@ class Screen:
         return np.array(self._figure.canvas.buffer_rgba())[..., :3]
 
     def show(self) -> None:
-        """Bring the window up to date."""
+        """Bring the window up to date; warns where there is no screen to open it on."""
+        if self._figure is None and str(require("matplotlib", "view").get_backend()).lower() == "agg":
+            message = 'render_mode="human" has no screen to open a window on, and shows nothing: take "rgb_array"'
+            warnings.warn(message, UserWarning, stacklevel=3)
         self._paint()
         require("matplotlib.pyplot", "view").pause(1e-3)
 

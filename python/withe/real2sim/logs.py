@@ -119,7 +119,13 @@ def _table(path: str | os.PathLike[str]) -> tuple[list[str], list[list[str]]]:
         rows.pop()
     if not rows:
         raise ValueError(f"path must hold names of columns and rows, got {os.fspath(path)!r}, which is empty")
-    return [name.strip() for name in rows[0]], rows[1:]
+    names = [name.strip() for name in rows[0]]
+    for number, row in enumerate(rows[1:], 1):
+        if any(cell.strip() for cell in row[len(names) :]):
+            raise ValueError(
+                f"path must name every column, got {len(row)} cells and {len(names)} names in row {number}"
+            )
+    return names, rows[1:]
 
 
 def _column(names: list[str], rows: list[list[str]], name: str, skip: int) -> FloatArray:
