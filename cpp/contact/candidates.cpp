@@ -245,12 +245,13 @@ bool Candidates::blocked(const VectorX& q, const Bodies& bodies, const std::vect
   return false;
 }
 
-bool Candidates::missed(const VectorX& q, const Bodies& bodies, const VectorX& back,
-                        const std::vector<Vec3d>& shift) const {
-  double way = 2.0 * farthest(model_, back);
-  for (const Vec3d& s : shift) way = std::max(way, way + 2.0 * std::sqrt(dot(s, s)));
+bool Candidates::missed(const VectorX& before, const VectorX& q, const Bodies& bodies,
+                        const std::vector<Vec3d>& shift) {
+  double farthest_shift = 0.0;
+  for (const Vec3d& s : shift) farthest_shift = std::max(farthest_shift, std::sqrt(dot(s, s)));
+  back_ = before - q;
+  const double way = 2.0 * (farthest(model_, back_) + farthest_shift);
   const double here = moved_ + way_from_last(q, bodies);
-  const VectorX before = q + back;
   for (std::size_t p = 0; p < bounds_.size(); ++p) {
     const ContactPair& pair = pairs_[p];
     // Who is as deep on the way, and apart at its ends, has gone farther than a radius.
@@ -259,7 +260,7 @@ bool Candidates::missed(const VectorX& q, const Bodies& bodies, const VectorX& b
     const double touching = pair.radii();
     if (distance_of(bodies, pair, q, Vec3d{}) < touching || distance_of(bodies, pair, before, moved) < touching)
       continue;
-    if (allowed_of(bodies, pair, q, &back, -moved, {1.0, touching - kGrazed * pair.small_radius()}) < 1.0) return true;
+    if (allowed_of(bodies, pair, q, &back_, -moved, {1.0, touching - kGrazed * pair.small_radius()}) < 1.0) return true;
   }
   return false;
 }

@@ -51,9 +51,9 @@ class Candidates {
   double allowed(const VectorX& q, const Bodies& bodies, const VectorX& change);
   /// Whether an obstacle that moves by its `shift` would pass through a rod that stays at q.
   bool blocked(const VectorX& q, const Bodies& bodies, const std::vector<Vec3d>& shift) const;
-  /// Whether surfaces that are apart at q, and were before it, have gone through each other in between. `back`: the way
-  /// to where rods were, which the candidates are known for; `shift`: that of obstacles since then; empty: they rest.
-  bool missed(const VectorX& q, const Bodies& bodies, const VectorX& back, const std::vector<Vec3d>& shift) const;
+  /// Whether surfaces that are apart at q, and were before it, have gone through each other in between, on a way that
+  /// the candidates are known for. `shift`: of obstacles since then; empty: they rest.
+  bool missed(const VectorX& before, const VectorX& q, const Bodies& bodies, const std::vector<Vec3d>& shift);
   /// What is within reach and half of its radii at q, sorted by key, whatever the candidates are; and all obstacles'
   /// pairs. Empty q: these alone.
   std::vector<ContactKey> near(const VectorX& q, const Bodies& bodies) const;
@@ -83,7 +83,7 @@ class Candidates {
   BroadPhase broad_phase_;
   std::vector<Box> boxes_;
   std::vector<ContactPair> pairs_;  ///< obstacles' first, then those of the broad phase, sorted by key
-  VectorX end_;                     ///< scratch: where a way leads
+  VectorX end_, back_;              ///< scratch: where a way leads, and the way to where one began
   VectorX reference_;               ///< where the candidates belong
   VectorX low_, high_;              ///< bounds of the way there
   double margin_ = 0;

@@ -107,9 +107,7 @@ class Contact {
   /// Whether a step of dt would be too long for what an impact loses by its restitution.
   bool unresolved(double dt) const;
   /// Whether the step from q0, now at its end, is too long to see that surfaces met.
-  bool missed(const VectorX& q0) const {
-    return candidates_.missed(set_.q(), problem_.bodies, q0 - set_.q(), problem_.shift);
-  }
+  bool missed(const VectorX& q0) { return candidates_.missed(q0, set_.q(), problem_.bodies, problem_.shift); }
   /// What touches or is near at q1, sorted: what the matrix should have room for.
   std::vector<ContactKey> near() const;
 

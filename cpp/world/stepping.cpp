@@ -201,7 +201,7 @@ World::Implementation::Attempt World::Implementation::try_step(double dt) {
     take_back();
     return Attempt::inaccurate;
   }
-  const Contact* contact = watched ? equations_of_step().contact() : nullptr;
+  Contact* contact = watched ? equations_of_step().contact() : nullptr;
   const bool unresolved = contact && (contact->unresolved(dt) || contact->missed(kept.state.q));
   const bool gains = !unresolved && guarded && gains_energy(),
              pumped = !unresolved && !gains && watched && asks && contact_pumps(dt);
