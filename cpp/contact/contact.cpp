@@ -257,7 +257,6 @@ double Contact::accept(State& state, Keep keep, double spare) {
 
 void Contact::remember(State& state) {
   ContactStiffness(problem_).remember(set_, state.contact_stiffness, scratch_.records);
-  scratch_.change = 0.0;
   state.contacts.swap(scratch_.records);
   leave_obstacles(state);
 }

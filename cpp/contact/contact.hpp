@@ -21,9 +21,6 @@
 
 namespace withe {
 
-/// No deeper than this where a step, an equilibrium or a drawing is accepted.
-inline constexpr double kDeepest = 0.04;
-
 /// One contact as a person wants it.
 struct ContactReport {
   ContactKey key;

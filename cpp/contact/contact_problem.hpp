@@ -11,6 +11,8 @@ namespace withe {
 
 /// Surfaces that carry the greatest force of their rod are this deep in each other, over the smaller radius.
 inline constexpr double kDepth = 0.01;
+/// No deeper than this where a step, an equilibrium or a drawing is accepted.
+inline constexpr double kDeepest = 0.04;
 
 /// Greatest depth that presses no more, over the smaller radius, where it is not for the sake of energy.
 inline constexpr double kMostYield = 0.02;

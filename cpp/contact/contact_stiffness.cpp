@@ -182,11 +182,11 @@ double ContactStiffness::change_stiffness(const Touching& t, double ratio, doubl
   return put_in;
 }
 
-/// With which a contact presses where it stands, by its record [N].
-double ContactStiffness::force_of(const Touching& t, const ContactRecord& record) {
-  const double distance = t.proximity.distance + record.yielded;
-  const ContactEnergy energy = contact_energy(t.law.law, distance, t.pair.radii(), t.pair.tolerance);
-  return -record.stiffness * t.pair.share * energy.first;
+/// With which a contact presses where it stands, so many times as stiff and with another depth that presses no more
+/// [N].
+double ContactStiffness::force_at(const Touching& t, double ratio, double yielded) {
+  const double distance = t.proximity.distance + yielded;
+  return -ratio * t.stiffness * contact_energy(t.law.law, distance, t.pair.radii(), t.pair.tolerance).first;
 }
 
 double ContactStiffness::wanted_ratio(const Touching& t, const ContactRecord& record) const {
@@ -261,22 +261,31 @@ double ContactStiffness::accept(const ContactSet& set, Keep keep, double spare, 
     const ContactPair& pair = t.pair;
     if (t.lagged >= 0 || !problem_.touch(pair, t.proximity.distance, t.yielded)) continue;
     ContactRecord record = this->record(t);
-    const double ratio = source && !problem_.fixed(pair) ? common / record.stiffness : wanted_ratio(t, record);
+    const bool still = problem_.pressing == Pressing::still;
+    double ratio = source && !problem_.fixed(pair) ? common / record.stiffness : wanted_ratio(t, record);
+    // An equilibrium that has been found stays one, unless surfaces are too deep in each other.
+    if (still && !source) ratio = std::max(ratio, 1.0);
+    const double most_yield = keep == Keep::depth ? kMostYield * pair.small_radius() : INFINITY;
+    if (keep == Keep::depth && t.depth() <= kDeepest) {
+      const double left = force_at(t, 1.0, std::max(t.yielded, most_yield));
+      if (ratio * left > record.force) ratio = std::max(record.force / left, 1.0);
+    }
     if (ratio > 1.0) {
       put_in += change_stiffness(t, ratio, yielded_at(t, ratio, keep), record);
     } else if (ratio < 1.0 || record.approach > 0.0) {
       put_in += change_stiffness(t, ratio, worn(problem_, t), record);
-    } else if (problem_.pressing == Pressing::still) {
-      // An equilibrium that has been found stays one; what has yielded in motion, by more, may press again.
-      const double most = keep == Keep::depth ? kMostYield * pair.small_radius() : INFINITY;
-      record.yielded = std::min(worn(problem_, t), most);
+    } else if (still) {
+      record.yielded = std::min(worn(problem_, t), most_yield);  // what has yielded in motion by more may press again
     } else if (t.yielded > 0.0) {
       ContactRecord unused;
       wanted += change_stiffness(t, 1.0, faded(problem_, t), unused);
       fading.push_back({&t, records.size()});
     }
     pressing = std::max(pressing, record.force);
-    if (keep == Keep::depth) change = std::max(change, std::abs(force_of(t, record) - record.force));
+    if (keep == Keep::depth) {
+      const double now = force_at(t, record.stiffness * pair.share / t.stiffness, record.yielded);
+      change = std::max(change, std::abs(now - record.force));
+    }
     for (int rod : {pair.rod_a, pair.rod_b})
       if (rod >= 0) greatest(rod) = std::max(greatest(rod), source ? common : wanted_stiffness(pair, -t.energy.first));
     records.push_back(record);

@@ -10,8 +10,9 @@
 
 namespace withe {
 
-/// What is never more where a contact becomes stiffer under load: its force; the depth that presses no more, for which
-/// it may press harder, out of balance; or, in an impact, its energy.
+/// What is never more where a contact becomes stiffer under load: its force; the depth that presses no more either, for
+/// which it becomes less stiff or, where surfaces are too deep in each other, presses harder; or, in an impact, its
+/// energy.
 enum class Keep { force, depth, energy };
 
 /// Of a contact that begins, for a whole node [N/m]. `stiffness`: of contacts that begin, per rod.
@@ -58,7 +59,7 @@ class ContactStiffness {
   void finish(const ContactSet& set, std::vector<ContactRecord>& records) const;
   double yielded_at(const Touching& t, double ratio, Keep keep) const;
   double change_stiffness(const Touching& t, double ratio, double yielded, ContactRecord& record) const;
-  static double force_of(const Touching& t, const ContactRecord& record);
+  static double force_at(const Touching& t, double ratio, double yielded);
   /// By how much a contact's stiffness is to change, by the force that it carries.
   double wanted_ratio(const Touching& t, const ContactRecord& record) const;
   double source_stiffness(const ContactSet& set, VectorX& force) const;

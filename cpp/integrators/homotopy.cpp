@@ -72,10 +72,7 @@ void Homotopy::accept(const VectorX& q) {
   const Model& model = equations_.model();
   if (Contact* contact = equations_.contact()) {
     contact->update(q);
-    if (stiffness_ == StiffnessChange::none)
-      contact->remember(state_);
-    else
-      contact->accept(state_, stiffness_ == StiffnessChange::limited ? Keep::depth : Keep::force, INFINITY);
+    contact->accept(state_, keep_, INFINITY);
   }
   compute_configuration(model, state_, q, scratch_);
   accept_configuration(model, q, scratch_, state_);

@@ -23,10 +23,6 @@ using LoadPath = std::function<void(double factor, MatrixX3& loads)>;
 /// them: their dead imbalance would pull where they do not. Others stay, as they are part of what is out of balance.
 LoadPath growing_loads(Equations& equations, Parameters& parameters, const State& state, NewtonWorkspace& work);
 
-/// How the stiffness of contacts follows their forces: with depths that yield only so far, with what they press kept,
-/// or not.
-enum class StiffnessChange { limited, balanced, none };
-
 class Homotopy {
  public:
   /// Loads among the parameters are those of the factor last gone to.
@@ -45,9 +41,8 @@ class Homotopy {
   /// Loads and what is left out of balance at a factor; the frames count from the present state.
   void go_to(double factor);
   bool hold(double factor, VectorX& q) const { return boundary_.hold(factor, q); }
-  /// What contacts do from here on, which by default yield no more than they may, and are found out of balance for it.
-  void keep_stiffness() { stiffness_ = StiffnessChange::none; }
-  void keep_balance() { stiffness_ = StiffnessChange::balanced; }
+  /// From here on contacts that become stiffer yield by as much as it takes to stay in balance.
+  void keep_balance() { keep_ = Keep::force; }
   /// Whether supports did so where a tangent was last found.
   bool supports_move() const { return moves_; }
   /// What grad V - f is to be at the factor last gone to.
@@ -85,7 +80,7 @@ class Homotopy {
   Configuration scratch_;
   double factor_ = 0.0;
   bool moves_ = false;
-  StiffnessChange stiffness_ = StiffnessChange::limited;
+  Keep keep_ = Keep::depth;
 };
 
 }  // namespace withe

@@ -43,7 +43,7 @@ constexpr double kJump = 0.25 * kFarthestTurn;
 class Statics {
  public:
   Statics(Equations& equations, const Newton& newton, const Options& options, Parameters& parameters,
-          const Boundary& boundary, State& state, NewtonWorkspace& work, bool stiffness_follows)
+          const Boundary& boundary, State& state, NewtonWorkspace& work)
       : equations_(equations),
         newton_(newton),
         options_(options),
@@ -51,7 +51,6 @@ class Statics {
         state_(state),
         work_(work),
         path_(equations, newton, parameters, boundary, growing_loads(equations, parameters, state, work), state, work) {
-    if (!stiffness_follows) path_.keep_stiffness();
   }
 
   StaticResult run() {
@@ -398,9 +397,8 @@ class Statics {
 }  // namespace
 
 StaticResult find_equilibrium(Equations& equations, const Newton& newton, const Options& options,
-                              Parameters& parameters, const Boundary& boundary, State& state, NewtonWorkspace& work,
-                              bool stiffness_follows) {
-  return Statics(equations, newton, options, parameters, boundary, state, work, stiffness_follows).run();
+                              Parameters& parameters, const Boundary& boundary, State& state, NewtonWorkspace& work) {
+  return Statics(equations, newton, options, parameters, boundary, state, work).run();
 }
 
 }  // namespace withe

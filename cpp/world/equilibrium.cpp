@@ -10,8 +10,8 @@
 namespace withe {
 namespace {
 
-// Times that an equilibrium is sought anew as contact becomes stiffer, and of these with stiffness that follows forces.
-constexpr int kMostStiffenings = 12, kMostFollowed = 6;
+// Times that an equilibrium is sought anew as contact becomes stiffer.
+constexpr int kMostStiffenings = 8;
 
 }  // namespace
 
@@ -144,8 +144,7 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
       newton->balance(work.newton.data, r.newton);
     else
       r = find_equilibrium(system, *newton, options, parameters, boundary, state, work.newton);
-    // Where contact that follows the forces found has yielded as much as it may, balance is sought anew; in the end
-    // with stiffness that stays, as forces between what does not yield grow with it.
+    // Where contact turns out too soft, and is made stiffer, balance is sought anew from where the scene has settled.
     from = target;
     for (int tries = 0; r.converged && system.contact() && tries < kMostStiffenings; ++tries) {
       if (system.contact()->contacts().depth() > kDeepest)
@@ -153,7 +152,7 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
       else if (system.contact()->presses_alike())
         break;
       const StaticResult before_it = r;
-      r = find_equilibrium(system, *newton, options, parameters, boundary, state, work.newton, tries < kMostFollowed);
+      r = find_equilibrium(system, *newton, options, parameters, boundary, state, work.newton);
       r.branch_changed = r.branch_changed || before_it.branch_changed;
       r.newton.iterations += before_it.newton.iterations;
     }
