@@ -34,7 +34,8 @@ class EquilibriumPath:
         Whether every small motion would be pushed back, at the point's loads and supports. With follower loads or
         moments in space that says no more than that the stiffness can be inverted.
     limit_points : ndarray of shape (limits,) of int
-        Points at which the load factor has an extremum: they are found to nine digits of the load factor.
+        Points at which the load factor has an extremum: they are found to nine digits of the load factor. A
+        bifurcation, where a symmetric branch only becomes unstable, is none: `stable` tells of it.
     finished : bool
         Whether the path came to the load factor or to the number of points that were asked for; False where it was
         lost on the way.
