@@ -100,6 +100,20 @@ Bracket distance_at(const Touching& t, bool force, double wanted) {
   return b;
 }
 
+/// With which a contact presses where it stands, so many times as stiff, with a depth that presses no more [N].
+double force_at(const Touching& t, double ratio, double yielded) {
+  const double distance = t.proximity.distance + yielded;
+  return -ratio * t.stiffness * contact_energy(t.law.law, distance, t.pair.radii(), t.pair.tolerance).first;
+}
+
+/// How much stiffer a contact in balance may become to stay there, where no more than `most` of its depth is to yield;
+/// not where surfaces are so deep in each other that balance is sought anew.
+double balanced_ratio(const Touching& t, double wanted, double most) {
+  if (t.depth() > kDeepest) return wanted;
+  const double pressing = -t.energy.first, left = force_at(t, 1.0, std::max(t.yielded, most));
+  return wanted * left > pressing ? std::max(pressing / left, 1.0) : wanted;
+}
+
 /// What stops an edge's mass at the speed at which the ends meet (along the normal of a plane, which is known before
 /// they do), within the step or within the depth of contact; and what stores its energy in that depth, where a step's
 /// force does as much work as contact stores.
@@ -182,13 +196,6 @@ double ContactStiffness::change_stiffness(const Touching& t, double ratio, doubl
   return put_in;
 }
 
-/// With which a contact presses where it stands, so many times as stiff and with another depth that presses no more
-/// [N].
-double ContactStiffness::force_at(const Touching& t, double ratio, double yielded) {
-  const double distance = t.proximity.distance + yielded;
-  return -ratio * t.stiffness * contact_energy(t.law.law, distance, t.pair.radii(), t.pair.tolerance).first;
-}
-
 double ContactStiffness::wanted_ratio(const Touching& t, const ContactRecord& record) const {
   if (problem_.fixed(t.pair)) return 1.0;
   const double wanted = wanted_stiffness(t.pair, record.force);
@@ -252,6 +259,7 @@ double ContactStiffness::accept(const ContactSet& set, Keep keep, double spare, 
   fading.clear();
   pressing = change = 0.0;
   const bool given = problem_.surfaces->parameters().contact_stiffness > 0.0;
+  const bool still = problem_.pressing == Pressing::still;
   const VectorX& least = problem_.parameters->least_stiffness;
   const bool source = problem_.description().stiffness_rule == StiffnessRule::source && !given;
   const double common = source ? std::max(source_stiffness(set, force), least.minCoeff()) : 0.0;
@@ -261,15 +269,11 @@ double ContactStiffness::accept(const ContactSet& set, Keep keep, double spare, 
     const ContactPair& pair = t.pair;
     if (t.lagged >= 0 || !problem_.touch(pair, t.proximity.distance, t.yielded)) continue;
     ContactRecord record = this->record(t);
-    const bool still = problem_.pressing == Pressing::still;
     double ratio = source && !problem_.fixed(pair) ? common / record.stiffness : wanted_ratio(t, record);
     // An equilibrium that has been found stays one, unless surfaces are too deep in each other.
     if (still && !source) ratio = std::max(ratio, 1.0);
     const double most_yield = keep == Keep::depth ? kMostYield * pair.small_radius() : INFINITY;
-    if (keep == Keep::depth && t.depth() <= kDeepest) {
-      const double left = force_at(t, 1.0, std::max(t.yielded, most_yield));
-      if (ratio * left > record.force) ratio = std::max(record.force / left, 1.0);
-    }
+    if (keep == Keep::depth) ratio = balanced_ratio(t, ratio, most_yield);
     if (ratio > 1.0) {
       put_in += change_stiffness(t, ratio, yielded_at(t, ratio, keep), record);
     } else if (ratio < 1.0 || record.approach > 0.0) {

@@ -179,3 +179,21 @@ def test_surfaces_are_no_deeper_in_an_equilibrium_than_it_promises(integrator, m
     assert found.residual < 1e-9
     assert -0.0601 * RADIUS < contact["gap"] < 0.0
     assert np.linalg.norm(simulation.reaction(clamp).force) == pytest.approx(contact["normal_force"], rel=1e-9)
+
+
+def test_an_arc_onto_a_floor_goes_on_in_balance():
+    """What contact has yielded as a load grows is no reason to lose the path."""
+    scene = withe.Scene(gravity=(0, 0, 0))
+    rubber = withe.Material(youngs_modulus=1e6, poisson_ratio=0.5, density=1000.0)
+    arm = scene.add_rod(start=(0, 0, 0.04), end=(0.3, 0, 0.04), nodes=31, radius=4e-3, material=rubber)
+    clamp = scene.clamp(arm.start)
+    load = scene.add_force(arm.end, (0, 0, -0.05))
+    scene.add_floor()
+    simulation = scene.build(integrator="static")
+    path = simulation.equilibrium(path="arc_length", load=load)
+    assert path.finished
+    borne = simulation.reaction(clamp).force[2] + simulation.contacts()["normal_force"].sum()
+    assert borne == pytest.approx(0.05, rel=1e-3)
+    before = simulation.positions(arm)
+    simulation.equilibrium()
+    assert np.abs(simulation.positions(arm) - before).max() < 0.05 * 4e-3
