@@ -34,9 +34,9 @@ void StepGradient::add_reactions(const ReactionAdjoint& reactions, StepAdjoint& 
   check_reactions();
   const Model& model = equations_.model();
   by_rows_.setZero(model.dof_count);
-  const auto row = [](const MatrixX3& table, std::size_t s) {
+  const auto row = [&](const MatrixX3& table, std::size_t s) {
     const auto i = static_cast<Eigen::Index>(s);
-    return i < table.rows() ? Vector3(table.row(i)) : Vector3(Vector3::Zero());
+    return i < table.rows() ? Vector3(reactions.share * table.row(i)) : Vector3(Vector3::Zero());
   };
   for (std::size_t s = 0; s < model.supports.size(); ++s) {
     if (!model.supports[s].active) continue;

@@ -49,11 +49,12 @@ struct SupportAdjoint {
   MatrixX3 forces, moments;  ///< per support [1/N], [1/(N m)]; zero for those after the last row
 };
 
-/// Those that are read out after a step, and where hands are then, about which their moments are; they may have gone
-/// on, where a step consists of parts.
+/// Those that are read out after a time step, of which a step may be a part, and where hands are then, about which
+/// their moments are.
 struct ReactionAdjoint {
   const SupportAdjoint& by;
   std::vector<HandPose> about;  ///< per support; none: there is no hand
+  double share = 1;             ///< of the time step, over whose parts reactions are means
 };
 
 /// Derivatives of a scalar by what supports prescribe, meaningful where held.

@@ -127,7 +127,7 @@ void Tape::record(const AcceptedStep& step) {
   acting_.record(steps_.size(), step.parameters);
   steps_.push_back({step.rule, step.duration, after.time, step.end, held_velocities(after.v), held_gains(step),
                     step.reached, moved_hands(step.hands), moved_obstacles(after.obstacles), after.contacts,
-                    step.reacts, step.unknown});
+                    step.begins, step.unknown});
   const VectorX before = held_velocities(last_velocity_);
   const double moved = steps_.back().held.norm() + before.norm();
   if (moved * std::abs(step.duration) <= kRounding * std::max(model_.length_scale, 1.0)) {
@@ -255,7 +255,7 @@ void Tape::walk_back(Player& player, const std::function<void(const Passage&)>& 
 /// What a scalar depends on, by the number of steps before, and by the step whose reactions it takes.
 class Tape::Moments {
  public:
-  Moments(const Tape& tape, const std::vector<MomentAdjoint>& moments, const ParameterVisitor& visit)
+  Moments(const Tape& tape, const std::vector<MomentAdjoint>& moments, const ParameterVisitor& visit, bool by_poses)
       : tape_(tape), moments_(moments), visit_(visit), left_(moments.size()) {
     long last = 0;
     for (const MomentAdjoint& moment : moments_) {
@@ -263,8 +263,7 @@ class Tape::Moments {
         throw std::invalid_argument("a moment lies outside of the run");
       last = moment.steps;
       moment.by.check(tape.model_);
-      if (moment.by.has_reactions())
-        reactions_.push_back({reacting_step(moment.steps), {moment.by.reactions, tape.hands_after(moment.steps)}});
+      if (moment.by.has_reactions()) add_reactions(moment, by_poses);
     }
   }
 
@@ -293,11 +292,32 @@ class Tape::Moments {
   }
 
  private:
-  std::size_t reacting_step(long steps) const {
-    for (long k = steps; k-- > 0;)
-      if (tape_.steps_[static_cast<std::size_t>(k)].reacts) return static_cast<std::size_t>(k);
-    throw std::invalid_argument(
-        "reactions at the start of a run come from before it, and have no gradient: give zeros for the first frame");
+  /// Reactions are the means over the parts of a time step, about where hands are at its end.
+  void add_reactions(const MomentAdjoint& moment, bool by_poses) {
+    if (moment.steps == 0)
+      throw std::invalid_argument(
+          "reactions at the start of a run come from before it, and have no gradient: give zeros for the first frame");
+    const auto end = static_cast<std::size_t>(moment.steps);
+    std::size_t first = end - 1;
+    while (first > 0 && !tape_.steps_[first].begins) --first;
+    double duration = 0.0;
+    for (std::size_t k = first; k < end; ++k) duration += tape_.steps_[k].duration;
+    const std::vector<HandPose> hands = tape_.hands_after(moment.steps);
+    for (std::size_t k = first; k < end; ++k) {
+      if (by_poses) check_rests(moment.by.reactions, hands, tape_.hands_after(static_cast<long>(k) + 1));
+      reactions_.push_back({k, {moment.by.reactions, hands, tape_.steps_[k].duration / duration}});
+    }
+  }
+
+  /// The way of a hand between the parts of a time step moves the point that its moment is about.
+  void check_rests(const SupportAdjoint& by, const std::vector<HandPose>& hands,
+                   const std::vector<HandPose>& then) const {
+    for (Eigen::Index s = 0; s < by.moments.rows(); ++s)
+      if (tape_.model_.supports[static_cast<std::size_t>(s)].is_hand() && !by.moments.row(s).isZero(0.0) &&
+          hands[static_cast<std::size_t>(s)].position != then[static_cast<std::size_t>(s)].position)
+        throw std::invalid_argument(
+            "no gradient by the way of a hand is known of its moment in a time step that was cut: take a smaller "
+            "time_step, or adaptive=False");
   }
 
   /// With the natural shape that was there after so many steps.
@@ -322,7 +342,7 @@ class Tape::Moments {
 InitialGradient Tape::gradient(const std::vector<MomentAdjoint>& given, const ParameterVisitor& visit,
                                const PoseVisitor& visit_poses) const {
   check_known();
-  Moments moments(*this, given, visit);
+  Moments moments(*this, given, visit, static_cast<bool>(visit_poses));
   StateAdjoint adjoint{VectorX::Zero(model_.dof_count), VectorX::Zero(model_.dof_count)};
   const CoefficientAdjoint none(model_, acting_.load_rows());
   CoefficientAdjoint coefficients = none;

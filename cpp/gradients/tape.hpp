@@ -59,7 +59,7 @@ struct AcceptedStep {
   const Parameters& parameters;  ///< as they acted
   Reached reached;
   std::vector<HandPose> hands;    ///< where hands are at its end, per support; empty: there is none
-  bool reacts = true;             ///< whether reactions are those of this step from here on
+  bool begins = true;             ///< whether it is the first part of a time step
   const char* unknown = nullptr;  ///< why no gradient goes through it, unless it is cut off again
 };
 
@@ -107,7 +107,7 @@ class Tape {
     std::vector<HandPose> hands;           ///< at its end; none: where they were before it
     std::vector<ObstaclePlace> obstacles;  ///< likewise
     std::vector<ContactRecord> contacts;   ///< at its end
-    bool reacts;
+    bool begins;
     const char* unknown;  ///< why no gradient goes through it, if so
   };
   /// As it is read out, where it is another than the one that acted last.

@@ -193,9 +193,12 @@ void World::Implementation::static_step(double end, double dt) {
 void World::Implementation::fail_equilibrium(const NewtonResult& newton, double dt) const {
   const bool held =
       std::any_of(model.supports.begin(), model.supports.end(), [](const Support& s) { return s.active; });
+  const bool lies = !description.contact.obstacles.empty();
   fail(newton, dt,
-       held ? "no static equilibrium was found"
-            : "no static equilibrium was found, and no support holds the scene: clamp or pin a node",
+       std::string("no static equilibrium was found") +
+           (held   ? ""
+            : lies ? ", and nothing but contact holds the scene, where friction may not be enough: clamp or pin a node"
+                   : ", and no support holds the scene: clamp or pin a node"),
        dt > 0.0 ? "" : "Try to get there in parts: small changes of loads and supports, or time steps with viscosity");
 }
 

@@ -127,9 +127,17 @@ void exchange(Archive& io, State& state) {
   for (int i : {0, 1}) io(velocity[i]), io(times[i]);
 }
 
+/// Of supports.
+template <class Archive>
+void exchange(Archive& io, std::vector<Wrench>& wrenches) {
+  exchange_size(io, wrenches, 1 << 20, "snapshot is damaged: impossible number of supports");
+  for (auto& [force, moment] : wrenches) io(force), io(moment);
+}
+
 template <class Archive>
 void exchange(Archive& io, Moving& moving) {
-  auto& [state, predictor, motions, support_work, actuation_work, dissipated, load_work] = moving;
+  auto& [state, predictor, motions, support_work, actuation_work, dissipated, load_work, impulses, impulse_time] =
+      moving;
   exchange(io, state);
   predictor.exchange(io);
   for (auto& motion : motions) {
@@ -138,7 +146,8 @@ void exchange(Archive& io, Moving& moving) {
     io(position), io(rotation), io(from_position), io(to_position), io(from_rotation), io(to_rotation);
     exchange(io, shift), exchange(io, turn), io(stretch), io(fed), io(fed_before), io(feed_rate), io(feeds_since);
   }
-  for (double* x : {&support_work, &actuation_work, &dissipated, &load_work}) io(*x);
+  for (double* x : {&support_work, &actuation_work, &dissipated, &load_work, &impulse_time}) io(*x);
+  exchange(io, impulses);
 }
 
 template <class Archive>
@@ -162,8 +171,7 @@ template <class Archive>
 void exchange(Archive& io, Found& found) {
   auto& [custom_force, custom_moments, reaction_residual, reaction_place, hand_wrenches, reaction_current] = found;
   io(custom_force), io(custom_moments), io(reaction_residual), io(reaction_place), io(reaction_current);
-  exchange_size(io, hand_wrenches, 1 << 20, "snapshot is damaged: impossible number of hands");
-  for (auto& [force, moment] : hand_wrenches) io(force), io(moment);
+  exchange(io, hand_wrenches);
 }
 
 template <class Archive>

@@ -137,7 +137,7 @@ void World::Implementation::check_tape() {
   if (!tape->has_loads(parameters)) tape->refuse("loads came or went while it ran; begin another run there");
 }
 
-void World::Implementation::record_step(StepRule rule, double dt, bool reacts) {
+void World::Implementation::record_step(StepRule rule, double dt, bool begins) {
   const char* unknown = nullptr;
   if (const Contact* contact = equations_of_step().contact()) {
     if (contact->frictional() && !known_friction(description.contact.friction_law))
@@ -149,7 +149,7 @@ void World::Implementation::record_step(StepRule rule, double dt, bool reacts) {
     else if (!contact->has_given_stiffness(state))
       unknown = kStiffness;
   }
-  tape->record({rule, dt, work.move, state, parameters, reached(), hand_poses(), reacts, unknown});
+  tape->record({rule, dt, work.move, state, parameters, reached(), hand_poses(), begins, unknown});
 }
 
 Reached World::Implementation::reached() const {

@@ -168,18 +168,16 @@ bool World::Implementation::hold_edges(int hand, VectorX& q) const {
   return true;
 }
 
-/// Of the hand on the rod, about where the hand is; `held`: rows of what supports hold, at `q`.
-Reaction World::Implementation::hand_reaction(int hand, const VectorX& held, const VectorX& q) const {
+/// Of a hand on the rod in the last evaluation, about the origin; see `reaction_of`.
+Wrench World::Implementation::hand_reaction(int hand, const VectorX& held) const {
   const Support& s = model.supports[at(hand)];
-  Reaction out;
-  if (s.yields()) {
-    const Wrench& wrench = hand_wrenches[at(hand)];
-    return {wrench.force, wrench.moment - motions[at(hand)].position.cross(wrench.force)};
-  }
+  if (s.yields()) return hand_wrenches[at(hand)];
+  const VectorX& q = reaction_place;
+  Wrench out;
   for (int node : s.nodes) {
     const Vector3 force = node_vector(model, held, node);
     out.force += force;
-    out.moment += (node_position(model, q, node) - motions[at(hand)].position).cross(force);
+    out.moment += node_position(model, q, node).cross(force);
   }
   for (int edge : s.edges)
     if (!model.planar())

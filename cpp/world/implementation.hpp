@@ -184,7 +184,7 @@ struct World::Implementation : Running {
   /// The unknowns that hands hold, where `motions` say.
   void hold_hands(HeldTarget& target) const;
   bool hold_edges(int hand, VectorX& q) const;
-  Reaction hand_reaction(int hand, const VectorX& held, const VectorX& q) const;
+  Wrench hand_reaction(int hand, const VectorX& held) const;
 
   // stepping.cpp
   enum class Attempt { failed, gained_energy, fell_back, inaccurate, hard, easy };
@@ -194,6 +194,10 @@ struct World::Implementation : Running {
     long parts = 1, done = 0;
     double reached() const { return from + (1.0 - from) * (static_cast<double>(done) / static_cast<double>(parts)); }
   };
+  /// Which part of a time step is being taken.
+  struct Part {
+    bool first = true, only = true;
+  } part;
   void advance(double duration);
   void advance_in_parts(double duration);
   bool may_cut() const;
@@ -220,7 +224,10 @@ struct World::Implementation : Running {
   StepRule rule_of_step() const;
   StepResult step_by_rule(double dt, int slot);
   void note_reactions();
-  void keep_reactions();
+  void note_residual();
+  Wrench reaction_of(int support, const VectorX& held) const;
+  void keep_reactions(double dt, bool begins);
+  void make_frame_moments();
   void check_impacts(const ContactDescription& contact) const;
   void check_reversible(const Parameters& p) const;
 
@@ -251,7 +258,7 @@ struct World::Implementation : Running {
 
   // gradients.cpp
   void check_tape();
-  void record_step(StepRule rule, double dt, bool reacts);
+  void record_step(StepRule rule, double dt, bool begins);
   Reached reached() const;
 
   // supports.cpp

@@ -110,6 +110,10 @@ struct Moving {
   Predictor predictor;
   std::vector<SupportMotion> motions;
   double support_work = 0, actuation_work = 0, dissipated = 0, load_work = 0;  ///< [J]
+  /// Of supports, in the parts of a time step so far, [N s] and [N m s], and how long those are [s]: per support, as
+  /// `reaction_of` has them. None: the last time step had one part.
+  std::vector<Wrench> impulses;
+  double impulse_time = 0;
 };
 
 /// By what the next step is chosen and judged.

@@ -196,6 +196,7 @@ void give_sizes(World::Implementation& self) {
   self.predictor.resize(self.model.dof_count);
   for (VectorX* v : {&self.reaction_residual, &self.reaction_place})
     if (v->size() != self.model.dof_count) v->setZero(self.model.dof_count);
+  if (!self.impulses.empty()) self.impulses.resize(self.model.supports.size());
 }
 
 struct StoredSupports {

@@ -57,6 +57,8 @@ void World::Implementation::advance_in_parts(double duration) {
   for (;;) {
     work.newton.poll();
     const double dt = duration * ((1.0 - division.from) / static_cast<double>(division.parts));
+    part = {division.from == 0.0 && division.done == 0,
+            division.from == 0.0 && division.parts == 1 && options.integrator != Integrator::fourth_order};
     const Attempt attempt = try_step(dt);
     if (attempt == Attempt::fell_back) continue;
     if (attempt != Attempt::easy && attempt != Attempt::hard) {
@@ -275,7 +277,6 @@ bool World::Implementation::scheme_step(double dt, double& error) {
   return options.integrator == Integrator::fourth_order ? composed_step(dt, error) : inner_step(dt, 0, error);
 }
 
-/// Reactions are those in the middle of the part in the middle, which is the middle of the step.
 bool World::Implementation::composed_step(double dt, double& error) {
   const double start = state.time;
   double reached = 0.0;
@@ -355,8 +356,8 @@ bool World::Implementation::inner_step(double dt, int slot, double& error) {
   system.respond({});
   release_obstacles(system);
   release_hands(system);
-  const bool reacts = options.integrator != Integrator::fourth_order || slot == 2;
-  if (tape) record_step(rule_of_step(), dt, reacts);
+  const bool begins = part.first && slot == 0;
+  if (tape) record_step(rule_of_step(), dt, begins);
   error = r.error;
   turned = std::max(turned, r.largest_turn);
   if (watches_energy()) {
@@ -368,7 +369,7 @@ bool World::Implementation::inner_step(double dt, int slot, double& error) {
   dissipated += r.dissipated;
   support_work += r.support_work;
   contact_guard.put_in = r.pressing_gain;
-  if (reacts) keep_reactions();
+  keep_reactions(dt, begins);
   if (ramped) {
     apply_ramps(end, model.planar() ? configuration() : work.after, actuation);
     actuation_work += actuation;
@@ -408,10 +409,31 @@ StepResult World::Implementation::step_by_rule(double dt, int slot) {
   return implicit_step(system, *newton, options, parameters, own, state, predictor, work);
 }
 
+/// Of a part of a time step, whose reactions are the means over all parts.
+void World::Implementation::keep_reactions(double dt, bool begins) {
+  note_residual();
+  make_frame_moments();
+  if (begins) {
+    impulses.clear();
+    impulse_time = 0.0;
+  }
+  if (part.only || model.supports.empty()) return;
+  impulses.resize(model.supports.size());
+  impulse_time += dt;
+  VectorX& held = work.assumed;
+  held.setZero(model.dof_count);
+  equations->assembler().set_held_part(reaction_residual, held);
+  for (std::size_t s = 0; s < model.supports.size(); ++s) {
+    if (!model.supports[s].active) continue;
+    const Wrench found = reaction_of(static_cast<int>(s), held);
+    impulses[s].force += dt * found.force;
+    impulses[s].moment += dt * found.moment;
+  }
+}
+
 /// The residual of a frame's unknowns is J(w)^T moment, w its turn where the forces act; of an energy-momentum step,
 /// the moment.
-void World::Implementation::keep_reactions() {
-  note_reactions();
+void World::Implementation::make_frame_moments() {
   if (model.planar() || rule_of_step() == StepRule::energy_momentum) return;
   for (const Support& support : model.supports) {
     if (!support.active || support.frame < 0) continue;

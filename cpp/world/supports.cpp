@@ -169,12 +169,39 @@ std::pair<Matrix3, double> World::support_turn(int support) const {
   return {m.to_rotation, m.turn.end};
 }
 
-/// Of the last evaluation.
+/// Reactions are those of the last evaluation.
 void World::Implementation::note_reactions() {
+  impulses.clear();
+  note_residual();
+}
+
+void World::Implementation::note_residual() {
   reaction_residual = work.newton.data.full_residual;
   reaction_place = work.newton.data.z;
   hand_wrenches = work.newton.data.hands;
   reaction_current = true;
+}
+
+/// Of a support on the rod in the last evaluation: about its node, of a hand about the origin. `held`: its rows of what
+/// supports hold.
+Wrench World::Implementation::reaction_of(int support, const VectorX& held) const {
+  const Support& s = model.supports[at(support)];
+  if (s.is_hand()) return hand_reaction(support, held);
+  Wrench out;
+  out.force = node_vector(model, held, s.node);
+  if (s.frame >= 0) {
+    const int dof = model.frame_dof[at(s.frame)];
+    out.moment = model.planar() ? Vector3(held(dof) * model.plane->normal) : Vector3(held.segment<3>(dof));
+  }
+  if (s.other_node >= 0) {
+    const Vector3 other = node_vector(model, held, s.other_node);
+    const Vector3 arm =
+        node_position(model, reaction_place, s.other_node) - node_position(model, reaction_place, s.node);
+    out.force += other;
+    out.moment = arm.cross(other);
+    if (!model.planar()) out.moment += held(model.edge_dof[at(s.edge)]) * arm.normalized();
+  }
+  return out;
 }
 
 Reaction World::reaction(int support) const {
@@ -183,25 +210,16 @@ Reaction World::reaction(int support) const {
       support >= 0 && support < static_cast<int>(self.model.supports.size()) && self.model.supports[at(support)].active,
       "no such support, or it is released: " + std::to_string(support));
   self.refresh_reactions();
-  const Model& model = self.model;
-  const Support& s = model.supports[at(support)];
-  const VectorX held = self.equations->assembler().held_part(self.reaction_residual);
-  if (s.is_hand()) return self.hand_reaction(support, held, self.reaction_place);
-  Reaction out;
-  out.force = node_vector(model, held, s.node);
-  if (s.frame >= 0) {
-    const int dof = model.frame_dof[at(s.frame)];
-    out.moment = model.planar() ? Vector3(held(dof) * model.plane->normal) : Vector3(held.segment<3>(dof));
+  Wrench found;
+  if (self.impulses.empty()) {
+    found = self.reaction_of(support, self.equations->assembler().held_part(self.reaction_residual));
+  } else {
+    found = self.impulses[at(support)];
+    found.force /= self.impulse_time;
+    found.moment /= self.impulse_time;
   }
-  if (s.other_node >= 0) {
-    const Vector3 other = node_vector(model, held, s.other_node);
-    const VectorX& q = self.reaction_place;
-    const Vector3 arm = node_position(model, q, s.other_node) - node_position(model, q, s.node);
-    out.force += other;
-    out.moment = arm.cross(other);
-    if (!model.planar()) out.moment += held(model.edge_dof[at(s.edge)]) * arm.normalized();
-  }
-  return out;
+  if (self.model.supports[at(support)].is_hand()) found.moment -= self.motions[at(support)].position.cross(found.force);
+  return {found.force, found.moment};
 }
 
 }  // namespace withe

@@ -168,3 +168,34 @@ def test_reactions_of_a_clamp_are_what_momenta_change_by_and_what_does_the_work(
         else:
             assert_order_at_least(found[:, column], 2.0, slack=0.2)
             assert found[-1, column] < 1e-4
+
+
+@pytest.mark.parametrize("stiffness", [None, (50.0, 0.5)], ids=["rigid", "yielding"])
+@pytest.mark.parametrize(
+    ("integrator", "options"),
+    [
+        ("fourth_order", {}),
+        ("implicit_midpoint", {"tolerance": 1e-4, "duration": 1.0}),
+        ("energy_momentum", {"tolerance": 1e-4, "duration": 1.0}),
+        ("backward_euler", {"tolerance": 1e-2, "duration": 1.0}),
+    ],
+)
+def test_wrenches_are_means_over_all_parts_of_a_time_step(integrator, options, stiffness):
+    """By them momenta grow, of fourth-order steps and of those that error control cuts."""
+    scene = rods.weightless()
+    rod = rods.straight(scene, 11, stiffness=rods.stiffness(stretch=1e3), normal=(0, 0, 1))
+    simulation = scene.build(
+        integrator=integrator, time_step=0.02, step_tolerance=1e-13, force_tolerance=1e-13, **options
+    )
+    hand = simulation.grasp(rod, 0.2, 0.2, stiffness=stiffness)
+    turn = rods.rotation((1.0, 2.0, -1.0), 0.5) if stiffness else None  # what is turned itself has moments of 2nd order
+    hand.move((0.3, 0.1, 0.2), turn, over=0.2)
+    pieces = simulation.statistics.steps
+    for _ in range(10):
+        before = simulation.momentum()
+        simulation.step()
+        after, wrench = simulation.momentum(), simulation.wrench(hand, about=(0.0, 0.0, 0.0))
+        np.testing.assert_allclose(after.linear - before.linear, 0.02 * wrench.force, atol=1e-11)
+        if integrator != "backward_euler":  # which does not keep angular momentum
+            np.testing.assert_allclose(after.angular - before.angular, 0.02 * wrench.moment, atol=1e-11)
+    assert integrator == "fourth_order" or simulation.statistics.steps > pieces + 20

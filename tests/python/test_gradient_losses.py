@@ -148,6 +148,35 @@ def test_gradient_of_the_read_outs_of_a_run_is_that_of_differences(integrator, v
         assert np.sum(gradient * along) == pytest.approx((4.0 * near - wide) / 3.0, rel=2e-6, abs=1e-9), unknown
 
 
+@pytest.mark.parametrize("integrator", ["backward_euler", "implicit_midpoint"])
+def test_gradient_of_reactions_is_that_of_their_means_over_a_time_step_that_was_cut(integrator):
+    random = np.random.default_rng(17)
+    drawn = Drawn(planar=False, joint=False, integrator=integrator, time_step=0.02, tolerance=1e-2, duration=1.0)
+    sim, wall = drawn.simulation, drawn.wall
+    start, steps = sim.snapshot(), sim.statistics.steps
+    weights = random.normal(size=(2, 4, 3))
+    weights[:, 0] = 0.0
+    extras = {"force": lambda s: s.reaction(wall).force, "moment": lambda s: s.reaction(wall).moment}
+
+    def run(**options):
+        return sim.run(0.06, record_every=0.02, progress=False, record=extras, **options)
+
+    def of():
+        record = run()
+        return float((weights[0] * record["force"]).sum() + (weights[1] * record["moment"]).sum())
+
+    record = run(differentiable=True)
+    assert sim.statistics.steps > steps + 30
+    sim.restore(start)
+    # by what hardly changes where steps are cut
+    cases = [case for case in settings(drawn, random) if case[0][1] in ("youngs_modulus", "natural_twist", "force")]
+    assert len(cases) == 3
+    by = {"reaction_forces": {wall: weights[0]}, "reaction_moments": {wall: weights[1]}}
+    gradients = record.gradient(by, [unknown for unknown, *_ in cases])
+    for gradient, (unknown, along, change, size) in zip(gradients, cases, strict=True):
+        assert np.sum(gradient * along) == pytest.approx(difference(sim, of, change, 0.1 * size), rel=1e-5), unknown
+
+
 def test_the_jacobian_of_a_read_out_has_the_rows_of_its_gradients():
     random = np.random.default_rng(15)
     drawn = Drawn(planar=False, joint=True, integrator="static")

@@ -164,10 +164,9 @@ class Measurements:
     def reaction(self, support: Support | NodeHandle | str) -> Reaction:
         """Force and moment of a support on the rod.
 
-        In motion, the mean of the last step, or of its last part where it was cut (`statistics.steps` counts parts):
-        with all other forces, that by which momentum grew in that time; of "fourth_order", that in the middle of the
-        step, which is off the mean by second order. Times the way and the turn of the step it is
-        what ``energy().work`` counts, to second order in the step. A support that starts or stops at full speed gives
+        In motion, the means over the last time step, of all its parts where it was cut (`statistics.steps` counts
+        parts): with all other forces, those by which momentum grew in that time. Times the way and the turn of a step
+        that was not cut they are what ``energy().work`` counts, to second order in the step. A support that starts or stops at full speed gives
         what it holds its speed by an impulse, which is part of the force of that step: its work is that times the mean
         of both speeds, half of what the way of the step would say.
 
@@ -188,7 +187,7 @@ class Measurements:
     def wrench(self, hand: Hand | str, about: npt.ArrayLike | None = None) -> Reaction:
         """Force and moment of a hand on the rod, of all that it holds as one.
 
-        In motion, those of the last step: midpoint steps have them in their middle. Together with gravity and other
+        In motion, the means over the last time step, of all its parts where it was cut. Together with gravity and other
         forces they are by what momentum and angular momentum grew.
 
         Parameters
