@@ -12,6 +12,7 @@ from withe.batch.lanes import Lanes
 from withe.batch.reading import Reading
 from withe.batch.setting import Setting
 from withe.common import validation
+from withe.common.keywords import keyword_hints
 from withe.errors import ConvergenceError
 from withe.simulation.functions import force_function, step_callback
 from withe.simulation.hands import forget_left_rings
@@ -26,6 +27,7 @@ __all__ = ["Batch"]
 _MAX_STEPS = 2**31 - 1
 
 
+@keyword_hints
 class Batch(Setting, Reading):
     """Many simulations of one shape, stepped in one call over threads, and read out into one array.
 

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from withe.batch.lanes import IntArray, Lanes, row
 from withe.common import validation
+from withe.common.keywords import keyword_hints
 from withe.parts.handles import NodeHandle, Obstacle, Rod, Support
 
 __all__ = ["Setting"]
@@ -17,6 +18,7 @@ __all__ = ["Setting"]
 FloatArray = npt.NDArray[np.float64]
 
 
+@keyword_hints
 class Setting:
     """Methods of `Batch` that actuate and set. `lanes` says which simulations: a mask of all, or numbers."""
 

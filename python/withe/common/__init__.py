@@ -1,1 +1,1 @@
-"""What every folder uses: checks of user input, geometry of polylines, recorded frames, on-demand packages, the bar."""
+"""What every folder uses: checks of user input, hints, geometry of polylines, recorded frames, extras, the bar."""

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
+from withe.common.keywords import keyword_hints
 from withe.parts.directory import Directory
 from withe.parts.handles import Load, NodeHandle, Rod
 from withe.parts.kinds import LoadKind, LoadPart, Pass, RodPart
@@ -35,6 +36,7 @@ class Bearer(Protocol):
         """Let a load act from now on."""
 
 
+@keyword_hints
 class AppliedLoads(ABC):
     """Methods of `Scene` and of `Simulation` that put loads on what `_bearer` is."""
 

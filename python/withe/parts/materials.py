@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
+from withe.common.keywords import keyword_hints
 from withe.parts.sections import Circle, Rectangle, Section, Tube
 
 __all__ = ["Circle", "Material", "Rectangle", "Section", "Stiffness", "Tube"]
@@ -15,6 +16,7 @@ __all__ = ["Circle", "Material", "Rectangle", "Section", "Stiffness", "Tube"]
 FloatArray = npt.NDArray[np.float64]
 
 
+@keyword_hints
 @dataclass(frozen=True, kw_only=True)
 class Material:
     """A linear elastic, Kelvin-Voigt viscous material.
@@ -67,6 +69,7 @@ def check_poisson_ratio(value: float, what: str) -> float:
     return ratio
 
 
+@keyword_hints
 @dataclass(frozen=True, kw_only=True)
 class Stiffness:
     """Stiffnesses of a rod given directly, instead of by a material.

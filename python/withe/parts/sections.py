@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
+from withe.common.keywords import keyword_hints
 
 __all__ = ["Circle", "Rectangle", "Section", "SectionProperties", "Tube"]
 
@@ -51,6 +52,7 @@ class SectionProperties:
         return np.stack([self.moment1, self.moment2], axis=1)
 
 
+@keyword_hints
 @dataclass(frozen=True)
 class Circle:
     """A full circle.
@@ -69,6 +71,7 @@ class Circle:
         return SectionProperties(math.pi * r**2, moment, moment.copy(), 2.0 * moment, r)
 
 
+@keyword_hints
 @dataclass(frozen=True)
 class Tube:
     """A circle with a round hole in its middle.
@@ -94,6 +97,7 @@ class Tube:
         return SectionProperties(math.pi * (outer**2 - inner**2), moment, moment.copy(), 2.0 * moment, outer)
 
 
+@keyword_hints
 @dataclass(frozen=True)
 class Rectangle:
     """A full rectangle, with its width along the first director and its height along the second.

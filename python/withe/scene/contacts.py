@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
+from withe.common.keywords import keyword_hints
 from withe.parts.contacts import Body, make_obstacle, pair_friction, pair_of
 from withe.parts.directory import Directory
 from withe.parts.friction import Coefficients, Friction
@@ -23,6 +24,7 @@ from withe.parts.kinds import ContactModel, FrictionModel, Overlap, PairSettings
 __all__ = ["Contacts"]
 
 
+@keyword_hints
 class Contacts:
     """Obstacles, contact of rods, and friction of a scene: methods of `Scene` that need its parts alone."""
 

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
+from withe.common.keywords import keyword_hints
 from withe.parts.directory import Directory
 from withe.parts.fluid import make_fluid
 from withe.parts.handles import CustomForce, Drag, Fluid, Mass, NodeHandle, Rod, Spring
@@ -20,6 +21,7 @@ __all__ = ["Loads"]
 FloatArray = npt.NDArray[np.float64]
 
 
+@keyword_hints
 class Loads:
     """Masses, springs, drag, custom forces and the fluid of a scene: methods of `Scene` that need its parts alone."""
 

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from withe.batch import Batch
 from withe.common import validation
+from withe.common.keywords import keyword_hints
 from withe.parts.applied_loads import AppliedLoads, Bearer
 from withe.parts.directory import Directory
 from withe.parts.handles import Joint, Load, NodeHandle, Rod, RodPlace
@@ -28,6 +29,7 @@ __all__ = ["Scene"]
 FloatArray = npt.NDArray[np.float64]
 
 
+@keyword_hints
 class Scene(AppliedLoads, Loads, Contacts, Supports):
     """A description of rods, joints, supports and loads, from which simulations are built.
 

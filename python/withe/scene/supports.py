@@ -6,6 +6,7 @@ from typing import Any, Literal, cast
 
 import numpy.typing as npt
 
+from withe.common.keywords import keyword_hints
 from withe.parts.directory import Directory
 from withe.parts.handles import Hand, NodeHandle, Rod, Support
 from withe.parts.hands import Sliding, make_hand
@@ -15,6 +16,7 @@ from withe.parts.supports import check_not_held, make_clamp, make_pin
 __all__ = ["Supports"]
 
 
+@keyword_hints
 class Supports:
     """Clamps, pins and hands of a scene: methods of `Scene` that need its parts alone."""
 

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
+from withe.common.keywords import keyword_hints
 from withe.parts.handles import CustomForce, Load, Rod, Support
 from withe.parts.rods import curvature_array, curvature_given, stretch_array, twist_array
 from withe.simulation.functions import check_jacobian
@@ -18,6 +19,7 @@ from withe.simulation.session import Session
 __all__ = ["Control"]
 
 
+@keyword_hints
 class Control:
     """Methods of `Simulation` that actuate and set; what they do is done by functions of the session."""
 

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
+from withe.common.keywords import keyword_hints
 from withe.parts.handles import Hand, Handle
 from withe.parts.kinds import Grasp
 from withe.simulation.motion import PathLike, RotationLike
@@ -89,6 +90,7 @@ class Passage(NamedTuple):
     feed_rate: float | None
 
 
+@keyword_hints
 @dataclass(frozen=True)
 class RunningHand(Hand):
     """A hand of a simulation, as `Simulation.grasp` returns it: its handle, which acts on that simulation.

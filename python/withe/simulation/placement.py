@@ -6,6 +6,7 @@ from typing import Any, Literal
 
 import numpy.typing as npt
 
+from withe.common.keywords import keyword_hints
 from withe.parts.friction import Friction
 from withe.parts.handles import NodeHandle, Obstacle, Rod, Support
 from withe.parts.hands import Sliding, make_hand
@@ -22,6 +23,7 @@ from withe.simulation.surfaces import set_pair_friction, set_pair_restitution, s
 __all__ = ["Placement"]
 
 
+@keyword_hints
 class Placement:
     """Methods of `Simulation` that hold, move and place; what they do is done by functions of the session."""
 

@@ -11,6 +11,7 @@ from typing import Any, Literal
 import numpy.typing as npt
 
 from withe.common import validation
+from withe.common.keywords import keyword_hints
 from withe.common.progress import progress as progress_bar
 from withe.recording.record import Record
 from withe.simulation.loop import Run
@@ -20,6 +21,7 @@ from withe.simulation.simulation import Simulation
 __all__ = ["listed_simulations", "run_many", "thread_count"]
 
 
+@keyword_hints
 def run_many(
     simulations: Iterable[Simulation],
     duration: float,

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
+from withe.common.keywords import keyword_hints
 from withe.common.progress import progress as progress_bar
 from withe.parts.applied_loads import AppliedLoads
 from withe.parts.directory import Directory
@@ -42,6 +43,7 @@ FloatArray = npt.NDArray[np.float64]
 _MAX_STEPS = 2**31 - 1
 
 
+@keyword_hints
 class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
     """A scene while it runs. Made by `Scene.build`.
 

@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from withe.common.extras import require
 from withe.common.frames import Frames
+from withe.common.keywords import keyword_hints
 from withe.common.outlines import ObstacleOutline
 from withe.view import scenery
 
@@ -17,6 +18,7 @@ __all__ = ["plot"]
 FloatArray = npt.NDArray[np.float64]
 
 
+@keyword_hints
 def plot(record: Frames, *, shapes: int = 6) -> Any:
     """Draw the shapes of the rods at several times, and the energies over time.
 

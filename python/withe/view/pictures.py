@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from withe.common.extras import require
 from withe.common.frames import Frames
+from withe.common.keywords import keyword_hints
 from withe.common.progress import progress as progress_bar
 from withe.io import written_beside
 from withe.view.colors import ColorBy
@@ -24,6 +25,7 @@ __all__ = ["animate", "picture", "view"]
 FloatArray = npt.NDArray[np.float64]
 
 
+@keyword_hints
 def picture(
     record: Frames,
     path: str | os.PathLike[str],
@@ -95,6 +97,7 @@ def picture(
     return path
 
 
+@keyword_hints
 def animate(
     record: Frames,
     path: str | os.PathLike[str],
@@ -163,6 +166,7 @@ def animate(
     return path
 
 
+@keyword_hints
 def view(
     record: Frames,
     *,

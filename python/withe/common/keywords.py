@@ -1,0 +1,174 @@
+"""Words that a call does not know: what the user may have meant, from the words of other packages and near misses."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Iterable
+from difflib import get_close_matches
+from functools import wraps
+from types import FunctionType
+from typing import Any, TypeVar
+
+__all__ = ["keyword_hints"]
+
+T = TypeVar("T", bound=Callable[..., Any])
+
+# What other packages (PyElastica, DisMech, MuJoCo), textbooks and habit call what our words name; those count that the
+# function called has.
+_ELSEWHERE: dict[str, tuple[str, ...]] = {
+    "dt": ("time_step",),
+    "h": ("time_step", "height"),
+    "timestep": ("time_step",),
+    "step_size": ("time_step",),
+    "method": ("integrator",),
+    "stepper": ("integrator",),
+    "timestepper": ("integrator",),
+    "max_iter": ("max_iterations",),
+    "maxiter": ("max_iterations",),
+    "iterations": ("max_iterations",),
+    "tol": ("step_tolerance", "force_tolerance", "tolerance"),
+    "dtol": ("step_tolerance",),
+    "ftol": ("force_tolerance",),
+    "two_d_sim": ("planar",),
+    "two_d": ("planar",),
+    "t": ("duration",),
+    "T": ("duration",),
+    "time": ("duration",),
+    "t_end": ("duration",),
+    "t_final": ("duration",),
+    "final_time": ("duration",),
+    "sim_time": ("duration",),
+    "total_time": ("duration",),
+    "callback": ("before_step",),
+    "log_step": ("record_every",),
+    "save_every": ("record_every",),
+    "step_skip": ("record_every",),
+    "n": ("nodes", "count"),
+    "steps": ("count",),
+    "n_steps": ("count",),
+    "n_nodes": ("nodes",),
+    "num_nodes": ("nodes",),
+    "vertices": ("points", "nodes"),
+    "centerline": ("points",),
+    "centreline": ("points",),
+    "base_length": ("end",),
+    "length": ("end",),
+    "direction": ("end", "normal"),
+    "r": ("radius",),
+    "base_radius": ("radius",),
+    "rod_radius": ("radius",),
+    "outer": ("outer_radius",),
+    "inner": ("inner_radius",),
+    "E": ("youngs_modulus", "material"),
+    "young": ("youngs_modulus", "material"),
+    "young_modulus": ("youngs_modulus", "material"),
+    "youngs_modulus": ("material",),
+    "nu": ("poisson_ratio", "material"),
+    "poissons_ratio": ("poisson_ratio", "material"),
+    "poisson_ratio": ("material",),
+    "rho": ("density", "material"),
+    "density": ("material",),
+    "eta": ("viscosity", "material"),
+    "damping": ("viscosity", "material"),
+    "damping_constant": ("viscosity", "material"),
+    "viscosity": ("material",),
+    "EA": ("stretch", "stiffness"),
+    "EI": ("bend", "stiffness"),
+    "GJ": ("twist", "stiffness"),
+    "kappa": ("natural_curvature",),
+    "rest_kappa": ("natural_curvature",),
+    "rest_curvature": ("natural_curvature",),
+    "rest_twist": ("natural_twist",),
+    "mu": ("friction",),
+    "friction_coefficient": ("friction",),
+    "k": ("stiffness",),
+    "g": ("gravity",),
+    "gravity_vector": ("gravity",),
+    "pos": ("position",),
+    "quat": ("rotation", "path"),
+    "orientation": ("rotation",),
+    "F": ("force",),
+    "M": ("moment",),
+    "torque": ("moment",),
+    "duration": ("over",),
+    "filename": ("path",),
+    "frames": ("shapes",),
+}
+# Words for numbers that ours count otherwise, and how to come from one to the other.
+_COUNTED_OTHERWISE: dict[str, tuple[str, str]] = {
+    "G": ("poisson_ratio", "poisson_ratio= with youngs_modulus=, where G = E / (2 (1 + nu))"),
+    "shear_modulus": ("poisson_ratio", "poisson_ratio= with youngs_modulus=, where G = E / (2 (1 + nu))"),
+    "diameter": ("radius", "radius=, half of it"),
+    "elements": ("nodes", "nodes=, which are one more"),
+    "edges": ("nodes", "nodes=, which are one more"),
+    "n_elem": ("nodes", "nodes=, which are one more"),
+    "n_elements": ("nodes", "nodes=, which are one more"),
+    "n_segments": ("nodes", "nodes=, which are one more"),
+    "num_elements": ("nodes", "nodes=, which are one more"),
+}
+
+
+def keyword_hints(target: T) -> T:
+    """Let a function, or a class in its constructor and public methods, say what an unknown keyword may have meant.
+
+    What a call costs grows by one more call and nothing else: signatures are looked at only after Python has refused
+    the arguments. What the function itself raises, TypeErrors too, passes through.
+
+    Parameters
+    ----------
+    target : function or class
+        A decorated function keeps its signature and docstring; of a class the functions defined in it do.
+
+    Examples
+    --------
+    >>> @keyword_hints
+    ... def simulate(time_step): ...
+    >>> simulate(dt=0.01)
+    Traceback (most recent call last):
+    TypeError: simulate() has no keyword 'dt'; did you mean time_step=?
+    """
+    if not isinstance(target, type):
+        hinted: T = _hinted(target, target.__name__)
+        return hinted
+    for name, function in list(vars(target).items()):
+        if isinstance(function, FunctionType) and (name == "__init__" or not name.startswith("_")):
+            setattr(target, name, _hinted(function, target.__name__ if name == "__init__" else name))
+    return target
+
+
+def _hinted(function: Callable[..., Any], name: str) -> Any:
+    @wraps(function)
+    def call(*arguments: Any, **keywords: Any) -> Any:
+        try:
+            return function(*arguments, **keywords)
+        except TypeError as error:
+            # What has no frame below this one comes from Python, which found no place for an argument.
+            if error.__traceback__ is None or error.__traceback__.tb_next is not None:
+                raise
+            message = _explained(function, name, keywords)
+            if message is None:
+                raise
+        raise TypeError(message)
+
+    return call
+
+
+def _explained(function: Callable[..., Any], name: str, keywords: Iterable[str]) -> str | None:
+    """What is wrong with the keywords of a call; None where nothing is."""
+    parameters = inspect.signature(function).parameters.values()
+    if any(parameter.kind is parameter.VAR_KEYWORD for parameter in parameters):
+        return None
+    named = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
+    known = [each.name for each in parameters if each.kind in named and each.name != "self"]
+    unknown = [word for word in keywords if word not in known]
+    return "\n".join(f"{name}() has no keyword {word!r}; {_meant(word, known)}" for word in unknown) or None
+
+
+def _meant(word: str, known: list[str]) -> str:
+    """What may have been meant by a word, as the end of a sentence; else all that there is."""
+    if word in _COUNTED_OTHERWISE and _COUNTED_OTHERWISE[word][0] in known:
+        return f"did you mean {_COUNTED_OTHERWISE[word][1]}?"
+    near = [ours for ours in _ELSEWHERE.get(word, ()) if ours in known] or get_close_matches(word.lower(), known, 1)
+    if near:
+        return f"did you mean {' or '.join(f'{ours}=' for ours in near)}?"
+    return f"it has {', '.join(f'{ours}=' for ours in known) or 'none'}"

@@ -1,0 +1,107 @@
+"""Keywords that a call does not have are refused with what the user may have meant; what is right is left alone."""
+
+import inspect
+
+import pytest
+
+import withe
+from simple_scenes import RUBBER, cantilever
+from withe.common import keywords
+from withe.common.keywords import keyword_hints
+
+ENDS = {"start": (0, 0, 0), "end": (1, 0, 0), "radius": 0.01}
+WRONG = [
+    (lambda s, m: s.build(dt=0.01), "build() has no keyword 'dt'; did you mean time_step=?"),
+    (lambda s, m: s.build(time_stp=0.01), "build() has no keyword 'time_stp'; did you mean time_step=?"),
+    (lambda s, m: s.build_batch(2, dt=0.01), "build() has no keyword 'dt'; did you mean time_step=?"),
+    (
+        lambda s, m: s.build(tol=1e-6),
+        "build() has no keyword 'tol'; did you mean step_tolerance= or force_tolerance= or tolerance=?",
+    ),
+    (
+        lambda s, m: s.add_rod(**ENDS, material=RUBBER, n_elements=20),
+        "add_rod() has no keyword 'n_elements'; did you mean nodes=, which are one more?",
+    ),
+    (
+        lambda s, m: s.add_rod(**ENDS, material=RUBBER, n_nodes=20),
+        "add_rod() has no keyword 'n_nodes'; did you mean nodes=?",
+    ),
+    (lambda s, m: s.add_rod(**ENDS, nodes=5, E=1e6), "add_rod() has no keyword 'E'; did you mean material=?"),
+    (lambda s, m: s.add_rod(diameter=0.1), "add_rod() has no keyword 'diameter'; did you mean radius=, half of it?"),
+    (lambda s, m: s.add_floor(0.0, mu=0.3), "add_floor() has no keyword 'mu'; did you mean friction=?"),
+    (lambda s, m: s.clamp("arm.end", nme="x"), "clamp() has no keyword 'nme'; did you mean name=?"),
+    (
+        lambda s, m: s.add_force("arm.end", F=(0, 0, 1)),
+        "add_force() has no keyword 'F'; did you mean force=?",
+    ),
+    (lambda s, m: withe.Scene(g=9.81), "Scene() has no keyword 'g'; did you mean gravity=?"),
+    (
+        lambda s, m: withe.Material(E=1e6, rho=1000.0),
+        "Material() has no keyword 'E'; did you mean youngs_modulus=?\n"
+        "Material() has no keyword 'rho'; did you mean density=?",
+    ),
+    (lambda s, m: withe.Material(nu=0.5), "Material() has no keyword 'nu'; did you mean poisson_ratio=?"),
+    (lambda s, m: withe.Circle(r=0.5), "Circle() has no keyword 'r'; did you mean radius=?"),
+    (lambda s, m: m.run(t=1), "run() has no keyword 't'; did you mean duration=?"),
+    (lambda s, m: m.step(n=10), "step() has no keyword 'n'; did you mean count=?"),
+    (lambda s, m: m.move("wall", pos=(0, 0, 0)), "move() has no keyword 'pos'; did you mean position=?"),
+    (lambda s, m: m.plot(foo=3), "plot() has no keyword 'foo'; it has record=, shapes="),
+]
+
+
+@pytest.mark.parametrize("case", range(len(WRONG)))
+def test_an_unknown_keyword_is_refused_with_what_may_have_been_meant(case):
+    call, message = WRONG[case]
+    scene, _, simulation = cantilever()
+    with pytest.raises(TypeError) as error:
+        call(scene, simulation)
+    assert str(error.value) == message
+
+
+def test_type_errors_of_the_function_itself_pass_through():
+    @keyword_hints
+    def outer(time_step=1.0):
+        return inner(dt=time_step)
+
+    def inner(time_step):
+        return time_step
+
+    with pytest.raises(TypeError, match=r"inner\(\) got an unexpected keyword argument 'dt'"):
+        outer()
+    _, _, simulation = cantilever()
+    with pytest.raises(TypeError, match="broken on purpose"):
+        simulation.run(0.01, before_step=broken, progress=False)
+
+
+def broken(simulation):
+    raise TypeError("broken on purpose")
+
+
+def test_arguments_that_are_missing_or_given_twice_are_told_by_python():
+    scene, _, simulation = cantilever()
+    with pytest.raises(TypeError, match="missing 1 required positional argument: 'duration'"):
+        simulation.run()
+    with pytest.raises(TypeError, match="missing 1 required positional argument: 'n'"):
+        scene.build_batch(time_step=0.01)
+    with pytest.raises(TypeError, match="multiple values for argument 'duration'"):
+        simulation.run(1.0, duration=2.0)
+
+
+def test_signatures_and_docstrings_stay_in_view():
+    assert "time_step" in inspect.signature(withe.Scene.build).parameters
+    assert next(iter(inspect.signature(withe.Material).parameters)) == "youngs_modulus"
+    assert withe.Simulation.run.__doc__.startswith("Advance by a duration")
+    assert withe.Scene.add_rod.__module__ == "withe.scene.scene"
+
+
+def test_words_of_other_packages_lead_to_words_that_there_are():
+    owners = [
+        *(withe.Scene, withe.Simulation, withe.Batch, withe.Material, withe.Stiffness),
+        *(withe.Circle, withe.Tube, withe.Rectangle),
+    ]
+    calls = [withe.view.plot, withe.view.picture, withe.view.animate]
+    calls += [each for owner in owners for _, each in inspect.getmembers(owner, inspect.isfunction)]
+    there = {word for call in calls for word in inspect.signature(call).parameters}
+    offered = {word for words in keywords._ELSEWHERE.values() for word in words}
+    offered |= {word for word, _ in keywords._COUNTED_OTHERWISE.values()}
+    assert offered - there == set()
