@@ -1,4 +1,4 @@
-"""Keywords that a call does not have are refused with what the user may have meant; what is right is left alone."""
+"""What a call does not take is refused with what the user may have meant; what is right is left alone."""
 
 import inspect
 
@@ -52,6 +52,46 @@ WRONG = [
 @pytest.mark.parametrize("case", range(len(WRONG)))
 def test_an_unknown_keyword_is_refused_with_what_may_have_been_meant(case):
     call, message = WRONG[case]
+    scene, _, simulation = cantilever()
+    with pytest.raises(TypeError) as error:
+        call(scene, simulation)
+    assert str(error.value) == message
+
+
+BY_POSITION = [
+    (
+        lambda s, m: s.add_rod((0, 0, 0), (1, 0, 0)),
+        "add_rod() takes no arguments by position, got 2: name them, as in add_rod(start=..., end=...)",
+    ),
+    (
+        lambda s, m: s.add_rod((0, 0, 0), (1, 0, 0), start=(0, 0, 0), nodes=5),
+        "add_rod() takes no arguments by position, got 2: name them, as in add_rod(end=..., points=...)",
+    ),
+    (
+        lambda s, m: s.build("static"),
+        "build() takes no arguments by position, got 1: name them, as in build(integrator=...)",
+    ),
+    (
+        lambda s, m: withe.Material(1e6, 0.5),
+        "Material() takes no arguments by position, got 2: name them, as in Material(youngs_modulus=..., "
+        "poisson_ratio=...)",
+    ),
+    (
+        lambda s, m: m.run(0.1, 0.01, False),
+        "run() takes 2 arguments by position, got 3: name the others, as in run(progress=...)",
+    ),
+    (
+        lambda s, m: m.clamp("arm.end", "edge"),
+        "clamp() takes 1 argument by position, got 2: name the others, as in clamp(hold=...)",
+    ),
+    (lambda s, m: m.step(1, 2), "Simulation.step() takes from 1 to 2 positional arguments but 3 were given"),
+    (lambda s, m: m.snapshot(3), "Simulation.snapshot() takes 1 positional argument but 2 were given"),
+]
+
+
+@pytest.mark.parametrize("case", range(len(BY_POSITION)))
+def test_what_must_not_be_given_by_position_is_refused_with_how_to_name_it(case):
+    call, message = BY_POSITION[case]
     scene, _, simulation = cantilever()
     with pytest.raises(TypeError) as error:
         call(scene, simulation)

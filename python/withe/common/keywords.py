@@ -1,9 +1,12 @@
-"""Words that a call does not know: what the user may have meant, from the words of other packages and near misses."""
+"""Arguments that a call does not take: what the user may have meant.
+
+Words are compared with those of other packages and for near misses.
+"""
 
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection
 from difflib import get_close_matches
 from functools import wraps
 from types import FunctionType
@@ -111,8 +114,9 @@ _COUNTED_OTHERWISE: dict[str, tuple[str, str]] = {
 def keyword_hints(target: T) -> T:
     """Let a function, or a class in its constructor and public methods, say what an unknown keyword may have meant.
 
-    What a call costs grows by one more call and nothing else: signatures are looked at only after Python has refused
-    the arguments. What the function itself raises, TypeErrors too, passes through.
+    And by which names to give what was given by position and has no place there. What a call costs grows by one more
+    call and nothing else: signatures are looked at only after Python has refused the arguments. What the function
+    itself raises, TypeErrors too, passes through.
 
     Parameters
     ----------
@@ -145,7 +149,7 @@ def _hinted(function: Callable[..., Any], name: str) -> Any:
             # What has no frame below this one comes from Python, which found no place for an argument.
             if error.__traceback__ is None or error.__traceback__.tb_next is not None:
                 raise
-            message = _explained(function, name, keywords)
+            message = _explained(function, name, len(arguments), keywords)
             if message is None:
                 raise
         raise TypeError(message)
@@ -153,15 +157,27 @@ def _hinted(function: Callable[..., Any], name: str) -> Any:
     return call
 
 
-def _explained(function: Callable[..., Any], name: str, keywords: Iterable[str]) -> str | None:
-    """What is wrong with the keywords of a call; None where nothing is."""
-    parameters = inspect.signature(function).parameters.values()
-    if any(parameter.kind is parameter.VAR_KEYWORD for parameter in parameters):
+def _explained(function: Callable[..., Any], name: str, given: int, keywords: Collection[str]) -> str | None:
+    """What is wrong with the arguments of a call, `given` of them by position; None where Python says it best."""
+    parameters = list(inspect.signature(function).parameters.values())
+    kinds = [each.kind for each in parameters]
+    if inspect.Parameter.VAR_KEYWORD in kinds:
         return None
     named = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
     known = [each.name for each in parameters if each.kind in named and each.name != "self"]
     unknown = [word for word in keywords if word not in known]
-    return "\n".join(f"{name}() has no keyword {word!r}; {_meant(word, known)}" for word in unknown) or None
+    if unknown:
+        return "\n".join(f"{name}() has no keyword {word!r}; {_meant(word, known)}" for word in unknown)
+    by_name = [each.name for each in parameters if each.kind is each.KEYWORD_ONLY and each.name not in keywords]
+    places = len(parameters) - kinds.count(inspect.Parameter.KEYWORD_ONLY)
+    if given <= places or not by_name or inspect.Parameter.VAR_POSITIONAL in kinds:
+        return None
+    selves = sum(each.name == "self" for each in parameters)
+    example = ", ".join(f"{word}=..." for word in by_name[: given - places])
+    return (
+        f"{name}() takes {places - selves or 'no'} argument{'' if places - selves == 1 else 's'} by position, "
+        f"got {given - selves}: name {'the others' if places > selves else 'them'}, as in {name}({example})"
+    )
 
 
 def _meant(word: str, known: list[str]) -> str:
