@@ -45,6 +45,17 @@ RODS = [
     (lambda: rod(radius=1e200), "radius of rod 'arm' must be less than 1e+50 in size, got 1e+200"),
     (lambda: rod(radius=1e-200), "of rod 'arm' must be positive and finite"),
     (lambda: rod(radius=10**400), "radius of rod 'arm' must be finite"),
+    (
+        lambda: rod(end=(0.1, 0, 0), radius=5),
+        "radius of rod 'arm' must be no more than 10 times the length of the rod, 0.1 m, got 5 m: is all given in "
+        "metres?",
+    ),
+    (lambda: rod(radius=[0.1, 0.1, 10.1, 0.1]), "radius of rod 'arm' must be no more than 10 times the length of the"),
+    (lambda: rod(contact_radius=50), "contact_radius of rod 'arm' must be no more than 10 times the length of the rod"),
+    (
+        lambda: rod(radius=None, section=withe.Rectangle(width=200, height=40)),
+        "half the thickness of rod 'arm' must be no more than 10 times the length of the rod, 1 m, got 20 m",
+    ),
     (lambda: rod(radius=None), "rod 'arm' must have either a radius or a section"),
     (lambda: rod(section=withe.Circle(0.1)), "rod 'arm' must have either a radius or a section"),
     (lambda: rod(radius=None, section=3), "section of rod 'arm' must be a withe.Circle, withe.Tube or"),
@@ -111,6 +122,11 @@ def test_rods(case):
     act, message = RODS[case]
     with pytest.raises(ValueError, match=re.escape(message)):
         act()
+
+
+def test_a_stub_may_be_thicker_than_long_and_a_band_wider():
+    rod(radius=9.9)
+    rod(radius=None, section=withe.Rectangle(width=200, height=0.1))
 
 
 MATERIALS = [

@@ -21,6 +21,7 @@ FloatArray = npt.NDArray[np.float64]
 Natural = Literal["as_built", "straight"]
 
 _MAX_NODES = 10_000_000
+_THICKEST = 10.0  # radius over length; stubs to which others are joined are thicker than long
 
 
 def make_rod(
@@ -59,8 +60,10 @@ def make_rod(
     directors = _directors(normal, tangents, owner)
     properties = _section(radius, section, len(lengths), owner)
     touching = properties.touching
+    _check_thickness(touching, lengths, "radius" if section is None else "half the thickness", owner)
     if contact_radius is not None:
         touching = validation.per_item(contact_radius, f"contact_radius of {owner}", len(lengths), "edges")
+        _check_thickness(touching, lengths, "contact_radius", owner)
     parameters = _parameters(material, stiffness, line_density, properties, owner)
 
     validation.choice(natural, f"natural of {owner}", get_args(Natural))
@@ -217,6 +220,16 @@ def _section(radius: npt.ArrayLike | None, section: Section | None, edges: int, 
         raise ValueError(f"{owner} must have either a radius or a section")
     with np.errstate(over="ignore", under="ignore"):
         return shape.properties(edges, owner)
+
+
+def _check_thickness(radii: FloatArray, lengths: FloatArray, what: str, owner: str) -> None:
+    """Refuse a rod that is far thicker than long: millimetres, as a rule, where metres were expected."""
+    thick, length = float(radii.max()), float(lengths.sum())
+    if thick > _THICKEST * length:
+        raise ValueError(
+            f"{what} of {owner} must be no more than {_THICKEST:g} times the length of the rod, {length:g} m, "
+            f"got {thick:g} m: is all given in metres?"
+        )
 
 
 def _parameters(

@@ -123,7 +123,7 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
             First director of the first edge, which the others get by parallel transport, or of every
             edge; made normal to the edge. By default the first coordinate axis not close to the edge.
         radius : float or array_like of shape (edges,) [m]
-            Of a circular section.
+            Of a circular section; no more than ten times the length of the rod.
         section : Circle, Tube or Rectangle
             Section instead of a radius; a rectangle's width lies along the first director.
         contact_radius : float or array_like of shape (edges,) [m]
