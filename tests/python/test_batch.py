@@ -115,6 +115,49 @@ def test_supports_move_each_to_a_place_of_its_own():
     np.testing.assert_allclose(batch.positions("arm")[:, 0], places, atol=1e-12)
 
 
+@pytest.mark.parametrize("rolls", [0.7, [0.2, -0.4, 2.0, 7.0]])
+def test_supports_roll_as_those_of_single_simulations_do(rolls):
+    batch, singles = arms(), lone()
+    tangents = np.linspace((1, 0, 0.1), (1, 0.3, -0.2), LANES)
+    batch.move("wall", roll=rolls, over=0.05)
+    batch.move("wall", tangent=tangents[2:], over=0.03, lanes=[2, 3])
+    batch.step(3)
+    batch.move("wall", roll=0.1, over=0.1, lanes=[True, False, False, False])
+    batch.step(9)
+    for lane, (single, roll) in enumerate(zip(singles, np.broadcast_to(rolls, LANES), strict=True)):
+        single.move("wall", roll=float(roll), over=0.05)
+        if lane >= 2:
+            single.move("wall", tangent=tangents[lane], over=0.03)
+        single.step(3)
+        if lane == 0:
+            single.move("wall", roll=0.1, over=0.1)
+        single.step(9)
+        assert same_state(single, batch[lane])
+    frames = batch.directors("arm")[:, 0]
+    assert np.abs(frames[0] - frames[1:]).max(axis=(1, 2)).min() > 0.02  # each where it was told
+
+
+def test_obstacles_turn_each_by_a_roll_of_its_own():
+    def on_a_drum():
+        scene = withe.Scene()
+        scene.add_rod(start=(0, 0, 0), end=(0.2, 0, 0), nodes=9, radius=5e-3, material=RUBBER, name="arm")
+        scene.add_capsule((0.1, -0.1, -0.0251), (0.1, 0.1, -0.0251), 0.02, friction=0.5, name="drum")
+        scene.add_sphere((0.1, 0, 0.0251), 0.02, friction=0.5, name="ball")
+        return scene.build()
+
+    batch, singles = withe.Batch([on_a_drum() for _ in range(3)], workers=2), [on_a_drum() for _ in range(3)]
+    rolls, axes = [0.0, 1.0, -2.0], [(0, 1, 0), (0, 1, 0.1), (0.2, 1, 0)]
+    batch.move("drum", roll=rolls, over=0.1)
+    batch.move("ball", roll=-1.0, tangent=axes, over=0.1)
+    batch.step(10)
+    for single, other, roll, axis in zip(singles, batch, rolls, axes, strict=True):
+        single.move("drum", roll=roll, over=0.1)
+        single.move("ball", roll=-1.0, tangent=axis, over=0.1)
+        single.step(10)
+        assert same_state(single, other)
+    assert np.ptp(batch.positions("arm")[:, :, 0].mean(axis=1)) > 1e-3
+
+
 def folded() -> np.ndarray:
     """Bends to and fro that no step of 5 ms reaches in 6 iterations."""
     return np.where(np.arange(9) % 2, 100.0, -100.0)[:, None] * np.ones(2)
@@ -293,6 +336,11 @@ BAD = [
     (lambda b: b.set_natural_stretch("arm", [1, 1, 0, 1]), "natural_stretch of rod 'arm' must be positive, got 0"),
     (lambda b: b.set("arm", youngs_modulus=[1e6]), "youngs_modulus must have a row for each of 4 simulations, got 1"),
     (lambda b: b.move("wall", [(0, 0, 0)]), "position must have shape (4, 3), got (1, 3)"),
+    (lambda b: b.move("wall", roll=[0.1, 0.2]), "roll must have shape (4,), got (2,)"),
+    (lambda b: b.move("wall", roll=[0.1, 0.2], lanes=[1, 2, 3]), "roll must have shape (3,), got (2,)"),
+    (lambda b: b.move("wall", roll=[0, 0, np.nan, 0]), "roll must be finite, got nan at [2]"),
+    (lambda b: b.move("wall", roll=4.0), "roll of support 'wall' must turn by at most half a turn in a time step"),
+    (lambda b: b.move("wall", tangent=(1, 0, 0)), "tangent must have shape (4, 3), got (3,)"),
     (lambda b: b.restore(b.snapshot()[:2]), "snapshots must be one for each of 4 simulations, got 2"),
     (lambda b: b.restore([1, 2, 3, 4]), "snapshots must be withe.Snapshot, got int at [0]"),
     (lambda b: b.__setitem__(0, 3), "simulation must be a withe.Simulation, got int"),

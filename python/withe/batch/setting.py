@@ -160,6 +160,8 @@ class Setting:
         position: npt.ArrayLike | None = None,
         rotation: npt.ArrayLike | None = None,
         *,
+        tangent: npt.ArrayLike | None = None,
+        roll: npt.ArrayLike | None = None,
         over: float = 0.0,
         lanes: npt.ArrayLike | None = None,
     ) -> None:
@@ -171,30 +173,38 @@ class Setting:
         position : array_like of shape (n, 3) [m]
         rotation : array_like of shape (n, 3, 3)
             Relative to the orientation as drawn.
+        tangent : array_like of shape (n, 3)
+            Where the rod is to point, instead; of a sphere, the axis about which it rolls.
+        roll : float or array_like of shape (n,) [rad]
+            A turn about the tangent, or of an obstacle about its axis; one number is for all simulations.
         over : float [s]
             Reached after so long, evenly; within the next step by default.
         lanes : array_like, optional
-            Which simulations; all by default. For paths, tangents and rolls move one: ``batch[i].move(...)``.
+            Which simulations; all by default. For paths move one: ``batch[i].move(..., path=path)``.
 
         Raises
         ------
         ValueError
-            See `Simulation.move`; or not a row for each simulation.
+            See `Simulation.move`; or not a row for each simulation. Simulations before the one that refuses move.
 
         Examples
         --------
         >>> batch = scene.build_batch(2)
-        >>> batch.move(arm.start, [(0, 0, 0.01), (0, 0, 0.02)], over=0.1)
+        >>> batch.move(arm.start, [(0, 0, 0.01), (0, 0, 0.02)], roll=[0.5, -0.5], over=0.1)
         """
         numbers = self._lanes.chosen(lanes)
         count = len(numbers)
         places = None if position is None else validation.number_array(position, "position", (count, 3))
         turns = None if rotation is None else validation.number_array(rotation, "rotation", (count, 3, 3))
+        tangents = None if tangent is None else validation.number_array(tangent, "tangent", (count, 3))
+        rolls = None if roll is None else validation.per_item(roll, "roll", count, "lanes", sign=True)
         for place, simulation in self._lanes.each(numbers):
             simulation.move(
                 support,
                 None if places is None else places[place],
                 None if turns is None else turns[place],
+                tangent=None if tangents is None else tangents[place],
+                roll=None if rolls is None else float(rolls[place]),
                 over=over,
             )
 
