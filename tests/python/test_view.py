@@ -75,6 +75,27 @@ def test_a_planar_motion_is_drawn_in_its_plane(record):
     np.testing.assert_allclose(axes.lines[0].get_ydata(), 1e3 * recorder.record.positions("arm")[0, :, 2])
 
 
+@pytest.mark.parametrize(("lift", "names"), [(0.0, ("x", "y")), (2e-3, ("x", "y", "z"))])
+def test_a_rod_that_lies_on_a_floor_is_drawn_from_above_and_one_that_is_lifted_in_space(lift, names):
+    """It sinks in by much less than it is thick, but by more than rounding."""
+    pytest.importorskip("matplotlib").use("Agg")
+    scene = withe.Scene()
+    rubber = withe.Material(youngs_modulus=1e6, density=1000.0, viscosity=2e3)
+    arm = scene.add_rod(start=(0, 0, 5e-3), end=(0.3, 0, 5e-3), nodes=31, radius=5e-3, material=rubber)
+    scene.add_floor(0.0, friction=0.3)
+    hand = scene.clamp(arm.start)
+    simulation = scene.build()
+    simulation.move(hand, position=(0, 0.05, 5e-3 + lift), over=0.1)
+    record = simulation.run(0.1, progress=False)
+    assert np.ptp(record.positions()[..., 2]) > 1e-5
+    axes = record.plot().axes[0]
+    labels = [getattr(axes, f"get_{axis}label")() for axis in "xyz" if hasattr(axes, f"get_{axis}label")]
+    assert labels == [f"{name} [mm]" for name in names]
+    if lift == 0.0:
+        assert axes.get_aspect() == 1.0
+        np.testing.assert_allclose(axes.lines[-1].get_ydata(), 1e3 * record.positions()[-1, :, 1])
+
+
 def test_the_present_state_is_one_frame_without_energies_over_time():
     pytest.importorskip("matplotlib").use("Agg")
     figure = present(CurlingSimulation(0.3)).plot()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy.typing as npt
 from withe.common.extras import require
 from withe.common.frames import Frames
 from withe.common.keywords import keyword_hints
-from withe.common.outlines import ObstacleOutline
+from withe.common.outlines import ObstacleOutline, RodOutline
 from withe.view import scenery
 
 __all__ = ["plot"]
@@ -34,7 +35,8 @@ def plot(record: Frames, *, shapes: int = 6) -> Any:
     Returns
     -------
     matplotlib.figure.Figure
-        In two dimensions where the motion stays in a coordinate plane, else in three.
+        In two dimensions where the motion stays in a coordinate plane, to a twentieth of the thickness of the thinnest
+        rod, else in three.
 
     Raises
     ------
@@ -81,6 +83,7 @@ _STYLE = {
     "lines.solid_capstyle": "round",
     "font.size": 10,
 }
+_UNSEEN = 0.05  # of a rod's thickness
 _OBSTACLE, _OBSTACLE_FILL = "#8a9299", "#d9dfe4"
 _ENERGY_COLOURS = {
     "kinetic": "#e76f51",
@@ -103,7 +106,7 @@ def _plot_shapes(figure: Any, place: Any, record: Frames, count: int) -> Any:
     frames = np.unique(np.linspace(0, len(record) - 1, count).round().astype(int))
     size = float(np.ptp(positions.reshape(-1, 3), axis=0).max())
     factor, prefix = _prefix(size, (1.0, 1e-3, 1e-6))
-    axes_shown = _plane(positions)
+    axes_shown = _plane(positions, _thinnest(record.rods))
     three = axes_shown is None
     shown = list(range(3)) if axes_shown is None else axes_shown
     axes = figure.add_subplot(place, projection="3d" if three else None)
@@ -258,11 +261,22 @@ def _prefix(largest: float, units: tuple[float, ...]) -> tuple[float, str]:
     return 1.0 / unit, prefixes[unit]
 
 
-def _plane(positions: FloatArray) -> list[int] | None:
-    """The two coordinates of a motion in a coordinate plane; None for any other."""
+def _plane(positions: FloatArray, thickness: float) -> list[int] | None:
+    """The two coordinates of a motion in a coordinate plane; None for any other.
+
+    What leaves the plane by far less than rods are thick cannot be seen: rods that lie on a floor sink in a little.
+    """
     extents = np.ptp(positions.reshape(-1, 3), axis=0)
     flat = extents <= 1e-6 * extents.max()
-    if not flat.any():
+    if flat.any():
+        missing = 1 if flat[1] else int(np.flatnonzero(flat)[0])
+    elif extents.min() <= _UNSEEN * thickness:
+        missing = int(extents.argmin())
+    else:
         return None
-    missing = 1 if flat[1] else int(np.flatnonzero(flat)[0])
     return [axis for axis in range(3) if axis != missing]
+
+
+def _thinnest(rods: Sequence[RodOutline]) -> float:
+    """Smallest thickness of any rod [m]."""
+    return min(float(rod.radii.min() * 2.0 if rod.widths is None else rod.widths.min()) for rod in rods)
