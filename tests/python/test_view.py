@@ -13,10 +13,10 @@ import pytest
 import withe
 from curling_motion import CurlingSimulation
 from withe.common.extras import require
-from withe.common.outlines import ObstacleOutline
+from withe.common.outlines import ObstacleOutline, RodOutline
 from withe.recording import Record
 from withe.recording.recorder import Recorder, present
-from withe.view import colors, figures, films, graphics, rendering, scenery
+from withe.view import colors, figures, films, ghosts, graphics, rendering, scenery
 
 
 @pytest.fixture
@@ -121,6 +121,48 @@ def test_frames_differ_and_the_last_is_the_default(record, renderer, tmp_path):
     )
     assert first != last
     assert last == default
+
+
+def test_only_what_has_moved_has_a_ghost(renderer, tmp_path):
+    scene = withe.Scene()
+    rubber = withe.Material(youngs_modulus=1e6, density=1000.0, viscosity=2e3)
+    arm = scene.add_rod(start=(0, 0, 0), end=(0.3, 0, 0), nodes=31, radius=8e-3, material=rubber)
+    post = scene.add_rod(start=(0, 0.1, 0), end=(0, 0.1, -0.3), nodes=31, radius=8e-3, material=rubber)
+    for end in (arm.start, post.start, post.end):
+        scene.clamp(end)
+    record = scene.build().run(0.1, 0.05, progress=False)
+    stage = rendering.Stage(record, size=(160, 120), frame=2, ghosts=(0, 1))
+    try:
+        assert len(stage._ghosts) == 2  # of the arm at both times
+        for frame, (points, shadows) in enumerate(stage._ghosts):
+            way = np.linalg.norm(record.positions(arm)[frame] - record.positions(arm)[2], axis=1)
+            first = int(np.flatnonzero(way > 0.1 * 8e-3)[0])
+            assert 0 < first < 20
+            assert points[shadows > 0.0][:, 0].min() == pytest.approx(0.01 * first, abs=0.01)
+    finally:
+        stage.close()
+    still = scene.build().run(0.005, progress=False)
+    plain, ghostly = (
+        still.picture(tmp_path / f"{len(others)}.png", ghosts=others, size=(160, 120)).read_bytes()
+        for others in ((), (1, 0))
+    )
+    assert plain == ghostly
+
+
+def test_a_rod_that_slides_along_itself_stands_out_where_it_was_not_before():
+    angle = np.linspace(0, 2 * np.pi, 24, endpoint=False)
+    ring = 0.1 * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    closed = RodOutline("ring", np.arange(24), True, np.full(24, 1e-2))
+    on_edges = 0.5 * (ring + np.roll(ring, -1, axis=0))
+    assert not ghosts.stands_out(closed, on_edges, [ring]).any()
+    assert ghosts.stands_out(closed, ring + np.array((0, 0, 1.1e-3)), [ring]).all()
+    assert not ghosts.stands_out(closed, ring + np.array((0, 0, 1.1e-3)), [ring, ring + np.array((0, 0, 1e-3))]).any()
+    line = np.outer(np.arange(11), (0.01, 0, 0))
+    widths = np.tile((0.05, 0.01), (10, 1))
+    band = RodOutline("band", np.arange(11), False, np.full(10, 0.025), widths)
+    assert ghosts.stands_out(band, line + np.array((0.034, 0, 0)), [line]).tolist() == [False] * 7 + [True] * 4
+    assert ghosts.stands_out(band, line + np.array((0, 0, 6e-4)), [line]).all()
+    assert not ghosts.stands_out(band, line + np.array((0, 0, 4e-4)), [line]).any()
 
 
 @pytest.mark.parametrize("color_by", ["tension", "curvature", "twist", "speed"])

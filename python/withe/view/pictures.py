@@ -51,7 +51,7 @@ def picture(
     frame : int
         Which frame; negative numbers count from the last one.
     ghosts : sequence of int
-        Other frames, drawn faintly.
+        Other frames, drawn faintly where rods have moved by more than a tenth of their radius since.
     size : pair of int [px]
     color_by : {"rod", "tension", "curvature", "twist", "speed"}
         One colour a rod, or the quantity with its scale, the same for all frames.
@@ -83,10 +83,16 @@ def picture(
     number = _frame(record, frame)
     others = [_frame(record, ghost) for ghost in ghosts]
     stage = Stage(
-        record, size=size, color_by=color_by, camera=camera, ground=ground, frames=[*others, number], ghosts=others
+        record,
+        size=size,
+        color_by=color_by,
+        camera=camera,
+        ground=ground,
+        frame=number,
+        frames=[*others, number],
+        ghosts=others,
     )
     try:
-        stage.show(number)
         if label:
             stage.label(label)
         pyplot_image = require("matplotlib.image", "view")

@@ -15,6 +15,7 @@ from withe.common.extras import require
 from withe.common.frames import Frames
 from withe.view import scenery
 from withe.view.colors import BARS, ColorBy, color_limits, nice_limits, nodal_values, rod_color
+from withe.view.ghosts import stands_out
 from withe.view.graphics import render_window
 from withe.view.pinhole import Pinhole, check_pinhole, look_through, towards
 from withe.view.springs import SpringLines
@@ -49,10 +50,12 @@ class Stage:
     camera : str, array_like of shape (3,) or Camera, optional
         From where to look: "front", "side", "top", "oblique" or a direction, or a camera of given pose and matrix. By
         default along the normal of a planar motion, and obliquely at any other.
+    frame : int
+        What is shown at first.
     frames : sequence of int, optional
         What the camera has in view; all frames by default.
     ghosts : sequence of int
-        Frames that stand behind the others, faintly, the first one most.
+        Frames that stand behind `frame`, faintly, the first one most: what of them is elsewhere than there.
     ground : float, optional [m]
         Height at which the shadow falls; by default a level plane near the rods, or a little below them.
     off_screen : bool
@@ -75,6 +78,7 @@ class Stage:
         size: Sequence[int] = (1280, 720),
         color_by: ColorBy = "rod",
         camera: Pinhole | str | npt.ArrayLike | None = None,
+        frame: int = 0,
         frames: Sequence[int] | None = None,
         ghosts: Sequence[int] = (),
         ground: float | None = None,
@@ -117,11 +121,13 @@ class Stage:
         self._add_shadow(pyvista)
         self._add_rods(pyvista, color_by)
         self._springs = SpringLines(pyvista, self.plotter, record, direction)
-        self._ghosts = [points for frame in ghosts for points in self._add_ghost(pyvista, frame, list(ghosts))]
+        self._ghosts: list[tuple[FloatArray, FloatArray]] = []
+        for place in range(len(ghosts)):
+            self._add_ghost(pyvista, [*ghosts, frame], place)
         if supersampling == 1:
             self.plotter.enable_anti_aliasing("ssaa")
         self._label: Any = None
-        self.show(0.0)
+        self.show(frame)
 
     def _read(self, record: Frames, color_by: ColorBy) -> None:
         """Motions, and the surfaces of rods."""
@@ -144,7 +150,7 @@ class Stage:
         before = min(int(frame), len(self.times) - 1)
         after = min(before + 1, len(self.times) - 1)
         share = frame - before
-        meshed = list(self._ghosts)
+        meshed = []
         self._obstacle_points = []
         for actor, places, surface in self._obstacles:
             way = self._mixed(places, before, after, share) - places[0]
@@ -326,22 +332,27 @@ class Stage:
             self._obstacles.append((actor, places, points))
             self._footprints_of_obstacles.append(np.full(len(points), area / len(points)))
 
-    def _add_ghost(self, pyvista: Any, frame: int, ghosts: list[int]) -> list[FloatArray]:
-        """Rods of one frame in pale colours, which do not move; returns the points of their surfaces."""
-        strength = 0.2 + 0.3 * ghosts.index(frame) / max(1, len(ghosts) - 1)
-        ghost = []
+    def _add_ghost(self, pyvista: Any, frames: list[int], place: int) -> None:
+        """Rods of one frame in pale colours, which do not move, where they stand out from what later frames show.
+
+        The points of their surfaces are kept, with the areas that cast shadows.
+        """
+        strength = 0.2 + 0.3 * place / max(1, len(frames) - 2)
         for index, rod in enumerate(self._record.rods):
-            surface = self._surfaces[index]
-            points, normals = surface.mesh(self._positions[frame, rod.rows], self._directors[index][frame])
-            mesh = _empty_mesh(pyvista, surface)
+            surface, pose = self._surfaces[index], self._positions[frames[place], rod.rows]
+            away = stands_out(rod, pose, [self._positions[frame, rod.rows] for frame in frames[place + 1 :]])
+            if not away.any():
+                continue
+            points, normals = surface.mesh(pose, self._directors[index][frames[place]])
+            there = surface.on_surface(away.astype(float)) > 0.5
+            mesh = _empty_mesh(pyvista, surface, surface.faces[there[surface.faces].all(axis=1)])
             mesh.points = points
             mesh.point_data["Normals"] = normals
             paint = rod_color(index) if self._values is None else np.array([0.5, 0.53, 0.56])
             pale = strength * paint + (1.0 - strength) * np.array([0.93, 0.94, 0.95])
             actor = self.plotter.add_mesh(mesh, color=pale, ambient=0.5, diffuse=0.6, reset_camera=False)
             actor.prop.interpolation = "Phong"
-            ghost.append(points)
-        return ghost
+            self._ghosts.append((points, there * self._footprints[index]))
 
     def _add_shadow(self, pyvista: Any) -> None:
         """A plane under the rods, clear where no shadow falls."""
@@ -359,8 +370,9 @@ class Stage:
 
         low, high = self._shadow_bounds
         shade = np.zeros((_SHADOW_CELLS, _SHADOW_CELLS))
-        footprints = self._footprints * (len(points) // len(self._footprints)) + self._footprints_of_obstacles
-        points = points + self._obstacle_points
+        ghosts = [points for points, _ in self._ghosts]
+        footprints = self._footprints + self._footprints_of_obstacles + [area for _, area in self._ghosts]
+        points = points + self._obstacle_points + ghosts
         heights = np.concatenate(points)[:, 2] - self._ground
         places = (np.concatenate(points)[:, :2] - low) / (high - low) * _SHADOW_CELLS
         weights = np.concatenate(footprints) / np.prod((high - low) / _SHADOW_CELLS)
@@ -379,8 +391,10 @@ class Stage:
         self._shadow.texture = texture
 
 
-def _empty_mesh(pyvista: Any, surface: Surface) -> Any:
-    faces = np.column_stack([np.full(len(surface.faces), 4), surface.faces])
+def _empty_mesh(pyvista: Any, surface: Surface, shown: npt.NDArray[np.int64] | None = None) -> Any:
+    """Points to be moved to their places, and faces between them, all or some."""
+    shown = surface.faces if shown is None else shown
+    faces = np.column_stack([np.full(len(shown), 4), shown])
     mesh = pyvista.PolyData(np.zeros((int(surface.faces.max()) + 1, 3)), faces.ravel())
     mesh.point_data.active_normals = np.zeros((mesh.n_points, 3))
     return mesh
